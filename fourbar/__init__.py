@@ -1,0 +1,35 @@
+"""Closed formulas of the planar four-bar linkage: from position to driving torque and pin forces."""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from fourbar.effects import Friction as Friction
+from fourbar.effects import Gravity as Gravity
+from fourbar.effects import Load as Load
+from fourbar.effects import Viscous as Viscous
+from fourbar.errors import FourBarError as FourBarError
+from fourbar.errors import InputError as InputError
+from fourbar.linkage import Bar as Bar
+from fourbar.linkage import FourBar as FourBar
+from fourbar.linkage import uniform as uniform
+from fourbar.scene import Free as Free
+from fourbar.scene import FromLimit as FromLimit
+from fourbar.scene import Motion as Motion
+from fourbar.scene import Scene as Scene
+from fourbar.scene import Sweep as Sweep
+from fourbar.scene import command as command
+from fourbar.scene import solve as solve
+from fourbar.solution import Solution as Solution
+
+__version__ = "0.1.0"
+
+if TYPE_CHECKING:
+    from fourbar.files import dump as dump
+    from fourbar.files import load as load
+
+
+def __getattr__(name: str) -> Any:
+    # the file edge needs a units library; it is loaded on first use, not by `import fourbar`
+    if name in ("load", "dump"):
+        return getattr(import_module("fourbar.files"), name)
+    raise AttributeError(f"module 'fourbar' has no attribute {name!r}")

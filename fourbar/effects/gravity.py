@@ -1,0 +1,60 @@
+"""Gravity: m g at the mass centre of every bar that has mass."""
+
+import math
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+from fourbar.effects.wrenches import Wrenches
+from fourbar.kinematics import Array, State, centre_in_bar
+from fourbar.linkage import MOVING_BARS, require
+
+
+@dataclass(frozen=True, slots=True)
+class Gravity:
+    """A uniform field of the given magnitude (m/s^2) and direction (rad, from +x, counter-clockwise)."""
+
+    magnitude: float = 9.81
+    angle: float = -math.pi / 2
+    key: ClassVar[str] = "gravity"
+    example: ClassVar[str] = 'gravity = ["9.81 m/s^2", "-90 deg"]'
+
+    def __post_init__(self) -> None:
+        require("effects.gravity", self.magnitude)
+        require("effects.gravity", self.angle)
+
+    @property
+    def vector(self) -> tuple[float, float]:
+        """(g_x, g_y), m/s^2."""
+        return (self.magnitude * math.cos(self.angle), self.magnitude * math.sin(self.angle))
+
+    @classmethod
+    def read(cls, value: object, reader: Any) -> "Gravity":
+        """From ``["9.81 m/s^2", "-90 deg"]``."""
+        return cls(*reader.polar("effects.gravity", value, "m/s^2"))
+
+    def write(self, writer: Any) -> Any:
+        """Back to the form of a scene file."""
+        return writer.polar(self.magnitude, self.angle, "m/s^2")
+
+    def add_wrenches(self, wrenches: Wrenches, state: State) -> None:
+        """F = m g at G."""
+        gx, gy = self.vector
+        for number in MOVING_BARS:
+            bar = state.linkage.bar(number)
+            if bar.mass != 0.0:
+                wrenches.add_force(number, (bar.mass * gx, bar.mass * gy), state.arm(number, *centre_in_bar(bar)))
+
+    def power(self, state: State) -> Array | float:
+        """P = sum of m g . v_G, W."""
+        gx, gy = self.vector
+        total: Array | float = 0.0
+        for number in MOVING_BARS:
+            bar = state.linkage.bar(number)
+            if bar.mass != 0.0:
+                vx, vy = state.velocity(number, *centre_in_bar(bar))
+                total = total + bar.mass * (gx * vx + gy * vy)
+        return total
+
+    def add_mjcf(self, model: Any) -> None:
+        """The option ``gravity``."""
+        model.option["gravity"] = (*self.vector, 0.0)

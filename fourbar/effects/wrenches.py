@@ -1,0 +1,43 @@
+"""What acts on each moving bar apart from its pins: a resultant force and a moment about its first pin."""
+
+from typing import Any
+
+import numpy as np
+
+from fourbar.kinematics import Array, State, Vector, cross
+
+
+class Wrenches:
+    """Sums of forces (N, world axes) and of moments (N m) about the first pin (O2, A, O4) of bars 2, 3, 4.
+
+    A bar on which nothing acts keeps the number 0.0: its term is never evaluated.
+    """
+
+    def __init__(self, state: State) -> None:
+        self.state = state
+        self.force_x: dict[int, Any] = {2: 0.0, 3: 0.0, 4: 0.0}
+        self.force_y: dict[int, Any] = {2: 0.0, 3: 0.0, 4: 0.0}
+        self.moments: dict[int, Any] = {2: 0.0, 3: 0.0, 4: 0.0}
+
+    def add_force(self, bar: int, force: Vector | tuple[float, float], arm: Vector) -> None:
+        """A force on a bar, applied at `arm` from the bar's first pin."""
+        self.force_x[bar] = self.force_x[bar] + force[0]
+        self.force_y[bar] = self.force_y[bar] + force[1]
+        self.moments[bar] = self.moments[bar] + cross(arm, force)  # type: ignore[arg-type]
+
+    def add_moment(self, bar: int, moment: Array | float) -> None:
+        """A pure couple on a bar; on the ground (bar 1) it does nothing."""
+        if bar != 1:
+            self.moments[bar] = self.moments[bar] + moment
+
+    def force(self, bar: int) -> Vector:
+        """Resultant on a bar, N."""
+        like = self.state.theta_2
+        return (
+            np.broadcast_to(np.asarray(self.force_x[bar], float), like.shape),
+            np.broadcast_to(np.asarray(self.force_y[bar], float), like.shape),
+        )
+
+    def moment(self, bar: int) -> Array:
+        """Resultant moment on a bar about its first pin, N m."""
+        return np.broadcast_to(np.asarray(self.moments[bar], float), self.state.theta_2.shape)

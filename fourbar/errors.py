@@ -1,0 +1,39 @@
+"""Errors: one root, one class per kind of mistake."""
+
+__all__ = ["DependencyError", "FourBarError", "InputError", "NotAssembledError"]
+
+
+class FourBarError(Exception):
+    """Root of every error that this package raises on purpose."""
+
+
+class InputError(FourBarError):
+    """The description is bad: names the key, its value and what is allowed.
+
+    Parameters
+    ----------
+    key : dotted name of the offending entry, for example ``"bars.input.mass"``.
+    value : what was given.
+    allowed : one phrase that says what would have been accepted.
+    file : the file it stands in, where there is one.
+    """
+
+    def __init__(self, key: str, value: object, allowed: str, file: str | None = None) -> None:
+        self.key, self.value, self.allowed, self.file = key, value, allowed, file
+        shown = repr(value)
+        if len(shown) > 80:
+            shown = shown[:77] + "..."
+        where = f"{file}: " if file else ""
+        super().__init__(f"{where}{key} = {shown}: {allowed}")
+
+    def in_file(self, file: str) -> "InputError":
+        """The same mistake, with the file it was found in."""
+        return InputError(self.key, self.value, self.allowed, file)
+
+
+class NotAssembledError(FourBarError):
+    """The linkage closes at none of the positions that were asked for."""
+
+
+class DependencyError(FourBarError):
+    """A library that the request needs is not installed."""

@@ -1,0 +1,100 @@
+"""Inverse dynamics (Newton-Euler): pin forces and the driving torque on bar 2, 3 or 4.
+
+F_ij is the force of bar i on bar j in world axes, T_k the pure couple that ground exerts on the
+driven bar k. The thirteen equations of the free bodies (Norton, ch. 11) are eliminated by hand to
+one 2x2 system whose determinant is the sine between the two bars that are not driven.
+"""
+
+from collections.abc import Iterable
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+from fourbar.effects.wrenches import Wrenches
+from fourbar.kinematics import Array, State, Vector, centre_in_bar, cross
+from fourbar.linkage import MOVING_BARS
+
+
+class Term(Protocol):
+    """Anything that acts on the moving bars."""
+
+    def add_wrenches(self, wrenches: Wrenches, state: State) -> None:
+        """Add forces and couples on the bars."""
+
+
+class PinForces(NamedTuple):
+    """Pin forces (N, world axes, components of shape (n,)), driving torque (N m) and its condition."""
+
+    F12: Vector
+    F32: Vector
+    F43: Vector
+    F14: Vector
+    torque: Array
+    drive_sine: Array
+    """sin(theta_4-theta_3), sin(theta_4-theta_2), sin(theta_3-theta_2) for the drive on bar 2, 3, 4."""
+
+
+def add_inertia(wrenches: Wrenches, state: State) -> None:
+    """d'Alembert: -m a_G at G and the couple -I alpha on every bar that has mass or inertia."""
+    for number in MOVING_BARS:
+        bar = state.linkage.bar(number)
+        if bar.mass != 0.0:
+            centre = centre_in_bar(bar)
+            ax, ay = state.acceleration(number, *centre)
+            wrenches.add_force(number, (-bar.mass * ax, -bar.mass * ay), state.arm(number, *centre))
+        if bar.inertia != 0.0:
+            wrenches.add_moment(number, -bar.inertia * state.alpha(number))  # type: ignore[operator]
+
+
+def between(m_u: Array, m_v: Array, u: Vector, v: Vector, sine: Array) -> Vector:
+    """The force F with u x F = m_u and v x F = m_v, for unit vectors with u x v = sine."""
+    return ((m_u * v[0] - m_v * u[0]) / sine, (m_u * v[1] - m_v * u[1]) / sine)
+
+
+def solve_pins(state: State, terms: Iterable[Term], drive_bar: int, *, inertia: bool = True) -> PinForces:
+    """Pin forces and driving torque for the terms that act.
+
+    The moments of the two bars that are not driven, about their outer pins, give the force
+    between them; sums of forces give the rest, and the moment of the driven bar the torque.
+
+    Parameters
+    ----------
+    state : positions, velocities and accelerations, (n,).
+    terms : loads and effects.
+    drive_bar : 2, 3 or 4.
+    inertia : False leaves out -m a and -I alpha (statics).
+    """
+    _, a, b, c = state.linkage.lengths
+    wrenches = Wrenches(state)
+    if inertia:
+        add_inertia(wrenches, state)
+    for term in terms:
+        term.add_wrenches(wrenches, state)
+    R2, R3, R4 = (wrenches.force(bar) for bar in MOVING_BARS)
+    M2, M3, M4 = (wrenches.moment(bar) for bar in MOVING_BARS)
+    u2, u3, u4 = state.u2, state.u3, state.u4
+    with np.errstate(divide="ignore", invalid="ignore"):
+        if drive_bar == 2:
+            sine = np.where(state.singular, np.nan, state.sin_mu)
+            F43 = between(-M3 / b, M4 / c, u3, u4, sine)
+            F32 = (R3[0] + F43[0], R3[1] + F43[1])
+            torque = -(M2 + a * cross(u2, F32))
+        elif drive_bar == 4:
+            sine = _usable(cross(u2, u3))
+            M3_about_B = M3 - b * cross(u3, R3)
+            F32 = between(-M2 / a, -M3_about_B / b, u2, u3, sine)
+            F43 = (F32[0] - R3[0], F32[1] - R3[1])
+            torque = c * cross(u4, F43) - M4
+        else:
+            sine = _usable(cross(u2, u4))
+            F43 = between(-M2 / a - cross(u2, R3), M4 / c, u2, u4, sine)
+            F32 = (R3[0] + F43[0], R3[1] + F43[1])
+            torque = -(M3 + b * cross(u3, F43))
+    F14 = (F43[0] - R4[0], F43[1] - R4[1])
+    F12 = (-R2[0] - F32[0], -R2[1] - F32[1])
+    return PinForces(F12, F32, F43, F14, torque, sine)
+
+
+def _usable(sine: Array) -> Array:
+    """NaN where the determinant is exactly zero: there no torque holds the linkage."""
+    return np.where(sine == 0.0, np.nan, sine)

@@ -1,0 +1,116 @@
+"""The description of a planar four-bar linkage: frozen, validated, computing nothing.
+
+Pins: O2 (origin; bars 1, 2), A (2, 3), B (3, 4), O4 (4, 1).
+Bars: 1 ground (length d), 2 input (a), 3 coupler (b), 4 output (c).
+"""
+
+import math
+from dataclasses import dataclass
+
+from fourbar.errors import InputError
+
+BAR_NAMES = {1: "ground", 2: "input", 3: "coupler", 4: "output"}
+MOVING_BARS = (2, 3, 4)
+PINS = {"O2": (1, 2), "A": (2, 3), "B": (3, 4), "O4": (1, 4)}
+FIRST_PIN = {2: "O2", 3: "A", 4: "O4"}
+
+
+def require(key: str, value: object, *, positive: bool = False, at_least_zero: bool = False) -> float:
+    """The value as a float, or an InputError that says what is allowed."""
+    allowed = "a finite number"
+    if positive:
+        allowed = "a finite number > 0"
+    elif at_least_zero:
+        allowed = "a finite number >= 0"
+    try:
+        number = float(value)  # type: ignore[arg-type]
+    except (TypeError, ValueError, OverflowError):
+        raise InputError(key, value, f"must be {allowed}") from None
+    if (
+        isinstance(value, bool)
+        or not math.isfinite(number)
+        or (positive and number <= 0.0)
+        or (at_least_zero and number < 0.0)
+    ):
+        raise InputError(key, value, f"must be {allowed}")
+    return number
+
+
+@dataclass(frozen=True, slots=True)
+class Bar:
+    """A moving bar; massless unless told otherwise.
+
+    Parameters
+    ----------
+    length : distance between its two pins, m, > 0.
+    mass : kg, >= 0.
+    inertia : about the mass centre G, kg m^2, >= 0; left out: uniform slender bar, m L^2/12.
+    centre : (r, phi), polar position of G from the bar's first pin (O2, A, O4), phi measured
+        from the bar's line, m and rad; left out: mid-bar.
+    """
+
+    length: float
+    mass: float = 0.0
+    inertia: float | None = None
+    centre: tuple[float, float] | None = None
+
+    def __post_init__(self) -> None:
+        length = require("length", self.length, positive=True)
+        mass = require("mass", self.mass, at_least_zero=True)
+        inertia = mass * length * length / 12.0 if self.inertia is None else self.inertia
+        centre = (length / 2.0, 0.0) if self.centre is None else self.centre
+        try:
+            r, phi = centre
+        except (TypeError, ValueError):
+            raise InputError("centre", centre, "must be a pair (distance, angle)") from None
+        set_field = object.__setattr__  # the class is frozen; this is its constructor
+        set_field(self, "length", length)
+        set_field(self, "mass", mass)
+        set_field(self, "inertia", require("inertia", inertia, at_least_zero=True))
+        set_field(self, "centre", (require("centre", r), require("centre", phi)))
+
+
+@dataclass(frozen=True, slots=True)
+class FourBar:
+    """A four-bar linkage: ground length d and angle theta_1 (O2 to O4), and three moving bars.
+
+    Raises InputError where the four lengths cannot close anywhere (the longest exceeds the sum
+    of the other three).
+    """
+
+    ground: float
+    input: Bar
+    coupler: Bar
+    output: Bar
+    ground_angle: float = 0.0
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "ground", require("lengths.ground", self.ground, positive=True))
+        object.__setattr__(self, "ground_angle", require("lengths.ground_angle", self.ground_angle))
+        longest = max(self.lengths)
+        # exact sum: a linkage that closes by one rounding is still a linkage
+        if math.fsum((*self.lengths, -2.0 * longest)) < 0.0:
+            raise InputError(
+                "lengths",
+                self.lengths,
+                "the bars (ground, input, coupler, output) can never close: "
+                "the longest must not exceed the sum of the other three",
+            )
+
+    @property
+    def lengths(self) -> tuple[float, float, float, float]:
+        """(d, a, b, c): ground, input, coupler, output, in m."""
+        return (self.ground, self.input.length, self.coupler.length, self.output.length)
+
+    def bar(self, number: int) -> Bar:
+        """The moving bar 2, 3 or 4."""
+        return {2: self.input, 3: self.coupler, 4: self.output}[number]
+
+
+def uniform(ground: float, input: float, coupler: float, output: float, *, per_metre: float = 1.0) -> FourBar:
+    """A linkage of uniform slender bars of the given lengths (m) and mass per metre (kg/m)."""
+    bars = []
+    for key, length in (("input", input), ("coupler", coupler), ("output", output)):
+        checked = require(f"lengths.{key}", length, positive=True)
+        bars.append(Bar(checked, mass=per_metre * checked))
+    return FourBar(ground, *bars)

@@ -1,0 +1,1 @@
+"""The cross-check of the formulas against engines that know nothing of them."""

@@ -1,0 +1,45 @@
+"""What an engine answers: its own numbers at the motion it really made, or the reason why it does not answer."""
+
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fourbar.scene import Command, Scene
+
+Array = NDArray[np.float64]
+
+
+@dataclass(slots=True, eq=False)
+class Answer:
+    """Quantities of one engine on one scene, under the names of `fourbar.Solution`, SI and radians."""
+
+    engine: str
+    """For example "pinocchio-inverse", "mujoco-inverse", "mujoco-simulated"."""
+    setting: str
+    """What was dialled: "exact", or "RK4 628/rev"."""
+    at: Command | None = None
+    """The motion this answer belongs to: the command itself, or what a simulation really did."""
+    assembled: NDArray[np.bool_] | None = None
+    """Where the engine found the loop to close, by its own means, (n,)."""
+    quantities: dict[str, Array] = field(default_factory=dict)
+    """(n,) or (n, 2) arrays; NaN where not assembled. A name that is missing was not answered."""
+    refusal: str | None = None
+    """A declared limit of the engine that this scene meets, with its reason; then nothing else is set."""
+    evidence: dict[str, float] = field(default_factory=dict)
+    """What the engine says of itself: closure gap (m), speed error, resets, residuals."""
+    shared: str = ""
+    """What it takes from the formulas' side."""
+    own: str = ""
+    """What it found alone."""
+    seconds: float = 0.0
+
+
+class Engine(Protocol):
+    """One way of asking one engine."""
+
+    name: str
+
+    def answer(self, scene: Scene, command: Command) -> Answer:
+        """Its answer; it is given the description and the command, never a result of the formulas."""
