@@ -8,7 +8,8 @@ import numpy as np
 from fourbar.effects.viscous import pin_values
 from fourbar.effects.wrenches import Wrenches
 from fourbar.kinematics import Array, State
-from fourbar.linkage import PINS
+from fourbar.linkage import MOVING_BARS, PINS, FourBar
+from fourbar.solution import Solution
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,6 +49,11 @@ class Friction:
             i, j = PINS[pin]
             total = total - f * np.abs(state.omega(j) - state.omega(i))
         return total
+
+    def size(self, linkage: FourBar, solution: Solution) -> Array:
+        """Sum of the couples, divided by the shortest moving bar, N."""
+        shortest = min(linkage.bar(number).length for number in MOVING_BARS)
+        return np.full(len(solution), sum(f for _, f in self.torques) / shortest)
 
     def add_mjcf(self, model: Any) -> None:
         """The attribute ``frictionloss`` of the hinge (of a tendon at the cut pin B)."""

@@ -6,7 +6,8 @@ from typing import Any, ClassVar
 
 from fourbar.effects.wrenches import Wrenches
 from fourbar.kinematics import Array, State, centre_in_bar
-from fourbar.linkage import MOVING_BARS, require
+from fourbar.linkage import MOVING_BARS, FourBar, require
+from fourbar.solution import Solution
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,6 +54,14 @@ class Gravity:
             if bar.mass != 0.0:
                 vx, vy = state.velocity(number, *centre_in_bar(bar))
                 total = total + bar.mass * (gx * vx + gy * vy)
+        return total
+
+    def size(self, linkage: FourBar, solution: Solution) -> float:
+        """Sum of the weights, counted with their levers, N."""
+        total = 0.0
+        for number in MOVING_BARS:
+            bar = linkage.bar(number)
+            total += bar.mass * abs(self.magnitude) * (1.0 + abs(bar.centre[0]) / bar.length)  # type: ignore[index]
         return total
 
     def add_mjcf(self, model: Any) -> None:

@@ -7,7 +7,7 @@ from typing import Any
 from fourbar.effects.wrenches import Wrenches
 from fourbar.errors import InputError
 from fourbar.kinematics import Array, State, Vector, along, centre_in_bar
-from fourbar.linkage import MOVING_BARS, require
+from fourbar.linkage import MOVING_BARS, FourBar, require
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,6 +67,14 @@ class Load:
             pin_x, pin_y = state.velocity(self.bar, 0.0, 0.0)
             w = state.omega(self.bar)
             total = total + force[0] * (pin_x - w * y) + force[1] * (pin_y + w * x)
+        return total
+
+    def size(self, linkage: FourBar) -> float:
+        """The force counted with its lever, and the couple divided by the bar's length, N."""
+        bar = linkage.bar(self.bar)
+        total = abs(self.moment) / bar.length
+        if self.force is not None:
+            total += abs(self.force[0]) * (1.0 + (abs(bar.centre[0]) + abs(self.at[0])) / bar.length)  # type: ignore[index]
         return total
 
     def add_mjcf(self, model: Any) -> None:

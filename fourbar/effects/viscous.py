@@ -4,10 +4,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
+import numpy as np
+
 from fourbar.effects.wrenches import Wrenches
 from fourbar.errors import InputError
 from fourbar.kinematics import Array, State
-from fourbar.linkage import PINS, require
+from fourbar.linkage import MOVING_BARS, PINS, FourBar, require
+from fourbar.solution import Solution
 
 
 def pin_values(key: str, values: Mapping[str, float]) -> tuple[tuple[str, float], ...]:
@@ -16,6 +19,13 @@ def pin_values(key: str, values: Mapping[str, float]) -> tuple[tuple[str, float]
         if pin not in PINS:
             raise InputError(f"{key}.{pin}", value, "the pins are " + ", ".join(PINS))
     return tuple((pin, require(f"{key}.{pin}", values[pin], at_least_zero=True)) for pin in PINS if pin in values)
+
+
+def relative_speed(solution: Solution, pin: str) -> Array:
+    """omega_j - omega_i of the bars that meet at a pin, rad/s."""
+    speeds = {1: 0.0, 2: solution.omega_2, 3: solution.omega_3, 4: solution.omega_4}
+    i, j = PINS[pin]
+    return np.asarray(speeds[j] - speeds[i])  # type: ignore[operator]
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,6 +64,14 @@ class Viscous:
         for pin, k in self.coefficients:
             i, j = PINS[pin]
             total = total - k * (state.omega(j) - state.omega(i)) ** 2
+        return total
+
+    def size(self, linkage: FourBar, solution: Solution) -> Array:
+        """Sum of the couples, divided by the shortest moving bar, N."""
+        shortest = min(linkage.bar(number).length for number in MOVING_BARS)
+        total = np.zeros(len(solution))
+        for pin, k in self.coefficients:
+            total += k * np.abs(relative_speed(solution, pin)) / shortest
         return total
 
     def add_mjcf(self, model: Any) -> None:

@@ -1,0 +1,182 @@
+"""An engine's answer against the formulas: one row per quantity, at the position where it is worst."""
+
+import math
+from collections.abc import Callable, Iterable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fourbar.scene import Scene
+from fourbar.solution import OK, Solution
+from validation.answer import Answer
+from validation.results import AGREES, DEGRADED, FAILS, REFUSES, Row
+from validation.scales import magnitude, of_length, yardstick
+from validation.tolerance import EPS, IDENTITY, NOTHING_TO_TELL, SIMULATED, Array, Tolerance, condition_of
+
+Mask = NDArray[np.bool_]
+
+COMPARED = (
+    *("theta_3", "theta_4", "omega_3", "omega_4", "alpha_3", "alpha_4"),
+    *("F12", "F32", "F43", "F14", "torque"),
+)
+"""Every quantity that an engine may be held to, in the order of the mechanics."""
+SLOW_DRIVE = 0.1
+"""T3 and T4 have poles where omega_3, omega_4 vanish: a simulation is judged where the driven bar
+turns at more than this part of its greatest speed."""
+TOUCHING_MARGIN = 32.0 * EPS
+"""A loop that closes, or misses, by less than this part of the sum of its lengths does so by the
+rounding of the data, and the engines may differ on whether it closes."""
+
+
+def compare(
+    name: str, scene: Scene, answer: Answer, formulas: Solution, tolerance: Tolerance, expected: Iterable[str]
+) -> list[Row]:
+    """Judge an answer; `formulas` is the solution at `answer.at`, `expected` what the engine must answer."""
+
+    def row(quantity: str, verdict: str, reason: str, **numbers: float) -> Row:
+        keys = ("error", "allowed", "theta_2", "condition")
+        return Row(
+            scene=name,
+            engine=answer.engine,
+            setting=answer.setting,
+            quantity=quantity,
+            passed=verdict != FAILS,
+            verdict=verdict,
+            reason=reason,
+            **{key: float(numbers.get(key, math.nan)) for key in keys},
+        )
+
+    if answer.refusal is not None:
+        return [row("all", REFUSES, answer.refusal)]
+    rows = []
+    if answer.assembled is None or len(answer.assembled) != len(formulas):
+        return [row("assembled", FAILS, "the engine did not say where the loop closes")]
+    differ = (answer.assembled != formulas.assembled) & ~_undecided(scene, formulas.theta_2)
+    worst = int(np.argmax(differ))
+    rows.append(
+        row(
+            "assembled",
+            FAILS if differ.any() else AGREES,
+            f"{np.count_nonzero(differ)} of {len(differ)} positions differ" if differ.any() else "the same positions",
+            error=float(np.count_nonzero(differ)),
+            allowed=0.0,
+            theta_2=formulas.theta_2[worst],
+            condition=1.0,
+        )
+    )
+    judged = (formulas.status_code == OK) & answer.assembled
+    for quantity in (q for q in COMPARED if q in expected):
+        ours, theirs = getattr(formulas, quantity, None), answer.quantities.get(quantity)
+        if ours is None:
+            continue
+        if theirs is None:
+            rows.append(row(quantity, FAILS, "no answer"))
+            continue
+        where = judged & _answerable(quantity, scene, formulas, tolerance)
+        rows.append(_judge(row, quantity, scene, formulas, theirs, where, tolerance))
+    return rows
+
+
+def closure(name: str, scene: Scene, answer: Answer) -> Row:
+    """Identity: do the engine's own angles close the loop? Relative to the sum of the lengths."""
+    d, a, b, c = scene.linkage.lengths
+    assert answer.at is not None and answer.assembled is not None
+    theta_3, theta_4 = answer.quantities["theta_3"], answer.quantities["theta_4"]
+    ground = d * np.exp(1j * scene.linkage.ground_angle)
+    gap = np.abs(a * np.exp(1j * answer.at.theta_2) + b * np.exp(1j * theta_3) - ground - c * np.exp(1j * theta_4))
+    error = np.where(answer.assembled, gap / of_length(scene), 0.0)
+    worst = int(np.argmax(np.where(np.isnan(error), np.inf, error)))
+    allowed = IDENTITY.factor if answer.setting == "exact" else SIMULATED.factor
+    holds = bool(error[worst] <= allowed)
+    return Row(
+        scene=name,
+        engine=answer.engine,
+        setting=answer.setting,
+        quantity="closure",
+        error=float(error[worst]),
+        allowed=allowed,
+        passed=holds,
+        verdict=AGREES if holds else FAILS,
+        reason="identity: a e^{i theta_2} + b e^{i theta_3} = d e^{i theta_1} + c e^{i theta_4}",
+        theta_2=float(answer.at.theta_2[worst]),
+        condition=1.0,
+    )
+
+
+def _judge(
+    row: Callable[..., Row],
+    quantity: str,
+    scene: Scene,
+    formulas: Solution,
+    theirs: Array,
+    where: Mask,
+    tolerance: Tolerance,
+) -> Row:
+    """One quantity over the positions `where`; NaN at any of them fails."""
+    if not where.any():
+        return row(quantity, DEGRADED, "nothing can be told: no position at which both may be held to it")
+    ours = getattr(formulas, quantity)
+    error = _difference(quantity, ours, theirs) / _divisor(yardstick(quantity, scene, formulas, ours))
+    condition = condition_of(quantity, formulas)
+    allowed = tolerance.allowed(condition)
+    told = where & (condition * NOTHING_TO_TELL > EPS)
+    untold = int(np.count_nonzero(where & ~told))
+    note = f"; {untold} positions with eps/condition > {NOTHING_TO_TELL:g} not judged" if untold else ""
+    if not told.any():
+        index = int(np.flatnonzero(where)[0])
+        verdict, reason = DEGRADED, f"nothing can be told: eps/condition = {EPS / condition[index]:.1e}"
+        if not np.isfinite(error[where]).all():
+            verdict, reason = FAILS, "NaN"
+    else:
+        with np.errstate(divide="ignore", invalid="ignore"):
+            ratio = np.where(told, error / allowed, -1.0)
+        ratio[where & ~np.isfinite(error)] = np.inf
+        index = int(np.argmax(ratio))
+        verdict = AGREES if ratio[index] <= 1.0 else FAILS
+        reason = ("NaN" if math.isnan(error[index]) else tolerance.name) + note
+    return row(
+        quantity,
+        verdict,
+        reason,
+        error=error[index],
+        allowed=allowed[index],
+        theta_2=formulas.theta_2[index],
+        condition=condition[index],
+    )
+
+
+def _difference(quantity: str, ours: Array, theirs: Array) -> Array:
+    """Angles modulo 2 pi, vectors by Euclidean norm, (n,)."""
+    if theirs.shape != ours.shape:
+        return np.full(len(ours), np.nan)
+    difference = ours - theirs
+    if quantity.startswith("theta"):
+        difference = np.remainder(difference + np.pi, 2.0 * np.pi) - np.pi
+    return magnitude(difference)
+
+
+def _divisor(yardstick: Array) -> Array:
+    """A yardstick of zero demands an error of exactly zero: dividing by the least double makes any other infinite."""
+    return np.where(yardstick == 0.0, np.nextafter(0.0, 1.0), yardstick)
+
+
+def closing_margin(scene: Scene, theta_2: Array) -> Array:
+    """By what part of the sum of the lengths the loop closes (> 0) or misses (< 0)."""
+    d, a, b, c = scene.linkage.lengths
+    e = np.abs(d * np.exp(1j * scene.linkage.ground_angle) - a * np.exp(1j * theta_2))
+    return np.asarray(np.minimum(b + c - e, e - abs(b - c)) / of_length(scene))
+
+
+def _undecided(scene: Scene, theta_2: Array) -> Mask:
+    """Positions at which rounding decides whether the loop closes."""
+    return np.asarray(np.abs(closing_margin(scene, theta_2)) < TOUCHING_MARGIN)
+
+
+def _answerable(quantity: str, scene: Scene, formulas: Solution, tolerance: Tolerance) -> Mask:
+    """Where a quantity may be asked of an engine of this class."""
+    if quantity == "torque" and scene.drive_bar != 2 and tolerance is SIMULATED:
+        speed = formulas.omega_3 if scene.drive_bar == 3 else formulas.omega_4
+        assert speed is not None
+        fast = np.abs(np.nan_to_num(speed))
+        return np.asarray(fast > SLOW_DRIVE * fast.max())
+    return np.ones(len(formulas), dtype=bool)

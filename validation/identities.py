@@ -1,0 +1,98 @@
+"""Equations that the formulas' own numbers must satisfy, summed over the whole linkage.
+
+They use the printed results alone (forces, accelerations, torque) and none of the elimination
+that produced them: closure, the sum of forces on the three bars, and the sum of moments about O2.
+"""
+
+import numpy as np
+
+from fourbar.effects import Wrenches
+from fourbar.kinematics import add_accelerations, add_velocities, close_loop
+from fourbar.linkage import MOVING_BARS
+from fourbar.scene import Command, Scene
+from fourbar.solution import OK, Solution
+from validation.answer import Answer
+from validation.compare import closure
+from validation.results import AGREES, FAILS, Row
+from validation.scales import magnitude
+from validation.tolerance import IDENTITY, Array
+
+FORMULAS = "formulas"
+
+
+def identities(name: str, scene: Scene, at: Command, solution: Solution) -> list[Row]:
+    """One row per identity that the stage of the solution allows."""
+    angles = {"theta_3": solution.theta_3, "theta_4": solution.theta_4}
+    rows = [closure(name, scene, Answer(FORMULAS, "exact", at, solution.assembled, angles))]
+    if solution.torque is not None and (solution.status_code == OK).any():
+        rows += _sums(name, scene, at, solution)
+    return rows
+
+
+def _sums(name: str, scene: Scene, at: Command, solution: Solution) -> list[Row]:
+    """F12 + F14 + sum of loads = sum of m a_G, and the moments of the same about O2 with the torque."""
+    assert at.omega_2 is not None and solution.F12 is not None and solution.F14 is not None
+    assert solution.torque is not None
+    state = close_loop(scene.linkage, at.theta_2, at.branch)
+    add_velocities(state, at.omega_2)
+    add_accelerations(state, at.alpha_2)
+    acting = Wrenches(state)
+    for term in (*scene.loads, *scene.effects):
+        term.add_wrenches(acting, state)
+    O4 = np.array(state.O4)
+    force = solution.F12 + solution.F14
+    force_terms = magnitude(solution.F12) + magnitude(solution.F14)
+    moment = solution.torque + _cross(O4, solution.F14)
+    moment_terms = np.abs(solution.torque) + np.hypot(*O4) * magnitude(solution.F14)
+    first_pins = {2: np.zeros(2), 3: solution.A, 4: O4}
+    for number in MOVING_BARS:
+        bar = scene.linkage.bar(number)
+        assert bar.inertia is not None
+        load, couple = np.stack(acting.force(number), axis=1), acting.moment(number)
+        centre, acceleration = getattr(solution, f"G{number}"), getattr(solution, f"a_G{number}")
+        alpha = getattr(solution, f"alpha_{number}")
+        force = force + load - bar.mass * acceleration
+        force_terms = force_terms + magnitude(load) + bar.mass * magnitude(acceleration)
+        turned = couple + _cross(first_pins[number], load)
+        swept = bar.mass * _cross(centre, acceleration) + bar.inertia * alpha
+        moment = moment + turned - swept
+        moment_terms = (
+            moment_terms
+            + (np.abs(couple) + _reach(first_pins[number]) * magnitude(load))
+            + bar.mass * _reach(centre) * magnitude(acceleration)
+            + bar.inertia * np.abs(alpha)
+        )
+    where = solution.status_code == OK
+    return [
+        _row(name, "force_sum", magnitude(force), force_terms, where, solution, "F12 + F14 + loads = sum of m a_G"),
+        _row(name, "moment_sum", np.abs(moment), moment_terms, where, solution, "moments about O2, with the torque"),
+    ]
+
+
+def _row(
+    name: str, quantity: str, error: Array, terms: Array, where: np.ndarray, solution: Solution, equation: str
+) -> Row:
+    relative = np.where(where, error / np.where(terms == 0.0, np.nextafter(0.0, 1.0), terms), 0.0)
+    worst = int(np.argmax(np.where(np.isnan(relative), np.inf, relative)))
+    holds = bool(relative[worst] <= IDENTITY.factor)
+    return Row(
+        scene=name,
+        engine=FORMULAS,
+        setting="exact",
+        quantity=quantity,
+        error=float(relative[worst]),
+        allowed=IDENTITY.factor,
+        passed=holds,
+        verdict=AGREES if holds else FAILS,
+        reason=f"identity: {equation}",
+        theta_2=float(solution.theta_2[worst]),
+        condition=1.0,
+    )
+
+
+def _cross(u: Array, v: Array) -> Array:
+    return np.asarray(u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0])
+
+
+def _reach(point: Array) -> Array:
+    return np.asarray(np.hypot(point[..., 0], point[..., 1]))

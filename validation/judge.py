@@ -1,0 +1,130 @@
+"""One scene through the formulas and every engine: its rows, its timings, and what was left out and why."""
+
+import time
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field, replace
+from importlib import import_module
+from typing import Any
+
+from fourbar.scene import Command, Scene, command, solve
+from fourbar.solution import Solution
+from validation.answer import Answer, Engine
+from validation.compare import COMPARED, closure, compare
+from validation.identities import FORMULAS, identities
+from validation.results import FAILS, Row
+from validation.tolerance import EQUIVALENCE, SIMULATED, Tolerance
+
+
+@dataclass(frozen=True, slots=True)
+class Witness:
+    """An engine that the harness asks, where its adapter lives, and what it is held to."""
+
+    name: str
+    adapter: str
+    """ "module:class"; imported when it is asked, so a missing engine costs only its own rows."""
+    tolerance: Tolerance
+    expected: tuple[str, ...] = COMPARED
+
+    def engine(self) -> Engine:
+        """The adapter."""
+        module, _, name = self.adapter.partition(":")
+        return getattr(import_module(module), name)()  # type: ignore[no-any-return]
+
+
+WITNESSES = (
+    Witness("pinocchio-inverse", "validation.engines.pinocchio:PinocchioInverse", EQUIVALENCE),
+    Witness("mujoco-inverse", "validation.engines.mujoco.inverse:MujocoInverse", EQUIVALENCE),
+    Witness("mujoco-simulated", "validation.engines.mujoco.simulate:MujocoSimulated", SIMULATED),
+    Witness("energy-method", "validation.engines.energy:EnergyMethod", EQUIVALENCE, ("torque",)),
+)
+
+
+@dataclass(slots=True)
+class Timing:
+    """Seconds that one answer took, measured in the process that gave it."""
+
+    scene: str
+    engine: str
+    setting: str
+    positions: int
+    seconds: float
+
+
+@dataclass(slots=True)
+class Record:
+    """Everything the report needs of one scene."""
+
+    name: str
+    scene: Scene
+    rows: list[Row] = field(default_factory=list)
+    timings: list[Timing] = field(default_factory=list)
+    left_out: list[str] = field(default_factory=list)
+    solution: Solution | None = None
+    answers: list[Answer] = field(default_factory=list)
+
+
+def judge(name: str, scene: Scene, witnesses: Sequence[Witness] = WITNESSES) -> Record:
+    """Ask every witness about one scene and compare; an engine that breaks down costs its own rows."""
+    record = Record(name, scene)
+    at = command(scene)
+    record.solution, seconds = _timed(lambda: solve(scene, at=at))
+    record.timings.append(Timing(name, FORMULAS, "exact", len(at.theta_2), seconds))
+    record.rows += identities(name, scene, at, record.solution)
+    for witness in witnesses:
+        answer = _ask(witness, scene, at, record)
+        if answer is None:
+            continue
+        record.answers.append(answer)
+        record.rows += _judged(name, scene, at, record.solution, answer, witness)
+    _judge_inertia(record, at, witnesses)
+    return record
+
+
+def _judged(name: str, scene: Scene, at: Command, solution: Solution, answer: Answer, witness: Witness) -> list[Row]:
+    """The rows of one answer, against the formulas at the motion that the engine really made."""
+    theirs = answer.at if answer.at is not None else at
+    formulas = solution if theirs is at else solve(scene, at=theirs)
+    rows = compare(name, scene, answer, formulas, witness.tolerance, witness.expected)
+    if answer.refusal is None and answer.at is not None and {"theta_3", "theta_4"} <= answer.quantities.keys():
+        rows.append(closure(name, scene, answer))
+    return rows
+
+
+def _judge_inertia(record: Record, at: Command, witnesses: Iterable[Witness]) -> None:
+    """The inertial part of the torque by itself: loads can hide an inertia that is 24 times wrong."""
+    scene = record.scene
+    if at.omega_2 is None or not (scene.loads or scene.effects):
+        return
+    bare = replace(scene, loads=(), effects=())
+    ours = solve(bare, at=at)
+    for witness in witnesses:
+        answer = _ask(replace(witness, expected=("torque",)), bare, at, record, part="inertia alone")
+        if answer is None or answer.refusal is not None:
+            continue
+        rows = _judged(record.name, bare, at, ours, answer, replace(witness, expected=("torque",)))
+        record.rows += [replace(row, quantity="torque_inertia") for row in rows if row.quantity == "torque"]
+
+
+def _ask(witness: Witness, scene: Scene, at: Command, record: Record, part: str = "") -> Answer | None:
+    try:
+        answer, seconds = _timed(lambda: witness.engine().answer(scene, at))
+    except Exception as error:  # whatever an engine raises is its own failure, told in its own row
+        reason = f"{type(error).__name__}: {error}".splitlines()[0]
+        record.rows.append(_failure(record.name, witness.name, part, reason))
+        return None
+    if not part:
+        record.timings.append(Timing(record.name, answer.engine, answer.setting, len(at.theta_2), seconds))
+        if answer.refusal is not None:
+            record.left_out.append(f"{answer.engine}: {answer.refusal}")
+    return answer
+
+
+def _failure(scene: str, engine: str, part: str, reason: str) -> Row:
+    nan = float("nan")
+    return Row(scene, engine, part or "-", "all", nan, nan, False, FAILS, reason, nan, nan)
+
+
+def _timed(action: Callable[[], Any]) -> tuple[Any, float]:
+    start = time.perf_counter()
+    result = action()
+    return result, time.perf_counter() - start

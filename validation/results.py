@@ -1,0 +1,83 @@
+"""The flat sorted table that joins run and report: one row per scene, engine, setting and quantity."""
+
+import csv
+import io
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass, fields
+from pathlib import Path
+
+from fourbar.files import write_text
+
+AGREES, DEGRADED, REFUSES, FAILS = "agrees", "degraded as predicted", "refuses", "fails"
+VERDICTS = (AGREES, DEGRADED, REFUSES, FAILS)
+
+
+@dataclass(frozen=True, slots=True, order=True)
+class Row:
+    """One comparison at the position where error/allowed is worst."""
+
+    scene: str
+    engine: str
+    setting: str
+    quantity: str
+    error: float
+    """Relative to the scale of the quantity (angles: rad); NaN where there is no answer."""
+    allowed: float
+    passed: bool
+    verdict: str
+    reason: str
+    theta_2: float
+    condition: float
+
+
+COLUMNS = tuple(field.name for field in fields(Row))
+
+
+def to_csv(rows: Iterable[Row]) -> str:
+    """The table as text, sorted, floats as repr, a missing number left empty."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(COLUMNS)
+    for row in sorted(rows, key=lambda row: (row.scene, row.engine, row.setting, row.quantity)):
+        writer.writerow([_cell(getattr(row, name)) for name in COLUMNS])
+    return text.getvalue()
+
+
+def _cell(value: object) -> str:
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, float):
+        return "" if math.isnan(value) else repr(value)
+    return str(value)
+
+
+def from_csv(path: Path) -> list[Row]:
+    """Read a table written by `to_csv`."""
+    with path.open(newline="", encoding="utf-8") as file:
+        records = list(csv.DictReader(file))
+
+    def number(cell: str) -> float:
+        return float(cell) if cell else math.nan
+
+    return [
+        Row(
+            record["scene"],
+            record["engine"],
+            record["setting"],
+            record["quantity"],
+            number(record["error"]),
+            number(record["allowed"]),
+            record["passed"] == "true",
+            record["verdict"],
+            record["reason"],
+            number(record["theta_2"]),
+            number(record["condition"]),
+        )
+        for record in records
+    ]
+
+
+def write_results(rows: Iterable[Row], path: Path) -> None:
+    """Write the table, all of it or nothing."""
+    write_text(path, to_csv(rows))

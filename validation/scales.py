@@ -1,0 +1,83 @@
+"""How large a quantity is: the yardstick of its error.
+
+The scale of a quantity is its largest magnitude over the well-conditioned positions; a position
+below that is judged relative to its own magnitude, or the forces that diverge near a limit would
+excuse every other row. A quantity that (nearly) vanishes is judged against the sum of the
+absolute terms of its equation; if those vanish too, the answer must be exactly zero.
+"""
+
+import math
+
+import numpy as np
+
+from fourbar.linkage import MOVING_BARS
+from fourbar.scene import Scene
+from fourbar.solution import Solution
+from validation.tolerance import WELL_CONDITIONED, Array, K
+
+VANISHING = 1.0 / K
+"""A quantity below this part of the sum of its terms has lost more to cancellation than K covers."""
+
+
+def magnitude(values: Array) -> Array:
+    """Absolute value of a scalar, Euclidean norm of a vector, (n,)."""
+    return np.asarray(np.hypot(values[:, 0], values[:, 1]) if values.ndim == 2 else np.abs(values))
+
+
+def yardstick(quantity: str, scene: Scene, formulas: Solution, values: Array) -> Array:
+    """What the error of a quantity is divided by at each position, (n,)."""
+    if quantity.startswith("theta"):
+        return np.ones(len(formulas))
+    size = magnitude(values)
+    terms = term_sizes(quantity, scene, formulas)
+    well = (formulas.condition >= WELL_CONDITIONED) & np.isfinite(size)
+    if quantity == "torque":  # its poles are not where sin_mu vanishes
+        assert formulas.drive_condition is not None
+        well &= formulas.drive_condition >= WELL_CONDITIONED
+    own = np.where(size < VANISHING * terms, terms, size)
+    if not well.any():
+        return own
+    scale = float(size[well].max())
+    most = float(terms[well].max())
+    return np.where(well, most if scale < VANISHING * most else scale, own)
+
+
+def term_sizes(quantity: str, scene: Scene, formulas: Solution) -> Array:
+    """Sum of the absolute terms of the equation that a quantity is computed from, (n,)."""
+    _, a, b, c = scene.linkage.lengths
+    s = formulas.condition
+    with np.errstate(divide="ignore", invalid="ignore"):
+        if quantity in ("omega_3", "omega_4"):
+            assert formulas.omega_2 is not None
+            return np.asarray(a * np.abs(formulas.omega_2) / ((b if quantity == "omega_3" else c) * s))
+        if quantity in ("alpha_3", "alpha_4"):
+            w2, w3, w4, a2 = formulas.omega_2, formulas.omega_3, formulas.omega_4, formulas.alpha_2
+            assert w2 is not None and w3 is not None and w4 is not None and a2 is not None
+            terms = a * w2 * w2 + a * np.abs(a2) + b * w3 * w3 + c * w4 * w4
+            return np.asarray(terms / ((b if quantity == "alpha_3" else c) * s))
+        assert formulas.drive_condition is not None
+        force = _force_terms(scene, formulas) / formulas.drive_condition
+        if quantity == "torque":
+            return np.asarray(max(a, b, c) * force)
+        return np.asarray(force)
+
+
+def _force_terms(scene: Scene, formulas: Solution) -> Array:
+    """Sum of the magnitudes of all inertial and external forces, couples divided by their bar's length, N."""
+    total = np.zeros(len(formulas))
+    for number in MOVING_BARS:
+        bar = scene.linkage.bar(number)
+        acceleration, alpha = getattr(formulas, f"a_G{number}"), getattr(formulas, f"alpha_{number}")
+        assert bar.centre is not None and bar.inertia is not None
+        lever = 1.0 + abs(bar.centre[0]) / bar.length
+        total += lever * bar.mass * magnitude(acceleration) + bar.inertia * np.abs(alpha) / bar.length
+    for load in scene.loads:
+        total += load.size(scene.linkage)
+    for effect in scene.effects:
+        total += effect.size(scene.linkage, formulas)
+    return total
+
+
+def of_length(scene: Scene) -> float:
+    """Sum of the four lengths, m: the terms of the loop closure."""
+    return math.fsum(scene.linkage.lengths)

@@ -1,0 +1,82 @@
+"""How much may differ, and why: four classes of tolerance, each a named object.
+
+`condition` lies in (0, 1], 1 is best; an exact comparison is allowed K eps / condition. The motion
+condition is s = |sin(theta_4 - theta_3)|, the drive condition the sine between the two bars that
+are not driven.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fourbar.solution import Solution
+
+Array = NDArray[np.float64]
+
+EPS = 2.0**-52
+K = 50.0
+"""One factor for every exact comparison. Two evaluations of about fifty roundings each differ by
+sqrt(2 * 50) = 10 of them as a random walk; 50 leaves room for the tails of some 10^5 comparisons."""
+NOTHING_TO_TELL = 1e-3
+"""Where eps/condition exceeds this, two correct programs may differ in the third digit: no verdict is drawn."""
+WELL_CONDITIONED = 0.1
+"""Positions whose condition is at least this set the scale of a quantity."""
+DEGRADED = 10.0
+"""An engine whose error is predicted may exceed the prediction by this factor, not more."""
+
+
+@dataclass(frozen=True, slots=True)
+class Tolerance:
+    """What a comparison is allowed, with the reason that the report prints."""
+
+    name: str
+    reason: str
+    factor: float
+    """Error allowed at condition 1, relative to the scale."""
+    conditioned: bool
+    """Whether it is divided by the condition."""
+
+    def allowed(self, condition: Array) -> Array:
+        """The relative error allowed at each position, (n,)."""
+        if not self.conditioned:
+            return np.full_like(condition, self.factor)
+        with np.errstate(divide="ignore"):
+            return self.factor / condition
+
+
+IDENTITY = Tolerance(
+    "identity",
+    "K eps of the sum of the absolute terms: an equation that holds in every position, whatever the condition",
+    K * EPS,
+    conditioned=False,
+)
+EQUIVALENCE = Tolerance(
+    "equivalence",
+    "K eps/condition: two exact derivations of one number differ by round-off alone",
+    K * EPS,
+    conditioned=True,
+)
+SIMULATED = Tolerance(
+    "modelling + integration",
+    "1e-5 of the scale: the soft loop and the time step of the generated MJCF at about 628 RK4 steps per revolution, "
+    "two to ten times what was measured (1e-6 to 4e-6)",
+    1e-5,
+    conditioned=False,
+)
+
+POSITION_POWER = {"theta_3": 1, "theta_4": 1}
+"""Angles lose digits as 1/s, everything that follows from them as 1/s^2."""
+MOTION_POWER = 2
+FORCES = frozenset(("F12", "F32", "F43", "F14", "torque"))
+"""Quantities that divide by the drive condition too."""
+
+
+def condition_of(quantity: str, formulas: Solution) -> Array:
+    """The condition of a quantity at each position: s for angles, s^2 for what follows, times the drive's."""
+    s = formulas.condition
+    condition = s ** POSITION_POWER.get(quantity, MOTION_POWER)
+    if quantity in FORCES:
+        assert formulas.drive_condition is not None
+        condition = condition * formulas.drive_condition
+    return np.asarray(condition, dtype=float)
