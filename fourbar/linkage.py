@@ -109,8 +109,8 @@ class FourBar:
 
 def uniform(ground: float, input: float, coupler: float, output: float, *, per_metre: float = 1.0) -> FourBar:
     """A linkage of uniform slender bars of the given lengths (m) and mass per metre (kg/m)."""
-    bars = []
+    bars: list[Bar] = []
     for key, length in (("input", input), ("coupler", coupler), ("output", output)):
         checked = require(f"lengths.{key}", length, positive=True)
         bars.append(Bar(checked, mass=per_metre * checked))
-    return FourBar(ground, *bars)
+    return FourBar(ground, bars[0], bars[1], bars[2])

@@ -107,6 +107,7 @@ def _judge_inertia(record: Record, at: Command, witnesses: Iterable[Witness]) ->
 
 def _ask(witness: Witness, scene: Scene, at: Command, record: Record, part: str = "") -> Answer | None:
     try:
+        answer: Answer
         answer, seconds = _timed(lambda: witness.engine().answer(scene, at))
     except Exception as error:  # whatever an engine raises is its own failure, told in its own row
         reason = f"{type(error).__name__}: {error}".splitlines()[0]

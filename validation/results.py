@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, fields
 from pathlib import Path
 
-from fourbar.files import write_text
+from fourbar.writing import write_text
 
 AGREES, DEGRADED, REFUSES, FAILS = "agrees", "degraded as predicted", "refuses", "fails"
 VERDICTS = (AGREES, DEGRADED, REFUSES, FAILS)

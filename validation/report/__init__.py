@@ -1,0 +1,1 @@
+"""The report: verdict first, then what was compared, how independent it was, what it cost."""
