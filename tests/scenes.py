@@ -1,0 +1,45 @@
+"""Scenes that several tests share, built in code."""
+
+import math
+
+import numpy as np
+
+import fourbar
+
+
+def crank_rocker(**changes: object) -> fourbar.Scene:
+    """A crank-rocker with gravity, an offset mass centre, a force and a couple."""
+    linkage = fourbar.FourBar(
+        0.3,
+        fourbar.Bar(0.1, 0.2),
+        fourbar.Bar(0.25, 0.5, 0.004, (0.13, 0.3)),
+        fourbar.Bar(0.22, 0.4),
+        ground_angle=0.2,
+    )
+    parts: dict[str, object] = {
+        "linkage": linkage,
+        "motion": fourbar.Motion(fourbar.Sweep(0.1, 0.1 + 2 * math.pi, 60), 10.0, 5.0),
+        "loads": (fourbar.Load(4, (3.0, 0.7), (0.05, 1.0)), fourbar.Load(3, moment=-0.2)),
+        "effects": (fourbar.Gravity(),),
+        "title": "crank-rocker",
+    }
+    return fourbar.Scene(**{**parts, **changes})  # type: ignore[arg-type]
+
+
+def thesis(theta_2: object = None) -> fourbar.Scene:
+    """The thesis's model mechanism, uniform bars 2.54 cm wide (Linares Mendoza, sections 4.12 and 5.7)."""
+
+    def inertia(mass: float, length: float) -> float:
+        return mass * (length**2 + 0.0254**2) / 12.0
+
+    linkage = fourbar.FourBar(
+        0.20,
+        fourbar.Bar(0.48, 57.0, 11.119275, (0.765, 0.0)),
+        fourbar.Bar(0.55, 0.544, inertia(0.544, 0.55)),
+        fourbar.Bar(0.20, 0.2, inertia(0.2, 0.20)),
+        ground_angle=math.radians(45.0),
+    )
+    loads = [fourbar.Load(2, (10.0, 0.0), (0.05, math.radians(265.0)))]
+    loads += [fourbar.Load(bar, moment=-0.15) for bar in (2, 3, 4)]
+    where = np.radians([135.0]) if theta_2 is None else theta_2
+    return fourbar.Scene(linkage, fourbar.Motion(where, 0.2244), 4, tuple(loads), title="thesis")  # type: ignore[arg-type]

@@ -1,0 +1,145 @@
+"""The harness itself, with witnesses that are told what to say: silence, NaN and breakdowns must cost the run."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import fourbar
+from fourbar.mobility import limit_positions
+from fourbar.scene import Command, Scene
+from tests.scenes import crank_rocker
+from validation.answer import Answer
+from validation.compare import COMPARED
+from validation.judge import Witness, judge
+from validation.results import AGREES, DEGRADED, FAILS, REFUSES, Row, from_csv, to_csv, write_results
+from validation.tolerance import EPS, EQUIVALENCE, K
+
+
+class Echo:
+    """Answers with the formulas' own numbers, changed by `spoil`; only for tests of the harness."""
+
+    name = "echo"
+
+    def spoil(self, answer: Answer) -> Answer:
+        return answer
+
+    def answer(self, scene: Scene, command: Command) -> Answer:
+        s = fourbar.solve(scene, at=command)
+        numbers = {name: np.array(getattr(s, name)) for name in COMPARED}
+        return self.spoil(Answer("echo", "exact", command, np.array(s.assembled), numbers))
+
+
+class Silent(Echo):
+    def spoil(self, answer: Answer) -> Answer:
+        del answer.quantities["F12"]
+        return answer
+
+
+class NotANumber(Echo):
+    def spoil(self, answer: Answer) -> Answer:
+        answer.quantities["torque"][3] = np.nan
+        return answer
+
+
+class Elsewhere(Echo):
+    def spoil(self, answer: Answer) -> Answer:
+        assert answer.assembled is not None
+        answer.assembled[5] = False
+        return answer
+
+
+class Refuses(Echo):
+    def answer(self, scene: Scene, command: Command) -> Answer:
+        return Answer("echo", "exact", refusal="a declared limit")
+
+
+class Breaks(Echo):
+    def answer(self, scene: Scene, command: Command) -> Answer:
+        raise RuntimeError("engine on fire\nsecond line")
+
+
+class OneTurnMore(Echo):
+    def spoil(self, answer: Answer) -> Answer:
+        answer.quantities["theta_4"] += 2 * np.pi
+        return answer
+
+
+class SlightlyOff(Echo):
+    def spoil(self, answer: Answer) -> Answer:
+        answer.quantities["torque"] *= 1.0 + 1e-9
+        return answer
+
+
+def rows_of(engine: type, scene: Scene | None = None) -> dict[str, Row]:
+    witness = Witness("echo", f"{__name__}:{engine.__name__}", EQUIVALENCE)
+    record = judge("scene", scene or crank_rocker(), [witness])
+    return {row.quantity: row for row in record.rows if row.engine == "echo"}
+
+
+def test_an_equal_answer_agrees_in_every_quantity() -> None:
+    rows = rows_of(Echo)
+    assert set(rows) == {*COMPARED, "assembled", "closure", "torque_inertia"}
+    assert all(row.verdict == AGREES for row in rows.values())
+
+
+@pytest.mark.parametrize(("engine", "quantity"), [(Silent, "F12"), (NotANumber, "torque"), (Elsewhere, "assembled")])
+def test_silence_nan_and_a_missing_position_fail(engine: type, quantity: str) -> None:
+    row = rows_of(engine)[quantity]
+    assert row.verdict == FAILS
+    assert not row.passed
+
+
+def test_a_declared_refusal_is_told_and_does_not_fail() -> None:
+    rows = rows_of(Refuses)
+    assert set(rows) == {"all"}
+    assert rows["all"].verdict == REFUSES
+    assert rows["all"].passed
+
+
+def test_an_engine_that_breaks_down_costs_its_own_row_in_one_line() -> None:
+    rows = rows_of(Breaks)
+    assert rows["all"].verdict == FAILS
+    assert "engine on fire" in rows["all"].reason
+    assert "\n" not in rows["all"].reason
+
+
+def test_angles_are_compared_modulo_a_turn() -> None:
+    assert rows_of(OneTurnMore)["theta_4"].verdict == AGREES
+
+
+def test_a_torque_off_by_a_billionth_fails() -> None:
+    row = rows_of(SlightlyOff)["torque"]
+    assert row.verdict == FAILS
+    assert row.error == pytest.approx(1e-9, rel=0.5)
+    assert row.allowed == pytest.approx(K * EPS / row.condition)
+
+
+def test_where_no_digit_is_left_nothing_is_told() -> None:
+    # 1e-13 rad beside a limit of theta_2 the condition of the accelerations is about 1e-13
+    rocker = fourbar.uniform(0.3, 0.25, 0.1, 0.22)
+    first = limit_positions(rocker)[0].theta_2
+    for side in (1.0, -1.0):
+        near = Scene(rocker, fourbar.Motion(np.array([first + side * 1e-13]), 1.0))
+        if fourbar.solve(near).assembled.all():
+            rows = rows_of(Echo, near)
+            assert rows["torque"].verdict == DEGRADED
+            assert "nothing can be told" in rows["torque"].reason
+            return
+    pytest.fail("neither side of the limit assembles")
+
+
+def test_positions_alone_need_no_forces() -> None:
+    scene = replace(crank_rocker(), motion=fourbar.Motion(fourbar.Sweep(0.0, 6.0, 10)))
+    rows = judge("scene", scene, []).rows
+    assert {row.quantity for row in rows} == {"closure"}
+
+
+def test_results_survive_the_file(tmp_path) -> None:  # type: ignore[no-untyped-def]
+    rows = judge("scene", crank_rocker(), [Witness("echo", f"{__name__}:Echo", EQUIVALENCE)]).rows
+    write_results(rows, tmp_path / "results.csv")
+    again = from_csv(tmp_path / "results.csv")
+    assert to_csv(again) == to_csv(rows)
+    assert [(r.scene, r.engine, r.setting, r.quantity) for r in again] == sorted(
+        (r.scene, r.engine, r.setting, r.quantity) for r in rows
+    )

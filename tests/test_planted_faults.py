@@ -1,0 +1,201 @@
+"""A harness that cannot catch a planted fault is not a harness.
+
+Each fault is put into the formulas (or, for the missing J-dot v, into the engines), one at a
+time; the run alone, through `judge`, must then contain a failing row. No unit test of a formula
+takes part. The same scenes without a fault must pass, or nothing would be shown.
+"""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import fourbar.kinematics
+import fourbar.kinetostatics
+import fourbar.scene
+import validation.judge
+from fourbar.linkage import Bar
+from fourbar.scene import Scene
+from fourbar.solution import Solution
+from tests.scenes import crank_rocker, thesis
+from validation.judge import WITNESSES, judge
+
+EXACT = [w for w in WITNESSES if w.name in ("pinocchio-inverse", "mujoco-inverse")]
+
+
+def outcome(scene: Scene) -> tuple[bool, set[str]]:
+    """Whether the run passes, and which quantities fail."""
+    rows = judge("scene", scene, EXACT).rows
+    return all(row.passed for row in rows), {row.quantity for row in rows if not row.passed}
+
+
+@contextmanager
+def formulas_see(change: Callable[[Scene], Scene]) -> Iterator[None]:
+    """The formulas work on a changed scene (a fault in how they read it), the engines on the true one."""
+    true = validation.judge.solve
+
+    def faulty(scene: Scene, *arguments: Any, **keywords: Any) -> Solution:
+        return true(change(scene), *arguments, **keywords)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(validation.judge, "solve", faulty)
+        yield
+
+
+@contextmanager
+def formulas_say(change: Callable[[Solution], None]) -> Iterator[None]:
+    """The formulas' result is spoilt after it was computed."""
+    true = validation.judge.solve
+
+    def faulty(*arguments: Any, **keywords: Any) -> Solution:
+        solution = true(*arguments, **keywords)
+        change(solution)
+        return solution
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(validation.judge, "solve", faulty)
+        yield
+
+
+@contextmanager
+def replaced(owner: Any, name: str, value: Any) -> Iterator[None]:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(owner, name, value)
+        yield
+
+
+def with_bars(change: Callable[[Bar], Bar]) -> Callable[[Scene], Scene]:
+    def changed(scene: Scene) -> Scene:
+        link = scene.linkage
+        bars = {"input": change(link.input), "coupler": change(link.coupler), "output": change(link.output)}
+        return replace(scene, linkage=replace(link, **bars))
+
+    return changed
+
+
+def inertia_about_the_pin(bar: Bar) -> Bar:
+    assert bar.centre is not None and bar.inertia is not None
+    return replace(bar, inertia=bar.inertia + bar.mass * bar.centre[0] ** 2)
+
+
+def inertia_shifted_twice(bar: Bar) -> Bar:
+    """m d^2 with d from mid-bar, added to an inertia that is already about G."""
+    assert bar.centre is not None and bar.inertia is not None
+    r, phi = bar.centre
+    squared = r * r + bar.length**2 / 4 - r * bar.length * np.cos(phi)
+    return replace(bar, inertia=bar.inertia + bar.mass * float(squared))
+
+
+def centre_from_the_other_pin(bar: Bar) -> Bar:
+    assert bar.centre is not None
+    return replace(bar, centre=(bar.length - bar.centre[0], bar.centre[1]))
+
+
+def swapped_branch(scene: Scene) -> Scene:
+    return replace(scene, motion=replace(scene.motion, branch=-scene.motion.branch))
+
+
+def load_on_another_bar(scene: Scene) -> Scene:
+    first, *others = scene.loads
+    return replace(scene, loads=(replace(first, bar=2 if first.bar == 3 else 3), *others))
+
+
+def gravity_flipped(scene: Scene) -> Scene:
+    flipped = tuple(replace(effect, magnitude=-effect.magnitude) for effect in scene.effects)
+    return replace(scene, effects=flipped)
+
+
+def flip(name: str) -> Callable[[Solution], None]:
+    def change(solution: Solution) -> None:
+        getattr(solution, name)[:] *= -1.0
+
+    return change
+
+
+def torque_off(solution: Solution) -> None:
+    assert solution.torque is not None
+    solution.torque *= 1.0 + 1e-9
+
+
+def alpha_for_acceleration(true: Callable[..., Any]) -> Callable[..., Any]:
+    """The thesis's index slip: a_G4x read as alpha_3 (its Java program takes element 5 for element 6)."""
+
+    def faulty(self: Any, bar: int, along: float, across: float) -> Any:
+        x, y = true(self, bar, along, across)
+        return (np.broadcast_to(self.alpha_3, np.shape(x)), y) if bar == 4 else (x, y)
+
+    return faulty
+
+
+def swing_without_centripetal(arm: Any, omega: Any, alpha: Any) -> Any:
+    return (-alpha * arm[1], alpha * arm[0])
+
+
+def swing_with_alpha_reversed(arm: Any, omega: Any, alpha: Any) -> Any:
+    w2 = omega * omega
+    return (alpha * arm[1] - w2 * arm[0], -alpha * arm[0] - w2 * arm[1])
+
+
+def kilogram_centimetres(true: Callable[..., None]) -> Callable[..., None]:
+    """The thesis's unit slip: m a in kg cm/s^2 added to newtons."""
+
+    def faulty(wrenches: Any, state: Any) -> None:
+        before = dict(wrenches.force_x), dict(wrenches.force_y)
+        true(wrenches, state)
+        for forces, old in zip((wrenches.force_x, wrenches.force_y), before, strict=True):
+            for bar in forces:
+                forces[bar] = old[bar] + 100.0 * (forces[bar] - old[bar])
+
+    return faulty
+
+
+kinematics, kinetostatics = fourbar.kinematics, fourbar.kinetostatics
+State = kinematics.State
+
+FAULTS = {
+    "force sign flipped": lambda: formulas_say(flip("F43")),
+    "F32 for F23": lambda: formulas_say(flip("F32")),
+    "F12 sign flipped": lambda: formulas_say(flip("F12")),
+    "branch swapped": lambda: formulas_see(swapped_branch),
+    "inertia about the pin": lambda: formulas_see(with_bars(inertia_about_the_pin)),
+    "m d^2 added to an inertia about G": lambda: formulas_see(with_bars(inertia_shifted_twice)),
+    "mass centre from the wrong pin": lambda: formulas_see(with_bars(centre_from_the_other_pin)),
+    "load on the wrong bar": lambda: formulas_see(load_on_another_bar),
+    "gravity missing": lambda: formulas_see(lambda scene: replace(scene, effects=())),
+    "gravity flipped": lambda: formulas_see(gravity_flipped),
+    "sign of the alpha term": lambda: replaced(kinematics, "swing", swing_with_alpha_reversed),
+    "m omega^2 r dropped": lambda: replaced(kinematics, "swing", swing_without_centripetal),
+    "alpha_3 used for an acceleration": lambda: replaced(
+        State, "acceleration", alpha_for_acceleration(State.acceleration)
+    ),
+    "m a in kg cm/s^2": lambda: replaced(kinetostatics, "add_inertia", kilogram_centimetres(kinetostatics.add_inertia)),
+    "torque off by 1e-9": lambda: formulas_say(torque_off),
+}
+
+
+def test_without_a_fault_the_run_passes() -> None:
+    for scene in (crank_rocker(), thesis()):
+        passed, failing = outcome(scene)
+        assert passed, failing
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_each_planted_fault_fails_the_run(fault: str) -> None:
+    with FAULTS[fault]():
+        passed, failing = outcome(crank_rocker())
+    assert not passed, f"{fault}: not noticed"
+    assert failing
+
+
+def test_positions_outside_the_range_fail_the_run() -> None:
+    def pretend(solution: Solution) -> None:
+        solution.status_code[:] = 0
+
+    scene = thesis(np.radians([80.0, 135.0]))  # the range starts at 84.6 deg
+    with formulas_say(pretend):
+        passed, failing = outcome(scene)
+    assert not passed
+    assert "assembled" in failing
