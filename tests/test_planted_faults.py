@@ -94,10 +94,6 @@ def centre_from_the_other_pin(bar: Bar) -> Bar:
     return replace(bar, centre=(bar.length - bar.centre[0], bar.centre[1]))
 
 
-def swapped_branch(scene: Scene) -> Scene:
-    return replace(scene, motion=replace(scene.motion, branch=-scene.motion.branch))
-
-
 def load_on_another_bar(scene: Scene) -> Scene:
     first, *others = scene.loads
     return replace(scene, loads=(replace(first, bar=2 if first.bar == 3 else 3), *others))
@@ -118,6 +114,10 @@ def flip(name: str) -> Callable[[Solution], None]:
 def torque_off(solution: Solution) -> None:
     assert solution.torque is not None
     solution.torque *= 1.0 + 1e-9
+
+
+def on_the_other_branch(true: Callable[..., Any]) -> Callable[..., Any]:
+    return lambda linkage, theta_2, branch: true(linkage, theta_2, -branch)
 
 
 def alpha_for_acceleration(true: Callable[..., Any]) -> Callable[..., Any]:
@@ -159,7 +159,7 @@ FAULTS = {
     "force sign flipped": lambda: formulas_say(flip("F43")),
     "F32 for F23": lambda: formulas_say(flip("F32")),
     "F12 sign flipped": lambda: formulas_say(flip("F12")),
-    "branch swapped": lambda: formulas_see(swapped_branch),
+    "branch swapped": lambda: replaced(fourbar.scene, "close_loop", on_the_other_branch(fourbar.scene.close_loop)),
     "inertia about the pin": lambda: formulas_see(with_bars(inertia_about_the_pin)),
     "m d^2 added to an inertia about G": lambda: formulas_see(with_bars(inertia_shifted_twice)),
     "mass centre from the wrong pin": lambda: formulas_see(with_bars(centre_from_the_other_pin)),

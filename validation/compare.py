@@ -10,7 +10,7 @@ from fourbar.scene import Scene
 from fourbar.solution import OK, Solution
 from validation.answer import Answer
 from validation.results import AGREES, DEGRADED, FAILS, REFUSES, Row
-from validation.scales import magnitude, of_length, yardstick
+from validation.scales import divisor, magnitude, of_length, yardstick
 from validation.tolerance import EPS, IDENTITY, NOTHING_TO_TELL, SIMULATED, Array, Tolerance, condition_of
 
 Mask = NDArray[np.bool_]
@@ -116,7 +116,7 @@ def _judge(
     if not where.any():
         return row(quantity, DEGRADED, "nothing can be told: no position at which both may be held to it")
     ours = getattr(formulas, quantity)
-    error = _difference(quantity, ours, theirs) / _divisor(yardstick(quantity, scene, formulas, ours))
+    error = angle_aware_difference(quantity, ours, theirs) / divisor(yardstick(quantity, scene, formulas, ours))
     condition = condition_of(quantity, formulas)
     allowed = tolerance.allowed(condition)
     told = where & (condition * NOTHING_TO_TELL > EPS)
@@ -145,7 +145,7 @@ def _judge(
     )
 
 
-def _difference(quantity: str, ours: Array, theirs: Array) -> Array:
+def angle_aware_difference(quantity: str, ours: Array, theirs: Array) -> Array:
     """Angles modulo 2 pi, vectors by Euclidean norm, (n,)."""
     if theirs.shape != ours.shape:
         return np.full(len(ours), np.nan)
@@ -153,11 +153,6 @@ def _difference(quantity: str, ours: Array, theirs: Array) -> Array:
     if quantity.startswith("theta"):
         difference = np.remainder(difference + np.pi, 2.0 * np.pi) - np.pi
     return magnitude(difference)
-
-
-def _divisor(yardstick: Array) -> Array:
-    """A yardstick of zero demands an error of exactly zero: dividing by the least double makes any other infinite."""
-    return np.where(yardstick == 0.0, np.nextafter(0.0, 1.0), yardstick)
 
 
 def closing_margin(scene: Scene, theta_2: Array) -> Array:

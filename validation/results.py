@@ -34,12 +34,17 @@ class Row:
 COLUMNS = tuple(field.name for field in fields(Row))
 
 
+def sorted_rows(rows: Iterable[Row]) -> list[Row]:
+    """The rows by scene, engine, setting and quantity."""
+    return sorted(rows, key=lambda row: (row.scene, row.engine, row.setting, row.quantity))
+
+
 def to_csv(rows: Iterable[Row]) -> str:
     """The table as text, sorted, floats as repr, a missing number left empty."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(COLUMNS)
-    for row in sorted(rows, key=lambda row: (row.scene, row.engine, row.setting, row.quantity)):
+    for row in sorted_rows(rows):
         writer.writerow([_cell(getattr(row, name)) for name in COLUMNS])
     return text.getvalue()
 

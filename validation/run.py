@@ -10,8 +10,9 @@ import click
 from fourbar.scene import Scene
 from fourbar.writing import write_text
 from validation.judge import Record, judge
+from validation.report.html import html
 from validation.report.markdown import markdown
-from validation.results import Row, write_results
+from validation.results import Row, sorted_rows, write_results
 from validation.suites import model_files, named_scenes
 
 WORKERS = 2
@@ -30,10 +31,7 @@ def records(scenes: Sequence[tuple[str, Scene]], workers: int = WORKERS) -> Iter
 
 def all_rows(done: Sequence[Record]) -> list[Row]:
     """The rows of all scenes, sorted by scene, engine, setting and quantity."""
-    return sorted(
-        (row for record in done for row in record.rows),
-        key=lambda row: (row.scene, row.engine, row.setting, row.quantity),
-    )
+    return sorted_rows(row for record in done for row in record.rows)
 
 
 def timings_csv(done: Sequence[Record]) -> str:
@@ -51,11 +49,12 @@ def timings_csv(done: Sequence[Record]) -> str:
 
 
 def write(done: Sequence[Record], out: Path) -> None:
-    """Write results.csv, timings.csv and report.md into a folder."""
+    """Write results.csv, timings.csv, report.md and report.html into a folder."""
     out.mkdir(parents=True, exist_ok=True)
     write_results(all_rows(done), out / "results.csv")
     write_text(out / "timings.csv", timings_csv(done))
     write_text(out / "report.md", markdown(done))
+    write_text(out / "report.html", html(done))
 
 
 @click.command(name="run")
@@ -63,7 +62,7 @@ def write(done: Sequence[Record], out: Path) -> None:
 @click.option("--out", type=click.Path(path_type=Path, file_okay=False), default=Path("results"), show_default=True)
 @click.option("--workers", type=click.IntRange(min=1), default=WORKERS, show_default=True, help="Processes.")
 def command(scenes: tuple[Path, ...], out: Path, workers: int) -> int:
-    """Judge scenes (default: all of models/) and write results.csv, timings.csv and report.md."""
+    """Judge scenes (default: all of models/) and write results.csv, timings.csv, report.md and report.html."""
     from rich.console import Console
     from rich.progress import track
 

@@ -42,6 +42,11 @@ def yardstick(quantity: str, scene: Scene, formulas: Solution, values: Array) ->
     return np.where(well, most if scale < VANISHING * most else scale, own)
 
 
+def divisor(sizes: Array) -> Array:
+    """A yardstick of zero demands an error of exactly zero: over the least double any other is huge."""
+    return np.where(sizes == 0.0, np.nextafter(0.0, 1.0), sizes)
+
+
 def term_sizes(quantity: str, scene: Scene, formulas: Solution) -> Array:
     """Sum of the absolute terms of the equation that a quantity is computed from, (n,)."""
     _, a, b, c = scene.linkage.lengths
