@@ -4,16 +4,19 @@
 
 The position is solved from the triangle A, B, O4 and its four Heron factors, never from the
 half-angle quadratic: nothing passes through zero at theta = 180 deg, and near a limit position
-the digits that are lost are those that the data themselves do not carry.
+the digits that are lost are those that the data themselves do not carry. A term that is zero at
+every position (alpha_2 = 0, theta_1 = 0, a centre on the bar's line) is not evaluated.
 """
 
+import math
 from dataclasses import dataclass
+from decimal import Decimal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.linkage import Bar, FourBar
-from fourbar.margins import heron_factors
+from fourbar.margins import diagonal_to_O4, scaled
 
 Array = NDArray[np.float64]
 Vector = tuple[Array, Array]
@@ -78,6 +81,12 @@ class State:
         assert value is not None, "accelerations were not evaluated"
         return value
 
+    def regular_sine(self) -> Array:
+        """sin_mu, NaN where the position is singular."""
+        if self.singular.any():
+            return np.where(self.singular, np.nan, self.sin_mu)
+        return self.sin_mu
+
     def angle(self, bar: int) -> Array:
         """theta_2 as given; theta_3, theta_4 in (-pi, pi]."""
         if bar == 2:
@@ -138,8 +147,14 @@ def along(u: Vector, r_along: float, r_across: float) -> Vector:
 
 def swing(arm: Vector, omega: Array | float, alpha: Array | float) -> Vector:
     """Acceleration of the end of an arm about its foot: alpha x r - omega^2 r."""
-    w2 = omega * omega
-    return (-alpha * arm[1] - w2 * arm[0], alpha * arm[0] - w2 * arm[1])
+    centripetal = -(omega * omega)
+    if _is_zero(alpha):
+        return (centripetal * arm[0], centripetal * arm[1])
+    return (centripetal * arm[0] - alpha * arm[1], centripetal * arm[1] + alpha * arm[0])
+
+
+def _is_zero(value: Array | float) -> bool:
+    return isinstance(value, (int, float)) and value == 0.0
 
 
 def centre_in_bar(bar: Bar) -> tuple[float, float]:
@@ -150,62 +165,67 @@ def centre_in_bar(bar: Bar) -> tuple[float, float]:
     return (float(r * np.cos(phi)), float(r * np.sin(phi)))
 
 
-def close_loop(linkage: FourBar, theta_2: Array, branch: int | NDArray[np.int8]) -> State:
+def close_loop(
+    linkage: FourBar, theta_2: Array, branch: int | NDArray[np.int8], offset: Decimal | None = None
+) -> State:
     """Positions on a branch: theta_3 = phi + sigma beta, theta_4 = phi + pi - sigma gamma.
 
     phi is the direction A to O4, beta and gamma are the angles of the triangle A, B, O4 at A and
-    O4, from the cosine rule written in Heron factors:
-        cos beta = (p3 p4 - p1 p2)/(4 b e),  sin beta = sqrt(p1 p2 p3 p4)/(2 b e),
+    O4, from the cosine rule and Heron's factors p1..p4 of its area:
+        cos beta = (e^2 + b^2 - c^2)/(2 b e),  sin beta = sqrt(p1 p2 p3 p4)/(2 b e),
         sin(theta_4 - theta_3) = sigma sqrt(p1 p2 p3 p4)/(2 b c).
 
     Parameters
     ----------
     theta_2 : (n,), rad.
     branch : +1 or -1, or one of them for each position (n,).
+    offset : what theta_2 as a double leaves out of the angle meant, rad.
     """
-    _, _, b, c = linkage.lengths
-    sigma = np.broadcast_to(np.asarray(branch, dtype=float), theta_2.shape)
-    diagonal = heron_factors(linkage, theta_2)
-    e = diagonal.length
-    p12, p34 = diagonal.p1 * diagonal.p2, diagonal.p3 * diagonal.p4
-    p13, p24 = diagonal.p1 * diagonal.p3, diagonal.p2 * diagonal.p4
-    assembled = (diagonal.p1 >= 0.0) & (diagonal.p2 >= 0.0) & (diagonal.p3 >= 0.0)
-    if not assembled.all():
-        p12 = np.where(assembled, p12, np.nan)
-    # two square roots: the product of all four factors could leave the range of doubles
-    area = sigma * (np.sqrt(p12) * np.sqrt(p34))
-    sin_mu = area / (2.0 * b * c)
-    cos_mu = (diagonal.p1 * diagonal.p4 - diagonal.p2 * diagonal.p3) / (4.0 * b * c)
-    with np.errstate(divide="ignore", invalid="ignore"):  # e = 0: A on O4, where beta is free
-        unit_x, unit_y = diagonal.x / e, diagonal.y / e
-        beta = ((p34 - p12) / (4.0 * b * e), area / (2.0 * b * e))
-        gamma = ((p24 - p13) / (4.0 * c * e), area / (2.0 * c * e))
-    theta_1 = linkage.ground_angle
+    diagonal = diagonal_to_O4(linkage, theta_2, offset)
+    _, _, _, b, c = scaled(linkage)
+    signs = np.asarray(branch, dtype=np.int8)
+    root = diagonal.root
+    if not (signs == 1).all():
+        root = signs * root
+    x, y = diagonal.x, diagonal.y
+    theta_1, d = linkage.ground_angle, linkage.ground
+    O4 = (d, 0.0)
+    u2 = ((1.0 - diagonal.t * diagonal.t) * diagonal.w, (2.0 * diagonal.t) * diagonal.w)
     if theta_1 != 0.0:
-        c1, s1 = np.cos(theta_1), np.sin(theta_1)
-        unit_x, unit_y = c1 * unit_x - s1 * unit_y, s1 * unit_x + c1 * unit_y
-        d_vector = (float(linkage.ground * c1), float(linkage.ground * s1))
-    else:
-        d_vector = (linkage.ground, 0.0)
-    u3 = (unit_x * beta[0] - unit_y * beta[1], unit_y * beta[0] + unit_x * beta[1])
-    u4 = (-(unit_x * gamma[0] + unit_y * gamma[1]), unit_x * gamma[1] - unit_y * gamma[0])
+        c1, s1 = math.cos(theta_1), math.sin(theta_1)
+        x, y = c1 * x - s1 * y, s1 * x + c1 * y
+        O4 = (d * c1, d * s1)
+        t = np.tan(0.5 * theta_2)  # not u2 turned by theta_1: a small component keeps its digits
+        w = 1.0 / (1.0 + t * t)
+        u2 = ((1.0 - t * t) * w, (2.0 * t) * w)
+    squared = diagonal.squared
+    excess = (b - c) * (b + c)
+    at_A, at_O4 = squared + excess, squared - excess
+    with np.errstate(divide="ignore", invalid="ignore"):  # e = 0: A on O4, where beta is free
+        to_3 = (0.5 / b) / squared
+    to_4 = to_3 * (b / c)
+    with np.errstate(invalid="ignore"):
+        u3 = (to_3 * (x * at_A - y * root), to_3 * (y * at_A + x * root))
+        u4 = (to_4 * -(x * at_O4 + y * root), to_4 * (x * root - y * at_O4))
+    sin_mu = (0.5 / (b * c)) * root
     return State(
         linkage=linkage,
         theta_2=theta_2,
-        branch=np.asarray(sigma, dtype=np.int8),
-        assembled=assembled,
-        u2=(np.cos(theta_2), np.sin(theta_2)),
+        branch=np.broadcast_to(signs, theta_2.shape),
+        assembled=diagonal.assembled,
+        u2=u2,
         u3=u3,
         u4=u4,
-        O4=d_vector,
+        O4=O4,
         sin_mu=sin_mu,
-        cos_mu=cos_mu,
-        singular=assembled & ~(np.abs(sin_mu) > NO_DIGIT_LEFT),
+        cos_mu=((b * b + c * c) - squared) * (0.5 / (b * c)),
+        singular=diagonal.assembled & ~(np.abs(sin_mu) > (NO_DIGIT_LEFT if offset is None else 0.0)),
     )
 
 
 NO_DIGIT_LEFT = 8.0 * 2.0**-52
-"""|sin mu| at or below this: the directions of bars 3 and 4 cannot be told apart in doubles."""
+"""|sin mu| at or below this: the directions of bars 3 and 4 cannot be told apart in doubles, unless
+the position is described by its offset from the limit."""
 
 
 def add_velocities(state: State, omega_2: Array | float) -> None:
@@ -214,11 +234,10 @@ def add_velocities(state: State, omega_2: Array | float) -> None:
     The loop's velocity multiplied by bars 4 and 3 (Norton, eq. 6.18); mu = theta_4 - theta_3.
     """
     _, a, b, c = state.linkage.lengths
-    s = np.where(state.singular, np.nan, state.sin_mu) if state.singular.any() else state.sin_mu
-    drive = -a * omega_2 / s
+    drive = -omega_2 / state.regular_sine()
     state.omega_2 = omega_2
-    state.omega_3 = drive * cross(state.u2, state.u4) / b
-    state.omega_4 = drive * cross(state.u2, state.u3) / c
+    state.omega_3 = drive * ((a / b) * cross(state.u2, state.u4))
+    state.omega_4 = drive * ((a / c) * cross(state.u2, state.u3))
 
 
 def add_accelerations(state: State, alpha_2: Array | float) -> None:
@@ -230,11 +249,10 @@ def add_accelerations(state: State, alpha_2: Array | float) -> None:
     _, a, b, c = state.linkage.lengths
     w2, w3, w4 = state.omega_2, state.omega_3, state.omega_4
     assert w3 is not None and w4 is not None, "velocities come first"
-    s = np.where(state.singular, np.nan, state.sin_mu) if state.singular.any() else state.sin_mu
-    centripetal = a * (w2 * w2)
-    term_4 = centripetal * dot(state.u2, state.u4)
-    term_3 = centripetal * dot(state.u2, state.u3)
-    if np.any(alpha_2):
+    s = state.regular_sine()
+    term_4 = (a * (w2 * w2)) * dot(state.u2, state.u4)
+    term_3 = (a * (w2 * w2)) * dot(state.u2, state.u3)
+    if not _is_zero(alpha_2):
         term_4 = term_4 - (a * alpha_2) * cross(state.u2, state.u4)
         term_3 = term_3 - (a * alpha_2) * cross(state.u2, state.u3)
     coupler, output = b * (w3 * w3), c * (w4 * w4)

@@ -35,20 +35,30 @@ class PinForces(NamedTuple):
 
 
 def add_inertia(wrenches: Wrenches, state: State) -> None:
-    """d'Alembert: -m a_G at G and the couple -I alpha on every bar that has mass or inertia."""
+    """d'Alembert: the force -m a_G and, about the bar's first pin, the moment -(I + m r^2) alpha - m r_G x a_pin.
+
+    The first pin moves on bar 3 alone; written about the pin, every term is positive where the
+    moment of -m a_G and -I alpha would cancel part of it.
+    """
     for number in MOVING_BARS:
         bar = state.linkage.bar(number)
-        if bar.mass != 0.0:
-            centre = centre_in_bar(bar)
+        centre = centre_in_bar(bar)
+        m, r2 = bar.mass, centre[0] * centre[0] + centre[1] * centre[1]
+        alpha = state.alpha(number)
+        if (inertia := bar.inertia + m * r2) != 0.0 and np.any(alpha):  # type: ignore[operator]
+            wrenches.add_moment(number, -inertia * alpha)
+        if m != 0.0:
             ax, ay = state.acceleration(number, *centre)
-            wrenches.add_force(number, (-bar.mass * ax, -bar.mass * ay), state.arm(number, *centre))
-        if bar.inertia != 0.0:
-            wrenches.add_moment(number, -bar.inertia * state.alpha(number))  # type: ignore[operator]
+            wrenches.add_force(number, (-m * ax, -m * ay))
+            if number == 3:
+                pin_x, pin_y = state.acceleration(2, state.linkage.input.length, 0.0)
+                wrenches.add_moment(3, cross(state.arm(3, *centre), (-m * pin_x, -m * pin_y)))
 
 
 def between(m_u: Array, m_v: Array, u: Vector, v: Vector, sine: Array) -> Vector:
     """The force F with u x F = m_u and v x F = m_v, for unit vectors with u x v = sine."""
-    return ((m_u * v[0] - m_v * u[0]) / sine, (m_u * v[1] - m_v * u[1]) / sine)
+    k_u, k_v = m_u / sine, m_v / sine
+    return (k_u * v[0] - k_v * u[0], k_u * v[1] - k_v * u[1])
 
 
 def solve_pins(state: State, terms: Iterable[Term], drive_bar: int, *, inertia: bool = True) -> PinForces:
@@ -75,7 +85,7 @@ def solve_pins(state: State, terms: Iterable[Term], drive_bar: int, *, inertia: 
     u2, u3, u4 = state.u2, state.u3, state.u4
     with np.errstate(divide="ignore", invalid="ignore"):
         if drive_bar == 2:
-            sine = np.where(state.singular, np.nan, state.sin_mu)
+            sine = state.regular_sine()
             F43 = between(-M3 / b, M4 / c, u3, u4, sine)
             F32 = (R3[0] + F43[0], R3[1] + F43[1])
             torque = -(M2 + a * cross(u2, F32))

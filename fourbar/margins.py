@@ -1,11 +1,13 @@
-"""The four Heron factors of the triangle A, B, O4: how far a position is from not closing.
+"""The diagonal A to O4 of the linkage, and how far a position is from not closing.
 
-With e the diagonal from A to O4, the loop closes where all of
-    p1 = b + c - e,   p2 = e + c - b,   p3 = e + b - c,   p4 = e + b + c
+With e the length of the diagonal, the loop closes where all of Heron's factors of the triangle
+A, B, O4,
+    p1 = b + c - e,   p2 = e + c - b,   p3 = e + b - c,   p4 = e + b + c,
 are >= 0; p1 = 0 is bars 3, 4 stretched, p2 = 0 or p3 = 0 is bars 3, 4 folded.
 """
 
 import decimal
+import math
 from dataclasses import dataclass
 from decimal import Decimal
 
@@ -20,7 +22,7 @@ U = 2.0**-53
 """Unit round-off of a double."""
 UNDECIDED = 32.0 * U
 """Margins smaller than this times the sum of the lengths are decided in 60 digits: the double
-evaluation (one sine, eight roundings) is wrong by at most about 12 U times that sum."""
+evaluation (one tangent, ten roundings) is wrong by at most about 12 U times that sum."""
 TOUCHING = U
 """A negative margin up to this times the sum of the lengths counts as zero: each length was
 itself rounded by up to U, so the linkage meant closes there as well as not."""
@@ -29,50 +31,108 @@ DIGITS = 60
 
 @dataclass(slots=True)
 class Diagonal:
-    """The diagonal A to O4 in the ground's frame and the Heron factors, each of shape (n,)."""
+    """The diagonal A to O4 and what it decides; lengths in units of `unit` (m), arrays of shape (n,)."""
 
+    unit: float
+    """A power of two near the longest bar: no product of lengths in it leaves the range of doubles."""
+    t: Array
+    """tan((theta_2 - theta_1)/2)."""
     x: Array
     y: Array
-    length: Array
-    p1: Array
-    p2: Array
-    p3: Array
-    p4: Array
+    """Components from A to O4 in the ground's frame."""
+    squared: Array
+    """e^2."""
+    root: Array
+    """sqrt(p1 p2 p3 p4), four times the area of the triangle A, B, O4; NaN where it does not close."""
+    w: Array
+    """cos^2((theta_2 - theta_1)/2)."""
+    assembled: NDArray[np.bool_]
 
 
-def heron_factors(linkage: FourBar, theta_2: Array) -> Diagonal:
-    """The diagonal and its margins: e^2 = (d - a)^2 + 4 a d sin^2((theta_2 - theta_1)/2).
+def scaled(linkage: FourBar) -> tuple[float, float, float, float, float]:
+    """The unit of `Diagonal` and (d, a, b, c) in it; exact."""
+    unit = math.ldexp(1.0, math.frexp(max(linkage.lengths))[1])
+    d, a, b, c = (length / unit for length in linkage.lengths)
+    return unit, d, a, b, c
 
-    Every term is positive, so e keeps full relative accuracy where it is small; margins near
-    zero are evaluated again in 60 digits, so their sign is right.
+
+def diagonal_to_O4(linkage: FourBar, theta_2: Array, offset: Decimal | None = None) -> Diagonal:
+    """The diagonal from t = tan((theta_2 - theta_1)/2): e^2 = ((d - a)^2 + (d + a)^2 t^2)/(1 + t^2).
+
+    Every term of e^2 is positive, so it keeps its relative accuracy where it is small. Margins
+    near zero are evaluated again in 60 digits, so their sign is right.
+
+    Parameters
+    ----------
+    theta_2 : (n,), rad.
+    offset : what theta_2 as a double leaves out of the angle meant, rad; then all margins are
+        evaluated in 60 digits.
     """
-    d, a, b, c = linkage.lengths
-    half = 0.5 * (theta_2 - linkage.ground_angle)
-    sine = np.sin(half)
-    step = 2.0 * a * sine
-    x = (d - a) + step * sine
-    y = -step * np.cos(half)
-    e = np.sqrt((d - a) * (d - a) + (2.0 * d) * sine * step)
-    diagonal = Diagonal(x, y, e, (b + c) - e, (c - b) + e, (b - c) + e, (b + c) + e)
-    limit = UNDECIDED * (a + b + c + d)
-    smallest = np.minimum(np.minimum(diagonal.p1, diagonal.p2), diagonal.p3)
-    for index in np.flatnonzero(np.abs(smallest) < limit):
-        _decide(linkage, diagonal, int(index), float(theta_2[index]))
-    return diagonal
+    unit, d, a, b, c = scaled(linkage)
+    theta_1 = linkage.ground_angle
+    t = np.tan(0.5 * theta_2 if theta_1 == 0.0 else 0.5 * (theta_2 - theta_1))
+    t2 = t * t
+    w = 1.0 / (1.0 + t2)
+    x = ((d - a) + (d + a) * t2) * w
+    y = (-2.0 * a) * (t * w)
+    squared = ((d - a) * (d - a) + ((d + a) * (d + a)) * t2) * w
+    e = np.sqrt(squared)
+    p1, p2, p3, p4 = (b + c) - e, e + (c - b), e + (b - c), e + (b + c)
+    undecided = UNDECIDED * (a + b + c + d)
+    if offset is None and e.max() < (b + c) - undecided and e.min() > abs(b - c) + undecided:
+        assembled = np.ones(e.shape, dtype=bool)
+    else:
+        smallest = np.minimum(p1, np.minimum(p2, p3))
+        assembled = smallest >= 0.0
+        close = np.full(e.shape, True) if offset is not None else np.abs(smallest) < undecided
+        for index in np.flatnonzero(close):
+            factors = _decide(linkage, float(theta_2[index]), offset or Decimal(0), unit)
+            p1[index], p2[index], p3[index], p4[index] = factors
+            assembled[index] = min(factors) >= 0.0
+        if not assembled.all():
+            p1 = np.where(assembled, p1, np.nan)
+    return Diagonal(unit, t, x, y, squared, np.sqrt((p1 * p2) * (p3 * p4)), w, assembled)
 
 
-def _decide(linkage: FourBar, diagonal: Diagonal, index: int, theta_2: float, offset: float = 0.0) -> None:
-    """Replace the margins of one position by their 60-digit values, rounded once."""
+def _decide(linkage: FourBar, theta_2: float, offset: Decimal, unit: float) -> tuple[float, ...]:
+    """The four margins of one position in 60 digits, each rounded once."""
     with decimal.localcontext() as context:
         context.prec = DIGITS
         d, a, b, c = (Decimal(length) for length in linkage.lengths)
-        cosine = _cosine(Decimal(theta_2) - Decimal(linkage.ground_angle) + Decimal(offset))
+        cosine = _cosine(Decimal(theta_2) - Decimal(linkage.ground_angle) + offset)
         e = ((d - a) ** 2 + 2 * a * d * (1 - cosine)).sqrt()
         touching = Decimal(TOUCHING) * (a + b + c + d)
-        for name, margin in (("p1", b + c - e), ("p2", e + c - b), ("p3", e + b - c), ("p4", e + b + c)):
-            value = Decimal(0) if -touching <= margin < 0 else margin
-            getattr(diagonal, name)[index] = float(value)
-        diagonal.length[index] = float(e)
+        margins = (b + c - e, e + c - b, e + b - c, e + b + c)
+        return tuple(float((Decimal(0) if -touching <= m < 0 else m) / Decimal(unit)) for m in margins)
+
+
+def limit_remainder(linkage: FourBar, limit: float, theta_2: float, offset: float) -> Decimal:
+    """(limit position + offset) - theta_2 in 60 digits, for the limit position whose double is `limit`.
+
+    The exact limit position is where bars 3, 4 are collinear:
+        cos(theta_2 - theta_1) = (a^2 + d^2 - (b +- c)^2)/(2 a d),
+    found by Newton's iteration from the double.
+    """
+    with decimal.localcontext() as context:
+        context.prec = DIGITS
+        d, a, b, c = (Decimal(length) for length in linkage.lengths)
+        theta_1 = Decimal(linkage.ground_angle)
+        angle = Decimal(limit)
+        at_limit = a * a + d * d - 2 * a * d * _cosine(angle - theta_1)
+        target = min(((b + c) ** 2, (b - c) ** 2), key=lambda squared: abs(squared - at_limit))
+        half_turn = _pi()
+        straight = theta_1 + ((angle - theta_1) / half_turn).to_integral_value() * half_turn
+        if a * a + d * d - 2 * a * d * _cosine(straight - theta_1) == target:
+            angle = straight  # a change point: the cosine is +-1 there, where Newton has no slope
+        else:
+            for _ in range(NEWTON_STEPS):
+                gap = a * a + d * d - 2 * a * d * _cosine(angle - theta_1) - target
+                angle -= gap / (2 * a * d * _cosine(angle - theta_1 - half_turn / 2))
+        return angle + Decimal(offset) - Decimal(theta_2)
+
+
+NEWTON_STEPS = 60
+"""The double's 16 digits double with each step; beside a change point they gain one bit each at first."""
 
 
 def _cosine(angle: Decimal) -> Decimal:

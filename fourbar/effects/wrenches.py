@@ -19,16 +19,17 @@ class Wrenches:
         self.force_y: dict[int, Any] = {2: 0.0, 3: 0.0, 4: 0.0}
         self.moments: dict[int, Any] = {2: 0.0, 3: 0.0, 4: 0.0}
 
-    def add_force(self, bar: int, force: Vector | tuple[float, float], arm: Vector) -> None:
-        """A force on a bar, applied at `arm` from the bar's first pin."""
-        self.force_x[bar] = self.force_x[bar] + force[0]
-        self.force_y[bar] = self.force_y[bar] + force[1]
-        self.moments[bar] = self.moments[bar] + cross(arm, force)  # type: ignore[arg-type]
+    def add_force(self, bar: int, force: Vector | tuple[float, float], arm: Vector | None = None) -> None:
+        """A force on a bar, applied at `arm` from the bar's first pin; at that pin where no arm is given."""
+        self.force_x[bar] = _plus(self.force_x[bar], force[0])
+        self.force_y[bar] = _plus(self.force_y[bar], force[1])
+        if arm is not None:
+            self.add_moment(bar, cross(arm, force))  # type: ignore[arg-type]
 
     def add_moment(self, bar: int, moment: Array | float) -> None:
         """A pure couple on a bar; on the ground (bar 1) it does nothing."""
         if bar != 1:
-            self.moments[bar] = self.moments[bar] + moment
+            self.moments[bar] = _plus(self.moments[bar], moment)
 
     def force(self, bar: int) -> Vector:
         """Resultant on a bar, N."""
@@ -41,3 +42,7 @@ class Wrenches:
     def moment(self, bar: int) -> Array:
         """Resultant moment on a bar about its first pin, N m."""
         return np.broadcast_to(np.asarray(self.moments[bar], float), self.state.theta_2.shape)
+
+
+def _plus(total: Array | float, term: Array | float) -> Array | float:
+    return term if isinstance(total, float) and total == 0.0 else total + term
