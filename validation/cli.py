@@ -11,6 +11,7 @@ from fourbar.errors import DependencyError, FourBarError
 
 COMMANDS = {
     "run": "validation.run:command",
+    "check": "validation.check:check",
     "published": "validation.published:published",
     "stability": "validation.stability:stability",
     "bench": "validation.bench:bench",

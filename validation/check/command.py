@@ -1,0 +1,119 @@
+"""`python -m validation check SCENE THEIRS.csv`: judge a user's own torques and forces."""
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+import click
+import numpy as np
+
+from fourbar.errors import InputError
+from fourbar.files import load
+from fourbar.scene import Command, Scene, command, solve
+from fourbar.solution import OK
+from validation.check.mistakes import Explanation, explain
+from validation.check.theirs import Array, Table, read_table
+from validation.compare import angle_aware_difference
+from validation.scales import divisor, yardstick
+from validation.tolerance import EPS, EQUIVALENCE, NOTHING_TO_TELL, condition_of
+
+SHOWN = 20
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One quantity at one position of the user's table."""
+
+    line: int
+    """In the user's file."""
+    quantity: str
+    error: float
+    allowed: float
+    theta_2: float
+    agrees: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Judgement:
+    """All findings, and the known mistakes that would explain them."""
+
+    findings: list[Finding]
+    not_assembled: list[int]
+    """Lines at which this linkage does not assemble, or is singular: there is no right answer there."""
+    explanations: list[Explanation]
+
+    @property
+    def differing(self) -> list[Finding]:
+        """The findings that do not agree."""
+        return [finding for finding in self.findings if not finding.agrees]
+
+
+def judge_table(scene: Scene, table: Table) -> Judgement:
+    """Judge every number by K eps/condition plus half a unit of its last printed digit."""
+    base = command(scene)
+    branch = np.full(len(table.theta_2), scene.motion.branch, dtype=np.int8)
+    at = Command(table.theta_2, branch, base.omega_2, base.alpha_2)
+    right = solve(scene, at=at)
+    ok = right.status_code == OK
+
+    def judged(quantity: str, ours: Array, theirs: Array) -> tuple[Array, Array]:
+        scale = divisor(yardstick(quantity, scene, right, getattr(right, quantity)))
+        error = angle_aware_difference(quantity, ours, theirs) / scale
+        condition = condition_of(quantity, right)
+        allowed = EQUIVALENCE.allowed(condition) + table.rounding[quantity] / scale
+        return error, np.where(condition * NOTHING_TO_TELL > EPS, allowed, np.inf)
+
+    def agrees(quantity: str, predicted: Array, theirs: Array) -> bool:
+        error, allowed = judged(quantity, predicted, theirs)
+        return bool(np.all((error <= allowed)[ok]))
+
+    findings = []
+    for quantity, theirs in table.values.items():
+        ours = getattr(right, quantity)
+        if ours is None:
+            raise InputError("motion.omega_2", None, f"is needed in the scene to judge {quantity}")
+        error, allowed = judged(quantity, ours, theirs)
+        for index in np.flatnonzero(ok):
+            numbers = (float(error[index]), float(allowed[index]), float(table.theta_2[index]))
+            findings.append(Finding(int(index) + 2, quantity, *numbers, bool(error[index] <= allowed[index])))
+    differing = sorted({finding.quantity for finding in findings if not finding.agrees})
+    known = explain(table, scene, at, right, differing, agrees) if differing else []
+    return Judgement(findings, [int(index) + 2 for index in np.flatnonzero(~ok)], known)
+
+
+@click.command()
+@click.argument("scene", type=click.Path(path_type=Path))
+@click.argument("theirs", type=click.Path(path_type=Path))
+def check(scene: Path, theirs: Path) -> int:
+    """Judge a table of torques and forces (THEIRS.csv) against the formulas, row by row.
+
+    Columns are named as by `fourbar analyze --csv`; a unit may follow in brackets:
+    theta_2 [deg], torque [N cm], F12_x, F12_y. Half a unit of the last printed digit is allowed.
+    """
+    from rich.console import Console
+    from rich.markup import escape
+    from rich.table import Table as Shown
+
+    judgement = judge_table(load(scene), read_table(theirs))
+    console = Console()
+    differing = judgement.differing
+    if differing:
+        shown = Shown(title=f"{escape(theirs.name)}: what differs, worst first")
+        for heading in ("line", "theta_2 [deg]", "quantity", "error", "allowed"):
+            shown.add_column(heading, justify="right")
+        for finding in sorted(differing, key=lambda f: -f.error)[:SHOWN]:
+            degrees = f"{math.degrees(finding.theta_2):.4f}"
+            numbers = (f"{finding.error:.2e}", f"{finding.allowed:.2e}")
+            shown.add_row(str(finding.line), degrees, finding.quantity, *numbers)
+        console.print(shown)
+    for line in judgement.not_assembled:
+        console.print(f"line {line}: the linkage has no motion there (it does not assemble, or is singular)")
+    for explanation in judgement.explanations:
+        quantities = ", ".join(explanation.quantities)
+        word = "explains everything that differs" if explanation.complete else f"explains {quantities}"
+        console.print(f"looks like: {escape(explanation.text)} ({word})")
+    if differing and not judgement.explanations:
+        console.print("no single known mistake explains it")
+    count = len(judgement.findings)
+    console.print(f"[bold]{count - len(differing)} of {count} numbers agree[/]")
+    return 1 if differing or judgement.not_assembled else 0

@@ -1,0 +1,164 @@
+"""Known mistakes as hypotheses: what the numbers would be if it had been made, held against what they are."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from fourbar.effects import Gravity
+from fourbar.linkage import Bar
+from fourbar.scene import Command, Scene, solve
+from fourbar.solution import VECTORS, Solution
+from validation.check.theirs import Array, Table
+
+POWERS_OF_TEN = (-6, -5, -4, -3, -2, -1, 1, 2, 3, 4, 5, 6)
+
+
+@dataclass(frozen=True, slots=True)
+class Mistake:
+    """A hypothesis: what was done, and what it turns the right numbers into."""
+
+    text: str
+    predict: Callable[[str, Solution], Array | None]
+    """quantity, right solution -> what would have been printed; None where it changes nothing of it."""
+    only: frozenset[str] | None = None
+    """The quantities it can touch; None: any."""
+
+
+def hypotheses(scene: Scene, at: Command) -> Iterator[Mistake]:
+    """Every mistake that this scene gives room for, the simplest first."""
+    yield Mistake(
+        "sign reversed, or F_ij given for F_ji", lambda quantity, right: _where(quantity, right, lambda v: -v)
+    )
+    for power in POWERS_OF_TEN:
+        factor = 10.0**power
+        yield Mistake(
+            f"units: every number is 10^{power} of ours (N cm for N m is 10^2, mm for m 10^3)",
+            lambda quantity, right, factor=factor: _where(quantity, right, lambda v: factor * v),  # type: ignore[misc]
+        )
+    yield Mistake(
+        "degrees where radians were announced",
+        lambda quantity, right: _where(quantity, right, np.degrees) if _is_angular(quantity) else None,
+    )
+    yield Mistake(
+        "x and y exchanged",
+        lambda quantity, right: _where(quantity, right, lambda v: v[:, ::-1]) if quantity in VECTORS else None,
+    )
+    for text, changed, where in _other_problems(scene, at):
+        try:
+            wrong = solve(changed, at=where)
+        except ValueError:
+            continue
+        yield Mistake(text, lambda quantity, right, wrong=wrong: getattr(wrong, quantity, None))  # type: ignore[misc]
+
+
+def _other_problems(scene: Scene, at: Command) -> Iterator[tuple[str, Scene, Command]]:
+    """The same formulas on the scene that the mistake amounts to."""
+    yield "the other branch", scene, at._replace(branch=-at.branch)
+    yield "theta_2 read as degrees", scene, at._replace(theta_2=np.radians(at.theta_2))
+    gravity = [effect for effect in scene.effects if isinstance(effect, Gravity)]
+    if gravity:
+        others = tuple(effect for effect in scene.effects if not isinstance(effect, Gravity))
+        yield "gravity is missing", replace(scene, effects=others), at
+        flipped = tuple(replace(g, magnitude=-g.magnitude) for g in gravity)
+        yield "gravity points the other way", replace(scene, effects=(*others, *flipped)), at
+    else:
+        yield "gravity along -y is included though the scene has none", _with_gravity(scene), at
+    if scene.loads:
+        yield "the loads are missing", replace(scene, loads=()), at
+        for number, load in enumerate(scene.loads, 1):
+            kept = tuple(other for other in scene.loads if other is not load)
+            yield f"load {number} (bar {load.bar}) is missing", replace(scene, loads=kept), at
+    if at.omega_2 is not None:
+        yield "no inertial forces (statics)", scene, at._replace(omega_2=0.0, alpha_2=0.0)
+        if np.any(at.alpha_2):
+            yield "alpha_2 is left out", scene, at._replace(alpha_2=0.0)
+        rpm = np.pi / 30.0
+        yield "omega_2 in rev/min taken for rad/s", scene, at._replace(omega_2=at.omega_2 / rpm)
+    for bar in ("input", "coupler", "output"):
+        for text, change in BAR_MISTAKES:
+            link = scene.linkage
+            if (changed := change(getattr(link, bar))) is not None:
+                bars: dict[str, Any] = {bar: changed}
+                yield f"{bar}: {text}", replace(scene, linkage=replace(link, **bars)), at
+    for drive in {2, 3, 4} - {scene.drive_bar}:
+        yield f"the torque acts on bar {drive} instead of bar {scene.drive_bar}", replace(scene, drive_bar=drive), at
+
+
+def _with_gravity(scene: Scene) -> Scene:
+    return replace(scene, effects=(*scene.effects, Gravity()))
+
+
+def _from_other_pin(bar: Bar) -> Bar | None:
+    r, phi = bar.centre or (0.0, 0.0)
+    x, y = bar.length - r * np.cos(phi), r * np.sin(phi)
+    return replace(bar, centre=(float(np.hypot(x, y)), float(np.arctan2(y, x)))) if bar.mass else None
+
+
+def _about_pin(bar: Bar) -> Bar | None:
+    assert bar.centre is not None and bar.inertia is not None
+    return replace(bar, inertia=bar.inertia + bar.mass * bar.centre[0] ** 2) if bar.mass else None
+
+
+def _mid_bar(bar: Bar) -> Bar | None:
+    return replace(bar, centre=(bar.length / 2.0, 0.0)) if bar.mass else None
+
+
+def _no_inertia(bar: Bar) -> Bar | None:
+    return replace(bar, inertia=0.0) if bar.inertia else None
+
+
+def _inertia_times(factor: float) -> Callable[[Bar], Bar | None]:
+    return lambda bar: replace(bar, inertia=bar.inertia * factor) if bar.inertia else None
+
+
+BAR_MISTAKES: tuple[tuple[str, Callable[[Bar], Bar | None]], ...] = (
+    ("mass centre measured from the wrong pin", _from_other_pin),
+    ("mass centre taken at mid-bar", _mid_bar),
+    ("inertia about the pin used as the inertia about G", _about_pin),
+    ("moment of inertia left out", _no_inertia),
+    ("moment of inertia in kg cm^2 taken for kg m^2", _inertia_times(1e4)),
+    ("moment of inertia 10^4 too small", _inertia_times(1e-4)),
+)
+
+
+def _is_angular(quantity: str) -> bool:
+    return quantity.startswith(("theta", "omega", "alpha"))
+
+
+def _where(quantity: str, right: Solution, change: Callable[[Array], Array]) -> Array | None:
+    values = getattr(right, quantity, None)
+    return None if values is None else change(values)
+
+
+@dataclass(frozen=True, slots=True)
+class Explanation:
+    """A mistake that accounts for what differs."""
+
+    text: str
+    quantities: tuple[str, ...]
+    """The quantities that agree once it is assumed."""
+    complete: bool
+    """Whether every quantity that differed now agrees."""
+
+
+def explain(
+    table: Table,
+    scene: Scene,
+    at: Command,
+    right: Solution,
+    differing: list[str],
+    agrees: Callable[[str, Array, Array], bool],
+) -> list[Explanation]:
+    """The hypotheses under which quantities that differ agree; the most complete first."""
+    found = []
+    for mistake in hypotheses(scene, at):
+        explained = []
+        for quantity in differing:
+            predicted = mistake.predict(quantity, right)
+            if predicted is not None and agrees(quantity, predicted, table.values[quantity]):
+                explained.append(quantity)
+        if explained:
+            found.append(Explanation(mistake.text, tuple(explained), len(explained) == len(differing)))
+    return sorted(found, key=lambda e: -len(e.quantities))

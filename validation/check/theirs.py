@@ -1,0 +1,115 @@
+"""Reading a table of somebody's results: columns named as `fourbar analyze --csv` names them, units in brackets.
+
+    theta_2 [deg], torque [N cm], F12_x, F12_y
+
+Without a unit a column is SI (rad). How many digits were printed decides how much rounding is
+theirs: half a unit of the last printed digit is always allowed.
+"""
+
+import csv
+import math
+from dataclasses import dataclass
+from decimal import Decimal, InvalidOperation
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fourbar.errors import InputError
+from fourbar.solution import UNITS, VECTORS
+
+Array = NDArray[np.float64]
+
+LARGEST_FILE = 64 * 2**20
+"""Bytes; a table larger than this is not a hand-made comparison."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Table:
+    """Somebody's numbers in SI: theta_2 (n,), and per quantity values (n,) or (n, 2) with their rounding."""
+
+    theta_2: Array
+    values: dict[str, Array]
+    rounding: dict[str, Array]
+    """Half a unit of the last digit printed, in SI, (n,)."""
+
+
+def read_table(path: Path) -> Table:
+    """Read a CSV table; InputError names the column or line that cannot be read."""
+    lines = _lines(path)
+    if not lines or len(lines) < 2:
+        raise InputError("table", path.name, "needs a header and at least one row", str(path))
+    columns = [_column(path, heading) for heading in lines[0]]
+    names = [name for name, _ in columns]
+    if len(set(names)) != len(names):
+        raise InputError("header", lines[0], "names a column twice", str(path))
+    if "theta_2" not in names:
+        raise InputError("header", lines[0], "needs a column theta_2 (say theta_2 [deg] for degrees)", str(path))
+    numbers = np.empty((len(lines) - 1, len(columns)))
+    halves = np.empty_like(numbers)
+    for line, cells in enumerate(lines[1:], 2):
+        if len(cells) != len(columns):
+            raise InputError(f"line {line}", cells, f"needs {len(columns)} cells", str(path))
+        for index, cell in enumerate(cells):
+            numbers[line - 2, index], halves[line - 2, index] = _number(path, line, cell)
+    factors = np.array([factor for _, factor in columns])
+    numbers, halves = numbers * factors, halves * factors
+    by_name = {name: numbers[:, index] for index, name in enumerate(names)}
+    half_by_name = {name: halves[:, index] for index, name in enumerate(names)}
+    values, rounding = {}, {}
+    for quantity in UNITS:
+        if quantity in VECTORS and {f"{quantity}_x", f"{quantity}_y"} <= by_name.keys():
+            pair = (f"{quantity}_x", f"{quantity}_y")
+            values[quantity] = np.stack([by_name[name] for name in pair], axis=1)
+            rounding[quantity] = np.hypot(*(half_by_name[name] for name in pair))
+        elif quantity in by_name and quantity != "theta_2":
+            values[quantity], rounding[quantity] = by_name[quantity], half_by_name[quantity]
+    if not values:
+        raise InputError("header", lines[0], "needs a result, such as torque or F12_x and F12_y", str(path))
+    return Table(by_name["theta_2"], values, rounding)
+
+
+def _lines(path: Path) -> list[list[str]]:
+    try:
+        if path.stat().st_size > LARGEST_FILE:
+            raise InputError("table", path.name, f"must be smaller than {LARGEST_FILE // 2**20} MB", str(path))
+        with path.open(newline="", encoding="utf-8-sig") as file:
+            return [row for row in csv.reader(file) if any(cell.strip() for cell in row)]
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        reason = error.strerror if isinstance(error, OSError) else "must be a CSV file in UTF-8"
+        raise InputError("table", path.name, str(reason), str(path)) from None
+
+
+def _column(path: Path, heading: str) -> tuple[str, float]:
+    """The quantity of a column and the factor that brings it to SI."""
+    name, _, rest = heading.strip().partition("[")
+    name, unit = name.strip(), rest.rstrip("] ").strip()
+    quantity = name[:-2] if name[-2:] in ("_x", "_y") and name[:-2] in VECTORS else name
+    if quantity not in UNITS or (quantity in VECTORS and quantity == name):
+        known = ", ".join(f"{q}_x, {q}_y" if q in VECTORS else q for q in UNITS)
+        raise InputError("header", heading, f"is not a known column; known are {known}", str(path))
+    if not unit:
+        return name, 1.0
+    from fourbar.units import factor_to
+
+    try:
+        return name, factor_to(UNITS[quantity], unit)
+    except InputError as error:
+        raise InputError("header", heading, error.allowed, str(path)) from None
+
+
+def _number(path: Path, line: int, cell: str) -> tuple[float, float]:
+    """The number in a cell and half a unit of its last printed digit."""
+    text = cell.strip()
+    try:
+        exact = Decimal(text)
+    except InvalidOperation:
+        raise InputError(f"line {line}", cell, "must be a number", str(path)) from None
+    if not exact.is_finite():
+        raise InputError(f"line {line}", cell, "must be a finite number", str(path))
+    exponent = exact.as_tuple().exponent
+    assert isinstance(exponent, int)
+    value = float(exact)
+    if not math.isfinite(value):
+        raise InputError(f"line {line}", cell, "is larger than a double can hold", str(path))
+    return value, 0.5 * 10.0**exponent
