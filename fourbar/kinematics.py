@@ -10,13 +10,12 @@ every position (alpha_2 = 0, theta_1 = 0, a centre on the bar's line) is not eva
 
 import math
 from dataclasses import dataclass
-from decimal import Decimal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.linkage import Bar, FourBar
-from fourbar.margins import diagonal_to_O4, scaled
+from fourbar.margins import Diagonal, diagonal_to_O4, scaled
 
 Array = NDArray[np.float64]
 Vector = tuple[Array, Array]
@@ -55,6 +54,7 @@ class State:
     u3: Vector
     u4: Vector
     O4: tuple[float, float]
+    diagonal: Diagonal
     sin_mu: Array
     cos_mu: Array
     singular: NDArray[np.bool_]
@@ -166,7 +166,7 @@ def centre_in_bar(bar: Bar) -> tuple[float, float]:
 
 
 def close_loop(
-    linkage: FourBar, theta_2: Array, branch: int | NDArray[np.int8], offset: Decimal | None = None
+    linkage: FourBar, theta_2: Array, branch: int | NDArray[np.int8], diagonal: Diagonal | None = None
 ) -> State:
     """Positions on a branch: theta_3 = phi + sigma beta, theta_4 = phi + pi - sigma gamma.
 
@@ -179,9 +179,9 @@ def close_loop(
     ----------
     theta_2 : (n,), rad.
     branch : +1 or -1, or one of them for each position (n,).
-    offset : what theta_2 as a double leaves out of the angle meant, rad.
+    diagonal : the diagonal A to O4 where it is known already.
     """
-    diagonal = diagonal_to_O4(linkage, theta_2, offset)
+    diagonal = diagonal_to_O4(linkage, theta_2) if diagonal is None else diagonal
     _, _, _, b, c = scaled(linkage)
     signs = np.asarray(branch, dtype=np.int8)
     root = diagonal.root
@@ -217,9 +217,10 @@ def close_loop(
         u3=u3,
         u4=u4,
         O4=O4,
+        diagonal=diagonal,
         sin_mu=sin_mu,
         cos_mu=((b * b + c * c) - squared) * (0.5 / (b * c)),
-        singular=diagonal.assembled & ~(np.abs(sin_mu) > (NO_DIGIT_LEFT if offset is None else 0.0)),
+        singular=diagonal.assembled & ~(np.abs(sin_mu) > (NO_DIGIT_LEFT if diagonal.offset is None else 0.0)),
     )
 
 

@@ -5,7 +5,7 @@ driven bar k. The thirteen equations of the free bodies (Norton, ch. 11) are eli
 one 2x2 system whose determinant is the sine between the two bars that are not driven.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -61,7 +61,9 @@ def between(m_u: Array, m_v: Array, u: Vector, v: Vector, sine: Array) -> Vector
     return (k_u * v[0] - k_v * u[0], k_u * v[1] - k_v * u[1])
 
 
-def solve_pins(state: State, terms: Iterable[Term], drive_bar: int, *, inertia: bool = True) -> PinForces:
+def solve_pins(
+    state: State, terms: Iterable[Term], drive_bar: int, *, inertia: bool = True, factors: Iterator[float] | None = None
+) -> PinForces:
     """Pin forces and driving torque for the terms that act.
 
     The moments of the two bars that are not driven, about their outer pins, give the force
@@ -73,9 +75,10 @@ def solve_pins(state: State, terms: Iterable[Term], drive_bar: int, *, inertia: 
     terms : loads and effects.
     drive_bar : 2, 3 or 4.
     inertia : False leaves out -m a and -I alpha (statics).
+    factors : multipliers of the terms, for the error bars.
     """
     _, a, b, c = state.linkage.lengths
-    wrenches = Wrenches(state)
+    wrenches = Wrenches(state, factors)
     if inertia:
         add_inertia(wrenches, state)
     for term in terms:

@@ -27,6 +27,7 @@ TOUCHING = U
 """A negative margin up to this times the sum of the lengths counts as zero: each length was
 itself rounded by up to U, so the linkage meant closes there as well as not."""
 DIGITS = 60
+NONE = np.empty(0, dtype=np.intp)
 
 
 @dataclass(slots=True)
@@ -47,6 +48,10 @@ class Diagonal:
     w: Array
     """cos^2((theta_2 - theta_1)/2)."""
     assembled: NDArray[np.bool_]
+    decided: NDArray[np.intp]
+    """Indices of the positions whose margins were evaluated in 60 digits."""
+    offset: Decimal | None
+    """What theta_2 as a double leaves out of the angle meant, rad, where that is known."""
 
 
 def scaled(linkage: FourBar) -> tuple[float, float, float, float, float]:
@@ -56,7 +61,9 @@ def scaled(linkage: FourBar) -> tuple[float, float, float, float, float]:
     return unit, d, a, b, c
 
 
-def diagonal_to_O4(linkage: FourBar, theta_2: Array, offset: Decimal | None = None) -> Diagonal:
+def diagonal_to_O4(
+    linkage: FourBar, theta_2: Array, offset: Decimal | None = None, *, decide: bool = True
+) -> Diagonal:
     """The diagonal from t = tan((theta_2 - theta_1)/2): e^2 = ((d - a)^2 + (d + a)^2 t^2)/(1 + t^2).
 
     Every term of e^2 is positive, so it keeps its relative accuracy where it is small. Margins
@@ -67,6 +74,7 @@ def diagonal_to_O4(linkage: FourBar, theta_2: Array, offset: Decimal | None = No
     theta_2 : (n,), rad.
     offset : what theta_2 as a double leaves out of the angle meant, rad; then all margins are
         evaluated in 60 digits.
+    decide : False leaves margins near zero as doubles give them.
     """
     unit, d, a, b, c = scaled(linkage)
     theta_1 = linkage.ground_angle
@@ -79,19 +87,23 @@ def diagonal_to_O4(linkage: FourBar, theta_2: Array, offset: Decimal | None = No
     e = np.sqrt(squared)
     p1, p2, p3, p4 = (b + c) - e, e + (c - b), e + (b - c), e + (b + c)
     undecided = UNDECIDED * (a + b + c + d)
+    decided = NONE
     if offset is None and e.max() < (b + c) - undecided and e.min() > abs(b - c) + undecided:
         assembled = np.ones(e.shape, dtype=bool)
     else:
         smallest = np.minimum(p1, np.minimum(p2, p3))
         assembled = smallest >= 0.0
-        close = np.full(e.shape, True) if offset is not None else np.abs(smallest) < undecided
-        for index in np.flatnonzero(close):
+        if offset is not None:
+            decided = np.arange(e.size)
+        elif decide:
+            decided = np.flatnonzero(np.abs(smallest) < undecided)
+        for index in decided:
             factors = _decide(linkage, float(theta_2[index]), offset or Decimal(0), unit)
             p1[index], p2[index], p3[index], p4[index] = factors
             assembled[index] = min(factors) >= 0.0
         if not assembled.all():
             p1 = np.where(assembled, p1, np.nan)
-    return Diagonal(unit, t, x, y, squared, np.sqrt((p1 * p2) * (p3 * p4)), w, assembled)
+    return Diagonal(unit, t, x, y, squared, np.sqrt((p1 * p2) * (p3 * p4)), w, assembled, decided, offset)
 
 
 def _decide(linkage: FourBar, theta_2: float, offset: Decimal, unit: float) -> tuple[float, ...]:

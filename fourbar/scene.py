@@ -1,19 +1,22 @@
 """A scene: linkage, motion, drive, loads and effects; `solve` evaluates only the stages asked for."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from decimal import Decimal
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.effects import Friction, Gravity, Load, Viscous
+from fourbar.error_bars import error_bars
 from fourbar.errors import FourBarError, InputError
 from fourbar.kinematics import Array, State, Vector, add_accelerations, add_velocities, centre_in_bar, close_loop
 from fourbar.kinetostatics import solve_pins
 from fourbar.linkage import MOVING_BARS, FourBar, require
+from fourbar.margins import diagonal_to_O4, limit_remainder
 from fourbar.mobility import default_range, limit_positions, on_smooth_path
-from fourbar.solution import NOT_ASSEMBLED, OK, SINGULAR, STAGE_OF, STAGES, VECTORS, Solution, unwrap
+from fourbar.solution import NOT_ASSEMBLED, OK, SINGULAR, STAGE_OF, STAGES, VECTORS, Solution, Unwrapped
 
 Effect = Gravity | Viscous | Friction
 OPEN, CROSSED = 1, -1
@@ -127,17 +130,19 @@ class Command(NamedTuple):
     """rad/s; None: positions only."""
     alpha_2: float | Array
     """rad/s^2."""
+    remainder: Decimal | None = None
+    """What theta_2 as a double leaves out of the one angle meant, rad: a limit position plus its offset."""
 
 
 DEFAULT_STEPS = 360
-BLOCK = 2048
-"""Positions evaluated at a time: their arrays stay in the second-level cache."""
+BLOCK = 4096
+"""Positions evaluated at a time, measured: fewer pay for calls, more leave the second-level cache."""
 
 
 def command(scene: Scene) -> Command:
     """The positions that the scene's motion names, each with its branch."""
     motion, linkage = scene.motion, scene.linkage
-    asked = motion.theta_2
+    asked, remainder = motion.theta_2, None
     if asked is None:
         asked = Sweep(*default_range(linkage), DEFAULT_STEPS)
     if isinstance(asked, Sweep):
@@ -148,96 +153,140 @@ def command(scene: Scene) -> Command:
             raise InputError("motion.theta_2.limit", asked.limit, "the input of this linkage has no limit positions")
         if asked.limit > len(limits):
             raise InputError("motion.theta_2.limit", asked.limit, f"must be from 1 to {len(limits)}")
-        theta_2 = np.array([limits[asked.limit - 1].theta_2 + asked.offset])
+        limit = limits[asked.limit - 1].theta_2
+        theta_2 = np.array([limit + asked.offset])
+        remainder = limit_remainder(linkage, limit, float(theta_2[0]), asked.offset)
     else:
         theta_2 = np.atleast_1d(np.asarray(asked, dtype=float))
     branch = np.full(theta_2.shape, motion.branch, dtype=np.int8)
     if motion.through == "follow":
         branch = on_smooth_path(linkage, theta_2, motion.branch)
-    return Command(theta_2, branch, motion.omega_2, motion.alpha_2)
+    return Command(theta_2, branch, motion.omega_2, motion.alpha_2, remainder)
 
 
-def solve(scene: Scene, stage: str | None = None, *, at: Command | None = None) -> Solution:
+def solve(
+    scene: Scene, stage: str | None = None, *, at: Command | None = None, out: Mapping[str, Array] | None = None
+) -> Solution:
     """Evaluate a scene with the closed formulas, no further than asked.
 
     Parameters
     ----------
-    stage : "position", "velocity", "acceleration" or "force"; each includes those before it.
-        Left out: "force", or "position" where the scene states no omega_2.
+    stage : "position", "velocity", "acceleration", "force" or "error"; each includes those before
+        it. Left out: "error", or "position" where the scene states no omega_2.
     at : other positions, velocities and accelerations of the input than the scene's own.
+    out : arrays to write into, by name, (n,) or (n, 2); only the quantities named are evaluated,
+        with the stages they need, and the others are None in the result.
 
     Raises
     ------
-    InputError : the stage is unknown, or needs an omega_2 that the scene does not state.
+    InputError : the stage or a name in `out` is unknown, its array has the wrong shape, or the
+        scene does not state the omega_2 that is needed.
     """
     where = command(scene) if at is None else at
-    if stage is None:
-        stage = "position" if where.omega_2 is None else "force"
-    if stage not in STAGES:
-        raise InputError("stage", stage, "must be one of " + ", ".join(STAGES))
+    n = len(where.theta_2)
+    if out is None:
+        if stage is None:
+            stage = "position" if where.omega_2 is None else STAGES[-1]
+        if stage not in STAGES:
+            raise InputError("stage", stage, "must be one of " + ", ".join(STAGES))
+        wanted = STAGES.index(stage)
+        names = [name for name, of in STAGE_OF.items() if STAGES.index(of) <= wanted]
+        # vectors component by component in memory: each is written and read in one piece
+        result = {name: np.empty((2, n)).T if name in VECTORS else np.empty(n) for name in names}
+    else:
+        result = dict(out)
+        wanted = _highest_stage(result, n)
+        stage = STAGES[wanted]
     if stage != "position" and where.omega_2 is None:
         raise InputError("motion.omega_2", None, f"is needed for the stage {stage!r}")
     if scene.motion.free is not None and at is None:
         raise FourBarError("a free motion is not evaluated position by position")
-    wanted = STAGES.index(stage)
-    n = len(where.theta_2)
-    names = [name for name, of in STAGE_OF.items() if STAGES.index(of) <= wanted]
-    out = {name: np.empty((n, 2) if name in VECTORS else n) for name in names}
     code = np.empty(n, dtype=np.uint8)
+    unwrapped = {name: Unwrapped() for name in ("theta_3", "theta_4") if name in result}
     for start in range(0, n, BLOCK):
-        part = slice(start, start + BLOCK)
-        code[part] = _solve_block(scene, where, part, wanted, out)
-    for name in ("theta_3", "theta_4"):
-        out[name] = unwrap(out[name])
-    return Solution(scene.title, scene.drive_bar, code, np.asarray(where.branch), where.theta_2, **out)
+        part = slice(start, min(start + BLOCK, n))
+        code[part] = _solve_block(scene, where, part, wanted, {name: array[part] for name, array in result.items()})
+        for name, turns in unwrapped.items():
+            turns.extend(result[name][part])
+    return Solution(scene.title, scene.drive_bar, code, np.asarray(where.branch), where.theta_2, **result)
 
 
-def _solve_block(scene: Scene, where: Command, part: slice, wanted: int, out: dict[str, Array]) -> NDArray[np.uint8]:
+def _highest_stage(out: Mapping[str, Array], n: int) -> int:
+    """The last stage that the quantities named need; an InputError where one cannot be written."""
+    for name, array in out.items():
+        if name not in STAGE_OF:
+            raise InputError("out", name, "must be among " + ", ".join(STAGE_OF))
+        shape = (n, 2) if name in VECTORS else (n,)
+        if array.shape != shape or array.dtype != np.float64:
+            raise InputError(f"out.{name}", (array.shape, str(array.dtype)), f"must be float64 of shape {shape}")
+    return max((STAGES.index(STAGE_OF[name]) for name in out), default=0)
+
+
+KINEMATIC: dict[str, Callable[[State], Array | Vector | float | None]] = {
+    "theta_3": lambda state: state.angle(3),
+    "theta_4": lambda state: state.angle(4),
+    "sin_mu": lambda state: state.sin_mu,
+    "condition": lambda state: np.abs(state.sin_mu),
+    "A": lambda state: state.pin("A"),
+    "B": lambda state: state.pin("B"),
+    "G2": lambda state: state.point(2, *centre_in_bar(state.linkage.input)),
+    "G3": lambda state: state.point(3, *centre_in_bar(state.linkage.coupler)),
+    "G4": lambda state: state.point(4, *centre_in_bar(state.linkage.output)),
+    "omega_2": lambda state: state.omega_2,
+    "omega_3": lambda state: state.omega_3,
+    "omega_4": lambda state: state.omega_4,
+    "alpha_2": lambda state: state.alpha_2,
+    "alpha_3": lambda state: state.alpha_3,
+    "alpha_4": lambda state: state.alpha_4,
+    "a_A": lambda state: state.acceleration(2, state.linkage.input.length, 0.0),
+    "a_B": lambda state: state.acceleration(4, state.linkage.output.length, 0.0),
+    "a_G2": lambda state: state.acceleration(2, *centre_in_bar(state.linkage.input)),
+    "a_G3": lambda state: state.acceleration(3, *centre_in_bar(state.linkage.coupler)),
+    "a_G4": lambda state: state.acceleration(4, *centre_in_bar(state.linkage.output)),
+}
+"""The quantities up to the acceleration, from the state of the stage that they belong to."""
+
+
+def _solve_block(
+    scene: Scene, where: Command, part: slice, wanted: int, out: Mapping[str, Array]
+) -> NDArray[np.uint8] | int:
     """Evaluate one block of positions into the result arrays; its status codes."""
-
-    def put(name: str, value: Array | Vector | float | None) -> None:
-        target = out[name]
-        if isinstance(value, tuple):
-            target[part, 0], target[part, 1] = value
-        else:
-            assert value is not None
-            target[part] = value
-
-    state = close_loop(scene.linkage, where.theta_2[part], where.branch[part])
-    bars = {number: scene.linkage.bar(number) for number in MOVING_BARS}
-    _put_positions(state, put)
+    theta_2, branch = where.theta_2[part], where.branch[part]
+    if where.remainder is None:
+        state = close_loop(scene.linkage, theta_2, branch)
+    else:
+        exact = diagonal_to_O4(scene.linkage, theta_2, where.remainder)
+        state = close_loop(scene.linkage, theta_2, branch, exact)
     if wanted >= 1:
-        omega_2 = _piece(where.omega_2, part)
-        add_velocities(state, omega_2)
-        for name, value in (("omega_2", omega_2), ("omega_3", state.omega_3), ("omega_4", state.omega_4)):
-            put(name, value)
+        add_velocities(state, _piece(where.omega_2, part))
     if wanted >= 2:
-        alpha_2 = _piece(where.alpha_2, part)
-        add_accelerations(state, alpha_2)
-        for name, value in (("alpha_2", alpha_2), ("alpha_3", state.alpha_3), ("alpha_4", state.alpha_4)):
-            put(name, value)
-        put("a_A", state.acceleration(2, scene.linkage.input.length, 0.0))
-        put("a_B", state.acceleration(4, scene.linkage.output.length, 0.0))
-        for number, bar in bars.items():
-            put(f"a_G{number}", state.acceleration(number, *centre_in_bar(bar)))
+        add_accelerations(state, _piece(where.alpha_2, part))
+    for name, array in out.items():
+        if name in KINEMATIC:
+            _put(array, KINEMATIC[name](state))
     if wanted >= 3:
-        pins = solve_pins(state, (*scene.loads, *scene.effects), scene.drive_bar)
+        terms = (*scene.loads, *scene.effects)
+        pins = solve_pins(state, terms, scene.drive_bar)
         for name in ("F12", "F32", "F43", "F14", "torque"):
-            put(name, getattr(pins, name))
-        put("drive_condition", np.abs(pins.drive_sine))
+            if name in out:
+                _put(out[name], getattr(pins, name))
+        if "drive_condition" in out:
+            np.abs(pins.drive_sine, out=out["drive_condition"])
+        if wanted >= 4:
+            for name, value in error_bars(state, pins, terms, scene.drive_bar).items():
+                if name in out:
+                    out[name][...] = value
+    if state.assembled.all() and not state.singular.any():
+        return OK
     return np.where(state.assembled, np.where(state.singular, SINGULAR, OK), NOT_ASSEMBLED).astype(np.uint8)
 
 
-def _put_positions(state: State, put: Callable[[str, Array | Vector | float | None], None]) -> None:
-    linkage = state.linkage
-    put("theta_3", state.angle(3))
-    put("theta_4", state.angle(4))
-    put("sin_mu", state.sin_mu)
-    put("condition", np.abs(state.sin_mu))
-    put("A", state.pin("A"))
-    put("B", state.pin("B"))
-    for number in MOVING_BARS:
-        put(f"G{number}", state.point(number, *centre_in_bar(linkage.bar(number))))
+def _put(target: Array, value: Array | Vector | float | None) -> None:
+    if isinstance(value, tuple):
+        target[:, 0], target[:, 1] = value
+    else:
+        assert value is not None
+        target[:] = value
 
 
 def _piece(value: float | Array | None, part: slice) -> float | Array:

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from fourbar.kinematics import Array
 
-STAGES = ("position", "velocity", "acceleration", "force")
+STAGES = ("position", "velocity", "acceleration", "force", "error")
 STAGE_OF = {
     **dict.fromkeys(("theta_3", "theta_4", "A", "B", "G2", "G3", "G4", "sin_mu", "condition"), "position"),
     **dict.fromkeys(("omega_2", "omega_3", "omega_4"), "velocity"),
@@ -16,6 +16,7 @@ STAGE_OF = {
         "acceleration",
     ),
     **dict.fromkeys(("F12", "F32", "F43", "F14", "torque", "drive_condition"), "force"),
+    **dict.fromkeys(("torque_error", "force_error"), "error"),
 }
 """Every evaluated quantity and the stage that computes it."""
 VECTORS = frozenset(("A", "B", "G2", "G3", "G4", "a_A", "a_B", "a_G2", "a_G3", "a_G4", "F12", "F32", "F43", "F14"))
@@ -27,6 +28,8 @@ UNITS = {
     **dict.fromkeys(("a_A", "a_B", "a_G2", "a_G3", "a_G4"), "m/s^2"),
     **dict.fromkeys(("F12", "F32", "F43", "F14"), "N"),
     "torque": "N m",
+    "torque_error": "N m",
+    "force_error": "N",
     **dict.fromkeys(("sin_mu", "condition", "drive_condition"), "1"),
 }
 STATUS_NAMES = ("ok", "not_assembled", "singular")
@@ -78,6 +81,10 @@ class Solution:
     """Couple of ground on the driven bar, N m."""
     drive_condition: Array | None = None
     """|sine| between the two bars that are not driven, in (0, 1]."""
+    torque_error: Array | None = None
+    """Error bar of the torque, N m: what rounding makes it scatter by."""
+    force_error: Array | None = None
+    """Error bar of the pin forces, N: the same for the worst of the four."""
 
     def __len__(self) -> int:
         return len(self.theta_2)
@@ -98,9 +105,29 @@ class Solution:
         return [name for name in names if getattr(self, name) is not None]
 
 
-def unwrap(angles: Array) -> Array:
-    """The same angles, continuous along a sweep: the first in (-pi, pi], gaps (NaN) stepped over."""
-    result = angles.copy()
-    known = ~np.isnan(angles)
-    result[known] = np.unwrap(angles[known])
-    return result
+class Unwrapped:
+    """Makes angles continuous along a sweep, one block after the other: the first in (-pi, pi]."""
+
+    def __init__(self) -> None:
+        self.turns: float = 0.0
+        self.last: float | None = None
+
+    def extend(self, angles: Array) -> None:
+        """Unwrap the next angles, each in [-pi, pi], in place; gaps (NaN) are stepped over."""
+        low, high = float(angles.min()), float(angles.max())
+        if low == low and self.last is not None and self.turns == 0.0:
+            low, high = min(low, self.last), max(high, self.last)
+        if high - low < np.pi and self.turns == 0.0:
+            self.last = float(angles[-1])
+            return
+        known = np.flatnonzero(~np.isnan(angles))
+        if not len(known):
+            return
+        raw = angles[known]
+        before = raw[0] if self.last is None else self.last - self.turns
+        # -pi as a double lies inside (-pi, pi], yet reads as the excluded end
+        start = self.turns + (2.0 * np.pi if self.last is None and raw[0] == -np.pi else 0.0)
+        jumps = np.diff(raw, prepend=before)
+        turns = start - (2.0 * np.pi) * np.cumsum(np.round(jumps / (2.0 * np.pi)))
+        angles[known] = raw + turns
+        self.turns, self.last = float(turns[-1]), float(raw[-1] + turns[-1])

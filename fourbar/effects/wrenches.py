@@ -1,5 +1,6 @@
 """What acts on each moving bar apart from its pins: a resultant force and a moment about its first pin."""
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -10,26 +11,28 @@ from fourbar.kinematics import Array, State, Vector, cross
 class Wrenches:
     """Sums of forces (N, world axes) and of moments (N m) about the first pin (O2, A, O4) of bars 2, 3, 4.
 
-    A bar on which nothing acts keeps the number 0.0: its term is never evaluated.
+    A bar on which nothing acts keeps the number 0.0: its term is never evaluated. With `factors`
+    each term is multiplied by the next of them (the error bars move every term by its last digit).
     """
 
-    def __init__(self, state: State) -> None:
+    def __init__(self, state: State, factors: Iterator[float] | None = None) -> None:
         self.state = state
+        self.factors = factors
         self.force_x: dict[int, Any] = {2: 0.0, 3: 0.0, 4: 0.0}
         self.force_y: dict[int, Any] = {2: 0.0, 3: 0.0, 4: 0.0}
         self.moments: dict[int, Any] = {2: 0.0, 3: 0.0, 4: 0.0}
 
     def add_force(self, bar: int, force: Vector | tuple[float, float], arm: Vector | None = None) -> None:
         """A force on a bar, applied at `arm` from the bar's first pin; at that pin where no arm is given."""
-        self.force_x[bar] = _plus(self.force_x[bar], force[0])
-        self.force_y[bar] = _plus(self.force_y[bar], force[1])
+        self.force_x[bar] = self._plus(self.force_x[bar], force[0])
+        self.force_y[bar] = self._plus(self.force_y[bar], force[1])
         if arm is not None:
             self.add_moment(bar, cross(arm, force))  # type: ignore[arg-type]
 
     def add_moment(self, bar: int, moment: Array | float) -> None:
         """A pure couple on a bar; on the ground (bar 1) it does nothing."""
         if bar != 1:
-            self.moments[bar] = _plus(self.moments[bar], moment)
+            self.moments[bar] = self._plus(self.moments[bar], moment)
 
     def force(self, bar: int) -> Vector:
         """Resultant on a bar, N."""
@@ -43,6 +46,7 @@ class Wrenches:
         """Resultant moment on a bar about its first pin, N m."""
         return np.broadcast_to(np.asarray(self.moments[bar], float), self.state.theta_2.shape)
 
-
-def _plus(total: Array | float, term: Array | float) -> Array | float:
-    return term if isinstance(total, float) and total == 0.0 else total + term
+    def _plus(self, total: Array | float, term: Array | float) -> Array | float:
+        if self.factors is not None:
+            term = next(self.factors) * term
+        return term if isinstance(total, float) and total == 0.0 else total + term
