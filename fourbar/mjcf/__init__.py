@@ -1,0 +1,9 @@
+"""MJCF of a scene, without any engine."""
+
+from fourbar.mjcf.defaults import defaults_used as defaults_used
+from fourbar.mjcf.defaults import scene_from_lengths as scene_from_lengths
+from fourbar.mjcf.document import flywheel as flywheel
+from fourbar.mjcf.document import mjcf as mjcf
+from fourbar.mjcf.document import run_through as run_through
+from fourbar.mjcf.settings import Run as Run
+from fourbar.mjcf.settings import Settings as Settings

@@ -1,0 +1,43 @@
+"""A scene from bare bar lengths, with every default it takes."""
+
+import math
+
+from fourbar.linkage import FourBar, uniform
+from fourbar.mobility import default_range
+from fourbar.scene import Motion, Scene
+
+PER_METRE = 1.0
+"""kg/m of the uniform bars."""
+OMEGA = 1.0
+"""rad/s of the input."""
+
+
+def scene_from_lengths(ground: float, input: float, coupler: float, output: float, omega: float = OMEGA) -> Scene:
+    """Uniform slender bars of 1 kg/m on the open branch, the input at omega (rad/s) from mid-range; lengths in m."""
+    linkage = uniform(ground, input, coupler, output, per_metre=PER_METRE)
+    title = f"four-bar {ground!r} {input!r} {coupler!r} {output!r}"
+    return Scene(linkage, Motion(_mid_range(linkage), omega), title=title)
+
+
+def defaults_used(scene: Scene) -> list[str]:
+    """The defaults of `scene_from_lengths`, one line each."""
+    theta_2 = scene.motion.theta_2
+    assert isinstance(theta_2, float)
+    return [
+        f"bars: uniform and slender, {PER_METRE:g} kg/m",
+        "branch: open",
+        f"omega_2: {scene.motion.omega_2!r} rad/s, alpha_2: 0",
+        f"start: theta_2 = {theta_2!r} rad ({math.degrees(theta_2):.6g} deg)",
+        "drive: bar 2; no gravity, no loads",
+    ]
+
+
+def _mid_range(linkage: FourBar) -> float:
+    """The middle of the input's range; a quarter turn from the ground bar where it turns fully.
+
+    Half a turn would start a parallelogram in its change point.
+    """
+    least, most = default_range(linkage)
+    if most - least >= 2.0 * math.pi * (1.0 - 1e-12):
+        return linkage.ground_angle + math.pi / 2.0
+    return 0.5 * (least + most)

@@ -1,0 +1,139 @@
+"""Scene -> MJCF text: the closed loop, a drive at omega_2 and alpha_2, and a keyframe to start from."""
+
+import math
+from typing import NamedTuple
+from xml.etree import ElementTree as ET
+
+import numpy as np
+
+from fourbar.errors import InputError, NotAssembledError
+from fourbar.linkage import MOVING_BARS, FourBar
+from fourbar.mjcf.model import Model, text
+from fourbar.mjcf.settings import RECIPE, Run, Settings
+from fourbar.mobility import default_range
+from fourbar.scene import Command, Scene, command, solve
+from fourbar.solution import OK
+
+AT_REST = 1.0
+"""rad/s that flywheel and timestep are laid out for where the scene states no speed."""
+COMMENT = (
+    " Written by fourbar. Reset to keyframe 0 and step: a flywheel (armature of pin O2) keeps the input at omega_2, "
+    "the motor adds alpha_2. Angles: O2 is theta_2, O2 + A is theta_3, O4 is theta_4. Beyond its limit positions the "
+    "linkage cannot be carried, nor everywhere through a change point. "
+)
+
+
+def mjcf(scene: Scene, settings: Settings = RECIPE, *, keyframe: bool = True) -> str:
+    """The MJCF text of a scene: it runs on its own in MuJoCo.
+
+    Parameters
+    ----------
+    settings : of MuJoCo; the default ones carry every linkage above MuJoCo's floor of mass.
+    keyframe : False leaves it out; then `settings.timestep` must be given and no position is computed.
+
+    Raises
+    ------
+    InputError : a bar has less mass or inertia than MuJoCo carries, or nothing sets the timestep.
+    NotAssembledError : the linkage closes at none of the scene's positions.
+    """
+    model = Model(scene.linkage, settings)
+    for term in (*scene.effects, *scene.loads):
+        term.add_mjcf(model)
+    start = _start(scene) if keyframe else None
+    if start is not None:
+        timestep = start.run.timestep(settings)
+    elif settings.timestep is not None:
+        timestep = settings.timestep * settings.timestep_scale
+    else:
+        raise InputError("timestep", None, "is needed where no keyframe is asked for")
+    armature = flywheel(scene, settings)
+    root = ET.Element("mujoco", model=_plain(scene.title) or "four-bar")
+    root.append(ET.Comment(COMMENT))
+    ET.SubElement(root, "compiler", angle="radian", autolimits="true")
+    model.add_option(root, timestep)
+    size = sum(scene.linkage.lengths)
+    x, y = model.O4[0] / 2.0, model.O4[1] / 2.0
+    ET.SubElement(root, "statistic", extent=text(size), center=text(x, y, 0.0))
+    model.add_bodies(root, armature)
+    model.add_load_sites(root)
+    model.add_closure(root, timestep)
+    model.add_actuators(root, armature * scene.motion.alpha_2)
+    if start is not None:
+        frame = ET.SubElement(root, "keyframe")
+        ET.SubElement(frame, "key", name="start", qpos=text(*start.qpos), qvel=text(*start.qvel))
+    ET.indent(root)
+    return ET.tostring(root, encoding="unicode") + "\n"
+
+
+def flywheel(scene: Scene, settings: Settings = RECIPE) -> float:
+    """Armature of pin O2, kg m^2: `settings.flywheel` times sum of m L^2 + I + (m g L + F L + M)/omega_2^2.
+
+    L is the longest arm at which anything acts; what does work on the linkage in a revolution is then
+    a small part of the flywheel's energy.
+    """
+    speed = abs(scene.motion.omega_2 or AT_REST)
+    longest = max(scene.linkage.lengths)
+    inertia = work = 0.0
+    gravity = sum(effect.magnitude for effect in scene.effects if effect.key == "gravity")
+    for number in MOVING_BARS:
+        bar = scene.linkage.bar(number)
+        assert bar.inertia is not None and bar.centre is not None
+        arm = max(longest, abs(bar.centre[0]))
+        inertia += bar.mass * arm * arm + bar.inertia
+        work += bar.mass * abs(gravity) * arm
+    work += sum(load.size(scene.linkage) * longest for load in scene.loads)
+    for effect in scene.effects:
+        if effect.key == "viscous":
+            work += sum(k for _, k in effect.coefficients) * speed
+        elif effect.key == "friction":
+            work += sum(f for _, f in effect.torques)
+    return settings.flywheel * (inertia + work / speed**2)
+
+
+class Start(NamedTuple):
+    """The assembled state that the keyframe holds, and the motion from there on."""
+
+    qpos: tuple[float, float, float]
+    qvel: tuple[float, float, float]
+    run: Run
+
+
+def run_through(theta_2: np.ndarray, omega: float, alpha: float) -> Run:
+    """The motion through positions: counter-clockwise from the least, or clockwise from the greatest."""
+    least, most = float(np.min(theta_2)), float(np.max(theta_2))
+    return Run(least, most, omega, alpha) if omega > 0.0 else Run(most, least, omega, alpha)
+
+
+def _start(scene: Scene) -> Start:
+    """Where the motion begins: the first position, in the direction of motion, that assembles."""
+    at = command(scene)
+    alpha = scene.motion.alpha_2
+    speed = scene.motion.omega_2 or 0.0
+    solution = solve(scene, "velocity", at=Command(at.theta_2, at.branch, speed, alpha))
+    usable = np.flatnonzero(solution.status_code == OK)
+    if not len(usable):
+        raise NotAssembledError("the linkage closes at none of the scene's positions: there is no keyframe to write")
+    theta_2 = at.theta_2[usable]
+    first = int(usable[np.argmin(theta_2) if speed >= 0.0 else np.argmax(theta_2)])
+    assert solution.omega_3 is not None and solution.omega_4 is not None
+    theta = (float(at.theta_2[first]), float(solution.theta_3[first]), float(solution.theta_4[first]))
+    omega = (speed, float(solution.omega_3[first]), float(solution.omega_4[first]))
+    if np.ptp(theta_2) == 0.0:
+        theta_2 = theta[0] + np.array([0.0, _span(scene.linkage)])
+        alpha = 0.0  # nobody asked for a window: its length only sets the timestep
+    return Start(
+        (theta[0], theta[1] - theta[0], theta[2]),
+        (omega[0], omega[1] - omega[0], omega[2]),
+        run_through(theta_2, speed or AT_REST, alpha if speed else 0.0),
+    )
+
+
+def _span(linkage: FourBar) -> float:
+    """Width of the range that the input can turn through, rad."""
+    least, most = default_range(linkage)
+    return min(abs(most - least), 2.0 * math.pi)
+
+
+def _plain(title: str) -> str:
+    """A title that XML can hold: every character that does not print becomes a blank."""
+    return "".join(character if character.isprintable() else " " for character in title).strip()

@@ -1,0 +1,189 @@
+"""The MJCF elements of a linkage and of what acts on it."""
+
+import math
+from collections.abc import Iterable
+from xml.etree import ElementTree as ET
+
+from fourbar.effects import Load
+from fourbar.errors import InputError
+from fourbar.kinematics import centre_in_bar
+from fourbar.linkage import BAR_NAMES, FIRST_PIN, MOVING_BARS, PINS, FourBar
+from fourbar.mjcf.settings import Settings
+
+FLOOR = 1e-15
+"""mjMINVAL: MuJoCo refuses a moving body of less mass (kg) or inertia (kg m^2)."""
+COLOURS = {1: "0.45 0.45 0.48 1", 2: "0.12 0.47 0.71 1", 3: "1 0.5 0.05 1", 4: "0.17 0.63 0.17 1"}
+THICKNESS = 0.015
+"""Radius of a bar's capsule, as a part of the longest bar."""
+
+
+def text(*numbers: float) -> str:
+    """Numbers so that they read back bit for bit."""
+    return " ".join(repr(float(number)) for number in numbers)
+
+
+class Model:
+    """What loads and effects add to: options, attributes of the pins, loads."""
+
+    def __init__(self, linkage: FourBar, settings: Settings) -> None:
+        self.linkage, self.settings = linkage, settings
+        self.option: dict[str, Iterable[float]] = {"gravity": (0.0, 0.0, 0.0)}
+        self.pin: dict[str, dict[str, float]] = {pin: {} for pin in PINS}
+        self.loads: list[Load] = []
+        for number in MOVING_BARS:
+            bar = linkage.bar(number)
+            for key, value, unit in (("mass", bar.mass, "kg"), ("inertia", bar.inertia, "kg m^2")):
+                if value is None or value < FLOOR:
+                    raise InputError(
+                        f"bars.{BAR_NAMES[number]}.{key}",
+                        value,
+                        f"MuJoCo cannot carry a massless bar: must be at least {FLOOR:g} {unit}",
+                    )
+
+    @property
+    def O4(self) -> tuple[float, float]:
+        """The fixed pin O4, m."""
+        d, theta_1 = self.linkage.ground, self.linkage.ground_angle
+        return (d * math.cos(theta_1), d * math.sin(theta_1))
+
+    @property
+    def radius(self) -> float:
+        """Radius of the capsules, m."""
+        return THICKNESS * max(self.linkage.lengths)
+
+    def used(self, attribute: str) -> bool:
+        """Whether any pin carries the attribute."""
+        return any(attribute in attributes for attributes in self.pin.values())
+
+    def add_option(self, root: ET.Element, timestep: float) -> None:
+        """Integrator, solver, and flags that switch off what a closed loop does not need."""
+        s = self.settings
+        option = ET.SubElement(
+            root,
+            "option",
+            timestep=text(timestep),
+            integrator=s.integrator,
+            solver=s.solver,
+            tolerance=text(s.tolerance),
+            iterations=str(s.iterations),
+            **{key: text(*value) for key, value in self.option.items()},
+        )
+        unneeded = ["contact", "limit", "island", "sensor", "midphase", "spring"]
+        unneeded += [] if self.used("frictionloss") else ["frictionloss"]
+        unneeded += [] if self.used("damping") else ["damper"]
+        ET.SubElement(option, "flag", dict.fromkeys(unneeded, "disable"))
+
+    def add_bodies(self, root: ET.Element, flywheel: float) -> None:
+        """ground > (input > coupler), output; light and camera face the plane."""
+        world = ET.SubElement(root, "worldbody")
+        x, y = self.O4[0] / 2.0, self.O4[1] / 2.0
+        size = sum(self.linkage.lengths)
+        ET.SubElement(world, "light", name="light", pos=text(x, y, size), dir="0 0 -1", directional="true")
+        ET.SubElement(world, "camera", name="plane", pos=text(x, y, 1.2 * size), fovy="45")
+        ground = ET.SubElement(world, "body", name="ground")
+        ET.SubElement(ground, "inertial", pos="0 0 0", mass="1", diaginertia="1 1 1")
+        self._add_capsule(ground, 1, self.linkage.ground, -2.0 * self.radius)
+        ET.SubElement(ground, "site", name="O2", pos="0 0 0", size=text(self.radius))
+        ET.SubElement(ground, "site", name="O4", pos=text(*self.O4, 0.0), size=text(self.radius))
+        crank = self._add_bar(ground, 2, (0.0, 0.0), armature=flywheel)
+        self._add_bar(crank, 3, (self.linkage.input.length, 0.0))
+        self._add_bar(ground, 4, self.O4)
+
+    def _add_bar(self, parent: ET.Element, number: int, at: tuple[float, float], **drive: float) -> ET.Element:
+        """A bar turning about its first pin; bars 3 and 4 end in the sites that the loop's closure joins."""
+        bar, pin = self.linkage.bar(number), FIRST_PIN[number]
+        assert bar.inertia is not None
+        body = ET.SubElement(parent, "body", name=BAR_NAMES[number], pos=text(*at, 0.0))
+        # only the z-component acts in the plane; three equal ones satisfy the triangle inequality
+        ET.SubElement(
+            body,
+            "inertial",
+            pos=text(*centre_in_bar(bar), 0.0),
+            mass=text(bar.mass),
+            diaginertia=text(bar.inertia, bar.inertia, bar.inertia),
+        )
+        numbers = {**drive, **self.pin[pin]}
+        joint = {key: text(value) for key, value in numbers.items()}
+        ET.SubElement(body, "joint", name=pin, type="hinge", axis="0 0 1", **joint)
+        self._add_capsule(body, number, bar.length, self.radius if number == 3 else -self.radius)
+        if number == 2:
+            ET.SubElement(body, "site", name="A", pos=text(bar.length, 0.0, 0.0), size=text(self.radius))
+            return body
+        end = body
+        if self.settings.pad is not None:
+            # massless and welded: it only moves the point at which MuJoCo measures how soft the closure may be
+            end = ET.SubElement(body, "body", name=f"{BAR_NAMES[number]}_pad")
+            place = text(self.settings.pad * bar.length, 0.0, 0.0)
+            ET.SubElement(end, "inertial", pos=place, mass="0", diaginertia="0 0 0")
+        ET.SubElement(end, "site", name=f"B{number}", pos=text(bar.length, 0.0, 0.0), size=text(self.radius))
+        return body
+
+    def _add_capsule(self, body: ET.Element, number: int, length: float, z: float) -> None:
+        """A bar's shape: for the eye alone, without mass and without contact."""
+        theta = self.linkage.ground_angle if number == 1 else 0.0
+        cos, sin = math.cos(theta), math.sin(theta)
+        shape = {
+            "name": BAR_NAMES[number],
+            "type": "capsule",
+            "size": text(self.radius, length / 2.0),
+            "pos": text(cos * length / 2.0, sin * length / 2.0, z),
+            "zaxis": text(cos, sin, 0.0),
+            "rgba": COLOURS[number],
+        }
+        ET.SubElement(body, "geom", shape, mass="0", contype="0", conaffinity="0")
+
+    def add_closure(self, root: ET.Element, timestep: float) -> None:
+        """The loop closes at B; what acts at B between bars 3 and 4 acts on a tendon theta_4 - theta_3."""
+        s = self.settings
+        ET.SubElement(
+            ET.SubElement(root, "equality"),
+            "connect",
+            name="B",
+            site1="B3",
+            site2="B4",
+            solref=text(s.time_constant_steps * timestep, 1.0),
+            solimp=text(s.impedance, s.impedance, 0.001, 0.5, 2.0),
+        )
+        if self.pin["B"]:
+            attributes = {key: text(value) for key, value in self.pin["B"].items()}
+            fixed = ET.SubElement(ET.SubElement(root, "tendon"), "fixed", name="B", **attributes)
+            for joint, coefficient in (("O2", -1), ("A", -1), ("O4", 1)):
+                ET.SubElement(fixed, "joint", joint=joint, coef=str(coefficient))
+
+    def add_load_sites(self, root: ET.Element) -> None:
+        """The point at which each load acts: G for world axes (the arm becomes a couple), else the point itself."""
+        for index, load in enumerate(self.loads, 1):
+            body = root.find(f".//body[@name='{BAR_NAMES[load.bar]}']")
+            assert body is not None
+            x, y = centre_in_bar(self.linkage.bar(load.bar))
+            if load.frame == "bar":
+                x += load.at[0] * math.cos(load.at[1])
+                y += load.at[0] * math.sin(load.at[1])
+            ET.SubElement(body, "site", name=f"load_{index}", pos=text(x, y, 0.0), size=text(self.radius))
+
+    def add_actuators(self, root: ET.Element, motor: float) -> None:
+        """Constant actuators: the motor that gives the flywheel alpha_2, and the loads."""
+        if motor == 0.0 and not self.loads:
+            return
+        actuators = ET.SubElement(root, "actuator")
+        constant = {"gaintype": "fixed", "gainprm": "0", "biastype": "affine"}
+        if motor != 0.0:
+            ET.SubElement(actuators, "general", constant, name="drive", joint="O2", biasprm=text(motor, 0.0, 0.0))
+        for index, load in enumerate(self.loads, 1):
+            fx = fy = 0.0
+            couple = load.moment
+            if load.force is not None:
+                fx, fy = load.force[0] * math.cos(load.force[1]), load.force[0] * math.sin(load.force[1])
+                if load.frame == "world":  # force and arm both keep their direction: so does the couple
+                    couple += load.at[0] * (math.cos(load.at[1]) * fy - math.sin(load.at[1]) * fx)
+            frame = {"refsite": "O2"} if load.frame == "world" else {}
+            ET.SubElement(
+                actuators,
+                "general",
+                constant,
+                name=f"load_{index}",
+                site=f"load_{index}",
+                **frame,
+                gear=text(fx, fy, 0.0, 0.0, 0.0, couple),
+                biasprm="1 0 0",
+            )

@@ -1,0 +1,76 @@
+"""What can be dialled in the generated MJCF, and the values that hold for every linkage that was tried."""
+
+import math
+from dataclasses import dataclass
+
+from fourbar.errors import FourBarError
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """Settings of MuJoCo in the file; the defaults carry a linkage of 5 mm to 100 m at any speed.
+
+    Parameters
+    ----------
+    timestep : s; None: from `steps_per_revolution` and `steps_per_window`.
+    timestep_scale : factor on the timestep.
+    integrator : "RK4", "Euler", "implicit" or "implicitfast".
+    time_constant_steps : solref's time constant of the loop's closure, in timesteps.
+    impedance : solimp's impedance d; MuJoCo clamps it at 0.9999.
+    pad : where the inertial frame of the massless pads that carry the closure lies, as a part of
+        the bar's length: the softness of the closure goes as its square. None: no pads.
+    solver, tolerance, iterations : of the constraint solver. MuJoCo divides the tolerance by the
+        flywheel's inertia, so only 0 is tight, and the number of iterations is then what stops it.
+    flywheel : inertia on pin O2 relative to the linkage's own; the speed ripples by about its inverse.
+    """
+
+    timestep: float | None = None
+    timestep_scale: float = 1.0
+    steps_per_revolution: float = 628.0
+    steps_per_window: int = 200
+    integrator: str = "RK4"
+    time_constant_steps: float = 20.0
+    impedance: float = 0.9999
+    pad: float | None = 1e-4
+    solver: str = "Newton"
+    tolerance: float = 0.0
+    iterations: int = 10
+    flywheel: float = 1e8
+
+
+RECIPE = Settings()
+
+
+class Run:
+    """The input's motion through a window of theta_2, in time.
+
+    theta_2 = start + omega t + alpha t^2/2 from `start` to `stop`, at the speed `omega` at the start.
+    """
+
+    def __init__(self, start: float, stop: float, omega: float, alpha: float) -> None:
+        if (stop - start) * omega < 0.0:
+            raise ValueError("the input turns away from the end of its window")
+        self.start, self.stop, self.omega, self.alpha = start, stop, omega, alpha
+
+    @property
+    def fastest(self) -> float:
+        """The greatest |omega_2| in the window, rad/s."""
+        return math.sqrt(max(self.omega**2, self.omega**2 + 2.0 * self.alpha * (self.stop - self.start)))
+
+    def time(self, theta_2: float) -> float:
+        """When the input passes an angle, s; FourBarError where alpha_2 stops it before."""
+        angle = theta_2 - self.start
+        squared = self.omega**2 + 2.0 * self.alpha * angle
+        if squared <= 0.0:
+            raise FourBarError(f"alpha_2 brings the input to rest before theta_2 = {theta_2:.6g} rad")
+        return 2.0 * angle / (self.omega + math.copysign(math.sqrt(squared), self.omega))
+
+    def timestep(self, settings: Settings = RECIPE, at_least: int = 0) -> float:
+        """A whole number of steps, at least so many per revolution, per window and in all, s."""
+        if settings.timestep is not None:
+            return settings.timestep * settings.timestep_scale
+        duration = self.time(self.stop)
+        per_revolution = duration * self.fastest / (2.0 * math.pi) * settings.steps_per_revolution
+        # a window of 628 steps per revolution must not become one more by a rounding
+        steps = max(math.ceil(per_revolution * (1.0 - 1e-9)), settings.steps_per_window, at_least)
+        return duration / steps * settings.timestep_scale
