@@ -55,6 +55,7 @@ class State:
     u4: Vector
     O4: tuple[float, float]
     diagonal: Diagonal
+    signed_root: Array
     sin_mu: Array
     cos_mu: Array
     singular: NDArray[np.bool_]
@@ -64,6 +65,7 @@ class State:
     alpha_2: Array | float = 0.0
     alpha_3: Array | None = None
     alpha_4: Array | None = None
+    first: "FirstCoefficients | None" = None
 
     def unit(self, bar: int) -> Vector:
         """Unit vector along bar 2, 3 or 4."""
@@ -86,6 +88,12 @@ class State:
         if self.singular.any():
             return np.where(self.singular, np.nan, self.sin_mu)
         return self.sin_mu
+
+    def regular_root(self) -> Array:
+        """sigma sqrt(p1 p2 p3 p4) in the unit of the diagonal, NaN where the position is singular."""
+        if self.singular.any():
+            return np.where(self.singular, np.nan, self.signed_root)
+        return self.signed_root
 
     def angle(self, bar: int) -> Array:
         """theta_2 as given; theta_3, theta_4 in (-pi, pi]."""
@@ -218,6 +226,7 @@ def close_loop(
         u4=u4,
         O4=O4,
         diagonal=diagonal,
+        signed_root=root,
         sin_mu=sin_mu,
         cos_mu=((b * b + c * c) - squared) * (0.5 / (b * c)),
         singular=diagonal.assembled & ~(np.abs(sin_mu) > (NO_DIGIT_LEFT if diagonal.offset is None else 0.0)),
@@ -230,33 +239,75 @@ the position is described by its offset from the limit."""
 
 
 def add_velocities(state: State, omega_2: Array | float) -> None:
-    """omega_3 = -a omega_2 sin(theta_4 - theta_2)/(b sin mu), omega_4 = -a omega_2 sin(theta_3 - theta_2)/(c sin mu).
+    """omega_3 = h3 omega_2, omega_4 = h4 omega_2 with the kinematic coefficients h_k = d theta_k/d theta_2.
 
-    The loop's velocity multiplied by bars 4 and 3 (Norton, eq. 6.18); mu = theta_4 - theta_3.
+    In the triangle A, B, O4, whose side e turns by kappa = d phi/d theta_2 and grows by lambda = e'/e:
+        h3 = kappa - sigma lambda cot gamma,  h4 = kappa + sigma lambda cot beta,
+        kappa = a (a - d cos psi)/e^2,  lambda = a d sin psi/e^2,  psi = theta_2 - theta_1.
+    The same as Norton's eq. 6.18, but where the ground is short and all bars turn together the
+    difference of nearly equal speeds is a term of its own (see `slip`).
     """
-    _, a, b, c = state.linkage.lengths
-    drive = -omega_2 / state.regular_sine()
+    coefficients = first_coefficients(state)
+    state.first = coefficients
     state.omega_2 = omega_2
-    state.omega_3 = drive * ((a / b) * cross(state.u2, state.u4))
-    state.omega_4 = drive * ((a / c) * cross(state.u2, state.u3))
+    state.omega_3, state.omega_4 = coefficients.h3 * omega_2, coefficients.h4 * omega_2
 
 
 def add_accelerations(state: State, alpha_2: Array | float) -> None:
-    """alpha_3, alpha_4 from the loop's acceleration multiplied by bars 4 and 3 (Norton, eq. 7.12).
+    """alpha_k = h_k alpha_2 + h_k' omega_2^2, with h_k' = d h_k/d theta_2:
 
-    b sin mu alpha_3 = a (omega_2^2 cos42 - alpha_2 sin42) + b omega_3^2 cos43 - c omega_4^2
-    c sin mu alpha_4 = a (omega_2^2 cos32 - alpha_2 sin32) + b omega_3^2 - c omega_4^2 cos43
+    h3' = kappa' - sigma (lambda' cot gamma + lambda^2 cot beta / sin^2 gamma),
+    h4' = kappa' + sigma (lambda' cot beta + lambda^2 cot gamma / sin^2 beta),
+    kappa' = lambda (d^2 - a^2)/e^2,  lambda' = a d cos psi/e^2 - 2 lambda^2.
     """
-    _, a, b, c = state.linkage.lengths
-    w2, w3, w4 = state.omega_2, state.omega_3, state.omega_4
-    assert w3 is not None and w4 is not None, "velocities come first"
-    s = state.regular_sine()
-    term_4 = (a * (w2 * w2)) * dot(state.u2, state.u4)
-    term_3 = (a * (w2 * w2)) * dot(state.u2, state.u3)
-    if not _is_zero(alpha_2):
-        term_4 = term_4 - (a * alpha_2) * cross(state.u2, state.u4)
-        term_3 = term_3 - (a * alpha_2) * cross(state.u2, state.u3)
-    coupler, output = b * (w3 * w3), c * (w4 * w4)
+    assert state.first is not None, "velocities come first"
+    w2 = state.omega_2 * state.omega_2
+    h3, h4 = second_coefficients(state, state.first)
     state.alpha_2 = alpha_2
-    state.alpha_3 = (term_4 + coupler * state.cos_mu - output) / (b * s)
-    state.alpha_4 = (term_3 + coupler - output * state.cos_mu) / (c * s)
+    state.alpha_3, state.alpha_4 = h3 * w2, h4 * w2
+    if not _is_zero(alpha_2):
+        state.alpha_3 = state.alpha_3 + state.first.h3 * alpha_2
+        state.alpha_4 = state.alpha_4 + state.first.h4 * alpha_2
+
+
+@dataclass(slots=True)
+class FirstCoefficients:
+    """d theta_3/d theta_2, d theta_4/d theta_2 and the parts that they are made of, each (n,)."""
+
+    h3: Array
+    h4: Array
+    growth: Array
+    """lambda = (de/d theta_2)/e."""
+    cot_beta: Array
+    cot_gamma: Array
+    """sigma cot of the angles of the triangle at A and O4."""
+
+
+def first_coefficients(state: State) -> FirstCoefficients:
+    """The first kinematic coefficients; NaN where the position is singular."""
+    _, d, a, b, c = scaled(state.linkage)
+    diagonal = state.diagonal
+    root = state.regular_root()
+    excess = (b - c) * (b + c)
+    t2 = diagonal.t * diagonal.t
+    cot_beta, cot_gamma = (diagonal.squared + excess) / root, (diagonal.squared - excess) / root
+    per_square = diagonal.w / diagonal.squared
+    growth = (2.0 * a * d) * (diagonal.t * per_square)
+    turn = (a * (a - d) + (a * (a + d)) * t2) * per_square
+    return FirstCoefficients(turn - growth * cot_gamma, turn + growth * cot_beta, growth, cot_beta, cot_gamma)
+
+
+def second_coefficients(state: State, first: FirstCoefficients) -> Vector:
+    """d^2 theta_3/d theta_2^2 and d^2 theta_4/d theta_2^2, each (n,)."""
+    _, d, a, b, c = scaled(state.linkage)
+    diagonal = state.diagonal
+    growth, cot_beta, cot_gamma = first.growth, first.cot_beta, first.cot_gamma
+    growth_2 = growth * growth
+    turn = ((d - a) * (d + a)) * growth / diagonal.squared
+    t2 = diagonal.t * diagonal.t
+    growing = (a * d) * ((1.0 - t2) * (diagonal.w / diagonal.squared)) - 2.0 * growth_2
+    root = state.regular_root()
+    squares = 4.0 * growth_2 * (diagonal.squared / (root * root))
+    h3 = turn - (growing * cot_gamma + (c * c) * (squares * cot_beta))
+    h4 = turn + (growing * cot_beta + (b * b) * (squares * cot_gamma))
+    return h3, h4

@@ -57,6 +57,8 @@ def add_inertia(wrenches: Wrenches, state: State) -> None:
 
 def between(m_u: Array, m_v: Array, u: Vector, v: Vector, sine: Array) -> Vector:
     """The force F with u x F = m_u and v x F = m_v, for unit vectors with u x v = sine."""
+    if not sine.all():
+        sine = np.where(sine == 0.0, np.nan, sine)  # no force balances the moments there
     k_u, k_v = m_u / sine, m_v / sine
     return (k_u * v[0] - k_v * u[0], k_u * v[1] - k_v * u[1])
 
@@ -93,13 +95,13 @@ def solve_pins(
             F32 = (R3[0] + F43[0], R3[1] + F43[1])
             torque = -(M2 + a * cross(u2, F32))
         elif drive_bar == 4:
-            sine = _usable(cross(u2, u3))
+            sine = cross(u2, u3)
             M3_about_B = M3 - b * cross(u3, R3)
             F32 = between(-M2 / a, -M3_about_B / b, u2, u3, sine)
             F43 = (F32[0] - R3[0], F32[1] - R3[1])
             torque = c * cross(u4, F43) - M4
         else:
-            sine = _usable(cross(u2, u4))
+            sine = cross(u2, u4)
             F43 = between(-M2 / a - cross(u2, R3), M4 / c, u2, u4, sine)
             F32 = (R3[0] + F43[0], R3[1] + F43[1])
             torque = -(M3 + b * cross(u3, F43))
@@ -107,7 +109,3 @@ def solve_pins(
     F12 = (-R2[0] - F32[0], -R2[1] - F32[1])
     return PinForces(F12, F32, F43, F14, torque, sine)
 
-
-def _usable(sine: Array) -> Array:
-    """NaN where the determinant is exactly zero: there no torque holds the linkage."""
-    return np.where(sine == 0.0, np.nan, sine)

@@ -217,6 +217,8 @@ def judge(scene: Scene, tally: Tally, sample: str) -> None:
     exact = reference(scene, scene.motion.branch, theta_2)
     if exact is None:
         tally.not_assembled += 1
+        if solution.status_code[0] == OK:
+            tally.worst["assembled"] = (math.inf, sample)
         return
     values, sensitivity = exact
     errors: dict[str, float] = {}
