@@ -1,0 +1,251 @@
+"""Curves over theta_2: angles, angular velocities and accelerations, torque, pin forces, transmission angle."""
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fourbar.kinematics import Array
+from fourbar.plot.style import (
+    BAR_COLOURS,
+    BAR_DASHES,
+    FAINT,
+    FORCE_COLOURS,
+    FORCE_DASHES,
+    FORCE_WIDTHS,
+    INK,
+    MUTED,
+    degree_ticks,
+    largest,
+    legend_above,
+    number,
+    unit_for,
+)
+from fourbar.plot.view import View
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+ORDINARY = 95.0
+"""Percentile of the magnitudes that counts as the ordinary size of a curve ..."""
+OUTLIER = 3.0
+"""... and the multiple of it that a curve must exceed to be clipped."""
+ROOM = 1.6
+"""A clipped axis ends at this multiple of the ordinary size."""
+RECOMMENDED = 40.0
+"""Smallest transmission angle that is usually recommended, deg (Norton, Design of Machinery, sec. 4.10)."""
+Indices = NDArray[np.intp]
+POLE_REASON = {2: "bars 3 and 4 collinear", 3: "ω₃ = 0", 4: "ω₄ = 0"}
+
+
+def _bases(axes: "Axes", view: View) -> None:
+    """The axis of theta_2, with the positions that do not assemble shaded and the position drawn marked."""
+    degrees = view.degrees
+    low, high = float(degrees[0]), float(degrees[-1])
+    if high == low:
+        low, high = low - 1.0, high + 1.0
+    axes.set_xlim(low, high)
+    degree_ticks(axes.xaxis, high - low)
+    axes.set_xlabel(r"$\theta_2$ (°)")
+    closed = np.flatnonzero(np.diff(np.concatenate([[False], ~view.sweep.assembled, [False]]).astype(int)))
+    for first, after in closed.reshape(-1, 2):
+        start = low if first == 0 else 0.5 * (degrees[first - 1] + degrees[first])
+        stop = high if after == len(degrees) else 0.5 * (degrees[after - 1] + degrees[after])
+        axes.axvspan(start, stop, fc="#f1f1f1", ec=FAINT, hatch="////", lw=0.0, zorder=0)
+    if closed.size:
+        note(view, "Hatched: the linkage does not assemble.")
+    axes.axvline(math.degrees(float(view.here.theta_2[0])), color=MUTED, lw=0.8, ls=(0, (2, 2)), zorder=1)
+
+
+def note(view: View, text: str) -> None:
+    """Say it once in the caption."""
+    if text not in view.notes:
+        view.notes.append(text)
+
+
+def poles(view: View) -> Indices:
+    """Indices i such that the determinant of the drive changes sign between positions i and i + 1."""
+    s = view.sweep
+    pair = {2: (s.theta_4, s.theta_3), 3: (s.theta_4, s.theta_2), 4: (s.theta_3, s.theta_2)}[view.scene.drive_bar]
+    sine = np.sin(pair[0] - pair[1])
+    return np.flatnonzero(sine[:-1] * sine[1:] <= 0.0)
+
+
+def broken(values: Array, where: Indices) -> Array:
+    """Copies of a curve's values with NaN at the positions beside a pole, so that no line crosses it."""
+    out = np.array(values, dtype=float)
+    out[~np.isfinite(out)] = np.nan
+    return np.insert(out, where + 1, np.nan)
+
+
+def limit_of(values: list[Array]) -> float | None:
+    """The end of a clipped axis, or None where no value stands far outside the rest."""
+    size = np.concatenate([np.abs(value[np.isfinite(value)]) for value in values])
+    if size.size == 0:
+        return None
+    ordinary = float(np.percentile(size, ORDINARY))
+    return ROOM * ordinary if ordinary > 0.0 and size.max() > OUTLIER * ordinary else None
+
+
+def clip(axes: "Axes", view: View, curves: dict[str, Array], what: str, factor: float, unit: str) -> None:
+    """End the axis short of what diverges, and say so."""
+    limit = limit_of(list(curves.values()))
+    if limit is None:
+        return
+    lowest = min(float(np.nanmin(value)) for value in curves.values())
+    axes.set_ylim(0.0 if lowest >= 0.0 else -limit * factor, limit * factor)
+    name, worst = max(curves.items(), key=lambda item: largest(item[1]))
+    index = int(np.nanargmax(np.where(np.isfinite(worst), np.abs(worst), np.nan)))
+    own_factor, own_unit = (1.0, unit) if "/" in unit else unit_for(abs(worst[index]), unit.lstrip("GMkmµn ") or unit)
+    note(
+        view,
+        f"{what} clipped at {number(limit * factor)} {unit}; the largest evaluated, {name} = "
+        f"{number(worst[index] * own_factor)} {own_unit}, is at θ₂ = {view.degrees[index]:.5g}°.",
+    )
+
+
+def draw_angles(axes: "Axes", view: View) -> None:
+    """theta_3 and theta_4."""
+    _bases(axes, view)
+    for bar, values in ((3, view.sweep.theta_3), (4, view.sweep.theta_4)):
+        axes.plot(
+            view.degrees, np.degrees(values), color=BAR_COLOURS[bar], ls=BAR_DASHES[bar], label=rf"$\theta_{bar}$"
+        )
+    shown = np.degrees(np.concatenate([view.sweep.theta_3, view.sweep.theta_4]))
+    degree_ticks(axes.yaxis, 1.3 * float(np.nanmax(shown) - np.nanmin(shown)) + 1e-9)
+    axes.set_ylabel(r"$\theta_3,\ \theta_4$ (°)")
+    axes.set_title("Angles of coupler and output")
+    legend_above(axes)
+
+
+def _rates(axes: "Axes", view: View, letter: str, unit: str, title: str, what: str) -> None:
+    _bases(axes, view)
+    name = {"omega": "ω", "alpha": "α"}[letter]
+    digits = {2: "₂", 3: "₃", 4: "₄"}
+    curves = {name + digits[bar]: getattr(view.sweep, f"{letter}_{bar}") for bar in (3, 4)}
+    command = getattr(view.sweep, f"{letter}_2")
+    if np.any(command):
+        axes.plot(view.degrees, command, color=BAR_COLOURS[2], lw=1.0, label=rf"$\{letter}_2$")
+    for bar, values in zip((3, 4), curves.values(), strict=True):
+        axes.plot(view.degrees, values, color=BAR_COLOURS[bar], ls=BAR_DASHES[bar], label=rf"$\{letter}_{bar}$")
+    axes.axhline(0.0, color=INK, lw=0.6, zorder=1)
+    axes.set_ylabel(rf"$\{letter}$ ({unit})")
+    axes.set_title(title)
+    clip(axes, view, curves, what, 1.0, unit)
+    legend_above(axes)
+
+
+def draw_velocities(axes: "Axes", view: View) -> None:
+    """omega_2, omega_3, omega_4."""
+    _rates(axes, view, "omega", "rad/s", "Angular velocities", "Angular velocity")
+
+
+def draw_accelerations(axes: "Axes", view: View) -> None:
+    """alpha_2 (where it is not zero), alpha_3, alpha_4."""
+    _rates(axes, view, "alpha", "rad/s²", "Angular accelerations", "Angular acceleration")
+
+
+def draw_torque(axes: "Axes", view: View) -> None:
+    """The driving torque, with its poles."""
+    _bases(axes, view)
+    torque, bar = view.sweep.torque, view.scene.drive_bar
+    assert torque is not None
+    limit = limit_of([torque])
+    factor, unit = unit_for(limit or largest(torque), "N m")
+    where = poles(view)
+    axes.plot(broken(view.degrees, where), factor * broken(torque, where), color=INK, label=f"$T_{bar}$")
+    for index in where:
+        axes.axvline(0.5 * float(view.degrees[index] + view.degrees[index + 1]), color=MUTED, lw=0.9, ls=(0, (1, 1.5)))
+    if where.size:
+        note(view, f"Dotted: poles of the torque on bar {bar} ({POLE_REASON[bar]}).")
+    axes.axhline(0.0, color=INK, lw=0.6, zorder=1)
+    axes.set_ylabel(f"$T_{bar}$ ({unit})")
+    axes.set_title(f"Driving torque on bar {bar}")
+    clip(axes, view, {f"T{'₂₃₄'[bar - 2]}": torque}, "Torque", factor, unit)
+
+
+def draw_forces(axes: "Axes", view: View) -> None:
+    """Magnitudes of the four pin forces."""
+    _bases(axes, view)
+    sizes = {name: np.hypot(*getattr(view.sweep, name).T) for name in FORCE_COLOURS}
+    factor, unit = unit_for(limit_of(list(sizes.values())) or largest(*sizes.values()), "N")
+    where = poles(view)
+    for name, values in sizes.items():
+        axes.plot(
+            broken(view.degrees, where),
+            factor * broken(values, where),
+            color=FORCE_COLOURS[name],
+            ls=FORCE_DASHES[name],
+            lw=FORCE_WIDTHS[name],
+            label=force_name(name),
+        )
+    axes.set_ylim(bottom=0.0)
+    axes.set_ylabel(f"$|F|$ ({unit})")
+    axes.set_title("Pin forces")
+    clip(axes, view, sizes, "Pin forces", factor, unit)
+    legend_above(axes)
+
+
+def force_name(name: str) -> str:
+    """F12 as it is typeset."""
+    return f"$F_{{{name[1:]}}}$"
+
+
+def draw_transmission(axes: "Axes", view: View) -> None:
+    """Acute angle between coupler and output, with limit and dead-centre positions."""
+    _bases(axes, view)
+    sweep = view.sweep
+    mu = np.degrees(np.arctan2(np.abs(sweep.sin_mu), np.abs(np.cos(sweep.theta_4 - sweep.theta_3))))
+    axes.plot(view.degrees, mu, color=INK)
+    axes.axhline(RECOMMENDED, color=MUTED, lw=0.9, ls=(0, (4, 2)))
+    axes.annotate(
+        f"{RECOMMENDED:g}° recommended",
+        (1.0, RECOMMENDED),
+        xycoords=("axes fraction", "data"),
+        xytext=(-2, 2),
+        textcoords="offset points",
+        ha="right",
+        size=7.0,
+        color=MUTED,
+    )
+    axes.set_ylim(0.0, 96.0)
+    axes.yaxis.set_ticks(range(0, 91, 15))
+    for theta, marker, name in _marked(view):
+        height = (
+            np.zeros_like(theta)
+            if name == "limit"
+            else np.interp(theta, view.degrees[sweep.assembled], mu[sweep.assembled])
+        )
+        axes.plot(
+            theta, height, marker, ms=6.0, mfc="white", mec=INK, mew=1.1, ls="none", label=name, clip_on=False, zorder=5
+        )
+    axes.set_ylabel(r"transmission angle $\mu$ (°)")
+    axes.set_title("Transmission angle")
+    legend_above(axes, 2)
+
+
+def _marked(view: View) -> list[tuple[Array, str, str]]:
+    """Limit positions (bars 3, 4 collinear) and dead centres (bars 2, 3 collinear) inside the sweep, degrees."""
+    degrees, sweep = view.degrees, view.sweep
+    margin = float(np.median(np.diff(degrees))) if len(degrees) > 1 else 0.0
+    limits = [math.degrees(t) for t in limit_angles(view)]
+    turns = [t + 360.0 * k for t in limits for k in range(-3, 4)]
+    inside = [t for t in turns if degrees[0] - 1.5 * margin <= t <= degrees[-1] + 1.5 * margin]
+    sine = np.sin(sweep.theta_3 - sweep.theta_2)
+    at = np.flatnonzero((sine[:-1] * sine[1:] < 0.0) | (sine[:-1] == 0.0))
+    share = sine[at] / (sine[at] - sine[at + 1])
+    centres = degrees[at] + share * (degrees[at + 1] - degrees[at])
+    found = []
+    if inside:
+        found.append((np.array(inside), "s", "limit"))
+    if centres.size:
+        found.append((centres, "D", "dead centre"))
+    return found
+
+
+def limit_angles(view: View) -> list[float]:
+    """theta_2 of the input's limit positions, rad, from e = b + c and e = |b - c|."""
+    from fourbar.mobility import limit_positions
+
+    return [float(limit.theta_2) for limit in limit_positions(view.scene.linkage)]

@@ -1,0 +1,176 @@
+"""The figures by name, and the way from a scene to a file."""
+
+import textwrap
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, cast
+
+from fourbar.errors import InputError
+from fourbar.plot import curves, freebody, hodograph, linkage
+from fourbar.plot.labels import Labels
+from fourbar.plot.style import FORCE_COLOURS, MUTED, matplotlib_style, plain, save
+from fourbar.plot.view import View, on_branch, view
+from fourbar.scene import Scene
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure, SubFigure
+    from matplotlib.projections.polar import PolarAxes
+
+FORMATS = ("svg", "png", "pdf")
+BRANCHES = ("one", "both")
+Painter = Callable[["SubFigure", View, Labels], None]
+
+
+def _overview(figure: "SubFigure", shown: View, labels: Labels) -> None:
+    if not shown.moves:
+        panels = figure.subplot_mosaic([["linkage", "angles"], ["linkage", "mu"]], width_ratios=[1.15, 1.0])
+        linkage.draw_linkage(panels["linkage"], shown, labels)
+        _path_legend(panels["linkage"])
+        curves.draw_angles(panels["angles"], shown)
+        curves.draw_transmission(panels["mu"], shown)
+        return
+    panels = figure.subplot_mosaic(
+        [["linkage", "angles", "torque"], ["linkage", "omega", "forces"], ["polar", "alpha", "mu"]],
+        width_ratios=[1.15, 1.0, 1.0],
+        per_subplot_kw={"polar": {"projection": "polar"}},
+    )
+    linkage.draw_linkage(panels["linkage"], shown, labels)
+    _path_legend(panels["linkage"])
+    curves.draw_angles(panels["angles"], shown)
+    curves.draw_velocities(panels["omega"], shown)
+    curves.draw_accelerations(panels["alpha"], shown)
+    curves.draw_torque(panels["torque"], shown)
+    curves.draw_forces(panels["forces"], shown)
+    curves.draw_transmission(panels["mu"], shown)
+    hodograph.draw_hodograph(cast("PolarAxes", panels["polar"]), shown)
+
+
+def _path_legend(axes: Any) -> None:
+    axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.005), ncols=3)
+    axes.set_title(axes.get_title(loc="left"), pad=18.0)
+
+
+def _linkage(figure: "SubFigure", shown: View, labels: Labels) -> None:
+    axes = figure.subplots()
+    linkage.draw_linkage(axes, shown, labels)
+    _path_legend(axes)
+
+
+def _coupler(figure: "SubFigure", shown: View, labels: Labels) -> None:
+    linkage.draw_coupler_curves(figure.subplots(), shown, labels)
+
+
+def _kinematics(figure: "SubFigure", shown: View, labels: Labels) -> None:
+    del labels
+    panels = figure.subplots(3 if shown.moves else 1, 1, squeeze=False)[:, 0]
+    painters = (curves.draw_angles, curves.draw_velocities, curves.draw_accelerations)
+    for axes, paint in zip(panels, painters, strict=False):
+        paint(axes, shown)
+
+
+def _single(paint: Callable[[Any, View], None]) -> Painter:
+    def painter(figure: "SubFigure", shown: View, labels: Labels) -> None:
+        del labels
+        paint(figure.subplots(), shown)
+
+    return painter
+
+
+def _hodographs(figure: "SubFigure", shown: View, labels: Labels) -> None:
+    del labels
+    panels = figure.subplots(2, 2, subplot_kw={"projection": "polar"}).ravel()
+    for axes, name in zip(panels, FORCE_COLOURS, strict=True):
+        hodograph.draw_hodograph(axes, shown, (name,))
+
+
+def _free_bodies(figure: "SubFigure", shown: View, labels: Labels) -> None:
+    freebody.draw_free_bodies(list(figure.subplots(1, 3)), shown, labels)
+
+
+FIGURES: dict[str, tuple[Painter, tuple[float, float], bool]] = {
+    "overview": (_overview, (11.7, 8.3), False),
+    "linkage": (_linkage, (5.6, 5.2), False),
+    "coupler": (_coupler, (5.6, 5.4), False),
+    "kinematics": (_kinematics, (5.6, 6.8), False),
+    "torque": (_single(curves.draw_torque), (5.6, 3.2), True),
+    "forces": (_single(curves.draw_forces), (5.6, 3.2), True),
+    "hodograph": (_hodographs, (6.4, 6.6), True),
+    "transmission": (_single(curves.draw_transmission), (5.6, 3.2), False),
+    "freebody": (_free_bodies, (9.6, 4.6), True),
+}
+"""Each figure: its painter, the size of one branch in inches, and whether it needs omega_2."""
+
+
+def draw(
+    scene: Scene,
+    path: str | Path,
+    figure: str = "overview",
+    *,
+    position: float | None = None,
+    branches: str = "one",
+    file_format: str | None = None,
+) -> None:
+    """Draw a figure of a scene into a file, whole or not at all; the same scene gives the same bytes.
+
+    Parameters
+    ----------
+    path : the file; its ending says which of svg, png and pdf is meant.
+    figure : one of `FIGURES`: "overview", "linkage", "coupler", "kinematics", "torque",
+        "forces", "hodograph", "transmission", "freebody".
+    position : theta_2 of the linkage and the free bodies, rad; left out: the scene's own.
+    branches : "one" (the scene's) or "both" (open and crossed, side by side).
+    file_format : svg, png or pdf where the path's ending does not say it.
+
+    Raises
+    ------
+    InputError : unknown figure, format or choice of branches; a figure of forces without omega_2.
+    NotAssembledError : there is no position to draw.
+    DependencyError : matplotlib is missing.
+    """
+    target = Path(path)
+    kind = (file_format or target.suffix.removeprefix(".")).lower()
+    for key, value, allowed in (("figure", figure, tuple(FIGURES)), ("branches", branches, BRANCHES)):
+        if value not in allowed:
+            raise InputError(key, value, "must be one of " + ", ".join(allowed))
+    if kind not in FORMATS:
+        raise InputError("output", str(path), "must end in one of " + ", ".join(f".{end}" for end in FORMATS))
+    painter, size, dynamic = FIGURES[figure]
+    if dynamic and scene.motion.omega_2 is None:
+        raise InputError("motion.omega_2", None, f"is needed for the figure {figure!r}")
+    with matplotlib_style():
+        save(compose(scene, painter, size, position, branches), target, kind)
+
+
+def compose(
+    scene: Scene, painter: Painter, size: tuple[float, float], position: float | None, branches: str
+) -> "Figure":
+    """The figure itself, laid out and labelled."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    scenes = [on_branch(scene, sign) for sign in (1, -1)] if branches == "both" else [scene]
+    views = [view(each, position) for each in scenes]
+    stacked = size[0] > 9.0
+    figure = Figure(
+        figsize=(size[0], size[1] * len(views)) if stacked else (size[0] * len(views), size[1]), layout="constrained"
+    )
+    FigureCanvasAgg(figure)
+    parts = figure.subfigures(len(views) if stacked else 1, 1 if stacked else len(views), squeeze=False).ravel()
+    labels = Labels([], [])
+    for part, shown in zip(parts, views, strict=True):
+        painter(part, shown, labels)
+        heading = plain(scene.title, 90) or "Four-bar linkage"
+        part.suptitle(
+            f"{heading} ({shown.branch_name} branch)" if len(views) > 1 else heading,
+            parse_math=False,
+            size=10.5,
+            weight="bold",
+            x=0.012,
+            ha="left",
+        )
+        wide = int(size[0] * 20)
+        caption = textwrap.fill(" ".join(shown.notes), wide)
+        if caption:
+            part.supxlabel(caption, size=6.8, color=MUTED, x=0.012, ha="left", parse_math=False, linespacing=1.35)
+    labels.settle(figure)
+    return figure

@@ -1,0 +1,183 @@
+"""The linkage drawn to scale: bars, pins, ground, mass centres and coupler curves."""
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from fourbar.kinematics import State, centre_in_bar
+from fourbar.linkage import MOVING_BARS
+from fourbar.plot.labels import Label, Labels
+from fourbar.plot.style import BAR_COLOURS, INK, MUTED, largest, length_unit
+from fourbar.plot.view import View
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+Point = tuple[float, float]
+ENDS = {2: ("O2", "A"), 3: ("A", "B"), 4: ("O4", "B")}
+
+
+def pins(state: State) -> dict[str, Point]:
+    """The four pins at the position drawn, m."""
+    return {name: _first(state.pin(name)) for name in ("O2", "A", "B", "O4")}
+
+
+def _first(vector: tuple[np.ndarray, np.ndarray]) -> Point:
+    return (float(vector[0][0]), float(vector[1][0]))
+
+
+def centres(state: State) -> dict[int, Point]:
+    """The mass centres of the bars that have mass, m."""
+    found = {}
+    for number in MOVING_BARS:
+        bar = state.linkage.bar(number)
+        if bar.mass > 0.0:
+            found[number] = _first(state.point(number, *centre_in_bar(bar)))
+    return found
+
+
+def draw_linkage(axes: "Axes", view: View, labels: Labels) -> None:
+    """The linkage at the position drawn, over the paths of A, B and the coupler's centre."""
+    state = view.state()
+    sweep = view.sweep
+    where, masses = pins(state), centres(state)
+    reached = np.concatenate([sweep.A, sweep.B, sweep.G3, list(where.values())])
+    factor, unit = length_unit(largest(reached))
+    where = {name: (factor * x, factor * y) for name, (x, y) in where.items()}
+    _paths(axes, view, labels, factor)
+    size = 0.03 * factor * float(np.max(np.nanmax(reached, axis=0) - np.nanmin(reached, axis=0)))
+    _ground(axes, labels, where["O2"], where["O4"], size)
+    middle = (float(np.mean([p[0] for p in where.values()])), float(np.mean([p[1] for p in where.values()])))
+    for number, (start, stop) in ENDS.items():
+        (x, y), colour = zip(where[start], where[stop], strict=True), BAR_COLOURS[number]
+        axes.plot(x, y, color=colour, lw=4.5, solid_capstyle="round", zorder=4)
+        labels.keep_off(axes, where[start], where[stop])
+        labels.add(Label(axes, str(number), (0.5 * sum(x), 0.5 * sum(y)), middle, colour, 9.0, 2.0))
+    for name, point in where.items():
+        axes.plot(*[[v] for v in point], "o", ms=6.0, mfc="white", mec=INK, mew=1.2, zorder=6)
+        labels.add(Label(axes, pin_name(name), point, middle, INK, 9.0, 2.5))
+    for number, (x_centre, y_centre) in masses.items():
+        here = (factor * x_centre, factor * y_centre)
+        bar, colour = state.linkage.bar(number), BAR_COLOURS[number]
+        r_along, r_across = centre_in_bar(bar)
+        if r_across != 0.0 or not 0.0 <= r_along <= bar.length:  # off the bar: tied to it by a line
+            axes.plot(*zip(where[ENDS[number][0]], here, strict=True), color=colour, lw=0.8, ls=":", zorder=3)
+        mass_centre(axes, here)
+        labels.add(Label(axes, f"$G_{number}$", here, middle, colour, 8.0, 3.0))
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.margins(0.08)
+    axes.set_xlabel(f"$x$ ({unit})")
+    axes.set_ylabel(f"$y$ ({unit})")
+    theta = f"{math.degrees(float(view.here.theta_2[0])):.4g}".replace("-", "−")
+    axes.set_title(rf"Linkage at $\theta_2$ = {theta}°, {view.branch_name} branch")
+
+
+def pin_name(name: str) -> str:
+    """A pin as it is typeset."""
+    return f"${name[0]}_{name[1]}$" if len(name) == 2 else f"${name}$"
+
+
+def _paths(axes: "Axes", view: View, labels: Labels, factor: float) -> None:
+    """Paths of A, B and the coupler's mass centre (or its mid-point)."""
+    sweep = view.sweep
+    massive = view.scene.linkage.coupler.mass > 0.0
+    mid = sweep.G3 if massive else 0.5 * (sweep.A + sweep.B)
+    for path, colour, dashes, name in (
+        (sweep.A, BAR_COLOURS[2], (0, (1, 2)), "path of $A$"),
+        (sweep.B, BAR_COLOURS[4], (0, (1, 2)), "path of $B$"),
+        (mid, BAR_COLOURS[3], (0, (4, 1.5)), "coupler curve of " + ("$G_3$" if massive else "its mid-point")),
+    ):
+        scaled = np.where(sweep.assembled[:, None], factor * path, np.nan)
+        axes.plot(scaled[:, 0], scaled[:, 1], color=colour, lw=1.0, ls=dashes, zorder=2, label=name)
+        labels.keep_off(axes, *[(float(x), float(y)) for x, y in scaled[:: max(1, len(scaled) // 120)]])
+
+
+def _ground(axes: "Axes", labels: Labels, O2: Point, O4: Point, size: float) -> None:
+    """The ground line between the fixed pins, and a hatched support under each."""
+    from matplotlib.patches import Polygon, Rectangle
+
+    axes.plot(*zip(O2, O4, strict=True), color=MUTED, lw=1.0, ls=(0, (8, 3, 2, 3)), zorder=1)
+    labels.keep_off(axes, O2, O4)
+    for x, y in (O2, O4):
+        triangle = [(x, y), (x - size, y - 1.7 * size), (x + size, y - 1.7 * size)]
+        axes.add_patch(Polygon(triangle, closed=True, fc="white", ec=INK, lw=1.0, zorder=3))
+        strip = Rectangle(
+            (x - 1.7 * size, y - 2.5 * size),
+            3.4 * size,
+            0.8 * size,
+            fc="none",
+            ec=INK,
+            lw=0.0,
+            hatch="//////",
+            zorder=2,
+        )
+        axes.add_patch(strip)
+        axes.plot([x - 1.7 * size, x + 1.7 * size], [y - 1.7 * size] * 2, color=INK, lw=1.0, zorder=3)
+        for share in (0.5, 1.0, 1.7, 2.1, 2.5):
+            wide = size * (share / 1.7 if share <= 1.7 else 1.7)
+            labels.keep_off(axes, (x - wide, y - share * size), (x + wide, y - share * size))
+
+
+def mass_centre(axes: "Axes", point: Point, ms: float = 7.0) -> None:
+    """The quartered circle that marks a mass centre."""
+    for fill, colour in (("full", "white"), ("none", INK)):
+        axes.plot(
+            *[[v] for v in point], "o", ms=ms, mfc=colour if fill == "full" else "none", mec=INK, mew=0.8, zorder=7
+        )
+    for first, second in ((0, 90), (180, 270)):
+        axes.plot(*[[v] for v in point], marker=_wedge(first, second), ms=ms, mfc=INK, mec="none", zorder=7)
+
+
+def _wedge(start: int, stop: int):  # type: ignore[no-untyped-def]
+    from matplotlib.path import Path
+
+    return Path.wedge(start, stop)
+
+
+def draw_coupler_curves(axes: "Axes", view: View, labels: Labels) -> None:
+    """Paths of points along the coupler's line and beside it, from one full sweep."""
+    sweep = view.sweep
+    along = sweep.B - sweep.A
+    across = np.stack([-along[:, 1], along[:, 0]], axis=1)
+    points = ((0.0, 0.0), (0.25, 0.0), (0.5, 0.0), (0.75, 0.0), (1.0, 0.0), (0.5, 0.5), (0.5, -0.5))
+    paths = [sweep.A + u * along + v * across for u, v in points]
+    factor, unit = length_unit(largest(*paths))
+    greys = ("#0072B2", "#56A0C8", "#D55E00", "#5FA48B", "#007A5A", "#8A3B78", "#8A3B78")
+    for (u, v), path, colour in zip(points, paths, greys, strict=True):
+        dashes = "-" if v == 0.0 else (0, (5, 1.5)) if v > 0 else (0, (1.4, 1.4))
+        lw = 1.8 if (u, v) == (0.5, 0.0) else 1.1
+        name = {0.0: "$A$", 1.0: "$B$"}.get(u, f"{u:g}") if v == 0.0 else f"{u:g}, {v:+g}".replace("-", "−")
+        scaled = factor * path
+        axes.plot(scaled[:, 0], scaled[:, 1], color=colour, lw=lw, ls=dashes, label=name, zorder=3)
+    state = view.state()
+    where = pins(state)
+    for ends in ENDS.values():
+        x, y = zip(*(where[end] for end in ends), strict=True)
+        axes.plot(
+            np.multiply(x, factor),
+            np.multiply(y, factor),
+            color=MUTED,
+            lw=2.5,
+            alpha=0.55,
+            solid_capstyle="round",
+            zorder=2,
+        )
+    for name, point in where.items():
+        axes.plot([factor * point[0]], [factor * point[1]], "o", ms=4.5, mfc="white", mec=INK, mew=1.0, zorder=5)
+        if name in ("O2", "O4"):
+            labels.add(Label(axes, f"$O_{name[1]}$", (factor * point[0], factor * point[1]), (0.0, 1e9), INK, 8.5, 2.0))
+    labels.keep_off(axes, *[(factor * where[k][0], factor * where[k][1]) for k in ("O2", "A", "B", "O4")])
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.set_xlabel(f"$x$ ({unit})")
+    axes.set_ylabel(f"$y$ ({unit})")
+    axes.set_title(f"Coupler curves, {view.branch_name} branch")
+    axes.legend(
+        loc="upper center",
+        bbox_to_anchor=(0.5, -0.14),
+        ncols=4,
+        title="point along AB (and beside it), in lengths of the coupler",
+        title_fontsize=7.5,
+    )
+    theta = math.degrees(float(view.here.theta_2[0]))
+    view.notes.append(f"The linkage is drawn at θ₂ = {theta:.4g}°.")

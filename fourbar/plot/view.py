@@ -1,0 +1,138 @@
+"""What a drawing shows: the sweep of a scene on one branch, and one position of it in detail."""
+
+import math
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from fourbar.effects.wrenches import Wrenches
+from fourbar.errors import FourBarError, NotAssembledError
+from fourbar.kinematics import Array, State, Vector, add_accelerations, add_velocities, close_loop
+from fourbar.scene import Command, FromLimit, Scene, command, solve
+from fourbar.solution import Solution
+
+LEAD = math.radians(60.0)
+"""The position drawn where none is named: this far into the first stretch that assembles (or half of a shorter one)."""
+
+
+@dataclass(slots=True)
+class View:
+    """A scene on one branch.
+
+    `sweep` runs over theta_2 in rising order, `here` is the one position drawn to scale, `notes`
+    collects what a caption has to say about the panels.
+    """
+
+    scene: Scene
+    sweep: Solution
+    here: Solution
+    notes: list[str] = field(default_factory=list)
+
+    @property
+    def degrees(self) -> Array:
+        """theta_2 of the sweep, degrees."""
+        return np.degrees(self.sweep.theta_2)
+
+    @property
+    def moves(self) -> bool:
+        """Whether velocities, accelerations and forces were evaluated."""
+        return self.sweep.omega_2 is not None
+
+    @property
+    def branch_name(self) -> str:
+        """ "open", "crossed", or "both signs" where the motion follows a smooth path through change points."""
+        return branch_name(self.sweep.branch)
+
+    def state(self) -> State:
+        """Kinematics at the position drawn."""
+        here = self.here
+        state = close_loop(self.scene.linkage, here.theta_2, here.branch)
+        if here.omega_2 is not None and here.alpha_2 is not None:
+            add_velocities(state, here.omega_2)
+            add_accelerations(state, here.alpha_2)
+        return state
+
+
+def branch_name(branch: np.ndarray) -> str:
+    """The branch of a set of positions in words."""
+    if np.all(branch == 1):
+        return "open"
+    return "crossed" if np.all(branch == -1) else "both signs"
+
+
+class Recorder(Wrenches):
+    """Wrenches that are kept one by one, each force with its arm, for a free-body diagram."""
+
+    def __init__(self, state: State) -> None:
+        super().__init__(state)
+        self.forces: list[tuple[int, tuple[float, float], tuple[float, float]]] = []
+        self.couples: list[tuple[int, float]] = []
+
+    def add_force(self, bar: int, force: Vector | tuple[float, float], arm: Vector | None = None) -> None:
+        """A force on a bar, applied at `arm` from the bar's first pin; at that pin where no arm is given."""
+        fx, fy, x, y = (float(np.ravel(value)[0]) for value in (*force, *(arm or (0.0, 0.0))))
+        self.forces.append((bar, (fx, fy), (x, y)))
+
+    def add_moment(self, bar: int, moment: Array | float) -> None:
+        """A pure couple on a bar."""
+        if bar != 1:
+            self.couples.append((bar, float(np.ravel(moment)[0])))
+
+
+def sweep_command(scene: Scene) -> Command:
+    """The positions of a scene in rising theta_2; a single position is put among those of the default range."""
+    if scene.motion.free is not None:
+        raise FourBarError("a free motion runs through time: draw it from its own results")
+    motion = scene.motion
+    own = command(scene)
+    if len(own.theta_2) > 1:
+        order = np.argsort(own.theta_2, kind="stable")
+        return own._replace(theta_2=own.theta_2[order], branch=own.branch[order])
+    assert motion.theta_2 is None or isinstance(motion.theta_2, (float, FromLimit, np.ndarray))
+    wide = command(replace(scene, motion=replace(motion, theta_2=None)))
+    # the same position may lie whole turns away from the default range
+    turns = np.round((0.5 * (wide.theta_2[0] + wide.theta_2[-1]) - own.theta_2) / math.tau)
+    theta_2, first = np.unique(np.concatenate([wide.theta_2, own.theta_2 + turns * math.tau]), return_index=True)
+    return wide._replace(theta_2=theta_2, branch=np.concatenate([wide.branch, own.branch])[first])
+
+
+def on_branch(scene: Scene, branch: int) -> Scene:
+    """The same scene on the given branch."""
+    return replace(scene, motion=replace(scene.motion, branch=branch))
+
+
+def view(scene: Scene, position: float | None = None) -> View:
+    """The sweep of a scene and one position of it.
+
+    Parameters
+    ----------
+    position : theta_2 drawn to scale, rad; left out: the scene's own where it names one, else 60
+        deg into the first stretch that assembles.
+
+    Raises
+    ------
+    NotAssembledError : no position of the sweep assembles, or the one named does not.
+    """
+    where = sweep_command(scene)
+    sweep = solve(scene, at=where)
+    if not sweep.assembled.any():
+        raise NotAssembledError("nothing to draw: the linkage assembles at none of the scene's positions")
+    own = command(scene)
+    if position is None:
+        position = float(own.theta_2[0]) if len(own.theta_2) == 1 else _representative(sweep)
+    branch = np.array([where.branch[np.argmin(np.abs(where.theta_2 - position))]], dtype=np.int8)
+    here = solve(scene, at=Command(np.array([position]), branch, own.omega_2, own.alpha_2))
+    if not here.assembled[0]:
+        raise NotAssembledError(f"the linkage does not assemble at theta_2 = {math.degrees(position):.6g} deg")
+    return View(scene, sweep, here)
+
+
+def _representative(sweep: Solution) -> float:
+    """A position that shows the bars apart from each other."""
+    first = int(np.argmax(sweep.assembled))
+    gap = np.flatnonzero(~sweep.assembled[first:])
+    last = first + int(gap[0]) - 1 if gap.size else len(sweep) - 1
+    start, stop = sweep.theta_2[first], sweep.theta_2[last]
+    target = start + min(LEAD, 0.5 * (stop - start))
+    run = sweep.theta_2[first : last + 1]
+    return float(run[np.argmin(np.abs(run - target))])
