@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from importlib import import_module
 from typing import Any
 
@@ -63,6 +63,69 @@ class Record:
     answers: list[Answer] = field(default_factory=list)
 
 
+@dataclass(slots=True)
+class Page:
+    """What is kept of one scene once it is judged: small, and storable as JSON but for its rows."""
+
+    name: str
+    title: str = ""
+    source: str = ""
+    rows: list[Row] = field(default_factory=list)
+    timings: list[Timing] = field(default_factory=list)
+    left_out: list[str] = field(default_factory=list)
+    independence: dict[str, tuple[str, str]] = field(default_factory=dict)
+    """engine: (shared with the formulas, found alone)."""
+    evidence: dict[str, dict[str, float]] = field(default_factory=dict)
+    figure: str | None = None
+    """SVG of the answers, or None where there is nothing to draw."""
+
+    def without_rows(self) -> dict[str, Any]:
+        """Everything but the rows, which have their own table."""
+        kept = asdict(replace(self, rows=[]))
+        del kept["rows"]
+        return kept
+
+    @classmethod
+    def restore(cls, kept: dict[str, Any], rows: list[Row]) -> "Page":
+        """From what `without_rows` gave."""
+        timings = [Timing(**timing) for timing in kept["timings"]]
+        independence = {engine: (shared, own) for engine, (shared, own) in kept["independence"].items()}
+        return cls(**{**kept, "timings": timings, "independence": independence}, rows=rows)
+
+    def joined(self, other: "Page") -> "Page":
+        """The same scene with what another set of engines said; the rows of the formulas stand once."""
+        known = set(self.rows)
+        return replace(
+            self,
+            rows=[*self.rows, *(row for row in other.rows if row not in known)],
+            timings=[*self.timings, *(timing for timing in other.timings if timing.engine != FORMULAS)],
+            left_out=[*self.left_out, *other.left_out],
+            independence={**self.independence, **other.independence},
+            evidence={**self.evidence, **other.evidence},
+        )
+
+
+def judged_page(name: str, scene: Scene, witnesses: Sequence[Witness] = WITNESSES, *, draw: bool = True) -> Page:
+    """Judge a scene and keep what the report needs of it."""
+    record = judge(name, scene, witnesses)
+    figure = None
+    if draw:
+        from validation.report.figures import scene_figure
+
+        figure = scene_figure(record)
+    return Page(
+        name,
+        scene.title,
+        scene.source,
+        record.rows,
+        record.timings,
+        record.left_out,
+        {answer.engine: (answer.shared, answer.own) for answer in record.answers if answer.own},
+        {answer.engine: answer.evidence for answer in record.answers if answer.evidence},
+        figure,
+    )
+
+
 def judge(name: str, scene: Scene, witnesses: Sequence[Witness] = WITNESSES) -> Record:
     """Ask every witness about one scene and compare; an engine that breaks down costs its own rows."""
     record = Record(name, scene)
@@ -118,6 +181,17 @@ def _ask(witness: Witness, scene: Scene, at: Command, record: Record, part: str 
         if answer.refusal is not None:
             record.left_out.append(f"{answer.engine}: {answer.refusal}")
     return answer
+
+
+def breakdown(scene: str, engine: str, error: BaseException) -> Row:
+    """The row of an engine that took its process with it, or never came back."""
+    if isinstance(error, TimeoutError):
+        reason = "the engine hung and was stopped"
+    else:
+        code = getattr(error, "exitcode", None)
+        died = f"exit code {code}" if code is not None else " ".join(str(error).split()) or type(error).__name__
+        reason = f"the engine crashed its process ({died})"
+    return _failure(scene, engine, "", reason)
 
 
 def _failure(scene: str, engine: str, part: str, reason: str) -> Row:

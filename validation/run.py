@@ -1,78 +1,135 @@
-"""The run: every scene judged, in parallel, and the results written."""
+"""The run: every scene judged, the results streamed to disk, the report written."""
 
 import csv
 import io
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import click
 
-from fourbar.scene import Scene
+from fourbar.errors import InputError
 from fourbar.writing import write_text
-from validation.judge import Record, judge
+from validation.judge import WITNESSES, Page, Witness
+from validation.machine import versions
 from validation.report.html import html
 from validation.report.markdown import markdown
-from validation.results import Row, sorted_rows, write_results
-from validation.suites import model_files, named_scenes
+from validation.report.summary import SCENES_SHOWN, Summary, summarise
+from validation.suite import pool
+from validation.suite.columns import write_columns
+from validation.suite.random import LinkageType
+from validation.suite.scenes import Random, Suite, model_files, scene_files
+from validation.suite.store import Store
 
 WORKERS = 2
+CHUNK = {True: 1, False: 20}
+"""Scenes per task: one where something is simulated (a second each), else twenty (a second together)."""
 
 
-def records(scenes: Sequence[tuple[str, Scene]], workers: int = WORKERS) -> Iterator[Record]:
-    """The record of each scene as it is done, in the order given."""
-    from joblib import Parallel, delayed
+def run(
+    suite: Suite, out: Path, witnesses: tuple[Witness, ...], *, workers: int = WORKERS, scheduler: str | None = None
+) -> Iterator[int | Summary]:
+    """Judge a suite into a folder; yields the number of scenes done as they come, at last the summary.
 
-    if workers == 1 or len(scenes) == 1:
-        yield from (judge(name, scene) for name, scene in scenes)
-        return
-    pool = Parallel(n_jobs=workers, return_as="generator", batch_size=1)
-    yield from pool(delayed(judge)(name, scene) for name, scene in scenes)
+    What an interrupted run of the same suite with the same engines and versions left is kept.
+    """
+    size = CHUNK[any(witness.name == "mujoco-simulated" for witness in witnesses)]
+    chunks = [range(start, min(start + size, len(suite))) for start in range(0, len(suite), size)]
+    draw = len(suite) <= SCENES_SHOWN
+    identity = {
+        "scenes": suite.fingerprint(),
+        "witnesses": [witness.name for witness in witnesses],
+        "versions": versions(),
+        "draw": draw,
+    }
+    with Store(out, identity).held() as store:
+        done = store.done()
+        yield sum(len(chunks[number]) for number in done)
+        todo = [(number, scenes) for number, scenes in enumerate(chunks) if number not in done]
+        if scheduler is not None:
+            answers = pool.over_machines(suite, todo, witnesses, draw, scheduler)
+        else:
+            answers = pool.over_processes(suite, todo, witnesses, draw, workers)
+        for number, pages in answers:
+            store.put(number, pages)
+            yield len(pages)
+        summary = summarise(store.pages(len(chunks)))
+        first_lines = write_columns(store.rows(len(chunks)), out)
+        write_text(out / "timings.csv", timings_csv(store.pages(len(chunks))))
+        write_text(out / "report.md", markdown(summary))
+        write_text(out / "report.html", html(summary, first_lines))
+        store.finish()
+    yield summary
 
 
-def all_rows(done: Sequence[Record]) -> list[Row]:
-    """The rows of all scenes, sorted by scene, engine, setting and quantity."""
-    return sorted_rows(row for record in done for row in record.rows)
-
-
-def timings_csv(done: Sequence[Record]) -> str:
+def timings_csv(pages: Iterator[Page]) -> str:
     """Seconds per answer, and their ratio to the formulas' on the same scene in the same process."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(["scene", "engine", "setting", "positions", "seconds", "times_formulas"])
-    for record in done:
-        formulas = record.timings[0].seconds
-        for t in record.timings:
-            writer.writerow(
-                [t.scene, t.engine, t.setting, t.positions, f"{t.seconds:.6f}", f"{t.seconds / formulas:.1f}"]
-            )
+    for page in pages:
+        for t in page.timings:
+            ratio = t.seconds / page.timings[0].seconds
+            writer.writerow([t.scene, t.engine, t.setting, t.positions, f"{t.seconds:.6f}", f"{ratio:.1f}"])
     return text.getvalue()
 
 
-def write(done: Sequence[Record], out: Path) -> None:
-    """Write results.csv, timings.csv, report.md and report.html into a folder."""
-    out.mkdir(parents=True, exist_ok=True)
-    write_results(all_rows(done), out / "results.csv")
-    write_text(out / "timings.csv", timings_csv(done))
-    write_text(out / "report.md", markdown(done))
-    write_text(out / "report.html", html(done))
+def chosen(engines: str | None) -> tuple[Witness, ...]:
+    """The witnesses named in a comma-separated list; all of them where there is none."""
+    if engines is None:
+        return WITNESSES
+    known = {witness.name: witness for witness in WITNESSES}
+    names = [name.strip() for name in engines.split(",") if name.strip()]
+    for name in names:
+        if name not in known:
+            raise InputError("--engines", name, "must be among " + ", ".join(known))
+    return tuple(witness for name, witness in known.items() if name in names)
+
+
+def linkage_types(text: str) -> tuple[LinkageType, ...]:
+    """The types named in a comma-separated list."""
+    try:
+        return tuple(LinkageType(name.strip()) for name in text.split(","))
+    except ValueError:
+        allowed = ", ".join(kind.value for kind in LinkageType)
+        raise InputError("--type", text, f"must be a comma-separated list of {allowed}") from None
 
 
 @click.command(name="run")
 @click.argument("scenes", nargs=-1, type=click.Path(path_type=Path))
 @click.option("--out", type=click.Path(path_type=Path, file_okay=False), default=Path("results"), show_default=True)
+@click.option("--engines", metavar="NAMES", help="Comma-separated witnesses; left out: all.")
+@click.option("--random", "count", type=click.IntRange(min=1), help="Judge this many random linkages instead.")
+@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of the random linkages.")
+@click.option("--type", "types", default=",".join(kind.value for kind in LinkageType), show_default=True)
 @click.option("--workers", type=click.IntRange(min=1), default=WORKERS, show_default=True, help="Processes.")
-def command(scenes: tuple[Path, ...], out: Path, workers: int) -> int:
-    """Judge scenes (default: all of models/) and write results.csv, timings.csv, report.md and report.html."""
+@click.option("--scheduler", metavar="ADDRESS", help="Spread over the workers of this Dask scheduler.")
+def command(
+    scenes: tuple[Path, ...],
+    out: Path,
+    engines: str | None,
+    count: int | None,
+    seed: int,
+    types: str,
+    workers: int,
+    scheduler: str | None,
+) -> int:
+    """Judge scenes (default: all of models/); write results.csv, timings.csv, report.md and report.html."""
     from rich.console import Console
-    from rich.progress import track
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
     from validation.report.terminal import table
 
-    console = Console(stderr=True)
-    todo = named_scenes(scenes or model_files())
-    done = list(
-        track(records(todo, workers), total=len(todo), description="judging", console=console, disable=console.quiet)
-    )
-    write(done, out)
-    table(done, out)
-    return 0 if all(row.passed for row in all_rows(done)) else 1
+    if count is not None and scenes:
+        raise InputError("--random", count, "judges random linkages; leave out the scene files")
+    suite: Suite = Random(count, seed, linkage_types(types)) if count else scene_files(scenes or model_files())
+    columns = (TextColumn("judging"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    result: Any = None
+    with Progress(*columns, console=Console(stderr=True)) as progress:
+        task = progress.add_task("judging", total=len(suite))
+        for result in run(suite, out, chosen(engines), workers=workers, scheduler=scheduler):
+            if isinstance(result, int):
+                progress.advance(task, result)
+    assert isinstance(result, Summary)
+    table(result, out)
+    return 1 if result.counts["fails"] else 0

@@ -1,13 +1,11 @@
 """report.md: short enough for a comment on a pull request."""
 
 import math
-from collections.abc import Sequence
 
-from validation.judge import Record
-from validation.report.summary import STATEMENT, TOLERANCES, summarise, used
+from validation.report.summary import STATEMENT, TOLERANCES, Summary, used
 
 
-def markdown(records: Sequence[Record]) -> str:
+def markdown(summary: Summary) -> str:
     """The report as Markdown."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
@@ -23,7 +21,7 @@ def markdown(records: Sequence[Record]) -> str:
     environment.filters["number"] = number
     environment.filters["degrees"] = lambda radians: f"{math.degrees(radians):.3f}"
     template = environment.get_template("report.md.j2")
-    return template.render(s=summarise(records), tolerances=TOLERANCES, statement=STATEMENT, used=used)
+    return template.render(s=summary, tolerances=TOLERANCES, statement=STATEMENT, used=used)
 
 
 def number(value: float) -> str:

@@ -1,12 +1,13 @@
-"""What every form of the report says, computed once from the records."""
+"""What every form of the report says, computed once from the pages."""
 
 import math
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from heapq import nlargest
 from statistics import median
 
-from validation.judge import Record
+from validation.judge import Page
 from validation.machine import machine, versions
 from validation.results import FAILS, REFUSES, VERDICTS, Row
 from validation.tolerance import EPS, EQUIVALENCE, IDENTITY, NOTHING_TO_TELL, SIMULATED, K
@@ -41,21 +42,27 @@ class Summary:
     """The report in data."""
 
     verdict: str
+    scenes: int
     counts: dict[str, int]
     versions: dict[str, str]
     machine: str
     worst: list[Worst]
     failures: list[Row]
-    refusals: list[Row]
+    refusals: list[tuple[str, str, int]]
+    """(engine, reason, number of scenes): declared limits that were met."""
     measured_k: dict[str, float]
     """Largest error*condition/eps of each exact engine: what K would have sufficed."""
     independence: list[tuple[str, str, str]]
     """(engine, shared with the formulas, found alone)."""
     costs: list[Cost]
-    left_out: list[tuple[str, str]]
-    evidence: list[tuple[str, str, dict[str, float]]]
+    pages: list[Page]
+    """The scenes shown one by one: those that fail first, at most SCENES_SHOWN."""
 
 
+SCENES_SHOWN = 200
+KEPT = 1000
+"""Rows listed at the most; all of them are in results.csv."""
+TIMED = 1000
 TOLERANCES = (IDENTITY, EQUIVALENCE, SIMULATED)
 STATEMENT = (
     f"K = {K:g} for every exact comparison; where eps/condition > {NOTHING_TO_TELL:g} the row says that nothing can be "
@@ -64,34 +71,55 @@ STATEMENT = (
 )
 
 
-def summarise(records: Sequence[Record]) -> Summary:
-    """Condense the records of a run."""
-    rows = [row for record in records for row in record.rows]
-    counts = Counter(row.verdict for row in rows)
-    failures = [row for row in rows if row.verdict == FAILS]
-    scenes = len({row.scene for row in rows})
-    if failures:
-        verdict = f"FAILS: {len(failures)} of {len(rows)} comparisons on {scenes} scenes do not hold"
+def summarise(pages: Iterable[Page]) -> Summary:
+    """Condense a run in one pass; what is kept does not grow with the number of scenes."""
+    counts: Counter[str] = Counter()
+    failures: list[Row] = []
+    refusals: Counter[tuple[str, str]] = Counter()
+    worst: list[Worst] = []
+    measured_k: dict[str, float] = {}
+    independence: dict[str, tuple[str, str]] = {}
+    costs: dict[tuple[str, str], list[tuple[float, float]]] = {}
+    failing: list[Page] = []
+    holding: list[Page] = []
+    scenes = 0
+    for page in pages:
+        scenes += 1
+        counts.update(row.verdict for row in page.rows)
+        bad = [row for row in page.rows if row.verdict == FAILS]
+        failures += bad[: KEPT - len(failures)]
+        refusals.update((row.engine, row.reason) for row in page.rows if row.verdict == REFUSES)
+        worst += _worst(page.rows)
+        if len(worst) > 2 * KEPT:
+            worst = _sorted(nlargest(KEPT, worst, key=lambda w: w.used))
+        _measure_k(page.rows, measured_k)
+        independence.update(page.independence)
+        _add_costs(page, costs)
+        keep = failing if bad else holding
+        if len(keep) < SCENES_SHOWN:
+            keep.append(page)
+    total, failed = sum(counts.values()), counts[FAILS]
+    if failed:
+        verdict = f"FAILS: {failed} of {total} comparisons on {scenes} scenes do not hold"
     else:
-        verdict = f"All {len(rows)} comparisons on {scenes} scenes hold"
+        verdict = f"All {total} comparisons on {scenes} scenes hold"
+    shown = sorted([*failing, *holding[: SCENES_SHOWN - len(failing)]], key=lambda page: page.name)
     return Summary(
         verdict=verdict,
-        counts={name: counts.get(name, 0) for name in VERDICTS},
+        scenes=scenes,
+        counts={name: counts[name] for name in VERDICTS},
         versions=versions(),
         machine=machine(),
-        worst=_worst(rows),
+        worst=_sorted(nlargest(KEPT, worst, key=lambda w: w.used)),
         failures=failures,
-        refusals=[row for row in rows if row.verdict == REFUSES],
-        measured_k=_measured_k(rows),
-        independence=_independence(records),
-        costs=_costs(records),
-        left_out=[(record.name, line) for record in records for line in record.left_out],
-        evidence=[
-            (record.name, answer.engine, answer.evidence)
-            for record in records
-            for answer in record.answers
-            if answer.evidence
+        refusals=[(engine, reason, count) for (engine, reason), count in sorted(refusals.items())],
+        measured_k=measured_k,
+        independence=[(engine, *independence[engine]) for engine in sorted(independence)],
+        costs=[
+            Cost(engine, setting, median(r for r, _ in values), median(m for _, m in values))
+            for (engine, setting), values in sorted(costs.items())
         ],
+        pages=shown,
     )
 
 
@@ -105,45 +133,29 @@ def used(row: Row) -> float:
 
 
 def _worst(rows: Sequence[Row]) -> list[Worst]:
-    groups: dict[tuple[str, str, str], list[Row]] = {}
+    groups: dict[tuple[str, str], list[Row]] = {}
     for row in rows:
         if row.verdict != REFUSES:
-            groups.setdefault((row.scene, row.engine, row.setting), []).append(row)
-    return [
-        Worst(max(group, key=used), len(group), sum(not row.passed for row in group))
-        for _, group in sorted(groups.items())
-    ]
+            groups.setdefault((row.engine, row.setting), []).append(row)
+    return [Worst(max(group, key=used), len(group), sum(not row.passed for row in group)) for group in groups.values()]
 
 
-def _measured_k(rows: Sequence[Row]) -> dict[str, float]:
-    largest: dict[str, float] = {}
+def _sorted(worst: Iterable[Worst]) -> list[Worst]:
+    return sorted(worst, key=lambda w: (w.row.scene, w.row.engine, w.row.setting))
+
+
+def _measure_k(rows: Sequence[Row], largest: dict[str, float]) -> None:
     for row in rows:
-        exact = row.reason.startswith(EQUIVALENCE.name) and math.isfinite(row.error)
-        if exact:
+        if row.reason.startswith(EQUIVALENCE.name) and math.isfinite(row.error):
             largest[row.engine] = max(largest.get(row.engine, 0.0), row.error * row.condition / EPS)
-    return largest
 
 
-def _independence(records: Sequence[Record]) -> list[tuple[str, str, str]]:
-    table = {
-        answer.engine: (answer.engine, answer.shared, answer.own)
-        for record in records
-        for answer in record.answers
-        if answer.own
-    }
-    return [table[engine] for engine in sorted(table)]
-
-
-def _costs(records: Sequence[Record]) -> list[Cost]:
-    groups: dict[tuple[str, str], list[tuple[float, float]]] = {}
-    for record in records:
-        formulas = record.timings[0].seconds if record.timings else math.nan
-        refused = {answer.engine for answer in record.answers if answer.refusal is not None}
-        for t in record.timings:
-            if t.engine not in refused:
-                each = (t.seconds / formulas, 1e6 * t.seconds / t.positions)
-                groups.setdefault((t.engine, t.setting), []).append(each)
-    return [
-        Cost(engine, setting, median(r for r, _ in values), median(m for _, m in values))
-        for (engine, setting), values in sorted(groups.items())
-    ]
+def _add_costs(page: Page, costs: dict[tuple[str, str], list[tuple[float, float]]]) -> None:
+    formulas = page.timings[0].seconds if page.timings else math.nan
+    refused = {row.engine for row in page.rows if row.verdict == REFUSES}
+    for t in page.timings:
+        kept = costs.setdefault((t.engine, t.setting), [])
+        if t.engine not in refused and len(kept) < TIMED:
+            kept.append((t.seconds / formulas, 1e6 * t.seconds / t.positions))
+    for key in [key for key, values in costs.items() if not values]:
+        del costs[key]

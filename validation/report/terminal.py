@@ -1,21 +1,18 @@
 """The table at the end of a run."""
 
 import math
-from collections.abc import Sequence
 from pathlib import Path
 
-from validation.judge import Record
 from validation.report.markdown import number
-from validation.report.summary import summarise
+from validation.report.summary import Summary
 
 
-def table(records: Sequence[Record], out: Path) -> None:
+def table(summary: Summary, out: Path) -> None:
     """Print the worst row of every scene and engine, the verdict last."""
     from rich.console import Console
     from rich.markup import escape
     from rich.table import Table
 
-    summary = summarise(records)
     console = Console()
     shown = Table(title="worst row of each scene and engine")
     for heading in ("scene", "engine", "quantity"):
@@ -41,6 +38,6 @@ def table(records: Sequence[Record], out: Path) -> None:
             f"[bold red]fails[/] {escape(row.scene)} {escape(row.engine)} {escape(row.quantity)}: "
             f"error {number(row.error)}, allowed {number(row.allowed)}: {escape(row.reason)}"
         )
-    for scene, line in summary.left_out:
-        console.print(f"left out {escape(scene)}: {escape(line)}")
+    for engine, reason, count in summary.refusals:
+        console.print(f"left out in {count} scene(s): {escape(engine)}: {escape(reason)}")
     console.print(f"[bold]{escape(summary.verdict)}[/]; written to {escape(str(out))}")

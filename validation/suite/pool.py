@@ -1,0 +1,126 @@
+"""Chunks of scenes over processes or machines, the same results whatever their number and order.
+
+A worker that dies or hangs costs the scene and engine that killed it, and no other: its chunk is
+done again scene by scene, and the scene at fault engine by engine.
+"""
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, wait
+from dataclasses import replace
+
+from validation.judge import Page, Witness, breakdown, judged_page
+from validation.suite.scenes import Suite
+
+SECONDS_PER_SCENE = 60.0
+"""A scene takes 0.05 to 3 s; one that takes longer than this hangs."""
+IN_FLIGHT = 4
+"""Chunks submitted per worker: enough to keep it busy, few enough to keep the memory bounded."""
+Chunk = tuple[int, range]
+
+
+def judge_chunk(suite: Suite, scenes: Sequence[int], witnesses: Sequence[Witness], draw: bool) -> list[Page]:
+    """The pages of some scenes; runs in a worker."""
+    return [judged_page(suite.name(i), suite.scene(i), witnesses, draw=draw) for i in scenes]
+
+
+def in_this_process(
+    suite: Suite, chunks: Iterable[Chunk], witnesses: Sequence[Witness], draw: bool
+) -> Iterator[tuple[int, list[Page]]]:
+    """One after the other, here: for a debugger, not for engines that may crash."""
+    for number, scenes in chunks:
+        yield number, judge_chunk(suite, scenes, witnesses, draw)
+
+
+def over_processes(
+    suite: Suite, chunks: Iterable[Chunk], witnesses: Sequence[Witness], draw: bool, workers: int
+) -> Iterator[tuple[int, list[Page]]]:
+    """Over processes of this machine."""
+    from multiprocessing import get_context
+
+    from pebble import ProcessPool
+
+    with ProcessPool(max_workers=workers, context=get_context("spawn")) as pool:
+        try:
+
+            def submit(scenes: Sequence[int], asked: Sequence[Witness]) -> Future[list[Page]]:
+                seconds = SECONDS_PER_SCENE * len(scenes)
+                future: Future[list[Page]] = pool.schedule(
+                    judge_chunk, args=(suite, scenes, asked, draw), timeout=seconds
+                )
+                return future
+
+            yield from _as_done(suite, chunks, witnesses, submit, IN_FLIGHT * workers)
+        except BaseException:
+            pool.stop()  # type: ignore[no-untyped-call]
+            raise
+
+
+def over_machines(
+    suite: Suite, chunks: Iterable[Chunk], witnesses: Sequence[Witness], draw: bool, scheduler: str
+) -> Iterator[tuple[int, list[Page]]]:
+    """Over the workers of a Dask scheduler; each needs this checkout importable."""
+    from distributed import Client
+
+    with Client(scheduler) as client:
+        executor = client.get_executor(retries=0, pure=False)
+        workers = max(1, len(client.scheduler_info()["workers"]))
+
+        def submit(scenes: Sequence[int], asked: Sequence[Witness]) -> Future[list[Page]]:
+            future: Future[list[Page]] = executor.submit(judge_chunk, suite, scenes, asked, draw)
+            return future
+
+        yield from _as_done(suite, chunks, witnesses, submit, IN_FLIGHT * workers)
+
+
+def _as_done(
+    suite: Suite,
+    chunks: Iterable[Chunk],
+    witnesses: Sequence[Witness],
+    submit: Callable[[Sequence[int], Sequence[Witness]], "Future[list[Page]]"],
+    in_flight: int,
+) -> Iterator[tuple[int, list[Page]]]:
+    """Keep a bounded number of chunks under way; yield each as it is done."""
+    waiting = iter(chunks)
+    under_way: dict[Future[list[Page]], Chunk] = {}
+    exhausted = False
+    while True:
+        while not exhausted and len(under_way) < in_flight:
+            chunk = next(waiting, None)
+            if chunk is None:
+                exhausted = True
+            else:
+                under_way[submit(chunk[1], witnesses)] = chunk
+        if not under_way:
+            return
+        done, _ = wait(under_way, return_when=FIRST_COMPLETED)
+        for future in done:
+            number, scenes = under_way.pop(future)
+            try:
+                yield number, future.result()
+            except Exception:  # the worker died or hung; find out on whose account
+                yield number, [_alone(suite, scene, witnesses, submit) for scene in scenes]
+
+
+def _alone(
+    suite: Suite,
+    scene: int,
+    witnesses: Sequence[Witness],
+    submit: Callable[[Sequence[int], Sequence[Witness]], "Future[list[Page]]"],
+) -> Page:
+    """One scene by itself, and if that breaks down too, one engine at a time."""
+    try:
+        return submit([scene], witnesses).result()[0]
+    except Exception:
+        pass
+    name = suite.name(scene)
+    page: Page | None = None
+    lost = []
+    for asked in ([], *([witness] for witness in witnesses)):
+        try:
+            part = submit([scene], asked).result()[0]
+        except Exception as error:
+            lost.append(breakdown(name, asked[0].name if asked else "formulas", error))
+            continue
+        page = part if page is None else page.joined(part)
+    page = page or Page(name)
+    return replace(page, rows=[*page.rows, *lost])
