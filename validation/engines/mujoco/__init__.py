@@ -1,0 +1,1 @@
+"""MuJoCo, imported in this package alone."""

@@ -1,0 +1,227 @@
+"""MuJoCo simulates the closed loop of the generated MJCF, driven at omega_2 through the sweep."""
+
+import time
+from dataclasses import dataclass, replace
+
+import mujoco
+import numpy as np
+
+from fourbar.errors import FourBarError, InputError
+from fourbar.mjcf import Run, Settings, mjcf, run_through
+from fourbar.scene import Command, Scene
+from validation.answer import Answer, Array
+from validation.engines.mujoco.closed_loop import O2, O4, A, ClosedLoop
+
+SHARED = "lengths, masses, inertias, centres, loads and effects as MJCF text; omega_2, alpha_2 and the branch"
+OWN = "assembly, velocities at the start, the motion through time, accelerations, drive torque, pin forces"
+LIGHT_FLYWHEEL = 1e4
+"""Flywheel of the model that is asked for T3 or T4: heavy enough to keep the closure's softness
+small, light enough that the torque it needs does not drown in its rounding."""
+FINE = np.radians(2.0)
+"""Between positions further apart than this it is looked whether the loop closes on the way."""
+FIELDS = ("theta_3", "theta_4", "omega_3", "omega_4", "alpha_3", "alpha_4", "torque")
+PINS = ("F12", "F32", "F43", "F14")
+
+
+@dataclass(frozen=True, slots=True)
+class MujocoSimulated:
+    """Engine "mujoco-simulated"."""
+
+    settings: Settings = Settings()
+    name: str = "mujoco-simulated"
+
+    def answer(self, scene: Scene, command: Command) -> Answer:
+        """The sweep run through in time; every quantity at the crank's own angle, speed and acceleration."""
+        began = time.perf_counter()
+        refusal = _refusal(scene, command)
+        if refusal is None:
+            try:
+                answer = _Simulation(self.settings, scene, command).answer()
+            except (FourBarError, np.linalg.LinAlgError) as error:
+                refusal = str(error)
+        if refusal is not None:
+            answer = Answer(self.name, self.settings.integrator, refusal=refusal)
+        answer.shared, answer.own, answer.seconds = SHARED, OWN, time.perf_counter() - began
+        return answer
+
+
+def _refusal(scene: Scene, command: Command) -> str | None:
+    """Why this scene is not simulated, or None."""
+    if scene.motion.free is not None:
+        return "a free motion has no commanded sweep"
+    if command.omega_2 is None or not np.any(command.omega_2):
+        return "omega_2 is 0 or not stated: nothing to simulate through time"
+    if np.ptp(command.omega_2) != 0.0 or np.ptp(command.alpha_2) != 0.0:
+        return "omega_2 or alpha_2 differs from position to position: that is no one motion through time"
+    if np.ptp(command.theta_2) == 0.0:
+        return "one position: nothing to run through"
+    return None
+
+
+class _Simulation:
+    """One scene: its own assembly, then each stretch of positions that assembles, run through in time."""
+
+    def __init__(self, settings: Settings, scene: Scene, command: Command) -> None:
+        self.settings, self.scene, self.command = settings, scene, command
+        self.omega, self.alpha = float(np.max(command.omega_2)), float(np.max(command.alpha_2))  # type: ignore[arg-type]
+        # the text is that of the command, which a caller may have given instead of the scene's own
+        motion = replace(scene.motion, omega_2=self.omega, alpha_2=self.alpha)
+        self.scene = replace(scene, motion=motion)
+        n = len(command.theta_2)
+        self.order = np.argsort(command.theta_2 if self.omega > 0.0 else -command.theta_2, kind="stable")
+        self.theta_2, self.omega_2, self.alpha_2 = (
+            command.theta_2.copy(),
+            np.full(n, self.omega),
+            np.full(n, self.alpha),
+        )
+        self.branch = command.branch.copy()
+        self.values = {name: np.full(n, np.nan) for name in FIELDS}
+        self.values.update({name: np.full((n, 2), np.nan) for name in PINS})
+        self.evidence = {
+            "closure_gap_m": 0.0,
+            "speed_error": 0.0,
+            "time_went_back": 0.0,
+            "bad_states": 0.0,
+            "solver_iterations": 0.0,
+            "steps": 0.0,
+        }
+        self.steps_per_revolution = 0.0
+
+    def answer(self) -> Answer:
+        """The answer over all positions."""
+        loop = ClosedLoop(self._text(1e-3))  # kinematics alone: the timestep plays no part
+        found = self._assemble(loop)
+        for stretch in self._stretches(loop, found):
+            self._run(stretch, found)
+        at = Command(self.theta_2, self.branch, self.omega_2, self.alpha_2)
+        setting = f"{self.settings.integrator} {self.steps_per_revolution:.0f}/rev"
+        assembled = np.array([angles is not None for angles in found])
+        return Answer("mujoco-simulated", setting, at, assembled, self.values, evidence=self.evidence)
+
+    def _text(self, timestep: float, flywheel: float | None = None) -> str:
+        """The generated MJCF without its keyframe."""
+        heavy = self.settings.flywheel if flywheel is None else flywheel
+        settings = replace(self.settings, timestep=timestep, timestep_scale=1.0, flywheel=heavy)
+        return mjcf(self.scene, settings, keyframe=False)
+
+    def _assemble(self, loop: ClosedLoop) -> list[tuple[float, float] | None]:
+        """Own (theta_3, theta_4) of every commanded position."""
+        found: list[tuple[float, float] | None] = [None] * len(self.order)
+        near = None
+        for index in self.order:
+            near = loop.assemble(float(self.command.theta_2[index]), int(self.command.branch[index]), near)
+            found[index] = near
+        return found
+
+    def _stretches(self, loop: ClosedLoop, found: list[tuple[float, float] | None]) -> list[list[int]]:
+        """Positions in order of time, split where the loop does not close between them."""
+        stretches: list[list[int]] = [[]]
+        for index in self.order:
+            if found[index] is None or (stretches[-1] and not self._closes_between(loop, stretches[-1][-1], index)):
+                stretches.append([])
+            if found[index] is not None:
+                stretches[-1].append(int(index))
+        return [stretch for stretch in stretches if stretch]
+
+    def _closes_between(self, loop: ClosedLoop, one: int, other: int) -> bool:
+        """Whether the loop closes all the way between two positions."""
+        start, stop = float(self.command.theta_2[one]), float(self.command.theta_2[other])
+        pieces = int(np.ceil(abs(stop - start) / FINE))
+        branch = int(self.command.branch[one])
+        return all(
+            loop.assemble(float(theta_2), branch, None) is not None
+            for theta_2 in np.linspace(start, stop, pieces + 1)[1:-1]
+        )
+
+    def _run(self, stretch: list[int], found: list[tuple[float, float] | None]) -> None:
+        """Step through one stretch and read at the step nearest to each position."""
+        commanded = self.command.theta_2[stretch]
+        run = run_through(commanded, self.omega, self.alpha)
+        width = len(np.unique(commanded)) - 1
+        timestep = run.timestep(self.settings, at_least=width) if width else 1e-3
+        if width:
+            turn = 2.0 * np.pi / run.fastest
+            self.steps_per_revolution = max(self.steps_per_revolution, turn / timestep)
+        loop = ClosedLoop(self._text(timestep))
+        light = None if self.scene.drive_bar == 2 else ClosedLoop(self._text(timestep, LIGHT_FLYWHEEL))
+        start = found[stretch[0]]
+        assert start is not None
+        loop.set_state((float(commanded[0]), *start), self.omega)
+        done = 0
+        for index, theta_2 in zip(stretch, commanded, strict=True):
+            step = round(run.time(float(theta_2)) / timestep)
+            if step > done:
+                mujoco.mj_step(loop.model, loop.data, step - done)
+                done = step
+            self._read(loop, light, index, run, done * timestep)
+        self.evidence["steps"] += done
+
+    def _read(self, loop: ClosedLoop, light: ClosedLoop | None, index: int, run: Run, expected_time: float) -> None:
+        """Everything of one sample, and what the engine says of itself there."""
+        loop.forward()
+        d = loop.data
+        self._watch(loop, run, expected_time)
+        self.theta_2[index], self.omega_2[index] = d.qpos[O2], d.qvel[O2]
+        self.branch[index] = loop.branch()
+        torque = loop.crank_torque()
+        if light is not None:
+            torque = self._drive_elsewhere(loop, light, torque)
+            loop, d = light, light.data
+        self.alpha_2[index] = d.qacc[O2]
+        numbers = (
+            *(d.qpos[O2] + d.qpos[A], d.qpos[O4]),
+            *(d.qvel[O2] + d.qvel[A], d.qvel[O4]),
+            *(d.qacc[O2] + d.qacc[A], d.qacc[O4]),
+            torque,
+        )
+        for name, number in zip(FIELDS, numbers, strict=True):
+            self.values[name][index] = number
+        for name, force in loop.forces().items():
+            self.values[name][index] = force
+
+    def _drive_elsewhere(self, loop: ClosedLoop, light: ClosedLoop, crank_torque: float) -> float:
+        """The couple on bar 3 or 4 with which the crank accelerates as commanded, at the simulated state.
+
+        The accelerations are linear in the couple; two trials give it, a third is what is read.
+        """
+        d = light.data
+        d.qpos[:], d.qvel[:] = loop.data.qpos, loop.data.qvel
+        acts_on = [O2, A] if self.scene.drive_bar == 3 else [O4]
+        speed = sum(d.qvel[dof] for dof in acts_on)
+        trial = crank_torque * d.qvel[O2] / speed if speed else crank_torque
+        trials = (0.5 * trial, 1.5 * trial) if trial else (-1.0, 1.0)
+
+        def crank_acceleration(couple: float) -> float:
+            d.qfrc_applied[:] = 0.0
+            d.qfrc_applied[acts_on] = couple
+            mujoco.mj_forward(light.model, d)
+            return float(d.qacc[O2])
+
+        low, high = (crank_acceleration(couple) for couple in trials)
+        if high == low:
+            raise InputError("drive.bar", self.scene.drive_bar, "its torque does not move the input")
+        couple = trials[0] + (trials[1] - trials[0]) * (self.alpha - low) / (high - low)
+        crank_acceleration(couple)
+        mujoco.mj_rnePostConstraint(light.model, d)
+        return couple
+
+    def _watch(self, loop: ClosedLoop, run: Run, expected_time: float) -> None:
+        """Keep the worst of what the engine says of itself."""
+        d, seen = loop.data, self.evidence
+        speed = np.sqrt(max(run.omega**2 + 2.0 * run.alpha * (d.qpos[O2] - run.start), 0.0))
+        worst = {
+            "closure_gap_m": float(np.hypot(*loop.gap())),
+            "speed_error": float(abs(abs(d.qvel[O2]) - speed) / run.fastest),
+            "solver_iterations": float(d.solver_niter.max()),
+            "bad_states": float(loop.bad()),
+            # a reset starts time again
+            "time_went_back": float(d.time < expected_time * (1.0 - 1e-6)),
+        }
+        for name, value in worst.items():
+            seen[name] = float(np.fmax(seen[name], value))
+
+
+def observed_order(coarse: Array, fine: Array, exact_coarse: Array, exact_fine: Array) -> float:
+    """log2 of the ratio of the worst errors at h and h/2."""
+    errors = (np.nanmax(np.abs(coarse - exact_coarse)), np.nanmax(np.abs(fine - exact_fine)))
+    return float(np.log2(errors[0] / errors[1]))
