@@ -1,0 +1,210 @@
+"""Assembly, motion and loop multipliers of a four-bar opened at pin B, by whatever engine moves the open tree.
+
+Coordinates q = (turn of bar 2 at O2, of bar 3 against bar 2 at A, of bar 4 at O4). With g(q) = B on
+bar 3 minus B on bar 4 and J = dg/dq the loop holds where g = 0, J v = 0, J a + (dJ/dt) v = 0, and
+
+    [J^T e_drive] [lambda; T] = tau(q, v, a),
+
+lambda = F43 and e_drive = the derivative of the driven bar's rotation. Every number comes from the tree.
+"""
+
+import math
+import time
+from collections.abc import Callable, Iterator, Sequence
+from typing import Protocol
+
+import numpy as np
+
+from fourbar.linkage import MOVING_BARS
+from fourbar.scene import Command, Scene
+from fourbar.solution import STAGE_OF, STAGES, VECTORS
+from validation.answer import Answer, Array
+
+START_ANGLES = (
+    *((30, 30), (15, 15), (45, 45), (5, 5), (5, 120)),
+    *((120, 5), (60, 60), (2, 150), (150, 2), (1, 1)),
+)
+"""Degrees that bars 3 and 4 first make with the diagonal A to O4, tried in turn; they served 8000 of 8000 linkages."""
+LONGEST_STEP = 0.5
+"""rad; a longer Newton step leaves the region in which the gap is nearly linear."""
+SHORTEST_STEP = 2.0**-40
+"""A step halved this often moves nothing that a gap above the rounding could tell."""
+NEWTON_STEPS = 100
+"""Beside a toggle Newton halves its distance: fifty steps reach the last digit from any start."""
+ROUNDING = 16.0 * 2.0**-52
+"""Gap, relative to the sum of the lengths, that the roundings of a chain of three bars alone can leave."""
+
+
+class Tree(Protocol):
+    """An engine holding the open tree of a scene; it computes everything from q, v, a by itself."""
+
+    def place(self, q: Sequence[float]) -> None:
+        """Move to a configuration."""
+
+    def gap(self) -> tuple[float, float]:
+        """B on bar 3 minus B on bar 4, m."""
+
+    def jacobian(self) -> Array:
+        """Derivative of the gap, (2, 3), m."""
+
+    def turn(self, bar: int) -> Array:
+        """Derivative of a bar's rotation, (3,)."""
+
+    def positions(self) -> dict[str, Array]:
+        """Points O4, A, B, G2, G3, G4 and "B4", the end of bar 4, (2,) each, m."""
+
+    def angle(self, bar: int) -> float:
+        """Rotation of a bar from +x, in (-pi, pi]."""
+
+    def drift(self, v: Array) -> Array:
+        """Acceleration of the gap at speeds v where a = 0, (2,), m/s^2."""
+
+    def velocity(self, bar: int) -> float:
+        """Angular velocity of a bar at the speeds last given, rad/s."""
+
+    def torques(self, v: Array, a: Array) -> Array:
+        """Generalised forces that the motion asks for beyond loads and effects, (3,), N m."""
+
+    def accelerations(self) -> dict[str, Array]:
+        """Accelerations of A, B, G2, G3, G4 at the motion last given, (2,) each, m/s^2."""
+
+    def alpha(self, bar: int) -> float:
+        """Angular acceleration of a bar at the motion last given, rad/s^2."""
+
+    def forces(self, loop_force: Array) -> dict[str, Array]:
+        """F12, F32, F14 with the loop force on bar 3 at B, and its opposite on bar 4, put back."""
+
+
+class Position:
+    """Assembles a tree at commanded angles of bar 2, one after another."""
+
+    def __init__(self, tree: Tree) -> None:
+        self.tree = tree
+        self.last: dict[int, tuple[float, float]] = {}
+
+    def find(self, theta_2: float, branch: int) -> tuple[float, float, float] | None:
+        """The configuration on the branch, with the tree placed there, or None where the loop does not close."""
+        tree = self.tree
+        tree.place((theta_2, 0.0, 0.0))
+        at = tree.positions()
+        diagonal = at["O4"] - at["A"]
+        e = math.hypot(*diagonal)
+        b, c = math.hypot(*(at["B"] - at["A"])), math.hypot(*(at["B4"] - at["O4"]))
+        closed = ROUNDING * (math.hypot(*at["A"]) + math.hypot(*at["O4"]) + b + c)
+        # with bar 2 held, the gap is stationary only where bars 3 and 4 lie along the diagonal: this is its least value
+        if max(e - (b + c), abs(b - c) - e) > closed:
+            return None
+        phi = math.atan2(diagonal[1], diagonal[0])
+        for q3, q4 in self._starts(theta_2, branch, phi):
+            found = newton(tree, (theta_2, q3, q4), branch, closed)
+            if found is not None:
+                self.last[branch] = found[1:]
+                return found
+        return None
+
+    def _starts(self, theta_2: float, branch: int, phi: float) -> Iterator[tuple[float, float]]:
+        if branch in self.last:
+            yield self.last[branch]
+        for alpha, beta in START_ANGLES:
+            theta_3 = phi + branch * math.radians(alpha)
+            theta_4 = phi + math.pi - branch * math.radians(beta)
+            yield math.remainder(theta_3 - theta_2, math.tau), math.remainder(theta_4, math.tau)
+
+
+def newton(tree: Tree, q: tuple[float, float, float], branch: int, closed: float) -> tuple[float, float, float] | None:
+    """Close the gap with bar 2 held, never leaving the branch.
+
+    The determinant of the gap's derivative by (q3, q4) is -b c sin(theta_4 - theta_3): its sign is the
+    branch's. A step is halved until the gap falls and the sign is kept; the last one is taken where
+    nothing smaller than `closed` (m) falls any further.
+    """
+
+    def look(q: tuple[float, float, float]) -> tuple[float, float, float, float, float, float, float]:
+        tree.place(q)
+        x, y = tree.gap()
+        (_, a, b), (_, c, d) = tree.jacobian().tolist()
+        return x, y, a, b, c, d, a * d - b * c
+
+    here = look(q)
+    if here[6] * branch >= 0.0:
+        return None
+    for _ in range(NEWTON_STEPS):
+        x, y, a, b, c, d, det = here
+        step_3, step_4 = (b * y - d * x) / det, (c * x - a * y) / det
+        size = math.hypot(x, y)
+        part = min(1.0, LONGEST_STEP / max(abs(step_3), abs(step_4), LONGEST_STEP))
+        while True:
+            trial = (q[0], q[1] + part * step_3, q[2] + part * step_4)
+            there = look(trial)
+            if math.hypot(there[0], there[1]) < size and there[6] * branch < 0.0:
+                break
+            part /= 2.0
+            if size <= closed or part < SHORTEST_STEP:
+                tree.place(q)
+                return q if size <= closed else None
+        q, here = trial, there
+    return None
+
+
+def answer_exactly(engine: str, build: Callable[[Scene], Tree], scene: Scene, command: Command) -> Answer:
+    """Every position by itself: assembly, velocities, accelerations, drive torque and pin forces of one engine."""
+    start = time.perf_counter()
+    tree, n = build(scene), len(command.theta_2)
+    wanted = ("position",) if command.omega_2 is None else STAGES
+    given = ("theta_2", "omega_2", "alpha_2", "condition", "drive_condition")
+    names = [name for name, stage in STAGE_OF.items() if stage in wanted and name not in given]
+    out = {name: np.full((n, 2) if name in VECTORS else n, np.nan) for name in names}
+    assembled = np.zeros(n, dtype=bool)
+    gap = 0.0
+    position = Position(tree)
+    omega_2 = np.broadcast_to(np.asarray(command.omega_2, dtype=float), (n,))
+    alpha_2 = np.broadcast_to(np.asarray(command.alpha_2, dtype=float), (n,))
+    tree.place((0.0, 0.0, 0.0))
+    e_drive = tree.turn(scene.drive_bar)
+    for i, (theta_2, branch) in enumerate(zip(command.theta_2.tolist(), command.branch.tolist(), strict=True)):
+        q = position.find(theta_2, branch)
+        if q is None:
+            continue
+        assembled[i] = True
+        values: dict[str, Array | float] = {f"theta_{bar}": tree.angle(bar) for bar in (3, 4)}
+        values["sin_mu"] = math.sin(tree.angle(4) - tree.angle(3))
+        points = tree.positions()
+        values.update({name: points[name] for name in ("A", "B", "G2", "G3", "G4")})
+        gap = max(gap, math.hypot(*tree.gap()))
+        if command.omega_2 is not None:
+            values.update(_motion_and_forces(tree, e_drive, omega_2[i], alpha_2[i]))
+        for name, value in values.items():
+            out[name][i] = value
+    for name in ("theta_3", "theta_4"):
+        out[name][assembled] = np.unwrap(out[name][assembled])
+    return Answer(
+        engine,
+        "exact",
+        at=command,
+        assembled=assembled,
+        quantities=out,
+        evidence={"closure_gap": gap},
+        shared="the description, theta_2, omega_2, alpha_2 and the branch",
+        own="assembly (Newton on its own gap), velocities (own Jacobian), accelerations (own dJ/dt v), "
+        "inverse dynamics, effects from its own state, loop multipliers, pin forces",
+        seconds=time.perf_counter() - start,
+    )
+
+
+def _motion_and_forces(tree: Tree, e_drive: Array, omega_2: float, alpha_2: float) -> dict[str, Array | float]:
+    """Velocities, accelerations and forces where the tree is placed; nothing where a toggle leaves them 0/0."""
+    jacobian = tree.jacobian()
+    try:
+        v = np.array([omega_2, *np.linalg.solve(jacobian[:, 1:], -jacobian[:, 0] * omega_2)])
+        drift = tree.drift(v)
+        a = np.array([alpha_2, *np.linalg.solve(jacobian[:, 1:], -jacobian[:, 0] * alpha_2 - drift)])
+        needed = tree.torques(v, a)
+        values: dict[str, Array | float] = {}
+        for bar in MOVING_BARS[1:]:
+            values[f"omega_{bar}"], values[f"alpha_{bar}"] = tree.velocity(bar), tree.alpha(bar)
+        values.update({f"a_{name}": value for name, value in tree.accelerations().items()})
+        unknowns = np.linalg.solve(np.column_stack((jacobian.T, e_drive)), needed)
+    except np.linalg.LinAlgError:
+        return {}
+    values.update(tree.forces(unknowns[:2]), F43=unknowns[:2], torque=unknowns[2])
+    return values

@@ -1,0 +1,229 @@
+"""Pinocchio: recursive Newton-Euler on the open tree, its own kinematics, the loop closed by multipliers."""
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from fourbar.effects import Friction, Gravity, Load, Viscous
+from fourbar.linkage import FIRST_PIN, MOVING_BARS, PINS
+from fourbar.scene import Command, Scene
+from validation.answer import Answer, Array
+from validation.engines.loop import answer_exactly
+
+NAME = "pinocchio-inverse"
+WORLD = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+
+
+class PinocchioInverse:
+    """Inverse dynamics with loop multipliers."""
+
+    name = NAME
+
+    def answer(self, scene: Scene, command: Command) -> Answer:
+        """Its answer, or the refusal that names an effect it does not know."""
+        for effect in scene.effects:
+            if type(effect) not in EFFECTS:
+                return Answer(NAME, "exact", refusal=f"the effect {effect.key!r} has no model here")
+        return answer_exactly(NAME, PinocchioTree, scene, command)
+
+
+class PinocchioTree:
+    """The open tree, built from the description."""
+
+    def __init__(self, scene: Scene) -> None:
+        linkage = scene.linkage
+        self.model = model = pin.Model()
+        model.gravity = pin.Motion.Zero()
+        theta_1, d = linkage.ground_angle, linkage.ground
+        foot = {2: (0.0, 0.0), 3: (linkage.input.length, 0.0), 4: (d * math.cos(theta_1), d * math.sin(theta_1))}
+        self.joint = {1: 0}
+        self.frame: dict[str, int] = {}
+        for bar in MOVING_BARS:
+            parent = self.joint[2] if bar == 3 else 0
+            joint = model.addJoint(parent, pin.JointModelRZ(), _at(*foot[bar]), FIRST_PIN[bar])
+            self.joint[bar] = joint
+            part = linkage.bar(bar)
+            assert part.centre is not None and part.inertia is not None
+            r, phi = part.centre
+            centre = _at(r * math.cos(phi), r * math.sin(phi))
+            inertia = pin.Inertia(part.mass, centre.translation, np.diag([0.0, 0.0, part.inertia]))
+            model.appendBodyToJoint(joint, inertia, pin.SE3.Identity())
+            self._add_frame(f"G{bar}", joint, centre)
+            self._add_frame(f"end{bar}", joint, _at(part.length, 0.0))
+        self.data = model.createData()
+        self.q = np.zeros(3)
+        self.v = np.zeros(3)
+        self.a = np.zeros(3)
+        self.wrenches: dict[int, Array] = {}
+        acting = [EFFECTS[type(effect)](self, effect) for effect in scene.effects]
+        acting += [load(self, each) for each in scene.loads]
+        self.acting = [act for act in acting if act is not None]
+
+    def _add_frame(self, name: str, joint: int, placement: Any) -> None:
+        frame = pin.Frame(name, joint, 0, placement, pin.FrameType.OP_FRAME)
+        self.frame[name] = self.model.addFrame(frame)
+
+    def place(self, q: Sequence[float]) -> None:
+        """Joint frames, Jacobian columns and points at q."""
+        self.q[:] = q
+        pin.computeJointJacobians(self.model, self.data, self.q)
+        pin.updateFramePlacements(self.model, self.data)
+
+    def point(self, name: str) -> Array:
+        """A point fixed in a bar, world axes, (2,)."""
+        return np.array(self.data.oMf[self.frame[name]].translation[:2])
+
+    def gap(self) -> tuple[float, float]:
+        """B on bar 3 minus B on bar 4."""
+        x, y = (self.point("end3") - self.point("end4")).tolist()
+        return x, y
+
+    def jacobian(self) -> Array:
+        """Difference of the two frame Jacobians."""
+        ends = (self.frame["end3"], self.frame["end4"])
+        on_3, on_4 = (pin.getFrameJacobian(self.model, self.data, end, WORLD) for end in ends)
+        return np.asarray((on_3 - on_4)[:2])
+
+    def turn(self, bar: int) -> Array:
+        """Last row of the bar's frame Jacobian."""
+        return np.array(pin.getFrameJacobian(self.model, self.data, self.frame[f"G{bar}"], WORLD)[5])
+
+    def positions(self) -> dict[str, Array]:
+        """Points of the bars."""
+        where = {name: self.point(name) for name in ("G2", "G3", "G4")}
+        where.update(A=self.foot(3), O4=self.foot(4), B=self.point("end3"), B4=self.point("end4"))
+        return where
+
+    def foot(self, bar: int) -> Array:
+        """First pin of a bar, (2,)."""
+        return np.array(self.data.oMi[self.joint[bar]].translation[:2])
+
+    def angle(self, bar: int) -> float:
+        """From the rotation matrix."""
+        rotation = self.data.oMi[self.joint[bar]].rotation
+        return math.atan2(rotation[1, 0], rotation[0, 0])
+
+    def drift(self, v: Array) -> Array:
+        """Difference of the two frames' accelerations where a = 0."""
+        pin.forwardKinematics(self.model, self.data, self.q, v, np.zeros(3))
+        return self._acceleration("end3") - self._acceleration("end4")
+
+    def _acceleration(self, name: str) -> Array:
+        motion = pin.getFrameClassicalAcceleration(self.model, self.data, self.frame[name], WORLD)
+        return np.array(motion.linear[:2])
+
+    def velocity(self, bar: int) -> float:
+        """Spin of the joint frame; the ground has none."""
+        return float(self.data.v[self.joint[bar]].angular[2]) if bar != 1 else 0.0
+
+    def alpha(self, bar: int) -> float:
+        """Angular acceleration of the joint frame."""
+        return float(self.data.a[self.joint[bar]].angular[2])
+
+    def torques(self, v: Array, a: Array) -> Array:
+        """Recursive Newton-Euler with what acts on the bars as external forces."""
+        self.v, self.a = v, a
+        pin.forwardKinematics(self.model, self.data, self.q, v, a)
+        self.wrenches = {bar: np.zeros(3) for bar in MOVING_BARS}
+        for act in self.acting:
+            act()
+        return np.array(self._newton_euler(self.wrenches))
+
+    def _newton_euler(self, wrenches: dict[int, Array]) -> Any:
+        external = pin.StdVec_Force()
+        external.extend([pin.Force.Zero()] * self.model.njoints)
+        for bar, (x, y, moment) in wrenches.items():
+            rotation = self.data.oMi[self.joint[bar]].rotation
+            local = rotation.T @ np.array([x, y, 0.0])
+            external[self.joint[bar]] = pin.Force(local, np.array([0.0, 0.0, moment]))
+        return pin.rnea(self.model, self.data, self.q, self.v, self.a, external)
+
+    def push(self, bar: int, force: Array, point: Array) -> None:
+        """Add a force at a point, world axes."""
+        x, y = point - self.foot(bar)
+        self.wrenches[bar] += (force[0], force[1], x * force[1] - y * force[0])
+
+    def twist(self, bar: int, couple: float) -> None:
+        """Add a couple; on the ground it does nothing."""
+        if bar != 1:
+            self.wrenches[bar][2] += couple
+
+    def accelerations(self) -> dict[str, Array]:
+        """Accelerations of the points, from the frames."""
+        ends = {"A": "end2", "B": "end4", "G2": "G2", "G3": "G3", "G4": "G4"}
+        return {name: self._acceleration(frame) for name, frame in ends.items()}
+
+    def forces(self, loop_force: Array) -> dict[str, Array]:
+        """What each joint transmits in a second pass with the loop force put back."""
+        self.push(3, loop_force, self.point("end3"))
+        self.push(4, -loop_force, self.point("end4"))
+        self._newton_euler(self.wrenches)
+        on = {}
+        for bar, joint in self.joint.items():
+            if bar != 1:
+                on[bar] = np.array((self.data.oMi[joint].rotation @ self.data.f[joint].linear)[:2])
+        return {"F12": on[2], "F32": -on[3], "F14": on[4]}
+
+
+def gravity(tree: PinocchioTree, effect: Gravity) -> None:
+    """The model's own gravity."""
+    tree.model.gravity = pin.Motion(np.array([*effect.vector, 0.0]), np.zeros(3))
+
+
+def viscous(tree: PinocchioTree, effect: Viscous) -> Callable[[], None]:
+    """Couples against the relative spin of the two bars at each pin."""
+
+    def act() -> None:
+        for name, k in effect.coefficients:
+            i, j = PINS[name]
+            couple = -k * (tree.velocity(j) - tree.velocity(i))
+            tree.twist(j, couple)
+            tree.twist(i, -couple)
+
+    return act
+
+
+def friction(tree: PinocchioTree, effect: Friction) -> Callable[[], None]:
+    """Couples of constant size against the relative spin at each pin."""
+
+    def act() -> None:
+        for name, f in effect.torques:
+            i, j = PINS[name]
+            couple = -f * float(np.sign(tree.velocity(j) - tree.velocity(i)))
+            tree.twist(j, couple)
+            tree.twist(i, -couple)
+
+    return act
+
+
+def load(tree: PinocchioTree, each: Load) -> Callable[[], None]:
+    """A force at its point and a couple; in the bar's frame both vectors turn with the joint."""
+
+    def act() -> None:
+        if each.force is not None:
+            f, f_angle = each.force
+            r, r_angle = each.at
+            force = f * np.array([math.cos(f_angle), math.sin(f_angle)])
+            arm = r * np.array([math.cos(r_angle), math.sin(r_angle)])
+            if each.frame == "bar":
+                rotation = tree.data.oMi[tree.joint[each.bar]].rotation[:2, :2]
+                force, arm = rotation @ force, rotation @ arm
+            tree.push(each.bar, force, tree.point(f"G{each.bar}") + arm)
+        tree.twist(each.bar, each.moment)
+
+    return act
+
+
+EFFECTS: dict[type, Callable[[PinocchioTree, Any], Callable[[], None] | None]] = {
+    Gravity: gravity,
+    Viscous: viscous,
+    Friction: friction,
+}
+"""How each effect acts on this engine's tree; one that is not here is refused by name."""
+
+
+def _at(x: float, y: float) -> Any:
+    return pin.SE3(np.eye(3), np.array([x, y, 0.0]))
