@@ -1,0 +1,238 @@
+"""MuJoCo's inverse dynamics on the open tree, constraints off; the loop is closed by multipliers."""
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from fourbar.effects import Friction, Gravity, Load, Viscous
+from fourbar.linkage import FIRST_PIN, MOVING_BARS, PINS
+from fourbar.scene import Command, Scene
+from validation.answer import Answer, Array
+from validation.engines.loop import answer_exactly
+
+NAME = "mujoco-inverse"
+LEAST = 1e-15
+"""kg and kg m^2; the compiler raises ValueError for a moving body below it (mjMINVAL, measured with 4.0.0)."""
+
+
+class MujocoInverse:
+    """Inverse dynamics with loop multipliers."""
+
+    name = NAME
+
+    def answer(self, scene: Scene, command: Command) -> Answer:
+        """Its answer, or the refusal that names an effect it does not know or a bar it cannot hold."""
+        reason = refusal(scene)
+        if reason is not None:
+            return Answer(NAME, "exact", refusal=reason)
+        return answer_exactly(NAME, MujocoTree, scene, command)
+
+
+def refusal(scene: Scene) -> str | None:
+    """The declared limit that a scene meets, or None."""
+    for effect in scene.effects:
+        if type(effect) not in EFFECTS:
+            return f"the effect {effect.key!r} has no model here"
+    for number in MOVING_BARS:
+        bar = scene.linkage.bar(number)
+        assert bar.inertia is not None
+        if bar.mass < LEAST or bar.inertia < LEAST:
+            return (
+                f"bar {number} has mass {bar.mass:g} kg and inertia {bar.inertia:g} kg m^2; "
+                f"MuJoCo compiles no moving body below {LEAST:g} of either"
+            )
+    return None
+
+
+class MujocoTree:
+    """The open tree, built from the description with MjSpec."""
+
+    def __init__(self, scene: Scene) -> None:
+        linkage = scene.linkage
+        spec = mujoco.MjSpec()
+        spec.option.gravity = np.zeros(3)
+        spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT | mujoco.mjtDisableBit.mjDSBL_CONTACT
+        theta_1, d = linkage.ground_angle, linkage.ground
+        foot = {2: (0.0, 0.0), 3: (linkage.input.length, 0.0), 4: (d * math.cos(theta_1), d * math.sin(theta_1))}
+        bodies: dict[int, Any] = {}
+        for number in MOVING_BARS:
+            part = linkage.bar(number)
+            assert part.centre is not None and part.inertia is not None
+            r, phi = part.centre
+            centre = [r * math.cos(phi), r * math.sin(phi), 0.0]
+            parent = bodies[2] if number == 3 else spec.worldbody
+            body = parent.add_body(name=f"bar{number}", pos=[*foot[number], 0.0])
+            body.explicitinertial = True
+            body.mass, body.ipos, body.inertia = part.mass, centre, [part.inertia] * 3
+            body.add_joint(name=FIRST_PIN[number], type=mujoco.mjtJoint.mjJNT_HINGE, axis=[0.0, 0.0, 1.0])
+            body.add_site(name=f"G{number}", pos=centre)
+            body.add_site(name=f"end{number}", pos=[part.length, 0.0, 0.0])
+            bodies[number] = body
+        self.model = model = spec.compile()
+        self.data = mujoco.MjData(model)
+        self.body = {n: model.body(f"bar{n}").id for n in MOVING_BARS}
+        self.dof = [int(model.joint(FIRST_PIN[n]).dofadr[0]) for n in MOVING_BARS]
+        self.site = {name: model.site(name).id for n in MOVING_BARS for name in (f"G{n}", f"end{n}")}
+        self.on_bar = {name: self.body[int(name[-1])] for name in self.site}
+        self.linear, self.linear_dot, self.angular = (np.zeros((3, 3)) for _ in range(3))
+        acting = [EFFECTS[type(effect)](self, effect) for effect in scene.effects]
+        acting += [load(self, each) for each in scene.loads]
+        self.acting = [act for act in acting if act is not None]
+
+    def place(self, q: Sequence[float]) -> None:
+        """Bodies, sites and the axes of the Jacobians at q."""
+        self.data.qpos[self.dof] = q
+        mujoco.mj_kinematics(self.model, self.data)
+        mujoco.mj_comPos(self.model, self.data)
+
+    def point(self, name: str) -> Array:
+        """A site, world axes, (2,)."""
+        return np.array(self.data.site_xpos[self.site[name], :2])
+
+    def gap(self) -> tuple[float, float]:
+        """B on bar 3 minus B on bar 4."""
+        x, y = (self.point("end3") - self.point("end4")).tolist()
+        return x, y
+
+    def jacobian(self) -> Array:
+        """Difference of the two site Jacobians."""
+        return self._site_jacobian("end3") - self._site_jacobian("end4")
+
+    def _site_jacobian(self, name: str) -> Array:
+        mujoco.mj_jacSite(self.model, self.data, self.linear, None, self.site[name])
+        return np.asarray(self.linear[:2, self.dof])
+
+    def _site_jacobian_rate(self, name: str) -> Array:
+        at = self.data.site_xpos[self.site[name]]
+        mujoco.mj_jacDot(self.model, self.data, self.linear_dot, None, at, self.on_bar[name])
+        return np.asarray(self.linear_dot[:2, self.dof])
+
+    def turn(self, bar: int) -> Array:
+        """Last row of the body's rotational Jacobian."""
+        mujoco.mj_jacBody(self.model, self.data, None, self.angular, self.body[bar])
+        return np.array(self.angular[2, self.dof])
+
+    def positions(self) -> dict[str, Array]:
+        """Points of the bars."""
+        where = {name: self.point(name) for name in ("G2", "G3", "G4")}
+        where["A"], where["O4"] = (np.array(self.data.xpos[self.body[bar], :2]) for bar in (3, 4))
+        where["B"], where["B4"] = self.point("end3"), self.point("end4")
+        return where
+
+    def angle(self, bar: int) -> float:
+        """From the body's rotation matrix."""
+        rotation = self.data.xmat[self.body[bar]]
+        return math.atan2(rotation[3], rotation[0])
+
+    def drift(self, v: Array) -> Array:
+        """(dJ/dt) v from mj_jacDot."""
+        self.data.qvel[self.dof] = v
+        mujoco.mj_comVel(self.model, self.data)
+        return np.asarray((self._site_jacobian_rate("end3") - self._site_jacobian_rate("end4")) @ v)
+
+    def velocity(self, bar: int) -> float:
+        """Spin of the body; the ground has none."""
+        return float(self.data.cvel[self.body[bar], 2]) if bar != 1 else 0.0
+
+    def alpha(self, bar: int) -> float:
+        """From the body's rotational Jacobian, which is constant in the plane."""
+        return float(self.turn(bar) @ self.data.qacc[self.dof])
+
+    def torques(self, v: Array, a: Array) -> Array:
+        """mj_inverse, less what loads and effects do on the coordinates."""
+        self.data.qvel[self.dof], self.data.qacc[self.dof] = v, a
+        self.data.xfrc_applied[:] = 0.0
+        mujoco.mj_inverse(self.model, self.data)
+        for act in self.acting:
+            act()
+        applied = np.zeros(3)
+        for body in self.body.values():
+            force, couple = self.data.xfrc_applied[body, :3], self.data.xfrc_applied[body, 3:]
+            mujoco.mj_applyFT(self.model, self.data, force, couple, self.data.xipos[body], body, applied)
+        return np.asarray((self.data.qfrc_inverse - applied)[self.dof])
+
+    def push(self, bar: int, force: Array, point: Array) -> None:
+        """Add a force at a point, world axes, as force and couple at the mass centre."""
+        body = self.body[bar]
+        x, y = point - self.data.xipos[body, :2]
+        self.data.xfrc_applied[body, :2] += force
+        self.data.xfrc_applied[body, 5] += x * force[1] - y * force[0]
+
+    def twist(self, bar: int, couple: float) -> None:
+        """Add a couple; on the ground it does nothing."""
+        if bar != 1:
+            self.data.xfrc_applied[self.body[bar], 5] += couple
+
+    def accelerations(self) -> dict[str, Array]:
+        """J a + (dJ/dt) v of each point."""
+        v, a = self.data.qvel[self.dof], self.data.qacc[self.dof]
+        sites = {"A": "end2", "B": "end4", "G2": "G2", "G3": "G3", "G4": "G4"}
+        return {n: self._site_jacobian(site) @ a + self._site_jacobian_rate(site) @ v for n, site in sites.items()}
+
+    def forces(self, loop_force: Array) -> dict[str, Array]:
+        """cfrc_int, the force of the parent on each body, with the loop force put back."""
+        self.push(3, loop_force, self.point("end3"))
+        self.push(4, -loop_force, self.point("end4"))
+        mujoco.mj_rnePostConstraint(self.model, self.data)
+        on = {bar: np.array(self.data.cfrc_int[body, 3:5]) for bar, body in self.body.items()}
+        return {"F12": on[2], "F32": -on[3], "F14": on[4]}
+
+
+def gravity(tree: MujocoTree, effect: Gravity) -> None:
+    """The model's own gravity."""
+    tree.model.opt.gravity[:2] = effect.vector
+
+
+def viscous(tree: MujocoTree, effect: Viscous) -> Callable[[], None]:
+    """Couples against the relative spin of the two bars at each pin."""
+
+    def act() -> None:
+        for name, k in effect.coefficients:
+            i, j = PINS[name]
+            couple = -k * (tree.velocity(j) - tree.velocity(i))
+            tree.twist(j, couple)
+            tree.twist(i, -couple)
+
+    return act
+
+
+def friction(tree: MujocoTree, effect: Friction) -> Callable[[], None]:
+    """Couples of constant size against the relative spin at each pin; MuJoCo's frictionloss is a soft constraint."""
+
+    def act() -> None:
+        for name, f in effect.torques:
+            i, j = PINS[name]
+            couple = -f * float(np.sign(tree.velocity(j) - tree.velocity(i)))
+            tree.twist(j, couple)
+            tree.twist(i, -couple)
+
+    return act
+
+
+def load(tree: MujocoTree, each: Load) -> Callable[[], None]:
+    """A force at its point and a couple; in the bar's frame both vectors turn with the body."""
+
+    def act() -> None:
+        if each.force is not None:
+            f, f_angle = each.force
+            r, r_angle = each.at
+            force = f * np.array([math.cos(f_angle), math.sin(f_angle)])
+            arm = r * np.array([math.cos(r_angle), math.sin(r_angle)])
+            if each.frame == "bar":
+                rotation = tree.data.xmat[tree.body[each.bar]].reshape(3, 3)[:2, :2]
+                force, arm = rotation @ force, rotation @ arm
+            tree.push(each.bar, force, tree.point(f"G{each.bar}") + arm)
+        tree.twist(each.bar, each.moment)
+
+    return act
+
+
+EFFECTS: dict[type, Callable[[MujocoTree, Any], Callable[[], None] | None]] = {
+    Gravity: gravity,
+    Viscous: viscous,
+    Friction: friction,
+}
+"""How each effect acts on this engine's tree; one that is not here is refused by name."""
