@@ -203,7 +203,7 @@ def _motion_and_forces(tree: Tree, e_drive: Array, omega_2: float, alpha_2: floa
         for bar in MOVING_BARS[1:]:
             values[f"omega_{bar}"], values[f"alpha_{bar}"] = tree.velocity(bar), tree.alpha(bar)
         values.update({f"a_{name}": value for name, value in tree.accelerations().items()})
-        unknowns = np.linalg.solve(np.column_stack((jacobian.T, e_drive)), needed)
+        unknowns: Array = np.asarray(np.linalg.solve(np.column_stack((jacobian.T, e_drive)), needed), dtype=np.float64)
     except np.linalg.LinAlgError:
         return {}
     values.update(tree.forces(unknowns[:2]), F43=unknowns[:2], torque=unknowns[2])
