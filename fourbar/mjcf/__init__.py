@@ -5,5 +5,6 @@ from fourbar.mjcf.defaults import scene_from_lengths as scene_from_lengths
 from fourbar.mjcf.document import flywheel as flywheel
 from fourbar.mjcf.document import mjcf as mjcf
 from fourbar.mjcf.document import run_through as run_through
+from fourbar.mjcf.settings import RECIPE as RECIPE
 from fourbar.mjcf.settings import Run as Run
 from fourbar.mjcf.settings import Settings as Settings

@@ -6,7 +6,9 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 
+from fourbar.effects import Friction, Gravity, Viscous
 from fourbar.errors import InputError, NotAssembledError
+from fourbar.kinematics import Array
 from fourbar.linkage import MOVING_BARS, FourBar
 from fourbar.mjcf.model import Model, text
 from fourbar.mjcf.settings import RECIPE, Run, Settings
@@ -73,20 +75,21 @@ def flywheel(scene: Scene, settings: Settings = RECIPE) -> float:
     """
     speed = abs(scene.motion.omega_2 or AT_REST)
     longest = max(scene.linkage.lengths)
-    inertia = work = 0.0
-    gravity = sum(effect.magnitude for effect in scene.effects if effect.key == "gravity")
+    inertia = work = weight = 0.0
     for number in MOVING_BARS:
         bar = scene.linkage.bar(number)
         assert bar.inertia is not None and bar.centre is not None
         arm = max(longest, abs(bar.centre[0]))
         inertia += bar.mass * arm * arm + bar.inertia
-        work += bar.mass * abs(gravity) * arm
+        weight += bar.mass * arm
     work += sum(load.size(scene.linkage) * longest for load in scene.loads)
     for effect in scene.effects:
-        if effect.key == "viscous":
-            work += sum(k for _, k in effect.coefficients) * speed
-        elif effect.key == "friction":
-            work += sum(f for _, f in effect.torques)
+        if isinstance(effect, Gravity):
+            work += weight * abs(effect.magnitude)
+        elif isinstance(effect, Viscous):
+            work += sum((k for _, k in effect.coefficients), 0.0) * speed
+        elif isinstance(effect, Friction):
+            work += sum((f for _, f in effect.torques), 0.0)
     return settings.flywheel * (inertia + work / speed**2)
 
 
@@ -98,7 +101,7 @@ class Start(NamedTuple):
     run: Run
 
 
-def run_through(theta_2: np.ndarray, omega: float, alpha: float) -> Run:
+def run_through(theta_2: Array, omega: float, alpha: float) -> Run:
     """The motion through positions: counter-clockwise from the least, or clockwise from the greatest."""
     least, most = float(np.min(theta_2)), float(np.max(theta_2))
     return Run(least, most, omega, alpha) if omega > 0.0 else Run(most, least, omega, alpha)

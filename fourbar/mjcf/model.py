@@ -58,16 +58,15 @@ class Model:
     def add_option(self, root: ET.Element, timestep: float) -> None:
         """Integrator, solver, and flags that switch off what a closed loop does not need."""
         s = self.settings
-        option = ET.SubElement(
-            root,
-            "option",
-            timestep=text(timestep),
-            integrator=s.integrator,
-            solver=s.solver,
-            tolerance=text(s.tolerance),
-            iterations=str(s.iterations),
+        options = {
+            "timestep": text(timestep),
+            "integrator": s.integrator,
+            "solver": s.solver,
+            "tolerance": text(s.tolerance),
+            "iterations": str(s.iterations),
             **{key: text(*value) for key, value in self.option.items()},
-        )
+        }
+        option = ET.SubElement(root, "option", options)
         unneeded = ["contact", "limit", "island", "sensor", "midphase", "spring"]
         unneeded += [] if self.used("frictionloss") else ["frictionloss"]
         unneeded += [] if self.used("damping") else ["damper"]
@@ -104,7 +103,7 @@ class Model:
         )
         numbers = {**drive, **self.pin[pin]}
         joint = {key: text(value) for key, value in numbers.items()}
-        ET.SubElement(body, "joint", name=pin, type="hinge", axis="0 0 1", **joint)
+        ET.SubElement(body, "joint", {"name": pin, "type": "hinge", "axis": "0 0 1", **joint})
         self._add_capsule(body, number, bar.length, self.radius if number == 3 else -self.radius)
         if number == 2:
             ET.SubElement(body, "site", name="A", pos=text(bar.length, 0.0, 0.0), size=text(self.radius))
@@ -146,7 +145,7 @@ class Model:
         )
         if self.pin["B"]:
             attributes = {key: text(value) for key, value in self.pin["B"].items()}
-            fixed = ET.SubElement(ET.SubElement(root, "tendon"), "fixed", name="B", **attributes)
+            fixed = ET.SubElement(ET.SubElement(root, "tendon"), "fixed", {"name": "B", **attributes})
             for joint, coefficient in (("O2", -1), ("A", -1), ("O4", 1)):
                 ET.SubElement(fixed, "joint", joint=joint, coef=str(coefficient))
 
@@ -177,13 +176,11 @@ class Model:
                 if load.frame == "world":  # force and arm both keep their direction: so does the couple
                     couple += load.at[0] * (math.cos(load.at[1]) * fy - math.sin(load.at[1]) * fx)
             frame = {"refsite": "O2"} if load.frame == "world" else {}
-            ET.SubElement(
-                actuators,
-                "general",
-                constant,
-                name=f"load_{index}",
-                site=f"load_{index}",
+            attributes = {
+                "name": f"load_{index}",
+                "site": f"load_{index}",
                 **frame,
-                gear=text(fx, fy, 0.0, 0.0, 0.0, couple),
-                biasprm="1 0 0",
-            )
+                "gear": text(fx, fy, 0.0, 0.0, 0.0, couple),
+                "biasprm": "1 0 0",
+            }
+            ET.SubElement(actuators, "general", {**constant, **attributes})

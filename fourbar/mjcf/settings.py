@@ -12,7 +12,9 @@ class Settings:
 
     Parameters
     ----------
-    timestep : s; None: from `steps_per_revolution` and `steps_per_window`.
+    timestep : s; None: from the two numbers of steps.
+    steps_per_window : at least so many where the input does not turn fully: towards a limit position
+        bars 3 and 4 speed up without bound, and 628 steps per revolution are too few there.
     timestep_scale : factor on the timestep.
     integrator : "RK4", "Euler", "implicit" or "implicitfast".
     time_constant_steps : solref's time constant of the loop's closure, in timesteps.
@@ -27,7 +29,7 @@ class Settings:
     timestep: float | None = None
     timestep_scale: float = 1.0
     steps_per_revolution: float = 628.0
-    steps_per_window: int = 200
+    steps_per_window: int = 800
     integrator: str = "RK4"
     time_constant_steps: float = 20.0
     impedance: float = 0.9999
@@ -39,6 +41,8 @@ class Settings:
 
 
 RECIPE = Settings()
+FULL_TURN = 2.0 * math.pi * (1.0 - 1e-9)
+"""rad; a sweep over 0..360 deg may miss the turn by its rounding."""
 
 
 class Run:
@@ -72,5 +76,6 @@ class Run:
         duration = self.time(self.stop)
         per_revolution = duration * self.fastest / (2.0 * math.pi) * settings.steps_per_revolution
         # a window of 628 steps per revolution must not become one more by a rounding
-        steps = max(math.ceil(per_revolution * (1.0 - 1e-9)), settings.steps_per_window, at_least)
+        window = settings.steps_per_window if abs(self.stop - self.start) < FULL_TURN else 1
+        steps = max(math.ceil(per_revolution * (1.0 - 1e-9)), window, at_least)
         return duration / steps * settings.timestep_scale

@@ -1,12 +1,12 @@
 """A compiled MJCF as a closed loop: MuJoCo's own kinematics, assembly, velocities and pin forces."""
 
-import math
+from collections.abc import Sequence
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from validation.engines.assembly import assemble, branch_sign
+from validation.engines.loop import Position
 
 Array = NDArray[np.float64]
 O2, A, O4 = 0, 1, 2
@@ -22,24 +22,15 @@ class ClosedLoop:
         self.data = mujoco.MjData(self.model)
         self.site = {name: self.model.site(name).id for name in ("A", "O4", "B3", "B4")}
         self.body = {name: self.model.body(name).id for name in ("input", "coupler", "output")}
-        self.size = sum(
-            math.dist(*pair)
-            for pair in (
-                (self.model.site("O2").pos, self.model.site("O4").pos),
-                (self.model.site("A").pos, (0.0, 0.0, 0.0)),
-                (self.model.site("B3").pos, (0.0, 0.0, 0.0)),
-                (self.model.site("B4").pos, (0.0, 0.0, 0.0)),
-            )
-        )
         loads = [i for i in range(self.model.nu) if self.model.actuator(i).name.startswith("load_")]
         self.loads = [(i, self.model.site_bodyid[self.model.actuator_trnid[i, 0]]) for i in loads]
         self.drive = next((i for i in range(self.model.nu) if self.model.actuator(i).name == "drive"), None)
         self._jac3, self._jac4 = np.zeros((3, self.model.nv)), np.zeros((3, self.model.nv))
 
-    def gap(self) -> Array:
-        """B on bar 3 minus B on bar 4, (2,), m."""
-        x = self.data.site_xpos
-        return np.asarray(x[self.site["B3"]][:2] - x[self.site["B4"]][:2])
+    def gap(self) -> tuple[float, float]:
+        """B on bar 3 minus B on bar 4, m."""
+        x = self.data.site_xpos[self.site["B3"]] - self.data.site_xpos[self.site["B4"]]
+        return (float(x[0]), float(x[1]))
 
     def jacobian(self) -> Array:
         """Derivative of the gap by the joint angles, (2, 3)."""
@@ -47,30 +38,31 @@ class ClosedLoop:
         mujoco.mj_jacSite(self.model, self.data, self._jac4, None, self.site["B4"])
         return np.asarray(self._jac3[:2] - self._jac4[:2])
 
-    def place(self, theta_2: float, theta_3: float, theta_4: float) -> tuple[Array, Array]:
-        """Gap, and its derivatives by theta_3 (joint A) and theta_4 (joint O4), (2, 2)."""
-        self.data.qpos[:] = (theta_2, theta_3 - theta_2, theta_4)
+    def place(self, q: Sequence[float]) -> None:
+        """Move to the joint angles (O2, A, O4)."""
+        self.data.qpos[:] = q
         mujoco.mj_kinematics(self.model, self.data)
         mujoco.mj_comPos(self.model, self.data)
-        return self.gap(), self.jacobian()[:, [A, O4]]
 
-    def assemble(self, theta_2: float, branch: int, near: tuple[float, float] | None) -> tuple[float, float] | None:
-        """Own (theta_3, theta_4), or None where the loop does not close."""
-        self.place(theta_2, 0.0, 0.0)
-        x = self.data.site_xpos
-        to_O4 = x[self.site["O4"]] - x[self.site["A"]]
-        return assemble(self.place, theta_2, branch, math.atan2(to_O4[1], to_O4[0]), self.size, near)
+    def positions(self) -> dict[str, Array]:
+        """Pins O4 and A, and B at the end of bar 3 and of bar 4, (2,), m."""
+        x, names = self.data.site_xpos, {"O4": "O4", "A": "A", "B": "B3", "B4": "B4"}
+        return {name: x[self.site[site]][:2].copy() for name, site in names.items()}
+
+    def position(self) -> Position:
+        """Own assembly, position after position."""
+        return Position(self)  # type: ignore[arg-type]  # it asks a tree for place, gap, jacobian, positions alone
 
     def branch(self) -> int:
-        """The branch of the state that was last forwarded, from the own Jacobian."""
-        jac = self.jacobian()
-        return branch_sign(float(np.linalg.det(jac[:, [A, O4]])))
+        """The branch of the state that was last forwarded: det = -b c sin(theta_4 - theta_3)."""
+        return int(-np.sign(np.linalg.det(self.jacobian()[:, [A, O4]])))
 
-    def set_state(self, theta: tuple[float, float, float], omega_2: float) -> None:
-        """Start from own angles at omega_2, with the velocities that keep the gap closed."""
+    def set_state(self, q: Sequence[float], omega_2: float) -> None:
+        """Start from own joint angles at omega_2, with the velocities that keep the gap closed."""
         mujoco.mj_resetData(self.model, self.data)
-        _, by_34 = self.place(*theta)
-        v = np.linalg.solve(by_34, -self.jacobian()[:, O2] * omega_2)
+        self.place(q)
+        jacobian = self.jacobian()
+        v = np.linalg.solve(jacobian[:, [A, O4]], -jacobian[:, O2] * omega_2)
         self.data.qvel[:] = (omega_2, v[0], v[1])
 
     def forward(self) -> None:

@@ -1,15 +1,17 @@
 """MuJoCo simulates the closed loop of the generated MJCF, driven at omega_2 through the sweep."""
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import mujoco
 import numpy as np
 
 from fourbar.errors import FourBarError, InputError
-from fourbar.mjcf import Run, Settings, mjcf, run_through
+from fourbar.mjcf import RECIPE, Run, Settings, mjcf, run_through
 from fourbar.scene import Command, Scene
-from validation.answer import Answer, Array
+from validation.answer import Answer
+from validation.engines.loop import Position
 from validation.engines.mujoco.closed_loop import O2, O4, A, ClosedLoop
 
 SHARED = "lengths, masses, inertias, centres, loads and effects as MJCF text; omega_2, alpha_2 and the branch"
@@ -20,6 +22,8 @@ small, light enough that the torque it needs does not drown in its rounding."""
 FINE = np.radians(2.0)
 """Between positions further apart than this it is looked whether the loop closes on the way."""
 FIELDS = ("theta_3", "theta_4", "omega_3", "omega_4", "alpha_3", "alpha_4", "torque")
+Found = tuple[float, float, float] | None
+"""Own joint angles (O2, A, O4), None where the loop does not close."""
 PINS = ("F12", "F32", "F43", "F14")
 
 
@@ -27,7 +31,7 @@ PINS = ("F12", "F32", "F43", "F14")
 class MujocoSimulated:
     """Engine "mujoco-simulated"."""
 
-    settings: Settings = Settings()
+    settings: Settings = RECIPE
     name: str = "mujoco-simulated"
 
     def answer(self, scene: Scene, command: Command) -> Answer:
@@ -89,9 +93,9 @@ class _Simulation:
 
     def answer(self) -> Answer:
         """The answer over all positions."""
-        loop = ClosedLoop(self._text(1e-3))  # kinematics alone: the timestep plays no part
-        found = self._assemble(loop)
-        for stretch in self._stretches(loop, found):
+        position = ClosedLoop(self._text(1e-3)).position()  # kinematics alone: the timestep plays no part
+        found = self._assemble(position)
+        for stretch in self._stretches(position, found):
             self._run(stretch, found)
         at = Command(self.theta_2, self.branch, self.omega_2, self.alpha_2)
         setting = f"{self.settings.integrator} {self.steps_per_revolution:.0f}/rev"
@@ -104,36 +108,33 @@ class _Simulation:
         settings = replace(self.settings, timestep=timestep, timestep_scale=1.0, flywheel=heavy)
         return mjcf(self.scene, settings, keyframe=False)
 
-    def _assemble(self, loop: ClosedLoop) -> list[tuple[float, float] | None]:
-        """Own (theta_3, theta_4) of every commanded position."""
-        found: list[tuple[float, float] | None] = [None] * len(self.order)
-        near = None
+    def _assemble(self, position: Position) -> list[Found]:
+        """Own joint angles of every commanded position."""
+        found: list[Found] = [None] * len(self.order)
         for index in self.order:
-            near = loop.assemble(float(self.command.theta_2[index]), int(self.command.branch[index]), near)
-            found[index] = near
+            found[index] = position.find(float(self.command.theta_2[index]), int(self.command.branch[index]))
         return found
 
-    def _stretches(self, loop: ClosedLoop, found: list[tuple[float, float] | None]) -> list[list[int]]:
+    def _stretches(self, position: Position, found: list[Found]) -> list[list[int]]:
         """Positions in order of time, split where the loop does not close between them."""
         stretches: list[list[int]] = [[]]
         for index in self.order:
-            if found[index] is None or (stretches[-1] and not self._closes_between(loop, stretches[-1][-1], index)):
+            if found[index] is None or (stretches[-1] and not self._closes_between(position, stretches[-1][-1], index)):
                 stretches.append([])
             if found[index] is not None:
                 stretches[-1].append(int(index))
         return [stretch for stretch in stretches if stretch]
 
-    def _closes_between(self, loop: ClosedLoop, one: int, other: int) -> bool:
+    def _closes_between(self, position: Position, one: int, other: int) -> bool:
         """Whether the loop closes all the way between two positions."""
         start, stop = float(self.command.theta_2[one]), float(self.command.theta_2[other])
         pieces = int(np.ceil(abs(stop - start) / FINE))
         branch = int(self.command.branch[one])
         return all(
-            loop.assemble(float(theta_2), branch, None) is not None
-            for theta_2 in np.linspace(start, stop, pieces + 1)[1:-1]
+            position.find(float(theta_2), branch) is not None for theta_2 in np.linspace(start, stop, pieces + 1)[1:-1]
         )
 
-    def _run(self, stretch: list[int], found: list[tuple[float, float] | None]) -> None:
+    def _run(self, stretch: list[int], found: list[Found]) -> None:
         """Step through one stretch and read at the step nearest to each position."""
         commanded = self.command.theta_2[stretch]
         run = run_through(commanded, self.omega, self.alpha)
@@ -146,7 +147,7 @@ class _Simulation:
         light = None if self.scene.drive_bar == 2 else ClosedLoop(self._text(timestep, LIGHT_FLYWHEEL))
         start = found[stretch[0]]
         assert start is not None
-        loop.set_state((float(commanded[0]), *start), self.omega)
+        loop.set_state(start, self.omega)
         done = 0
         for index, theta_2 in zip(stretch, commanded, strict=True):
             step = round(run.time(float(theta_2)) / timestep)
@@ -163,11 +164,10 @@ class _Simulation:
         self._watch(loop, run, expected_time)
         self.theta_2[index], self.omega_2[index] = d.qpos[O2], d.qvel[O2]
         self.branch[index] = loop.branch()
-        torque = loop.crank_torque()
-        if light is not None:
-            torque = self._drive_elsewhere(loop, light, torque)
-            loop, d = light, light.data
         self.alpha_2[index] = d.qacc[O2]
+        torque, forces = loop.crank_torque(), loop.forces
+        if light is not None:
+            torque, forces = self._drive_elsewhere(loop, light, torque), light.forces
         numbers = (
             *(d.qpos[O2] + d.qpos[A], d.qpos[O4]),
             *(d.qvel[O2] + d.qvel[A], d.qvel[O4]),
@@ -176,34 +176,37 @@ class _Simulation:
         )
         for name, number in zip(FIELDS, numbers, strict=True):
             self.values[name][index] = number
-        for name, force in loop.forces().items():
+        for name, force in forces().items():
             self.values[name][index] = force
 
     def _drive_elsewhere(self, loop: ClosedLoop, light: ClosedLoop, crank_torque: float) -> float:
-        """The couple on bar 3 or 4 with which the crank accelerates as commanded, at the simulated state.
+        """The couple on bar 3 or 4 with which the crank accelerates as it did, at the simulated state.
 
         The accelerations are linear in the couple; two trials give it, a third is what is read.
         """
         d = light.data
         d.qpos[:], d.qvel[:] = loop.data.qpos, loop.data.qvel
+        alpha_2 = loop.data.qacc[O2]
+        # the light flywheel's motor gives it alpha_2 as commanded; this gives it what the crank really had
+        correction = light.model.dof_armature[O2] * (alpha_2 - self.alpha)
         acts_on = [O2, A] if self.scene.drive_bar == 3 else [O4]
         speed = sum(d.qvel[dof] for dof in acts_on)
         trial = crank_torque * d.qvel[O2] / speed if speed else crank_torque
         trials = (0.5 * trial, 1.5 * trial) if trial else (-1.0, 1.0)
 
         def crank_acceleration(couple: float) -> float:
-            d.qfrc_applied[:] = 0.0
-            d.qfrc_applied[acts_on] = couple
+            d.qfrc_applied[:] = (correction, 0.0, 0.0)
+            d.qfrc_applied[acts_on] += couple
             mujoco.mj_forward(light.model, d)
             return float(d.qacc[O2])
 
         low, high = (crank_acceleration(couple) for couple in trials)
         if high == low:
             raise InputError("drive.bar", self.scene.drive_bar, "its torque does not move the input")
-        couple = trials[0] + (trials[1] - trials[0]) * (self.alpha - low) / (high - low)
+        couple = trials[0] + (trials[1] - trials[0]) * (alpha_2 - low) / (high - low)
         crank_acceleration(couple)
         mujoco.mj_rnePostConstraint(light.model, d)
-        return couple
+        return float(couple)
 
     def _watch(self, loop: ClosedLoop, run: Run, expected_time: float) -> None:
         """Keep the worst of what the engine says of itself."""
@@ -221,7 +224,17 @@ class _Simulation:
             seen[name] = float(np.fmax(seen[name], value))
 
 
-def observed_order(coarse: Array, fine: Array, exact_coarse: Array, exact_fine: Array) -> float:
-    """log2 of the ratio of the worst errors at h and h/2."""
-    errors = (np.nanmax(np.abs(coarse - exact_coarse)), np.nanmax(np.abs(fine - exact_fine)))
-    return float(np.log2(errors[0] / errors[1]))
+def observed_order(scene: Scene, command: Command, error: Callable[[Answer], float]) -> tuple[float, float, float]:
+    """Errors at 4h and 2h with the closure's time constant held in seconds, and log2 of their ratio.
+
+    At the recipe's own h the softness is already of the size of the truncation; the order shows above it.
+    """
+    errors = [
+        error(
+            MujocoSimulated(replace(RECIPE, timestep_scale=scale, time_constant_steps=80.0 / scale)).answer(
+                scene, command
+            )
+        )
+        for scale in (4.0, 2.0)
+    ]
+    return errors[0], errors[1], float(np.log2(errors[0] / errors[1]))

@@ -1,0 +1,114 @@
+"""MuJoCo's simulation against the formulas at the motion it really made."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import fourbar
+from tests.scenes import crank_rocker, thesis
+from validation.answer import Answer
+from validation.compare import COMPARED, compare
+from validation.engines.mujoco.simulate import MujocoSimulated, observed_order
+from validation.tolerance import SIMULATED
+
+TURN = fourbar.Sweep(0.1, 0.1 + 2 * math.pi, 90)
+
+
+def scene(
+    lengths: tuple[float, float, float, float], sweep: fourbar.Sweep, omega: float, **parts: object
+) -> fourbar.Scene:
+    """Offset mass centres, gravity, loads in both frames."""
+    d, a, b, c = lengths
+    bars = [fourbar.Bar(x, 0.4, None, (0.55 * x, turn)) for x, turn in ((a, 0.2), (b, 0.3), (c, -0.2))]
+    loads = (
+        fourbar.Load(4, (3.0, 0.7), (0.05, 1.0)),
+        fourbar.Load(3, (2.0, 0.3), (0.03, 0.2), frame="bar"),
+        fourbar.Load(2, moment=-0.2),
+    )
+    whole: dict[str, object] = {
+        "linkage": fourbar.FourBar(d, bars[0], bars[1], bars[2], 0.2),
+        "motion": fourbar.Motion(sweep, omega, 0.0),
+        "loads": loads,
+        "effects": (fourbar.Gravity(),),
+    }
+    return fourbar.Scene(**{**whole, **parts})  # type: ignore[arg-type]
+
+
+DRAG, ROCKER, TRIPLE = (0.1, 0.3, 0.25, 0.28), (0.3, 0.25, 0.1, 0.28), (0.35, 0.25, 0.2, 0.25)
+EVERY_PIN = {"O2": 0.02, "A": 0.03, "B": 0.04, "O4": 0.05}
+SCENES = {
+    "crank-rocker": crank_rocker(motion=fourbar.Motion(TURN, 10.0, 5.0)),
+    "backwards": crank_rocker(motion=fourbar.Motion(TURN, -10.0)),
+    "crossed": crank_rocker(motion=fourbar.Motion(TURN, 10.0, branch=-1)),
+    "drive on bar 4": crank_rocker(motion=fourbar.Motion(TURN, 10.0, 3.0), drive_bar=4),
+    "drag link": scene(DRAG, TURN, 10.0),
+    "drag link, drive on bar 3": scene(DRAG, TURN, 10.0, drive_bar=3),
+    "double rocker": scene(ROCKER, fourbar.Sweep(0.2 + math.radians(38), 0.2 + math.radians(85), 90), 10.0),
+    "triple rocker": scene(TRIPLE, fourbar.Sweep(0.2 - math.radians(94), 0.2 + math.radians(94), 90), 10.0),
+    "thesis": thesis(fourbar.Sweep(math.radians(86.618), math.radians(363.382), 180)),
+    "viscous": crank_rocker(motion=fourbar.Motion(TURN, 10.0), effects=(fourbar.Viscous.at(**EVERY_PIN),)),
+}
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_within_1e_5_of_the_scale(name: str) -> None:
+    asked = SCENES[name]
+    answer = MujocoSimulated().answer(asked, fourbar.command(asked))
+    assert answer.refusal is None and answer.at is not None
+    rows = compare(name, asked, answer, fourbar.solve(asked, at=answer.at), SIMULATED, COMPARED)
+    assert {row.quantity for row in rows} == {"assembled", *COMPARED}
+    assert all(row.passed for row in rows), [row for row in rows if not row.passed]
+    assert answer.evidence["time_went_back"] == answer.evidence["bad_states"] == 0.0
+
+
+def test_it_is_run_near_the_positions_asked_for() -> None:
+    asked = SCENES["crank-rocker"]
+    command = fourbar.command(asked)
+    at = MujocoSimulated().answer(asked, command).at
+    assert at is not None
+    assert np.abs(at.theta_2 - command.theta_2).max() <= math.pi / 600  # half a step of some 628 a turn
+
+
+def test_a_wrong_load_is_seen() -> None:
+    asked = SCENES["crank-rocker"]
+    answer = MujocoSimulated().answer(asked, fourbar.command(asked))
+    other = replace(asked, loads=(replace(asked.loads[0], bar=3), *asked.loads[1:]))
+    rows = compare("", other, answer, fourbar.solve(other, at=answer.at), SIMULATED, COMPARED)
+    assert {row.quantity for row in rows if not row.passed} >= {"F12", "F32", "F43", "F14", "torque"}
+
+
+def test_positions_outside_the_range_are_not_assembled() -> None:
+    asked = scene(TRIPLE, fourbar.Sweep(0.2 - math.pi, 0.2 + math.pi, 72), 10.0)
+    command = fourbar.command(asked)
+    answer = MujocoSimulated().answer(asked, command)
+    inside = np.abs(command.theta_2 - 0.2) < math.radians(95.739)  # cosine rule at b + c
+    assert answer.assembled is not None and np.array_equal(answer.assembled, inside)
+    assert np.isfinite(answer.quantities["F43"]).all(axis=1).tolist() == inside.tolist()
+
+
+@pytest.mark.parametrize(
+    ("motion", "reason"),
+    [
+        (fourbar.Motion(TURN, 0.0), "nothing to simulate"),
+        (fourbar.Motion(TURN), "nothing to simulate"),
+        (fourbar.Motion(1.0, 10.0), "nothing to run through"),
+        (fourbar.Motion(TURN, 1.0, -5.0), "to rest"),
+    ],
+)
+def test_refusals_state_their_reason(motion: fourbar.Motion, reason: str) -> None:
+    asked = crank_rocker(motion=motion)
+    refusal = MujocoSimulated().answer(asked, fourbar.command(asked)).refusal
+    assert refusal is not None and reason in refusal and "\n" not in refusal
+
+
+def test_error_falls_with_the_fourth_power_of_the_timestep() -> None:
+    """RK4, the closure's time constant held in seconds, so that the softness stays what it is."""
+    asked = crank_rocker(motion=fourbar.Motion(TURN, 10.0))
+
+    def error(answer: Answer) -> float:
+        return float(np.abs(answer.quantities["F43"] - fourbar.solve(asked, at=answer.at).F43).max())  # type: ignore[operator]
+
+    coarse, fine, order = observed_order(asked, fourbar.command(asked), error)
+    assert fine < coarse and 3.0 < order < 6.0, (coarse, fine, order)
