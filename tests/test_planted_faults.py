@@ -95,6 +95,8 @@ def centre_from_the_other_pin(bar: Bar) -> Bar:
 
 
 def load_on_another_bar(scene: Scene) -> Scene:
+    if not scene.loads:  # the run with inertia alone
+        return scene
     first, *others = scene.loads
     return replace(scene, loads=(replace(first, bar=2 if first.bar == 3 else 3), *others))
 

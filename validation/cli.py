@@ -11,6 +11,8 @@ from fourbar.errors import DependencyError, FourBarError
 
 COMMANDS = {
     "run": "validation.run:command",
+    "accept": "validation.regression.command:accept_command",
+    "compare": "validation.regression.command:compare",
     "check": "validation.check:check",
     "published": "validation.published:published",
     "stability": "validation.stability:stability",

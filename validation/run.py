@@ -12,6 +12,8 @@ from fourbar.errors import InputError
 from fourbar.writing import write_text
 from validation.judge import WITNESSES, Page, Witness
 from validation.machine import versions
+from validation.regression.command import output_options, told
+from validation.regression.record import about, baseline, write_about
 from validation.report.html import html
 from validation.report.markdown import markdown
 from validation.report.summary import SCENES_SHOWN, Summary, summarise
@@ -55,6 +57,7 @@ def run(
             yield len(pages)
         summary = summarise(store.pages(len(chunks)))
         first_lines = write_columns(store.rows(len(chunks)), out)
+        write_about(about([witness.name for witness in witnesses], suite.fingerprint()), out)
         write_text(out / "timings.csv", timings_csv(store.pages(len(chunks))))
         write_text(out / "report.md", markdown(summary))
         write_text(out / "report.html", html(summary, first_lines))
@@ -104,6 +107,8 @@ def linkage_types(text: str) -> tuple[LinkageType, ...]:
 @click.option("--type", "types", default=",".join(kind.value for kind in LinkageType), show_default=True)
 @click.option("--workers", type=click.IntRange(min=1), default=WORKERS, show_default=True, help="Processes.")
 @click.option("--scheduler", metavar="ADDRESS", help="Spread over the workers of this Dask scheduler.")
+@click.option("--against", metavar="BASELINE", help="Compare with an accepted name or an earlier run's folder.")
+@output_options
 def command(
     scenes: tuple[Path, ...],
     out: Path,
@@ -113,6 +118,8 @@ def command(
     types: str,
     workers: int,
     scheduler: str | None,
+    against: str | None,
+    **forms: Path | None,
 ) -> int:
     """Judge scenes (default: all of models/); write results.csv, timings.csv, report.md and report.html."""
     from rich.console import Console
@@ -132,4 +139,5 @@ def command(
                 progress.advance(task, result)
     assert isinstance(result, Summary)
     table(result, out)
-    return 1 if result.counts["fails"] else 0
+    failed = 1 if result.counts["fails"] else 0
+    return failed if against is None else max(failed, told(baseline(against), out, forms))

@@ -1,0 +1,73 @@
+"""A recorded run: its table and the versions, machine and settings it was made with."""
+
+import json
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from fourbar.errors import InputError
+from fourbar.writing import write_text
+from validation.machine import machine, versions
+from validation.results import Row, from_csv, to_csv
+from validation.tolerance import SIMULATED, K
+
+BASELINES = Path(__file__).parent.parent / "baselines"
+ACCEPTED = "accepted"
+TABLE, ABOUT = "results.csv", "record.json"
+
+
+@dataclass(frozen=True, slots=True)
+class About:
+    """What a run was made with."""
+
+    versions: dict[str, str]
+    machine: str
+    settings: dict[str, str]
+    """Engines asked, suite, and the factors of the tolerances."""
+
+
+def about(engines: list[str], suite: str) -> About:
+    """The record of a run made here and now."""
+    settings = {"engines": ", ".join(engines), "suite": suite, "K": repr(K), "simulated": repr(SIMULATED.factor)}
+    return About(versions(), machine(), settings)
+
+
+def write_about(record: About, folder: Path) -> None:
+    """Write record.json beside the results."""
+    write_text(folder / ABOUT, json.dumps(asdict(record), indent=1, sort_keys=True) + "\n")
+
+
+def read_run(path: Path) -> tuple[About, list[Row]]:
+    """A run from its folder, or from a results.csv alone (then nothing is known of how it was made).
+
+    Raises InputError where there is no readable table.
+    """
+    table = path / TABLE if path.is_dir() else path
+    if not table.is_file():
+        raise InputError("RESULTS", str(path), f"must be a folder with {TABLE}, or such a file")
+    try:
+        rows = from_csv(table)
+    except (KeyError, ValueError, UnicodeDecodeError):
+        raise InputError("RESULTS", str(table), "is not a table written by `run`") from None
+    beside = table.parent / ABOUT
+    if not beside.is_file():
+        return About({}, "unknown machine", {}), rows
+    try:
+        return About(**json.loads(beside.read_text(encoding="utf-8"))), rows
+    except (TypeError, ValueError):
+        raise InputError("RESULTS", str(beside), "is not a record written by `run`") from None
+
+
+def accept(run: Path, name: str = ACCEPTED) -> Path:
+    """Keep a run as the accepted state of that name; the folder it is kept in."""
+    record, rows = read_run(run)
+    target = BASELINES / name
+    target.mkdir(parents=True, exist_ok=True)
+    write_text(target / TABLE, to_csv(rows))
+    write_about(record, target)
+    return target
+
+
+def baseline(name_or_path: str) -> Path:
+    """A baseline by its name, or any run by its path."""
+    named = BASELINES / name_or_path
+    return named if named.is_dir() else Path(name_or_path)

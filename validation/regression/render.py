@@ -1,0 +1,94 @@
+"""Differences as text, Markdown, HTML and JUnit XML."""
+
+from validation.regression.changes import Change, Differences, Kind
+from validation.report.markdown import cell, number
+
+TOLD = tuple(kind for kind in Kind if kind not in (Kind.SAME, Kind.ROUND_OFF))
+AT_MOST = 50
+"""Rows of one kind listed in text and Markdown."""
+
+
+def verdict(found: Differences) -> str:
+    """One line: how many regressions among how many rows, and what else moved."""
+    counts = [f"{len(found.of(kind))} {kind.value}" for kind in Kind if found.of(kind)]
+    head = f"{len(found.regressions)} regressions" if found.regressions else "No regression"
+    return f"{head} in {len(found.changes)} rows: " + ", ".join(counts)
+
+
+def line(change: Change) -> str:
+    """One change in one line of text."""
+    name = " / ".join(part for part in change.key if part)
+    if change.old is None:
+        assert change.new is not None
+        return f"{name}: {change.new.verdict}, error {number(change.new.error)}"
+    if change.new is None:
+        return f"{name}: was {change.old.verdict}, error {number(change.old.error)}"
+    old, new = change.old, change.new
+    words = f"{name}: error {number(old.error)} -> {number(new.error)}"
+    if old.verdict != new.verdict:
+        words += f", {old.verdict} -> {new.verdict} ({new.reason})"
+    return words + f"; round-off moves it by {number(change.round_off)}"
+
+
+def text(found: Differences) -> str:
+    """For a terminal."""
+    lines = [f"{what}: {old} -> {new}" for what, old, new in found.surroundings]
+    for kind in TOLD:
+        changes = found.of(kind)
+        lines += [f"{kind.value}: {line(change)}" for change in changes[:AT_MOST]]
+        if len(changes) > AT_MOST:
+            lines.append(f"{kind.value}: and {len(changes) - AT_MOST} more")
+    return "\n".join([*lines, verdict(found)]) + "\n"
+
+
+def markdown(found: Differences) -> str:
+    """For a comment on a pull request."""
+    lines = [f"# {verdict(found)}", ""]
+    if found.surroundings:
+        lines += ["| made with | old | new |", "|---|---|---|"]
+        lines += [f"| {cell(what)} | {cell(old)} | {cell(new)} |" for what, old, new in found.surroundings]
+        lines.append("")
+    for kind in TOLD:
+        if changes := found.of(kind):
+            lines += [f"## {kind.value}: {len(changes)}", ""]
+            lines += [f"- {cell(line(change))}" for change in changes[:AT_MOST]]
+            if len(changes) > AT_MOST:
+                lines.append(f"- and {len(changes) - AT_MOST} more")
+            lines.append("")
+    return "\n".join(lines)
+
+
+def html(found: Differences) -> str:
+    """A page of its own."""
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    environment = Environment(
+        loader=PackageLoader("validation.regression"),
+        undefined=StrictUndefined,
+        autoescape=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters["number"] = number
+    kinds = [(kind, found.of(kind)) for kind in TOLD if found.of(kind)]
+    template = environment.get_template("changes.html.j2")
+    return template.render(found=found, verdict=verdict(found), kinds=kinds)
+
+
+def junit(found: Differences) -> str:
+    """For the test page of a continuous-integration system: one case per row, a failure per regression."""
+    from junitparser import Failure, JUnitXml, TestCase, TestSuite
+
+    report = JUnitXml()
+    suites: dict[str, TestSuite] = {}
+    for change in found.changes:
+        scene, engine, setting, quantity = change.key
+        suite = suites.setdefault(scene, TestSuite(scene))
+        case = TestCase(quantity, classname=f"{scene}.{engine} {setting}", time=0.0)
+        if change.regression:
+            case.result = [Failure(line(change), change.kind.value)]
+        suite.add_testcase(case)
+    for suite in suites.values():
+        report.add_testsuite(suite)
+    xml: str | bytes = report.tostring()
+    return xml if isinstance(xml, str) else xml.decode("utf-8")
