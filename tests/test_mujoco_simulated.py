@@ -103,6 +103,18 @@ def test_refusals_state_their_reason(motion: fourbar.Motion, reason: str) -> Non
     assert refusal is not None and reason in refusal and "\n" not in refusal
 
 
+def test_a_change_point_is_a_declared_limit() -> None:
+    motion = fourbar.Motion(TURN, 10.0)
+    for lengths, refused in (
+        ((0.3, 0.1, 0.3, 0.1), True),
+        ((0.1, 0.1, 0.25, 0.25), True),
+        ((0.3, 0.1, 0.3, 0.11), False),
+    ):
+        asked = fourbar.Scene(fourbar.uniform(*lengths), motion)
+        refusal = MujocoSimulated().answer(asked, fourbar.command(asked)).refusal
+        assert (refusal is not None and "change point" in refusal) == refused
+
+
 def test_error_falls_with_the_fourth_power_of_the_timestep() -> None:
     """RK4, the closure's time constant held in seconds, so that the softness stays what it is."""
     asked = crank_rocker(motion=fourbar.Motion(TURN, 10.0))

@@ -1,5 +1,6 @@
 """MuJoCo simulates the closed loop of the generated MJCF, driven at omega_2 through the sweep."""
 
+import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -21,6 +22,8 @@ LIGHT_FLYWHEEL = 1e4
 small, light enough that the torque it needs does not drown in its rounding."""
 FINE = np.radians(2.0)
 """Between positions further apart than this it is looked whether the loop closes on the way."""
+COLLINEAR = 1e-9
+"""Part of the sum of the lengths, and of half a turn: below what the time step itself can resolve."""
 FIELDS = ("theta_3", "theta_4", "omega_3", "omega_4", "alpha_3", "alpha_4", "torque")
 Found = tuple[float, float, float] | None
 """Own joint angles (O2, A, O4), None where the loop does not close."""
@@ -59,7 +62,20 @@ def _refusal(scene: Scene, command: Command) -> str | None:
         return "omega_2 or alpha_2 differs from position to position: that is no one motion through time"
     if np.ptp(command.theta_2) == 0.0:
         return "one position: nothing to run through"
+    if _passes_change_point(scene, command):
+        return "the sweep meets a change point, where all bars are collinear and MuJoCo's closure loses a direction"
     return None
+
+
+def _passes_change_point(scene: Scene, command: Command) -> bool:
+    """Whether all four bars come to lie along the ground within the sweep: +-a +-b +-c = d."""
+    d, a, b, c = scene.linkage.lengths
+    least, most = (float(x) - scene.linkage.ground_angle for x in (command.theta_2.min(), command.theta_2.max()))
+    for half_turn in range(math.ceil(least / math.pi - COLLINEAR), math.floor(most / math.pi + COLLINEAR) + 1):
+        diagonal = abs(d - a if half_turn % 2 == 0 else d + a)
+        if min(abs(diagonal - abs(b - c)), abs(diagonal - (b + c))) <= COLLINEAR * (a + b + c + d):
+            return True
+    return False
 
 
 class _Simulation:
