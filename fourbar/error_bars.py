@@ -18,10 +18,13 @@ from fourbar.kinematics import Array, State, add_accelerations, add_velocities, 
 from fourbar.kinetostatics import PinForces, Term, solve_pins
 from fourbar.linkage import Bar, FourBar
 from fourbar.margins import diagonal_to_O4
+from fourbar.more_digits import rounded
 
 EVALUATIONS = 8
 """With fewer, all of them may by chance come out as far off as the answer itself."""
 LAST_DIGIT = 2.0**-52
+LAST_ROUNDING = 2.0**-55
+"""A typical error of rounding to nearest, whose largest is 2^-53."""
 TYPICAL = 0.5
 """The root mean square holds the error of the answer besides the scatter; half of it is a typical error."""
 
@@ -35,6 +38,9 @@ def error_bars(state: State, pins: PinForces, terms: Iterable[Term], drive_bar: 
     terms, drive_bar : as given to `solve_pins`.
     """
     terms = tuple(terms)
+    if not isinstance(state.theta_2, np.ndarray):  # evaluated in more digits: the last rounding is all there is
+        sizes = [np.hypot(rounded(x), rounded(y)) for x, y in pins[:4]]
+        return {"torque_error": LAST_ROUNDING * np.abs(rounded(pins.torque)), "force_error": LAST_ROUNDING * np.max(sizes, axis=0)}
     n = len(state.theta_2)
     torque, forces = np.zeros(n), np.zeros((4, n))
     runs = 0

@@ -8,14 +8,14 @@ the digits that are lost are those that the data themselves do not carry. A term
 every position (alpha_2 = 0, theta_1 = 0, a centre on the bar's line) is not evaluated.
 """
 
-import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.linkage import Bar, FourBar
-from fourbar.margins import Diagonal, diagonal_to_O4, scaled
+from fourbar.margins import Diagonal, diagonal_to_O4, in_precision_of, scaled
 
 Array = NDArray[np.float64]
 Vector = tuple[Array, Array]
@@ -66,6 +66,8 @@ class State:
     alpha_3: Array | None = None
     alpha_4: Array | None = None
     first: "FirstCoefficients | None" = None
+    parallel: tuple[NDArray[np.bool_], Array] | None = None
+    """Where two pairs of bars stay parallel or coincide, and there d theta_4/d theta_2."""
 
     def unit(self, bar: int) -> Vector:
         """Unit vector along bar 2, 3 or 4."""
@@ -86,13 +88,13 @@ class State:
     def regular_sine(self) -> Array:
         """sin_mu, NaN where the position is singular."""
         if self.singular.any():
-            return np.where(self.singular, np.nan, self.sin_mu)
+            return self.sin_mu + np.where(self.singular, np.nan, 0.0)
         return self.sin_mu
 
     def regular_root(self) -> Array:
         """sigma sqrt(p1 p2 p3 p4) in the unit of the diagonal, NaN where the position is singular."""
         if self.singular.any():
-            return np.where(self.singular, np.nan, self.signed_root)
+            return self.signed_root + np.where(self.singular, np.nan, 0.0)
         return self.signed_root
 
     def angle(self, bar: int) -> Array:
@@ -156,12 +158,13 @@ def along(u: Vector, r_along: float, r_across: float) -> Vector:
 def swing(arm: Vector, omega: Array | float, alpha: Array | float) -> Vector:
     """Acceleration of the end of an arm about its foot: alpha x r - omega^2 r."""
     centripetal = -(omega * omega)
-    if _is_zero(alpha):
+    if is_zero(alpha):
         return (centripetal * arm[0], centripetal * arm[1])
     return (centripetal * arm[0] - alpha * arm[1], centripetal * arm[1] + alpha * arm[0])
 
 
-def _is_zero(value: Array | float) -> bool:
+def is_zero(value: Array | float) -> bool:
+    """Whether a term with this factor does not exist at any position."""
     return isinstance(value, (int, float)) and value == 0.0
 
 
@@ -190,33 +193,29 @@ def close_loop(
     diagonal : the diagonal A to O4 where it is known already.
     """
     diagonal = diagonal_to_O4(linkage, theta_2) if diagonal is None else diagonal
-    _, _, _, b, c = scaled(linkage)
+    _, _, b, c = scaled(linkage, theta_2)
     signs = np.asarray(branch, dtype=np.int8)
     root = diagonal.root
     if not (signs == 1).all():
         root = signs * root
     x, y = diagonal.x, diagonal.y
-    theta_1, d = linkage.ground_angle, linkage.ground
-    O4 = (d, 0.0)
-    u2 = ((1.0 - diagonal.t * diagonal.t) * diagonal.w, (2.0 * diagonal.t) * diagonal.w)
+    theta_1 = linkage.ground_angle
+    u1: tuple[Any, Any] = (1.0, 0.0)
+    u2 = direction_from_half(diagonal.t, diagonal.w)
     if theta_1 != 0.0:
-        c1, s1 = math.cos(theta_1), math.sin(theta_1)
+        c1, s1 = u1 = unit_vector(in_precision_of(theta_2, theta_1))
         x, y = c1 * x - s1 * y, s1 * x + c1 * y
-        O4 = (d * c1, d * s1)
-        t = np.tan(0.5 * theta_2)  # not u2 turned by theta_1: a small component keeps its digits
-        w = 1.0 / (1.0 + t * t)
-        u2 = ((1.0 - t * t) * w, (2.0 * t) * w)
+        u2 = unit_vector(theta_2)  # not u2 turned by theta_1: a small component keeps its digits
     squared = diagonal.squared
     excess = (b - c) * (b + c)
     at_A, at_O4 = squared + excess, squared - excess
     with np.errstate(divide="ignore", invalid="ignore"):  # e = 0: A on O4, where beta is free
         to_3 = (0.5 / b) / squared
-    to_4 = to_3 * (b / c)
-    with np.errstate(invalid="ignore"):
+        to_4 = to_3 * (b / c)
         u3 = (to_3 * (x * at_A - y * root), to_3 * (y * at_A + x * root))
         u4 = (to_4 * -(x * at_O4 + y * root), to_4 * (x * root - y * at_O4))
     sin_mu = (0.5 / (b * c)) * root
-    return State(
+    state = State(
         linkage=linkage,
         theta_2=theta_2,
         branch=np.broadcast_to(signs, theta_2.shape),
@@ -224,13 +223,50 @@ def close_loop(
         u2=u2,
         u3=u3,
         u4=u4,
-        O4=O4,
+        O4=(float(linkage.ground * np.cos(theta_1)), float(linkage.ground * np.sin(theta_1))),
         diagonal=diagonal,
         signed_root=root,
         sin_mu=sin_mu,
         cos_mu=((b * b + c * c) - squared) * (0.5 / (b * c)),
         singular=diagonal.assembled & ~(np.abs(sin_mu) > (NO_DIGIT_LEFT if diagonal.offset is None else 0.0)),
     )
+    _parallel(state, u1)
+    return state
+
+
+def direction_from_half(t: Array, w: Array) -> Vector:
+    """(cos, sin) of an angle from t, the tangent of its half, and w = 1/(1 + t^2)."""
+    return ((1.0 - t * t) * w, (2.0 * t) * w)
+
+
+def unit_vector(angle: Any) -> tuple[Any, Any]:
+    """(cos, sin) of an angle by one tangent, a fifth of the cost, in the precision of the angle."""
+    t = np.tan(0.5 * angle)
+    return direction_from_half(t, 1.0 / (1.0 + t * t))
+
+
+def _parallel(state: State, u1: tuple[Any, Any]) -> None:
+    """Put the exact directions where two pairs of bars stay parallel or coincide.
+
+    a = c, b = d: the coupler keeps the ground's direction and bars 2, 4 turn together;
+    a = b, c = d: B stays on O2, bars 2, 3 turn together and bar 4 rests.
+    """
+    d, a, b, c = state.linkage.lengths
+    if not ((a == c and b == d) or (a == b and c == d)) or not isinstance(state.sin_mu, np.ndarray):
+        return  # no such pairs, or positions of the second pass, which are others
+    half_turn = np.sign(state.diagonal.t)
+    sine, cosine = 2.0 * state.diagonal.t * state.diagonal.w, state.diagonal.w * (1.0 - state.diagonal.t * state.diagonal.t)
+    none = np.zeros(state.theta_2.shape, dtype=bool)
+    together = (state.branch == half_turn) if (a == c and b == d) else none
+    folded = (state.branch == -half_turn) if (a == b and c == d) else none
+    where = together | folded
+    u2, u3, u4 = state.u2, state.u3, state.u4
+    state.u3 = tuple(np.where(together, u1[i], np.where(folded, -u2[i], u3[i])) for i in (0, 1))  # type: ignore[assignment]
+    state.u4 = tuple(np.where(together, u2[i], np.where(folded, -u1[i], u4[i])) for i in (0, 1))  # type: ignore[assignment]
+    state.sin_mu = np.where(where, state.branch * np.abs(sine), state.sin_mu)
+    state.cos_mu = np.where(where, cosine, state.cos_mu)
+    state.singular = state.assembled & ~(np.abs(state.sin_mu) > NO_DIGIT_LEFT)
+    state.parallel = (where, together.astype(float))
 
 
 NO_DIGIT_LEFT = 8.0 * 2.0**-52
@@ -245,7 +281,7 @@ def add_velocities(state: State, omega_2: Array | float) -> None:
         h3 = kappa - sigma lambda cot gamma,  h4 = kappa + sigma lambda cot beta,
         kappa = a (a - d cos psi)/e^2,  lambda = a d sin psi/e^2,  psi = theta_2 - theta_1.
     The same as Norton's eq. 6.18, but where the ground is short and all bars turn together the
-    difference of nearly equal speeds is a term of its own (see `slip`).
+    difference of nearly equal speeds keeps its digits.
     """
     coefficients = first_coefficients(state)
     state.first = coefficients
@@ -265,7 +301,7 @@ def add_accelerations(state: State, alpha_2: Array | float) -> None:
     h3, h4 = second_coefficients(state, state.first)
     state.alpha_2 = alpha_2
     state.alpha_3, state.alpha_4 = h3 * w2, h4 * w2
-    if not _is_zero(alpha_2):
+    if not is_zero(alpha_2):
         state.alpha_3 = state.alpha_3 + state.first.h3 * alpha_2
         state.alpha_4 = state.alpha_4 + state.first.h4 * alpha_2
 
@@ -285,8 +321,8 @@ class FirstCoefficients:
 
 def first_coefficients(state: State) -> FirstCoefficients:
     """The first kinematic coefficients; NaN where the position is singular."""
-    _, d, a, b, c = scaled(state.linkage)
     diagonal = state.diagonal
+    d, a, b, c = scaled(state.linkage, diagonal.t)
     root = state.regular_root()
     excess = (b - c) * (b + c)
     t2 = diagonal.t * diagonal.t
@@ -294,13 +330,18 @@ def first_coefficients(state: State) -> FirstCoefficients:
     per_square = diagonal.w / diagonal.squared
     growth = (2.0 * a * d) * (diagonal.t * per_square)
     turn = (a * (a - d) + (a * (a + d)) * t2) * per_square
-    return FirstCoefficients(turn - growth * cot_gamma, turn + growth * cot_beta, growth, cot_beta, cot_gamma)
+    h3, h4 = turn - growth * cot_gamma, turn + growth * cot_beta
+    if state.parallel is not None:
+        where, fourth = state.parallel
+        gap = np.where(state.singular, np.nan, 0.0)
+        h3, h4 = np.where(where, (1.0 - fourth) + gap, h3), np.where(where, fourth + gap, h4)
+    return FirstCoefficients(h3, h4, growth, cot_beta, cot_gamma)
 
 
 def second_coefficients(state: State, first: FirstCoefficients) -> Vector:
     """d^2 theta_3/d theta_2^2 and d^2 theta_4/d theta_2^2, each (n,)."""
-    _, d, a, b, c = scaled(state.linkage)
     diagonal = state.diagonal
+    d, a, b, c = scaled(state.linkage, diagonal.t)
     growth, cot_beta, cot_gamma = first.growth, first.cot_beta, first.cot_gamma
     growth_2 = growth * growth
     turn = ((d - a) * (d + a)) * growth / diagonal.squared
@@ -310,4 +351,7 @@ def second_coefficients(state: State, first: FirstCoefficients) -> Vector:
     squares = 4.0 * growth_2 * (diagonal.squared / (root * root))
     h3 = turn - (growing * cot_gamma + (c * c) * (squares * cot_beta))
     h4 = turn + (growing * cot_beta + (b * b) * (squares * cot_gamma))
+    if state.parallel is not None:
+        rest = np.where(state.singular, np.nan, 0.0)
+        h3, h4 = (np.where(state.parallel[0], rest, h) for h in (h3, h4))
     return h3, h4

@@ -11,7 +11,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from fourbar.effects.wrenches import Wrenches
-from fourbar.kinematics import Array, State, Vector, centre_in_bar, cross
+from fourbar.kinematics import Array, State, Vector, centre_in_bar, cross, is_zero
 from fourbar.linkage import MOVING_BARS
 
 
@@ -45,7 +45,7 @@ def add_inertia(wrenches: Wrenches, state: State) -> None:
         centre = centre_in_bar(bar)
         m, r2 = bar.mass, centre[0] * centre[0] + centre[1] * centre[1]
         alpha = state.alpha(number)
-        if (inertia := bar.inertia + m * r2) != 0.0 and np.any(alpha):  # type: ignore[operator]
+        if (inertia := bar.inertia + m * r2) != 0.0 and not is_zero(alpha):  # type: ignore[operator]
             wrenches.add_moment(number, -inertia * alpha)
         if m != 0.0:
             ax, ay = state.acceleration(number, *centre)
@@ -57,8 +57,9 @@ def add_inertia(wrenches: Wrenches, state: State) -> None:
 
 def between(m_u: Array, m_v: Array, u: Vector, v: Vector, sine: Array) -> Vector:
     """The force F with u x F = m_u and v x F = m_v, for unit vectors with u x v = sine."""
-    if not sine.all():
-        sine = np.where(sine == 0.0, np.nan, sine)  # no force balances the moments there
+    zero = sine == 0.0
+    if zero.any():
+        sine = sine + np.where(zero, np.nan, 0.0)  # no force balances the moments there
     k_u, k_v = m_u / sine, m_v / sine
     return (k_u * v[0] - k_v * u[0], k_u * v[1] - k_v * u[1])
 

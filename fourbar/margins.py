@@ -10,6 +10,7 @@ import decimal
 import math
 from dataclasses import dataclass
 from decimal import Decimal
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,11 +55,21 @@ class Diagonal:
     """What theta_2 as a double leaves out of the angle meant, rad, where that is known."""
 
 
-def scaled(linkage: FourBar) -> tuple[float, float, float, float, float]:
-    """The unit of `Diagonal` and (d, a, b, c) in it; exact."""
-    unit = math.ldexp(1.0, math.frexp(max(linkage.lengths))[1])
-    d, a, b, c = (length / unit for length in linkage.lengths)
-    return unit, d, a, b, c
+def scaled(linkage: FourBar, like: Array) -> tuple[Any, Any, Any, Any]:
+    """(d, a, b, c) in the unit of `Diagonal`, as numbers of the precision of `like`."""
+    unit = unit_of(linkage)
+    d, a, b, c = (in_precision_of(like, length / unit) for length in linkage.lengths)
+    return d, a, b, c
+
+
+def unit_of(linkage: FourBar) -> float:
+    """A power of two near the longest bar, m."""
+    return math.ldexp(1.0, math.frexp(max(linkage.lengths))[1])
+
+
+def in_precision_of(array: Array, number: float) -> Any:
+    """A number that carries on as many digits as an array does: a float, or a `DoubleDouble`."""
+    return number if isinstance(array, np.ndarray) else type(array)(number)
 
 
 def diagonal_to_O4(
@@ -76,17 +87,12 @@ def diagonal_to_O4(
         evaluated in 60 digits.
     decide : False leaves margins near zero as doubles give them.
     """
-    unit, d, a, b, c = scaled(linkage)
-    theta_1 = linkage.ground_angle
-    t = np.tan(0.5 * theta_2 if theta_1 == 0.0 else 0.5 * (theta_2 - theta_1))
-    t2 = t * t
-    w = 1.0 / (1.0 + t2)
-    x = ((d - a) + (d + a) * t2) * w
-    y = (-2.0 * a) * (t * w)
-    squared = ((d - a) * (d - a) + ((d + a) * (d + a)) * t2) * w
+    unit = unit_of(linkage)
+    _, _, b, c = scaled(linkage, theta_2)
+    t, x, y, squared, w = _triangle(linkage, theta_2)
     e = np.sqrt(squared)
     p1, p2, p3, p4 = (b + c) - e, e + (c - b), e + (b - c), e + (b + c)
-    undecided = UNDECIDED * (a + b + c + d)
+    undecided = UNDECIDED * (sum(linkage.lengths) / unit)
     decided = NONE
     if offset is None and e.max() < (b + c) - undecided and e.min() > abs(b - c) + undecided:
         assembled = np.ones(e.shape, dtype=bool)
@@ -104,6 +110,28 @@ def diagonal_to_O4(
         if not assembled.all():
             p1 = np.where(assembled, p1, np.nan)
     return Diagonal(unit, t, x, y, squared, np.sqrt((p1 * p2) * (p3 * p4)), w, assembled, decided, offset)
+
+
+def in_double_double(linkage: FourBar, theta_2: Array) -> Diagonal:
+    """The same in 32 digits, for positions that are known to assemble; theta_2 is a `DoubleDouble`."""
+    _, _, b, c = scaled(linkage, theta_2)
+    t, x, y, squared, w = _triangle(linkage, theta_2)
+    e = np.sqrt(squared)
+    root = np.sqrt((((b + c) - e) * (e + (c - b))) * ((e + (b - c)) * (e + (b + c))))
+    return Diagonal(unit_of(linkage), t, x, y, squared, root, w, np.ones(theta_2.shape, dtype=bool), NONE, None)
+
+
+def _triangle(linkage: FourBar, theta_2: Array) -> tuple[Array, Array, Array, Array, Array]:
+    """t, x, y, e^2 and w of `Diagonal`, in the precision of theta_2."""
+    d, a, _, _ = scaled(linkage, theta_2)
+    theta_1 = linkage.ground_angle
+    t = np.tan(0.5 * theta_2 if theta_1 == 0.0 else 0.5 * (theta_2 - theta_1))
+    t2 = t * t
+    w = 1.0 / (1.0 + t2)
+    x = ((d - a) + (d + a) * t2) * w
+    y = (-2.0 * a) * (t * w)
+    squared = ((d - a) * (d - a) + ((d + a) * (d + a)) * t2) * w
+    return t, x, y, squared, w
 
 
 def _decide(linkage: FourBar, theta_2: float, offset: Decimal, unit: float) -> tuple[float, ...]:

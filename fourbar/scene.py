@@ -1,6 +1,6 @@
 """A scene: linkage, motion, drive, loads and effects; `solve` evaluates only the stages asked for."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from decimal import Decimal
 from typing import NamedTuple
@@ -15,11 +15,13 @@ from fourbar.kinematics import Array, State, Vector, add_accelerations, add_velo
 from fourbar.kinetostatics import solve_pins
 from fourbar.linkage import MOVING_BARS, FourBar, require
 from fourbar.margins import diagonal_to_O4, limit_remainder
+from fourbar.more_digits import needing_more_digits, restated, rounded
 from fourbar.mobility import default_range, limit_positions, on_smooth_path
 from fourbar.solution import NOT_ASSEMBLED, OK, SINGULAR, STAGE_OF, STAGES, VECTORS, Solution, Unwrapped
 
 Effect = Gravity | Viscous | Friction
 OPEN, CROSSED = 1, -1
+ALL = slice(None)
 
 
 @dataclass(frozen=True, slots=True)
@@ -252,44 +254,57 @@ def _solve_block(
 ) -> NDArray[np.uint8] | int:
     """Evaluate one block of positions into the result arrays; its status codes."""
     theta_2, branch = where.theta_2[part], where.branch[part]
+    motion = (_piece(where.omega_2, part), _piece(where.alpha_2, part))
     if where.remainder is None:
         state = close_loop(scene.linkage, theta_2, branch)
     else:
         exact = diagonal_to_O4(scene.linkage, theta_2, where.remainder)
         state = close_loop(scene.linkage, theta_2, branch, exact)
-    if wanted >= 1:
-        add_velocities(state, _piece(where.omega_2, part))
-    if wanted >= 2:
-        add_accelerations(state, _piece(where.alpha_2, part))
-    for name, array in out.items():
-        if name in KINEMATIC:
-            _put(array, KINEMATIC[name](state))
-    if wanted >= 3:
-        terms = (*scene.loads, *scene.effects)
-        pins = solve_pins(state, terms, scene.drive_bar)
-        for name in ("F12", "F32", "F43", "F14", "torque"):
-            if name in out:
-                _put(out[name], getattr(pins, name))
-        if "drive_condition" in out:
-            np.abs(pins.drive_sine, out=out["drive_condition"])
-        if wanted >= 4:
-            for name, value in error_bars(state, pins, terms, scene.drive_bar).items():
-                if name in out:
-                    out[name][...] = value
+    for name, value in _evaluate(scene, state, *motion, wanted, out):
+        _put(out[name], value)
+    if (hard := needing_more_digits(state)).size:
+        for name, value in _evaluate(scene, *restated(state, *motion, hard), wanted, out):
+            _put(out[name], value, hard)
     if state.assembled.all() and not state.singular.any():
         return OK
     return np.where(state.assembled, np.where(state.singular, SINGULAR, OK), NOT_ASSEMBLED).astype(np.uint8)
 
 
-def _put(target: Array, value: Array | Vector | float | None) -> None:
+def _evaluate(
+    scene: Scene, state: State, omega_2: Array | float, alpha_2: Array | float, wanted: int, names: Mapping[str, Array]
+) -> Iterator[tuple[str, Array | Vector | float | None]]:
+    """The quantities named, stage by stage."""
+    if wanted >= 1:
+        add_velocities(state, omega_2)
+    if wanted >= 2:
+        add_accelerations(state, alpha_2)
+    for name in names:
+        if name in KINEMATIC:
+            yield name, KINEMATIC[name](state)
+    if wanted >= 3:
+        terms = (*scene.loads, *scene.effects)
+        pins = solve_pins(state, terms, scene.drive_bar)
+        for name in ("F12", "F32", "F43", "F14", "torque"):
+            if name in names:
+                yield name, getattr(pins, name)
+        if "drive_condition" in names:
+            yield "drive_condition", np.abs(pins.drive_sine)
+        if wanted >= 4:
+            for name, value in error_bars(state, pins, terms, scene.drive_bar).items():
+                if name in names:
+                    yield name, value
+
+
+def _put(target: Array, value: Array | Vector | float | None, where: slice | NDArray[np.intp] = ALL) -> None:
     if isinstance(value, tuple):
-        target[:, 0], target[:, 1] = value
+        target[where, 0], target[where, 1] = (rounded(component) for component in value)
     else:
         assert value is not None
-        target[:] = value
+        target[where] = rounded(value)
 
 
 def _piece(value: float | Array | None, part: slice) -> float | Array:
     """A number for all positions, or the part of an array that belongs to a block."""
-    assert value is not None
-    return value if np.ndim(value) == 0 else value[part]  # type: ignore[index]
+    if value is None or np.ndim(value) == 0:
+        return value or 0.0  # type: ignore[return-value]
+    return value[part]  # type: ignore[index]

@@ -209,7 +209,9 @@ def judge(scene: Scene, tally: Tally, sample: str) -> None:
     """Compare one position with the reference."""
     tally.samples += 1
     theta_2 = float(np.asarray(scene.motion.theta_2))
-    at = Command(np.array([theta_2]), np.array([scene.motion.branch], np.int8), scene.motion.omega_2, scene.motion.alpha_2)
+    at = Command(
+        np.array([theta_2]), np.array([scene.motion.branch], np.int8), scene.motion.omega_2, scene.motion.alpha_2
+    )
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         solution = solve(scene, at=at)

@@ -36,15 +36,14 @@ class Wrenches:
 
     def force(self, bar: int) -> Vector:
         """Resultant on a bar, N."""
-        like = self.state.theta_2
-        return (
-            np.broadcast_to(np.asarray(self.force_x[bar], float), like.shape),
-            np.broadcast_to(np.asarray(self.force_y[bar], float), like.shape),
-        )
+        return (self._array(self.force_x[bar]), self._array(self.force_y[bar]))
 
     def moment(self, bar: int) -> Array:
         """Resultant moment on a bar about its first pin, N m."""
-        return np.broadcast_to(np.asarray(self.moments[bar], float), self.state.theta_2.shape)
+        return self._array(self.moments[bar])
+
+    def _array(self, value: Any) -> Array:
+        return value if np.shape(value) else np.broadcast_to(float(value), self.state.theta_2.shape)  # type: ignore[no-any-return]
 
     def _plus(self, total: Array | float, term: Array | float) -> Array | float:
         if self.factors is not None:
