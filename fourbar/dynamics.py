@@ -131,9 +131,7 @@ def path(linkage: FourBar, theta_2: Number, branch: Number) -> Path:
     """The path in q = theta_2 on a branch (NaN where the loop does not close, inf at a limit)."""
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
         u_3, u_4, t_3, t_4, tt_3, tt_4, sine = trace(triangle(*linkage.lengths), linkage.ground_angle, theta_2, branch)
-    return Path(
-        {2: np.exp(1j * theta_2), 3: u_3, 4: u_4}, {2: 1.0, 3: t_3, 4: t_4}, {2: 0.0, 3: tt_3, 4: tt_4}, sine
-    )
+    return Path({2: np.exp(1j * theta_2), 3: u_3, 4: u_4}, {2: 1.0, 3: t_3, 4: t_4}, {2: 0.0, 3: tt_3, 4: tt_4}, sine)
 
 
 def inertia(linkage: FourBar, way: Path) -> tuple[Number, Number]:
@@ -213,12 +211,10 @@ def driving_torque(
         return work / way.first[drive_bar]
 
 
-def acceleration(linkage: FourBar, way: Path, rate: Number, terms: Iterable[Power]) -> Number:
-    """q'' = (Q - J'/2 q'^2)/J with no driving torque, rad/s^2; NaN where nothing has inertia."""
+def acceleration(linkage: FourBar, way: Path, rate: Number, Q: Number) -> Number:
+    """q'' = (Q - J'/2 q'^2)/J under the generalised force Q and no driving torque, rad/s^2."""
     J, J_1 = inertia(linkage, way)
-    Q = generalised_force(linkage, way, rate, terms)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        return np.divide(Q - 0.5 * J_1 * rate * rate, J)
+    return np.divide(Q - 0.5 * J_1 * rate * rate, J)
 
 
 def kinetic_energy(linkage: FourBar, way: Path, rate: Number) -> Number:
