@@ -1,6 +1,6 @@
 """Errors: one root, one class per kind of mistake."""
 
-__all__ = ["DependencyError", "FourBarError", "InputError", "NotAssembledError"]
+__all__ = ["DependencyError", "FourBarError", "InputError", "LimitError", "NotAssembledError"]
 
 
 class FourBarError(Exception):
@@ -33,6 +33,10 @@ class InputError(FourBarError):
 
 class NotAssembledError(FourBarError):
     """The linkage closes at none of the positions that were asked for."""
+
+
+class LimitError(FourBarError):
+    """A declared limit of an engine that the scene meets; not a fault of the scene."""
 
 
 class DependencyError(FourBarError):

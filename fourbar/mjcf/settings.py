@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 
-from fourbar.errors import FourBarError
+from fourbar.errors import LimitError
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,11 +62,11 @@ class Run:
         return math.sqrt(max(self.omega**2, self.omega**2 + 2.0 * self.alpha * (self.stop - self.start)))
 
     def time(self, theta_2: float) -> float:
-        """When the input passes an angle, s; FourBarError where alpha_2 stops it before."""
+        """When the input passes an angle, s; LimitError where alpha_2 stops it before."""
         angle = theta_2 - self.start
         squared = self.omega**2 + 2.0 * self.alpha * angle
         if squared <= 0.0:
-            raise FourBarError(f"alpha_2 brings the input to rest before theta_2 = {theta_2:.6g} rad")
+            raise LimitError(f"alpha_2 brings the input to rest before theta_2 = {theta_2:.6g} rad")
         return 2.0 * angle / (self.omega + math.copysign(math.sqrt(squared), self.omega))
 
     def timestep(self, settings: Settings = RECIPE, at_least: int = 0) -> float:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import mujoco
 import numpy as np
 
-from fourbar.errors import FourBarError, InputError
+from fourbar.errors import InputError, LimitError
 from fourbar.mjcf import RECIPE, Run, Settings, mjcf, run_through
 from fourbar.scene import Command, Scene
 from validation.answer import Answer
@@ -44,7 +44,7 @@ class MujocoSimulated:
         if refusal is None:
             try:
                 answer = _Simulation(self.settings, scene, command).answer()
-            except (FourBarError, np.linalg.LinAlgError) as error:
+            except (LimitError, InputError) as error:  # anything else is a failure, not a declared limit
                 refusal = str(error)
         if refusal is not None:
             answer = Answer(self.name, self.settings.integrator, refusal=refusal)
@@ -218,7 +218,7 @@ class _Simulation:
 
         low, high = (crank_acceleration(couple) for couple in trials)
         if high == low:
-            raise InputError("drive.bar", self.scene.drive_bar, "its torque does not move the input")
+            raise LimitError(f"the couple on bar {self.scene.drive_bar} does not move the input: a pole of the torque")
         couple = trials[0] + (trials[1] - trials[0]) * (alpha_2 - low) / (high - low)
         crank_acceleration(couple)
         mujoco.mj_rnePostConstraint(light.model, d)
