@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 
 from fourbar.effects import Friction, Gravity, Load, Viscous
 from fourbar.error_bars import error_bars
-from fourbar.errors import FourBarError, InputError
+from fourbar.errors import InputError
 from fourbar.kinematics import Array, State, Vector, add_accelerations, add_velocities, centre_in_bar, close_loop
 from fourbar.kinetostatics import solve_pins
 from fourbar.linkage import MOVING_BARS, FourBar, require
 from fourbar.margins import diagonal_to_O4, limit_remainder
-from fourbar.more_digits import needing_more_digits, restated, rounded
 from fourbar.mobility import default_range, limit_positions, on_smooth_path
+from fourbar.more_digits import needing_more_digits, restated, rounded
 from fourbar.solution import NOT_ASSEMBLED, OK, SINGULAR, STAGE_OF, STAGES, VECTORS, Solution, Unwrapped
 
 Effect = Gravity | Viscous | Friction
@@ -184,6 +184,8 @@ def solve(
     InputError : the stage or a name in `out` is unknown, its array has the wrong shape, or the
         scene does not state the omega_2 that is needed.
     """
+    if scene.motion.free is not None and at is None:
+        return _solve_free(scene, stage, out)
     where = command(scene) if at is None else at
     n = len(where.theta_2)
     if out is None:
@@ -201,8 +203,6 @@ def solve(
         stage = STAGES[wanted]
     if stage != "position" and where.omega_2 is None:
         raise InputError("motion.omega_2", None, f"is needed for the stage {stage!r}")
-    if scene.motion.free is not None and at is None:
-        raise FourBarError("a free motion is not evaluated position by position")
     code = np.empty(n, dtype=np.uint8)
     unwrapped = {name: Unwrapped() for name in ("theta_3", "theta_4") if name in result}
     for start in range(0, n, BLOCK):
@@ -211,6 +211,29 @@ def solve(
         for name, turns in unwrapped.items():
             turns.extend(result[name][part])
     return Solution(scene.title, scene.drive_bar, code, np.asarray(where.branch), where.theta_2, **result)
+
+
+def _solve_free(scene: Scene, stage: str | None, out: Mapping[str, Array] | None) -> Solution:
+    """Release the linkage, then evaluate the motion it makes instant by instant, with its times."""
+    from fourbar.free_motion import release
+
+    free, start = scene.motion.free, command(scene)
+    assert free is not None
+    if len(start.theta_2) != 1:
+        raise InputError("motion.theta_2", scene.motion.theta_2, "a free motion is released at one angle")
+    moved = release(
+        scene.linkage,
+        (*scene.loads, *scene.effects),
+        float(start.theta_2[0]),
+        scene.motion.omega_2 or 0.0,
+        int(start.branch[0]),
+        np.linspace(0.0, free.duration, free.steps + 1),
+        follow=scene.motion.through == "follow",
+    )
+    at = Command(moved.theta_2, moved.branch, moved.omega_2, moved.alpha_2)
+    solution = solve(scene, stage, at=at, out=out)
+    solution.time = moved.time
+    return solution
 
 
 def _highest_stage(out: Mapping[str, Array], n: int) -> int:

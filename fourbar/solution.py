@@ -27,6 +27,7 @@ UNITS = {
     **dict.fromkeys(("A", "B", "G2", "G3", "G4"), "m"),
     **dict.fromkeys(("a_A", "a_B", "a_G2", "a_G3", "a_G4"), "m/s^2"),
     **dict.fromkeys(("F12", "F32", "F43", "F14"), "N"),
+    "time": "s",
     "torque": "N m",
     "torque_error": "N m",
     "force_error": "N",
@@ -85,6 +86,9 @@ class Solution:
     """Error bar of the torque, N m: what rounding makes it scatter by."""
     force_error: Array | None = None
     """Error bar of the pin forces, N: the same for the worst of the four."""
+
+    time: Array | None = None
+    """Of a free motion, s; it ends where the linkage stops at a limit position."""
 
     def __len__(self) -> int:
         return len(self.theta_2)

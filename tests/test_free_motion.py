@@ -1,0 +1,106 @@
+"""Free motion against exact solutions, an independent integration, and its own equilibrium."""
+
+import math
+
+import numpy as np
+import pytest
+
+import fourbar
+from fourbar.free_motion import release
+from fourbar.scene import Command, solve
+
+FIVE_SECONDS = 1e-9
+"""rad over 5 s, where the motion amplifies errors by no more than 1000."""
+HANGING = fourbar.FourBar(
+    0.3, fourbar.Bar(0.1, 0.2), fourbar.Bar(0.25, 0.5, 0.004, (0.13, 0.3)), fourbar.Bar(0.22, 0.4)
+)
+
+
+def test_one_window_of_iftomm_a02() -> None:
+    """Ten seconds through the change points (lim.ii.udc.es/mbsbenchmark, A02)."""
+    bar = fourbar.Bar(1.0, 1.0)
+    linkage = fourbar.FourBar(1.0, bar, bar, bar)
+    m = release(linkage, (fourbar.Gravity(),), math.pi / 2, -1.0, 1, np.array([0.0, 10.0]), follow=True)
+    x, y, w = math.cos(m.theta_2[-1]), math.sin(m.theta_2[-1]), m.omega_2[-1]
+    printed = (0.478385058, 0.878150179, 1.727264076, -0.940952179)
+    for ours, theirs in zip((x, y, -y * w, x * w), printed, strict=True):
+        assert abs(ours - theirs) <= 0.5e-9
+    assert m.energy_drift < 1e-12  # hundreds of steps of 3e-14
+
+
+def absolute_coordinates(linkage: fourbar.FourBar, start: np.ndarray, rates: np.ndarray, k: float, times: np.ndarray):
+    """The same motion in theta_2, theta_3, theta_4 with Lagrange multipliers and stabilised closure (Baumgarte)."""
+    from scipy.integrate import solve_ivp
+
+    d, a, b, c = linkage.lengths
+    L, sign = np.array([a, b, c]), np.array([1.0, 1.0, -1.0])
+
+    def rhs(_: float, y: np.ndarray) -> np.ndarray:
+        q, v = y[:3], y[3:]
+        e, n = np.array([np.cos(q), np.sin(q)]), np.array([-np.sin(q), np.cos(q)])
+        M, f = np.zeros((3, 3)), np.zeros(3)
+        for i, bar in enumerate((linkage.input, linkage.coupler, linkage.output)):
+            r, phi = bar.centre
+            along = np.array([math.cos(q[i] + phi), math.sin(q[i] + phi)])
+            J, Jv = np.zeros((2, 3)), -r * along * v[i] ** 2
+            J[:, i] = r * np.array([-along[1], along[0]])
+            if i == 1:
+                J[:, 0] += a * n[:, 0]
+                Jv = Jv - a * e[:, 0] * v[0] ** 2
+            M += bar.mass * J.T @ J
+            M[i, i] += bar.inertia
+            f += bar.mass * J.T @ (np.array([0.0, -9.81]) - Jv)
+        f[0] -= k * v[0]
+        P = n * (L * sign)
+        gap = e @ (L * sign) - np.array([d, 0.0])
+        bias = -(-e * (L * sign)) @ v**2 - 200.0 * (P @ v) - 1e4 * gap
+        x = np.linalg.solve(np.block([[M, P.T], [P, np.zeros((2, 2))]]), np.concatenate([f, bias]))
+        return np.concatenate([v, x[:3]])
+
+    return solve_ivp(rhs, (0, times[-1]), np.concatenate([start, rates]), "DOP853", times, rtol=2.3e-14, atol=1e-14)
+
+
+@pytest.mark.parametrize("damping", [0.0, 0.002])
+def test_against_multipliers_in_absolute_coordinates(damping: float) -> None:
+    terms = (fourbar.Gravity(), fourbar.Viscous.at(O2=damping))
+    times = np.linspace(0.0, 5.0, 26)
+    m = release(HANGING, terms, 0.3, 0.0, 1, times)
+    nudged = release(HANGING, terms, 0.3 + 1e-7, 0.0, 1, times)
+    assert np.abs(nudged.theta_2 - m.theta_2).max() < 1000 * 1e-7  # the motion does not amplify more
+    s = solve(fourbar.Scene(HANGING), at=Command(m.theta_2[:1], m.branch[:1], None, 0.0))
+    start = np.array([0.3, s.theta_3[0], s.theta_4[0]])
+    theirs = absolute_coordinates(HANGING, start, np.zeros(3), damping, times)
+    assert np.abs(theirs.y[0] - m.theta_2).max() < FIVE_SECONDS
+
+
+def test_needs_no_driving_torque() -> None:
+    terms = (fourbar.Gravity(), fourbar.Viscous.at(O2=0.002, B=0.001))
+    m = release(HANGING, terms, 0.3, 2.0, -1, np.linspace(0.0, 2.0, 41))
+    s = solve(fourbar.Scene(HANGING, effects=terms), "force", at=Command(m.theta_2, m.branch, m.omega_2, m.alpha_2))
+    assert s.torque is not None
+    assert np.abs(s.torque).max() < 1e-12 * 9.81 * 1.1  # of all the weights at one metre
+
+
+def test_stops_at_a_limit_unless_told_to_follow() -> None:
+    linkage = fourbar.FourBar(0.3, fourbar.Bar(0.2, 0.2), fourbar.Bar(0.12, 0.5), fourbar.Bar(0.22, 0.4))
+    times = np.linspace(0.0, 5.0, 101)
+    halted = release(linkage, (fourbar.Gravity(),), 1.0, 0.0, 1, times)
+    assert halted.stopped_at is not None and halted.time[-1] <= halted.stopped_at < 5.0
+    assert set(halted.branch) == {1}
+    passed = release(linkage, (fourbar.Gravity(),), 1.0, 0.0, 1, times, follow=True)
+    assert passed.stopped_at is None and set(passed.branch) == {1, -1} and passed.energy_drift < 1e-11
+    n = len(halted.time)
+    assert np.array_equal(passed.theta_2[:n], halted.theta_2)
+
+
+def test_dry_friction_holds() -> None:
+    m = release(HANGING, (fourbar.Gravity(), fourbar.Friction.at(O2=0.3)), 0.3, 1.0, 1, np.linspace(0.0, 5.0, 51))
+    assert m.omega_2[-1] == 0.0 and m.alpha_2[-1] == 0.0 and m.theta_2[-1] == m.theta_2[-2]
+
+
+def test_a_scene_reports_its_times() -> None:
+    motion = fourbar.Motion(0.3, 2.0, free=fourbar.Free(1.0, 10))
+    s = solve(fourbar.Scene(HANGING, motion, effects=(fourbar.Gravity(),)))
+    assert s.time is not None and s.torque is not None and s.F12 is not None
+    assert np.array_equal(s.time, np.linspace(0.0, 1.0, 11))
+    assert np.abs(s.torque).max() < 1e-12 * 9.81 * 1.1
