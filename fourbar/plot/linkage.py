@@ -1,11 +1,11 @@
 """The linkage drawn to scale: bars, pins, ground, mass centres and coupler curves."""
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fourbar.kinematics import State, centre_in_bar
+from fourbar.kinematics import Array, State, centre_in_bar
 from fourbar.linkage import MOVING_BARS
 from fourbar.plot.labels import Label, Labels
 from fourbar.plot.style import BAR_COLOURS, INK, MUTED, largest, length_unit
@@ -13,6 +13,7 @@ from fourbar.plot.view import View
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.lines import Line2D
 
 Point = tuple[float, float]
 ENDS = {2: ("O2", "A"), 3: ("A", "B"), 4: ("O4", "B")}
@@ -78,58 +79,59 @@ def pin_name(name: str) -> str:
     return f"${name[0]}_{name[1]}$" if len(name) == 2 else f"${name}$"
 
 
-def _paths(axes: "Axes", view: View, labels: Labels, factor: float) -> None:
-    """Paths of A, B and the coupler's mass centre (or its mid-point)."""
+def paths(view: View) -> list[tuple[Array, str, Any, str]]:
+    """Paths of A, B and the coupler's mass centre (or its mid-point): points (n, 2) in m, colour, dashes, name."""
     sweep = view.sweep
     massive = view.scene.linkage.coupler.mass > 0.0
-    mid = sweep.G3 if massive else 0.5 * (sweep.A + sweep.B)
-    for path, colour, dashes, name in (
+    middle = sweep.G3 if massive else 0.5 * (sweep.A + sweep.B)
+    found = (
         (sweep.A, BAR_COLOURS[2], (0, (1, 2)), "path of $A$"),
         (sweep.B, BAR_COLOURS[4], (0, (1, 2)), "path of $B$"),
-        (mid, BAR_COLOURS[3], (0, (4, 1.5)), "coupler curve of " + ("$G_3$" if massive else "its mid-point")),
-    ):
-        scaled = np.where(sweep.assembled[:, None], factor * path, np.nan)
+        (middle, BAR_COLOURS[3], (0, (4, 1.5)), "coupler curve of " + ("$G_3$" if massive else "its mid-point")),
+    )
+    return [(np.where(sweep.assembled[:, None], path, np.nan), *look) for path, *look in found]
+
+
+def _paths(axes: "Axes", view: View, labels: Labels, factor: float) -> None:
+    for path, colour, dashes, name in paths(view):
+        scaled = factor * path
         axes.plot(scaled[:, 0], scaled[:, 1], color=colour, lw=1.0, ls=dashes, zorder=2, label=name)
         labels.keep_off(axes, *[(float(x), float(y)) for x, y in scaled[:: max(1, len(scaled) // 120)]])
 
 
 def _ground(axes: "Axes", labels: Labels, O2: Point, O4: Point, size: float) -> None:
-    """The ground line between the fixed pins, and a hatched support under each."""
-    from matplotlib.patches import Polygon, Rectangle
-
-    axes.plot(*zip(O2, O4, strict=True), color=MUTED, lw=1.0, ls=(0, (8, 3, 2, 3)), zorder=1)
+    supports(axes, O2, O4, size)
     labels.keep_off(axes, O2, O4)
     for x, y in (O2, O4):
-        triangle = [(x, y), (x - size, y - 1.7 * size), (x + size, y - 1.7 * size)]
-        axes.add_patch(Polygon(triangle, closed=True, fc="white", ec=INK, lw=1.0, zorder=3))
-        strip = Rectangle(
-            (x - 1.7 * size, y - 2.5 * size),
-            3.4 * size,
-            0.8 * size,
-            fc="none",
-            ec=INK,
-            lw=0.0,
-            hatch="//////",
-            zorder=2,
-        )
-        axes.add_patch(strip)
-        axes.plot([x - 1.7 * size, x + 1.7 * size], [y - 1.7 * size] * 2, color=INK, lw=1.0, zorder=3)
         for share in (0.5, 1.0, 1.7, 2.1, 2.5):
             wide = size * (share / 1.7 if share <= 1.7 else 1.7)
             labels.keep_off(axes, (x - wide, y - share * size), (x + wide, y - share * size))
 
 
-def mass_centre(axes: "Axes", point: Point, ms: float = 7.0) -> None:
+def supports(axes: "Axes", O2: Point, O4: Point, size: float) -> None:
+    """The ground line between the fixed pins, and a hatched support under each."""
+    from matplotlib.patches import Polygon, Rectangle
+
+    axes.plot(*zip(O2, O4, strict=True), color=MUTED, lw=1.0, ls=(0, (8, 3, 2, 3)), zorder=1)
+    for x, y in (O2, O4):
+        wide, foot = 1.7 * size, y - 1.7 * size
+        triangle = [(x, y), (x - size, foot), (x + size, foot)]
+        axes.add_patch(Polygon(triangle, closed=True, fc="white", ec=INK, lw=1.0, zorder=3))
+        strip = ((x - wide, foot - 0.8 * size), 2.0 * wide, 0.8 * size)
+        axes.add_patch(Rectangle(*strip, fc="none", ec=INK, lw=0.0, hatch="//////", zorder=2))
+        axes.plot([x - wide, x + wide], [foot, foot], color=INK, lw=1.0, zorder=3)
+
+
+def mass_centre(axes: "Axes", point: Point, ms: float = 7.0) -> "list[Line2D]":
     """The quartered circle that marks a mass centre."""
-    for fill, colour in (("full", "white"), ("none", INK)):
-        axes.plot(
-            *[[v] for v in point], "o", ms=ms, mfc=colour if fill == "full" else "none", mec=INK, mew=0.8, zorder=7
-        )
-    for first, second in ((0, 90), (180, 270)):
-        axes.plot(*[[v] for v in point], marker=_wedge(first, second), ms=ms, mfc=INK, mec="none", zorder=7)
+    x, y = point
+    marks = axes.plot([x], [y], "o", ms=ms, mfc="white", mec=INK, mew=0.8, zorder=7)
+    for quarter in ((0, 90), (180, 270)):
+        marks += axes.plot([x], [y], marker=_wedge(*quarter), ms=ms, mfc=INK, mec="none", zorder=7)
+    return marks
 
 
-def _wedge(start: int, stop: int):  # type: ignore[no-untyped-def]
+def _wedge(start: int, stop: int) -> Any:
     from matplotlib.path import Path
 
     return Path.wedge(start, stop)

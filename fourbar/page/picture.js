@@ -1,0 +1,342 @@
+const data = JSON.parse(document.getElementById("data").textContent);
+const byId = id => document.getElementById(id);
+const DEG = 180 / Math.PI, TURN = 2 * Math.PI, FORCES = ["F12", "F32", "F43", "F14"];
+const FORCE_PIN = { F12: "O2", F32: "A", F43: "B", F14: "O4" };
+const SWEEP_SECONDS = 6, ROWS = 360;   // one sweep at speed 1; positions of a sweep whose lengths were edited
+const ORDINARY = 0.95, OUTLIER = 3, ROOM = 1.6;   // a scale ends at ROOM times the 95th percentile where values diverge
+const unit = data.unit, still = window.matchMedia("(prefers-reduced-motion: reduce)").matches;
+
+let lengths = data.lengths.slice(), edited = false, branch = data.branch, grid = data.theta_2, row = data.start;
+let phase = row, playing = false, direction = data.omega_2 < 0 ? -1 : 1, lastTime = null, lastDraw = 0;
+let view = { width: 0, height: 0, k: 1, x: 0, y: 0 }, forceScale = { top: 0, cut: false };
+
+const table = () => data.branches[branch];
+const signAt = i => edited ? branch : table().sign[Math.min(i, grid.length - 1)];
+const at = i => closeLoop(lengths, data.theta_1, grid[i], signAt(i));
+const dynamic = () => !edited && "torque" in table();
+
+// ---- numbers -------------------------------------------------------------------------------
+function text(value, digits = 5) {
+  if (value === null || value === undefined || !Number.isFinite(value)) return "\u2013";
+  if (value === 0) return "0";
+  const size = Math.abs(value);
+  const shown = size >= 1e6 || size < 1e-4 ? value.toExponential(digits - 2) : value.toPrecision(digits);
+  return shown.replace("-", "\u2212").replace("e+", "e");
+}
+const rounded = (value, digits) => Math.abs(value) < 1e6 ? String(Number(value.toPrecision(digits))) : text(value, digits + 2);
+const degrees = value => value === null || !Number.isFinite(value) ? "\u2013" : (value * DEG).toFixed(3).replace("-", "\u2212");
+
+function valuesAt(i) {
+  const t = table(), out = {};
+  if (!edited) {
+    for (const [name, column] of Object.entries(t)) out[name] = column[i];
+    out.theta_2 = grid[i];
+    return out;
+  }
+  out.theta_2 = grid[i];
+  const p = at(i);
+  if (p) Object.assign(out, { theta_3: p.theta3, theta_4: p.theta4, condition: Math.abs(p.sinMu) });
+  if (p && data.omega_2 !== null) {
+    const r = rates(lengths, p, data.omega_2, data.alpha_2);
+    Object.assign(out, { omega_2: data.omega_2, omega_3: r.omega3, omega_4: r.omega4, alpha_2: data.alpha_2, alpha_3: r.alpha3, alpha_4: r.alpha4 });
+  }
+  return out;
+}
+
+function showNumbers(i) {
+  const v = valuesAt(i);
+  for (const k of [2, 3, 4]) {
+    byId(`theta_${k}`).textContent = degrees(v[`theta_${k}`] ?? null);
+    byId(`omega_${k}`).textContent = text(v[`omega_${k}`]);
+    byId(`alpha_${k}`).textContent = text(v[`alpha_${k}`]);
+  }
+  byId("condition").textContent = text(v.condition);
+  const across = v.theta_3 === undefined || v.theta_3 === null ? null : Math.atan2(Math.abs(Math.sin(v.theta_4 - v.theta_3)), Math.abs(Math.cos(v.theta_4 - v.theta_3)));
+  byId("mu").textContent = degrees(across);
+  if (dynamic()) {
+    byId("torque").textContent = text(v.torque);
+    for (const name of FORCES) {
+      const f = v[name], known = f[0] !== null;
+      byId(`${name}_x`).textContent = text(f[0]);
+      byId(`${name}_y`).textContent = text(f[1]);
+      byId(`${name}_size`).textContent = text(known ? Math.hypot(f[0], f[1]) : null);
+      byId(`${name}_angle`).textContent = known ? (Math.atan2(f[1], f[0]) * DEG).toFixed(2).replace("-", "\u2212") : "\u2013";
+    }
+  }
+  const assembled = at(i) !== null, singular = assembled && Math.abs(at(i).sinMu) < 8 * Number.EPSILON;
+  const status = byId("status");
+  status.hidden = assembled && !singular;
+  status.textContent = !assembled ? "The linkage does not assemble at this position." : singular ? "Coupler and output are in line: velocities have no value here." : "";
+  byId("theta").value = i;
+  const here = `${(grid[i] * DEG).toFixed(2)}\u00b0`.replace("-", "\u2212");
+  byId("theta-text").textContent = here;
+  byId("theta").setAttribute("aria-valuetext", `${(grid[i] * DEG).toFixed(2)} degrees`);
+  if (!playing) {
+    let words = assembled ? `Theta 2 ${here}, theta 3 ${degrees(v.theta_3)}, theta 4 ${degrees(v.theta_4)} degrees` : `Theta 2 ${here}: does not assemble`;
+    if (dynamic() && v.torque !== null) words += `, torque ${text(v.torque, 4)} newton metres`;
+    byId("live").textContent = words;
+    byId("picture-text").textContent = `Four-bar linkage, ${branch === 1 ? "open" : "crossed"} branch. ${words}`;
+  }
+}
+
+// ---- picture -------------------------------------------------------------------------------
+const SVG = "http://www.w3.org/2000/svg";
+function make(parent, name, attributes) {
+  const element = document.createElementNS(SVG, name);
+  for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, value);
+  parent.appendChild(element);
+  return element;
+}
+const set = (element, attributes) => { for (const key in attributes) element.setAttribute(key, attributes[key]); };
+const picture = byId("picture");
+const parts = { ground: make(picture, "g", {}), images: make(picture, "g", { id: "images" }), curve: make(picture, "path", { class: "path", id: "curve" }) };
+parts.bars = {}; parts.image = {};
+for (const k of [2, 3, 4]) {
+  if (data.pictures[k]) parts.image[k] = make(parts.images, "image", { href: data.pictures[k], preserveAspectRatio: "none", id: `picture-${k}` });
+  parts.bars[k] = make(picture, "line", { class: `bar b${k}`, id: `bar-${k}` });
+}
+parts.forces = make(picture, "g", { id: "arrows" });
+parts.arrow = Object.fromEntries(FORCES.map(name => [name, {
+  shaft: make(parts.forces, "line", { class: `force s-${name}`, id: `arrow-${name}` }),
+  head: make(parts.forces, "path", { class: `head f-${name}` }),
+}]));
+parts.pins = Object.fromEntries(["O2", "A", "B", "O4"].map(name => [name, make(picture, "circle", { class: "pin", r: 6, id: `pin-${name}` })]));
+parts.centres = make(picture, "g", { id: "centres" });
+parts.centre = {};
+for (const k of [2, 3, 4]) if (data.centres[k]) {
+  const arm = make(parts.centres, "line", { class: "arm" }), mark = make(parts.centres, "g", { id: `centre-${k}` });
+  make(mark, "circle", { class: "centre-disc", r: 7 });
+  make(mark, "path", { class: "centre-fill", d: "M0 0H7A7 7 0 0 0 0 -7ZM0 0H-7A7 7 0 0 0 0 7Z" });
+  parts.centre[k] = { arm, mark };
+}
+parts.labels = make(picture, "g", { id: "labels" });
+parts.label = {};
+for (const name of ["O2", "A", "B", "O4", "2", "3", "4", "G2", "G3", "G4", ...FORCES]) {
+  const element = make(parts.labels, "text", { class: "label" + (FORCES.includes(name) ? ` f-${name}` : "") });
+  element.append(name[0]);
+  if (name.length > 1) {
+    const index = make(element, "tspan", { dy: 4, "font-size": 10 });
+    index.textContent = name.slice(1);
+  }
+  parts.label[name] = element;
+}
+parts.legend = make(picture, "g", { id: "force-scale" });
+
+const toScreen = p => [view.x + view.k * p[0], view.y - view.k * p[1]];
+const FIRST_PIN = { 2: "O2", 3: "A", 4: "O4" }, LAST_PIN = { 2: "A", 3: "B", 4: "B" };
+
+function barPoint(p, k, r) {
+  const angle = { 2: p.theta2, 3: p.theta3, 4: p.theta4 }[k], foot = p[FIRST_PIN[k]];
+  const c = Math.cos(angle), s = Math.sin(angle);
+  return [foot[0] + r[0] * c - r[1] * s, foot[1] + r[0] * s + r[1] * c];
+}
+
+const coupler = p => barPoint(p, 3, data.centres[3] ?? [0.5 * lengths[2], 0]);
+
+// Everything the sweep reaches fits into the picture, so that the scale does not change while it moves.
+function fit() {
+  view.width = Math.max(280, picture.parentElement.clientWidth);
+  view.height = Math.round(Math.min(560, Math.max(270, 0.68 * view.width)));
+  set(picture, { viewBox: `0 0 ${view.width} ${view.height}` });
+  let low = [0, 0], high = [0, 0];
+  const curve = [];
+  let broken = true;
+  for (let i = 0; i < grid.length; i++) {
+    const p = at(i);
+    if (!p) { broken = true; continue; }
+    const g = coupler(p), reached = [p.A, p.B, p.O4, g];
+    for (const k of [2, 4]) if (data.centres[k]) reached.push(barPoint(p, k, data.centres[k]));
+    for (const q of reached) for (const j of [0, 1]) { low[j] = Math.min(low[j], q[j]); high[j] = Math.max(high[j], q[j]); }
+    curve.push([broken ? "M" : "L", g]);
+    broken = false;
+  }
+  const margin = view.width < 480 ? 40 : 58;
+  view.k = Math.min((view.width - 2 * margin) / (high[0] - low[0]), (view.height - 2 * margin) / (high[1] - low[1]));
+  view.x = 0.5 * view.width - 0.5 * view.k * (low[0] + high[0]);
+  view.y = 0.5 * view.height + 0.5 * view.k * (low[1] + high[1]);
+  parts.curve.setAttribute("d", curve.map(([step, g]) => step + toScreen(g).map(v => v.toFixed(2)).join(" ")).join(""));
+  drawGround();
+  scaleForces();
+}
+
+function drawGround() {
+  parts.ground.replaceChildren();
+  const O4 = [lengths[0] * Math.cos(data.theta_1), lengths[0] * Math.sin(data.theta_1)];
+  const [p, q] = [toScreen([0, 0]), toScreen(O4)];
+  make(parts.ground, "line", { class: "ground-line", x1: p[0], y1: p[1], x2: q[0], y2: q[1] });
+  for (const [x, y] of [p, q]) {
+    for (let i = -18; i < 18; i += 6) make(parts.ground, "line", { class: "hatch", x1: x + i + 6, y1: y + 20, x2: x + i, y2: y + 27 });
+    make(parts.ground, "path", { class: "support", d: `M${x} ${y}L${x - 11} ${y + 20}H${x + 11}ZM${x - 18} ${y + 20}H${x + 18}` });
+  }
+}
+
+function ceiling(values) {
+  const sizes = values.filter(Number.isFinite).map(Math.abs).sort((x, y) => x - y);
+  if (!sizes.length) return { top: 0, cut: false };
+  const ordinary = sizes[Math.floor(ORDINARY * (sizes.length - 1))], largest = sizes[sizes.length - 1];
+  return ordinary > 0 && largest > OUTLIER * ordinary ? { top: ROOM * ordinary, cut: true } : { top: largest, cut: false };
+}
+
+function scaleForces() {
+  parts.legend.replaceChildren();
+  const shown = dynamic() && byId("show-forces").checked;
+  parts.forces.style.display = shown ? "" : "none";
+  if (!dynamic()) return;
+  forceScale = ceiling(FORCES.flatMap(name => table()[name].map(f => f[0] === null ? NaN : Math.hypot(f[0], f[1]))));
+  forceScale.pixels = forceScale.top > 0 ? 0.3 * Math.min(view.width, view.height) / forceScale.top : 0;
+  if (!shown || forceScale.pixels === 0) return;
+  forceLegend();
+}
+
+// With one scale for the whole sweep arrows can be compared from position to position; scaled to the
+// position, small forces stay visible where others diverge.
+function forceLegend() {
+  parts.legend.replaceChildren();
+  const step = 10 ** Math.floor(Math.log10(forceScale.top));
+  const round = [5, 2, 1].map(m => m * step).find(v => v <= 0.75 * forceScale.top) ?? 0.5 * step;
+  const y = view.height - 12, long = round * forceScale.pixels;
+  make(parts.legend, "line", { class: "scale", x1: 14, x2: 14 + long, y1: y, y2: y });
+  make(parts.legend, "text", { class: "small", x: 14, y: y - 7 }).textContent =
+    `${rounded(round, 1)} N` + (forceScale.cut ? `, arrows over ${rounded(forceScale.top, 2)} N cut (dashed)` : "");
+}
+
+function place(name, point, from, distance) {
+  const dx = point[0] - from[0], dy = point[1] - from[1], size = Math.hypot(dx, dy) || 1;
+  set(parts.label[name], { x: point[0] + distance * dx / size, y: point[1] + distance * dy / size });
+}
+
+function drawLinkage(p, i) {
+  const show = id => byId(id).checked;
+  parts.curve.style.display = show("show-curve") ? "" : "none";
+  parts.labels.style.display = show("show-labels") ? "" : "none";
+  for (const element of Object.values(parts.label)) element.style.display = "none";
+  const visible = (name, on) => { parts.label[name].style.display = on ? "" : "none"; };
+  const known = p ?? { theta2: grid[i], O2: [0, 0], O4: [lengths[0] * Math.cos(data.theta_1), lengths[0] * Math.sin(data.theta_1)], A: [lengths[1] * Math.cos(grid[i]), lengths[1] * Math.sin(grid[i])] };
+  const s = Object.fromEntries(["O2", "A", "B", "O4"].filter(name => known[name]).map(name => [name, toScreen(known[name])]));
+  const pins = Object.values(s), middle = [0, 1].map(j => pins.reduce((sum, q) => sum + q[j], 0) / pins.length);
+  for (const name of ["O2", "A", "B", "O4"]) {
+    parts.pins[name].style.display = s[name] ? "" : "none";
+    if (!s[name]) continue;
+    set(parts.pins[name], { cx: s[name][0], cy: s[name][1] });
+    visible(name, true);
+    if (name[0] === "O") set(parts.label[name], { x: s[name][0] + (s[name][0] < middle[0] ? -24 : 24), y: s[name][1] + 8 });
+    else place(name, s[name], middle, 18);
+  }
+  for (const k of [2, 3, 4]) {
+    const p1 = s[FIRST_PIN[k]], p2 = s[LAST_PIN[k]], drawn = Boolean(p1 && p2);
+    parts.bars[k].style.display = drawn ? "" : "none";
+    if (parts.image[k]) parts.image[k].style.display = drawn && show("show-pictures") ? "" : "none";
+    if (parts.centre[k]) for (const element of Object.values(parts.centre[k])) element.style.display = drawn && show("show-centres") ? "" : "none";
+    if (!drawn) continue;
+    set(parts.bars[k], { x1: p1[0], y1: p1[1], x2: p2[0], y2: p2[1] });
+    visible(String(k), true);
+    const half = [0.5 * (p1[0] + p2[0]), 0.5 * (p1[1] + p2[1])], long = Math.hypot(p2[0] - p1[0], p2[1] - p1[1]) || 1;
+    const normal = [-(p2[1] - p1[1]) / long, (p2[0] - p1[0]) / long];
+    let side = (half[0] - middle[0]) * normal[0] + (half[1] - middle[1]) * normal[1] >= 0 ? 15 : -15;
+    if (data.centres[k] && Math.abs(data.centres[k][1]) * view.k > 10) side = data.centres[k][1] > 0 ? 15 : -15;   // beside the bar, G has the other side
+    set(parts.label[k], { x: half[0] + side * normal[0], y: half[1] + side * normal[1] });
+    if (parts.image[k]) {
+      const height = long * (parts.image[k].ratio ?? 0.3), angle = Math.atan2(p2[1] - p1[1], p2[0] - p1[0]) * DEG;
+      set(parts.image[k], { x: 0, y: -0.5 * height, width: long, height, transform: `translate(${p1[0]} ${p1[1]}) rotate(${angle})` });
+      parts.bars[k].classList.toggle("pictured", show("show-pictures"));
+    }
+    if (parts.centre[k]) {
+      const g = toScreen(barPoint(known, k, data.centres[k]));
+      parts.centre[k].mark.setAttribute("transform", `translate(${g[0]} ${g[1]})`);
+      set(parts.centre[k].arm, { x1: p1[0], y1: p1[1], x2: g[0], y2: g[1] });
+      visible(`G${k}`, show("show-centres"));
+      set(parts.label[`G${k}`], { x: g[0] - 1.2 * side * normal[0], y: g[1] - 1.2 * side * normal[1] });
+    }
+  }
+  const forces = dynamic() && show("show-forces");
+  if (forces && p && byId("arrow-scale").value === "position") {
+    const top = Math.max(...FORCES.map(name => Math.hypot(...table()[name][i])));
+    forceScale = { top, cut: false, pixels: top > 0 ? 0.3 * Math.min(view.width, view.height) / top : 0 };
+    if (top > 0) forceLegend(); else parts.legend.replaceChildren();
+  }
+  for (const name of FORCES) {
+    const arrow = parts.arrow[name], f = forces && p ? table()[name][i] : [null, null];
+    const size = f[0] === null ? 0 : Math.hypot(f[0], f[1]), cut = size > forceScale.top;
+    const long = Math.min(size, forceScale.top) * forceScale.pixels, drawn = long > 2;
+    for (const element of Object.values(arrow)) element.style.display = drawn ? "" : "none";
+    visible(name, drawn);
+    if (!drawn) continue;
+    const [x, y] = s[FORCE_PIN[name]], ux = f[0] / size, uy = -f[1] / size, head = Math.min(11, long);
+    const tip = [x + long * ux, y + long * uy], neck = [tip[0] - head * ux, tip[1] - head * uy];
+    set(arrow.shaft, { x1: x, y1: y, x2: neck[0], y2: neck[1] });
+    arrow.shaft.classList.toggle("cut", cut);
+    arrow.head.setAttribute("d", `M${tip[0]} ${tip[1]}L${neck[0] - 0.45 * head * uy} ${neck[1] + 0.45 * head * ux}L${neck[0] + 0.45 * head * uy} ${neck[1] - 0.45 * head * ux}Z`);
+    set(parts.label[name], { x: tip[0] + 15 * ux, y: tip[1] + 13 * uy });
+  }
+}
+
+// ---- chart ---------------------------------------------------------------------------------
+const QUANTITIES = [
+  ["theta_3", "\u03b8\u2083, deg", DEG], ["theta_4", "\u03b8\u2084, deg", DEG],
+  ["omega_3", "\u03c9\u2083, rad/s", 1], ["omega_4", "\u03c9\u2084, rad/s", 1],
+  ["alpha_3", "\u03b1\u2083, rad/s\u00b2", 1], ["alpha_4", "\u03b1\u2084, rad/s\u00b2", 1],
+  ["torque", `torque on bar ${data.drive_bar}, N m`, 1],
+  ...FORCES.map(name => [name, `|F${name.slice(1).replace(/./g, d => "\u2080\u2081\u2082\u2083\u2084"[d])}|, N`, 1]),
+];
+const chart = byId("chart");
+let plotted = { values: [], x: () => 0, y: () => 0 };
+
+function column(name) {
+  const [, , factor] = QUANTITIES.find(q => q[0] === name);
+  const values = grid.map((_, i) => {
+    const v = edited ? valuesAt(i)[name] : table()[name][i];
+    if (v === null || v === undefined) return NaN;
+    return Array.isArray(v) ? (v[0] === null ? NaN : Math.hypot(v[0], v[1])) : v * factor;
+  });
+  if (name.startsWith("theta")) for (let i = 1; i < values.length; i++) values[i] -= 360 * Math.round((values[i] - values[i - 1]) / 360) || 0;
+  return values;
+}
+
+function drawChart() {
+  const available = QUANTITIES.filter(([name]) => edited ? !FORCES.includes(name) && name !== "torque" && (data.omega_2 !== null || name.startsWith("theta")) : name in table());
+  const select = byId("quantity"), wanted = available.some(q => q[0] === select.value) ? select.value : (available.find(q => q[0] === "torque") ?? available[0])[0];
+  select.replaceChildren(...available.map(([name, label]) => new Option(label, name, false, name === wanted)));
+  const width = Math.max(280, picture.parentElement.clientWidth), height = 170, left = 62, bottom = 26, values = column(wanted);
+  chart.replaceChildren();
+  set(chart, { viewBox: `0 0 ${width} ${height}` });
+  const limit = wanted.startsWith("theta") ? { cut: false } : ceiling(values), finite = values.filter(Number.isFinite);
+  let low = Math.min(...finite), high = Math.max(...finite);
+  if (limit.cut) { low = Math.max(low, -limit.top); high = Math.min(high, limit.top); }
+  if (!wanted.startsWith("theta")) { low = Math.min(low, 0); high = Math.max(high, 0); }
+  if (high - low < 1e-300) { high += 1; low -= 1; }
+  byId("chart-note").textContent = limit.cut ? `cut at ${text(limit.top, 3)}; it reaches ${text(finite.reduce((m, v) => Math.abs(v) > Math.abs(m) ? v : m, 0), 4)}` : "";
+  const first = grid[0], span = grid[grid.length - 1] - first || 1;
+  const x = t => left + (width - left - 12) * (t - first) / span, y = v => 10 + (height - 10 - bottom) * (high - v) / (high - low);
+  plotted = { values, x, y, low, high, height, bottom };
+  const step = [15, 30, 45, 60, 90, 180].find(d => span * DEG / d <= Math.max(3, width / 75)) ?? 360;
+  for (let d = Math.ceil(first * DEG / step - 1e-9) * step; d <= (first + span) * DEG + 1e-9; d += step) {
+    make(chart, "line", { class: "axis", x1: x(d / DEG), x2: x(d / DEG), y1: 10, y2: height - bottom });
+    make(chart, "text", { class: "small", x: x(d / DEG), y: height - 9, "text-anchor": "middle" }).textContent = `${d}\u00b0`.replace("-", "\u2212");
+  }
+  for (const [v, kind] of [[low, "axis"], [high, "axis"], [0, "zero"]]) {
+    if (v < low || v > high) continue;
+    make(chart, "line", { class: kind, x1: left, x2: width - 12, y1: y(v), y2: y(v) });
+    if (v === 0 && Math.min(y(low) - y(0), y(0) - y(high)) < 14 && low !== 0 && high !== 0) continue;
+    if (v !== 0 || kind === "zero") make(chart, "text", { class: "small", x: left - 6, y: y(v) + 4, "text-anchor": "end" }).textContent = text(v, 3);
+  }
+  let d = "", open = false;
+  values.forEach((v, i) => {
+    const jump = i > 0 && limit.cut && v * values[i - 1] < 0 && Math.abs(v - values[i - 1]) > limit.top;   // across a pole no line
+    if (!Number.isFinite(v) || v < low || v > high) { open = false; return; }
+    d += (open && !jump ? "L" : "M") + x(grid[i]).toFixed(2) + " " + y(v).toFixed(2);
+    open = true;
+  });
+  make(chart, "path", { class: "curve", d });
+  plotted.cursor = make(chart, "line", { class: "cursor", y1: 10, y2: height - bottom });
+  plotted.dot = make(chart, "circle", { class: "dot", r: 4.5 });
+}
+
+function moveCursor(i) {
+  const { cursor, dot, values, x, y, low, high } = plotted;
+  if (!cursor) return;
+  set(cursor, { x1: x(grid[i]), x2: x(grid[i]) });
+  const inside = Number.isFinite(values[i]) && values[i] >= low && values[i] <= high;
+  dot.style.display = inside ? "" : "none";
+  if (inside) set(dot, { cx: x(grid[i]), cy: y(values[i]) });
+}
+

@@ -1,0 +1,241 @@
+"""Drawings: what they show against the formulas, that nothing overlaps, and that they reach the file whole."""
+
+import math
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.text import Text
+
+import fourbar
+from fourbar import plot
+from fourbar.errors import DependencyError, InputError, NotAssembledError
+from fourbar.plot.curves import broken, limit_of, poles
+from fourbar.plot.figures import FIGURES, compose
+from fourbar.plot.freebody import free_body
+from fourbar.plot.style import matplotlib_style, number, plain, unit_for
+from fourbar.plot.view import view
+from tests.scenes import crank_rocker, thesis
+
+SIGNATURES = {"svg": b"<?xml", "png": b"\x89PNG", "pdf": b"%PDF"}
+BALANCE = 1e-12
+"""Force and moment sums of a free body, relative to their largest term: a few tens of roundings."""
+
+
+TOUCH = 1.0
+"""Boxes of texts may share this many pixels: a box is wider than its ink."""
+
+
+def composed(scene, name, branches="one", position=None):
+    painter, size, _ = FIGURES[name]
+    with matplotlib_style():
+        return compose(scene, painter, size, position, branches)
+
+
+@pytest.mark.parametrize("file_format", plot.FORMATS)
+def test_the_same_scene_gives_the_same_bytes(tmp_path: Path, file_format: str) -> None:
+    files = [tmp_path / f"{k}.{file_format}" for k in (1, 2)]
+    for path in files:
+        plot.draw(crank_rocker(), path, "linkage")
+    first, second = (path.read_bytes() for path in files)
+    assert first.startswith(SIGNATURES[file_format])
+    assert first == second
+    assert sorted(p.name for p in tmp_path.iterdir()) == sorted(p.name for p in files)  # nothing half-written
+
+
+def texts_shown(figure):
+    """Every text that reaches the paper, with its box in pixels."""
+    renderer = figure.canvas.get_renderer()
+    off_axis = set()
+    for axes in figure.axes:
+        for axis in (axes.xaxis, axes.yaxis):
+            low, high = sorted(axis.get_view_interval())
+            for tick in (*axis.get_major_ticks(), *axis.get_minor_ticks()):
+                if not axes.axison or not low - 1e-9 <= tick.get_loc() <= high + 1e-9:
+                    off_axis |= {tick.label1, tick.label2}
+        if not axes.axison:
+            off_axis |= {axes.xaxis.label, axes.yaxis.label}
+    found = figure.findobj(lambda artist: isinstance(artist, Text))
+    shown = [t for t in found if t.get_visible() and t.get_text().strip() and t not in off_axis]
+    return [(t.get_text(), t.get_window_extent(renderer)) for t in shown]
+
+
+@pytest.mark.parametrize("name", sorted(FIGURES))
+def test_every_figure_draws_both_branches_and_no_texts_overlap(name: str) -> None:
+    for scene, branches in ((crank_rocker(), "both"), (thesis(), "one")):
+        figure = composed(scene, name, branches)
+        texts, page = texts_shown(figure), figure.bbox
+        assert len(texts) > 5
+        for text, box in texts:
+            assert page.x0 <= box.x0 and box.x1 <= page.x1 and page.y0 <= box.y0 and box.y1 <= page.y1, text
+        clashes = [
+            (p, q)
+            for k, (p, a) in enumerate(texts)
+            for q, b in texts[k + 1 :]
+            if min(a.x1, b.x1) - max(a.x0, b.x0) > TOUCH and min(a.y1, b.y1) - max(a.y0, b.y0) > TOUCH
+        ]
+        assert not clashes
+
+
+def test_every_axis_of_theta_2_is_in_degrees_and_every_axis_has_a_unit() -> None:
+    figure = composed(crank_rocker(), "overview")
+    flat = [axes for axes in figure.axes if axes.name == "rectilinear"]
+    assert len(flat) == 7
+    for axes in flat:
+        for label in (axes.get_xlabel(), axes.get_ylabel()):
+            assert label.endswith(")"), label
+        if "theta_2" in axes.get_xlabel():
+            assert axes.get_xlabel().endswith("(°)")
+            assert axes.get_xlim() == pytest.approx(np.degrees([0.1, 0.1 + 2 * math.pi]))
+
+
+def test_drawn_curves_are_those_of_the_solution() -> None:
+    scene = crank_rocker()
+    solution = fourbar.solve(scene)
+    axes = composed(scene, "kinematics").axes
+    drawn = {line.get_label(): line.get_ydata() for panel in axes for line in panel.lines}
+    np.testing.assert_allclose(drawn[r"$\theta_4$"], np.degrees(solution.theta_4))
+    np.testing.assert_allclose(drawn[r"$\omega_3$"], solution.omega_3)
+    np.testing.assert_allclose(drawn[r"$\alpha_4$"], solution.alpha_4)
+    torque = composed(scene, "torque").axes[0]
+    assert torque.get_ylabel() == "$T_2$ (mN m)"
+    np.testing.assert_allclose(torque.lines[1].get_ydata(), 1e3 * solution.torque)
+
+
+def test_bars_are_drawn_to_scale_at_the_position_asked_for() -> None:
+    scene = crank_rocker()
+    axes = composed(scene, "linkage", position=1.3).axes[0]
+    bars = [line for line in axes.lines if line.get_linewidth() == 4.5]
+    lengths = [float(np.hypot(*np.diff(line.get_xydata(), axis=0)[0])) for line in bars]
+    assert lengths == pytest.approx([100.0, 250.0, 220.0])  # mm
+    (x, y) = bars[0].get_xydata()[1]
+    assert math.atan2(y, x) == pytest.approx(1.3)
+    x_scale, y_scale = (np.diff(axes.transData.transform([(0, 0), step]), axis=0)[0] for step in ((1, 0), (0, 1)))
+    assert x_scale[0] == pytest.approx(y_scale[1])
+
+
+def test_positions_that_do_not_assemble_leave_a_gap_and_poles_cut_the_line() -> None:
+    shown = view(thesis())
+    panel = composed(thesis(), "torque").axes[0]
+    curve = panel.lines[1]
+    closed = np.degrees(shown.sweep.theta_2[~shown.sweep.assembled])
+    assert closed.size > 30
+    at_closed = np.isin(curve.get_xdata(), closed)
+    assert np.all(np.isnan(curve.get_ydata()[at_closed]))
+    (pole,) = poles(shown)
+    # the torque of bar 4 diverges where omega_4 changes sign, bars 2 and 3 being in line
+    assert shown.sweep.omega_4[pole] * shown.sweep.omega_4[pole + 1] < 0
+    assert shown.sweep.torque[pole] * shown.sweep.torque[pole + 1] < 0
+    assert np.isnan(broken(shown.sweep.torque, np.array([pole]))[pole + 1])
+    _, top = panel.get_ylim()
+    assert top < np.nanmax(np.abs(shown.sweep.torque))
+    caption = " ".join(
+        t.get_text() for t in composed(thesis(), "torque").findobj(lambda artist: isinstance(artist, Text))
+    )
+    assert "Torque clipped at" in caption.replace("\n", " ")
+
+
+def test_an_ordinary_curve_is_not_clipped() -> None:
+    assert limit_of([np.sin(np.linspace(0, 6, 100))]) is None
+    assert limit_of([1.0 / np.linspace(-1, 1, 100)]) is not None
+    assert limit_of([np.full(3, np.nan)]) is None
+
+
+def test_transmission_angle_marks_limits_and_dead_centres() -> None:
+    panel = composed(thesis(), "transmission").axes[0]
+    marks = {line.get_label(): np.sort(line.get_xdata()) for line in panel.lines if line.get_marker() in "sD"}
+    d, a, b, c = thesis().linkage.lengths
+    # bars 3 and 4 folded: |b - c| between A and O4; bars 2 and 3 in line on the sweep: c seen from O2 at b - a or a + b
+    limit = math.degrees(math.acos((a * a + d * d - (b - c) ** 2) / (2 * a * d)))
+    assert marks["limit"] == pytest.approx(np.sort([45 - limit, 45 + limit]), abs=1e-9)
+    inner = math.degrees(math.acos(((b - a) ** 2 + d * d - c * c) / (2 * (b - a) * d)))
+    expected = {round(45 + s * inner + 180, 6) % 360 for s in (1, -1)}
+    assert len(marks["dead centre"]) == 1
+    assert min(abs(marks["dead centre"][0] - e) for e in expected) < 0.05  # linear between positions 1 deg apart
+
+
+@pytest.mark.parametrize("drive_bar", (2, 3, 4))
+def test_free_bodies_balance(drive_bar: int) -> None:
+    effects = (fourbar.Gravity(), fourbar.Viscous.at(A=0.02, O4=0.01), fourbar.Friction.at(B=0.03))
+    shown = view(crank_rocker(drive_bar=drive_bar, effects=effects))
+    state = shown.state()
+    for bar in (2, 3, 4):
+        arrows, couples = free_body(shown, state, bar)
+        forces = np.array([arrow.force for arrow in arrows])
+        assert np.abs(forces.sum(axis=0)).max() <= BALANCE * np.abs(forces).max()
+        moments = [a.at[0] * a.force[1] - a.at[1] * a.force[0] for a in arrows] + [c.moment for c in couples]
+        assert abs(sum(moments)) <= BALANCE * max(map(abs, moments))
+        assert any(c.text == f"$T_{bar}$" for c in couples) == (bar == drive_bar)
+
+
+def test_a_scene_without_velocity_draws_positions_only(tmp_path: Path) -> None:
+    scene = crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.0, 6.0, 30)))
+    plot.draw(scene, tmp_path / "a.svg")
+    with pytest.raises(InputError, match="omega_2"):
+        plot.draw(scene, tmp_path / "b.svg", "torque")
+    assert not (tmp_path / "b.svg").exists()
+
+
+def test_hostile_titles_are_text(tmp_path: Path) -> None:
+    title = "$\\frac{ <script>alert(1)</script> & \x1b[31m\u2028 %s {0} " + 300 * "x"
+    plot.draw(replace(crank_rocker(), title=title), tmp_path / "a.svg", "linkage")
+    assert "<script" not in (tmp_path / "a.svg").read_text(encoding="utf-8")
+    assert len(plain(title, 50)) == 50
+
+
+@pytest.mark.parametrize(
+    ("name", "options"),
+    [("a.bmp", {}), ("a.png", {"figure": "pie"}), ("a.png", {"branches": "all"})],
+)
+def test_what_is_not_allowed_is_named(tmp_path: Path, name: str, options: dict[str, str]) -> None:
+    with pytest.raises(InputError, match="must"):
+        plot.draw(crank_rocker(), tmp_path / name, **options)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_position_that_does_not_assemble_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(NotAssembledError, match="45 deg"):
+        plot.draw(thesis(), tmp_path / "a.png", "linkage", position=math.radians(45.0))
+
+
+def test_the_settings_of_the_reader_are_left_alone(tmp_path: Path) -> None:
+    import matplotlib as mpl
+
+    before = dict(mpl.rcParams)
+    plot.draw(crank_rocker(), tmp_path / "a.svg", "torque")
+    assert dict(mpl.rcParams) == before
+
+
+def test_matplotlib_is_loaded_only_to_draw_and_its_absence_is_one_line(tmp_path: Path) -> None:
+    code = (
+        "import sys, fourbar.plot, fourbar.animate\n"
+        "assert 'matplotlib' not in sys.modules\n"
+        "sys.modules['matplotlib'] = None\n"
+        "from tests.scenes import crank_rocker\n"
+        "try:\n"
+        "    fourbar.plot.draw(crank_rocker(), sys.argv[1])\n"
+        "except fourbar.errors.DependencyError as error:\n"
+        "    print(error)\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code, str(tmp_path / "a.png")], capture_output=True, text=True, check=True
+    )
+    assert done.stdout.strip() == 'drawing needs matplotlib: pip install "fourbar[plot]"'
+    assert issubclass(DependencyError, fourbar.FourBarError)
+
+
+@pytest.mark.parametrize(
+    ("value", "shown"),
+    [(0.0, "0"), (-1234.6, "−1235"), (0.012345, "0.0123"), (3.09312, "3.09"), (2.5e7, "2.50·10^7")],
+)
+def test_numbers_have_three_digits(value: float, shown: str) -> None:
+    assert number(value) == shown
+
+
+def test_units_get_the_prefix_that_suits() -> None:
+    assert unit_for(0.94, "N m") == (1e3, "mN m")
+    assert unit_for(15218.0, "N m") == (1e-3, "kN m")
+    assert unit_for(0.0, "N") == (1.0, "N")
