@@ -23,7 +23,7 @@ class BearingLoad(NamedTuple):
     """theta_2 of the largest load, rad."""
 
 
-def _force_of(solution: Solution, name: str) -> Array:
+def _evaluated(solution: Solution, name: str) -> Array:
     force: Array | None = getattr(solution, name)
     if force is None:
         raise InputError("solution", name, "was not evaluated: solve up to the stage 'force'")
@@ -32,7 +32,7 @@ def _force_of(solution: Solution, name: str) -> Array:
 
 def shaking_force(solution: Solution) -> Array:
     """Force of the bars on the frame, F21 + F41 = -(F12 + F14), N, (n, 2) (Norton, ch. 11)."""
-    return -(_force_of(solution, "F12") + _force_of(solution, "F14"))
+    return -(_evaluated(solution, "F12") + _evaluated(solution, "F14"))
 
 
 def shaking_moment(linkage: FourBar, solution: Solution) -> Array:
@@ -41,21 +41,21 @@ def shaking_moment(linkage: FourBar, solution: Solution) -> Array:
     Couples that effects exert between the bars and ground (pin damping or friction at O2, O4)
     are not part of it.
     """
-    F14, torque = _force_of(solution, "F14"), _force_of(solution, "torque")
+    F14, torque = _evaluated(solution, "F14"), _evaluated(solution, "torque")
     x, y = linkage.ground * np.cos(linkage.ground_angle), linkage.ground * np.sin(linkage.ground_angle)
     return -torque - (x * F14[:, 1] - y * F14[:, 0])
 
 
 def drive_power(solution: Solution) -> Array:
     """T_k omega_k, W, (n,)."""
-    return _force_of(solution, "torque") * _force_of(solution, f"omega_{solution.drive_bar}")
+    return np.asarray(_evaluated(solution, "torque") * _evaluated(solution, f"omega_{solution.drive_bar}"))
 
 
 def bearing_load(solution: Solution, pin: str) -> BearingLoad:
     """Largest and root mean square load of pin "O2", "A", "B" or "O4", and where; NaN positions are left out."""
     if pin not in PIN_FORCE:
         raise InputError("pin", pin, "the pins are " + ", ".join(PIN_FORCE))
-    load = np.hypot(*_force_of(solution, PIN_FORCE[pin]).T)
+    load = np.hypot(*_evaluated(solution, PIN_FORCE[pin]).T)
     theta_2 = solution.theta_2
     if len(load) > 1 and np.isclose(abs(theta_2[-1] - theta_2[0]), 2.0 * np.pi, rtol=1e-12, atol=0.0):
         load, theta_2 = load[:-1], theta_2[:-1]

@@ -81,8 +81,9 @@ def test_needs_no_driving_torque() -> None:
     assert np.abs(s.torque).max() < 1e-12 * 9.81 * 1.1  # of all the weights at one metre
 
 
-def test_stops_at_a_limit_unless_told_to_follow() -> None:
-    linkage = fourbar.FourBar(0.3, fourbar.Bar(0.2, 0.2), fourbar.Bar(0.12, 0.5), fourbar.Bar(0.22, 0.4))
+@pytest.mark.parametrize("coupler", [0.12, 0.15])  # the first has a change point, the second a limit position only
+def test_stops_at_a_limit_unless_told_to_follow(coupler: float) -> None:
+    linkage = fourbar.FourBar(0.3, fourbar.Bar(0.2, 0.2), fourbar.Bar(coupler, 0.5), fourbar.Bar(0.22, 0.4))
     times = np.linspace(0.0, 5.0, 101)
     halted = release(linkage, (fourbar.Gravity(),), 1.0, 0.0, 1, times)
     assert halted.stopped_at is not None and halted.time[-1] <= halted.stopped_at < 5.0
