@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 import fourbar
+from fourbar.kinematics import Array
 
 UNKNOWNS = ("F12x", "F12y", "F32x", "F32y", "F23x", "F23y", "F43x", "F43y", "F14x", "F14y", "F34x", "F34y", "T4")
 LENGTHS = (20.0, 48.0, 55.0, 20.0)
@@ -36,7 +37,7 @@ def to_ours(theta: float) -> float:
     return math.remainder(theta + math.pi, 2.0 * math.pi)
 
 
-def motion(theta_2: float | np.ndarray, branch: int = 1) -> fourbar.Solution:
+def motion(theta_2: Array, branch: int = 1) -> fourbar.Solution:
     """Position to accelerations of the model mechanism by our formulas, SI."""
     d, a, b, c = (0.01 * length for length in LENGTHS)
     bars = (fourbar.Bar(a, centre=(0.765, 0.0)), fourbar.Bar(b), fourbar.Bar(c))
