@@ -43,7 +43,7 @@ def shaking_moment(linkage: FourBar, solution: Solution) -> Array:
     """
     F14, torque = _evaluated(solution, "F14"), _evaluated(solution, "torque")
     x, y = linkage.ground * np.cos(linkage.ground_angle), linkage.ground * np.sin(linkage.ground_angle)
-    return -torque - (x * F14[:, 1] - y * F14[:, 0])
+    return np.asarray(-torque - (x * F14[:, 1] - y * F14[:, 0]))
 
 
 def drive_power(solution: Solution) -> Array:
