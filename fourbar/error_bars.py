@@ -10,9 +10,11 @@ import math
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from itertools import count
+from typing import Any
 
 import numpy as np
 
+from fourbar.effects import Gravity, Load
 from fourbar.errors import InputError
 from fourbar.kinematics import Array, State, add_accelerations, add_velocities, close_loop
 from fourbar.kinetostatics import PinForces, Term, solve_pins
@@ -22,7 +24,8 @@ from fourbar.more_digits import rounded
 
 EVALUATIONS = 8
 """With fewer, all of them may by chance come out as far off as the answer itself."""
-LAST_DIGIT = 2.0**-52
+LAST_DIGIT = 1.01 * 2.0**-53
+"""Relative: x + x LAST_DIGIT is the next double, whatever x."""
 LAST_ROUNDING = 2.0**-55
 """A typical error of rounding to nearest, whose largest is 2^-53."""
 TYPICAL = 0.5
@@ -38,51 +41,80 @@ def error_bars(state: State, pins: PinForces, terms: Iterable[Term], drive_bar: 
     terms, drive_bar : as given to `solve_pins`.
     """
     terms = tuple(terms)
-    if not isinstance(state.theta_2, np.ndarray):  # evaluated in more digits: the last rounding is all there is
-        sizes = [np.hypot(rounded(x), rounded(y)) for x, y in pins[:4]]
-        return {"torque_error": LAST_ROUNDING * np.abs(rounded(pins.torque)), "force_error": LAST_ROUNDING * np.max(sizes, axis=0)}
-    n = len(state.theta_2)
+    in_doubles = isinstance(state.theta_2, np.ndarray)
+    n = len(rounded(state.theta_2))
     torque, forces = np.zeros(n), np.zeros((4, n))
     runs = 0
     for run in range(EVALUATIONS):
         signs = _signs(run)
         try:
-            linkage = _moved(state.linkage, signs)
+            linkage = _moved_linkage(state.linkage, signs, lengths=in_doubles)
+            moved_terms = [_moved_term(term, signs) for term in terms]
+            if in_doubles:
+                moved = _moved_state(state, linkage, signs)
+                other = solve_pins(moved, moved_terms, drive_bar, growths=signs)
+            else:
+                other = solve_pins(replace(state, linkage=linkage), moved_terms, drive_bar)
         except InputError:  # the bars lie stretched out: moved, they cannot close anywhere
             continue
-        moved = _moved_state(state, linkage, signs)
-        other = solve_pins(moved, terms, drive_bar, factors=signs)
-        torque += (other.torque - pins.torque) ** 2
+        torque += rounded(other.torque - pins.torque) ** 2
         for total, before, after in zip(forces, pins[:4], other[:4], strict=True):
-            total += (after[0] - before[0]) ** 2 + (after[1] - before[1]) ** 2
+            total += rounded(after[0] - before[0]) ** 2 + rounded(after[1] - before[1]) ** 2
         runs += 1
     scale = TYPICAL / math.sqrt(max(runs, 1))
-    return {"torque_error": scale * np.sqrt(torque), "force_error": scale * np.sqrt(forces.max(axis=0))}
+    torque_error, force_error = scale * np.sqrt(torque), scale * np.sqrt(forces.max(axis=0))
+    sizes = [np.hypot(rounded(x), rounded(y)) for x, y in pins[:4]]
+    torque_error += LAST_ROUNDING * np.abs(rounded(pins.torque))
+    force_error += LAST_ROUNDING * np.max(sizes, axis=0)
+    return {"torque_error": torque_error, "force_error": force_error}
 
 
 def _signs(run: int) -> Iterator[float]:
-    """1 +- one last digit for input 1, 2, ...: a row of the Hadamard matrix, over and over."""
+    """+- one last digit for input 1, 2, ...: a row of the Hadamard matrix, over and over."""
     for column in count(1):
         bits = run & (column % EVALUATIONS or EVALUATIONS - 1)
-        yield 1.0 + LAST_DIGIT * (1.0 if bits.bit_count() % 2 else -1.0)
+        yield LAST_DIGIT if bits.bit_count() % 2 else -LAST_DIGIT
 
 
-def _moved(linkage: FourBar, signs: Iterator[float]) -> FourBar:
+def _next(value: Any, signs: Iterator[float]) -> Any:
+    """The next double, up or down."""
+    return value + value * next(signs)
+
+
+def _moved_linkage(linkage: FourBar, signs: Iterator[float], *, lengths: bool) -> FourBar:
+    """The linkage with the numbers of its bars changed in their last digit, and its lengths if asked."""
+    # bars that are equal stay equal
+    moved = {value: _next(value, signs) if lengths else value for value in dict.fromkeys(linkage.lengths)}
+
     def bar(old: Bar) -> Bar:
-        assert old.centre is not None
-        return replace(old, length=old.length * next(signs), centre=(old.centre[0] * next(signs), old.centre[1]))
+        assert old.centre is not None and old.inertia is not None
+        centre = (_next(old.centre[0], signs), _next(old.centre[1], signs))
+        return replace(old, length=moved[old.length], inertia=_next(old.inertia, signs), centre=centre)
 
-    ground = linkage.ground * next(signs)
-    return FourBar(ground, bar(linkage.input), bar(linkage.coupler), bar(linkage.output), linkage.ground_angle)
+    bars = (bar(linkage.input), bar(linkage.coupler), bar(linkage.output))
+    return FourBar(moved[linkage.ground], *bars, ground_angle=linkage.ground_angle)
 
 
 def _moved_state(state: State, linkage: FourBar, signs: Iterator[float]) -> State:
+    """The motion of the changed linkage at the same positions."""
     diagonal = diagonal_to_O4(linkage, state.theta_2, decide=False)
     exact = state.diagonal.decided
     # margins of 60 digits carry one rounding, not the cancellation of the lengths
-    diagonal.root[exact] = state.diagonal.root[exact] * next(signs)
+    diagonal.root[exact] = _next(state.diagonal.root[exact], signs)
     moved = close_loop(linkage, state.theta_2, state.branch, diagonal)
     moved.assembled, moved.singular = state.assembled, state.singular
     add_velocities(moved, state.omega_2)
     add_accelerations(moved, state.alpha_2)
     return moved
+
+
+def _moved_term(term: Any, signs: Iterator[float]) -> Any:
+    def pair(polar: tuple[float, float]) -> tuple[float, float]:
+        return (_next(polar[0], signs), _next(polar[1], signs))
+
+    if isinstance(term, Load):
+        force = None if term.force is None else pair(term.force)
+        return replace(term, force=force, at=pair(term.at), moment=_next(term.moment, signs))
+    if isinstance(term, Gravity):
+        return Gravity(*pair((term.magnitude, term.angle)))
+    return term

@@ -65,7 +65,7 @@ def between(m_u: Array, m_v: Array, u: Vector, v: Vector, sine: Array) -> Vector
 
 
 def solve_pins(
-    state: State, terms: Iterable[Term], drive_bar: int, *, inertia: bool = True, factors: Iterator[float] | None = None
+    state: State, terms: Iterable[Term], drive_bar: int, *, inertia: bool = True, growths: Iterator[float] | None = None
 ) -> PinForces:
     """Pin forces and driving torque for the terms that act.
 
@@ -78,10 +78,10 @@ def solve_pins(
     terms : loads and effects.
     drive_bar : 2, 3 or 4.
     inertia : False leaves out -m a and -I alpha (statics).
-    factors : multipliers of the terms, for the error bars.
+    growths : relative changes of the terms, for the error bars.
     """
     _, a, b, c = state.linkage.lengths
-    wrenches = Wrenches(state, factors)
+    wrenches = Wrenches(state, growths)
     if inertia:
         add_inertia(wrenches, state)
     for term in terms:

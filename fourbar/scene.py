@@ -14,7 +14,7 @@ from fourbar.errors import InputError
 from fourbar.kinematics import Array, State, Vector, add_accelerations, add_velocities, centre_in_bar, close_loop
 from fourbar.kinetostatics import solve_pins
 from fourbar.linkage import MOVING_BARS, FourBar, require
-from fourbar.margins import diagonal_to_O4, limit_remainder
+from fourbar.margins import U, diagonal_to_O4, limit_remainder
 from fourbar.mobility import default_range, limit_positions, on_smooth_path
 from fourbar.more_digits import needing_more_digits, restated, rounded
 from fourbar.solution import NOT_ASSEMBLED, OK, SINGULAR, STAGE_OF, STAGES, VECTORS, Solution, Unwrapped
@@ -287,7 +287,10 @@ def _solve_block(
         _put(out[name], value)
     if (hard := needing_more_digits(state)).size:
         for name, value in _evaluate(scene, *restated(state, *motion, hard), wanted, out):
+            # what doubles lost is lost again, 53 bits further down
+            left = out[name][hard] * U if STAGE_OF[name] == "error" else 0.0
             _put(out[name], value, hard)
+            out[name][hard] += left
     if state.assembled.all() and not state.singular.any():
         return OK
     return np.where(state.assembled, np.where(state.singular, SINGULAR, OK), NOT_ASSEMBLED).astype(np.uint8)

@@ -235,7 +235,7 @@ def judge(scene: Scene, tally: Tally, sample: str) -> None:
             size = abs(float(values[component].mid()))
             if name.startswith("theta"):
                 error, size = math.remainder(float(error), 2.0 * math.pi), 1.0
-            errors[component] = abs(float(error))
+            errors[component] = abs(float(error)) if values[component].rad() < abs(error) else 0.0
             allowed = FACTOR * EPS * (size + sensitivity[component])
             ratio = 0.0 if errors[component] == 0.0 else errors[component] / allowed if allowed else math.inf
             tally.worst[component] = max(tally.worst.get(component, (0.0, "")), (ratio, sample))

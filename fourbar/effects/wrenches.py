@@ -11,13 +11,13 @@ from fourbar.kinematics import Array, State, Vector, cross
 class Wrenches:
     """Sums of forces (N, world axes) and of moments (N m) about the first pin (O2, A, O4) of bars 2, 3, 4.
 
-    A bar on which nothing acts keeps the number 0.0: its term is never evaluated. With `factors`
-    each term is multiplied by the next of them (the error bars move every term by its last digit).
+    A bar on which nothing acts keeps the number 0.0: its term is never evaluated. With `growths`
+    each term grows by the next of them (the error bars move every term by its last digit).
     """
 
-    def __init__(self, state: State, factors: Iterator[float] | None = None) -> None:
+    def __init__(self, state: State, growths: Iterator[float] | None = None) -> None:
         self.state = state
-        self.factors = factors
+        self.growths = growths
         self.force_x: dict[int, Any] = {2: 0.0, 3: 0.0, 4: 0.0}
         self.force_y: dict[int, Any] = {2: 0.0, 3: 0.0, 4: 0.0}
         self.moments: dict[int, Any] = {2: 0.0, 3: 0.0, 4: 0.0}
@@ -46,6 +46,6 @@ class Wrenches:
         return value if np.shape(value) else np.broadcast_to(float(value), self.state.theta_2.shape)  # type: ignore[no-any-return]
 
     def _plus(self, total: Array | float, term: Array | float) -> Array | float:
-        if self.factors is not None:
-            term = next(self.factors) * term
+        if self.growths is not None:
+            term = term + next(self.growths) * term
         return term if isinstance(total, float) and total == 0.0 else total + term
