@@ -1,0 +1,288 @@
+"""Scene files: TOML with units <-> Scene, checked entry by entry.
+
+Numbers are rounded once when they are read; what is written reads back bit for bit.
+"""
+
+import json
+import math
+import stat
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fourbar.effects import REGISTRY, Load
+from fourbar.entries import Reader
+from fourbar.errors import InputError
+from fourbar.kinematics import Array
+from fourbar.linkage import BAR_NAMES, MOVING_BARS, Bar, FourBar
+from fourbar.scene import CROSSED, OPEN, Free, FromLimit, Motion, Scene, Sweep
+from fourbar.writing import write_text
+
+__all__ = ["dump", "load", "loads", "read_text", "save"]
+
+LARGEST_FILE = 1_000_000
+"""Bytes; a scene takes about a thousand."""
+MOST_STEPS = 100_000_000
+"""The bound that Sweep and Free hold."""
+MOST_LOADS = 1000
+"""Each load is a term at every position."""
+BRANCHES = {"open": OPEN, "crossed": CROSSED}
+THROUGH = ("sign", "follow")
+BARS = {BAR_NAMES[number]: number for number in MOVING_BARS}
+
+
+def load(path: str | Path) -> Scene:
+    """The scene of a TOML file.
+
+    Raises InputError, in one line with file, key, value and what is allowed, for a file that is
+    missing, not a file, too large, not text or not TOML, and for every entry that is wrong.
+    """
+    return loads(read_text(path), str(path))
+
+
+def read_text(path: str | Path) -> str:
+    """The text of a scene file; its size is looked at before it is read."""
+    file = Path(path)
+
+    def refuse(allowed: str) -> InputError:
+        return InputError("scene file", str(path), allowed)
+
+    try:
+        about = file.stat()
+        if stat.S_ISDIR(about.st_mode):
+            raise refuse("is a directory; must be a TOML file")
+        if not stat.S_ISREG(about.st_mode):
+            raise refuse("must be an ordinary file")
+        if about.st_size > LARGEST_FILE:
+            raise refuse(f"has {about.st_size} bytes; must not exceed {LARGEST_FILE}")
+        with file.open("rb") as opened:
+            data = opened.read(LARGEST_FILE + 1)
+    except FileNotFoundError:
+        raise refuse("there is no such file") from None
+    except (OSError, ValueError) as error:  # ValueError: a NUL in the name
+        raise refuse(f"cannot be read: {getattr(error, 'strerror', None) or error}") from None
+    if len(data) > LARGEST_FILE:
+        raise refuse(f"must not exceed {LARGEST_FILE} bytes")
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise refuse(f"must be UTF-8 text; byte {error.start} is not") from None
+
+
+def loads(text: str, name: str = "scene") -> Scene:
+    """The scene that a TOML text describes; `name` stands for the file in errors."""
+    shown = name if name.isprintable() else repr(name)
+    try:
+        document = tomllib.loads(text)
+    except RecursionError:
+        raise InputError("TOML", "...", "is nested too deeply", shown) from None
+    except ValueError as error:  # TOMLDecodeError, and numbers that Python refuses
+        raise InputError("TOML", text[:40], f"cannot be read: {' '.join(str(error).split())[:120]}", shown) from None
+    try:
+        return _scene(Reader(shown), document)
+    except InputError as error:
+        raise (error if error.file else error.in_file(shown)) from None
+
+
+def _scene(read: Reader, document: dict[str, Any]) -> Scene:
+    top = read.table("", document, ("title", "source", "lengths", "bars", "motion", "drive", "loads", "effects"))
+    linkage = _linkage(read, top)
+    drive = read.table("drive", top.get("drive", {}), ("bar",))
+    entries = top.get("loads", [])
+    if not isinstance(entries, list) or len(entries) > MOST_LOADS:
+        raise read.refuse("loads", entries, f"must be written as [[loads]], at most {MOST_LOADS}")
+    effects = read.table("effects", top.get("effects", {}), REGISTRY)
+    return Scene(
+        linkage,
+        _motion(read, top.get("motion", {})),
+        read.whole("drive.bar", drive.get("bar", 2), 2, 4),
+        tuple(_load(read, f"loads[{index}]", entry) for index, entry in enumerate(entries)),
+        tuple(REGISTRY[key].read(value, read) for key, value in effects.items()),
+        read.text("title", top.get("title", "")),
+        read.text("source", top.get("source", "")),
+    )
+
+
+def _linkage(read: Reader, top: dict[str, Any]) -> FourBar:
+    lengths = read.table("lengths", top.get("lengths", {}), (*BAR_NAMES.values(), "ground_angle"))
+    length = {
+        name: read.quantity(f"lengths.{name}", lengths.get(name), "m", positive=True) for name in BAR_NAMES.values()
+    }
+    tables = read.table("bars", top.get("bars", {}), BARS)
+    bars = {name: _bar(read, f"bars.{name}", tables.get(name, {}), length[name]) for name in BARS}
+    angle = read.quantity("lengths.ground_angle", lengths.get("ground_angle", "0 rad"), "rad")
+    try:
+        return FourBar(length["ground"], bars["input"], bars["coupler"], bars["output"], angle)
+    except OverflowError:
+        raise read.refuse("lengths", lengths, "must have a finite sum") from None
+
+
+def _bar(read: Reader, key: str, value: object, length: float) -> Bar:
+    entry = read.table(key, value, ("mass", "inertia", "centre"))
+    mass = read.quantity(f"{key}.mass", entry.get("mass", "0 kg"), "kg", at_least_zero=True)
+    inertia = centre = None
+    if "inertia" in entry:
+        inertia = read.quantity(f"{key}.inertia", entry["inertia"], "kg m^2", at_least_zero=True)
+    elif not math.isfinite(mass * length * length):
+        raise read.refuse(f"{key}.mass", entry.get("mass"), "must leave the inertia m L^2/12 a finite number")
+    if "centre" in entry:
+        centre = read.polar(f"{key}.centre", entry["centre"], "m")
+    return Bar(length, mass, inertia, centre)
+
+
+def _motion(read: Reader, value: object) -> Motion:
+    entry = read.table("motion", value, ("theta_2", "omega_2", "alpha_2", "branch", "through", "free"))
+    free = None
+    if "free" in entry:
+        released = read.table("motion.free", entry["free"], ("duration", "steps"))
+        duration = read.quantity("motion.free.duration", released.get("duration"), "s", positive=True)
+        free = Free(duration, read.whole("motion.free.steps", released.get("steps"), 1, MOST_STEPS))
+    omega_2 = None
+    if "omega_2" in entry:
+        omega_2 = read.quantity("motion.omega_2", entry["omega_2"], "rad/s")
+    return Motion(
+        _theta_2(read, entry["theta_2"]) if "theta_2" in entry else None,
+        omega_2,
+        read.quantity("motion.alpha_2", entry.get("alpha_2", "0 rad/s^2"), "rad/s^2"),
+        BRANCHES[read.choice("motion.branch", entry.get("branch", "open"), BRANCHES)],
+        read.choice("motion.through", entry.get("through", "sign"), THROUGH),
+        free,
+    )
+
+
+def _theta_2(read: Reader, value: object) -> float | Array | Sweep | FromLimit:
+    key = "motion.theta_2"
+    if isinstance(value, str):
+        return read.quantity(key, value, "rad")
+    if isinstance(value, list) and value:
+        return np.array([read.quantity(f"{key}[{index}]", angle, "rad") for index, angle in enumerate(value)])
+    if not isinstance(value, dict):
+        raise read.refuse(
+            key, value, 'must be an angle like "135 deg", a list of angles, { from, to, steps } or { limit, offset }'
+        )
+    if "limit" in value or "offset" in value:
+        start = read.table(key, value, ("limit", "offset"))
+        offset = read.quantity(f"{key}.offset", start.get("offset", "0 rad"), "rad")
+        # four bars have at most four limit positions of the input; how many these have is not known here
+        return FromLimit(read.whole(f"{key}.limit", start.get("limit"), 1, 4), offset)
+    sweep = read.table(key, value, ("from", "to", "steps"))
+    ends = [read.quantity(f"{key}.{end}", sweep.get(end), "rad") for end in ("from", "to")]
+    return Sweep(ends[0], ends[1], read.whole(f"{key}.steps", sweep.get("steps"), 1, MOST_STEPS))
+
+
+def _load(read: Reader, key: str, value: object) -> Load:
+    entry = read.table(key, value, ("bar", "force", "at", "moment", "frame"))
+    if "force" not in entry and "moment" not in entry:
+        raise read.refuse(key, value, "must have a force, a moment or both")
+    if "at" in entry and "force" not in entry:
+        raise read.refuse(f"{key}.at", entry["at"], "belongs to a force, and there is none")
+    return Load(
+        read.whole(f"{key}.bar", entry.get("bar"), 2, 4),
+        read.polar(f"{key}.force", entry["force"], "N") if "force" in entry else None,
+        read.polar(f"{key}.at", entry["at"], "m") if "at" in entry else (0.0, 0.0),
+        read.quantity(f"{key}.moment", entry.get("moment", "0 N m"), "N m"),
+        read.choice(f"{key}.frame", entry.get("frame", "world"), ("world", "bar")),
+    )
+
+
+class Writer:
+    """Writes entries in SI and radians, every digit kept; effects write their own through it."""
+
+    def quantity(self, value: float, unit: str) -> str:
+        """A number with its unit."""
+        return f"{float(value)!r} {unit}"
+
+    def polar(self, magnitude: float, angle: float, unit: str) -> list[str]:
+        """A pair [magnitude, angle]."""
+        return [self.quantity(magnitude, unit), self.quantity(angle, "rad")]
+
+
+def save(scene: Scene, path: str | Path) -> None:
+    """Write a scene to a TOML file, whole or not at all."""
+    write_text(path, dump(scene))
+
+
+def dump(scene: Scene) -> str:
+    """The scene as TOML text, in SI and radians; `loads` gives the same numbers back, bit for bit.
+
+    Raises InputError for a scene that a file cannot hold: two effects of one kind, a title that is
+    no valid text.
+    """
+    write = Writer()
+    linkage, motion = scene.linkage, scene.motion
+    top = {"title": scene.title, "source": scene.source}
+    parts = [_table("", {key: value for key, value in top.items() if value})]
+    lengths: dict[str, Any] = {
+        BAR_NAMES[number]: write.quantity(length, "m") for number, length in enumerate(linkage.lengths, 1)
+    }
+    lengths["ground_angle"] = write.quantity(linkage.ground_angle, "rad")
+    parts.append(_table("lengths", lengths))
+    for name, number in BARS.items():
+        bar = linkage.bar(number)
+        if bar != Bar(bar.length):
+            assert bar.inertia is not None and bar.centre is not None
+            entry = {"mass": write.quantity(bar.mass, "kg"), "inertia": write.quantity(bar.inertia, "kg m^2")}
+            parts.append(_table(f"bars.{name}", {**entry, "centre": write.polar(*bar.centre, "m")}))
+    parts.append(_table("motion", _motion_entry(write, motion)))
+    parts.append(_table("drive", {"bar": scene.drive_bar}))
+    parts += [_table("[loads]", _load_entry(write, load)) for load in scene.loads]
+    effects = {effect.key: effect.write(write) for effect in scene.effects}
+    if len(effects) != len(scene.effects):
+        raise InputError("effects", [effect.key for effect in scene.effects], "a file holds one of each kind")
+    parts.append(_table("effects", effects))
+    return "\n".join(part for part in parts if part)
+
+
+def _motion_entry(write: Writer, motion: Motion) -> dict[str, Any]:
+    entry: dict[str, Any] = {}
+    asked = motion.theta_2
+    if isinstance(asked, Sweep):
+        ends = {"from": write.quantity(asked.start, "rad"), "to": write.quantity(asked.stop, "rad")}
+        entry["theta_2"] = {**ends, "steps": asked.steps}
+    elif isinstance(asked, FromLimit):
+        entry["theta_2"] = {"limit": asked.limit, "offset": write.quantity(asked.offset, "rad")}
+    elif isinstance(asked, np.ndarray):
+        entry["theta_2"] = [write.quantity(angle, "rad") for angle in asked.tolist()]
+    elif asked is not None:
+        entry["theta_2"] = write.quantity(asked, "rad")
+    if motion.omega_2 is not None:
+        entry["omega_2"] = write.quantity(motion.omega_2, "rad/s")
+    entry["alpha_2"] = write.quantity(motion.alpha_2, "rad/s^2")
+    entry["branch"] = next(name for name, sign in BRANCHES.items() if sign == motion.branch)
+    entry["through"] = motion.through
+    if motion.free is not None:
+        entry["free"] = {"duration": write.quantity(motion.free.duration, "s"), "steps": motion.free.steps}
+    return entry
+
+
+def _load_entry(write: Writer, load: Load) -> dict[str, Any]:
+    entry: dict[str, Any] = {"bar": load.bar}
+    if load.force is not None:
+        entry["force"] = write.polar(*load.force, "N")
+        entry["at"] = write.polar(*load.at, "m")
+    return {**entry, "moment": write.quantity(load.moment, "N m"), "frame": load.frame}
+
+
+def _table(name: str, entries: dict[str, Any]) -> str:
+    """One TOML table, nothing where it is empty."""
+    if not entries:
+        return ""
+    heading = f"[{name}]\n" if name else ""
+    return heading + "".join(f"{key} = {_value(key, value)}\n" for key, value in entries.items())
+
+
+def _value(key: str, value: object) -> str:
+    """A TOML value; strings escape as in JSON, and DEL too."""
+    if isinstance(value, dict):
+        return "{ " + ", ".join(f"{name} = {_value(key, entry)}" for name, entry in value.items()) + " }"
+    if isinstance(value, list):
+        return "[" + ", ".join(_value(key, entry) for entry in value) + "]"
+    if not isinstance(value, str):
+        return repr(value)
+    try:
+        value.encode("utf-8")
+    except UnicodeEncodeError:
+        raise InputError(key, value, "must be valid Unicode text") from None
+    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")

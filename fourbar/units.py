@@ -1,0 +1,103 @@
+"""Quantities as text, "48 cm" or "0.01 N m s/rad", to SI numbers: converted exactly, rounded once.
+
+The units are a short list rather than all that the units library knows, because the angle is a
+dimension here: rad/s is not 1/s, so neither Hz nor a forgotten "deg" slips through.
+"""
+
+import math
+import re
+from fractions import Fraction
+from functools import cache
+from typing import Any
+
+DEFINITIONS = """
+nano- = 1e-9 = n-
+micro- = 1e-6 = µ- = μ- = u-
+milli- = 1e-3 = m-
+centi- = 1e-2 = c-
+deci- = 1e-1 = d-
+kilo- = 1e3 = k-
+mega- = 1e6 = M-
+giga- = 1e9 = G-
+meter = [length] = m = metre
+inch = 0.0254 * meter = in
+foot = 0.3048 * meter = ft
+second = [time] = s = sec
+minute = 60 * second = min
+hour = 3600 * second = h
+gram = [mass] = g
+tonne = 1000 * kilogram = t
+pound = 0.45359237 * kilogram = lb
+ounce = pound / 16 = oz
+radian = [angle] = rad
+pi = 3.14159265358979323846264338327950288419716939937510582097494
+degree = pi / 180 * radian = deg = °
+revolution = 2 * pi * radian = rev = turn
+rpm = revolution / minute
+newton = kilogram * meter / second ** 2 = N
+standard_gravity = 9.80665 * meter / second ** 2 = g_0 = g0
+kilogram_force = kilogram * standard_gravity = kgf
+pound_force = pound * standard_gravity = lbf
+slug = pound_force * second ** 2 / foot
+"""
+"""pi to 60 digits, so that an angle given in degrees is rounded once."""
+
+NUMBER = re.compile(r"[+-]?(?:[0-9]{1,100}(?:\.[0-9]{0,100})?|\.[0-9]{1,100})(?:[eE][+-]?[0-9]{1,3})?(?![0-9.])")
+UNIT = re.compile(r"(?:[A-Za-zµμ°_]+(?:_?0(?![0-9]))?(?:(?:\^|\*\*)-?[1-9](?![0-9^*])|[²³])?|[·*/()]|\s)+")
+"""Names, each with at most one small exponent, and operators: nothing else reaches the parser, no tower of powers."""
+LONGEST_UNIT = 60
+
+
+class UnitError(ValueError):
+    """A text that is not a quantity of the asked dimension; says why in one phrase."""
+
+
+def to_si(text: str, unit: str) -> float:
+    """The number that `text` states, in `unit`, as the nearest double.
+
+    Raises UnitError where the text has no number, no unit, an unknown unit, or a unit of another
+    dimension than `unit`, and where the number does not fit into a double.
+    """
+    text = text.strip()
+    found = NUMBER.match(text)
+    if found is None:
+        raise UnitError("there is no finite number")
+    name = text[found.end() :].strip()
+    if not name:
+        raise UnitError("the unit is missing")
+    factor, dimension = _factor(name)
+    asked, asked_dimension = _factor(unit)
+    if dimension != asked_dimension:
+        raise UnitError(f'"{name}" does not convert to {unit}')
+    try:
+        value = float(Fraction(found[0]) * factor / asked)
+    except OverflowError:
+        value = math.inf
+    if not math.isfinite(value):
+        raise UnitError("the number is too large")
+    # Fraction has no -0.0
+    return -0.0 if value == 0.0 and found[0].startswith("-") else value
+
+
+@cache
+def _registry() -> Any:
+    import pint
+
+    registry: Any = pint.UnitRegistry(None, non_int_type=Fraction)
+    for line in DEFINITIONS.split("\n"):
+        if line:
+            registry.define(line)
+    return registry
+
+
+@cache
+def _factor(name: str) -> tuple[Fraction, dict[str, Fraction]]:
+    """What one of the unit is in base units, and its dimension."""
+    if len(name) > LONGEST_UNIT or not UNIT.fullmatch(name):
+        raise UnitError("the unit cannot be read")
+    registry = _registry()
+    try:
+        one = registry.Quantity(Fraction(1), registry.parse_units(name)).to_root_units()
+    except Exception:  # the parser of the library raises whatever its tokenizer and evaluator do
+        raise UnitError(f'the unit "{name}" is not known') from None
+    return Fraction(one.magnitude), dict(one.dimensionality)
