@@ -1,6 +1,7 @@
 """The moving linkage as a film: GIF through pillow, MP4 through ffmpeg."""
 
 import math
+import subprocess
 import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -46,10 +47,13 @@ def write_film(scene: Scene, path: Path, kind: str, seconds: float) -> None:
             writer = FFMpegWriter(fps=FRAMES_PER_SECOND, codec="h264", extra_args=["-pix_fmt", "yuv420p"])
         with tempfile.TemporaryDirectory() as folder:
             draft = Path(folder) / f"film.{kind}"
-            with writer.saving(figure, str(draft), DPI):
-                for index in order:
-                    move(index)
-                    writer.grab_frame()
+            try:
+                with writer.saving(figure, str(draft), DPI):
+                    for index in order:
+                        move(index)
+                        writer.grab_frame()
+            except (subprocess.CalledProcessError, BrokenPipeError):
+                raise DependencyError("this ffmpeg cannot encode H.264 (libx264); .gif and .html need none") from None
             write_bytes(path, draft.read_bytes())
 
 

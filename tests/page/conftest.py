@@ -1,0 +1,60 @@
+"""A headless Chromium, where the machine has one."""
+
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+DRIVER = shutil.which("chromedriver")
+FLAGS = (
+    "--headless",
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-quic",
+    "--disable-dev-shm-usage",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--hide-scrollbars",
+)
+
+
+@pytest.fixture(scope="session")
+def chromium(tmp_path_factory: pytest.TempPathFactory) -> Iterator:
+    """One browser for all tests of pages; each test opens its own page in it."""
+    if CHROMIUM is None or DRIVER is None:
+        pytest.skip("pages are tested in Chromium: install chromium and chromedriver (chromium-driver)")
+    from selenium import webdriver
+
+    options = webdriver.ChromeOptions()
+    for flag in (*FLAGS, f"--user-data-dir={tmp_path_factory.mktemp('chromium')}"):
+        options.add_argument(flag)
+    options.binary_location = CHROMIUM
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
+    driver = webdriver.Chrome(options=options, service=webdriver.ChromeService(DRIVER))
+    yield driver
+    driver.quit()
+
+
+@pytest.fixture
+def browse(chromium, tmp_path: Path):
+    """Opens page text at a width, light or dark; after the test the console must be empty."""
+
+    def open_page(text: str, width: int = 1100, *, dark: bool = False, still: bool = False):
+        path = tmp_path / "page.html"
+        path.write_text(text, encoding="utf-8")
+        metrics = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": False}
+        chromium.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
+        media = [
+            {"name": "prefers-color-scheme", "value": "dark" if dark else "light"},
+            {"name": "prefers-reduced-motion", "value": "reduce" if still else "no-preference"},
+        ]
+        chromium.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": media})
+        chromium.get(path.as_uri())
+        return chromium
+
+    yield open_page
+    assert chromium.get_log("browser") == []

@@ -1,0 +1,364 @@
+"""The moving page in a real browser, its picture and numbers against the formulas in Python."""
+
+import math
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import fourbar
+from fourbar import animate
+from tests.scenes import crank_rocker, thesis
+from tests.test_animate import HOSTILE, PNG, embedded
+
+pytest.importorskip("selenium", reason="pages are driven by selenium: pip install selenium")
+
+PRINTED = 6e-5
+"""Numbers are shown with five significant digits."""
+PRINTED_DEG = 6e-4
+"""Angles are shown with three decimals of a degree."""
+PIXEL = 0.01
+"""Coordinates in the picture are exact but for rounding; a hundredth of a pixel is far below what is seen."""
+RADIANS = 1e-9
+"""closeLoop in the page against fourbar, rad: the diagonal is a Math.hypot of rounded components, and the
+samples keep |sin mu| above 1e-4, where 30 roundings amount to less than 1e-10."""
+
+
+def number(text: str) -> float:
+    return float(text.replace("−", "-"))
+
+
+def shown(driver, *ids: str) -> list[float]:
+    return [number(driver.find_element("id", name).text) for name in ids]
+
+
+def pins(driver) -> dict[str, np.ndarray]:
+    """The pins as drawn, in lengths of the ground from O2 and in the plane's axes."""
+    script = """return Object.fromEntries(["O2", "A", "B", "O4"].map(name => {
+        const e = document.getElementById("pin-" + name);
+        return [name, [Number(e.getAttribute("cx")), -Number(e.getAttribute("cy"))]]; }));"""
+    found = {name: np.array(point) for name, point in driver.execute_script(script).items()}
+    return {name: point - found["O2"] for name, point in found.items()}
+
+
+def state_of(driver, expression: str):
+    return driver.execute_script(f"return {expression};")
+
+
+def type_length(driver, bar: int, value: float | str) -> None:
+    script = (
+        "const e = document.getElementById(arguments[0]); e.value = arguments[1]; e.dispatchEvent(new Event('input'))"
+    )
+    driver.execute_script(script, f"length-{bar}", str(value))
+
+
+def test_it_loads_and_shows_the_first_position(browse) -> None:
+    scene = crank_rocker()
+    driver = browse(animate.page(scene))
+    s = fourbar.solve(scene)
+    assert driver.title == "crank-rocker"
+    assert shown(driver, "theta_2", "theta_3", "theta_4") == pytest.approx(
+        np.degrees([s.theta_2[0], s.theta_3[0], s.theta_4[0]]), abs=PRINTED_DEG
+    )
+    assert shown(driver, "omega_3", "alpha_4", "torque", "F43_x", "F14_y") == pytest.approx(
+        [s.omega_3[0], s.alpha_4[0], s.torque[0], s.F43[0, 0], s.F14[0, 1]], rel=PRINTED
+    )
+
+
+def test_a_step_changes_the_numbers_by_the_right_amount(browse) -> None:
+    scene = crank_rocker()
+    driver = browse(animate.page(scene))
+    s = fourbar.solve(scene)
+    names = ("theta_2", "theta_3", "torque", "F12_x")
+    for clicks in (1, 2, 3):
+        before = shown(driver, *names)
+        driver.find_element("id", "forward").click()
+        after = shown(driver, *names)
+        k = clicks
+        expected = [
+            math.degrees(s.theta_2[k] - s.theta_2[k - 1]),
+            math.degrees(s.theta_3[k] - s.theta_3[k - 1]),
+            s.torque[k] - s.torque[k - 1],
+            s.F12[k, 0] - s.F12[k - 1, 0],
+        ]
+        assert np.subtract(after, before) == pytest.approx(expected, abs=2e-3)
+        assert np.subtract(after, before)[0] == pytest.approx(6.0, abs=2 * PRINTED_DEG)
+    driver.find_element("id", "back").click()
+    assert shown(driver, "torque")[0] == pytest.approx(s.torque[2], rel=PRINTED)
+    assert "torque" in state_of(driver, "document.getElementById('live').textContent")
+
+
+def test_play_moves_the_linkage_and_pause_leaves_true_numbers(browse) -> None:
+    scene = crank_rocker()
+    driver = browse(animate.page(scene))
+    start = pins(driver)["A"]
+    driver.find_element("id", "play").click()
+    assert driver.find_element("id", "play").text == "Pause"
+    deadline = time.monotonic() + 10.0
+    while state_of(driver, "row") < 4:
+        assert time.monotonic() < deadline, "the linkage does not move"
+    driver.find_element("id", "play").click()
+    row = state_of(driver, "row")
+    s = fourbar.solve(scene)
+    assert np.hypot(*(pins(driver)["A"] - start)) > 10
+    assert shown(driver, "torque", "omega_4") == pytest.approx([s.torque[row], s.omega_4[row]], rel=PRINTED)
+    drawn, ground = pins(driver), scene.linkage.ground
+    scale = np.hypot(*drawn["O4"]) / ground
+    np.testing.assert_allclose(drawn["A"], scale * s.A[row], atol=PIXEL)
+    np.testing.assert_allclose(drawn["B"], scale * s.B[row], atol=PIXEL)
+
+
+def clockwork(driver, ticks: int) -> list[int]:
+    """Play without waiting: frames 50 ms apart, and the row after each."""
+    script = """window.requestAnimationFrame = () => 0; play(true);
+        const rows = []; for (let i = 0; i < arguments[0]; i++) { frame(50 * i); rows.push(row); }
+        play(false); return rows;"""
+    return driver.execute_script(script, ticks)
+
+
+def test_an_input_that_turns_fully_goes_round_and_one_that_does_not_swings(browse) -> None:
+    driver = browse(animate.page(crank_rocker()))
+    rows = clockwork(driver, 241)  # 12 s: two sweeps
+    assert set(rows) == set(range(61)) or set(rows) == set(range(60))
+    assert sum(np.diff(rows) < 0) == 2
+    data = embedded(animate.page(thesis()))
+    driver = browse(animate.page(thesis()))
+    rows = clockwork(driver, 400)
+    closes = [k for k, v in enumerate(data["branches"]["1"]["theta_3"]) if v is not None and k >= 20]
+    assert (min(rows), max(rows)) == (min(closes), max(closes))
+    assert np.abs(np.diff(rows)).max() <= 4  # it never jumps
+
+
+def test_a_changed_length_redraws_by_the_formulas_and_hides_the_forces(browse) -> None:
+    scene = crank_rocker()
+    driver = browse(animate.page(scene))
+    driver.execute_script("go(7)")
+    type_length(driver, 3, 283.0)
+    changed = fourbar.FourBar(0.3, fourbar.Bar(0.1), fourbar.Bar(0.283), fourbar.Bar(0.22), ground_angle=0.2)
+    theta_2 = state_of(driver, "grid[row]")
+    s = fourbar.solve(fourbar.Scene(changed, fourbar.Motion(theta_2, 10.0, 5.0)))
+    assert math.remainder(theta_2 - fourbar.solve(scene).theta_2[7], 2 * math.pi) == pytest.approx(
+        0, abs=math.radians(0.51)
+    )
+    drawn = pins(driver)
+    scale = np.hypot(*drawn["O4"]) / 0.3
+    np.testing.assert_allclose(drawn["A"], scale * s.A[0], atol=PIXEL)
+    np.testing.assert_allclose(drawn["B"], scale * s.B[0], atol=PIXEL)
+    angles = shown(driver, "theta_3", "theta_4")
+    for angle, expected in zip(angles, (s.theta_3[0], s.theta_4[0]), strict=True):
+        assert math.remainder(angle - math.degrees(expected), 360.0) == pytest.approx(0, abs=PRINTED_DEG)
+    assert shown(driver, "omega_3", "omega_4", "alpha_3", "alpha_4") == pytest.approx(
+        [s.omega_3[0], s.omega_4[0], s.alpha_3[0], s.alpha_4[0]], rel=PRINTED
+    )
+    assert not driver.find_element("id", "torque").is_displayed()
+    assert not driver.find_element("id", "forces").is_displayed()
+    assert not driver.find_element("id", "arrow-F12").is_displayed()
+    assert driver.find_element("id", "edited").is_displayed()
+    driver.find_element("id", "original").click()
+    assert driver.find_element("id", "torque").is_displayed()
+    assert shown(driver, "theta_2")[0] == pytest.approx(math.degrees(fourbar.solve(scene).theta_2[7]), abs=PRINTED_DEG)
+
+
+@pytest.mark.parametrize("value", ("-1", "0", "5000", ""))
+def test_lengths_that_cannot_be_are_refused_and_the_picture_stays(browse, value: str) -> None:
+    driver = browse(animate.page(crank_rocker()))
+    before = pins(driver)
+    type_length(driver, 2, value)
+    assert driver.find_element("id", "length-error").is_displayed()
+    assert all(np.array_equal(before[name], point) for name, point in pins(driver).items())
+
+
+def test_the_formulas_of_the_page_agree_with_fourbar(browse) -> None:
+    driver = browse(animate.page(crank_rocker()))
+    rng = np.random.default_rng(5)
+    cases, expected = [], []
+    while len(cases) < 300:
+        lengths = np.exp(rng.uniform(-2, 2, 4))
+        theta_1, theta_2, sign = rng.uniform(-7, 7), rng.uniform(-7, 7), int(rng.choice([-1, 1]))
+        if 2 * lengths.max() >= lengths.sum():
+            continue
+        linkage = fourbar.FourBar(lengths[0], *(fourbar.Bar(v) for v in lengths[1:]), ground_angle=theta_1)
+        s = fourbar.solve(fourbar.Scene(linkage, fourbar.Motion(theta_2, 1.3, -0.7, branch=sign)))
+        if s.assembled[0] and s.condition[0] < 1e-4:
+            continue
+        cases.append([lengths.tolist(), theta_1, theta_2, sign])
+        expected.append(s)
+    script = """return arguments[0].map(([l, t1, t2, s]) => { const p = closeLoop(l, t1, t2, s);
+        return p && [p, rates(l, p, 1.3, -0.7)]; });"""
+    found = driver.execute_script(script, cases)
+    assert 50 < sum(p is not None for p in found) < 300
+    for answer, s in zip(found, expected, strict=True):
+        assert (answer is not None) == bool(s.assembled[0])
+        if answer is None:
+            continue
+        position, speed = answer
+        for name in ("theta_3", "theta_4"):
+            away = position[name.replace("_", "")] - getattr(s, name)[0]
+            assert abs(math.remainder(away, 2 * math.pi)) <= RADIANS
+        assert speed["omega3"] == pytest.approx(s.omega_3[0], rel=1e-6)
+        assert speed["alpha4"] == pytest.approx(s.alpha_4[0], rel=1e-6)
+
+
+def test_the_intervals_of_the_page_are_those_that_assemble(browse) -> None:
+    driver = browse(animate.page(crank_rocker()))
+    rng = np.random.default_rng(6)
+    kinds = set()
+    for _ in range(60):
+        lengths = rng.uniform(0.2, 1.0, 4)
+        if 2 * lengths.max() >= lengths.sum():
+            continue
+        linkage = fourbar.FourBar(lengths[0], *(fourbar.Bar(v) for v in lengths[1:]))
+        theta_2 = np.linspace(-math.pi, math.pi, 721)
+        closes = fourbar.solve(fourbar.Scene(linkage, fourbar.Motion(theta_2))).assembled
+        intervals = driver.execute_script("return closingIntervals(arguments[0])", lengths.tolist())
+        kinds.add((len(intervals), intervals[0][0] == 0.0))
+        inside = np.zeros_like(closes)
+        for low, high in intervals:
+            inside |= np.mod(theta_2 - low, 2 * math.pi) <= high - low
+        assert np.array_equal(inside, closes)
+    assert len(kinds) >= 3  # full turns, one interval and two have all been seen
+
+
+def test_the_branch_switches_the_picture_and_the_numbers(browse) -> None:
+    scene = crank_rocker()
+    driver = browse(animate.page(scene))
+    driver.execute_script("chooseBranch(-1)")
+    s = fourbar.solve(replace(scene, motion=replace(scene.motion, branch=-1)))
+    assert shown(driver, "torque", "F32_y") == pytest.approx([s.torque[0], s.F32[0, 1]], rel=PRINTED)
+    drawn = pins(driver)
+    np.testing.assert_allclose(drawn["B"], np.hypot(*drawn["O4"]) / 0.3 * s.B[0], atol=PIXEL)
+
+
+@pytest.mark.parametrize("scaling", ("sweep", "position"))
+def test_arrows_point_along_the_forces_to_the_scale_of_the_legend(browse, scaling: str) -> None:
+    scene = crank_rocker()
+    driver = browse(animate.page(scene))
+    choose = """const e = document.getElementById("arrow-scale"); e.value = arguments[0];
+        e.dispatchEvent(new Event("change")); go(50)"""
+    driver.execute_script(choose, scaling)
+    s = fourbar.solve(scene)
+    script = """const shaft = document.getElementById("arrow-" + arguments[0]), n = k => Number(shaft.getAttribute(k));
+        const tip = shaft.nextElementSibling.getAttribute("d").match(/M(\\S+) ([^L]+)/);
+        return [Number(tip[1]) - n("x1"), n("y1") - Number(tip[2])];"""
+    length = """const e = document.querySelector("#force-scale line");
+        return Number(e.getAttribute("x2")) - Number(e.getAttribute("x1"))"""
+    bar = driver.execute_script(length)
+    newtons = float(driver.find_element("css selector", "#force-scale text").text.split()[0])
+    for name in ("F12", "F32", "F43", "F14"):
+        drawn = np.array(driver.execute_script(script, name))
+        np.testing.assert_allclose(drawn, getattr(s, name)[50] * bar / newtons, atol=PIXEL)
+
+
+def test_keyboard_drives_it(browse) -> None:
+    from selenium.webdriver.common.action_chains import ActionChains
+    from selenium.webdriver.common.keys import Keys
+
+    driver = browse(animate.page(crank_rocker()))
+    press = lambda *keys: ActionChains(driver).send_keys(*keys).perform()  # noqa: E731
+    press(Keys.ARROW_RIGHT, Keys.ARROW_RIGHT, Keys.ARROW_LEFT, Keys.ARROW_RIGHT)
+    assert state_of(driver, "row") == 2
+    press(Keys.SPACE)
+    assert state_of(driver, "playing")
+    press(Keys.SPACE)
+    assert not state_of(driver, "playing")
+    press(Keys.HOME)
+    assert state_of(driver, "row") == 0
+    press("b")
+    assert state_of(driver, "branch") == 1  # single letters act only on the picture in focus
+    driver.execute_script("document.getElementById('picture').focus()")
+    press("b", "f")
+    assert state_of(driver, "branch") == -1
+    assert not state_of(driver, "document.getElementById('show-forces').checked")
+    assert not driver.find_element("id", "arrow-F12").is_displayed()
+    order = []
+    driver.execute_script("document.body.tabIndex = -1; document.body.focus()")
+    for _ in range(6):
+        press(Keys.TAB)
+        order.append(state_of(driver, "document.activeElement.id"))
+    assert order == ["", "picture", "play", "back", "forward", "reset"]  # first the link that skips to the controls
+
+
+def test_every_control_has_a_name(browse) -> None:
+    driver = browse(animate.page(crank_rocker()))
+    controls = driver.find_elements("css selector", "button, select, input, [role=img]")
+    assert len(controls) > 15
+    for control in (c for c in controls if c.is_displayed()):
+        assert control.accessible_name.strip(), control.get_attribute("id")
+    driver.execute_script("go(3)")
+    assert driver.find_element("id", "theta").get_attribute("aria-valuetext").endswith("degrees")
+
+
+@pytest.mark.parametrize("dark", (False, True))
+@pytest.mark.parametrize("scene", (crank_rocker(), thesis()), ids=("crank-rocker", "thesis"))
+def test_at_360_pixels_nothing_sticks_out_and_all_text_is_readable(browse, scene: fourbar.Scene, dark: bool) -> None:
+    driver = browse(animate.page(scene), 360, dark=dark)
+    assert state_of(driver, "document.documentElement.scrollWidth") <= 360
+    assert state_of(driver, "document.getElementById('picture').getBoundingClientRect().width") > 300
+    for control in driver.find_elements("css selector", "button, select, input[type=number], input[type=range]"):
+        if control.is_displayed():
+            assert control.size["height"] >= 40  # large enough for a finger
+    script = """return [...document.querySelectorAll("body *")]
+        .filter(e => [...e.childNodes].some(c => c.nodeType === 3 && c.textContent.trim()))
+        .filter(e => e.checkVisibility() && !e.closest("svg, noscript, script, [disabled]"))
+        .map(e => { let ground = e;
+            while (getComputedStyle(ground).backgroundColor === "rgba(0, 0, 0, 0)") ground = ground.parentElement;
+            const colours = [getComputedStyle(e).color, getComputedStyle(ground).backgroundColor];
+            return [...colours, e.textContent.trim().slice(0, 30)]; })"""
+    seen = driver.execute_script(script)
+    assert len(seen) > 40
+    for colour, ground, text in seen:
+        assert contrast(colour, ground) >= 4.5, (text, colour, ground)  # WCAG AA
+    page = luminance(state_of(driver, "getComputedStyle(document.body).backgroundColor"))
+    assert page < 0.05 if dark else page > 0.9
+
+
+def luminance(colour: str) -> float:
+    parts = [int(v) / 255 for v in colour[colour.index("(") + 1 : -1].split(",")[:3]]
+    linear = [v / 12.92 if v <= 0.03928 else ((v + 0.055) / 1.055) ** 2.4 for v in parts]
+    return float(np.dot([0.2126, 0.7152, 0.0722], linear))
+
+
+def contrast(first: str, second: str) -> float:
+    low, high = sorted((luminance(first), luminance(second)))
+    return (high + 0.05) / (low + 0.05)
+
+
+def test_hostile_titles_do_nothing_but_appear(browse) -> None:
+    driver = browse(animate.page(replace(crank_rocker(), title=HOSTILE)))
+    assert "<script>alert(1)</script>" in driver.find_element("css selector", "h1").text
+    driver.find_element("id", "forward").click()
+    assert state_of(driver, "row") == 1
+
+
+def test_a_picture_lies_along_its_bar(browse, tmp_path: Path) -> None:
+    (tmp_path / "bar.png").write_bytes(PNG)
+    driver = browse(animate.page(crank_rocker(), {"output": tmp_path / "bar.png"}))
+    driver.execute_script("go(9)")
+    length = state_of(driver, "Number(document.getElementById('picture-4').getAttribute('width'))")
+    drawn = pins(driver)
+    assert length == pytest.approx(np.hypot(*(drawn["B"] - drawn["O4"])))
+    turn = driver.find_element("id", "picture-4").get_attribute("transform")
+    angle = float(turn[turn.index("rotate(") + 7 : -1])
+    assert math.remainder(angle + math.degrees(fourbar.solve(crank_rocker()).theta_4[9]), 360) == pytest.approx(
+        0, abs=1e-6
+    )
+
+
+def test_with_reduced_motion_it_moves_twice_a_second(browse) -> None:
+    driver = browse(animate.page(crank_rocker()), still=True)
+    script = """window.requestAnimationFrame = () => 0; play(true); const seen = new Set();
+        const x = () => document.getElementById("pin-A").getAttribute("cx");
+        for (let i = 0; i < 60; i++) { frame(10000 + 50 * i); seen.add(x()); }
+        play(false); return seen.size;"""
+    assert 4 <= driver.execute_script(script) <= 8  # 3 s
+
+
+def test_positions_alone_show_no_dynamics(browse) -> None:
+    scene = crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.0, 2 * math.pi, 36)))
+    driver = browse(animate.page(scene))
+    assert not driver.find_element("id", "forces").is_displayed()
+    assert driver.find_element("id", "omega_3").text == "–"
+    driver.find_element("id", "forward").click()
+    assert shown(driver, "theta_2") == pytest.approx([10.0], abs=PRINTED_DEG)
