@@ -29,7 +29,7 @@ class Settings:
     timestep: float | None = None
     timestep_scale: float = 1.0
     steps_per_revolution: float = 628.0
-    steps_per_window: int = 800
+    steps_per_window: int = 1200
     integrator: str = "RK4"
     time_constant_steps: float = 20.0
     impedance: float = 0.9999

@@ -6,18 +6,24 @@ from pathlib import Path
 from validation.report.markdown import number
 from validation.report.summary import Summary
 
+WIDE = 100
+"""Columns of a terminal from which the position and its condition are shown too."""
+
 
 def table(summary: Summary, out: Path) -> None:
     """Print the worst row of every scene and engine, the verdict last."""
+    from rich.box import SIMPLE_HEAD
     from rich.console import Console
     from rich.markup import escape
     from rich.table import Table
 
     console = Console()
-    shown = Table(title="worst row of each scene and engine")
-    for heading in ("scene", "engine", "quantity"):
-        shown.add_column(heading, overflow="fold")
-    for heading in ("error", "allowed", "used", "theta_2", "condition"):
+    wide = console.width >= WIDE
+    shown = Table(title="worst row of each scene and engine", box=SIMPLE_HEAD, pad_edge=False)
+    shown.add_column("scene", overflow="fold")
+    for heading in ("engine", "worst"):
+        shown.add_column(heading, no_wrap=True)
+    for heading in ("error", "allowed", "used", *(("theta_2", "condition") if wide else ())):
         shown.add_column(heading, justify="right", no_wrap=True)
     for w in summary.worst:
         style = "" if w.failed == 0 else "bold red"
@@ -28,8 +34,7 @@ def table(summary: Summary, out: Path) -> None:
             number(w.row.error),
             number(w.row.allowed),
             f"{w.used:.2f}",
-            f"{math.degrees(w.row.theta_2):.2f} deg",
-            number(w.row.condition),
+            *((f"{math.degrees(w.row.theta_2):.2f} deg", number(w.row.condition)) if wide else ()),
             style=style,
         )
     console.print(shown)
