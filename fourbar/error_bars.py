@@ -1,6 +1,6 @@
 """Error bars of torque and pin forces: how far rounding makes them scatter.
 
-The forces are evaluated again with every length, arm and term changed in its last digit. All
+The forces are evaluated again with every part of the triangle, arm and term changed in its last digit. All
 roundings then fall differently, so the root mean square of the changes is of the size of the error
 itself, whatever the formulas lose at this position. Signs are taken from a Hadamard matrix: the
 changes of different inputs do not cancel over the evaluations.
@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 
 from fourbar.effects import Gravity, Load
-from fourbar.errors import InputError
 from fourbar.kinematics import Array, State, add_accelerations, add_velocities, close_loop
 from fourbar.kinetostatics import PinForces, Term, solve_pins
 from fourbar.linkage import Bar, FourBar
@@ -44,24 +43,19 @@ def error_bars(state: State, pins: PinForces, terms: Iterable[Term], drive_bar: 
     in_doubles = isinstance(state.theta_2, np.ndarray)
     n = len(rounded(state.theta_2))
     torque, forces = np.zeros(n), np.zeros((4, n))
-    runs = 0
     for run in range(EVALUATIONS):
         signs = _signs(run)
-        try:
-            linkage = _moved_linkage(state.linkage, signs, lengths=in_doubles)
-            moved_terms = [_moved_term(term, signs) for term in terms]
-            if in_doubles:
-                moved = _moved_state(state, linkage, signs)
-                other = solve_pins(moved, moved_terms, drive_bar, growths=signs)
-            else:
-                other = solve_pins(replace(state, linkage=linkage), moved_terms, drive_bar)
-        except InputError:  # the bars lie stretched out: moved, they cannot close anywhere
-            continue
+        linkage = _moved_linkage(state.linkage, signs)
+        moved_terms = [_moved_term(term, signs) for term in terms]
+        if in_doubles:
+            moved = _moved_state(state, linkage, signs)
+            other = solve_pins(moved, moved_terms, drive_bar, growths=signs)
+        else:
+            other = solve_pins(replace(state, linkage=linkage), moved_terms, drive_bar)
         torque += rounded(other.torque - pins.torque) ** 2
         for total, before, after in zip(forces, pins[:4], other[:4], strict=True):
             total += rounded(after[0] - before[0]) ** 2 + rounded(after[1] - before[1]) ** 2
-        runs += 1
-    scale = TYPICAL / math.sqrt(max(runs, 1))
+    scale = TYPICAL / math.sqrt(EVALUATIONS)
     torque_error, force_error = scale * np.sqrt(torque), scale * np.sqrt(forces.max(axis=0))
     sizes = [np.hypot(rounded(x), rounded(y)) for x, y in pins[:4]]
     torque_error += LAST_ROUNDING * np.abs(rounded(pins.torque))
@@ -81,30 +75,30 @@ def _next(value: Any, signs: Iterator[float]) -> Any:
     return value + value * next(signs)
 
 
-def _moved_linkage(linkage: FourBar, signs: Iterator[float], *, lengths: bool) -> FourBar:
-    """The linkage with the numbers of its bars changed in their last digit, and its lengths if asked."""
-    # bars that are equal stay equal
-    moved = {value: _next(value, signs) if lengths else value for value in dict.fromkeys(linkage.lengths)}
+def _moved_linkage(linkage: FourBar, signs: Iterator[float]) -> FourBar:
+    """The linkage with centres and inertias changed in their last digit."""
 
     def bar(old: Bar) -> Bar:
         assert old.centre is not None and old.inertia is not None
         centre = (_next(old.centre[0], signs), _next(old.centre[1], signs))
-        return replace(old, length=moved[old.length], inertia=_next(old.inertia, signs), centre=centre)
+        return replace(old, inertia=_next(old.inertia, signs), centre=centre)
 
-    bars = (bar(linkage.input), bar(linkage.coupler), bar(linkage.output))
-    return FourBar(moved[linkage.ground], *bars, ground_angle=linkage.ground_angle)
+    return replace(linkage, input=bar(linkage.input), coupler=bar(linkage.coupler), output=bar(linkage.output))
 
 
 def _moved_state(state: State, linkage: FourBar, signs: Iterator[float]) -> State:
-    """The motion of the changed linkage at the same positions."""
-    diagonal = diagonal_to_O4(linkage, state.theta_2, decide=False)
+    """The motion of the changed linkage at the same positions, from a triangle changed in its last digits."""
+    diagonal = diagonal_to_O4(linkage, state.theta_2, growths=signs)
     exact = state.diagonal.decided
     # margins of 60 digits carry one rounding, not the cancellation of the lengths
     diagonal.root[exact] = _next(state.diagonal.root[exact], signs)
     moved = close_loop(linkage, state.theta_2, state.branch, diagonal)
     moved.assembled, moved.singular = state.assembled, state.singular
+    moved.u2, moved.u3, moved.u4 = ((_next(u[0], signs), _next(u[1], signs)) for u in (moved.u2, moved.u3, moved.u4))
     add_velocities(moved, state.omega_2)
     add_accelerations(moved, state.alpha_2)
+    moved.omega_3, moved.omega_4 = _next(moved.omega_3, signs), _next(moved.omega_4, signs)
+    moved.alpha_3, moved.alpha_4 = _next(moved.alpha_3, signs), _next(moved.alpha_4, signs)
     return moved
 
 

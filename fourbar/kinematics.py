@@ -92,7 +92,7 @@ class State:
         return self.sin_mu
 
     def regular_root(self) -> Array:
-        """sigma sqrt(p1 p2 p3 p4) in the unit of the diagonal, NaN where the position is singular."""
+        """sigma root in the unit of the diagonal, NaN where the position is singular."""
         if self.singular.any():
             return self.signed_root + np.where(self.singular, np.nan, 0.0)
         return self.signed_root
@@ -182,9 +182,9 @@ def close_loop(
     """Positions on a branch: theta_3 = phi + sigma beta, theta_4 = phi + pi - sigma gamma.
 
     phi is the direction A to O4, beta and gamma are the angles of the triangle A, B, O4 at A and
-    O4, from the cosine rule and Heron's factors p1..p4 of its area:
-        cos beta = (e^2 + b^2 - c^2)/(2 b e),  sin beta = sqrt(p1 p2 p3 p4)/(2 b e),
-        sin(theta_4 - theta_3) = sigma sqrt(p1 p2 p3 p4)/(2 b c).
+    O4, from the cosine rule and Heron's formula (root = 4 times its area):
+        cos beta = (e^2 + b^2 - c^2)/(2 b e),  sin beta = root/(2 b e),
+        sin(theta_4 - theta_3) = sigma root/(2 b c).
 
     Parameters
     ----------

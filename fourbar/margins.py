@@ -1,13 +1,15 @@
 """The diagonal A to O4 of the linkage, and how far a position is from not closing.
 
-With e the length of the diagonal, the loop closes where all of Heron's factors of the triangle
-A, B, O4,
-    p1 = b + c - e,   p2 = e + c - b,   p3 = e + b - c,   p4 = e + b + c,
-are >= 0; p1 = 0 is bars 3, 4 stretched, p2 = 0 or p3 = 0 is bars 3, 4 folded.
+With e the length of the diagonal, the triangle A, B, O4 closes where both factors of Heron's formula
+    outer = (b + c)^2 - e^2 = (b + c - a - d)(a + b + c + d) + 4 a d cos^2(psi/2),
+    inner = e^2 - (b - c)^2 = (d - a + b - c)(d - a - b + c) + 4 a d sin^2(psi/2)
+are >= 0, psi = theta_2 - theta_1; outer = 0 is bars 3, 4 stretched, inner = 0 is bars 3, 4 folded.
+At a change point the product of lengths is zero exactly, and nothing cancels beside it.
 """
 
 import decimal
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from decimal import Decimal
 from typing import Any
@@ -22,11 +24,11 @@ Array = NDArray[np.float64]
 U = 2.0**-53
 """Unit round-off of a double."""
 UNDECIDED = 32.0 * U
-"""Margins smaller than this times the sum of the lengths are decided in 60 digits: the double
-evaluation (one tangent, ten roundings) is wrong by at most about 12 U times that sum."""
+"""A factor smaller than this times the sum of its terms is evaluated in 60 digits: in doubles
+(one tangent, eight roundings) it is wrong by at most about 12 U times that sum."""
 TOUCHING = U
-"""A negative margin up to this times the sum of the lengths counts as zero: each length was
-itself rounded by up to U, so the linkage meant closes there as well as not."""
+"""Bars that miss each other by up to this times the sum of the lengths count as touching: each length
+was itself rounded by up to U, so the linkage meant closes there as well as not."""
 DIGITS = 60
 NONE = np.empty(0, dtype=np.intp)
 
@@ -45,7 +47,7 @@ class Diagonal:
     squared: Array
     """e^2."""
     root: Array
-    """sqrt(p1 p2 p3 p4), four times the area of the triangle A, B, O4; NaN where it does not close."""
+    """sqrt(outer inner), four times the area of the triangle A, B, O4; NaN where it does not close."""
     w: Array
     """cos^2((theta_2 - theta_1)/2)."""
     assembled: NDArray[np.bool_]
@@ -73,7 +75,7 @@ def in_precision_of(array: Array, number: float) -> Any:
 
 
 def diagonal_to_O4(
-    linkage: FourBar, theta_2: Array, offset: Decimal | None = None, *, decide: bool = True
+    linkage: FourBar, theta_2: Array, offset: Decimal | None = None, *, growths: Iterator[float] | None = None
 ) -> Diagonal:
     """The diagonal from t = tan((theta_2 - theta_1)/2): e^2 = ((d - a)^2 + (d + a)^2 t^2)/(1 + t^2).
 
@@ -85,65 +87,81 @@ def diagonal_to_O4(
     theta_2 : (n,), rad.
     offset : what theta_2 as a double leaves out of the angle meant, rad; then all margins are
         evaluated in 60 digits.
-    decide : False leaves margins near zero as doubles give them.
+    growths : relative changes of the parts, for the error bars; factors near zero then stay as doubles give them.
     """
-    unit = unit_of(linkage)
-    _, _, b, c = scaled(linkage, theta_2)
-    t, x, y, squared, w = _triangle(linkage, theta_2)
-    e = np.sqrt(squared)
-    p1, p2, p3, p4 = (b + c) - e, e + (c - b), e + (b - c), e + (b + c)
-    undecided = UNDECIDED * (sum(linkage.lengths) / unit)
+    t, x, y, squared, w, (constant_1, constant_2, product) = _triangle(linkage, theta_2, growths)
+    outer, inner = constant_1 + product * w, constant_2 + product * (t * t * w)
+    least_1, least_2 = UNDECIDED * (abs(constant_1) + product), UNDECIDED * (abs(constant_2) + product)
     decided = NONE
-    if offset is None and e.max() < (b + c) - undecided and e.min() > abs(b - c) + undecided:
-        assembled = np.ones(e.shape, dtype=bool)
+    if offset is None and outer.min() > least_1 and inner.min() > least_2:
+        assembled = np.ones(outer.shape, dtype=bool)
     else:
-        smallest = np.minimum(p1, np.minimum(p2, p3))
-        assembled = smallest >= 0.0
+        assembled = (outer >= 0.0) & (inner >= 0.0)
         if offset is not None:
-            decided = np.arange(e.size)
-        elif decide:
-            decided = np.flatnonzero(np.abs(smallest) < undecided)
+            decided = np.arange(outer.size)
+        elif growths is None:
+            decided = np.flatnonzero(
+                ((np.abs(outer) < least_1) & (constant_1 < 0.0)) | ((np.abs(inner) < least_2) & (constant_2 < 0.0))
+            )
         for index in decided:
-            factors = _decide(linkage, float(theta_2[index]), offset or Decimal(0), unit)
-            p1[index], p2[index], p3[index], p4[index] = factors
-            assembled[index] = min(factors) >= 0.0
+            outer[index], inner[index] = _decide(linkage, float(theta_2[index]), offset or Decimal(0))
+            assembled[index] = outer[index] >= 0.0 and inner[index] >= 0.0
         if not assembled.all():
-            p1 = np.where(assembled, p1, np.nan)
-    return Diagonal(unit, t, x, y, squared, np.sqrt((p1 * p2) * (p3 * p4)), w, assembled, decided, offset)
+            outer = np.where(assembled, outer, np.nan)
+    return Diagonal(unit_of(linkage), t, x, y, squared, np.sqrt(outer * inner), w, assembled, decided, offset)
 
 
 def in_double_double(linkage: FourBar, theta_2: Array) -> Diagonal:
     """The same in 32 digits, for positions that are known to assemble; theta_2 is a `DoubleDouble`."""
-    _, _, b, c = scaled(linkage, theta_2)
-    t, x, y, squared, w = _triangle(linkage, theta_2)
-    e = np.sqrt(squared)
-    root = np.sqrt((((b + c) - e) * (e + (c - b))) * ((e + (b - c)) * (e + (b + c))))
+    t, x, y, squared, w, (constant_1, constant_2, product) = _triangle(linkage, theta_2)
+    root = np.sqrt((constant_1 + product * w) * (constant_2 + product * (t * t * w)))
     return Diagonal(unit_of(linkage), t, x, y, squared, root, w, np.ones(theta_2.shape, dtype=bool), NONE, None)
 
 
-def _triangle(linkage: FourBar, theta_2: Array) -> tuple[Array, Array, Array, Array, Array]:
-    """t, x, y, e^2 and w of `Diagonal`, in the precision of theta_2."""
-    d, a, _, _ = scaled(linkage, theta_2)
+def _triangle(
+    linkage: FourBar, theta_2: Array, growths: Iterator[float] | None = None
+) -> tuple[Array, Array, Array, Array, Array, tuple[Any, Any, Any]]:
+    """t, x, y, e^2 and w of `Diagonal`, the constants of outer and inner and 4 a d, in the precision of theta_2."""
+    d, a, b, c = scaled(linkage, theta_2)
     theta_1 = linkage.ground_angle
     t = np.tan(0.5 * theta_2 if theta_1 == 0.0 else 0.5 * (theta_2 - theta_1))
+    if growths is not None:
+        t = t + next(growths) * t
     t2 = t * t
     w = 1.0 / (1.0 + t2)
     x = ((d - a) + (d + a) * t2) * w
     y = (-2.0 * a) * (t * w)
     squared = ((d - a) * (d - a) + ((d + a) * (d + a)) * t2) * w
-    return t, x, y, squared, w
+    constants = (
+        _sum(b, c, -a, -d) * (a + b + c + d),
+        _sum(d, b, -a, -c) * _sum(d, c, -a, -b),
+        4.0 * a * d,
+    )
+    if growths is not None:
+        x, y, squared, w = (part + next(growths) * part for part in (x, y, squared, w))
+        constants = tuple(part + next(growths) * part for part in constants)  # type: ignore[assignment]
+    return t, x, y, squared, w, constants
 
 
-def _decide(linkage: FourBar, theta_2: float, offset: Decimal, unit: float) -> tuple[float, ...]:
-    """The four margins of one position in 60 digits, each rounded once."""
+def _sum(*lengths: Any) -> Any:
+    """Their sum, rounded once; in more digits than a double has it is exact anyway."""
+    if isinstance(lengths[0], float):
+        return math.fsum(lengths)
+    return (lengths[0] + lengths[2]) + (lengths[1] + lengths[3])
+
+
+def _decide(linkage: FourBar, theta_2: float, offset: Decimal) -> tuple[float, float]:
+    """outer and inner of one position in 60 digits, each rounded once."""
     with decimal.localcontext() as context:
         context.prec = DIGITS
-        d, a, b, c = (Decimal(length) for length in linkage.lengths)
+        unit = Decimal(unit_of(linkage))
+        d, a, b, c = (Decimal(length) / unit for length in linkage.lengths)
         cosine = _cosine(Decimal(theta_2) - Decimal(linkage.ground_angle) + offset)
-        e = ((d - a) ** 2 + 2 * a * d * (1 - cosine)).sqrt()
-        touching = Decimal(TOUCHING) * (a + b + c + d)
-        margins = (b + c - e, e + c - b, e + b - c, e + b + c)
-        return tuple(float((Decimal(0) if -touching <= m < 0 else m) / Decimal(unit)) for m in margins)
+        squared = (d - a) ** 2 + 2 * a * d * (1 - cosine)
+        touching = Decimal(TOUCHING) * (a + b + c + d) * 2 * squared.sqrt()
+        factors = ((b + c) ** 2 - squared, squared - (b - c) ** 2)
+        outer, inner = (float(Decimal(0) if -touching <= factor < 0 else factor) for factor in factors)
+        return outer, inner
 
 
 def limit_remainder(linkage: FourBar, limit: float, theta_2: float, offset: float) -> Decimal:
