@@ -47,7 +47,7 @@ SCALARS = (
     "torque",
 )
 FORCES = ("F12", "F32", "F43", "F14")
-SCRIPTS = ("linkage.js", "picture.js", "page.js")
+SCRIPTS = ("linkage.js", "numbers.js", "picture.js", "chart.js", "page.js")
 
 
 def write(

@@ -201,6 +201,12 @@ def test_a_position_that_does_not_assemble_is_refused(tmp_path: Path) -> None:
         plot.draw(thesis(), tmp_path / "a.png", "linkage", position=math.radians(45.0))
 
 
+def test_a_free_motion_is_refused_in_one_line(tmp_path: Path) -> None:
+    motion = replace(crank_rocker().motion, theta_2=0.5, free=fourbar.Free(1.0, 10))
+    with pytest.raises(InputError, match=r"motion\.free"):
+        plot.draw(crank_rocker(motion=motion), tmp_path / "a.svg")
+
+
 def test_the_settings_of_the_reader_are_left_alone(tmp_path: Path) -> None:
     import matplotlib as mpl
 

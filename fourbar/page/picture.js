@@ -1,84 +1,3 @@
-const data = JSON.parse(document.getElementById("data").textContent);
-const byId = id => document.getElementById(id);
-const DEG = 180 / Math.PI, TURN = 2 * Math.PI, FORCES = ["F12", "F32", "F43", "F14"];
-const FORCE_PIN = { F12: "O2", F32: "A", F43: "B", F14: "O4" };
-const SWEEP_SECONDS = 6, ROWS = 360;   // one sweep at speed 1; positions of a sweep whose lengths were edited
-const ORDINARY = 0.95, OUTLIER = 3, ROOM = 1.6;   // a scale ends at ROOM times the 95th percentile where values diverge
-const unit = data.unit, still = window.matchMedia("(prefers-reduced-motion: reduce)").matches;
-
-let lengths = data.lengths.slice(), edited = false, branch = data.branch, grid = data.theta_2, row = data.start;
-let phase = row, playing = false, direction = data.omega_2 < 0 ? -1 : 1, lastTime = null, lastDraw = 0;
-let view = { width: 0, height: 0, k: 1, x: 0, y: 0 }, forceScale = { top: 0, cut: false };
-
-const table = () => data.branches[branch];
-const signAt = i => edited ? branch : table().sign[Math.min(i, grid.length - 1)];
-const at = i => closeLoop(lengths, data.theta_1, grid[i], signAt(i));
-const dynamic = () => !edited && "torque" in table();
-
-// ---- numbers -------------------------------------------------------------------------------
-function text(value, digits = 5) {
-  if (value === null || value === undefined || !Number.isFinite(value)) return "\u2013";
-  if (value === 0) return "0";
-  const size = Math.abs(value);
-  const shown = size >= 1e6 || size < 1e-4 ? value.toExponential(digits - 2) : value.toPrecision(digits);
-  return shown.replace("-", "\u2212").replace("e+", "e");
-}
-const rounded = (value, digits) => Math.abs(value) < 1e6 ? String(Number(value.toPrecision(digits))) : text(value, digits + 2);
-const degrees = value => value === null || !Number.isFinite(value) ? "\u2013" : (value * DEG).toFixed(3).replace("-", "\u2212");
-
-function valuesAt(i) {
-  const t = table(), out = {};
-  if (!edited) {
-    for (const [name, column] of Object.entries(t)) out[name] = column[i];
-    out.theta_2 = grid[i];
-    return out;
-  }
-  out.theta_2 = grid[i];
-  const p = at(i);
-  if (p) Object.assign(out, { theta_3: p.theta3, theta_4: p.theta4, condition: Math.abs(p.sinMu) });
-  if (p && data.omega_2 !== null) {
-    const r = rates(lengths, p, data.omega_2, data.alpha_2);
-    Object.assign(out, { omega_2: data.omega_2, omega_3: r.omega3, omega_4: r.omega4, alpha_2: data.alpha_2, alpha_3: r.alpha3, alpha_4: r.alpha4 });
-  }
-  return out;
-}
-
-function showNumbers(i) {
-  const v = valuesAt(i);
-  for (const k of [2, 3, 4]) {
-    byId(`theta_${k}`).textContent = degrees(v[`theta_${k}`] ?? null);
-    byId(`omega_${k}`).textContent = text(v[`omega_${k}`]);
-    byId(`alpha_${k}`).textContent = text(v[`alpha_${k}`]);
-  }
-  byId("condition").textContent = text(v.condition);
-  const across = v.theta_3 === undefined || v.theta_3 === null ? null : Math.atan2(Math.abs(Math.sin(v.theta_4 - v.theta_3)), Math.abs(Math.cos(v.theta_4 - v.theta_3)));
-  byId("mu").textContent = degrees(across);
-  if (dynamic()) {
-    byId("torque").textContent = text(v.torque);
-    for (const name of FORCES) {
-      const f = v[name], known = f[0] !== null;
-      byId(`${name}_x`).textContent = text(f[0]);
-      byId(`${name}_y`).textContent = text(f[1]);
-      byId(`${name}_size`).textContent = text(known ? Math.hypot(f[0], f[1]) : null);
-      byId(`${name}_angle`).textContent = known ? (Math.atan2(f[1], f[0]) * DEG).toFixed(2).replace("-", "\u2212") : "\u2013";
-    }
-  }
-  const assembled = at(i) !== null, singular = assembled && Math.abs(at(i).sinMu) < 8 * Number.EPSILON;
-  const status = byId("status");
-  status.hidden = assembled && !singular;
-  status.textContent = !assembled ? "The linkage does not assemble at this position." : singular ? "Coupler and output are in line: velocities have no value here." : "";
-  byId("theta").value = i;
-  const here = `${(grid[i] * DEG).toFixed(2)}\u00b0`.replace("-", "\u2212");
-  byId("theta-text").textContent = here;
-  byId("theta").setAttribute("aria-valuetext", `${(grid[i] * DEG).toFixed(2)} degrees`);
-  if (!playing) {
-    let words = assembled ? `Theta 2 ${here}, theta 3 ${degrees(v.theta_3)}, theta 4 ${degrees(v.theta_4)} degrees` : `Theta 2 ${here}: does not assemble`;
-    if (dynamic() && v.torque !== null) words += `, torque ${text(v.torque, 4)} newton metres`;
-    byId("live").textContent = words;
-    byId("picture-text").textContent = `Four-bar linkage, ${branch === 1 ? "open" : "crossed"} branch. ${words}`;
-  }
-}
-
 // ---- picture -------------------------------------------------------------------------------
 const SVG = "http://www.w3.org/2000/svg";
 function make(parent, name, attributes) {
@@ -268,75 +187,23 @@ function drawLinkage(p, i) {
     arrow.head.setAttribute("d", `M${tip[0]} ${tip[1]}L${neck[0] - 0.45 * head * uy} ${neck[1] + 0.45 * head * ux}L${neck[0] + 0.45 * head * uy} ${neck[1] - 0.45 * head * ux}Z`);
     set(parts.label[name], { x: tip[0] + 15 * ux, y: tip[1] + 13 * uy });
   }
+  separateLabels();
 }
 
-// ---- chart ---------------------------------------------------------------------------------
-const QUANTITIES = [
-  ["theta_3", "\u03b8\u2083, deg", DEG], ["theta_4", "\u03b8\u2084, deg", DEG],
-  ["omega_3", "\u03c9\u2083, rad/s", 1], ["omega_4", "\u03c9\u2084, rad/s", 1],
-  ["alpha_3", "\u03b1\u2083, rad/s\u00b2", 1], ["alpha_4", "\u03b1\u2084, rad/s\u00b2", 1],
-  ["torque", `torque on bar ${data.drive_bar}, N m`, 1],
-  ...FORCES.map(name => [name, `|F${name.slice(1).replace(/./g, d => "\u2080\u2081\u2082\u2083\u2084"[d])}|, N`, 1]),
-];
-const chart = byId("chart");
-let plotted = { values: [], x: () => 0, y: () => 0 };
-
-function column(name) {
-  const [, , factor] = QUANTITIES.find(q => q[0] === name);
-  const values = grid.map((_, i) => {
-    const v = edited ? valuesAt(i)[name] : table()[name][i];
-    if (v === null || v === undefined) return NaN;
-    return Array.isArray(v) ? (v[0] === null ? NaN : Math.hypot(v[0], v[1])) : v * factor;
-  });
-  if (name.startsWith("theta")) for (let i = 1; i < values.length; i++) values[i] -= 360 * Math.round((values[i] - values[i - 1]) / 360) || 0;
-  return values;
-}
-
-function drawChart() {
-  const available = QUANTITIES.filter(([name]) => edited ? !FORCES.includes(name) && name !== "torque" && (data.omega_2 !== null || name.startsWith("theta")) : name in table());
-  const select = byId("quantity"), wanted = available.some(q => q[0] === select.value) ? select.value : (available.find(q => q[0] === "torque") ?? available[0])[0];
-  select.replaceChildren(...available.map(([name, label]) => new Option(label, name, false, name === wanted)));
-  const width = Math.max(280, picture.parentElement.clientWidth), height = 170, left = 62, bottom = 26, values = column(wanted);
-  chart.replaceChildren();
-  set(chart, { viewBox: `0 0 ${width} ${height}` });
-  const limit = wanted.startsWith("theta") ? { cut: false } : ceiling(values), finite = values.filter(Number.isFinite);
-  let low = Math.min(...finite), high = Math.max(...finite);
-  if (limit.cut) { low = Math.max(low, -limit.top); high = Math.min(high, limit.top); }
-  if (!wanted.startsWith("theta")) { low = Math.min(low, 0); high = Math.max(high, 0); }
-  if (high - low < 1e-300) { high += 1; low -= 1; }
-  byId("chart-note").textContent = limit.cut ? `cut at ${text(limit.top, 3)}; it reaches ${text(finite.reduce((m, v) => Math.abs(v) > Math.abs(m) ? v : m, 0), 4)}` : "";
-  const first = grid[0], span = grid[grid.length - 1] - first || 1;
-  const x = t => left + (width - left - 12) * (t - first) / span, y = v => 10 + (height - 10 - bottom) * (high - v) / (high - low);
-  plotted = { values, x, y, low, high, height, bottom };
-  const step = [15, 30, 45, 60, 90, 180].find(d => span * DEG / d <= Math.max(3, width / 75)) ?? 360;
-  for (let d = Math.ceil(first * DEG / step - 1e-9) * step; d <= (first + span) * DEG + 1e-9; d += step) {
-    make(chart, "line", { class: "axis", x1: x(d / DEG), x2: x(d / DEG), y1: 10, y2: height - bottom });
-    make(chart, "text", { class: "small", x: x(d / DEG), y: height - 9, "text-anchor": "middle" }).textContent = `${d}\u00b0`.replace("-", "\u2212");
+// Labels that would cover each other give way, the less important one first; one without room is left out.
+function separateLabels() {
+  const kept = [];
+  for (const name of ["O2", "A", "B", "O4", ...FORCES, "2", "3", "4", "G2", "G3", "G4"]) {
+    const label = parts.label[name];
+    if (label.style.display === "none") continue;
+    const x = Number(label.getAttribute("x")), y = Number(label.getAttribute("y")), wide = 6 + 6 * name.length;
+    const free = SHIFTS.map(([dx, dy]) => [x + dx, y + dy]).find(([u, v]) =>
+      u > 10 && v > 10 && u < view.width - 10 && v < view.height - 10
+      && kept.every(([s, t, w]) => Math.abs(u - s) > 0.5 * (wide + w) || Math.abs(v - t) > 15));
+    if (!free) { label.style.display = "none"; continue; }
+    set(label, { x: free[0], y: free[1] });
+    kept.push([...free, wide]);
   }
-  for (const [v, kind] of [[low, "axis"], [high, "axis"], [0, "zero"]]) {
-    if (v < low || v > high) continue;
-    make(chart, "line", { class: kind, x1: left, x2: width - 12, y1: y(v), y2: y(v) });
-    if (v === 0 && Math.min(y(low) - y(0), y(0) - y(high)) < 14 && low !== 0 && high !== 0) continue;
-    if (v !== 0 || kind === "zero") make(chart, "text", { class: "small", x: left - 6, y: y(v) + 4, "text-anchor": "end" }).textContent = text(v, 3);
-  }
-  let d = "", open = false;
-  values.forEach((v, i) => {
-    const jump = i > 0 && limit.cut && v * values[i - 1] < 0 && Math.abs(v - values[i - 1]) > limit.top;   // across a pole no line
-    if (!Number.isFinite(v) || v < low || v > high) { open = false; return; }
-    d += (open && !jump ? "L" : "M") + x(grid[i]).toFixed(2) + " " + y(v).toFixed(2);
-    open = true;
-  });
-  make(chart, "path", { class: "curve", d });
-  plotted.cursor = make(chart, "line", { class: "cursor", y1: 10, y2: height - bottom });
-  plotted.dot = make(chart, "circle", { class: "dot", r: 4.5 });
 }
-
-function moveCursor(i) {
-  const { cursor, dot, values, x, y, low, high } = plotted;
-  if (!cursor) return;
-  set(cursor, { x1: x(grid[i]), x2: x(grid[i]) });
-  const inside = Number.isFinite(values[i]) && values[i] >= low && values[i] <= high;
-  dot.style.display = inside ? "" : "none";
-  if (inside) set(dot, { cx: x(grid[i]), cy: y(values[i]) });
-}
+const SHIFTS = [[0, 0], [0, -15], [0, 15], [17, 0], [-17, 0], [17, -15], [-17, -15], [17, 15], [-17, 15]];
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from fourbar.effects.wrenches import Wrenches
-from fourbar.errors import FourBarError, NotAssembledError
+from fourbar.errors import InputError, NotAssembledError
 from fourbar.kinematics import Array, State, Vector, add_accelerations, add_velocities, close_loop
 from fourbar.scene import Command, FromLimit, Scene, command, solve
 from fourbar.solution import Solution
@@ -82,7 +82,9 @@ class Recorder(Wrenches):
 def sweep_command(scene: Scene) -> Command:
     """The positions of a scene in rising theta_2; a single position is put among those of the default range."""
     if scene.motion.free is not None:
-        raise FourBarError("a free motion runs through time: draw it from its own results")
+        raise InputError(
+            "motion.free", scene.motion.free, "is not drawn over theta_2; leave it out to draw the linkage"
+        )
     motion = scene.motion
     own = command(scene)
     if len(own.theta_2) > 1:

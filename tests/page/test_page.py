@@ -325,6 +325,20 @@ def contrast(first: str, second: str) -> float:
     return (high + 0.05) / (low + 0.05)
 
 
+def test_labels_of_the_picture_do_not_cover_each_other(browse) -> None:
+    driver = browse(animate.page(thesis()), 360)
+    script = """return [...document.querySelectorAll("#labels text")].filter(e => e.style.display !== "none")
+        .map(e => { const b = e.getBBox(); return [b.x, b.y, b.x + b.width, b.y + b.height]; })"""
+    for row in (90, 136, 200, 300):
+        driver.execute_script("go(arguments[0])", row)
+        boxes = driver.execute_script(script)
+        assert len(boxes) >= 8
+        for k, a in enumerate(boxes):
+            for b in boxes[k + 1 :]:
+                wide, high = min(a[2], b[2]) - max(a[0], b[0]), min(a[3], b[3]) - max(a[1], b[1])
+                assert wide < 3 or high < 6  # a box holds room for accents and descenders around the ink
+
+
 def test_hostile_titles_do_nothing_but_appear(browse) -> None:
     driver = browse(animate.page(replace(crank_rocker(), title=HOSTILE)))
     assert "<script>alert(1)</script>" in driver.find_element("css selector", "h1").text

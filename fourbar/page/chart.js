@@ -1,0 +1,70 @@
+// ---- chart ---------------------------------------------------------------------------------
+const QUANTITIES = [
+  ["theta_3", "\u03b8\u2083, deg", DEG], ["theta_4", "\u03b8\u2084, deg", DEG],
+  ["omega_3", "\u03c9\u2083, rad/s", 1], ["omega_4", "\u03c9\u2084, rad/s", 1],
+  ["alpha_3", "\u03b1\u2083, rad/s\u00b2", 1], ["alpha_4", "\u03b1\u2084, rad/s\u00b2", 1],
+  ["torque", `torque on bar ${data.drive_bar}, N m`, 1],
+  ...FORCES.map(name => [name, `|F${name.slice(1).replace(/./g, d => "\u2080\u2081\u2082\u2083\u2084"[d])}|, N`, 1]),
+];
+const chart = byId("chart");
+let plotted = { values: [], x: () => 0, y: () => 0 };
+
+function column(name) {
+  const [, , factor] = QUANTITIES.find(q => q[0] === name);
+  const values = grid.map((_, i) => {
+    const v = edited ? valuesAt(i)[name] : table()[name][i];
+    if (v === null || v === undefined) return NaN;
+    return Array.isArray(v) ? (v[0] === null ? NaN : Math.hypot(v[0], v[1])) : v * factor;
+  });
+  if (name.startsWith("theta")) for (let i = 1; i < values.length; i++) values[i] -= 360 * Math.round((values[i] - values[i - 1]) / 360) || 0;
+  return values;
+}
+
+function drawChart() {
+  const available = QUANTITIES.filter(([name]) => edited ? !FORCES.includes(name) && name !== "torque" && (data.omega_2 !== null || name.startsWith("theta")) : name in table());
+  const select = byId("quantity"), wanted = available.some(q => q[0] === select.value) ? select.value : (available.find(q => q[0] === "torque") ?? available[0])[0];
+  select.replaceChildren(...available.map(([name, label]) => new Option(label, name, false, name === wanted)));
+  const width = Math.max(280, picture.parentElement.clientWidth), height = 170, left = 62, bottom = 26, values = column(wanted);
+  chart.replaceChildren();
+  set(chart, { viewBox: `0 0 ${width} ${height}` });
+  const limit = wanted.startsWith("theta") ? { cut: false } : ceiling(values), finite = values.filter(Number.isFinite);
+  let low = Math.min(...finite), high = Math.max(...finite);
+  if (limit.cut) { low = Math.max(low, -limit.top); high = Math.min(high, limit.top); }
+  if (!wanted.startsWith("theta")) { low = Math.min(low, 0); high = Math.max(high, 0); }
+  if (high - low < 1e-300) { high += 1; low -= 1; }
+  byId("chart-note").textContent = limit.cut ? `cut at ${text(limit.top, 3)}; it reaches ${text(finite.reduce((m, v) => Math.abs(v) > Math.abs(m) ? v : m, 0), 4)}` : "";
+  const first = grid[0], span = grid[grid.length - 1] - first || 1;
+  const x = t => left + (width - left - 12) * (t - first) / span, y = v => 10 + (height - 10 - bottom) * (high - v) / (high - low);
+  plotted = { values, x, y, low, high, height, bottom };
+  const step = [15, 30, 45, 60, 90, 180].find(d => span * DEG / d <= Math.max(3, width / 75)) ?? 360;
+  for (let d = Math.ceil(first * DEG / step - 1e-9) * step; d <= (first + span) * DEG + 1e-9; d += step) {
+    make(chart, "line", { class: "axis", x1: x(d / DEG), x2: x(d / DEG), y1: 10, y2: height - bottom });
+    make(chart, "text", { class: "small", x: x(d / DEG), y: height - 9, "text-anchor": "middle" }).textContent = `${d}\u00b0`.replace("-", "\u2212");
+  }
+  for (const [v, kind] of [[low, "axis"], [high, "axis"], [0, "zero"]]) {
+    if (v < low || v > high) continue;
+    make(chart, "line", { class: kind, x1: left, x2: width - 12, y1: y(v), y2: y(v) });
+    if (v === 0 && Math.min(y(low) - y(0), y(0) - y(high)) < 14 && low !== 0 && high !== 0) continue;
+    if (v !== 0 || kind === "zero") make(chart, "text", { class: "small", x: left - 6, y: y(v) + 4, "text-anchor": "end" }).textContent = text(v, 3);
+  }
+  let d = "", open = false;
+  values.forEach((v, i) => {
+    const jump = i > 0 && limit.cut && v * values[i - 1] < 0 && Math.abs(v - values[i - 1]) > limit.top;   // across a pole no line
+    if (!Number.isFinite(v) || v < low || v > high) { open = false; return; }
+    d += (open && !jump ? "L" : "M") + x(grid[i]).toFixed(2) + " " + y(v).toFixed(2);
+    open = true;
+  });
+  make(chart, "path", { class: "curve", d });
+  plotted.cursor = make(chart, "line", { class: "cursor", y1: 10, y2: height - bottom });
+  plotted.dot = make(chart, "circle", { class: "dot", r: 4.5 });
+}
+
+function moveCursor(i) {
+  const { cursor, dot, values, x, y, low, high } = plotted;
+  if (!cursor) return;
+  set(cursor, { x1: x(grid[i]), x2: x(grid[i]) });
+  const inside = Number.isFinite(values[i]) && values[i] >= low && values[i] <= high;
+  dot.style.display = inside ? "" : "none";
+  if (inside) set(dot, { cx: x(grid[i]), cy: y(values[i]) });
+}
+

@@ -1,0 +1,81 @@
+const data = JSON.parse(document.getElementById("data").textContent);
+const byId = id => document.getElementById(id);
+const DEG = 180 / Math.PI, TURN = 2 * Math.PI, FORCES = ["F12", "F32", "F43", "F14"];
+const FORCE_PIN = { F12: "O2", F32: "A", F43: "B", F14: "O4" };
+const SWEEP_SECONDS = 6, ROWS = 360;   // one sweep at speed 1; positions of a sweep whose lengths were edited
+const ORDINARY = 0.95, OUTLIER = 3, ROOM = 1.6;   // a scale ends at ROOM times the 95th percentile where values diverge
+const unit = data.unit, still = window.matchMedia("(prefers-reduced-motion: reduce)").matches;
+
+let lengths = data.lengths.slice(), edited = false, branch = data.branch, grid = data.theta_2, row = data.start;
+let phase = row, playing = false, direction = data.omega_2 < 0 ? -1 : 1, lastTime = null, lastDraw = 0;
+let view = { width: 0, height: 0, k: 1, x: 0, y: 0 }, forceScale = { top: 0, cut: false };
+
+const table = () => data.branches[branch];
+const signAt = i => edited ? branch : table().sign[Math.min(i, grid.length - 1)];
+const at = i => closeLoop(lengths, data.theta_1, grid[i], signAt(i));
+const dynamic = () => !edited && "torque" in table();
+
+// ---- numbers -------------------------------------------------------------------------------
+function text(value, digits = 5) {
+  if (value === null || value === undefined || !Number.isFinite(value)) return "\u2013";
+  if (value === 0) return "0";
+  const size = Math.abs(value);
+  const shown = size >= 1e6 || size < 1e-4 ? value.toExponential(digits - 2) : value.toPrecision(digits);
+  return shown.replace("-", "\u2212").replace("e+", "e");
+}
+const rounded = (value, digits) => Math.abs(value) < 1e6 ? String(Number(value.toPrecision(digits))) : text(value, digits + 2);
+const degrees = value => value === null || !Number.isFinite(value) ? "\u2013" : (value * DEG).toFixed(3).replace("-", "\u2212");
+
+function valuesAt(i) {
+  const t = table(), out = {};
+  if (!edited) {
+    for (const [name, column] of Object.entries(t)) out[name] = column[i];
+    out.theta_2 = grid[i];
+    return out;
+  }
+  out.theta_2 = grid[i];
+  const p = at(i);
+  if (p) Object.assign(out, { theta_3: p.theta3, theta_4: p.theta4, condition: Math.abs(p.sinMu) });
+  if (p && data.omega_2 !== null) {
+    const r = rates(lengths, p, data.omega_2, data.alpha_2);
+    Object.assign(out, { omega_2: data.omega_2, omega_3: r.omega3, omega_4: r.omega4, alpha_2: data.alpha_2, alpha_3: r.alpha3, alpha_4: r.alpha4 });
+  }
+  return out;
+}
+
+function showNumbers(i) {
+  const v = valuesAt(i);
+  for (const k of [2, 3, 4]) {
+    byId(`theta_${k}`).textContent = degrees(v[`theta_${k}`] ?? null);
+    byId(`omega_${k}`).textContent = text(v[`omega_${k}`]);
+    byId(`alpha_${k}`).textContent = text(v[`alpha_${k}`]);
+  }
+  byId("condition").textContent = text(v.condition);
+  const across = v.theta_3 === undefined || v.theta_3 === null ? null : Math.atan2(Math.abs(Math.sin(v.theta_4 - v.theta_3)), Math.abs(Math.cos(v.theta_4 - v.theta_3)));
+  byId("mu").textContent = degrees(across);
+  if (dynamic()) {
+    byId("torque").textContent = text(v.torque);
+    for (const name of FORCES) {
+      const f = v[name], known = f[0] !== null;
+      byId(`${name}_x`).textContent = text(f[0]);
+      byId(`${name}_y`).textContent = text(f[1]);
+      byId(`${name}_size`).textContent = text(known ? Math.hypot(f[0], f[1]) : null);
+      byId(`${name}_angle`).textContent = known ? (Math.atan2(f[1], f[0]) * DEG).toFixed(2).replace("-", "\u2212") : "\u2013";
+    }
+  }
+  const assembled = at(i) !== null, singular = assembled && Math.abs(at(i).sinMu) < 8 * Number.EPSILON;
+  const status = byId("status");
+  status.hidden = assembled && !singular;
+  status.textContent = !assembled ? "The linkage does not assemble at this position." : singular ? "Coupler and output are in line: velocities have no value here." : "";
+  byId("theta").value = i;
+  const here = `${(grid[i] * DEG).toFixed(2)}\u00b0`.replace("-", "\u2212");
+  byId("theta-text").textContent = here;
+  byId("theta").setAttribute("aria-valuetext", `${(grid[i] * DEG).toFixed(2)} degrees`);
+  if (!playing) {
+    let words = assembled ? `Theta 2 ${here}, theta 3 ${degrees(v.theta_3)}, theta 4 ${degrees(v.theta_4)} degrees` : `Theta 2 ${here}: does not assemble`;
+    if (dynamic() && v.torque !== null) words += `, torque ${text(v.torque, 4)} newton metres`;
+    byId("live").textContent = words;
+    byId("picture-text").textContent = `Four-bar linkage, ${branch === 1 ? "open" : "crossed"} branch. ${words}`;
+  }
+}
+
