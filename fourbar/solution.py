@@ -52,17 +52,18 @@ class Solution:
     branch: NDArray[np.int8]
     """+1 open, -1 crossed."""
     theta_2: Array
-    theta_3: Array
-    theta_4: Array
-    sin_mu: Array
+    # the positions are None only where `out` named other quantities, which then are all that is wanted
+    theta_3: Array = None  # type: ignore[assignment]
+    theta_4: Array = None  # type: ignore[assignment]
+    sin_mu: Array = None  # type: ignore[assignment]
     """sin(theta_4 - theta_3), signed like the branch."""
-    condition: Array
+    condition: Array = None  # type: ignore[assignment]
     """Motion condition |sin(theta_4 - theta_3)|, in (0, 1]; 1 is best."""
-    A: Array
-    B: Array
-    G2: Array
-    G3: Array
-    G4: Array
+    A: Array = None  # type: ignore[assignment]
+    B: Array = None  # type: ignore[assignment]
+    G2: Array = None  # type: ignore[assignment]
+    G3: Array = None  # type: ignore[assignment]
+    G4: Array = None  # type: ignore[assignment]
     omega_2: Array | None = None
     omega_3: Array | None = None
     omega_4: Array | None = None

@@ -1,0 +1,53 @@
+"""The thesis's way to the forces: its thirteen equations per position, assembled and solved as a batch.
+
+The measure of speed for the eliminated form. Moments are taken about the mass centres, unknowns in
+the order F12, F32, F23, F43, F14, F34 (x, y each), T, as in the thesis (section 5.7).
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Vectors = dict[int, Array]
+"""For each bar 2, 3, 4 an array (n, 2)."""
+
+
+class FreeBodies(NamedTuple):
+    """What the thirteen equations are made of."""
+
+    to_first: Vectors
+    """From the mass centre to the first pin (O2, A, O4), m."""
+    to_second: Vectors
+    """From the mass centre to the second pin (A, B, B), m."""
+    inertia_force: Vectors
+    """m a_G minus the forces that act besides the pins', N."""
+    inertia_moment: dict[int, Array]
+    """I alpha minus the moments about G that act besides the pins', N m, (n,)."""
+
+
+F12, F32, F23, F43, F14, F34, TORQUE = 0, 2, 4, 6, 8, 10, 12
+
+
+def assemble(bodies: FreeBodies, drive_bar: int) -> tuple[Array, Array]:
+    """Matrices (n, 13, 13) and right-hand sides (n, 13)."""
+    n = len(bodies.inertia_moment[2])
+    matrix, right = np.zeros((n, 13, 13)), np.zeros((n, 13))
+    for row, bar, first, second in ((0, 2, F12, F32), (3, 3, F23, F43), (6, 4, F14, F34)):
+        for force, arm in ((first, bodies.to_first[bar]), (second, bodies.to_second[bar])):
+            matrix[:, row, force] = matrix[:, row + 1, force + 1] = 1.0
+            matrix[:, row + 2, force], matrix[:, row + 2, force + 1] = -arm[:, 1], arm[:, 0]
+        if bar == drive_bar:
+            matrix[:, row + 2, TORQUE] = 1.0
+        right[:, row : row + 2] = bodies.inertia_force[bar]
+        right[:, row + 2] = bodies.inertia_moment[bar]
+    for row, (force, reaction) in enumerate(((F32, F23), (F32 + 1, F23 + 1), (F43, F34), (F43 + 1, F34 + 1)), start=9):
+        matrix[:, row, force] = matrix[:, row, reaction] = 1.0
+    return matrix, right
+
+
+def solve_thirteen(bodies: FreeBodies, drive_bar: int) -> Array:
+    """The thirteen unknowns of each position, (n, 13)."""
+    matrix, right = assemble(bodies, drive_bar)
+    return np.asarray(np.linalg.solve(matrix, right[:, :, None])[:, :, 0])
