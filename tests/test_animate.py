@@ -66,7 +66,7 @@ def test_a_single_position_is_one_of_the_rows_and_the_first_shown() -> None:
 
 
 def test_positions_that_do_not_assemble_are_null() -> None:
-    data = embedded(animate.page(thesis()))
+    data = embedded(animate.page(thesis(fourbar.Sweep(0.0, 2 * math.pi, 360))))
     solution = fourbar.solve(replace(thesis(), motion=fourbar.Motion(np.array(data["theta_2"]), 0.2244)))
     assert [v is None for v in data["branches"]["1"]["torque"]] == np.isnan(solution.torque).tolist()
     assert data["branches"]["1"]["F12"][30] == [None, None]

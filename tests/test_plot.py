@@ -29,6 +29,9 @@ TOUCH = 1.0
 """Boxes of texts may share this many pixels: a box is wider than its ink."""
 
 
+FULL_TURN = fourbar.Sweep(0.0, 2 * math.pi, 360)
+
+
 def composed(scene, name, branches="one", position=None):
     painter, size, _ = FIGURES[name]
     with matplotlib_style():
@@ -118,8 +121,8 @@ def test_bars_are_drawn_to_scale_at_the_position_asked_for() -> None:
 
 
 def test_positions_that_do_not_assemble_leave_a_gap_and_poles_cut_the_line() -> None:
-    shown = view(thesis())
-    panel = composed(thesis(), "torque").axes[0]
+    shown = view(thesis(FULL_TURN))
+    panel = composed(thesis(FULL_TURN), "torque").axes[0]
     curve = panel.lines[1]
     closed = np.degrees(shown.sweep.theta_2[~shown.sweep.assembled])
     assert closed.size > 30
@@ -133,7 +136,7 @@ def test_positions_that_do_not_assemble_leave_a_gap_and_poles_cut_the_line() -> 
     _, top = panel.get_ylim()
     assert top < np.nanmax(np.abs(shown.sweep.torque))
     caption = " ".join(
-        t.get_text() for t in composed(thesis(), "torque").findobj(lambda artist: isinstance(artist, Text))
+        t.get_text() for t in composed(thesis(FULL_TURN), "torque").findobj(lambda artist: isinstance(artist, Text))
     )
     assert "Torque clipped at" in caption.replace("\n", " ")
 
@@ -145,7 +148,7 @@ def test_an_ordinary_curve_is_not_clipped() -> None:
 
 
 def test_transmission_angle_marks_limits_and_dead_centres() -> None:
-    panel = composed(thesis(), "transmission").axes[0]
+    panel = composed(thesis(FULL_TURN), "transmission").axes[0]
     marks = {line.get_label(): np.sort(line.get_xdata()) for line in panel.lines if line.get_marker() in "sD"}
     d, a, b, c = thesis().linkage.lengths
     # bars 3 and 4 folded: |b - c| between A and O4; bars 2 and 3 in line on the sweep: c seen from O2 at b - a or a + b
