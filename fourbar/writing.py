@@ -11,7 +11,16 @@ def write_bytes(path: str | Path, data: bytes) -> None:
     Raises OSError (full disk, read-only folder, a folder in the way).
     """
     target = Path(path)
-    handle, temporary = tempfile.mkstemp(prefix=f".{target.name}.", suffix=".part", dir=target.parent)
+    if target.exists() and not target.is_file():
+        # a device or pipe is written to; renaming onto it would replace /dev/null itself
+        with target.open("wb") as file:
+            file.write(data)
+        return
+    try:
+        handle, temporary = tempfile.mkstemp(prefix=f".{target.name[:100]}.", suffix=".part", dir=target.parent)
+    except OSError as error:
+        error.filename = str(target)  # the reader knows this name, not the temporary one
+        raise
     try:
         with os.fdopen(handle, "wb") as file:
             file.write(data)

@@ -1,0 +1,5 @@
+"""`python -m fourbar` is the same as `fourbar`."""
+
+from fourbar.cli import main
+
+main()

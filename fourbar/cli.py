@@ -1,0 +1,264 @@
+"""The command `fourbar`; what a command needs is imported when it is called."""
+
+import io
+import os
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from fourbar import __version__
+from fourbar.errors import DependencyError, FourBarError, InputError, NotAssembledError
+
+if TYPE_CHECKING:
+    from fourbar.scene import Scene
+
+HOLDS, BAD_INPUT, BROKEN, INTERRUPTED = 0, 2, 3, 130
+"""Exit statuses; 1 is kept for comparisons that fail, which are not made here."""
+MOST_POSITIONS = 1_000_000
+"""Positions that `analyze` prints: about a gigabyte of text."""
+
+scene_argument = click.argument("scene", type=click.Path(path_type=Path))
+out_option = click.option("-o", "--out", type=click.Path(path_type=Path), required=True, metavar="FILE")
+
+
+@click.group(context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(__version__, prog_name="fourbar")
+@click.option("--traceback", is_flag=True, help="Show where an internal error happened.")
+def group(traceback: bool) -> None:
+    """Closed formulas of the planar four-bar linkage: from a scene file to driving torque and pin forces.
+
+    Exit status: 0 all well (also when some positions do not assemble), 2 the input is bad, 3 the
+    environment or the program failed, 130 interrupted.
+    """
+    del traceback  # looked at where errors are told
+
+
+@group.command()
+@click.argument("lengths", nargs=4, metavar="D A B C")
+def classify(lengths: tuple[str, ...]) -> None:
+    """Name a linkage by its bar lengths: ground, input, coupler, output.
+
+    Bare numbers are metres; "30 cm" works too.
+    """
+    from fourbar.linkage import Bar, FourBar
+    from fourbar.mobility import grashof
+
+    d, a, b, c = _lengths(lengths)
+    linkage = FourBar(d, Bar(a), Bar(b), Bar(c))
+    found = grashof(linkage)
+    relation = "<" if found.surplus > 0.0 else ">" if found.surplus < 0.0 else "="
+    shortest, longest = min(linkage.lengths), max(linkage.lengths)
+    rest = sum(linkage.lengths) - shortest - longest
+    click.echo(found.name)
+    click.echo(f"s + l = {shortest + longest:.6g} m {relation} p + q = {rest:.6g} m (shortest + longest, other two)")
+
+
+@group.command()
+@scene_argument
+@click.option("--json", "form", flag_value="json", help="One object, SI, every digit.")
+@click.option("--csv", "form", flag_value="csv", help="One line per position, SI, every digit.")
+@click.option("--degrees/--radians", default=None, help="Angles theta; left out: degrees in the table, else radians.")
+@click.option("-o", "--out", type=click.Path(path_type=Path), metavar="FILE", help="Write there instead.")
+def analyze(scene: Path, form: str | None, degrees: bool | None, out: Path | None) -> None:
+    """Solve a scene: angles, speeds, accelerations, driving torque and pin forces."""
+    from fourbar import tables
+    from fourbar.scene import solve
+    from fourbar.writing import write_text
+
+    asked = _load(scene)
+    solution = solve(asked)
+    if not solution.assembled.any():
+        raise NotAssembledError(f"{scene}: motion.theta_2: the linkage assembles at none of the positions asked for")
+    if form is None:
+        text = _table_text(asked, solution, None if out else _terminal_width(), degrees is not False)
+    else:
+        write = tables.json_text if form == "json" else tables.csv_text
+        text = write(solution, degrees=bool(degrees))
+    if out is None:
+        click.echo(text, nl=False)
+    else:
+        write_text(out, text)
+
+
+@group.command()
+@click.argument("scene", type=click.Path(path_type=Path), required=False)
+@click.option("--lengths", nargs=4, metavar="D A B C", help="Ground, input, coupler, output (bare numbers: m).")
+@click.option("--omega", metavar="W", help="Speed of the input with --lengths (a bare number: rad/s).")
+@out_option
+def mjcf(scene: Path | None, lengths: tuple[str, ...] | None, omega: str | None, out: Path) -> None:
+    """Write a scene, or a linkage of uniform bars, as MJCF that runs on its own in MuJoCo."""
+    from fourbar import mjcf as writer
+    from fourbar.writing import write_text
+
+    if (scene is None) == (lengths is None):
+        raise click.UsageError("give a scene file or --lengths D A B C, one of the two")
+    if scene is not None:
+        if omega is not None:
+            raise click.UsageError("--omega goes with --lengths; a scene states its own omega_2")
+        write_text(out, writer.mjcf(_load(scene)))
+        return
+    assert lengths is not None
+    speed = {} if omega is None else {"omega": _number("--omega", omega, "rad/s")}
+    made = writer.scene_from_lengths(*_lengths(lengths), **speed)
+    write_text(out, writer.mjcf(made))
+    for line in writer.defaults_used(made):
+        click.echo(line)
+
+
+@group.command()
+@scene_argument
+@out_option
+@click.option(
+    "--figure",
+    default="overview",
+    show_default=True,
+    metavar="NAME",
+    help="overview, linkage, coupler, kinematics, torque, forces, hodograph, transmission or freebody.",
+)
+@click.option("--position", metavar="ANGLE", help='theta_2 of the linkage and free bodies, like "135 deg".')
+@click.option("--branches", default="one", show_default=True, metavar="WHICH", help="one or both.")
+def plot(scene: Path, out: Path, figure: str, position: str | None, branches: str) -> None:
+    """Draw a scene as SVG, PNG or PDF (by the ending of FILE)."""
+    from fourbar.plot import draw
+
+    at = None if position is None else _number("--position", position, "rad")
+    draw(_load(scene), out, figure, position=at, branches=branches)
+
+
+@group.command()
+@scene_argument
+@out_option
+@click.option(
+    "--picture",
+    "pictures",
+    multiple=True,
+    metavar="BAR=FILE",
+    help="A PNG or JPEG laid along input, coupler or output (pages).",
+)
+@click.option(
+    "--seconds", type=click.FloatRange(min=0.1, max=600.0), default=6.0, show_default=True, help="Length of a film."
+)
+def animate(scene: Path, out: Path, pictures: tuple[str, ...], seconds: float) -> None:
+    """Show a scene moving: one web page (.html), or a film (.gif, .mp4)."""
+    from fourbar.animate import write
+
+    attached = {}
+    for entry in pictures:
+        bar, equals, file = entry.partition("=")
+        if not equals:
+            raise InputError("--picture", entry, "must be like coupler=FILE")
+        attached[bar] = file
+    write(_load(scene), out, pictures=attached, seconds=seconds)
+
+
+def _load(path: Path) -> "Scene":
+    from fourbar.files import load
+    from fourbar.scene import Free, Sweep
+
+    scene = load(path)
+    for key, asked in (("motion.theta_2", scene.motion.theta_2), ("motion.free", scene.motion.free)):
+        if isinstance(asked, (Sweep, Free)) and asked.steps >= MOST_POSITIONS:
+            raise InputError(f"{key}.steps", asked.steps, f"must be below {MOST_POSITIONS} here", str(path))
+    return scene
+
+
+def _lengths(texts: tuple[str, ...]) -> list[float]:
+    names = ("ground", "input", "coupler", "output")
+    return [_number(f"length of {name}", text, "m", positive=True) for name, text in zip(names, texts, strict=True)]
+
+
+def _number(key: str, text: str, unit: str, *, positive: bool = False) -> float:
+    """A number of the command line: bare in SI, or with a unit."""
+    from fourbar.linkage import require
+
+    try:
+        return require(key, float(text), positive=positive)
+    except ValueError:
+        from fourbar.units import UnitError, to_si
+
+        try:
+            return require(key, to_si(text, unit), positive=positive)
+        except UnitError as error:
+            raise InputError(key, text, f"{error}; must be a number in {unit}, or one with a unit") from None
+
+
+def _terminal_width() -> int | None:
+    """Columns of the terminal; None where the output goes elsewhere."""
+    if not sys.stdout.isatty():
+        return None
+    import shutil
+
+    return shutil.get_terminal_size().columns
+
+
+def _table_text(scene: "Scene", solution: Any, width: int | None, degrees: bool) -> str:
+    from rich.console import Console
+    from rich.text import Text
+
+    from fourbar import tables
+
+    shown, left_out = tables.table(scene, solution, width, degrees=degrees)
+    text = io.StringIO()
+    console = Console(file=text, width=width or 10_000, color_system=None)
+    if scene.title:
+        console.print(Text(_printable(scene.title)))
+    for line in tables.heading(scene, solution):
+        console.print(Text(line))
+    console.print(shown)
+    if left_out:
+        console.print(Text(f"not shown: {', '.join(left_out)} (a wider terminal, --csv or --json has them)"))
+    return "\n".join(line.rstrip() for line in text.getvalue().split("\n"))
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Run a command and leave with its exit status."""
+    sys.exit(status(arguments))
+
+
+def status(arguments: list[str] | None = None) -> int:
+    """Run a command; what goes wrong becomes one line on standard error and an exit status."""
+    given = sys.argv[1:] if arguments is None else arguments
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="replace")  # a terminal that has no Greek still gets its table
+    try:
+        group.main(args=given, prog_name="fourbar", standalone_mode=False)
+        sys.stdout.flush()
+        return HOLDS
+    except BrokenPipeError:
+        _drop_output()  # the reader of the pipe has what it wants
+        return HOLDS
+    except (click.exceptions.Abort, KeyboardInterrupt):
+        return _say("interrupted", INTERRUPTED)
+    except click.ClickException as error:
+        return _say(error.format_message(), BAD_INPUT)
+    except DependencyError as error:
+        return _say(str(error), BROKEN)
+    except FourBarError as error:
+        return _say(str(error), BAD_INPUT)
+    except OSError as error:
+        _drop_output()
+        return _say(f"{error.filename or 'output'}: {error.strerror}", BROKEN)
+    except Exception as error:
+        if "--traceback" in given or os.environ.get("FOURBAR_TRACEBACK"):
+            raise
+        return _say(f"internal error: {type(error).__name__}: {error} (--traceback shows where)", BROKEN)
+
+
+def _drop_output() -> None:
+    """Leave nothing in the buffer that Python would try, and fail, to write at exit."""
+    try:
+        sys.stdout.flush()
+    except OSError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+def _say(message: str, code: int) -> int:
+    click.echo("error: " + _printable(message), err=True)
+    return code
+
+
+def _printable(text: str) -> str:
+    """One line without control characters: a title or file name does not steer the terminal."""
+    return " ".join("".join(letter if letter.isprintable() else " " for letter in text).split())

@@ -1,0 +1,175 @@
+"""What `fourbar analyze` prints: JSON, CSV, or a table for the reader; the quantities are those of `Solution`."""
+
+import csv
+import io
+import json
+import math
+from dataclasses import fields
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fourbar.kinematics import Array
+from fourbar.linkage import BAR_NAMES
+from fourbar.scene import OPEN, Scene
+from fourbar.solution import STATUS_NAMES, UNITS, VECTORS, Solution
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+SCHEMA = "fourbar-analyze/1"
+ANGLES = frozenset(name for name, unit in UNITS.items() if unit == "rad")
+FORCES = ("F12", "F32", "F43", "F14")
+MOST_DIGITS = 16
+"""Of a double."""
+
+
+def json_text(solution: Solution, *, degrees: bool = False) -> str:
+    """One object, SI; arrays over the positions, vectors as [x, y], null where there is no value."""
+    document: dict[str, Any] = {
+        "schema": SCHEMA,
+        "title": solution.title,
+        "angle_unit": "deg" if degrees else "rad",
+        "status": solution.status,
+        "branch": solution.branch.tolist(),
+    }
+    for name in _quantities(solution):
+        values = _values(solution, name, degrees)
+        document[name] = None if values is None else _nulled(values)
+    document["drive_bar"] = solution.drive_bar
+    document["assembled"] = solution.assembled.tolist()
+    return json.dumps(document, allow_nan=False) + "\n"
+
+
+def csv_text(solution: Solution, *, degrees: bool = False) -> str:
+    """One line per position; vectors as columns `A_x`, `A_y`, empty where there is no value."""
+    columns: dict[str, list[Any]] = {}
+    for name in _quantities(solution):
+        values = _values(solution, name, degrees)
+        heading = f"{name} [deg]" if degrees and name in ANGLES else name
+        if name in VECTORS:
+            for axis, letter in enumerate("xy"):
+                columns[f"{heading}_{letter}"] = _blank(solution) if values is None else _nulled(values[:, axis])
+        else:
+            columns[heading] = _blank(solution) if values is None else _nulled(values)
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(["status", "branch", "drive_bar", *columns])
+    rows = zip(solution.status, solution.branch.tolist(), *columns.values(), strict=True)
+    for status, branch, *row in rows:
+        writer.writerow([status, branch, solution.drive_bar, *("" if cell is None else repr(cell) for cell in row)])
+    return text.getvalue()
+
+
+def _quantities(solution: Solution) -> list[str]:
+    """Every quantity of a solution, evaluated or not; the time only where a free motion has one."""
+    names = [field.name for field in fields(Solution) if field.name in UNITS]
+    return [name for name in names if name != "time" or getattr(solution, name) is not None]
+
+
+def _values(solution: Solution, name: str, degrees: bool) -> Array | None:
+    values: Array | None = getattr(solution, name)
+    if values is not None and degrees and name in ANGLES:
+        return np.degrees(values)
+    return values
+
+
+def _nulled(values: Array) -> list[Any]:
+    """Python numbers, None for what is not finite."""
+    plain = values.tolist()
+    if np.isfinite(values).all():
+        return plain  # type: ignore[no-any-return]
+    if values.ndim == 2:
+        return [[_number(x), _number(y)] for x, y in plain]
+    return [_number(x) for x in plain]
+
+
+def _number(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+def _blank(solution: Solution) -> list[None]:
+    return [None] * len(solution)
+
+
+def heading(scene: Scene, solution: Solution) -> list[str]:
+    """The lines above the table: what was asked, and how many of the positions have an answer."""
+    d, a, b, c = scene.linkage.lengths
+    branch = "open" if scene.motion.branch == OPEN else "crossed"
+    lines = [
+        f"ground {d:.6g} m, input {a:.6g} m, coupler {b:.6g} m, output {c:.6g} m",
+        f"{branch} branch; drive on bar {scene.drive_bar} ({BAR_NAMES[scene.drive_bar]})",
+    ]
+    counts = np.bincount(solution.status_code, minlength=len(STATUS_NAMES))
+    parts = [
+        f"{count} {name.replace('_', ' ')}" for name, count in zip(STATUS_NAMES, counts.tolist(), strict=True) if count
+    ]
+    lines.append(f"{len(solution)} position{'s' if len(solution) != 1 else ''}: " + ", ".join(parts))
+    if solution.torque is not None and np.isfinite(solution.torque).any():
+        worst = int(np.nanargmax(np.abs(solution.torque)))
+        where = math.degrees(solution.theta_2[worst])
+        lines.append(f"largest torque {solution.torque[worst]:.6g} N m at theta_2 = {where:.6g} deg")
+    return lines
+
+
+def columns(scene: Scene, solution: Solution, *, degrees: bool = True) -> dict[str, list[str]]:
+    """The columns of the table, most wanted first: heading with unit -> cells."""
+    unit, factor = ("deg", 180.0 / math.pi) if degrees else ("rad", 1.0)
+    shown: dict[str, list[str]] = {f"theta_2\n{unit}": _cells(solution.theta_2 * factor, "angle")}
+    if solution.torque is not None:
+        shown[f"T{scene.drive_bar}\nN m"] = _cells(solution.torque)
+        shown["digits\nof T"] = _digits(solution)
+        for name in FORCES:
+            shown[f"|{name}|\nN"] = _cells(np.hypot(*getattr(solution, name).T))
+    for name in ("theta_3", "theta_4"):
+        shown[f"{name}\n{unit}"] = _cells(getattr(solution, name) * factor, "angle")
+    for name in ("omega_3", "omega_4", "alpha_3", "alpha_4"):
+        values = getattr(solution, name)
+        if values is not None:
+            shown[f"{name}\n{UNITS[name]}"] = _cells(values)
+    shown["sin mu\n"] = _cells(solution.sin_mu)
+    return shown
+
+
+def table(scene: Scene, solution: Solution, width: int | None, *, degrees: bool = True) -> "tuple[Table, list[str]]":
+    """The table for a terminal of the given width (None: as wide as it needs), and the columns left out of it."""
+    from rich import box
+    from rich.table import Table
+    from rich.text import Text
+
+    cells = columns(scene, solution, degrees=degrees)
+    if (solution.status_code != 0).any():
+        cells = {"status\n": [status.replace("_", " ") for status in solution.status], **cells}
+    needed = 0
+    kept: list[str] = []
+    for name, column in cells.items():
+        needed += 2 + max(len(cell) for cell in (*name.split("\n"), *column))
+        if width is None or needed <= width:
+            kept.append(name)
+    shown = Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 2, 0, 0))
+    for name in kept:
+        shown.add_column(Text(name), justify="right", no_wrap=True)
+    for row in zip(*(cells[name] for name in kept), strict=True):
+        shown.add_row(*(Text(cell) for cell in row))
+    return shown, [name.split("\n")[0] for name in cells if name not in kept]
+
+
+def _cells(values: Array, kind: str = "") -> list[str]:
+    """Six digits; angles with four decimals; a dash where there is no value."""
+    form = "{:.4f}" if kind == "angle" else "{:.6g}"
+    return [form.format(value) if math.isfinite(value) else "-" for value in values.tolist()]
+
+
+def _digits(solution: Solution) -> list[str]:
+    """How many digits of the torque are not rounding."""
+    if solution.torque is None or solution.torque_error is None:
+        return ["-"] * len(solution)
+    cells = []
+    for value, error in zip(solution.torque.tolist(), solution.torque_error.tolist(), strict=True):
+        if not math.isfinite(value) or not math.isfinite(error):
+            cells.append("-")
+        elif value == 0.0 or error == 0.0:
+            cells.append(str(MOST_DIGITS) if error == 0.0 else "0")
+        else:
+            cells.append(str(min(max(math.floor(math.log10(abs(value) / error)), 0), MOST_DIGITS)))
+    return cells
