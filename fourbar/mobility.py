@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.linkage import MOVING_BARS, FourBar
-from fourbar.margins import TOUCHING, Array, U, scaled
+from fourbar.margins import TOUCHING, Array, U, unit_of
 
 TURN = 2.0 * math.pi
 MARGIN = math.radians(1.0)
@@ -42,7 +42,7 @@ class LimitPosition(NamedTuple):
 
 
 class _Reach(NamedTuple):
-    """Bar k against the rest of the loop, in the unit of `scaled`; sums within rounding of 0 are 0."""
+    """Bar k against the rest of the loop, in the unit of `unit_of`; sums within rounding of 0 are 0."""
 
     d: float
     own: float
@@ -81,7 +81,8 @@ class _Reach(NamedTuple):
 def _reach(linkage: FourBar, bar: int) -> _Reach:
     if bar not in MOVING_BARS:
         raise ValueError(f"bar = {bar!r}: must be 2, 3 or 4")
-    _, d, *moving = scaled(linkage)
+    unit = unit_of(linkage)  # exact, and no product of lengths leaves the range of doubles
+    d, *moving = (length / unit for length in linkage.lengths)
     own = moving.pop(bar - 2)
     return _Reach(d, own, *moving)
 

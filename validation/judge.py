@@ -187,10 +187,10 @@ def breakdown(scene: str, engine: str, error: BaseException) -> Row:
     """The row of an engine that took its process with it, or never came back."""
     if isinstance(error, TimeoutError):
         reason = "the engine hung and was stopped"
+    elif type(error).__name__ in ("ProcessExpired", "KilledWorker"):  # of Pebble, of Dask
+        reason = f"the engine crashed its process (exit code {getattr(error, 'exitcode', 'unknown')})"
     else:
-        code = getattr(error, "exitcode", None)
-        died = f"exit code {code}" if code is not None else " ".join(str(error).split()) or type(error).__name__
-        reason = f"the engine crashed its process ({died})"
+        reason = " ".join(f"{type(error).__name__}: {error}".split())
     return _failure(scene, engine, "", reason)
 
 

@@ -1,0 +1,150 @@
+"""Nothing is lost: whatever dies, finished scenes stay, and a rerun ends with the same bytes."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fourbar.errors import FourBarError
+from fourbar.scene import Command, Scene
+from tests.scenes import crank_rocker
+from validation.answer import Answer
+from validation.judge import Witness
+from validation.report.summary import SCENES_SHOWN, Summary
+from validation.results import FAILS, from_csv
+from validation.run import chosen, run
+from validation.suite import pool
+from validation.suite.random import LinkageType
+from validation.suite.scenes import Random
+from validation.suite.store import RunningError, Store
+from validation.tolerance import EQUIVALENCE
+
+SEED = 7
+TYPES = tuple(LinkageType)
+EXACT = chosen("energy-method")
+
+
+@dataclass(frozen=True)
+class Few:
+    """Scenes made in code; the names say which engine misbehaves where."""
+
+    names: tuple[str, ...] = ("a", "b", "c", "d")
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    def name(self, index: int) -> str:
+        return self.names[index]
+
+    def scene(self, index: int) -> Scene:
+        return crank_rocker(title=self.names[index])
+
+    def fingerprint(self) -> str:
+        return repr(self.names)
+
+
+class Moody:
+    """Agrees, except that it kills its process on scene b and hangs on scene c."""
+
+    name = "moody"
+
+    def answer(self, scene: Scene, command: Command) -> Answer:
+        if scene.title == "b":
+            os.kill(os.getpid(), signal.SIGSEGV)
+        if scene.title == "c":
+            time.sleep(3600.0)
+        return Answer("moody", "exact", refusal="not asked")
+
+
+def judge_all(suite: object, out: Path, witnesses: tuple[Witness, ...] = EXACT, workers: int = 2) -> Summary:
+    *_, last = run(suite, out, witnesses, workers=workers)  # type: ignore[arg-type]
+    assert isinstance(last, Summary)
+    return last
+
+
+def test_an_engine_that_crashes_or_hangs_costs_its_own_rows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(pool, "SECONDS_PER_SCENE", 4.0)
+    moody = Witness("moody", f"{__name__}:Moody", EQUIVALENCE)
+    judge_all(Few(), tmp_path / "run", (*EXACT, moody))
+    rows = from_csv(tmp_path / "run" / "results.csv")
+    failing = {(row.scene, row.engine): row.reason for row in rows if row.verdict == FAILS}
+    assert set(failing) == {("b", "moody"), ("c", "moody")}
+    assert "crashed" in failing["b", "moody"]
+    assert "hung" in failing["c", "moody"]
+    for scene in "abcd":
+        assert any(row.scene == scene and row.engine == "energy-method" for row in rows)
+
+
+def test_the_bytes_depend_neither_on_the_workers_nor_on_the_order(tmp_path: Path) -> None:
+    suite = Random(45, SEED, TYPES)
+    for workers in (1, 2):
+        judge_all(suite, tmp_path / str(workers), workers=workers)
+    for name in ("results.csv", "results.parquet"):
+        assert (tmp_path / "1" / name).read_bytes() == (tmp_path / "2" / name).read_bytes()
+
+
+def test_random_scenes_depend_on_seed_and_index_alone() -> None:
+    short, long = Random(3, SEED, TYPES), Random(30, SEED, TYPES)
+    assert short.scene(2).linkage == long.scene(2).linkage
+    assert short.scene(2).linkage != Random(3, SEED + 1, TYPES).scene(2).linkage
+    names = [long.name(index) for index in range(len(long))]
+    assert names == sorted(names)
+
+
+def test_two_runs_into_one_folder_refuse_each_other(tmp_path: Path) -> None:
+    with Store(tmp_path, {}).held(), pytest.raises(RunningError), Store(tmp_path, {}).held():
+        pass
+    with Store(tmp_path, {}).held():
+        pass
+
+
+def test_another_suite_does_not_resume_the_parts_of_this_one(tmp_path: Path) -> None:
+    for identity, kept in (({"scenes": "one"}, 0), ({"scenes": "one"}, 1), ({"scenes": "two"}, 0)):
+        with Store(tmp_path, identity).held() as store:
+            assert len(store.done()) == kept
+            store.put(0, [])
+
+
+def start(out: Path, count: int) -> subprocess.Popen[bytes]:
+    command = [sys.executable, "-m", "validation", "run", "--random", str(count), "--engines", "energy-method"]
+    return subprocess.Popen(
+        [*command, "--out", str(out)],
+        cwd=Path(__file__).parent.parent,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        start_new_session=True,
+    )
+
+
+def wait_for_parts(out: Path, process: subprocess.Popen[bytes], at_least: int) -> None:
+    deadline = time.monotonic() + 60.0
+    while len(list(out.glob("parts/*.csv"))) < at_least and process.poll() is None and time.monotonic() < deadline:
+        time.sleep(0.01)
+
+
+def test_killed_three_times_a_rerun_ends_with_the_bytes_of_an_undisturbed_run(tmp_path: Path) -> None:
+    count, undisturbed, disturbed = SCENES_SHOWN + 20, tmp_path / "undisturbed", tmp_path / "disturbed"
+    assert start(undisturbed, count).wait(timeout=100) == 0
+    rng = np.random.default_rng(SEED)
+    for kill in range(3):
+        process = start(disturbed, count)
+        wait_for_parts(disturbed, process, at_least=1 + 2 * kill)
+        time.sleep(float(rng.uniform(0.0, 0.1)))
+        os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
+    assert start(disturbed, count).wait(timeout=100) == 0
+    for name in ("results.csv", "results.parquet"):
+        assert (disturbed / name).read_bytes() == (undisturbed / name).read_bytes()
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")
+def test_a_read_only_folder_is_said(tmp_path: Path) -> None:
+    tmp_path.chmod(0o500)
+    with pytest.raises((OSError, FourBarError)):
+        judge_all(Few(), tmp_path / "run")
