@@ -3,6 +3,8 @@
 import io
 import os
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -42,8 +44,8 @@ def classify(lengths: tuple[str, ...]) -> None:
 
     Bare numbers are metres; "30 cm" works too.
     """
+    from fourbar.grashof import grashof
     from fourbar.linkage import Bar, FourBar
-    from fourbar.mobility import grashof
 
     d, a, b, c = _lengths(lengths)
     linkage = FourBar(d, Bar(a), Bar(b), Bar(c))
@@ -68,7 +70,8 @@ def analyze(scene: Path, form: str | None, degrees: bool | None, out: Path | Non
     from fourbar.writing import write_text
 
     asked = _load(scene)
-    solution = solve(asked)
+    with _named(scene):
+        solution = solve(asked)
     if not solution.assembled.any():
         raise NotAssembledError(f"{scene}: motion.theta_2: the linkage assembles at none of the positions asked for")
     if form is None:
@@ -97,7 +100,9 @@ def mjcf(scene: Path | None, lengths: tuple[str, ...] | None, omega: str | None,
     if scene is not None:
         if omega is not None:
             raise click.UsageError("--omega goes with --lengths; a scene states its own omega_2")
-        write_text(out, writer.mjcf(_load(scene)))
+        with _named(scene):
+            text = writer.mjcf(_load(scene))
+        write_text(out, text)
         return
     assert lengths is not None
     speed = {} if omega is None else {"omega": _number("--omega", omega, "rad/s")}
@@ -124,7 +129,8 @@ def plot(scene: Path, out: Path, figure: str, position: str | None, branches: st
     from fourbar.plot import draw
 
     at = None if position is None else _number("--position", position, "rad")
-    draw(_load(scene), out, figure, position=at, branches=branches)
+    with _named(scene):
+        draw(_load(scene), out, figure, position=at, branches=branches)
 
 
 @group.command()
@@ -150,7 +156,19 @@ def animate(scene: Path, out: Path, pictures: tuple[str, ...], seconds: float) -
         if not equals:
             raise InputError("--picture", entry, "must be like coupler=FILE")
         attached[bar] = file
-    write(_load(scene), out, pictures=attached, seconds=seconds)
+    with _named(scene):
+        write(_load(scene), out, pictures=attached, seconds=seconds)
+
+
+@contextmanager
+def _named(path: Path) -> Iterator[None]:
+    """Mistakes of a scene that show only when it is solved name its file too."""
+    try:
+        yield
+    except InputError as error:
+        if error.file is None and error.key.startswith(("motion", "lengths", "bars", "drive", "loads", "effects")):
+            raise error.in_file(str(path)) from None
+        raise
 
 
 def _load(path: Path) -> "Scene":
