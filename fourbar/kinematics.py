@@ -255,7 +255,10 @@ def _parallel(state: State, u1: tuple[Any, Any]) -> None:
     if not ((a == c and b == d) or (a == b and c == d)) or not isinstance(state.sin_mu, np.ndarray):
         return  # no such pairs, or positions of the second pass, which are others
     half_turn = np.sign(state.diagonal.t)
-    sine, cosine = 2.0 * state.diagonal.t * state.diagonal.w, state.diagonal.w * (1.0 - state.diagonal.t * state.diagonal.t)
+    sine, cosine = (
+        2.0 * state.diagonal.t * state.diagonal.w,
+        state.diagonal.w * (1.0 - state.diagonal.t * state.diagonal.t),
+    )
     none = np.zeros(state.theta_2.shape, dtype=bool)
     together = (state.branch == half_turn) if (a == c and b == d) else none
     folded = (state.branch == -half_turn) if (a == b and c == d) else none

@@ -109,4 +109,3 @@ def solve_pins(
     F14 = (F43[0] - R4[0], F43[1] - R4[1])
     F12 = (-R2[0] - F32[0], -R2[1] - F32[1])
     return PinForces(F12, F32, F43, F14, torque, sine)
-

@@ -140,6 +140,9 @@ DEFAULT_STEPS = 360
 BLOCK = 4096
 """Positions evaluated at a time, measured: fewer pay for calls, more leave the second-level cache."""
 
+LIVE_ARRAYS = 96
+"""More than a block ever holds at once."""
+
 
 def command(scene: Scene) -> Command:
     """The positions that the scene's motion names, each with its branch."""
@@ -204,13 +207,27 @@ def solve(
     if stage != "position" and where.omega_2 is None:
         raise InputError("motion.omega_2", None, f"is needed for the stage {stage!r}")
     code = np.empty(n, dtype=np.uint8)
+    lid = _warm_heap() if n > BLOCK else None
     unwrapped = {name: Unwrapped() for name in ("theta_3", "theta_4") if name in result}
     for start in range(0, n, BLOCK):
         part = slice(start, min(start + BLOCK, n))
         code[part] = _solve_block(scene, where, part, wanted, {name: array[part] for name, array in result.items()})
         for name, turns in unwrapped.items():
             turns.extend(result[name][part])
+    del lid
     return Solution(scene.title, scene.drive_bar, code, np.asarray(where.branch), where.theta_2, **result)
+
+
+def _warm_heap() -> Array:
+    """Memory for the arrays of a block, freed below a small array that is kept.
+
+    The C library returns the free top of its heap to the system, and the next block would fault
+    every page in again: three times the cost of the arithmetic. The array on top prevents that.
+    """
+    ballast = [np.empty(BLOCK) for _ in range(LIVE_ARRAYS)]
+    lid = np.empty(BLOCK)  # too large for a hole further down
+    del ballast
+    return lid
 
 
 def _solve_free(scene: Scene, stage: str | None, out: Mapping[str, Array] | None) -> Solution:

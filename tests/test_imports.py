@@ -1,0 +1,72 @@
+"""Imports go one way, and `import fourbar` loads numpy alone."""
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+HEAVY = ("pint", "click", "rich", "jinja2", "matplotlib", "scipy", "joblib", "mujoco", "pinocchio", "flint", "mpmath")
+ENGINES = {"mujoco": "mujoco", "pinocchio": "pinocchio"}
+LAYERS = [
+    ("errors",),
+    ("linkage",),
+    ("margins", "kinematics"),
+    ("effects",),
+    ("kinetostatics", "transmission", "mobility"),
+]
+"""Inside `fourbar`: none of these imports one that stands later; at import time or inside a function."""
+LATER = ("scene", "files", "mjcf", "plot", "cli", "animate")
+
+
+def imported(path: Path) -> set[str]:
+    """Full names of all modules that a file imports anywhere."""
+    names = set()
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            names |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            names.add(node.module)
+            names |= {f"{node.module}.{alias.name}" for alias in node.names}
+    return names
+
+
+def test_import_fourbar_loads_numpy_alone() -> None:
+    code = "import sys, fourbar; print(*sorted({name.partition('.')[0] for name in sys.modules}))"
+    out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
+    assert "numpy" in out
+    assert not set(HEAVY) & set(out)
+
+
+@pytest.mark.parametrize("path", sorted((ROOT / "fourbar").rglob("*.py")), ids=lambda path: path.stem)
+def test_the_product_knows_neither_harness_nor_engines(path: Path) -> None:
+    roots = {name.partition(".")[0] for name in imported(path)}
+    assert not roots & {"validation", "tests", *ENGINES}
+
+
+@pytest.mark.parametrize("path", sorted((ROOT / "validation").rglob("*.py")), ids=lambda path: path.stem)
+def test_each_engine_is_imported_under_its_own_name_alone(path: Path) -> None:
+    names = imported(path)
+    assert not {name for name in names if name.partition(".")[0] == "tests"}
+    for engine in ENGINES:
+        if any(name.partition(".")[0] == engine for name in names):
+            assert path.parent.name == "engines" or path.parent.parent.name == "engines"
+            assert engine in path.relative_to(ROOT).as_posix()
+
+
+def modules(layer: tuple[str, ...]) -> list[Path]:
+    """The files of a layer, a package file by file."""
+    return [
+        path for name in layer for path in (ROOT / "fourbar").rglob("*.py") if name in (path.stem, path.parent.name)
+    ]
+
+
+def test_layers_of_the_product() -> None:
+    assert all(modules(layer) for layer in LAYERS)
+    for number, layer in enumerate(LAYERS):
+        later = {name for above in LAYERS[number + 1 :] for name in above} | set(LATER)
+        for path in modules(layer):
+            known = {name.split(".")[1] for name in imported(path) if name.startswith("fourbar.")}
+            assert not known & later, (path, known & later)

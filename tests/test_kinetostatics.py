@@ -1,0 +1,136 @@
+"""Pin forces and torque against the thirteen equations, power, sums over the whole linkage, and the thesis's figures."""
+
+import math
+
+import numpy as np
+import pytest
+
+import fourbar
+from validation.bench import bodies_of, command, example
+from validation.thirteen import assemble, solve_thirteen
+
+EPS = 2.0**-52
+SOLVED = 1e-11
+"""Relative: LU of the 13x13 system, whose condition is below 1e4 on this crank-rocker."""
+BALANCE = 64 * EPS
+"""Of the sum of absolute terms: about twenty roundings each."""
+PRINTED = 5e-14
+"""Relative: the thesis's case recomputed in doubles elsewhere, printed to 16 digits."""
+
+
+def scene(drive_bar: int) -> fourbar.Scene:
+    link = fourbar.FourBar(
+        0.3,
+        fourbar.Bar(0.1, 0.2, 1e-3, (0.03, 0.4)),
+        fourbar.Bar(0.25, 0.5, None, (0.1, -0.2)),
+        fourbar.Bar(0.22, 0.4),
+        0.3,
+    )
+    loads = (fourbar.Load(3, (5.0, 1.0), (0.05, 0.3), 0.2, "bar"), fourbar.Load(4, (-3.0, 0.5)))
+    effects = (fourbar.Gravity(), fourbar.Viscous.at(O2=0.1, A=0.05, B=0.02), fourbar.Friction.at(O4=0.03))
+    return fourbar.Scene(link, fourbar.Motion(np.linspace(0.1, 6.0, 31), -8.0, 20.0), drive_bar, loads, effects)
+
+
+def test_the_thirteen_equations_give_the_same() -> None:
+    at = command(50)
+    bodies = bodies_of(example(), at)
+    unknowns, solution = solve_thirteen(bodies, 2), fourbar.solve(example(), at=at)
+    for name, column in (("F12", 0), ("F32", 2), ("F43", 6), ("F14", 8)):
+        ours = getattr(solution, name)
+        assert np.max(np.abs(unknowns[:, column : column + 2] - ours)) <= SOLVED * np.max(np.abs(ours))
+    assert solution.torque is not None
+    assert np.max(np.abs(unknowns[:, 12] - solution.torque)) <= SOLVED * np.max(np.abs(solution.torque))
+    matrix, _ = assemble(bodies, 2)
+    assert np.count_nonzero(matrix[7]) == 12 + 12 + 1 + 8
+
+
+@pytest.mark.parametrize("drive_bar", [2, 3, 4])
+def test_power_in_equals_power_out(drive_bar: int) -> None:
+    """T omega + power of loads and effects = d/dt of the kinetic energy = sum of m a . v + I alpha omega."""
+    case = scene(drive_bar)
+    s = fourbar.solve(case)
+    state = fourbar.kinematics.close_loop(case.linkage, s.theta_2, 1)
+    fourbar.kinematics.add_velocities(state, -8.0)
+    terms = [s.torque * getattr(s, f"omega_{drive_bar}")]
+    terms += [np.broadcast_to(term.power(state), s.theta_2.shape) for term in (*case.loads, *case.effects)]
+    for number in (2, 3, 4):
+        bar = case.linkage.bar(number)
+        v = state.velocity(number, *fourbar.kinematics.centre_in_bar(bar))
+        a = getattr(s, f"a_G{number}")
+        terms.append(-bar.mass * (a[:, 0] * v[0] + a[:, 1] * v[1]))
+        terms.append(-bar.inertia * getattr(s, f"alpha_{number}") * getattr(s, f"omega_{number}"))
+    assert np.all(np.abs(sum(terms)) <= 20 * BALANCE * sum(np.abs(term) for term in terms))
+
+
+@pytest.mark.parametrize("drive_bar", [2, 3, 4])
+def test_forces_from_outside_equal_mass_times_acceleration(drive_bar: int) -> None:
+    case = scene(drive_bar)
+    s = fourbar.solve(case)
+    assert s.F12 is not None and s.F14 is not None
+    gravity = np.array([0.0, -9.81])
+    inertia = sum(case.linkage.bar(k).mass * (getattr(s, f"a_G{k}") - gravity) for k in (2, 3, 4))
+    angle = 1.0 + s.theta_3
+    loads = 5.0 * np.stack([np.cos(angle), np.sin(angle)], axis=1) - 3.0 * np.array([math.cos(0.5), math.sin(0.5)])
+    gap = s.F12 + s.F14 + loads - inertia
+    size = np.abs(s.F12) + np.abs(s.F14) + np.abs(loads) + np.abs(inertia)
+    assert np.all(np.abs(gap) <= 20 * BALANCE * size.max(axis=1, keepdims=True))
+
+
+CORRECT = {
+    # I_G3, I_G4: torque, F12, F32, F43, F14 of the thesis's model mechanism in SI units
+    (2.924725333333334e-05, 1.0752666666666668e-05): (
+        3.093307799397968,
+        (7.0338395650111, -2.1219312151085874),
+        (-15.481213051434557, 0.5693047015320454),
+        (-15.477291466013861, 0.5558579890407687),
+        (-15.477558824261218, 0.5526234623357096),
+    ),
+    (0.01374258058666667, 0.0006774193333333334): (
+        3.0930935923198564,
+        (7.03311775702161, -2.1212094071190957),
+        (-15.480491243445071, 0.5685828935425536),
+        (-15.476569658024376, 0.5551361810512767),
+        (-15.476837016271721, 0.5519016543462177),
+    ),
+}
+"""Linares Mendoza, UNAM FES Cuautitlan, section 5.7, with its errors of units corrected."""
+
+
+@pytest.mark.parametrize("inertias", CORRECT)
+def test_the_model_mechanism_of_the_thesis(inertias: tuple[float, float]) -> None:
+    link = fourbar.FourBar(
+        0.2,
+        fourbar.Bar(0.48, 57, 11.119275, (0.765, 0)),
+        fourbar.Bar(0.55, 0.544, inertias[0]),
+        fourbar.Bar(0.2, 0.2, inertias[1]),
+        math.radians(45),
+    )
+    loads = [fourbar.Load(2, (10, 0), (0.05, math.radians(265)))]
+    loads += [fourbar.Load(k, moment=-0.15) for k in (2, 3, 4)]
+    s = fourbar.solve(fourbar.Scene(link, fourbar.Motion(math.radians(135), 0.2244), 4, tuple(loads)))
+    torque, *forces = CORRECT[inertias]
+    assert s.torque is not None
+    assert s.torque[0] == pytest.approx(torque, rel=PRINTED)
+    for name, force in zip(("F12", "F32", "F43", "F14"), forces, strict=True):
+        assert getattr(s, name)[0] == pytest.approx(force, rel=0, abs=PRINTED * math.hypot(*force))
+
+
+def test_nothing_acts_nothing_is_carried() -> None:
+    link = fourbar.FourBar(0.3, fourbar.Bar(0.1), fourbar.Bar(0.25), fourbar.Bar(0.22))
+    s = fourbar.solve(fourbar.Scene(link, fourbar.Motion(1.0, 5.0)))
+    assert s.torque is not None and s.torque[0] == 0.0
+    assert s.F12 is not None and not s.F12.any()
+
+
+def test_written_into_given_arrays() -> None:
+    case = scene(2)
+    whole = fourbar.solve(case)
+    out = {"torque": np.empty(31), "F43": np.empty((31, 2))}
+    part = fourbar.solve(case, out=out)
+    assert part.torque is out["torque"] and np.array_equal(out["torque"], whole.torque)  # type: ignore[arg-type]
+    assert np.array_equal(out["F43"], whole.F43)  # type: ignore[arg-type]
+    assert part.F12 is None and part.theta_3 is None
+    with pytest.raises(fourbar.InputError, match=r"out\.torque"):
+        fourbar.solve(case, out={"torque": np.empty(30)})
+    with pytest.raises(fourbar.InputError, match="T2"):
+        fourbar.solve(case, out={"T2": np.empty(31)})
