@@ -65,6 +65,7 @@ def draw_linkage(axes: "Axes", view: View, labels: Labels) -> None:
         if r_across != 0.0 or not 0.0 <= r_along <= bar.length:  # off the bar: tied to it by a line
             axes.plot(*zip(where[ENDS[number][0]], here, strict=True), color=colour, lw=0.8, ls=":", zorder=3)
         mass_centre(axes, here)
+        labels.keep_off(axes, here, here)
         labels.add(Label(axes, f"$G_{number}$", here, middle, colour, 8.0, 3.0))
     axes.set_aspect("equal", adjustable="datalim")
     axes.margins(0.08)
