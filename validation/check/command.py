@@ -59,7 +59,7 @@ def judge_table(scene: Scene, table: Table) -> Judgement:
     def judged(quantity: str, ours: Array, theirs: Array) -> tuple[Array, Array]:
         scale = divisor(yardstick(quantity, scene, right, getattr(right, quantity)))
         error = angle_aware_difference(quantity, ours, theirs) / scale
-        condition = condition_of(quantity, right)
+        condition = condition_of(quantity, scene.linkage, right)
         allowed = EQUIVALENCE.allowed(condition) + table.rounding[quantity] / scale
         return error, np.where(condition * NOTHING_TO_TELL > EPS, allowed, np.inf)
 

@@ -66,7 +66,7 @@ def _draw_quantity(
     top.plot(
         degrees, np.where(shown, value(ours), np.nan), color="#bbbbbb", lw=6, solid_capstyle="butt", label="formulas"
     )
-    allowed = EQUIVALENCE.allowed(condition_of(quantity, solution))
+    allowed = EQUIVALENCE.allowed(condition_of(quantity, record.scene.linkage, solution))
     below.plot(degrees, np.where(shown, allowed, np.nan), color=INK, lw=1, ls="dashed")
     below.annotate("allowed to exact engines", (0.01, 0.9), xycoords="axes fraction", fontsize=7, color=INK)
     for answer in answers:
