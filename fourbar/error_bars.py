@@ -53,8 +53,8 @@ def error_bars(state: State, pins: PinForces, terms: Iterable[Term], drive_bar: 
         else:
             other = solve_pins(replace(state, linkage=linkage), moved_terms, drive_bar)
         torque += rounded(other.torque - pins.torque) ** 2
-        for total, before, after in zip(forces, pins[:4], other[:4], strict=True):
-            total += rounded(after[0] - before[0]) ** 2 + rounded(after[1] - before[1]) ** 2
+        for k, (before, after) in enumerate(zip(pins[:4], other[:4], strict=True)):
+            forces[k] += rounded(after[0] - before[0]) ** 2 + rounded(after[1] - before[1]) ** 2
     scale = TYPICAL / math.sqrt(EVALUATIONS)
     torque_error, force_error = scale * np.sqrt(torque), scale * np.sqrt(forces.max(axis=0))
     sizes = [np.hypot(rounded(x), rounded(y)) for x, y in pins[:4]]

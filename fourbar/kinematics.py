@@ -48,7 +48,7 @@ class State:
 
     linkage: FourBar
     theta_2: Array
-    branch: Array
+    branch: NDArray[np.int8]
     assembled: NDArray[np.bool_]
     u2: Vector
     u3: Vector

@@ -139,7 +139,7 @@ def _triangle(
     )
     if growths is not None:
         x, y, squared, w = (part + next(growths) * part for part in (x, y, squared, w))
-        constants = tuple(part + next(growths) * part for part in constants)  # type: ignore[assignment]
+        constants = tuple(part + next(growths) * part for part in constants)
     return t, x, y, squared, w, constants
 
 

@@ -41,7 +41,7 @@ class Sweep:
 
 @dataclass(frozen=True, slots=True)
 class FromLimit:
-    """theta_2 = limit position number `limit` of the input (1, 2, ... counter-clockwise from theta_1) + `offset` (rad)."""
+    """theta_2 = limit position number `limit` of the input (1, 2, ... from theta_1 on) + `offset` (rad)."""
 
     limit: int
     offset: float = 0.0
@@ -349,5 +349,5 @@ def _put(target: Array, value: Array | Vector | float | None, where: slice | NDA
 def _piece(value: float | Array | None, part: slice) -> float | Array:
     """A number for all positions, or the part of an array that belongs to a block."""
     if value is None or np.ndim(value) == 0:
-        return value or 0.0  # type: ignore[return-value]
+        return value or 0.0
     return value[part]  # type: ignore[index]

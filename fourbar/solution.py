@@ -120,7 +120,7 @@ class Unwrapped:
     def extend(self, angles: Array) -> None:
         """Unwrap the next angles, each in [-pi, pi], in place; gaps (NaN) are stepped over."""
         low, high = float(angles.min()), float(angles.max())
-        if low == low and self.last is not None and self.turns == 0.0:
+        if not np.isnan(low) and self.last is not None and self.turns == 0.0:
             low, high = min(low, self.last), max(high, self.last)
         if high - low < np.pi and self.turns == 0.0:
             self.last = float(angles[-1])

@@ -15,7 +15,7 @@ LAYERS = [
     ("linkage",),
     ("margins", "kinematics"),
     ("effects",),
-    ("kinetostatics", "transmission", "mobility"),
+    ("kinetostatics", "mobility"),
 ]
 """Inside `fourbar`: none of these imports one that stands later; at import time or inside a function."""
 LATER = ("scene", "files", "mjcf", "plot", "cli", "animate")
@@ -56,11 +56,14 @@ def test_each_engine_is_imported_under_its_own_name_alone(path: Path) -> None:
             assert engine in path.relative_to(ROOT).as_posix()
 
 
+def in_package(name: str) -> list[Path]:
+    """`fourbar/name.py`, or the files of `fourbar/name/`."""
+    return [*(ROOT / "fourbar").glob(f"{name}.py"), *(ROOT / "fourbar" / name).glob("*.py")]
+
+
 def modules(layer: tuple[str, ...]) -> list[Path]:
-    """The files of a layer, a package file by file."""
-    return [
-        path for name in layer for path in (ROOT / "fourbar").rglob("*.py") if name in (path.stem, path.parent.name)
-    ]
+    """The files of a layer."""
+    return [path for name in layer for path in in_package(name)]
 
 
 def test_layers_of_the_product() -> None:

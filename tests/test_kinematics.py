@@ -1,4 +1,4 @@
-"""Kinematics against second derivations: complex Newton on the closure, differences of positions in 50 digits, symmetry."""
+"""Kinematics against second derivations: Newton on the closure, 50-digit differences of positions, symmetry."""
 
 import cmath
 import math
@@ -103,7 +103,6 @@ def test_positions_that_cannot_close_are_nan_and_say_so() -> None:
 def test_an_offset_from_a_limit_keeps_all_its_digits(offset: float) -> None:
     """Near a limit sin mu grows as the square root of the offset, however small."""
     link = fourbar.FourBar(0.5, fourbar.Bar(0.4), fourbar.Bar(0.3), fourbar.Bar(0.25), 0.2)
-    d, a, b, c = link.lengths
     with mpmath.workdps(60):
         D, A, B, C = (mpmath.mpf(x) for x in link.lengths)
         limit = mpmath.mpf(0.2) + mpmath.acos((A**2 + D**2 - (B + C) ** 2) / (2 * A * D))

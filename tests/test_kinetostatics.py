@@ -1,4 +1,4 @@
-"""Pin forces and torque against the thirteen equations, power, sums over the whole linkage, and the thesis's figures."""
+"""Pin forces and torque against the thirteen equations, power, sums over the linkage, and the thesis."""
 
 import math
 

@@ -189,17 +189,23 @@ def measure(positions: int, rounds: int, largest: int) -> list[tuple[str, str, s
     return rows
 
 
+def repeated(scene: Scene, n: int) -> Callable[[], object]:
+    """n positions, as often as makes 200 000."""
+    at, out = command(n), preallocated(ALL, n)
+
+    def action() -> None:
+        for _ in range(max(1, 200_000 // n)):
+            solve(scene, at=at, out=out)
+
+    return action
+
+
 def growth(largest: int, rounds: int) -> dict[int, float]:
     """ns per position for 1000, 10 000, ... positions, into preallocated arrays."""
     sizes = [10**k for k in range(3, 9) if 10**k <= largest]
     scene = example()
     actions: dict[str, Callable[[], object]] = {}
     for n in sizes:
-
-        def action(at: Command = command(n), out: dict[str, Array] = preallocated(ALL, n), n: int = n) -> None:
-            for _ in range(max(1, 200_000 // n)):
-                solve(scene, at=at, out=out)
-
-        actions[str(n)] = action
+        actions[str(n)] = repeated(scene, n)
     times = interleaved(actions, rounds)
     return {n: 1e9 * times[str(n)] / (n * max(1, 200_000 // n)) for n in sizes}

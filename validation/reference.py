@@ -97,7 +97,7 @@ def linear(rows: list[list[Ball]], right: list[Ball]) -> list[Ball]:
     return [solution[k, 0] for k in range(len(right))]
 
 
-def outputs(scene: Scene, branch: int, x: Values, drive_bar: int) -> Values | None:
+def outputs(scene: Scene, branch: int, x: Values, drive_bar: int) -> Values | None:  # noqa: PLR0915 - one system
     """Every output at one position as balls; vectors as name_x, name_y; None where the loop does not close."""
     closed = closure(x, branch)
     if closed is None:
@@ -143,7 +143,7 @@ def outputs(scene: Scene, branch: int, x: Values, drive_bar: int) -> Values | No
         if "g" in x:
             force[k] = plus(force[k], times(x[f"m{k}"], polar(x["g"], x["g_angle"])))
     for pin, (i, j) in PINS.items():
-        slip = (omega[j] if j in omega else 0) - (omega[i] if i in omega else 0)
+        slip = omega.get(j, 0) - omega.get(i, 0)
         sign = arb(1) if slip > 0 else arb(-1) if slip < 0 else arb(0)
         couple = -x.get(f"viscous_{pin}", arb(0)) * slip - x.get(f"friction_{pin}", arb(0)) * sign
         for k, value in ((j, couple), (i, -couple)):

@@ -67,7 +67,13 @@ def dressed(rng: np.random.Generator, lengths: tuple[float, ...], spread: float 
         float(rng.choice([0.0, rng.uniform(-50, 50)])),
         branch=int(rng.choice([-1, 1])),
     )
-    return Scene(FourBar(d, *bars, theta_1), motion, int(rng.choice(MOVING_BARS)), tuple(loads), tuple(effects))
+    return Scene(
+        FourBar(d, bars[0], bars[1], bars[2], theta_1),
+        motion,
+        int(rng.choice(MOVING_BARS)),
+        tuple(loads),
+        tuple(effects),
+    )
 
 
 def at_angle(scene: Scene, theta_2: float) -> Scene:
@@ -143,7 +149,7 @@ def scales(rng: np.random.Generator) -> Scene:
         assert bar.inertia is not None and bar.centre is not None
         bars.append(Bar(bar.length * k, bar.mass, bar.inertia * k * k, (bar.centre[0] * k, bar.centre[1])))
     loads = tuple(replace(load, at=(load.at[0] * k, load.at[1]), moment=load.moment * k) for load in scene.loads)
-    return replace(scene, linkage=FourBar(link.ground * k, *bars, link.ground_angle), loads=loads)
+    return replace(scene, linkage=FourBar(link.ground * k, bars[0], bars[1], bars[2], link.ground_angle), loads=loads)
 
 
 def speeds(rng: np.random.Generator) -> Scene:
@@ -247,7 +253,7 @@ def judge(scene: Scene, tally: Tally, sample: str) -> None:
     for name, error in (("torque_error", errors["torque"]), ("force_error", force)):
         bar = float(getattr(solution, name)[0])
         ratio = 0.0 if error == 0.0 else error / bar if bar else math.inf
-        tally.too_small[name] = max(tally.too_small.get(name, 0.0), ratio if ratio == ratio else math.inf)
+        tally.too_small[name] = max(tally.too_small.get(name, 0.0), math.inf if math.isnan(ratio) else ratio)
         tally.too_large[name] = tally.too_large.get(name, 0) + (bar > TOO_LARGE * error)
 
 

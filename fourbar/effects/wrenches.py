@@ -43,7 +43,7 @@ class Wrenches:
         return self._array(self.moments[bar])
 
     def _array(self, value: Any) -> Array:
-        return value if np.shape(value) else np.broadcast_to(float(value), self.state.theta_2.shape)  # type: ignore[no-any-return]
+        return value if np.shape(value) else np.broadcast_to(float(value), self.state.theta_2.shape)
 
     def _plus(self, total: Array | float, term: Array | float) -> Array | float:
         if self.growths is not None:
