@@ -27,6 +27,10 @@ class Answer:
     """(n,) or (n, 2) arrays; NaN where not assembled. A name that is missing was not answered."""
     refusal: str | None = None
     """A declared limit of the engine that this scene meets, with its reason; then nothing else is set."""
+    predicted: dict[str, Array] = field(default_factory=dict)
+    """Errors that the engine must expect by its own residuals, (n,), in the unit of the quantity."""
+    alarms: list[str] = field(default_factory=list)
+    """What the engine's watch on itself found wrong, in words; each fails the run."""
     evidence: dict[str, float] = field(default_factory=dict)
     """What the engine says of itself: closure gap (m), speed error, resets, residuals."""
     shared: str = ""

@@ -1,7 +1,7 @@
 """An engine's answer against the formulas: one row per quantity, at the position where it is worst."""
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +11,7 @@ from fourbar.solution import OK, Solution
 from validation.answer import Answer
 from validation.results import AGREES, DEGRADED, FAILS, REFUSES, Row
 from validation.scales import divisor, magnitude, of_length, yardstick
+from validation.tolerance import DEGRADED as TIMES_PREDICTED
 from validation.tolerance import EPS, IDENTITY, NOTHING_TO_TELL, SIMULATED, Array, Tolerance, condition_of
 
 Mask = NDArray[np.bool_]
@@ -29,9 +30,19 @@ rounding of the data, and the engines may differ on whether it closes."""
 
 
 def compare(
-    name: str, scene: Scene, answer: Answer, formulas: Solution, tolerance: Tolerance, expected: Iterable[str]
+    name: str,
+    scene: Scene,
+    answer: Answer,
+    formulas: Solution,
+    tolerance: Tolerance,
+    expected: Iterable[str],
+    predicted: Mapping[str, Array] | None = None,
 ) -> list[Row]:
-    """Judge an answer; `formulas` is the solution at `answer.at`, `expected` what the engine must answer."""
+    """Judge an answer; `formulas` is the solution at `answer.at`, `expected` what the engine must answer.
+
+    With `predicted`, the error to be expected of each quantity at each position in its own unit, an
+    error beyond full accuracy must be within DEGRADED times that, and the law in the condition plays no part.
+    """
 
     def row(quantity: str, verdict: str, reason: str, **numbers: float) -> Row:
         keys = ("error", "allowed", "theta_2", "condition")
@@ -73,7 +84,11 @@ def compare(
             rows.append(row(quantity, FAILS, "no answer"))
             continue
         where = judged & _answerable(quantity, scene, formulas, tolerance)
-        rows.append(_judge(row, quantity, scene, formulas, theirs, where, tolerance))
+        if predicted is not None:
+            rows.append(_judge_predicted(row, quantity, scene, formulas, theirs, where, tolerance, predicted[quantity]))
+        else:
+            rows.append(_judge(row, quantity, scene, formulas, theirs, where, tolerance))
+    rows += [row("watch", FAILS, alarm) for alarm in answer.alarms]
     return rows
 
 
@@ -117,7 +132,7 @@ def _judge(
         return row(quantity, DEGRADED, "nothing can be told: no position at which both may be held to it")
     ours = getattr(formulas, quantity)
     error = angle_aware_difference(quantity, ours, theirs) / divisor(yardstick(quantity, scene, formulas, ours))
-    condition = condition_of(quantity, formulas)
+    condition = condition_of(quantity, scene.linkage, formulas)
     allowed = tolerance.allowed(condition)
     told = where & (condition * NOTHING_TO_TELL > EPS)
     untold = int(np.count_nonzero(where & ~told))
@@ -134,6 +149,50 @@ def _judge(
         index = int(np.argmax(ratio))
         verdict = AGREES if ratio[index] <= 1.0 else FAILS
         reason = ("NaN" if math.isnan(error[index]) else tolerance.name) + note
+    return row(
+        quantity,
+        verdict,
+        reason,
+        error=error[index],
+        allowed=allowed[index],
+        theta_2=formulas.theta_2[index],
+        condition=condition[index],
+    )
+
+
+def _judge_predicted(
+    row: Callable[..., Row],
+    quantity: str,
+    scene: Scene,
+    formulas: Solution,
+    theirs: Array,
+    where: Mask,
+    tolerance: Tolerance,
+    predicted: Array,
+) -> Row:
+    """One quantity against full accuracy, or else against what was predicted for it; NaN always fails."""
+    if not where.any():
+        return row(quantity, DEGRADED, "nothing can be told: no position at which both may be held to it")
+    ours = getattr(formulas, quantity)
+    yard = divisor(yardstick(quantity, scene, formulas, ours))
+    condition = condition_of(quantity, scene.linkage, formulas)
+    with np.errstate(over="ignore"):
+        error = angle_aware_difference(quantity, ours, theirs) / yard
+        expected = np.nan_to_num(predicted / yard, nan=0.0, posinf=np.inf)
+    allowed = np.maximum(tolerance.factor, TIMES_PREDICTED * expected)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio = np.where(where, error / allowed, -1.0)
+    ratio[where & ~np.isfinite(error)] = np.inf
+    beyond = where & ~(error <= tolerance.factor)
+    index = int(np.argmax(np.where(beyond, ratio, -1.0) if beyond.any() else ratio))
+    if not beyond.any():
+        verdict, reason = AGREES, f"{tolerance.name}: as at condition 1"
+    elif ratio[index] <= 1.0:
+        verdict, reason = DEGRADED, f"{error[index]:.1e} of {expected[index]:.1e} predicted for this position"
+    elif math.isnan(error[index]):
+        verdict, reason = FAILS, "NaN"
+    else:
+        verdict, reason = FAILS, f"{error[index]:.1e} where {expected[index]:.1e} was predicted"
     return row(
         quantity,
         verdict,

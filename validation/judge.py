@@ -6,13 +6,15 @@ from dataclasses import asdict, dataclass, field, replace
 from importlib import import_module
 from typing import Any
 
+import numpy as np
+
 from fourbar.scene import Command, Scene, command, solve
 from fourbar.solution import Solution
 from validation.answer import Answer, Engine
 from validation.compare import COMPARED, closure, compare
 from validation.identities import FORMULAS, identities
 from validation.results import FAILS, Row
-from validation.tolerance import EQUIVALENCE, SIMULATED, Tolerance
+from validation.tolerance import EQUIVALENCE, FORCES, SIMULATED, Array, Tolerance
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,6 +26,10 @@ class Witness:
     """ "module:class"; imported when it is asked, so a missing engine costs only its own rows."""
     tolerance: Tolerance
     expected: tuple[str, ...] = COMPARED
+    order: str = ""
+    """ "module:function" that runs the engine at two coarser timesteps; its observed order is shown."""
+    predictor: str = ""
+    """ "module:function" that predicts errors from the description; "own": the engine's own residuals do."""
 
     def engine(self) -> Engine:
         """The adapter."""
@@ -34,7 +40,12 @@ class Witness:
 WITNESSES = (
     Witness("pinocchio-inverse", "validation.engines.pinocchio:PinocchioInverse", EQUIVALENCE),
     Witness("mujoco-inverse", "validation.engines.mujoco.inverse:MujocoInverse", EQUIVALENCE),
-    Witness("mujoco-simulated", "validation.engines.mujoco.simulate:MujocoSimulated", SIMULATED),
+    Witness(
+        "mujoco-simulated",
+        "validation.engines.mujoco.simulate:MujocoSimulated",
+        SIMULATED,
+        order="validation.engines.mujoco.simulate:observed_order",
+    ),
     Witness("energy-method", "validation.engines.energy:EnergyMethod", EQUIVALENCE, ("torque",)),
 )
 
@@ -139,6 +150,8 @@ def judge(name: str, scene: Scene, witnesses: Sequence[Witness] = WITNESSES) -> 
             continue
         record.answers.append(answer)
         record.rows += _judged(name, scene, at, record.solution, answer, witness)
+        if witness.order and answer.refusal is None:
+            answer.evidence |= _observed_order(name, scene, at, record.solution, witness)
     _judge_inertia(record, at, witnesses)
     return record
 
@@ -147,10 +160,34 @@ def _judged(name: str, scene: Scene, at: Command, solution: Solution, answer: An
     """The rows of one answer, against the formulas at the motion that the engine really made."""
     theirs = answer.at if answer.at is not None else at
     formulas = solution if theirs is at else solve(scene, at=theirs)
-    rows = compare(name, scene, answer, formulas, witness.tolerance, witness.expected)
+    predicted = _predicted(witness, scene, theirs, answer)
+    rows = compare(name, scene, answer, formulas, witness.tolerance, witness.expected, predicted)
     if answer.refusal is None and answer.at is not None and {"theta_3", "theta_4"} <= answer.quantities.keys():
         rows.append(closure(name, scene, answer))
     return rows
+
+
+def _observed_order(name: str, scene: Scene, at: Command, solution: Solution, witness: Witness) -> dict[str, float]:
+    """The worst error of the torque and the pin forces at 4h and 2h, and the order in h that they show."""
+    module, _, function = witness.order.partition(":")
+
+    def error(answer: Answer) -> float:
+        rows = _judged(name, scene, at, solution, answer, replace(witness, expected=tuple(FORCES)))
+        return max(row.error for row in rows if row.quantity in FORCES)
+
+    coarse, fine, order = getattr(import_module(module), function)(scene, at, error)
+    return {"error_at_4h": coarse, "error_at_2h": fine, "observed_order": order}
+
+
+def _predicted(witness: Witness, scene: Scene, at: Command, answer: Answer) -> dict[str, Array] | None:
+    if not witness.predictor or answer.refusal is not None:
+        return None
+    if witness.predictor == "own":
+        zero = np.zeros(len(at.theta_2))
+        return {quantity: answer.predicted.get(quantity, zero) for quantity in witness.expected}
+    module, _, name = witness.predictor.partition(":")
+    predict = getattr(import_module(module), name)
+    return predict(scene, at, witness.expected)  # type: ignore[no-any-return]
 
 
 def _judge_inertia(record: Record, at: Command, witnesses: Iterable[Witness]) -> None:

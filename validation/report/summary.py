@@ -55,6 +55,8 @@ class Summary:
     independence: list[tuple[str, str, str]]
     """(engine, shared with the formulas, found alone)."""
     costs: list[Cost]
+    orders: list[tuple[str, dict[str, float]]]
+    """(scene, errors at 4h and 2h and observed order) of the simulated engine."""
     pages: list[Page]
     """The scenes shown one by one: those that fail first, at most SCENES_SHOWN."""
 
@@ -118,6 +120,12 @@ def summarise(pages: Iterable[Page]) -> Summary:
         costs=[
             Cost(engine, setting, median(r for r, _ in values), median(m for _, m in values))
             for (engine, setting), values in sorted(costs.items())
+        ],
+        orders=[
+            (page.name, evidence)
+            for page in shown
+            for evidence in page.evidence.values()
+            if "observed_order" in evidence
         ],
         pages=shown,
     )
