@@ -26,6 +26,8 @@ LARGEST_FILE = 1_000_000
 """Bytes; a scene takes about a thousand."""
 MOST_STEPS = 100_000_000
 """The bound that Sweep and Free hold."""
+MOST_DOTS = 100
+"""In one line: the time that the TOML reader takes grows with the square of a dotted key's parts."""
 MOST_LOADS = 1000
 """Each load is a term at every position."""
 BRANCHES = {"open": OPEN, "crossed": CROSSED}
@@ -74,6 +76,9 @@ def read_text(path: str | Path) -> str:
 def loads(text: str, name: str = "scene") -> Scene:
     """The scene that a TOML text describes; `name` stands for the file in errors."""
     shown = name if name.isprintable() else repr(name)
+    for number, line in enumerate(text.split("\n"), 1):
+        if line.count(".") > MOST_DOTS:
+            raise InputError("TOML", line[:40], f"line {number} holds more than {MOST_DOTS} dots", shown)
     try:
         document = tomllib.loads(text)
     except RecursionError:
@@ -278,7 +283,9 @@ def _value(key: str, value: object) -> str:
     if isinstance(value, dict):
         return "{ " + ", ".join(f"{name} = {_value(key, entry)}" for name, entry in value.items()) + " }"
     if isinstance(value, list):
-        return "[" + ", ".join(_value(key, entry) for entry in value) + "]"
+        # one line each where there are many, so that no line holds more than MOST_DOTS
+        between = ", " if len(value) <= 3 else ",\n  "
+        return "[" + between.join(_value(key, entry) for entry in value) + "]"
     if not isinstance(value, str):
         return repr(value)
     try:

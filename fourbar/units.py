@@ -10,6 +10,8 @@ from fractions import Fraction
 from functools import cache
 from typing import Any
 
+from fourbar.errors import InputError
+
 DEFINITIONS = """
 nano- = 1e-9 = n-
 micro- = 1e-6 = µ- = μ- = u-
@@ -77,6 +79,17 @@ def to_si(text: str, unit: str) -> float:
         raise UnitError("the number is too large")
     # Fraction has no -0.0
     return -0.0 if value == 0.0 and found[0].startswith("-") else value
+
+
+def factor_to(unit: str, given: str) -> float:
+    """What a number in the unit `given` is multiplied by to be in `unit`.
+
+    Raises InputError for a unit that is unknown or of another dimension.
+    """
+    try:
+        return to_si(f"1 {given}", unit)
+    except UnitError as error:
+        raise InputError("unit", given, f"{error}; must convert to {unit}") from None
 
 
 @cache

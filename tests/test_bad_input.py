@@ -1,0 +1,287 @@
+"""Bad input: exit status 2, one line that names file, key and value, no traceback, nothing written."""
+
+import os
+import random
+import time
+from pathlib import Path
+
+import pytest
+
+from fourbar.cli import BAD_INPUT, status
+from fourbar.errors import FourBarError, InputError
+from fourbar.files import LARGEST_FILE, loads, read_text
+
+GOOD = """title = "good"
+[lengths]
+ground = "0.3 m"
+input = "0.1 m"
+coupler = "0.25 m"
+output = "0.22 m"
+[bars.input]
+mass = "0.2 kg"
+[motion]
+theta_2 = "60 deg"
+omega_2 = "10 rad/s"
+branch = "open"
+[drive]
+bar = 2
+[[loads]]
+bar = 4
+force = ["3 N", "40 deg"]
+at = ["5 cm", "0 deg"]
+[effects]
+gravity = ["9.81 m/s^2", "-90 deg"]
+viscous = { O2 = "0.01 N m s/rad" }
+"""
+LONGEST_LINE = 700
+"""Characters of an error: a few lines of a terminal, whatever was given."""
+PATIENCE = 5.0
+"""Seconds in which any file is answered."""
+
+
+def test_the_file_that_the_mistakes_are_made_in_is_good(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "good.toml").write_text(GOOD)
+    assert status(["analyze", str(tmp_path / "good.toml")]) == 0
+    assert capsys.readouterr().err == ""
+
+
+MISTAKES = [
+    # id, what is replaced, by what, words that the line must hold
+    ("unknown key at the top", 'title = "good"', "colour = 1", ["colour", "title, source, lengths"]),
+    ("unknown key, closest named", "omega_2", "omega2", ["motion.omega2", 'did you mean "omega_2"?']),
+    ("unknown bar", "[bars.input]", "[bars.imput]", ["bars.imput", 'did you mean "input"?']),
+    ("ground has no mass", "[bars.input]", "[bars.ground]", ["bars.ground", "input, coupler, output"]),
+    ("unknown effect", "gravity", "gravitiy", ["effects.gravitiy", 'did you mean "gravity"?']),
+    ("unknown pin", "{ O2 =", "{ O3 =", ["effects.viscous.O3", "O2, A, B, O4"]),
+    ("unknown key of a load", "at =", "where =", ["loads[0].where"]),
+    ("wrong dimension", '"0.1 m"', '"48 kg"', ["lengths.input", "48 kg", "does not convert to m"]),
+    ("wrong force unit", '"3 N"', '"3 kg"', ["loads[0].force[0]", "3 kg", "N"]),
+    ("Hz is no angular speed", '"10 rad/s"', '"10 Hz"', ["motion.omega_2", "10 Hz", "rad/s"]),
+    ("damping without an angle", '"0.01 N m s/rad"', '"0.01 N m s"', ["effects.viscous.O2", "N m s/rad"]),
+    ("temperature", '"0.2 kg"', '"20 degC"', ["bars.input.mass", "20 degC"]),
+    ("bare length", '"0.1 m"', "0.1", ["lengths.input", "0.1", "with a unit"]),
+    ("length without unit", '"0.1 m"', '"0.1"', ["lengths.input", "unit is missing"]),
+    ("bare angle", '"60 deg"', "60", ["motion.theta_2", "60", "135 deg"]),
+    ("unit without number", '"0.1 m"', '"m"', ["lengths.input", "no finite number"]),
+    ("NaN", '"0.1 m"', '"nan m"', ["lengths.input", "nan m", "finite"]),
+    ("bare NaN", '"0.1 m"', "nan", ["lengths.input", "nan", "finite"]),
+    ("infinite", '"0.1 m"', '"inf m"', ["lengths.input", "inf m", "finite"]),
+    ("too large", '"0.1 m"', '"1e999 m"', ["lengths.input", "1e999 m", "too large"]),
+    ("negative length", '"0.1 m"', '"-0.1 m"', ["lengths.input", "-0.1 m", "> 0"]),
+    ("zero length", '"0.1 m"', '"0 m"', ["lengths.input", "0 m", "> 0"]),
+    ("length that rounds to zero", '"0.1 m"', '"1e-400 m"', ["lengths.input", "> 0"]),
+    ("negative mass", '"0.2 kg"', '"-1 kg"', ["bars.input.mass", "-1 kg", ">= 0"]),
+    ("negative damping", '"0.01 N', '"-0.01 N', ["effects.viscous.O2", "-0.01 N m s/rad", ">= 0"]),
+    ("inertia overflows", '"0.2 kg"', '"1e308 kg"\n[bars.coupler]\nmass = "1e400 kg"', ["bars.coupler.mass"]),
+    ("lengths missing", GOOD[GOOD.index("[lengths]") : GOOD.index("[bars")], "", ["lengths.ground", "missing"]),
+    ("one length missing", 'output = "0.22 m"\n', "", ["lengths.output", "missing"]),
+    ("can never close", '"0.1 m"', '"10 m"', ["lengths", "never close"]),
+    ("lengths without a finite sum", '"0.25 m"\noutput = "0.22 m"', '"1.7e308 m"\noutput = "1.7e308 m"', ["lengths"]),
+    ("branch misspelt", '"open"', '"opne"', ["motion.branch", "opne", 'did you mean "open"?', '"crossed"']),
+    ("branch as a sign", '"open"', "1", ["motion.branch", '"open" or "crossed"']),
+    ("through misspelt", 'branch = "open"', 'through = "folow"', ["motion.through", 'did you mean "follow"?']),
+    ("drive on the ground", "[drive]\nbar = 2", "[drive]\nbar = 1", ["drive.bar", "1", "from 2 to 4"]),
+    ("drive as text", "[drive]\nbar = 2", '[drive]\nbar = "2"', ["drive.bar", "'2'"]),
+    ("drive as truth", "[drive]\nbar = 2", "[drive]\nbar = true", ["drive.bar", "True"]),
+    ("load on the ground", "bar = 4", "bar = 1", ["loads[0].bar", "1"]),
+    ("load that does nothing", 'force = ["3 N", "40 deg"]\nat = ["5 cm", "0 deg"]\n', "", ["loads[0]", "force"]),
+    ("arm without a force", 'force = ["3 N", "40 deg"]', 'moment = "1 N m"', ["loads[0].at", "belongs to a force"]),
+    ("force without an angle", '["3 N", "40 deg"]', '"3 N"', ["loads[0].force", "pair"]),
+    ("force with three parts", '["3 N", "40 deg"]', '["3 N", "40 deg", "1 m"]', ["loads[0].force", "pair"]),
+    ("loads as a table", "[[loads]]", "[loads]", ["loads", "[[loads]]"]),
+    ("frame misspelt", "bar = 4", 'bar = 4\nframe = "body"', ["loads[0].frame", '"world" or "bar"']),
+    ("gravity as truth", '["9.81 m/s^2", "-90 deg"]', "true", ["effects.gravity", "True"]),
+    ("sweep without steps", '"60 deg"', '{ from = "0 deg", to = "9 deg" }', ["motion.theta_2.steps", "missing"]),
+    ("no steps", '"60 deg"', '{ from = "0 deg", to = "9 deg", steps = 0 }', ["motion.theta_2.steps", "0"]),
+    ("half a step", '"60 deg"', '{ from = "0 deg", to = "9 deg", steps = 1.5 }', ["motion.theta_2.steps", "1.5"]),
+    ("steps without end", '"60 deg"', '{ from = "0 deg", to = "9 deg", steps = 99999999 }', ["motion.theta_2.steps"]),
+    ("no angles", '"60 deg"', "[]", ["motion.theta_2"]),
+    ("limit and sweep", '"60 deg"', '{ limit = 1, from = "0 deg" }', ["motion.theta_2.from", "limit, offset"]),
+    ("limit zero", '"60 deg"', "{ limit = 0 }", ["motion.theta_2.limit", "0"]),
+    ("a limit the linkage lacks", '"60 deg"', "{ limit = 1 }", ["motion.theta_2.limit", "no limit positions"]),
+    ("free without duration", 'branch = "open"', "free = { steps = 3 }", ["motion.free.duration", "missing"]),
+    ("title as a number", '"good"', "7", ["title", "7", "text"]),
+    ("lengths as a number", GOOD[GOOD.index("[lengths]") : GOOD.index("[bars")], "lengths = 3\n", ["lengths", "table"]),
+    ("huge number", '"good"', "0x" + "f" * 5000, ["title", "huge whole number"]),
+    ("more digits than Python reads", '"good"', "1" * 5000, ["TOML"]),
+    ("broken quote", '"good"', '"good', ["TOML", "line 1"]),
+    ("a key twice", 'title = "good"', 'title = "a"\ntitle = "b"', ["TOML"]),
+    ("deep nesting", '"good"', "[" * 20000, ["TOML", "deep"]),
+    ("deep table", '"good"', "{a=" * 20000, ["TOML", "deep"]),
+    ("hostile key", 'title = "good"', '"a\\nb\\u001b[31m" = 1', ["'a\\nb\\x1b[31m'", "unknown key"]),
+    ("hostile value", '"open"', '"\\n\\u001b[2J\\u202e"', ["motion.branch", "\\x1b", "\\u202e"]),
+    ("endless key", 'title = "good"', "k" * 50000 + " = 1", ["unknown key"]),
+    ("endless value", '"open"', '"' + "x" * 50000 + '"', ["motion.branch"]),
+    ("code for a unit", '"0.1 m"', '"1 __import__(\'os\').system(\'true\')"', ["lengths.input"]),
+    ("tower of powers", '"0.1 m"', '"1 m**9**9**9**9"', ["lengths.input"]),
+    ("a date", '"good"', "2024-02-31", ["TOML"]),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("old", "new", "words"), [case[1:] for case in MISTAKES], ids=[case[0] for case in MISTAKES])
+def test_a_mistake_in_a_scene_file(
+    old: str, new: str, words: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert GOOD.count(old) >= 1
+    file = tmp_path / "scene.toml"
+    file.write_text(GOOD.replace(old, new, 1), encoding="utf-8")
+    refused(["analyze", str(file)], [str(file), *words], tmp_path, capsys)
+
+
+def refused(arguments: list[str], words: list[str], folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The command is refused with these words, and writes nothing into the folder."""
+    before = sorted(folder.rglob("*"))
+    started = time.perf_counter()
+    assert status([*arguments, "-o", str(folder / "written")]) == BAD_INPUT
+    assert time.perf_counter() - started < PATIENCE
+    told = capsys.readouterr()
+    assert told.out == ""
+    assert told.err.startswith("error: ") and told.err.endswith("\n") and told.err.count("\n") == 1
+    assert "Traceback" not in told.err and len(told.err) <= LONGEST_LINE
+    assert told.err[:-1].isprintable()
+    for word in words:
+        assert word in told.err, told.err
+    assert sorted(folder.rglob("*")) == before
+
+
+@pytest.mark.parametrize("command", ["analyze", "mjcf", "plot", "animate"])
+def test_every_command_refuses_a_bad_file(command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    refused([command, str(tmp_path / "missing.toml")], ["missing.toml", "no such file"], tmp_path, capsys)
+    bad = tmp_path / "bad.toml"
+    bad.write_text(GOOD.replace('"open"', '"opne"'))
+    refused([command, str(bad)], [str(bad), "motion.branch", "opne"], tmp_path, capsys)
+
+
+def test_a_directory(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    refused(["analyze", str(tmp_path)], [str(tmp_path), "directory"], tmp_path, capsys)
+
+
+def test_a_huge_file_is_not_read(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    huge = tmp_path / "huge.toml"
+    with huge.open("wb") as file:
+        file.truncate(100_000_000)
+    os.chmod(huge, 0)  # it would not even open
+    refused(["analyze", str(huge)], ["100000000 bytes", str(LARGEST_FILE)], tmp_path, capsys)
+
+
+def test_a_pipe_is_not_waited_for(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    refused(["analyze", str(tmp_path / "pipe")], ["ordinary file"], tmp_path, capsys)
+
+
+@pytest.mark.parametrize("name", ["a\nb\x1b[31m.toml", "n" * 300])
+def test_hostile_names(name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    refused(["analyze", str(tmp_path / name)], [], tmp_path, capsys)
+
+
+def test_a_name_that_no_file_can_have() -> None:
+    with pytest.raises(InputError, match="cannot be read"):
+        read_text("nul\0.toml")
+
+
+@pytest.mark.parametrize("data", [b"\xff\xfe\x00", GOOD.encode() + b"\n# \xe9\n", b"\x89PNG\r\n\x1a\n" + bytes(100)])
+def test_what_is_not_text(data: bytes, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "scene.toml").write_bytes(data)
+    refused(["analyze", str(tmp_path / "scene.toml")], ["UTF-8"], tmp_path, capsys)
+
+
+def test_not_toml(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "scene.toml").write_text("<mujoco/>")
+    refused(["analyze", str(tmp_path / "scene.toml")], ["TOML", "line 1"], tmp_path, capsys)
+
+
+def rocker(theta_2: str) -> str:
+    """A linkage whose input does not turn fully: it closes for theta_2 between 22.3 and 71.7 deg."""
+    text = GOOD.replace('"0.1 m"', '"0.24 m"').replace('"0.25 m"', '"0.1 m"')
+    return text.replace('"60 deg"', theta_2)
+
+
+def test_no_position_assembles(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "scene.toml").write_text(rocker('"180 deg"'))
+    refused(["analyze", str(tmp_path / "scene.toml")], ["scene.toml", "theta_2", "assembles at none"], tmp_path, capsys)
+
+
+def test_some_positions_do_not_assemble(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "scene.toml").write_text(rocker('{ from = "0 deg", to = "90 deg", steps = 9 }'))
+    assert status(["analyze", str(tmp_path / "scene.toml")]) == 0
+    shown = capsys.readouterr()
+    assert "10 positions: 5 ok, 5 not assembled" in shown.out and shown.err == ""
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["mjcf"], ["scene file or --lengths"]),
+        (["mjcf", "x.toml", "--lengths", "1", "1", "1", "1"], ["one of the two"]),
+        (["mjcf", "x.toml", "--omega", "1"], ["--omega goes with --lengths"]),
+        (["mjcf", "--lengths", "0.3", "0.1", "0.25"], ["Missing option"]),
+        (["mjcf", "--lengths", "0.3", "0.1", "0.25", "-1"], ["length of output", "> 0"]),
+        (["mjcf", "--lengths", "0.3", "0.1", "0.25", "nan"], ["length of output", "nan"]),
+        (["mjcf", "--lengths", "0.3", "0.1", "0.25", "2 kg"], ["length of output", "2 kg"]),
+        (["mjcf", "--lengths", "9", "0.1", "0.25", "0.2"], ["never close"]),
+        (["mjcf", "--lengths", "0.3", "0.1", "0.25", "0.2", "--omega", "1 Hz"], ["--omega", "1 Hz"]),
+        (["mjcf", "--lengths", "0.3", "0.1", "0.25", "0.2", "--omega", "inf"], ["--omega", "inf"]),
+        (["analyse"], ["analyse"]),
+        (["analyze"], ["SCENE"]),
+        (["analyze", "x.toml", "--xml"], ["--xml"]),
+    ],
+)
+def test_bad_arguments(
+    arguments: list[str], words: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    refused(arguments, words, tmp_path, capsys)
+
+
+@pytest.mark.parametrize("arguments", [["x"], ["1", "1", "1"], ["1", "1", "1", "0"], ["1", "1", "1", "1 s"]])
+def test_bad_lengths_for_classify(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    assert status(["classify", *arguments]) == BAD_INPUT
+    assert capsys.readouterr().err.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    "pattern",
+    ["a.", '"a b".', "a." * 99 + "a=1\n", "[" + "a." * 99 + "a]\n", "[", "{a=", '"', "[[a]]\n", "'''", "a=1\n",
+     "[a.b.c]\n", "#", "\\", "a" * 99 + "\n"],
+)  # fmt: skip
+def test_large_nonsense_is_answered_soon(pattern: str) -> None:
+    text = pattern * (LARGEST_FILE // len(pattern))
+    started = time.perf_counter()
+    with pytest.raises(FourBarError):
+        loads(text, "nonsense")
+    assert time.perf_counter() - started < PATIENCE
+
+
+@pytest.mark.parametrize("pattern", ["a{n}." + "a." * 98 + "a=1\n", "[a{n}]\nb=1\n", "[[a]]\nb={n}\n"])
+def test_large_files_without_a_repeated_key_are_answered_soon(pattern: str) -> None:
+    text = "".join(pattern.format(n=n) for n in range(LARGEST_FILE // (len(pattern) + 3)))
+    started = time.perf_counter()
+    with pytest.raises(FourBarError):
+        loads(text, "nonsense")
+    assert time.perf_counter() - started < PATIENCE
+
+
+def test_mutated_files_end_in_a_scene_or_in_one_line() -> None:
+    """2000 seeded mutations of a good file: any other exception than ours fails the test."""
+    random.seed(20261121)
+    pieces = [*GOOD.split(), "nan", "[", "]", "{", "}", '"', "\x00", "é", "-1", "1e999", "= =", "\n", "deg", "🤖"]
+    answered = 0
+    for _ in range(2000):
+        text = list(GOOD)
+        for _ in range(random.randint(1, 2)):
+            at = random.randrange(len(text))
+            action = random.randrange(4)
+            if action == 0:
+                del text[at : at + random.randint(1, 12)]
+            elif action == 1:
+                text[at:at] = random.choice(pieces)
+            elif action == 2:
+                text[at] = chr(random.randrange(32, 0x250))
+            else:
+                digits = [index for index, letter in enumerate(text) if letter.isdecimal()]
+                text[random.choice(digits)] = random.choice("0123456789.e-")
+        try:
+            loads("".join(text), "mutated")
+            answered += 1
+        except FourBarError as error:
+            assert "\n" not in str(error) and len(str(error)) < LONGEST_LINE, str(error)
+    assert 50 < answered < 1950  # the mutations reach both ends
