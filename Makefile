@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: validate test setup clean
+.PHONY: validate test models setup clean
 
 validate: setup
 	$(BIN)/python -m validation run
@@ -14,6 +14,9 @@ test: setup
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/python -m pytest -n 2
+
+models: setup
+	$(BIN)/python -m validation models
 
 setup: $(STAMP)
 

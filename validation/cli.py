@@ -14,6 +14,7 @@ COMMANDS = {
     "accept": "validation.regression.command:accept_command",
     "compare": "validation.regression.command:compare",
     "check": "validation.check:check",
+    "models": "validation.models:models",
     "published": "validation.published:published",
     "stability": "validation.stability:stability",
     "bench": "validation.bench:bench",

@@ -1,0 +1,36 @@
+"""`python -m validation models`: write the MJCF of every scene in models/ beside it."""
+
+from collections.abc import Iterable
+from pathlib import Path
+
+import click
+
+from fourbar.files import load
+from fourbar.mjcf import mjcf
+from fourbar.writing import write_text
+from validation.suite.scenes import model_files
+
+
+def stale(files: Iterable[Path]) -> list[Path]:
+    """The scene files whose MJCF is missing or differs from what they generate now."""
+    found = []
+    for file in files:
+        xml = file.with_suffix(".xml")
+        if not xml.is_file() or xml.read_text(encoding="utf-8") != mjcf(load(file)):
+            found.append(file)
+    return found
+
+
+def write_mjcf(files: Iterable[Path]) -> list[Path]:
+    """Write the MJCF of the scenes for which it is stale; those scenes."""
+    written = stale(files)
+    for file in written:
+        write_text(file.with_suffix(".xml"), mjcf(load(file)))
+    return written
+
+
+@click.command()
+def models() -> None:
+    """Write the MJCF of every scene in models/ for which it is stale."""
+    for file in write_mjcf(model_files()):
+        click.echo(f"wrote {file.with_suffix('.xml').name}")
