@@ -41,7 +41,7 @@ class LimitPosition(NamedTuple):
     """The other two bars lie along each other's prolongation (e = x + y); otherwise they are folded."""
 
 
-class _Reach(NamedTuple):
+class Reach(NamedTuple):
     """Bar k against the rest of the loop, in the unit of `unit_of`; sums within rounding of 0 are 0."""
 
     d: float
@@ -78,13 +78,14 @@ class _Reach(NamedTuple):
         return 2.0 * at_near, 2.0 * at_far
 
 
-def _reach(linkage: FourBar, bar: int) -> _Reach:
+def reach_of(linkage: FourBar, bar: int = 2) -> Reach:
+    """Bar 2, 3 or 4 against the rest of the loop; ValueError for another bar."""
     if bar not in MOVING_BARS:
         raise ValueError(f"bar = {bar!r}: must be 2, 3 or 4")
     unit = unit_of(linkage)  # exact, and no product of lengths leaves the range of doubles
     d, *moving = (length / unit for length in linkage.lengths)
     own = moving.pop(bar - 2)
-    return _Reach(d, own, *moving)
+    return Reach(d, own, *moving)
 
 
 def _wrapped(angle: float) -> float:
@@ -107,7 +108,7 @@ def limit_positions(linkage: FourBar, bar: int = 2) -> tuple[LimitPosition, ...]
 
     Source: Norton, Design of Machinery, sec. 4.11; Linares Mendoza, eqs 3.7-3.15 (one of each mirror pair).
     """
-    reach = _reach(linkage, bar)
+    reach = reach_of(linkage, bar)
     theta_1 = linkage.ground_angle
     others = [k for k in MOVING_BARS if k != bar]
     found: list[LimitPosition] = []
@@ -135,7 +136,7 @@ def intervals(linkage: FourBar, bar: int = 2) -> tuple[tuple[float, float], ...]
     limits, two mirror images where it has two pairs; the range that contains the ground's
     direction (for bar 4: its opposite) or lies first counter-clockwise from it comes first.
     """
-    reach = _reach(linkage, bar)
+    reach = reach_of(linkage, bar)
     start = linkage.ground_angle + (math.pi if bar == 4 else 0.0)
     inner = reach.triangle(False)[0] if reach.beyond_folded > 0.0 else None
     outer = reach.triangle(True)[0] if reach.beyond_stretched > 0.0 else None
@@ -148,7 +149,7 @@ def intervals(linkage: FourBar, bar: int = 2) -> tuple[tuple[float, float], ...]
 
 def turns_fully(linkage: FourBar, bar: int = 2) -> bool:
     """Whether a moving bar can turn through 360 deg against the ground (through change points, if need be)."""
-    reach = _reach(linkage, bar)
+    reach = reach_of(linkage, bar)
     return reach.beyond_folded <= 0.0 and reach.beyond_stretched <= 0.0
 
 
@@ -169,7 +170,7 @@ def change_points(linkage: FourBar) -> tuple[float, ...]:
 
     theta_1 where |a - d| = |b - c|, theta_1 + pi where a + d = b + c, within the rounding of the lengths.
     """
-    reach, theta_1 = _reach(linkage, 2), linkage.ground_angle
+    reach, theta_1 = reach_of(linkage, 2), linkage.ground_angle
     folded = (theta_1,) if reach.beyond_folded == 0.0 else ()
     return (*folded, theta_1 + math.pi) if reach.beyond_stretched == 0.0 else folded
 

@@ -1,0 +1,354 @@
+"""Limit positions, ranges, circuits and types against scans, 50 digits and published figures."""
+
+import itertools
+import math
+
+import mpmath as mp
+import numpy as np
+import pytest
+
+from fourbar.circuits import circuit_of, circuits, same_circuit
+from fourbar.errors import NotAssembledError
+from fourbar.kinematics import close_loop
+from fourbar.linkage import Bar, FourBar, uniform
+from fourbar.linkage_type import classify
+from fourbar.mobility import (
+    change_points,
+    default_range,
+    intervals,
+    limit_positions,
+    on_smooth_path,
+    swing,
+    time_ratio,
+    turns_fully,
+)
+
+EPS = 2.0**-52
+ANGLE = 8.0 * EPS
+"""Rounding of a limit's angle: exact sums, then four roots, two products and an arc tangent, each 1/2 eps of
+the angle, and the sum with theta_1 and pi, 2 pi: 1/2 eps of at most 4 pi."""
+PRINTED_8 = 0.5e-8
+"""Half a unit in the last digit of an angle printed to eight decimals of a degree, deg."""
+SCAN = 20_000
+SCAN_STEP = 20.0 * math.pi / SCAN
+"""What a scan of SCAN positions can miss of a range, rad: one step at each end, the output up to ten times as fast."""
+GRID = 2000
+"""Positions of a scan over one turn."""
+
+
+def linkage(d: float, a: float, b: float, c: float, theta_1: float = 0.0) -> FourBar:
+    return FourBar(d, Bar(a), Bar(b), Bar(c), theta_1)
+
+
+def random_linkages(seed: int, count: int) -> list[FourBar]:
+    """Random lengths and theta_1; a third of them integers, which makes change points common."""
+    rng = np.random.default_rng(seed)
+    found: list[FourBar] = []
+    while len(found) < count:
+        lengths = rng.integers(1, 7, 4).astype(float) if len(found) % 3 == 0 else rng.uniform(0.1, 1.0, 4)
+        if 2.0 * lengths.max() < lengths.sum():
+            found.append(linkage(*lengths.tolist(), theta_1=float(rng.uniform(-math.pi, math.pi))))
+    return found
+
+
+def closes(bars: FourBar, theta_2: np.ndarray) -> np.ndarray:
+    """How far the circles about A (radius b) and about O4 (radius c) are from not meeting, m; >= 0: they meet."""
+    d, a, b, c = bars.lengths
+    distance = np.abs(a * np.exp(1j * theta_2) - d * np.exp(1j * bars.ground_angle))
+    return np.minimum(b + c - distance, distance - abs(b - c))
+
+
+def inside(angle: np.ndarray, ranges: tuple[tuple[float, float], ...]) -> np.ndarray:
+    return np.any([(angle - start) % (2 * math.pi) <= stop - start for start, stop in ranges], axis=0)
+
+
+# the thesis's model mechanism: 20, 48, 55, 20 cm, theta_1 = 45 deg; Linares Mendoza, table 3.2 (rows 2 and 4),
+# with the mirror positions that it leaves out: 145.078..., 5.3819... deg
+THESIS = linkage(0.20, 0.48, 0.55, 0.20, math.radians(45.0))
+
+
+def test_thesis_limits_of_the_input() -> None:
+    limits = limit_positions(THESIS)
+    assert np.degrees([limit.theta_2 for limit in limits]) == pytest.approx(
+        [84.61804062253105, 365.38195937746895], abs=PRINTED_8
+    )
+    # theta_4 of chapter 2 (from B to O4) is ours + 180 deg
+    assert (math.degrees(limits[0].theta_4) + 180.0) % 360.0 == pytest.approx(105.98752759110246, abs=PRINTED_8)
+    assert (math.degrees(limits[1].theta_4) + 180.0) % 360.0 == pytest.approx(344.01247240889757, abs=PRINTED_8)
+    assert np.degrees(default_range(THESIS)) == pytest.approx([85.61804062253105, 364.38195937746895], abs=PRINTED_8)
+    assert math.degrees(swing(THESIS, 2)) == pytest.approx(280.7639187549379, abs=PRINTED_8)
+
+
+def test_thesis_limits_of_the_output() -> None:
+    limits = limit_positions(THESIS, 4)
+    assert np.degrees([limit.theta_2 for limit in limits]) == pytest.approx(
+        [145.07865810778765, 304.92134189221235], abs=PRINTED_8
+    )
+    assert sorted((math.degrees(limit.theta_4) + 180.0) % 360.0 for limit in limits) == pytest.approx(
+        [24.842683784424707, 65.15731621557532], abs=PRINTED_8
+    )
+    found = classify(THESIS)
+    assert (found.code, found.barker, found.longest) == ("RRR3", 7, 3)
+    assert found.surplus == pytest.approx(-0.07)
+
+
+@pytest.mark.parametrize(
+    ("lengths", "barker", "code"),
+    [
+        ((1, 3, 2.5, 3.2), 1, "GCCC"),
+        ((3, 1, 2.5, 2.2), 2, "GCRR"),
+        ((3, 2.5, 1, 2.2), 3, "GRCR"),
+        ((3, 2.5, 2.2, 1), 4, "GRRC"),
+        ((4, 2, 2.5, 2.2), 5, "RRR1"),
+        ((2, 4, 2.5, 2.2), 6, "RRR2"),
+        ((2, 2.5, 4, 2.2), 7, "RRR3"),
+        ((2, 2.5, 2.2, 4), 8, "RRR4"),
+        ((1, 2, 4, 3), 9, "SCCC"),
+        ((2, 1, 4, 3), 10, "SCRR"),
+        ((2, 4, 1, 3), 11, "SRCR"),
+        ((2, 4, 3, 1), 12, "SRRC"),
+        ((2, 1, 2, 1), 13, "S2X"),
+        ((1, 1, 2, 2), 13, "S2X"),
+        ((2, 1, 1, 2), 13, "S2X"),
+        ((0.1, 0.1, 0.1, 0.1), 14, "S3X"),
+    ],
+)
+def test_barker_classes(lengths: tuple[float, ...], barker: int, code: str) -> None:
+    for scale in (1.0, 1e-9, 1e9, 1e300):
+        found = classify(linkage(*(scale * length for length in lengths)))
+        assert (found.barker, found.code) == (barker, code)
+    assert (found.surplus == 0.0) == (barker >= 9)
+
+
+def test_two_equal_pairs_have_their_names() -> None:
+    assert "parallelogram" in classify(uniform(2, 1, 2, 1)).name
+    assert "ground and input" in classify(uniform(1, 1, 2, 2)).name
+    assert "ground and output" in classify(uniform(2, 1, 1, 2)).name
+
+
+def test_equality_is_decided_within_the_rounding_of_the_lengths() -> None:
+    assert 0.1 + 0.7 != 0.2 + 0.6  # in doubles; the lengths meant are equal sums
+    assert classify(uniform(0.2, 0.1, 0.7, 0.6)).barker == 10
+    assert change_points(uniform(0.2, 0.1, 0.7, 0.6))
+    for ulps, barker in ((1, 10), (16, 2), (-16, 7)):
+        longest = 0.7 - ulps * math.ulp(0.7)
+        assert classify(uniform(0.2, 0.1, longest, 0.6)).barker == barker
+
+
+def test_a_structure_stands_in_one_position() -> None:
+    for lengths in itertools.permutations((1.0, 2.0, 3.0, 6.0)):
+        bars = linkage(*lengths, theta_1=0.3)
+        assert classify(bars).code == "structure" and classify(bars).turning == ()
+        (limit,) = limit_positions(bars)
+        start, stop = default_range(bars)
+        assert start == stop == limit.theta_2
+        assert closes(bars, np.array([start]))[0] == pytest.approx(0.0, abs=12.0 * EPS)
+
+
+@pytest.mark.parametrize("bars", random_linkages(1, 60), ids=lambda bars: "-".join(f"{x:.3g}" for x in bars.lengths))
+def test_ranges_and_circuits_agree_with_a_scan(bars: FourBar) -> None:
+    theta_2 = bars.ground_angle + (np.arange(GRID) + 0.5) * (2 * math.pi / GRID)
+    margin = closes(bars, theta_2)
+    sure = np.abs(margin) > 16.0 * EPS * sum(bars.lengths)
+    assert (inside(theta_2, intervals(bars))[sure] == (margin >= 0.0)[sure]).all()
+    assert turns_fully(bars) == bool((margin[sure] >= 0.0).all())
+
+    # positions as a graph: neighbours on a branch, both branches beside a gap or across a change point
+    node = {(i, s): (i, s) for i in range(GRID) for s in (1, -1) if margin[i] >= 0.0}
+
+    def root(x: tuple[int, int]) -> tuple[int, int]:
+        while node[x] != x:
+            node[x] = node[node[x]]
+            x = node[x]
+        return x
+
+    crossing = {0, GRID // 2} if change_points(bars) else set()
+    for i, s in list(node):
+        behind = ((i - 1) % GRID, s)
+        if behind in node:
+            node[root((i, s))] = root(behind)
+        at_gap = behind not in node or ((i + 1) % GRID, s) not in node
+        touches = i in crossing and min(abs(closes(bars, theta_2[i : i + 1] - math.pi / GRID))) < 1e-12
+        if at_gap or touches:
+            node[root((i, 1))] = root((i, -1))
+    assert len({root(x) for x in node}) == len(circuits(bars))
+    places = np.array(sorted(node))
+    numbers = circuit_of(bars, theta_2[places[:, 0]], places[:, 1].astype(np.int8))
+    for x, number in zip(places[:: GRID // 50], numbers[:: GRID // 50], strict=True):
+        same = root(tuple(x.tolist())) == root(tuple(places[0].tolist()))
+        assert same == (number == numbers[0])
+
+
+def test_circuits_of_grashof_linkages_by_the_angle_that_never_closes() -> None:
+    # at the ends of the bar opposite the shortest the angles never reach 0 or pi: their sign is the circuit's
+    seen = set()
+    for bars in random_linkages(2, 200):
+        found = classify(bars)
+        if found.surplus <= 0.0:
+            continue
+        seen.add(found.barker)
+        theta_2 = np.concatenate([np.linspace(*ends, 41)[1:-1] for ends in intervals(bars)])
+        for branch in (1, -1):
+            state = close_loop(bars, theta_2, branch)
+            sine = np.sin(theta_2 - bars.ground_angle) if found.shortest in (3, 4) else state.sin_mu
+            assert ((sine > 0.0) == (circuit_of(bars, theta_2, branch) == 0)).all()
+    assert seen == {1, 2, 3, 4}
+
+
+def test_same_circuit_refuses_a_position_that_does_not_exist() -> None:
+    crank_rocker, rocker = uniform(3, 1, 2.5, 2.2), uniform(3, 2.5, 1, 2.2)
+    assert same_circuit(crank_rocker, (0.1, 1), (3.0, 1)) and not same_circuit(crank_rocker, (0.1, 1), (3.0, -1))
+    start, stop = default_range(rocker)
+    assert same_circuit(rocker, (start, 1), (stop, -1)) and not same_circuit(rocker, (start, 1), (-start, 1))
+    with pytest.raises(NotAssembledError, match=r"theta_2 = 3\.0"):
+        same_circuit(rocker, (start, 1), (3.0, 1))
+
+
+def exact_psi(bars: FourBar, bar: int, stretched: bool) -> mp.mpf:
+    """The limit's angle from the ground by the law of cosines in 50 digits."""
+    d, *moving = (mp.mpf(length) for length in bars.lengths)
+    own = moving.pop(bar - 2)
+    e = moving[0] + moving[1] if stretched else moving[0] - moving[1]
+    return mp.acos((d * d + own * own - e * e) / (2 * d * own))
+
+
+def nearly_special(seed: int, count: int) -> list[FourBar]:
+    """Linkages whose surplus or rest of the longest bar is 1e-14..1e-1 of their size."""
+    rng = np.random.default_rng(seed)
+    found: list[FourBar] = []
+    while len(found) < count:
+        p, q, s = rng.uniform(0.1, 1.0, 3)
+        gap = float(rng.choice([-1.0, 1.0]) * 10.0 ** rng.uniform(-14, -1))
+        longest = p + q - s + gap if len(found) % 2 else p + q + s - abs(gap)
+        lengths = rng.permutation([p, q, s, longest])
+        if (lengths > 0.02).all() and 2.0 * lengths.max() < lengths.sum():
+            found.append(linkage(*lengths.tolist(), theta_1=0.0))
+    return found
+
+
+def test_limits_keep_their_digits_beside_special_linkages() -> None:
+    checked = 0
+    with mp.workdps(50):
+        for bars in nearly_special(3, 300) + random_linkages(4, 100):
+            theta_1 = bars.ground_angle
+            for bar in (2, 3, 4):
+                for limit in limit_positions(bars, bar):
+                    value = {2: limit.theta_2, 3: limit.theta_3, 4: limit.theta_4 + math.pi}[bar]
+                    psi = exact_psi(bars, bar, limit.stretched)
+                    error = min(abs(_mod(mp.mpf(value) - theta_1 - s * psi)) for s in (1, -1))
+                    # theta_1 = 0, first of the pair: nothing is added, so the angle is good relative to itself
+                    size = psi if bar == 2 and theta_1 == 0.0 and 0.0 < value < math.pi else 4 * mp.pi
+                    assert error <= ANGLE * size, (bars.lengths, bar, limit, float(error))
+                    checked += 1
+    assert checked > 1000
+
+
+def _mod(angle: mp.mpf) -> mp.mpf:
+    return angle - 2 * mp.pi * mp.nint(angle / (2 * mp.pi))
+
+
+def test_limits_close_the_loop_with_two_bars_collinear() -> None:
+    for bars in random_linkages(5, 300):
+        d, a, b, c = bars.lengths
+        for bar, pair in ((2, (3, 4)), (3, (2, 4)), (4, (2, 3))):
+            limits = limit_positions(bars, bar)
+            ahead = [limit.theta_2 - bars.ground_angle for limit in limits]
+            assert ahead == sorted(ahead) and all(-EPS * 8 <= angle < 2 * math.pi for angle in ahead)
+            for limit in limits:
+                angles = {2: limit.theta_2, 3: limit.theta_3, 4: limit.theta_4}
+                gap = a * np.exp(1j * angles[2]) + b * np.exp(1j * angles[3])
+                gap -= d * np.exp(1j * bars.ground_angle) + c * np.exp(1j * angles[4])
+                assert abs(gap) <= ANGLE * 2 * math.pi * sum(bars.lengths)
+                assert abs(math.sin(angles[pair[0]] - angles[pair[1]])) <= ANGLE * 2 * math.pi
+                # bars 2, 3 lie along each other where stretched; the output runs from its far end
+                along = math.cos(angles[pair[0]] - angles[pair[1]]) > 0.0
+                assert along == (limit.stretched == (bar == 4))
+                assert limit.branch == (0 if bar == 2 else math.copysign(1.0, math.sin(angles[4] - angles[3])))
+
+
+def test_swing_is_what_a_scan_of_the_output_finds() -> None:
+    seen = set()
+    for bars in random_linkages(6, 60):
+        if change_points(bars):
+            continue  # there the output's range is that of several smooth paths
+        seen.add(classify(bars).code[:4])
+        start, stop = intervals(bars)[0]
+        phase = np.arange(0.5, SCAN) * (math.pi / SCAN)
+        theta_2 = 0.5 * (start + stop) - 0.5 * (stop - start) * np.cos(phase)  # dense where theta_4 goes as a root
+        branches = (1,) if turns_fully(bars) else (1, -1)
+        theta_4 = [np.unwrap(close_loop(bars, theta_2, branch).angle(4)) for branch in branches]
+        if len(theta_4) == 2:  # both branches start from the same limit position
+            theta_4[1] += 2 * math.pi * round((theta_4[0][0] - theta_4[1][0]) / (2 * math.pi))
+        found = max(x.max() for x in theta_4) - min(x.min() for x in theta_4)
+        assert found == pytest.approx(swing(bars), abs=SCAN_STEP), bars.lengths
+    assert seen >= {"GCCC", "GCRR", "GRCR", "GRRC", "RRR1", "RRR2", "RRR3", "RRR4"}
+
+
+def test_time_ratio_is_the_time_of_both_strokes() -> None:
+    bars = uniform(3.0, 1.0, 2.5, 2.2)
+    n = 200_000
+    theta_2 = (np.arange(n) + 0.5) * (2 * math.pi / n)
+    state = close_loop(bars, theta_2, 1)
+    ahead = np.count_nonzero(np.sin(theta_2 - state.angle(3)) * state.sin_mu > 0.0)  # omega_4 > 0
+    ratio = max(ahead, n - ahead) / min(ahead, n - ahead)
+    assert time_ratio(bars) == pytest.approx(ratio, rel=8.0 / n)  # both ends counted to one step
+    assert time_ratio(uniform(1, 3, 2.5, 3.2)) is None
+    assert time_ratio(THESIS) is None
+    # a central (in-line) crank-rocker, d^2 + a^2 = b^2 + c^2, has equal strokes
+    assert time_ratio(uniform(math.sqrt(2.5**2 + 2.2**2 - 1), 1, 2.5, 2.2)) == pytest.approx(1.0, abs=1e-14)
+
+
+@pytest.mark.parametrize(
+    "lengths", [(2, 1, 2, 1), (1, 1, 2, 2), (2, 1, 1, 2), (2, 1, 4, 3), (1, 2, 4, 3), (2, 4, 3, 1), (1, 1, 1, 1)]
+)
+@pytest.mark.parametrize("backwards", [False, True])
+def test_the_smooth_path_has_no_corner(lengths: tuple[float, ...], backwards: bool) -> None:
+    bars = linkage(*lengths, theta_1=0.4)
+    assert change_points(bars)
+    if turns_fully(bars):
+        theta_2 = 0.4 + (np.arange(2400) + 0.5) * (4 * math.pi / 2400)
+    else:
+        theta_2 = np.linspace(*default_range(bars), 1200)
+    theta_2 = theta_2[::-1] if backwards else theta_2
+    branch = on_smooth_path(bars, theta_2, 1)
+    assert branch[0] == 1 and (branch == -1).any()
+    largest = {True: 0.0, False: 0.0}
+    for smooth in (True, False):
+        state = close_loop(bars, theta_2, branch if smooth else 1)
+        for bar in (3, 4):
+            bend = np.diff(np.unwrap(state.angle(bar)), 2)
+            near = np.abs(np.sin(theta_2[1:-1] - 0.4)) < 0.02
+            largest[smooth] = max(largest[smooth], float(np.abs(bend[near]).max()))
+    # a corner bends by the step itself, a smooth path by its square
+    assert largest[True] < 0.1 * largest[False] and largest[False] > 2e-3
+
+
+def test_a_sweep_on_a_change_point_is_before_it() -> None:
+    bars = uniform(2, 1, 2, 1)  # change points at 0 and pi
+    quarter = np.arange(5) * (math.pi / 2)
+    assert on_smooth_path(bars, quarter, 1).tolist() == [1, -1, -1, 1, 1]
+    assert on_smooth_path(bars, quarter[::-1], 1).tolist() == [1, -1, -1, 1, 1]
+    assert on_smooth_path(bars, np.array([-1.0, 0.0, -1.0]), 1).tolist() == [1, 1, 1]  # touched, then back
+    assert on_smooth_path(bars, np.array([-1.0, 0.0, 1.0]), -1).tolist() == [-1, -1, 1]
+    assert on_smooth_path(bars, np.array([1.0, 1.0, 1.0]), -1).tolist() == [-1, -1, -1]
+    assert on_smooth_path(bars, np.array([1.0]), 1).dtype == np.int8
+    assert (on_smooth_path(uniform(3, 1, 2.5, 2.2), quarter, -1) == -1).all()
+
+
+def test_the_default_range_is_as_wide_as_the_contract_says() -> None:
+    assert default_range(uniform(3, 1, 2.5, 2.2)) == (0.0, 2 * math.pi)
+    for bars in random_linkages(7, 100):
+        start, stop = default_range(bars)
+        if turns_fully(bars):
+            continue
+        touching = -16.0 * EPS * sum(bars.lengths)  # at a change point the bars just meet
+        assert start < stop and (closes(bars, np.linspace(start, stop, 50)) > touching).all()
+        ends = closes(bars, np.array([start - math.radians(1.001), stop + math.radians(1.001)]))
+        assert (ends < 0.0).all()
+        holds_theta_1 = closes(bars, np.array([bars.ground_angle]))[0] > touching
+        assert (start < bars.ground_angle < stop) == holds_theta_1
+
+
+def test_a_bar_that_does_not_move_is_refused() -> None:
+    with pytest.raises(ValueError, match="2, 3 or 4"):
+        limit_positions(THESIS, 1)
