@@ -22,6 +22,8 @@ ANGLES = frozenset(name for name, unit in UNITS.items() if unit == "rad")
 FORCES = ("F12", "F32", "F43", "F14")
 MOST_DIGITS = 16
 """Of a double."""
+GAP = 2
+"""Blanks between two columns of the table, the divider among them."""
 
 
 def json_text(solution: Solution, *, degrees: bool = False) -> str:
@@ -140,13 +142,14 @@ def table(scene: Scene, solution: Solution, width: int | None, *, degrees: bool 
     cells = columns(scene, solution, degrees=degrees)
     if (solution.status_code != 0).any():
         cells = {"status\n": [status.replace("_", " ") for status in solution.status], **cells}
-    needed = 0
+    needed = -GAP
     kept: list[str] = []
     for name, column in cells.items():
-        needed += 2 + max(len(cell) for cell in (*name.split("\n"), *column))
-        if width is None or needed <= width:
-            kept.append(name)
-    shown = Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 2, 0, 0))
+        needed += GAP + max(len(cell) for cell in (*name.split("\n"), *column))
+        if width is not None and needed > width:
+            break
+        kept.append(name)
+    shown = Table(box=box.SIMPLE_HEAD, show_edge=False, pad_edge=False, padding=(0, GAP - 1, 0, 0))
     for name in kept:
         shown.add_column(Text(name), justify="right", no_wrap=True)
     for row in zip(*(cells[name] for name in kept), strict=True):
