@@ -1,0 +1,229 @@
+"""Kinematic coefficients by differentiation in 50 digits, instant centres by Kennedy's theorem, coupler curves."""
+
+import math
+
+import mpmath as mp
+import numpy as np
+import pytest
+
+from fourbar.circuits import circuits
+from fourbar.coefficients import Centre, bar_coefficients, coupler_curve, instant_centres, point_coefficients
+from fourbar.kinematics import State, add_accelerations, add_velocities, close_loop
+from fourbar.linkage import Bar, FourBar
+from fourbar.mobility import intervals, turns_fully
+
+EPS = 2.0**-52
+FIRST, SECOND = 32.0, 128.0
+"""Roundings in a first and a second coefficient; each is magnified by 1/sin^2 mu and 1/sin^4 mu at most:
+one power of 1/sin^2 mu from the angles, one from the division by the root of the area."""
+COLLINEAR = 64.0 * EPS
+"""Rounding of the determinant of three instant centres, relative to the product of their magnitudes and
+magnified by 1/|sin mu|."""
+
+
+def random_states(seed: int, count: int, least_sine: float = 0.05) -> list[State]:
+    """One regular position each of random linkages, on a random branch."""
+    rng = np.random.default_rng(seed)
+    found: list[State] = []
+    while len(found) < count:
+        d, a, b, c = rng.uniform(0.1, 1.0, 4).tolist()
+        if 2.0 * max(d, a, b, c) > d + a + b + c - 0.01:
+            continue
+        bars = FourBar(d, Bar(a), Bar(b), Bar(c), float(rng.uniform(-math.pi, math.pi)))
+        start, stop = intervals(bars)[-1]
+        state = close_loop(bars, rng.uniform(start, stop, 1), int(rng.choice([-1, 1])))
+        if abs(state.sin_mu[0]) > least_sine:
+            found.append(state)
+    return found
+
+
+class Exact:
+    """Position in 50 digits by the intersection of two circles in the complex plane."""
+
+    def __init__(self, state: State) -> None:
+        self.d, self.a, self.b, self.c = (mp.mpf(length) for length in state.linkage.lengths)
+        self.theta_1, self.sign = mp.mpf(state.linkage.ground_angle), int(state.branch[0])
+
+    def pin_b(self, theta_2: mp.mpf) -> tuple[mp.mpc, mp.mpc, mp.mpc]:
+        pin_a, pin_4 = self.a * mp.expj(theta_2), self.d * mp.expj(self.theta_1)
+        gap = pin_4 - pin_a
+        foot = (abs(gap) ** 2 + self.b**2 - self.c**2) / (2 * abs(gap))
+        height = mp.sqrt(self.b**2 - foot**2)
+        return pin_a, pin_a + gap / abs(gap) * mp.mpc(foot, self.sign * height), pin_4
+
+    def angle(self, bar: int, theta_2: mp.mpf) -> mp.mpf:
+        pin_a, pin_b, pin_4 = self.pin_b(theta_2)
+        return mp.arg(pin_b - (pin_a if bar == 3 else pin_4))
+
+    def point(self, theta_2: mp.mpf, along: float, across: float) -> mp.mpc:
+        pin_a, pin_b, _ = self.pin_b(theta_2)
+        return pin_a + (pin_b - pin_a) / self.b * mp.mpc(along, across)
+
+
+def test_bar_coefficients_are_derivatives() -> None:
+    with mp.workdps(50):
+        for state in random_states(11, 60):
+            exact, at = Exact(state), mp.mpf(float(state.theta_2[0]))
+            sine = float(abs(state.sin_mu[0]))
+            found = bar_coefficients(state)
+            for bar, first, second in (
+                (3, found.theta_3, found.theta_3_second),
+                (4, found.theta_4, found.theta_4_second),
+            ):
+                # about the direction itself, so that the angle never jumps
+                here = exact.angle(bar, at)
+                derivatives = [
+                    mp.diff(lambda x, e=exact, b=bar, h=here: _near(e.angle(b, x), h), at, n) for n in (1, 2)
+                ]
+                size = 1.0 + state.linkage.input.length / min(state.linkage.lengths)
+                assert abs(first[0] - derivatives[0]) <= FIRST * EPS * size**2 / sine**2
+                assert abs(second[0] - derivatives[1]) <= SECOND * EPS * size**3 / sine**4
+
+
+def _near(angle: mp.mpf, about: mp.mpf) -> mp.mpf:
+    return angle - 2 * mp.pi * mp.nint((angle - about) / (2 * mp.pi))
+
+
+def test_point_coefficients_are_derivatives() -> None:
+    with mp.workdps(50):
+        for state in random_states(12, 40):
+            exact, at, sine = Exact(state), mp.mpf(float(state.theta_2[0])), float(abs(state.sin_mu[0]))
+            found = point_coefficients(state, 3, 0.3, -0.2)
+            size = 1.0 + state.linkage.input.length / min(state.linkage.lengths)
+            for n, (x, y), roundings in ((1, found.first, FIRST), (2, found.second, SECOND)):
+                derivative = mp.diff(lambda angle, e=exact: e.point(angle, 0.3, -0.2), at, n)
+                error = abs(mp.mpc(x[0], y[0]) - derivative)
+                assert error <= roundings * EPS * size ** (n + 1) / sine ** (2 * n)
+
+
+def test_a_motion_law_follows_from_the_coefficients() -> None:
+    state = random_states(13, 1, 0.5)[0]
+    bars, points = bar_coefficients(state), point_coefficients(state, 3, 0.1, 0.4)
+    omega_2, alpha_2 = -7.0, 31.0
+    add_velocities(state, omega_2)
+    add_accelerations(state, alpha_2)
+    assert state.omega(4) == pytest.approx(bars.theta_4 * omega_2, rel=8 * EPS)
+    expected = bars.theta_3_second * omega_2**2 + bars.theta_3 * alpha_2
+    assert state.alpha(3) == pytest.approx(expected, rel=64 * EPS)
+    for i in (0, 1):
+        law = points.second[i] * omega_2**2 + points.first[i] * alpha_2
+        assert state.acceleration(3, 0.1, 0.4)[i] == pytest.approx(law, abs=1e3 * EPS * omega_2**2)
+
+
+def test_coefficients_leave_the_state_as_it_was() -> None:
+    state = random_states(14, 1)[0]
+    bar_coefficients(state)
+    assert state.omega_3 is None and state.first is None and state.omega_2 == 0.0
+
+
+def determinant(*centres: Centre) -> tuple[float, float]:
+    """Determinant of three homogeneous points and the product of their magnitudes."""
+    rows = np.array([[float(x[0]) for x in centre] for centre in centres])
+    return float(np.linalg.det(rows)), float(np.prod(np.linalg.norm(rows, axis=1)))
+
+
+def test_three_centres_of_three_bars_are_collinear() -> None:
+    for state in random_states(15, 300):
+        centres = instant_centres(state)
+        assert sorted(centres) == [(1, 2), (1, 3), (1, 4), (2, 3), (2, 4), (3, 4)]
+        for i, j, k in ((1, 2, 3), (1, 2, 4), (1, 3, 4), (2, 3, 4)):
+            gap, size = determinant(centres[i, j], centres[j, k], centres[i, k])
+            assert abs(gap) <= COLLINEAR * size / abs(float(state.sin_mu[0]))
+
+
+def test_the_coupler_turns_about_I13_and_bars_2_and_4_share_I24() -> None:
+    for state in random_states(16, 200):
+        add_velocities(state, 1.0)
+        (x, y), sine = instant_centres(state)[1, 3].point, float(abs(state.sin_mu[0]))
+        spin = float(np.asarray(state.omega(3))[0])
+        speed = state.velocity(3, 0.0, 0.0)
+        pin = state.pin("A")
+        still = math.hypot(speed[0][0] - spin * (y[0] - pin[1][0]), speed[1][0] + spin * (x[0] - pin[0][0]))
+        reach = abs(spin) * math.hypot(x[0], y[0]) + 1.0
+        assert still <= 1e3 * EPS * reach / sine**3
+        (x, y) = instant_centres(state)[2, 4].point
+        spin_4 = float(np.asarray(state.omega(4))[0])
+        # both bars give the same velocity there: x r_2 = omega_4 (r_2 - O4)
+        apart = math.hypot(x[0] - spin_4 * (x[0] - state.O4[0]), y[0] - spin_4 * (y[0] - state.O4[1]))
+        assert apart <= 1e3 * EPS * (math.hypot(x[0], y[0]) + 1.0) * (1.0 + abs(spin_4)) / sine**3
+
+
+def test_centres_at_infinity_have_a_direction() -> None:
+    # a parallelogram: bars 2, 4 are parallel, so is the coupler to the ground
+    state = close_loop(FourBar(2.0, Bar(1.0), Bar(2.0), Bar(1.0)), np.array([1.0]), 1)
+    centres = instant_centres(state)
+    assert centres[1, 3].w[0] == 0.0 and centres[2, 4].w[0] == 0.0
+    assert math.atan2(centres[1, 3].y[0], centres[1, 3].x[0]) % math.pi == pytest.approx(1.0, abs=4 * EPS)
+    assert centres[2, 4].y[0] == 0.0 and centres[2, 4].x[0] != 0.0
+    assert not np.isfinite(centres[1, 3].point[0][0])
+
+
+CURVES = {
+    "crank-rocker": (3.0, 1.0, 2.5, 2.2),
+    "drag link": (1.0, 3.0, 2.5, 3.2),
+    "double rocker": (3.0, 2.5, 1.0, 2.2),
+    "triple rocker": (2.0, 2.5, 4.0, 2.2),
+    "parallelogram": (2.0, 1.0, 2.0, 1.0),
+    "change-point crank": (2.0, 1.0, 4.0, 3.0),
+    "kite, short ground": (1.0, 1.0, 2.0, 2.0),
+    "rhombus": (1.0, 1.0, 1.0, 1.0),
+}
+
+
+@pytest.mark.parametrize("lengths", CURVES.values(), ids=CURVES)
+def test_coupler_curves_are_closed_and_lie_on_the_sextic(lengths: tuple[float, float, float, float]) -> None:
+    d, a, b, c = lengths
+    bars = FourBar(d, Bar(a), Bar(b), Bar(c), 0.3)
+    along, across = 0.4 * b, 0.3 * b
+    for circuit in range(len(circuits(bars))):
+        curve = coupler_curve(bars, along, across, circuit, steps=720)
+        assert curve.theta_2.shape == curve.x.shape == curve.branch.shape == (721,)
+        point = curve.x + 1j * curve.y
+        assert np.isfinite(point).all()
+        assert point[0] == point[-1] and curve.branch[0] == curve.branch[-1]
+        steps = np.abs(np.diff(point))
+        # a jump to another branch or circuit is as long as a bar; a step of the curve is not
+        assert steps.max() < 0.1 * min(lengths)
+        assert (curve.branch == 1).any() == (1 in circuits(bars)[circuit].branches)
+        assert _off_sextic(bars, point, along, across) < 1e-9
+
+
+def _off_sextic(bars: FourBar, point: np.ndarray, along: float, across: float) -> float:
+    """How far the points are from the coupler curve's own equation, free of theta_2.
+
+    A lies on the circle a about O2 and at the distance |(along, across)| of the point P; B follows from A
+    and P alone and must lie on the circle c about O4: one of the two possible A fulfils it.
+    """
+    d, a, b, c = bars.lengths
+    arm = complex(along, across)
+    feet = (np.abs(point) ** 2 + a * a - abs(arm) ** 2) / (2 * np.abs(point))
+    height = np.sqrt(np.maximum(a * a - feet**2, 0.0))
+    off = []
+    for side in (1, -1):
+        pin_a = point / np.abs(point) * (feet + 1j * side * height)
+        pin_b = pin_a + (point - pin_a) / arm * b
+        off.append(np.abs(np.abs(pin_b - d * np.exp(1j * bars.ground_angle)) - c))
+    return float(np.minimum(*off)[height > 1e-3 * a].max())
+
+
+def test_symmetric_circuits_draw_mirror_images() -> None:
+    bars = FourBar(3.0, Bar(2.5), Bar(1.0), Bar(2.2))
+    one, other = (coupler_curve(bars, 0.5, 0.0, circuit) for circuit in (0, 1))
+    assert (one.y > 0.0).mean() > 0.5 > (other.y > 0.0).mean()
+    for x, y in ((one.x[10], -one.y[10]), (one.x[200], -one.y[200])):
+        assert np.hypot(other.x - x, other.y - y).min() < 1e-12
+
+
+def test_a_curve_with_one_change_point_takes_two_turns() -> None:
+    curve = coupler_curve(FourBar(2.0, Bar(1.0), Bar(4.0), Bar(3.0)), 1.0, 1.0)
+    assert turns_fully(FourBar(2.0, Bar(1.0), Bar(4.0), Bar(3.0)))
+    assert curve.theta_2[-1] - curve.theta_2[0] == pytest.approx(4 * math.pi, rel=4 * EPS)
+    assert set(curve.branch.tolist()) == {1, -1}
+
+
+def test_a_circuit_that_does_not_exist_is_refused() -> None:
+    bars = FourBar(2.0, Bar(2.5), Bar(4.0), Bar(2.2))
+    with pytest.raises(ValueError, match="from 0 to 0"):
+        coupler_curve(bars, 0.0, 0.0, 1)
+    with pytest.raises(ValueError, match="multiple of 4"):
+        coupler_curve(bars, 0.0, 0.0, steps=90)

@@ -1,0 +1,147 @@
+"""Transmission angle against the dot product, its extremes against a scan, power, distance to singular positions."""
+
+import math
+
+import mpmath as mp
+import numpy as np
+import pytest
+
+from fourbar.kinematics import add_velocities, close_loop
+from fourbar.linkage import Bar, FourBar
+from fourbar.mobility import default_range, intervals, limit_positions, turns_fully
+from fourbar.transmission import (
+    distance_to_singular,
+    mechanical_advantage,
+    speed_ratio,
+    transmission_angle,
+    transmission_extremes,
+)
+from tests.test_coefficients import random_states
+
+EPS = 2.0**-52
+ANGLE = 16.0 * EPS
+"""Rounding of an angle at B, rad: eight operations, and theta_2 itself; magnified by 1/|sin mu|."""
+SCAN = 4001
+HIGHER_ORDER = 1.1
+"""What the terms beyond the leading one may add to the miss of a scan."""
+
+
+def test_transmission_angle_is_the_acute_angle_between_coupler_and_output() -> None:
+    with mp.workdps(50):
+        for state in random_states(21, 200, 1e-4):
+            d, a, b, c = (mp.mpf(length) for length in state.linkage.lengths)
+            psi = mp.mpf(float(state.theta_2[0])) - mp.mpf(state.linkage.ground_angle)
+            cosine = (b * b + c * c - a * a - d * d + 2 * a * d * mp.cos(psi)) / (2 * b * c)
+            exact = min(mp.acos(cosine), mp.pi - mp.acos(cosine))
+            stretch = float(a * d / (b * c)) + 1.0  # d mu/d psi = a d sin(psi)/(b c sin(mu))
+            size = max(1.0, float(a * a + d * d) / float(b * c))
+            error = abs(transmission_angle(state)[0] - exact)
+            assert error <= ANGLE * (stretch + size) / abs(float(state.sin_mu[0]))
+
+
+def test_extremes_are_those_of_a_scan() -> None:
+    rng = np.random.default_rng(22)
+    kinds = set()
+    for _ in range(200):
+        d, a, b, c = rng.uniform(0.1, 1.0, 4).tolist()
+        if 2.0 * max(d, a, b, c) > d + a + b + c - 0.01:
+            continue
+        bars = FourBar(d, Bar(a), Bar(b), Bar(c), float(rng.uniform(-3.0, 3.0)))
+        found = transmission_extremes(bars)
+        kinds.add((found.least == 0.0, found.greatest == math.pi))
+        start, stop = intervals(bars)[0]
+        theta_2 = np.linspace(start, stop, SCAN)[1:-1]
+        state = close_loop(bars, theta_2, 1)
+        ba, bo = -(b * state.u3[0] + 1j * b * state.u3[1]), -(c * state.u4[0] + 1j * c * state.u4[1])
+        angle = np.abs(np.angle(ba / bo))  # A-B-O4
+        step = (stop - start) / (SCAN - 1)
+        steep = a * d / (b * c)  # d cos(mu)/d theta_2 = -steep sin psi
+        for end, scanned in ((found.least, angle.min()), (found.greatest, angle.max())):
+            # mu^2/2 = steep sin psi delta at a limit; else mu'' = steep/sin mu, a whole step away at most
+            at_limit = end in (0.0, math.pi)
+            miss = math.sqrt(2.0 * steep * step) if at_limit else 0.5 * steep / math.sin(end) * step**2
+            assert end == pytest.approx(scanned, abs=HIGHER_ORDER * miss)
+        assert found.worst == min(found.least, math.pi - found.greatest)
+        for end, where in ((found.least, found.theta_2_least), (found.greatest, found.theta_2_greatest)):
+            e = abs(a * np.exp(1j * where) - d * np.exp(1j * bars.ground_angle))
+            assert e**2 == pytest.approx(b * b + c * c - 2 * b * c * math.cos(end), abs=64 * EPS)
+    assert kinds == {(True, True), (True, False), (False, True), (False, False)}
+
+
+def test_extremes_keep_their_digits_beside_a_change_point() -> None:
+    with mp.workdps(50):
+        for gap in (1e-3, 1e-7, 1e-11, 1e-14):
+            d, a, b, c = 0.3, 0.1, 0.25, 0.15 + gap
+            found = transmission_extremes(FourBar(d, Bar(a), Bar(b), Bar(c)))
+            e, b_, c_ = mp.mpf(d) + mp.mpf(a), mp.mpf(b), mp.mpf(c)
+            # relative to the distance from pi, which is what is left to transmit
+            exact = mp.pi - mp.acos((b_ * b_ + c_ * c_ - e * e) / (2 * b_ * c_))
+            assert abs((math.pi - found.greatest) - exact) <= 4 * EPS * math.pi
+            least = mp.acos((b_ * b_ + c_ * c_ - (mp.mpf(d) - mp.mpf(a)) ** 2) / (2 * b_ * c_))
+            assert abs(found.least - least) <= 8 * EPS * least
+
+
+def test_speed_ratio_follows_from_the_centres_of_rotation() -> None:
+    # the velocity of B along the coupler equals that of A: a sin(theta_2 - theta_3) = (omega_4/omega_2) c sin(...)
+    for state in random_states(23, 100):
+        _, a, _, c = state.linkage.lengths
+        lever_in = a * math.sin(state.theta_2[0] - state.angle(3)[0])
+        lever_out = c * math.sin(state.angle(4)[0] - state.angle(3)[0])
+        assert speed_ratio(state)[0] * lever_out == pytest.approx(
+            lever_in, abs=256 * EPS * (a + c) / state.sin_mu[0] ** 2
+        )
+
+
+def test_power_in_is_power_out() -> None:
+    for state in random_states(24, 100):
+        add_velocities(state, 3.0)
+        force_in, r_in, r_out = 2.0, 0.1, 0.4
+        force_out = mechanical_advantage(state, r_in, r_out) * force_in
+        power_out = force_out * r_out * np.asarray(state.omega(4))
+        assert power_out == pytest.approx(force_in * r_in * 3.0, rel=16 * EPS)
+
+
+def test_advantage_where_the_output_stands_and_where_the_input_does() -> None:
+    # the output stands still exactly: antiparallel kite folded onto itself, B on O2
+    kite = FourBar(2.0, Bar(1.0), Bar(1.0), Bar(2.0))
+    assert np.isinf(mechanical_advantage(close_loop(kite, np.array([1.0]), -1))).all()
+    rocker = FourBar(3.0, Bar(2.5), Bar(1.0), Bar(2.2))
+    limit = limit_positions(rocker)[0].theta_2
+    near = close_loop(rocker, limit + np.array([1e-4, 1e-6, 1e-8]), 1)
+    advantage = np.abs(mechanical_advantage(near))
+    assert near.assembled.all()
+    # it falls as the root of the distance
+    assert advantage[:-1] / advantage[1:] == pytest.approx([10.0, 10.0], rel=1e-2)
+    flat = close_loop(FourBar(2.0, Bar(1.0), Bar(2.0), Bar(1.0)), np.array([0.0]), 1)
+    assert np.isnan(speed_ratio(flat)).all() and np.isnan(mechanical_advantage(flat)).all()
+
+
+def test_distance_is_that_to_the_edge_of_assembly() -> None:
+    for bars in (
+        FourBar(3.0, Bar(2.5), Bar(1.0), Bar(2.2), 0.7),
+        FourBar(2.0, Bar(2.5), Bar(4.0), Bar(2.2), -2.0),
+        FourBar(4.0, Bar(2.0), Bar(2.5), Bar(2.2), 3.0),
+    ):
+        assert not turns_fully(bars)
+        theta_2 = np.linspace(*default_range(bars), 40) + 4 * math.pi
+        distance = distance_to_singular(bars, theta_2)
+        inside = [close_loop(bars, theta_2 + s * distance * (1 - 1e-9), 1).assembled for s in (1, -1)]
+        outside = [close_loop(bars, theta_2 + s * distance * (1 + 1e-9), 1).assembled for s in (1, -1)]
+        assert np.all(inside[0] & inside[1])
+        assert not np.any(outside[0] & outside[1])
+
+
+def test_distance_counts_change_points_and_the_dead_centres_of_the_drive() -> None:
+    crank = FourBar(3.0, Bar(1.0), Bar(2.5), Bar(2.2), 0.5)
+    theta_2 = np.linspace(0.0, 6.0, 50)
+    assert np.isinf(distance_to_singular(crank, theta_2)).all()
+    dead = distance_to_singular(crank, theta_2, 4, 1)
+    assert np.isfinite(dead).all() and (dead >= distance_to_singular(crank, theta_2, 4)).all()
+    # at a dead centre of a drive on bar 4 the output stands: the speed ratio changes its sign there
+    at = theta_2 + dead * 0.999, theta_2 + dead * 1.001, theta_2 - dead * 0.999, theta_2 - dead * 1.001
+    sign = [np.sign(speed_ratio(close_loop(crank, angle, 1))) for angle in at]
+    assert ((sign[0] != sign[1]) | (sign[2] != sign[3])).all()
+    parallelogram = FourBar(2.0, Bar(1.0), Bar(2.0), Bar(1.0), 0.5)
+    assert distance_to_singular(parallelogram, np.array([0.6, 3.5, 0.5 + math.pi / 2])) == pytest.approx(
+        [0.1, 0.5 + math.pi - 3.5, math.pi / 2], abs=8 * EPS
+    )
