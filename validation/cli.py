@@ -14,6 +14,7 @@ COMMANDS = {
     "accept": "validation.regression.command:accept_command",
     "compare": "validation.regression.command:compare",
     "check": "validation.check:check",
+    "fuzz-files": "validation.suite.mutants:fuzz_files",
     "models": "validation.models:models",
     "published": "validation.published:published",
     "stability": "validation.stability:stability",

@@ -2,6 +2,7 @@
 
 import csv
 import io
+import os
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -19,6 +20,7 @@ from validation.report.markdown import markdown
 from validation.report.summary import SCENES_SHOWN, Summary, summarise
 from validation.suite import pool
 from validation.suite.columns import write_columns
+from validation.suite.elsewhere import run_elsewhere
 from validation.suite.random import LinkageType
 from validation.suite.scenes import Random, Suite, model_files, scene_files
 from validation.suite.store import Store
@@ -108,6 +110,11 @@ def linkage_types(text: str) -> tuple[LinkageType, ...]:
 @click.option("--workers", type=click.IntRange(min=1), default=WORKERS, show_default=True, help="Processes.")
 @click.option("--scheduler", metavar="ADDRESS", help="Spread over the workers of this Dask scheduler.")
 @click.option("--against", metavar="BASELINE", help="Compare with an accepted name or an earlier run's folder.")
+@click.option(
+    "--python",
+    type=click.Path(path_type=Path),
+    help="Run the suite under this interpreter too (into OUT/elsewhere), and say what changes from there to here.",
+)
 @output_options
 def command(
     scenes: tuple[Path, ...],
@@ -119,6 +126,7 @@ def command(
     workers: int,
     scheduler: str | None,
     against: str | None,
+    python: Path | None,
     **forms: Path | None,
 ) -> int:
     """Judge scenes (default: all of models/); write results.csv, timings.csv, report.md and report.html."""
@@ -130,6 +138,11 @@ def command(
     if count is not None and scenes:
         raise InputError("--random", count, "judges random linkages; leave out the scene files")
     suite: Suite = Random(count, seed, linkage_types(types)) if count else scene_files(scenes or model_files())
+    if python is not None:
+        passed_on = [*map(os.path.abspath, scenes), f"--seed={seed}", f"--type={types}", f"--workers={workers}"]
+        passed_on += [f"--engines={engines}"] if engines else []
+        passed_on += [f"--random={count}"] if count else []
+        against = str(run_elsewhere(python, passed_on, out / "elsewhere"))
     columns = (TextColumn("judging"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     result: Any = None
     with Progress(*columns, console=Console(stderr=True)) as progress:
