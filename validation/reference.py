@@ -112,11 +112,13 @@ def outputs(scene: Scene, branch: int, x: Values, drive_bar: int) -> Values | No
     omega = {2: x["omega_2"]}
     if y["sin_mu"] == 0:
         return y
-    omega[3], omega[4] = linear(rows, [a * omega[2] * w[2][1], -a * omega[2] * w[2][0]])
+    zero = (arb(0), arb(0))
+    slip, jerk = x.get("slip", zero), x.get("jerk", zero)  # what a probe opens the loop by, m/s and m/s^2
+    omega[3], omega[4] = linear(rows, [a * omega[2] * w[2][1] + slip[0], -a * omega[2] * w[2][0] + slip[1]])
     alpha = {2: x["alpha_2"]}
     centripetal = plus(times(a * omega[2] ** 2, w[2]), times(b * omega[3] ** 2, w[3]))
     centripetal = plus(centripetal, times(-c * omega[4] ** 2, w[4]))
-    right = [centripetal[0] + a * alpha[2] * w[2][1], centripetal[1] - a * alpha[2] * w[2][0]]
+    right = [centripetal[0] + a * alpha[2] * w[2][1] + jerk[0], centripetal[1] - a * alpha[2] * w[2][0] + jerk[1]]
     alpha[3], alpha[4] = linear(rows, right)
     for k in (2, 3, 4):
         y[f"omega_{k}"], y[f"alpha_{k}"] = omega[k], alpha[k]
@@ -124,7 +126,6 @@ def outputs(scene: Scene, branch: int, x: Values, drive_bar: int) -> Values | No
     def swing(k: int, arm: Pair) -> Pair:
         return turn(arm, (-omega[k] * omega[k], alpha[k]))
 
-    zero = (arb(0), arb(0))
     O4 = polar(x["d"], x["theta_1"])
     foot = {2: zero, 3: times(a, w[2]), 4: O4}
     foot_acceleration = {2: zero, 3: swing(2, times(a, w[2])), 4: zero}

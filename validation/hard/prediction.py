@@ -1,19 +1,23 @@
 """The error that rounding must be expected to make, computed from the description in 320-bit arithmetic.
 
-    predicted = R eps sum_i w_i |dy/dx_i|,
+    predicted = R eps (sum_i w_i |dy/dx_i| + reach sum_j |dy/dz_j|),
 
-the first-order change of a result y when every stored input x_i (lengths, angles, masses, loads, the
-command) and the closure of the loop move in their last digit, at this very position and for this very
-quantity. It replaces K eps/condition where no power of a sine is the right law: beside change points,
-where a torque cancels, and for forces beside a toggle, which a law in s^2 would excuse too much.
+the first-order change of a result y, at this very position and for this very quantity, when every
+stored input x_i (lengths, angles, masses, loads, the command) moves in its last digit, and when the
+loop opens with the speed z_1 and the acceleration z_2 that rounding leaves in an engine whose lever
+arms are differences of coordinates as long as `reach`. It replaces K eps/condition where no power of
+a sine is the right law: beside change points, where a torque cancels, and for forces beside a toggle,
+which a law in s^2 would excuse too much.
 """
 
 import math
+from collections.abc import Iterable
 from functools import lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from fourbar.linkage import MOVING_BARS
 from fourbar.scene import Command, Scene
 from fourbar.solution import VECTORS
 from validation.tolerance import EPS, Array
@@ -21,59 +25,104 @@ from validation.tolerance import EPS, Array
 ROUNDINGS = 8.0
 """R: a chain of some fifty roundings moves a result by sqrt(50) = 7 last digits, as a random walk."""
 
+FIRST_ORDER = 0.1
+"""Where the angles are uncertain by this part of the sine that everything divides by, first order predicts nothing:
+speeds and forces may come out as anything, the torque too, whose own first order can cancel."""
 
-def predicted_error(scene: Scene, at: Command, quantities: tuple[str, ...]) -> dict[str, Array]:
-    """Absolute error predicted for each quantity at each position, (n,); NaN where the loop does not close.
 
-    At a singular position, where the exact equations have no answer, it is infinite.
+def from_data(scene: Scene, at: Command, quantities: Iterable[str]) -> dict[str, Array]:
+    """For a derivation that works in angles and lengths themselves."""
+    return predicted_error(scene, at, quantities, 0.0)
+
+
+def in_world_axes(scene: Scene, at: Command, quantities: Iterable[str]) -> dict[str, Array]:
+    """For an engine that differences points of the linkage in world axes, as Pinocchio's frame Jacobians do."""
+    return predicted_error(scene, at, quantities, _extent(scene))
+
+
+def about_mass_centre(scene: Scene, at: Command, quantities: Iterable[str]) -> dict[str, Array]:
+    """For an engine whose lever arms start at the mass centre of a tree of bodies, as MuJoCo's do."""
+    furthest = max(abs(scene.linkage.bar(number).centre[0]) for number in MOVING_BARS)  # type: ignore[index]
+    return predicted_error(scene, at, quantities, _extent(scene) + furthest)
+
+
+def _extent(scene: Scene) -> float:
+    return math.fsum(scene.linkage.lengths)
+
+
+def predicted_error(scene: Scene, at: Command, quantities: Iterable[str], reach: float) -> dict[str, Array]:
+    """Absolute error predicted for each quantity at each position, (n,).
+
+    NaN where the loop does not close; infinite at a singular position, where the equations have no answer.
     """
     n = len(at.theta_2)
-    omega = np.broadcast_to(np.nan if at.omega_2 is None else np.asarray(at.omega_2, float), (n,))
+    omega = np.broadcast_to(0.0 if at.omega_2 is None else np.asarray(at.omega_2, float), (n,))
     alpha = np.broadcast_to(np.asarray(at.alpha_2, float), (n,))
     result = {name: np.full(n, np.nan) for name in quantities}
     for i in range(n):
         moved = _sensitivity(scene, float(at.theta_2[i]), int(at.branch[i]), float(omega[i]), float(alpha[i]))
         if moved is None:
             continue
-        for name in quantities:
-            parts = [moved.get(f"{name}{axis}", math.inf) for axis in (("_x", "_y") if name in VECTORS else ("",))]
+        lost = ROUNDINGS * EPS * moved.data["theta_4"] >= FIRST_ORDER * float(moved.data["condition"])
+        for name in result:
+            if lost and not name.startswith("theta"):
+                result[name][i] = math.inf
+                continue
+            axes = ("_x", "_y") if name in VECTORS else ("",)
+            parts = [moved.data.get(name + axis, math.inf) + reach * moved.loop.get(name + axis, 0.0) for axis in axes]
             result[name][i] = ROUNDINGS * EPS * math.hypot(*parts)
     return result
 
 
-@lru_cache(maxsize=4096)
-def _sensitivity(scene: Scene, theta_2: float, branch: int, omega_2: float, alpha_2: float) -> dict[str, float] | None:
-    """|y| + sum w_i |dy/dx_i| of every output; None where the loop does not close."""
+class Sensitivity(NamedTuple):
+    """How far each output moves at one position."""
+
+    data: dict[str, float]
+    """|y| + sum w_i |dy/dx_i|; of the condition, its value."""
+    loop: dict[str, float]
+    """By a loop that opens at its fastest bar's speed and acceleration times 1 m."""
+
+
+@lru_cache(maxsize=8192)
+def _sensitivity(scene: Scene, theta_2: float, branch: int, omega_2: float, alpha_2: float) -> Sensitivity | None:
+    """Sensitivities at one position; None where the loop does not close."""
     from flint import arb, ctx
 
     from validation.reference import BITS, STEP_BITS, inputs, outputs
 
     ctx.prec = BITS
-    stored = inputs(scene, theta_2) | {"omega_2": 0.0 if math.isnan(omega_2) else omega_2, "alpha_2": alpha_2}
+    stored = inputs(scene, theta_2) | {"omega_2": omega_2, "alpha_2": alpha_2}
     exact: dict[str, Any] = {name: arb(value) for name, value in stored.items()}
-
-    def evaluate(changed: dict[str, Any]) -> Any:
-        return outputs(scene, branch, exact | changed, scene.drive_bar)
-
-    base = evaluate({})
+    base = outputs(scene, branch, exact, scene.drive_bar)
     if base is None:
         return None
-    total = {name: 1.0 if name.startswith("theta") else abs(float(value.mid())) for name, value in base.items()}
     step, two_pi = arb(2) ** -STEP_BITS, 2 * arb.pi()
+
+    def add(total: dict[str, float], changes: list[dict[str, Any]]) -> None:
+        """The change under the first of several changes of the inputs with which the loop still closes."""
+        for changed in changes:
+            moved = outputs(scene, branch, exact | changed, scene.drive_bar)
+            if moved is None or len(moved) != len(base):
+                continue
+            for output, y in base.items():
+                change = abs(moved[output] - y)
+                if output.startswith("theta") and change > 3:
+                    change = two_pi - change
+                total[output] = total.get(output, 0.0) + abs(float((change / step).mid()))
+            return
+
+    data = {name: 1.0 if name.startswith("theta") else abs(float(value.mid())) for name, value in base.items()}
     for name, weight in _weights(stored).items():
-        moved = None
-        for side in (1, -1):
-            moved = evaluate({name: exact[name] + side * weight * step})
-            if moved is not None and len(moved) == len(base):
-                break
-        if moved is None:
-            continue
-        for output, y in base.items():
-            change = abs(moved[output] - y)
-            if output.startswith("theta") and change > 3:
-                change = two_pi - change
-            total[output] += abs(float((change / step).mid()))
-    return total
+        add(data, [{name: exact[name] + side * weight * step} for side in (1, -1)])
+    data["condition"] = float(base["condition"].mid())
+    loop: dict[str, float] = {}
+    if "omega_3" in base:
+        fastest = max(abs(base[f"omega_{bar}"]) for bar in MOVING_BARS)
+        hardest = max(abs(base[f"alpha_{bar}"]) for bar in MOVING_BARS) + fastest * fastest
+        for name, most in (("slip", fastest), ("jerk", hardest)):
+            for x, y in ((most * step, arb(0)), (arb(0), most * step)):
+                add(loop, [{name: (x, y)}])
+    return Sensitivity(data, loop)
 
 
 def _weights(stored: dict[str, float]) -> dict[str, float]:

@@ -7,18 +7,21 @@ from validation.hard.families import FAMILIES
 from validation.judge import WITNESSES, Witness
 from validation.tolerance import FULL_ACCURACY, SIMULATED
 
-COMPUTED = "validation.hard.prediction:predicted_error"
-BALLS = Witness("ball-arithmetic", "validation.hard.exact:BallArithmetic", FULL_ACCURACY, predictor=COMPUTED)
+PREDICTION = "validation.hard.prediction:"
+PREDICTORS = {"pinocchio-inverse": "in_world_axes", "mujoco-inverse": "about_mass_centre"}
+"""How each exact engine measures lever arms; others work with the data as they are."""
+BALLS = Witness("ball-arithmetic", "validation.hard.exact:BallArithmetic", FULL_ACCURACY)
 
 
 def predicting(witness: Witness) -> Witness:
     """The witness held to full accuracy, or else to the error predicted for each position."""
     if witness.tolerance is SIMULATED:
         return replace(witness, predictor="own")
-    return replace(witness, tolerance=FULL_ACCURACY, predictor=COMPUTED)
+    predictor = PREDICTION + PREDICTORS.get(witness.name, "from_data")
+    return replace(witness, tolerance=FULL_ACCURACY, predictor=predictor)
 
 
-HARD_WITNESSES = (BALLS, *(predicting(witness) for witness in WITNESSES))
+HARD_WITNESSES = tuple(predicting(witness) for witness in (BALLS, *WITNESSES))
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 from validation.engines.loop import Position
 
 Array = NDArray[np.float64]
+CARRIED_BY = {"input": ("input",), "coupler": ("coupler", "input"), "output": ("output",)}
+"""The bodies whose parent bears what acts on a body."""
 O2, A, O4 = 0, 1, 2
 """Degrees of freedom, in the order of the bodies."""
 WARNINGS = (mujoco.mjtWarning.mjWARN_BADQPOS, mujoco.mjtWarning.mjWARN_BADQVEL, mujoco.mjtWarning.mjWARN_BADQACC)
@@ -25,7 +27,7 @@ class ClosedLoop:
         loads = [i for i in range(self.model.nu) if self.model.actuator(i).name.startswith("load_")]
         self.loads = [(i, self.model.site_bodyid[self.model.actuator_trnid[i, 0]]) for i in loads]
         self.drive = next((i for i in range(self.model.nu) if self.model.actuator(i).name == "drive"), None)
-        self._jac3, self._jac4 = np.zeros((3, self.model.nv)), np.zeros((3, self.model.nv))
+        self._jac = np.zeros((3, self.model.nv))
 
     def gap(self) -> tuple[float, float]:
         """B on bar 3 minus B on bar 4, m."""
@@ -34,9 +36,12 @@ class ClosedLoop:
 
     def jacobian(self) -> Array:
         """Derivative of the gap by the joint angles, (2, 3)."""
-        mujoco.mj_jacSite(self.model, self.data, self._jac3, None, self.site["B3"])
-        mujoco.mj_jacSite(self.model, self.data, self._jac4, None, self.site["B4"])
-        return np.asarray(self._jac3[:2] - self._jac4[:2])
+        return self.jacobian_at("B3") - self.jacobian_at("B4")
+
+    def jacobian_at(self, site: str) -> Array:
+        """Derivative of a site's position by the joint angles, (2, 3)."""
+        mujoco.mj_jacSite(self.model, self.data, self._jac, None, self.site[site])
+        return self._jac[:2].copy()
 
     def place(self, q: Sequence[float]) -> None:
         """Move to the joint angles (O2, A, O4)."""
@@ -74,17 +79,15 @@ class ClosedLoop:
         """Pin forces of the state that was last forwarded, world axes, N.
 
         cfrc_int is what the parent exerts on a body and all it carries, but MuJoCo counts the forces
-        of actuators on sites into it; they are taken out again.
+        of actuators on sites into it; they are taken out again. Those of tendons it keeps apart.
         """
         d = self.data
         on = {name: d.cfrc_int[body][3:5].copy() for name, body in self.body.items()}
         for actuator, body in self.loads:
             force = self._load_force(actuator)
-            for name in {"input": ("input",), "coupler": ("coupler", "input"), "output": ("output",)}[
-                self.model.body(body).name
-            ]:
+            for name in CARRIED_BY[self.model.body(body).name]:
                 on[name] -= force
-        return {"F12": on["input"], "F32": -on["coupler"], "F43": d.efc_force[:2].copy(), "F14": on["output"]}
+        return on
 
     def _load_force(self, actuator: int) -> Array:
         """Force of a load actuator, in world axes, (2,)."""
