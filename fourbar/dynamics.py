@@ -35,6 +35,16 @@ class Power(Protocol):
     def power(self, state: State) -> Array | float:
         """The power it puts into the linkage, W."""
 
+    def carried_by(self, linkage: FourBar) -> FourBar:
+        """The linkage with the inertia that it adds."""
+
+
+def carrying(linkage: FourBar, terms: Iterable[Power]) -> FourBar:
+    """The linkage with the inertia that effects (a flywheel) add to its bars."""
+    for term in terms:
+        linkage = term.carried_by(linkage)
+    return linkage
+
 
 class Path(NamedTuple):
     """A position of the linkage and the way it moves with the independent angle q."""
@@ -205,8 +215,9 @@ def driving_torque(
     omega, alpha : dq/dt and d^2q/dt^2, rad/s and rad/s^2.
     terms : loads and effects.
     """
+    terms = tuple(terms)
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-        J, J_1 = inertia(linkage, way)
+        J, J_1 = inertia(carrying(linkage, terms), way)
         work = J * alpha + 0.5 * J_1 * omega * omega - generalised_force(linkage, way, omega, terms)
         return work / way.first[drive_bar]
 

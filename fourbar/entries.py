@@ -1,6 +1,7 @@
 """Entries of a scene file, checked one by one: every mistake names the file, the key, the value and what is allowed."""
 
 import difflib
+import math
 import re
 from collections.abc import Iterable
 from typing import Any
@@ -56,6 +57,13 @@ class Reader:
             missing = "is missing; " if value is None else ""
             raise self.refuse(key, value, f"{missing}must be a whole number from {least} to {most}")
         return value
+
+    def number(self, key: str, value: object) -> float:
+        """A number without a dimension."""
+        if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
+            missing = "is missing; " if value is None else ""
+            raise self.refuse(key, value, f"{missing}must be a finite number without a unit")
+        return float(value)
 
     def quantity(
         self, key: str, value: object, unit: str, *, positive: bool = False, at_least_zero: bool = False

@@ -19,6 +19,7 @@ from fourbar.dynamics import (
     Path,
     Power,
     acceleration,
+    carrying,
     generalised_force,
     inertia,
     kinetic_energy,
@@ -110,7 +111,8 @@ def release(
     DependencyError : SciPy is not installed.
     """
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-        return _Run(linkage, tuple(terms), theta_2, omega_2, branch, follow).through(times)
+        terms = tuple(terms)
+        return _Run(carrying(linkage, terms), terms, theta_2, omega_2, branch, follow).through(times)
 
 
 class _Run:

@@ -3,23 +3,32 @@
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from decimal import Decimal
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.effects import Friction, Gravity, Load, Viscous
+from fourbar.effects import Effect, Load
 from fourbar.error_bars import error_bars
 from fourbar.errors import InputError
 from fourbar.kinematics import Array, State, Vector, add_accelerations, add_velocities, centre_in_bar, close_loop
-from fourbar.kinetostatics import solve_pins
+from fourbar.kinetostatics import solve_pins, torque_interval
 from fourbar.linkage import MOVING_BARS, FourBar, require
 from fourbar.margins import U, diagonal_to_O4, limit_remainder
 from fourbar.mobility import default_range, limit_positions, on_smooth_path
 from fourbar.more_digits import needing_more_digits, restated, rounded
-from fourbar.solution import NOT_ASSEMBLED, OK, SINGULAR, STAGE_OF, STAGES, VECTORS, Solution, Unwrapped
+from fourbar.solution import (
+    NOT_ASSEMBLED,
+    OF_DRY_FRICTION,
+    OF_PIN_LOADS,
+    SINGULAR,
+    STAGE_OF,
+    STAGES,
+    VECTORS,
+    Solution,
+    Unwrapped,
+)
 
-Effect = Gravity | Viscous | Friction
 OPEN, CROSSED = 1, -1
 ALL = slice(None)
 
@@ -197,7 +206,8 @@ def solve(
         if stage not in STAGES:
             raise InputError("stage", stage, "must be one of " + ", ".join(STAGES))
         wanted = STAGES.index(stage)
-        names = [name for name, of in STAGE_OF.items() if STAGES.index(of) <= wanted]
+        absent = _absent(scene)
+        names = [name for name, of in STAGE_OF.items() if STAGES.index(of) <= wanted and name not in absent]
         # vectors component by component in memory: each is written and read in one piece
         result = {name: np.empty((2, n)).T if name in VECTORS else np.empty(n) for name in names}
     else:
@@ -253,6 +263,12 @@ def _solve_free(scene: Scene, stage: str | None, out: Mapping[str, Array] | None
     return solution
 
 
+def _absent(scene: Scene) -> tuple[str, ...]:
+    """Quantities that do not exist without dry friction, or without friction that depends on the pin forces."""
+    absent = () if any(effect.dry for effect in scene.effects) else OF_DRY_FRICTION
+    return absent if any(effect.loaded_pins for effect in scene.effects) else (*absent, *OF_PIN_LOADS)
+
+
 def _highest_stage(out: Mapping[str, Array], n: int) -> int:
     """The last stage that the quantities named need; an InputError where one cannot be written."""
     for name, array in out.items():
@@ -289,9 +305,7 @@ KINEMATIC: dict[str, Callable[[State], Array | Vector | float | None]] = {
 """The quantities up to the acceleration, from the state of the stage that they belong to."""
 
 
-def _solve_block(
-    scene: Scene, where: Command, part: slice, wanted: int, out: Mapping[str, Array]
-) -> NDArray[np.uint8] | int:
+def _solve_block(scene: Scene, where: Command, part: slice, wanted: int, out: Mapping[str, Array]) -> NDArray[np.uint8]:
     """Evaluate one block of positions into the result arrays; its status codes."""
     theta_2, branch = where.theta_2[part], where.branch[part]
     motion = (_piece(where.omega_2, part), _piece(where.alpha_2, part))
@@ -300,23 +314,30 @@ def _solve_block(
     else:
         exact = diagonal_to_O4(scene.linkage, theta_2, where.remainder)
         state = close_loop(scene.linkage, theta_2, branch, exact)
+    friction = np.zeros(theta_2.shape, dtype=np.uint8)
     for name, value in _evaluate(scene, state, *motion, wanted, out):
-        _put(out[name], value)
+        if name == "status":
+            friction[:] = value
+        else:
+            _put(out[name], value)
     if (hard := needing_more_digits(state)).size:
         for name, value in _evaluate(scene, *restated(state, *motion, hard), wanted, out):
+            if name == "status":
+                friction[hard] = value
+                continue
             # what doubles lost is lost again, 53 bits further down
             left = out[name][hard] * U if STAGE_OF[name] == "error" else 0.0
             _put(out[name], value, hard)
             out[name][hard] += left
     if state.assembled.all() and not state.singular.any():
-        return OK
-    return np.where(state.assembled, np.where(state.singular, SINGULAR, OK), NOT_ASSEMBLED).astype(np.uint8)
+        return friction
+    return np.where(state.assembled, np.where(state.singular, SINGULAR, friction), NOT_ASSEMBLED).astype(np.uint8)
 
 
 def _evaluate(
     scene: Scene, state: State, omega_2: Array | float, alpha_2: Array | float, wanted: int, names: Mapping[str, Array]
-) -> Iterator[tuple[str, Array | Vector | float | None]]:
-    """The quantities named, stage by stage."""
+) -> Iterator[tuple[str, Any]]:
+    """The quantities named, stage by stage, and the "status" that friction leaves."""
     if wanted >= 1:
         add_velocities(state, omega_2)
     if wanted >= 2:
@@ -330,8 +351,15 @@ def _evaluate(
         for name in ("F12", "F32", "F43", "F14", "torque"):
             if name in names:
                 yield name, getattr(pins, name)
+        if pins.unsettled is not None:
+            yield "status", pins.unsettled
         if "drive_condition" in names:
             yield "drive_condition", np.abs(pins.drive_sine)
+        if "friction_residual" in names:
+            yield "friction_residual", 0.0 if pins.residual is None else pins.residual
+        if "torque_low" in names or "torque_high" in names:
+            ends = torque_interval(state, terms, scene.drive_bar, pins.torque)
+            yield from ((name, end) for name, end in zip(OF_DRY_FRICTION, ends, strict=True) if name in names)
         if wanted >= 4:
             for name, value in error_bars(state, pins, terms, scene.drive_bar).items():
                 if name in names:

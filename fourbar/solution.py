@@ -16,9 +16,13 @@ STAGE_OF = {
         "acceleration",
     ),
     **dict.fromkeys(("F12", "F32", "F43", "F14", "torque", "drive_condition"), "force"),
+    **dict.fromkeys(("torque_low", "torque_high", "friction_residual"), "force"),
     **dict.fromkeys(("torque_error", "force_error"), "error"),
 }
 """Every evaluated quantity and the stage that computes it."""
+OF_DRY_FRICTION = ("torque_low", "torque_high")
+OF_PIN_LOADS = ("friction_residual",)
+"""Quantities that exist only where the scene has dry friction, or friction that depends on the pin forces."""
 VECTORS = frozenset(("A", "B", "G2", "G3", "G4", "a_A", "a_B", "a_G2", "a_G3", "a_G4", "F12", "F32", "F43", "F14"))
 UNITS = {
     **dict.fromkeys(("theta_2", "theta_3", "theta_4"), "rad"),
@@ -30,11 +34,12 @@ UNITS = {
     "time": "s",
     "torque": "N m",
     "torque_error": "N m",
+    **dict.fromkeys(("torque_low", "torque_high", "friction_residual"), "N m"),
     "force_error": "N",
     **dict.fromkeys(("sin_mu", "condition", "drive_condition"), "1"),
 }
-STATUS_NAMES = ("ok", "not_assembled", "singular")
-OK, NOT_ASSEMBLED, SINGULAR = range(3)
+STATUS_NAMES = ("ok", "not_assembled", "singular", "jammed", "several")
+OK, NOT_ASSEMBLED, SINGULAR, JAMMED, SEVERAL = range(5)
 
 
 @dataclass(slots=True, eq=False)
@@ -48,7 +53,8 @@ class Solution:
     title: str
     drive_bar: int
     status_code: NDArray[np.uint8]
-    """0 ok, 1 not_assembled, 2 singular (velocities are 0/0)."""
+    """0 ok, 1 not_assembled, 2 singular (velocities are 0/0); of friction that depends on the pin forces: 3 jammed
+    (no forces fulfil it: forces are NaN), 4 several (more than one set does: those of the least friction)."""
     branch: NDArray[np.int8]
     """+1 open, -1 crossed."""
     theta_2: Array
@@ -87,6 +93,12 @@ class Solution:
     """Error bar of the torque, N m: what rounding makes it scatter by."""
     force_error: Array | None = None
     """Error bar of the pin forces, N: the same for the worst of the four."""
+    torque_low: Array | None = None
+    """Where dry friction holds a pin at rest the least torque that may act, else the torque itself, N m."""
+    torque_high: Array | None = None
+    """The greatest one; NaN where friction jams the motion that would begin."""
+    friction_residual: Array | None = None
+    """Largest |mu r |F| - couple| that the solved pin friction leaves, N m."""
 
     time: Array | None = None
     """Of a free motion, s; it ends where the linkage stops at a limit position."""

@@ -4,6 +4,7 @@ import math
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
+from fourbar.effects.effect import Act, Effect, Tree
 from fourbar.effects.wrenches import Wrenches
 from fourbar.kinematics import Array, State, centre_in_bar
 from fourbar.linkage import MOVING_BARS, FourBar, require
@@ -11,7 +12,7 @@ from fourbar.solution import Solution
 
 
 @dataclass(frozen=True, slots=True)
-class Gravity:
+class Gravity(Effect):
     """A uniform field of the given magnitude (m/s^2) and direction (rad, from +x, counter-clockwise)."""
 
     magnitude: float = 9.81
@@ -56,6 +57,15 @@ class Gravity:
                 total = total + bar.mass * (gx * vx + gy * vy)
         return total
 
+    def engine_term(self, tree: Tree) -> Act | None:
+        """The engine's own gravity."""
+        tree.gravity(self.vector)
+        return None
+
+    def add_mjcf(self, model: Any) -> None:
+        """The option ``gravity``."""
+        model.option["gravity"] = (*self.vector, 0.0)
+
     def size(self, linkage: FourBar, solution: Solution) -> float:
         """Sum of the weights, counted with their levers, N."""
         total = 0.0
@@ -64,6 +74,10 @@ class Gravity:
             total += bar.mass * abs(self.magnitude) * (1.0 + abs(bar.centre[0]) / bar.length)  # type: ignore[index]
         return total
 
-    def add_mjcf(self, model: Any) -> None:
-        """The option ``gravity``."""
-        model.option["gravity"] = (*self.vector, 0.0)
+    def couple(self, linkage: FourBar, speed: float) -> float:
+        """Sum of m g L, with L the longest arm at which a weight acts, N m."""
+        longest, total = max(linkage.lengths), 0.0
+        for number in MOVING_BARS:
+            bar = linkage.bar(number)
+            total += bar.mass * max(longest, abs(bar.centre[0]))  # type: ignore[index]
+        return total * abs(self.magnitude)

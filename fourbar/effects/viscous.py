@@ -1,35 +1,20 @@
 """Viscous pin damping: a couple proportional to the relative angular velocity at a pin."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
 
+from fourbar.effects.effect import Act, Effect, Tree
+from fourbar.effects.pins import pin_values, relative_speed, shortest_bar
 from fourbar.effects.wrenches import Wrenches
-from fourbar.errors import InputError
 from fourbar.kinematics import Array, State
-from fourbar.linkage import MOVING_BARS, PINS, FourBar, require
+from fourbar.linkage import PINS, FourBar
 from fourbar.solution import Solution
 
 
-def pin_values(key: str, values: Mapping[str, float]) -> tuple[tuple[str, float], ...]:
-    """The non-negative value of each pin named, in the order of the pins."""
-    for pin, value in values.items():
-        if pin not in PINS:
-            raise InputError(f"{key}.{pin}", value, "the pins are " + ", ".join(PINS))
-    return tuple((pin, require(f"{key}.{pin}", values[pin], at_least_zero=True)) for pin in PINS if pin in values)
-
-
-def relative_speed(solution: Solution, pin: str) -> Array:
-    """omega_j - omega_i of the bars that meet at a pin, rad/s."""
-    speeds = {1: 0.0, 2: solution.omega_2, 3: solution.omega_3, 4: solution.omega_4}
-    i, j = PINS[pin]
-    return np.asarray(speeds[j] - speeds[i])  # type: ignore[operator]
-
-
 @dataclass(frozen=True, slots=True)
-class Viscous:
+class Viscous(Effect):
     """Damping coefficients per pin, N m s/rad, as pairs (pin, value)."""
 
     coefficients: tuple[tuple[str, float], ...]
@@ -66,15 +51,30 @@ class Viscous:
             total = total - k * (state.omega(j) - state.omega(i)) ** 2
         return total
 
-    def size(self, linkage: FourBar, solution: Solution) -> Array:
-        """Sum of the couples, divided by the shortest moving bar, N."""
-        shortest = min(linkage.bar(number).length for number in MOVING_BARS)
-        total = np.zeros(len(solution))
-        for pin, k in self.coefficients:
-            total += k * np.abs(relative_speed(solution, pin)) / shortest
-        return total
+    def engine_term(self, tree: Tree) -> Act:
+        """Couples against the relative spin of the two bars at each pin."""
+
+        def act() -> None:
+            for pin, k in self.coefficients:
+                one, other = PINS[pin]
+                slip = tree.velocity(one) - tree.velocity(other)
+                tree.twist(other, k * slip)
+                tree.twist(one, -k * slip)
+
+        return act
 
     def add_mjcf(self, model: Any) -> None:
         """The attribute ``damping`` of the hinge (of a tendon at the cut pin B)."""
         for pin, k in self.coefficients:
             model.pin[pin]["damping"] = k
+
+    def size(self, linkage: FourBar, solution: Solution) -> Array:
+        """Sum of the couples, divided by the shortest moving bar, N."""
+        total = np.zeros(len(solution))
+        for pin, k in self.coefficients:
+            total += k * np.abs(relative_speed(solution, pin)) / shortest_bar(linkage)
+        return total
+
+    def couple(self, linkage: FourBar, speed: float) -> float:
+        """Sum of the couples at the speed, N m."""
+        return sum((k for _, k in self.coefficients), 0.0) * speed

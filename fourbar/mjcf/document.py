@@ -6,7 +6,6 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 
-from fourbar.effects import Friction, Gravity, Viscous
 from fourbar.errors import InputError, NotAssembledError
 from fourbar.kinematics import Array
 from fourbar.linkage import MOVING_BARS, FourBar
@@ -59,10 +58,14 @@ def mjcf(scene: Scene, settings: Settings = RECIPE, *, keyframe: bool = True) ->
     model.add_bodies(root, armature)
     model.add_load_sites(root)
     model.add_closure(root, timestep)
+    model.add_tendons(root)
     model.add_actuators(root, armature * scene.motion.alpha_2)
     if start is not None:
         frame = ET.SubElement(root, "keyframe")
-        ET.SubElement(frame, "key", name="start", qpos=text(*start.qpos), qvel=text(*start.qvel))
+        qpos = start.qpos
+        for effect in scene.effects:
+            qpos = effect.unwind(scene.linkage, qpos)
+        ET.SubElement(frame, "key", name="start", qpos=text(*qpos), qvel=text(*start.qvel))
     ET.indent(root)
     return ET.tostring(root, encoding="unicode") + "\n"
 
@@ -70,26 +73,19 @@ def mjcf(scene: Scene, settings: Settings = RECIPE, *, keyframe: bool = True) ->
 def flywheel(scene: Scene, settings: Settings = RECIPE) -> float:
     """Armature of pin O2, kg m^2: `settings.flywheel` times sum of m L^2 + I + (m g L + F L + M)/omega_2^2.
 
-    L is the longest arm at which anything acts; what does work on the linkage in a revolution is then
-    a small part of the flywheel's energy.
+    L is the longest arm at which anything acts, and the work is what each load and effect says of itself;
+    in a revolution it is then a small part of the flywheel's energy.
     """
     speed = abs(scene.motion.omega_2 or AT_REST)
     longest = max(scene.linkage.lengths)
-    inertia = work = weight = 0.0
+    inertia = work = 0.0
     for number in MOVING_BARS:
         bar = scene.linkage.bar(number)
         assert bar.inertia is not None and bar.centre is not None
         arm = max(longest, abs(bar.centre[0]))
         inertia += bar.mass * arm * arm + bar.inertia
-        weight += bar.mass * arm
-    work += sum(load.size(scene.linkage) * longest for load in scene.loads)
-    for effect in scene.effects:
-        if isinstance(effect, Gravity):
-            work += weight * abs(effect.magnitude)
-        elif isinstance(effect, Viscous):
-            work += sum((k for _, k in effect.coefficients), 0.0) * speed
-        elif isinstance(effect, Friction):
-            work += sum((f for _, f in effect.torques), 0.0)
+    for term in (*scene.loads, *scene.effects):
+        work += term.couple(scene.linkage, speed)
     return settings.flywheel * (inertia + work / speed**2)
 
 

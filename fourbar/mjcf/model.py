@@ -4,8 +4,9 @@ import math
 from collections.abc import Iterable
 from xml.etree import ElementTree as ET
 
-from fourbar.effects import Load
-from fourbar.errors import InputError
+from fourbar.effects import Load, Spring
+from fourbar.effects.spring import Point
+from fourbar.errors import InputError, LimitError
 from fourbar.kinematics import centre_in_bar
 from fourbar.linkage import BAR_NAMES, FIRST_PIN, MOVING_BARS, PINS, FourBar
 from fourbar.mjcf.settings import Settings
@@ -13,6 +14,8 @@ from fourbar.mjcf.settings import Settings
 FLOOR = 1e-15
 """mjMINVAL: MuJoCo refuses a moving body of less mass (kg) or inertia (kg m^2)."""
 COLOURS = {1: "0.45 0.45 0.48 1", 2: "0.12 0.47 0.71 1", 3: "1 0.5 0.05 1", 4: "0.17 0.63 0.17 1"}
+NEVER_NEEDED = ("contact", "limit", "island", "sensor", "midphase")
+"""Features that a closed loop of bars never uses."""
 THICKNESS = 0.015
 """Radius of a bar's capsule, as a part of the longest bar."""
 
@@ -30,6 +33,9 @@ class Model:
         self.option: dict[str, Iterable[float]] = {"gravity": (0.0, 0.0, 0.0)}
         self.pin: dict[str, dict[str, float]] = {pin: {} for pin in PINS}
         self.loads: list[Load] = []
+        self.springs: list[Spring] = []
+        self.inertia = dict.fromkeys(MOVING_BARS, 0.0)
+        """What is added to a bar's own, kg m^2."""
         for number in MOVING_BARS:
             bar = linkage.bar(number)
             for key, value, unit in (("mass", bar.mass, "kg"), ("inertia", bar.inertia, "kg m^2")):
@@ -67,7 +73,8 @@ class Model:
             **{key: text(*value) for key, value in self.option.items()},
         }
         option = ET.SubElement(root, "option", options)
-        unneeded = ["contact", "limit", "island", "sensor", "midphase", "spring"]
+        unneeded = list(NEVER_NEEDED)
+        unneeded += [] if self.springs or self.used("stiffness") else ["spring"]
         unneeded += [] if self.used("frictionloss") else ["frictionloss"]
         unneeded += [] if self.used("damping") else ["damper"]
         ET.SubElement(option, "flag", dict.fromkeys(unneeded, "disable"))
@@ -99,7 +106,7 @@ class Model:
             "inertial",
             pos=text(*centre_in_bar(bar), 0.0),
             mass=text(bar.mass),
-            diaginertia=text(bar.inertia, bar.inertia, bar.inertia),
+            diaginertia=text(*[bar.inertia + self.inertia[number]] * 3),
         )
         numbers = {**drive, **self.pin[pin]}
         joint = {key: text(value) for key, value in numbers.items()}
@@ -132,7 +139,7 @@ class Model:
         ET.SubElement(body, "geom", shape, mass="0", contype="0", conaffinity="0")
 
     def add_closure(self, root: ET.Element, timestep: float) -> None:
-        """The loop closes at B; what acts at B between bars 3 and 4 acts on a tendon theta_4 - theta_3."""
+        """The loop closes at B."""
         s = self.settings
         ET.SubElement(
             ET.SubElement(root, "equality"),
@@ -143,11 +150,40 @@ class Model:
             solref=text(s.time_constant_steps * timestep, 1.0),
             solimp=text(s.impedance, s.impedance, 0.001, 0.5, 2.0),
         )
+
+    def add_tendons(self, root: ET.Element) -> None:
+        """What acts at the cut pin B acts on a tendon theta_4 - theta_3; a linear spring is a tendon between two sites."""
+        if not self.pin["B"] and not self.springs:
+            return
+        tendons = ET.SubElement(root, "tendon")
         if self.pin["B"]:
             attributes = {key: text(value) for key, value in self.pin["B"].items()}
-            fixed = ET.SubElement(ET.SubElement(root, "tendon"), "fixed", {"name": "B", **attributes})
+            fixed = ET.SubElement(tendons, "fixed", {"name": "B", **attributes})
             for joint, coefficient in (("O2", -1), ("A", -1), ("O4", 1)):
                 ET.SubElement(fixed, "joint", joint=joint, coef=str(coefficient))
+        for index, spring in enumerate(self.springs, 1):
+            rest = -spring.slack / spring.stiffness
+            if rest < 0.0:
+                raise LimitError(
+                    "a spring that pulls at every length has no counterpart in MJCF: its rest would be negative"
+                )
+            name = f"spring_{index}"
+            tendon = ET.SubElement(
+                tendons, "spatial", name=name, stiffness=text(spring.stiffness), springlength=text(rest)
+            )
+            for end, point in (("start", spring.start), ("end", spring.end)):
+                ET.SubElement(tendon, "site", site=f"{name}_{end}")
+                self._add_site(root, point, f"{name}_{end}")
+
+    def _add_site(self, root: ET.Element, point: Point, name: str) -> None:
+        """A point of a bar; the ground's body keeps world axes."""
+        body = root.find(f".//body[@name='{BAR_NAMES[point.bar]}']")
+        assert body is not None
+        x, y = point.in_bar
+        if point.bar == 1:
+            cos, sin = math.cos(self.linkage.ground_angle), math.sin(self.linkage.ground_angle)
+            x, y = cos * x - sin * y, sin * x + cos * y
+        ET.SubElement(body, "site", name=name, pos=text(x, y, 0.0), size=text(self.radius))
 
     def add_load_sites(self, root: ET.Element) -> None:
         """The point at which each load acts: G for world axes (the arm becomes a couple), else the point itself."""

@@ -3,6 +3,7 @@
 import numpy as np
 
 from fourbar.dynamics import driving_torque, path
+from fourbar.errors import LimitError
 from fourbar.scene import Command, Scene
 from validation.answer import Answer
 
@@ -26,6 +27,11 @@ class EnergyMethod:
         answer.quantities["theta_4"] = np.angle(way.unit[4])
         if command.omega_2 is not None:
             terms = (*scene.loads, *scene.effects)
-            torque = driving_torque(scene.linkage, way, command.omega_2, command.alpha_2, terms, scene.drive_bar)
-            answer.quantities["torque"] = np.where(np.isfinite(torque), torque, np.nan)
+            try:
+                torque = driving_torque(scene.linkage, way, command.omega_2, command.alpha_2, terms, scene.drive_bar)
+            except LimitError as error:
+                return Answer(self.name, "exact", refusal=str(error))
+            # one number for all positions where nothing that moves has mass and nothing acts
+            torque = np.where(np.isfinite(torque), torque, np.nan)
+            answer.quantities["torque"] = np.broadcast_to(torque, command.theta_2.shape)
         return answer

@@ -11,10 +11,12 @@ lambda = F43 and e_drive = the derivative of the driven bar's rotation. Every nu
 import math
 import time
 from collections.abc import Callable, Iterator, Sequence
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
+from fourbar import effects
+from fourbar.bearing import PIN_FORCE
 from fourbar.linkage import MOVING_BARS
 from fourbar.scene import Command, Scene
 from fourbar.solution import STAGE_OF, STAGES, VECTORS
@@ -31,12 +33,26 @@ SHORTEST_STEP = 2.0**-40
 """A step halved this often moves nothing that a gap above the rounding could tell."""
 NEWTON_STEPS = 100
 """Beside a toggle Newton halves its distance: fifty steps reach the last digit from any start."""
+PASSES = 1000
+"""Passes over pin loads and the friction they make; each lessens the error where the friction is unique."""
+REPEATED = 2.0 * 2.0**-52
+"""Change of a pin load, relative, that is rounding."""
+NOT_ANSWERED = frozenset(
+    (
+        *("theta_2", "omega_2", "alpha_2", "condition", "drive_condition"),
+        *("torque_error", "force_error", "torque_low", "torque_high", "friction_residual"),
+    )
+)
+"""What is commanded, or asked of the formulas alone."""
 ROUNDING = 16.0 * 2.0**-52
 """Gap, relative to the sum of the lengths, that the roundings of a chain of three bars alone can leave."""
 
 
-class Tree(Protocol):
+class Tree(effects.Tree, Protocol):
     """An engine holding the open tree of a scene; it computes everything from q, v, a by itself."""
+
+    pin_loads: dict[str, float]
+    """Magnitudes of its own pin forces in the last pass, by pin, N."""
 
     def place(self, q: Sequence[float]) -> None:
         """Move to a configuration."""
@@ -53,23 +69,14 @@ class Tree(Protocol):
     def positions(self) -> dict[str, Array]:
         """Points O4, A, B, G2, G3, G4 and "B4", the end of bar 4, (2,) each, m."""
 
-    def angle(self, bar: int) -> float:
-        """Rotation of a bar from +x, in (-pi, pi]."""
-
     def drift(self, v: Array) -> Array:
         """Acceleration of the gap at speeds v where a = 0, (2,), m/s^2."""
-
-    def velocity(self, bar: int) -> float:
-        """Angular velocity of a bar at the speeds last given, rad/s."""
 
     def torques(self, v: Array, a: Array) -> Array:
         """Generalised forces that the motion asks for beyond loads and effects, (3,), N m."""
 
     def accelerations(self) -> dict[str, Array]:
         """Accelerations of A, B, G2, G3, G4 at the motion last given, (2,) each, m/s^2."""
-
-    def alpha(self, bar: int) -> float:
-        """Angular acceleration of a bar at the motion last given, rad/s^2."""
 
     def forces(self, loop_force: Array) -> dict[str, Array]:
         """F12, F32, F14 with the loop force on bar 3 at B, and its opposite on bar 4, put back."""
@@ -151,14 +158,14 @@ def answer_exactly(engine: str, build: Callable[[Scene], Tree], scene: Scene, co
     start = time.perf_counter()
     tree, n = build(scene), len(command.theta_2)
     wanted = ("position",) if command.omega_2 is None else STAGES
-    given = ("theta_2", "omega_2", "alpha_2", "condition", "drive_condition")
-    names = [name for name, stage in STAGE_OF.items() if stage in wanted and name not in given]
+    names = [name for name, stage in STAGE_OF.items() if stage in wanted and name not in NOT_ANSWERED]
     out = {name: np.full((n, 2) if name in VECTORS else n, np.nan) for name in names}
     assembled = np.zeros(n, dtype=bool)
     gap = 0.0
     position = Position(tree)
     omega_2 = np.broadcast_to(np.asarray(command.omega_2, dtype=float), (n,))
     alpha_2 = np.broadcast_to(np.asarray(command.alpha_2, dtype=float), (n,))
+    loaded = [pin for effect in scene.effects for pin in effect.loaded_pins]
     tree.place((0.0, 0.0, 0.0))
     e_drive = tree.turn(scene.drive_bar)
     for i, (theta_2, branch) in enumerate(zip(command.theta_2.tolist(), command.branch.tolist(), strict=True)):
@@ -172,7 +179,7 @@ def answer_exactly(engine: str, build: Callable[[Scene], Tree], scene: Scene, co
         values.update({name: points[name] for name in ("A", "B", "G2", "G3", "G4")})
         gap = max(gap, math.hypot(*tree.gap()))
         if command.omega_2 is not None:
-            values.update(_motion_and_forces(tree, e_drive, omega_2[i], alpha_2[i]))
+            values.update(_motion_and_forces(tree, e_drive, omega_2[i], alpha_2[i], loaded))
         for name, value in values.items():
             out[name][i] = value
     for name in ("theta_3", "theta_4"):
@@ -191,20 +198,63 @@ def answer_exactly(engine: str, build: Callable[[Scene], Tree], scene: Scene, co
     )
 
 
-def _motion_and_forces(tree: Tree, e_drive: Array, omega_2: float, alpha_2: float) -> dict[str, Array | float]:
-    """Velocities, accelerations and forces where the tree is placed; nothing where a toggle leaves them 0/0."""
+def _motion_and_forces(
+    tree: Tree, e_drive: Array, omega_2: float, alpha_2: float, loaded: Sequence[str]
+) -> dict[str, Array | float]:
+    """Velocities, accelerations and forces where the tree is placed; nothing where a toggle leaves them 0/0.
+
+    Effects that depend on the load of a pin (`loaded`) are given the loads of the pass before, until they repeat.
+    """
     jacobian = tree.jacobian()
     try:
         v = np.array([omega_2, *np.linalg.solve(jacobian[:, 1:], -jacobian[:, 0] * omega_2)])
         drift = tree.drift(v)
         a = np.array([alpha_2, *np.linalg.solve(jacobian[:, 1:], -jacobian[:, 0] * alpha_2 - drift)])
+        tree.pin_loads = {}
         needed = tree.torques(v, a)
         values: dict[str, Array | float] = {}
         for bar in MOVING_BARS[1:]:
             values[f"omega_{bar}"], values[f"alpha_{bar}"] = tree.velocity(bar), tree.alpha(bar)
         values.update({f"a_{name}": value for name, value in tree.accelerations().items()})
-        unknowns: Array = np.asarray(np.linalg.solve(np.column_stack((jacobian.T, e_drive)), needed), dtype=np.float64)
+        matrix = np.column_stack((jacobian.T, e_drive))
+        forces = _forces(tree, matrix, needed)
+        for _ in range(PASSES if loaded else 0):
+            loads = {pin: math.hypot(*forces[PIN_FORCE[pin]]) for pin in loaded}
+            change = max(abs(load - tree.pin_loads.get(pin, 0.0)) for pin, load in loads.items())
+            if change <= REPEATED * max(loads.values()):
+                break
+            tree.pin_loads = loads
+            forces = _forces(tree, matrix, tree.torques(v, a))
+        else:
+            if loaded:  # its loads never settle: no answer, rather than that of some pass
+                return values
     except np.linalg.LinAlgError:
         return {}
-    values.update(tree.forces(unknowns[:2]), F43=unknowns[:2], torque=unknowns[2])
+    values.update(forces)
     return values
+
+
+def _forces(tree: Tree, matrix: Array, needed: Array) -> dict[str, Any]:
+    """Driving torque and the four pin forces."""
+    unknowns: Array = np.asarray(np.linalg.solve(matrix, needed), dtype=np.float64)
+    return {**tree.forces(unknowns[:2]), "F43": unknowns[:2], "torque": unknowns[2]}
+
+
+def acting(scene: Scene, tree: effects.Tree) -> list[effects.Act]:
+    """What loads and effects do at each state of a tree."""
+    terms = [term.engine_term(tree) for term in (*scene.effects, *scene.loads)]
+    return [term for term in terms if term is not None]
+
+
+def unknown_effect(scene: Scene) -> str | None:
+    """The reason to refuse a scene: an effect that says nothing about engines."""
+    for effect in scene.effects:
+        if getattr(type(effect), "engine_term", effects.Effect.engine_term) is effects.Effect.engine_term:
+            return f"the effect {effect.key!r} has no model here"
+    return None
+
+
+def turned_ground(theta_1: float, x: float, y: float) -> Array:
+    """World axes of a vector along and across the ground's line, as described."""
+    cos, sin = math.cos(theta_1), math.sin(theta_1)
+    return np.array([cos * x - sin * y, sin * x + cos * y])

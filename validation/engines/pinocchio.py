@@ -1,17 +1,16 @@
 """Pinocchio: recursive Newton-Euler on the open tree, its own kinematics, the loop closed by multipliers."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
-from fourbar.effects import Friction, Gravity, Load, Viscous
-from fourbar.linkage import FIRST_PIN, MOVING_BARS, PINS
+from fourbar.linkage import FIRST_PIN, MOVING_BARS
 from fourbar.scene import Command, Scene
 from validation.answer import Answer, Array
-from validation.engines.loop import answer_exactly
+from validation.engines.loop import acting, answer_exactly, turned_ground, unknown_effect
 
 NAME = "pinocchio-inverse"
 WORLD = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
@@ -24,9 +23,8 @@ class PinocchioInverse:
 
     def answer(self, scene: Scene, command: Command) -> Answer:
         """Its answer, or the refusal that names an effect it does not know."""
-        for effect in scene.effects:
-            if type(effect) not in EFFECTS:
-                return Answer(NAME, "exact", refusal=f"the effect {effect.key!r} has no model here")
+        if (reason := unknown_effect(scene)) is not None:
+            return Answer(NAME, "exact", refusal=reason)
         return answer_exactly(NAME, PinocchioTree, scene, command)
 
 
@@ -58,9 +56,9 @@ class PinocchioTree:
         self.v = np.zeros(3)
         self.a = np.zeros(3)
         self.wrenches: dict[int, Array] = {}
-        acting = [EFFECTS[type(effect)](self, effect) for effect in scene.effects]
-        acting += [load(self, each) for each in scene.loads]
-        self.acting = [act for act in acting if act is not None]
+        self.ground_angle = theta_1
+        self.pin_loads: dict[str, float] = {}
+        self.acting = acting(scene, self)
 
     def _add_frame(self, name: str, joint: int, placement: Any) -> None:
         frame = pin.Frame(name, joint, 0, placement, pin.FrameType.OP_FRAME)
@@ -97,12 +95,32 @@ class PinocchioTree:
         where.update(A=self.foot(3), O4=self.foot(4), B=self.point("end3"), B4=self.point("end4"))
         return where
 
+    def gravity(self, vector: tuple[float, float]) -> None:
+        """The model's own gravity."""
+        self.model.gravity = pin.Motion(np.array([*vector, 0.0]), np.zeros(3))
+
+    def centre(self, bar: int) -> Array:
+        """Mass centre of a bar, from its frame."""
+        return self.point(f"G{bar}")
+
+    def turned(self, bar: int, x: float, y: float) -> Array:
+        """A vector of a bar in world axes, by the joint's rotation."""
+        if bar == 1:
+            return turned_ground(self.ground_angle, x, y)
+        return np.asarray(self.data.oMi[self.joint[bar]].rotation[:2, :2] @ (x, y))
+
+    def pin_load(self, pin: str) -> float:
+        """Pin force of the last pass; none before the first."""
+        return self.pin_loads.get(pin, 0.0)
+
     def foot(self, bar: int) -> Array:
         """First pin of a bar, (2,)."""
-        return np.array(self.data.oMi[self.joint[bar]].translation[:2])
+        return np.zeros(2) if bar == 1 else np.array(self.data.oMi[self.joint[bar]].translation[:2])
 
     def angle(self, bar: int) -> float:
-        """From the rotation matrix."""
+        """From the rotation matrix; the ground's line as described."""
+        if bar == 1:
+            return self.ground_angle
         rotation = self.data.oMi[self.joint[bar]].rotation
         return math.atan2(rotation[1, 0], rotation[0, 0])
 
@@ -120,8 +138,8 @@ class PinocchioTree:
         return float(self.data.v[self.joint[bar]].angular[2]) if bar != 1 else 0.0
 
     def alpha(self, bar: int) -> float:
-        """Angular acceleration of the joint frame."""
-        return float(self.data.a[self.joint[bar]].angular[2])
+        """Angular acceleration of the joint frame; the ground has none."""
+        return float(self.data.a[self.joint[bar]].angular[2]) if bar != 1 else 0.0
 
     def torques(self, v: Array, a: Array) -> Array:
         """Recursive Newton-Euler with what acts on the bars as external forces."""
@@ -142,7 +160,9 @@ class PinocchioTree:
         return pin.rnea(self.model, self.data, self.q, self.v, self.a, external)
 
     def push(self, bar: int, force: Array, point: Array) -> None:
-        """Add a force at a point, world axes."""
+        """Add a force at a point, world axes; on the ground it does nothing."""
+        if bar == 1:
+            return
         x, y = point - self.foot(bar)
         self.wrenches[bar] += (force[0], force[1], x * force[1] - y * force[0])
 
@@ -166,63 +186,6 @@ class PinocchioTree:
             if bar != 1:
                 on[bar] = np.array((self.data.oMi[joint].rotation @ self.data.f[joint].linear)[:2])
         return {"F12": on[2], "F32": -on[3], "F14": on[4]}
-
-
-def gravity(tree: PinocchioTree, effect: Gravity) -> None:
-    """The model's own gravity."""
-    tree.model.gravity = pin.Motion(np.array([*effect.vector, 0.0]), np.zeros(3))
-
-
-def viscous(tree: PinocchioTree, effect: Viscous) -> Callable[[], None]:
-    """Couples against the relative spin of the two bars at each pin."""
-
-    def act() -> None:
-        for name, k in effect.coefficients:
-            i, j = PINS[name]
-            couple = -k * (tree.velocity(j) - tree.velocity(i))
-            tree.twist(j, couple)
-            tree.twist(i, -couple)
-
-    return act
-
-
-def friction(tree: PinocchioTree, effect: Friction) -> Callable[[], None]:
-    """Couples of constant size against the relative spin at each pin."""
-
-    def act() -> None:
-        for name, f in effect.torques:
-            i, j = PINS[name]
-            couple = -f * float(np.sign(tree.velocity(j) - tree.velocity(i)))
-            tree.twist(j, couple)
-            tree.twist(i, -couple)
-
-    return act
-
-
-def load(tree: PinocchioTree, each: Load) -> Callable[[], None]:
-    """A force at its point and a couple; in the bar's frame both vectors turn with the joint."""
-
-    def act() -> None:
-        if each.force is not None:
-            f, f_angle = each.force
-            r, r_angle = each.at
-            force = f * np.array([math.cos(f_angle), math.sin(f_angle)])
-            arm = r * np.array([math.cos(r_angle), math.sin(r_angle)])
-            if each.frame == "bar":
-                rotation = tree.data.oMi[tree.joint[each.bar]].rotation[:2, :2]
-                force, arm = rotation @ force, rotation @ arm
-            tree.push(each.bar, force, tree.point(f"G{each.bar}") + arm)
-        tree.twist(each.bar, each.moment)
-
-    return act
-
-
-EFFECTS: dict[type, Callable[[PinocchioTree, Any], Callable[[], None] | None]] = {
-    Gravity: gravity,
-    Viscous: viscous,
-    Friction: friction,
-}
-"""How each effect acts on this engine's tree; one that is not here is refused by name."""
 
 
 def _at(x: float, y: float) -> Any:

@@ -1,17 +1,16 @@
 """MuJoCo's inverse dynamics on the open tree, constraints off; the loop is closed by multipliers."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import mujoco
 import numpy as np
 
-from fourbar.effects import Friction, Gravity, Load, Viscous
-from fourbar.linkage import FIRST_PIN, MOVING_BARS, PINS
+from fourbar.linkage import FIRST_PIN, MOVING_BARS
 from fourbar.scene import Command, Scene
 from validation.answer import Answer, Array
-from validation.engines.loop import answer_exactly
+from validation.engines.loop import acting, answer_exactly, turned_ground, unknown_effect
 
 NAME = "mujoco-inverse"
 LEAST = 1e-15
@@ -33,9 +32,8 @@ class MujocoInverse:
 
 def refusal(scene: Scene) -> str | None:
     """The declared limit that a scene meets, or None."""
-    for effect in scene.effects:
-        if type(effect) not in EFFECTS:
-            return f"the effect {effect.key!r} has no model here"
+    if (reason := unknown_effect(scene)) is not None:
+        return reason
     for number in MOVING_BARS:
         bar = scene.linkage.bar(number)
         assert bar.inertia is not None
@@ -78,9 +76,9 @@ class MujocoTree:
         self.site = {name: model.site(name).id for n in MOVING_BARS for name in (f"G{n}", f"end{n}")}
         self.on_bar = {name: self.body[int(name[-1])] for name in self.site}
         self.linear, self.linear_dot, self.angular = (np.zeros((3, 3)) for _ in range(3))
-        acting = [EFFECTS[type(effect)](self, effect) for effect in scene.effects]
-        acting += [load(self, each) for each in scene.loads]
-        self.acting = [act for act in acting if act is not None]
+        self.ground_angle = theta_1
+        self.pin_loads: dict[str, float] = {}
+        self.acting = acting(scene, self)
 
     def place(self, q: Sequence[float]) -> None:
         """Bodies, sites and the axes of the Jacobians at q."""
@@ -122,8 +120,32 @@ class MujocoTree:
         where["B"], where["B4"] = self.point("end3"), self.point("end4")
         return where
 
+    def gravity(self, vector: tuple[float, float]) -> None:
+        """The model's own gravity."""
+        self.model.opt.gravity[:2] = vector
+
+    def foot(self, bar: int) -> Array:
+        """First pin of a bar, (2,)."""
+        return np.zeros(2) if bar == 1 else np.array(self.data.xpos[self.body[bar], :2])
+
+    def centre(self, bar: int) -> Array:
+        """Mass centre of a bar, from its site."""
+        return self.point(f"G{bar}")
+
+    def turned(self, bar: int, x: float, y: float) -> Array:
+        """A vector of a bar in world axes, by the body's rotation."""
+        if bar == 1:
+            return turned_ground(self.ground_angle, x, y)
+        return np.asarray(self.data.xmat[self.body[bar]].reshape(3, 3)[:2, :2] @ (x, y))
+
+    def pin_load(self, pin: str) -> float:
+        """Pin force of the last pass; none before the first."""
+        return self.pin_loads.get(pin, 0.0)
+
     def angle(self, bar: int) -> float:
-        """From the body's rotation matrix."""
+        """From the body's rotation matrix; the ground's line as described."""
+        if bar == 1:
+            return self.ground_angle
         rotation = self.data.xmat[self.body[bar]]
         return math.atan2(rotation[3], rotation[0])
 
@@ -139,7 +161,7 @@ class MujocoTree:
 
     def alpha(self, bar: int) -> float:
         """From the body's rotational Jacobian, which is constant in the plane."""
-        return float(self.turn(bar) @ self.data.qacc[self.dof])
+        return float(self.turn(bar) @ self.data.qacc[self.dof]) if bar != 1 else 0.0
 
     def torques(self, v: Array, a: Array) -> Array:
         """mj_inverse, less what loads and effects do on the coordinates."""
@@ -155,7 +177,9 @@ class MujocoTree:
         return np.asarray((self.data.qfrc_inverse - applied)[self.dof])
 
     def push(self, bar: int, force: Array, point: Array) -> None:
-        """Add a force at a point, world axes, as force and couple at the mass centre."""
+        """Add a force at a point, world axes, as force and couple at the mass centre; on the ground it does nothing."""
+        if bar == 1:
+            return
         body = self.body[bar]
         x, y = point - self.data.xipos[body, :2]
         self.data.xfrc_applied[body, :2] += force
@@ -179,60 +203,3 @@ class MujocoTree:
         mujoco.mj_rnePostConstraint(self.model, self.data)
         on = {bar: np.array(self.data.cfrc_int[body, 3:5]) for bar, body in self.body.items()}
         return {"F12": on[2], "F32": -on[3], "F14": on[4]}
-
-
-def gravity(tree: MujocoTree, effect: Gravity) -> None:
-    """The model's own gravity."""
-    tree.model.opt.gravity[:2] = effect.vector
-
-
-def viscous(tree: MujocoTree, effect: Viscous) -> Callable[[], None]:
-    """Couples against the relative spin of the two bars at each pin."""
-
-    def act() -> None:
-        for name, k in effect.coefficients:
-            i, j = PINS[name]
-            couple = -k * (tree.velocity(j) - tree.velocity(i))
-            tree.twist(j, couple)
-            tree.twist(i, -couple)
-
-    return act
-
-
-def friction(tree: MujocoTree, effect: Friction) -> Callable[[], None]:
-    """Couples of constant size against the relative spin at each pin; MuJoCo's frictionloss is a soft constraint."""
-
-    def act() -> None:
-        for name, f in effect.torques:
-            i, j = PINS[name]
-            couple = -f * float(np.sign(tree.velocity(j) - tree.velocity(i)))
-            tree.twist(j, couple)
-            tree.twist(i, -couple)
-
-    return act
-
-
-def load(tree: MujocoTree, each: Load) -> Callable[[], None]:
-    """A force at its point and a couple; in the bar's frame both vectors turn with the body."""
-
-    def act() -> None:
-        if each.force is not None:
-            f, f_angle = each.force
-            r, r_angle = each.at
-            force = f * np.array([math.cos(f_angle), math.sin(f_angle)])
-            arm = r * np.array([math.cos(r_angle), math.sin(r_angle)])
-            if each.frame == "bar":
-                rotation = tree.data.xmat[tree.body[each.bar]].reshape(3, 3)[:2, :2]
-                force, arm = rotation @ force, rotation @ arm
-            tree.push(each.bar, force, tree.point(f"G{each.bar}") + arm)
-        tree.twist(each.bar, each.moment)
-
-    return act
-
-
-EFFECTS: dict[type, Callable[[MujocoTree, Any], Callable[[], None] | None]] = {
-    Gravity: gravity,
-    Viscous: viscous,
-    Friction: friction,
-}
-"""How each effect acts on this engine's tree; one that is not here is refused by name."""

@@ -14,6 +14,7 @@ from fourbar.scene import Command, Scene
 from validation.answer import Answer
 from validation.engines.loop import Position
 from validation.engines.mujoco.closed_loop import O2, O4, A, ClosedLoop
+from validation.engines.mujoco.watch import Watch, alarms
 
 SHARED = "lengths, masses, inertias, centres, loads and effects as MJCF text; omega_2, alpha_2 and the branch"
 OWN = "assembly, velocities at the start, the motion through time, accelerations, drive torque, pin forces"
@@ -85,7 +86,7 @@ class _Simulation:
         self.settings, self.scene, self.command = settings, scene, command
         self.omega, self.alpha = float(np.max(command.omega_2)), float(np.max(command.alpha_2))  # type: ignore[arg-type]
         # the text is that of the command, which a caller may have given instead of the scene's own
-        motion = replace(scene.motion, omega_2=self.omega, alpha_2=self.alpha)
+        motion = replace(scene.motion, theta_2=command.theta_2, omega_2=self.omega, alpha_2=self.alpha)
         self.scene = replace(scene, motion=motion)
         n = len(command.theta_2)
         self.order = np.argsort(command.theta_2 if self.omega > 0.0 else -command.theta_2, kind="stable")
@@ -106,6 +107,8 @@ class _Simulation:
             "steps": 0.0,
         }
         self.steps_per_revolution = 0.0
+        self.turns = 0.0
+        """Whole turns by which MuJoCo's theta_2 is ahead: springs at pins count them, rad."""
 
     def answer(self) -> Answer:
         """The answer over all positions."""
@@ -116,7 +119,16 @@ class _Simulation:
         at = Command(self.theta_2, self.branch, self.omega_2, self.alpha_2)
         setting = f"{self.settings.integrator} {self.steps_per_revolution:.0f}/rev"
         assembled = np.array([angles is not None for angles in found])
-        return Answer("mujoco-simulated", setting, at, assembled, self.values, evidence=self.evidence)
+        return Answer(
+            "mujoco-simulated",
+            setting,
+            at,
+            assembled,
+            self.values,
+            predicted=self.predicted,
+            alarms=alarms(self.evidence, sum(self.scene.linkage.lengths), self.settings.iterations),
+            evidence=self.evidence,
+        )
 
     def _text(self, timestep: float, flywheel: float | None = None) -> str:
         """The generated MJCF without its keyframe."""
@@ -163,29 +175,51 @@ class _Simulation:
         light = None if self.scene.drive_bar == 2 else ClosedLoop(self._text(timestep, LIGHT_FLYWHEEL))
         start = found[stretch[0]]
         assert start is not None
-        loop.set_state(start, self.omega)
+        wound = self._unwound(start)
+        self.turns = wound[O2] - start[O2]
+        watch = Watch(self._text(timestep), self.scene.drive_bar)
+        loop.set_state(wound, self.omega)
         done = 0
         for index, theta_2 in zip(stretch, commanded, strict=True):
             step = round(run.time(float(theta_2)) / timestep)
             if step > done:
                 mujoco.mj_step(loop.model, loop.data, step - done)
                 done = step
-            self._read(loop, light, index, run, done * timestep)
+            self._read(loop, light, watch, index, run, done * timestep)
         self.evidence["steps"] += done
+        for name, value in watch.evidence().items():
+            self.evidence[name] = float(np.fmax(self.evidence.get(name, 0.0), value))
 
-    def _read(self, loop: ClosedLoop, light: ClosedLoop | None, index: int, run: Run, expected_time: float) -> None:
+    def _unwound(self, q: tuple[float, float, float]) -> tuple[float, float, float]:
+        """The joint angles as the scene's springs count them."""
+        for effect in self.scene.effects:
+            q = effect.unwind(self.scene.linkage, q)
+        return q
+
+    def _read(
+        self,
+        loop: ClosedLoop,
+        light: ClosedLoop | None,
+        watch: Watch,
+        index: int,
+        run: Run,
+        expected_time: float,
+    ) -> None:
         """Everything of one sample, and what the engine says of itself there."""
         loop.forward()
         d = loop.data
         self._watch(loop, run, expected_time)
-        self.theta_2[index], self.omega_2[index] = d.qpos[O2], d.qvel[O2]
+        q = (float(d.qpos[O2]), float(d.qpos[A]), float(d.qpos[O4]))
+        if self._unwound(q) != q:
+            raise LimitError("a torsion spring is wound by more than half a turn from its rest")
+        self.theta_2[index], self.omega_2[index] = d.qpos[O2] - self.turns, d.qvel[O2]
         self.branch[index] = loop.branch()
         self.alpha_2[index] = d.qacc[O2]
         torque, forces = loop.crank_torque(), loop.forces
         if light is not None:
             torque, forces = self._drive_elsewhere(loop, light, torque), light.forces
         numbers = (
-            *(d.qpos[O2] + d.qpos[A], d.qpos[O4]),
+            *(d.qpos[O2] + d.qpos[A] - self.turns, d.qpos[O4]),
             *(d.qvel[O2] + d.qvel[A], d.qvel[O4]),
             *(d.qacc[O2] + d.qacc[A], d.qacc[O4]),
             torque,
@@ -194,6 +228,8 @@ class _Simulation:
             self.values[name][index] = number
         for name, force in forces().items():
             self.values[name][index] = force
+        for name, error in watch.look(loop, torque).items():
+            self.predicted[name][index] = error
 
     def _drive_elsewhere(self, loop: ClosedLoop, light: ClosedLoop, crank_torque: float) -> float:
         """The couple on bar 3 or 4 with which the crank accelerates as it did, at the simulated state.
@@ -227,7 +263,8 @@ class _Simulation:
     def _watch(self, loop: ClosedLoop, run: Run, expected_time: float) -> None:
         """Keep the worst of what the engine says of itself."""
         d, seen = loop.data, self.evidence
-        speed = np.sqrt(max(run.omega**2 + 2.0 * run.alpha * (d.qpos[O2] - run.start), 0.0))
+        turned = d.qpos[O2] - self.turns - run.start
+        speed = np.sqrt(max(run.omega**2 + 2.0 * run.alpha * turned, 0.0))
         worst = {
             "closure_gap_m": float(np.hypot(*loop.gap())),
             "speed_error": float(abs(abs(d.qvel[O2]) - speed) / run.fastest),

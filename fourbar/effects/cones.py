@@ -1,0 +1,133 @@
+"""x_p = k_p |F_p + sum over q of C_pq x_q|, x >= 0: sliding friction couples that make the pin forces they depend on.
+
+With K_pq = k_p |C_pq| the right-hand side is a contraction in a weighted maximum norm where the
+spectral radius of K is below 1 (Perron): exactly one solution. For one pin the squared equation
+is a quadratic, and decides at any K. For several pins beyond that radius solutions are searched
+for from many starts: what is not found there is taken not to exist.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fourbar.kinematics import Array
+
+ONE, NONE, SEVERAL = range(3)
+"""How many solutions there are."""
+ROUNDING = 32.0 * 2.0**-52
+"""Change of x, relative, that is the rounding of its evaluation."""
+STEPS = 200
+"""Each halves the error where the spectral radius is 1/2; Newton's steps end it long before."""
+SAME = 1e-6
+"""Two solutions found by the search are the same if they differ by less, relative."""
+STARTS = 64
+
+
+class Sliding(NamedTuple):
+    """Solutions of n independent problems."""
+
+    x: Array
+    """(n, p), N m; the only or the least solution, NaN where there is none."""
+    number: NDArray[np.uint8]
+    """(n,), ONE, NONE or SEVERAL."""
+
+
+def settle(F: Array, C: Array, k: Array) -> Sliding:
+    """Solve n problems in p unknowns: F (n, p, 2) in N, C (n, p, p, 2) in 1/m, k (p,) in m."""
+    n, p = F.shape[:2]
+    known = np.isfinite(F).all(axis=(1, 2)) & np.isfinite(C).all(axis=(1, 2, 3))
+    x = np.full((n, p), np.nan)
+    count = np.full(n, ONE, dtype=np.uint8)
+    if p == 1:
+        with np.errstate(invalid="ignore", divide="ignore"):
+            x[:, 0], found = _quadratic(F[:, 0], C[:, 0, 0], k[0])
+        count[known] = found[known]
+        return Sliding(x, count)
+    K = k[:, None] * np.hypot(C[..., 0], C[..., 1])
+    radius = np.full(n, np.nan)
+    radius[known] = np.abs(np.linalg.eigvals(K[known])).max(axis=1)
+    sure = np.flatnonzero(known & (radius < 1.0))
+    x[sure] = _iterate(F[sure], C[sure], k, np.zeros((len(sure), p)))
+    for index in np.flatnonzero(known & ~(radius < 1.0)):
+        x[index], count[index] = _search(F[index], C[index], k)
+    return Sliding(x, count)
+
+
+def _quadratic(F: Array, C: Array, k: float) -> tuple[Array, NDArray[np.uint8]]:
+    """(k^2 |C|^2 - 1) x^2 + 2 k^2 F.C x + k^2 |F|^2 = 0."""
+    c2 = k * np.hypot(C[:, 0], C[:, 1])
+    a = (c2 - 1.0) * (c2 + 1.0)
+    b = k * k * (F[:, 0] * C[:, 0] + F[:, 1] * C[:, 1])
+    c = (k * k) * (F[:, 0] * F[:, 0] + F[:, 1] * F[:, 1])
+    # b^2 - a c as k^2 |F|^2 - k^4 (F x C)^2: nothing cancels where there is no jam
+    turned = k * k * (F[:, 0] * C[:, 1] - F[:, 1] * C[:, 0])
+    under = c - turned * turned
+    root = np.sqrt(under)
+    q = -(b + np.where(b < 0.0, -root, root))
+    one, other = np.where(a == 0.0, np.inf, q / a), np.where(q == 0.0, 0.0, c / q)
+    low, high = np.fmin(one, other), np.fmax(one, other)
+    x = np.where(a < 0.0, high, low)
+    count = np.full(len(x), ONE, dtype=np.uint8)
+    count[~(a < 0.0) & ((under < 0.0) | (b >= 0.0)) & (c > 0.0)] = NONE
+    count[(a > 0.0) & (under > 0.0) & (b < 0.0)] = SEVERAL
+    x = np.where(c == 0.0, 0.0, x)
+    x[count == NONE] = np.nan
+    return x, count
+
+
+def _right_side(F: Array, C: Array, k: Array, x: Array) -> tuple[Array, Array]:
+    """k |F + C x| and its derivative, (n, p) and (n, p, p)."""
+    force = F + np.einsum("npqi,nq->npi", C, x)
+    size = np.hypot(force[..., 0], force[..., 1])
+    unit = force / np.where(size == 0.0, 1.0, size)[..., None]
+    return k * size, k[:, None] * np.einsum("npi,npqi->npq", unit, C)
+
+
+def newton_step(gap: Array, slope: Array) -> Array:
+    """(1 - slope) step = gap, zero where that cannot be solved, (n, p)."""
+    matrix = np.eye(gap.shape[1]) - slope
+    usable = np.asarray(np.isfinite(matrix).all(axis=(1, 2)) & np.isfinite(gap).all(axis=1))
+    usable[usable] = np.linalg.det(matrix[usable]) != 0.0
+    step = np.zeros_like(gap)
+    step[usable] = np.linalg.solve(matrix[usable], gap[usable][..., None])[..., 0]
+    return step
+
+
+def _iterate(F: Array, C: Array, k: Array, x: Array) -> Array:
+    """Newton's step where it lessens the gap, else the plain one of the contraction."""
+    for _ in range(STEPS):
+        right, slope = _right_side(F, C, k, x)
+        newton = np.maximum(x + newton_step(right - x, slope), 0.0)
+        plain_gap = np.abs(_right_side(F, C, k, right)[0] - right).max(axis=1)
+        newton_gap = np.abs(_right_side(F, C, k, newton)[0] - newton).max(axis=1)
+        new = np.where((newton_gap < plain_gap)[:, None], newton, right)
+        done = np.abs(new - x).max(axis=1, initial=0.0) <= ROUNDING * new.max(axis=1, initial=0.0)
+        x = new
+        if done.all():
+            break
+    return x
+
+
+def _search(F: Array, C: Array, k: Array) -> tuple[Array, int]:
+    """The least solution of one problem, and whether others were found, from starts over many magnitudes."""
+    p = len(k)
+    size = float(np.max(k * np.hypot(F[:, 0], F[:, 1])))
+    if size == 0.0:
+        return np.zeros(p), ONE
+    directions = np.vstack([np.ones(p), np.eye(p) + 0.01, np.random.default_rng(0).uniform(0.0, 1.0, (STARTS // p, p))])
+    starts = (size * np.logspace(-2, 3, 11)[:, None, None] * directions).reshape(-1, p)
+    x = np.vstack([np.zeros((1, p)), starts])
+    many = np.broadcast_to(F, (len(x), *F.shape)), np.broadcast_to(C, (len(x), *C.shape))
+    for _ in range(60):
+        right, slope = _right_side(*many, k, x)
+        x = np.clip(x + newton_step(right - x, slope), 0.0, 1e12 * size)
+    right, _ = _right_side(*many, k, x)
+    found = x[np.abs(right - x).max(axis=1) <= 1e-9 * np.maximum(x.max(axis=1), size)]
+    distinct: list[Array] = []
+    for each in found[np.argsort(found.sum(axis=1))]:
+        if all(np.abs(each - other).max() > SAME * max(each.max(), other.max()) for other in distinct):
+            distinct.append(each)
+    if not distinct:
+        return np.full(p, np.nan), NONE
+    return distinct[0], ONE if len(distinct) == 1 else SEVERAL

@@ -1,0 +1,52 @@
+"""Values per pin, and the relative rotation of the two bars that meet there."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from fourbar.errors import InputError
+from fourbar.kinematics import Array, State
+from fourbar.linkage import MOVING_BARS, PINS, FourBar, require
+from fourbar.solution import Solution
+
+
+def pin_values(key: str, values: Mapping[str, float]) -> tuple[tuple[str, float], ...]:
+    """The non-negative value of each pin named, in the order of the pins."""
+    for pin, value in values.items():
+        known(f"{key}.{pin}", pin, value)
+    return tuple((pin, require(f"{key}.{pin}", values[pin], at_least_zero=True)) for pin in PINS if pin in values)
+
+
+def known(key: str, pin: str, value: object) -> None:
+    """An InputError where there is no such pin."""
+    if pin not in PINS:
+        raise InputError(key, value, "the pins are " + ", ".join(PINS))
+
+
+def relative_speed(solution: Solution, pin: str) -> Array:
+    """omega_j - omega_i of the bars that meet at a pin, rad/s."""
+    speeds = {1: 0.0, 2: solution.omega_2, 3: solution.omega_3, 4: solution.omega_4}
+    i, j = PINS[pin]
+    return np.asarray(speeds[j] - speeds[i])  # type: ignore[operator]
+
+
+def shortest_bar(linkage: FourBar) -> float:
+    """The least length of a moving bar, m."""
+    return min(linkage.bar(number).length for number in MOVING_BARS)
+
+
+def sense(state: State, pin: str, side: int) -> Any:
+    """Sign of omega_j - omega_i; where it is 0 the one that a motion beginning to `side` would have, 0 for side 0.
+
+    A linkage at rest begins to move as theta_2 grows (side +1) or falls (-1); a pin that is at rest in a
+    linkage that moves turns either way.
+    """
+    i, j = PINS[pin]
+    sign = np.sign(state.omega(j) - state.omega(i)) + np.zeros(state.theta_2.shape)
+    if side == 0:
+        return sign
+    assert state.first is not None
+    rates: dict[int, Any] = {1: 0.0, 2: 1.0, 3: state.first.h3, 4: state.first.h4}
+    beginning = np.where(np.equal(state.omega_2, 0.0), np.sign(rates[j] - rates[i]), 1.0)
+    return np.where(sign == 0.0, side * beginning, sign)
