@@ -76,9 +76,15 @@ class ClosedLoop:
         mujoco.mj_rnePostConstraint(self.model, self.data)
 
     def forces(self) -> dict[str, Array]:
-        """Pin forces of the state that was last forwarded, world axes, N.
+        """Pin forces of the state that was last forwarded, world axes, N."""
+        on = self.carried()
+        closure = self.data.efc_force[:2].copy()
+        return {"F12": on["input"], "F32": -on["coupler"], "F43": closure, "F14": on["output"]}
 
-        cfrc_int is what the parent exerts on a body and all it carries, but MuJoCo counts the forces
+    def carried(self) -> dict[str, Array]:
+        """Force of the parent on each bar and all that the bar carries, world axes, N.
+
+        That is cfrc_int, but MuJoCo counts the forces
         of actuators on sites into it; they are taken out again. Those of tendons it keeps apart.
         """
         d = self.data
