@@ -182,11 +182,14 @@ def _judge_predicted(
     allowed = np.maximum(tolerance.factor, TIMES_PREDICTED * expected)
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = np.where(where, error / allowed, -1.0)
+    ratio[expected >= 1.0] = np.minimum(ratio[expected >= 1.0], 1.0)  # first order says no more than that no digit is left
     ratio[where & ~np.isfinite(error)] = np.inf
     beyond = where & ~(error <= tolerance.factor)
     index = int(np.argmax(np.where(beyond, ratio, -1.0) if beyond.any() else ratio))
     if not beyond.any():
         verdict, reason = AGREES, f"{tolerance.name}: as at condition 1"
+    elif expected[index] >= 1.0 and math.isfinite(error[index]):
+        verdict, reason = DEGRADED, f"nothing can be told: {expected[index]:.1e} of the value is predicted"
     elif ratio[index] <= 1.0:
         verdict, reason = DEGRADED, f"{error[index]:.1e} of {expected[index]:.1e} predicted for this position"
     elif math.isnan(error[index]):

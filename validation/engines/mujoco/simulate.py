@@ -107,6 +107,7 @@ class _Simulation:
             "steps": 0.0,
         }
         self.steps_per_revolution = 0.0
+        self.predicted = {name: np.zeros(n) for name in (*FIELDS, *PINS)}
         self.turns = 0.0
         """Whole turns by which MuJoCo's theta_2 is ahead: springs at pins count them, rad."""
 

@@ -31,7 +31,7 @@ class Limit:
 
 LIMITS = {
     "acceleration_gap": Limit(1e-3, "of the greatest a_B: healthy runs have 1e-7..1e-4, a step that errs by 98 % has 4"),
-    "power_gap": Limit(1e-3, "of the greatest power: healthy runs have 1e-8..1e-5, that step 4e-2, a stopped solver 1"),
+    "power_gap": Limit(1e-4, "of the greatest power: healthy runs have 1e-8..1e-5, that step 4e-2, a stopped solver 1"),
 }
 """Residuals of the motion that `Watch` measures."""
 SELF_TOLD = {
