@@ -284,6 +284,20 @@ def test_swing_is_what_a_scan_of_the_output_finds() -> None:
     assert seen >= {"GCCC", "GCRR", "GRCR", "GRRC", "RRR1", "RRR2", "RRR3", "RRR4"}
 
 
+def test_ranges_of_coupler_and_output_hold_every_position_and_no_more() -> None:
+    for bars in random_linkages(8, 60):
+        theta_2 = bars.ground_angle + (np.arange(GRID) + 0.5) * (2 * math.pi / GRID)
+        theta_2 = theta_2[closes(bars, theta_2) > 0.0]
+        for bar in (3, 4):
+            reached = np.concatenate([close_loop(bars, theta_2, branch).angle(bar) for branch in (1, -1)])
+            clear = np.min([np.abs(np.sin(0.5 * (reached - end))) for end in np.ravel(intervals(bars, bar))], axis=0)
+            assert inside(reached[clear > 1e-6], intervals(bars, bar)).all()
+            for start, stop in intervals(bars, bar):
+                for end in (start, stop) if not turns_fully(bars, bar) else ():
+                    # theta_k goes as a square root near its limit's theta_2, or is tangent to it
+                    assert np.abs(np.sin(0.5 * (reached - end))).min() < 20.0 * math.pi / GRID
+
+
 def test_time_ratio_is_the_time_of_both_strokes() -> None:
     bars = uniform(3.0, 1.0, 2.5, 2.2)
     n = 200_000
@@ -333,6 +347,22 @@ def test_a_sweep_on_a_change_point_is_before_it() -> None:
     assert on_smooth_path(bars, np.array([1.0, 1.0, 1.0]), -1).tolist() == [-1, -1, -1]
     assert on_smooth_path(bars, np.array([1.0]), 1).dtype == np.int8
     assert (on_smooth_path(uniform(3, 1, 2.5, 2.2), quarter, -1) == -1).all()
+
+
+def test_a_change_point_is_met_in_spite_of_rounding() -> None:
+    for theta_1 in np.random.default_rng(9).uniform(-math.pi, math.pi, 200):
+        bars = linkage(2, 1, 2, 1, float(theta_1))
+        quarters = np.linspace(theta_1, theta_1 + 40 * math.pi, 81)
+        expected = [1, -1, -1, 1] * 20 + [1]
+        assert on_smooth_path(bars, quarters, 1).tolist() == expected
+        assert on_smooth_path(bars, quarters[::-1], 1).tolist() == expected
+
+
+def test_a_range_narrower_than_two_margins_is_halved() -> None:
+    bars = linkage(6.0, 1.0, 2.0, 3.0001, 0.3)  # 1e-4 beyond a structure
+    (start, stop), (low, high) = intervals(bars)[0], default_range(bars)
+    assert 0.0 < stop - start < math.radians(4.0)
+    assert (low - start, stop - high) == pytest.approx(2 * [(stop - start) / 4.0], rel=1e-12)
 
 
 def test_the_default_range_is_as_wide_as_the_contract_says() -> None:

@@ -39,6 +39,13 @@ def test_transmission_angle_is_the_acute_angle_between_coupler_and_output() -> N
             assert error <= ANGLE * (stretch + size) / abs(float(state.sin_mu[0]))
 
 
+def test_transmission_angle_keeps_its_digits_where_it_vanishes() -> None:
+    psi = 10.0 ** -np.arange(1.0, 14.0)
+    # in a parallelogram the angle at B is the angle of the input
+    found = transmission_angle(close_loop(FourBar(0.3, Bar(0.1), Bar(0.3), Bar(0.1)), psi, 1))
+    assert found == pytest.approx(psi, rel=8 * EPS)
+
+
 def test_extremes_are_those_of_a_scan() -> None:
     rng = np.random.default_rng(22)
     kinds = set()
