@@ -83,6 +83,13 @@ class Reader:
             raise self.refuse(key, value, wanted)
         return number
 
+    def quantities(self, key: str, value: object, unit: str) -> tuple[float, ...]:
+        """A list of numbers with units, in `unit`."""
+        if not isinstance(value, list):
+            missing = "is missing; " if value is None else ""
+            raise self.refuse(key, value, f'{missing}must be a list like ["1 {unit}", "2 {unit}"]')
+        return tuple(self.quantity(f"{key}[{index}]", entry, unit) for index, entry in enumerate(value))
+
     def polar(self, key: str, value: object, unit: str) -> tuple[float, float]:
         """A pair [magnitude, angle], in `unit` and rad."""
         if not isinstance(value, list) or len(value) != 2:

@@ -12,12 +12,13 @@ from typing import Any
 
 import numpy as np
 
-from fourbar.effects import REGISTRY, Load
+from fourbar.effects import REGISTRY, Load, Table
 from fourbar.entries import Reader
 from fourbar.errors import InputError
 from fourbar.kinematics import Array
 from fourbar.linkage import BAR_NAMES, MOVING_BARS, Bar, FourBar
-from fourbar.scene import CROSSED, OPEN, Free, FromLimit, Motion, Scene, Sweep
+from fourbar.motion_law import ENDS, Law
+from fourbar.scene import CROSSED, DEFAULT_STEPS, OPEN, Free, FromLimit, Motion, Scene, Sweep
 from fourbar.writing import write_text
 
 __all__ = ["dump", "load", "loads", "read_text", "save"]
@@ -138,7 +139,7 @@ def _bar(read: Reader, key: str, value: object, length: float) -> Bar:
 
 
 def _motion(read: Reader, value: object) -> Motion:
-    entry = read.table("motion", value, ("theta_2", "omega_2", "alpha_2", "branch", "through", "free"))
+    entry = read.table("motion", value, ("theta_2", "omega_2", "alpha_2", "branch", "through", "free", "law"))
     free = None
     if "free" in entry:
         released = read.table("motion.free", entry["free"], ("duration", "steps"))
@@ -154,6 +155,18 @@ def _motion(read: Reader, value: object) -> Motion:
         BRANCHES[read.choice("motion.branch", entry.get("branch", "open"), BRANCHES)],
         read.choice("motion.through", entry.get("through", "sign"), THROUGH),
         free,
+        _law(read, entry["law"]) if "law" in entry else None,
+    )
+
+
+def _law(read: Reader, value: object) -> Law:
+    key = "motion.law"
+    entry = read.table(key, value, ("time", "theta_2", "steps", "ends"))
+    return Law(
+        read.quantities(f"{key}.time", entry.get("time"), "s"),
+        read.quantities(f"{key}.theta_2", entry.get("theta_2"), "rad"),
+        read.whole(f"{key}.steps", entry.get("steps", DEFAULT_STEPS), 1, MOST_STEPS),
+        read.choice(f"{key}.ends", entry.get("ends", "free"), ENDS),
     )
 
 
@@ -178,7 +191,15 @@ def _theta_2(read: Reader, value: object) -> float | Array | Sweep | FromLimit:
 
 
 def _load(read: Reader, key: str, value: object) -> Load:
-    entry = read.table(key, value, ("bar", "force", "at", "moment", "frame"))
+    entry = read.table(key, value, ("bar", "force", "at", "moment", "frame", "table"))
+    table = None
+    if "table" in entry:
+        over = read.table(f"{key}.table", entry["table"], ("theta_2", "factor"))
+        factors = over.get("factor")
+        if not isinstance(factors, list):
+            raise read.refuse(f"{key}.table.factor", factors, "must be a list of numbers without a unit")
+        angles = read.quantities(f"{key}.table.theta_2", over.get("theta_2"), "rad")
+        table = Table(angles, tuple(read.number(f"{key}.table.factor[{i}]", x) for i, x in enumerate(factors)))
     if "force" not in entry and "moment" not in entry:
         raise read.refuse(key, value, "must have a force, a moment or both")
     if "at" in entry and "force" not in entry:
@@ -189,6 +210,7 @@ def _load(read: Reader, key: str, value: object) -> Load:
         read.polar(f"{key}.at", entry["at"], "m") if "at" in entry else (0.0, 0.0),
         read.quantity(f"{key}.moment", entry.get("moment", "0 N m"), "N m"),
         read.choice(f"{key}.frame", entry.get("frame", "world"), ("world", "bar")),
+        table,
     )
 
 
@@ -254,7 +276,16 @@ def _motion_entry(write: Writer, motion: Motion) -> dict[str, Any]:
         entry["theta_2"] = write.quantity(asked, "rad")
     if motion.omega_2 is not None:
         entry["omega_2"] = write.quantity(motion.omega_2, "rad/s")
-    entry["alpha_2"] = write.quantity(motion.alpha_2, "rad/s^2")
+    if motion.law is None:
+        entry["alpha_2"] = write.quantity(motion.alpha_2, "rad/s^2")
+    else:
+        law = motion.law
+        entry["law"] = {
+            "time": [write.quantity(time, "s") for time in law.time],
+            "theta_2": [write.quantity(angle, "rad") for angle in law.theta_2],
+            "steps": law.steps,
+            "ends": law.ends,
+        }
     entry["branch"] = next(name for name, sign in BRANCHES.items() if sign == motion.branch)
     entry["through"] = motion.through
     if motion.free is not None:
@@ -267,7 +298,11 @@ def _load_entry(write: Writer, load: Load) -> dict[str, Any]:
     if load.force is not None:
         entry["force"] = write.polar(*load.force, "N")
         entry["at"] = write.polar(*load.at, "m")
-    return {**entry, "moment": write.quantity(load.moment, "N m"), "frame": load.frame}
+    entry |= {"moment": write.quantity(load.moment, "N m"), "frame": load.frame}
+    if load.table is not None:
+        angles = [write.quantity(angle, "rad") for angle in load.table.theta_2]
+        entry["table"] = {"theta_2": angles, "factor": list(load.table.factor)}
+    return entry
 
 
 def _table(name: str, entries: dict[str, Any]) -> str:

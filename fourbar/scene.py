@@ -17,6 +17,7 @@ from fourbar.linkage import MOVING_BARS, FourBar, require
 from fourbar.margins import U, diagonal_to_O4, limit_remainder
 from fourbar.mobility import default_range, limit_positions, on_smooth_path
 from fourbar.more_digits import needing_more_digits, restated, rounded
+from fourbar.motion_law import Law
 from fourbar.solution import (
     NOT_ASSEMBLED,
     OF_DRY_FRICTION,
@@ -86,6 +87,7 @@ class Motion:
     branch : +1 open (B left of the diagonal A to O4), -1 crossed.
     through : at a change point keep the "sign" of the branch, or "follow" the smooth path.
     free : released motion instead of a prescribed one.
+    law : theta_2 over time instead of theta_2, omega_2 and alpha_2.
     """
 
     theta_2: float | Array | Sweep | FromLimit | None = None
@@ -94,6 +96,7 @@ class Motion:
     branch: int = OPEN
     through: str = "sign"
     free: Free | None = None
+    law: Law | None = None
 
     def __post_init__(self) -> None:
         if self.theta_2 is not None and not isinstance(self.theta_2, (Sweep, FromLimit)):
@@ -107,6 +110,9 @@ class Motion:
         object.__setattr__(self, "alpha_2", require("motion.alpha_2", self.alpha_2))
         if self.branch not in (OPEN, CROSSED):
             raise InputError("motion.branch", self.branch, "must be +1 (open) or -1 (crossed)")
+        given = (self.free, self.theta_2, self.omega_2, self.alpha_2 or None)
+        if self.law is not None and any(value is not None for value in given):
+            raise InputError("motion.law", self.law.ends, "stands alone: it gives theta_2, omega_2 and alpha_2")
         if self.through not in ("sign", "follow"):
             raise InputError("motion.through", self.through, 'must be "sign" or "follow"')
 
@@ -143,6 +149,8 @@ class Command(NamedTuple):
     """rad/s^2."""
     remainder: Decimal | None = None
     """What theta_2 as a double leaves out of the one angle meant, rad: a limit position plus its offset."""
+    time: Array | None = None
+    """(n,), s; where the motion is given over time."""
 
 
 DEFAULT_STEPS = 360
@@ -156,10 +164,15 @@ LIVE_ARRAYS = 96
 def command(scene: Scene) -> Command:
     """The positions that the scene's motion names, each with its branch."""
     motion, linkage = scene.motion, scene.linkage
-    asked, remainder = motion.theta_2, None
-    if asked is None:
-        asked = Sweep(*default_range(linkage), DEFAULT_STEPS)
-    if isinstance(asked, Sweep):
+    asked, remainder, time = motion.theta_2, None, None
+    omega_2: float | Array | None = motion.omega_2
+    alpha_2: float | Array = motion.alpha_2
+    if motion.law is not None:
+        time = motion.law.times()
+        theta_2, omega_2, alpha_2 = motion.law.at(time)
+    elif asked is None:
+        theta_2 = np.linspace(*default_range(linkage), DEFAULT_STEPS + 1)
+    elif isinstance(asked, Sweep):
         theta_2 = np.linspace(asked.start, asked.stop, asked.steps + 1)
     elif isinstance(asked, FromLimit):
         limits = limit_positions(linkage)
@@ -175,7 +188,7 @@ def command(scene: Scene) -> Command:
     branch = np.full(theta_2.shape, motion.branch, dtype=np.int8)
     if motion.through == "follow":
         branch = on_smooth_path(linkage, theta_2, motion.branch)
-    return Command(theta_2, branch, motion.omega_2, motion.alpha_2, remainder)
+    return Command(theta_2, branch, omega_2, alpha_2, remainder, time)
 
 
 def solve(
@@ -225,7 +238,9 @@ def solve(
         for name, turns in unwrapped.items():
             turns.extend(result[name][part])
     del lid
-    return Solution(scene.title, scene.drive_bar, code, np.asarray(where.branch), where.theta_2, **result)
+    solution = Solution(scene.title, scene.drive_bar, code, np.asarray(where.branch), where.theta_2, **result)
+    solution.time = where.time
+    return solution
 
 
 def _warm_heap() -> Array:

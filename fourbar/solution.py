@@ -101,7 +101,7 @@ class Solution:
     """Largest |mu r |F| - couple| that the solved pin friction leaves, N m."""
 
     time: Array | None = None
-    """Of a free motion, s; it ends where the linkage stops at a limit position."""
+    """Of a motion law, or of a free motion, s; the latter ends where the linkage stops at a limit position."""
 
     def __len__(self) -> int:
         return len(self.theta_2)

@@ -10,8 +10,8 @@ import numpy as np
 from fourbar.effects.effect import Act, Effect, Joints, Tree
 from fourbar.effects.pins import known, shortest_bar
 from fourbar.effects.wrenches import Wrenches
-from fourbar.kinematics import Array, State
 from fourbar.errors import LimitError
+from fourbar.kinematics import Array, State
 from fourbar.linkage import PINS, FourBar, require
 from fourbar.solution import Solution
 

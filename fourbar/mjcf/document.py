@@ -6,7 +6,7 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 
-from fourbar.errors import InputError, NotAssembledError
+from fourbar.errors import InputError, LimitError, NotAssembledError
 from fourbar.kinematics import Array
 from fourbar.linkage import MOVING_BARS, FourBar
 from fourbar.mjcf.model import Model, text
@@ -35,8 +35,11 @@ def mjcf(scene: Scene, settings: Settings = RECIPE, *, keyframe: bool = True) ->
     Raises
     ------
     InputError : a bar has less mass or inertia than MuJoCo carries, or nothing sets the timestep.
+    LimitError : an effect or the motion has no counterpart in MJCF.
     NotAssembledError : the linkage closes at none of the scene's positions.
     """
+    if scene.motion.law is not None:
+        raise LimitError("a motion law has no counterpart in MJCF: its drive keeps omega_2 or alpha_2")
     model = Model(scene.linkage, settings)
     for term in (*scene.effects, *scene.loads):
         term.add_mjcf(model)

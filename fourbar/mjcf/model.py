@@ -152,7 +152,7 @@ class Model:
         )
 
     def add_tendons(self, root: ET.Element) -> None:
-        """What acts at the cut pin B acts on a tendon theta_4 - theta_3; a linear spring is a tendon between two sites."""
+        """At the cut pin B a tendon theta_4 - theta_3 takes what acts there; a spring is one between two sites."""
         if not self.pin["B"] and not self.springs:
             return
         tendons = ET.SubElement(root, "tendon")
@@ -164,13 +164,10 @@ class Model:
         for index, spring in enumerate(self.springs, 1):
             rest = -spring.slack / spring.stiffness
             if rest < 0.0:
-                raise LimitError(
-                    "a spring that pulls at every length has no counterpart in MJCF: its rest would be negative"
-                )
+                raise LimitError("a spring that pulls at every length has no counterpart in MJCF")
             name = f"spring_{index}"
-            tendon = ET.SubElement(
-                tendons, "spatial", name=name, stiffness=text(spring.stiffness), springlength=text(rest)
-            )
+            attributes = {"stiffness": text(spring.stiffness), "springlength": text(rest)}
+            tendon = ET.SubElement(tendons, "spatial", {"name": name, **attributes})
             for end, point in (("start", spring.start), ("end", spring.end)):
                 ET.SubElement(tendon, "site", site=f"{name}_{end}")
                 self._add_site(root, point, f"{name}_{end}")
