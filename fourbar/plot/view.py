@@ -86,7 +86,7 @@ def sweep_command(scene: Scene) -> Command:
             "motion.free", scene.motion.free, "is not drawn over theta_2; leave it out to draw the linkage"
         )
     if scene.motion.law is not None:
-        raise InputError("motion.law", scene.motion.law.ends, "is not drawn over theta_2; state theta_2 and omega_2 instead")
+        raise InputError("motion.law", scene.motion.law.ends, "is not drawn over theta_2; state theta_2 and omega_2")
     motion = scene.motion
     own = command(scene)
     if len(own.theta_2) > 1:
