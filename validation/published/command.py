@@ -1,64 +1,106 @@
-"""`python -m validation published`: printed figures against ours, differences bound to named errata."""
+"""`python -m validation published`: printed figures against ours, every difference bound to named errata."""
 
-import csv
-import json
 from collections import Counter
 from collections.abc import Iterator
-from decimal import ROUND_DOWN, ROUND_HALF_EVEN, Decimal
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import click
-import numpy as np
 
-from validation.published.program import ladder, motion, to_ours
+from validation.published.errata import ERRATA
+from validation.published.figures import VERDICTS, Figure
+from validation.published.maple import maple_figures
+from validation.published.program import STEPS, ladder, printed
+from validation.published.textbook import textbook_figures
+from validation.published.thesis_dynamics import dynamics_figures
+from validation.published.thesis_positions import position_figures
 
-DATA = Path(__file__).parent / "data"
-SOLVER_NOISE = 1e-12
-"""The 13 unknowns are printed with up to 17 digits; elimination of a 13x13 system leaves 2-3e-13 in each."""
-ERRATA = {
-    (
-        "positions",
-        "136 theta3_1",
-    ): "#6: printed -2.3887999 for -0.23887999, the exponent E-1 is lost; the loop would stay 2.064 cm open"
-}
+WIDTH = 78
 
 
-class Figure(NamedTuple):
-    """One printed figure and ours."""
+class LadderRow(NamedTuple):
+    """The model mechanism's torque and force at O2 after one more erratum of the thesis."""
 
-    table: str
-    name: str
-    printed: str
-    ours: float
-    noise: float = 0.0
+    erratum: str
+    """Its id; "" for the right answer."""
+    did: str
+    """What the program did."""
+    right: str
+    """What is right."""
+    torque: float
+    """T4, N cm."""
+    F12: tuple[float, float]
+    """N."""
+    published: dict[str, str] | None = None
+    """T4, F12x and F12y as printed, where the thesis prints the result of this row."""
 
-    def verdict(self) -> str:
-        """rounded, truncated or differs."""
-        printed, ours = Decimal(self.printed), Decimal(self.ours)
-        unit = Decimal(1).scaleb(int(printed.as_tuple().exponent))
-        if ours.quantize(unit, ROUND_HALF_EVEN) == printed or abs(ours - printed) <= Decimal(self.noise):
-            return "rounded"
-        return "truncated" if ours.quantize(unit, ROUND_DOWN) == printed else "differs"
+
+def ladder_rows() -> list[LadderRow]:
+    """From our answer to the two published ones, error by error: rows of `LadderRow`.
+
+    The first row is right: 309.309 N cm and (7.033, -2.121) N. The last two are what the manual and
+    section 5.7 print: 308.804 N cm and (161.418, -156.506) N.
+    """
+    source = printed()["published"]
+    tables = {"manual": source["manual_program_dynamic"], "5b": source["section_5_7_hand_solution"]}
+    rows = []
+    for erratum, x in ladder():
+        did, right = "nothing wrong: SI, uniform bars m (L^2 + w^2)/12", "the answer of this project"
+        if erratum in ERRATA:
+            did, right = ERRATA[erratum].title, ERRATA[erratum].right
+        elif erratum:
+            did, right = "I_G3, I_G4 as printed in the manual, ten digits", "see #3"
+        published = tables.get(erratum)
+        digits = {name: published[name] for name in ("T4", "F12x", "F12y")} if published else None
+        rows.append(LadderRow(erratum, did, right, x["T4"], (x["F12x"], x["F12y"]), digits))
+    return rows
 
 
 def figures() -> Iterator[Figure]:
-    """Every printed figure compared so far: section 2.4's angles and the 13 unknowns, twice."""
-    rows = list(csv.DictReader((DATA / "positions.csv").read_text(encoding="utf-8").splitlines()))
-    where = np.radians([float(row["theta2_deg"]) for row in rows])
-    for branch, third, fourth in ((1, "theta3_1", "theta4_2"), (-1, "theta3_2", "theta4_1")):
-        s = motion(where, branch)
-        for row, theta_3, theta_4 in zip(rows, s.theta_3, s.theta_4, strict=True):
-            for name, angle in ((third, float(theta_3)), (fourth, to_ours(float(theta_4)))):
-                degrees = float(np.degrees(angle))
-                printed = row[f"{name}_deg"]
-                degrees += 360.0 * round((float(printed) - degrees) / 360.0)
-                yield Figure("positions", f"{row['theta2_deg']} {name}", printed, degrees)
-    source: dict[str, Any] = json.loads((DATA / "model_mechanism.json").read_text(encoding="utf-8"))["published"]
-    steps = ladder()
-    for table, (_, ours) in (("manual_program_dynamic", steps[-2]), ("section_5_7_hand_solution", steps[-1])):
-        for name, printed in source[table].items():
-            yield Figure(table, name, printed, ours[name], SOLVER_NOISE)
+    """Every printed figure: the thesis, the Maple worksheet, public test cases."""
+    yield from position_figures()
+    yield from dynamics_figures()
+    yield from maple_figures()
+    yield from textbook_figures()
+
+
+def explained(figure: Figure) -> bool:
+    """Whether a difference is bound to errata that give the printed digits, or to a misprint that none can give."""
+    if not figure.errata or not set(figure.errata) <= set(ERRATA):
+        return False
+    return figure.reproduced() or not all(ERRATA[name].reproduced for name in figure.errata)
+
+
+def reason(figure: Figure) -> str:
+    """Why a figure differs, in a phrase."""
+    if not figure.errata or not set(figure.errata) <= set(ERRATA):
+        return "no erratum explains this"
+    steps = tuple(name for name, _, _ in STEPS if name in ERRATA)
+    if len(figure.errata) > 3 and set(figure.errata) <= set(steps):
+        text = "#" + " #".join(figure.errata) + ", the steps of the table above"
+    else:
+        text = "; ".join(f"#{name} {ERRATA[name].title}" for name in figure.errata)
+    if figure.reproduced():
+        decimals = len(figure.printed.partition(".")[2])
+        return f"{text}: gives {figure.made:.{min(decimals + 1, 12)}f}"
+    return f"{text} (no computation gives these digits)" if explained(figure) else f"{text}: does not give this"
+
+
+def show_ladder(console: Any) -> None:
+    """The table of the published torque, error by error."""
+    from rich.table import Table
+
+    table = Table(title="The published torque, error by error", show_lines=True)
+    table.add_column("what the program did", ratio=3)
+    table.add_column("what is right", ratio=3)
+    for name in ("T4, N cm", "F12, N"):
+        table.add_column(name, justify="right", no_wrap=True)
+    for row in ladder_rows():
+        torque = f"{row.torque:.9f}"
+        if row.published:
+            torque += f"\nprinted {float(row.published['T4']):.9f}"
+        force = f"{row.F12[0]:.6f}\n{row.F12[1]:.6f}"
+        table.add_row((f"#{row.erratum} " if row.erratum in ERRATA else "") + row.did, row.right, torque, force)
+    console.print(table)
 
 
 @click.command()
@@ -68,28 +110,45 @@ def published(show_all: bool) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    console = Console()
-    steps = Table(
-        "what the program did", "T4, N cm", "F12x, N", "F12y, N", title="The published torque, error by error"
-    )
-    for name, x in ladder():
-        steps.add_row(name, f"{x['T4']:.12f}", f"{x['F12x']:.6f}", f"{x['F12y']:.6f}")
-    console.print(steps)
+    console = Console(highlight=False, markup=False)
+    show_ladder(console)
     counts: Counter[tuple[str, str]] = Counter()
-    listed = Table("table", "figure", "printed", "ours", "verdict", "why")
-    unexplained = 0
+    named: Counter[str] = Counter()
+    unexplained, reproduced = [], 0
+    console.print("\nPrinted figures that differ from ours, and why:" if not show_all else "\nPrinted figures:")
     for figure in figures():
         verdict = figure.verdict()
         counts[figure.table, verdict] += 1
-        why = ERRATA.get((figure.table, figure.name), "") if verdict == "differs" else ""
-        unexplained += verdict == "differs" and not why
-        if show_all or verdict == "differs":
-            listed.add_row(figure.table, figure.name, figure.printed, f"{figure.ours:.12g}", verdict, why)
-    console.print(listed)
-    total = Table("table", "rounded", "truncated", "differs", title="Printed figures against ours")
+        if verdict == "differs":
+            named.update(figure.errata)
+            reproduced += figure.reproduced()
+            if not explained(figure):
+                unexplained.append(figure)
+        if verdict == "differs" or show_all:
+            ours = f"ours {figure.ours:.10g}" + ("" if verdict == "differs" else f", {verdict}")
+            click.echo(f"{figure.table}: {figure.name}  printed {figure.printed}  {ours}")
+        if verdict == "differs":
+            click.echo(click.wrap_text(reason(figure), WIDTH, "    ", "    "))
+    total = Table(*("table", *VERDICTS), title="Printed figures against ours")
     for table in dict.fromkeys(key[0] for key in counts):
-        total.add_row(table, *(str(counts[table, v]) for v in ("rounded", "truncated", "differs")))
+        total.add_row(table, *(str(counts[table, verdict]) for verdict in VERDICTS))
+    total.add_section()
+    sums = [sum(n for (_, v), n in counts.items() if v == verdict) for verdict in VERDICTS]
+    total.add_row(f"{sum(sums)} figures", *map(str, sums))
     console.print(total)
+    misprints = sums[2] - reproduced - len(unexplained)
+    summary = (
+        "Rounded, truncated: ours, rounded or cut to the digits printed, is what is printed. "
+        f"Of the {sums[2]} that differ {reproduced} are what the errata named make of ours, digit for digit; "
+        f"{misprints} are misprints."
+    )
+    click.echo(click.wrap_text(summary, WIDTH) + "\n")
+    console.print("The errata met above (all: validation/published/errata.toml):")
+    for name, erratum in ERRATA.items():
+        if named[name]:
+            text = f"#{name} {erratum.where}: printed {erratum.printed}. Right: {erratum.right}. "
+            text += f"Why: {erratum.derivation}. Effect: {erratum.effect}."
+            click.echo(click.wrap_text(text, WIDTH, "", "    "))
     if unexplained:
-        console.print(f"{unexplained} differences are not explained by an erratum")
+        console.print(f"{len(unexplained)} differences are not explained by an erratum")
         raise SystemExit(1)

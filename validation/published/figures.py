@@ -1,0 +1,38 @@
+"""A printed figure, ours, and what the named errata make of ours."""
+
+from decimal import ROUND_DOWN, ROUND_HALF_EVEN, Decimal
+from typing import NamedTuple
+
+VERDICTS = ("rounded", "truncated", "differs")
+
+
+class Figure(NamedTuple):
+    """One printed figure and ours, in the unit printed."""
+
+    table: str
+    name: str
+    printed: str
+    ours: float
+    errata: tuple[str, ...] = ()
+    """Ids of the errata that lead from ours to what is printed, in the order in which they are made."""
+    made: float | None = None
+    """Ours after these errata; None where they cannot be computed."""
+    noise: float = 0.0
+    """Round-off of whoever printed 15 digits or more, in the unit printed."""
+
+    def verdict(self) -> str:
+        """rounded, truncated or differs: how ours compares with the printed digits."""
+        return compare(self.printed, self.ours, self.noise)
+
+    def reproduced(self) -> bool:
+        """Whether the errata give the printed digits, rounded or truncated."""
+        return self.made is not None and compare(self.printed, self.made, self.noise) != "differs"
+
+
+def compare(printed: str, value: float, noise: float = 0.0) -> str:
+    """Whether `value` to the printed number of decimals is what is printed: rounded, truncated, or it differs."""
+    theirs, ours = Decimal(printed), Decimal(value)
+    unit = Decimal(1).scaleb(int(theirs.as_tuple().exponent))
+    if ours.quantize(unit, ROUND_HALF_EVEN) == theirs or abs(ours - theirs) <= Decimal(noise):
+        return "rounded"
+    return "truncated" if ours.quantize(unit, ROUND_DOWN) == theirs else "differs"
