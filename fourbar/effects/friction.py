@@ -79,7 +79,7 @@ class Friction(Effect):
     def add_mjcf(self, model: Any) -> None:
         """The attribute ``frictionloss`` of the hinge (of a tendon at the cut pin B)."""
         for pin, f in self.torques:
-            model.pin[pin]["frictionloss"] = f
+            model.add_dry_friction(pin, f)
 
     def size(self, linkage: FourBar, solution: Solution) -> Array:
         """Sum of the couples, divided by the shortest moving bar, N."""

@@ -9,7 +9,7 @@ import numpy as np
 from fourbar.errors import InputError, LimitError, NotAssembledError
 from fourbar.kinematics import Array
 from fourbar.linkage import MOVING_BARS, FourBar
-from fourbar.mjcf.model import Model, text
+from fourbar.mjcf.model import Model, carriable, text
 from fourbar.mjcf.settings import RECIPE, Run, Settings
 from fourbar.mobility import default_range
 from fourbar.scene import Command, Scene, command, solve
@@ -40,9 +40,7 @@ def mjcf(scene: Scene, settings: Settings = RECIPE, *, keyframe: bool = True) ->
     """
     if scene.motion.law is not None:
         raise LimitError("a motion law has no counterpart in MJCF: its drive keeps omega_2 or alpha_2")
-    model = Model(scene.linkage, settings)
-    for term in (*scene.effects, *scene.loads):
-        term.add_mjcf(model)
+    carriable(scene.linkage)
     start = _start(scene) if keyframe else None
     if start is not None:
         timestep = start.run.timestep(settings)
@@ -50,6 +48,9 @@ def mjcf(scene: Scene, settings: Settings = RECIPE, *, keyframe: bool = True) ->
         timestep = settings.timestep * settings.timestep_scale
     else:
         raise InputError("timestep", None, "is needed where no keyframe is asked for")
+    model = Model(scene.linkage, settings, timestep)
+    for term in (*scene.effects, *scene.loads):
+        term.add_mjcf(model)
     armature = flywheel(scene, settings)
     root = ET.Element("mujoco", model=_plain(scene.title) or "four-bar")
     root.append(ET.Comment(COMMENT))

@@ -4,6 +4,8 @@ import math
 from collections.abc import Iterable
 from xml.etree import ElementTree as ET
 
+import numpy as np
+
 from fourbar.effects import Load, Spring
 from fourbar.effects.spring import Point
 from fourbar.errors import InputError, LimitError
@@ -14,6 +16,9 @@ from fourbar.mjcf.settings import Settings
 FLOOR = 1e-15
 """mjMINVAL: MuJoCo refuses a moving body of less mass (kg) or inertia (kg m^2)."""
 COLOURS = {1: "0.45 0.45 0.48 1", 2: "0.12 0.47 0.71 1", 3: "1 0.5 0.05 1", 4: "0.17 0.63 0.17 1"}
+SLIP_DAMPING = 1e6
+"""Of dry friction, per timestep: the slower the slip that it still softens. The drive prescribes the slip itself, so
+it makes nothing stiff; measured, a reversal is then as exact as any other position."""
 NEVER_NEEDED = ("contact", "limit", "island", "sensor", "midphase")
 """Features that a closed loop of bars never uses."""
 THICKNESS = 0.015
@@ -25,26 +30,40 @@ def text(*numbers: float) -> str:
     return " ".join(repr(float(number)) for number in numbers)
 
 
+def carriable(linkage: FourBar) -> None:
+    """An InputError where a bar is lighter than MuJoCo carries."""
+    for number in MOVING_BARS:
+        bar = linkage.bar(number)
+        for key, value, unit in (("mass", bar.mass, "kg"), ("inertia", bar.inertia, "kg m^2")):
+            if value is None or value < FLOOR:
+                raise InputError(
+                    f"bars.{BAR_NAMES[number]}.{key}",
+                    value,
+                    f"MuJoCo cannot carry a massless bar: must be at least {FLOOR:g} {unit}",
+                )
+
+
 class Model:
     """What loads and effects add to: options, attributes of the pins, loads."""
 
-    def __init__(self, linkage: FourBar, settings: Settings) -> None:
+    def __init__(self, linkage: FourBar, settings: Settings, timestep: float) -> None:
         self.linkage, self.settings = linkage, settings
         self.option: dict[str, Iterable[float]] = {"gravity": (0.0, 0.0, 0.0)}
-        self.pin: dict[str, dict[str, float]] = {pin: {} for pin in PINS}
+        self.timestep = timestep
+        self.pin: dict[str, dict[str, float | tuple[float, ...]]] = {pin: {} for pin in PINS}
         self.loads: list[Load] = []
         self.springs: list[Spring] = []
         self.inertia = dict.fromkeys(MOVING_BARS, 0.0)
         """What is added to a bar's own, kg m^2."""
-        for number in MOVING_BARS:
-            bar = linkage.bar(number)
-            for key, value, unit in (("mass", bar.mass, "kg"), ("inertia", bar.inertia, "kg m^2")):
-                if value is None or value < FLOOR:
-                    raise InputError(
-                        f"bars.{BAR_NAMES[number]}.{key}",
-                        value,
-                        f"MuJoCo cannot carry a massless bar: must be at least {FLOOR:g} {unit}",
-                    )
+
+    def add_dry_friction(self, pin: str, torque: float) -> None:
+        """``frictionloss`` that reaches its full torque at once: by default it would rise over 0.02 s of slip."""
+        impedance = self.settings.impedance
+        self.pin[pin] |= {
+            "frictionloss": torque,
+            "solreffriction": (-1.0, -SLIP_DAMPING / self.timestep),
+            "solimpfriction": (impedance, impedance, 0.001, 0.5, 2.0),
+        }
 
     @property
     def O4(self) -> tuple[float, float]:
@@ -109,7 +128,7 @@ class Model:
             diaginertia=text(*[bar.inertia + self.inertia[number]] * 3),
         )
         numbers = {**drive, **self.pin[pin]}
-        joint = {key: text(value) for key, value in numbers.items()}
+        joint = {key: text(*np.atleast_1d(value)) for key, value in numbers.items()}
         ET.SubElement(body, "joint", {"name": pin, "type": "hinge", "axis": "0 0 1", **joint})
         self._add_capsule(body, number, bar.length, self.radius if number == 3 else -self.radius)
         if number == 2:
@@ -157,7 +176,7 @@ class Model:
             return
         tendons = ET.SubElement(root, "tendon")
         if self.pin["B"]:
-            attributes = {key: text(value) for key, value in self.pin["B"].items()}
+            attributes = {key: text(*np.atleast_1d(value)) for key, value in self.pin["B"].items()}
             fixed = ET.SubElement(tendons, "fixed", {"name": "B", **attributes})
             for joint, coefficient in (("O2", -1), ("A", -1), ("O4", 1)):
                 ET.SubElement(fixed, "joint", joint=joint, coef=str(coefficient))
