@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import validation.run
 from fourbar.errors import FourBarError
 from fourbar.scene import Command, Scene
 from tests.scenes import crank_rocker
@@ -26,6 +27,10 @@ from validation.suite.store import RunningError, Store
 from validation.tolerance import EQUIVALENCE
 
 SEED = 7
+COUNT = SCENES_SHOWN + 20
+"""More than are drawn, so that the work is the judging alone."""
+KILLS = int(os.environ.get("KILLS", "3"))
+"""Kills in each of the tests that kill; `make long-test` asks for 50."""
 TYPES = tuple(LinkageType)
 EXACT = chosen("energy-method")
 
@@ -70,6 +75,7 @@ def judge_all(suite: object, out: Path, witnesses: tuple[Witness, ...] = EXACT, 
 
 def test_an_engine_that_crashes_or_hangs_costs_its_own_rows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(pool, "SECONDS_PER_SCENE", 4.0)
+    monkeypatch.setattr(validation.run, "CHUNK", {True: 1, False: 2})
     moody = Witness("moody", f"{__name__}:Moody", EQUIVALENCE)
     judge_all(Few(), tmp_path / "run", (*EXACT, moody))
     rows = from_csv(tmp_path / "run" / "results.csv")
@@ -82,7 +88,7 @@ def test_an_engine_that_crashes_or_hangs_costs_its_own_rows(tmp_path: Path, monk
 
 
 def test_the_bytes_depend_neither_on_the_workers_nor_on_the_order(tmp_path: Path) -> None:
-    suite = Random(45, SEED, TYPES)
+    suite = Random(COUNT, SEED, TYPES)
     for workers in (1, 2):
         judge_all(suite, tmp_path / str(workers), workers=workers)
     for name in ("results.csv", "results.parquet"):
@@ -111,13 +117,20 @@ def test_another_suite_does_not_resume_the_parts_of_this_one(tmp_path: Path) -> 
             store.put(0, [])
 
 
-def start(out: Path, count: int) -> subprocess.Popen[bytes]:
-    command = [sys.executable, "-m", "validation", "run", "--random", str(count), "--engines", "energy-method"]
+LIMITED = (
+    "import resource, runpy, sys; resource.setrlimit(resource.RLIMIT_FSIZE, (60_000, resource.RLIM_INFINITY)); "
+    "runpy.run_module('validation', run_name='__main__', alter_sys=True)"
+)
+"""The harness on a disk that takes no file of more than 60 kB: the parts fit, the results do not."""
+
+
+def start(out: Path, count: int, *program: str, stderr: int = subprocess.DEVNULL) -> subprocess.Popen[bytes]:
+    command = [sys.executable, *(program or ("-m", "validation")), "run", "--random", str(count)]
     return subprocess.Popen(
-        [*command, "--out", str(out)],
+        [*command, "--engines", "energy-method", "--out", str(out)],
         cwd=Path(__file__).parent.parent,
         stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
+        stderr=stderr,
         start_new_session=True,
     )
 
@@ -128,19 +141,66 @@ def wait_for_parts(out: Path, process: subprocess.Popen[bytes], at_least: int) -
         time.sleep(0.01)
 
 
-def test_killed_three_times_a_rerun_ends_with_the_bytes_of_an_undisturbed_run(tmp_path: Path) -> None:
-    count, undisturbed, disturbed = SCENES_SHOWN + 20, tmp_path / "undisturbed", tmp_path / "disturbed"
-    assert start(undisturbed, count).wait(timeout=100) == 0
-    rng = np.random.default_rng(SEED)
-    for kill in range(3):
-        process = start(disturbed, count)
-        wait_for_parts(disturbed, process, at_least=1 + 2 * kill)
-        time.sleep(float(rng.uniform(0.0, 0.1)))
-        os.killpg(process.pid, signal.SIGKILL)
-        process.wait()
-    assert start(disturbed, count).wait(timeout=100) == 0
+@pytest.fixture(scope="module")
+def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a run that nothing disturbed."""
+    out = tmp_path_factory.mktemp("undisturbed")
+    assert start(out, COUNT).wait(timeout=100) == 0
+    return out
+
+
+def assert_resumes(disturbed: Path, undisturbed: Path) -> None:
+    """A rerun ends with the bytes of the undisturbed run, and nothing is left over."""
+    assert start(disturbed, COUNT).wait(timeout=100) == 0
     for name in ("results.csv", "results.parquet"):
         assert (disturbed / name).read_bytes() == (undisturbed / name).read_bytes()
+    assert {path.name for path in disturbed.iterdir()} == {path.name for path in undisturbed.iterdir()}
+
+
+@pytest.mark.timeout(60 + 20 * KILLS)
+def test_killed_at_random_moments_a_rerun_ends_with_the_same_bytes(tmp_path: Path, undisturbed: Path) -> None:
+    rng = np.random.default_rng(SEED)
+    chunks = len(range(0, COUNT, 20))
+    for _ in range(KILLS):
+        process = start(tmp_path, COUNT)
+        wait_for_parts(tmp_path, process, at_least=int(rng.integers(chunks)))
+        time.sleep(float(rng.uniform(0.0, 0.3)))
+        os.killpg(process.pid, signal.SIGKILL)
+        process.communicate()
+    assert_resumes(tmp_path, undisturbed)
+
+
+@pytest.mark.timeout(60 + 20 * KILLS)
+def test_a_worker_killed_at_random_moments_changes_no_byte(tmp_path: Path, undisturbed: Path) -> None:
+    rng = np.random.default_rng(SEED + 1)
+    process = start(tmp_path, COUNT)
+    for kill in range(KILLS):
+        wait_for_parts(tmp_path, process, at_least=1 + kill)
+        children = Path(f"/proc/{process.pid}/task/{process.pid}/children")
+        workers = [int(pid) for pid in children.read_text().split()] if children.exists() else []
+        if workers:
+            os.kill(workers[int(rng.integers(len(workers)))], signal.SIGKILL)
+    assert process.wait(timeout=100) == 0
+    assert (tmp_path / "results.csv").read_bytes() == (undisturbed / "results.csv").read_bytes()
+
+
+def test_interrupted_it_says_130_and_resumes(tmp_path: Path, undisturbed: Path) -> None:
+    process = start(tmp_path, COUNT)
+    wait_for_parts(tmp_path, process, at_least=1)
+    os.kill(process.pid, signal.SIGINT)
+    assert process.wait(timeout=60) == 130
+    assert not list(tmp_path.glob("**/*.part"))
+    assert_resumes(tmp_path, undisturbed)
+
+
+def test_a_full_disk_is_one_line_and_status_3_and_resumes(tmp_path: Path, undisturbed: Path) -> None:
+    process = start(tmp_path, COUNT, "-c", LIMITED, stderr=subprocess.PIPE)
+    _, said = process.communicate(timeout=100)
+    assert process.returncode == 3
+    assert b"Traceback" not in said
+    assert said.strip().splitlines()[-1].startswith(b"error: ")
+    assert not (tmp_path / "results.csv").exists()
+    assert_resumes(tmp_path, undisturbed)
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")
