@@ -1,7 +1,7 @@
 """One scene through the formulas and every engine: its rows, its timings, and what was left out and why."""
 
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from importlib import import_module
 from typing import Any
@@ -28,6 +28,10 @@ class Witness:
     expected: tuple[str, ...] = COMPARED
     order: str = ""
     """ "module:function" that runs the engine at two coarser timesteps; its observed order is shown."""
+    positions: tuple[str, ...] = ()
+    """What it is held to where only positions are asked for; nothing: it is then not started."""
+    through_time: bool = False
+    """Whether it runs through the motion in time."""
     predictor: str = ""
     """ "module:function" that predicts errors from the description; "own": the engine's own residuals do."""
 
@@ -45,8 +49,15 @@ WITNESSES = (
         "validation.engines.mujoco.simulate:MujocoSimulated",
         SIMULATED,
         order="validation.engines.mujoco.simulate:observed_order",
+        through_time=True,
     ),
-    Witness("energy-method", "validation.engines.energy:EnergyMethod", EQUIVALENCE, ("torque",)),
+    Witness(
+        "energy-method",
+        "validation.engines.energy:EnergyMethod",
+        EQUIVALENCE,
+        ("torque",),
+        positions=("theta_3", "theta_4"),
+    ),
 )
 
 
@@ -140,7 +151,8 @@ def judged_page(name: str, scene: Scene, witnesses: Sequence[Witness] = WITNESSE
 def judge(name: str, scene: Scene, witnesses: Sequence[Witness] = WITNESSES) -> Record:
     """Ask every witness about one scene and compare; an engine that breaks down costs its own rows."""
     record = Record(name, scene)
-    at = command(scene)
+    at = _once(command(scene), record)
+    witnesses = list(_called_for(witnesses, at, record))
     record.solution, seconds = _timed(lambda: solve(scene, at=at))
     record.timings.append(Timing(name, FORMULAS, "exact", len(at.theta_2), seconds))
     record.rows += identities(name, scene, at, record.solution)
@@ -154,6 +166,32 @@ def judge(name: str, scene: Scene, witnesses: Sequence[Witness] = WITNESSES) -> 
             answer.evidence |= _observed_order(name, scene, at, record.solution, witness)
     _judge_inertia(record, at, witnesses)
     return record
+
+
+def _once(at: Command, record: Record) -> Command:
+    """One position where all of them are the same: constant conditions are not swept."""
+    numbers = (at.theta_2, at.branch, 0.0 if at.omega_2 is None else at.omega_2, at.alpha_2)
+    if len(at.theta_2) == 1 or any(np.ptp(values) != 0 for values in numbers):
+        return at
+    record.left_out.append("positions: all are the same, one is evaluated")
+    omega_2, alpha_2 = (x if x is None or np.ndim(x) == 0 else x[:1] for x in (at.omega_2, at.alpha_2))  # type: ignore[index]
+    return at._replace(theta_2=at.theta_2[:1], branch=at.branch[:1], omega_2=omega_2, alpha_2=alpha_2, time=None)  # type: ignore[arg-type]
+
+
+def _called_for(witnesses: Iterable[Witness], at: Command, record: Record) -> Iterator[Witness]:
+    """The witnesses that the question needs; the others are left out before their engine is imported."""
+    for witness in witnesses:
+        reason = None
+        if at.omega_2 is None:
+            reason = None if witness.positions else "only positions are asked for, and it gives forces"
+        elif witness.through_time and not np.any(at.omega_2):
+            reason = "omega_2 is 0: nothing moves through time"
+        elif witness.through_time and len(at.theta_2) == 1:
+            reason = "one position is no motion through time"
+        if reason is None:
+            yield witness if at.omega_2 is not None else replace(witness, expected=witness.positions)
+        else:
+            record.left_out.append(f"{witness.name}: {reason}")
 
 
 def _judged(name: str, scene: Scene, at: Command, solution: Solution, answer: Answer, witness: Witness) -> list[Row]:

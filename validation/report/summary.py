@@ -90,7 +90,7 @@ def summarise(pages: Iterable[Page]) -> Summary:
         counts.update(row.verdict for row in page.rows)
         bad = [row for row in page.rows if row.verdict == FAILS]
         failures += bad[: KEPT - len(failures)]
-        refusals.update((row.engine, row.reason) for row in page.rows if row.verdict == REFUSES)
+        refusals.update(_left_out(page))
         worst += _worst(page.rows)
         if len(worst) > 2 * KEPT:
             worst = _sorted(nlargest(KEPT, worst, key=lambda w: w.used))
@@ -129,6 +129,15 @@ def summarise(pages: Iterable[Page]) -> Summary:
         ],
         pages=shown,
     )
+
+
+def _left_out(page: Page) -> set[tuple[str, str]]:
+    """What was not asked, or refused to answer: (engine, reason)."""
+    told = {(row.engine, row.reason) for row in page.rows if row.verdict == REFUSES}
+    for line in page.left_out:
+        engine, _, reason = line.partition(": ")
+        told.add((engine, reason))
+    return told
 
 
 def used(row: Row) -> float:
