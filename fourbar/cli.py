@@ -242,11 +242,9 @@ def status(arguments: list[str] | None = None) -> int:
         sys.stdout.reconfigure(errors="replace")  # a terminal that has no Greek still gets its table
     try:
         group.main(args=given, prog_name="fourbar", standalone_mode=False)
-        sys.stdout.flush()
         return HOLDS
-    except BrokenPipeError:
-        _drop_output()  # the reader of the pipe has what it wants
-        return HOLDS
+    except SystemExit:
+        return HOLDS  # click leaves with 1 where the reader of a pipe has gone; it has what it wants
     except (click.exceptions.Abort, KeyboardInterrupt):
         return _say("interrupted", INTERRUPTED)
     except click.ClickException as error:
@@ -256,20 +254,11 @@ def status(arguments: list[str] | None = None) -> int:
     except FourBarError as error:
         return _say(str(error), BAD_INPUT)
     except OSError as error:
-        _drop_output()
         return _say(f"{error.filename or 'output'}: {error.strerror}", BROKEN)
     except Exception as error:
         if "--traceback" in given or os.environ.get("FOURBAR_TRACEBACK"):
             raise
         return _say(f"internal error: {type(error).__name__}: {error} (--traceback shows where)", BROKEN)
-
-
-def _drop_output() -> None:
-    """Leave nothing in the buffer that Python would try, and fail, to write at exit."""
-    try:
-        sys.stdout.flush()
-    except OSError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _say(message: str, code: int) -> int:

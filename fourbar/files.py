@@ -23,7 +23,7 @@ from fourbar.writing import write_text
 
 __all__ = ["dump", "load", "loads", "read_text", "save"]
 
-LARGEST_FILE = 1_000_000
+LARGEST_FILE = 500_000
 """Bytes; a scene takes about a thousand."""
 MOST_STEPS = 100_000_000
 """The bound that Sweep and Free hold."""

@@ -45,7 +45,7 @@ slug = pound_force * second ** 2 / foot
 """pi to 60 digits, so that an angle given in degrees is rounded once."""
 
 NUMBER = re.compile(r"[+-]?(?:[0-9]{1,100}(?:\.[0-9]{0,100})?|\.[0-9]{1,100})(?:[eE][+-]?[0-9]{1,3})?(?![0-9.])")
-UNIT = re.compile(r"(?:[A-Za-zµμ°_]+(?:_?0(?![0-9]))?(?:(?:\^|\*\*)-?[1-9](?![0-9^*])|[²³])?|[·*/()]|\s)+")
+UNIT = re.compile(r"(?:[A-Za-zµμ°_]+(?:_?0(?![0-9]))?(?:(?:\^|\*\*)-?[1-9](?![0-9])|[²³])?|[·*/()]|\s)+")
 """Names, each with at most one small exponent, and operators: nothing else reaches the parser, no tower of powers."""
 LONGEST_UNIT = 60
 

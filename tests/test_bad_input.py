@@ -36,7 +36,7 @@ viscous = { O2 = "0.01 N m s/rad" }
 LONGEST_LINE = 700
 """Characters of an error: a few lines of a terminal, whatever was given."""
 PATIENCE = 5.0
-"""Seconds in which any file is answered."""
+"""Seconds of processor time in which any file is answered, on a machine that does other things too."""
 
 
 def test_the_file_that_the_mistakes_are_made_in_is_good(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -131,9 +131,9 @@ def test_a_mistake_in_a_scene_file(
 def refused(arguments: list[str], words: list[str], folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """The command is refused with these words, and writes nothing into the folder."""
     before = sorted(folder.rglob("*"))
-    started = time.perf_counter()
+    started = time.process_time()
     assert status([*arguments, "-o", str(folder / "written")]) == BAD_INPUT
-    assert time.perf_counter() - started < PATIENCE
+    assert time.process_time() - started < PATIENCE
     told = capsys.readouterr()
     assert told.out == ""
     assert told.err.startswith("error: ") and told.err.endswith("\n") and told.err.count("\n") == 1
@@ -245,19 +245,19 @@ def test_bad_lengths_for_classify(arguments: list[str], capsys: pytest.CaptureFi
 )  # fmt: skip
 def test_large_nonsense_is_answered_soon(pattern: str) -> None:
     text = pattern * (LARGEST_FILE // len(pattern))
-    started = time.perf_counter()
+    started = time.process_time()
     with pytest.raises(FourBarError):
         loads(text, "nonsense")
-    assert time.perf_counter() - started < PATIENCE
+    assert time.process_time() - started < PATIENCE
 
 
 @pytest.mark.parametrize("pattern", ["a{n}." + "a." * 98 + "a=1\n", "[a{n}]\nb=1\n", "[[a]]\nb={n}\n"])
 def test_large_files_without_a_repeated_key_are_answered_soon(pattern: str) -> None:
     text = "".join(pattern.format(n=n) for n in range(LARGEST_FILE // (len(pattern) + 3)))
-    started = time.perf_counter()
+    started = time.process_time()
     with pytest.raises(FourBarError):
         loads(text, "nonsense")
-    assert time.perf_counter() - started < PATIENCE
+    assert time.process_time() - started < PATIENCE
 
 
 def test_mutated_files_end_in_a_scene_or_in_one_line() -> None:

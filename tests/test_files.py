@@ -210,6 +210,11 @@ def test_any_scene_reads_back_bit_for_bit(scene: fourbar.Scene) -> None:
     assert facts(loads(dump(scene))) == facts(scene)
 
 
+def test_every_letter_of_a_title_reads_back() -> None:
+    title = "".join(map(chr, range(0x180))) + "\u2028\ufeff\U0001f980"
+    assert loads(dump(replace(load(MODELS[0]), title=title))).title == title
+
+
 def test_save_is_whole_or_not_at_all(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     scene = load(MODELS[0])
     target = tmp_path / "scene.toml"
