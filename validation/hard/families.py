@@ -19,6 +19,8 @@ CRANK, ROCKER = LinkageType.CRANK_ROCKER, LinkageType.TRIPLE_ROCKER
 REGULAR = (0.5, 0.4, 0.3)
 """rad from the singular position: positions that set the scale of each quantity."""
 TOGGLE = tuple(10.0**-k for k in range(1, 13))
+NEAR = (1e-1, 3e-2, 1e-2, 3e-3)
+"""rad; as far as a simulation in time follows."""
 POLE = tuple(10.0**-k for k in range(1, 10))
 CHANGE = tuple(10.0**-k for k in range(1, 9))
 
@@ -216,12 +218,37 @@ class Family:
 
 
 FAMILIES = (
-    Family("toggle", "up to 1e-12 rad every exact engine errs as predicted; beyond, every engine says not assembled", toggle),
-    Family("pole-T3", "T3 grows as 1/distance to omega_3 = 0 on both sides; forces and torque err as predicted", lambda: poles(bar=3)),
-    Family("pole-T4", "T4 grows as 1/distance to omega_4 = 0 on both sides; forces and torque err as predicted", lambda: poles(bar=4)),
+    Family(
+        "toggle",
+        "up to 1e-12 rad every exact engine errs as predicted; beyond, every engine says not assembled",
+        toggle,
+    ),
+    Family(
+        "toggle-near",
+        "up to |sin mu| = 0.05 the simulation follows, and its residuals predict its error",
+        lambda: toggle(distances=NEAR),
+    ),
+    Family(
+        "pole-T3",
+        "T3 grows as 1/distance to omega_3 = 0 on both sides; forces and torque err as predicted",
+        lambda: poles(bar=3),
+    ),
+    Family(
+        "pole-T4",
+        "T4 grows as 1/distance to omega_4 = 0 on both sides; forces and torque err as predicted",
+        lambda: poles(bar=4),
+    ),
     Family("driven-output", "a drive on bar 4 is answered on both sides of omega_4 = 0", driven_output),
-    Family("change-point", "to 1e-8 rad the formulas keep their digits and the engines lose what was predicted, never more", change_point),
-    Family("change-point-through", "by sign or along the smooth path, every engine stays on the branch that is stated", through_change_point),
+    Family(
+        "change-point",
+        "to 1e-8 rad the formulas keep their digits and the engines lose what was predicted, never more",
+        change_point,
+    ),
+    Family(
+        "change-point-through",
+        "by sign or along the smooth path, every engine stays on the branch that is stated",
+        through_change_point,
+    ),
     Family("near-grashof", "whatever assembles is answered, and the engines agree on what assembles", near_grashof),
     Family("bar-ratio", "a crank down to 1e-6 of the coupler costs no more digits than predicted", bar_ratio),
     Family("mass-ratio", "exact engines keep all digits", mass_ratio),
@@ -231,6 +258,10 @@ FAMILIES = (
     Family("speeds", "1e-6 to 1e6 rad/s: exact engines keep all digits", speeds),
     Family("loads", "1e-9 to 1e9 of the weights: exact engines keep all digits", loads),
     Family("out-and-back", "not assembled outside, the same answers on the way out and on the way back", out_and_back),
-    Family("thesis-limits", "both limit positions are singular or not assembled, all between is answered", thesis_limits),
-    Family("released", "position error and energy drift of each free motion stay within what its step predicts", released),
+    Family(
+        "thesis-limits", "both limit positions are singular or not assembled, all between is answered", thesis_limits
+    ),
+    Family(
+        "released", "position error and energy drift of each free motion stay within what its step predicts", released
+    ),
 )

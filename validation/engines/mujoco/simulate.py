@@ -14,6 +14,7 @@ from fourbar.scene import Command, Scene
 from validation.answer import Answer
 from validation.engines.loop import Position
 from validation.engines.mujoco.closed_loop import O2, O4, A, ClosedLoop
+from validation.engines.mujoco.limits import NEAREST_TOGGLE, least_sine, too_fast_or_loaded
 from validation.engines.mujoco.watch import Watch, alarms
 
 SHARED = "lengths, masses, inertias, centres, loads and effects as MJCF text; omega_2, alpha_2 and the branch"
@@ -63,6 +64,9 @@ def _refusal(scene: Scene, command: Command) -> str | None:
         return "omega_2 or alpha_2 differs from position to position: that is no one motion through time"
     if np.ptp(command.theta_2) == 0.0:
         return "one position: nothing to run through"
+    reason = too_fast_or_loaded(scene, float(np.max(np.abs(command.omega_2))))
+    if reason is not None:
+        return reason
     if _passes_change_point(scene, command):
         return "the sweep meets a change point, where all bars are collinear and MuJoCo's closure loses a direction"
     return None
@@ -115,6 +119,9 @@ class _Simulation:
         """The answer over all positions."""
         position = ClosedLoop(self._text(1e-3)).position()  # kinematics alone: the timestep plays no part
         found = self._assemble(position)
+        least = least_sine(self.scene.linkage, self.command.theta_2, np.array([q is not None for q in found]))
+        if least < NEAREST_TOGGLE.boundary:
+            raise LimitError(f"|sin(theta_4 - theta_3)| falls to {least:.1e}; {NEAREST_TOGGLE.reason}")
         for stretch in self._stretches(position, found):
             self._run(stretch, found)
         at = Command(self.theta_2, self.branch, self.omega_2, self.alpha_2)
@@ -127,7 +134,7 @@ class _Simulation:
             assembled,
             self.values,
             predicted=self.predicted,
-            alarms=alarms(self.evidence, sum(self.scene.linkage.lengths), self.settings.iterations),
+            alarms=alarms(self.evidence, sum(self.scene.linkage.lengths)),
             evidence=self.evidence,
         )
 
@@ -227,9 +234,10 @@ class _Simulation:
         )
         for name, number in zip(FIELDS, numbers, strict=True):
             self.values[name][index] = number
-        for name, force in forces().items():
+        pins = forces()
+        for name, force in pins.items():
             self.values[name][index] = force
-        for name, error in watch.look(loop, torque).items():
+        for name, error in watch.look(loop, torque, pins["F43"]).items():
             self.predicted[name][index] = error
 
     def _drive_elsewhere(self, loop: ClosedLoop, light: ClosedLoop, crank_torque: float) -> float:

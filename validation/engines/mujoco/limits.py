@@ -1,0 +1,85 @@
+"""What MuJoCo's simulation of the loop cannot do, as data: the measured boundary and the reason.
+
+The boundaries were measured with MuJoCo 4.0.0 and the default `Settings`; a test measures both sides of
+each again, so an engine that moves one is noticed.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fourbar.linkage import FourBar
+from fourbar.mjcf import RECIPE
+from fourbar.mjcf.document import flywheel
+from fourbar.scene import Scene
+
+
+@dataclass(frozen=True, slots=True)
+class Boundary:
+    """A declared limit."""
+
+    name: str
+    boundary: float
+    unit: str
+    reason: str
+
+
+NEAREST_TOGGLE = Boundary(
+    "|sin(theta_4 - theta_3)|, least",
+    0.05,
+    "1",
+    "below 0.05 bars 3 and 4 speed up faster than the time step follows: torque 1e-5 wrong at 0.1, 1e-2 at 0.03, "
+    "data reset at 0.01",
+)
+FASTEST = Boundary(
+    "omega_2, greatest",
+    3e4,
+    "rad/s",
+    "beyond 3e4 rad/s accelerations pass mjMAXVAL = 1e10, which MuJoCo takes for a bad state and resets",
+)
+SLOWEST = Boundary(
+    "a omega_2^2, least",
+    5e-10,
+    "m/s^2",
+    "below 5e-10 m/s^2 the accelerations of the crank drown in the constraint solver's rounding",
+)
+HEAVIEST = Boundary(
+    "loads and weights / inertial forces, greatest",
+    1e8,
+    "1",
+    "loads and weights beyond 1e8 times the inertial forces open the soft loop: its gap grows as their ratio",
+)
+BOUNDARIES = (NEAREST_TOGGLE, FASTEST, SLOWEST, HEAVIEST)
+
+
+def too_fast_or_loaded(scene: Scene, speed: float) -> str | None:
+    """The limit of speed or load that a scene passes, or None; speed in rad/s."""
+    if speed > FASTEST.boundary:
+        return FASTEST.reason
+    if scene.linkage.input.length * speed**2 < SLOWEST.boundary:
+        return SLOWEST.reason
+    if load_ratio(scene) > HEAVIEST.boundary:
+        return HEAVIEST.reason
+    return None
+
+
+def load_ratio(scene: Scene) -> float:
+    """(m g L + F L + M)/(omega_2^2 (m L^2 + I)): loads and weights against the inertia of the bars."""
+    inertia = flywheel(Scene(scene.linkage, scene.motion), RECIPE)
+    return flywheel(scene, RECIPE) / inertia - 1.0 if inertia else math.inf
+
+
+def least_sine(linkage: FourBar, theta_2: NDArray[np.float64], assembled: NDArray[np.bool_]) -> float:
+    """The least |sin(theta_4 - theta_3)| on the way from one assembled position to the next, by the cosine rule."""
+    d, a, b, c = linkage.lengths
+    psi = np.sort(theta_2[assembled] - linkage.ground_angle)
+    if not len(psi):
+        return 1.0
+    turns = math.pi * np.arange(math.ceil(psi[0] / math.pi), math.floor(psi[-1] / math.pi) + 1)
+    squared = d * d + a * a - 2.0 * d * a * np.cos(np.concatenate((psi, turns)))
+    cosine = (b * b + c * c - squared) / (2.0 * b * c)
+    sine = np.sqrt(np.clip(1.0 - cosine**2, 0.0, None))
+    between = np.abs(cosine[len(psi) :]) <= 1.0  # a turn at which the loop is open splits the way
+    return float(np.concatenate((sine[: len(psi)], sine[len(psi) :][between])).min())
