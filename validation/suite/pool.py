@@ -7,6 +7,7 @@ done again scene by scene, and the scene at fault engine by engine.
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from dataclasses import replace
+from importlib import import_module
 
 from validation.judge import Page, Witness, breakdown, judged_page
 from validation.suite.scenes import Suite
@@ -23,12 +24,10 @@ def judge_chunk(suite: Suite, scenes: Sequence[int], witnesses: Sequence[Witness
     return [judged_page(suite.name(i), suite.scene(i), witnesses, draw=draw) for i in scenes]
 
 
-def in_this_process(
-    suite: Suite, chunks: Iterable[Chunk], witnesses: Sequence[Witness], draw: bool
-) -> Iterator[tuple[int, list[Page]]]:
-    """One after the other, here: for a debugger, not for engines that may crash."""
-    for number, scenes in chunks:
-        yield number, judge_chunk(suite, scenes, witnesses, draw)
+def ready() -> None:
+    """Import what every scene needs."""
+    import_module("validation.judge")
+    import_module("validation.engines.energy")
 
 
 def over_processes(
@@ -39,7 +38,8 @@ def over_processes(
 
     from pebble import ProcessPool
 
-    with ProcessPool(max_workers=workers, context=get_context("spawn")) as pool:
+    # a worker imports before its first task, so that the time for it is not taken from a scene
+    with ProcessPool(max_workers=workers, context=get_context("spawn"), initializer=ready) as pool:
         try:
 
             def submit(scenes: Sequence[int], asked: Sequence[Witness]) -> Future[list[Page]]:
