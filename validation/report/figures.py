@@ -1,133 +1,179 @@
-"""The picture of one scene: the linkage, every engine over the formulas, and the differences on their own axes."""
+"""The pictures of one scene: the linkage, every engine's answer over the formulas, and the errors beneath."""
 
-import io
-import math
-from collections.abc import Callable
-from typing import Any
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fourbar.scene import solve
+from fourbar.scene import Command, solve
 from fourbar.solution import OK, Solution
 from validation.answer import Answer
 from validation.compare import angle_aware_difference
 from validation.judge import Record
+from validation.report.colours import ALLOWED, BAND, GRID, INK, PAPER, style_of
+from validation.report.drawing import drawing
+from validation.report.svg import svg_text
 from validation.scales import divisor, magnitude, yardstick
-from validation.tolerance import EQUIVALENCE, Array, condition_of
+from validation.tolerance import EPS, EQUIVALENCE, SIMULATED, Array, condition_of
 
-INK = "#777777"
-"""Grey that reads on white and on black; the page lets text follow its own colour."""
-STYLES = {
-    "pinocchio-inverse": ("#0072b2", "o", (0, (4, 3))),
-    "mujoco-inverse": ("#009e73", "s", (0, (1, 2))),
-    "mujoco-simulated": ("#d55e00", "^", "solid"),
-    "energy-method": ("#cc79a7", "x", (0, (6, 2, 1, 2))),
-}
-"""Colour-blind-safe colours; marker and line style tell them apart in grey."""
-MARKS = 12
-"""Markers per curve: enough to see that it lies on the band, few enough to see the band."""
-FLOOR = 1e-18
-"""Differences of exactly zero are drawn here."""
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+MARKS = 10
+"""Marks of one engine on a curve. Every engine has its own positions, so no mark hides another."""
+STRETCHES = 24
+"""Stretches of a sweep; the error shown in each is its largest."""
+FLOOR = EPS / 16.0
+"""Errors below this, zero among them, are drawn here."""
+TORQUE_AND_FORCE = ("torque", "F32")
+ANGLES = ("theta_3", "theta_4")
+SUBSCRIPT = str.maketrans("234", "₂₃₄")
 
 
 def scene_figure(record: Record) -> str | None:
-    """An SVG of the scene's answers, or None where there is no sweep with forces to draw."""
+    """SVGs of the linkage and, for a sweep, of the answers; None where nothing assembles."""
     solution = record.solution
-    if solution is None or solution.torque is None or np.count_nonzero(solution.status_code == OK) < 2:
+    if solution is None or not np.any(solution.status_code == OK):
         return None
+    linkage = drawing(record.scene, solution)
+    if np.count_nonzero(solution.status_code == OK) < 2:
+        return linkage
+    return linkage + _answers(record, solution)
+
+
+def _answers(record: Record, solution: Solution) -> str:
+    """One SVG per quantity: values above, errors of the simulation and of the exact engines on axes of their own."""
+    answers = [answer for answer in record.answers if answer.refusal is None and answer.quantities]
+    shown = TORQUE_AND_FORCE if solution.torque is not None else ANGLES
+    return "".join(_picture(quantity, record, solution, answers) for quantity in shown)
+
+
+def _picture(quantity: str, record: Record, solution: Solution, answers: list[Answer]) -> str:
     from matplotlib.backends.backend_svg import FigureCanvasSVG
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(10.5, 4.6), layout="constrained")
+    simulated = [answer for answer in answers if style_of(answer.engine).simulated and quantity in answer.quantities]
+    exact = [answer for answer in answers if not style_of(answer.engine).simulated and quantity in answer.quantities]
+    groups = [group for group in (simulated, exact) if group]
+    figure = Figure(figsize=(4.3, 2.2 + 1.0 * len(groups)), layout="constrained")
     FigureCanvasSVG(figure)
-    grid = figure.add_gridspec(2, 3, width_ratios=(1.0, 1.5, 1.5), height_ratios=(1.5, 1.0))
-    _draw_linkage(figure.add_subplot(grid[:, 0]), record, solution)
-    answers = [answer for answer in record.answers if answer.refusal is None and answer.at is not None]
-    for column, (quantity, label) in enumerate((("torque", f"T{solution.drive_bar} [N m]"), ("F32", "|F32| [N]")), 1):
-        top = figure.add_subplot(grid[0, column])
-        below = figure.add_subplot(grid[1, column], sharex=top)
-        _draw_quantity(top, below, quantity, record, solution, answers)
-        top.set_ylabel(label)
-        top.tick_params(labelbottom=False)
-        below.set_ylabel("|difference| / scale")
-        below.set_xlabel("theta_2 [deg]")
-    handles, labels = figure.axes[1].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper center", ncols=len(labels), frameon=False, fontsize=8)
-    return _svg(figure, record.name)
+    panels = figure.subplots(1 + len(groups), 1, sharex=True, height_ratios=[1.9, *[1.0] * len(groups)], squeeze=False)
+    axes = list(panels[:, 0])
+    _draw_values(axes[0], quantity, solution, [*exact, *simulated])
+    for below, group in zip(axes[1:], groups, strict=True):
+        _draw_errors(below, quantity, record, solution, group)
+        below.set_ylabel("error / scale" if quantity in TORQUE_AND_FORCE else "error (rad)", fontsize=7.5)
+    axes[-1].set_xlabel("time (s)" if solution.time is not None else "θ₂ (°)")
+    figure.align_ylabels(axes)
+    for panel in axes:
+        panel.grid(color=GRID, lw=0.5)
+        panel.tick_params(labelsize=8, color=GRID)
+        panel.spines[["top", "right"]].set_visible(False)
+        panel.spines[["left", "bottom"]].set_color(GRID)
+    return svg_text(figure, f"{record.name} {quantity}")
 
 
-def _draw_quantity(
-    top: Any, below: Any, quantity: str, record: Record, solution: Solution, answers: list[Answer]
-) -> None:
-    shown = solution.status_code == OK
-    degrees = np.degrees(solution.theta_2)
-    ours = getattr(solution, quantity)
-    value: Callable[[Array], Array] = (lambda v: v) if quantity == "torque" else magnitude
-    top.plot(
-        degrees, np.where(shown, value(ours), np.nan), color="#bbbbbb", lw=6, solid_capstyle="butt", label="formulas"
-    )
-    allowed = EQUIVALENCE.allowed(condition_of(quantity, record.scene.linkage, solution))
-    below.plot(degrees, np.where(shown, allowed, np.nan), color=INK, lw=1, ls="dashed")
-    below.annotate("allowed to exact engines", (0.01, 0.9), xycoords="axes fraction", fontsize=7, color=INK)
-    for answer in answers:
-        if quantity not in answer.quantities or answer.at is None:
-            continue
-        formulas = solution if len(answer.at.theta_2) == 0 else solve(record.scene, at=answer.at)
-        theirs = answer.quantities[quantity]
-        colour, marker, line = STYLES.get(answer.engine, ("#56b4e9", "d", "solid"))
-        x = np.degrees(answer.at.theta_2)
-        top.plot(
-            *(x, value(theirs)),
-            **{"color": colour, "lw": 1.0, "ls": line, "marker": marker, "ms": 4},
-            markevery=max(1, len(x) // MARKS),
-            label=answer.engine,
-        )
+def _draw_values(axes: "Axes", quantity: str, solution: Solution, answers: list[Answer]) -> None:
+    """The formulas as a band, and each engine's marks on it at positions of its own."""
+    good = solution.status_code == OK
+    ours = np.where(good, _plain(quantity, getattr(solution, quantity)), np.nan)
+    axes.plot(_base(solution, None), ours, color=BAND, lw=5, solid_capstyle="butt")
+    for turn, answer in enumerate(answers):
+        theirs = _plain(quantity, answer.quantities[quantity])
+        phase = (turn + 0.5) / (len(answers) * MARKS)
+        places = np.unique(((np.arange(MARKS) / MARKS + phase) * len(theirs)).astype(int))
+        axes.plot(_base(solution, answer.at)[places], theirs[places], **_mark(answer, 5.5))
+    _limit_to_bulk(axes, ours[good])
+    axes.set_ylabel(_label(quantity, solution))
+
+
+def _draw_errors(axes: "Axes", quantity: str, record: Record, solution: Solution, answers: list[Answer]) -> None:
+    """The largest error of each stretch on a logarithmic axis, the worst one ringed, and what is allowed."""
+    from matplotlib.ticker import LogLocator, NullLocator
+
+    good = solution.status_code == OK
+    if style_of(answers[0].engine).simulated:
+        allowed = np.full(len(solution), SIMULATED.factor)
+    else:
+        allowed = EQUIVALENCE.allowed(condition_of(quantity, record.scene.linkage, solution))
+    axes.plot(_base(solution, None), np.where(good, allowed, np.nan), color=ALLOWED, lw=1.1, ls=(0, (5, 2)))
+    low, high = float(np.nanmin(allowed[good])), float(np.nanmax(allowed[good]))
+    for turn, answer in enumerate(answers):
+        formulas = solution if answer.at is None else solve(record.scene, at=answer.at)
         mine = getattr(formulas, quantity)
-        error = angle_aware_difference(quantity, mine, theirs) / divisor(
+        error = angle_aware_difference(quantity, mine, answer.quantities[quantity]) / divisor(
             yardstick(quantity, record.scene, formulas, mine)
         )
-        below.plot(x, np.maximum(error, FLOOR), color=colour, lw=1.0, ls=line)
-    below.set_yscale("log")
-    _limit_to_bulk(top, value(ours)[shown])
-    for axes in (top, below):
-        axes.grid(color=INK, alpha=0.25, lw=0.5)
-        axes.tick_params(labelsize=7)
+        places = worst_of_stretches(error, turn / len(answers))
+        if not len(places):
+            continue
+        x, heights = _base(solution, answer.at)[places], np.maximum(error[places], FLOOR)
+        axes.plot(x, heights, **_mark(answer, 3.2) | {"mew": 0.8})
+        worst = int(np.argmax(heights))
+        axes.plot(x[worst], heights[worst], "o", ms=9, mfc="none", mec=style_of(answer.engine).colour, mew=0.9)
+        low, high = min(low, float(heights.min())), max(high, float(heights.max()))
+    axes.set_yscale("log")
+    axes.set_ylim(low / 4.0, 5.0 * high)
+    axes.yaxis.set_major_locator(LogLocator(numticks=5))
+    axes.yaxis.set_minor_locator(NullLocator())
+    axes.annotate(
+        "allowed",
+        (0.01, float(allowed[good][0])),
+        xycoords=("axes fraction", "data"),
+        xytext=(0, -9),
+        textcoords="offset points",
+        fontsize=7.5,
+        color=ALLOWED,
+    )
 
 
-def _limit_to_bulk(axes: Any, values: Array) -> None:
+def worst_of_stretches(error: Array, phase: float) -> np.ndarray[Any, np.dtype[np.intp]]:
+    """Index of the largest error in each of STRETCHES stretches; `phase` in [0, 1) shifts where they begin.
+
+    What is not finite is left out: the table says that it fails.
+    """
+    edges = (np.arange(STRETCHES + 2) - 1.0 + phase) * len(error) / STRETCHES
+    bounds = np.clip(edges.astype(int), 0, len(error))
+    found = []
+    for start, stop in pairwise(bounds):
+        piece = error[start:stop]
+        if np.isfinite(piece).any():
+            found.append(start + int(np.nanargmax(np.where(np.isfinite(piece), piece, np.nan))))
+    return np.array(found, dtype=np.intp)
+
+
+def _mark(answer: Answer, size: float) -> dict[str, Any]:
+    look = style_of(answer.engine)
+    return {"color": look.colour, "ls": "none", "marker": look.marker, "ms": size, "mfc": PAPER, "mew": 1.2}
+
+
+def _plain(quantity: str, values: Array) -> Array:
+    """A scalar as it is (angles in degrees), the magnitude of a vector."""
+    if quantity in ANGLES:
+        return np.degrees(values)
+    return magnitude(values) if values.ndim == 2 else values
+
+
+def _label(quantity: str, solution: Solution) -> str:
+    if quantity == "torque":
+        return f"T{solution.drive_bar} (N m)".translate(SUBSCRIPT)
+    name = quantity.replace("theta_", "θ").translate(SUBSCRIPT)
+    return f"{name} (°)" if quantity in ANGLES else f"|{quantity}| (N)"
+
+
+def _base(solution: Solution, at: Command | None) -> Array:
+    """What a curve is drawn over: the time of a free motion, else theta_2 in degrees."""
+    theta_2 = solution.theta_2 if at is None else at.theta_2
+    if solution.time is not None and len(solution.time) == len(theta_2):
+        return solution.time
+    return np.degrees(theta_2)
+
+
+def _limit_to_bulk(axes: "Axes", values: Array) -> None:
     """Near a pole the curve leaves the picture; the axis follows the other 96 % of the positions."""
     low, high = np.nanpercentile(values, [2.0, 98.0])
     span = high - low
     if span > 0.0 and (np.nanmax(values) > high + 3 * span or np.nanmin(values) < low - 3 * span):
         axes.set_ylim(low - 0.5 * span, high + 0.5 * span)
-
-
-def _draw_linkage(axes: Any, record: Record, solution: Solution) -> None:
-    index = int(np.argmax(np.where(solution.status_code == OK, solution.condition, -1.0)))
-    d, theta_1 = record.scene.linkage.ground, record.scene.linkage.ground_angle
-    O2, O4 = np.zeros(2), d * np.array([math.cos(theta_1), math.sin(theta_1)])
-    A, B = solution.A[index], solution.B[index]
-    for start, end, colour in ((O2, A, "#0072b2"), (A, B, "#e69f00"), (O4, B, "#009e73")):
-        axes.plot(*np.transpose([start, end]), color=colour, lw=4, solid_capstyle="round")
-    axes.plot(*np.transpose([O2, O4]), color=INK, lw=1, ls="dotted")
-    for name, point, ground in (("O2", O2, True), ("A", A, False), ("B", B, False), ("O4", O4, True)):
-        axes.plot(*point, marker="^" if ground else "o", ms=7, color=INK, mec="white")
-        axes.annotate(name, point, xytext=(5, 6), textcoords="offset points", fontsize=8)
-    axes.set_aspect("equal", adjustable="datalim")
-    axes.margins(0.2)
-    axes.tick_params(labelsize=7)
-    axes.set_xlabel("x [m]")
-    axes.set_title(f"theta_2 = {math.degrees(solution.theta_2[index]):.1f} deg", fontsize=8)
-
-
-def _svg(figure: Any, salt: str) -> str:
-    """The figure as inline SVG without a date, with ids of its own, text in the page's colour."""
-    import matplotlib
-
-    text = io.StringIO()
-    with matplotlib.rc_context(
-        {"svg.fonttype": "none", "svg.hashsalt": salt, "font.size": 8, "font.family": "sans-serif"}
-    ):
-        figure.savefig(text, format="svg", transparent=True, metadata={"Date": None, "Creator": None})
-    svg = text.getvalue()
-    return svg[svg.index("<svg") :].replace("#000000", "currentColor")
+        note = "axis ends where the curve leaves towards a pole"
+        axes.annotate(note, (0.99, 0.97), xycoords="axes fraction", fontsize=7, ha="right", va="top", color=INK)

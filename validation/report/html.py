@@ -2,17 +2,93 @@
 
 import base64
 import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from itertools import groupby
+from typing import Any, NamedTuple
 
+from validation.judge import Page
+from validation.report.colours import by_variable, declarations, style_of
+from validation.report.costs import cost_figure
 from validation.report.markdown import number
 from validation.report.summary import STATEMENT, TOLERANCES, Summary, used
-from validation.results import to_csv
+from validation.results import FAILS, REFUSES, Row, to_csv
+
+ALL_OPEN = 8
+"""Up to so many scenes all stand open; the bodies of more are made when they are opened."""
+ORDER = (
+    *("theta_3", "theta_4", "omega_3", "omega_4", "alpha_3", "alpha_4"),
+    *("F12", "F32", "F43", "F14", "torque", "torque_inertia"),
+)
+"""Quantities in the order of the computation; others follow by name."""
 
 
-def html(summary: Summary, first_lines: dict[str, int]) -> str:
-    """The report as one page: no script is needed to read it, and nothing is fetched.
+class Cell(NamedTuple):
+    """One comparison and the line of results.csv where it stands."""
 
-    `first_lines` gives the line of results.csv at which the rows of each scene start.
+    line: int
+    row: Row
+
+    @property
+    def used(self) -> float:
+        """error/allowed."""
+        return used(self.row)
+
+    @property
+    def kind(self) -> str:
+        """Word for its colour."""
+        return {FAILS: "fails", REFUSES: "refuses"}.get(self.row.verdict, "holds")
+
+
+@dataclass(frozen=True, slots=True)
+class Section:
+    """A part of the report that another module provides: a table, cells of plain text."""
+
+    key: str
+    """Anchor in the page, for example "hard"."""
+    title: str
+    text: str
+    headings: Sequence[str]
+    rows: Sequence[Sequence[str]]
+
+
+@dataclass(frozen=True, slots=True)
+class SceneView:
+    """What the page shows of one scene."""
+
+    page: Page
+    cells: list[Cell]
+    engines: list[str]
+    quantities: list[str]
+    by_place: dict[tuple[str, str], Cell]
+    """(quantity, engine): the comparison that used most of its allowance."""
+    worst: dict[str, Cell]
+    """engine: its comparison that used most."""
+    picture: str | None
+    """Base64 of a PNG of the MJCF."""
+
+    @property
+    def failed(self) -> int:
+        """Comparisons that do not hold."""
+        return sum(not cell.row.passed for cell in self.cells)
+
+
+def html(
+    summary: Summary,
+    first_lines: dict[str, int],
+    *,
+    pictures: Mapping[str, str] | None = None,
+    no_pictures: str = "",
+    sections: Sequence[Section] = (),
+) -> str:
+    """The report as one page that fetches nothing.
+
+    Parameters
+    ----------
+    first_lines : the line of results.csv at which the rows of each scene start.
+    pictures : base64 of a PNG by scene: the MJCF as MuJoCo draws it.
+    no_pictures : why there are none.
+    sections : further tables, for example of the hard cases.
     """
     from jinja2 import Environment, PackageLoader, StrictUndefined
     from markupsafe import Markup
@@ -26,19 +102,55 @@ def html(summary: Summary, first_lines: dict[str, int]) -> str:
     )
     environment.filters["number"] = number
     environment.filters["degrees"] = lambda radians: "-" if math.isnan(radians) else f"{math.degrees(radians):.3f}"
-    numbered = [
-        (line, row) for page in summary.pages for line, row in enumerate(page.rows, first_lines.get(page.name, 2))
-    ]
-    csv = base64.b64encode(to_csv(row for _, row in numbered).encode("utf-8")).decode("ascii")
-    template = environment.get_template("report.html.j2")
-    return template.render(
+    environment.filters["share"] = share
+    environment.filters["colour"] = lambda engine: by_variable(style_of(engine).colour)
+    environment.filters["symbol"] = lambda engine: style_of(engine).symbol
+    views = [_view(page, first_lines.get(page.name, 2), pictures or {}) for page in summary.pages]
+    csv = base64.b64encode(to_csv(cell.row for view in views for cell in view.cells).encode("utf-8"))
+    failing = sorted((cell for view in views for cell in view.cells if not cell.row.passed), key=lambda c: c.line)
+    costs = cost_figure(summary.pages)
+    return environment.get_template("report.html.j2").render(
         s=summary,
-        row_number={(row.scene, row.engine, row.setting, row.quantity): line for line, row in numbered},
-        by_scene={name: list(group) for name, group in groupby(numbered, key=lambda pair: pair[1].scene)},
-        # drawn by our own figure code, titles escaped by the SVG writer
-        figures={page.name: Markup(page.figure) for page in summary.pages if page.figure},
+        views=views,
+        engines=[engine for engine in _engines(cell.row for view in views for cell in view.cells)],
+        failing=failing,
+        lazy=len(views) > ALL_OPEN,
+        figures={page.name: Markup(page.figure) for page in summary.pages if page.figure},  # drawn by our own code
+        cost_figure=Markup(costs) if costs else None,
+        no_pictures=no_pictures,
+        sections=sections,
         tolerances=TOLERANCES,
         statement=STATEMENT,
         used=used,
-        csv=csv,
+        csv=csv.decode("ascii"),
+        light=Markup(declarations(dark=False)),
+        dark=Markup(declarations(dark=True)),
     )
+
+
+def share(value: float) -> str:
+    """error/allowed in two digits."""
+    if math.isinf(value):
+        return "∞"
+    return "0" if value == 0.0 else "<0.01" if value < 0.01 else f"{value:.2f}" if value < 10.0 else f"{value:.1e}"
+
+
+def _view(page: Page, first_line: int, pictures: Mapping[str, str]) -> SceneView:
+    cells = [Cell(line, row) for line, row in enumerate(page.rows, first_line)]
+    by_place: dict[tuple[str, str], Cell] = {}
+    worst: dict[str, Cell] = {}
+    for cell in cells:
+        for places, place in ((by_place, (cell.row.quantity, cell.row.engine)), (worst, cell.row.engine)):
+            held: dict[Any, Cell] = places
+            if place not in held or cell.used > held[place].used:
+                held[place] = cell
+    found = {cell.row.quantity for cell in cells}
+    quantities = [name for name in ORDER if name in found] + sorted(found.difference(ORDER))
+    engines = _engines(cell.row for cell in cells)
+    return SceneView(page, cells, engines, quantities, by_place, worst, pictures.get(page.name))
+
+
+def _engines(rows: Any) -> list[str]:
+    """Engines by name, the formulas (their identities) last."""
+    names = [name for name, _ in groupby(sorted(row.engine for row in rows))]
+    return sorted(names, key=lambda name: (name == "formulas", name))
