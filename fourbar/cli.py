@@ -44,17 +44,18 @@ def classify(lengths: tuple[str, ...]) -> None:
 
     Bare numbers are metres; "30 cm" works too.
     """
-    from fourbar.grashof import grashof
-    from fourbar.linkage import Bar, FourBar
+    from fourbar.linkage import BAR_NAMES, Bar, FourBar
+    from fourbar.linkage_type import classify as type_of
 
     d, a, b, c = _lengths(lengths)
     linkage = FourBar(d, Bar(a), Bar(b), Bar(c))
-    found = grashof(linkage)
+    found = type_of(linkage)
     relation = "<" if found.surplus > 0.0 else ">" if found.surplus < 0.0 else "="
-    shortest, longest = min(linkage.lengths), max(linkage.lengths)
-    rest = sum(linkage.lengths) - shortest - longest
+    outer = min(linkage.lengths) + max(linkage.lengths)
+    turning = ", ".join(BAR_NAMES[number] for number in found.turning) or "none"
     click.echo(found.name)
-    click.echo(f"s + l = {shortest + longest:.6g} m {relation} p + q = {rest:.6g} m (shortest + longest, other two)")
+    click.echo(f"s + l = {outer:.6g} m {relation} p + q = {sum(linkage.lengths) - outer:.6g} m")
+    click.echo(f"bars that turn fully: {turning}")
 
 
 @group.command()

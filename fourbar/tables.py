@@ -97,17 +97,20 @@ def _blank(solution: Solution) -> list[None]:
 def heading(scene: Scene, solution: Solution) -> list[str]:
     """The lines above the table: what was asked, and how many of the positions have an answer."""
     d, a, b, c = scene.linkage.lengths
+    drive = f"drive on bar {scene.drive_bar} ({BAR_NAMES[scene.drive_bar]})"
+    if scene.motion.free is not None:
+        drive = "released, no drive"
     branch = "open" if scene.motion.branch == OPEN else "crossed"
     lines = [
         f"ground {d:.6g} m, input {a:.6g} m, coupler {b:.6g} m, output {c:.6g} m",
-        f"{branch} branch; drive on bar {scene.drive_bar} ({BAR_NAMES[scene.drive_bar]})",
+        f"{branch} branch; {drive}",
     ]
     counts = np.bincount(solution.status_code, minlength=len(STATUS_NAMES))
     parts = [
         f"{count} {name.replace('_', ' ')}" for name, count in zip(STATUS_NAMES, counts.tolist(), strict=True) if count
     ]
     lines.append(f"{len(solution)} position{'s' if len(solution) != 1 else ''}: " + ", ".join(parts))
-    if solution.torque is not None and np.isfinite(solution.torque).any():
+    if scene.motion.free is None and solution.torque is not None and np.isfinite(solution.torque).any():
         worst = int(np.nanargmax(np.abs(solution.torque)))
         where = math.degrees(solution.theta_2[worst])
         lines.append(f"largest torque {solution.torque[worst]:.6g} N m at theta_2 = {where:.6g} deg")
@@ -117,10 +120,14 @@ def heading(scene: Scene, solution: Solution) -> list[str]:
 def columns(scene: Scene, solution: Solution, *, degrees: bool = True) -> dict[str, list[str]]:
     """The columns of the table, most wanted first: heading with unit -> cells."""
     unit, factor = ("deg", 180.0 / math.pi) if degrees else ("rad", 1.0)
-    shown: dict[str, list[str]] = {f"theta_2\n{unit}": _cells(solution.theta_2 * factor, "angle")}
+    shown: dict[str, list[str]] = {}
+    if solution.time is not None:
+        shown["time\ns"] = _cells(solution.time)
+    shown[f"theta_2\n{unit}"] = _cells(solution.theta_2 * factor, "angle")
     if solution.torque is not None:
-        shown[f"T{scene.drive_bar}\nN m"] = _cells(solution.torque)
-        shown["digits\nof T"] = _digits(solution)
+        if scene.motion.free is None:  # released, it has no drive: its torque is rounding
+            shown[f"T{scene.drive_bar}\nN m"] = _cells(solution.torque)
+            shown["digits\nof T"] = _digits(solution)
         for name in FORCES:
             shown[f"|{name}|\nN"] = _cells(np.hypot(*getattr(solution, name).T))
     for name in ("theta_3", "theta_4"):

@@ -106,6 +106,14 @@ def test_positions_only(tmp_path: Path, run: Fourbar) -> None:
     assert rows[0]["torque"] == "" and rows[0]["theta_2"] == "1.0"
 
 
+def test_a_free_motion_has_time_and_no_drive(tmp_path: Path, run: Fourbar) -> None:
+    released = fourbar.Motion(0.5, 0.0, free=fourbar.Free(0.5, 4))
+    save(crank_rocker(motion=released), tmp_path / "scene.toml")
+    assert strict(run("analyze", tmp_path / "scene.toml", "--json")[1])["time"] == [0.0, 0.125, 0.25, 0.375, 0.5]
+    out = run("analyze", tmp_path / "scene.toml")[1]
+    assert "released, no drive" in out and "time" in out and "T2" not in out and "torque" not in out
+
+
 def test_csv_has_the_same_numbers(run: Fourbar) -> None:
     file = MODELS / "crank_rocker.toml"
     code, out, err = run("analyze", file, "--csv")
@@ -183,8 +191,8 @@ CLASSES = [
     ("0.3 0.24 0.1 0.22", "double rocker"),
     ("0.3 0.22 0.25 0.1", "rocker-crank"),
     ("20cm 48cm 55cm 20cm", "triple rocker"),
-    ("0.3 0.1 0.2 0.2", "change point"),  # 0.3 + 0.1 and 0.2 + 0.2 differ as doubles
-    ("0.1 0.3 0.1 0.3", "change point"),
+    ("0.3 0.1 0.2 0.2", "change-point crank-rocker"),  # 0.3 + 0.1 and 0.2 + 0.2 differ as doubles
+    ("0.1 0.3 0.1 0.3", "parallelogram"),
 ]
 
 
