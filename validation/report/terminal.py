@@ -1,13 +1,11 @@
 """The table at the end of a run."""
 
 import math
+from itertools import groupby
 from pathlib import Path
 
 from validation.report.markdown import number
 from validation.report.summary import Summary
-
-WIDE = 100
-"""Columns of a terminal from which the position and its condition are shown too."""
 
 
 def table(summary: Summary, out: Path) -> None:
@@ -18,31 +16,39 @@ def table(summary: Summary, out: Path) -> None:
     from rich.table import Table
 
     console = Console()
-    wide = console.width >= WIDE
     shown = Table(title="worst row of each scene and engine", box=SIMPLE_HEAD, pad_edge=False)
-    shown.add_column("scene", overflow="fold")
-    for heading in ("engine", "worst"):
+    for heading in ("scene and engine", "worst"):
         shown.add_column(heading, no_wrap=True)
-    for heading in ("error", "allowed", "used", *(("theta_2", "condition") if wide else ())):
+    for heading in ("error", "allowed", "used", "at deg"):
         shown.add_column(heading, justify="right", no_wrap=True)
-    for w in summary.worst:
-        style = "" if w.failed == 0 else "bold red"
-        shown.add_row(
-            escape(w.row.scene),
-            escape(w.row.engine),
-            escape(w.row.quantity),
-            number(w.row.error),
-            number(w.row.allowed),
-            f"{w.used:.2f}",
-            *((f"{math.degrees(w.row.theta_2):.2f} deg", number(w.row.condition)) if wide else ()),
-            style=style,
-        )
+    for scene, group in groupby(summary.worst, key=lambda w: w.row.scene):
+        shown.add_row(f"[bold]{escape(plain(scene))}[/]")
+        for w in group:
+            shown.add_row(
+                f"  {escape(w.row.engine)}",
+                escape(w.row.quantity),
+                short(w.row.error),
+                short(w.row.allowed),
+                f"{w.used:.2f}",
+                f"{math.degrees(w.row.theta_2):.1f}",
+                style="" if w.failed == 0 else "bold red",
+            )
     console.print(shown)
     for row in summary.failures[:20]:
         console.print(
-            f"[bold red]fails[/] {escape(row.scene)} {escape(row.engine)} {escape(row.quantity)}: "
-            f"error {number(row.error)}, allowed {number(row.allowed)}: {escape(row.reason)}"
+            f"[bold red]fails[/] {escape(plain(row.scene))} {escape(row.engine)} {escape(row.quantity)}: "
+            f"error {number(row.error)}, allowed {number(row.allowed)}: {escape(plain(row.reason))}"
         )
     for engine, reason, count in summary.refusals:
-        console.print(f"left out in {count} scene(s): {escape(engine)}: {escape(reason)}")
-    console.print(f"[bold]{escape(summary.verdict)}[/]; written to {escape(str(out))}")
+        console.print(f"left out in {count} scene(s): {escape(engine)}: {escape(plain(reason))}")
+    console.print(f"[bold]{escape(summary.verdict)}[/]; written to {escape(plain(str(out)))}")
+
+
+def short(value: float) -> str:
+    """Two digits: the table fits 80 columns, results.csv has them all."""
+    return "-" if math.isnan(value) else f"{value:.1e}"
+
+
+def plain(text: str) -> str:
+    """Text without the control characters that a terminal would obey."""
+    return "".join(character if character.isprintable() else "?" for character in text)
