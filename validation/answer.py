@@ -47,3 +47,23 @@ class Engine(Protocol):
 
     def answer(self, scene: Scene, command: Command) -> Answer:
         """Its answer; it is given the description and the command, never a result of the formulas."""
+
+
+@dataclass(slots=True, eq=False)
+class Released:
+    """A free motion as one engine integrated it, at the times asked for."""
+
+    engine: str
+    setting: str
+    theta_2: Array
+    """(n,), rad, continuous."""
+    omega_2: Array
+    energy: Array
+    """Kinetic and potential energy, (n,), J."""
+    refusal: str | None = None
+    """A declared limit that the scene meets; then the arrays are empty."""
+
+    @classmethod
+    def refused(cls, engine: str, setting: str, reason: str) -> "Released":
+        """No motion, and why."""
+        return cls(engine, setting, np.empty(0), np.empty(0), np.empty(0), reason)

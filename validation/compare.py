@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,9 +11,10 @@ from fourbar.scene import Scene
 from fourbar.solution import OK, Solution
 from validation.answer import Answer
 from validation.results import AGREES, DEGRADED, FAILS, REFUSES, Row
+from validation.reversals import reversing
 from validation.scales import divisor, magnitude, of_length, yardstick
 from validation.tolerance import DEGRADED as TIMES_PREDICTED
-from validation.tolerance import EPS, IDENTITY, NOTHING_TO_TELL, SIMULATED, Array, Tolerance, condition_of
+from validation.tolerance import EPS, FORCES, IDENTITY, NOTHING_TO_TELL, SIMULATED, Array, Tolerance, condition_of
 
 Mask = NDArray[np.bool_]
 
@@ -84,10 +86,15 @@ def compare(
             rows.append(row(quantity, FAILS, "no answer"))
             continue
         where = judged & _answerable(quantity, scene, formulas, tolerance)
+        jumping = reversing(scene, formulas, tolerance.factor) & where if quantity in FORCES else ~judged & judged
+        where &= ~jumping
         if predicted is not None:
             rows.append(_judge_predicted(row, quantity, scene, formulas, theirs, where, tolerance, predicted[quantity]))
         else:
             rows.append(_judge(row, quantity, scene, formulas, theirs, where, tolerance))
+        if jumping.any():
+            note = f"; {np.count_nonzero(jumping)} positions at which dry friction reverses not judged"
+            rows[-1] = replace(rows[-1], reason=rows[-1].reason + note)
     rows += [row("watch", FAILS, alarm) for alarm in answer.alarms]
     return rows
 
@@ -182,7 +189,8 @@ def _judge_predicted(
     allowed = np.maximum(tolerance.factor, TIMES_PREDICTED * expected)
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = np.where(where, error / allowed, -1.0)
-    ratio[expected >= 1.0] = np.minimum(ratio[expected >= 1.0], 1.0)  # first order says no more than that no digit is left
+    lost = expected >= 1.0  # first order says no more than that no digit is left
+    ratio[lost] = np.minimum(ratio[lost], 1.0)
     ratio[where & ~np.isfinite(error)] = np.inf
     beyond = where & ~(error <= tolerance.factor)
     index = int(np.argmax(np.where(beyond, ratio, -1.0) if beyond.any() else ratio))

@@ -55,7 +55,7 @@ class BallArithmetic:
             assembled=assembled,
             quantities=out,
             shared="the description, theta_2, omega_2, alpha_2 and the branch",
-            own="closure as a complex quadratic, linear velocity and acceleration equations, thirteen Newton-Euler equations",
+            own="closure as a complex quadratic, linear speeds and accelerations, thirteen Newton-Euler equations",
         )
 
 

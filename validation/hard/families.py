@@ -114,7 +114,7 @@ def bar_ratio(*, exponents: range = range(-6, 0)) -> Scenes:
 
 def with_bars(scene: Scene, **bars: Bar) -> Scene:
     """The scene with other bars."""
-    return replace(scene, linkage=replace(scene.linkage, **bars))
+    return replace(scene, linkage=replace(scene.linkage, **bars))  # type: ignore[arg-type]
 
 
 def mass_ratio(*, exponents: tuple[int, ...] = (-6, -3, 3, 6)) -> Scenes:

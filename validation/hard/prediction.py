@@ -64,13 +64,13 @@ def predicted_error(scene: Scene, at: Command, quantities: Iterable[str], reach:
         if moved is None:
             continue
         lost = ROUNDINGS * EPS * moved.data["theta_4"] >= FIRST_ORDER * float(moved.data["condition"])
-        for name in result:
+        for name, errors in result.items():
             if lost and not name.startswith("theta"):
-                result[name][i] = math.inf
+                errors[i] = math.inf
                 continue
             axes = ("_x", "_y") if name in VECTORS else ("",)
             parts = [moved.data.get(name + axis, math.inf) + reach * moved.loop.get(name + axis, 0.0) for axis in axes]
-            result[name][i] = ROUNDINGS * EPS * math.hypot(*parts)
+            errors[i] = ROUNDINGS * EPS * math.hypot(*parts)
     return result
 
 

@@ -101,7 +101,7 @@ class Watch:
         self._most = dict.fromkeys(LIMITS, 0.0)
 
     def look(self, loop: ClosedLoop, torque: float, loop_force: Array) -> dict[str, float]:
-        """Take in a state that was forwarded, the drive's torque and F43 as read; the error to expect of each quantity."""
+        """Take in a forwarded state, the drive's torque and F43 as read; the error to expect of each quantity."""
         q, v, a = (np.array(field) for field in (loop.data.qpos, loop.data.qvel, loop.data.qacc))
         seen = self._motion(q, v, a)
         power = torque * float(self.e_drive @ v)
@@ -125,7 +125,7 @@ class Watch:
         return expected
 
     def _keep(self, name: str, value: float, size: float) -> None:
-        self.worst[name] = max(self.worst[name], value) if value == value else math.inf
+        self.worst[name] = max(self.worst[name], value) if math.isfinite(value) else math.inf
         self._most[name] = max(self._most[name], size)
 
     def evidence(self) -> dict[str, float]:

@@ -1,0 +1,180 @@
+"""Free motions: every engine against the exact solution where there is one, otherwise against the formulas.
+
+An engine's error is predicted by itself: it is asked twice, with its step and with twice its step, and
+the difference is what the coarser motion errs by. The finer one must not err by more than ten times that.
+"""
+
+import math
+import time
+from collections.abc import Callable
+from importlib import import_module
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from fourbar.effects import Gravity
+from fourbar.linkage import MOVING_BARS
+from fourbar.scene import Scene, solve
+from validation.answer import Array, Released
+from validation.judge import Record, Timing, breakdown
+from validation.results import AGREES, DEGRADED, FAILS, REFUSES, Row
+from validation.tolerance import DEGRADED as TIMES_PREDICTED
+
+ENGINES = {
+    "mujoco-forward": ("validation.engines.mujoco.released:MujocoForward", 1e-3),
+    "pinocchio-forward": ("validation.engines.pinocchio_forward:PinocchioForward", 2e-3),
+}
+"""Adapter and step (s) of each engine that integrates by itself."""
+FULL = {"theta_2": 1e-9, "omega_2": 1e-8, "energy": 1e-10}
+"""Errors (rad, of the greatest speed, of the greatest energy) at which a free motion agrees: the formulas
+hold theta_2 to 1e-9 rad over 5 s; a motion of 100 s may amplify that by its duration, so 5 s is the unit."""
+UNIT = 5.0
+
+
+class Pendulum(NamedTuple):
+    """A parallelogram that stays parallel is a pendulum: J phi'' = W sin phi, phi from the upright."""
+
+    J: float
+    W: float
+    phi_0: float
+    omega_0: float
+
+    def motion(self, times: Array) -> tuple[Array, Array]:
+        """phi and phi' (rad, rad/s) of a pendulum that turns over, by Jacobi's elliptic functions."""
+        from scipy.special import ellipj, ellipk, ellipkinc
+
+        k, sense = self.W / self.J, math.copysign(1.0, self.omega_0)
+        bottom = math.sqrt(self.omega_0**2 + 2.0 * k * (1.0 + math.cos(self.phi_0)))  # speed at the lowest point
+        m = 4.0 * k / bottom**2
+        # half the angle from the lowest point is the amplitude; it starts at phi_0 - pi, seen along the motion
+        start = ellipkinc(0.5 * (sense * self.phi_0 - math.pi), m)
+        turns = 0.5 * bottom * times + start
+        whole = np.round(turns / (2.0 * ellipk(m)))  # the amplitude grows by pi in every 2 K
+        _, _, dn, amplitude = ellipj(turns - whole * 2.0 * ellipk(m), m)
+        return sense * (2.0 * (amplitude + math.pi * whole) + math.pi), sense * bottom * dn
+
+
+def as_pendulum(scene: Scene) -> Pendulum | None:
+    """The pendulum that the scene is, or None; it must turn over, or none of this is an answer."""
+    d, a, b, c = scene.linkage.lengths
+    effects = scene.effects
+    if not (a == c and b == d and scene.motion.through == "follow" and not scene.loads and len(effects) == 1):
+        return None
+    down = effects[0]
+    if not (isinstance(down, Gravity) and math.isclose(down.angle, -math.pi / 2) and scene.motion.omega_2):
+        return None
+    J = W = 0.0
+    for number in MOVING_BARS:
+        bar = scene.linkage.bar(number)
+        assert bar.centre is not None and bar.inertia is not None
+        r, phi = bar.centre
+        if phi != 0.0:
+            return None
+        J += bar.mass * a * a if number == 3 else bar.inertia + bar.mass * r * r
+        W += bar.mass * down.magnitude * (a if number == 3 else r)
+    phi_0 = float(np.asarray(scene.motion.theta_2)) - math.pi / 2
+    pendulum = Pendulum(J, W, phi_0, scene.motion.omega_2)
+    over_the_top = scene.motion.omega_2**2 > 2.0 * W / J * (1.0 - math.cos(phi_0))
+    return pendulum if over_the_top else None
+
+
+def judge_released(record: Record) -> Record:
+    """Rows of the formulas and of every forward engine for a scene with a free motion."""
+    free = record.scene.motion.free
+    assert free is not None
+    times = np.linspace(0.0, free.duration, free.steps + 1)
+    begin = time.perf_counter()
+    solution = solve(record.scene)
+    record.timings.append(Timing(record.name, "formulas", "exact", len(times), time.perf_counter() - begin))
+    record.solution = solution
+    assert solution.omega_2 is not None
+    pendulum = as_pendulum(record.scene)
+    truth: tuple[Array, Array] = (solution.theta_2, solution.omega_2)
+    if pendulum is not None:
+        phi, rate = pendulum.motion(times)
+        truth = (phi + math.pi / 2, rate)
+        ours = Released("formulas", "exact", solution.theta_2, solution.omega_2, np.zeros(len(times)))
+        record.rows += _rows(record, ours, None, truth, free.duration)
+    for name, (adapter, step) in ENGINES.items():
+        try:
+            asked = _adapter(adapter)
+            begin = time.perf_counter()
+            fine = asked(step).release(record.scene, times)
+            seconds = time.perf_counter() - begin
+            coarse = None if fine.refusal else asked(2.0 * step).release(record.scene, times)
+        except Exception as error:  # whatever an engine raises is its own failure, told in its own row
+            record.rows.append(breakdown(record.name, name, error))
+            continue
+        record.timings.append(Timing(record.name, fine.engine, fine.setting, len(times), seconds))
+        if fine.refusal is not None:
+            record.left_out.append(f"{fine.engine}: {fine.refusal}")
+        record.rows += _rows(record, fine, coarse, truth, free.duration)
+    return record
+
+
+def _adapter(adapter: str) -> Callable[[float], Any]:
+    module, _, name = adapter.partition(":")
+    return getattr(import_module(module), name)  # type: ignore[no-any-return]
+
+
+def _rows(
+    record: Record, fine: Released, coarse: Released | None, truth: tuple[Array, Array], duration: float
+) -> list[Row]:
+    if fine.refusal is not None:
+        nan = math.nan
+        return [Row(record.name, fine.engine, fine.setting, "all", nan, nan, True, REFUSES, fine.refusal, nan, nan)]
+    n = min(len(fine.theta_2), len(truth[0]))
+    if n < len(truth[0]):
+        nan = math.nan
+        return [Row(record.name, fine.engine, fine.setting, "all", nan, nan, False, FAILS, "it stopped", nan, nan)]
+    speed = float(np.abs(truth[1]).max())
+    sizes = {"theta_2": 1.0, "omega_2": speed, "energy": float(np.abs(fine.energy).max()) or 1.0}
+
+    def errors(of: Released) -> dict[str, Array]:
+        return {
+            "theta_2": np.abs(of.theta_2 - truth[0]),
+            "omega_2": np.abs(of.omega_2 - truth[1]),
+            "energy": np.abs(of.energy - of.energy[0]),
+        }
+
+    def differences(one: Released, other: Released) -> dict[str, Array]:
+        return {
+            "theta_2": np.abs(one.theta_2 - other.theta_2),
+            "omega_2": np.abs(one.omega_2 - other.omega_2),
+            "energy": np.abs((one.energy - one.energy[0]) - (other.energy - other.energy[0])),
+        }
+
+    found = errors(fine)
+    predicted = {name: np.zeros(len(error)) for name, error in found.items()}
+    if coarse is not None:
+        predicted = differences(fine, coarse)
+    rows = []
+    for name, error in found.items():
+        if name == "energy" and coarse is None:
+            continue  # the formulas integrate the energy equation itself; their drift is part of their own test
+        relative, expected = error / sizes[name], float(np.nanmax(predicted[name])) / sizes[name]
+        worst = int(np.argmax(np.where(np.isnan(relative), np.inf, relative)))
+        full = FULL[name] * max(1.0, duration / UNIT)
+        allowed = max(full, TIMES_PREDICTED * expected)
+        if relative[worst] <= full:
+            verdict, reason = AGREES, f"a free motion of {duration:g} s"
+        elif relative[worst] <= allowed and math.isfinite(expected):
+            verdict, reason = DEGRADED, f"{relative[worst]:.1e} of {expected:.1e} predicted from twice the step"
+        else:
+            verdict, reason = FAILS, f"{relative[worst]:.1e} where {expected:.1e} was predicted"
+        rows.append(
+            Row(
+                record.name,
+                fine.engine,
+                fine.setting,
+                name,
+                float(relative[worst]),
+                allowed,
+                verdict != FAILS,
+                verdict,
+                reason,
+                float(fine.theta_2[worst]),
+                1.0,
+            )
+        )
+    return rows
