@@ -9,8 +9,10 @@ from typing import Any
 
 import click
 
-from fourbar.errors import InputError
+from fourbar.errors import FourBarError, InputError
+from fourbar.mjcf import mjcf
 from fourbar.writing import write_text
+from validation.engines.mujoco.picture import pictures
 from validation.judge import WITNESSES, Page, Witness
 from validation.machine import versions
 from validation.regression.command import output_options, told
@@ -62,9 +64,21 @@ def run(
         write_about(about([witness.name for witness in witnesses], suite.fingerprint()), out)
         write_text(out / "timings.csv", timings_csv(store.pages(len(chunks))))
         write_text(out / "report.md", markdown(summary))
-        write_text(out / "report.html", html(summary, first_lines))
+        drawn, why_not = mjcf_pictures(suite) if draw else ({}, "")
+        write_text(out / "report.html", html(summary, first_lines, pictures=drawn, no_pictures=why_not))
         store.finish()
     yield summary
+
+
+def mjcf_pictures(suite: Suite) -> tuple[dict[str, str], str]:
+    """MuJoCo's own pictures of the scenes' MJCF, base64 PNGs by name, and the reason where there are none."""
+    texts = {}
+    for index in range(len(suite)):
+        try:
+            texts[suite.name(index)] = mjcf(suite.scene(index))
+        except FourBarError:  # bars without mass, a motion law: the engines' own rows say so
+            continue
+    return pictures(texts)
 
 
 def timings_csv(pages: Iterator[Page]) -> str:

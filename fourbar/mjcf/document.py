@@ -9,6 +9,7 @@ import numpy as np
 from fourbar.errors import InputError, LimitError, NotAssembledError
 from fourbar.kinematics import Array
 from fourbar.linkage import MOVING_BARS, FourBar
+from fourbar.mjcf.appearance import add_appearance
 from fourbar.mjcf.model import Model, carriable, text
 from fourbar.mjcf.settings import RECIPE, Run, Settings
 from fourbar.mobility import default_range
@@ -56,9 +57,7 @@ def mjcf(scene: Scene, settings: Settings = RECIPE, *, keyframe: bool = True) ->
     root.append(ET.Comment(COMMENT))
     ET.SubElement(root, "compiler", angle="radian", autolimits="true")
     model.add_option(root, timestep)
-    size = sum(scene.linkage.lengths)
-    x, y = model.O4[0] / 2.0, model.O4[1] / 2.0
-    ET.SubElement(root, "statistic", extent=text(size), center=text(x, y, 0.0))
+    add_appearance(root, scene.linkage)
     model.add_bodies(root, armature)
     model.add_load_sites(root)
     model.add_closure(root, timestep)

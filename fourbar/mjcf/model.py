@@ -11,6 +11,7 @@ from fourbar.effects.spring import Point
 from fourbar.errors import InputError, LimitError
 from fourbar.kinematics import centre_in_bar
 from fourbar.linkage import BAR_NAMES, FIRST_PIN, MOVING_BARS, PINS, FourBar
+from fourbar.mjcf.appearance import add_camera
 from fourbar.mjcf.settings import Settings
 
 FLOOR = 1e-15
@@ -21,7 +22,7 @@ SLIP_DAMPING = 1e6
 it makes nothing stiff; measured, a reversal is then as exact as any other position."""
 NEVER_NEEDED = ("contact", "limit", "island", "sensor", "midphase")
 """Features that a closed loop of bars never uses."""
-THICKNESS = 0.015
+THICKNESS = 0.02
 """Radius of a bar's capsule, as a part of the longest bar."""
 
 
@@ -101,10 +102,7 @@ class Model:
     def add_bodies(self, root: ET.Element, flywheel: float) -> None:
         """ground > (input > coupler), output; light and camera face the plane."""
         world = ET.SubElement(root, "worldbody")
-        x, y = self.O4[0] / 2.0, self.O4[1] / 2.0
-        size = sum(self.linkage.lengths)
-        ET.SubElement(world, "light", name="light", pos=text(x, y, size), dir="0 0 -1", directional="true")
-        ET.SubElement(world, "camera", name="plane", pos=text(x, y, 1.2 * size), fovy="45")
+        add_camera(world, self.linkage)
         ground = ET.SubElement(world, "body", name="ground")
         ET.SubElement(ground, "inertial", pos="0 0 0", mass="1", diaginertia="1 1 1")
         self._add_capsule(ground, 1, self.linkage.ground, -2.0 * self.radius)

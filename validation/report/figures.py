@@ -13,6 +13,7 @@ from validation.judge import Record
 from validation.report.colours import ALLOWED, BAND, GRID, INK, PAPER, style_of
 from validation.report.drawing import drawing
 from validation.report.svg import svg_text
+from validation.reversals import Reversal, broken
 from validation.scales import divisor, magnitude, yardstick
 from validation.tolerance import EPS, EQUIVALENCE, SIMULATED, Array, condition_of
 
@@ -59,7 +60,7 @@ def _picture(quantity: str, record: Record, solution: Solution, answers: list[An
     FigureCanvasSVG(figure)
     panels = figure.subplots(1 + len(groups), 1, sharex=True, height_ratios=[1.9, *[1.0] * len(groups)], squeeze=False)
     axes = list(panels[:, 0])
-    _draw_values(axes[0], quantity, solution, [*exact, *simulated])
+    _draw_values(axes[0], quantity, solution, [*exact, *simulated], record.reversals)
     for below, group in zip(axes[1:], groups, strict=True):
         _draw_errors(below, quantity, record, solution, group)
         below.set_ylabel("error / scale" if quantity in TORQUE_AND_FORCE else "error (rad)", fontsize=7.5)
@@ -73,11 +74,17 @@ def _picture(quantity: str, record: Record, solution: Solution, answers: list[An
     return svg_text(figure, f"{record.name} {quantity}")
 
 
-def _draw_values(axes: "Axes", quantity: str, solution: Solution, answers: list[Answer]) -> None:
-    """The formulas as a band, and each engine's marks on it at positions of its own."""
+def _draw_values(
+    axes: "Axes", quantity: str, solution: Solution, answers: list[Answer], jumps: list[Reversal]
+) -> None:
+    """The formulas as a band, broken at jumps, and each engine's marks on it at positions of its own."""
     good = solution.status_code == OK
     ours = np.where(good, _plain(quantity, getattr(solution, quantity)), np.nan)
-    axes.plot(_base(solution, None), ours, color=BAND, lw=5, solid_capstyle="butt")
+    base, line = _base(solution, None), ours
+    if jumps:
+        theta_2, line = broken(solution.theta_2, ours, jumps, lambda side: _plain(quantity, getattr(side, quantity)))
+        base = np.degrees(theta_2)
+    axes.plot(base, line, color=BAND, lw=5, solid_capstyle="butt")
     for turn, answer in enumerate(answers):
         theirs = _plain(quantity, answer.quantities[quantity])
         phase = (turn + 0.5) / (len(answers) * MARKS)

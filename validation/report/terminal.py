@@ -4,6 +4,7 @@ import math
 from itertools import groupby
 from pathlib import Path
 
+from fourbar.exits import printable
 from validation.report.markdown import number
 from validation.report.summary import Summary
 
@@ -22,7 +23,7 @@ def table(summary: Summary, out: Path) -> None:
     for heading in ("error", "allowed", "used", "at deg"):
         shown.add_column(heading, justify="right", no_wrap=True)
     for scene, group in groupby(summary.worst, key=lambda w: w.row.scene):
-        shown.add_row(f"[bold]{escape(plain(scene))}[/]")
+        shown.add_row(f"[bold]{escape(printable(scene))}[/]")
         for w in group:
             shown.add_row(
                 f"  {escape(w.row.engine)}",
@@ -36,19 +37,14 @@ def table(summary: Summary, out: Path) -> None:
     console.print(shown)
     for row in summary.failures[:20]:
         console.print(
-            f"[bold red]fails[/] {escape(plain(row.scene))} {escape(row.engine)} {escape(row.quantity)}: "
-            f"error {number(row.error)}, allowed {number(row.allowed)}: {escape(plain(row.reason))}"
+            f"[bold red]fails[/] {escape(printable(row.scene))} {escape(row.engine)} {escape(row.quantity)}: "
+            f"error {number(row.error)}, allowed {number(row.allowed)}: {escape(printable(row.reason))}"
         )
     for engine, reason, count in summary.refusals:
-        console.print(f"left out in {count} scene(s): {escape(engine)}: {escape(plain(reason))}")
-    console.print(f"[bold]{escape(summary.verdict)}[/]; written to {escape(plain(str(out)))}")
+        console.print(f"left out in {count} scene(s): {escape(engine)}: {escape(printable(reason))}")
+    console.print(f"[bold]{escape(summary.verdict)}[/]; written to {escape(printable(str(out)))}")
 
 
 def short(value: float) -> str:
     """Two digits: the table fits 80 columns, results.csv has them all."""
     return "-" if math.isnan(value) else f"{value:.1e}"
-
-
-def plain(text: str) -> str:
-    """Text without the control characters that a terminal would obey."""
-    return "".join(character if character.isprintable() else "?" for character in text)

@@ -1,0 +1,59 @@
+"""How the generated file looks: camera facing the plane, soft light, plain background; nothing that acts."""
+
+import math
+from typing import Any, NamedTuple
+from xml.etree import ElementTree as ET
+
+from fourbar.linkage import FourBar
+
+FOVY = 45.0
+"""Vertical field of view, deg."""
+ASPECT = 4.0 / 3.0
+"""Narrowest window that shows the whole linkage."""
+ROOM = 1.15
+"""Free room around it."""
+
+
+class Frame(NamedTuple):
+    """What the camera sees: the box in which pins A and B move."""
+
+    x: float
+    y: float
+    half: float
+    """Half the height of the picture, m."""
+
+    @property
+    def distance(self) -> float:
+        """Of the camera from the plane, m."""
+        return self.half / math.tan(math.radians(0.5 * FOVY))
+
+
+def frame(linkage: FourBar) -> Frame:
+    """The box around the circle of A about O2 and of B about O4: no position leaves it."""
+    d, a, _, c = linkage.lengths
+    x, y = d * math.cos(linkage.ground_angle), d * math.sin(linkage.ground_angle)
+    left, right = min(-a, x - c), max(a, x + c)
+    low, high = min(-a, y - c), max(a, y + c)
+    half = ROOM * max(0.5 * (high - low), 0.5 * (right - left) / ASPECT)
+    return Frame(0.5 * (left + right), 0.5 * (low + high), half)
+
+
+def add_appearance(root: ET.Element, linkage: FourBar) -> None:
+    """Extent and free camera of the viewer, light, background."""
+    seen = frame(linkage)
+    ET.SubElement(root, "statistic", extent=repr(seen.distance / 1.5), center=f"{seen.x!r} {seen.y!r} 0")
+    visual = ET.SubElement(root, "visual")
+    # the viewer's free camera starts at 1.5 extents from the centre; -90 deg looks straight down on the plane
+    ET.SubElement(visual, "global", azimuth="90", elevation="-90", fovy=f"{FOVY:g}", offwidth="1280", offheight="960")
+    ET.SubElement(visual, "headlight", ambient=".55 .55 .55", diffuse=".35 .35 .35", specular=".1 .1 .1")
+    ET.SubElement(visual, "rgba", haze="1 1 1 1")
+    sky: dict[str, Any] = {"rgb1": ".95 .96 .98", "rgb2": ".95 .96 .98", "width": "32", "height": "192"}
+    ET.SubElement(ET.SubElement(root, "asset"), "texture", type="skybox", builtin="flat", **sky)
+
+
+def add_camera(world: ET.Element, linkage: FourBar) -> None:
+    """The camera `plane`, and a light beside it."""
+    seen = frame(linkage)
+    place = f"{seen.x!r} {seen.y!r} {seen.distance!r}"
+    ET.SubElement(world, "light", name="light", pos=place, dir="0 0 -1", directional="true", castshadow="false")
+    ET.SubElement(world, "camera", name="plane", pos=place, fovy=f"{FOVY:g}")
