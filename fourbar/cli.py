@@ -1,7 +1,6 @@
 """The command `fourbar`; what a command needs is imported when it is called."""
 
 import io
-import os
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -11,12 +10,12 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from fourbar import __version__
-from fourbar.errors import DependencyError, FourBarError, InputError, NotAssembledError
+from fourbar.errors import InputError, NotAssembledError
+from fourbar.exits import printable, run
 
 if TYPE_CHECKING:
     from fourbar.scene import Scene
 
-HOLDS, BAD_INPUT, BROKEN, INTERRUPTED = 0, 2, 3, 130
 """Exit statuses; 1 is kept for comparisons that fail, which are not made here."""
 MOST_POSITIONS = 1_000_000
 """Positions that `analyze` prints: about a gigabyte of text."""
@@ -222,7 +221,7 @@ def _table_text(scene: "Scene", solution: Any, width: int | None, degrees: bool)
     text = io.StringIO()
     console = Console(file=text, width=width or 10_000, color_system=None)
     if scene.title:
-        console.print(Text(_printable(scene.title)))
+        console.print(Text(printable(scene.title)))
     for line in tables.heading(scene, solution):
         console.print(Text(line))
     console.print(shown)
@@ -238,35 +237,4 @@ def main(arguments: list[str] | None = None) -> None:
 
 def status(arguments: list[str] | None = None) -> int:
     """Run a command; what goes wrong becomes one line on standard error and an exit status."""
-    given = sys.argv[1:] if arguments is None else arguments
-    if isinstance(sys.stdout, io.TextIOWrapper):
-        sys.stdout.reconfigure(errors="replace")  # a terminal that has no Greek still gets its table
-    try:
-        group.main(args=given, prog_name="fourbar", standalone_mode=False)
-        return HOLDS
-    except SystemExit:
-        return HOLDS  # click leaves with 1 where the reader of a pipe has gone; it has what it wants
-    except (click.exceptions.Abort, KeyboardInterrupt):
-        return _say("interrupted", INTERRUPTED)
-    except click.ClickException as error:
-        return _say(error.format_message(), BAD_INPUT)
-    except DependencyError as error:
-        return _say(str(error), BROKEN)
-    except FourBarError as error:
-        return _say(str(error), BAD_INPUT)
-    except OSError as error:
-        return _say(f"{error.filename or 'output'}: {error.strerror}", BROKEN)
-    except Exception as error:
-        if "--traceback" in given or os.environ.get("FOURBAR_TRACEBACK"):
-            raise
-        return _say(f"internal error: {type(error).__name__}: {error} (--traceback shows where)", BROKEN)
-
-
-def _say(message: str, code: int) -> int:
-    click.echo("error: " + _printable(message), err=True)
-    return code
-
-
-def _printable(text: str) -> str:
-    """One line without control characters: a title or file name does not steer the terminal."""
-    return " ".join("".join(letter if letter.isprintable() else " " for letter in text).split())
+    return run(group, "fourbar", arguments)

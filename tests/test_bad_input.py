@@ -7,8 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from fourbar.cli import BAD_INPUT, status
+from fourbar.cli import status
 from fourbar.errors import FourBarError, InputError
+from fourbar.exits import BAD_INPUT
 from fourbar.files import LARGEST_FILE, loads, read_text
 
 GOOD = """title = "good"

@@ -16,8 +16,9 @@ import pytest
 
 import fourbar
 from fourbar import tables
-from fourbar.cli import BROKEN, HOLDS, INTERRUPTED, status
+from fourbar.cli import status
 from fourbar.errors import DependencyError
+from fourbar.exits import BROKEN, HOLDS, INTERRUPTED
 from fourbar.files import load, save
 from fourbar.solution import UNITS, VECTORS
 from tests.scenes import crank_rocker, thesis

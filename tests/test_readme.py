@@ -9,8 +9,9 @@ from pathlib import Path
 import pytest
 
 import fourbar
-from fourbar.cli import HOLDS, status
+from fourbar.cli import status
 from fourbar.effects import REGISTRY
+from fourbar.exits import HOLDS
 
 ROOT = Path(__file__).parent.parent
 TEXT = (ROOT / "README.md").read_text(encoding="utf-8")

@@ -2,12 +2,10 @@
 
 import sys
 from importlib import import_module
-from pathlib import Path
-from typing import Any
 
 import click
 
-from fourbar.errors import DependencyError, FourBarError
+from fourbar.exits import run
 
 COMMANDS = {
     "run": "validation.run:command",
@@ -20,8 +18,6 @@ COMMANDS = {
     "stability": "validation.stability:stability",
     "bench": "validation.bench:bench",
 }
-HOLDS, FAILED, BAD_INPUT, BROKEN, INTERRUPTED = 0, 1, 2, 3, 130
-"""Exit statuses of the design."""
 
 
 class LazyGroup(click.Group):
@@ -56,27 +52,4 @@ def main(arguments: list[str] | None = None) -> None:
 
 def status(arguments: list[str] | None = None) -> int:
     """Run a command; what goes wrong becomes one line on standard error and an exit status."""
-    try:
-        result: Any = group.main(args=arguments, prog_name="python -m validation", standalone_mode=False)
-        return result if isinstance(result, int) else HOLDS
-    except click.exceptions.Abort:
-        return INTERRUPTED
-    except KeyboardInterrupt:
-        return INTERRUPTED
-    except click.ClickException as error:
-        return _say(error.format_message(), BAD_INPUT)
-    except DependencyError as error:
-        return _say(str(error), BROKEN)
-    except FourBarError as error:
-        return _say(str(error), BAD_INPUT)
-    except ModuleNotFoundError as error:
-        return _say(f'{error.name} is not installed: pip install "fourbar[all]"', BROKEN)
-    except OSError as error:
-        return _say(f"{Path(error.filename).name if error.filename else 'file'}: {error.strerror}", BROKEN)
-    except Exception as error:  # a bug: still one line, never a traceback
-        return _say(f"internal error: {type(error).__name__}: {error}", BROKEN)
-
-
-def _say(message: str, code: int) -> int:
-    click.echo("error: " + " ".join(message.split()), err=True)
-    return code
+    return run(group, "python -m validation", arguments)
