@@ -93,11 +93,24 @@ def timings_csv(pages: Iterator[Page]) -> str:
     return text.getvalue()
 
 
-def chosen(engines: str | None) -> tuple[Witness, ...]:
+def _suite(
+    scenes: tuple[Path, ...], named: str | None, count: int | None, seed: int, types: str
+) -> tuple[Suite, tuple[Witness, ...]]:
+    """The scenes asked for, and the witnesses with what they are held to there."""
+    if named == "hard":
+        from validation.hard.suite import HARD_WITNESSES, Hard
+
+        return Hard(), HARD_WITNESSES
+    if count:
+        return Random(count, seed, linkage_types(types)), WITNESSES
+    return scene_files(scenes or model_files()), WITNESSES
+
+
+def chosen(engines: str | None, witnesses: tuple[Witness, ...] = WITNESSES) -> tuple[Witness, ...]:
     """The witnesses named in a comma-separated list; all of them where there is none."""
     if engines is None:
-        return WITNESSES
-    known = {witness.name: witness for witness in WITNESSES}
+        return witnesses
+    known = {witness.name: witness for witness in witnesses}
     names = [name.strip() for name in engines.split(",") if name.strip()]
     for name in names:
         if name not in known:
@@ -118,6 +131,7 @@ def linkage_types(text: str) -> tuple[LinkageType, ...]:
 @click.argument("scenes", nargs=-1, type=click.Path(path_type=Path))
 @click.option("--out", type=click.Path(path_type=Path, file_okay=False), default=Path("results"), show_default=True)
 @click.option("--engines", metavar="NAMES", help="Comma-separated witnesses; left out: all.")
+@click.option("--suite", "named", type=click.Choice(["hard"]), help="Judge the hard cases instead.")
 @click.option("--random", "count", type=click.IntRange(min=1), help="Judge this many random linkages instead.")
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of the random linkages.")
 @click.option("--type", "types", default=",".join(kind.value for kind in LinkageType), show_default=True)
@@ -134,6 +148,7 @@ def command(
     scenes: tuple[Path, ...],
     out: Path,
     engines: str | None,
+    named: str | None,
     count: int | None,
     seed: int,
     types: str,
@@ -151,7 +166,9 @@ def command(
 
     if count is not None and scenes:
         raise InputError("--random", count, "judges random linkages; leave out the scene files")
-    suite: Suite = Random(count, seed, linkage_types(types)) if count else scene_files(scenes or model_files())
+    if named is not None and (scenes or count is not None):
+        raise InputError("--suite", named, "has its own scenes; leave out scene files and --random")
+    suite, witnesses = _suite(scenes, named, count, seed, types)
     if python is not None:
         passed_on = [*map(os.path.abspath, scenes), f"--seed={seed}", f"--type={types}", f"--workers={workers}"]
         passed_on += [f"--engines={engines}"] if engines else []
@@ -161,7 +178,7 @@ def command(
     result: Any = None
     with Progress(*columns, console=Console(stderr=True)) as progress:
         task = progress.add_task("judging", total=len(suite))
-        for result in run(suite, out, chosen(engines), workers=workers, scheduler=scheduler):
+        for result in run(suite, out, chosen(engines, witnesses), workers=workers, scheduler=scheduler):
             if isinstance(result, int):
                 progress.advance(task, result)
     assert isinstance(result, Summary)
