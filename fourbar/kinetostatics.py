@@ -11,9 +11,10 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from fourbar.effects.pins import resting
 from fourbar.effects.wrenches import Wrenches
-from fourbar.kinematics import Array, State, Vector, centre_in_bar, cross, is_zero, swing
-from fourbar.linkage import MOVING_BARS, PINS
+from fourbar.kinematics import Array, State, Vector, centre_in_bar, cross, dot, is_zero
+from fourbar.linkage import MOVING_BARS
 
 
 class Term(Protocol):
@@ -24,15 +25,15 @@ class Term(Protocol):
 
 
 class PinForces(NamedTuple):
-    """Pin forces (N, world axes, components of shape (n,)), driving torque (N m) and its condition."""
+    """Pin forces (N, world axes, components of shape (n,)), driving torque (N m)."""
 
     F12: Vector
     F32: Vector
     F43: Vector
     F14: Vector
     torque: Array
-    drive_sine: Array
-    """sin(theta_4-theta_3), sin(theta_4-theta_2), sin(theta_3-theta_2) for the drive on bar 2, 3, 4."""
+    from_jamming: Array | None = None
+    """How far the friction that depends on these forces is from jamming, in (0, 1]; None without it."""
     residual: Array | None = None
     """What friction that depends on these forces was solved to, N m; None without it."""
     unsettled: NDArray[np.uint8] | None = None
@@ -43,35 +44,66 @@ def add_inertia(wrenches: Wrenches, state: State) -> None:
     """d'Alembert: the force -m a_G and, about the bar's first pin, the moment -(I + m r^2) alpha - m r_G x a_pin.
 
     The first pin moves on bar 3 alone; written about the pin, every term is positive where the
-    moment of -m a_G and -I alpha would cancel part of it.
+    moment of -m a_G and -I alpha would cancel part of it. The force -m a_A of the coupler's mass is
+    carried by bar 2: its moment about O2 is -m a^2 alpha_2, where O2 A x (-m a_A) would be a
+    difference of large numbers.
     """
     for number in MOVING_BARS:
         bar = state.linkage.bar(number)
-        centre = centre_in_bar(bar)
-        m, r2 = bar.mass, centre[0] * centre[0] + centre[1] * centre[1]
-        alpha = state.alpha(number)
-        if (inertia := bar.inertia + m * r2) != 0.0 and not is_zero(alpha):  # type: ignore[operator]
+        p, q = centre_in_bar(bar)
+        m, alpha = bar.mass, state.alpha(number)
+        if (inertia := bar.inertia + m * (p * p + q * q)) != 0.0 and not is_zero(alpha):  # type: ignore[operator]
             wrenches.add_moment(number, -inertia * alpha)
         if m == 0.0:
             continue
+        u = state.unit(number)
+        wrenches.add_force(number, _pull(u, m * p, m * q, state.omega(number), alpha))
         if number == 3:
-            arm = state.arm(3, *centre)
-            pin_x, pin_y = state.acceleration(2, state.linkage.input.length, 0.0)
-            own_x, own_y = swing(arm, state.omega(3), alpha)
-            wrenches.add_force(3, (-m * (pin_x + own_x), -m * (pin_y + own_y)))
-            wrenches.add_moment(3, -m * cross(arm, (pin_x, pin_y)))
-        else:
-            ax, ay = state.acceleration(number, *centre)
-            wrenches.add_force(number, (-m * ax, -m * ay))
+            a, alpha_2 = state.linkage.input.length, state.alpha(2)
+            at_A = _pull(state.u2, m * a, 0.0, state.omega(2), alpha_2)
+            wrenches.carry_at_A(at_A, 0.0 if is_zero(alpha_2) else (-m * a * a) * alpha_2)
+            wrenches.add_moment(3, p * cross(u, at_A) if q == 0.0 else cross(state.arm(3, p, q), at_A))
+
+
+def _pull(u: Vector, m_along: float, m_across: float, omega: Array | float, alpha: Array | float) -> Vector:
+    """-m a of a mass at (along, across) in a bar that turns about its first pin: m (omega^2 r - alpha x r)."""
+    square = omega * omega
+    if m_across == 0.0:
+        inward = m_along * square
+        if is_zero(alpha):
+            return (inward * u[0], inward * u[1])
+        sideways = m_along * alpha
+    else:
+        inward, sideways = m_along * square + m_across * alpha, m_along * alpha - m_across * square
+    x, y = inward * u[0], inward * u[1]
+    x += sideways * u[1]
+    y -= sideways * u[0]
+    return (x, y)
 
 
 def between(m_u: Array, m_v: Array, u: Vector, v: Vector, sine: Array) -> Vector:
     """The force F with u x F = m_u and v x F = m_v, for unit vectors with u x v = sine."""
-    zero = sine == 0.0
-    if zero.any():
-        sine = sine + np.where(zero, np.nan, 0.0)  # no force balances the moments there
     k_u, k_v = m_u / sine, m_v / sine
-    return (k_u * v[0] - k_v * u[0], k_u * v[1] - k_v * u[1])
+    x, y = k_u * v[0], k_u * v[1]
+    x -= k_v * u[0]
+    y -= k_v * u[1]
+    return (x, y)
+
+
+def sine_between(u: Vector, v: Vector) -> Array:
+    """u x v, NaN where it is zero: no force balances the moments there."""
+    sine = cross(u, v)
+    zero = sine == 0.0
+    return sine + np.where(zero, np.nan, 0.0) if zero.any() else sine
+
+
+def drive_sine(state: State, drive_bar: int) -> Array:
+    """sin(theta_4-theta_3), sin(theta_4-theta_2), sin(theta_3-theta_2) for the drive on bar 2, 3, 4."""
+    if drive_bar == 2:
+        return state.sin_mu
+    v = state.unit(7 - drive_bar)
+    # a short bar beside a long diagonal: its vector keeps its direction better than its length 1
+    return cross(state.u2, v) / np.sqrt(dot(v, v))
 
 
 def solve_pins(
@@ -112,7 +144,7 @@ def torque_interval(state: State, terms: Iterable[Term], drive_bar: int, torque:
     """
     terms = tuple(terms)
     pins = {pin for term in terms for pin in getattr(term, "dry_pins", ())}
-    if not any(np.any(np.equal(state.omega(PINS[pin][1]), state.omega(PINS[pin][0]))) for pin in pins):
+    if not any(np.any(resting(state, pin)) for pin in pins):
         return torque, torque
     ways = []
     for side in (1, -1):
@@ -130,22 +162,22 @@ def eliminate(state: State, wrenches: Wrenches, drive_bar: int) -> PinForces:
     u2, u3, u4 = state.u2, state.u3, state.u4
     with np.errstate(divide="ignore", invalid="ignore"):
         if drive_bar == 2:
-            sine = state.regular_sine()
-            F43 = between(-M3 / b, M4 / c, u3, u4, sine)
+            F43 = between(M3 / -b, M4 / c, u3, u4, state.regular_sine())
             F32 = (R3[0] + F43[0], R3[1] + F43[1])
-            torque = -(M2 + a * cross(u2, F32))
+            torque = a * cross(F32, u2) - M2
         elif drive_bar == 4:
-            sine = cross(u2, u3)
+            sine = sine_between(u2, u3)
             M3_about_B = M3 - b * cross(u3, R3)
             F32 = between(-M2 / a, -M3_about_B / b, u2, u3, sine)
             # not F32 - R3: what the mass near A carries to O2 would cancel again
-            F43 = between(-M3 / b, -(M2 / a + cross(u2, R3)), u3, u2, -sine)
+            F43 = between(M3 / -b, -(M2 / a + cross(u2, R3)), u3, u2, -sine)
             torque = c * cross(u4, F43) - M4
         else:
-            sine = cross(u2, u4)
-            F43 = between(-M2 / a - cross(u2, R3), M4 / c, u2, u4, sine)
+            F43 = between(-M2 / a - cross(u2, R3), M4 / c, u2, u4, sine_between(u2, u4))
             F32 = (R3[0] + F43[0], R3[1] + F43[1])
             torque = -(M3 + b * cross(u3, F43))
+    if wrenches.at_A is not None:
+        F32 = (F32[0] + wrenches.at_A[0], F32[1] + wrenches.at_A[1])
     F14 = (F43[0] - R4[0], F43[1] - R4[1])
     F12 = (-R2[0] - F32[0], -R2[1] - F32[1])
-    return PinForces(F12, F32, F43, F14, torque, sine)
+    return PinForces(F12, F32, F43, F14, torque)

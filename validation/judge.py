@@ -14,6 +14,7 @@ from validation.answer import Answer, Engine
 from validation.compare import COMPARED, closure, compare
 from validation.identities import FORMULAS, identities
 from validation.results import FAILS, Row
+from validation.reversals import Reversal, reversals
 from validation.tolerance import EQUIVALENCE, FORCES, SIMULATED, Array, Tolerance
 
 
@@ -81,6 +82,7 @@ class Record:
     rows: list[Row] = field(default_factory=list)
     timings: list[Timing] = field(default_factory=list)
     left_out: list[str] = field(default_factory=list)
+    reversals: list[Reversal] = field(default_factory=list)
     solution: Solution | None = None
     answers: list[Answer] = field(default_factory=list)
 
@@ -95,6 +97,8 @@ class Page:
     rows: list[Row] = field(default_factory=list)
     timings: list[Timing] = field(default_factory=list)
     left_out: list[str] = field(default_factory=list)
+    reversals: list[str] = field(default_factory=list)
+    """Where dry friction reverses and the pin forces jump, in words."""
     independence: dict[str, tuple[str, str]] = field(default_factory=dict)
     """engine: (shared with the formulas, found alone)."""
     evidence: dict[str, dict[str, float]] = field(default_factory=dict)
@@ -142,6 +146,7 @@ def judged_page(name: str, scene: Scene, witnesses: Sequence[Witness] = WITNESSE
         record.rows,
         record.timings,
         record.left_out,
+        [str(reversal) for reversal in record.reversals],
         {answer.engine: (answer.shared, answer.own) for answer in record.answers if answer.own},
         {answer.engine: answer.evidence for answer in record.answers if answer.evidence},
         figure,
@@ -160,6 +165,7 @@ def judge(name: str, scene: Scene, witnesses: Sequence[Witness] = WITNESSES) -> 
     record.solution, seconds = _timed(lambda: solve(scene, at=at))
     record.timings.append(Timing(name, FORMULAS, "exact", len(at.theta_2), seconds))
     record.rows += identities(name, scene, at, record.solution)
+    record.reversals = reversals(scene, at, record.solution)
     for witness in witnesses:
         answer = _ask(witness, scene, at, record)
         if answer is None:

@@ -36,17 +36,30 @@ def shortest_bar(linkage: FourBar) -> float:
     return min(linkage.bar(number).length for number in MOVING_BARS)
 
 
+AT_REST = 50.0 * 2.0**-52
+"""Slip over the sum of the speeds, times sin^2 mu: what is below, rounding leaves of a slip that is zero."""
+
+
+def resting(state: State, pin: str) -> Any:
+    """Where the two bars turn together, as far as doubles can tell, (n,)."""
+    i, j = PINS[pin]
+    one, other = state.omega(i), state.omega(j)
+    speeds = (np.abs(one) + np.abs(other) + np.abs(state.omega_2)) + np.zeros(state.theta_2.shape)
+    return ~np.greater(np.abs(other - one) * (state.sin_mu * state.sin_mu), AT_REST * speeds)
+
+
 def sense(state: State, pin: str, side: int) -> Any:
-    """Sign of omega_j - omega_i; where it is 0 the one that a motion beginning to `side` would have, 0 for side 0.
+    """Sign of omega_j - omega_i; at rest the one that a motion beginning to `side` would have, 0 for side 0.
 
     A linkage at rest begins to move as theta_2 grows (side +1) or falls (-1); a pin that is at rest in a
     linkage that moves turns either way.
     """
     i, j = PINS[pin]
-    sign = np.sign(state.omega(j) - state.omega(i)) + np.zeros(state.theta_2.shape)
+    at_rest = resting(state, pin)
+    sign = np.where(at_rest, 0.0, np.sign(state.omega(j) - state.omega(i)))
     if side == 0:
         return sign
     assert state.first is not None
     rates: dict[int, Any] = {1: 0.0, 2: 1.0, 3: state.first.h3, 4: state.first.h4}
     beginning = np.where(np.equal(state.omega_2, 0.0), np.sign(rates[j] - rates[i]), 1.0)
-    return np.where(sign == 0.0, side * beginning, sign)
+    return np.where(at_rest, side * beginning, sign)
