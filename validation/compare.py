@@ -38,12 +38,12 @@ def compare(
     formulas: Solution,
     tolerance: Tolerance,
     expected: Iterable[str],
-    predicted: Mapping[str, Array] | None = None,
+    predicted: Callable[[], Mapping[str, Array]] | None = None,
 ) -> list[Row]:
     """Judge an answer; `formulas` is the solution at `answer.at`, `expected` what the engine must answer.
 
-    With `predicted`, the error to be expected of each quantity at each position in its own unit, an
-    error beyond full accuracy must be within DEGRADED times that, and the law in the condition plays no part.
+    With `predicted`, which gives the error to be expected of each quantity at each position in its own unit,
+    an error beyond full accuracy must be within DEGRADED times that, and the law in the condition plays no part.
     """
 
     def row(quantity: str, verdict: str, reason: str, **numbers: float) -> Row:
@@ -89,7 +89,7 @@ def compare(
         jumping = reversing(scene, formulas, tolerance.factor) & where if quantity in FORCES else ~judged & judged
         where &= ~jumping
         if predicted is not None:
-            rows.append(_judge_predicted(row, quantity, scene, formulas, theirs, where, tolerance, predicted[quantity]))
+            rows.append(_judge_predicted(row, quantity, scene, formulas, theirs, where, tolerance, predicted))
         else:
             rows.append(_judge(row, quantity, scene, formulas, theirs, where, tolerance))
         if jumping.any():
@@ -175,7 +175,7 @@ def _judge_predicted(
     theirs: Array,
     where: Mask,
     tolerance: Tolerance,
-    predicted: Array,
+    predicted: Callable[[], Mapping[str, Array]],
 ) -> Row:
     """One quantity against full accuracy, or else against what was predicted for it; NaN always fails."""
     if not where.any():
@@ -185,14 +185,16 @@ def _judge_predicted(
     condition = condition_of(quantity, scene.linkage, formulas)
     with np.errstate(over="ignore"):
         error = angle_aware_difference(quantity, ours, theirs) / yard
-        expected = np.nan_to_num(predicted / yard, nan=0.0, posinf=np.inf)
+        beyond = where & ~(error <= tolerance.factor)
+        expected = np.zeros_like(error)
+        if beyond.any():
+            expected = np.nan_to_num(predicted()[quantity] / yard, nan=0.0, posinf=np.inf)
     allowed = np.maximum(tolerance.factor, TIMES_PREDICTED * expected)
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = np.where(where, error / allowed, -1.0)
     lost = expected >= 1.0  # first order says no more than that no digit is left
     ratio[lost] = np.minimum(ratio[lost], 1.0)
     ratio[where & ~np.isfinite(error)] = np.inf
-    beyond = where & ~(error <= tolerance.factor)
     index = int(np.argmax(np.where(beyond, ratio, -1.0) if beyond.any() else ratio))
     if not beyond.any():
         verdict, reason = AGREES, f"{tolerance.name}: as at condition 1"

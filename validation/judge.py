@@ -3,6 +3,7 @@
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass, field, replace
+from functools import cache
 from importlib import import_module
 from typing import Any
 
@@ -227,15 +228,18 @@ def _observed_order(name: str, scene: Scene, at: Command, solution: Solution, wi
     return {"error_at_4h": coarse, "error_at_2h": fine, "observed_order": order}
 
 
-def _predicted(witness: Witness, scene: Scene, at: Command, answer: Answer) -> dict[str, Array] | None:
+def _predicted(
+    witness: Witness, scene: Scene, at: Command, answer: Answer
+) -> Callable[[], dict[str, Array]] | None:
+    """What computes the errors to be expected, should any be called for."""
     if not witness.predictor or answer.refusal is not None:
         return None
     if witness.predictor == "own":
         zero = np.zeros(len(at.theta_2))
-        return {quantity: answer.predicted.get(quantity, zero) for quantity in witness.expected}
+        return lambda: {quantity: answer.predicted.get(quantity, zero) for quantity in witness.expected}
     module, _, name = witness.predictor.partition(":")
     predict = getattr(import_module(module), name)
-    return predict(scene, at, witness.expected)  # type: ignore[no-any-return]
+    return cache(lambda: predict(scene, at, witness.expected))
 
 
 def _judge_inertia(record: Record, at: Command, witnesses: Iterable[Witness]) -> None:

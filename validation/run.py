@@ -173,6 +173,7 @@ def command(
         passed_on = [*map(os.path.abspath, scenes), f"--seed={seed}", f"--type={types}", f"--workers={workers}"]
         passed_on += [f"--engines={engines}"] if engines else []
         passed_on += [f"--random={count}"] if count else []
+        passed_on += [f"--suite={named}"] if named else []
         against = str(run_elsewhere(python, passed_on, out / "elsewhere"))
     columns = (TextColumn("judging"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     result: Any = None
