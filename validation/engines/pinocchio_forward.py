@@ -1,82 +1,139 @@
-"""Pinocchio's forward dynamics of the closed loop: constrained accelerations, stabilised, stepped by RK4."""
+"""Pinocchio's forward dynamics of the closed loop through time: RK4, Baumgarte's stabilisation, a flywheel on the crank."""
 
-from collections.abc import Callable
-from typing import Any
+import time
+from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
 
-from fourbar.effects import Gravity
-from fourbar.scene import Scene, command
-from validation.answer import Array, Released
+from fourbar.errors import LimitError
+from fourbar.mjcf import Settings, flywheel, run_through
+from fourbar.scene import Command, Scene
+from validation.answer import Array
 from validation.engines.loop import Position
 from validation.engines.pinocchio import PinocchioTree
 
-NAME = "pinocchio-forward"
-TIME_CONSTANT_STEPS = 10.0
-"""Of Baumgarte's stabilisation, in timesteps: with 30 the loop is lost at a change point from h = 5 ms on."""
 PROXIMAL = (1e-14, 1e-8, 10)
-"""Accuracy, mu, iterations. With Pinocchio's default settings the planar loop, whose third row is redundant, is NaN."""
-Acceleration = Callable[[Array, Array], Array]
+"""Accuracy, mu, iterations. With the default mu = 0 every acceleration is NaN: of the three rows of
+the closure only two are independent in the plane."""
+
+
+@dataclass(slots=True, eq=False)
+class Forward:
+    """What one run gave."""
+
+    at: Command
+    quantities: dict[str, Array]
+    steps: int
+    steps_per_revolution: float
+    stepping: float
+    """CPU seconds in steps."""
 
 
 class PinocchioForward:
-    """Free motion of the closed loop with a fixed step, s."""
+    """One scene, driven at omega_2 by a flywheel, stepped with the classical Runge-Kutta method.
 
-    name = NAME
+    Parameters
+    ----------
+    time_constant_steps : Kp = 1/tc^2 and Kd = 2/tc of the stabilisation, tc in steps.
+    """
 
-    def __init__(self, step: float = 2e-3) -> None:
-        self.step = step
+    def __init__(self, scene: Scene, command: Command, steps_per_revolution: float, time_constant_steps: float) -> None:
+        self.omega, self.alpha = float(np.max(command.omega_2)), float(np.max(command.alpha_2))  # type: ignore[arg-type]
+        self.scene, self.command = scene, command
+        self.run = run_through(command.theta_2, self.omega, self.alpha)
+        settings = Settings(steps_per_revolution=steps_per_revolution, steps_per_window=1)
+        self.h = self.run.timestep(settings)
+        self.tree = PinocchioTree(scene)
+        model = self.tree.model
+        self.armature = flywheel(scene, settings)
+        model.armature = np.array([self.armature, 0.0, 0.0])
+        ends = [model.frames[self.tree.frame[name]] for name in ("end3", "end4")]
+        closure = pin.RigidConstraintModel(
+            pin.ContactType.CONTACT_3D,
+            model,
+            *(part for end in ends for part in (end.parentJoint, end.placement)),
+            pin.ReferenceFrame.LOCAL,
+        )
+        tc = time_constant_steps * self.h
+        closure.m_baumgarte_parameters.Kp, closure.m_baumgarte_parameters.Kd = 1.0 / tc**2, 2.0 / tc
+        self.closures = pin.StdVec_RigidConstraintModel()
+        self.closures.append(closure)
+        self.found = pin.StdVec_RigidConstraintData()
+        self.found.append(closure.createData())
+        self.data = model.createData()
+        pin.initConstraintDynamics(model, self.data, self.closures, self.found)
+        self.proximal = pin.ProximalSettings(*PROXIMAL)
 
-    def release(self, scene: Scene, times: Array) -> Released:
-        """The motion at the given times, rising from 0 (s)."""
-        setting = f"RK4 {self.step:g} s"
-        if scene.loads or any(not isinstance(effect, Gravity) for effect in scene.effects):
-            return Released.refused(NAME, setting, "in forward dynamics only gravity has a model here")
-        tree, start = PinocchioTree(scene), command(scene)
-        q_0 = Position(tree).find(float(start.theta_2[0]), int(start.branch[0]))
-        if q_0 is None:
-            return Released.refused(NAME, setting, "the loop does not close at the start")
-        jacobian, omega_2 = tree.jacobian(), scene.motion.omega_2 or 0.0
-        q, v = np.array(q_0), np.array([omega_2, *np.linalg.solve(jacobian[:, 1:], -jacobian[:, 0] * omega_2)])
-        acceleration = constrained(tree, self.step)
-        rows, now = [], 0.0
-        for t in times:
-            while t - now > 0.5 * self.step:
-                q, v = step(acceleration, q, v, self.step)
-                now += self.step
-            rows.append((q[0], v[0], pin.computeMechanicalEnergy(tree.model, tree.data, q, v)))
-        theta_2, omega, energy = np.array(rows).T
-        return Released(NAME, setting, theta_2, omega, energy)
+    def acceleration(self, q: Array, v: Array) -> Array:
+        """Of the closed loop under loads, effects and the flywheel's motor."""
+        tree = self.tree
+        tau = np.array([self.armature * self.alpha, 0.0, 0.0])
+        if tree.acting:
+            zero = np.zeros(3)
+            tree.place(q)  # type: ignore[arg-type]
+            # what acts, as generalised forces: the difference it makes to inverse dynamics
+            acted = np.array(tree.torques(v, zero))
+            tau += np.array(pin.rnea(tree.model, tree.data, q, v, zero)) - acted
+        a = pin.constraintDynamics(tree.model, self.data, q, v, tau, self.closures, self.found, self.proximal)
+        return np.array(a)
 
+    def step(self, q: Array, v: Array) -> tuple[Array, Array]:
+        """One step of the classical Runge-Kutta method."""
+        h, a1 = self.h, self.acceleration(q, v)
+        v2 = v + h / 2 * a1
+        a2 = self.acceleration(q + h / 2 * v, v2)
+        v3 = v + h / 2 * a2
+        a3 = self.acceleration(q + h / 2 * v2, v3)
+        v4 = v + h * a3
+        a4 = self.acceleration(q + h * v3, v4)
+        return q + h / 6 * (v + 2 * v2 + 2 * v3 + v4), v + h / 6 * (a1 + 2 * a2 + 2 * a3 + a4)
 
-def constrained(tree: PinocchioTree, h: float) -> Acceleration:
-    """Accelerations of the tree with its loop closed at B, stabilised for steps of h (s)."""
-    ends = [(tree.joint[bar], tree.model.frames[tree.frame[f"end{bar}"]].placement) for bar in (3, 4)]
-    loop = pin.RigidConstraintModel(
-        pin.ContactType.CONTACT_3D, tree.model, *ends[0], *ends[1], pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
-    )
-    tau = TIME_CONSTANT_STEPS * h
-    loop.setBaumgarteCorrectorParameters(pin.BaumgarteCorrectorParameters(1.0 / tau**2, 2.0 / tau))
-    models, datas = pin.StdVec_RigidConstraintModel(), pin.StdVec_RigidConstraintData()
-    models.append(loop)
-    datas.append(loop.createData())
-    pin.initConstraintDynamics(tree.model, tree.data, models, datas)
-    settings, none = pin.ProximalSettings(*PROXIMAL), np.zeros(3)
+    def forward(self) -> Forward:
+        """Run through the positions; each is read at the step nearest to it."""
+        order = np.argsort(self.command.theta_2 if self.omega > 0.0 else -self.command.theta_2, kind="stable")
+        first = int(order[0])
+        start = Position(self.tree).find(float(self.command.theta_2[first]), int(self.command.branch[first]))
+        if start is None:
+            raise LimitError("the loop does not close at the first position")
+        q = np.array(start)
+        jacobian = self.tree.jacobian()
+        v = np.array([self.omega, *np.linalg.solve(jacobian[:, 1:], -jacobian[:, 0] * self.omega)])
+        n, done, stepping = len(order), 0, 0.0
+        motion = {name: np.full(n, np.nan) for name in ("theta_2", "omega_2", "alpha_2", "torque")}
+        forces = {name: np.full((n, 2), np.nan) for name in ("F12", "F32", "F43", "F14")}
+        for row, index in enumerate(order):
+            target = round(self.run.time(float(self.command.theta_2[index])) / self.h)
+            began = time.process_time()
+            while done < target:
+                q, v = self.step(q, v)
+                done += 1
+            stepping += time.process_time() - began
+            if not np.isfinite(q).all():
+                break
+            a = self.acceleration(q, v)
+            motion["theta_2"][row], motion["omega_2"][row], motion["alpha_2"][row] = q[0], v[0], a[0]
+            motion["torque"][row], read = self._read(q, v, a)
+            for name, force in read.items():
+                forces[name][row] = force
+        at = Command(motion["theta_2"], self.command.branch[order], motion["omega_2"], motion["alpha_2"])
+        revolution = 2.0 * np.pi / self.run.fastest / self.h
+        return Forward(at, {"torque": motion["torque"], **forces}, done, revolution, stepping)
 
-    def acceleration(q: Array, v: Array) -> Any:
-        return pin.constraintDynamics(tree.model, tree.data, q, v, none, models, datas, settings).copy()
-
-    return acceleration
-
-
-def step(f: Acceleration, q: Array, v: Array, h: float) -> tuple[Array, Array]:
-    """One step of the classical Runge-Kutta method."""
-    a1 = f(q, v)
-    v2 = v + 0.5 * h * a1
-    a2 = f(q + 0.5 * h * v, v2)
-    v3 = v + 0.5 * h * a2
-    a3 = f(q + 0.5 * h * v2, v3)
-    v4 = v + h * a3
-    a4 = f(q + h * v3, v4)
-    return q + h / 6.0 * (v + 2.0 * v2 + 2.0 * v3 + v4), v + h / 6.0 * (a1 + 2.0 * a2 + 2.0 * a3 + a4)
+    def _read(self, q: Array, v: Array, a: Array) -> tuple[float, dict[str, Array]]:
+        """Torque and pin forces at a state, with the multiplier of the closure that the engine found."""
+        tree = self.tree
+        tree.place(q)  # type: ignore[arg-type]
+        tree.model.armature = np.zeros(3)
+        needed = tree.torques(v, a)
+        if self.scene.drive_bar == 2:
+            end = tree.data.oMi[self.closures[0].joint1_id] * self.closures[0].joint1_placement
+            loop_force = np.array(end.rotation @ self.found[0].contact_force.linear)[:2]
+            torque = -self.armature * (a[0] - self.alpha)
+        else:
+            e_drive = tree.turn(self.scene.drive_bar)
+            unknowns = np.linalg.solve(np.column_stack((tree.jacobian().T, e_drive)), needed)
+            loop_force, torque = unknowns[:2], float(unknowns[2])
+        read = {**tree.forces(loop_force), "F43": loop_force}
+        tree.model.armature = np.array([self.armature, 0.0, 0.0])
+        return torque, read

@@ -1,0 +1,52 @@
+"""How wrong an answer is: the torque, and the worst of the pin forces, each on its scale against the formulas."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from fourbar.scene import Command, Scene, solve
+from fourbar.solution import OK
+from validation.answer import Array
+from validation.compare import SLOW_DRIVE, angle_aware_difference
+from validation.scales import divisor, yardstick
+
+PIN_FORCES = ("F12", "F32", "F43", "F14")
+
+
+class Errors(NamedTuple):
+    """Worst relative errors over the positions; inf where there is no answer."""
+
+    torque: float
+    force: float
+
+    @property
+    def worst(self) -> float:
+        """What an asked error is compared with."""
+        return max(self.torque, self.force)
+
+
+NO_ANSWER = Errors(float("inf"), float("inf"))
+
+
+def errors(scene: Scene, at: Command, quantities: dict[str, Array]) -> Errors:
+    """Of an answer at the motion that its engine really made.
+
+    The torque on bar 3 or 4 has poles where that bar stands still: it is judged where the bar turns
+    at more than a tenth of its greatest speed, as in the regression report.
+    """
+    if not np.isfinite(at.theta_2).all():
+        return NO_ANSWER
+    formulas = solve(scene, "force", at=at)
+    judged = formulas.status_code == OK
+    if not judged.any():
+        return NO_ANSWER
+    worst = {}
+    for name in ("torque", *PIN_FORCES):
+        ours, where = getattr(formulas, name), judged
+        if name == "torque" and scene.drive_bar != 2:
+            speed = np.abs(np.nan_to_num(formulas.omega_3 if scene.drive_bar == 3 else formulas.omega_4))
+            where = judged & (speed > SLOW_DRIVE * speed.max())
+        relative = angle_aware_difference(name, ours, quantities[name]) / divisor(yardstick(name, scene, formulas, ours))
+        value = float(np.max(relative[where]))
+        worst[name] = value if np.isfinite(value) else float("inf")
+    return Errors(worst["torque"], max(worst[name] for name in PIN_FORCES))

@@ -1,0 +1,153 @@
+"""Other ways to soften the closure and to drive the crank than the generated MJCF's, for the study of their cost.
+
+Each builds a loop from the generated text; the flywheel of the text is taken out where another
+drive takes its place, and the torque is read where that drive exerts it.
+"""
+
+from collections.abc import Sequence
+from xml.etree import ElementTree as ET
+
+import mujoco
+import numpy as np
+
+from fourbar.mjcf.model import text as numbers
+from validation.engines.mujoco.closed_loop import O2, ClosedLoop
+
+WHEEL = 1e8
+"""Armature of the kinematic wheel that a joint equality follows, relative to the crank's dof inertia."""
+POSITION_GAIN, VELOCITY_GAIN = 1e6, 1e4
+"""kp of the stiff servo, per (inertia omega^2), and kv of servo and velocity actuator, per (inertia omega)."""
+GENTLE_POSITION_GAIN, GENTLE_VELOCITY_GAIN = 1.0, 1.0
+"""Gains that an explicit integrator can follow: they droop, and the motion that happened is what is compared."""
+
+
+class Softened(ClosedLoop):
+    """The compiled model's body_invweight0 scaled: the softness of the closure goes in proportion."""
+
+    def __init__(self, mjcf: str, factor: float) -> None:
+        super().__init__(mjcf)
+        self.model.body_invweight0[:] *= factor
+
+
+class Driven(ClosedLoop):
+    """Another drive in place of the flywheel."""
+
+    wheel_armature = 0.0
+
+    def __init__(self, mjcf: str, omega: float) -> None:
+        self.omega = omega
+        root = ET.fromstring(mjcf)
+        crank = root.find(".//joint[@name='O2']")
+        assert crank is not None
+        # what the flywheel was laid out by is a measure of the linkage's inertia about O2
+        self.flywheel = float(crank.attrib.pop("armature"))
+        self.add_drive(root)
+        super().__init__(ET.tostring(root, encoding="unicode"))
+        drive = [i for i in range(self.model.nu) if self.model.actuator(i).name == "servo"]
+        self.servo = drive[0] if drive else None
+
+    def add_drive(self, root: ET.Element) -> None:
+        """Add the drive to the text."""
+        raise NotImplementedError
+
+    def crank_torque(self) -> float:
+        """What the actuator gives the crank."""
+        return float(self.data.actuator_force[self.servo])
+
+
+class VelocityActuator(Driven):
+    """A velocity actuator: it droops, so the motion that happened is what is compared."""
+
+    gain = VELOCITY_GAIN
+
+    def add_drive(self, root: ET.Element) -> None:
+        """kv (omega - omega_2), without a control input: the affine bias holds the speed."""
+        kv = self.gain * self.flywheel * abs(self.omega)
+        actuators = root.find("actuator")
+        actuators = ET.SubElement(root, "actuator") if actuators is None else actuators
+        bias = {"gaintype": "fixed", "gainprm": "0", "biastype": "affine", "biasprm": numbers(kv * self.omega, 0.0, -kv)}
+        ET.SubElement(actuators, "general", bias, name="servo", joint="O2")
+
+
+class Servo(Driven):
+    """A position servo whose target turns at omega: the integrated set-point of `intvelocity`."""
+
+    gains = (POSITION_GAIN, VELOCITY_GAIN)
+
+    def add_drive(self, root: ET.Element) -> None:
+        """kp (act - theta_2) + kv (omega - omega_2), act integrating omega."""
+        kp, kv = self.gains[0] * self.flywheel * self.omega**2, self.gains[1] * self.flywheel * abs(self.omega)
+        actuators = root.find("actuator")
+        actuators = ET.SubElement(root, "actuator") if actuators is None else actuators
+        servo = {
+            "dyntype": "integrator",
+            "gaintype": "fixed",
+            "gainprm": numbers(kp),
+            "biastype": "affine",
+            "biasprm": numbers(kv * self.omega, -kp, -kv),
+        }
+        ET.SubElement(actuators, "general", servo, name="servo", joint="O2")
+
+    def set_state(self, q: Sequence[float], omega_2: float) -> None:
+        """The target starts where the crank is."""
+        super().set_state(q, omega_2)
+        self.data.act[:] = q[O2]
+        self.data.ctrl[self.servo] = self.omega
+
+
+class WheelEquality(Driven):
+    """A joint equality to a kinematic wheel: a second, heavy body that turns at omega and is not part of the linkage."""
+
+    softness = 1.0
+    """Factor on dof_invweight0: how soft the equality is, edited after compile; 1: plain MJCF."""
+
+    def __init__(self, mjcf: str, omega: float) -> None:
+        super().__init__(mjcf, omega)
+        self.model.dof_invweight0[:] *= self.softness
+        self.row = 3  # the closure takes three rows, the joint equality the next
+
+    def add_drive(self, root: ET.Element) -> None:
+        """The wheel comes last, so that O2, A, O4 stay the first degrees of freedom."""
+        ground, equality = root.find(".//body[@name='ground']"), root.find("equality")
+        assert ground is not None and equality is not None
+        wheel = ET.SubElement(ground, "body", name="wheel")
+        ET.SubElement(wheel, "inertial", pos="0 0 0", mass="1", diaginertia="1 1 1")
+        ET.SubElement(wheel, "joint", name="wheel", axis="0 0 1", armature=numbers(WHEEL * self.flywheel))
+        closure = equality.find("connect")
+        assert closure is not None
+        softness = {key: closure.attrib[key] for key in ("solref", "solimp")}
+        ET.SubElement(equality, "joint", softness, joint1="O2", joint2="wheel", polycoef="0 1 0 0 0")
+
+    def place(self, q: Sequence[float]) -> None:
+        """The wheel stands where the crank does."""
+        super().place((*q, q[O2]))
+
+    def set_state(self, q: Sequence[float], omega_2: float) -> None:
+        """Velocities that keep the gap closed, the wheel's the crank's."""
+        mujoco.mj_resetData(self.model, self.data)
+        self.place(q)
+        jacobian = self.jacobian()
+        v = np.linalg.solve(jacobian[:, [1, 2]], -jacobian[:, O2] * omega_2)
+        self.data.qvel[:] = (omega_2, v[0], v[1], omega_2)
+
+    def crank_torque(self) -> float:
+        """The multiplier of the joint equality: its row of the Jacobian is 1 at the crank."""
+        return float(self.data.efc_force[self.row])
+
+
+class StiffWheelEquality(WheelEquality):
+    """The same with its softness edited down as far as the closure's is by the pads."""
+
+    softness = 1e-8
+
+
+class GentleVelocityActuator(VelocityActuator):
+    """The same with a gain that an explicit integrator can follow."""
+
+    gain = GENTLE_VELOCITY_GAIN
+
+
+class GentleServo(Servo):
+    """The same with gains that an explicit integrator can follow."""
+
+    gains = (GENTLE_POSITION_GAIN, GENTLE_VELOCITY_GAIN)

@@ -1,0 +1,106 @@
+"""MuJoCo's forward dynamics at one state: the torque with which the closed loop accelerates as it is told.
+
+At an exactly closed state the only error is the closure's softness, in proportion to (1-d)/d with
+d the impedance: the values at several d, extrapolated to (1-d)/d = 0, are free of it.
+"""
+
+import time
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from fourbar.errors import InputError
+from fourbar.mjcf import Settings, mjcf
+from fourbar.scene import Command, Scene
+from validation.answer import Answer, Array
+from validation.engines.mujoco.closed_loop import O2, O4, A, ClosedLoop
+
+NAME = "mujoco-one-state"
+RUNGS = (0.9999, 0.9998, 0.9996, 0.9992)
+"""Impedances to extrapolate from; MuJoCo clamps at the first."""
+ACTS_ON = {2: [O2], 3: [O2, A], 4: [O4]}
+"""Joints whose angle the driven bar's rotation is the sum of."""
+
+
+@dataclass(frozen=True, slots=True)
+class MujocoOneState:
+    """Forward dynamics at each position by itself, at one impedance or extrapolated from several."""
+
+    impedances: tuple[float, ...] = RUNGS
+    pad: float | None = None
+    name: str = NAME
+
+    def answer(self, scene: Scene, command: Command) -> Answer:
+        """Its answer, or the refusal of a bar that MuJoCo cannot hold."""
+        began = time.perf_counter()
+        setting = "extrapolated" if len(self.impedances) > 1 else f"d = {self.impedances[0]:g}"
+        try:
+            rungs = [_one_impedance(scene, command, d, self.pad) for d in self.impedances]
+        except InputError as error:
+            return Answer(NAME, setting, refusal=str(error))
+        values, assembled = extrapolated(self.impedances, [rung for rung, _ in rungs]), rungs[0][1]
+        return Answer(
+            NAME,
+            setting,
+            command,
+            assembled,
+            values,
+            shared="lengths, masses, inertias, centres, loads and effects as MJCF text; the command",
+            own="assembly, velocities, accelerations, drive torque, pin forces",
+            seconds=time.perf_counter() - began,
+        )
+
+
+def extrapolated(impedances: tuple[float, ...], rungs: list[dict[str, Array]]) -> dict[str, Array]:
+    """The value at x = 0 of the polynomial in x = (1-d)/d through the rungs (Lagrange)."""
+    x = np.array([(1.0 - d) / d for d in impedances])
+    weights = [float(np.prod([xj / (xj - xi) for j, xj in enumerate(x) if j != i])) for i, xi in enumerate(x)]
+    return {name: sum(w * rung[name] for w, rung in zip(weights, rungs, strict=True)) for name in rungs[0]}  # type: ignore[misc]
+
+
+def _one_impedance(scene: Scene, command: Command, d: float, pad: float | None) -> tuple[dict[str, Array], Array]:
+    """Torque and pin forces at every position that assembles."""
+    # no flywheel: the torque is on the driven bar itself
+    settings = Settings(timestep=1e-3, impedance=d, pad=pad, flywheel=0.0)
+    loop = ClosedLoop(mjcf(scene, settings, keyframe=False))
+    position, n = loop.position(), len(command.theta_2)
+    values = {"torque": np.full(n, np.nan), **{name: np.full((n, 2), np.nan) for name in ("F12", "F32", "F43", "F14")}}
+    assembled = np.zeros(n, dtype=bool)
+    omega, alpha = (np.broadcast_to(np.asarray(x or 0.0, dtype=float), (n,)) for x in (command.omega_2, command.alpha_2))
+    acts_on = ACTS_ON[scene.drive_bar]
+    for i, (theta_2, branch) in enumerate(zip(command.theta_2.tolist(), command.branch.tolist(), strict=True)):
+        found = position.find(theta_2, branch)
+        if found is None:
+            continue
+        assembled[i] = True
+        for effect in scene.effects:
+            found = effect.unwind(scene.linkage, found)
+        loop.set_state(found, float(omega[i]))
+        torque = _torque(loop, acts_on, float(alpha[i]))
+        values["torque"][i] = torque
+        for name, force in loop.forces().items():
+            values[name][i] = force
+    return values, assembled
+
+
+def _torque(loop: ClosedLoop, acts_on: list[int], alpha: float) -> float:
+    """The couple that gives the crank its acceleration: linear in the couple, so two trials; the third is read."""
+    d = loop.data
+
+    def crank_acceleration(couple: float) -> float:
+        d.qfrc_applied[:] = 0.0
+        d.qfrc_applied[acts_on] = couple
+        mujoco.mj_forward(loop.model, d)
+        return float(d.qacc[O2])
+
+    at_rest = crank_acceleration(0.0)
+    slope = crank_acceleration(1.0) - at_rest
+    if slope == 0.0:
+        return float("nan")  # a pole of the torque
+    # once more from where the first guess leads: the difference of the two trials has lost digits
+    guess = (alpha - at_rest) / slope
+    couple = guess + (alpha - crank_acceleration(guess)) / slope
+    crank_acceleration(couple)
+    mujoco.mj_rnePostConstraint(loop.model, d)
+    return couple
