@@ -7,7 +7,7 @@ that produced them: closure, the sum of forces on the three bars, and the sum of
 import numpy as np
 
 from fourbar.bearing import PIN_FORCE
-from fourbar.effects import PinFriction, Wrenches
+from fourbar.effects import Wrenches
 from fourbar.kinematics import add_accelerations, add_velocities, close_loop
 from fourbar.linkage import MOVING_BARS
 from fourbar.scene import Command, Scene
@@ -40,7 +40,7 @@ def _sums(name: str, scene: Scene, at: Command, solution: Solution) -> list[Row]
     acting = Wrenches(state)
     for term in (*scene.loads, *scene.effects):
         term.add_wrenches(acting, state)
-        if isinstance(term, PinFriction):
+        if term.loaded_pins:
             term.add_known(acting, state, {name: getattr(solution, name) for name in PIN_FORCE.values()})
     O4 = np.array(state.O4)
     force = solution.F12 + solution.F14

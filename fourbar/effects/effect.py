@@ -1,6 +1,6 @@
 """What every effect is made of, and the engine's side that its engine term may use."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any, ClassVar, Protocol, Self
 
@@ -85,6 +85,9 @@ class Effect:
 
     def add_wrenches(self, wrenches: Wrenches, state: State) -> None:
         """Its forces and couples on the bars, in Newton-Euler."""
+
+    def add_known(self, wrenches: Wrenches, state: State, forces: Mapping[str, Array]) -> None:
+        """What `add_wrenches` leaves to the solution of the pin forces, once these are known (name: (n, 2), N)."""
 
     def power(self, state: State) -> Array | float:
         """The power it puts into the linkage, W, for the energy method: derived on its own."""

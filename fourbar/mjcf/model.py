@@ -2,17 +2,20 @@
 
 import math
 from collections.abc import Iterable
+from typing import TYPE_CHECKING
 from xml.etree import ElementTree as ET
 
 import numpy as np
 
-from fourbar.effects import Load, Spring
-from fourbar.effects.spring import Point
+from fourbar.effects import Load
 from fourbar.errors import InputError, LimitError
 from fourbar.kinematics import centre_in_bar
 from fourbar.linkage import BAR_NAMES, FIRST_PIN, MOVING_BARS, PINS, FourBar
 from fourbar.mjcf.appearance import add_camera
 from fourbar.mjcf.settings import Settings
+
+if TYPE_CHECKING:
+    from fourbar.effects.spring import Point, Spring
 
 FLOOR = 1e-15
 """mjMINVAL: MuJoCo refuses a moving body of less mass (kg) or inertia (kg m^2)."""
@@ -189,7 +192,7 @@ class Model:
                 ET.SubElement(tendon, "site", site=f"{name}_{end}")
                 self._add_site(root, point, f"{name}_{end}")
 
-    def _add_site(self, root: ET.Element, point: Point, name: str) -> None:
+    def _add_site(self, root: ET.Element, point: "Point", name: str) -> None:
         """A point of a bar; the ground's body keeps world axes."""
         body = root.find(f".//body[@name='{BAR_NAMES[point.bar]}']")
         assert body is not None
