@@ -6,7 +6,6 @@ import pytest
 
 from fourbar.errors import InputError
 from fourbar.files import load
-from fourbar.mjcf import mjcf
 from validation.models import stale, write_mjcf
 from validation.suite.scenes import MODELS, model_files
 
@@ -17,7 +16,7 @@ FILES = model_files()
 def test_every_model_names_its_source_and_has_its_mjcf(file: Path) -> None:
     scene = load(file)
     assert scene.title and scene.source
-    assert file.with_suffix(".xml").read_text(encoding="utf-8") == mjcf(scene), "stale: run `make models`"
+    assert not stale([file]), "stale: run `make models`"
 
 
 def test_no_mjcf_without_its_scene() -> None:
@@ -30,6 +29,12 @@ def test_a_changed_scene_makes_its_mjcf_stale(tmp_path: Path) -> None:
     assert stale([file]) == [file]
     write_mjcf([file])
     assert stale([file]) == []
+    xml = file.with_suffix(".xml")
+    text = xml.read_text(encoding="utf-8")
+    xml.write_text(text.replace("0.1 ", "0.1000000001 ", 1), encoding="utf-8")
+    assert text != xml.read_text(encoding="utf-8")
+    assert stale([file]) == [file]
+    xml.write_text(text, encoding="utf-8")
     changed = file.read_text(encoding="utf-8").replace("branch = ", 'alpha_2 = "1 rad/s^2"\nbranch = ')
     file.write_text(changed, encoding="utf-8")
     assert stale([file]) == [file]
