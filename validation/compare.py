@@ -85,6 +85,8 @@ def compare(
         if theirs is None:
             rows.append(row(quantity, FAILS, "no answer"))
             continue
+        if quantity in FORCES:
+            judged = judged & ~_without_forces(formulas)
         where = judged & _answerable(quantity, scene, formulas, tolerance)
         jumping = reversing(scene, formulas, tolerance.factor) & where if quantity in FORCES else ~judged & judged
         where &= ~jumping
@@ -215,6 +217,11 @@ def _judge_predicted(
         theta_2=formulas.theta_2[index],
         condition=condition[index],
     )
+
+
+def _without_forces(formulas: Solution) -> Mask:
+    """Positions at which the driven bar cannot be held in balance by any torque: its drive condition is 0."""
+    return np.asarray(formulas.drive_condition == 0.0)
 
 
 def angle_aware_difference(quantity: str, ours: Array, theirs: Array) -> Array:

@@ -65,7 +65,8 @@ def _sums(name: str, scene: Scene, at: Command, solution: Solution) -> list[Row]
             + bar.mass * _reach(centre) * magnitude(acceleration)
             + bar.inertia * np.abs(alpha)
         )
-    where = solution.status_code == OK
+    # where the drive condition is 0 no torque balances the bars
+    where = (solution.status_code == OK) & (solution.drive_condition != 0.0)
     return [
         _row(name, "force_sum", magnitude(force), force_terms, where, solution, "F12 + F14 + loads = sum of m a_G"),
         _row(name, "moment_sum", np.abs(moment), moment_terms, where, solution, "moments about O2, with the torque"),

@@ -137,7 +137,7 @@ def outputs(scene: Scene, branch: int, x: Values, drive_bar: int) -> Values | No
     points |= {f"a_G{k}": acceleration[k] for k in MOVING_BARS}
 
     force = dict.fromkeys(MOVING_BARS, zero)
-    moment = dict.fromkeys(MOVING_BARS, arb(0))  # about G
+    moment = {k: x.get(f"couple_{k}", arb(0)) for k in MOVING_BARS}  # about G; a probe may add one
     for k, load in enumerate(scene.loads):
         _add_load(load, x, k, w, force, moment)
     for k in MOVING_BARS:

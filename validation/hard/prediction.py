@@ -4,8 +4,8 @@
 
 the first-order change of a result y, at this very position and for this very quantity, when every
 stored input x_i (lengths, angles, masses, loads, the command) moves in its last digit, and when the
-loop opens with the speed z_1 and the acceleration z_2 that rounding leaves in an engine whose lever
-arms are differences of coordinates as long as `reach`. It replaces K eps/condition where no power of
+loop opens with the speed and the acceleration, and the bars get the couples, that rounding leaves in
+an engine whose lever arms are differences of coordinates as long as `reach` (z_j). It replaces K eps/condition where no power of
 a sine is the right law: beside change points, where a torque cancels, and for forces beside a toggle,
 which a law in s^2 would excuse too much.
 """
@@ -80,7 +80,8 @@ class Sensitivity(NamedTuple):
     data: dict[str, float]
     """|y| + sum w_i |dy/dx_i|; of the condition, its value."""
     loop: dict[str, float]
-    """By a loop that opens at its fastest bar's speed and acceleration times 1 m."""
+    """By a loop that opens at its fastest bar's speed and acceleration times 1 m, and by couples on the bars of the
+    strongest pin force times 1 m."""
 
 
 @lru_cache(maxsize=8192)
@@ -102,9 +103,12 @@ def _sensitivity(scene: Scene, theta_2: float, branch: int, omega_2: float, alph
         """The change under the first of several changes of the inputs with which the loop still closes."""
         for changed in changes:
             moved = outputs(scene, branch, exact | changed, scene.drive_bar)
-            if moved is None or len(moved) != len(base):
+            if moved is None:
                 continue
             for output, y in base.items():
+                if output not in moved:  # singular there
+                    total[output] = math.inf
+                    continue
                 change = abs(moved[output] - y)
                 if output.startswith("theta") and change > 3:
                     change = two_pi - change
@@ -122,6 +126,10 @@ def _sensitivity(scene: Scene, theta_2: float, branch: int, omega_2: float, alph
         for name, most in (("slip", fastest), ("jerk", hardest)):
             for x, y in ((most * step, arb(0)), (arb(0), most * step)):
                 add(loop, [{name: (x, y)}])
+    if "torque" in base:
+        strongest = max(abs(base[name + axis]) for name in ("F12", "F32", "F43", "F14") for axis in ("_x", "_y"))
+        for bar in MOVING_BARS:
+            add(loop, [{f"couple_{bar}": strongest * step}])
     return Sensitivity(data, loop)
 
 
