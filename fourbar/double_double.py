@@ -49,9 +49,14 @@ class DoubleDouble(NDArrayOperatorsMixin):
 
     def __array_ufunc__(self, ufunc: Any, method: str, *inputs: Any, **options: Any) -> Any:
         operation = OPERATIONS.get(ufunc)
+        into = options.pop("out", (None,))[0]
         if operation is None or method != "__call__" or options:
             return NotImplemented
-        return operation(*(value if isinstance(value, DoubleDouble) else DoubleDouble(value) for value in inputs))
+        result = operation(*(value if isinstance(value, DoubleDouble) else DoubleDouble(value) for value in inputs))
+        if into is None:
+            return result
+        into.hi, into.lo = result.hi, result.lo  # in place: x += y
+        return into
 
     def __getitem__(self, index: Any) -> "DoubleDouble":
         return DoubleDouble(self.hi[index], self.lo[index])
@@ -148,4 +153,5 @@ OPERATIONS: dict[Any, Callable[..., Any]] = {
     np.equal: lambda x, y: (x - y).hi == 0.0,
     np.greater: lambda x, y: (x - y).hi > 0.0,
     np.less: lambda x, y: (x - y).hi < 0.0,
+    np.less_equal: lambda x, y: (x - y).hi <= 0.0,
 }

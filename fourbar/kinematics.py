@@ -57,7 +57,9 @@ class State:
     diagonal: Diagonal
     signed_root: Array
     sin_mu: Array
-    cos_mu: Array
+    at_A: Array
+    at_O4: Array
+    """2 b e cos beta and 2 c e cos gamma, of the angles of the triangle A, B, O4 at A and O4; unit of the diagonal."""
     singular: NDArray[np.bool_]
     omega_2: Array | float = 0.0
     omega_3: Array | None = None
@@ -68,6 +70,15 @@ class State:
     first: "FirstCoefficients | None" = None
     parallel: tuple[NDArray[np.bool_], Array] | None = None
     """Where two pairs of bars stay parallel or coincide, and there d theta_4/d theta_2."""
+
+    @property
+    def cos_mu(self) -> Array:
+        """cos(theta_4 - theta_3)."""
+        _, _, b, c = scaled(self.linkage, self.diagonal.w)
+        cosine: Array = ((b * b + c * c) - self.diagonal.squared) * (0.5 / (b * c))
+        if self.parallel is not None:
+            return np.where(self.parallel[0], self.diagonal.w - self.diagonal.v, cosine)
+        return cosine
 
     def unit(self, bar: int) -> Vector:
         """Unit vector along bar 2, 3 or 4."""
@@ -201,7 +212,7 @@ def close_loop(
     x, y = diagonal.x, diagonal.y
     theta_1 = linkage.ground_angle
     u1: tuple[Any, Any] = (1.0, 0.0)
-    u2 = direction_from_half(diagonal.t, diagonal.w)
+    u2 = (diagonal.w - diagonal.v, 2.0 * diagonal.h)
     if theta_1 != 0.0:
         c1, s1 = u1 = unit_vector(in_precision_of(theta_2, theta_1))
         x, y = c1 * x - s1 * y, s1 * x + c1 * y
@@ -211,9 +222,15 @@ def close_loop(
     at_A, at_O4 = squared + excess, squared - excess
     with np.errstate(divide="ignore", invalid="ignore"):  # e = 0: A on O4, where beta is free
         to_3 = (0.5 / b) / squared
-        to_4 = to_3 * (b / c)
-        u3 = (to_3 * (x * at_A - y * root), to_3 * (y * at_A + x * root))
-        u4 = (to_4 * -(x * at_O4 + y * root), to_4 * (x * root - y * at_O4))
+        to_4 = to_3 * -(b / c)
+        x_root, y_root = x * root, y * root
+        (x3, y3), (x4, y4) = u3, u4 = (x * at_A, y * at_A), (x * at_O4, y * at_O4)
+        x3 -= y_root
+        y3 += x_root
+        x4 += y_root
+        y4 -= x_root
+        for component, scale in ((x3, to_3), (y3, to_3), (x4, to_4), (y4, to_4)):
+            component *= scale  # noqa: PLW2901 - in place
     sin_mu = (0.5 / (b * c)) * root
     state = State(
         linkage=linkage,
@@ -227,22 +244,19 @@ def close_loop(
         diagonal=diagonal,
         signed_root=root,
         sin_mu=sin_mu,
-        cos_mu=((b * b + c * c) - squared) * (0.5 / (b * c)),
-        singular=diagonal.assembled & ~(np.abs(sin_mu) > (NO_DIGIT_LEFT if diagonal.offset is None else 0.0)),
+        at_A=at_A,
+        at_O4=at_O4,
+        singular=np.abs(sin_mu) <= (NO_DIGIT_LEFT if diagonal.offset is None else 0.0),  # false where it is NaN
     )
     _parallel(state, u1)
     return state
 
 
-def direction_from_half(t: Array, w: Array) -> Vector:
-    """(cos, sin) of an angle from t, the tangent of its half, and w = 1/(1 + t^2)."""
-    return ((1.0 - t * t) * w, (2.0 * t) * w)
-
-
 def unit_vector(angle: Any) -> tuple[Any, Any]:
     """(cos, sin) of an angle by one tangent, a fifth of the cost, in the precision of the angle."""
     t = np.tan(0.5 * angle)
-    return direction_from_half(t, 1.0 / (1.0 + t * t))
+    w = 1.0 / (1.0 + t * t)
+    return ((1.0 - t * t) * w, (2.0 * t) * w)
 
 
 def _parallel(state: State, u1: tuple[Any, Any]) -> None:
@@ -254,11 +268,7 @@ def _parallel(state: State, u1: tuple[Any, Any]) -> None:
     d, a, b, c = state.linkage.lengths
     if not ((a == c and b == d) or (a == b and c == d)) or not isinstance(state.sin_mu, np.ndarray):
         return  # no such pairs, or positions of the second pass, which are others
-    half_turn = np.sign(state.diagonal.t)
-    sine, cosine = (
-        2.0 * state.diagonal.t * state.diagonal.w,
-        state.diagonal.w * (1.0 - state.diagonal.t * state.diagonal.t),
-    )
+    half_turn = np.sign(state.diagonal.h)
     none = np.zeros(state.theta_2.shape, dtype=bool)
     together = (state.branch == half_turn) if (a == c and b == d) else none
     folded = (state.branch == -half_turn) if (a == b and c == d) else none
@@ -266,8 +276,7 @@ def _parallel(state: State, u1: tuple[Any, Any]) -> None:
     u2, u3, u4 = state.u2, state.u3, state.u4
     state.u3 = tuple(np.where(together, u1[i], np.where(folded, -u2[i], u3[i])) for i in (0, 1))  # type: ignore[assignment]
     state.u4 = tuple(np.where(together, u2[i], np.where(folded, -u1[i], u4[i])) for i in (0, 1))  # type: ignore[assignment]
-    state.sin_mu = np.where(where, state.branch * np.abs(sine), state.sin_mu)
-    state.cos_mu = np.where(where, cosine, state.cos_mu)
+    state.sin_mu = np.where(where, state.branch * np.abs(2.0 * state.diagonal.h), state.sin_mu)
     state.singular = state.assembled & ~(np.abs(state.sin_mu) > NO_DIGIT_LEFT)
     state.parallel = (where, together.astype(float))
 
@@ -325,14 +334,13 @@ class FirstCoefficients:
 def first_coefficients(state: State) -> FirstCoefficients:
     """The first kinematic coefficients; NaN where the position is singular."""
     diagonal = state.diagonal
-    d, a, b, c = scaled(state.linkage, diagonal.t)
+    d, a, _, _ = scaled(state.linkage, diagonal.w)
     root = state.regular_root()
-    excess = (b - c) * (b + c)
-    t2 = diagonal.t * diagonal.t
-    cot_beta, cot_gamma = (diagonal.squared + excess) / root, (diagonal.squared - excess) / root
-    per_square = diagonal.w / diagonal.squared
-    growth = (2.0 * a * d) * (diagonal.t * per_square)
-    turn = (a * (a - d) + (a * (a + d)) * t2) * per_square
+    cot_beta, cot_gamma = state.at_A / root, state.at_O4 / root
+    growth, turn = (2.0 * a * d) * diagonal.h, (a * (a - d)) * diagonal.w
+    turn += (a * (a + d)) * diagonal.v
+    growth /= diagonal.squared
+    turn /= diagonal.squared
     h3, h4 = turn - growth * cot_gamma, turn + growth * cot_beta
     if state.parallel is not None:
         where, fourth = state.parallel
@@ -344,16 +352,24 @@ def first_coefficients(state: State) -> FirstCoefficients:
 def second_coefficients(state: State, first: FirstCoefficients) -> Vector:
     """d^2 theta_3/d theta_2^2 and d^2 theta_4/d theta_2^2, each (n,)."""
     diagonal = state.diagonal
-    d, a, b, c = scaled(state.linkage, diagonal.t)
+    d, a, b, c = scaled(state.linkage, diagonal.w)
     growth, cot_beta, cot_gamma = first.growth, first.cot_beta, first.cot_gamma
     growth_2 = growth * growth
-    turn = ((d - a) * (d + a)) * growth / diagonal.squared
-    t2 = diagonal.t * diagonal.t
-    growing = (a * d) * ((1.0 - t2) * (diagonal.w / diagonal.squared)) - 2.0 * growth_2
+    turn, growing = ((d - a) * (d + a)) * growth, (a * d) * (diagonal.w - diagonal.v)
+    turn /= diagonal.squared
+    growing /= diagonal.squared
+    growing -= 2.0 * growth_2
     root = state.regular_root()
-    squares = 4.0 * growth_2 * (diagonal.squared / (root * root))
-    h3 = turn - (growing * cot_gamma + (c * c) * (squares * cot_beta))
-    h4 = turn + (growing * cot_beta + (b * b) * (squares * cot_gamma))
+    growth_2 *= diagonal.squared
+    growth_2 /= root * root  # 1/(4 e^2) of what multiplies the cotangents below
+    squares_3, squares_4 = (4.0 * c * c) * growth_2, (4.0 * b * b) * growth_2
+    squares_3 *= cot_beta
+    squares_4 *= cot_gamma
+    h3, h4 = growing * cot_gamma, growing * cot_beta
+    h3 += squares_3
+    h4 += squares_4
+    h3 = turn - h3
+    h4 += turn
     if state.parallel is not None:
         rest = np.where(state.singular, np.nan, 0.0)
         h3, h4 = (np.where(state.parallel[0], rest, h) for h in (h3, h4))

@@ -15,6 +15,7 @@ from fourbar.effects.pins import resting
 from fourbar.effects.wrenches import Wrenches
 from fourbar.kinematics import Array, State, Vector, centre_in_bar, cross, dot, is_zero
 from fourbar.linkage import MOVING_BARS
+from fourbar.margins import in_precision_of
 
 
 class Term(Protocol):
@@ -51,24 +52,25 @@ def add_inertia(wrenches: Wrenches, state: State) -> None:
     for number in MOVING_BARS:
         bar = state.linkage.bar(number)
         p, q = centre_in_bar(bar)
-        m, alpha = bar.mass, state.alpha(number)
-        if (inertia := bar.inertia + m * (p * p + q * q)) != 0.0 and not is_zero(alpha):  # type: ignore[operator]
-            wrenches.add_moment(number, -inertia * alpha)
-        if m == 0.0:
+        # products of constants are rounded once for all positions, in the digits of the state
+        m, alpha = in_precision_of(state.theta_2, bar.mass), state.alpha(number)
+        if (bar.inertia != 0.0 or bar.mass != 0.0) and not is_zero(alpha):
+            wrenches.add_moment(number, -(bar.inertia + m * (p * p + q * q)) * alpha)
+        if bar.mass == 0.0:
             continue
         u = state.unit(number)
-        wrenches.add_force(number, _pull(u, m * p, m * q, state.omega(number), alpha))
+        wrenches.add_force(number, _pull(u, m * p, m * q if q else None, state.omega(number), alpha))
         if number == 3:
             a, alpha_2 = state.linkage.input.length, state.alpha(2)
-            at_A = _pull(state.u2, m * a, 0.0, state.omega(2), alpha_2)
+            at_A = _pull(state.u2, m * a, None, state.omega(2), alpha_2)
             wrenches.carry_at_A(at_A, 0.0 if is_zero(alpha_2) else (-m * a * a) * alpha_2)
             wrenches.add_moment(3, p * cross(u, at_A) if q == 0.0 else cross(state.arm(3, p, q), at_A))
 
 
-def _pull(u: Vector, m_along: float, m_across: float, omega: Array | float, alpha: Array | float) -> Vector:
+def _pull(u: Vector, m_along: Any, m_across: Any, omega: Array | float, alpha: Array | float) -> Vector:
     """-m a of a mass at (along, across) in a bar that turns about its first pin: m (omega^2 r - alpha x r)."""
     square = omega * omega
-    if m_across == 0.0:
+    if m_across is None:
         inward = m_along * square
         if is_zero(alpha):
             return (inward * u[0], inward * u[1])

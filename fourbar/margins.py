@@ -39,8 +39,6 @@ class Diagonal:
 
     unit: float
     """A power of two near the longest bar: no product of lengths in it leaves the range of doubles."""
-    t: Array
-    """tan((theta_2 - theta_1)/2)."""
     x: Array
     y: Array
     """Components from A to O4 in the ground's frame."""
@@ -49,7 +47,9 @@ class Diagonal:
     root: Array
     """sqrt(outer inner), four times the area of the triangle A, B, O4; NaN where it does not close."""
     w: Array
-    """cos^2((theta_2 - theta_1)/2)."""
+    v: Array
+    h: Array
+    """cos^2, sin^2 and sin cos of (theta_2 - theta_1)/2."""
     assembled: NDArray[np.bool_]
     decided: NDArray[np.intp]
     """Indices of the positions whose margins were evaluated in 60 digits."""
@@ -77,7 +77,7 @@ def in_precision_of(array: Array, number: float) -> Any:
 def diagonal_to_O4(
     linkage: FourBar, theta_2: Array, offset: Decimal | None = None, *, growths: Iterator[float] | None = None
 ) -> Diagonal:
-    """The diagonal from t = tan((theta_2 - theta_1)/2): e^2 = ((d - a)^2 + (d + a)^2 t^2)/(1 + t^2).
+    """The diagonal from the half angle: e^2 = (d - a)^2 w + (d + a)^2 v, w and v its squared cosine and sine.
 
     Every term of e^2 is positive, so it keeps its relative accuracy where it is small. Margins
     near zero are evaluated again in 60 digits, so their sign is right.
@@ -89,8 +89,10 @@ def diagonal_to_O4(
         evaluated in 60 digits.
     growths : relative changes of the parts, for the error bars; factors near zero then stay as doubles give them.
     """
-    t, x, y, squared, w, (constant_1, constant_2, product) = _triangle(linkage, theta_2, growths)
-    outer, inner = constant_1 + product * w, constant_2 + product * (t * t * w)
+    x, y, squared, (w, v, h), (constant_1, constant_2, product) = _triangle(linkage, theta_2, growths)
+    outer, inner = product * w, product * v
+    outer += constant_1
+    inner += constant_2
     least_1, least_2 = UNDECIDED * (abs(constant_1) + product), UNDECIDED * (abs(constant_2) + product)
     decided = NONE
     if offset is None and outer.min() > least_1 and inner.min() > least_2:
@@ -108,39 +110,43 @@ def diagonal_to_O4(
             assembled[index] = outer[index] >= 0.0 and inner[index] >= 0.0
         if not assembled.all():
             outer = np.where(assembled, outer, np.nan)
-    return Diagonal(unit_of(linkage), t, x, y, squared, np.sqrt(outer * inner), w, assembled, decided, offset)
+    outer *= inner
+    return Diagonal(unit_of(linkage), x, y, squared, np.sqrt(outer, outer), w, v, h, assembled, decided, offset)
 
 
 def in_double_double(linkage: FourBar, theta_2: Array) -> Diagonal:
     """The same in 32 digits, for positions that are known to assemble; theta_2 is a `DoubleDouble`."""
-    t, x, y, squared, w, (constant_1, constant_2, product) = _triangle(linkage, theta_2)
-    root = np.sqrt((constant_1 + product * w) * (constant_2 + product * (t * t * w)))
-    return Diagonal(unit_of(linkage), t, x, y, squared, root, w, np.ones(theta_2.shape, dtype=bool), NONE, None)
+    x, y, squared, (w, v, h), (constant_1, constant_2, product) = _triangle(linkage, theta_2)
+    root = np.sqrt((constant_1 + product * w) * (constant_2 + product * v))
+    return Diagonal(unit_of(linkage), x, y, squared, root, w, v, h, np.ones(theta_2.shape, dtype=bool), NONE, None)
 
 
 def _triangle(
     linkage: FourBar, theta_2: Array, growths: Iterator[float] | None = None
-) -> tuple[Array, Array, Array, Array, Array, tuple[Any, Any, Any]]:
-    """t, x, y, e^2 and w of `Diagonal`, the constants of outer and inner and 4 a d, in the precision of theta_2."""
+) -> tuple[Array, Array, Array, tuple[Array, Array, Array], tuple[Any, Any, Any]]:
+    """x, y, e^2 and w, v, h of `Diagonal`, the constants of outer and inner and 4 a d, in the precision of theta_2."""
     d, a, b, c = scaled(linkage, theta_2)
     theta_1 = linkage.ground_angle
     t = np.tan(0.5 * theta_2 if theta_1 == 0.0 else 0.5 * (theta_2 - theta_1))
     if growths is not None:
         t = t + next(growths) * t
-    t2 = t * t
-    w = 1.0 / (1.0 + t2)
-    x = ((d - a) + (d + a) * t2) * w
-    y = (-2.0 * a) * (t * w)
-    squared = ((d - a) * (d - a) + ((d + a) * (d + a)) * t2) * w
+    v = t * t
+    w = 1.0 / (1.0 + v)
+    v *= w
+    h = t * w
+    x, squared = (d + a) * v, ((d + a) * (d + a)) * v
+    x += (d - a) * w
+    squared += ((d - a) * (d - a)) * w
+    y = (-2.0 * a) * h
     constants = (
         _sum(b, c, -a, -d) * (a + b + c + d),
         _sum(d, b, -a, -c) * _sum(d, c, -a, -b),
         4.0 * a * d,
     )
     if growths is not None:
-        x, y, squared, w = (part + next(growths) * part for part in (x, y, squared, w))
+        x, y, squared, w, v, h = (part + next(growths) * part for part in (x, y, squared, w, v, h))
         constants = tuple(part + next(growths) * part for part in constants)
-    return t, x, y, squared, w, constants
+    return x, y, squared, (w, v, h), constants
 
 
 def _sum(*lengths: Any) -> Any:

@@ -25,7 +25,7 @@ def needing_more_digits(state: State) -> NDArray[np.intp]:
         hard = np.abs(state.sin_mu) < near_sine
         if not hard.any():
             return np.flatnonzero(hard)
-        hard &= np.abs(state.diagonal.t * state.diagonal.w) < 0.5 * near_angle
+        hard &= np.abs(state.diagonal.h) < 0.5 * near_angle
     hard &= state.assembled & ~state.singular
     hard[state.diagonal.decided] = False  # their margins carry 60 digits already
     if state.parallel is not None:

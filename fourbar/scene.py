@@ -12,7 +12,7 @@ from fourbar.effects import Effect, Load
 from fourbar.error_bars import error_bars
 from fourbar.errors import InputError
 from fourbar.kinematics import Array, State, Vector, add_accelerations, add_velocities, centre_in_bar, close_loop
-from fourbar.kinetostatics import solve_pins, torque_interval
+from fourbar.kinetostatics import drive_sine, solve_pins, torque_interval
 from fourbar.linkage import MOVING_BARS, FourBar, require
 from fourbar.margins import U, diagonal_to_O4, limit_remainder
 from fourbar.mobility import default_range, limit_positions, on_smooth_path
@@ -369,7 +369,8 @@ def _evaluate(
         if pins.unsettled is not None:
             yield "status", pins.unsettled
         if "drive_condition" in names:
-            yield "drive_condition", np.abs(pins.drive_sine)
+            condition = np.abs(drive_sine(state, scene.drive_bar))
+            yield "drive_condition", condition if pins.from_jamming is None else condition * pins.from_jamming
         if "friction_residual" in names:
             yield "friction_residual", 0.0 if pins.residual is None else pins.residual
         if "torque_low" in names or "torque_high" in names:

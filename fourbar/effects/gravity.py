@@ -44,7 +44,7 @@ class Gravity(Effect):
         for number in MOVING_BARS:
             bar = state.linkage.bar(number)
             if bar.mass != 0.0:
-                wrenches.add_force(number, (bar.mass * gx, bar.mass * gy), state.arm(number, *centre_in_bar(bar)))
+                wrenches.add_constant_force(number, (bar.mass * gx, bar.mass * gy), centre_in_bar(bar))
 
     def power(self, state: State) -> Array | float:
         """P = sum of m g . v_G, W."""

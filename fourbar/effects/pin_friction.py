@@ -122,9 +122,7 @@ class PinFriction(Effect):
         usable = np.isfinite(matrix).all(axis=(1, 2))
         far[usable] = np.minimum(np.linalg.svd(matrix[usable], compute_uv=False)[:, -1], 1.0)
         unsettled = np.where(found.number == ONE, OK, np.where(found.number == NONE, JAMMED, SEVERAL)).astype(np.uint8)
-        return done._replace(
-            drive_sine=done.drive_sine * far, residual=np.max(np.abs(left), axis=0), unsettled=unsettled
-        )
+        return done._replace(from_jamming=far, residual=np.max(np.abs(left), axis=0), unsettled=unsettled)
 
     def add_known(self, wrenches: Wrenches, state: State, forces: Mapping[str, Array]) -> None:
         """Its couples where the pin forces (name: (n, 2), N) are known already."""

@@ -21,6 +21,15 @@ class Wrenches:
         self.force_x: dict[int, Any] = {2: 0.0, 3: 0.0, 4: 0.0}
         self.force_y: dict[int, Any] = {2: 0.0, 3: 0.0, 4: 0.0}
         self.moments: dict[int, Any] = {2: 0.0, 3: 0.0, 4: 0.0}
+        self.at_A: tuple[Any, Any] | None = None
+        """A force at pin A whose moment about O2 is known apart from it; bar 2 carries it."""
+
+    def add_constant_force(self, bar: int, force: tuple[float, float], point: tuple[float, float]) -> None:
+        """A force of world axes at a point fixed in the bar, in its frame at its first pin."""
+        (fx, fy), (p, q), u = force, point, self.state.unit(bar)
+        self.add_force(bar, force)
+        # (p u + q u turned) x F
+        self.add_moment(bar, (p * fy - q * fx) * u[0] - (p * fx + q * fy) * u[1])
 
     def add_force(self, bar: int, force: Vector | tuple[float, float], arm: Vector | None = None) -> None:
         """A force on a bar, applied at `arm` from the bar's first pin; at that pin where no arm is given."""
@@ -33,6 +42,11 @@ class Wrenches:
         """A pure couple on a bar; on the ground (bar 1) it does nothing."""
         if bar != 1:
             self.moments[bar] = self._plus(self.moments[bar], moment)
+
+    def carry_at_A(self, force: Vector, moment: Array | float) -> None:
+        """A force at pin A with its moment about O2, stated exactly where the force points to O2."""
+        self.at_A = (self._plus(0.0, force[0]), self._plus(0.0, force[1]))
+        self.add_moment(2, moment)
 
     def force(self, bar: int) -> Vector:
         """Resultant on a bar, N."""
