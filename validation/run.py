@@ -15,6 +15,7 @@ from fourbar.writing import write_text
 from validation.engines.mujoco.picture import pictures
 from validation.judge import WITNESSES, Page, Witness
 from validation.machine import versions
+from validation.published import ladder_rows
 from validation.regression.command import output_options, told
 from validation.regression.record import about, baseline, write_about
 from validation.report.html import html
@@ -33,9 +34,17 @@ CHUNK = {True: 1, False: 20}
 
 
 def run(
-    suite: Suite, out: Path, witnesses: tuple[Witness, ...], *, workers: int = WORKERS, scheduler: str | None = None
+    suite: Suite,
+    out: Path,
+    witnesses: tuple[Witness, ...],
+    *,
+    workers: int = WORKERS,
+    scheduler: str | None = None,
+    published: bool = False,
 ) -> Iterator[int | Summary]:
     """Judge a suite into a folder; yields the number of scenes done as they come, at last the summary.
+
+    With `published` the report sets what the thesis printed beside what is right, error by error.
 
     What an interrupted run of the same suite with the same engines and versions left is kept.
     """
@@ -59,7 +68,7 @@ def run(
         for number, pages in answers:
             store.put(number, pages)
             yield len(pages)
-        summary = summarise(store.pages(len(chunks)))
+        summary = summarise(store.pages(len(chunks)), ladder_rows() if published else [])
         first_lines = write_columns(store.rows(len(chunks)), out)
         write_about(about([witness.name for witness in witnesses], suite.fingerprint()), out)
         write_text(out / "timings.csv", timings_csv(store.pages(len(chunks))))
@@ -127,6 +136,18 @@ def linkage_types(text: str) -> tuple[LinkageType, ...]:
         raise InputError("--type", text, f"must be a comma-separated list of {allowed}") from None
 
 
+def examine(scenes: tuple[Path, ...], mjcf: Path, names: tuple[str, ...], out: Path) -> int:
+    """What a user's own MJCF of one scene differs in, and what it costs; 1 where a comparison fails."""
+    from validation.check.model import examine_model, named, tell
+
+    if len(scenes) != 1:
+        raise InputError("--mjcf", str(mjcf), f"needs the one scene it is a model of, not {len(scenes)}")
+    suite = scene_files(scenes)
+    report = examine_model(suite.name(0), suite.scene(0), mjcf, named(names))
+    tell(report, mjcf, out)
+    return 1 if report.fails else 0
+
+
 @click.command(name="run")
 @click.argument("scenes", nargs=-1, type=click.Path(path_type=Path))
 @click.option("--out", type=click.Path(path_type=Path, file_okay=False), default=Path("results"), show_default=True)
@@ -143,6 +164,8 @@ def linkage_types(text: str) -> tuple[LinkageType, ...]:
     type=click.Path(path_type=Path),
     help="Run the suite under this interpreter too (into OUT/elsewhere), and say what changes from there to here.",
 )
+@click.option("--mjcf", type=click.Path(path_type=Path), help="Examine this MJCF of the one SCENE instead.")
+@click.option("--name", "names", metavar="ROLE=NAME", multiple=True, help="Body or site of --mjcf named otherwise.")
 @output_options
 def command(
     scenes: tuple[Path, ...],
@@ -156,6 +179,8 @@ def command(
     scheduler: str | None,
     against: str | None,
     python: Path | None,
+    mjcf: Path | None,
+    names: tuple[str, ...],
     **forms: Path | None,
 ) -> int:
     """Judge scenes (default: all of models/); write results.csv, timings.csv, report.md and report.html."""
@@ -164,6 +189,8 @@ def command(
 
     from validation.report.terminal import table
 
+    if mjcf is not None:
+        return examine(scenes, mjcf, names, out)
     if count is not None and scenes:
         raise InputError("--random", count, "judges random linkages; leave out the scene files")
     if named is not None and (scenes or count is not None):
@@ -179,7 +206,10 @@ def command(
     result: Any = None
     with Progress(*columns, console=Console(stderr=True)) as progress:
         task = progress.add_task("judging", total=len(suite))
-        for result in run(suite, out, chosen(engines, witnesses), workers=workers, scheduler=scheduler):
+        published = not scenes and named is None and count is None  # the models, the thesis's among them
+        for result in run(
+            suite, out, chosen(engines, witnesses), workers=workers, scheduler=scheduler, published=published
+        ):
             if isinstance(result, int):
                 progress.advance(task, result)
     assert isinstance(result, Summary)

@@ -9,6 +9,7 @@ from statistics import median
 
 from validation.judge import Page
 from validation.machine import machine, versions
+from validation.published.command import LadderRow
 from validation.results import FAILS, REFUSES, VERDICTS, Row
 from validation.tolerance import EPS, EQUIVALENCE, IDENTITY, NOTHING_TO_TELL, SIMULATED, K
 
@@ -57,6 +58,8 @@ class Summary:
     costs: list[Cost]
     orders: list[tuple[str, dict[str, float]]]
     """(scene, errors at 4h and 2h and observed order) of the simulated engine."""
+    ladder: list[LadderRow]
+    """The thesis's errors one by one, from the right answer to the printed ones; empty where not asked for."""
     pages: list[Page]
     """The scenes shown one by one: those that fail first, at most SCENES_SHOWN."""
 
@@ -73,7 +76,7 @@ STATEMENT = (
 )
 
 
-def summarise(pages: Iterable[Page]) -> Summary:
+def summarise(pages: Iterable[Page], ladder: Sequence[LadderRow] = ()) -> Summary:
     """Condense a run in one pass; what is kept does not grow with the number of scenes."""
     counts: Counter[str] = Counter()
     failures: list[Row] = []
@@ -127,6 +130,7 @@ def summarise(pages: Iterable[Page]) -> Summary:
             for evidence in page.evidence.values()
             if "observed_order" in evidence
         ],
+        ladder=list(ladder),
         pages=shown,
     )
 
