@@ -90,5 +90,5 @@ def junit(found: Differences) -> str:
         suite.add_testcase(case)
     for suite in suites.values():
         report.add_testsuite(suite)
-    xml: str | bytes = report.tostring()
+    xml: str | bytes = report.tostring()  # type: ignore[no-untyped-call]
     return xml if isinstance(xml, str) else xml.decode("utf-8")

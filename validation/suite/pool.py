@@ -61,7 +61,7 @@ def over_machines(
     """Over the workers of a Dask scheduler; each needs this checkout importable."""
     from distributed import Client
 
-    with Client(scheduler) as client:
+    with Client(scheduler) as client:  # type: ignore[no-untyped-call]
         executor = client.get_executor(retries=0, pure=False)
         workers = max(1, len(client.scheduler_info()["workers"]))
 
