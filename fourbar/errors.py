@@ -26,6 +26,10 @@ class InputError(FourBarError):
         where = f"{file}: " if file else ""
         super().__init__(f"{where}{key} = {shown}: {allowed}")
 
+    def __reduce__(self) -> tuple[type, tuple[object, ...]]:
+        """It crosses from one process to another as it was made."""
+        return type(self), (self.key, self.value, self.allowed, self.file)
+
     def in_file(self, file: str) -> "InputError":
         """The same mistake, with the file it was found in."""
         return InputError(self.key, self.value, self.allowed, file)

@@ -1,0 +1,273 @@
+"""Somebody's own MJCF: what differs is named, what it costs is measured, and the file is data."""
+
+import math
+import os
+import re
+import signal
+import time
+from collections.abc import Mapping
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import fourbar
+import validation.run
+from fourbar.errors import InputError
+from fourbar.mjcf import mjcf
+from fourbar.scene import Scene, solve
+from validation.check import model
+from validation.check.differences import differences
+from validation.check.screen import DEEPEST, LARGEST_MJCF, read_mjcf
+from validation.compare import COMPARED, compare
+from validation.engines.mujoco.theirs import ONE_STATE, THROUGH_TIME, Examined, examine
+from validation.results import FAILS, from_csv
+from validation.tolerance import SIMULATED
+
+CRANK_ROCKER = fourbar.load(Path(__file__).parents[1] / "models" / "crank_rocker.toml")
+GENERATED = mjcf(CRANK_ROCKER)
+MINE = {"input": "crank", "coupler": "rod", "output": "rocker"}
+BARE = Scene(CRANK_ROCKER.linkage, CRANK_ROCKER.motion, effects=CRANK_ROCKER.effects, title="no loads")
+STIFF = 'solref="0.02 1" solimp="0.9999 0.9999 0.001 0.5 2"'
+STIFF_ENOUGH = 1e-4
+"""One state at d = 0.9999 without pads: 1.5e-5 of the torque, 5e-5 of the forces, as measured."""
+
+
+@cache
+def generated(scene: Scene) -> Examined:
+    return examine(scene, None, {})
+
+
+def keys(scene: Scene, theirs: Examined) -> set[str]:
+    return {d.key for d in differences(generated(scene).described, theirs.described)}
+
+
+def errors(scene: Scene, examined: Examined, how: str) -> dict[str, float]:
+    (answer,) = (answer for answer in examined.answers if answer.engine == how)
+    assert answer.refusal is None, answer.refusal
+    return {
+        row.quantity: row.error
+        for row in compare("", scene, answer, solve(scene, at=answer.at), SIMULATED, COMPARED)
+        if row.quantity != "assembled"
+    }
+
+
+def test_the_generated_file_differs_in_nothing_and_agrees() -> None:
+    found = examine(CRANK_ROCKER, GENERATED, {})
+    assert keys(CRANK_ROCKER, found) == set()
+    for how in (ONE_STATE, THROUGH_TIME):
+        assert max(errors(CRANK_ROCKER, found, how).values()) <= SIMULATED.factor
+
+
+EDITS = [
+    ("coupler's mass", 'mass="0.5"', 'mass="5"', "bars.coupler.mass", "10^1 times: units?"),
+    ("inertia about the pin", "0.0016133333333333336", "0.0073733333333333336", "bars.output.inertia", ""),
+    ("mass centre", 'pos="0.05 0.0 0.0" mass="0.2"', 'pos="0.06 0.0 0.0" mass="0.2"', "bars.input.centre.distance", ""),
+    ("length", '"B4" pos="0.22 0.0 0.0"', '"B4" pos="0.23 0.0 0.0"', "lengths.output", "another linkage"),
+    ("gravity left out", "-9.81", "0.0", "gravity.y", "weight"),
+    ("damping", 'name="A" type="hinge"', 'name="A" type="hinge" damping="0.1"', "pins.A.damping", "couple"),
+    ("timestep", 'timestep="0.00100', 'timestep="0.00200', "option.timestep", "integration"),
+    ("integrator", '"RK4"', '"Euler"', "option.integrator", "RK4 four"),
+    ("impedance", "0.9999 0.9999", "0.95 0.95", "closure.softness", "at every timestep"),
+    ("tolerance", 'tolerance="0.0"', 'tolerance="1e-8"', "option.tolerance", "only 0 is tight"),
+    ("range", 'name="O4" type="hinge"', 'name="O4" type="hinge" range="0 1"', "pins.O4.range", "stop"),
+    ("load missing", '<general gaintype="fixed" gainprm="0" biastype="affine" name="load_2"', "", "actuators", ""),
+]
+
+
+@pytest.mark.parametrize(("what", "old", "new", "key", "word"), EDITS, ids=[edit[0] for edit in EDITS])
+def test_a_planted_difference_is_named(what: str, old: str, new: str, key: str, word: str) -> None:
+    assert old in GENERATED
+    text = GENERATED.replace(old, new) if new else re.sub(old + "[^>]*>", "", GENERATED)
+    if "range" in new:
+        text = text.replace('limit="disable"', "")
+    found = {d.key: d.remark for d in differences(generated(CRANK_ROCKER).described, described(text))}
+    assert key in found
+    assert word in found[key]
+
+
+def described(text: str) -> Mapping[str, float | str]:
+    from validation.engines.mujoco.anatomy import Anatomy
+    from validation.engines.mujoco.describe import described as describe
+    from validation.engines.mujoco.theirs import compile_text
+
+    return describe(Anatomy(compile_text(text), {}))
+
+
+@pytest.mark.parametrize(("old", "new"), [("-9.81", "-9.80"), ('mass="0.5"', 'mass="0.501"')])
+def test_what_a_difference_costs_is_seen(old: str, new: str) -> None:
+    found = examine(CRANK_ROCKER, GENERATED.replace(old, new), {})
+    assert errors(CRANK_ROCKER, found, ONE_STATE)["F12"] > SIMULATED.factor
+    assert errors(CRANK_ROCKER, found, THROUGH_TIME)["F12"] > SIMULATED.factor
+
+
+def other_plane(closure: str = 'site1="r" site2="q"', axis: str = "0 -1 0", option: str = "") -> str:
+    """The crank-rocker by another hand: x-z plane, away from the origin, other names, default closure."""
+    linkage = BARE.linkage
+
+    def inertial(number: int) -> str:
+        bar = linkage.bar(number)
+        r, phi = bar.centre or (0.0, 0.0)
+        x, z = r * math.cos(phi), r * math.sin(phi)
+        moments = " ".join([repr(bar.inertia)] * 3)
+        return f'<inertial pos="{x!r} 0 {z!r}" mass="{bar.mass!r}" diaginertia="{moments}"/>'
+
+    return f"""<mujoco><option gravity="0 0 -9.81" {option}/><default><joint axis="{axis}"/></default><worldbody>
+    <body name="crank" pos="1 2 3"><joint/>{inertial(2)}
+      <body name="rod" pos="0.1 0 0"><joint/>{inertial(3)}<site name="r" pos="0.25 0 0"/></body></body>
+    <body name="rocker" pos="1.3 2 3"><joint/>{inertial(4)}<site name="q" pos="0.22 0 0"/></body></worldbody>
+    <equality>{f"<connect {closure}/>" if closure else ""}</equality></mujoco>"""
+
+
+@pytest.mark.parametrize("axis", ["0 -1 0", "0 1 0"])
+def test_another_plane_and_a_reversed_axis_change_no_number(axis: str) -> None:
+    found = examine(BARE, other_plane(f'site1="r" site2="q" {STIFF}', axis), MINE)
+    assert max(errors(BARE, found, ONE_STATE).values()) < STIFF_ENOUGH
+    assert {"plane"} <= keys(BARE, found)
+    assert ("pins.A.positive" in keys(BARE, found)) == (axis == "0 1 0")
+
+
+def test_the_default_softness_costs_a_percent_or_so() -> None:
+    soft = examine(BARE, other_plane(), MINE)
+    assert "closure.softness" in keys(BARE, soft)
+    assert 1e-3 < errors(BARE, soft, ONE_STATE)["torque"] < 1e-1
+
+
+def test_body_anchors_on_an_open_rest_state_build_another_linkage() -> None:
+    found = examine(BARE, other_plane('body1="rod" body2="rocker" anchor="0.25 0 0"'), MINE)
+    (remark,) = (d.remark for d in differences(generated(BARE).described, found.described) if d.key == "lengths.output")
+    assert "body anchors" in remark
+    assert found.described["lengths.output"] == pytest.approx(0.05)
+
+
+def test_cut_at_another_pin_it_is_the_same_linkage() -> None:
+    """The rocker hangs on the coupler, and the loop closes at O4."""
+    text = other_plane().replace('<site name="r" pos="0.25 0 0"/></body></body>', "<ROCKER/></body></body>")
+    rocker = re.search('    <body name="rocker".*?</body>', text)
+    assert rocker is not None
+    hanging = rocker[0].replace('pos="1.3 2 3"', 'pos="0.25 0 0"')
+    # its own line runs from O4 to B: turned round, B is its origin
+    hanging = re.sub(
+        r'<inertial pos="(\S+) 0 (\S+)"', lambda m: f'<inertial pos="{float(m[1]) - 0.22!r} 0 {m[2]}"', hanging
+    ).replace('<site name="q" pos="0.22 0 0"/>', '<site name="q" pos="-0.22 0 0"/>')
+    text = text.replace(rocker[0], '<site name="r" pos="1.3 2 3"/>').replace("<ROCKER/>", hanging)
+    found = examine(BARE, text.replace('site1="r" site2="q"', f'site1="r" site2="q" {STIFF}'), MINE)
+    assert found.described["closure.pin"] == "O4"
+    assert not {key for key in keys(BARE, found) if key.startswith(("bars.", "lengths."))}
+    assert max(errors(BARE, found, ONE_STATE).values()) < STIFF_ENOUGH
+
+
+def test_a_servo_and_another_equality_are_taken_off_and_said() -> None:
+    text = GENERATED.replace("</actuator>", '<velocity name="servo" joint="O2" kv="10"/></actuator>')
+    text = text.replace("</equality>", '<joint joint1="O2" joint2="O4"/></equality>')
+    found = examine(CRANK_ROCKER, text, {})
+    assert any("servo" in note for note in found.notes)
+    assert any("switched off" in note for note in found.notes)
+    assert max(errors(CRANK_ROCKER, found, ONE_STATE).values()) <= SIMULATED.factor
+
+
+def test_a_loop_that_nothing_closes_is_seen_in_the_numbers() -> None:
+    text = other_plane("").replace('site name="r"', 'site name="B3"').replace('site name="q"', 'site name="B4"')
+    found = examine(BARE, text, MINE)
+    assert found.described["closure.by"] == "nothing"
+    assert np.isnan(errors(BARE, found, ONE_STATE)["F43"])
+    assert errors(BARE, found, ONE_STATE)["torque"] > 0.01
+
+
+def test_colliding_bars_are_seen() -> None:
+    text = GENERATED.replace('contype="0" conaffinity="0"', "").replace('contact="disable"', "")
+    found = examine(CRANK_ROCKER, text, {})
+    assert "contacts" in keys(CRANK_ROCKER, found)
+
+
+HOSTILE = [
+    ("include", "<mujoco><include file='/etc/passwd'/></mujoco>", "<include>"),
+    ("mesh file", "<mujoco><asset><mesh file='../m.stl'/></asset></mujoco>", "no other file"),
+    ("texture side", "<mujoco><asset><texture fileup='u.png'/></asset></mujoco>", "no other file"),
+    ("directory", "<mujoco><compiler meshdir='/'/></mujoco>", "no other file"),
+    ("plugin", "<mujoco><extension><plugin plugin='x'/></extension></mujoco>", "<extension>"),
+    ("thousand", "<mujoco><worldbody><replicate count='1000000'/></worldbody></mujoco>", "<replicate>"),
+    ("entities", "<!DOCTYPE a [<!ENTITY b 'c'>]><mujoco/>", "document type"),
+    ("other XML", "<robot/>", "<mujoco>"),
+    ("no XML", "four bars", "no XML"),
+    ("no text", b"\xff\xfe\x00", "UTF-8"),
+    ("null byte", "<mujoco model='a\0b'/>", "no XML"),
+    ("large", " " * (LARGEST_MJCF + 1), "smaller than"),
+    ("deep", "<mujoco>" + "<body>" * 10 * DEEPEST, "deeper"),
+    ("deep and closed", "<mujoco>" + "<b>" * 5000 + "</b>" * 5000 + "</mujoco>", "deeper"),
+]
+
+
+@pytest.mark.parametrize(("what", "text", "word"), HOSTILE, ids=[case[0] for case in HOSTILE])
+def test_what_an_mjcf_may_not_hold(what: str, text: str | bytes, word: str, tmp_path: Path) -> None:
+    path = tmp_path / "theirs.xml"
+    path.write_bytes(text if isinstance(text, bytes) else text.encode())
+    with pytest.raises(InputError) as caught:
+        read_mjcf(path)
+    assert word in str(caught.value) or (what == "deep" and "no XML" in str(caught.value))
+    assert "\n" not in str(caught.value)
+
+
+REFUSED = [
+    ("no such body", other_plane(), {}, "the file has: crank, rod, rocker"),
+    ("a slide", other_plane().replace("<joint/>", '<joint type="slide"/>', 1), MINE, "hinge"),
+    ("nothing closes", other_plane(""), MINE, "--name B3=SITE"),
+    ("does not compile", other_plane().replace("mass=", "weight="), MINE, "does not compile"),
+    ("two names, one body", other_plane(), {**MINE, "coupler": "crank"}, "three bodies"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("what", "text", "names", "word"), REFUSED, ids=[case[0] for case in REFUSED])
+def test_a_file_that_is_no_four_bar_is_one_line(what: str, text: str, names: dict[str, str], word: str) -> None:
+    with pytest.raises(InputError) as caught:
+        examine(BARE, text, names)
+    assert word in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def crash(scene: Scene, text: str | None, names: dict[str, str]) -> None:
+    os.kill(os.getpid(), signal.SIGSEGV)
+
+
+def hang(scene: Scene, text: str | None, names: dict[str, str]) -> None:
+    time.sleep(3600.0)
+
+
+def devour(scene: Scene, text: str | None, names: dict[str, str]) -> None:
+    bytearray(2 * model.MEMORY)
+
+
+@pytest.mark.parametrize(("what", "word"), [(crash, "crashed"), (hang, "did not come back"), (devour, "memory")])
+def test_a_file_that_breaks_the_engine_is_one_line(what: object, word: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(model, "EXAMINE", f"{__name__}:{what.__name__}")  # type: ignore[attr-defined]
+    monkeypatch.setattr(model, "SECONDS", 4.0)
+    with pytest.raises(InputError, match=word):
+        model._guarded(BARE, "<mujoco/>", {})
+
+
+def test_the_command_writes_and_prints_what_it_found(tmp_path: Path) -> None:
+    path = tmp_path / "mine\x1b[31m.xml"
+    path.write_text(other_plane().replace('name="rod"', 'name="rod&#60;b&#62;|"'))
+    scene = tmp_path / "scene.toml"
+    scene.write_text(fourbar.dump(BARE))
+    names = [f"--name={role}={name}" for role, name in {**MINE, "coupler": "rod<b>|"}.items()]
+    arguments = [str(scene), "--mjcf", str(path), *names, "--out", str(tmp_path / "out")]
+    result = CliRunner().invoke(validation.run.command, arguments, standalone_mode=False)
+    assert result.return_value == 1, result.output
+    assert "\x1b" not in result.output
+    assert "closure.softness" in result.output
+    told = (tmp_path / "out" / "theirs.md").read_text()
+    assert "\x1b" not in told
+    assert any(row.verdict == FAILS and row.engine == ONE_STATE for row in from_csv(tmp_path / "out" / "results.csv"))
+
+
+@pytest.mark.parametrize("arguments", [["--mjcf", "x.xml"], ["SCENE", "--mjcf", "x.xml", "--name", "wheel=a"]])
+def test_bad_options_are_said(arguments: list[str], tmp_path: Path) -> None:
+    scene = tmp_path / "scene.toml"
+    scene.write_text(fourbar.dump(BARE))
+    result = CliRunner().invoke(
+        validation.run.command, [str(scene) if word == "SCENE" else word for word in arguments], standalone_mode=False
+    )
+    assert isinstance(result.exception, InputError)

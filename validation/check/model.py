@@ -1,0 +1,192 @@
+"""`run SCENE --mjcf THEIRS.xml`: what differs from the generated MJCF, and what it costs in accuracy.
+
+The file is somebody's: it is compiled and run in a process of its own, with a limit on time and memory.
+"""
+
+import math
+import os
+import tempfile
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from fourbar.errors import FourBarError, InputError
+from fourbar.scene import Scene, solve
+from fourbar.writing import write_text
+from validation.answer import Answer
+from validation.check.differences import Difference, differences
+from validation.check.screen import read_mjcf
+from validation.check.shown import printable
+from validation.compare import COMPARED, compare
+from validation.report.markdown import cell, number
+from validation.results import FAILS, Row, write_results
+from validation.tolerance import SIMULATED
+
+SECONDS = 120.0
+"""A four-bar takes less than one."""
+MEMORY = 8 * 2**30
+"""Bytes of address space; a file can ask for any amount."""
+HEADINGS = ("quantity", "theirs", "generated", "allowed", "verdict")
+EXAMINE = "validation.engines.mujoco.theirs:examine"
+
+
+@dataclass(frozen=True, slots=True)
+class Cost:
+    """One quantity, asked in one way: the error of their file, and of the generated one beside it."""
+
+    row: Row
+    generated: float
+
+    @property
+    def asked(self) -> str:
+        """How."""
+        return f"{self.row.engine} {self.row.setting}"
+
+    def cells(self) -> tuple[str, ...]:
+        """Under HEADINGS; a row without an error says why."""
+        row = self.row
+        verdict = row.verdict if not math.isnan(row.error) else f"{row.verdict}: {row.reason}"
+        return row.quantity, number(row.error), number(self.generated), number(row.allowed), verdict
+
+
+@dataclass(frozen=True, slots=True)
+class ModelReport:
+    """All that is said about somebody's file."""
+
+    differences: list[Difference]
+    costs: list[Cost]
+    notes: list[str]
+
+    def asked(self) -> list[str]:
+        """The ways in which their file was asked."""
+        return list(dict.fromkeys(cost.asked for cost in self.costs))
+
+    @property
+    def fails(self) -> int:
+        """Comparisons of their file that fail."""
+        return sum(cost.row.verdict == FAILS for cost in self.costs)
+
+
+def named(pairs: tuple[str, ...]) -> dict[str, str]:
+    """ROLE=NAME pairs of the command line."""
+    allowed = ("input", "coupler", "output", "B3", "B4")
+    names = {}
+    for pair in pairs:
+        role, equals, name = pair.partition("=")
+        if not equals or role not in allowed or not name:
+            raise InputError("--name", pair, f"must be ROLE=NAME, ROLE one of {', '.join(allowed)}")
+        names[role] = name
+    return names
+
+
+def examine_model(name: str, scene: Scene, mjcf: Path, names: Mapping[str, str]) -> ModelReport:
+    """Examine a file in a guarded process, and the generated one in the same way."""
+    text = read_mjcf(mjcf)
+    generated, theirs = _guarded(scene, None, {}), _guarded(scene, text, names)
+    beside = {(row.engine, row.quantity): row.error for row in _rows(name, scene, generated.answers)}
+    rows = _rows(name, scene, theirs.answers)
+    costs = [Cost(row, beside.get((row.engine, row.quantity), math.nan)) for row in rows]
+    return ModelReport(differences(generated.described, theirs.described), costs, theirs.notes)
+
+
+def _rows(name: str, scene: Scene, answers: list[Answer]) -> list[Row]:
+    found = []
+    for answer in answers:
+        formulas = solve(scene, at=answer.at)
+        found += compare(name, scene, answer, formulas, SIMULATED, COMPARED)
+    return found
+
+
+def _guarded(scene: Scene, text: str | None, names: Mapping[str, str]) -> Any:
+    """The examination, in a process that may crash, hang or run out of memory."""
+    from multiprocessing import get_context
+
+    from pebble import ProcessExpired, ProcessPool
+
+    with ProcessPool(max_workers=1, context=get_context("spawn"), initializer=_confine) as pool:
+        future = pool.schedule(_examine, args=(EXAMINE, scene, text, dict(names)), timeout=SECONDS)
+        try:
+            return future.result()
+        except FourBarError:
+            raise
+        except TimeoutError:
+            reason = f"MuJoCo did not come back in {SECONDS:g} s"
+        except MemoryError:
+            reason = f"asks for more than {MEMORY // 2**30} GB of memory"
+        except ProcessExpired as error:
+            reason = f"MuJoCo crashed on it (exit code {error.exitcode})"
+    raise InputError("--mjcf", "the file", reason)
+
+
+def _confine() -> None:
+    """Memory bounded, and MuJoCo's log where it is swept away."""
+    os.chdir(tempfile.gettempdir())
+    try:
+        import resource
+    except ImportError:  # only systems of the Unix family can bound it
+        return
+    _, hard = resource.getrlimit(resource.RLIMIT_AS)
+    resource.setrlimit(resource.RLIMIT_AS, (MEMORY if hard < 0 else min(MEMORY, hard), hard))
+
+
+def _examine(adapter: str, scene: Scene, text: str | None, names: dict[str, str]) -> Any:
+    from importlib import import_module
+
+    module, _, function = adapter.partition(":")
+    return getattr(import_module(module), function)(scene, text, names)
+
+
+def tell(report: ModelReport, mjcf: Path, out: Path) -> None:
+    """Print the report and write theirs.md and results.csv."""
+    from rich.box import SIMPLE_HEAD
+    from rich.console import Console
+    from rich.markup import escape
+    from rich.table import Table
+
+    console = Console()
+    shown = Table(title=f"{escape(printable(mjcf.name))} against the generated MJCF", box=SIMPLE_HEAD)
+    for heading in ("what differs", "generated", "theirs", "what it does"):
+        shown.add_column(heading, overflow="fold")
+    for d in report.differences:
+        shown.add_row(*(escape(printable(text)) for text in (d.key, value(d.generated), value(d.theirs), d.remark)))
+    console.print(shown if report.differences else "It differs in nothing from the generated MJCF.")
+    for note in report.notes:
+        console.print(f"note: {escape(printable(note))}")
+    for asked in report.asked():
+        costs = Table(title=f"what it costs, {escape(printable(asked))}: error", box=SIMPLE_HEAD, pad_edge=False)
+        for heading in HEADINGS:
+            costs.add_column(heading, overflow="fold")
+        for cost in report.costs:
+            if cost.asked == asked:
+                style = "bold red" if cost.row.verdict == FAILS else ""
+                costs.add_row(*(escape(printable(text)) for text in cost.cells()), style=style)
+        console.print(costs)
+    out.mkdir(parents=True, exist_ok=True)
+    write_text(out / "theirs.md", markdown(report, mjcf))
+    write_results([cost.row for cost in report.costs], out / "results.csv")
+    said = f"{report.fails} of {len(report.costs)} comparisons fail; {len(report.differences)} differences"
+    console.print(f"[bold]{said}[/]; written to {escape(printable(str(out)))}")
+
+
+def markdown(report: ModelReport, mjcf: Path) -> str:
+    """The same as text for a page."""
+    lines = [
+        f"# {cell(printable(mjcf.name))} against the generated MJCF",
+        "",
+        "| what differs | generated | theirs | what it does |",
+    ]
+    lines += ["|---|---|---|---|"]
+    for d in report.differences:
+        entries = (d.key, value(d.generated), value(d.theirs), d.remark)
+        lines.append("| " + " | ".join(cell(printable(text)) for text in entries) + " |")
+    lines += ["", *(f"- {cell(printable(note))}" for note in report.notes), "", "## What it costs", ""]
+    lines += [f"| asked | {' | '.join(HEADINGS)} |", "|---|---|---|---|---|---|"]
+    for cost in report.costs:
+        lines.append("| " + " | ".join(cell(printable(text)) for text in (cost.asked, *cost.cells())) + " |")
+    return "\n".join(lines) + "\n"
+
+
+def value(entry: float | str) -> str:
+    """A number with the digits that tell it apart, or the word itself."""
+    return entry if isinstance(entry, str) else f"{entry:.12g}"

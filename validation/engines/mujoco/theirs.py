@@ -1,0 +1,314 @@
+"""Somebody's own MJCF of a linkage, asked for the torque and the pin forces of a scene.
+
+At one state: its own assembly and speeds, then the couple on the driven bar with which its crank
+accelerates as commanded; the accelerations are linear in that couple, so a few `mj_forward` find it.
+Through time: the same, at the states that its own timestep, integrator and closure lead to, a
+flywheel on pin O2 keeping the speed. The file's own drive on that pin is taken off in both.
+"""
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from fourbar.errors import InputError, LimitError
+from fourbar.linkage import PINS
+from fourbar.mjcf import flywheel, mjcf, run_through
+from fourbar.scene import Command, Scene, command
+from fourbar.solution import VECTORS
+from validation.answer import Answer, Array
+from validation.compare import COMPARED
+from validation.engines.loop import Position
+from validation.engines.mujoco.anatomy import HIGHER, Anatomy
+from validation.engines.mujoco.closed_loop import WARNINGS
+from validation.engines.mujoco.describe import Described, described
+
+ONE_STATE, THROUGH_TIME = "mjcf-one-state", "mjcf-simulated"
+POSITIONS = 37
+"""Positions asked of a sweep: a file is judged as a whole, not position by position."""
+MOST_STEPS = 400_000
+"""A revolution at 628 steps per turn is a thousandth of this; more would be minutes."""
+REFINEMENTS = 3
+"""Secant steps after the first: each gains the digits that the one before has."""
+MOVES = 1e-3
+"""rad; a crank that misses its angle by more was not kept at its speed."""
+SHARED = "theta_2, omega_2, alpha_2 and the branch; the rest is the file's"
+OWN = "assembly, speeds, accelerations, drive torque and pin forces, by MuJoCo from the file as compiled"
+
+
+@dataclass(slots=True)
+class Examined:
+    """What was found of one file."""
+
+    described: Described
+    answers: list[Answer]
+    notes: list[str]
+
+
+def compile_text(text: str) -> mujoco.MjModel:
+    """MuJoCo's compiler on a text; its complaint as an InputError of one line."""
+    try:
+        return mujoco.MjModel.from_xml_string(text)
+    except ValueError as error:
+        raise InputError("--mjcf", None, " ".join(f"MuJoCo does not compile it: {error}".split())) from None
+
+
+def examine(scene: Scene, text: str | None, names: Mapping[str, str]) -> Examined:
+    """Describe an MJCF, ask it at single states, and run it through time; None: the one generated from the scene."""
+    model = compile_text(mjcf(scene) if text is None else text)
+    anatomy = Anatomy(model, names)
+    at = _positions(command(scene))
+    loop = Loop(anatomy, scene)
+    answers = [_answered(ONE_STATE, scene, lambda: one_state(loop, at))]
+    if at.omega_2 is not None and np.any(at.omega_2) and np.ptp(at.theta_2) > 0.0:
+        answers.append(_answered(THROUGH_TIME, scene, lambda: through_time(loop, at)))
+    return Examined(described(anatomy), answers, loop.notes)
+
+
+def _positions(at: Command) -> Command:
+    """At most so many of the positions, spread evenly."""
+    n = len(at.theta_2)
+    if at.omega_2 is None:
+        raise InputError("motion.omega_2", None, "is needed: without a speed there is no torque to compare")
+    if np.ptp(at.omega_2) != 0.0 or np.ptp(at.alpha_2) != 0.0:
+        raise LimitError("omega_2 or alpha_2 differs from position to position: that is no one motion through time")
+    keep = np.unique(np.linspace(0, n - 1, min(n, POSITIONS)).round().astype(int))
+    return Command(at.theta_2[keep], at.branch[keep], float(np.max(at.omega_2)), float(np.max(at.alpha_2)))
+
+
+def _answered(name: str, scene: Scene, ask: Callable[[], Answer]) -> Answer:
+    start = time.perf_counter()
+    try:
+        answer = ask()
+    except LimitError as error:
+        answer = Answer(name, "-", refusal=str(error))
+    answer.shared, answer.own, answer.seconds = SHARED, OWN, time.perf_counter() - start
+    return answer
+
+
+class Loop:
+    """Somebody's model with its drive taken off; coordinates x = (theta_2, theta_3 - theta_2, theta_4)."""
+
+    def __init__(self, anatomy: Anatomy, scene: Scene) -> None:
+        self.anatomy, self.scene, self.model = anatomy, scene, anatomy.model
+        self.data = mujoco.MjData(self.model)
+        self.notes: list[str] = []
+        self.to_joints, self.from_joints = anatomy.to_joints, np.linalg.inv(anatomy.to_joints)
+        self.crank = None if anatomy.cut == "O2" else int(self.model.jnt_dofadr[anatomy.hinge["O2"]])
+        self.armature = 0.0 if self.crank is None else float(self.model.dof_armature[self.crank])
+        self._take_off_the_drive()
+        self._loads = [i for i in range(self.model.nu) if self.model.actuator_trntype[i] == mujoco.mjtTrn.mjTRN_SITE]
+        self._jac, self._spin = np.zeros((3, self.model.nv)), np.zeros((3, self.model.nv))
+
+    def _take_off_the_drive(self) -> None:
+        model, joint = self.model, self.anatomy.hinge.get("O2")
+        for i in range(model.nu):
+            if model.actuator_trntype[i] == mujoco.mjtTrn.mjTRN_JOINT and model.actuator_trnid[i, 0] == joint:
+                model.actuator_gainprm[i], model.actuator_biasprm[i] = 0.0, 0.0
+                self.notes.append(
+                    f"its drive {model.actuator(i).name!r} on pin O2 is taken off: the torque is solved for"
+                )
+        for i in range(model.neq):
+            if i != self.anatomy.closure and model.eq_active0[i] and self.anatomy.closed_by != "tendon":
+                self.data.eq_active[i] = 0
+                self.notes.append(f"its equality {model.equality(i).name or i!r} is switched off: it is no pin")
+
+    # what `Position` asks of a tree
+    def place(self, x: Sequence[float]) -> None:
+        """Move to a configuration."""
+        self.data.qpos[:] = self.anatomy.qpos(x)
+        mujoco.mj_kinematics(self.model, self.data)
+        mujoco.mj_comPos(self.model, self.data)
+
+    def gap(self) -> tuple[float, float]:
+        """What the cut pin is open by, (2,), m."""
+        first, second = (self.anatomy.world(self.data, bar, self.anatomy.cut) for bar in HIGHER[self.anatomy.cut])
+        x, y = self.anatomy.in_plane(first - second).tolist()
+        return x, y
+
+    def jacobian(self) -> Array:
+        """Derivative of the gap by x, (2, 3)."""
+        rows = []
+        for bar in HIGHER[self.anatomy.cut]:
+            body, at = self.anatomy.root[bar], self.anatomy.world(self.data, bar, self.anatomy.cut)
+            mujoco.mj_jac(self.model, self.data, self._jac, None, at, body)
+            rows.append(self._jac[list(self.anatomy.axes)] @ self.to_joints)
+        return np.asarray(rows[0] - rows[1])
+
+    def positions(self) -> dict[str, Array]:
+        """A, B, O4, and the end of bar 4, laid off bar by bar from O2, (2,), m."""
+        line = {bar: self.anatomy.line(self.data, bar) for bar in (1, 2, 3, 4)}
+        return {"A": line[2], "B": line[2] + line[3], "O4": line[1], "B4": line[1] + line[4]}
+
+    def speeds(self, omega_2: float) -> Array:
+        """Joint speeds that keep the gap closed where the model is placed, (3,)."""
+        jacobian = self.jacobian()
+        others = np.linalg.solve(jacobian[:, 1:], -jacobian[:, 0] * omega_2)
+        return np.asarray(self.to_joints @ (omega_2, *others))
+
+    def ask(self, q: Array, v: Array, alpha_2: float) -> dict[str, Array | float]:
+        """Everything at a state at which the crank accelerates at alpha_2, the driven bar's couple solved for."""
+        data, drive = self.data, self.scene.drive_bar
+        active = data.eq_active.copy()
+        mujoco.mj_resetData(self.model, data)
+        data.eq_active[:] = active
+        data.qpos[:], data.qvel[:] = q, v
+        if self.crank is not None:  # what its own armature takes belongs to the drive
+            data.qfrc_applied[self.crank] = self.armature * self.anatomy.sense["O2"] * alpha_2
+        body = self.anatomy.root[drive]
+
+        def acceleration(couple: float) -> float:
+            data.xfrc_applied[body, 3:] = couple * self.anatomy.normal
+            mujoco.mj_forward(self.model, data)
+            return float((self.from_joints @ data.qacc)[0])
+
+        at_rest = acceleration(0.0)
+        inertia = float(self.model.dof_M0.sum())
+        trial = inertia * max(abs(alpha_2 - at_rest), np.finfo(float).tiny / np.finfo(float).eps)
+        slope = (acceleration(trial) - at_rest) / trial
+        if slope == 0.0 or not np.isfinite(slope):
+            raise LimitError(f"a couple on bar {drive} does not move the crank of this model")
+        couple = (alpha_2 - at_rest) / slope
+        for _ in range(REFINEMENTS):
+            couple += (alpha_2 - acceleration(couple)) / slope
+        acceleration(couple)
+        mujoco.mj_rnePostConstraint(self.model, data)
+        values: dict[str, Array | float] = {"torque": couple}
+        turned = (self.anatomy.angles(data), self.from_joints @ data.qvel, self.from_joints @ data.qacc)
+        for name, (two, three, four) in zip(("theta", "omega", "alpha"), turned, strict=True):
+            values |= {f"{name}_2": two, f"{name}_3": two + three, f"{name}_4": four}
+        return values | self._forces()
+
+    def _forces(self) -> dict[str, Array]:
+        """F12, F32, F43, F14 in the plane; NaN at a cut pin that no connect or weld holds."""
+        data, anatomy = self.data, self.anatomy
+        on: dict[tuple[int, int], Array] = {}
+        for pin in anatomy.hinge:
+            child, parent = anatomy.turning(pin)
+            force = data.cfrc_int[anatomy.root[child], 3:].copy()
+            for load in self._loads:
+                body, pushed = self._load(load)
+                if self._carries(anatomy.root[child], body):
+                    force -= pushed
+            on[parent, child] = anatomy.in_plane(force)
+        bars = PINS[anatomy.cut]
+        force = np.full(2, np.nan)
+        if anatomy.closure is not None:
+            rows = np.flatnonzero(
+                (data.efc_type == mujoco.mjtConstraint.mjCNSTR_EQUALITY) & (data.efc_id == anatomy.closure)
+            )
+            force = anatomy.in_plane(data.efc_force[rows[:3]]) if len(rows) else force
+            if anatomy.first == bars[0]:
+                on[bars[1], bars[0]] = force
+            else:
+                on[bars[0], bars[1]] = force
+        else:
+            on[bars] = force
+        wanted = {"F12": (1, 2), "F32": (3, 2), "F43": (4, 3), "F14": (1, 4)}
+        return {name: on[i, j] if (i, j) in on else -on[j, i] for name, (i, j) in wanted.items()}
+
+    def _load(self, actuator: int) -> tuple[int, Array]:
+        """Body and world force of an actuator on a site: MuJoCo counts it into the force of the parent."""
+        site, frame = self.model.actuator_trnid[actuator]
+        axes = self.data.site_xmat[frame if frame >= 0 else site].reshape(3, 3)
+        force = axes @ self.model.actuator_gear[actuator, :3] * self.data.actuator_force[actuator]
+        return int(self.model.site_bodyid[site]), np.asarray(force)
+
+    def _carries(self, bearer: int, body: int) -> bool:
+        """Whether a body hangs, however far down, on another."""
+        while body not in (bearer, 0):
+            body = int(self.model.body_parentid[body])
+        return body == bearer
+
+
+def one_state(loop: Loop, at: Command) -> Answer:
+    """Every position by itself."""
+    n = len(at.theta_2)
+    out = _empty(n)
+    assembled = np.zeros(n, dtype=bool)
+    position, gap, contacts = Position(loop), 0.0, 0  # type: ignore[arg-type]  # it asks for four methods alone
+    assert isinstance(at.omega_2, float) and isinstance(at.alpha_2, float)
+    for i, (theta_2, branch) in enumerate(zip(at.theta_2.tolist(), at.branch.tolist(), strict=True)):
+        x = position.find(theta_2, branch)
+        if x is None:
+            continue
+        assembled[i] = True
+        gap = max(gap, float(np.hypot(*loop.gap())))
+        try:
+            v = loop.speeds(at.omega_2)
+        except np.linalg.LinAlgError:
+            continue
+        values = loop.ask(loop.data.qpos.copy(), v, at.alpha_2)
+        contacts = max(contacts, int(loop.data.ncon))
+        for name, array in out.items():
+            array[i] = values[name]
+    if contacts:
+        loop.notes.append(f"{contacts} contacts at a position where nothing but pins should touch")
+    evidence = {"closure_gap_m": gap, "contacts": float(contacts)}
+    return Answer(ONE_STATE, "as compiled", at, assembled, out, evidence=evidence)
+
+
+def through_time(loop: Loop, at: Command) -> Answer:
+    """The longest stretch of positions that assembles, run through at the file's own timestep."""
+    model, data = loop.model, mujoco.MjData(loop.model)
+    data.eq_active[:] = loop.data.eq_active
+    if loop.crank is None:
+        raise LimitError("pin O2 is not a hinge in this file: nothing can keep its crank at a speed")
+    assert isinstance(at.omega_2, float) and isinstance(at.alpha_2, float)
+    position = Position(loop)  # type: ignore[arg-type]
+    stretch = _longest_stretch(position, at)
+    if len(stretch) < 2:
+        raise LimitError("nowhere do two neighbouring positions assemble in this file")
+    run = run_through(at.theta_2[stretch], at.omega_2, at.alpha_2)
+    timestep, sense = float(model.opt.timestep), loop.anatomy.sense["O2"]
+    if run.time(run.stop) > MOST_STEPS * timestep:
+        raise LimitError(f"its timestep of {timestep:g} s asks for more than {MOST_STEPS} steps")
+    position.find(float(at.theta_2[stretch[0]]), int(at.branch[stretch[0]]))
+    data.qpos[:], data.qvel[:] = loop.data.qpos, loop.speeds(at.omega_2)
+    heavy = max(loop.armature, flywheel(loop.scene))
+    out, seen, done = _empty(len(stretch)), {"closure_gap_m": 0.0, "speed_error": 0.0}, 0
+    alarms: list[str] = []
+    for i, index in enumerate(stretch):
+        step = round(run.time(float(at.theta_2[index])) / timestep)
+        model.dof_armature[loop.crank] = heavy
+        data.qfrc_applied[loop.crank] = heavy * sense * at.alpha_2
+        if step > done:
+            mujoco.mj_step(model, data, step - done)
+            done = step
+        mujoco.mj_forward(model, data)
+        if data.time < (done - 0.5) * timestep or any(data.warning[kind].number for kind in WARNINGS):
+            alarms.append("the simulation of this file blew up")
+            break
+        alpha_2 = float((loop.from_joints @ data.qacc)[0])
+        model.dof_armature[loop.crank] = loop.armature
+        values = loop.ask(data.qpos.copy(), data.qvel.copy(), alpha_2)
+        seen["closure_gap_m"] = max(seen["closure_gap_m"], float(np.hypot(*loop.gap())))
+        seen["speed_error"] = max(seen["speed_error"], abs(float(values["omega_2"]) / at.omega_2 - 1.0))
+        for name, array in out.items():
+            array[i] = values[name]
+    model.dof_armature[loop.crank] = loop.armature
+    known = np.isfinite(out["theta_2"])
+    out = {name: array[known] for name, array in out.items()}
+    where = Command(out["theta_2"], at.branch[stretch][known], out["omega_2"], out["alpha_2"])
+    setting = f"{mujoco.mjtIntegrator(model.opt.integrator).name.removeprefix('mjINT_')} {timestep:g} s"
+    return Answer(THROUGH_TIME, setting, where, np.ones(known.sum(), dtype=bool), out, evidence=seen, alarms=alarms)
+
+
+def _longest_stretch(position: Position, at: Command) -> list[int]:
+    """Neighbouring positions that assemble, in order of time."""
+    assert isinstance(at.omega_2, float)
+    order = np.argsort(at.theta_2 if at.omega_2 > 0.0 else -at.theta_2, kind="stable").tolist()
+    stretches: list[list[int]] = [[]]
+    for index in order:
+        if position.find(float(at.theta_2[index]), int(at.branch[index])) is None:
+            stretches.append([])
+        else:
+            stretches[-1].append(index)
+    return max(stretches, key=len)
+
+
+def _empty(n: int) -> dict[str, Array]:
+    names = (*COMPARED, "theta_2", "omega_2", "alpha_2")
+    return {name: np.full((n, 2) if name in VECTORS else n, np.nan) for name in names}
