@@ -37,6 +37,10 @@ PASSES = 1000
 """Passes over pin loads and the friction they make; each lessens the error where the friction is unique."""
 REPEATED = 2.0 * 2.0**-52
 """Change of a pin load, relative, that is rounding."""
+ROUNDED = 1e-11
+"""Change, relative, at or below which one that no longer falls is rounding, beside a pole of the torque too."""
+DIVERGED = 1e100
+"""Load, N, that only passes running away from each other reach."""
 NOT_ANSWERED = frozenset(
     (
         *("theta_2", "omega_2", "alpha_2", "condition", "drive_condition"),
@@ -218,20 +222,34 @@ def _motion_and_forces(
         values.update({f"a_{name}": value for name, value in tree.accelerations().items()})
         matrix = np.column_stack((jacobian.T, e_drive))
         forces = _forces(tree, matrix, needed)
-        for _ in range(PASSES if loaded else 0):
-            loads = {pin: math.hypot(*forces[PIN_FORCE[pin]]) for pin in loaded}
-            change = max(abs(load - tree.pin_loads.get(pin, 0.0)) for pin, load in loads.items())
-            if change <= REPEATED * max(loads.values()):
-                break
-            tree.pin_loads = loads
-            forces = _forces(tree, matrix, tree.torques(v, a))
-        else:
-            if loaded:  # its loads never settle: no answer, rather than that of some pass
+        if loaded:
+            settled = _settle(tree, loaded, forces, lambda: _forces(tree, matrix, tree.torques(v, a)))
+            if settled is None:  # no answer, rather than that of some pass
                 return values
+            forces = settled
     except np.linalg.LinAlgError:
         return {}
     values.update(forces)
     return values
+
+
+def _settle(
+    tree: Tree, loaded: Sequence[str], forces: dict[str, Any], again: Callable[[], dict[str, Any]]
+) -> dict[str, Any] | None:
+    """Passes over pin loads and the friction they make, until they repeat; None where they never do."""
+    before = math.inf
+    for _ in range(PASSES):
+        loads = {pin: math.hypot(*forces[PIN_FORCE[pin]]) for pin in loaded}
+        most = max(loads.values())
+        change = max(abs(load - tree.pin_loads.get(pin, 0.0)) for pin, load in loads.items())
+        # once down to the rounding of a pass, the change falls no further
+        if change <= REPEATED * most or before <= change <= ROUNDED * most:
+            return forces
+        if not most < DIVERGED:
+            return None
+        before, tree.pin_loads = change, loads
+        forces = again()
+    return None
 
 
 def _forces(tree: Tree, matrix: Array, needed: Array) -> dict[str, Any]:

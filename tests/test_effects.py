@@ -1,0 +1,255 @@
+"""Each effect and each pair of effects through every engine that has it, and faults that the run must catch."""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+import pytest
+
+import fourbar
+from fourbar.effects import (
+    REGISTRY,
+    Effect,
+    Flywheel,
+    Friction,
+    Gravity,
+    Load,
+    PinFriction,
+    Point,
+    Spring,
+    Springs,
+    Table,
+    Torsion,
+    Viscous,
+    Wrenches,
+)
+from fourbar.scene import Scene
+from tests.scenes import crank_rocker
+from validation.judge import WITNESSES, judge
+
+TABLE = Table((0.0, 1.0, 2.5, 2 * np.pi), (0.0, 1.0, -0.5, 0.0))
+ACTING: dict[str, Effect] = {
+    "gravity": Gravity(9.81, 0.3),
+    "viscous": Viscous.at(O2=0.02, A=0.03, B=0.04, O4=0.05),
+    "friction": Friction.at(O2=0.02, A=0.03, B=0.04, O4=0.05),
+    "pin_friction": PinFriction.at(O2=(0.2, 0.01), A=(0.3, 0.01), B=(0.1, 0.02), O4=(0.2, 0.01)),
+    "torsion": Torsion.at(O4=(2.0, 1.9, 0.1), B=(1.0, 0.8, -0.2)),
+    "springs": Springs(
+        (
+            Spring(Point(1, 0.1, -1.5), Point(4, 0.08, 0.2), 200.0, 0.05, 3.0),
+            Spring(Point(2, 0.05, 0.5), Point(3, 0.1, 0.3), 50.0, 0.05, 1.0),
+        )
+    ),
+    "flywheel": Flywheel(0.02, 2),
+    "load": Load(4, (3.0, 0.7), (0.05, 1.0), 0.2, "bar"),
+    "load over theta_2": Load(3, (4.0, 0.7), (0.05, 1.0), 0.2, "world", TABLE),
+}
+EXACT = [witness for witness in WITNESSES if not witness.through_time]
+SIMULATED = [replace(witness, order="") for witness in WITNESSES if witness.through_time]
+INVERSE = {"pinocchio-inverse", "mujoco-inverse"}
+NO_COUNTERPART = {"energy-method": {"pin_friction"}, "mujoco-simulated": {"pin_friction", "load over theta_2"}}
+"""What an engine cannot do; it must say so, and the others remain."""
+
+
+def scene(*names: str, steps: int = 12) -> Scene:
+    """A crank-rocker with the effects named, driven on bar 2."""
+    terms = [ACTING[name] for name in names]
+    return crank_rocker(
+        motion=fourbar.Motion(fourbar.Sweep(0.13, 0.13 + 2 * np.pi, steps), 10.0, 3.0),
+        loads=tuple(term for term in terms if isinstance(term, Load)),
+        effects=tuple(term for term in terms if not isinstance(term, Load)),
+    )
+
+
+def failing(asked: Scene, witnesses: list[Any]) -> list[tuple[str, str, str]]:
+    return [(r.engine, r.quantity, r.reason) for r in judge("scene", asked, witnesses).rows if not r.passed]
+
+
+def refusing(asked: Scene, witnesses: list[Any]) -> set[str]:
+    return {r.engine for r in judge("scene", asked, witnesses).rows if r.verdict == "refuses"}
+
+
+def test_every_effect_of_the_registry_is_here() -> None:
+    assert set(REGISTRY) <= set(ACTING)
+
+
+@pytest.mark.parametrize("names", [*((one,) for one in ACTING), *combinations(ACTING, 2)], ids="+".join)
+def test_exact_engines_agree(names: tuple[str, ...]) -> None:
+    asked = scene(*names)
+    assert failing(asked, EXACT) == []
+    expected = {engine for engine, effects in NO_COUNTERPART.items() if effects & set(names)} - {"mujoco-simulated"}
+    assert refusing(asked, EXACT) == expected
+
+
+@pytest.mark.parametrize("names", [*((one,) for one in ACTING), tuple(ACTING)], ids="+".join)
+def test_the_simulation_agrees_or_says_what_it_has_no_counterpart_for(names: tuple[str, ...]) -> None:
+    asked = scene(*names)
+    assert failing(asked, SIMULATED) == []
+    missing = NO_COUNTERPART["mujoco-simulated"] & set(names)
+    assert refusing(asked, SIMULATED) == ({"mujoco-simulated"} if missing else set())
+
+
+@pytest.mark.parametrize("pair", list(combinations(sorted(ACTING.keys() - NO_COUNTERPART["mujoco-simulated"]), 2)))
+def test_the_simulation_agrees_on_pairs(pair: tuple[str, str]) -> None:
+    assert failing(scene(*pair), SIMULATED) == []
+
+
+@pytest.mark.parametrize("drive", [2, 3, 4])
+@pytest.mark.parametrize("branch", [1, -1])
+def test_all_at_once_on_every_drive_and_branch(drive: int, branch: int) -> None:
+    asked = scene(*ACTING)
+    motion = replace(asked.motion, branch=branch, omega_2=-7.0)
+    assert failing(replace(asked, drive_bar=drive, motion=motion), EXACT) == []
+
+
+def test_a_turned_frame_turns_gravity_with_it() -> None:
+    """Ground, input and gravity turned by one angle: the same torque and the same forces, turned."""
+    asked, by = scene("gravity"), 0.7
+    motion = replace(asked.motion, theta_2=fourbar.Sweep(0.13 + by, 0.13 + by + 2 * np.pi, 12))
+    turned = replace(
+        asked,
+        linkage=replace(asked.linkage, ground_angle=asked.linkage.ground_angle + by),
+        motion=motion,
+        effects=(Gravity(9.81, 0.3 + by),),
+    )
+    one, other = fourbar.solve(asked), fourbar.solve(turned)
+    assert one.torque is not None and one.F32 is not None and other.F32 is not None
+    # 60 roundings of numbers of the size of the largest
+    assert other.torque == pytest.approx(one.torque, abs=60 * 2.0**-52 * np.abs(one.torque).max(), rel=0)
+    spin = np.exp(1j * by)
+    expected = (one.F32 @ [1, 1j]) * spin
+    assert np.abs(other.F32 @ [1, 1j] - expected).max() <= 60 * 2.0**-52 * np.abs(expected).max()
+
+
+# faults
+
+
+def changed(effect: Effect, factor: float) -> Callable[[Any, Wrenches, Any], None]:
+    right = type(effect).add_wrenches
+
+    def faulty(self: Any, wrenches: Wrenches, state: Any) -> None:
+        alone = Wrenches(state)
+        right(self, alone, state)
+        for bar in (2, 3, 4):
+            wrenches.add_force(bar, tuple(factor * x for x in alone.force(bar)))  # type: ignore[arg-type]
+            wrenches.add_moment(bar, factor * alone.moment(bar))
+
+    return faulty
+
+
+OTHER_PIN = {"O2": "A", "A": "B", "B": "O4", "O4": "O2"}
+
+
+def moved(effect: Effect) -> Effect:
+    """The effect at another pin, on another bar, or in another direction."""
+    match effect:
+        case Viscous():
+            return Viscous.at(**{OTHER_PIN[pin]: k for pin, k in effect.coefficients})
+        case Friction():
+            return Friction.at(**{OTHER_PIN[pin]: f for pin, f in effect.torques})
+        case PinFriction():
+            return PinFriction.at(**{OTHER_PIN[pin]: (mu, r) for pin, mu, r in effect.pins})
+        case Torsion():
+            return Torsion.at(**{OTHER_PIN[pin]: (k, rest, preload) for pin, k, rest, preload in effect.springs})
+        case Springs():
+            first, *others = effect.springs
+            return Springs((replace(first, end=first.end._replace(bar=3)), *others))
+        case Flywheel():
+            return Flywheel(effect.inertia, 4)
+        case Gravity():
+            return Gravity(effect.magnitude, effect.angle + 1.0)
+        case Load():
+            return replace(effect, bar=5 - effect.bar if effect.bar == 3 else 3)
+    raise NotImplementedError(effect)
+
+
+@contextmanager
+def formulas_see(change: Callable[[Scene], Scene]) -> Iterator[None]:
+    """The formulas work on a changed scene, the engines on the true one."""
+    import validation.judge
+
+    true = validation.judge.solve
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(validation.judge, "solve", lambda scene, *a, **k: true(change(scene), *a, **k))
+        yield
+
+
+def each_term(change: Callable[[Effect], list[Effect]]) -> Callable[[Scene], Scene]:
+    def changed_scene(asked: Scene) -> Scene:
+        terms = [new for term in (*asked.loads, *asked.effects) for new in change(term)]
+        loads = tuple(term for term in terms if isinstance(term, Load))
+        return replace(asked, loads=loads, effects=tuple(term for term in terms if not isinstance(term, Load)))
+
+    return changed_scene
+
+
+def reversed_slip(term: Effect) -> list[Effect]:
+    """Pin-load friction that drives instead of braking."""
+    assert isinstance(term, PinFriction)
+    return [PinFriction(tuple((pin, -mu, r) for pin, mu, r in term.pins))]
+
+
+@pytest.mark.parametrize("name", ACTING)
+@pytest.mark.parametrize("fault", ["wrong sign", "wrong pin or bar", "applied twice", "missing"])
+def test_a_fault_in_the_formulas_fails_the_run(name: str, fault: str) -> None:
+    asked, effect = scene(name), ACTING[name]
+    inverse = [witness for witness in EXACT if witness.name in INVERSE]
+    if fault == "missing":
+        with formulas_see(each_term(lambda term: [])):
+            found = failing(asked, inverse)
+    elif fault == "wrong pin or bar":
+        with formulas_see(each_term(lambda term: [moved(term)])):
+            found = failing(asked, inverse)
+    elif fault == "applied twice":
+        with formulas_see(each_term(lambda term: [term, term])):
+            found = failing(asked, inverse)
+    elif name == "pin_friction":
+        with formulas_see(each_term(reversed_slip)):
+            found = failing(asked, inverse)
+    else:
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(type(effect), "add_wrenches", changed(effect, -1.0))
+            found = failing(asked, inverse)
+    assert {engine for engine, _, _ in found} >= INVERSE
+    assert "torque" in {quantity for _, quantity, _ in found}
+
+
+class FaultyTree:
+    """An engine's tree on which whatever acts is multiplied."""
+
+    def __init__(self, tree: Any, factor: float) -> None:
+        self.tree, self.factor = tree, factor
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.tree, name)
+
+    def push(self, bar: int, force: Any, point: Any) -> None:
+        self.tree.push(bar, self.factor * force, point)
+
+    def twist(self, bar: int, couple: float) -> None:
+        self.tree.twist(bar, self.factor * couple)
+
+    def gravity(self, vector: tuple[float, float]) -> None:
+        self.tree.gravity((self.factor * vector[0], self.factor * vector[1]))
+
+
+@pytest.mark.parametrize("name", ACTING)
+@pytest.mark.parametrize("factor", [-1.0, 2.0, 0.0], ids=["wrong sign", "applied twice", "missing"])
+def test_a_fault_in_the_engine_term_fails_the_run(name: str, factor: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    effect = ACTING[name]
+    right = type(effect).engine_term
+    monkeypatch.setattr(type(effect), "engine_term", lambda self, tree: right(self, FaultyTree(tree, factor)))
+    found = failing(scene(name), [witness for witness in EXACT if witness.name in INVERSE])
+    assert {engine for engine, _, _ in found} >= INVERSE
+
+
+@pytest.mark.parametrize("name", [n for n in ACTING if n not in ("pin_friction", "flywheel")])
+def test_a_fault_in_the_power_fails_the_run(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    effect = ACTING[name]
+    right = type(effect).power
+    monkeypatch.setattr(type(effect), "power", lambda self, state: -right(self, state))
+    energy = [witness for witness in EXACT if witness.name == "energy-method"]
+    assert {quantity for _, quantity, _ in failing(scene(name), energy)} == {"torque"}
