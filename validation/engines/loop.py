@@ -111,7 +111,13 @@ class Position:
             if found is not None:
                 self.last[branch] = found[1:]
                 return found
-        return None
+        # the starts miss where a bar is a millionth of the others; the triangle of the lengths as measured does not
+        alpha, beta = (_triangle_angle(e, near, far) for near, far in ((b, c), (c, b)))
+        theta_3, theta_4 = phi + branch * alpha, phi + math.pi - branch * beta
+        found = newton(tree, (theta_2, theta_3 - theta_2, theta_4), branch, closed)
+        if found is None and max(e - (b + c), abs(b - c) - e) < -closed:
+            raise ArithmeticError(f"the loop closes at theta_2 = {theta_2!r}, but Newton's method does not find it")
+        return found
 
     def _starts(self, theta_2: float, branch: int, phi: float) -> Iterator[tuple[float, float]]:
         if branch in self.last:
@@ -120,6 +126,12 @@ class Position:
             theta_3 = phi + branch * math.radians(alpha)
             theta_4 = phi + math.pi - branch * math.radians(beta)
             yield math.remainder(theta_3 - theta_2, math.tau), math.remainder(theta_4, math.tau)
+
+
+def _triangle_angle(e: float, near: float, far: float) -> float:
+    """The angle between the sides e and near, by half-angle tangents."""
+    above, below = (e - near + far) * (far + near - e), (e + near - far) * (e + near + far)
+    return 2.0 * math.atan2(math.sqrt(max(above, 0.0)), math.sqrt(max(below, 0.0)))
 
 
 def newton(tree: Tree, q: tuple[float, float, float], branch: int, closed: float) -> tuple[float, float, float] | None:
@@ -220,6 +232,9 @@ def _motion_and_forces(
         for bar in MOVING_BARS[1:]:
             values[f"omega_{bar}"], values[f"alpha_{bar}"] = tree.velocity(bar), tree.alpha(bar)
         values.update({f"a_{name}": value for name, value in tree.accelerations().items()})
+    except np.linalg.LinAlgError:
+        return {}
+    try:
         matrix = np.column_stack((jacobian.T, e_drive))
         forces = _forces(tree, matrix, needed)
         if loaded:
@@ -227,8 +242,8 @@ def _motion_and_forces(
             if settled is None:  # no answer, rather than that of some pass
                 return values
             forces = settled
-    except np.linalg.LinAlgError:
-        return {}
+    except np.linalg.LinAlgError:  # no torque on that bar balances the linkage here
+        return values
     values.update(forces)
     return values
 
