@@ -111,6 +111,7 @@ def closure(name: str, scene: Scene, answer: Answer) -> Row:
     error = np.where(answer.assembled, gap / of_length(scene), 0.0)
     worst = int(np.argmax(np.where(np.isnan(error), np.inf, error)))
     allowed = IDENTITY.factor if answer.setting == "exact" else SIMULATED.factor
+    allowed *= turned(answer.at.theta_2)
     holds = bool(error[worst] <= allowed)
     return Row(
         scene=name,
@@ -217,6 +218,11 @@ def _judge_predicted(
         theta_2=formulas.theta_2[index],
         condition=condition[index],
     )
+
+
+def turned(theta_2: Array) -> float:
+    """Angles many turns away carry fewer digits of their direction: the largest of them, at least 1 rad."""
+    return max(1.0, float(np.abs(theta_2).max(initial=0.0)) / np.pi)
 
 
 def _without_forces(formulas: Solution) -> Mask:

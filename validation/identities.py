@@ -13,7 +13,7 @@ from fourbar.linkage import MOVING_BARS
 from fourbar.scene import Command, Scene
 from fourbar.solution import OK, Solution
 from validation.answer import Answer
-from validation.compare import closure
+from validation.compare import closure, turned
 from validation.results import AGREES, FAILS, Row
 from validation.scales import magnitude
 from validation.tolerance import IDENTITY, Array
@@ -78,14 +78,15 @@ def _row(
 ) -> Row:
     relative = np.where(where, error / np.where(terms == 0.0, np.nextafter(0.0, 1.0), terms), 0.0)
     worst = int(np.argmax(np.where(np.isnan(relative), np.inf, relative)))
-    holds = bool(relative[worst] <= IDENTITY.factor)
+    allowed = IDENTITY.factor * turned(solution.theta_2)
+    holds = bool(relative[worst] <= allowed)
     return Row(
         scene=name,
         engine=FORMULAS,
         setting="exact",
         quantity=quantity,
         error=float(relative[worst]),
-        allowed=IDENTITY.factor,
+        allowed=allowed,
         passed=holds,
         verdict=AGREES if holds else FAILS,
         reason=f"identity: {equation}",
