@@ -209,7 +209,7 @@ def _judged(name: str, scene: Scene, at: Command, solution: Solution, answer: An
     """The rows of one answer, against the formulas at the motion that the engine really made."""
     theirs = answer.at if answer.at is not None else at
     formulas = solution if theirs is at else solve(scene, at=theirs)
-    predicted = _predicted(witness, scene, theirs, answer)
+    predicted = predicting_from(witness, scene, theirs, answer)
     rows = compare(name, scene, answer, formulas, witness.tolerance, witness.expected, predicted)
     if answer.refusal is None and answer.at is not None and {"theta_3", "theta_4"} <= answer.quantities.keys():
         rows.append(closure(name, scene, answer))
@@ -228,7 +228,7 @@ def _observed_order(name: str, scene: Scene, at: Command, solution: Solution, wi
     return {"error_at_4h": coarse, "error_at_2h": fine, "observed_order": order}
 
 
-def _predicted(
+def predicting_from(
     witness: Witness, scene: Scene, at: Command, answer: Answer
 ) -> Callable[[], dict[str, Array]] | None:
     """What computes the errors to be expected, should any be called for."""
