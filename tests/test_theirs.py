@@ -61,6 +61,28 @@ def test_the_generated_file_differs_in_nothing_and_agrees() -> None:
         assert max(errors(CRANK_ROCKER, found, how).values()) <= SIMULATED.factor
 
 
+def test_the_description_is_that_of_the_scene() -> None:
+    found, linkage = generated(CRANK_ROCKER).described, CRANK_ROCKER.linkage
+    for number, name in ((2, "input"), (3, "coupler"), (4, "output")):
+        bar = linkage.bar(number)
+        assert bar.centre is not None
+        expected = (bar.length, bar.mass, bar.inertia, *bar.centre)
+        parts = ("mass", "inertia", "centre.distance", "centre.angle")
+        told = (found[f"lengths.{name}"], *(found[f"bars.{name}.{part}"] for part in parts))
+        assert told == pytest.approx(expected, rel=1e-14)
+
+
+def test_what_is_welded_to_a_bar_is_part_of_it() -> None:
+    """Two masses m at distance s of each other: G half-way, inertia 2 I + m s^2/2."""
+    half = '<body pos="{} 0 0"><inertial pos="0 0 0" mass="0.2" diaginertia="1e-3 1e-3 1e-3"/></body>'
+    text = re.sub(
+        '(name="rocker"[^>]*><joint/>)<inertial[^>]*>', r"\1" + half.format(0.05) + half.format(0.15), other_plane()
+    )
+    found = examine(BARE, text, MINE).described
+    told = [found[f"bars.output.{part}"] for part in ("mass", "centre.distance", "centre.angle", "inertia")]
+    assert told == pytest.approx([0.4, 0.1, 0.0, 2e-3 + 0.2 * 0.1**2 / 2.0], rel=1e-12, abs=1e-14)
+
+
 EDITS = [
     ("coupler's mass", 'mass="0.5"', 'mass="5"', "bars.coupler.mass", "10^1 times: units?"),
     ("inertia about the pin", "0.0016133333333333336", "0.0073733333333333336", "bars.output.inertia", ""),

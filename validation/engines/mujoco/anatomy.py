@@ -17,8 +17,6 @@ from validation.answer import Array
 PIN_OF = {frozenset(bars): pin for pin, bars in PINS.items()}
 ENDS = {1: ("O2", "O4"), 2: ("O2", "A"), 3: ("A", "B"), 4: ("O4", "B")}
 """The pins between which a bar's line runs."""
-HIGHER = {"B": (3, 4), "O4": (4, 1), "A": (2, 3), "O2": (1, 2)}
-"""At a cut pin, first minus second is A + b e^{i theta_3} - c e^{i theta_4} - O4, whichever pin it is."""
 PLANES = {2: ("x-y", (0, 1)), 1: ("x-z", (0, 2)), 0: ("y-z", (1, 2))}
 """Axis of the hinges: the plane they move in, and the world axes that stand for x and y there."""
 STRAIGHT = 1e-9

@@ -21,7 +21,7 @@ from fourbar.solution import VECTORS
 from validation.answer import Answer, Array
 from validation.compare import COMPARED
 from validation.engines.loop import Position
-from validation.engines.mujoco.anatomy import HIGHER, Anatomy
+from validation.engines.mujoco.anatomy import Anatomy
 from validation.engines.mujoco.closed_loop import WARNINGS
 from validation.engines.mujoco.describe import Described, described
 
@@ -123,15 +123,15 @@ class Loop:
         mujoco.mj_comPos(self.model, self.data)
 
     def gap(self) -> tuple[float, float]:
-        """What the cut pin is open by, (2,), m."""
-        first, second = (self.anatomy.world(self.data, bar, self.anatomy.cut) for bar in HIGHER[self.anatomy.cut])
+        """What the cut pin is open by, m: at any pin, up to its sign, A + b e^{i theta_3} - O4 - c e^{i theta_4}."""
+        first, second = (self.anatomy.world(self.data, bar, self.anatomy.cut) for bar in PINS[self.anatomy.cut])
         x, y = self.anatomy.in_plane(first - second).tolist()
         return x, y
 
     def jacobian(self) -> Array:
         """Derivative of the gap by x, (2, 3)."""
         rows = []
-        for bar in HIGHER[self.anatomy.cut]:
+        for bar in PINS[self.anatomy.cut]:
             body, at = self.anatomy.root[bar], self.anatomy.world(self.data, bar, self.anatomy.cut)
             mujoco.mj_jac(self.model, self.data, self._jac, None, at, body)
             rows.append(self._jac[list(self.anatomy.axes)] @ self.to_joints)
