@@ -15,6 +15,7 @@ COMMANDS = {
     "fuzz-files": "validation.suite.mutants:fuzz_files",
     "models": "validation.models:models",
     "published": "validation.published:published",
+    "fuzz": "validation.fuzz.command:fuzz",
     "stability": "validation.stability:stability",
     "bench": "validation.bench:bench",
 }
