@@ -93,6 +93,11 @@ def diagonal_to_O4(
     outer, inner = product * w, product * v
     outer += constant_1
     inner += constant_2
+    _, _, b, c = (length / unit_of(linkage) for length in linkage.lengths)
+    if product > 4.0 * b * c:
+        # b, c short beside the others: of the two factors the one whose change over psi is small has the digits
+        whole = 4.0 * b * c
+        outer, inner = np.where(v < w, whole - inner, outer), np.where(v < w, inner, whole - outer)
     least_1, least_2 = UNDECIDED * (abs(constant_1) + product), UNDECIDED * (abs(constant_2) + product)
     decided = NONE
     if offset is None and outer.min() > least_1 and inner.min() > least_2:
@@ -127,7 +132,12 @@ def _triangle(
     """x, y, e^2 and w, v, h of `Diagonal`, the constants of outer and inner and 4 a d, in the precision of theta_2."""
     d, a, b, c = scaled(linkage, theta_2)
     theta_1 = linkage.ground_angle
-    t = np.tan(0.5 * theta_2 if theta_1 == 0.0 else 0.5 * (theta_2 - theta_1))
+    psi = theta_2
+    if theta_1 != 0.0:
+        psi = theta_2 - theta_1
+        if growths is not None:  # psi is rounded at its own size, however near to a whole turn it is
+            psi = psi + next(growths) * psi
+    t = np.tan(0.5 * psi)
     if growths is not None:
         t = t + next(growths) * t
     v = t * t

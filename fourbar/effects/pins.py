@@ -41,11 +41,13 @@ AT_REST = 50.0 * 2.0**-52
 
 
 def resting(state: State, pin: str) -> Any:
-    """Where the two bars turn together, as far as doubles can tell, (n,)."""
+    """Where the two bars turn together, as far as the digits of the state can tell, (n,)."""
     i, j = PINS[pin]
     one, other = state.omega(i), state.omega(j)
     speeds = (np.abs(one) + np.abs(other) + np.abs(state.omega_2)) + np.zeros(state.theta_2.shape)
-    return ~np.greater(np.abs(other - one) * (state.sin_mu * state.sin_mu), AT_REST * speeds)
+    # positions evaluated in 32 digits tell slips apart that doubles cannot
+    rounding = AT_REST if isinstance(state.theta_2, np.ndarray) else AT_REST * 2.0**-52
+    return ~np.greater(np.abs(other - one) * (state.sin_mu * state.sin_mu), rounding * speeds)
 
 
 def sense(state: State, pin: str, side: int) -> Any:
