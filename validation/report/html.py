@@ -1,6 +1,7 @@
 """report.html: one self-contained page; every number can be traced to its row in results.csv, which it carries."""
 
 import base64
+import gzip
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -15,7 +16,7 @@ from validation.report.summary import STATEMENT, TOLERANCES, Summary, used
 from validation.results import FAILS, REFUSES, Row, to_csv
 
 ALL_OPEN = 8
-"""Up to so many scenes all stand open; the bodies of more are made when they are opened."""
+"""Up to so many scenes all stand open; the bodies of more are packed, and unpacked when they are opened."""
 ORDER = (
     *("theta_3", "theta_4", "omega_3", "omega_4", "alpha_3", "alpha_4"),
     *("F12", "F32", "F43", "F14", "torque", "torque_inertia"),
@@ -103,6 +104,7 @@ def html(
     environment.filters["number"] = number
     environment.filters["degrees"] = lambda radians: "-" if math.isnan(radians) else f"{math.degrees(radians):.3f}"
     environment.filters["share"] = share
+    environment.filters["packed"] = lambda text: base64.b64encode(gzip.compress(text.encode("utf-8"), mtime=0)).decode()
     environment.filters["colour"] = lambda engine: by_variable(style_of(engine).colour)
     environment.filters["symbol"] = lambda engine: style_of(engine).symbol
     views = [_view(page, first_lines.get(page.name, 2), pictures or {}) for page in summary.pages]
