@@ -111,7 +111,8 @@ class Springs(Effect):
         for spring in self.springs:
             across = _minus(_place(state, spring.end), _place(state, spring.start))
             pull = _per_distance(spring, across)
-            force = (pull * across[0], pull * across[1])
+            with np.errstate(invalid="ignore"):
+                force = (pull * across[0], pull * across[1])
             for point, sign in ((spring.start, 1.0), (spring.end, -1.0)):
                 if point.bar != 1:
                     arm = state.arm(point.bar, *point.in_bar)

@@ -1,0 +1,199 @@
+"""What a scene does not name does not exist: nothing of it in the formulas, in the MJCF or in the compiled model."""
+
+import json
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import mujoco
+import pytest
+
+import fourbar
+from fourbar.effects import REGISTRY, Effect, Friction, Viscous
+from fourbar.mjcf import mjcf
+from tests.scenes import crank_rocker
+from tests.test_effects import ACTING
+
+ROOT = Path(fourbar.__file__).parent.parent
+FILES = {key: Path(sys.modules[effect.__module__].__file__).name for key, effect in REGISTRY.items()}  # type: ignore[arg-type]
+BUILD = """
+import hashlib, json, sys
+sys.path.insert(0, sys.argv[1])
+import fourbar
+from fourbar.mjcf import mjcf
+link = fourbar.FourBar(0.3, fourbar.Bar(0.1, 0.2), fourbar.Bar(0.25, 0.5, 0.004, (0.13, 0.3)), fourbar.Bar(0.22, 0.4))
+scene = fourbar.Scene(link, fourbar.Motion(fourbar.Sweep(0.1, 6.3, 60), 10.0, 5.0))
+fourbar.solve(scene)
+calls = []
+def note(frame, event, argument):
+    if event == "call" and "fourbar" in frame.f_code.co_filename:
+        calls.append(frame.f_code.co_qualname)
+sys.setprofile(note)
+solution = fourbar.solve(scene)
+sys.setprofile(None)
+numbers = {name: hashlib.sha256(getattr(solution, name).tobytes()).hexdigest() for name in solution.evaluated()}
+print(json.dumps({"file": fourbar.__file__, "numbers": numbers, "calls": calls, "mjcf": mjcf(scene)}))
+"""
+
+
+def built(root: Path) -> dict[str, object]:
+    """What a checkout makes of a scene without effects: digests of every array, the calls made, the MJCF."""
+    command = [sys.executable, "-c", BUILD, str(root)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=root)
+    assert done.returncode == 0, done.stderr
+    answer: dict[str, object] = json.loads(done.stdout)
+    assert Path(str(answer.pop("file"))).is_relative_to(root)
+    return answer
+
+
+def without(effect: type[Effect], folder: Path) -> Path:
+    """A copy of the package that has never heard of an effect: its file, its registration, its name are gone."""
+    copy = folder / "fourbar"
+    shutil.copytree(ROOT / "fourbar", copy, ignore=shutil.ignore_patterns("__pycache__", "page", "plot"))
+    key, name = effect.key, effect.__name__
+    (copy / "effects" / FILES[key]).unlink()
+    for file in (copy / "__init__.py", copy / "effects" / "__init__.py"):
+        kept = [line for line in file.read_text().splitlines() if f".{FILES[key][:-3]} import" not in line]
+        kept = [line for line in kept if not line.endswith(f"import {name} as {name}")]
+        file.write_text(re.sub(rf"\b{name}, |, {name}(?=\))", "", "\n".join(kept)) + "\n")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def whole() -> dict[str, object]:
+    return built(ROOT)
+
+
+@pytest.mark.parametrize("key", [key for key in REGISTRY if key != "gravity"])
+def test_a_build_that_never_heard_of_an_effect_gives_the_same_bits(
+    key: str, whole: dict[str, object], tmp_path: Path
+) -> None:
+    other = built(without(REGISTRY[key], tmp_path))
+    assert other["numbers"] == whole["numbers"]
+    assert other["mjcf"] == whole["mjcf"]
+    assert other["calls"] == whole["calls"]
+
+
+def test_no_term_of_an_effect_runs_in_a_scene_without_effects(whole: dict[str, object]) -> None:
+    calls = whole["calls"]
+    assert isinstance(calls, list) and "add_inertia" in calls
+    names = {effect.__name__ for effect in REGISTRY.values()} | {"Load", "PinFriction", "torque_interval", "settle"}
+    assert not [call for call in calls if call.split(".")[0] in names]
+
+
+def test_an_effect_that_is_named_runs() -> None:
+    """The check above could fail: the same profile sees the term where the scene has it."""
+    calls = []
+
+    def note(frame, event, argument):  # type: ignore[no-untyped-def]
+        if event == "call":
+            calls.append(frame.f_code.co_qualname)
+
+    sys.setprofile(note)
+    fourbar.solve(crank_rocker(loads=(), effects=(Viscous.at(O2=0.1),)))
+    sys.setprofile(None)
+    assert "Viscous.add_wrenches" in calls and "Gravity.add_wrenches" not in calls
+
+
+def compiled(*names: str) -> mujoco.MjModel:
+    effects = tuple(ACTING[name] for name in names)
+    return mujoco.MjModel.from_xml_string(mjcf(crank_rocker(loads=(), effects=effects)))
+
+
+def rows(model: mujoco.MjModel) -> int:
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, 0)
+    mujoco.mj_forward(model, data)
+    return int(data.nefc)
+
+
+def disabled(model: mujoco.MjModel) -> set[str]:
+    flags = mujoco.mjtDisableBit
+    return {
+        name.removeprefix("mjDSBL_").lower()
+        for name in flags.__members__
+        if name != "mjNDISABLE" and model.opt.disableflags & int(flags.__members__[name])
+    }
+
+
+BARE = {"contact", "limit", "island", "sensor", "midphase", "spring", "damper", "frictionloss"}
+
+
+def test_the_bare_model_has_the_closed_loop_and_nothing_else() -> None:
+    model = compiled()
+    assert (model.nv, model.neq, model.nu, model.ntendon, model.nsensor, model.njnt) == (3, 1, 1, 0, 0, 3)
+    assert rows(model) == 3  # connect has three, the third of them empty in the plane
+    assert disabled(model) == BARE
+    assert not model.opt.gravity.any() and not model.dof_damping.any() and not model.dof_frictionloss.any()
+    assert not (model.opt.enableflags or model.geom_contype.any() or model.jnt_limited.any())
+
+
+@pytest.mark.parametrize(
+    ("name", "enabled", "more_rows", "tendons"),
+    [
+        ("gravity", set(), 0, 0),
+        ("viscous", {"damper"}, 0, 1),
+        ("friction", {"frictionloss"}, 4, 1),
+        ("torsion", {"spring"}, 0, 1),
+        ("springs", {"spring"}, 0, 2),
+        ("flywheel", set(), 0, 0),
+    ],
+)
+def test_each_effect_adds_what_it_needs_and_no_more(name: str, enabled: set[str], more_rows: int, tendons: int) -> None:
+    model = compiled(name)
+    assert (model.nv, model.neq, model.nu, model.nsensor) == (3, 1, 1, 0)
+    assert disabled(model) == BARE - enabled
+    assert rows(model) == 3 + more_rows
+    assert model.ntendon == tendons  # one at the cut pin B, one for each linear spring
+
+
+def test_an_effect_of_zero_size_is_still_named() -> None:
+    """A torque of 0 that the scene writes down is the scene's; what it leaves out is not there at all."""
+    named = mjcf(crank_rocker(loads=(), effects=(Friction.at(A=0.0),)))
+    assert "frictionloss=" in named and 'frictionloss="0.0"' not in mjcf(crank_rocker(loads=(), effects=()))
+
+
+POSITIONS_ONLY = """
+import sys
+import fourbar
+from validation.judge import judge
+link = fourbar.uniform(0.3, 0.1, 0.25, 0.22)
+motion = {motion}
+record = judge("scene", fourbar.Scene(link, motion))
+print(sorted(name for name in ("mujoco", "pinocchio") if name in sys.modules))
+print(*record.left_out, sep="\\n")
+print(*sorted({{row.engine for row in record.rows}}))
+"""
+
+
+def asked(motion: str) -> list[str]:
+    code = POSITIONS_ONLY.format(motion=motion)
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT)
+    return done.stdout.splitlines()
+
+
+def test_positions_alone_start_no_force_engine() -> None:
+    engines, *left_out, answered = asked("fourbar.Motion(fourbar.Sweep(0.0, 6.0, 20))")
+    assert engines == "[]" and answered == "energy-method formulas"
+    assert {line.split(":")[0] for line in left_out} == {"pinocchio-inverse", "mujoco-inverse", "mujoco-simulated"}
+    assert all("only positions are asked for" in line for line in left_out)
+
+
+@pytest.mark.parametrize(
+    ("motion", "reason"),
+    [
+        ("fourbar.Motion(fourbar.Sweep(0.0, 6.0, 20), 0.0)", "omega_2 is 0: nothing moves through time"),
+        ("fourbar.Motion(1.0, 2.0)", "one position is no motion through time"),
+    ],
+)
+def test_what_does_not_move_through_time_is_not_simulated(motion: str, reason: str) -> None:
+    _, *left_out, answered = asked(motion)
+    assert left_out == [f"mujoco-simulated: {reason}"]
+    assert answered == "energy-method formulas mujoco-inverse pinocchio-inverse"
+
+
+def test_equal_positions_are_evaluated_once() -> None:
+    _, *left_out, _ = asked("fourbar.Motion([1.0, 1.0, 1.0], 2.0)")
+    assert "positions: all are the same, one is evaluated" in left_out
