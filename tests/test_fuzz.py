@@ -1,0 +1,91 @@
+"""Fuzzing: counter-examples stay fixed, the fuzzer itself notices what it must, a stretch of scenes holds."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import fourbar.kinetostatics
+from fourbar.files import loads
+from tests.scenes import crank_rocker
+from validation.fuzz import examine
+from validation.fuzz.command import examine_chunk, run
+from validation.fuzz.scenes import scene_of
+from validation.fuzz.shrink import KEPT, keep, shrunk
+
+SEED = 0
+
+
+@pytest.mark.parametrize("path", sorted(KEPT.glob("*.toml")), ids=lambda path: path.stem)
+def test_a_kept_counterexample_holds(path: Path) -> None:
+    assert examine.findings(loads(path.read_text(encoding="utf-8"))) == []
+
+
+def test_a_stretch_of_scenes_holds() -> None:
+    assert examine_chunk(SEED, 0, 60) == {}
+
+
+def test_a_scene_depends_on_its_number_alone() -> None:
+    assert fourbar.dump(scene_of(3, 17)) == fourbar.dump(scene_of(3, 17)) != fourbar.dump(scene_of(3, 19))
+
+
+def test_half_are_adversarial() -> None:
+    """Odd scenes reach where even ones never go: bars in a ratio beyond 100, or positions that barely close."""
+    spread = [max(s.linkage.lengths) / min(s.linkage.lengths) for s in (scene_of(SEED, i) for i in range(200))]
+    assert max(spread[0::2]) < 20.0
+    assert max(spread[1::2]) > 1e3
+
+
+def small_error(true: object) -> object:
+    """One part in 1e9 of the moment of bar 3."""
+
+    def wrong(m_u, m_v, u, v, sine):  # type: ignore[no-untyped-def]
+        return true((1.0 + 1e-9) * m_u, m_v, u, v, sine)  # type: ignore[operator]
+
+    return wrong
+
+
+def test_an_error_of_a_billionth_is_found_and_shrunk(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(fourbar.kinetostatics, "between", small_error(fourbar.kinetostatics.between))
+    scene = replace(crank_rocker(), motion=fourbar.Motion(np.array([1.0, 2.0]), 10.0, 5.0))
+    assert examine.findings(scene)
+    small = shrunk(scene, lambda candidate: bool(examine.findings(candidate)))
+    assert len(small.loads) + len(small.effects) < 3 and examine.findings(small)
+    kept = keep(small, "billionth", tmp_path)
+    assert examine.findings(loads(kept.read_text(encoding="utf-8")))
+
+
+def test_a_traceback_is_a_finding(monkeypatch: pytest.MonkeyPatch) -> None:
+    def broken(*_: object) -> None:
+        raise ZeroDivisionError("oops")
+
+    monkeypatch.setattr(examine, "_back", broken)
+    assert examine.findings(crank_rocker()) == ["ZeroDivisionError: oops"]
+
+
+def test_a_position_that_does_not_close_is_a_finding(monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = replace(crank_rocker(), linkage=fourbar.uniform(0.3, 0.25, 0.1, 0.22))
+    scene = replace(scene, motion=fourbar.Motion(np.array([3.0]), 1.0), loads=())
+    true = examine.solve
+
+    def pretend(*arguments: object, **keywords: object) -> object:
+        solution = true(*arguments, **keywords)  # type: ignore[arg-type]
+        solution.status_code[:] = 0
+        return solution
+
+    assert examine.findings(scene) == []
+    monkeypatch.setattr(examine, "solve", pretend)
+    assert any(line.startswith("assembled") for line in examine.findings(scene))
+
+
+def test_an_interrupted_run_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("validation.fuzz.command.CHUNK", 4)
+    first = run(12, 1, tmp_path, 1)
+    next(first)
+    first.close()
+    done = next(iter(sorted(tmp_path.glob("chunk-*.json"))))
+    done.write_text(json.dumps({"0": ["left by the run before"]}), encoding="utf-8")
+    found = list(run(12, 1, tmp_path, 1))
+    assert len(found) == 3 and found[0] == {"0": ["left by the run before"]}

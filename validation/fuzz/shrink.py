@@ -1,0 +1,92 @@
+"""Make a failing scene smaller while it still fails, and keep it as a scene file that a test reads."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from fourbar.errors import FourBarError
+from fourbar.files import save
+from fourbar.linkage import Bar, FourBar
+from fourbar.scene import Motion, Scene
+
+KEPT = Path(__file__).parent.parent.parent / "tests" / "counterexamples"
+DIGITS = (1, 2, 3, 6, 10)
+ROUNDS = 4
+
+
+def shrunk(scene: Scene, fails: Callable[[Scene], bool]) -> Scene:
+    """The simplest scene found by one change at a time that still fails."""
+    for _ in range(ROUNDS):
+        before = scene
+        for change in _changes(scene):
+            try:
+                smaller = change(scene)
+                if smaller is not None and fails(smaller):
+                    scene = smaller
+            except FourBarError:
+                continue
+        if scene is before:
+            break
+    return scene
+
+
+def _changes(scene: Scene) -> Iterator[Callable[[Scene], Scene | None]]:
+    yield lambda s: _at(s, 0)
+    yield lambda s: _at(s, 1)
+    for k in range(len(scene.loads)):
+        yield lambda s, k=k: replace(s, loads=(*s.loads[:k], *s.loads[k + 1 :])) if k < len(s.loads) else None
+    for k in range(len(scene.effects)):
+        yield lambda s, k=k: replace(s, effects=(*s.effects[:k], *s.effects[k + 1 :])) if k < len(s.effects) else None
+    yield lambda s: replace(s, motion=replace(s.motion, alpha_2=0.0))
+    yield lambda s: replace(s, motion=replace(s.motion, omega_2=1.0))
+    yield lambda s: replace(s, drive_bar=2)
+    yield lambda s: replace(s, motion=replace(s.motion, branch=1))
+    yield _without_ground_angle
+    for name in ("input", "coupler", "output"):
+        yield lambda s, name=name: _bar(s, name, lambda bar: Bar(bar.length))
+        yield lambda s, name=name: _bar(s, name, lambda bar: Bar(bar.length, 1.0))
+    for digits in DIGITS:
+        for name in ("input", "coupler", "output"):
+            yield lambda s, name=name, n=digits: _bar(s, name, lambda bar: replace(bar, length=_rounded(bar.length, n)))
+        yield lambda s, n=digits: replace(s, linkage=replace(s.linkage, ground=_rounded(s.linkage.ground, n)))
+        yield lambda s, n=digits: _angle(s, n)
+
+
+def _bar(scene: Scene, name: str, change: Callable[[Bar], Bar]) -> Scene:
+    return replace(scene, linkage=replace(scene.linkage, **{name: change(getattr(scene.linkage, name))}))  # type: ignore[arg-type]
+
+
+def _at(scene: Scene, k: int) -> Scene | None:
+    angles = np.atleast_1d(np.asarray(scene.motion.theta_2))
+    return _moved(scene, float(angles[k])) if len(angles) > k > -len(angles) and len(angles) > 1 else None
+
+
+def _moved(scene: Scene, theta_2: float) -> Scene:
+    motion: Motion = replace(scene.motion, theta_2=theta_2)
+    return replace(scene, motion=motion)
+
+
+def _without_ground_angle(scene: Scene) -> Scene:
+    turn = scene.linkage.ground_angle
+    linkage: FourBar = replace(scene.linkage, ground_angle=0.0)
+    motion = replace(scene.motion, theta_2=np.atleast_1d(np.asarray(scene.motion.theta_2)) - turn)
+    return replace(scene, linkage=linkage, motion=motion)
+
+
+def _angle(scene: Scene, digits: int) -> Scene | None:
+    angles = np.atleast_1d(np.asarray(scene.motion.theta_2))
+    return _moved(scene, _rounded(float(angles[0]), digits)) if len(angles) == 1 else None
+
+
+def _rounded(value: float, digits: int) -> float:
+    return float(f"{value:.{digits}g}")
+
+
+def keep(scene: Scene, name: str, folder: Path = KEPT) -> Path:
+    """Write a counter-example where the tests find it."""
+    folder.mkdir(parents=True, exist_ok=True)
+    path = folder / f"{name}.toml"
+    save(scene, path)
+    return path
