@@ -12,10 +12,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import click
+import numpy as np
 
 from fourbar.errors import InputError, LimitError
 from fourbar.mjcf import Settings, mjcf
-from fourbar.scene import Scene
+from fourbar.scene import Command, Scene
 from fourbar.scene import command as command_of
 from fourbar.writing import write_text
 from validation.cost.errors import NO_ANSWER, Errors, errors
@@ -35,6 +36,8 @@ MARGIN = 0.7
 """The run must stay within this part of the asked error: between the positions it may be larger."""
 CLOSE_ENOUGH = 1.15
 """The search stops where the least steps that serve and the most that do not are this close."""
+BETWEEN = 180
+"""Intervals of the sweep at which a run is read at least."""
 MOST_TRIALS = 24
 FEWEST_STEPS = 6.0
 MOST_STEPS = 16_000
@@ -90,7 +93,17 @@ def advise(scene: Scene, error: float, rig: Rig | None = None) -> Advice:
     """
     if not 0.0 < error < 1.0:
         raise InputError("--error", error, "must be a relative error, above 0 and below 1")
-    return _Search(scene, error, rig or Rig(scene, command_of(scene))).advice()
+    return _Search(scene, error, rig or Rig(scene, looked_at(scene))).advice()
+
+
+def looked_at(scene: Scene) -> Command:
+    """The scene's own positions and others between them: the error peaks in between, most of all beside a pole of T3, T4."""
+    own = command_of(scene)
+    if np.ptp(own.branch) != 0:
+        return own
+    between = np.linspace(own.theta_2.min(), own.theta_2.max(), BETWEEN + 1)
+    theta_2 = np.union1d(own.theta_2, between)
+    return own._replace(theta_2=theta_2, branch=np.full(theta_2.shape, own.branch[0], dtype=np.int8))
 
 
 class _Search:

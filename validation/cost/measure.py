@@ -30,8 +30,8 @@ WINDOW = 0.8
 """Part of the range of a rocker that is run through: away from its limits."""
 GENTLE = 0.02
 """|alpha_2| / omega_2^2: over a turn the speed changes by an eighth and never vanishes."""
-POSITIONS, DENSER = 36, 4
-"""Intervals that the advice sees; the answer is judged at so many times more."""
+POSITIONS, DENSER, SEARCHED = 36, 4, 2
+"""Intervals of the scene; the answer is judged at so many times more, the search decides at so many times more."""
 NEEDED_MET, NEEDED_CHEAP, CHEAP = 0.95, 0.80, 3.0
 QUANTILE = 1.959963984540054
 """Of the normal distribution, two-sided 95 %."""
@@ -86,21 +86,20 @@ def scene_of(seed: int, index: int) -> tuple[Scene, float]:
     return replace(scene, motion=motion), float(10.0 ** rng.uniform(*ERRORS))
 
 
-def denser(scene: Scene) -> Scene:
+def denser(scene: Scene, times: int) -> Scene:
     """The same motion at more positions."""
     sweep = scene.motion.theta_2
     assert isinstance(sweep, Sweep)
-    return replace(scene, motion=replace(scene.motion, theta_2=replace(sweep, steps=sweep.steps * DENSER)))
+    return replace(scene, motion=replace(scene.motion, theta_2=replace(sweep, steps=sweep.steps * times)))
 
 
 def case(seed: int, index: int, costs: dict[tuple[str, bool], float]) -> Case:
     """Ask for advice, judge it at denser positions, and search exhaustively."""
     scene, asked = scene_of(seed, index)
     advice = advise(scene, asked)
-    dense = denser(scene)
-    rig = Rig(dense, command(dense))
-    error = judged(dense, rig.try_out(advice.best.settings)).worst
-    found = cheapest(rig, asked, costs)
+    dense, searched = denser(scene, DENSER), denser(scene, SEARCHED)
+    error = judged(dense, Rig(dense, command(dense)).try_out(advice.best.settings)).worst
+    found = cheapest(Rig(searched, command(searched)), asked, costs)
     return Case(
         index,
         scene.title.rpartition(" ")[0],
