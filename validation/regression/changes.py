@@ -82,10 +82,8 @@ def _by_key(rows: Iterable[Row]) -> dict[Key, Row]:
 
 def _change(key: Key, old: Row | None, new: Row | None) -> Change:
     if old is None or new is None:
-        if new is None:
-            kind = Kind.GONE
-        else:
-            kind = Kind.NEW_FAILURE if new.verdict == FAILS else Kind.NEW
+        fails = new is not None and new.verdict == FAILS
+        kind = Kind.GONE if new is None else Kind.NEW_FAILURE if fails else Kind.NEW
         return Change(kind, key, old, new, math.nan)
     condition = min((c for c in (old.condition, new.condition) if c > 0.0), default=1.0)
     round_off = ROUND_OFF * EPS / condition
