@@ -74,9 +74,7 @@ def _picture(quantity: str, record: Record, solution: Solution, answers: list[An
     return svg_text(figure, f"{record.name} {quantity}")
 
 
-def _draw_values(
-    axes: "Axes", quantity: str, solution: Solution, answers: list[Answer], jumps: list[Reversal]
-) -> None:
+def _draw_values(axes: "Axes", quantity: str, solution: Solution, answers: list[Answer], jumps: list[Reversal]) -> None:
     """The formulas as a band, broken at jumps, and each engine's marks on it at positions of its own."""
     good = solution.status_code == OK
     ours = np.where(good, _plain(quantity, getattr(solution, quantity)), np.nan)

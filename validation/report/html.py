@@ -13,7 +13,7 @@ from validation.report.colours import by_variable, declarations, style_of
 from validation.report.costs import cost_figure
 from validation.report.markdown import number
 from validation.report.summary import STATEMENT, TOLERANCES, Summary, used
-from validation.results import FAILS, REFUSES, Row, to_csv
+from validation.results import FAILS, REFUSES, Row, sorted_rows, to_csv
 
 ALL_OPEN = 8
 """Up to so many scenes all stand open; the bodies of more are packed, and unpacked when they are opened."""
@@ -138,7 +138,7 @@ def share(value: float) -> str:
 
 
 def _view(page: Page, first_line: int, pictures: Mapping[str, str]) -> SceneView:
-    cells = [Cell(line, row) for line, row in enumerate(page.rows, first_line)]
+    cells = [Cell(line, row) for line, row in enumerate(sorted_rows(page.rows), first_line)]
     by_place: dict[tuple[str, str], Cell] = {}
     worst: dict[str, Cell] = {}
     for cell in cells:

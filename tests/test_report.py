@@ -1,0 +1,145 @@
+"""The report as text: every number traceable to its row, short enough where it must be, whatever a scene is called."""
+
+import base64
+import csv
+import gzip
+import io
+import re
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+import fourbar
+from tests.scenes import crank_rocker
+from validation.judge import WITNESSES, Page, judged_page
+from validation.report.costs import cost_points
+from validation.report.figures import FLOOR, STRETCHES, worst_of_stretches
+from validation.report.html import ALL_OPEN, Section, html
+from validation.report.markdown import markdown
+from validation.report.summary import Summary, summarise
+from validation.results import FAILS, to_csv
+
+COMMENT_LIMIT = 65_536
+"""Characters of a comment on GitHub."""
+HOSTILE = "</script><img src=x onerror=alert(1)>\"'&|`*"
+
+
+@cache
+def page() -> Page:
+    """A small scene as two exact engines and the energy method judge it."""
+    scene = crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.0, 6.0, 36), 5.0))
+    return judged_page("demo", scene, tuple(w for w in WITNESSES if w.name != "mujoco-simulated"))
+
+
+def copies(count: int, *, failing: int = 0) -> list[Page]:
+    """The scene under many names; in the first ones a torque fails."""
+    made = []
+    for number in range(count):
+        name = f"scene-{number:03d}"
+        rows = [replace(row, scene=name) for row in page().rows]
+        if number < failing:
+            at = next(i for i, row in enumerate(rows) if row.quantity == "torque")
+            rows[at] = replace(rows[at], error=0.5, passed=False, verdict=FAILS)
+        made.append(replace(page(), name=name, rows=rows))
+    return made
+
+
+def report(pages: list[Page], **more) -> tuple[Summary, str]:
+    """Summary and page, the lines of results.csv counted as `write_columns` does."""
+    lines, line = {}, 2
+    for each in pages:
+        lines[each.name] = line
+        line += len(each.rows)
+    summary = summarise(pages)
+    return summary, html(summary, lines, **more)
+
+
+def unpacked(text: str) -> str:
+    """The page with the packed bodies of its scenes laid open."""
+    return re.sub(
+        r'<script type="application/gzip">(.*?)</script>',
+        lambda found: gzip.decompress(base64.b64decode(found.group(1))).decode(),
+        text,
+        flags=re.DOTALL,
+    )
+
+
+@pytest.mark.parametrize("count", [2, ALL_OPEN + 1])
+def test_every_link_leads_to_a_row_and_the_row_says_what_results_csv_says_there(count: int) -> None:
+    pages = copies(count, failing=1)
+    _, text = report(pages)
+    text = unpacked(text)
+    lines = list(csv.reader(io.StringIO(to_csv(row for each in pages for row in each.rows))))
+    rows = dict(re.findall(r'<tr id="row-(\d+)"[^>]*>(.*?)</tr>', text))
+    assert {int(line) for line in rows} == set(range(2, len(lines) + 1))
+    for line, shown in rows.items():
+        cells = [re.sub(r"<[^>]*>", "", cell).split() for cell in re.findall(r"<td[^>]*>(.*?)</td>", shown)]
+        record = dict(zip(lines[0], lines[int(line) - 1], strict=True))
+        assert cells[1][0] == record["engine"] and cells[2] == [record["quantity"]]
+        assert cells[3] == [f"{float(record['error']):.2e}"]
+    linked = {int(line) for line in re.findall(r'href="#row-(\d+)"', text)}
+    assert linked <= {int(line) for line in rows} and len(linked) > 20 * count
+
+
+def test_the_page_carries_results_csv_to_the_byte() -> None:
+    pages = copies(3)
+    _, text = report(pages)
+    data = re.search(r'download="results.csv" href="data:text/csv;base64,([^"]*)"', text)
+    assert data is not None
+    assert base64.b64decode(data.group(1)).decode() == to_csv(row for each in pages for row in each.rows)
+
+
+def test_the_verdict_stands_first_and_a_failure_is_named_before_anything_else() -> None:
+    summary, text = report(copies(3, failing=1))
+    assert summary.verdict.startswith("FAILS: 1 of ")
+    body = text[text.index("<body>") :]
+    assert body.index(summary.verdict) < body.index("What fails</h2>") < body.index("Overview</h2>")
+    assert "What fails</h2>" not in report(copies(3))[1]
+
+
+def test_a_scene_cannot_write_into_the_page() -> None:
+    hostile = replace(page(), title=HOSTILE, source=HOSTILE, name=HOSTILE, left_out=[HOSTILE])
+    summary, text = report([hostile], sections=[Section("more", HOSTILE, HOSTILE, [HOSTILE], [[HOSTILE]])])
+    assert "<img src=x" not in text
+    assert len(re.findall("<script", text)) == 1
+    assert "<img" not in markdown(summary)
+
+
+def test_nothing_is_fetched() -> None:
+    _, text = report(copies(2), pictures={"scene-000": "iVBORw0KGgo="}, no_pictures="none")
+    text = re.sub(r'xmlns(:xlink)?="[^"]*"', "", text)
+    assert not re.search(r'(?:src|href)="(?!#|data:)', text)
+    assert "url(" not in re.sub(r"url\(#", "", text) and "@import" not in text
+
+
+def test_the_comment_of_a_pull_request_holds_200_scenes_that_all_fail() -> None:
+    assert len(markdown(summarise(copies(200, failing=200)))) < COMMENT_LIMIT
+
+
+def test_a_section_of_another_module_is_shown_and_linked() -> None:
+    _, text = report(copies(2), sections=[Section("hard", "Hard cases", "As predicted.", ["family"], [["toggle"]])])
+    assert '<a href="#hard">Hard cases</a>' in text and '<h2 id="hard">' in text and "<td>toggle</td>" in text
+
+
+def test_the_errors_drawn_are_the_largest_of_their_stretches() -> None:
+    error = np.random.default_rng(1).uniform(size=1000)
+    for phase in (0.0, 0.3, 0.9):
+        found = worst_of_stretches(error, phase)
+        assert STRETCHES <= len(found) <= STRETCHES + 1
+        assert int(np.argmax(error)) in found
+        assert np.all(np.diff(found) > 0)
+    error[found[3]] = np.nan
+    assert found[3] not in worst_of_stretches(error, 0.9)
+    assert len(worst_of_stretches(np.full(40, np.nan), 0.0)) == 0
+    assert len(worst_of_stretches(np.array([FLOOR]), 0.5)) == 1
+
+
+def test_costs_are_those_of_the_run() -> None:
+    points, formulas = cost_points([page()])
+    timings = {timing.engine: timing for timing in page().timings}
+    errors = {row.engine: row.error for row in page().rows if row.quantity == "torque"}
+    assert formulas == [1e6 * timings["formulas"].seconds / 37]
+    assert points == {name: [(1e6 * timings[name].seconds / 37, error)] for name, error in errors.items()}
+    assert set(points) == {"pinocchio-inverse", "mujoco-inverse", "energy-method"}
