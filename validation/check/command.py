@@ -11,10 +11,11 @@ from fourbar.errors import InputError
 from fourbar.files import load
 from fourbar.scene import Command, Scene, command, solve
 from fourbar.solution import OK
-from validation.check.mistakes import Explanation, explain
+from validation.check.mistakes import NEARER, Explanation, explain
+from validation.check.shown import printable
 from validation.check.theirs import Array, Table, read_table
 from validation.compare import angle_aware_difference
-from validation.scales import divisor, yardstick
+from validation.scales import divisor, magnitude, yardstick
 from validation.tolerance import EPS, EQUIVALENCE, NOTHING_TO_TELL, condition_of
 
 SHOWN = 20
@@ -51,6 +52,8 @@ class Judgement:
 def judge_table(scene: Scene, table: Table) -> Judgement:
     """Judge every number by K eps/condition plus half a unit of its last printed digit."""
     base = command(scene)
+    if np.ndim(base.omega_2 or 0.0) or np.ndim(base.alpha_2):
+        raise InputError("motion.law", scene.title, "a table is judged at one omega_2 and alpha_2, not along a law")
     branch = np.full(len(table.theta_2), scene.motion.branch, dtype=np.int8)
     at = Command(table.theta_2, branch, base.omega_2, base.alpha_2)
     right = solve(scene, at=at)
@@ -60,12 +63,11 @@ def judge_table(scene: Scene, table: Table) -> Judgement:
         scale = divisor(yardstick(quantity, scene, right, getattr(right, quantity)))
         error = angle_aware_difference(quantity, ours, theirs) / scale
         condition = condition_of(quantity, scene.linkage, right)
-        allowed = EQUIVALENCE.allowed(condition) + table.rounding[quantity] / scale
-        return error, np.where(condition * NOTHING_TO_TELL > EPS, allowed, np.inf)
-
-    def agrees(quantity: str, predicted: Array, theirs: Array) -> bool:
-        error, allowed = judged(quantity, predicted, theirs)
-        return bool(np.all((error <= allowed)[ok]))
+        # what a mistake would have printed is rounded at its own size, however much larger
+        size = np.nanmax(magnitude(ours)[ok], initial=0.0) if not quantity.startswith("theta") else 0.0
+        larger = 1.0 if ours is getattr(right, quantity) else np.maximum(size / scale, 1.0)
+        allowed = EQUIVALENCE.allowed(condition) * larger + table.rounding[quantity] / scale
+        return error[ok], np.where(condition * NOTHING_TO_TELL > EPS, allowed, np.inf)[ok]
 
     findings = []
     for quantity, theirs in table.values.items():
@@ -73,12 +75,23 @@ def judge_table(scene: Scene, table: Table) -> Judgement:
         if ours is None:
             raise InputError("motion.omega_2", None, f"is needed in the scene to judge {quantity}")
         error, allowed = judged(quantity, ours, theirs)
-        for index in np.flatnonzero(ok):
-            numbers = (float(error[index]), float(allowed[index]), float(table.theta_2[index]))
-            findings.append(Finding(int(index) + 2, quantity, *numbers, bool(error[index] <= allowed[index])))
+        for index, e, most in zip(np.flatnonzero(ok).tolist(), error.tolist(), allowed.tolist(), strict=True):
+            findings.append(Finding(table.lines[index], quantity, e, most, float(table.theta_2[index]), e <= most))
     differing = sorted({finding.quantity for finding in findings if not finding.agrees})
-    known = explain(table, scene, at, right, differing, agrees) if differing else []
-    return Judgement(findings, [int(index) + 2 for index in np.flatnonzero(~ok)], known)
+    known = explain(table, scene, at, right, differing, judged) if differing else []
+    return Judgement(findings, [table.lines[index] for index in np.flatnonzero(~ok)], known)
+
+
+def said(explanation: Explanation) -> str:
+    """How far a mistake explains what differs."""
+    if explanation.complete:
+        return "explains everything that differs"
+    parts = []
+    if explanation.quantities:
+        parts.append("explains " + ", ".join(explanation.quantities))
+    if explanation.nearer:
+        parts.append(", ".join(explanation.nearer) + f" then at least {NEARER:g} times nearer")
+    return "; ".join(parts)
 
 
 @click.command()
@@ -95,10 +108,10 @@ def check(scene: Path, theirs: Path) -> int:
     from rich.table import Table as Shown
 
     judgement = judge_table(load(scene), read_table(theirs))
-    console = Console()
+    console = Console(soft_wrap=True)
     differing = judgement.differing
     if differing:
-        shown = Shown(title=f"{escape(theirs.name)}: what differs, worst first")
+        shown = Shown(title=f"{escape(printable(theirs.name))}: what differs, worst first")
         for heading in ("line", "theta_2 [deg]", "quantity", "error", "allowed"):
             shown.add_column(heading, justify="right")
         for finding in sorted(differing, key=lambda f: -f.error)[:SHOWN]:
@@ -109,11 +122,9 @@ def check(scene: Path, theirs: Path) -> int:
     for line in judgement.not_assembled:
         console.print(f"line {line}: the linkage has no motion there (it does not assemble, or is singular)")
     for explanation in judgement.explanations:
-        quantities = ", ".join(explanation.quantities)
-        word = "explains everything that differs" if explanation.complete else f"explains {quantities}"
-        console.print(f"looks like: {escape(explanation.text)} ({word})")
-    if differing and not judgement.explanations:
-        console.print("no single known mistake explains it")
+        console.print(f"looks like: {escape(explanation.text)} ({said(explanation)})")
+    if differing and not any(explanation.complete for explanation in judgement.explanations):
+        console.print("no single known mistake explains all of it")
     count = len(judgement.findings)
     console.print(f"[bold]{count - len(differing)} of {count} numbers agree[/]")
     return 1 if differing or judgement.not_assembled else 0

@@ -13,6 +13,12 @@ from fourbar.solution import VECTORS, Solution
 from validation.check.theirs import Array, Table
 
 POWERS_OF_TEN = (-6, -5, -4, -3, -2, -1, 1, 2, 3, 4, 5, 6)
+GRAVITATIONAL = 9.80665
+"""kgf in N."""
+SHOWN = 5
+"""Explanations that are told."""
+NEARER = 10.0
+"""A mistake that brings every row of a quantity this much nearer is told, though it does not explain it wholly."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,35 +28,96 @@ class Mistake:
     text: str
     predict: Callable[[str, Solution], Array | None]
     """quantity, right solution -> what would have been printed; None where it changes nothing of it."""
-    only: frozenset[str] | None = None
-    """The quantities it can touch; None: any."""
+    whole: bool = True
+    """Whether it was made in the calculation, and so shows in every quantity; a column's unit shows in its own."""
 
 
 def hypotheses(scene: Scene, at: Command) -> Iterator[Mistake]:
     """Every mistake that this scene gives room for, the simplest first."""
     yield Mistake(
-        "sign reversed, or F_ij given for F_ji", lambda quantity, right: _where(quantity, right, lambda v: -v)
+        "sign reversed, or F_ij given for F_ji",
+        lambda quantity, right: _where(quantity, right, lambda v: -v),
+        whole=False,
     )
     for power in POWERS_OF_TEN:
         factor = 10.0**power
         yield Mistake(
             f"units: every number is 10^{power} of ours (N cm for N m is 10^2, mm for m 10^3)",
             lambda quantity, right, factor=factor: _where(quantity, right, lambda v: factor * v),  # type: ignore[misc]
+            whole=False,
         )
+    yield Mistake(
+        "forces in kgf where newtons were announced",
+        lambda quantity, right: _where(quantity, right, lambda v: v / GRAVITATIONAL) if _is_force(quantity) else None,
+        whole=False,
+    )
     yield Mistake(
         "degrees where radians were announced",
         lambda quantity, right: _where(quantity, right, np.degrees) if _is_angular(quantity) else None,
+        whole=False,
     )
     yield Mistake(
         "x and y exchanged",
         lambda quantity, right: _where(quantity, right, lambda v: v[:, ::-1]) if quantity in VECTORS else None,
+        whole=False,
     )
+    yield Mistake(
+        "measured from the other end of the bar (half a turn off)",
+        lambda quantity, right: _where(quantity, right, lambda v: v + np.pi) if quantity.startswith("theta") else None,
+        whole=False,
+    )
+    yield Mistake(
+        "relative to bar 2 instead of the ground",
+        lambda quantity, right: (
+            getattr(right, quantity) - getattr(right, f"{quantity[:-1]}2")
+            if _is_angular(quantity) and _where(quantity, right, np.negative) is not None
+            else None
+        ),
+        whole=False,
+    )
+    yield from _inertial(scene, at)
     for text, changed, where in _other_problems(scene, at):
         try:
             wrong = solve(changed, at=where)
         except ValueError:
             continue
         yield Mistake(text, lambda quantity, right, wrong=wrong: getattr(wrong, quantity, None))  # type: ignore[misc]
+
+
+def _inertial(scene: Scene, at: Command) -> Iterator[Mistake]:
+    """Inertial forces in another unit than the loads they are added to: forces and torque are linear in each."""
+    if at.omega_2 is None:
+        return
+    bare = replace(scene, loads=(), effects=())
+    of_mass = solve(_with_bars(bare, lambda bar: replace(bar, inertia=0.0)), at=at)
+    of_inertia = solve(_with_bars(bare, lambda bar: replace(bar, mass=0.0)), at=at)
+
+    def scaled(by_mass: float, by_inertia: float) -> Callable[[str, Solution], Array | None]:
+        def predict(quantity: str, right: Solution) -> Array | None:
+            if not _is_force(quantity):
+                return None
+            extra = (by_mass - 1.0) * getattr(of_mass, quantity) + (by_inertia - 1.0) * getattr(of_inertia, quantity)
+            return np.asarray(getattr(right, quantity) + extra)
+
+        return predict
+
+    yield Mistake("m a and I alpha in kg cm/s^2 and kg cm^2/s^2, added to N and N cm: 100 times", scaled(1e2, 1e2))
+    yield Mistake("m a in kg cm/s^2 added to N: 100 times too large", scaled(1e2, 1.0))
+    yield Mistake("I alpha in kg cm^2/s^2 added to N cm: 100 times too large", scaled(1.0, 1e2))
+    yield Mistake("m a and I alpha in kg mm/s^2 and kg mm^2/s^2, added to N and N mm: 1000 times", scaled(1e3, 1e3))
+    yield Mistake("m a in kg mm/s^2 added to N: 1000 times too large", scaled(1e3, 1.0))
+    yield Mistake(
+        "inertial forces with the wrong sign (d'Alembert's forces put on the side of m a)", scaled(-1.0, -1.0)
+    )
+    yield Mistake("I alpha with the wrong sign", scaled(1.0, -1.0))
+
+
+def _with_bars(scene: Scene, change: Callable[[Bar], Bar]) -> Scene:
+    link = scene.linkage
+    return replace(
+        scene,
+        linkage=replace(link, input=change(link.input), coupler=change(link.coupler), output=change(link.output)),
+    )
 
 
 def _other_problems(scene: Scene, at: Command) -> Iterator[tuple[str, Scene, Command]]:
@@ -123,6 +190,10 @@ BAR_MISTAKES: tuple[tuple[str, Callable[[Bar], Bar | None]], ...] = (
 )
 
 
+def _is_force(quantity: str) -> bool:
+    return quantity in ("torque", "F12", "F32", "F43", "F14")
+
+
 def _is_angular(quantity: str) -> bool:
     return quantity.startswith(("theta", "omega", "alpha"))
 
@@ -141,6 +212,8 @@ class Explanation:
     """The quantities that agree once it is assumed."""
     complete: bool
     """Whether every quantity that differed now agrees."""
+    nearer: tuple[str, ...] = ()
+    """Quantities that it explains for the most part: what remains is NEARER times smaller."""
 
 
 def explain(
@@ -149,16 +222,31 @@ def explain(
     at: Command,
     right: Solution,
     differing: list[str],
-    agrees: Callable[[str, Array, Array], bool],
+    judged: Callable[[str, Array, Array], tuple[Array, Array]],
 ) -> list[Explanation]:
-    """The hypotheses under which quantities that differ agree; the most complete first."""
+    """The hypotheses under which quantities that differ agree, the most complete first; then those that come near.
+
+    A mistake that breaks a quantity which agreed as it was is none.
+    """
     found = []
+    theirs = table.values
     for mistake in hypotheses(scene, at):
-        explained = []
-        for quantity in differing:
+        explained, nearer, broken = [], [], False
+        for quantity, values in theirs.items():
             predicted = mistake.predict(quantity, right)
-            if predicted is not None and agrees(quantity, predicted, table.values[quantity]):
-                explained.append(quantity)
-        if explained:
-            found.append(Explanation(mistake.text, tuple(explained), len(explained) == len(differing)))
-    return sorted(found, key=lambda e: -len(e.quantities))
+            if predicted is None or np.array_equal(predicted, getattr(right, quantity), equal_nan=True):
+                continue
+            error, allowed = judged(quantity, predicted, values)
+            if np.all(error <= allowed):
+                if quantity in differing:
+                    explained.append(quantity)
+            elif quantity not in differing:
+                broken = mistake.whole
+            else:
+                before, _ = judged(quantity, getattr(right, quantity), values)
+                if np.all(NEARER * error <= before):
+                    nearer.append(quantity)
+        if (explained or nearer) and not broken:
+            complete = len(explained) == len(differing)
+            found.append(Explanation(mistake.text, tuple(explained), complete, tuple(nearer)))
+    return sorted(found, key=lambda e: (-len(e.quantities), -len(e.nearer)))[:SHOWN]

@@ -32,12 +32,15 @@ class Table:
     values: dict[str, Array]
     rounding: dict[str, Array]
     """Half a unit of the last digit printed, in SI, (n,)."""
+    lines: list[int]
+    """The line of the file that each row stands in."""
 
 
 def read_table(path: Path) -> Table:
     """Read a CSV table; InputError names the column or line that cannot be read."""
-    lines = _lines(path)
-    if not lines or len(lines) < 2:
+    numbered = _lines(path)
+    places, lines = [place for place, _ in numbered][1:], [cells for _, cells in numbered]
+    if len(lines) < 2:
         raise InputError("table", path.name, "needs a header and at least one row", str(path))
     columns = [_column(path, heading) for heading in lines[0]]
     names = [name for name, _ in columns]
@@ -47,11 +50,11 @@ def read_table(path: Path) -> Table:
         raise InputError("header", lines[0], "needs a column theta_2 (say theta_2 [deg] for degrees)", str(path))
     numbers = np.empty((len(lines) - 1, len(columns)))
     halves = np.empty_like(numbers)
-    for line, cells in enumerate(lines[1:], 2):
+    for row, (line, cells) in enumerate(zip(places, lines[1:], strict=True)):
         if len(cells) != len(columns):
             raise InputError(f"line {line}", cells, f"needs {len(columns)} cells", str(path))
         for index, cell in enumerate(cells):
-            numbers[line - 2, index], halves[line - 2, index] = _number(path, line, cell)
+            numbers[row, index], halves[row, index] = _number(path, line, cell)
     factors = np.array([factor for _, factor in columns])
     numbers, halves = numbers * factors, halves * factors
     by_name = {name: numbers[:, index] for index, name in enumerate(names)}
@@ -66,15 +69,17 @@ def read_table(path: Path) -> Table:
             values[quantity], rounding[quantity] = by_name[quantity], half_by_name[quantity]
     if not values:
         raise InputError("header", lines[0], "needs a result, such as torque or F12_x and F12_y", str(path))
-    return Table(by_name["theta_2"], values, rounding)
+    return Table(by_name["theta_2"], values, rounding, places)
 
 
-def _lines(path: Path) -> list[list[str]]:
+def _lines(path: Path) -> list[tuple[int, list[str]]]:
+    """The lines that hold anything, with their numbers."""
     try:
         if path.stat().st_size > LARGEST_FILE:
             raise InputError("table", path.name, f"must be smaller than {LARGEST_FILE // 2**20} MB", str(path))
         with path.open(newline="", encoding="utf-8-sig") as file:
-            return [row for row in csv.reader(file) if any(cell.strip() for cell in row)]
+            reader = csv.reader(file)
+            return [(reader.line_num, row) for row in reader if any(cell.strip() for cell in row)]
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         reason = error.strerror if isinstance(error, OSError) else "must be a CSV file in UTF-8"
         raise InputError("table", path.name, str(reason), str(path)) from None

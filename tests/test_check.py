@@ -1,0 +1,304 @@
+"""Other people's numbers: judged row by row, and a known mistake is named as such."""
+
+import csv
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import fourbar
+from fourbar.exits import BAD_INPUT, FAILED, HOLDS
+from fourbar.scene import Command, Scene, command, solve
+from fourbar.solution import OK, VECTORS
+from validation.check.command import Judgement, judge_table
+from validation.check.theirs import LARGEST_FILE, read_table
+from validation.cli import status
+
+MODELS = Path(__file__).parents[1] / "models"
+SCENES = {
+    "thesis": fourbar.load(MODELS / "thesis.toml"),
+    "crank_rocker": fourbar.load(MODELS / "crank_rocker.toml"),
+}
+FORCES = ("torque", "F12", "F32", "F43", "F14")
+ALL = ("theta_3", "theta_4", "omega_3", "omega_4", "alpha_3", "alpha_4", *FORCES)
+EVERY = 31
+"""One position of so many is written."""
+Numbers = dict[str, np.ndarray]
+
+
+def right(scene: Scene, **changed: object) -> Numbers:
+    """The right numbers at some positions; the command may be changed."""
+    at = command(scene)
+    at = Command(at.theta_2[::EVERY], at.branch[::EVERY], at.omega_2, at.alpha_2)._replace(**changed)
+    solution = solve(scene, at=at)
+    assert np.all(solution.status_code == OK)
+    return {name: np.array(getattr(solution, name)) for name in ("theta_2", *ALL)}
+
+
+def write(path: Path, numbers: Numbers, names: tuple[str, ...] = ALL, digits: int | None = None) -> Path:
+    columns = {"theta_2": numbers["theta_2"]}
+    for name in names:
+        if name in VECTORS:
+            columns |= {f"{name}_x": numbers[name][:, 0], f"{name}_y": numbers[name][:, 1]}
+        else:
+            columns[name] = numbers[name]
+    with path.open("w", newline="") as file:
+        writer = csv.writer(file)
+        writer.writerow(columns)
+        for row in zip(*columns.values(), strict=True):
+            # the angle stays exact: rounding it would ask for another position
+            writer.writerow(
+                [repr(float(row[0])), *(repr(float(x)) if digits is None else f"{x:.{digits}e}" for x in row[1:])]
+            )
+    return path  # fmt: skip
+
+
+def judged(scene: Scene, path: Path) -> Judgement:
+    return judge_table(scene, read_table(path))
+
+
+@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize("digits", [None, 5])
+def test_the_right_numbers_agree_also_when_rounded(name: str, digits: int | None, tmp_path: Path) -> None:
+    path = write(tmp_path / "theirs.csv", right(SCENES[name]), digits=digits)
+    assert judged(SCENES[name], path).differing == []
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_a_torque_off_by_one_in_the_last_of_six_digits_is_found(name: str, tmp_path: Path) -> None:
+    numbers = right(SCENES[name])
+    numbers["torque"] = numbers["torque"] * (1.0 + 3e-5)
+    found = judged(SCENES[name], write(tmp_path / "theirs.csv", numbers, digits=5))
+    assert {finding.quantity for finding in found.differing} == {"torque"}
+
+
+def bars(scene: Scene, **changes: object) -> Scene:
+    return replace(scene, linkage=replace(scene.linkage, **changes))
+
+
+def units(*names: str, factor: float) -> Callable[[Scene], Numbers]:
+    def planted(scene: Scene) -> Numbers:
+        numbers = right(scene)
+        return numbers | {name: numbers[name] * factor for name in names}
+
+    return planted
+
+
+def solved(change: Callable[[Scene], Scene], **command: object) -> Callable[[Scene], Numbers]:
+    return lambda scene: right(change(scene), **command)
+
+
+def same(scene: Scene) -> Scene:
+    return scene
+
+
+def inertial_times(scene: Scene, by_mass: float, by_inertia: float) -> Numbers:
+    """m a and I alpha by hand: what they add to static equilibrium is put on as loads at G, d'Alembert's way."""
+    motion = solve(scene, at=(at := command(scene)))
+    numbers: dict[str, list[np.ndarray]] = {name: [] for name in ("theta_2", *ALL)}
+    for i in range(0, len(at.theta_2), EVERY):
+        extra = []
+        for bar in (2, 3, 4):
+            described = scene.linkage.bar(bar)
+            assert described.inertia is not None
+            x, y = (by_mass - 1.0) * -described.mass * getattr(motion, f"a_G{bar}")[i]
+            couple = (by_inertia - 1.0) * -described.inertia * float(getattr(motion, f"alpha_{bar}")[i])
+            force = (math.hypot(x, y), math.atan2(y, x))
+            extra.append(fourbar.Load(bar, force, moment=couple))
+        here = Command(at.theta_2[i : i + 1], at.branch[i : i + 1], at.omega_2, at.alpha_2)
+        one = solve(replace(scene, loads=(*scene.loads, *extra)), at=here)
+        for name, values in numbers.items():
+            values.append(getattr(one, name)[0])
+    return {name: np.array(values) for name, values in numbers.items()}
+
+
+def other_pin(scene: Scene) -> Scene:
+    bar = scene.linkage.coupler
+    assert bar.centre is not None
+    r, phi = bar.centre
+    x, y = bar.length - r * math.cos(phi), r * math.sin(phi)
+    return bars(scene, coupler=replace(bar, centre=(math.hypot(x, y), math.atan2(y, x))))
+
+
+def about_pin(scene: Scene) -> Scene:
+    bar = scene.linkage.output
+    assert bar.inertia is not None and bar.centre is not None
+    return bars(scene, output=replace(bar, inertia=bar.inertia + bar.mass * bar.centre[0] ** 2))
+
+
+def exchanged(scene: Scene) -> Numbers:
+    numbers = right(scene)
+    return numbers | {"F32": numbers["F32"][:, ::-1]}
+
+
+OMEGA = {"thesis": 0.2244, "crank_rocker": 10.0}
+MISTAKES: list[tuple[str, str, tuple[str, ...], Callable[[Scene], Numbers], str]] = [
+    # id, scene, columns, what was done, words of the explanation
+    ("torque in N cm", "thesis", ALL, units("torque", factor=1e2), "10^2 of ours"),
+    ("torque in N mm", "crank_rocker", ALL, units("torque", factor=1e3), "10^3 of ours"),
+    ("forces in kN", "crank_rocker", ALL, units("F12", "F32", "F43", "F14", factor=1e-3), "10^-3 of ours"),
+    ("forces in kgf", "thesis", ALL, units("F12", "F32", "F43", "F14", factor=1 / 9.80665), "kgf"),
+    ("torque of the bar on the ground", "thesis", ALL, units("torque", factor=-1.0), "sign reversed"),
+    ("F23 for F32", "crank_rocker", ALL, units("F32", factor=-1.0), "F_ij given for F_ji"),
+    ("angles in degrees", "crank_rocker", ALL, units("theta_3", "theta_4", factor=180 / math.pi), "degrees"),
+    ("x and y exchanged", "thesis", ALL, exchanged, "x and y exchanged"),
+    ("other branch", "thesis", ALL, solved(same, branch=np.full(12, -1, np.int8)), "other branch"),
+    ("gravity missing", "crank_rocker", FORCES, solved(lambda s: replace(s, effects=())), "gravity is missing"),
+    ("gravity upwards", "crank_rocker", FORCES,
+     solved(lambda s: replace(s, effects=(fourbar.Gravity(-9.81),))), "gravity points the other way"),
+    ("gravity added", "thesis", FORCES,
+     solved(lambda s: replace(s, effects=(fourbar.Gravity(),))), "gravity along -y is included"),
+    ("loads missing", "thesis", FORCES, solved(lambda s: replace(s, loads=())), "the loads are missing"),
+    ("third load missing", "thesis", FORCES,
+     solved(lambda s: replace(s, loads=(*s.loads[:2], s.loads[3]))), "load 3 (bar 3) is missing"),
+    ("statics", "crank_rocker", FORCES, solved(same, omega_2=0.0, alpha_2=0.0), "statics"),
+    ("omega_2 in rev/min", "crank_rocker", ALL, solved(same, omega_2=10.0 * 30 / math.pi), "rev/min"),
+    ("wrong pin", "crank_rocker", FORCES, solved(other_pin), "coupler: mass centre measured from the wrong pin"),
+    ("mid-bar", "crank_rocker", FORCES,
+     solved(lambda s: bars(s, coupler=replace(s.linkage.coupler, centre=(0.125, 0.0)))), "centre taken at"),
+    ("inertia about the pin", "crank_rocker", FORCES, solved(about_pin), "output: inertia about the pin"),
+    ("no inertia", "thesis", FORCES,
+     solved(lambda s: bars(s, coupler=replace(s.linkage.coupler, inertia=0.0))), "coupler: moment of inertia left out"),
+    ("kg cm^2 for kg m^2", "thesis", FORCES,
+     solved(lambda s: bars(s, output=replace(s.linkage.output, inertia=s.linkage.output.inertia * 1e4))),
+     "output: moment of inertia in kg cm^2 taken for kg m^2"),
+    ("drive on bar 2", "thesis", FORCES, solved(lambda s: replace(s, drive_bar=2)), "on bar 2 instead of bar 4"),
+    ("m a in kg cm/s^2", "thesis", FORCES, lambda s: inertial_times(s, 100.0, 1.0), "m a in kg cm/s^2 added to N"),
+    ("I alpha in kg cm^2/s^2", "thesis", FORCES, lambda s: inertial_times(s, 1.0, 100.0), "I alpha in kg cm^2/s^2"),
+    ("both", "crank_rocker", FORCES, lambda s: inertial_times(s, 100.0, 100.0), "m a and I alpha in kg cm/s^2"),
+    ("m a in kg mm/s^2", "crank_rocker", FORCES, lambda s: inertial_times(s, 1e3, 1.0), "m a in kg mm/s^2"),
+    ("d'Alembert's sign", "crank_rocker", FORCES, lambda s: inertial_times(s, -1.0, -1.0), "d'Alembert"),
+    ("theta_2 as degrees", "crank_rocker", ALL,
+     lambda s: right(s, theta_2=np.radians(right(s)["theta_2"])) | {"theta_2": right(s)["theta_2"]}, "read as degrees"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("what", "scene", "columns", "planted", "words"), MISTAKES, ids=[m[0] for m in MISTAKES])
+def test_a_known_mistake_is_the_first_explanation(
+    what: str,
+    scene: str,
+    columns: tuple[str, ...],
+    planted: Callable[[Scene], Numbers],
+    words: str,
+    tmp_path: Path,
+) -> None:
+    found = judged(SCENES[scene], write(tmp_path / "theirs.csv", planted(SCENES[scene]), columns))
+    assert found.differing
+    first = found.explanations[0]
+    assert words in first.text
+    assert first.complete
+
+
+def test_two_mistakes_in_two_columns_are_both_named(tmp_path: Path) -> None:
+    scene = SCENES["crank_rocker"]
+    numbers = right(scene)
+    numbers |= {"torque": numbers["torque"] * 100.0, "F43": -numbers["F43"]}
+    found = judged(scene, write(tmp_path / "theirs.csv", numbers))
+    told = {explanation.text[:14]: explanation for explanation in found.explanations}
+    assert told["units: every n"].quantities == ("torque",)
+    assert told["sign reversed,"].quantities == ("F43",)
+    assert not any(explanation.complete for explanation in found.explanations)
+
+
+def test_nonsense_is_explained_by_nothing(tmp_path: Path) -> None:
+    scene = SCENES["crank_rocker"]
+    numbers = right(scene)
+    rng = np.random.default_rng(3)
+    numbers |= {name: rng.normal(size=numbers[name].shape) for name in FORCES}
+    found = judged(scene, write(tmp_path / "theirs.csv", numbers, FORCES))
+    assert found.explanations == []
+
+
+PUBLISHED = {
+    "T4": "308.80440716278196",
+    "F12": ("161.41816840858934", "-156.5062600586869"),
+    "F32": ("-16.155517050935163", "1.2436087010327004"),
+    "F43": ("-15.747450980232276", "-0.10106254809495736"),
+    "F14": ("-15.753131487864277", "-0.4245152186008738"),
+}
+"""The thesis's section 5.7 at theta_2 = 135 deg, N and N cm, digits as printed."""
+
+
+def test_the_thesis_itself_differs_and_its_unit_slip_is_hinted(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    forces = ("F12", "F32", "F43", "F14")
+    path = tmp_path / "thesis.csv"
+    heading = ",".join(f"{name}_x,{name}_y" for name in forces)
+    cells = ",".join(x for name in forces for x in PUBLISHED[name])
+    path.write_text(f"theta_2 [deg],torque [N cm],{heading}\n135,{PUBLISHED['T4']},{cells}\n")
+    assert status(["check", str(MODELS / "thesis.toml"), str(path)]) == FAILED
+    told = capsys.readouterr().out
+    assert "0 of 5 numbers agree" in told
+    hint = next(line for line in told.splitlines() if line.startswith("looks like: m a"))
+    assert "kg cm/s^2 added to N" in hint
+    assert "F12" in hint
+
+
+BAD_TABLES = [
+    ("empty", "", "header and at least one row"),
+    ("header alone", "theta_2,torque\n", "header and at least one row"),
+    ("no angle", "torque\n1\n", "theta_2"),
+    ("no result", "theta_2\n1\n", "needs a result"),
+    ("half a vector", "theta_2,F12_x\n1,2\n", "needs a result"),
+    ("vector without component", "theta_2,F12\n1,2\n", "not a known column"),
+    ("unknown column", "theta_2,wheel\n1,2\n", "not a known column"),
+    ("unit of another kind", "theta_2,torque [kg]\n1,2\n", "kg"),
+    ("twice", "theta_2,torque,torque\n1,2,2\n", "twice"),
+    ("word", "theta_2,torque\n1,much\n", "line 2"),
+    ("NaN", "theta_2,torque\n1,nan\n", "finite"),
+    ("too large", "theta_2,torque\n1,1e999\n", "larger than a double"),
+    ("cells missing", "theta_2,torque\n\n1,2\n3\n", "line 4"),
+    ("decimal comma", 'theta_2,torque\n1,"2,5"\n', "must be a number"),
+    ("binary", b"\xff\xfe\x00\x01", "UTF-8"),
+    ("null byte", "theta_2,torque\n1,2\x00\n", "table"),
+    ("escape", "theta_2,\x1b[31mtorque\n1,2\n", "not a known column"),
+    ("endless exponent", "theta_2,torque\n1,1e-99999999\n", "torque"),
+]
+
+
+@pytest.mark.parametrize(("what", "text", "words"), BAD_TABLES, ids=[case[0] for case in BAD_TABLES])
+def test_a_bad_table_is_one_line(
+    what: str, text: str | bytes, words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "theirs.csv"
+    path.write_bytes(text if isinstance(text, bytes) else text.encode())
+    code = status(["check", str(MODELS / "thesis.toml"), str(path)])
+    said = capsys.readouterr()
+    if what == "endless exponent":  # a zero, printed to many digits: judged like any other
+        assert code == FAILED
+        return
+    assert code == BAD_INPUT
+    assert words in said.err
+    assert len(said.err.splitlines()) == 1
+    assert "\x1b" not in said.err
+
+
+def test_a_table_that_is_too_large_or_missing_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    large = tmp_path / "large.csv"
+    with large.open("wb") as file:
+        file.truncate(LARGEST_FILE + 1)
+    for path, words in ((large, "smaller than"), (tmp_path / "none.csv", "No such file"), (tmp_path, "directory")):
+        assert status(["check", str(MODELS / "thesis.toml"), str(path)]) == BAD_INPUT
+        assert words in capsys.readouterr().err
+
+
+def test_positions_that_do_not_assemble_are_named_by_their_line(tmp_path: Path) -> None:
+    path = tmp_path / "theirs.csv"
+    path.write_text("theta_2 [deg],theta_3\n\n45,1\n")
+    found = judged(SCENES["thesis"], path)
+    assert found.not_assembled == [3]
+    assert status(["check", str(MODELS / "thesis.toml"), str(path)]) == FAILED
+
+
+def test_agreement_is_exit_0_in_every_unit(tmp_path: Path) -> None:
+    numbers = right(SCENES["thesis"])
+    path = tmp_path / "theirs.csv"
+    rows = zip(np.degrees(numbers["theta_2"]), numbers["torque"] * 100.0, numbers["F12"] / 9.80665, strict=True)
+    lines = [f"{theta!r},{torque:.9e},{x:.9e},{y:.9e}" for theta, torque, (x, y) in rows]
+    heading = "theta_2 [deg],torque [N cm],F12_x [kgf],F12_y [kgf]"
+    path.write_text("\n".join([heading, *lines]).replace("np.float64(", "").replace(")", ""))
+    assert status(["check", str(MODELS / "thesis.toml"), str(path)]) == HOLDS
