@@ -7,7 +7,7 @@ import numpy as np
 from fourbar.dynamics import acceleration, generalised_force, inertia, path
 from fourbar.files import dump, loads
 from fourbar.scene import Command, Scene, command, solve
-from fourbar.solution import OK
+from fourbar.solution import OK, Solution
 from validation.compare import TOUCHING_MARGIN, closing_margin, compare
 from validation.hard.prediction import from_data
 from validation.hard.suite import predicting
@@ -25,7 +25,10 @@ def findings(scene: Scene, witnesses: tuple[Witness, ...] = EXACT) -> list[str]:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error")
-            return [*_file(scene), *_assembly(scene), *_engines(scene, witnesses), *_back(scene)]
+            at = command(scene)
+            solution = solve(scene, "force", at=at)
+            found = [*_file(scene), *_assembly(scene, at, solution)]
+            return [*found, *_engines(scene, at, solution, witnesses), *_back(scene, at, solution)]
     except Exception as error:  # a traceback is what fuzzing looks for
         return [f"{type(error).__name__}: {error}".splitlines()[0]]
 
@@ -36,14 +39,12 @@ def _file(scene: Scene) -> list[str]:
     return [] if again == dump(scene) else ["file: a scene that was written and read is another one"]
 
 
-def _assembly(scene: Scene) -> list[str]:
+def _assembly(scene: Scene, at: Command, solution: Solution) -> list[str]:
     """No position where the loop does not close, none missing where it does, by ball arithmetic."""
     from flint import arb, ctx
 
     from validation.reference import BITS, closure, inputs
 
-    at = command(scene)
-    solution = solve(scene, "position", at=at)
     ctx.prec = BITS
     found = []
     margin = np.abs(closing_margin(scene, at.theta_2))
@@ -58,9 +59,7 @@ def _assembly(scene: Scene) -> list[str]:
     return found
 
 
-def _engines(scene: Scene, witnesses: tuple[Witness, ...]) -> list[str]:
-    at = command(scene)
-    solution = solve(scene, at=at)
+def _engines(scene: Scene, at: Command, solution: Solution, witnesses: tuple[Witness, ...]) -> list[str]:
     rows = identities("", scene, at, solution)
     for witness in witnesses:
         answer = witness.engine().answer(scene, at)
@@ -76,10 +75,8 @@ def _engines(scene: Scene, witnesses: tuple[Witness, ...]) -> list[str]:
     return [f"{row.engine} {row.quantity}: {row.reason}" for row in rows if row.verdict == FAILS]
 
 
-def _back(scene: Scene) -> list[str]:
+def _back(scene: Scene, at: Command, solution: Solution) -> list[str]:
     """From the torque back to alpha_2 by the reduced equation: J alpha = Q + T theta_k' - J'/2 omega^2."""
-    at = command(scene)
-    solution = solve(scene, at=at)
     assert solution.torque is not None and at.omega_2 is not None
     way = path(scene.linkage, at.theta_2, np.asarray(at.branch, dtype=float))
     terms = (*scene.loads, *scene.effects)
