@@ -169,7 +169,7 @@ class Rig:
     def _drive_elsewhere(self, loop: ClosedLoop, light: ClosedLoop, crank_torque: float) -> float:
         """The couple on bar 3 or 4 with which the crank accelerates as it did: linear in the couple, so two trials."""
         d = light.data
-        d.qpos[:], d.qvel[:] = loop.data.qpos, loop.data.qvel
+        d.qpos[:], d.qvel[:] = loop.data.qpos[: d.qpos.size], loop.data.qvel[: d.qvel.size]  # a drive may have its own
         alpha_2 = loop.data.qacc[O2]
         # the light flywheel's motor gives it alpha_2 as commanded; this gives it what the crank really had
         correction = light.model.dof_armature[O2] * (alpha_2 - self.alpha)
