@@ -18,6 +18,10 @@ COMMANDS = {
     "fuzz": "validation.fuzz.command:fuzz",
     "stability": "validation.stability:stability",
     "bench": "validation.bench:bench",
+    "cost": "validation.cost.command:cost",
+    "advise": "validation.cost.advise:command",
+    "advise-study": "validation.cost.measure:study",
+    "effects-cost": "validation.effect_cost:command",
 }
 
 

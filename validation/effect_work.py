@@ -1,0 +1,119 @@
+"""One workload for counting its instructions: `python -m validation.effect_work ENGINE EFFECT AMOUNT`."""
+
+import gc
+import math
+import re
+import sys
+from collections.abc import Callable
+from typing import Any
+
+from fourbar.effects import (
+    Effect,
+    Flywheel,
+    Friction,
+    Gravity,
+    Load,
+    PinFriction,
+    Point,
+    Spring,
+    Springs,
+    Table,
+    Torsion,
+    Viscous,
+)
+from fourbar.linkage import Bar, FourBar
+from fourbar.scene import Motion, Scene, Sweep, command, solve
+
+EFFECTS: dict[str, Effect | None] = {
+    "none": None,
+    "gravity": Gravity(),
+    "viscous": Viscous.at(O2=0.01, A=0.01, O4=0.01),
+    "viscous, pin B": Viscous.at(B=0.01),
+    "friction": Friction.at(O2=0.01, A=0.01, O4=0.01),
+    "friction, pin B": Friction.at(B=0.01),
+    "pin_friction": PinFriction.at(O2=(0.1, 0.01), A=(0.1, 0.01), B=(0.1, 0.01), O4=(0.1, 0.01)),
+    "torsion": Torsion.at(O4=(2.0, 1.9, 0.1)),
+    "springs": Springs((Spring(Point(1, 0.1, -1.5), Point(4, 0.08, 0.0), 200.0, 0.05, 3.0),)),
+    "flywheel": Flywheel(0.02),
+    "load": Load(4, (3.0, 0.7), (0.05, 1.0), 0.2),
+    "load over theta_2": Load(4, (3.0, 0.7), (0.05, 1.0), 0.2, "world", Table((0.0, 3.0, math.tau), (0.0, 1.0, 0.0))),
+}
+"""What is counted, each by itself on the same linkage."""
+DEFAULT_FLAGS = "none, MuJoCo's default flags"
+POSITIONS = 1000
+"""Of the formulas in one unit of work: they take arrays."""
+
+
+def scene(effect: str, positions: int) -> Scene:
+    """A crank-rocker of uniform bars with one effect."""
+    linkage = FourBar(0.3, Bar(0.1, 0.2), Bar(0.25, 0.5), Bar(0.22, 0.4))
+    term = EFFECTS[effect]
+    loads = (term,) if isinstance(term, Load) else ()
+    effects = () if term is None or loads else (term,)
+    return Scene(linkage, Motion(Sweep(0.13, 0.13 + math.tau, positions - 1), 10.0), loads=loads, effects=effects)
+
+
+def formulas(effect: str) -> Callable[[int], Any]:
+    """Pin forces and torque at POSITIONS positions, as often as asked."""
+    asked = scene(effect, POSITIONS)
+
+    def work(amount: int) -> None:
+        for _ in range(amount):
+            solve(asked, "force")
+
+    return work
+
+
+def simulated(effect: str) -> Callable[[int], Any]:
+    """Steps of the generated MJCF, as many as asked."""
+    import mujoco
+
+    from fourbar.mjcf import mjcf
+
+    text = mjcf(scene("none" if effect == DEFAULT_FLAGS else effect, 91))
+    if effect == DEFAULT_FLAGS:
+        text = re.sub(r"<flag [^>]*/>", "", text)
+    model = mujoco.MjModel.from_xml_string(text)
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, 0)
+    return lambda amount: mujoco.mj_step(model, data, amount)
+
+
+def inverse(adapter: str) -> Callable[[str], Callable[[int], Any]]:
+    """Answers of an inverse engine at as many positions as asked."""
+
+    def prepare(effect: str) -> Callable[[int], Any]:
+        from importlib import import_module
+
+        module, _, name = adapter.partition(":")
+        engine = getattr(import_module(module), name)()
+
+        def work(amount: int) -> None:
+            asked = scene(effect, amount)
+            engine.answer(asked, command(asked))
+
+        return work
+
+    return prepare
+
+
+ENGINES: dict[str, Callable[[str], Callable[[int], Any]]] = {
+    "formulas": formulas,
+    "mujoco-simulated": simulated,
+    "mujoco-inverse": inverse("validation.engines.mujoco.inverse:MujocoInverse"),
+    "pinocchio-inverse": inverse("validation.engines.pinocchio:PinocchioInverse"),
+}
+
+
+def main() -> None:
+    """Prepare, then work; nothing is printed, so that nothing but the work differs between two amounts."""
+    engine, effect, amount = sys.argv[1:4]
+    work = ENGINES[engine](effect)
+    work(2)
+    gc.collect()
+    gc.disable()
+    work(int(amount))
+
+
+if __name__ == "__main__":
+    main()
