@@ -12,6 +12,7 @@ import fourbar
 from fourbar.cli import status
 from fourbar.effects import REGISTRY
 from fourbar.exits import HOLDS
+from validation.cli import COMMANDS
 
 ROOT = Path(__file__).parent.parent
 TEXT = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -61,3 +62,14 @@ def test_the_scene_file_is_one(checkout: Path) -> None:
     scene = fourbar.load(checkout / "example.toml")
     assert set(fourbar.solve(scene).status) == {"ok"}
     assert {effect.key for effect in scene.effects} <= set(REGISTRY)
+
+
+def test_every_command_of_the_harness_is_listed() -> None:
+    table = TEXT[TEXT.index("| `python -m validation` |") : TEXT.index("A suite is run in parallel")]
+    listed = re.findall(r"`([a-z-]+)[^`]*`", "".join(line.split("|")[1] for line in table.splitlines()[2:] if line))
+    assert sorted(listed) == sorted(COMMANDS)
+
+
+def test_every_link_leads_somewhere() -> None:
+    for target in re.findall(r"\]\(([^)#]+)\)", TEXT):
+        assert (ROOT / target).is_file(), target
