@@ -1,0 +1,77 @@
+"""The guide's example is a working effect: read from the page, registered, and judged by the engines."""
+
+import re
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import pytest
+
+from fourbar.effects import REGISTRY
+from fourbar.files import dump, loads
+from fourbar.scene import Scene
+from tests.test_effects import EXACT, SIMULATED, failing, refusing
+
+PAGE = (Path(__file__).parent.parent / "docs" / "adding-an-effect.md").read_text(encoding="utf-8")
+SCENE = """
+[lengths]
+ground = "300 mm"
+input = "100 mm"
+coupler = "250 mm"
+output = "220 mm"
+[bars]
+input = { mass = "0.2 kg" }
+coupler = { mass = "0.5 kg" }
+output = { mass = "0.4 kg" }
+[motion]
+theta_2 = { from = "5 deg", to = "365 deg", steps = 12 }
+omega_2 = "10 rad/s"
+"""
+
+
+def block(language: str) -> str:
+    found = re.search(rf"```{language}\n(.*?)```", PAGE, re.S)
+    assert found is not None
+    return found[1]
+
+
+@pytest.fixture
+def windage(monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
+    module = ModuleType("fourbar.effects.windage")
+    monkeypatch.setitem(sys.modules, module.__name__, module)
+    exec(block("python"), module.__dict__)
+    monkeypatch.setitem(REGISTRY, "windage", module.Windage)
+    yield module.Windage
+
+
+def asked() -> Scene:
+    return loads(SCENE + block("toml"))
+
+
+def test_the_page_is_one_page() -> None:
+    assert len(PAGE.splitlines()) <= 120
+
+
+def test_the_example_is_read_written_and_agreed_on(windage: Any) -> None:
+    scene = asked()
+    assert scene.effects == (windage(4, 0.002),)
+    assert loads(dump(scene)).effects == scene.effects
+    assert windage.example in PAGE
+    assert failing(scene, EXACT) == []
+    assert refusing(scene, SIMULATED) == {"mujoco-simulated"}
+
+
+@pytest.mark.parametrize("method", ["add_wrenches", "power", "engine_term"])
+def test_a_fault_in_the_example_is_caught(windage: Any, method: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    right = getattr(windage, method)
+
+    def three_times(self: Any, *arguments: Any) -> Any:
+        if method == "power":
+            return 3.0 * right(self, *arguments)
+        acts = [right(self, *arguments) for _ in range(3)]
+        return (lambda: [act() for act in acts]) if method == "engine_term" else None
+
+    monkeypatch.setattr(windage, method, three_times)
+    assert "torque" in {quantity for _, quantity, _ in failing(asked(), EXACT)}
