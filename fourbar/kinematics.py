@@ -24,7 +24,9 @@ Vector = tuple[Array, Array]
 
 def cross(u: Vector, v: Vector) -> Array:
     """z-component of u x v."""
-    return u[0] * v[1] - u[1] * v[0]
+    z = u[0] * v[1]
+    z -= u[1] * v[0]
+    return z
 
 
 def dot(u: Vector, v: Vector) -> Array:

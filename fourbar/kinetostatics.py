@@ -178,8 +178,12 @@ def eliminate(state: State, wrenches: Wrenches, drive_bar: int) -> PinForces:
             F43 = between(-M2 / a - cross(u2, R3), M4 / c, u2, u4, sine_between(u2, u4))
             F32 = (R3[0] + F43[0], R3[1] + F43[1])
             torque = -(M3 + b * cross(u3, F43))
+    F32_x, F32_y = F32
     if wrenches.at_A is not None:
-        F32 = (F32[0] + wrenches.at_A[0], F32[1] + wrenches.at_A[1])
+        F32_x += wrenches.at_A[0]
+        F32_y += wrenches.at_A[1]
+    F12_x, F12_y = -R2[0], -R2[1]
+    F12_x -= F32_x
+    F12_y -= F32_y
     F14 = (F43[0] - R4[0], F43[1] - R4[1])
-    F12 = (-R2[0] - F32[0], -R2[1] - F32[1])
-    return PinForces(F12, F32, F43, F14, torque)
+    return PinForces((F12_x, F12_y), F32, F43, F14, torque)

@@ -135,6 +135,11 @@ class Scene:
         object.__setattr__(self, "loads", tuple(self.loads))
         object.__setattr__(self, "effects", tuple(self.effects))
 
+    def _repr_html_(self) -> str:
+        from fourbar.notebook import scene_html
+
+        return scene_html(self)
+
 
 class Command(NamedTuple):
     """What the input bar is told to do at each of n independent positions."""
@@ -154,8 +159,9 @@ class Command(NamedTuple):
 
 
 DEFAULT_STEPS = 360
-BLOCK = 8192
-"""Positions evaluated at a time, measured: fewer pay for calls, more leave the second-level cache."""
+BLOCK = 15 * 1024
+"""Positions evaluated at a time, measured: fewer pay for calls; from 128 KiB an array on, the C library maps fresh
+pages for each."""
 
 LIVE_ARRAYS = 96
 """More than a block ever holds at once."""

@@ -47,7 +47,10 @@ def resting(state: State, pin: str) -> Any:
     speeds = (np.abs(one) + np.abs(other) + np.abs(state.omega_2)) + np.zeros(state.theta_2.shape)
     # positions evaluated in 32 digits tell slips apart that doubles cannot
     rounding = AT_REST if isinstance(state.theta_2, np.ndarray) else AT_REST * 2.0**-52
-    return ~np.greater(np.abs(other - one) * (state.sin_mu * state.sin_mu), rounding * speeds)
+    lost: Any = state.sin_mu * state.sin_mu
+    if state.parallel is not None:
+        lost = np.where(state.parallel[0], 1.0, lost)  # speeds of bars that stay parallel are exact
+    return ~np.greater(np.abs(other - one) * lost, rounding * speeds)
 
 
 def sense(state: State, pin: str, side: int) -> Any:

@@ -29,7 +29,9 @@ class Wrenches:
         (fx, fy), (p, q), u = force, point, self.state.unit(bar)
         self.add_force(bar, force)
         # (p u + q u turned) x F
-        self.add_moment(bar, (p * fy - q * fx) * u[0] - (p * fx + q * fy) * u[1])
+        moment = (p * fy - q * fx) * u[0]
+        moment -= (p * fx + q * fy) * u[1]
+        self.add_moment(bar, moment)
 
     def add_force(self, bar: int, force: Vector | tuple[float, float], arm: Vector | None = None) -> None:
         """A force on a bar, applied at `arm` from the bar's first pin; at that pin where no arm is given."""
