@@ -86,7 +86,8 @@ def _passes_change_point(scene: Scene, command: Command) -> bool:
 class _Simulation:
     """One scene: its own assembly, then each stretch of positions that assembles, run through in time."""
 
-    def __init__(self, settings: Settings, scene: Scene, command: Command) -> None:
+    def __init__(self, settings: Settings, scene: Scene, command: Command, *, bounded: bool = True) -> None:
+        self.bounded = bounded
         self.settings, self.scene, self.command = settings, scene, command
         self.omega, self.alpha = float(np.max(command.omega_2)), float(np.max(command.alpha_2))  # type: ignore[arg-type]
         # the text is that of the command, which a caller may have given instead of the scene's own
@@ -120,7 +121,7 @@ class _Simulation:
         position = ClosedLoop(self._text(1e-3)).position()  # kinematics alone: the timestep plays no part
         found = self._assemble(position)
         least = least_sine(self.scene.linkage, self.command.theta_2, np.array([q is not None for q in found]))
-        if least < NEAREST_TOGGLE.boundary:
+        if self.bounded and least < NEAREST_TOGGLE.boundary:
             raise LimitError(f"|sin(theta_4 - theta_3)| falls to {least:.1e}; {NEAREST_TOGGLE.reason}")
         for stretch in self._stretches(position, found):
             self._run(stretch, found)
