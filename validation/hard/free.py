@@ -22,7 +22,7 @@ from validation.tolerance import DEGRADED as TIMES_PREDICTED
 
 ENGINES = {
     "mujoco-forward": ("validation.engines.mujoco.released:MujocoForward", 1e-3),
-    "pinocchio-forward": ("validation.engines.pinocchio_forward:PinocchioForward", 2e-3),
+    "pinocchio-forward": ("validation.engines.pinocchio_released:PinocchioReleased", 2e-3),
 }
 """Adapter and step (s) of each engine that integrates by itself."""
 FULL = {"theta_2": 1e-9, "omega_2": 1e-8, "energy": 1e-10}

@@ -5,9 +5,10 @@
 the first-order change of a result y, at this very position and for this very quantity, when every
 stored input x_i (lengths, angles, masses, loads, the command) moves in its last digit, and when the
 loop opens with the speed and the acceleration, and the bars get the couples, that rounding leaves in
-an engine whose lever arms are differences of coordinates as long as `reach` (z_j). It replaces K eps/condition where no power of
-a sine is the right law: beside change points, where a torque cancels, and for forces beside a toggle,
-which a law in s^2 would excuse too much.
+an engine whose lever arms are differences of coordinates as long as `reach` (z_j).
+
+It replaces K eps/condition where no power of a sine is the right law: beside change points, where a
+torque cancels, and for forces beside a toggle, which a law in s^2 would excuse too much.
 """
 
 import math
