@@ -53,9 +53,9 @@ class DoubleDouble(NDArrayOperatorsMixin):
         if operation is None or method != "__call__" or options:
             return NotImplemented
         result = operation(*(value if isinstance(value, DoubleDouble) else DoubleDouble(value) for value in inputs))
-        if into is None:
+        if not isinstance(into, DoubleDouble):  # after x += y with an array x, the name holds more digits
             return result
-        into.hi, into.lo = result.hi, result.lo  # in place: x += y
+        into.hi, into.lo = result.hi, result.lo
         return into
 
     def __getitem__(self, index: Any) -> "DoubleDouble":
