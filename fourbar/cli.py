@@ -58,6 +58,23 @@ def classify(lengths: tuple[str, ...]) -> None:
 
 
 @group.command()
+@click.argument("file", type=click.Path(path_type=Path))
+@click.option("--lengths", nargs=4, required=True, metavar="D A B C", help="Ground, input, coupler, output.")
+def new(file: Path, lengths: tuple[str, ...]) -> None:
+    """Write a new scene file with the four lengths, the rest explained in comments.
+
+    Bare numbers are metres; "30 cm" works too.
+    """
+    from fourbar.new import new_scene
+    from fourbar.writing import write_text
+
+    if file.exists():
+        raise InputError("FILE", str(file), "is there already; a new scene needs a new name")
+    write_text(file, new_scene(lengths))
+    click.echo(f"wrote {file}; edit it, then: fourbar analyze {file}")
+
+
+@group.command()
 @scene_argument
 @click.option("--json", "form", flag_value="json", help="One object, SI, every digit.")
 @click.option("--csv", "form", flag_value="csv", help="One line per position, SI, every digit.")

@@ -1,11 +1,17 @@
 """What `solve` returns: one array per quantity, and `None` for what was not asked for."""
 
 from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.kinematics import Array
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from pandas import DataFrame
 
 STAGES = ("position", "velocity", "acceleration", "force", "error")
 STAGE_OF = {
@@ -120,6 +126,31 @@ class Solution:
         """Names of the quantities that were evaluated, theta_2 first."""
         names = [f.name for f in fields(self) if f.name in UNITS]
         return [name for name in names if getattr(self, name) is not None]
+
+    def to_csv(self, path: "str | Path | None" = None, *, degrees: bool = False) -> str | None:
+        """One line per position, every digit; the text itself, or written to a file, whole or not at all."""
+        from fourbar.tables import csv_text
+        from fourbar.writing import write_text
+
+        text = csv_text(self, degrees=degrees)
+        if path is None:
+            return text
+        write_text(path, text)
+        return None
+
+    def to_pandas(self) -> "DataFrame":
+        """One row per position, vectors as columns `A_x`, `A_y`; only what was evaluated, SI and radians.
+
+        Raises DependencyError where pandas is not installed.
+        """
+        from fourbar.notebook import frame
+
+        return frame(self)
+
+    def _repr_html_(self) -> str:
+        from fourbar.notebook import solution_html
+
+        return solution_html(self)
 
 
 class Unwrapped:

@@ -45,15 +45,10 @@ def json_text(solution: Solution, *, degrees: bool = False) -> str:
 
 def csv_text(solution: Solution, *, degrees: bool = False) -> str:
     """One line per position; vectors as columns `A_x`, `A_y`, empty where there is no value."""
-    columns: dict[str, list[Any]] = {}
-    for name in _quantities(solution):
-        values = _values(solution, name, degrees)
-        heading = f"{name} [deg]" if degrees and name in ANGLES else name
-        if name in VECTORS:
-            for axis, letter in enumerate("xy"):
-                columns[f"{heading}_{letter}"] = _blank(solution) if values is None else _nulled(values[:, axis])
-        else:
-            columns[heading] = _blank(solution) if values is None else _nulled(values)
+    columns = {
+        name: [None] * len(solution) if values is None else _nulled(values)
+        for name, values in scalars(solution, degrees=degrees).items()
+    }
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(["status", "branch", "drive_bar", *columns])
@@ -61,6 +56,20 @@ def csv_text(solution: Solution, *, degrees: bool = False) -> str:
     for status, branch, *row in rows:
         writer.writerow([status, branch, solution.drive_bar, *("" if cell is None else repr(cell) for cell in row)])
     return text.getvalue()
+
+
+def scalars(solution: Solution, *, degrees: bool = False) -> dict[str, Array | None]:
+    """Every quantity as columns of numbers, vectors as `A_x`, `A_y`; None for what was not evaluated."""
+    found: dict[str, Array | None] = {}
+    for name in _quantities(solution):
+        values = _values(solution, name, degrees)
+        heading = f"{name} [deg]" if degrees and name in ANGLES else name
+        if name in VECTORS:
+            for axis, letter in enumerate("xy"):
+                found[f"{heading}_{letter}"] = None if values is None else values[:, axis]
+        else:
+            found[heading] = values
+    return found
 
 
 def _quantities(solution: Solution) -> list[str]:
@@ -90,10 +99,6 @@ def _number(value: float) -> float | None:
     return value if math.isfinite(value) else None
 
 
-def _blank(solution: Solution) -> list[None]:
-    return [None] * len(solution)
-
-
 def heading(scene: Scene, solution: Solution) -> list[str]:
     """The lines above the table: what was asked, and how many of the positions have an answer."""
     d, a, b, c = scene.linkage.lengths
@@ -117,7 +122,7 @@ def heading(scene: Scene, solution: Solution) -> list[str]:
     return lines
 
 
-def columns(scene: Scene, solution: Solution, *, degrees: bool = True) -> dict[str, list[str]]:
+def columns(solution: Solution, *, degrees: bool = True) -> dict[str, list[str]]:
     """The columns of the table, most wanted first: heading with unit -> cells."""
     unit, factor = ("deg", 180.0 / math.pi) if degrees else ("rad", 1.0)
     shown: dict[str, list[str]] = {}
@@ -125,8 +130,8 @@ def columns(scene: Scene, solution: Solution, *, degrees: bool = True) -> dict[s
         shown["time\ns"] = _cells(solution.time)
     shown[f"theta_2\n{unit}"] = _cells(solution.theta_2 * factor, "angle")
     if solution.torque is not None:
-        if scene.motion.free is None:  # released, it has no drive: its torque is rounding
-            shown[f"T{scene.drive_bar}\nN m"] = _cells(solution.torque)
+        if solution.time is None:  # released, it has no drive: its torque is rounding
+            shown[f"T{solution.drive_bar}\nN m"] = _cells(solution.torque)
             shown["digits\nof T"] = _digits(solution)
         for name in FORCES:
             shown[f"|{name}|\nN"] = _cells(np.hypot(*getattr(solution, name).T))
@@ -146,7 +151,7 @@ def table(scene: Scene, solution: Solution, width: int | None, *, degrees: bool 
     from rich.table import Table
     from rich.text import Text
 
-    cells = columns(scene, solution, degrees=degrees)
+    cells = columns(solution, degrees=degrees)
     if (solution.status_code != 0).any():
         cells = {"status\n": [status.replace("_", " ") for status in solution.status], **cells}
     needed = -GAP

@@ -171,7 +171,7 @@ def tables_text(scene: fourbar.Scene, width: int) -> str:
 def test_the_digits_of_the_torque() -> None:
     solution = fourbar.solve(crank_rocker())
     assert solution.torque is not None and solution.torque_error is not None
-    column = next(cells for name, cells in tables.columns(crank_rocker(), solution).items() if "digits" in name)
+    column = next(cells for name, cells in tables.columns(solution).items() if "digits" in name)
     for cell, torque, error in zip(column, solution.torque, solution.torque_error, strict=True):
         digits = int(cell)
         assert error <= abs(torque) * 10.0**-digits or digits == 0

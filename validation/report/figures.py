@@ -5,13 +5,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from fourbar.drawing import drawing
 from fourbar.scene import Command, solve
 from fourbar.solution import OK, Solution
 from validation.answer import Answer
 from validation.compare import angle_aware_difference
 from validation.judge import Record
-from validation.report.colours import ALLOWED, BAND, GRID, INK, PAPER, style_of
-from validation.report.drawing import drawing
+from validation.report.colours import ALLOWED, BAND, GRID, INK, PAPER, by_variable, style_of
 from validation.report.svg import svg_text
 from validation.reversals import Reversal, broken
 from validation.scales import divisor, magnitude, yardstick
@@ -36,7 +36,7 @@ def scene_figure(record: Record) -> str | None:
     solution = record.solution
     if solution is None or not np.any(solution.status_code == OK):
         return None
-    linkage = drawing(record.scene, solution)
+    linkage = by_variable(drawing(record.scene, solution))
     if np.count_nonzero(solution.status_code == OK) < 2:
         return linkage
     return linkage + _answers(record, solution)

@@ -5,11 +5,12 @@ from collections.abc import Iterable
 
 import numpy as np
 
+from fourbar.errors import NotAssembledError
+from fourbar.kinematics import Array
 from fourbar.scene import Scene
-from fourbar.solution import OK, Solution
-from validation.report.colours import INK, PAPER, SOFT, by_variable
-from validation.tolerance import Array
+from fourbar.solution import Solution
 
+INK, SOFT, PAPER = "currentColor", "#6e7781", "#fefefe"
 WIDTH, HEIGHT, MARGIN = 300.0, 270.0, 30.0
 BARS = {2: "#0072b2", 3: "#c74f00", 4: "#00845f"}
 MOST_POINTS = 120
@@ -17,8 +18,13 @@ MOST_POINTS = 120
 
 
 def drawing(scene: Scene, solution: Solution) -> str:
-    """The linkage at its best conditioned position."""
-    good = solution.status_code == OK
+    """The linkage at its best conditioned position; ink in the colour of the text around it.
+
+    Raises NotAssembledError where it assembles nowhere.
+    """
+    if not solution.assembled.any():
+        raise NotAssembledError("nothing to draw: the linkage assembles at none of the positions")
+    good = solution.assembled
     index = int(np.argmax(np.where(good, solution.condition, -1.0)))
     d, theta_1 = scene.linkage.ground, scene.linkage.ground_angle
     O2, O4 = np.zeros(2), d * np.array([math.cos(theta_1), math.sin(theta_1)])
@@ -41,7 +47,8 @@ def drawing(scene: Scene, solution: Solution) -> str:
         parts.append(_pin(name, place(point), (float(centre[0]), float(centre[1])), supported=name[0] == "O"))
     theta_2 = f"{math.degrees(solution.theta_2[index]):.1f}".replace("-", "−")
     parts.append(_text(f"θ₂ = {theta_2}°", WIDTH / 2.0, HEIGHT - 6.0, 11, SOFT))
-    return by_variable(f'<svg class="linkage" viewBox="0 0 {WIDTH:g} {HEIGHT:g}">{"".join(parts)}</svg>')
+    box = f'viewBox="0 0 {WIDTH:g} {HEIGHT:g}"'
+    return f'<svg class="linkage" xmlns="http://www.w3.org/2000/svg" {box}>{"".join(parts)}</svg>'
 
 
 def _thinned(path: Array) -> Array:
