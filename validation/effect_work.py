@@ -7,38 +7,30 @@ import sys
 from collections.abc import Callable
 from typing import Any
 
-from fourbar.effects import (
-    Effect,
-    Flywheel,
-    Friction,
-    Gravity,
-    Load,
-    PinFriction,
-    Point,
-    Spring,
-    Springs,
-    Table,
-    Torsion,
-    Viscous,
-)
+from fourbar import effects as kinds
+from fourbar.effects import Effect, Load
 from fourbar.linkage import Bar, FourBar
 from fourbar.scene import Motion, Scene, Sweep, command, solve
 
-EFFECTS: dict[str, Effect | None] = {
-    "none": None,
-    "gravity": Gravity(),
-    "viscous": Viscous.at(O2=0.01, A=0.01, O4=0.01),
-    "viscous, pin B": Viscous.at(B=0.01),
-    "friction": Friction.at(O2=0.01, A=0.01, O4=0.01),
-    "friction, pin B": Friction.at(B=0.01),
-    "pin_friction": PinFriction.at(O2=(0.1, 0.01), A=(0.1, 0.01), B=(0.1, 0.01), O4=(0.1, 0.01)),
-    "torsion": Torsion.at(O4=(2.0, 1.9, 0.1)),
-    "springs": Springs((Spring(Point(1, 0.1, -1.5), Point(4, 0.08, 0.0), 200.0, 0.05, 3.0),)),
-    "flywheel": Flywheel(0.02),
-    "load": Load(4, (3.0, 0.7), (0.05, 1.0), 0.2),
-    "load over theta_2": Load(4, (3.0, 0.7), (0.05, 1.0), 0.2, "world", Table((0.0, 3.0, math.tau), (0.0, 1.0, 0.0))),
+EFFECTS: dict[str, Callable[[], Effect | None]] = {
+    "none": lambda: None,
+    "gravity": kinds.Gravity,
+    "viscous": lambda: kinds.Viscous.at(O2=0.01, A=0.01, O4=0.01),
+    "viscous, pin B": lambda: kinds.Viscous.at(B=0.01),
+    "friction": lambda: kinds.Friction.at(O2=0.01, A=0.01, O4=0.01),
+    "friction, pin B": lambda: kinds.Friction.at(B=0.01),
+    "pin_friction": lambda: kinds.PinFriction.at(O2=(0.1, 0.01), A=(0.1, 0.01), B=(0.1, 0.01), O4=(0.1, 0.01)),
+    "torsion": lambda: kinds.Torsion.at(O4=(2.0, 1.9, 0.1)),
+    "springs": lambda: kinds.Springs(
+        (kinds.Spring(kinds.Point(1, 0.1, -1.5), kinds.Point(4, 0.08, 0.0), 200.0, 0.05, 3.0),)
+    ),
+    "flywheel": lambda: kinds.Flywheel(0.02),
+    "load": lambda: Load(4, (3.0, 0.7), (0.05, 1.0), 0.2),
+    "load over theta_2": lambda: Load(
+        4, (3.0, 0.7), (0.05, 1.0), 0.2, "world", kinds.Table((0.0, 3.0, math.tau), (0.0, 1.0, 0.0))
+    ),
 }
-"""What is counted, each by itself on the same linkage."""
+"""What is counted, each by itself on the same linkage; made when asked for, so that a build without one still works."""
 DEFAULT_FLAGS = "none, MuJoCo's default flags"
 POSITIONS = 1000
 """Of the formulas in one unit of work: they take arrays."""
@@ -47,7 +39,7 @@ POSITIONS = 1000
 def scene(effect: str, positions: int) -> Scene:
     """A crank-rocker of uniform bars with one effect."""
     linkage = FourBar(0.3, Bar(0.1, 0.2), Bar(0.25, 0.5), Bar(0.22, 0.4))
-    term = EFFECTS[effect]
+    term = EFFECTS[effect]()
     loads = (term,) if isinstance(term, Load) else ()
     effects = () if term is None or loads else (term,)
     return Scene(linkage, Motion(Sweep(0.13, 0.13 + math.tau, positions - 1), 10.0), loads=loads, effects=effects)
