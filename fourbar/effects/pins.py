@@ -50,6 +50,8 @@ def resting(state: State, pin: str) -> Any:
     lost: Any = state.sin_mu * state.sin_mu
     if state.parallel is not None:
         lost = np.where(state.parallel[0], 1.0, lost)  # speeds of bars that stay parallel are exact
+    if state.diagonal.decided.size:
+        lost[state.diagonal.decided] = 1.0  # margins of 60 digits lose nothing
     return ~np.greater(np.abs(other - one) * lost, rounding * speeds)
 
 
