@@ -94,6 +94,7 @@ def _moved_state(state: State, linkage: FourBar, signs: Iterator[float]) -> Stat
     exact = state.diagonal.decided
     # margins of 60 digits carry one rounding, not the cancellation of the lengths
     diagonal.root[exact] = _next(state.diagonal.root[exact], signs)
+    diagonal.decided = exact
     moved = close_loop(linkage, state.theta_2, state.branch, diagonal)
     moved.assembled, moved.singular = state.assembled, state.singular
     moved.u2, moved.u3, moved.u4 = ((_next(u[0], signs), _next(u[1], signs)) for u in (moved.u2, moved.u3, moved.u4))
