@@ -37,6 +37,8 @@ def _sums(name: str, scene: Scene, at: Command, solution: Solution) -> list[Row]
     state = close_loop(scene.linkage, at.theta_2, at.branch)
     add_velocities(state, at.omega_2)
     add_accelerations(state, at.alpha_2)
+    # what acts at the speeds that were answered, not at another evaluation of them
+    state.omega_3, state.omega_4 = solution.omega_3, solution.omega_4
     acting = Wrenches(state)
     for term in (*scene.loads, *scene.effects):
         term.add_wrenches(acting, state)
@@ -47,6 +49,9 @@ def _sums(name: str, scene: Scene, at: Command, solution: Solution) -> list[Row]
     force_terms = magnitude(solution.F12) + magnitude(solution.F14)
     moment = solution.torque + _cross(O4, solution.F14)
     moment_terms = np.abs(solution.torque) + np.hypot(*O4) * magnitude(solution.F14)
+    # the moments of the forces inside, which cancel
+    moment_terms = moment_terms + _reach(solution.A) * magnitude(solution.F32)
+    moment_terms = moment_terms + _reach(solution.B) * magnitude(solution.F43)
     first_pins = {2: np.zeros(2), 3: solution.A, 4: O4}
     for number in MOVING_BARS:
         bar = scene.linkage.bar(number)

@@ -13,6 +13,7 @@ from fourbar.errors import FourBarError, InputError
 from fourbar.mjcf import mjcf
 from fourbar.writing import write_text
 from validation.engines.mujoco.picture import pictures
+from validation.hard.suite import HARD_WITNESSES, Hard
 from validation.judge import WITNESSES, Page, Witness
 from validation.machine import versions
 from validation.published import ladder_rows
@@ -75,6 +76,10 @@ def run(
         write_text(out / "report.md", markdown(summary))
         drawn, why_not = mjcf_pictures(suite) if draw else ({}, "")
         write_text(out / "report.html", html(summary, first_lines, pictures=drawn, no_pictures=why_not))
+        if isinstance(suite, Hard):
+            from validation.hard.page import page, picture
+
+            write_text(out / "hard.html", page(picture()))
         store.finish()
     yield summary
 
@@ -107,8 +112,6 @@ def _suite(
 ) -> tuple[Suite, tuple[Witness, ...]]:
     """The scenes asked for, and the witnesses with what they are held to there."""
     if named == "hard":
-        from validation.hard.suite import HARD_WITNESSES, Hard
-
         return Hard(), HARD_WITNESSES
     if count:
         return Random(count, seed, linkage_types(types)), WITNESSES
