@@ -101,7 +101,7 @@ def compare(
     return rows
 
 
-def closure(name: str, scene: Scene, answer: Answer) -> Row:
+def closure(name: str, scene: Scene, answer: Answer, simulated: Tolerance = SIMULATED) -> Row:
     """Identity: do the engine's own angles close the loop? Relative to the sum of the lengths."""
     d, a, b, c = scene.linkage.lengths
     assert answer.at is not None and answer.assembled is not None
@@ -110,7 +110,7 @@ def closure(name: str, scene: Scene, answer: Answer) -> Row:
     gap = np.abs(a * np.exp(1j * answer.at.theta_2) + b * np.exp(1j * theta_3) - ground - c * np.exp(1j * theta_4))
     error = np.where(answer.assembled, gap / of_length(scene), 0.0)
     worst = int(np.argmax(np.where(np.isnan(error), np.inf, error)))
-    allowed = IDENTITY.factor if answer.setting == "exact" else SIMULATED.factor
+    allowed = IDENTITY.factor if answer.setting == "exact" else simulated.factor
     allowed *= turned(answer.at.theta_2)
     holds = bool(error[worst] <= allowed)
     return Row(
@@ -254,7 +254,7 @@ def _undecided(scene: Scene, theta_2: Array) -> Mask:
 
 def _answerable(quantity: str, scene: Scene, formulas: Solution, tolerance: Tolerance) -> Mask:
     """Where a quantity may be asked of an engine of this class."""
-    if quantity == "torque" and scene.drive_bar != 2 and tolerance is SIMULATED:
+    if quantity == "torque" and scene.drive_bar != 2 and tolerance.name == SIMULATED.name:
         speed = formulas.omega_3 if scene.drive_bar == 3 else formulas.omega_4
         assert speed is not None
         fast = np.abs(np.nan_to_num(speed))

@@ -96,6 +96,13 @@ def advise(scene: Scene, error: float, rig: Rig | None = None) -> Advice:
     return _Search(scene, error, rig or Rig(scene, looked_at(scene))).advice()
 
 
+def guess(error: float) -> tuple[float, float]:
+    """Steps per revolution and time constant in steps that the laws say for an error."""
+    tc = (STIFF / (error / 2.0)) ** (1.0 / ORDER)
+    steps = FIRST_STEPS * (FIRST_ERROR / error) ** (1.0 / ORDER)
+    return max(steps, FEWEST_STEPS), min(max(tc, SHORTEST), LONGEST)
+
+
 def looked_at(scene: Scene) -> Command:
     """The scene's own positions and others between them: the error peaks in between, most of all beside a pole of T3, T4."""
     own = command_of(scene)
@@ -116,9 +123,8 @@ class _Search:
 
     def advice(self) -> Advice:
         """The cheapest that serves, by bisection in steps, then with shorter and longer time constants."""
-        tc = min(max(SHORTEST, (STIFF / (self.error / 2.0)) ** 0.25), LONGEST)
-        first = FIRST_STEPS * (FIRST_ERROR / self.error) ** (1.0 / ORDER)
-        self._bisect(tc, max(first, FEWEST_STEPS))
+        first, tc = guess(self.error)
+        self._bisect(tc, first)
         for factor in (0.5, 2.0, 4.0):
             other = min(max(tc * factor, SHORTEST), LONGEST)
             if other != tc:

@@ -17,6 +17,8 @@ ABOVE_FLOOR = 3.0
 WITHIN = 0.35
 """An exponent may miss the expected one by this much, or by twice its own uncertainty: over two decades of
 a ladder the next order of the error's series moves a fitted slope by about a quarter."""
+FEWEST = 3
+"""Points of a fit."""
 FIRST_ORDER, FOURTH_ORDER = 1.0, 4.0
 EXPECTED_ORDER = {
     **dict.fromkeys(("Euler", "implicit", "implicitfast", "discrete"), FIRST_ORDER),
@@ -36,12 +38,17 @@ class Law:
     points: int
 
     @property
+    def decided(self) -> bool:
+        """Whether enough points are left for a fit with an uncertainty."""
+        return self.points >= FEWEST
+
+    @property
     def holds(self) -> bool:
-        """Whether the exponent is the expected one; False where too few points are left to say so."""
-        return self.points >= 3 and abs(self.exponent - self.expected) <= max(2.0 * self.sigma, WITHIN)
+        """Whether the exponent is the expected one; False where it is not decided."""
+        return self.decided and abs(self.exponent - self.expected) <= max(2.0 * self.sigma, WITHIN)
 
     def __str__(self) -> str:
-        if self.points < 3:
+        if not self.decided:
             return f"{self.name}: only {self.points} points above the floor and below {TOO_LARGE:g}: no fit"
         verdict = "holds" if self.holds else "FAILS"
         return f"{self.name}: exponent {self.exponent:.2f} +- {self.sigma:.2f}, expected {self.expected:g}: {verdict}"
@@ -92,7 +99,7 @@ def laws(curves: Mapping[str, Sequence[Point]]) -> list[Law]:
 def _law(name: str, points: Sequence[Point], expected: float, *, by_steps: bool = False) -> Law:
     least = (floor(points) or 0.0) if by_steps else 0.0
     used = [p for p in points if p.dial > 0.0 and ABOVE_FLOOR * least < p.worst < TOO_LARGE]
-    if len(used) < 3:
+    if len(used) < FEWEST:
         return Law(name, math.nan, math.inf, expected, len(used))
     x = [1.0 / p.dial if by_steps else p.dial for p in used]
     slope, sigma = fit(x, [p.worst for p in used])
@@ -107,7 +114,7 @@ def _stiff(curves: Mapping[str, Sequence[Point]]) -> Law:
         if least is not None:
             floors[tc] = least
     name = "floor of RK4 in tc/h"
-    if len(floors) < 3:
+    if len(floors) < FEWEST:
         return Law(name, math.nan, math.inf, -FOURTH_ORDER, len(floors))
     slope, sigma = fit(list(floors), list(floors.values()))
     return Law(name, slope, sigma, -FOURTH_ORDER, len(floors))
