@@ -1,8 +1,6 @@
 """What a scene does not name does not exist: nothing of it in the formulas, in the MJCF or in the compiled model."""
 
 import json
-import re
-import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -11,13 +9,13 @@ import mujoco
 import pytest
 
 import fourbar
-from fourbar.effects import REGISTRY, Effect, Friction, Viscous
+from fourbar.effects import REGISTRY, Friction, Viscous
 from fourbar.mjcf import mjcf
 from tests.scenes import crank_rocker
 from tests.test_effects import ACTING
+from validation.effect_cost import build
 
 ROOT = Path(fourbar.__file__).parent.parent
-FILES = {key: Path(sys.modules[effect.__module__].__file__).name for key, effect in REGISTRY.items()}  # type: ignore[arg-type]
 BUILD = """
 import hashlib, json, sys
 sys.path.insert(0, sys.argv[1])
@@ -48,19 +46,6 @@ def built(root: Path) -> dict[str, object]:
     return answer
 
 
-def without(effect: type[Effect], folder: Path) -> Path:
-    """A copy of the package that has never heard of an effect: its file, its registration, its name are gone."""
-    copy = folder / "fourbar"
-    shutil.copytree(ROOT / "fourbar", copy, ignore=shutil.ignore_patterns("__pycache__", "page", "plot"))
-    key, name = effect.key, effect.__name__
-    (copy / "effects" / FILES[key]).unlink()
-    for file in (copy / "__init__.py", copy / "effects" / "__init__.py"):
-        kept = [line for line in file.read_text().splitlines() if f".{FILES[key][:-3]} import" not in line]
-        kept = [line for line in kept if not line.endswith(f"import {name} as {name}")]
-        file.write_text(re.sub(rf"\b{name}, |, {name}(?=\))", "", "\n".join(kept)) + "\n")
-    return folder
-
-
 @pytest.fixture(scope="module")
 def whole() -> dict[str, object]:
     return built(ROOT)
@@ -70,7 +55,7 @@ def whole() -> dict[str, object]:
 def test_a_build_that_never_heard_of_an_effect_gives_the_same_bits(
     key: str, whole: dict[str, object], tmp_path: Path
 ) -> None:
-    other = built(without(REGISTRY[key], tmp_path))
+    other = built(build(tmp_path, key))
     assert other["numbers"] == whole["numbers"]
     assert other["mjcf"] == whole["mjcf"]
     assert other["calls"] == whole["calls"]

@@ -18,6 +18,7 @@ from pathlib import Path
 
 import click
 
+from fourbar.effects import REGISTRY
 from fourbar.errors import DependencyError, FourBarError, InputError
 from validation.effect_work import DEFAULT_FLAGS, EFFECTS, ENGINES, POSITIONS
 
@@ -84,12 +85,51 @@ def costs(engines: tuple[str, ...], effects: tuple[str, ...], workers: int) -> I
         yield from pool.map(lambda pair: cost(*pair), pairs)
 
 
+def build(folder: Path, without: str | None = None) -> Path:
+    """A copy of the package and of the workloads; one that has never heard of an effect where one is named.
+
+    Its file, its registration and its name are gone.
+    """
+    root = Path(__file__).parent.parent
+    copy = folder / "fourbar"
+    shutil.copytree(root / "fourbar", copy, ignore=shutil.ignore_patterns("__pycache__", "page", "plot"))
+    (folder / "validation").mkdir()
+    for file in ("__init__.py", "effect_work.py"):
+        shutil.copy(root / "validation" / file, folder / "validation")
+    if without is None:
+        return folder
+    name, module = REGISTRY[without].__name__, REGISTRY[without].__module__.rpartition(".")[2]
+    (copy / "effects" / f"{module}.py").unlink()
+    for path in (copy / "__init__.py", copy / "effects" / "__init__.py"):
+        lines = [line for line in path.read_text().splitlines() if f".{module} import" not in line]
+        lines = [line for line in lines if not line.endswith(f"import {name} as {name}")]
+        path.write_text(re.sub(rf"\b{name}, |, {name}(?=\))", "", "\n".join(lines)) + "\n")
+    return folder
+
+
+def absent(effects: tuple[str, ...]) -> Iterator[tuple[str, float]]:
+    """For each effect the instructions of a bare scene in a build without it, relative to the whole build's, less 1."""
+    with tempfile.TemporaryDirectory() as folder:
+        roots = {}
+        for number, effect in enumerate((None, *effects)):
+            # names of one length: paths are part of what is counted
+            roots[effect] = Path(folder) / f"{number:03d}"
+            roots[effect].mkdir()
+            build(roots[effect], effect)
+        whole = cost("formulas", "none", roots[None]).instructions
+        for effect in effects:
+            yield effect, cost("formulas", "none", roots[effect]).instructions / whole - 1.0
+
+
 @click.command(name="effects-cost")
 @click.option("--engines", metavar="NAMES", default=",".join(AMOUNTS), show_default=True, help="Comma-separated.")
 @click.option("--effects", metavar="NAMES", help="Comma-separated; left out: all.")
 @click.option("--workers", type=click.IntRange(min=1), default=2, show_default=True, help="Counts at the same time.")
-def command(engines: str, effects: str | None, workers: int) -> None:
-    """Count the instructions that each effect costs in each engine (valgrind; about fifteen minutes for all)."""
+@click.option("--absent", "check", is_flag=True, help="Count instead what effects cost that are not named: nothing.")
+def command(engines: str, effects: str | None, workers: int, check: bool) -> int:
+    """Count the instructions that each effect costs in each engine (valgrind; half an hour for all)."""
+    if check:
+        return check_absent(tuple(name for name in REGISTRY if name != "gravity"))
     asked = tuple(name.strip() for name in engines.split(","))
     for name in asked:
         if name not in ENGINES:
@@ -99,6 +139,17 @@ def command(engines: str, effects: str | None, workers: int) -> None:
         if name not in EFFECTS:
             raise InputError("--effects", name, "must be among " + ", ".join(EFFECTS))
     table(costs(asked, chosen, workers), asked, chosen)
+    return 0
+
+
+def check_absent(effects: tuple[str, ...]) -> int:
+    """Print by how much a bare scene differs in a build without each effect; 1 where it is more than repeats."""
+    worst = 0.0
+    for effect, difference in absent(effects):
+        worst = max(worst, abs(difference))
+        click.echo(f"{effect}: {100.0 * difference:+.3f} % in a build without it")
+    click.echo(f"{'holds' if worst < REPEATS else 'FAILS'}: less than {100.0 * REPEATS:g} % is asked for")
+    return 0 if worst < REPEATS else 1
 
 
 def table(measured: Iterator[Cost], engines: tuple[str, ...], effects: tuple[str, ...]) -> None:
