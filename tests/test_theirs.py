@@ -24,6 +24,7 @@ from validation.check.screen import DEEPEST, LARGEST_MJCF, read_mjcf
 from validation.compare import COMPARED, compare
 from validation.engines.mujoco.theirs import ONE_STATE, THROUGH_TIME, Examined, examine
 from validation.results import FAILS, from_csv
+from validation.suite.memory import WORKER_MEMORY
 from validation.tolerance import SIMULATED
 
 CRANK_ROCKER = fourbar.load(Path(__file__).parents[1] / "models" / "crank_rocker.toml")
@@ -258,7 +259,7 @@ def hang(scene: Scene, text: str | None, names: dict[str, str]) -> None:
 
 
 def devour(scene: Scene, text: str | None, names: dict[str, str]) -> None:
-    bytearray(2 * model.MEMORY)
+    bytearray(2 * WORKER_MEMORY)
 
 
 @pytest.mark.parametrize(("what", "word"), [(crash, "crashed"), (hang, "did not come back"), (devour, "memory")])

@@ -8,6 +8,7 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 
 from fourbar.writing import write_text
+from validation.plain import plain
 
 AGREES, DEGRADED, REFUSES, FAILS = "agrees", "degraded as predicted", "refuses", "fails"
 VERDICTS = (AGREES, DEGRADED, REFUSES, FAILS)
@@ -67,15 +68,15 @@ def from_csv(path: Path) -> list[Row]:
 
     return [
         Row(
-            record["scene"],
-            record["engine"],
-            record["setting"],
-            record["quantity"],
+            plain(record["scene"]),
+            plain(record["engine"]),
+            plain(record["setting"]),
+            plain(record["quantity"]),
             number(record["error"]),
             number(record["allowed"]),
             record["passed"] == "true",
-            record["verdict"],
-            record["reason"],
+            plain(record["verdict"]),
+            plain(record["reason"]),
             number(record["theta_2"]),
             number(record["condition"]),
         )

@@ -26,7 +26,7 @@ from validation.suite import pool
 from validation.suite.columns import write_columns
 from validation.suite.elsewhere import run_elsewhere
 from validation.suite.random import LinkageType
-from validation.suite.scenes import Random, Suite, model_files, scene_files
+from validation.suite.scenes import Random, Suite, model_files, scene_files, suite_file
 from validation.suite.store import Store
 
 WORKERS = 2
@@ -54,7 +54,7 @@ def run(
     draw = len(suite) <= SCENES_SHOWN
     identity = {
         "scenes": suite.fingerprint(),
-        "witnesses": [witness.name for witness in witnesses],
+        "witnesses": [f"{witness.name} {witness.tolerance.factor!r}" for witness in witnesses],
         "versions": versions(),
         "draw": draw,
     }
@@ -113,6 +113,8 @@ def _suite(
     """The scenes asked for, and the witnesses with what they are held to there."""
     if named == "hard":
         return Hard(), HARD_WITNESSES
+    if named is not None:
+        return suite_file(Path(named)), WITNESSES
     if count:
         return Random(count, seed, linkage_types(types)), WITNESSES
     return scene_files(scenes or model_files()), WITNESSES
@@ -155,7 +157,8 @@ def examine(scenes: tuple[Path, ...], mjcf: Path, names: tuple[str, ...], out: P
 @click.argument("scenes", nargs=-1, type=click.Path(path_type=Path))
 @click.option("--out", type=click.Path(path_type=Path, file_okay=False), default=Path("results"), show_default=True)
 @click.option("--engines", metavar="NAMES", help="Comma-separated witnesses; left out: all.")
-@click.option("--suite", "named", type=click.Choice(["hard"]), help="Judge the hard cases instead.")
+@click.option("--error", "asked", type=float, metavar="E", help="Simulate no more precisely than this relative error.")
+@click.option("--suite", "named", metavar="hard|FILE", help="Judge the hard cases, or the scenes that FILE lists.")
 @click.option("--random", "count", type=click.IntRange(min=1), help="Judge this many random linkages instead.")
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of the random linkages.")
 @click.option("--type", "types", default=",".join(kind.value for kind in LinkageType), show_default=True)
@@ -174,6 +177,7 @@ def command(
     scenes: tuple[Path, ...],
     out: Path,
     engines: str | None,
+    asked: float | None,
     named: str | None,
     count: int | None,
     seed: int,
@@ -199,11 +203,16 @@ def command(
     if named is not None and (scenes or count is not None):
         raise InputError("--suite", named, "has its own scenes; leave out scene files and --random")
     suite, witnesses = _suite(scenes, named, count, seed, types)
+    if asked is not None:
+        from validation.cost.dial import dialled
+
+        witnesses = dialled(witnesses, asked)
     if python is not None:
         passed_on = [*map(os.path.abspath, scenes), f"--seed={seed}", f"--type={types}", f"--workers={workers}"]
         passed_on += [f"--engines={engines}"] if engines else []
         passed_on += [f"--random={count}"] if count else []
-        passed_on += [f"--suite={named}"] if named else []
+        passed_on += [f"--error={asked!r}"] if asked is not None else []
+        passed_on += [f"--suite={named if named == 'hard' else os.path.abspath(named)}"] if named else []
         against = str(run_elsewhere(python, passed_on, out / "elsewhere"))
     columns = (TextColumn("judging"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     result: Any = None

@@ -12,9 +12,9 @@ from fourbar.files import load
 from fourbar.scene import Command, Scene, command, solve
 from fourbar.solution import OK
 from validation.check.mistakes import NEARER, Explanation, explain
-from validation.check.shown import printable
 from validation.check.theirs import Array, Table, read_table
 from validation.compare import angle_aware_difference
+from validation.plain import plain
 from validation.scales import divisor, magnitude, yardstick
 from validation.tolerance import EPS, EQUIVALENCE, NOTHING_TO_TELL, condition_of
 
@@ -111,7 +111,7 @@ def check(scene: Path, theirs: Path) -> int:
     console = Console(soft_wrap=True)
     differing = judgement.differing
     if differing:
-        shown = Shown(title=f"{escape(printable(theirs.name))}: what differs, worst first")
+        shown = Shown(title=f"{escape(plain(theirs.name))}: what differs, worst first")
         for heading in ("line", "theta_2 [deg]", "quantity", "error", "allowed"):
             shown.add_column(heading, justify="right")
         for finding in sorted(differing, key=lambda f: -f.error)[:SHOWN]:

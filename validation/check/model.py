@@ -17,16 +17,15 @@ from fourbar.writing import write_text
 from validation.answer import Answer
 from validation.check.differences import Difference, differences
 from validation.check.screen import read_mjcf
-from validation.check.shown import printable
 from validation.compare import COMPARED, compare
+from validation.plain import plain
 from validation.report.markdown import cell, number
 from validation.results import FAILS, Row, write_results
+from validation.suite.memory import WORKER_MEMORY, bound_memory
 from validation.tolerance import SIMULATED
 
 SECONDS = 120.0
 """A four-bar takes less than one."""
-MEMORY = 8 * 2**30
-"""Bytes of address space; a file can ask for any amount."""
 HEADINGS = ("quantity", "theirs", "generated", "allowed", "verdict")
 EXAMINE = "validation.engines.mujoco.theirs:examine"
 
@@ -113,7 +112,7 @@ def _guarded(scene: Scene, text: str | None, names: Mapping[str, str]) -> Any:
         except TimeoutError:
             reason = f"MuJoCo did not come back in {SECONDS:g} s"
         except MemoryError:
-            reason = f"asks for more than {MEMORY // 2**30} GB of memory"
+            reason = f"asks for more than {WORKER_MEMORY // 2**30} GB of memory"
         except ProcessExpired as error:
             reason = f"MuJoCo crashed on it (exit code {error.exitcode})"
     raise InputError("--mjcf", "the file", reason)
@@ -122,12 +121,7 @@ def _guarded(scene: Scene, text: str | None, names: Mapping[str, str]) -> Any:
 def _confine() -> None:
     """Memory bounded, and MuJoCo's log where it is swept away."""
     os.chdir(tempfile.gettempdir())
-    try:
-        import resource
-    except ImportError:  # only systems of the Unix family can bound it
-        return
-    _, hard = resource.getrlimit(resource.RLIMIT_AS)
-    resource.setrlimit(resource.RLIMIT_AS, (MEMORY if hard < 0 else min(MEMORY, hard), hard))
+    bound_memory()
 
 
 def _examine(adapter: str, scene: Scene, text: str | None, names: dict[str, str]) -> Any:
@@ -145,45 +139,45 @@ def tell(report: ModelReport, mjcf: Path, out: Path) -> None:
     from rich.table import Table
 
     console = Console()
-    shown = Table(title=f"{escape(printable(mjcf.name))} against the generated MJCF", box=SIMPLE_HEAD)
+    shown = Table(title=f"{escape(plain(mjcf.name))} against the generated MJCF", box=SIMPLE_HEAD)
     for heading in ("what differs", "generated", "theirs", "what it does"):
         shown.add_column(heading, overflow="fold")
     for d in report.differences:
-        shown.add_row(*(escape(printable(text)) for text in (d.key, value(d.generated), value(d.theirs), d.remark)))
+        shown.add_row(*(escape(plain(text)) for text in (d.key, value(d.generated), value(d.theirs), d.remark)))
     console.print(shown if report.differences else "It differs in nothing from the generated MJCF.")
     for note in report.notes:
-        console.print(f"note: {escape(printable(note))}")
+        console.print(f"note: {escape(plain(note))}")
     for asked in report.asked():
-        costs = Table(title=f"what it costs, {escape(printable(asked))}: error", box=SIMPLE_HEAD, pad_edge=False)
+        costs = Table(title=f"what it costs, {escape(plain(asked))}: error", box=SIMPLE_HEAD, pad_edge=False)
         for heading in HEADINGS:
             costs.add_column(heading, overflow="fold")
         for cost in report.costs:
             if cost.asked == asked:
                 style = "bold red" if cost.row.verdict == FAILS else ""
-                costs.add_row(*(escape(printable(text)) for text in cost.cells()), style=style)
+                costs.add_row(*(escape(plain(text)) for text in cost.cells()), style=style)
         console.print(costs)
     out.mkdir(parents=True, exist_ok=True)
     write_text(out / "theirs.md", markdown(report, mjcf))
     write_results([cost.row for cost in report.costs], out / "results.csv")
     said = f"{report.fails} of {len(report.costs)} comparisons fail; {len(report.differences)} differences"
-    console.print(f"[bold]{said}[/]; written to {escape(printable(str(out)))}")
+    console.print(f"[bold]{said}[/]; written to {escape(plain(str(out)))}")
 
 
 def markdown(report: ModelReport, mjcf: Path) -> str:
     """The same as text for a page."""
     lines = [
-        f"# {cell(printable(mjcf.name))} against the generated MJCF",
+        f"# {cell(plain(mjcf.name))} against the generated MJCF",
         "",
         "| what differs | generated | theirs | what it does |",
     ]
     lines += ["|---|---|---|---|"]
     for d in report.differences:
         entries = (d.key, value(d.generated), value(d.theirs), d.remark)
-        lines.append("| " + " | ".join(cell(printable(text)) for text in entries) + " |")
-    lines += ["", *(f"- {cell(printable(note))}" for note in report.notes), "", "## What it costs", ""]
+        lines.append("| " + " | ".join(cell(plain(text)) for text in entries) + " |")
+    lines += ["", *(f"- {cell(plain(note))}" for note in report.notes), "", "## What it costs", ""]
     lines += [f"| asked | {' | '.join(HEADINGS)} |", "|---|---|---|---|---|---|"]
     for cost in report.costs:
-        lines.append("| " + " | ".join(cell(printable(text)) for text in (cost.asked, *cost.cells())) + " |")
+        lines.append("| " + " | ".join(cell(plain(text)) for text in (cost.asked, *cost.cells())) + " |")
     return "\n".join(lines) + "\n"
 
 

@@ -1,12 +1,15 @@
 """A recorded run: its table and the versions, machine and settings it was made with."""
 
+import csv
 import json
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 from fourbar.errors import InputError
 from fourbar.writing import write_text
 from validation.machine import machine, versions
+from validation.plain import plain
 from validation.results import Row, from_csv, to_csv
 from validation.tolerance import SIMULATED, K
 
@@ -46,15 +49,23 @@ def read_run(path: Path) -> tuple[About, list[Row]]:
         raise InputError("RESULTS", str(path), f"must be a folder with {TABLE}, or such a file")
     try:
         rows = from_csv(table)
-    except (KeyError, ValueError, UnicodeDecodeError):
+    except (KeyError, TypeError, ValueError, csv.Error):  # a column, a cell or a number is missing, or it is no text
         raise InputError("RESULTS", str(table), "is not a table written by `run`") from None
     beside = table.parent / ABOUT
     if not beside.is_file():
         return About({}, "unknown machine", {}), rows
     try:
-        return About(**json.loads(beside.read_text(encoding="utf-8"))), rows
-    except (TypeError, ValueError):
+        return _about(json.loads(beside.read_text(encoding="utf-8"))), rows
+    except (AttributeError, KeyError, TypeError, ValueError, RecursionError):
         raise InputError("RESULTS", str(beside), "is not a record written by `run`") from None
+
+
+def _about(kept: dict[str, Any]) -> About:
+    """What a file says of a run; its words are somebody's text."""
+    versions, settings = (
+        {plain(key): plain(value) for key, value in kept[name].items()} for name in ("versions", "settings")
+    )
+    return About(versions, plain(kept["machine"]), settings)
 
 
 def accept(run: Path, name: str = ACCEPTED) -> Path:

@@ -10,7 +10,9 @@ from dataclasses import replace
 from importlib import import_module
 
 from validation.judge import Page, Witness, breakdown, judged_page
-from validation.suite.scenes import Suite
+from validation.plain import plain
+from validation.suite.memory import bound_memory
+from validation.suite.scenes import Files, Suite
 
 SECONDS_PER_SCENE = 60.0
 """A scene takes 0.05 to 3 s; one that takes longer than this hangs."""
@@ -19,13 +21,21 @@ IN_FLIGHT = 4
 Chunk = tuple[int, range]
 
 
+def part(suite: Suite, scenes: Sequence[int]) -> tuple[Suite, Sequence[int]]:
+    """What a worker needs of a suite: of files those scenes alone, else each task would carry all the texts."""
+    if isinstance(suite, Files):
+        return Files(tuple(suite.texts[i] for i in scenes)), range(len(scenes))
+    return suite, scenes
+
+
 def judge_chunk(suite: Suite, scenes: Sequence[int], witnesses: Sequence[Witness], draw: bool) -> list[Page]:
     """The pages of some scenes; runs in a worker."""
-    return [judged_page(suite.name(i), suite.scene(i), witnesses, draw=draw) for i in scenes]
+    return [judged_page(plain(suite.name(i)), suite.scene(i), witnesses, draw=draw) for i in scenes]
 
 
 def ready() -> None:
-    """Import what every scene needs."""
+    """Bound the memory, and import what every scene needs."""
+    bound_memory()
     import_module("validation.judge")
     import_module("validation.engines.energy")
 
@@ -45,7 +55,7 @@ def over_processes(
             def submit(scenes: Sequence[int], asked: Sequence[Witness]) -> Future[list[Page]]:
                 seconds = SECONDS_PER_SCENE * len(scenes)
                 future: Future[list[Page]] = pool.schedule(
-                    judge_chunk, args=(suite, scenes, asked, draw), timeout=seconds
+                    judge_chunk, args=(*part(suite, scenes), asked, draw), timeout=seconds
                 )
                 return future
 
@@ -66,7 +76,7 @@ def over_machines(
         workers = max(1, len(client.scheduler_info()["workers"]))
 
         def submit(scenes: Sequence[int], asked: Sequence[Witness]) -> Future[list[Page]]:
-            future: Future[list[Page]] = executor.submit(judge_chunk, suite, scenes, asked, draw)
+            future: Future[list[Page]] = executor.submit(judge_chunk, *part(suite, scenes), asked, draw)
             return future
 
         yield from _as_done(suite, chunks, witnesses, submit, IN_FLIGHT * workers)
@@ -112,7 +122,7 @@ def _alone(
         return submit([scene], witnesses).result()[0]
     except Exception:
         pass
-    name = suite.name(scene)
+    name = plain(suite.name(scene))
     page: Page | None = None
     lost = []
     for asked in ([], *([witness] for witness in witnesses)):

@@ -1,6 +1,8 @@
 """Which scenes a run judges: the named mechanisms of `models/`, the files given, or random linkages."""
 
 import hashlib
+import tomllib
+from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -82,13 +84,54 @@ def scene_files(paths: Iterable[Path]) -> Files:
     Raises InputError for a file that is bad, at once: a long run does not start on bad input.
     """
     files = list(dict.fromkeys(Path(path) for path in paths))
-    stems = [file.stem for file in files]
+    stems = Counter(file.stem for file in files)
     texts = []
-    for file, stem in zip(files, stems, strict=True):
-        name = stem if stems.count(stem) == 1 else file.with_suffix("").as_posix()
+    for file in files:
+        name = file.stem if stems[file.stem] == 1 else file.with_suffix("").as_posix()
         text = read_text(file)
         loads(text, str(file))
         texts.append((name, text))
     if not texts:
         raise InputError("SCENE", [], "no scene file to run")
     return Files(tuple(sorted(texts)))
+
+
+LARGEST_LIST = 16 * 2**20
+"""Bytes; a hundred thousand names."""
+
+
+def suite_file(path: Path) -> Files:
+    """The scenes that a file lists, named from its own folder: TOML with `scenes = [...]`, or one per line.
+
+    An entry may hold * for any name. InputError where an entry leaves the folder or names no file.
+    """
+
+    def refuse(entry: object, allowed: str) -> InputError:
+        return InputError("--suite", entry, allowed, str(path))
+
+    try:
+        if path.stat().st_size > LARGEST_LIST:
+            raise refuse(path.name, f"must be smaller than {LARGEST_LIST // 2**20} MB")
+        text = path.read_text(encoding="utf-8")
+        entries = tomllib.loads(text).get("scenes") if path.suffix == ".toml" else _listed(text)
+    except OSError as error:
+        raise refuse(path.name, f'must be "hard" or a file that lists scenes: {error.strerror}') from None
+    except (ValueError, RecursionError):  # no UTF-8, or no TOML
+        raise refuse(path.name, "is no list of scenes") from None
+    if not isinstance(entries, list) or not all(isinstance(entry, str) and entry for entry in entries):
+        raise refuse(path.name, 'must have scenes = ["a.toml", ...], or one scene file per line')
+    files: list[Path] = []
+    for entry in entries:
+        if Path(entry).is_absolute() or ".." in Path(entry).parts or "\0" in entry:
+            raise refuse(entry, "must lie in the folder of the list, or below it")
+        found = sorted(path.parent.glob(entry)) if "*" in entry else [path.parent / entry]
+        if not found:
+            raise refuse(entry, "names no file")
+        files += found
+    return scene_files(files)
+
+
+def _listed(text: str) -> list[str]:
+    """One entry per line; # begins a comment."""
+    lines = (line.partition("#")[0].strip() for line in text.splitlines())
+    return [line for line in lines if line]
