@@ -1,11 +1,11 @@
 """The error that rounding must be expected to make, computed from the description in 320-bit arithmetic.
 
-    predicted = R eps (sum_i w_i |dy/dx_i| + reach sum_j |dy/dz_j|),
+    predicted = eps (R sum_i w_i |dy/dx_i| + reach sum_j |dy/dz_j|),
 
 the first-order change of a result y, at this very position and for this very quantity, when every
 stored input x_i (lengths, angles, masses, loads, the command) moves in its last digit, and when the
 loop opens with the speed and the acceleration, and the bars get the couples, that rounding leaves in
-an engine whose lever arms are differences of coordinates as long as `reach` (z_j).
+an engine whose lever arms are differences of coordinates as long as `reach` (z_j, one rounding of them).
 
 It replaces K eps/condition where no power of a sine is the right law: beside change points, where a
 torque cancels, and for forces beside a toggle, which a law in s^2 would excuse too much.
@@ -70,8 +70,11 @@ def predicted_error(scene: Scene, at: Command, quantities: Iterable[str], reach:
                 errors[i] = math.inf
                 continue
             axes = ("_x", "_y") if name in VECTORS else ("",)
-            parts = [moved.data.get(name + axis, math.inf) + reach * moved.loop.get(name + axis, 0.0) for axis in axes]
-            errors[i] = ROUNDINGS * EPS * math.hypot(*parts)
+            parts = [
+                ROUNDINGS * moved.data.get(name + axis, math.inf) + reach * moved.loop.get(name + axis, 0.0)
+                for axis in axes
+            ]
+            errors[i] = EPS * math.hypot(*parts)
     return result
 
 
@@ -139,6 +142,7 @@ def _weights(stored: dict[str, float]) -> dict[str, float]:
     longest = max(stored[name] for name in ("d", "a", "b", "c"))
     weights = {name: abs(value) for name, value in stored.items() if value != 0.0}
     weights["d"] = longest
-    weights["theta_1"] = max(abs(stored["theta_1"]), longest / stored["d"])
+    # theta_2 - theta_1 is rounded as the larger of them is
+    weights["theta_1"] = max(abs(stored["theta_1"]), abs(stored["theta_2"]), longest / stored["d"])
     weights["theta_2"] = max(abs(stored["theta_2"]), 1.0)
     return weights
