@@ -102,8 +102,9 @@ def build(folder: Path, without: str | None = None) -> Path:
     (copy / "effects" / f"{module}.py").unlink()
     for path in (copy / "__init__.py", copy / "effects" / "__init__.py"):
         lines = [line for line in path.read_text().splitlines() if f".{module} import" not in line]
-        lines = [line for line in lines if not line.endswith(f"import {name} as {name}")]
-        path.write_text(re.sub(rf"\b{name}, |, {name}(?=\))", "", "\n".join(lines)) + "\n")
+        gone = (f"import {name} as {name}", f'"{name}": "{module}",')
+        lines = [line for line in lines if not line.endswith(gone)]
+        path.write_text(re.sub(rf'"{name}", |\b{name}, |, {name}(?=\))', "", "\n".join(lines)) + "\n")
     return folder
 
 
