@@ -161,7 +161,7 @@ def plot(scene: Path, out: Path, figure: str, position: str | None, branches: st
     help="A PNG or JPEG laid along input, coupler or output (pages).",
 )
 @click.option(
-    "--seconds", type=click.FloatRange(min=0.1, max=600.0), default=6.0, show_default=True, help="Length of a film."
+    "--seconds", type=click.FloatRange(min=0.1, max=60.0), default=6.0, show_default=True, help="Length of a film."
 )
 def animate(scene: Path, out: Path, pictures: tuple[str, ...], seconds: float) -> None:
     """Show a scene moving: one web page (.html), or a film (.gif, .mp4)."""

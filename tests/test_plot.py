@@ -155,9 +155,14 @@ def test_transmission_angle_marks_limits_and_dead_centres() -> None:
     limit = math.degrees(math.acos((a * a + d * d - (b - c) ** 2) / (2 * a * d)))
     assert marks["limit"] == pytest.approx(np.sort([45 - limit, 45 + limit]), abs=1e-9)
     inner = math.degrees(math.acos(((b - a) ** 2 + d * d - c * c) / (2 * (b - a) * d)))
-    expected = {round(45 + s * inner + 180, 6) % 360 for s in (1, -1)}
+    expected = [(45 + s * inner + 180) % 360 for s in (1, -1)]
     assert len(marks["dead centre"]) == 1
-    assert min(abs(marks["dead centre"][0] - e) for e in expected) < 0.05  # linear between positions 1 deg apart
+    assert min(abs(marks["dead centre"][0] - e) for e in expected) < 1e-9
+    other = thesis(FULL_TURN)
+    other = replace(other, motion=replace(other.motion, branch=-1))
+    panel = composed(other, "transmission").axes[0]
+    crossed = next(line.get_xdata()[0] for line in panel.lines if line.get_marker() == "D")
+    assert crossed + marks["dead centre"][0] == pytest.approx(sum(expected))  # its mirror image in the ground's line
 
 
 @pytest.mark.parametrize("drive_bar", (2, 3, 4))

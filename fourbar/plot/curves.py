@@ -211,12 +211,7 @@ def draw_transmission(axes: "Axes", view: View) -> None:
     )
     axes.set_ylim(0.0, 96.0)
     axes.yaxis.set_ticks(range(0, 91, 15))
-    for theta, marker, name in _marked(view):
-        height = (
-            np.zeros_like(theta)
-            if name == "limit"
-            else np.interp(theta, view.degrees[sweep.assembled], mu[sweep.assembled])
-        )
+    for theta, height, marker, name in _marked(view):
         axes.plot(
             theta, height, marker, ms=6.0, mfc="white", mec=INK, mew=1.1, ls="none", label=name, clip_on=False, zorder=5
         )
@@ -225,23 +220,30 @@ def draw_transmission(axes: "Axes", view: View) -> None:
     legend_above(axes, 2)
 
 
-def _marked(view: View) -> list[tuple[Array, str, str]]:
-    """Limit positions (bars 3, 4 collinear) and dead centres (bars 2, 3 collinear) inside the sweep, degrees."""
-    degrees, sweep = view.degrees, view.sweep
-    margin = float(np.median(np.diff(degrees))) if len(degrees) > 1 else 0.0
-    limits = [math.degrees(t) for t in limit_angles(view)]
-    turns = [t + 360.0 * k for t in limits for k in range(-3, 4)]
-    inside = [t for t in turns if degrees[0] - 1.5 * margin <= t <= degrees[-1] + 1.5 * margin]
-    sine = np.sin(sweep.theta_3 - sweep.theta_2)
-    at = np.flatnonzero((sine[:-1] * sine[1:] < 0.0) | (sine[:-1] == 0.0))
-    share = sine[at] / (sine[at] - sine[at + 1])
-    centres = degrees[at] + share * (degrees[at + 1] - degrees[at])
-    found = []
-    if inside:
-        found.append((np.array(inside), "s", "limit"))
-    if centres.size:
-        found.append((centres, "D", "dead centre"))
-    return found
+def _marked(view: View) -> list[tuple[list[float], list[float], str, str]]:
+    """Limits (bars 3, 4 collinear) and dead centres (bars 2, 3 collinear): theta_2, mu (degrees), mark, name."""
+    from fourbar.mobility import limit_positions
+
+    degrees = view.degrees
+    margin = 1.5 * float(np.median(np.diff(degrees))) if len(degrees) > 1 else 0.0
+    limits = [t for angle in limit_angles(view) for t in _inside(view, angle, margin)]
+    centres, heights = [], []
+    for found in limit_positions(view.scene.linkage, 4):
+        difference = found.theta_4 - found.theta_3
+        for t in _inside(view, found.theta_2, 0.0):
+            if view.sweep.branch[np.argmin(np.abs(degrees - t))] == found.branch:
+                centres.append(t)
+                heights.append(math.degrees(math.atan2(abs(math.sin(difference)), abs(math.cos(difference)))))
+    marked = [(limits, [0.0] * len(limits), "s", "limit"), (centres, heights, "D", "dead centre")]
+    return [entry for entry in marked if entry[0]]
+
+
+def _inside(view: View, angle: float, margin: float) -> list[float]:
+    """An angle (rad) and its whole turns that lie in the sweep, degrees."""
+    low, high = float(view.degrees[0]) - margin, float(view.degrees[-1]) + margin
+    start = math.degrees(angle)
+    first = math.ceil((low - start) / 360.0)
+    return [start + 360.0 * k for k in range(first, math.floor((high - start) / 360.0) + 1)]
 
 
 def limit_angles(view: View) -> list[float]:
