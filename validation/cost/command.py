@@ -22,11 +22,16 @@ ORDERS = "Errors are the worst over the scene's positions, each on its scale, ag
 @click.command(name="cost")
 @click.argument("scenes", nargs=-1, type=click.Path(path_type=Path))
 @click.option("--out", type=click.Path(path_type=Path, file_okay=False), default=Path("results/cost"), show_default=True)
-def cost(scenes: tuple[Path, ...], out: Path) -> int:
+@click.option("--effects", is_flag=True, help="Count instead what each effect costs in each engine (`effects-cost`).")
+def cost(scenes: tuple[Path, ...], out: Path, effects: bool) -> int:
     """What accuracy costs in time: work and precision of every way to an answer, on SCENES (default: the crank-rocker).
 
     An interrupted study is resumed where it stopped. Exit status 1 where a law does not hold.
     """
+    if effects:
+        from validation.effect_cost import command
+
+        return int(command.main([], standalone_mode=False))
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
