@@ -3,10 +3,6 @@
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from fourbar.effects import Friction as Friction
-from fourbar.effects import Gravity as Gravity
-from fourbar.effects import Load as Load
-from fourbar.effects import Viscous as Viscous
 from fourbar.errors import FourBarError as FourBarError
 from fourbar.errors import InputError as InputError
 from fourbar.linkage import Bar as Bar
@@ -24,12 +20,18 @@ from fourbar.solution import Solution as Solution
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
+    from fourbar.effects import Friction as Friction
+    from fourbar.effects import Gravity as Gravity
+    from fourbar.effects import Load as Load
+    from fourbar.effects import Viscous as Viscous
     from fourbar.files import dump as dump
     from fourbar.files import load as load
 
 
 def __getattr__(name: str) -> Any:
-    # the file edge needs a units library; it is loaded on first use, not by `import fourbar`
+    # the file edge needs a units library, most scenes few effects: loaded on first use, not by `import fourbar`
     if name in ("load", "dump"):
         return getattr(import_module("fourbar.files"), name)
+    if name in ("Friction", "Gravity", "Load", "Viscous"):
+        return getattr(import_module("fourbar.effects"), name)
     raise AttributeError(f"module 'fourbar' has no attribute {name!r}")

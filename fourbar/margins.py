@@ -7,17 +7,18 @@ are >= 0, psi = theta_2 - theta_1; outer = 0 is bars 3, 4 stretched, inner = 0 i
 At a change point the product of lengths is zero exactly, and nothing cancels beside it.
 """
 
-import decimal
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from decimal import Decimal
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.linkage import FourBar
+
+if TYPE_CHECKING:
+    from decimal import Decimal
 
 Array = NDArray[np.float64]
 
@@ -29,7 +30,6 @@ UNDECIDED = 32.0 * U
 TOUCHING = U
 """Bars that miss each other by up to this times the sum of the lengths count as touching: each length
 was itself rounded by up to U, so the linkage meant closes there as well as not."""
-DIGITS = 60
 NONE = np.empty(0, dtype=np.intp)
 
 
@@ -53,7 +53,7 @@ class Diagonal:
     assembled: NDArray[np.bool_]
     decided: NDArray[np.intp]
     """Indices of the positions whose margins were evaluated in 60 digits."""
-    offset: Decimal | None
+    offset: "Decimal | None"
     """What theta_2 as a double leaves out of the angle meant, rad, where that is known."""
 
 
@@ -75,7 +75,7 @@ def in_precision_of(array: Array, number: float) -> Any:
 
 
 def diagonal_to_O4(
-    linkage: FourBar, theta_2: Array, offset: Decimal | None = None, *, growths: Iterator[float] | None = None
+    linkage: FourBar, theta_2: Array, offset: "Decimal | None" = None, *, growths: Iterator[float] | None = None
 ) -> Diagonal:
     """The diagonal from the half angle: e^2 = (d - a)^2 w + (d + a)^2 v, w and v its squared cosine and sine.
 
@@ -110,8 +110,10 @@ def diagonal_to_O4(
             decided = np.flatnonzero(
                 ((np.abs(outer) < least_1) & (constant_1 < 0.0)) | ((np.abs(inner) < least_2) & (constant_2 < 0.0))
             )
+        if decided.size:
+            from fourbar.sixty_digits import decide
         for index in decided:
-            outer[index], inner[index] = _decide(linkage, float(theta_2[index]), offset or Decimal(0))
+            outer[index], inner[index] = decide(linkage, float(theta_2[index]), offset)
             assembled[index] = outer[index] >= 0.0 and inner[index] >= 0.0
         if not assembled.all():
             outer = np.where(assembled, outer, np.nan)
@@ -164,71 +166,3 @@ def _sum(*lengths: Any) -> Any:
     if isinstance(lengths[0], float):
         return math.fsum(lengths)
     return (lengths[0] + lengths[2]) + (lengths[1] + lengths[3])
-
-
-def _decide(linkage: FourBar, theta_2: float, offset: Decimal) -> tuple[float, float]:
-    """outer and inner of one position in 60 digits, each rounded once."""
-    with decimal.localcontext() as context:
-        context.prec = DIGITS
-        unit = Decimal(unit_of(linkage))
-        d, a, b, c = (Decimal(length) / unit for length in linkage.lengths)
-        cosine = _cosine(Decimal(theta_2) - Decimal(linkage.ground_angle) + offset)
-        squared = (d - a) ** 2 + 2 * a * d * (1 - cosine)
-        touching = Decimal(TOUCHING) * (a + b + c + d) * 2 * squared.sqrt()
-        factors = ((b + c) ** 2 - squared, squared - (b - c) ** 2)
-        outer, inner = (float(Decimal(0) if -touching <= factor < 0 else factor) for factor in factors)
-        return outer, inner
-
-
-def limit_remainder(linkage: FourBar, limit: float, theta_2: float, offset: float) -> Decimal:
-    """(limit position + offset) - theta_2 in 60 digits, for the limit position whose double is `limit`.
-
-    The exact limit position is where bars 3, 4 are collinear:
-        cos(theta_2 - theta_1) = (a^2 + d^2 - (b +- c)^2)/(2 a d),
-    found by Newton's iteration from the double.
-    """
-    with decimal.localcontext() as context:
-        context.prec = DIGITS
-        d, a, b, c = (Decimal(length) for length in linkage.lengths)
-        theta_1 = Decimal(linkage.ground_angle)
-        angle = Decimal(limit)
-        at_limit = a * a + d * d - 2 * a * d * _cosine(angle - theta_1)
-        target = min(((b + c) ** 2, (b - c) ** 2), key=lambda squared: abs(squared - at_limit))
-        half_turn = _pi()
-        straight = theta_1 + ((angle - theta_1) / half_turn).to_integral_value() * half_turn
-        if a * a + d * d - 2 * a * d * _cosine(straight - theta_1) == target:
-            angle = straight  # a change point: the cosine is +-1 there, where Newton has no slope
-        else:
-            for _ in range(NEWTON_STEPS):
-                gap = a * a + d * d - 2 * a * d * _cosine(angle - theta_1) - target
-                angle -= gap / (2 * a * d * _cosine(angle - theta_1 - half_turn / 2))
-        return angle + Decimal(offset) - Decimal(theta_2)
-
-
-NEWTON_STEPS = 60
-"""The double's 16 digits double with each step; beside a change point they gain one bit each at first."""
-
-
-def _cosine(angle: Decimal) -> Decimal:
-    """cos of an angle in the digits of the current context."""
-    with decimal.localcontext() as context:
-        context.prec += 10
-        angle = angle % (2 * _pi())
-        square, term, total, k = angle * angle, Decimal(1), Decimal(1), 0
-        while abs(term) > Decimal(10) ** -context.prec:
-            k += 2
-            term = -term * square / (k * (k - 1))
-            total += term
-    return +total
-
-
-def _pi() -> Decimal:
-    """pi in the digits of the current context (the recipe of the decimal module's documentation)."""
-    last, t, total, n, na, d, da = Decimal(0), Decimal(3), Decimal(3), 1, 0, 0, 24
-    while total != last:
-        last = total
-        n, na = n + na, na + 8
-        d, da = d + da, da + 32
-        t = (t * n) / d
-        total += t
-    return +total

@@ -2,22 +2,18 @@
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
-from decimal import Decimal
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.effects import Effect, Load
-from fourbar.error_bars import error_bars
 from fourbar.errors import InputError
 from fourbar.kinematics import Array, State, Vector, add_accelerations, add_velocities, centre_in_bar, close_loop
 from fourbar.kinetostatics import drive_sine, solve_pins, torque_interval
 from fourbar.linkage import MOVING_BARS, FourBar, require
-from fourbar.margins import U, diagonal_to_O4, limit_remainder
+from fourbar.margins import U, diagonal_to_O4
 from fourbar.mobility import default_range, limit_positions, on_smooth_path
 from fourbar.more_digits import needing_more_digits, restated, rounded
-from fourbar.motion_law import Law
 from fourbar.solution import (
     NOT_ASSEMBLED,
     OF_DRY_FRICTION,
@@ -29,6 +25,12 @@ from fourbar.solution import (
     Solution,
     Unwrapped,
 )
+
+if TYPE_CHECKING:
+    from decimal import Decimal
+
+    from fourbar.effects import Effect, Load
+    from fourbar.motion_law import Law
 
 OPEN, CROSSED = 1, -1
 ALL = slice(None)
@@ -96,7 +98,7 @@ class Motion:
     branch: int = OPEN
     through: str = "sign"
     free: Free | None = None
-    law: Law | None = None
+    law: "Law | None" = None
 
     def __post_init__(self) -> None:
         if self.theta_2 is not None and not isinstance(self.theta_2, (Sweep, FromLimit)):
@@ -124,8 +126,8 @@ class Scene:
     linkage: FourBar
     motion: Motion = field(default_factory=Motion)
     drive_bar: int = 2
-    loads: tuple[Load, ...] = ()
-    effects: tuple[Effect, ...] = ()
+    loads: "tuple[Load, ...]" = ()
+    effects: "tuple[Effect, ...]" = ()
     title: str = ""
     source: str = ""
 
@@ -152,7 +154,7 @@ class Command(NamedTuple):
     """rad/s; None: positions only."""
     alpha_2: float | Array
     """rad/s^2."""
-    remainder: Decimal | None = None
+    remainder: "Decimal | None" = None
     """What theta_2 as a double leaves out of the one angle meant, rad: a limit position plus its offset."""
     time: Array | None = None
     """(n,), s; where the motion is given over time."""
@@ -186,6 +188,8 @@ def command(scene: Scene) -> Command:
             raise InputError("motion.theta_2.limit", asked.limit, "the input of this linkage has no limit positions")
         if asked.limit > len(limits):
             raise InputError("motion.theta_2.limit", asked.limit, f"must be from 1 to {len(limits)}")
+        from fourbar.sixty_digits import limit_remainder
+
         limit = limits[asked.limit - 1].theta_2
         theta_2 = np.array([limit + asked.offset])
         remainder = limit_remainder(linkage, limit, float(theta_2[0]), asked.offset)
@@ -383,6 +387,8 @@ def _evaluate(
             ends = torque_interval(state, terms, scene.drive_bar, pins.torque)
             yield from ((name, end) for name, end in zip(OF_DRY_FRICTION, ends, strict=True) if name in names)
         if wanted >= 4:
+            from fourbar.error_bars import error_bars
+
             for name, value in error_bars(state, pins, terms, scene.drive_bar).items():
                 if name in names:
                     yield name, value

@@ -10,7 +10,7 @@ import pytest
 
 import fourbar
 from fourbar.kinematics import add_accelerations, add_velocities, close_loop
-from fourbar.margins import limit_remainder
+from fourbar.sixty_digits import limit_remainder
 
 EPS = 2.0**-52
 LENGTHS = (0.3, 0.1, 0.25, 0.22)
