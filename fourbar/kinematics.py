@@ -341,8 +341,9 @@ def first_coefficients(state: State) -> FirstCoefficients:
     cot_beta, cot_gamma = state.at_A / root, state.at_O4 / root
     growth, turn = (2.0 * a * d) * diagonal.h, (a * (a - d)) * diagonal.w
     turn += (a * (a + d)) * diagonal.v
-    growth /= diagonal.squared
-    turn /= diagonal.squared
+    with np.errstate(divide="ignore", invalid="ignore"):  # A on O4
+        growth /= diagonal.squared
+        turn /= diagonal.squared
     h3, h4 = turn - growth * cot_gamma, turn + growth * cot_beta
     if state.parallel is not None:
         where, fourth = state.parallel
