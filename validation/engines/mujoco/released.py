@@ -1,5 +1,6 @@
 """MuJoCo's forward dynamics of a released linkage: the generated MJCF without its flywheel."""
 
+import math
 from dataclasses import replace
 
 import mujoco
@@ -28,7 +29,9 @@ class MujocoForward:
     def release(self, scene: Scene, times: Array) -> Released:
         """The motion at the given times, rising from 0 (s)."""
         setting, start = f"RK4 {self.step:g} s", command(scene)
-        settings = replace(RECIPE, flywheel=0.0, timestep=self.step, time_constant_steps=TIME_CONSTANT_STEPS, pad=None)
+        interval = float(times[1] - times[0])  # the times are evenly spaced; the step divides the interval
+        timestep = interval / math.ceil(interval / self.step - 1e-6)
+        settings = replace(RECIPE, flywheel=0.0, timestep=timestep, time_constant_steps=TIME_CONSTANT_STEPS, pad=None)
         bare = replace(scene, motion=replace(scene.motion, free=None, alpha_2=0.0))
         try:
             loop = ClosedLoop(mjcf(bare, settings, keyframe=False))
@@ -41,7 +44,7 @@ class MujocoForward:
         loop.set_state(q_0, scene.motion.omega_2 or 0.0)
         rows, done = [], 0
         for t in times:
-            wanted = round(float(t) / self.step)
+            wanted = round(float(t) / timestep)
             if wanted > done:
                 mujoco.mj_step(loop.model, loop.data, wanted - done)
                 done = wanted
