@@ -15,6 +15,7 @@ from fourbar.scene import Scene
 from tests.test_effects import EXACT, SIMULATED, failing, refusing
 
 PAGE = (Path(__file__).parent.parent / "docs" / "adding-an-effect.md").read_text(encoding="utf-8")
+REFERENCE = (Path(__file__).parent.parent / "docs" / "effects.md").read_text(encoding="utf-8")
 SCENE = """
 [lengths]
 ground = "300 mm"
@@ -31,8 +32,8 @@ omega_2 = "10 rad/s"
 """
 
 
-def block(language: str) -> str:
-    found = re.search(rf"```{language}\n(.*?)```", PAGE, re.S)
+def block(language: str, page: str = PAGE) -> str:
+    found = re.search(rf"```{language}\n(.*?)```", page, re.S)
     assert found is not None
     return found[1]
 
@@ -75,3 +76,21 @@ def test_a_fault_in_the_example_is_caught(windage: Any, method: str, monkeypatch
 
     monkeypatch.setattr(windage, method, three_times)
     assert "torque" in {quantity for _, quantity, _ in failing(asked(), EXACT)}
+
+
+@pytest.mark.parametrize("key", REGISTRY)
+def test_the_example_of_each_effect_is_read_and_written_back(key: str) -> None:
+    effect = REGISTRY[key]
+    scene = loads(f"{SCENE}[effects]\n{effect.example}")
+    assert [type(each) for each in scene.effects] == [effect]
+    assert loads(dump(scene)).effects == scene.effects
+    assert effect.example.split("=")[0] in REFERENCE
+
+
+def test_the_scene_of_the_reference_names_everything_and_is_agreed_on() -> None:
+    scene = loads(SCENE.partition("[motion]")[0] + block("toml", REFERENCE))
+    assert [effect.key for effect in scene.effects] == list(REGISTRY)
+    assert scene.motion.law is not None and scene.loads[0].table is not None
+    again = loads(dump(scene))
+    assert (again.effects, again.loads, again.motion.law) == (scene.effects, scene.loads, scene.motion.law)
+    assert failing(scene, EXACT) == []
