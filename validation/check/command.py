@@ -56,7 +56,7 @@ def judge_table(scene: Scene, table: Table) -> Judgement:
         raise InputError("motion.law", scene.title, "a table is judged at one omega_2 and alpha_2, not along a law")
     branch = np.full(len(table.theta_2), scene.motion.branch, dtype=np.int8)
     at = Command(table.theta_2, branch, base.omega_2, base.alpha_2)
-    right = solve(scene, at=at)
+    right = solve(scene, "position" if at.omega_2 is None else "force", at=at)
     ok = right.status_code == OK
 
     def judged(quantity: str, ours: Array, theirs: Array) -> tuple[Array, Array]:

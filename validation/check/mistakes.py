@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from fourbar.effects import Gravity
+from fourbar.errors import FourBarError
 from fourbar.linkage import Bar
 from fourbar.scene import Command, Scene, solve
 from fourbar.solution import VECTORS, Solution
@@ -78,8 +79,8 @@ def hypotheses(scene: Scene, at: Command) -> Iterator[Mistake]:
     yield from _inertial(scene, at)
     for text, changed, where in _other_problems(scene, at):
         try:
-            wrong = solve(changed, at=where)
-        except ValueError:
+            wrong = solve(changed, "position" if where.omega_2 is None else "force", at=where)
+        except FourBarError:  # what the mistake makes of this scene is none
             continue
         yield Mistake(text, lambda quantity, right, wrong=wrong: getattr(wrong, quantity, None))  # type: ignore[misc]
 
@@ -89,8 +90,8 @@ def _inertial(scene: Scene, at: Command) -> Iterator[Mistake]:
     if at.omega_2 is None:
         return
     bare = replace(scene, loads=(), effects=())
-    of_mass = solve(_with_bars(bare, lambda bar: replace(bar, inertia=0.0)), at=at)
-    of_inertia = solve(_with_bars(bare, lambda bar: replace(bar, mass=0.0)), at=at)
+    of_mass = solve(_with_bars(bare, lambda bar: replace(bar, inertia=0.0)), "force", at=at)
+    of_inertia = solve(_with_bars(bare, lambda bar: replace(bar, mass=0.0)), "force", at=at)
 
     def scaled(by_mass: float, by_inertia: float) -> Callable[[str, Solution], Array | None]:
         def predict(quantity: str, right: Solution) -> Array | None:

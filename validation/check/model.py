@@ -92,7 +92,7 @@ def examine_model(name: str, scene: Scene, mjcf: Path, names: Mapping[str, str])
 def _rows(name: str, scene: Scene, answers: list[Answer]) -> list[Row]:
     found = []
     for answer in answers:
-        formulas = solve(scene, at=answer.at)
+        formulas = solve(scene, "force", at=answer.at)
         found += compare(name, scene, answer, formulas, SIMULATED, COMPARED)
     return found
 
