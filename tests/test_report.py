@@ -143,3 +143,28 @@ def test_costs_are_those_of_the_run() -> None:
     assert formulas == [1e6 * timings["formulas"].seconds / 37]
     assert points == {name: [(1e6 * timings[name].seconds / 37, error)] for name, error in errors.items()}
     assert set(points) == {"pinocchio-inverse", "mujoco-inverse", "energy-method"}
+
+
+@pytest.mark.parametrize(
+    ("motion", "pictures"),
+    [
+        (fourbar.Motion(fourbar.Sweep(0.0, 6.0, 24)), 3),  # positions only: angles are drawn
+        (fourbar.Motion(1.0, 5.0), 1),  # one position: the linkage alone
+        (fourbar.Motion(1.0, 0.0, free=fourbar.Free(0.2, 20)), 3),
+        (fourbar.Motion(fourbar.Sweep(0.0, 6.0, 24), 5.0), 3),
+    ],
+    ids=["positions", "one position", "released", "sweep"],
+)
+def test_every_kind_of_scene_is_drawn(motion: fourbar.Motion, pictures: int) -> None:
+    witnesses = tuple(w for w in WITNESSES if w.name == "energy-method")
+    made = judged_page("kind", crank_rocker(motion=motion), witnesses)
+    assert made.figure is not None and made.figure.count("<svg") == pictures
+    _, text = report([made])
+    assert "kind: crank-rocker" in text
+
+
+def test_an_engine_that_is_missing_is_said_to_fail() -> None:
+    absent = replace(WITNESSES[0], adapter="validation.engines.absent:Absent")
+    summary, text = report([judged_page("demo", crank_rocker(), (absent,))])
+    assert summary.verdict.startswith("FAILS")
+    assert "What fails</h2>" in text and "No module named" in text and "∞" in text
