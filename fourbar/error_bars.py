@@ -47,8 +47,8 @@ def error_bars(state: State, pins: PinForces, terms: Iterable[Term], drive_bar: 
     torque, forces = np.zeros(n), np.zeros((4, n))
     for run in range(EVALUATIONS):
         signs = _signs(run)
-        linkage = _moved_linkage(state.linkage, signs)
-        moved_terms = [_moved_term(term, signs) for term in terms]
+        linkage = _moved_linkage(state.linkage, signs, all_of_it=in_doubles)
+        moved_terms = [_moved_term(term, signs, all_of_it=in_doubles) for term in terms]
         if in_doubles:
             moved = _moved_state(state, linkage, signs)
             other = solve_pins(moved, moved_terms, drive_bar, growths=signs)
@@ -77,13 +77,15 @@ def _next(value: Any, signs: Iterator[float]) -> Any:
     return value + value * next(signs)
 
 
-def _moved_linkage(linkage: FourBar, signs: Iterator[float]) -> FourBar:
-    """The linkage with centres and inertias changed in their last digit."""
+def _moved_linkage(linkage: FourBar, signs: Iterator[float], *, all_of_it: bool) -> FourBar:
+    """The linkage with centres and inertias changed in their last digit; or only what doubles round in 32 digits."""
 
     def bar(old: Bar) -> Bar:
         assert old.centre is not None and old.inertia is not None
+        if not all_of_it and old.centre[1] == 0.0:
+            return old
         centre = (_next(old.centre[0], signs), _next(old.centre[1], signs))
-        return replace(old, inertia=_next(old.inertia, signs), centre=centre)
+        return replace(old, inertia=_next(old.inertia, signs) if all_of_it else old.inertia, centre=centre)
 
     return replace(linkage, input=bar(linkage.input), coupler=bar(linkage.coupler), output=bar(linkage.output))
 
@@ -98,7 +100,12 @@ def _moved_state(state: State, linkage: FourBar, signs: Iterator[float]) -> Stat
     moved = close_loop(linkage, state.theta_2, state.branch, diagonal)
     moved.assembled, moved.singular = state.assembled, state.singular
     moved.u2, moved.u3, moved.u4 = ((_next(u[0], signs), _next(u[1], signs)) for u in (moved.u2, moved.u3, moved.u4))
-    if state.parallel is not None:  # bars that turn as one are one in the answer too
+    if state.parallel is not None:
+        # all that is lost is in the directions, each of several roundings; bars that turn as one are one here too
+        u2, u3, u4 = moved.u2, moved.u3, moved.u4
+        for _ in range(3):
+            u2, u3, u4 = ((_next(u[0], signs), _next(u[1], signs)) for u in (u2, u3, u4))
+        moved.u2, moved.u3, moved.u4 = u2, u3, u4
         together, folded = (
             state.parallel[0] & (state.parallel[1] == 1.0),
             state.parallel[0] & (state.parallel[1] == 0.0),
@@ -112,13 +119,15 @@ def _moved_state(state: State, linkage: FourBar, signs: Iterator[float]) -> Stat
     return moved
 
 
-def _moved_term(term: Any, signs: Iterator[float]) -> Any:
+def _moved_term(term: Any, signs: Iterator[float], *, all_of_it: bool) -> Any:
     def pair(polar: tuple[float, float]) -> tuple[float, float]:
         return (_next(polar[0], signs), _next(polar[1], signs))
 
     if isinstance(term, Load):
         force = None if term.force is None else pair(term.force)
-        return replace(term, force=force, at=pair(term.at), moment=_next(term.moment, signs))
+        return replace(
+            term, force=force, at=pair(term.at), moment=_next(term.moment, signs) if all_of_it else term.moment
+        )
     if isinstance(term, Gravity):
         return Gravity(*pair((term.magnitude, term.angle)))
     return term

@@ -55,7 +55,7 @@ def add_inertia(wrenches: Wrenches, state: State) -> None:
         # products of constants are rounded once for all positions, in the digits of the state
         m, alpha = in_precision_of(state.theta_2, bar.mass), state.alpha(number)
         if (bar.inertia != 0.0 or bar.mass != 0.0) and not is_zero(alpha):
-            wrenches.add_moment(number, -(bar.inertia + m * (p * p + q * q)) * alpha)
+            wrenches.add_moment(number, -(bar.inertia + (m * p * p + m * q * q)) * alpha)
         if bar.mass == 0.0:
             continue
         u = state.unit(number)
