@@ -162,6 +162,7 @@ def test_one_cone_has_one_none_or_two_solutions() -> None:
         ((1.0, 0.0), (2.0, 0.0)): (NONE, math.nan),
         ((1.0, 0.0), (-2.0, 0.0)): (SEVERAL, 1.0 / 3.0),
         ((1.0, 0.0), (0.0, 2.0)): (NONE, math.nan),
+        ((1.0, 0.0), (0.0, 0.6)): (ONE, 1.25),
         ((0.0, 0.0), (0.5, 0.3)): (ONE, 0.0),
         ((3.0, 4.0), (0.0, 0.0)): (ONE, 5.0),
     }
@@ -252,6 +253,16 @@ def test_the_ends_of_a_law() -> None:
     assert periodic[0] == pytest.approx([0.0, 2 * math.pi], abs=1e-13)
     assert periodic[1][0] == pytest.approx(periodic[1][1], rel=1e-12)
     assert periodic[2][0] == pytest.approx(periodic[2][1], rel=1e-11)
+
+
+@pytest.mark.parametrize("ends", ["free", "rest", "periodic"])
+def test_speed_and_acceleration_are_the_slopes_of_the_law(ends: str) -> None:
+    law = Law((0.0, 0.2, 0.5, 1.0), (0.0, 1.0, 2.5, 2 * math.pi), 10, ends)
+    inside, step = np.array([0.05, 0.33, 0.71, 0.93]), 1e-5
+    before, here, after = (law.at(inside + shift) for shift in (-step, 0.0, step))
+    # central differences: third derivative times step^2/6, and rounding over the step
+    assert here[1] == pytest.approx((after[0] - before[0]) / (2 * step), rel=1e-7)
+    assert here[2] == pytest.approx((after[1] - before[1]) / (2 * step), rel=1e-7)
 
 
 def test_each_position_of_a_law_is_that_motion_alone() -> None:
