@@ -15,6 +15,7 @@ COMMANDS = {
     "fuzz-files": "validation.suite.mutants:fuzz_files",
     "models": "validation.models:models",
     "published": "validation.published:published",
+    "mutation": "validation.mutation.command:mutation",
     "fuzz": "validation.fuzz.command:fuzz",
     "stability": "validation.stability:stability",
     "bench": "validation.bench:bench",
