@@ -104,7 +104,7 @@ def guess(error: float) -> tuple[float, float]:
 
 
 def looked_at(scene: Scene) -> Command:
-    """The scene's own positions and others between them: the error peaks in between, most of all beside a pole of T3, T4."""
+    """The scene's own positions and others between them: the error peaks there, most of all beside a pole of T3, T4."""
     own = command_of(scene)
     if np.ptp(own.branch) != 0:
         return own

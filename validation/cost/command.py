@@ -21,7 +21,9 @@ ORDERS = "Errors are the worst over the scene's positions, each on its scale, ag
 
 @click.command(name="cost")
 @click.argument("scenes", nargs=-1, type=click.Path(path_type=Path))
-@click.option("--out", type=click.Path(path_type=Path, file_okay=False), default=Path("results/cost"), show_default=True)
+@click.option(
+    "--out", type=click.Path(path_type=Path, file_okay=False), default=Path("results/cost"), show_default=True
+)
 @click.option("--effects", is_flag=True, help="Count instead what each effect costs in each engine (`effects-cost`).")
 def cost(scenes: tuple[Path, ...], out: Path, effects: bool) -> int:
     """What accuracy costs in time: work and precision of every way to an answer, on SCENES (default: the crank-rocker).
@@ -40,7 +42,13 @@ def cost(scenes: tuple[Path, ...], out: Path, effects: bool) -> int:
     for index in range(len(files)):
         name, scene = files.name(index), files.scene(index)
         study = Study(name, scene, out / name)
-        columns = (TextColumn(name), BarColumn(), MofNCompleteColumn(), TextColumn("{task.description}"), TimeRemainingColumn())
+        columns = (
+            TextColumn(name),
+            BarColumn(),
+            MofNCompleteColumn(),
+            TextColumn("{task.description}"),
+            TimeRemainingColumn(),
+        )
         curves: dict[str, list[Point]] = {}
         with Progress(*columns, console=Console(stderr=True)) as progress:
             task = progress.add_task("", total=len(study))
@@ -98,7 +106,10 @@ def front_lines(curves: Mapping[str, Sequence[Point]]) -> list[str]:
     points = [p for name, row in curves.items() if "slow" not in name for p in row if p.kind == STEPPED]
     head = f"{'error':>8} {'RK4 steps':>10} {'ms/turn':>8}  setting"
     front = pareto(points, "worst")
-    rows = [f"{p.worst:8.0e} {p.rk4_steps:10.0f} {1e3 * p.seconds_per_revolution:8.2f}  {p.curve}: {p.setting}" for p in front]
+    rows = [
+        f"{p.worst:8.0e} {p.rk4_steps:10.0f} {1e3 * p.seconds_per_revolution:8.2f}  {p.curve}: {p.setting}"
+        for p in front
+    ]
     return [head, *rows]
 
 
@@ -116,7 +127,13 @@ def report(
     lines += ["", "## Laws", "", *(f"- {law}" for law in found)]
     lines += ["", "## Cheapest for each error", "", "```", *front_lines(curves), "```"]
     lines += ["", "## Where more steps buy nothing", "", *(f"- {line}" for line in warnings(curves) or ["none"])]
-    lines += ["", "## All points", "", "| setting | torque | force | steps/turn | ms/turn | us/sample | RK4 steps |", "|---|---|---|---|---|---|---|"]
+    lines += [
+        "",
+        "## All points",
+        "",
+        "| setting | torque | force | steps/turn | ms/turn | us/sample | RK4 steps |",
+        "|---|---|---|---|---|---|---|",
+    ]
     for name, points in curves.items():
         for p in points:
             lines.append(

@@ -56,7 +56,7 @@ def _parts(witness: Witness) -> dict[str, Any]:
     return {field.name: getattr(witness, field.name) for field in fields(Witness)}
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class Dialled:
     """Engine "mujoco-simulated" with settings for an asked error."""
 
@@ -69,12 +69,12 @@ class Dialled:
         from validation.engines.mujoco.simulate import MujocoSimulated
 
         steps, tc = guess(self.error)
-        spent = 0.0
-        for done in range(1, ROUNDS + 1):
+        spent, runs = 0.0, 0
+        for _ in range(ROUNDS):
             answer = MujocoSimulated(dialled(steps, tc)).answer(scene, command)
             if answer.refusal is not None:
                 return answer
-            spent += answer.evidence["steps"]
+            spent, runs = spent + answer.evidence["steps"], runs + 1
             expected = expected_error(scene, answer)
             if expected <= MARGIN * self.error and not answer.alarms:
                 break
@@ -88,7 +88,7 @@ class Dialled:
             "asked_error": self.error,
             "expected_error": expected,
             "steps_with_the_search": spent,
-            "runs": float(done),
+            "runs": float(runs),
         }
         return answer
 

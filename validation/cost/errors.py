@@ -44,9 +44,11 @@ def errors(scene: Scene, at: Command, quantities: dict[str, Array]) -> Errors:
     for name in ("torque", *PIN_FORCES):
         ours, where = getattr(formulas, name), judged
         if name == "torque" and scene.drive_bar != 2:
-            speed = np.abs(np.nan_to_num(formulas.omega_3 if scene.drive_bar == 3 else formulas.omega_4))
+            speed = np.abs(np.nan_to_num(getattr(formulas, f"omega_{scene.drive_bar}")))
             where = judged & (speed > SLOW_DRIVE * speed.max())
-        relative = angle_aware_difference(name, ours, quantities[name]) / divisor(yardstick(name, scene, formulas, ours))
+        relative = angle_aware_difference(name, ours, quantities[name]) / divisor(
+            yardstick(name, scene, formulas, ours)
+        )
         value = float(np.max(relative[where]))
         worst[name] = value if np.isfinite(value) else float("inf")
     return Errors(worst["torque"], max(worst[name] for name in PIN_FORCES))

@@ -73,8 +73,8 @@ def _least(rig: Rig, kind: tuple[str, bool], tc: float, most: float, error: floa
         if _serves(rig, kind, tc, n, error):
             for finer in (n / FINE**2, n / FINE):
                 if _serves(rig, kind, tc, finer, error):
-                    return round(finer)
-            return round(n)
+                    return int(finer + 0.5)
+            return int(n + 0.5)
     return None
 
 

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from fourbar.effects import Wrenches
 from fourbar.kinematics import State, add_accelerations, add_velocities, close_loop
 from fourbar.kinetostatics import add_inertia, eliminate
 from fourbar.linkage import MOVING_BARS
-from fourbar.effects import Wrenches
 from fourbar.scene import Command, Scene, solve
 from validation import thirteen
 from validation.answer import Array

@@ -69,7 +69,7 @@ def floor(points: Sequence[Point]) -> float | None:
     worst = [point.worst for point in sorted(points, key=lambda point: point.steps_per_revolution)]
     if len(worst) < 2 or not math.isfinite(worst[-1]) or worst[-1] < FLOORED * worst[-2]:
         return None
-    return min(worst)
+    return worst[-1]  # on the way there two sources may cancel: a dip is not a floor
 
 
 def steps_at_floor(points: Sequence[Point]) -> Point | None:

@@ -179,7 +179,8 @@ def study(count: int, seed: int, out: Path) -> int:
     ratios = sorted(each.cost / each.cheapest for each in cases if each.reached and each.cheapest == each.cheapest)
     bound = wilson(met, len(cases))
     click.echo(f"met: {met} of {len(cases)}, lower Wilson bound {bound:.3f} (needed {NEEDED_MET})")
-    click.echo(f"called unreachable: {unreachable}, of which the search reached {sum(not c.met for c in cases if not c.reached)}")
+    wrongly = sum(not each.met for each in cases if not each.reached)
+    click.echo(f"called unreachable: {unreachable}, of which the search reached {wrongly}")
     share = cheap / len(cases)
     click.echo(f"within {CHEAP:g} times the cheapest: {cheap} of {len(cases)}, {share:.3f} (needed {NEEDED_CHEAP})")
     if ratios:

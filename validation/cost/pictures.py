@@ -61,21 +61,21 @@ def _work_precision(curves: Mapping[str, Sequence[Point]], quantity: str, title:
     points = [point for name, row in curves.items() for point in row if "slow" not in name]
     stepped = [p for p in points if p.kind == STEPPED]
     front = pareto(stepped, quantity)
+    broad: dict[str, Any] = {"lw": 9.0, "solid_capstyle": "round", "solid_joinstyle": "round", "zorder": 1}
     axes.plot(
         *(_ms(front), [getattr(p, quantity) for p in front]),
-        **{"color": PALE, "lw": 9.0, "solid_capstyle": "round", "solid_joinstyle": "round", "zorder": 1},
+        **broad,
+        color=PALE,
         label="Pareto front of everything stepped",
     )
     for name, (label, colour, marker, line) in SHOWN.items():
         row = [p for p in curves.get(name, ()) if math.isfinite(getattr(p, quantity))]
         if row:
-            axes.plot(
-                *(_ms(row), [getattr(p, quantity) for p in row]),
-                **{"color": colour, "ls": line, "marker": marker, "ms": 5.5, "lw": 1.8},
-                **{"mec": colour if marker == "x" else "white", "mew": 1.4 if marker == "x" else 0.6},
-                label=label,
-                zorder=3 if name == "recommended" else 2,
-            )
+            style: dict[str, Any] = {"color": colour, "ls": line, "marker": marker, "ms": 5.5, "lw": 1.8}
+            # a cross has no face: with a white edge it would vanish
+            style |= {"mec": colour, "mew": 1.4} if marker == "x" else {"mec": "white", "mew": 0.6}
+            style["zorder"] = 3 if name == "recommended" else 2
+            axes.plot(_ms(row), [getattr(p, quantity) for p in row], label=label, **style)
     _label_recommended(axes, curves.get("recommended", ()), quantity)
     if front and front[-1].curve != "recommended":
         _label_end(axes, front[-1], quantity)
@@ -88,10 +88,10 @@ def _work_precision(curves: Mapping[str, Sequence[Point]], quantity: str, title:
     axes.set_xlim(low / 1.3, high * 1.6)
     axes.grid(visible=True, which="major")
     axes.tick_params(labelsize=10)
-    axes.xaxis.label.set_size(11)
-    axes.yaxis.label.set_size(11)
+    axes.xaxis.label.set_fontsize(11)
+    axes.yaxis.label.set_fontsize(11)
     axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=4, fontsize=8.5)
-    figure.text(0.02, 0.965, _statement(curves, quantity), fontsize=12.5, weight="bold", va="center")
+    figure.text(0.02, 0.965, statement(curves, quantity), fontsize=12.5, weight="bold", va="center")
     figure.text(0.02, 0.928, title, fontsize=9.5, color="#666666", va="center")
     return figure
 
@@ -101,7 +101,7 @@ def _ms(points: Sequence[Point]) -> list[float]:
 
 
 def _label_recommended(axes: Any, row: Sequence[Point], quantity: str) -> None:
-    """Steps and time constant at every second point of the front; left of it above the plain settings' floor, then right."""
+    """Steps and time constant at every second point; left of the curve above the plain settings' floor, then right."""
     for point in row[::2]:
         tc, error = point.setting.partition("tc = ")[2], getattr(point, quantity)
         left = error > TURN
@@ -175,7 +175,7 @@ def short(value: float) -> str:
     return f"{mantissa}e{int(exponent)}"
 
 
-def _statement(curves: Mapping[str, Sequence[Point]], quantity: str) -> str:
+def statement(curves: Mapping[str, Sequence[Point]], quantity: str) -> str:
     """What the picture means."""
     four = [p for p in curves.get("recommended", ()) if getattr(p, quantity) <= 1e-4]
     default = [p for row in curves.values() for p in row if p.setting == DEFAULT]
@@ -186,9 +186,9 @@ def _statement(curves: Mapping[str, Sequence[Point]], quantity: str) -> str:
             f"Four digits of {NAMES[quantity].removeprefix('driving ').removeprefix('worst ')} cost "
             f"{1e3 * cheap.seconds_per_revolution:.2g} ms a revolution"
         )
-    if default and math.isfinite(getattr(default[0], quantity)):
+    if default and math.isfinite(error := getattr(default[0], quantity)):
         parts.append(
-            f"the defaults pay {1e3 * default[0].seconds_per_revolution:.2g} ms for an error of {short(getattr(default[0], quantity))}"
+            f"the defaults pay {1e3 * default[0].seconds_per_revolution:.2g} ms for an error of {short(error)}"
         )
     return "; ".join(parts) or f"Error of the {NAMES[quantity]} against its cost"
 
@@ -227,7 +227,8 @@ def _sources(curves: Mapping[str, Sequence[Point]], title: str) -> Any:
         for name, (curve, colour, marker, line) in rows.items():
             row = [p for p in curves.get(curve, ()) if math.isfinite(p.worst) and p.worst < 10.0]
             x = [1.0 / p.dial if axes is panels[0] else p.dial or NONE for p in row]
-            style = {"color": colour, "ls": line, "marker": marker, "ms": 5, "lw": 1.8, "mec": "white", "mew": 0.5}
+            style: dict[str, Any] = {"color": colour, "ls": line, "marker": marker, "ms": 5, "lw": 1.8}
+            style |= {"mec": "white", "mew": 0.5}
             axes.plot(x, [p.worst for p in row], label=name, **style)
         axes.set(xscale="log", yscale="log", ylim=(1e-12, 20.0), xlabel=label)
         axes.set_title(heading, loc="left", fontsize=11, weight="bold", pad=44.0)
@@ -241,11 +242,8 @@ def _sources(curves: Mapping[str, Sequence[Point]], title: str) -> Any:
     _slope(panels[0], 4.0, 8e-3, 1e-8, "4")
     _slope(panels[1], 1.0, 2e-3, 2e-5, "1")
     panels[0].set_ylabel("worst error of torque and pin forces")
-    figure.text(
-        *(0.02, 0.955),
-        "Three sources, one at a time: the time step by its order, softness in proportion, the solver unless at 0",
-        **{"fontsize": 12.5, "weight": "bold", "va": "center"},
-    )
+    sentence = "Three sources, one at a time: time step by its order, softness in proportion, the solver unless at 0"
+    figure.text(0.02, 0.955, sentence, fontsize=12.5, weight="bold", va="center")
     figure.text(0.02, 0.912, title, fontsize=9.5, color="#666666", va="center")
     return figure
 
@@ -253,4 +251,6 @@ def _sources(curves: Mapping[str, Sequence[Point]], title: str) -> Any:
 def _slope(axes: Any, exponent: float, x: float, y: float, name: str) -> None:
     """A triangle's hypotenuse with the exponent beside it."""
     axes.plot([x, 4.0 * x], [y, y * 4.0**exponent], color=INK, lw=1.0)
-    axes.annotate(f"slope {name}", (2.0 * x, y * 2.0**exponent), xytext=(6, -8), textcoords="offset points", fontsize=8.5)
+    axes.annotate(
+        f"slope {name}", (2.0 * x, y * 2.0**exponent), xytext=(6, -8), textcoords="offset points", fontsize=8.5
+    )

@@ -12,7 +12,7 @@ import numpy as np
 
 from fourbar.errors import FourBarError, LimitError
 from fourbar.files import dump
-from fourbar.mjcf import Settings
+from fourbar.mobility import turns_fully
 from fourbar.scene import Command, Scene, command
 from fourbar.writing import write_text
 from validation.answer import Engine
@@ -20,7 +20,7 @@ from validation.cost import formulas
 from validation.cost.advise import advise, judged
 from validation.cost.curves import BEST, SLOW, Curve, Spot, curves
 from validation.cost.errors import Errors, errors
-from validation.engines.mujoco.trial import Rig
+from validation.engines.mujoco.trial import Rig, Trial
 from validation.machine import versions
 
 ROUNDS = 7
@@ -31,7 +31,7 @@ FORWARD_TIME_CONSTANT = 0.25
 ASKED = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 2e-9)
 """Errors for which the advice is drawn."""
 ONE_STATE = (0.9, 0.99, 0.999, 0.9999)
-VERSION = 3
+VERSION = 4
 """Of what is tried; parts of another one are done again."""
 EXACT, STEPPED, FORMULAS = "exact", "stepped", "formulas"
 
@@ -75,7 +75,7 @@ class Study:
         self.name, self.scene, self.folder = name, scene, folder / "parts"
         self.command = command(scene)
         self.left_out: list[str] = []
-        self._rigs: dict[tuple[bool, bool], Rig] = {}
+        self._rigs: dict[tuple[bool, bool, bool], Rig] = {}
         identity = json.dumps({"scene": dump(scene), "versions": versions(), "study": VERSION}, sort_keys=True)
         marker = self.folder / "study.json"
         if not (marker.is_file() and marker.read_text(encoding="utf-8") == identity):
@@ -111,26 +111,38 @@ class Study:
             write_text(path, json.dumps({"points": [asdict(point) for point in found], "left_out": reasons}))
             yield name, found
 
-    def rig(self, slow: bool = False, bare: bool = False) -> Rig:
-        """The scene assembled for trials, at its own speed or slow, with what acts on it or without."""
-        if (slow, bare) not in self._rigs:
+    def rig(self, slow: bool = False, bare: bool = False, settled: bool = False) -> Rig:
+        """The scene assembled for trials: at its own speed or slow, as it is or bare, after a turn or not."""
+        if (slow, bare, settled) not in self._rigs:
             scene = self.scene
             if slow:
                 sign = math.copysign(1.0, scene.motion.omega_2 or 1.0)
                 scene = replace(scene, motion=replace(scene.motion, omega_2=sign * SLOW, alpha_2=0.0))
             if bare:
                 scene = replace(scene, loads=(), effects=())
-            self._rigs[slow, bare] = Rig(scene, command(scene))
-        return self._rigs[slow, bare]
+            at = command(scene)
+            if settled:
+                before = float(at.theta_2.min() if at.omega_2 > 0.0 else at.theta_2.max())  # type: ignore[operator]
+                before -= math.copysign(2.0 * math.pi, at.omega_2)  # type: ignore[arg-type]
+                at = at._replace(theta_2=np.append(at.theta_2, before), branch=np.append(at.branch, at.branch[0]))
+            self._rigs[slow, bare, settled] = Rig(scene, at)
+        return self._rigs[slow, bare, settled]
 
     def _curve(self, curve: Curve) -> list[Point]:
-        return self._stepped(curve.name, curve.spots, self.rig(curve.slow, curve.bare))
+        settled = curve.settled and turns_fully(self.scene.linkage) and self.scene.motion.alpha_2 == 0.0
+        rig = self.rig(curve.slow, curve.bare, settled)
+        return self._stepped(curve.name, curve.spots, rig, settled)
 
-    def _stepped(self, name: str, spots: tuple[Spot, ...], rig: Rig) -> list[Point]:
+    def _stepped(self, name: str, spots: tuple[Spot, ...], rig: Rig, settled: bool = False) -> list[Point]:
         """Errors of each spot, and the CPU time of its steps beside that of the recommended model, interleaved."""
         trials = [rig.try_out(spot.settings, spot.build) for spot in spots]
+        if settled:
+            for trial in trials:
+                _leave_out_first(trial)
         clocks = [rig.seconds_per_step(spot.settings, spot.build) for spot in spots]
-        per_step, reference = _interleaved(clocks, rig.seconds_per_step(BEST), [min(t.steps, TIMED_STEPS) or 1 for t in trials])
+        per_step, reference = _interleaved(
+            clocks, rig.seconds_per_step(BEST), [min(t.steps, TIMED_STEPS) or 1 for t in trials]
+        )
         points = []
         for spot, trial, seconds in zip(spots, trials, per_step, strict=True):
             found = judged(rig.scene, trial)
@@ -150,17 +162,28 @@ class Study:
         for asked in ASKED:
             advice = advise(self.scene, asked, rig)
             if advice.reached:
-                spots.append(Spot(f"asked {asked:g}: tc = {advice.best.settings.time_constant_steps:.3g} h", advice.best.settings, None, asked))
+                spots.append(
+                    Spot(
+                        f"asked {asked:g}: tc = {advice.best.settings.time_constant_steps:.3g} h",
+                        advice.best.settings,
+                        None,
+                        asked,
+                    )
+                )
             else:
                 self.left_out.append(f"recommended: {advice.reason}")
         return self._stepped("recommended", tuple(spots), rig)
 
-    def _at_positions(self, name: str, kind: str, label: str, found: Errors, seconds: float, n: int, dial: float = math.nan) -> Point:
+    def _at_positions(
+        self, name: str, kind: str, label: str, found: Errors, seconds: float, n: int, dial: float = math.nan
+    ) -> Point:
         """A point of a method that answers each position by itself."""
         per_revolution = self._positions_per_revolution()
         reference = self._rk4_step()
         cost = seconds / n * per_revolution
-        return Point(name, kind, label, dial, n, per_revolution, found.torque, found.force, cost, seconds / n, cost / reference)
+        return Point(
+            name, kind, label, dial, n, per_revolution, found.torque, found.force, cost, seconds / n, cost / reference
+        )
 
     def _positions_per_revolution(self) -> float:
         span = float(np.ptp(self.command.theta_2)) or 2.0 * math.pi
@@ -213,7 +236,8 @@ class Study:
         from validation.engines.mujoco.one_state import MujocoOneState
 
         points = [
-            self._asked("one state", MujocoOneState((d,)), f"MuJoCo at one state, d = {d:g}", (1.0 - d) / d) for d in ONE_STATE
+            self._asked("one state", MujocoOneState((d,)), f"MuJoCo at one state, d = {d:g}", (1.0 - d) / d)
+            for d in ONE_STATE
         ]
         return [*points, self._asked("one state", MujocoOneState(), "MuJoCo at one state, extrapolated", 0.0)]
 
@@ -235,7 +259,16 @@ class Study:
         return points
 
 
-def _interleaved(clocks: list[Callable[[int], float]], reference: Callable[[int], float], steps: list[int]) -> tuple[list[float], float]:
+def _leave_out_first(trial: Trial) -> None:
+    """The turn that a soft closure takes to settle from its exact start."""
+    at = trial.at
+    trial.at = Command(at.theta_2[1:], at.branch[1:], at.omega_2[1:], at.alpha_2[1:])  # type: ignore[index]
+    trial.quantities = {name: values[1:] for name, values in trial.quantities.items()}
+
+
+def _interleaved(
+    clocks: list[Callable[[int], float]], reference: Callable[[int], float], steps: list[int]
+) -> tuple[list[float], float]:
     """Medians over rounds of CPU seconds per step; all take turns, so that a slow spell hits all of them."""
     times: list[list[float]] = [[] for _ in clocks]
     base = []
@@ -249,5 +282,3 @@ def _interleaved(clocks: list[Callable[[int], float]], reference: Callable[[int]
 def table(points: list[Point]) -> list[dict[str, Any]]:
     """The rows of the CSV."""
     return [asdict(point) for point in points]
-
-

@@ -1,4 +1,4 @@
-"""Pinocchio's forward dynamics of the closed loop through time: RK4, Baumgarte's stabilisation, a flywheel on the crank."""
+"""Pinocchio's forward dynamics of the closed loop through time: RK4, Baumgarte's stabilisation, a flywheel."""
 
 import time
 from dataclasses import dataclass

@@ -65,7 +65,12 @@ class VelocityActuator(Driven):
         kv = self.gain * self.flywheel * abs(self.omega)
         actuators = root.find("actuator")
         actuators = ET.SubElement(root, "actuator") if actuators is None else actuators
-        bias = {"gaintype": "fixed", "gainprm": "0", "biastype": "affine", "biasprm": numbers(kv * self.omega, 0.0, -kv)}
+        bias = {
+            "gaintype": "fixed",
+            "gainprm": "0",
+            "biastype": "affine",
+            "biasprm": numbers(kv * self.omega, 0.0, -kv),
+        }
         ET.SubElement(actuators, "general", bias, name="servo", joint="O2")
 
 
@@ -96,7 +101,7 @@ class Servo(Driven):
 
 
 class WheelEquality(Driven):
-    """A joint equality to a kinematic wheel: a second, heavy body that turns at omega and is not part of the linkage."""
+    """A joint equality to a kinematic wheel: a second, heavy body that turns at omega beside the linkage."""
 
     softness = 1.0
     """Factor on dof_invweight0: how soft the equality is, edited after compile; 1: plain MJCF."""

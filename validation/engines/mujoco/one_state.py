@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from fourbar.errors import InputError
 from fourbar.mjcf import Settings, mjcf
@@ -23,7 +24,7 @@ ACTS_ON = {2: [O2], 3: [O2, A], 4: [O4]}
 """Joints whose angle the driven bar's rotation is the sum of."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class MujocoOneState:
     """Forward dynamics at each position by itself, at one impedance or extrapolated from several."""
 
@@ -59,7 +60,9 @@ def extrapolated(impedances: tuple[float, ...], rungs: list[dict[str, Array]]) -
     return {name: sum(w * rung[name] for w, rung in zip(weights, rungs, strict=True)) for name in rungs[0]}  # type: ignore[misc]
 
 
-def _one_impedance(scene: Scene, command: Command, d: float, pad: float | None) -> tuple[dict[str, Array], Array]:
+def _one_impedance(
+    scene: Scene, command: Command, d: float, pad: float | None
+) -> tuple[dict[str, Array], NDArray[np.bool_]]:
     """Torque and pin forces at every position that assembles."""
     # no flywheel: the torque is on the driven bar itself
     settings = Settings(timestep=1e-3, impedance=d, pad=pad, flywheel=0.0)
@@ -67,7 +70,9 @@ def _one_impedance(scene: Scene, command: Command, d: float, pad: float | None) 
     position, n = loop.position(), len(command.theta_2)
     values = {"torque": np.full(n, np.nan), **{name: np.full((n, 2), np.nan) for name in ("F12", "F32", "F43", "F14")}}
     assembled = np.zeros(n, dtype=bool)
-    omega, alpha = (np.broadcast_to(np.asarray(x or 0.0, dtype=float), (n,)) for x in (command.omega_2, command.alpha_2))
+    omega, alpha = (
+        np.broadcast_to(np.asarray(x or 0.0, dtype=float), (n,)) for x in (command.omega_2, command.alpha_2)
+    )
     acts_on = ACTS_ON[scene.drive_bar]
     for i, (theta_2, branch) in enumerate(zip(command.theta_2.tolist(), command.branch.tolist(), strict=True)):
         found = position.find(theta_2, branch)

@@ -62,7 +62,7 @@ class Rig:
     """
 
     def __init__(self, scene: Scene, command: Command) -> None:
-        if scene.motion.free is not None or not np.any(command.omega_2) or np.ptp(command.theta_2) == 0.0:  # type: ignore[arg-type]
+        if scene.motion.free is not None or not np.any(command.omega_2) or np.ptp(command.theta_2) == 0.0:
             raise LimitError("nothing to run through in time: a sweep of theta_2 at omega_2 is needed")
         self.omega, self.alpha = float(np.max(command.omega_2)), float(np.max(command.alpha_2))  # type: ignore[arg-type]
         motion = replace(scene.motion, theta_2=command.theta_2, omega_2=self.omega, alpha_2=self.alpha)
@@ -207,5 +207,3 @@ class Rig:
                 return time.process_time() - began
 
         return clock
-
-

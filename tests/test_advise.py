@@ -1,0 +1,149 @@
+"""The advice: the figures it reaches, the file it writes, what it says where nothing serves, and its measure."""
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import fourbar
+from fourbar.scene import Command, command
+from tests.test_cost import turning
+from validation.cost import advise, dial, measure
+from validation.cost.errors import errors
+from validation.cost.exhaustive import cheapest
+from validation.engines.mujoco.closed_loop import O2, ClosedLoop
+from validation.engines.mujoco.trial import Rig
+from validation.judge import WITNESSES, judge
+from validation.results import FAILS
+from validation.suite.scenes import MODELS
+
+
+@pytest.mark.parametrize("omega", [10.0, 100.0, 1000.0])
+@pytest.mark.parametrize(("asked", "most"), [(1e-4, 75), (1e-6, 300), (2e-9, 1000)])
+def test_figures_of_the_crank_rocker(omega: float, asked: float, most: int) -> None:
+    advice = advise.advise(turning(omega, 72), asked)
+    assert advice.reached and advice.steps_per_revolution <= most, advice.reason
+    assert advice.best.errors.worst <= asked and advice.best.settings.integrator == "RK4"
+
+
+@pytest.mark.parametrize("name", ["double_rocker", "triple_rocker", "thesis"])
+def test_figures_of_rockers_and_the_thesis(name: str) -> None:
+    advice = advise.advise(fourbar.load(MODELS / f"{name}.toml"), 1e-5)
+    assert advice.reached and advice.best.steps <= 1000 and advice.steps_per_revolution <= 1000, advice.reason
+
+
+def test_the_file_alone_keeps_the_error(tmp_path: Path) -> None:
+    """What -o writes, loaded by nothing but its text: reset to the keyframe and stepped for a revolution."""
+    scene, out = tmp_path / "scene.toml", tmp_path / "out.xml"
+    scene.write_text(fourbar.dump(turning(positions=72)))
+    result = CliRunner().invoke(advise.command, [str(scene), "--error", "1e-5", "-o", str(out)], standalone_mode=False)
+    assert result.return_value == 0, result.output
+    loop = ClosedLoop(out.read_text())
+    mujoco.mj_resetDataKeyframe(loop.model, loop.data, 0)
+    steps = round(2.0 * math.pi / 10.0 / loop.model.opt.timestep)
+    rows: dict[str, list[object]] = {}
+    for _ in range(steps):
+        mujoco.mj_step(loop.model, loop.data)
+        loop.forward()
+        seen = {"theta_2": loop.data.qpos[O2], "omega_2": loop.data.qvel[O2], "alpha_2": loop.data.qacc[O2]}
+        for key, value in {**seen, "torque": loop.crank_torque(), **loop.forces()}.items():
+            rows.setdefault(key, []).append(value)
+    found = {key: np.array(values) for key, values in rows.items()}
+    at = Command(found["theta_2"], np.ones(steps, dtype=np.int8), found["omega_2"], found["alpha_2"])
+    assert steps < 100 and errors(turning(), at, found).worst <= 1e-5
+
+
+def test_out_of_reach_is_said_with_what_would_reach_it(tmp_path: Path) -> None:
+    scene = tmp_path / "scene.toml"
+    scene.write_text(fourbar.dump(turning(positions=12)))
+    out = tmp_path / "none.xml"
+    result = CliRunner().invoke(advise.command, [str(scene), "--error", "1e-14", "-o", str(out)], standalone_mode=False)
+    assert result.return_value == 1 and not out.exists()
+    assert "no setting of plain MJCF" in result.output and "inverse dynamics" in result.output
+    still = replace(turning(), motion=fourbar.Motion(1.0, 10.0))
+    scene.write_text(fourbar.dump(still))
+    result = CliRunner().invoke(advise.command, [str(scene), "--error", "1e-3"], standalone_mode=False)
+    assert result.return_value == 1 and "nothing to run through" in result.output
+
+
+@pytest.mark.parametrize("asked", [0.0, 1.0, -1e-3, math.nan])
+def test_an_error_is_between_0_and_1(asked: float) -> None:
+    with pytest.raises(fourbar.errors.InputError, match="above 0 and below 1"):
+        advise.advise(turning(), asked)
+    with pytest.raises(fourbar.errors.InputError, match="above 0 and below 1"):
+        dial.dialled(WITNESSES, asked)
+
+
+def test_unseen_linkages_are_served_and_not_at_three_times_the_cheapest() -> None:
+    """A few of those of `advise-study`, of every type, judged between the positions that the advice saw."""
+    costs = {("RK4", True): 1.0}
+    for index in range(3):
+        case = measure.case(99, index, costs)
+        assert case.met and case.cheap, case
+
+
+def test_the_search_knows_when_nothing_serves() -> None:
+    scene = turning(positions=12)
+    rig = Rig(scene, command(scene))
+    assert cheapest(rig, 1e-3, {("RK4", True): 1.0}) is not None
+    trials: list[object] = []
+    rig.try_out = lambda settings, build=None: trials.append(settings) or hopeless(scene)  # type: ignore[method-assign,func-returns-value]
+    assert cheapest(rig, 1e-3, {("RK4", True): 1.0}) is None and len(trials) > 50
+
+
+def hopeless(scene: fourbar.Scene) -> object:
+    made = Rig(scene, command(scene)).try_out(advise.dialled(10.0, 3.0))
+    made.broken = "lost"
+    return made
+
+
+def test_wilson() -> None:
+    # Brown, Cai, DasGupta, Statistical Science 16 (2001): bounds solve (p - x/n)^2 = z^2 p (1 - p)/n
+    for x, n in ((9, 10), (380, 400), (400, 400), (0, 5)):
+        p = measure.wilson(x, n)
+        assert (p - x / n) ** 2 == pytest.approx(measure.QUANTILE**2 * p * (1.0 - p) / n, abs=1e-15) and p <= x / n
+    assert measure.wilson(400, 400) >= measure.NEEDED_MET > measure.wilson(380, 400)
+
+
+def test_a_measure_is_resumed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    made: list[int] = []
+
+    def case(seed: int, index: int, costs: object) -> measure.Case:
+        made.append(index)
+        return measure.Case(index, "drag-link", 1.0, True, 2, 1e-3, True, 5e-4, 20.0, 19.0, 5)
+
+    monkeypatch.setattr(measure, "case", case)
+    monkeypatch.setattr(measure, "relative_costs", lambda rig: {})
+    out = tmp_path / "study.csv"
+    list(measure.measure(3, 2, out))
+    cases = list(measure.measure(3, 4, out))
+    assert made == [0, 1, 2, 3] and [each.index for each in cases] == made and all(each.met for each in cases)
+    made.clear()
+    list(measure.measure(4, 1, out))  # another seed starts over
+    assert made == [0]
+
+
+@pytest.mark.parametrize("asked", [1e-3, 1e-7])
+def test_a_run_is_no_more_precise_than_asked(asked: float) -> None:
+    scene = turning(positions=90)
+    witnesses = [witness for witness in WITNESSES if witness.through_time]
+    record = judge("s", scene, dial.dialled(witnesses, asked))
+    assert not [row for row in record.rows if row.verdict == FAILS]
+    (answer,) = record.answers
+    worst = max(row.error for row in record.rows if row.engine == "mujoco-simulated")
+    assert answer.evidence["asked_error"] == asked and answer.evidence["expected_error"] <= asked
+    # the engine's own prediction is what the formulas find, though it never saw them
+    assert worst == pytest.approx(answer.evidence["expected_error"], rel=0.5)
+    assert answer.evidence["steps"] < 628
+
+
+def test_exact_witnesses_stay_exact() -> None:
+    changed = [new for old, new in zip(WITNESSES, dial.dialled(WITNESSES, 1e-3), strict=True) if new != old]
+    assert [witness.name for witness in changed] == ["mujoco-simulated"]
+    assert changed[0].tolerance.factor == 1e-3 and changed[0].expected == next(
+        w.expected for w in WITNESSES if w.through_time
+    )
