@@ -1,0 +1,147 @@
+"""The harness alone against mutants of the formulas: no unit test takes part.
+
+Run in a tree that mutmut has generated, in which every mutant is switched on by its name. A mutant counts
+where it changes a number that `solve` or the energy method returns by more than 1e-9 of its scale (or
+what assembles, or which numbers exist, or raises); it is caught where a comparison then fails.
+"""
+
+import json
+import signal
+import sys
+from importlib import import_module
+from typing import Any
+
+import numpy as np
+
+from fourbar.scene import Command, Scene, command, solve
+from fourbar.solution import UNITS
+from validation.answer import Answer
+from validation.compare import compare
+from validation.identities import identities
+from validation.judge import WITNESSES, Witness
+from validation.results import FAILS
+
+CHANGES = 1e-9
+SECONDS = 20
+"""A mutant that computes longer than this hangs: the run would be stopped, which is a failure too."""
+MODULES = ("kinematics", "kinetostatics", "mobility", "transmission", "dynamics")
+SCENES = 10
+EXACT = ("pinocchio-inverse", "mujoco-inverse")
+
+
+class HangError(Exception):
+    """A mutant did not come back."""
+
+
+def mutants(module: str) -> list[str]:
+    """Full names of the mutants of a module."""
+    tables = [value for name, value in vars(import_module(module)).items() if name.endswith("__mutmut")]
+    return [f"{module}.{key}" for table in tables if isinstance(table, dict) for key in table if key != "_mutmut_orig"]
+
+
+def scenes() -> list[Scene]:
+    """Random linkages of every type, drive and branch, and a parallelogram beside and on its change point."""
+    from validation.hard.families import change_point, sweep_of
+    from validation.hard.linkages import dressed
+    from validation.suite.random import LinkageType, random_scene
+
+    chosen = [random_scene(0, index, tuple(LinkageType)) for index in range(SCENES)]
+    chosen.append(sweep_of(dressed((0.3, 0.1, 0.25, 0.22)), 12))
+    chosen += [scene for name, scene in change_point(distances=(1e-2, 1e-4)) if name.startswith(("par", "kite a = d"))]
+    return chosen
+
+
+def numbers(scene: Scene, at: Command) -> dict[str, Any]:
+    """Everything that the formulas and the energy method say of a scene."""
+    solution = solve(scene, "force", at=at)
+    said = {name: getattr(solution, name) for name in UNITS if getattr(solution, name) is not None}
+    energy = _energy().engine().answer(scene, at)
+    return {**said, "status": solution.status_code.astype(float), "energy": energy.quantities.get("torque")}
+
+
+def _energy() -> Witness:
+    return next(witness for witness in WITNESSES if witness.name == "energy-method")
+
+
+def changed(before: dict[str, Any], after: dict[str, Any]) -> bool:
+    """Whether any number differs by more than 1e-9 of its scale."""
+    for name, old in before.items():
+        new = after.get(name)
+        if old is None and new is None:
+            continue
+        if old is None or new is None or np.shape(old) != np.shape(new):
+            return True
+        if not np.array_equal(np.isnan(old), np.isnan(new)):
+            return True
+        scale = float(np.nanmax(np.abs(old), initial=0.0)) or 1.0
+        if np.nanmax(np.abs(new - old), initial=0.0) > CHANGES * scale:
+            return True
+    return False
+
+
+def caught(scene: Scene, at: Command, answers: list[tuple[Witness, Answer]]) -> bool:
+    """Whether any comparison or identity fails."""
+    solution = solve(scene, at=at)
+    rows = identities("", scene, at, solution)
+    for witness, answer in [*answers, (_energy(), _energy().engine().answer(scene, at))]:
+        rows += compare("", scene, answer, solution, witness.tolerance, witness.expected)
+    return any(row.verdict == FAILS for row in rows)
+
+
+def main(only: str, most: int) -> dict[str, dict[str, Any]]:
+    """Per module: mutants tried, those that change a number, those caught, and the names of the others."""
+    from mutmut.mutation.trampoline import set_mutant_under_test
+
+    def alarm(*_: object) -> None:
+        raise HangError
+
+    signal.signal(signal.SIGALRM, alarm)
+    set_mutant_under_test("")
+    cases = []
+    for scene in scenes():
+        at = command(scene)
+        answers = [(w, w.engine().answer(scene, at)) for w in WITNESSES if w.name in EXACT]
+        cases.append((scene, at, answers, numbers(scene, at)))
+        if caught(scene, at, answers):
+            raise RuntimeError(f"the harness fails without a mutant: {scene.title}")
+    result: dict[str, dict[str, Any]] = {}
+    for module in MODULES:
+        if only and only != module:
+            continue
+        names = mutants(f"fourbar.{module}")
+        if most and len(names) > most:
+            names = [names[i] for i in np.random.default_rng(0).choice(len(names), most, replace=False)]
+        tally: dict[str, Any] = {"mutants": len(names), "changing": 0, "caught": 0, "missed": []}
+        for name in names:
+            set_mutant_under_test(name)
+            verdict = _try(cases)
+            set_mutant_under_test("")
+            tally["changing"] += verdict is not None
+            tally["caught"] += bool(verdict)
+            if verdict is False:
+                tally["missed"].append(name)
+        result[module] = tally
+        print(module, {key: value for key, value in tally.items() if key != "missed"}, file=sys.stderr, flush=True)
+    return result
+
+
+def _try(cases: list[Any]) -> bool | None:
+    """None where nothing changes, else whether it is caught."""
+    differs = False
+    signal.alarm(SECONDS)
+    try:
+        with np.errstate(all="ignore"):
+            for scene, at, answers, before in cases:
+                if changed(before, numbers(scene, at)):
+                    differs = True
+                    if caught(scene, at, answers):
+                        return True
+    except Exception:  # a mutant that raises or hangs ends the run: that is noticed
+        return True
+    finally:
+        signal.alarm(0)
+    return False if differs else None
+
+
+if __name__ == "__main__":
+    print(json.dumps(main(sys.argv[1] if len(sys.argv) > 1 else "", int(sys.argv[2]) if len(sys.argv) > 2 else 0)))
