@@ -13,12 +13,17 @@ ENGINES = {"mujoco": "mujoco", "pinocchio": "pinocchio"}
 LAYERS = [
     ("errors",),
     ("linkage",),
-    ("margins", "kinematics"),
+    ("margins", "sixty_digits", "double_double"),
+    ("kinematics",),
+    ("bearing",),
     ("effects",),
-    ("kinetostatics", "mobility"),
+    ("mobility", "more_digits", "circuits", "linkage_type"),
+    ("transmission", "coefficients", "kinetostatics", "dynamics"),
+    ("scene",),
+    ("files", "mjcf", "plot", "animate", "tables"),
+    ("cli",),
 ]
 """Inside `fourbar`: none of these imports one that stands later; at import time or inside a function."""
-LATER = ("scene", "files", "mjcf", "plot", "cli", "animate")
 
 
 def imported(path: Path) -> set[str]:
@@ -69,7 +74,26 @@ def modules(layer: tuple[str, ...]) -> list[Path]:
 def test_layers_of_the_product() -> None:
     assert all(modules(layer) for layer in LAYERS)
     for number, layer in enumerate(LAYERS):
-        later = {name for above in LAYERS[number + 1 :] for name in above} | set(LATER)
+        later = {name for above in LAYERS[number + 1 :] for name in above}
         for path in modules(layer):
             known = {name.split(".")[1] for name in imported(path) if name.startswith("fourbar.")}
             assert not known & later, (path, known & later)
+
+
+def test_the_two_derivations_share_no_equation_of_motion() -> None:
+    """The energy method never imports Newton-Euler, nor the other way round."""
+    for path, other in (
+        (ROOT / "fourbar/dynamics.py", "kinetostatics"),
+        (ROOT / "fourbar/kinetostatics.py", "dynamics"),
+    ):
+        assert f"fourbar.{other}" not in imported(path)
+
+
+@pytest.mark.parametrize("name", ["compare", "tolerance", "report"])
+def test_what_judges_knows_no_engine(name: str) -> None:
+    paths = [*(ROOT / "validation").glob(f"{name}.py"), *(ROOT / "validation" / name).rglob("*.py")]
+    assert paths
+    for path in paths:
+        names = imported(path)
+        assert not {each for each in names if each.startswith("validation.engines")}, path
+        assert not {each.partition(".")[0] for each in names} & set(ENGINES), path
