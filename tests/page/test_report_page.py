@@ -43,6 +43,13 @@ return found.sort((a, b) => a[0] - b[0]).slice(0, 5);
 """
 
 
+def wait(driver, condition):
+    """What the condition gives once it holds: a body is unpacked in its own time."""
+    from selenium.webdriver.support.wait import WebDriverWait
+
+    return WebDriverWait(driver, LOADED).until(lambda _: condition())
+
+
 @pytest.mark.parametrize("dark", [False, True])
 def test_all_text_is_readable(browse, dark: bool) -> None:
     driver = browse(report(copies(2, failing=1))[1], dark=dark)
@@ -63,12 +70,10 @@ def test_a_number_leads_to_its_row(browse, count: int) -> None:
     target = link.get_attribute("href").rpartition("#")[2]
     assert count <= ALL_OPEN or not driver.find_elements("id", target)  # not unpacked yet
     driver.execute_script("arguments[0].click()", link)
-    driver.set_script_timeout(5)
-    driver.execute_async_script("const done = arguments[0]; setTimeout(done, 200)")
-    row = driver.find_element("id", target)
-    assert row.is_displayed()
-    top = driver.execute_script("return arguments[0].getBoundingClientRect().top", row)
-    assert 0 <= top <= 900
+    row = wait(driver, lambda: driver.find_element("id", target))
+    wait(driver, row.is_displayed)
+    position = "return arguments[0].getBoundingClientRect().top"
+    assert wait(driver, lambda: 0 <= driver.execute_script(position, row) <= 900)
     assert row.find_elements("tag name", "td")[0].text == target.removeprefix("row-")
 
 
@@ -87,8 +92,7 @@ def test_200_scenes_open_quickly_and_a_scene_when_asked(browse) -> None:
     scene = driver.find_element("id", "scene-7")
     assert not scene.find_elements("tag name", "svg")
     driver.execute_script("arguments[0].open = true", scene)
-    driver.execute_async_script("const done = arguments[0]; setTimeout(done, 300)")
-    assert len(scene.find_elements("tag name", "svg")) == 3
+    assert wait(driver, lambda: len(scene.find_elements("tag name", "svg")) == 3)
     assert scene.find_element("tag name", "table").is_displayed()
 
 
