@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: validate test models setup clean
+.PHONY: validate test long-test models setup clean
 
 validate: setup
 	$(BIN)/python -m validation run
@@ -14,6 +14,16 @@ test: setup
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/python -m pytest -n 2
+
+# hours: everything that `make test` samples, in full
+long-test: setup
+	KILLS=50 $(BIN)/python -m pytest tests/test_suite.py tests/test_dask.py
+	$(BIN)/python -m validation fuzz-files --count 100000
+	$(BIN)/python -m validation fuzz
+	$(BIN)/python -m validation stability
+	$(BIN)/python -m validation published
+	$(BIN)/python -m validation run --suite hard --out results/hard
+	$(BIN)/python -m validation run --random 1000 --out results/random
 
 models: setup
 	$(BIN)/python -m validation models
