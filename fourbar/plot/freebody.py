@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from fourbar.bearing import PIN_FORCE
 from fourbar.kinematics import State, centre_in_bar
 from fourbar.linkage import BAR_NAMES, FIRST_PIN, MOVING_BARS
 from fourbar.plot.curves import force_name, note
@@ -85,6 +86,7 @@ def _actions(view: View, state: State) -> Iterator[tuple[str, Recorder]]:
     for effect in view.scene.effects:
         recorder = Recorder(state)
         effect.add_wrenches(recorder, state)
+        effect.add_known(recorder, state, {name: getattr(view.here, name) for name in PIN_FORCE.values()})
         name = r"$m_#\,g$" if effect.key == "gravity" else effect.key
         yield name, recorder
 

@@ -73,6 +73,10 @@ class Recorder(Wrenches):
         fx, fy, x, y = (float(np.ravel(value)[0]) for value in (*force, *(arm or (0.0, 0.0))))
         self.forces.append((bar, (fx, fy), (x, y)))
 
+    def add_constant_force(self, bar: int, force: tuple[float, float], point: tuple[float, float]) -> None:
+        """A force of world axes at a point of the bar: drawn there, not as force and couple at the pin."""
+        self.add_force(bar, force, self.state.arm(bar, *point))
+
     def add_moment(self, bar: int, moment: Array | float) -> None:
         """A pure couple on a bar."""
         if bar != 1:
