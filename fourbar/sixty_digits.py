@@ -7,6 +7,8 @@ from fourbar.linkage import FourBar
 from fourbar.margins import TOUCHING, unit_of
 
 DIGITS = 60
+LAST_DIGITS = Decimal(10) ** (5 - DIGITS)
+"""What 60 digits leave of the limit position itself."""
 
 
 def decide(linkage: FourBar, theta_2: float, offset: Decimal | None) -> tuple[float, float]:
@@ -22,7 +24,9 @@ def decide(linkage: FourBar, theta_2: float, offset: Decimal | None) -> tuple[fl
         d, a, b, c = (Decimal(length) / unit for length in linkage.lengths)
         cosine = _cosine(Decimal(theta_2) - Decimal(linkage.ground_angle) + (offset or 0))
         squared = (d - a) ** 2 + 2 * a * d * (1 - cosine)
-        touching = Decimal(TOUCHING) * (a + b + c + d) * 2 * squared.sqrt()
+        # stated by its offset from a limit, a position beyond it does not assemble, however near it is
+        touch = Decimal(TOUCHING) if offset is None else LAST_DIGITS
+        touching = touch * (a + b + c + d) * 2 * squared.sqrt()
         factors = ((b + c) ** 2 - squared, squared - (b - c) ** 2)
         outer, inner = (float(Decimal(0) if -touching <= factor < 0 else factor) for factor in factors)
         return outer, inner

@@ -99,6 +99,18 @@ def test_positions_that_cannot_close_are_nan_and_say_so() -> None:
     assert np.isnan(state.angle(3)).tolist() == [False, True]
 
 
+@pytest.mark.parametrize("offset", [1e-6, 1e-12, 1e-20, 1e-40])
+def test_beyond_a_limit_nothing_assembles_however_near(offset: float) -> None:
+    link = fourbar.FourBar(0.5, fourbar.Bar(0.4), fourbar.Bar(0.3), fourbar.Bar(0.25), 0.2)
+    # the first limit ends the range in which the linkage closes, the second begins it
+    for limit, inside in ((1, -1.0), (2, 1.0)):
+        status = [
+            fourbar.solve(fourbar.Scene(link, fourbar.Motion(fourbar.FromLimit(limit, side * offset), 1.0))).status
+            for side in (inside, 0.0, -inside)
+        ]
+        assert status == [["ok"], ["singular"], ["not_assembled"]]
+
+
 @pytest.mark.parametrize("offset", [1e-6, 1e-12, 1e-20])
 def test_an_offset_from_a_limit_keeps_all_its_digits(offset: float) -> None:
     """Near a limit sin mu grows as the square root of the offset, however small."""

@@ -83,8 +83,8 @@ def bodies_of(scene: Scene, at: Command) -> FreeBodies:
 
 
 def import_cost() -> float:
-    """Milliseconds that `import fourbar` adds to `import numpy`, median over fresh interpreters."""
-    code = "import time, numpy; t = time.perf_counter(); import fourbar; print(time.perf_counter() - t)"
+    """CPU milliseconds that `import fourbar` adds to `import numpy`, median over fresh interpreters."""
+    code = "import time, numpy; t = time.process_time(); import fourbar; print(time.process_time() - t)"
     runs = [subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True) for _ in range(7)]
     return 1e3 * median(float(run.stdout) for run in runs)
 
