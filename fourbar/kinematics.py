@@ -360,7 +360,8 @@ def second_coefficients(state: State, first: FirstCoefficients) -> Vector:
     growth_2 = growth * growth
     turn, growing = ((d - a) * (d + a)) * growth, (a * d) * (diagonal.w - diagonal.v)
     turn /= diagonal.squared
-    growing /= diagonal.squared
+    with np.errstate(divide="ignore", invalid="ignore"):  # A on O4
+        growing /= diagonal.squared
     growing -= 2.0 * growth_2
     root = state.regular_root()
     growth_2 *= diagonal.squared
