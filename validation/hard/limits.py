@@ -13,7 +13,15 @@ import numpy as np
 from fourbar.linkage import Bar
 from fourbar.scene import Motion, Scene, command
 from validation.answer import Answer
-from validation.engines.mujoco.limits import FASTEST, HEAVIEST, NEAREST_TOGGLE, SLOWEST, Boundary, load_ratio
+from validation.engines.mujoco.limits import (
+    FASTEST,
+    HEAVIEST,
+    NEAREST_CENTRE,
+    NEAREST_TOGGLE,
+    SLOWEST,
+    Boundary,
+    load_ratio,
+)
 from validation.hard.families import dressed, linkage_of, loads, sweep_of, with_bars
 from validation.hard.linkages import at
 from validation.suite.random import LinkageType
@@ -96,6 +104,18 @@ def _compiles(inertia: float) -> bool:
     return True
 
 
+def _centre_kept(r: float) -> bool:
+    """Whether the compiled MJCF places a mass centre at this distance from its pin where it was put."""
+    import mujoco
+
+    from fourbar.mjcf import RECIPE, mjcf
+
+    base = _base()
+    scene = with_bars(base, output=replace(base.linkage.output, centre=(r, 0.5)))
+    model = mujoco.MjModel.from_xml_string(mjcf(scene, replace(RECIPE, timestep=1e-3), keyframe=False))
+    return int(model.body_sameframe[model.body("output").id]) == int(mujoco.mjtSameFrame.mjSAMEFRAME_NONE)
+
+
 def _proximal(mu: float) -> bool:
     """Whether Pinocchio's constrained acceleration is a number with this proximal parameter."""
     from validation.engines import pinocchio_released as forward
@@ -121,6 +141,7 @@ LIMITS = (
     _declared(FASTEST, 3e4, 3e5, _at_speed),
     _declared(SLOWEST, 1e-3, 1e-11, _crank_acceleration),
     _declared(HEAVIEST, 5e7, 1e9, _loaded),
+    _declared(NEAREST_CENTRE, 2e-6, 5e-7, _centre_kept),
     Limit(
         "mujoco-inverse and mujoco-simulated",
         "mass or inertia of a moving bar, least",

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.linkage import FourBar
+from fourbar.linkage import MOVING_BARS, FourBar
 from fourbar.mjcf import RECIPE
 from fourbar.mjcf.document import flywheel
 from fourbar.scene import Scene
@@ -51,15 +51,23 @@ HEAVIEST = Boundary(
     "1",
     "loads and weights beyond 1e8 times the inertial forces open the soft loop: its gap grows as their ratio",
 )
-BOUNDARIES = (NEAREST_TOGGLE, FASTEST, SLOWEST, HEAVIEST)
+NEAREST_CENTRE = Boundary(
+    "distance of a mass centre from the bar's first pin, least but 0",
+    2e-6,
+    "m",
+    "a centre nearer than about 1e-6 m to its pin is silently taken to lie on it (the compiler's sameframe)",
+)
 
 
 def too_fast_or_loaded(scene: Scene, speed: float) -> str | None:
-    """The limit of speed or load that a scene passes, or None; speed in rad/s."""
+    """The limit of speed, load or place of a centre that a scene passes, or None; speed in rad/s."""
     if speed > FASTEST.boundary:
         return FASTEST.reason
     if scene.linkage.input.length * speed**2 < SLOWEST.boundary:
         return SLOWEST.reason
+    centres = (abs(scene.linkage.bar(number).centre[0]) for number in MOVING_BARS)  # type: ignore[index]
+    if any(0.0 < r < NEAREST_CENTRE.boundary for r in centres):
+        return NEAREST_CENTRE.reason
     if load_ratio(scene) > HEAVIEST.boundary:
         return HEAVIEST.reason
     return None
