@@ -49,7 +49,8 @@ def run(
 
     What an interrupted run of the same suite with the same engines and versions left is kept.
     """
-    size = CHUNK[any(witness.name == "mujoco-simulated" for witness in witnesses)]
+    simulated = any(witness.name == "mujoco-simulated" for witness in witnesses)
+    size = CHUNK[simulated]
     chunks = [range(start, min(start + size, len(suite))) for start in range(0, len(suite), size)]
     draw = len(suite) <= SCENES_SHOWN
     identity = {
@@ -74,7 +75,7 @@ def run(
         write_about(about([witness.name for witness in witnesses], suite.fingerprint()), out)
         write_text(out / "timings.csv", timings_csv(store.pages(len(chunks))))
         write_text(out / "report.md", markdown(summary))
-        drawn, why_not = mjcf_pictures(suite) if draw else ({}, "")
+        drawn, why_not = mjcf_pictures(suite) if draw and simulated else ({}, "")
         write_text(out / "report.html", html(summary, first_lines, pictures=drawn, no_pictures=why_not))
         if isinstance(suite, Hard):
             from validation.hard.page import page, picture
