@@ -119,7 +119,33 @@ def heading(scene: Scene, solution: Solution) -> list[str]:
         worst = int(np.nanargmax(np.abs(solution.torque)))
         where = math.degrees(solution.theta_2[worst])
         lines.append(f"largest torque {solution.torque[worst]:.6g} N m at theta_2 = {where:.6g} deg")
+        lines += _warning(scene, solution)
     return lines
+
+
+def _warning(scene: Scene, solution: Solution) -> list[str]:
+    """Where the torque has few digits left, and how far from in line the two bars are that cost them."""
+    assert solution.torque is not None
+    if solution.torque_error is None or solution.drive_condition is None:
+        return []
+    # of torques that matter: one that passes through zero has no digits, and needs none
+    with np.errstate(invalid="ignore"):
+        share = solution.torque_error / np.maximum(np.abs(solution.torque), np.nanmedian(np.abs(solution.torque)))
+    if not np.nanmax(share, initial=0.0) > FEW_DIGITS:
+        return []
+    worst = int(np.nanargmax(share))
+    left = max(math.floor(-math.log10(share[worst])), 0)
+    where = f"at theta_2 = {math.degrees(solution.theta_2[worst]):.6g} deg"
+    sines = {"3 and 4": abs(solution.sin_mu[worst])}
+    if scene.drive_bar != 2:
+        sines[{3: "2 and 4", 4: "2 and 3"}[scene.drive_bar]] = solution.drive_condition[worst]
+    bars = min(sines, key=lambda pair: sines[pair])
+    gap = math.asin(min(sines[bars], 1.0))
+    return [f"{left} digits left of T{scene.drive_bar} {where}: bars {bars} are {gap:.2g} rad from being in line"]
+
+
+FEW_DIGITS = 1e-8
+"""Relative error of the torque above which the heading says so: half of what a double carries is lost."""
 
 
 def columns(solution: Solution, *, degrees: bool = True) -> dict[str, list[str]]:

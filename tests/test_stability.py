@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import fourbar
+from fourbar.tables import heading
 from validation.stability import FAMILIES, TOO_SMALL, Tally, run
 
 SAMPLES = 40
@@ -84,6 +85,18 @@ def test_a_tally_adds_up() -> None:
     for part in (range(5), range(5, 12)):
         parts.add(run("random", part))
     assert parts == whole
+
+
+def test_the_command_line_says_how_few_digits_are_left() -> None:
+    linkage = fourbar.uniform(0.3, 0.1, 0.25, 0.22)
+    dead = float(np.arccos((0.3**2 + 0.35**2 - 0.22**2) / (2 * 0.3 * 0.35)))  # bars 2, 3 in line
+    for angle, said in ((dead + 1e-11, True), (dead + 0.5, False)):
+        scene = fourbar.Scene(linkage, fourbar.Motion(angle, 10.0), drive_bar=4)
+        last = heading(scene, fourbar.solve(scene))[-1]
+        assert ("digits left of T4" in last and "bars 2 and 3" in last) is said
+    nothing = fourbar.FourBar(0.3, fourbar.Bar(0.1), fourbar.Bar(0.25), fourbar.Bar(0.22))
+    scene = fourbar.Scene(nothing, fourbar.Motion(1.0, 5.0))
+    assert "digits" not in heading(scene, fourbar.solve(scene))[-1]
 
 
 def test_error_bars_grow_towards_a_dead_centre() -> None:
