@@ -106,14 +106,12 @@ def _compiles(inertia: float) -> bool:
 
 def _centre_kept(r: float) -> bool:
     """Whether the compiled MJCF places a mass centre at this distance from its pin where it was put."""
-    import mujoco
-
     from fourbar.mjcf import RECIPE, mjcf
+    from validation.engines.mujoco.closed_loop import ClosedLoop
 
     base = _base()
     scene = with_bars(base, output=replace(base.linkage.output, centre=(r, 0.5)))
-    model = mujoco.MjModel.from_xml_string(mjcf(scene, replace(RECIPE, timestep=1e-3), keyframe=False))
-    return int(model.body_sameframe[model.body("output").id]) == int(mujoco.mjtSameFrame.mjSAMEFRAME_NONE)
+    return ClosedLoop(mjcf(scene, replace(RECIPE, timestep=1e-3), keyframe=False)).keeps_centre("output")
 
 
 def _proximal(mu: float) -> bool:

@@ -108,6 +108,10 @@ class ClosedLoop:
         motor = 0.0 if self.drive is None else self.data.actuator_force[self.drive]
         return float(flywheel + motor)
 
+    def keeps_centre(self, name: str) -> bool:
+        """Whether the compiler left a bar's mass centre where the file has it, and not at the bar's origin."""
+        return int(self.model.body_sameframe[self.body[name]]) == int(mujoco.mjtSameFrame.mjSAMEFRAME_NONE)
+
     def bad(self) -> int:
         """Warnings of a bad position, velocity or acceleration: each resets the data."""
         return sum(int(self.data.warning[kind].number) for kind in WARNINGS)
