@@ -2,7 +2,9 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -14,6 +16,7 @@ from fourbar.scene import Motion, Scene
 KEPT = Path(__file__).parent.parent.parent / "tests" / "counterexamples"
 DIGITS = (1, 2, 3, 6, 10)
 ROUNDS = 4
+BARS = ("input", "coupler", "output")
 
 
 def shrunk(scene: Scene, fails: Callable[[Scene], bool]) -> Scene:
@@ -33,25 +36,49 @@ def shrunk(scene: Scene, fails: Callable[[Scene], bool]) -> Scene:
 
 
 def _changes(scene: Scene) -> Iterator[Callable[[Scene], Scene | None]]:
-    yield lambda s: _at(s, 0)
-    yield lambda s: _at(s, 1)
+    yield partial(_at, k=0)
+    yield partial(_at, k=1)
     for k in range(len(scene.loads)):
-        yield lambda s, k=k: replace(s, loads=(*s.loads[:k], *s.loads[k + 1 :])) if k < len(s.loads) else None
+        yield partial(_without, part="loads", k=k)
     for k in range(len(scene.effects)):
-        yield lambda s, k=k: replace(s, effects=(*s.effects[:k], *s.effects[k + 1 :])) if k < len(s.effects) else None
-    yield lambda s: replace(s, motion=replace(s.motion, alpha_2=0.0))
-    yield lambda s: replace(s, motion=replace(s.motion, omega_2=1.0))
+        yield partial(_without, part="effects", k=k)
+    for plain in ({"alpha_2": 0.0}, {"omega_2": 1.0}, {"branch": 1}):
+        yield partial(_motion, plain=plain)
     yield lambda s: replace(s, drive_bar=2)
-    yield lambda s: replace(s, motion=replace(s.motion, branch=1))
     yield _without_ground_angle
-    for name in ("input", "coupler", "output"):
-        yield lambda s, name=name: _bar(s, name, lambda bar: Bar(bar.length))
-        yield lambda s, name=name: _bar(s, name, lambda bar: Bar(bar.length, 1.0))
+    for name in BARS:
+        yield partial(_bar, name=name, change=_massless)
+        yield partial(_bar, name=name, change=_uniform)
     for digits in DIGITS:
-        for name in ("input", "coupler", "output"):
-            yield lambda s, name=name, n=digits: _bar(s, name, lambda bar: replace(bar, length=_rounded(bar.length, n)))
-        yield lambda s, n=digits: replace(s, linkage=replace(s.linkage, ground=_rounded(s.linkage.ground, n)))
-        yield lambda s, n=digits: _angle(s, n)
+        for name in BARS:
+            yield partial(_bar, name=name, change=partial(_shorter, digits=digits))
+        yield partial(_ground, digits=digits)
+        yield partial(_angle, digits=digits)
+
+
+def _without(scene: Scene, part: str, k: int) -> Scene | None:
+    terms = getattr(scene, part)
+    return replace(scene, **{part: (*terms[:k], *terms[k + 1 :])}) if k < len(terms) else None
+
+
+def _motion(scene: Scene, plain: dict[str, Any]) -> Scene:
+    return replace(scene, motion=replace(scene.motion, **plain))
+
+
+def _massless(bar: Bar) -> Bar:
+    return Bar(bar.length)
+
+
+def _uniform(bar: Bar) -> Bar:
+    return Bar(bar.length, 1.0)
+
+
+def _shorter(bar: Bar, digits: int) -> Bar:
+    return replace(bar, length=_rounded(bar.length, digits))
+
+
+def _ground(scene: Scene, digits: int) -> Scene:
+    return replace(scene, linkage=replace(scene.linkage, ground=_rounded(scene.linkage.ground, digits)))
 
 
 def _bar(scene: Scene, name: str, change: Callable[[Bar], Bar]) -> Scene:

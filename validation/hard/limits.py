@@ -22,8 +22,8 @@ from validation.engines.mujoco.limits import (
     Boundary,
     load_ratio,
 )
-from validation.hard.families import dressed, linkage_of, loads, sweep_of, with_bars
-from validation.hard.linkages import at
+from validation.hard.families import loads, sweep_of, with_bars
+from validation.hard.linkages import at, dressed, linkage_of
 from validation.suite.random import LinkageType
 
 
