@@ -58,7 +58,8 @@ def _changes(scene: Scene) -> Iterator[Callable[[Scene], Scene | None]]:
 
 def _without(scene: Scene, part: str, k: int) -> Scene | None:
     terms = getattr(scene, part)
-    return replace(scene, **{part: (*terms[:k], *terms[k + 1 :])}) if k < len(terms) else None
+    fewer: dict[str, Any] = {part: (*terms[:k], *terms[k + 1 :])}
+    return replace(scene, **fewer) if k < len(terms) else None
 
 
 def _motion(scene: Scene, plain: dict[str, Any]) -> Scene:
