@@ -34,7 +34,7 @@ def identities(name: str, scene: Scene, at: Command, solution: Solution) -> list
 def _sums(name: str, scene: Scene, at: Command, solution: Solution) -> list[Row]:
     """F12 + F14 + sum of loads = sum of m a_G, and the moments of the same about O2 with the torque."""
     assert at.omega_2 is not None and solution.F12 is not None and solution.F14 is not None
-    assert solution.torque is not None
+    assert solution.torque is not None and solution.F32 is not None and solution.F43 is not None
     state = close_loop(scene.linkage, at.theta_2, at.branch)
     add_velocities(state, at.omega_2)
     add_accelerations(state, at.alpha_2)
