@@ -28,6 +28,8 @@ def test_figures_of_the_crank_rocker(omega: float, asked: float, most: int) -> N
     advice = advise.advise(turning(omega, 72), asked)
     assert advice.reached and advice.steps_per_revolution <= most, advice.reason
     assert advice.best.errors.worst <= asked and advice.best.settings.integrator == "RK4"
+    serves = [attempt for attempt in advice.attempts if attempt.errors.worst <= advise.MARGIN * asked]
+    assert advice.best.steps == min(attempt.steps for attempt in serves) < max(attempt.steps for attempt in serves)
 
 
 @pytest.mark.parametrize("name", ["double_rocker", "triple_rocker", "thesis"])

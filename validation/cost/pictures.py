@@ -91,7 +91,7 @@ def _work_precision(curves: Mapping[str, Sequence[Point]], quantity: str, title:
     axes.xaxis.label.set_fontsize(11)
     axes.yaxis.label.set_fontsize(11)
     axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=4, fontsize=8.5)
-    figure.text(0.02, 0.965, statement(curves, quantity), fontsize=12.5, weight="bold", va="center")
+    figure.text(0.02, 0.965, statement(curves, quantity), fontsize=12, weight="bold", va="center")
     figure.text(0.02, 0.928, title, fontsize=9.5, color="#666666", va="center")
     return figure
 
@@ -108,7 +108,7 @@ def _label_recommended(axes: Any, row: Sequence[Point], quantity: str) -> None:
         axes.annotate(
             f"{point.steps_per_revolution:.0f} steps, tc = {tc}",
             (1e3 * point.seconds_per_revolution, error),
-            xytext=(-10, -5) if left else (10, 3),
+            xytext=(-10, -5) if left else (12, 4),
             textcoords="offset points",
             ha="right" if left else "left",
             fontsize=8.5,
