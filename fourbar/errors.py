@@ -3,6 +3,10 @@
 __all__ = ["DependencyError", "FourBarError", "InputError", "LimitError", "NotAssembledError"]
 
 
+LONGEST_SHOWN = 160
+"""Characters of a value that an error repeats."""
+
+
 class FourBarError(Exception):
     """Root of every error that this package raises on purpose."""
 
@@ -21,8 +25,8 @@ class InputError(FourBarError):
     def __init__(self, key: str, value: object, allowed: str, file: str | None = None) -> None:
         self.key, self.value, self.allowed, self.file = key, value, allowed, file
         shown = repr(value)
-        if len(shown) > 80:
-            shown = shown[:77] + "..."
+        if len(shown) > LONGEST_SHOWN:  # of a long path the end says which
+            shown = f"{shown[: LONGEST_SHOWN // 2 - 3]}...{shown[-LONGEST_SHOWN // 2 :]}"
         where = f"{file}: " if file else ""
         super().__init__(f"{where}{key} = {shown}: {allowed}")
 

@@ -1,4 +1,4 @@
-"""Invariants of the mechanics over random linkages: each is a second derivation or a symmetry, never the formula again."""
+"""Invariants of the mechanics over random linkages: a symmetry or a second derivation, never the formula again."""
 
 import math
 from dataclasses import replace
@@ -231,7 +231,7 @@ def test_mirror_symmetry(scene: Scene) -> None:
 @EXAMPLES
 @given(scenes(), st.integers(-20, 20), st.integers(-20, 20), st.integers(-20, 20))
 def test_length_mass_and_time_scale(scene: Scene, length: int, mass: int, time: int) -> None:
-    """By powers of two, which round nothing: forces scale as m L/t^2 and torques as m L^2/t^2, to the last bit or so."""
+    """By powers of two, which round nothing: forces scale as m L/t^2, torques as m L^2/t^2."""
     L, M, T = 2.0**length, 2.0**mass, 2.0**time
     force, torque = M * L / T**2, M * L * L / T**2
     link, m = scene.linkage, scene.motion

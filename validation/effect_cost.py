@@ -85,6 +85,13 @@ def costs(engines: tuple[str, ...], effects: tuple[str, ...], workers: int) -> I
         yield from pool.map(lambda pair: cost(*pair), pairs)
 
 
+WORKLOADS = (
+    *("__init__.py", "effect_work.py", "engines/__init__.py"),
+    *("engines/mujoco/__init__.py", "engines/mujoco/stepping.py"),
+)
+"""Of the harness, what runs a workload; it names no effect but those it is asked for."""
+
+
 def build(folder: Path, without: str | None = None) -> Path:
     """A copy of the package and of the workloads; one that has never heard of an effect where one is named.
 
@@ -93,9 +100,10 @@ def build(folder: Path, without: str | None = None) -> Path:
     root = Path(__file__).parent.parent
     copy = folder / "fourbar"
     shutil.copytree(root / "fourbar", copy, ignore=shutil.ignore_patterns("__pycache__", "page", "plot"))
-    (folder / "validation").mkdir()
-    for file in ("__init__.py", "effect_work.py"):
-        shutil.copy(root / "validation" / file, folder / "validation")
+    for file in WORKLOADS:
+        target = folder / "validation" / file
+        target.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(root / "validation" / file, target)
     if without is None:
         return folder
     name, module = REGISTRY[without].__name__, REGISTRY[without].__module__.rpartition(".")[2]

@@ -58,17 +58,13 @@ def formulas(effect: str) -> Callable[[int], Any]:
 
 def simulated(effect: str) -> Callable[[int], Any]:
     """Steps of the generated MJCF, as many as asked."""
-    import mujoco
-
     from fourbar.mjcf import mjcf
+    from validation.engines.mujoco.stepping import steps
 
     text = mjcf(scene("none" if effect == DEFAULT_FLAGS else effect, 91))
     if effect == DEFAULT_FLAGS:
         text = re.sub(r"<flag [^>]*/>", "", text)
-    model = mujoco.MjModel.from_xml_string(text)
-    data = mujoco.MjData(model)
-    mujoco.mj_resetDataKeyframe(model, data, 0)
-    return lambda amount: mujoco.mj_step(model, data, amount)
+    return steps(text)
 
 
 def inverse(adapter: str) -> Callable[[str], Callable[[int], Any]]:
