@@ -110,7 +110,7 @@ class ClosedLoop:
 
     def keeps_centre(self, name: str) -> bool:
         """Whether the compiler left a bar's mass centre where the file has it, and not at the bar's origin."""
-        return int(self.model.body_sameframe[self.body[name]]) == int(mujoco.mjtSameFrame.mjSAMEFRAME_NONE)
+        return int(self.model.body_sameframe[self.body[name]]) != int(mujoco.mjtSameFrame.mjSAMEFRAME_BODY)
 
     def bad(self) -> int:
         """Warnings of a bad position, velocity or acceleration: each resets the data."""
