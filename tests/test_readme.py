@@ -65,7 +65,7 @@ def test_the_scene_file_is_one(checkout: Path) -> None:
 
 
 def test_every_command_of_the_harness_is_listed() -> None:
-    table = TEXT[TEXT.index("| `python -m validation` |") : TEXT.index("A suite is run in parallel")]
+    table = TEXT[TEXT.index("| `python -m validation` |") : TEXT.index("The columns of the results:")]
     listed = re.findall(r"`([a-z-]+)[^`]*`", "".join(line.split("|")[1] for line in table.splitlines()[2:] if line))
     assert sorted(listed) == sorted(COMMANDS)
 
