@@ -18,7 +18,14 @@ SECONDS_PER_SCENE = 60.0
 """A scene takes 0.05 to 3 s; one that takes longer than this hangs."""
 IN_FLIGHT = 4
 """Chunks submitted per worker: enough to keep it busy, few enough to keep the memory bounded."""
+STALL = 20.0
+"""Seconds in which no worker takes up any of the waiting chunks: one was killed while it held the
+lock of the queue that they share, and the pool is made anew."""
 Chunk = tuple[int, range]
+
+
+class StalledError(Exception):
+    """The workers no longer take up tasks."""
 
 
 def part(suite: Suite, scenes: Sequence[int]) -> tuple[Suite, Sequence[int]]:
@@ -44,6 +51,19 @@ def over_processes(
     suite: Suite, chunks: Iterable[Chunk], witnesses: Sequence[Witness], draw: bool, workers: int
 ) -> Iterator[tuple[int, list[Page]]]:
     """Over processes of this machine."""
+    left = dict(chunks)
+    while left:
+        try:
+            for number, pages in _over_one_pool(suite, list(left.items()), witnesses, draw, workers):
+                yield number, pages
+                del left[number]
+        except StalledError:
+            continue
+
+
+def _over_one_pool(
+    suite: Suite, chunks: Iterable[Chunk], witnesses: Sequence[Witness], draw: bool, workers: int
+) -> Iterator[tuple[int, list[Page]]]:
     from multiprocessing import get_context
 
     from pebble import ProcessPool
@@ -102,13 +122,27 @@ def _as_done(
                 under_way[submit(chunk[1], witnesses)] = chunk
         if not under_way:
             return
-        done, _ = wait(under_way, return_when=FIRST_COMPLETED)
+        done, _ = wait(under_way, STALL, FIRST_COMPLETED)
+        if not done and not any(future.running() for future in under_way):
+            raise StalledError
         for future in done:
             number, scenes = under_way.pop(future)
             try:
                 yield number, future.result()
+            except StalledError:
+                raise
             except Exception:  # the worker died or hung; find out on whose account
                 yield number, [_alone(suite, scene, witnesses, submit) for scene in scenes]
+
+
+def _outcome(future: "Future[list[Page]]") -> list[Page]:
+    """The result of a task, or StalledError where no worker takes it up."""
+    while True:
+        wait([future], STALL)
+        if future.done():
+            return future.result()
+        if not future.running():
+            raise StalledError
 
 
 def _alone(
@@ -119,7 +153,9 @@ def _alone(
 ) -> Page:
     """One scene by itself, and if that breaks down too, one engine at a time."""
     try:
-        return submit([scene], witnesses).result()[0]
+        return _outcome(submit([scene], witnesses))[0]
+    except StalledError:
+        raise
     except Exception:
         pass
     name = plain(suite.name(scene))
@@ -127,7 +163,9 @@ def _alone(
     lost = []
     for asked in ([], *([witness] for witness in witnesses)):
         try:
-            part = submit([scene], asked).result()[0]
+            part = _outcome(submit([scene], asked))[0]
+        except StalledError:
+            raise
         except Exception as error:
             lost.append(breakdown(name, asked[0].name if asked else "formulas", error))
             continue
