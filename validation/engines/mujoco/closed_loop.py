@@ -115,3 +115,42 @@ class ClosedLoop:
     def bad(self) -> int:
         """Warnings of a bad position, velocity or acceleration: each resets the data."""
         return sum(int(self.data.warning[kind].number) for kind in WARNINGS)
+
+
+def couple_elsewhere(
+    loop: ClosedLoop, light: ClosedLoop, drive_bar: int, alpha_2: float, crank_torque: float
+) -> float | None:
+    """The couple on bar 3 or 4 with which the crank accelerates as it did, or None where it does not move the crank.
+
+    The accelerations are linear in the couple; two trials give it, and `light` is left at a third, to be read.
+
+    Parameters
+    ----------
+    loop : at the simulated state.
+    light : the same linkage with a light flywheel.
+    alpha_2 : what the flywheel's motor was told, rad/s^2.
+    crank_torque : T2 at that state, N m: the size of the trials.
+    """
+    d = light.data
+    d.qpos[:], d.qvel[:] = loop.data.qpos[: d.qpos.size], loop.data.qvel[: d.qvel.size]  # a drive may have its own
+    happened = loop.data.qacc[O2]
+    # the light flywheel's motor gives it alpha_2 as commanded; this gives it what the crank really had
+    correction = light.model.dof_armature[O2] * (happened - alpha_2)
+    acts_on = [O2, A] if drive_bar == 3 else [O4]
+    speed = sum(d.qvel[dof] for dof in acts_on)
+    guess = crank_torque * d.qvel[O2] / speed if speed else crank_torque
+    trials = (0.5 * guess, 1.5 * guess) if guess else (-1.0, 1.0)
+
+    def crank_acceleration(couple: float) -> float:
+        d.qfrc_applied[:] = (correction, 0.0, 0.0)
+        d.qfrc_applied[acts_on] += couple
+        mujoco.mj_forward(light.model, d)
+        return float(d.qacc[O2])
+
+    low, high = (crank_acceleration(couple) for couple in trials)
+    if high == low:
+        return None
+    couple = trials[0] + (trials[1] - trials[0]) * (happened - low) / (high - low)
+    crank_acceleration(couple)
+    mujoco.mj_rnePostConstraint(light.model, d)
+    return float(couple)

@@ -13,7 +13,7 @@ from fourbar.mjcf import RECIPE, Run, Settings, mjcf, run_through
 from fourbar.scene import Command, Scene
 from validation.answer import Answer
 from validation.engines.loop import Position
-from validation.engines.mujoco.closed_loop import O2, O4, A, ClosedLoop
+from validation.engines.mujoco.closed_loop import O2, O4, A, ClosedLoop, couple_elsewhere
 from validation.engines.mujoco.limits import NEAREST_TOGGLE, least_sine, too_fast_or_loaded
 from validation.engines.mujoco.watch import Watch, alarms
 
@@ -242,33 +242,11 @@ class _Simulation:
             self.predicted[name][index] = error
 
     def _drive_elsewhere(self, loop: ClosedLoop, light: ClosedLoop, crank_torque: float) -> float:
-        """The couple on bar 3 or 4 with which the crank accelerates as it did, at the simulated state.
-
-        The accelerations are linear in the couple; two trials give it, a third is what is read.
-        """
-        d = light.data
-        d.qpos[:], d.qvel[:] = loop.data.qpos, loop.data.qvel
-        alpha_2 = loop.data.qacc[O2]
-        # the light flywheel's motor gives it alpha_2 as commanded; this gives it what the crank really had
-        correction = light.model.dof_armature[O2] * (alpha_2 - self.alpha)
-        acts_on = [O2, A] if self.scene.drive_bar == 3 else [O4]
-        speed = sum(d.qvel[dof] for dof in acts_on)
-        trial = crank_torque * d.qvel[O2] / speed if speed else crank_torque
-        trials = (0.5 * trial, 1.5 * trial) if trial else (-1.0, 1.0)
-
-        def crank_acceleration(couple: float) -> float:
-            d.qfrc_applied[:] = (correction, 0.0, 0.0)
-            d.qfrc_applied[acts_on] += couple
-            mujoco.mj_forward(light.model, d)
-            return float(d.qacc[O2])
-
-        low, high = (crank_acceleration(couple) for couple in trials)
-        if high == low:
+        """The couple on bar 3 or 4, or LimitError at a pole of the torque."""
+        couple = couple_elsewhere(loop, light, self.scene.drive_bar, self.alpha, crank_torque)
+        if couple is None:
             raise LimitError(f"the couple on bar {self.scene.drive_bar} does not move the input: a pole of the torque")
-        couple = trials[0] + (trials[1] - trials[0]) * (alpha_2 - low) / (high - low)
-        crank_acceleration(couple)
-        mujoco.mj_rnePostConstraint(light.model, d)
-        return float(couple)
+        return couple
 
     def _watch(self, loop: ClosedLoop, run: Run, expected_time: float) -> None:
         """Keep the worst of what the engine says of itself."""

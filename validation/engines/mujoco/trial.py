@@ -16,7 +16,7 @@ from fourbar.errors import LimitError
 from fourbar.mjcf import Settings, mjcf, run_through
 from fourbar.scene import Command, Scene
 from validation.answer import Array
-from validation.engines.mujoco.closed_loop import O2, O4, A, ClosedLoop
+from validation.engines.mujoco.closed_loop import O2, ClosedLoop, couple_elsewhere
 
 LIGHT_FLYWHEEL = 1e4
 """Flywheel of the model that is asked for T3 or T4: heavy enough to keep the closure's softness
@@ -157,7 +157,9 @@ class Rig:
             motion["torque"][row] = loop.crank_torque()
             read = loop.forces
             if light is not None:
-                motion["torque"][row] = self._drive_elsewhere(loop, light, motion["torque"][row])
+                crank = float(motion["torque"][row])
+                couple = couple_elsewhere(loop, light, self.scene.drive_bar, self.alpha, crank)
+                motion["torque"][row] = np.nan if couple is None else couple
                 read = light.forces
             for name, force in read().items():
                 forces[name][row] = force
@@ -165,32 +167,6 @@ class Rig:
             trial.reading += time.process_time() - stepped
         trial.steps += done
         trial.steps_per_revolution = max(trial.steps_per_revolution, 2.0 * np.pi / run.fastest / timestep)
-
-    def _drive_elsewhere(self, loop: ClosedLoop, light: ClosedLoop, crank_torque: float) -> float:
-        """The couple on bar 3 or 4 with which the crank accelerates as it did: linear in the couple, so two trials."""
-        d = light.data
-        d.qpos[:], d.qvel[:] = loop.data.qpos[: d.qpos.size], loop.data.qvel[: d.qvel.size]  # a drive may have its own
-        alpha_2 = loop.data.qacc[O2]
-        # the light flywheel's motor gives it alpha_2 as commanded; this gives it what the crank really had
-        correction = light.model.dof_armature[O2] * (alpha_2 - self.alpha)
-        acts_on = [O2, A] if self.scene.drive_bar == 3 else [O4]
-        speed = sum(d.qvel[dof] for dof in acts_on)
-        guess = crank_torque * d.qvel[O2] / speed if speed else crank_torque
-        trials = (0.5 * guess, 1.5 * guess) if guess else (-1.0, 1.0)
-
-        def crank_acceleration(couple: float) -> float:
-            d.qfrc_applied[:] = (correction, 0.0, 0.0)
-            d.qfrc_applied[acts_on] += couple
-            mujoco.mj_forward(light.model, d)
-            return float(d.qacc[O2])
-
-        low, high = (crank_acceleration(couple) for couple in trials)
-        if high == low:
-            return float("nan")  # a pole of the torque: the couple does not move the input
-        couple = trials[0] + (trials[1] - trials[0]) * (alpha_2 - low) / (high - low)
-        crank_acceleration(couple)
-        mujoco.mj_rnePostConstraint(light.model, d)
-        return float(couple)
 
     def seconds_per_step(self, settings: Settings, build: Build | None = None) -> Callable[[int], float]:
         """CPU seconds of a number of steps from the start of the longest stretch; each call starts there again."""
