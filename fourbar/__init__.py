@@ -8,11 +8,11 @@ from fourbar.errors import InputError as InputError
 from fourbar.linkage import Bar as Bar
 from fourbar.linkage import FourBar as FourBar
 from fourbar.linkage import uniform as uniform
-from fourbar.scene import Free as Free
-from fourbar.scene import FromLimit as FromLimit
-from fourbar.scene import Motion as Motion
+from fourbar.motion import Free as Free
+from fourbar.motion import FromLimit as FromLimit
+from fourbar.motion import Motion as Motion
+from fourbar.motion import Sweep as Sweep
 from fourbar.scene import Scene as Scene
-from fourbar.scene import Sweep as Sweep
 from fourbar.scene import command as command
 from fourbar.scene import solve as solve
 from fourbar.solution import Solution as Solution

@@ -190,7 +190,7 @@ def _named(path: Path) -> Iterator[None]:
 
 def _load(path: Path) -> "Scene":
     from fourbar.files import load
-    from fourbar.scene import Free, Sweep
+    from fourbar.motion import Free, Sweep
 
     scene = load(path)
     for key, asked in (("motion.theta_2", scene.motion.theta_2), ("motion.free", scene.motion.free)):

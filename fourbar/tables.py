@@ -11,7 +11,8 @@ import numpy as np
 
 from fourbar.kinematics import Array
 from fourbar.linkage import BAR_NAMES
-from fourbar.scene import OPEN, Scene
+from fourbar.motion import OPEN
+from fourbar.scene import Scene
 from fourbar.solution import STATUS_NAMES, UNITS, VECTORS, Solution
 
 if TYPE_CHECKING:

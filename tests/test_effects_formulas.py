@@ -12,8 +12,9 @@ from fourbar.dynamics import path
 from fourbar.effects import Flywheel, Friction, Gravity, Load, PinFriction, Point, Spring, Springs, Table, Torsion
 from fourbar.effects.cones import NONE, ONE, SEVERAL, settle
 from fourbar.errors import InputError, LimitError
+from fourbar.motion import Motion, Sweep
 from fourbar.motion_law import Law
-from fourbar.scene import Motion, Scene, Sweep, solve
+from fourbar.scene import Scene, solve
 from tests.scenes import crank_rocker
 
 SECOND_ORDER = 1e-8

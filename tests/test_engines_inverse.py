@@ -10,7 +10,8 @@ import pytest
 from fourbar.effects import Friction, Gravity, Load, Viscous
 from fourbar.errors import InputError
 from fourbar.linkage import Bar, FourBar
-from fourbar.scene import Command, Motion, Scene, command, solve
+from fourbar.motion import Motion
+from fourbar.scene import Command, Scene, command, solve
 from validation.compare import COMPARED, closure, compare
 from validation.engines import loop
 from validation.engines.mujoco.inverse import LEAST, MujocoInverse, MujocoTree

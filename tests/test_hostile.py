@@ -63,7 +63,7 @@ class Named:
 
     def scene(self, index: int) -> Scene:
         text = self.texts[index]
-        motion = fourbar.Motion(fourbar.scene.Sweep(0.1, 1.0, 3), 1.0)
+        motion = fourbar.Motion(fourbar.Sweep(0.1, 1.0, 3), 1.0)
         return crank_rocker(title=text, source=text, motion=motion)
 
     def fingerprint(self) -> str:

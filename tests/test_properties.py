@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 import fourbar
 from fourbar.effects import Gravity, Load, Viscous
 from fourbar.linkage import MOVING_BARS, Bar, FourBar
-from fourbar.scene import Motion, Scene
+from fourbar.motion import Motion
+from fourbar.scene import Scene
 from fourbar.solution import Solution
 
 WORST_CONDITION = 0.2

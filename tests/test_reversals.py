@@ -7,7 +7,8 @@ import pytest
 
 import fourbar
 from fourbar.effects import Friction
-from fourbar.scene import Motion, Scene, Sweep, command, solve
+from fourbar.motion import Motion, Sweep
+from fourbar.scene import Scene, command, solve
 from validation.judge import WITNESSES, judge
 from validation.reversals import broken, reversals
 

@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 
 from fourbar.effects import Gravity
 from fourbar.linkage import MOVING_BARS, Bar, FourBar
-from fourbar.scene import Command, Motion, Scene, solve
+from fourbar.motion import Motion
+from fourbar.scene import Command, Scene, solve
 from fourbar.solution import VECTORS
 from validation.thirteen import FreeBodies, solve_thirteen
 

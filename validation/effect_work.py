@@ -10,7 +10,8 @@ from typing import Any
 from fourbar import effects as kinds
 from fourbar.effects import Effect, Load
 from fourbar.linkage import Bar, FourBar
-from fourbar.scene import Motion, Scene, Sweep, command, solve
+from fourbar.motion import Motion, Sweep
+from fourbar.scene import Scene, command, solve
 
 EFFECTS: dict[str, Callable[[], Effect | None]] = {
     "none": lambda: None,

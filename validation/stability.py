@@ -15,7 +15,8 @@ import numpy as np
 
 from fourbar.effects import Friction, Gravity, Load, Viscous
 from fourbar.linkage import MOVING_BARS, PINS, Bar, FourBar
-from fourbar.scene import Command, Motion, Scene, solve
+from fourbar.motion import Motion
+from fourbar.scene import Command, Scene, solve
 from fourbar.solution import OK, UNITS, VECTORS
 from validation.reference import reference
 

@@ -4,7 +4,8 @@ import math
 
 from fourbar.linkage import FourBar, uniform
 from fourbar.mobility import default_range
-from fourbar.scene import Motion, Scene
+from fourbar.motion import Motion
+from fourbar.scene import Scene
 
 PER_METRE = 1.0
 """kg/m of the uniform bars."""

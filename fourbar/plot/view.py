@@ -8,7 +8,8 @@ import numpy as np
 from fourbar.effects.wrenches import Wrenches
 from fourbar.errors import InputError, NotAssembledError
 from fourbar.kinematics import Array, State, Vector, add_accelerations, add_velocities, close_loop
-from fourbar.scene import Command, FromLimit, Scene, command, solve
+from fourbar.motion import FromLimit
+from fourbar.scene import Command, Scene, command, solve
 from fourbar.solution import Solution
 
 LEAD = math.radians(60.0)

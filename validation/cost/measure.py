@@ -12,7 +12,8 @@ import numpy as np
 
 from fourbar.errors import LimitError
 from fourbar.mobility import turns_fully
-from fourbar.scene import Motion, Scene, Sweep, command
+from fourbar.motion import Motion, Sweep
+from fourbar.scene import Scene, command
 from validation.cost.advise import advise, judged
 from validation.cost.exhaustive import cheapest, relative_costs
 from validation.engines.mujoco.trial import Rig

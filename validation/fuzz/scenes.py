@@ -8,7 +8,8 @@ import numpy as np
 from fourbar.effects import Friction, Gravity, Load, Viscous
 from fourbar.errors import InputError
 from fourbar.linkage import MOVING_BARS, PINS, Bar, FourBar
-from fourbar.scene import Motion, Scene
+from fourbar.motion import Motion
+from fourbar.scene import Scene
 
 POSITIONS = 2
 RANGES: dict[str, tuple[float, float]] = {"ordinary": (-0.7, 0.7), "adversarial": (-6.0, 6.0)}

@@ -11,7 +11,8 @@ import numpy as np
 from fourbar.errors import FourBarError
 from fourbar.files import save
 from fourbar.linkage import Bar, FourBar
-from fourbar.scene import Motion, Scene
+from fourbar.motion import Motion
+from fourbar.scene import Scene
 
 KEPT = Path(__file__).parent.parent.parent / "tests" / "counterexamples"
 DIGITS = (1, 2, 3, 6, 10)

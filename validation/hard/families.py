@@ -8,7 +8,8 @@ import numpy as np
 
 from fourbar.effects import Gravity
 from fourbar.linkage import Bar, FourBar
-from fourbar.scene import Free, Motion, Scene, Sweep
+from fourbar.motion import Free, Motion, Sweep
+from fourbar.scene import Scene
 from validation.hard.linkages import Lengths, at, collinear_2_3, collinear_3_4, dressed, linkage_of, parallel_2_4
 from validation.suite.random import LinkageType
 

@@ -11,7 +11,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fourbar.linkage import Bar
-from fourbar.scene import Motion, Scene, command
+from fourbar.motion import Motion
+from fourbar.scene import Scene, command
 from validation.answer import Answer
 from validation.engines.mujoco.limits import (
     FASTEST,

@@ -7,7 +7,8 @@ import numpy as np
 
 from fourbar.effects import Gravity, Load
 from fourbar.linkage import Bar, FourBar
-from fourbar.scene import Motion, Scene
+from fourbar.motion import Motion
+from fourbar.scene import Scene
 from validation.suite.random import LinkageType, random_lengths
 
 Lengths = tuple[float, float, float, float]

@@ -8,7 +8,8 @@ import numpy as np
 from fourbar.effects import Gravity, Load
 from fourbar.linkage import Bar, FourBar
 from fourbar.mobility import default_range
-from fourbar.scene import CROSSED, OPEN, Motion, Scene, Sweep
+from fourbar.motion import CROSSED, OPEN, Motion, Sweep
+from fourbar.scene import Scene
 
 
 class LinkageType(Enum):

@@ -1,0 +1,147 @@
+"""One block of positions at a time, stage by stage: what `solve` runs over a scene."""
+
+from collections.abc import Callable, Iterator, Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fourbar.kinematics import Array, State, Vector, add_accelerations, add_velocities, centre_in_bar, close_loop
+from fourbar.kinetostatics import drive_sine, solve_pins, torque_interval
+from fourbar.margins import U, diagonal_to_O4
+from fourbar.more_digits import needing_more_digits, restated, rounded
+from fourbar.solution import NOT_ASSEMBLED, OF_DRY_FRICTION, SINGULAR, STAGE_OF
+
+if TYPE_CHECKING:
+    from fourbar.scene import Command, Scene
+
+ALL = slice(None)
+BLOCK = 15 * 1024
+"""Positions evaluated at a time, measured: fewer pay for calls; from 128 KiB an array on, the C library maps fresh
+pages for each."""
+
+LIVE_ARRAYS = 96
+"""More than a block ever holds at once."""
+
+
+def warm_heap() -> Array:
+    """Memory for the arrays of a block, freed below a small array that is kept.
+
+    The C library returns the free top of its heap to the system, and the next block would fault
+    every page in again: three times the cost of the arithmetic. The array on top prevents that.
+    """
+    ballast = [np.empty(BLOCK) for _ in range(LIVE_ARRAYS)]
+    lid = np.empty(BLOCK)  # too large for a hole further down
+    del ballast
+    return lid
+
+
+KINEMATIC: dict[str, Callable[[State], Array | Vector | float | None]] = {
+    "theta_3": lambda state: state.angle(3),
+    "theta_4": lambda state: state.angle(4),
+    "sin_mu": lambda state: state.sin_mu,
+    "condition": lambda state: np.abs(state.sin_mu),
+    "A": lambda state: state.pin("A"),
+    "B": lambda state: state.pin("B"),
+    "G2": lambda state: state.point(2, *centre_in_bar(state.linkage.input)),
+    "G3": lambda state: state.point(3, *centre_in_bar(state.linkage.coupler)),
+    "G4": lambda state: state.point(4, *centre_in_bar(state.linkage.output)),
+    "omega_2": lambda state: state.omega_2,
+    "omega_3": lambda state: state.omega_3,
+    "omega_4": lambda state: state.omega_4,
+    "alpha_2": lambda state: state.alpha_2,
+    "alpha_3": lambda state: state.alpha_3,
+    "alpha_4": lambda state: state.alpha_4,
+    "a_A": lambda state: state.acceleration(2, state.linkage.input.length, 0.0),
+    "a_B": lambda state: state.acceleration(4, state.linkage.output.length, 0.0),
+    "a_G2": lambda state: state.acceleration(2, *centre_in_bar(state.linkage.input)),
+    "a_G3": lambda state: state.acceleration(3, *centre_in_bar(state.linkage.coupler)),
+    "a_G4": lambda state: state.acceleration(4, *centre_in_bar(state.linkage.output)),
+}
+"""The quantities up to the acceleration, from the state of the stage that they belong to."""
+
+
+def solve_block(
+    scene: "Scene", where: "Command", part: slice, wanted: int, out: Mapping[str, Array]
+) -> NDArray[np.uint8]:
+    """Evaluate one block of positions into the result arrays; its status codes."""
+    theta_2, branch = where.theta_2[part], where.branch[part]
+    motion = (_piece(where.omega_2, part), _piece(where.alpha_2, part))
+    if where.remainder is None:
+        state = close_loop(scene.linkage, theta_2, branch)
+    else:
+        exact = diagonal_to_O4(scene.linkage, theta_2, where.remainder)
+        state = close_loop(scene.linkage, theta_2, branch, exact)
+    friction = np.zeros(theta_2.shape, dtype=np.uint8)
+    for name, value in _evaluate(scene, state, *motion, wanted, out):
+        if name == "status":
+            friction[:] = value
+        else:
+            _put(out[name], value)
+    if (hard := needing_more_digits(state)).size:
+        for name, value in _evaluate(scene, *restated(state, *motion, hard), wanted, out):
+            if name == "status":
+                friction[hard] = value
+                continue
+            # what doubles lost is lost again, 53 bits further down
+            left = out[name][hard] * U if STAGE_OF[name] == "error" else 0.0
+            _put(out[name], value, hard)
+            out[name][hard] += left
+    if state.assembled.all() and not state.singular.any():
+        return friction
+    return np.where(state.assembled, np.where(state.singular, SINGULAR, friction), NOT_ASSEMBLED).astype(np.uint8)
+
+
+def _evaluate(
+    scene: "Scene",
+    state: State,
+    omega_2: Array | float,
+    alpha_2: Array | float,
+    wanted: int,
+    names: Mapping[str, Array],
+) -> Iterator[tuple[str, Any]]:
+    """The quantities named, stage by stage, and the "status" that friction leaves."""
+    if wanted >= 1:
+        add_velocities(state, omega_2)
+    if wanted >= 2:
+        add_accelerations(state, alpha_2)
+    for name in names:
+        if name in KINEMATIC:
+            yield name, KINEMATIC[name](state)
+    if wanted >= 3:
+        terms = (*scene.loads, *scene.effects)
+        pins = solve_pins(state, terms, scene.drive_bar)
+        for name in ("F12", "F32", "F43", "F14", "torque"):
+            if name in names:
+                yield name, getattr(pins, name)
+        if pins.unsettled is not None:
+            yield "status", pins.unsettled
+        if "drive_condition" in names:
+            condition = np.abs(drive_sine(state, scene.drive_bar))
+            yield "drive_condition", condition if pins.from_jamming is None else condition * pins.from_jamming
+        if "friction_residual" in names:
+            yield "friction_residual", 0.0 if pins.residual is None else pins.residual
+        if "torque_low" in names or "torque_high" in names:
+            ends = torque_interval(state, terms, scene.drive_bar, pins.torque)
+            yield from ((name, end) for name, end in zip(OF_DRY_FRICTION, ends, strict=True) if name in names)
+        if wanted >= 4:
+            from fourbar.error_bars import error_bars
+
+            for name, value in error_bars(state, pins, terms, scene.drive_bar).items():
+                if name in names:
+                    yield name, value
+
+
+def _put(target: Array, value: Array | Vector | float | None, where: slice | NDArray[np.intp] = ALL) -> None:
+    if isinstance(value, tuple):
+        target[where, 0], target[where, 1] = (rounded(component) for component in value)
+    else:
+        assert value is not None
+        target[where] = rounded(value)
+
+
+def _piece(value: float | Array | None, part: slice) -> float | Array:
+    """A number for all positions, or the part of an array that belongs to a block."""
+    if value is None or np.ndim(value) == 0:
+        return value or 0.0
+    return value[part]  # type: ignore[index]
