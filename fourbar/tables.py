@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from fourbar.bearing import PIN_FORCE, bearing_load
 from fourbar.kinematics import Array
 from fourbar.linkage import BAR_NAMES
 from fourbar.motion import OPEN
@@ -121,6 +122,10 @@ def heading(scene: Scene, solution: Solution) -> list[str]:
         where = math.degrees(solution.theta_2[worst])
         lines.append(f"largest torque {solution.torque[worst]:.6g} N m at theta_2 = {where:.6g} deg")
         lines += _warning(scene, solution)
+    if solution.F12 is not None and np.isfinite(solution.F12).any():
+        loads = {pin: bearing_load(solution, pin) for pin in PIN_FORCE}
+        parts = [f"{pin} {load.largest:.6g} N at {math.degrees(load.where):.6g} deg" for pin, load in loads.items()]
+        lines.append("largest pin loads: " + ", ".join(parts))
     return lines
 
 

@@ -153,6 +153,16 @@ def test_the_table_says_what_was_asked_and_in_what_units(run: Fourbar) -> None:
     assert radians[heading + 1].split()[0] == "rad"
 
 
+def test_the_largest_pin_loads_stand_above_the_table(run: Fourbar) -> None:
+    """As found row by row in the JSON."""
+    _, printed, _ = run("analyze", str(MODELS / "crank_rocker.toml"))
+    whole = json.loads(run("analyze", str(MODELS / "crank_rocker.toml"), "--json")[1])
+    line = next(line for line in printed.splitlines() if line.startswith("largest pin loads"))
+    for pin, name in {"O2": "F12", "A": "F32", "B": "F43", "O4": "F14"}.items():
+        size, at = max((math.hypot(*force), at) for force, at in zip(whole[name], whole["theta_2"], strict=True))
+        assert f" {pin} {size:.6g} N at {math.degrees(at):.6g} deg" in line
+
+
 def test_a_narrow_terminal_gets_whole_columns_and_is_told_what_is_missing() -> None:
     scene = crank_rocker()
     for width in (40, 80, 120):

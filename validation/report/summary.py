@@ -104,10 +104,11 @@ def summarise(pages: Iterable[Page], ladder: Sequence[LadderRow] = ()) -> Summar
         if len(keep) < SCENES_SHOWN:
             keep.append(page)
     total, failed = sum(counts.values()), counts[FAILS]
+    many = f"{scenes} scene{'s' if scenes != 1 else ''}"
     if failed:
-        verdict = f"FAILS: {failed} of {total} comparisons on {scenes} scenes do not hold"
+        verdict = f"FAILS: {failed} of {total} comparisons on {many} do not hold"
     else:
-        verdict = f"All {total} comparisons on {scenes} scenes hold"
+        verdict = f"All {total} comparisons on {many} hold"
     shown = sorted([*failing, *holding[: SCENES_SHOWN - len(failing)]], key=lambda page: page.name)
     return Summary(
         verdict=verdict,
