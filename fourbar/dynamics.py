@@ -55,6 +55,8 @@ class Path(NamedTuple):
     """theta_k' = d theta_k/dq."""
     second: dict[int, Number]
     """theta_k'' = d^2 theta_k/dq^2."""
+    slip: Number
+    """theta_2' - theta_3', which keeps its digits where all bars turn nearly as one."""
     sine: Number
     """Sine between the two bars that do not carry q, signed; 0 where q is at a limit."""
 
@@ -74,19 +76,39 @@ class Triangle(NamedTuple):
     E2: float
 
 
-def triangle(d: float, a: float, b: float, c: float) -> Triangle:
-    """E1 and E2 as products of exact sums, zero where the lengths touch a change point."""
+def triangle(d: float, a: float, b: float, c: float, *, touching: bool = False) -> Triangle:
+    """E1 and E2 as products of exact sums; with `touching` zero where the lengths miss a change point by rounding."""
     total = math.fsum((d, a, b, c))
 
     def gap(*terms: float) -> float:
         value = math.fsum(terms)
-        return 0.0 if abs(value) <= TOUCHING * total else value
+        return 0.0 if touching and abs(value) <= TOUCHING * total else value
 
     return Triangle(d, a, b, c, gap(b, c, -a, -d) * total, gap(d, -a, -b, c) * gap(d, -a, b, -c))
 
 
-def trace(shape: Triangle, theta_1: float, q: Number, sign: Number, *, follow: bool = False) -> tuple[Number, ...]:
-    """u_3, u_4, theta_3', theta_4', theta_3'', theta_4'' and sin(theta_4 - theta_3) of a bar 2 at angle q.
+class Half(NamedTuple):
+    """sin h, cos h and the two factors of Heron, which vanish at the limit positions of q."""
+
+    s: Number
+    k: Number
+    outer: Number
+    inner: Number
+
+
+def half_angle(shape: Triangle, theta_1: float, q: Number) -> Half:
+    """In doubles: beside a limit position the factors keep the digits that q has of its distance."""
+    h = 0.5 * (q - theta_1)
+    s, k = np.sin(h), np.cos(h)
+    four_ad = 4.0 * shape.a * shape.d
+    return Half(s, k, shape.E1 + four_ad * (k * k), shape.E2 + four_ad * (s * s))
+
+
+def trace(
+    shape: Triangle, theta_1: float, q: Number, sign: Number, *, follow: bool = False, at: Half | None = None
+) -> tuple[Number, ...]:
+    """u_3, u_4, theta_3', theta_4', theta_3'', theta_4'', 1 - theta_3', theta_4' - theta_3' and
+    sin(theta_4 - theta_3) of a bar 2 at angle q.
 
     Parameters
     ----------
@@ -95,17 +117,17 @@ def trace(shape: Triangle, theta_1: float, q: Number, sign: Number, *, follow: b
     sign : +1 or -1, the branch; with `follow` a constant of the path instead.
     follow : run smoothly through change points: the signed factor cos h or sin h is kept where
         its square root would be its magnitude.
+    at : sin h, cos h and the factors where they are known better than from q.
     """
     d, a, b, c, E1, E2 = shape
-    h = 0.5 * (q - theta_1)
-    s, k = np.sin(h), np.cos(h)
+    s, k, outer, inner = half_angle(shape, theta_1, q) if at is None else at
     ad = a * d
     e2 = (d - a) * (d - a) + 4.0 * ad * (s * s)
-    s_C, C, dC = _leg(E1, ad, k, -s, follow)
-    s_S, S, dS = _leg(E2, ad, s, k, follow)
+    s_C, C, dC = _leg(E1, ad, k, -s, outer, follow)
+    s_S, S, dS = _leg(E2, ad, s, k, inner, follow)
     root = sign * (s_C * s_S)
     excess = (b - c) * (b + c)
-    spin = np.exp(1j * (h + theta_1))
+    spin = np.exp(0.5j * (q + theta_1))
     diagonal = (d - a) * np.exp(1j * theta_1) - 2j * a * s * spin
     u_3 = diagonal * ((e2 + excess) + 1j * root) / (2.0 * b * e2)
     u_4 = -diagonal * ((e2 - excess) - 1j * root) / (2.0 * c * e2)
@@ -116,6 +138,7 @@ def trace(shape: Triangle, theta_1: float, q: Number, sign: Number, *, follow: b
     both = 2.0 * ad * sign * S * C
     both_1 = 2.0 * ad * sign * (dS * C + S * dC)
     share_1 = share * 2.0 * ad * sin_q / e2
+    behind = (2.0 * ad * (s * s) - d * (a - d)) / e2  # 1 - phi'
     return (
         u_3,
         u_4,
@@ -123,50 +146,64 @@ def trace(shape: Triangle, theta_1: float, q: Number, sign: Number, *, follow: b
         phi_1 + (1.0 + share) * both,
         phi_2 - (1.0 - share) * both_1 - share_1 * both,
         phi_2 + (1.0 + share) * both_1 - share_1 * both,
+        behind + (1.0 - share) * both,
+        2.0 * both,
         root / (2.0 * b * c),
     )
 
 
-def _leg(E: float, ad: float, x: Number, dx: Number, follow: bool) -> tuple[Number, Number, Number]:
-    """r = sqrt(E + 4 a d x^2), x/r and its derivative E x_h/(2 r^3), for x = cos h or sin h."""
+def _leg(E: float, ad: float, x: Number, dx: Number, factor: Number, follow: bool) -> tuple[Number, Number, Number]:
+    """r = sqrt(factor), x/r and its derivative E x_h/(2 r^3), factor = E + 4 a d x^2, for x = cos h or sin h."""
     if E == 0.0:
         side = 1.0 if follow else np.where(x < 0.0, -1.0, 1.0)
         half = 2.0 * math.sqrt(ad)
         return side * half * x, side / half, 0.0
-    r = np.sqrt(E + 4.0 * ad * (x * x))
+    r = np.sqrt(factor)
     return r, x / r, 0.5 * E * dx / (r * r * r)
 
 
-def path(linkage: FourBar, theta_2: Number, branch: Number) -> Path:
+def path(linkage: FourBar, theta_2: Number, branch: Number, at: Half | None = None) -> Path:
     """The path in q = theta_2 on a branch (NaN where the loop does not close, inf at a limit)."""
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-        u_3, u_4, t_3, t_4, tt_3, tt_4, sine = trace(triangle(*linkage.lengths), linkage.ground_angle, theta_2, branch)
-    return Path({2: np.exp(1j * theta_2), 3: u_3, 4: u_4}, {2: 1.0, 3: t_3, 4: t_4}, {2: 0.0, 3: tt_3, 4: tt_4}, sine)
+        return along_input(linkage, triangle(*linkage.lengths), theta_2, branch, at=at)
+
+
+def along_input(
+    linkage: FourBar, shape: Triangle, q: Number, sign: Number, *, follow: bool = False, at: Half | None = None
+) -> Path:
+    """The path in q = theta_2."""
+    theta_1 = linkage.ground_angle
+    u_3, u_4, t_3, t_4, tt_3, tt_4, slip, _, sine = trace(shape, theta_1, q, sign, follow=follow, at=at)
+    return Path({2: np.exp(1j * q), 3: u_3, 4: u_4}, {2: 1.0, 3: t_3, 4: t_4}, {2: 0.0, 3: tt_3, 4: tt_4}, slip, sine)
 
 
 def inertia(linkage: FourBar, way: Path) -> tuple[Number, Number]:
     """Equivalent inertia J at q and its derivative dJ/dq, kg m^2 and kg m^2/rad.
 
     J = sum of m |G'|^2 + I theta_k'^2,   J' = 2 sum of m G'.G'' + I theta_k' theta_k''.
+
+    About the pin O2, O4 of bars 2, 4 that is (I + m r^2) theta_k' theta_k''; of the coupler, G = A + R,
+        G'.G'' = a^2 theta_2' theta_2'' + r^2 theta_3' theta_3'' + (theta_2' theta_3'' + theta_3' theta_2'') A.R
+                 + theta_2' theta_3' (theta_2' - theta_3') A x R.
     """
     J: Number = 0.0
     half: Number = 0.0
     for number in MOVING_BARS:
         bar = linkage.bar(number)
         t, tt = way.first[number], way.second[number]
-        if bar.mass != 0.0:
-            r, phi = bar.centre  # type: ignore[misc]
-            arm = r * complex(math.cos(phi), math.sin(phi)) * way.unit[number]
-            g_1, g_2 = 1j * t * arm, (1j * tt - t * t) * arm
-            if number == 3:
-                t_2, tt_2 = way.first[2], way.second[2]
-                a_u = linkage.input.length * way.unit[2]
-                g_1, g_2 = g_1 + 1j * t_2 * a_u, g_2 + (1j * tt_2 - t_2 * t_2) * a_u
-            J = J + bar.mass * (g_1.real * g_1.real + g_1.imag * g_1.imag)
-            half = half + bar.mass * (g_1.real * g_2.real + g_1.imag * g_2.imag)
-        if bar.inertia != 0.0:
-            J = J + bar.inertia * t * t
-            half = half + bar.inertia * t * tt
+        r, phi = bar.centre  # type: ignore[misc]
+        about_pin = bar.inertia + bar.mass * (r * r)  # type: ignore[operator]
+        if about_pin != 0.0:
+            half = half + about_pin * t * tt
+        if number == 3 and bar.mass != 0.0:
+            t_2, tt_2, a = way.first[2], way.second[2], linkage.input.length
+            A, R = a * way.unit[2], r * complex(math.cos(phi), math.sin(phi)) * way.unit[3]
+            velocity, turned = t_2 * A + t * R, A.conjugate() * R
+            J = J + bar.mass * (velocity.real * velocity.real + velocity.imag * velocity.imag) + bar.inertia * t * t
+            sideways = t_2 * t * way.slip * turned.imag
+            half = half + bar.mass * (a * a * t_2 * tt_2 + (t_2 * tt + t * tt_2) * turned.real + sideways)
+        elif about_pin != 0.0:
+            J = J + about_pin * t * t
     return J, 2.0 * half
 
 

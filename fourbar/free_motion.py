@@ -19,6 +19,7 @@ from fourbar.dynamics import (
     Path,
     Power,
     acceleration,
+    along_input,
     carrying,
     generalised_force,
     inertia,
@@ -67,14 +68,13 @@ class _Chart:
         """The path at q; bar 4 is the input of the same loop read backwards from O4."""
         d, a, b, c = self.linkage.lengths
         theta_1 = self.linkage.ground_angle
-        u = complex(math.cos(q), math.sin(q))
         if self.bar == 2:
-            u_3, u_4, t_3, t_4, tt_3, tt_4, sine = trace(triangle(d, a, b, c), theta_1, q, self.sign, follow=True)
-            return Path({2: u, 3: u_3, 4: u_4}, {2: 1.0, 3: t_3, 4: t_4}, {2: 0.0, 3: tt_3, 4: tt_4}, sine)
-        back, u_2, t_3, t_2, tt_3, tt_2, sine = trace(
-            triangle(d, c, b, a), theta_1 + math.pi, q, self.sign, follow=True
+            return along_input(self.linkage, triangle(d, a, b, c, touching=True), q, self.sign, follow=True)
+        back, u_2, t_3, t_2, tt_3, tt_2, _, slip, sine = trace(
+            triangle(d, c, b, a, touching=True), theta_1 + math.pi, q, self.sign, follow=True
         )
-        return Path({2: u_2, 3: -back, 4: u}, {2: t_2, 3: t_3, 4: 1.0}, {2: tt_2, 3: tt_3, 4: 0.0}, sine)
+        u = complex(math.cos(q), math.sin(q))
+        return Path({2: u_2, 3: -back, 4: u}, {2: t_2, 3: t_3, 4: 1.0}, {2: tt_2, 3: tt_3, 4: 0.0}, slip, sine)
 
 
 def _sines(way: Path) -> tuple[float, float]:
