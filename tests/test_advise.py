@@ -17,9 +17,10 @@ from validation.cost.errors import errors
 from validation.cost.exhaustive import cheapest
 from validation.engines.mujoco.closed_loop import O2, ClosedLoop
 from validation.engines.mujoco.trial import Rig
-from validation.judge import WITNESSES, judge
+from validation.judge import judge
 from validation.results import FAILS
 from validation.suite.scenes import MODELS
+from validation.witnesses import WITNESSES
 
 
 @pytest.mark.parametrize("omega", [10.0, 100.0, 1000.0])

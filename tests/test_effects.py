@@ -28,7 +28,8 @@ from fourbar.effects import (
 )
 from fourbar.scene import Scene
 from tests.scenes import crank_rocker
-from validation.judge import WITNESSES, judge
+from validation.judge import judge
+from validation.witnesses import WITNESSES
 
 TABLE = Table((0.0, 1.0, 2.5, 2 * np.pi), (0.0, 1.0, -0.5, 0.0))
 ACTING: dict[str, Effect] = {

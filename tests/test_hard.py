@@ -25,10 +25,12 @@ from validation.hard.linkages import at, collinear_3_4, dressed, linkage_of
 from validation.hard.page import limit_rows, page
 from validation.hard.prediction import from_data, in_world_axes
 from validation.hard.suite import HARD_WITNESSES, Hard
-from validation.judge import Record, Witness, judge
+from validation.judge import judge
+from validation.page import Record
 from validation.results import AGREES, DEGRADED, FAILS, VERDICTS
 from validation.suite.random import LinkageType
 from validation.tolerance import FULL_ACCURACY
+from validation.witnesses import Witness
 
 EXACT = tuple(w for w in HARD_WITNESSES if w.name != "mujoco-simulated")
 SWEEP = crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.1, 0.1 + 2 * math.pi, 30), 10.0))

@@ -11,9 +11,10 @@ from fourbar.scene import Command, Scene
 from tests.scenes import crank_rocker
 from validation.answer import Answer
 from validation.compare import COMPARED
-from validation.judge import Witness, judge
+from validation.judge import judge
 from validation.results import AGREES, DEGRADED, FAILS, REFUSES, Row, from_csv, to_csv, write_results
 from validation.tolerance import EPS, EQUIVALENCE, K
+from validation.witnesses import Witness
 
 
 class Echo:

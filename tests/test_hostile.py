@@ -18,7 +18,6 @@ from fourbar.scene import Command, Scene
 from tests.scenes import crank_rocker
 from validation.answer import Answer
 from validation.cli import status
-from validation.judge import Witness
 from validation.report.summary import Summary
 from validation.report.terminal import table
 from validation.results import COLUMNS, FAILS, from_csv
@@ -27,6 +26,7 @@ from validation.suite import pool
 from validation.suite.memory import WORKER_MEMORY
 from validation.suite.scenes import LARGEST_LIST, suite_file
 from validation.tolerance import EQUIVALENCE
+from validation.witnesses import Witness
 
 HOSTILE = {
     "html": "<script>alert(1)</script><img src=x onerror=alert(2)>",

@@ -23,7 +23,8 @@ from fourbar.solution import Solution
 from tests.scenes import crank_rocker, thesis
 from validation.engines.mujoco.inverse import MujocoTree
 from validation.engines.pinocchio import PinocchioTree
-from validation.judge import WITNESSES, judge
+from validation.judge import judge
+from validation.witnesses import WITNESSES
 
 EXACT = [w for w in WITNESSES if w.name in ("pinocchio-inverse", "mujoco-inverse")]
 

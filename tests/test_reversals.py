@@ -9,8 +9,9 @@ import fourbar
 from fourbar.effects import Friction
 from fourbar.motion import Motion, Sweep
 from fourbar.scene import Scene, command, solve
-from validation.judge import WITNESSES, judge
+from validation.judge import judge
 from validation.reversals import broken, reversals
+from validation.witnesses import WITNESSES
 
 D, A, B, C = 0.3, 0.1, 0.25, 0.22
 FRICTION = 0.5

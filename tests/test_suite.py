@@ -16,7 +16,6 @@ from fourbar.errors import FourBarError
 from fourbar.scene import Command, Scene
 from tests.scenes import crank_rocker
 from validation.answer import Answer
-from validation.judge import Witness
 from validation.report.summary import SCENES_SHOWN, Summary
 from validation.results import FAILS, from_csv
 from validation.run import chosen, run
@@ -25,6 +24,7 @@ from validation.suite.random import LinkageType
 from validation.suite.scenes import Random
 from validation.suite.store import RunningError, Store
 from validation.tolerance import EQUIVALENCE
+from validation.witnesses import Witness
 
 SEED = 7
 COUNT = SCENES_SHOWN + 20

@@ -2,8 +2,7 @@
 
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import asdict, dataclass, field, replace
-from functools import cache
+from dataclasses import replace
 from importlib import import_module
 from typing import Any
 
@@ -11,126 +10,15 @@ import numpy as np
 
 from fourbar.scene import Command, Scene, command, solve
 from fourbar.solution import Solution
-from validation.answer import Answer, Engine
-from validation.compare import COMPARED, closure, compare
+from validation.answer import Answer
+from validation.compare import closure, compare
 from validation.identities import FORMULAS, identities
+from validation.page import Page, Record, Timing
 from validation.plain import plain
 from validation.results import FAILS, Row
-from validation.reversals import Reversal, reversals
-from validation.tolerance import EQUIVALENCE, FORCES, SIMULATED, Array, Tolerance
-
-
-@dataclass(frozen=True, slots=True)
-class Witness:
-    """An engine that the harness asks, where its adapter lives, and what it is held to."""
-
-    name: str
-    adapter: str
-    """ "module:class"; imported when it is asked, so a missing engine costs only its own rows."""
-    tolerance: Tolerance
-    expected: tuple[str, ...] = COMPARED
-    order: str = ""
-    """ "module:function" that runs the engine at two coarser timesteps; its observed order is shown."""
-    positions: tuple[str, ...] = ()
-    """What it is held to where only positions are asked for; nothing: it is then not started."""
-    through_time: bool = False
-    """Whether it runs through the motion in time."""
-    predictor: str = ""
-    """ "module:function" that predicts errors from the description; "own": the engine's own residuals do."""
-
-    def engine(self) -> Engine:
-        """The adapter."""
-        module, _, name = self.adapter.partition(":")
-        return getattr(import_module(module), name)()  # type: ignore[no-any-return]
-
-
-WITNESSES = (
-    Witness("pinocchio-inverse", "validation.engines.pinocchio:PinocchioInverse", EQUIVALENCE),
-    Witness("mujoco-inverse", "validation.engines.mujoco.inverse:MujocoInverse", EQUIVALENCE),
-    Witness(
-        "mujoco-simulated",
-        "validation.engines.mujoco.simulate:MujocoSimulated",
-        SIMULATED,
-        order="validation.engines.mujoco.simulate:observed_order",
-        through_time=True,
-    ),
-    Witness(
-        "energy-method",
-        "validation.engines.energy:EnergyMethod",
-        EQUIVALENCE,
-        ("torque",),
-        positions=("theta_3", "theta_4"),
-    ),
-)
-
-
-@dataclass(slots=True)
-class Timing:
-    """Seconds that one answer took, measured in the process that gave it."""
-
-    scene: str
-    engine: str
-    setting: str
-    positions: int
-    seconds: float
-
-
-@dataclass(slots=True)
-class Record:
-    """Everything the report needs of one scene."""
-
-    name: str
-    scene: Scene
-    rows: list[Row] = field(default_factory=list)
-    timings: list[Timing] = field(default_factory=list)
-    left_out: list[str] = field(default_factory=list)
-    reversals: list[Reversal] = field(default_factory=list)
-    solution: Solution | None = None
-    answers: list[Answer] = field(default_factory=list)
-
-
-@dataclass(slots=True)
-class Page:
-    """What is kept of one scene once it is judged: small, and storable as JSON but for its rows."""
-
-    name: str
-    title: str = ""
-    source: str = ""
-    rows: list[Row] = field(default_factory=list)
-    timings: list[Timing] = field(default_factory=list)
-    left_out: list[str] = field(default_factory=list)
-    reversals: list[str] = field(default_factory=list)
-    """Where dry friction reverses and the pin forces jump, in words."""
-    independence: dict[str, tuple[str, str]] = field(default_factory=dict)
-    """engine: (shared with the formulas, found alone)."""
-    evidence: dict[str, dict[str, float]] = field(default_factory=dict)
-    figure: str | None = None
-    """SVG of the answers, or None where there is nothing to draw."""
-
-    def without_rows(self) -> dict[str, Any]:
-        """Everything but the rows, which have their own table."""
-        kept = asdict(replace(self, rows=[]))
-        del kept["rows"]
-        return kept
-
-    @classmethod
-    def restore(cls, kept: dict[str, Any], rows: list[Row]) -> "Page":
-        """From what `without_rows` gave."""
-        timings = [Timing(**timing) for timing in kept["timings"]]
-        independence = {engine: (shared, own) for engine, (shared, own) in kept["independence"].items()}
-        return cls(**{**kept, "timings": timings, "independence": independence}, rows=rows)
-
-    def joined(self, other: "Page") -> "Page":
-        """The same scene with what another set of engines said; the rows of the formulas stand once."""
-        known = set(self.rows)
-        return replace(
-            self,
-            rows=[*self.rows, *(row for row in other.rows if row not in known)],
-            timings=[*self.timings, *(timing for timing in other.timings if timing.engine != FORMULAS)],
-            left_out=[*self.left_out, *other.left_out],
-            independence={**self.independence, **other.independence},
-            evidence={**self.evidence, **other.evidence},
-        )
+from validation.reversals import reversals
+from validation.tolerance import FORCES
+from validation.witnesses import WITNESSES, Witness, predicting_from
 
 
 def judged_page(name: str, scene: Scene, witnesses: Sequence[Witness] = WITNESSES, *, draw: bool = True) -> Page:
@@ -234,20 +122,6 @@ def _observed_order(name: str, scene: Scene, at: Command, solution: Solution, wi
 
     coarse, fine, order = getattr(import_module(module), function)(scene, at, error)
     return {"error_at_4h": coarse, "error_at_2h": fine, "observed_order": order}
-
-
-def predicting_from(
-    witness: Witness, scene: Scene, at: Command, answer: Answer
-) -> Callable[[], dict[str, Array]] | None:
-    """What computes the errors to be expected, should any be called for."""
-    if not witness.predictor or answer.refusal is not None:
-        return None
-    if witness.predictor == "own":
-        zero = np.zeros(len(at.theta_2))
-        return lambda: {quantity: answer.predicted.get(quantity, zero) for quantity in witness.expected}
-    module, _, name = witness.predictor.partition(":")
-    predict = getattr(import_module(module), name)
-    return cache(lambda: predict(scene, at, witness.expected))
 
 
 def _judge_inertia(record: Record, at: Command, witnesses: Iterable[Witness]) -> None:

@@ -14,8 +14,8 @@ from fourbar.mjcf import mjcf
 from fourbar.writing import write_text
 from validation.engines.mujoco.picture import pictures
 from validation.hard.suite import HARD_WITNESSES, Hard
-from validation.judge import WITNESSES, Page, Witness
 from validation.machine import versions
+from validation.page import Page
 from validation.published import ladder_rows
 from validation.regression.command import output_options, told
 from validation.regression.record import about, baseline, write_about
@@ -28,6 +28,7 @@ from validation.suite.elsewhere import run_elsewhere
 from validation.suite.random import LinkageType
 from validation.suite.scenes import Random, Suite, model_files, scene_files, suite_file
 from validation.suite.store import Store
+from validation.witnesses import WITNESSES, Witness
 
 WORKERS = 2
 CHUNK = {True: 1, False: 20}

@@ -14,9 +14,9 @@ from fourbar.errors import InputError
 from fourbar.scene import Command, Scene
 from validation.answer import Answer, Engine
 from validation.compare import COMPARED, SLOW_DRIVE
-from validation.judge import Witness
 from validation.scales import magnitude
 from validation.tolerance import SIMULATED
+from validation.witnesses import Witness
 
 ROUNDS = 6
 """Simulations of a scene at most; the laws are seldom wrong by more than one."""

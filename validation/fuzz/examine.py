@@ -12,9 +12,9 @@ from validation.compare import TOUCHING_MARGIN, closing_margin, compare
 from validation.hard.prediction import from_data
 from validation.hard.suite import predicting
 from validation.identities import identities
-from validation.judge import WITNESSES, Witness, predicting_from
 from validation.results import FAILS
 from validation.tolerance import DEGRADED, EPS, K
+from validation.witnesses import WITNESSES, Witness, predicting_from
 
 EXACT = tuple(predicting(w) for w in WITNESSES if w.name in ("pinocchio-inverse", "mujoco-inverse", "energy-method"))
 """The exact engines, held to full accuracy or to what was predicted for the position."""

@@ -16,7 +16,8 @@ from fourbar.effects import Gravity
 from fourbar.linkage import MOVING_BARS
 from fourbar.scene import Scene, solve
 from validation.answer import Array, Released
-from validation.judge import Record, Timing, breakdown
+from validation.judge import breakdown
+from validation.page import Record, Timing
 from validation.results import AGREES, DEGRADED, FAILS, REFUSES, Row
 from validation.tolerance import DEGRADED as TIMES_PREDICTED
 

@@ -19,10 +19,10 @@ from validation.hard.limits import LIMITS, Limit
 from validation.hard.linkages import at, collinear_2_3, collinear_3_4, dressed, linkage_of
 from validation.hard.prediction import in_world_axes
 from validation.hard.suite import HARD_WITNESSES
-from validation.judge import Witness
 from validation.report.colours import OTHER, STYLES
 from validation.scales import divisor, magnitude
 from validation.tolerance import DEGRADED, EPS, K, condition_of
+from validation.witnesses import Witness
 
 DISTANCES = np.logspace(-1, -12, 23)
 """rad from the singular position."""

@@ -4,8 +4,8 @@ from dataclasses import dataclass, field, replace
 
 from fourbar.scene import Scene
 from validation.hard.families import FAMILIES
-from validation.judge import WITNESSES, Witness
 from validation.tolerance import FULL_ACCURACY, SIMULATED
+from validation.witnesses import WITNESSES, Witness
 
 PREDICTION = "validation.hard.prediction:"
 PREDICTORS = {"pinocchio-inverse": "in_world_axes", "mujoco-inverse": "about_mass_centre"}

@@ -18,8 +18,8 @@ from fourbar.solution import UNITS
 from validation.answer import Answer
 from validation.compare import compare
 from validation.identities import identities
-from validation.judge import WITNESSES, Witness
 from validation.results import FAILS
+from validation.witnesses import WITNESSES, Witness
 
 CHANGES = 1e-9
 SECONDS = 20

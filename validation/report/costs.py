@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterable
 from statistics import median
 
-from validation.judge import Page
+from validation.page import Page
 from validation.report.colours import GRID, INK, PAPER, SOFT, style_of
 from validation.report.svg import svg_text
 from validation.tolerance import EPS

@@ -10,7 +10,7 @@ from fourbar.scene import Command, solve
 from fourbar.solution import OK, Solution
 from validation.answer import Answer
 from validation.compare import angle_aware_difference
-from validation.judge import Record
+from validation.page import Record
 from validation.report.colours import ALLOWED, BAND, GRID, INK, PAPER, by_variable, style_of
 from validation.report.svg import svg_text
 from validation.reversals import Reversal, broken

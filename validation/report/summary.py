@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from heapq import nlargest
 from statistics import median
 
-from validation.judge import Page
 from validation.machine import machine, versions
+from validation.page import Page
 from validation.published.command import LadderRow
 from validation.results import FAILS, REFUSES, VERDICTS, Row
 from validation.tolerance import EPS, EQUIVALENCE, IDENTITY, NOTHING_TO_TELL, SIMULATED, K

@@ -9,10 +9,12 @@ from concurrent.futures import FIRST_COMPLETED, Future, wait
 from dataclasses import replace
 from importlib import import_module
 
-from validation.judge import Page, Witness, breakdown, judged_page
+from validation.judge import breakdown, judged_page
+from validation.page import Page
 from validation.plain import plain
 from validation.suite.memory import bound_memory
 from validation.suite.scenes import Files, Suite
+from validation.witnesses import Witness
 
 SECONDS_PER_SCENE = 60.0
 """A scene takes 0.05 to 3 s; one that takes longer than this hangs."""

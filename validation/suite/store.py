@@ -15,7 +15,7 @@ from typing import Any
 
 from fourbar.errors import FourBarError
 from fourbar.writing import write_text
-from validation.judge import Page
+from validation.page import Page
 from validation.results import Row, from_csv, to_csv
 
 

@@ -1,0 +1,71 @@
+"""Who is asked: each witness, where its adapter lives, what it needs, and what it is held to."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from importlib import import_module
+
+import numpy as np
+
+from fourbar.scene import Command, Scene
+from validation.answer import Answer, Engine
+from validation.compare import COMPARED
+from validation.tolerance import EQUIVALENCE, SIMULATED, Array, Tolerance
+
+
+@dataclass(frozen=True, slots=True)
+class Witness:
+    """An engine that the harness asks, where its adapter lives, and what it is held to."""
+
+    name: str
+    adapter: str
+    """ "module:class"; imported when it is asked, so a missing engine costs only its own rows."""
+    tolerance: Tolerance
+    expected: tuple[str, ...] = COMPARED
+    order: str = ""
+    """ "module:function" that runs the engine at two coarser timesteps; its observed order is shown."""
+    positions: tuple[str, ...] = ()
+    """What it is held to where only positions are asked for; nothing: it is then not started."""
+    through_time: bool = False
+    """Whether it runs through the motion in time."""
+    predictor: str = ""
+    """ "module:function" that predicts errors from the description; "own": the engine's own residuals do."""
+
+    def engine(self) -> Engine:
+        """The adapter."""
+        module, _, name = self.adapter.partition(":")
+        return getattr(import_module(module), name)()  # type: ignore[no-any-return]
+
+
+WITNESSES = (
+    Witness("pinocchio-inverse", "validation.engines.pinocchio:PinocchioInverse", EQUIVALENCE),
+    Witness("mujoco-inverse", "validation.engines.mujoco.inverse:MujocoInverse", EQUIVALENCE),
+    Witness(
+        "mujoco-simulated",
+        "validation.engines.mujoco.simulate:MujocoSimulated",
+        SIMULATED,
+        order="validation.engines.mujoco.simulate:observed_order",
+        through_time=True,
+    ),
+    Witness(
+        "energy-method",
+        "validation.engines.energy:EnergyMethod",
+        EQUIVALENCE,
+        ("torque",),
+        positions=("theta_3", "theta_4"),
+    ),
+)
+
+
+def predicting_from(
+    witness: Witness, scene: Scene, at: Command, answer: Answer
+) -> Callable[[], dict[str, Array]] | None:
+    """What computes the errors to be expected, should any be called for."""
+    if not witness.predictor or answer.refusal is not None:
+        return None
+    if witness.predictor == "own":
+        zero = np.zeros(len(at.theta_2))
+        return lambda: {quantity: answer.predicted.get(quantity, zero) for quantity in witness.expected}
+    module, _, name = witness.predictor.partition(":")
+    predict = getattr(import_module(module), name)
+    return cache(lambda: predict(scene, at, witness.expected))
