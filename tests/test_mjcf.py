@@ -1,6 +1,7 @@
 """The MJCF on its own: exact numbers, clear refusals, and a file that runs in plain MuJoCo."""
 
 import math
+from pathlib import Path
 from xml.etree import ElementTree as ET
 
 import mujoco
@@ -8,8 +9,11 @@ import numpy as np
 import pytest
 
 import fourbar
+from fourbar.effects import Torsion
 from fourbar.mjcf import Settings, defaults_used, mjcf, scene_from_lengths
+from fourbar.mjcf.document import SETTLING
 from tests.scenes import crank_rocker, thesis
+from validation.suite.scenes import model_files
 
 SPEED = 1e-2
 """The promise of the file: the input within 1 % of omega_2 over a revolution or its range."""
@@ -81,6 +85,79 @@ def test_runs_alone() -> None:
         gap, speed, missing = run_alone(scene)
         assert gap <= GAP and speed <= SPEED and missing <= SPEED, (kind, scene, gap, speed, missing)
     assert len(kinds) == 8
+
+
+OPEN = 1e-9
+"""m; of the loop as the file opens: sixteen roundings of 100 m are 4e-13 m."""
+LAG = 1e-3
+"""Of the crank behind omega_2 t, beyond the settling of its drive, in timesteps."""
+
+
+def opened(scene: fourbar.Scene) -> tuple[mujoco.MjModel, mujoco.MjData]:
+    """As MuJoCo's viewer does it: no keyframe, no control."""
+    model = mujoco.MjModel.from_xml_string(mjcf(scene))
+    data = mujoco.MjData(model)
+    mujoco.mj_resetData(model, data)
+    mujoco.mj_forward(model, data)
+    return model, data
+
+
+def gap(data: mujoco.MjData) -> float:
+    return math.dist(data.site("B3").xpos, data.site("B4").xpos)
+
+
+def sprung() -> fourbar.Scene:
+    """Springs that count whole turns: the joints start where those put them, far from the angles' first turn."""
+    springs = Torsion.at(O2=(0.1, 9.0, 0.0), A=(0.1, -12.0, 0.0))
+    return crank_rocker(motion=fourbar.Motion(1.0, 10.0), effects=(springs,))
+
+
+def test_opens_assembled_and_moves_without_keyframe_or_control() -> None:
+    rng = np.random.default_rng(SEED)
+    scenes = [fourbar.load(file) for file in model_files()] + [sprung()]
+    for scene in [*scenes, *(random_scene(rng)[1] for _ in range(12))]:
+        model, data = opened(scene)
+        assert gap(data) < OPEN and (model.qpos0 == model.key_qpos[0]).all()
+        omega = scene.motion.omega_2
+        assert omega and not data.qvel.any() and not data.ctrl.any()
+        # a second, or what is left of the range where it ends before
+        travel = scene.motion.theta_2
+        room = 0.9 * (travel.stop - travel.start) if isinstance(travel, fourbar.Sweep) else 0.5
+        steps = int(min(1.0, room / abs(omega)) / model.opt.timestep)
+        worst = 0.0
+        for _ in range(steps):
+            mujoco.mj_step(model, data)
+            worst = max(worst, gap(data))
+        assert worst < GAP * max(scene.linkage.lengths), scene
+        turned = data.qpos[0] - model.qpos0[0]
+        assert turned == pytest.approx(
+            omega * (data.time - SETTLING * model.opt.timestep), abs=LAG * abs(omega) * model.opt.timestep
+        )
+
+
+def test_with_alpha_2_the_keyframe_keeps_it() -> None:
+    scene = crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.1, 2.0, 60), 10.0, 30.0), effects=())
+    model, data = opened(scene)
+    mujoco.mj_resetDataKeyframe(model, data, 0)
+    while data.qpos[0] < 2.0:
+        mujoco.mj_step(model, data)
+    assert data.qvel[0] ** 2 == pytest.approx(100.0 + 60.0 * (data.qpos[0] - 0.1), rel=1e-6)
+
+
+def test_past_a_limit_position_it_starts_anew_assembled(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What the viewer shows of an input that cannot turn fully: the same stretch again and again."""
+    monkeypatch.chdir(tmp_path)  # MuJoCo writes a log of its resets into the working folder
+    scene = thesis()
+    model, data = opened(scene)
+    assert scene.motion.omega_2
+    starts, last = 0, 0.0
+    for _ in range(int(2.0 * math.tau / scene.motion.omega_2 / model.opt.timestep)):
+        mujoco.mj_step(model, data)
+        if data.time < last:
+            starts += 1
+            assert gap(data) < GAP and abs(data.qpos[0] - model.qpos0[0]) < 0.01
+        last = data.time
+    assert starts >= 1
 
 
 def test_keyframe_is_on_the_asked_branch_and_closed() -> None:

@@ -10,7 +10,7 @@ from fourbar.errors import InputError, LimitError, NotAssembledError
 from fourbar.kinematics import Array
 from fourbar.linkage import MOVING_BARS, FourBar
 from fourbar.mjcf.appearance import add_appearance
-from fourbar.mjcf.model import Model, carriable, text
+from fourbar.mjcf.model import Model, carriable, constant, servo, text
 from fourbar.mjcf.settings import RECIPE, Run, Settings
 from fourbar.mobility import default_range
 from fourbar.scene import Command, Scene, command, solve
@@ -18,10 +18,14 @@ from fourbar.solution import OK
 
 AT_REST = 1.0
 """rad/s that flywheel and timestep are laid out for where the scene states no speed."""
+SETTLING = 2.0
+"""Time constant with which the drive starts the input from rest, in timesteps: the crank lags by so many, for good."""
 COMMENT = (
-    " Written by fourbar. Reset to keyframe 0 and step: a flywheel (armature of pin O2) keeps the input at omega_2, "
-    "the motor adds alpha_2. Angles: O2 is theta_2, O2 + A is theta_3, O4 is theta_4. Beyond its limit positions the "
-    "linkage cannot be carried, nor everywhere through a change point. "
+    " Written by fourbar. It opens assembled (each joint's ref is its angle there) and just steps: the drive brings "
+    "the input to omega_2 within a few steps, a flywheel (armature of pin O2) keeps it there. With an alpha_2 the "
+    "drive is a constant motor: reset to keyframe 0, which starts at omega_2. Angles: O2 is theta_2, O2 + A is "
+    "theta_3, O4 is theta_4. Beyond its limit positions the linkage cannot be carried, nor everywhere through a "
+    "change point: MuJoCo then starts anew. "
 )
 
 
@@ -31,7 +35,8 @@ def mjcf(scene: Scene, settings: Settings = RECIPE, *, keyframe: bool = True) ->
     Parameters
     ----------
     settings : of MuJoCo; the default ones carry every linkage above MuJoCo's floor of mass.
-    keyframe : False leaves it out; then `settings.timestep` must be given and no position is computed.
+    keyframe : False leaves it out, and with it the assembled pose and the servo that starts it from rest; then
+        `settings.timestep` must be given and no position is computed.
 
     Raises
     ------
@@ -58,17 +63,21 @@ def mjcf(scene: Scene, settings: Settings = RECIPE, *, keyframe: bool = True) ->
     ET.SubElement(root, "compiler", angle="radian", autolimits="true")
     model.add_option(root, timestep)
     add_appearance(root, scene.linkage)
+    drive = constant(armature * scene.motion.alpha_2)
+    if start is not None:
+        for effect in scene.effects:
+            start = start._replace(qpos=effect.unwind(scene.linkage, start.qpos))
+        model.rest = start.qpos
+        if scene.motion.alpha_2 == 0.0:
+            drive = servo(armature / (SETTLING * timestep), start.qvel[0])
     model.add_bodies(root, armature)
     model.add_load_sites(root)
     model.add_closure(root, timestep)
     model.add_tendons(root)
-    model.add_actuators(root, armature * scene.motion.alpha_2)
+    model.add_actuators(root, drive)
     if start is not None:
         frame = ET.SubElement(root, "keyframe")
-        qpos = start.qpos
-        for effect in scene.effects:
-            qpos = effect.unwind(scene.linkage, qpos)
-        ET.SubElement(frame, "key", name="start", qpos=text(*qpos), qvel=text(*start.qvel))
+        ET.SubElement(frame, "key", name="start", qpos=text(*start.qpos), qvel=text(*start.qvel))
     ET.indent(root)
     return ET.tostring(root, encoding="unicode") + "\n"
 

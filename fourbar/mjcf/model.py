@@ -34,6 +34,16 @@ def text(*numbers: float) -> str:
     return " ".join(repr(float(number)) for number in numbers)
 
 
+def constant(force: float) -> tuple[float, float, float]:
+    """The drive as a motor: bias of an actuator that ignores its control."""
+    return (force, 0.0, 0.0)
+
+
+def servo(gain: float, omega: float) -> tuple[float, float, float]:
+    """The drive as a speed servo, gain (omega - speed): without a control it turns at omega, and there it is idle."""
+    return (gain * omega, 0.0, -gain)
+
+
 def carriable(linkage: FourBar) -> None:
     """An InputError where a bar is lighter than MuJoCo carries."""
     for number in MOVING_BARS:
@@ -59,6 +69,8 @@ class Model:
         self.springs: list[Spring] = []
         self.inertia = dict.fromkeys(MOVING_BARS, 0.0)
         """What is added to a bar's own, kg m^2."""
+        self.rest: tuple[float, float, float] | None = None
+        """The angles of pins O2, A, O4 in which the bodies are put down, rad; None: every bar along its parent."""
 
     def add_dry_friction(self, pin: str, torque: float) -> None:
         """``frictionloss`` that reaches its full torque at once: by default it would rise over 0.02 s of slip."""
@@ -120,6 +132,10 @@ class Model:
         bar, pin = self.linkage.bar(number), FIRST_PIN[number]
         assert bar.inertia is not None
         body = ET.SubElement(parent, "body", name=BAR_NAMES[number], pos=text(*at, 0.0))
+        if self.rest is not None:
+            angle = self.rest[number - 2]
+            body.set("axisangle", text(0.0, 0.0, 1.0, angle))
+            drive["ref"] = angle
         # only the z-component acts in the plane; three equal ones satisfy the triangle inequality
         ET.SubElement(
             body,
@@ -213,14 +229,14 @@ class Model:
                 y += load.at[0] * math.sin(load.at[1])
             ET.SubElement(body, "site", name=f"load_{index}", pos=text(x, y, 0.0), size=text(self.radius))
 
-    def add_actuators(self, root: ET.Element, motor: float) -> None:
-        """Constant actuators: the motor that gives the flywheel alpha_2, and the loads."""
-        if motor == 0.0 and not self.loads:
+    def add_actuators(self, root: ET.Element, drive: tuple[float, float, float]) -> None:
+        """Actuators without a control: the drive (force, per angle, per speed) on pin O2, and the loads."""
+        if not any(drive) and not self.loads:
             return
         actuators = ET.SubElement(root, "actuator")
-        constant = {"gaintype": "fixed", "gainprm": "0", "biastype": "affine"}
-        if motor != 0.0:
-            ET.SubElement(actuators, "general", constant, name="drive", joint="O2", biasprm=text(motor, 0.0, 0.0))
+        uncontrolled = {"gaintype": "fixed", "gainprm": "0", "biastype": "affine"}
+        if any(drive):
+            ET.SubElement(actuators, "general", uncontrolled, name="drive", joint="O2", biasprm=text(*drive))
         for index, load in enumerate(self.loads, 1):
             fx = fy = 0.0
             couple = load.moment
@@ -236,4 +252,4 @@ class Model:
                 "gear": text(fx, fy, 0.0, 0.0, 0.0, couple),
                 "biasprm": "1 0 0",
             }
-            ET.SubElement(actuators, "general", {**constant, **attributes})
+            ET.SubElement(actuators, "general", {**uncontrolled, **attributes})
