@@ -6,7 +6,9 @@ from scipy.optimize import brentq
 
 import fourbar
 from fourbar.dynamics import acceleration, driving_torque, generalised_force, inertia, path
-from fourbar.scene import Command, solve
+from fourbar.mobility import limit_positions
+from fourbar.scene import Command, command, solve
+from validation.engines.energy import EnergyMethod
 
 EPS = 2.0**-52
 K = 200.0
@@ -61,6 +63,29 @@ def test_torque_agrees_with_newton_euler(drive: int) -> None:
         assert np.all(np.abs(torque - s.torque)[ok] <= K * EPS * (scale / condition)[ok])
         compared += int(ok.sum())
     assert compared > 1000
+
+
+@pytest.mark.parametrize("offset", [1e-2, 1e-8, 1e-14, 1e-30])
+def test_both_keep_their_digits_at_a_stated_distance_from_a_limit(offset: float) -> None:
+    """theta_2 = limit + offset: both assemble and agree on one side of the limit, neither on the other."""
+    for seed in range(6):
+        rng = np.random.default_rng(seed)
+        linkage, terms, _ = random_case(rng)
+        for number in range(1, len(limit_positions(linkage)) + 1):
+            drive, branch = int(rng.integers(2, 5)), int(rng.choice([-1, 1]))
+            assembled = []
+            for side in (offset, -offset):
+                motion = fourbar.Motion(fourbar.FromLimit(number, side), 1.3, 0.7, branch=branch)
+                scene = fourbar.Scene(linkage, motion, drive, terms[:3], terms[3:5])
+                at = command(scene)
+                s, theirs = solve(scene, "force", at=at), EnergyMethod().answer(scene, at)
+                assert theirs.assembled is not None and s.torque is not None and s.drive_condition is not None
+                assert np.array_equal(s.assembled, theirs.assembled)
+                assembled.append(bool(s.assembled[0]))
+                if assembled[-1]:
+                    allowed = K * EPS * np.abs(s.torque) / s.drive_condition
+                    assert np.all(np.abs(theirs.quantities["torque"] - s.torque) <= allowed)
+            assert any(assembled) and (offset > 1e-3 or not all(assembled))
 
 
 def test_four_bar_of_gtdynamics() -> None:
