@@ -3,6 +3,8 @@
 import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
+from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -90,10 +92,20 @@ def compare(
         where = judged & _answerable(quantity, scene, formulas, tolerance)
         jumping = reversing(scene, formulas, tolerance.factor) & where if quantity in FORCES else ~judged & judged
         where &= ~jumping
-        if predicted is not None:
-            rows.append(_judge_predicted(row, quantity, scene, formulas, theirs, where, tolerance, predicted))
+        if not where.any():
+            rows.append(row(quantity, DEGRADED, "nothing can be told: no position at which both may be held to it"))
         else:
-            rows.append(_judge(row, quantity, scene, formulas, theirs, where, tolerance))
+            yard = divisor(yardstick(quantity, scene, formulas, ours))
+            with np.errstate(over="ignore"):
+                error = angle_aware_difference(quantity, ours, theirs) / yard
+            condition = condition_of(quantity, scene.linkage, formulas)
+            if predicted is None:
+                found = _by_condition(error, condition, where, tolerance)
+            else:
+                found = _by_prediction(error, where, tolerance, partial(_relative, predicted, quantity, yard))
+            at = {"theta_2": formulas.theta_2[found.worst], "condition": condition[found.worst]}
+            numbers = {"error": error[found.worst], "allowed": found.allowed, **at}
+            rows.append(row(quantity, found.verdict, found.reason, **numbers))
         if jumping.any():
             note = f"; {np.count_nonzero(jumping)} positions at which dry friction reverses not judged"
             rows[-1] = replace(rows[-1], reason=rows[-1].reason + note)
@@ -128,21 +140,23 @@ def closure(name: str, scene: Scene, answer: Answer, simulated: Tolerance = SIMU
     )
 
 
-def _judge(
-    row: Callable[..., Row],
-    quantity: str,
-    scene: Scene,
-    formulas: Solution,
-    theirs: Array,
-    where: Mask,
-    tolerance: Tolerance,
-) -> Row:
-    """One quantity over the positions `where`; NaN at any of them fails."""
-    if not where.any():
-        return row(quantity, DEGRADED, "nothing can be told: no position at which both may be held to it")
-    ours = getattr(formulas, quantity)
-    error = angle_aware_difference(quantity, ours, theirs) / divisor(yardstick(quantity, scene, formulas, ours))
-    condition = condition_of(quantity, scene.linkage, formulas)
+def _relative(predicted: Callable[[], Mapping[str, Array]], quantity: str, yard: Array) -> Array:
+    """The predicted error of a quantity in parts of its yardstick; computed when it is called for."""
+    with np.errstate(over="ignore"):
+        return predicted()[quantity] / yard
+
+
+class _Finding(NamedTuple):
+    """What was found of one quantity at the position where it is worst."""
+
+    worst: int
+    verdict: str
+    reason: str
+    allowed: float
+
+
+def _by_condition(error: Array, condition: Array, where: Mask, tolerance: Tolerance) -> _Finding:
+    """Errors over the positions `where` against the law in the condition; NaN at any of them fails."""
     allowed = tolerance.allowed(condition)
     told = where & (condition * NOTHING_TO_TELL > EPS)
     untold = int(np.count_nonzero(where & ~told))
@@ -152,46 +166,21 @@ def _judge(
         verdict, reason = DEGRADED, f"nothing can be told: eps/condition = {EPS / condition[index]:.1e}"
         if not np.isfinite(error[where]).all():
             verdict, reason = FAILS, "NaN"
-    else:
-        with np.errstate(divide="ignore", invalid="ignore"):
-            ratio = np.where(told, error / allowed, -1.0)
-        ratio[where & ~np.isfinite(error)] = np.inf
-        index = int(np.argmax(ratio))
-        verdict = AGREES if ratio[index] <= 1.0 else FAILS
-        reason = ("NaN" if math.isnan(error[index]) else tolerance.name) + note
-    return row(
-        quantity,
-        verdict,
-        reason,
-        error=error[index],
-        allowed=allowed[index],
-        theta_2=formulas.theta_2[index],
-        condition=condition[index],
-    )
+        return _Finding(index, verdict, reason, allowed[index])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio = np.where(told, error / allowed, -1.0)
+    ratio[where & ~np.isfinite(error)] = np.inf
+    index = int(np.argmax(ratio))
+    reason = ("NaN" if math.isnan(error[index]) else tolerance.name) + note
+    return _Finding(index, AGREES if ratio[index] <= 1.0 else FAILS, reason, allowed[index])
 
 
-def _judge_predicted(
-    row: Callable[..., Row],
-    quantity: str,
-    scene: Scene,
-    formulas: Solution,
-    theirs: Array,
-    where: Mask,
-    tolerance: Tolerance,
-    predicted: Callable[[], Mapping[str, Array]],
-) -> Row:
-    """One quantity against full accuracy, or else against what was predicted for it; NaN always fails."""
-    if not where.any():
-        return row(quantity, DEGRADED, "nothing can be told: no position at which both may be held to it")
-    ours = getattr(formulas, quantity)
-    yard = divisor(yardstick(quantity, scene, formulas, ours))
-    condition = condition_of(quantity, scene.linkage, formulas)
-    with np.errstate(over="ignore"):
-        error = angle_aware_difference(quantity, ours, theirs) / yard
-        beyond = where & ~(error <= tolerance.factor)
-        expected = np.zeros_like(error)
-        if beyond.any():
-            expected = np.nan_to_num(predicted()[quantity] / yard, nan=0.0, posinf=np.inf)
+def _by_prediction(error: Array, where: Mask, tolerance: Tolerance, predicted: Callable[[], Array]) -> _Finding:
+    """Errors against full accuracy, or else against what was predicted for each position; NaN always fails."""
+    beyond = where & ~(error <= tolerance.factor)
+    expected = np.zeros_like(error)
+    if beyond.any():
+        expected = np.nan_to_num(predicted(), nan=0.0, posinf=np.inf)
     allowed = np.maximum(tolerance.factor, TIMES_PREDICTED * expected)
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = np.where(where, error / allowed, -1.0)
@@ -209,15 +198,7 @@ def _judge_predicted(
         verdict, reason = FAILS, "NaN"
     else:
         verdict, reason = FAILS, f"{error[index]:.1e} where {expected[index]:.1e} was predicted"
-    return row(
-        quantity,
-        verdict,
-        reason,
-        error=error[index],
-        allowed=allowed[index],
-        theta_2=formulas.theta_2[index],
-        condition=condition[index],
-    )
+    return _Finding(index, verdict, reason, allowed[index])
 
 
 def turned(theta_2: Array) -> float:
