@@ -7,10 +7,13 @@ import numpy as np
 import pytest
 
 import fourbar
+from fourbar.mjcf import RECIPE
+from fourbar.mjcf.settings import Run
 from tests.scenes import crank_rocker, thesis
 from validation.answer import Answer
 from validation.compare import COMPARED, compare
 from validation.engines.mujoco.simulate import MujocoSimulated, observed_order
+from validation.suite.random import LinkageType, random_scene
 from validation.tolerance import SIMULATED
 
 TURN = fourbar.Sweep(0.1, 0.1 + 2 * math.pi, 90)
@@ -61,6 +64,23 @@ def test_within_1e_5_of_the_scale(name: str) -> None:
     assert {row.quantity for row in rows} == {"assembled", *COMPARED}
     assert all(row.passed for row in rows), [row for row in rows if not row.passed]
     assert answer.evidence["time_went_back"] == answer.evidence["bad_states"] == 0.0
+
+
+@pytest.mark.parametrize("index", [1, 6, 10, 21])
+@pytest.mark.parametrize("loaded", [False, True], ids=["bare", "loaded"])
+def test_slow_linkages_hold_as_well(loaded: bool, index: int) -> None:
+    """One pass of Newton's method is all they get; under loads the closure must be the stiffer for it."""
+    drawn = random_scene(7, index, tuple(LinkageType))
+    slow = replace(drawn, motion=replace(drawn.motion, omega_2=0.001 if loaded else 0.01, alpha_2=0.0), drive_bar=2)
+    asked = slow if loaded else replace(slow, loads=(), effects=())
+    answer = MujocoSimulated().answer(asked, fourbar.command(asked))
+    rows = compare("", asked, answer, fourbar.solve(asked, at=answer.at), SIMULATED, COMPARED)
+    assert all(row.passed for row in rows), [row for row in rows if not row.passed]
+
+
+def test_an_input_that_speeds_up_covers_the_end_of_its_window_in_as_many_steps() -> None:
+    run = Run(0.0, 3.0, 0.01, 5.0)
+    assert run.fastest * run.timestep(RECIPE) <= 3.0 / RECIPE.steps_per_window
 
 
 def test_it_is_run_near_the_positions_asked_for() -> None:

@@ -1,6 +1,7 @@
 """Scene -> MJCF text: the closed loop, a drive at omega_2 and alpha_2, and a keyframe to start from."""
 
 import math
+from dataclasses import replace
 from typing import NamedTuple
 from xml.etree import ElementTree as ET
 
@@ -11,7 +12,7 @@ from fourbar.kinematics import Array
 from fourbar.linkage import MOVING_BARS, FourBar
 from fourbar.mjcf.appearance import add_appearance
 from fourbar.mjcf.model import Model, carriable, constant, servo, text
-from fourbar.mjcf.settings import RECIPE, Run, Settings
+from fourbar.mjcf.settings import RECIPE, Run, Settings, fitted_pad
 from fourbar.mobility import default_range
 from fourbar.scene import Command, Scene, command, solve
 from fourbar.solution import OK
@@ -54,6 +55,8 @@ def mjcf(scene: Scene, settings: Settings = RECIPE, *, keyframe: bool = True) ->
         timestep = settings.timestep * settings.timestep_scale
     else:
         raise InputError("timestep", None, "is needed where no keyframe is asked for")
+    if settings.pad == "fitted":
+        settings = replace(settings, pad=_pad(scene))
     model = Model(scene.linkage, settings, timestep)
     for term in (*scene.effects, *scene.loads):
         term.add_mjcf(model)
@@ -83,22 +86,46 @@ def mjcf(scene: Scene, settings: Settings = RECIPE, *, keyframe: bool = True) ->
 
 
 def flywheel(scene: Scene, settings: Settings = RECIPE) -> float:
-    """Armature of pin O2, kg m^2: `settings.flywheel` times sum of m L^2 + I + (m g L + F L + M)/omega_2^2.
+    """Armature of pin O2, kg m^2: `settings.flywheel` times sum of m L^2 + I + (m g L + F L + M)/q.
 
     L is the longest arm at which anything acts, and the work is what each load and effect says of itself;
-    in a revolution it is then a small part of the flywheel's energy.
+    in a revolution it is then a small part of the flywheel's energy. q is the greater of omega_2^2 and |alpha_2|.
     """
-    speed = abs(scene.motion.omega_2 or AT_REST)
-    longest = max(scene.linkage.lengths)
-    inertia = work = 0.0
+    return settings.flywheel * (_inertia(scene.linkage) + _work(scene))
+
+
+def load_ratio(scene: Scene) -> float:
+    """(m g L + F L + M)/(q (m L^2 + I)): loads and weights against the inertia of the bars."""
+    inertia = _inertia(scene.linkage)
+    return _work(scene) / inertia if inertia else math.inf
+
+
+def _pad(scene: Scene) -> float:
+    return fitted_pad(_quickness(scene), load_ratio(scene))
+
+
+def _quickness(scene: Scene) -> float:
+    """The greater of omega_2^2 and |alpha_2|: by it the accelerations of all bars scale, rad/s^2."""
+    return max((scene.motion.omega_2 or AT_REST) ** 2, abs(scene.motion.alpha_2))
+
+
+def _inertia(linkage: FourBar) -> float:
+    """Sum of m L^2 + I, kg m^2."""
+    longest = max(linkage.lengths)
+    inertia = 0.0
     for number in MOVING_BARS:
-        bar = scene.linkage.bar(number)
+        bar = linkage.bar(number)
         assert bar.inertia is not None and bar.centre is not None
         arm = max(longest, abs(bar.centre[0]))
         inertia += bar.mass * arm * arm + bar.inertia
-    for term in (*scene.loads, *scene.effects):
-        work += term.couple(scene.linkage, speed)
-    return settings.flywheel * (inertia + work / speed**2)
+    return inertia
+
+
+def _work(scene: Scene) -> float:
+    """Sum of the couples that loads and effects may ask of the drive, by the accelerations' scale, kg m^2."""
+    quickness = _quickness(scene)
+    couples = (term.couple(scene.linkage, math.sqrt(quickness)) for term in (*scene.loads, *scene.effects))
+    return sum(couples) / quickness
 
 
 class Start(NamedTuple):

@@ -153,6 +153,7 @@ class Model:
             return body
         end = body
         if self.settings.pad is not None:
+            assert not isinstance(self.settings.pad, str)  # the document has fitted it
             # massless and welded: it only moves the point at which MuJoCo measures how soft the closure may be
             end = ET.SubElement(body, "body", name=f"{BAR_NAMES[number]}_pad")
             place = text(self.settings.pad * bar.length, 0.0, 0.0)

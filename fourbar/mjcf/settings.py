@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from typing import Literal
 
 from fourbar.errors import LimitError
 
@@ -20,7 +21,8 @@ class Settings:
     time_constant_steps : solref's time constant of the loop's closure, in timesteps.
     impedance : solimp's impedance d; MuJoCo clamps it at 0.9999.
     pad : where the inertial frame of the massless pads that carry the closure lies, as a part of
-        the bar's length: the softness of the closure goes as its square. None: no pads.
+        the bar's length: the softness of the closure goes as its square. None: no pads; "fitted": to
+        the speed and the loads (`fitted_pad`).
     solver, tolerance, iterations : of the constraint solver. MuJoCo divides the tolerance by the
         flywheel's inertia, so only 0 is tight, and the number of iterations is then what stops it.
     flywheel : inertia on pin O2 relative to the linkage's own; the speed ripples by about its inverse.
@@ -29,11 +31,11 @@ class Settings:
     timestep: float | None = None
     timestep_scale: float = 1.0
     steps_per_revolution: float = 628.0
-    steps_per_window: int = 1200
+    steps_per_window: int = 2000
     integrator: str = "RK4"
     time_constant_steps: float = 20.0
     impedance: float = 0.9999
-    pad: float | None = 1e-4
+    pad: float | Literal["fitted"] | None = "fitted"
     solver: str = "Newton"
     tolerance: float = 0.0
     iterations: int = 10
@@ -41,6 +43,27 @@ class Settings:
 
 
 RECIPE = Settings()
+STIFF_PAD, SOFT_PAD = 1e-4, 2e-3
+"""Stiff: the closure's softness plays no part above 1e-9. Soft: its forces have 7 digits after a single pass."""
+QUICK = 1.0
+"""rad/s^2. Newton stops where a pass moves the accelerations by less than 1e-15 rad/s^2 (mjMINVAL): below about
+this acceleration there is no second pass, and with stiff pads the forces of the first are wrong by up to 1e-3."""
+
+
+def fitted_pad(acceleration: float, load_ratio: float) -> float:
+    """The pad that leaves the closure stiff enough for the loads, and soft enough for one pass of Newton's method.
+
+    The sag of the closure grows as pad^2 times the loads, the rounding of one pass as 1/(pad^2 times the loads).
+
+    Parameters
+    ----------
+    acceleration : of the input's motion, omega_2^2 or alpha_2, rad/s^2.
+    load_ratio : loads and weights by the inertial forces.
+    """
+    least_sag = SOFT_PAD / math.sqrt(1.0 + load_ratio)
+    return least_sag if acceleration < QUICK else min(STIFF_PAD, least_sag)
+
+
 FULL_TURN = 2.0 * math.pi * (1.0 - 1e-9)
 """rad; a sweep over 0..360 deg may miss the turn by its rounding."""
 
@@ -75,7 +98,9 @@ class Run:
             return settings.timestep * settings.timestep_scale
         duration = self.time(self.stop)
         per_revolution = duration * self.fastest / (2.0 * math.pi) * settings.steps_per_revolution
+        # at the greatest speed throughout: an input that speeds up covers the end of its window in few steps
+        width = abs(self.stop - self.start)
+        window = settings.steps_per_window * duration * self.fastest / width if 0.0 < width < FULL_TURN else 1.0
         # a window of 628 steps per revolution must not become one more by a rounding
-        window = settings.steps_per_window if abs(self.stop - self.start) < FULL_TURN else 1
-        steps = max(math.ceil(per_revolution * (1.0 - 1e-9)), window, at_least)
+        steps = max(math.ceil(max(per_revolution, window) * (1.0 - 1e-9)), at_least)
         return duration / steps * settings.timestep_scale

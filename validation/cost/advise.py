@@ -75,7 +75,7 @@ class Advice:
         found = f"torque {e.torque:.1e}, worst pin force {e.force:.1e}"
         dial = (
             f"RK4, {self.best.steps} steps ({self.steps_per_revolution:.0f} per revolution), "
-            f"tc = {s.time_constant_steps:.3g} steps, pads {s.pad:g}, tolerance 0, flywheel {s.flywheel:g}"
+            f"tc = {s.time_constant_steps:.3g} steps, pads {s.pad}, tolerance 0, flywheel {s.flywheel:g}"
         )
         if self.reached:
             return f"{dial}: {found}, asked {self.asked:g}"
