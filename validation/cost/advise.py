@@ -5,7 +5,7 @@ The laws of the study say where to look, and short runs of the scene itself deci
     the closure's time constant    error = STIFF (h/tc)^4, whatever the timestep        -> tc in steps
     the timestep                   error ~ h^ORDER until a floor                         -> steps
 
-With pads the softness of the closure plays no part above 1e-9, so that tc may be long.
+With fitted pads the softness of the closure plays no part above 1e-9 (1e-6 in a slow linkage), so that tc may be long.
 """
 
 from dataclasses import dataclass
