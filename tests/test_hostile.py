@@ -21,10 +21,11 @@ from validation.cli import status
 from validation.report.summary import Summary
 from validation.report.terminal import table
 from validation.results import COLUMNS, FAILS, from_csv
-from validation.run import chosen, run
+from validation.run import run
 from validation.suite import pool
 from validation.suite.memory import WORKER_MEMORY
 from validation.suite.scenes import LARGEST_LIST, suite_file
+from validation.suite.selection import chosen
 from validation.tolerance import EQUIVALENCE
 from validation.witnesses import Witness
 

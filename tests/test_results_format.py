@@ -9,9 +9,10 @@ import pytest
 
 from validation.report.summary import SCENES_SHOWN
 from validation.results import COLUMNS, Row, from_csv
-from validation.run import CHUNK, chosen, run
+from validation.run import CHUNK, run
 from validation.suite.random import LinkageType
 from validation.suite.scenes import Random
+from validation.suite.selection import chosen
 
 PAGE = (Path(__file__).parents[1] / "docs" / "results-format.md").read_text()
 TYPES = {"string": str, "double": float, "boolean": bool}

@@ -18,10 +18,11 @@ from tests.scenes import crank_rocker
 from validation.answer import Answer
 from validation.report.summary import SCENES_SHOWN, Summary
 from validation.results import FAILS, from_csv
-from validation.run import chosen, run
+from validation.run import run
 from validation.suite import pool
 from validation.suite.random import LinkageType
 from validation.suite.scenes import Random
+from validation.suite.selection import chosen
 from validation.suite.store import RunningError, Store
 from validation.tolerance import EQUIVALENCE
 from validation.witnesses import Witness
@@ -73,6 +74,7 @@ def judge_all(suite: object, out: Path, witnesses: tuple[Witness, ...] = EXACT, 
     return last
 
 
+@pytest.mark.timeout(300)  # its hangs alone take half a minute, and every new worker imports the harness again
 def test_an_engine_that_crashes_or_hangs_costs_its_own_rows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(pool, "SECONDS_PER_SCENE", 8.0)
     monkeypatch.setattr(validation.run, "CHUNK", {True: 1, False: 2})
@@ -132,6 +134,7 @@ def start(out: Path, count: int, *program: str, stderr: int = subprocess.DEVNULL
         stdout=subprocess.DEVNULL,
         stderr=stderr,
         start_new_session=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # a job in the background inherits it ignored
     )
 
 
@@ -173,15 +176,21 @@ def test_killed_at_random_moments_a_rerun_ends_with_the_same_bytes(tmp_path: Pat
 @pytest.mark.timeout(60 + 20 * KILLS)
 def test_a_worker_killed_at_random_moments_changes_no_byte(tmp_path: Path, undisturbed: Path) -> None:
     rng = np.random.default_rng(SEED + 1)
-    process = start(tmp_path, COUNT)
-    for kill in range(KILLS):
-        wait_for_parts(tmp_path, process, at_least=1 + kill)
-        children = Path(f"/proc/{process.pid}/task/{process.pid}/children")
-        workers = [int(pid) for pid in children.read_text().split()] if children.exists() else []
-        if workers:
-            os.kill(workers[int(rng.integers(len(workers)))], signal.SIGKILL)
-    assert process.wait(timeout=100) == 0
-    assert (tmp_path / "results.csv").read_bytes() == (undisturbed / "results.csv").read_bytes()
+    kills = 0
+    while kills < KILLS:  # a run is over after some ten of them: another one takes the rest
+        out = tmp_path / str(kills)
+        process = start(out, COUNT)
+        before = kills
+        while kills < KILLS and process.poll() is None:
+            wait_for_parts(out, process, at_least=1 + kills - before)
+            children = Path(f"/proc/{process.pid}/task/{process.pid}/children")
+            workers = [int(pid) for pid in children.read_text().split()] if process.poll() is None else []
+            if workers:
+                os.kill(workers[int(rng.integers(len(workers)))], signal.SIGKILL)
+                kills += 1
+        assert process.wait(timeout=100) == 0
+        assert kills > before
+        assert (out / "results.csv").read_bytes() == (undisturbed / "results.csv").read_bytes()
 
 
 def test_interrupted_it_says_130_and_resumes(tmp_path: Path, undisturbed: Path) -> None:

@@ -3,17 +3,18 @@
 import csv
 import io
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 import click
 
-from fourbar.errors import FourBarError, InputError
+from fourbar.errors import DependencyError, FourBarError, InputError
+from fourbar.exits import FAILED, HOLDS
 from fourbar.mjcf import mjcf
 from fourbar.writing import write_text
 from validation.engines.mujoco.picture import pictures
-from validation.hard.suite import HARD_WITNESSES, Hard
+from validation.hard.suite import Hard
 from validation.machine import versions
 from validation.page import Page
 from validation.published import ladder_rows
@@ -26,9 +27,11 @@ from validation.suite import pool
 from validation.suite.columns import write_columns
 from validation.suite.elsewhere import run_elsewhere
 from validation.suite.random import LinkageType
-from validation.suite.scenes import Random, Suite, model_files, scene_files, suite_file
+from validation.suite.scenes import Suite, scene_files
+from validation.suite.selection import askable, chosen, selected
 from validation.suite.store import Store
-from validation.witnesses import WITNESSES, Witness
+from validation.tolerance import IDENTITY
+from validation.witnesses import Witness
 
 WORKERS = 2
 CHUNK = {True: 1, False: 20}
@@ -43,10 +46,12 @@ def run(
     workers: int = WORKERS,
     scheduler: str | None = None,
     published: bool = False,
+    missing: Sequence[tuple[str, str]] = (),
 ) -> Iterator[int | Summary]:
     """Judge a suite into a folder; yields the number of scenes done as they come, at last the summary.
 
     With `published` the report sets what the thesis printed beside what is right, error by error.
+    `missing` are the witnesses that cannot be asked here, each with the reason.
 
     What an interrupted run of the same suite with the same engines and versions left is kept.
     """
@@ -71,9 +76,12 @@ def run(
         for number, pages in answers:
             store.put(number, pages)
             yield len(pages)
-        summary = summarise(store.pages(len(chunks)), ladder_rows() if published else [])
+        held_to = list(dict.fromkeys((IDENTITY, *(witness.tolerance for witness in witnesses))))
+        ladder = ladder_rows() if published else []
+        summary = summarise(store.pages(len(chunks)), ladder, held_to, missing)
         first_lines = write_columns(store.rows(len(chunks)), out)
-        write_about(about([witness.name for witness in witnesses], suite.fingerprint()), out)
+        factors = {witness.name: witness.tolerance.factor for witness in witnesses}
+        write_about(about(factors, suite.fingerprint()), out)
         write_text(out / "timings.csv", timings_csv(store.pages(len(chunks))))
         write_text(out / "report.md", markdown(summary))
         drawn, why_not = mjcf_pictures(suite) if draw and simulated else ({}, "")
@@ -107,40 +115,6 @@ def timings_csv(pages: Iterator[Page]) -> str:
             ratio = t.seconds / page.timings[0].seconds
             writer.writerow([t.scene, t.engine, t.setting, t.positions, f"{t.seconds:.6f}", f"{ratio:.1f}"])
     return text.getvalue()
-
-
-def _suite(
-    scenes: tuple[Path, ...], named: str | None, count: int | None, seed: int, types: str
-) -> tuple[Suite, tuple[Witness, ...]]:
-    """The scenes asked for, and the witnesses with what they are held to there."""
-    if named == "hard":
-        return Hard(), HARD_WITNESSES
-    if named is not None:
-        return suite_file(Path(named)), WITNESSES
-    if count:
-        return Random(count, seed, linkage_types(types)), WITNESSES
-    return scene_files(scenes or model_files()), WITNESSES
-
-
-def chosen(engines: str | None, witnesses: tuple[Witness, ...] = WITNESSES) -> tuple[Witness, ...]:
-    """The witnesses named in a comma-separated list; all of them where there is none."""
-    if engines is None:
-        return witnesses
-    known = {witness.name: witness for witness in witnesses}
-    names = [name.strip() for name in engines.split(",") if name.strip()]
-    for name in names:
-        if name not in known:
-            raise InputError("--engines", name, "must be among " + ", ".join(known))
-    return tuple(witness for name, witness in known.items() if name in names)
-
-
-def linkage_types(text: str) -> tuple[LinkageType, ...]:
-    """The types named in a comma-separated list."""
-    try:
-        return tuple(LinkageType(name.strip()) for name in text.split(","))
-    except ValueError:
-        allowed = ", ".join(kind.value for kind in LinkageType)
-        raise InputError("--type", text, f"must be a comma-separated list of {allowed}") from None
 
 
 def examine(scenes: tuple[Path, ...], mjcf: Path, names: tuple[str, ...], out: Path) -> int:
@@ -204,7 +178,7 @@ def command(
         raise InputError("--random", count, "judges random linkages; leave out the scene files")
     if named is not None and (scenes or count is not None):
         raise InputError("--suite", named, "has its own scenes; leave out scene files and --random")
-    suite, witnesses = _suite(scenes, named, count, seed, types)
+    suite, witnesses = selected(scenes, named, count, seed, types)
     if asked is not None:
         from validation.cost.dial import dialled
 
@@ -216,17 +190,23 @@ def command(
         passed_on += [f"--error={asked!r}"] if asked is not None else []
         passed_on += [f"--suite={named if named == 'hard' else os.path.abspath(named)}"] if named else []
         against = str(run_elsewhere(python, passed_on, out / "elsewhere"))
+    present, missing = askable(chosen(engines, witnesses), by_name=engines is not None)
     columns = (TextColumn("judging"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     result: Any = None
     with Progress(*columns, console=Console(stderr=True)) as progress:
         task = progress.add_task("judging", total=len(suite))
         published = not scenes and named is None and count is None  # the models, the thesis's among them
         for result in run(
-            suite, out, chosen(engines, witnesses), workers=workers, scheduler=scheduler, published=published
+            suite, out, present, workers=workers, scheduler=scheduler, published=published, missing=missing
         ):
             if isinstance(result, int):
                 progress.advance(task, result)
     assert isinstance(result, Summary)
     table(result, out)
-    failed = 1 if result.counts["fails"] else 0
-    return failed if against is None else max(failed, told(baseline(against), out, forms))
+    worse = told(baseline(against), out, forms) if against is not None else 0
+    if result.counts["fails"] or worse:
+        return FAILED
+    if missing:
+        there = ",".join(witness.name for witness in present)
+        raise DependencyError(f"{missing[0][1]}, or say --engines {there} where those are all that is wanted")
+    return HOLDS

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
+from importlib.util import find_spec
 
 import numpy as np
 
@@ -30,22 +31,42 @@ class Witness:
     """Whether it runs through the motion in time."""
     predictor: str = ""
     """ "module:function" that predicts errors from the description; "own": the engine's own residuals do."""
+    library: str = ""
+    """The module that its adapter imports, a key of `REQUIREMENT`; nothing: it needs no more than the formulas."""
 
     def engine(self) -> Engine:
         """The adapter."""
         module, _, name = self.adapter.partition(":")
         return getattr(import_module(module), name)()  # type: ignore[no-any-return]
 
+    def missing(self) -> str | None:
+        """Why it cannot be asked in this environment, or None."""
+        return not_installed(self.library) if self.library else None
+
+
+REQUIREMENT = {"mujoco": "fourbar[mujoco]", "pinocchio": "fourbar[pinocchio]", "flint": "python-flint"}
+"""Module of an engine: what pip installs it by."""
+
+
+def not_installed(library: str) -> str | None:
+    """The reason to give where a module cannot be found, or None; one that is found but broken fails in its rows."""
+    try:
+        found = find_spec(library) is not None
+    except ModuleNotFoundError:
+        found = False
+    return None if found else f'{library} is not installed: pip install "{REQUIREMENT[library]}"'
+
 
 WITNESSES = (
-    Witness("pinocchio-inverse", "validation.engines.pinocchio:PinocchioInverse", EQUIVALENCE),
-    Witness("mujoco-inverse", "validation.engines.mujoco.inverse:MujocoInverse", EQUIVALENCE),
+    Witness("pinocchio-inverse", "validation.engines.pinocchio:PinocchioInverse", EQUIVALENCE, library="pinocchio"),
+    Witness("mujoco-inverse", "validation.engines.mujoco.inverse:MujocoInverse", EQUIVALENCE, library="mujoco"),
     Witness(
         "mujoco-simulated",
         "validation.engines.mujoco.simulate:MujocoSimulated",
         SIMULATED,
         order="validation.engines.mujoco.simulate:observed_order",
         through_time=True,
+        library="mujoco",
     ),
     Witness(
         "energy-method",

@@ -20,12 +20,13 @@ from validation.judge import breakdown
 from validation.page import Record, Timing
 from validation.results import AGREES, DEGRADED, FAILS, REFUSES, Row
 from validation.tolerance import DEGRADED as TIMES_PREDICTED
+from validation.witnesses import not_installed
 
 ENGINES = {
-    "mujoco-forward": ("validation.engines.mujoco.released:MujocoForward", 1e-3),
-    "pinocchio-forward": ("validation.engines.pinocchio_released:PinocchioReleased", 2e-3),
+    "mujoco-forward": ("validation.engines.mujoco.released:MujocoForward", 1e-3, "mujoco"),
+    "pinocchio-forward": ("validation.engines.pinocchio_released:PinocchioReleased", 2e-3, "pinocchio"),
 }
-"""Adapter and step (s) of each engine that integrates by itself."""
+"""Adapter, step (s) and library of each engine that integrates by itself."""
 FULL = {"theta_2": 1e-9, "omega_2": 1e-8, "energy": 1e-10}
 """Errors (rad, of the greatest speed, of the greatest energy) at which a free motion agrees: the formulas
 hold theta_2 to 1e-9 rad over 5 s; a motion of 100 s may amplify that by its duration, so 5 s is the unit."""
@@ -96,7 +97,10 @@ def judge_released(record: Record) -> Record:
         truth = (phi + math.pi / 2, rate)
         ours = Released("formulas", "exact", solution.theta_2, solution.omega_2, np.zeros(len(times)))
         record.rows += _rows(record, ours, None, truth, free.duration)
-    for name, (adapter, step) in ENGINES.items():
+    for name, (adapter, step, library) in ENGINES.items():
+        if reason := not_installed(library):
+            record.left_out.append(f"{name}: {reason}")
+            continue
         try:
             asked = _adapter(adapter)
             begin = time.perf_counter()

@@ -10,7 +10,7 @@ from validation.witnesses import WITNESSES, Witness
 PREDICTION = "validation.hard.prediction:"
 PREDICTORS = {"pinocchio-inverse": "in_world_axes", "mujoco-inverse": "about_mass_centre"}
 """How each exact engine measures lever arms; others work with the data as they are."""
-BALLS = Witness("ball-arithmetic", "validation.hard.exact:BallArithmetic", FULL_ACCURACY)
+BALLS = Witness("ball-arithmetic", "validation.hard.exact:BallArithmetic", FULL_ACCURACY, library="flint")
 
 
 def predicting(witness: Witness) -> Witness:

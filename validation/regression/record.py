@@ -2,6 +2,7 @@
 
 import csv
 import json
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -28,9 +29,10 @@ class About:
     """Engines asked, suite, and the factors of the tolerances."""
 
 
-def about(engines: list[str], suite: str) -> About:
-    """The record of a run made here and now."""
-    settings = {"engines": ", ".join(engines), "suite": suite, "K": repr(K), "simulated": repr(SIMULATED.factor)}
+def about(factors: Mapping[str, float], suite: str) -> About:
+    """The record of a run made here and now; `factors` are the errors allowed to each engine at condition 1."""
+    simulated = factors.get("mujoco-simulated", SIMULATED.factor)
+    settings = {"engines": ", ".join(factors), "suite": suite, "K": repr(K), "simulated": repr(simulated)}
     return About(versions(), machine(), settings)
 
 

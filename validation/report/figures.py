@@ -98,7 +98,8 @@ def _draw_errors(axes: "Axes", quantity: str, record: Record, solution: Solution
 
     good = solution.status_code == OK
     if style_of(answers[0].engine).simulated:
-        allowed = np.full(len(solution), SIMULATED.factor)
+        held_to = (r.allowed for r in record.rows if (r.engine, r.quantity) == (answers[0].engine, quantity))
+        allowed = np.full(len(solution), next(held_to, SIMULATED.factor))
     else:
         allowed = EQUIVALENCE.allowed(condition_of(quantity, record.scene.linkage, solution))
     axes.plot(_base(solution, None), np.where(good, allowed, np.nan), color=ALLOWED, lw=1.1, ls=(0, (5, 2)))

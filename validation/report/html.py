@@ -12,7 +12,7 @@ from validation.page import Page
 from validation.report.colours import by_variable, declarations, style_of
 from validation.report.costs import cost_figure
 from validation.report.markdown import number
-from validation.report.summary import STATEMENT, TOLERANCES, Summary, used
+from validation.report.summary import STATEMENT, Summary, used
 from validation.results import FAILS, REFUSES, Row, sorted_rows, to_csv
 
 ALL_OPEN = 8
@@ -121,7 +121,6 @@ def html(
         cost_figure=Markup(costs) if costs else None,
         no_pictures=no_pictures,
         sections=sections,
-        tolerances=TOLERANCES,
         statement=STATEMENT,
         used=used,
         csv=csv.decode("ascii"),

@@ -2,7 +2,7 @@
 
 import math
 
-from validation.report.summary import STATEMENT, TOLERANCES, Summary, used
+from validation.report.summary import STATEMENT, Summary, used
 
 
 def markdown(summary: Summary) -> str:
@@ -21,7 +21,7 @@ def markdown(summary: Summary) -> str:
     environment.filters["number"] = number
     environment.filters["degrees"] = lambda radians: f"{math.degrees(radians):.3f}"
     template = environment.get_template("report.md.j2")
-    return template.render(s=summary, tolerances=TOLERANCES, statement=STATEMENT, used=used)
+    return template.render(s=summary, statement=STATEMENT, used=used)
 
 
 def number(value: float) -> str:

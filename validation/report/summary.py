@@ -11,7 +11,7 @@ from validation.machine import machine, versions
 from validation.page import Page
 from validation.published.command import LadderRow
 from validation.results import FAILS, REFUSES, VERDICTS, Row
-from validation.tolerance import EPS, EQUIVALENCE, IDENTITY, NOTHING_TO_TELL, SIMULATED, K
+from validation.tolerance import EPS, EQUIVALENCE, IDENTITY, NOTHING_TO_TELL, SIMULATED, K, Tolerance
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,6 +60,10 @@ class Summary:
     """(scene, errors at 4h and 2h and observed order) of the simulated engine."""
     ladder: list[LadderRow]
     """The thesis's errors one by one, from the right answer to the printed ones; empty where not asked for."""
+    tolerances: list[Tolerance]
+    """What the witnesses were held to."""
+    missing: list[tuple[str, str]]
+    """(engine, why it could not be asked here)."""
     pages: list[Page]
     """The scenes shown one by one: those that fail first, at most SCENES_SHOWN."""
 
@@ -69,6 +73,7 @@ KEPT = 1000
 """Rows listed at the most; all of them are in results.csv."""
 TIMED = 1000
 TOLERANCES = (IDENTITY, EQUIVALENCE, SIMULATED)
+"""Of a run with the standing witnesses."""
 STATEMENT = (
     f"K = {K:g} for every exact comparison; where eps/condition > {NOTHING_TO_TELL:g} the row says that nothing can be "
     "told. Errors are relative to the largest magnitude over the positions whose condition is at least 0.1; below that "
@@ -76,7 +81,12 @@ STATEMENT = (
 )
 
 
-def summarise(pages: Iterable[Page], ladder: Sequence[LadderRow] = ()) -> Summary:
+def summarise(
+    pages: Iterable[Page],
+    ladder: Sequence[LadderRow] = (),
+    tolerances: Sequence[Tolerance] = TOLERANCES,
+    missing: Sequence[tuple[str, str]] = (),
+) -> Summary:
     """Condense a run in one pass; what is kept does not grow with the number of scenes."""
     counts: Counter[str] = Counter()
     failures: list[Row] = []
@@ -109,6 +119,8 @@ def summarise(pages: Iterable[Page], ladder: Sequence[LadderRow] = ()) -> Summar
         verdict = f"FAILS: {failed} of {total} comparisons on {many} do not hold"
     else:
         verdict = f"All {total} comparisons on {many} hold"
+    if missing:
+        verdict += f"; not asked: {', '.join(engine for engine, _ in missing)}"
     shown = sorted([*failing, *holding[: SCENES_SHOWN - len(failing)]], key=lambda page: page.name)
     return Summary(
         verdict=verdict,
@@ -132,6 +144,8 @@ def summarise(pages: Iterable[Page], ladder: Sequence[LadderRow] = ()) -> Summar
             if "observed_order" in evidence
         ],
         ladder=list(ladder),
+        tolerances=list(tolerances),
+        missing=list(missing),
         pages=shown,
     )
 

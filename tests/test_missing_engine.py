@@ -1,0 +1,82 @@
+"""An environment without one of the engines: what is left is judged, and what is missing is said."""
+
+import csv
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parent.parent
+BLOCKER = """
+import os
+import sys
+
+
+class Blocker:
+    def find_spec(self, name, path=None, target=None):
+        if name.partition(".")[0] == os.environ["BLOCKED"]:
+            raise ModuleNotFoundError(f"No module named {name!r}", name=name)
+
+
+sys.meta_path.insert(0, Blocker())
+"""
+"""As `sitecustomize` it is imported by every Python started with it on its path, the workers too."""
+WITNESSES = {
+    "mujoco": {"mujoco-inverse", "mujoco-simulated"},
+    "pinocchio": {"pinocchio-inverse"},
+}
+ALL = {"energy-method", *WITNESSES["mujoco"], *WITNESSES["pinocchio"]}
+SCENE = """
+[lengths]
+ground = "4 m"
+input = "1 m"
+coupler = "3 m"
+output = "3 m"
+[bars.coupler]
+mass = "1 kg"
+[motion]
+theta_2 = { from = "10 deg", to = "50 deg", steps = 8 }
+omega_2 = "1 rad/s"
+"""
+
+
+def without(library: str, folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    """`python -m validation run` where a library cannot be imported."""
+    (folder / "sitecustomize.py").write_text(BLOCKER)
+    (folder / "scene.toml").write_text(SCENE)
+    paths = os.pathsep.join((str(folder), str(ROOT)))
+    return subprocess.run(
+        [sys.executable, "-m", "validation", "run", "scene.toml", "--workers", "1", "--out", "out", *arguments],
+        cwd=folder,
+        env={**os.environ, "PYTHONPATH": paths, "BLOCKED": library, "COLUMNS": "200"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+@pytest.mark.parametrize("library", WITNESSES)
+def test_the_others_are_asked_and_the_missing_named_with_the_reason(library: str, tmp_path: Path) -> None:
+    done = without(library, tmp_path)
+    reason = f'{library} is not installed: pip install "fourbar[{library}]"'
+    with (tmp_path / "out" / "results.csv").open() as table:
+        rows = list(csv.DictReader(table))
+    assert {row["engine"] for row in rows} == {"formulas", *(ALL - WITNESSES[library])}
+    assert all(row["passed"] == "true" for row in rows)
+    for name in WITNESSES[library]:
+        assert f"not asked {name}: {reason}" in done.stdout
+        assert f"Not asked: {name}: " in (tmp_path / "out" / "report.html").read_text()
+        assert f"not asked: {name}: " in (tmp_path / "out" / "report.md").read_text()
+    said = done.stderr.strip().splitlines()[-1]
+    assert said.startswith(f"error: {reason}, or say --engines ")
+    assert done.returncode == 3  # the environment, not the formulas
+
+
+def test_asked_for_by_name_nothing_is_run(tmp_path: Path) -> None:
+    done = without("mujoco", tmp_path, "--engines", "energy-method,mujoco-inverse")
+    assert done.stderr.strip() == 'error: mujoco-inverse: mujoco is not installed: pip install "fourbar[mujoco]"'
+    assert done.returncode == 3
+    assert not (tmp_path / "out").exists()
+
