@@ -31,7 +31,7 @@ def _evaluated(solution: Solution, name: str) -> Array:
 
 
 def shaking_force(solution: Solution) -> Array:
-    """Force of the bars on the frame through its pins, F21 + F41 = -(F12 + F14), N, (n, 2) (Norton, ch. 11).
+    """Force of the bars on the frame through its pins, F21 + F41 = -(F12 + F14), N, (n, 2).
 
     A spring with one end on the ground pulls there besides.
     """

@@ -48,7 +48,7 @@ def _at_unit_speed(state: State) -> State:
 def bar_coefficients(state: State) -> Coefficients:
     """h_k = d theta_k/d theta_2 and h_k' = d^2 theta_k/d theta_2^2 of bars 3 and 4.
 
-    Source: Paul, Kinematics and Dynamics of Planar Machinery, ch. 8; Norton, eqs 6.18 and 7.12.
+    Source: B. Paul, Kinematics and Dynamics of Planar Machinery (1979); R. L. Norton, Design of Machinery, ch. 6 and 7.
     """
     moving = _at_unit_speed(state)
     values = (moving.omega_3, moving.omega_4, moving.alpha_3, moving.alpha_4)
@@ -87,7 +87,7 @@ def instant_centres(state: State) -> dict[tuple[int, int], Centre]:
     I12, I23, I34, I14 are the pins; I13 = line O2 A with line B O4, I24 = line A B with line O2 O4
     (Aronhold-Kennedy). Where two such lines coincide the centre is undetermined: x = y = w = 0.
 
-    Source: Norton, Design of Machinery, sec. 6.3-6.4.
+    Source: R. L. Norton, Design of Machinery, ch. 6.
     """
     one = np.ones_like(state.theta_2)
     pins = {(1, 2): "O2", (2, 3): "A", (3, 4): "B", (1, 4): "O4"}

@@ -2,7 +2,7 @@
 
 An array of this kind takes the place of a NumPy array in the formulas themselves; the algorithms
 are Dekker's and Knuth's (Hida, Li, Bailey, "Library for double-double and quad-double arithmetic",
-2007, sections 2-3).
+2007).
 """
 
 import math

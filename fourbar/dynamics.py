@@ -12,7 +12,7 @@ h = (q - theta_1)/2 and Heron's factors in pairs,
     S = sin h/sqrt(E2 + 4 a d sin^2 h),   C = cos h/sqrt(E1 + 4 a d cos^2 h).
 At a change point E1 or E2 is zero and C or S is a constant: nothing there is 0/0.
 
-The reduced equation of motion (Eksergian; Norton, Design of Machinery, ch. 11, gives the power balance) is
+The reduced equation of motion (Eksergian; R. L. Norton, Design of Machinery, ch. 11, has the virtual work) is
     J q'' + J'/2 q'^2 = Q,   J = sum of m |dG/dq|^2 + I theta_k'^2.
 """
 

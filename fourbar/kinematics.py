@@ -1,8 +1,8 @@
 """Loop closure on a branch, angular velocities and accelerations, motion of the points of the bars.
 
-    a e^{i theta_2} + b e^{i theta_3} = d e^{i theta_1} + c e^{i theta_4}        (Norton, ch. 4)
+    a e^{i theta_2} + b e^{i theta_3} = d e^{i theta_1} + c e^{i theta_4}
 
-The position is solved from the triangle A, B, O4 and its four Heron factors, never from the
+(R. L. Norton, Design of Machinery, ch. 4.) The position is solved from the triangle A, B, O4 and its four Heron factors, never from the
 half-angle quadratic: nothing passes through zero at theta = 180 deg, and near a limit position
 the digits that are lost are those that the data themselves do not carry. A term that is zero at
 every position (alpha_2 = 0, theta_1 = 0, a centre on the bar's line) is not evaluated.
@@ -294,7 +294,7 @@ def add_velocities(state: State, omega_2: Array | float) -> None:
     In the triangle A, B, O4, whose side e turns by kappa = d phi/d theta_2 and grows by lambda = e'/e:
         h3 = kappa - sigma lambda cot gamma,  h4 = kappa + sigma lambda cot beta,
         kappa = a (a - d cos psi)/e^2,  lambda = a d sin psi/e^2,  psi = theta_2 - theta_1.
-    The same as Norton's eq. 6.18, but where the ground is short and all bars turn together the
+    The same as Norton's (ch. 6), but where the ground is short and all bars turn together the
     difference of nearly equal speeds keeps its digits.
     """
     coefficients = first_coefficients(state)

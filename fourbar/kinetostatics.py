@@ -1,8 +1,9 @@
 """Inverse dynamics (Newton-Euler): pin forces and the driving torque on bar 2, 3 or 4.
 
 F_ij is the force of bar i on bar j in world axes, T_k the pure couple that ground exerts on the
-driven bar k. The thirteen equations of the free bodies (Norton, ch. 11) are eliminated by hand to
-one 2x2 system whose determinant is the sine between the two bars that are not driven.
+driven bar k. The thirteen equations of the free bodies (Linares Mendoza, section 5.7; R. L. Norton,
+Design of Machinery, ch. 11) are eliminated by hand to one 2x2 system whose determinant is the sine
+between the two bars that are not driven.
 """
 
 from collections.abc import Iterable, Iterator

@@ -45,7 +45,7 @@ def classify(linkage: FourBar) -> LinkageType:
     bars equal: parallelogram; adjacent bars equal: kite, also deltoid or Galloway), three 14 (rhombus).
 
     Source: C. R. Barker, A complete classification of planar four-bar linkages, Mechanism and
-    Machine Theory 20 (1985) 535-554; Norton, Design of Machinery, sec. 2.13.
+    Machine Theory 20 (1985).
     """
     unit = unit_of(linkage)
     lengths = dict(zip(BAR_NAMES, (length / unit for length in linkage.lengths), strict=True))

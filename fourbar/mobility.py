@@ -106,7 +106,7 @@ def limit_positions(linkage: FourBar, bar: int = 2) -> tuple[LimitPosition, ...]
     ----------
     bar : 2, 3 or 4; ValueError otherwise.
 
-    Source: Norton, Design of Machinery, sec. 4.11; Linares Mendoza, eqs 3.7-3.15 (one of each mirror pair).
+    Source: R. L. Norton, Design of Machinery; Linares Mendoza, eqs 3.7-3.15 (one of each mirror pair).
     """
     reach = reach_of(linkage, bar)
     theta_1 = linkage.ground_angle
@@ -185,7 +185,7 @@ def time_ratio(linkage: FourBar) -> float | None:
     """Quick return of a crank-rocker: time of its slower stroke over that of the faster, at constant omega_2.
 
     (2 pi - delta)/delta, delta <= pi the input's angle between the two limits of the output
-    (Norton, sec. 3.4). None where the input does not turn fully or the output has no stroke of its own.
+    (R. L. Norton, Design of Machinery). None where the input does not turn fully or the output has no stroke of its own.
     """
     if not turns_fully(linkage) or change_points(linkage):
         return None

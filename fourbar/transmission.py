@@ -17,7 +17,7 @@ def transmission_angle(state: State) -> Array:
     tan mu = |sin(theta_4 - theta_3)| / |cos(theta_4 - theta_3)|, so mu keeps eps-accuracy near 0 and
     pi/2 as far as the position itself does: |error| about eps/|sin mu|.
 
-    Source: Norton, Design of Machinery, sec. 4.10.
+    Source: R. L. Norton, Design of Machinery.
     """
     return np.arctan2(np.abs(state.sin_mu), np.abs(state.cos_mu))
 
@@ -30,7 +30,7 @@ class TransmissionExtremes(NamedTuple):
     greatest: float
     """rad, in [0, pi]; pi where bars 3, 4 are stretched."""
     theta_2_least: float
-    """rad; where the input has limits the mirror position has the same angle."""
+    """rad, in [theta_1, theta_1 + pi]; where the input has limits the mirror position has the same angle."""
     theta_2_greatest: float
     """rad; likewise."""
 
@@ -77,7 +77,7 @@ def mechanical_advantage(state: State, radius_in: float = 1.0, radius_out: float
     ----------
     radius_in, radius_out : distances of the forces from O2 and O4, m.
 
-    Source: Norton, Design of Machinery, sec. 6.5.
+    Source: R. L. Norton, Design of Machinery.
     """
     with np.errstate(divide="ignore"):
         return np.divide(radius_in / radius_out, speed_ratio(state))

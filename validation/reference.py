@@ -2,7 +2,7 @@
 
 Shares nothing with the formulas: the loop is closed by the complex quadratic in e^{i theta_3}, the
 velocities and accelerations come from the linear systems of the differentiated loop, the pin forces
-and the torque from the full thirteen Newton-Euler equations about the mass centres (Norton, ch. 11).
+and the torque from the full thirteen Newton-Euler equations about the mass centres.
 """
 
 from collections.abc import Callable

@@ -34,7 +34,7 @@ OUTLIER = 3.0
 ROOM = 1.6
 """A clipped axis ends at this multiple of the ordinary size."""
 RECOMMENDED = 40.0
-"""Smallest transmission angle that is usually recommended, deg (Norton, Design of Machinery, sec. 4.10)."""
+"""Smallest transmission angle that is usually recommended, deg (R. L. Norton, Design of Machinery)."""
 Indices = NDArray[np.intp]
 POLE_REASON = {2: "bars 3 and 4 collinear", 3: "ω₃ = 0", 4: "ω₄ = 0"}
 
