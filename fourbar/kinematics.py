@@ -2,10 +2,10 @@
 
     a e^{i theta_2} + b e^{i theta_3} = d e^{i theta_1} + c e^{i theta_4}
 
-(R. L. Norton, Design of Machinery, ch. 4.) The position is solved from the triangle A, B, O4 and its four Heron factors, never from the
-half-angle quadratic: nothing passes through zero at theta = 180 deg, and near a limit position
-the digits that are lost are those that the data themselves do not carry. A term that is zero at
-every position (alpha_2 = 0, theta_1 = 0, a centre on the bar's line) is not evaluated.
+(R. L. Norton, Design of Machinery, ch. 4). The position is solved from the triangle A, B, O4 and its
+four Heron factors, never from the half-angle quadratic: nothing passes through zero at theta = 180 deg,
+and near a limit position the digits that are lost are those that the data themselves do not carry. A term
+that is zero at every position (alpha_2 = 0, theta_1 = 0, a centre on the bar's line) is not evaluated.
 """
 
 from dataclasses import dataclass

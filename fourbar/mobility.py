@@ -185,7 +185,8 @@ def time_ratio(linkage: FourBar) -> float | None:
     """Quick return of a crank-rocker: time of its slower stroke over that of the faster, at constant omega_2.
 
     (2 pi - delta)/delta, delta <= pi the input's angle between the two limits of the output
-    (R. L. Norton, Design of Machinery). None where the input does not turn fully or the output has no stroke of its own.
+    (R. L. Norton, Design of Machinery). None where the input does not turn fully or the output has no
+    stroke of its own.
     """
     if not turns_fully(linkage) or change_points(linkage):
         return None
