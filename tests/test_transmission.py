@@ -70,6 +70,7 @@ def test_extremes_are_those_of_a_scan() -> None:
             assert end == pytest.approx(scanned, abs=HIGHER_ORDER * miss)
         assert found.worst == min(found.least, math.pi - found.greatest)
         for end, where in ((found.least, found.theta_2_least), (found.greatest, found.theta_2_greatest)):
+            assert 0.0 <= where - bars.ground_angle <= math.pi * (1.0 + EPS) + 2.0 * EPS
             e = abs(a * np.exp(1j * where) - d * np.exp(1j * bars.ground_angle))
             assert e**2 == pytest.approx(b * b + c * c - 2 * b * c * math.cos(end), abs=64 * EPS)
     assert kinds == {(True, True), (True, False), (False, True), (False, False)}
@@ -106,6 +107,8 @@ def test_power_in_is_power_out() -> None:
         force_out = mechanical_advantage(state, r_in, r_out) * force_in
         power_out = force_out * r_out * np.asarray(state.omega(4))
         assert power_out == pytest.approx(force_in * r_in * 3.0, rel=16 * EPS)
+        # at equal distances, which is what is taken where none are given, it is the ratio of torques
+        assert mechanical_advantage(state) == pytest.approx(mechanical_advantage(state, 0.7, 0.7), rel=4 * EPS)
 
 
 def test_advantage_where_the_output_stands_and_where_the_input_does() -> None:
@@ -152,3 +155,39 @@ def test_distance_counts_change_points_and_the_dead_centres_of_the_drive() -> No
     assert distance_to_singular(parallelogram, np.array([0.6, 3.5, 0.5 + math.pi / 2])) == pytest.approx(
         [0.1, 0.5 + math.pi - 3.5, math.pi / 2], abs=8 * EPS
     )
+
+
+def test_what_ends_the_input_is_near_for_every_drive_and_branch() -> None:
+    rocker = FourBar(3.0, Bar(2.5), Bar(1.0), Bar(2.2), 0.7)
+    theta_2 = np.linspace(*default_range(rocker), 9)
+    from_its_ends = distance_to_singular(rocker, theta_2)
+    parallelogram = FourBar(2.0, Bar(1.0), Bar(2.0), Bar(1.0), 0.5)
+    for branch in (1, -1, np.where(np.arange(9) < 4, 1, -1)):
+        assert np.array_equal(distance_to_singular(rocker, theta_2, branch=branch), from_its_ends)
+        for drive in (3, 4):
+            assert (distance_to_singular(rocker, theta_2, drive, branch) <= from_its_ends).all()
+        assert distance_to_singular(parallelogram, np.full(9, 0.6), branch=branch) == pytest.approx(0.1, abs=8 * EPS)
+
+
+@pytest.mark.parametrize("branch", [1, -1])
+@pytest.mark.parametrize("drive", [3, 4])
+def test_a_dead_centre_is_where_the_driven_bar_reverses(drive: int, branch: int) -> None:
+    crank = FourBar(3.0, Bar(1.0), Bar(2.5), Bar(2.2), 0.5)
+    theta_2 = np.linspace(0.0, 2.0 * math.pi, 1201)
+    state = close_loop(crank, theta_2, branch)
+    add_velocities(state, 1.0)
+    reverses = np.flatnonzero(np.diff(np.sign(np.asarray(state.omega(drive)))))
+    assert reverses.size == 2
+    step = theta_2[1] - theta_2[0]
+    sides = np.full(theta_2.shape, branch)
+    assert (distance_to_singular(crank, theta_2, drive, sides)[reverses] <= step).all()
+    nearest = np.abs(
+        theta_2[:, None] - theta_2[reverses] - np.array([[-2.0 * math.pi], [0.0], [2.0 * math.pi]])[:, None]
+    )
+    assert distance_to_singular(crank, theta_2, drive, branch) == pytest.approx(nearest.min(axis=(0, 2)), abs=step)
+
+
+def test_distances_of_single_precision_angles_are_in_doubles() -> None:
+    rocker = FourBar(3.0, Bar(2.5), Bar(1.0), Bar(2.2), 0.7)
+    coarse = np.linspace(*default_range(rocker), 9).astype(np.float32)
+    assert np.array_equal(distance_to_singular(rocker, coarse), distance_to_singular(rocker, coarse.astype(float)))
