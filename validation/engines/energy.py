@@ -30,8 +30,9 @@ class EnergyMethod:
             self.name,
             "exact",
             assembled=(at.outer >= 0.0) & (at.inner >= 0.0),
-            shared="the powers of loads and effects, with State.velocity and State.omega from which they are computed",
-            own="the triangle and its limits (python-flint decides), kinematic coefficients, equivalent inertia, "
+            shared="the powers of loads and effects, with State.velocity and State.omega from which they are computed; "
+            "the idea, not the code, of the triangle A, B, O4",
+            own="positions and limits (python-flint decides near them), kinematic coefficients, equivalent inertia, "
             "virtual work",
         )
         answer.quantities["theta_3"] = np.angle(way.unit[3])
