@@ -164,7 +164,7 @@ FAULTS = {
     "force sign flipped": lambda: formulas_say(flip("F43")),
     "F32 for F23": lambda: formulas_say(flip("F32")),
     "F12 sign flipped": lambda: formulas_say(flip("F12")),
-    "branch swapped": lambda: replaced(fourbar.scene, "close_loop", on_the_other_branch(fourbar.scene.close_loop)),
+    "branch swapped": lambda: replaced(fourbar.blocks, "close_loop", on_the_other_branch(kinematics.close_loop)),
     "inertia about the pin": lambda: formulas_see(with_bars(inertia_about_the_pin)),
     "m d^2 added to an inertia about G": lambda: formulas_see(with_bars(inertia_shifted_twice)),
     "mass centre from the wrong pin": lambda: formulas_see(with_bars(centre_from_the_other_pin)),
