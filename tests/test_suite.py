@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import validation.run
-from fourbar.errors import FourBarError
+from fourbar.errors import FourBarError, InputError
 from fourbar.scene import Command, Scene
 from tests.scenes import crank_rocker
 from validation.answer import Answer
@@ -21,7 +21,7 @@ from validation.results import FAILS, from_csv
 from validation.run import run
 from validation.suite import pool
 from validation.suite.random import LinkageType
-from validation.suite.scenes import Random
+from validation.suite.scenes import MOST_POSITIONS, Files, Random, scene_files
 from validation.suite.selection import chosen
 from validation.suite.store import RunningError, Store
 from validation.tolerance import EQUIVALENCE
@@ -218,3 +218,25 @@ def test_a_read_only_folder_is_said(tmp_path: Path) -> None:
     tmp_path.chmod(0o500)
     with pytest.raises((OSError, FourBarError)):
         judge_all(Few(), tmp_path / "run")
+
+
+@pytest.mark.parametrize(
+    ("asked", "key"),
+    [
+        ('theta_2 = { from = "0 deg", to = "9 deg", steps = %d }', "motion.theta_2"),
+        ('theta_2 = "1 deg"\nfree = { duration = "1 s", steps = %d }', "motion.free"),
+    ],
+)
+def test_a_scene_of_too_many_positions_is_refused_before_anything_runs(asked: str, key: str, tmp_path: Path) -> None:
+    lengths = '[lengths]\nground = "4 m"\ninput = "1 m"\ncoupler = "3 m"\noutput = "3 m"\n'
+    masses = '[bars.input]\nmass = "1 kg"\n[bars.coupler]\nmass = "1 kg"\n[bars.output]\nmass = "1 kg"\n'
+    path = tmp_path / "long.toml"
+    path.write_text(f"{lengths}{masses}[motion]\n{asked % (MOST_POSITIONS - 1)}\n")
+    assert scene_files([path]).positions == MOST_POSITIONS
+    path.write_text(f"{lengths}{masses}[motion]\n{asked % MOST_POSITIONS}\n")
+    with pytest.raises(InputError, match=rf"{key}.steps = {MOST_POSITIONS}: must be below {MOST_POSITIONS} in a run"):
+        scene_files([path])
+
+
+def test_a_scene_of_many_positions_has_longer_before_it_counts_as_hanging() -> None:
+    assert pool.longest(Files((), 50_000)) > 20 * pool.longest(Random(1, 0, TYPES))

@@ -189,7 +189,7 @@ def _by_prediction(error: Array, where: Mask, tolerance: Tolerance, predicted: C
     ratio[where & ~np.isfinite(error)] = np.inf
     index = int(np.argmax(np.where(beyond, ratio, -1.0) if beyond.any() else ratio))
     if not beyond.any():
-        verdict, reason = AGREES, f"{tolerance.name}: as at condition 1"
+        verdict, reason = AGREES, tolerance.name
     elif expected[index] >= 1.0 and math.isfinite(error[index]):
         verdict, reason = DEGRADED, f"nothing can be told: {expected[index]:.1e} of the value is predicted"
     elif ratio[index] <= 1.0:

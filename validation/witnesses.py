@@ -66,6 +66,7 @@ WITNESSES = (
         SIMULATED,
         order="validation.engines.mujoco.simulate:observed_order",
         through_time=True,
+        predictor="own",
         library="mujoco",
     ),
     Witness(

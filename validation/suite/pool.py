@@ -18,6 +18,8 @@ from validation.witnesses import Witness
 
 SECONDS_PER_SCENE = 60.0
 """A scene takes 0.05 to 3 s; one that takes longer than this hangs."""
+SECONDS_PER_POSITION = 0.03
+"""Ten times what a position takes with all engines: scenes of many positions have that much longer."""
 IN_FLIGHT = 4
 """Chunks submitted per worker: enough to keep it busy, few enough to keep the memory bounded."""
 STALL = 20.0
@@ -33,8 +35,13 @@ class StalledError(Exception):
 def part(suite: Suite, scenes: Sequence[int]) -> tuple[Suite, Sequence[int]]:
     """What a worker needs of a suite: of files those scenes alone, else each task would carry all the texts."""
     if isinstance(suite, Files):
-        return Files(tuple(suite.texts[i] for i in scenes)), range(len(scenes))
+        return replace(suite, texts=tuple(suite.texts[i] for i in scenes)), range(len(scenes))
     return suite, scenes
+
+
+def longest(suite: Suite) -> float:
+    """Seconds after which a scene of the suite is taken to hang."""
+    return SECONDS_PER_SCENE + SECONDS_PER_POSITION * (suite.positions if isinstance(suite, Files) else 0)
 
 
 def judge_chunk(suite: Suite, scenes: Sequence[int], witnesses: Sequence[Witness], draw: bool) -> list[Page]:
@@ -75,7 +82,7 @@ def _over_one_pool(
         try:
 
             def submit(scenes: Sequence[int], asked: Sequence[Witness]) -> Future[list[Page]]:
-                seconds = SECONDS_PER_SCENE * len(scenes)
+                seconds = longest(suite) * len(scenes)
                 future: Future[list[Page]] = pool.schedule(
                     judge_chunk, args=(*part(suite, scenes), asked, draw), timeout=seconds
                 )

@@ -10,9 +10,12 @@ from typing import Protocol
 
 from fourbar.errors import InputError
 from fourbar.files import loads, read_text
+from fourbar.motion import DEFAULT_STEPS, Free, Sweep
 from fourbar.scene import Scene
 from validation.suite.random import LinkageType, random_scene
 
+MOST_POSITIONS = 100_000
+"""Of a scene in a run, where every engine solves each of them: 3 ms each, with all engines."""
 MODELS = Path(__file__).parent.parent.parent / "models"
 
 
@@ -37,6 +40,8 @@ class Files:
 
     texts: tuple[tuple[str, str], ...]
     """(name, text of the file), sorted by name."""
+    positions: int = 0
+    """The most that any of them asks for."""
 
     def __len__(self) -> int:
         return len(self.texts)
@@ -86,14 +91,25 @@ def scene_files(paths: Iterable[Path]) -> Files:
     files = list(dict.fromkeys(Path(path) for path in paths))
     stems = Counter(file.stem for file in files)
     texts = []
+    most = 0
     for file in files:
         name = file.stem if stems[file.stem] == 1 else file.with_suffix("").as_posix()
         text = read_text(file)
-        loads(text, str(file))
+        most = max(most, _positions(loads(text, str(file)), file))
         texts.append((name, text))
     if not texts:
         raise InputError("SCENE", [], "no scene file to run")
-    return Files(tuple(sorted(texts)))
+    return Files(tuple(sorted(texts)), most)
+
+
+def _positions(scene: Scene, file: Path) -> int:
+    """How many positions a scene asks for; InputError beyond MOST_POSITIONS."""
+    for key, asked in (("motion.theta_2", scene.motion.theta_2), ("motion.free", scene.motion.free)):
+        if isinstance(asked, (Sweep, Free)):
+            if asked.steps >= MOST_POSITIONS:
+                raise InputError(f"{key}.steps", asked.steps, f"must be below {MOST_POSITIONS} in a run", str(file))
+            return asked.steps + 1
+    return DEFAULT_STEPS + 1
 
 
 LARGEST_LIST = 16 * 2**20
