@@ -1,8 +1,8 @@
 """A scene that moves: one self-contained web page, or a film (GIF, MP4).
 
 The page needs nothing but a browser: no network, no library. Its numbers are those of
-`fourbar.solve`, embedded for both branches; the position formula runs in the page as well, so
-that the picture follows when a length is changed.
+`fourbar.solve`, embedded for both branches (of a motion through time: for its own); the position
+formula runs in the page as well, so that the picture follows when a length is changed.
 """
 
 import base64
@@ -22,9 +22,11 @@ import numpy as np
 from fourbar.errors import InputError, NotAssembledError
 from fourbar.kinematics import Array, centre_in_bar
 from fourbar.linkage import BAR_NAMES, MOVING_BARS
+from fourbar.plot.energy import energies
 from fourbar.plot.style import length_unit, plain
-from fourbar.plot.view import on_branch, sweep_command
+from fourbar.plot.view import on_branch, over_time, sweep_command
 from fourbar.scene import Command, Scene, command, solve
+from fourbar.solution import Solution
 from fourbar.writing import write_text
 
 FORMATS = ("html", "gif", "mp4")
@@ -34,6 +36,8 @@ MAX_PICTURE = 2_000_000
 """Bytes of one picture: a page with three of them still opens quickly."""
 RASTER = {b"\x89PNG\r\n\x1a\n": "image/png", b"\xff\xd8\xff": "image/jpeg"}
 """First bytes of the formats that may be attached; SVG may not, because it can carry scripts."""
+WATCHED = (1.5, 60.0)
+"""A motion through time that lasts between these, s, is shown in real time."""
 SCALARS = (
     "theta_3",
     "theta_4",
@@ -56,7 +60,7 @@ def write(
     *,
     pictures: Mapping[str, str | Path] | None = None,
     file_format: str | None = None,
-    seconds: float = 6.0,
+    seconds: float | None = None,
 ) -> None:
     """Write a moving scene to a file, whole or not at all.
 
@@ -67,7 +71,7 @@ def write(
         bar, its left edge at the bar's first pin (O2, A, O4) and its right edge at the second.
         Pages only.
     file_format : html, gif or mp4 where the path's ending does not say it.
-    seconds : duration of one sweep in a film.
+    seconds : duration of a film; left out: 6 s for a sweep, of a motion through time its own.
 
     Raises
     ------
@@ -122,15 +126,11 @@ def embedded(value: object) -> str:
 def page_data(scene: Scene, pictures: Mapping[str, str | Path]) -> dict[str, Any]:
     """Everything the page's script needs: SI units, radians, null where there is no value."""
     linkage, motion = scene.linkage, scene.motion
-    where = thinned(sweep_command(scene))
-    branches = {str(sign): _columns(on_branch(scene, sign), where.theta_2) for sign in (1, -1)}
-    closes = [theta_3 is not None for theta_3 in branches[str(motion.branch)]["theta_3"]]
+    shown = _through_time(scene) if over_time(scene) else _sweep(scene)
+    closes = [theta_3 is not None for theta_3 in shown["branches"][str(motion.branch)]["theta_3"]]
     if not any(closes):
         raise NotAssembledError("nothing to show: the linkage assembles at none of the scene's positions")
-    own = command(scene).theta_2
-    start = closes.index(True)
-    if len(own) == 1:
-        start = int(np.argmin(np.abs(np.angle(np.exp(1j * (where.theta_2 - own[0]))))))
+    shown["start"] = closes.index(True) if shown["start"] is None else shown["start"]
     factor, unit = length_unit(max(linkage.lengths))
     return {
         "lengths": list(linkage.lengths),
@@ -141,15 +141,57 @@ def page_data(scene: Scene, pictures: Mapping[str, str | Path]) -> dict[str, Any
             for number in MOVING_BARS
         },
         "drive_bar": scene.drive_bar,
-        "omega_2": motion.omega_2,
-        "alpha_2": motion.alpha_2,
         "branch": motion.branch,
         "followed": motion.through == "follow",
-        "theta_2": where.theta_2.tolist(),
-        "start": start,
-        "branches": branches,
         "pictures": {str(number): picture for number, picture in _pictures(pictures).items()},
-        "pace": _pace(motion.omega_2, where.theta_2, len(sweep_command(scene).theta_2)),
+        **shown,
+    }
+
+
+def _sweep(scene: Scene) -> dict[str, Any]:
+    """Both branches over theta_2."""
+    motion = scene.motion
+    asked = sweep_command(scene)
+    where = thinned(asked)
+    own, start = command(scene).theta_2, None
+    if len(own) == 1:
+        start = int(np.argmin(np.abs(np.angle(np.exp(1j * (where.theta_2 - own[0]))))))
+    return {
+        "omega_2": motion.omega_2,
+        "alpha_2": motion.alpha_2,
+        "theta_2": where.theta_2.tolist(),
+        "time": None,
+        "rate": None,
+        "start": start,
+        "branches": {str(sign): _columns(on_branch(scene, sign), where.theta_2) for sign in (1, -1)},
+        "pace": _pace(motion.omega_2, where.theta_2, len(asked.theta_2)),
+    }
+
+
+def _through_time(scene: Scene) -> dict[str, Any]:
+    """The one motion that the scene makes: released, or by a law."""
+    asked = solve(scene)
+    assert asked.time is not None and asked.omega_2 is not None and asked.alpha_2 is not None
+    where = thinned(Command(asked.theta_2, asked.branch, asked.omega_2, asked.alpha_2, time=asked.time))
+    assert where.time is not None
+    solution = solve(scene, at=where)
+    solution.time = where.time
+    columns = _solved(solution)
+    columns["theta_2"] = where.theta_2.tolist()
+    if scene.motion.free is not None:
+        del columns["torque"]
+        columns["energy"] = [_or_null(value) for value in energies(scene, solution).kinetic.tolist()]
+    duration = float(where.time[-1] - where.time[0])
+    rate = _rate(duration)
+    return {
+        "omega_2": None,
+        "alpha_2": 0.0,
+        "theta_2": where.theta_2.tolist(),
+        "time": where.time.tolist(),
+        "rate": rate,
+        "start": None,
+        "branches": {str(scene.motion.branch): columns},
+        "pace": _pace_in_time(scene, asked, rate, len(where.time)),
     }
 
 
@@ -159,7 +201,8 @@ def thinned(where: Command) -> Command:
     if n <= MAX_ROWS:
         return where
     keep = np.round(np.linspace(0, n - 1, MAX_ROWS)).astype(int)
-    return where._replace(theta_2=where.theta_2[keep], branch=where.branch[keep])
+    rows = {name: value[keep] for name, value in where._asdict().items() if isinstance(value, np.ndarray)}
+    return where._replace(**rows)
 
 
 def _pace(omega_2: float | None, theta_2: Array, asked: int) -> str:
@@ -173,10 +216,40 @@ def _pace(omega_2: float | None, theta_2: Array, asked: int) -> str:
     return words + "."
 
 
+def _rate(duration: float) -> float:
+    """Seconds of a motion shown in one second: 1, or the power of ten that makes it last neither too short nor long."""
+    if duration <= 0.0:
+        return 1.0
+    shortest, longest = WATCHED
+    if duration < shortest:
+        return float(10.0 ** math.floor(math.log10(duration / shortest)))
+    return float(10.0 ** math.ceil(math.log10(duration / longest))) if duration > longest else 1.0
+
+
+def _pace_in_time(scene: Scene, asked: Solution, rate: float, shown: int) -> str:
+    """What speed 1 means, where the motion ends before its time, and whether instants were left out."""
+    assert asked.time is not None
+    words = "At speed 1× it moves in real time"
+    if rate < 1.0:
+        words = f"At speed 1× it moves {1.0 / rate:.0f} times slower than it really does"
+    elif rate > 1.0:
+        words = f"At speed 1× it moves {rate:.0f} times faster than it really does"
+    free = scene.motion.free
+    if free is not None and len(asked) <= free.steps:
+        words += f". It ends at {asked.time[-1]:.4g} s, where the linkage stops at a limit position"
+    if len(asked) > shown:
+        words += f". Shown are {shown} of the {len(asked)} instants"
+    return words + "."
+
+
 def _columns(scene: Scene, theta_2: Array) -> dict[str, Any]:
     """The solution on one branch, quantity by quantity."""
     own = command(replace(scene, motion=replace(scene.motion, theta_2=theta_2)))
-    solution = solve(scene, at=own)
+    return _solved(solve(scene, at=own))
+
+
+def _solved(solution: Solution) -> dict[str, Any]:
+    """Quantity by quantity, as lists."""
     columns: dict[str, Any] = {"sign": solution.branch.tolist()}
     for name in SCALARS:
         values = getattr(solution, name)

@@ -137,7 +137,7 @@ def mjcf(scene: Path | None, lengths: tuple[str, ...] | None, omega: str | None,
     default="overview",
     show_default=True,
     metavar="NAME",
-    help="overview, linkage, coupler, kinematics, torque, forces, hodograph, transmission or freebody.",
+    help="overview, linkage, coupler, kinematics, torque, forces, hodograph, energy, transmission or freebody.",
 )
 @click.option("--position", metavar="ANGLE", help='theta_2 of the linkage and free bodies, like "135 deg".')
 @click.option("--branches", default="one", show_default=True, metavar="WHICH", help="one or both.")
@@ -161,9 +161,11 @@ def plot(scene: Path, out: Path, figure: str, position: str | None, branches: st
     help="A PNG or JPEG laid along input, coupler or output (pages).",
 )
 @click.option(
-    "--seconds", type=click.FloatRange(min=0.1, max=60.0), default=6.0, show_default=True, help="Length of a film."
+    "--seconds",
+    type=click.FloatRange(min=0.1, max=60.0),
+    help="Length of a film; left out: 6, of a motion through time its own.",
 )
-def animate(scene: Path, out: Path, pictures: tuple[str, ...], seconds: float) -> None:
+def animate(scene: Path, out: Path, pictures: tuple[str, ...], seconds: float | None) -> None:
     """Show a scene moving: one web page (.html), or a film (.gif, .mp4)."""
     from fourbar.animate import write
 

@@ -16,6 +16,7 @@ import pytest
 import fourbar
 from fourbar import animate
 from fourbar.errors import DependencyError, InputError, NotAssembledError
+from fourbar.motion_law import Law
 from tests.scenes import crank_rocker, thesis
 
 HOSTILE = "</script><script>alert(1)</script> \"'><img src=x onerror=alert(2)> $style ${data} {{x}} \u2028 \x00 é"
@@ -63,6 +64,29 @@ def test_a_single_position_is_one_of_the_rows_and_the_first_shown() -> None:
     assert data["theta_2"][data["start"]] == theta_2
     assert data["branches"]["1"]["torque"][data["start"]] == fourbar.solve(thesis(theta_2)).torque[0]
     assert len(data["theta_2"]) > 300
+
+
+RELEASED = crank_rocker(motion=fourbar.Motion(0.5, 0.0, free=fourbar.Free(1.8, 90)), drive_bar=2)
+
+
+def test_a_free_motion_is_embedded_instant_by_instant() -> None:
+    data, solution = embedded(animate.page(RELEASED)), fourbar.solve(RELEASED)
+    (columns,) = data["branches"].values()
+    np.testing.assert_array_equal(data["time"], solution.time)
+    for name in ("theta_2", "theta_4", "omega_2", "alpha_3", "F12"):
+        np.testing.assert_array_equal(np.array(columns[name]), getattr(solution, name))  # to the last bit
+    assert columns["energy"][0] == 0.0 and max(columns["energy"]) > 0.1
+    assert "torque" not in columns  # nothing drives it
+    assert data["rate"] == 1.0 and "real time" in data["pace"]
+
+
+@pytest.mark.parametrize(("duration", "rate"), [(0.2, 0.1), (1.4e-3, 1e-4), (30.0, 1.0), (6e3, 100.0), (6.1e3, 1e3)])
+def test_what_is_too_quick_to_see_is_slowed_down_by_a_power_of_ten(duration: float, rate: float) -> None:
+    law = Law((0.0, 0.5 * duration, duration), (0.0, 1.0, 2.0), ends="rest")
+    data = embedded(animate.page(crank_rocker(motion=fourbar.Motion(law=law))))
+    assert data["rate"] == pytest.approx(rate)
+    assert 1.5 <= duration / rate <= 60.0
+    assert len(data["branches"]["1"]["torque"]) == 361
 
 
 def test_positions_that_do_not_assemble_are_null() -> None:
@@ -185,6 +209,23 @@ def test_an_ffmpeg_without_the_encoder_is_named(tmp_path: Path, monkeypatch: pyt
     with pytest.raises(DependencyError, match=r"cannot encode H\.264[^\n]*$"):
         animate.write(crank_rocker(), tmp_path / "a.mp4", seconds=0.2)
     assert not list(tmp_path.glob("*.mp4"))
+
+
+def test_a_film_of_a_free_motion_runs_forward_and_as_long_as_it_does(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from PIL import Image
+
+    from fourbar.plot import film as films
+    from fourbar.plot.film import frames
+    from fourbar.plot.view import view
+
+    shown = view(RELEASED)
+    assert np.all(np.diff(frames(shown, 46)) == 2) and shown.sweep.time[frames(shown, 46)[-1]] == 1.8
+    monkeypatch.setattr(films, "FRAMES_PER_SECOND", 5)
+    animate.write(RELEASED, tmp_path / "a.gif")
+    with Image.open(tmp_path / "a.gif") as film:
+        assert film.n_frames == 9
 
 
 def test_a_film_of_a_rocker_goes_there_and_back() -> None:

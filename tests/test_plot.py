@@ -12,8 +12,11 @@ from matplotlib.text import Text
 
 import fourbar
 from fourbar import plot
+from fourbar.effects import Flywheel
 from fourbar.errors import DependencyError, InputError, NotAssembledError
+from fourbar.motion_law import Law
 from fourbar.plot.curves import broken, limit_of, poles
+from fourbar.plot.energy import energies
 from fourbar.plot.figures import FIGURES, compose
 from fourbar.plot.freebody import free_body
 from fourbar.plot.style import matplotlib_style, number, plain, unit_for
@@ -66,7 +69,18 @@ def texts_shown(figure):
     return [(t.get_text(), t.get_window_extent(renderer)) for t in shown]
 
 
-@pytest.mark.parametrize("name", sorted(FIGURES))
+def clashes(figure) -> list[tuple[str, str]]:
+    """Texts that cover each other."""
+    texts = texts_shown(figure)
+    return [
+        (p, q)
+        for k, (p, a) in enumerate(texts)
+        for q, b in texts[k + 1 :]
+        if min(a.x1, b.x1) - max(a.x0, b.x0) > TOUCH and min(a.y1, b.y1) - max(a.y0, b.y0) > TOUCH
+    ]
+
+
+@pytest.mark.parametrize("name", sorted(set(FIGURES) - {"energy"}))
 def test_every_figure_draws_both_branches_and_no_texts_overlap(name: str) -> None:
     for scene, branches in ((crank_rocker(), "both"), (thesis(), "one")):
         figure = composed(scene, name, branches)
@@ -74,13 +88,7 @@ def test_every_figure_draws_both_branches_and_no_texts_overlap(name: str) -> Non
         assert len(texts) > 5
         for text, box in texts:
             assert page.x0 <= box.x0 and box.x1 <= page.x1 and page.y0 <= box.y0 and box.y1 <= page.y1, text
-        clashes = [
-            (p, q)
-            for k, (p, a) in enumerate(texts)
-            for q, b in texts[k + 1 :]
-            if min(a.x1, b.x1) - max(a.x0, b.x0) > TOUCH and min(a.y1, b.y1) - max(a.y0, b.y0) > TOUCH
-        ]
-        assert not clashes
+        assert not clashes(figure)
 
 
 def test_every_axis_of_theta_2_is_in_degrees_and_every_axis_has_a_unit() -> None:
@@ -209,10 +217,82 @@ def test_a_position_that_does_not_assemble_is_refused(tmp_path: Path) -> None:
         plot.draw(thesis(), tmp_path / "a.png", "linkage", position=math.radians(45.0))
 
 
-def test_a_free_motion_is_refused_in_one_line(tmp_path: Path) -> None:
-    motion = replace(crank_rocker().motion, theta_2=0.5, free=fourbar.Free(1.0, 10))
-    with pytest.raises(InputError, match=r"motion\.free"):
-        plot.draw(crank_rocker(motion=motion), tmp_path / "a.svg")
+def released(steps: int = 600, **changes: object) -> fourbar.Scene:
+    """The crank-rocker let go from rest under gravity, a load and damping."""
+    motion = fourbar.Motion(0.5, 0.0, free=fourbar.Free(1.2, steps))
+    parts = {"motion": motion, "effects": (fourbar.Gravity(), fourbar.Viscous.at(O2=0.002, B=0.001)), **changes}
+    return crank_rocker(**parts)
+
+
+def by_law() -> fourbar.Scene:
+    law = Law((0.0, 1.0, 2.0), (0.3, 2.0, 1.0), ends="rest")
+    return crank_rocker(motion=fourbar.Motion(law=law), drive_bar=4)
+
+
+@pytest.mark.parametrize("scene", (released(60), by_law()), ids=("released", "by law"))
+def test_a_motion_through_time_is_drawn_over_time(scene: fourbar.Scene) -> None:
+    solution = fourbar.solve(scene)
+    drawn = {line.get_label(): line for panel in composed(scene, "kinematics").axes for line in panel.lines}
+    for name, values in ((r"$\theta_2$", np.degrees(solution.theta_2)), (r"$\omega_4$", solution.omega_4)):
+        np.testing.assert_allclose(drawn[name].get_xdata(), solution.time)
+        np.testing.assert_allclose(drawn[name].get_ydata(), values)
+    free = scene.motion.free is not None
+    for name in ("overview", "energy" if free else "torque"):
+        figure = composed(scene, name)
+        assert not clashes(figure), name
+        flat = [axes for axes in figure.axes if axes.name == "rectilinear" and axes.axison]
+        assert all(axes.get_xlabel().endswith(("(s)", "m)")) for axes in flat)
+
+
+def test_the_position_of_a_motion_through_time_is_one_that_it_passes(tmp_path: Path) -> None:
+    shown = view(released(), position=0.3)
+    k = int(np.argmin(np.abs(shown.sweep.theta_2 - 0.3)))
+    assert shown.here.time[0] == shown.sweep.time[k] and shown.here.F12[0] == pytest.approx(shown.sweep.F12[k])
+    with pytest.raises(NotAssembledError, match="does not pass"):
+        plot.draw(released(), tmp_path / "a.svg", position=9.0)
+
+
+ENERGY = 1e-6
+"""Of the work against the kinetic energy, relative: the spline's (dt omega)^4, its instants 2 ms apart."""
+
+
+def test_the_work_of_what_acts_is_the_kinetic_energy() -> None:
+    from fourbar.dynamics import carrying, kinetic_energy, path
+
+    scene = released(effects=(fourbar.Gravity(), fourbar.Viscous.at(O2=0.002, B=0.001), Flywheel(0.01, 4)))
+    motion = fourbar.solve(scene)
+    found = energies(scene, motion)
+    assert set(found.work) == {"loads", "gravity", "viscous"}
+    linkage = carrying(scene.linkage, scene.effects)
+    expected = kinetic_energy(linkage, path(linkage, motion.theta_2, motion.branch), motion.omega_2)
+    np.testing.assert_allclose(found.kinetic, expected, rtol=1e-9, atol=1e-15)
+    assert found.kinetic.max() > 0.1
+    assert np.all(np.diff(found.work["viscous"]) <= 0.0)
+    np.testing.assert_allclose(sum(found.work.values()), found.kinetic, atol=ENERGY * found.kinetic.max())
+    panel = composed(scene, "energy").axes[0]
+    assert panel.get_ylabel() in ("energy (J)", "energy (mJ)")
+
+
+def test_figures_that_a_motion_does_not_have_are_refused_in_one_line(tmp_path: Path) -> None:
+    for scene, figure in ((released(), "torque"), (crank_rocker(), "energy"), (by_law(), "energy")):
+        with pytest.raises(InputError, match="free motion"):
+            plot.draw(scene, tmp_path / "a.svg", figure)
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("name", ("overview", "coupler", "hodograph", "freebody"))
+def test_both_branches_are_drawn_to_one_scale(name: str) -> None:
+    figure = composed(crank_rocker(), name, "both")
+    half = len(figure.axes) // 2
+    assert half and len(figure.axes) == 2 * half
+    figure.draw_without_rendering()
+    for one, other in zip(figure.axes[:half], figure.axes[half:], strict=True):
+        # free bodies move their window with the bar: its width is the scale
+        ends = [np.array([axes.get_xlim(), axes.get_ylim()]) for axes in (one, other)]
+        if one.axison:
+            np.testing.assert_allclose(ends[0], ends[1], rtol=1e-9)
+        np.testing.assert_allclose(np.diff(ends[0]), np.diff(ends[1]), rtol=1e-9)
+        assert one.get_ylabel() == other.get_ylabel()
 
 
 def test_the_settings_of_the_reader_are_left_alone(tmp_path: Path) -> None:

@@ -1,9 +1,11 @@
 // ---- chart ---------------------------------------------------------------------------------
+const INPUT = [["theta_2", "\u03b8\u2082, deg", DEG], ["omega_2", "\u03c9\u2082, rad/s", 1], ["alpha_2", "\u03b1\u2082, rad/s\u00b2", 1]];
 const QUANTITIES = [
+  ...throughTime ? INPUT : [],
   ["theta_3", "\u03b8\u2083, deg", DEG], ["theta_4", "\u03b8\u2084, deg", DEG],
   ["omega_3", "\u03c9\u2083, rad/s", 1], ["omega_4", "\u03c9\u2084, rad/s", 1],
   ["alpha_3", "\u03b1\u2083, rad/s\u00b2", 1], ["alpha_4", "\u03b1\u2084, rad/s\u00b2", 1],
-  ["torque", `torque on bar ${data.drive_bar}, N m`, 1],
+  ["energy", "kinetic energy, J", 1], ["torque", `torque on bar ${data.drive_bar}, N m`, 1],
   ...FORCES.map(name => [name, `|F${name.slice(1).replace(/./g, d => "\u2080\u2081\u2082\u2083\u2084"[d])}|, N`, 1]),
 ];
 const chart = byId("chart");
@@ -21,7 +23,8 @@ function column(name) {
 }
 
 function drawChart() {
-  const available = QUANTITIES.filter(([name]) => edited ? !FORCES.includes(name) && name !== "torque" && (data.omega_2 !== null || name.startsWith("theta")) : name in table());
+  const kinematic = name => /^(theta|omega|alpha)_[34]$/.test(name);
+  const available = QUANTITIES.filter(([name]) => edited ? kinematic(name) && (data.omega_2 !== null || name.startsWith("theta")) : name in table());
   const select = byId("quantity"), wanted = available.some(q => q[0] === select.value) ? select.value : (available.find(q => q[0] === "torque") ?? available[0])[0];
   select.replaceChildren(...available.map(([name, label]) => new Option(label, name, false, name === wanted)));
   const width = Math.max(280, picture.parentElement.clientWidth), height = 170, left = 62, bottom = 26, values = column(wanted);
@@ -33,13 +36,16 @@ function drawChart() {
   if (!wanted.startsWith("theta")) { low = Math.min(low, 0); high = Math.max(high, 0); }
   if (high - low < 1e-300) { high += 1; low -= 1; }
   byId("chart-note").textContent = limit.cut ? `cut at ${text(limit.top, 3)}; it reaches ${text(finite.reduce((m, v) => Math.abs(v) > Math.abs(m) ? v : m, 0), 4)}` : "";
-  const first = grid[0], span = grid[grid.length - 1] - first || 1;
+  const over = timed() ? data.time : grid, first = over[0], span = over[over.length - 1] - first || 1;
   const x = t => left + (width - left - 12) * (t - first) / span, y = v => 10 + (height - 10 - bottom) * (high - v) / (high - low);
-  plotted = { values, x, y, low, high, height, bottom };
-  const step = [15, 30, 45, 60, 90, 180].find(d => span * DEG / d <= Math.max(3, width / 75)) ?? 360;
-  for (let d = Math.ceil(first * DEG / step - 1e-9) * step; d <= (first + span) * DEG + 1e-9; d += step) {
-    make(chart, "line", { class: "axis", x1: x(d / DEG), x2: x(d / DEG), y1: 10, y2: height - bottom });
-    make(chart, "text", { class: "small", x: x(d / DEG), y: height - 9, "text-anchor": "middle" }).textContent = `${d}\u00b0`.replace("-", "\u2212");
+  plotted = { over, values, x, y, low, high, height, bottom };
+  const most = Math.max(3, width / 75), decade = 10 ** Math.floor(Math.log10(span / most));
+  const [factor, sign] = timed() ? [1, " s"] : [DEG, "\u00b0"];
+  const step = timed() ? [1, 2, 5, 10].map(m => m * decade).find(d => span / d <= most) : [15, 30, 45, 60, 90, 180].find(d => span * DEG / d <= most) ?? 360;
+  for (let n = Math.ceil(first * factor / step - 1e-9); n * step <= (first + span) * factor + 1e-9 * step; n++) {
+    const at = x(n * step / factor), shown = String(Number((n * step).toPrecision(12)));
+    make(chart, "line", { class: "axis", x1: at, x2: at, y1: 10, y2: height - bottom });
+    make(chart, "text", { class: "small", x: at, y: height - 9, "text-anchor": at > width - 30 ? "end" : "middle" }).textContent = `${shown}${sign}`.replace("-", "\u2212");
   }
   for (const [v, kind] of [[low, "axis"], [high, "axis"], [0, "zero"]]) {
     if (v < low || v > high) continue;
@@ -51,7 +57,7 @@ function drawChart() {
   values.forEach((v, i) => {
     const jump = i > 0 && limit.cut && v * values[i - 1] < 0 && Math.abs(v - values[i - 1]) > limit.top;   // across a pole no line
     if (!Number.isFinite(v) || v < low || v > high) { open = false; return; }
-    d += (open && !jump ? "L" : "M") + x(grid[i]).toFixed(2) + " " + y(v).toFixed(2);
+    d += (open && !jump ? "L" : "M") + x(over[i]).toFixed(2) + " " + y(v).toFixed(2);
     open = true;
   });
   make(chart, "path", { class: "curve", d });
@@ -60,11 +66,11 @@ function drawChart() {
 }
 
 function moveCursor(i) {
-  const { cursor, dot, values, x, y, low, high } = plotted;
+  const { cursor, dot, over, values, x, y, low, high } = plotted;
   if (!cursor) return;
-  set(cursor, { x1: x(grid[i]), x2: x(grid[i]) });
+  set(cursor, { x1: x(over[i]), x2: x(over[i]) });
   const inside = Number.isFinite(values[i]) && values[i] >= low && values[i] <= high;
   dot.style.display = inside ? "" : "none";
-  if (inside) set(dot, { cx: x(grid[i]), cy: y(values[i]) });
+  if (inside) set(dot, { cx: x(over[i]), cy: y(values[i]) });
 }
 

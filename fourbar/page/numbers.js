@@ -10,10 +10,11 @@ let lengths = data.lengths.slice(), edited = false, branch = data.branch, grid =
 let phase = row, playing = false, direction = data.omega_2 < 0 ? -1 : 1, lastTime = null, lastDraw = 0;
 let view = { width: 0, height: 0, k: 1, x: 0, y: 0 }, forceScale = { top: 0, cut: false };
 
-const table = () => data.branches[branch];
+const throughTime = data.time !== null, timed = () => throughTime && !edited;   // edited lengths are swept over the angle
+const table = () => data.branches[throughTime ? data.branch : branch];
 const signAt = i => edited ? branch : table().sign[Math.min(i, grid.length - 1)];
 const at = i => closeLoop(lengths, data.theta_1, grid[i], signAt(i));
-const dynamic = () => !edited && "torque" in table();
+const shows = name => !edited && name in table(), dynamic = () => shows("F12");
 
 // ---- numbers -------------------------------------------------------------------------------
 function text(value, digits = 5) {
@@ -43,6 +44,7 @@ function valuesAt(i) {
   return out;
 }
 
+const clock = throughTime ? Math.max(2, 3 - Math.floor(Math.log10(data.time[data.time.length - 1] || 1))) : 0;   // decimals of a second
 function showNumbers(i) {
   const v = valuesAt(i);
   for (const k of [2, 3, 4]) {
@@ -53,8 +55,9 @@ function showNumbers(i) {
   byId("condition").textContent = text(v.condition);
   const across = v.theta_3 === undefined || v.theta_3 === null ? null : Math.atan2(Math.abs(Math.sin(v.theta_4 - v.theta_3)), Math.abs(Math.cos(v.theta_4 - v.theta_3)));
   byId("mu").textContent = degrees(across);
+  byId("torque").textContent = text(v.torque);
+  byId("energy").textContent = text(v.energy);
   if (dynamic()) {
-    byId("torque").textContent = text(v.torque);
     for (const name of FORCES) {
       const f = v[name], known = f[0] !== null;
       byId(`${name}_x`).textContent = text(f[0]);
@@ -68,12 +71,13 @@ function showNumbers(i) {
   status.hidden = assembled && !singular;
   status.textContent = !assembled ? "The linkage does not assemble at this position." : singular ? "Coupler and output are in line: velocities have no value here." : "";
   byId("theta").value = i;
-  const here = `${(grid[i] * DEG).toFixed(2)}\u00b0`.replace("-", "\u2212");
-  byId("theta-text").textContent = here;
-  byId("theta").setAttribute("aria-valuetext", `${(grid[i] * DEG).toFixed(2)} degrees`);
+  const here = `${(grid[i] * DEG).toFixed(2)}\u00b0`.replace("-", "\u2212"), instant = timed() ? data.time[i].toFixed(clock) : "";
+  byId("theta-text").textContent = timed() ? `${instant} s` : here;
+  byId("theta").setAttribute("aria-valuetext", timed() ? `${instant} seconds` : `${(grid[i] * DEG).toFixed(2)} degrees`);
   if (!playing) {
     let words = assembled ? `Theta 2 ${here}, theta 3 ${degrees(v.theta_3)}, theta 4 ${degrees(v.theta_4)} degrees` : `Theta 2 ${here}: does not assemble`;
-    if (dynamic() && v.torque !== null) words += `, torque ${text(v.torque, 4)} newton metres`;
+    if (timed()) words = `At ${instant} seconds: ` + words;
+    if (v.torque !== undefined && v.torque !== null) words += `, torque ${text(v.torque, 4)} newton metres`;
     byId("live").textContent = words;
     byId("picture-text").textContent = `Four-bar linkage, ${branch === 1 ? "open" : "crossed"} branch. ${words}`;
   }

@@ -16,7 +16,7 @@ function stretch(i) {   // the positions around i that assemble without a gap
   while (last < grid.length - 1 && at(last + 1)) last++;
   return [first, last];
 }
-const turnsFully = () => Math.abs(grid[grid.length - 1] - grid[0] - TURN) < 1e-6 && grid.every((_, i) => at(i));
+const turnsFully = () => !timed() && Math.abs(grid[grid.length - 1] - grid[0] - TURN) < 1e-6 && grid.every((_, i) => at(i));
 
 let run = null;
 function play(on) {
@@ -25,6 +25,10 @@ function play(on) {
     if (!at(row)) row = grid.findIndex((_, i) => at(i));
     if (row < 0) { row = 0; playing = false; return; }
     run = { bounds: stretch(row), wraps: turnsFully() };
+    if (timed()) {   // once through; from the end it starts anew
+      direction = 1;
+      if (row === run.bounds[1]) row = run.bounds[0];
+    }
     if (run.bounds[0] === run.bounds[1]) { playing = false; return; }
     phase = row; lastTime = null;
     requestAnimationFrame(frame);
@@ -42,7 +46,9 @@ function frame(time) {
   const seconds = lastTime === null ? 0 : Math.min(0.1, (time - lastTime) / 1000);
   lastTime = time;
   const [first, last] = run.bounds, span = last - first;
-  phase += direction * seconds * Number(byId("speed").value) * (grid.length - 1) / SWEEP_SECONDS;
+  const whole = timed() ? (data.time[grid.length - 1] - data.time[0]) / data.rate || 1 : SWEEP_SECONDS;   // its length on the screen, s
+  phase += direction * seconds * Number(byId("speed").value) * (grid.length - 1) / whole;
+  if (timed() && phase >= last) { phase = last; play(false); return; }
   if (run.wraps) phase = first + (((phase - first) % span) + span) % span;
   else {
     if (phase > last) { phase = Math.max(first, 2 * last - phase); direction = -1; }
@@ -90,7 +96,12 @@ function nearest(theta) {
 function refresh() {
   byId("theta").max = grid.length - 1;
   byId("theta").disabled = grid.length < 2;
-  byId("edited").hidden = !edited || !("torque" in table());
+  byId("edited").hidden = !edited || !("F12" in table());
+  byId("branch").parentElement.hidden = timed();
+  for (const element of document.querySelectorAll(".swept")) element.hidden = timed();
+  for (const element of document.querySelectorAll(".timed")) element.hidden = !timed();
+  for (const element of document.querySelectorAll(".driven")) element.hidden = !shows("torque");
+  for (const element of document.querySelectorAll(".energy")) element.hidden = !shows("energy");
   byId("original").disabled = !edited;
   for (const element of document.querySelectorAll(".dynamic")) element.hidden = !dynamic();
   byId("show-forces").disabled = byId("arrow-scale").disabled = !dynamic();
@@ -115,9 +126,11 @@ function readLengths() {
   if (message) return;
   if (playing) play(false);
   lengths = values;
+  const wasTimed = timed();
   edited = values.some((value, k) => value !== data.lengths[k]);
+  const before = row;
   grid = edited ? gridFor(theta) ?? grid : data.theta_2;
-  row = phase = nearest(theta);
+  row = phase = timed() && wasTimed ? before : nearest(theta);
   refresh();
 }
 const shown = value => Number((value * unit.factor).toPrecision(12));
@@ -179,9 +192,13 @@ for (const element of document.querySelectorAll(".unit")) element.textContent = 
 if (data.followed) byId("branch").options[branch === 1 ? 0 : 1].textContent += " (followed)";
 if (!Object.keys(data.pictures).length) byId("show-pictures").parentElement.hidden = true;
 if (!Object.values(data.centres).some(Boolean)) byId("show-centres").parentElement.hidden = true;
-if (data.omega_2 === null) byId("show-forces").parentElement.hidden = true;
-if (data.omega_2 === null) byId("arrow-scale").parentElement.hidden = true;
-else if (ceiling(FORCES.flatMap(name => table()[name].map(f => f[0] === null ? NaN : Math.hypot(f[0], f[1])))).cut) byId("arrow-scale").value = "position";
+if (!dynamic()) byId("show-forces").parentElement.hidden = true;
+if (!dynamic()) byId("arrow-scale").parentElement.hidden = true;
+else {   // one scale for all positions, unless most arrows would then be too short to see
+  const sizes = FORCES.flatMap(name => table()[name].map(f => f[0] === null ? NaN : Math.hypot(f[0], f[1]))).filter(Number.isFinite).sort((x, y) => x - y);
+  const most = ceiling(sizes);
+  if (most.cut || sizes[Math.floor(0.5 * sizes.length)] < 0.1 * most.top) byId("arrow-scale").value = "position";
+}
 byId("pace").textContent = data.pace;
 for (const [k, source] of Object.entries(data.pictures)) {
   const probe = new Image();

@@ -178,7 +178,7 @@ function drawLinkage(p, i) {
     const size = f[0] === null ? 0 : Math.hypot(f[0], f[1]), cut = size > forceScale.top;
     const long = Math.min(size, forceScale.top) * forceScale.pixels, drawn = long > 2;
     for (const element of Object.values(arrow)) element.style.display = drawn ? "" : "none";
-    visible(name, drawn);
+    visible(name, long > 10);   // beside a shorter arrow its name would stand on the pin's
     if (!drawn) continue;
     const [x, y] = s[FORCE_PIN[name]], ux = f[0] / size, uy = -f[1] / size, head = Math.min(11, long);
     const tip = [x + long * ux, y + long * uy], neck = [tip[0] - head * ux, tip[1] - head * uy];

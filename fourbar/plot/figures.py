@@ -5,14 +5,17 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
+import numpy as np
+
 from fourbar.errors import InputError
 from fourbar.plot import curves, freebody, hodograph, linkage
 from fourbar.plot.labels import Labels
 from fourbar.plot.style import FORCE_COLOURS, MUTED, matplotlib_style, plain, save
-from fourbar.plot.view import View, on_branch, view
+from fourbar.plot.view import View, on_branch, over_time, view
 from fourbar.scene import Scene
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure, SubFigure
     from matplotlib.projections.polar import PolarAxes
 
@@ -39,10 +42,15 @@ def _overview(figure: "SubFigure", shown: View, labels: Labels) -> None:
     curves.draw_angles(panels["angles"], shown)
     curves.draw_velocities(panels["omega"], shown)
     curves.draw_accelerations(panels["alpha"], shown)
-    curves.draw_torque(panels["torque"], shown)
+    _drive(panels["torque"], shown)
     curves.draw_forces(panels["forces"], shown)
     curves.draw_transmission(panels["mu"], shown)
     hodograph.draw_hodograph(cast("PolarAxes", panels["polar"]), shown)
+
+
+def _drive(axes: Any, shown: View) -> None:
+    """What drives: the torque, or in a free motion the work of loads and effects."""
+    (curves.draw_torque if shown.scene.motion.free is None else curves.draw_energy)(axes, shown)
 
 
 def _path_legend(axes: Any) -> None:
@@ -95,6 +103,7 @@ FIGURES: dict[str, tuple[Painter, tuple[float, float], bool]] = {
     "torque": (_single(curves.draw_torque), (5.6, 3.2), True),
     "forces": (_single(curves.draw_forces), (5.6, 3.2), True),
     "hodograph": (_hodographs, (6.4, 6.6), True),
+    "energy": (_single(curves.draw_energy), (5.6, 3.2), True),
     "transmission": (_single(curves.draw_transmission), (5.6, 3.2), False),
     "freebody": (_free_bodies, (9.6, 4.6), True),
 }
@@ -116,9 +125,9 @@ def draw(
     ----------
     path : the file; its ending says which of svg, png and pdf is meant.
     figure : one of `FIGURES`: "overview", "linkage", "coupler", "kinematics", "torque",
-        "forces", "hodograph", "transmission", "freebody".
+        "forces", "hodograph", "energy", "transmission", "freebody".
     position : theta_2 of the linkage and the free bodies, rad; left out: the scene's own.
-    branches : "one" (the scene's) or "both" (open and crossed, side by side).
+    branches : "one" (the scene's) or "both" (open and crossed, to the same scales).
     file_format : svg, png or pdf where the path's ending does not say it.
 
     Raises
@@ -135,8 +144,12 @@ def draw(
     if kind not in FORMATS:
         raise InputError("output", str(path), "must end in one of " + ", ".join(f".{end}" for end in FORMATS))
     painter, size, dynamic = FIGURES[figure]
-    if dynamic and scene.motion.omega_2 is None:
+    if dynamic and scene.motion.omega_2 is None and not over_time(scene):
         raise InputError("motion.omega_2", None, f"is needed for the figure {figure!r}")
+    if figure == "energy" and scene.motion.free is None:
+        raise InputError("figure", figure, "needs a free motion: motion.free")
+    if figure == "torque" and scene.motion.free is not None:
+        raise InputError("figure", figure, "a free motion has no driving torque; energy shows what moves it")
     with matplotlib_style():
         save(compose(scene, painter, size, position, branches), target, kind)
 
@@ -150,6 +163,8 @@ def compose(
 
     scenes = [on_branch(scene, sign) for sign in (1, -1)] if branches == "both" else [scene]
     views = [view(each, position) for each in scenes]
+    for shown in views:
+        shown.beside = [other for other in views if other is not shown]
     stacked = size[0] > 9.0
     figure = Figure(
         figsize=(size[0], size[1] * len(views)) if stacked else (size[0] * len(views), size[1]), layout="constrained"
@@ -172,5 +187,23 @@ def compose(
         caption = textwrap.fill(" ".join(shown.notes), wide)
         if caption:
             part.supxlabel(caption, size=6.8, color=MUTED, x=0.012, ha="left", parse_math=False, linespacing=1.35)
+    _to_one_scale([part.axes for part in parts])
     labels.settle(figure)
     return figure
+
+
+def _to_one_scale(columns: "list[list[Axes]]") -> None:
+    """The same panel of every branch gets the same limits; polar panels and free bodies share theirs already."""
+    for panels in zip(*columns, strict=True):
+        if len(panels) == 1 or panels[0].name == "polar" or not panels[0].axison:
+            continue
+        if panels[0].get_aspect() == 1.0:  # to scale: the data, not the limits, say what has to fit
+            corners = np.concatenate([axes.dataLim.get_points() for axes in panels])
+            for axes in panels:
+                axes.update_datalim(corners)
+                axes.autoscale_view()
+            continue
+        for limits in ("xlim", "ylim"):
+            ends = [getattr(axes, f"get_{limits}")() for axes in panels]
+            for axes in panels:
+                getattr(axes, f"set_{limits}")(min(low for low, _ in ends), max(high for _, high in ends))

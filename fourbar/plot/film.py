@@ -24,14 +24,24 @@ SIZE = (6.4, 5.6)
 DPI = 100
 
 
-def write_film(scene: Scene, path: Path, kind: str, seconds: float) -> None:
-    """One sweep; where the input does not turn fully, there and back.
+SWEEP_SECONDS = 6.0
+"""Of a film of a sweep, where nothing else is asked for."""
+SHORTEST = 1.0
+"""A motion through time shorter than this, s, is slowed down to be seen."""
+
+
+def write_film(scene: Scene, path: Path, kind: str, seconds: float | None) -> None:
+    """One sweep; where the input does not turn fully, there and back. A motion through time is shown as it is.
+
+    Parameters
+    ----------
+    seconds : length of the film; None: 6 s for a sweep, of a motion through time its own duration.
 
     Raises
     ------
     DependencyError : matplotlib or, for MP4, ffmpeg with its H.264 encoder is missing.
     """
-    if not (math.isfinite(seconds) and 0.0 < seconds * FRAMES_PER_SECOND <= MAX_FRAMES):
+    if seconds is not None and not (math.isfinite(seconds) and 0.0 < seconds * FRAMES_PER_SECOND <= MAX_FRAMES):
         raise InputError("seconds", seconds, f"must be more than 0 and at most {MAX_FRAMES // FRAMES_PER_SECOND}")
     with matplotlib_style():
         from matplotlib.animation import FFMpegWriter, PillowWriter
@@ -39,6 +49,11 @@ def write_film(scene: Scene, path: Path, kind: str, seconds: float) -> None:
         if kind == "mp4" and not FFMpegWriter.isAvailable():
             raise DependencyError("an .mp4 film needs the program ffmpeg; .gif and .html do not")
         shown = view(scene)
+        if seconds is None:
+            seconds = SWEEP_SECONDS
+            if shown.time is not None:
+                duration = float(shown.time[-1] - shown.time[0])
+                seconds = min(max(duration, SHORTEST), MAX_FRAMES / FRAMES_PER_SECOND)
         figure, move = _stage(shown)
         order = frames(shown, max(2, round(seconds * FRAMES_PER_SECOND)))
         writer: Any = PillowWriter(fps=FRAMES_PER_SECOND)
@@ -61,11 +76,15 @@ def frames(shown: View, count: int) -> list[int]:
     """Indices of the positions shown one after the other: the stretch that assembles around the one drawn."""
     closes = shown.sweep.assembled
     here = int(np.argmin(np.abs(shown.sweep.theta_2 - shown.here.theta_2[0])))
+    if shown.time is not None and shown.here.time is not None:
+        here = int(np.argmin(np.abs(shown.time - shown.here.time[0])))
     first, last = here, here
     while first > 0 and closes[first - 1]:
         first -= 1
     while last < len(closes) - 1 and closes[last + 1]:
         last += 1
+    if shown.time is not None:
+        return [round(i) for i in np.linspace(first, last, count)]
     theta_2 = shown.sweep.theta_2
     if abs(theta_2[last] - theta_2[first] - math.tau) < 1e-6:
         return [round(i) for i in np.linspace(first, last, count, endpoint=False)]
@@ -118,6 +137,7 @@ def _stage(shown: View) -> tuple["Figure", Any]:
             for mark in marks:
                 mark.set_data([point[0]], [point[1]])
         theta = f"{math.degrees(sweep.theta_2[index]):.1f}".replace("-", "−")
-        axes.set_title(rf"$\theta_2$ = {theta}°, {shown.branch_name} branch", pad=18.0)
+        when = "" if shown.time is None else f"$t$ = {shown.time[index]:.2f} s, "
+        axes.set_title(rf"{when}$\theta_2$ = {theta}°, {shown.branch_name} branch", pad=18.0)
 
     return figure, move

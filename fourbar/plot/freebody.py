@@ -63,7 +63,7 @@ def free_body(view: View, state: State, bar: int) -> tuple[list[Arrow], list[Cou
         shown = name if sign > 0 else f"F{name[2]}{name[1]}"
         at = (where[pin][0] - first[0], where[pin][1] - first[1])
         arrows.append(Arrow(force_name(shown), at, (fx, fy), FORCE_COLOURS[name]))
-    if view.scene.drive_bar == bar:
+    if view.scene.drive_bar == bar and view.scene.motion.free is None:
         couples.append(Couple(f"$T_{bar}$", float(view.here.torque[0])))  # type: ignore[index]
     for text, recorder in _actions(view, state):
         arrows += [Arrow(text.replace("#", str(bar)), arm, force, INK) for b, force, arm in recorder.forces if b == bar]
@@ -95,12 +95,13 @@ def draw_free_bodies(panels: "list[Axes]", view: View, labels: Labels) -> None:
     """The three bars, each freed from its pins, with arrows to one scale."""
     state = view.state()
     bodies = {bar: free_body(view, state, bar) for bar in MOVING_BARS}
-    biggest = max((math.hypot(*arrow.force) for arrows, _ in bodies.values() for arrow in arrows), default=0.0)
+    drawn = [(v, s, free_body(v, s, bar)[0], bar) for v in view.alike for s in (v.state(),) for bar in MOVING_BARS]
+    biggest = max((math.hypot(*arrow.force) for *_, arrows, _ in drawn for arrow in arrows), default=0.0)
     longest = max(view.scene.linkage.bar(bar).length for bar in MOVING_BARS)
     scale = 0.75 * longest / biggest if biggest > 0.0 else 0.0
     reach = {bar: _reach(state, bar, bodies[bar][0], scale) for bar in MOVING_BARS}
     # one window size: the bars, too, are to one scale
-    span = ROOM * max(float(np.ptp(points, axis=0).max()) for points in reach.values())
+    span = ROOM * max(float(np.ptp(_reach(s, bar, arrows, scale), axis=0).max()) for _, s, arrows, bar in drawn)
     for axes, bar in zip(panels, MOVING_BARS, strict=True):
         _draw_one(axes, view, state, bar, bodies[bar], scale, biggest, labels, reach[bar], span)
     _scale_bar(panels[0], scale, biggest)

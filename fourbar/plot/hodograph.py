@@ -1,9 +1,11 @@
 """Pin forces as hodographs: magnitude over direction, in polar axes."""
 
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from fourbar.kinematics import Array
 from fourbar.plot.curves import broken, force_name, limit_of, note, poles
 from fourbar.plot.style import FORCE_COLOURS, FORCE_DASHES, FORCE_WIDTHS, MUTED, largest, number, unit_for
 from fourbar.plot.view import View
@@ -12,7 +14,9 @@ if TYPE_CHECKING:
     from matplotlib.projections.polar import PolarAxes
 
 EVERY = 60.0
-"""Dots on a hodograph stand this far apart in theta_2, deg."""
+"""Dots on a hodograph stand this far apart in theta_2, deg ..."""
+MOST_DOTS = 12
+"""... or, over time, a round number of seconds that gives no more than these."""
 
 
 def draw_hodograph(axes: "PolarAxes", view: View, names: tuple[str, ...] = tuple(FORCE_COLOURS)) -> None:
@@ -21,12 +25,14 @@ def draw_hodograph(axes: "PolarAxes", view: View, names: tuple[str, ...] = tuple
 
     forces = {name: getattr(view.sweep, name) for name in names}
     sizes = {name: np.hypot(*force.T) for name, force in forces.items()}
-    limit = limit_of(list(sizes.values()))
-    top = limit or 1.08 * largest(*sizes.values()) or 1.0
+    everywhere = [np.hypot(*getattr(other.sweep, name).T) for other in view.alike for name in names]
+    limit = limit_of(everywhere)
+    top = limit or 1.08 * largest(*everywhere) or 1.0
     factor, unit = unit_for(top, "N")
     where = poles(view)
-    marks = np.unique(np.round((view.degrees - view.degrees[0]) / EVERY).astype(int))
-    dots = [int(np.argmin(np.abs(view.degrees - view.degrees[0] - EVERY * k))) for k in marks]
+    over, every, apart = _spacing(view)
+    marks = np.unique(np.round((over - over[0]) / every).astype(int))
+    dots = [int(np.argmin(np.abs(over - over[0] - every * k))) for k in marks]
     for name, force in forces.items():
         direction = np.arctan2(force[:, 1], force[:, 0])
         # drawn as a polyline in x, y: unwrapped angles keep matplotlib from going round the long way
@@ -53,7 +59,7 @@ def draw_hodograph(axes: "PolarAxes", view: View, names: tuple[str, ...] = tuple
             mew=1.1,
             zorder=5,
         )
-    if limit:
+    if limit and largest(*sizes.values()) > limit:
         note(view, f"Hodographs of {', '.join(names)} clipped at {number(factor * top)} {unit}.")
     axes.set_rlim(0.0, factor * top)
     axes.set_thetagrids(range(0, 360, 45))
@@ -71,9 +77,18 @@ def draw_hodograph(axes: "PolarAxes", view: View, names: tuple[str, ...] = tuple
     )
     note(
         view,
-        f"Hodographs: open dot at the start of the sweep, dots every {EVERY:g}° of θ₂; "
-        "angles are directions in the x-y plane.",
+        f"Hodographs: open dot at the start, dots every {apart}; angles are directions in the x-y plane.",
     )
+
+
+def _spacing(view: View) -> tuple[Array, float, str]:
+    """What the dots are evenly spaced in, by how much, and that in words."""
+    if view.time is None:
+        return view.degrees, EVERY, f"{EVERY:g}° of θ₂"
+    duration = float(view.time[-1] - view.time[0]) or 1.0
+    step = 10.0 ** math.floor(math.log10(duration))
+    every = next(share * step for share in (0.1, 0.2, 0.5, 1.0) if duration <= MOST_DOTS * share * step)
+    return view.time, every, f"{every:g} s"
 
 
 def _free_direction(forces: list[np.ndarray]) -> float:

@@ -1,6 +1,5 @@
 """The linkage drawn to scale: bars, pins, ground, mass centres and coupler curves."""
 
-import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -44,7 +43,7 @@ def draw_linkage(axes: "Axes", view: View, labels: Labels) -> None:
     sweep = view.sweep
     where, masses = pins(state), centres(state)
     reached = np.concatenate([sweep.A, sweep.B, sweep.G3, list(where.values())])
-    factor, unit = length_unit(largest(reached))
+    factor, unit = _unit(view)
     where = {name: (factor * x, factor * y) for name, (x, y) in where.items()}
     _paths(axes, view, labels, factor)
     size = 0.03 * factor * float(np.max(np.nanmax(reached, axis=0) - np.nanmin(reached, axis=0)))
@@ -71,8 +70,14 @@ def draw_linkage(axes: "Axes", view: View, labels: Labels) -> None:
     axes.margins(0.08)
     axes.set_xlabel(f"$x$ ({unit})")
     axes.set_ylabel(f"$y$ ({unit})")
-    theta = f"{math.degrees(float(view.here.theta_2[0])):.4g}".replace("-", "−")
-    axes.set_title(rf"Linkage at $\theta_2$ = {theta}°, {view.branch_name} branch")
+    axes.set_title(f"Linkage at {view.at}, {view.branch_name} branch")
+
+
+def _unit(view: View) -> tuple[float, str]:
+    """The unit of length of a drawing, the same for both branches."""
+    return length_unit(
+        max(largest(v.sweep.A, v.sweep.B, v.sweep.G3, *np.array(list(pins(v.state()).values()))) for v in view.alike)
+    )
 
 
 def pin_name(name: str) -> str:
@@ -145,7 +150,7 @@ def draw_coupler_curves(axes: "Axes", view: View, labels: Labels) -> None:
     across = np.stack([-along[:, 1], along[:, 0]], axis=1)
     points = ((0.0, 0.0), (0.25, 0.0), (0.5, 0.0), (0.75, 0.0), (1.0, 0.0), (0.5, 0.5), (0.5, -0.5))
     paths = [sweep.A + u * along + v * across for u, v in points]
-    factor, unit = length_unit(largest(*paths))
+    factor, unit = _unit(view)
     greys = ("#0072B2", "#56A0C8", "#D55E00", "#5FA48B", "#007A5A", "#8A3B78", "#8A3B78")
     for (u, v), path, colour in zip(points, paths, greys, strict=True):
         dashes = "-" if v == 0.0 else (0, (5, 1.5)) if v > 0 else (0, (1.4, 1.4))
@@ -182,5 +187,4 @@ def draw_coupler_curves(axes: "Axes", view: View, labels: Labels) -> None:
         title="point along AB (and beside it), in lengths of the coupler",
         title_fontsize=7.5,
     )
-    theta = math.degrees(float(view.here.theta_2[0]))
-    view.notes.append(f"The linkage is drawn at θ₂ = {theta:.4g}°.")
+    view.notes.append(f"The linkage is drawn at {view.at}.")

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from fourbar.effects.wrenches import Wrenches
-from fourbar.errors import InputError, NotAssembledError
+from fourbar.errors import NotAssembledError
 from fourbar.kinematics import Array, State, Vector, add_accelerations, add_velocities, close_loop
 from fourbar.motion import FromLimit
 from fourbar.scene import Command, Scene, command, solve
@@ -28,11 +28,31 @@ class View:
     sweep: Solution
     here: Solution
     notes: list[str] = field(default_factory=list)
+    beside: "list[View]" = field(default_factory=list)
+    """The other branch, where it is drawn beside this one: to the same scales."""
+
+    @property
+    def alike(self) -> "list[View]":
+        """This view and those that share its scales."""
+        return [self, *self.beside]
 
     @property
     def degrees(self) -> Array:
         """theta_2 of the sweep, degrees."""
         return np.degrees(self.sweep.theta_2)
+
+    @property
+    def time(self) -> Array | None:
+        """Of a motion given over time, s."""
+        return self.sweep.time
+
+    @property
+    def at(self) -> str:
+        """The position drawn, in words."""
+        theta = f"θ₂ = {math.degrees(float(self.here.theta_2[0])):.4g}°"
+        if self.here.time is None:
+            return theta.replace("-", "−")
+        return f"{theta}, t = {self.here.time[0]:.4g} s".replace("-", "−")
 
     @property
     def moves(self) -> bool:
@@ -84,14 +104,13 @@ class Recorder(Wrenches):
             self.couples.append((bar, float(np.ravel(moment)[0])))
 
 
+def over_time(scene: Scene) -> bool:
+    """Whether the motion is one through time: released, or by a law."""
+    return scene.motion.free is not None or scene.motion.law is not None
+
+
 def sweep_command(scene: Scene) -> Command:
     """The positions of a scene in rising theta_2; a single position is put among those of the default range."""
-    if scene.motion.free is not None:
-        raise InputError(
-            "motion.free", scene.motion.free, "is not drawn over theta_2; leave it out to draw the linkage"
-        )
-    if scene.motion.law is not None:
-        raise InputError("motion.law", scene.motion.law.ends, "is not drawn over theta_2; state theta_2 and omega_2")
     motion = scene.motion
     own = command(scene)
     if len(own.theta_2) > 1:
@@ -111,21 +130,22 @@ def on_branch(scene: Scene, branch: int) -> Scene:
 
 
 def view(scene: Scene, position: float | None = None) -> View:
-    """The sweep of a scene and one position of it.
+    """The sweep of a scene, or its motion through time, and one position of it.
 
     Parameters
     ----------
-    position : theta_2 drawn to scale, rad; left out: the scene's own where it names one, else 60
-        deg into the first stretch that assembles.
+    position : theta_2 drawn to scale, rad; left out: the scene's own where it names one (the start of
+        a motion through time), else 60 deg into the first stretch that assembles.
 
     Raises
     ------
     NotAssembledError : no position of the sweep assembles, or the one named does not.
     """
+    if over_time(scene):
+        return _through_time(scene, position)
     where = sweep_command(scene)
     sweep = solve(scene, at=where)
-    if not sweep.assembled.any():
-        raise NotAssembledError("nothing to draw: the linkage assembles at none of the scene's positions")
+    _something(sweep)
     own = command(scene)
     if position is None:
         position = float(own.theta_2[0]) if len(own.theta_2) == 1 else _representative(sweep)
@@ -134,6 +154,38 @@ def view(scene: Scene, position: float | None = None) -> View:
     if not here.assembled[0]:
         raise NotAssembledError(f"the linkage does not assemble at theta_2 = {math.degrees(position):.6g} deg")
     return View(scene, sweep, here)
+
+
+def _something(sweep: Solution) -> None:
+    if not sweep.assembled.any():
+        raise NotAssembledError("nothing to draw: the linkage assembles at none of the scene's positions")
+
+
+def _through_time(scene: Scene, position: float | None) -> View:
+    """The instant drawn is the first that assembles, or the one whose theta_2 comes nearest to the position."""
+    sweep = solve(scene)
+    _something(sweep)
+    assert sweep.time is not None and sweep.omega_2 is not None and sweep.alpha_2 is not None
+    if position is None:
+        index = int(np.argmax(sweep.assembled))
+    else:
+        low, high = math.degrees(np.min(sweep.theta_2)), math.degrees(np.max(sweep.theta_2))
+        if not low <= math.degrees(position) <= high:
+            raise NotAssembledError(
+                f"the motion does not pass theta_2 = {math.degrees(position):.6g} deg: it stays within "
+                f"{low:.6g} and {high:.6g} deg"
+            )
+        index = int(np.argmin(np.abs(sweep.theta_2 - position)))
+    one = slice(index, index + 1)
+    here = solve(scene, at=Command(sweep.theta_2[one], sweep.branch[one], sweep.omega_2[one], sweep.alpha_2[one]))
+    here.time = sweep.time[one]
+    shown = View(scene, sweep, here)
+    free = scene.motion.free
+    if free is not None and len(sweep) <= free.steps:
+        shown.notes.append(
+            f"The motion ends at t = {sweep.time[-1]:.4g} s, where the linkage stops at a limit position."
+        )
+    return shown
 
 
 def _representative(sweep: Solution) -> float:

@@ -11,7 +11,7 @@ import pytest
 import fourbar
 from fourbar import animate
 from tests.scenes import crank_rocker, thesis
-from tests.test_animate import HOSTILE, PNG, embedded
+from tests.test_animate import HOSTILE, PNG, RELEASED, embedded
 
 pytest.importorskip("selenium", reason="pages are driven by selenium: pip install selenium")
 
@@ -131,6 +131,40 @@ def test_an_input_that_turns_fully_goes_round_and_one_that_does_not_swings(brows
     closes = [k for k, v in enumerate(data["branches"]["1"]["theta_3"]) if v is not None and k >= 20]
     assert (min(rows), max(rows)) == (min(closes), max(closes))
     assert np.abs(np.diff(rows)).max() <= 1  # it never jumps
+
+
+def test_a_free_motion_plays_once_in_its_own_time(browse) -> None:
+    driver = browse(animate.page(RELEASED))
+    s = fourbar.solve(RELEASED)
+    assert not driver.find_element("id", "branch").is_displayed()
+    assert not driver.find_element("id", "torque").is_displayed()
+    rows = clockwork(driver, 20)  # 0.95 s: the first frame starts the clock
+    np.testing.assert_allclose(s.time[rows], 0.05 * np.arange(20), atol=0.011)  # half a row
+    assert clockwork(driver, 41)[-1] == 90 and not state_of(driver, "playing")
+    driver.execute_script("go(37)")
+    assert driver.find_element("id", "theta-text").text == "0.740 s"
+    assert driver.find_element("id", "theta").get_attribute("aria-valuetext") == "0.740 seconds"
+    assert shown(driver, "omega_2", "alpha_4") == pytest.approx([s.omega_2[37], s.alpha_4[37]], rel=PRINTED)
+    kinetic = embedded(animate.page(RELEASED))["branches"]["1"]["energy"][37]
+    assert shown(driver, "energy") == pytest.approx([kinetic], rel=PRINTED)
+    drawn = pins(driver)
+    np.testing.assert_allclose(drawn["B"], np.hypot(*drawn["O4"]) / 0.3 * s.B[37], atol=PIXEL)
+
+
+def test_a_released_linkage_with_other_lengths_is_swept_over_the_angle(browse) -> None:
+    driver = browse(animate.page(RELEASED))
+    driver.execute_script("go(37)")
+    type_length(driver, 3, 283.0)
+    assert driver.find_element("id", "branch").is_displayed()
+    assert not driver.find_element("id", "energy").is_displayed()
+    assert driver.find_element("id", "theta-text").text.endswith("°")
+    driver.execute_script("chooseBranch(-1)")
+    driver.find_element("id", "original").click()
+    assert driver.find_element("id", "theta-text").text.endswith(" s")
+    s = fourbar.solve(RELEASED)
+    row = state_of(driver, "row")
+    drawn = pins(driver)
+    np.testing.assert_allclose(drawn["B"], np.hypot(*drawn["O4"]) / 0.3 * s.B[row], atol=PIXEL)
 
 
 def test_a_changed_length_redraws_by_the_formulas_and_hides_the_forces(browse) -> None:
