@@ -1,17 +1,21 @@
 """What every form of the report says, computed once from the pages."""
 
 import math
+import re
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from heapq import nlargest
 from statistics import median
+from typing import NamedTuple, TypeVar
 
 from validation.machine import machine, versions
 from validation.page import Page
 from validation.published.command import LadderRow
 from validation.results import FAILS, REFUSES, VERDICTS, Row
 from validation.tolerance import EPS, EQUIVALENCE, IDENTITY, NOTHING_TO_TELL, SIMULATED, K, Tolerance
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,16 +52,21 @@ class Summary:
     versions: dict[str, str]
     machine: str
     worst: list[Worst]
+    """By scene and engine; of more than WORST_SHOWN those that used most of their allowance, in that order."""
+    judged: int
+    """Pairs of scene and engine of which `worst` shows the worst."""
     failures: list[Row]
+    """At most FAILURES_KEPT of them."""
     refusals: list[tuple[str, str, int]]
-    """(engine, reason, number of scenes): declared limits that were met."""
+    """(engine, reason, number of scenes): declared limits that were met; reasons that differ by their numbers
+    alone are one, with the numbers of the first scene."""
     measured_k: dict[str, float]
     """Largest error*condition/eps of each exact engine: what K would have sufficed."""
     independence: list[tuple[str, str, str]]
     """(engine, shared with the formulas, found alone)."""
     costs: list[Cost]
     orders: list[tuple[str, dict[str, float]]]
-    """(scene, errors at 4h and 2h and observed order) of the simulated engine."""
+    """(scene, errors at 4h and 2h and observed order) of the simulated engine: at most ORDERS_SHOWN, lowest first."""
     ladder: list[LadderRow]
     """The thesis's errors one by one, from the right answer to the printed ones; empty where not asked for."""
     tolerances: list[Tolerance]
@@ -65,13 +74,17 @@ class Summary:
     missing: list[tuple[str, str]]
     """(engine, why it could not be asked here)."""
     pages: list[Page]
-    """The scenes shown one by one: those that fail first, at most SCENES_SHOWN."""
+    """The scenes shown one by one, at most SCENES_SHOWN: those that fail, then those that used most of what is
+    allowed."""
 
 
 SCENES_SHOWN = 200
-KEPT = 1000
-"""Rows listed at the most; all of them are in results.csv."""
+WORST_SHOWN = 60
+ORDERS_SHOWN = 20
+FAILURES_KEPT = 1000
+"""Lines of a table at the most; everything is in results.csv."""
 TIMED = 1000
+NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 TOLERANCES = (IDENTITY, EQUIVALENCE, SIMULATED)
 """Of a run with the standing witnesses."""
 STATEMENT = (
@@ -91,28 +104,38 @@ def summarise(
     counts: Counter[str] = Counter()
     failures: list[Row] = []
     refusals: Counter[tuple[str, str]] = Counter()
+    first_reason: dict[tuple[str, str], str] = {}
     worst: list[Worst] = []
+    judged = 0
     measured_k: dict[str, float] = {}
     independence: dict[str, tuple[str, str]] = {}
-    costs: dict[tuple[str, str], list[tuple[float, float]]] = {}
+    costs: dict[tuple[str, str], list[Timed]] = {}
+    orders: list[tuple[str, dict[str, float]]] = []
     failing: list[Page] = []
-    holding: list[Page] = []
+    holding: list[tuple[float, Page]] = []
     scenes = 0
     for page in pages:
         scenes += 1
         counts.update(row.verdict for row in page.rows)
         bad = [row for row in page.rows if row.verdict == FAILS]
-        failures += bad[: KEPT - len(failures)]
-        refusals.update(_left_out(page))
-        worst += _worst(page.rows)
-        if len(worst) > 2 * KEPT:
-            worst = _sorted(nlargest(KEPT, worst, key=lambda w: w.used))
+        failures += bad[: FAILURES_KEPT - len(failures)]
+        for engine, reason in sorted(_left_out(page)):
+            kind = (engine, NUMBER.sub("#", reason))
+            refusals[kind] += 1
+            first_reason.setdefault(kind, reason)
+        found = _worst(page.rows)
+        judged += len(found)
+        worst = _top(WORST_SHOWN, [*worst, *found], lambda w: w.used)
         _measure_k(page.rows, measured_k)
         independence.update(page.independence)
         _add_costs(page, costs)
-        keep = failing if bad else holding
-        if len(keep) < SCENES_SHOWN:
-            keep.append(page)
+        known = [(page.name, each) for each in page.evidence.values() if "observed_order" in each]
+        orders = _top(ORDERS_SHOWN, [*orders, *known], _lowest)
+        if bad:
+            failing += [page][: SCENES_SHOWN - len(failing)]
+        else:
+            most = max((w.used for w in found), default=0.0)
+            holding = _top(SCENES_SHOWN, [*holding, (most, page)], lambda each: each[0])
     total, failed = sum(counts.values()), counts[FAILS]
     many = f"{scenes} scene{'s' if scenes != 1 else ''}"
     if failed:
@@ -121,28 +144,25 @@ def summarise(
         verdict = f"All {total} comparisons on {many} hold"
     if missing:
         verdict += f"; not asked: {', '.join(engine for engine, _ in missing)}"
-    shown = sorted([*failing, *holding[: SCENES_SHOWN - len(failing)]], key=lambda page: page.name)
+    holding = nlargest(SCENES_SHOWN - len(failing), holding, key=lambda each: each[0])
+    shown = sorted([*failing, *(page for _, page in holding)], key=lambda page: page.name)
     return Summary(
         verdict=verdict,
         scenes=scenes,
         counts={name: counts[name] for name in VERDICTS},
         versions=versions(),
         machine=machine(),
-        worst=_sorted(nlargest(KEPT, worst, key=lambda w: w.used)),
+        worst=_sorted(worst) if judged <= WORST_SHOWN else nlargest(WORST_SHOWN, worst, key=lambda w: w.used),
+        judged=judged,
         failures=failures,
-        refusals=[(engine, reason, count) for (engine, reason), count in sorted(refusals.items())],
+        refusals=[(kind[0], first_reason[kind], count) for kind, count in sorted(refusals.items())],
         measured_k=measured_k,
         independence=[(engine, *independence[engine]) for engine in sorted(independence)],
         costs=[
-            Cost(engine, setting, median(r for r, _ in values), median(m for _, m in values))
-            for (engine, setting), values in sorted(costs.items())
+            Cost(engine, _settings(values), median(t.times for t in values), median(t.microseconds for t in values))
+            for (engine, _), values in sorted(costs.items())
         ],
-        orders=[
-            (page.name, evidence)
-            for page in shown
-            for evidence in page.evidence.values()
-            if "observed_order" in evidence
-        ],
+        orders=orders if len(orders) <= ORDERS_SHOWN else nlargest(ORDERS_SHOWN, orders, key=_lowest),
         ladder=list(ladder),
         tolerances=list(tolerances),
         missing=list(missing),
@@ -176,6 +196,15 @@ def _worst(rows: Sequence[Row]) -> list[Worst]:
     return [Worst(max(group, key=used), len(group), sum(not row.passed for row in group)) for group in groups.values()]
 
 
+def _top(most: int, of: list[T], key: Callable[[T], float]) -> list[T]:
+    """The list, cut to its largest once it is twice too long."""
+    return of if len(of) <= 2 * most else nlargest(most, of, key=key)
+
+
+def _lowest(order: tuple[str, dict[str, float]]) -> float:
+    return -order[1]["observed_order"]
+
+
 def _sorted(worst: Iterable[Worst]) -> list[Worst]:
     return sorted(worst, key=lambda w: (w.row.scene, w.row.engine, w.row.setting))
 
@@ -186,12 +215,26 @@ def _measure_k(rows: Sequence[Row], largest: dict[str, float]) -> None:
             largest[row.engine] = max(largest.get(row.engine, 0.0), row.error * row.condition / EPS)
 
 
-def _add_costs(page: Page, costs: dict[tuple[str, str], list[tuple[float, float]]]) -> None:
+class Timed(NamedTuple):
+    """One answer's setting, its time over that of the formulas, and per position."""
+
+    setting: str
+    times: float
+    microseconds: float
+
+
+def _add_costs(page: Page, costs: dict[tuple[str, str], list[Timed]]) -> None:
     formulas = page.timings[0].seconds if page.timings else math.nan
     refused = {row.engine for row in page.rows if row.verdict == REFUSES}
     for t in page.timings:
-        kept = costs.setdefault((t.engine, t.setting), [])
+        kept = costs.setdefault((t.engine, t.setting.partition(" ")[0]), [])  # an integrator, whatever its steps
         if t.engine not in refused and len(kept) < TIMED:
-            kept.append((t.seconds / formulas, 1e6 * t.seconds / t.positions))
+            kept.append(Timed(t.setting, t.seconds / formulas, 1e6 * t.seconds / t.positions))
     for key in [key for key, values in costs.items() if not values]:
         del costs[key]
+
+
+def _settings(of: Sequence[Timed]) -> str:
+    """The setting, or the first and last of those that differ by their number: "RK4 628/rev to 1490/rev"."""
+    known = sorted({t.setting for t in of}, key=lambda name: (len(name), name))
+    return known[0] if len(known) == 1 else f"{known[0]} to {known[-1].partition(' ')[2]}"

@@ -17,7 +17,10 @@ def table(summary: Summary, out: Path) -> None:
     from rich.table import Table
 
     console = Console()
-    shown = Table(title="worst row of each scene and engine", box=SIMPLE_HEAD, pad_edge=False)
+    title = "worst row of each scene and engine"
+    if len(summary.worst) < summary.judged:
+        title = f"worst rows of {len(summary.worst)} of {summary.judged} scenes and engines"
+    shown = Table(title=title, box=SIMPLE_HEAD, pad_edge=False)
     for heading in ("scene and engine", "worst"):
         shown.add_column(heading, no_wrap=True)
     for heading in ("error", "allowed", "used", "at deg"):
