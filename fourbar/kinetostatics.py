@@ -7,7 +7,7 @@ between the two bars that are not driven.
 """
 
 from collections.abc import Iterable, Iterator
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,10 +20,21 @@ from fourbar.margins import in_precision_of
 
 
 class Term(Protocol):
-    """Anything that acts on the moving bars."""
+    """Anything that acts on the moving bars; what the effects are."""
+
+    @property
+    def loaded_pins(self) -> tuple[str, ...]:
+        """Pins whose forces it depends on itself."""
+
+    @property
+    def dry_pins(self) -> tuple[str, ...]:
+        """Pins at which its couples jump."""
 
     def add_wrenches(self, wrenches: Wrenches, state: State) -> None:
         """Add forces and couples on the bars."""
+
+    def leaning(self, side: int) -> Self:
+        """The same with every pin at rest about to turn."""
 
 
 class PinForces(NamedTuple):
@@ -110,7 +121,7 @@ def drive_sine(state: State, drive_bar: int) -> Array:
 
 
 def solve_pins(
-    state: State, terms: Iterable[Term], drive_bar: int, *, inertia: bool = True, growths: Iterator[float] | None = None
+    state: State, terms: Iterable[Term], drive_bar: int, *, growths: Iterator[float] | None = None
 ) -> PinForces:
     """Pin forces and driving torque for the terms that act.
 
@@ -122,16 +133,14 @@ def solve_pins(
     state : positions, velocities and accelerations, (n,).
     terms : loads and effects.
     drive_bar : 2, 3 or 4.
-    inertia : False leaves out -m a and -I alpha (statics).
     growths : relative changes of the terms, for the error bars.
     """
     wrenches = Wrenches(state, growths)
-    if inertia:
-        add_inertia(wrenches, state)
+    add_inertia(wrenches, state)
     implicit = []
     for term in terms:
         term.add_wrenches(wrenches, state)
-        if getattr(term, "loaded_pins", ()):
+        if term.loaded_pins:
             implicit.append(term)
     pins = eliminate(state, wrenches, drive_bar)
     for each in implicit:  # a scene holds one effect of a kind, and one kind depends on the forces
@@ -146,13 +155,12 @@ def torque_interval(state: State, terms: Iterable[Term], drive_bar: int, torque:
     pin comes to rest while the linkage moves, the torques just before and after its reversal.
     """
     terms = tuple(terms)
-    pins = {pin for term in terms for pin in getattr(term, "dry_pins", ())}
+    pins = {pin for term in terms for pin in term.dry_pins}
     if not any(np.any(resting(state, pin)) for pin in pins):
         return torque, torque
     ways = []
     for side in (1, -1):
-        leaning: list[Any] = [term.leaning(side) if getattr(term, "dry", False) else term for term in terms]  # type: ignore[attr-defined]
-        ways.append(solve_pins(state, leaning, drive_bar).torque)
+        ways.append(solve_pins(state, [term.leaning(side) for term in terms], drive_bar).torque)
     ahead, back = (getattr(way, "hi", way) for way in ways)
     return np.minimum(ahead, back), np.maximum(ahead, back)
 

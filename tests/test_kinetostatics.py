@@ -1,11 +1,13 @@
 """Pin forces and torque against the thirteen equations, power, sums over the linkage, and the thesis."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import fourbar
+from fourbar.kinetostatics import sine_between
 from validation.bench import bodies_of, command, example
 from validation.thirteen import assemble, solve_thirteen
 
@@ -116,6 +118,51 @@ def test_the_model_mechanism_of_the_thesis(inertias: tuple[float, float]) -> Non
     assert s.torque[0] == pytest.approx(torque, rel=PRINTED)
     for name, force in zip(("F12", "F32", "F43", "F14"), forces, strict=True):
         assert getattr(s, name)[0] == pytest.approx(force, rel=0, abs=PRINTED * math.hypot(*force))
+
+
+@pytest.mark.parametrize("drive_bar", [2, 3, 4])
+@pytest.mark.parametrize("alpha", [0.0, 70.0])
+@pytest.mark.parametrize(
+    "bodies",
+    [((0, 1), (1, 0), (0.4, 1)), ((1, 1), (0, 0), (1, 0)), ((0, 0), (0, 0.5), (0.7, 0)), ((0, 0), (1, 1), (0, 0))],
+)
+def test_bars_without_mass_or_inertia(bodies: tuple[tuple[float, float], ...], alpha: float, drive_bar: int) -> None:
+    """Mass and inertia of 0 and of 1, where a term may be left out: the thirteen equations leave none out."""
+    bars = (fourbar.Bar(x, *body, (0.4 * x, 0.3)) for x, body in zip((0.1, 0.25, 0.22), bodies, strict=True))
+    case = fourbar.Scene(fourbar.FourBar(0.3, *bars), fourbar.Motion(0.0, 10.0), drive_bar)
+    at = fourbar.scene.Command(np.linspace(0.1, 6.0, 13), np.ones(13, np.int8), 10.0, alpha)
+    unknowns, solution = solve_thirteen(bodies_of(case, at), drive_bar), fourbar.solve(case, at=at)
+    size = np.max(np.abs(unknowns[:, :12])) / np.min(np.abs(solution.drive_condition))
+    for name, column in (("F12", 0), ("F32", 2), ("F43", 6), ("F14", 8)):
+        assert np.max(np.abs(unknowns[:, column : column + 2] - getattr(solution, name))) <= SOLVED * size
+    assert np.max(np.abs(unknowns[:, 12] - solution.torque)) <= SOLVED * size
+
+
+def test_a_force_between_two_bars_in_line_does_not_exist() -> None:
+    x, y, slanted = (1.0, 0.0), (0.0, 1.0), (0.6, 0.8)
+    u, v = (tuple(np.array(c) for c in zip(*pair, strict=True)) for pair in ((x, x, x), (x, y, slanted)))
+    sine = sine_between(u, v)  # type: ignore[arg-type]
+    assert np.isnan(sine[0]) and sine[1:].tolist() == [1.0, 0.8]
+
+
+@pytest.mark.parametrize("drive_bar", [2, 3, 4])
+def test_dry_friction_at_rest_holds_as_much_as_its_work(drive_bar: int) -> None:
+    """Virtual work: the torque may move by the friction couples times the turns of their pins, either way."""
+    couples = {"O2": 0.04, "A": 0.02, "B": 0.03, "O4": 0.01}
+    case = replace(scene(drive_bar), motion=fourbar.Motion(np.linspace(0.1, 6.0, 7), 0.0))
+    loads_and_gravity = replace(case, effects=case.effects[:1])
+    s = fourbar.solve(replace(case, effects=(case.effects[0], fourbar.Friction.at(**couples))))
+    free = fourbar.solve(loads_and_gravity)
+    turning = fourbar.solve(replace(loads_and_gravity, motion=replace(case.motion, omega_2=1.0)))
+    rate = {1: 0.0, 2: 1.0, 3: turning.omega_3, 4: turning.omega_4}
+    pins = {"O2": (1, 2), "A": (2, 3), "B": (3, 4), "O4": (1, 4)}
+    work = sum(f * np.abs(rate[j] - rate[i]) for (i, j), f in ((pins[pin], f) for pin, f in couples.items()))
+    half = work / np.abs(rate[drive_bar])
+    size = np.abs(free.torque) + half
+    for end, side in ((s.torque_high, 1.0), (s.torque_low, -1.0)):
+        assert np.all(np.abs(end - (free.torque + side * half)) <= SOLVED * size)
+    moving = fourbar.solve(replace(case, motion=replace(case.motion, omega_2=2.0)))
+    assert np.array_equal(moving.torque_low, moving.torque) and np.array_equal(moving.torque_high, moving.torque)
 
 
 def test_nothing_acts_nothing_is_carried() -> None:
