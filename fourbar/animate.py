@@ -22,6 +22,7 @@ import numpy as np
 from fourbar.errors import InputError, NotAssembledError
 from fourbar.kinematics import Array, centre_in_bar
 from fourbar.linkage import BAR_NAMES, MOVING_BARS
+from fourbar.pictures import data_uri
 from fourbar.plot.energy import energies
 from fourbar.plot.style import length_unit, plain
 from fourbar.plot.view import on_branch, over_time, sweep_command
@@ -32,10 +33,6 @@ from fourbar.writing import write_text
 FORMATS = ("html", "gif", "mp4")
 MAX_ROWS = 1441
 """Positions embedded in a page: a quarter of a degree over a full turn; a finer sweep is thinned out evenly."""
-MAX_PICTURE = 2_000_000
-"""Bytes of one picture: a page with three of them still opens quickly."""
-RASTER = {b"\x89PNG\r\n\x1a\n": "image/png", b"\xff\xd8\xff": "image/jpeg"}
-"""First bytes of the formats that may be attached; SVG may not, because it can carry scripts."""
 WATCHED = (1.5, 60.0)
 """A motion through time that lasts between these, s, is shown in real time."""
 SCALARS = (
@@ -67,9 +64,9 @@ def write(
     Parameters
     ----------
     path : the file; its ending says which of html, gif and mp4 is meant.
-    pictures : for bars "input", "coupler", "output": a PNG or JPEG file that is laid along the
-        bar, its left edge at the bar's first pin (O2, A, O4) and its right edge at the second.
-        Pages only.
+    pictures : for bars "input", "coupler", "output", in place of the scene's own: a PNG or JPEG file
+        that is laid along the bar, its left edge at the bar's first pin (O2, A, O4) and its right
+        edge at the second. Pages only.
     file_format : html, gif or mp4 where the path's ending does not say it.
     seconds : duration of a film; left out: 6 s for a sweep, of a motion through time its own.
 
@@ -143,7 +140,7 @@ def page_data(scene: Scene, pictures: Mapping[str, str | Path]) -> dict[str, Any
         "drive_bar": scene.drive_bar,
         "branch": motion.branch,
         "followed": motion.through == "follow",
-        "pictures": {str(number): picture for number, picture in _pictures(pictures).items()},
+        "pictures": {str(number): picture for number, picture in _pictures(scene, pictures).items()},
         **shown,
     }
 
@@ -266,22 +263,13 @@ def _or_null(value: float) -> float | None:
     return value if math.isfinite(value) else None
 
 
-def _pictures(pictures: Mapping[str, str | Path]) -> dict[int, str]:
-    """The pictures of the bars as data URIs."""
+def _pictures(scene: Scene, pictures: Mapping[str, str | Path]) -> dict[int, str]:
+    """The pictures of the bars as data URIs: those of the scene, and those given in their place."""
     numbers = {name: number for number, name in BAR_NAMES.items() if number in MOVING_BARS}
     found = {}
     for name, path in pictures.items():
         if name not in numbers:
             raise InputError("picture", name, "must name one of " + ", ".join(numbers))
-        key = f"picture.{name}"
-        try:
-            content = Path(path).read_bytes()
-        except OSError as error:
-            raise InputError(key, str(path), f"cannot be read: {error.strerror or error}") from None
-        kind = next((kind for magic, kind in RASTER.items() if content.startswith(magic)), None)
-        if kind is None:
-            raise InputError(key, str(path), "must be a PNG or JPEG picture")
-        if len(content) > MAX_PICTURE:
-            raise InputError(key, str(path), f"must not exceed {MAX_PICTURE // 1_000_000} MB")
-        found[numbers[name]] = f"data:{kind};base64,{base64.b64encode(content).decode('ascii')}"
-    return found
+        found[numbers[name]] = data_uri(f"picture.{name}", path)
+    own = {picture.bar: picture for picture in scene.pictures if picture.bar not in found}
+    return found | {bar: picture.data_uri() for bar, picture in own.items()}

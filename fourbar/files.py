@@ -7,6 +7,7 @@ import json
 import math
 import stat
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,7 @@ from fourbar.kinematics import Array
 from fourbar.linkage import BAR_NAMES, MOVING_BARS, Bar, FourBar
 from fourbar.motion import CROSSED, DEFAULT_STEPS, OPEN, Free, FromLimit, Motion, Sweep
 from fourbar.motion_law import ENDS, Law
+from fourbar.pictures import Picture
 from fourbar.scene import Scene
 from fourbar.writing import write_text
 
@@ -76,7 +78,7 @@ def read_text(path: str | Path) -> str:
 
 
 def loads(text: str, name: str = "scene") -> Scene:
-    """The scene that a TOML text describes; `name` stands for the file in errors."""
+    """The scene that a TOML text describes; `name` stands for the file in errors, its folder is that of pictures."""
     shown = name if name.isprintable() else repr(name)
     for number, line in enumerate(text.split("\n"), 1):
         if line.count(".") > MOST_DOTS:
@@ -88,12 +90,12 @@ def loads(text: str, name: str = "scene") -> Scene:
     except ValueError as error:  # TOMLDecodeError, and numbers that Python refuses
         raise InputError("TOML", text[:40], f"cannot be read: {' '.join(str(error).split())[:120]}", shown) from None
     try:
-        return _scene(Reader(shown), document)
+        return _scene(Reader(shown), document, str(Path(name).parent))
     except InputError as error:
         raise (error if error.file else error.in_file(shown)) from None
 
 
-def _scene(read: Reader, document: dict[str, Any]) -> Scene:
+def _scene(read: Reader, document: dict[str, Any], folder: str) -> Scene:
     top = read.table("", document, ("title", "source", "lengths", "bars", "motion", "drive", "loads", "effects"))
     linkage = _linkage(read, top)
     drive = read.table("drive", top.get("drive", {}), ("bar",))
@@ -109,6 +111,16 @@ def _scene(read: Reader, document: dict[str, Any]) -> Scene:
         tuple(REGISTRY[key].read(value, read) for key, value in effects.items()),
         read.text("title", top.get("title", "")),
         read.text("source", top.get("source", "")),
+        _pictures(read, top.get("bars", {}), folder),
+    )
+
+
+def _pictures(read: Reader, bars: dict[str, Any], folder: str) -> tuple[Picture, ...]:
+    """The pictures of the bars that have one; the files themselves are read when they are shown."""
+    return tuple(
+        Picture(number, read.text(f"bars.{name}.picture", bars[name]["picture"]), folder)
+        for name, number in BARS.items()
+        if "picture" in bars.get(name, {})
     )
 
 
@@ -127,7 +139,7 @@ def _linkage(read: Reader, top: dict[str, Any]) -> FourBar:
 
 
 def _bar(read: Reader, key: str, value: object, length: float) -> Bar:
-    entry = read.table(key, value, ("mass", "inertia", "centre"))
+    entry = read.table(key, value, ("mass", "inertia", "centre", "picture"))
     mass = read.quantity(f"{key}.mass", entry.get("mass", "0 kg"), "kg", at_least_zero=True)
     inertia = centre = None
     if "inertia" in entry:
@@ -228,8 +240,12 @@ class Writer:
 
 
 def save(scene: Scene, path: str | Path) -> None:
-    """Write a scene to a TOML file, whole or not at all."""
-    write_text(path, dump(scene))
+    """Write a scene to a TOML file, whole or not at all.
+
+    Raises InputError as `dump` does, and for a picture that lies outside the file's folder.
+    """
+    pictures = tuple(picture.moved(Path(path).parent) for picture in scene.pictures)
+    write_text(path, dump(replace(scene, pictures=pictures)))
 
 
 def dump(scene: Scene) -> str:
@@ -248,11 +264,15 @@ def dump(scene: Scene) -> str:
     lengths["ground_angle"] = write.quantity(linkage.ground_angle, "rad")
     parts.append(_table("lengths", lengths))
     for name, number in BARS.items():
-        bar = linkage.bar(number)
+        bar, entry = linkage.bar(number), dict[str, Any]()
         if bar != Bar(bar.length):
             assert bar.inertia is not None and bar.centre is not None
             entry = {"mass": write.quantity(bar.mass, "kg"), "inertia": write.quantity(bar.inertia, "kg m^2")}
-            parts.append(_table(f"bars.{name}", {**entry, "centre": write.polar(*bar.centre, "m")}))
+            entry["centre"] = write.polar(*bar.centre, "m")
+        for picture in scene.pictures:
+            if picture.bar == number:
+                entry["picture"] = picture.name
+        parts.append(_table(f"bars.{name}", entry))
     parts.append(_table("motion", _motion_entry(write, motion)))
     parts.append(_table("drive", {"bar": scene.drive_bar}))
     parts += [_table("[loads]", _load_entry(write, load)) for load in scene.loads]

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from decimal import Decimal
 
     from fourbar.effects import Effect, Load
+    from fourbar.pictures import Picture
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -32,12 +33,16 @@ class Scene:
     effects: "tuple[Effect, ...]" = ()
     title: str = ""
     source: str = ""
+    pictures: "tuple[Picture, ...]" = ()
 
     def __post_init__(self) -> None:
         if self.drive_bar not in MOVING_BARS or isinstance(self.drive_bar, bool):
             raise InputError("drive.bar", self.drive_bar, "must be 2, 3 or 4")
         object.__setattr__(self, "loads", tuple(self.loads))
         object.__setattr__(self, "effects", tuple(self.effects))
+        object.__setattr__(self, "pictures", tuple(self.pictures))
+        if len({picture.bar for picture in self.pictures}) < len(self.pictures):
+            raise InputError("pictures", [picture.bar for picture in self.pictures], "a bar has one picture")
 
     def _repr_html_(self) -> str:
         from fourbar.notebook import scene_html

@@ -17,6 +17,7 @@ import fourbar
 from fourbar import animate
 from fourbar.errors import DependencyError, InputError, NotAssembledError
 from fourbar.motion_law import Law
+from fourbar.pictures import LARGEST
 from tests.scenes import crank_rocker, thesis
 
 HOSTILE = "</script><script>alert(1)</script> \"'><img src=x onerror=alert(2)> $style ${data} {{x}} \u2028 \x00 é"
@@ -148,7 +149,7 @@ def test_a_picture_is_embedded_where_it_is_one(tmp_path: Path) -> None:
     [
         ("input", b"<svg onload='alert(1)'/>", "PNG or JPEG"),
         ("input", b"", "PNG or JPEG"),
-        ("input", PNG + bytes(animate.MAX_PICTURE), "2 MB"),
+        ("input", PNG + bytes(LARGEST), "2 MB"),
         ("input", None, "cannot be read"),
         ("wheel", PNG, "must name one of input, coupler, output"),
     ],

@@ -13,7 +13,7 @@ ENGINES = {"mujoco": "mujoco", "pinocchio": "pinocchio"}
 LAYERS = [
     ("errors", "writing", "double_double"),
     ("exits", "linkage", "units"),
-    ("entries", "margins", "sixty_digits"),
+    ("entries", "margins", "pictures", "sixty_digits"),
     ("new", "kinematics", "mobility"),
     ("linkage_type", "circuits", "more_digits", "motion_law", "solution"),
     ("bearing", "motion", "transmission", "coefficients", "dynamics"),

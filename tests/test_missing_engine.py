@@ -79,4 +79,3 @@ def test_asked_for_by_name_nothing_is_run(tmp_path: Path) -> None:
     assert done.stderr.strip() == 'error: mujoco-inverse: mujoco is not installed: pip install "fourbar[mujoco]"'
     assert done.returncode == 3
     assert not (tmp_path / "out").exists()
-

@@ -13,7 +13,18 @@ from fourbar.cli import status
 TUTORIAL = Path(__file__).parent.parent / "docs" / "tutorial.md"
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 SESSION = re.compile(r"^\$ (.*)\n((?:(?!\$ ).*\n)*)", re.MULTILINE)
-WRITTEN = ("first.toml", "thesis.csv", "thesis.toml", "freebody.svg", "overview.svg", "thesis.html", "thesis.xml")
+WRITTEN = (
+    "first.toml",
+    "thesis.csv",
+    "thesis.toml",
+    "freebody.svg",
+    "overview.svg",
+    "thesis.html",
+    "pictured.html",
+    "energy.svg",
+    "released.html",
+    "thesis.xml",
+)
 
 
 def test_the_tutorial_does_and_prints_what_it_says(
