@@ -217,6 +217,11 @@ def test_a_bad_suite_in_toml_is_one_line(text: str, tmp_path: Path) -> None:
         suite_file(listed(tmp_path, text, "suite.toml"))
 
 
+def test_the_pattern_of_a_suite_does_not_take_the_suite_itself(tmp_path: Path) -> None:
+    suite = suite_file(listed(tmp_path, 'scenes = ["*.toml"]', "suite.toml"))
+    assert [suite.name(i) for i in range(len(suite))] == ["a", "b"]
+
+
 def test_a_suite_file_runs_from_the_command_line(tmp_path: Path) -> None:
     path = listed(tmp_path, "a.toml\nb.toml\n")
     out = tmp_path / "out"

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
+from validation.cli import status
 from validation.regression import record, render
 from validation.regression.changes import Kind, differences
 from validation.regression.command import accept_command, compare
@@ -98,3 +99,25 @@ def test_accept_records_the_run_under_a_name(tmp_path: Path, monkeypatch: pytest
     result = runner.invoke(compare, ["mine", str(run)], standalone_mode=False)
     assert result.return_value == 0
     assert runner.invoke(accept_command, [str(run), "--as", "../out"]).exit_code != 0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["--type", "crank-rocker"], "say --random N too"),
+        (["--seed", "3"], "say --random N too"),
+        (["--random", "3", "--type", "crank"], "crank-rocker, drag-link"),
+        (["--engines", ","], "must be among pinocchio-inverse"),
+        (["--against", "no-such-run"], "must be a folder with results.csv"),
+        (["--against", "accepted", "--python", "python"], "cannot be said with --python"),
+        (["--junit", "changes.xml"], "say --against BASELINE or --python PATH too"),
+        (["--name", "coupler=link"], "names a body or site of --mjcf"),
+    ],
+)
+def test_options_of_a_run_that_would_do_nothing_are_refused_before_it(
+    arguments: list[str], said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert status(["run", *arguments, "--out", str(tmp_path / "out")]) == 2
+    message = capsys.readouterr().err.strip()
+    assert message.startswith("error: ") and said in message and "\n" not in message
+    assert not (tmp_path / "out").exists()

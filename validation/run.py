@@ -19,7 +19,7 @@ from validation.machine import versions
 from validation.page import Page
 from validation.published import ladder_rows
 from validation.regression.command import output_options, told
-from validation.regression.record import about, baseline, write_about
+from validation.regression.record import about, baseline, read_run, write_about
 from validation.report.html import html
 from validation.report.markdown import markdown
 from validation.report.summary import SCENES_SHOWN, Summary, summarise
@@ -34,6 +34,7 @@ from validation.tolerance import IDENTITY
 from validation.witnesses import Witness
 
 WORKERS = 2
+ALL_TYPES = ",".join(kind.value for kind in LinkageType)
 CHUNK = {True: 1, False: 20}
 """Scenes per task: one where something is simulated (a second each), else twenty (a second together)."""
 
@@ -136,8 +137,8 @@ def examine(scenes: tuple[Path, ...], mjcf: Path, names: tuple[str, ...], out: P
 @click.option("--error", "asked", type=float, metavar="E", help="Simulate no more precisely than this relative error.")
 @click.option("--suite", "named", metavar="hard|FILE", help="Judge the hard cases, or the scenes that FILE lists.")
 @click.option("--random", "count", type=click.IntRange(min=1), help="Judge this many random linkages instead.")
-@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of the random linkages.")
-@click.option("--type", "types", default=",".join(kind.value for kind in LinkageType), show_default=True)
+@click.option("--seed", type=click.IntRange(min=0), metavar="S", help="Of the random linkages; left out: 0.")
+@click.option("--type", "types", metavar="TYPES", help=f"Of the random linkages, comma-separated: {ALL_TYPES} (all).")
 @click.option("--workers", type=click.IntRange(min=1), default=WORKERS, show_default=True, help="Processes.")
 @click.option("--scheduler", metavar="ADDRESS", help="Spread over the workers of this Dask scheduler.")
 @click.option("--against", metavar="BASELINE", help="Compare with an accepted name or an earlier run's folder.")
@@ -156,8 +157,8 @@ def command(
     asked: float | None,
     named: str | None,
     count: int | None,
-    seed: int,
-    types: str,
+    seed: int | None,
+    types: str | None,
     workers: int,
     scheduler: str | None,
     against: str | None,
@@ -174,19 +175,32 @@ def command(
 
     if mjcf is not None:
         return examine(scenes, mjcf, names, out)
+    if names:
+        raise InputError("--name", names[0], "names a body or site of --mjcf; say which file that is")
     if count is not None and scenes:
         raise InputError("--random", count, "judges random linkages; leave out the scene files")
     if named is not None and (scenes or count is not None):
         raise InputError("--suite", named, "has its own scenes; leave out scene files and --random")
+    for option, value in (("--seed", seed), ("--type", types)):
+        if value is not None and count is None:
+            raise InputError(option, value, "is of random linkages; say --random N too")
+    if python is not None and against is not None:
+        raise InputError("--against", against, "cannot be said with --python, which compares with the run made there")
+    for form, path in forms.items():
+        if path is not None and python is None and against is None:
+            raise InputError(f"--{form}", str(path), "tells differences; say --against BASELINE or --python PATH too")
+    if against is not None:
+        read_run(baseline(against))  # before anything runs
+    seed, types = seed or 0, types or ALL_TYPES
     suite, witnesses = selected(scenes, named, count, seed, types)
     if asked is not None:
         from validation.cost.dial import dialled
 
         witnesses = dialled(witnesses, asked)
     if python is not None:
-        passed_on = [*map(os.path.abspath, scenes), f"--seed={seed}", f"--type={types}", f"--workers={workers}"]
+        passed_on = [*map(os.path.abspath, scenes), f"--workers={workers}"]
         passed_on += [f"--engines={engines}"] if engines else []
-        passed_on += [f"--random={count}"] if count else []
+        passed_on += [f"--random={count}", f"--seed={seed}", f"--type={types}"] if count else []
         passed_on += [f"--error={asked!r}"] if asked is not None else []
         passed_on += [f"--suite={named if named == 'hard' else os.path.abspath(named)}"] if named else []
         against = str(run_elsewhere(python, passed_on, out / "elsewhere"))

@@ -11,7 +11,8 @@ AT_MOST = 50
 def verdict(found: Differences) -> str:
     """One line: how many regressions among how many rows, and what else moved."""
     counts = [f"{len(found.of(kind))} {kind.value}" for kind in Kind if found.of(kind)]
-    head = f"{len(found.regressions)} regressions" if found.regressions else "No regression"
+    many = len(found.regressions)
+    head = f"{many} regression{'s' if many > 1 else ''}" if many else "No regression"
     return f"{head} in {len(found.changes)} rows: " + ", ".join(counts)
 
 

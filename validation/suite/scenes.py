@@ -140,7 +140,9 @@ def suite_file(path: Path) -> Files:
     for entry in entries:
         if Path(entry).is_absolute() or ".." in Path(entry).parts or "\0" in entry:
             raise refuse(entry, "must lie in the folder of the list, or below it")
-        found = sorted(path.parent.glob(entry)) if "*" in entry else [path.parent / entry]
+        found = [path.parent / entry]
+        if "*" in entry:
+            found = sorted(file for file in path.parent.glob(entry) if not file.samefile(path))
         if not found:
             raise refuse(entry, "names no file")
         files += found

@@ -28,7 +28,7 @@ def chosen(engines: str | None, witnesses: tuple[Witness, ...] = WITNESSES) -> t
         return witnesses
     known = {witness.name: witness for witness in witnesses}
     names = [name.strip() for name in engines.split(",") if name.strip()]
-    for name in names:
+    for name in names or [engines]:
         if name not in known:
             raise InputError("--engines", name, "must be among " + ", ".join(known))
     return tuple(witness for name, witness in known.items() if name in names)
