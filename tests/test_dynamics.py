@@ -88,6 +88,16 @@ def test_both_keep_their_digits_at_a_stated_distance_from_a_limit(offset: float)
             assert any(assembled) and (offset > 1e-3 or not all(assembled))
 
 
+def test_both_say_alike_where_the_loop_closes_at_the_last_digits_of_a_limit() -> None:
+    for seed in range(10):
+        linkage, _, _ = random_case(np.random.default_rng(seed))
+        for limit in limit_positions(linkage):
+            angles = limit.theta_2 + np.arange(-4, 5) * np.spacing(limit.theta_2)
+            at = Command(angles, np.ones(9, dtype=np.int8), None, 0.0)
+            ours, theirs = solve(fourbar.Scene(linkage), at=at), EnergyMethod().answer(fourbar.Scene(linkage), at)
+            assert theirs.assembled is not None and np.array_equal(ours.assembled, theirs.assembled)
+
+
 def test_four_bar_of_gtdynamics() -> None:
     """Torque 1 N m between crank and coupler of a square: 0.125 rad/s^2 (borglab/GTDynamics test_four_bar.py)."""
     bar = fourbar.Bar(2.0, 1.0, 1.0)
