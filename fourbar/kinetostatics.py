@@ -171,22 +171,21 @@ def eliminate(state: State, wrenches: Wrenches, drive_bar: int) -> PinForces:
     R2, R3, R4 = (wrenches.force(bar) for bar in MOVING_BARS)
     M2, M3, M4 = (wrenches.moment(bar) for bar in MOVING_BARS)
     u2, u3, u4 = state.u2, state.u3, state.u4
-    with np.errstate(divide="ignore", invalid="ignore"):
-        if drive_bar == 2:
-            F43 = between(M3 / -b, M4 / c, u3, u4, state.regular_sine())
-            F32 = (R3[0] + F43[0], R3[1] + F43[1])
-            torque = a * cross(F32, u2) - M2
-        elif drive_bar == 4:
-            sine = sine_between(u2, u3)
-            M3_about_B = M3 - b * cross(u3, R3)
-            F32 = between(-M2 / a, -M3_about_B / b, u2, u3, sine)
-            # not F32 - R3: what the mass near A carries to O2 would cancel again
-            F43 = between(M3 / -b, -(M2 / a + cross(u2, R3)), u3, u2, -sine)
-            torque = c * cross(u4, F43) - M4
-        else:
-            F43 = between(-M2 / a - cross(u2, R3), M4 / c, u2, u4, sine_between(u2, u4))
-            F32 = (R3[0] + F43[0], R3[1] + F43[1])
-            torque = -(M3 + b * cross(u3, F43))
+    if drive_bar == 2:
+        F43 = between(M3 / -b, M4 / c, u3, u4, state.regular_sine())
+        F32 = (R3[0] + F43[0], R3[1] + F43[1])
+        torque = a * cross(F32, u2) - M2
+    elif drive_bar == 4:
+        sine = sine_between(u2, u3)
+        M3_about_B = M3 - b * cross(u3, R3)
+        F32 = between(-M2 / a, -M3_about_B / b, u2, u3, sine)
+        # not F32 - R3: what the mass near A carries to O2 would cancel again
+        F43 = between(M3 / -b, -(M2 / a + cross(u2, R3)), u3, u2, -sine)
+        torque = c * cross(u4, F43) - M4
+    else:
+        F43 = between(-M2 / a - cross(u2, R3), M4 / c, u2, u4, sine_between(u2, u4))
+        F32 = (R3[0] + F43[0], R3[1] + F43[1])
+        torque = -(M3 + b * cross(u3, F43))
     F32_x, F32_y = F32
     if wrenches.at_A is not None:
         F32_x += wrenches.at_A[0]

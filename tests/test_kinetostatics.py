@@ -2,12 +2,13 @@
 
 import math
 from dataclasses import replace
+from itertools import repeat
 
 import numpy as np
 import pytest
 
 import fourbar
-from fourbar.kinetostatics import sine_between
+from fourbar.kinetostatics import sine_between, solve_pins
 from validation.bench import bodies_of, command, example
 from validation.thirteen import assemble, solve_thirteen
 
@@ -136,6 +137,51 @@ def test_bars_without_mass_or_inertia(bodies: tuple[tuple[float, float], ...], a
     for name, column in (("F12", 0), ("F32", 2), ("F43", 6), ("F14", 8)):
         assert np.max(np.abs(unknowns[:, column : column + 2] - getattr(solution, name))) <= SOLVED * size
     assert np.max(np.abs(unknowns[:, 12] - solution.torque)) <= SOLVED * size
+
+
+def test_a_centre_one_metre_beside_its_bar() -> None:
+    """Across the bar by exactly 1 m, and not along it."""
+    across = fourbar.Bar(0.25, 0.5, 0.1, (1.0, math.pi / 2))
+    case = fourbar.Scene(fourbar.FourBar(0.3, fourbar.Bar(0.1), across, fourbar.Bar(0.22)), fourbar.Motion(0.0, 10.0))
+    at = command(9)
+    unknowns, solution = solve_thirteen(bodies_of(case, at), 2), fourbar.solve(case, at=at)
+    assert np.max(np.abs(unknowns[:, 12] - solution.torque)) <= SOLVED * np.max(np.abs(unknowns[:, 12]))
+
+
+def test_every_term_grows_with_its_share() -> None:
+    """The forces are linear in what acts: all of it larger by a thousandth is all of them larger by that."""
+    case = scene(3)
+    state = fourbar.kinematics.close_loop(case.linkage, np.linspace(0.1, 6.0, 5), 1)
+    fourbar.kinematics.add_velocities(state, -8.0)
+    fourbar.kinematics.add_accelerations(state, 20.0)
+    terms = (*case.loads, *case.effects)
+    plain = solve_pins(state, terms, 3)
+    grown = solve_pins(state, terms, 3, growths=repeat(1e-3))
+    for name in ("F12", "F32", "F43", "F14", "torque"):
+        assert np.allclose(getattr(grown, name), 1.001 * np.array(getattr(plain, name)), rtol=1e-13, atol=0.0)
+
+
+@pytest.mark.parametrize("pin", ["O2", "A", "B", "O4"])
+@pytest.mark.parametrize("drive_bar", [2, 3, 4])
+def test_the_couple_of_a_loaded_pin_is_its_force_times_the_radius_of_friction(pin: str, drive_bar: int) -> None:
+    """With the couples mu r |F| of the forces found, the thirteen equations give these forces again."""
+    case = fourbar.Scene(example().linkage, fourbar.Motion(0.0, 10.0), drive_bar, effects=(fourbar.Gravity(),))
+    at = fourbar.scene.Command(np.linspace(0.1, 6.0, 13), np.ones(13, np.int8), 10.0, 0.0)
+    s = fourbar.solve(
+        replace(case, effects=(*case.effects, fourbar.effects.PinFriction.at(**{pin: (0.1, 0.02)}))), at=at
+    )
+    (i, j), force = {"O2": ((1, 2), s.F12), "A": ((2, 3), s.F32), "B": ((3, 4), s.F43), "O4": ((1, 4), s.F14)}[pin]
+    rate = {1: 0.0, 2: s.omega_2, 3: s.omega_3, 4: s.omega_4}
+    couple = 0.1 * 0.02 * np.hypot(*force.T) * np.sign(rate[j] - rate[i])
+    bodies = bodies_of(case, at)
+    for bar, of in ((i, 1.0), (j, -1.0)):
+        if bar != 1:
+            bodies.inertia_moment[bar][:] -= of * couple
+    unknowns = solve_thirteen(bodies, drive_bar)
+    size = np.max(np.abs(unknowns[:, :12])) / np.min(np.abs(s.drive_condition))
+    for name, column in (("F12", 0), ("F32", 2), ("F43", 6), ("F14", 8)):
+        assert np.max(np.abs(unknowns[:, column : column + 2] - getattr(s, name))) <= SOLVED * size
+    assert np.max(np.abs(unknowns[:, 12] - s.torque)) <= SOLVED * size
 
 
 def test_a_force_between_two_bars_in_line_does_not_exist() -> None:
