@@ -121,3 +121,27 @@ def test_options_of_a_run_that_would_do_nothing_are_refused_before_it(
     message = capsys.readouterr().err.strip()
     assert message.startswith("error: ") and said in message and "\n" not in message
     assert not (tmp_path / "out").exists()
+
+
+def test_what_stood_for_a_failure_and_is_gone_is_no_regression() -> None:
+    alarm = replace(ROW, quantity="watch", verdict=FAILS, passed=False, error=math.nan)
+    assert kinds([ROW, alarm], [ROW]) == [Kind.SAME, Kind.GONE_FAILURE]
+    assert not differences((HERE, [ROW, alarm]), (HERE, [ROW])).regressions
+    failed = replace(ROW, verdict=FAILS, passed=False)
+    assert differences((HERE, [failed]), (HERE, [])).regressions  # a comparison that failed and is not made any more
+
+
+def test_another_python_without_the_libraries_is_one_line_and_status_3(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    bare = tmp_path / "python"
+    bare.write_text("#!/bin/sh\necho \"ModuleNotFoundError: No module named 'click'\" >&2\nexit 1\n")
+    bare.chmod(0o755)
+    earlier = tmp_path / "out" / "elsewhere" / "results.csv"
+    earlier.parent.mkdir(parents=True)
+    earlier.write_text("of an earlier run")
+    scene = Path(__file__).parent.parent / "models" / "crank_rocker.toml"
+    assert status(["run", str(scene), "--python", str(bare), "--out", str(tmp_path / "out")]) == 3
+    message = capsys.readouterr().err.strip()
+    assert "did not run there: ModuleNotFoundError: No module named 'click' (it needs" in message
+    assert "\n" not in message

@@ -24,12 +24,15 @@ class Kind(Enum):
     GONE = "gone"
     VERDICT_BETTER = "verdict got better"
     BETTER = "better"
+    GONE_FAILURE = "gone, and had failed"
     NEW = "new"
     NEW_FAILURE = "new, and fails"
     ROUND_OFF = "moved within round-off"
     SAME = "same"
 
 
+WHOLE = ("all", "watch")
+"""Rows that stand for what went wrong with an engine as a whole: once it is mended they are gone."""
 REGRESSIONS = frozenset((Kind.VERDICT_WORSE, Kind.WORSE, Kind.GONE, Kind.NEW_FAILURE))
 Key = tuple[str, str, str, str]
 
@@ -83,7 +86,9 @@ def _by_key(rows: Iterable[Row]) -> dict[Key, Row]:
 def _change(key: Key, old: Row | None, new: Row | None) -> Change:
     if old is None or new is None:
         fails = new is not None and new.verdict == FAILS
-        kind = Kind.GONE if new is None else Kind.NEW_FAILURE if fails else Kind.NEW
+        kind = Kind.NEW_FAILURE if fails else Kind.NEW
+        if old is not None:
+            kind = Kind.GONE_FAILURE if old.verdict == FAILS and old.quantity in WHOLE else Kind.GONE
         return Change(kind, key, old, new, math.nan)
     condition = min((c for c in (old.condition, new.condition) if c > 0.0), default=1.0)
     round_off = ROUND_OFF * EPS / condition
