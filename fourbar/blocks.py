@@ -10,7 +10,7 @@ from fourbar.kinematics import Array, State, Vector, add_accelerations, add_velo
 from fourbar.kinetostatics import drive_sine, solve_pins, torque_interval
 from fourbar.margins import U, diagonal_to_O4
 from fourbar.more_digits import needing_more_digits, restated, rounded
-from fourbar.solution import NOT_ASSEMBLED, OF_DRY_FRICTION, SINGULAR, STAGE_OF
+from fourbar.solution import ANGLES, NOT_ASSEMBLED, OF_DRY_FRICTION, SINGULAR, STAGE_OF, VECTORS
 
 if TYPE_CHECKING:
     from fourbar.scene import Command, Scene
@@ -37,8 +37,6 @@ def warm_heap() -> Array:
 
 
 KINEMATIC: dict[str, Callable[[State], Array | Vector | float | None]] = {
-    "theta_3": lambda state: state.angle(3),
-    "theta_4": lambda state: state.angle(4),
     "sin_mu": lambda state: state.sin_mu,
     "condition": lambda state: np.abs(state.sin_mu),
     "A": lambda state: state.pin("A"),
@@ -73,21 +71,22 @@ def solve_block(
         exact = diagonal_to_O4(scene.linkage, theta_2, where.remainder)
         state = close_loop(scene.linkage, theta_2, branch, exact)
     friction = np.zeros(theta_2.shape, dtype=np.uint8)
-    for name, value in _evaluate(scene, state, *motion, wanted, out):
+    room = {name: (array[:, 0], array[:, 1]) if name in VECTORS else array for name, array in out.items()}
+    for name, value in _evaluate(scene, state, *motion, wanted, room):
         if name == "status":
             friction[:] = value
         else:
-            _put(out[name], value)
+            _put(room[name], value)
     if (hard := needing_more_digits(state)).size:
-        for name, value in _evaluate(scene, *restated(state, *motion, hard), wanted, out):
+        for name, value in _evaluate(scene, *restated(state, *motion, hard), wanted, dict.fromkeys(out)):
             if name == "status":
                 friction[hard] = value
                 continue
             # what doubles lost is lost again, 53 bits further down
             left = out[name][hard] * U if STAGE_OF[name] == "error" else 0.0
-            _put(out[name], value, hard)
+            _put(room[name], value, hard)
             out[name][hard] += left
-    if state.assembled.all() and not state.singular.any():
+    if state.diagonal.least_root != 0.0 or (state.assembled.all() and not state.singular.any()):
         return friction
     return np.where(state.assembled, np.where(state.singular, SINGULAR, friction), NOT_ASSEMBLED).astype(np.uint8)
 
@@ -98,19 +97,25 @@ def _evaluate(
     omega_2: Array | float,
     alpha_2: Array | float,
     wanted: int,
-    names: Mapping[str, Array],
+    names: Mapping[str, Any],
 ) -> Iterator[tuple[str, Any]]:
-    """The quantities named, stage by stage, and the "status" that friction leaves."""
+    """The quantities named, stage by stage, and the "status" that friction leaves.
+
+    A name may come with room for the result; most of them are then written there at once.
+    """
+    room = {name: array for name, array in names.items() if array is not None}
     if wanted >= 1:
-        add_velocities(state, omega_2)
+        add_velocities(state, omega_2, room)
     if wanted >= 2:
-        add_accelerations(state, alpha_2)
+        add_accelerations(state, alpha_2, room)
     for name in names:
-        if name in KINEMATIC:
+        if name in ANGLES:
+            yield name, state.angle(int(name[-1]), room.get(name))
+        elif name in KINEMATIC:
             yield name, KINEMATIC[name](state)
     if wanted >= 3:
         terms = (*scene.loads, *scene.effects)
-        pins = solve_pins(state, terms, scene.drive_bar)
+        pins = solve_pins(state, terms, scene.drive_bar, room=room)
         for name in ("F12", "F32", "F43", "F14", "torque"):
             if name in names:
                 yield name, getattr(pins, name)
@@ -132,12 +137,13 @@ def _evaluate(
                     yield name, value
 
 
-def _put(target: Array, value: Array | Vector | float | None, where: slice | NDArray[np.intp] = ALL) -> None:
-    if isinstance(value, tuple):
-        target[where, 0], target[where, 1] = (rounded(component) for component in value)
-    else:
-        assert value is not None
-        target[where] = rounded(value)
+def _put(room: Array | Vector, value: Array | Vector | float | None, where: slice | NDArray[np.intp] = ALL) -> None:
+    assert value is not None
+    if not isinstance(value, tuple):
+        room, value = (room,), (value,)  # type: ignore[assignment]
+    for target, component in zip(room, value, strict=True):  # type: ignore[arg-type]
+        if component is not target:  # else it is there already
+            target[where] = rounded(component)
 
 
 def _piece(value: float | Array | None, part: slice) -> float | Array:

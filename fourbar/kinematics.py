@@ -8,6 +8,7 @@ and near a limit position the digits that are lost are those that the data thems
 that is zero at every position (alpha_2 = 0, theta_1 = 0, a centre on the bar's line) is not evaluated.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,11 +16,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.linkage import Bar, FourBar
-from fourbar.margins import Diagonal, diagonal_to_O4, in_precision_of, scaled
+from fourbar.margins import Diagonal, diagonal_to_O4, in_precision_of
 
 Array = NDArray[np.float64]
 Vector = tuple[Array, Array]
 """A planar vector as its components (x, y), each an array over the positions."""
+NO_ROOM: Mapping[str, Any] = {}
+"""For results by name, where each is to get an array of its own."""
 
 
 def cross(u: Vector, v: Vector) -> Array:
@@ -62,6 +65,8 @@ class State:
     at_A: Array
     at_O4: Array
     """2 b e cos beta and 2 c e cos gamma, of the angles of the triangle A, B, O4 at A and O4; unit of the diagonal."""
+    cos_psi: Array
+    """cos(theta_2 - theta_1)."""
     singular: NDArray[np.bool_]
     omega_2: Array | float = 0.0
     omega_3: Array | None = None
@@ -76,10 +81,10 @@ class State:
     @property
     def cos_mu(self) -> Array:
         """cos(theta_4 - theta_3)."""
-        _, _, b, c = scaled(self.linkage, self.diagonal.w)
+        _, _, b, c = self.diagonal.lengths
         cosine: Array = ((b * b + c * c) - self.diagonal.squared) * (0.5 / (b * c))
         if self.parallel is not None:
-            return np.where(self.parallel[0], self.diagonal.w - self.diagonal.v, cosine)
+            return np.where(self.parallel[0], self.cos_psi, cosine)
         return cosine
 
     def unit(self, bar: int) -> Vector:
@@ -100,22 +105,22 @@ class State:
 
     def regular_sine(self) -> Array:
         """sin_mu, NaN where the position is singular."""
-        if self.singular.any():
+        if self.diagonal.least_root == 0.0 and self.singular.any():
             return self.sin_mu + np.where(self.singular, np.nan, 0.0)
         return self.sin_mu
 
     def regular_root(self) -> Array:
         """sigma root in the unit of the diagonal, NaN where the position is singular."""
-        if self.singular.any():
+        if self.diagonal.least_root == 0.0 and self.singular.any():
             return self.signed_root + np.where(self.singular, np.nan, 0.0)
         return self.signed_root
 
-    def angle(self, bar: int) -> Array:
+    def angle(self, bar: int, into: Array | None = None) -> Array:
         """theta_2 as given; theta_3, theta_4 in (-pi, pi]."""
         if bar == 2:
             return self.theta_2
         u = self.unit(bar)
-        return np.arctan2(u[1], u[0])
+        return np.arctan2(u[1], u[0], out=into)
 
     def pin(self, name: str) -> Vector:
         """Position of a pin: "O2", "A", "B" or "O4"."""
@@ -206,7 +211,7 @@ def close_loop(
     diagonal : the diagonal A to O4 where it is known already.
     """
     diagonal = diagonal_to_O4(linkage, theta_2) if diagonal is None else diagonal
-    _, _, b, c = scaled(linkage, theta_2)
+    _, _, b, c = diagonal.lengths
     signs = np.asarray(branch, dtype=np.int8)
     root = diagonal.root
     if not (signs == 1).all():
@@ -214,7 +219,8 @@ def close_loop(
     x, y = diagonal.x, diagonal.y
     theta_1 = linkage.ground_angle
     u1: tuple[Any, Any] = (1.0, 0.0)
-    u2 = (diagonal.w - diagonal.v, 2.0 * diagonal.h)
+    cos_psi = diagonal.w - diagonal.v
+    u2 = (cos_psi, 2.0 * diagonal.h)
     if theta_1 != 0.0:
         c1, s1 = u1 = unit_vector(in_precision_of(theta_2, theta_1))
         x, y = c1 * x - s1 * y, s1 * x + c1 * y
@@ -234,6 +240,11 @@ def close_loop(
         for component, scale in ((x3, to_3), (y3, to_3), (x4, to_4), (y4, to_4)):
             component *= scale  # noqa: PLW2901 - in place
     sin_mu = (0.5 / (b * c)) * root
+    no_digit = NO_DIGIT_LEFT if diagonal.offset is None else 0.0
+    if diagonal.least_root != 0.0 and diagonal.least_root > no_digit * (2.0 * b * c):
+        singular = np.zeros(theta_2.shape, dtype=bool)
+    else:
+        singular = np.abs(sin_mu) <= no_digit  # false where it is NaN
     state = State(
         linkage=linkage,
         theta_2=theta_2,
@@ -248,7 +259,8 @@ def close_loop(
         sin_mu=sin_mu,
         at_A=at_A,
         at_O4=at_O4,
-        singular=np.abs(sin_mu) <= (NO_DIGIT_LEFT if diagonal.offset is None else 0.0),  # false where it is NaN
+        cos_psi=cos_psi,
+        singular=singular,
     )
     _parallel(state, u1)
     return state
@@ -288,36 +300,43 @@ NO_DIGIT_LEFT = 8.0 * 2.0**-52
 the position is described by its offset from the limit."""
 
 
-def add_velocities(state: State, omega_2: Array | float) -> None:
+def add_velocities(state: State, omega_2: Array | float, room: Mapping[str, Any] = NO_ROOM) -> None:
     """omega_3 = h3 omega_2, omega_4 = h4 omega_2 with the kinematic coefficients h_k = d theta_k/d theta_2.
 
     In the triangle A, B, O4, whose side e turns by kappa = d phi/d theta_2 and grows by lambda = e'/e:
         h3 = kappa - sigma lambda cot gamma,  h4 = kappa + sigma lambda cot beta,
         kappa = a (a - d cos psi)/e^2,  lambda = a d sin psi/e^2,  psi = theta_2 - theta_1.
     The same as Norton's (ch. 6), but where the ground is short and all bars turn together the
-    difference of nearly equal speeds keeps its digits.
+    difference of nearly equal speeds keeps its digits. What `room` has an array for is written there.
     """
     coefficients = first_coefficients(state)
     state.first = coefficients
     state.omega_2 = omega_2
-    state.omega_3, state.omega_4 = coefficients.h3 * omega_2, coefficients.h4 * omega_2
+    state.omega_3 = np.multiply(coefficients.h3, omega_2, out=room.get("omega_3"))
+    state.omega_4 = np.multiply(coefficients.h4, omega_2, out=room.get("omega_4"))
 
 
-def add_accelerations(state: State, alpha_2: Array | float) -> None:
+def add_accelerations(state: State, alpha_2: Array | float, room: Mapping[str, Any] = NO_ROOM) -> None:
     """alpha_k = h_k alpha_2 + h_k' omega_2^2, with h_k' = d h_k/d theta_2:
 
     h3' = kappa' - sigma (lambda' cot gamma + lambda^2 cot beta / sin^2 gamma),
     h4' = kappa' + sigma (lambda' cot beta + lambda^2 cot gamma / sin^2 beta),
     kappa' = lambda (d^2 - a^2)/e^2,  lambda' = a d cos psi/e^2 - 2 lambda^2.
+
+    Evaluated with 1/sin^2 = 1 + cot^2 and what both share taken together:
+        h3' = kappa' - lambda p4 - Z cot gamma,  h4' = kappa' + lambda p3 + Z cot beta,
+        p3 = sigma lambda cot gamma,  p4 = sigma lambda cot beta,  Z = sigma (lambda' + p3 p4).
+    What `room` has an array for is written there.
     """
     assert state.first is not None, "velocities come first"
     w2 = state.omega_2 * state.omega_2
     h3, h4 = second_coefficients(state, state.first)
     state.alpha_2 = alpha_2
-    state.alpha_3, state.alpha_4 = h3 * w2, h4 * w2
+    state.alpha_3 = np.multiply(h3, w2, out=room.get("alpha_3"))
+    state.alpha_4 = np.multiply(h4, w2, out=room.get("alpha_4"))
     if not is_zero(alpha_2):
-        state.alpha_3 = state.alpha_3 + state.first.h3 * alpha_2
-        state.alpha_4 = state.alpha_4 + state.first.h4 * alpha_2
+        state.alpha_3 = np.add(state.alpha_3, state.first.h3 * alpha_2, out=room.get("alpha_3"))
+        state.alpha_4 = np.add(state.alpha_4, state.first.h4 * alpha_2, out=room.get("alpha_4"))
 
 
 @dataclass(slots=True)
@@ -331,12 +350,15 @@ class FirstCoefficients:
     cot_beta: Array
     cot_gamma: Array
     """sigma cot of the angles of the triangle at A and O4."""
+    with_beta: Array
+    with_gamma: Array
+    """sigma lambda cot of the same angles: what h4 and h3 differ by from the turning of the diagonal."""
 
 
 def first_coefficients(state: State) -> FirstCoefficients:
     """The first kinematic coefficients; NaN where the position is singular."""
     diagonal = state.diagonal
-    d, a, _, _ = scaled(state.linkage, diagonal.w)
+    d, a, _, _ = diagonal.lengths
     root = state.regular_root()
     cot_beta, cot_gamma = state.at_A / root, state.at_O4 / root
     growth, turn = (2.0 * a * d) * diagonal.h, (a * (a - d)) * diagonal.w
@@ -344,34 +366,31 @@ def first_coefficients(state: State) -> FirstCoefficients:
     with np.errstate(divide="ignore", invalid="ignore"):  # A on O4
         growth /= diagonal.squared
         turn /= diagonal.squared
-    h3, h4 = turn - growth * cot_gamma, turn + growth * cot_beta
+    with_beta, with_gamma = growth * cot_beta, growth * cot_gamma
+    h3, h4 = turn - with_gamma, turn + with_beta
     if state.parallel is not None:
         where, fourth = state.parallel
         gap = np.where(state.singular, np.nan, 0.0)
         h3, h4 = np.where(where, (1.0 - fourth) + gap, h3), np.where(where, fourth + gap, h4)
-    return FirstCoefficients(h3, h4, growth, cot_beta, cot_gamma)
+    return FirstCoefficients(h3, h4, growth, cot_beta, cot_gamma, with_beta, with_gamma)
 
 
 def second_coefficients(state: State, first: FirstCoefficients) -> Vector:
     """d^2 theta_3/d theta_2^2 and d^2 theta_4/d theta_2^2, each (n,)."""
     diagonal = state.diagonal
-    d, a, b, c = scaled(state.linkage, diagonal.w)
-    growth, cot_beta, cot_gamma = first.growth, first.cot_beta, first.cot_gamma
-    growth_2 = growth * growth
-    turn, growing = ((d - a) * (d + a)) * growth, (a * d) * (diagonal.w - diagonal.v)
+    d, a, _, _ = diagonal.lengths
+    growth = first.growth
+    turn, shared = ((d - a) * (d + a)) * growth, (a * d) * state.cos_psi
     turn /= diagonal.squared
     with np.errstate(divide="ignore", invalid="ignore"):  # A on O4
-        growing /= diagonal.squared
-    growing -= 2.0 * growth_2
-    root = state.regular_root()
-    growth_2 *= diagonal.squared
-    growth_2 /= root * root  # 1/(4 e^2) of what multiplies the cotangents below
-    squares_3, squares_4 = (4.0 * c * c) * growth_2, (4.0 * b * b) * growth_2
-    squares_3 *= cot_beta
-    squares_4 *= cot_gamma
-    h3, h4 = growing * cot_gamma, growing * cot_beta
-    h3 += squares_3
-    h4 += squares_4
+        shared /= diagonal.squared
+    twice = growth * growth
+    twice *= 2.0
+    shared -= twice
+    shared += first.with_beta * first.with_gamma
+    h3, h4 = growth * first.with_beta, growth * first.with_gamma
+    h3 += shared * first.cot_gamma
+    h4 += shared * first.cot_beta
     h3 = turn - h3
     h4 += turn
     if state.parallel is not None:

@@ -6,7 +6,7 @@ Design of Machinery, ch. 11) are eliminated by hand to one 2x2 system whose dete
 between the two bars that are not driven.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, NamedTuple, Protocol, Self
 
 import numpy as np
@@ -14,9 +14,13 @@ from numpy.typing import NDArray
 
 from fourbar.effects.pins import resting
 from fourbar.effects.wrenches import Wrenches
-from fourbar.kinematics import Array, State, Vector, centre_in_bar, cross, dot, is_zero
+from fourbar.kinematics import NO_ROOM, Array, State, Vector, centre_in_bar, cross, dot, is_zero
 from fourbar.linkage import MOVING_BARS
 from fourbar.margins import in_precision_of
+
+Room = tuple[Array | None, Array | None]
+NEW: Room = (None, None)
+"""No arrays to write a vector into."""
 
 
 class Term(Protocol):
@@ -95,10 +99,10 @@ def _pull(u: Vector, m_along: Any, m_across: Any, omega: Array | float, alpha: A
     return (x, y)
 
 
-def between(m_u: Array, m_v: Array, u: Vector, v: Vector, sine: Array) -> Vector:
+def between(m_u: Array, m_v: Array, u: Vector, v: Vector, sine: Array, room: Room = NEW) -> Vector:
     """The force F with u x F = m_u and v x F = m_v, for unit vectors with u x v = sine."""
     k_u, k_v = m_u / sine, m_v / sine
-    x, y = k_u * v[0], k_u * v[1]
+    x, y = np.multiply(k_u, v[0], out=room[0]), np.multiply(k_u, v[1], out=room[1])
     x -= k_v * u[0]
     y -= k_v * u[1]
     return (x, y)
@@ -121,7 +125,12 @@ def drive_sine(state: State, drive_bar: int) -> Array:
 
 
 def solve_pins(
-    state: State, terms: Iterable[Term], drive_bar: int, *, growths: Iterator[float] | None = None
+    state: State,
+    terms: Iterable[Term],
+    drive_bar: int,
+    *,
+    growths: Iterator[float] | None = None,
+    room: Mapping[str, Any] = NO_ROOM,
 ) -> PinForces:
     """Pin forces and driving torque for the terms that act.
 
@@ -134,6 +143,7 @@ def solve_pins(
     terms : loads and effects.
     drive_bar : 2, 3 or 4.
     growths : relative changes of the terms, for the error bars.
+    room : arrays to write results into, by name: (n,), or both components of a vector.
     """
     wrenches = Wrenches(state, growths)
     add_inertia(wrenches, state)
@@ -142,7 +152,7 @@ def solve_pins(
         term.add_wrenches(wrenches, state)
         if term.loaded_pins:
             implicit.append(term)
-    pins = eliminate(state, wrenches, drive_bar)
+    pins = eliminate(state, wrenches, drive_bar, NO_ROOM if implicit else room)
     for each in implicit:  # a scene holds one effect of a kind, and one kind depends on the forces
         pins = each.settle(state, wrenches, pins, lambda wrenches: eliminate(state, wrenches, drive_bar))  # type: ignore[attr-defined]
     return pins
@@ -165,33 +175,41 @@ def torque_interval(state: State, terms: Iterable[Term], drive_bar: int, torque:
     return np.minimum(ahead, back), np.maximum(ahead, back)
 
 
-def eliminate(state: State, wrenches: Wrenches, drive_bar: int) -> PinForces:
+def eliminate(state: State, wrenches: Wrenches, drive_bar: int, room: Mapping[str, Any] = NO_ROOM) -> PinForces:
     """Pin forces and driving torque under the wrenches: the 2x2 system and the sums around it."""
     _, a, b, c = state.linkage.lengths
     R2, R3, R4 = (wrenches.force(bar) for bar in MOVING_BARS)
     M2, M3, M4 = (wrenches.moment(bar) for bar in MOVING_BARS)
     u2, u3, u4 = state.u2, state.u3, state.u4
+    for_F32, for_F43 = room.get("F32", NEW), room.get("F43", NEW)
     if drive_bar == 2:
-        F43 = between(M3 / -b, M4 / c, u3, u4, state.regular_sine())
-        F32 = (R3[0] + F43[0], R3[1] + F43[1])
-        torque = a * cross(F32, u2) - M2
+        F43 = between(M3 / -b, M4 / c, u3, u4, state.regular_sine(), for_F43)
+        F32 = plus(R3, F43, for_F32)
+        torque = a * cross(F32, u2)
+        torque = np.subtract(torque, M2, out=room.get("torque"))
     elif drive_bar == 4:
         sine = sine_between(u2, u3)
         M3_about_B = M3 - b * cross(u3, R3)
-        F32 = between(-M2 / a, -M3_about_B / b, u2, u3, sine)
+        F32 = between(-M2 / a, -M3_about_B / b, u2, u3, sine, for_F32)
         # not F32 - R3: what the mass near A carries to O2 would cancel again
-        F43 = between(M3 / -b, -(M2 / a + cross(u2, R3)), u3, u2, -sine)
+        F43 = between(M3 / -b, -(M2 / a + cross(u2, R3)), u3, u2, -sine, for_F43)
         torque = c * cross(u4, F43) - M4
     else:
-        F43 = between(-M2 / a - cross(u2, R3), M4 / c, u2, u4, sine_between(u2, u4))
-        F32 = (R3[0] + F43[0], R3[1] + F43[1])
+        F43 = between(-M2 / a - cross(u2, R3), M4 / c, u2, u4, sine_between(u2, u4), for_F43)
+        F32 = plus(R3, F43, for_F32)
         torque = -(M3 + b * cross(u3, F43))
     F32_x, F32_y = F32
     if wrenches.at_A is not None:
         F32_x += wrenches.at_A[0]
         F32_y += wrenches.at_A[1]
-    F12_x, F12_y = -R2[0], -R2[1]
+    for_F12, for_F14 = room.get("F12", NEW), room.get("F14", NEW)
+    F12_x, F12_y = np.negative(R2[0], out=for_F12[0]), np.negative(R2[1], out=for_F12[1])
     F12_x -= F32_x
     F12_y -= F32_y
-    F14 = (F43[0] - R4[0], F43[1] - R4[1])
+    F14 = (np.subtract(F43[0], R4[0], out=for_F14[0]), np.subtract(F43[1], R4[1], out=for_F14[1]))
     return PinForces((F12_x, F12_y), F32, F43, F14, torque)
+
+
+def plus(u: Vector, v: Vector, room: Room) -> Vector:
+    """u + v."""
+    return (np.add(u[0], v[0], out=room[0]), np.add(u[1], v[1], out=room[1]))

@@ -39,6 +39,8 @@ class Diagonal:
 
     unit: float
     """A power of two near the longest bar: no product of lengths in it leaves the range of doubles."""
+    lengths: tuple[Any, Any, Any, Any]
+    """(d, a, b, c) in that unit, as numbers of the precision of the arrays."""
     x: Array
     y: Array
     """Components from A to O4 in the ground's frame."""
@@ -55,13 +57,14 @@ class Diagonal:
     """Indices of the positions whose margins were evaluated in 60 digits."""
     offset: "Decimal | None"
     """What theta_2 as a double leaves out of the angle meant, rad, where that is known."""
+    least_root: float = 0.0
+    """A bound that the root does not go below at any theta_2; 0 where the linkage has limits or may come near one."""
 
 
-def scaled(linkage: FourBar, like: Array) -> tuple[Any, Any, Any, Any]:
-    """(d, a, b, c) in the unit of `Diagonal`, as numbers of the precision of `like`."""
-    unit = unit_of(linkage)
-    d, a, b, c = (in_precision_of(like, length / unit) for length in linkage.lengths)
-    return d, a, b, c
+def scaled(linkage: FourBar, unit: float) -> tuple[float, float, float, float]:
+    """(d, a, b, c) in a unit."""
+    d, a, b, c = linkage.lengths
+    return d / unit, a / unit, b / unit, c / unit
 
 
 def unit_of(linkage: FourBar) -> float:
@@ -89,18 +92,23 @@ def diagonal_to_O4(
         evaluated in 60 digits.
     growths : relative changes of the parts, for the error bars; factors near zero then stay as doubles give them.
     """
-    x, y, squared, (w, v, h), (constant_1, constant_2, product) = _triangle(linkage, theta_2, growths)
+    unit = unit_of(linkage)
+    lengths = scaled(linkage, unit)
+    x, y, squared, (w, v, h), (constant_1, constant_2, product) = _triangle(linkage, lengths, theta_2, growths)
     outer, inner = product * w, product * v
     outer += constant_1
     inner += constant_2
-    _, _, b, c = (length / unit_of(linkage) for length in linkage.lengths)
+    _, _, b, c = lengths
     if product > 4.0 * b * c:
         # b, c short beside the others: of the two factors the one whose change over psi is small has the digits
         whole = 4.0 * b * c
         outer, inner = np.where(v < w, whole - inner, outer), np.where(v < w, inner, whole - outer)
     least_1, least_2 = UNDECIDED * (abs(constant_1) + product), UNDECIDED * (abs(constant_2) + product)
-    decided = NONE
-    if offset is None and outer.min() > least_1 and inner.min() > least_2:
+    decided, least_root = NONE, 0.0
+    if offset is None and growths is None and constant_1 > least_1 and constant_2 > least_2:
+        least_root = _least_root(constant_1, constant_2, product)
+        assembled = np.ones(outer.shape, dtype=bool)
+    elif offset is None and outer.min() > least_1 and inner.min() > least_2:
         assembled = np.ones(outer.shape, dtype=bool)
     else:
         assembled = (outer >= 0.0) & (inner >= 0.0)
@@ -118,21 +126,34 @@ def diagonal_to_O4(
         if not assembled.all():
             outer = np.where(assembled, outer, np.nan)
     outer *= inner
-    return Diagonal(unit_of(linkage), x, y, squared, np.sqrt(outer, outer), w, v, h, assembled, decided, offset)
+    root = np.sqrt(outer, outer)
+    return Diagonal(unit, lengths, x, y, squared, root, w, v, h, assembled, decided, offset, least_root)
+
+
+def _least_root(constant_1: float, constant_2: float, product: float) -> float:
+    """The least root over a turn: outer + inner is constant, so their product is least at one of its ends.
+
+    A millionth less, which no rounding reaches.
+    """
+    ends = (constant_1 + product) * constant_2, constant_1 * (constant_2 + product)
+    return (1.0 - 1e-6) * math.sqrt(min(ends))
 
 
 def in_double_double(linkage: FourBar, theta_2: Array) -> Diagonal:
     """The same in 32 digits, for positions that are known to assemble; theta_2 is a `DoubleDouble`."""
-    x, y, squared, (w, v, h), (constant_1, constant_2, product) = _triangle(linkage, theta_2)
+    unit = unit_of(linkage)
+    d, a, b, c = (in_precision_of(theta_2, length) for length in scaled(linkage, unit))
+    x, y, squared, (w, v, h), (constant_1, constant_2, product) = _triangle(linkage, (d, a, b, c), theta_2)
     root = np.sqrt((constant_1 + product * w) * (constant_2 + product * v))
-    return Diagonal(unit_of(linkage), x, y, squared, root, w, v, h, np.ones(theta_2.shape, dtype=bool), NONE, None)
+    assembled = np.ones(theta_2.shape, dtype=bool)
+    return Diagonal(unit, (d, a, b, c), x, y, squared, root, w, v, h, assembled, NONE, None)
 
 
 def _triangle(
-    linkage: FourBar, theta_2: Array, growths: Iterator[float] | None = None
+    linkage: FourBar, lengths: tuple[Any, Any, Any, Any], theta_2: Array, growths: Iterator[float] | None = None
 ) -> tuple[Array, Array, Array, tuple[Array, Array, Array], tuple[Any, Any, Any]]:
     """x, y, e^2 and w, v, h of `Diagonal`, the constants of outer and inner and 4 a d, in the precision of theta_2."""
-    d, a, b, c = scaled(linkage, theta_2)
+    d, a, b, c = lengths
     theta_1 = linkage.ground_angle
     psi = theta_2
     if theta_1 != 0.0:

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.kinematics import Array, State, close_loop
-from fourbar.margins import in_double_double
+from fourbar.margins import NONE, in_double_double
 
 NEAR = (0.03, 0.1)
 """|sin mu| and |sin(theta_2 - theta_1)| below which a position counts as near a change point: there errors that
@@ -22,6 +22,9 @@ def needing_more_digits(state: State) -> NDArray[np.intp]:
         hard = np.ones(state.theta_2.shape, dtype=bool)
     else:
         near_sine, near_angle = NEAR
+        _, _, b, c = state.diagonal.lengths
+        if state.diagonal.least_root > near_sine * (2.0 * b * c):
+            return NONE  # at no theta_2
         hard = np.abs(state.sin_mu) < near_sine
         if not hard.any():
             return np.flatnonzero(hard)

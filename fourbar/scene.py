@@ -9,11 +9,12 @@ from numpy.typing import NDArray
 
 from fourbar.blocks import BLOCK, solve_block, warm_heap
 from fourbar.errors import InputError
+from fourbar.half_angles import HalfAngles, half_angles
 from fourbar.kinematics import Array
 from fourbar.linkage import MOVING_BARS, FourBar
 from fourbar.mobility import default_range, limit_positions, on_smooth_path
 from fourbar.motion import DEFAULT_STEPS, FromLimit, Motion, Sweep
-from fourbar.solution import OF_DRY_FRICTION, OF_PIN_LOADS, STAGE_OF, STAGES, VECTORS, Solution, Unwrapped
+from fourbar.solution import ANGLES, OF_DRY_FRICTION, OF_PIN_LOADS, STAGE_OF, STAGES, VECTORS, Solution, Unwrapped
 
 if TYPE_CHECKING:
     from decimal import Decimal
@@ -137,12 +138,18 @@ def solve(
         stage = STAGES[wanted]
     if stage != "position" and where.omega_2 is None:
         raise InputError("motion.omega_2", None, f"is needed for the stage {stage!r}")
-    code = np.empty(n, dtype=np.uint8)
+    code = np.zeros(n, dtype=np.uint8)
+    alone = 0 < len(result) == len(result.keys() & set(ANGLES))
+    halves = _half_angles(scene.linkage, where) if alone or n > BLOCK else None
     lid = warm_heap() if n > BLOCK else None
-    unwrapped = {name: Unwrapped() for name in ("theta_3", "theta_4") if name in result}
+    unwrapped = {name: Unwrapped() for name in ANGLES if name in result and halves is None}
     for start in range(0, n, BLOCK):
         part = slice(start, min(start + BLOCK, n))
-        code[part] = solve_block(scene, where, part, wanted, {name: array[part] for name, array in result.items()})
+        arrays = {name: array[part] for name, array in result.items()}
+        if alone and halves is not None:
+            halves.write(where.theta_2[part], arrays)
+        else:
+            code[part] = solve_block(scene, where, part, wanted, arrays)
         for name, turns in unwrapped.items():
             turns.extend(result[name][part])
     del lid
@@ -189,3 +196,11 @@ def _highest_stage(out: Mapping[str, Array], n: int) -> int:
         if array.shape != shape or array.dtype != np.float64:
             raise InputError(f"out.{name}", (array.shape, str(array.dtype)), f"must be float64 of shape {shape}")
     return max((STAGES.index(STAGE_OF[name]) for name in out), default=0)
+
+
+def _half_angles(linkage: FourBar, where: Command) -> HalfAngles | None:
+    """Of a linkage whose theta_3, theta_4 need no second look and no unwrapping at any position; None for others."""
+    branch = where.branch
+    if where.remainder is not None or (any(branch.strides) and branch.min() != branch.max()):
+        return None
+    return half_angles(linkage, int(branch[0]))

@@ -29,6 +29,7 @@ STAGE_OF = {
 OF_DRY_FRICTION = ("torque_low", "torque_high")
 OF_PIN_LOADS = ("friction_residual",)
 """Quantities that exist only where the scene has dry friction, or friction that depends on the pin forces."""
+ANGLES = ("theta_3", "theta_4")
 VECTORS = frozenset(("A", "B", "G2", "G3", "G4", "a_A", "a_B", "a_G2", "a_G3", "a_G4", "F12", "F32", "F43", "F14"))
 UNITS = {
     **dict.fromkeys(("theta_2", "theta_3", "theta_4"), "rad"),

@@ -16,7 +16,7 @@ LAYERS = [
     ("entries", "margins", "pictures", "sixty_digits"),
     ("new", "kinematics", "mobility"),
     ("linkage_type", "circuits", "more_digits", "motion_law", "solution"),
-    ("bearing", "motion", "transmission", "coefficients", "dynamics"),
+    ("bearing", "motion", "transmission", "coefficients", "dynamics", "half_angles"),
     ("effects", "free_motion"),
     ("kinetostatics",),
     ("error_bars",),

@@ -8,6 +8,7 @@ from fourbar.effects.effect import Act, Effect, Tree
 from fourbar.effects.wrenches import Wrenches
 from fourbar.kinematics import Array, State, centre_in_bar
 from fourbar.linkage import MOVING_BARS, FourBar, require
+from fourbar.margins import U
 from fourbar.solution import Solution
 
 
@@ -26,8 +27,9 @@ class Gravity(Effect):
 
     @property
     def vector(self) -> tuple[float, float]:
-        """(g_x, g_y), m/s^2."""
-        return (self.magnitude * math.cos(self.angle), self.magnitude * math.sin(self.angle))
+        """(g_x, g_y), m/s^2; a component that the angle as a double cannot tell from zero is zero."""
+        cosine, sine = (x if abs(x) > U else 0.0 for x in (math.cos(self.angle), math.sin(self.angle)))
+        return (self.magnitude * cosine, self.magnitude * sine)
 
     @classmethod
     def read(cls, value: object, reader: Any) -> "Gravity":

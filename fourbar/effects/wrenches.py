@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from fourbar.kinematics import Array, State, Vector, cross
+from fourbar.kinematics import Array, State, Vector, cross, is_zero
 
 
 class Wrenches:
@@ -29,14 +29,18 @@ class Wrenches:
         (fx, fy), (p, q), u = force, point, self.state.unit(bar)
         self.add_force(bar, force)
         # (p u + q u turned) x F
-        moment = (p * fy - q * fx) * u[0]
-        moment -= (p * fx + q * fy) * u[1]
+        along, across = p * fx + q * fy, p * fy - q * fx
+        moment = across * u[0]
+        if along != 0.0:
+            moment -= along * u[1]
         self.add_moment(bar, moment)
 
     def add_force(self, bar: int, force: Vector | tuple[float, float], arm: Vector | None = None) -> None:
         """A force on a bar, applied at `arm` from the bar's first pin; at that pin where no arm is given."""
-        self.force_x[bar] = self._plus(self.force_x[bar], force[0])
-        self.force_y[bar] = self._plus(self.force_y[bar], force[1])
+        if not is_zero(force[0]):
+            self.force_x[bar] = self._plus(self.force_x[bar], force[0])
+        if not is_zero(force[1]):
+            self.force_y[bar] = self._plus(self.force_y[bar], force[1])
         if arm is not None:
             self.add_moment(bar, cross(arm, force))  # type: ignore[arg-type]
 
