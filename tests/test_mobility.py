@@ -292,6 +292,9 @@ def test_ranges_of_coupler_and_output_hold_every_position_and_no_more() -> None:
             reached = np.concatenate([close_loop(bars, theta_2, branch).angle(bar) for branch in (1, -1)])
             clear = np.min([np.abs(np.sin(0.5 * (reached - end))) for end in np.ravel(intervals(bars, bar))], axis=0)
             assert inside(reached[clear > 1e-6], intervals(bars, bar)).all()
+            # the first range holds the ground's direction (bar 4: its opposite) or begins less than pi after it
+            first, half = intervals(bars, bar)[0][0], math.pi if bar == 4 else 0.0
+            assert abs(first - (bars.ground_angle + half)) <= math.pi * (1.0 + EPS)
             for start, stop in intervals(bars, bar):
                 for end in (start, stop) if not turns_fully(bars, bar) else ():
                     # theta_k goes as a square root near its limit's theta_2, or is tangent to it
@@ -308,6 +311,10 @@ def test_time_ratio_is_the_time_of_both_strokes() -> None:
     assert time_ratio(bars) == pytest.approx(ratio, rel=8.0 / n)  # both ends counted to one step
     assert time_ratio(uniform(1, 3, 2.5, 3.2)) is None
     assert time_ratio(THESIS) is None
+    # limits of the output alone are not enough: there are change points, or the input does not turn
+    assert time_ratio(uniform(3, 1, 2, 2)) is None and len(limit_positions(linkage(3, 1, 2, 2), 4)) == 2
+    for bars in random_linkages(11, 100):
+        assert turns_fully(bars) or time_ratio(bars) is None
     # a central (in-line) crank-rocker, d^2 + a^2 = b^2 + c^2, has equal strokes
     assert time_ratio(uniform(math.sqrt(2.5**2 + 2.2**2 - 1), 1, 2.5, 2.2)) == pytest.approx(1.0, abs=1e-14)
 
@@ -347,6 +354,51 @@ def test_a_sweep_on_a_change_point_is_before_it() -> None:
     assert on_smooth_path(bars, np.array([1.0, 1.0, 1.0]), -1).tolist() == [-1, -1, -1]
     assert on_smooth_path(bars, np.array([1.0]), 1).dtype == np.int8
     assert (on_smooth_path(uniform(3, 1, 2.5, 2.2), quarter, -1) == -1).all()
+
+
+def test_a_position_on_a_change_point_belongs_to_the_side_it_is_reached_from() -> None:
+    bars = uniform(2, 1, 2, 1)
+    assert on_smooth_path(bars, np.array([-1.0, 0.5, 0.0, 0.5]), 1).tolist() == [1, -1, -1, -1]
+    assert on_smooth_path(bars, np.array([0.5, -1.0, 0.0, -1.0]), 1).tolist() == [1, -1, -1, -1]
+
+
+def test_a_single_precision_angle_beside_a_change_point_is_beside_it() -> None:
+    bars = linkage(2, 1, 2, 1, 0.4)
+    beside = np.array([0.4, 0.5], dtype=np.float32)  # 6e-9 beyond 0.4
+    assert beside[0].item() > 0.4
+    assert on_smooth_path(bars, beside, 1).tolist() == [1, 1]
+
+
+def test_change_points_lie_along_the_ground_and_opposite() -> None:
+    assert change_points(linkage(2, 1, 2, 1, 0.4)) == (0.4, 0.4 + math.pi)
+    assert change_points(linkage(1, 2, 4, 3, 0.4)) == (0.4,)
+    assert change_points(linkage(3, 1, 2, 2, 0.4)) == (0.4 + math.pi,)
+    assert change_points(linkage(3, 1, 2.5, 2.2, 0.4)) == ()
+
+
+def test_what_touches_is_up_to_the_rounding_of_the_lengths_and_no_further() -> None:
+    """The sum of the lengths is 2: bars that miss each other by 2 U = 2^-52 touch, by twice that they do not."""
+    assert change_points(linkage(0.5, 0.5 + EPS, 0.5, 0.5)) == (0.0, math.pi)
+    assert turns_fully(linkage(0.5, 0.5 + EPS, 0.5, 0.5))
+    assert change_points(linkage(0.5, 0.5 + 2 * EPS, 0.5, 0.5)) == ()
+
+
+@pytest.mark.parametrize(
+    ("lengths", "turning"),
+    [((3, 1, 2.5, 2.2), {2}), ((1, 3, 2.5, 3.2), {2, 3, 4}), ((3, 2.5, 1, 2.2), {3}), ((3, 2.2, 2.5, 1), {4})],
+)
+def test_the_shortest_bar_of_a_grashof_linkage_turns(lengths: tuple[float, ...], turning: set[int]) -> None:
+    """Grashof: the shortest bar turns against all others; where it is the ground, all turn against it."""
+    assert {bar for bar in (2, 3, 4) if turns_fully(linkage(*lengths), bar)} == turning
+
+
+def test_angles_of_limits_exclude_minus_pi() -> None:
+    straight = linkage(6.0, 1.0, 2.0, 3.0, -math.pi)  # a structure: all bars along the ground
+    assert len(limit_positions(straight)) == 1
+    for limit in limit_positions(straight):
+        assert limit.theta_3 == math.pi
+    for limit in limit_positions(linkage(6.0, 1.0, 2.0, 3.0001, -math.pi)):
+        assert -math.pi < limit.theta_3 <= math.pi and -math.pi < limit.theta_4 <= math.pi
 
 
 def test_a_change_point_is_met_in_spite_of_rounding() -> None:
