@@ -10,9 +10,10 @@ from fourbar.kinematics import Array, State, Vector, add_accelerations, add_velo
 from fourbar.kinetostatics import drive_sine, solve_pins, torque_interval
 from fourbar.margins import U, diagonal_to_O4
 from fourbar.more_digits import needing_more_digits, restated, rounded
-from fourbar.solution import ANGLES, NOT_ASSEMBLED, OF_DRY_FRICTION, SINGULAR, STAGE_OF, VECTORS
+from fourbar.solution import ANGLES, NOT_ASSEMBLED, OF_DRY_FRICTION, OK, SINGULAR, STAGE_OF, VECTORS
 
 if TYPE_CHECKING:
+    from fourbar.effects import Effect
     from fourbar.scene import Command, Scene
 
 ALL = slice(None)
@@ -115,26 +116,60 @@ def _evaluate(
             yield name, KINEMATIC[name](state)
     if wanted >= 3:
         terms = (*scene.loads, *scene.effects)
-        pins = solve_pins(state, terms, scene.drive_bar, room=room)
-        for name in ("F12", "F32", "F43", "F14", "torque"):
-            if name in names:
-                yield name, getattr(pins, name)
-        if pins.unsettled is not None:
-            yield "status", pins.unsettled
-        if "drive_condition" in names:
-            condition = np.abs(drive_sine(state, scene.drive_bar))
-            yield "drive_condition", condition if pins.from_jamming is None else condition * pins.from_jamming
-        if "friction_residual" in names:
-            yield "friction_residual", 0.0 if pins.residual is None else pins.residual
-        if "torque_low" in names or "torque_high" in names:
-            ends = torque_interval(state, terms, scene.drive_bar, pins.torque)
-            yield from ((name, end) for name, end in zip(OF_DRY_FRICTION, ends, strict=True) if name in names)
-        if wanted >= 4:
-            from fourbar.error_bars import error_bars
+        forces = _forces(scene, state, terms, wanted, room, names)
+        yield from forces if (codes := _without_value(terms, state)) is None else _blanked(forces, codes)
 
-            for name, value in error_bars(state, pins, terms, scene.drive_bar).items():
-                if name in names:
-                    yield name, value
+
+def _without_value(terms: "tuple[Effect, ...]", state: State) -> NDArray[np.uint8] | None:
+    """Where an effect has no value its status code, elsewhere OK; None: each has one everywhere."""
+    found = [codes for term in terms if (codes := term.unsettled(state)) is not None]
+    return np.max(found, axis=0) if found else None
+
+
+def _blanked(forces: Iterator[tuple[str, Any]], codes: NDArray[np.uint8]) -> Iterator[tuple[str, Any]]:
+    """NaN where an effect has no value, and its status there."""
+    gone, status = codes != OK, codes
+    for name, value in forces:
+        if name == "status":
+            status = np.where(gone, codes, value)
+        elif name == "drive_condition":
+            yield name, value
+        elif isinstance(value, tuple):
+            yield name, tuple(np.where(gone, np.nan, rounded(component)) for component in value)
+        else:
+            yield name, np.where(gone, np.nan, rounded(value))
+    yield "status", status
+
+
+def _forces(
+    scene: "Scene",
+    state: State,
+    terms: "tuple[Effect, ...]",
+    wanted: int,
+    room: Mapping[str, Any],
+    names: Mapping[str, Any],
+) -> Iterator[tuple[str, Any]]:
+    """What the force stage and the error bars evaluate."""
+    pins = solve_pins(state, terms, scene.drive_bar, room=room)
+    for name in ("F12", "F32", "F43", "F14", "torque"):
+        if name in names:
+            yield name, getattr(pins, name)
+    if pins.unsettled is not None:
+        yield "status", pins.unsettled
+    if "drive_condition" in names:
+        condition = np.abs(drive_sine(state, scene.drive_bar))
+        yield "drive_condition", condition if pins.from_jamming is None else condition * pins.from_jamming
+    if "friction_residual" in names:
+        yield "friction_residual", 0.0 if pins.residual is None else pins.residual
+    if "torque_low" in names or "torque_high" in names:
+        ends = torque_interval(state, terms, scene.drive_bar, pins.torque)
+        yield from ((name, end) for name, end in zip(OF_DRY_FRICTION, ends, strict=True) if name in names)
+    if wanted >= 4:
+        from fourbar.error_bars import error_bars
+
+        for name, value in error_bars(state, pins, terms, scene.drive_bar).items():
+            if name in names:
+                yield name, value
 
 
 def _put(room: Array | Vector, value: Array | Vector | float | None, where: slice | NDArray[np.intp] = ALL) -> None:

@@ -1,16 +1,16 @@
 """A scene: linkage, motion, drive, loads and effects; `solve` evaluates only the stages asked for."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.blocks import BLOCK, solve_block, warm_heap
-from fourbar.errors import InputError
+from fourbar.errors import InputError, LimitError
 from fourbar.half_angles import HalfAngles, half_angles
-from fourbar.kinematics import Array
+from fourbar.kinematics import Array, close_loop
 from fourbar.linkage import MOVING_BARS, FourBar
 from fourbar.mobility import default_range, limit_positions, on_smooth_path
 from fourbar.motion import DEFAULT_STEPS, FromLimit, Motion, Sweep
@@ -138,6 +138,8 @@ def solve(
         stage = STAGES[wanted]
     if stage != "position" and where.omega_2 is None:
         raise InputError("motion.omega_2", None, f"is needed for the stage {stage!r}")
+    if stage in STAGES[3:] and any(effect.counts_turns for effect in scene.effects):
+        scene = _begun(scene)
     code = np.zeros(n, dtype=np.uint8)
     alone = 0 < len(result) == len(result.keys() & set(ANGLES))
     halves = _half_angles(scene.linkage, where) if alone or n > BLOCK else None
@@ -176,9 +178,30 @@ def _solve_free(scene: Scene, stage: str | None, out: Mapping[str, Array] | None
         follow=scene.motion.through == "follow",
     )
     at = Command(moved.theta_2, moved.branch, moved.omega_2, moved.alpha_2)
+    if any(effect.counts_turns for effect in scene.effects):
+        _refuse_wound(scene, at, moved.time)
     solution = solve(scene, stage, at=at, out=out)
     solution.time = moved.time
     return solution
+
+
+def _begun(scene: Scene) -> Scene:
+    """The scene with effects that know where its motion begins."""
+    begins = command(scene)
+    start = close_loop(scene.linkage, begins.theta_2, begins.branch)
+    return replace(scene, effects=tuple(effect.begun(start) for effect in scene.effects))
+
+
+def _refuse_wound(scene: Scene, at: Command, time: Array) -> None:
+    """A LimitError where a free motion winds a spring: from there on it is no longer the spring's."""
+    state = close_loop(scene.linkage, at.theta_2, at.branch)
+    for effect in _begun(scene).effects:
+        codes = effect.unsettled(state) if effect.counts_turns else None
+        if codes is not None and codes.any():
+            raise LimitError(
+                f"effects.{effect.key}: at {time[np.argmax(codes)]:.6g} s the free motion has turned a pin "
+                "by more than half a turn from the rest of its spring, which is not modelled"
+            )
 
 
 def _absent(scene: Scene) -> tuple[str, ...]:

@@ -45,8 +45,8 @@ UNITS = {
     "force_error": "N",
     **dict.fromkeys(("sin_mu", "condition", "drive_condition"), "1"),
 }
-STATUS_NAMES = ("ok", "not_assembled", "singular", "jammed", "several")
-OK, NOT_ASSEMBLED, SINGULAR, JAMMED, SEVERAL = range(5)
+STATUS_NAMES = ("ok", "not_assembled", "singular", "jammed", "several", "no_direction", "wound")
+OK, NOT_ASSEMBLED, SINGULAR, JAMMED, SEVERAL, NO_DIRECTION, WOUND = range(7)
 
 
 @dataclass(slots=True, eq=False)
@@ -61,7 +61,8 @@ class Solution:
     drive_bar: int
     status_code: NDArray[np.uint8]
     """0 ok, 1 not_assembled, 2 singular (velocities are 0/0); of friction that depends on the pin forces: 3 jammed
-    (no forces fulfil it: forces are NaN), 4 several (more than one set does: those of the least friction)."""
+    (no forces fulfil it: forces are NaN), 4 several (more than one set does: those of the least friction); of springs,
+    forces NaN: 5 no_direction (both ends in one point), 6 wound (turned beyond half a turn from rest)."""
     branch: NDArray[np.int8]
     """+1 open, -1 crossed."""
     theta_2: Array
@@ -120,7 +121,7 @@ class Solution:
 
     @property
     def status(self) -> list[str]:
-        """ "ok", "not_assembled" or "singular" for each position."""
+        """One of `STATUS_NAMES` for each position."""
         return [STATUS_NAMES[code] for code in self.status_code]
 
     def evaluated(self) -> list[str]:

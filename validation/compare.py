@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.scene import Scene
-from fourbar.solution import OK, Solution
+from fourbar.solution import NOT_ASSEMBLED, OK, SINGULAR, Solution
 from validation.answer import Answer
 from validation.results import AGREES, DEGRADED, FAILS, REFUSES, Row
 from validation.reversals import reversing
@@ -79,7 +79,7 @@ def compare(
             condition=1.0,
         )
     )
-    judged = (formulas.status_code == OK) & answer.assembled
+    moving = ~np.isin(formulas.status_code, (NOT_ASSEMBLED, SINGULAR)) & answer.assembled
     for quantity in (q for q in COMPARED if q in expected):
         ours, theirs = getattr(formulas, quantity, None), answer.quantities.get(quantity)
         if ours is None:
@@ -87,8 +87,9 @@ def compare(
         if theirs is None:
             rows.append(row(quantity, FAILS, "no answer"))
             continue
+        judged = moving
         if quantity in FORCES:
-            judged = judged & ~_without_forces(formulas)
+            judged = moving & (formulas.status_code == OK) & ~_without_forces(formulas)
         where = judged & _answerable(quantity, scene, formulas, tolerance)
         jumping = reversing(scene, formulas, tolerance.factor) & where if quantity in FORCES else ~judged & judged
         where &= ~jumping

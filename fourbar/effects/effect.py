@@ -4,6 +4,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any, ClassVar, Protocol, Self
 
+import numpy as np
+from numpy.typing import NDArray
+
 from fourbar.effects.wrenches import Wrenches
 from fourbar.kinematics import Array, State
 from fourbar.linkage import FourBar
@@ -64,6 +67,9 @@ class Effect:
     dry: ClassVar[bool] = False
     """Whether its couples jump where the relative rotation at a pin changes its sense."""
 
+    counts_turns: ClassVar[bool] = False
+    """Whether it depends on where the motion began (`begun`)."""
+
     @property
     def loaded_pins(self) -> tuple[str, ...]:
         """Pins whose forces it depends on itself."""
@@ -88,6 +94,14 @@ class Effect:
 
     def add_known(self, wrenches: Wrenches, state: State, forces: Mapping[str, Array]) -> None:
         """What `add_wrenches` leaves to the solution of the pin forces, once these are known (name: (n, 2), N)."""
+
+    def begun(self, start: State) -> Self:
+        """The same effect in a motion that begins at the first of these positions that assembles."""
+        return self
+
+    def unsettled(self, state: State) -> NDArray[np.uint8] | None:
+        """Status codes, (n,): other than `OK` where it has no value; None: it has one everywhere."""
+        return None
 
     def power(self, state: State) -> Array | float:
         """The power it puts into the linkage, W, for the energy method: derived on its own."""

@@ -5,15 +5,18 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fourbar.effects.effect import Act, Effect, Tree
 from fourbar.effects.wrenches import Wrenches
 from fourbar.errors import InputError
 from fourbar.kinematics import Array, State, Vector, along, dot
 from fourbar.linkage import BAR_NAMES, FourBar, require
-from fourbar.solution import Solution
+from fourbar.solution import NO_DIRECTION, OK, Solution
 
 FIELDS = {"stiffness": "N/m", "length": "m", "preload": "N"}
+COINCIDE = 16.0 * 2.0**-52
+"""Two points nearer than this part of their ways from O2, bar by bar, do not tell where the other lies."""
 
 
 class Point(NamedTuple):
@@ -69,7 +72,11 @@ class Spring:
 
 @dataclass(frozen=True, slots=True)
 class Springs(Effect):
-    """Linear springs; a spring whose two points coincide has no direction: NaN there, unless it pulls with 0."""
+    """Linear springs.
+
+    Where the two points of a spring coincide its pull has no direction: status "no_direction". One that pulls
+    with stiffness times distance alone (preload = stiffness length) pulls with 0 there.
+    """
 
     springs: tuple[Spring, ...]
     key: ClassVar[str] = "springs"
@@ -111,12 +118,23 @@ class Springs(Effect):
         for spring in self.springs:
             across = _minus(_place(state, spring.end), _place(state, spring.start))
             pull = _per_distance(spring, across)
-            with np.errstate(invalid="ignore"):
-                force = (pull * across[0], pull * across[1])
+            force = (pull * across[0], pull * across[1])
             for point, sign in ((spring.start, 1.0), (spring.end, -1.0)):
                 if point.bar != 1:
                     arm = state.arm(point.bar, *point.in_bar)
                     wrenches.add_force(point.bar, (sign * force[0], sign * force[1]), arm)
+
+    def unsettled(self, state: State) -> NDArray[np.uint8] | None:
+        """NO_DIRECTION where the two points of a spring with slack coincide."""
+        codes = None
+        for spring in self.springs:
+            if spring.slack == 0.0:
+                continue
+            x, y = _minus(_place(state, spring.end), _place(state, spring.start))
+            away = sum(state.linkage.lengths) + abs(spring.start.distance) + abs(spring.end.distance)
+            here = np.hypot(getattr(x, "hi", x), getattr(y, "hi", y)) <= COINCIDE * away
+            codes = np.where(here, NO_DIRECTION, OK if codes is None else codes).astype(np.uint8)
+        return codes
 
     def power(self, state: State) -> Array | float:
         """P = -tension d(distance)/dt, W."""
@@ -194,8 +212,9 @@ def _per_distance(spring: Spring, across: Vector) -> Any:
     """Tension over distance, N/m."""
     if spring.slack == 0.0:
         return spring.stiffness
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return spring.stiffness + spring.slack / np.sqrt(dot(across, across))
+    distance = np.sqrt(dot(across, across))
+    # a distance of 0 has no direction, which `unsettled` says
+    return spring.stiffness + spring.slack / (distance + np.where(distance == 0.0, 1.0, 0.0))
 
 
 def _point(reader: Any, key: str, value: object) -> Point:

@@ -2,10 +2,11 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fourbar.effects.effect import Act, Effect, Joints, Tree
 from fourbar.effects.pins import known, shortest_bar
@@ -13,9 +14,11 @@ from fourbar.effects.wrenches import Wrenches
 from fourbar.errors import LimitError
 from fourbar.kinematics import Array, State
 from fourbar.linkage import PINS, FourBar, require
-from fourbar.solution import Solution
+from fourbar.solution import OK, WOUND, Solution
 
 FIELDS = {"stiffness": "N m/rad", "rest": "rad", "preload": "N m"}
+HALF_TURN = math.pi * (1.0 + 1e-12)
+"""rad; a spring that begins exactly half a turn from rest is not wound by a rounding."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,11 +26,15 @@ class Torsion(Effect):
     """Springs as (pin, stiffness in N m/rad, rest angle in rad, preload in N m).
 
     With beta = theta_j - theta_i (theta_1 for the ground) the couple on bar j is
-    -(preload + stiffness (beta - rest)). The angle beta - rest is counted in [-pi, pi): at a pin that
-    turns further than half a turn from its rest the spring would be wound; state its preload instead.
+    -(preload + stiffness (beta - rest)). Where the motion begins beta - rest is within half a turn, whatever
+    whole turns the scene's angles count; where the pin then turns beyond half a turn from rest, followed
+    continuously along theta_2, the status is "wound" and there are no forces.
     """
 
     springs: tuple[tuple[str, float, float, float], ...]
+    turns: tuple[float, ...] | None = None
+    """Whole turns of each pin where the motion begins, rad; not part of a scene."""
+    counts_turns: ClassVar[bool] = True
     key: ClassVar[str] = "torsion"
     example: ClassVar[str] = 'torsion = { B = { stiffness = "2 N m/rad", rest = "30 deg", preload = "0.1 N m" } }'
 
@@ -65,10 +72,33 @@ class Torsion(Effect):
             wrenches.add_moment(j, couple)
             wrenches.add_moment(i, -couple)
 
+    def begun(self, start: State) -> "Torsion":
+        """Whole turns counted at the first position that assembles; none where the motion changes its branch."""
+        if not start.assembled.any() or np.ptp(start.branch) != 0:
+            return self
+        first = int(np.argmax(start.assembled))
+        away = [
+            float(angle[first]) - rest for angle, (_, _, rest, _) in zip(self._along(start), self.springs, strict=True)
+        ]
+        return replace(self, turns=tuple(math.tau * math.floor(angle / math.tau + 0.5) for angle in away))
+
+    def unsettled(self, state: State) -> NDArray[np.uint8] | None:
+        """WOUND beyond half a turn from rest."""
+        if self.turns is None:
+            return None
+        wound = np.zeros(state.theta_2.shape, dtype=bool)
+        for angle, turns, (_, _, rest, _) in zip(self._along(state), self.turns, self.springs, strict=True):
+            wound |= np.abs(angle - rest - turns) > HALF_TURN
+        return np.where(wound, WOUND, OK).astype(np.uint8)
+
+    def _along(self, state: State) -> list[Array]:
+        """theta_j - theta_i of each sprung pin, continuous in theta_2 on one branch."""
+        angles = _continuous(state)
+        return [angles[PINS[pin][1]] - angles[PINS[pin][0]] for pin, *_ in self.springs]
+
     @staticmethod
     def _angle(state: State, bar: int) -> Array | float:
-        angle = state.linkage.ground_angle if bar == 1 else state.angle(bar)
-        return getattr(angle, "hi", angle)  # a spring's angle needs no more than a double's digits
+        return state.linkage.ground_angle if bar == 1 else _hi(state.angle(bar))
 
     def power(self, state: State) -> Array | float:
         """P = -dV/dt with V = sum of preload beta + k beta^2/2, W; beta from the sine and cosine between the bars."""
@@ -129,6 +159,36 @@ class Torsion(Effect):
     def couple(self, linkage: FourBar, speed: float) -> float:
         """Greatest couples, N m."""
         return sum(abs(preload) + k * math.pi for _, k, _, preload in self.springs)
+
+
+def _continuous(state: State) -> dict[int, Array]:
+    """theta_1 .. theta_4 without jumps at a whole turn, on one branch.
+
+    The diagonal from A to O4 swings about the ground's line where a < d, and otherwise about the input's, never by
+    more than a quarter turn; bars 3 and 4 make angles with it that stay between 0 and half a turn.
+    """
+    d, a, _, _ = state.linkage.lengths
+    theta_1, sign = state.linkage.ground_angle, state.branch
+    theta_2, theta_3, theta_4 = (_hi(state.angle(bar)) for bar in (2, 3, 4))
+    phi = np.arctan2(state.O4[1] - a * np.sin(theta_2), state.O4[0] - a * np.cos(theta_2))
+    line = theta_1 if a < d else theta_2 + math.pi
+    phi = line + _wound(phi - line)
+
+    def beyond(angle: Array) -> Array:
+        """An angle between 0 and half a turn, or as far outside as rounding puts it."""
+        return _wound(angle - 0.5 * math.pi) + 0.5 * math.pi
+
+    return {
+        1: np.full_like(theta_2, theta_1),
+        2: theta_2,
+        3: phi + sign * beyond(sign * (theta_3 - phi)),
+        4: phi + math.pi - sign * beyond(sign * (phi + math.pi - theta_4)),
+    }
+
+
+def _hi(angle: Any) -> Array:
+    """A double: a spring's angle needs no more than its digits."""
+    return np.asarray(getattr(angle, "hi", angle))
 
 
 def _wound(angle: Array | float) -> Array:
