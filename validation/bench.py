@@ -16,8 +16,10 @@ import click
 import numpy as np
 from numpy.typing import NDArray
 
+from fourbar.blocks import BLOCK
 from fourbar.effects import Gravity
 from fourbar.linkage import MOVING_BARS, Bar, FourBar
+from fourbar.mobility import default_range
 from fourbar.motion import Motion
 from fourbar.scene import Command, Scene, solve
 from fourbar.solution import VECTORS
@@ -30,15 +32,19 @@ LINKAGE = FourBar(0.3, Bar(0.1, 0.2), Bar(0.25, 0.5), Bar(0.22, 0.4))
 ALL = ("theta_3", "theta_4", "omega_3", "omega_4", "alpha_3", "alpha_4", "F12", "F32", "F43", "F14", "torque")
 """From position to pin forces, one drive: every unknown of the mechanism, none of the points."""
 POSITIONS = ("theta_3", "theta_4")
+WITH_LIMITS = FourBar(0.3, Bar(0.25, 0.2), Bar(0.1, 0.5), Bar(0.22, 0.4))
+"""Its input swings between limit positions: each of its positions has to be looked at."""
 THIRTEEN_BATCH = 20_000
 """Positions per batch of the 13x13 system: larger batches are slower per position (27 MB of matrices each)."""
+DEFAULT_SOLVED = 100_000
+"""Positions of a plain `solve`, which evaluates the forces 17 times for the error bars."""
 ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 NEEDED = {"thirteen": 25.0, "growth": 1.3, "positions": 5.0, "import_ms": 30.0, "memory_MB": 50.0}
 
 
-def example() -> Scene:
+def example(linkage: FourBar = LINKAGE) -> Scene:
     """The scene that is timed: crank at 10 rad/s, gravity, drive on the input."""
-    return Scene(LINKAGE, Motion(0.0, 10.0), 2, (), (Gravity(),))
+    return Scene(linkage, Motion(0.0, 10.0), 2, (), (Gravity(),))
 
 
 def preallocated(names: tuple[str, ...], n: int) -> dict[str, Array]:
@@ -46,9 +52,9 @@ def preallocated(names: tuple[str, ...], n: int) -> dict[str, Array]:
     return {name: np.zeros((2, n)).T if name in VECTORS else np.zeros(n) for name in names}
 
 
-def command(n: int) -> Command:
-    """n positions over a revolution."""
-    return Command(np.linspace(0.0, 2.0 * np.pi, n), np.broadcast_to(np.int8(1), (n,)), 10.0, 0.0)
+def command(n: int, start: float = 0.0, stop: float = 2.0 * np.pi) -> Command:
+    """n positions, over a revolution unless told otherwise."""
+    return Command(np.linspace(start, stop, n), np.broadcast_to(np.int8(1), (n,)), 10.0, 0.0)
 
 
 def seconds(action: Callable[[], object]) -> float:
@@ -127,6 +133,20 @@ def c_loop(n: int) -> Callable[[], object] | None:
     return call
 
 
+def floor(theta_2: Array, out: dict[str, Array]) -> Callable[[], object]:
+    """What no formula for two angles does without: a tangent, a square root and two arctangents, block by block."""
+
+    def action() -> None:
+        for start in range(0, len(theta_2), BLOCK):
+            part = slice(start, start + BLOCK)
+            t = np.tan(theta_2[part])
+            root = np.sqrt(np.abs(t, out=t), out=t)
+            for angle in out.values():
+                np.arctan(root, out=angle[part])
+
+    return action
+
+
 @click.command()
 @click.option("--positions", default=1_000_000, show_default=True, type=click.IntRange(1000))
 @click.option("--rounds", default=5, show_default=True, type=click.IntRange(1))
@@ -155,6 +175,7 @@ def bench(positions: int, rounds: int, largest: int) -> None:
 def measure(positions: int, rounds: int, largest: int) -> list[tuple[str, str, str, bool | None]]:
     """Rows of the table: what, measured, needed, whether it holds."""
     scene, at = example(), command(positions)
+    limits, swing = example(WITH_LIMITS), command(positions, *default_range(WITH_LIMITS))
     everything, angles = preallocated(ALL, positions), preallocated(POSITIONS, positions)
     batch = min(positions, THIRTEEN_BATCH)
     bodies = bodies_of(scene, command(batch))
@@ -162,19 +183,36 @@ def measure(positions: int, rounds: int, largest: int) -> list[tuple[str, str, s
         "all": lambda: solve(scene, at=at, out=everything),
         "positions": lambda: solve(scene, at=at, out=angles),
         "thirteen": lambda: solve_thirteen(bodies, 2),
+        "floor": floor(at.theta_2, angles),
+        "all, limits": lambda: solve(limits, at=swing, out=everything),
+        "positions, limits": lambda: solve(limits, at=swing, out=angles),
     }
+    default = command(min(positions, DEFAULT_SOLVED))
+    actions["default"] = lambda: solve(scene, at=default)
     in_c = c_loop(positions)
     if in_c is not None:
         actions["c"] = in_c
     times = interleaved(actions, rounds)
-    per = {name: 1e9 * value / (batch if name == "thirteen" else positions) for name, value in times.items()}
+    solved = {"thirteen": batch, "default": len(default.theta_2)}
+    per = {name: 1e9 * value / solved.get(name, positions) for name, value in times.items()}
     ratio, staged = per["thirteen"] / per["all"], per["all"] / per["positions"]
+    by_default = per["default"] / per["positions"]
     rows: list[tuple[str, str, str, bool | None]] = [
         ("formulas, all", f"{per['all']:.1f} ns/position", "", None),
         ("13x13 assembled and solved", f"{per['thirteen']:.0f} ns/position", "", None),
         ("13x13 / formulas", f"{ratio:.1f}", ">= 25", ratio >= NEEDED["thirteen"]),
         ("positions only", f"{per['positions']:.1f} ns/position", "", None),
-        ("all / positions only", f"{staged:.2f}", ">= 5", staged >= NEEDED["positions"]),
+        ("all (11 unknowns) / positions only", f"{staged:.2f}", ">= 5", staged >= NEEDED["positions"]),
+        ("plain solve(scene): error bars, points", f"{per['default']:.0f} ns/position", "", None),
+        ("plain solve(scene) / positions only", f"{by_default:.1f}", ">= 5", by_default >= NEEDED["positions"]),
+        ("floor: tangent, root, two arctan", f"{per['floor']:.1f} ns/position", "", None),
+        ("input between limits: all", f"{per['all, limits']:.1f} ns/position", "", None),
+        (
+            "input between limits: all / positions only",
+            f"{per['all, limits'] / per['positions, limits']:.2f}",
+            "",
+            None,
+        ),
     ]
     if "c" in per:
         rows.append(("plain C loop, all", f"{per['c']:.1f} ns/position", "", None))
