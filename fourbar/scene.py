@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from fourbar.blocks import BLOCK, solve_block, warm_heap
 from fourbar.errors import InputError, LimitError
-from fourbar.half_angles import HalfAngles, half_angles
 from fourbar.kinematics import Array, close_loop
 from fourbar.linkage import MOVING_BARS, FourBar
 from fourbar.mobility import default_range, limit_positions, on_smooth_path
@@ -20,6 +19,7 @@ if TYPE_CHECKING:
     from decimal import Decimal
 
     from fourbar.effects import Effect, Load
+    from fourbar.half_angles import HalfAngles
     from fourbar.pictures import Picture
 
 
@@ -221,9 +221,11 @@ def _highest_stage(out: Mapping[str, Array], n: int) -> int:
     return max((STAGES.index(STAGE_OF[name]) for name in out), default=0)
 
 
-def _half_angles(linkage: FourBar, where: Command) -> HalfAngles | None:
+def _half_angles(linkage: FourBar, where: Command) -> "HalfAngles | None":
     """Of a linkage whose theta_3, theta_4 need no second look and no unwrapping at any position; None for others."""
     branch = where.branch
     if where.remainder is not None or (any(branch.strides) and branch.min() != branch.max()):
         return None
+    from fourbar.half_angles import half_angles
+
     return half_angles(linkage, int(branch[0]))
