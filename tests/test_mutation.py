@@ -38,11 +38,55 @@ def test_the_harness_alone_catches_a_wrong_sign(monkeypatch: pytest.MonkeyPatch)
     assert caught(SCENE, at, answers)
 
 
-def test_survivors_need_a_reason(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    listed = "\n".join(f"    fourbar.dynamics.x_f__mutmut_{i}: killed" for i in range(1, 19))
-    listed += "\n    fourbar.dynamics.x_f__mutmut_19: survived\n    fourbar.mobility.x_g__mutmut_1: not checked\n"
-    assert command._told(listed, tmp_path, ["fourbar.dynamics*", "fourbar.mobility*"]) == 1
-    assert "18 of 19" in capsys.readouterr().out
+def test_survivors_need_a_reason(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    listed = "\n".join(f"    fourbar.dynamics.x_f__mutmut_{i}: killed" for i in range(1, 20))
+    listed += "\n    fourbar.dynamics.x_f__mutmut_20: survived\n    fourbar.mobility.x_g__mutmut_1: not checked\n"
+    states = command._states(listed, ["fourbar.dynamics*", "fourbar.mobility*"])
+    assert len(states) == 20
+    survivors = {"fourbar.dynamics.x_f__mutmut_20": "dynamics.f: return a -> return b"}
+    reasons = tmp_path / "harmless.json"
+    monkeypatch.setattr(command, "HARMLESS", reasons)
+    assert command._told(states, survivors, tmp_path) == 1
+    assert "19 of 20" in capsys.readouterr().out
     assert "NO REASON" in (tmp_path / "survivors.txt").read_text(encoding="utf-8")
-    assert command._told(listed + "    fourbar.dynamics.x_f__mutmut_20: killed\n", tmp_path, ["fourbar.dynamics*"]) == 0
-    assert command._told("", tmp_path, ["fourbar.dynamics*"]) == 1
+    reasons.write_text('{"dynamics.f": {"return a -> return b": "a is b"}}', encoding="utf-8")
+    assert command._told(states, survivors, tmp_path) == 0
+    assert "a is b" in (tmp_path / "survivors.txt").read_text(encoding="utf-8")
+    # with a reason each, but too many
+    del states["fourbar.dynamics.x_f__mutmut_1"]
+    assert command._told(states, survivors, tmp_path) == 1
+    assert command._told({}, {}, tmp_path) == 1
+
+
+SHOWN = """# fourbar.mobility.xǁReachǁsum__mutmut_11: survived
+--- fourbar/mobility.py
++++ fourbar/mobility.py
+@@ -1,3 +1,3 @@
+ total = 1
+-return 0.0 if total <= limit else total
++return 0.0 if total < limit else total
+"""
+
+
+def test_a_survivor_is_known_by_its_function_and_its_line(tmp_path: Path) -> None:
+    mutmut = tmp_path / "mutmut"
+    mutmut.write_text(f"#!/bin/sh\ncat <<'END'\n{SHOWN}END\n", encoding="utf-8")
+    mutmut.chmod(0o755)
+    change = command._change(mutmut, tmp_path, "fourbar.mobility.xǁReachǁsum__mutmut_11")
+    assert (
+        change
+        == "mobility.Reach.sum: return 0.0 if total <= limit else total -> return 0.0 if total < limit else total"
+    )
+    assert command._change(mutmut, tmp_path, "fourbar.mobility.x__wrapped__mutmut_1").startswith("mobility._wrapped: ")
+
+
+def test_the_whole_suite_is_tried_without_what_fails_on_the_copy(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "mutants").mkdir()
+    test = "import os\ndef test_copy(): assert False\ndef test_one(): assert os.environ['MUTANT_UNDER_TEST'] != 'bad'\n"
+    (tmp_path / "mutants" / "test_it.py").write_text(test, encoding="utf-8")
+    assert command._caught_by_all(tmp_path, ["bad", "harmless"], 0) == ["bad"]
+    assert command._caught_by_all(tmp_path, [], 0) == []

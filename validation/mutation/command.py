@@ -19,7 +19,9 @@ COPIED = ("fourbar", "validation", "tests", "models", "docs", "README.md", "CHAN
 LEAST = 0.95
 """Share of the mutants that must be caught."""
 HARMLESS = Path(__file__).parent / "harmless.json"
-"""Survivors that change nothing that anyone could notice, each with its reason."""
+"""By function and changed line: survivors that change nothing that anyone could notice, each with its reason."""
+CAUGHT = 1
+"""Status of pytest where a test failed."""
 ALIVE = ("survived", "no tests", "suspicious")
 
 
@@ -27,10 +29,15 @@ ALIVE = ("survived", "no tests", "suspicious")
 @click.option("--harness", is_flag=True, help="The harness alone, on mutants that change a number by more than 1e-9.")
 @click.option("--module", type=click.Choice(MODULES), help="Only this one.")
 @click.option("--most", default=0, type=click.IntRange(0), help="With --harness: at most this many per module.")
+@click.option("--whole", is_flag=True, help="Try survivors without a reason on the whole suite (minutes each).")
 @click.option("--workers", default=2, show_default=True, type=click.IntRange(1))
 @click.option("--out", type=click.Path(path_type=Path, file_okay=False), default=Path("results/mutation"))
-def mutation(harness: bool, module: str | None, most: int, workers: int, out: Path) -> int:
-    """Measure the checks: small faults in the formulas, one at a time, against `make test` or the harness alone."""
+def mutation(harness: bool, module: str | None, most: int, whole: bool, workers: int, out: Path) -> int:
+    """Measure the checks: small faults in the formulas, one at a time, against `make test` or the harness alone.
+
+    The tests of the formulas are tried (pyproject.toml names them), the fast ones first: what they
+    catch, `make test` catches. Every survivor needs a reason in harmless.json.
+    """
     mutmut = Path(sys.executable).parent / "mutmut"
     if not mutmut.is_file():
         raise DependencyError('mutmut is not installed: pip install "fourbar[mutation]"')
@@ -44,7 +51,14 @@ def mutation(harness: bool, module: str | None, most: int, workers: int, out: Pa
     # its own status says nothing of survivors; the results are read below
     subprocess.run([mutmut, "run", "--max-children", str(workers), *names], cwd=tree, check=False)
     listed = subprocess.run([mutmut, "results", "--all", "true"], cwd=tree, check=True, capture_output=True, text=True)
-    return _told(listed.stdout, out, names)
+    states = _states(listed.stdout, names)
+    survivors = {name: _change(mutmut, tree, name) for name, state in states.items() if state in ALIVE}
+    if whole:
+        reasons = _reasons()
+        for name in _caught_by_all(tree, [n for n, change in survivors.items() if change not in reasons], workers):
+            states[name] = "killed"
+            del survivors[name]
+    return _told(states, survivors, out)
 
 
 def _copy(tree: Path) -> None:
@@ -59,26 +73,68 @@ def _copy(tree: Path) -> None:
             shutil.copy2(source, target)
 
 
-def _told(listed: str, out: Path, names: list[str]) -> int:
-    """Kill rate per module, and the survivors with the reason that is on record for them."""
-    harmless: dict[str, str] = json.loads(HARMLESS.read_text(encoding="utf-8")) if HARMLESS.is_file() else {}
+def _states(listed: str, names: list[str]) -> dict[str, str]:
+    """What became of each mutant that was tried."""
     prefixes = tuple(name.rstrip("*") for name in names)
     states = {}
     for line in listed.splitlines():
         name, _, state = line.strip().partition(": ")
         if name.startswith(prefixes) and state not in ("", "not checked"):
             states[name] = state
-    count = Counter((name.split(".")[1], state in ALIVE) for name, state in states.items())
+    return states
+
+
+def _reasons() -> dict[str, str]:
+    """Changes on record, as `_change` words them, and why each is harmless."""
+    recorded = json.loads(HARMLESS.read_text(encoding="utf-8")) if HARMLESS.is_file() else {}
+    return {
+        f"{function}: {change}": reason for function, changes in recorded.items() for change, reason in changes.items()
+    }
+
+
+def _change(mutmut: Path, tree: Path, name: str) -> str:
+    """Function and changed line of a mutant; its number alone would mean another mutant after any edit."""
+    shown = subprocess.run([mutmut, "show", name], cwd=tree, check=True, capture_output=True, text=True).stdout
+    lines = [line for line in shown.splitlines() if line[:1] in ("-", "+") and line[:4] not in ("--- ", "+++ ")]
+    old, new = (" ".join(line[1:].strip() for line in lines if line[0] == sign) for sign in "-+")
+    mangled = name.partition("__mutmut_")[0].removeprefix("fourbar.")  # module.x_function, module.xǁClassǁmethod
+    function = mangled.replace(".x_", ".").replace(".xǁ", ".").replace("ǁ", ".")
+    return f"{function}: {old} -> {new}"
+
+
+def _caught_by_all(tree: Path, names: list[str], workers: int) -> list[str]:
+    """Those of the mutants that some test of the whole suite catches."""
+    mutants = tree / "mutants"
+
+    def tested(name: str, *options: str) -> subprocess.CompletedProcess[str]:
+        command = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", "-n", str(workers), *options]
+        environment = {**os.environ, "PYTHONPATH": ".", "MUTANT_UNDER_TEST": name}
+        return subprocess.run(command, cwd=mutants, check=False, capture_output=True, text=True, env=environment)
+
+    if not names:
+        return []
+    # what fails on the copy without a mutant (no repository, slower calls) says nothing
+    failing = [line.split()[1] for line in tested("", "-rfE").stdout.splitlines() if line[:6] in ("FAILED", "ERROR ")]
+    without = [f"--deselect={test}" for test in failing]
+    return [name for name in names if tested(name, "-x", *without).returncode == CAUGHT]
+
+
+def _told(states: dict[str, str], survivors: dict[str, str], out: Path) -> int:
+    """Kill rate per module, and the survivors with the reason that is on record for them."""
+    reasons = _reasons()
+    count = Counter((name.split(".")[1], name in survivors) for name in states)
     for module in MODULES:
         dead, alive = count[module, False], count[module, True]
         if dead + alive:
             print(f"{module}: {dead} of {dead + alive} mutants killed ({dead / (dead + alive):.1%})")
-    survivors = [name for name, state in sorted(states.items()) if state in ALIVE]
-    lines = [f"{name}: {harmless.get(name, 'NO REASON ON RECORD')}" for name in survivors]
-    write_text(out / "survivors.txt", "\n".join(lines) + "\n")
-    print(f"{len(survivors)} survivors are listed in {out / 'survivors.txt'}")
     killed = len(states) - len(survivors)
-    return 0 if states and killed >= LEAST * len(states) else 1
+    if states:
+        print(f"together: {killed} of {len(states)} ({killed / len(states):.1%})")
+    lines = [f"{change}\n    {reasons.get(change, 'NO REASON ON RECORD')}" for change in sorted(survivors.values())]
+    write_text(out / "survivors.txt", "\n".join(lines) + "\n")
+    unknown = sum(change not in reasons for change in survivors.values())
+    print(f"{len(survivors)} survivors, {unknown} without a reason, are listed in {out / 'survivors.txt'}")
+    return 0 if states and killed >= LEAST * len(states) and not unknown else 1
 
 
 def _harness(mutmut: Path, tree: Path, module: str | None, most: int, out: Path) -> int:
