@@ -9,12 +9,12 @@ changes of different inputs do not cancel over the evaluations.
 import math
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
+from functools import partial
 from itertools import count
 from typing import Any
 
 import numpy as np
 
-from fourbar.effects import Gravity, Load
 from fourbar.kinematics import Array, State, add_accelerations, add_velocities, close_loop
 from fourbar.kinetostatics import PinForces, Term, solve_pins
 from fourbar.linkage import Bar, FourBar
@@ -48,7 +48,8 @@ def error_bars(state: State, pins: PinForces, terms: Iterable[Term], drive_bar: 
     for run in range(EVALUATIONS):
         signs = _signs(run)
         linkage = _moved_linkage(state.linkage, signs, all_of_it=in_doubles)
-        moved_terms = [_moved_term(term, signs, all_of_it=in_doubles) for term in terms]
+        beside = partial(_next, signs=signs)
+        moved_terms = [term.rounded_anew(beside, all_of_it=in_doubles) for term in terms]
         if in_doubles:
             moved = _moved_state(state, linkage, signs)
             other = solve_pins(moved, moved_terms, drive_bar, growths=signs)
@@ -117,17 +118,3 @@ def _moved_state(state: State, linkage: FourBar, signs: Iterator[float]) -> Stat
     moved.omega_3, moved.omega_4 = _next(moved.omega_3, signs), _next(moved.omega_4, signs)
     moved.alpha_3, moved.alpha_4 = _next(moved.alpha_3, signs), _next(moved.alpha_4, signs)
     return moved
-
-
-def _moved_term(term: Any, signs: Iterator[float], *, all_of_it: bool) -> Any:
-    def pair(polar: tuple[float, float]) -> tuple[float, float]:
-        return (_next(polar[0], signs), _next(polar[1], signs))
-
-    if isinstance(term, Load):
-        force = None if term.force is None else pair(term.force)
-        return replace(
-            term, force=force, at=pair(term.at), moment=_next(term.moment, signs) if all_of_it else term.moment
-        )
-    if isinstance(term, Gravity):
-        return Gravity(*pair((term.magnitude, term.angle)))
-    return term

@@ -6,7 +6,7 @@ Design of Machinery, ch. 11) are eliminated by hand to one 2x2 system whose dete
 between the two bars that are not driven.
 """
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any, NamedTuple, Protocol, Self
 
 import numpy as np
@@ -39,6 +39,9 @@ class Term(Protocol):
 
     def leaning(self, side: int) -> Self:
         """The same with every pin at rest about to turn."""
+
+    def rounded_anew(self, beside: Callable[[float], float], *, all_of_it: bool) -> Self:
+        """The same with its numbers moved in their last digits."""
 
 
 class PinForces(NamedTuple):

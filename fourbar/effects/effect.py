@@ -95,6 +95,13 @@ class Effect:
     def add_known(self, wrenches: Wrenches, state: State, forces: Mapping[str, Array]) -> None:
         """What `add_wrenches` leaves to the solution of the pin forces, once these are known (name: (n, 2), N)."""
 
+    def rounded_anew(self, beside: Callable[[float], float], *, all_of_it: bool) -> Self:
+        """The same with its own numbers moved in their last digits, for the error bars.
+
+        Without `all_of_it` those remain whose rounding is in the moment or force that they make alone.
+        """
+        return self
+
     def begun(self, start: State) -> Self:
         """The same effect in a motion that begins at the first of these positions that assembles."""
         return self

@@ -1,6 +1,7 @@
 """Gravity: m g at the mass centre of every bar that has mass."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -47,6 +48,10 @@ class Gravity(Effect):
             bar = state.linkage.bar(number)
             if bar.mass != 0.0:
                 wrenches.add_constant_force(number, (bar.mass * gx, bar.mass * gy), centre_in_bar(bar))
+
+    def rounded_anew(self, beside: Callable[[float], float], *, all_of_it: bool) -> "Gravity":
+        """Magnitude and angle."""
+        return Gravity(beside(self.magnitude), beside(self.angle))
 
     def power(self, state: State) -> Array | float:
         """P = sum of m g . v_G, W."""

@@ -2,7 +2,8 @@
 
 import bisect
 import math
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
 
@@ -129,6 +130,12 @@ class Load(Effect):
 
     def _moment(self, state: State) -> Array | float:
         return self.moment if self.table is None else self.moment * self.table.at(state.theta_2)
+
+    def rounded_anew(self, beside: Callable[[float], float], *, all_of_it: bool) -> "Load":
+        """Force, arm and couple."""
+        force = None if self.force is None else (beside(self.force[0]), beside(self.force[1]))
+        at = (beside(self.at[0]), beside(self.at[1]))
+        return replace(self, force=force, at=at, moment=beside(self.moment) if all_of_it else self.moment)
 
     def power(self, state: State) -> Array | float:
         """P = F . v of the point of application + M omega, W."""
