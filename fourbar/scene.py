@@ -110,7 +110,7 @@ def solve(
     stage : "position", "velocity", "acceleration", "force" or "error"; each includes those before
         it. Left out: "error", or "position" where the scene states no omega_2.
     at : other positions, velocities and accelerations of the input than the scene's own.
-    out : arrays to write into, by name, (n,) or (n, 2); only the quantities named are evaluated,
+    out : arrays to write into, by name, (n,) or (n, 2), which share no memory; only the quantities named are evaluated,
         with the stages they need, and the others are None in the result.
 
     Raises
