@@ -2,18 +2,25 @@
 
 import os
 import signal
+import subprocess
+import sys
+import time
 import warnings
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from tests.test_suite import COUNT, EXACT, SEED, TYPES, judge_all
+from fourbar.errors import InputError
+from tests.test_suite import COUNT, EXACT, KILLS, SEED, TYPES, judge_all
 from validation.report.summary import Summary
 from validation.run import run
 from validation.suite.scenes import Random
 
 distributed = pytest.importorskip("distributed", reason="Dask is optional")
+dask = pytest.importorskip("dask", reason="Dask is optional")
+ROOT = Path(__file__).parent.parent
 # Dask's own clean-up of killed workers is not what is tested here
 pytestmark = pytest.mark.filterwarnings("ignore::ResourceWarning", "ignore::pytest.PytestUnraisableExceptionWarning")
 
@@ -27,15 +34,38 @@ def cluster() -> Iterator[object]:
             yield local
 
 
-def test_a_killed_worker_changes_no_byte(cluster: object, tmp_path: Path) -> None:
+@pytest.mark.timeout(120 + 20 * KILLS)
+def test_killed_workers_change_no_byte(cluster: object, tmp_path: Path) -> None:
     suite = Random(COUNT, SEED, TYPES)
     judge_all(suite, tmp_path / "here")
-    pids = [worker.process.process.pid for worker in cluster.workers.values()]  # type: ignore[attr-defined]
-    killed = False
-    for step in run(suite, tmp_path / "dask", EXACT, scheduler=cluster.scheduler_address):  # type: ignore[attr-defined]
-        if not isinstance(step, Summary) and step and not killed:
-            os.kill(pids[0], signal.SIGKILL)
-            killed = True
-    assert killed
-    for name in ("results.csv", "results.parquet"):
-        assert (tmp_path / "here" / name).read_bytes() == (tmp_path / "dask" / name).read_bytes()
+    rng = np.random.default_rng(SEED)
+    kills = 0
+    while kills < KILLS:
+        out, before = tmp_path / f"dask{kills}", kills
+        for step in run(suite, out, EXACT, scheduler=cluster.scheduler_address):  # type: ignore[attr-defined]
+            alive = [nanny.process.process for nanny in cluster.workers.values() if nanny.process]  # type: ignore[attr-defined]
+            if not isinstance(step, Summary) and step and alive and kills < KILLS:
+                os.kill(alive[int(rng.integers(len(alive)))].pid, signal.SIGKILL)
+                kills += 1
+        assert kills > before
+        for name in ("results.csv", "results.parquet"):
+            assert (tmp_path / "here" / name).read_bytes() == (out / name).read_bytes()
+
+
+def test_a_worker_in_which_an_engine_hangs_ends_itself() -> None:
+    code = (
+        "from tests.test_suite import Few; from validation.suite.pool import judge_watched; "
+        "from validation.tolerance import EQUIVALENCE; from validation.witnesses import Witness; "
+        "judge_watched(5.0, Few(), [2], [Witness('moody', 'tests.test_suite:Moody', EQUIVALENCE)], False)"
+    )
+    began = time.monotonic()
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, timeout=100, check=False, cwd=ROOT)
+    assert done.returncode == 1 and b"Timeout" in done.stderr and b"answer" in done.stderr
+    assert time.monotonic() - began < 100.0
+
+
+@pytest.mark.parametrize("address", ["tcp://127.0.0.1:1", "nonsense"])
+def test_no_scheduler_is_one_line(address: str, tmp_path: Path) -> None:
+    with dask.config.set({"distributed.comm.timeouts.connect": "1s"}), pytest.raises(InputError) as caught:
+        list(run(Random(1, SEED, TYPES), tmp_path, EXACT, scheduler=address))
+    assert "must be the address of a Dask scheduler" in str(caught.value) and "\n" not in str(caught.value)

@@ -158,8 +158,10 @@ def breakdown(scene: str, engine: str, error: BaseException) -> Row:
     """The row of an engine that took its process with it, or never came back."""
     if isinstance(error, TimeoutError):
         reason = "the engine hung and was stopped"
-    elif type(error).__name__ in ("ProcessExpired", "KilledWorker"):  # of Pebble, of Dask
+    elif type(error).__name__ == "ProcessExpired":  # of Pebble
         reason = f"the engine crashed its process (exit code {getattr(error, 'exitcode', 'unknown')})"
+    elif type(error).__name__ == "KilledWorker":  # of Dask
+        reason = "the engine crashed its process, or hung and was stopped"
     else:
         reason = " ".join(f"{type(error).__name__}: {error}".split())
     return _failure(scene, engine, "", reason)

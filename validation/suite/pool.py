@@ -4,11 +4,13 @@ A worker that dies or hangs costs the scene and engine that killed it, and no ot
 done again scene by scene, and the scene at fault engine by engine.
 """
 
+import faulthandler
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from dataclasses import replace
 from importlib import import_module
 
+from fourbar.errors import InputError
 from validation.judge import breakdown, judged_page
 from validation.page import Page
 from validation.plain import plain
@@ -47,6 +49,17 @@ def longest(suite: Suite) -> float:
 def judge_chunk(suite: Suite, scenes: Sequence[int], witnesses: Sequence[Witness], draw: bool) -> list[Page]:
     """The pages of some scenes; runs in a worker."""
     return [judged_page(plain(suite.name(i)), suite.scene(i), witnesses, draw=draw) for i in scenes]
+
+
+def judge_watched(
+    seconds: float, suite: Suite, scenes: Sequence[int], witnesses: Sequence[Witness], draw: bool
+) -> list[Page]:
+    """The same in a worker that nobody stops from outside: it ends its own process where it takes longer."""
+    faulthandler.dump_traceback_later(seconds, exit=True)
+    try:
+        return judge_chunk(suite, scenes, witnesses, draw)
+    finally:
+        faulthandler.cancel_dump_traceback_later()
 
 
 def ready() -> None:
@@ -100,15 +113,22 @@ def over_machines(
     """Over the workers of a Dask scheduler; each needs this checkout importable."""
     from distributed import Client
 
-    with Client(scheduler) as client:  # type: ignore[no-untyped-call]
+    try:
+        connected = Client(scheduler)  # type: ignore[no-untyped-call]
+    except (OSError, ValueError) as error:  # no answer, or no address
+        why = str(error) or "no answer"
+        raise InputError("--scheduler", scheduler, f"must be the address of a Dask scheduler: {why}") from None
+    with connected as client:
         executor = client.get_executor(retries=0, pure=False)
         workers = max(1, len(client.scheduler_info()["workers"]))
 
         def submit(scenes: Sequence[int], asked: Sequence[Witness]) -> Future[list[Page]]:
-            future: Future[list[Page]] = executor.submit(judge_chunk, *part(suite, scenes), asked, draw)
+            seconds = longest(suite) * len(scenes)
+            future: Future[list[Page]] = executor.submit(judge_watched, seconds, *part(suite, scenes), asked, draw)
             return future
 
-        yield from _as_done(suite, chunks, witnesses, submit, IN_FLIGHT * workers)
+        # the scheduler finds other workers for what a lost one had; there is nothing here to make anew
+        yield from _as_done(suite, chunks, witnesses, submit, IN_FLIGHT * workers, stall=None)
 
 
 def _as_done(
@@ -117,6 +137,7 @@ def _as_done(
     witnesses: Sequence[Witness],
     submit: Callable[[Sequence[int], Sequence[Witness]], "Future[list[Page]]"],
     in_flight: int,
+    stall: float | None = STALL,
 ) -> Iterator[tuple[int, list[Page]]]:
     """Keep a bounded number of chunks under way; yield each as it is done."""
     waiting = iter(chunks)
@@ -131,7 +152,7 @@ def _as_done(
                 under_way[submit(chunk[1], witnesses)] = chunk
         if not under_way:
             return
-        done, _ = wait(under_way, STALL, FIRST_COMPLETED)
+        done, _ = wait(under_way, stall, FIRST_COMPLETED)
         if not done and not any(future.running() for future in under_way):
             raise StalledError
         for future in done:
@@ -141,13 +162,13 @@ def _as_done(
             except StalledError:
                 raise
             except Exception:  # the worker died or hung; find out on whose account
-                yield number, [_alone(suite, scene, witnesses, submit) for scene in scenes]
+                yield number, [_alone(suite, scene, witnesses, submit, stall) for scene in scenes]
 
 
-def _outcome(future: "Future[list[Page]]") -> list[Page]:
+def _outcome(future: "Future[list[Page]]", stall: float | None) -> list[Page]:
     """The result of a task, or StalledError where no worker takes it up."""
     while True:
-        wait([future], STALL)
+        wait([future], stall)
         if future.done():
             return future.result()
         if not future.running():
@@ -159,10 +180,11 @@ def _alone(
     scene: int,
     witnesses: Sequence[Witness],
     submit: Callable[[Sequence[int], Sequence[Witness]], "Future[list[Page]]"],
+    stall: float | None,
 ) -> Page:
     """One scene by itself, and if that breaks down too, one engine at a time."""
     try:
-        return _outcome(submit([scene], witnesses))[0]
+        return _outcome(submit([scene], witnesses), stall)[0]
     except StalledError:
         raise
     except Exception:
@@ -172,7 +194,7 @@ def _alone(
     lost = []
     for asked in ([], *([witness] for witness in witnesses)):
         try:
-            part = _outcome(submit([scene], asked))[0]
+            part = _outcome(submit([scene], asked), stall)[0]
         except StalledError:
             raise
         except Exception as error:
