@@ -122,7 +122,7 @@ def test_the_comment_of_a_pull_request_holds_200_scenes_that_all_fail() -> None:
 
 def test_a_section_of_another_module_is_shown_and_linked() -> None:
     _, text = report(copies(2), sections=[Section("hard", "Hard cases", "As predicted.", ["family"], [["toggle"]])])
-    assert '<a href="#hard">Hard cases</a>' in text and '<h2 id="hard">' in text and "<td>toggle</td>" in text
+    assert '<a href="#hard">Hard cases</a>' in text and '<h2 id="hard">' in text and ">toggle</th>" in text
 
 
 def test_the_errors_drawn_are_the_largest_of_their_stretches() -> None:

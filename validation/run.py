@@ -3,7 +3,7 @@
 import csv
 import io
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,16 +13,19 @@ from fourbar.errors import DependencyError, FourBarError, InputError
 from fourbar.exits import FAILED, HOLDS
 from fourbar.mjcf import mjcf
 from fourbar.writing import write_text
+from validation.cost import section as cost_section
 from validation.engines.mujoco.picture import pictures
+from validation.hard import section as hard_section
 from validation.hard.suite import Hard
 from validation.machine import versions
 from validation.page import Page
 from validation.published import ladder_rows
 from validation.regression.command import output_options, told
 from validation.regression.record import about, baseline, read_run, write_about
-from validation.report.html import html
+from validation.report.html import Section, html
 from validation.report.markdown import markdown
 from validation.report.summary import SCENES_SHOWN, Summary, summarise
+from validation.results import Row
 from validation.suite import pool
 from validation.suite.columns import write_columns
 from validation.suite.elsewhere import run_elsewhere
@@ -86,13 +89,28 @@ def run(
         write_text(out / "timings.csv", timings_csv(store.pages(len(chunks))))
         write_text(out / "report.md", markdown(summary))
         drawn, why_not = mjcf_pictures(suite) if draw and simulated else ({}, "")
-        write_text(out / "report.html", html(summary, first_lines, pictures=drawn, no_pictures=why_not))
-        if isinstance(suite, Hard):
-            from validation.hard.page import page, picture
-
-            write_text(out / "hard.html", page(picture()))
+        rows = (row for chunk in store.rows(len(chunks)) for row in chunk)
+        more = sections(rows if isinstance(suite, Hard) else None, out)
+        page = html(summary, first_lines, pictures=drawn, no_pictures=why_not, sections=more)
+        write_text(out / "report.html", page)
         store.finish()
     yield summary
+
+
+def sections(hard: Iterable[Row] | None, out: Path) -> list[Section]:
+    """Parts of the report from elsewhere: the hard cases of this run or one in OUT/hard, the study in OUT/cost.
+
+    Of rows of the hard suite the page hard.html is written too.
+    """
+    if hard is None:
+        found = hard_section.beside(out)
+        return [*([found] if found else []), *cost_section.beside(out)]
+    from validation.hard.page import page, picture
+    from validation.report.svg import inline
+
+    svg = picture()
+    write_text(out / hard_section.PAGE, page(svg))
+    return [hard_section.section(hard, inline(svg)), *cost_section.beside(out)]
 
 
 def mjcf_pictures(suite: Suite) -> tuple[dict[str, str], str]:

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
 from importlib.util import find_spec
+from typing import NamedTuple
 
 import numpy as np
 
@@ -57,6 +58,40 @@ def not_installed(library: str) -> str | None:
     return None if found else f'{library} is not installed: pip install "{REQUIREMENT[library]}"'
 
 
+class Work(NamedTuple):
+    """What the time of an answer goes into."""
+
+    short: str
+    """For a legend."""
+    said: str
+    """For a table."""
+
+
+ONE_BY_ONE = (
+    "each position by itself, in Python: Newton on its own gap, its own speeds and accelerations, then inverse "
+    "dynamics with the loop's multipliers: pin forces and torque"
+)
+WORK = {
+    "formulas": Work(
+        "forces and torque, all positions at once",
+        "all positions in one call on arrays: angles, speeds, accelerations, pin forces and torque",
+    ),
+    "pinocchio-inverse": Work("assembly, forces and torque, one by one", ONE_BY_ONE),
+    "mujoco-inverse": Work("assembly, forces and torque, one by one", ONE_BY_ONE),
+    "mujoco-simulated": Work(
+        "steps from position to position, forces and torque",
+        "one motion: every position assembled, the model compiled, Runge-Kutta steps from position to position (the "
+        "fewer positions, the dearer each), then pin forces and torque read",
+    ),
+    "energy-method": Work(
+        "torque alone, all positions at once", "all positions in one call on arrays: the torque alone, no pin forces"
+    ),
+    "ball-arithmetic": Work(
+        "forces and torque in many digits, one by one",
+        "each position by itself, in Python, in many digits with an error bound: pin forces and torque",
+    ),
+}
+"""By witness: what is compared is not the same work."""
 WITNESSES = (
     Witness("pinocchio-inverse", "validation.engines.pinocchio:PinocchioInverse", EQUIVALENCE, library="pinocchio"),
     Witness("mujoco-inverse", "validation.engines.mujoco.inverse:MujocoInverse", EQUIVALENCE, library="mujoco"),

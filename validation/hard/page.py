@@ -2,7 +2,6 @@
 
 import base64
 import html
-import io
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -19,7 +18,8 @@ from validation.hard.limits import LIMITS, Limit
 from validation.hard.linkages import at, collinear_2_3, collinear_3_4, dressed, linkage_of
 from validation.hard.prediction import in_world_axes
 from validation.hard.suite import HARD_WITNESSES
-from validation.report.colours import OTHER, STYLES
+from validation.report.colours import OTHER, STYLES, declarations
+from validation.report.svg import drawn, inline
 from validation.scales import divisor, magnitude
 from validation.tolerance import DEGRADED, EPS, K, condition_of
 from validation.witnesses import Witness
@@ -77,7 +77,7 @@ def errors(scene: Scene, quantity: str, witness: Witness) -> tuple[Array, Array]
 
 
 def picture() -> str:
-    """SVG: one column per singular position, one row per quantity; the law and the prediction drawn through."""
+    """SVG that stands by itself: a column per singular position, a row per quantity; law and prediction drawn in."""
     from matplotlib.backends.backend_svg import FigureCanvasSVG
     from matplotlib.figure import Figure
 
@@ -94,7 +94,7 @@ def picture() -> str:
         axes[row][0].set_ylabel(f"error of {quantity}, of its own size")
     handles, labels = axes[0][0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper center", ncols=4, frameon=False, fontsize=8)
-    return _svg(figure)
+    return drawn(figure, "where it gets hard")
 
 
 def _draw(axes: Any, way: Approach, quantity: str) -> None:
@@ -139,18 +139,12 @@ def _singular(way: Approach) -> float:
     return float(theta_2[0]) - side * float(way.distances[0])
 
 
-def _svg(figure: Any) -> str:
-    from matplotlib import rc_context
-
-    text = io.StringIO()
-    with rc_context({"svg.fonttype": "none", "svg.hashsalt": "where it gets hard"}):
-        figure.savefig(text, format="svg", metadata={"Date": None, "Creator": None}, transparent=True)
-    return text.getvalue()[text.getvalue().index("<svg") :]
-
-
 def limit_rows(limits: Sequence[Limit] = LIMITS) -> list[tuple[str, str, str, str]]:
     """(engine, what, boundary, reason) of every declared limit."""
-    return [(limit.engine, limit.what, f"{limit.boundary:g} {limit.unit}", limit.reason) for limit in limits]
+    return [
+        (limit.engine, limit.what, f"{limit.boundary:g} {limit.unit}".removesuffix(" 1"), limit.reason)
+        for limit in limits
+    ]
 
 
 def page(svg: str) -> str:
@@ -160,15 +154,20 @@ def page(svg: str) -> str:
         "<tr>" + "".join(f"<td>{html.escape(cell)}</td>" for cell in row) + "</tr>" for row in limit_rows()
     )
     source = base64.b64encode(svg.encode()).decode("ascii")
-    return PAGE.format(svg=svg, source=source, families=families, limits=limits)
+    light, dark = declarations(dark=False), declarations(dark=True)
+    return PAGE.format(svg=inline(svg), source=source, families=families, limits=limits, light=light, dark=dark)
 
 
 PAGE = """<!doctype html>
 <html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">
 <title>Where it gets hard</title>
-<style>:root {{ color-scheme: light dark; }}
-body {{ font: 15px/1.5 system-ui, sans-serif; max-width: 72rem; margin: 0 auto; padding: 1rem; }}
-svg {{ width: 100%; height: auto; }} table {{ border-collapse: collapse; width: 100%; font-size: .9rem; }}
+<style>:root {{ color-scheme: light dark; {light} }}
+@media screen and (prefers-color-scheme: dark) {{ :root {{ {dark} }} }}
+body {{ font: 15px/1.5 system-ui, sans-serif; max-width: 76rem; margin: 0 auto; padding: 1rem; color: var(--ink);
+background: var(--paper); overflow-wrap: anywhere; }}
+a {{ color: inherit; }} figure {{ margin: 1rem 0; overflow-x: auto; }} .wide {{ overflow-x: auto; }}
+svg {{ width: 100%; min-width: 40rem; height: auto; fill: var(--ink); }}
+table {{ border-collapse: collapse; width: 100%; font-size: .9rem; }}
 td, th {{ text-align: left; padding: .2rem .6rem; border-bottom: 1px solid #8884; vertical-align: top; }}</style>
 </head><body>
 <h1>Where it gets hard</h1>
@@ -176,8 +175,8 @@ td, th {{ text-align: left; padding: .2rem .6rem; border-bottom: 1px solid #8884
 The dotted line is the law in powers of the sines; the band is what rounding was computed to do at each position,
 and ten times that: above it a row fails, whoever agrees.</p>
 <figure>{svg}</figure><p><a download="hard.svg" href="data:image/svg+xml;base64,{source}">Download the picture</a></p>
-<h2>What must happen</h2><table><tr><th>family</th><th>statement</th></tr>{families}</table>
+<h2>What must happen</h2><div class="wide"><table><tr><th>family</th><th>statement</th></tr>{families}</table></div>
 <h2>Limits of the engines</h2>
-<table><tr><th>engine</th><th>of what</th><th>boundary</th><th>why</th></tr>{limits}</table>
+<div class="wide"><table><tr><th>engine</th><th>of what</th><th>boundary</th><th>why</th></tr>{limits}</table></div>
 </body></html>
 """

@@ -1,4 +1,4 @@
-"""Accuracy against cost: what every scene of this run took, and how far its torque was off."""
+"""Accuracy against cost: what every scene of this run took, for what work, and how far its torque was off."""
 
 import math
 from collections.abc import Iterable
@@ -8,6 +8,7 @@ from validation.page import Page
 from validation.report.colours import GRID, INK, PAPER, SOFT, style_of
 from validation.report.svg import svg_text
 from validation.tolerance import EPS
+from validation.witnesses import WORK
 
 FLOOR = EPS / 4.0
 """Errors below this, zero among them, are drawn here."""
@@ -37,7 +38,7 @@ def cost_figure(pages: Iterable[Page]) -> str | None:
     from matplotlib.backends.backend_svg import FigureCanvasSVG
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(7.0, 3.1), layout="constrained")
+    figure = Figure(figsize=(7.0, 3.9), layout="constrained")
     FigureCanvasSVG(figure)
     axes = figure.add_subplot()
     axes.set_xscale("log")
@@ -47,10 +48,10 @@ def cost_figure(pages: Iterable[Page]) -> str | None:
         x, y = [cost for cost, _ in found], [max(error, FLOOR) for _, error in found]
         axes.plot(x, y, look.marker, ms=4.0, mfc=PAPER, mec=look.colour, mew=0.9, alpha=0.75)
         centre = (median(x), median(y))
-        axes.plot(*centre, look.marker, ms=9.0, color=look.colour, label=engine)
+        axes.plot(*centre, look.marker, ms=9.0, color=look.colour, label=_labelled(engine))
     axes.axvline(median(formulas), color=INK, lw=1.1, ls=(0, (5, 2)))
     axes.annotate(
-        "formulas", (median(formulas), 1.0), xycoords=("data", "axes fraction"), xytext=(4, -9),
+        _labelled("formulas"), (median(formulas), 1.0), xycoords=("data", "axes fraction"), xytext=(4, -9),
         textcoords="offset points", fontsize=8, color=INK,
     )  # fmt: skip
     axes.axhline(EPS, color=SOFT, lw=0.8, ls=(0, (1, 2)))
@@ -58,11 +59,16 @@ def cost_figure(pages: Iterable[Page]) -> str | None:
         "eps", (1.0, EPS), xycoords=("axes fraction", "data"), xytext=(-2, 3), textcoords="offset points",
         fontsize=8, ha="right", color=SOFT,
     )  # fmt: skip
-    axes.set_xlabel("µs per position (one call each, in the process that judged the scene)")
+    axes.set_xlabel("µs per position, for the work that the legend names")
     axes.set_ylabel("error of the torque / scale")
     axes.grid(color=GRID, lw=0.5)
     axes.tick_params(which="both", labelsize=8, color=GRID)
     axes.spines[["top", "right"]].set_visible(False)
     axes.spines[["left", "bottom"]].set_color(GRID)
-    figure.legend(loc="outside upper center", ncols=4, frameon=False, fontsize=8)
+    figure.legend(loc="outside upper left", frameon=False, fontsize=8)
     return svg_text(figure, "costs")
+
+
+def _labelled(engine: str) -> str:
+    """An engine and what it did for a position."""
+    return f"{engine}: {WORK[engine].short}" if engine in WORK else engine

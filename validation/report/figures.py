@@ -122,13 +122,14 @@ def _draw_errors(axes: "Axes", quantity: str, record: Record, solution: Solution
     axes.set_ylim(low / 4.0, 5.0 * high)
     axes.yaxis.set_major_locator(LogLocator(numticks=5))
     axes.yaxis.set_minor_locator(NullLocator())
+    middle = int(np.flatnonzero(good)[np.count_nonzero(good) // 2])
     axes.annotate(
         "allowed",
-        (0.01, float(allowed[good][0])),
-        xycoords=("axes fraction", "data"),
+        (float(_base(solution, None)[middle]), float(allowed[middle])),
         xytext=(0, -9),
         textcoords="offset points",
         fontsize=7.5,
+        ha="center",
         color=ALLOWED,
     )
 

@@ -41,16 +41,32 @@ class Cell(NamedTuple):
         return {FAILS: "fails", REFUSES: "refuses"}.get(self.row.verdict, "holds")
 
 
+class Figure(NamedTuple):
+    """A picture of a section: an SVG drawn by our own code, which stands in the page, or an image as a data URI."""
+
+    alt: str
+    caption: str
+    svg: str = ""
+    image: str = ""
+
+
 @dataclass(frozen=True, slots=True)
 class Section:
-    """A part of the report that another module provides: a table, cells of plain text."""
+    """A part of the report that another module provides: pictures and a table, cells of plain text."""
 
     key: str
     """Anchor in the page, for example "hard"."""
     title: str
     text: str
-    headings: Sequence[str]
-    rows: Sequence[Sequence[str]]
+    headings: Sequence[str] = ()
+    rows: Sequence[Sequence[str]] = ()
+    figures: Sequence[Figure] = ()
+    links: Sequence[tuple[str, str]] = ()
+    """(words, file beside the report)."""
+    numbers: tuple[int, int] = (0, 0)
+    """The columns that hold numbers: from, up to."""
+    under: str = ""
+    """Key of the section of the report that it belongs under; nothing: it stands by itself."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,7 +105,7 @@ def html(
     first_lines : the line of results.csv at which the rows of each scene start.
     pictures : base64 of a PNG by scene: the MJCF as MuJoCo draws it.
     no_pictures : why there are none.
-    sections : further tables, for example of the hard cases.
+    sections : further parts, for example of the hard cases.
     """
     from jinja2 import Environment, PackageLoader, StrictUndefined
     from markupsafe import Markup

@@ -14,6 +14,7 @@ from validation.page import Page
 from validation.published.command import LadderRow
 from validation.results import FAILS, REFUSES, VERDICTS, Row
 from validation.tolerance import EPS, EQUIVALENCE, IDENTITY, NOTHING_TO_TELL, SIMULATED, K, Tolerance
+from validation.witnesses import WORK
 
 T = TypeVar("T")
 
@@ -40,6 +41,8 @@ class Cost:
     setting: str
     times_formulas: float
     microseconds_per_position: float
+    work: str
+    """What it did for that."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -159,7 +162,13 @@ def summarise(
         measured_k=measured_k,
         independence=[(engine, *independence[engine]) for engine in sorted(independence)],
         costs=[
-            Cost(engine, _settings(values), median(t.times for t in values), median(t.microseconds for t in values))
+            Cost(
+                engine,
+                _settings(values),
+                median(t.times for t in values),
+                median(t.microseconds for t in values),
+                WORK[engine].said if engine in WORK else "",
+            )
             for (engine, _), values in sorted(costs.items())
         ],
         orders=orders if len(orders) <= ORDERS_SHOWN else nlargest(ORDERS_SHOWN, orders, key=_lowest),

@@ -16,7 +16,12 @@ GROUP_NAME = re.compile(r'<g id="[^"]*"')
 
 
 def svg_text(figure: Any, salt: str) -> str:
-    """The figure; `salt` keeps the ids of two figures in one page apart."""
+    """The figure, to stand in a page; `salt` keeps the ids of two figures in one page apart."""
+    return inline(drawn(figure, salt))
+
+
+def drawn(figure: Any, salt: str) -> str:
+    """The figure as matplotlib draws it, transparent: an SVG that stands by itself."""
     import matplotlib
 
     text = io.StringIO()
@@ -24,7 +29,12 @@ def svg_text(figure: Any, salt: str) -> str:
     with matplotlib.rc_context(settings):
         figure.savefig(text, format="svg", transparent=True, metadata={"Date": None, "Creator": None})
     svg = text.getvalue()
-    svg = METADATA.sub("", svg[svg.index("<svg") :])
+    return svg[svg.index("<svg") :]
+
+
+def inline(svg: str) -> str:
+    """The same, smaller and in the colours of the page around it."""
+    svg = METADATA.sub("", svg)
     svg = COORDINATES.sub(lambda found: LONG_NUMBER.sub(r"\1", found.group()), svg)
     svg = GROUP_NAME.sub("<g", BETWEEN_TAGS.sub("><", svg))
     return _classed(by_variable(svg))

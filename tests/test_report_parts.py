@@ -1,0 +1,92 @@
+"""Parts of the report from elsewhere: the hard cases, and what accuracy costs."""
+
+import base64
+from html import unescape
+from pathlib import Path
+
+import pytest
+
+from tests.test_report import page, report
+from validation.cost import section as cost
+from validation.hard.families import FAMILIES
+from validation.hard.section import beside, section
+from validation.hard.suite import HARD_WITNESSES, Hard
+from validation.report.costs import cost_figure
+from validation.report.html import html
+from validation.report.summary import summarise
+from validation.results import AGREES, FAILS, REFUSES, Row, write_results
+from validation.run import sections
+from validation.witnesses import WORK
+
+
+def judged(scene: str, verdict: str) -> Row:
+    return Row(scene, "engine", "exact", "torque", 1.0, 1.0, verdict != FAILS, verdict, "", 0.0, 1.0)
+
+
+def test_every_scene_is_counted_in_its_family_alone() -> None:
+    hard = Hard()
+    rows = [judged(hard.name(index), AGREES) for index in range(len(hard))]
+    table = {row[0]: row for row in section(rows).rows}
+    for family in FAMILIES:
+        count = str(sum(1 for _ in family.scenes()))
+        assert table[family.name][1:3] == (count, count) and table[family.name][6:] == ("holds", family.statement)
+    assert set(table) == {family.name for family in FAMILIES}
+
+
+def test_a_failing_row_fails_its_family_in_the_report(tmp_path: Path) -> None:
+    rows = [judged("toggle-near-a", AGREES), judged("toggle-near-a", REFUSES), judged("toggle-b", FAILS)]
+    toggle, near = section(rows).rows
+    assert toggle[:7] == ("toggle", "1", "0", "0", "0", "1", "FAILS")
+    assert near[:7] == ("toggle-near", "1", "1", "0", "1", "0", "holds")
+    assert beside(tmp_path) is None
+    (tmp_path / "hard").mkdir()
+    write_results(rows, tmp_path / "hard" / "results.csv")
+    assert beside(tmp_path) is None  # unfinished: its page is not written yet
+    (tmp_path / "hard" / "hard.html").touch()
+    found = beside(tmp_path)
+    assert found is not None and found.rows == section(rows).rows
+    assert [file for _, file in found.links] == ["hard/hard.html", "hard/report.html"]
+
+
+def test_a_run_of_the_hard_suite_writes_its_page_and_its_part_of_the_report(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("validation.hard.page.picture", lambda: "<svg><text>the picture</text></svg>")
+    (part,) = sections([judged("toggle-b", AGREES)], tmp_path)
+    assert (part.key, part.links[0][1]) == ("hard", "hard.html")
+    assert (
+        "the picture" in (tmp_path / "hard.html").read_text(encoding="utf-8") and "the picture" in part.figures[0].svg
+    )
+    text = html(summarise([]), {}, sections=[part])
+    assert 'href="#hard"' in text and 'href="hard.html"' in text and "<text>the picture</text>" in text
+
+
+def test_the_picture_of_costs_says_what_each_did_for_a_position() -> None:
+    assert set(WORK) == {"formulas", *(witness.name for witness in HARD_WITNESSES)}
+    summary, text = report([page()])
+    drawn = cost_figure([page()])
+    assert drawn is not None
+    for engine in ("formulas", "pinocchio-inverse", "mujoco-inverse", "energy-method"):
+        assert f"{engine}: {WORK[engine].short}" in drawn
+        assert WORK[engine].said in unescape(text)
+    assert {each.engine for each in summary.costs} == {
+        "formulas",
+        "pinocchio-inverse",
+        "mujoco-inverse",
+        "energy-method",
+    }
+
+
+def test_a_study_of_cost_beside_the_report_is_part_of_it(tmp_path: Path) -> None:
+    assert cost.beside(tmp_path) == []
+    folder = tmp_path / "cost" / "demo"
+    folder.mkdir(parents=True)
+    (folder / "cost.csv").touch()
+    (folder / "sources.svg").write_text("<svg onload='alert(1)'/>")
+    (folder / "work-precision-force.svg").write_bytes(bytes(cost.LARGEST + 1))
+    _, text = report([page()], sections=cost.beside(tmp_path))
+    assert "The study of demo" in text and 'href="cost/demo/cost.md"' in text
+    data = base64.b64encode(b"<svg onload='alert(1)'/>").decode()
+    # an image runs no script; what is too large stays outside
+    assert text.count('<figure class="part">') == 1 and f'src="data:image/svg+xml;base64,{data}"' in text
+    assert text.index('id="cost"') < text.index("The study of demo")
