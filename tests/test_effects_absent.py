@@ -1,6 +1,5 @@
 """What a scene does not name does not exist: nothing of it in the formulas, in the MJCF or in the compiled model."""
 
-import json
 import subprocess
 import sys
 from pathlib import Path
@@ -13,52 +12,37 @@ from fourbar.effects import REGISTRY, Friction, Viscous
 from fourbar.mjcf import mjcf
 from tests.scenes import crank_rocker
 from tests.test_effects import ACTING
-from validation.effect_cost import build
+from validation.effect_absent import ABSENT, build, differences, made
 
 ROOT = Path(fourbar.__file__).parent.parent
-BUILD = """
-import hashlib, json, sys
-sys.path.insert(0, sys.argv[1])
-import fourbar
-from fourbar.mjcf import mjcf
-link = fourbar.FourBar(0.3, fourbar.Bar(0.1, 0.2), fourbar.Bar(0.25, 0.5, 0.004, (0.13, 0.3)), fourbar.Bar(0.22, 0.4))
-scene = fourbar.Scene(link, fourbar.Motion(fourbar.Sweep(0.1, 6.3, 60), 10.0, 5.0))
-fourbar.solve(scene)
-calls = []
-def note(frame, event, argument):
-    if event == "call" and "fourbar" in frame.f_code.co_filename:
-        calls.append(frame.f_code.co_qualname)
-sys.setprofile(note)
-solution = fourbar.solve(scene)
-sys.setprofile(None)
-numbers = {name: hashlib.sha256(getattr(solution, name).tobytes()).hexdigest() for name in solution.evaluated()}
-print(json.dumps({"file": fourbar.__file__, "numbers": numbers, "calls": calls, "mjcf": mjcf(scene)}))
-"""
-
-
-def built(root: Path) -> dict[str, object]:
-    """What a checkout makes of a scene without effects: digests of every array, the calls made, the MJCF."""
-    command = [sys.executable, "-c", BUILD, str(root)]
-    done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=root)
-    assert done.returncode == 0, done.stderr
-    answer: dict[str, object] = json.loads(done.stdout)
-    assert Path(str(answer.pop("file"))).is_relative_to(root)
-    return answer
 
 
 @pytest.fixture(scope="module")
 def whole() -> dict[str, object]:
-    return built(ROOT)
+    return made(ROOT)
 
 
-@pytest.mark.parametrize("key", [key for key in REGISTRY if key != "gravity"])
+@pytest.mark.parametrize("key", ABSENT)
 def test_a_build_that_never_heard_of_an_effect_gives_the_same_bits(
     key: str, whole: dict[str, object], tmp_path: Path
 ) -> None:
-    other = built(build(tmp_path, key))
-    assert other["numbers"] == whole["numbers"]
-    assert other["mjcf"] == whole["mjcf"]
-    assert other["calls"] == whole["calls"]
+    assert differences(whole, made(build(tmp_path, key))) == []
+
+
+def test_a_build_that_pays_for_an_absent_effect_is_noticed(whole: dict[str, object], tmp_path: Path) -> None:
+    """One that runs a term of size zero, and one whose MJCF leaves a flag on."""
+    other = build(tmp_path)
+    blocks, model = other / "fourbar" / "blocks.py", other / "fourbar" / "mjcf" / "model.py"
+    text = blocks.read_text()
+    changed = text.replace("(*scene.loads, *scene.effects)", "(Viscous.at(O2=0.0), *scene.loads, *scene.effects)")
+    assert changed != text
+    blocks.write_text(changed + "\n\nfrom fourbar.effects import Viscous\n")
+    text = model.read_text()
+    assert '"island", ' in text
+    model.write_text(text.replace('"island", ', ""))
+    found = differences(whole, made(other))
+    assert "list of the terms that run" in found and "bytes of the MJCF" in found
+    assert "disabled of the compiled model" in found
 
 
 def test_no_term_of_an_effect_runs_in_a_scene_without_effects(whole: dict[str, object]) -> None:

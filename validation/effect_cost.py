@@ -18,9 +18,9 @@ from pathlib import Path
 
 import click
 
-from fourbar.effects import REGISTRY
 from fourbar.errors import DependencyError, FourBarError, InputError
-from validation.effect_work import DEFAULT_FLAGS, EFFECTS, ENGINES, POSITIONS
+from fourbar.writing import write_text
+from validation.effect_work import DEFAULT_FLAGS, EFFECTS, ENGINES, POSITIONS, flags
 
 AMOUNTS = {
     "formulas": (4, 24),
@@ -29,7 +29,6 @@ AMOUNTS = {
     "pinocchio-inverse": (20, 120),
 }
 """Two amounts of work for each engine; the difference leaves out start-up, import and compilation."""
-UNIT = {"formulas": "position", "mujoco-simulated": "step"}
 NO_COUNTERPART = {("mujoco-simulated", "pin_friction"), ("mujoco-simulated", "load over theta_2")}
 REPEATS = 1e-3
 """Counts of the same work differ by less than this part."""
@@ -76,69 +75,30 @@ def cost(engine: str, effect: str, root: Path | None = None) -> Cost:
     return Cost(engine, effect, per_unit / (POSITIONS if engine == "formulas" else 1))
 
 
-def costs(engines: tuple[str, ...], effects: tuple[str, ...], workers: int) -> Iterator[Cost]:
-    """Every engine with every effect that it has."""
-    pairs = [(engine, effect) for engine in engines for effect in effects if (engine, effect) not in NO_COUNTERPART]
+def pairs(engines: tuple[str, ...], effects: tuple[str, ...]) -> list[tuple[str, str]]:
+    """Every engine with every effect that it has; of the simulation each flag that the bare scene switches off too."""
+    found = [(engine, effect) for engine in engines for effect in effects if (engine, effect) not in NO_COUNTERPART]
     if "mujoco-simulated" in engines:
-        pairs.append(("mujoco-simulated", DEFAULT_FLAGS))
+        found += [("mujoco-simulated", name) for name in (DEFAULT_FLAGS, *flags())]
+    return found
+
+
+def costs(asked: list[tuple[str, str]], workers: int) -> Iterator[Cost]:
+    """Instructions of each, as they come."""
     with ThreadPoolExecutor(workers) as pool:
-        yield from pool.map(lambda pair: cost(*pair), pairs)
-
-
-WORKLOADS = (
-    *("__init__.py", "effect_work.py", "engines/__init__.py"),
-    *("engines/mujoco/__init__.py", "engines/mujoco/stepping.py"),
-)
-"""Of the harness, what runs a workload; it names no effect but those it is asked for."""
-
-
-def build(folder: Path, without: str | None = None) -> Path:
-    """A copy of the package and of the workloads; one that has never heard of an effect where one is named.
-
-    Its file, its registration and its name are gone.
-    """
-    root = Path(__file__).parent.parent
-    copy = folder / "fourbar"
-    shutil.copytree(root / "fourbar", copy, ignore=shutil.ignore_patterns("__pycache__", "page", "plot"))
-    for file in WORKLOADS:
-        target = folder / "validation" / file
-        target.parent.mkdir(parents=True, exist_ok=True)
-        shutil.copy(root / "validation" / file, target)
-    if without is None:
-        return folder
-    name, module = REGISTRY[without].__name__, REGISTRY[without].__module__.rpartition(".")[2]
-    (copy / "effects" / f"{module}.py").unlink()
-    for path in (copy / "__init__.py", copy / "effects" / "__init__.py"):
-        lines = [line for line in path.read_text().splitlines() if f".{module} import" not in line]
-        gone = (f"import {name} as {name}", f'"{name}": "{module}",')
-        lines = [line for line in lines if not line.endswith(gone)]
-        path.write_text(re.sub(rf'"{name}", |\b{name}, |, {name}(?=\))', "", "\n".join(lines)) + "\n")
-    return folder
-
-
-def absent(effects: tuple[str, ...]) -> Iterator[tuple[str, float]]:
-    """For each effect the instructions of a bare scene in a build without it, relative to the whole build's, less 1."""
-    with tempfile.TemporaryDirectory() as folder:
-        roots = {}
-        for number, effect in enumerate((None, *effects)):
-            # names of one length: paths are part of what is counted
-            roots[effect] = Path(folder) / f"{number:03d}"
-            roots[effect].mkdir()
-            build(roots[effect], effect)
-        whole = cost("formulas", "none", roots[None]).instructions
-        for effect in effects:
-            yield effect, cost("formulas", "none", roots[effect]).instructions / whole - 1.0
+        yield from pool.map(lambda pair: cost(*pair), asked)
 
 
 @click.command(name="effects-cost")
 @click.option("--engines", metavar="NAMES", default=",".join(AMOUNTS), show_default=True, help="Comma-separated.")
 @click.option("--effects", metavar="NAMES", help="Comma-separated; left out: all.")
 @click.option("--workers", type=click.IntRange(min=1), default=2, show_default=True, help="Counts at the same time.")
-@click.option("--absent", "check", is_flag=True, help="Count instead what effects cost that are not named: nothing.")
-def command(engines: str, effects: str | None, workers: int, check: bool) -> int:
+@click.option("--out", type=click.Path(path_type=Path, dir_okay=False), help="Write the table as Markdown too.")
+@click.option("--absent", is_flag=True, help="Look instead for any trace of an effect in a build without it: none.")
+def command(engines: str, effects: str | None, workers: int, out: Path | None, absent: bool) -> int:
     """Count the instructions that each effect costs in each engine (valgrind; half an hour for all)."""
-    if check:
-        return check_absent(tuple(name for name in REGISTRY if name != "gravity"))
+    if absent:
+        return check_absent()
     asked = tuple(name.strip() for name in engines.split(","))
     for name in asked:
         if name not in ENGINES:
@@ -147,39 +107,35 @@ def command(engines: str, effects: str | None, workers: int, check: bool) -> int
     for name in chosen:
         if name not in EFFECTS:
             raise InputError("--effects", name, "must be among " + ", ".join(EFFECTS))
-    table(costs(asked, chosen, workers), asked, chosen)
+    if not available():
+        raise DependencyError("valgrind and setarch are needed to count instructions")
+    from rich.progress import track
+
+    from validation.effect_clock import ratio
+    from validation.effect_table import Entry, markdown, show
+
+    work = pairs(asked, chosen)
+    counted = list(track(costs(work, workers), total=len(work), description="instructions", transient=True))
+    clocked = [ratio(*pair) for pair in track(work, description="wall clock", transient=True)]  # by itself, undisturbed
+    entries = [
+        Entry(one.engine, one.effect, one.instructions, times) for one, times in zip(counted, clocked, strict=True)
+    ]
+    show(entries)
+    if out is not None:
+        write_text(out, markdown(entries))
+        click.echo(f"written to {out}")
     return 0
 
 
-def check_absent(effects: tuple[str, ...]) -> int:
-    """Print by how much a bare scene differs in a build without each effect; 1 where it is more than repeats."""
-    worst = 0.0
-    for effect, difference in absent(effects):
-        worst = max(worst, abs(difference))
-        click.echo(f"{effect}: {100.0 * difference:+.3f} % in a build without it")
-    click.echo(f"{'holds' if worst < REPEATS else 'FAILS'}: less than {100.0 * REPEATS:g} % is asked for")
-    return 0 if worst < REPEATS else 1
+def check_absent() -> int:
+    """Print what a build without each effect makes otherwise of a bare scene; 1 where it is anything."""
+    from validation.effect_absent import ABSENT, compared, holds
 
-
-def table(measured: Iterator[Cost], engines: tuple[str, ...], effects: tuple[str, ...]) -> None:
-    """Print instructions and their ratio to the scene without effects."""
-    from rich.box import SIMPLE_HEAD
-    from rich.console import Console
-    from rich.table import Table
-
-    found = {(one.engine, one.effect): one.instructions for one in measured}
-    shown = Table(title="instructions per position, per step of the simulation", box=SIMPLE_HEAD, pad_edge=False)
-    shown.add_column("effect")
-    for engine in engines:
-        shown.add_column(engine, justify="right")
-    rows = [*effects, DEFAULT_FLAGS] if "mujoco-simulated" in engines else [*effects]
-    for effect in rows:
-        cells = []
-        for engine in engines:
-            if (engine, effect) in found:
-                ratio = found[engine, effect] / found[engine, "none"] - 1.0
-                cells.append(f"{found[engine, effect]:,.0f} ({100.0 * ratio:+.2f} %)")
-            else:
-                cells.append("no counterpart" if effect in EFFECTS else "")
-        shown.add_row(effect, *cells)
-    Console().print(shown)
+    failed = False
+    for effect, differs, more in compared(ABSENT):
+        failed |= not holds(differs, more)
+        same = "differs in " + ", ".join(differs) if differs else "bits, MJCF, compiled model and terms are equal"
+        counted = "instructions not counted: no valgrind" if more is None else f"instructions {100.0 * more:+.3f} %"
+        click.echo(f"without {effect}: {same}; {counted}")
+    click.echo(f"{'FAILS' if failed else 'holds'}: less than {100.0 * REPEATS:g} % and no difference are asked for")
+    return int(failed)

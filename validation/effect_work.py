@@ -5,15 +5,18 @@ import math
 import re
 import sys
 from collections.abc import Callable
-from typing import Any
+from functools import cache
+from typing import TYPE_CHECKING, Any
 
 from fourbar import effects as kinds
-from fourbar.effects import Effect, Load
 from fourbar.linkage import Bar, FourBar
 from fourbar.motion import Motion, Sweep
 from fourbar.scene import Scene, command, solve
 
-EFFECTS: dict[str, Callable[[], Effect | None]] = {
+if TYPE_CHECKING:
+    from fourbar.effects import Effect, Load
+
+EFFECTS: dict[str, "Callable[[], Effect | None]"] = {
     "none": lambda: None,
     "gravity": kinds.Gravity,
     "viscous": lambda: kinds.Viscous.at(O2=0.01, A=0.01, O4=0.01),
@@ -26,13 +29,15 @@ EFFECTS: dict[str, Callable[[], Effect | None]] = {
         (kinds.Spring(kinds.Point(1, 0.1, -1.5), kinds.Point(4, 0.08, 0.0), 200.0, 0.05, 3.0),)
     ),
     "flywheel": lambda: kinds.Flywheel(0.02),
-    "load": lambda: Load(4, (3.0, 0.7), (0.05, 1.0), 0.2),
-    "load over theta_2": lambda: Load(
+    "load": lambda: kinds.Load(4, (3.0, 0.7), (0.05, 1.0), 0.2),
+    "load over theta_2": lambda: kinds.Load(
         4, (3.0, 0.7), (0.05, 1.0), 0.2, "world", kinds.Table((0.0, 3.0, math.tau), (0.0, 1.0, 0.0))
     ),
 }
 """What is counted, each by itself on the same linkage; made when asked for, so that a build without one still works."""
 DEFAULT_FLAGS = "none, MuJoCo's default flags"
+LEFT_ON = "none, {} left on"
+"""One flag of MuJoCo as it is by default, the others as the generated MJCF has them."""
 POSITIONS = 1000
 """Of the formulas in one unit of work: they take arrays."""
 
@@ -41,7 +46,7 @@ def scene(effect: str, positions: int) -> Scene:
     """A crank-rocker of uniform bars with one effect."""
     linkage = FourBar(0.3, Bar(0.1, 0.2), Bar(0.25, 0.5), Bar(0.22, 0.4))
     term = EFFECTS[effect]()
-    loads = (term,) if isinstance(term, Load) else ()
+    loads: tuple[Load, ...] = (term,) if isinstance(term, getattr(kinds, "Load", ())) else ()  # type: ignore[assignment]
     effects = () if term is None or loads else (term,)
     return Scene(linkage, Motion(Sweep(0.13, 0.13 + math.tau, positions - 1), 10.0), loads=loads, effects=effects)
 
@@ -62,10 +67,21 @@ def simulated(effect: str) -> Callable[[int], Any]:
     from fourbar.mjcf import mjcf
     from validation.engines.mujoco.stepping import steps
 
-    text = mjcf(scene("none" if effect == DEFAULT_FLAGS else effect, 91))
+    text = mjcf(scene(effect if effect in EFFECTS else "none", 91))
     if effect == DEFAULT_FLAGS:
         text = re.sub(r"<flag [^>]*/>", "", text)
+    elif effect not in EFFECTS:
+        text = text.replace(f' {flags()[effect]}="disable"', "")
     return steps(text)
+
+
+@cache
+def flags() -> dict[str, str]:
+    """The flags that the MJCF of a bare scene switches off, by the name of the workload that leaves one on."""
+    from fourbar.mjcf import mjcf
+
+    found = re.findall(r'(\w+)="disable"', mjcf(scene("none", 91)))
+    return {LEFT_ON.format(flag): flag for flag in found}
 
 
 def inverse(adapter: str) -> Callable[[str], Callable[[int], Any]]:

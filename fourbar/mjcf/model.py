@@ -7,7 +7,6 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 
-from fourbar.effects import Load
 from fourbar.errors import InputError, LimitError
 from fourbar.kinematics import centre_in_bar
 from fourbar.linkage import BAR_NAMES, FIRST_PIN, MOVING_BARS, PINS, FourBar
@@ -15,6 +14,7 @@ from fourbar.mjcf.appearance import add_camera
 from fourbar.mjcf.settings import Settings
 
 if TYPE_CHECKING:
+    from fourbar.effects import Load
     from fourbar.effects.spring import Point, Spring
 
 FLOOR = 1e-15

@@ -33,7 +33,7 @@ def cost(scenes: tuple[Path, ...], out: Path, effects: bool) -> int:
     if effects:
         from validation.effect_cost import command
 
-        return int(command.main([], standalone_mode=False))
+        return int(command.main(["--out", str(out / "effects.md")], standalone_mode=False))
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
