@@ -13,8 +13,8 @@ from validation.effect_work import ENGINES
 
 ROUNDS = 31
 """Pairs of runs, first one ahead and then the other."""
-AMOUNTS = {"formulas": 4, "mujoco-simulated": 1000, "mujoco-inverse": 20, "pinocchio-inverse": 20}
-"""Of one run: 2 to 20 ms, long beside the clock and short beside what disturbs it."""
+AMOUNTS = {"formulas": 40, "mujoco-simulated": 1000, "mujoco-inverse": 100, "pinocchio-inverse": 100}
+"""Of one run: 10 to 20 ms, long beside the clock and short beside what disturbs it."""
 
 
 class Ratio(NamedTuple):
