@@ -120,6 +120,10 @@ def test_every_engine_stops_where_the_spring_is_wound() -> None:
     assert {row.engine for row in record.rows if row.verdict == "refuses"} == {"mujoco-simulated"}
     assert any("wound by more than half a turn" in line for line in record.left_out)
     assert record.solution is not None and record.solution.status.count("wound") == 6  # of theta_2 beyond 0.5 + pi
+    at_half = Scene(scene.linkage, Motion([0.5, 1.0, 0.5 + math.pi, 4.0], 10.0), effects=(spring,))
+    record = judge("scene", at_half)
+    assert record.solution is not None and record.solution.status == ["ok", "ok", "wound", "wound"]
+    assert [row for row in record.rows if not row.passed] == []
     within = Scene(scene.linkage, Motion(Sweep(0.1, 3.6, 12), 10.0), effects=(spring,))
     record = judge("scene", within)
     assert [row for row in record.rows if not row.passed] == [] and record.left_out == []

@@ -17,8 +17,8 @@ from fourbar.linkage import PINS, FourBar, require
 from fourbar.solution import OK, WOUND, Solution
 
 FIELDS = {"stiffness": "N m/rad", "rest": "rad", "preload": "N m"}
-HALF_TURN = math.pi * (1.0 + 1e-12)
-"""rad; a spring that begins exactly half a turn from rest is not wound by a rounding."""
+HALF_TURN = math.pi * (1.0 - 1e-12)
+"""rad; at half a turn itself rounding would decide which way the spring turns."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,7 +83,7 @@ class Torsion(Effect):
         return replace(self, turns=tuple(math.tau * math.floor(angle / math.tau + 0.5) for angle in away))
 
     def unsettled(self, state: State) -> NDArray[np.uint8] | None:
-        """WOUND beyond half a turn from rest."""
+        """WOUND at half a turn from rest and beyond."""
         if self.turns is None:
             return None
         wound = np.zeros(state.theta_2.shape, dtype=bool)
