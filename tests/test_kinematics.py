@@ -131,3 +131,156 @@ def test_an_offset_from_a_limit_keeps_all_its_digits(offset: float) -> None:
     assert abs(solution.sin_mu[0] / sine - 1.0) < 8 * EPS
     assert solution.status == ["ok"]
     assert solution.omega_3 is not None and np.isfinite(solution.omega_3).all()
+
+
+STEP = 1e-4
+"""s; a central difference then misses STEP^2 of the third derivative of positions that turn at 3 rad/s."""
+BY_DIFFERENCES = 1e-5
+
+
+@pytest.mark.parametrize("alpha", [0.0, -7.0])
+@pytest.mark.parametrize("theta_1", [0.0, 0.4])
+@pytest.mark.parametrize("point", [(0.05, -0.02), (0.07, 0.0), (0.0, 1.0)])
+def test_points_move_as_their_positions_do(point: tuple[float, float], theta_1: float, alpha: float) -> None:
+    """Points of all bars as complex numbers; speeds and accelerations as differences of their positions."""
+    link, omega = linkage(theta_1), 3.0
+    angles = np.linspace(0.3, 6.0, 9)
+
+    def at(t: float) -> fourbar.kinematics.State:
+        return close_loop(link, angles + omega * t + 0.5 * alpha * t * t, 1)
+
+    state = at(0.0)
+    add_velocities(state, omega)
+    add_accelerations(state, alpha)
+    d, a, b, _ = link.lengths
+    e2, e3, e4 = (np.exp(1j * state.angle(bar)) for bar in (2, 3, 4))
+    O4 = d * cmath.exp(1j * theta_1)
+    first = {2: np.zeros(9), 3: a * e2, 4: np.full(9, O4)}
+    pins = {"O2": first[2], "A": a * e2, "B": a * e2 + b * e3, "O4": first[4]}
+    for name, place in pins.items():
+        x, y = state.pin(name)
+        assert x.shape == y.shape == (9,) and np.max(np.abs(x + 1j * y - place)) <= CLOSURE
+    for bar, unit in ((2, e2), (3, e3), (4, e4)):
+        arm, u = state.arm(bar, *point), state.unit(bar)
+        assert np.max(np.abs(u[0] + 1j * u[1] - unit)) <= CLOSURE
+        assert np.max(np.abs(arm[0] + 1j * arm[1] - complex(*point) * unit)) <= CLOSURE
+        x, y = state.point(bar, *point)
+        assert np.max(np.abs(x + 1j * y - (first[bar] + complex(*point) * unit))) <= CLOSURE
+        ahead, back = (complex_of(at(t).point(bar, *point)) for t in (STEP, -STEP))
+        assert complex_of(state.velocity(bar, *point)) == pytest.approx((ahead - back) / (2 * STEP), abs=BY_DIFFERENCES)
+        bend = (ahead - 2.0 * complex_of((x, y)) + back) / STEP**2
+        assert complex_of(state.acceleration(bar, *point)) == pytest.approx(bend, abs=BY_DIFFERENCES)
+    with pytest.raises(KeyError, match="C"):
+        state.pin("C")
+
+
+def complex_of(vector: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
+    return vector[0] + 1j * vector[1]
+
+
+def test_speeds_given_one_by_one_are_speeds_given_at_once() -> None:
+    """Zero at every position, as a number or as an array, is the same motion; the ground does not move."""
+    states = []
+    for omega, alpha in ((3.0, 0.0), (np.full(5, 3.0), np.zeros(5)), (3, 0)):
+        state = close_loop(linkage(), np.linspace(0.3, 6.0, 5), 1)
+        add_velocities(state, omega)
+        add_accelerations(state, alpha)
+        states.append(state)
+        assert state.omega(1) == 0.0 and state.alpha(1) == 0.0
+    for state in states[1:]:
+        for bar in (2, 3, 4):
+            assert np.all(state.omega(bar) == states[0].omega(bar))
+            assert np.all(state.alpha(bar) == states[0].alpha(bar))
+            assert np.array_equal(state.acceleration(bar, 0.1, 0.2), states[0].acceleration(bar, 0.1, 0.2))
+
+
+def test_what_was_not_evaluated_is_not_there() -> None:
+    state = close_loop(linkage(), ANGLES, 1)
+    with pytest.raises(AssertionError, match=r"^velocities were not evaluated$"):
+        state.omega(3)
+    with pytest.raises(AssertionError, match=r"^velocities come first$"):
+        add_accelerations(state, 0.0)
+    add_velocities(state, 1.0)
+    with pytest.raises(AssertionError, match=r"^accelerations were not evaluated$"):
+        state.alpha(4)
+
+
+def test_the_cosine_at_B_is_that_of_the_two_bars() -> None:
+    for lengths, branch in ((LENGTHS, 1), (LENGTHS, -1), ((0.3, 0.1, 0.3, 0.1), 1), ((0.1, 0.3, 0.3, 0.1), -1)):
+        d, a, b, c = lengths
+        state = close_loop(fourbar.FourBar(d, fourbar.Bar(a), fourbar.Bar(b), fourbar.Bar(c), 0.4), ANGLES, branch)
+        ok = state.assembled
+        expected = np.cos(state.angle(4) - state.angle(3))
+        assert state.cos_mu[ok] == pytest.approx(expected[ok], abs=64 * EPS)
+        assert state.sin_mu[ok] == pytest.approx(np.sin(state.angle(4) - state.angle(3))[ok], abs=1e-13)
+
+
+def test_singular_positions_have_no_speed_and_their_neighbours_keep_theirs() -> None:
+    link = fourbar.uniform(0.3, 0.1, 0.3, 0.1)
+    theta_2 = np.array([0.0, 1.0, math.pi])
+    state = close_loop(link, theta_2, 1)
+    assert state.singular.tolist() == [True, False, True] and state.assembled.all()
+    for regular, plain in ((state.regular_sine(), state.sin_mu), (state.regular_root(), state.signed_root)):
+        assert np.isnan(regular).tolist() == [True, False, True] and regular[1] == plain[1]
+    add_velocities(state, 2.0)
+    add_accelerations(state, 5.0)
+    assert np.isnan(state.omega(3)).tolist() == [True, False, True]  # type: ignore[arg-type]
+    assert (state.omega(4)[1], state.alpha(4)[1], state.alpha(3)[1]) == (2.0, 5.0, 0.0)  # type: ignore[index]
+    crank = close_loop(linkage(), ANGLES, 1)
+    assert crank.regular_sine() is crank.sin_mu and not crank.singular.any()
+
+
+def test_branches_may_differ_from_position_to_position() -> None:
+    branches = np.where(np.arange(41) % 3 == 0, -1, 1).astype(np.int8)
+    mixed = close_loop(linkage(), ANGLES, branches)
+    add_velocities(mixed, 2.0)
+    add_accelerations(mixed, 1.0)
+    for branch in (1, -1):
+        alone = close_loop(linkage(), ANGLES, branch)
+        add_velocities(alone, 2.0)
+        add_accelerations(alone, 1.0)
+        which = branches == branch
+        for bar in (3, 4):
+            assert np.array_equal(mixed.angle(bar)[which], alone.angle(bar)[which])
+            assert np.array_equal(mixed.omega(bar)[which], alone.omega(bar)[which])  # type: ignore[index]
+            assert np.array_equal(mixed.alpha(bar)[which], alone.alpha(bar)[which])  # type: ignore[index]
+    assert np.array_equal(mixed.branch, branches)
+
+
+@pytest.mark.parametrize("centre", [(0.3, 0.0), (0.3, 1.0), (0.3, -2.5), (0.0, 0.0)])
+def test_a_mass_centre_in_the_frame_of_its_bar(centre: tuple[float, float]) -> None:
+    place = fourbar.kinematics.centre_in_bar(fourbar.Bar(0.2, 1.0, 0.1, centre))
+    assert complex(*place) == pytest.approx(cmath.rect(*centre), abs=EPS)
+    assert place[1] == 0.0 or centre[1] != 0.0
+    assert all(type(part) is float for part in place)
+
+
+@pytest.mark.parametrize(
+    ("lengths", "branch"), [((0.3, 0.1, 0.3, 0.1), 1), ((0.1, 0.3, 0.3, 0.1), -1), ((0.2, 0.2, 0.2, 0.2), 1)]
+)
+@pytest.mark.parametrize("half_turn", [0, 1])
+def test_pairs_that_stay_parallel_keep_the_directions_of_ground_and_input(
+    lengths: tuple[float, ...], branch: int, half_turn: int
+) -> None:
+    """A parallelogram's coupler lies as its ground and bar 4 as bar 2; a folded kite has B on O2."""
+    d, a, b, c = lengths
+    link = fourbar.FourBar(d, fourbar.Bar(a), fourbar.Bar(b), fourbar.Bar(c), 0.4)
+    theta_2 = 0.4 + math.pi * half_turn + np.array([1e-9, 0.5, 2.0])
+    branch = -branch if half_turn else branch
+    state = close_loop(link, theta_2, branch)
+    add_velocities(state, 2.0)
+    add_accelerations(state, 3.0)
+    u1 = (math.cos(0.4), math.sin(0.4))
+    together = a == c
+    expected = (
+        ((u1, state.u2), (0.0, 2.0), (0.0, 3.0))
+        if together
+        else ((tuple(-x for x in state.u2), tuple(-x for x in u1)), (2.0, 0.0), (3.0, 0.0))
+    )
+    for k, bar in enumerate((3, 4)):
+        for i in (0, 1):
+            assert state.unit(bar)[i] == pytest.approx(np.broadcast_to(expected[0][k][i], 3), abs=EPS)
+        assert np.array_equal(state.omega(bar), np.full(3, expected[1][k]))
+        assert np.array_equal(state.alpha(bar), np.full(3, expected[2][k]))
+    # between the bars: the angle of input and ground
+    assert np.abs(state.sin_mu) == pytest.approx(np.abs(np.sin(theta_2 - 0.4)), rel=8 * EPS, abs=2 * EPS)
