@@ -77,7 +77,7 @@ def judge_all(suite: object, out: Path, witnesses: tuple[Witness, ...] = EXACT, 
 @pytest.mark.timeout(300)  # its hangs alone take half a minute, and every new worker imports the harness again
 def test_an_engine_that_crashes_or_hangs_costs_its_own_rows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(pool, "SECONDS_PER_SCENE", 8.0)
-    monkeypatch.setattr(validation.run, "CHUNK", {True: 1, False: 2})
+    monkeypatch.setattr(validation.run, "CHUNK", {True: 2, False: 2})
     moody = Witness("moody", f"{__name__}:Moody", EQUIVALENCE)
     judge_all(Few(), tmp_path / "run", (*EXACT, moody))
     rows = from_csv(tmp_path / "run" / "results.csv")

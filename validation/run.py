@@ -39,7 +39,7 @@ from validation.witnesses import Witness
 WORKERS = 2
 ALL_TYPES = ",".join(kind.value for kind in LinkageType)
 CHUNK = {True: 1, False: 20}
-"""Scenes per task: one where something is simulated (a second each), else twenty (a second together)."""
+"""Scenes per task: one where something is simulated or drawn (a second each), else twenty (a second together)."""
 
 
 def run(
@@ -60,9 +60,9 @@ def run(
     What an interrupted run of the same suite with the same engines and versions left is kept.
     """
     simulated = any(witness.name == "mujoco-simulated" for witness in witnesses)
-    size = CHUNK[simulated]
-    chunks = [range(start, min(start + size, len(suite))) for start in range(0, len(suite), size)]
     draw = len(suite) <= SCENES_SHOWN
+    size = CHUNK[simulated or draw]
+    chunks = [range(start, min(start + size, len(suite))) for start in range(0, len(suite), size)]
     identity = {
         "scenes": suite.fingerprint(),
         "witnesses": [f"{witness.name} {witness.tolerance.factor!r}" for witness in witnesses],
