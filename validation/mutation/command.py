@@ -140,9 +140,8 @@ def _told(states: dict[str, str], survivors: dict[str, str], out: Path) -> int:
 def _harness(mutmut: Path, tree: Path, module: str | None, most: int, out: Path) -> int:
     """Generate the mutants with mutmut, then try them on the harness in the mutated tree."""
     generated = tree / "mutants"
-    if not generated.is_dir():
-        # a name that no mutant has: mutmut generates all of them, finds none to run and stops
-        subprocess.run([mutmut, "run", "fourbar.none*"], cwd=tree, check=False, capture_output=True)
+    # a name that no mutant has: mutmut generates all of them, those of changed files anew, finds none to run and stops
+    subprocess.run([mutmut, "run", "fourbar.none*"], cwd=tree, check=False, capture_output=True)
     arguments = [sys.executable, "-m", "validation.mutation.harness", module or "", str(most)]
     environment = {**os.environ, "PYTHONPATH": "."}
     done = subprocess.run(arguments, cwd=generated, check=True, stdout=subprocess.PIPE, text=True, env=environment)
