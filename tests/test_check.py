@@ -75,6 +75,25 @@ def test_a_torque_off_by_one_in_the_last_of_six_digits_is_found(name: str, tmp_p
     assert {finding.quantity for finding in found.differing} == {"torque"}
 
 
+@pytest.mark.parametrize("name", SCENES)
+def test_a_theta_2_rounded_as_the_rest_is_allowed_for_and_excuses_no_more(name: str, tmp_path: Path) -> None:
+    numbers = right(SCENES[name])
+    rounded = numbers | {"theta_2": np.array([float(f"{x:.6g}") for x in numbers["theta_2"]])}
+    assert np.any(rounded["theta_2"] != numbers["theta_2"])
+    assert judged(SCENES[name], write(tmp_path / "theirs.csv", rounded, digits=5)).differing == []
+    wrong = rounded | {"F43": rounded["F43"] * (1.0 + 1e-4)}
+    found = judged(SCENES[name], write(tmp_path / "wrong.csv", wrong, digits=5))
+    assert {finding.quantity for finding in found.differing} == {"F43"}
+
+
+def test_whole_degrees_are_positions_that_somebody_chose(tmp_path: Path) -> None:
+    path = tmp_path / "theirs.csv"
+    path.write_text("theta_2 [deg],torque\n10,1.0\n20.5,1.0\n")
+    assert not read_table(path).theta_2_rounding.any()
+    path.write_text("theta_2 [deg],torque\n10,1.0\n20.5003,1.0\n")  # zeros left off: the column has four decimals
+    assert read_table(path).theta_2_rounding == pytest.approx(np.radians(0.00005), rel=1e-9)
+
+
 def bars(scene: Scene, **changes: object) -> Scene:
     return replace(scene, linkage=replace(scene.linkage, **changes))
 

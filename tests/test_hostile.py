@@ -249,7 +249,7 @@ class Greedy:
 
 def test_running_out_of_memory_costs_its_own_row(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     suite = suite_file(listed(tmp_path, "a.toml\nb.toml\n"))
-    monkeypatch.setattr(validation.run, "CHUNK", {True: 1, False: 2})
+    monkeypatch.setattr(validation.run, "CHUNK", {True: 2, False: 2})
     greedy = Witness("greedy", f"{__name__}:Greedy", EQUIVALENCE)
     list(run(suite, tmp_path / "run", (*EXACT, greedy), workers=1))
     failing = [row for row in from_csv(tmp_path / "run" / "results.csv") if row.verdict == FAILS]

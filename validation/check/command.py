@@ -50,7 +50,7 @@ class Judgement:
 
 
 def judge_table(scene: Scene, table: Table) -> Judgement:
-    """Judge every number by K eps/condition plus half a unit of its last printed digit."""
+    """Judge every number by K eps/condition plus half a unit of its last printed digit, and of theta_2's."""
     base = command(scene)
     if np.ndim(base.omega_2 or 0.0) or np.ndim(base.alpha_2):
         raise InputError("motion.law", scene.title, "a table is judged at one omega_2 and alpha_2, not along a law")
@@ -58,6 +58,11 @@ def judge_table(scene: Scene, table: Table) -> Judgement:
     at = Command(table.theta_2, branch, base.omega_2, base.alpha_2)
     right = solve(scene, "position" if at.omega_2 is None else "force", at=at)
     ok = right.status_code == OK
+    beside = []  # the same half a unit of a rounded theta_2 away
+    if table.theta_2_rounding.any():
+        for shift in (-table.theta_2_rounding, table.theta_2_rounding):
+            moved = at._replace(theta_2=at.theta_2 + shift)
+            beside.append(solve(scene, "position" if at.omega_2 is None else "force", at=moved))
 
     def judged(quantity: str, ours: Array, theirs: Array) -> tuple[Array, Array]:
         scale = divisor(yardstick(quantity, scene, right, getattr(right, quantity)))
@@ -65,8 +70,11 @@ def judge_table(scene: Scene, table: Table) -> Judgement:
         condition = condition_of(quantity, scene.linkage, right)
         # what a mistake would have printed is rounded at its own size, however much larger
         size = np.nanmax(magnitude(ours)[ok], initial=0.0) if not quantity.startswith("theta") else 0.0
-        larger = 1.0 if ours is getattr(right, quantity) else np.maximum(size / scale, 1.0)
-        allowed = EQUIVALENCE.allowed(condition) * larger + table.rounding[quantity] / scale
+        there = getattr(right, quantity)
+        larger = 1.0 if ours is there else np.maximum(size / scale, 1.0)
+        moves = [angle_aware_difference(quantity, there, getattr(other, quantity)) for other in beside]
+        spread = np.fmax.reduce(moves) / scale if moves else 0.0
+        allowed = (EQUIVALENCE.allowed(condition) + spread) * larger + table.rounding[quantity] / scale
         return error[ok], np.where(condition * NOTHING_TO_TELL > EPS, allowed, np.inf)[ok]
 
     findings = []
@@ -85,7 +93,7 @@ def judge_table(scene: Scene, table: Table) -> Judgement:
 def said(explanation: Explanation) -> str:
     """How far a mistake explains what differs."""
     if explanation.complete:
-        return "explains everything that differs"
+        return "explains everything that differs: " + ", ".join(explanation.quantities)
     parts = []
     if explanation.quantities:
         parts.append("explains " + ", ".join(explanation.quantities))

@@ -3,7 +3,8 @@
     theta_2 [deg], torque [N cm], F12_x, F12_y
 
 Without a unit a column is SI (rad). How many digits were printed decides how much rounding is
-theirs: half a unit of the last printed digit is always allowed.
+theirs: half a unit of the last printed digit is always allowed, and what half a unit of a rounded
+theta_2 changes.
 """
 
 import csv
@@ -17,9 +18,12 @@ from numpy.typing import NDArray
 
 from fourbar.errors import InputError
 from fourbar.solution import UNITS, VECTORS
+from validation.tolerance import EPS
 
 Array = NDArray[np.float64]
 
+DECIMALS = 4
+"""12.5 deg and 0.25 rad are positions that somebody chose, 0.1745 rad is one that was rounded."""
 LARGEST_FILE = 64 * 2**20
 """Bytes; a table larger than this is not a hand-made comparison."""
 
@@ -34,6 +38,8 @@ class Table:
     """Half a unit of the last digit printed, in SI, (n,)."""
     lines: list[int]
     """The line of the file that each row stands in."""
+    theta_2_rounding: Array
+    """Half a unit of the last digit of theta_2 in a column that is printed with DECIMALS, rad, (n,); else 0."""
 
 
 def read_table(path: Path) -> Table:
@@ -69,7 +75,16 @@ def read_table(path: Path) -> Table:
             values[quantity], rounding[quantity] = by_name[quantity], half_by_name[quantity]
     if not values:
         raise InputError("header", lines[0], "needs a result, such as torque or F12_x and F12_y", str(path))
-    return Table(by_name["theta_2"], values, rounding, places)
+    return Table(by_name["theta_2"], values, rounding, places, _rounded(half_by_name["theta_2"], columns))
+
+
+def _rounded(halves: Array, columns: list[tuple[str, float]]) -> Array:
+    """Half a unit of each theta_2; of a cell whose zeros were left off, that of the column."""
+    unit = dict(columns)["theta_2"]
+    least = halves.min()
+    if least > 0.5 * unit * 10.0**-DECIMALS * (1.0 + EPS):
+        return np.zeros_like(halves)
+    return np.where(halves <= 0.5 * unit * 10.0 ** (1 - DECIMALS) * (1.0 + EPS), halves, least)
 
 
 def _lines(path: Path) -> list[tuple[int, list[str]]]:
