@@ -277,7 +277,7 @@ def test_springs_tables_and_rest_have_the_torque_of_newton_euler(drive: int) -> 
     """What depends on O4, on theta_2 and on rest beside motion, in one sweep."""
     linkage = of(SHAPES["crank-rocker"])
     ends = fourbar.effects.Point(1, 0.2, 0.3), fourbar.effects.Point(4, 0.15, 0.2)
-    table = fourbar.effects.Table((0.0, 2.0, 5.0), (1.0, 3.0, -1.0))
+    table = fourbar.effects.Table((0.0, 2.0, 6.0), (1.0, 3.0, -1.0))
     loads = (fourbar.Load(3, (2.0, 0.3), (0.1, 2.0), 0.4, table=table),)
     effects = (
         fourbar.effects.Springs((fourbar.effects.Spring(*ends, 300.0, 0.05),)),
