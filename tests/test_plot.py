@@ -15,12 +15,12 @@ from fourbar import plot
 from fourbar.effects import Flywheel
 from fourbar.errors import DependencyError, InputError, NotAssembledError
 from fourbar.motion_law import Law
-from fourbar.plot.curves import broken, limit_of, poles
+from fourbar.plot.curves import broken, free_place, limit_of, poles
 from fourbar.plot.energy import energies
 from fourbar.plot.figures import FIGURES, compose
 from fourbar.plot.freebody import free_body
 from fourbar.plot.style import matplotlib_style, number, plain, unit_for
-from fourbar.plot.view import view
+from fourbar.plot.view import CLEAR, common_position, on_branch, view
 from tests.scenes import crank_rocker, thesis
 
 SIGNATURES = {"svg": b"<?xml", "png": b"\x89PNG", "pdf": b"%PDF"}
@@ -195,6 +195,36 @@ def test_a_scene_without_velocity_draws_positions_only(tmp_path: Path) -> None:
     assert not (tmp_path / "b.svg").exists()
 
 
+def test_the_position_drawn_of_both_branches_is_one_and_stands_clear_of_their_poles() -> None:
+    alone = view(thesis(FULL_TURN)).here
+    scenes = [on_branch(thesis(FULL_TURN), sign) for sign in (1, -1)]
+    position = common_position(scenes)
+    assert position is not None
+    sweeps = [view(scene).sweep for scene in scenes]
+    both = np.fmin.reduce([quality for s in sweeps for quality in (s.condition, s.drive_condition)])
+    best = min(CLEAR, float(np.nanmax(both)))  # the two poles leave no position clear of both by more than 0.25
+    assert best > 0.2
+    for scene in scenes:
+        here = view(scene, position).here
+        assert min(here.condition[0], here.drive_condition[0]) >= best
+    assert min(alone.condition[0], alone.drive_condition[0]) >= CLEAR
+    # the position of the open branch alone is a pole of the crossed one
+    assert view(scenes[1], float(alone.theta_2[0])).here.drive_condition[0] < CLEAR
+    titles = {axes.get_title(loc="left").split(",")[0] for axes in composed(thesis(FULL_TURN), "linkage", "both").axes}
+    assert len(titles) == 1
+
+
+def test_a_remark_stands_where_the_curve_keeps_away() -> None:
+    share = np.linspace(0.0, 1.0, 361)
+    for mu, low, high in (
+        (90.0 * np.sin(np.pi * share), 0.3, 0.7),
+        (90.0 * share, 0.6, 1.0),
+        (90.0 - 90.0 * share, 0.0, 0.4),
+    ):
+        assert low <= free_place(mu) <= high
+    assert 0.0 < free_place(np.full(361, np.nan)) < 1.0
+
+
 def test_hostile_titles_are_text(tmp_path: Path) -> None:
     title = "$\\frac{ <script>alert(1)</script> & \x1b[31m\u2028 %s {0} " + 300 * "x"
     plot.draw(replace(crank_rocker(), title=title), tmp_path / "a.svg", "linkage")
@@ -323,7 +353,14 @@ def test_matplotlib_is_loaded_only_to_draw_and_its_absence_is_one_line(tmp_path:
 
 @pytest.mark.parametrize(
     ("value", "shown"),
-    [(0.0, "0"), (-1234.6, "−1235"), (0.012345, "0.0123"), (3.09312, "3.09"), (2.5e7, "2.50·10^7")],
+    [
+        (0.0, "0"),
+        (-1234.6, "−1235"),
+        (0.012345, "0.0123"),
+        (3.09312, "3.09"),
+        (2.5e7, "2.50·10⁷"),
+        (-3.12e-14, "−3.12·10⁻¹⁴"),
+    ],
 )
 def test_numbers_have_three_digits(value: float, shown: str) -> None:
     assert number(value) == shown

@@ -55,7 +55,9 @@ const coupler = p => barPoint(p, 3, data.centres[3] ?? [0.5 * lengths[2], 0]);
 // Everything the sweep reaches fits into the picture, so that the scale does not change while it moves.
 function fit() {
   view.width = Math.max(280, picture.parentElement.clientWidth);
-  view.height = Math.round(Math.min(560, Math.max(270, 0.68 * view.width)));
+  const small = view.width < 480;
+  view.height = Math.round(small ? view.width : Math.min(560, 0.68 * view.width));
+  picture.classList.toggle("small", small);
   set(picture, { viewBox: `0 0 ${view.width} ${view.height}` });
   let low = [0, 0], high = [0, 0];
   const curve = [];
@@ -69,7 +71,7 @@ function fit() {
     curve.push([broken ? "M" : "L", g]);
     broken = false;
   }
-  const margin = view.width < 480 ? 40 : 58;
+  const margin = small ? 30 : 58;
   view.k = Math.min((view.width - 2 * margin) / (high[0] - low[0]), (view.height - 2 * margin) / (high[1] - low[1]));
   view.x = 0.5 * view.width - 0.5 * view.k * (low[0] + high[0]);
   view.y = 0.5 * view.height + 0.5 * view.k * (low[1] + high[1]);
@@ -117,6 +119,17 @@ function forceLegend() {
   make(parts.legend, "line", { class: "scale", x1: 14, x2: 14 + long, y1: y, y2: y });
   make(parts.legend, "text", { class: "small", x: 14, y: y - 7 }).textContent =
     `${rounded(round, 1)} N` + (forceScale.cut ? `, arrows over ${rounded(forceScale.top, 2)} N cut (dashed)` : "");
+}
+
+// The length, in pixels, of the greatest force with which no arrow of a position leaves the picture.
+function insideTip(i, s, top) {
+  let length = Infinity;
+  for (const name of FORCES) {
+    const [fx, fy] = table()[name][i], [x, y] = s[FORCE_PIN[name]], edge = 24;   // room for its name
+    if (fx) length = Math.min(length, (fx > 0 ? view.width - edge - x : x - edge) * top / Math.abs(fx));
+    if (fy) length = Math.min(length, (fy > 0 ? y - edge : view.height - edge - y) * top / Math.abs(fy));
+  }
+  return length;
 }
 
 function place(name, point, from, distance) {
@@ -169,8 +182,8 @@ function drawLinkage(p, i) {
   }
   const forces = dynamic() && show("show-forces");
   if (forces && p && byId("arrow-scale").value === "position") {
-    const top = Math.max(...FORCES.map(name => Math.hypot(...table()[name][i])));
-    forceScale = { top, cut: false, pixels: top > 0 ? 0.3 * Math.min(view.width, view.height) / top : 0 };
+    const top = Math.max(...FORCES.map(name => Math.hypot(...table()[name][i]))), room = Math.min(view.width, view.height);
+    forceScale = { top, cut: false, pixels: top > 0 ? Math.max(0.15 * room, Math.min(0.3 * room, insideTip(i, s, top))) / top : 0 };
     if (top > 0) forceLegend(); else parts.legend.replaceChildren();
   }
   for (const name of FORCES) {

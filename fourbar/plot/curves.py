@@ -1,6 +1,7 @@
 """Curves over theta_2 or time: angles and their rates, torque, pin forces, energy, transmission angle."""
 
 import math
+import re
 from itertools import cycle
 from typing import TYPE_CHECKING, Any
 
@@ -37,10 +38,13 @@ ROOM = 1.6
 """A clipped axis ends at this multiple of the ordinary size."""
 RECOMMENDED = 40.0
 """Smallest transmission angle that is usually recommended, deg (R. L. Norton, Design of Machinery)."""
+REMARK = 0.34
+"""Room that a remark takes along an axis, as a part of its length."""
 Indices = NDArray[np.intp]
 WORKS: tuple[tuple[str, Any], ...] = tuple(
     (FORCE_COLOURS[name], FORCE_DASHES[name]) for name in ("F12", "F32", "F43", "F14")
 )
+BINDING = re.compile(r" (?==)|(?<==) |(?<=[\d]) (?=[A-Za-zµ])|(?<=N) (?=m\b)")
 POLE_REASON = {2: "bars 3 and 4 collinear", 3: "ω₃ = 0", 4: "ω₄ = 0"}
 
 
@@ -76,7 +80,8 @@ def _bases(axes: "Axes", view: View) -> Array:
 
 
 def note(view: View, text: str) -> None:
-    """Say it once in the caption."""
+    """Say it once in the caption; a number stays on one line with its name and unit."""
+    text = BINDING.sub("\u00a0", text)
     if text not in view.notes:
         view.notes.append(text)
 
@@ -226,16 +231,13 @@ def draw_transmission(axes: "Axes", view: View) -> None:
     mu = np.degrees(np.arctan2(np.abs(sweep.sin_mu), np.abs(np.cos(sweep.theta_4 - sweep.theta_3))))
     axes.plot(over, mu, color=INK)
     axes.axhline(RECOMMENDED, color=MUTED, lw=0.9, ls=(0, (4, 2)))
-    # at the end that the curve keeps away from
-    away = [np.nanmin(np.abs(part - RECOMMENDED)) if np.isfinite(part).any() else 90.0 for part in _ends(mu)]
-    right = away[1] >= away[0]
+    place = free_place(mu)
     axes.annotate(
         f"{RECOMMENDED:g}° recommended",
-        (1.0 if right else 0.0, RECOMMENDED),
-        xycoords=("axes fraction", "data"),
-        xytext=(-2 if right else 2, 2),
+        (over[0] + place * (over[-1] - over[0]), RECOMMENDED),
+        xytext=(0, 2),
         textcoords="offset points",
-        ha="right" if right else "left",
+        ha="center",
         size=7.0,
         color=MUTED,
     )
@@ -251,10 +253,16 @@ def draw_transmission(axes: "Axes", view: View) -> None:
         legend_above(axes, 2)
 
 
-def _ends(values: Array) -> tuple[Array, Array]:
-    """The first and the last fifth of a curve: as long as a remark beside its axis."""
-    fifth = max(1, len(values) // 5)
-    return values[:fifth], values[-fifth:]
+def free_place(mu: Array) -> float:
+    """Where along the axis the curve keeps furthest from a remark at 40 deg, as a part of its length."""
+    half = REMARK / 2.0
+    best, room = 1.0 - half, -1.0
+    for place in np.linspace(1.0 - half, half, 25):
+        part = mu[int((place - half) * len(mu)) : max(1, math.ceil((place + half) * len(mu)))]
+        away = np.abs(part[np.isfinite(part)] - RECOMMENDED - 3.0)  # the remark stands on the line
+        if away.size and away.min() > room:
+            best, room = float(place), float(away.min())
+    return best
 
 
 def draw_energy(axes: "Axes", view: View) -> None:

@@ -11,7 +11,7 @@ from fourbar.errors import InputError
 from fourbar.plot import curves, freebody, hodograph, linkage
 from fourbar.plot.labels import Labels
 from fourbar.plot.style import FORCE_COLOURS, MUTED, matplotlib_style, plain, save
-from fourbar.plot.view import View, on_branch, over_time, view
+from fourbar.plot.view import View, common_position, on_branch, over_time, view
 from fourbar.scene import Scene
 
 if TYPE_CHECKING:
@@ -162,6 +162,8 @@ def compose(
     from matplotlib.figure import Figure
 
     scenes = [on_branch(scene, sign) for sign in (1, -1)] if branches == "both" else [scene]
+    if position is None and len(scenes) > 1:
+        position = common_position(scenes)
     views = [view(each, position) for each in scenes]
     for shown in views:
         shown.beside = [other for other in views if other is not shown]
@@ -183,7 +185,7 @@ def compose(
             x=0.012,
             ha="left",
         )
-        wide = int(size[0] * 20)
+        wide = int(size[0] * 18.5)
         caption = textwrap.fill(" ".join(shown.notes), wide)
         if caption:
             part.supxlabel(caption, size=6.8, color=MUTED, x=0.012, ha="left", parse_math=False, linespacing=1.35)

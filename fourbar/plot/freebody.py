@@ -149,10 +149,11 @@ def _draw_one(
             Label(axes, f"${name[0]}_{name[1]}$" if len(name) == 2 else f"${name}$", (x, y), middle, MUTED, 8.0, 2.5)
         )
     arrows, couples = body
+    short: list[str] = []
     for arrow in arrows:
         size = math.hypot(*arrow.force)
         if size < SHOWN * biggest:
-            note(view, f"Too short to draw on bar {bar}: {_words(arrow.text)} = {number(size)} N.")
+            short.append(f"{_words(arrow.text)} = {number(size)} N")
             continue
         tip = (arrow.at[0] + scale * arrow.force[0], arrow.at[1] + scale * arrow.force[1])
         axes.annotate(
@@ -174,6 +175,8 @@ def _draw_one(
         factor, unit = unit_for(size, "N")
         labels.keep_off(axes, arrow.at, tip)
         labels.add(Label(axes, f"{arrow.text} = {number(factor * size)} {unit}", tip, arrow.at, arrow.colour, 7.5))
+    if short:
+        note(view, f"Too short to draw on bar {bar}: {', '.join(short)}.")
     centre = state.linkage.bar(bar)
     if centre.mass > 0.0:
         x, y = (float(v[0]) for v in state.arm(bar, *centre_in_bar(centre)))

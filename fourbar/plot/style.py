@@ -137,6 +137,9 @@ def largest(*values: Array) -> float:
     return float(flat.max()) if flat.size else 0.0
 
 
+RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
 def number(value: float) -> str:
     """Three significant digits, never in exponent form where four digits do."""
     if value == 0.0:
@@ -146,7 +149,7 @@ def number(value: float) -> str:
         text = f"{value:.{max(0, 2 - size)}f}"
         return text.replace("-", "−")
     mantissa, exponent = f"{value:.2e}".split("e")
-    return f"{mantissa}·10^{int(exponent)}".replace("-", "−")
+    return f"{mantissa}·10".replace("-", "−") + str(int(exponent)).translate(RAISED)
 
 
 def degree_ticks(axis: Any, span: float) -> None:

@@ -12,8 +12,10 @@ from fourbar.motion import FromLimit
 from fourbar.scene import Command, Scene, command, solve
 from fourbar.solution import Solution
 
+CLEAR = 0.3
+"""Motion and drive condition of the position drawn, where any has them: beside a pole forces dwarf all others."""
 LEAD = math.radians(60.0)
-"""The position drawn where none is named: this far into the first stretch that assembles (or half of a shorter one)."""
+"""The position drawn where none is named: this far into the longest stretch that assembles (or half of a shorter one)."""
 
 
 @dataclass(slots=True)
@@ -124,6 +126,15 @@ def sweep_command(scene: Scene) -> Command:
     return wide._replace(theta_2=theta_2, branch=np.concatenate([wide.branch, own.branch])[first])
 
 
+def common_position(scenes: "list[Scene]") -> float | None:
+    """A position that shows each of several scenes over the same theta_2; None where each has its own."""
+    if any(over_time(scene) for scene in scenes) or len(command(scenes[0]).theta_2) == 1:
+        return None
+    sweeps = [solve(scene, at=sweep_command(scene)) for scene in scenes]
+    sweeps = [sweep for sweep in sweeps if sweep.assembled.any()]
+    return representative(sweeps) if sweeps else None
+
+
 def on_branch(scene: Scene, branch: int) -> Scene:
     """The same scene on the given branch."""
     return replace(scene, motion=replace(scene.motion, branch=branch))
@@ -135,7 +146,7 @@ def view(scene: Scene, position: float | None = None) -> View:
     Parameters
     ----------
     position : theta_2 drawn to scale, rad; left out: the scene's own where it names one (the start of
-        a motion through time), else 60 deg into the first stretch that assembles.
+        a motion through time), else 60 deg into the longest stretch that assembles, clear of poles.
 
     Raises
     ------
@@ -148,7 +159,7 @@ def view(scene: Scene, position: float | None = None) -> View:
     _something(sweep)
     own = command(scene)
     if position is None:
-        position = float(own.theta_2[0]) if len(own.theta_2) == 1 else _representative(sweep)
+        position = float(own.theta_2[0]) if len(own.theta_2) == 1 else representative([sweep])
     branch = np.array([where.branch[np.argmin(np.abs(where.theta_2 - position))]], dtype=np.int8)
     here = solve(scene, at=Command(np.array([position]), branch, own.omega_2, own.alpha_2))
     if not here.assembled[0]:
@@ -188,12 +199,16 @@ def _through_time(scene: Scene, position: float | None) -> View:
     return shown
 
 
-def _representative(sweep: Solution) -> float:
-    """A position that shows the bars apart from each other."""
-    first = int(np.argmax(sweep.assembled))
-    gap = np.flatnonzero(~sweep.assembled[first:])
-    last = first + int(gap[0]) - 1 if gap.size else len(sweep) - 1
-    start, stop = sweep.theta_2[first], sweep.theta_2[last]
-    target = start + min(LEAD, 0.5 * (stop - start))
-    run = sweep.theta_2[first : last + 1]
-    return float(run[np.argmin(np.abs(run - target))])
+def representative(sweeps: "list[Solution]") -> float:
+    """A position that shows the bars apart from each other, the same for all sweeps; well conditioned where one is."""
+    ends = np.flatnonzero(np.diff(np.concatenate([[False], sweeps[0].assembled, [False]]).astype(int))).reshape(-1, 2)
+    run = slice(*ends[int(np.argmax(ends[:, 1] - ends[:, 0]))])
+    theta_2 = sweeps[0].theta_2[run]
+    quality = np.full(len(theta_2), np.inf)
+    for sweep in sweeps:
+        for condition in (sweep.condition, sweep.drive_condition):
+            if condition is not None:
+                quality = np.minimum(quality, np.nan_to_num(condition[run]))
+    good = quality >= min(CLEAR, float(quality.max()))
+    target = theta_2[0] + min(LEAD, 0.5 * (theta_2[-1] - theta_2[0]))
+    return float(theta_2[good][np.argmin(np.abs(theta_2[good] - target))])

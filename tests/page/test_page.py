@@ -287,6 +287,20 @@ def test_arrows_point_along_the_forces_to_the_scale_of_the_legend(browse, scalin
         np.testing.assert_allclose(drawn, getattr(s, name)[50] * bar / newtons, atol=PIXEL)
 
 
+@pytest.mark.parametrize("width", (360, 1100))
+def test_no_arrow_that_fits_the_position_leaves_the_picture(browse, width: int) -> None:
+    driver = browse(animate.page(thesis()), width)
+    script = """const choice = document.getElementById("arrow-scale"); choice.value = "position";
+        choice.dispatchEvent(new Event("change"));
+        const least = []; for (let i = 0; i < grid.length; i += 7) { go(i);
+          for (const e of document.querySelectorAll("#arrows .head")) { if (e.style.display === "none") continue;
+            const [x, y] = e.getAttribute("d").slice(1).split("L")[0].split(" ").map(Number);
+            least.push(Math.min(x, y, view.width - x, view.height - y)); } }
+        return least;"""
+    room = driver.execute_script(script)
+    assert len(room) > 100 and min(room) > 0.0
+
+
 def test_keyboard_drives_it(browse) -> None:
     from selenium.webdriver.common.action_chains import ActionChains
     from selenium.webdriver.common.keys import Keys
