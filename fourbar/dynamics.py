@@ -98,8 +98,11 @@ class Half(NamedTuple):
 
 def half_angle(shape: Triangle, theta_1: float, q: Number) -> Half:
     """In doubles: beside a limit position the factors keep the digits that q has of its distance."""
-    h = 0.5 * (q - theta_1)
-    s, k = np.sin(h), np.cos(h)
+    psi = q - theta_1
+    taken = q - psi
+    lost = 0.5 * ((q - (psi + taken)) + (taken - theta_1))  # many turns away the rounding of psi is more than that of h
+    sine, cosine = np.sin(0.5 * psi), np.cos(0.5 * psi)
+    s, k = sine + lost * cosine, cosine - lost * sine
     four_ad = 4.0 * shape.a * shape.d
     return Half(s, k, shape.E1 + four_ad * (k * k), shape.E2 + four_ad * (s * s))
 
@@ -127,10 +130,12 @@ def trace(
     s_S, S, dS = _leg(E2, ad, s, k, inner, follow)
     root = sign * (s_C * s_S)
     excess = (b - c) * (b + c)
-    spin = np.exp(0.5j * (q + theta_1))
+    spin = np.exp(0.5j * q) * np.exp(0.5j * theta_1)
     diagonal = (d - a) * np.exp(1j * theta_1) - 2j * a * s * spin
     u_3 = diagonal * ((e2 + excess) + 1j * root) / (2.0 * b * e2)
     u_4 = -diagonal * ((e2 - excess) - 1j * root) / (2.0 * c * e2)
+    # the rounding of unequal lengths turns a short bar, and must not stretch it
+    u_3, u_4 = u_3 / np.abs(u_3), u_4 / np.abs(u_4)
     share = excess / e2 if excess else 0.0
     sin_q = 2.0 * s * k
     phi_1 = (a * (a - d) + 2.0 * ad * (s * s)) / e2

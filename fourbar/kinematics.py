@@ -226,8 +226,9 @@ def close_loop(
         x, y = c1 * x - s1 * y, s1 * x + c1 * y
         u2 = unit_vector(theta_2)  # not u2 turned by theta_1: a small component keeps its digits
     squared = diagonal.squared
-    excess = (b - c) * (b + c)
-    at_A, at_O4 = squared + excess, squared - excess
+    # e^2 + b^2 - c^2 and e^2 - b^2 + c^2 by Heron's factor, from which the root is too: u3 and u4 keep their length
+    inner, more = diagonal.inner, 2.0 * (b - c)
+    at_A, at_O4 = inner + b * more, inner - c * more
     with np.errstate(divide="ignore", invalid="ignore"):  # e = 0: A on O4, where beta is free
         to_3 = (0.5 / b) / squared
         to_4 = to_3 * -(b / c)
@@ -263,6 +264,8 @@ def close_loop(
         singular=singular,
     )
     _parallel(state, u1)
+    if linkage.ground == linkage.input.length and linkage.coupler.length == linkage.output.length:
+        _put_A_on_O4(state, u1)
     return state
 
 
@@ -271,6 +274,16 @@ def unit_vector(angle: Any) -> tuple[Any, Any]:
     t = np.tan(0.5 * angle)
     w = 1.0 / (1.0 + t * t)
     return ((1.0 - t * t) * w, (2.0 * t) * w)
+
+
+def _put_A_on_O4(state: State, u1: tuple[Any, Any]) -> None:
+    """Bars 3 and 4 of a kite lie on each other and turn freely where A meets O4: put where theta_2 falls to that."""
+    if not isinstance(state.diagonal.squared, np.ndarray):
+        return  # singular, and so none of the second pass
+    met = np.flatnonzero(state.assembled & (state.diagonal.squared == 0.0))
+    for u in (state.u3, state.u4):
+        for i in (0, 1):
+            u[i][met] = state.branch[met] * u1[i]
 
 
 def _parallel(state: State, u1: tuple[Any, Any]) -> None:

@@ -30,6 +30,8 @@ UNDECIDED = 32.0 * U
 TOUCHING = U
 """Bars that miss each other by up to this times the sum of the lengths count as touching: each length
 was itself rounded by up to U, so the linkage meant closes there as well as not."""
+MANY_TURNS = 8.0
+"""rad. Beyond, what the rounding of theta_2 - theta_1 takes away is put back: it is more than that of a turn."""
 NONE = np.empty(0, dtype=np.intp)
 
 
@@ -46,6 +48,8 @@ class Diagonal:
     """Components from A to O4 in the ground's frame."""
     squared: Array
     """e^2."""
+    inner: Array
+    """e^2 - (b - c)^2."""
     root: Array
     """sqrt(outer inner), four times the area of the triangle A, B, O4; NaN where it does not close."""
     w: Array
@@ -127,7 +131,7 @@ def diagonal_to_O4(
             outer = np.where(assembled, outer, np.nan)
     outer *= inner
     root = np.sqrt(outer, outer)
-    return Diagonal(unit, lengths, x, y, squared, root, w, v, h, assembled, decided, offset, least_root)
+    return Diagonal(unit, lengths, x, y, squared, inner, root, w, v, h, assembled, decided, offset, least_root)
 
 
 def _least_root(constant_1: float, constant_2: float, product: float) -> float:
@@ -144,9 +148,10 @@ def in_double_double(linkage: FourBar, theta_2: Array) -> Diagonal:
     unit = unit_of(linkage)
     d, a, b, c = (in_precision_of(theta_2, length) for length in scaled(linkage, unit))
     x, y, squared, (w, v, h), (constant_1, constant_2, product) = _triangle(linkage, (d, a, b, c), theta_2)
-    root = np.sqrt((constant_1 + product * w) * (constant_2 + product * v))
+    inner = constant_2 + product * v
+    root = np.sqrt((constant_1 + product * w) * inner)
     assembled = np.ones(theta_2.shape, dtype=bool)
-    return Diagonal(unit, (d, a, b, c), x, y, squared, root, w, v, h, assembled, NONE, None)
+    return Diagonal(unit, (d, a, b, c), x, y, squared, inner, root, w, v, h, assembled, NONE, None)
 
 
 def _triangle(
@@ -159,8 +164,12 @@ def _triangle(
     if theta_1 != 0.0:
         psi = theta_2 - theta_1
         if growths is not None:  # psi is rounded at its own size, however near to a whole turn it is
-            psi = psi + next(growths) * psi
+            psi = psi + next(growths) * np.clip(psi, -MANY_TURNS, MANY_TURNS)
     t = np.tan(0.5 * psi)
+    if psi is not theta_2 and isinstance(psi, np.ndarray) and np.abs(psi).max() > MANY_TURNS:
+        taken = theta_2 - psi
+        rounded_away = (theta_2 - (psi + taken)) + (taken - theta_1)  # Knuth's sum: psi + this is exact
+        t = t + (0.5 + 0.5 * (t * t)) * rounded_away
     if growths is not None:
         t = t + next(growths) * t
     v = t * t

@@ -10,6 +10,7 @@ from fourbar.bearing import PIN_FORCE
 from fourbar.effects import Wrenches
 from fourbar.kinematics import add_accelerations, add_velocities, close_loop
 from fourbar.linkage import MOVING_BARS
+from fourbar.more_digits import needing_more_digits, restated, rounded
 from fourbar.scene import Command, Scene
 from fourbar.solution import OK, Solution
 from validation.answer import Answer
@@ -38,7 +39,12 @@ def _sums(name: str, scene: Scene, at: Command, solution: Solution) -> list[Row]
     state = close_loop(scene.linkage, at.theta_2, at.branch)
     add_velocities(state, at.omega_2)
     add_accelerations(state, at.alpha_2)
-    # what acts at the speeds that were answered, not at another evaluation of them
+    # what acts in the directions and at the speeds that were answered, not at another evaluation of them
+    hard = needing_more_digits(state)
+    finer, *_ = restated(state, at.omega_2, at.alpha_2, hard)
+    for number in MOVING_BARS:
+        for component, digits in zip(state.unit(number), finer.unit(number), strict=True):
+            component[hard] = rounded(digits)
     state.omega_3, state.omega_4 = solution.omega_3, solution.omega_4
     acting = Wrenches(state)
     for term in (*scene.loads, *scene.effects):

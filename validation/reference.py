@@ -110,7 +110,7 @@ def outputs(scene: Scene, branch: int, x: Values, drive_bar: int) -> Values | No
     # b i w3 omega_3 - c i w4 omega_4 = -a i w2 omega_2, and the same differentiated once more
     rows = [[-b * w[3][1], c * w[4][1]], [b * w[3][0], -c * w[4][0]]]
     omega = {2: x["omega_2"]}
-    if y["sin_mu"] == 0:
+    if not y["condition"] > 0:  # singular; NaN where A lies on O4, about which bars 3 and 4 then turn freely
         return y
     zero = (arb(0), arb(0))
     slip, jerk = x.get("slip", zero), x.get("jerk", zero)  # what a probe opens the loop by, m/s and m/s^2

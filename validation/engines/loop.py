@@ -166,7 +166,7 @@ def newton(tree: Tree, q: tuple[float, float, float], branch: int, closed: float
                 tree.place(q)
                 return q if size <= closed else None
         q, here = trial, there
-    return None
+    return q if math.hypot(here[0], here[1]) <= closed else None
 
 
 def answer_exactly(engine: str, build: Callable[[Scene], Tree], scene: Scene, command: Command) -> Answer:

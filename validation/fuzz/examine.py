@@ -99,4 +99,5 @@ def _back(scene: Scene, at: Command, solution: Solution) -> list[str]:
 def _torque_slack(scene: Scene, at: Command, coefficient: object) -> np.ndarray:
     """What the rounding of the data may do to J alpha through the torque."""
     predicted = from_data(scene, at, ("torque",))["torque"]
-    return np.asarray(np.nan_to_num(np.abs(coefficient) * predicted, nan=0.0, posinf=np.inf))  # type: ignore[call-overload]
+    with np.errstate(invalid="ignore"):  # a torque that has no bound on a bar that does not move
+        return np.asarray(np.nan_to_num(np.abs(coefficient) * predicted, nan=0.0, posinf=np.inf))  # type: ignore[call-overload]

@@ -6,6 +6,8 @@ the first-order change of a result y, at this very position and for this very qu
 stored input x_i (lengths, angles, masses, loads, the command) moves in its last digit, and when the
 loop opens with the speed and the acceleration, and the bars get the couples, that rounding leaves in
 an engine whose lever arms are differences of coordinates as long as `reach` (z_j, one rounding of them).
+Where the first order of a torque vanishes, the product of two first orders is what remains: the error of a
+force times that of its lever arm.
 
 It replaces K eps/condition where no power of a sine is the right law: beside change points, where a
 torque cancels, and for forces beside a toggle, which a law in s^2 would excuse too much.
@@ -26,6 +28,7 @@ from validation.tolerance import EPS, Array
 ROUNDINGS = 8.0
 """R: a chain of some fifty roundings moves a result by sqrt(50) = 7 last digits, as a random walk."""
 
+PIN_FORCES = ("F12", "F32", "F43", "F14")
 FIRST_ORDER = 0.1
 """Where the angles are uncertain by this part of the sine that everything divides by, first order predicts nothing:
 speeds and forces may come out as anything, the torque too, whose own first order can cancel."""
@@ -42,18 +45,24 @@ def in_world_axes(scene: Scene, at: Command, quantities: Iterable[str]) -> dict[
 
 
 def about_mass_centre(scene: Scene, at: Command, quantities: Iterable[str]) -> dict[str, Array]:
-    """For an engine whose lever arms start at the mass centre of a tree of bodies, as MuJoCo's do."""
+    """For an engine that moves a tree of bodies about the mass centre of all of them, as MuJoCo does.
+
+    Every bar is accelerated with the first of its tree and back again by its own joint.
+    """
     furthest = max(abs(scene.linkage.bar(number).centre[0]) for number in MOVING_BARS)  # type: ignore[index]
-    return predicted_error(scene, at, quantities, _extent(scene) + furthest)
+    return predicted_error(scene, at, quantities, _extent(scene) + furthest, carried=True)
 
 
 def _extent(scene: Scene) -> float:
     return math.fsum(scene.linkage.lengths)
 
 
-def predicted_error(scene: Scene, at: Command, quantities: Iterable[str], reach: float) -> dict[str, Array]:
+def predicted_error(
+    scene: Scene, at: Command, quantities: Iterable[str], reach: float, *, carried: bool = False
+) -> dict[str, Array]:
     """Absolute error predicted for each quantity at each position, (n,).
 
+    With `carried` the accelerations of the bars are differences of others as large as the fastest bar's at `reach`.
     NaN where the loop does not close; infinite at a singular position, where the equations have no answer.
     """
     n = len(at.theta_2)
@@ -69,12 +78,11 @@ def predicted_error(scene: Scene, at: Command, quantities: Iterable[str], reach:
             if lost and not name.startswith("theta"):
                 errors[i] = math.inf
                 continue
-            axes = ("_x", "_y") if name in VECTORS else ("",)
-            parts = [
-                ROUNDINGS * moved.data.get(name + axis, math.inf) + reach * moved.loop.get(name + axis, 0.0)
-                for axis in axes
-            ]
-            errors[i] = EPS * math.hypot(*parts)
+            errors[i] = moved.first_order(name, reach, carried=carried)
+            if name == "torque":
+                turned = max(moved.first_order(f"theta_{bar}", reach) for bar in (3, 4))
+                pulled = max(moved.first_order(force, reach, carried=carried) for force in PIN_FORCES)
+                errors[i] += pulled * turned * _extent(scene)
     return result
 
 
@@ -86,6 +94,16 @@ class Sensitivity(NamedTuple):
     loop: dict[str, float]
     """By a loop that opens at its fastest bar's speed and acceleration times 1 m, and by couples on the bars of the
     strongest pin force times 1 m."""
+    carried: dict[str, float]
+    """By couples on the bars of the heaviest bar's inertial force at 1 m of the fastest bar, times 1 m."""
+
+    def first_order(self, name: str, reach: float, *, carried: bool = False) -> float:
+        """The error predicted for an output, vectors by their norm; infinite where it has none."""
+        parts = []
+        for axis in ("_x", "_y") if name in VECTORS else ("",):
+            part = ROUNDINGS * self.data.get(name + axis, math.inf) + reach * self.loop.get(name + axis, 0.0)
+            parts.append(part + reach * reach * self.carried.get(name + axis, 0.0) if carried else part)
+        return EPS * math.hypot(*parts)
 
 
 @lru_cache(maxsize=8192)
@@ -124,6 +142,7 @@ def _sensitivity(scene: Scene, theta_2: float, branch: int, omega_2: float, alph
         add(data, [{name: exact[name] + side * weight * step} for side in (1, -1)])
     data["condition"] = float(base["condition"].mid())
     loop: dict[str, float] = {}
+    carried: dict[str, float] = {}
     if "omega_3" in base:
         fastest = max(abs(base[f"omega_{bar}"]) for bar in MOVING_BARS)
         hardest = max(abs(base[f"alpha_{bar}"]) for bar in MOVING_BARS) + fastest * fastest
@@ -131,10 +150,12 @@ def _sensitivity(scene: Scene, theta_2: float, branch: int, omega_2: float, alph
             for x, y in ((most * step, arb(0)), (arb(0), most * step)):
                 add(loop, [{name: (x, y)}])
     if "torque" in base:
-        strongest = max(abs(base[name + axis]) for name in ("F12", "F32", "F43", "F14") for axis in ("_x", "_y"))
+        strongest = max(abs(base[name + axis]) for name in PIN_FORCES for axis in ("_x", "_y"))
+        heaviest = max(scene.linkage.bar(bar).mass for bar in MOVING_BARS)
         for bar in MOVING_BARS:
             add(loop, [{f"couple_{bar}": strongest * step}])
-    return Sensitivity(data, loop)
+            add(carried, [{f"couple_{bar}": heaviest * hardest * step}])
+    return Sensitivity(data, loop, carried)
 
 
 def _weights(stored: dict[str, float]) -> dict[str, float]:

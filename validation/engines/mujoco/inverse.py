@@ -70,9 +70,10 @@ class MujocoTree:
             body.add_site(name=f"end{number}", pos=[part.length, 0.0, 0.0])
             bodies[number] = body
         self.model = model = spec.compile()
-        # a centre or site nearer than 1e-6 m is taken for the body's origin, silently; these flags are why
+        # a centre or site nearer than 1e-6 m is taken for the body's origin, silently; these marks are why
         model.body_sameframe[:] = mujoco.mjtSameFrame.mjSAMEFRAME_NONE
         model.site_sameframe[:] = mujoco.mjtSameFrame.mjSAMEFRAME_NONE
+        model.body_simple[:] = model.dof_simplenum[:] = 0
         self.data = mujoco.MjData(model)
         self.body = {n: model.body(f"bar{n}").id for n in MOVING_BARS}
         self.dof = [int(model.joint(FIRST_PIN[n]).dofadr[0]) for n in MOVING_BARS]
