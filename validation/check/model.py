@@ -19,7 +19,8 @@ from validation.check.differences import Difference, differences
 from validation.check.screen import read_mjcf
 from validation.compare import COMPARED, compare
 from validation.plain import plain
-from validation.report.markdown import cell, number
+from validation.report.markdown import cell
+from validation.report.templating import number
 from validation.results import FAILS, Row, write_results
 from validation.suite.memory import WORKER_MEMORY, bound_memory
 from validation.tolerance import SIMULATED

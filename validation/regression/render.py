@@ -1,7 +1,8 @@
 """Differences as text, Markdown, HTML and JUnit XML."""
 
 from validation.regression.changes import Change, Differences, Kind
-from validation.report.markdown import cell, number
+from validation.report.markdown import cell
+from validation.report.templating import environment, number
 
 TOLD = tuple(kind for kind in Kind if kind not in (Kind.SAME, Kind.ROUND_OFF))
 AT_MOST = 50
@@ -61,18 +62,8 @@ def markdown(found: Differences) -> str:
 
 def html(found: Differences) -> str:
     """A page of its own."""
-    from jinja2 import Environment, PackageLoader, StrictUndefined
-
-    environment = Environment(
-        loader=PackageLoader("validation.regression"),
-        undefined=StrictUndefined,
-        autoescape=True,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    environment.filters["number"] = number
     kinds = [(kind, found.of(kind)) for kind in TOLD if found.of(kind)]
-    template = environment.get_template("changes.html.j2")
+    template = environment("validation.regression", escape=True).get_template("changes.html.j2")
     return template.render(found=found, verdict=verdict(found), kinds=kinds)
 
 

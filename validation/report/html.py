@@ -11,8 +11,8 @@ from typing import Any, NamedTuple
 from validation.page import Page
 from validation.report.colours import by_variable, declarations, style_of
 from validation.report.costs import cost_figure
-from validation.report.markdown import number
 from validation.report.summary import STATEMENT, Summary, used
+from validation.report.templating import environment
 from validation.results import FAILS, REFUSES, Row, sorted_rows, to_csv
 
 ALL_OPEN = 8
@@ -107,27 +107,18 @@ def html(
     no_pictures : why there are none.
     sections : further parts, for example of the hard cases.
     """
-    from jinja2 import Environment, PackageLoader, StrictUndefined
     from markupsafe import Markup
 
-    environment = Environment(
-        loader=PackageLoader("validation.report"),
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        autoescape=True,
-    )
-    environment.filters["number"] = number
-    environment.filters["degrees"] = lambda radians: "-" if math.isnan(radians) else f"{math.degrees(radians):.3f}"
-    environment.filters["share"] = share
-    environment.filters["packed"] = lambda text: base64.b64encode(gzip.compress(text.encode("utf-8"), mtime=0)).decode()
-    environment.filters["colour"] = lambda engine: by_variable(style_of(engine).colour)
-    environment.filters["symbol"] = lambda engine: style_of(engine).symbol
+    templates = environment("validation.report", escape=True)
+    templates.filters["share"] = share
+    templates.filters["packed"] = lambda text: base64.b64encode(gzip.compress(text.encode("utf-8"), mtime=0)).decode()
+    templates.filters["colour"] = lambda engine: by_variable(style_of(engine).colour)
+    templates.filters["symbol"] = lambda engine: style_of(engine).symbol
     views = [_view(page, first_lines.get(page.name, 2), pictures or {}) for page in summary.pages]
     csv = base64.b64encode(to_csv(cell.row for view in views for cell in view.cells).encode("utf-8"))
     failing = sorted((cell for view in views for cell in view.cells if not cell.row.passed), key=lambda c: c.line)
     costs = cost_figure(summary.pages)
-    return environment.get_template("report.html.j2").render(
+    return templates.get_template("report.html.j2").render(
         s=summary,
         views=views,
         engines=[engine for engine in _engines(cell.row for view in views for cell in view.cells)],

@@ -1,32 +1,15 @@
 """report.md: short enough for a comment on a pull request."""
 
-import math
-
 from validation.report.summary import STATEMENT, Summary, used
+from validation.report.templating import environment
 
 
 def markdown(summary: Summary) -> str:
     """The report as Markdown."""
-    from jinja2 import Environment, PackageLoader, StrictUndefined
-
-    environment = Environment(
-        loader=PackageLoader("validation.report"),
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-        autoescape=False,  # the text is Markdown; `cell` escapes what would break out of it
-    )
-    environment.filters["cell"] = cell
-    environment.filters["number"] = number
-    environment.filters["degrees"] = lambda radians: f"{math.degrees(radians):.3f}"
-    template = environment.get_template("report.md.j2")
+    templates = environment("validation.report", escape=False)  # Markdown: `cell` escapes what would break out
+    templates.filters["cell"] = cell
+    template = templates.get_template("report.md.j2")
     return template.render(s=summary, statement=STATEMENT, used=used)
-
-
-def number(value: float) -> str:
-    """Three significant digits; a dash where there is no number."""
-    return "-" if math.isnan(value) else f"{value:.2e}"
 
 
 def cell(text: object) -> str:

@@ -5,8 +5,8 @@ from itertools import groupby
 from pathlib import Path
 
 from fourbar.exits import printable
-from validation.report.markdown import number
 from validation.report.summary import Summary
+from validation.report.templating import number
 
 
 def table(summary: Summary, out: Path) -> None:
