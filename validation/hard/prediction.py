@@ -151,6 +151,7 @@ def _sensitivity(scene: Scene, theta_2: float, branch: int, omega_2: float, alph
                 add(loop, [{name: (x, y)}])
     if "torque" in base:
         strongest = max(abs(base[name + axis]) for name in PIN_FORCES for axis in ("_x", "_y"))
+        strongest += abs(base["torque"]) / _extent(scene)  # the couple on a bar is rounded too
         heaviest = max(scene.linkage.bar(bar).mass for bar in MOVING_BARS)
         for bar in MOVING_BARS:
             add(loop, [{f"couple_{bar}": strongest * step}])

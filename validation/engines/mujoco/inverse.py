@@ -1,6 +1,7 @@
 """MuJoCo's inverse dynamics on the open tree, constraints off; the loop is closed by multipliers."""
 
 import math
+import warnings
 from collections.abc import Sequence
 from typing import Any
 
@@ -69,7 +70,10 @@ class MujocoTree:
             body.add_site(name=f"G{number}", pos=centre)
             body.add_site(name=f"end{number}", pos=[part.length, 0.0, 0.0])
             bodies[number] = body
-        self.model = model = spec.compile()
+        with warnings.catch_warnings():
+            # of the mass matrix at q = 0, which inverse dynamics never divides by
+            warnings.filterwarnings("ignore", "Inertia matrix is too close to singular")
+            self.model = model = spec.compile()
         # a centre or site nearer than 1e-6 m is taken for the body's origin, silently; these marks are why
         model.body_sameframe[:] = mujoco.mjtSameFrame.mjSAMEFRAME_NONE
         model.site_sameframe[:] = mujoco.mjtSameFrame.mjSAMEFRAME_NONE
