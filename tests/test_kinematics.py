@@ -138,7 +138,7 @@ STEP = 1e-4
 BY_DIFFERENCES = 1e-5
 
 
-@pytest.mark.parametrize("alpha", [0.0, -7.0])
+@pytest.mark.parametrize("alpha", [0.0, 1.0, -7.0])
 @pytest.mark.parametrize("theta_1", [0.0, 0.4])
 @pytest.mark.parametrize("point", [(0.05, -0.02), (0.07, 0.0), (0.0, 1.0)])
 def test_points_move_as_their_positions_do(point: tuple[float, float], theta_1: float, alpha: float) -> None:
@@ -226,6 +226,10 @@ def test_singular_positions_have_no_speed_and_their_neighbours_keep_theirs() -> 
     add_accelerations(state, 5.0)
     assert np.isnan(state.omega(3)).tolist() == [True, False, True]  # type: ignore[arg-type]
     assert (state.omega(4)[1], state.alpha(4)[1], state.alpha(3)[1]) == (2.0, 5.0, 0.0)  # type: ignore[index]
+    still = close_loop(link, theta_2, 1)
+    add_velocities(still, 2.0)
+    add_accelerations(still, 0.0)
+    assert np.isnan(still.alpha(3)).tolist() == np.isnan(still.alpha(4)).tolist() == [True, False, True]  # type: ignore[arg-type]
     crank = close_loop(linkage(), ANGLES, 1)
     assert crank.regular_sine() is crank.sin_mu and not crank.singular.any()
 
@@ -284,3 +288,28 @@ def test_pairs_that_stay_parallel_keep_the_directions_of_ground_and_input(
         assert np.array_equal(state.alpha(bar), np.full(3, expected[2][k]))
     # between the bars: the angle of input and ground
     assert np.abs(state.sin_mu) == pytest.approx(np.abs(np.sin(theta_2 - 0.4)), rel=8 * EPS, abs=2 * EPS)
+
+
+@pytest.mark.parametrize("alpha", [0.0, 5.0])
+def test_what_has_room_is_written_there(alpha: float) -> None:
+    plain, placed = close_loop(linkage(), ANGLES, 1), close_loop(linkage(), ANGLES, 1)
+    room = {name: np.empty(41) for name in ("omega_3", "omega_4", "alpha_3", "alpha_4")}
+    add_velocities(plain, 2.0)
+    add_accelerations(plain, alpha)
+    add_velocities(placed, 2.0, room)
+    add_accelerations(placed, alpha, room)
+    for name, array in room.items():
+        assert getattr(placed, name) is array and np.array_equal(array, getattr(plain, name))
+    into = np.empty(41)
+    assert plain.angle(3, into) is into and np.array_equal(into, placed.angle(3))
+
+
+def test_a_kite_whose_A_lies_on_O4_has_no_speed_there_and_no_warning() -> None:
+    """a = d, b = c: at theta_2 = theta_1 bars 3 and 4 lie on each other and turn freely."""
+    link = fourbar.uniform(0.3, 0.3, 0.2, 0.2)
+    for branch in (1, -1):
+        state = close_loop(link, np.array([0.0, 0.5]), branch)
+        add_velocities(state, 2.0)
+        add_accelerations(state, 3.0)
+        for value in (state.omega(3), state.omega(4), state.alpha(3), state.alpha(4)):
+            assert np.isfinite(value).tolist() == [False, True]  # type: ignore[arg-type]

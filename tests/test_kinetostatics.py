@@ -161,6 +161,24 @@ def test_every_term_grows_with_its_share() -> None:
         assert np.allclose(getattr(grown, name), 1.001 * np.array(getattr(plain, name)), rtol=1e-13, atol=0.0)
 
 
+@pytest.mark.parametrize("drive_bar", [2, 3, 4])
+def test_forces_with_room_are_written_there(drive_bar: int) -> None:
+    case = scene(drive_bar)
+    state = fourbar.kinematics.close_loop(case.linkage, np.linspace(0.1, 6.0, 5), 1)
+    fourbar.kinematics.add_velocities(state, -8.0)
+    fourbar.kinematics.add_accelerations(state, 20.0)
+    terms = (*case.loads, *case.effects)
+    room = {name: (np.empty(5), np.empty(5)) for name in ("F12", "F32", "F43", "F14")}
+    plain, placed = solve_pins(state, terms, drive_bar), solve_pins(state, terms, drive_bar, room=room)
+    for name in ("F12", "F32", "F43", "F14"):
+        for i in (0, 1):
+            assert getattr(placed, name)[i] is room[name][i]
+            assert np.array_equal(room[name][i], getattr(plain, name)[i])
+    torque = np.empty(5)
+    alone = solve_pins(state, terms, drive_bar, room={"torque": torque}).torque
+    assert np.array_equal(alone, plain.torque) and (alone is torque or drive_bar != 2)
+
+
 @pytest.mark.parametrize("pin", ["O2", "A", "B", "O4"])
 @pytest.mark.parametrize("drive_bar", [2, 3, 4])
 def test_the_couple_of_a_loaded_pin_is_its_force_times_the_radius_of_friction(pin: str, drive_bar: int) -> None:
