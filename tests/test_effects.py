@@ -51,7 +51,7 @@ ACTING: dict[str, Effect] = {
 EXACT = [witness for witness in WITNESSES if not witness.through_time]
 SIMULATED = [replace(witness, order="") for witness in WITNESSES if witness.through_time]
 INVERSE = {"pinocchio-inverse", "mujoco-inverse"}
-NO_COUNTERPART = {"energy-method": {"pin_friction"}, "mujoco-simulated": {"pin_friction", "load over theta_2"}}
+NO_COUNTERPART = {"energy-method": {"pin_friction"}, "mujoco-simulated": {"pin_friction"}}
 """What an engine cannot do; it must say so, and the others remain."""
 
 

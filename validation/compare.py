@@ -91,7 +91,10 @@ def compare(
         if quantity in FORCES:
             judged = moving & (formulas.status_code == OK) & ~_without_forces(formulas)
         where = judged & _answerable(quantity, scene, formulas, tolerance)
-        jumping = reversing(scene, formulas, tolerance.factor) & where if quantity in FORCES else ~judged & judged
+        jumping = ~judged & judged
+        if quantity in FORCES:
+            in_time = tolerance.name == SIMULATED.name
+            jumping = reversing(scene, formulas, tolerance.factor, in_time=in_time) & where
         where &= ~jumping
         if not where.any():
             rows.append(row(quantity, DEGRADED, "nothing can be told: no position at which both may be held to it"))

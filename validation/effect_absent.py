@@ -13,6 +13,7 @@ from pathlib import Path
 from fourbar.effects import REGISTRY
 from fourbar.errors import FourBarError
 from validation.effect_cost import REPEATS, available, cost
+from validation.witnesses import not_installed
 
 WORKLOADS = (
     *("__init__.py", "effect_work.py", "engines/__init__.py"),
@@ -80,27 +81,14 @@ def made(root: Path) -> dict[str, object]:
     return answer
 
 
-def model(mjcf: str) -> dict[str, object]:
-    """The compiled model: sizes, flags, and the whole of it as bytes."""
-    import mujoco
-    import numpy as np
-
-    compiled = mujoco.MjModel.from_xml_string(mjcf)
-    data = mujoco.MjData(compiled)
-    mujoco.mj_resetDataKeyframe(compiled, data, 0)
-    mujoco.mj_forward(compiled, data)
-    whole = np.zeros(mujoco.mj_sizeModel(compiled), dtype=np.uint8)
-    mujoco.mj_saveModel(compiled, None, whole)
-    sizes = {name: int(getattr(compiled, name)) for name in ("nv", "neq", "nu", "ntendon", "nsensor", "njnt")}
-    flags = {"disabled": int(compiled.opt.disableflags), "enabled": int(compiled.opt.enableflags)}
-    return {**sizes, "nefc": int(data.nefc), **flags, "bytes": whole.tobytes()}
-
-
 def differences(whole: dict[str, object], other: dict[str, object]) -> list[str]:
     """What a build makes otherwise than the whole one, in words."""
     texts = {"numbers": "bits of the results", "mjcf": "bytes of the MJCF", "calls": "list of the terms that run"}
     found = [text for key, text in texts.items() if whole[key] != other[key]]
-    one, two = (model(str(answer["mjcf"])) for answer in (whole, other))
+    if not_installed("mujoco") is not None:
+        return found
+    compiled = import_module("validation.engines.mujoco.stepping").compiled
+    one, two = (compiled(answer["mjcf"]) for answer in (whole, other))
     return found + [f"{key} of the compiled model" for key in one if one[key] != two[key]]
 
 

@@ -1,5 +1,6 @@
 """One scene through the formulas and every engine: its rows, its timings, and what was left out and why."""
 
+import math
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
@@ -118,10 +119,11 @@ def _observed_order(name: str, scene: Scene, at: Command, solution: Solution, wi
 
     def error(answer: Answer) -> float:
         rows = _judged(name, scene, at, solution, answer, replace(witness, expected=tuple(FORCES)))
-        return max(row.error for row in rows if row.quantity in FORCES)
+        return max((row.error for row in rows if row.quantity in FORCES), default=math.nan)  # a refusal has none
 
     coarse, fine, order = getattr(import_module(module), function)(scene, at, error)
-    return {"error_at_4h": coarse, "error_at_2h": fine, "observed_order": order}
+    seen = {"error_at_4h": coarse, "error_at_2h": fine, "observed_order": order}
+    return seen if all(map(math.isfinite, seen.values())) else {}  # a coarse run may leave what the scene covers
 
 
 def _judge_inertia(record: Record, at: Command, witnesses: Iterable[Witness]) -> None:

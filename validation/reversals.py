@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.bearing import PIN_FORCE
-from fourbar.linkage import PINS
+from fourbar.linkage import MOVING_BARS, PINS
 from fourbar.scene import Command, Scene, solve
 from fourbar.solution import OK, Solution
 from validation.tolerance import EPS, Array, K
@@ -66,15 +66,25 @@ def reversals(scene: Scene, at: Command, solution: Solution) -> list[Reversal]:
     return sorted(found, key=lambda reversal: reversal.position)
 
 
-def reversing(scene: Scene, solution: Solution, slip: float) -> NDArray[np.bool_]:
+def reversing(scene: Scene, solution: Solution, slip: float, *, in_time: bool = False) -> NDArray[np.bool_]:
     """Where a dry pin of a moving linkage slips by no more than this part of the two speeds over sin^2 mu, (n,).
 
-    There the sense of friction is anything's guess, and the forces on both sides of the jump are right.
+    There the sense of friction is anything's guess, and the forces on both sides of the jump are right. An engine
+    that runs through the motion `in_time` has no convention at rest either: 0 is as good as any couple up to the
+    friction's.
     """
     where = np.zeros(len(solution), dtype=bool)
     for pin in {pin for effect in scene.effects for pin in effect.dry_pins}:
         where |= _resting(solution, pin, slip)
+        if in_time:
+            speeds = np.nan_to_num(_greatest_speed(solution))
+            where |= speeds <= slip * speeds.max()
     return where
+
+
+def _greatest_speed(solution: Solution) -> Array:
+    speeds = _speeds(solution)
+    return np.asarray(np.max([np.abs(speeds[bar]) for bar in MOVING_BARS], axis=0))
 
 
 def _resting(solution: Solution, pin: str, slip: float) -> NDArray[np.bool_]:

@@ -133,6 +133,7 @@ def couple_elsewhere(
     """
     d = light.data
     d.qpos[:], d.qvel[:] = loop.data.qpos[: d.qpos.size], loop.data.qvel[: d.qvel.size]  # a drive may have its own
+    d.time = loop.data.time
     happened = loop.data.qacc[O2]
     # the light flywheel's motor gives it alpha_2 as commanded; this gives it what the crank really had
     correction = light.model.dof_armature[O2] * (happened - alpha_2)

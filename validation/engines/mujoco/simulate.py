@@ -9,15 +9,21 @@ import mujoco
 import numpy as np
 
 from fourbar.errors import InputError, LimitError
-from fourbar.mjcf import RECIPE, Run, Settings, mjcf, run_through
+from fourbar.mjcf import RECIPE, Settings, mjcf
+from fourbar.motion import Motion
 from fourbar.scene import Command, Scene
 from validation.answer import Answer
 from validation.engines.loop import Position
+from validation.engines.mujoco.called_back import Told, at_full_size, listening, of_loads, telling, within
 from validation.engines.mujoco.closed_loop import O2, O4, A, ClosedLoop, couple_elsewhere
 from validation.engines.mujoco.limits import NEAREST_TOGGLE, least_sine, too_fast_or_loaded
+from validation.engines.mujoco.motions import Lawful, Passage, Steady, extremes, order_in_time
 from validation.engines.mujoco.watch import Watch, alarms
 
-SHARED = "lengths, masses, inertias, centres, loads and effects as MJCF text; omega_2, alpha_2 and the branch"
+SHARED = (
+    "lengths, masses, inertias, centres, loads and effects as MJCF text; tables of loads; omega_2, alpha_2 or the "
+    "motion law, and the branch"
+)
 OWN = "assembly, velocities at the start, the motion through time, accelerations, drive torque, pin forces"
 LIGHT_FLYWHEEL = 1e4
 """Flywheel of the model that is asked for T3 or T4: heavy enough to keep the closure's softness
@@ -60,11 +66,13 @@ def _refusal(scene: Scene, command: Command) -> str | None:
         return "a free motion has no commanded sweep"
     if command.omega_2 is None or not np.any(command.omega_2):
         return "omega_2 is 0 or not stated: nothing to simulate through time"
-    if np.ptp(command.omega_2) != 0.0 or np.ptp(command.alpha_2) != 0.0:
+    law = scene.motion.law if command.time is not None else None
+    if law is None and (np.ptp(command.omega_2) != 0.0 or np.ptp(command.alpha_2) != 0.0):
         return "omega_2 or alpha_2 differs from position to position: that is no one motion through time"
     if np.ptp(command.theta_2) == 0.0:
         return "one position: nothing to run through"
-    reason = too_fast_or_loaded(scene, float(np.max(np.abs(command.omega_2))))
+    run = as_run(scene, command)
+    reason = too_fast_or_loaded(run, abs(run.motion.omega_2 or 0.0))
     if reason is not None:
         return reason
     if _passes_change_point(scene, command):
@@ -83,23 +91,29 @@ def _passes_change_point(scene: Scene, command: Command) -> bool:
     return False
 
 
+def as_run(scene: Scene, command: Command) -> Scene:
+    """The scene whose MJCF is run through: at the command's positions, a law by its greatest speed and acceleration."""
+    if scene.motion.law is not None:
+        omega, alpha = extremes(scene.motion.law)
+        motion = Motion(command.theta_2, omega, alpha, scene.motion.branch, scene.motion.through)
+        return replace(scene, motion=motion)
+    omega, alpha = float(np.max(command.omega_2)), float(np.max(command.alpha_2))  # type: ignore[arg-type]
+    return replace(scene, motion=replace(scene.motion, theta_2=command.theta_2, omega_2=omega, alpha_2=alpha))
+
+
 class _Simulation:
     """One scene: its own assembly, then each stretch of positions that assembles, run through in time."""
 
     def __init__(self, settings: Settings, scene: Scene, command: Command, *, bounded: bool = True) -> None:
         self.bounded = bounded
-        self.settings, self.scene, self.command = settings, scene, command
-        self.omega, self.alpha = float(np.max(command.omega_2)), float(np.max(command.alpha_2))  # type: ignore[arg-type]
+        self.settings, self.command, self.law = settings, command, scene.motion.law
         # the text is that of the command, which a caller may have given instead of the scene's own
-        motion = replace(scene.motion, theta_2=command.theta_2, omega_2=self.omega, alpha_2=self.alpha)
-        self.scene = replace(scene, motion=motion)
+        self.scene = as_run(scene, command)
+        self.told = of_loads(scene)
         n = len(command.theta_2)
-        self.order = np.argsort(command.theta_2 if self.omega > 0.0 else -command.theta_2, kind="stable")
-        self.theta_2, self.omega_2, self.alpha_2 = (
-            command.theta_2.copy(),
-            np.full(n, self.omega),
-            np.full(n, self.alpha),
-        )
+        self.order = order_in_time(command, self.scene.motion.omega_2 or 0.0, self.law)
+        self.theta_2 = command.theta_2.copy()
+        self.omega_2, self.alpha_2 = (np.full(n, x, dtype=float) for x in (command.omega_2, command.alpha_2))
         self.branch = command.branch.copy()
         self.values = {name: np.full(n, np.nan) for name in FIELDS}
         self.values.update({name: np.full((n, 2), np.nan) for name in PINS})
@@ -125,7 +139,7 @@ class _Simulation:
             raise LimitError(f"|sin(theta_4 - theta_3)| falls to {least:.1e}; {NEAREST_TOGGLE.reason}")
         for stretch in self._stretches(position, found):
             self._run(stretch, found)
-        at = Command(self.theta_2, self.branch, self.omega_2, self.alpha_2)
+        at = Command(within(self.scene, self.theta_2), self.branch, self.omega_2, self.alpha_2)
         setting = f"{self.settings.integrator} {self.steps_per_revolution:.0f}/rev"
         assembled = np.array([angles is not None for angles in found])
         return Answer(
@@ -139,11 +153,22 @@ class _Simulation:
             evidence=self.evidence,
         )
 
+    def _passage(self, stretch: list[int]) -> Passage:
+        """How the input moves through a stretch."""
+        if self.law is not None:
+            return Lawful(self.law, self.command, stretch)
+        motion = self.scene.motion
+        return Steady(self.command, stretch, motion.omega_2 or 0.0, motion.alpha_2)
+
+    def _loop(self, timestep: float, told: dict[str, Told], flywheel: float | None = None) -> ClosedLoop:
+        """A compiled model that takes from `telling` what its text cannot say."""
+        return listening(ClosedLoop(self._text(timestep, flywheel)), told)
+
     def _text(self, timestep: float, flywheel: float | None = None) -> str:
         """The generated MJCF without its keyframe."""
         heavy = self.settings.flywheel if flywheel is None else flywheel
         settings = replace(self.settings, timestep=timestep, timestep_scale=1.0, flywheel=heavy)
-        return mjcf(self.scene, settings, keyframe=False)
+        return mjcf(at_full_size(self.scene), settings, keyframe=False)
 
     def _assemble(self, position: Position) -> list[Found]:
         """Own joint angles of every commanded position."""
@@ -173,28 +198,37 @@ class _Simulation:
 
     def _run(self, stretch: list[int], found: list[Found]) -> None:
         """Step through one stretch and read at the step nearest to each position."""
-        commanded = self.command.theta_2[stretch]
-        run = run_through(commanded, self.omega, self.alpha)
-        width = len(np.unique(commanded)) - 1
-        timestep = run.timestep(self.settings, at_least=width) if width else 1e-3
-        if width:
+        run = self._passage(stretch)
+        timestep = run.timestep(self.settings)
+        if len(stretch) > 1:
             turn = 2.0 * np.pi / run.fastest
             self.steps_per_revolution = max(self.steps_per_revolution, turn / timestep)
-        loop = ClosedLoop(self._text(timestep))
-        light = None if self.scene.drive_bar == 2 else ClosedLoop(self._text(timestep, LIGHT_FLYWHEEL))
+        told = self.told
+        if self.law is not None:
+            told = {**told, "drive": lambda m, d: m.dof_armature[O2] * run.alpha(d.time)}
+        with telling(told):
+            self._run_told(stretch, found, run, timestep, told)
+
+    def _run_told(
+        self, stretch: list[int], found: list[Found], run: Passage, timestep: float, told: dict[str, Told]
+    ) -> None:
+        """The same with everything that acts in place."""
+        loop = self._loop(timestep, told)
+        light = None if self.scene.drive_bar == 2 else self._loop(timestep, told, LIGHT_FLYWHEEL)
         start = found[stretch[0]]
         assert start is not None
         wound = self._unwound(start)
         self.turns = wound[O2] - start[O2]
-        watch = Watch(self._text(timestep), self.scene.drive_bar)
-        loop.set_state(wound, self.omega)
+        watch = Watch(self._loop(timestep, told), self.scene.drive_bar)
+        loop.set_state(wound, run.omega)
+        begins = float(self.command.theta_2[stretch[0]])
         done = 0
-        for index, theta_2 in zip(stretch, commanded, strict=True):
-            step = round(run.time(float(theta_2)) / timestep)
+        for index in stretch:
+            step = round(run.seconds(index) / timestep)
             if step > done:
                 mujoco.mj_step(loop.model, loop.data, step - done)
                 done = step
-            self._read(loop, light, watch, index, run, done * timestep)
+            self._read(loop, light, watch, index, run, done * timestep, begins)
         self.evidence["steps"] += done
         for name, value in watch.evidence().items():
             self.evidence[name] = float(np.fmax(self.evidence.get(name, 0.0), value))
@@ -211,13 +245,14 @@ class _Simulation:
         light: ClosedLoop | None,
         watch: Watch,
         index: int,
-        run: Run,
+        run: Passage,
         expected_time: float,
+        begins: float,
     ) -> None:
         """Everything of one sample, and what the engine says of itself there."""
         loop.forward()
         d = loop.data
-        self._watch(loop, run, expected_time)
+        self._watch(loop, run, expected_time, begins)
         q = (float(d.qpos[O2]), float(d.qpos[A]), float(d.qpos[O4]))
         if self._unwound(q) != q:
             raise LimitError("a torsion spring is wound by more than half a turn from its rest")
@@ -226,7 +261,7 @@ class _Simulation:
         self.alpha_2[index] = d.qacc[O2]
         torque, forces = loop.crank_torque(), loop.forces
         if light is not None:
-            torque, forces = self._drive_elsewhere(loop, light, torque), light.forces
+            torque, forces = self._drive_elsewhere(loop, light, torque, run.alpha(expected_time)), light.forces
         numbers = (
             *(d.qpos[O2] + d.qpos[A] - self.turns, d.qpos[O4]),
             *(d.qvel[O2] + d.qvel[A], d.qvel[O4]),
@@ -241,18 +276,17 @@ class _Simulation:
         for name, error in watch.look(loop, torque, pins["F43"]).items():
             self.predicted[name][index] = error
 
-    def _drive_elsewhere(self, loop: ClosedLoop, light: ClosedLoop, crank_torque: float) -> float:
+    def _drive_elsewhere(self, loop: ClosedLoop, light: ClosedLoop, crank_torque: float, alpha: float) -> float:
         """The couple on bar 3 or 4, or LimitError at a pole of the torque."""
-        couple = couple_elsewhere(loop, light, self.scene.drive_bar, self.alpha, crank_torque)
+        couple = couple_elsewhere(loop, light, self.scene.drive_bar, alpha, crank_torque)
         if couple is None:
             raise LimitError(f"the couple on bar {self.scene.drive_bar} does not move the input: a pole of the torque")
         return couple
 
-    def _watch(self, loop: ClosedLoop, run: Run, expected_time: float) -> None:
+    def _watch(self, loop: ClosedLoop, run: Passage, expected_time: float, begins: float) -> None:
         """Keep the worst of what the engine says of itself."""
         d, seen = loop.data, self.evidence
-        turned = d.qpos[O2] - self.turns - run.start
-        speed = np.sqrt(max(run.omega**2 + 2.0 * run.alpha * turned, 0.0))
+        speed = run.speed(float(d.qpos[O2]) - self.turns - begins, expected_time)
         worst = {
             "closure_gap_m": float(np.hypot(*loop.gap())),
             "speed_error": float(abs(abs(d.qvel[O2]) - speed) / run.fastest),

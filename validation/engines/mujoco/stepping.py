@@ -1,8 +1,9 @@
-"""Bare steps of an MJCF, for counting their instructions."""
+"""Bare steps of an MJCF, for counting their instructions, and all that it compiles to."""
 
 from collections.abc import Callable
 
 import mujoco
+import numpy as np
 
 
 def steps(text: str) -> Callable[[int], None]:
@@ -15,3 +16,16 @@ def steps(text: str) -> Callable[[int], None]:
         mujoco.mj_step(model, data, amount)
 
     return work
+
+
+def compiled(text: str) -> dict[str, object]:
+    """The compiled model: sizes, rows of its constraints at the keyframe, flags, and the whole of it as bytes."""
+    model = mujoco.MjModel.from_xml_string(text)
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, 0)
+    mujoco.mj_forward(model, data)
+    whole = np.zeros(mujoco.mj_sizeModel(model), dtype=np.uint8)
+    mujoco.mj_saveModel(model, None, whole)
+    sizes = {name: int(getattr(model, name)) for name in ("nv", "neq", "nu", "ntendon", "nsensor", "njnt")}
+    flags = {"disabled": int(model.opt.disableflags), "enabled": int(model.opt.enableflags)}
+    return {**sizes, "nefc": int(data.nefc), **flags, "bytes": whole.tobytes()}

@@ -87,13 +87,13 @@ class _Motion:
 class Watch:
     """Looks at a simulated motion with the bars alone, sample after sample."""
 
-    def __init__(self, mjcf: str, drive_bar: int) -> None:
-        self.bars = ClosedLoop(mjcf)
+    def __init__(self, bars: ClosedLoop, drive_bar: int) -> None:
+        self.bars = bars
         model = self.bars.model
         model.dof_armature[:] = 0.0
         model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_EQUALITY
         if self.bars.drive is not None:
-            model.actuator_biasprm[self.bars.drive, 0] = 0.0
+            model.actuator_biastype[self.bars.drive] = mujoco.mjtBias.mjBIAS_NONE
         self.e_drive = np.zeros(3)
         self.e_drive[{2: [O2], 3: [O2, A], 4: [O4]}[drive_bar]] = 1.0
         self._dot = np.zeros((3, 3))

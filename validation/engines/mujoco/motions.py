@@ -1,0 +1,120 @@
+"""The input's motion through a stretch of positions, in time: steadily, or by a motion law."""
+
+import bisect
+import math
+from collections.abc import Sequence
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fourbar.mjcf import Settings, run_through
+from fourbar.mjcf.settings import FULL_TURN
+from fourbar.motion_law import Law
+from fourbar.scene import Command
+
+LOOKED_AT = 2000
+"""Instants at which a law is searched for its greatest speed and acceleration; between them it hardly differs."""
+
+
+class Passage(Protocol):
+    """One stretch, from its first position on."""
+
+    omega: float
+    """At the start, rad/s."""
+    fastest: float
+    """The greatest |omega_2|, rad/s."""
+
+    def timestep(self, settings: Settings) -> float:
+        """The timestep of the settings for this stretch, s."""
+
+    def seconds(self, index: int) -> float:
+        """When it passes a position, from the start of the stretch."""
+
+    def speed(self, turned: float, seconds: float) -> float:
+        """|omega_2| that is due after a turn (rad) and a time."""
+
+    def alpha(self, seconds: float) -> float:
+        """What the drive is told, rad/s^2."""
+
+
+class Steady:
+    """At constant alpha_2, through positions in the order of their angles."""
+
+    def __init__(self, command: Command, stretch: Sequence[int], omega: float, alpha: float) -> None:
+        self.theta_2 = command.theta_2
+        commanded = command.theta_2[list(stretch)]
+        self.run = run_through(commanded, omega, alpha)
+        self.width = len(np.unique(commanded)) - 1
+        self.omega, self.fastest = omega, self.run.fastest
+
+    def timestep(self, settings: Settings) -> float:
+        """At least as many steps as positions; any where there is but one."""
+        return self.run.timestep(settings, at_least=self.width) if self.width else 1e-3
+
+    def seconds(self, index: int) -> float:
+        """By the angle."""
+        return self.run.time(float(self.theta_2[index]))
+
+    def speed(self, turned: float, seconds: float) -> float:
+        """By the angle turned."""
+        return math.sqrt(max(self.run.omega**2 + 2.0 * self.run.alpha * turned, 0.0))
+
+    def alpha(self, seconds: float) -> float:
+        """The same all the way."""
+        return self.run.alpha
+
+
+class Lawful:
+    """By a motion law, through positions in the order of their times."""
+
+    def __init__(self, law: Law, command: Command, stretch: Sequence[int]) -> None:
+        assert command.time is not None
+        self.law, self.time = law, command.time
+        self.began, ends = float(command.time[stretch[0]]), float(command.time[stretch[-1]])
+        self.intervals, self.duration = len(stretch) - 1, ends - self.began
+        self.omega = float(law.at(np.array([self.began]))[1][0])
+        self.knots = list(law.time)
+        self.at_knots = law.at(np.array(law.time))[2].tolist()
+        angles, speeds, _ = law.at(np.linspace(self.began, ends, LOOKED_AT))
+        self.fastest, self.width = float(np.abs(speeds).max()), float(np.ptp(angles))
+
+    def timestep(self, settings: Settings) -> float:
+        """A whole number of steps from each position to the next."""
+        if not self.intervals:
+            return 1e-3
+        turned = self.duration * self.fastest
+        steps = turned / (2.0 * math.pi) * settings.steps_per_revolution
+        if 0.0 < self.width < FULL_TURN:
+            steps = max(steps, settings.steps_per_window * turned / self.width)
+        each = math.ceil(steps / self.intervals * (1.0 - 1e-9))
+        return self.duration / (self.intervals * each) * settings.timestep_scale
+
+    def seconds(self, index: int) -> float:
+        """As the law was sampled."""
+        return float(self.time[index]) - self.began
+
+    def speed(self, turned: float, seconds: float) -> float:
+        """By the time."""
+        return float(abs(self.law.at(np.array([self.began + seconds]))[1][0]))
+
+    def alpha(self, seconds: float) -> float:
+        """The second derivative of cubic pieces is linear between their ends."""
+        at, t, f = self.began + seconds, self.knots, self.at_knots
+        k = min(max(bisect.bisect_right(t, at), 1), len(t) - 1)
+        part = (at - t[k - 1]) / (t[k] - t[k - 1])
+        return float(f[k - 1] + part * (f[k] - f[k - 1]))
+
+
+def extremes(law: Law) -> tuple[float, float]:
+    """Greatest |omega_2| and |alpha_2| of a law: what flywheel and closure are laid out for."""
+    _, omega, alpha = law.at(np.linspace(law.time[0], law.time[-1], LOOKED_AT))
+    return float(np.abs(omega).max()), float(np.abs(alpha).max())
+
+
+def order_in_time(command: Command, omega: float, law: Law | None) -> NDArray[np.intp]:
+    """Indices of the positions as they are passed."""
+    if law is not None:
+        assert command.time is not None
+        return np.argsort(command.time, kind="stable")
+    return np.argsort(command.theta_2 if omega > 0.0 else -command.theta_2, kind="stable")
