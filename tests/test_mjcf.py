@@ -144,6 +144,25 @@ def test_with_alpha_2_the_keyframe_keeps_it() -> None:
     assert data.qvel[0] ** 2 == pytest.approx(100.0 + 60.0 * (data.qpos[0] - 0.1), rel=1e-6)
 
 
+RELEASE = 1e-4
+"""rad, of a free motion of half a second at the file's own timestep; measured 1e-6."""
+
+
+@pytest.mark.parametrize("scale", (1.0, 0.01))
+def test_a_released_linkage_falls_by_itself(scale: float) -> None:
+    bars = [fourbar.Bar(scale * length, mass) for length, mass in ((0.1, 0.2), (0.25, 0.5), (0.22, 0.4))]
+    linkage = fourbar.FourBar(scale * 0.3, *bars, ground_angle=0.2)
+    motion = fourbar.Motion(0.5, 0.0, free=fourbar.Free(0.5 * math.sqrt(scale), 10))
+    scene = fourbar.Scene(linkage, motion, effects=(fourbar.Gravity(),))
+    model, data = opened(scene)
+    assert gap(data) < OPEN and model.nu == 0 and model.dof_armature[0] == 0.0
+    expected = fourbar.solve(scene)
+    assert expected.time is not None and np.ptp(expected.theta_2) > 0.5
+    for time, theta_2 in zip(expected.time[1:], expected.theta_2[1:], strict=True):
+        mujoco.mj_step(model, data, round((time - data.time) / model.opt.timestep))
+        assert data.qpos[0] + data.qvel[0] * (time - data.time) == pytest.approx(theta_2, abs=RELEASE)
+
+
 def test_past_a_limit_position_it_starts_anew_assembled(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """What the viewer shows of an input that cannot turn fully: the same stretch again and again."""
     monkeypatch.chdir(tmp_path)  # MuJoCo writes a log of its resets into the working folder

@@ -45,7 +45,7 @@ def add_appearance(root: ET.Element, linkage: FourBar) -> None:
     visual = ET.SubElement(root, "visual")
     # the viewer's free camera starts at 1.5 extents from the centre; -90 deg looks straight down on the plane
     ET.SubElement(visual, "global", azimuth="90", elevation="-90", fovy=f"{FOVY:g}", offwidth="1280", offheight="960")
-    ET.SubElement(visual, "headlight", ambient=".55 .55 .55", diffuse=".35 .35 .35", specular=".1 .1 .1")
+    ET.SubElement(visual, "headlight", ambient=".45 .45 .45", diffuse=".35 .35 .35", specular=".1 .1 .1")
     ET.SubElement(visual, "rgba", haze="1 1 1 1")
     sky: dict[str, Any] = {"rgb1": ".95 .96 .98", "rgb2": ".95 .96 .98", "width": "32", "height": "192"}
     ET.SubElement(ET.SubElement(root, "asset"), "texture", type="skybox", builtin="flat", **sky)
@@ -55,5 +55,11 @@ def add_camera(world: ET.Element, linkage: FourBar) -> None:
     """The camera `plane`, and a light beside it."""
     seen = frame(linkage)
     place = f"{seen.x!r} {seen.y!r} {seen.distance!r}"
-    ET.SubElement(world, "light", name="light", pos=place, dir="0 0 -1", directional="true", castshadow="false")
+    shining = {
+        "diffuse": ".2 .2 .2",
+        "specular": ".1 .1 .1",
+        "directional": "true",
+        "castshadow": "false",
+    }  # with the headlight 1
+    ET.SubElement(world, "light", shining, name="light", pos=place, dir="0 0 -1")
     ET.SubElement(world, "camera", name="plane", pos=place, fovy=f"{FOVY:g}")

@@ -21,6 +21,14 @@ AT_REST = 1.0
 """rad/s that flywheel and timestep are laid out for where the scene states no speed."""
 SETTLING = 2.0
 """Time constant with which the drive starts the input from rest, in timesteps: the crank lags by so many, for good."""
+RELEASED_STEPS = 6280
+"""Of a free motion, in the time in which weights and loads would turn the linkage once."""
+RELEASED_CLOSURE = 2.0
+"""Time constant of the closure of a released linkage, in timesteps: measured, 2 takes the least energy out of it."""
+RELEASED = (
+    " Written by fourbar. It opens assembled (each joint's ref is its angle there) and released: no drive, weights and "
+    "loads move it. Keyframe 0 starts at the scene's omega_2. Angles: O2 is theta_2, O2 + A is theta_3, O4 is theta_4. "
+)
 COMMENT = (
     " Written by fourbar. It opens assembled (each joint's ref is its angle there) and just steps: the drive brings "
     "the input to omega_2 within a few steps, a flywheel (armature of pin O2) keeps it there. With an alpha_2 the "
@@ -48,6 +56,9 @@ def mjcf(scene: Scene, settings: Settings = RECIPE, *, keyframe: bool = True) ->
     if scene.motion.law is not None:
         raise LimitError("a motion law has no counterpart in MJCF: its drive keeps omega_2 or alpha_2")
     carriable(scene.linkage)
+    free = scene.motion.free is not None
+    if free:
+        settings = _released(scene, settings)
     start = _start(scene) if keyframe else None
     if start is not None:
         timestep = start.run.timestep(settings)
@@ -62,7 +73,7 @@ def mjcf(scene: Scene, settings: Settings = RECIPE, *, keyframe: bool = True) ->
         term.add_mjcf(model)
     armature = flywheel(scene, settings)
     root = ET.Element("mujoco", model=_plain(scene.title) or "four-bar")
-    root.append(ET.Comment(COMMENT))
+    root.append(ET.Comment(RELEASED if free else COMMENT))
     ET.SubElement(root, "compiler", angle="radian", autolimits="true")
     model.add_option(root, timestep)
     add_appearance(root, scene.linkage)
@@ -71,7 +82,7 @@ def mjcf(scene: Scene, settings: Settings = RECIPE, *, keyframe: bool = True) ->
         for effect in scene.effects:
             start = start._replace(qpos=effect.unwind(scene.linkage, start.qpos))
         model.rest = start.qpos
-        if scene.motion.alpha_2 == 0.0:
+        if scene.motion.alpha_2 == 0.0 and not free:
             drive = servo(armature / (SETTLING * timestep), start.qvel[0])
     model.add_bodies(root, armature)
     model.add_load_sites(root)
@@ -98,6 +109,13 @@ def load_ratio(scene: Scene) -> float:
     """(m g L + F L + M)/(q (m L^2 + I)): loads and weights against the inertia of the bars."""
     inertia = _inertia(scene.linkage)
     return _work(scene) / inertia if inertia else math.inf
+
+
+def _released(scene: Scene, settings: Settings) -> Settings:
+    """Without a flywheel, and with a timestep by what moves the linkage."""
+    quickest = math.sqrt((scene.motion.omega_2 or 0.0) ** 2 + load_ratio(scene) * _quickness(scene)) or AT_REST
+    timestep = settings.timestep or math.tau / (RELEASED_STEPS * quickest)
+    return replace(settings, flywheel=0.0, pad=None, time_constant_steps=RELEASED_CLOSURE, timestep=timestep)
 
 
 def _pad(scene: Scene) -> float:

@@ -15,7 +15,7 @@ from fourbar.solution import Solution
 CLEAR = 0.3
 """Motion and drive condition of the position drawn, where any has them: beside a pole forces dwarf all others."""
 LEAD = math.radians(60.0)
-"""The position drawn where none is named: this far into the longest stretch that assembles (or half of a shorter one)."""
+"""The position drawn where none is named: so far into the longest stretch that assembles, or half of a shorter one."""
 
 
 @dataclass(slots=True)
