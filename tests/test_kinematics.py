@@ -44,7 +44,7 @@ def newton(link: fourbar.FourBar, theta_2: mpmath.mpf, start: tuple[float, float
 
 
 @pytest.mark.parametrize("branch", [1, -1])
-@pytest.mark.parametrize("theta_1", [0.0, 0.4, -2.5])
+@pytest.mark.parametrize("theta_1", [0.0, 0.4, 1.0, -2.5])
 def test_the_loop_closes_on_the_branch_asked_for(branch: int, theta_1: float) -> None:
     state = close_loop(linkage(theta_1), ANGLES, branch)
     d, a, b, c = LENGTHS
@@ -234,6 +234,15 @@ def test_singular_positions_have_no_speed_and_their_neighbours_keep_theirs() -> 
     assert crank.regular_sine() is crank.sin_mu and not crank.singular.any()
 
 
+@pytest.mark.parametrize("lengths", [(3, 1, 2, 2), (0.99, 0.97, 0.98, 0.98)])
+def test_within_the_rounding_of_a_change_point_no_direction_is_left(lengths: tuple[float, ...]) -> None:
+    theta_2 = math.pi + 2.0 * EPS * np.arange(5)  # the next doubles after pi
+    state = close_loop(fourbar.uniform(*lengths), theta_2, 1)
+    assert (state.sin_mu > 0.0).all() and (state.sin_mu < 8.0 * EPS).all()
+    assert state.singular.all() and np.isnan(state.regular_sine()).all()
+    assert not close_loop(fourbar.uniform(*lengths), theta_2 + 1e-13, 1).singular.any()
+
+
 def test_branches_may_differ_from_position_to_position() -> None:
     branches = np.where(np.arange(41) % 3 == 0, -1, 1).astype(np.int8)
     mixed = close_loop(linkage(), ANGLES, branches)
@@ -249,6 +258,7 @@ def test_branches_may_differ_from_position_to_position() -> None:
             assert np.array_equal(mixed.omega(bar)[which], alone.omega(bar)[which])  # type: ignore[index]
             assert np.array_equal(mixed.alpha(bar)[which], alone.alpha(bar)[which])  # type: ignore[index]
     assert np.array_equal(mixed.branch, branches)
+    assert close_loop(linkage(), ANGLES, -1).branch.dtype == np.int8
 
 
 @pytest.mark.parametrize("centre", [(0.3, 0.0), (0.3, 1.0), (0.3, -2.5), (0.0, 0.0)])
@@ -263,18 +273,19 @@ def test_a_mass_centre_in_the_frame_of_its_bar(centre: tuple[float, float]) -> N
     ("lengths", "branch"), [((0.3, 0.1, 0.3, 0.1), 1), ((0.1, 0.3, 0.3, 0.1), -1), ((0.2, 0.2, 0.2, 0.2), 1)]
 )
 @pytest.mark.parametrize("half_turn", [0, 1])
+@pytest.mark.parametrize("theta_1", [0.0, 0.4])
 def test_pairs_that_stay_parallel_keep_the_directions_of_ground_and_input(
-    lengths: tuple[float, ...], branch: int, half_turn: int
+    lengths: tuple[float, ...], branch: int, half_turn: int, theta_1: float
 ) -> None:
     """A parallelogram's coupler lies as its ground and bar 4 as bar 2; a folded kite has B on O2."""
     d, a, b, c = lengths
-    link = fourbar.FourBar(d, fourbar.Bar(a), fourbar.Bar(b), fourbar.Bar(c), 0.4)
-    theta_2 = 0.4 + math.pi * half_turn + np.array([1e-9, 0.5, 2.0])
+    link = fourbar.FourBar(d, fourbar.Bar(a), fourbar.Bar(b), fourbar.Bar(c), theta_1)
+    theta_2 = theta_1 + math.pi * half_turn + np.array([1e-9, 0.5, 2.0])
     branch = -branch if half_turn else branch
     state = close_loop(link, theta_2, branch)
     add_velocities(state, 2.0)
     add_accelerations(state, 3.0)
-    u1 = (math.cos(0.4), math.sin(0.4))
+    u1 = (math.cos(theta_1), math.sin(theta_1))
     together = a == c
     expected = (
         ((u1, state.u2), (0.0, 2.0), (0.0, 3.0))
@@ -287,7 +298,7 @@ def test_pairs_that_stay_parallel_keep_the_directions_of_ground_and_input(
         assert np.array_equal(state.omega(bar), np.full(3, expected[1][k]))
         assert np.array_equal(state.alpha(bar), np.full(3, expected[2][k]))
     # between the bars: the angle of input and ground
-    assert np.abs(state.sin_mu) == pytest.approx(np.abs(np.sin(theta_2 - 0.4)), rel=8 * EPS, abs=2 * EPS)
+    assert np.abs(state.sin_mu) == pytest.approx(np.abs(np.sin(theta_2 - theta_1)), rel=8 * EPS, abs=2 * EPS)
 
 
 @pytest.mark.parametrize("alpha", [0.0, 5.0])
