@@ -36,7 +36,7 @@ class Label:
 
 @dataclass(slots=True)
 class Labels:
-    """The labels of one figure and the lines (data coordinates) they must keep off."""
+    """The labels of one figure and the lines and marks (data coordinates) they must keep off."""
 
     wanted: list[Label]
     lines: list[tuple["Axes", list[Point]]]
@@ -46,7 +46,7 @@ class Labels:
         self.wanted.append(label)
 
     def keep_off(self, axes: "Axes", *points: Point) -> None:
-        """Lines, given by their points, that labels do not cover."""
+        """Lines, given by their points, that labels do not cover; twice the same point is a mark."""
         self.lines.append((axes, list(points)))
 
     def settle(self, figure: "Figure") -> None:
@@ -58,7 +58,7 @@ class Labels:
         taken: list[tuple[Axes, Box]] = []
         samples: dict[int, list[np.ndarray]] = {}
         for axes, points in self.lines:
-            samples.setdefault(id(axes), []).append(_sampled(axes.transData.transform(points), 3.0 * per_point))
+            samples.setdefault(id(axes), []).append(_sampled(axes.transData.transform(points), per_point))
         for label in self.wanted:
             axes = label.axes
             text = axes.text(*label.at, label.text, color=label.colour, size=label.size, ha="center", va="center")
@@ -82,12 +82,19 @@ def _inside(axes: "Axes") -> Box:
     return (box.x0, box.y0, box.x1, box.y1)
 
 
-def _sampled(points: np.ndarray, step: float) -> np.ndarray:
-    """Points every `step` pixels along a polyline."""
-    pieces = []
+STEP, MARK = 3.0, 4.5
+"""Of the points along a line, and radius of a mark, typographic points."""
+RING = np.array([(math.cos(k * math.tau / 12), math.sin(k * math.tau / 12)) for k in range(12)])
+
+
+def _sampled(points: np.ndarray, per_point: float) -> np.ndarray:
+    """Points along a polyline, or around a mark: a line that ends where it begins."""
+    pieces, step = [], STEP * per_point
     for p, q in pairwise(points):
         if not (np.all(np.isfinite(p)) and np.all(np.isfinite(q))):
             continue
+        if np.array_equal(p, q):
+            pieces.append(p + MARK * per_point * RING)
         share = np.linspace(0.0, 1.0, 2 + int(min(np.hypot(*(q - p)) / step, 2000)))
         pieces.append(p + share[:, None] * (q - p))
     return np.concatenate(pieces) if pieces else np.empty((0, 2))

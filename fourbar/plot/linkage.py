@@ -63,6 +63,7 @@ def draw_linkage(axes: "Axes", view: View, labels: Labels) -> None:
         r_along, r_across = centre_in_bar(bar)
         if r_across != 0.0 or not 0.0 <= r_along <= bar.length:  # off the bar: tied to it by a line
             axes.plot(*zip(where[ENDS[number][0]], here, strict=True), color=colour, lw=0.8, ls=":", zorder=3)
+            labels.keep_off(axes, where[ENDS[number][0]], here)
         mass_centre(axes, here)
         labels.keep_off(axes, here, here)
         labels.add(Label(axes, f"$G_{number}$", here, middle, colour, 8.0, 3.0))
