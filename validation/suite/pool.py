@@ -5,6 +5,7 @@ done again scene by scene, and the scene at fault engine by engine.
 """
 
 import faulthandler
+import signal
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from dataclasses import replace
@@ -27,6 +28,8 @@ IN_FLIGHT = 4
 STALL = 20.0
 """Seconds in which no worker takes up any of the waiting chunks: one was killed while it held the
 lock of the queue that they share, and the pool is made anew."""
+ATTEMPTS = 5
+"""An engine may be killed from outside so often on one scene before the scene is given up."""
 Chunk = tuple[int, range]
 
 
@@ -193,13 +196,17 @@ def _alone(
     page: Page | None = None
     lost = []
     for asked in ([], *([witness] for witness in witnesses)):
-        try:
-            part = _outcome(submit([scene], asked), stall)[0]
-        except StalledError:
-            raise
-        except Exception as error:
-            lost.append(breakdown(name, asked[0].name if asked else "formulas", error))
-            continue
-        page = part if page is None else page.joined(part)
+        for attempt in range(ATTEMPTS):
+            try:
+                part = _outcome(submit([scene], asked), stall)[0]
+            except StalledError:
+                raise
+            except Exception as error:
+                if getattr(error, "exitcode", None) == -signal.SIGKILL and attempt + 1 < ATTEMPTS:
+                    continue  # somebody killed it: that is not the engine's doing
+                lost.append(breakdown(name, asked[0].name if asked else "formulas", error))
+            else:
+                page = part if page is None else page.joined(part)
+            break
     page = page or Page(name)
     return replace(page, rows=[*page.rows, *lost])
