@@ -5,7 +5,6 @@ done again scene by scene, and the scene at fault engine by engine.
 """
 
 import faulthandler
-import signal
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from dataclasses import replace
@@ -28,6 +27,8 @@ IN_FLIGHT = 4
 STALL = 20.0
 """Seconds in which no worker takes up any of the waiting chunks: one was killed while it held the
 lock of the queue that they share, and the pool is made anew."""
+KILLED = -9
+"""Exit code of a process that was killed from outside; one that crashes leaves with another."""
 ATTEMPTS = 5
 """An engine may be killed from outside so often on one scene before the scene is given up."""
 Chunk = tuple[int, range]
@@ -202,7 +203,7 @@ def _alone(
             except StalledError:
                 raise
             except Exception as error:
-                if getattr(error, "exitcode", None) == -signal.SIGKILL and attempt + 1 < ATTEMPTS:
+                if getattr(error, "exitcode", None) == KILLED and attempt + 1 < ATTEMPTS:
                     continue  # somebody killed it: that is not the engine's doing
                 lost.append(breakdown(name, asked[0].name if asked else "formulas", error))
             else:
