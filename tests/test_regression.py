@@ -9,12 +9,14 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
+from fourbar.errors import InputError
 from validation.cli import status
 from validation.regression import record, render
 from validation.regression.changes import Kind, differences
 from validation.regression.command import accept_command, compare
 from validation.regression.record import About, about, read_run, write_about
 from validation.results import AGREES, FAILS, Row, write_results
+from validation.suite.columns import write_columns
 from validation.tolerance import EPS
 
 ROW = Row("scene", "engine", "exact", "torque", 1e-15, 1e-14, True, AGREES, "equivalence", 1.0, 1.0)
@@ -145,3 +147,17 @@ def test_another_python_without_the_libraries_is_one_line_and_status_3(
     message = capsys.readouterr().err.strip()
     assert "did not run there: ModuleNotFoundError: No module named 'click' (it needs" in message
     assert "\n" not in message
+
+
+def test_a_run_with_too_many_rows_for_a_text_is_read_from_its_columns(tmp_path: Path) -> None:
+    rows = [ROW, replace(ROW, quantity="watch", error=math.nan)]
+    write_columns(iter([rows]), tmp_path)
+    write_about(HERE, tmp_path)
+    from_text = read_run(tmp_path)
+    (tmp_path / "results.csv").unlink()
+    from_columns = read_run(tmp_path)
+    assert from_columns[0] == from_text[0] and repr(from_columns[1]) == repr(from_text[1])
+    assert not differences(from_text, from_columns).regressions
+    (tmp_path / "results.parquet").write_bytes(b"no columns")
+    with pytest.raises(InputError, match="is not a table written by"):
+        read_run(tmp_path)

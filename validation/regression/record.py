@@ -12,11 +12,12 @@ from fourbar.writing import write_text
 from validation.machine import machine, versions
 from validation.plain import plain
 from validation.results import Row, from_csv, to_csv
+from validation.suite.columns import read_columns
 from validation.tolerance import SIMULATED, K
 
 BASELINES = Path(__file__).parent.parent / "baselines"
 ACCEPTED = "accepted"
-TABLE, ABOUT = "results.csv", "record.json"
+TABLE, COLUMNS, ABOUT = "results.csv", "results.parquet", "record.json"
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,10 +48,13 @@ def read_run(path: Path) -> tuple[About, list[Row]]:
     Raises InputError where there is no readable table.
     """
     table = path / TABLE if path.is_dir() else path
+    long = path / COLUMNS
+    if not table.is_file() and long.is_file():  # too many rows for a text
+        table = long
     if not table.is_file():
         raise InputError("RESULTS", str(path), f"must be a folder with {TABLE}, or such a file")
     try:
-        rows = from_csv(table)
+        rows = list(read_columns(table)) if table.suffix == ".parquet" else from_csv(table)
     except (KeyError, TypeError, ValueError, csv.Error):  # a column, a cell or a number is missing, or it is no text
         raise InputError("RESULTS", str(table), "is not a table written by `run`") from None
     beside = table.parent / ABOUT

@@ -5,11 +5,13 @@ the Parquet file has one row group per chunk of scenes and is written as the chu
 """
 
 import os
+import sys
 from collections.abc import Iterator
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
+from validation.plain import plain
 from validation.results import COLUMNS, Row, to_csv
 
 CSV_ROWS = 1_000_000
@@ -42,6 +44,22 @@ def write_columns(chunks: Iterator[list[Row]], out: Path) -> dict[str, int]:
         text.unlink()
         (out / "results.csv").unlink(missing_ok=True)
     return first_lines
+
+
+def read_columns(path: Path) -> Iterator[Row]:
+    """The rows of a results.parquet, a row group at a time; words that recur are kept once."""
+    import pyarrow.parquet as pq
+
+    with pq.ParquetFile(path) as file:
+        for batch in file.iter_batches():
+            for cells in batch.to_pylist():
+                yield Row(
+                    **{name: sys.intern(plain(cell)) if isinstance(cell, str) else cell for name, cell in cells.items()}
+                )
+
+
+def _kept_once(cell: Any) -> Any:
+    return sys.intern(plain(cell)) if isinstance(cell, str) else cell
 
 
 def _by_column(rows: list[Row]) -> dict[str, list[Any]]:
