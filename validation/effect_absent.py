@@ -12,7 +12,7 @@ from pathlib import Path
 
 from fourbar.effects import REGISTRY
 from fourbar.errors import FourBarError
-from validation.effect_cost import REPEATS, available, cost
+from validation.effect_cost import REPEATS, available, counts
 from validation.witnesses import not_installed
 
 WORKLOADS = (
@@ -105,12 +105,12 @@ def compared(effects: tuple[str, ...]) -> Iterator[tuple[str, list[str], float |
             roots[effect].mkdir()
             build(roots[effect], effect)
         whole = made(roots[None])
-        counted = cost("formulas", "none", roots[None]).instructions if available() else None
+        counted = counts("formulas", ["none"], roots[None])["none"] if available() else None
         for effect in effects:
             differs = differences(whole, made(roots[effect]))
             more = None
             if counted is not None:
-                more = cost("formulas", "none", roots[effect]).instructions / counted - 1.0
+                more = counts("formulas", ["none"], roots[effect])["none"] / counted - 1.0
             yield effect, differs, more
 
 

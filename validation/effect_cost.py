@@ -1,4 +1,4 @@
-"""What each effect costs in each engine, in instructions: valgrind, two amounts of work, their difference.
+"""What each effect costs in each engine, in instructions: valgrind, of the work alone.
 
 Wall clock on a busy machine scatters by a third; instructions repeat to some 0.01 % where hashing
 and addresses are fixed (PYTHONHASHSEED, setarch -R) and one thread runs.
@@ -11,9 +11,8 @@ import shutil
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
 from pathlib import Path
 
 import click
@@ -22,26 +21,13 @@ from fourbar.errors import DependencyError, FourBarError, InputError
 from fourbar.writing import write_text
 from validation.effect_work import DEFAULT_FLAGS, EFFECTS, ENGINES, POSITIONS, flags
 
-AMOUNTS = {
-    "formulas": (4, 24),
-    "mujoco-simulated": (100, 1100),
-    "mujoco-inverse": (20, 120),
-    "pinocchio-inverse": (20, 120),
-}
-"""Two amounts of work for each engine; the difference leaves out start-up, import and compilation."""
+AMOUNTS = {"formulas": 4, "mujoco-simulated": 100, "mujoco-inverse": 40, "pinocchio-inverse": 40}
+"""Work that is counted, in steps or positions, of the formulas in thousands of positions."""
+BRACKET = "ffi_call"
+"""The function of libffi within which a workload runs."""
 NO_COUNTERPART = {("mujoco-simulated", "pin_friction"), ("mujoco-simulated", "load over theta_2")}
 REPEATS = 1e-3
 """Counts of the same work differ by less than this part."""
-
-
-@dataclass(frozen=True, slots=True)
-class Cost:
-    """Instructions of one engine with one effect."""
-
-    engine: str
-    effect: str
-    instructions: float
-    """Per step of the simulation, else per position."""
 
 
 def available() -> bool:
@@ -49,30 +35,27 @@ def available() -> bool:
     return shutil.which("valgrind") is not None and shutil.which("setarch") is not None
 
 
-def count(engine: str, effect: str, amount: int, root: Path | None = None) -> int:
-    """Instructions of a whole process that does an amount of work, from another checkout where one is given."""
+def counts(engine: str, effects: Sequence[str], root: Path | None = None) -> dict[str, float]:
+    """Instructions of each effect per step or position, from another checkout where one is given."""
     if not available():
         raise DependencyError("valgrind and setarch are needed to count instructions")
     here = Path(__file__).parent.parent if root is None else root
+    amount = AMOUNTS[engine]
     threads = {name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")}
     with tempfile.TemporaryDirectory() as folder:  # MuJoCo writes its log where it runs
         told = {**os.environ, **threads, "PYTHONHASHSEED": "0", "PYTHONPATH": str(here), "PYTHONDONTWRITEBYTECODE": "1"}
-        command = ["setarch", platform.machine(), "-R", "valgrind", "--tool=cachegrind", "--cache-sim=no"]
-        command += ["--cachegrind-out-file=/dev/null", sys.executable, "-m", "validation.effect_work"]
-        done = subprocess.run(
-            [*command, engine, effect, str(amount)], env=told, cwd=folder, capture_output=True, text=True, check=False
+        command = ["setarch", platform.machine(), "-R", "valgrind", "--tool=callgrind", "--callgrind-out-file=counted"]
+        command += ["--collect-atstart=no", f"--toggle-collect={BRACKET}", f"--dump-after={BRACKET}"]
+        command += [sys.executable, "-m", "validation.effect_work", engine, str(amount), *effects]
+        done = subprocess.run(command, env=told, cwd=folder, capture_output=True, text=True, check=False)
+        dumps = sorted(Path(folder).glob("counted.*"), key=lambda path: int(path.suffix[1:]))
+        totals = [re.findall(r"^totals: (\d+)", dump.read_text(), re.MULTILINE) for dump in dumps[-len(effects) :]]
+    if done.returncode or len(totals) < len(effects) or not all(totals):
+        raise FourBarError(
+            f"{engine} with {', '.join(effects)} did not run under valgrind: {done.stderr.strip()[-300:]}"
         )
-    found = re.search(r"I\s+refs:\s+([\d,]+)", done.stderr)
-    if done.returncode or found is None:
-        raise FourBarError(f"{engine} with {effect} did not run under valgrind: {done.stderr.strip()[-300:]}")
-    return int(found[1].replace(",", ""))
-
-
-def cost(engine: str, effect: str, root: Path | None = None) -> Cost:
-    """Instructions per step or position: the difference of two amounts of work."""
-    few, many = AMOUNTS[engine]
-    per_unit = (count(engine, effect, many, root) - count(engine, effect, few, root)) / (many - few)
-    return Cost(engine, effect, per_unit / (POSITIONS if engine == "formulas" else 1))
+    units = amount * (POSITIONS if engine == "formulas" else 1)
+    return {effect: int(total[-1]) / units for effect, total in zip(effects, totals, strict=True)}
 
 
 def pairs(engines: tuple[str, ...], effects: tuple[str, ...]) -> list[tuple[str, str]]:
@@ -83,10 +66,13 @@ def pairs(engines: tuple[str, ...], effects: tuple[str, ...]) -> list[tuple[str,
     return found
 
 
-def costs(asked: list[tuple[str, str]], workers: int) -> Iterator[Cost]:
-    """Instructions of each, as they come."""
+def costs(asked: list[tuple[str, str]], workers: int) -> dict[tuple[str, str], float]:
+    """Instructions of each; one process for each engine."""
+    engines = list(dict.fromkeys(engine for engine, _ in asked))
+    effects = [[effect for engine, effect in asked if engine == each] for each in engines]
     with ThreadPoolExecutor(workers) as pool:
-        yield from pool.map(lambda pair: cost(*pair), asked)
+        found = pool.map(counts, engines, effects)
+    return {(engine, name): n for engine, of in zip(engines, found, strict=True) for name, n in of.items()}
 
 
 @click.command(name="effects-cost")
@@ -96,7 +82,7 @@ def costs(asked: list[tuple[str, str]], workers: int) -> Iterator[Cost]:
 @click.option("--out", type=click.Path(path_type=Path, dir_okay=False), help="Write the table as Markdown too.")
 @click.option("--absent", is_flag=True, help="Look instead for any trace of an effect in a build without it: none.")
 def command(engines: str, effects: str | None, workers: int, out: Path | None, absent: bool) -> int:
-    """Count the instructions that each effect costs in each engine (valgrind; half an hour for all)."""
+    """Count the instructions that each effect costs in each engine (valgrind; some minutes)."""
     if absent:
         return check_absent()
     asked = tuple(name.strip() for name in engines.split(","))
@@ -115,11 +101,9 @@ def command(engines: str, effects: str | None, workers: int, out: Path | None, a
     from validation.effect_table import Entry, markdown, show
 
     work = pairs(asked, chosen)
-    counted = list(track(costs(work, workers), total=len(work), description="instructions", transient=True))
+    counted = costs(work, workers)
     clocked = [ratio(*pair) for pair in track(work, description="wall clock", transient=True)]  # by itself, undisturbed
-    entries = [
-        Entry(one.engine, one.effect, one.instructions, times) for one, times in zip(counted, clocked, strict=True)
-    ]
+    entries = [Entry(*pair, counted[pair], times) for pair, times in zip(work, clocked, strict=True)]
     show(entries)
     if out is not None:
         write_text(out, markdown(entries))

@@ -9,8 +9,8 @@ from validation.machine import machine, versions
 
 COMMAND = "python -m validation cost --effects"
 ABOUT = (
-    "Instructions per position, per step of the simulation (RK4), counted by valgrind as the difference of two amounts "
-    "of work, and relative to the scene without effects; counts of the same work repeat to 0.1 %. In brackets the wall "
+    "Instructions per position, per step of the simulation (RK4), counted by valgrind within the work alone, and "
+    "relative to the scene without effects; counts of the same work repeat to 0.1 %. In brackets the wall "
     "clock of runs with and without in turn: the median of the ratios and their middle half. It scatters with whatever "
     "else the machine does."
 )

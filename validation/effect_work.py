@@ -1,5 +1,6 @@
-"""One workload for counting its instructions: `python -m validation.effect_work ENGINE EFFECT AMOUNT`."""
+"""Workloads for counting their instructions: `python -m validation.effect_work ENGINE AMOUNT EFFECT...`."""
 
+import ctypes
 import gc
 import math
 import re
@@ -110,14 +111,30 @@ ENGINES: dict[str, Callable[[str], Callable[[int], Any]]] = {
 }
 
 
+def bracketed(work: Callable[[int], Any], amount: int) -> None:
+    """The work within one call of C through ctypes: valgrind counts what runs inside `ffi_call`, and nothing else."""
+
+    def called(*_: object) -> int:
+        work(amount)
+        return 0
+
+    compares = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p)(called)
+    one = ctypes.create_string_buffer(8)
+    # a search among one element compares once
+    ctypes.CDLL(None).bsearch(one, one, ctypes.c_size_t(1), ctypes.c_size_t(8), compares)
+
+
 def main() -> None:
-    """Prepare, then work; nothing is printed, so that nothing but the work differs between two amounts."""
-    engine, effect, amount = sys.argv[1:4]
-    work = ENGINES[engine](effect)
-    work(2)
+    """Prepare everything asked for, then work, each by itself; what the first bracket finds unprepared is its own."""
+    engine, amount, *effects = sys.argv[1:]
+    works = [ENGINES[engine](effect) for effect in effects]
+    for work in works:
+        work(2)
     gc.collect()
     gc.disable()
-    work(int(amount))
+    bracketed(works[0], 2)
+    for work in works:
+        bracketed(work, int(amount))
 
 
 if __name__ == "__main__":
