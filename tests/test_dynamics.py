@@ -350,3 +350,24 @@ def test_what_touches_is_up_to_the_rounding_of_the_lengths() -> None:
     assert wide == triangle(0.3, 0.1, 0.25, 0.22)
     products = 0.47**2 - 0.4**2, 0.2**2 - 0.03**2
     assert wide[4:] == pytest.approx(products)
+
+
+def test_half_angles_keep_their_digits_after_many_turns() -> None:
+    """sin h and cos h near their zeros, where the rounding of theta_2 - theta_1 is what is left of them."""
+    shape = triangle(0.3, 0.1, 0.25, 0.22)
+    for theta_1 in (0.4, -2.9, 3.1):
+        for turns in (0, 3, 800, -800):
+            q = theta_1 + 2.0 * np.pi * turns + np.array([1e-9, 0.7, np.pi + 1e-9])
+            found = half_angle(shape, theta_1, q)
+            with mp.workdps(50):
+                h = [(mp.mpf(x) - mp.mpf(theta_1)) / 2 for x in q.tolist()]
+                for ours, exact in ((found.s, mp.sin), (found.k, mp.cos)):
+                    assert all(abs(mp.mpf(x) / exact(y) - 1) <= 8 * EPS for x, y in zip(ours.tolist(), h, strict=True))
+
+
+def test_a_drive_on_a_bar_that_stands_is_quiet() -> None:
+    """A folded kite has B on O2: bar 4 stands still, and no torque on it is found."""
+    kite = fourbar.FourBar(2.0, fourbar.Bar(1.0, 1.0), fourbar.Bar(1.0, 1.0), fourbar.Bar(2.0, 1.0))
+    way = path(kite, np.array([1.0]), np.array([-1.0]))
+    standing = Path(way.unit, {**way.first, 4: np.zeros(1)}, way.second, way.slip, way.sine)
+    assert not np.isfinite(driving_torque(kite, standing, 2.0, 1.0, (fourbar.Gravity(),), 4)).any()
