@@ -53,9 +53,8 @@ def read_columns(path: Path) -> Iterator[Row]:
     with pq.ParquetFile(path) as file:
         for batch in file.iter_batches():
             for cells in batch.to_pylist():
-                yield Row(
-                    **{name: sys.intern(plain(cell)) if isinstance(cell, str) else cell for name, cell in cells.items()}
-                )
+                kept: dict[str, Any] = {name: _kept_once(cell) for name, cell in cells.items()}
+                yield Row(**kept)
 
 
 def _kept_once(cell: Any) -> Any:
