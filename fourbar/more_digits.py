@@ -14,11 +14,16 @@ are allowed in the velocities multiply each other in the torque, whose own sensi
 SHORT_GROUND = 1.0 / 8.0
 """Of the input. Below it the bars turn nearly as one body: their centripetal forces cancel in the torque."""
 
+SHORT_INPUT = 1.0 / 64.0
+"""Of the ground. Below it the diagonal hardly leaves the ground's line, and forces along it have a component that is
+small beside the other, with digits of its own."""
+
 
 def needing_more_digits(state: State) -> NDArray[np.intp]:
     """Indices of the positions for the second pass; none in ordinary linkages away from change points."""
     linkage = state.linkage
-    if linkage.ground < SHORT_GROUND * linkage.input.length:
+    a, d = linkage.input.length, linkage.ground
+    if d < SHORT_GROUND * a or a < SHORT_INPUT * d:
         hard = np.ones(state.theta_2.shape, dtype=bool)
     else:
         near_sine, near_angle = NEAR
