@@ -5,6 +5,7 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -195,8 +196,9 @@ def test_a_worker_killed_at_random_moments_changes_no_byte(tmp_path: Path, undis
             wait_for_parts(out, process, at_least=1 + kills - before)
             workers = workers_of(process)
             if workers:
-                os.kill(workers[int(rng.integers(len(workers)))], signal.SIGKILL)
-                kills += 1
+                with suppress(ProcessLookupError):
+                    os.kill(workers[int(rng.integers(len(workers)))], signal.SIGKILL)
+                    kills += 1
         assert process.wait(timeout=100) == 0
         assert kills > before
         assert (out / "results.csv").read_bytes() == (undisturbed / "results.csv").read_bytes()
