@@ -21,8 +21,8 @@ from fourbar.errors import DependencyError, FourBarError, InputError
 from fourbar.writing import write_text
 from validation.effect_work import DEFAULT_FLAGS, EFFECTS, ENGINES, POSITIONS, flags
 
-AMOUNTS = {"formulas": 4, "mujoco-simulated": 100, "mujoco-inverse": 40, "pinocchio-inverse": 40}
-"""Work that is counted, in steps or positions, of the formulas in thousands of positions."""
+AMOUNTS = {"formulas": (1, 5), "mujoco-simulated": (10, 210), "mujoco-inverse": (5, 45), "pinocchio-inverse": (5, 45)}
+"""Two amounts of work, in steps or positions, of the formulas in thousands of positions: their difference counts."""
 BRACKET = "ffi_call"
 """The function of libffi within which a workload runs."""
 NO_COUNTERPART = {("mujoco-simulated", "pin_friction"), ("mujoco-simulated", "load over theta_2")}
@@ -40,22 +40,23 @@ def counts(engine: str, effects: Sequence[str], root: Path | None = None) -> dic
     if not available():
         raise DependencyError("valgrind and setarch are needed to count instructions")
     here = Path(__file__).parent.parent if root is None else root
-    amount = AMOUNTS[engine]
+    few, many = AMOUNTS[engine]
     threads = {name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")}
     with tempfile.TemporaryDirectory() as folder:  # MuJoCo writes its log where it runs
         told = {**os.environ, **threads, "PYTHONHASHSEED": "0", "PYTHONPATH": str(here), "PYTHONDONTWRITEBYTECODE": "1"}
         command = ["setarch", platform.machine(), "-R", "valgrind", "--tool=callgrind", "--callgrind-out-file=counted"]
         command += ["--collect-atstart=no", f"--toggle-collect={BRACKET}", f"--dump-after={BRACKET}"]
-        command += [sys.executable, "-m", "validation.effect_work", engine, str(amount), *effects]
+        command += [sys.executable, "-m", "validation.effect_work", engine, str(few), str(many), *effects]
         done = subprocess.run(command, env=told, cwd=folder, capture_output=True, text=True, check=False)
         dumps = sorted(Path(folder).glob("counted.*"), key=lambda path: int(path.suffix[1:]))
-        totals = [re.findall(r"^totals: (\d+)", dump.read_text(), re.MULTILINE) for dump in dumps[-len(effects) :]]
-    if done.returncode or len(totals) < len(effects) or not all(totals):
+        totals = [re.findall(r"^totals: (\d+)", dump.read_text(), re.MULTILINE) for dump in dumps[-2 * len(effects) :]]
+    if done.returncode or len(totals) < 2 * len(effects) or not all(totals):
         raise FourBarError(
             f"{engine} with {', '.join(effects)} did not run under valgrind: {done.stderr.strip()[-300:]}"
         )
-    units = amount * (POSITIONS if engine == "formulas" else 1)
-    return {effect: int(total[-1]) / units for effect, total in zip(effects, totals, strict=True)}
+    each = iter(int(total[-1]) for total in totals)
+    units = (many - few) * (POSITIONS if engine == "formulas" else 1)
+    return {effect: (more - less) / units for effect, less, more in zip(effects, each, each, strict=False)}
 
 
 def pairs(engines: tuple[str, ...], effects: tuple[str, ...]) -> list[tuple[str, str]]:

@@ -1,4 +1,4 @@
-"""Workloads for counting their instructions: `python -m validation.effect_work ENGINE AMOUNT EFFECT...`."""
+"""Workloads for counting their instructions: `python -m validation.effect_work ENGINE FEW MANY EFFECT...`."""
 
 import ctypes
 import gc
@@ -125,16 +125,16 @@ def bracketed(work: Callable[[int], Any], amount: int) -> None:
 
 
 def main() -> None:
-    """Prepare everything asked for, then work, each by itself; what the first bracket finds unprepared is its own."""
-    engine, amount, *effects = sys.argv[1:]
+    """Prepare everything asked for, then work, each by itself, a little and more: what a call costs is in both."""
+    engine, few, many, *effects = sys.argv[1:]
     works = [ENGINES[engine](effect) for effect in effects]
     for work in works:
         work(2)
     gc.collect()
     gc.disable()
-    bracketed(works[0], 2)
     for work in works:
-        bracketed(work, int(amount))
+        bracketed(work, int(few))
+        bracketed(work, int(many))
 
 
 if __name__ == "__main__":
