@@ -274,6 +274,20 @@ def test_a_motion_through_time_is_drawn_over_time(scene: fourbar.Scene) -> None:
         assert all(axes.get_xlabel().endswith(("(s)", "m)")) for axes in flat)
 
 
+def test_branches_that_are_released_for_different_times_share_their_scales() -> None:
+    bars = [fourbar.Bar(0.22, 0.5), fourbar.Bar(0.25, 0.8), fourbar.Bar(0.2, 0.4)]
+    motion = fourbar.Motion(math.radians(60.0), 0.0, free=fourbar.Free(2.0, 200))
+    scene = fourbar.Scene(fourbar.FourBar(0.3, *bars), motion, effects=(fourbar.Gravity(),))
+    lasting = [len(view(on_branch(scene, sign)).sweep) for sign in (1, -1)]
+    assert lasting[0] != lasting[1]  # each stops at a limit position of its own
+    for name in ("kinematics", "energy"):
+        axes = composed(scene, name, "both").axes
+        half = len(axes) // 2
+        for one, other in zip(axes[:half], axes[half:], strict=True):
+            assert (one.get_xlim(), one.get_ylim()) == (other.get_xlim(), other.get_ylim())
+            assert (one.get_xlabel(), one.get_ylabel()) == (other.get_xlabel(), other.get_ylabel())
+
+
 def test_the_position_of_a_motion_through_time_is_one_that_it_passes(tmp_path: Path) -> None:
     shown = view(released(), position=0.3)
     k = int(np.argmin(np.abs(shown.sweep.theta_2 - 0.3)))

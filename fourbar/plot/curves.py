@@ -56,7 +56,8 @@ def _bases(axes: "Axes", view: View) -> Array:
     over, here = view.degrees, math.degrees(float(view.here.theta_2[0]))
     if view.time is not None:
         assert view.here.time is not None
-        factor, unit = (1.0, "s") if view.time[-1] >= 1.0 else unit_for(float(view.time[-1]), "s")
+        longest = max(float(other.time[-1]) for other in view.alike if other.time is not None)
+        factor, unit = (1.0, "s") if longest >= 1.0 else unit_for(longest, "s")
         over, here = factor * view.time, factor * float(view.here.time[0])
         axes.set_xlabel(f"$t$ ({unit})")
     else:
@@ -140,7 +141,7 @@ def draw_angles(axes: "Axes", view: View) -> None:
     for bar in bars:
         values = np.degrees(getattr(view.sweep, f"theta_{bar}"))
         axes.plot(over, values, color=BAR_COLOURS[bar], ls=BAR_DASHES[bar], label=rf"$\theta_{bar}$")
-    shown = [np.degrees(getattr(other.sweep, f"theta_{bar}")) for other in view.alike for bar in bars]
+    shown = np.concatenate([np.degrees(getattr(other.sweep, f"theta_{bar}")) for other in view.alike for bar in bars])
     degree_ticks(axes.yaxis, 1.3 * float(np.nanmax(shown) - np.nanmin(shown)) + 1e-9)
     axes.set_ylabel(r"$\theta$ (°)" if len(bars) > 2 else r"$\theta_3,\ \theta_4$ (°)")
     axes.set_title("Angles of the bars" if len(bars) > 2 else "Angles of coupler and output")
