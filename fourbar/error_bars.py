@@ -27,10 +27,10 @@ LAST_DIGIT = 1.01 * 2.0**-53
 """Relative: x + x LAST_DIGIT is the next double, whatever x."""
 LAST_ROUNDING = 2.0**-56
 """An error of rounding to nearest, whose largest is 2^-53, is above this in 7 cases of 8."""
-TYPICAL = 0.3
+TYPICAL = 0.4
 """The error bar as a share of the root mean square. That holds the error of the answer besides the scatter, sqrt 2
-times either, so the bar is 0.42 standard deviations: 3 in 100 000 normal errors exceed ten bars, and 3 in 1000 are
-below a hundredth of one."""
+times either, so the bar is 0.57 standard deviations: 2 in 100 million normal errors exceed ten bars, and 5 in 1000
+are below a hundredth of one."""
 
 
 def error_bars(state: State, pins: PinForces, terms: Iterable[Term], drive_bar: int) -> dict[str, Array]:

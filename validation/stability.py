@@ -26,6 +26,9 @@ FACTOR = 8.0
 """Of eps, as the contract states it."""
 TOO_SMALL, TOO_LARGE = 10.0, 100.0
 """An error bar may be this much smaller (never) and this much larger (in 99 % of the samples) than the error."""
+HALF_A_DIGIT = 2.0**-53
+"""Of a result: an error below that is chance, for no double need be nearer to the truth. A bar is held to be too
+large against no less."""
 FULL = 10_000
 """Samples per family of the full set."""
 CHUNK = 250
@@ -260,11 +263,16 @@ def judge(scene: Scene, tally: Tally, sample: str) -> None:
         return
     assert solution.status_code[0] == OK or "torque" in errors
     force = max(math.hypot(errors[f"{name}_x"], errors[f"{name}_y"]) for name in FORCES)
-    for name, error in (("torque_error", errors["torque"]), ("force_error", force)):
+    strongest = max(math.hypot(*getattr(solution, name)[0]) for name in FORCES)
+    assert solution.torque is not None
+    for name, error, size in (
+        ("torque_error", errors["torque"], abs(solution.torque[0])),
+        ("force_error", force, strongest),
+    ):
         bar = float(getattr(solution, name)[0])
         ratio = 0.0 if error == 0.0 else error / bar if bar else math.inf
         tally.too_small[name] = max(tally.too_small.get(name, 0.0), math.inf if math.isnan(ratio) else ratio)
-        tally.too_large[name] = tally.too_large.get(name, 0) + (bar > TOO_LARGE * error)
+        tally.too_large[name] = tally.too_large.get(name, 0) + (bar > TOO_LARGE * max(error, HALF_A_DIGIT * size))
 
 
 def _ratio(name: str, ours: float, value: Any, sensitivity: float) -> tuple[float, float]:
