@@ -16,6 +16,7 @@ from fourbar.errors import InputError
 from tests.test_suite import COUNT, EXACT, KILLS, SEED, TYPES, judge_all
 from validation.report.summary import Summary
 from validation.run import run
+from validation.suite import pool
 from validation.suite.scenes import Random
 
 distributed = pytest.importorskip("distributed", reason="Dask is optional")
@@ -77,3 +78,12 @@ def test_no_scheduler_is_one_line(address: str, tmp_path: Path) -> None:
     with dask.config.set({"distributed.comm.timeouts.connect": "1s"}), pytest.raises(InputError) as caught:
         list(run(Random(1, SEED, TYPES), tmp_path, EXACT, scheduler=address))
     assert "must be the address of a Dask scheduler" in str(caught.value) and "\n" not in str(caught.value)
+
+
+def test_a_scheduler_without_workers_is_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(pool, "STALL", 0.5)
+    with (
+        distributed.LocalCluster(n_workers=0, dashboard_address=None, host="127.0.0.1") as empty,
+        pytest.raises(pool.NoWorkersError, match="no workers; start some"),
+    ):
+        list(run(Random(1, SEED, TYPES), tmp_path, EXACT, scheduler=empty.scheduler_address))

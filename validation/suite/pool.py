@@ -10,7 +10,7 @@ from concurrent.futures import FIRST_COMPLETED, Future, wait
 from dataclasses import replace
 from importlib import import_module
 
-from fourbar.errors import InputError
+from fourbar.errors import DependencyError, InputError
 from validation.judge import breakdown, judged_page
 from validation.page import Page
 from validation.plain import plain
@@ -36,6 +36,10 @@ Chunk = tuple[int, range]
 
 class StalledError(Exception):
     """The workers no longer take up tasks."""
+
+
+class NoWorkersError(DependencyError):
+    """The scheduler has no workers."""
 
 
 def part(suite: Suite, scenes: Sequence[int]) -> tuple[Suite, Sequence[int]]:
@@ -105,7 +109,7 @@ def _over_one_pool(
                 )
                 return future
 
-            yield from _as_done(suite, chunks, witnesses, submit, IN_FLIGHT * workers)
+            yield from _as_done(suite, chunks, witnesses, submit, IN_FLIGHT * workers, _idle)
         except BaseException:
             pool.stop()  # type: ignore[no-untyped-call]
             raise
@@ -131,8 +135,13 @@ def over_machines(
             future: Future[list[Page]] = executor.submit(judge_watched, seconds, *part(suite, scenes), asked, draw)
             return future
 
-        # the scheduler finds other workers for what a lost one had; there is nothing here to make anew
-        yield from _as_done(suite, chunks, witnesses, submit, IN_FLIGHT * workers, stall=None)
+        def deserted(_: Iterable[Future[list[Page]]]) -> bool:
+            return not client.scheduler_info()["workers"]
+
+        try:
+            yield from _as_done(suite, chunks, witnesses, submit, IN_FLIGHT * workers, deserted)
+        except StalledError:
+            raise NoWorkersError(f"{scheduler}: no workers; start some, what is finished is kept") from None
 
 
 def _as_done(
@@ -141,7 +150,7 @@ def _as_done(
     witnesses: Sequence[Witness],
     submit: Callable[[Sequence[int], Sequence[Witness]], "Future[list[Page]]"],
     in_flight: int,
-    stall: float | None = STALL,
+    lost: "Callable[[Iterable[Future[list[Page]]]], bool]",
 ) -> Iterator[tuple[int, list[Page]]]:
     """Keep a bounded number of chunks under way; yield each as it is done."""
     waiting = iter(chunks)
@@ -156,8 +165,8 @@ def _as_done(
                 under_way[submit(chunk[1], witnesses)] = chunk
         if not under_way:
             return
-        done, _ = wait(under_way, stall, FIRST_COMPLETED)
-        if not done and not any(future.running() for future in under_way):
+        done, _ = wait(under_way, STALL, FIRST_COMPLETED)
+        if not done and lost(under_way):
             raise StalledError
         for future in done:
             number, scenes = under_way.pop(future)
@@ -166,16 +175,21 @@ def _as_done(
             except StalledError:
                 raise
             except Exception:  # the worker died or hung; find out on whose account
-                yield number, [_alone(suite, scene, witnesses, submit, stall) for scene in scenes]
+                yield number, [_alone(suite, scene, witnesses, submit, lost) for scene in scenes]
 
 
-def _outcome(future: "Future[list[Page]]", stall: float | None) -> list[Page]:
+def _idle(under_way: "Iterable[Future[list[Page]]]") -> bool:
+    """Whether no process of the pool works on any of them."""
+    return not any(future.running() for future in under_way)
+
+
+def _outcome(future: "Future[list[Page]]", lost: "Callable[[Iterable[Future[list[Page]]]], bool]") -> list[Page]:
     """The result of a task, or StalledError where no worker takes it up."""
     while True:
-        wait([future], stall)
+        wait([future], STALL)
         if future.done():
             return future.result()
-        if not future.running():
+        if lost([future]):
             raise StalledError
 
 
@@ -184,30 +198,30 @@ def _alone(
     scene: int,
     witnesses: Sequence[Witness],
     submit: Callable[[Sequence[int], Sequence[Witness]], "Future[list[Page]]"],
-    stall: float | None,
+    lost: "Callable[[Iterable[Future[list[Page]]]], bool]",
 ) -> Page:
     """One scene by itself, and if that breaks down too, one engine at a time."""
     try:
-        return _outcome(submit([scene], witnesses), stall)[0]
+        return _outcome(submit([scene], witnesses), lost)[0]
     except StalledError:
         raise
     except Exception:
         pass
     name = plain(suite.name(scene))
     page: Page | None = None
-    lost = []
+    failed = []
     for asked in ([], *([witness] for witness in witnesses)):
         for attempt in range(ATTEMPTS):
             try:
-                part = _outcome(submit([scene], asked), stall)[0]
+                part = _outcome(submit([scene], asked), lost)[0]
             except StalledError:
                 raise
             except Exception as error:
                 if getattr(error, "exitcode", None) == KILLED and attempt + 1 < ATTEMPTS:
                     continue  # somebody killed it: that is not the engine's doing
-                lost.append(breakdown(name, asked[0].name if asked else "formulas", error))
+                failed.append(breakdown(name, asked[0].name if asked else "formulas", error))
             else:
                 page = part if page is None else page.joined(part)
             break
     page = page or Page(name)
-    return replace(page, rows=[*page.rows, *lost])
+    return replace(page, rows=[*page.rows, *failed])
