@@ -41,10 +41,11 @@ def _sums(name: str, scene: Scene, at: Command, solution: Solution) -> list[Row]
     add_accelerations(state, at.alpha_2)
     # what acts in the directions and at the speeds that were answered, not at another evaluation of them
     hard = needing_more_digits(state)
-    finer, *_ = restated(state, at.omega_2, at.alpha_2, hard)
-    for number in MOVING_BARS:
-        for component, digits in zip(state.unit(number), finer.unit(number), strict=True):
-            component[hard] = rounded(digits)
+    if hard.size:
+        finer, *_ = restated(state, at.omega_2, at.alpha_2, hard)
+        for number in MOVING_BARS:
+            for component, digits in zip(state.unit(number), finer.unit(number), strict=True):
+                component[hard] = rounded(digits)
     state.omega_3, state.omega_4 = solution.omega_3, solution.omega_4
     acting = Wrenches(state)
     for term in (*scene.loads, *scene.effects):
