@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 EFFECTS: dict[str, "Callable[[], Effect | None]"] = {
     "none": lambda: None,
-    "gravity": kinds.Gravity,
+    "gravity": lambda: kinds.Gravity(9.81),
     "viscous": lambda: kinds.Viscous.at(O2=0.01, A=0.01, O4=0.01),
     "viscous, pin B": lambda: kinds.Viscous.at(B=0.01),
     "friction": lambda: kinds.Friction.at(O2=0.01, A=0.01, O4=0.01),
