@@ -60,6 +60,12 @@ def error_bars(state: State, pins: PinForces, terms: Iterable[Term], drive_bar: 
             forces[k] += rounded(after[0] - before[0]) ** 2 + rounded(after[1] - before[1]) ** 2
     scale = TYPICAL / math.sqrt(EVALUATIONS)
     torque_error, force_error = scale * np.sqrt(torque), scale * np.sqrt(forces.max(axis=0))
+    if state.parallel is not None:
+        # the torque is what the components of a force leave of each other, and none of the changes is a force's own
+        bar, force = {2: (2, pins.F32), 3: (3, pins.F43), 4: (4, pins.F43)}[drive_bar]
+        (ux, uy), (fx, fy) = state.unit(bar), force
+        left = state.linkage.bar(bar).length * (np.abs(ux * fy) + np.abs(uy * fx))
+        torque_error += np.where(state.parallel[0], LAST_ROUNDING * left, 0.0)
     sizes = [np.hypot(rounded(x), rounded(y)) for x, y in pins[:4]]
     torque_error += LAST_ROUNDING * np.abs(rounded(pins.torque))
     force_error += LAST_ROUNDING * np.max(sizes, axis=0)
@@ -91,6 +97,14 @@ def _moved_linkage(linkage: FourBar, signs: Iterator[float], *, all_of_it: bool)
     return replace(linkage, input=bar(linkage.input), coupler=bar(linkage.coupler), output=bar(linkage.output))
 
 
+def _unit_vector_beside(angle: Array, signs: Iterator[float]) -> tuple[Array, Array]:
+    """`unit_vector` with every rounding another: near a right angle its cosine is a small difference."""
+    t = _next(np.tan(0.5 * angle), signs)
+    squared = _next(t * t, signs)
+    w = _next(1.0 / (1.0 + squared), signs)
+    return (1.0 - squared) * w, 2.0 * t * w
+
+
 def _moved_state(state: State, linkage: FourBar, signs: Iterator[float]) -> State:
     """The motion of the changed linkage at the same positions, from a triangle changed in its last digits."""
     diagonal = diagonal_to_O4(linkage, state.theta_2, growths=signs)
@@ -103,14 +117,19 @@ def _moved_state(state: State, linkage: FourBar, signs: Iterator[float]) -> Stat
     moved.u2, moved.u3, moved.u4 = ((_next(u[0], signs), _next(u[1], signs)) for u in (moved.u2, moved.u3, moved.u4))
     if state.parallel is not None:
         # all that is lost is in the directions, each of several roundings; bars that turn as one are one here too
-        u2, u3, u4 = moved.u2, moved.u3, moved.u4
-        for _ in range(3):
-            u2, u3, u4 = ((_next(u[0], signs), _next(u[1], signs)) for u in (u2, u3, u4))
-        moved.u2, moved.u3, moved.u4 = u2, u3, u4
         together, folded = (
             state.parallel[0] & (state.parallel[1] == 1.0),
             state.parallel[0] & (state.parallel[1] == 0.0),
         )
+        if linkage.ground_angle != 0.0:
+            ground = _unit_vector_beside(np.asarray(linkage.ground_angle), signs)
+            moved.u2 = _unit_vector_beside(state.theta_2, signs)
+            moved.u3 = tuple(np.where(together, u, v) for u, v in zip(ground, moved.u3, strict=True))  # type: ignore[assignment]
+            moved.u4 = tuple(np.where(folded, -u, v) for u, v in zip(ground, moved.u4, strict=True))  # type: ignore[assignment]
+        u2, u3, u4 = moved.u2, moved.u3, moved.u4
+        for _ in range(3):
+            u2, u3, u4 = ((_next(u[0], signs), _next(u[1], signs)) for u in (u2, u3, u4))
+        moved.u2, moved.u3, moved.u4 = u2, u3, u4
         moved.u3 = tuple(np.where(folded, -u, v) for u, v in zip(moved.u2, moved.u3, strict=True))  # type: ignore[assignment]
         moved.u4 = tuple(np.where(together, u, v) for u, v in zip(moved.u2, moved.u4, strict=True))  # type: ignore[assignment]
     add_velocities(moved, state.omega_2)

@@ -68,4 +68,6 @@ class Wrenches:
     def _plus(self, total: Array | float, term: Array | float) -> Array | float:
         if self.growths is not None:
             term = term + next(self.growths) * term
+        if not isinstance(self.state.theta_2, np.ndarray):  # in 32 digits couples that doubles hold exactly add up so
+            term = term + 0.0 * self.state.theta_2
         return term if isinstance(total, float) and total == 0.0 else total + term
