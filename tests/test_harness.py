@@ -7,14 +7,14 @@ import pytest
 
 import fourbar
 from fourbar.mobility import limit_positions
-from fourbar.scene import Command, Scene
+from fourbar.scene import Command, Scene, command
 from tests.scenes import crank_rocker
 from validation.answer import Answer
 from validation.compare import COMPARED
 from validation.judge import judge
 from validation.results import AGREES, DEGRADED, FAILS, REFUSES, Row, from_csv, to_csv, write_results
 from validation.tolerance import EPS, EQUIVALENCE, K
-from validation.witnesses import Witness
+from validation.witnesses import WITNESSES, Witness, predicting_from
 
 
 class Echo:
@@ -144,3 +144,14 @@ def test_results_survive_the_file(tmp_path) -> None:  # type: ignore[no-untyped-
     assert [(r.scene, r.engine, r.setting, r.quantity) for r in again] == sorted(
         (r.scene, r.engine, r.setting, r.quantity) for r in rows
     )
+
+
+def test_an_engine_that_raised_an_alarm_is_excused_by_no_prediction_of_its_own() -> None:
+    scene = crank_rocker()
+    at = command(scene)
+    witness = next(witness for witness in WITNESSES if witness.predictor == "own")
+    answer = Answer(witness.name, "RK4", at, predicted={"torque": np.ones(len(at.theta_2))})
+    predicted = predicting_from(witness, scene, at, answer)
+    assert predicted is not None and predicted()["torque"][0] == 1.0
+    answer.alarms.append("the loop is open")
+    assert predicting_from(witness, scene, at, answer) is None

@@ -117,10 +117,12 @@ WITNESSES = (
 def predicting_from(
     witness: Witness, scene: Scene, at: Command, answer: Answer
 ) -> Callable[[], dict[str, Array]] | None:
-    """What computes the errors to be expected, should any be called for."""
+    """What computes the errors to be expected, should any be called for; an alarm leaves an engine no own excuse."""
     if not witness.predictor or answer.refusal is not None:
         return None
     if witness.predictor == "own":
+        if answer.alarms:
+            return None
         zero = np.zeros(len(at.theta_2))
         return lambda: {quantity: answer.predicted.get(quantity, zero) for quantity in witness.expected}
     module, _, name = witness.predictor.partition(":")
