@@ -16,6 +16,7 @@ from fourbar.dynamics import (
     inertia,
     kinetic_energy,
     path,
+    trace,
     triangle,
 )
 from fourbar.mobility import limit_positions, on_smooth_path
@@ -371,3 +372,16 @@ def test_a_drive_on_a_bar_that_stands_is_quiet() -> None:
     way = path(kite, np.array([1.0]), np.array([-1.0]))
     standing = Path(way.unit, {**way.first, 4: np.zeros(1)}, way.second, way.slip, way.sine)
     assert not np.isfinite(driving_torque(kite, standing, 2.0, 1.0, (fourbar.Gravity(),), 4)).any()
+
+
+def test_directions_are_unit_vectors_and_the_last_rate_is_that_of_bar_4_against_bar_3() -> None:
+    lengths = (0.3, 0.3 + 1e-9, 0.25, 0.25 - 1e-9)  # A passes O4 at a billionth of the bars
+    q = np.concatenate([np.linspace(0.3, 1.5, 20), np.linspace(-1e-8, 1e-8, 40)])
+    for sign in (1.0, -1.0):
+        with np.errstate(invalid="ignore"):
+            u_3, u_4, t_3, t_4, _, _, _, apart, _ = trace(triangle(*lengths), 0.0, q, sign, follow=False)
+        closed = np.isfinite(t_3)
+        assert closed.sum() > 30 and closed[:20].all()
+        for u in (u_3, u_4):
+            assert np.all(np.abs(np.abs(u[closed]) - 1.0) <= 2 * EPS)
+        assert np.all(np.abs(apart - (t_4 - t_3))[:20] <= 64 * EPS * (np.abs(t_3) + np.abs(t_4))[:20])
