@@ -57,6 +57,22 @@ def test_an_error_of_a_billionth_is_found_and_shrunk(monkeypatch: pytest.MonkeyP
     assert examine.findings(loads(kept.read_text(encoding="utf-8")))
 
 
+@pytest.mark.parametrize(("times", "found"), [(9.0, False), (11.0, True)])
+def test_a_force_that_vanishes_is_held_to_its_prediction(
+    monkeypatch: pytest.MonkeyPatch, times: float, found: bool
+) -> None:
+    """Relative to 0 no error has a size: it is judged in newtons, and not left unjudged."""
+    scene = loads((KEPT / "bar_with_all_mass_stands_for_an_instant.toml").read_text(encoding="utf-8"))
+    witness = next(witness for witness in examine.EXACT if witness.name == "pinocchio-inverse")
+    solution = fourbar.solve(scene, "force")
+    assert solution.F12 is not None and not solution.F12.any()
+    answer = witness.engine().answer(scene, examine.command(scene))
+    wrong = np.array([[times, 0.0]])
+    answer.quantities["F12"] = wrong
+    rows = examine.compare("", scene, answer, solution, witness.tolerance, ("F12",), lambda: {"F12": np.ones(1)})
+    assert [row.verdict == "fails" for row in rows if row.quantity == "F12"] == [found]
+
+
 def test_a_traceback_is_a_finding(monkeypatch: pytest.MonkeyPatch) -> None:
     def broken(*_: object) -> None:
         raise ZeroDivisionError("oops")

@@ -100,13 +100,20 @@ def compare(
             rows.append(row(quantity, DEGRADED, "nothing can be told: no position at which both may be held to it"))
         else:
             yard = divisor(yardstick(quantity, scene, formulas, ours))
+            difference = angle_aware_difference(quantity, ours, theirs)
+            if predicted is not None:  # nothing to be relative to where the quantity vanishes: in its own unit
+                vanishing = yard == divisor(np.zeros(1))
+                yard = np.where(vanishing, 1.0, yard)
             with np.errstate(over="ignore"):
-                error = angle_aware_difference(quantity, ours, theirs) / yard
+                error = difference / yard
             condition = condition_of(quantity, scene.linkage, formulas)
             if predicted is None:
                 found = _by_condition(error, condition, where, tolerance)
             else:
-                found = _by_prediction(error, where, tolerance, partial(_relative, predicted, quantity, yard))
+                expected_error = partial(_relative, predicted, quantity, yard)
+                found = _by_prediction(
+                    error, where, np.where(vanishing, 0.0, tolerance.factor), tolerance, expected_error
+                )
             at = {"theta_2": formulas.theta_2[found.worst], "condition": condition[found.worst]}
             numbers = {"error": error[found.worst], "allowed": found.allowed, **at}
             rows.append(row(quantity, found.verdict, found.reason, **numbers))
@@ -179,22 +186,27 @@ def _by_condition(error: Array, condition: Array, where: Mask, tolerance: Tolera
     return _Finding(index, AGREES if ratio[index] <= 1.0 else FAILS, reason, allowed[index])
 
 
-def _by_prediction(error: Array, where: Mask, tolerance: Tolerance, predicted: Callable[[], Array]) -> _Finding:
-    """Errors against full accuracy, or else against what was predicted for each position; NaN always fails."""
-    beyond = where & ~(error <= tolerance.factor)
+def _by_prediction(
+    error: Array, where: Mask, full: Array, tolerance: Tolerance, predicted: Callable[[], Array]
+) -> _Finding:
+    """Errors against full accuracy, or else against what was predicted for each position; NaN always fails.
+
+    Full accuracy is 0 where the quantity vanishes; the error is in its own unit there.
+    """
+    beyond = where & ~(error <= full)
     expected = np.zeros_like(error)
     if beyond.any():
         expected = np.nan_to_num(predicted(), nan=0.0, posinf=np.inf)
-    allowed = np.maximum(tolerance.factor, TIMES_PREDICTED * expected)
+    allowed = np.maximum(full, TIMES_PREDICTED * expected)
     with np.errstate(divide="ignore", invalid="ignore"):
-        ratio = np.where(where, error / allowed, -1.0)
-    lost = expected >= 1.0  # first order says no more than that no digit is left
+        ratio = np.where(where & (error != 0.0), error / allowed, -1.0)
+    lost = np.where(full > 0.0, expected >= 1.0, expected == np.inf)  # first order says that no digit is left, no more
     ratio[lost] = np.minimum(ratio[lost], 1.0)
     ratio[where & ~np.isfinite(error)] = np.inf
-    index = int(np.argmax(np.where(beyond, ratio, -1.0) if beyond.any() else ratio))
+    index = int(np.argmax(np.where(beyond, ratio, -1.0) if beyond.any() else np.where(where, ratio, -2.0)))
     if not beyond.any():
         verdict, reason = AGREES, tolerance.name
-    elif expected[index] >= 1.0 and math.isfinite(error[index]):
+    elif lost[index] and math.isfinite(error[index]):
         verdict, reason = DEGRADED, f"nothing can be told: {expected[index]:.1e} of the value is predicted"
     elif ratio[index] <= 1.0:
         verdict, reason = DEGRADED, f"{error[index]:.1e} of {expected[index]:.1e} predicted for this position"

@@ -4,7 +4,7 @@ import warnings
 
 import numpy as np
 
-from fourbar.dynamics import acceleration, generalised_force, inertia, path
+from fourbar.dynamics import VANISHING, acceleration, generalised_force, inertia, path
 from fourbar.files import dump, loads
 from fourbar.scene import Command, Scene, command, solve
 from fourbar.solution import OK, Solution
@@ -85,7 +85,9 @@ def _back(scene: Scene, at: Command, solution: Solution) -> list[str]:
         Q = generalised_force(scene.linkage, way, at.omega_2, terms)
         driven = solution.torque * way.first[scene.drive_bar]
         alpha = acceleration(scene.linkage, way, at.omega_2, Q + driven)
-        sizes = np.abs(Q) + np.abs(driven) + np.abs(0.5 * J_1 * at.omega_2**2) + np.abs(J * at.alpha_2)
+        rate = np.where(at.omega_2 == 0.0, VANISHING, at.omega_2)  # dry friction at rest is the mean of two that cancel
+        pulls = sum(np.abs(generalised_force(scene.linkage, way, rate, (term,))) for term in terms)
+        sizes = pulls + np.abs(driven) + np.abs(0.5 * J_1 * at.omega_2**2) + np.abs(J * at.alpha_2)
         error = np.abs(J * (alpha - at.alpha_2))
     balanced = solution.drive_condition != 0.0  # elsewhere there is no torque
     where = (solution.status_code == OK) & balanced & (np.broadcast_to(J, error.shape) > 0.0)
