@@ -164,8 +164,12 @@ def _triangle(
     if theta_1 != 0.0:
         psi = theta_2 - theta_1
         if growths is not None:
-            least = np.where(np.abs(psi) > MANY_TURNS, 0.0, _rounded_away(theta_2, theta_1, psi))
-            psi = psi + math.copysign(1.0, next(growths)) * least
+            growth = next(growths)
+            if (a == c and b == d) or (a == b and c == d):  # bars that stay parallel lose this and nothing else
+                least = np.where(np.abs(psi) > MANY_TURNS, 0.0, _rounded_away(theta_2, theta_1, psi))
+                psi = psi + math.copysign(1.0, growth) * least
+            else:  # psi is rounded at its own size, however near to a whole turn it is
+                psi = psi + growth * np.clip(psi, -MANY_TURNS, MANY_TURNS)
     t = np.tan(0.5 * psi)
     if psi is not theta_2 and isinstance(psi, np.ndarray) and np.abs(psi).max() > MANY_TURNS:
         t = t + (0.5 + 0.5 * (t * t)) * _rounded_away(theta_2, theta_1, psi)
