@@ -163,16 +163,13 @@ def _triangle(
     psi = theta_2
     if theta_1 != 0.0:
         psi = theta_2 - theta_1
-        if growths is not None:
-            growth = next(growths)
-            if (a == c and b == d) or (a == b and c == d):  # bars that stay parallel lose this and nothing else
-                least = np.where(np.abs(psi) > MANY_TURNS, 0.0, _rounded_away(theta_2, theta_1, psi))
-                psi = psi + math.copysign(1.0, growth) * least
-            else:  # psi is rounded at its own size, however near to a whole turn it is
-                psi = psi + growth * np.clip(psi, -MANY_TURNS, MANY_TURNS)
+        if growths is not None:  # psi is rounded at its own size, however near to a whole turn it is
+            psi = psi + next(growths) * np.clip(psi, -MANY_TURNS, MANY_TURNS)
     t = np.tan(0.5 * psi)
     if psi is not theta_2 and isinstance(psi, np.ndarray) and np.abs(psi).max() > MANY_TURNS:
-        t = t + (0.5 + 0.5 * (t * t)) * _rounded_away(theta_2, theta_1, psi)
+        taken = theta_2 - psi
+        rounded_away = (theta_2 - (psi + taken)) + (taken - theta_1)  # Knuth's sum: psi + this is exact
+        t = t + (0.5 + 0.5 * (t * t)) * rounded_away
     if growths is not None:
         t = t + next(growths) * t
     v = t * t
@@ -192,12 +189,6 @@ def _triangle(
         x, y, squared, w, v, h = (part + next(growths) * part for part in (x, y, squared, w, v, h))
         constants = tuple(part + next(growths) * part for part in constants)
     return x, y, squared, (w, v, h), constants
-
-
-def _rounded_away(theta_2: Array, theta_1: float, psi: Array) -> Array:
-    """theta_2 - theta_1 - psi, exactly (Knuth's sum)."""
-    taken = theta_2 - psi
-    return (theta_2 - (psi + taken)) + (taken - theta_1)
 
 
 def _sum(*lengths: Any) -> Any:
