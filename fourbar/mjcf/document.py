@@ -119,7 +119,8 @@ def _released(scene: Scene, settings: Settings) -> Settings:
 
 
 def _pad(scene: Scene) -> float:
-    return fitted_pad(_quickness(scene), load_ratio(scene))
+    _, a, b, c = scene.linkage.lengths
+    return fitted_pad(_quickness(scene) * a / max(b, c), load_ratio(scene))
 
 
 def _quickness(scene: Scene) -> float:

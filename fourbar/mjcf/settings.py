@@ -57,7 +57,7 @@ def fitted_pad(acceleration: float, load_ratio: float) -> float:
 
     Parameters
     ----------
-    acceleration : of the input's motion, omega_2^2 or alpha_2, rad/s^2.
+    acceleration : of bars 3 and 4, by their size: omega_2^2 or alpha_2 times input by longest of them, rad/s^2.
     load_ratio : loads and weights by the inertial forces.
     """
     least_sag = SOFT_PAD / math.sqrt(1.0 + load_ratio)
