@@ -20,7 +20,6 @@ from typing import Any
 import numpy as np
 
 from fourbar.errors import InputError, NotAssembledError
-from fourbar.kinematics import Array, centre_in_bar
 from fourbar.linkage import BAR_NAMES, MOVING_BARS
 from fourbar.pictures import data_uri
 from fourbar.plot.energy import energies
@@ -28,6 +27,7 @@ from fourbar.plot.style import length_unit, plain
 from fourbar.plot.view import on_branch, over_time, sweep_command
 from fourbar.scene import Command, Scene, command, solve
 from fourbar.solution import Solution
+from fourbar.state import Array, centre_in_bar
 from fourbar.writing import write_text
 
 FORMATS = ("html", "gif", "mp4")

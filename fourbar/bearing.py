@@ -5,9 +5,9 @@ from typing import NamedTuple
 import numpy as np
 
 from fourbar.errors import InputError
-from fourbar.kinematics import Array
 from fourbar.linkage import FourBar
 from fourbar.solution import Solution
+from fourbar.state import Array
 
 PIN_FORCE = {"O2": "F12", "A": "F32", "B": "F43", "O4": "F14"}
 

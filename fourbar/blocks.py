@@ -6,11 +6,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.kinematics import Array, State, Vector, add_accelerations, add_velocities, centre_in_bar, close_loop
+from fourbar.kinematics import add_accelerations, add_velocities, close_loop
 from fourbar.kinetostatics import drive_sine, solve_pins, torque_interval
 from fourbar.margins import U, diagonal_to_O4
 from fourbar.more_digits import needing_more_digits, restated, rounded
 from fourbar.solution import ANGLES, NOT_ASSEMBLED, OF_DRY_FRICTION, OK, SINGULAR, STAGE_OF, VECTORS
+from fourbar.state import Array, State, Vector, centre_in_bar
 
 if TYPE_CHECKING:
     from fourbar.effects import Effect

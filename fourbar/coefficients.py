@@ -12,10 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.circuits import circuits
-from fourbar.kinematics import State, Vector, add_accelerations, add_velocities, close_loop, cross
+from fourbar.kinematics import add_accelerations, add_velocities, close_loop
 from fourbar.linkage import FourBar
 from fourbar.margins import Array
 from fourbar.mobility import TURN, change_points, on_smooth_path, turns_fully
+from fourbar.state import State, Vector, cross
 
 
 class Coefficients(NamedTuple):

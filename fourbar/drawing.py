@@ -6,9 +6,9 @@ from collections.abc import Iterable
 import numpy as np
 
 from fourbar.errors import NotAssembledError
-from fourbar.kinematics import Array
 from fourbar.scene import Scene
 from fourbar.solution import Solution
+from fourbar.state import Array
 
 INK, SOFT, PAPER = "currentColor", "#6e7781", "#fefefe"
 WIDTH, HEIGHT, MARGIN = 300.0, 270.0, 30.0

@@ -22,8 +22,8 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from fourbar.kinematics import Array, State
 from fourbar.linkage import MOVING_BARS, FourBar
+from fourbar.state import Array, State
 
 Number = Any
 """A float or an array over the positions: the same formulas serve the integrator and a sweep."""

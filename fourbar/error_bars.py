@@ -15,11 +15,12 @@ from typing import Any
 
 import numpy as np
 
-from fourbar.kinematics import Array, State, add_accelerations, add_velocities, close_loop
+from fourbar.kinematics import add_accelerations, add_velocities, close_loop
 from fourbar.kinetostatics import PinForces, Term, solve_pins
 from fourbar.linkage import Bar, FourBar
 from fourbar.margins import diagonal_to_O4
 from fourbar.more_digits import rounded
+from fourbar.state import Array, State
 
 EVALUATIONS = 16
 """A power of two. With fewer, all of them may by chance come out as far off as the answer itself."""

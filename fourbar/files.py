@@ -16,12 +16,12 @@ import numpy as np
 from fourbar.effects import REGISTRY, Load, Table
 from fourbar.entries import Reader
 from fourbar.errors import InputError
-from fourbar.kinematics import Array
 from fourbar.linkage import BAR_NAMES, MOVING_BARS, Bar, FourBar
 from fourbar.motion import CROSSED, DEFAULT_STEPS, OPEN, Free, FromLimit, Motion, Sweep
 from fourbar.motion_law import ENDS, Law
 from fourbar.pictures import Picture
 from fourbar.scene import Scene
+from fourbar.state import Array
 from fourbar.writing import write_text
 
 __all__ = ["dump", "load", "loads", "read_text", "save"]

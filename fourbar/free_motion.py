@@ -28,8 +28,8 @@ from fourbar.dynamics import (
     triangle,
 )
 from fourbar.errors import DependencyError, FourBarError, InputError
-from fourbar.kinematics import Array
 from fourbar.linkage import FourBar
+from fourbar.state import Array
 
 RELATIVE, ABSOLUTE = 3e-15, 3e-15
 """Tolerances of a step of DOP853: below them a long fast motion errs by its round-off."""

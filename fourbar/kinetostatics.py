@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from fourbar.effects.pins import resting
 from fourbar.effects.wrenches import Wrenches
-from fourbar.kinematics import NO_ROOM, Array, State, Vector, centre_in_bar, cross, dot, is_zero
 from fourbar.linkage import MOVING_BARS
 from fourbar.margins import in_precision_of
+from fourbar.state import NO_ROOM, Array, State, Vector, centre_in_bar, cross, dot, is_zero
 
 Room = tuple[Array | None, Array | None]
 NEW: Room = (None, None)

@@ -5,8 +5,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.kinematics import Array, State, close_loop
+from fourbar.kinematics import close_loop
 from fourbar.margins import NONE, in_double_double
+from fourbar.state import Array, State
 
 NEAR = (0.03, 0.1)
 """|sin mu| and |sin(theta_2 - theta_1)| below which a position counts as near a change point: there errors that

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fourbar.errors import InputError
-from fourbar.kinematics import Array
 from fourbar.linkage import require
+from fourbar.state import Array
 
 if TYPE_CHECKING:
     from fourbar.motion_law import Law

@@ -6,8 +6,8 @@ from itertools import pairwise
 import numpy as np
 
 from fourbar.errors import DependencyError, InputError
-from fourbar.kinematics import Array
 from fourbar.linkage import require
+from fourbar.state import Array
 
 ENDS = {"free": "not-a-knot", "rest": "clamped", "periodic": "periodic"}
 """How the motion begins and ends: no condition, at rest, or as one period of a motion that goes on."""

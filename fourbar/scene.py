@@ -9,11 +9,12 @@ from numpy.typing import NDArray
 
 from fourbar.blocks import BLOCK, solve_block, warm_heap
 from fourbar.errors import InputError, LimitError
-from fourbar.kinematics import Array, close_loop
+from fourbar.kinematics import close_loop
 from fourbar.linkage import MOVING_BARS, FourBar
 from fourbar.mobility import default_range, limit_positions, on_smooth_path
 from fourbar.motion import DEFAULT_STEPS, FromLimit, Motion, Sweep
 from fourbar.solution import ANGLES, OF_DRY_FRICTION, OF_PIN_LOADS, STAGE_OF, STAGES, VECTORS, Solution, Unwrapped
+from fourbar.state import Array
 
 if TYPE_CHECKING:
     from decimal import Decimal

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.kinematics import Array
+from fourbar.state import Array
 
 if TYPE_CHECKING:
     from pathlib import Path

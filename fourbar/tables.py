@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fourbar.bearing import PIN_FORCE, bearing_load
-from fourbar.kinematics import Array
 from fourbar.linkage import BAR_NAMES
 from fourbar.motion import OPEN
 from fourbar.scene import Scene
 from fourbar.solution import STATUS_NAMES, UNITS, VECTORS, Solution
+from fourbar.state import Array
 
 if TYPE_CHECKING:
     from rich.table import Table

@@ -5,10 +5,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fourbar.kinematics import State, first_coefficients
+from fourbar.kinematics import first_coefficients
 from fourbar.linkage import FourBar
 from fourbar.margins import Array
 from fourbar.mobility import TURN, Reach, change_points, limit_positions, reach_of
+from fourbar.state import State
 
 
 def transmission_angle(state: State) -> Array:

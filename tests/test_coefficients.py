@@ -8,9 +8,10 @@ import pytest
 
 from fourbar.circuits import circuits
 from fourbar.coefficients import Centre, bar_coefficients, coupler_curve, instant_centres, point_coefficients
-from fourbar.kinematics import State, add_accelerations, add_velocities, close_loop
+from fourbar.kinematics import add_accelerations, add_velocities, close_loop
 from fourbar.linkage import Bar, FourBar
 from fourbar.mobility import intervals, turns_fully
+from fourbar.state import State
 
 EPS = 2.0**-52
 FIRST, SECOND = 32.0, 128.0

@@ -243,7 +243,7 @@ def test_equivalent_inertia_is_that_of_the_kinetic_energy(lengths: tuple[float, 
     energy = np.zeros(3)
     for number in (2, 3, 4):
         bar = linkage.bar(number)
-        v = state.velocity(number, *fourbar.kinematics.centre_in_bar(bar))
+        v = state.velocity(number, *fourbar.state.centre_in_bar(bar))
         energy += 0.5 * bar.mass * (v[0] ** 2 + v[1] ** 2) + 0.5 * bar.inertia * np.asarray(state.omega(number)) ** 2
     ok = state.assembled
     assert ok.any()

@@ -146,7 +146,7 @@ def test_points_move_as_their_positions_do(point: tuple[float, float], theta_1: 
     link, omega = linkage(theta_1), 3.0
     angles = np.linspace(0.3, 6.0, 9)
 
-    def at(t: float) -> fourbar.kinematics.State:
+    def at(t: float) -> fourbar.state.State:
         return close_loop(link, angles + omega * t + 0.5 * alpha * t * t, 1)
 
     state = at(0.0)
@@ -263,7 +263,7 @@ def test_branches_may_differ_from_position_to_position() -> None:
 
 @pytest.mark.parametrize("centre", [(0.3, 0.0), (0.3, 1.0), (0.3, -2.5), (0.0, 0.0)])
 def test_a_mass_centre_in_the_frame_of_its_bar(centre: tuple[float, float]) -> None:
-    place = fourbar.kinematics.centre_in_bar(fourbar.Bar(0.2, 1.0, 0.1, centre))
+    place = fourbar.state.centre_in_bar(fourbar.Bar(0.2, 1.0, 0.1, centre))
     assert complex(*place) == pytest.approx(cmath.rect(*centre), abs=EPS)
     assert place[1] == 0.0 or centre[1] != 0.0
     assert all(type(part) is float for part in place)

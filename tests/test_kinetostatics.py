@@ -59,7 +59,7 @@ def test_power_in_equals_power_out(drive_bar: int) -> None:
     terms += [np.broadcast_to(term.power(state), s.theta_2.shape) for term in (*case.loads, *case.effects)]
     for number in (2, 3, 4):
         bar = case.linkage.bar(number)
-        v = state.velocity(number, *fourbar.kinematics.centre_in_bar(bar))
+        v = state.velocity(number, *fourbar.state.centre_in_bar(bar))
         a = getattr(s, f"a_G{number}")
         terms.append(-bar.mass * (a[:, 0] * v[0] + a[:, 1] * v[1]))
         terms.append(-bar.inertia * getattr(s, f"alpha_{number}") * getattr(s, f"omega_{number}"))

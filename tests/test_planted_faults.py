@@ -158,7 +158,7 @@ def kilogram_centimetres(true: Callable[..., None]) -> Callable[..., None]:
 
 
 kinematics, kinetostatics = fourbar.kinematics, fourbar.kinetostatics
-State = kinematics.State
+State = fourbar.state.State
 
 FAULTS = {
     "force sign flipped": lambda: formulas_say(flip("F43")),
@@ -171,8 +171,8 @@ FAULTS = {
     "load on the wrong bar": lambda: formulas_see(load_on_another_bar),
     "gravity missing": lambda: formulas_see(lambda scene: replace(scene, effects=())),
     "gravity flipped": lambda: formulas_see(gravity_flipped),
-    "sign of the alpha term": lambda: replaced(kinematics, "swing", swing_with_alpha_reversed),
-    "m omega^2 r dropped": lambda: replaced(kinematics, "swing", swing_without_centripetal),
+    "sign of the alpha term": lambda: replaced(fourbar.state, "swing", swing_with_alpha_reversed),
+    "m omega^2 r dropped": lambda: replaced(fourbar.state, "swing", swing_without_centripetal),
     "alpha_3 used for an acceleration": lambda: replaced(
         State, "acceleration", alpha_for_acceleration(State.acceleration)
     ),

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.kinematics import Array
+from fourbar.state import Array
 
 ONE, NONE, SEVERAL = range(3)
 """How many solutions there are."""

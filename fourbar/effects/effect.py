@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.effects.wrenches import Wrenches
-from fourbar.kinematics import Array, State
 from fourbar.linkage import FourBar
 from fourbar.solution import Solution
+from fourbar.state import Array, State
 
 Act = Callable[[], None]
 Joints = tuple[float, float, float]

@@ -6,9 +6,9 @@ from typing import Any, ClassVar
 from fourbar.effects.effect import Act, Effect, Tree
 from fourbar.effects.wrenches import Wrenches
 from fourbar.errors import InputError
-from fourbar.kinematics import Array, State, is_zero
 from fourbar.linkage import FourBar, require
 from fourbar.solution import Solution
+from fourbar.state import Array, State, is_zero
 
 
 @dataclass(frozen=True, slots=True)

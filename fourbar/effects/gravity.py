@@ -7,10 +7,10 @@ from typing import Any, ClassVar
 
 from fourbar.effects.effect import Act, Effect, Tree
 from fourbar.effects.wrenches import Wrenches
-from fourbar.kinematics import Array, State, centre_in_bar
 from fourbar.linkage import MOVING_BARS, FourBar, require
 from fourbar.margins import U
 from fourbar.solution import Solution
+from fourbar.state import Array, State, centre_in_bar
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,9 +12,9 @@ import numpy as np
 from fourbar.effects.effect import Act, Effect, Tree
 from fourbar.effects.wrenches import Wrenches
 from fourbar.errors import InputError, LimitError
-from fourbar.kinematics import Array, State, Vector, along, centre_in_bar
 from fourbar.linkage import MOVING_BARS, FourBar, require
 from fourbar.solution import Solution
+from fourbar.state import Array, State, Vector, along, centre_in_bar
 
 TURN = 2.0 * math.pi
 

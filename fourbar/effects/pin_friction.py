@@ -13,9 +13,9 @@ from fourbar.effects.effect import Act, Effect, Tree
 from fourbar.effects.pins import known, sense, shortest_bar
 from fourbar.effects.wrenches import Wrenches
 from fourbar.errors import InputError, LimitError
-from fourbar.kinematics import Array, State
 from fourbar.linkage import PINS, FourBar, require
 from fourbar.solution import JAMMED, OK, SEVERAL, Solution
+from fourbar.state import Array, State
 
 NO_POWER = "friction that depends on the pin forces does an amount of work that the energy method cannot know"
 NO_MJCF = "friction that depends on the pin forces has no counterpart in MJCF"

@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 
 from fourbar.errors import InputError
-from fourbar.kinematics import Array, State
 from fourbar.linkage import MOVING_BARS, PINS, FourBar, require
 from fourbar.solution import Solution
+from fourbar.state import Array, State
 
 
 def pin_values(key: str, values: Mapping[str, float]) -> tuple[tuple[str, float], ...]:

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from fourbar.effects.effect import Act, Effect, Tree
 from fourbar.effects.wrenches import Wrenches
 from fourbar.errors import InputError
-from fourbar.kinematics import Array, State, Vector, along, dot
 from fourbar.linkage import BAR_NAMES, FourBar, require
 from fourbar.solution import NO_DIRECTION, OK, Solution
+from fourbar.state import Array, State, Vector, along, dot
 
 FIELDS = {"stiffness": "N/m", "length": "m", "preload": "N"}
 COINCIDE = 16.0 * 2.0**-52

@@ -12,9 +12,9 @@ from fourbar.effects.effect import Act, Effect, Joints, Tree
 from fourbar.effects.pins import known, shortest_bar
 from fourbar.effects.wrenches import Wrenches
 from fourbar.errors import LimitError
-from fourbar.kinematics import Array, State
 from fourbar.linkage import PINS, FourBar, require
 from fourbar.solution import OK, WOUND, Solution
+from fourbar.state import Array, State
 
 FIELDS = {"stiffness": "N m/rad", "rest": "rad", "preload": "N m"}
 HALF_TURN = math.pi * (1.0 - 1e-12)

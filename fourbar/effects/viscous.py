@@ -8,9 +8,9 @@ import numpy as np
 from fourbar.effects.effect import Act, Effect, Tree
 from fourbar.effects.pins import pin_values, relative_speed, shortest_bar
 from fourbar.effects.wrenches import Wrenches
-from fourbar.kinematics import Array, State
 from fourbar.linkage import PINS, FourBar
 from fourbar.solution import Solution
+from fourbar.state import Array, State
 
 
 @dataclass(frozen=True, slots=True)

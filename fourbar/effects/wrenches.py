@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from fourbar.kinematics import Array, State, Vector, cross, is_zero
+from fourbar.state import Array, State, Vector, cross, is_zero
 
 
 class Wrenches:

@@ -8,7 +8,6 @@ from xml.etree import ElementTree as ET
 import numpy as np
 
 from fourbar.errors import InputError, LimitError, NotAssembledError
-from fourbar.kinematics import Array
 from fourbar.linkage import MOVING_BARS, FourBar
 from fourbar.mjcf.appearance import add_appearance
 from fourbar.mjcf.model import Model, carriable, constant, servo, text
@@ -16,6 +15,7 @@ from fourbar.mjcf.settings import RECIPE, Run, Settings, fitted_pad
 from fourbar.mobility import default_range
 from fourbar.scene import Command, Scene, command, solve
 from fourbar.solution import OK
+from fourbar.state import Array
 
 AT_REST = 1.0
 """rad/s that flywheel and timestep are laid out for where the scene states no speed."""

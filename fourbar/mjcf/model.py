@@ -8,10 +8,10 @@ from xml.etree import ElementTree as ET
 import numpy as np
 
 from fourbar.errors import InputError, LimitError
-from fourbar.kinematics import centre_in_bar
 from fourbar.linkage import BAR_NAMES, FIRST_PIN, MOVING_BARS, PINS, FourBar
 from fourbar.mjcf.appearance import add_camera
 from fourbar.mjcf.settings import Settings
+from fourbar.state import centre_in_bar
 
 if TYPE_CHECKING:
     from fourbar.effects import Load

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.kinematics import Array
 from fourbar.plot.energy import energies
 from fourbar.plot.style import (
     BAR_COLOURS,
@@ -26,6 +25,7 @@ from fourbar.plot.style import (
     unit_for,
 )
 from fourbar.plot.view import View
+from fourbar.state import Array
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

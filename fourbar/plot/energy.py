@@ -6,10 +6,11 @@ import numpy as np
 
 from fourbar.dynamics import carrying
 from fourbar.errors import DependencyError
-from fourbar.kinematics import Array, State, add_velocities, centre_in_bar, close_loop
+from fourbar.kinematics import add_velocities, close_loop
 from fourbar.linkage import MOVING_BARS
 from fourbar.scene import Scene
 from fourbar.solution import Solution
+from fourbar.state import Array, State, centre_in_bar
 
 
 class Energies(NamedTuple):

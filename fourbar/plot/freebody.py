@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.bearing import PIN_FORCE
-from fourbar.kinematics import State, centre_in_bar
 from fourbar.linkage import BAR_NAMES, FIRST_PIN, MOVING_BARS
 from fourbar.plot.curves import force_name, note
 from fourbar.plot.labels import Label, Labels
 from fourbar.plot.linkage import ENDS, mass_centre, pins
 from fourbar.plot.style import BAR_COLOURS, FORCE_COLOURS, INK, MUTED, number, unit_for
 from fourbar.plot.view import Recorder, View
+from fourbar.state import State, centre_in_bar
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

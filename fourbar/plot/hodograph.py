@@ -5,10 +5,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fourbar.kinematics import Array
 from fourbar.plot.curves import broken, force_name, limit_of, note, poles
 from fourbar.plot.style import FORCE_COLOURS, FORCE_DASHES, FORCE_WIDTHS, MUTED, largest, number, unit_for
 from fourbar.plot.view import View
+from fourbar.state import Array
 
 if TYPE_CHECKING:
     from matplotlib.projections.polar import PolarAxes

@@ -4,11 +4,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fourbar.kinematics import Array, State, centre_in_bar
 from fourbar.linkage import MOVING_BARS
 from fourbar.plot.labels import Label, Labels
 from fourbar.plot.style import BAR_COLOURS, INK, MUTED, largest, length_unit
 from fourbar.plot.view import View
+from fourbar.state import Array, State, centre_in_bar
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

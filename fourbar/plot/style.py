@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fourbar.errors import DependencyError
-from fourbar.kinematics import Array
+from fourbar.state import Array
 from fourbar.writing import write_bytes
 
 if TYPE_CHECKING:

@@ -7,10 +7,11 @@ import numpy as np
 
 from fourbar.effects.wrenches import Wrenches
 from fourbar.errors import NotAssembledError
-from fourbar.kinematics import Array, State, Vector, add_accelerations, add_velocities, close_loop
+from fourbar.kinematics import add_accelerations, add_velocities, close_loop
 from fourbar.motion import FromLimit
 from fourbar.scene import Command, Scene, command, solve
 from fourbar.solution import Solution
+from fourbar.state import Array, State, Vector
 
 CLEAR = 0.3
 """Motion and drive condition of the position drawn, where any has them: beside a pole forces dwarf all others."""

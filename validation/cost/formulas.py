@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 
 from fourbar.effects import Wrenches
-from fourbar.kinematics import State, add_accelerations, add_velocities, close_loop
+from fourbar.kinematics import add_accelerations, add_velocities, close_loop
 from fourbar.kinetostatics import add_inertia, eliminate
 from fourbar.linkage import MOVING_BARS
 from fourbar.scene import Command, Scene, solve
+from fourbar.state import State
 from validation import thirteen
 from validation.answer import Array
 from validation.cost.errors import PIN_FORCES, Errors

@@ -24,7 +24,7 @@ from validation.witnesses import WITNESSES, Witness
 CHANGES = 1e-9
 SECONDS = 20
 """A mutant that computes longer than this hangs: the run would be stopped, which is a failure too."""
-MODULES = ("kinematics", "kinetostatics", "mobility", "transmission", "dynamics")
+MODULES = ("state", "kinematics", "kinetostatics", "mobility", "transmission", "dynamics")
 SCENES = 10
 EXACT = ("pinocchio-inverse", "mujoco-inverse")
 

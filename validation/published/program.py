@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 import fourbar
-from fourbar.kinematics import Array
+from fourbar.state import Array
 
 DATA = Path(__file__).parent / "data"
 UNKNOWNS = ("F12x", "F12y", "F32x", "F32y", "F23x", "F23y", "F43x", "F43y", "F14x", "F14y", "F34x", "F34y", "T4")
