@@ -72,7 +72,7 @@ def _sums(name: str, scene: Scene, at: Command, solution: Solution) -> list[Row]
         if scene.drive_bar == 4 and number != 4:  # F32 and F43 are solved apart, from the moments of bars 2 and 3
             swung = np.abs(couple) + bar.mass * magnitude(centre - first_pins[number]) * magnitude(acceleration)
             sine = np.abs(np.sin(solution.theta_3 - solution.theta_2))
-            with np.errstate(divide="ignore"):
+            with np.errstate(divide="ignore", invalid="ignore"):  # 0/0 where nothing is judged: at a change point
                 force_terms = force_terms + (swung + bar.inertia * np.abs(alpha)) / (bar.length * sine)
         turned = couple + _cross(first_pins[number], load)
         swept = bar.mass * _cross(centre, acceleration) + bar.inertia * alpha
