@@ -14,11 +14,12 @@ from fourbar.solution import Solution
 from validation.answer import Answer
 from validation.compare import closure, compare
 from validation.identities import FORMULAS, identities
+from validation.mobility.rows import statements
 from validation.page import Page, Record, Timing
 from validation.plain import plain
 from validation.results import FAILS, Row
 from validation.reversals import reversals
-from validation.tolerance import FORCES
+from validation.tolerance import EQUIVALENCE, FORCES
 from validation.witnesses import WITNESSES, Witness, predicting_from
 
 
@@ -65,6 +66,8 @@ def judge(name: str, scene: Scene, witnesses: Sequence[Witness] = WITNESSES) -> 
             continue
         record.answers.append(answer)
         record.rows += _judged(name, scene, at, record.solution, answer, witness)
+        if witness.tolerance == EQUIVALENCE and answer.refusal is None and "theta_3" in witness.expected:
+            record.rows += _stated(name, scene, witness, answer)
         if witness.order and answer.refusal is None:
             answer.evidence |= _observed_order(name, scene, at, record.solution, witness)
     _judge_inertia(record, at, witnesses)
@@ -111,6 +114,15 @@ def _judged(name: str, scene: Scene, at: Command, solution: Solution, answer: An
     if answer.refusal is None and answer.at is not None and {"theta_3", "theta_4"} <= answer.quantities.keys():
         rows.append(closure(name, scene, answer, witness.tolerance))
     return rows
+
+
+def _stated(name: str, scene: Scene, witness: Witness, answer: Answer) -> list[Row]:
+    """What the formulas state of the linkage whatever its motion, asked of an exact engine."""
+    try:
+        return statements(name, scene, witness.engine(), answer)
+    except Exception as error:  # whatever an engine raises is its own failure, told in its own row
+        reason = f"{type(error).__name__}: {error}".splitlines()[0]
+        return [_failure(name, witness.name, "statements of the linkage", reason)]
 
 
 def _observed_order(name: str, scene: Scene, at: Command, solution: Solution, witness: Witness) -> dict[str, float]:
