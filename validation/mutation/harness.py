@@ -1,11 +1,13 @@
 """The harness alone against mutants of the formulas: no unit test takes part.
 
 Run in a tree that mutmut has generated, in which every mutant is switched on by its name. A mutant counts
-where it changes a number that `solve` or the energy method returns by more than 1e-9 of its scale (or
-what assembles, or which numbers exist, or raises); it is caught where a comparison then fails.
+where it changes a number that `solve` or the energy method returns, or that is stated of the linkage, by more
+than 1e-9 of its scale (or what assembles, or which numbers exist, or raises); it is caught where a comparison
+then fails.
 """
 
 import json
+import math
 import signal
 import sys
 from importlib import import_module
@@ -13,11 +15,15 @@ from typing import Any
 
 import numpy as np
 
+from fourbar import mobility, transmission
+from fourbar.kinematics import add_velocities, close_loop
+from fourbar.linkage import MOVING_BARS, FourBar
 from fourbar.scene import Command, Scene, command, solve
 from fourbar.solution import UNITS
 from validation.answer import Answer
 from validation.compare import compare
 from validation.identities import identities
+from validation.mobility.rows import statements
 from validation.results import FAILS
 from validation.witnesses import WITNESSES, Witness
 
@@ -52,11 +58,43 @@ def scenes() -> list[Scene]:
 
 
 def numbers(scene: Scene, at: Command) -> dict[str, Any]:
-    """Everything that the formulas and the energy method say of a scene."""
+    """Everything that the formulas and the energy method say of a scene and of its linkage."""
     solution = solve(scene, "force", at=at)
     said = {name: getattr(solution, name) for name in UNITS if getattr(solution, name) is not None}
     energy = _energy().engine().answer(scene, at)
-    return {**said, "status": solution.status_code.astype(float), "energy": energy.quantities.get("torque")}
+    said |= {"status": solution.status_code.astype(float), "energy": energy.quantities.get("torque")}
+    return said | stated(scene.linkage) | stated_of_motion(scene, at)
+
+
+def stated(linkage: FourBar) -> dict[str, Any]:
+    """What the formulas state of a linkage whatever its motion."""
+    said: dict[str, Any] = {
+        "default_range": mobility.default_range(linkage),
+        "change_points": mobility.change_points(linkage),
+        "time_ratio": mobility.time_ratio(linkage) or math.nan,
+        "extremes": [*transmission.transmission_extremes(linkage), transmission.transmission_extremes(linkage).worst],
+    }
+    for bar in MOVING_BARS:
+        said[f"limits_{bar}"] = mobility.limit_positions(linkage, bar)
+        said[f"intervals_{bar}"] = mobility.intervals(linkage, bar)
+        said[f"turns_{bar}"] = mobility.turns_fully(linkage, bar)
+        said[f"swing_{bar}"] = mobility.swing(linkage, bar)
+    sweep = linkage.ground_angle + np.array([-0.5, 0.5, 4.0, 2.0])  # through both change points, and back
+    said["through"] = mobility.on_smooth_path(linkage, sweep, 1)
+    return {name: np.array(value, dtype=float) for name, value in said.items()}
+
+
+def stated_of_motion(scene: Scene, at: Command) -> dict[str, Any]:
+    """How well the positions of a motion transmit."""
+    state = close_loop(scene.linkage, at.theta_2, at.branch)
+    add_velocities(state, 1.0)
+    branch = at.branch.astype(float)
+    return {
+        "transmission_angle": transmission.transmission_angle(state),
+        "speed_ratio": transmission.speed_ratio(state),
+        "mechanical_advantage": transmission.mechanical_advantage(state, 0.2, 0.3),
+        "to_singular": transmission.distance_to_singular(scene.linkage, at.theta_2, scene.drive_bar, branch),
+    }
 
 
 def _energy() -> Witness:
@@ -71,10 +109,13 @@ def changed(before: dict[str, Any], after: dict[str, Any]) -> bool:
             continue
         if old is None or new is None or np.shape(old) != np.shape(new):
             return True
-        if not np.array_equal(np.isnan(old), np.isnan(new)):
+        finite = np.isfinite(old)
+        if not np.array_equal(finite, np.isfinite(new)) or not np.array_equal(
+            old[~finite], new[~finite], equal_nan=True
+        ):
             return True
-        scale = float(np.nanmax(np.abs(old), initial=0.0)) or 1.0
-        if np.nanmax(np.abs(new - old), initial=0.0) > CHANGES * scale:
+        scale = float(np.max(np.abs(old[finite]), initial=0.0)) or 1.0
+        if np.max(np.abs(new[finite] - old[finite]), initial=0.0) > CHANGES * scale:
             return True
     return False
 
@@ -85,6 +126,8 @@ def caught(scene: Scene, at: Command, answers: list[tuple[Witness, Answer]]) -> 
     rows = identities("", scene, at, solution)
     for witness, answer in [*answers, (_energy(), _energy().engine().answer(scene, at))]:
         rows += compare("", scene, answer, solution, witness.tolerance, witness.expected)
+    if not any(row.verdict == FAILS for row in rows):
+        rows += [row for witness, answer in answers for row in statements("", scene, witness.engine(), answer)]
     return any(row.verdict == FAILS for row in rows)
 
 
