@@ -24,11 +24,14 @@ def decide(linkage: FourBar, theta_2: float, offset: Decimal | None) -> tuple[fl
         d, a, b, c = (Decimal(length) / unit for length in linkage.lengths)
         cosine = _cosine(Decimal(theta_2) - Decimal(linkage.ground_angle) + (offset or 0))
         squared = (d - a) ** 2 + 2 * a * d * (1 - cosine)
-        # stated by its offset from a limit, a position beyond it does not assemble, however near it is
-        touch = Decimal(TOUCHING) if offset is None else LAST_DIGITS
-        touching = touch * (a + b + c + d) * 2 * squared.sqrt()
+        whole = (a + b + c + d) * 2 * squared.sqrt()
+        if offset is None:
+            least, most = -Decimal(TOUCHING) * whole, Decimal(0)
+        else:
+            # a position beyond the limit does not assemble, however near; of the limit itself a residue is left
+            least, most = -LAST_DIGITS * whole, LAST_DIGITS * whole
         factors = ((b + c) ** 2 - squared, squared - (b - c) ** 2)
-        outer, inner = (float(Decimal(0) if -touching <= factor < 0 else factor) for factor in factors)
+        outer, inner = (float(Decimal(0) if least <= factor <= most else factor) for factor in factors)
         return outer, inner
 
 

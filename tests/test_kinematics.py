@@ -45,12 +45,14 @@ def newton(link: fourbar.FourBar, theta_2: mpmath.mpf, start: tuple[float, float
 
 @pytest.mark.parametrize("branch", [1, -1])
 @pytest.mark.parametrize("theta_1", [0.0, 0.4, 1.0, -2.5])
-def test_the_loop_closes_on_the_branch_asked_for(branch: int, theta_1: float) -> None:
-    state = close_loop(linkage(theta_1), ANGLES, branch)
-    d, a, b, c = LENGTHS
+@pytest.mark.parametrize("lengths", [LENGTHS, (0.3, 0.1, 0.3, 0.1), (0.3, 0.1, 0.1, 0.3)])
+def test_the_loop_closes_on_the_branch_asked_for(lengths: tuple[float, ...], branch: int, theta_1: float) -> None:
+    d, a, b, c = lengths
+    link = fourbar.FourBar(d, fourbar.Bar(a), fourbar.Bar(b), fourbar.Bar(c), theta_1)
+    state = close_loop(link, theta_1 + ANGLES, branch)
     e2, e3, e4 = (np.exp(1j * state.angle(bar)) for bar in (2, 3, 4))
     gap = a * e2 + b * e3 - d * cmath.exp(1j * theta_1) - c * e4
-    assert np.max(np.abs(gap)) <= CLOSURE * sum(LENGTHS)
+    assert np.max(np.abs(gap)) <= CLOSURE * sum(lengths)
     diagonal = d * cmath.exp(1j * theta_1) - a * e2
     assert np.all(np.sign((np.conj(diagonal) * b * e3).imag) == branch)
 
@@ -99,9 +101,14 @@ def test_positions_that_cannot_close_are_nan_and_say_so() -> None:
     assert np.isnan(state.angle(3)).tolist() == [False, True]
 
 
+@pytest.mark.parametrize(
+    "lengths",  # no bars alike, or one pair: one alone never stays parallel
+    [(0.5, 0.4, 0.3, 0.25), (0.5, 0.3, 0.4, 0.3), (0.5, 0.6, 0.5, 0.45), (0.5, 0.3, 0.3, 0.25), (0.5, 0.6, 0.45, 0.5)],
+)
 @pytest.mark.parametrize("offset", [1e-6, 1e-12, 1e-20, 1e-40])
-def test_beyond_a_limit_nothing_assembles_however_near(offset: float) -> None:
-    link = fourbar.FourBar(0.5, fourbar.Bar(0.4), fourbar.Bar(0.3), fourbar.Bar(0.25), 0.2)
+def test_beyond_a_limit_nothing_assembles_however_near(lengths: tuple[float, ...], offset: float) -> None:
+    d, a, b, c = lengths
+    link = fourbar.FourBar(d, fourbar.Bar(a), fourbar.Bar(b), fourbar.Bar(c), 0.2)
     # the first limit ends the range in which the linkage closes, the second begins it
     for limit, inside in ((1, -1.0), (2, 1.0)):
         status = [
@@ -324,3 +331,37 @@ def test_a_kite_whose_A_lies_on_O4_has_no_speed_there_and_no_warning() -> None:
         add_accelerations(state, 3.0)
         for value in (state.omega(3), state.omega(4), state.alpha(3), state.alpha(4)):
             assert np.isfinite(value).tolist() == [False, True]  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("theta_1", [0.0, 0.4, -2.5])
+@pytest.mark.parametrize("branch", [1, -1])
+def test_a_kite_whose_A_lies_on_O4_lies_where_its_neighbours_do(branch: int, theta_1: float) -> None:
+    """As theta_2 falls to theta_1 bars 3 and 4 come to lie on the ground's line, both the same way."""
+    link = fourbar.FourBar(0.3, fourbar.Bar(0.3), fourbar.Bar(0.2), fourbar.Bar(0.2), theta_1)
+    beside = 2.0**-30
+    on, near = (close_loop(link, theta_1 + np.array([psi, 0.5]), branch) for psi in (0.0, beside))
+    for bar in (3, 4):
+        for ours, limit in zip(on.unit(bar), near.unit(bar), strict=True):
+            assert ours == pytest.approx(limit, abs=2.0 * beside)
+    # with b and c unlike each other nothing closes there
+    assert not close_loop(fourbar.uniform(0.3, 0.3, 0.2, 0.25), np.zeros(1), branch).assembled.any()
+
+
+def test_beside_parallel_bars_mu_is_the_angle_of_the_input_to_the_last_bit() -> None:
+    """Bars 3 and 4 of a parallelogram lie as its ground and input do: so does the angle between them."""
+    link = fourbar.uniform(0.3, 0.1, 0.3, 0.1)
+    state = close_loop(link, np.linspace(0.01, 3.1, 200), 1)
+    assert np.array_equal(state.sin_mu, state.u2[1]) and np.array_equal(state.cos_mu, state.u2[0])
+    # 8 EPS has no digit left, the next double has
+    assert close_loop(link, np.array([8.0 * EPS, 8.0 * EPS * (1.0 + EPS)]), 1).singular.tolist() == [True, False]
+
+
+def test_short_ground_and_input_leave_no_digit_of_mu() -> None:
+    """b = c, d and a a billiardth of them: mu = e/b, and A passes O4 so near that 8 EPS is reached."""
+    b, psi = 0.9, np.linspace(0.0, 2.0 * math.pi, 41)
+    for least, most in ((0.7, 2.0), (0.02, 0.03)):
+        d, a = (4.0 * EPS * b * part for part in (most + least, most - least))
+        state = close_loop(fourbar.uniform(d, a, b, b), psi, 1)
+        e = np.abs(d - a * np.exp(1j * psi))
+        assert state.assembled.all() and state.diagonal.least_root > 0.0
+        assert np.array_equal(state.singular, e / b <= 8.0 * EPS)

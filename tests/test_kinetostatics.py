@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import fourbar
-from fourbar.kinetostatics import sine_between, solve_pins
+from fourbar.kinetostatics import drive_sine, sine_between, solve_pins
 from validation.bench import bodies_of, command, example
 from validation.thirteen import assemble, solve_thirteen
 
@@ -200,6 +200,15 @@ def test_the_couple_of_a_loaded_pin_is_its_force_times_the_radius_of_friction(pi
     for name, column in (("F12", 0), ("F32", 2), ("F43", 6), ("F14", 8)):
         assert np.max(np.abs(unknowns[:, column : column + 2] - getattr(s, name))) <= SOLVED * size
     assert np.max(np.abs(unknowns[:, 12] - s.torque)) <= SOLVED * size
+
+
+@pytest.mark.parametrize("drive_bar", [3, 4])
+def test_the_sine_of_a_drive_is_that_of_two_directions(drive_bar: int) -> None:
+    """Vectors that are not of length 1 have the same angle."""
+    state = fourbar.kinematics.close_loop(example().linkage, np.linspace(0.1, 6.0, 5), 1)
+    sine = np.sin(state.angle(7 - drive_bar) - state.theta_2)
+    state.u3, state.u4 = ((3.0 * u[0], 3.0 * u[1]) for u in (state.u3, state.u4))
+    assert drive_sine(state, drive_bar) == pytest.approx(sine, abs=8 * EPS)
 
 
 def test_a_force_between_two_bars_in_line_does_not_exist() -> None:
