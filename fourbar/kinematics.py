@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.linkage import FourBar
-from fourbar.margins import Diagonal, diagonal_to_O4, in_precision_of
+from fourbar.margins import NO_DIGIT_LEFT, Diagonal, diagonal_to_O4, in_precision_of
 from fourbar.state import NO_ROOM, Array, FirstCoefficients, State, Vector, is_zero
 
 
@@ -66,11 +66,10 @@ def close_loop(
         for component, scale in ((x3, to_3), (y3, to_3), (x4, to_4), (y4, to_4)):
             component *= scale  # noqa: PLW2901 - in place
     sin_mu = (0.5 / (b * c)) * root
-    no_digit = NO_DIGIT_LEFT if diagonal.offset is None else 0.0
-    if diagonal.least_root != 0.0 and diagonal.least_root > no_digit * (2.0 * b * c):
+    if diagonal.least_root != 0.0:
         singular = np.zeros(theta_2.shape, dtype=bool)
-    else:
-        singular = np.abs(sin_mu) <= no_digit  # false where it is NaN
+    else:  # false where it is NaN
+        singular = np.abs(sin_mu) <= (NO_DIGIT_LEFT if diagonal.offset is None else 0.0)
     state = State(
         linkage=linkage,
         theta_2=theta_2,
@@ -131,11 +130,6 @@ def _parallel(state: State, u1: tuple[Any, Any]) -> None:
     state.sin_mu = np.where(where, state.branch * np.abs(2.0 * state.diagonal.h), state.sin_mu)
     state.singular = state.assembled & ~(np.abs(state.sin_mu) > NO_DIGIT_LEFT)
     state.parallel = (where, together.astype(float))
-
-
-NO_DIGIT_LEFT = 8.0 * 2.0**-52
-"""|sin mu| at or below this: the directions of bars 3 and 4 cannot be told apart in doubles, unless
-the position is described by its offset from the limit."""
 
 
 def add_velocities(state: State, omega_2: Array | float, room: Mapping[str, Any] = NO_ROOM) -> None:

@@ -30,6 +30,9 @@ UNDECIDED = 32.0 * U
 TOUCHING = U
 """Bars that miss each other by up to this times the sum of the lengths count as touching: each length
 was itself rounded by up to U, so the linkage meant closes there as well as not."""
+NO_DIGIT_LEFT = 8.0 * 2.0**-52
+"""|sin mu| at or below this: the directions of bars 3 and 4 cannot be told apart in doubles, unless
+the position is described by its offset from the limit."""
 MANY_TURNS = 8.0
 """rad. Beyond, what the rounding of theta_2 - theta_1 takes away is put back: it is more than that of a turn."""
 NONE = np.empty(0, dtype=np.intp)
@@ -111,6 +114,8 @@ def diagonal_to_O4(
     decided, least_root = NONE, 0.0
     if offset is None and growths is None and constant_1 > least_1 and constant_2 > least_2:
         least_root = _least_root(constant_1, constant_2, product)
+        if least_root <= NO_DIGIT_LEFT * (2.0 * b * c):  # ground and input a billiardth of the other bars
+            least_root = 0.0
         assembled = np.ones(outer.shape, dtype=bool)
     elif offset is None and outer.min() > least_1 and inner.min() > least_2:
         assembled = np.ones(outer.shape, dtype=bool)

@@ -359,9 +359,13 @@ def test_beside_parallel_bars_mu_is_the_angle_of_the_input_to_the_last_bit() -> 
 def test_short_ground_and_input_leave_no_digit_of_mu() -> None:
     """b = c, d and a a billiardth of them: mu = e/b, and A passes O4 so near that 8 EPS is reached."""
     b, psi = 0.9, np.linspace(0.0, 2.0 * math.pi, 41)
-    for least, most in ((0.7, 2.0), (0.02, 0.03)):
+    for least, most in ((0.7, 2.0), (0.02, 0.03), (1.1, 1.3)):
         d, a = (4.0 * EPS * b * part for part in (most + least, most - least))
         state = close_loop(fourbar.uniform(d, a, b, b), psi, 1)
         e = np.abs(d - a * np.exp(1j * psi))
-        assert state.assembled.all() and state.diagonal.least_root > 0.0
-        assert np.array_equal(state.singular, e / b <= 8.0 * EPS)
+        assert state.assembled.all() and np.array_equal(state.singular, e / b <= 8.0 * EPS)
+        add_velocities(state, 2.0)
+        assert np.array_equal(np.isnan(state.omega(3)), state.singular)
+        motion = fourbar.Motion(psi, 2.0)
+        status = fourbar.solve(fourbar.Scene(state.linkage, motion)).status
+        assert [each == "singular" for each in status] == state.singular.tolist()

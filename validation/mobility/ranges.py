@@ -47,10 +47,12 @@ def _of_bar(linkage: FourBar, bar: int, engine: Engine) -> Iterator[Finding]:
     first = FourBar(linkage.ground, linkage.bar(bar), second, third, linkage.ground_angle)
     shift = math.pi if bar == 4 else 0.0  # the loop runs along bar 4 from B to O4
     spans, full = mobility.intervals(linkage, bar), mobility.turns_fully(linkage, bar)
-    ends = [] if full else [(end, side) for span in spans for end, side in zip(span, (1.0, -1.0), strict=True)]
     expected = [((start + stop) / 2.0, True) for start, stop in spans]
-    # that the loop closes up to there is seen where the limit positions themselves are asked for
-    expected += [(end - side * beside(first, end + shift), False) for end, side in ends]
+    # that the loop closes up to its limits is seen where the limit positions themselves are asked for
+    for i, (start, stop) in enumerate(() if full else spans):
+        before, after = (start - spans[i - 1][1]) % TURN, (spans[i + 1 - len(spans)][0] - stop) % TURN
+        expected.append((start - min(beside(first, start + shift), 0.5 * before), False))
+        expected.append((stop + min(beside(first, stop + shift), 0.5 * after), False))
     along = [linkage.ground_angle + angle - shift for angle in (0.0, math.pi)]  # the ground, either way
     within = [any((angle - start) % TURN < stop - start for start, stop in spans) for angle in along]
     expected += zip(along, within, strict=True)
@@ -65,6 +67,6 @@ def _of_bar(linkage: FourBar, bar: int, engine: Engine) -> Iterator[Finding]:
     said = f"bar {bar} at {where!r} rad: the engine finds the opposite" if wrong.any() else "closes where stated"
     yield Finding(float(np.count_nonzero(wrong)), 0.0, where, said)
     limits = [limit[MOVING_BARS.index(bar)] for limit in mobility.limit_positions(linkage, bar)]
-    yield same(f"limits of bar {bar}", limits, [end for end, _ in ends])
+    yield same(f"limits of bar {bar}", limits, [] if full else [end for span in spans for end in span])
     yield same(f"swing of bar {bar}", [mobility.swing(linkage, bar)], [spans[0][1] - spans[0][0]])
     yield Finding(float(full != all(within)), 0.0, where, f"whether bar {bar} turns fully")

@@ -41,12 +41,13 @@ def _over(scene: Scene, answer: Answer, extremes: transmission.TransmissionExtre
         largest = np.maximum(1.0, np.maximum(np.abs(ratio), np.abs(answer.quantities["omega_3"] / at.omega_2)))
         allowed_gain = allowed / sine * largest / np.abs(ratio)
     where = state.assembled & ~state.singular & ~(allowed >= NOTHING_TO_TELL)  # a missing answer is none that holds
+    moving = where & (at.omega_2 != 0.0)
     acute = np.minimum(angle, math.pi - angle)
     outside = np.maximum(np.maximum(extremes.least - angle, angle - extremes.greatest), 0.0)
     for what, error, bound, counts in (
         ("transmission angle", np.abs(transmission.transmission_angle(state) - acute), allowed, where),
         ("beyond the extremes", outside, allowed, where),
-        ("mechanical advantage", np.abs(gained), allowed_gain, where & ~(allowed_gain >= NOTHING_TO_TELL)),
+        ("mechanical advantage", np.abs(gained), allowed_gain, moving & ~(allowed_gain >= NOTHING_TO_TELL)),
     ):
         yield from (Finding(*each, what) for each in zip(error[counts], bound[counts], at.theta_2[counts], strict=True))
     branch = at.branch.astype(float)
