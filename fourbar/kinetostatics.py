@@ -146,7 +146,7 @@ def solve_pins(
     terms : loads and effects.
     drive_bar : 2, 3 or 4.
     growths : relative changes of the terms, for the error bars.
-    room : arrays to write results into, by name: (n,), or both components of a vector.
+    room : arrays that results may be written into, by name: (n,), or both components of a vector.
     """
     wrenches = Wrenches(state, growths)
     add_inertia(wrenches, state)
@@ -155,7 +155,7 @@ def solve_pins(
         term.add_wrenches(wrenches, state)
         if term.loaded_pins:
             implicit.append(term)
-    pins = eliminate(state, wrenches, drive_bar, NO_ROOM if implicit else room)
+    pins = eliminate(state, wrenches, drive_bar, room)
     for each in implicit:  # a scene holds one effect of a kind, and one kind depends on the forces
         pins = each.settle(state, wrenches, pins, lambda wrenches: eliminate(state, wrenches, drive_bar))  # type: ignore[attr-defined]
     return pins

@@ -99,6 +99,11 @@ FAULTS = {
         "limit_positions",
         changed("limit_positions", lambda found: tuple(limit._replace(branch=-limit.branch) for limit in found)),
     ),
+    "no branch of a dead centre": (
+        ROCKER,
+        "limit_positions",
+        changed("limit_positions", lambda found: tuple(limit._replace(branch=0) for limit in found)),
+    ),
     "stretched for folded": (
         TRIPLE,
         "limit_positions",

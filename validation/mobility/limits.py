@@ -9,7 +9,7 @@ from fourbar import mobility
 from fourbar.linkage import MOVING_BARS, FourBar
 from fourbar.scene import Scene
 from validation.answer import Engine
-from validation.compare import closing_margin
+from validation.compare import TOUCHING_MARGIN, closing_margin
 from validation.mobility.finding import Finding, asked, wrapped
 from validation.mobility.ranges import beside
 from validation.tolerance import EPS, EQUIVALENCE, NOTHING_TO_TELL, Array, lever
@@ -20,13 +20,21 @@ def limit_positions(linkage: FourBar, engine: Engine) -> Iterator[Finding]:
     yield Finding(0.0, 0.0, linkage.ground_angle, "the same positions")
     for bar in MOVING_BARS:
         found = mobility.limit_positions(linkage, bar)
-        limits = [limit for limit in found if bar == 2 or limit.branch != 0]
+        limits = [limit for limit in found if bar == 2 or not _all_collinear(linkage, limit)]
+        for limit in found:
+            told = (0,) if bar == 2 else (1, -1) if limit in limits else (0, 1, -1)
+            yield Finding(float(limit.branch not in told), 0.0, limit.theta_2, f"branch of a limit of bar {bar}")
         # at its own limit bar 2 stands where rounding decides whether the loop closes
         steps = [_inwards(linkage, limit.theta_2) if bar == 2 else 0.0 for limit in limits]
         angles = [limit.theta_2 + step for limit, step in zip(limits, steps, strict=True)]
         seen = asked(engine, linkage, angles, [limit.branch or 1 for limit in limits]) if limits else {}
         for i, (limit, step) in enumerate(zip(limits, steps, strict=True)):
             yield from _held(linkage, bar, limit, step, {name: value[i] for name, value in seen.items()})
+
+
+def _all_collinear(linkage: FourBar, limit: mobility.LimitPosition) -> bool:
+    """Whether rounding decides on which branch the position lies."""
+    return bool(np.abs(closing_margin(Scene(linkage), np.array([limit.theta_2])))[0] <= TOUCHING_MARGIN)
 
 
 def _inwards(linkage: FourBar, theta_2: float) -> float:
