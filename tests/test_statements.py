@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import fourbar
+import validation.mobility.transmission
 from fourbar import mobility, transmission
 from fourbar.linkage import uniform
 from fourbar.scene import Scene, command
@@ -123,6 +124,11 @@ FAULTS = {
         ROCKER,
         "transmission",
         changed("transmission_angle", lambda found: found + SEEN, transmission),
+    ),
+    "drive condition": (
+        ROCKER,
+        "transmission",
+        changed("drive_sine", lambda found: found * (1.0 + SEEN), validation.mobility.transmission),
     ),
     "mechanical advantage": (
         ROCKER,

@@ -7,7 +7,8 @@ import numpy as np
 
 from fourbar import mobility, transmission
 from fourbar.kinematics import add_velocities, close_loop
-from fourbar.linkage import FourBar
+from fourbar.kinetostatics import drive_sine
+from fourbar.linkage import MOVING_BARS, FourBar
 from fourbar.scene import Scene
 from validation.answer import Answer, Engine
 from validation.compare import turned
@@ -32,7 +33,10 @@ def _over(scene: Scene, answer: Answer, extremes: transmission.TransmissionExtre
     assert at is not None and at.omega_2 is not None and answer.assembled is not None
     state = close_loop(linkage, at.theta_2, at.branch)
     add_velocities(state, at.omega_2)
-    angle = np.abs(wrapped(answer.quantities["theta_4"] - answer.quantities["theta_3"]))
+    theta = {2: at.theta_2, **{bar: answer.quantities[f"theta_{bar}"] for bar in (3, 4)}}
+    one, other = (theta[bar] for bar in MOVING_BARS if bar != scene.drive_bar)
+    driven = np.abs(np.sin(other - one))
+    angle = np.abs(wrapped(theta[4] - theta[3]))
     sine = np.abs(np.sin(angle))
     with np.errstate(divide="ignore", invalid="ignore"):
         allowed = EQUIVALENCE.factor * turned(at.theta_2) / (lever(linkage) * sine)
@@ -45,6 +49,9 @@ def _over(scene: Scene, answer: Answer, extremes: transmission.TransmissionExtre
     acute = np.minimum(angle, math.pi - angle)
     outside = np.maximum(np.maximum(extremes.least - angle, angle - extremes.greatest), 0.0)
     for what, error, bound, counts in (
+        # what divides every tolerance is not to be had from the formulas alone
+        ("condition", np.abs(state.sin_mu - np.sin(theta[4] - theta[3])), allowed, where),
+        ("drive condition", np.abs(np.abs(drive_sine(state, scene.drive_bar)) - driven), allowed, where),
         ("transmission angle", np.abs(transmission.transmission_angle(state) - acute), allowed, where),
         ("beyond the extremes", outside, allowed, where),
         ("mechanical advantage", np.abs(gained), allowed_gain, moving & ~(allowed_gain >= NOTHING_TO_TELL)),
