@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import fourbar.kinetostatics
+import fourbar.mobility
 from fourbar.files import loads
 from tests.scenes import crank_rocker
 from validation.fuzz import examine
@@ -55,6 +56,19 @@ def test_an_error_of_a_billionth_is_found_and_shrunk(monkeypatch: pytest.MonkeyP
     assert len(small.loads) + len(small.effects) < 3 and examine.findings(small)
     kept = keep(small, "billionth", tmp_path)
     assert examine.findings(loads(kept.read_text(encoding="utf-8")))
+
+
+def test_a_limit_off_by_a_billionth_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = replace(crank_rocker(), motion=fourbar.Motion(np.array([1.0, 2.0]), 10.0, 5.0))
+    assert examine.findings(scene) == []
+    true = fourbar.mobility.limit_positions
+    monkeypatch.setattr(
+        fourbar.mobility,
+        "limit_positions",
+        lambda *of: tuple(limit._replace(theta_4=limit.theta_4 + 1e-9) for limit in true(*of)),
+    )
+    found = {finding.split(":")[0] for finding in examine.findings(scene)}
+    assert found == {"pinocchio-inverse range", "pinocchio-inverse limit_positions"}
 
 
 @pytest.mark.parametrize(("times", "found"), [(9.0, False), (11.0, True)])

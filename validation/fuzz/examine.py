@@ -12,6 +12,7 @@ from validation.compare import TOUCHING_MARGIN, closing_margin, compare
 from validation.hard.prediction import from_data
 from validation.hard.suite import predicting
 from validation.identities import identities
+from validation.mobility.rows import statements
 from validation.results import FAILS
 from validation.tolerance import DEGRADED, EPS, K
 from validation.witnesses import WITNESSES, Witness, predicting_from
@@ -72,6 +73,8 @@ def _engines(scene: Scene, at: Command, solution: Solution, witnesses: tuple[Wit
             witness.expected,
             predicting_from(witness, scene, at, answer),
         )
+        if witness.name == "pinocchio-inverse" and answer.refusal is None:  # of two exact engines the quicker one
+            rows += statements("", scene, witness.engine(), answer)
     return [f"{row.engine} {row.quantity}: {row.reason}" for row in rows if row.verdict == FAILS]
 
 
