@@ -12,29 +12,39 @@ from validation.answer import Engine
 from validation.compare import TOUCHING_MARGIN, closing_margin
 from validation.mobility.finding import Finding, asked, wrapped
 from validation.mobility.ranges import beside
-from validation.tolerance import EPS, EQUIVALENCE, NOTHING_TO_TELL, Array, lever
+from validation.tolerance import EPS, EQUIVALENCE, NOTHING_TO_TELL, lever
 
 
 def limit_positions(linkage: FourBar, engine: Engine) -> Iterator[Finding]:
     """The limits of every moving bar; where all bars are collinear there is nothing to be told."""
     yield Finding(0.0, 0.0, linkage.ground_angle, "the same positions")
-    for bar in MOVING_BARS:
-        found = mobility.limit_positions(linkage, bar)
-        limits = [limit for limit in found if bar == 2 or not _all_collinear(linkage, limit)]
-        for limit in found:
-            told = (0,) if bar == 2 else (1, -1) if limit in limits else (0, 1, -1)
-            yield Finding(float(limit.branch not in told), 0.0, limit.theta_2, f"branch of a limit of bar {bar}")
-        # at its own limit bar 2 stands where rounding decides whether the loop closes
-        steps = [_inwards(linkage, limit.theta_2) if bar == 2 else 0.0 for limit in limits]
-        angles = [limit.theta_2 + step for limit, step in zip(limits, steps, strict=True)]
-        seen = asked(engine, linkage, angles, [limit.branch or 1 for limit in limits]) if limits else {}
-        for i, (limit, step) in enumerate(zip(limits, steps, strict=True)):
-            yield from _held(linkage, bar, limit, step, {name: value[i] for name, value in seen.items()})
+    yield from _of_input(linkage, engine)
+    for bar in (3, 4):
+        yield from _dead_centres(linkage, bar, engine)
 
 
-def _all_collinear(linkage: FourBar, limit: mobility.LimitPosition) -> bool:
-    """Whether rounding decides on which branch the position lies."""
-    return bool(np.abs(closing_margin(Scene(linkage), np.array([limit.theta_2])))[0] <= TOUCHING_MARGIN)
+def _of_input(linkage: FourBar, engine: Engine) -> Iterator[Finding]:
+    """On both branches just inside each limit: bars 3 and 4 stand off their common line by the same angles."""
+    d, a, *_ = linkage.lengths
+    limits = mobility.limit_positions(linkage)
+    # at the limit itself rounding decides whether the loop closes
+    steps = [_inwards(linkage, limit.theta_2) for limit in limits]
+    angles = [limit.theta_2 + step for limit, step in zip(limits, steps, strict=True)]
+    open_, crossed = (asked(engine, linkage, angles, [sign] * len(limits)) for sign in (1, -1)) if limits else ({}, {})
+    for i, (limit, step) in enumerate(zip(limits, steps, strict=True)):
+        yield Finding(float(limit.branch != 0), 0.0, limit.theta_2, "both branches meet at a limit of bar 2")
+        digits = lever(linkage) * abs(float(open_["sin_mu"][i]))
+        if digits * NOTHING_TO_TELL <= EPS:
+            continue
+        e = abs(d - a * np.exp(1j * (limit.theta_2 - linkage.ground_angle)))
+        allowed = EQUIVALENCE.factor / digits + a / e * (abs(step) + _moved(linkage, 2, limit))
+        middle = {}
+        for name, stated in (("theta_3", limit.theta_3), ("theta_4", limit.theta_4)):
+            middle[name] = open_[name][i] + 0.5 * wrapped(crossed[name][i] - open_[name][i])
+            error = abs(float(wrapped(middle[name] - stated)))
+            yield Finding(error, allowed, limit.theta_2, f"{name} at a limit of bar 2")
+        aligned = math.cos(middle["theta_4"] - middle["theta_3"]) < 0.0
+        yield Finding(float(aligned != limit.stretched), 0.0, limit.theta_2, "stretched or folded")
 
 
 def _inwards(linkage: FourBar, theta_2: float) -> float:
@@ -44,31 +54,39 @@ def _inwards(linkage: FourBar, theta_2: float) -> float:
     return step if ahead > behind else -step
 
 
-def _held(
-    linkage: FourBar, bar: int, limit: mobility.LimitPosition, step: float, seen: dict[str, Array]
-) -> Iterator[Finding]:
-    d, a, b, c = linkage.lengths
-    what = f"bar {bar} at theta_2 = {limit.theta_2!r}"
-    theta_3, theta_4 = float(seen["theta_3"]), float(seen["theta_4"])
-    rates = {3: float(seen["omega_3"]), 4: float(seen["omega_4"])}
-    sine, speed = abs(math.sin(theta_4 - theta_3)), max(1.0, *(abs(rate) for rate in rates.values()))
-    digits = lever(linkage) * sine
-    if digits * NOTHING_TO_TELL <= EPS:
-        return
-    # the triangle of the ground, the bar, and the other two in one line is known to eps of its perimeter
+def _moved(linkage: FourBar, bar: int, limit: mobility.LimitPosition) -> float:
+    """What rounding may turn a limit by: the triangle of the ground, the bar and the other two in one line."""
     upright = abs(math.sin(limit[MOVING_BARS.index(bar)] - linkage.ground_angle))
-    rounding = sum(linkage.lengths) / d * (1.0 + (a + b + c) / linkage.bar(bar).length) / max(upright, EPS)
-    moved = EQUIVALENCE.factor * rounding
-    allowed = EQUIVALENCE.factor / digits + moved * speed
-    if bar == 2:  # beside the limit bars 3 and 4 stand off their common line
-        e = abs(d - a * np.exp(1j * (limit.theta_2 - linkage.ground_angle)))
-        allowed = 2.0 * (max(b, c) / e * sine + (1.0 + a / e) * abs(step))
-    for angle, stated in ((theta_3, limit.theta_3), (theta_4, limit.theta_4)):
-        yield Finding(abs(float(wrapped(np.array(angle - stated)))), allowed, limit.theta_2, what)
-    vectors = {2: limit.theta_2, 3: theta_3, 4: theta_4 + math.pi}  # the loop runs along bar 4 from B to O4
-    one, other = (vectors[k] for k in MOVING_BARS if k != bar)
-    yield Finding(float((math.cos(one - other) > 0.0) != limit.stretched), 0.0, limit.theta_2, what)
-    if bar != 2:
-        slowing = abs(float(seen[f"alpha_{bar}"]))
+    d, *moving = linkage.lengths
+    spread = sum(linkage.lengths) / d * (1.0 + sum(moving) / linkage.bar(bar).length)
+    return EQUIVALENCE.factor * spread / max(upright, EPS)
+
+
+def _dead_centres(linkage: FourBar, bar: int, engine: Engine) -> Iterator[Finding]:
+    """The other two bars are in one line there, and the bar is at rest."""
+    limits = []
+    for limit in mobility.limit_positions(linkage, bar):
+        margin = abs(float(closing_margin(Scene(linkage), np.array([limit.theta_2]))[0]))
+        told = (1, -1) if margin > TOUCHING_MARGIN else (0, 1, -1)  # all bars collinear: rounding decides
+        yield Finding(float(limit.branch not in told), 0.0, limit.theta_2, f"branch of a limit of bar {bar}")
+        limits += [limit] if margin > TOUCHING_MARGIN and limit.branch != 0 else []
+    if not limits:
+        return
+    seen = asked(engine, linkage, [limit.theta_2 for limit in limits], [limit.branch for limit in limits])
+    for i, limit in enumerate(limits):
+        what = f"bar {bar} at theta_2 = {limit.theta_2!r}"
+        theta_3, theta_4, omega_3, omega_4 = (float(seen[q][i]) for q in ("theta_3", "theta_4", "omega_3", "omega_4"))
+        sine, speed = abs(float(seen["sin_mu"][i])), max(1.0, abs(omega_3), abs(omega_4))
+        digits = lever(linkage) * sine
+        if digits * NOTHING_TO_TELL <= EPS:
+            continue
+        moved = _moved(linkage, bar, limit)
+        for angle, stated in ((theta_3, limit.theta_3), (theta_4, limit.theta_4)):
+            error = abs(float(wrapped(np.array(angle - stated))))
+            yield Finding(error, EQUIVALENCE.factor / digits + moved * speed, limit.theta_2, what)
+        # the loop runs along bar 4 from B to O4
+        aligned = math.cos({3: theta_4 + math.pi, 4: theta_3}[bar] - limit.theta_2) > 0.0
+        yield Finding(float(aligned != limit.stretched), 0.0, limit.theta_2, "stretched or folded")
+        slowing = abs(float(seen[f"alpha_{bar}"][i]))
         at_rest = EQUIVALENCE.factor * speed / (digits * sine) + slowing * moved
-        yield Finding(abs(rates[bar]), at_rest, limit.theta_2, f"{what}: at rest")
+        yield Finding(abs({3: omega_3, 4: omega_4}[bar]), at_rest, limit.theta_2, f"{what}: at rest")
