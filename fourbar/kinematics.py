@@ -54,7 +54,7 @@ def close_loop(
     # e^2 + b^2 - c^2 and e^2 - b^2 + c^2 by Heron's factor, from which the root is too: u3 and u4 keep their length
     inner, more = diagonal.inner, 2.0 * (b - c)
     at_A, at_O4 = inner + b * more, inner - c * more
-    with np.errstate(divide="ignore", invalid="ignore"):  # e = 0: A on O4, where beta is free
+    with np.errstate(all="ignore"):  # e = 0: A on O4, where beta is free
         to_3 = (0.5 / b) / squared
         to_4 = to_3 * -(b / c)
         x_root, y_root = x * root, y * root
@@ -104,10 +104,11 @@ def _put_A_on_O4(state: State, u1: tuple[Any, Any]) -> None:
     """Bars 3 and 4 of a kite lie on each other and turn freely where A meets O4: put where theta_2 falls to that."""
     if not isinstance(state.diagonal.squared, np.ndarray):
         return  # singular, and so none of the second pass
-    met = np.flatnonzero(state.assembled & (state.diagonal.squared == 0.0))
+    met = np.flatnonzero(state.assembled & ~np.isfinite(state.u3[0]))
+    side = np.where(state.diagonal.h[met] < 0.0, -1.0, 1.0)  # so near that e^2 left the range of doubles
     for u in (state.u3, state.u4):
         for i in (0, 1):
-            u[i][met] = state.branch[met] * u1[i]
+            u[i][met] = side * state.branch[met] * u1[i]
 
 
 def _parallel(state: State, u1: tuple[Any, Any]) -> None:
@@ -179,7 +180,7 @@ def first_coefficients(state: State) -> FirstCoefficients:
     cot_beta, cot_gamma = state.at_A / root, state.at_O4 / root
     growth, turn = (2.0 * a * d) * diagonal.h, (a * (a - d)) * diagonal.w
     turn += (a * (a + d)) * diagonal.v
-    with np.errstate(divide="ignore", invalid="ignore"):  # A on O4
+    with np.errstate(all="ignore"):  # A on O4
         growth /= diagonal.squared
         turn /= diagonal.squared
     with_beta, with_gamma = growth * cot_beta, growth * cot_gamma
@@ -196,19 +197,19 @@ def second_coefficients(state: State, first: FirstCoefficients) -> Vector:
     diagonal = state.diagonal
     d, a, _, _ = diagonal.lengths
     growth = first.growth
-    turn, shared = ((d - a) * (d + a)) * growth, (a * d) * state.cos_psi
-    turn /= diagonal.squared
-    with np.errstate(divide="ignore", invalid="ignore"):  # A on O4
+    with np.errstate(all="ignore"):  # A on O4
+        turn, shared = ((d - a) * (d + a)) * growth, (a * d) * state.cos_psi
+        turn /= diagonal.squared
         shared /= diagonal.squared
-    twice = growth * growth
-    twice *= 2.0
-    shared -= twice
-    shared += first.with_beta * first.with_gamma
-    h3, h4 = growth * first.with_beta, growth * first.with_gamma
-    h3 += shared * first.cot_gamma
-    h4 += shared * first.cot_beta
-    h3 = turn - h3
-    h4 += turn
+        twice = growth * growth
+        twice *= 2.0
+        shared -= twice
+        shared += first.with_beta * first.with_gamma
+        h3, h4 = growth * first.with_beta, growth * first.with_gamma
+        h3 += shared * first.cot_gamma
+        h4 += shared * first.cot_beta
+        h3 = turn - h3
+        h4 += turn
     if state.parallel is not None:
         rest = np.where(state.singular, np.nan, 0.0)
         h3, h4 = (np.where(state.parallel[0], rest, h) for h in (h3, h4))

@@ -339,10 +339,18 @@ def test_a_kite_whose_A_lies_on_O4_lies_where_its_neighbours_do(branch: int, the
     """As theta_2 falls to theta_1 bars 3 and 4 come to lie on the ground's line, both the same way."""
     link = fourbar.FourBar(0.3, fourbar.Bar(0.3), fourbar.Bar(0.2), fourbar.Bar(0.2), theta_1)
     beside = 2.0**-30
-    on, near = (close_loop(link, theta_1 + np.array([psi, 0.5]), branch) for psi in (0.0, beside))
-    for bar in (3, 4):
-        for ours, limit in zip(on.unit(bar), near.unit(bar), strict=True):
-            assert ours == pytest.approx(limit, abs=2.0 * beside)
+    # on it, and so near that e^2 leaves the range of doubles
+    for psi, towards in ((0.0, 1.0), *((side * psi, side) for psi in (1e-170, 1e-157) for side in (1.0, -1.0))):
+        if psi != 0.0 and theta_1 != 0.0:
+            continue
+        on, near = (close_loop(link, theta_1 + np.array([psi, 0.5]), branch) for psi in (psi, towards * beside))
+        for bar in (3, 4):
+            for ours, limit in zip(on.unit(bar), near.unit(bar), strict=True):
+                assert ours == pytest.approx(limit, abs=2.0 * beside)
+        assert on.singular.tolist() == [True, False]
+        add_velocities(on, 2.0)
+        add_accelerations(on, 3.0)
+        assert np.isnan(on.omega(3)).tolist() == np.isnan(on.alpha(4)).tolist() == [True, False]  # type: ignore[arg-type]
     # with b and c unlike each other nothing closes there
     assert not close_loop(fourbar.uniform(0.3, 0.3, 0.2, 0.25), np.zeros(1), branch).assembled.any()
 
