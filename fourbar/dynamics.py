@@ -108,7 +108,7 @@ def half_angle(shape: Triangle, theta_1: float, q: Number) -> Half:
 
 
 def trace(
-    shape: Triangle, theta_1: float, q: Number, sign: Number, *, follow: bool = False, at: Half | None = None
+    shape: Triangle, theta_1: float, q: Number, sign: Number, *, follow: bool, at: Half | None = None
 ) -> tuple[Number, ...]:
     """u_3, u_4, theta_3', theta_4', theta_3'', theta_4'', 1 - theta_3', theta_4' - theta_3' and
     sin(theta_4 - theta_3) of a bar 2 at angle q.
@@ -169,7 +169,7 @@ def _leg(E: float, ad: float, x: Number, dx: Number, factor: Number, follow: boo
 
 def path(linkage: FourBar, theta_2: Number, branch: Number, at: Half | None = None) -> Path:
     """The path in q = theta_2 on a branch (NaN where the loop does not close, inf at a limit)."""
-    with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+    with np.errstate(all="ignore"):
         return along_input(linkage, triangle(*linkage.lengths), theta_2, branch, at=at)
 
 
@@ -258,7 +258,7 @@ def driving_torque(
     terms : loads and effects.
     """
     terms = tuple(terms)
-    with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+    with np.errstate(all="ignore"):
         J, J_1 = inertia(carrying(linkage, terms), way)
         work = J * alpha + 0.5 * J_1 * omega * omega - generalised_force(linkage, way, omega, terms)
         return work / way.first[drive_bar]

@@ -170,7 +170,7 @@ def change_points(linkage: FourBar) -> tuple[float, ...]:
 
     theta_1 where |a - d| = |b - c|, theta_1 + pi where a + d = b + c, within the rounding of the lengths.
     """
-    reach, theta_1 = reach_of(linkage, 2), linkage.ground_angle
+    reach, theta_1 = reach_of(linkage), linkage.ground_angle
     folded = (theta_1,) if reach.beyond_folded == 0.0 else ()
     return (*folded, theta_1 + math.pi) if reach.beyond_stretched == 0.0 else folded
 

@@ -238,6 +238,20 @@ def test_dry_friction_at_rest_holds_as_much_as_its_work(drive_bar: int) -> None:
     assert np.array_equal(moving.torque_low, moving.torque) and np.array_equal(moving.torque_high, moving.torque)
 
 
+def test_bars_without_mass_hold_a_load_where_the_input_turns_back() -> None:
+    """There bars 3 and 4 have no acceleration; a drive on bar 4 needs none to hold what it holds beside the limit."""
+    link = fourbar.FourBar(0.5, fourbar.Bar(0.4), fourbar.Bar(0.3), fourbar.Bar(0.25), 0.2)
+    loads = (fourbar.Load(3, (2.0, 0.3), (0.1, 0.02)),)
+    on, beside = (
+        fourbar.solve(fourbar.Scene(link, fourbar.Motion(fourbar.FromLimit(1, offset), 1.0), 4, loads))
+        for offset in (0.0, -1e-20)
+    )
+    assert on.status == ["singular"] and beside.status == ["ok"]
+    for name in ("torque", "F12", "F32", "F43", "F14"):
+        # mu grows as the root of the offset
+        assert getattr(on, name) == pytest.approx(getattr(beside, name), rel=1e-8)
+
+
 def test_nothing_acts_nothing_is_carried() -> None:
     link = fourbar.FourBar(0.3, fourbar.Bar(0.1), fourbar.Bar(0.25), fourbar.Bar(0.22))
     s = fourbar.solve(fourbar.Scene(link, fourbar.Motion(1.0, 5.0)))
