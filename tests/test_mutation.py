@@ -43,8 +43,10 @@ def test_survivors_need_a_reason(
 ) -> None:
     listed = "\n".join(f"    fourbar.dynamics.x_f__mutmut_{i}: killed" for i in range(1, 20))
     listed += "\n    fourbar.dynamics.x_f__mutmut_20: survived\n    fourbar.mobility.x_g__mutmut_1: not checked\n"
-    states = command._states(listed, ["fourbar.dynamics*", "fourbar.mobility*"])
+    states = command._states(listed, ["fourbar.dynamics*"])
     assert len(states) == 20
+    every = command._states(listed, ["fourbar.dynamics*", "fourbar.mobility*"])
+    assert len(every) == 21
     survivors = {"fourbar.dynamics.x_f__mutmut_20": "dynamics.f: return a -> return b"}
     reasons = tmp_path / "harmless.json"
     monkeypatch.setattr(command, "HARMLESS", reasons)
@@ -54,6 +56,17 @@ def test_survivors_need_a_reason(
     reasons.write_text('{"dynamics.f": {"return a -> return b": "a is b"}}', encoding="utf-8")
     assert command._told(states, survivors, tmp_path) == 0
     assert "a is b" in (tmp_path / "survivors.txt").read_text(encoding="utf-8")
+    assert "of no survivor" not in capsys.readouterr().out
+    # a run that ended early proves nothing, nor do nineteen dead of one module speak for another
+    assert command._told(every, survivors, tmp_path) == 1
+    assert "1 mutants were not tried" in capsys.readouterr().out
+    more = {**states, "fourbar.mobility.x_g__mutmut_1": "survived", "fourbar.mobility.x_g__mutmut_2": "killed"}
+    more |= {f"fourbar.dynamics.x_h__mutmut_{i}": "killed" for i in range(40)}
+    same = "dynamics.f: return a -> return b"  # on record too
+    assert command._told(more, {**survivors, "fourbar.mobility.x_g__mutmut_1": same}, tmp_path) == 1
+    capsys.readouterr()
+    assert command._told(states | {"fourbar.dynamics.x_f__mutmut_20": "killed"}, {}, tmp_path) == 0
+    assert "of no survivor:\n    dynamics.f: return a -> return b" in capsys.readouterr().out
     # with a reason each, but too many
     del states["fourbar.dynamics.x_f__mutmut_1"]
     assert command._told(states, survivors, tmp_path) == 1

@@ -23,6 +23,7 @@ HARMLESS = Path(__file__).parent / "harmless.json"
 CAUGHT = 1
 """Status of pytest where a test failed."""
 ALIVE = ("survived", "no tests", "suspicious")
+UNTRIED = ("", "not checked", "check was interrupted by user")
 
 
 @click.command()
@@ -30,9 +31,10 @@ ALIVE = ("survived", "no tests", "suspicious")
 @click.option("--module", type=click.Choice(MODULES), help="Only this one.")
 @click.option("--most", default=0, type=click.IntRange(0), help="With --harness: at most this many per module.")
 @click.option("--whole", is_flag=True, help="Try survivors without a reason on the whole suite (minutes each).")
+@click.option("--again", is_flag=True, help="Only what survived the last run into --out, after tests were added.")
 @click.option("--workers", default=2, show_default=True, type=click.IntRange(1))
 @click.option("--out", type=click.Path(path_type=Path, file_okay=False), default=Path("results/mutation"))
-def mutation(harness: bool, module: str | None, most: int, whole: bool, workers: int, out: Path) -> int:
+def mutation(harness: bool, module: str | None, most: int, whole: bool, again: bool, workers: int, out: Path) -> int:
     """Measure the checks: small faults in the formulas, one at a time, against `make test` or the harness alone.
 
     The tests of the formulas are tried (pyproject.toml names them), the fast ones first: what they
@@ -43,15 +45,26 @@ def mutation(harness: bool, module: str | None, most: int, whole: bool, workers:
         raise DependencyError('mutmut is not installed: pip install "fourbar[mutation]"')
     if most and not harness:
         raise InputError("--most", most, "is for --harness; mutmut itself runs whole modules")
+    if again and harness:
+        raise InputError("--again", again, "is for the tests; the harness tries every mutant")
     tree = out / "tree"
+    if again and not tree.is_dir():
+        raise InputError("--again", again, f"no run into {out} came before")
     _copy(tree)
     if harness:
         return _harness(mutmut, tree, module, most, out)
-    names = [f"fourbar.{name}*" for name in ([module] if module else MODULES)]
-    # its own status says nothing of survivors; the results are read below
-    subprocess.run([mutmut, "run", "--max-children", str(workers), *names], cwd=tree, check=False)
-    listed = subprocess.run([mutmut, "results", "--all", "true"], cwd=tree, check=True, capture_output=True, text=True)
-    states = _states(listed.stdout, names)
+    modules = [f"fourbar.{name}*" for name in ([module] if module else MODULES)]
+    tried = modules
+    if again:  # and those of functions that changed since, whose results are gone
+        _generate(mutmut, tree)
+        tried = [n for n, state in _listed(mutmut, tree, modules).items() if state in (*ALIVE, *UNTRIED)]
+    if tried:
+        # its own status says nothing of survivors; its display is for a terminal
+        with (out / "mutmut.log").open("w", encoding="utf-8") as log:
+            shown = None if sys.stdout.isatty() else log
+            arguments = ["run", "--max-children", str(workers), *tried]
+            subprocess.run([mutmut, *arguments], cwd=tree, check=False, stdout=shown, stderr=shown)
+    states = _listed(mutmut, tree, modules)
     survivors = {name: _change(mutmut, tree, name) for name, state in states.items() if state in ALIVE}
     if whole:
         reasons = _reasons()
@@ -62,7 +75,7 @@ def mutation(harness: bool, module: str | None, most: int, whole: bool, workers:
 
 
 def _copy(tree: Path) -> None:
-    """The checkout, without what earlier runs made of it; results of unchanged mutants in the tree are kept."""
+    """The checkout, without what earlier runs made of it; mutmut's own record in the tree stays."""
     tree.mkdir(parents=True, exist_ok=True)
     for name in COPIED:
         source, target = ROOT / name, tree / name
@@ -73,14 +86,25 @@ def _copy(tree: Path) -> None:
             shutil.copy2(source, target)
 
 
-def _states(listed: str, names: list[str]) -> dict[str, str]:
-    """What became of each mutant that was tried."""
-    prefixes = tuple(name.rstrip("*") for name in names)
+def _generate(mutmut: Path, tree: Path) -> None:
+    """All mutants, those of changed functions anew: asked for a name that none has, mutmut then stops."""
+    subprocess.run([mutmut, "run", "fourbar.none*"], cwd=tree, check=False, capture_output=True)
+
+
+def _listed(mutmut: Path, tree: Path, modules: list[str]) -> dict[str, str]:
+    """What mutmut has on record of the mutants of the modules."""
+    listed = subprocess.run([mutmut, "results", "--all", "true"], cwd=tree, check=True, capture_output=True, text=True)
+    return _states(listed.stdout, modules)
+
+
+def _states(listed: str, modules: list[str]) -> dict[str, str]:
+    """What became of each mutant of the modules."""
+    prefixes = tuple(name.rstrip("*") for name in modules)
     states = {}
     for line in listed.splitlines():
-        name, _, state = line.strip().partition(": ")
-        if name.startswith(prefixes) and state not in ("", "not checked"):
-            states[name] = state
+        name, _, state = line.strip().partition(":")  # of one that was not tried the state may be missing
+        if name.startswith(prefixes):
+            states[name] = state.strip()
     return states
 
 
@@ -122,26 +146,33 @@ def _caught_by_all(tree: Path, names: list[str], workers: int) -> list[str]:
 def _told(states: dict[str, str], survivors: dict[str, str], out: Path) -> int:
     """Kill rate per module, and the survivors with the reason that is on record for them."""
     reasons = _reasons()
-    count = Counter((name.split(".")[1], name in survivors) for name in states)
+    untried = [name for name, state in states.items() if state in UNTRIED]
+    count = Counter((name.split(".")[1], name in survivors or name in untried) for name in states)
+    shares = {}
     for module in MODULES:
         dead, alive = count[module, False], count[module, True]
         if dead + alive:
-            print(f"{module}: {dead} of {dead + alive} mutants killed ({dead / (dead + alive):.1%})")
-    killed = len(states) - len(survivors)
+            shares[module] = dead / (dead + alive)
+            print(f"{module}: {dead} of {dead + alive} mutants killed ({shares[module]:.1%})")
+    killed = len(states) - len(survivors) - len(untried)
     if states:
         print(f"together: {killed} of {len(states)} ({killed / len(states):.1%})")
+    if untried:
+        print(f"{len(untried)} mutants were not tried: the run of mutmut ended before it came to them")
     lines = [f"{change}\n    {reasons.get(change, 'NO REASON ON RECORD')}" for change in sorted(survivors.values())]
     write_text(out / "survivors.txt", "\n".join(lines) + "\n")
     unknown = sum(change not in reasons for change in survivors.values())
     print(f"{len(survivors)} survivors, {unknown} without a reason, are listed in {out / 'survivors.txt'}")
-    return 0 if states and killed >= LEAST * len(states) and not unknown else 1
+    idle = [change for change in reasons if change.split(".")[0] in shares and change not in survivors.values()]
+    if idle:
+        print("on record, but of no survivor:", *idle, sep="\n    ")
+    return 0 if shares and min(shares.values()) >= LEAST and not unknown and not untried else 1
 
 
 def _harness(mutmut: Path, tree: Path, module: str | None, most: int, out: Path) -> int:
     """Generate the mutants with mutmut, then try them on the harness in the mutated tree."""
     generated = tree / "mutants"
-    # a name that no mutant has: mutmut generates all of them, those of changed files anew, finds none to run and stops
-    subprocess.run([mutmut, "run", "fourbar.none*"], cwd=tree, check=False, capture_output=True)
+    _generate(mutmut, tree)
     arguments = [sys.executable, "-m", "validation.mutation.harness", module or "", str(most)]
     environment = {**os.environ, "PYTHONPATH": "."}
     done = subprocess.run(arguments, cwd=generated, check=True, stdout=subprocess.PIPE, text=True, env=environment)
