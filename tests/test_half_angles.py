@@ -9,7 +9,7 @@ import fourbar
 from fourbar.half_angles import _half, half_angles
 from fourbar.scene import Command, solve
 from validation.reference import reference
-from validation.stability import EPS, FACTOR
+from validation.stability.judge import EPS, FACTOR
 
 SEED, LINKAGES = 3, 12
 """Crank-rockers; 40 positions each take about half a second of ball arithmetic together."""

@@ -23,7 +23,8 @@ LAYERS = [
     ("error_bars",),
     ("blocks",),
     ("scene",),
-    ("files", "mjcf", "plot", "drawing", "tables"),
+    ("scene_text", "mjcf", "plot", "drawing", "tables"),
+    ("files",),
     ("animate", "notebook"),
     ("cli",),
 ]

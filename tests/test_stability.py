@@ -5,7 +5,9 @@ import pytest
 
 import fourbar
 from fourbar.tables import heading
-from validation.stability import FAMILIES, TOO_SMALL, Tally, run
+from validation.stability.command import run
+from validation.stability.families import FAMILIES
+from validation.stability.judge import TOO_SMALL, Tally
 
 SAMPLES = 40
 """Per family: about 1 s each; the ten thousand of each are `python -m validation stability`."""
@@ -74,7 +76,7 @@ def test_a_torque_off_in_its_twelfth_digit_is_noticed(monkeypatch: pytest.Monkey
         solution.torque *= 1.0 + 1e-12
         return solution
 
-    monkeypatch.setattr("validation.stability.solve", off)
+    monkeypatch.setattr("validation.stability.judge.solve", off)
     tally = run("random", range(20))
     assert tally.worst["torque"][0] > 1.0
     assert not tally.held()

@@ -17,7 +17,7 @@ COMMANDS = {
     "published": "validation.published:published",
     "mutation": "validation.mutation.command:mutation",
     "fuzz": "validation.fuzz.command:fuzz",
-    "stability": "validation.stability:stability",
+    "stability": "validation.stability.command:stability",
     "bench": "validation.bench:bench",
     "cost": "validation.cost.command:cost",
     "advise": "validation.cost.advise:command",

@@ -1,0 +1,1 @@
+"""Forward error of the formulas against ball arithmetic, per family of hard cases."""
