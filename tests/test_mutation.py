@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import fourbar
 from tests.scenes import crank_rocker
 from validation.mutation import command, harness
 from validation.mutation.harness import caught, changed, numbers
@@ -93,6 +94,32 @@ def test_a_survivor_is_known_by_its_function_and_its_line(tmp_path: Path) -> Non
         == "mobility.Reach.sum: return 0.0 if total <= limit else total -> return 0.0 if total < limit else total"
     )
     assert command._change(mutmut, tmp_path, "fourbar.mobility.x__wrapped__mutmut_1").startswith("mobility._wrapped: ")
+
+
+def test_a_run_that_mutmut_stops_is_no_result(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Here mutmut knows of one killed mutant, from before, and finds a test that fails without any."""
+    mutmut = tmp_path / "mutmut"
+    mutmut.write_text(
+        "#!/bin/sh\n[ $1 = results ] && echo 'fourbar.dynamics.x_f__mutmut_1: killed' || exit $STOPS\n",
+        encoding="utf-8",
+    )
+    mutmut.chmod(0o755)
+    monkeypatch.setattr(command.sys, "executable", str(tmp_path / "python"))
+    monkeypatch.setattr(command, "_copy", lambda tree: tree.mkdir(parents=True, exist_ok=True))
+    monkeypatch.setattr(command, "_reasons", dict)
+    for stops, status in (("0", 0), ("1", 1)):
+        monkeypatch.setenv("STOPS", stops)
+        arguments = ["--out", str(tmp_path / "out")]
+        assert command.mutation.main(arguments, standalone_mode=False) == status
+        assert ("mutmut stopped with status 1" in capsys.readouterr().out) == bool(status)
+        assert (tmp_path / "out" / "mutmut.log").is_file()
+    # nothing survived: there is nothing to try again, and no run before it means nothing to go by
+    monkeypatch.setenv("STOPS", "0")
+    assert command.mutation.main([*arguments, "--again"], standalone_mode=False) == 0
+    with pytest.raises(fourbar.InputError, match="no run into"):
+        command.mutation.main(["--again", "--out", str(tmp_path / "other")], standalone_mode=False)
 
 
 def test_the_whole_suite_is_tried_without_what_fails_on_the_copy(

@@ -58,12 +58,9 @@ def mutation(harness: bool, module: str | None, most: int, whole: bool, again: b
     if again:  # and those of functions that changed since, whose results are gone
         _generate(mutmut, tree)
         tried = [n for n, state in _listed(mutmut, tree, modules).items() if state in (*ALIVE, *UNTRIED)]
-    if tried:
-        # its own status says nothing of survivors; its display is for a terminal
-        with (out / "mutmut.log").open("w", encoding="utf-8") as log:
-            shown = None if sys.stdout.isatty() else log
-            arguments = ["run", "--max-children", str(workers), *tried]
-            subprocess.run([mutmut, *arguments], cwd=tree, check=False, stdout=shown, stderr=shown)
+    if tried and (status := _run(mutmut, tree, tried, workers, out / "mutmut.log")):
+        print(f"mutmut stopped with status {status}: the results in {out} are not those of this checkout")
+        return 1
     states = _listed(mutmut, tree, modules)
     survivors = {name: _change(mutmut, tree, name) for name, state in states.items() if state in ALIVE}
     if whole:
@@ -89,6 +86,15 @@ def _copy(tree: Path) -> None:
 def _generate(mutmut: Path, tree: Path) -> None:
     """All mutants, those of changed functions anew: asked for a name that none has, mutmut then stops."""
     subprocess.run([mutmut, "run", "fourbar.none*"], cwd=tree, check=False, capture_output=True)
+
+
+def _run(mutmut: Path, tree: Path, names: list[str], workers: int, log: Path) -> int:
+    """Try the mutants named; mutmut's status, which is 0 with survivors too and not where a test fails without any."""
+    command = [str(mutmut), "run", "--max-children", str(workers), *names]
+    if sys.stdout.isatty():
+        return subprocess.run(command, cwd=tree, check=False).returncode
+    with log.open("w", encoding="utf-8") as shown:  # its display is for a terminal
+        return subprocess.run(command, cwd=tree, check=False, stdout=shown, stderr=shown).returncode
 
 
 def _listed(mutmut: Path, tree: Path, modules: list[str]) -> dict[str, str]:
