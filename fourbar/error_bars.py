@@ -18,7 +18,7 @@ import numpy as np
 from fourbar.kinematics import add_accelerations, add_velocities, close_loop
 from fourbar.kinetostatics import PinForces, Term, solve_pins
 from fourbar.linkage import Bar, FourBar
-from fourbar.margins import diagonal_to_O4
+from fourbar.margins import diagonal_to_O4, lost_by_turning
 from fourbar.more_digits import rounded
 from fourbar.state import Array, State
 
@@ -44,6 +44,9 @@ def error_bars(state: State, pins: PinForces, terms: Iterable[Term], drive_bar: 
     """
     terms = tuple(terms)
     in_doubles = isinstance(state.theta_2, np.ndarray)
+    turned = None
+    if state.parallel is not None and state.linkage.ground_angle != 0.0:
+        turned = lost_by_turning(state.linkage, state.theta_2, state.parallel[0], LAST_DIGIT)
     n = len(rounded(state.theta_2))
     torque, forces = np.zeros(n), np.zeros((4, n))
     for run in range(EVALUATIONS):
@@ -52,7 +55,7 @@ def error_bars(state: State, pins: PinForces, terms: Iterable[Term], drive_bar: 
         beside = partial(_next, signs=signs)
         moved_terms = [term.rounded_anew(beside, all_of_it=in_doubles) for term in terms]
         if in_doubles:
-            moved = _moved_state(state, linkage, signs)
+            moved = _moved_state(state, linkage, signs, turned)
             other = solve_pins(moved, moved_terms, drive_bar, growths=signs)
         else:
             other = solve_pins(replace(state, linkage=linkage), moved_terms, drive_bar)
@@ -106,9 +109,9 @@ def _unit_vector_beside(angle: Array, signs: Iterator[float]) -> tuple[Array, Ar
     return (1.0 - squared) * w, 2.0 * t * w
 
 
-def _moved_state(state: State, linkage: FourBar, signs: Iterator[float]) -> State:
+def _moved_state(state: State, linkage: FourBar, signs: Iterator[float], turned: tuple[Array, Array] | None) -> State:
     """The motion of the changed linkage at the same positions, from a triangle changed in its last digits."""
-    diagonal = diagonal_to_O4(linkage, state.theta_2, growths=signs)
+    diagonal = diagonal_to_O4(linkage, state.theta_2, growths=signs, turned=turned)
     exact = state.diagonal.decided
     # margins of 60 digits carry one rounding, not the cancellation of the lengths
     diagonal.root[exact] = _next(state.diagonal.root[exact], signs)

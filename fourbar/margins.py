@@ -85,7 +85,12 @@ def in_precision_of(array: Array, number: float) -> Any:
 
 
 def diagonal_to_O4(
-    linkage: FourBar, theta_2: Array, offset: "Decimal | None" = None, *, growths: Iterator[float] | None = None
+    linkage: FourBar,
+    theta_2: Array,
+    offset: "Decimal | None" = None,
+    *,
+    growths: Iterator[float] | None = None,
+    turned: tuple[Array, Array] | None = None,
 ) -> Diagonal:
     """The diagonal from the half angle: e^2 = (d - a)^2 w + (d + a)^2 v, w and v its squared cosine and sine.
 
@@ -98,10 +103,11 @@ def diagonal_to_O4(
     offset : what theta_2 as a double leaves out of the angle meant, rad; then all margins are
         evaluated in 60 digits.
     growths : relative changes of the parts, for the error bars; factors near zero then stay as doubles give them.
+    turned : what `lost_by_turning` gives, where pairs of bars stay parallel.
     """
     unit = unit_of(linkage)
     lengths = scaled(linkage, unit)
-    x, y, squared, (w, v, h), (constant_1, constant_2, product) = _triangle(linkage, lengths, theta_2, growths)
+    x, y, squared, (w, v, h), (constant_1, constant_2, product) = _triangle(linkage, lengths, theta_2, growths, turned)
     outer, inner = product * w, product * v
     outer += constant_1
     inner += constant_2
@@ -160,7 +166,11 @@ def in_double_double(linkage: FourBar, theta_2: Array) -> Diagonal:
 
 
 def _triangle(
-    linkage: FourBar, lengths: tuple[Any, Any, Any, Any], theta_2: Array, growths: Iterator[float] | None = None
+    linkage: FourBar,
+    lengths: tuple[Any, Any, Any, Any],
+    theta_2: Array,
+    growths: Iterator[float] | None = None,
+    turned: tuple[Array, Array] | None = None,
 ) -> tuple[Array, Array, Array, tuple[Array, Array, Array], tuple[Any, Any, Any]]:
     """x, y, e^2 and w, v, h of `Diagonal`, the constants of outer and inner and 4 a d, in the precision of theta_2."""
     d, a, b, c = lengths
@@ -169,12 +179,13 @@ def _triangle(
     if theta_1 != 0.0:
         psi = theta_2 - theta_1
         if growths is not None:  # psi is rounded at its own size, however near to a whole turn it is
-            psi = psi + next(growths) * np.clip(psi, -MANY_TURNS, MANY_TURNS)
+            growth = next(growths)
+            psi = psi + growth * (np.clip(psi, -MANY_TURNS, MANY_TURNS) if turned is None else turned[0])
     t = np.tan(0.5 * psi)
+    if growths is not None and turned is not None:  # half a last digit of psi would be rounded away again
+        t = t + growth * ((0.5 + 0.5 * (t * t)) * turned[1])
     if psi is not theta_2 and isinstance(psi, np.ndarray) and np.abs(psi).max() > MANY_TURNS:
-        taken = theta_2 - psi
-        rounded_away = (theta_2 - (psi + taken)) + (taken - theta_1)  # Knuth's sum: psi + this is exact
-        t = t + (0.5 + 0.5 * (t * t)) * rounded_away
+        t = t + (0.5 + 0.5 * (t * t)) * _rounded_away(theta_2, theta_1, psi)
     if growths is not None:
         t = t + next(growths) * t
     v = t * t
@@ -194,6 +205,25 @@ def _triangle(
         x, y, squared, w, v, h = (part + next(growths) * part for part in (x, y, squared, w, v, h))
         constants = tuple(part + next(growths) * part for part in constants)
     return x, y, squared, (w, v, h), constants
+
+
+def lost_by_turning(
+    linkage: FourBar, theta_2: Array, parallel: NDArray[np.bool_], growth: float
+) -> tuple[Array, Array]:
+    """What a growth adds, per unit, to theta_2 - theta_1 before and after its tangent is taken, rad, each (n,).
+
+    Where bars stay parallel sin(theta_4 - theta_3) loses what the subtraction rounded away, often nothing, and no
+    more; in the other branch roundings of the margins come in, and the angle counts as rounded at its own size.
+    """
+    psi = theta_2 - linkage.ground_angle
+    lost = np.where(parallel & (np.abs(psi) <= MANY_TURNS), _rounded_away(theta_2, linkage.ground_angle, psi), 0.0)
+    return np.where(parallel, 0.0, np.clip(psi, -MANY_TURNS, MANY_TURNS)), lost / growth
+
+
+def _rounded_away(theta_2: Array, theta_1: float, psi: Array) -> Array:
+    """theta_2 - theta_1 - psi, exactly (Knuth's sum)."""
+    taken = theta_2 - psi
+    return (theta_2 - (psi + taken)) + (taken - theta_1)
 
 
 def _sum(*lengths: Any) -> Any:
