@@ -33,7 +33,7 @@ def _of_input(linkage: FourBar, engine: Engine) -> Iterator[Finding]:
     open_, crossed = (asked(engine, linkage, angles, [sign] * len(limits)) for sign in (1, -1)) if limits else ({}, {})
     for i, (limit, step) in enumerate(zip(limits, steps, strict=True)):
         yield Finding(float(limit.branch != 0), 0.0, limit.theta_2, "both branches meet at a limit of bar 2")
-        digits = lever(linkage) * abs(float(open_["sin_mu"][i]))
+        digits = lever(linkage) * abs(math.sin(open_["theta_4"][i] - open_["theta_3"][i]))
         if digits * NOTHING_TO_TELL <= EPS:
             continue
         e = abs(d - a * np.exp(1j * (limit.theta_2 - linkage.ground_angle)))
@@ -76,7 +76,7 @@ def _dead_centres(linkage: FourBar, bar: int, engine: Engine) -> Iterator[Findin
     for i, limit in enumerate(limits):
         what = f"bar {bar} at theta_2 = {limit.theta_2!r}"
         theta_3, theta_4, omega_3, omega_4 = (float(seen[q][i]) for q in ("theta_3", "theta_4", "omega_3", "omega_4"))
-        sine, speed = abs(float(seen["sin_mu"][i])), max(1.0, abs(omega_3), abs(omega_4))
+        sine, speed = abs(math.sin(theta_4 - theta_3)), max(1.0, abs(omega_3), abs(omega_4))
         digits = lever(linkage) * sine
         if digits * NOTHING_TO_TELL <= EPS:
             continue
