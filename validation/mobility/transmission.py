@@ -44,7 +44,8 @@ def _over(scene: Scene, answer: Answer, extremes: transmission.TransmissionExtre
         gained = transmission.mechanical_advantage(state, *RADII) * ratio * (RADII[1] / RADII[0]) - 1.0
         largest = np.maximum(1.0, np.maximum(np.abs(ratio), np.abs(answer.quantities["omega_3"] / at.omega_2)))
         allowed_gain = allowed / sine * largest / np.abs(ratio)
-    where = state.assembled & ~state.singular & ~(allowed >= NOTHING_TO_TELL)  # a missing answer is none that holds
+    closed = answer.assembled & state.assembled & ~state.singular  # whether both say so is a row of its own
+    where = closed & ~(allowed >= NOTHING_TO_TELL)  # a missing number is none that holds
     moving = where & (at.omega_2 != 0.0)
     acute = np.minimum(angle, math.pi - angle)
     outside = np.maximum(np.maximum(extremes.least - angle, angle - extremes.greatest), 0.0)
