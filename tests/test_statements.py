@@ -85,6 +85,7 @@ FAULTS = {
     "sweep leaves the range": (TRIPLE, "range", changed("default_range", lambda found: (found[0] - 0.1, found[1]))),
     "swing": (ROCKER, "range", changed("swing", lambda found: found + SEEN)),
     "change point": (CHANGE, "range", changed("change_points", lambda found: found[:1])),
+    "a change point that is none": (ROCKER, "range", changed("change_points", lambda found: (0.4,))),
     "theta_2 of a dead centre": (
         ROCKER,
         "limit_positions",

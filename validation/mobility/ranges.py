@@ -8,6 +8,7 @@ the limits and along the ground settle every angle.
 
 import math
 from collections.abc import Iterator
+from fractions import Fraction
 
 import numpy as np
 
@@ -17,7 +18,7 @@ from fourbar.scene import Command, Scene
 from validation.answer import Engine
 from validation.compare import TOUCHING_MARGIN, closing_margin
 from validation.mobility.finding import TURN, Finding, same
-from validation.tolerance import EPS
+from validation.tolerance import EPS, EQUIVALENCE
 
 BESIDE = 4.0 * TOUCHING_MARGIN
 """Of the sum of the lengths: by this much the loop closes, or misses, beside a limit where the engine is asked."""
@@ -27,9 +28,21 @@ def ranges(linkage: FourBar, engine: Engine) -> Iterator[Finding]:
     """Ranges, limits and full turns of every moving bar, the range of a sweep, and the change points."""
     for bar in MOVING_BARS:
         yield from _of_bar(linkage, bar, engine)
-    collinear = linkage.ground_angle + np.array([0.0, math.pi])
-    touching = np.abs(closing_margin(Scene(linkage), collinear)) <= EPS
-    yield same("change points", mobility.change_points(linkage), collinear[touching].tolist())
+    yield _change_points(linkage)
+
+
+def _change_points(linkage: FourBar) -> Finding:
+    """By the exact sums of the lengths: which of the two positions with input and ground in line have all bars so."""
+    d, a, b, c = (Fraction(length) for length in linkage.lengths)
+    missing = {0.0: abs(abs(d - a) - abs(b - c)), math.pi: abs(d + a - b - c)}
+    stated, wrong, known = mobility.change_points(linkage), 0, 0
+    for psi, gap in missing.items():
+        part, angle = float(gap / (d + a + b + c)), linkage.ground_angle + psi
+        allowed = EQUIVALENCE.factor * max(1.0, abs(angle))
+        here = any(abs(math.remainder(point - angle, TURN)) <= allowed for point in stated)
+        known += here
+        wrong += part > EPS if here else part < EPS / 4.0  # the lengths were rounded themselves
+    return Finding(float(wrong + len(stated) - known), 0.0, linkage.ground_angle, "change points")
 
 
 def beside(linkage: FourBar, theta_2: float) -> float:
