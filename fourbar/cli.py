@@ -39,12 +39,13 @@ def group(traceback: bool) -> None:
 @group.command()
 @click.argument("lengths", nargs=4, metavar="D A B C")
 def classify(lengths: tuple[str, ...]) -> None:
-    """Name a linkage by its bar lengths: ground, input, coupler, output.
+    """Name a linkage by its bar lengths (ground, input, coupler, output), and say what turns and how far.
 
     Bare numbers are metres; "30 cm" works too.
     """
     from fourbar.linkage import BAR_NAMES, Bar, FourBar
     from fourbar.linkage_type import classify as type_of
+    from fourbar.mobility_text import told
 
     d, a, b, c = _lengths(lengths)
     linkage = FourBar(d, Bar(a), Bar(b), Bar(c))
@@ -55,6 +56,8 @@ def classify(lengths: tuple[str, ...]) -> None:
     click.echo(found.name)
     click.echo(f"s + l = {outer:.6g} m {relation} p + q = {sum(linkage.lengths) - outer:.6g} m")
     click.echo(f"bars that turn fully: {turning}")
+    for line in told(linkage) if found.barker is not None else ():  # a structure does not move
+        click.echo(line)
 
 
 @group.command()

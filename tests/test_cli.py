@@ -213,6 +213,38 @@ def test_classify(lengths: str, name: str, run: Fourbar) -> None:
     assert (code, err) == (HOLDS, "") and out.startswith(name)
 
 
+def test_classify_says_what_turns_and_how_far(run: Fourbar) -> None:
+    """Numbers by the law of cosines in the triangles that the bars make where two of them are in line."""
+
+    def angle(opposite: float, one: float, other: float) -> float:
+        return math.degrees(math.acos((one**2 + other**2 - opposite**2) / (2.0 * one * other)))
+
+    d, a, b, c = 0.3, 0.1, 0.25, 0.22
+    lines = run("classify", d, a, b, c)[1].splitlines()
+    stretched, folded = angle(c, d, b + a), 180.0 + angle(c, d, b - a)
+    row = next(
+        line.split() for line in lines if line.startswith("  output: input, coupler stretched") and "open" in line
+    )
+    assert [float(cell) for cell in row[4:7]] == pytest.approx(
+        [stretched, stretched, 180.0 - angle(a + b, d, c)], abs=6e-5
+    )
+    row = next(line.split() for line in lines if line.startswith("  output: input, coupler folded") and "open" in line)
+    assert [float(cell) for cell in row[4:6]] == pytest.approx([folded, folded - 180.0], abs=6e-5)
+    least, greatest = angle(d - a, b, c), angle(d + a, b, c)
+    swung = angle(b - a, d, c) - angle(b + a, d, c)
+    one_way = folded - stretched
+    for said in (
+        f"angle between coupler and output: {least:.4f} deg at theta_2 = 0.0000 deg "
+        f"to {greatest:.4f} deg at 180.0000 deg",
+        f"smallest transmission angle: {least:.4f} deg",
+        f"slower stroke of the output over the faster, at constant omega_2: {one_way / (360.0 - one_way):.4f}",
+    ):
+        assert said in lines
+    assert f"output {abs(swung):.4f} deg" in lines[3]
+    assert "change points: theta_2 = 0.0000 deg and 180.0000 deg" in run("classify", 2, 1, 2, 1)[1]
+    assert len(run("classify", 3, 1, 1, 1)[1].splitlines()) == 3  # a structure does not move
+
+
 def test_mjcf_of_a_scene_and_of_bare_lengths(tmp_path: Path, run: Fourbar) -> None:
     from fourbar.mjcf import defaults_used, mjcf, scene_from_lengths
 

@@ -23,7 +23,7 @@ LAYERS = [
     ("error_bars",),
     ("blocks",),
     ("scene",),
-    ("scene_text", "mjcf", "plot", "drawing", "tables"),
+    ("scene_text", "mjcf", "plot", "drawing", "tables", "mobility_text"),
     ("files",),
     ("animate", "notebook"),
     ("cli",),
