@@ -17,7 +17,8 @@ def told(linkage: FourBar) -> Iterator[str]:
         yield f"bars that swing: {', '.join(swings)}"
     limits = [(bar, limit) for bar in MOVING_BARS for limit in limit_positions(linkage, bar)]
     if limits:
-        yield f"{'limit positions (deg)':<34}" + "".join(f"{name:>10}" for name in ("theta_2", "theta_3", "theta_4"))
+        names = "".join(f"{name:>10}" for name in ("theta_2", "theta_3", "theta_4"))
+        yield f"{'limit positions (deg)':<34}{names}  branch"
     for bar, limit in limits:
         one, other = (BAR_NAMES[number] for number in MOVING_BARS if number != bar)
         what = f"  {BAR_NAMES[bar]}: {one}, {other} {'stretched' if limit.stretched else 'folded'}"
