@@ -90,6 +90,33 @@ def test_an_engine_that_crashes_or_hangs_costs_its_own_rows(tmp_path: Path, monk
         assert any(row.scene == scene and row.engine == "energy-method" for row in rows)
 
 
+def dies_at_first() -> None:
+    """Starts no worker as long as some of its lives are left in the folder that the run was told."""
+    lives = sorted(Path(os.environ["LIVES"]).iterdir())
+    if lives:
+        lives[0].unlink(missing_ok=True)
+        os._exit(1)
+
+
+@pytest.mark.parametrize(("lives", "pools"), [(3, pool.POOLS), (9, 2)])
+def test_workers_that_die_with_nothing_to_do_are_on_nobodys_account(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, lives: int, pools: int
+) -> None:
+    """Pebble gives up a pool whose workers die while none is at work; the run makes it anew, but not for ever."""
+    (tmp_path / "lives").mkdir()
+    for life in range(lives):
+        (tmp_path / "lives" / str(life)).touch()
+    monkeypatch.setenv("LIVES", str(tmp_path / "lives"))
+    monkeypatch.setattr(pool, "ready", dies_at_first)
+    monkeypatch.setattr(pool, "POOLS", pools)
+    if lives > pools:
+        with pytest.raises(pool.NoWorkersError, match="what is finished is kept"):
+            judge_all(Few(), tmp_path / "run", workers=1)
+    else:
+        assert judge_all(Few(), tmp_path / "run", workers=1).counts[FAILS] == 0
+        assert not list((tmp_path / "lives").iterdir())
+
+
 def test_the_bytes_depend_neither_on_the_workers_nor_on_the_order(tmp_path: Path) -> None:
     suite = Random(COUNT, SEED, TYPES)
     for workers in (1, 2):

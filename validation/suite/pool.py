@@ -7,6 +7,7 @@ done again scene by scene, and the scene at fault engine by engine.
 import faulthandler
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import replace
 from importlib import import_module
 
@@ -27,19 +28,23 @@ IN_FLIGHT = 4
 STALL = 20.0
 """Seconds in which no worker takes up any of the waiting chunks: one was killed while it held the
 lock of the queue that they share, and the pool is made anew."""
-KILLED = -9
-"""Exit code of a process that was killed from outside; one that crashes leaves with another."""
+FROM_OUTSIDE = (-9, 1)
+"""Exit codes of a worker that was killed, and of one that waited in vain for a lock that a killed one held;
+one that crashes leaves with another."""
 ATTEMPTS = 5
 """An engine may be killed from outside so often on one scene before the scene is given up."""
+POOLS = 100
+"""Pools made anew, one after the other without a chunk done, before the run is given up: a worker that
+dies while it starts breaks its pool, and somebody may well kill a few in a row."""
 Chunk = tuple[int, range]
 
 
 class StalledError(Exception):
-    """The workers no longer take up tasks."""
+    """The workers no longer take up tasks, or the pool broke."""
 
 
 class NoWorkersError(DependencyError):
-    """The scheduler has no workers."""
+    """The scheduler has no workers, or those of this machine all die."""
 
 
 def part(suite: Suite, scenes: Sequence[int]) -> tuple[Suite, Sequence[int]]:
@@ -82,13 +87,17 @@ def over_processes(
 ) -> Iterator[tuple[int, list[Page]]]:
     """Over processes of this machine."""
     left = dict(chunks)
+    in_vain = 0
     while left:
         try:
             for number, pages in _over_one_pool(suite, list(left.items()), witnesses, draw, workers):
                 yield number, pages
                 del left[number]
+                in_vain = 0
         except StalledError:
-            continue
+            in_vain += 1
+            if in_vain == POOLS:
+                raise NoWorkersError("the workers die before they finish a scene; what is finished is kept") from None
 
 
 def _over_one_pool(
@@ -104,12 +113,17 @@ def _over_one_pool(
 
             def submit(scenes: Sequence[int], asked: Sequence[Witness]) -> Future[list[Page]]:
                 seconds = longest(suite) * len(scenes)
-                future: Future[list[Page]] = pool.schedule(
-                    judge_chunk, args=(*part(suite, scenes), asked, draw), timeout=seconds
-                )
+                task = (*part(suite, scenes), asked, draw)
+                try:
+                    future: Future[list[Page]] = pool.schedule(judge_chunk, args=task, timeout=seconds)
+                except RuntimeError:  # a broken pool takes no more
+                    raise StalledError from None
                 return future
 
-            yield from _as_done(suite, chunks, witnesses, submit, IN_FLIGHT * workers, _idle)
+            def lost(under_way: Iterable[Future[list[Page]]]) -> bool:
+                return not pool.active or not any(future.running() for future in under_way)
+
+            yield from _as_done(suite, chunks, witnesses, submit, IN_FLIGHT * workers, lost)
         except BaseException:
             pool.stop()  # type: ignore[no-untyped-call]
             raise
@@ -171,24 +185,22 @@ def _as_done(
         for future in done:
             number, scenes = under_way.pop(future)
             try:
-                yield number, future.result()
+                yield number, _outcome(future, lost)
             except StalledError:
                 raise
             except Exception:  # the worker died or hung; find out on whose account
                 yield number, [_alone(suite, scene, witnesses, submit, lost) for scene in scenes]
 
 
-def _idle(under_way: "Iterable[Future[list[Page]]]") -> bool:
-    """Whether no process of the pool works on any of them."""
-    return not any(future.running() for future in under_way)
-
-
 def _outcome(future: "Future[list[Page]]", lost: "Callable[[Iterable[Future[list[Page]]]], bool]") -> list[Page]:
-    """The result of a task, or StalledError where no worker takes it up."""
+    """The result of a task, or StalledError where no worker takes it up or the pool breaks."""
     while True:
         wait([future], STALL)
         if future.done():
-            return future.result()
+            try:
+                return future.result()
+            except BrokenProcessPool:  # workers died while they had nothing to do: on nobody's account
+                raise StalledError from None
         if lost([future]):
             raise StalledError
 
@@ -217,7 +229,7 @@ def _alone(
             except StalledError:
                 raise
             except Exception as error:
-                if getattr(error, "exitcode", None) == KILLED and attempt + 1 < ATTEMPTS:
+                if getattr(error, "exitcode", None) in FROM_OUTSIDE and attempt + 1 < ATTEMPTS:
                     continue  # somebody killed it: that is not the engine's doing
                 failed.append(breakdown(name, asked[0].name if asked else "formulas", error))
             else:
