@@ -29,7 +29,9 @@ pytestmark = pytest.mark.filterwarnings("ignore::ResourceWarning", "ignore::pyte
 
 @pytest.fixture(scope="module")
 def cluster() -> Iterator[object]:
-    with warnings.catch_warnings():
+    # else the cluster looks 15 s after a kill, and drops a worker for good that starts again at that moment
+    patient = {"distributed.deploy.lost-worker-timeout": "1 hour"}
+    with warnings.catch_warnings(), dask.config.set(patient):
         warnings.simplefilter("ignore")
         local = distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None, host="127.0.0.1")
         with local:
