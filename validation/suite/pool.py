@@ -6,7 +6,7 @@ done again scene by scene, and the scene at fault engine by engine.
 
 import faulthandler
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, wait
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import replace
 from importlib import import_module
@@ -140,17 +140,17 @@ def over_machines(
     except (OSError, ValueError) as error:  # no answer, or no address
         why = str(error) or "no answer"
         raise InputError("--scheduler", scheduler, f"must be the address of a Dask scheduler: {why}") from None
-    with connected as client:
-        executor = client.get_executor(retries=0, pure=False)
-        workers = max(1, len(client.scheduler_info()["workers"]))
+    workers = max(1, len(connected.nthreads()))  # type: ignore[no-untyped-call]
+    # threads that wait for Dask's futures: those of its executor never end where a result was lost on its way here;
+    # the client is left first, which ends what is still waited for
+    with ThreadPoolExecutor(IN_FLIGHT * workers) as waiting, connected as client:
 
         def submit(scenes: Sequence[int], asked: Sequence[Witness]) -> Future[list[Page]]:
-            seconds = longest(suite) * len(scenes)
-            future: Future[list[Page]] = executor.submit(judge_watched, seconds, *part(suite, scenes), asked, draw)
-            return future
+            task = (longest(suite) * len(scenes), *part(suite, scenes), asked, draw)
+            return waiting.submit(client.submit(judge_watched, *task, retries=0, pure=False).result)
 
         def deserted(_: Iterable[Future[list[Page]]]) -> bool:
-            return not client.scheduler_info()["workers"]
+            return not client.nthreads()
 
         try:
             yield from _as_done(suite, chunks, witnesses, submit, IN_FLIGHT * workers, deserted)
