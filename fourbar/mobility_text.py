@@ -5,9 +5,10 @@ from collections.abc import Iterator
 
 from fourbar.linkage import BAR_NAMES, MOVING_BARS, FourBar
 from fourbar.mobility import change_points, limit_positions, swing, time_ratio, turns_fully
+from fourbar.motion import BRANCH_NAMES
 from fourbar.transmission import transmission_extremes
 
-BRANCHES = {1: "open", -1: "crossed", 0: "both"}
+BRANCHES = {**BRANCH_NAMES, 0: "both"}
 
 
 def told(linkage: FourBar) -> Iterator[str]:

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from fourbar.motion_law import Law
 
 OPEN, CROSSED = 1, -1
+BRANCH_NAMES = {OPEN: "open", CROSSED: "crossed"}
 DEFAULT_STEPS = 360
 """Of the default range, where a motion names no angle."""
 

@@ -10,11 +10,11 @@ import numpy as np
 from fourbar.effects import Load
 from fourbar.errors import InputError
 from fourbar.linkage import BAR_NAMES, MOVING_BARS, Bar
-from fourbar.motion import CROSSED, OPEN, FromLimit, Motion, Sweep
+from fourbar.motion import BRANCH_NAMES, FromLimit, Motion, Sweep
 from fourbar.scene import Scene
 from fourbar.writing import write_text
 
-BRANCHES = {"open": OPEN, "crossed": CROSSED}
+BRANCHES = {name: branch for branch, name in BRANCH_NAMES.items()}
 BARS = {BAR_NAMES[number]: number for number in MOVING_BARS}
 
 
@@ -98,7 +98,7 @@ def _motion_entry(write: Writer, motion: Motion) -> dict[str, Any]:
             "steps": law.steps,
             "ends": law.ends,
         }
-    entry["branch"] = next(name for name, sign in BRANCHES.items() if sign == motion.branch)
+    entry["branch"] = BRANCH_NAMES[motion.branch]
     entry["through"] = motion.through
     if motion.free is not None:
         entry["free"] = {"duration": write.quantity(motion.free.duration, "s"), "steps": motion.free.steps}

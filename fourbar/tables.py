@@ -11,7 +11,7 @@ import numpy as np
 
 from fourbar.bearing import PIN_FORCE, bearing_load
 from fourbar.linkage import BAR_NAMES
-from fourbar.motion import OPEN
+from fourbar.motion import BRANCH_NAMES
 from fourbar.scene import Scene
 from fourbar.solution import STATUS_NAMES, UNITS, VECTORS, Solution
 from fourbar.state import Array
@@ -107,7 +107,7 @@ def heading(scene: Scene, solution: Solution) -> list[str]:
     drive = f"drive on bar {scene.drive_bar} ({BAR_NAMES[scene.drive_bar]})"
     if scene.motion.free is not None:
         drive = "released, no drive"
-    branch = "open" if scene.motion.branch == OPEN else "crossed"
+    branch = BRANCH_NAMES[scene.motion.branch]
     lines = [
         f"ground {d:.6g} m, input {a:.6g} m, coupler {b:.6g} m, output {c:.6g} m",
         f"{branch} branch; {drive}",

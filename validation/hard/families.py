@@ -8,13 +8,12 @@ import numpy as np
 
 from fourbar.effects import Gravity
 from fourbar.linkage import Bar, FourBar
-from fourbar.motion import Free, Motion, Sweep
+from fourbar.motion import BRANCH_NAMES, Free, Motion, Sweep
 from fourbar.scene import Scene
 from validation.hard.linkages import Lengths, at, collinear_2_3, collinear_3_4, dressed, linkage_of, parallel_2_4
 from validation.suite.random import LinkageType
 
 Scenes = Iterator[tuple[str, Scene]]
-BRANCHES = ((1, "open"), (-1, "crossed"))
 ROCKERS = (LinkageType.DOUBLE_ROCKER, LinkageType.TRIPLE_ROCKER)
 CRANK, ROCKER = LinkageType.CRANK_ROCKER, LinkageType.TRIPLE_ROCKER
 REGULAR = (0.5, 0.4, 0.3)
@@ -40,7 +39,7 @@ def toggle(*, distances: tuple[float, ...] = TOGGLE, seeds: range = range(2)) ->
                 inward = -1.0 if stretched else 1.0
                 inside = psi + inward * np.array([*REGULAR, *distances])
                 beyond = psi - inward * np.array(distances)
-                for branch, name in BRANCHES:
+                for branch, name in BRANCH_NAMES.items():
                     label = f"{kind.value} {seed} {'stretched' if stretched else 'folded'} {name}"
                     yield label, at(dressed(lengths, seed), [*inside, *beyond[::-1]], branch)
 
@@ -59,7 +58,7 @@ def driven_output(*, steps: int = 180, seeds: range = range(2)) -> Scenes:
     """Drive on bar 4 through a whole turn of the input, across both positions where omega_4 = 0."""
     for seed in seeds:
         scene = dressed(linkage_of(CRANK, seed), seed)
-        for branch, name in BRANCHES:
+        for branch, name in BRANCH_NAMES.items():
             motion = Motion(Sweep(0.05, 0.05 + 2 * math.pi, steps), 3.0, 0.0, branch)
             yield f"{seed} {name}", replace(scene, motion=motion, drive_bar=4)
 
@@ -78,7 +77,7 @@ def change_point(*, distances: tuple[float, ...] = CHANGE) -> Scenes:
     offsets = np.array([*(-x for x in (*REGULAR, *distances)), *distances[::-1], *REGULAR[::-1]])
     for kind, (lengths, _, points) in CHANGE_POINTS.items():
         for psi in points:
-            for branch, name in BRANCHES:
+            for branch, name in BRANCH_NAMES.items():
                 yield f"{kind} {math.degrees(psi):.0f} {name}", at(dressed(lengths), psi + offsets, branch)
 
 
@@ -183,7 +182,7 @@ def out_and_back(*, beyond: float = 0.5, steps: int = 40, seeds: range = range(2
         (psi, stretched), *_ = collinear_3_4(lengths)
         outward = 1.0 if stretched else -1.0
         way = np.linspace(psi - outward * 0.6, psi + outward * beyond, steps)
-        for branch, name in BRANCHES:
+        for branch, name in BRANCH_NAMES.items():
             yield f"{seed} {name}", at(dressed(lengths, seed), [*way, *way[::-1]], branch)
 
 
@@ -192,7 +191,7 @@ def thesis_limits(*, steps: int = 120) -> Scenes:
     bars = (Bar(0.48, 57.0, 11.119275, (0.765, 0.0)), Bar(0.55, 0.544), Bar(0.20, 0.2))
     linkage = FourBar(0.20, *bars, math.radians(45.0))
     (psi, _), *_ = collinear_3_4(linkage.lengths)
-    for branch, name in BRANCHES:
+    for branch, name in BRANCH_NAMES.items():
         sweep = Sweep(linkage.ground_angle + psi, linkage.ground_angle + 2 * math.pi - psi, steps)
         yield name, Scene(linkage, Motion(sweep, 0.2244, branch=branch), 4)
 
