@@ -56,6 +56,20 @@ class Few:
         return repr(self.names)
 
 
+class Unlucky:
+    """Agrees, once its process was killed, or waited in vain for a lock, as often as the folder LIVES has files."""
+
+    name = "unlucky"
+
+    def answer(self, scene: Scene, command: Command) -> Answer:
+        for life in sorted(Path(os.environ["LIVES"]).iterdir()):
+            life.unlink()
+            if life.name.startswith("killed"):
+                os.kill(os.getpid(), signal.SIGKILL)
+            os._exit(1)
+        return Answer("unlucky", "exact", refusal="not asked")
+
+
 class Moody:
     """Agrees, except that it kills its process on scene b and hangs on scene c."""
 
@@ -88,6 +102,20 @@ def test_an_engine_that_crashes_or_hangs_costs_its_own_rows(tmp_path: Path, monk
     assert "hung" in failing["c", "moody"]
     for scene in "abcd":
         assert any(row.scene == scene and row.engine == "energy-method" for row in rows)
+
+
+@pytest.mark.parametrize("how", ["killed", "locked out"])
+def test_what_comes_from_outside_is_not_held_against_the_engine(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, how: str
+) -> None:
+    """Three times: in a chunk, in the scene by itself, and when it is the only engine asked."""
+    (tmp_path / "lives").mkdir()
+    for life in range(3):
+        (tmp_path / "lives" / f"{how} {life}").touch()
+    monkeypatch.setenv("LIVES", str(tmp_path / "lives"))
+    unlucky = Witness("unlucky", f"{__name__}:Unlucky", EQUIVALENCE)
+    assert judge_all(Few(("a",)), tmp_path / "run", (*EXACT, unlucky), workers=1).counts[FAILS] == 0
+    assert not list((tmp_path / "lives").iterdir())
 
 
 def dies_at_first() -> None:

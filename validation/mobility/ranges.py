@@ -23,6 +23,9 @@ from validation.tolerance import EPS, EQUIVALENCE
 BESIDE = 4.0 * TOUCHING_MARGIN
 """Of the sum of the lengths: by this much the loop closes, or misses, beside a limit where the engine is asked."""
 
+LENGTHS_ROUNDED = (EPS / 4.0, EPS)
+"""Of the perimeter: the lengths were rounded themselves, and between these two a change point may be stated or not."""
+
 
 def ranges(linkage: FourBar, engine: Engine) -> Iterator[Finding]:
     """Ranges, limits and full turns of every moving bar, the range of a sweep, and the change points."""
@@ -41,7 +44,7 @@ def _change_points(linkage: FourBar) -> Finding:
         allowed = EQUIVALENCE.factor * max(1.0, abs(angle))
         here = any(abs(math.remainder(point - angle, TURN)) <= allowed for point in stated)
         known += here
-        wrong += part > EPS if here else part < EPS / 4.0  # the lengths were rounded themselves
+        wrong += part > LENGTHS_ROUNDED[1] if here else part < LENGTHS_ROUNDED[0]
     return Finding(float(wrong + len(stated) - known), 0.0, linkage.ground_angle, "change points")
 
 
