@@ -15,10 +15,10 @@ from fourbar.mjcf import Settings
 from fourbar.scene import command
 from tests.scenes import crank_rocker, thesis
 from validation.bench import LINKAGE
-from validation.cost import formulas, laws, pictures, study
+from validation.cost import formulas, laws, orders, pictures, study
 from validation.cost.command import cost
 from validation.cost.curves import BEST
-from validation.cost.errors import NO_ANSWER, Errors, errors
+from validation.cost.errors import NO_ANSWER, QUANTITIES, Errors, errors
 from validation.engines.mujoco import drives
 from validation.engines.mujoco.one_state import MujocoOneState
 from validation.engines.mujoco.trial import Build, Rig
@@ -160,20 +160,70 @@ def test_formulas_in_four_precisions() -> None:
 
 
 def point(steps: float, worst: float, curve: str = "c", kind: str = study.STEPPED) -> study.Point:
-    return study.Point(curve, kind, f"{steps:g}/rev", steps, int(steps), steps, worst, worst, steps * 1e-6, 1e-6, steps)
+    errors = [worst] * len(QUANTITIES)
+    return study.Point(curve, kind, f"{steps:g}/rev", steps, int(steps), steps, *errors, steps * 1e-6, 1e-6, steps)
 
 
 def test_fit_floor_and_warning() -> None:
     slope, sigma = laws.fit([1.0, 2.0, 4.0, 8.0], [3.0, 6.0, 12.0, 24.0])
     assert slope == pytest.approx(1.0) and sigma < 1e-9
     falling = [point(10.0 * 2**k, 2.0 ** (-4 * k)) for k in range(6)]
-    assert laws.floor(falling) is None
+    assert laws.floor(falling, "F12") is None
     floored = [*falling, point(640.0, 9e-7), point(1280.0, 9e-7)]
-    assert laws.floor(floored) == 9e-7
+    assert laws.floor(floored, "F12") == 9e-7
     (line,) = laws.warnings({"c": floored})
-    assert "beyond 320 steps" in line and "9.0e-07" in line  # 320 has 9.5e-7: within a fifth of the floor
+    for quantity in QUANTITIES:
+        assert f"{quantity} beyond 320 (9.0e-07)" in line  # 320 has 9.5e-7: within a fifth of the floor
     wrong = laws.laws({"RK4, tc held": [point(10.0 * 2**k, 0.05 * 2.0 ** (-2 * k)) for k in range(6)]})
-    assert not wrong[0].holds and wrong[0].decided and "FAILS" in str(wrong[0])
+    assert [law.quantity for law in wrong] == list(QUANTITIES)
+    assert all(not law.holds and law.decided and "FAILS" in str(law) for law in wrong)
+
+
+JUMPING = (6.4e-2, 3.2e-2, 1.6e-2, 8e-3, 4e-3, 0.44, 1e-3, 5e-4)
+"""Of one pin force in steps doubled from 20 on: first order but for one point, which is no longer the motion."""
+
+
+@pytest.mark.parametrize(
+    "jumping", [JUMPING, (*JUMPING[:5], 9e-2, *JUMPING[6:]), (*JUMPING[:5], math.inf, *JUMPING[6:])]
+)
+def test_a_jump_in_one_pin_force_is_named_and_its_law_fails(jumping: tuple[float, ...]) -> None:
+    ladder = [point(20.0 * 2**k, 0.05 / 2**k) for k in range(8)]
+    ladder = [replace(each, F43=error) for each, error in zip(ladder, jumping, strict=True)]
+    found = {law.quantity: law for law in laws.laws({"Euler, tc held": ladder})}
+    assert {name for name, law in found.items() if not law.holds} == {"F43"} and found["F43"].decided
+    said = f"jumps from 4.0e-03 to {jumping[5]:.1e} at 640/rev"
+    assert laws.warnings({"Euler, tc held": ladder}) == [f"Euler, tc held: F43: {said}"]
+    assert "F43 jumps" in orders.statement({"Euler, tc held": ladder})
+    drawn = {line.get_gid(): len(line.get_xdata()) for axes in orders.picture({"Euler, tc held": ladder}, "").axes
+             for line in axes.lines if line.get_gid() and len(line.get_xdata())}  # fmt: skip
+    assert drawn == {"jump-F43": 1}
+    (line,) = laws.lines(list(found.values()))
+    assert f"; F43: FAILS, {said}" in line and "torque, F12, F32, F14: holds, 1.00" in line
+
+
+def test_each_quantity_has_its_own_order_and_floor() -> None:
+    ladder = [replace(point(20.0 * 2**k, 2.0 ** (-4 * k - 8)), F14=0.05 / 2**k, F32=1e-3) for k in range(8)]
+    found = {law.quantity: law for law in laws.laws({"RK4, tc held": ladder})}
+    assert found["torque"].holds and found["F14"].exponent == pytest.approx(1.0) and not found["F14"].holds
+    (line,) = laws.warnings({"RK4, tc held": ladder})
+    assert line.endswith("F32 beyond 20 (1.0e-03)") and "torque" not in line
+
+
+def test_a_quantity_that_no_timestep_brings_down_is_no_law_and_is_said() -> None:
+    """In the thesis's mechanism the torque falls by its order with Euler, and the pin forces are wrong throughout."""
+    ladder = [replace(point(160.0 * 2**k, 0.05 / 2**k), F12=error) for k, error in enumerate((1.8, 0.9, 1.1, 0.7))]
+    found = {law.quantity: law for law in laws.laws({"Euler, tc held": ladder})}
+    assert found["torque"].holds and not found["F12"].decided and not found["F12"].holds
+    assert laws.warnings({"Euler, tc held": ladder}) == [
+        "Euler, tc held: no timestep of the ladder brings F12 below 0.1"
+    ]
+    assert orders.statement({"Euler, tc held": ladder}) == "No time step brings F12 below 0.1 with Euler"
+
+
+def test_a_dip_and_a_motion_lost_at_coarse_steps_are_no_jump() -> None:
+    """Where two sources cancel the error dips; the softest closures, and the fewest steps, carry no motion at all."""
+    ladder = [point(20.0 * 2**k, each) for k, each in enumerate((0.9, math.inf, 0.3, 3e-2, 1e-4, 1.2e-2, 6e-3, 3e-3))]
+    assert not any(laws.jumps(ladder, quantity) for quantity in QUANTITIES)
 
 
 def test_the_front_holds_what_nothing_beats() -> None:
@@ -221,7 +271,9 @@ def test_the_command_writes_table_report_and_pictures(tmp_path: Path, monkeypatc
     assert rows[0] == ",".join(study.COLUMNS) and len(rows) > 40
     text = (folder / "cost.md").read_text()
     assert "order of RK4 in the timestep" in text and "more steps buy nothing" in text
-    for stem in ("work-precision-torque", "work-precision-force", "sources"):
+    (order,) = [line for line in text.splitlines() if "order of RK4" in line]
+    assert all(quantity in order for quantity in QUANTITIES) and "FAILS" not in order
+    for stem in ("work-precision-torque", "work-precision-force", "orders", "sources"):
         assert (folder / f"{stem}.svg").read_text().startswith("<?xml") and (
             folder / f"{stem}.png"
         ).stat().st_size > 20_000

@@ -6,6 +6,7 @@ import re
 import signal
 import time
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -15,6 +16,7 @@ from click.testing import CliRunner
 
 import fourbar
 import validation.run
+from fourbar.effects import Friction
 from fourbar.errors import InputError
 from fourbar.mjcf import mjcf
 from fourbar.scene import Scene, solve
@@ -84,6 +86,7 @@ def test_what_is_welded_to_a_bar_is_part_of_it() -> None:
     assert told == pytest.approx([0.4, 0.1, 0.0, 2e-3 + 0.2 * 0.1**2 / 2.0], rel=1e-12, abs=1e-14)
 
 
+STOP = 'range="0 1" solreflimit="0.1 1"'
 EDITS = [
     ("coupler's mass", 'mass="0.5"', 'mass="5"', "bars.coupler.mass", "10^1 times: units?"),
     ("inertia about the pin", "0.0016133333333333336", "0.0073733333333333336", "bars.output.inertia", ""),
@@ -96,8 +99,18 @@ EDITS = [
     ("impedance", "0.9999 0.9999", "0.95 0.95", "closure.softness", "at every timestep"),
     ("tolerance", 'tolerance="0.0"', 'tolerance="1e-8"', "option.tolerance", "only 0 is tight"),
     ("range", 'name="O4" type="hinge"', 'name="O4" type="hinge" range="0 1"', "pins.O4.range", "stop"),
-    ("load missing", '<general gaintype="fixed" gainprm="0" biastype="affine" name="load_2"', "", "actuators", ""),
-]
+    ("load missing", '<general gaintype="fixed" gainprm="0" biastype="affine" name="load_2"', "",
+     "actuators.load_2", "missing"),
+    ("load turned", "3.061616997868383e-17 -0.5", "-0.5 0.0", "actuators.load_2.gear", "the load"),
+    ("load elsewhere", 'name="load_2" pos="0.15', 'name="load_2" pos="0.16', "actuators.load_2.site", "along the bar"),
+    ("stop's softness", 'name="O4" type="hinge"', f'name="O4" type="hinge" {STOP}', "pins.O4.solreflimit", ""),
+    ("weightless", 'name="coupler" pos', 'name="coupler" gravcomp="1" pos', "bars.coupler.gravcomp", "weight away"),
+    ("line search", 'iterations="10"', 'iterations="10" ls_iterations="1"', "option.ls_iterations", "line search"),
+    ("wind", 'iterations="10"', 'iterations="10" density="1.2" wind="1 0 0"', "option.wind", "drag"),
+    ("no gain in Euler", 'island="disable"', 'island="disable" eulerdamp="disable"', "option.switched off", "flags"),
+    ("bounded by a joint", 'name="O4" type="hinge"', 'name="O4" type="hinge" actuatorfrcrange="-1 1"',
+     "pins.O4.actuatorfrcrange", "cuts off"),
+]  # fmt: skip
 
 
 @pytest.mark.parametrize(("what", "old", "new", "key", "word"), EDITS, ids=[edit[0] for edit in EDITS])
@@ -106,9 +119,43 @@ def test_a_planted_difference_is_named(what: str, old: str, new: str, key: str, 
     text = GENERATED.replace(old, new) if new else re.sub(old + "[^>]*>", "", GENERATED)
     if "range" in new:
         text = text.replace('limit="disable"', "")
+    text = text.replace('damper="disable"', "")
     found = {d.key: d.remark for d in differences(generated(CRANK_ROCKER).described, described(text))}
     assert key in found
     assert word in found[key]
+
+
+DRY = replace(CRANK_ROCKER, effects=(*CRANK_ROCKER.effects, Friction((("A", 0.05), ("O4", 0.05)))))
+
+
+def test_how_softly_dry_friction_slips_is_named_and_costs() -> None:
+    """By default its couple rises over 0.02 s of slip."""
+    text = re.sub(' sol(ref|imp)friction="[^"]*"', "", mjcf(DRY))
+    found = examine(DRY, text.replace('joint name="A"', 'joint name="rod"').replace('joint="A"', 'joint="rod"'), {})
+    told = {d.key: d for d in differences(generated(DRY).described, found.described, found.called)}
+    fields = {f"pins.{pin}.{field}" for pin in ("A", "O4") for field in ("solreffriction", "solimpfriction")}
+    assert told.keys() == fields
+    assert told["pins.A.solreffriction"].written == 'joint "rod" solreffriction'
+    assert told["pins.A.solreffriction"].theirs == (0.02, 1.0)
+    assert errors(DRY, found, ONE_STATE)["F12"] > 100.0 * SIMULATED.factor
+
+
+def test_a_cause_is_told_without_what_hangs_on_it() -> None:
+    """Solver parameters of friction and of a stop that a file does not have, and what MuJoCo derives from a mass."""
+    soft = GENERATED.replace('type="hinge"', 'type="hinge" solreffriction="0.1 1" solreflimit="0.1 1" margin="0.1"')
+    assert {d.key for d in differences(generated(CRANK_ROCKER).described, described(soft))} == set()
+    heavy = {
+        d.key for d in differences(generated(CRANK_ROCKER).described, described(GENERATED.replace('"0.5"', '"1"')))
+    }
+    assert heavy == {"bars.coupler.mass", "closure.softness"}
+
+
+def test_loads_under_other_names_and_in_another_order_are_the_same_loads() -> None:
+    text = GENERATED.replace("load_1", "couple").replace("load_2", "push")
+    first, second = re.findall("    <general [^>]*(?:couple|push)[^>]*/>\n", text)
+    found = examine(CRANK_ROCKER, text.replace(first + second, second + first), {})
+    assert keys(CRANK_ROCKER, found) == set()
+    assert max(errors(CRANK_ROCKER, found, ONE_STATE).values()) <= SIMULATED.factor
 
 
 def described(text: str) -> Mapping[str, float | str]:
@@ -294,3 +341,34 @@ def test_bad_options_are_said(arguments: list[str], tmp_path: Path) -> None:
         validation.run.command, [str(scene) if word == "SCENE" else word for word in arguments], standalone_mode=False
     )
     assert isinstance(result.exception, InputError)
+
+
+def run(tmp_path: Path, text: str, *options: str) -> tuple[int | None, list[float]]:
+    """Exit status of the command on a file of the crank-rocker, and what its comparisons are allowed."""
+    scene, path = tmp_path / "scene.toml", tmp_path / "theirs.xml"
+    scene.write_text(fourbar.dump(BARE))
+    path.write_text(text)
+    out = tmp_path / f"out{len(options)}"
+    arguments = [str(scene), "--mjcf", str(path), "--out", str(out), *options]
+    result = CliRunner().invoke(validation.run.command, arguments, standalone_mode=False)
+    if result.exception is not None:
+        raise result.exception
+    return result.return_value, sorted({row.allowed for row in from_csv(out / "results.csv")})
+
+
+def test_an_asked_error_is_what_their_file_is_held_to(tmp_path: Path) -> None:
+    text = mjcf(BARE).replace("0.0016133333333333336", "0.0017")
+    assert run(tmp_path, text) == (1, [0.0, SIMULATED.factor])
+    assert run(tmp_path, text, "--error", "0.5") == (0, [0.0, 0.5])
+    with pytest.raises(InputError, match="above 0 and below 1"):
+        run(tmp_path, text, "--error", "2")
+
+
+OTHERS = ["--engines=pinocchio-inverse", "--suite=hard", "--random=3", "--seed=1", "--type=parallelogram",
+          "--against=accepted", "--scheduler=tcp://x", "--python=python3"]  # fmt: skip
+
+
+@pytest.mark.parametrize("option", OTHERS)
+def test_an_option_that_a_file_is_not_examined_by_is_refused(option: str, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=f"{option.partition('=')[0]}.*--mjcf"):
+        run(tmp_path, GENERATED, option)

@@ -33,7 +33,7 @@ from validation.suite.random import LinkageType
 from validation.suite.scenes import Suite, scene_files
 from validation.suite.selection import askable, chosen, selected
 from validation.suite.store import Store
-from validation.tolerance import IDENTITY
+from validation.tolerance import IDENTITY, SIMULATED
 from validation.witnesses import Witness
 
 WORKERS = 2
@@ -136,14 +136,16 @@ def timings_csv(pages: Iterator[Page]) -> str:
     return text.getvalue()
 
 
-def examine(scenes: tuple[Path, ...], mjcf: Path, names: tuple[str, ...], out: Path) -> int:
-    """What a user's own MJCF of one scene differs in, and what it costs; 1 where a comparison fails."""
+def examine(scenes: tuple[Path, ...], mjcf: Path, names: tuple[str, ...], out: Path, asked: float | None) -> int:
+    """What a user's own MJCF of one scene differs in, and what it costs; 1 where it is wrong by more than asked."""
     from validation.check.model import examine_model, named, tell
+    from validation.cost.dial import held_to
 
     if len(scenes) != 1:
         raise InputError("--mjcf", str(mjcf), f"needs the one scene it is a model of, not {len(scenes)}")
     suite = scene_files(scenes)
-    report = examine_model(suite.name(0), suite.scene(0), mjcf, named(names))
+    tolerance = SIMULATED if asked is None else held_to(asked, "what this file may be wrong by")
+    report = examine_model(suite.name(0), suite.scene(0), mjcf, named(names), tolerance)
     tell(report, mjcf, out)
     return 1 if report.fails else 0
 
@@ -152,7 +154,13 @@ def examine(scenes: tuple[Path, ...], mjcf: Path, names: tuple[str, ...], out: P
 @click.argument("scenes", nargs=-1, type=click.Path(path_type=Path))
 @click.option("--out", type=click.Path(path_type=Path, file_okay=False), default=Path("results"), show_default=True)
 @click.option("--engines", metavar="NAMES", help="Comma-separated witnesses; left out: all.")
-@click.option("--error", "asked", type=float, metavar="E", help="Simulate no more precisely than this relative error.")
+@click.option(
+    "--error",
+    "asked",
+    type=float,
+    metavar="E",
+    help="Simulate no more precisely than this relative error; with --mjcf: what that file may be wrong by.",
+)
 @click.option("--suite", "named", metavar="hard|FILE", help="Judge the hard cases, or the scenes that FILE lists.")
 @click.option("--random", "count", type=click.IntRange(min=1), help="Judge this many random linkages instead.")
 @click.option("--seed", type=click.IntRange(min=0), metavar="S", help="Of the random linkages; left out: 0.")
@@ -192,7 +200,11 @@ def command(
     from validation.report.terminal import table
 
     if mjcf is not None:
-        return examine(scenes, mjcf, names, out)
+        others = {"engines": engines, "suite": named, "random": count, "seed": seed, "type": types, "against": against}
+        for option, said in {**others, "scheduler": scheduler, "python": python, **forms}.items():
+            if said is not None:
+                raise InputError(f"--{option}", str(said), "is not of --mjcf, which examines one file beside its scene")
+        return examine(scenes, mjcf, names, out, asked)
     if names:
         raise InputError("--name", names[0], "names a body or site of --mjcf; say which file that is")
     if count is not None and scenes:

@@ -1,10 +1,14 @@
 """How a described MJCF differs from the one generated for the same scene, and what each difference does."""
 
 import math
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-Described = Mapping[str, float | str]
+import numpy as np
+
+Value = float | str | tuple[float, ...]
+Described = Mapping[str, Value]
 
 SAME = 1e-12
 """Relative; a number written with its digits in another order of operations."""
@@ -12,6 +16,39 @@ TENFOLD = 1e-9
 """Relative distance from a power of ten at which a ratio is called one."""
 OF_THE_DRIVE = {"pins.O2.armature": "the generated file keeps its speed by a flywheel; another drive needs none"}
 """Differences that are no fault: both files are driven alike here."""
+ATTACHED = re.compile(r"((?:actuators|tendons)\.\d+)(\..+)?")
+"""Keys of what a file may have any number of: numbered, so that their names can be anything."""
+NEEDS = {
+    r"(pins\.\w+)\.sol(?:ref|imp)friction": (r"\1.friction", 0.0),
+    r"(pins\.\w+)\.(?:sol(?:ref|imp)limit|margin)": (r"\1.range", "free"),
+    r"(pins\.\w+)\.(?:spring angle|springyield)": (r"\1.stiffness", 0.0),
+    r"(tendons\.\d+)\.sol(?:ref|imp)friction": (r"\1.frictionloss", 0.0),
+    r"(tendons\.\d+)\.(?:sol(?:ref|imp)limit|margin)": (r"\1.range", "free"),
+    r"(tendons\.\d+)\.(?:springlength.*|springyield)": (r"\1.stiffness", 0.0),
+    r"(actuators\.\d+)\.dynprm": (r"\1.dyntype", 0.0),
+    r"option\.wind": ("option.density", 0.0),
+    r"option\.noslip_tolerance": ("option.noslip_iterations", 0.0),
+    r"option\.sleep_tolerance": ("option.switched on", "nothing that matters here"),
+    r"option\.meaninertia": ("option.tolerance", 0.0),
+}
+"""A key, and what its effect hangs on: where their file has that switched off, the key is not told."""
+NEUTRAL: dict[str, Value] = {"damping": 0.0, "friction": 0.0, "stiffness": 0.0, "armature": 0.0, "range": "free"}
+"""What a pin without a hinge has of each: the pin at which the other file is cut. The rest of it is not compared."""
+WRITTEN = {
+    "friction": "frictionloss",
+    "positive": "axis",
+    "spring angle": "springref",
+    "centre.distance": "inertial pos",
+    "centre.angle": "inertial pos",
+    "inertia": "inertial",
+    "time constant": "solref",
+    "damping ratio": "solref",
+    "impedance": "solimp",
+    "impedance when open": "solimp",
+    "softness": "solimp",
+}
+"""Attributes whose name in MJCF is another."""
+SLIPS = "dry friction reaches its couple only at speed: by default over 0.02 s of slip"
 REMARKS = (
     ("lengths.ground_angle", "the linkage is turned in the plane"),
     ("lengths.", "another linkage; body anchors of a connect are laid off in the rest state of the file: where it is "
@@ -24,10 +61,19 @@ REMARKS = (
     (".damping", "a couple at this pin that the scene does not have"),
     (".friction", "a couple at this pin that the scene does not have"),
     (".stiffness", "a spring at this pin that the scene does not have"),
+    (".solreffriction", SLIPS),
+    (".solimpfriction", SLIPS),
+    (".spring angle", "where the spring exerts nothing"),
+    (".springlength", "where the spring exerts nothing"),
+    (".gravcomp", "takes that part of the bar's weight away"),
+    (".actuatorfrcrange", "cuts off what loads exert at this pin"),
+    (".margin", "a stop acts so much before its angle"),
     (".armature", "adds to the inertia of what turns at this pin"),
     (".positive", "the hinge's axis points away: its angle, speed and motor torque change sign"),
     (".range", "a stop inside the motion acts as a contact"),
-    ("closure.softness", "the loop yields: an error in proportion, at every timestep and unseen in the gap"),
+    ("closure.softness", "the loop yields: an error in proportion, at every timestep and unseen in the gap; follows "
+     "from the impedance, the inertial frames of the bodies it joins, and their masses"),
+    ("closure.impedance when", "the loop's impedance changes with its gap: d, width, midpoint, power"),
     ("closure.impedance", "the loop yields by (1-d)/d; 0.9999 is the most that MuJoCo takes"),
     ("closure.time constant", "a stiff loop (few timesteps) is integrated badly, a slow one sags under load"),
     ("closure.by", "a tendon leaves out the centripetal term (54 % measured), a weld holds the angle too"),
@@ -37,11 +83,21 @@ REMARKS = (
     ("option.tolerance", "divided by the inertia of a flywheel, only 0 is tight"),
     ("option.iterations", "matters where the tolerance does not stop the solver"),
     ("option.solver", "CG and PGS leave residuals in the loop's force"),
-    ("option.medium", "drag on every body that has a size"),
-    ("option.switched off", "see the MuJoCo flags of that name"),
+    ("option.density", "drag on every body that has a size"),
+    ("option.viscosity", "drag on every body that has a size"),
+    ("option.wind", "drag on every body that has a size"),
+    ("option.meaninertia", "the solver's tolerance is in proportion to it; it follows from armatures and inertias"),
+    ("option.ls_", "of the solver's line search: how well each of its steps is made"),
+    ("option.noslip", "a second solver for dry friction: it changes what the first has found"),
+    ("option.actuatorgroupdisable", "actuators of these groups are switched off"),
+    ("option.switched", "see the MuJoCo flags of that name"),
     ("contacts", "bars that touch at the pins push each other: forces of thousands of newtons"),
     ("plane", "x and y of the scene are these axes of the file"),
+    (".gear", "the load: force and couple in the plane, gear times bias; a control is 0 here"),
+    (".site", "where the load acts: along the bar from its first pin, and to its left"),
     ("actuators", "loads are actuators in the generated file; one that is missing is missing in every force"),
+    ("tendons", "springs, and what acts at the cut pin, are tendons in the generated file"),
+    ("unknown", "a field of this MuJoCo that nothing is known of here"),
     ("other equalities", "switched off here: the four pins are all that joins the bars"),
 )  # fmt: skip
 """Part of a key, and what a difference there does; the first that fits."""
@@ -52,36 +108,102 @@ class Difference:
     """One entry that is not the same in both files."""
 
     key: str
-    generated: float | str
-    theirs: float | str
+    generated: Value
+    theirs: Value
     remark: str
+    written: str = ""
+    """Element and attribute in their file, where there is one."""
 
 
-def differences(generated: Described, theirs: Described) -> list[Difference]:
-    """What differs, in the order of the description."""
-    scale = float(max(value for key, value in generated.items() if _is_length(key) and not isinstance(value, str)))
+def differences(generated: Described, theirs: Described, called: Mapping[str, str] | None = None) -> list[Difference]:
+    """What differs, in the order of the description; `called` says how their file calls what part of a key is of."""
+    scale = max(value for key, value in generated.items() if _is_length(key) and isinstance(value, float))
+    generated = _numbered_like(theirs, generated)
     found = []
     for key in [*theirs, *(key for key in generated if key not in theirs)]:
-        ours, other = generated.get(key, "none"), theirs.get(key, "none")
-        if not _same(key, ours, other, scale):
-            found.append(Difference(key, ours, other, _remark(key, ours, other)))
+        ours, other = (told.get(key, _without(key)) for told in (generated, theirs))
+        if ours is not None and other is not None and _acts(key, theirs) and not _same(key, ours, other, scale):
+            name = _named(key, theirs if key in theirs else generated)
+            found.append(Difference(name, ours, other, _remark(key, ours, other), _written(key, theirs, called or {})))
     return found
+
+
+def _numbered_like(theirs: Described, generated: Described) -> Described:
+    """The generated file's actuators and tendons under the numbers of their counterparts: same role, if possible name.
+
+    One without a counterpart keeps a number that theirs does not have.
+    """
+    heads = {key: value for key, value in theirs.items() if (m := ATTACHED.fullmatch(key)) and not m[2]}
+    numbers: dict[str, str] = {}
+    mine = [key for key in generated if (m := ATTACHED.fullmatch(key)) and not m[2]]
+    for by_name in (True, False):
+        for key in mine:
+            for other, role in heads.items():
+                same = not by_name or generated[f"{key}.name"] == theirs[f"{other}.name"]
+                free = key not in numbers and other not in numbers.values()
+                if free and same and role == generated[key] and other.partition(".")[0] == key.partition(".")[0]:
+                    numbers[key] = other
+    for key in mine:
+        numbers.setdefault(key, f"{key}0{len(heads)}")
+    renumbered = {}
+    for key, value in generated.items():
+        attached = ATTACHED.fullmatch(key)
+        renumbered[numbers[attached[1]] + (attached[2] or "") if attached else key] = value
+    return renumbered
+
+
+def _without(key: str) -> Value | None:
+    """What a file has that does not have the key; None: nothing is to be said of it."""
+    if attached := ATTACHED.fullmatch(key):
+        return None if attached[2] else "none"
+    if key.startswith("pins."):
+        return NEUTRAL.get(key.split(".", 2)[2])
+    return "none"
+
+
+def _acts(key: str, theirs: Described) -> bool:
+    """Whether what the key says has an effect in their file; a name has none."""
+    if ATTACHED.fullmatch(key) and key.endswith(".name"):
+        return False
+    for pattern, (switch, off) in NEEDS.items():
+        if found := re.fullmatch(pattern, key):
+            return theirs.get(found.expand(switch), off) != off
+    return True
+
+
+def _named(key: str, told: Described) -> str:
+    attached = ATTACHED.fullmatch(key)
+    if not attached or not (name := told[f"{attached[1]}.name"]):
+        return key
+    return f"{key.partition('.')[0]}.{name}{attached[2] or ''}"
+
+
+def _written(key: str, theirs: Described, called: Mapping[str, str]) -> str:
+    """Element and attribute as they stand in their MJCF, where the key does not say so itself."""
+    if key not in theirs:
+        return ""
+    part = next((known for known in called if key == known or key.startswith(known + ".")), "")
+    return f"{called[part]} {WRITTEN.get(key[len(part) + 1 :], key[len(part) + 1 :])}".strip() if part else ""
 
 
 def _is_length(key: str) -> bool:
     return key.startswith("lengths.") and not key.endswith("angle")
 
 
-def _same(key: str, ours: float | str, theirs: float | str, length: float) -> bool:
+def _same(key: str, ours: Value, theirs: Value, length: float) -> bool:
     if isinstance(ours, str) or isinstance(theirs, str):
         return ours == theirs
+    one, other = np.atleast_1d(ours), np.atleast_1d(theirs)
+    if one.shape != other.shape:
+        return False
     if key.endswith("angle"):
-        return abs(math.remainder(ours - theirs, math.tau)) <= SAME
-    floor = length if "centre" in key or "plane" in key else 1.0 if key.startswith("gravity") else 0.0
-    return abs(ours - theirs) <= SAME * max(abs(ours), abs(theirs), floor)
+        return bool(np.all(np.abs(np.remainder(one - other + np.pi, math.tau) - np.pi) <= SAME))
+    placed = any(part in key for part in ("centre", "plane", ".site", ".path"))
+    floor = length if placed else 1.0 if key.startswith("gravity") else 0.0
+    return bool(np.all(np.abs(one - other) <= SAME * max(np.abs(one).max(), np.abs(other).max(), floor)))
 
 
-def _remark(key: str, ours: float | str, theirs: float | str) -> str:
+def _remark(key: str, ours: Value, theirs: Value) -> str:
     if key in OF_THE_DRIVE:
         return OF_THE_DRIVE[key]
     remark = next((text for part, text in REMARKS if part in key), "")

@@ -15,7 +15,7 @@ from fourbar.errors import FourBarError, InputError
 from fourbar.scene import Scene, solve
 from fourbar.writing import write_text
 from validation.answer import Answer
-from validation.check.differences import Difference, differences
+from validation.check.differences import Difference, Value, differences
 from validation.check.screen import read_mjcf
 from validation.compare import COMPARED, compare
 from validation.plain import plain
@@ -23,10 +23,11 @@ from validation.report.markdown import cell
 from validation.report.templating import number
 from validation.results import FAILS, Row, write_results
 from validation.suite.memory import WORKER_MEMORY, bound_memory
-from validation.tolerance import SIMULATED
+from validation.tolerance import SIMULATED, Tolerance
 
 SECONDS = 120.0
 """A four-bar takes less than one."""
+DIFFERENCES = ("what differs", "generated", "theirs", "what it does")
 HEADINGS = ("quantity", "theirs", "generated", "allowed", "verdict")
 EXAMINE = "validation.engines.mujoco.theirs:examine"
 
@@ -80,21 +81,23 @@ def named(pairs: tuple[str, ...]) -> dict[str, str]:
     return names
 
 
-def examine_model(name: str, scene: Scene, mjcf: Path, names: Mapping[str, str]) -> ModelReport:
-    """Examine a file in a guarded process, and the generated one in the same way."""
+def examine_model(
+    name: str, scene: Scene, mjcf: Path, names: Mapping[str, str], tolerance: Tolerance = SIMULATED
+) -> ModelReport:
+    """Examine a file in a guarded process, and the generated one in the same way; theirs is held to the tolerance."""
     text = read_mjcf(mjcf)
     generated, theirs = _guarded(scene, None, {}), _guarded(scene, text, names)
-    beside = {(row.engine, row.quantity): row.error for row in _rows(name, scene, generated.answers)}
-    rows = _rows(name, scene, theirs.answers)
+    beside = {(row.engine, row.quantity): row.error for row in _rows(name, scene, generated.answers, SIMULATED)}
+    rows = _rows(name, scene, theirs.answers, tolerance)
     costs = [Cost(row, beside.get((row.engine, row.quantity), math.nan)) for row in rows]
-    return ModelReport(differences(generated.described, theirs.described), costs, theirs.notes)
+    return ModelReport(differences(generated.described, theirs.described, theirs.called), costs, theirs.notes)
 
 
-def _rows(name: str, scene: Scene, answers: list[Answer]) -> list[Row]:
+def _rows(name: str, scene: Scene, answers: list[Answer], tolerance: Tolerance) -> list[Row]:
     found = []
     for answer in answers:
         formulas = solve(scene, "force", at=answer.at)
-        found += compare(name, scene, answer, formulas, SIMULATED, COMPARED)
+        found += compare(name, scene, answer, formulas, tolerance, COMPARED)
     return found
 
 
@@ -141,10 +144,10 @@ def tell(report: ModelReport, mjcf: Path, out: Path) -> None:
 
     console = Console()
     shown = Table(title=f"{escape(plain(mjcf.name))} against the generated MJCF", box=SIMPLE_HEAD)
-    for heading in ("what differs", "generated", "theirs", "what it does"):
+    for heading in DIFFERENCES:
         shown.add_column(heading, overflow="fold")
     for d in report.differences:
-        shown.add_row(*(escape(plain(text)) for text in (d.key, value(d.generated), value(d.theirs), d.remark)))
+        shown.add_row(*(escape(plain(text)) for text in entries(d)))
     console.print(shown if report.differences else "It differs in nothing from the generated MJCF.")
     for note in report.notes:
         console.print(f"note: {escape(plain(note))}")
@@ -169,12 +172,11 @@ def markdown(report: ModelReport, mjcf: Path) -> str:
     lines = [
         f"# {cell(plain(mjcf.name))} against the generated MJCF",
         "",
-        "| what differs | generated | theirs | what it does |",
+        f"| {' | '.join(DIFFERENCES)} |",
+        "|---|---|---|---|",
     ]
-    lines += ["|---|---|---|---|"]
     for d in report.differences:
-        entries = (d.key, value(d.generated), value(d.theirs), d.remark)
-        lines.append("| " + " | ".join(cell(plain(text)) for text in entries) + " |")
+        lines.append("| " + " | ".join(cell(plain(text)) for text in entries(d)) + " |")
     lines += ["", *(f"- {cell(plain(note))}" for note in report.notes), "", "## What it costs", ""]
     lines += [f"| asked | {' | '.join(HEADINGS)} |", "|---|---|---|---|---|---|"]
     for cost in report.costs:
@@ -182,6 +184,14 @@ def markdown(report: ModelReport, mjcf: Path) -> str:
     return "\n".join(lines) + "\n"
 
 
-def value(entry: float | str) -> str:
-    """A number with the digits that tell it apart, or the word itself."""
-    return entry if isinstance(entry, str) else f"{entry:.12g}"
+def entries(difference: Difference) -> tuple[str, ...]:
+    """Under DIFFERENCES; the first says how it stands in their file."""
+    d = difference
+    return f"{d.key} ({d.written})" if d.written else d.key, value(d.generated), value(d.theirs), d.remark
+
+
+def value(entry: Value) -> str:
+    """Numbers with the digits that tell them apart, or the word itself."""
+    if isinstance(entry, str):
+        return entry
+    return " ".join(f"{x:.12g}" for x in (entry if isinstance(entry, tuple) else (entry,)))

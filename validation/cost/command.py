@@ -10,7 +10,8 @@ import click
 
 from fourbar.scene import Scene
 from fourbar.writing import write_text
-from validation.cost.laws import Law, laws, pareto, warnings
+from validation.cost.errors import QUANTITIES
+from validation.cost.laws import Law, laws, lines, pareto, warnings
 from validation.cost.study import COLUMNS, STEPPED, Point, Study
 from validation.machine import machine, versions
 from validation.suite.scenes import MODELS, scene_files
@@ -28,7 +29,8 @@ ORDERS = "Errors are the worst over the scene's positions, each on its scale, ag
 def cost(scenes: tuple[Path, ...], out: Path, effects: bool) -> int:
     """What accuracy costs in time: work and precision of every way to an answer, on SCENES (default: the crank-rocker).
 
-    An interrupted study is resumed where it stopped. Exit status 1 where a law does not hold.
+    An interrupted study is resumed where it stopped. Exit status 1 where the law of any quantity does not hold, or
+    none is decided.
     """
     if effects:
         from validation.effect_cost import command
@@ -56,7 +58,7 @@ def cost(scenes: tuple[Path, ...], out: Path, effects: bool) -> int:
                 curves[curve] = points
                 progress.update(task, advance=1, description=curve)
         found = laws(curves)
-        failed |= any(law.decided and not law.holds for law in found)
+        failed |= any(law.decided and not law.holds for law in found) or not any(law.decided for law in found)
         written = write(study, curves, found, scene.title or name)
         click.echo(summary(name, curves, found, study.left_out))
         click.echo(f"written to {out / name}: {', '.join(sorted(path.name for path in written))}")
@@ -96,9 +98,9 @@ def to_csv(curves: Mapping[str, Sequence[Point]]) -> str:
 
 def summary(name: str, curves: Mapping[str, Sequence[Point]], found: Sequence[Law], left_out: Sequence[str]) -> str:
     """What the terminal shows."""
-    lines = [f"{name}: what accuracy costs", "", *front_lines(curves), "", *map(str, found), ""]
-    lines += [f"warning: {line}" for line in warnings(curves)]
-    return "\n".join((*lines, *(f"left out: {line}" for line in left_out)))
+    told = [f"{name}: what accuracy costs", "", *front_lines(curves), "", *lines(found), ""]
+    told += [f"warning: {line}" for line in warnings(curves)]
+    return "\n".join((*told, *(f"left out: {line}" for line in left_out)))
 
 
 def front_lines(curves: Mapping[str, Sequence[Point]]) -> list[str]:
@@ -122,24 +124,26 @@ def report(
 ) -> str:
     """The study as Markdown."""
     about = ", ".join(f"{name} {version}" for name, version in versions().items())
-    lines = [f"# What accuracy costs: {title}", "", f"{machine()}; {about}. {ORDERS}", ""]
-    lines += [f"![{path.stem}]({path.name})" for path in pictures if path.suffix == ".svg"]
-    lines += ["", "## Laws", "", *(f"- {law}" for law in found)]
-    lines += ["", "## Cheapest for each error", "", "```", *front_lines(curves), "```"]
-    lines += ["", "## Where more steps buy nothing", "", *(f"- {line}" for line in warnings(curves) or ["none"])]
-    lines += [
+    told = [f"# What accuracy costs: {title}", "", f"{machine()}; {about}. {ORDERS}", ""]
+    told += [f"![{path.stem}]({path.name})" for path in pictures if path.suffix == ".svg"]
+    told += ["", "## Laws", "", *(f"- {law}" for law in lines(found))]
+    told += ["", "## Cheapest for each error", "", "```", *front_lines(curves), "```"]
+    told += ["", "## Where an error jumps, and where more steps buy nothing", ""]
+    told += [f"- {line}" for line in warnings(curves) or ["none"]]
+    told += [
         "",
         "## All points",
         "",
-        "| setting | torque | force | steps/turn | ms/turn | us/sample | RK4 steps |",
-        "|---|---|---|---|---|---|---|",
+        f"| setting | {' | '.join(QUANTITIES)} | steps/turn | ms/turn | us/sample | RK4 steps |",
+        "|---|---|---|---|---|---|---|---|---|---|",
     ]
     for name, points in curves.items():
         for p in points:
-            lines.append(
-                f"| {name}: {p.setting} | {p.torque:.1e} | {p.force:.1e} | {p.steps_per_revolution:.0f} "
+            told.append(
+                f"| {name}: {p.setting} | {' | '.join(f'{getattr(p, q):.1e}' for q in QUANTITIES)} "
+                f"| {p.steps_per_revolution:.0f} "
                 f"| {1e3 * p.seconds_per_revolution:.3g} | {1e6 * p.seconds_per_sample:.3g} | {p.rk4_steps:.0f} |"
             )
     if left_out:
-        lines += ["", "## Left out", "", *(f"- {line}" for line in left_out)]
-    return "\n".join(lines) + "\n"
+        told += ["", "## Left out", "", *(f"- {line}" for line in left_out)]
+    return "\n".join(told) + "\n"

@@ -15,7 +15,7 @@ from fourbar.scene import Command, Scene
 from validation.answer import Answer, Engine
 from validation.compare import COMPARED, SLOW_DRIVE
 from validation.scales import magnitude
-from validation.tolerance import SIMULATED
+from validation.tolerance import SIMULATED, Tolerance
 from validation.witnesses import Witness
 
 ROUNDS = 6
@@ -37,13 +37,16 @@ class DialledWitness(Witness):
         return Dialled(self.error)
 
 
-def dialled(witnesses: Sequence[Witness], error: float) -> tuple[Witness, ...]:
-    """The witnesses, with whatever runs through time held to `error` and laid out for it; exact ones stay exact."""
+def held_to(error: float, why: str) -> Tolerance:
+    """What runs through time, held to an asked error."""
     if not 0.0 < error < 1.0:
         raise InputError("--error", error, "must be a relative error, above 0 and below 1")
-    tolerance = replace(
-        SIMULATED, factor=error, reason=f"{error:g} of the scale, as asked: steps and softness are laid out for it"
-    )
+    return replace(SIMULATED, factor=error, reason=f"{error:g} of the scale, as asked: {why}")
+
+
+def dialled(witnesses: Sequence[Witness], error: float) -> tuple[Witness, ...]:
+    """The witnesses, with whatever runs through time held to `error` and laid out for it; exact ones stay exact."""
+    tolerance = held_to(error, "steps and softness are laid out for it")
     return tuple(
         DialledWitness(**{**_parts(each), "tolerance": tolerance, "order": "", "error": error})
         if each.through_time

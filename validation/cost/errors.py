@@ -1,4 +1,4 @@
-"""How wrong an answer is: the torque, and the worst of the pin forces, each on its scale against the formulas."""
+"""How wrong an answer is: the torque and each pin force, each on its scale against the formulas."""
 
 from typing import NamedTuple
 
@@ -17,15 +17,24 @@ class Errors(NamedTuple):
     """Worst relative errors over the positions; inf where there is no answer."""
 
     torque: float
-    force: float
+    F12: float
+    F32: float
+    F43: float
+    F14: float
+
+    @property
+    def force(self) -> float:
+        """Of the worst pin force."""
+        return max(self[1:])
 
     @property
     def worst(self) -> float:
         """What an asked error is compared with."""
-        return max(self.torque, self.force)
+        return max(self)
 
 
-NO_ANSWER = Errors(float("inf"), float("inf"))
+QUANTITIES = Errors._fields
+NO_ANSWER = Errors(*[float("inf")] * len(QUANTITIES))
 
 
 def errors(scene: Scene, at: Command, quantities: dict[str, Array]) -> Errors:
@@ -41,7 +50,7 @@ def errors(scene: Scene, at: Command, quantities: dict[str, Array]) -> Errors:
     if not judged.any():
         return NO_ANSWER
     worst = {}
-    for name in ("torque", *PIN_FORCES):
+    for name in QUANTITIES:
         ours, where = getattr(formulas, name), judged
         if name == "torque" and scene.drive_bar != 2:
             speed = np.abs(np.nan_to_num(getattr(formulas, f"omega_{scene.drive_bar}")))
@@ -51,4 +60,4 @@ def errors(scene: Scene, at: Command, quantities: dict[str, Array]) -> Errors:
         )
         value = float(np.max(relative[where]))
         worst[name] = value if np.isfinite(value) else float("inf")
-    return Errors(worst["torque"], max(worst[name] for name in PIN_FORCES))
+    return Errors(**worst)

@@ -131,7 +131,7 @@ def against_reference(scene: Scene, at: Command, quantities: Quantities, referen
                 continue
             value = max(value, math.hypot(*(_difference(x, y) for x, y in pairs)) / size)
         worst[name] = value
-    return Errors(worst["torque"], max(worst[name] for name in PIN_FORCES))
+    return Errors(**worst)
 
 
 def _difference(ours: Any, exact: Any) -> float:

@@ -1,4 +1,4 @@
-"""Pictures of the study: work and precision per quantity, and the three sources of error side by side."""
+"""Pictures of the study: work and precision, each quantity over the timestep, and the three sources of error."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -6,7 +6,9 @@ from pathlib import Path
 from typing import Any
 
 from fourbar.plot.style import matplotlib_style, save
+from validation.cost import orders
 from validation.cost.laws import pareto
+from validation.cost.orders import CURVES
 from validation.cost.study import EXACT, FORMULAS, STEPPED, Point
 
 SHOWN = {
@@ -39,6 +41,8 @@ def draw(curves: Mapping[str, Sequence[Point]], title: str, folder: Path) -> lis
     with matplotlib_style():
         for quantity in ("torque", "force"):
             written += _both(_work_precision(curves, quantity, title), folder / f"work-precision-{quantity}")
+        if any(name in curves for name, *_ in CURVES.values()):
+            written += _both(orders.picture(curves, title), folder / "orders")
         if "tolerance, Newton" in curves:
             written += _both(_sources(curves, title), folder / "sources")
     return written
@@ -200,12 +204,6 @@ def _sources(curves: Mapping[str, Sequence[Point]], title: str) -> Any:
     figure = Figure(figsize=(11.5, 5.6))
     left, right, both = 0.075, 0.985, 0.3
     panels = [figure.add_axes((left + i * (right - left + 0.012) / 3.0, 0.105, both - 0.008, 0.6)) for i in range(3)]
-    by_steps = {
-        "Euler": ("Euler, tc held", "#d55e00", "s", (0, (4, 2))),
-        "implicitfast": ("implicitfast, tc held", "#cc79a7", "v", (0, (1, 1.5))),
-        "discrete": ("discrete, tc held", "#e69f00", "D", (0, (6, 2, 1, 2))),
-        "RK4": ("RK4, tc held", "#0072b2", "o", "solid"),
-    }
     softness = {
         "at the scene's speed": ("softness d", "#0072b2", "o", "solid"),
         "at 0.1 rad/s, sag under gravity and loads": ("sag d, slow", "#d55e00", "s", (0, (4, 2))),
@@ -220,7 +218,7 @@ def _sources(curves: Mapping[str, Sequence[Point]], title: str) -> Any:
         )
     }
     for axes, heading, label, rows in (
-        (panels[0], "Time step", "time step, part of a revolution", by_steps),
+        (panels[0], "Time step", "time step, part of a revolution", CURVES),
         (panels[1], "Softness of the closure", "1 - d", softness),
         (panels[2], "Solver", "tolerance", solvers),
     ):

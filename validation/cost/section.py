@@ -8,6 +8,7 @@ from validation.report.html import Figure, Section
 FOLDER = "cost"
 PICTURES = {
     "work-precision-force.svg": "Error of the worst pin force over the CPU time of a revolution, for every way to it",
+    "orders.svg": "Error of the driving torque and of each pin force over the time step; a jump is ringed",
     "sources.svg": "Error over time step, softness of the closure and tolerance of the solver, one at a time",
 }
 """Pictures of the study, and what they show."""

@@ -31,7 +31,7 @@ FORWARD_TIME_CONSTANT = 0.25
 ASKED = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 2e-9)
 """Errors for which the advice is drawn."""
 ONE_STATE = (0.9, 0.99, 0.999, 0.9999)
-VERSION = 4
+VERSION = 5
 """Of what is tried; parts of another one are done again."""
 EXACT, STEPPED, FORMULAS = "exact", "stepped", "formulas"
 
@@ -50,7 +50,10 @@ class Point:
     """Of one run through the scene; positions, where nothing is stepped."""
     steps_per_revolution: float
     torque: float
-    force: float
+    F12: float
+    F32: float
+    F43: float
+    F14: float
     seconds_per_revolution: float
     """CPU; of an exact method: the scene's positions in one revolution."""
     seconds_per_sample: float
@@ -60,8 +63,13 @@ class Point:
     broken: str = ""
 
     @property
+    def force(self) -> float:
+        """The error of the worst pin force."""
+        return max(self.F12, self.F32, self.F43, self.F14)
+
+    @property
     def worst(self) -> float:
-        """The larger of the two errors."""
+        """The largest of the errors."""
         return max(self.torque, self.force)
 
 
@@ -150,7 +158,7 @@ class Study:
             samples = max(len(trial.at.theta_2), 1)
             points.append(
                 Point(
-                    *(name, STEPPED, spot.label, spot.x, trial.steps, n, found.torque, found.force),
+                    *(name, STEPPED, spot.label, spot.x, trial.steps, n, *found),
                     *(seconds * n, trial.reading / samples, seconds * n / reference, trial.broken),
                 )
             )
@@ -181,9 +189,7 @@ class Study:
         per_revolution = self._positions_per_revolution()
         reference = self._rk4_step()
         cost = seconds / n * per_revolution
-        return Point(
-            name, kind, label, dial, n, per_revolution, found.torque, found.force, cost, seconds / n, cost / reference
-        )
+        return Point(name, kind, label, dial, n, per_revolution, *found, cost, seconds / n, cost / reference)
 
     def _positions_per_revolution(self) -> float:
         span = float(np.ptp(self.command.theta_2)) or 2.0 * math.pi
@@ -253,7 +259,7 @@ class Study:
             points.append(
                 Point(
                     *("Pinocchio forward", STEPPED, f"Pinocchio RK4, {n}/rev", n, ran.steps, ran.steps_per_revolution),
-                    *(found.torque, found.force, cost, math.nan, cost / reference),
+                    *(*found, cost, math.nan, cost / reference),
                 )
             )
         return points

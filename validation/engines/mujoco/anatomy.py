@@ -173,6 +173,21 @@ class Anatomy:
         """theta_1, rad."""
         return self._line[1]
 
+    def rest_angle(self, pin: str) -> float:
+        """What a hinge is turned by in the rest state: the line of the bar that hangs on it from that of its bearer."""
+        child, parent = self.turning(pin)
+        return self._line[child] - self._line[parent]
+
+    def along_bar(self, bar: int, world: Array) -> tuple[float, float]:
+        """Where a point is from a bar's first pin in the rest state: along its line and to its left, m."""
+        return self.turned_back(bar, world - self.world(self.data, bar, ENDS[bar][0]))
+
+    def turned_back(self, bar: int, vector: Array) -> tuple[float, float]:
+        """A vector's components along a bar's line in the rest state and to its left."""
+        x, y = self.in_plane(vector)
+        cos, sin = math.cos(self._line[bar]), math.sin(self._line[bar])
+        return float(cos * x + sin * y), float(cos * y - sin * x)
+
     def _to_joints(self) -> Array:
         turns = {1: np.zeros(3), 2: np.array([1.0, 0, 0]), 3: np.array([1.0, 1.0, 0]), 4: np.array([0, 0, 1.0])}
         matrix = np.zeros((self.model.nv, 3))

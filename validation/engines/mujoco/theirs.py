@@ -22,8 +22,9 @@ from validation.answer import Answer, Array
 from validation.compare import COMPARED
 from validation.engines.loop import Position
 from validation.engines.mujoco.anatomy import Anatomy
+from validation.engines.mujoco.attached import Described
 from validation.engines.mujoco.closed_loop import WARNINGS
-from validation.engines.mujoco.describe import Described, described
+from validation.engines.mujoco.describe import called, described
 
 ONE_STATE, THROUGH_TIME = "mjcf-one-state", "mjcf-simulated"
 POSITIONS = 37
@@ -43,6 +44,8 @@ class Examined:
     """What was found of one file."""
 
     described: Described
+    called: dict[str, str]
+    """Part of a key of the description: the element of the file that it is of."""
     answers: list[Answer]
     notes: list[str]
 
@@ -64,7 +67,7 @@ def examine(scene: Scene, text: str | None, names: Mapping[str, str]) -> Examine
     answers = [_answered(ONE_STATE, scene, lambda: one_state(loop, at))]
     if at.omega_2 is not None and np.any(at.omega_2) and np.ptp(at.theta_2) > 0.0:
         answers.append(_answered(THROUGH_TIME, scene, lambda: through_time(loop, at)))
-    return Examined(described(anatomy), answers, loop.notes)
+    return Examined(described(anatomy), called(anatomy), answers, loop.notes)
 
 
 def _positions(at: Command) -> Command:
