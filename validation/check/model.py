@@ -103,8 +103,10 @@ def _guarded(scene: Scene, text: str | None, names: Mapping[str, str]) -> Any:
     from multiprocessing import get_context
 
     from pebble import ProcessExpired, ProcessPool
+    from rich.console import Console
 
-    with ProcessPool(max_workers=1, context=get_context("spawn"), initializer=_confine) as pool:
+    waiting = Console(stderr=True).status(f"MuJoCo examines the file, in {SECONDS:g} s at most")
+    with waiting, ProcessPool(max_workers=1, context=get_context("spawn"), initializer=_confine) as pool:
         future = pool.schedule(_examine, args=(EXAMINE, scene, text, dict(names)), timeout=SECONDS)
         try:
             return future.result()
@@ -116,6 +118,9 @@ def _guarded(scene: Scene, text: str | None, names: Mapping[str, str]) -> Any:
             reason = f"asks for more than {WORKER_MEMORY // 2**30} GB of memory"
         except ProcessExpired as error:
             reason = f"MuJoCo crashed on it (exit code {error.exitcode})"
+        except KeyboardInterrupt:
+            pool.stop()  # type: ignore[no-untyped-call]  # or the pool would wait for the file to its time limit
+            raise
     raise InputError("--mjcf", "the file", reason)
 
 

@@ -9,6 +9,7 @@ theta_2 changes.
 """
 
 import csv
+import io
 import math
 from dataclasses import dataclass
 from decimal import Decimal, InvalidOperation
@@ -18,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.errors import InputError
+from fourbar.reading import read_text
 from fourbar.solution import UNITS, VECTORS
 from validation.tolerance import EPS
 
@@ -105,15 +107,12 @@ def _rounded(halves: Array, columns: list[tuple[str, float]]) -> Array:
 
 def _lines(path: Path) -> list[tuple[int, list[str]]]:
     """The lines that hold anything, with their numbers."""
+    text = read_text(path, "table", LARGEST_FILE)
     try:
-        if path.stat().st_size > LARGEST_FILE:
-            raise InputError("table", path.name, f"must be smaller than {LARGEST_FILE // 2**20} MB", str(path))
-        with path.open(newline="", encoding="utf-8-sig") as file:
-            reader = csv.reader(file)
-            return [(reader.line_num, row) for row in reader if any(cell.strip() for cell in row)]
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        reason = error.strerror if isinstance(error, OSError) else "must be a CSV file in UTF-8"
-        raise InputError("table", path.name, str(reason), str(path)) from None
+        reader = csv.reader(io.StringIO(text, newline=""))
+        return [(reader.line_num, row) for row in reader if any(cell.strip() for cell in row)]
+    except csv.Error:
+        raise InputError("table", path.name, "must be a CSV file", str(path)) from None
 
 
 def _column(path: Path, heading: str) -> tuple[str, float]:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
+from fourbar import reading
 from fourbar.errors import InputError
 from fourbar.files import loads, read_text
 from fourbar.motion import DEFAULT_STEPS, Free, Sweep
@@ -125,14 +126,12 @@ def suite_file(path: Path) -> Files:
     def refuse(entry: object, allowed: str) -> InputError:
         return InputError("--suite", entry, allowed, str(path))
 
+    if not path.exists():
+        raise refuse(path.name, 'must be "hard" or a file that lists scenes: there is no such file')
+    text = reading.read_text(path, "--suite", LARGEST_LIST)
     try:
-        if path.stat().st_size > LARGEST_LIST:
-            raise refuse(path.name, f"must be smaller than {LARGEST_LIST // 2**20} MB")
-        text = path.read_text(encoding="utf-8")
         entries = tomllib.loads(text).get("scenes") if path.suffix == ".toml" else _listed(text)
-    except OSError as error:
-        raise refuse(path.name, f'must be "hard" or a file that lists scenes: {error.strerror}') from None
-    except (ValueError, RecursionError):  # no UTF-8, or no TOML
+    except (ValueError, RecursionError):  # no TOML
         raise refuse(path.name, "is no list of scenes") from None
     if not isinstance(entries, list) or not all(isinstance(entry, str) and entry for entry in entries):
         raise refuse(path.name, 'must have scenes = ["a.toml", ...], or one scene file per line')
