@@ -13,6 +13,7 @@ from typing import Any
 
 from fourbar.errors import FourBarError, InputError
 from fourbar.scene import Scene, solve
+from fourbar.under_way import under_way
 from fourbar.writing import write_text
 from validation.answer import Answer
 from validation.check.differences import Difference, differences
@@ -103,9 +104,8 @@ def _guarded(scene: Scene, text: str | None, names: Mapping[str, str]) -> Any:
     from multiprocessing import get_context
 
     from pebble import ProcessExpired, ProcessPool
-    from rich.console import Console
 
-    waiting = Console(stderr=True).status(f"MuJoCo examines the file, in {SECONDS:g} s at most")
+    waiting = under_way(f"MuJoCo examines the file, in {SECONDS:g} s at most")
     with waiting, ProcessPool(max_workers=1, context=get_context("spawn"), initializer=_confine) as pool:
         future = pool.schedule(_examine, args=(EXAMINE, scene, text, dict(names)), timeout=SECONDS)
         try:

@@ -1,6 +1,7 @@
 """Which scenes a run judges: the named mechanisms of `models/`, the files given, or random linkages."""
 
 import hashlib
+import math
 import tomllib
 from collections import Counter
 from collections.abc import Iterable
@@ -17,6 +18,10 @@ from validation.suite.random import LinkageType, random_scene
 
 MOST_POSITIONS = 100_000
 """Of a scene in a run, where every engine solves each of them: 3 ms each, with all engines."""
+MOST_SECONDS = 100.0
+"""Of a free motion in a run: the engines go through it in steps of 1 to 4 ms, a second in about a second."""
+AS_LONG_AS = 100
+"""Positions that take as long as a second of free motion, with room."""
 MODELS = Path(__file__).parent.parent.parent / "models"
 
 
@@ -42,7 +47,7 @@ class Files:
     texts: tuple[tuple[str, str], ...]
     """(name, text of the file), sorted by name."""
     positions: int = 0
-    """The most that any of them asks for."""
+    """The most that any of them asks for, or what takes as long."""
 
     def __len__(self) -> int:
         return len(self.texts)
@@ -104,12 +109,16 @@ def scene_files(paths: Iterable[Path]) -> Files:
 
 
 def _positions(scene: Scene, file: Path) -> int:
-    """How many positions a scene asks for; InputError beyond MOST_POSITIONS."""
+    """How many positions a scene asks for, or what takes as long; InputError beyond the most."""
     for key, asked in (("motion.theta_2", scene.motion.theta_2), ("motion.free", scene.motion.free)):
         if isinstance(asked, (Sweep, Free)):
             if asked.steps >= MOST_POSITIONS:
                 raise InputError(f"{key}.steps", asked.steps, f"must be below {MOST_POSITIONS} in a run", str(file))
-            return asked.steps + 1
+            seconds = asked.duration if isinstance(asked, Free) else 0.0
+            if seconds > MOST_SECONDS:
+                allowed = f"must not exceed {MOST_SECONDS:g} s in a run: engines go through it in steps of 1 ms"
+                raise InputError(f"{key}.duration", seconds, allowed, str(file))
+            return asked.steps + 1 + math.ceil(AS_LONG_AS * seconds)
     return DEFAULT_STEPS + 1
 
 
