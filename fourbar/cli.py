@@ -90,7 +90,7 @@ def analyze(scene: Path, form: str | None, degrees: bool | None, out: Path | Non
     from fourbar.writing import write_text
 
     asked = _load(scene)
-    with _named(scene):
+    with _named(scene), _waiting(asked):
         solution = solve(asked)
     if not solution.assembled.any():
         raise NotAssembledError(f"{scene}: motion.theta_2: the linkage assembles at none of the positions asked for")
@@ -149,8 +149,9 @@ def plot(scene: Path, out: Path, figure: str, position: str | None, branches: st
     from fourbar.plot import draw
 
     at = None if position is None else _number("--position", position, "rad")
-    with _named(scene):
-        draw(_load(scene), out, figure, position=at, branches=branches)
+    asked = _load(scene)
+    with _named(scene), _waiting(asked):
+        draw(asked, out, figure, position=at, branches=branches)
 
 
 @group.command()
@@ -178,8 +179,9 @@ def animate(scene: Path, out: Path, pictures: tuple[str, ...], seconds: float | 
         if not equals:
             raise InputError("--picture", entry, "must be like coupler=FILE")
         attached[bar] = file
-    with _named(scene):
-        write(_load(scene), out, pictures=attached, seconds=seconds)
+    asked = _load(scene)
+    with _named(scene), _waiting(asked):
+        write(asked, out, pictures=attached, seconds=seconds)
 
 
 @contextmanager
@@ -191,6 +193,19 @@ def _named(path: Path) -> Iterator[None]:
         if error.file is None and error.key.startswith(("motion", "lengths", "bars", "drive", "loads", "effects")):
             raise error.in_file(str(path)) from None
         raise
+
+
+@contextmanager
+def _waiting(scene: "Scene") -> Iterator[None]:
+    """A long free motion takes minutes: a terminal shows that it is under way."""
+    if scene.motion.free is None:
+        yield
+        return
+    from fourbar.free_motion import STEPS
+    from fourbar.under_way import under_way
+
+    with under_way(f"the free motion is integrated, in {STEPS} steps at most"):
+        yield
 
 
 def _load(path: Path) -> "Scene":

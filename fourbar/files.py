@@ -4,13 +4,13 @@ Numbers are rounded once when they are read; what is written reads back bit for 
 """
 
 import math
-import stat
 import tomllib
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from fourbar import reading
 from fourbar.effects import REGISTRY, Load, Table
 from fourbar.entries import Reader
 from fourbar.errors import InputError
@@ -45,32 +45,8 @@ def load(path: str | Path) -> Scene:
 
 
 def read_text(path: str | Path) -> str:
-    """The text of a scene file; its size is looked at before it is read."""
-    file = Path(path)
-
-    def refuse(allowed: str) -> InputError:
-        return InputError("scene file", str(path), allowed)
-
-    try:
-        about = file.stat()
-        if stat.S_ISDIR(about.st_mode):
-            raise refuse("is a directory; must be a TOML file")
-        if not stat.S_ISREG(about.st_mode):
-            raise refuse("must be an ordinary file")
-        if about.st_size > LARGEST_FILE:
-            raise refuse(f"has {about.st_size} bytes; must not exceed {LARGEST_FILE}")
-        with file.open("rb") as opened:
-            data = opened.read(LARGEST_FILE + 1)
-    except FileNotFoundError:
-        raise refuse("there is no such file") from None
-    except (OSError, ValueError) as error:  # ValueError: a NUL in the name
-        raise refuse(f"cannot be read: {getattr(error, 'strerror', None) or error}") from None
-    if len(data) > LARGEST_FILE:
-        raise refuse(f"must not exceed {LARGEST_FILE} bytes")
-    try:
-        return data.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise refuse(f"must be UTF-8 text; byte {error.start} is not") from None
+    """The text of a scene file."""
+    return reading.read_text(path, "scene file", LARGEST_FILE)
 
 
 def loads(text: str, name: str = "scene") -> Scene:

@@ -37,8 +37,9 @@ SCIPY_LEAST = 100.0 * 2.0**-52
 """The least relative tolerance that SciPy's constructor takes without a warning; the solver itself works with less."""
 CHANGE_OVER = 0.5
 """The angle is changed when its sine falls below this times the sine of the other one."""
-STEPS = 1_000_000
-"""A motion that needs more steps than this is given up: something makes it infinitely fast."""
+STEPS = 200_000
+"""A motion that needs more steps than this is given up, after a few minutes: some hundred turns of the fastest bar
+take a thousand, so it is thousands of turns long, or something makes it infinitely fast."""
 
 
 @dataclass(slots=True, eq=False)
@@ -108,7 +109,7 @@ def release(
 
     Raises
     ------
-    InputError : the linkage does not assemble at theta_2.
+    InputError : the linkage does not assemble at theta_2, or the motion takes more than STEPS steps.
     FourBarError : nothing that moves has inertia, or the motion cannot be continued.
     DependencyError : SciPy is not installed.
     """
@@ -218,8 +219,11 @@ class _Run:
             while solver.status == "running" and stopped is None:
                 steps += 1
                 message = solver.step()
-                if solver.status == "failed" or steps > STEPS:
-                    raise FourBarError(f"the free motion cannot be continued beyond {t!r} s: {message or 'too fast'}")
+                if solver.status == "failed":
+                    raise FourBarError(f"the free motion cannot be continued beyond {t!r} s: {message}")
+                if steps > STEPS:
+                    allowed = f"this motion is followed for {STEPS} steps, here to {t:.6g} s; make it shorter"
+                    raise InputError("motion.free.duration", end, allowed)
                 dense, t_new, new = solver.dense_output(), solver.t, solver.y
                 rested = bool(self.side and self.side * new[1] < 0.0)
                 if rested:

@@ -6,12 +6,12 @@ is read there must be a PNG or JPEG of moderate size.
 
 import base64
 import os
-import stat
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
 from fourbar.errors import InputError
 from fourbar.linkage import BAR_NAMES, MOVING_BARS
+from fourbar.reading import read_bytes
 
 LARGEST = 2_000_000
 """Bytes of one picture: a page with three of them still opens quickly."""
@@ -76,21 +76,11 @@ class Picture:
 def data_uri(key: str, path: str | Path, shown: str | None = None) -> str:
     """A PNG or JPEG file as a data URI.
 
-    Raises InputError, in one line, for a file that cannot be read, is no ordinary one, is too large
-    or begins as neither.
+    Raises InputError, in one line, as `read_bytes` does, and for a file that begins as neither.
     """
     name = str(path) if shown is None else shown
-    try:
-        about = os.stat(path)
-        if not stat.S_ISREG(about.st_mode):
-            raise InputError(key, name, "must be an ordinary file")
-        with open(path, "rb") as opened:
-            content = opened.read(LARGEST + 1)
-    except (OSError, ValueError) as error:  # ValueError: a NUL in the name
-        raise InputError(key, name, f"cannot be read: {getattr(error, 'strerror', None) or error}") from None
+    content = read_bytes(path, key, LARGEST, shown=name)
     kind = next((kind for magic, kind in RASTER.items() if content.startswith(magic)), None)
     if kind is None:
         raise InputError(key, name, "must be a PNG or JPEG picture")
-    if len(content) > LARGEST:
-        raise InputError(key, name, f"must not exceed {LARGEST // 1_000_000} MB")
     return f"data:{kind};base64,{base64.b64encode(content).decode('ascii')}"

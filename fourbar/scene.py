@@ -182,7 +182,7 @@ def _solve_free(scene: Scene, stage: str | None, out: Mapping[str, Array] | None
     if any(effect.counts_turns for effect in scene.effects):
         _refuse_wound(scene, at, moved.time)
     solution = solve(scene, stage, at=at, out=out)
-    solution.time = moved.time
+    solution.time, solution.stopped_at = moved.time, moved.stopped_at
     return solution
 
 

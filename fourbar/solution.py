@@ -1,6 +1,6 @@
 """What `solve` returns: one array per quantity, and `None` for what was not asked for."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -110,6 +110,8 @@ class Solution:
 
     time: Array | None = None
     """Of a motion law, or of a free motion, s; the latter ends where the linkage stops at a limit position."""
+    stopped_at: float | None = field(default=None, init=False)
+    """When a free motion reached that limit position or change point, s; None: it did not."""
 
     def __len__(self) -> int:
         return len(self.theta_2)

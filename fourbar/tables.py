@@ -117,6 +117,8 @@ def heading(scene: Scene, solution: Solution) -> list[str]:
         f"{count} {name.replace('_', ' ')}" for name, count in zip(STATUS_NAMES, counts.tolist(), strict=True) if count
     ]
     lines.append(f"{len(solution)} position{'s' if len(solution) != 1 else ''}: " + ", ".join(parts))
+    if solution.stopped_at is not None:
+        lines.append(f"the motion ends at {solution.stopped_at:.6g} s: bars 3 and 4 lie in one line there")
     if scene.motion.free is None and solution.torque is not None and np.isfinite(solution.torque).any():
         worst = int(np.nanargmax(np.abs(solution.torque)))
         where = math.degrees(solution.theta_2[worst])

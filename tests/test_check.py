@@ -12,10 +12,12 @@ import pytest
 import fourbar
 from fourbar.exits import BAD_INPUT, FAILED, HOLDS
 from fourbar.scene import Command, Scene, command, solve
-from fourbar.solution import OK, VECTORS
+from fourbar.solution import OK, UNITS, VECTORS
 from validation.check.command import Judgement, judge_table
-from validation.check.theirs import LARGEST_FILE, read_table
+from validation.check.theirs import LARGEST_FILE, NOT_JUDGED, read_table
 from validation.cli import status
+from validation.scales import TERMS, yardstick
+from validation.tolerance import POWER
 
 MODELS = Path(__file__).parents[1] / "models"
 SCENES = {
@@ -222,6 +224,68 @@ def test_two_mistakes_in_two_columns_are_both_named(tmp_path: Path) -> None:
     assert not any(explanation.complete for explanation in found.explanations)
 
 
+EVERY_QUANTITY = [name for name in UNITS if name not in NOT_JUDGED and name != "theta_2"]
+
+
+@pytest.mark.parametrize("quantity", [name for name in EVERY_QUANTITY if not name.startswith("torque_")])
+@pytest.mark.parametrize("name", SCENES)
+def test_every_quantity_is_judged_at_its_own_scale(name: str, quantity: str, tmp_path: Path) -> None:
+    """Off by 1e-9 of its largest value it differs, whatever its unit: A_x was once judged in newtons."""
+    scene = SCENES[name]
+    at = command(scene)
+    at = Command(at.theta_2[::EVERY], at.branch[::EVERY], at.omega_2, at.alpha_2)
+    solution = solve(scene, at=at)
+    numbers = {"theta_2": at.theta_2, quantity: np.array(getattr(solution, quantity))}
+    assert judged(scene, write(tmp_path / "right.csv", numbers, (quantity,))).differing == []
+    size = np.abs(numbers[quantity]).max()
+    off = numbers | {quantity: numbers[quantity] + 1e-9 * (size or 1.0)}
+    found = judged(scene, write(tmp_path / "off.csv", off, (quantity,)))
+    assert len(found.differing) == len(found.findings) > 0
+
+
+def test_a_quantity_of_no_known_scale_is_not_judged_by_another() -> None:
+    """Every unit that is judged has its sum of terms."""
+    scene = SCENES["thesis"]
+    assert {UNITS[name] for name in EVERY_QUANTITY} == TERMS.keys() == POWER.keys()
+    for quantity in ("time", "wheel"):
+        with pytest.raises(KeyError):
+            yardstick(quantity, scene, solve(scene), np.ones(1))
+
+
+@pytest.mark.parametrize("letter", "xy")
+def test_one_component_is_judged_by_itself(letter: str, tmp_path: Path) -> None:
+    scene, path = SCENES["crank_rocker"], tmp_path / "theirs.csv"
+    numbers = right(scene)
+    column = numbers["F12"][:, "xy".index(letter)]
+
+    def found(values: np.ndarray) -> Judgement:
+        rows = [f"{t!r},{x!r}" for t, x in zip(numbers["theta_2"].tolist(), values.tolist(), strict=True)]
+        path.write_text("\n".join([f"theta_2,F12_{letter}", *rows]))
+        return judged(scene, path)
+
+    assert found(column).differing == [] and len(found(column).findings) == len(column)
+    off = found(column + 1e-6 * np.abs(column).max())
+    assert {finding.quantity for finding in off.differing} == {f"F12_{letter}"}
+    first = found(-column).explanations[0]
+    assert "sign reversed" in first.text and first.complete and first.quantities == (f"F12_{letter}",)
+
+
+@pytest.mark.parametrize(("torque", "code"), [("0.0", HOLDS), ("0.04", FAILED), ("5.0", FAILED)])
+def test_what_is_zero_by_all_its_terms_is_judged_in_its_own_unit(torque: str, code: int, tmp_path: Path) -> None:
+    """Bars without mass or load take no torque; half a printed digit over a scale of 0 once excused any number."""
+    linkage = fourbar.FourBar(0.3, fourbar.Bar(0.1), fourbar.Bar(0.25), fourbar.Bar(0.22))
+    (tmp_path / "scene.toml").write_text(fourbar.dump(Scene(linkage, fourbar.Motion(1.0, 2.0))))
+    (tmp_path / "theirs.csv").write_text(f"theta_2,torque\n1.0,{torque}\n")
+    assert status(["check", str(tmp_path / "scene.toml"), str(tmp_path / "theirs.csv")]) == code
+
+
+def test_a_released_scene_is_not_judged_at_the_speed_of_its_start(tmp_path: Path) -> None:
+    released = replace(SCENES["crank_rocker"], motion=fourbar.Motion(1.0, 2.0, free=fourbar.Free(1.0, 10)))
+    path = write(tmp_path / "theirs.csv", right(SCENES["crank_rocker"]))
+    with pytest.raises(fourbar.InputError, match="not while released"):
+        judged(released, path)
+
+
 def test_nonsense_is_explained_by_nothing(tmp_path: Path) -> None:
     scene = SCENES["crank_rocker"]
     numbers = right(scene)
@@ -262,7 +326,9 @@ BAD_TABLES = [
     ("header alone", "theta_2,torque\n", "header and at least one row"),
     ("no angle", "torque\n1\n", "theta_2"),
     ("no result", "theta_2\n1\n", "needs a result"),
-    ("half a vector", "theta_2,F12_x\n1,2\n", "needs a result"),
+    ("a time", "theta_2,time,torque\n1,0,2\n", "is not judged: a row is found by its theta_2"),
+    ("error bars", "theta_2,torque_error\n1,0\n", "is not judged: it is an error of the formulas"),
+    ("of dry friction", "theta_2,torque_low\n1,2\n", "no dry friction"),
     ("vector without component", "theta_2,F12\n1,2\n", "not a known column"),
     ("unknown column", "theta_2,wheel\n1,2\n", "not a known column"),
     ("unit of another kind", "theta_2,torque [kg]\n1,2\n", "kg"),
@@ -300,7 +366,7 @@ def test_a_table_that_is_too_large_or_missing_is_one_line(tmp_path: Path, capsys
     large = tmp_path / "large.csv"
     with large.open("wb") as file:
         file.truncate(LARGEST_FILE + 1)
-    for path, words in ((large, "smaller than"), (tmp_path / "none.csv", "No such file"), (tmp_path, "directory")):
+    for path, words in ((large, "must not exceed"), (tmp_path / "none.csv", "no such file"), (tmp_path, "directory")):
         assert status(["check", str(MODELS / "thesis.toml"), str(path)]) == BAD_INPUT
         assert words in capsys.readouterr().err
 

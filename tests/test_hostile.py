@@ -198,8 +198,8 @@ BAD_LISTS = [
     ("missing", "c.toml", "c.toml"),
     ("pattern without a file", "*.xml", "names no file"),
     ("empty", "", "no scene file"),
-    ("binary", b"\xff\xfe", "is no list of scenes"),
-    ("large", b" " * (LARGEST_LIST + 1), "smaller than"),
+    ("binary", b"\xff\xfe", "must be UTF-8 text"),
+    ("large", b" " * (LARGEST_LIST + 1), "must not exceed"),
 ]
 
 

@@ -11,7 +11,7 @@ ROOT = Path(__file__).parents[1]
 HEAVY = ("pint", "click", "rich", "jinja2", "matplotlib", "scipy", "joblib", "mujoco", "pinocchio", "flint", "mpmath")
 ENGINES = {"mujoco": "mujoco", "pinocchio": "pinocchio"}
 LAYERS = [
-    ("errors", "writing", "double_double"),
+    ("errors", "reading", "under_way", "writing", "double_double"),
     ("exits", "linkage", "units"),
     ("entries", "margins", "pictures", "sixty_digits"),
     ("new", "state", "mobility"),

@@ -101,9 +101,9 @@ def test_what_the_name_leads_to_is_looked_at_before_it_is_shown(tmp_path: Path) 
         ("link.png", "out of the scene's folder"),
         ("up/secret.png", "out of the scene's folder"),
         ("text.png", "PNG or JPEG"),
-        ("big.png", "2 MB"),
-        ("folder.png", "ordinary file"),
-        ("missing.png", "cannot be read"),
+        ("big.png", "must not exceed 2000000"),
+        ("folder.png", "is a directory"),
+        ("missing.png", "no such file"),
     ):
         scene = load(scene_file(inner, name))
         fourbar.solve(scene)  # nobody has to see it to compute

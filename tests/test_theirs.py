@@ -4,6 +4,7 @@ import math
 import os
 import re
 import signal
+import threading
 import time
 from collections.abc import Mapping
 from dataclasses import replace
@@ -260,11 +261,15 @@ HOSTILE = [
     ("plugin", "<mujoco><extension><plugin plugin='x'/></extension></mujoco>", "<extension>"),
     ("thousand", "<mujoco><worldbody><replicate count='1000000'/></worldbody></mujoco>", "<replicate>"),
     ("entities", "<!DOCTYPE a [<!ENTITY b 'c'>]><mujoco/>", "document type"),
+    ("endless solver", "<mujoco><option iterations='2000000000'/></mujoco>", "up to 1000"),
+    ("endless line search", "<mujoco><option ls_iterations=' 1001'/></mujoco>", "up to 1000"),
+    ("endless slip", "<mujoco><option noslip_iterations='0x7fffffff'/></mujoco>", "up to 1000"),
+    ("endless collisions", "<mujoco><option ccd_iterations='1e9'/></mujoco>", "up to 1000"),
     ("other XML", "<robot/>", "<mujoco>"),
     ("no XML", "four bars", "no XML"),
     ("no text", b"\xff\xfe\x00", "UTF-8"),
     ("null byte", "<mujoco model='a\0b'/>", "no XML"),
-    ("large", " " * (LARGEST_MJCF + 1), "smaller than"),
+    ("large", " " * (LARGEST_MJCF + 1), "must not exceed"),
     ("deep", "<mujoco>" + "<body>" * 10 * DEEPEST, "deeper"),
     ("deep and closed", "<mujoco>" + "<b>" * 5000 + "</b>" * 5000 + "</mujoco>", "deeper"),
 ]
@@ -278,6 +283,19 @@ def test_what_an_mjcf_may_not_hold(what: str, text: str | bytes, word: str, tmp_
         read_mjcf(path)
     assert word in str(caught.value) or (what == "deep" and "no XML" in str(caught.value))
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("timestep", ["1e-12", "1e9", "nan", "0", "-1"])
+def test_an_absurd_timestep_is_said_and_not_run_through(timestep: str) -> None:
+    """One so long that no step is made once agreed in every position: the state at the start, again and again."""
+    text = re.sub('timestep="[^"]*"', f'timestep="{timestep}"', GENERATED)
+    assert text != GENERATED
+    try:
+        _, through = examine(CRANK_ROCKER, text, {}).answers
+    except InputError as error:
+        assert "does not compile" in str(error)
+    else:
+        assert through.refusal is not None and "steps of the motion; must be 1 to 400000" in through.refusal
 
 
 REFUSED = [
@@ -307,6 +325,15 @@ def hang(scene: Scene, text: str | None, names: dict[str, str]) -> None:
 
 def devour(scene: Scene, text: str | None, names: dict[str, str]) -> None:
     bytearray(2 * WORKER_MEMORY)
+
+
+def test_ctrl_c_does_not_wait_for_the_file(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(model, "EXAMINE", f"{__name__}:hang")
+    began = time.monotonic()
+    threading.Timer(3.0, os.kill, (os.getpid(), signal.SIGINT)).start()
+    with pytest.raises(KeyboardInterrupt):
+        model._guarded(BARE, "<mujoco/>", {})
+    assert time.monotonic() - began < model.SECONDS / 4
 
 
 @pytest.mark.parametrize(("what", "word"), [(crash, "crashed"), (hang, "did not come back"), (devour, "memory")])

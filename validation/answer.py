@@ -60,10 +60,12 @@ class Released:
     omega_2: Array
     energy: Array
     """Kinetic and potential energy, (n,), J."""
+    stopped_at: float | None = None
+    """When its bars 3 and 4 first came to lie in one line, s; None: they did not. It moves on."""
     refusal: str | None = None
     """A declared limit that the scene meets; then the arrays are empty."""
 
     @classmethod
     def refused(cls, engine: str, setting: str, reason: str) -> "Released":
         """No motion, and why."""
-        return cls(engine, setting, np.empty(0), np.empty(0), np.empty(0), reason)
+        return cls(engine, setting, np.empty(0), np.empty(0), np.empty(0), refusal=reason)

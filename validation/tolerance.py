@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.linkage import FourBar
-from fourbar.solution import Solution
+from fourbar.solution import UNITS, Solution
 
 Array = NDArray[np.float64]
 
@@ -73,9 +73,10 @@ FULL_ACCURACY = Tolerance(
     conditioned=False,
 )
 
-POSITION_POWER = {"theta_3": 1, "theta_4": 1}
-"""Angles lose digits as 1/s, everything that follows from them as 1/s^2."""
-MOTION_POWER = 2
+POWER = {**dict.fromkeys(("rad", "m", "1"), 1), **dict.fromkeys(("rad/s", "rad/s^2", "m/s^2", "N", "N m"), 2)}
+"""By unit: angles and positions lose digits as 1/s, everything that follows from them as 1/s^2."""
+OF_THE_INPUT = frozenset(("theta_2", "omega_2", "alpha_2", "A", "G2", "a_A", "a_G2"))
+"""Quantities that the input alone decides: they lose none."""
 FORCES = frozenset(("F12", "F32", "F43", "F14", "torque"))
 """Quantities that divide by the drive condition too."""
 
@@ -90,10 +91,12 @@ def lever(linkage: FourBar) -> float:
 
 
 def condition_of(quantity: str, linkage: FourBar, formulas: Solution) -> Array:
-    """The condition of a quantity at each position: s for angles, s^2 for what follows, times lever and drive."""
-    s = formulas.condition
-    condition = lever(linkage) * s ** POSITION_POWER.get(quantity, MOTION_POWER)
-    if quantity in FORCES:
+    """The condition of a quantity at each position: s for positions, s^2 for what follows, times lever and drive."""
+    s, unit = formulas.condition, UNITS[quantity]
+    if quantity in OF_THE_INPUT:
+        return np.ones_like(s)
+    condition = lever(linkage) * s ** POWER[unit]
+    if unit in ("N", "N m"):
         assert formulas.drive_condition is not None
         condition = condition * formulas.drive_condition
     return np.asarray(condition, dtype=float)

@@ -15,7 +15,7 @@ from validation.check.mistakes import NEARER, Explanation, explain
 from validation.check.theirs import Array, Table, read_table
 from validation.compare import angle_aware_difference
 from validation.plain import plain
-from validation.scales import divisor, magnitude, yardstick
+from validation.scales import magnitude, yardstick
 from validation.tolerance import EPS, EQUIVALENCE, NOTHING_TO_TELL, condition_of
 
 SHOWN = 20
@@ -54,6 +54,8 @@ def judge_table(scene: Scene, table: Table) -> Judgement:
     base = command(scene)
     if np.ndim(base.omega_2 or 0.0) or np.ndim(base.alpha_2):
         raise InputError("motion.law", scene.title, "a table is judged at one omega_2 and alpha_2, not along a law")
+    if scene.motion.free is not None:
+        raise InputError("motion.free", scene.title, "a table is judged at one omega_2 and alpha_2, not while released")
     branch = np.full(len(table.theta_2), scene.motion.branch, dtype=np.int8)
     at = Command(table.theta_2, branch, base.omega_2, base.alpha_2)
     right = solve(scene, "position" if at.omega_2 is None else "force", at=at)
@@ -65,7 +67,9 @@ def judge_table(scene: Scene, table: Table) -> Judgement:
             beside.append(solve(scene, "position" if at.omega_2 is None else "force", at=moved))
 
     def judged(quantity: str, ours: Array, theirs: Array) -> tuple[Array, Array]:
-        scale = divisor(yardstick(quantity, scene, right, getattr(right, quantity)))
+        yard = yardstick(quantity, scene, right, getattr(right, quantity))
+        scale = np.where(yard == 0.0, 1.0, yard)  # what all its terms leave 0 is judged in its own unit
+        theirs = np.where(np.isnan(theirs), ours, theirs)  # a component that their table does not have
         error = angle_aware_difference(quantity, ours, theirs) / scale
         condition = condition_of(quantity, scene.linkage, right)
         # what a mistake would have printed is rounded at its own size, however much larger
@@ -74,18 +78,23 @@ def judge_table(scene: Scene, table: Table) -> Judgement:
         larger = 1.0 if ours is there else np.maximum(size / scale, 1.0)
         moves = [angle_aware_difference(quantity, there, getattr(other, quantity)) for other in beside]
         spread = np.fmax.reduce(moves) / scale if moves else 0.0
-        allowed = (EQUIVALENCE.allowed(condition) + spread) * larger + table.rounding[quantity] / scale
+        exact = np.where(yard == 0.0, 0.0, EQUIVALENCE.allowed(condition))
+        allowed = (exact + spread) * larger + table.rounding[quantity] / scale
         return error[ok], np.where(condition * NOTHING_TO_TELL > EPS, allowed, np.inf)[ok]
 
     findings = []
     for quantity, theirs in table.values.items():
         ours = getattr(right, quantity)
         if ours is None:
-            raise InputError("motion.omega_2", None, f"is needed in the scene to judge {quantity}")
+            if at.omega_2 is None:
+                raise InputError("motion.omega_2", None, f"is needed in the scene to judge {quantity}")
+            raise InputError("header", quantity, "does not exist in this scene: it has no dry friction")
         error, allowed = judged(quantity, ours, theirs)
+        label = table.label(quantity)
         for index, e, most in zip(np.flatnonzero(ok).tolist(), error.tolist(), allowed.tolist(), strict=True):
-            findings.append(Finding(table.lines[index], quantity, e, most, float(table.theta_2[index]), e <= most))
-    differing = sorted({finding.quantity for finding in findings if not finding.agrees})
+            findings.append(Finding(table.lines[index], label, e, most, float(table.theta_2[index]), e <= most))
+    found = {finding.quantity for finding in findings if not finding.agrees}
+    differing = sorted(quantity for quantity in table.values if table.label(quantity) in found)
     known = explain(table, scene, at, right, differing, judged) if differing else []
     return Judgement(findings, [table.lines[index] for index in np.flatnonzero(~ok)], known)
 

@@ -240,13 +240,13 @@ def explain(
             error, allowed = judged(quantity, predicted, values)
             if np.all(error <= allowed):
                 if quantity in differing:
-                    explained.append(quantity)
+                    explained.append(table.label(quantity))
             elif quantity not in differing:
                 broken = mistake.whole
             else:
                 before, _ = judged(quantity, getattr(right, quantity), values)
                 if np.all(NEARER * error <= before):
-                    nearer.append(quantity)
+                    nearer.append(table.label(quantity))
         if (explained or nearer) and not broken:
             complete = len(explained) == len(differing)
             found.append(Explanation(mistake.text, tuple(explained), complete, tuple(nearer)))

@@ -13,6 +13,7 @@ from typing import Any
 
 from fourbar.errors import FourBarError, InputError
 from fourbar.scene import Scene, solve
+from fourbar.under_way import under_way
 from fourbar.writing import write_text
 from validation.answer import Answer
 from validation.check.differences import Difference, Value, differences
@@ -107,7 +108,8 @@ def _guarded(scene: Scene, text: str | None, names: Mapping[str, str]) -> Any:
 
     from pebble import ProcessExpired, ProcessPool
 
-    with ProcessPool(max_workers=1, context=get_context("spawn"), initializer=_confine) as pool:
+    waiting = under_way(f"MuJoCo examines the file, in {SECONDS:g} s at most")
+    with waiting, ProcessPool(max_workers=1, context=get_context("spawn"), initializer=_confine) as pool:
         future = pool.schedule(_examine, args=(EXAMINE, scene, text, dict(names)), timeout=SECONDS)
         try:
             return future.result()
@@ -119,6 +121,9 @@ def _guarded(scene: Scene, text: str | None, names: Mapping[str, str]) -> Any:
             reason = f"asks for more than {WORKER_MEMORY // 2**30} GB of memory"
         except ProcessExpired as error:
             reason = f"MuJoCo crashed on it (exit code {error.exitcode})"
+        except KeyboardInterrupt:
+            pool.stop()  # type: ignore[no-untyped-call]  # or the pool would wait for the file to its time limit
+            raise
     raise InputError("--mjcf", "the file", reason)
 
 

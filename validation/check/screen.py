@@ -4,10 +4,12 @@ The text that the engine gets is written anew from the elements that were looked
 can mean one thing to the reader here and another to the engine's.
 """
 
+import re
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
 from fourbar.errors import InputError
+from fourbar.reading import read_text
 
 LARGEST_MJCF = 2**20
 """Bytes; a four-bar takes four thousand."""
@@ -18,6 +20,11 @@ REACHING_OUT = ("include", "extension", "plugin", "attach", "composite", "flexco
 OUTSIDE = ("file", "meshdir", "texturedir", "assetdir", "directory")
 """Attributes that name files; those of a cube texture are file and a side."""
 
+COUNTS = ("iterations", "ls_iterations", "noslip_iterations", "ccd_iterations", "sdf_iterations", "sdf_initpoints")
+MOST_ITERATIONS = 1000
+"""Of each count in <option>, ten times the greatest of MuJoCo's defaults: it already steps while it compiles, and with
+a tolerance of 0 nothing else may stop a solver."""
+
 
 def read_mjcf(path: Path) -> str:
     """The screened text of an MJCF; InputError says in one line what it may not hold."""
@@ -25,17 +32,7 @@ def read_mjcf(path: Path) -> str:
     def refuse(what: object, allowed: str) -> InputError:
         return InputError("--mjcf", what, allowed, str(path))
 
-    try:
-        with path.open("rb") as file:
-            raw = file.read(LARGEST_MJCF + 1)
-    except OSError as error:
-        raise refuse(path.name, f"cannot be read: {error.strerror}") from None
-    if len(raw) > LARGEST_MJCF:
-        raise refuse(path.name, f"must be smaller than {LARGEST_MJCF // 2**20} MB")
-    try:
-        text = raw.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        raise refuse(path.name, "must be UTF-8") from None
+    text = read_text(path, "--mjcf", LARGEST_MJCF)
     for word in ("<!DOCTYPE", "<!ENTITY"):
         if word in text.upper():
             raise refuse(word, "is not allowed: an MJCF needs no document type")
@@ -53,6 +50,11 @@ def read_mjcf(path: Path) -> str:
         if element.tag in REACHING_OUT:
             raise refuse(f"<{element.tag}>", "is not allowed: a linkage is described by the file itself")
         for name in element.attrib:
+            if element.tag == "option" and name in COUNTS:
+                count = element.attrib[name].strip()
+                if not re.fullmatch("[0-9]{1,9}", count) or int(count) > MOST_ITERATIONS:
+                    allowed = f"must be a whole number up to {MOST_ITERATIONS}: MuJoCo might never come back"
+                    raise refuse(f'<option {name}="{count}">', allowed)
             if name.startswith(OUTSIDE):
                 raise refuse(f"<{element.tag} {name}=...>", "is not allowed: no other file is read")
     return ET.tostring(root, encoding="unicode")

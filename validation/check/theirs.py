@@ -2,12 +2,14 @@
 
     theta_2 [deg], torque [N cm], F12_x, F12_y
 
+Of a vector one component may stand alone; it is judged by itself, at the scale of the vector.
 Without a unit a column is SI (rad). How many digits were printed decides how much rounding is
 theirs: half a unit of the last printed digit is always allowed, and what half a unit of a rounded
 theta_2 changes.
 """
 
 import csv
+import io
 import math
 from dataclasses import dataclass
 from decimal import Decimal, InvalidOperation
@@ -17,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.errors import InputError
+from fourbar.reading import read_text
 from fourbar.solution import UNITS, VECTORS
 from validation.tolerance import EPS
 
@@ -24,13 +27,21 @@ Array = NDArray[np.float64]
 
 DECIMALS = 4
 """12.5 deg and 0.25 rad are positions that somebody chose, 0.1745 rad is one that was rounded."""
+NOT_JUDGED = {
+    "time": "a row is found by its theta_2",
+    **dict.fromkeys(("torque_error", "force_error", "friction_residual"), "it is an error of the formulas themselves"),
+}
+"""Columns of `fourbar analyze --csv` that are no answer, and why."""
 LARGEST_FILE = 64 * 2**20
 """Bytes; a table larger than this is not a hand-made comparison."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Table:
-    """Somebody's numbers in SI: theta_2 (n,), and per quantity values (n,) or (n, 2) with their rounding."""
+    """Somebody's numbers in SI: theta_2 (n,), and per quantity values (n,) or (n, 2) with their rounding.
+
+    A component that the table does not have is NaN, in every row.
+    """
 
     theta_2: Array
     values: dict[str, Array]
@@ -40,6 +51,12 @@ class Table:
     """The line of the file that each row stands in."""
     theta_2_rounding: Array
     """Half a unit of the last digit of theta_2 in a column that is printed with DECIMALS, rad, (n,); else 0."""
+
+    def label(self, quantity: str) -> str:
+        """The quantity, or the one component of it that the table has."""
+        values = self.values[quantity]
+        there = [letter for letter, gone in zip("xy", np.isnan(values).T, strict=False) if not gone.any()]
+        return f"{quantity}_{there[0]}" if values.ndim == 2 and len(there) == 1 else quantity
 
 
 def read_table(path: Path) -> Table:
@@ -67,10 +84,11 @@ def read_table(path: Path) -> Table:
     half_by_name = {name: halves[:, index] for index, name in enumerate(names)}
     values, rounding = {}, {}
     for quantity in UNITS:
-        if quantity in VECTORS and {f"{quantity}_x", f"{quantity}_y"} <= by_name.keys():
-            pair = (f"{quantity}_x", f"{quantity}_y")
-            values[quantity] = np.stack([by_name[name] for name in pair], axis=1)
-            rounding[quantity] = np.hypot(*(half_by_name[name] for name in pair))
+        pair = (f"{quantity}_x", f"{quantity}_y")
+        if quantity in VECTORS and not by_name.keys().isdisjoint(pair):
+            gone = np.full(len(numbers), np.nan)
+            values[quantity] = np.stack([by_name.get(name, gone) for name in pair], axis=1)
+            rounding[quantity] = np.hypot(*(half_by_name.get(name, 0.0 * numbers[:, 0]) for name in pair))
         elif quantity in by_name and quantity != "theta_2":
             values[quantity], rounding[quantity] = by_name[quantity], half_by_name[quantity]
     if not values:
@@ -89,15 +107,12 @@ def _rounded(halves: Array, columns: list[tuple[str, float]]) -> Array:
 
 def _lines(path: Path) -> list[tuple[int, list[str]]]:
     """The lines that hold anything, with their numbers."""
+    text = read_text(path, "table", LARGEST_FILE)
     try:
-        if path.stat().st_size > LARGEST_FILE:
-            raise InputError("table", path.name, f"must be smaller than {LARGEST_FILE // 2**20} MB", str(path))
-        with path.open(newline="", encoding="utf-8-sig") as file:
-            reader = csv.reader(file)
-            return [(reader.line_num, row) for row in reader if any(cell.strip() for cell in row)]
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        reason = error.strerror if isinstance(error, OSError) else "must be a CSV file in UTF-8"
-        raise InputError("table", path.name, str(reason), str(path)) from None
+        reader = csv.reader(io.StringIO(text, newline=""))
+        return [(reader.line_num, row) for row in reader if any(cell.strip() for cell in row)]
+    except csv.Error:
+        raise InputError("table", path.name, "must be a CSV file", str(path)) from None
 
 
 def _column(path: Path, heading: str) -> tuple[str, float]:
@@ -105,8 +120,10 @@ def _column(path: Path, heading: str) -> tuple[str, float]:
     name, _, rest = heading.strip().partition("[")
     name, unit = name.strip(), rest.rstrip("] ").strip()
     quantity = name[:-2] if name[-2:] in ("_x", "_y") and name[:-2] in VECTORS else name
+    if quantity in NOT_JUDGED:
+        raise InputError("header", heading, f"is not judged: {NOT_JUDGED[quantity]}; leave this column out", str(path))
     if quantity not in UNITS or (quantity in VECTORS and quantity == name):
-        known = ", ".join(f"{q}_x, {q}_y" if q in VECTORS else q for q in UNITS)
+        known = ", ".join(f"{q}_x, {q}_y" if q in VECTORS else q for q in UNITS if q not in NOT_JUDGED)
         raise InputError("header", heading, f"is not a known column; known are {known}", str(path))
     if not unit:
         return name, 1.0

@@ -291,3 +291,21 @@ def turned_ground(theta_1: float, x: float, y: float) -> Array:
     """World axes of a vector along and across the ground's line, as described."""
     cos, sin = math.cos(theta_1), math.sin(theta_1)
     return np.array([cos * x - sin * y, sin * x + cos * y])
+
+
+class LimitWatch:
+    """Sees bars 3 and 4 of one branch come to lie in one line, from step to step of an engine."""
+
+    def __init__(self, branch: int) -> None:
+        self.branch, self.before = branch, (0.0, 0.0)
+        self.stopped_at: float | None = None
+
+    def look(self, time: float, theta_3: float, theta_4: float) -> None:
+        """Take in a state; the instant between two of them is that of the line through their sines."""
+        if self.stopped_at is not None:
+            return
+        sine = self.branch * math.sin(theta_4 - theta_3)
+        began, last = self.before
+        if sine < 0.0:
+            self.stopped_at = began + (time - began) * max(last, 0.0) / (max(last, 0.0) - sine)
+        self.before = (time, sine)

@@ -10,7 +10,7 @@ import pinocchio as pin
 from fourbar.effects import Gravity
 from fourbar.scene import Scene, command
 from validation.answer import Array, Released
-from validation.engines.loop import Position
+from validation.engines.loop import LimitWatch, Position
 from validation.engines.pinocchio import PinocchioTree
 
 NAME = "pinocchio-forward"
@@ -41,15 +41,16 @@ class PinocchioReleased:
         jacobian, omega_2 = tree.jacobian(), scene.motion.omega_2 or 0.0
         q, v = np.array(q_0), np.array([omega_2, *np.linalg.solve(jacobian[:, 1:], -jacobian[:, 0] * omega_2)])
         acceleration = constrained(tree, self.step)
-        rows, now = [], 0.0
+        rows, now, watch = [], 0.0, LimitWatch(int(start.branch[0]))
         for t in times:
             steps = math.ceil((t - now) / self.step - 1e-6)
-            for _ in range(steps):
+            for taken in range(1, steps + 1):
                 q, v = step(acceleration, q, v, (t - now) / steps)
+                watch.look(now + taken * (t - now) / steps, q[0] + q[1], q[2])
             now = float(t)
             rows.append((q[0], v[0], pin.computeMechanicalEnergy(tree.model, tree.data, q, v)))
         theta_2, omega, energy = np.array(rows).T
-        return Released(NAME, setting, theta_2, omega, energy)
+        return Released(NAME, setting, theta_2, omega, energy, watch.stopped_at)
 
 
 def constrained(tree: PinocchioTree, h: float) -> Acceleration:

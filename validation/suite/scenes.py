@@ -1,6 +1,7 @@
 """Which scenes a run judges: the named mechanisms of `models/`, the files given, or random linkages."""
 
 import hashlib
+import math
 import tomllib
 from collections import Counter
 from collections.abc import Iterable
@@ -8,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
+from fourbar import reading
 from fourbar.errors import InputError
 from fourbar.files import loads, read_text
 from fourbar.motion import DEFAULT_STEPS, Free, Sweep
@@ -16,6 +18,10 @@ from validation.suite.random import LinkageType, random_scene
 
 MOST_POSITIONS = 100_000
 """Of a scene in a run, where every engine solves each of them: 3 ms each, with all engines."""
+MOST_SECONDS = 100.0
+"""Of a free motion in a run: the engines go through it in steps of 1 to 4 ms, a second in about a second."""
+AS_LONG_AS = 100
+"""Positions that take as long as a second of free motion, with room."""
 MODELS = Path(__file__).parent.parent.parent / "models"
 
 
@@ -41,7 +47,7 @@ class Files:
     texts: tuple[tuple[str, str], ...]
     """(name, text of the file), sorted by name."""
     positions: int = 0
-    """The most that any of them asks for."""
+    """The most that any of them asks for, or what takes as long."""
 
     def __len__(self) -> int:
         return len(self.texts)
@@ -103,12 +109,16 @@ def scene_files(paths: Iterable[Path]) -> Files:
 
 
 def _positions(scene: Scene, file: Path) -> int:
-    """How many positions a scene asks for; InputError beyond MOST_POSITIONS."""
+    """How many positions a scene asks for, or what takes as long; InputError beyond the most."""
     for key, asked in (("motion.theta_2", scene.motion.theta_2), ("motion.free", scene.motion.free)):
         if isinstance(asked, (Sweep, Free)):
             if asked.steps >= MOST_POSITIONS:
                 raise InputError(f"{key}.steps", asked.steps, f"must be below {MOST_POSITIONS} in a run", str(file))
-            return asked.steps + 1
+            seconds = asked.duration if isinstance(asked, Free) else 0.0
+            if seconds > MOST_SECONDS:
+                allowed = f"must not exceed {MOST_SECONDS:g} s in a run: engines go through it in steps of 1 ms"
+                raise InputError(f"{key}.duration", seconds, allowed, str(file))
+            return asked.steps + 1 + math.ceil(AS_LONG_AS * seconds)
     return DEFAULT_STEPS + 1
 
 
@@ -125,14 +135,12 @@ def suite_file(path: Path) -> Files:
     def refuse(entry: object, allowed: str) -> InputError:
         return InputError("--suite", entry, allowed, str(path))
 
+    if not path.exists():
+        raise refuse(path.name, 'must be "hard" or a file that lists scenes: there is no such file')
+    text = reading.read_text(path, "--suite", LARGEST_LIST)
     try:
-        if path.stat().st_size > LARGEST_LIST:
-            raise refuse(path.name, f"must be smaller than {LARGEST_LIST // 2**20} MB")
-        text = path.read_text(encoding="utf-8")
         entries = tomllib.loads(text).get("scenes") if path.suffix == ".toml" else _listed(text)
-    except OSError as error:
-        raise refuse(path.name, f'must be "hard" or a file that lists scenes: {error.strerror}') from None
-    except (ValueError, RecursionError):  # no UTF-8, or no TOML
+    except (ValueError, RecursionError):  # no TOML
         raise refuse(path.name, "is no list of scenes") from None
     if not isinstance(entries, list) or not all(isinstance(entry, str) and entry for entry in entries):
         raise refuse(path.name, 'must have scenes = ["a.toml", ...], or one scene file per line')

@@ -10,7 +10,8 @@ from fourbar.errors import InputError
 from fourbar.mjcf import RECIPE, mjcf
 from fourbar.scene import Scene, command
 from validation.answer import Array, Released
-from validation.engines.mujoco.closed_loop import O2, ClosedLoop
+from validation.engines.loop import LimitWatch
+from validation.engines.mujoco.closed_loop import O2, O4, A, ClosedLoop
 
 NAME = "mujoco-forward"
 TIME_CONSTANT_STEPS = 2.0
@@ -42,13 +43,15 @@ class MujocoForward:
             return Released.refused(NAME, setting, "the loop does not close at the start")
         loop.model.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_ENERGY
         loop.set_state(q_0, scene.motion.omega_2 or 0.0)
-        rows, done = [], 0
+        rows, done, watch = [], 0, LimitWatch(int(start.branch[0]))
         for t in times:
             wanted = round(float(t) / timestep)
-            if wanted > done:
-                mujoco.mj_step(loop.model, loop.data, wanted - done)
-                done = wanted
+            while done < wanted:
+                mujoco.mj_step(loop.model, loop.data)
+                done += 1
+                q = loop.data.qpos
+                watch.look(done * timestep, q[O2] + q[A], q[O4])
             mujoco.mj_forward(loop.model, loop.data)
             rows.append((loop.data.qpos[O2], loop.data.qvel[O2], loop.data.energy.sum()))
         theta_2, omega, energy = np.array(rows).T
-        return Released(NAME, setting, theta_2, omega, energy)
+        return Released(NAME, setting, theta_2, omega, energy, watch.stopped_at)

@@ -6,6 +6,7 @@ Through time: the same, at the states that its own timestep, integrator and clos
 flywheel on pin O2 keeping the speed. The file's own drive on that pin is taken off in both.
 """
 
+import math
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -266,8 +267,11 @@ def through_time(loop: Loop, at: Command) -> Answer:
         raise LimitError("nowhere do two neighbouring positions assemble in this file")
     run = run_through(at.theta_2[stretch], at.omega_2, at.alpha_2)
     timestep, sense = float(model.opt.timestep), loop.anatomy.sense["O2"]
-    if run.time(run.stop) > MOST_STEPS * timestep:
-        raise LimitError(f"its timestep of {timestep:g} s asks for more than {MOST_STEPS} steps")
+    steps = run.time(run.stop) / timestep if timestep > 0.0 else math.nan
+    if not 1.0 <= steps <= MOST_STEPS:
+        raise LimitError(
+            f"its timestep of {timestep:g} s makes {steps:.3g} steps of the motion; must be 1 to {MOST_STEPS}"
+        )
     position.find(float(at.theta_2[stretch[0]]), int(at.branch[stretch[0]]))
     data.qpos[:], data.qvel[:] = loop.data.qpos, loop.speeds(at.omega_2)
     heavy = max(loop.armature, flywheel(loop.scene))
