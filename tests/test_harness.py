@@ -13,7 +13,7 @@ from validation.answer import Answer
 from validation.compare import COMPARED
 from validation.judge import judge
 from validation.results import AGREES, DEGRADED, FAILS, REFUSES, Row, from_csv, to_csv, write_results
-from validation.tolerance import EPS, EQUIVALENCE, K
+from validation.tolerance import EPS, EQUIVALENCE, FORCES, K
 from validation.witnesses import WITNESSES, Witness, predicting_from
 
 
@@ -115,6 +115,38 @@ def test_a_torque_off_by_a_billionth_fails() -> None:
     assert row.verdict == FAILS
     assert row.error == pytest.approx(1e-9, rel=0.5)
     assert row.allowed == pytest.approx(K * EPS / row.condition)
+
+
+class OffAtTheReversal(Echo):
+    """Everything is off by a thousandth at the dead centre of `with_friction`, and nowhere else."""
+
+    def spoil(self, answer: Answer) -> Answer:
+        for values in answer.quantities.values():
+            values[AT_REST] += 1e-3 + 1e-3 * np.abs(values[AT_REST])
+        return answer
+
+
+AT_REST = 1
+"""Position at which bar 4 stands still in its dry pin."""
+
+
+def with_friction() -> Scene:
+    """A crank-rocker with dry friction at O4, at the dead centre of bar 4 and on either side of it."""
+    linkage = fourbar.uniform(0.3, 0.1, 0.25, 0.22)
+    d, a, b, c = linkage.lengths
+    psi = np.arccos((d * d + (a + b) ** 2 - c * c) / (2.0 * d * (a + b)))
+    motion = fourbar.Motion(np.array([psi - 0.2, psi, psi + 0.2]), 10.0)
+    return Scene(linkage, motion, effects=(fourbar.Friction.at(O4=0.5),))
+
+
+def test_where_dry_friction_reverses_forces_are_not_judged_and_the_motion_is() -> None:
+    rows = rows_of(OffAtTheReversal, with_friction())
+    for quantity in COMPARED:
+        row = rows[quantity]
+        noted = "1 positions at which dry friction reverses not judged" in row.reason
+        assert (row.verdict, noted) == ((AGREES, True) if quantity in FORCES else (FAILS, False)), quantity
+        if quantity not in FORCES:
+            assert row.theta_2 == with_friction().motion.theta_2[AT_REST], quantity  # type: ignore[index]
 
 
 def test_where_no_digit_is_left_nothing_is_told() -> None:
