@@ -188,3 +188,41 @@ def test_an_engine_that_raised_an_alarm_is_excused_by_no_prediction_of_its_own()
     assert predicted is not None and predicted()["torque"][0] == 1.0
     answer.alarms.append("the loop is open")
     assert predicting_from(witness, scene, at, answer) is None
+
+
+class AnswersAnyway(Echo):
+    """Numbers of its own where the formulas state none."""
+
+    def spoil(self, answer: Answer) -> Answer:
+        answer.quantities = {name: np.nan_to_num(values, nan=7.0) for name, values in answer.quantities.items()}
+        return answer
+
+
+def test_an_answer_that_the_formulas_withhold_is_not_compared() -> None:
+    """On bar 3 of a parallelogram no torque exists: no agreement, whatever the engine says; the motion is judged."""
+    motion = fourbar.Motion(np.linspace(0.3, 2.0, 5), 1.0)
+    for engine in (Echo, AnswersAnyway):
+        rows = rows_of(engine, Scene(fourbar.uniform(1.0, 0.5, 1.0, 0.5), motion, 3))
+        for quantity in COMPARED:
+            row = rows[quantity]
+            expected = (REFUSES, "the formulas state no value: 5 no_torque")
+            assert (row.verdict, row.reason) == (expected if quantity in FORCES else (AGREES, EQUIVALENCE.name))
+
+
+def test_positions_without_a_value_are_counted_beside_those_that_were_compared() -> None:
+    """A parallelogram from the crossed branch through its change point into bars that stay parallel."""
+    motion = fourbar.Motion(np.array([-0.5, -0.3, 0.0, 0.3]), 1.0)
+    scene = Scene(fourbar.uniform(1.0, 0.5, 1.0, 0.5), motion, 3)
+    rows = rows_of(AnswersAnyway, scene)
+    assert (rows["torque"].verdict, rows["torque"].reason) == (
+        AGREES,
+        f"{EQUIVALENCE.name}; not judged: 1 singular, 1 no_torque",
+    )
+    assert rows["omega_3"].reason == f"{EQUIVALENCE.name}; not judged: 1 singular"
+
+
+def test_beyond_the_range_of_doubles_what_was_before_is_judged() -> None:
+    heavy = fourbar.FourBar(3.0, fourbar.Bar(1.0, 1.0), fourbar.Bar(2.5, 1e308, 1.0), fourbar.Bar(2.2, 1.0))
+    rows = rows_of(AnswersAnyway, Scene(heavy, fourbar.Motion(np.linspace(0.3, 2.0, 5), 10.0)))
+    for quantity in COMPARED:
+        assert rows[quantity].verdict == (REFUSES if quantity in FORCES else AGREES), quantity
