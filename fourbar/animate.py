@@ -26,7 +26,7 @@ from fourbar.plot.energy import energies
 from fourbar.plot.style import length_unit, plain
 from fourbar.plot.view import on_branch, over_time, sweep_command
 from fourbar.scene import Command, Scene, command, solve
-from fourbar.solution import Solution
+from fourbar.solution import OK, Solution
 from fourbar.state import Array, centre_in_bar
 from fourbar.writing import write_text
 
@@ -248,6 +248,8 @@ def _columns(scene: Scene, theta_2: Array) -> dict[str, Any]:
 def _solved(solution: Solution) -> dict[str, Any]:
     """Quantity by quantity, as lists."""
     columns: dict[str, Any] = {"sign": solution.branch.tolist()}
+    if (solution.status_code != OK).any():
+        columns["status"] = solution.status
     for name in SCALARS:
         values = getattr(solution, name)
         if values is not None:

@@ -8,9 +8,22 @@ from numpy.typing import NDArray
 
 from fourbar.kinematics import add_accelerations, add_velocities, close_loop
 from fourbar.kinetostatics import drive_sine, solve_pins, torque_interval
-from fourbar.margins import U, diagonal_to_O4
+from fourbar.margins import NO_DIGIT_LEFT, U, diagonal_to_O4
 from fourbar.more_digits import needing_more_digits, restated, rounded
-from fourbar.solution import ANGLES, NOT_ASSEMBLED, OF_DRY_FRICTION, OK, SINGULAR, STAGE_OF, VECTORS
+from fourbar.solution import (
+    ANGLES,
+    JAMMED,
+    NO_TORQUE,
+    NOT_ASSEMBLED,
+    OF_DRY_FRICTION,
+    OK,
+    OVERFLOW,
+    SEVERAL,
+    SINGULAR,
+    STAGE_OF,
+    STAGES,
+    VECTORS,
+)
 from fourbar.state import Array, State, Vector, centre_in_bar
 
 if TYPE_CHECKING:
@@ -61,6 +74,7 @@ KINEMATIC: dict[str, Callable[[State], Array | Vector | float | None]] = {
 """The quantities up to the acceleration, from the state of the stage that they belong to."""
 
 
+@np.errstate(all="ignore")  # what comes of it is looked for, and said by the status
 def solve_block(
     scene: "Scene", where: "Command", part: slice, wanted: int, out: Mapping[str, Array]
 ) -> NDArray[np.uint8]:
@@ -88,9 +102,52 @@ def solve_block(
             left = out[name][hard] * U if STAGE_OF[name] == "error" else 0.0
             _put(room[name], value, hard)
             out[name][hard] += left
-    if state.diagonal.least_root != 0.0 or (state.assembled.all() and not state.singular.any()):
-        return friction
-    return np.where(state.assembled, np.where(state.singular, SINGULAR, friction), NOT_ASSEMBLED).astype(np.uint8)
+    code = friction
+    if state.diagonal.least_root == 0.0 and not (state.assembled.all() and not state.singular.any()):
+        code = np.where(state.assembled, np.where(state.singular, SINGULAR, friction), NOT_ASSEMBLED).astype(np.uint8)
+        code[np.isnan(state.diagonal.squared)] = OVERFLOW  # of theta_2 - theta_1: not even where it closes is known
+    if not all_finite(out):
+        withhold(out, code, np.abs(drive_sine(state, scene.drive_bar)) <= NO_DIGIT_LEFT)
+    return code
+
+
+def all_finite(out: Mapping[str, Array]) -> bool:
+    """Whether every entry of a block's arrays is a number: their sum at each position is, which is quicker to look at.
+
+    False also where the sum alone is beyond the range of a double.
+    """
+    total: Array | float = 0.0
+    for array in out.values():
+        for values in array.T if array.ndim == 2 else (array,):
+            total = np.add(total, values, out=total if isinstance(total, np.ndarray) else None)
+    return bool(np.isfinite(total).all())
+
+
+def withhold(out: Mapping[str, Array], code: NDArray[np.uint8], in_line: NDArray[np.bool_] | bool = False) -> None:
+    """Where a quantity is no number and the status promises one: the status that says so, and NaN from that stage on.
+
+    Parameters
+    ----------
+    code : status of each position, changed in place.
+    in_line : where the two bars that are not driven are in line: there no forces hold them in balance.
+    """
+    gone = np.zeros(code.shape, dtype=bool)
+    for stage in STAGES:
+        arrays = {name: array for name, array in out.items() if STAGE_OF[name] == stage}
+        of_forces = stage in STAGES[3:]
+        promised = np.isin(code, (OK, SEVERAL)) if of_forces else ~np.isin(code, (NOT_ASSEMBLED, SINGULAR))
+        found = np.zeros_like(gone)
+        for array in arrays.values():
+            found |= ~(np.isfinite(array).all(axis=1) if array.ndim == 2 else np.isfinite(array))
+            array[np.isinf(array)] = np.nan
+        found &= promised & ~gone
+        code[found] = OVERFLOW
+        if of_forces:
+            code[found & in_line] = NO_TORQUE
+        gone |= found
+        for name, array in arrays.items():
+            if name != "drive_condition":
+                array[gone] = np.nan
 
 
 def _evaluate(
@@ -163,8 +220,10 @@ def _forces(
     if "friction_residual" in names:
         yield "friction_residual", 0.0 if pins.residual is None else pins.residual
     if "torque_low" in names or "torque_high" in names:
-        ends = torque_interval(state, terms, scene.drive_bar, pins.torque)
+        *ends, held = torque_interval(state, terms, scene.drive_bar, pins.torque)
         yield from ((name, end) for name, end in zip(OF_DRY_FRICTION, ends, strict=True) if name in names)
+        if held is not None and pins.unsettled is not None:
+            yield "status", np.where(held & (pins.unsettled == OK), JAMMED, pins.unsettled)
     if wanted >= 4:
         from fourbar.error_bars import error_bars
 

@@ -16,7 +16,6 @@ from fourbar.exits import printable, run
 if TYPE_CHECKING:
     from fourbar.scene import Scene
 
-"""Exit statuses; 1 is kept for comparisons that fail, which are not made here."""
 MOST_POSITIONS = 1_000_000
 """Positions that `analyze` prints: about a gigabyte of text."""
 
@@ -254,7 +253,7 @@ def _table_text(scene: "Scene", solution: Any, width: int | None, degrees: bool)
 
     from fourbar import tables
 
-    shown, left_out = tables.table(scene, solution, width, degrees=degrees)
+    shown, left_out = tables.table(solution, width, degrees=degrees)
     text = io.StringIO()
     console = Console(file=text, width=width or 10_000, color_system=None)
     if scene.title:

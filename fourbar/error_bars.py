@@ -73,6 +73,9 @@ def error_bars(state: State, pins: PinForces, terms: Iterable[Term], drive_bar: 
     sizes = [np.hypot(rounded(x), rounded(y)) for x, y in pins[:4]]
     torque_error += LAST_ROUNDING * np.abs(rounded(pins.torque))
     force_error += LAST_ROUNDING * np.max(sizes, axis=0)
+    # a change that leaves no value, or none in the range of a double: of the value itself no digit is left
+    torque_error = np.where(np.isfinite(torque_error), torque_error, np.abs(rounded(pins.torque)))
+    force_error = np.where(np.isfinite(force_error), force_error, np.max(sizes, axis=0))
     return {"torque_error": torque_error, "force_error": force_error}
 
 

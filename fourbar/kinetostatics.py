@@ -16,6 +16,7 @@ from fourbar.effects.pins import resting
 from fourbar.effects.wrenches import Wrenches
 from fourbar.linkage import MOVING_BARS
 from fourbar.margins import in_precision_of
+from fourbar.solution import JAMMED
 from fourbar.state import NO_ROOM, Array, State, Vector, centre_in_bar, cross, dot, is_zero
 
 Room = tuple[Array | None, Array | None]
@@ -161,8 +162,12 @@ def solve_pins(
     return pins
 
 
-def torque_interval(state: State, terms: Iterable[Term], drive_bar: int, torque: Array) -> tuple[Array, Array]:
+def torque_interval(
+    state: State, terms: Iterable[Term], drive_bar: int, torque: Array
+) -> tuple[Array, Array, NDArray[np.bool_] | None]:
     """Least and greatest driving torque where dry friction holds a pin at rest, elsewhere the torque twice, N m.
+
+    The third is where one of them is NaN because friction jams the motion that would begin; None: nowhere.
 
     The ends are the torques at which the linkage would begin to move either way, or, where only a
     pin comes to rest while the linkage moves, the torques just before and after its reversal.
@@ -170,12 +175,11 @@ def torque_interval(state: State, terms: Iterable[Term], drive_bar: int, torque:
     terms = tuple(terms)
     pins = {pin for term in terms for pin in term.dry_pins}
     if not any(np.any(resting(state, pin)) for pin in pins):
-        return torque, torque
-    ways = []
-    for side in (1, -1):
-        ways.append(solve_pins(state, [term.leaning(side) for term in terms], drive_bar).torque)
-    ahead, back = (getattr(way, "hi", way) for way in ways)
-    return np.minimum(ahead, back), np.maximum(ahead, back)
+        return torque, torque, None
+    ways = [solve_pins(state, [term.leaning(side) for term in terms], drive_bar) for side in (1, -1)]
+    ahead, back = (getattr(way.torque, "hi", way.torque) for way in ways)
+    jammed = [way.unsettled == JAMMED for way in ways if way.unsettled is not None]
+    return np.minimum(ahead, back), np.maximum(ahead, back), np.any(jammed, axis=0) if jammed else None
 
 
 def eliminate(state: State, wrenches: Wrenches, drive_bar: int, room: Mapping[str, Any] = NO_ROOM) -> PinForces:

@@ -88,6 +88,8 @@ class FourBar:
         object.__setattr__(self, "ground", require("lengths.ground", self.ground, positive=True))
         object.__setattr__(self, "ground_angle", require("lengths.ground_angle", self.ground_angle))
         longest = max(self.lengths)
+        if not math.isfinite(4.0 * longest):
+            raise InputError("lengths", self.lengths, "must be at most a quarter of the greatest double, 4.5e307 m")
         # exact sum: a linkage that closes by one rounding is still a linkage
         if math.fsum((*self.lengths, -2.0 * longest)) < 0.0:
             raise InputError(

@@ -1,5 +1,7 @@
 """The command to the input bar: angles, a sweep, a limit position, a law over time, or release."""
 
+import math
+import sys
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -14,6 +16,8 @@ if TYPE_CHECKING:
 
 OPEN, CROSSED = 1, -1
 BRANCH_NAMES = {OPEN: "open", CROSSED: "crossed"}
+FASTEST = math.sqrt(sys.float_info.max)
+"""rad/s. The square of any greater speed is beyond the range of a double, and with it every acceleration."""
 DEFAULT_STEPS = 360
 """Of the default range, where a motion names no angle."""
 
@@ -29,6 +33,8 @@ class Sweep:
     def __post_init__(self) -> None:
         require("motion.theta_2.from", self.start)
         require("motion.theta_2.to", self.stop)
+        if not math.isfinite(self.stop - self.start):
+            raise InputError("motion.theta_2.to", self.stop, f"must be within the range of doubles from {self.start!r}")
         if isinstance(self.steps, bool) or not isinstance(self.steps, int) or not 1 <= self.steps <= 100_000_000:
             raise InputError("motion.theta_2.steps", self.steps, "must be a whole number from 1 to 100 000 000")
 
@@ -91,6 +97,9 @@ class Motion:
             object.__setattr__(self, "theta_2", float(angles) if angles.ndim == 0 else angles)
         if self.omega_2 is not None:
             object.__setattr__(self, "omega_2", require("motion.omega_2", self.omega_2))
+            if not math.isfinite(self.omega_2 * self.omega_2):
+                allowed = f"must be below {FASTEST:.4g} rad/s: every acceleration has its square"
+                raise InputError("motion.omega_2", self.omega_2, allowed)
         object.__setattr__(self, "alpha_2", require("motion.alpha_2", self.alpha_2))
         if self.branch not in (OPEN, CROSSED):
             raise InputError("motion.branch", self.branch, "must be +1 (open) or -1 (crossed)")

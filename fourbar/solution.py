@@ -45,8 +45,11 @@ UNITS = {
     "force_error": "N",
     **dict.fromkeys(("sin_mu", "condition", "drive_condition"), "1"),
 }
-STATUS_NAMES = ("ok", "not_assembled", "singular", "jammed", "several", "no_direction", "wound")
-OK, NOT_ASSEMBLED, SINGULAR, JAMMED, SEVERAL, NO_DIRECTION, WOUND = range(7)
+STATUS_NAMES = (
+    *("ok", "not_assembled", "singular", "jammed", "several", "no_direction", "wound"),
+    *("no_torque", "overflow"),
+)
+OK, NOT_ASSEMBLED, SINGULAR, JAMMED, SEVERAL, NO_DIRECTION, WOUND, NO_TORQUE, OVERFLOW = range(len(STATUS_NAMES))
 
 
 @dataclass(slots=True, eq=False)
@@ -60,9 +63,13 @@ class Solution:
     title: str
     drive_bar: int
     status_code: NDArray[np.uint8]
-    """0 ok, 1 not_assembled, 2 singular (velocities are 0/0); of friction that depends on the pin forces: 3 jammed
-    (no forces fulfil it: forces are NaN), 4 several (more than one set does: those of the least friction); of springs,
-    forces NaN: 5 no_direction (both ends in one point), 6 wound (turned beyond half a turn from rest)."""
+    """0 ok: every quantity that was asked for is a number. 1 not_assembled, 2 singular (velocities are 0/0); of
+    friction that depends on the pin forces: 3 jammed (no forces fulfil it: they are NaN; at rest, where it is the
+    motion that would begin, torque_low or torque_high is), 4 several (more than one set does: those of the least
+    friction); of springs, forces NaN: 5 no_direction (both ends in one point), 6 wound (turned beyond half a turn from
+    rest). 7 no_torque: the two bars that are not driven are in line, no couple on the driven bar holds them in balance,
+    forces are NaN (T3 and T4 have these poles where omega_3, omega_4 are 0). 8 overflow: numbers beyond the range of
+    doubles; from the first stage (position, velocity, ...) that meets them on everything is NaN."""
     branch: NDArray[np.int8]
     """+1 open, -1 crossed."""
     theta_2: Array

@@ -179,7 +179,7 @@ def columns(solution: Solution, *, degrees: bool = True) -> dict[str, list[str]]
     return shown
 
 
-def table(scene: Scene, solution: Solution, width: int | None, *, degrees: bool = True) -> "tuple[Table, list[str]]":
+def table(solution: Solution, width: int | None, *, degrees: bool = True) -> "tuple[Table, list[str]]":
     """The table for a terminal of the given width (None: as wide as it needs), and the columns left out of it."""
     from rich import box
     from rich.table import Table

@@ -180,7 +180,7 @@ THETA_2 = (
 MOTION = st.builds(
     fourbar.Motion,
     THETA_2,
-    st.none() | numbers(),
+    st.none() | numbers(-1e150, 1e150),
     numbers(),
     st.sampled_from((1, -1)),
     st.sampled_from(("sign", "follow")),

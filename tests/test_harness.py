@@ -13,7 +13,7 @@ from validation.answer import Answer
 from validation.compare import COMPARED
 from validation.judge import judge
 from validation.results import AGREES, DEGRADED, FAILS, REFUSES, Row, from_csv, to_csv, write_results
-from validation.tolerance import EPS, EQUIVALENCE, K
+from validation.tolerance import EPS, EQUIVALENCE, FORCES, K
 from validation.witnesses import WITNESSES, Witness, predicting_from
 
 
@@ -117,6 +117,38 @@ def test_a_torque_off_by_a_billionth_fails() -> None:
     assert row.allowed == pytest.approx(K * EPS / row.condition)
 
 
+class OffAtTheReversal(Echo):
+    """Everything is off by a thousandth at the dead centre of `with_friction`, and nowhere else."""
+
+    def spoil(self, answer: Answer) -> Answer:
+        for values in answer.quantities.values():
+            values[AT_REST] += 1e-3 + 1e-3 * np.abs(values[AT_REST])
+        return answer
+
+
+AT_REST = 1
+"""Position at which bar 4 stands still in its dry pin."""
+
+
+def with_friction() -> Scene:
+    """A crank-rocker with dry friction at O4, at the dead centre of bar 4 and on either side of it."""
+    linkage = fourbar.uniform(0.3, 0.1, 0.25, 0.22)
+    d, a, b, c = linkage.lengths
+    psi = np.arccos((d * d + (a + b) ** 2 - c * c) / (2.0 * d * (a + b)))
+    motion = fourbar.Motion(np.array([psi - 0.2, psi, psi + 0.2]), 10.0)
+    return Scene(linkage, motion, effects=(fourbar.Friction.at(O4=0.5),))
+
+
+def test_where_dry_friction_reverses_forces_are_not_judged_and_the_motion_is() -> None:
+    rows = rows_of(OffAtTheReversal, with_friction())
+    for quantity in COMPARED:
+        row = rows[quantity]
+        noted = "1 positions at which dry friction reverses not judged" in row.reason
+        assert (row.verdict, noted) == ((AGREES, True) if quantity in FORCES else (FAILS, False)), quantity
+        if quantity not in FORCES:
+            assert row.theta_2 == with_friction().motion.theta_2[AT_REST], quantity  # type: ignore[index]
+
+
 def test_where_no_digit_is_left_nothing_is_told() -> None:
     # 1e-13 rad beside a limit of theta_2 the condition of the accelerations is about 1e-13
     rocker = fourbar.uniform(0.3, 0.25, 0.1, 0.22)
@@ -156,3 +188,41 @@ def test_an_engine_that_raised_an_alarm_is_excused_by_no_prediction_of_its_own()
     assert predicted is not None and predicted()["torque"][0] == 1.0
     answer.alarms.append("the loop is open")
     assert predicting_from(witness, scene, at, answer) is None
+
+
+class AnswersAnyway(Echo):
+    """Numbers of its own where the formulas state none."""
+
+    def spoil(self, answer: Answer) -> Answer:
+        answer.quantities = {name: np.nan_to_num(values, nan=7.0) for name, values in answer.quantities.items()}
+        return answer
+
+
+def test_an_answer_that_the_formulas_withhold_is_not_compared() -> None:
+    """On bar 3 of a parallelogram no torque exists: no agreement, whatever the engine says; the motion is judged."""
+    motion = fourbar.Motion(np.linspace(0.3, 2.0, 5), 1.0)
+    for engine in (Echo, AnswersAnyway):
+        rows = rows_of(engine, Scene(fourbar.uniform(1.0, 0.5, 1.0, 0.5), motion, 3))
+        for quantity in COMPARED:
+            row = rows[quantity]
+            expected = (REFUSES, "the formulas state no value: 5 no_torque")
+            assert (row.verdict, row.reason) == (expected if quantity in FORCES else (AGREES, EQUIVALENCE.name))
+
+
+def test_positions_without_a_value_are_counted_beside_those_that_were_compared() -> None:
+    """A parallelogram from the crossed branch through its change point into bars that stay parallel."""
+    motion = fourbar.Motion(np.array([-0.5, -0.3, 0.0, 0.3]), 1.0)
+    scene = Scene(fourbar.uniform(1.0, 0.5, 1.0, 0.5), motion, 3)
+    rows = rows_of(AnswersAnyway, scene)
+    assert (rows["torque"].verdict, rows["torque"].reason) == (
+        AGREES,
+        f"{EQUIVALENCE.name}; not judged: 1 singular, 1 no_torque",
+    )
+    assert rows["omega_3"].reason == f"{EQUIVALENCE.name}; not judged: 1 singular"
+
+
+def test_beyond_the_range_of_doubles_what_was_before_is_judged() -> None:
+    heavy = fourbar.FourBar(3.0, fourbar.Bar(1.0, 1.0), fourbar.Bar(2.5, 1e308, 1.0), fourbar.Bar(2.2, 1.0))
+    rows = rows_of(AnswersAnyway, Scene(heavy, fourbar.Motion(np.linspace(0.3, 2.0, 5), 10.0)))
+    for quantity in COMPARED:
+        assert rows[quantity].verdict == (REFUSES if quantity in FORCES else AGREES), quantity

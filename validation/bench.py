@@ -77,7 +77,7 @@ def bodies_of(scene: Scene, at: Command) -> FreeBodies:
     """The right-hand sides of the 13x13 system, from the kinematics; not part of what is timed."""
     s = solve(scene, "acceleration", at=at)
     gravity = np.array(next((effect.vector for effect in scene.effects if isinstance(effect, Gravity)), (0.0, 0.0)))
-    first = {2: np.zeros_like(s.A), 3: s.A, 4: s.B - s.B + [LINKAGE.ground, 0.0]}
+    first = {2: np.zeros_like(s.A), 3: s.A, 4: np.full_like(s.A, (LINKAGE.ground, 0.0))}
     second = {2: s.A, 3: s.B, 4: s.B}
     bars = {k: scene.linkage.bar(k) for k in MOVING_BARS}
     centre = {k: getattr(s, f"G{k}") for k in MOVING_BARS}

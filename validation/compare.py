@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.scene import Scene
-from fourbar.solution import NOT_ASSEMBLED, OK, SINGULAR, Solution
+from fourbar.solution import OK, OVERFLOW, SINGULAR, STATUS_NAMES, Solution
 from validation.answer import Answer
 from validation.results import AGREES, DEGRADED, FAILS, REFUSES, Row
 from validation.reversals import reversing
@@ -79,7 +79,7 @@ def compare(
             condition=1.0,
         )
     )
-    moving = ~np.isin(formulas.status_code, (NOT_ASSEMBLED, SINGULAR)) & answer.assembled
+    both = formulas.assembled & answer.assembled
     for quantity in (q for q in COMPARED if q in expected):
         ours, theirs = getattr(formulas, quantity, None), answer.quantities.get(quantity)
         if ours is None:
@@ -87,14 +87,13 @@ def compare(
         if theirs is None:
             rows.append(row(quantity, FAILS, "no answer"))
             continue
-        judged = moving
-        if quantity in FORCES:
-            judged = moving & (formulas.status_code == OK) & ~_without_forces(formulas)
+        judged = both & _stated(quantity, formulas, ours)
+        withheld = _counted(formulas.status_code[both & ~judged])
+        if withheld and not judged.any():
+            rows.append(row(quantity, REFUSES, f"the formulas state no value: {withheld}"))
+            continue
         where = judged & _answerable(quantity, scene, formulas, tolerance)
-        jumping = ~judged & judged
-        if quantity in FORCES:
-            in_time = tolerance.name == SIMULATED.name
-            jumping = reversing(scene, formulas, tolerance.factor, in_time=in_time) & where
+        jumping = where & _jumping(quantity, scene, formulas, tolerance)
         where &= ~jumping
         if not where.any():
             rows.append(row(quantity, DEGRADED, "nothing can be told: no position at which both may be held to it"))
@@ -117,9 +116,10 @@ def compare(
             at = {"theta_2": formulas.theta_2[found.worst], "condition": condition[found.worst]}
             numbers = {"error": error[found.worst], "allowed": found.allowed, **at}
             rows.append(row(quantity, found.verdict, found.reason, **numbers))
+        note = f"; not judged: {withheld}" if withheld else ""
         if jumping.any():
-            note = f"; {np.count_nonzero(jumping)} positions at which dry friction reverses not judged"
-            rows[-1] = replace(rows[-1], reason=rows[-1].reason + note)
+            note += f"; {np.count_nonzero(jumping)} positions at which dry friction reverses not judged"
+        rows[-1] = replace(rows[-1], reason=rows[-1].reason + note)
     rows += [row("watch", FAILS, alarm) for alarm in answer.alarms]
     return rows
 
@@ -222,9 +222,17 @@ def turned(theta_2: Array) -> float:
     return max(1.0, float(np.abs(theta_2).max(initial=0.0)) / np.pi)
 
 
-def _without_forces(formulas: Solution) -> Mask:
-    """Positions at which the driven bar cannot be held in balance by any torque: its drive condition is 0."""
-    return np.asarray(formulas.drive_condition == 0.0)
+def _stated(quantity: str, formulas: Solution, ours: Array) -> Mask:
+    """Where the formulas state one value: beyond the range of doubles the motion is, up to the stage that met it."""
+    if quantity in FORCES:
+        return np.asarray(formulas.status_code == OK)
+    return np.asarray((formulas.status_code != SINGULAR) & ~((formulas.status_code == OVERFLOW) & np.isnan(ours)))
+
+
+def _counted(codes: NDArray[np.uint8]) -> str:
+    """How many positions have which status: "3 singular, 5 no_torque"."""
+    counts = np.bincount(codes, minlength=len(STATUS_NAMES)).tolist()
+    return ", ".join(f"{count} {name}" for name, count in zip(STATUS_NAMES, counts, strict=True) if count)
 
 
 def angle_aware_difference(quantity: str, ours: Array, theirs: Array) -> Array:
@@ -247,6 +255,13 @@ def closing_margin(scene: Scene, theta_2: Array) -> Array:
 def _undecided(scene: Scene, theta_2: Array) -> Mask:
     """Positions at which rounding decides whether the loop closes."""
     return np.asarray(np.abs(closing_margin(scene, theta_2)) < TOUCHING_MARGIN)
+
+
+def _jumping(quantity: str, scene: Scene, formulas: Solution, tolerance: Tolerance) -> Mask:
+    """Where dry friction reverses and a force may have either value; the motion is prescribed and has one."""
+    if quantity not in FORCES:
+        return np.zeros(len(formulas), dtype=bool)
+    return reversing(scene, formulas, tolerance.factor, in_time=tolerance.name == SIMULATED.name)
 
 
 def _answerable(quantity: str, scene: Scene, formulas: Solution, tolerance: Tolerance) -> Mask:

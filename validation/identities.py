@@ -12,7 +12,7 @@ from fourbar.kinematics import add_accelerations, add_velocities, close_loop
 from fourbar.linkage import MOVING_BARS
 from fourbar.more_digits import needing_more_digits, restated, rounded
 from fourbar.scene import Command, Scene
-from fourbar.solution import OK, Solution
+from fourbar.solution import OK, OVERFLOW, Solution
 from validation.answer import Answer
 from validation.compare import closure, turned
 from validation.results import AGREES, FAILS, Row
@@ -26,7 +26,8 @@ FORMULAS = "formulas"
 def identities(name: str, scene: Scene, at: Command, solution: Solution) -> list[Row]:
     """One row per identity that the stage of the solution allows."""
     angles = {"theta_3": solution.theta_3, "theta_4": solution.theta_4}
-    rows = [closure(name, scene, Answer(FORMULAS, "exact", at, solution.assembled, angles))]
+    closing = solution.assembled & (solution.status_code != OVERFLOW)
+    rows = [closure(name, scene, Answer(FORMULAS, "exact", at, closing, angles))]
     if solution.torque is not None and (solution.status_code == OK).any():
         rows += _sums(name, scene, at, solution)
     return rows
@@ -83,8 +84,7 @@ def _sums(name: str, scene: Scene, at: Command, solution: Solution) -> list[Row]
             + bar.mass * _reach(centre) * magnitude(acceleration)
             + bar.inertia * np.abs(alpha)
         )
-    # where the drive condition is 0 no torque balances the bars
-    where = (solution.status_code == OK) & (solution.drive_condition != 0.0)
+    where = solution.status_code == OK
     # which way dry friction acts at a pin at rest is decided by rounding: not the same here as in the answer
     where &= ~reversing(scene, solution, IDENTITY.factor)
     return [

@@ -118,7 +118,7 @@ class PinFriction(Effect):
         ]
         # how far from jamming: the least stretch of 1 - slope
         matrix = np.eye(len(names)) - np.stack(slope, axis=1)
-        far = np.full(len(matrix), np.nan)
+        far = np.ones(len(matrix))
         usable = np.isfinite(matrix).all(axis=(1, 2))
         far[usable] = np.minimum(np.linalg.svd(matrix[usable], compute_uv=False)[:, -1], 1.0)
         unsettled = np.where(found.number == ONE, OK, np.where(found.number == NONE, JAMMED, SEVERAL)).astype(np.uint8)

@@ -1,6 +1,14 @@
 const data = JSON.parse(document.getElementById("data").textContent);
 const byId = id => document.getElementById(id);
 const DEG = 180 / Math.PI, TURN = 2 * Math.PI, FORCES = ["F12", "F32", "F43", "F14"];
+const REASONS = {   // why a position has no forces, or more than one set of them
+  jammed: "Friction jams the linkage here: no forces, or none that begin a motion, are in balance.",
+  several: "Friction allows several sets of forces here; shown are those of the least friction.",
+  no_direction: "Both ends of a spring meet here: its pull has no direction, and forces have no value.",
+  wound: "A torsion spring is wound by more than half a turn here: forces have no value.",
+  no_torque: "The two bars that are not driven are in line here: no torque of the drive holds them in balance.",
+  overflow: "Numbers here are beyond the range of doubles: they have no value.",
+};
 const FORCE_PIN = { F12: "O2", F32: "A", F43: "B", F14: "O4" };
 const SWEEP_SECONDS = 6, ROWS = 360;   // one sweep at speed 1; positions of a sweep whose lengths were edited
 const ORDINARY = 0.95, OUTLIER = 3, ROOM = 1.6;   // a scale ends at ROOM times the 95th percentile where values diverge
@@ -68,8 +76,8 @@ function showNumbers(i) {
   }
   const assembled = at(i) !== null, singular = assembled && Math.abs(at(i).sinMu) < 8 * Number.EPSILON;
   const status = byId("status");
-  status.hidden = assembled && !singular;
-  status.textContent = !assembled ? "The linkage does not assemble at this position." : singular ? "Coupler and output are in line: velocities have no value here." : "";
+  status.textContent = !assembled ? "The linkage does not assemble at this position." : singular ? "Coupler and output are in line: velocities have no value here." : REASONS[v.status] || "";
+  status.hidden = status.textContent === "";
   byId("theta").value = i;
   const here = `${(grid[i] * DEG).toFixed(2)}\u00b0`.replace("-", "\u2212"), instant = timed() ? data.time[i].toFixed(clock) : "";
   byId("theta-text").textContent = timed() ? `${instant} s` : here;

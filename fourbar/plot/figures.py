@@ -1,5 +1,6 @@
 """The figures by name, and the way from a scene to a file."""
 
+import math
 import textwrap
 from collections.abc import Callable
 from pathlib import Path
@@ -92,6 +93,10 @@ def _hodographs(figure: "SubFigure", shown: View, labels: Labels) -> None:
 
 
 def _free_bodies(figure: "SubFigure", shown: View, labels: Labels) -> None:
+    here = shown.here
+    if not np.isfinite(here.F12).all():  # type: ignore[arg-type]
+        where = f"theta_2 = {math.degrees(here.theta_2[0]):.6g} deg"
+        raise InputError("figure", "freebody", f"needs forces, which have no value at {where}: {here.status[0]}")
     freebody.draw_free_bodies(list(figure.subplots(1, 3)), shown, labels)
 
 

@@ -163,7 +163,9 @@ def degree_ticks(axis: Any, span: float) -> None:
 
 
 def legend_above(axes: "Axes", columns: int = 4) -> None:
-    """The legend between title and panel, where it covers no curve."""
+    """The legend between title and panel, where it covers no curve; none where no curve has a value."""
+    if not axes.get_legend_handles_labels()[1]:
+        return
     legend = axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.02), ncols=columns)
     rows = math.ceil(len(legend.get_texts()) / columns)
     axes.set_title(axes.get_title(loc="left"), pad=7.0 + 11.0 * rows)

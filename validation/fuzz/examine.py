@@ -92,8 +92,7 @@ def _back(scene: Scene, at: Command, solution: Solution) -> list[str]:
         pulls = sum(np.abs(generalised_force(scene.linkage, way, rate, (term,))) for term in terms)
         sizes = pulls + np.abs(driven) + np.abs(0.5 * J_1 * at.omega_2**2) + np.abs(J * at.alpha_2)
         error = np.abs(J * (alpha - at.alpha_2))
-    balanced = solution.drive_condition != 0.0  # elsewhere there is no torque
-    where = (solution.status_code == OK) & balanced & (np.broadcast_to(J, error.shape) > 0.0)
+    where = (solution.status_code == OK) & (np.broadcast_to(J, error.shape) > 0.0)
     if not where.any() or not (error[where] > K * EPS * np.broadcast_to(sizes, error.shape)[where]).any():
         return []
     slack = _torque_slack(scene, at, way.first[scene.drive_bar])

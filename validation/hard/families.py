@@ -1,7 +1,7 @@
 """The hard cases: each family a generator with named parameters and seeds, and one line on what must happen."""
 
 import math
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -23,11 +23,6 @@ NEAR = (1e-1, 3e-2, 1e-2, 3e-3)
 """rad; as far as a simulation in time follows."""
 POLE = tuple(10.0**-k for k in range(1, 10))
 CHANGE = tuple(10.0**-k for k in range(1, 9))
-
-
-def powers(exponents: Iterable[int]) -> list[float]:
-    """Powers of ten."""
-    return [10.0**k for k in exponents]
 
 
 def toggle(*, distances: tuple[float, ...] = TOGGLE, seeds: range = range(2)) -> Scenes:
@@ -213,8 +208,6 @@ class Family:
     statement: str
     """What must happen; printed with every scene of the family."""
     scenes: Callable[[], Scenes]
-    full_accuracy: bool = False
-    """Every exact engine must agree as at condition 1: nothing may excuse a lost digit."""
 
 
 FAMILIES = (

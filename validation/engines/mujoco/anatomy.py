@@ -21,8 +21,6 @@ PLANES = {2: ("x-y", (0, 1)), 1: ("x-z", (0, 2)), 0: ("y-z", (1, 2))}
 """Axis of the hinges: the plane they move in, and the world axes that stand for x and y there."""
 STRAIGHT = 1e-9
 """A hinge tilted by more than this (sine) leaves the plane."""
-CALLED = {"input", "coupler", "output", "B3", "B4"}
-"""What may be given another name: the three bodies, and the sites that mark pin B where no connect does."""
 
 
 class Anatomy:

@@ -32,8 +32,6 @@ class Softened(ClosedLoop):
 class Driven(ClosedLoop):
     """Another drive in place of the flywheel."""
 
-    wheel_armature = 0.0
-
     def __init__(self, mjcf: str, omega: float) -> None:
         self.omega = omega
         root = ET.fromstring(mjcf)

@@ -34,8 +34,6 @@ MOST_STEPS = 400_000
 """A revolution at 628 steps per turn is a thousandth of this; more would be minutes."""
 REFINEMENTS = 3
 """Secant steps after the first: each gains the digits that the one before has."""
-MOVES = 1e-3
-"""rad; a crank that misses its angle by more was not kept at its speed."""
 SHARED = "theta_2, omega_2, alpha_2 and the branch; the rest is the file's"
 OWN = "assembly, speeds, accelerations, drive torque and pin forces, by MuJoCo from the file as compiled"
 
@@ -104,7 +102,7 @@ class Loop:
         self.armature = 0.0 if self.crank is None else float(self.model.dof_armature[self.crank])
         self._take_off_the_drive()
         self._loads = [i for i in range(self.model.nu) if self.model.actuator_trntype[i] == mujoco.mjtTrn.mjTRN_SITE]
-        self._jac, self._spin = np.zeros((3, self.model.nv)), np.zeros((3, self.model.nv))
+        self._jac = np.zeros((3, self.model.nv))
 
     def _take_off_the_drive(self) -> None:
         model, joint = self.model, self.anatomy.hinge.get("O2")
