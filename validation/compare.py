@@ -133,8 +133,8 @@ def closure(name: str, scene: Scene, answer: Answer, simulated: Tolerance = SIMU
     gap = np.abs(a * np.exp(1j * answer.at.theta_2) + b * np.exp(1j * theta_3) - ground - c * np.exp(1j * theta_4))
     error = np.where(answer.assembled, gap / of_length(scene), 0.0)
     worst = int(np.argmax(np.where(np.isnan(error), np.inf, error)))
-    allowed = IDENTITY.factor if answer.setting == "exact" else simulated.factor
-    allowed *= turned(answer.at.theta_2)
+    condition = 1.0 / turned(answer.at.theta_2)
+    allowed = (IDENTITY.factor if answer.setting == "exact" else simulated.factor) / condition
     holds = bool(error[worst] <= allowed)
     return Row(
         scene=name,
@@ -147,7 +147,7 @@ def closure(name: str, scene: Scene, answer: Answer, simulated: Tolerance = SIMU
         verdict=AGREES if holds else FAILS,
         reason="identity: a e^{i theta_2} + b e^{i theta_3} = d e^{i theta_1} + c e^{i theta_4}",
         theta_2=float(answer.at.theta_2[worst]),
-        condition=1.0,
+        condition=condition,
     )
 
 

@@ -98,7 +98,8 @@ def _row(
 ) -> Row:
     relative = np.where(where, error / np.where(terms == 0.0, np.nextafter(0.0, 1.0), terms), 0.0)
     worst = int(np.argmax(np.where(np.isnan(relative), np.inf, relative)))
-    allowed = IDENTITY.factor * turned(solution.theta_2)
+    condition = 1.0 / turned(solution.theta_2)
+    allowed = IDENTITY.factor / condition
     holds = bool(relative[worst] <= allowed)
     return Row(
         scene=name,
@@ -111,7 +112,7 @@ def _row(
         verdict=AGREES if holds else FAILS,
         reason=f"identity: {equation}",
         theta_2=float(solution.theta_2[worst]),
-        condition=1.0,
+        condition=condition,
     )
 
 

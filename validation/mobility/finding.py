@@ -41,7 +41,7 @@ def worst(name: str, answer: Answer, quantity: str, findings: Iterable[Finding])
         verdict=AGREES if holds else FAILS,
         reason=found.said,
         theta_2=float(found.theta_2),
-        condition=1.0,
+        condition=float(EQUIVALENCE.factor / max(found.allowed, EQUIVALENCE.factor)),
     )
 
 

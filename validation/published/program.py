@@ -14,6 +14,7 @@ import numpy as np
 
 import fourbar
 from fourbar.state import Array
+from validation.tolerance import EPS
 
 DATA = Path(__file__).parent / "data"
 UNKNOWNS = ("F12x", "F12y", "F32x", "F32y", "F23x", "F23y", "F43x", "F43y", "F14x", "F14y", "F34x", "F34y", "T4")
@@ -106,8 +107,8 @@ def inertia(bar: int, about_long_axis: bool = False) -> float:
     return MASSES[bar] * (across + WIDTH**2) / 12.0
 
 
-def thesis_program(errors: Errors, inertias: tuple[float, float] | None = None) -> dict[str, float]:
-    """The 13 unknowns of section 5.7 at theta_2 = 135 deg, N and N cm.
+def equations(errors: Errors, inertias: tuple[float, float] | None = None) -> tuple[Array, Array]:
+    """Matrix and right side of section 5.7 at theta_2 = 135 deg, N and N cm.
 
     sum F = m A and sum M_G = I alpha of bars 2, 3, 4; F32 = -F23 and F34 = -F43.
 
@@ -152,7 +153,25 @@ def thesis_program(errors: Errors, inertias: tuple[float, float] | None = None) 
     matrix[8, column["T4"]] = 1.0
     for row, one, other in ((9, "F32x", "F23x"), (10, "F32y", "F23y"), (11, "F43x", "F34x"), (12, "F43y", "F34y")):
         matrix[row, column[one]] = matrix[row, column[other]] = 1.0
-    return dict(zip(UNKNOWNS, map(float, np.linalg.solve(matrix, right)), strict=True))
+    return matrix, right
+
+
+def thesis_program(errors: Errors, inertias: tuple[float, float] | None = None) -> dict[str, float]:
+    """The 13 unknowns of section 5.7 at theta_2 = 135 deg, N and N cm."""
+    unknowns = np.linalg.solve(*equations(errors, inertias))
+    return dict(zip(UNKNOWNS, map(float, unknowns), strict=True))
+
+
+def round_off(errors: Errors, inertias: tuple[float, float] | None = None) -> dict[str, float]:
+    """How far an elimination of these equations may be off in each unknown, whoever makes it: N and N cm.
+
+    13 eps |A^-1| (|A| |x| + |b|): each number of the system carries up to as many roundings as there are
+    unknowns, from its own making and from the elimination (Higham, Accuracy and Stability, 7.2 and 9.3).
+    """
+    matrix, right = equations(errors, inertias)
+    unknowns = np.linalg.solve(matrix, right)
+    moved = np.abs(np.linalg.inv(matrix)) @ (np.abs(matrix) @ np.abs(unknowns) + np.abs(right))
+    return dict(zip(UNKNOWNS, map(float, len(UNKNOWNS) * EPS * moved), strict=True))
 
 
 PRINTED_INERTIAS = (0.2924725333, 0.1075266667)

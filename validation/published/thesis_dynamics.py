@@ -30,11 +30,10 @@ from validation.published.program import (
     polar,
     printed,
     right_unknowns,
+    round_off,
     to_ours,
 )
 
-SOLVER_NOISE = 1e-12
-"""The 13 unknowns are printed with up to 17 digits; elimination of a 13x13 system leaves 2-3e-13 in each."""
 ANGLE_NOISE = 4e-15
 """The program carries angles near 360 deg, where a double steps by 5.7e-14 deg = 1e-15 rad: four such steps, rad."""
 _, a, b, c = LENGTHS
@@ -193,8 +192,9 @@ def unknowns() -> Iterator[Figure]:
         ("manual_program_dynamic", "manual, unknowns", -2, ()),
         ("section_5_7_hand_solution", "5.7 unknowns", -1, ("5b",)),
     ):
+        noise = round_off(*STEPS[step][1:])  # printed with up to 17 digits
         for name, text in printed()["published"][key].items():
-            yield Figure(label, name, text, right[name], (*names, *last), steps[step][1][name], SOLVER_NOISE)
+            yield Figure(label, name, text, right[name], (*names, *last), steps[step][1][name], noise[name])
 
 
 def dynamics_figures() -> Iterator[Figure]:
