@@ -258,3 +258,10 @@ def test_faults_in_the_free_bodies_show(monkeypatch: pytest.MonkeyPatch) -> None
         with monkeypatch.context() as patch:
             patch.setattr(free_body, name, fault)
             assert failing() >= expected, name
+
+
+def test_blocks_of_positions_make_no_difference(monkeypatch: pytest.MonkeyPatch) -> None:
+    whole = asked(crank_rocker())
+    monkeypatch.setattr(free_body, "BLOCK", 7)
+    for name, values in asked(crank_rocker()).items():
+        assert np.array_equal(values, whole[name]), name

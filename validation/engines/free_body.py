@@ -22,6 +22,8 @@ TORQUE = 12
 ROWS = {2: (0, "F12", "F32"), 3: (3, "F23", "F43"), 4: (6, "F14", "F34")}
 """First row of a bar, the force at its first pin and that at its second."""
 LOAD_OF = {"O2": "F12", "A": "F32", "B": "F43", "O4": "F14"}
+BLOCK = 4096
+"""Positions solved at once: 1.4 kB a matrix, and some four of them at a time, are 22 MB."""
 FRICTION_STAGES = 16
 """Friction grows from none to its full coefficient in so many stages, each the start of the next."""
 FRICTION_STEPS = 60
@@ -52,23 +54,35 @@ class FreeBody:
             "effect from its definition, the thirteen equations of the free bodies as one system",
         )
         if command.omega_2 is not None:
-            motion = move(scene.linkage, command, closed.theta)
-            for bar in (3, 4):
-                answer.quantities |= {f"omega_{bar}": motion.omega[bar], f"alpha_{bar}": motion.alpha[bar]}
-            unknowns, residual = balance(scene, motion)
-            for name in LOAD_OF.values():
-                answer.quantities[name] = unknowns[:, COLUMN[name] : COLUMN[name] + 2]
-            answer.quantities["torque"] = unknowns[:, TORQUE]
-            answer.evidence["residual"] = residual
+            n = len(command.theta_2)
+            omega_2, alpha_2 = (np.broadcast_to(np.asarray(x, float), (n,)) for x in (command.omega_2, command.alpha_2))
+            asked = (command.theta_2, omega_2, alpha_2, *closed.theta)
+            blocks = [slice(start, start + BLOCK) for start in range(0, n, BLOCK)]
+            parts = [_answered(scene, *(array[block] for array in asked)) for block in blocks]
+            answer.evidence["residual"] = max((residual for _, residual in parts), default=0.0)
+            for name in parts[0][0] if parts else ():
+                answer.quantities[name] = np.concatenate([part[name] for part, _ in parts])
         return answer
 
 
-def move(linkage: FourBar, command: Command, theta: Array) -> Motion:
+def _answered(
+    scene: Scene, theta_2: Array, omega_2: Array, alpha_2: Array, theta_3: Array, theta_4: Array
+) -> tuple[dict[str, Array], float]:
+    """Motion, pin forces and torque at some positions, and the residual of their thirteen equations."""
+    motion = move(scene.linkage, theta_2, omega_2, alpha_2, theta_3, theta_4)
+    unknowns, residual = balance(scene, motion)
+    found = {name: unknowns[:, COLUMN[name] : COLUMN[name] + 2] for name in LOAD_OF.values()}
+    for bar in (3, 4):
+        found |= {f"omega_{bar}": motion.omega[bar], f"alpha_{bar}": motion.alpha[bar]}
+    return found | {"torque": unknowns[:, TORQUE]}, residual
+
+
+def move(linkage: FourBar, theta_2: Array, omega_2: Array, alpha_2: Array, theta_3: Array, theta_4: Array) -> Motion:
     """Speeds and accelerations; NaN where the Jacobian is singular."""
     d, a, b, c = linkage.lengths
-    n = len(command.theta_2)
-    omega_2, alpha_2 = (np.broadcast_to(np.asarray(x, float), (n,)) for x in (command.omega_2, command.alpha_2))
-    u_1, u_2, (u_3, u_4) = np.exp(1j * linkage.ground_angle), np.exp(1j * command.theta_2), np.exp(1j * theta)
+    n = len(theta_2)
+    u_1, u_2 = np.exp(1j * linkage.ground_angle), np.exp(1j * theta_2)
+    u_3, u_4 = np.exp(1j * theta_3), np.exp(1j * theta_4)
     jacobian = np.stack((_plane(u_3), -_plane(u_4)), axis=-1)
     v_3, v_4 = solved(jacobian, _plane(-a * omega_2 * u_2)[..., None])[0][..., 0].T
     omega = {1: np.zeros(n), 2: omega_2, 3: v_3 / b, 4: v_4 / c}
@@ -77,7 +91,7 @@ def move(linkage: FourBar, command: Command, theta: Array) -> Motion:
     alpha = {1: np.zeros(n), 2: alpha_2, 3: w_3 / b, 4: w_4 / c}
     zero = np.zeros(n, dtype=complex)
     foot = {1: zero, 2: zero, 3: a * u_2, 4: zero + d * u_1}
-    return Motion(linkage, command.theta_2, {1: zero + u_1, 2: u_2, 3: u_3, 4: u_4}, foot, omega, alpha)
+    return Motion(linkage, theta_2, {1: zero + u_1, 2: u_2, 3: u_3, 4: u_4}, foot, omega, alpha)
 
 
 def balance(scene: Scene, motion: Motion) -> tuple[Array, float]:
