@@ -145,7 +145,7 @@ def asked(motion: str) -> list[str]:
 
 def test_positions_alone_start_no_force_engine() -> None:
     engines, *left_out, answered = asked("fourbar.Motion(fourbar.Sweep(0.0, 6.0, 20))")
-    assert engines == "[]" and answered == "energy-method formulas"
+    assert engines == "[]" and answered == "formulas free-body"
     assert {line.split(":")[0] for line in left_out} == {"pinocchio-inverse", "mujoco-inverse", "mujoco-simulated"}
     assert all("only positions are asked for" in line for line in left_out)
 
@@ -160,7 +160,7 @@ def test_positions_alone_start_no_force_engine() -> None:
 def test_what_does_not_move_through_time_is_not_simulated(motion: str, reason: str) -> None:
     _, *left_out, answered = asked(motion)
     assert left_out == [f"mujoco-simulated: {reason}"]
-    assert answered == "energy-method formulas mujoco-inverse pinocchio-inverse"
+    assert answered == "formulas free-body mujoco-inverse pinocchio-inverse"
 
 
 def test_equal_positions_are_evaluated_once() -> None:

@@ -7,12 +7,15 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+import numpy as np
 import pytest
 
 from fourbar.effects import REGISTRY
 from fourbar.files import dump, loads
-from fourbar.scene import Scene
+from fourbar.scene import Scene, command, solve
 from tests.test_effects import EXACT, SIMULATED, failing, refusing
+from validation.engines import free_body_effects
+from validation.stability.energy import by_energy
 
 PAGE = (Path(__file__).parent.parent / "docs" / "adding-an-effect.md").read_text(encoding="utf-8")
 REFERENCE = (Path(__file__).parent.parent / "docs" / "effects.md").read_text(encoding="utf-8")
@@ -32,10 +35,8 @@ omega_2 = "10 rad/s"
 """
 
 
-def block(language: str, page: str = PAGE) -> str:
-    found = re.search(rf"```{language}\n(.*?)```", page, re.S)
-    assert found is not None
-    return found[1]
+def block(language: str, page: str = PAGE, number: int = 0) -> str:
+    return re.findall(rf"```{language}\n(.*?)```", page, re.S)[number]
 
 
 @pytest.fixture
@@ -44,6 +45,9 @@ def windage(monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
     monkeypatch.setitem(sys.modules, module.__name__, module)
     exec(block("python"), module.__dict__)
     monkeypatch.setitem(REGISTRY, "windage", module.Windage)
+    row = dict(vars(free_body_effects))
+    exec(block("python", number=1), row)
+    monkeypatch.setitem(free_body_effects.WRENCH_OF, "windage", row["_windage"])
     yield module.Windage
 
 
@@ -64,13 +68,23 @@ def test_the_example_is_read_written_and_agreed_on(windage: Any) -> None:
     assert refusing(scene, SIMULATED) == {"mujoco-simulated"}
 
 
-@pytest.mark.parametrize("method", ["add_wrenches", "power", "engine_term"])
+def test_without_its_row_the_free_bodies_refuse_the_example(windage: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delitem(free_body_effects.WRENCH_OF, "windage")
+    assert failing(asked(), EXACT) == []
+    assert refusing(asked(), EXACT) == {"free-body"}
+
+
+def test_the_power_of_the_example_is_that_of_its_couple(windage: Any) -> None:
+    scene = asked()
+    s, (_, energy) = solve(scene), by_energy(scene, command(scene))
+    assert s.torque == pytest.approx(energy["torque"], abs=1e-13 * np.abs(energy["torque"]).max(), rel=0)
+
+
+@pytest.mark.parametrize("method", ["add_wrenches", "engine_term"])
 def test_a_fault_in_the_example_is_caught(windage: Any, method: str, monkeypatch: pytest.MonkeyPatch) -> None:
     right = getattr(windage, method)
 
     def three_times(self: Any, *arguments: Any) -> Any:
-        if method == "power":
-            return 3.0 * right(self, *arguments)
         acts = [right(self, *arguments) for _ in range(3)]
         return (lambda: [act() for act in acts]) if method == "engine_term" else None
 

@@ -14,6 +14,7 @@ from fourbar.motion import Motion
 from fourbar.scene import Command, Scene, command, solve
 from validation.compare import COMPARED, closure, compare
 from validation.engines import loop
+from validation.engines.free_body import FreeBody
 from validation.engines.mujoco.inverse import LEAST, MujocoInverse, MujocoTree
 from validation.engines.pinocchio import PinocchioInverse, PinocchioTree
 from validation.tolerance import EPS, EQUIVALENCE, K
@@ -22,6 +23,7 @@ ENGINES = [PinocchioInverse(), MujocoInverse()]
 TREES = [PinocchioTree, MujocoTree]
 IDS = ["pinocchio", "mujoco"]
 each_engine = pytest.mark.parametrize("engine", ENGINES, ids=IDS)
+each_witness = pytest.mark.parametrize("engine", [*ENGINES, FreeBody()], ids=[*IDS, "free-body"])
 PRINTED = 5e-10
 """The last digit of the figures, which were computed with ten."""
 
@@ -81,7 +83,7 @@ def failures(engine: Any, scene: Scene, at: Command) -> list[str]:
     return [row.quantity for row in rows if not row.passed]
 
 
-@each_engine
+@each_witness
 def test_thesis_figures(engine: Any) -> None:
     scene = thesis()
     got = engine.answer(scene, command(scene)).quantities
@@ -96,7 +98,7 @@ def test_thesis_figures(engine: Any) -> None:
         assert got[name][0] == pytest.approx(figure, abs=PRINTED, rel=0.0), name
 
 
-@each_engine
+@each_witness
 @pytest.mark.parametrize("lengths", MECHANISMS.values(), ids=MECHANISMS.keys())
 def test_agrees_to_round_off(engine: Any, lengths: tuple[float, ...]) -> None:
     for drive in (2, 3, 4):
@@ -143,7 +145,7 @@ def test_the_branch_is_the_commanded_one(engine: Any) -> None:
     assert missing > 100, "the sample must hold positions that do not assemble"
 
 
-@each_engine
+@each_witness
 @pytest.mark.parametrize("offset", [1e-3, 1e-6, 1e-9, 1e-12])
 def test_assembles_up_to_a_limit_and_not_beyond(engine: Any, offset: float) -> None:
     linkage = bars(MECHANISMS["triple rocker"], 0.0)
@@ -158,7 +160,7 @@ def test_assembles_up_to_a_limit_and_not_beyond(engine: Any, offset: float) -> N
             assert np.isnan(answer.quantities["torque"][0]) == (not answer.assembled[0])
 
 
-@each_engine
+@each_witness
 def test_positions_only(engine: Any) -> None:
     scene = Scene(bars(MECHANISMS["crank-rocker"]), Motion(np.array([0.5, 1.0])))
     quantities = engine.answer(scene, command(scene)).quantities
@@ -201,7 +203,7 @@ class Wind:
     key: ClassVar[str] = "wind"
 
 
-@each_engine
+@each_witness
 def test_an_unknown_effect_is_refused_by_name(engine: Any) -> None:
     scene = Scene(bars(MECHANISMS["crank-rocker"]), Motion(1.0, 1.0), 2, (), (Wind(),))  # type: ignore[arg-type]
     assert "'wind'" in (engine.answer(scene, command(scene)).refusal or "")

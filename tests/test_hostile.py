@@ -43,7 +43,7 @@ HOSTILE = {
 }
 STEERING = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f]")
 """Control characters, but for the ends of lines."""
-EXACT = chosen("energy-method")
+EXACT = chosen("free-body")
 
 
 def scene_text(title: str) -> str:
@@ -164,7 +164,7 @@ def test_hostile_names_of_good_files_are_shown_and_not_sent(tmp_path: Path, caps
     for name in FILE_NAMES:
         (tmp_path / name).write_text(scene_text("fine"))
     files = [str(tmp_path / name) for name in FILE_NAMES]
-    assert status(["run", *files, "--engines", "energy-method", "--out", str(tmp_path / "out")]) == HOLDS
+    assert status(["run", *files, "--engines", "free-body", "--out", str(tmp_path / "out")]) == HOLDS
     # the progress bar steers the terminal itself; what is printed at the end does not
     assert not STEERING.search(capsys.readouterr().out)
 
@@ -225,7 +225,7 @@ def test_the_pattern_of_a_suite_does_not_take_the_suite_itself(tmp_path: Path) -
 def test_a_suite_file_runs_from_the_command_line(tmp_path: Path) -> None:
     path = listed(tmp_path, "a.toml\nb.toml\n")
     out = tmp_path / "out"
-    assert status(["run", "--suite", str(path), "--engines", "energy-method", "--out", str(out)]) == HOLDS
+    assert status(["run", "--suite", str(path), "--engines", "free-body", "--out", str(out)]) == HOLDS
     assert {row.scene for row in from_csv(out / "results.csv")} == {"a", "b"}
 
 

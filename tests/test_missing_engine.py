@@ -27,7 +27,7 @@ WITNESSES = {
     "mujoco": {"mujoco-inverse", "mujoco-simulated"},
     "pinocchio": {"pinocchio-inverse"},
 }
-ALL = {"energy-method", *WITNESSES["mujoco"], *WITNESSES["pinocchio"]}
+ALL = {"free-body", *WITNESSES["mujoco"], *WITNESSES["pinocchio"]}
 SCENE = """
 [lengths]
 ground = "4 m"
@@ -75,7 +75,7 @@ def test_the_others_are_asked_and_the_missing_named_with_the_reason(library: str
 
 
 def test_asked_for_by_name_nothing_is_run(tmp_path: Path) -> None:
-    done = without("mujoco", tmp_path, "--engines", "energy-method,mujoco-inverse")
+    done = without("mujoco", tmp_path, "--engines", "free-body,mujoco-inverse")
     assert done.stderr.strip() == 'error: mujoco-inverse: mujoco is not installed: pip install "fourbar[mujoco]"'
     assert done.returncode == 3
     assert not (tmp_path / "out").exists()

@@ -30,7 +30,7 @@ HOSTILE = "</script><img src=x onerror=alert(1)>\"'&|`*"
 
 @cache
 def page() -> Page:
-    """A small scene as two exact engines and the energy method judge it."""
+    """A small scene as two exact engines and the free bodies judge it."""
     scene = crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.0, 6.0, 36), 5.0))
     return judged_page("demo", scene, tuple(w for w in WITNESSES if w.name != "mujoco-simulated"))
 
@@ -144,7 +144,7 @@ def test_costs_are_those_of_the_run() -> None:
     errors = {row.engine: row.error for row in page().rows if row.quantity == "torque"}
     assert formulas == [1e6 * timings["formulas"].seconds / 37]
     assert points == {name: [(1e6 * timings[name].seconds / 37, error)] for name, error in errors.items()}
-    assert set(points) == {"pinocchio-inverse", "mujoco-inverse", "energy-method"}
+    assert set(points) == {"pinocchio-inverse", "mujoco-inverse", "free-body"}
 
 
 @pytest.mark.parametrize(
@@ -158,7 +158,7 @@ def test_costs_are_those_of_the_run() -> None:
     ids=["positions", "one position", "released", "sweep"],
 )
 def test_every_kind_of_scene_is_drawn(motion: fourbar.Motion, pictures: int) -> None:
-    witnesses = tuple(w for w in WITNESSES if w.name == "energy-method")
+    witnesses = tuple(w for w in WITNESSES if w.name == "free-body")
     made = judged_page("kind", crank_rocker(motion=motion), witnesses)
     assert made.figure is not None and made.figure.count("<svg") == pictures
     _, text = report([made])

@@ -66,14 +66,14 @@ def test_the_picture_of_costs_says_what_each_did_for_a_position() -> None:
     summary, text = report([page()])
     drawn = cost_figure([page()])
     assert drawn is not None
-    for engine in ("formulas", "pinocchio-inverse", "mujoco-inverse", "energy-method"):
+    for engine in ("formulas", "pinocchio-inverse", "mujoco-inverse", "free-body"):
         assert f"{engine}: {WORK[engine].short}" in drawn
         assert WORK[engine].said in unescape(text)
     assert {each.engine for each in summary.costs} == {
         "formulas",
         "pinocchio-inverse",
         "mujoco-inverse",
-        "energy-method",
+        "free-body",
     }
 
 

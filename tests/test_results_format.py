@@ -27,7 +27,7 @@ def block(language: str) -> str:
 @pytest.fixture(scope="module")
 def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("run")
-    list(run(Random(SCENES_SHOWN + 5, 1, tuple(LinkageType)), folder / "results", chosen("energy-method"), workers=1))
+    list(run(Random(SCENES_SHOWN + 5, 1, tuple(LinkageType)), folder / "results", chosen("free-body"), workers=1))
     return folder
 
 
@@ -57,11 +57,11 @@ def test_the_pandas_snippet_runs(
     monkeypatch.chdir(results)
     exec(block("python"), {})
     told = capsys.readouterr().out
-    assert "energy-method" in told
+    assert "free-body" in told
     assert "0 of " in told
 
 
 def test_the_sql_runs(results: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     duckdb = pytest.importorskip("duckdb", reason="DuckDB is optional")
     monkeypatch.chdir(results)
-    assert ("energy-method", "torque") in {row[:2] for row in duckdb.sql(block("sql")).fetchall()}
+    assert ("free-body", "torque") in {row[:2] for row in duckdb.sql(block("sql")).fetchall()}

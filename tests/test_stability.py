@@ -94,7 +94,7 @@ def test_a_torque_off_in_its_twelfth_digit_is_noticed(monkeypatch: pytest.Monkey
 
 def test_an_energy_method_off_in_its_twelfth_digit_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     true = fourbar.dynamics.driving_torque
-    monkeypatch.setattr("validation.engines.energy.driving_torque", lambda *args: true(*args) * (1.0 + 1e-12))
+    monkeypatch.setattr("validation.stability.energy.driving_torque", lambda *args: true(*args) * (1.0 + 1e-12))
     tally = run("random", range(20))
     assert tally.worst["torque"][0] <= 1.0 < tally.worst["torque, by energy"][0]
     assert not tally.held()

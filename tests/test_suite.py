@@ -34,7 +34,7 @@ COUNT = SCENES_SHOWN + 20
 KILLS = int(os.environ.get("KILLS", "3"))
 """Kills in each of the tests that kill; `make long-test` asks for 50."""
 TYPES = tuple(LinkageType)
-EXACT = chosen("energy-method")
+EXACT = chosen("free-body")
 
 
 @dataclass(frozen=True)
@@ -101,7 +101,7 @@ def test_an_engine_that_crashes_or_hangs_costs_its_own_rows(tmp_path: Path, monk
     assert "crashed" in failing["b", "moody"]
     assert "hung" in failing["c", "moody"]
     for scene in "abcd":
-        assert any(row.scene == scene and row.engine == "energy-method" for row in rows)
+        assert any(row.scene == scene and row.engine == "free-body" for row in rows)
 
 
 @pytest.mark.parametrize("how", ["killed", "locked out"])
@@ -185,7 +185,7 @@ LIMITED = (
 def start(out: Path, count: int, *program: str, stderr: int = subprocess.DEVNULL) -> subprocess.Popen[bytes]:
     command = [sys.executable, *(program or ("-m", "validation")), "run", "--random", str(count)]
     return subprocess.Popen(
-        [*command, "--engines", "energy-method", "--out", str(out)],
+        [*command, "--engines", "free-body", "--out", str(out)],
         cwd=Path(__file__).parent.parent,
         stdout=subprocess.DEVNULL,
         stderr=stderr,

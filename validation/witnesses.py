@@ -83,8 +83,10 @@ WORK = {
         "one motion: every position assembled, the model compiled, Runge-Kutta steps from position to position (the "
         "fewer positions, the dearer each), then pin forces and torque read",
     ),
-    "energy-method": Work(
-        "torque alone, all positions at once", "all positions in one call on arrays: the torque alone, no pin forces"
+    "free-body": Work(
+        "thirteen equations, all positions at once",
+        "all positions in one call on arrays: Newton on the closure, speeds and accelerations, thirteen equations each "
+        "for pin forces and torque",
     ),
     "ball-arithmetic": Work(
         "forces and torque in many digits, one by one",
@@ -104,13 +106,7 @@ WITNESSES = (
         predictor="own",
         library="mujoco",
     ),
-    Witness(
-        "energy-method",
-        "validation.engines.energy:EnergyMethod",
-        EQUIVALENCE,
-        ("torque",),
-        positions=("theta_3", "theta_4"),
-    ),
+    Witness("free-body", "validation.engines.free_body:FreeBody", EQUIVALENCE, positions=("theta_3", "theta_4")),
 )
 
 

@@ -17,7 +17,7 @@ from validation.results import FAILS
 from validation.tolerance import DEGRADED, EPS, K
 from validation.witnesses import WITNESSES, Witness, predicting_from
 
-EXACT = tuple(predicting(w) for w in WITNESSES if w.name in ("pinocchio-inverse", "mujoco-inverse", "energy-method"))
+EXACT = tuple(predicting(w) for w in WITNESSES if w.name in ("pinocchio-inverse", "mujoco-inverse", "free-body"))
 """The exact engines, held to full accuracy or to what was predicted for the position."""
 
 

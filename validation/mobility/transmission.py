@@ -20,10 +20,11 @@ RADII = (0.2, 0.3)
 
 
 def transmitted(scene: Scene, engine: Engine, answer: Answer) -> Iterator[Finding]:
-    """Over the scene's own motion, at the stated extremes, and between the stated limits of bar 4."""
+    """Over the scene's own motion, if it is one, at the stated extremes, and between the stated limits of bar 4."""
     linkage = scene.linkage
     extremes = transmission.transmission_extremes(linkage)
-    yield from _over(scene, answer, extremes)
+    if answer.at is not None and answer.at.omega_2 is not None:
+        yield from _over(scene, answer, extremes)
     yield from _extremes(linkage, engine, extremes)
     yield from _strokes(linkage, engine)
 

@@ -21,7 +21,7 @@ STYLES = {
     "pinocchio-inverse": Style("#0072b2", "o", "○"),
     "mujoco-inverse": Style("#00845f", "s", "□"),
     "mujoco-simulated": Style("#c74f00", "^", "△", simulated=True),
-    "energy-method": Style("#a6478a", "D", "◇"),
+    "free-body": Style("#a6478a", "D", "◇"),
     "ball-arithmetic": Style("#5f5b9e", "v", "▽"),
 }
 OTHER = Style("#7a6a00", "P", "✚")

@@ -13,8 +13,8 @@ import numpy as np
 
 from fourbar.scene import Command, Scene, solve
 from fourbar.solution import OK, UNITS, VECTORS
-from validation.engines.energy import EnergyMethod
 from validation.reference import reference
+from validation.stability.energy import by_energy
 
 EPS = 2.0**-52
 FACTOR = 8.0
@@ -84,19 +84,18 @@ def judge(scene: Scene, tally: Tally, sample: str) -> None:
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         solution = solve(scene, at=at)
-        witness = EnergyMethod().answer(scene, at)
+        _, energy = by_energy(scene, at)
     tally.warned += [f"{sample}: {warning.message}" for warning in caught]
-    assert witness.assembled is not None
     exact = reference(scene, scene.motion.branch, theta_2)
     if exact is None:
         tally.not_assembled += 1
         if solution.status_code[0] == OK:
             tally.worst["assembled"] = (math.inf, sample)
-        if np.isfinite(witness.quantities["torque"]).any():
+        if np.isfinite(energy["torque"]).any():
             tally.worst[BY_ENERGY.format("assembled")] = (math.inf, sample)
         return
     values, sensitivity = exact
-    for name, array in witness.quantities.items():
+    for name, array in energy.items():
         if name in values:
             ratio, _ = _ratio(name, float(array[0]), values[name], sensitivity[name])
             tally.note(BY_ENERGY.format(name), ratio, sample)

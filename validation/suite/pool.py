@@ -79,7 +79,7 @@ def ready() -> None:
     """Bound the memory, and import what every scene needs."""
     bound_memory()
     import_module("validation.judge")
-    import_module("validation.engines.energy")
+    import_module("validation.engines.free_body")
 
 
 def over_processes(

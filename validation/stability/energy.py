@@ -1,13 +1,13 @@
-"""The energy method as a witness of the driving torque: power balance and virtual work instead of Newton-Euler."""
+"""The energy method with all the digits that a position beside a limit needs: its forward error is held too."""
 
 from decimal import Decimal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fourbar.dynamics import TOUCHING, Half, Triangle, driving_torque, half_angle, path, triangle
-from fourbar.errors import LimitError
 from fourbar.scene import Command, Scene
-from validation.answer import Answer
+from fourbar.state import Array
 
 UNSURE = 2.0**-20
 """Where a factor of Heron's formula is this small beside its terms, balls take the place of doubles."""
@@ -17,36 +17,19 @@ LIMIT_DIGITS = 1e-55
 """... and what those digits leave of it."""
 
 
-class EnergyMethod:
-    """The driving torque from T_k theta_k' = J alpha_2 + J'/2 omega_2^2 - Q."""
-
-    name = "energy-method"
-
-    def answer(self, scene: Scene, command: Command) -> Answer:
-        """Its torque; where the scene states no velocity, its angles alone."""
-        at = surely(scene, command)
-        way = path(scene.linkage, command.theta_2, np.asarray(command.branch, dtype=float), at)
-        answer = Answer(
-            self.name,
-            "exact",
-            assembled=(at.outer >= 0.0) & (at.inner >= 0.0),
-            shared="the powers of loads and effects, with State.velocity and State.omega from which they are computed; "
-            "the idea, not the code, of the triangle A, B, O4",
-            own="positions and limits (python-flint decides near them), kinematic coefficients, equivalent inertia, "
-            "virtual work",
-        )
-        answer.quantities["theta_3"] = np.angle(way.unit[3])
-        answer.quantities["theta_4"] = np.angle(way.unit[4])
-        if command.omega_2 is not None:
-            terms = (*scene.loads, *scene.effects)
-            try:
-                torque = driving_torque(scene.linkage, way, command.omega_2, command.alpha_2, terms, scene.drive_bar)
-            except LimitError as error:
-                return Answer(self.name, "exact", refusal=str(error))
-            # one number for all positions where nothing that moves has mass and nothing acts
-            torque = np.where(np.isfinite(torque), torque, np.nan)
-            answer.quantities["torque"] = np.broadcast_to(torque, command.theta_2.shape)
-        return answer
+def by_energy(scene: Scene, command: Command) -> tuple[NDArray[np.bool_], dict[str, Array]]:
+    """Where the loop closes, (n,), and theta_3, theta_4, and with velocities the torque, from
+    T_k theta_k' = J alpha_2 + J'/2 omega_2^2 - Q.
+    """
+    at = surely(scene, command)
+    way = path(scene.linkage, command.theta_2, np.asarray(command.branch, dtype=float), at)
+    found = {"theta_3": np.angle(way.unit[3]), "theta_4": np.angle(way.unit[4])}
+    if command.omega_2 is not None:
+        terms = (*scene.loads, *scene.effects)
+        torque = driving_torque(scene.linkage, way, command.omega_2, command.alpha_2, terms, scene.drive_bar)
+        # one number for all positions where nothing that moves has mass and nothing acts
+        found["torque"] = np.broadcast_to(np.where(np.isfinite(torque), torque, np.nan), command.theta_2.shape)
+    return (at.outer >= 0.0) & (at.inner >= 0.0), found
 
 
 def surely(scene: Scene, command: Command) -> Half:
