@@ -127,11 +127,11 @@ def _rows(
 ) -> list[Row]:
     if fine.refusal is not None:
         nan = math.nan
-        return [Row(record.name, fine.engine, fine.setting, "all", nan, nan, True, REFUSES, fine.refusal, nan, nan)]
+        return [Row(record.name, fine.engine, fine.setting, "all", nan, nan, REFUSES, fine.refusal, nan, nan)]
     n = min(len(fine.theta_2), len(truth[0]))
     if n < len(truth[0]):
         nan = math.nan
-        return [Row(record.name, fine.engine, fine.setting, "all", nan, nan, False, FAILS, "it stopped", nan, nan)]
+        return [Row(record.name, fine.engine, fine.setting, "all", nan, nan, FAILS, "it stopped", nan, nan)]
     speed = float(np.abs(truth[1]).max())
     sizes = {"theta_2": 1.0, "omega_2": speed, "energy": float(np.abs(fine.energy).max()) or 1.0}
 
@@ -175,7 +175,6 @@ def _rows(
                 name,
                 float(relative[worst]),
                 allowed,
-                verdict != FAILS,
                 verdict,
                 reason,
                 float(fine.theta_2[worst]),
