@@ -2,14 +2,16 @@
 
 import io
 import os
+import select
 import sys
+from typing import TextIO
 
 import click
 
 from fourbar.errors import DependencyError, FourBarError
 
 HOLDS, FAILED, BAD_INPUT, BROKEN, INTERRUPTED = 0, 1, 2, 3, 130
-"""All holds; a comparison fails; the input is bad; the environment or the program failed; interrupted."""
+"""All holds; a comparison fails or none was made; bad input; the environment or the program failed; interrupted."""
 
 
 def run(group: click.Group, program: str, arguments: list[str] | None = None) -> int:
@@ -17,11 +19,14 @@ def run(group: click.Group, program: str, arguments: list[str] | None = None) ->
     given = sys.argv[1:] if arguments is None else arguments
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="replace")  # a terminal that has no Greek still gets its table
+    streams = (sys.stdout, sys.stderr)
     try:
         result = group.main(args=given, prog_name=program, standalone_mode=False)
-        return result if isinstance(result, int) else HOLDS
-    except SystemExit:
-        return HOLDS  # click leaves with 1 where the reader of a pipe has gone; it has what it wants
+        status = HOLDS if result is None else int(result)
+        _flush()
+        return status
+    except SystemExit as left:
+        return _left(left, streams)
     except (click.exceptions.Abort, KeyboardInterrupt):
         return _say("interrupted", INTERRUPTED)
     except click.ClickException as error:
@@ -38,6 +43,42 @@ def run(group: click.Group, program: str, arguments: list[str] | None = None) ->
         if "--traceback" in given or os.environ.get("FOURBAR_TRACEBACK"):
             raise
         return _say(f"internal error: {type(error).__name__}: {error} (FOURBAR_TRACEBACK=1 shows where)", BROKEN)
+
+
+def _left(left: SystemExit, streams: tuple[TextIO | None, ...]) -> int:
+    """The status of a command that was left by SystemExit.
+
+    Click and rich leave with 1 where the reader of a pipe has gone; it has what it wants. Click lets go of standard
+    output then, and does so for every pipe that breaks, that of a worker too.
+    """
+    if sys.stdout is not streams[0]:
+        return HOLDS if any(map(_unread, streams)) else _say("a pipe inside the program broke", BROKEN)
+    if isinstance(left.__context__, BrokenPipeError):
+        return HOLDS
+    if left.code is None or isinstance(left.code, int):
+        return left.code or HOLDS
+    return _say(left.code, BROKEN)
+
+
+def _unread(stream: TextIO | None) -> bool:
+    """Whether a stream is a pipe that nobody reads any more; taken for one where the system cannot be asked."""
+    if not hasattr(select, "poll"):
+        return True
+    try:
+        asked = select.poll()
+        asked.register(stream.fileno(), select.POLLOUT)  # type: ignore[union-attr]
+        return any(event & (select.POLLERR | select.POLLHUP) for _, event in asked.poll(0))
+    except (AttributeError, OSError, ValueError):  # no stream, or one without a file
+        return False
+
+
+def _flush() -> None:
+    """Write out what was printed while an error can still be told; a reader that has gone is none."""
+    try:
+        if sys.stdout is not None:
+            sys.stdout.flush()
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # or the interpreter tells of it at its end
 
 
 def _say(message: str, status: int) -> int:

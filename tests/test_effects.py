@@ -70,7 +70,7 @@ def scene(*names: str, steps: int = 12) -> Scene:
 
 
 def failing(asked: Scene, witnesses: list[Any]) -> list[tuple[str, str, str]]:
-    return [(r.engine, r.quantity, r.reason) for r in judge("scene", asked, witnesses).rows if not r.passed]
+    return [(r.engine, r.quantity, r.reason) for r in judge("scene", asked, witnesses).rows if r.failed]
 
 
 def refusing(asked: Scene, witnesses: list[Any]) -> set[str]:

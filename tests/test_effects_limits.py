@@ -48,7 +48,7 @@ def test_a_spring_with_both_ends_in_one_pin_has_no_direction(name: str, pin: str
         assert np.isnan(getattr(solution, quantity)).all(), quantity
     assert solution.omega_4 is not None and np.isfinite(solution.omega_4).all()
     assert solve(scene, "velocity").status == ["ok"] * 41  # nothing is asked of the spring
-    assert [row for row in judge("scene", scene).rows if not row.passed] == []
+    assert [row for row in judge("scene", scene).rows if row.failed] == []
 
 
 def test_a_spring_whose_ends_meet_once_loses_that_position_alone() -> None:
@@ -116,17 +116,17 @@ def test_every_engine_stops_where_the_spring_is_wound() -> None:
     spring = Torsion.at(O2=(0.2, 0.5, 0.0))
     scene = Scene(linkage("crank-rocker"), Motion(Sweep(0.1, 6.2, 12), 10.0), effects=(spring,))
     record = judge("scene", scene)
-    assert [row for row in record.rows if not row.passed] == []
+    assert [row for row in record.rows if row.failed] == []
     assert {row.engine for row in record.rows if row.verdict == "refuses"} == {"mujoco-simulated"}
     assert any("wound by more than half a turn" in line for line in record.left_out)
     assert record.solution is not None and record.solution.status.count("wound") == 6  # of theta_2 beyond 0.5 + pi
     at_half = Scene(scene.linkage, Motion([0.5, 1.0, 0.5 + math.pi, 4.0], 10.0), effects=(spring,))
     record = judge("scene", at_half)
     assert record.solution is not None and record.solution.status == ["ok", "ok", "wound", "wound"]
-    assert [row for row in record.rows if not row.passed] == []
+    assert [row for row in record.rows if row.failed] == []
     within = Scene(scene.linkage, Motion(Sweep(0.1, 3.6, 12), 10.0), effects=(spring,))
     record = judge("scene", within)
-    assert [row for row in record.rows if not row.passed] == [] and record.left_out == []
+    assert [row for row in record.rows if row.failed] == [] and record.left_out == []
 
 
 def test_a_free_motion_that_winds_a_spring_is_an_error() -> None:

@@ -264,8 +264,8 @@ def test_inputs_are_those_of_the_model(other: fourbar.Scene) -> None:
 
 
 def test_the_command_explains_every_difference() -> None:
-    result = CliRunner().invoke(published)
-    assert result.exit_code == 0
+    result = CliRunner().invoke(published, standalone_mode=False)
+    assert result.return_value == 0
     assert max(map(len, result.output.splitlines())) <= 80
     for figure in ALL:
         line = f"{figure.table}: {figure.name}  printed {figure.printed}"
@@ -278,4 +278,4 @@ def test_a_difference_without_an_erratum_fails(monkeypatch: pytest.MonkeyPatch) 
     for figure in (wrong, wrong._replace(errata=()), wrong._replace(errata=("99",), made=167.877224)):
         assert figure.verdict() == "differs" and not explained(figure) and reason(figure)
         monkeypatch.setattr(command, "figures", lambda figure=figure: iter([figure]))
-        assert CliRunner().invoke(published).exit_code == 1
+        assert CliRunner().invoke(published, standalone_mode=False).return_value == 1

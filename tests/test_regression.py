@@ -19,7 +19,7 @@ from validation.results import AGREES, FAILS, Row, write_results
 from validation.suite.columns import write_columns
 from validation.tolerance import EPS
 
-ROW = Row("scene", "engine", "exact", "torque", 1e-15, 1e-14, True, AGREES, "equivalence", 1.0, 1.0)
+ROW = Row("scene", "engine", "exact", "torque", 1e-15, 1e-14, AGREES, "equivalence", 1.0, 1.0)
 HERE = about({"engine": 1.0}, "suite")
 
 
@@ -33,7 +33,7 @@ def kinds(old: list[Row], new: list[Row]) -> list[Kind]:
         ({}, Kind.SAME),
         ({"error": 9e-15}, Kind.ROUND_OFF),
         ({"error": 1e-10, "allowed": 1e-9}, Kind.WORSE),
-        ({"error": math.nan, "verdict": FAILS, "passed": False}, Kind.VERDICT_WORSE),
+        ({"error": math.nan, "verdict": FAILS}, Kind.VERDICT_WORSE),
         ({"quantity": "F12"}, Kind.GONE),
     ],
 )
@@ -54,7 +54,7 @@ def test_better_and_new_rows_are_no_regression_but_a_new_failure_is() -> None:
     found = differences((HERE, [simulated]), (HERE, [replace(simulated, error=1e-6), replace(ROW, quantity="F12")]))
     assert {change.kind for change in found.changes} == {Kind.BETTER, Kind.NEW}
     assert not found.regressions
-    failing = replace(ROW, quantity="F12", verdict=FAILS, passed=False)
+    failing = replace(ROW, quantity="F12", verdict=FAILS)
     assert differences((HERE, [ROW]), (HERE, [ROW, failing])).regressions
 
 
@@ -126,10 +126,10 @@ def test_options_of_a_run_that_would_do_nothing_are_refused_before_it(
 
 
 def test_what_stood_for_a_failure_and_is_gone_is_no_regression() -> None:
-    alarm = replace(ROW, quantity="watch", verdict=FAILS, passed=False, error=math.nan)
+    alarm = replace(ROW, quantity="watch", verdict=FAILS, error=math.nan)
     assert kinds([ROW, alarm], [ROW]) == [Kind.SAME, Kind.GONE_FAILURE]
     assert not differences((HERE, [ROW, alarm]), (HERE, [ROW])).regressions
-    failed = replace(ROW, verdict=FAILS, passed=False)
+    failed = replace(ROW, verdict=FAILS)
     assert differences((HERE, [failed]), (HERE, [])).regressions  # a comparison that failed and is not made any more
 
 
@@ -150,7 +150,7 @@ def test_another_python_without_the_libraries_is_one_line_and_status_3(
 
 
 def test_a_run_with_too_many_rows_for_a_text_is_read_from_its_columns(tmp_path: Path) -> None:
-    rows = [ROW, replace(ROW, quantity="watch", error=math.nan)]
+    rows = [ROW, replace(ROW, quantity="watch", error=math.nan, verdict=FAILS)]
     write_columns(iter([rows]), tmp_path)
     write_about(HERE, tmp_path)
     from_text = read_run(tmp_path)

@@ -14,13 +14,13 @@ from validation.hard.suite import HARD_WITNESSES, Hard
 from validation.report.costs import cost_figure
 from validation.report.html import html
 from validation.report.summary import summarise
-from validation.results import AGREES, FAILS, REFUSES, Row, write_results
+from validation.results import AGREES, FAILS, REFUSES, UNTOLD, Row, write_results
 from validation.run import sections
 from validation.witnesses import WORK
 
 
 def judged(scene: str, verdict: str) -> Row:
-    return Row(scene, "engine", "exact", "torque", 1.0, 1.0, verdict != FAILS, verdict, "", 0.0, 1.0)
+    return Row(scene, "engine", "exact", "torque", 1.0, 1.0, verdict, "", 0.0, 1.0)
 
 
 def test_every_scene_is_counted_in_its_family_alone() -> None:
@@ -29,15 +29,17 @@ def test_every_scene_is_counted_in_its_family_alone() -> None:
     table = {row[0]: row for row in section(rows).rows}
     for family in FAMILIES:
         count = str(sum(1 for _ in family.scenes()))
-        assert table[family.name][1:3] == (count, count) and table[family.name][6:] == ("holds", family.statement)
+        assert table[family.name][1:3] == (count, count) and table[family.name][7:] == ("holds", family.statement)
     assert set(table) == {family.name for family in FAMILIES}
 
 
 def test_a_failing_row_fails_its_family_in_the_report(tmp_path: Path) -> None:
     rows = [judged("toggle-near-a", AGREES), judged("toggle-near-a", REFUSES), judged("toggle-b", FAILS)]
     toggle, near = section(rows).rows
-    assert toggle[:7] == ("toggle", "1", "0", "0", "0", "1", "FAILS")
-    assert near[:7] == ("toggle-near", "1", "1", "0", "1", "0", "holds")
+    assert toggle[:8] == ("toggle", "1", "0", "0", "0", "0", "1", "1 fail")
+    assert near[:8] == ("toggle-near", "1", "1", "0", "0", "1", "0", "holds")
+    (refused,) = section([judged("toggle-near-a", REFUSES), judged("toggle-near-a", UNTOLD)]).rows
+    assert refused[:8] == ("toggle-near", "1", "0", "0", "1", "1", "0", "nothing compared")
     assert beside(tmp_path) is None
     (tmp_path / "hard").mkdir()
     write_results(rows, tmp_path / "hard" / "results.csv")

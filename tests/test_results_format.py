@@ -10,6 +10,7 @@ import pytest
 from validation.report.summary import SCENES_SHOWN
 from validation.results import COLUMNS, Row, from_csv
 from validation.run import CHUNK, run
+from validation.suite.columns import read_columns
 from validation.suite.random import LinkageType
 from validation.suite.scenes import Random
 from validation.suite.selection import chosen
@@ -42,7 +43,7 @@ def test_the_parquet_file_holds_the_rows_of_the_table(results: Path) -> None:
 
     file = pq.ParquetFile(results / "results" / "results.parquet")
     assert file.num_row_groups == math.ceil((SCENES_SHOWN + 5) / CHUNK[False])
-    kept = [Row(**row) for row in file.read().to_pylist()]
+    kept = list(read_columns(results / "results" / "results.parquet"))
     table = from_csv(results / "results" / "results.csv")
     assert len(kept) == len(table)
     for one, other in zip(kept, table, strict=True):

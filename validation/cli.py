@@ -46,8 +46,8 @@ class LazyGroup(click.Group):
 def group() -> None:
     """Check the closed formulas of the planar four-bar linkage against independent engines.
 
-    Exit status: 0 all holds, 1 a comparison fails, 2 the input is bad, 3 the environment or the
-    program failed, 130 interrupted.
+    Exit status: 0 all holds, 1 a comparison fails or nothing was compared, 2 the input is bad,
+    3 the environment or the program failed, 130 interrupted.
     """
 
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from fourbar.scene import Scene
 from fourbar.solution import OK, OVERFLOW, SINGULAR, STATUS_NAMES, Solution
 from validation.answer import Answer
-from validation.results import AGREES, DEGRADED, FAILS, REFUSES, Row
+from validation.results import AGREES, DEGRADED, FAILS, REFUSES, UNTOLD, Row
 from validation.reversals import reversing
 from validation.scales import divisor, magnitude, of_length, yardstick
 from validation.tolerance import DEGRADED as TIMES_PREDICTED
@@ -55,7 +55,6 @@ def compare(
             engine=answer.engine,
             setting=answer.setting,
             quantity=quantity,
-            passed=verdict != FAILS,
             verdict=verdict,
             reason=reason,
             **{key: float(numbers.get(key, math.nan)) for key in keys},
@@ -82,10 +81,9 @@ def compare(
     both = formulas.assembled & answer.assembled
     for quantity in (q for q in COMPARED if q in expected):
         ours, theirs = getattr(formulas, quantity, None), answer.quantities.get(quantity)
-        if ours is None:
-            continue
-        if theirs is None:
-            rows.append(row(quantity, FAILS, "no answer"))
+        if ours is None or theirs is None:
+            if ours is not theirs:  # both are missing where the scene states positions only
+                rows.append(row(quantity, FAILS, "no answer" if theirs is None else "the formulas have no answer"))
             continue
         judged = both & _stated(quantity, formulas, ours)
         withheld = _counted(formulas.status_code[both & ~judged])
@@ -96,7 +94,7 @@ def compare(
         jumping = where & _jumping(quantity, scene, formulas, tolerance)
         where &= ~jumping
         if not where.any():
-            rows.append(row(quantity, DEGRADED, "nothing can be told: no position at which both may be held to it"))
+            rows.append(row(quantity, UNTOLD, "no position at which both may be held to it"))
         else:
             yard = divisor(yardstick(quantity, scene, formulas, ours))
             difference = angle_aware_difference(quantity, ours, theirs)
@@ -143,8 +141,7 @@ def closure(name: str, scene: Scene, answer: Answer, simulated: Tolerance = SIMU
         quantity="closure",
         error=float(error[worst]),
         allowed=allowed,
-        passed=holds,
-        verdict=AGREES if holds else FAILS,
+        verdict=(AGREES if holds else FAILS) if answer.assembled.any() else UNTOLD,
         reason="identity: a e^{i theta_2} + b e^{i theta_3} = d e^{i theta_1} + c e^{i theta_4}",
         theta_2=float(answer.at.theta_2[worst]),
         condition=condition,
@@ -174,7 +171,7 @@ def _by_condition(error: Array, condition: Array, where: Mask, tolerance: Tolera
     note = f"; {untold} positions with eps/condition > {NOTHING_TO_TELL:g} not judged" if untold else ""
     if not told.any():
         index = int(np.flatnonzero(where)[0])
-        verdict, reason = DEGRADED, f"nothing can be told: eps/condition = {EPS / condition[index]:.1e}"
+        verdict, reason = UNTOLD, f"eps/condition = {EPS / condition[index]:.1e}"
         if not np.isfinite(error[where]).all():
             verdict, reason = FAILS, "NaN"
         return _Finding(index, verdict, reason, allowed[index])
@@ -207,7 +204,7 @@ def _by_prediction(
     if not beyond.any():
         verdict, reason = AGREES, tolerance.name
     elif lost[index] and math.isfinite(error[index]):
-        verdict, reason = DEGRADED, f"nothing can be told: {expected[index]:.1e} of the value is predicted"
+        verdict, reason = UNTOLD, f"an error of {expected[index]:.1e} of the value is predicted"
     elif ratio[index] <= 1.0:
         verdict, reason = DEGRADED, f"{error[index]:.1e} of {expected[index]:.1e} predicted for this position"
     elif math.isnan(error[index]):

@@ -15,12 +15,14 @@ from fourbar.scene import Command, Scene
 from fourbar.solution import OK, OVERFLOW, Solution
 from validation.answer import Answer
 from validation.compare import closure, turned
-from validation.results import AGREES, FAILS, Row
+from validation.results import AGREES, FAILS, UNTOLD, Row
 from validation.reversals import reversing
 from validation.scales import magnitude
 from validation.tolerance import IDENTITY, Array
 
 FORMULAS = "formulas"
+IDENTITIES = ("closure", "force_sum", "moment_sum")
+"""Quantities of the rows made here: the formulas against themselves."""
 
 
 def identities(name: str, scene: Scene, at: Command, solution: Solution) -> list[Row]:
@@ -108,9 +110,8 @@ def _row(
         quantity=quantity,
         error=float(relative[worst]),
         allowed=allowed,
-        passed=holds,
-        verdict=AGREES if holds else FAILS,
-        reason=f"identity: {equation}",
+        verdict=(AGREES if holds else FAILS) if where.any() else UNTOLD,
+        reason=f"identity: {equation}" if where.any() else "no position at which it is asked",
         theta_2=float(solution.theta_2[worst]),
         condition=condition,
     )

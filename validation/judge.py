@@ -17,7 +17,7 @@ from validation.identities import FORMULAS, identities
 from validation.mobility.rows import statements
 from validation.page import Page, Record, Timing
 from validation.plain import plain
-from validation.results import FAILS, Row
+from validation.results import FAILS, REFUSES, VERDICTS, Row
 from validation.reversals import reversals
 from validation.tolerance import EQUIVALENCE, FORCES
 from validation.witnesses import WITNESSES, Witness, predicting_from
@@ -111,7 +111,8 @@ def _judged(name: str, scene: Scene, at: Command, solution: Solution, answer: An
     formulas = solution if theirs is at else solve(scene, _stage(theirs), at=theirs)
     predicted = predicting_from(witness, scene, theirs, answer)
     rows = compare(name, scene, answer, formulas, witness.tolerance, witness.expected, predicted)
-    if answer.refusal is None and answer.at is not None and {"theta_3", "theta_4"} <= answer.quantities.keys():
+    said = answer.assembled is not None and len(answer.assembled) == len(formulas)  # otherwise a row has failed
+    if said and answer.at is not None and {"theta_3", "theta_4"} <= answer.quantities.keys():
         rows.append(closure(name, scene, answer, witness.tolerance))
     return rows
 
@@ -145,12 +146,17 @@ def _judge_inertia(record: Record, at: Command, witnesses: Iterable[Witness]) ->
         return
     bare = replace(scene, loads=(), effects=())
     ours = solve(bare, _stage(at), at=at)
+    refused = {answer.engine for answer in record.answers if answer.refusal is not None}  # and has said so
     for witness in witnesses:
         answer = _ask(replace(witness, expected=("torque",)), bare, at, record, part="inertia alone")
-        if answer is None or answer.refusal is not None:
+        if answer is None or (answer.refusal is not None and answer.engine in refused):
             continue
         rows = _judged(record.name, bare, at, ours, answer, replace(witness, expected=("torque",)))
-        record.rows += [replace(row, quantity="torque_inertia") for row in rows if row.quantity == "torque"]
+        rows = [row for row in rows if row.quantity == "torque" or row.verdict in (REFUSES, FAILS)]
+        if rows:  # what fails besides the torque, or stands in place of it, is not left out
+            worst = max(rows, key=lambda row: VERDICTS.index(row.verdict))
+            reason = worst.reason if worst.quantity in ("torque", "all") else f"{worst.quantity}: {worst.reason}"
+            record.rows.append(replace(worst, quantity="torque_inertia", reason=reason))
 
 
 def _ask(witness: Witness, scene: Scene, at: Command, record: Record, part: str = "") -> Answer | None:
@@ -183,7 +189,7 @@ def breakdown(scene: str, engine: str, error: BaseException) -> Row:
 
 def _failure(scene: str, engine: str, part: str, reason: str) -> Row:
     nan = float("nan")
-    return Row(scene, engine, part or "-", "all", nan, nan, False, FAILS, plain(reason), nan, nan)
+    return Row(scene, engine, part or "-", "all", nan, nan, FAILS, plain(reason), nan, nan)
 
 
 def _timed(action: Callable[[], Any]) -> tuple[Any, float]:

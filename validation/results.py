@@ -4,14 +4,21 @@ import csv
 import io
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 
 from fourbar.writing import write_text
 from validation.plain import plain
 
-AGREES, DEGRADED, REFUSES, FAILS = "agrees", "degraded as predicted", "refuses", "fails"
-VERDICTS = (AGREES, DEGRADED, REFUSES, FAILS)
+AGREES, DEGRADED, UNTOLD, REFUSES, FAILS = (
+    *("agrees", "degraded as predicted"),
+    *("nothing can be told", "refuses", "fails"),
+)
+VERDICTS = (AGREES, DEGRADED, UNTOLD, REFUSES, FAILS)
+"""From the best to the worst."""
+HELD = (AGREES, DEGRADED)
+COMPARED = (*HELD, FAILS)
+"""Of the others nothing was compared: no digit of the quantity is left to be told, or the engine declared a limit."""
 
 
 @dataclass(frozen=True, slots=True, order=True)
@@ -25,14 +32,31 @@ class Row:
     error: float
     """Relative to the scale of the quantity (angles: rad); NaN where there is no answer."""
     allowed: float
-    passed: bool
+    passed: bool = field(init=False)
+    """Whether it was compared and holds; the verdict decides."""
     verdict: str
     reason: str
     theta_2: float
     condition: float
 
+    def __post_init__(self) -> None:
+        """Raise ValueError for a verdict that nobody knows, and for one that holds without a number."""
+        if self.verdict not in VERDICTS or (self.verdict in HELD and math.isnan(self.error)):
+            raise ValueError(f"{self.verdict!r} is no verdict on an error of {self.error!r}")
+        object.__setattr__(self, "passed", self.verdict in HELD)
 
-COLUMNS = tuple(field.name for field in fields(Row))
+    @property
+    def compared(self) -> bool:
+        """Whether anything was compared."""
+        return self.verdict in COMPARED
+
+    @property
+    def failed(self) -> bool:
+        """Whether it was compared and does not hold, or an answer that was due is missing."""
+        return self.verdict == FAILS
+
+
+COLUMNS = tuple(column.name for column in fields(Row))
 
 
 def sorted_rows(rows: Iterable[Row]) -> list[Row]:
@@ -74,7 +98,6 @@ def from_csv(path: Path) -> list[Row]:
             plain(record["quantity"]),
             number(record["error"]),
             number(record["allowed"]),
-            record["passed"] == "true",
             plain(record["verdict"]),
             plain(record["reason"]),
             number(record["theta_2"]),

@@ -10,7 +10,7 @@ from typing import Any
 import click
 
 from fourbar.errors import DependencyError, FourBarError, InputError
-from fourbar.exits import FAILED, HOLDS
+from fourbar.exits import FAILED
 from fourbar.mjcf import mjcf
 from fourbar.writing import write_text
 from validation.cost import section as cost_section
@@ -25,7 +25,7 @@ from validation.regression.record import about, baseline, read_run, write_about
 from validation.report.html import Section, html
 from validation.report.markdown import markdown
 from validation.report.summary import SCENES_SHOWN, Summary, summarise
-from validation.results import Row
+from validation.results import FAILS, Row
 from validation.suite import pool
 from validation.suite.columns import write_columns
 from validation.suite.elsewhere import run_elsewhere
@@ -147,7 +147,7 @@ def examine(scenes: tuple[Path, ...], mjcf: Path, names: tuple[str, ...], out: P
     tolerance = SIMULATED if asked is None else held_to(asked, "what this file may be wrong by")
     report = examine_model(suite.name(0), suite.scene(0), mjcf, named(names), tolerance)
     tell(report, mjcf, out)
-    return 1 if report.fails else 0
+    return report.counts.status
 
 
 @click.command(name="run")
@@ -248,9 +248,9 @@ def command(
     assert isinstance(result, Summary)
     table(result, out)
     worse = told(baseline(against), out, forms) if against is not None else 0
-    if result.counts["fails"] or worse:
+    if result.counts.of[FAILS] or worse:
         return FAILED
     if missing:
         there = ",".join(witness.name for witness in present)
         raise DependencyError(f"{missing[0][1]}, or say --engines {there} where those are all that is wanted")
-    return HOLDS
+    return result.counts.status

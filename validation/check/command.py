@@ -8,6 +8,7 @@ import click
 import numpy as np
 
 from fourbar.errors import InputError
+from fourbar.exits import FAILED, HOLDS
 from fourbar.files import load
 from fourbar.scene import Command, Scene, command, solve
 from fourbar.solution import OK
@@ -31,7 +32,16 @@ class Finding:
     error: float
     allowed: float
     theta_2: float
-    agrees: bool
+
+    @property
+    def told(self) -> bool:
+        """Whether any digit is left by which it can be judged."""
+        return self.allowed != math.inf
+
+    @property
+    def agrees(self) -> bool:
+        """Whether it is within what is allowed."""
+        return self.told and self.error <= self.allowed
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,8 +55,18 @@ class Judgement:
 
     @property
     def differing(self) -> list[Finding]:
-        """The findings that do not agree."""
-        return [finding for finding in self.findings if not finding.agrees]
+        """The findings that do not agree, though there are digits to tell by."""
+        return [finding for finding in self.findings if finding.told and not finding.agrees]
+
+    @property
+    def agreeing(self) -> int:
+        """How many numbers agree."""
+        return sum(finding.agrees for finding in self.findings)
+
+    @property
+    def untold(self) -> int:
+        """How many numbers nothing can be told of."""
+        return sum(not finding.told for finding in self.findings)
 
 
 def judge_table(scene: Scene, table: Table) -> Judgement:
@@ -92,8 +112,8 @@ def judge_table(scene: Scene, table: Table) -> Judgement:
         error, allowed = judged(quantity, ours, theirs)
         label = table.label(quantity)
         for index, e, most in zip(np.flatnonzero(ok).tolist(), error.tolist(), allowed.tolist(), strict=True):
-            findings.append(Finding(table.lines[index], label, e, most, float(table.theta_2[index]), e <= most))
-    found = {finding.quantity for finding in findings if not finding.agrees}
+            findings.append(Finding(table.lines[index], label, e, most, float(table.theta_2[index])))
+    found = {finding.quantity for finding in findings if finding.told and not finding.agrees}
     differing = sorted(quantity for quantity in table.values if table.label(quantity) in found)
     known = explain(table, scene, at, right, differing, judged) if differing else []
     return Judgement(findings, [table.lines[index] for index in np.flatnonzero(~ok)], known)
@@ -142,6 +162,8 @@ def check(scene: Path, theirs: Path) -> int:
         console.print(f"looks like: {escape(explanation.text)} ({said(explanation)})")
     if differing and not any(explanation.complete for explanation in judgement.explanations):
         console.print("no single known mistake explains all of it")
-    count = len(judgement.findings)
-    console.print(f"[bold]{count - len(differing)} of {count} numbers agree[/]")
-    return 1 if differing or judgement.not_assembled else 0
+    count = len(judgement.findings) - judgement.untold
+    apart = f"; nothing can be told of {judgement.untold} more" if judgement.untold else ""
+    told = f"{judgement.agreeing} of {count} numbers agree" if count else "Nothing was compared"
+    console.print(f"[bold]{told}{apart}[/]")
+    return FAILED if differing or judgement.not_assembled or not count else HOLDS

@@ -19,10 +19,11 @@ from validation.answer import Answer
 from validation.check.differences import Difference, Value, differences
 from validation.check.screen import read_mjcf
 from validation.compare import COMPARED, compare
+from validation.counts import Counts
 from validation.plain import plain
 from validation.report.markdown import cell
 from validation.report.templating import number
-from validation.results import FAILS, Row, write_results
+from validation.results import Row, write_results
 from validation.suite.memory import WORKER_MEMORY, bound_memory
 from validation.tolerance import SIMULATED, Tolerance
 
@@ -65,9 +66,9 @@ class ModelReport:
         return list(dict.fromkeys(cost.asked for cost in self.costs))
 
     @property
-    def fails(self) -> int:
-        """Comparisons of their file that fail."""
-        return sum(cost.row.verdict == FAILS for cost in self.costs)
+    def counts(self) -> Counts:
+        """The comparisons of their file by verdict."""
+        return Counts(cost.row for cost in self.costs)
 
 
 def named(pairs: tuple[str, ...]) -> dict[str, str]:
@@ -162,13 +163,13 @@ def tell(report: ModelReport, mjcf: Path, out: Path) -> None:
             costs.add_column(heading, overflow="fold")
         for cost in report.costs:
             if cost.asked == asked:
-                style = "bold red" if cost.row.verdict == FAILS else ""
+                style = "bold red" if cost.row.failed else ""
                 costs.add_row(*(escape(plain(text)) for text in cost.cells()), style=style)
         console.print(costs)
     out.mkdir(parents=True, exist_ok=True)
     write_text(out / "theirs.md", markdown(report, mjcf))
     write_results([cost.row for cost in report.costs], out / "results.csv")
-    said = f"{report.fails} of {len(report.costs)} comparisons fail; {len(report.differences)} differences"
+    said = f"{report.counts.sentence()}. It differs in {len(report.differences)} entries"
     console.print(f"[bold]{said}[/]; written to {escape(plain(str(out)))}")
 
 
@@ -183,6 +184,7 @@ def markdown(report: ModelReport, mjcf: Path) -> str:
     for d in report.differences:
         lines.append("| " + " | ".join(cell(plain(text)) for text in entries(d)) + " |")
     lines += ["", *(f"- {cell(plain(note))}" for note in report.notes), "", "## What it costs", ""]
+    lines += [f"{report.counts.sentence()}.", ""]
     lines += [f"| asked | {' | '.join(HEADINGS)} |", "|---|---|---|---|---|---|"]
     for cost in report.costs:
         lines.append("| " + " | ".join(cell(plain(text)) for text in (cost.asked, *cost.cells())) + " |")

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import click
 
+from fourbar.exits import FAILED, HOLDS
 from fourbar.scene import Scene
 from fourbar.writing import write_text
 from validation.cost.errors import QUANTITIES
@@ -40,7 +41,7 @@ def cost(scenes: tuple[Path, ...], out: Path, effects: bool) -> int:
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
     files = scene_files(scenes or DEFAULT_SCENES)
-    failed = False
+    fitted: list[Law] = []
     for index in range(len(files)):
         name, scene = files.name(index), files.scene(index)
         study = Study(name, scene, out / name)
@@ -58,11 +59,13 @@ def cost(scenes: tuple[Path, ...], out: Path, effects: bool) -> int:
                 curves[curve] = points
                 progress.update(task, advance=1, description=curve)
         found = laws(curves)
-        failed |= any(law.decided and not law.holds for law in found) or not any(law.decided for law in found)
+        fitted += [law for law in found if law.decided]
         written = write(study, curves, found, scene.title or name)
         click.echo(summary(name, curves, found, study.left_out))
         click.echo(f"written to {out / name}: {', '.join(sorted(path.name for path in written))}")
-    return 1 if failed else 0
+    if not fitted:
+        click.echo("Nothing was compared: no law has points enough for a fit")
+    return HOLDS if fitted and all(law.holds for law in fitted) else FAILED
 
 
 def write(study: Study, curves: Mapping[str, Sequence[Point]], found: Sequence[Law], title: str) -> list[Path]:

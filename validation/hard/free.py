@@ -138,10 +138,10 @@ def _rows(record: Record, fine: Released, coarse: Released | None, truth: _Truth
     free, nan, n = record.scene.motion.free, math.nan, len(truth.theta_2)
     assert free is not None
     if fine.refusal is not None:
-        return [Row(record.name, fine.engine, fine.setting, "all", nan, nan, True, REFUSES, fine.refusal, nan, nan)]
+        return [Row(record.name, fine.engine, fine.setting, "all", nan, nan, REFUSES, fine.refusal, nan, nan)]
     if len(fine.theta_2) < n:
         reason = f"it stopped after {len(fine.theta_2)} of {n} instants"
-        return [Row(record.name, fine.engine, fine.setting, "all", nan, nan, False, FAILS, reason, nan, nan)]
+        return [Row(record.name, fine.engine, fine.setting, "all", nan, nan, FAILS, reason, nan, nan)]
     speed = float(np.abs(truth.omega_2).max())
     sizes = {"theta_2": 1.0, "omega_2": speed, "energy": float(np.abs(fine.energy[:n]).max()), "stopped_at": 1.0}
 
@@ -183,7 +183,6 @@ def _rows(record: Record, fine: Released, coarse: Released | None, truth: _Truth
                 name,
                 float(relative[worst]),
                 allowed,
-                verdict != FAILS,
                 verdict,
                 reason,
                 float(fine.theta_2[n - 1 if name == "stopped_at" else worst]),

@@ -1,12 +1,12 @@
 """The hard cases as a part of report.html: how each family came out, and where to look further."""
 
-from collections import Counter
 from collections.abc import Iterable
 from pathlib import Path
 
+from validation.counts import Counts
 from validation.hard.families import FAMILIES
 from validation.report.html import Figure, Section
-from validation.results import FAILS, VERDICTS, Row, from_csv
+from validation.results import VERDICTS, Row, from_csv
 
 KEY, TITLE, FOLDER, PAGE = "hard", "Hard cases", "hard", "hard.html"
 ALT = "Error of each engine over the distance to a toggle, a pole of T4 and a change point"
@@ -37,19 +37,19 @@ def beside(out: Path) -> Section | None:
 
 
 def _section(rows: Iterable[Row], text: str, figures: list[Figure], links: list[tuple[str, str]]) -> Section:
-    found: dict[str, Counter[str]] = {family.name: Counter() for family in FAMILIES}
+    found = {family.name: Counts() for family in FAMILIES}
     scenes: dict[str, set[str]] = {family.name: set() for family in FAMILIES}
     for row in rows:
         family = family_of(row.scene)
         if family is not None:
-            found[family][row.verdict] += 1
+            found[family].add([row])
             scenes[family].add(row.scene)
     table = [
         (
             family.name,
             str(len(scenes[family.name])),
-            *(str(found[family.name][verdict]) for verdict in VERDICTS),
-            "FAILS" if found[family.name][FAILS] else "holds",
+            *(str(found[family.name].of[verdict]) for verdict in VERDICTS),
+            found[family.name].word,
             family.statement,
         )
         for family in FAMILIES

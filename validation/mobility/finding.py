@@ -37,7 +37,6 @@ def worst(name: str, answer: Answer, quantity: str, findings: Iterable[Finding])
         quantity=quantity,
         error=float(found.error),
         allowed=float(found.allowed),
-        passed=bool(holds),
         verdict=AGREES if holds else FAILS,
         reason=found.said,
         theta_2=float(found.theta_2),
@@ -47,7 +46,7 @@ def worst(name: str, answer: Answer, quantity: str, findings: Iterable[Finding])
 
 def _excess(found: Finding) -> float:
     """The error as a multiple of what is allowed; NaN is beyond all."""
-    if math.isnan(found.error):
+    if math.isnan(found.error) or math.isnan(found.allowed):
         return math.inf
     return found.error / found.allowed if found.allowed > 0.0 else math.inf if found.error > 0.0 else 0.0
 

@@ -5,6 +5,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import Enum
 
+from fourbar.exits import FAILED, HOLDS
+from validation.counts import Counts
 from validation.regression.record import About
 from validation.results import FAILS, VERDICTS, Row
 from validation.tolerance import EPS, K
@@ -71,6 +73,21 @@ class Differences:
         """The changes for which a run fails."""
         return [change for change in self.changes if change.regression]
 
+    @property
+    def counts(self) -> Counts:
+        """The rows of the new run by verdict."""
+        return Counts(change.new for change in self.changes if change.new is not None)
+
+    @property
+    def nothing(self) -> bool:
+        """Whether no comparison of the new run has its counterpart in the old one."""
+        return Counts(change.new for change in self.changes if change.new and change.old).nothing
+
+    @property
+    def status(self) -> int:
+        """Exit status: 1 on a regression, and where nothing was compared."""
+        return FAILED if self.regressions or self.nothing else HOLDS
+
 
 def differences(old: tuple[About, Iterable[Row]], new: tuple[About, Iterable[Row]]) -> Differences:
     """Compare two runs."""
@@ -80,7 +97,8 @@ def differences(old: tuple[About, Iterable[Row]], new: tuple[About, Iterable[Row
 
 
 def _by_key(rows: Iterable[Row]) -> dict[Key, Row]:
-    return {(row.scene, row.engine, row.setting, row.quantity): row for row in rows}
+    worst_last = sorted(rows, key=lambda row: VERDICTS.index(row.verdict))  # of two of one name the worse one counts
+    return {(row.scene, row.engine, row.setting, row.quantity): row for row in worst_last}
 
 
 def _change(key: Key, old: Row | None, new: Row | None) -> Change:
@@ -99,7 +117,7 @@ def _kind(old: Row, new: Row, round_off: float) -> Kind:
     if old.verdict != new.verdict:
         worse = VERDICTS.index(new.verdict) > VERDICTS.index(old.verdict)
         return Kind.VERDICT_WORSE if worse else Kind.VERDICT_BETTER
-    if old.error == new.error or (math.isnan(old.error) and math.isnan(new.error)):
+    if not new.compared or old.error == new.error or (math.isnan(old.error) and math.isnan(new.error)):
         return Kind.SAME
     if abs(new.error - old.error) <= round_off:
         return Kind.ROUND_OFF

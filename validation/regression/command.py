@@ -29,13 +29,13 @@ def output_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def told(old: Path, new: Path, forms: dict[str, Path | None]) -> int:
-    """Print the differences, write the forms asked for; 1 on a regression."""
+    """Print the differences, write the forms asked for; 1 on a regression, or where nothing was compared."""
     found = differences(read_run(old), read_run(new))
     for form, path in forms.items():
         if path is not None:
             write_text(path, FORMS[form](found))
     click.echo(render.text(found), nl=False)
-    return 1 if found.regressions else 0
+    return found.status
 
 
 @click.command()
@@ -46,7 +46,7 @@ def compare(old: str, new: Path, **forms: Path | None) -> int:
     """Say what changed from OLD (a run's folder, its results.csv, or an accepted name) to NEW.
 
     Exit status 1 on a regression: a verdict that got worse, an error that grew beyond round-off,
-    a row that is gone, a new row that fails.
+    a row that is gone, a new row that fails; and where nothing was compared.
     """
     return told(baseline(old), new, forms)
 

@@ -10,11 +10,14 @@ AT_MOST = 50
 
 
 def verdict(found: Differences) -> str:
-    """One line: how many regressions among how many rows, and what else moved."""
+    """One line: how many regressions among how many rows, what else moved, and the counts of the new run."""
     counts = [f"{len(found.of(kind))} {kind.value}" for kind in Kind if found.of(kind)]
     many = len(found.regressions)
     head = f"{many} regression{'s' if many > 1 else ''}" if many else "No regression"
-    return f"{head} in {len(found.changes)} rows: " + ", ".join(counts)
+    if found.nothing and not many:
+        head = "Nothing was compared with the old run"
+    moved = f" in {len(found.changes)} rows: {', '.join(counts)}" if counts else ""
+    return f"{head}{moved}. New run: {found.counts.sentence()}"
 
 
 def line(change: Change) -> str:
@@ -68,19 +71,32 @@ def html(found: Differences) -> str:
 
 
 def junit(found: Differences) -> str:
-    """For the test page of a continuous-integration system: one case per row, a failure per regression."""
-    from junitparser import Failure, JUnitXml, TestCase, TestSuite
+    """For the test page of a continuous-integration system: one case per row.
 
-    report = JUnitXml()
+    A regression is a failure, and so is a row that fails as it did before; what was not compared is skipped.
+    """
+    from junitparser import Failure, JUnitXml, Skipped, TestCase, TestSuite
+
+    report = JUnitXml(verdict(found))
     suites: dict[str, TestSuite] = {}
     for change in found.changes:
         scene, engine, setting, quantity = change.key
         suite = suites.setdefault(scene, TestSuite(scene))
         case = TestCase(quantity, classname=f"{scene}.{engine} {setting}", time=0.0)
-        if change.regression:
+        if change.regression or (change.new is not None and change.new.failed):
             case.result = [Failure(line(change), change.kind.value)]
+        elif change.new is None:
+            case.result = [Skipped(line(change), change.kind.value)]
+        elif not change.new.compared:
+            case.result = [Skipped(f"{change.new.verdict}: {change.new.reason}", change.kind.value)]
         suite.add_testcase(case)
+    if found.nothing:
+        suites[""] = TestSuite("all scenes")
+        case = TestCase("anything is compared", classname="all scenes", time=0.0)
+        case.result = [Failure(verdict(found), "nothing compared")]
+        suites[""].add_testcase(case)
     for suite in suites.values():
         report.add_testsuite(suite)
+    report.update_statistics()  # type: ignore[no-untyped-call]
     xml: str | bytes = report.tostring()  # type: ignore[no-untyped-call]
     return xml if isinstance(xml, str) else xml.decode("utf-8")

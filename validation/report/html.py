@@ -8,12 +8,13 @@ from dataclasses import dataclass
 from itertools import groupby
 from typing import Any, NamedTuple
 
+from validation.counts import Counts
 from validation.page import Page
 from validation.report.colours import by_variable, declarations, style_of
 from validation.report.costs import cost_figure
 from validation.report.summary import STATEMENT, Summary, used
 from validation.report.templating import environment
-from validation.results import FAILS, REFUSES, Row, sorted_rows, to_csv
+from validation.results import FAILS, REFUSES, UNTOLD, Row, sorted_rows, to_csv
 
 ALL_OPEN = 8
 """Up to so many scenes all stand open; the bodies of more are packed, and unpacked when they are opened."""
@@ -38,7 +39,12 @@ class Cell(NamedTuple):
     @property
     def kind(self) -> str:
         """Word for its colour."""
-        return {FAILS: "fails", REFUSES: "refuses"}.get(self.row.verdict, "holds")
+        return {FAILS: "fails", REFUSES: "refuses", UNTOLD: "untold"}.get(self.row.verdict, "holds")
+
+    @property
+    def shown(self) -> str:
+        """What stands in its cell."""
+        return {"refuses": "refuses", "untold": "not told"}.get(self.kind, share(self.used))
 
 
 class Figure(NamedTuple):
@@ -85,9 +91,9 @@ class SceneView:
     """Base64 of a PNG of the MJCF."""
 
     @property
-    def failed(self) -> int:
-        """Comparisons that do not hold."""
-        return sum(not cell.row.passed for cell in self.cells)
+    def counts(self) -> Counts:
+        """Its comparisons by verdict."""
+        return Counts(cell.row for cell in self.cells)
 
 
 def html(
@@ -116,7 +122,7 @@ def html(
     templates.filters["symbol"] = lambda engine: style_of(engine).symbol
     views = [_view(page, first_lines.get(page.name, 2), pictures or {}) for page in summary.pages]
     csv = base64.b64encode(to_csv(cell.row for view in views for cell in view.cells).encode("utf-8"))
-    failing = sorted((cell for view in views for cell in view.cells if not cell.row.passed), key=lambda c: c.line)
+    failing = sorted((cell for view in views for cell in view.cells if cell.row.failed), key=lambda c: c.line)
     costs = cost_figure(summary.pages)
     return templates.get_template("report.html.j2").render(
         s=summary,
@@ -150,12 +156,17 @@ def _view(page: Page, first_line: int, pictures: Mapping[str, str]) -> SceneView
     for cell in cells:
         for places, place in ((by_place, (cell.row.quantity, cell.row.engine)), (worst, cell.row.engine)):
             held: dict[Any, Cell] = places
-            if place not in held or cell.used > held[place].used:
+            if place not in held or _rank(cell) > _rank(held[place]):
                 held[place] = cell
     found = {cell.row.quantity for cell in cells}
     quantities = [name for name in ORDER if name in found] + sorted(found.difference(ORDER))
     engines = _engines(cell.row for cell in cells)
     return SceneView(page, cells, engines, quantities, by_place, worst, pictures.get(page.name))
+
+
+def _rank(cell: Cell) -> tuple[bool, float]:
+    """What was compared stands before what was not, then what used more of its allowance."""
+    return cell.row.compared, cell.used
 
 
 def _engines(rows: Any) -> list[str]:

@@ -9,10 +9,12 @@ from heapq import nlargest
 from statistics import median
 from typing import NamedTuple, TypeVar
 
+from fourbar.exits import HOLDS
+from validation.counts import Counts
 from validation.machine import machine, versions
 from validation.page import Page
 from validation.published.command import LadderRow
-from validation.results import FAILS, REFUSES, VERDICTS, Row
+from validation.results import REFUSES, Row
 from validation.tolerance import EPS, EQUIVALENCE, IDENTITY, NOTHING_TO_TELL, SIMULATED, K, Tolerance
 from validation.witnesses import WORK
 
@@ -51,7 +53,7 @@ class Summary:
 
     verdict: str
     scenes: int
-    counts: dict[str, int]
+    counts: Counts
     versions: dict[str, str]
     machine: str
     worst: list[Worst]
@@ -76,6 +78,12 @@ class Summary:
     """What the witnesses were held to."""
     missing: list[tuple[str, str]]
     """(engine, why it could not be asked here)."""
+
+    @property
+    def good(self) -> bool:
+        """Whether all that was to be compared was, and holds."""
+        return self.counts.status == HOLDS and not self.missing
+
     pages: list[Page]
     """The scenes shown one by one, at most SCENES_SHOWN: those that fail, then those that used most of what is
     allowed."""
@@ -104,7 +112,7 @@ def summarise(
     missing: Sequence[tuple[str, str]] = (),
 ) -> Summary:
     """Condense a run in one pass; what is kept does not grow with the number of scenes."""
-    counts: Counter[str] = Counter()
+    counts = Counts()
     failures: list[Row] = []
     refusals: Counter[tuple[str, str]] = Counter()
     first_reason: dict[tuple[str, str], str] = {}
@@ -116,11 +124,9 @@ def summarise(
     orders: list[tuple[str, dict[str, float]]] = []
     failing: list[Page] = []
     holding: list[tuple[float, Page]] = []
-    scenes = 0
     for page in pages:
-        scenes += 1
-        counts.update(row.verdict for row in page.rows)
-        bad = [row for row in page.rows if row.verdict == FAILS]
+        counts.add_scene(page.rows)
+        bad = [row for row in page.rows if row.failed]
         failures += bad[: FAILURES_KEPT - len(failures)]
         for engine, reason in sorted(_left_out(page)):
             kind = (engine, NUMBER.sub("#", reason))
@@ -139,20 +145,15 @@ def summarise(
         else:
             most = max((w.used for w in found), default=0.0)
             holding = _top(SCENES_SHOWN, [*holding, (most, page)], lambda each: each[0])
-    total, failed = sum(counts.values()), counts[FAILS]
-    many = f"{scenes} scene{'s' if scenes != 1 else ''}"
-    if failed:
-        verdict = f"FAILS: {failed} of {total} comparisons on {many} do not hold"
-    else:
-        verdict = f"All {total} comparisons on {many} hold"
+    verdict = counts.sentence()
     if missing:
         verdict += f"; not asked: {', '.join(engine for engine, _ in missing)}"
     holding = nlargest(SCENES_SHOWN - len(failing), holding, key=lambda each: each[0])
     shown = sorted([*failing, *(page for _, page in holding)], key=lambda page: page.name)
     return Summary(
         verdict=verdict,
-        scenes=scenes,
-        counts={name: counts[name] for name in VERDICTS},
+        scenes=counts.scenes,
+        counts=counts,
         versions=versions(),
         machine=machine(),
         worst=_sorted(worst) if judged <= WORST_SHOWN else nlargest(WORST_SHOWN, worst, key=lambda w: w.used),
@@ -189,9 +190,11 @@ def _left_out(page: Page) -> set[tuple[str, str]]:
 
 
 def used(row: Row) -> float:
-    """error/allowed; infinite for a row without an answer, 0 for one that allows nothing and errs by nothing."""
+    """error/allowed; infinite without an answer, 0 where nothing is allowed and errs, or nothing was compared."""
+    if not row.compared:
+        return 0.0
     if math.isnan(row.error):
-        return 0.0 if row.passed else math.inf
+        return math.inf
     if row.allowed == 0.0:
         return 0.0 if row.error == 0.0 else math.inf
     return row.error / row.allowed
@@ -200,9 +203,9 @@ def used(row: Row) -> float:
 def _worst(rows: Sequence[Row]) -> list[Worst]:
     groups: dict[tuple[str, str], list[Row]] = {}
     for row in rows:
-        if row.verdict != REFUSES:
+        if row.compared:
             groups.setdefault((row.engine, row.setting), []).append(row)
-    return [Worst(max(group, key=used), len(group), sum(not row.passed for row in group)) for group in groups.values()]
+    return [Worst(max(group, key=used), len(group), sum(row.failed for row in group)) for group in groups.values()]
 
 
 def _top(most: int, of: list[T], key: Callable[[T], float]) -> list[T]:

@@ -59,14 +59,16 @@ class Tally:
             self.too_large[name] = self.too_large.get(name, 0) + count
 
     def note(self, output: str, ratio: float, sample: str) -> None:
-        """One error over what is allowed."""
+        """One error over what is allowed; NaN is beyond all."""
+        ratio = math.inf if math.isnan(ratio) else ratio
         self.worst[output] = max(self.worst.get(output, (0.0, "")), (ratio, sample))
 
     def held(self) -> bool:
-        """Whether error and error bars are as promised."""
+        """Whether anything was compared, and error and error bars are as promised."""
         bars = all(ratio <= TOO_SMALL for ratio in self.too_small.values())
         useful = all(count <= 0.01 * self.samples for count in self.too_large.values())
-        return bars and useful and not self.warned and all(ratio <= 1.0 for ratio, _ in self.worst.values())
+        errors = bool(self.worst) and all(ratio <= 1.0 for ratio, _ in self.worst.values())
+        return errors and bars and useful and not self.warned
 
 
 def components(name: str) -> list[tuple[str, Any]]:

@@ -53,7 +53,7 @@ def read_columns(path: Path) -> Iterator[Row]:
     with pq.ParquetFile(path) as file:
         for batch in file.iter_batches():
             for cells in batch.to_pylist():
-                kept: dict[str, Any] = {name: _kept_once(cell) for name, cell in cells.items()}
+                kept: dict[str, Any] = {name: _kept_once(cell) for name, cell in cells.items() if name != "passed"}
                 yield Row(**kept)
 
 
