@@ -11,7 +11,7 @@ import click
 from fourbar.errors import DependencyError, FourBarError
 
 HOLDS, FAILED, BAD_INPUT, BROKEN, INTERRUPTED = 0, 1, 2, 3, 130
-"""All holds; a comparison fails, or none was made; the input is bad; the environment or the program failed; interrupted."""
+"""All holds; a comparison fails or none was made; bad input; the environment or the program failed; interrupted."""
 
 
 def run(group: click.Group, program: str, arguments: list[str] | None = None) -> int:
