@@ -64,7 +64,7 @@ def test_the_others_are_asked_and_the_missing_named_with_the_reason(library: str
     with (tmp_path / "out" / "results.csv").open() as table:
         rows = list(csv.DictReader(table))
     assert {row["engine"] for row in rows} == {"formulas", *(ALL - WITNESSES[library])}
-    assert all(row["passed"] == "true" for row in rows)
+    assert "fails" not in {row["verdict"] for row in rows}  # MuJoCo refuses bars without mass
     for name in WITNESSES[library]:
         assert f"not asked {name}: {reason}" in done.stdout
         assert f"Not asked: {name}: " in (tmp_path / "out" / "report.html").read_text()

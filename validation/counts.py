@@ -21,14 +21,17 @@ class Counts:
     """Rows by verdict. What no engine answered is not compared, even where the formulas' own identities hold."""
 
     def __init__(self, rows: Iterable[Row] = ()) -> None:
-        self.of = Counter(dict.fromkeys(VERDICTS, 0))
+        self._of = Counter(dict.fromkeys(VERDICTS, 0))
         self.scenes = self.scenes_compared = self._answered = 0
         self.add(rows)
+
+    def __getitem__(self, verdict: str) -> int:
+        return self._of[verdict]
 
     def add(self, rows: Iterable[Row]) -> None:
         """Take in rows."""
         for row in rows:
-            self.of[row.verdict] += 1
+            self._of[row.verdict] += 1
             self._answered += row.compared and not (row.engine == FORMULAS and row.quantity in IDENTITIES)
 
     def add_scene(self, rows: Iterable[Row]) -> None:
@@ -41,26 +44,26 @@ class Counts:
     @property
     def compared(self) -> int:
         """Comparisons that were made."""
-        return sum(self.of[verdict] for verdict in COMPARED)
+        return sum(self[verdict] for verdict in COMPARED)
 
     @property
     def nothing(self) -> bool:
         """Whether nothing was compared, and nothing that was due is missing."""
-        return not self._answered and not self.of[FAILS]
+        return not self._answered and not self[FAILS]
 
     @property
     def status(self) -> int:
         """Exit status: nothing compared is no success."""
-        return FAILED if self.of[FAILS] or self.nothing else HOLDS
+        return FAILED if self[FAILS] or self.nothing else HOLDS
 
     @property
     def word(self) -> str:
         """The verdict in a cell of a table."""
-        return f"{self.of[FAILS]} fail" if self.of[FAILS] else "nothing compared" if self.nothing else "holds"
+        return f"{self[FAILS]} fail" if self[FAILS] else "nothing compared" if self.nothing else "holds"
 
     def sentence(self) -> str:
         """The verdict in one sentence: "all hold" is said only of what was compared."""
-        total, failed = self.compared, self.of[FAILS]
+        total, failed = self.compared, self[FAILS]
         if failed:
             verdict = f"FAILS: {failed} of {total} comparisons{self._where()} do not hold"
         elif self.nothing:
@@ -84,4 +87,4 @@ class Counts:
         return f" on {of}{self.scenes} scene{'s' if self.scenes != 1 else ''}"
 
     def _said(self, verdicts: Iterable[str]) -> list[str]:
-        return [f"{self.of[each]} {SAID[each][self.of[each] != 1]}" for each in verdicts if self.of[each]]
+        return [f"{self[each]} {SAID[each][self[each] != 1]}" for each in verdicts if self[each]]

@@ -248,7 +248,7 @@ def command(
     assert isinstance(result, Summary)
     table(result, out)
     worse = told(baseline(against), out, forms) if against is not None else 0
-    if result.counts.of[FAILS] or worse:
+    if result.counts[FAILS] or worse:
         return FAILED
     if missing:
         there = ",".join(witness.name for witness in present)

@@ -48,7 +48,7 @@ def _section(rows: Iterable[Row], text: str, figures: list[Figure], links: list[
         (
             family.name,
             str(len(scenes[family.name])),
-            *(str(found[family.name].of[verdict]) for verdict in VERDICTS),
+            *(str(found[family.name][verdict]) for verdict in VERDICTS),
             found[family.name].word,
             family.statement,
         )
