@@ -106,12 +106,12 @@ def solve_block(
     if state.diagonal.least_root == 0.0 and not (state.assembled.all() and not state.singular.any()):
         code = np.where(state.assembled, np.where(state.singular, SINGULAR, friction), NOT_ASSEMBLED).astype(np.uint8)
         code[np.isnan(state.diagonal.squared)] = OVERFLOW  # of theta_2 - theta_1: not even where it closes is known
-    if not all_finite(out):
-        withhold(out, code, np.abs(drive_sine(state, scene.drive_bar)) <= NO_DIGIT_LEFT)
+    if not _all_finite(out):
+        _withhold(out, code, np.abs(drive_sine(state, scene.drive_bar)) <= NO_DIGIT_LEFT)
     return code
 
 
-def all_finite(out: Mapping[str, Array]) -> bool:
+def _all_finite(out: Mapping[str, Array]) -> bool:
     """Whether every entry of a block's arrays is a number: their sum at each position is, which is quicker to look at.
 
     False also where the sum alone is beyond the range of a double.
@@ -123,7 +123,7 @@ def all_finite(out: Mapping[str, Array]) -> bool:
     return bool(np.isfinite(total).all())
 
 
-def withhold(out: Mapping[str, Array], code: NDArray[np.uint8], in_line: NDArray[np.bool_] | bool = False) -> None:
+def _withhold(out: Mapping[str, Array], code: NDArray[np.uint8], in_line: NDArray[np.bool_]) -> None:
     """Where a quantity is no number and the status promises one: the status that says so, and NaN from that stage on.
 
     Parameters

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.blocks import BLOCK, all_finite, solve_block, warm_heap, withhold
+from fourbar.blocks import BLOCK, solve_block, warm_heap
 from fourbar.errors import InputError, LimitError
 from fourbar.kinematics import close_loop
 from fourbar.linkage import MOVING_BARS, FourBar
@@ -151,8 +151,6 @@ def solve(
         arrays = {name: array[part] for name, array in result.items()}
         if alone and halves is not None:
             halves.write(where.theta_2[part], arrays)
-            if not all_finite(arrays):
-                withhold(arrays, code[part])
         else:
             code[part] = solve_block(scene, where, part, wanted, arrays)
         for name, turns in unwrapped.items():
