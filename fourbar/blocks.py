@@ -116,11 +116,14 @@ def _all_finite(out: Mapping[str, Array]) -> bool:
 
     False also where the sum alone is beyond the range of a double.
     """
-    total: Array | float = 0.0
-    for array in out.values():
-        for values in array.T if array.ndim == 2 else (array,):
-            total = np.add(total, values, out=total if isinstance(total, np.ndarray) else None)
-    return bool(np.isfinite(total).all())
+    for arrays in ([array for array in out.values() if array.ndim == dimensions] for dimensions in (1, 2)):
+        if arrays:
+            total = arrays[0].copy("K")
+            for array in arrays[1:]:
+                total += array
+            if not np.isfinite(total).all():
+                return False
+    return True
 
 
 def _withhold(out: Mapping[str, Array], code: NDArray[np.uint8], in_line: NDArray[np.bool_]) -> None:

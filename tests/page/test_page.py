@@ -426,3 +426,12 @@ def test_positions_alone_show_no_dynamics(browse) -> None:
     assert driver.find_element("id", "omega_3").text == "–"
     driver.find_element("id", "forward").click()
     assert shown(driver, "theta_2") == pytest.approx([10.0], abs=PRINTED_DEG)
+
+
+def test_it_says_why_a_position_has_no_forces(browse) -> None:
+    """T3 of a parallelogram exists nowhere; on its input the drive has forces everywhere, and nothing is said."""
+    motion = fourbar.Motion(fourbar.Sweep(0.3, 2.0, 4), 1.0)
+    for drive_bar, said in ((3, "no torque of the drive holds them in balance"), (2, "")):
+        scene = fourbar.Scene(fourbar.uniform(1.0, 0.5, 1.0, 0.5), motion, drive_bar)
+        status = browse(animate.page(scene)).find_element("id", "status")
+        assert (said in status.text) and status.is_displayed() == bool(said)
