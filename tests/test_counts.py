@@ -144,10 +144,10 @@ def test_where_no_loop_closes_no_identity_is_counted_as_held() -> None:
     apart = fourbar.Motion(fourbar.Sweep(2.0, 4.0, 5), 1.0)  # beyond the limits of this input
     scene = Scene(fourbar.uniform(0.3, 0.25, 0.1, 0.22), apart)
     assert not fourbar.solve(scene).assembled.any()
-    found = judge("scene", scene, [w for w in WITNESSES if w.name == "energy-method"]).rows
+    found = judge("scene", scene, [w for w in WITNESSES if w.name == "free-body"]).rows
     verdicts = {(row.engine, row.quantity): row.verdict for row in found}
-    assert verdicts["formulas", "closure"] == verdicts["energy-method", "torque"] == UNTOLD
-    assert verdicts["energy-method", "assembled"] == AGREES
+    assert verdicts["formulas", "closure"] == verdicts["free-body", "torque"] == UNTOLD
+    assert verdicts["free-body", "assembled"] == AGREES
 
 
 def test_an_identity_that_is_asked_nowhere_is_not_counted_as_held(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -189,19 +189,19 @@ def test_a_run_in_which_nothing_was_compared_says_so_everywhere_and_ends_with_1(
     assert sentence in (out / "report.md").read_text()
     page = html.unescape((out / "report.html").read_text())
     assert f'<h1 class="bad">{sentence}</h1>' in page and '<span class="bad">nothing compared</span>' in page
-    assert status([*arguments, "--engines", "mujoco-simulated,energy-method"]) == HOLDS
+    assert status([*arguments, "--engines", "mujoco-simulated,free-body"]) == HOLDS
 
 
 def test_every_form_of_a_report_says_the_same_counts() -> None:
     refused = Witness("echo", "tests.test_harness:Refuses", EQUIVALENCE)
-    exact = next(w for w in WITNESSES if w.name == "energy-method")
+    exact = next(w for w in WITNESSES if w.name == "free-body")
     good, bad = (
         judged_page(name, crank_rocker(title=name), witnesses, draw=False)
         for name, witnesses in (("good", (exact, refused)), ("refused", (refused,)))
     )
     summary = summarise([good, bad])
-    # closure and two sums of the formulas on both scenes; assembled, torque and its inertia of the energy method
-    sentence = "All 9 comparisons on 1 of 2 scenes hold: 9 agree; not compared: 2 refuse"
+    # closure and two sums of the formulas on both scenes; the other 17 are of the free bodies
+    sentence = "All 23 comparisons on 1 of 2 scenes hold: 23 agree; not compared: 2 refuse"
     assert summary.verdict == sentence == summary.counts.sentence() and summary.good
     assert sentence in markdown(summary)
     page = page_of(summary, {})
@@ -287,7 +287,7 @@ def test_a_study_in_which_no_law_is_fitted_is_no_success(
 ) -> None:
     monkeypatch.setattr("validation.cost.study.Study.points", lambda _: iter(()))
     monkeypatch.setattr("validation.cost.command.write", lambda *_: [])
-    law = Law("order", 4.0, 0.1, 4.0, 9)
+    law = Law("order", "torque", 4.0, 0.1, 4.0, 9)
     for found, code in (([], FAILED), ([replace(law, points=1)], FAILED), ([law], HOLDS)):
         monkeypatch.setattr("validation.cost.command.laws", lambda _, found=found: found)
         assert status(["cost", "--out", str(tmp_path)]) == code
