@@ -329,10 +329,15 @@ def devour(scene: Scene, text: str | None, names: dict[str, str]) -> None:
 
 def test_ctrl_c_does_not_wait_for_the_file(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(model, "EXAMINE", f"{__name__}:hang")
+    # a test run in the background inherits SIGINT ignored
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
     began = time.monotonic()
     threading.Timer(3.0, os.kill, (os.getpid(), signal.SIGINT)).start()
-    with pytest.raises(KeyboardInterrupt):
-        model._guarded(BARE, "<mujoco/>", {})
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            model._guarded(BARE, "<mujoco/>", {})
+    finally:
+        signal.signal(signal.SIGINT, before)
     assert time.monotonic() - began < model.SECONDS / 4
 
 
