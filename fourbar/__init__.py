@@ -8,14 +8,14 @@ from fourbar.errors import InputError as InputError
 from fourbar.linkage import Bar as Bar
 from fourbar.linkage import FourBar as FourBar
 from fourbar.linkage import uniform as uniform
-from fourbar.motion import Free as Free
-from fourbar.motion import FromLimit as FromLimit
-from fourbar.motion import Motion as Motion
-from fourbar.motion import Sweep as Sweep
 from fourbar.scene import Scene as Scene
 from fourbar.scene import command as command
-from fourbar.scene import solve as solve
+from fourbar.scene.motion import Free as Free
+from fourbar.scene.motion import FromLimit as FromLimit
+from fourbar.scene.motion import Motion as Motion
+from fourbar.scene.motion import Sweep as Sweep
 from fourbar.solution import Solution as Solution
+from fourbar.solve import solve as solve
 
 __version__ = "0.1.0"
 
@@ -26,6 +26,19 @@ if TYPE_CHECKING:
     from fourbar.effects import Viscous as Viscous
     from fourbar.files import dump as dump
     from fourbar.files import load as load
+
+
+def _notebook(name: str) -> Any:
+    """How a notebook shows a scene or a solution; what draws it is loaded when it is asked to."""
+
+    def show(self: Any) -> str:
+        return str(getattr(import_module("fourbar.show.notebook"), name)(self))
+
+    return show
+
+
+setattr(Scene, "_repr_html_", _notebook("scene_html"))  # noqa: B010 - declared where it is drawn
+setattr(Solution, "_repr_html_", _notebook("solution_html"))  # noqa: B010
 
 
 def __getattr__(name: str) -> Any:

@@ -42,9 +42,9 @@ def classify(lengths: tuple[str, ...]) -> None:
 
     Bare numbers are metres; "30 cm" works too.
     """
+    from fourbar.formulas.linkage_type import classify as type_of
     from fourbar.linkage import BAR_NAMES, Bar, FourBar
-    from fourbar.linkage_type import classify as type_of
-    from fourbar.mobility_text import told
+    from fourbar.show.words import told
 
     d, a, b, c = _lengths(lengths)
     linkage = FourBar(d, Bar(a), Bar(b), Bar(c))
@@ -67,7 +67,7 @@ def new(file: Path, lengths: tuple[str, ...]) -> None:
 
     Bare numbers are metres; "30 cm" works too.
     """
-    from fourbar.new import new_scene
+    from fourbar.files.new import new_scene
     from fourbar.writing import write_text
 
     if file.exists():
@@ -84,8 +84,8 @@ def new(file: Path, lengths: tuple[str, ...]) -> None:
 @click.option("-o", "--out", type=click.Path(path_type=Path), metavar="FILE", help="Write there instead.")
 def analyze(scene: Path, form: str | None, degrees: bool | None, out: Path | None) -> None:
     """Solve a scene: angles, speeds, accelerations, driving torque and pin forces."""
-    from fourbar import tables
-    from fourbar.scene import solve
+    from fourbar.solution import csv_text, json_text
+    from fourbar.solve import solve
     from fourbar.writing import write_text
 
     asked = _load(scene)
@@ -96,7 +96,7 @@ def analyze(scene: Path, form: str | None, degrees: bool | None, out: Path | Non
     if form is None:
         text = _table_text(asked, solution, None if out else _terminal_width(), degrees is not False)
     else:
-        write = tables.json_text if form == "json" else tables.csv_text
+        write = json_text if form == "json" else csv_text
         text = write(solution, degrees=bool(degrees))
     if out is None:
         click.echo(text, nl=False)
@@ -145,7 +145,7 @@ def mjcf(scene: Path | None, lengths: tuple[str, ...] | None, omega: str | None,
 @click.option("--branches", default="one", show_default=True, metavar="WHICH", help="one or both.")
 def plot(scene: Path, out: Path, figure: str, position: str | None, branches: str) -> None:
     """Draw a scene as SVG, PNG or PDF (by the ending of FILE)."""
-    from fourbar.plot import draw
+    from fourbar.show.plot import draw
 
     at = None if position is None else _number("--position", position, "rad")
     asked = _load(scene)
@@ -170,7 +170,7 @@ def plot(scene: Path, out: Path, figure: str, position: str | None, branches: st
 )
 def animate(scene: Path, out: Path, pictures: tuple[str, ...], seconds: float | None) -> None:
     """Show a scene moving: one web page (.html), or a film (.gif, .mp4)."""
-    from fourbar.animate import write
+    from fourbar.show.animate import write
 
     attached = {}
     for entry in pictures:
@@ -201,7 +201,7 @@ def _waiting(scene: "Scene") -> Iterator[None]:
         yield
         return
     from fourbar.free_motion import STEPS
-    from fourbar.under_way import under_way
+    from fourbar.show.under_way import under_way
 
     with under_way(f"the free motion is integrated, in {STEPS} steps at most"):
         yield
@@ -209,7 +209,7 @@ def _waiting(scene: "Scene") -> Iterator[None]:
 
 def _load(path: Path) -> "Scene":
     from fourbar.files import load
-    from fourbar.motion import Free, Sweep
+    from fourbar.scene.motion import Free, Sweep
 
     scene = load(path)
     for key, asked in (("motion.theta_2", scene.motion.theta_2), ("motion.free", scene.motion.free)):
@@ -230,7 +230,7 @@ def _number(key: str, text: str, unit: str, *, positive: bool = False) -> float:
     try:
         return require(key, float(text), positive=positive)
     except ValueError:
-        from fourbar.units import UnitError, to_si
+        from fourbar.files.units import UnitError, to_si
 
         try:
             return require(key, to_si(text, unit), positive=positive)
@@ -251,7 +251,7 @@ def _table_text(scene: "Scene", solution: Any, width: int | None, degrees: bool)
     from rich.console import Console
     from rich.text import Text
 
-    from fourbar import tables
+    from fourbar.show import tables
 
     shown, left_out = tables.table(solution, width, degrees=degrees)
     text = io.StringIO()

@@ -1,26 +1,24 @@
 """Error bars of torque and pin forces: how far rounding makes them scatter.
 
-The forces are evaluated again with every part of the triangle, arm and term changed in its last digit. All
-roundings then fall differently, so the root mean square of the changes is of the size of the error
+The forces are evaluated again with every number of the position, coefficient, arm and term changed in its last
+digit. All roundings then fall differently, so the root mean square of the changes is of the size of the error
 itself, whatever the formulas lose at this position. Signs are taken from a Hadamard matrix: the
-changes of different inputs do not cancel over the evaluations.
+changes of different numbers do not cancel over the evaluations, which run as one batch.
 """
 
-import math
-from collections.abc import Iterable, Iterator
-from dataclasses import replace
-from functools import partial
+from collections.abc import Iterator
+from dataclasses import fields, is_dataclass
 from itertools import count
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from fourbar.kinematics import add_accelerations, add_velocities, close_loop
-from fourbar.kinetostatics import PinForces, Term, solve_pins
-from fourbar.linkage import Bar, FourBar
-from fourbar.margins import diagonal_to_O4, lost_by_turning
-from fourbar.more_digits import rounded
-from fourbar.state import Array, State
+from fourbar.case import Case, Dynamics
+from fourbar.formulas.motion import Coefficients, Rates, State, rates
+from fourbar.formulas.path import Path, read_backwards
+from fourbar.formulas.pin_forces import Body
+from fourbar.formulas.position import HalfAngle, Loop, Position, two_sum
 
 EVALUATIONS = 16
 """A power of two. With fewer, all of them may by chance come out as far off as the answer itself."""
@@ -34,113 +32,131 @@ times either, so the bar is 0.57 standard deviations: 2 in 100 million normal er
 are below a hundredth of one."""
 
 
-def error_bars(state: State, pins: PinForces, terms: Iterable[Term], drive_bar: int) -> dict[str, Array]:
+class Roundings:
+    """Changes of numbers in their last digit, up or down, in EVALUATIONS ways at once."""
+
+    def __init__(self) -> None:
+        self.signs = _signs()
+
+    def __call__(self, number: Any) -> Any:
+        """Real numbers: the next double up or down, (EVALUATIONS, ...); each part of a complex one by itself."""
+        if np.iscomplexobj(number):
+            return self(number.real) + 1j * self(number.imag)
+        return number + number * next(self.signs)
+
+    def each(self, number: Any) -> Any:
+        """A number that is one for all positions is exact."""
+        return self(number) if np.ndim(number) else number
+
+    def of(self, value: Any) -> Any:
+        """The numbers of an effect likewise: its floats, in tuples and parts too; all else stays."""
+        if isinstance(value, float):
+            return self(value)
+        if isinstance(value, tuple):
+            parts = [self.of(part) for part in value]
+            return type(value)(*parts) if hasattr(value, "_fields") else tuple(parts)
+        if not is_dataclass(value) or getattr(value, "as_given", False):
+            return value
+        other = object.__new__(type(value))  # a constructor checks what a user gives, one number at a time
+        for field in fields(value):
+            object.__setattr__(other, field.name, self.of(getattr(value, field.name)))
+        return other
+
+
+def error_bars(
+    case: Case, state: State, acceleration: Any, sign: Any, found: Dynamics, exact: NDArray[np.intp]
+) -> dict[str, Any]:
     """`torque_error` (N m) and `force_error` (N, worst of the four pin forces), each (n,).
 
     Parameters
     ----------
-    state, pins : the evaluation that the error bars are for.
-    terms, drive_bar : as given to `solve_pins`.
+    state, acceleration, sign, found : the evaluation that the error bars are for; the sign is that of the path's root.
+    exact : indices of the positions whose half angle is known in many digits.
     """
-    terms = tuple(terms)
-    in_doubles = isinstance(state.theta_2, np.ndarray)
-    turned = None
-    if state.parallel is not None and state.linkage.ground_angle != 0.0:
-        turned = lost_by_turning(state.linkage, state.theta_2, state.parallel[0], LAST_DIGIT)
-    n = len(rounded(state.theta_2))
-    torque, forces = np.zeros(n), np.zeros((4, n))
-    for run in range(EVALUATIONS):
-        signs = _signs(run)
-        linkage = _moved_linkage(state.linkage, signs, all_of_it=in_doubles)
-        beside = partial(_next, signs=signs)
-        moved_terms = [term.rounded_anew(beside, all_of_it=in_doubles) for term in terms]
-        if in_doubles:
-            moved = _moved_state(state, linkage, signs, turned)
-            other = solve_pins(moved, moved_terms, drive_bar, growths=signs)
-        else:
-            other = solve_pins(replace(state, linkage=linkage), moved_terms, drive_bar)
-        torque += rounded(other.torque - pins.torque) ** 2
-        for k, (before, after) in enumerate(zip(pins[:4], other[:4], strict=True)):
-            forces[k] += rounded(after[0] - before[0]) ** 2 + rounded(after[1] - before[1]) ** 2
-    scale = TYPICAL / math.sqrt(EVALUATIONS)
-    torque_error, force_error = scale * np.sqrt(torque), scale * np.sqrt(forces.max(axis=0))
-    if state.parallel is not None:
-        # the torque is what the components of a force leave of each other, and none of the changes is a force's own
-        bar, force = {2: (2, pins.F32), 3: (3, pins.F43), 4: (4, pins.F43)}[drive_bar]
-        (ux, uy), (fx, fy) = state.unit(bar), force
-        left = state.linkage.bar(bar).length * (np.abs(ux * fy) + np.abs(uy * fx))
-        torque_error += np.where(state.parallel[0], LAST_ROUNDING * left, 0.0)
-    sizes = [np.hypot(rounded(x), rounded(y)) for x, y in pins[:4]]
-    torque_error += LAST_ROUNDING * np.abs(rounded(pins.torque))
-    force_error += LAST_ROUNDING * np.max(sizes, axis=0)
+    rounded = Roundings()
+
+    def rounded_body(body: Body) -> Body:
+        return Body(body.m, rounded(body.I), rounded(body.z))
+
+    path = case.path
+    q = state.theta_2 if path.bar == 2 else np.angle(state.at.u4)
+    half = _rounded_half_angle(path, q, state.at.half, exact, rounded)
+    path = path._replace(lengths=Loop(*path.lengths[:4], *map(rounded, path.lengths[4:])))
+    near, k = path.motion(path.position(q, half, sign), sign)
+    moved = case._replace(
+        path=path,
+        bodies=(rounded_body(case.bodies[0]), rounded_body(case.bodies[1]), rounded_body(case.bodies[2])),
+        terms=tuple(rounded.of(term) for term in case.terms),
+    )
+    near = near._replace(sin_mu=rounded(near.sin_mu), diagonal=rounded(near.diagonal))
+    near = near._replace(u2=rounded(near.u2), u3=rounded(near.u3), u4=rounded(near.u4))
+    k = _rounded_coefficients(path, near, k, rounded)
+    moving = Rates(*map(rounded.each, rates(k, state.speed, acceleration)))
+    beside = state._replace(at=near, k=k, moving=moving)
+    other = moved.dynamics(beside, acceleration, rounded=rounded)
+    torque = np.mean((other.torque - found.torque) ** 2, axis=0)
+    forces = [
+        np.mean(np.abs(after - before) ** 2, axis=0) for before, after in zip(found.pins, other.pins, strict=True)
+    ]
+    largest = np.max([np.abs(force) for force in found.pins], axis=0)
+    torque_error = TYPICAL * np.sqrt(torque) + LAST_ROUNDING * np.abs(found.torque)
+    force_error = TYPICAL * np.sqrt(np.max(forces, axis=0)) + LAST_ROUNDING * largest
     # a change that leaves no value, or none in the range of a double: of the value itself no digit is left
-    torque_error = np.where(np.isfinite(torque_error), torque_error, np.abs(rounded(pins.torque)))
-    force_error = np.where(np.isfinite(force_error), force_error, np.max(sizes, axis=0))
-    return {"torque_error": torque_error, "force_error": force_error}
+    return {
+        "torque_error": np.where(np.isfinite(torque_error), torque_error, np.abs(found.torque)),
+        "force_error": np.where(np.isfinite(force_error), force_error, largest),
+    }
 
 
-def _signs(run: int) -> Iterator[float]:
-    """+- one last digit for input 1, 2, ...: a row of the Hadamard matrix, over and over."""
+def _rounded_half_angle(path: Path, q: Any, half: HalfAngle, exact: NDArray[np.intp], rounded: Roundings) -> HalfAngle:
+    """The five numbers with their own roundings, that of q - theta_1, and those of the two sums.
+
+    Those known in many digits carry one rounding each.
+    """
+    d, a, b, c, E1, E2 = path.lengths
+    ss, kk, sk, outer, inner = half
+    four_ad = 4.0 * a * d
+    of_outer, of_inner = np.abs(E1) + four_ad * kk, np.abs(E2) + four_ad * ss
+    of_outer, of_inner = np.minimum(of_outer, 4.0 * b * c + of_inner), np.minimum(of_inner, 4.0 * b * c + of_outer)
+    lost = np.where(np.isin(np.arange(np.size(ss)), exact), 0.0, two_sum(q, -path.theta_1)[1])
+    turned = lost * np.sign(next(rounded.signs))
+    if exact.size:
+        of_outer, of_inner = np.array(of_outer), np.array(of_inner)
+        of_outer[exact], of_inner[exact] = outer[exact], inner[exact]
+    return HalfAngle(
+        rounded(ss) + sk * turned,
+        rounded(kk) - sk * turned,
+        rounded(sk) + (0.5 * (kk - ss)) * turned,
+        outer - (four_ad * sk) * turned + of_outer * next(rounded.signs),
+        inner + (four_ad * sk) * turned + of_inner * next(rounded.signs),
+    )
+
+
+def _rounded_coefficients(path: Path, at: Position, k: Coefficients, rounded: Roundings) -> Coefficients:
+    """The coefficients from parts rounded each: h3 = t - (1 - q) g, h4 = t + (1 + q) g, and so their slopes."""
+    k = k if path.bar == 2 else read_backwards(k)
+    _, _, b, c, _, _ = path.lengths
+    q = ((b - c) * (b + c)) / at.e2
+    g, dg, dq = 0.5 * k.h43, 0.5 * (k.dh4 - k.dh3), q * next(rounded.signs)
+    t, of_slope = k.h3 + (1.0 - q) * g, k.dh3 + (1.0 - q) * dg
+    t_moved, g_moved = t * next(rounded.signs), g * next(rounded.signs)
+    slope_moved, dg_moved = of_slope * next(rounded.signs), dg * next(rounded.signs)
+    k = Coefficients(
+        k.h2,
+        rounded(k.h3) + t_moved - (1.0 - q) * g_moved + g * dq,
+        rounded(k.h4) + t_moved + (1.0 + q) * g_moved + g * dq,
+        rounded(k.h23) + (1.0 - q) * g_moved - g * dq,
+        rounded(k.h43) + 2.0 * g_moved,
+        k.dh2,
+        rounded(k.dh3) + slope_moved - (1.0 - q) * dg_moved + dg * dq,
+        rounded(k.dh4) + slope_moved + (1.0 + q) * dg_moved + dg * dq,
+    )
+    return k if path.bar == 2 else read_backwards(k)
+
+
+def _signs() -> Iterator[NDArray[np.float64]]:
+    """+- one last digit for number 1, 2, ... of each evaluation: columns of the Hadamard matrix, over and over."""
     for column in count(1):
-        bits = run & (column % EVALUATIONS or EVALUATIONS - 1)
-        yield LAST_DIGIT if bits.bit_count() % 2 else -LAST_DIGIT
-
-
-def _next(value: Any, signs: Iterator[float]) -> Any:
-    """The next double, up or down."""
-    return value + value * next(signs)
-
-
-def _moved_linkage(linkage: FourBar, signs: Iterator[float], *, all_of_it: bool) -> FourBar:
-    """The linkage with centres and inertias changed in their last digit; or only what doubles round in 32 digits."""
-
-    def bar(old: Bar) -> Bar:
-        assert old.centre is not None and old.inertia is not None
-        if not all_of_it and old.centre[1] == 0.0:
-            return old
-        centre = (_next(old.centre[0], signs), _next(old.centre[1], signs))
-        return replace(old, inertia=_next(old.inertia, signs) if all_of_it else old.inertia, centre=centre)
-
-    return replace(linkage, input=bar(linkage.input), coupler=bar(linkage.coupler), output=bar(linkage.output))
-
-
-def _unit_vector_beside(angle: Array, signs: Iterator[float]) -> tuple[Array, Array]:
-    """`unit_vector` with every rounding another: near a right angle its cosine is a small difference."""
-    t = _next(np.tan(0.5 * angle), signs)
-    squared = _next(t * t, signs)
-    w = _next(1.0 / (1.0 + squared), signs)
-    return (1.0 - squared) * w, 2.0 * t * w
-
-
-def _moved_state(state: State, linkage: FourBar, signs: Iterator[float], turned: tuple[Array, Array] | None) -> State:
-    """The motion of the changed linkage at the same positions, from a triangle changed in its last digits."""
-    diagonal = diagonal_to_O4(linkage, state.theta_2, growths=signs, turned=turned)
-    exact = state.diagonal.decided
-    # margins of 60 digits carry one rounding, not the cancellation of the lengths
-    diagonal.root[exact] = _next(state.diagonal.root[exact], signs)
-    diagonal.decided = exact
-    moved = close_loop(linkage, state.theta_2, state.branch, diagonal)
-    moved.assembled, moved.singular = state.assembled, state.singular
-    moved.u2, moved.u3, moved.u4 = ((_next(u[0], signs), _next(u[1], signs)) for u in (moved.u2, moved.u3, moved.u4))
-    if state.parallel is not None:
-        # all that is lost is in the directions, each of several roundings; bars that turn as one are one here too
-        together, folded = (
-            state.parallel[0] & (state.parallel[1] == 1.0),
-            state.parallel[0] & (state.parallel[1] == 0.0),
-        )
-        if linkage.ground_angle != 0.0:
-            ground = _unit_vector_beside(np.asarray(linkage.ground_angle), signs)
-            moved.u2 = _unit_vector_beside(state.theta_2, signs)
-            moved.u3 = tuple(np.where(together, u, v) for u, v in zip(ground, moved.u3, strict=True))  # type: ignore[assignment]
-            moved.u4 = tuple(np.where(folded, -u, v) for u, v in zip(ground, moved.u4, strict=True))  # type: ignore[assignment]
-        u2, u3, u4 = moved.u2, moved.u3, moved.u4
-        for _ in range(3):
-            u2, u3, u4 = ((_next(u[0], signs), _next(u[1], signs)) for u in (u2, u3, u4))
-        moved.u2, moved.u3, moved.u4 = u2, u3, u4
-        moved.u3 = tuple(np.where(folded, -u, v) for u, v in zip(moved.u2, moved.u3, strict=True))  # type: ignore[assignment]
-        moved.u4 = tuple(np.where(together, u, v) for u, v in zip(moved.u2, moved.u4, strict=True))  # type: ignore[assignment]
-    add_velocities(moved, state.omega_2)
-    add_accelerations(moved, state.alpha_2)
-    moved.omega_3, moved.omega_4 = _next(moved.omega_3, signs), _next(moved.omega_4, signs)
-    moved.alpha_3, moved.alpha_4 = _next(moved.alpha_3, signs), _next(moved.alpha_4, signs)
-    return moved
+        bits = np.arange(EVALUATIONS) & (column % EVALUATIONS or EVALUATIONS - 1)
+        odd = np.array([int(value).bit_count() % 2 for value in bits])
+        yield np.where(odd == 1, LAST_DIGIT, -LAST_DIGIT)[:, None]

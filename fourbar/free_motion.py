@@ -9,27 +9,24 @@ loop therefore closes to round-off at every instant, and nothing drifts off it.
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.dynamics import (
-    VANISHING,
-    Path,
-    Power,
-    acceleration,
-    along_input,
-    carrying,
-    generalised_force,
-    inertia,
-    kinetic_energy,
-    trace,
-    triangle,
-)
-from fourbar.errors import DependencyError, FourBarError, InputError
+from fourbar.effects.actions import Actions, bodies
+from fourbar.errors import DependencyError, FourBarError, InputError, LimitError
+from fourbar.formulas.motion import Coefficients, State, rates
+from fourbar.formulas.path import Path, path, smooth_branch
+from fourbar.formulas.pin_forces import cross
+from fourbar.formulas.position import Loop, Position, loop
+from fourbar.formulas.torque import half_slope, inertia
 from fourbar.linkage import FourBar
-from fourbar.state import Array
+from fourbar.scene import Command
+from fourbar.solution import Array
+
+if TYPE_CHECKING:
+    from fourbar.effects import Effect
 
 RELATIVE, ABSOLUTE = 3e-15, 3e-15
 """Tolerances of a step of DOP853: below them a long fast motion errs by its round-off."""
@@ -40,55 +37,75 @@ CHANGE_OVER = 0.5
 STEPS = 200_000
 """A motion that needs more steps than this is given up, after a few minutes: some hundred turns of the fastest bar
 take a thousand, so it is thousands of turns long, or something makes it infinitely fast."""
+VANISHING = 2.0**-300
+"""A speed at which a couple of viscous damping is nothing and dry friction has its sense."""
+TOUCHING = 2.0**-53
+"""Lengths that miss a change point by this times their sum meet it: each was itself rounded by that."""
 
 
 @dataclass(slots=True, eq=False)
 class FreeMotion:
     """What the linkage did at the times asked for, until it stopped."""
 
-    time: Array
-    """(n,), s; ends before `stopped_at` where the motion did."""
-    theta_2: Array
-    """(n,), rad, continuous."""
-    omega_2: Array
-    alpha_2: Array
-    branch: NDArray[np.int8]
+    command: Command
+    """theta_2 (continuous), branch, omega_2, alpha_2 and time; ends before `stopped_at` where the motion did."""
+    bar: NDArray[np.int8]
+    """Whose angle is the independent one, 2 or 4, (n,)."""
+    paths: dict[int, Path]
+    """Of bars 2 and 4."""
+    q: Array
+    """The independent angle (rad), its speed and its acceleration, each (n,)."""
+    speed: Array
+    acceleration: Array
+    sign: Array
+    """Of the root on the path, (n,)."""
     energy_drift: float
     """Largest |kinetic energy - work done| over the motion, by the largest of either; 0 where nothing moves."""
     stopped_at: float | None = None
     """Time at which a limit position or change point was reached, s; None: the whole duration was run."""
 
 
-@dataclass(slots=True)
-class _Chart:
-    """The independent angle: that of bar 2 or bar 4, and the constants of its path."""
-
-    linkage: FourBar
-    bar: int
-    sign: float = 1.0
-
-    def path(self, q: float) -> Path:
-        """The path at q; bar 4 is the input of the same loop read backwards from O4."""
-        d, a, b, c = self.linkage.lengths
-        theta_1 = self.linkage.ground_angle
-        if self.bar == 2:
-            return along_input(self.linkage, triangle(d, a, b, c, touching=True), q, self.sign, follow=True)
-        back, u_2, t_3, t_2, tt_3, tt_2, _, slip, sine = trace(
-            triangle(d, c, b, a, touching=True), theta_1 + math.pi, q, self.sign, follow=True
-        )
-        u = complex(math.cos(q), math.sin(q))
-        return Path({2: u_2, 3: -back, 4: u}, {2: t_2, 3: t_3, 4: 1.0}, {2: tt_2, 3: tt_3, 4: 0.0}, slip, sine)
+def _meeting(lengths: Loop) -> Loop:
+    """E1 and E2 zero where the lengths miss a change point by rounding."""
+    d, a, b, c, E1, E2 = lengths
+    total = d + a + b + c
+    largest = max(abs((d - a) - (b - c)), abs((d - a) + (b - c)))
+    return Loop(
+        d,
+        a,
+        b,
+        c,
+        0.0 if abs(E1) <= TOUCHING * total * total else E1,
+        0.0 if abs(E2) <= TOUCHING * total * largest else E2,
+    )
 
 
-def _sines(way: Path) -> tuple[float, float]:
+class _Reading:
+    """The linkage read in the angle of bar 2 or of bar 4, with the sign of its path."""
+
+    def __init__(self, linkage: FourBar, bar: int, sign: float = 1.0) -> None:
+        found = path(loop(*linkage.lengths), linkage.ground_angle, bar)
+        self.path = found._replace(lengths=_meeting(found.lengths))
+        self.bar, self.sign = bar, sign
+
+    def branch(self, q: float) -> float:
+        """Sign of the root at q."""
+        return float(smooth_branch(self.path.lengths, q - self.path.theta_1, self.sign))
+
+    def at(self, q: float) -> tuple[Position, Coefficients]:
+        """The position and its coefficients by q."""
+        branch = self.branch(q)
+        return self.path.motion(self.path.position(q, self.path.half_angle(q), branch), branch)
+
+
+def _sines(at: Position) -> dict[int, float]:
     """sin(theta_4 - theta_3) and sin(theta_3 - theta_2): zero at the limits of theta_2 and of theta_4."""
-    u2, u3, u4 = way.unit[2], way.unit[3], way.unit[4]
-    return float((u3.conjugate() * u4).imag), float((u2.conjugate() * u3).imag)
+    return {2: float(cross(at.u3, at.u4)), 4: float(cross(at.u2, at.u3))}
 
 
 def release(
     linkage: FourBar,
-    terms: Iterable[Power],
+    terms: "Iterable[Effect]",
     theta_2: float,
     omega_2: float,
     branch: int,
@@ -110,88 +127,107 @@ def release(
     Raises
     ------
     InputError : the linkage does not assemble at theta_2, or the motion takes more than STEPS steps.
+    LimitError : friction that depends on the pin forces acts.
     FourBarError : nothing that moves has inertia, or the motion cannot be continued.
     DependencyError : SciPy is not installed.
     """
-    with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-        terms = tuple(terms)
-        return _Run(carrying(linkage, terms), terms, theta_2, omega_2, branch, follow).through(times)
+    terms = tuple(terms)
+    if any(term.loaded_pins for term in terms):
+        raise LimitError("a free motion cannot carry friction that depends on the pin forces")
+    with np.errstate(invalid="ignore", divide="ignore", over="ignore", under="ignore"):
+        return _Run(linkage, terms, theta_2, omega_2, branch, follow).through(times)
 
 
 class _Run:
     """One integration: its angle, and what has been reported so far."""
 
     def __init__(
-        self, linkage: FourBar, terms: tuple[Power, ...], theta_2: float, omega_2: float, branch: int, follow: bool
+        self, linkage: FourBar, terms: "tuple[Effect, ...]", theta_2: float, omega_2: float, branch: int, follow: bool
     ) -> None:
         self.linkage, self.terms, self.follow, self.branch = linkage, terms, follow, branch
-        self.chart = _Chart(linkage, 2)
+        self.lengths, self.bodies = loop(*linkage.lengths), bodies(linkage, terms)
+        self.readings = {bar: _Reading(linkage, bar) for bar in (2, 4)}
+        self.reading = self.readings[2]
         # the sign of the path is that of the branch just after the start, should that be a change point
         ahead = theta_2 + math.copysign(1e-8, omega_2)
         for near in (theta_2, ahead, 2.0 * theta_2 - ahead):
-            sine = float(self.chart.path(near).sine)
+            sine = _sines(self.reading.at(near)[0])[2]
             if sine != 0.0 and math.isfinite(sine):
-                self.chart.sign = branch * math.copysign(1.0, sine)
+                self.reading.sign = branch * math.copysign(1.0, sine)
                 break
-        way = self.chart.path(theta_2)
-        if not math.isfinite(way.sine):
+        at, k = self.reading.at(theta_2)
+        if not np.isfinite(at.u3):
             raise InputError("motion.theta_2", theta_2, "the linkage does not assemble there")
-        self.theta = {2: theta_2, 4: float(np.angle(way.unit[4]))}
-        self.state = np.array([theta_2, omega_2, 0.0])
-        if not float(inertia(linkage, way)[0]) > 0.0:
+        self.theta = {2: theta_2, 4: float(np.angle(at.u4))}
+        self.y = np.array([theta_2, omega_2, 0.0])
+        if not float(self._inertia(at, k)) > 0.0:
             raise FourBarError("nothing that moves has inertia: the free motion is undetermined")
         self._change_over()
         self.side = 0.0  # the way it moves, where dry friction makes the two ways different
         self.dry = self._is_dry()
-        self.start_energy = float(kinetic_energy(linkage, self._way(), self.state[1]))
+        self.start_energy = self._kinetic_energy()
 
-    def _way(self) -> Path:
-        return self.chart.path(float(self.state[0]))
+    def _inertia(self, at: Position, k: Coefficients) -> Any:
+        return sum(inertia(self.lengths.a, self.bodies, at, k))
+
+    def _kinetic_energy(self) -> float:
+        return 0.5 * float(self._inertia(*self._at())) * float(self.y[1]) ** 2
+
+    def _at(self) -> tuple[Position, Coefficients]:
+        return self.reading.at(float(self.y[0]))
+
+    def _generalised_force(self, q: float, at: Position, k: Coefficients, rate: float) -> float:
+        """Q under everything that acts, at a speed that is not zero where friction has to have a sense."""
+        theta_2 = q if self.reading.bar == 2 else float(np.angle(at.u2))
+        state = State(self.lengths, self.linkage.ground_angle, theta_2, at, k, rate, rates(k, rate, 0.0))
+        actions = Actions(state, self.bodies)
+        for term in self.terms:
+            term.act(actions, state)
+        return float(actions.work()[0])
+
+    def _either_way(self) -> list[float]:
+        q = float(self.y[0])
+        return [self._generalised_force(q, *self._at(), rate) for rate in (VANISHING, -VANISHING)]
 
     def _is_dry(self) -> bool:
-        way = self._way()
-        either = [generalised_force(self.linkage, way, side, self.terms) for side in (VANISHING, -VANISHING)]
-        return bool(either[0] != either[1])
+        ahead, back = self._either_way()
+        return ahead != back
 
     def _rates(self, _: float, y: Array) -> list[float]:
-        way = self.chart.path(float(y[0]))
-        rate = float(y[1])
+        q, rate = float(y[0]), float(y[1])
+        at, k = self.reading.at(q)
         # beyond a standstill friction keeps its sense, until the step is cut there
         moving = self.side * max(self.side * rate, VANISHING) if self.side else rate
-        Q = generalised_force(self.linkage, way, moving, self.terms)
-        return [rate, float(acceleration(self.linkage, way, rate, Q)), float(Q * rate)]
+        Q = self._generalised_force(q, at, k, moving)
+        slope = half_slope(self.lengths.a, self.bodies, at, k)
+        return [rate, float((Q - slope * rate * rate) / self._inertia(at, k)), Q * rate]
 
     def _change_over(self) -> bool:
         """Take the other angle where it is further from its limit; keeps position, velocity and work."""
-        way = self._way()
-        to_3, to_4 = (abs(sine) for sine in _sines(way))
-        own, other = (to_3, to_4) if self.chart.bar == 2 else (to_4, to_3)
-        if own >= CHANGE_OVER * other:
+        at, k = self._at()
+        sines, bar = _sines(at), 6 - self.reading.bar
+        if abs(sines[self.reading.bar]) >= CHANGE_OVER * abs(sines[bar]):
             return False
-        bar = 6 - self.chart.bar
-        q = self.theta[bar]
-        chart = _Chart(self.linkage, bar)
-        wanted = _sines(way)[0 if bar == 2 else 1]
-        chart.sign = math.copysign(1.0, float(chart.path(q).sine) * wanted)
-        rate = float(self.state[1] * way.first[bar]) if self.state[1] else 0.0
-        self.chart, self.state = chart, np.array([q, rate, self.state[2]])
+        q, reading = self.theta[bar], self.readings[bar]
+        reading.sign *= math.copysign(1.0, _sines(reading.at(q)[0])[bar] * sines[bar])
+        rate = float(self.y[1] * (k.h2 if bar == 2 else k.h4)) if self.y[1] else 0.0
+        self.reading, self.y = reading, np.array([q, rate, self.y[2]])
         return True
 
-    def _turn(self, way: Path) -> None:
+    def _turn(self, at: Position) -> None:
         """Bring theta_2 and theta_4 up to date, continuous from one step to the next."""
-        for bar in (2, 4):
-            now = float(np.angle(way.unit[bar]))
+        for bar, u in ((2, at.u2), (4, at.u4)):
+            now = float(np.angle(u))
             self.theta[bar] = now + 2.0 * math.pi * round((self.theta[bar] - now) / (2.0 * math.pi))
 
     def _starts(self) -> bool:
         """Whether it moves on: at a standstill dry friction holds what is weaker than it."""
         self.side = 0.0
-        rate = float(self.state[1])
+        rate = float(self.y[1])
         if not self.dry:
             return True
         if rate == 0.0:
-            way = self._way()
-            ahead, back = (generalised_force(self.linkage, way, s, self.terms) for s in (VANISHING, -VANISHING))
+            ahead, back = self._either_way()
             if ahead <= 0.0 <= back:
                 return False
             rate = 1.0 if ahead > 0.0 else -1.0
@@ -209,12 +245,12 @@ class _Run:
             while len(rows) < len(times) and times[len(rows)] <= upto:
                 rows.append(self._row(at(float(times[len(rows)]))))
 
-        report(0.0, lambda _: self.state)
+        report(0.0, lambda _: self.y)
         while t < end and stopped is None:
             if not self._starts():
-                report(end, lambda _: self.state)
+                report(end, lambda _: self.y)
                 break
-            solver = DOP853(self._rates, t, self.state, end, rtol=SCIPY_LEAST, atol=ABSOLUTE)
+            solver = DOP853(self._rates, t, self.y, end, rtol=SCIPY_LEAST, atol=ABSOLUTE)
             solver.rtol = RELATIVE
             while solver.status == "running" and stopped is None:
                 steps += 1
@@ -233,21 +269,22 @@ class _Run:
                     stopped = t_new = self._root(brentq, dense, self._sine, solver.t_old, t_new)
                     new = dense(t_new)
                 report(t_new, dense)
-                t, self.state = t_new, np.array(new)
-                way = self._way()
-                self._turn(way)
-                energy = float(kinetic_energy(self.linkage, way, self.state[1])) - self.start_energy
-                worst = max(worst, abs(energy - float(self.state[2])))
-                largest = max(largest, abs(energy + self.start_energy), abs(float(self.state[2])))
+                t, self.y = t_new, np.array(new)
+                self._turn(self._at()[0])
+                energy = self._kinetic_energy() - self.start_energy
+                worst = max(worst, abs(energy - float(self.y[2])))
+                largest = max(largest, abs(energy + self.start_energy), abs(float(self.y[2])))
                 if rested or self._change_over():
                     break
-        done = np.array(rows).reshape(-1, 4)
+        theta_2, omega_2, alpha_2, branch, bar, q, speed, growth, sign = np.array(rows).reshape(-1, 9).T
         return FreeMotion(
-            np.asarray(times[: len(done)]),
-            done[:, 0],
-            done[:, 1],
-            done[:, 2],
-            done[:, 3].astype(np.int8),
+            Command(theta_2, branch.astype(np.int8), omega_2, alpha_2, None, np.asarray(times[: len(rows)])),
+            bar.astype(np.int8),
+            {each: reading.path for each, reading in self.readings.items()},
+            q,
+            speed,
+            growth,
+            sign,
             worst / largest if largest else 0.0,
             stopped,
         )
@@ -266,26 +303,27 @@ class _Run:
 
     def _sine(self, y: Array) -> float:
         """sin(theta_4 - theta_3): zero where bars 3, 4 lie in one line."""
-        return _sines(self.chart.path(float(y[0])))[0]
+        return _sines(self.reading.at(float(y[0]))[0])[2]
 
     def _past(self, y: Array) -> bool:
         """Whether bars 3, 4 have gone through their common line."""
         return self.branch * self._sine(y) < 0.0
 
     def _row(self, y: Array) -> tuple[float, ...]:
-        """theta_2, omega_2, alpha_2 and branch of one instant."""
+        """theta_2, omega_2, alpha_2, branch, and the independent angle with all that belongs to it, of one instant."""
         q, rate = float(y[0]), float(y[1])
-        way = self.chart.path(q)
-        now = float(np.angle(way.unit[2]))
+        at, k = self.reading.at(q)
+        now = float(np.angle(at.u2))
         theta_2 = now + 2.0 * math.pi * round((self.theta[2] - now) / (2.0 * math.pi))
-        if self.chart.bar == 2:
+        if self.reading.bar == 2:
             theta_2 = q
         still = self.dry and rate == 0.0 and not self.side
-        q_2 = 0.0 if still else self._rates(0.0, y)[1]
-        omega_2 = way.first[2] * rate
-        alpha_2 = way.first[2] * q_2 + way.second[2] * rate * rate
-        sine = _sines(way)[0]
-        return theta_2, float(omega_2), float(alpha_2), math.copysign(1.0, sine) if sine else float(self.branch)
+        growth = 0.0 if still else self._rates(0.0, y)[1]
+        moving = rates(k, rate, growth)
+        sine = _sines(at)[2]
+        branch = math.copysign(1.0, sine) if sine else float(self.branch)
+        independent = (float(self.reading.bar), q, rate, growth, self.reading.branch(q))
+        return theta_2, float(moving.omega_2), float(moving.alpha_2), branch, *independent
 
 
 def _scipy() -> tuple[Any, Any]:

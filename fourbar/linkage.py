@@ -8,10 +8,13 @@ import math
 from dataclasses import dataclass
 
 from fourbar.errors import InputError
+from fourbar.quantities import PIN_FORCES
 
 BAR_NAMES = {1: "ground", 2: "input", 3: "coupler", 4: "output"}
 MOVING_BARS = (2, 3, 4)
 PINS = {"O2": (1, 2), "A": (2, 3), "B": (3, 4), "O4": (1, 4)}
+PIN_FORCE = dict(zip(PINS, PIN_FORCES, strict=True))
+"""The independent force of each pin."""
 FIRST_PIN = {2: "O2", 3: "A", 4: "O4"}
 
 
@@ -57,17 +60,33 @@ class Bar:
     def __post_init__(self) -> None:
         length = require("length", self.length, positive=True)
         mass = require("mass", self.mass, at_least_zero=True)
-        inertia = mass * length * length / 12.0 if self.inertia is None else self.inertia
-        centre = (length / 2.0, 0.0) if self.centre is None else self.centre
-        try:
-            r, phi = centre
-        except (TypeError, ValueError):
-            raise InputError("centre", centre, "must be a pair (distance, angle)") from None
         set_field = object.__setattr__  # the class is frozen; this is its constructor
         set_field(self, "length", length)
         set_field(self, "mass", mass)
-        set_field(self, "inertia", require("inertia", inertia, at_least_zero=True))
-        set_field(self, "centre", (require("centre", r), require("centre", phi)))
+        if self.inertia is not None:
+            set_field(self, "inertia", require("inertia", self.inertia, at_least_zero=True))
+        if self.centre is not None:
+            try:
+                r, phi = self.centre
+            except (TypeError, ValueError):
+                raise InputError("centre", self.centre, "must be a pair (distance, angle)") from None
+            set_field(self, "centre", (require("centre", r), require("centre", phi)))
+
+    @property
+    def moment_of_inertia(self) -> float:
+        """About the mass centre, kg m^2; of a uniform slender bar, m L^2/12, where it is left out."""
+        return self.mass * self.length * self.length / 12.0 if self.inertia is None else self.inertia
+
+    @property
+    def mass_centre(self) -> tuple[float, float]:
+        """Polar (r, phi) from the bar's first pin, m and rad; mid-bar where it is left out."""
+        return (0.5 * self.length, 0.0) if self.centre is None else self.centre
+
+    @property
+    def to_centre(self) -> complex:
+        """From the first pin to G in the bar's frame: along + i across, m."""
+        r, phi = self.mass_centre
+        return complex(r * math.cos(phi), r * math.sin(phi)) if phi else complex(r, 0.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,6 +122,11 @@ class FourBar:
     def lengths(self) -> tuple[float, float, float, float]:
         """(d, a, b, c): ground, input, coupler, output, in m."""
         return (self.ground, self.input.length, self.coupler.length, self.output.length)
+
+    @property
+    def moving(self) -> tuple[Bar, Bar, Bar]:
+        """Bars 2, 3, 4."""
+        return (self.input, self.coupler, self.output)
 
     def bar(self, number: int) -> Bar:
         """The moving bar 2, 3 or 4."""

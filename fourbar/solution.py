@@ -1,55 +1,26 @@
 """What `solve` returns: one array per quantity, and `None` for what was not asked for."""
 
-from dataclasses import dataclass, field, fields
-from typing import TYPE_CHECKING
+import csv
+import io
+import json
+import math
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.state import Array
+from fourbar.errors import DependencyError
+from fourbar.quantities import IN_DEGREES, NOT_ASSEMBLED, STATUS_NAMES, UNITS, VECTORS
+
+Array = NDArray[np.float64]
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from pandas import DataFrame
 
-STAGES = ("position", "velocity", "acceleration", "force", "error")
-STAGE_OF = {
-    **dict.fromkeys(("theta_3", "theta_4", "A", "B", "G2", "G3", "G4", "sin_mu", "condition"), "position"),
-    **dict.fromkeys(("omega_2", "omega_3", "omega_4"), "velocity"),
-    **dict.fromkeys(
-        ("alpha_2", "alpha_3", "alpha_4", "a_A", "a_B", "a_G2", "a_G3", "a_G4"),
-        "acceleration",
-    ),
-    **dict.fromkeys(("F12", "F32", "F43", "F14", "torque", "drive_condition"), "force"),
-    **dict.fromkeys(("torque_low", "torque_high", "friction_residual"), "force"),
-    **dict.fromkeys(("torque_error", "force_error"), "error"),
-}
-"""Every evaluated quantity and the stage that computes it."""
-OF_DRY_FRICTION = ("torque_low", "torque_high")
-OF_PIN_LOADS = ("friction_residual",)
-"""Quantities that exist only where the scene has dry friction, or friction that depends on the pin forces."""
-ANGLES = ("theta_3", "theta_4")
-VECTORS = frozenset(("A", "B", "G2", "G3", "G4", "a_A", "a_B", "a_G2", "a_G3", "a_G4", "F12", "F32", "F43", "F14"))
-UNITS = {
-    **dict.fromkeys(("theta_2", "theta_3", "theta_4"), "rad"),
-    **dict.fromkeys(("omega_2", "omega_3", "omega_4"), "rad/s"),
-    **dict.fromkeys(("alpha_2", "alpha_3", "alpha_4"), "rad/s^2"),
-    **dict.fromkeys(("A", "B", "G2", "G3", "G4"), "m"),
-    **dict.fromkeys(("a_A", "a_B", "a_G2", "a_G3", "a_G4"), "m/s^2"),
-    **dict.fromkeys(("F12", "F32", "F43", "F14"), "N"),
-    "time": "s",
-    "torque": "N m",
-    "torque_error": "N m",
-    **dict.fromkeys(("torque_low", "torque_high", "friction_residual"), "N m"),
-    "force_error": "N",
-    **dict.fromkeys(("sin_mu", "condition", "drive_condition"), "1"),
-}
-STATUS_NAMES = (
-    *("ok", "not_assembled", "singular", "jammed", "several", "no_direction", "wound"),
-    *("no_torque", "overflow"),
-)
-OK, NOT_ASSEMBLED, SINGULAR, JAMMED, SEVERAL, NO_DIRECTION, WOUND, NO_TORQUE, OVERFLOW = range(len(STATUS_NAMES))
+SCHEMA = "fourbar-analyze/1"
 
 
 @dataclass(slots=True, eq=False)
@@ -135,12 +106,10 @@ class Solution:
 
     def evaluated(self) -> list[str]:
         """Names of the quantities that were evaluated, theta_2 first."""
-        names = [f.name for f in fields(self) if f.name in UNITS]
-        return [name for name in names if getattr(self, name) is not None]
+        return [name for name in UNITS if getattr(self, name) is not None]
 
     def to_csv(self, path: "str | Path | None" = None, *, degrees: bool = False) -> str | None:
         """One line per position, every digit; the text itself, or written to a file, whole or not at all."""
-        from fourbar.tables import csv_text
         from fourbar.writing import write_text
 
         text = csv_text(self, degrees=degrees)
@@ -154,39 +123,95 @@ class Solution:
 
         Raises DependencyError where pandas is not installed.
         """
-        from fourbar.notebook import frame
-
-        return frame(self)
-
-    def _repr_html_(self) -> str:
-        from fourbar.notebook import solution_html
-
-        return solution_html(self)
+        try:
+            from pandas import DataFrame
+        except ImportError:
+            raise DependencyError('to_pandas needs pandas: pip install "fourbar[pandas]"') from None
+        known = {name: values for name, values in scalars(self).items() if values is not None}
+        return DataFrame({"status": self.status, "branch": self.branch, "drive_bar": self.drive_bar, **known})
 
 
-class Unwrapped:
-    """Makes angles continuous along a sweep, one block after the other: the first in (-pi, pi]."""
+def json_text(solution: Solution, *, degrees: bool = False) -> str:
+    """One object, SI; arrays over the positions, vectors as [x, y], null where there is no value."""
+    document: dict[str, Any] = {
+        "schema": SCHEMA,
+        "title": solution.title,
+        "angle_unit": "deg" if degrees else "rad",
+        "status": solution.status,
+        "branch": solution.branch.tolist(),
+    }
+    for name in _quantities(solution):
+        values = _values(solution, name, degrees)
+        document[name] = None if values is None else _nulled(values)
+    document["drive_bar"] = solution.drive_bar
+    document["assembled"] = solution.assembled.tolist()
+    return json.dumps(document, allow_nan=False) + "\n"
 
-    def __init__(self) -> None:
-        self.turns: float = 0.0
-        self.last: float | None = None
 
-    def extend(self, angles: Array) -> None:
-        """Unwrap the next angles, each in [-pi, pi], in place; gaps (NaN) are stepped over."""
-        low, high = float(angles.min()), float(angles.max())
-        if not np.isnan(low) and self.last is not None and self.turns == 0.0:
-            low, high = min(low, self.last), max(high, self.last)
-        if high - low < np.pi and self.turns == 0.0:
-            self.last = float(angles[-1])
-            return
-        known = np.flatnonzero(~np.isnan(angles))
-        if not len(known):
-            return
-        raw = angles[known]
-        before = raw[0] if self.last is None else self.last - self.turns
-        # -pi as a double lies inside (-pi, pi], yet reads as the excluded end
-        start = self.turns + (2.0 * np.pi if self.last is None and raw[0] == -np.pi else 0.0)
-        jumps = np.diff(raw, prepend=before)
-        turns = start - (2.0 * np.pi) * np.cumsum(np.round(jumps / (2.0 * np.pi)))
-        angles[known] = raw + turns
-        self.turns, self.last = float(turns[-1]), float(raw[-1] + turns[-1])
+def csv_text(solution: Solution, *, degrees: bool = False) -> str:
+    """One line per position; vectors as columns `A_x`, `A_y`, empty where there is no value."""
+    columns = {
+        name: [None] * len(solution) if values is None else _nulled(values)
+        for name, values in scalars(solution, degrees=degrees).items()
+    }
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(["status", "branch", "drive_bar", *columns])
+    rows = zip(solution.status, solution.branch.tolist(), *columns.values(), strict=True)
+    for status, branch, *row in rows:
+        writer.writerow([status, branch, solution.drive_bar, *("" if cell is None else repr(cell) for cell in row)])
+    return text.getvalue()
+
+
+def scalars(solution: Solution, *, degrees: bool = False) -> dict[str, Array | None]:
+    """Every quantity as columns of numbers, vectors as `A_x`, `A_y`; None for what was not evaluated."""
+    found: dict[str, Array | None] = {}
+    for name in _quantities(solution):
+        values = _values(solution, name, degrees)
+        heading = f"{name} [deg]" if degrees and name in IN_DEGREES else name
+        if name in VECTORS:
+            for axis, letter in enumerate("xy"):
+                found[f"{heading}_{letter}"] = None if values is None else values[:, axis]
+        else:
+            found[heading] = values
+    return found
+
+
+def _quantities(solution: "Solution") -> list[str]:
+    """Every quantity of a solution, evaluated or not; the time only where a free motion has one."""
+    return [name for name in UNITS if name != "time" or getattr(solution, name) is not None]
+
+
+def _values(solution: Solution, name: str, degrees: bool) -> Array | None:
+    values: Array | None = getattr(solution, name)
+    if values is not None and degrees and name in IN_DEGREES:
+        return np.degrees(values)
+    return values
+
+
+def _nulled(values: Array) -> list[Any]:
+    """Python numbers, None for what is not finite."""
+    plain = values.tolist()
+    if np.isfinite(values).all():
+        return plain  # type: ignore[no-any-return]
+    if values.ndim == 2:
+        return [[_number(x), _number(y)] for x, y in plain]
+    return [_number(x) for x in plain]
+
+
+def _number(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+def unwrap(angles: Array) -> None:
+    """Make angles in [-pi, pi] continuous along a sweep, in place: the first in (-pi, pi]; NaN is stepped over."""
+    if not len(angles) or angles.max() - angles.min() < np.pi:
+        return
+    known = np.flatnonzero(~np.isnan(angles))
+    if not len(known):
+        return
+    raw = angles[known]
+    # -pi as a double lies inside (-pi, pi], yet reads as the excluded end
+    start = 2.0 * np.pi if raw[0] == -np.pi else 0.0
+    jumps = np.diff(raw, prepend=raw[0])
+    angles[known] = raw + start - (2.0 * np.pi) * np.cumsum(np.round(jumps / (2.0 * np.pi)))

@@ -18,7 +18,7 @@ from flint import arb, arb_series, ctx
 
 from fourbar import FourBar, Gravity, Load, Viscous
 from fourbar.linkage import MOVING_BARS, PINS
-from validation.reference import closure
+from validation.engines.balls import closure
 
 BITS = 256
 """Beside a change point the terms of 1/(t . M t) grow as SINGULAR^-ORDER = 1e-34, and cancel."""
@@ -95,9 +95,9 @@ class Equations:
         self.O4 = d * theta_1.cos(), d * theta_1.sin()
         bars = [linkage.bar(number) for number in MOVING_BARS]
         mass = [arb(bar.mass) for bar in bars]
-        polar = [(arb(bar.centre[0]), arb(bar.centre[1])) for bar in bars]  # type: ignore[index]
+        polar = [(arb(bar.mass_centre[0]), arb(bar.mass_centre[1])) for bar in bars]  # type: ignore[index]
         self.centre = [(r * phi.cos(), r * phi.sin()) for r, phi in polar]
-        self.M = [arb(bar.inertia) + m * r * r for bar, m, (r, _) in zip(bars, mass, polar, strict=True)]
+        self.M = [arb(bar.moment_of_inertia) + m * r * r for bar, m, (r, _) in zip(bars, mass, polar, strict=True)]
         self.M[0] += mass[1] * a * a
         self.m3_a = mass[1] * a
         # constant forces at the mass centres, those of a bar's own axes, and couples

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 import fourbar
-from validation.judge import judge
+from validation.compare.tolerance import EPS, K
+from validation.engines.witnesses import WITNESSES
 from validation.regression import render
 from validation.regression.changes import differences
 from validation.regression.record import ACCEPTED, about, baseline, read_run
-from validation.suite.scenes import model_files
-from validation.tolerance import EPS, K
-from validation.witnesses import WITNESSES
+from validation.run.judge import judge
+from validation.scenes.suites import model_files
 
 SCENES = [(file.stem, fourbar.load(file)) for file in model_files()]
 EXACT = [witness for witness in WITNESSES if not witness.through_time]

@@ -12,15 +12,16 @@ from click.testing import CliRunner
 import fourbar
 from fourbar.scene import Command, command
 from tests.test_cost import turning
-from validation.cost import advise, dial, measure
-from validation.cost.errors import errors
-from validation.cost.exhaustive import cheapest
+from validation.compare.rows import FAILS
 from validation.engines.mujoco.closed_loop import O2, ClosedLoop
 from validation.engines.mujoco.trial import Rig
-from validation.judge import judge
-from validation.results import FAILS
-from validation.suite.scenes import MODELS
-from validation.witnesses import WITNESSES
+from validation.engines.witnesses import WITNESSES
+from validation.run import dial
+from validation.run.judge import judge
+from validation.scenes.suites import MODELS
+from validation.studies.cost import advise, measure
+from validation.studies.cost.errors import errors
+from validation.studies.cost.exhaustive import cheapest
 
 
 @pytest.mark.parametrize("omega", [10.0, 100.0, 1000.0])

@@ -14,10 +14,10 @@ import numpy as np
 import pytest
 
 import fourbar
-from fourbar import animate
 from fourbar.errors import DependencyError, InputError, NotAssembledError
-from fourbar.motion_law import Law
-from fourbar.pictures import LARGEST
+from fourbar.files.pictures import LARGEST
+from fourbar.scene.motion_law import Law
+from fourbar.show import animate
 from tests.scenes import crank_rocker, thesis
 
 HOSTILE = "</script><script>alert(1)</script> \"'><img src=x onerror=alert(2)> $style ${data} {{x}} \u2028 \x00 é"
@@ -149,7 +149,7 @@ def test_a_picture_is_embedded_where_it_is_one(tmp_path: Path) -> None:
     [
         ("input", b"<svg onload='alert(1)'/>", "PNG or JPEG"),
         ("input", b"", "PNG or JPEG"),
-        ("input", PNG + bytes(LARGEST), "must not exceed 2000000"),
+        ("input", PNG + bytes(LARGEST), f"must not exceed {LARGEST}"),
         ("input", None, "there is no such file"),
         ("wheel", PNG, "must name one of input, coupler, output"),
     ],
@@ -217,9 +217,9 @@ def test_a_film_of_a_free_motion_runs_forward_and_as_long_as_it_does(
 ) -> None:
     from PIL import Image
 
-    from fourbar.plot import film as films
-    from fourbar.plot.film import frames
-    from fourbar.plot.view import view
+    from fourbar.show.plot import film as films
+    from fourbar.show.plot.film import frames
+    from fourbar.show.plot.view import view
 
     shown = view(RELEASED)
     assert np.all(np.diff(frames(shown, 46)) == 2) and shown.sweep.time[frames(shown, 46)[-1]] == 1.8
@@ -230,8 +230,8 @@ def test_a_film_of_a_free_motion_runs_forward_and_as_long_as_it_does(
 
 
 def test_a_film_of_a_rocker_goes_there_and_back() -> None:
-    from fourbar.plot.film import frames
-    from fourbar.plot.view import view
+    from fourbar.show.plot.film import frames
+    from fourbar.show.plot.view import view
 
     shown = view(thesis())
     order = frames(shown, 40)

@@ -10,7 +10,8 @@ import pytest
 from fourbar.cli import status
 from fourbar.errors import FourBarError, InputError
 from fourbar.exits import BAD_INPUT
-from fourbar.files import LARGEST_FILE, loads, read_text
+from fourbar.files import loads, read_text
+from fourbar.files.scene_file import LARGEST_FILE
 
 GOOD = """title = "good"
 [lengths]

@@ -3,7 +3,7 @@
 import numpy as np
 
 import fourbar
-from fourbar.bearing import bearing_load, drive_power, shaking_force, shaking_moment
+from fourbar.show.bearing import bearing_load, drive_power, shaking_force, shaking_moment
 from tests.scenes import crank_rocker
 
 ROUND_OFF = 1e-11
@@ -21,7 +21,7 @@ def test_shaking_is_the_momentum_that_the_bars_lose() -> None:
     ):
         bar = scene.linkage.bar(number)
         force -= bar.mass * a
-        moment -= bar.mass * (G[:, 0] * a[:, 1] - G[:, 1] * a[:, 0]) + bar.inertia * alpha
+        moment -= bar.mass * (G[:, 0] * a[:, 1] - G[:, 1] * a[:, 0]) + bar.moment_of_inertia * alpha
     assert np.abs(shaking_force(s) - force).max() < ROUND_OFF * np.abs(force).max()
     assert np.abs(shaking_moment(scene.linkage, s) - moment).max() < ROUND_OFF * np.abs(moment).max()
     assert np.array_equal(drive_power(s), s.torque * 10.0)

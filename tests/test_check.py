@@ -11,13 +11,14 @@ import pytest
 
 import fourbar
 from fourbar.exits import BAD_INPUT, FAILED, HOLDS
-from fourbar.scene import Command, Scene, command, solve
-from fourbar.solution import OK, UNITS, VECTORS
-from validation.check.command import Judgement, judge_table
+from fourbar.quantities import OK, UNITS, VECTORS
+from fourbar.scene import Command, Scene, command
+from fourbar.solve import solve
+from validation.check.check import Judgement, judge_table
 from validation.check.theirs import LARGEST_FILE, NOT_JUDGED, read_table
 from validation.cli import status
-from validation.scales import TERMS, yardstick
-from validation.tolerance import POWER
+from validation.compare.scales import TERMS, yardstick
+from validation.compare.tolerance import POWER
 
 MODELS = Path(__file__).parents[1] / "models"
 SCENES = {
@@ -124,9 +125,8 @@ def inertial_times(scene: Scene, by_mass: float, by_inertia: float) -> Numbers:
         extra = []
         for bar in (2, 3, 4):
             described = scene.linkage.bar(bar)
-            assert described.inertia is not None
             x, y = (by_mass - 1.0) * -described.mass * getattr(motion, f"a_G{bar}")[i]
-            couple = (by_inertia - 1.0) * -described.inertia * float(getattr(motion, f"alpha_{bar}")[i])
+            couple = (by_inertia - 1.0) * -described.moment_of_inertia * float(getattr(motion, f"alpha_{bar}")[i])
             force = (math.hypot(x, y), math.atan2(y, x))
             extra.append(fourbar.Load(bar, force, moment=couple))
         here = Command(at.theta_2[i : i + 1], at.branch[i : i + 1], at.omega_2, at.alpha_2)
@@ -138,16 +138,14 @@ def inertial_times(scene: Scene, by_mass: float, by_inertia: float) -> Numbers:
 
 def other_pin(scene: Scene) -> Scene:
     bar = scene.linkage.coupler
-    assert bar.centre is not None
-    r, phi = bar.centre
+    r, phi = bar.mass_centre
     x, y = bar.length - r * math.cos(phi), r * math.sin(phi)
     return bars(scene, coupler=replace(bar, centre=(math.hypot(x, y), math.atan2(y, x))))
 
 
 def about_pin(scene: Scene) -> Scene:
     bar = scene.linkage.output
-    assert bar.inertia is not None and bar.centre is not None
-    return bars(scene, output=replace(bar, inertia=bar.inertia + bar.mass * bar.centre[0] ** 2))
+    return bars(scene, output=replace(bar, inertia=bar.moment_of_inertia + bar.mass * bar.mass_centre[0] ** 2))
 
 
 def exchanged(scene: Scene) -> Numbers:
@@ -184,7 +182,7 @@ MISTAKES: list[tuple[str, str, tuple[str, ...], Callable[[Scene], Numbers], str]
     ("no inertia", "thesis", FORCES,
      solved(lambda s: bars(s, coupler=replace(s.linkage.coupler, inertia=0.0))), "coupler: moment of inertia left out"),
     ("kg cm^2 for kg m^2", "thesis", FORCES,
-     solved(lambda s: bars(s, output=replace(s.linkage.output, inertia=s.linkage.output.inertia * 1e4))),
+     solved(lambda s: bars(s, output=replace(s.linkage.output, inertia=s.linkage.output.moment_of_inertia * 1e4))),
      "output: moment of inertia in kg cm^2 taken for kg m^2"),
     ("drive on bar 2", "thesis", FORCES, solved(lambda s: replace(s, drive_bar=2)), "on bar 2 instead of bar 4"),
     ("m a in kg cm/s^2", "thesis", FORCES, lambda s: inertial_times(s, 100.0, 1.0), "m a in kg cm/s^2 added to N"),

@@ -9,18 +9,19 @@ import stat
 import subprocess
 import sys
 from collections.abc import Callable
+from importlib import import_module
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import fourbar
-from fourbar import tables
 from fourbar.cli import status
 from fourbar.errors import DependencyError
 from fourbar.exits import BROKEN, HOLDS, INTERRUPTED
 from fourbar.files import load, save
-from fourbar.solution import UNITS, VECTORS
+from fourbar.quantities import UNITS, VECTORS
+from fourbar.show import tables
 from tests.scenes import crank_rocker, thesis
 
 ROOT = Path(__file__).parent.parent
@@ -284,7 +285,7 @@ def test_what_goes_wrong_is_one_line_and_a_status(
     def broken(_: object) -> None:
         raise error
 
-    monkeypatch.setattr("fourbar.scene.solve", broken)
+    monkeypatch.setattr(import_module("fourbar.solve"), "solve", broken)
     monkeypatch.delenv("FOURBAR_TRACEBACK", raising=False)
     found, out, err = run("analyze", MODELS / "thesis.toml", "--json", "-o", tmp_path / "out")
     # after an interrupt click ends the line that the terminal has begun with ^C

@@ -1,17 +1,18 @@
 """Kinematic coefficients by differentiation in 50 digits, instant centres by Kennedy's theorem, coupler curves."""
 
 import math
+from typing import NamedTuple
 
 import mpmath as mp
 import numpy as np
 import pytest
 
-from fourbar.circuits import circuits
-from fourbar.coefficients import Centre, bar_coefficients, coupler_curve, instant_centres, point_coefficients
-from fourbar.kinematics import add_accelerations, add_velocities, close_loop
+from fourbar.formulas.circuits import circuits
+from fourbar.formulas.mobility import intervals, turns_fully
+from fourbar.formulas.motion import State
+from fourbar.formulas.path import state
+from fourbar.formulas.points import Centre, coupler_curve, instant_centres, point_coefficients
 from fourbar.linkage import Bar, FourBar
-from fourbar.mobility import intervals, turns_fully
-from fourbar.state import State
 
 EPS = 2.0**-52
 FIRST, SECOND = 32.0, 128.0
@@ -22,28 +23,43 @@ COLLINEAR = 64.0 * EPS
 magnified by 1/|sin mu|."""
 
 
-def random_states(seed: int, count: int, least_sine: float = 0.05) -> list[State]:
+class Drawn(NamedTuple):
+    """A linkage in one position."""
+
+    bars: FourBar
+    theta_2: np.ndarray
+    branch: int
+
+    def moving(self, omega_2: float = 1.0, alpha_2: float = 0.0) -> State:
+        return state(self.bars, self.theta_2, self.branch, omega_2, alpha_2)
+
+    @property
+    def sine(self) -> float:
+        return float(abs(self.moving().at.sin_mu[0]))
+
+
+def random_positions(seed: int, count: int, least_sine: float = 0.05) -> list[Drawn]:
     """One regular position each of random linkages, on a random branch."""
     rng = np.random.default_rng(seed)
-    found: list[State] = []
+    found: list[Drawn] = []
     while len(found) < count:
         d, a, b, c = rng.uniform(0.1, 1.0, 4).tolist()
         if 2.0 * max(d, a, b, c) > d + a + b + c - 0.01:
             continue
         bars = FourBar(d, Bar(a), Bar(b), Bar(c), float(rng.uniform(-math.pi, math.pi)))
         start, stop = intervals(bars)[-1]
-        state = close_loop(bars, rng.uniform(start, stop, 1), int(rng.choice([-1, 1])))
-        if abs(state.sin_mu[0]) > least_sine:
-            found.append(state)
+        drawn = Drawn(bars, rng.uniform(start, stop, 1), int(rng.choice([-1, 1])))
+        if drawn.sine > least_sine:
+            found.append(drawn)
     return found
 
 
 class Exact:
     """Position in 50 digits by the intersection of two circles in the complex plane."""
 
-    def __init__(self, state: State) -> None:
-        self.d, self.a, self.b, self.c = (mp.mpf(length) for length in state.linkage.lengths)
-        self.theta_1, self.sign = mp.mpf(state.linkage.ground_angle), int(state.branch[0])
+    def __init__(self, drawn: Drawn) -> None:
+        self.d, self.a, self.b, self.c = (mp.mpf(length) for length in drawn.bars.lengths)
+        self.theta_1, self.sign = mp.mpf(drawn.bars.ground_angle), drawn.branch
 
     def pin_b(self, theta_2: mp.mpf) -> tuple[mp.mpc, mp.mpc, mp.mpc]:
         pin_a, pin_4 = self.a * mp.expj(theta_2), self.d * mp.expj(self.theta_1)
@@ -63,20 +79,16 @@ class Exact:
 
 def test_bar_coefficients_are_derivatives() -> None:
     with mp.workdps(50):
-        for state in random_states(11, 60):
-            exact, at = Exact(state), mp.mpf(float(state.theta_2[0]))
-            sine = float(abs(state.sin_mu[0]))
-            found = bar_coefficients(state)
-            for bar, first, second in (
-                (3, found.theta_3, found.theta_3_second),
-                (4, found.theta_4, found.theta_4_second),
-            ):
+        for drawn in random_positions(11, 60):
+            exact, at = Exact(drawn), mp.mpf(float(drawn.theta_2[0]))
+            sine, k = drawn.sine, drawn.moving().k
+            for bar, first, second in ((3, k.h3, k.dh3), (4, k.h4, k.dh4)):
                 # about the direction itself, so that the angle never jumps
                 here = exact.angle(bar, at)
                 derivatives = [
                     mp.diff(lambda x, e=exact, b=bar, h=here: _near(e.angle(b, x), h), at, n) for n in (1, 2)
                 ]
-                size = 1.0 + state.linkage.input.length / min(state.linkage.lengths)
+                size = 1.0 + drawn.bars.input.length / min(drawn.bars.lengths)
                 assert abs(first[0] - derivatives[0]) <= FIRST * EPS * size**2 / sine**2
                 assert abs(second[0] - derivatives[1]) <= SECOND * EPS * size**3 / sine**4
 
@@ -87,34 +99,35 @@ def _near(angle: mp.mpf, about: mp.mpf) -> mp.mpf:
 
 def test_point_coefficients_are_derivatives() -> None:
     with mp.workdps(50):
-        for state in random_states(12, 40):
-            exact, at, sine = Exact(state), mp.mpf(float(state.theta_2[0])), float(abs(state.sin_mu[0]))
-            found = point_coefficients(state, 3, 0.3, -0.2)
-            size = 1.0 + state.linkage.input.length / min(state.linkage.lengths)
-            for n, (x, y), roundings in ((1, found.first, FIRST), (2, found.second, SECOND)):
+        for drawn in random_positions(12, 40):
+            exact, at, sine = Exact(drawn), mp.mpf(float(drawn.theta_2[0])), drawn.sine
+            found = point_coefficients(*drawn, 3, 0.3 - 0.2j)
+            size = 1.0 + drawn.bars.input.length / min(drawn.bars.lengths)
+            for n, value, roundings in ((1, found.first, FIRST), (2, found.second, SECOND)):
                 derivative = mp.diff(lambda angle, e=exact: e.point(angle, 0.3, -0.2), at, n)
-                error = abs(mp.mpc(x[0], y[0]) - derivative)
+                error = abs(mp.mpc(value[0]) - derivative)
                 assert error <= roundings * EPS * size ** (n + 1) / sine ** (2 * n)
 
 
 def test_a_motion_law_follows_from_the_coefficients() -> None:
-    state = random_states(13, 1, 0.5)[0]
-    bars, points = bar_coefficients(state), point_coefficients(state, 3, 0.1, 0.4)
+    drawn = random_positions(13, 1, 0.5)[0]
+    k, points = drawn.moving().k, point_coefficients(*drawn, 3, 0.1 + 0.4j)
     omega_2, alpha_2 = -7.0, 31.0
-    add_velocities(state, omega_2)
-    add_accelerations(state, alpha_2)
-    assert state.omega(4) == pytest.approx(bars.theta_4 * omega_2, rel=8 * EPS)
-    expected = bars.theta_3_second * omega_2**2 + bars.theta_3 * alpha_2
-    assert state.alpha(3) == pytest.approx(expected, rel=64 * EPS)
-    for i in (0, 1):
-        law = points.second[i] * omega_2**2 + points.first[i] * alpha_2
-        assert state.acceleration(3, 0.1, 0.4)[i] == pytest.approx(law, abs=1e3 * EPS * omega_2**2)
+    moving = drawn.moving(omega_2, alpha_2)
+    assert moving.omega(4) == pytest.approx(k.h4 * omega_2, rel=8 * EPS)
+    expected = k.dh3 * omega_2**2 + k.h3 * alpha_2
+    assert moving.alpha(3) == pytest.approx(expected, rel=64 * EPS)
+    law = points.second * omega_2**2 + points.first * alpha_2
+    assert moving.acceleration(3, 0.1 + 0.4j) == pytest.approx(law, abs=1e3 * EPS * omega_2**2)
 
 
-def test_coefficients_leave_the_state_as_it_was() -> None:
-    state = random_states(14, 1)[0]
-    bar_coefficients(state)
-    assert state.omega_3 is None and state.first is None and state.omega_2 == 0.0
+def test_differences_of_coefficients_are_those_of_two_bars() -> None:
+    for drawn in random_positions(14, 60):
+        k = drawn.moving().k
+        size = 1.0 + np.abs(k.h3) + np.abs(k.h4)
+        assert np.abs(k.h23 - (k.h2 - k.h3)) <= FIRST * EPS * size / drawn.sine
+        assert np.abs(k.h43 - (k.h4 - k.h3)) <= FIRST * EPS * size / drawn.sine
+        assert (k.h2, k.dh2) == (1.0, 0.0)
 
 
 def determinant(*centres: Centre) -> tuple[float, float]:
@@ -124,35 +137,35 @@ def determinant(*centres: Centre) -> tuple[float, float]:
 
 
 def test_three_centres_of_three_bars_are_collinear() -> None:
-    for state in random_states(15, 300):
-        centres = instant_centres(state)
+    for drawn in random_positions(15, 300):
+        centres = instant_centres(*drawn)
         assert sorted(centres) == [(1, 2), (1, 3), (1, 4), (2, 3), (2, 4), (3, 4)]
         for i, j, k in ((1, 2, 3), (1, 2, 4), (1, 3, 4), (2, 3, 4)):
             gap, size = determinant(centres[i, j], centres[j, k], centres[i, k])
-            assert abs(gap) <= COLLINEAR * size / abs(float(state.sin_mu[0]))
+            assert abs(gap) <= COLLINEAR * size / drawn.sine
 
 
 def test_the_coupler_turns_about_I13_and_bars_2_and_4_share_I24() -> None:
-    for state in random_states(16, 200):
-        add_velocities(state, 1.0)
-        (x, y), sine = instant_centres(state)[1, 3].point, float(abs(state.sin_mu[0]))
-        spin = float(np.asarray(state.omega(3))[0])
-        speed = state.velocity(3, 0.0, 0.0)
-        pin = state.pin("A")
-        still = math.hypot(speed[0][0] - spin * (y[0] - pin[1][0]), speed[1][0] + spin * (x[0] - pin[0][0]))
+    for drawn in random_positions(16, 200):
+        moving, sine = drawn.moving(), drawn.sine
+        O4 = drawn.bars.ground * moving.at.u1
+        (x, y) = instant_centres(*drawn)[1, 3].point
+        spin = float(moving.omega(3)[0])
+        pin, speed = moving.foot(3)[0], moving.velocity(3, 0.0)[0]
+        still = abs(speed + 1j * spin * (complex(x[0], y[0]) - pin))
         reach = abs(spin) * math.hypot(x[0], y[0]) + 1.0
         assert still <= 1e3 * EPS * reach / sine**3
-        (x, y) = instant_centres(state)[2, 4].point
-        spin_4 = float(np.asarray(state.omega(4))[0])
+        (x, y) = instant_centres(*drawn)[2, 4].point
+        spin_4 = float(moving.omega(4)[0])
         # both bars give the same velocity there: x r_2 = omega_4 (r_2 - O4)
-        apart = math.hypot(x[0] - spin_4 * (x[0] - state.O4[0]), y[0] - spin_4 * (y[0] - state.O4[1]))
-        assert apart <= 1e3 * EPS * (math.hypot(x[0], y[0]) + 1.0) * (1.0 + abs(spin_4)) / sine**3
+        here = complex(x[0], y[0])
+        apart = abs(here - spin_4 * (here - O4))
+        assert apart <= 1e3 * EPS * (abs(here) + 1.0) * (1.0 + abs(spin_4)) / sine**3
 
 
 def test_centres_at_infinity_have_a_direction() -> None:
     # a parallelogram: bars 2, 4 are parallel, so is the coupler to the ground
-    state = close_loop(FourBar(2.0, Bar(1.0), Bar(2.0), Bar(1.0)), np.array([1.0]), 1)
-    centres = instant_centres(state)
+    centres = instant_centres(FourBar(2.0, Bar(1.0), Bar(2.0), Bar(1.0)), np.array([1.0]), 1)
     assert centres[1, 3].w[0] == 0.0 and centres[2, 4].w[0] == 0.0
     assert math.atan2(centres[1, 3].y[0], centres[1, 3].x[0]) % math.pi == pytest.approx(1.0, abs=4 * EPS)
     assert centres[2, 4].y[0] == 0.0 and centres[2, 4].x[0] != 0.0

@@ -14,15 +14,15 @@ import fourbar
 from fourbar.mjcf import Settings
 from fourbar.scene import command
 from tests.scenes import crank_rocker, thesis
-from validation.bench import LINKAGE
-from validation.cost import formulas, laws, orders, pictures, study
-from validation.cost.command import cost
-from validation.cost.curves import BEST
-from validation.cost.errors import NO_ANSWER, QUANTITIES, Errors, errors
 from validation.engines.mujoco import drives
 from validation.engines.mujoco.one_state import MujocoOneState
 from validation.engines.mujoco.trial import Build, Rig
 from validation.engines.pinocchio_forward import PinocchioForward
+from validation.stress.bench import LINKAGE
+from validation.studies.cost import formulas, laws, orders, pictures, study
+from validation.studies.cost.cost import cost
+from validation.studies.cost.curves import BEST
+from validation.studies.cost.errors import NO_ANSWER, QUANTITIES, Errors, errors
 
 
 def turning(omega: float = 10.0, positions: int = 36) -> fourbar.Scene:

@@ -13,28 +13,28 @@ import pytest
 
 import fourbar
 from fourbar.exits import FAILED, HOLDS
-from fourbar.mobility import limit_positions
+from fourbar.formulas.mobility import limit_positions
 from fourbar.scene import Command, Scene, command
 from tests.scenes import crank_rocker
 from tests.test_harness import Echo
 from tests.test_regression import HERE, ROW, save
-from validation.answer import Answer, Released
 from validation.check.model import ModelReport
 from validation.cli import status
-from validation.compare import compare
-from validation.cost.laws import Law
-from validation.counts import Counts
-from validation.hard import free
-from validation.judge import judge, judged_page
-from validation.mutation import command as mutation
+from validation.compare.answer import Answer, Released
+from validation.compare.compare import compare
+from validation.compare.counts import Counts
+from validation.compare.rows import AGREES, DEGRADED, FAILS, REFUSES, UNTOLD, VERDICTS, Row, from_csv, write_results
+from validation.compare.tolerance import EQUIVALENCE
+from validation.engines.witnesses import WITNESSES, Witness
 from validation.regression import render
 from validation.regression.changes import differences
 from validation.report.html import html as page_of
 from validation.report.markdown import markdown
 from validation.report.summary import summarise
-from validation.results import AGREES, DEGRADED, FAILS, REFUSES, UNTOLD, VERDICTS, Row, from_csv, write_results
-from validation.tolerance import EQUIVALENCE
-from validation.witnesses import WITNESSES, Witness
+from validation.run import released as free
+from validation.run.judge import judge, judged_page
+from validation.stress.mutation import mutation
+from validation.studies.cost.laws import Law
 
 NAN = math.nan
 
@@ -151,7 +151,9 @@ def test_where_no_loop_closes_no_identity_is_counted_as_held() -> None:
 
 
 def test_an_identity_that_is_asked_nowhere_is_not_counted_as_held(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("validation.identities.reversing", lambda scene, solution, _: np.ones(len(solution), bool))
+    monkeypatch.setattr(
+        "validation.compare.identities.reversing", lambda scene, solution, _: np.ones(len(solution), bool)
+    )
     verdicts = {row.quantity: row.verdict for row in judge("scene", crank_rocker(), []).rows}
     assert verdicts == {"closure": AGREES, "force_sum": UNTOLD, "moment_sum": UNTOLD}
 
@@ -285,11 +287,11 @@ def test_numbers_that_nothing_can_be_told_of_do_not_agree(tmp_path: Path, capsys
 def test_a_study_in_which_no_law_is_fitted_is_no_success(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr("validation.cost.study.Study.points", lambda _: iter(()))
-    monkeypatch.setattr("validation.cost.command.write", lambda *_: [])
+    monkeypatch.setattr("validation.studies.cost.study.Study.points", lambda _: iter(()))
+    monkeypatch.setattr("validation.studies.cost.cost.write", lambda *_: [])
     law = Law("order", "torque", 4.0, 0.1, 4.0, 9)
     for found, code in (([], FAILED), ([replace(law, points=1)], FAILED), ([law], HOLDS)):
-        monkeypatch.setattr("validation.cost.command.laws", lambda _, found=found: found)
+        monkeypatch.setattr("validation.studies.cost.cost.laws", lambda _, found=found: found)
         assert status(["cost", "--out", str(tmp_path)]) == code
         assert ("Nothing was compared" in capsys.readouterr().out) == (code == FAILED)
 

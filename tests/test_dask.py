@@ -17,9 +17,9 @@ import pytest
 from fourbar.errors import InputError
 from tests.test_suite import COUNT, EXACT, KILLS, SEED, TYPES, judge_all
 from validation.report.summary import Summary
-from validation.run import run
-from validation.suite import pool
-from validation.suite.scenes import Random
+from validation.run import pool
+from validation.run.run import run
+from validation.scenes.suites import Random
 
 distributed = pytest.importorskip("distributed", reason="Dask is optional")
 dask = pytest.importorskip("dask", reason="Dask is optional")
@@ -68,8 +68,8 @@ def test_killed_workers_change_no_byte(cluster: object, tmp_path: Path) -> None:
 
 def test_a_worker_in_which_an_engine_hangs_ends_itself() -> None:
     code = (
-        "from tests.test_suite import Few; from validation.suite.pool import judge_watched; "
-        "from validation.tolerance import EQUIVALENCE; from validation.witnesses import Witness; "
+        "from tests.test_suite import Few; from validation.run.pool import judge_watched; "
+        "from validation.compare.tolerance import EQUIVALENCE; from validation.engines.witnesses import Witness; "
         "judge_watched(5.0, Few(), [2], [Witness('moody', 'tests.test_suite:Moody', EQUIVALENCE)], False)"
     )
     began = time.monotonic()

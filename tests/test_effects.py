@@ -11,7 +11,6 @@ import pytest
 
 import fourbar
 from fourbar.effects import (
-    REGISTRY,
     Effect,
     Flywheel,
     Friction,
@@ -24,14 +23,19 @@ from fourbar.effects import (
     Table,
     Torsion,
     Viscous,
-    Wrenches,
 )
-from fourbar.scene import Scene
+from fourbar.effects.actions import Actions, bodies
+from fourbar.files.effects import REGISTRY
+from fourbar.formulas.path import state
+from fourbar.formulas.pin_forces import Bodies, dot
+from fourbar.linkage import MOVING_BARS
+from fourbar.scene import Scene, command
 from tests.scenes import crank_rocker
-from validation.engines import free_body_effects
-from validation.judge import judge
-from validation.stability.energy import by_energy
-from validation.witnesses import WITNESSES
+from validation.engines import free_body, free_body_effects
+from validation.engines.effects import TERM_OF
+from validation.engines.free_body_closure import close
+from validation.engines.witnesses import WITNESSES
+from validation.run.judge import judge
 
 TABLE = Table((0.0, 1.0, 2.5, 2 * np.pi), (0.0, 1.0, -0.5, 0.0))
 ACTING: dict[str, Effect] = {
@@ -53,7 +57,7 @@ ACTING: dict[str, Effect] = {
 EXACT = [witness for witness in WITNESSES if not witness.through_time]
 SIMULATED = [replace(witness, order="") for witness in WITNESSES if witness.through_time]
 ENGINES = {"pinocchio-inverse", "mujoco-inverse"}
-"""What asks an effect for its `engine_term`."""
+"""What acts by `TERM_OF`, the table of the engines."""
 INVERSE = {*ENGINES, "free-body"}
 NO_COUNTERPART = {"mujoco-simulated": {"pin_friction"}}
 """What an engine cannot do; it must say so, and the others remain."""
@@ -131,15 +135,19 @@ def test_a_turned_frame_turns_gravity_with_it() -> None:
 # faults
 
 
-def changed(effect: Effect, factor: float) -> Callable[[Any, Wrenches, Any], None]:
-    right = type(effect).add_wrenches
+def changed(effect: Effect, factor: float) -> Callable[[Any, Actions, Any], None]:
+    right = type(effect).act
 
-    def faulty(self: Any, wrenches: Wrenches, state: Any) -> None:
-        alone = Wrenches(state)
+    def faulty(self: Any, actions: Actions, state: Any) -> None:
+        alone = Actions(state, actions.bodies, actions.side)
         right(self, alone, state)
-        for bar in (2, 3, 4):
-            wrenches.add_force(bar, tuple(factor * x for x in alone.force(bar)))  # type: ignore[arg-type]
-            wrenches.add_moment(bar, factor * alone.moment(bar))
+        for put, sums in (
+            (actions.force, alone.forces),
+            (actions.moment, alone.moments),
+            (actions.couple, alone.couples),
+        ):
+            for where, acting in sums.items():
+                put(where, factor * acting)  # type: ignore[operator]
 
     return faulty
 
@@ -173,11 +181,11 @@ def moved(effect: Effect) -> Effect:
 @contextmanager
 def formulas_see(change: Callable[[Scene], Scene]) -> Iterator[None]:
     """The formulas work on a changed scene, the engines on the true one."""
-    import validation.judge
+    import validation.run.judge
 
-    true = validation.judge.solve
+    true = validation.run.judge.solve
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(validation.judge, "solve", lambda scene, *a, **k: true(change(scene), *a, **k))
+        patch.setattr(validation.run.judge, "solve", lambda scene, *a, **k: true(change(scene), *a, **k))
         yield
 
 
@@ -194,6 +202,14 @@ def reversed_slip(term: Effect) -> list[Effect]:
     """Pin-load friction that drives instead of braking."""
     assert isinstance(term, PinFriction)
     return [PinFriction(tuple((pin, -mu, r) for pin, mu, r in term.pins))]
+
+
+class Lightening(Flywheel):
+    """A flywheel that takes its inertia from the bar."""
+
+    def carried_by(self, bodies: Bodies) -> Bodies:
+        two, three, four = bodies
+        return two._replace(I=two.I - self.inertia), three, four
 
 
 @pytest.mark.parametrize("name", ACTING)
@@ -213,9 +229,12 @@ def test_a_fault_in_the_formulas_fails_the_run(name: str, fault: str) -> None:
     elif name == "pin_friction":
         with formulas_see(each_term(reversed_slip)):
             found = failing(asked, inverse)
+    elif name == "flywheel":
+        with formulas_see(each_term(lambda term: [Lightening(0.02, 2)])):
+            found = failing(asked, inverse)
     else:
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(type(effect), "add_wrenches", changed(effect, -1.0))
+            patch.setattr(type(effect), "act", changed(effect, -1.0))
             found = failing(asked, inverse)
     assert {engine for engine, _, _ in found} >= INVERSE
     assert "torque" in {quantity for _, quantity, _ in found}
@@ -266,25 +285,40 @@ def test_a_fault_in_the_wrench_on_the_free_bodies_fails_the_run(
 @pytest.mark.parametrize("name", ACTING)
 @pytest.mark.parametrize("factor", [-1.0, 2.0, 0.0], ids=["wrong sign", "applied twice", "missing"])
 def test_a_fault_in_the_engine_term_fails_the_run(name: str, factor: float, monkeypatch: pytest.MonkeyPatch) -> None:
-    effect = ACTING[name]
-    right = type(effect).engine_term
-    monkeypatch.setattr(type(effect), "engine_term", lambda self, tree: right(self, FaultyTree(tree, factor)))
+    key = ACTING[name].key
+    right = TERM_OF[key]
+    monkeypatch.setitem(TERM_OF, key, lambda effect, tree: right(effect, FaultyTree(tree, factor)))
     found = failing(scene(name), [witness for witness in EXACT if witness.name in ENGINES])
     assert {engine for engine, _, _ in found} >= ENGINES
 
 
 @pytest.mark.parametrize("name", [n for n in ACTING if n not in ("pin_friction", "flywheel")])
-def test_the_power_of_an_effect_is_that_of_its_forces(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The energy method, by which a free motion runs, against Newton-Euler; a wrong sign must show."""
+def test_the_work_of_an_effect_is_that_of_the_forces_on_the_free_bodies(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Power = sum of F v + M omega, with F and M of the witness and velocities of the first pins; a sign must show."""
     asked, effect = scene(name), ACTING[name]
-    torque = fourbar.solve(asked).torque
-    assert torque is not None
+    where, linkage = command(asked), asked.linkage
+    moving = state(linkage, where.theta_2, where.branch, 10.0, 3.0)
+    n = len(where.theta_2)
+    closed = close(linkage, where.theta_2, where.branch)
+    on = free_body_effects.acting(
+        asked, free_body.move(linkage, where.theta_2, np.full(n, 10.0), np.full(n, 3.0), *closed.theta)
+    )
+    pin = {2: 0.0j, 3: moving.velocity(2, linkage.input.length), 4: 0.0j}
+    by_bar = {bar: dot(on.force[bar], pin[bar]) + on.moment[bar] * moving.omega(bar) for bar in MOVING_BARS}
+    others = by_bar[3] + by_bar[4]
+    expected = np.array([by_bar[2] + others, others])
 
     def off() -> float:
-        return float(np.abs(by_energy(asked, fourbar.command(asked))[1]["torque"] - torque).max())  # type: ignore[operator]
+        actions = Actions(moving, bodies(linkage))
+        effect.act(actions, moving)
+        # of all bars, and of bars 3 and 4 alone
+        return max(
+            np.abs(work * moving.speed - power).max() for work, power in zip(actions.work(), expected, strict=True)
+        )
 
-    allowed = 1e-12 * np.abs(torque).max()
+    allowed = 1e-12 * np.abs(expected).max()
     assert off() <= allowed
-    right = type(effect).power
-    monkeypatch.setattr(type(effect), "power", lambda self, state: -right(self, state))
+    monkeypatch.setattr(type(effect), "act", changed(effect, -1.0))
     assert off() > 1e6 * allowed

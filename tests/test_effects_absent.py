@@ -8,11 +8,11 @@ import mujoco
 import pytest
 
 import fourbar
-from fourbar.effects import REGISTRY, Friction, Viscous
+from fourbar.effects import FILE_OF, Friction, Viscous
 from fourbar.mjcf import mjcf
 from tests.scenes import crank_rocker
 from tests.test_effects import ACTING
-from validation.effect_absent import ABSENT, build, differences, made
+from validation.studies.effects.absent import ABSENT, TABLES, build, differences, made
 
 ROOT = Path(fourbar.__file__).parent.parent
 
@@ -26,17 +26,19 @@ def whole() -> dict[str, object]:
 def test_a_build_that_never_heard_of_an_effect_gives_the_same_bits(
     key: str, whole: dict[str, object], tmp_path: Path
 ) -> None:
-    assert differences(whole, made(build(tmp_path, key))) == []
+    other = build(tmp_path, key)
+    assert not any(f'"{key}": ' in (other / "fourbar" / table).read_text() for table in TABLES)
+    assert differences(whole, made(other)) == []
 
 
 def test_a_build_that_pays_for_an_absent_effect_is_noticed(whole: dict[str, object], tmp_path: Path) -> None:
     """One that runs a term of size zero, and one whose MJCF leaves a flag on."""
     other = build(tmp_path)
-    blocks, model = other / "fourbar" / "blocks.py", other / "fourbar" / "mjcf" / "model.py"
-    text = blocks.read_text()
+    solver, model = other / "fourbar" / "case.py", other / "fourbar" / "mjcf" / "model.py"
+    text = solver.read_text()
     changed = text.replace("(*scene.loads, *scene.effects)", "(Viscous.at(O2=0.0), *scene.loads, *scene.effects)")
     assert changed != text
-    blocks.write_text(changed + "\n\nfrom fourbar.effects import Viscous\n")
+    solver.write_text(changed + "\n\nfrom fourbar.effects import Viscous\n")
     text = model.read_text()
     assert '"island", ' in text
     model.write_text(text.replace('"island", ', ""))
@@ -47,9 +49,9 @@ def test_a_build_that_pays_for_an_absent_effect_is_noticed(whole: dict[str, obje
 
 def test_no_term_of_an_effect_runs_in_a_scene_without_effects(whole: dict[str, object]) -> None:
     calls = whole["calls"]
-    assert isinstance(calls, list) and "add_inertia" in calls
-    names = {effect.__name__ for effect in REGISTRY.values()} | {"Load", "PinFriction", "torque_interval", "settle"}
-    assert not [call for call in calls if call.split(".")[0] in names]
+    assert isinstance(calls, list) and "inertia_wrenches" in calls
+    names = {*FILE_OF, "Load", "torque_interval", "settle"}
+    assert not [call for call in calls if names & set(call.split("."))]
 
 
 def test_an_effect_that_is_named_runs() -> None:
@@ -63,7 +65,7 @@ def test_an_effect_that_is_named_runs() -> None:
     sys.setprofile(note)
     fourbar.solve(crank_rocker(loads=(), effects=(Viscous.at(O2=0.1),)))
     sys.setprofile(None)
-    assert "Viscous.add_wrenches" in calls and "Gravity.add_wrenches" not in calls
+    assert "Viscous.act" in calls and "Gravity.act" not in calls
 
 
 def compiled(*names: str) -> mujoco.MjModel:
@@ -127,7 +129,7 @@ def test_an_effect_of_zero_size_is_still_named() -> None:
 POSITIONS_ONLY = """
 import sys
 import fourbar
-from validation.judge import judge
+from validation.run.judge import judge
 link = fourbar.uniform(0.3, 0.1, 0.25, 0.22)
 motion = {motion}
 record = judge("scene", fourbar.Scene(link, motion))

@@ -6,8 +6,8 @@ What every effect costs in every engine, and that one which is not named costs n
 
 import pytest
 
-from validation.effect_cost import available, counts
-from validation.effect_work import DEFAULT_FLAGS
+from validation.studies.effects.cost import available, counts
+from validation.studies.effects.work import DEFAULT_FLAGS
 
 SAVED = 0.08
 """Part of a step's instructions that the flags of the bare scene must save."""

@@ -8,14 +8,15 @@ import numpy as np
 import pytest
 
 import fourbar
-from fourbar.dynamics import path
 from fourbar.effects import Flywheel, Friction, Gravity, Load, PinFriction, Point, Spring, Springs, Table, Torsion
 from fourbar.effects.cones import NONE, ONE, SEVERAL, settle
 from fourbar.errors import InputError, LimitError
-from fourbar.motion import Motion, Sweep
-from fourbar.motion_law import Law
-from fourbar.scene import Scene, solve
+from fourbar.scene import Scene
+from fourbar.scene.motion import Motion, Sweep
+from fourbar.scene.motion_law import Law
+from fourbar.solve import solve
 from tests.scenes import crank_rocker
+from validation.engines.effects import look_up
 
 SECOND_ORDER = 1e-8
 """A central difference with a step of 1e-5 rad: 1e-10 from its third derivative, 1e-11 from rounding, times the
@@ -81,8 +82,7 @@ def test_torsion_springs_are_the_slope_of_their_energy() -> None:
 def test_a_flywheel_is_inertia_of_the_bar() -> None:
     scene = crank_rocker(effects=(Gravity(), Flywheel(0.02, 4)), drive_bar=4)
     bar = scene.linkage.output
-    assert bar.inertia is not None
-    heavier = replace(scene.linkage, output=replace(bar, inertia=bar.inertia + 0.02))
+    heavier = replace(scene.linkage, output=replace(bar, inertia=bar.moment_of_inertia + 0.02))
     with_wheel, with_bar = solve(scene), solve(replace(scene, linkage=heavier, effects=(Gravity(),)))
     for name in ("torque", "F12", "F32", "F14"):
         one, other = getattr(with_wheel, name), getattr(with_bar, name)
@@ -150,37 +150,46 @@ def _newton_euler(link, s, i, ends, speed, couples):  # type: ignore[no-untyped-
             row[8] = mp.mpf(1)
         rows.append(row)
         friction = sum(-side * mp.sign(mp.mpf(slip[pin])) * couples[pin] for pin, side in pins_of[bar])
-        right.append(mp.mpf(body.inertia) * mp.mpf(alpha) - friction)
+        right.append(mp.mpf(body.moment_of_inertia) * mp.mpf(alpha) - friction)
     return mp.lu_solve(mp.matrix(rows), mp.matrix(right))
 
 
 def test_one_cone_has_one_none_or_two_solutions() -> None:
-    """x = k |F + C x| on a line: F = 1, C = c: x = k (1 + c x), x = k |1 - c x| ..."""
-    cases = {  # (F, C): solutions of x = |F + C x| with k = 1
-        ((1.0, 0.0), (0.5, 0.0)): (ONE, 2.0),
-        ((1.0, 0.0), (-0.5, 0.0)): (ONE, 2.0 / 3.0),
-        ((1.0, 0.0), (2.0, 0.0)): (NONE, math.nan),
-        ((1.0, 0.0), (-2.0, 0.0)): (SEVERAL, 1.0 / 3.0),
-        ((1.0, 0.0), (0.0, 2.0)): (NONE, math.nan),
-        ((1.0, 0.0), (0.0, 0.6)): (ONE, 1.25),
-        ((0.0, 0.0), (0.5, 0.3)): (ONE, 0.0),
-        ((3.0, 4.0), (0.0, 0.0)): (ONE, 5.0),
+    """x = k |F + C x| on a line: F = 1, C = c: x = k (1 + c x), x = k |1 - c x| ...
+
+    Its distance from jamming is the slope 1 - k e.C of x - k |F + C x|, e along F + C x, and at most 1.
+    """
+    cases = {  # (F, C): solutions of x = |F + C x| with k = 1, and how far from jamming
+        ((1.0, 0.0), (0.5, 0.0)): (ONE, 2.0, 0.5),
+        ((1.0, 0.0), (-0.5, 0.0)): (ONE, 2.0 / 3.0, 1.0),
+        ((1.0, 0.0), (2.0, 0.0)): (NONE, math.nan, None),
+        ((1.0, 0.0), (-2.0, 0.0)): (SEVERAL, 1.0 / 3.0, 1.0),
+        ((1.0, 0.0), (0.0, 2.0)): (NONE, math.nan, None),
+        ((1.0, 0.0), (0.0, 0.6)): (ONE, 1.25, 0.64),
+        ((0.0, 0.0), (0.5, 0.3)): (ONE, 0.0, 1.0),
+        ((3.0, 4.0), (0.0, 0.0)): (ONE, 5.0, 1.0),
+        ((1.0, 0.0), (1.0 - 2.0**-20, 0.0)): (ONE, 2.0**20, 2.0**-20),
     }
-    for (F, C), (number, x) in cases.items():
-        found = settle(np.array([[F]]), np.array([[[C]]]), np.array([1.0]))
+    for (F, C), (number, x, far) in cases.items():
+        found = settle(np.array([[F]]), np.array([[[C]]]), np.array([[1.0]]))
         assert found.number[0] == number, (F, C)
         assert found.x[0, 0] == pytest.approx(x, rel=1e-15, nan_ok=True), (F, C)
+        if far is not None:
+            assert found.from_jamming[0] == pytest.approx(far, rel=LAST_DIGITS), (F, C)
 
 
 def test_several_cones_one_of_which_is_known() -> None:
-    """Two pins that do not feel each other are two single ones, in every outcome."""
+    """Two pins that do not feel each other are two single ones, in every outcome, each position with its own arms."""
     for c1, c2, number in ((0.5, 0.3, ONE), (2.0, 0.3, NONE), (-2.0, 0.3, SEVERAL), (-2.0, -3.0, SEVERAL)):
-        F = np.array([[[1.0, 0.0], [2.0, 0.0]]])
-        C = np.array([[[[c1, 0.0], [0.0, 0.0]], [[0.0, 0.0], [c2, 0.0]]]])
-        found = settle(F, C, np.ones(2))
-        assert found.number[0] == number
+        F = np.array([[[1.0, 0.0], [2.0, 0.0]]] * 2)
+        C = np.array([[[[c1, 0.0], [0.0, 0.0]], [[0.0, 0.0], [c2, 0.0]]]] * 2)
+        found = settle(F, C, np.array([[1.0, 1.0], [0.25, 0.125]]))
+        assert list(found.number) == [number, ONE]
         if number != NONE:
             assert found.x[0] == pytest.approx([1.0 / (1.0 - c1), 2.0 / (1.0 - c2)], rel=1e-12)
+            # both slopes are 1 - k c where F + C x keeps the sense of F
+            assert found.from_jamming[0] == pytest.approx(min(1.0, 1.0 - c1, 1.0 - c2), rel=1e-12)
+        assert found.x[1] == pytest.approx([0.25 / (1.0 - 0.25 * c1), 0.25 / (1.0 - 0.125 * c2)], rel=1e-12)
 
 
 def test_jamming_is_a_status_and_leaves_no_force() -> None:
@@ -203,6 +212,8 @@ def test_at_rest_the_interval_is_that_of_beginning_to_move(friction: object) -> 
     assert rest.torque_high == pytest.approx(np.maximum(*slow), rel=1e-13)
     assert rest.torque_low == pytest.approx(np.minimum(*slow), rel=1e-13)
     assert ((rest.torque_low < rest.torque) & (rest.torque < rest.torque_high)).all()
+    for side, beginning in zip((1, -1), slow, strict=True):
+        assert solve(scene, "force", side=side).torque == pytest.approx(beginning, rel=1e-13)
 
 
 def test_without_dry_friction_there_is_no_interval() -> None:
@@ -221,7 +232,7 @@ def test_a_table_is_linear_between_its_points_and_periodic() -> None:
     at = np.array([1.0, 1.25, 2.0, 1.5 - 2 * math.pi, 1.25 + 6 * math.pi])
     assert table.at(at) == pytest.approx([0.0, 1.0, 4.0, 2.0, 1.0], abs=1e-14)
     for theta_2, factor in zip(at.tolist(), table.at(at), strict=True):
-        assert table.look_up(theta_2) == pytest.approx(factor, abs=1e-14)
+        assert look_up(table, theta_2) == pytest.approx(factor, abs=1e-14)
     with pytest.raises(InputError, match="lies outside"):
         Table((0.0, 1.0), (1.0, 2.0)).at(np.array([0.5, 1.5]))
 
@@ -294,16 +305,14 @@ def test_bad_input_names_its_key(make: object, key: str) -> None:
     assert error.value.key == key
 
 
-def test_the_energy_method_carries_the_flywheel() -> None:
-    scene = crank_rocker(effects=(Flywheel(0.02),), loads=())
-    s = solve(scene)
-    way = path(scene.linkage, s.theta_2, s.branch)
-    from fourbar.dynamics import driving_torque
-
-    torque = driving_torque(scene.linkage, way, 10.0, 5.0, scene.effects, 2)
-    without = driving_torque(scene.linkage, way, 10.0, 5.0, (), 2)
-    assert torque - without == pytest.approx(0.02 * 5.0, rel=1e-12)
-    assert s.torque == pytest.approx(torque, abs=1e-13 * np.abs(torque).max(), rel=0)
+def test_a_flywheel_on_the_driven_bar_asks_for_its_inertia_times_the_acceleration() -> None:
+    """And for nothing else: motion and pin forces are those without it."""
+    scene = crank_rocker()
+    bare, wheel = solve(scene), solve(replace(scene, effects=(*scene.effects, Flywheel(0.02))))
+    assert bare.torque is not None and wheel.torque is not None
+    assert wheel.torque - bare.torque == pytest.approx(0.02 * 5.0, abs=LAST_DIGITS * np.abs(wheel.torque).max())
+    for name in ("F12", "F32", "F43", "F14"):
+        assert np.array_equal(getattr(wheel, name), getattr(bare, name)), name
 
 
 def test_a_sweep_without_theta_2_still_runs_over_the_range() -> None:

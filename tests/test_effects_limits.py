@@ -9,11 +9,12 @@ import pytest
 import fourbar
 from fourbar.effects import Gravity, PinFriction, Point, Spring, Springs, Torsion
 from fourbar.errors import LimitError
+from fourbar.formulas.mobility import default_range
 from fourbar.linkage import PINS
-from fourbar.mobility import default_range
-from fourbar.motion import Free, Motion, Sweep
-from fourbar.scene import Scene, solve
-from validation.judge import judge
+from fourbar.scene import Scene
+from fourbar.scene.motion import Free, Motion, Sweep
+from fourbar.solve import solve
+from validation.run.judge import judge
 
 FINE = 20_000
 """Positions of a sweep in which no pin turns by half a turn from one to the next."""

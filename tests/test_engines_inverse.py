@@ -10,14 +10,15 @@ import pytest
 from fourbar.effects import Friction, Gravity, Load, Viscous
 from fourbar.errors import InputError
 from fourbar.linkage import Bar, FourBar
-from fourbar.motion import Motion
-from fourbar.scene import Command, Scene, command, solve
-from validation.compare import COMPARED, closure, compare
+from fourbar.scene import Command, Scene, command
+from fourbar.scene.motion import Motion
+from fourbar.solve import solve
+from validation.compare.compare import COMPARED, closure, compare
+from validation.compare.tolerance import EPS, EQUIVALENCE, K
 from validation.engines import loop
 from validation.engines.free_body import FreeBody
 from validation.engines.mujoco.inverse import LEAST, MujocoInverse, MujocoTree
 from validation.engines.pinocchio import PinocchioInverse, PinocchioTree
-from validation.tolerance import EPS, EQUIVALENCE, K
 
 ENGINES = [PinocchioInverse(), MujocoInverse()]
 TREES = [PinocchioTree, MujocoTree]

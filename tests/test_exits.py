@@ -16,9 +16,9 @@ import validation.cli
 from fourbar.errors import DependencyError, InputError
 from fourbar.exits import BAD_INPUT, BROKEN, FAILED, HOLDS, INTERRUPTED, run
 from tests.scenes import crank_rocker
+from validation.compare.rows import AGREES, FAILS, Row, write_results
 from validation.published.figures import Figure
-from validation.results import AGREES, FAILS, Row, write_results
-from validation.stability.judge import Tally
+from validation.stress.forward_error.judge import Tally
 
 ROOT = Path(__file__).parent.parent
 MODEL = str(ROOT / "models" / "crank_rocker.toml")
@@ -152,12 +152,12 @@ def test_every_command_ends_with_its_status(
 def test_a_figure_that_no_erratum_explains_is_status_1(monkeypatch: pytest.MonkeyPatch) -> None:
     assert VALIDATION(["published"]) == HOLDS
     wrong = Figure("2.4 positions", "1 theta3_1", "167.877224", 167.8)
-    monkeypatch.setattr("validation.published.command.figures", lambda: iter([wrong]))
+    monkeypatch.setattr("validation.published.ladder.figures", lambda: iter([wrong]))
     assert VALIDATION(["published"]) == FAILED
 
 
 def test_no_figure_at_all_is_status_1(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
-    monkeypatch.setattr("validation.published.command.figures", lambda: iter([]))
+    monkeypatch.setattr("validation.published.ladder.figures", lambda: iter([]))
     assert VALIDATION(["published"]) == FAILED
     assert "Nothing was compared" in capsys.readouterr().out
 
@@ -166,7 +166,7 @@ STABILITY = ["stability", "--samples", "3", "--family", "random", "--jobs", "1"]
 
 
 def test_a_torque_off_in_its_twelfth_digit_is_status_1(monkeypatch: pytest.MonkeyPatch) -> None:
-    true = fourbar.scene.solve
+    true = fourbar.solve
 
     def off(*arguments: object, **options: object) -> fourbar.Solution:
         solution = true(*arguments, **options)  # type: ignore[arg-type]
@@ -174,7 +174,7 @@ def test_a_torque_off_in_its_twelfth_digit_is_status_1(monkeypatch: pytest.Monke
         solution.torque *= 1.0 + 1e-12
         return solution
 
-    monkeypatch.setattr("validation.stability.judge.solve", off)
+    monkeypatch.setattr("validation.stress.forward_error.judge.solve", off)
     assert VALIDATION(STABILITY) == FAILED
 
 
@@ -185,7 +185,7 @@ def test_samples_that_compare_nothing_are_status_1(
         tally.samples += 1
         tally.not_assembled += 1
 
-    monkeypatch.setattr("validation.stability.command.judge", open_loop)
+    monkeypatch.setattr("validation.stress.forward_error.stability.judge", open_loop)
     assert VALIDATION(STABILITY) == FAILED
     assert "random: nothing was compared" in capsys.readouterr().out
 
@@ -194,7 +194,7 @@ def test_a_ratio_that_is_not_reached_is_status_1(monkeypatch: pytest.MonkeyPatch
     for name in ONE_THREAD:
         monkeypatch.setenv(name, "1")
     rows = {"growth from 1000 positions on": 1.1, "floor": 1.0}
-    monkeypatch.setattr("validation.bench.measure", lambda *_: rows)
+    monkeypatch.setattr("validation.stress.bench.measure", lambda *_: rows)
     assert VALIDATION(["bench"]) == HOLDS
     rows["growth from 1000 positions on"] = 2.0
     assert VALIDATION(["bench"]) == FAILED
@@ -204,7 +204,9 @@ def test_a_ratio_that_is_not_reached_is_status_1(monkeypatch: pytest.MonkeyPatch
 def test_bench_passes_on_how_its_own_process_ended(ended: int, status: int, monkeypatch: pytest.MonkeyPatch) -> None:
     for name in ONE_THREAD:
         monkeypatch.delenv(name, raising=False)
-    monkeypatch.setattr("validation.bench.subprocess.run", lambda line, **_: subprocess.CompletedProcess(line, ended))
+    monkeypatch.setattr(
+        "validation.stress.bench.subprocess.run", lambda line, **_: subprocess.CompletedProcess(line, ended)
+    )
     assert VALIDATION(["bench"]) == status
 
 
@@ -217,7 +219,7 @@ PROCESSES = [
     ("fourbar", f"animate {NO_FILE} -o a.html", BAD_INPUT),
     ("validation", f"run {NO_FILE}", BAD_INPUT),
     ("validation", f"accept {NO_FILE}", BAD_INPUT),
-    ("validation", f"compare accepted {ROOT / 'validation/baselines/accepted'}", HOLDS),
+    ("validation", f"compare accepted {ROOT / 'validation/regression/accepted'}", HOLDS),
     ("validation", f"check {NO_FILE} {NO_FILE}", BAD_INPUT),
     ("validation", "fuzz-files --count 1", HOLDS),
     ("validation", "models --no-such-option", BAD_INPUT),

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 import fourbar
 from fourbar.errors import InputError
 from fourbar.files import dump, load, loads, save
-from fourbar.units import UnitError, to_si
+from fourbar.files.units import UnitError, to_si
 
 MODELS = sorted((Path(__file__).parent.parent / "models").glob("*.toml"))
 LENGTHS = '[lengths]\nground = "0.3 m"\ninput = "0.1 m"\ncoupler = "0.25 m"\noutput = "0.22 m"\n'
@@ -116,7 +116,7 @@ def test_defaults_are_those_of_the_contract() -> None:
     assert (motion.through, motion.free, scene.drive_bar) == ("sign", None, 2)
     assert (scene.loads, scene.effects, scene.title, scene.source) == ((), (), "", "")
     bar = loads(LENGTHS + '[bars.coupler]\nmass = "6 kg"\n').linkage.coupler
-    assert bar.inertia == pytest.approx(6.0 * 0.25**2 / 12.0, rel=1e-15) and bar.centre == (0.125, 0.0)
+    assert bar.moment_of_inertia == pytest.approx(6.0 * 0.25**2 / 12.0, rel=1e-15) and bar.mass_centre == (0.125, 0.0)
 
 
 def test_every_form_of_theta_2() -> None:
@@ -237,3 +237,17 @@ def test_what_a_file_cannot_hold_is_refused() -> None:
         dump(replace(scene, effects=(fourbar.Gravity(), fourbar.Gravity())))
     with pytest.raises(InputError, match="Unicode"):
         dump(replace(scene, title="\ud800"))
+
+
+@pytest.mark.parametrize("length", [0.05, 0.4])
+def test_what_a_bar_leaves_out_follows_its_length(length: float) -> None:
+    """The inertia m L^2/12 and mid-bar, of a bar that was read and then given another length; what is stated stays."""
+    read = loads(
+        '[lengths]\nground = "30 cm"\ninput = "10 cm"\ncoupler = "25 cm"\noutput = "22 cm"\n'
+        '[bars.coupler]\nmass = "0.5 kg"\n'
+        '[bars.output]\nmass = "2 kg"\ninertia = "3 kg m^2"\ncentre = ["7 cm", "0 deg"]\n'
+    ).linkage
+    coupler, output = (replace(bar, length=length) for bar in (read.coupler, read.output))
+    assert coupler.moment_of_inertia == pytest.approx(0.5 * length**2 / 12.0, rel=1e-15)
+    assert coupler.mass_centre == (0.5 * length, 0.0)
+    assert output.moment_of_inertia == 3.0 and output.mass_centre == pytest.approx((0.07, 0.0), rel=1e-15)

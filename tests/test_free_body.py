@@ -18,8 +18,8 @@ from tests.scenes import crank_rocker
 from tests.test_imports import ROOT, imported
 from validation.engines import free_body, free_body_closure, free_body_effects
 from validation.engines.free_body import FreeBody, slide
-from validation.judge import judge
-from validation.witnesses import WITNESSES
+from validation.engines.witnesses import WITNESSES
+from validation.run.judge import judge
 
 EPS = 2.0**-52
 DIGITS = 50.0 * EPS
@@ -35,7 +35,7 @@ def asked(scene: Scene) -> dict[str, Any]:
 
 
 def test_it_imports_the_description_and_nothing_of_the_formulas() -> None:
-    allowed = ("fourbar.linkage", "fourbar.scene", "validation.answer", "validation.engines.free_body", "numpy")
+    allowed = ("fourbar.linkage", "fourbar.scene", "validation.compare.answer", "validation.engines.free_body", "numpy")
     standard = {"collections", "typing"}
     for module in (free_body, free_body_closure, free_body_effects):
         modules = imported(ROOT / "validation/engines" / f"{module.__name__.split('.')[-1]}.py")

@@ -138,10 +138,10 @@ def amplification(of: Released) -> float:
         patch.setattr(free_motion, "RELATIVE", LOOSE)
         patch.setattr(free_motion, "ABSOLUTE", LOOSE)
         base = ours(of)
-        speed = float(np.abs(base.omega_2).max())
+        speed = float(np.abs(base.command.omega_2).max())
         moved = [ours(of, nudge) for nudge in ((NUDGE, 0.0), (0.0, NUDGE * speed))]
-    n = min(len(m.time) for m in (base, *moved))
-    return max(float(np.abs(m.theta_2[:n] - base.theta_2[:n]).max()) for m in moved) / NUDGE
+    n = min(len(m.command.time) for m in (base, *moved))
+    return max(float(np.abs(m.command.theta_2[:n] - base.command.theta_2[:n]).max()) for m in moved) / NUDGE
 
 
 TURNS, STOPS, AT_LIMITS, AT_CHANGE_POINTS, AMPLIFIES = range(5)
@@ -170,13 +170,13 @@ def test_nine_digits_over_five_seconds(kind: str, number: int) -> None:
     amplified = amplification(of)
     promised = PROMISED * max(1.0, amplified / AMPLIFIED)
     n = len(theirs.theta_2)
-    assert len(m.time) == n
-    assert np.abs(m.theta_2 - theirs.theta_2).max() <= promised
+    assert len(m.command.time) == n
+    assert np.abs(m.command.theta_2 - theirs.theta_2).max() <= promised
     sure = np.abs(theirs.sine) > SURE
-    assert np.array_equal(m.branch[sure], np.sign(theirs.sine[sure]))
+    assert np.array_equal(m.command.branch[sure], np.sign(theirs.sine[sure]))
     assert (m.stopped_at is None) is (theirs.stopped_at is None)
     if m.stopped_at is not None and theirs.stopped_at is not None:
-        assert abs(m.stopped_at - theirs.stopped_at) * np.abs(m.omega_2).max() <= promised
+        assert abs(m.stopped_at - theirs.stopped_at) * np.abs(m.command.omega_2).max() <= promised
     shown = SHOWN.get((kind, number))
     if shown is not None:
         passed = theirs.limits > 0, theirs.change_points > 0

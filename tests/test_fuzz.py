@@ -2,19 +2,19 @@
 
 import json
 from dataclasses import replace
+from importlib import import_module
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-import fourbar.kinetostatics
-import fourbar.mobility
+import fourbar.formulas.mobility
 from fourbar.files import loads
 from tests.scenes import crank_rocker
-from validation.fuzz import examine
-from validation.fuzz.command import examine_chunk, run
-from validation.fuzz.scenes import scene_of
-from validation.fuzz.shrink import KEPT, keep, shrunk
+from validation.stress.fuzz import examine
+from validation.stress.fuzz.fuzz import examine_chunk, run
+from validation.stress.fuzz.scenes import scene_of
+from validation.stress.fuzz.shrink import KEPT, keep, shrunk
 
 SEED = 0
 
@@ -42,14 +42,15 @@ def test_half_are_adversarial() -> None:
 def small_error(true: object) -> object:
     """One part in 1e9 of the moment of bar 3."""
 
-    def wrong(m_u, m_v, u, v, sine):  # type: ignore[no-untyped-def]
-        return true((1.0 + 1e-9) * m_u, m_v, u, v, sine)  # type: ignore[operator]
+    def wrong(lengths, at, drive_bar, w, *others):  # type: ignore[no-untyped-def]
+        return true(lengths, at, drive_bar, w._replace(M3=(1.0 + 1e-9) * w.M3), *others)  # type: ignore[operator]
 
     return wrong
 
 
 def test_an_error_of_a_billionth_is_found_and_shrunk(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr(fourbar.kinetostatics, "between", small_error(fourbar.kinetostatics.between))
+    solving = import_module("fourbar.case")
+    monkeypatch.setattr(solving, "pin_forces", small_error(solving.pin_forces))
     scene = replace(crank_rocker(), motion=fourbar.Motion(np.array([1.0, 2.0]), 10.0, 5.0))
     assert examine.findings(scene)
     small = shrunk(scene, lambda candidate: bool(examine.findings(candidate)))
@@ -61,9 +62,9 @@ def test_an_error_of_a_billionth_is_found_and_shrunk(monkeypatch: pytest.MonkeyP
 def test_a_limit_off_by_a_billionth_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     scene = replace(crank_rocker(), motion=fourbar.Motion(np.array([1.0, 2.0]), 10.0, 5.0))
     assert examine.findings(scene) == []
-    true = fourbar.mobility.limit_positions
+    true = fourbar.formulas.mobility.limit_positions
     monkeypatch.setattr(
-        fourbar.mobility,
+        fourbar.formulas.mobility,
         "limit_positions",
         lambda *of: tuple(limit._replace(theta_4=limit.theta_4 + 1e-9) for limit in true(*of)),
     )
@@ -91,7 +92,7 @@ def test_a_traceback_is_a_finding(monkeypatch: pytest.MonkeyPatch) -> None:
     def broken(*_: object) -> None:
         raise ZeroDivisionError("oops")
 
-    monkeypatch.setattr(examine, "_back", broken)
+    monkeypatch.setattr(examine, "_file", broken)
     assert examine.findings(crank_rocker()) == ["ZeroDivisionError: oops"]
 
 
@@ -111,7 +112,7 @@ def test_a_position_that_does_not_close_is_a_finding(monkeypatch: pytest.MonkeyP
 
 
 def test_an_interrupted_run_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("validation.fuzz.command.CHUNK", 4)
+    monkeypatch.setattr("validation.stress.fuzz.fuzz.CHUNK", 4)
     first = run(12, 1, tmp_path, 1)
     next(first)
     first.close()

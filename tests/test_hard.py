@@ -13,24 +13,24 @@ import fourbar
 from fourbar.mjcf import RECIPE, Settings
 from fourbar.scene import Command, Scene
 from tests.scenes import crank_rocker
-from validation.answer import Answer
-from validation.compare import COMPARED
+from validation.compare.answer import Answer
+from validation.compare.compare import COMPARED
+from validation.compare.rows import AGREES, DEGRADED, FAILS, VERDICTS
+from validation.compare.tolerance import FULL_ACCURACY
+from validation.engines.hard_suite import HARD_WITNESSES, Hard
+from validation.engines.limits import LIMITS, Limit
 from validation.engines.mujoco import simulate
 from validation.engines.mujoco.closed_loop import ClosedLoop
-from validation.hard import families
-from validation.hard.families import FAMILIES, TOGGLE, Family, toggle
-from validation.hard.free import as_pendulum, judge_released
-from validation.hard.limits import LIMITS, Limit
-from validation.hard.linkages import at, collinear_3_4, dressed, linkage_of
-from validation.hard.page import limit_rows, page
-from validation.hard.prediction import from_data, in_world_axes
-from validation.hard.suite import HARD_WITNESSES, Hard
-from validation.judge import judge
-from validation.page import Record
-from validation.results import AGREES, DEGRADED, FAILS, VERDICTS
-from validation.suite.random import LinkageType
-from validation.tolerance import FULL_ACCURACY
-from validation.witnesses import Witness
+from validation.engines.prediction import from_data, in_world_axes
+from validation.engines.witnesses import Witness
+from validation.report.hard_page import limit_rows, page
+from validation.report.page import Record
+from validation.run.judge import judge
+from validation.run.released import as_pendulum, judge_released
+from validation.scenes import hard_families as families
+from validation.scenes.hard_families import FAMILIES, TOGGLE, Family, toggle
+from validation.scenes.hard_linkages import at, collinear_3_4, dressed, linkage_of
+from validation.scenes.random import LinkageType
 
 EXACT = tuple(w for w in HARD_WITNESSES if w.name != "mujoco-simulated")
 SWEEP = crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.1, 0.1 + 2 * math.pi, 30), 10.0))
@@ -100,7 +100,7 @@ def verdict_of(engine: type, scene: Scene, predictor: str) -> tuple[str, float]:
 
 
 def _equivalence() -> Any:
-    from validation.tolerance import EQUIVALENCE
+    from validation.compare.tolerance import EQUIVALENCE
 
     return EQUIVALENCE
 
@@ -110,7 +110,7 @@ def test_beside_a_toggle_a_wrong_force_fails_that_the_law_excuses() -> None:
     lengths = linkage_of(LinkageType.TRIPLE_ROCKER, 1)
     (psi, _), *_ = collinear_3_4(lengths)
     scene = at(dressed(lengths, 1), psi - 1e-8)
-    predictor = "validation.hard.prediction:in_world_axes"
+    predictor = "validation.engines.prediction:in_world_axes"
     assert verdict_of(Wrong, scene, "")[0] == AGREES
     assert verdict_of(Wrong, scene, predictor)[0] == FAILS
     verdict, allowed = verdict_of(AlmostRight, scene, predictor)

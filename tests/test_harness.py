@@ -6,15 +6,16 @@ import numpy as np
 import pytest
 
 import fourbar
-from fourbar.mobility import limit_positions
+from fourbar.formulas.mobility import limit_positions
+from fourbar.quantities import FORCES
 from fourbar.scene import Command, Scene, command
 from tests.scenes import crank_rocker
-from validation.answer import Answer
-from validation.compare import COMPARED
-from validation.judge import judge
-from validation.results import AGREES, FAILS, REFUSES, UNTOLD, Row, from_csv, to_csv, write_results
-from validation.tolerance import EPS, EQUIVALENCE, FORCES, K
-from validation.witnesses import WITNESSES, Witness, predicting_from
+from validation.compare.answer import Answer
+from validation.compare.compare import COMPARED
+from validation.compare.rows import AGREES, FAILS, REFUSES, UNTOLD, Row, from_csv, to_csv, write_results
+from validation.compare.tolerance import EPS, EQUIVALENCE, K
+from validation.engines.witnesses import WITNESSES, Witness, predicting_from
+from validation.run.judge import judge
 
 
 class Echo:

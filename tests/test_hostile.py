@@ -10,24 +10,24 @@ from pathlib import Path
 import pytest
 
 import fourbar
-import validation.run
+import validation.run.run
 from fourbar.errors import InputError
 from fourbar.exits import BAD_INPUT, FAILED, HOLDS
 from fourbar.mjcf import mjcf
 from fourbar.scene import Command, Scene
 from tests.scenes import crank_rocker
-from validation.answer import Answer
 from validation.cli import status
+from validation.compare.answer import Answer
+from validation.compare.rows import COLUMNS, FAILS, from_csv
+from validation.compare.tolerance import EQUIVALENCE
+from validation.engines.memory import WORKER_MEMORY
+from validation.engines.witnesses import Witness
 from validation.report.summary import Summary
 from validation.report.terminal import table
-from validation.results import COLUMNS, FAILS, from_csv
-from validation.run import run
-from validation.suite import pool
-from validation.suite.memory import WORKER_MEMORY
-from validation.suite.scenes import LARGEST_LIST, suite_file
-from validation.suite.selection import chosen
-from validation.tolerance import EQUIVALENCE
-from validation.witnesses import Witness
+from validation.run import pool
+from validation.run.run import run
+from validation.run.selection import chosen
+from validation.scenes.suites import LARGEST_LIST, suite_file
 
 HOSTILE = {
     "html": "<script>alert(1)</script><img src=x onerror=alert(2)>",
@@ -249,7 +249,7 @@ class Greedy:
 
 def test_running_out_of_memory_costs_its_own_row(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     suite = suite_file(listed(tmp_path, "a.toml\nb.toml\n"))
-    monkeypatch.setattr(validation.run, "CHUNK", {True: 2, False: 2})
+    monkeypatch.setattr(validation.run.run, "CHUNK", {True: 2, False: 2})
     greedy = Witness("greedy", f"{__name__}:Greedy", EQUIVALENCE)
     list(run(suite, tmp_path / "run", (*EXACT, greedy), workers=1))
     failing = [row for row in from_csv(tmp_path / "run" / "results.csv") if row.verdict == FAILS]

@@ -1,4 +1,4 @@
-"""Imports go one way, and `import fourbar` loads numpy alone."""
+"""Imports run downwards from room to room, and `import fourbar` loads numpy alone."""
 
 import ast
 import subprocess
@@ -10,27 +10,42 @@ import pytest
 ROOT = Path(__file__).parents[1]
 HEAVY = ("pint", "click", "rich", "jinja2", "matplotlib", "scipy", "joblib", "mujoco", "pinocchio", "flint", "mpmath")
 ENGINES = {"mujoco": "mujoco", "pinocchio": "pinocchio"}
-LAYERS = [
-    ("errors", "reading", "under_way", "writing", "double_double"),
-    ("exits", "linkage", "units"),
-    ("entries", "margins", "pictures", "sixty_digits"),
-    ("new", "state", "mobility"),
-    ("kinematics",),
-    ("linkage_type", "circuits", "more_digits", "motion_law", "solution"),
-    ("bearing", "motion", "transmission", "coefficients", "dynamics", "half_angles"),
-    ("effects", "free_motion"),
-    ("kinetostatics",),
-    ("error_bars",),
-    ("blocks",),
-    ("scene",),
-    ("scene_text", "mjcf", "plot", "drawing", "tables", "mobility_text"),
-    ("files",),
-    ("animate", "notebook"),
-    ("cli",),
-]
-"""Inside `fourbar`: none of these imports one that stands later; at import time or inside a function."""
-SHOWN = {("solution", "tables"), ("solution", "notebook"), ("scene", "notebook")}
-"""A scene and a solution hand themselves over to what shows them, when they are asked to show themselves."""
+ROOMS = {
+    "fourbar": (
+        "errors quantities writing",
+        "exits linkage",
+        "formulas",
+        "many_digits solution",
+        "effects",
+        "scene",
+        "case free_motion",
+        "error_bars",
+        "solve",
+        "files mjcf",
+        "show",
+        "cli",
+    ),
+    "validation": (
+        "compare scenes",
+        "engines published",
+        "report",
+        "regression",
+        "check run",
+        "studies stress",
+        "cli",
+    ),
+}
+"""From the ground up: a room imports none that stands above it or beside it, at import time or inside a function."""
+BESIDE = {
+    ("exits", "linkage"),
+    ("scenes", "compare"),
+    ("published", "engines"),
+    ("run", "check"),
+    ("stress", "studies"),
+}
+"""Of two rooms on one floor the first may use the second."""
+MOST = {"fourbar": 18, "validation": 15}
+"""Entries at a package's own level, dunder files not counted: what a stranger can take in at a glance."""
 
 
 def imported(path: Path) -> set[str]:
@@ -75,43 +90,54 @@ def test_each_engine_is_imported_under_its_own_name_alone(path: Path) -> None:
             assert engine in path.relative_to(ROOT).as_posix()
 
 
-def in_package(name: str) -> list[Path]:
-    """`fourbar/name.py`, or the files of `fourbar/name/`."""
-    return [*(ROOT / "fourbar").glob(f"{name}.py"), *(ROOT / "fourbar" / name).glob("*.py")]
+def room(name: str) -> str:
+    """The room of a module: the second part of its name."""
+    return name.split(".")[1]
 
 
-def modules(layer: tuple[str, ...]) -> list[Path]:
-    """The files of a layer."""
-    return [path for name in layer for path in in_package(name)]
+def modules(package: str) -> dict[str, Path]:
+    """Every module of a package, but for its dunder files at the top."""
+    paths = (ROOT / package).rglob("*.py")
+    names = {path.relative_to(ROOT).with_suffix("").as_posix().replace("/", "."): path for path in paths}
+    return {name: path for name, path in names.items() if not name.split(".")[1].startswith("__")}
 
 
-def test_layers_of_the_product() -> None:
-    inside = {
-        path.relative_to(ROOT / "fourbar").parts[0].removesuffix(".py") for path in (ROOT / "fourbar").rglob("*.py")
+@pytest.mark.parametrize("package", ROOMS)
+def test_rooms_stand_on_floors(package: str) -> None:
+    floors = [floor.split() for floor in ROOMS[package]]
+    entries = {
+        path.name.removesuffix(".py")
+        for path in (ROOT / package).iterdir()
+        if not path.name.startswith("__") and (path.suffix == ".py" or any(path.glob("*.py")))
     }
-    assert {name for layer in LAYERS for name in layer} == inside - {"__init__", "__main__"}
-    for number, layer in enumerate(LAYERS):
-        later = {name for above in LAYERS[number + 1 :] for name in above}
-        for path in modules(layer):
-            later_here = {name for name in later if (path.stem, name) not in SHOWN}
-            known = {name.split(".")[1] for name in imported(path) if name.startswith("fourbar.")}
-            assert not known & later_here, (path, known & later_here)
+    assert {name for floor in floors for name in floor} == entries
+    assert len([path for path in (ROOT / package).iterdir() if not path.name.startswith("__")]) <= MOST[package]
+    height = {name: number for number, floor in enumerate(floors) for name in floor}
+    for name, path in modules(package).items():
+        for other in (each for each in imported(path) if each.startswith(f"{package}.")):
+            own, used = room(name), room(other)
+            if used in height and used != own:
+                assert height[used] < height[own] or (own, used) in BESIDE, f"{name} imports {other}"
 
 
-def test_the_two_derivations_share_no_equation_of_motion() -> None:
-    """The energy method never imports Newton-Euler, nor the other way round."""
-    for path, other in (
-        (ROOT / "fourbar/dynamics.py", "kinetostatics"),
-        (ROOT / "fourbar/kinetostatics.py", "dynamics"),
-    ):
-        assert f"fourbar.{other}" not in imported(path)
+@pytest.mark.parametrize("package", ROOMS)
+def test_no_modules_import_each_other_in_a_circle(package: str) -> None:
+    names = modules(package)
+    uses = {name: {other for other in imported(path) if other in names} - {name} for name, path in names.items()}
+    while leaves := {name for name, used in uses.items() if not used & uses.keys()}:
+        uses = {name: used for name, used in uses.items() if name not in leaves}
+    assert not uses
 
 
-@pytest.mark.parametrize("name", ["compare", "tolerance", "report"])
-def test_what_judges_knows_no_engine(name: str) -> None:
-    paths = [*(ROOT / "validation").glob(f"{name}.py"), *(ROOT / "validation" / name).rglob("*.py")]
+def test_the_formulas_know_numpy_and_the_linkage_alone() -> None:
+    for path in (ROOT / "fourbar" / "formulas").glob("*.py"):
+        known = {name for name in imported(path) if name.startswith("fourbar.")}
+        assert {room(name) for name in known} <= {"formulas", "linkage", "errors"}, path
+
+
+@pytest.mark.parametrize("name", ["compare", "report"])
+def test_what_judges_knows_no_engine_library(name: str) -> None:
+    paths = [*(ROOT / "validation" / name).rglob("*.py")]
     assert paths
     for path in paths:
-        names = imported(path)
-        assert not {each for each in names if each.startswith("validation.engines")}, path
-        assert not {each.partition(".")[0] for each in names} & set(ENGINES), path
+        assert not {each.partition(".")[0] for each in imported(path)} & set(ENGINES), path

@@ -2,15 +2,16 @@
 
 import cmath
 import math
-from decimal import Decimal
 
 import mpmath
 import numpy as np
 import pytest
 
 import fourbar
-from fourbar.kinematics import add_accelerations, add_velocities, close_loop
-from fourbar.sixty_digits import limit_remainder
+from fourbar.formulas.motion import State
+from fourbar.formulas.path import singular, state
+from fourbar.formulas.pin_forces import dot
+from fourbar.many_digits import limit_remainder
 
 EPS = 2.0**-52
 LENGTHS = (0.3, 0.1, 0.25, 0.22)
@@ -24,6 +25,14 @@ DIFFERENCES = 1e-12
 def linkage(theta_1: float = 0.4) -> fourbar.FourBar:
     d, a, b, c = LENGTHS
     return fourbar.FourBar(d, fourbar.Bar(a), fourbar.Bar(b), fourbar.Bar(c), theta_1)
+
+
+def angle(at: State, bar: int) -> np.ndarray:
+    return np.angle(at.direction(bar))
+
+
+def assembled(at: State) -> np.ndarray:
+    return (at.at.half.outer >= 0.0) & (at.at.half.inner >= 0.0)
 
 
 def newton(link: fourbar.FourBar, theta_2: mpmath.mpf, start: tuple[float, float]) -> tuple[mpmath.mpf, mpmath.mpf]:
@@ -49,8 +58,8 @@ def newton(link: fourbar.FourBar, theta_2: mpmath.mpf, start: tuple[float, float
 def test_the_loop_closes_on_the_branch_asked_for(lengths: tuple[float, ...], branch: int, theta_1: float) -> None:
     d, a, b, c = lengths
     link = fourbar.FourBar(d, fourbar.Bar(a), fourbar.Bar(b), fourbar.Bar(c), theta_1)
-    state = close_loop(link, theta_1 + ANGLES, branch)
-    e2, e3, e4 = (np.exp(1j * state.angle(bar)) for bar in (2, 3, 4))
+    moving = state(link, theta_1 + ANGLES, branch)
+    e2, e3, e4 = (np.exp(1j * angle(moving, bar)) for bar in (2, 3, 4))
     gap = a * e2 + b * e3 - d * cmath.exp(1j * theta_1) - c * e4
     assert np.max(np.abs(gap)) <= CLOSURE * sum(lengths)
     diagonal = d * cmath.exp(1j * theta_1) - a * e2
@@ -59,25 +68,23 @@ def test_the_loop_closes_on_the_branch_asked_for(lengths: tuple[float, ...], bra
 
 def test_velocity_and_acceleration_are_differences_of_the_position() -> None:
     link, omega, alpha = linkage(), 3.0, -7.0
-    state = close_loop(link, np.array([1.1]), -1)
-    add_velocities(state, omega)
-    add_accelerations(state, alpha)
-    start = (float(state.angle(3)[0]), float(state.angle(4)[0]))
+    moving = state(link, np.array([1.1]), -1, omega, alpha)
+    start = (float(angle(moving, 3)[0]), float(angle(moving, 4)[0]))
     with mpmath.workdps(50):
         h = mpmath.mpf("1e-12")
         at = [newton(link, mpmath.mpf(1.1) + omega * t + alpha * t * t / 2, start) for t in (-h, mpmath.mpf(0), h)]
         for k, bar in enumerate((3, 4)):
             speed = (at[2][k] - at[0][k]) / (2 * h)
             growth = (at[2][k] - 2 * at[1][k] + at[0][k]) / h**2
-            assert abs(state.omega(bar)[0] / speed - 1) < DIFFERENCES  # type: ignore[index]
-            assert abs(state.alpha(bar)[0] / growth - 1) < DIFFERENCES  # type: ignore[index]
+            assert abs(moving.omega(bar)[0] / speed - 1) < DIFFERENCES
+            assert abs(moving.alpha(bar)[0] / growth - 1) < DIFFERENCES
 
 
 def test_mirror_image() -> None:
     """Mirrored at the ground line: angles change sign, and so does the branch."""
-    up, down = close_loop(linkage(0.0), ANGLES, 1), close_loop(linkage(0.0), -ANGLES, -1)
+    up, down = state(linkage(0.0), ANGLES, 1), state(linkage(0.0), -ANGLES, -1)
     for bar in (3, 4):
-        assert np.array_equal(up.angle(bar), -down.angle(bar))
+        assert np.array_equal(angle(up, bar), -angle(down, bar))
 
 
 @pytest.mark.parametrize("lengths", [(0.3, 0.1, 0.3, 0.1), (0.1, 0.3, 0.3, 0.1)], ids=["parallelogram", "kite"])
@@ -86,19 +93,18 @@ def test_parallel_bars_are_exact_beside_the_change_point(lengths: tuple[float, .
     link = fourbar.FourBar(d, fourbar.Bar(a), fourbar.Bar(b), fourbar.Bar(c))
     parallelogram = a == c
     for delta in (1e-8, 1e-4, 0.5):
-        state = close_loop(link, np.array([math.pi - delta]), 1 if parallelogram else -1)
-        add_velocities(state, 2.0)
-        add_accelerations(state, 0.0)
+        moving = state(link, np.array([math.pi - delta]), 1 if parallelogram else -1, 2.0)
         expected = (0.0, 2.0) if parallelogram else (2.0, 0.0)
-        assert (state.omega(3)[0], state.omega(4)[0]) == expected  # type: ignore[index]
-        assert (state.alpha(3)[0], state.alpha(4)[0]) == (0.0, 0.0)  # type: ignore[index]
+        assert (moving.omega(3)[0], moving.omega(4)[0]) == expected
+        assert (moving.alpha(3)[0], moving.alpha(4)[0]) == (0.0, 0.0)
 
 
 def test_positions_that_cannot_close_are_nan_and_say_so() -> None:
     link = fourbar.uniform(1.0, 1.0, 0.4, 0.4)
-    state = close_loop(link, np.array([0.5, 2.0]), 1)
-    assert state.assembled.tolist() == [True, False]
-    assert np.isnan(state.angle(3)).tolist() == [False, True]
+    moving = state(link, np.array([0.5, 2.0]), 1)
+    assert assembled(moving).tolist() == [True, False]
+    for value in (angle(moving, 3), moving.omega(3), moving.alpha(4), moving.point(3, 0.1)):
+        assert np.isnan(value).tolist() == [False, True]
 
 
 @pytest.mark.parametrize(
@@ -134,7 +140,7 @@ def test_an_offset_from_a_limit_keeps_all_its_digits(offset: float) -> None:
     at = fourbar.scene.Command(np.array([theta_2]), np.array([1], np.int8), 1.0, 0.0, remainder)
     scene = fourbar.Scene(link, fourbar.Motion(theta_2, 1.0))
     solution = fourbar.solve(scene, at=at)
-    assert isinstance(remainder, Decimal)
+    assert isinstance(remainder, mpmath.mpf)
     assert abs(solution.sin_mu[0] / sine - 1.0) < 8 * EPS
     assert solution.status == ["ok"]
     assert solution.omega_3 is not None and np.isfinite(solution.omega_3).all()
@@ -153,127 +159,107 @@ def test_points_move_as_their_positions_do(point: tuple[float, float], theta_1: 
     link, omega = linkage(theta_1), 3.0
     angles = np.linspace(0.3, 6.0, 9)
 
-    def at(t: float) -> fourbar.state.State:
-        return close_loop(link, angles + omega * t + 0.5 * alpha * t * t, 1)
+    def at(t: float) -> State:
+        return state(link, angles + omega * t + 0.5 * alpha * t * t, 1)
 
-    state = at(0.0)
-    add_velocities(state, omega)
-    add_accelerations(state, alpha)
-    d, a, b, _ = link.lengths
-    e2, e3, e4 = (np.exp(1j * state.angle(bar)) for bar in (2, 3, 4))
+    z = complex(*point)
+    moving = state(link, angles, 1, omega, alpha)
+    d, a, b, c = link.lengths
+    e2, e3, e4 = (np.exp(1j * angle(moving, bar)) for bar in (2, 3, 4))
     O4 = d * cmath.exp(1j * theta_1)
     first = {2: np.zeros(9), 3: a * e2, 4: np.full(9, O4)}
-    pins = {"O2": first[2], "A": a * e2, "B": a * e2 + b * e3, "O4": first[4]}
-    for name, place in pins.items():
-        x, y = state.pin(name)
-        assert x.shape == y.shape == (9,) and np.max(np.abs(x + 1j * y - place)) <= CLOSURE
+    pins = {(2, a): a * e2, (3, 0.0): a * e2, (3, b): a * e2 + b * e3, (4, c): a * e2 + b * e3, (4, 0.0): first[4]}
+    for (bar, along), place in pins.items():
+        assert np.max(np.abs(moving.point(bar, along) - place)) <= CLOSURE
     for bar, unit in ((2, e2), (3, e3), (4, e4)):
-        arm, u = state.arm(bar, *point), state.unit(bar)
-        assert np.max(np.abs(u[0] + 1j * u[1] - unit)) <= CLOSURE
-        assert np.max(np.abs(arm[0] + 1j * arm[1] - complex(*point) * unit)) <= CLOSURE
-        x, y = state.point(bar, *point)
-        assert np.max(np.abs(x + 1j * y - (first[bar] + complex(*point) * unit))) <= CLOSURE
-        ahead, back = (complex_of(at(t).point(bar, *point)) for t in (STEP, -STEP))
-        assert complex_of(state.velocity(bar, *point)) == pytest.approx((ahead - back) / (2 * STEP), abs=BY_DIFFERENCES)
-        bend = (ahead - 2.0 * complex_of((x, y)) + back) / STEP**2
-        assert complex_of(state.acceleration(bar, *point)) == pytest.approx(bend, abs=BY_DIFFERENCES)
+        assert np.max(np.abs(moving.direction(bar) - unit)) <= CLOSURE
+        assert np.max(np.abs(moving.foot(bar) - first[bar])) <= CLOSURE
+        place = moving.point(bar, z)
+        assert place.shape == (9,) and np.max(np.abs(place - (first[bar] + z * unit))) <= CLOSURE
+        ahead, back = (at(t).point(bar, z) for t in (STEP, -STEP))
+        assert moving.velocity(bar, z) == pytest.approx((ahead - back) / (2 * STEP), abs=BY_DIFFERENCES)
+        assert moving.point_coefficient(bar, z) * omega == pytest.approx(moving.velocity(bar, z), abs=CLOSURE * omega)
+        bend = (ahead - 2.0 * place + back) / STEP**2
+        assert moving.acceleration(bar, z) == pytest.approx(bend, abs=BY_DIFFERENCES)
+
+
+@pytest.mark.parametrize("branch", [1, -1])
+def test_slip_at_a_pin_is_the_difference_of_its_two_bars(branch: int) -> None:
+    unit, growing = state(linkage(), ANGLES, branch, 1.0, 0.0), state(linkage(), ANGLES, branch, 0.0, 1.0)
+    for pin, (i, j) in fourbar.linkage.PINS.items():
+        slip, slope = unit.slip(pin)
+        assert slip == pytest.approx(unit.omega(j) - unit.omega(i), abs=CLOSURE)
+        assert slip == pytest.approx(growing.alpha(j) - growing.alpha(i), abs=CLOSURE)
+        assert slope == pytest.approx(unit.alpha(j) - unit.alpha(i), abs=CLOSURE)
     with pytest.raises(KeyError, match="C"):
-        state.pin("C")
-
-
-def complex_of(vector: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
-    return vector[0] + 1j * vector[1]
+        unit.slip("C")
 
 
 def test_speeds_given_one_by_one_are_speeds_given_at_once() -> None:
     """Zero at every position, as a number or as an array, is the same motion; the ground does not move."""
     states = []
     for omega, alpha in ((3.0, 0.0), (np.full(5, 3.0), np.zeros(5)), (3, 0)):
-        state = close_loop(linkage(), np.linspace(0.3, 6.0, 5), 1)
-        add_velocities(state, omega)
-        add_accelerations(state, alpha)
-        states.append(state)
-        assert state.omega(1) == 0.0 and state.alpha(1) == 0.0
-    for state in states[1:]:
+        states.append(state(linkage(), np.linspace(0.3, 6.0, 5), 1, omega, alpha))
+        assert states[-1].omega(1) == 0.0 and states[-1].alpha(1) == 0.0 and states[-1].coefficient(1) == 0.0
+    for other in states[1:]:
         for bar in (2, 3, 4):
-            assert np.all(state.omega(bar) == states[0].omega(bar))
-            assert np.all(state.alpha(bar) == states[0].alpha(bar))
-            assert np.array_equal(state.acceleration(bar, 0.1, 0.2), states[0].acceleration(bar, 0.1, 0.2))
-
-
-def test_what_was_not_evaluated_is_not_there() -> None:
-    state = close_loop(linkage(), ANGLES, 1)
-    with pytest.raises(AssertionError, match=r"^velocities were not evaluated$"):
-        state.omega(3)
-    with pytest.raises(AssertionError, match=r"^velocities come first$"):
-        add_accelerations(state, 0.0)
-    add_velocities(state, 1.0)
-    with pytest.raises(AssertionError, match=r"^accelerations were not evaluated$"):
-        state.alpha(4)
+            assert np.all(other.omega(bar) == states[0].omega(bar))
+            assert np.all(other.alpha(bar) == states[0].alpha(bar))
+            assert np.array_equal(other.acceleration(bar, 0.1 + 0.2j), states[0].acceleration(bar, 0.1 + 0.2j))
 
 
 def test_the_cosine_at_B_is_that_of_the_two_bars() -> None:
     for lengths, branch in ((LENGTHS, 1), (LENGTHS, -1), ((0.3, 0.1, 0.3, 0.1), 1), ((0.1, 0.3, 0.3, 0.1), -1)):
         d, a, b, c = lengths
-        state = close_loop(fourbar.FourBar(d, fourbar.Bar(a), fourbar.Bar(b), fourbar.Bar(c), 0.4), ANGLES, branch)
-        ok = state.assembled
-        expected = np.cos(state.angle(4) - state.angle(3))
-        assert state.cos_mu[ok] == pytest.approx(expected[ok], abs=64 * EPS)
-        assert state.sin_mu[ok] == pytest.approx(np.sin(state.angle(4) - state.angle(3))[ok], abs=1e-13)
+        moving = state(fourbar.FourBar(d, fourbar.Bar(a), fourbar.Bar(b), fourbar.Bar(c), 0.4), ANGLES, branch)
+        ok = assembled(moving)
+        expected = np.cos(angle(moving, 4) - angle(moving, 3))
+        assert dot(moving.at.u3, moving.at.u4)[ok] == pytest.approx(expected[ok], abs=64 * EPS)
+        assert moving.at.sin_mu[ok] == pytest.approx(np.sin(angle(moving, 4) - angle(moving, 3))[ok], abs=1e-13)
 
 
 def test_singular_positions_have_no_speed_and_their_neighbours_keep_theirs() -> None:
     link = fourbar.uniform(0.3, 0.1, 0.3, 0.1)
     theta_2 = np.array([0.0, 1.0, math.pi])
-    state = close_loop(link, theta_2, 1)
-    assert state.singular.tolist() == [True, False, True] and state.assembled.all()
-    for regular, plain in ((state.regular_sine(), state.sin_mu), (state.regular_root(), state.signed_root)):
-        assert np.isnan(regular).tolist() == [True, False, True] and regular[1] == plain[1]
-    add_velocities(state, 2.0)
-    add_accelerations(state, 5.0)
-    assert np.isnan(state.omega(3)).tolist() == [True, False, True]  # type: ignore[arg-type]
-    assert (state.omega(4)[1], state.alpha(4)[1], state.alpha(3)[1]) == (2.0, 5.0, 0.0)  # type: ignore[index]
-    still = close_loop(link, theta_2, 1)
-    add_velocities(still, 2.0)
-    add_accelerations(still, 0.0)
-    assert np.isnan(still.alpha(3)).tolist() == np.isnan(still.alpha(4)).tolist() == [True, False, True]  # type: ignore[arg-type]
-    crank = close_loop(linkage(), ANGLES, 1)
-    assert crank.regular_sine() is crank.sin_mu and not crank.singular.any()
+    moving = state(link, theta_2, 1, 2.0, 5.0)
+    assert singular(moving.at).tolist() == [True, False, True] and assembled(moving).all()
+    assert np.isnan(moving.at.root).tolist() == [True, False, True]
+    assert np.isfinite(moving.at.sin_mu).all() and np.isfinite(moving.at.u3).all()
+    for bar in (3, 4):
+        assert np.isnan(moving.omega(bar)).tolist() == [True, False, True]
+    assert (moving.omega(4)[1], moving.alpha(4)[1], moving.alpha(3)[1]) == (2.0, 5.0, 0.0)
+    still = state(link, theta_2, 1, 2.0)
+    assert np.isnan(still.alpha(3)).tolist() == np.isnan(still.alpha(4)).tolist() == [True, False, True]
+    assert not singular(state(linkage(), ANGLES, 1).at).any()
 
 
 @pytest.mark.parametrize("lengths", [(3, 1, 2, 2), (0.99, 0.97, 0.98, 0.98)])
 def test_within_the_rounding_of_a_change_point_no_direction_is_left(lengths: tuple[float, ...]) -> None:
     theta_2 = math.pi + 2.0 * EPS * np.arange(5)  # the next doubles after pi
-    state = close_loop(fourbar.uniform(*lengths), theta_2, 1)
-    assert (state.sin_mu > 0.0).all() and (state.sin_mu < 8.0 * EPS).all()
-    assert state.singular.all() and np.isnan(state.regular_sine()).all()
-    assert not close_loop(fourbar.uniform(*lengths), theta_2 + 1e-13, 1).singular.any()
+    moving = state(fourbar.uniform(*lengths), theta_2, 1)
+    assert (moving.at.sin_mu > 0.0).all() and (moving.at.sin_mu < 8.0 * EPS).all()
+    assert singular(moving.at).all() and np.isnan(moving.omega(3)).all()
+    assert not singular(state(fourbar.uniform(*lengths), theta_2 + 1e-13, 1).at).any()
 
 
 def test_branches_may_differ_from_position_to_position() -> None:
     branches = np.where(np.arange(41) % 3 == 0, -1, 1).astype(np.int8)
-    mixed = close_loop(linkage(), ANGLES, branches)
-    add_velocities(mixed, 2.0)
-    add_accelerations(mixed, 1.0)
+    mixed = state(linkage(), ANGLES, branches, 2.0, 1.0)
     for branch in (1, -1):
-        alone = close_loop(linkage(), ANGLES, branch)
-        add_velocities(alone, 2.0)
-        add_accelerations(alone, 1.0)
+        alone = state(linkage(), ANGLES, branch, 2.0, 1.0)
         which = branches == branch
         for bar in (3, 4):
-            assert np.array_equal(mixed.angle(bar)[which], alone.angle(bar)[which])
-            assert np.array_equal(mixed.omega(bar)[which], alone.omega(bar)[which])  # type: ignore[index]
-            assert np.array_equal(mixed.alpha(bar)[which], alone.alpha(bar)[which])  # type: ignore[index]
-    assert np.array_equal(mixed.branch, branches)
-    assert close_loop(linkage(), ANGLES, -1).branch.dtype == np.int8
+            assert np.array_equal(mixed.direction(bar)[which], alone.direction(bar)[which])
+            assert np.array_equal(mixed.omega(bar)[which], alone.omega(bar)[which])
+            assert np.array_equal(mixed.alpha(bar)[which], alone.alpha(bar)[which])
 
 
 @pytest.mark.parametrize("centre", [(0.3, 0.0), (0.3, 1.0), (0.3, -2.5), (0.0, 0.0)])
 def test_a_mass_centre_in_the_frame_of_its_bar(centre: tuple[float, float]) -> None:
-    place = fourbar.state.centre_in_bar(fourbar.Bar(0.2, 1.0, 0.1, centre))
-    assert complex(*place) == pytest.approx(cmath.rect(*centre), abs=EPS)
-    assert place[1] == 0.0 or centre[1] != 0.0
-    assert all(type(part) is float for part in place)
+    place = fourbar.Bar(0.2, 1.0, 0.1, centre).to_centre
+    assert place == pytest.approx(cmath.rect(*centre), abs=EPS)
+    assert place.imag == 0.0 or centre[1] != 0.0
+    assert type(place) is complex
 
 
 @pytest.mark.parametrize(
@@ -289,48 +275,27 @@ def test_pairs_that_stay_parallel_keep_the_directions_of_ground_and_input(
     link = fourbar.FourBar(d, fourbar.Bar(a), fourbar.Bar(b), fourbar.Bar(c), theta_1)
     theta_2 = theta_1 + math.pi * half_turn + np.array([1e-9, 0.5, 2.0])
     branch = -branch if half_turn else branch
-    state = close_loop(link, theta_2, branch)
-    add_velocities(state, 2.0)
-    add_accelerations(state, 3.0)
-    u1 = (math.cos(theta_1), math.sin(theta_1))
+    moving = state(link, theta_2, branch, 2.0, 3.0)
+    u1, u2 = cmath.exp(1j * theta_1), moving.at.u2
     together = a == c
-    expected = (
-        ((u1, state.u2), (0.0, 2.0), (0.0, 3.0))
-        if together
-        else ((tuple(-x for x in state.u2), tuple(-x for x in u1)), (2.0, 0.0), (3.0, 0.0))
+    directions, speeds, growths = (
+        ((u1, u2), (0.0, 2.0), (0.0, 3.0)) if together else ((-u2, -u1), (2.0, 0.0), (3.0, 0.0))
     )
     for k, bar in enumerate((3, 4)):
-        for i in (0, 1):
-            assert state.unit(bar)[i] == pytest.approx(np.broadcast_to(expected[0][k][i], 3), abs=EPS)
-        assert np.array_equal(state.omega(bar), np.full(3, expected[1][k]))
-        assert np.array_equal(state.alpha(bar), np.full(3, expected[2][k]))
+        assert moving.direction(bar) == pytest.approx(np.broadcast_to(directions[k], 3), abs=EPS)
+        assert np.array_equal(moving.omega(bar), np.full(3, speeds[k]))
+        assert np.array_equal(moving.alpha(bar), np.full(3, growths[k]))
     # between the bars: the angle of input and ground
-    assert np.abs(state.sin_mu) == pytest.approx(np.abs(np.sin(theta_2 - theta_1)), rel=8 * EPS, abs=2 * EPS)
-
-
-@pytest.mark.parametrize("alpha", [0.0, 5.0])
-def test_what_has_room_is_written_there(alpha: float) -> None:
-    plain, placed = close_loop(linkage(), ANGLES, 1), close_loop(linkage(), ANGLES, 1)
-    room = {name: np.empty(41) for name in ("omega_3", "omega_4", "alpha_3", "alpha_4")}
-    add_velocities(plain, 2.0)
-    add_accelerations(plain, alpha)
-    add_velocities(placed, 2.0, room)
-    add_accelerations(placed, alpha, room)
-    for name, array in room.items():
-        assert getattr(placed, name) is array and np.array_equal(array, getattr(plain, name))
-    into = np.empty(41)
-    assert plain.angle(3, into) is into and np.array_equal(into, placed.angle(3))
+    assert np.abs(moving.at.sin_mu) == pytest.approx(np.abs(np.sin(theta_2 - theta_1)), rel=8 * EPS, abs=2 * EPS)
 
 
 def test_a_kite_whose_A_lies_on_O4_has_no_speed_there_and_no_warning() -> None:
     """a = d, b = c: at theta_2 = theta_1 bars 3 and 4 lie on each other and turn freely."""
     link = fourbar.uniform(0.3, 0.3, 0.2, 0.2)
     for branch in (1, -1):
-        state = close_loop(link, np.array([0.0, 0.5]), branch)
-        add_velocities(state, 2.0)
-        add_accelerations(state, 3.0)
-        for value in (state.omega(3), state.omega(4), state.alpha(3), state.alpha(4)):
-            assert np.isfinite(value).tolist() == [False, True]  # type: ignore[arg-type]
+        moving = state(link, np.array([0.0, 0.5]), branch, 2.0, 3.0)
+        for value in (moving.omega(3), moving.omega(4), moving.alpha(3), moving.alpha(4)):
+            assert np.isfinite(value).tolist() == [False, True]
 
 
 @pytest.mark.parametrize("theta_1", [0.0, 0.4, -2.5])
@@ -343,25 +308,22 @@ def test_a_kite_whose_A_lies_on_O4_lies_where_its_neighbours_do(branch: int, the
     for psi, towards in ((0.0, 1.0), *((side * psi, side) for psi in (1e-170, 1e-157) for side in (1.0, -1.0))):
         if psi != 0.0 and theta_1 != 0.0:
             continue
-        on, near = (close_loop(link, theta_1 + np.array([psi, 0.5]), branch) for psi in (psi, towards * beside))
+        on, near = (state(link, theta_1 + np.array([psi, 0.5]), branch, 2.0, 3.0) for psi in (psi, towards * beside))
         for bar in (3, 4):
-            for ours, limit in zip(on.unit(bar), near.unit(bar), strict=True):
-                assert ours == pytest.approx(limit, abs=2.0 * beside)
-        assert on.singular.tolist() == [True, False]
-        add_velocities(on, 2.0)
-        add_accelerations(on, 3.0)
-        assert np.isnan(on.omega(3)).tolist() == np.isnan(on.alpha(4)).tolist() == [True, False]  # type: ignore[arg-type]
+            assert on.direction(bar) == pytest.approx(near.direction(bar), abs=2.0 * beside)
+        assert singular(on.at).tolist() == [True, False]
+        assert np.isnan(on.omega(3)).tolist() == np.isnan(on.alpha(4)).tolist() == [True, False]
     # with b and c unlike each other nothing closes there
-    assert not close_loop(fourbar.uniform(0.3, 0.3, 0.2, 0.25), np.zeros(1), branch).assembled.any()
+    assert not assembled(state(fourbar.uniform(0.3, 0.3, 0.2, 0.25), np.zeros(1), branch)).any()
 
 
 def test_beside_parallel_bars_mu_is_the_angle_of_the_input_to_the_last_bit() -> None:
     """Bars 3 and 4 of a parallelogram lie as its ground and input do: so does the angle between them."""
     link = fourbar.uniform(0.3, 0.1, 0.3, 0.1)
-    state = close_loop(link, np.linspace(0.01, 3.1, 200), 1)
-    assert np.array_equal(state.sin_mu, state.u2[1]) and np.array_equal(state.cos_mu, state.u2[0])
+    at = state(link, np.linspace(0.01, 3.1, 200), 1).at
+    assert np.array_equal(at.sin_mu, at.u2.imag) and np.array_equal(dot(at.u3, at.u4), at.u2.real)
     # 8 EPS has no digit left, the next double has
-    assert close_loop(link, np.array([8.0 * EPS, 8.0 * EPS * (1.0 + EPS)]), 1).singular.tolist() == [True, False]
+    assert singular(state(link, np.array([8.0 * EPS, 8.0 * EPS * (1.0 + EPS)]), 1).at).tolist() == [True, False]
 
 
 def test_short_ground_and_input_leave_no_digit_of_mu() -> None:
@@ -369,11 +331,32 @@ def test_short_ground_and_input_leave_no_digit_of_mu() -> None:
     b, psi = 0.9, np.linspace(0.0, 2.0 * math.pi, 41)
     for least, most in ((0.7, 2.0), (0.02, 0.03), (1.1, 1.3)):
         d, a = (4.0 * EPS * b * part for part in (most + least, most - least))
-        state = close_loop(fourbar.uniform(d, a, b, b), psi, 1)
+        link = fourbar.uniform(d, a, b, b)
+        moving = state(link, psi, 1, 2.0)
         e = np.abs(d - a * np.exp(1j * psi))
-        assert state.assembled.all() and np.array_equal(state.singular, e / b <= 8.0 * EPS)
-        add_velocities(state, 2.0)
-        assert np.array_equal(np.isnan(state.omega(3)), state.singular)
-        motion = fourbar.Motion(psi, 2.0)
-        status = fourbar.solve(fourbar.Scene(state.linkage, motion)).status
-        assert [each == "singular" for each in status] == state.singular.tolist()
+        assert assembled(moving).all() and np.array_equal(singular(moving.at), e / b <= 8.0 * EPS)
+        assert np.array_equal(np.isnan(moving.omega(3)), singular(moving.at))
+        status = fourbar.solve(fourbar.Scene(link, fourbar.Motion(psi, 2.0))).status
+        assert [each == "singular" for each in status] == singular(moving.at).tolist()
+
+
+@pytest.mark.parametrize("theta_1", [0.0, 1.2, -2.9])
+@pytest.mark.parametrize("branch", [1, -1])
+@pytest.mark.parametrize("lengths", [(0.3, 0.1, 0.25, 0.22), (0.3, 0.25, 0.1, 0.22), (0.3, 0.3, 0.2, 0.2)])
+def test_angles_alone_are_those_of_the_whole_position(
+    lengths: tuple[float, float, float, float], branch: int, theta_1: float
+) -> None:
+    """The same angles, statuses and gaps, a limit and A on O4 among them; to the roundings of an angle."""
+    d, *moving = lengths
+    link = fourbar.FourBar(d, *[fourbar.Bar(length) for length in moving], theta_1)
+    theta_2 = theta_1 + np.concatenate([np.linspace(-7.0, 7.0, 57), [0.0, np.pi, 1e-9]])
+    at = fourbar.scene.Command(theta_2, np.full(theta_2.shape, branch, np.int8), None, 0.0)
+    whole = fourbar.solve(fourbar.Scene(link), "position", at=at)
+    alone = fourbar.solve(
+        fourbar.Scene(link), at=at, out={"theta_3": np.empty(theta_2.shape), "theta_4": np.empty(theta_2.shape)}
+    )
+    assert alone.status == whole.status
+    for name in ("theta_3", "theta_4"):
+        ours, theirs = getattr(alone, name), getattr(whole, name)
+        assert np.array_equal(np.isnan(ours), np.isnan(theirs))
+        assert np.nanmax(np.abs(np.remainder(ours - theirs + np.pi, 2.0 * np.pi) - np.pi)) <= 1e-15 * 32

@@ -13,7 +13,7 @@ from fourbar.effects import Torsion
 from fourbar.mjcf import Settings, defaults_used, mjcf, scene_from_lengths
 from fourbar.mjcf.document import SETTLING
 from tests.scenes import crank_rocker, thesis
-from validation.suite.scenes import model_files
+from validation.scenes.suites import model_files
 
 SPEED = 1e-2
 """The promise of the file: the input within 1 % of omega_2 over a revolution or its range."""
@@ -199,7 +199,7 @@ def test_numbers_survive_bit_for_bit() -> None:
     model = mujoco.MjModel.from_xml_string(mjcf(scene))
     for name, bar in (("input", scene.linkage.input), ("coupler", scene.linkage.coupler)):
         assert model.body(name).mass[0] == bar.mass
-        assert model.body(name).inertia[2] == bar.inertia
+        assert model.body(name).inertia[2] == bar.moment_of_inertia
     assert model.site("A").pos[0] == scene.linkage.input.length
     assert not model.opt.gravity.any()
 

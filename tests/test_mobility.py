@@ -7,12 +7,10 @@ import mpmath as mp
 import numpy as np
 import pytest
 
-from fourbar.circuits import circuit_of, circuits, same_circuit
 from fourbar.errors import NotAssembledError
-from fourbar.kinematics import close_loop
-from fourbar.linkage import Bar, FourBar, uniform
-from fourbar.linkage_type import classify
-from fourbar.mobility import (
+from fourbar.formulas.circuits import circuit_of, circuits, same_circuit
+from fourbar.formulas.linkage_type import classify
+from fourbar.formulas.mobility import (
     change_points,
     default_range,
     intervals,
@@ -22,6 +20,9 @@ from fourbar.mobility import (
     time_ratio,
     turns_fully,
 )
+from fourbar.formulas.path import smooth_branch, state
+from fourbar.formulas.position import loop
+from fourbar.linkage import Bar, FourBar, uniform
 
 EPS = 2.0**-52
 ANGLE = 8.0 * EPS
@@ -56,6 +57,10 @@ def closes(bars: FourBar, theta_2: np.ndarray) -> np.ndarray:
     d, a, b, c = bars.lengths
     distance = np.abs(a * np.exp(1j * theta_2) - d * np.exp(1j * bars.ground_angle))
     return np.minimum(b + c - distance, distance - abs(b - c))
+
+
+def angle(bars: FourBar, theta_2: np.ndarray, branch: int | np.ndarray, bar: int) -> np.ndarray:
+    return np.angle(state(bars, theta_2, branch).direction(bar))
 
 
 def inside(angle: np.ndarray, ranges: tuple[tuple[float, float], ...]) -> np.ndarray:
@@ -189,8 +194,8 @@ def test_circuits_of_grashof_linkages_by_the_angle_that_never_closes() -> None:
         seen.add(found.barker)
         theta_2 = np.concatenate([np.linspace(*ends, 41)[1:-1] for ends in intervals(bars)])
         for branch in (1, -1):
-            state = close_loop(bars, theta_2, branch)
-            sine = np.sin(theta_2 - bars.ground_angle) if found.shortest in (3, 4) else state.sin_mu
+            sin_mu = state(bars, theta_2, branch).at.sin_mu
+            sine = np.sin(theta_2 - bars.ground_angle) if found.shortest in (3, 4) else sin_mu
             assert ((sine > 0.0) == (circuit_of(bars, theta_2, branch) == 0)).all()
     assert seen == {1, 2, 3, 4}
 
@@ -276,7 +281,7 @@ def test_swing_is_what_a_scan_of_the_output_finds() -> None:
         phase = np.arange(0.5, SCAN) * (math.pi / SCAN)
         theta_2 = 0.5 * (start + stop) - 0.5 * (stop - start) * np.cos(phase)  # dense where theta_4 goes as a root
         branches = (1,) if turns_fully(bars) else (1, -1)
-        theta_4 = [np.unwrap(close_loop(bars, theta_2, branch).angle(4)) for branch in branches]
+        theta_4 = [np.unwrap(angle(bars, theta_2, branch, 4)) for branch in branches]
         if len(theta_4) == 2:  # both branches start from the same limit position
             theta_4[1] += 2 * math.pi * round((theta_4[0][0] - theta_4[1][0]) / (2 * math.pi))
         found = max(x.max() for x in theta_4) - min(x.min() for x in theta_4)
@@ -289,7 +294,7 @@ def test_ranges_of_coupler_and_output_hold_every_position_and_no_more() -> None:
         theta_2 = bars.ground_angle + (np.arange(GRID) + 0.5) * (2 * math.pi / GRID)
         theta_2 = theta_2[closes(bars, theta_2) > 0.0]
         for bar in (3, 4):
-            reached = np.concatenate([close_loop(bars, theta_2, branch).angle(bar) for branch in (1, -1)])
+            reached = np.concatenate([angle(bars, theta_2, branch, bar) for branch in (1, -1)])
             clear = np.min([np.abs(np.sin(0.5 * (reached - end))) for end in np.ravel(intervals(bars, bar))], axis=0)
             assert inside(reached[clear > 1e-6], intervals(bars, bar)).all()
             # the first range holds the ground's direction (bar 4: its opposite) or begins less than pi after it
@@ -305,8 +310,8 @@ def test_time_ratio_is_the_time_of_both_strokes() -> None:
     bars = uniform(3.0, 1.0, 2.5, 2.2)
     n = 200_000
     theta_2 = (np.arange(n) + 0.5) * (2 * math.pi / n)
-    state = close_loop(bars, theta_2, 1)
-    ahead = np.count_nonzero(np.sin(theta_2 - state.angle(3)) * state.sin_mu > 0.0)  # omega_4 > 0
+    at = state(bars, theta_2, 1).at
+    ahead = np.count_nonzero(np.sin(theta_2 - np.angle(at.u3)) * at.sin_mu > 0.0)  # omega_4 > 0
     ratio = max(ahead, n - ahead) / min(ahead, n - ahead)
     assert time_ratio(bars) == pytest.approx(ratio, rel=8.0 / n)  # both ends counted to one step
     assert time_ratio(uniform(1, 3, 2.5, 3.2)) is None
@@ -333,11 +338,13 @@ def test_the_smooth_path_has_no_corner(lengths: tuple[float, ...], backwards: bo
     theta_2 = theta_2[::-1] if backwards else theta_2
     branch = on_smooth_path(bars, theta_2, 1)
     assert branch[0] == 1 and (branch == -1).any()
+    # at one position alone, without the sweep before it: the same path, or the one that crosses it
+    alone = smooth_branch(loop(*bars.lengths), theta_2 - 0.4, 1.0)
+    assert np.array_equal(alone * alone[0], branch)
     largest = {True: 0.0, False: 0.0}
     for smooth in (True, False):
-        state = close_loop(bars, theta_2, branch if smooth else 1)
         for bar in (3, 4):
-            bend = np.diff(np.unwrap(state.angle(bar)), 2)
+            bend = np.diff(np.unwrap(angle(bars, theta_2, branch if smooth else 1, bar)), 2)
             near = np.abs(np.sin(theta_2[1:-1] - 0.4)) < 0.02
             largest[smooth] = max(largest[smooth], float(np.abs(bend[near]).max()))
     # a corner bends by the step itself, a smooth path by its square

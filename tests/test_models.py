@@ -6,8 +6,8 @@ import pytest
 
 from fourbar.errors import InputError
 from fourbar.files import load
-from validation.models import stale, write_mjcf
-from validation.suite.scenes import MODELS, model_files
+from validation.scenes.suites import MODELS, model_files
+from validation.studies.models import stale, write_mjcf
 
 FILES = model_files()
 

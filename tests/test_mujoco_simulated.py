@@ -10,11 +10,11 @@ import fourbar
 from fourbar.mjcf import RECIPE
 from fourbar.mjcf.settings import Run
 from tests.scenes import crank_rocker, thesis
-from validation.answer import Answer
-from validation.compare import COMPARED, compare
+from validation.compare.answer import Answer
+from validation.compare.compare import COMPARED, compare
+from validation.compare.tolerance import SIMULATED
 from validation.engines.mujoco.simulate import MujocoSimulated, observed_order
-from validation.suite.random import LinkageType, random_scene
-from validation.tolerance import SIMULATED
+from validation.scenes.random import LinkageType, random_scene
 
 TURN = fourbar.Sweep(0.1, 0.1 + 2 * math.pi, 90)
 

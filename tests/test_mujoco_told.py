@@ -11,14 +11,14 @@ import pytest
 
 import fourbar
 from fourbar.effects import Friction, Gravity, Load, Table
-from fourbar.motion_law import Law
 from fourbar.scene import Scene
+from fourbar.scene.motion_law import Law
 from tests.scenes import crank_rocker
+from validation.compare.rows import Row
 from validation.engines.mujoco import motions, simulate
 from validation.engines.mujoco.called_back import OVERRUN, within
-from validation.judge import judge
-from validation.results import Row
-from validation.witnesses import WITNESSES
+from validation.engines.witnesses import WITNESSES
+from validation.run.judge import judge
 
 KINK = 1e-5
 """rad; where the cubic pieces of a law meet within a step of RK4 the motion errs by h^2: measured 3e-6 here."""

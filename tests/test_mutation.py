@@ -7,8 +7,9 @@ import pytest
 
 import fourbar
 from tests.scenes import crank_rocker
-from validation.mutation import command, harness
-from validation.mutation.harness import caught, changed, numbers
+from validation.stress.mutation import harness
+from validation.stress.mutation import mutation as command
+from validation.stress.mutation.harness import caught, changed, numbers
 
 SCENE = crank_rocker()
 
@@ -42,39 +43,44 @@ def test_the_harness_alone_catches_a_wrong_sign(monkeypatch: pytest.MonkeyPatch)
 def test_survivors_need_a_reason(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    listed = "\n".join(f"    fourbar.dynamics.x_f__mutmut_{i}: killed" for i in range(1, 20))
-    listed += "\n    fourbar.dynamics.x_f__mutmut_20: survived\n    fourbar.mobility.x_g__mutmut_1: not checked\n"
-    states = command._states(listed, ["fourbar.dynamics*"])
+    listed = "\n".join(f"    fourbar.formulas.torque.x_f__mutmut_{i}: killed" for i in range(1, 20))
+    listed += "\n    fourbar.formulas.torque.x_f__mutmut_20: survived"
+    listed += "\n    fourbar.formulas.mobility.x_g__mutmut_1: not checked\n"
+    states = command._states(listed, ["fourbar.formulas.torque*"])
     assert len(states) == 20
-    every = command._states(listed, ["fourbar.dynamics*", "fourbar.mobility*"])
+    every = command._states(listed, ["fourbar.formulas.torque*", "fourbar.formulas.mobility*"])
     assert len(every) == 21
-    survivors = {"fourbar.dynamics.x_f__mutmut_20": "dynamics.f: return a -> return b"}
+    survivors = {"fourbar.formulas.torque.x_f__mutmut_20": "torque.f: return a -> return b"}
     reasons = tmp_path / "harmless.json"
     monkeypatch.setattr(command, "HARMLESS", reasons)
     assert command._told(states, survivors, tmp_path) == 1
     assert "19 of 20" in capsys.readouterr().out
     assert "NO REASON" in (tmp_path / "survivors.txt").read_text(encoding="utf-8")
-    reasons.write_text('{"dynamics.f": {"return a -> return b": "a is b"}}', encoding="utf-8")
+    reasons.write_text('{"torque.f": {"return a -> return b": "a is b"}}', encoding="utf-8")
     assert command._told(states, survivors, tmp_path) == 0
     assert "a is b" in (tmp_path / "survivors.txt").read_text(encoding="utf-8")
     assert "of no survivor" not in capsys.readouterr().out
     # a run that ended early proves nothing, nor do nineteen dead of one module speak for another
     assert command._told(every, survivors, tmp_path) == 1
     assert "1 mutants were not tried" in capsys.readouterr().out
-    more = {**states, "fourbar.mobility.x_g__mutmut_1": "survived", "fourbar.mobility.x_g__mutmut_2": "killed"}
-    more |= {f"fourbar.dynamics.x_h__mutmut_{i}": "killed" for i in range(40)}
-    same = "dynamics.f: return a -> return b"  # on record too
-    assert command._told(more, {**survivors, "fourbar.mobility.x_g__mutmut_1": same}, tmp_path) == 1
+    more = {
+        **states,
+        "fourbar.formulas.mobility.x_g__mutmut_1": "survived",
+        "fourbar.formulas.mobility.x_g__mutmut_2": "killed",
+    }
+    more |= {f"fourbar.formulas.torque.x_h__mutmut_{i}": "killed" for i in range(40)}
+    same = "torque.f: return a -> return b"  # on record too
+    assert command._told(more, {**survivors, "fourbar.formulas.mobility.x_g__mutmut_1": same}, tmp_path) == 1
     capsys.readouterr()
-    assert command._told(states | {"fourbar.dynamics.x_f__mutmut_20": "killed"}, {}, tmp_path) == 0
-    assert "of no survivor:\n    dynamics.f: return a -> return b" in capsys.readouterr().out
+    assert command._told(states | {"fourbar.formulas.torque.x_f__mutmut_20": "killed"}, {}, tmp_path) == 0
+    assert "of no survivor:\n    torque.f: return a -> return b" in capsys.readouterr().out
     # with a reason each, but too many
-    del states["fourbar.dynamics.x_f__mutmut_1"]
+    del states["fourbar.formulas.torque.x_f__mutmut_1"]
     assert command._told(states, survivors, tmp_path) == 1
     assert command._told({}, {}, tmp_path) == 1
 
 
-SHOWN = """# fourbar.mobility.xǁReachǁsum__mutmut_11: survived
+SHOWN = """# fourbar.formulas.mobility.xǁReachǁsum__mutmut_11: survived
 --- fourbar/mobility.py
 +++ fourbar/mobility.py
 @@ -1,3 +1,3 @@
@@ -88,12 +94,14 @@ def test_a_survivor_is_known_by_its_function_and_its_line(tmp_path: Path) -> Non
     mutmut = tmp_path / "mutmut"
     mutmut.write_text(f"#!/bin/sh\ncat <<'END'\n{SHOWN}END\n", encoding="utf-8")
     mutmut.chmod(0o755)
-    change = command._change(mutmut, tmp_path, "fourbar.mobility.xǁReachǁsum__mutmut_11")
+    change = command._change(mutmut, tmp_path, "fourbar.formulas.mobility.xǁReachǁsum__mutmut_11")
     assert (
         change
         == "mobility.Reach.sum: return 0.0 if total <= limit else total -> return 0.0 if total < limit else total"
     )
-    assert command._change(mutmut, tmp_path, "fourbar.mobility.x__wrapped__mutmut_1").startswith("mobility._wrapped: ")
+    assert command._change(mutmut, tmp_path, "fourbar.formulas.mobility.x__wrapped__mutmut_1").startswith(
+        "mobility._wrapped: "
+    )
 
 
 def test_a_run_that_mutmut_stops_is_no_result(
@@ -102,7 +110,7 @@ def test_a_run_that_mutmut_stops_is_no_result(
     """Here mutmut knows of one killed mutant, from before, and finds a test that fails without any."""
     mutmut = tmp_path / "mutmut"
     mutmut.write_text(
-        "#!/bin/sh\n[ $1 = results ] && echo 'fourbar.dynamics.x_f__mutmut_1: killed' || exit $STOPS\n",
+        "#!/bin/sh\n[ $1 = results ] && echo 'fourbar.formulas.torque.x_f__mutmut_1: killed' || exit $STOPS\n",
         encoding="utf-8",
     )
     mutmut.chmod(0o755)

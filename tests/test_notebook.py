@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 
 import fourbar
-from fourbar import files
 from fourbar.cli import status
-from fourbar.drawing import HEIGHT, WIDTH, drawing
 from fourbar.errors import DependencyError, InputError
-from fourbar.new import new_scene
+from fourbar.files import scene_file as files
+from fourbar.files.new import new_scene
+from fourbar.show.drawing import HEIGHT, WIDTH, drawing
 from tests.scenes import crank_rocker, thesis
 
 HOSTILE = "<script>alert(1)</script>&"

@@ -7,11 +7,11 @@ from pathlib import Path
 import pytest
 
 import fourbar
-from fourbar import animate
 from fourbar.cli import status
 from fourbar.errors import InputError
 from fourbar.files import dump, load, loads, save
-from fourbar.pictures import LARGEST, Picture
+from fourbar.files.pictures import LARGEST, Picture
+from fourbar.show import animate
 from tests.scenes import crank_rocker
 from tests.test_animate import PNG, embedded
 

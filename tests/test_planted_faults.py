@@ -8,23 +8,23 @@ takes part. The same scenes without a fault must pass, or nothing would be shown
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
+from importlib import import_module
 from typing import Any
 
 import numpy as np
 import pytest
 
-import fourbar.kinematics
-import fourbar.kinetostatics
-import fourbar.scene
-import validation.judge
+import validation.run.judge
+from fourbar.formulas import motion, path
+from fourbar.formulas.motion import State
 from fourbar.linkage import Bar
 from fourbar.scene import Scene
 from fourbar.solution import Solution
 from tests.scenes import crank_rocker, thesis
 from validation.engines.mujoco.inverse import MujocoTree
 from validation.engines.pinocchio import PinocchioTree
-from validation.judge import judge
-from validation.witnesses import WITNESSES
+from validation.engines.witnesses import WITNESSES
+from validation.run.judge import judge
 
 EXACT = {name: [w for w in WITNESSES if w.name in name] for name in ("pinocchio-inverse, mujoco-inverse", "free-body")}
 """The engines, and the witness that needs none: each has to notice by itself."""
@@ -39,20 +39,20 @@ def outcome(scene: Scene, asked: str = "pinocchio-inverse, mujoco-inverse") -> t
 @contextmanager
 def formulas_see(change: Callable[[Scene], Scene]) -> Iterator[None]:
     """The formulas work on a changed scene (a fault in how they read it), the engines on the true one."""
-    true = validation.judge.solve
+    true = validation.run.judge.solve
 
     def faulty(scene: Scene, *arguments: Any, **keywords: Any) -> Solution:
         return true(change(scene), *arguments, **keywords)
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(validation.judge, "solve", faulty)
+        patch.setattr(validation.run.judge, "solve", faulty)
         yield
 
 
 @contextmanager
 def formulas_say(change: Callable[[Solution], None]) -> Iterator[None]:
     """The formulas' result is spoilt after it was computed."""
-    true = validation.judge.solve
+    true = validation.run.judge.solve
 
     def faulty(*arguments: Any, **keywords: Any) -> Solution:
         solution = true(*arguments, **keywords)
@@ -60,7 +60,7 @@ def formulas_say(change: Callable[[Solution], None]) -> Iterator[None]:
         return solution
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(validation.judge, "solve", faulty)
+        patch.setattr(validation.run.judge, "solve", faulty)
         yield
 
 
@@ -81,21 +81,18 @@ def with_bars(change: Callable[[Bar], Bar]) -> Callable[[Scene], Scene]:
 
 
 def inertia_about_the_pin(bar: Bar) -> Bar:
-    assert bar.centre is not None and bar.inertia is not None
-    return replace(bar, inertia=bar.inertia + bar.mass * bar.centre[0] ** 2)
+    return replace(bar, inertia=bar.moment_of_inertia + bar.mass * bar.mass_centre[0] ** 2)
 
 
 def inertia_shifted_twice(bar: Bar) -> Bar:
     """m d^2 with d from mid-bar, added to an inertia that is already about G."""
-    assert bar.centre is not None and bar.inertia is not None
-    r, phi = bar.centre
+    r, phi = bar.mass_centre
     squared = r * r + bar.length**2 / 4 - r * bar.length * np.cos(phi)
-    return replace(bar, inertia=bar.inertia + bar.mass * float(squared))
+    return replace(bar, inertia=bar.moment_of_inertia + bar.mass * float(squared))
 
 
 def centre_from_the_other_pin(bar: Bar) -> Bar:
-    assert bar.centre is not None
-    return replace(bar, centre=(bar.length - bar.centre[0], bar.centre[1]))
+    return replace(bar, centre=(bar.length - bar.mass_centre[0], bar.mass_centre[1]))
 
 
 def load_on_another_bar(scene: Scene) -> Scene:
@@ -122,62 +119,96 @@ def torque_off(solution: Solution) -> None:
     solution.torque *= 1.0 + 1e-9
 
 
-def on_the_other_branch(true: Callable[..., Any]) -> Callable[..., Any]:
-    return lambda linkage, theta_2, branch: true(linkage, theta_2, -branch)
+solving = import_module("fourbar.case")
+"""Where the forces of a scene are put together."""
+close_loop, inertia_wrenches, half_slope, inertia = (
+    path.close_loop,
+    solving.inertia_wrenches,
+    solving.half_slope,
+    solving.inertia,
+)
+
+
+def on_the_other_branch(lengths: Any, u1: Any, u2: Any, half: Any, branch: Any) -> Any:
+    return close_loop(lengths, u1, u2, half, -branch)
 
 
 def alpha_for_acceleration(true: Callable[..., Any]) -> Callable[..., Any]:
     """The thesis's index slip: a_G4x read as alpha_3 (its Java program takes element 5 for element 6)."""
 
-    def faulty(self: Any, bar: int, along: float, across: float) -> Any:
-        x, y = true(self, bar, along, across)
-        return (np.broadcast_to(self.alpha_3, np.shape(x)), y) if bar == 4 else (x, y)
+    def faulty(self: Any, bar: int, z: Any) -> Any:
+        a = true(self, bar, z)
+        return self.alpha(3) + 1j * a.imag if bar == 4 else a
 
     return faulty
+
+
+def alpha_for_acceleration_in_a_force(a: Any, bodies: Any, at: Any, moving: Any) -> Any:
+    wrenches, at_A = inertia_wrenches(a, bodies, at, moving)
+    return wrenches._replace(R4=-bodies[2].m * moving.alpha_3 + 1j * wrenches.R4.imag), at_A
 
 
 def swing_without_centripetal(arm: Any, omega: Any, alpha: Any) -> Any:
-    return (-alpha * arm[1], alpha * arm[0])
+    return 1j * alpha * arm
 
 
 def swing_with_alpha_reversed(arm: Any, omega: Any, alpha: Any) -> Any:
-    w2 = omega * omega
-    return (alpha * arm[1] - w2 * arm[0], -alpha * arm[0] - w2 * arm[1])
+    return (-1j * alpha - omega * omega) * arm
 
 
-def kilogram_centimetres(true: Callable[..., None]) -> Callable[..., None]:
+def inertia_without_centripetal(a: Any, bodies: Any, at: Any, moving: Any) -> Any:
+    return inertia_wrenches(a, bodies, at, moving._replace(omega_2=0.0, omega_3=0.0, omega_4=0.0))
+
+
+def inertia_with_alpha_reversed(a: Any, bodies: Any, at: Any, moving: Any) -> Any:
+    back = moving._replace(alpha_2=-moving.alpha_2, alpha_3=-moving.alpha_3, alpha_4=-moving.alpha_4)
+    return inertia_wrenches(a, bodies, at, back)
+
+
+def kilogram_centimetres(a: Any, bodies: Any, at: Any, moving: Any) -> Any:
     """The thesis's unit slip: m a in kg cm/s^2 added to newtons."""
+    wrenches, at_A = inertia_wrenches(a, bodies, at, moving)
+    return wrenches._replace(R2=100.0 * wrenches.R2, R3=100.0 * wrenches.R3, R4=100.0 * wrenches.R4), 100.0 * at_A
 
-    def faulty(wrenches: Any, state: Any) -> None:
-        before = dict(wrenches.force_x), dict(wrenches.force_y)
-        true(wrenches, state)
-        for forces, old in zip((wrenches.force_x, wrenches.force_y), before, strict=True):
-            for bar in forces:
-                forces[bar] = old[bar] + 100.0 * (forces[bar] - old[bar])
+
+def work_of_bars_3_and_4_alone(true: Callable[..., Any]) -> Callable[..., Any]:
+    def faulty(self: Any) -> Any:
+        _, others = true(self)
+        return others, others
 
     return faulty
 
-
-kinematics, kinetostatics = fourbar.kinematics, fourbar.kinetostatics
-State = fourbar.state.State
 
 FAULTS = {
     "force sign flipped": lambda: formulas_say(flip("F43")),
     "F32 for F23": lambda: formulas_say(flip("F32")),
     "F12 sign flipped": lambda: formulas_say(flip("F12")),
-    "branch swapped": lambda: replaced(fourbar.blocks, "close_loop", on_the_other_branch(kinematics.close_loop)),
+    "branch swapped": lambda: replaced(path, "close_loop", on_the_other_branch),
     "inertia about the pin": lambda: formulas_see(with_bars(inertia_about_the_pin)),
     "m d^2 added to an inertia about G": lambda: formulas_see(with_bars(inertia_shifted_twice)),
     "mass centre from the wrong pin": lambda: formulas_see(with_bars(centre_from_the_other_pin)),
     "load on the wrong bar": lambda: formulas_see(load_on_another_bar),
     "gravity missing": lambda: formulas_see(lambda scene: replace(scene, effects=())),
     "gravity flipped": lambda: formulas_see(gravity_flipped),
-    "sign of the alpha term": lambda: replaced(fourbar.state, "swing", swing_with_alpha_reversed),
-    "m omega^2 r dropped": lambda: replaced(fourbar.state, "swing", swing_without_centripetal),
+    "sign of the alpha term of a point": lambda: replaced(motion, "swing", swing_with_alpha_reversed),
+    "sign of the alpha terms of the forces": lambda: replaced(solving, "inertia_wrenches", inertia_with_alpha_reversed),
+    "omega^2 r of a point dropped": lambda: replaced(motion, "swing", swing_without_centripetal),
+    "m omega^2 r dropped": lambda: replaced(solving, "inertia_wrenches", inertia_without_centripetal),
     "alpha_3 used for an acceleration": lambda: replaced(
         State, "acceleration", alpha_for_acceleration(State.acceleration)
     ),
-    "m a in kg cm/s^2": lambda: replaced(kinetostatics, "add_inertia", kilogram_centimetres(kinetostatics.add_inertia)),
+    "alpha_3 used for an acceleration in a force": lambda: replaced(
+        solving, "inertia_wrenches", alpha_for_acceleration_in_a_force
+    ),
+    "m a in kg cm/s^2": lambda: replaced(solving, "inertia_wrenches", kilogram_centimetres),
+    "J'/2 omega^2 of the torque dropped": lambda: replaced(solving, "half_slope", lambda *_: 0.0),
+    "J' for J'/2 in the torque": lambda: replaced(solving, "half_slope", lambda *of: 2.0 * half_slope(*of)),
+    "J of the coupler and output left out of the torque": lambda: replaced(
+        solving, "inertia", lambda *of: (inertia(*of)[0], 0.0)
+    ),
+    "work on the input left out of the torque": lambda: replaced(
+        solving.Actions, "work", work_of_bars_3_and_4_alone(solving.Actions.work)
+    ),
     "torque off by 1e-9": lambda: formulas_say(torque_off),
 }
 

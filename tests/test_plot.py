@@ -11,16 +11,19 @@ import pytest
 from matplotlib.text import Text
 
 import fourbar
-from fourbar import plot
-from fourbar.effects import Flywheel
+from fourbar.effects import Effect, Flywheel, PinFriction, Point, Spring, Springs, Torsion
+from fourbar.effects.actions import bodies
 from fourbar.errors import DependencyError, InputError, NotAssembledError
-from fourbar.motion_law import Law
-from fourbar.plot.curves import broken, free_place, limit_of, poles
-from fourbar.plot.energy import energies
-from fourbar.plot.figures import FIGURES, compose
-from fourbar.plot.freebody import free_body
-from fourbar.plot.style import matplotlib_style, number, plain, unit_for
-from fourbar.plot.view import CLEAR, common_position, on_branch, view
+from fourbar.formulas.path import state
+from fourbar.formulas.torque import inertia
+from fourbar.scene.motion_law import Law
+from fourbar.show import plot
+from fourbar.show.plot.curves import broken, free_place, limit_of, poles
+from fourbar.show.plot.energy import energies
+from fourbar.show.plot.figures import FIGURES, compose
+from fourbar.show.plot.freebody import free_body
+from fourbar.show.plot.style import matplotlib_style, number, plain, unit_for
+from fourbar.show.plot.view import CLEAR, common_position, on_branch, view
 from tests.scenes import crank_rocker, thesis
 
 SIGNATURES = {"svg": b"<?xml", "png": b"\x89PNG", "pdf": b"%PDF"}
@@ -173,13 +176,25 @@ def test_transmission_angle_marks_limits_and_dead_centres() -> None:
     assert crossed + marks["dead centre"][0] == pytest.approx(sum(expected))  # its mirror image in the ground's line
 
 
+EFFECTS = (
+    fourbar.Gravity(),
+    fourbar.Viscous.at(A=0.02, O4=0.01),
+    fourbar.Friction.at(B=0.03),
+    PinFriction.at(A=(0.2, 0.01), O4=(0.1, 0.02)),
+    Torsion.at(B=(0.5, 1.0, 0.1)),
+    Springs((Spring(Point(1, 0.1, -1.5), Point(3, 0.08, 0.2), 50.0, 0.05),)),
+    Flywheel(0.01, 4),
+)
+
+
 @pytest.mark.parametrize("drive_bar", (2, 3, 4))
-def test_free_bodies_balance(drive_bar: int) -> None:
-    effects = (fourbar.Gravity(), fourbar.Viscous.at(A=0.02, O4=0.01), fourbar.Friction.at(B=0.03))
+@pytest.mark.parametrize(
+    "effects", [EFFECTS, *((one,) for one in EFFECTS)], ids=lambda some: "+".join(e.key for e in some)
+)
+def test_free_bodies_balance(drive_bar: int, effects: tuple[Effect, ...]) -> None:
     shown = view(crank_rocker(drive_bar=drive_bar, effects=effects))
-    state = shown.state()
     for bar in (2, 3, 4):
-        arrows, couples = free_body(shown, state, bar)
+        arrows, couples = free_body(shown, bar)
         forces = np.array([arrow.force for arrow in arrows])
         assert np.abs(forces.sum(axis=0)).max() <= BALANCE * np.abs(forces).max()
         moments = [a.at[0] * a.force[1] - a.at[1] * a.force[0] for a in arrows] + [c.moment for c in couples]
@@ -301,14 +316,13 @@ ENERGY = 1e-6
 
 
 def test_the_work_of_what_acts_is_the_kinetic_energy() -> None:
-    from fourbar.dynamics import carrying, kinetic_energy, path
-
     scene = released(effects=(fourbar.Gravity(), fourbar.Viscous.at(O2=0.002, B=0.001), Flywheel(0.01, 4)))
     motion = fourbar.solve(scene)
     found = energies(scene, motion)
     assert set(found.work) == {"loads", "gravity", "viscous"}
-    linkage = carrying(scene.linkage, scene.effects)
-    expected = kinetic_energy(linkage, path(linkage, motion.theta_2, motion.branch), motion.omega_2)
+    carried, place = bodies(scene.linkage, scene.effects), state(scene.linkage, motion.theta_2, motion.branch)
+    of_input, of_others = inertia(scene.linkage.input.length, carried, place.at, place.k)
+    expected = 0.5 * (of_input + of_others) * motion.omega_2**2
     np.testing.assert_allclose(found.kinetic, expected, rtol=1e-9, atol=1e-15)
     assert found.kinetic.max() > 0.1
     assert np.all(np.diff(found.work["viscous"]) <= 0.0)
@@ -349,12 +363,12 @@ def test_the_settings_of_the_reader_are_left_alone(tmp_path: Path) -> None:
 
 def test_matplotlib_is_loaded_only_to_draw_and_its_absence_is_one_line(tmp_path: Path) -> None:
     code = (
-        "import sys, fourbar.plot, fourbar.animate\n"
+        "import sys, fourbar.show.plot, fourbar.show.animate\n"
         "assert 'matplotlib' not in sys.modules\n"
         "sys.modules['matplotlib'] = None\n"
         "from tests.scenes import crank_rocker\n"
         "try:\n"
-        "    fourbar.plot.draw(crank_rocker(), sys.argv[1])\n"
+        "    fourbar.show.plot.draw(crank_rocker(), sys.argv[1])\n"
         "except fourbar.errors.DependencyError as error:\n"
         "    print(error)\n"
     )

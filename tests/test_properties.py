@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 import fourbar
 from fourbar.effects import Gravity, Load, Viscous
 from fourbar.linkage import MOVING_BARS, Bar, FourBar
-from fourbar.motion import Motion
 from fourbar.scene import Scene
+from fourbar.scene.motion import Motion
 from fourbar.solution import Solution
 
 WORST_CONDITION = 0.2
@@ -77,10 +77,10 @@ def force_size(scene: Scene, solution: Solution) -> float:
 
 def torque_size(scene: Scene, solution: Solution, size: float) -> float:
     """Sum of the magnitudes of all moments, N m; `size` is that of the forces."""
-    longest = max(*scene.linkage.lengths, *(abs(scene.linkage.bar(bar).centre[0]) for bar in MOVING_BARS), 0.5)
+    longest = max(*scene.linkage.lengths, *(abs(scene.linkage.bar(bar).mass_centre[0]) for bar in MOVING_BARS), 0.5)
     couples = abs(float(solution.torque[0])) + sum(abs(load.moment) for load in scene.loads)
     for bar in MOVING_BARS:
-        couples += scene.linkage.bar(bar).inertia * abs(float(getattr(solution, f"alpha_{bar}")[0]))
+        couples += scene.linkage.bar(bar).moment_of_inertia * abs(float(getattr(solution, f"alpha_{bar}")[0]))
     for effect in scene.effects:
         if isinstance(effect, Viscous):
             speeds = sum(abs(float(getattr(solution, f"omega_{bar}")[0])) for bar in MOVING_BARS)
@@ -159,7 +159,7 @@ def test_power_balance(scene: Scene) -> None:
         part, G = scene.linkage.bar(bar), getattr(s, f"G{bar}")[0]
         velocity[bar] = base[bar] + spin(w[bar], G - foot[bar])
         gain = part.mass * velocity[bar] @ getattr(s, f"a_G{bar}")[0]
-        turn = part.inertia * w[bar] * float(getattr(s, f"alpha_{bar}")[0])
+        turn = part.moment_of_inertia * w[bar] * float(getattr(s, f"alpha_{bar}")[0])
         power -= gain + turn
         terms += abs(gain) + abs(turn)
     for load in scene.loads:
@@ -211,7 +211,7 @@ def test_mirror_symmetry(scene: Scene) -> None:
     link, m = scene.linkage, scene.motion
 
     def bar(old: Bar) -> Bar:
-        return replace(old, centre=(old.centre[0], -old.centre[1]))
+        return replace(old, centre=(old.mass_centre[0], -old.mass_centre[1]))
 
     mirrored = replace(
         scene,
@@ -238,7 +238,12 @@ def test_length_mass_and_time_scale(scene: Scene, length: int, mass: int, time: 
     link, m = scene.linkage, scene.motion
 
     def bar(old: Bar) -> Bar:
-        return Bar(old.length * L, old.mass * M, old.inertia * M * L * L, (old.centre[0] * L, old.centre[1]))
+        return Bar(
+            old.length * L,
+            old.mass * M,
+            old.moment_of_inertia * M * L * L,
+            (old.mass_centre[0] * L, old.mass_centre[1]),
+        )
 
     scaled = replace(
         scene,
@@ -321,7 +326,7 @@ def test_relabelled_from_the_other_end(scene: Scene) -> None:
     theta_1 = link.ground_angle + math.pi
     b = link.coupler
     # the coupler's first pin is now B: G from there, along the line from B to A
-    r, phi = b.centre
+    r, phi = b.mass_centre
     x, y = b.length - r * math.cos(phi), -r * math.sin(phi)
     coupler = replace(b, centre=(math.hypot(x, y), math.atan2(y, x)))
     names = {2: 4, 3: 3, 4: 2}

@@ -10,8 +10,8 @@ import pytest
 
 import fourbar
 from fourbar.cli import status
-from fourbar.effects import REGISTRY
 from fourbar.exits import HOLDS
+from fourbar.files.effects import REGISTRY
 from validation.cli import COMMANDS
 
 ROOT = Path(__file__).parent.parent

@@ -11,13 +11,13 @@ from click.testing import CliRunner
 
 from fourbar.errors import InputError
 from validation.cli import status
+from validation.compare.columns import write_columns
+from validation.compare.rows import AGREES, FAILS, Row, write_results
+from validation.compare.tolerance import EPS
 from validation.regression import record, render
+from validation.regression.accept import accept_command, compare
 from validation.regression.changes import Kind, differences
-from validation.regression.command import accept_command, compare
 from validation.regression.record import About, about, read_run, write_about
-from validation.results import AGREES, FAILS, Row, write_results
-from validation.suite.columns import write_columns
-from validation.tolerance import EPS
 
 ROW = Row("scene", "engine", "exact", "torque", 1e-15, 1e-14, AGREES, "equivalence", 1.0, 1.0)
 HERE = about({"engine": 1.0}, "suite")

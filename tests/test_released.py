@@ -7,12 +7,13 @@ import numpy as np
 import pytest
 
 import fourbar
-from fourbar.scene import Scene, solve
+from fourbar.scene import Scene
+from fourbar.solve import solve
+from validation.compare.rows import FAILS, Row
 from validation.engines.loop import LimitWatch
-from validation.hard import free
-from validation.judge import judge, judged_page
-from validation.page import Record
-from validation.results import FAILS, Row
+from validation.report.page import Record
+from validation.run import released as free
+from validation.run.judge import judge, judged_page
 
 
 def falling(coupler: float = 0.15, **motion: Any) -> Scene:
@@ -110,7 +111,7 @@ def test_a_limit_is_seen_once_and_between_two_steps() -> None:
 
 
 def test_the_table_says_that_the_motion_ended() -> None:
-    from fourbar.tables import heading
+    from fourbar.show.tables import heading
 
     scene = falling()
     assert any("ends at 0.43991 s" in line for line in heading(scene, solve(scene)))

@@ -13,15 +13,15 @@ import pytest
 
 import fourbar
 from tests.scenes import crank_rocker
-from validation.judge import judged_page
-from validation.page import Page
+from validation.compare.rows import FAILS, to_csv
+from validation.engines.witnesses import WITNESSES
 from validation.report.costs import cost_points
 from validation.report.figures import FLOOR, STRETCHES, worst_of_stretches
 from validation.report.html import ALL_OPEN, Section, html
 from validation.report.markdown import markdown
+from validation.report.page import Page
 from validation.report.summary import Summary, summarise
-from validation.results import FAILS, to_csv
-from validation.witnesses import WITNESSES
+from validation.run.judge import judged_page
 
 COMMENT_LIMIT = 65_536
 """Characters of a comment on GitHub."""

@@ -7,16 +7,16 @@ from pathlib import Path
 import pytest
 
 from tests.test_report import page, report
-from validation.cost import section as cost
-from validation.hard.families import FAMILIES
-from validation.hard.section import beside, section
-from validation.hard.suite import HARD_WITNESSES, Hard
+from validation.compare.rows import AGREES, FAILS, REFUSES, UNTOLD, Row, write_results
+from validation.engines.hard_suite import HARD_WITNESSES, Hard
+from validation.engines.witnesses import WORK
+from validation.report import cost_section as cost
 from validation.report.costs import cost_figure
+from validation.report.hard_section import beside, section
 from validation.report.html import html
 from validation.report.summary import summarise
-from validation.results import AGREES, FAILS, REFUSES, UNTOLD, Row, write_results
-from validation.run import sections
-from validation.witnesses import WORK
+from validation.run.run import sections
+from validation.scenes.hard_families import FAMILIES
 
 
 def judged(scene: str, verdict: str) -> Row:
@@ -53,7 +53,7 @@ def test_a_failing_row_fails_its_family_in_the_report(tmp_path: Path) -> None:
 def test_a_run_of_the_hard_suite_writes_its_page_and_its_part_of_the_report(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("validation.hard.page.picture", lambda: "<svg><text>the picture</text></svg>")
+    monkeypatch.setattr("validation.report.hard_page.picture", lambda: "<svg><text>the picture</text></svg>")
     (part,) = sections([judged("toggle-b", AGREES)], tmp_path)
     assert (part.key, part.links[0][1]) == ("hard", "hard.html")
     assert (

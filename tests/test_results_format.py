@@ -7,15 +7,22 @@ from pathlib import Path
 
 import pytest
 
+from fourbar import solve
+from fourbar.effects import PinFriction
+from fourbar.formulas.pin_forces import PinForces
+from fourbar.quantities import FORCES, PIN_FORCES, QUANTITIES, STAGES, UNKNOWNS
+from fourbar.solution import Solution
+from tests.scenes import crank_rocker
+from validation.compare.columns import read_columns
+from validation.compare.rows import COLUMNS, Row, from_csv
 from validation.report.summary import SCENES_SHOWN
-from validation.results import COLUMNS, Row, from_csv
-from validation.run import CHUNK, run
-from validation.suite.columns import read_columns
-from validation.suite.random import LinkageType
-from validation.suite.scenes import Random
-from validation.suite.selection import chosen
+from validation.run.run import CHUNK, run
+from validation.run.selection import chosen
+from validation.scenes.random import LinkageType
+from validation.scenes.suites import Random
 
 PAGE = (Path(__file__).parents[1] / "docs" / "results-format.md").read_text()
+NOT_QUANTITIES = ("title", "drive_bar", "status_code", "branch", "stopped_at")
 TYPES = {"string": str, "double": float, "boolean": bool}
 
 
@@ -36,6 +43,34 @@ def test_every_column_is_described_with_its_type() -> None:
     described = dict(re.findall(r"^\| `(\w+)` \| (string|double|boolean) \|", PAGE, re.MULTILINE))
     assert tuple(described) == COLUMNS
     assert {field.name: field.type for field in dataclasses.fields(Row)} == {k: TYPES[t] for k, t in described.items()}
+
+
+def test_every_quantity_is_described_as_the_table_has_it() -> None:
+    described = re.findall(r"^\| `(\w+)` \| (.+?) \| (\w+) \| (scalar|vector) \| (.+) \|$", PAGE, re.MULTILINE)
+    table = [(q.name, q.unit, q.stage or "commanded", q.kind, q.meaning.replace("|", r"\|")) for q in QUANTITIES]
+    assert described == table
+
+
+def test_the_fields_of_a_solution_are_the_rows_of_the_table() -> None:
+    named = [field.name for field in dataclasses.fields(Solution)]
+    assert [name for name in named if name not in NOT_QUANTITIES] == [q.name for q in QUANTITIES]
+    assert set(NOT_QUANTITIES) <= set(named)
+    assert {q.kind for q in QUANTITIES} == {"scalar", "vector"}
+    assert {q.group for q in QUANTITIES} == {"", "unknown", "dry friction", "pin loads"}
+    assert STAGES == ("position", "velocity", "acceleration", "force", "error")
+
+
+def test_a_solution_has_the_shapes_of_the_table_and_no_other_quantity() -> None:
+    solution = solve(crank_rocker(effects=(PinFriction.at(A=(0.1, 0.01)),)))
+    for q in QUANTITIES:
+        values = getattr(solution, q.name)
+        assert (values is None) == (q.name == "time")
+        assert values is None or values.shape == ((len(solution), 2) if q.kind == "vector" else (len(solution),))
+
+
+def test_the_formulas_name_the_pin_forces_as_the_table_does() -> None:
+    assert PinForces._fields == PIN_FORCES == ("F12", "F32", "F43", "F14")
+    assert tuple(name for name in UNKNOWNS if name not in FORCES) + FORCES == UNKNOWNS
 
 
 def test_the_parquet_file_holds_the_rows_of_the_table(results: Path) -> None:

@@ -7,11 +7,12 @@ import pytest
 
 import fourbar
 from fourbar.effects import Friction
-from fourbar.motion import Motion, Sweep
-from fourbar.scene import Scene, command, solve
-from validation.judge import judge
-from validation.reversals import broken, reversals
-from validation.witnesses import WITNESSES
+from fourbar.scene import Scene, command
+from fourbar.scene.motion import Motion, Sweep
+from fourbar.solve import solve
+from validation.compare.reversals import broken, reversals
+from validation.engines.witnesses import WITNESSES
+from validation.run.judge import judge
 
 D, A, B, C = 0.3, 0.1, 0.25, 0.22
 FRICTION = 0.5

@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 
 import fourbar
-import validation.mobility.transmission
-from fourbar import mobility, transmission
+import validation.compare.statements.transmission
+from fourbar.formulas import mobility, transmission
 from fourbar.linkage import uniform
 from fourbar.scene import Scene, command
+from validation.compare.rows import Row
+from validation.compare.statements.statements import statements
 from validation.engines.mujoco.inverse import MujocoInverse
 from validation.engines.pinocchio import PinocchioInverse
-from validation.mobility.rows import statements
-from validation.results import Row
-from validation.suite.random import LinkageType, random_scene
+from validation.scenes.random import LinkageType, random_scene
 
 ROCKER, TRIPLE, CHANGE = (0.3, 0.1, 0.25, 0.22), (0.22, 0.2, 0.32, 0.18), (0.3, 0.1, 0.3, 0.1)
 LENGTHS = [
@@ -129,7 +129,7 @@ FAULTS = {
     "drive condition": (
         ROCKER,
         "transmission",
-        changed("drive_sine", lambda found: found * (1.0 + SEEN), validation.mobility.transmission),
+        changed("drive_sine", lambda found: found * (1.0 + SEEN), validation.compare.statements.transmission),
     ),
     "mechanical advantage": (
         ROCKER,

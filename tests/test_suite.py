@@ -12,21 +12,21 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import validation.run
+import validation.run.run
 from fourbar.errors import FourBarError, InputError
 from fourbar.scene import Command, Scene
 from tests.scenes import crank_rocker
-from validation.answer import Answer
+from validation.compare.answer import Answer
+from validation.compare.rows import FAILS, from_csv
+from validation.compare.tolerance import EQUIVALENCE
+from validation.engines.witnesses import Witness
 from validation.report.summary import SCENES_SHOWN, Summary
-from validation.results import FAILS, from_csv
-from validation.run import run
-from validation.suite import pool
-from validation.suite.random import LinkageType
-from validation.suite.scenes import AS_LONG_AS, MOST_POSITIONS, Files, Random, scene_files
-from validation.suite.selection import chosen
-from validation.suite.store import RunningError, Store
-from validation.tolerance import EQUIVALENCE
-from validation.witnesses import Witness
+from validation.run import pool
+from validation.run.run import run
+from validation.run.selection import chosen
+from validation.run.store import RunningError, Store
+from validation.scenes.random import LinkageType
+from validation.scenes.suites import AS_LONG_AS, MOST_POSITIONS, Files, Random, scene_files
 
 SEED = 7
 COUNT = SCENES_SHOWN + 20
@@ -92,7 +92,7 @@ def judge_all(suite: object, out: Path, witnesses: tuple[Witness, ...] = EXACT, 
 @pytest.mark.timeout(300)  # its hangs alone take half a minute, and every new worker imports the harness again
 def test_an_engine_that_crashes_or_hangs_costs_its_own_rows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(pool, "SECONDS_PER_SCENE", 8.0)
-    monkeypatch.setattr(validation.run, "CHUNK", {True: 2, False: 2})
+    monkeypatch.setattr(validation.run.run, "CHUNK", {True: 2, False: 2})
     moody = Witness("moody", f"{__name__}:Moody", EQUIVALENCE)
     judge_all(Few(), tmp_path / "run", (*EXACT, moody))
     rows = from_csv(tmp_path / "run" / "results.csv")

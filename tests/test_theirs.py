@@ -16,19 +16,20 @@ import pytest
 from click.testing import CliRunner
 
 import fourbar
-import validation.run
+import validation.run.run
 from fourbar.effects import Friction
 from fourbar.errors import InputError
 from fourbar.mjcf import mjcf
-from fourbar.scene import Scene, solve
+from fourbar.scene import Scene
+from fourbar.solve import solve
 from validation.check import model
 from validation.check.differences import differences
 from validation.check.screen import DEEPEST, LARGEST_MJCF, read_mjcf
-from validation.compare import COMPARED, compare
+from validation.compare.compare import COMPARED, compare
+from validation.compare.rows import FAILS, from_csv
+from validation.compare.tolerance import SIMULATED
+from validation.engines.memory import WORKER_MEMORY
 from validation.engines.mujoco.theirs import ONE_STATE, THROUGH_TIME, Examined, examine
-from validation.results import FAILS, from_csv
-from validation.suite.memory import WORKER_MEMORY
-from validation.tolerance import SIMULATED
 
 CRANK_ROCKER = fourbar.load(Path(__file__).parents[1] / "models" / "crank_rocker.toml")
 GENERATED = mjcf(CRANK_ROCKER)
@@ -69,8 +70,7 @@ def test_the_description_is_that_of_the_scene() -> None:
     found, linkage = generated(CRANK_ROCKER).described, CRANK_ROCKER.linkage
     for number, name in ((2, "input"), (3, "coupler"), (4, "output")):
         bar = linkage.bar(number)
-        assert bar.centre is not None
-        expected = (bar.length, bar.mass, bar.inertia, *bar.centre)
+        expected = (bar.length, bar.mass, bar.moment_of_inertia, *bar.mass_centre)
         parts = ("mass", "inertia", "centre.distance", "centre.angle")
         told = (found[f"lengths.{name}"], *(found[f"bars.{name}.{part}"] for part in parts))
         assert told == pytest.approx(expected, rel=1e-14)
@@ -180,9 +180,9 @@ def other_plane(closure: str = 'site1="r" site2="q"', axis: str = "0 -1 0", opti
 
     def inertial(number: int) -> str:
         bar = linkage.bar(number)
-        r, phi = bar.centre or (0.0, 0.0)
+        r, phi = bar.mass_centre or (0.0, 0.0)
         x, z = r * math.cos(phi), r * math.sin(phi)
-        moments = " ".join([repr(bar.inertia)] * 3)
+        moments = " ".join([repr(bar.moment_of_inertia)] * 3)
         return f'<inertial pos="{x!r} 0 {z!r}" mass="{bar.mass!r}" diaginertia="{moments}"/>'
 
     return f"""<mujoco><option gravity="0 0 -9.81" {option}/><default><joint axis="{axis}"/></default><worldbody>
@@ -356,7 +356,7 @@ def test_the_command_writes_and_prints_what_it_found(tmp_path: Path) -> None:
     scene.write_text(fourbar.dump(BARE))
     names = [f"--name={role}={name}" for role, name in {**MINE, "coupler": "rod<b>|"}.items()]
     arguments = [str(scene), "--mjcf", str(path), *names, "--out", str(tmp_path / "out")]
-    result = CliRunner().invoke(validation.run.command, arguments, standalone_mode=False)
+    result = CliRunner().invoke(validation.run.run.command, arguments, standalone_mode=False)
     assert result.return_value == 1, result.output
     assert "\x1b" not in result.output
     assert "closure.softness" in result.output
@@ -370,7 +370,9 @@ def test_bad_options_are_said(arguments: list[str], tmp_path: Path) -> None:
     scene = tmp_path / "scene.toml"
     scene.write_text(fourbar.dump(BARE))
     result = CliRunner().invoke(
-        validation.run.command, [str(scene) if word == "SCENE" else word for word in arguments], standalone_mode=False
+        validation.run.run.command,
+        [str(scene) if word == "SCENE" else word for word in arguments],
+        standalone_mode=False,
     )
     assert isinstance(result.exception, InputError)
 
@@ -382,7 +384,7 @@ def run(tmp_path: Path, text: str, *options: str) -> tuple[int | None, list[floa
     path.write_text(text)
     out = tmp_path / f"out{len(options)}"
     arguments = [str(scene), "--mjcf", str(path), "--out", str(out), *options]
-    result = CliRunner().invoke(validation.run.command, arguments, standalone_mode=False)
+    result = CliRunner().invoke(validation.run.run.command, arguments, standalone_mode=False)
     if result.exception is not None:
         raise result.exception
     return result.return_value, sorted({row.allowed for row in from_csv(out / "results.csv")})

@@ -8,21 +8,21 @@ import click
 from fourbar.exits import run
 
 COMMANDS = {
-    "run": "validation.run:command",
-    "accept": "validation.regression.command:accept_command",
-    "compare": "validation.regression.command:compare",
+    "run": "validation.run.run:command",
+    "accept": "validation.regression.accept:accept_command",
+    "compare": "validation.regression.accept:compare",
     "check": "validation.check:check",
-    "fuzz-files": "validation.suite.mutants:fuzz_files",
-    "models": "validation.models:models",
+    "fuzz-files": "validation.stress.mutants:fuzz_files",
+    "models": "validation.studies.models:models",
     "published": "validation.published:published",
-    "mutation": "validation.mutation.command:mutation",
-    "fuzz": "validation.fuzz.command:fuzz",
-    "stability": "validation.stability.command:stability",
-    "bench": "validation.bench:bench",
-    "cost": "validation.cost.command:cost",
-    "advise": "validation.cost.advise:command",
-    "advise-study": "validation.cost.measure:study",
-    "effects-cost": "validation.effect_cost:command",
+    "mutation": "validation.stress.mutation.mutation:mutation",
+    "fuzz": "validation.stress.fuzz.fuzz:fuzz",
+    "stability": "validation.stress.forward_error.stability:stability",
+    "bench": "validation.stress.bench:bench",
+    "cost": "validation.studies.cost.cost:cost",
+    "advise": "validation.studies.cost.advise:command",
+    "advise-study": "validation.studies.cost.measure:study",
+    "effects-cost": "validation.studies.effects.cost:command",
 }
 
 

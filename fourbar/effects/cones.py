@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.state import Array
+Array = NDArray[np.float64]
 
 ONE, NONE, SEVERAL = range(3)
 """How many solutions there are."""
@@ -31,30 +31,41 @@ class Sliding(NamedTuple):
     """(n, p), N m; the only or the least solution, NaN where there is none."""
     number: NDArray[np.uint8]
     """(n,), ONE, NONE or SEVERAL."""
+    from_jamming: Array
+    """(n,), in (0, 1]: the least stretch of the equations' slope, 0 where they jam."""
 
 
 def settle(F: Array, C: Array, k: Array) -> Sliding:
-    """Solve n problems in p unknowns: F (n, p, 2) in N, C (n, p, p, 2) in 1/m, k (p,) in m."""
+    """Solve n problems in p unknowns: F (n, p, 2) in N, C (n, p, p, 2) in 1/m, k (n, p) in m."""
     n, p = F.shape[:2]
     known = np.isfinite(F).all(axis=(1, 2)) & np.isfinite(C).all(axis=(1, 2, 3))
     x = np.full((n, p), np.nan)
     count = np.full(n, ONE, dtype=np.uint8)
     if p == 1:
         with np.errstate(invalid="ignore", divide="ignore"):
-            x[:, 0], found = _quadratic(F[:, 0], C[:, 0, 0], k[0])
+            x[:, 0], found = _quadratic(F[:, 0], C[:, 0, 0], k[:, 0])
         count[known] = found[known]
-        return Sliding(x, count)
-    K = k[:, None] * np.hypot(C[..., 0], C[..., 1])
-    radius = np.full(n, np.nan)
-    radius[known] = np.abs(np.linalg.eigvals(K[known])).max(axis=1)
-    sure = np.flatnonzero(known & (radius < 1.0))
-    x[sure] = _iterate(F[sure], C[sure], k, np.zeros((len(sure), p)))
-    for index in np.flatnonzero(known & ~(radius < 1.0)):
-        x[index], count[index] = _search(F[index], C[index], k)
-    return Sliding(x, count)
+    else:
+        K = k[:, :, None] * np.hypot(C[..., 0], C[..., 1])
+        radius = np.full(n, np.nan)
+        radius[known] = np.abs(np.linalg.eigvals(K[known])).max(axis=1)
+        sure = np.flatnonzero(known & (radius < 1.0))
+        x[sure] = _iterate(F[sure], C[sure], k[sure], np.zeros((len(sure), p)))
+        for index in np.flatnonzero(known & ~(radius < 1.0)):
+            x[index], count[index] = _search(F[index], C[index], k[index])
+    with np.errstate(invalid="ignore"):
+        for _ in range(2):  # takes back the rounding of the search and of the quadratic
+            right, slope = _right_side(F, C, k, x)
+            x = x + newton_step(right - x, slope)
+        _, slope = _right_side(F, C, k, x)
+    matrix = np.eye(p) - slope
+    far = np.ones(n)
+    usable = np.isfinite(matrix).all(axis=(1, 2))
+    far[usable] = np.minimum(np.linalg.svd(matrix[usable], compute_uv=False)[:, -1], 1.0)
+    return Sliding(x, count, far)
 
 
-def _quadratic(F: Array, C: Array, k: float) -> tuple[Array, NDArray[np.uint8]]:
+def _quadratic(F: Array, C: Array, k: Array) -> tuple[Array, NDArray[np.uint8]]:
     """(k^2 |C|^2 - 1) x^2 + 2 k^2 F.C x + k^2 |F|^2 = 0."""
     c2 = k * np.hypot(C[:, 0], C[:, 1])
     a = (c2 - 1.0) * (c2 + 1.0)
@@ -81,7 +92,7 @@ def _right_side(F: Array, C: Array, k: Array, x: Array) -> tuple[Array, Array]:
     force = F + np.einsum("npqi,nq->npi", C, x)
     size = np.hypot(force[..., 0], force[..., 1])
     unit = force / np.where(size == 0.0, 1.0, size)[..., None]
-    return k * size, k[:, None] * np.einsum("npi,npqi->npq", unit, C)
+    return k * size, k[..., None] * np.einsum("npi,npqi->npq", unit, C)
 
 
 def newton_step(gap: Array, slope: Array) -> Array:
@@ -118,11 +129,11 @@ def _search(F: Array, C: Array, k: Array) -> tuple[Array, int]:
     directions = np.vstack([np.ones(p), np.eye(p) + 0.01, np.random.default_rng(0).uniform(0.0, 1.0, (STARTS // p, p))])
     starts = (size * np.logspace(-2, 3, 11)[:, None, None] * directions).reshape(-1, p)
     x = np.vstack([np.zeros((1, p)), starts])
-    many = np.broadcast_to(F, (len(x), *F.shape)), np.broadcast_to(C, (len(x), *C.shape))
+    all_F, all_C, all_k = (np.broadcast_to(one, (len(x), *one.shape)) for one in (F, C, k))
     for _ in range(60):
-        right, slope = _right_side(*many, k, x)
+        right, slope = _right_side(all_F, all_C, all_k, x)
         x = np.clip(x + newton_step(right - x, slope), 0.0, 1e12 * size)
-    right, _ = _right_side(*many, k, x)
+    right, _ = _right_side(all_F, all_C, all_k, x)
     found = x[np.abs(right - x).max(axis=1) <= 1e-9 * np.maximum(x.max(axis=1), size)]
     distinct: list[Array] = []
     for each in found[np.argsort(found.sum(axis=1))]:

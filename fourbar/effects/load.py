@@ -1,20 +1,19 @@
 """External loads: a force at a point of a bar, or a pure couple on it, constant or a table over theta_2."""
 
-import bisect
 import math
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
-from fourbar.effects.effect import Act, Effect, Tree
-from fourbar.effects.wrenches import Wrenches
-from fourbar.errors import InputError, LimitError
+from fourbar.effects.actions import Actions
+from fourbar.effects.effect import Effect
+from fourbar.errors import InputError
+from fourbar.formulas.motion import State
+from fourbar.formulas.position import polar
 from fourbar.linkage import MOVING_BARS, FourBar, require
-from fourbar.solution import Solution
-from fourbar.state import Array, State, Vector, along, centre_in_bar
+from fourbar.solution import Array
 
 TURN = 2.0 * math.pi
 
@@ -31,6 +30,8 @@ class Table:
 
     theta_2: tuple[float, ...]
     factor: tuple[float, ...]
+    as_given: ClassVar[bool] = True
+    """Error bars leave its numbers alone: they are looked up."""
 
     def __post_init__(self) -> None:
         key = "loads.table"
@@ -52,7 +53,7 @@ class Table:
     def at(self, theta_2: Any) -> Array:
         """The factor; InputError for a position that the table does not cover."""
         first, last = self.theta_2[0], self.theta_2[-1]
-        angle = first + np.remainder(np.asarray(getattr(theta_2, "hi", theta_2)) - first, TURN)
+        angle = first + np.remainder(np.asarray(theta_2) - first, TURN)
         beyond = angle > last + 1e-12 * TURN
         if beyond.any():
             # a position just below the first angle has come round to a whole turn above it
@@ -63,13 +64,6 @@ class Table:
                 )
             angle = np.where(round_, first, angle)
         return np.asarray(np.interp(angle, self.theta_2, self.factor))
-
-    def look_up(self, theta_2: float) -> float:
-        """The factor at one angle, by the two neighbours' chord: for the engines, apart from `at`."""
-        angle = self.theta_2[0] + math.fmod(math.fmod(theta_2 - self.theta_2[0], TURN) + TURN, TURN)
-        k = min(max(bisect.bisect_right(self.theta_2, angle), 1), len(self.theta_2) - 1)
-        (a, b), (f, g) = self.theta_2[k - 1 : k + 1], self.factor[k - 1 : k + 1]
-        return (f * (b - angle) + g * (angle - a)) / (b - a)
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,6 +86,7 @@ class Load(Effect):
     moment: float = 0.0
     frame: str = "world"
     table: Table | None = None
+    key: ClassVar[str] = "load"
 
     def __post_init__(self) -> None:
         if self.bar not in MOVING_BARS or isinstance(self.bar, bool):
@@ -103,85 +98,23 @@ class Load(Effect):
                 require(key, number)
         require("loads.moment", self.moment)
 
-    def force_and_arm(self, state: State) -> tuple[tuple[Any, Any], Vector]:
-        """The force in world axes and its point of application from the bar's first pin."""
-        assert self.force is not None
-        f, f_angle = self.force
-        r, r_angle = self.at
-        fx, fy = f * math.cos(f_angle), f * math.sin(f_angle)
-        rx, ry = r * math.cos(r_angle), r * math.sin(r_angle)
-        gx, gy = centre_in_bar(state.linkage.bar(self.bar))
-        if self.frame == "bar":
-            force, arm = along(state.unit(self.bar), fx, fy), state.arm(self.bar, gx + rx, gy + ry)
-        else:
-            x, y = state.arm(self.bar, gx, gy)
-            force, arm = (fx, fy), (x + rx, y + ry)  # type: ignore[assignment]
-        if self.table is None:
-            return force, arm
-        factor = self.table.at(state.theta_2)
-        return (factor * force[0], factor * force[1]), arm
-
-    def add_wrenches(self, wrenches: Wrenches, state: State) -> None:
+    def act(self, actions: Actions, state: State) -> None:
         """F at its point, and the couple."""
+        factor = 1.0 if self.table is None else self.table.at(state.theta_2)
         if self.force is not None:
-            wrenches.add_force(self.bar, *self.force_and_arm(state))
-        if self.moment != 0.0:
-            wrenches.add_moment(self.bar, self._moment(state))
+            force, arm = polar(*self.force), polar(*self.at)
+            u = state.direction(self.bar)
+            to_G = actions.bodies[self.bar - 2].z * u
+            if self.frame == "bar":
+                force, arm = force * u, arm * u
+            actions.force(self.bar, factor * force, to_G + arm)
+        if np.any(self.moment):
+            actions.moment(self.bar, factor * self.moment)
 
-    def _moment(self, state: State) -> Array | float:
-        return self.moment if self.table is None else self.moment * self.table.at(state.theta_2)
-
-    def rounded_anew(self, beside: Callable[[float], float], *, all_of_it: bool) -> "Load":
-        """Force, arm and couple."""
-        force = None if self.force is None else (beside(self.force[0]), beside(self.force[1]))
-        at = (beside(self.at[0]), beside(self.at[1]))
-        return replace(self, force=force, at=at, moment=beside(self.moment) if all_of_it else self.moment)
-
-    def power(self, state: State) -> Array | float:
-        """P = F . v of the point of application + M omega, W."""
-        total: Array | float = self._moment(state) * state.omega(self.bar)
-        if self.force is not None:
-            force, (x, y) = self.force_and_arm(state)
-            pin_x, pin_y = state.velocity(self.bar, 0.0, 0.0)
-            w = state.omega(self.bar)
-            total = total + force[0] * (pin_x - w * y) + force[1] * (pin_y + w * x)
-        return total
-
-    def engine_term(self, tree: Tree) -> Act:
-        """A force at its point and a couple; in the bar's frame both vectors turn with the engine's bar."""
-
-        def act() -> None:
-            factor = 1.0 if self.table is None else self.table.look_up(tree.angle(2))
-            if self.force is not None:
-                f, f_angle = self.force
-                r, r_angle = self.at
-                x, y, at_x, at_y = (
-                    *(f * math.cos(f_angle), f * math.sin(f_angle)),
-                    *(r * math.cos(r_angle), r * math.sin(r_angle)),
-                )
-                if self.frame == "bar":
-                    force, arm = tree.turned(self.bar, x, y), tree.turned(self.bar, at_x, at_y)
-                else:
-                    force, arm = np.array([x, y]), np.array([at_x, at_y])
-                tree.push(self.bar, factor * force, tree.centre(self.bar) + arm)
-            tree.twist(self.bar, factor * self.moment)
-
-        return act
-
-    def add_mjcf(self, model: Any) -> None:
-        """A constant actuator on a site (force) or on the bar (couple)."""
-        if self.table is not None:
-            raise LimitError("a load that is a table over theta_2 has no counterpart in MJCF")
-        model.loads.append(self)
-
-    def size(self, linkage: FourBar, solution: Solution | None = None) -> float:
+    def greatest_force(self, linkage: FourBar) -> float:
         """The force counted with its lever, and the couple divided by the bar's length, N."""
         bar = linkage.bar(self.bar)
         total = abs(self.moment) / bar.length
         if self.force is not None:
-            total += abs(self.force[0]) * (1.0 + (abs(bar.centre[0]) + abs(self.at[0])) / bar.length)  # type: ignore[index]
+            total += abs(self.force[0]) * (1.0 + (abs(bar.mass_centre[0]) + abs(self.at[0])) / bar.length)
         return total if self.table is None else total * max(abs(factor) for factor in self.table.factor)
-
-    def couple(self, linkage: FourBar, speed: float) -> float:
-        """The load's size at the longest bar, N m."""
-        return self.size(linkage) * max(linkage.lengths)

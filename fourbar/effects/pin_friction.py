@@ -1,24 +1,32 @@
 """Coulomb friction in the pins: a couple mu r |F| against the rotation, with F the pin force it helps to make."""
 
-import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from fourbar.bearing import PIN_FORCE
-from fourbar.effects.cones import NONE, ONE, newton_step, settle
-from fourbar.effects.effect import Act, Effect, Tree
-from fourbar.effects.pins import known, sense, shortest_bar
-from fourbar.effects.wrenches import Wrenches
-from fourbar.errors import InputError, LimitError
-from fourbar.linkage import PINS, FourBar, require
-from fourbar.solution import JAMMED, OK, SEVERAL, Solution
-from fourbar.state import Array, State
+from fourbar.effects.actions import Actions
+from fourbar.effects.cones import NONE, ONE, settle
+from fourbar.effects.effect import Effect
+from fourbar.effects.pins import known
+from fourbar.errors import InputError
+from fourbar.formulas.pin_forces import PinForces
+from fourbar.linkage import PIN_FORCE, PINS, require
+from fourbar.quantities import JAMMED, OK, SEVERAL
+from fourbar.solution import Array
 
-NO_POWER = "friction that depends on the pin forces does an amount of work that the energy method cannot know"
-NO_MJCF = "friction that depends on the pin forces has no counterpart in MJCF"
+
+class Settled(NamedTuple):
+    """Pin forces with the friction that they make."""
+
+    pins: PinForces
+    from_jamming: Array
+    """How far the friction is from jamming, in (0, 1]."""
+    residual: Array
+    """Largest |mu r |F| - couple| that is left, N m."""
+    status: NDArray[np.uint8]
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,10 +39,7 @@ class PinFriction(Effect):
     """
 
     pins: tuple[tuple[str, float, float], ...]
-    side: int = 0
-    """Which way pins at rest are about to turn; not part of a scene."""
     key: ClassVar[str] = "pin_friction"
-    example: ClassVar[str] = 'pin_friction = { A = { coefficient = 0.1, radius = "8 mm" } }'
     dry: ClassVar[bool] = True
 
     @classmethod
@@ -42,138 +47,70 @@ class PinFriction(Effect):
         """``PinFriction.at(A=(mu, radius))``."""
         return cls(_checked(pins))
 
-    @classmethod
-    def read(cls, value: object, reader: Any) -> "PinFriction":
-        """From ``{ A = { coefficient = 0.1, radius = "8 mm" } }``."""
-        key = "effects.pin_friction"
-        pins = {}
-        for pin, entry in reader.table(key, value, PINS).items():
-            given = reader.table(f"{key}.{pin}", entry, ("coefficient", "radius"))
-            mu = reader.number(f"{key}.{pin}.coefficient", given.get("coefficient"))
-            pins[pin] = (mu, reader.quantity(f"{key}.{pin}.radius", given.get("radius"), "m", at_least_zero=True))
-        return cls.at(**pins)
-
-    def write(self, writer: Any) -> Any:
-        """Back to the form of a scene file."""
-        return {pin: {"coefficient": mu, "radius": writer.quantity(r, "m")} for pin, mu, r in self.pins}
-
     @property
     def loaded_pins(self) -> tuple[str, ...]:
         """The pins whose forces it depends on."""
-        return tuple(pin for pin, mu, r in self.pins if mu * r != 0.0)
+        return tuple(pin for pin, mu, r in self.pins if np.any(mu * r))
 
     @property
     def dry_pins(self) -> tuple[str, ...]:
         """The pins at which it acts."""
         return self.loaded_pins
 
-    def settle(self, state: State, wrenches: Wrenches, pins: Any, eliminate: Callable[[Wrenches], Any]) -> Any:
+    def settle(
+        self,
+        actions: Actions,
+        pins: PinForces,
+        eliminate: Callable[[Actions], PinForces],
+        by_couples: Callable[[Actions], PinForces],
+    ) -> "Settled":
         """Pin forces with the couples that fulfil x_p = mu_p r_p |F_p(x)|, their residual and their status.
 
         The pin forces are linear in the couples: F_p = F0_p + sum over q of C_pq x_q.
 
         Parameters
         ----------
-        wrenches : of everything else; the couples are added to it.
+        actions : of everything else; the couples are added to it.
         pins : pin forces under those.
-        eliminate : wrenches -> pin forces.
+        eliminate : pin forces under some actions, with inertia.
+        by_couples : without it.
         """
         names = self.loaded_pins
         arms = {pin: mu * r for pin, mu, r in self.pins}
-        k = np.array([arms[pin] for pin in names])
-        senses = {pin: sense(state, pin, self.side) for pin in names}
-        force = {pin: getattr(pins, PIN_FORCE[pin]) for pin in names}
-        per_unit: dict[tuple[str, str], Any] = {}
+        senses = {pin: actions.sense(pin) for pin in names}
+        per_unit = {}
         for turned in names:
-            alone = Wrenches(state)
-            _add_couple(alone, turned, -senses[turned])
-            answer = eliminate(alone)
-            per_unit.update({(pin, turned): getattr(answer, PIN_FORCE[pin]) for pin in names})
-        F = np.stack([_doubles(force[pin]) for pin in names], axis=1)
-        C = np.stack([np.stack([_doubles(per_unit[pin, q]) for q in names], axis=1) for pin in names], axis=1)
-        found = settle(F, C, k)
-        x: list[Any] = list(found.x.T)
-        # one more step of Newton in the precision of the state, which may have 32 digits
-        for _ in range(2):
-            residuals, slope = [], []
-            for p, pin in enumerate(names):
-                fx, fy = force[pin]
-                for other, couple in zip(names, x, strict=True):
-                    cx, cy = per_unit[pin, other]
-                    fx, fy = fx + cx * couple, fy + cy * couple
-                size = np.sqrt(fx * fx + fy * fy)
-                residuals.append(x[p] - k[p] * size)
-                with np.errstate(invalid="ignore"):
-                    unit = np.nan_to_num(_doubles((fx, fy)) / _double(size)[:, None])
-                slope.append(k[p] * np.einsum("ni,nqi->nq", unit, C[:, p]))
-            gap = -np.stack([_double(residual) for residual in residuals], axis=1)
-            step = newton_step(gap, np.stack(slope, axis=1))
-            x = [couple + step[:, p] for p, couple in enumerate(x)]
-        for pin, couple in zip(names, x, strict=True):
-            _add_couple(wrenches, pin, -senses[pin] * couple)
-        done = eliminate(wrenches)
-        left = [
-            _double(couple) - arms[pin] * np.hypot(*_doubles(getattr(done, PIN_FORCE[pin])).T)
-            for pin, couple in zip(names, x, strict=True)
-        ]
-        # how far from jamming: the least stretch of 1 - slope
-        matrix = np.eye(len(names)) - np.stack(slope, axis=1)
-        far = np.ones(len(matrix))
-        usable = np.isfinite(matrix).all(axis=(1, 2))
-        far[usable] = np.minimum(np.linalg.svd(matrix[usable], compute_uv=False)[:, -1], 1.0)
-        unsettled = np.where(found.number == ONE, OK, np.where(found.number == NONE, JAMMED, SEVERAL)).astype(np.uint8)
-        return done._replace(from_jamming=far, residual=np.max(np.abs(left), axis=0), unsettled=unsettled)
+            alone = Actions(actions.state, actions.bodies)
+            alone.couple(turned, -senses[turned])
+            per_unit[turned] = by_couples(alone)
+        shape = np.shape(pins.F12)
 
-    def add_known(self, wrenches: Wrenches, state: State, forces: Mapping[str, Array]) -> None:
+        def column(force: Any) -> Any:
+            """Components of a force over all positions, (n, 2)."""
+            flat = np.broadcast_to(force, shape).ravel()
+            return np.stack([flat.real, flat.imag], axis=-1)
+
+        k = np.stack([np.broadcast_to(arms[pin], shape).ravel() for pin in names], axis=1)
+        F = np.stack([column(getattr(pins, PIN_FORCE[pin])) for pin in names], axis=1)
+        C = np.stack(
+            [np.stack([column(getattr(per_unit[q], PIN_FORCE[pin])) for q in names], axis=1) for pin in names], axis=1
+        )
+        found = settle(F, C, k)
+        for p, pin in enumerate(names):
+            actions.couple(pin, -senses[pin] * found.x[:, p].reshape(shape))
+        done = eliminate(actions)
+        left = [
+            np.abs(found.x[:, p].reshape(shape) - arms[pin] * np.abs(getattr(done, PIN_FORCE[pin])))
+            for p, pin in enumerate(names)
+        ]
+        status = np.where(found.number == ONE, OK, np.where(found.number == NONE, JAMMED, SEVERAL)).astype(np.uint8)
+        return Settled(done, found.from_jamming.reshape(shape), np.max(left, axis=0), status.reshape(shape))
+
+    def act_known(self, actions: Actions, forces: Mapping[str, Array]) -> None:
         """Its couples where the pin forces (name: (n, 2), N) are known already."""
         for pin, mu, r in self.pins:
             load = np.hypot(*np.asarray(forces[PIN_FORCE[pin]]).T)
-            _add_couple(wrenches, pin, -sense(state, pin, self.side) * (mu * r * load))
-
-    def power(self, state: State) -> Array | float:
-        """Raises LimitError: the work depends on the pin forces."""
-        raise LimitError(NO_POWER)
-
-    def engine_term(self, tree: Tree) -> Act:
-        """Couples of mu r times the load that the engine found at the pin in its last pass, against the spin."""
-
-        def act() -> None:
-            for pin, mu, r in self.pins:
-                one, other = PINS[pin]
-                slip = tree.velocity(one) - tree.velocity(other)
-                if slip != 0.0:
-                    couple = math.copysign(mu * r * tree.pin_load(pin), slip)
-                    tree.twist(other, couple)
-                    tree.twist(one, -couple)
-
-        return act
-
-    def add_mjcf(self, model: Any) -> None:
-        """Raises LimitError: there is none."""
-        raise LimitError(NO_MJCF)
-
-    def size(self, linkage: FourBar, solution: Solution) -> Array:
-        """The couples, divided by the shortest moving bar, N."""
-        total = np.zeros(len(solution))
-        for pin, mu, r in self.pins:
-            total += mu * r * np.nan_to_num(np.hypot(*getattr(solution, PIN_FORCE[pin]).T)) / shortest_bar(linkage)
-        return total
-
-
-def _add_couple(wrenches: Wrenches, pin: str, couple: Any) -> None:
-    i, j = PINS[pin]
-    wrenches.add_moment(j, couple)
-    wrenches.add_moment(i, -couple)
-
-
-def _double(value: Any) -> Array:
-    """A number of 32 digits as the nearest double; a double as it is."""
-    return np.asarray(getattr(value, "hi", value))
-
-
-def _doubles(vector: Any) -> Array:
-    """Components as one array, (n, 2)."""
-    return np.stack(np.broadcast_arrays(*(_double(component) for component in vector)), axis=-1)
+            actions.couple(pin, -actions.sense(pin) * (mu * r * load))
 
 
 def _checked(pins: Mapping[str, tuple[float, float]]) -> tuple[tuple[str, float, float], ...]:

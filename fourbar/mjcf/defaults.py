@@ -2,10 +2,10 @@
 
 import math
 
+from fourbar.formulas.mobility import default_range
 from fourbar.linkage import FourBar, uniform
-from fourbar.mobility import default_range
-from fourbar.motion import Motion
 from fourbar.scene import Scene
+from fourbar.scene.motion import Motion
 
 PER_METRE = 1.0
 """kg/m of the uniform bars."""

@@ -8,14 +8,16 @@ from xml.etree import ElementTree as ET
 import numpy as np
 
 from fourbar.errors import InputError, LimitError, NotAssembledError
+from fourbar.formulas.mobility import default_range
 from fourbar.linkage import MOVING_BARS, FourBar
 from fourbar.mjcf.appearance import add_appearance
+from fourbar.mjcf.effects import row, unwound
 from fourbar.mjcf.model import Model, carriable, constant, servo, text
 from fourbar.mjcf.settings import RECIPE, Run, Settings, fitted_pad
-from fourbar.mobility import default_range
-from fourbar.scene import Command, Scene, command, solve
-from fourbar.solution import OK
-from fourbar.state import Array
+from fourbar.quantities import OK
+from fourbar.scene import Command, Scene, command
+from fourbar.solution import Array
+from fourbar.solve import solve
 
 AT_REST = 1.0
 """rad/s that flywheel and timestep are laid out for where the scene states no speed."""
@@ -70,7 +72,7 @@ def mjcf(scene: Scene, settings: Settings = RECIPE, *, keyframe: bool = True) ->
         settings = replace(settings, pad=_pad(scene))
     model = Model(scene.linkage, settings, timestep)
     for term in (*scene.effects, *scene.loads):
-        term.add_mjcf(model)
+        row(term).add(term, model)
     armature = flywheel(scene, settings)
     root = ET.Element("mujoco", model=_plain(scene.title) or "four-bar")
     root.append(ET.Comment(RELEASED if free else COMMENT))
@@ -79,8 +81,7 @@ def mjcf(scene: Scene, settings: Settings = RECIPE, *, keyframe: bool = True) ->
     add_appearance(root, scene.linkage)
     drive = constant(armature * scene.motion.alpha_2)
     if start is not None:
-        for effect in scene.effects:
-            start = start._replace(qpos=effect.unwind(scene.linkage, start.qpos))
+        start = start._replace(qpos=unwound(scene, start.qpos))
         model.rest = start.qpos
         if scene.motion.alpha_2 == 0.0 and not free:
             drive = servo(armature / (SETTLING * timestep), start.qvel[0])
@@ -134,16 +135,16 @@ def _inertia(linkage: FourBar) -> float:
     inertia = 0.0
     for number in MOVING_BARS:
         bar = linkage.bar(number)
-        assert bar.inertia is not None and bar.centre is not None
-        arm = max(longest, abs(bar.centre[0]))
-        inertia += bar.mass * arm * arm + bar.inertia
+        arm = max(longest, abs(bar.mass_centre[0]))
+        inertia += bar.mass * arm * arm + bar.moment_of_inertia
     return inertia
 
 
 def _work(scene: Scene) -> float:
     """Sum of the couples that loads and effects may ask of the drive, by the accelerations' scale, kg m^2."""
     quickness = _quickness(scene)
-    couples = (term.couple(scene.linkage, math.sqrt(quickness)) for term in (*scene.loads, *scene.effects))
+    speed = math.sqrt(quickness)
+    couples = (row(term).couple(term, scene.linkage, speed) for term in (*scene.loads, *scene.effects))
     return sum(couples) / quickness
 
 

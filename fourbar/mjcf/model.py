@@ -11,7 +11,6 @@ from fourbar.errors import InputError, LimitError
 from fourbar.linkage import BAR_NAMES, FIRST_PIN, MOVING_BARS, PINS, FourBar
 from fourbar.mjcf.appearance import add_camera
 from fourbar.mjcf.settings import Settings
-from fourbar.state import centre_in_bar
 
 if TYPE_CHECKING:
     from fourbar.effects import Load
@@ -48,7 +47,7 @@ def carriable(linkage: FourBar) -> None:
     """An InputError where a bar is lighter than MuJoCo carries."""
     for number in MOVING_BARS:
         bar = linkage.bar(number)
-        for key, value, unit in (("mass", bar.mass, "kg"), ("inertia", bar.inertia, "kg m^2")):
+        for key, value, unit in (("mass", bar.mass, "kg"), ("inertia", bar.moment_of_inertia, "kg m^2")):
             if value is None or value < FLOOR:
                 raise InputError(
                     f"bars.{BAR_NAMES[number]}.{key}",
@@ -130,7 +129,6 @@ class Model:
     def _add_bar(self, parent: ET.Element, number: int, at: tuple[float, float], **drive: float) -> ET.Element:
         """A bar turning about its first pin; bars 3 and 4 end in the sites that the loop's closure joins."""
         bar, pin = self.linkage.bar(number), FIRST_PIN[number]
-        assert bar.inertia is not None
         body = ET.SubElement(parent, "body", name=BAR_NAMES[number], pos=text(*at, 0.0))
         if self.rest is not None:
             angle = self.rest[number - 2]
@@ -140,9 +138,9 @@ class Model:
         ET.SubElement(
             body,
             "inertial",
-            pos=text(*centre_in_bar(bar), 0.0),
+            pos=text(bar.to_centre.real, bar.to_centre.imag, 0.0),
             mass=text(bar.mass),
-            diaginertia=text(*[bar.inertia + self.inertia[number]] * 3),
+            diaginertia=text(*[bar.moment_of_inertia + self.inertia[number]] * 3),
         )
         numbers = {**drive, **self.pin[pin]}
         joint = {key: text(*np.atleast_1d(value)) for key, value in numbers.items()}
@@ -213,7 +211,7 @@ class Model:
         """A point of a bar; the ground's body keeps world axes."""
         body = root.find(f".//body[@name='{BAR_NAMES[point.bar]}']")
         assert body is not None
-        x, y = point.in_bar
+        x, y = point.in_bar.real, point.in_bar.imag
         if point.bar == 1:
             cos, sin = math.cos(self.linkage.ground_angle), math.sin(self.linkage.ground_angle)
             x, y = cos * x - sin * y, sin * x + cos * y
@@ -224,7 +222,8 @@ class Model:
         for index, load in enumerate(self.loads, 1):
             body = root.find(f".//body[@name='{BAR_NAMES[load.bar]}']")
             assert body is not None
-            x, y = centre_in_bar(self.linkage.bar(load.bar))
+            to_G = self.linkage.bar(load.bar).to_centre
+            x, y = to_G.real, to_G.imag
             if load.frame == "bar":
                 x += load.at[0] * math.cos(load.at[1])
                 y += load.at[0] * math.sin(load.at[1])

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import fourbar
-from fourbar import animate
+from fourbar.show import animate
 from tests.scenes import crank_rocker, thesis
 from tests.test_animate import HOSTILE, PNG, RELEASED, embedded
 

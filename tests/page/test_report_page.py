@@ -6,8 +6,8 @@ import json
 import pytest
 
 from tests.test_report import copies, report
+from validation.compare.rows import to_csv
 from validation.report.html import ALL_OPEN
-from validation.results import to_csv
 
 pytest.importorskip("selenium", reason="pages are driven by selenium: pip install selenium")
 

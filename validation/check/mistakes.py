@@ -9,8 +9,10 @@ import numpy as np
 from fourbar.effects import Gravity
 from fourbar.errors import FourBarError
 from fourbar.linkage import Bar
-from fourbar.scene import Command, Scene, solve
-from fourbar.solution import VECTORS, Solution
+from fourbar.quantities import FORCES, VECTORS
+from fourbar.scene import Command, Scene
+from fourbar.solution import Solution
+from fourbar.solve import solve
 from validation.check.theirs import Array, Table
 
 POWERS_OF_TEN = (-6, -5, -4, -3, -2, -1, 1, 2, 3, 4, 5, 6)
@@ -91,7 +93,9 @@ def _inertial(scene: Scene, at: Command) -> Iterator[Mistake]:
         return
     bare = replace(scene, loads=(), effects=())
     of_mass = solve(_with_bars(bare, lambda bar: replace(bar, inertia=0.0)), "force", at=at)
-    of_inertia = solve(_with_bars(bare, lambda bar: replace(bar, mass=0.0)), "force", at=at)
+    of_inertia = solve(
+        _with_bars(bare, lambda bar: replace(bar, mass=0.0, inertia=bar.moment_of_inertia)), "force", at=at
+    )
 
     def scaled(by_mass: float, by_inertia: float) -> Callable[[str, Solution], Array | None]:
         def predict(quantity: str, right: Solution) -> Array | None:
@@ -159,14 +163,13 @@ def _with_gravity(scene: Scene) -> Scene:
 
 
 def _from_other_pin(bar: Bar) -> Bar | None:
-    r, phi = bar.centre or (0.0, 0.0)
+    r, phi = bar.mass_centre
     x, y = bar.length - r * np.cos(phi), r * np.sin(phi)
     return replace(bar, centre=(float(np.hypot(x, y)), float(np.arctan2(y, x)))) if bar.mass else None
 
 
 def _about_pin(bar: Bar) -> Bar | None:
-    assert bar.centre is not None and bar.inertia is not None
-    return replace(bar, inertia=bar.inertia + bar.mass * bar.centre[0] ** 2) if bar.mass else None
+    return replace(bar, inertia=bar.moment_of_inertia + bar.mass * bar.mass_centre[0] ** 2) if bar.mass else None
 
 
 def _mid_bar(bar: Bar) -> Bar | None:
@@ -174,11 +177,11 @@ def _mid_bar(bar: Bar) -> Bar | None:
 
 
 def _no_inertia(bar: Bar) -> Bar | None:
-    return replace(bar, inertia=0.0) if bar.inertia else None
+    return replace(bar, inertia=0.0) if bar.moment_of_inertia else None
 
 
 def _inertia_times(factor: float) -> Callable[[Bar], Bar | None]:
-    return lambda bar: replace(bar, inertia=bar.inertia * factor) if bar.inertia else None
+    return lambda bar: replace(bar, inertia=bar.moment_of_inertia * factor) if bar.moment_of_inertia else None
 
 
 BAR_MISTAKES: tuple[tuple[str, Callable[[Bar], Bar | None]], ...] = (
@@ -192,7 +195,7 @@ BAR_MISTAKES: tuple[tuple[str, Callable[[Bar], Bar | None]], ...] = (
 
 
 def _is_force(quantity: str) -> bool:
-    return quantity in ("torque", "F12", "F32", "F43", "F14")
+    return quantity in FORCES
 
 
 def _is_angular(quantity: str) -> bool:

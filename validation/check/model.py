@@ -12,20 +12,21 @@ from pathlib import Path
 from typing import Any
 
 from fourbar.errors import FourBarError, InputError
-from fourbar.scene import Scene, solve
-from fourbar.under_way import under_way
+from fourbar.scene import Scene
+from fourbar.show.under_way import under_way
+from fourbar.solve import solve
 from fourbar.writing import write_text
-from validation.answer import Answer
 from validation.check.differences import Difference, Value, differences
 from validation.check.screen import read_mjcf
-from validation.compare import COMPARED, compare
-from validation.counts import Counts
-from validation.plain import plain
+from validation.compare.answer import Answer
+from validation.compare.compare import COMPARED, compare
+from validation.compare.counts import Counts
+from validation.compare.plain import plain
+from validation.compare.rows import Row, write_results
+from validation.compare.tolerance import SIMULATED, Tolerance
+from validation.engines.memory import WORKER_MEMORY, bound_memory
 from validation.report.markdown import cell
 from validation.report.templating import number
-from validation.results import Row, write_results
-from validation.suite.memory import WORKER_MEMORY, bound_memory
-from validation.tolerance import SIMULATED, Tolerance
 
 SECONDS = 120.0
 """A four-bar takes less than one."""

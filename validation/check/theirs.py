@@ -19,9 +19,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.errors import InputError
-from fourbar.reading import read_text
-from fourbar.solution import UNITS, VECTORS
-from validation.tolerance import EPS
+from fourbar.files.reading import read_text
+from fourbar.quantities import UNITS, VECTORS
+from validation.compare.tolerance import EPS
 
 Array = NDArray[np.float64]
 
@@ -127,7 +127,7 @@ def _column(path: Path, heading: str) -> tuple[str, float]:
         raise InputError("header", heading, f"is not a known column; known are {known}", str(path))
     if not unit:
         return name, 1.0
-    from fourbar.units import factor_to
+    from fourbar.files.units import factor_to
 
     try:
         return name, factor_to(UNITS[quantity], unit)

@@ -10,9 +10,9 @@ are complex numbers, x + i y.
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.linkage import MOVING_BARS, FourBar
+from fourbar.linkage import MOVING_BARS, PIN_FORCE, FourBar
 from fourbar.scene import Command, Scene
-from validation.answer import Answer, Array
+from validation.compare.answer import Answer, Array
 from validation.engines.free_body_closure import Complex, close
 from validation.engines.free_body_effects import Motion, Wrenches, acting, sliding_pins, unknown
 
@@ -21,7 +21,6 @@ COLUMN = {"F12": 0, "F32": 2, "F23": 4, "F43": 6, "F34": 8, "F14": 10}
 TORQUE = 12
 ROWS = {2: (0, "F12", "F32"), 3: (3, "F23", "F43"), 4: (6, "F14", "F34")}
 """First row of a bar, the force at its first pin and that at its second."""
-LOAD_OF = {"O2": "F12", "A": "F32", "B": "F43", "O4": "F14"}
 BLOCK = 4096
 """Positions solved at once: 1.4 kB a matrix, and some four of them at a time, are 22 MB."""
 FRICTION_STAGES = 16
@@ -71,7 +70,7 @@ def _answered(
     """Motion, pin forces and torque at some positions, and the residual of their thirteen equations."""
     motion = move(scene.linkage, theta_2, omega_2, alpha_2, theta_3, theta_4)
     unknowns, residual = balance(scene, motion)
-    found = {name: unknowns[:, COLUMN[name] : COLUMN[name] + 2] for name in LOAD_OF.values()}
+    found = {name: unknowns[:, COLUMN[name] : COLUMN[name] + 2] for name in PIN_FORCE.values()}
     for bar in (3, 4):
         found |= {f"omega_{bar}": motion.omega[bar], f"alpha_{bar}": motion.alpha[bar]}
     return found | {"torque": unknowns[:, TORQUE]}, residual
@@ -108,7 +107,7 @@ def balance(scene: Scene, motion: Motion) -> tuple[Array, float]:
     unknowns[:, TORQUE] *= motion.linkage.bar(scene.drive_bar).length
     total = unknowns[..., 0]
     if pins:
-        of_pin = [unknowns[:, COLUMN[LOAD_OF[pin]] : COLUMN[LOAD_OF[pin]] + 2] for pin in pins]
+        of_pin = [unknowns[:, COLUMN[PIN_FORCE[pin]] : COLUMN[PIN_FORCE[pin]] + 2] for pin in pins]
         loads = np.stack([force[:, 0] + 1j * force[:, 1] for force in of_pin], axis=1)
         couples = slide(loads[..., 0], loads[..., 1:], np.array(list(pins.values())))
         total = total + (unknowns[..., 1:] * couples[:, None, :]).sum(axis=-1)
@@ -120,9 +119,8 @@ def _add_inertia(motion: Motion, wrenches: Wrenches) -> None:
     for number in MOVING_BARS:
         bar = motion.linkage.bar(number)
         arm, omega, alpha = motion.to_centre(number), motion.omega[number], motion.alpha[number]
-        assert bar.inertia is not None and bar.centre is not None
         wrenches.push(number, -bar.mass * (1j * alpha - omega**2) * arm, 0.0)
-        wrenches.twist(number, -(bar.inertia + bar.mass * bar.centre[0] ** 2) * alpha)
+        wrenches.twist(number, -(bar.moment_of_inertia + bar.mass * bar.mass_centre[0] ** 2) * alpha)
     a_A = (1j * motion.alpha[2] - motion.omega[2] ** 2) * motion.foot[3]
     wrenches.push(3, -motion.linkage.coupler.mass * a_A, motion.to_centre(3))
 

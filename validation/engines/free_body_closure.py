@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.linkage import FourBar
-from validation.answer import Array
+from validation.compare.answer import Array
 
 Complex = NDArray[np.complex128]
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from fourbar.linkage import MOVING_BARS, PINS, FourBar
 from fourbar.scene import Scene
-from validation.answer import Array
+from validation.compare.answer import Array
 from validation.engines.free_body_closure import Complex, cross
 
 
@@ -29,7 +29,7 @@ class Motion(NamedTuple):
 
     def to_centre(self, bar: int) -> Complex:
         """From the first pin of a moving bar to its mass centre, m."""
-        return self.unit[bar] * polar(self.linkage.bar(bar).centre)
+        return self.unit[bar] * polar(self.linkage.bar(bar).mass_centre)
 
     def slip(self, pin: str) -> Array:
         """omega_j - omega_i of the bars that meet at a pin, rad/s."""

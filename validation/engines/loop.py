@@ -15,12 +15,11 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from fourbar import effects
-from fourbar.bearing import PIN_FORCE
-from fourbar.linkage import MOVING_BARS
+from fourbar.linkage import MOVING_BARS, PIN_FORCE
+from fourbar.quantities import ANGLES, STAGE_OF, STAGES, VECTORS
 from fourbar.scene import Command, Scene
-from fourbar.solution import STAGE_OF, STAGES, VECTORS
-from validation.answer import Answer, Array
+from validation.compare.answer import Answer, Array
+from validation.engines import effects
 
 START_ANGLES = (
     *((30, 30), (15, 15), (45, 45), (5, 5), (5, 120)),
@@ -198,7 +197,7 @@ def answer_exactly(engine: str, build: Callable[[Scene], Tree], scene: Scene, co
             values.update(_motion_and_forces(tree, e_drive, omega_2[i], alpha_2[i], loaded))
         for name, value in values.items():
             out[name][i] = value
-    for name in ("theta_3", "theta_4"):
+    for name in ANGLES:
         out[name][assembled] = np.unwrap(out[name][assembled])
     return Answer(
         engine,
@@ -271,20 +270,6 @@ def _forces(tree: Tree, matrix: Array, needed: Array) -> dict[str, Any]:
     """Driving torque and the four pin forces."""
     unknowns: Array = np.asarray(np.linalg.solve(matrix, needed), dtype=np.float64)
     return {**tree.forces(unknowns[:2]), "F43": unknowns[:2], "torque": unknowns[2]}
-
-
-def acting(scene: Scene, tree: effects.Tree) -> list[effects.Act]:
-    """What loads and effects do at each state of a tree."""
-    terms = [term.engine_term(tree) for term in (*scene.effects, *scene.loads)]
-    return [term for term in terms if term is not None]
-
-
-def unknown_effect(scene: Scene) -> str | None:
-    """The reason to refuse a scene: an effect that says nothing about engines."""
-    for effect in scene.effects:
-        if getattr(type(effect), "engine_term", effects.Effect.engine_term) is effects.Effect.engine_term:
-            return f"the effect {effect.key!r} has no model here"
-    return None
 
 
 def turned_ground(theta_1: float, x: float, y: float) -> Array:

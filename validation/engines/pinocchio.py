@@ -9,8 +9,9 @@ import pinocchio as pin
 
 from fourbar.linkage import FIRST_PIN, MOVING_BARS
 from fourbar.scene import Command, Scene
-from validation.answer import Answer, Array
-from validation.engines.loop import acting, answer_exactly, turned_ground, unknown_effect
+from validation.compare.answer import Answer, Array
+from validation.engines.effects import acting, unknown_effect
+from validation.engines.loop import answer_exactly, turned_ground
 
 NAME = "pinocchio-inverse"
 WORLD = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
@@ -44,10 +45,9 @@ class PinocchioTree:
             joint = model.addJoint(parent, pin.JointModelRZ(), _at(*foot[bar]), FIRST_PIN[bar])
             self.joint[bar] = joint
             part = linkage.bar(bar)
-            assert part.centre is not None and part.inertia is not None
-            r, phi = part.centre
+            r, phi = part.mass_centre
             centre = _at(r * math.cos(phi), r * math.sin(phi))
-            inertia = pin.Inertia(part.mass, centre.translation, np.diag([0.0, 0.0, part.inertia]))
+            inertia = pin.Inertia(part.mass, centre.translation, np.diag([0.0, 0.0, part.moment_of_inertia]))
             model.appendBodyToJoint(joint, inertia, pin.SE3.Identity())
             self._add_frame(f"G{bar}", joint, centre)
             self._add_frame(f"end{bar}", joint, _at(part.length, 0.0))

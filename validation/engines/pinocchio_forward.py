@@ -8,8 +8,9 @@ import pinocchio as pin
 
 from fourbar.errors import LimitError
 from fourbar.mjcf import Settings, flywheel, run_through
+from fourbar.quantities import PIN_FORCES
 from fourbar.scene import Command, Scene
-from validation.answer import Array
+from validation.compare.answer import Array
 from validation.engines.loop import Position
 from validation.engines.pinocchio import PinocchioTree
 
@@ -101,7 +102,7 @@ class PinocchioForward:
         v = np.array([self.omega, *np.linalg.solve(jacobian[:, 1:], -jacobian[:, 0] * self.omega)])
         n, done, stepping = len(order), 0, 0.0
         motion = {name: np.full(n, np.nan) for name in ("theta_2", "omega_2", "alpha_2", "torque")}
-        forces = {name: np.full((n, 2), np.nan) for name in ("F12", "F32", "F43", "F14")}
+        forces = {name: np.full((n, 2), np.nan) for name in PIN_FORCES}
         for row, index in enumerate(order):
             target = round(self.run.time(float(self.command.theta_2[index])) / self.h)
             began = time.process_time()

@@ -9,7 +9,7 @@ import pinocchio as pin
 
 from fourbar.effects import Gravity
 from fourbar.scene import Scene, command
-from validation.answer import Array, Released
+from validation.compare.answer import Array, Released
 from validation.engines.loop import LimitWatch, Position
 from validation.engines.pinocchio import PinocchioTree
 

@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 
 import fourbar
-from fourbar.state import Array
-from validation.tolerance import EPS
+from fourbar.solution import Array
+from validation.compare.tolerance import EPS
 
 DATA = Path(__file__).parent / "data"
 UNKNOWNS = ("F12x", "F12y", "F32x", "F32y", "F23x", "F23y", "F43x", "F43y", "F14x", "F14y", "F34x", "F34y", "T4")

@@ -1,6 +1,6 @@
 """The thesis's printed angles and limit positions against ours: section 2.4, table 3.2, the manual's window.
 
-Ours come from `fourbar.solve` and `fourbar.mobility`, or from the thesis's formula for a constant that
+Ours come from `fourbar.solve` and `fourbar.formulas.mobility`, or from the thesis's formula for a constant that
 nobody else defines. Units as printed: cm and deg.
 """
 
@@ -11,7 +11,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from fourbar.mobility import limit_positions
+from fourbar.formulas.mobility import limit_positions
 from validation.published.figures import Figure
 from validation.published.program import DATA, LENGTHS, THETA_1, THETA_2, deg, motion, printed, scene, to_ours
 

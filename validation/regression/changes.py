@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from enum import Enum
 
 from fourbar.exits import FAILED, HOLDS
-from validation.counts import Counts
+from validation.compare.counts import Counts
+from validation.compare.rows import FAILS, VERDICTS, Row
+from validation.compare.tolerance import EPS, K
 from validation.regression.record import About
-from validation.results import FAILS, VERDICTS, Row
-from validation.tolerance import EPS, K
 
 ROUND_OFF = K
 """Errors of an exact comparison move freely by this many eps/condition: another compiler, another

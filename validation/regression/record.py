@@ -9,13 +9,13 @@ from typing import Any
 
 from fourbar.errors import InputError
 from fourbar.writing import write_text
-from validation.machine import machine, versions
-from validation.plain import plain
-from validation.results import Row, from_csv, to_csv
-from validation.suite.columns import read_columns
-from validation.tolerance import SIMULATED, K
+from validation.compare.columns import read_columns
+from validation.compare.plain import plain
+from validation.compare.rows import Row, from_csv, to_csv
+from validation.compare.tolerance import SIMULATED, K
+from validation.report.machine import machine, versions
 
-BASELINES = Path(__file__).parent.parent / "baselines"
+BASELINES = Path(__file__).parent
 ACCEPTED = "accepted"
 TABLE, COLUMNS, ABOUT = "results.csv", "results.parquet", "record.json"
 

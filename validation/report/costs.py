@@ -4,11 +4,11 @@ import math
 from collections.abc import Iterable
 from statistics import median
 
-from validation.page import Page
+from validation.compare.tolerance import EPS
+from validation.engines.witnesses import WORK
 from validation.report.colours import GRID, INK, PAPER, SOFT, style_of
+from validation.report.page import Page
 from validation.report.svg import svg_text
-from validation.tolerance import EPS
-from validation.witnesses import WORK
 
 FLOOR = EPS / 4.0
 """Errors below this, zero among them, are drawn here."""

@@ -5,17 +5,19 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fourbar.drawing import drawing
-from fourbar.scene import Command, solve
-from fourbar.solution import OK, Solution
-from validation.answer import Answer
-from validation.compare import angle_aware_difference
-from validation.page import Record
+from fourbar.quantities import ANGLES, OK
+from fourbar.scene import Command
+from fourbar.show.drawing import drawing
+from fourbar.solution import Solution
+from fourbar.solve import solve
+from validation.compare.answer import Answer
+from validation.compare.compare import angle_aware_difference
+from validation.compare.reversals import Reversal, broken
+from validation.compare.scales import divisor, magnitude, yardstick
+from validation.compare.tolerance import EPS, EQUIVALENCE, SIMULATED, Array, condition_of
 from validation.report.colours import ALLOWED, BAND, GRID, INK, PAPER, by_variable, style_of
+from validation.report.page import Record
 from validation.report.svg import svg_text
-from validation.reversals import Reversal, broken
-from validation.scales import divisor, magnitude, yardstick
-from validation.tolerance import EPS, EQUIVALENCE, SIMULATED, Array, condition_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -27,7 +29,6 @@ STRETCHES = 24
 FLOOR = EPS / 16.0
 """Errors below this, zero among them, are drawn here."""
 TORQUE_AND_FORCE = ("torque", "F32")
-ANGLES = ("theta_3", "theta_4")
 SUBSCRIPT = str.maketrans("234", "₂₃₄")
 
 

@@ -8,20 +8,18 @@ from dataclasses import dataclass
 from itertools import groupby
 from typing import Any, NamedTuple
 
-from validation.counts import Counts
-from validation.page import Page
+from fourbar.quantities import UNKNOWNS
+from validation.compare.counts import Counts
+from validation.compare.rows import FAILS, REFUSES, UNTOLD, Row, sorted_rows, to_csv
 from validation.report.colours import by_variable, declarations, style_of
 from validation.report.costs import cost_figure
+from validation.report.page import Page
 from validation.report.summary import STATEMENT, Summary, used
 from validation.report.templating import environment
-from validation.results import FAILS, REFUSES, UNTOLD, Row, sorted_rows, to_csv
 
 ALL_OPEN = 8
 """Up to so many scenes all stand open; the bodies of more are packed, and unpacked when they are opened."""
-ORDER = (
-    *("theta_3", "theta_4", "omega_3", "omega_4", "alpha_3", "alpha_4"),
-    *("F12", "F32", "F43", "F14", "torque", "torque_inertia"),
-)
+ORDER = (*UNKNOWNS, "torque_inertia")
 """Quantities in the order of the computation; others follow by name."""
 
 

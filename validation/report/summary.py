@@ -10,13 +10,13 @@ from statistics import median
 from typing import NamedTuple, TypeVar
 
 from fourbar.exits import HOLDS
-from validation.counts import Counts
-from validation.machine import machine, versions
-from validation.page import Page
-from validation.published.command import LadderRow
-from validation.results import REFUSES, Row
-from validation.tolerance import EPS, EQUIVALENCE, IDENTITY, NOTHING_TO_TELL, SIMULATED, K, Tolerance
-from validation.witnesses import WORK
+from validation.compare.counts import Counts
+from validation.compare.rows import REFUSES, Row
+from validation.compare.tolerance import EPS, EQUIVALENCE, IDENTITY, NOTHING_TO_TELL, SIMULATED, K, Tolerance
+from validation.engines.witnesses import WORK
+from validation.published.ladder import LadderRow
+from validation.report.machine import machine, versions
+from validation.report.page import Page
 
 T = TypeVar("T")
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from fourbar.errors import InputError
 from fourbar.linkage import BAR_NAMES, MOVING_BARS, PINS
-from validation.answer import Array
+from validation.compare.answer import Array
 
 PIN_OF = {frozenset(bars): pin for pin, bars in PINS.items()}
 ENDS = {1: ("O2", "O4"), 2: ("O2", "A"), 3: ("A", "B"), 4: ("O4", "B")}

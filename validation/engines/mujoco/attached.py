@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 
 from fourbar.linkage import BAR_NAMES, MOVING_BARS
-from validation.answer import Array
+from validation.compare.answer import Array
 from validation.engines.mujoco.anatomy import Anatomy
 from validation.engines.mujoco.fields import ACTUATOR, RANGES, TENDON
 

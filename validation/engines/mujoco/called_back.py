@@ -14,7 +14,8 @@ import numpy as np
 from fourbar.effects import Load
 from fourbar.errors import LimitError
 from fourbar.scene import Scene
-from validation.answer import Array
+from validation.compare.answer import Array
+from validation.engines.effects import look_up
 from validation.engines.mujoco.closed_loop import O2, ClosedLoop
 
 OVERRUN = 1e-7
@@ -49,7 +50,7 @@ def of_loads(scene: Scene) -> dict[str, Told]:
             angle = first + (float(d.qpos[O2]) - first) % math.tau
             if angle > last:  # the stages of a step may look beyond the end of a table
                 angle = last if angle - last < first + math.tau - angle else first
-            return table.look_up(angle) / peak
+            return look_up(table, angle) / peak
 
         return factor
 

@@ -10,8 +10,9 @@ import numpy as np
 
 from fourbar.linkage import FIRST_PIN, MOVING_BARS
 from fourbar.scene import Command, Scene
-from validation.answer import Answer, Array
-from validation.engines.loop import acting, answer_exactly, turned_ground, unknown_effect
+from validation.compare.answer import Answer, Array
+from validation.engines.effects import acting, unknown_effect
+from validation.engines.loop import answer_exactly, turned_ground
 
 NAME = "mujoco-inverse"
 LEAST = 1e-15
@@ -37,10 +38,9 @@ def refusal(scene: Scene) -> str | None:
         return reason
     for number in MOVING_BARS:
         bar = scene.linkage.bar(number)
-        assert bar.inertia is not None
-        if bar.mass < LEAST or bar.inertia < LEAST:
+        if bar.mass < LEAST or bar.moment_of_inertia < LEAST:
             return (
-                f"bar {number} has mass {bar.mass:g} kg and inertia {bar.inertia:g} kg m^2; "
+                f"bar {number} has mass {bar.mass:g} kg and inertia {bar.moment_of_inertia:g} kg m^2; "
                 f"MuJoCo compiles no moving body below {LEAST:g} of either"
             )
     return None
@@ -59,13 +59,12 @@ class MujocoTree:
         bodies: dict[int, Any] = {}
         for number in MOVING_BARS:
             part = linkage.bar(number)
-            assert part.centre is not None and part.inertia is not None
-            r, phi = part.centre
+            r, phi = part.mass_centre
             centre = [r * math.cos(phi), r * math.sin(phi), 0.0]
             parent = bodies[2] if number == 3 else spec.worldbody
             body = parent.add_body(name=f"bar{number}", pos=[*foot[number], 0.0])
             body.explicitinertial = True
-            body.mass, body.ipos, body.inertia = part.mass, centre, [part.inertia] * 3
+            body.mass, body.ipos, body.inertia = part.mass, centre, [part.moment_of_inertia] * 3
             body.add_joint(name=FIRST_PIN[number], type=mujoco.mjtJoint.mjJNT_HINGE, axis=[0.0, 0.0, 1.0])
             body.add_site(name=f"G{number}", pos=centre)
             body.add_site(name=f"end{number}", pos=[part.length, 0.0, 0.0])

@@ -65,7 +65,7 @@ def too_fast_or_loaded(scene: Scene, speed: float) -> str | None:
         return FASTEST.reason
     if scene.linkage.input.length * speed**2 < SLOWEST.boundary:
         return SLOWEST.reason
-    centres = (abs(scene.linkage.bar(number).centre[0]) for number in MOVING_BARS)  # type: ignore[index]
+    centres = (abs(scene.linkage.bar(number).mass_centre[0]) for number in MOVING_BARS)
     if any(0.0 < r < NEAREST_CENTRE.boundary for r in centres):
         return NEAREST_CENTRE.reason
     if load_ratio(scene) > HEAVIEST.boundary:

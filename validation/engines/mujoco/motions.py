@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from fourbar.mjcf import Settings, run_through
 from fourbar.mjcf.settings import FULL_TURN
-from fourbar.motion_law import Law
 from fourbar.scene import Command
+from fourbar.scene.motion_law import Law
 
 LOOKED_AT = 2000
 """Instants at which a law is searched for its greatest speed and acceleration; between them it hardly differs."""

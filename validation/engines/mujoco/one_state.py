@@ -13,8 +13,10 @@ from numpy.typing import NDArray
 
 from fourbar.errors import InputError
 from fourbar.mjcf import Settings, mjcf
+from fourbar.mjcf.effects import unwound
+from fourbar.quantities import PIN_FORCES
 from fourbar.scene import Command, Scene
-from validation.answer import Answer, Array
+from validation.compare.answer import Answer, Array
 from validation.engines.mujoco.closed_loop import O2, O4, A, ClosedLoop
 
 NAME = "mujoco-one-state"
@@ -68,7 +70,7 @@ def _one_impedance(
     settings = Settings(timestep=1e-3, impedance=d, pad=pad, flywheel=0.0)
     loop = ClosedLoop(mjcf(scene, settings, keyframe=False))
     position, n = loop.position(), len(command.theta_2)
-    values = {"torque": np.full(n, np.nan), **{name: np.full((n, 2), np.nan) for name in ("F12", "F32", "F43", "F14")}}
+    values = {"torque": np.full(n, np.nan), **{name: np.full((n, 2), np.nan) for name in PIN_FORCES}}
     assembled = np.zeros(n, dtype=bool)
     omega, alpha = (
         np.broadcast_to(np.asarray(x or 0.0, dtype=float), (n,)) for x in (command.omega_2, command.alpha_2)
@@ -79,9 +81,7 @@ def _one_impedance(
         if found is None:
             continue
         assembled[i] = True
-        for effect in scene.effects:
-            found = effect.unwind(scene.linkage, found)
-        loop.set_state(found, float(omega[i]))
+        loop.set_state(unwound(scene, found), float(omega[i]))
         torque = _torque(loop, acts_on, float(alpha[i]))
         values["torque"][i] = torque
         for name, force in loop.forces().items():

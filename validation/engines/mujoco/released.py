@@ -9,7 +9,7 @@ import numpy as np
 from fourbar.errors import InputError
 from fourbar.mjcf import RECIPE, mjcf
 from fourbar.scene import Scene, command
-from validation.answer import Array, Released
+from validation.compare.answer import Array, Released
 from validation.engines.loop import LimitWatch
 from validation.engines.mujoco.closed_loop import O2, O4, A, ClosedLoop
 

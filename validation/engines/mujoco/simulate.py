@@ -10,9 +10,11 @@ import numpy as np
 
 from fourbar.errors import InputError, LimitError
 from fourbar.mjcf import RECIPE, Settings, mjcf
-from fourbar.motion import Motion
+from fourbar.mjcf.effects import unwound
+from fourbar.quantities import PIN_FORCES, UNKNOWNS
 from fourbar.scene import Command, Scene
-from validation.answer import Answer
+from fourbar.scene.motion import Motion
+from validation.compare.answer import Answer
 from validation.engines.loop import Position
 from validation.engines.mujoco.called_back import Told, at_full_size, listening, of_loads, telling, within
 from validation.engines.mujoco.closed_loop import O2, O4, A, ClosedLoop, couple_elsewhere
@@ -32,10 +34,9 @@ FINE = np.radians(2.0)
 """Between positions further apart than this it is looked whether the loop closes on the way."""
 COLLINEAR = 1e-9
 """Part of the sum of the lengths, and of half a turn: below what the time step itself can resolve."""
-FIELDS = ("theta_3", "theta_4", "omega_3", "omega_4", "alpha_3", "alpha_4", "torque")
+FIELDS = tuple(name for name in UNKNOWNS if name not in PIN_FORCES)
 Found = tuple[float, float, float] | None
 """Own joint angles (O2, A, O4), None where the loop does not close."""
-PINS = ("F12", "F32", "F43", "F14")
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,12 +49,12 @@ class MujocoSimulated:
     def answer(self, scene: Scene, command: Command) -> Answer:
         """The sweep run through in time; every quantity at the crank's own angle, speed and acceleration."""
         began = time.perf_counter()
-        refusal = _refusal(scene, command)
-        if refusal is None:
-            try:
+        try:
+            refusal = _refusal(scene, command)
+            if refusal is None:
                 answer = _Simulation(self.settings, scene, command).answer()
-            except (LimitError, InputError) as error:  # anything else is a failure, not a declared limit
-                refusal = str(error)
+        except (LimitError, InputError) as error:  # anything else is a failure, not a declared limit
+            refusal = str(error)
         if refusal is not None:
             answer = Answer(self.name, self.settings.integrator, refusal=refusal)
         answer.shared, answer.own, answer.seconds = SHARED, OWN, time.perf_counter() - began
@@ -116,7 +117,7 @@ class _Simulation:
         self.omega_2, self.alpha_2 = (np.full(n, x, dtype=float) for x in (command.omega_2, command.alpha_2))
         self.branch = command.branch.copy()
         self.values = {name: np.full(n, np.nan) for name in FIELDS}
-        self.values.update({name: np.full((n, 2), np.nan) for name in PINS})
+        self.values.update({name: np.full((n, 2), np.nan) for name in PIN_FORCES})
         self.evidence = {
             "closure_gap_m": 0.0,
             "speed_error": 0.0,
@@ -126,7 +127,7 @@ class _Simulation:
             "steps": 0.0,
         }
         self.steps_per_revolution = 0.0
-        self.predicted = {name: np.zeros(n) for name in (*FIELDS, *PINS)}
+        self.predicted = {name: np.zeros(n) for name in (*FIELDS, *PIN_FORCES)}
         self.turns = 0.0
         """Whole turns by which MuJoCo's theta_2 is ahead: springs at pins count them, rad."""
 
@@ -217,7 +218,7 @@ class _Simulation:
         light = None if self.scene.drive_bar == 2 else self._loop(timestep, told, LIGHT_FLYWHEEL)
         start = found[stretch[0]]
         assert start is not None
-        wound = self._unwound(start)
+        wound = unwound(self.scene, start)
         self.turns = wound[O2] - start[O2]
         watch = Watch(self._loop(timestep, told), self.scene.drive_bar)
         loop.set_state(wound, run.omega)
@@ -232,12 +233,6 @@ class _Simulation:
         self.evidence["steps"] += done
         for name, value in watch.evidence().items():
             self.evidence[name] = float(np.fmax(self.evidence.get(name, 0.0), value))
-
-    def _unwound(self, q: tuple[float, float, float]) -> tuple[float, float, float]:
-        """The joint angles as the scene's springs count them."""
-        for effect in self.scene.effects:
-            q = effect.unwind(self.scene.linkage, q)
-        return q
 
     def _read(
         self,
@@ -254,7 +249,7 @@ class _Simulation:
         d = loop.data
         self._watch(loop, run, expected_time, begins)
         q = (float(d.qpos[O2]), float(d.qpos[A]), float(d.qpos[O4]))
-        if self._unwound(q) != q:
+        if unwound(self.scene, q) != q:
             raise LimitError("a torsion spring is wound by more than half a turn from its rest")
         self.theta_2[index], self.omega_2[index] = d.qpos[O2] - self.turns, d.qvel[O2]
         self.branch[index] = loop.branch()

@@ -17,10 +17,10 @@ import numpy as np
 from fourbar.errors import InputError, LimitError
 from fourbar.linkage import PINS
 from fourbar.mjcf import flywheel, mjcf, run_through
+from fourbar.quantities import VECTORS
 from fourbar.scene import Command, Scene, command
-from fourbar.solution import VECTORS
-from validation.answer import Answer, Array
-from validation.compare import COMPARED
+from validation.compare.answer import Answer, Array
+from validation.compare.compare import COMPARED
 from validation.engines.loop import Position
 from validation.engines.mujoco.anatomy import Anatomy
 from validation.engines.mujoco.attached import Described

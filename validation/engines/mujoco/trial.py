@@ -14,8 +14,10 @@ import numpy as np
 
 from fourbar.errors import LimitError
 from fourbar.mjcf import Settings, mjcf, run_through
+from fourbar.mjcf.effects import unwound
+from fourbar.quantities import PIN_FORCES
 from fourbar.scene import Command, Scene
-from validation.answer import Array
+from validation.compare.answer import Array
 from validation.engines.mujoco.closed_loop import O2, ClosedLoop, couple_elsewhere
 
 LIGHT_FLYWHEEL = 1e4
@@ -104,7 +106,7 @@ class Rig:
         samples = [index for stretch in self.stretches for index in stretch]
         n = len(samples)
         motion = {name: np.full(n, np.nan) for name in ("theta_2", "omega_2", "alpha_2", "torque")}
-        forces = {name: np.full((n, 2), np.nan) for name in ("F12", "F32", "F43", "F14")}
+        forces = {name: np.full((n, 2), np.nan) for name in PIN_FORCES}
         trial = Trial(self.command, {}, 0, 0.0, 0.0, 0.0)
         first = 0
         with silence():
@@ -134,9 +136,7 @@ class Rig:
         if self.scene.drive_bar != 2:
             light = ClosedLoop(self.text(replace(settings, flywheel=LIGHT_FLYWHEEL), timestep))
         start = self.start[stretch[0]]
-        wound = start
-        for effect in self.scene.effects:  # the joint angles as springs count them
-            wound = effect.unwind(self.scene.linkage, wound)
+        wound = unwound(self.scene, start)
         loop.set_state(wound, self.omega)
         turns, done = wound[O2] - start[O2], 0
         for row, index in enumerate(stretch, first):

@@ -18,7 +18,8 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from validation.answer import Array
+from fourbar.quantities import PIN_FORCES
+from validation.compare.answer import Array
 from validation.engines.mujoco.closed_loop import O2, O4, A, ClosedLoop
 
 
@@ -118,7 +119,7 @@ class Watch:
         expected = {name: float(np.linalg.norm(value - closed.answer[name])) for name, value in seen.answer.items()}
         # what the solver left over: the pin forces differ by as much as F43
         left = {"torque": abs(torque - float(seen.answer["torque"]))}
-        left |= dict.fromkeys(("F12", "F32", "F43", "F14"), float(np.linalg.norm(loop_force - seen.answer["F43"])))
+        left |= dict.fromkeys(PIN_FORCES, float(np.linalg.norm(loop_force - seen.answer["F43"])))
         for name, error in left.items():
             size = seen.needed if name == "torque" else seen.answer[name]
             expected[name] += min(error, EXCUSED * float(np.linalg.norm(size)))

@@ -1,0 +1,165 @@
+"""A scene in the numbers of the formulas: positions, motion, and the forces under everything that acts."""
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fourbar.effects.actions import Actions, bodies
+from fourbar.formulas.motion import Coefficients, State, rates
+from fourbar.formulas.path import Path, path
+from fourbar.formulas.pin_forces import Bodies, PinForces, Wrenches, inertia_wrenches, pin_forces
+from fourbar.formulas.position import HalfAngle, Loop, Position, loop, parallel_pairs
+from fourbar.formulas.torque import driving_torque, half_slope, inertia
+from fourbar.formulas.transmission import drive_sine, drive_sine_of_triangle
+from fourbar.linkage import FourBar
+from fourbar.quantities import JAMMED
+from fourbar.scene import Scene
+from fourbar.solution import Array
+
+if TYPE_CHECKING:
+    from fourbar.effects import Effect
+
+
+U = 2.0**-53
+"""Unit round-off of a double."""
+UNDECIDED = 32.0 * U
+"""A factor of Heron's formula smaller than this times its terms is evaluated in many digits: in doubles it is wrong
+by at most about 12 U times them."""
+
+
+NO_MOTION = Coefficients(*[np.nan] * 8)
+"""Where positions are all that is asked for."""
+
+
+class Dynamics(NamedTuple):
+    """Pin forces and driving torque, and what friction that depends on the pin forces was solved to."""
+
+    pins: PinForces
+    torque: Any
+    from_jamming: Any = None
+    residual: Any = None
+    status: Any = None
+
+
+class Case(NamedTuple):
+    """A scene in the numbers of the formulas."""
+
+    linkage: FourBar
+    lengths: Loop
+    bodies: Bodies
+    terms: "tuple[Effect, ...]"
+    drive_bar: int
+    path: Path
+    side: int = 0
+    """Which way pins at rest are about to turn."""
+
+    @classmethod
+    def of(cls, scene: Scene) -> "Case":
+        """The numbers that stay the same over the positions."""
+        terms, linkage = (*scene.loads, *scene.effects), scene.linkage
+        lengths = loop(*linkage.lengths)
+        return cls(
+            linkage, lengths, bodies(linkage, terms), terms, scene.drive_bar, path(lengths, linkage.ground_angle)
+        )
+
+    def state(
+        self, path: Path, q: Any, at: Position, branch: Any, speed: Any, acceleration: Any, *, moving: bool = True
+    ) -> State:
+        """Positions and, unless they are all that is asked for, motion.
+
+        Parameters
+        ----------
+        at : in the order in which the path reads the loop.
+        """
+        theta_1 = self.linkage.ground_angle
+        if not moving:
+            return State(self.lengths, theta_1, q, at, NO_MOTION, 0.0, rates(NO_MOTION, 0.0, 0.0))
+        at, k = path.motion(at, branch)
+        return State(self.lengths, theta_1, q, at, k, speed, rates(k, speed, acceleration))
+
+    def half_angle(self, theta_2: Array, remainder: Any) -> tuple[HalfAngle, NDArray[np.intp]]:
+        """The half angles, and the indices of those evaluated in many digits."""
+        lengths, half = self.path.lengths, self.path.half_angle(theta_2)
+        if remainder is not None:
+            index = np.arange(len(theta_2))
+        else:
+            size = 4.0 * lengths.a * lengths.d
+            index = np.empty(0, dtype=np.intp)
+            for factor, constant in ((half.outer, lengths.E1), (half.inner, lengths.E2)):
+                if constant < 0.0:  # else it is a sum of two positive terms
+                    close = np.abs(factor) < UNDECIDED * (abs(constant) + size)
+                    index = np.union1d(index, np.flatnonzero(close))
+        if index.size:
+            from fourbar.many_digits import decided
+
+            half = decided(self.linkage, self.path.unit, half, index, theta_2, remainder)
+        return half, index
+
+    def dynamics(
+        self, state: State, acceleration: Any, side: int = 0, rounded: Callable[[Any], Any] | None = None
+    ) -> Dynamics:
+        """Pin forces and torque under everything that acts; for the parameters see `Actions`."""
+        a, at, k = self.lengths.a, state.at, state.k
+        actions = Actions(state, self.bodies, side, rounded)
+        for term in self.terms:
+            term.act(actions, state)
+        own, at_A = inertia_wrenches(a, self.bodies, at, state.moving)
+        # J q'' + J'/2 q'^2 of all bars, and of bars 3 and 4
+        inertial = others = half_slope(a, self.bodies, at, k) * (state.speed * state.speed)
+        if np.any(acceleration):
+            of_input, of_others = inertia(a, self.bodies, at, k)
+            others = others + of_others * acceleration
+            inertial = others + of_input * acceleration
+        if rounded is not None:
+            own, at_A = Wrenches(*map(rounded, own)), rounded(at_A)
+            inertial, others = rounded(inertial), rounded(others)
+
+        sine = self.drive_sine(at)
+        if rounded is not None:
+            sine = rounded(sine)
+
+        def eliminate(acting: Actions) -> PinForces:
+            return pin_forces(
+                self.lengths, at, self.drive_bar, sine, acting.wrenches(own), at_A, acting.work()[1] - others
+            )
+
+        def by_couples(acting: Actions) -> PinForces:
+            return pin_forces(
+                self.lengths, at, self.drive_bar, sine, acting.wrenches(Wrenches()), 0.0j, acting.work()[1]
+            )
+
+        pins = eliminate(actions)
+        found = Dynamics(pins, None)
+        for term in self.terms:  # a scene holds one effect of a kind, and one kind depends on the forces
+            if term.loaded_pins:
+                settled = term.settle(actions, pins, eliminate, by_couples)  # type: ignore[attr-defined]
+                found = Dynamics(settled.pins, None, settled.from_jamming, settled.residual, settled.status)
+        return found._replace(torque=driving_torque(k, self.drive_bar, inertial, actions.work()[0]))
+
+    def drive_sine(self, at: Position) -> Any:
+        """Sine between the two bars that are not driven."""
+        if self.path.bar == 4:
+            return drive_sine(at, self.drive_bar)
+        sine = drive_sine_of_triangle(self.path.lengths, at, self.drive_bar)
+        if self.path.may_stay_parallel:  # whose directions are exact
+            first, second = parallel_pairs(self.path.lengths, at.half, np.sign(at.root))
+            sine = np.where(first | second, drive_sine(at, self.drive_bar), sine)
+        return sine
+
+    def torque_interval(self, state: State, alpha_2: Any, torque: Any) -> tuple[Any, Any, Any]:
+        """Least and greatest driving torque where dry friction holds a pin at rest, elsewhere the torque twice, N m.
+
+        The third is where one of them is NaN because friction jams the motion that would begin; None: nowhere.
+        The ends are the torques at which the linkage would begin to move either way, or, where only a
+        pin comes to rest while the linkage moves, the torques just before and after its reversal.
+        """
+        actions = Actions(state, self.bodies)
+        pins = {pin for term in self.terms for pin in term.dry_pins}
+        if np.all(state.speed) and all(np.all(actions.turning(pin)) for pin in pins):
+            return torque, torque, None
+        ahead, back = (self.dynamics(state, alpha_2, side) for side in (1, -1))
+        jammed = [found.status == JAMMED for found in (ahead, back) if found.status is not None]
+        low, high = np.minimum(ahead.torque, back.torque), np.maximum(ahead.torque, back.torque)
+        return low, high, np.any(jammed, axis=0) if jammed else None

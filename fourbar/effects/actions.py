@@ -1,0 +1,121 @@
+"""What loads and effects do to the bars: forces and moments, and the generalised force that they make."""
+
+from collections.abc import Callable, Iterable
+from typing import Any
+
+import numpy as np
+
+from fourbar.formulas.motion import State
+from fourbar.formulas.pin_forces import Bodies, Body, Wrenches, cross
+from fourbar.formulas.position import Number
+from fourbar.linkage import PINS, FourBar
+
+AT_REST = 50.0 * 2.0**-52
+"""A slip below this part of the coefficients that it is made of is what rounding leaves of zero."""
+
+
+def bodies(linkage: FourBar, effects: Iterable[Any] = ()) -> Bodies:
+    """Of bars 2, 3, 4 of a linkage, with the inertia that effects (a flywheel) add."""
+    two, three, four = (Body(bar.mass, bar.moment_of_inertia, bar.to_centre) for bar in linkage.moving)
+    carried: Bodies = (two, three, four)
+    for effect in effects:
+        carried = effect.carried_by(carried)
+    return carried
+
+
+class Actions:
+    """Sums over everything that acts on bars 2, 3, 4 apart from pins and inertia.
+
+    Parameters
+    ----------
+    state : positions and motion.
+    bodies : of bars 2, 3, 4.
+    side : which way pins at rest are about to turn: +1 as theta_2 grows, -1 as it falls, 0 neither.
+    rounded : what a term becomes when it is rounded otherwise, for the error bars.
+    """
+
+    def __init__(
+        self, state: State, bodies: Bodies, side: int = 0, rounded: Callable[[Number], Number] | None = None
+    ) -> None:
+        self.state, self.bodies, self.side, self.rounded = state, bodies, side, rounded
+        self.forces: dict[int, Any] = {}
+        """Resultants of the bars on which any acts, complex, N."""
+        self.moments: dict[int, Any] = {}
+        """About the first pins O2, A, O4, N m, but for the couples between two bars."""
+        self.couples: dict[str, Any] = {}
+        """Between the two bars that meet at a pin, on the second of them, N m."""
+
+    def force(self, bar: int, force: Number, arm: Number = 0.0j) -> None:
+        """A force (complex, N, world axes) on a bar; on the ground it does nothing.
+
+        Parameters
+        ----------
+        arm : from the bar's first pin to where it acts, complex, m, world axes.
+        """
+        if bar != 1:
+            force = self._rounded(force)
+            self.forces[bar] = self.forces[bar] + force if bar in self.forces else force
+            self.moment(bar, cross(arm, force))
+
+    def moment(self, bar: int, moment: Number) -> None:
+        """A pure couple on a bar, N m; on the ground it does nothing."""
+        if bar != 1:
+            moment = self._rounded(moment)
+            self.moments[bar] = self.moments[bar] + moment if bar in self.moments else moment
+
+    def couple(self, pin: str, couple: Number) -> None:
+        """A couple on the second of the two bars that meet at a pin, and its opposite on the first, N m."""
+        couple = self._rounded(couple)
+        self.couples[pin] = self.couples[pin] + couple if pin in self.couples else couple
+
+    def work(self) -> tuple[Number, Number]:
+        """Generalised force Q (power over the speed of the independent angle) of everything, and of what acts on
+        bars 3 and 4 alone, N m."""
+        k = self.state.k
+        others: Any = 0.0
+        for bar, h in ((3, k.h3), (4, k.h4)):
+            if bar in self.moments:
+                others = others + self.moments[bar] * h
+        if 3 in self.forces:
+            others = others + k.h2 * cross(self.state.foot(3), self.forces[3])
+        total = others + self.moments[2] * k.h2 if 2 in self.moments else others
+        for pin, couple in self.couples.items():
+            total = total + couple * self.state.slip(pin)[0]
+            if pin != "O2":
+                others = others + couple * (k.h3 if pin == "A" else self.state.slip(pin)[0])
+        return total, others
+
+    def sense(self, pin: str) -> Number:
+        """Sign of omega_j - omega_i at a pin; at rest the one that a motion beginning to `side` would have.
+
+        A linkage at rest begins to move as theta_2 grows or falls; a pin that is at rest in a linkage that
+        moves turns either way.
+        """
+        slip, turning = self.state.slip(pin)[0], self.turning(pin)
+        if self.side == 0:
+            return turning * np.sign(slip * self.state.speed)
+        moving = np.where(turning, np.sign(slip * self.state.speed), self.side)
+        return np.where(np.equal(self.state.speed, 0.0), self.side * turning * np.sign(slip), moving)
+
+    def turning(self, pin: str) -> Number:
+        """Whether the two bars turn against each other in a motion, as far as rounding lets it be known."""
+        slip, growth = self.state.slip(pin)
+        k = self.state.k
+        return np.abs(slip) > AT_REST * (np.abs(k.h2) + np.abs(k.h3) + np.abs(k.h4) + np.abs(growth))
+
+    def wrenches(self, inertia: Wrenches) -> Wrenches:
+        """Everything that acts on each bar, with d'Alembert's forces and moments."""
+        R, M = dict(zip((2, 3, 4), inertia[:3], strict=True)), dict(zip((2, 3, 4), inertia[3:], strict=True))
+        for bar, force in self.forces.items():
+            R[bar] = R[bar] + force
+        for bar, moment in self.moments.items():
+            M[bar] = M[bar] + moment
+        for pin, couple in self.couples.items():
+            i, j = PINS[pin]
+            M[j] = M[j] + couple
+            if i != 1:
+                M[i] = M[i] - couple
+        return Wrenches(R[2], R[3], R[4], M[2], M[3], M[4])
+
+    def _rounded(self, term: Number) -> Number:
+        return term if self.rounded is None else self.rounded(term)

@@ -1,0 +1,133 @@
+"""Entries of a scene file, checked one by one: every mistake names the file, the key, the value and what is allowed."""
+
+import difflib
+import math
+import re
+from collections.abc import Iterable
+from typing import Any
+
+from fourbar.errors import InputError
+from fourbar.files.units import UnitError, to_si
+from fourbar.linkage import PINS
+
+BARE_KEY = re.compile(r"[A-Za-z0-9_-]{1,40}")
+LONGEST_SHOWN = 60
+
+
+class Reader:
+    """Reads entries of one file; effects are read through it too."""
+
+    def __init__(self, file: str) -> None:
+        self.file = file
+
+    def refuse(self, key: str, value: object, allowed: str) -> InputError:
+        """The error for an entry, with the file's name."""
+        return InputError(key, _shown(value), allowed, self.file)
+
+    def table(self, key: str, value: object, allowed: Iterable[str]) -> dict[str, Any]:
+        """A table that holds no other keys than those allowed; `key` is "" for the whole file."""
+        names = list(allowed)
+        if not isinstance(value, dict):
+            raise self.refuse(key, value, "must be a table with the keys " + ", ".join(names))
+        for name, entry in value.items():
+            if name not in names:
+                close = difflib.get_close_matches(name[:LONGEST_SHOWN], names, 1)
+                hint = f'did you mean "{close[0]}"? ' if close else ""
+                raise self.refuse(_joined(key, name), entry, f"unknown key; {hint}allowed: {', '.join(names)}")
+        return value
+
+    def text(self, key: str, value: object) -> str:
+        """A string."""
+        if not isinstance(value, str):
+            raise self.refuse(key, value, "must be a text in quotes")
+        return value
+
+    def choice(self, key: str, value: object, allowed: Iterable[str]) -> str:
+        """One of a few words."""
+        words = list(allowed)
+        if not isinstance(value, str) or value not in words:
+            close = difflib.get_close_matches(value[:LONGEST_SHOWN], words, 1) if isinstance(value, str) else []
+            hint = f'did you mean "{close[0]}"? ' if close else ""
+            raise self.refuse(key, value, f"{hint}must be " + " or ".join(f'"{word}"' for word in words))
+        return value
+
+    def whole(self, key: str, value: object, least: int, most: int) -> int:
+        """A whole number of a range, both ends included."""
+        if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
+            missing = "is missing; " if value is None else ""
+            raise self.refuse(key, value, f"{missing}must be a whole number from {least} to {most}")
+        return value
+
+    def number(self, key: str, value: object) -> float:
+        """A number without a dimension."""
+        if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
+            missing = "is missing; " if value is None else ""
+            raise self.refuse(key, value, f"{missing}must be a finite number without a unit")
+        return float(value)
+
+    def quantity(
+        self, key: str, value: object, unit: str, *, positive: bool = False, at_least_zero: bool = False
+    ) -> float:
+        """A number with a unit, in `unit`."""
+        bound = " > 0" if positive else " >= 0" if at_least_zero else ""
+        wanted = f'must be a finite number{bound} with a unit, like "1 {unit}"'
+        if value is None:
+            raise self.refuse(key, value, f"is missing; {wanted}")
+        if not isinstance(value, str):
+            raise self.refuse(key, value, wanted)
+        try:
+            number = to_si(value, unit)
+        except UnitError as error:
+            raise self.refuse(key, value, f"{error}; {wanted}") from None
+        if (positive and number <= 0.0) or (at_least_zero and number < 0.0):
+            raise self.refuse(key, value, wanted)
+        return number
+
+    def quantities(self, key: str, value: object, unit: str) -> tuple[float, ...]:
+        """A list of numbers with units, in `unit`."""
+        if not isinstance(value, list):
+            missing = "is missing; " if value is None else ""
+            raise self.refuse(key, value, f'{missing}must be a list like ["1 {unit}", "2 {unit}"]')
+        return tuple(self.quantity(f"{key}[{index}]", entry, unit) for index, entry in enumerate(value))
+
+    def polar(self, key: str, value: object, unit: str) -> tuple[float, float]:
+        """A pair [magnitude, angle], in `unit` and rad."""
+        if not isinstance(value, list) or len(value) != 2:
+            raise self.refuse(key, value, f'must be a pair like ["1 {unit}", "0 deg"]')
+        return (self.quantity(f"{key}[0]", value[0], unit), self.quantity(f"{key}[1]", value[1], "rad"))
+
+    def per_pin(self, key: str, value: object, unit: str) -> dict[str, float]:
+        """A table of quantities >= 0 by pin."""
+        pins = self.table(key, value, PINS)
+        return {pin: self.quantity(f"{key}.{pin}", entry, unit, at_least_zero=True) for pin, entry in pins.items()}
+
+
+def _joined(key: str, name: str) -> str:
+    """The dotted key; a name that is not a plain word is quoted, so that it stays on one line."""
+    if not BARE_KEY.fullmatch(name):
+        name = repr(name if len(name) <= LONGEST_SHOWN else name[:LONGEST_SHOWN] + "...")
+    return f"{key}.{name}" if key else name
+
+
+def _shown(value: object) -> object:
+    """The value as far as an error line shows it: never long or deep."""
+    if isinstance(value, str):
+        return value[: 2 * LONGEST_SHOWN]
+    if isinstance(value, dict):
+        return _Words(f"a table of {len(value)} entries")
+    if isinstance(value, list):
+        if len(value) <= 3 and all(isinstance(entry, (str, float, bool)) for entry in value):
+            return [_shown(entry) for entry in value]
+        return _Words(f"a list of {len(value)} entries")
+    if isinstance(value, int) and value.bit_length() > 64:
+        return _Words("a huge whole number")
+    return value
+
+
+class _Words(str):
+    """A description that is shown without quotes."""
+
+    __slots__ = ()
+
+    def __repr__(self) -> str:
+        return str(self)

@@ -1,0 +1,200 @@
+"""Scene files: TOML with units <-> Scene, checked entry by entry.
+
+Numbers are rounded once when they are read; what is written reads back bit for bit.
+"""
+
+import math
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fourbar.effects import Load, Table
+from fourbar.errors import InputError
+from fourbar.files import reading
+from fourbar.files.effects import REGISTRY
+from fourbar.files.fields import Reader
+from fourbar.files.pictures import Picture
+from fourbar.files.scene_text import BARS, BRANCHES, dump, save
+from fourbar.linkage import BAR_NAMES, Bar, FourBar
+from fourbar.scene import Scene
+from fourbar.scene.motion import DEFAULT_STEPS, Free, FromLimit, Motion, Sweep
+from fourbar.scene.motion_law import ENDS, Law
+from fourbar.solution import Array
+
+__all__ = ["dump", "load", "loads", "read_text", "save"]
+
+LARGEST_FILE = 500_000
+"""Bytes; a scene takes about a thousand."""
+MOST_STEPS = 100_000_000
+"""The bound that Sweep and Free hold."""
+MOST_DOTS = 100
+"""In one line: the time that the TOML reader takes grows with the square of a dotted key's parts."""
+MOST_LOADS = 1000
+"""Each load is a term at every position."""
+THROUGH = ("sign", "follow")
+
+
+def load(path: str | Path) -> Scene:
+    """The scene of a TOML file.
+
+    Raises InputError, in one line with file, key, value and what is allowed, for a file that is
+    missing, not a file, too large, not text or not TOML, and for every entry that is wrong.
+    """
+    return loads(read_text(path), str(path))
+
+
+def read_text(path: str | Path) -> str:
+    """The text of a scene file."""
+    return reading.read_text(path, "scene file", LARGEST_FILE)
+
+
+def loads(text: str, name: str = "scene") -> Scene:
+    """The scene that a TOML text describes; `name` stands for the file in errors, its folder is that of pictures."""
+    shown = name if name.isprintable() else repr(name)
+    for number, line in enumerate(text.split("\n"), 1):
+        if line.count(".") > MOST_DOTS:
+            raise InputError("TOML", line[:40], f"line {number} holds more than {MOST_DOTS} dots", shown)
+    try:
+        document = tomllib.loads(text)
+    except RecursionError:
+        raise InputError("TOML", "...", "is nested too deeply", shown) from None
+    except ValueError as error:  # TOMLDecodeError, and numbers that Python refuses
+        raise InputError("TOML", text[:40], f"cannot be read: {' '.join(str(error).split())[:120]}", shown) from None
+    try:
+        return _scene(Reader(shown), document, str(Path(name).parent))
+    except InputError as error:
+        raise (error if error.file else error.in_file(shown)) from None
+
+
+def _scene(read: Reader, document: dict[str, Any], folder: str) -> Scene:
+    top = read.table("", document, ("title", "source", "lengths", "bars", "motion", "drive", "loads", "effects"))
+    linkage = _linkage(read, top)
+    drive = read.table("drive", top.get("drive", {}), ("bar",))
+    entries = top.get("loads", [])
+    if not isinstance(entries, list) or len(entries) > MOST_LOADS:
+        raise read.refuse("loads", entries, f"must be written as [[loads]], at most {MOST_LOADS}")
+    effects = read.table("effects", top.get("effects", {}), REGISTRY)
+    return Scene(
+        linkage,
+        _motion(read, top.get("motion", {})),
+        read.whole("drive.bar", drive.get("bar", 2), 2, 4),
+        tuple(_load(read, f"loads[{index}]", entry) for index, entry in enumerate(entries)),
+        tuple(REGISTRY[key].read(value, read) for key, value in effects.items()),
+        read.text("title", top.get("title", "")),
+        read.text("source", top.get("source", "")),
+        _pictures(read, top.get("bars", {}), folder),
+    )
+
+
+def _pictures(read: Reader, bars: dict[str, Any], folder: str) -> tuple[Picture, ...]:
+    """The pictures of the bars that have one; the files themselves are read when they are shown."""
+    return tuple(
+        Picture(number, read.text(f"bars.{name}.picture", bars[name]["picture"]), folder)
+        for name, number in BARS.items()
+        if "picture" in bars.get(name, {})
+    )
+
+
+def _linkage(read: Reader, top: dict[str, Any]) -> FourBar:
+    lengths = read.table("lengths", top.get("lengths", {}), (*BAR_NAMES.values(), "ground_angle"))
+    length = {
+        name: read.quantity(f"lengths.{name}", lengths.get(name), "m", positive=True) for name in BAR_NAMES.values()
+    }
+    tables = read.table("bars", top.get("bars", {}), BARS)
+    bars = {name: _bar(read, f"bars.{name}", tables.get(name, {}), length[name]) for name in BARS}
+    angle = read.quantity("lengths.ground_angle", lengths.get("ground_angle", "0 rad"), "rad")
+    try:
+        return FourBar(length["ground"], bars["input"], bars["coupler"], bars["output"], angle)
+    except OverflowError:
+        raise read.refuse("lengths", lengths, "must have a finite sum") from None
+
+
+def _bar(read: Reader, key: str, value: object, length: float) -> Bar:
+    entry = read.table(key, value, ("mass", "inertia", "centre", "picture"))
+    mass = read.quantity(f"{key}.mass", entry.get("mass", "0 kg"), "kg", at_least_zero=True)
+    inertia = centre = None
+    if "inertia" in entry:
+        inertia = read.quantity(f"{key}.inertia", entry["inertia"], "kg m^2", at_least_zero=True)
+    elif not math.isfinite(mass * length * length):
+        raise read.refuse(f"{key}.mass", entry.get("mass"), "must leave the inertia m L^2/12 a finite number")
+    if "centre" in entry:
+        centre = read.polar(f"{key}.centre", entry["centre"], "m")
+    return Bar(length, mass, inertia, centre)
+
+
+def _motion(read: Reader, value: object) -> Motion:
+    entry = read.table("motion", value, ("theta_2", "omega_2", "alpha_2", "branch", "through", "free", "law"))
+    free = None
+    if "free" in entry:
+        released = read.table("motion.free", entry["free"], ("duration", "steps"))
+        duration = read.quantity("motion.free.duration", released.get("duration"), "s", positive=True)
+        free = Free(duration, read.whole("motion.free.steps", released.get("steps"), 1, MOST_STEPS))
+    omega_2 = None
+    if "omega_2" in entry:
+        omega_2 = read.quantity("motion.omega_2", entry["omega_2"], "rad/s")
+    return Motion(
+        _theta_2(read, entry["theta_2"]) if "theta_2" in entry else None,
+        omega_2,
+        read.quantity("motion.alpha_2", entry.get("alpha_2", "0 rad/s^2"), "rad/s^2"),
+        BRANCHES[read.choice("motion.branch", entry.get("branch", "open"), BRANCHES)],
+        read.choice("motion.through", entry.get("through", "sign"), THROUGH),
+        free,
+        _law(read, entry["law"]) if "law" in entry else None,
+    )
+
+
+def _law(read: Reader, value: object) -> Law:
+    key = "motion.law"
+    entry = read.table(key, value, ("time", "theta_2", "steps", "ends"))
+    return Law(
+        read.quantities(f"{key}.time", entry.get("time"), "s"),
+        read.quantities(f"{key}.theta_2", entry.get("theta_2"), "rad"),
+        read.whole(f"{key}.steps", entry.get("steps", DEFAULT_STEPS), 1, MOST_STEPS),
+        read.choice(f"{key}.ends", entry.get("ends", "free"), ENDS),
+    )
+
+
+def _theta_2(read: Reader, value: object) -> float | Array | Sweep | FromLimit:
+    key = "motion.theta_2"
+    if isinstance(value, str):
+        return read.quantity(key, value, "rad")
+    if isinstance(value, list) and value:
+        return np.array([read.quantity(f"{key}[{index}]", angle, "rad") for index, angle in enumerate(value)])
+    if not isinstance(value, dict):
+        raise read.refuse(
+            key, value, 'must be an angle like "135 deg", a list of angles, { from, to, steps } or { limit, offset }'
+        )
+    if "limit" in value or "offset" in value:
+        start = read.table(key, value, ("limit", "offset"))
+        offset = read.quantity(f"{key}.offset", start.get("offset", "0 rad"), "rad")
+        # four bars have at most four limit positions of the input; how many these have is not known here
+        return FromLimit(read.whole(f"{key}.limit", start.get("limit"), 1, 4), offset)
+    sweep = read.table(key, value, ("from", "to", "steps"))
+    ends = [read.quantity(f"{key}.{end}", sweep.get(end), "rad") for end in ("from", "to")]
+    return Sweep(ends[0], ends[1], read.whole(f"{key}.steps", sweep.get("steps"), 1, MOST_STEPS))
+
+
+def _load(read: Reader, key: str, value: object) -> Load:
+    entry = read.table(key, value, ("bar", "force", "at", "moment", "frame", "table"))
+    table = None
+    if "table" in entry:
+        over = read.table(f"{key}.table", entry["table"], ("theta_2", "factor"))
+        factors = over.get("factor")
+        if not isinstance(factors, list):
+            raise read.refuse(f"{key}.table.factor", factors, "must be a list of numbers without a unit")
+        angles = read.quantities(f"{key}.table.theta_2", over.get("theta_2"), "rad")
+        table = Table(angles, tuple(read.number(f"{key}.table.factor[{i}]", x) for i, x in enumerate(factors)))
+    if "force" not in entry and "moment" not in entry:
+        raise read.refuse(key, value, "must have a force, a moment or both")
+    if "at" in entry and "force" not in entry:
+        raise read.refuse(f"{key}.at", entry["at"], "belongs to a force, and there is none")
+    return Load(
+        read.whole(f"{key}.bar", entry.get("bar"), 2, 4),
+        read.polar(f"{key}.force", entry["force"], "N") if "force" in entry else None,
+        read.polar(f"{key}.at", entry["at"], "m") if "at" in entry else (0.0, 0.0),
+        read.quantity(f"{key}.moment", entry.get("moment", "0 N m"), "N m"),
+        read.choice(f"{key}.frame", entry.get("frame", "world"), ("world", "bar")),
+        table,
+    )

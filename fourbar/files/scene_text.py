@@ -1,0 +1,145 @@
+"""A scene as the text of its file: SI and radians, every digit, so that it reads back bit for bit."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fourbar.effects import Load
+from fourbar.errors import InputError
+from fourbar.files.effects import written
+from fourbar.linkage import BAR_NAMES, MOVING_BARS, Bar
+from fourbar.scene import Scene
+from fourbar.scene.motion import BRANCH_NAMES, FromLimit, Motion, Sweep
+from fourbar.writing import write_text
+
+BRANCHES = {name: branch for branch, name in BRANCH_NAMES.items()}
+BARS = {BAR_NAMES[number]: number for number in MOVING_BARS}
+
+
+class Writer:
+    """Writes entries in SI and radians, every digit kept; effects are written through it too."""
+
+    def quantity(self, value: float, unit: str) -> str:
+        """A number with its unit."""
+        return f"{float(value)!r} {unit}"
+
+    def polar(self, magnitude: float, angle: float, unit: str) -> list[str]:
+        """A pair [magnitude, angle]."""
+        return [self.quantity(magnitude, unit), self.quantity(angle, "rad")]
+
+
+def save(scene: Scene, path: str | Path) -> None:
+    """Write a scene to a TOML file, whole or not at all.
+
+    Raises InputError as `dump` does, and for a picture that lies outside the file's folder.
+    """
+    pictures = tuple(picture.moved(Path(path).parent) for picture in scene.pictures)
+    write_text(path, dump(replace(scene, pictures=pictures)))
+
+
+def dump(scene: Scene) -> str:
+    """The scene as TOML text, in SI and radians; `loads` gives the same numbers back, bit for bit.
+
+    Raises InputError for a scene that a file cannot hold: two effects of one kind, a title that is
+    no valid text.
+    """
+    write = Writer()
+    linkage, motion = scene.linkage, scene.motion
+    top = {"title": scene.title, "source": scene.source}
+    parts = [_table("", {key: value for key, value in top.items() if value})]
+    lengths: dict[str, Any] = {
+        BAR_NAMES[number]: write.quantity(length, "m") for number, length in enumerate(linkage.lengths, 1)
+    }
+    lengths["ground_angle"] = write.quantity(linkage.ground_angle, "rad")
+    parts.append(_table("lengths", lengths))
+    for name, number in BARS.items():
+        bar, entry = linkage.bar(number), dict[str, Any]()
+        if bar != Bar(bar.length):
+            entry = {"mass": write.quantity(bar.mass, "kg")}
+            if bar.inertia is not None:
+                entry["inertia"] = write.quantity(bar.inertia, "kg m^2")
+            if bar.centre is not None:
+                entry["centre"] = write.polar(*bar.centre, "m")
+        for picture in scene.pictures:
+            if picture.bar == number:
+                entry["picture"] = picture.name
+        parts.append(_table(f"bars.{name}", entry))
+    parts.append(_table("motion", _motion_entry(write, motion)))
+    parts.append(_table("drive", {"bar": scene.drive_bar}))
+    parts += [_table("[loads]", _load_entry(write, load)) for load in scene.loads]
+    effects = {effect.key: written(effect, write) for effect in scene.effects}
+    if len(effects) != len(scene.effects):
+        raise InputError("effects", [effect.key for effect in scene.effects], "a file holds one of each kind")
+    parts.append(_table("effects", effects))
+    return "\n".join(part for part in parts if part)
+
+
+def _motion_entry(write: Writer, motion: Motion) -> dict[str, Any]:
+    entry: dict[str, Any] = {}
+    asked = motion.theta_2
+    if isinstance(asked, Sweep):
+        ends = {"from": write.quantity(asked.start, "rad"), "to": write.quantity(asked.stop, "rad")}
+        entry["theta_2"] = {**ends, "steps": asked.steps}
+    elif isinstance(asked, FromLimit):
+        entry["theta_2"] = {"limit": asked.limit, "offset": write.quantity(asked.offset, "rad")}
+    elif isinstance(asked, np.ndarray):
+        entry["theta_2"] = [write.quantity(angle, "rad") for angle in asked.tolist()]
+    elif asked is not None:
+        entry["theta_2"] = write.quantity(asked, "rad")
+    if motion.omega_2 is not None:
+        entry["omega_2"] = write.quantity(motion.omega_2, "rad/s")
+    if motion.law is None:
+        entry["alpha_2"] = write.quantity(motion.alpha_2, "rad/s^2")
+    else:
+        law = motion.law
+        entry["law"] = {
+            "time": [write.quantity(time, "s") for time in law.time],
+            "theta_2": [write.quantity(angle, "rad") for angle in law.theta_2],
+            "steps": law.steps,
+            "ends": law.ends,
+        }
+    entry["branch"] = BRANCH_NAMES[motion.branch]
+    entry["through"] = motion.through
+    if motion.free is not None:
+        entry["free"] = {"duration": write.quantity(motion.free.duration, "s"), "steps": motion.free.steps}
+    return entry
+
+
+def _load_entry(write: Writer, load: Load) -> dict[str, Any]:
+    entry: dict[str, Any] = {"bar": load.bar}
+    if load.force is not None:
+        entry["force"] = write.polar(*load.force, "N")
+        entry["at"] = write.polar(*load.at, "m")
+    entry |= {"moment": write.quantity(load.moment, "N m"), "frame": load.frame}
+    if load.table is not None:
+        angles = [write.quantity(angle, "rad") for angle in load.table.theta_2]
+        entry["table"] = {"theta_2": angles, "factor": list(load.table.factor)}
+    return entry
+
+
+def _table(name: str, entries: dict[str, Any]) -> str:
+    """One TOML table, nothing where it is empty."""
+    if not entries:
+        return ""
+    heading = f"[{name}]\n" if name else ""
+    return heading + "".join(f"{key} = {_value(key, value)}\n" for key, value in entries.items())
+
+
+def _value(key: str, value: object) -> str:
+    """A TOML value; strings escape as in JSON, and DEL too."""
+    if isinstance(value, dict):
+        return "{ " + ", ".join(f"{name} = {_value(key, entry)}" for name, entry in value.items()) + " }"
+    if isinstance(value, list):
+        # one line each where there are many, so that no line holds more than MOST_DOTS
+        between = ", " if len(value) <= 3 else ",\n  "
+        return "[" + between.join(_value(key, entry) for entry in value) + "]"
+    if not isinstance(value, str):
+        return repr(value)
+    try:
+        value.encode("utf-8")
+    except UnicodeEncodeError:
+        raise InputError(key, value, "must be valid Unicode text") from None
+    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")

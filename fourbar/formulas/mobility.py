@@ -1,0 +1,240 @@
+"""What can turn, and how far: limit positions of each moving bar, ranges, change points, swing, time ratio.
+
+Let bar k (length l) close the loop with the ground (d) and the other two moving bars (x, y). With e
+the distance from the bar's free end to the far end of the ground, the loop closes where
+|x - y| <= e <= x + y, while e runs from |d - l| to d + l. Where e = x + y the other two bars are
+stretched, where e = |x - y| they are folded: a limit of bar k. Where an end of e meets an end of the
+allowed range all four bars are collinear: a change point. All sums of lengths are exact, rounded once.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fourbar.linkage import MOVING_BARS, FourBar
+
+Array = NDArray[np.float64]
+TURN = 2.0 * math.pi
+U = 2.0**-53
+"""Unit round-off of a double."""
+TOUCHING = U
+"""Bars that miss each other by up to this times the sum of the lengths count as touching: each length was
+itself rounded by up to that, so the linkage meant touches as well as not."""
+MARGIN = math.radians(1.0)
+"""What `default_range` leaves out at each end of an interval: at a limit itself no speeds exist."""
+NARROW = 4.0
+"""An interval shorter than NARROW * MARGIN gives up this part of its width at each end instead."""
+AT_CHANGE_POINT = 4.0 * U
+"""A position this close to a change point, relative to the angles it was computed from, is on it:
+theta_2, theta_1 and n pi are rounded by U each, their difference once more."""
+
+
+class LimitPosition(NamedTuple):
+    """A position in which bar k stands at a limit because the other two moving bars are collinear."""
+
+    theta_2: float
+    """rad, in [theta_1, theta_1 + 2 pi)."""
+    theta_3: float
+    """rad, in (-pi, pi]."""
+    theta_4: float
+    """rad, in (-pi, pi]."""
+    branch: int
+    """+1 open, -1 crossed, 0 where the two branches meet (every limit of bar 2)."""
+    stretched: bool
+    """The other two bars lie along each other's prolongation (e = x + y); otherwise they are folded."""
+
+
+class Reach(NamedTuple):
+    """Bar k against the rest of the loop, in the unit of `unit_of`; sums within rounding of 0 are 0."""
+
+    d: float
+    own: float
+    x: float
+    y: float
+
+    def sum(self, d: int, own: int, x: int, y: int) -> float:
+        """The exact sum of the lengths with these signs, rounded once."""
+        total = math.fsum((d * self.d, own * self.own, x * self.x, y * self.y))
+        return 0.0 if abs(total) <= TOUCHING * (self.d + self.own + self.x + self.y) else total
+
+    @property
+    def beyond_stretched(self) -> float:
+        """(d + l) - (x + y): > 0 where stretched bars stop bar k, 0 at a change point."""
+        return self.sum(1, 1, -1, -1)
+
+    @property
+    def beyond_folded(self) -> float:
+        """|x - y| - |d - l|: > 0 where folded bars stop bar k, 0 at a change point."""
+        p, q = (1 if self.x >= self.y else -1), (1 if self.d >= self.own else -1)
+        return self.sum(-q, q, p, -p)
+
+    def triangle(self, stretched: bool) -> tuple[float, float]:
+        """Angles of the triangle d, l, e at both ends of the ground, rad, from its Heron factors:
+
+        tan^2(psi/2) = (e + l - d)(e + d - l)/((d + l - e)(d + l + e)), and with d, e for d, l.
+        """
+        x, y = (1, 1) if stretched else (1, -1) if self.x >= self.y else (-1, 1)
+        short_d, short_l = self.sum(-1, 1, x, y), self.sum(1, -1, x, y)
+        short_e, whole = self.sum(1, 1, -x, -y), self.sum(1, 1, x, y)
+        at_near = math.atan2(math.sqrt(short_d) * math.sqrt(short_l), math.sqrt(short_e) * math.sqrt(whole))
+        at_far = math.atan2(math.sqrt(short_d) * math.sqrt(short_e), math.sqrt(short_l) * math.sqrt(whole))
+        return 2.0 * at_near, 2.0 * at_far
+
+
+def unit_of(linkage: FourBar) -> float:
+    """A power of two near the longest bar, m."""
+    return math.ldexp(1.0, math.frexp(max(linkage.lengths))[1])
+
+
+def reach_of(linkage: FourBar, bar: int = 2) -> Reach:
+    """Bar 2, 3 or 4 against the rest of the loop; ValueError for another bar."""
+    if bar not in MOVING_BARS:
+        raise ValueError(f"bar = {bar!r}: must be 2, 3 or 4")
+    unit = unit_of(linkage)  # exact, and no product of lengths leaves the range of doubles
+    d, *moving = (length / unit for length in linkage.lengths)
+    own = moving.pop(bar - 2)
+    return Reach(d, own, *moving)
+
+
+def _wrapped(angle: float) -> float:
+    """The angle in (-pi, pi]."""
+    rest = math.remainder(angle, TURN)
+    return math.pi if rest <= -math.pi else rest
+
+
+def limit_positions(linkage: FourBar, bar: int = 2) -> tuple[LimitPosition, ...]:
+    """The positions in which a bar reverses, all mirror solutions, counter-clockwise in theta_2 from theta_1.
+
+    cos psi = (d^2 + l^2 - (x +- y)^2)/(2 d l), psi the angle between the ground and the bar.
+
+    They are the limits of the input for bar 2 (bars 3, 4 collinear) and of the output for bar 4
+    (bars 2, 3 collinear), and the dead centres of a drive on that bar. A change point is none.
+
+    Parameters
+    ----------
+    bar : 2, 3 or 4; ValueError otherwise.
+
+    Source: R. L. Norton, Design of Machinery; Linares Mendoza, eqs 3.7-3.15 (one of each mirror pair).
+    """
+    reach = reach_of(linkage, bar)
+    theta_1 = linkage.ground_angle
+    others = [k for k in MOVING_BARS if k != bar]
+    found: list[LimitPosition] = []
+    for stretched, beyond in ((False, reach.beyond_folded), (True, reach.beyond_stretched)):
+        if beyond <= 0.0:
+            continue
+        psi, eta = reach.triangle(stretched)
+        straight = psi in (0.0, math.pi)
+        # the loop as a sum of vectors: bar 4 runs from B back to O4, so its vector is -c u4
+        for side in (1.0,) if straight else (1.0, -1.0):
+            vectors = {bar: side * psi, others[0]: -side * eta, others[1]: -side * eta}
+            if not stretched:
+                vectors[others[1] if reach.x >= reach.y else others[0]] += math.pi
+            psi_2, theta_3 = vectors[2] % TURN, theta_1 + vectors[3]
+            theta_4 = theta_1 + vectors[4] + math.pi
+            branch = 0 if bar == 2 or straight else int(math.copysign(1.0, math.sin(theta_4 - theta_3)))
+            found.append(LimitPosition(theta_1 + psi_2, _wrapped(theta_3), _wrapped(theta_4), branch, stretched))
+    return tuple(sorted(found))
+
+
+def intervals(linkage: FourBar, bar: int = 2) -> tuple[tuple[float, float], ...]:
+    """The ranges [from, to] of a bar's angle in which the linkage assembles, rad; `to` may exceed 2 pi.
+
+    One range where the bar turns fully (a whole turn from the ground's line) or has one pair of
+    limits, two mirror images where it has two pairs; the range that contains the ground's
+    direction (for bar 4: its opposite) or lies first counter-clockwise from it comes first.
+    """
+    reach = reach_of(linkage, bar)
+    start = linkage.ground_angle + (math.pi if bar == 4 else 0.0)
+    inner = reach.triangle(False)[0] if reach.beyond_folded > 0.0 else None
+    outer = reach.triangle(True)[0] if reach.beyond_stretched > 0.0 else None
+    if inner is None:
+        return ((start, start + TURN),) if outer is None else ((start - outer, start + outer),)
+    if outer is None:
+        return ((start + inner, start + (TURN - inner)),)
+    return (start + inner, start + outer), (start + (TURN - outer), start + (TURN - inner))
+
+
+def turns_fully(linkage: FourBar, bar: int = 2) -> bool:
+    """Whether a moving bar can turn through 360 deg against the ground (through change points, if need be)."""
+    reach = reach_of(linkage, bar)
+    return reach.beyond_folded <= 0.0 and reach.beyond_stretched <= 0.0
+
+
+def default_range(linkage: FourBar) -> tuple[float, float]:
+    """The range of theta_2 that is swept where a scene names none, rad.
+
+    0..2 pi where the input turns fully; otherwise the first of `intervals`, shrunk by MARGIN at each end.
+    """
+    if turns_fully(linkage):
+        return 0.0, TURN
+    start, stop = intervals(linkage)[0]
+    margin = min(MARGIN, (stop - start) / NARROW)
+    return start + margin, stop - margin
+
+
+def change_points(linkage: FourBar) -> tuple[float, ...]:
+    """theta_2 of the positions in which all bars are collinear and both branches cross, rad.
+
+    theta_1 where |a - d| = |b - c|, theta_1 + pi where a + d = b + c, within the rounding of the lengths.
+    """
+    reach, theta_1 = reach_of(linkage), linkage.ground_angle
+    folded = (theta_1,) if reach.beyond_folded == 0.0 else ()
+    return (*folded, theta_1 + math.pi) if reach.beyond_stretched == 0.0 else folded
+
+
+def swing(linkage: FourBar, bar: int = 4) -> float:
+    """Angle through which a bar swings between its limits, rad; 2 pi where it turns fully."""
+    start, stop = intervals(linkage, bar)[0]
+    return stop - start
+
+
+def time_ratio(linkage: FourBar) -> float | None:
+    """Quick return of a crank-rocker: time of its slower stroke over that of the faster, at constant omega_2.
+
+    (2 pi - delta)/delta, delta <= pi the input's angle between the two limits of the output
+    (R. L. Norton, Design of Machinery). None where the input does not turn fully or the output has no
+    stroke of its own.
+    """
+    if not turns_fully(linkage) or change_points(linkage):
+        return None
+    stroke = [limit.theta_2 for limit in limit_positions(linkage, 4) if limit.branch == 1]
+    if len(stroke) != 2:
+        return None
+    delta = stroke[1] - stroke[0]
+    delta = min(delta, TURN - delta)
+    return (TURN - delta) / delta
+
+
+def on_smooth_path(linkage: FourBar, theta_2: Array, branch: int) -> NDArray[np.int8]:
+    """The branch of each position of a sweep that runs smoothly through the change points, (n,).
+
+    At a change point sin(theta_4 - theta_3) passes through zero with its slope, so the smooth path
+    changes the sign there. A position on a change point belongs to the side that the sweep comes
+    from; if the sweep starts on one, to the side that it does not turn to.
+
+    Parameters
+    ----------
+    theta_2 : (n,), rad, in the order of the sweep; the input turns from each to the next without detour.
+    branch : +1 or -1, of the first position.
+    """
+    psi = np.asarray(theta_2, dtype=float) - linkage.ground_angle
+    crossed = np.zeros(psi.shape, dtype=np.int64)
+    steps = np.sign(np.diff(psi)).astype(np.int64)
+    heading = np.zeros(psi.shape, dtype=np.int64)
+    if steps.any():
+        heading[1:] = steps
+        moving = np.flatnonzero(heading)
+        latest = np.maximum.accumulate(np.where(heading != 0, np.arange(psi.size), moving[0]))
+        heading = heading[latest]
+    rounding = AT_CHANGE_POINT * (np.abs(theta_2) + abs(linkage.ground_angle))
+    for point in change_points(linkage):
+        at = 0.0 if point == linkage.ground_angle else math.pi
+        turns = (psi - at) / TURN
+        nearest = np.rint(turns)
+        on = np.abs(psi - at - nearest * TURN) <= rounding
+        cell = np.where(on, nearest - (heading > 0), np.floor(turns)).astype(np.int64)
+        crossed += cell - cell[:1]
+    return np.where(crossed % 2 == 0, branch, -branch).astype(np.int8)

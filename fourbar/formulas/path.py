@@ -1,0 +1,153 @@
+"""The path of a linkage in one independent angle: theta_2, or theta_4 where the input stands at a limit.
+
+Read backwards, from O4 over B and A to O2, the loop is one of the same kind whose input is bar 4:
+    c e^{i theta_4} + b e^{i (theta_3 + pi)} = d e^{i (theta_1 + pi)} + a e^{i theta_2}.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from fourbar.formulas.motion import Coefficients, State, coefficients, rates
+from fourbar.formulas.motion import with_parallel_pairs as parallel_motion
+from fourbar.formulas.pin_forces import cross
+from fourbar.formulas.position import (
+    HalfAngle,
+    Loop,
+    Number,
+    Position,
+    close_loop,
+    direction,
+    half_angle,
+    loop,
+    parallel_pairs,
+    polar,
+)
+from fourbar.formulas.position import with_parallel_pairs as parallel_position
+from fourbar.linkage import FourBar
+
+NO_DIGIT_LEFT = 16.0 * 2.0**-53
+"""|sin mu| at or below this: the directions of bars 3 and 4 cannot be told apart in doubles."""
+
+
+class Path(NamedTuple):
+    """The loop as it is read from the bar whose angle is independent."""
+
+    bar: int
+    """2 or 4."""
+    lengths: Loop
+    """In the order of the reading: ground, the bar itself, coupler, the other one."""
+    theta_1: Number
+    """Direction of the ground in the order of the reading, rad."""
+    unit: Number = 1.0
+    """Of the lengths, a power of two near the longest, m: no product of them leaves the range of doubles."""
+
+    def half_angle(self, q: Number) -> HalfAngle:
+        """Of the independent angle q (rad) against the ground."""
+        return half_angle(self.lengths, q - self.theta_1)
+
+    def position(self, q: Number, half: HalfAngle, branch: Number) -> Position:
+        """Positions with the bars in the order of the reading.
+
+        Parameters
+        ----------
+        q : rad.
+        half : of q.
+        branch : sign of the root in that order: for bar 2 the branch, for bar 4 that of sin(theta_3 - theta_2).
+        """
+        at = close_loop(self.lengths, polar(1.0, self.theta_1), direction(q), half, branch)
+        if self.may_stay_parallel:
+            at = parallel_position(at, *parallel_pairs(self.lengths, half, branch))
+        return at._replace(diagonal=at.diagonal * self.unit)
+
+    def angles(self, half: HalfAngle, branch: Number) -> tuple[Number, Number, Number]:
+        """theta_3, theta_4 and the root alone, the arguments of what `close_loop` divides by lengths, in (-pi, pi].
+
+        In real numbers, against the ground; a turned ground's angle is added.
+        """
+        d, a, b, c, _, _ = self.lengths
+        ss, kk, sk, outer, inner = half
+        root = branch * np.sqrt(outer * inner)
+        at_A, at_O4 = inner + 2.0 * b * (b - c), inner - 2.0 * c * (b - c)
+        x, y = (d - a) * kk + (d + a) * ss, (-2.0 * a) * sk
+        theta_3 = np.arctan2(x * root + y * at_A, x * at_A - y * root)
+        theta_4 = np.arctan2(x * root - y * at_O4, -x * at_O4 - y * root)
+        if np.any(self.theta_1):
+            theta_3, theta_4 = (np.remainder(np.pi - theta - self.theta_1, 2.0 * np.pi) for theta in (theta_3, theta_4))
+            theta_3, theta_4 = np.pi - theta_3, np.pi - theta_4
+        return theta_3, theta_4, root
+
+    def motion(self, at: Position, branch: Number) -> tuple[Position, Coefficients]:
+        """Positions and kinematic coefficients by q with the bars in their usual order, from `position`."""
+        k = coefficients(self.lengths, at)
+        if self.may_stay_parallel:
+            first, second = parallel_pairs(self.lengths, at.half, branch)
+            known = ~np.isnan(at.root)
+            k = parallel_motion(k, first & known, second & known)
+        return (at, k) if self.bar == 2 else (_turned_round(self, at), read_backwards(k))
+
+    @property
+    def may_stay_parallel(self) -> bool:
+        """Whether there are two pairs of equal bars."""
+        return bool(np.any(np.equal(self.lengths.E1, 0.0) & np.equal(self.lengths.E2, 0.0)))
+
+
+def path(lengths: Loop, theta_1: Number, bar: int = 2) -> Path:
+    """The path in the angle of bar 2 or 4."""
+    d, a, b, c, _, _ = lengths
+    unit = np.ldexp(1.0, np.frexp(np.maximum(np.maximum(d, a), np.maximum(b, c)))[1])
+    d, a, b, c = d / unit, a / unit, b / unit, c / unit
+    if bar == 2:
+        return Path(2, loop(d, a, b, c), theta_1, unit)
+    return Path(4, loop(d, c, b, a), theta_1 + np.pi, unit)
+
+
+def singular(at: Position, margin: float = NO_DIGIT_LEFT) -> Number:
+    """Where velocities are 0/0: bars 3 and 4 lie in one line."""
+    return np.abs(at.sin_mu) <= margin
+
+
+def state(linkage: FourBar, theta_2: Number, branch: Number, omega_2: Number = 1.0, alpha_2: Number = 0.0) -> State:
+    """Positions and motion for a motion of the input; NaN where the loop does not close, or speeds are 0/0.
+
+    Parameters
+    ----------
+    theta_2 : rad.
+    branch : +1 or -1.
+    omega_2, alpha_2 : rad/s and rad/s^2; left out, speeds are first coefficients and accelerations second ones.
+    """
+    with np.errstate(all="ignore"):
+        lengths = loop(*linkage.lengths)
+        way = path(lengths, linkage.ground_angle)
+        at = way.position(theta_2, way.half_angle(theta_2), branch)
+        at, k = way.motion(at._replace(root=np.where(singular(at), np.nan, at.root)), branch)
+        return State(lengths, linkage.ground_angle, theta_2, at, k, omega_2, rates(k, omega_2, alpha_2))
+
+
+def smooth_branch(lengths: Loop, psi: Number, sign: Number) -> Number:
+    """The sign of the root on a path that runs smoothly through change points: there cos h or sin h changes its sign.
+
+    Parameters
+    ----------
+    psi : independent angle less that of the ground, rad, not wrapped.
+    sign : +1 or -1, a constant of the path.
+    """
+    k, s = np.cos(0.5 * psi), np.sin(0.5 * psi)
+    at_stretched = np.where(np.equal(lengths.E1, 0.0) & (k < 0.0), -1.0, 1.0)
+    at_folded = np.where(np.equal(lengths.E2, 0.0) & (s < 0.0), -1.0, 1.0)
+    return sign * at_stretched * at_folded
+
+
+def _turned_round(way: Path, at: Position) -> Position:
+    """A position of the loop read backwards, in the usual order of the bars."""
+    d, c, b, a, _, _ = way.lengths
+    u1, u2, u3, u4 = -at.u1, at.u4, -at.u3, at.u2
+    diagonal = d * u1 - a * u2
+    sine = cross(u3, u4)
+    e2 = diagonal.real * diagonal.real + diagonal.imag * diagonal.imag
+    return Position(u1, u2, u3, u4, sine, diagonal * way.unit, e2, 2.0 * b * c * sine, at.half)
+
+
+def read_backwards(k: Coefficients) -> Coefficients:
+    """The coefficients of the loop read backwards, in the usual order of the bars."""
+    return Coefficients(k.h4, k.h3, k.h2, k.h43, k.h23, k.dh4, k.dh3, k.dh2)

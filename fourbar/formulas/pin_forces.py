@@ -1,0 +1,146 @@
+"""Pin forces: the equations of the free bodies, eliminated to one 2x2 system.
+
+F_ij is the force of bar i on bar j. The moments of the two bars that are not driven, about their outer
+pins, give the force between them; sums of forces give the rest:
+    bar 2:  F12 + F32 + R2 = 0,            a u2 x F32 + M2 + T2 = 0   (about O2),
+    bar 3:  F43 - F32 + R3 = 0,            b u3 x F43 + M3 + T3 = 0   (about A),
+    bar 4:  F14 - F43 + R4 = 0,           -c u4 x F43 + M4 + T4 = 0   (about O4),
+with R, M the resultant and the moment of everything else on the bar: loads, effects and -m a_G, -I alpha.
+
+Source: Linares Mendoza, section 5.7 (the thirteen equations); R. L. Norton, Design of Machinery, ch. 11.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from fourbar.formulas.motion import Rates
+from fourbar.formulas.position import Loop, Number, Position
+
+
+class Body(NamedTuple):
+    """What inertia needs of a bar."""
+
+    m: Number
+    """kg."""
+    I: Number  # noqa: E741 - the literature's letter
+    """About the mass centre, kg m^2."""
+    z: Number
+    """From the bar's first pin to G in the bar's frame, as a complex number, m."""
+
+
+Bodies = tuple[Body, Body, Body]
+"""Of bars 2, 3, 4."""
+
+
+class Wrenches(NamedTuple):
+    """Resultant forces (complex, N) on bars 2, 3, 4 and moments (N m) about their first pins O2, A, O4."""
+
+    R2: Number = 0j
+    R3: Number = 0j
+    R4: Number = 0j
+    M2: Number = 0.0
+    M3: Number = 0.0
+    M4: Number = 0.0
+
+
+class PinForces(NamedTuple):
+    """Force of bar i on bar j as x + i y in world axes, N."""
+
+    F12: Number
+    F32: Number
+    F43: Number
+    F14: Number
+
+
+def cross(u: Number, v: Number) -> Number:
+    """z-component of u x v."""
+    return u.real * v.imag - u.imag * v.real
+
+
+def dot(u: Number, v: Number) -> Number:
+    """Scalar product u . v."""
+    return u.real * v.real + u.imag * v.imag
+
+
+def about_first_pin(body: Body) -> Number:
+    """I + m r^2, kg m^2."""
+    return body.I + body.m * body.z.real * body.z.real + body.m * body.z.imag * body.z.imag
+
+
+def inertia_wrenches(a: Number, bodies: Bodies, at: Position, moving: Rates) -> tuple[Wrenches, Number]:
+    """d'Alembert: -m a_G on each bar, and -(I + m r^2) alpha - m r_G x a_pin about its first pin.
+
+    The force -m a_A of the coupler's mass at pin A is returned apart and is no part of R3: bar 2
+    carries it, with the moment -m a^2 alpha_2 about O2.
+
+    Parameters
+    ----------
+    a : length of the input, m.
+    bodies : of bars 2, 3, 4.
+    """
+    two, three, four = bodies
+    w2, w3, w4, alpha_2, alpha_3, alpha_4 = moving
+    G3 = three.z * at.u3
+    at_A = (three.m * a) * (w2 * w2 - 1j * alpha_2) * at.u2
+    return Wrenches(
+        (two.m * two.z) * (w2 * w2 - 1j * alpha_2) * at.u2,
+        three.m * (w3 * w3 - 1j * alpha_3) * G3,
+        (four.m * four.z) * (w4 * w4 - 1j * alpha_4) * at.u4,
+        -(about_first_pin(two) + three.m * a * a) * alpha_2,
+        cross(G3, at_A) - about_first_pin(three) * alpha_3,
+        -about_first_pin(four) * alpha_4,
+    ), at_A
+
+
+def between(M_u: Number, M_v: Number, u: Number, v: Number, sine: Number) -> Number:
+    """The force F with u x F = M_u and v x F = M_v, for unit vectors with u x v = sine: F = (M_u v - M_v u)/sine."""
+    return (M_u * v - M_v * u) * (1.0 / sine)
+
+
+def pin_forces(
+    lengths: Loop, at: Position, drive_bar: int, sine: Number, w: Wrenches, at_A: Number, moment_of_F32: Number
+) -> PinForces:
+    """The four pin forces; inf or NaN where the two bars that are not driven lie in one line.
+
+    With the drive on bar 2 the force at B is written with the diagonal D from A to O4, which closes the
+    triangle of bars 3 and 4, so that a couple between them keeps its digits:
+        F43 = (M3 D - (M3 + M4) b u3)/(b c sin(theta_4 - theta_3)).
+
+    Parameters
+    ----------
+    drive_bar : 2, 3 or 4.
+    sine : between the two bars that are not driven, of theta_4 - theta_3, theta_4 - theta_2, theta_3 - theta_2.
+    w, at_A : everything that acts, as from `inertia_wrenches`.
+    moment_of_F32 : a u2 x F32 (N m), which the virtual work of bars 3 and 4 knows; read for drive bar 2 alone.
+
+    >>> from fourbar.formulas.path import state
+    >>> from fourbar.formulas.position import polar
+    >>> from fourbar.linkage import uniform  # below, Norton, example 11-3: in, lbf, s
+    >>> s, deg = state(uniform(19, 5, 15, 10), np.pi / 3, 1, 25.0, -40.0), np.pi / 180
+    >>> G3, P = polar(9, 45 * deg), polar(80, 330 * deg)  # a force on the coupler
+    >>> bars = Body(0.004, 0.4, polar(3, 30 * deg)), Body(0.020, 1.5, G3), Body(0.015, 0.8, 5 + 0j)
+    >>> w, at_A = inertia_wrenches(5, bars, s.at, s.moving)
+    >>> moment = cross((G3 + polar(3, 100 * deg)) * s.at.u3, P)
+    >>> w = w._replace(R3=w.R3 + P, M3=w.M3 + moment, M4=w.M4 + 120)  # and a couple on the output
+    >>> f"{pin_forces(s.lengths, s.at, 2, s.at.sin_mu, w, at_A, 0.0).F12:.2f}"
+    '-117.65-107.84j'
+    """
+    d, a, b, c, _, _ = lengths
+    R2, R3, R4, M2, M3, M4 = w
+    if drive_bar == 4:
+        F32 = between(-M2 / a, cross(at.u3, R3) - M3 / b, at.u2, at.u3, sine) + at_A
+        # not F32 - R3: what the mass near A carries to O2 would cancel again
+        F43 = between(-M3 / b, -M2 / a - cross(at.u2, R3), at.u3, at.u2, -sine)
+    elif drive_bar == 3:
+        F43 = between(-M2 / a - cross(at.u2, R3), M4 / c, at.u2, at.u4, sine)
+        F32 = between(-M2 / a, M4 / c + cross(at.u4, R3), at.u2, at.u4, sine)
+        F32 = (dot(at.u2, F32) - 1j * (M2 / a)) * at.u2 + at_A  # across bar 2 its own moment knows it best
+    else:
+        k = 1.0 / (c * sine)
+        F43 = (M3 * k / b) * at.diagonal - ((M3 + M4) * k) * at.u3
+        F32 = R3 + F43 + at_A
+        short = d < a
+        if np.any(short):  # all bars turn as one, and the sum loses the small component across bar 2
+            F32 = F32 + short * (moment_of_F32 / a - cross(at.u2, F32)) * 1j * at.u2
+    return PinForces(-(R2 + F32), F32, F43, F43 - R4)

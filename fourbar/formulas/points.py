@@ -1,0 +1,133 @@
+"""Points of the bars: kinematic coefficients, instant centres, coupler curves.
+
+A coefficient is a derivative by theta_2, so every motion law follows from it:
+    omega_k = h_k omega_2,              alpha_k = h_k alpha_2 + h_k' omega_2^2,
+    v_P = f omega_2,                    a_P = f alpha_2 + f' omega_2^2.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fourbar.formulas.circuits import circuits
+from fourbar.formulas.mobility import TURN, Array, change_points, on_smooth_path, turns_fully
+from fourbar.formulas.path import state
+from fourbar.formulas.pin_forces import cross
+from fourbar.formulas.position import Number
+from fourbar.linkage import FourBar
+
+
+class PointCoefficients(NamedTuple):
+    """First and second derivatives of a point's position by theta_2, complex, (n,)."""
+
+    first: Number
+    """m/rad."""
+    second: Number
+    """m/rad^2."""
+
+
+def point_coefficients(linkage: FourBar, theta_2: Array, branch: Number, bar: int, z: complex) -> PointCoefficients:
+    """d r_P/d theta_2 and d^2 r_P/d theta_2^2 of a point of bar 2, 3 or 4.
+
+    Parameters
+    ----------
+    theta_2 : (n,), rad.
+    branch : +1 or -1, or one of them for each position.
+    z : the point in the bar's frame at its first pin, along + i across, m.
+
+    Source: B. Paul, Kinematics and Dynamics of Planar Machinery (1979).
+    """
+    moving = state(linkage, theta_2, branch)
+    return PointCoefficients(moving.velocity(bar, z), moving.acceleration(bar, z))
+
+
+class Centre(NamedTuple):
+    """Instant centre in homogeneous coordinates: the point (x, y)/w; at infinity in direction (x, y) where w = 0."""
+
+    x: Array
+    y: Array
+    w: Array
+
+    @property
+    def point(self) -> tuple[Array, Array]:
+        """(x/w, y/w), m; inf or NaN where the centre is at infinity or undetermined."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return self.x / self.w, self.y / self.w
+
+
+def instant_centres(linkage: FourBar, theta_2: Array, branch: Number) -> dict[tuple[int, int], Centre]:
+    """The six instant centres I_ij, keyed by (i, j) with i < j.
+
+    I12, I23, I34, I14 are the pins; I13 = line O2 A with line B O4, I24 = line A B with line O2 O4
+    (Aronhold-Kennedy). Where two such lines coincide the centre is undetermined: x = y = w = 0.
+
+    Parameters
+    ----------
+    theta_2 : (n,), rad.
+    branch : +1 or -1, or one of them for each position.
+
+    Source: R. L. Norton, Design of Machinery, ch. 6.
+    """
+    here = state(linkage, theta_2, branch)
+    at, one = here.at, np.ones_like(theta_2)
+    O4, A, B = linkage.ground * at.u1 + 0.0 * at.u2, here.foot(3), here.point(4, linkage.output.length)
+    centres = {
+        bars: Centre(p.real, p.imag, one) for bars, p in {(1, 2): 0.0 * A, (2, 3): A, (3, 4): B, (1, 4): O4}.items()
+    }
+    I13, I24 = cross(O4, at.u4) * at.u2, cross(A, at.u3) * at.u1
+    centres[1, 3] = Centre(I13.real, I13.imag, cross(at.u2, at.u4))
+    centres[2, 4] = Centre(I24.real, I24.imag, cross(at.u1, at.u3))
+    return centres
+
+
+class CouplerCurve(NamedTuple):
+    """A closed curve that a point of the coupler draws; the last position repeats the first; each (n,)."""
+
+    theta_2: Array
+    """rad; not wrapped."""
+    branch: NDArray[np.int8]
+    x: Array
+    """m."""
+    y: Array
+
+
+def coupler_curve(
+    linkage: FourBar, r_along: float, r_across: float, circuit: int = 0, *, branch: int = 1, steps: int = 360
+) -> CouplerCurve:
+    """The closed coupler curve of one circuit, run smoothly through limits and change points.
+
+    Where the input turns fully theta_2 is spaced evenly, over two turns if one turn ends on the
+    other branch; else it goes from limit to limit on one branch and back on the other, spaced by
+    the cosine, so that the curve's points do not thin out at the limits.
+
+    Parameters
+    ----------
+    r_along, r_across : the point in the coupler's frame at A, m.
+    circuit : index into `circuits`; ValueError where there is none of that number.
+    branch : where to start, for a linkage with change points.
+    steps : number of intervals, a multiple of 4 (ValueError otherwise): limits and change points,
+        at which directions are undetermined or lose digits, then fall between positions.
+    """
+    found = circuits(linkage)
+    if not 0 <= circuit < len(found):
+        raise ValueError(f"circuit = {circuit!r}: must be from 0 to {len(found) - 1}")
+    if steps < 4 or steps % 4:
+        raise ValueError(f"steps = {steps!r}: must be a positive multiple of 4")
+    (start, stop), branches = found[circuit]
+    branch = branch if branch in branches else branches[0]
+    half = np.arange(0.5, steps, dtype=np.float64)
+    turns = 0
+    if turns_fully(linkage):
+        turns = 2 if len(change_points(linkage)) == 1 else 1
+        # odd halves of a multiple of 4 never meet theta_1 or theta_1 + pi
+        theta_2: Array = start + half * (turns * TURN / steps)
+        signs = on_smooth_path(linkage, theta_2, branch)
+    else:
+        out = 0.5 * (start + stop) - 0.5 * (stop - start) * np.cos(half[: steps // 2] * (TURN / steps))
+        there = on_smooth_path(linkage, out, branch)
+        theta_2, signs = np.concatenate((out, out[::-1])), np.concatenate((there, -there[::-1]))
+    curve = state(linkage, theta_2, signs).point(3, complex(r_along, r_across))
+    x, y = curve.real, curve.imag
+    theta_2 = np.append(theta_2, theta_2[0] + turns * TURN)
+    return CouplerCurve(theta_2, np.append(signs, signs[0]), np.append(x, x[0]), np.append(y, y[0]))

@@ -1,0 +1,182 @@
+"""Position: the directions of the bars on a branch, from the triangle A, B, O4.
+
+    a e^{i theta_2} + b e^{i theta_3} = d e^{i theta_1} + c e^{i theta_4}
+
+With h = (theta_2 - theta_1)/2 and e the diagonal from A to O4, the loop closes where both factors of
+Heron's formula are >= 0; their product is the square of four times the area of the triangle:
+    outer = (b + c)^2 - e^2 = E1 + 4 a d cos^2 h,   E1 = (b + c - a - d)(a + b + c + d),
+    inner = e^2 - (b - c)^2 = E2 + 4 a d sin^2 h,   E2 = (d - a - b + c)(d - a + b - c).
+outer = 0 is bars 3, 4 stretched, inner = 0 is bars 3, 4 folded. At a change point E1 or E2 is zero
+exactly and nothing cancels beside it; nothing passes through zero at theta = 180 deg.
+
+Source: R. L. Norton, Design of Machinery, ch. 4 (the loop and its two branches).
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+Number = Any
+"""A float, or an array that broadcasts with the others over positions and linkages."""
+HAIR = 1e-100
+"""Added to the size of tan h, where zero alone feels it: with A on O4 bars 3, 4 get the directions to which they tend
+from theta_2 > theta_1, and so near to it that e^2 leaves the range of doubles those of their own side."""
+
+
+class Loop(NamedTuple):
+    """The lengths (m) of ground, input, coupler and output, and what they decide together (m^2)."""
+
+    d: Number
+    a: Number
+    b: Number
+    c: Number
+    E1: Number
+    E2: Number
+
+
+class HalfAngle(NamedTuple):
+    """The five numbers of a position that may be given in more digits than a double computes."""
+
+    ss: Number
+    """sin^2 h."""
+    kk: Number
+    """cos^2 h."""
+    sk: Number
+    """sin h cos h."""
+    outer: Number
+    """m^2."""
+    inner: Number
+    """m^2."""
+
+
+class Position(NamedTuple):
+    """Directions of the bars as complex numbers, and the triangle A, B, O4."""
+
+    u1: Number
+    """e^{i theta_1}, from O2 to O4."""
+    u2: Number
+    """From O2 to A."""
+    u3: Number
+    """From A to B."""
+    u4: Number
+    """From O4 to B."""
+    sin_mu: Number
+    """sin(theta_4 - theta_3), signed like the branch."""
+    diagonal: Number
+    """From A to O4, complex, m."""
+    e2: Number
+    """Its square e^2, m^2."""
+    root: Number
+    """sigma sqrt(outer inner), m^2; NaN where the loop does not close."""
+    half: HalfAngle
+
+
+def two_sum(x: Number, y: Number) -> tuple[Number, Number]:
+    """x + y = s + r exactly, s the rounded sum.
+
+    Source: D. E. Knuth, The Art of Computer Programming, vol. 2, 4.2.2, theorem B.
+    """
+    s = x + y
+    z = s - x
+    return s, (x - (s - z)) + (y - z)
+
+
+def exact_difference(p: Number, q: Number, r: Number, s: Number) -> Number:
+    """(p + q) - (r + s), zero only where it is zero."""
+    one, lost_1 = two_sum(p, q)
+    other, lost_2 = two_sum(r, s)
+    gap, lost = two_sum(one, -other)
+    both, rest = two_sum(lost_1, -lost_2)
+    return (gap + (lost + both)) + rest
+
+
+def loop(d: Number, a: Number, b: Number, c: Number) -> Loop:
+    """The lengths with E1 = (b + c - a - d)(a + b + c + d) and E2 = (d - a - b + c)(d - a + b - c).
+
+    >>> loop(0.3, 0.1, 0.3, 0.1).E1  # a parallelogram, whose bars come to lie in one line
+    0.0
+    """
+    E1 = exact_difference(b, c, a, d) * (a + b + c + d)
+    E2 = exact_difference(d, c, a, b) * exact_difference(d, b, a, c)
+    return Loop(d, a, b, c, E1, E2)
+
+
+def direction(theta: Number) -> Number:
+    """e^{i theta} from one tangent: ((1 - t^2) + 2 i t)/(1 + t^2), t = tan(theta/2)."""
+    t = np.tan(0.5 * theta)
+    kk = 1.0 / (1.0 + t * t)
+    return (1.0 - t * t) * kk + 1j * (2.0 * t * kk)
+
+
+def polar(r: Number, phi: Number) -> Number:
+    """r e^{i phi} with the cosine and the sine of the library, exact where phi = 0."""
+    return r * np.cos(phi) + 1j * (r * np.sin(phi))
+
+
+def half_angle(lengths: Loop, psi: Number) -> HalfAngle:
+    """The half angle h of psi = theta_2 - theta_1 (rad) by its tangent, and the factors of Heron's formula."""
+    t = np.tan(0.5 * psi)
+    meets = np.equal(lengths.E2, 0.0)
+    if np.any(meets):
+        t = np.where(meets, t + np.copysign(HAIR, t), t)
+    kk = 1.0 / (1.0 + t * t)
+    sk = t * kk
+    ss = t * sk
+    four_ad, four_bc = 4.0 * lengths.a * lengths.d, 4.0 * lengths.b * lengths.c
+    outer, inner = lengths.E1 + four_ad * kk, lengths.E2 + four_ad * ss
+    short = four_ad > four_bc
+    if np.any(short):  # outer + inner = 4 b c: of the two, the one that changes less over psi has the digits
+        outer, inner = (
+            np.where(short & (ss < kk), four_bc - inner, outer),
+            np.where(short & (kk <= ss), four_bc - outer, inner),
+        )
+    return HalfAngle(ss, kk, sk, outer, inner)
+
+
+def close_loop(lengths: Loop, u1: Number, u2: Number, half: HalfAngle, branch: Number) -> Position:
+    """The directions of coupler and output:
+
+        u3 = (O4 - A) ((e^2 + b^2 - c^2) + i root)/(2 b e^2),   e^2 = (d - a)^2 + 4 a d sin^2 h,
+        u4 = (O4 - A) ((b^2 - e^2 - c^2) + i root)/(2 c e^2),   sin(theta_4 - theta_3) = root/(2 b c).
+
+    Parameters
+    ----------
+    lengths : of the loop, m.
+    u1, u2 : e^{i theta_1} and e^{i theta_2}.
+    half : of theta_2 - theta_1.
+    branch : +1 (B lies left of the diagonal from A to O4) or -1.
+
+    >>> lengths, theta_2 = loop(100, 40, 120, 80), np.radians(40)  # mm; Norton, example 4-1
+    >>> at = close_loop(lengths, 1.0, direction(theta_2), half_angle(lengths, theta_2), 1)
+    >>> [f"{np.angle(u, deg=True):.3f}" for u in (at.u3, at.u4)]
+    ['20.298', '57.325']
+    """
+    d, a, b, c, _, _ = lengths
+    e2 = (d - a) * (d - a) + 4.0 * a * d * half.ss
+    # e^2 + b^2 - c^2 and e^2 - b^2 + c^2 from the factor that the root is made of, so that u3, u4 keep their length
+    at_A, at_O4 = half.inner + 2.0 * b * (b - c), half.inner - 2.0 * c * (b - c)
+    root = branch * np.sqrt(half.outer * half.inner)
+    diagonal = (((d - a) * half.kk + (d + a) * half.ss) - 1j * (2.0 * a * half.sk)) * u1
+    to_3, to_4 = 0.5 / (b * e2), 0.5 / (c * e2)
+    u3 = diagonal * (at_A * to_3 + 1j * (root * to_3))
+    u4 = diagonal * (1j * (root * to_4) - at_O4 * to_4)
+    return Position(u1, u2, u3, u4, root / (2.0 * b * c), diagonal, e2, root, half)
+
+
+def parallel_pairs(lengths: Loop, half: HalfAngle, branch: Number) -> tuple[Number, Number]:
+    """Where two pairs of bars stay parallel: E1 = E2 = 0, and the root is 4 a d sin h cos h or its opposite.
+
+    First: the coupler keeps the ground's direction and bars 2, 4 turn together (a = c, b = d).
+    Second: B stays on O2, bars 2, 3 turn together and bar 4 rests (a = b, c = d).
+    """
+    d, a, b, c, _, _ = lengths
+    side = branch * np.sign(half.sk)
+    return (a == c) & (b == d) & (side > 0), (a == b) & (c == d) & (side < 0)
+
+
+def with_parallel_pairs(at: Position, first: Number, second: Number) -> Position:
+    """The position with the exact directions u3 = u1, u4 = u2 where `first`, u3 = -u2, u4 = -u1 where `second`."""
+    u3 = np.where(first, at.u1, np.where(second, -at.u2, at.u3))
+    u4 = np.where(first, at.u2, np.where(second, -at.u1, at.u4))
+    sine = np.where(first | second, np.sign(at.root) * 2.0 * np.abs(at.half.sk), at.sin_mu)
+    return at._replace(u3=u3, u4=u4, sin_mu=sine)

@@ -1,0 +1,140 @@
+"""How well a position transmits: transmission angle, speed ratio, mechanical advantage, nearest singular position."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from fourbar.formulas.mobility import TURN, Array, Reach, change_points, limit_positions, reach_of
+from fourbar.formulas.motion import State
+from fourbar.formulas.pin_forces import cross, dot
+from fourbar.formulas.position import Loop, Number, Position
+from fourbar.linkage import FourBar
+
+
+def transmission_angle(state: State) -> Array:
+    """mu = the acute angle between coupler and output, rad, in [0, pi/2], (n,); NaN where not assembled.
+
+    tan mu = |sin(theta_4 - theta_3)| / |cos(theta_4 - theta_3)|, so mu keeps eps-accuracy near 0 and
+    pi/2 as far as the position itself does: |error| about eps/|sin mu|.
+
+    Source: R. L. Norton, Design of Machinery.
+    """
+    return np.asarray(np.arctan2(np.abs(state.at.sin_mu), np.abs(dot(state.at.u3, state.at.u4))))
+
+
+class TransmissionExtremes(NamedTuple):
+    """The angle A-B-O4 between coupler and output at its extremes over all the positions that assemble."""
+
+    least: float
+    """rad, in [0, pi]; 0 where bars 3, 4 fold."""
+    greatest: float
+    """rad, in [0, pi]; pi where bars 3, 4 are stretched."""
+    theta_2_least: float
+    """rad, in [theta_1, theta_1 + pi]; where the input has limits the mirror position has the same angle."""
+    theta_2_greatest: float
+    """rad; likewise."""
+
+    @property
+    def worst(self) -> float:
+        """The smallest transmission angle, taken as acute, rad."""
+        return min(self.least, math.pi - self.greatest)
+
+
+def transmission_extremes(linkage: FourBar) -> TransmissionExtremes:
+    """Extremes of the angle at B: bars 1, 2 collinear, or a limit of the input; the same on both branches.
+
+    tan^2(mu/2) = (e + b - c)(e - b + c)/((b + c - e)(b + c + e)) at e = |d - a| and e = d + a.
+    """
+    reach, theta_1 = reach_of(linkage), linkage.ground_angle
+    sign = 1 if reach.d >= reach.own else -1
+    least, at_least = _angle_at_B(reach, sign, -sign), theta_1
+    greatest, at_greatest = _angle_at_B(reach, 1, 1), theta_1 + math.pi
+    if reach.beyond_folded > 0.0:
+        least, at_least = 0.0, theta_1 + reach.triangle(False)[0]
+    if reach.beyond_stretched > 0.0:
+        greatest, at_greatest = math.pi, theta_1 + reach.triangle(True)[0]
+    return TransmissionExtremes(least, greatest, at_least, at_greatest)
+
+
+def _angle_at_B(reach: Reach, d: int, own: int) -> float:
+    """The angle between the sides b, c of the triangle b, c, e with e = d (ground) + own (input), signed."""
+    opposite = max(reach.sum(d, own, 1, -1), 0.0) ** 0.5 * max(reach.sum(d, own, -1, 1), 0.0) ** 0.5
+    return 2.0 * math.atan2(opposite, max(reach.sum(-d, -own, 1, 1), 0.0) ** 0.5 * reach.sum(d, own, 1, 1) ** 0.5)
+
+
+def drive_sine(at: Position, drive_bar: int) -> Number:
+    """sin(theta_4 - theta_3), sin(theta_4 - theta_2), sin(theta_3 - theta_2) for the drive on bar 2, 3, 4."""
+    if drive_bar == 2:
+        return at.sin_mu
+    return cross(at.u2, at.u4 if drive_bar == 3 else at.u3)
+
+
+def drive_sine_of_triangle(lengths: Loop, at: Position, drive_bar: int) -> Number:
+    """The same from the triangle A, B, O4, where a short ground leaves few digits to directions that differ little:
+
+        sin(theta_4 - theta_2) = ((d cos psi - a) root + d sin psi (e^2 - b^2 + c^2))/(2 c e^2),
+        sin(theta_3 - theta_2) = ((d cos psi - a) root - d sin psi (e^2 + b^2 - c^2))/(2 b e^2).
+
+    Parameters
+    ----------
+    lengths : of the loop that the position was closed with.
+    """
+    if drive_bar == 2:
+        return at.sin_mu
+    d, a, b, c, _, _ = lengths
+    ss, kk, sk, _, inner = at.half
+    along = (d * (kk - ss) - a) * at.root
+    if drive_bar == 3:
+        return (along + 2.0 * d * sk * (inner - 2.0 * c * (b - c))) / (2.0 * c * at.e2)
+    return (along - 2.0 * d * sk * (inner + 2.0 * b * (b - c))) / (2.0 * b * at.e2)
+
+
+def speed_ratio(state: State) -> Array:
+    """omega_4/omega_2 = a sin(theta_2 - theta_3)/(c sin(theta_4 - theta_3)), (n,); NaN at a singular position."""
+    return np.asarray(state.k.h4)
+
+
+def mechanical_advantage(state: State, radius_in: float = 1.0, radius_out: float = 1.0) -> Array:
+    """F_out/F_in = (omega_2/omega_4)(r_in/r_out) of a linkage without losses, (n,).
+
+    The signed ratio of torques where the radii are equal; +-inf where the output stands still (bars
+    2, 3 collinear), NaN at a singular position.
+
+    Parameters
+    ----------
+    radius_in, radius_out : distances of the forces from O2 and O4, m.
+
+    Source: R. L. Norton, Design of Machinery.
+    """
+    with np.errstate(divide="ignore"):
+        return np.divide(radius_in / radius_out, speed_ratio(state))
+
+
+def distance_to_singular(
+    linkage: FourBar, theta_2: Array, drive_bar: int = 2, branch: int | Array | None = None
+) -> Array:
+    """Angle of the input to the nearest singular position, rad, in [0, pi], (n,); inf where there is none.
+
+    Singular are the limits of theta_2 and the change points (speeds are 0/0), and for a drive on bar 3
+    or 4 its dead centres, where no torque on it holds the linkage. Error at most about
+    eps (|theta_2| + |theta_1| + 2 pi). Not counted is the kite whose input and coupler coincide: there
+    a drive on bar 4 is dead at every position of that motion.
+
+    Parameters
+    ----------
+    theta_2 : (n,), rad.
+    drive_bar : 2, 3 or 4.
+    branch : +1 or -1, or one of them for each position; left out: dead centres of both branches count.
+    """
+    theta_2 = np.asarray(theta_2, dtype=float)
+    points = [(limit.theta_2, 0) for limit in limit_positions(linkage)]
+    points += [(point, 0) for point in change_points(linkage)]
+    if drive_bar != 2:
+        points += [(limit.theta_2, limit.branch) for limit in limit_positions(linkage, drive_bar)]
+    nearest = np.full(theta_2.shape, np.inf)
+    for point, side in points:
+        distance = np.abs((theta_2 - point) - TURN * np.rint((theta_2 - point) / TURN))
+        counts = True if branch is None or side == 0 else np.asarray(branch) == side
+        nearest = np.where(counts, np.minimum(nearest, distance), nearest)
+    return nearest

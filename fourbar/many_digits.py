@@ -1,0 +1,71 @@
+"""The half angle in many digits, for the few positions at which doubles cannot decide whether the loop closes."""
+
+from typing import Any
+
+import numpy as np
+
+from fourbar.formulas.position import HalfAngle
+from fourbar.linkage import FourBar
+
+DIGITS = 120
+"""The angle of a limit position beside a change point keeps half of them."""
+RESIDUE = 1e-55
+"""Relative: what so many digits leave of a factor that is zero at the limit position itself."""
+TOUCHING = 2.0**-53
+"""Bars that miss each other by up to this times the sum of the lengths count as touching: each length
+was itself rounded by up to that, so the linkage meant closes there as well as not."""
+
+
+def half_angle(linkage: FourBar, theta_2: float, offset: Any = None, unit: float = 1.0) -> HalfAngle:
+    """The five numbers of `formulas.position.half_angle`, each rounded once.
+
+    Parameters
+    ----------
+    theta_2 : rad.
+    offset : what theta_2 as a double leaves out of the angle meant (rad, mpmath), where that is known. A position
+        beyond the limit then does not assemble, however near.
+    unit : of the lengths, m.
+    """
+    from mpmath import mp, mpf
+
+    with mp.workdps(DIGITS):
+        d, a, b, c = (mpf(length) / unit for length in linkage.lengths)
+        h = (mpf(theta_2) - mpf(linkage.ground_angle) + (0 if offset is None else offset)) / 2
+        s, k = mp.sin(h), mp.cos(h)
+        e2 = (d - a) ** 2 + 4 * a * d * s * s
+        whole = 2 * (a + b + c + d) * mp.sqrt(e2)
+        least, most = (-TOUCHING * whole, 0) if offset is None else (-RESIDUE * whole, RESIDUE * whole)
+        factors = ((b + c) ** 2 - e2, e2 - (b - c) ** 2)
+        outer, inner = (0.0 if least <= factor <= most else float(factor) for factor in factors)
+        return HalfAngle(float(s * s), float(k * k), float(s * k), outer, inner)
+
+
+def decided(linkage: FourBar, unit: float, half: HalfAngle, index: Any, theta_2: Any, offset: Any = None) -> HalfAngle:
+    """The half angles with those of some positions (an index) replaced."""
+    exact = [half_angle(linkage, float(theta_2[i]), offset, unit) for i in index]
+    numbers = [np.array(np.broadcast_to(number, np.shape(theta_2))) for number in half]
+    for number, values in zip(numbers, zip(*exact, strict=True), strict=True):
+        number[index] = values
+    return HalfAngle(*numbers)
+
+
+def limit_remainder(linkage: FourBar, limit: float, theta_2: float, offset: float) -> Any:
+    """(limit position + offset) - theta_2 in many digits, for the limit position whose double is `limit`.
+
+    Where bars 3, 4 are collinear cos(theta_2 - theta_1) = (a^2 + d^2 - (b +- c)^2)/(2 a d).
+    """
+    from mpmath import mp, mpf
+
+    with mp.workdps(DIGITS):
+        d, a, b, c = map(mpf, linkage.lengths)
+        theta_1 = mpf(linkage.ground_angle)
+        exact = []
+        for side in (b + c, b - c):
+            cosine = (a * a + d * d - side * side) / (2 * a * d)
+            psi = mp.acos(min(max(cosine, mpf(-1)), mpf(1)))
+            exact += [theta_1 + sign * psi for sign in (1, -1)]
+        turn = 2 * mp.pi
+        nearest = min(
+            (angle + turn * mp.nint((limit - angle) / turn) for angle in exact), key=lambda angle: abs(angle - limit)
+        )
+        return nearest + mpf(offset) - mpf(theta_2)

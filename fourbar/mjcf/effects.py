@@ -1,0 +1,153 @@
+"""Each load and each effect in MJCF: what it adds to the model and asks of the drive, one row of a table each."""
+
+import math
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from fourbar.errors import LimitError
+from fourbar.linkage import MOVING_BARS, FourBar
+from fourbar.mjcf.model import Model
+from fourbar.scene import Scene
+
+if TYPE_CHECKING:
+    from fourbar.effects import Effect, Flywheel, Friction, Gravity, Load, Springs, Torsion, Viscous
+
+Joints = tuple[float, float, float]
+
+
+def _gravity(effect: "Gravity", model: Model) -> None:
+    """The option ``gravity``."""
+    model.option["gravity"] = (*effect.vector, 0.0)
+
+
+def _weights(effect: "Gravity", linkage: FourBar, speed: float) -> float:
+    """Sum of m g L, with L the longest arm at which a weight acts."""
+    longest, total = max(linkage.lengths), 0.0
+    for number in MOVING_BARS:
+        bar = linkage.bar(number)
+        total += bar.mass * max(longest, abs(bar.mass_centre[0]))
+    return total * abs(effect.magnitude)
+
+
+def _viscous(effect: "Viscous", model: Model) -> None:
+    """The attribute ``damping`` of the hinge (of a tendon at the cut pin B)."""
+    for pin, k in effect.coefficients:
+        model.pin[pin]["damping"] = k
+
+
+def _damping_couples(effect: "Viscous", linkage: FourBar, speed: float) -> float:
+    return sum((k for _, k in effect.coefficients), 0.0) * speed
+
+
+def _friction(effect: "Friction", model: Model) -> None:
+    """The attribute ``frictionloss`` of the hinge (of a tendon at the cut pin B)."""
+    for pin, f in effect.torques:
+        model.add_dry_friction(pin, f)
+
+
+def _friction_couples(effect: "Friction", linkage: FourBar, speed: float) -> float:
+    return sum((f for _, f in effect.torques), 0.0)
+
+
+def _torsion(effect: "Torsion", model: Model) -> None:
+    """``stiffness`` of the hinge (of a tendon at the cut pin B), its rest shifted by the preload."""
+    for pin, k, rest, preload in effect.springs:
+        turned = model.linkage.ground_angle if pin in ("O2", "O4") else 0.0
+        model.pin[pin]["stiffness"] = k
+        # a tendon's rest is a length
+        model.pin[pin]["springlength" if pin == "B" else "springref"] = rest + turned - preload / k
+
+
+def _torsion_couples(effect: "Torsion", linkage: FourBar, speed: float) -> float:
+    return effect.greatest_couple
+
+
+def _unwind_torsion(effect: "Torsion", linkage: FourBar, q: Joints) -> Joints:
+    """Each sprung pin within half a turn of its rest; LimitError where the turns of A, B and O4 contradict."""
+    rests = {pin: rest for pin, _, rest, _ in effect.springs}
+
+    def turns(pin: str, angle: float, line: float) -> float:
+        return 0.0 if pin not in rests else math.tau * round((rests[pin] + line - angle) / math.tau)
+
+    theta_1 = linkage.ground_angle
+    q2, q3, q4 = q[0] + turns("O2", q[0], theta_1), q[1] + turns("A", q[1], 0.0), q[2] + turns("O4", q[2], theta_1)
+    at_B = turns("B", q4 - q2 - q3, 0.0)
+    if at_B and "O4" not in rests:
+        q4 += at_B
+    elif at_B and "A" not in rests:
+        q3 -= at_B
+    elif at_B:
+        raise LimitError("the springs at A, B and O4 count turns that MuJoCo's joints cannot have at once")
+    return q2, q3, q4
+
+
+def _springs(effect: "Springs", model: Model) -> None:
+    """A spatial tendon between two sites, its rest length shortened by the preload."""
+    model.springs += effect.springs
+
+
+def _tensions(effect: "Springs", linkage: FourBar, speed: float) -> float:
+    """Greatest tensions times the longest bar."""
+    return sum(spring.greatest_tension(linkage) for spring in effect.springs) * max(linkage.lengths)
+
+
+def _flywheel(effect: "Flywheel", model: Model) -> None:
+    """Inertia of the body: MuJoCo's armature of pin O2 is what drives."""
+    model.inertia[effect.bar] += effect.inertia
+
+
+def _load(effect: "Load", model: Model) -> None:
+    """A constant actuator on a site (force) or on the bar (couple)."""
+    if effect.table is not None:
+        raise LimitError("a load that is a table over theta_2 has no counterpart in MJCF")
+    model.loads.append(effect)
+
+
+def _load_couples(effect: "Load", linkage: FourBar, speed: float) -> float:
+    """The load's size at the longest bar."""
+    return effect.greatest_force(linkage) * max(linkage.lengths)
+
+
+def _none(effect: Any, linkage: FourBar, speed: float) -> float:
+    return 0.0
+
+
+def _as_it_is(effect: Any, linkage: FourBar, q: Joints) -> Joints:
+    return q
+
+
+class Row(NamedTuple):
+    """One effect in MJCF."""
+
+    add: Callable[[Any, Model], None]
+    """Puts it into the model."""
+    couple: Callable[[Any, FourBar, float], float] = _none
+    """The couple that it may ask of the drive at a speed (rad/s), N m: lays out the flywheel."""
+    unwind: Callable[[Any, FourBar, Joints], Joints] = _as_it_is
+    """The angles of pins O2, A, O4, moved by the whole turns that the effect tells apart, rad."""
+
+
+MJCF_OF: dict[str, Row] = {
+    "gravity": Row(_gravity, _weights),
+    "viscous": Row(_viscous, _damping_couples),
+    "friction": Row(_friction, _friction_couples),
+    "torsion": Row(_torsion, _torsion_couples, _unwind_torsion),
+    "springs": Row(_springs, _tensions),
+    "flywheel": Row(_flywheel),
+    "load": Row(_load, _load_couples),
+}
+"""By the key of an effect; MJCF has no counterpart of what is not here (friction that depends on the pin forces)."""
+
+
+def row(effect: "Effect") -> Row:
+    """The row of an effect; LimitError where it has none."""
+    if effect.key not in MJCF_OF:
+        raise LimitError(f"the effect {effect.key!r} has no counterpart in MJCF")
+    return MJCF_OF[effect.key]
+
+
+def unwound(scene: Scene, q: Joints) -> Joints:
+    """The angles of pins O2, A, O4 as the scene's springs count them, rad."""
+    for effect in scene.effects:
+        q = row(effect).unwind(effect, scene.linkage, q)
+    return q

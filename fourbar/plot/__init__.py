@@ -1,9 +1,0 @@
-"""Drawings of a scene in publication quality: linkage, curves over theta_2, forces, free bodies.
-
-Needs matplotlib (``pip install "fourbar[plot]"``), which is loaded when something is drawn.
-"""
-
-from fourbar.plot.figures import BRANCHES as BRANCHES
-from fourbar.plot.figures import FIGURES as FIGURES
-from fourbar.plot.figures import FORMATS as FORMATS
-from fourbar.plot.figures import draw as draw

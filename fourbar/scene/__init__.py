@@ -1,0 +1,5 @@
+"""What is asked: linkage, motion, drive, loads and effects."""
+
+from fourbar.scene.scene import Command as Command
+from fourbar.scene.scene import Scene as Scene
+from fourbar.scene.scene import command as command

@@ -1,0 +1,110 @@
+"""The command to the input bar: angles, a sweep, a limit position, a law over time, or release."""
+
+import math
+import sys
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from fourbar.errors import InputError
+from fourbar.linkage import require
+from fourbar.solution import Array
+
+if TYPE_CHECKING:
+    from fourbar.scene.motion_law import Law
+
+OPEN, CROSSED = 1, -1
+BRANCH_NAMES = {OPEN: "open", CROSSED: "crossed"}
+FASTEST = math.sqrt(sys.float_info.max)
+"""rad/s. The square of any greater speed is beyond the range of a double, and with it every acceleration."""
+DEFAULT_STEPS = 360
+"""Of the default range, where a motion names no angle."""
+
+
+@dataclass(frozen=True, slots=True)
+class Sweep:
+    """theta_2 from `start` to `stop` (rad) in `steps` equal intervals, both ends included."""
+
+    start: float
+    stop: float
+    steps: int
+
+    def __post_init__(self) -> None:
+        require("motion.theta_2.from", self.start)
+        require("motion.theta_2.to", self.stop)
+        if not math.isfinite(self.stop - self.start):
+            raise InputError("motion.theta_2.to", self.stop, f"must be within the range of doubles from {self.start!r}")
+        if isinstance(self.steps, bool) or not isinstance(self.steps, int) or not 1 <= self.steps <= 100_000_000:
+            raise InputError("motion.theta_2.steps", self.steps, "must be a whole number from 1 to 100 000 000")
+
+
+@dataclass(frozen=True, slots=True)
+class FromLimit:
+    """theta_2 = limit position number `limit` of the input (1, 2, ... from theta_1 on) + `offset` (rad)."""
+
+    limit: int
+    offset: float = 0.0
+
+    def __post_init__(self) -> None:
+        require("motion.theta_2.offset", self.offset)
+        if isinstance(self.limit, bool) or not isinstance(self.limit, int) or self.limit < 1:
+            raise InputError("motion.theta_2.limit", self.limit, "must be a whole number, 1 or more")
+
+
+@dataclass(frozen=True, slots=True)
+class Free:
+    """Released motion: moved by loads and effects alone for `duration` (s), reported at `steps` equal intervals."""
+
+    duration: float
+    steps: int
+
+    def __post_init__(self) -> None:
+        require("motion.free.duration", self.duration, positive=True)
+        if isinstance(self.steps, bool) or not isinstance(self.steps, int) or not 1 <= self.steps <= 100_000_000:
+            raise InputError("motion.free.steps", self.steps, "must be a whole number from 1 to 100 000 000")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Motion:
+    """The command to the input bar.
+
+    Parameters
+    ----------
+    theta_2 : one angle, an array of them (n,), a Sweep, a FromLimit, or None (the default range), rad.
+    omega_2 : rad/s; None: only positions are asked for.
+    alpha_2 : rad/s^2.
+    branch : +1 open (B left of the diagonal A to O4), -1 crossed.
+    through : at a change point keep the "sign" of the branch, or "follow" the smooth path.
+    free : released motion instead of a prescribed one.
+    law : theta_2 over time instead of theta_2, omega_2 and alpha_2.
+    """
+
+    theta_2: float | Array | Sweep | FromLimit | None = None
+    omega_2: float | None = None
+    alpha_2: float = 0.0
+    branch: int = OPEN
+    through: str = "sign"
+    free: Free | None = None
+    law: "Law | None" = None
+
+    def __post_init__(self) -> None:
+        if self.theta_2 is not None and not isinstance(self.theta_2, (Sweep, FromLimit)):
+            angles = np.array(self.theta_2, dtype=float)
+            if not np.all(np.isfinite(angles)) or angles.ndim > 1 or angles.size == 0:
+                raise InputError("motion.theta_2", self.theta_2, "must be finite angles, shape () or (n,)")
+            angles.flags.writeable = False
+            object.__setattr__(self, "theta_2", float(angles) if angles.ndim == 0 else angles)
+        if self.omega_2 is not None:
+            object.__setattr__(self, "omega_2", require("motion.omega_2", self.omega_2))
+            if not math.isfinite(self.omega_2 * self.omega_2):
+                allowed = f"must be below {FASTEST:.4g} rad/s: every acceleration has its square"
+                raise InputError("motion.omega_2", self.omega_2, allowed)
+        object.__setattr__(self, "alpha_2", require("motion.alpha_2", self.alpha_2))
+        if self.branch not in (OPEN, CROSSED):
+            raise InputError("motion.branch", self.branch, "must be +1 (open) or -1 (crossed)")
+        given = (self.free, self.theta_2, self.omega_2, self.alpha_2 or None)
+        if self.law is not None and any(value is not None for value in given):
+            raise InputError("motion.law", self.law.ends, "stands alone: it gives theta_2, omega_2 and alpha_2")
+        if self.through not in ("sign", "follow"):
+            raise InputError("motion.through", self.through, 'must be "sign" or "follow"')

@@ -1,0 +1,89 @@
+"""A scene: linkage, motion, drive, loads and effects; `solve` evaluates only the stages asked for."""
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fourbar.errors import InputError
+from fourbar.formulas.mobility import default_range, limit_positions, on_smooth_path
+from fourbar.linkage import MOVING_BARS, FourBar
+from fourbar.scene.motion import DEFAULT_STEPS, FromLimit, Motion, Sweep
+from fourbar.solution import Array
+
+if TYPE_CHECKING:
+    from fourbar.effects import Effect, Load
+    from fourbar.files.pictures import Picture
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Scene:
+    """Everything that is asked of a linkage; `effects` and `loads` hold only what acts."""
+
+    linkage: FourBar
+    motion: Motion = field(default_factory=Motion)
+    drive_bar: int = 2
+    loads: "tuple[Load, ...]" = ()
+    effects: "tuple[Effect, ...]" = ()
+    title: str = ""
+    source: str = ""
+    pictures: "tuple[Picture, ...]" = ()
+
+    def __post_init__(self) -> None:
+        if self.drive_bar not in MOVING_BARS or isinstance(self.drive_bar, bool):
+            raise InputError("drive.bar", self.drive_bar, "must be 2, 3 or 4")
+        object.__setattr__(self, "loads", tuple(self.loads))
+        object.__setattr__(self, "effects", tuple(self.effects))
+        object.__setattr__(self, "pictures", tuple(self.pictures))
+        if len({picture.bar for picture in self.pictures}) < len(self.pictures):
+            raise InputError("pictures", [picture.bar for picture in self.pictures], "a bar has one picture")
+
+
+class Command(NamedTuple):
+    """What the input bar is told to do at each of n independent positions."""
+
+    theta_2: Array
+    """(n,), rad."""
+    branch: NDArray[np.int8]
+    """(n,), +1 or -1."""
+    omega_2: float | Array | None
+    """rad/s; None: positions only."""
+    alpha_2: float | Array
+    """rad/s^2."""
+    remainder: Any = None
+    """What theta_2 as a double leaves out of the one angle meant (mpmath), rad: a limit position plus its offset."""
+    time: Array | None = None
+    """(n,), s; where the motion is given over time."""
+
+
+def command(scene: Scene) -> Command:
+    """The positions that the scene's motion names, each with its branch."""
+    motion, linkage = scene.motion, scene.linkage
+    asked, remainder, time = motion.theta_2, None, None
+    omega_2: float | Array | None = motion.omega_2
+    alpha_2: float | Array = motion.alpha_2
+    if motion.law is not None:
+        time = motion.law.times()
+        theta_2, omega_2, alpha_2 = motion.law.at(time)
+    elif asked is None:
+        theta_2 = np.linspace(*default_range(linkage), DEFAULT_STEPS + 1)
+    elif isinstance(asked, Sweep):
+        theta_2 = np.linspace(asked.start, asked.stop, asked.steps + 1)
+    elif isinstance(asked, FromLimit):
+        limits = limit_positions(linkage)
+        if not limits:
+            raise InputError("motion.theta_2.limit", asked.limit, "the input of this linkage has no limit positions")
+        if asked.limit > len(limits):
+            raise InputError("motion.theta_2.limit", asked.limit, f"must be from 1 to {len(limits)}")
+        from fourbar.many_digits import limit_remainder
+
+        limit = limits[asked.limit - 1].theta_2
+        theta_2 = np.array([limit + asked.offset])
+        remainder = limit_remainder(linkage, limit, float(theta_2[0]), asked.offset)
+    else:
+        theta_2 = np.atleast_1d(np.asarray(asked, dtype=float))
+    branch = np.full(theta_2.shape, motion.branch, dtype=np.int8)
+    if motion.through == "follow":
+        branch = on_smooth_path(linkage, theta_2, motion.branch)
+    return Command(theta_2, branch, omega_2, alpha_2, remainder, time)

@@ -1,0 +1,277 @@
+"""A scene that moves: one self-contained web page, or a film (GIF, MP4).
+
+The page needs nothing but a browser: no network, no library. Its numbers are those of
+`fourbar.solve`, embedded for both branches (of a motion through time: for its own); the position
+formula runs in the page as well, so that the picture follows when a length is changed.
+"""
+
+import base64
+import hashlib
+import html
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from importlib.resources import files
+from pathlib import Path
+from string import Template
+from typing import Any
+
+import numpy as np
+
+from fourbar.errors import InputError, NotAssembledError
+from fourbar.files.pictures import data_uri
+from fourbar.linkage import BAR_NAMES, MOVING_BARS
+from fourbar.quantities import OK, PIN_FORCES
+from fourbar.scene import Command, Scene, command
+from fourbar.show.plot.energy import energies
+from fourbar.show.plot.style import length_unit, plain
+from fourbar.show.plot.view import on_branch, over_time, sweep_command
+from fourbar.solution import Array, Solution
+from fourbar.solve import solve
+from fourbar.writing import write_text
+
+FORMATS = ("html", "gif", "mp4")
+MAX_ROWS = 1441
+"""Positions embedded in a page: a quarter of a degree over a full turn; a finer sweep is thinned out evenly."""
+WATCHED = (1.5, 60.0)
+"""A motion through time that lasts between these, s, is shown in real time."""
+SCALARS = (
+    "theta_3",
+    "theta_4",
+    "condition",
+    "omega_2",
+    "omega_3",
+    "omega_4",
+    "alpha_2",
+    "alpha_3",
+    "alpha_4",
+    "torque",
+)
+SCRIPTS = ("linkage.js", "numbers.js", "picture.js", "chart.js", "page.js")
+
+
+def write(
+    scene: Scene,
+    path: str | Path,
+    *,
+    pictures: Mapping[str, str | Path] | None = None,
+    file_format: str | None = None,
+    seconds: float | None = None,
+) -> None:
+    """Write a moving scene to a file, whole or not at all.
+
+    Parameters
+    ----------
+    path : the file; its ending says which of html, gif and mp4 is meant.
+    pictures : for bars "input", "coupler", "output", in place of the scene's own: a PNG or JPEG file
+        that is laid along the bar, its left edge at the bar's first pin (O2, A, O4) and its right
+        edge at the second. Pages only.
+    file_format : html, gif or mp4 where the path's ending does not say it.
+    seconds : duration of a film; left out: 6 s for a sweep, of a motion through time its own.
+
+    Raises
+    ------
+    InputError : unknown format; a picture that cannot be read, is too large or no PNG or JPEG.
+    NotAssembledError : the linkage assembles at none of the scene's positions.
+    DependencyError : a film without matplotlib, or MP4 without ffmpeg.
+    """
+    target = Path(path)
+    kind = (file_format or target.suffix.removeprefix(".")).lower()
+    if kind not in FORMATS:
+        raise InputError("output", str(path), "must end in one of " + ", ".join(f".{end}" for end in FORMATS))
+    if kind == "html":
+        write_text(target, page(scene, pictures or {}))
+        return
+    if pictures:
+        raise InputError("picture", sorted(pictures), "pictures are shown in an .html page only")
+    from fourbar.show.plot.film import write_film
+
+    write_film(scene, target, kind, seconds)
+
+
+def page(scene: Scene, pictures: Mapping[str, str | Path] | None = None) -> str:
+    """The page as text."""
+    from fourbar import __version__
+
+    assets = files("fourbar.show").joinpath("page")
+    style = assets.joinpath("page.css").read_text(encoding="utf-8")
+    script = "".join(assets.joinpath(name).read_text(encoding="utf-8") for name in SCRIPTS)
+    return Template(assets.joinpath("page.html").read_text(encoding="utf-8")).substitute(
+        title=html.escape(plain(scene.title, 200) or "Four-bar linkage"),
+        source=html.escape(plain(scene.source, 400)),
+        version=__version__,
+        style=style,
+        style_hash=_content_hash(style),
+        script=script,
+        script_hash=_content_hash(script),
+        data=embedded(page_data(scene, pictures or {})),
+    )
+
+
+def _content_hash(text: str) -> str:
+    """The name by which the page's own security policy allows an inline script or style."""
+    return "sha256-" + base64.b64encode(hashlib.sha256(text.encode("utf-8")).digest()).decode("ascii")
+
+
+def embedded(value: object) -> str:
+    """JSON that can stand inside a script element, whatever strings it holds."""
+    text = json.dumps(value, ensure_ascii=True, allow_nan=False, separators=(",", ":"))
+    return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
+
+
+def page_data(scene: Scene, pictures: Mapping[str, str | Path]) -> dict[str, Any]:
+    """Everything the page's script needs: SI units, radians, null where there is no value."""
+    linkage, motion = scene.linkage, scene.motion
+    shown = _through_time(scene) if over_time(scene) else _sweep(scene)
+    closes = [theta_3 is not None for theta_3 in shown["branches"][str(motion.branch)]["theta_3"]]
+    if not any(closes):
+        raise NotAssembledError("nothing to show: the linkage assembles at none of the scene's positions")
+    shown["start"] = closes.index(True) if shown["start"] is None else shown["start"]
+    factor, unit = length_unit(max(linkage.lengths))
+    return {
+        "lengths": list(linkage.lengths),
+        "theta_1": linkage.ground_angle,
+        "unit": {"factor": factor, "name": unit},
+        "centres": {
+            str(number): [(z := linkage.bar(number).to_centre).real, z.imag] if linkage.bar(number).mass > 0.0 else None
+            for number in MOVING_BARS
+        },
+        "drive_bar": scene.drive_bar,
+        "branch": motion.branch,
+        "followed": motion.through == "follow",
+        "pictures": {str(number): picture for number, picture in _pictures(scene, pictures).items()},
+        **shown,
+    }
+
+
+def _sweep(scene: Scene) -> dict[str, Any]:
+    """Both branches over theta_2."""
+    motion = scene.motion
+    asked = sweep_command(scene)
+    where = thinned(asked)
+    own, start = command(scene).theta_2, None
+    if len(own) == 1:
+        start = int(np.argmin(np.abs(np.angle(np.exp(1j * (where.theta_2 - own[0]))))))
+    return {
+        "omega_2": motion.omega_2,
+        "alpha_2": motion.alpha_2,
+        "theta_2": where.theta_2.tolist(),
+        "time": None,
+        "rate": None,
+        "start": start,
+        "branches": {str(sign): _columns(on_branch(scene, sign), where.theta_2) for sign in (1, -1)},
+        "pace": _pace(motion.omega_2, where.theta_2, len(asked.theta_2)),
+    }
+
+
+def _through_time(scene: Scene) -> dict[str, Any]:
+    """The one motion that the scene makes: released, or by a law."""
+    asked = solve(scene)
+    assert asked.time is not None and asked.omega_2 is not None and asked.alpha_2 is not None
+    where = thinned(Command(asked.theta_2, asked.branch, asked.omega_2, asked.alpha_2, time=asked.time))
+    assert where.time is not None
+    solution = solve(scene, at=where)
+    solution.time = where.time
+    columns = _solved(solution)
+    columns["theta_2"] = where.theta_2.tolist()
+    if scene.motion.free is not None:
+        del columns["torque"]
+        columns["energy"] = [_or_null(value) for value in energies(scene, solution).kinetic.tolist()]
+    duration = float(where.time[-1] - where.time[0])
+    rate = _rate(duration)
+    return {
+        "omega_2": None,
+        "alpha_2": 0.0,
+        "theta_2": where.theta_2.tolist(),
+        "time": where.time.tolist(),
+        "rate": rate,
+        "start": None,
+        "branches": {str(scene.motion.branch): columns},
+        "pace": _pace_in_time(scene, asked, rate, len(where.time)),
+    }
+
+
+def thinned(where: Command) -> Command:
+    """At most `MAX_ROWS` of the positions, evenly, both ends included."""
+    n = len(where.theta_2)
+    if n <= MAX_ROWS:
+        return where
+    keep = np.round(np.linspace(0, n - 1, MAX_ROWS)).astype(int)
+    rows = {name: value[keep] for name, value in where._asdict().items() if isinstance(value, np.ndarray)}
+    return where._replace(**rows)
+
+
+def _pace(omega_2: float | None, theta_2: Array, asked: int) -> str:
+    """What speed 1 means, and whether positions were left out."""
+    words = "At speed 1× one sweep takes 6 s"
+    if omega_2:
+        real = abs(float(theta_2[-1] - theta_2[0]) / omega_2)
+        words += f"; at ω₂ = {omega_2:.4g} rad/s the mechanism takes {real:.3g} s"
+    if asked > len(theta_2):
+        words += f". Shown are {len(theta_2)} of the {asked} positions"
+    return words + "."
+
+
+def _rate(duration: float) -> float:
+    """Seconds of a motion shown in one second: 1, or the power of ten that makes it last neither too short nor long."""
+    if duration <= 0.0:
+        return 1.0
+    shortest, longest = WATCHED
+    if duration < shortest:
+        return float(10.0 ** math.floor(math.log10(duration / shortest)))
+    return float(10.0 ** math.ceil(math.log10(duration / longest))) if duration > longest else 1.0
+
+
+def _pace_in_time(scene: Scene, asked: Solution, rate: float, shown: int) -> str:
+    """What speed 1 means, where the motion ends before its time, and whether instants were left out."""
+    assert asked.time is not None
+    words = "At speed 1× it moves in real time"
+    if rate < 1.0:
+        words = f"At speed 1× it moves {1.0 / rate:.0f} times slower than it really does"
+    elif rate > 1.0:
+        words = f"At speed 1× it moves {rate:.0f} times faster than it really does"
+    free = scene.motion.free
+    if free is not None and len(asked) <= free.steps:
+        words += f". It ends at {asked.time[-1]:.4g} s, where the linkage stops at a limit position"
+    if len(asked) > shown:
+        words += f". Shown are {shown} of the {len(asked)} instants"
+    return words + "."
+
+
+def _columns(scene: Scene, theta_2: Array) -> dict[str, Any]:
+    """The solution on one branch, quantity by quantity."""
+    own = command(replace(scene, motion=replace(scene.motion, theta_2=theta_2)))
+    return _solved(solve(scene, at=own))
+
+
+def _solved(solution: Solution) -> dict[str, Any]:
+    """Quantity by quantity, as lists."""
+    columns: dict[str, Any] = {"sign": solution.branch.tolist()}
+    if (solution.status_code != OK).any():
+        columns["status"] = solution.status
+    for name in SCALARS:
+        values = getattr(solution, name)
+        if values is not None:
+            columns[name] = [_or_null(value) for value in values.tolist()]
+    for name in PIN_FORCES:
+        values = getattr(solution, name)
+        if values is not None:
+            columns[name] = [[_or_null(x), _or_null(y)] for x, y in values.tolist()]
+    return columns
+
+
+def _or_null(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+def _pictures(scene: Scene, pictures: Mapping[str, str | Path]) -> dict[int, str]:
+    """The pictures of the bars as data URIs: those of the scene, and those given in their place."""
+    numbers = {name: number for number, name in BAR_NAMES.items() if number in MOVING_BARS}
+    found = {}
+    for name, path in pictures.items():
+        if name not in numbers:
+            raise InputError("picture", name, "must name one of " + ", ".join(numbers))
+        found[numbers[name]] = data_uri(f"picture.{name}", path)
+    own = {picture.bar: picture for picture in scene.pictures if picture.bar not in found}
+    return found | {bar: picture.data_uri() for bar, picture in own.items()}

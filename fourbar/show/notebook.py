@@ -1,0 +1,90 @@
+"""How a scene and a solution show themselves in a notebook, and a solution as a table of pandas."""
+
+from html import escape
+from typing import TYPE_CHECKING
+
+from fourbar.errors import FourBarError
+from fourbar.linkage import BAR_NAMES, MOVING_BARS
+from fourbar.solution import Solution
+
+if TYPE_CHECKING:
+    from fourbar.scene import Scene
+
+SHOWN = 5
+"""Positions shown at either end of a long sweep."""
+
+
+def scene_html(scene: "Scene") -> str:
+    """The linkage drawn, beside what the scene states."""
+    from fourbar.show.drawing import drawing
+    from fourbar.solve import solve
+
+    try:
+        picture = drawing(scene, solve(scene, "position"))
+    except FourBarError as error:  # a notebook shows the reason, not a traceback
+        picture = f"<p>{escape(str(error))}</p>"
+    rows = "".join(
+        f'<tr><th style="text-align:left">{escape(name)}</th><td style="text-align:left">{escape(text)}</td></tr>'
+        for name, text in _facts(scene)
+    )
+    return (
+        f"<div><b>{escape(scene.title or 'Four-bar linkage')}</b>"
+        '<div style="display:flex;flex-wrap:wrap;align-items:center;gap:1em">'
+        f'<div style="width:18em">{picture}</div><table>{rows}</table></div></div>'
+    )
+
+
+def _facts(scene: "Scene") -> list[tuple[str, str]]:
+    from fourbar.formulas.linkage_type import classify
+
+    motion = scene.motion
+    facts = [("type", classify(scene.linkage).name)]
+    facts += [
+        (name, f"{scene.linkage.lengths[number - 1]:.6g} m{_mass(scene, number)}") for number, name in BAR_NAMES.items()
+    ]
+    speed = (
+        "positions only"
+        if motion.omega_2 is None
+        else f"ω2 = {motion.omega_2:.6g} rad/s, α2 = {motion.alpha_2:.6g} rad/s²"
+    )
+    facts.append(("motion", f"{speed}; {'open' if motion.branch > 0 else 'crossed'} branch"))
+    facts.append(
+        ("drive", "released" if motion.free is not None else f"bar {scene.drive_bar} ({BAR_NAMES[scene.drive_bar]})")
+    )
+    facts.append(
+        (
+            "acting",
+            ", ".join([f"load on bar {load.bar}" for load in scene.loads] + [e.key for e in scene.effects])
+            or "nothing",
+        )
+    )
+    return facts
+
+
+def _mass(scene: "Scene", number: int) -> str:
+    if number not in MOVING_BARS or scene.linkage.bar(number).mass == 0.0:
+        return ""
+    return f", {scene.linkage.bar(number).mass:.6g} kg"
+
+
+def solution_html(solution: Solution) -> str:
+    """The first and last positions as a table; angles in degrees."""
+    from fourbar.show.tables import columns
+
+    cells = columns(solution)
+    if (solution.status_code != 0).any():
+        cells = {"status": [status.replace("_", " ") for status in solution.status], **cells}
+    count = len(solution)
+    places = list(range(count)) if count <= 2 * SHOWN else [*range(SHOWN), *range(count - SHOWN, count)]
+    head = "".join(f"<th>{escape(name.strip()).replace(chr(10), '<br>')}</th>" for name in cells)
+    lines = []
+    for place in places:
+        if count > 2 * SHOWN and place == count - SHOWN:
+            lines.append(
+                f'<tr><td colspan="{len(cells)}" style="text-align:center">… {count - 2 * SHOWN} more …</td></tr>'
+            )
+        lines.append("<tr>" + "".join(f"<td>{escape(column[place])}</td>" for column in cells.values()) + "</tr>")
+    title = escape(solution.title or "Solution")
+    positions = f"{count} position{'s' if count != 1 else ''}"
+    table = f"<table><thead><tr>{head}</tr></thead><tbody>{''.join(lines)}</tbody></table>"
+    return f"<div><b>{title}</b>: {positions}{table}</div>"

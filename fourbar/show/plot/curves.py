@@ -1,0 +1,318 @@
+"""Curves over theta_2 or time: angles and their rates, torque, pin forces, energy, transmission angle."""
+
+import math
+import re
+from itertools import cycle
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fourbar.quantities import PIN_FORCES
+from fourbar.show.plot.energy import energies
+from fourbar.show.plot.style import (
+    BAR_COLOURS,
+    BAR_DASHES,
+    FAINT,
+    FORCE_COLOURS,
+    FORCE_DASHES,
+    FORCE_WIDTHS,
+    INK,
+    MUTED,
+    degree_ticks,
+    largest,
+    legend_above,
+    number,
+    unit_for,
+)
+from fourbar.show.plot.view import View
+from fourbar.solution import Array
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+ORDINARY = 95.0
+"""Percentile of the magnitudes that counts as the ordinary size of a curve ..."""
+OUTLIER = 3.0
+"""... and the multiple of it that a curve must exceed to be clipped."""
+ROOM = 1.6
+"""A clipped axis ends at this multiple of the ordinary size."""
+RECOMMENDED = 40.0
+"""Smallest transmission angle that is usually recommended, deg (R. L. Norton, Design of Machinery)."""
+REMARK = 0.34
+"""Room that a remark takes along an axis, as a part of its length."""
+Indices = NDArray[np.intp]
+WORKS: tuple[tuple[str, Any], ...] = tuple((FORCE_COLOURS[name], FORCE_DASHES[name]) for name in PIN_FORCES)
+BINDING = re.compile(r" (?==)|(?<==) |(?<=[\d]) (?=[A-Za-zµ])|(?<=N) (?=m\b)")
+POLE_REASON = {2: "bars 3 and 4 collinear", 3: "ω₃ = 0", 4: "ω₄ = 0"}
+
+
+def _bases(axes: "Axes", view: View) -> Array:
+    """The axis of theta_2 (or time), with the positions that do not assemble shaded and the position drawn marked.
+
+    Returns what the curves are drawn over.
+    """
+    over, here = view.degrees, math.degrees(float(view.here.theta_2[0]))
+    if view.time is not None:
+        assert view.here.time is not None
+        longest = max(float(other.time[-1]) for other in view.alike if other.time is not None)
+        factor, unit = (1.0, "s") if longest >= 1.0 else unit_for(longest, "s")
+        over, here = factor * view.time, factor * float(view.here.time[0])
+        axes.set_xlabel(f"$t$ ({unit})")
+    else:
+        axes.set_xlabel(r"$\theta_2$ (°)")
+    low, high = float(over[0]), float(over[-1])
+    if high == low:
+        low, high = low - 1.0, high + 1.0
+    axes.set_xlim(low, high)
+    if view.time is None:
+        degree_ticks(axes.xaxis, high - low)
+    closed = np.flatnonzero(np.diff(np.concatenate([[False], ~view.sweep.assembled, [False]]).astype(int)))
+    for first, after in closed.reshape(-1, 2):
+        start = low if first == 0 else 0.5 * (over[first - 1] + over[first])
+        stop = high if after == len(over) else 0.5 * (over[after - 1] + over[after])
+        axes.axvspan(start, stop, fc="#f1f1f1", ec=FAINT, hatch="////", lw=0.0, zorder=0)
+    if closed.size:
+        note(view, "Hatched: the linkage does not assemble.")
+    if low < here < high:
+        axes.axvline(here, color=MUTED, lw=0.8, ls=(0, (2, 2)), zorder=1)
+    return over
+
+
+def note(view: View, text: str) -> None:
+    """Say it once in the caption; a number stays on one line with its name and unit."""
+    text = BINDING.sub("\u00a0", text)
+    if text not in view.notes:
+        view.notes.append(text)
+
+
+def poles(view: View) -> Indices:
+    """Indices i such that the determinant of the drive changes sign between positions i and i + 1."""
+    s = view.sweep
+    if view.scene.motion.free is not None:  # no drive, no pole
+        return np.array([], dtype=np.intp)
+    pair = {2: (s.theta_4, s.theta_3), 3: (s.theta_4, s.theta_2), 4: (s.theta_3, s.theta_2)}[view.scene.drive_bar]
+    sine = np.sin(pair[0] - pair[1])
+    return np.flatnonzero(sine[:-1] * sine[1:] <= 0.0)
+
+
+def broken(values: Array, where: Indices) -> Array:
+    """Copies of a curve's values with NaN at the positions beside a pole, so that no line crosses it."""
+    out = np.array(values, dtype=float)
+    out[~np.isfinite(out)] = np.nan
+    return np.insert(out, where + 1, np.nan)
+
+
+def limit_of(values: list[Array]) -> float | None:
+    """The end of a clipped axis, or None where no value stands far outside the rest."""
+    size = np.concatenate([np.abs(value[np.isfinite(value)]) for value in values])
+    if size.size == 0:
+        return None
+    ordinary = float(np.percentile(size, ORDINARY))
+    return ROOM * ordinary if ordinary > 0.0 and size.max() > OUTLIER * ordinary else None
+
+
+def clip(
+    axes: "Axes", view: View, curves: dict[str, Array], limit: float | None, what: str, factor: float, unit: str
+) -> None:
+    """End the axis short of what diverges, and say so."""
+    if limit is None:
+        return
+    lowest = min(float(np.nanmin(value)) for value in curves.values())
+    axes.set_ylim(0.0 if lowest >= 0.0 else -limit * factor, limit * factor)
+    name, worst = max(curves.items(), key=lambda item: largest(item[1]))
+    index = int(np.nanargmax(np.where(np.isfinite(worst), np.abs(worst), np.nan)))
+    if abs(worst[index]) <= limit:
+        return
+    where = f"θ₂ = {view.degrees[index]:.5g}°" if view.time is None else f"t = {view.time[index]:.4g} s"
+    own_factor, own_unit = (1.0, unit) if "/" in unit else unit_for(abs(worst[index]), unit.lstrip("GMkmµn ") or unit)
+    note(
+        view,
+        f"{what} clipped at {number(limit * factor)} {unit}; the largest evaluated, {name} = "
+        f"{number(worst[index] * own_factor)} {own_unit}, is at {where}.",
+    )
+
+
+def draw_angles(axes: "Axes", view: View) -> None:
+    """theta_3 and theta_4; over time theta_2 too."""
+    over = _bases(axes, view)
+    bars = (3, 4) if view.time is None else (2, 3, 4)
+    for bar in bars:
+        values = np.degrees(getattr(view.sweep, f"theta_{bar}"))
+        axes.plot(over, values, color=BAR_COLOURS[bar], ls=BAR_DASHES[bar], label=rf"$\theta_{bar}$")
+    shown = np.concatenate([np.degrees(getattr(other.sweep, f"theta_{bar}")) for other in view.alike for bar in bars])
+    degree_ticks(axes.yaxis, 1.3 * float(np.nanmax(shown) - np.nanmin(shown)) + 1e-9)
+    axes.set_ylabel(r"$\theta$ (°)" if len(bars) > 2 else r"$\theta_3,\ \theta_4$ (°)")
+    axes.set_title("Angles of the bars" if len(bars) > 2 else "Angles of coupler and output")
+    legend_above(axes)
+
+
+def _rates(axes: "Axes", view: View, letter: str, unit: str, title: str, what: str) -> None:
+    over = _bases(axes, view)
+    name = {"omega": "ω", "alpha": "α"}[letter]
+    digits = {2: "₂", 3: "₃", 4: "₄"}
+    curves = {name + digits[bar]: getattr(view.sweep, f"{letter}_{bar}") for bar in (3, 4)}
+    command = getattr(view.sweep, f"{letter}_2")
+    if np.any(command):
+        axes.plot(over, command, color=BAR_COLOURS[2], lw=1.0, label=rf"$\{letter}_2$")
+    for bar, values in zip((3, 4), curves.values(), strict=True):
+        axes.plot(over, values, color=BAR_COLOURS[bar], ls=BAR_DASHES[bar], label=rf"$\{letter}_{bar}$")
+    axes.axhline(0.0, color=INK, lw=0.6, zorder=1)
+    axes.set_ylabel(rf"$\{letter}$ ({unit})")
+    axes.set_title(title)
+    limit = limit_of([getattr(other.sweep, f"{letter}_{bar}") for other in view.alike for bar in (3, 4)])
+    clip(axes, view, curves, limit, what, 1.0, unit)
+    legend_above(axes)
+
+
+def draw_velocities(axes: "Axes", view: View) -> None:
+    """omega_2, omega_3, omega_4."""
+    _rates(axes, view, "omega", "rad/s", "Angular velocities", "Angular velocity")
+
+
+def draw_accelerations(axes: "Axes", view: View) -> None:
+    """alpha_2 (where it is not zero), alpha_3, alpha_4."""
+    _rates(axes, view, "alpha", "rad/s²", "Angular accelerations", "Angular acceleration")
+
+
+def draw_torque(axes: "Axes", view: View) -> None:
+    """The driving torque, with its poles."""
+    over = _bases(axes, view)
+    torque, bar = view.sweep.torque, view.scene.drive_bar
+    assert torque is not None
+    torques = [other.sweep.torque for other in view.alike if other.sweep.torque is not None]
+    limit = limit_of(torques)
+    factor, unit = unit_for(limit or largest(*torques), "N m")
+    where = poles(view)
+    axes.plot(broken(over, where), factor * broken(torque, where), color=INK, label=f"$T_{bar}$")
+    for index in where:
+        axes.axvline(0.5 * float(over[index] + over[index + 1]), color=MUTED, lw=0.9, ls=(0, (1, 1.5)))
+    if where.size:
+        note(view, f"Dotted: poles of the torque on bar {bar} ({POLE_REASON[bar]}).")
+    axes.axhline(0.0, color=INK, lw=0.6, zorder=1)
+    axes.set_ylabel(f"$T_{bar}$ ({unit})")
+    axes.set_title(f"Driving torque on bar {bar}")
+    clip(axes, view, {f"T{'₂₃₄'[bar - 2]}": torque}, limit, "Torque", factor, unit)
+
+
+def draw_forces(axes: "Axes", view: View) -> None:
+    """Magnitudes of the four pin forces."""
+    over = _bases(axes, view)
+    sizes = {name: np.hypot(*getattr(view.sweep, name).T) for name in FORCE_COLOURS}
+    everywhere = [np.hypot(*getattr(other.sweep, name).T) for other in view.alike for name in FORCE_COLOURS]
+    limit = limit_of(everywhere)
+    factor, unit = unit_for(limit or largest(*everywhere), "N")
+    where = poles(view)
+    for name, values in sizes.items():
+        axes.plot(
+            broken(over, where),
+            factor * broken(values, where),
+            color=FORCE_COLOURS[name],
+            ls=FORCE_DASHES[name],
+            lw=FORCE_WIDTHS[name],
+            label=force_name(name),
+        )
+    axes.set_ylim(bottom=0.0)
+    axes.set_ylabel(f"$|F|$ ({unit})")
+    axes.set_title("Pin forces")
+    clip(axes, view, sizes, limit, "Pin forces", factor, unit)
+    legend_above(axes)
+
+
+def force_name(name: str) -> str:
+    """F12 as it is typeset."""
+    return f"$F_{{{name[1:]}}}$"
+
+
+def draw_transmission(axes: "Axes", view: View) -> None:
+    """Acute angle between coupler and output, with limit and dead-centre positions."""
+    over = _bases(axes, view)
+    sweep = view.sweep
+    mu = np.degrees(np.arctan2(np.abs(sweep.sin_mu), np.abs(np.cos(sweep.theta_4 - sweep.theta_3))))
+    axes.plot(over, mu, color=INK)
+    axes.axhline(RECOMMENDED, color=MUTED, lw=0.9, ls=(0, (4, 2)))
+    place = free_place(mu)
+    axes.annotate(
+        f"{RECOMMENDED:g}° recommended",
+        (over[0] + place * (over[-1] - over[0]), RECOMMENDED),
+        xytext=(0, 2),
+        textcoords="offset points",
+        ha="center",
+        size=7.0,
+        color=MUTED,
+    )
+    axes.set_ylim(0.0, 96.0)
+    axes.yaxis.set_ticks(range(0, 91, 15))
+    for theta, height, marker, name in _marked(view):
+        axes.plot(
+            theta, height, marker, ms=6.0, mfc="white", mec=INK, mew=1.1, ls="none", label=name, clip_on=False, zorder=5
+        )
+    axes.set_ylabel(r"transmission angle $\mu$ (°)")
+    axes.set_title("Transmission angle")
+    if view.time is None:
+        legend_above(axes, 2)
+
+
+def free_place(mu: Array) -> float:
+    """Where along the axis the curve keeps furthest from a remark at 40 deg, as a part of its length."""
+    half = REMARK / 2.0
+    best, room = 1.0 - half, -1.0
+    for place in np.linspace(1.0 - half, half, 25):
+        part = mu[int((place - half) * len(mu)) : max(1, math.ceil((place + half) * len(mu)))]
+        away = np.abs(part[np.isfinite(part)] - RECOMMENDED - 3.0)  # the remark stands on the line
+        if away.size and away.min() > room:
+            best, room = float(place), float(away.min())
+    return best
+
+
+def draw_energy(axes: "Axes", view: View) -> None:
+    """Kinetic energy of a free motion, and the work that made it."""
+    over = _bases(axes, view)
+    own = energies(view.scene, view.sweep)
+    shared = [energies(other.scene, other.sweep) for other in view.beside] + [own]
+    factor, unit = unit_for(
+        largest(*(values for each in shared for values in (each.kinetic, *each.work.values()))), "J"
+    )
+    axes.plot(over, factor * own.kinetic, color=INK, lw=2.2, label="kinetic energy")
+    for (name, values), (colour, dashes) in zip(own.work.items(), cycle(WORKS), strict=False):
+        axes.plot(over, factor * values, color=colour, ls=dashes, label=name.replace("_", " "))
+    axes.axhline(0.0, color=INK, lw=0.6, zorder=1)
+    axes.set_ylabel(f"energy ({unit})")
+    axes.set_title("Kinetic energy, and the work done")
+    legend_above(axes, 3)
+    note(view, "The kinetic energy has grown by the work that loads and effects have done since the release.")
+
+
+def _marked(view: View) -> list[tuple[list[float], list[float], str, str]]:
+    """Limits (bars 3, 4 collinear) and dead centres (bars 2, 3 collinear): theta_2, mu (degrees), mark, name."""
+    from fourbar.formulas.mobility import limit_positions
+
+    if view.time is not None:
+        return []
+    degrees = view.degrees
+    margin = 1.5 * float(np.median(np.diff(degrees))) if len(degrees) > 1 else 0.0
+    limits = [t for angle in limit_angles(view) for t in _inside(view, angle, margin)]
+    centres, heights = [], []
+    for found in limit_positions(view.scene.linkage, 4):
+        difference = found.theta_4 - found.theta_3
+        for t in _inside(view, found.theta_2, 0.0):
+            if view.sweep.branch[np.argmin(np.abs(degrees - t))] == found.branch:
+                centres.append(t)
+                heights.append(math.degrees(math.atan2(abs(math.sin(difference)), abs(math.cos(difference)))))
+    marked = [(limits, [0.0] * len(limits), "s", "limit"), (centres, heights, "D", "dead centre")]
+    return [entry for entry in marked if entry[0]]
+
+
+def _inside(view: View, angle: float, margin: float) -> list[float]:
+    """An angle (rad) and its whole turns that lie in the sweep, degrees."""
+    low, high = float(view.degrees[0]) - margin, float(view.degrees[-1]) + margin
+    start = math.degrees(angle)
+    first = math.ceil((low - start) / 360.0)
+    return [start + 360.0 * k for k in range(first, math.floor((high - start) / 360.0) + 1)]
+
+
+def limit_angles(view: View) -> list[float]:
+    """theta_2 of the input's limit positions, rad, from e = b + c and e = |b - c|."""
+    from fourbar.formulas.mobility import limit_positions
+
+    return [float(limit.theta_2) for limit in limit_positions(view.scene.linkage)]

@@ -1,0 +1,216 @@
+"""The figures by name, and the way from a scene to a file."""
+
+import math
+import textwrap
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, cast
+
+import numpy as np
+
+from fourbar.errors import InputError
+from fourbar.scene import Scene
+from fourbar.show.plot import curves, freebody, hodograph, linkage
+from fourbar.show.plot.labels import Labels
+from fourbar.show.plot.style import FORCE_COLOURS, MUTED, matplotlib_style, plain, save
+from fourbar.show.plot.view import View, common_position, on_branch, over_time, view
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure, SubFigure
+    from matplotlib.projections.polar import PolarAxes
+
+FORMATS = ("svg", "png", "pdf")
+BRANCHES = ("one", "both")
+Painter = Callable[["SubFigure", View, Labels], None]
+
+
+def _overview(figure: "SubFigure", shown: View, labels: Labels) -> None:
+    if not shown.moves:
+        panels = figure.subplot_mosaic([["linkage", "angles"], ["linkage", "mu"]], width_ratios=[1.15, 1.0])
+        linkage.draw_linkage(panels["linkage"], shown, labels)
+        _path_legend(panels["linkage"])
+        curves.draw_angles(panels["angles"], shown)
+        curves.draw_transmission(panels["mu"], shown)
+        return
+    panels = figure.subplot_mosaic(
+        [["linkage", "angles", "torque"], ["linkage", "omega", "forces"], ["polar", "alpha", "mu"]],
+        width_ratios=[1.15, 1.0, 1.0],
+        per_subplot_kw={"polar": {"projection": "polar"}},
+    )
+    linkage.draw_linkage(panels["linkage"], shown, labels)
+    _path_legend(panels["linkage"])
+    curves.draw_angles(panels["angles"], shown)
+    curves.draw_velocities(panels["omega"], shown)
+    curves.draw_accelerations(panels["alpha"], shown)
+    _drive(panels["torque"], shown)
+    curves.draw_forces(panels["forces"], shown)
+    curves.draw_transmission(panels["mu"], shown)
+    hodograph.draw_hodograph(cast("PolarAxes", panels["polar"]), shown)
+
+
+def _drive(axes: Any, shown: View) -> None:
+    """What drives: the torque, or in a free motion the work of loads and effects."""
+    (curves.draw_torque if shown.scene.motion.free is None else curves.draw_energy)(axes, shown)
+
+
+def _path_legend(axes: Any) -> None:
+    axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.005), ncols=3)
+    axes.set_title(axes.get_title(loc="left"), pad=18.0)
+
+
+def _linkage(figure: "SubFigure", shown: View, labels: Labels) -> None:
+    axes = figure.subplots()
+    linkage.draw_linkage(axes, shown, labels)
+    _path_legend(axes)
+
+
+def _coupler(figure: "SubFigure", shown: View, labels: Labels) -> None:
+    linkage.draw_coupler_curves(figure.subplots(), shown, labels)
+
+
+def _kinematics(figure: "SubFigure", shown: View, labels: Labels) -> None:
+    del labels
+    panels = figure.subplots(3 if shown.moves else 1, 1, squeeze=False)[:, 0]
+    painters = (curves.draw_angles, curves.draw_velocities, curves.draw_accelerations)
+    for axes, paint in zip(panels, painters, strict=False):
+        paint(axes, shown)
+
+
+def _single(paint: Callable[[Any, View], None]) -> Painter:
+    def painter(figure: "SubFigure", shown: View, labels: Labels) -> None:
+        del labels
+        paint(figure.subplots(), shown)
+
+    return painter
+
+
+def _hodographs(figure: "SubFigure", shown: View, labels: Labels) -> None:
+    del labels
+    panels = figure.subplots(2, 2, subplot_kw={"projection": "polar"}).ravel()
+    for axes, name in zip(panels, FORCE_COLOURS, strict=True):
+        hodograph.draw_hodograph(axes, shown, (name,))
+
+
+def _free_bodies(figure: "SubFigure", shown: View, labels: Labels) -> None:
+    here = shown.here
+    if not np.isfinite(here.F12).all():  # type: ignore[arg-type]
+        where = f"theta_2 = {math.degrees(here.theta_2[0]):.6g} deg"
+        raise InputError("figure", "freebody", f"needs forces, which have no value at {where}: {here.status[0]}")
+    freebody.draw_free_bodies(list(figure.subplots(1, 3)), shown, labels)
+
+
+FIGURES: dict[str, tuple[Painter, tuple[float, float], bool]] = {
+    "overview": (_overview, (11.7, 8.3), False),
+    "linkage": (_linkage, (5.6, 5.2), False),
+    "coupler": (_coupler, (5.6, 5.4), False),
+    "kinematics": (_kinematics, (5.6, 6.8), False),
+    "torque": (_single(curves.draw_torque), (5.6, 3.2), True),
+    "forces": (_single(curves.draw_forces), (5.6, 3.2), True),
+    "hodograph": (_hodographs, (6.4, 6.6), True),
+    "energy": (_single(curves.draw_energy), (5.6, 3.2), True),
+    "transmission": (_single(curves.draw_transmission), (5.6, 3.2), False),
+    "freebody": (_free_bodies, (9.6, 4.6), True),
+}
+"""Each figure: its painter, the size of one branch in inches, and whether it needs omega_2."""
+
+
+def draw(
+    scene: Scene,
+    path: str | Path,
+    figure: str = "overview",
+    *,
+    position: float | None = None,
+    branches: str = "one",
+    file_format: str | None = None,
+) -> None:
+    """Draw a figure of a scene into a file, whole or not at all; the same scene gives the same bytes.
+
+    Parameters
+    ----------
+    path : the file; its ending says which of svg, png and pdf is meant.
+    figure : one of `FIGURES`: "overview", "linkage", "coupler", "kinematics", "torque",
+        "forces", "hodograph", "energy", "transmission", "freebody".
+    position : theta_2 of the linkage and the free bodies, rad; left out: the scene's own.
+    branches : "one" (the scene's) or "both" (open and crossed, to the same scales).
+    file_format : svg, png or pdf where the path's ending does not say it.
+
+    Raises
+    ------
+    InputError : unknown figure, format or choice of branches; a figure of forces without omega_2.
+    NotAssembledError : there is no position to draw.
+    DependencyError : matplotlib is missing.
+    """
+    target = Path(path)
+    kind = (file_format or target.suffix.removeprefix(".")).lower()
+    for key, value, allowed in (("figure", figure, tuple(FIGURES)), ("branches", branches, BRANCHES)):
+        if value not in allowed:
+            raise InputError(key, value, "must be one of " + ", ".join(allowed))
+    if kind not in FORMATS:
+        raise InputError("output", str(path), "must end in one of " + ", ".join(f".{end}" for end in FORMATS))
+    painter, size, dynamic = FIGURES[figure]
+    if dynamic and scene.motion.omega_2 is None and not over_time(scene):
+        raise InputError("motion.omega_2", None, f"is needed for the figure {figure!r}")
+    if figure == "energy" and scene.motion.free is None:
+        raise InputError("figure", figure, "needs a free motion: motion.free")
+    if figure == "torque" and scene.motion.free is not None:
+        raise InputError("figure", figure, "a free motion has no driving torque; energy shows what moves it")
+    with matplotlib_style():
+        save(compose(scene, painter, size, position, branches), target, kind)
+
+
+def compose(
+    scene: Scene, painter: Painter, size: tuple[float, float], position: float | None, branches: str
+) -> "Figure":
+    """The figure itself, laid out and labelled."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    scenes = [on_branch(scene, sign) for sign in (1, -1)] if branches == "both" else [scene]
+    if position is None and len(scenes) > 1:
+        position = common_position(scenes)
+    views = [view(each, position) for each in scenes]
+    for shown in views:
+        shown.beside = [other for other in views if other is not shown]
+    stacked = size[0] > 9.0
+    figure = Figure(
+        figsize=(size[0], size[1] * len(views)) if stacked else (size[0] * len(views), size[1]), layout="constrained"
+    )
+    FigureCanvasAgg(figure)
+    parts = figure.subfigures(len(views) if stacked else 1, 1 if stacked else len(views), squeeze=False).ravel()
+    labels = Labels([], [])
+    for part, shown in zip(parts, views, strict=True):
+        painter(part, shown, labels)
+        heading = plain(scene.title, 90) or "Four-bar linkage"
+        part.suptitle(
+            f"{heading} ({shown.branch_name} branch)" if len(views) > 1 else heading,
+            parse_math=False,
+            size=10.5,
+            weight="bold",
+            x=0.012,
+            ha="left",
+        )
+        wide = int(size[0] * 18.5)
+        caption = textwrap.fill(" ".join(shown.notes), wide)
+        if caption:
+            part.supxlabel(caption, size=6.8, color=MUTED, x=0.012, ha="left", parse_math=False, linespacing=1.35)
+    _to_one_scale([part.axes for part in parts])
+    labels.settle(figure)
+    return figure
+
+
+def _to_one_scale(columns: "list[list[Axes]]") -> None:
+    """The same panel of every branch gets the same limits; polar panels and free bodies share theirs already."""
+    for panels in zip(*columns, strict=True):
+        if len(panels) == 1 or panels[0].name == "polar" or not panels[0].axison:
+            continue
+        if panels[0].get_aspect() == 1.0:  # to scale: the data, not the limits, say what has to fit
+            corners = np.concatenate([axes.dataLim.get_points() for axes in panels])
+            for axes in panels:
+                axes.update_datalim(corners)
+                axes.autoscale_view()
+            continue
+        for limits in ("xlim", "ylim"):
+            ends = [getattr(axes, f"get_{limits}")() for axes in panels]
+            for axes in panels:
+                getattr(axes, f"set_{limits}")(min(low for low, _ in ends), max(high for _, high in ends))

@@ -1,0 +1,143 @@
+"""The moving linkage as a film: GIF through pillow, MP4 through ffmpeg."""
+
+import math
+import subprocess
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fourbar.errors import DependencyError, InputError
+from fourbar.scene import Scene
+from fourbar.show.plot.linkage import ENDS, mass_centre, paths, supports
+from fourbar.show.plot.style import BAR_COLOURS, INK, largest, length_unit, matplotlib_style, plain
+from fourbar.show.plot.view import View, view
+from fourbar.writing import write_bytes
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+FRAMES_PER_SECOND = 25
+MAX_FRAMES = 1500
+SIZE = (6.4, 5.6)
+DPI = 100
+
+
+SWEEP_SECONDS = 6.0
+"""Of a film of a sweep, where nothing else is asked for."""
+SHORTEST = 1.0
+"""A motion through time shorter than this, s, is slowed down to be seen."""
+
+
+def write_film(scene: Scene, path: Path, kind: str, seconds: float | None) -> None:
+    """One sweep; where the input does not turn fully, there and back. A motion through time is shown as it is.
+
+    Parameters
+    ----------
+    seconds : length of the film; None: 6 s for a sweep, of a motion through time its own duration.
+
+    Raises
+    ------
+    DependencyError : matplotlib or, for MP4, ffmpeg with its H.264 encoder is missing.
+    """
+    if seconds is not None and not (math.isfinite(seconds) and 0.0 < seconds * FRAMES_PER_SECOND <= MAX_FRAMES):
+        raise InputError("seconds", seconds, f"must be more than 0 and at most {MAX_FRAMES // FRAMES_PER_SECOND}")
+    with matplotlib_style():
+        from matplotlib.animation import FFMpegWriter, PillowWriter
+
+        if kind == "mp4" and not FFMpegWriter.isAvailable():
+            raise DependencyError("an .mp4 film needs the program ffmpeg; .gif and .html do not")
+        shown = view(scene)
+        if seconds is None:
+            seconds = SWEEP_SECONDS
+            if shown.time is not None:
+                duration = float(shown.time[-1] - shown.time[0])
+                seconds = min(max(duration, SHORTEST), MAX_FRAMES / FRAMES_PER_SECOND)
+        figure, move = _stage(shown)
+        order = frames(shown, max(2, round(seconds * FRAMES_PER_SECOND)))
+        writer: Any = PillowWriter(fps=FRAMES_PER_SECOND)
+        if kind == "mp4":
+            # yuv420p needs even pixel numbers and is what browsers and slides play
+            writer = FFMpegWriter(fps=FRAMES_PER_SECOND, codec="h264", extra_args=["-pix_fmt", "yuv420p"])
+        with tempfile.TemporaryDirectory() as folder:
+            draft = Path(folder) / f"film.{kind}"
+            try:
+                with writer.saving(figure, str(draft), DPI):
+                    for index in order:
+                        move(index)
+                        writer.grab_frame()
+            except (subprocess.CalledProcessError, BrokenPipeError):
+                raise DependencyError("this ffmpeg cannot encode H.264 (libx264); .gif and .html need none") from None
+            write_bytes(path, draft.read_bytes())
+
+
+def frames(shown: View, count: int) -> list[int]:
+    """Indices of the positions shown one after the other: the stretch that assembles around the one drawn."""
+    closes = shown.sweep.assembled
+    here = int(np.argmin(np.abs(shown.sweep.theta_2 - shown.here.theta_2[0])))
+    if shown.time is not None and shown.here.time is not None:
+        here = int(np.argmin(np.abs(shown.time - shown.here.time[0])))
+    first, last = here, here
+    while first > 0 and closes[first - 1]:
+        first -= 1
+    while last < len(closes) - 1 and closes[last + 1]:
+        last += 1
+    if shown.time is not None:
+        return [round(i) for i in np.linspace(first, last, count)]
+    theta_2 = shown.sweep.theta_2
+    if abs(theta_2[last] - theta_2[first] - math.tau) < 1e-6:
+        return [round(i) for i in np.linspace(first, last, count, endpoint=False)]
+    there = [round(i) for i in np.linspace(first, last, max(2, count // 2))]
+    return there + there[-2:0:-1]
+
+
+def _stage(shown: View) -> tuple["Figure", Any]:
+    """The figure, and the function that moves it to a position of the sweep."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    sweep, linkage = shown.sweep, shown.scene.linkage
+    O4 = (linkage.ground * math.cos(linkage.ground_angle), linkage.ground * math.sin(linkage.ground_angle))
+    factor, unit = length_unit(largest(sweep.A, sweep.B, sweep.G3, np.array(O4)))
+    figure = Figure(figsize=SIZE, dpi=DPI, layout="constrained")
+    FigureCanvasAgg(figure)
+    axes = figure.subplots()
+    figure.suptitle(plain(shown.scene.title, 70), parse_math=False, size=10.5, weight="bold", x=0.02, ha="left")
+    for path, colour, dashes, name in paths(shown):
+        axes.plot(*(factor * path).T, color=colour, lw=1.0, ls=dashes, label=name, zorder=2)
+    reached = np.concatenate([sweep.A, sweep.B, sweep.G3, [(0.0, 0.0), O4]])
+    supports(
+        axes,
+        (0.0, 0.0),
+        (factor * O4[0], factor * O4[1]),
+        0.03 * factor * float(np.nanmax(np.nanmax(reached, 0) - np.nanmin(reached, 0))),
+    )
+    bars = {
+        number: axes.plot(
+            [], [], "o-", color=BAR_COLOURS[number], lw=4.5, ms=6.5, mfc="white", mec=INK, mew=1.2, zorder=4
+        )[0]
+        for number in ENDS
+    }
+    centres = {number: mass_centre(axes, (0.0, 0.0)) for number in ENDS if linkage.bar(number).mass > 0.0}
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.set_xlabel(f"$x$ ({unit})")
+    axes.set_ylabel(f"$y$ ({unit})")
+    axes.set_title("θ", pad=18.0)
+    axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.005), ncols=3)
+    figure.draw_without_rendering()
+    figure.set_layout_engine("none")  # nothing jumps from frame to frame
+
+    def move(index: int) -> None:
+        pins = {"O2": (0.0, 0.0), "A": sweep.A[index], "B": sweep.B[index], "O4": O4}
+        for number, (start, stop) in ENDS.items():
+            bars[number].set_data(*(factor * np.array([pins[start], pins[stop]]).T))
+        for number, marks in centres.items():
+            point = factor * getattr(sweep, f"G{number}")[index]
+            for mark in marks:
+                mark.set_data([point[0]], [point[1]])
+        theta = f"{math.degrees(sweep.theta_2[index]):.1f}".replace("-", "−")
+        when = "" if shown.time is None else f"$t$ = {shown.time[index]:.2f} s, "
+        axes.set_title(rf"{when}$\theta_2$ = {theta}°, {shown.branch_name} branch", pad=18.0)
+
+    return figure, move

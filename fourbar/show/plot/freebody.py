@@ -1,0 +1,239 @@
+"""Free-body diagrams of the three moving bars, all forces to one scale."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fourbar.effects.actions import bodies
+from fourbar.linkage import BAR_NAMES, FIRST_PIN, MOVING_BARS, PIN_FORCE
+from fourbar.show.plot.curves import force_name, note
+from fourbar.show.plot.labels import Label, Labels
+from fourbar.show.plot.linkage import ENDS, components, mass_centre, pins
+from fourbar.show.plot.style import BAR_COLOURS, FORCE_COLOURS, INK, MUTED, number, unit_for
+from fourbar.show.plot.view import Recorder, View
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+PIN_FORCES = {
+    2: (("O2", "F12", 1.0), ("A", "F32", 1.0)),
+    3: (("A", "F32", -1.0), ("B", "F43", 1.0)),
+    4: (("B", "F43", -1.0), ("O4", "F14", 1.0)),
+}
+"""The pins of a bar, the force there among the independent ones, and its sign on this bar."""
+ROOM = 1.3
+"""The window is this much wider than what it shows: room for the labels."""
+Points = NDArray[np.float64]
+SHOWN = 0.02
+"""Forces below this share of the largest would be shorter than their head: named in the caption only."""
+
+
+@dataclass(slots=True)
+class Arrow:
+    """A force on a bar: where it acts (from the bar's first pin, world axes, m) and its vector, N."""
+
+    text: str
+    at: tuple[float, float]
+    force: tuple[float, float]
+    colour: str
+    dashed: bool = False
+
+
+@dataclass(slots=True)
+class Couple:
+    """A couple on a bar, N m."""
+
+    text: str
+    moment: float
+
+
+def free_body(view: View, bar: int) -> tuple[list[Arrow], list[Couple]]:
+    """Every force and couple on a bar at the position drawn, d'Alembert's included: together they vanish."""
+    where = pins(view)
+    first = where[FIRST_PIN[bar]]
+    arrows: list[Arrow] = []
+    couples: list[Couple] = []
+    for pin, name, sign in PIN_FORCES[bar]:
+        fx, fy = (sign * float(v) for v in getattr(view.here, name)[0])
+        shown = name if sign > 0 else f"F{name[2]}{name[1]}"
+        at = (where[pin][0] - first[0], where[pin][1] - first[1])
+        arrows.append(Arrow(force_name(shown), at, (fx, fy), FORCE_COLOURS[name]))
+    if view.scene.drive_bar == bar and view.scene.motion.free is None:
+        couples.append(Couple(f"$T_{bar}$", float(view.here.torque[0])))  # type: ignore[index]
+    for text, recorder in _actions(view):
+        name = text.replace("#", str(bar))
+        acting = [(components(arm), components(force)) for b, force, arm in recorder.arrows if b == bar]
+        arrows += [Arrow(name, arm, force, INK) for arm, force in acting]
+        couples += [Couple(name, m) for b, m in recorder.turns if b == bar]
+    described = view.scene.linkage.bar(bar)
+    ax, ay = (float(v) for v in getattr(view.here, f"a_G{bar}")[0])
+    arm = components(described.to_centre * view.state().direction(bar))
+    arrows.append(Arrow(rf"$-m_{bar}\,a_{{G{bar}}}$", arm, (-described.mass * ax, -described.mass * ay), INK, True))
+    alpha = float(getattr(view.here, f"alpha_{bar}")[0])
+    carried = bodies(view.scene.linkage, view.scene.effects)[bar - 2]
+    couples.append(Couple(rf"$-I_{bar}\,\alpha_{bar}$", -carried.I * alpha))
+    return [a for a in arrows if math.hypot(*a.force) > 0.0], [c for c in couples if c.moment != 0.0]
+
+
+def _actions(view: View) -> Iterator[tuple[str, Recorder]]:
+    """Loads and effects, each with what it puts on the bars."""
+    state = view.state()
+    for count, load in enumerate(view.scene.loads, start=1):
+        recorder = Recorder(view.scene, state)
+        load.act(recorder, state)
+        yield f"load {count}", recorder
+    for effect in view.scene.effects:
+        recorder = Recorder(view.scene, state)
+        effect.act(recorder, state)
+        effect.act_known(recorder, {name: getattr(view.here, name) for name in PIN_FORCE.values()})
+        name = r"$m_#\,g$" if effect.key == "gravity" else effect.key
+        yield name, recorder
+
+
+def draw_free_bodies(panels: "list[Axes]", view: View, labels: Labels) -> None:
+    """The three bars, each freed from its pins, with arrows to one scale."""
+    freed = {bar: free_body(view, bar) for bar in MOVING_BARS}
+    drawn = [(v, free_body(v, bar)[0], bar) for v in view.alike for bar in MOVING_BARS]
+    biggest = max((math.hypot(*arrow.force) for *_, arrows, _ in drawn for arrow in arrows), default=0.0)
+    longest = max(view.scene.linkage.bar(bar).length for bar in MOVING_BARS)
+    scale = 0.75 * longest / biggest if biggest > 0.0 else 0.0
+    reach = {bar: _reach(view, bar, freed[bar][0], scale) for bar in MOVING_BARS}
+    # one window size: the bars, too, are to one scale
+    span = ROOM * max(float(np.ptp(_reach(v, bar, arrows, scale), axis=0).max()) for v, arrows, bar in drawn)
+    for axes, bar in zip(panels, MOVING_BARS, strict=True):
+        _draw_one(axes, view, bar, freed[bar], scale, biggest, labels, reach[bar], span)
+    _scale_bar(panels[0], scale, biggest)
+    note(
+        view,
+        "Bars and forces each to one scale, in world axes; dashed: inertia forces −m a at G (d'Alembert), with which "
+        "the forces and the moments on each bar add up to zero.",
+    )
+
+
+def _reach(view: View, bar: int, arrows: list[Arrow], scale: float) -> Points:
+    """Every point that a bar's panel has to show, from the bar's first pin, m."""
+    described, u = view.scene.linkage.bar(bar), view.state().direction(bar)
+    end, centre = list(components(described.length * u)), list(components(described.to_centre * u))
+    points = [[0.0, 0.0], end, centre]
+    for arrow in arrows:
+        points += [list(arrow.at), [arrow.at[k] + scale * arrow.force[k] for k in (0, 1)]]
+    return np.array(points)
+
+
+def _draw_one(
+    axes: "Axes",
+    view: View,
+    bar: int,
+    body: tuple[list[Arrow], list[Couple]],
+    scale: float,
+    biggest: float,
+    labels: Labels,
+    reach: Points,
+    span: float,
+) -> None:
+    where = pins(view)
+    first = where[FIRST_PIN[bar]]
+    second = where[_second_pin(bar)]
+    end = (second[0] - first[0], second[1] - first[1])
+    middle = (0.5 * end[0], 0.5 * end[1])
+    axes.plot(
+        [0.0, end[0]], [0.0, end[1]], color=BAR_COLOURS[bar], lw=5.0, alpha=0.45, solid_capstyle="round", zorder=2
+    )
+    labels.keep_off(axes, (0.0, 0.0), end)
+    for name, (x, y) in ((FIRST_PIN[bar], (0.0, 0.0)), (_second_pin(bar), end)):
+        axes.plot([x], [y], "o", ms=5.5, mfc="white", mec=INK, mew=1.1, zorder=6)
+        labels.add(
+            Label(axes, f"${name[0]}_{name[1]}$" if len(name) == 2 else f"${name}$", (x, y), middle, MUTED, 8.0, 2.5)
+        )
+    arrows, couples = body
+    short: list[str] = []
+    for arrow in arrows:
+        size = math.hypot(*arrow.force)
+        if size < SHOWN * biggest:
+            short.append(f"{_words(arrow.text)} = {number(size)} N")
+            continue
+        tip = (arrow.at[0] + scale * arrow.force[0], arrow.at[1] + scale * arrow.force[1])
+        axes.annotate(
+            "",
+            xy=tip,
+            xytext=arrow.at,
+            arrowprops={
+                "arrowstyle": "-|>",
+                "color": arrow.colour,
+                "lw": 1.5,
+                "shrinkA": 0,
+                "shrinkB": 0,
+                "mutation_scale": 9,
+                "ls": "--" if arrow.dashed else "-",
+            },
+            zorder=5,
+            annotation_clip=False,
+        )
+        factor, unit = unit_for(size, "N")
+        labels.keep_off(axes, arrow.at, tip)
+        labels.add(Label(axes, f"{arrow.text} = {number(factor * size)} {unit}", tip, arrow.at, arrow.colour, 7.5))
+    if short:
+        note(view, f"Too short to draw on bar {bar}: {', '.join(short)}.")
+    centre = view.scene.linkage.bar(bar)
+    if centre.mass > 0.0:
+        x, y = components(centre.to_centre * view.state().direction(bar))
+        axes.plot([0.0, x], [0.0, y], color=BAR_COLOURS[bar], lw=0.8, ls=":", zorder=1)
+        labels.keep_off(axes, (0.0, 0.0), (x, y))
+        mass_centre(axes, (x, y), 6.0)
+        labels.add(Label(axes, f"$G_{bar}$", (x, y), middle, MUTED, 8.0, 3.0))
+    middle_of = 0.5 * (np.min(reach, axis=0) + np.max(reach, axis=0))
+    axes.set_xlim(middle_of[0] - 0.5 * span, middle_of[0] + 0.5 * span)
+    axes.set_ylim(middle_of[1] - 0.5 * span, middle_of[1] + 0.5 * span)
+    axes.set_aspect("equal", adjustable="box")
+    axes.set_axis_off()
+    axes.set_title(f"Bar {bar} ({BAR_NAMES[bar]})")
+    lines = []
+    for couple in couples:
+        factor, unit = unit_for(abs(couple.moment), "N m")
+        turn = "↺" if couple.moment > 0.0 else "↻"
+        lines.append(f"{turn} {couple.text} = {number(factor * couple.moment)} {unit}")
+    axes.text(
+        0.0,
+        -0.02,
+        "\n".join(lines) if lines else "no couples",
+        transform=axes.transAxes,
+        va="top",
+        size=7.5,
+        color=INK if lines else MUTED,
+        linespacing=1.45,
+    )
+
+
+def _second_pin(bar: int) -> str:
+    """The pin of a bar that is not its first."""
+    return next(pin for pin in ENDS[bar] if pin != FIRST_PIN[bar])
+
+
+def _words(text: str) -> str:
+    """A typeset name in plain letters, for the caption."""
+    return (
+        text.replace("$", "")
+        .replace("\\,", " ")
+        .replace("_{", "")
+        .replace("_", "")
+        .replace("{", "")
+        .replace("}", "")
+        .replace("-", "−")
+    )
+
+
+def _scale_bar(axes: "Axes", scale: float, biggest: float) -> None:
+    """A round force as a length, under the first panel."""
+    if scale == 0.0:
+        return
+    step = 10.0 ** math.floor(math.log10(biggest))
+    round_force = next(m * step for m in (5.0, 2.0, 1.0) if 2.0 * m * step <= biggest or m == 1.0)
+    factor, unit = unit_for(round_force, "N")
+    x, y = axes.get_xlim()[0], axes.get_ylim()[0]
+    axes.plot([x, x + scale * round_force], [y, y], color=INK, lw=2.0, solid_capstyle="butt", clip_on=False)
+    text = f"{factor * round_force:g} {unit}"
+    axes.annotate(text, (x, y), xytext=(0, 4), textcoords="offset points", size=7.5, annotation_clip=False)

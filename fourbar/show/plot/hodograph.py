@@ -1,0 +1,101 @@
+"""Pin forces as hodographs: magnitude over direction, in polar axes."""
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from fourbar.show.plot.curves import broken, force_name, limit_of, note, poles
+from fourbar.show.plot.style import FORCE_COLOURS, FORCE_DASHES, FORCE_WIDTHS, MUTED, largest, number, unit_for
+from fourbar.show.plot.view import View
+from fourbar.solution import Array
+
+if TYPE_CHECKING:
+    from matplotlib.projections.polar import PolarAxes
+
+EVERY = 60.0
+"""Dots on a hodograph stand this far apart in theta_2, deg ..."""
+MOST_DOTS = 12
+"""... or, over time, a round number of seconds that gives no more than these."""
+
+
+def draw_hodograph(axes: "PolarAxes", view: View, names: tuple[str, ...] = tuple(FORCE_COLOURS)) -> None:
+    """The tips of the force vectors drawn from one origin; open dot: start of the sweep, dots every 60 deg."""
+    from matplotlib.ticker import MaxNLocator
+
+    forces = {name: getattr(view.sweep, name) for name in names}
+    sizes = {name: np.hypot(*force.T) for name, force in forces.items()}
+    everywhere = [np.hypot(*getattr(other.sweep, name).T) for other in view.alike for name in names]
+    limit = limit_of(everywhere)
+    top = limit or 1.08 * largest(*everywhere) or 1.0
+    factor, unit = unit_for(top, "N")
+    where = poles(view)
+    over, every, apart = _spacing(view)
+    marks = np.unique(np.round((over - over[0]) / every).astype(int))
+    dots = [int(np.argmin(np.abs(over - over[0] - every * k))) for k in marks]
+    for name, force in forces.items():
+        direction = np.arctan2(force[:, 1], force[:, 0])
+        # drawn as a polyline in x, y: unwrapped angles keep matplotlib from going round the long way
+        known = np.isfinite(direction)
+        direction[known] = np.unwrap(direction[known])
+        size = np.where(sizes[name] <= top, sizes[name], np.nan) if limit else sizes[name]
+        axes.plot(
+            broken(direction, where),
+            factor * broken(size, where),
+            color=FORCE_COLOURS[name],
+            ls=FORCE_DASHES[name],
+            lw=FORCE_WIDTHS[name],
+            label=force_name(name),
+        )
+        axes.plot(direction[dots], factor * size[dots], "o", ms=2.8, color=FORCE_COLOURS[name], ls="none")
+        first = int(np.argmax(np.isfinite(size)))
+        axes.plot(
+            direction[[first]],
+            factor * size[[first]],
+            "o",
+            ms=4.6,
+            mfc="white",
+            mec=FORCE_COLOURS[name],
+            mew=1.1,
+            zorder=5,
+        )
+    if limit and largest(*sizes.values()) > limit:
+        note(view, f"Hodographs of {', '.join(names)} clipped at {number(factor * top)} {unit}.")
+    axes.set_rlim(0.0, factor * top)
+    axes.set_thetagrids(range(0, 360, 45))
+    axes.tick_params(pad=0.5)
+    axes.set_rticks(
+        [tick for tick in MaxNLocator(4).tick_values(0.0, factor * top) if 0.0 < tick < 0.97 * factor * top]
+    )
+    axes.set_rlabel_position(_free_direction([np.column_stack([forces[n], sizes[n]]) for n in names]))
+    axes.tick_params(axis="y", labelsize=6.5, labelcolor=MUTED)
+    axes.set_title(
+        ", ".join(force_name(n) for n in names) + f" ({unit})"
+        if len(names) < 4
+        else f"Hodographs of the pin forces ({unit})",
+        pad=12,
+    )
+    note(
+        view,
+        f"Hodographs: open dot at the start, dots every {apart}; angles are directions in the x-y plane.",
+    )
+
+
+def _spacing(view: View) -> tuple[Array, float, str]:
+    """What the dots are evenly spaced in, by how much, and that in words."""
+    if view.time is None:
+        return view.degrees, EVERY, f"{EVERY:g}° of θ₂"
+    duration = float(view.time[-1] - view.time[0]) or 1.0
+    step = 10.0 ** math.floor(math.log10(duration))
+    every = next(share * step for share in (0.1, 0.2, 0.5, 1.0) if duration <= MOST_DOTS * share * step)
+    return view.time, every, f"{every:g} s"
+
+
+def _free_direction(forces: list[np.ndarray]) -> float:
+    """The multiple of 22.5 deg that lies furthest from the curves."""
+    directions = np.concatenate([np.arctan2(f[:, 1], f[:, 0])[np.isfinite(f[:, 2])] for f in forces])
+    candidates = np.radians(np.arange(16) * 22.5)
+    away = [
+        float(np.min(np.abs(np.angle(np.exp(1j * (directions - c)))))) if directions.size else 0.0 for c in candidates
+    ]
+    return float(np.degrees(candidates[int(np.argmax(away))]))

@@ -1,0 +1,129 @@
+"""Labels beside points, where they cover neither each other nor a line of the drawing."""
+
+import math
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from fourbar.show.plot.style import INK
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+Point = tuple[float, float]
+Box = tuple[float, float, float, float]
+REACH = (7.0, 11.0, 16.0, 23.0, 32.0)
+"""Distances from the point to the label's edge that are tried, typographic points."""
+DIRECTIONS = 16
+
+
+@dataclass(slots=True)
+class Label:
+    """A text that wants to stand beside `at` (data coordinates), away from `shun`."""
+
+    axes: "Axes"
+    text: str
+    at: Point
+    shun: Point
+    colour: str = INK
+    size: float = 8.5
+    dots_clear: float = 0.0
+    """Radius of the mark at the point itself, typographic points."""
+
+
+@dataclass(slots=True)
+class Labels:
+    """The labels of one figure and the lines and marks (data coordinates) they must keep off."""
+
+    wanted: list[Label]
+    lines: list[tuple["Axes", list[Point]]]
+
+    def add(self, label: Label) -> None:
+        """Ask for a label; it is placed by `settle`."""
+        self.wanted.append(label)
+
+    def keep_off(self, axes: "Axes", *points: Point) -> None:
+        """Lines, given by their points, that labels do not cover; twice the same point is a mark."""
+        self.lines.append((axes, list(points)))
+
+    def settle(self, figure: "Figure") -> None:
+        """Place every label once the layout is final: the first free spot, nearest first."""
+        figure.draw_without_rendering()
+        figure.set_layout_engine("none")  # labels must not move what they were measured against
+        per_point = figure.dpi / 72.0
+        renderer = figure.canvas.get_renderer()  # type: ignore[attr-defined]
+        taken: list[tuple[Axes, Box]] = []
+        samples: dict[int, list[np.ndarray]] = {}
+        for axes, points in self.lines:
+            samples.setdefault(id(axes), []).append(_sampled(axes.transData.transform(points), per_point))
+        for label in self.wanted:
+            axes = label.axes
+            text = axes.text(*label.at, label.text, color=label.colour, size=label.size, ha="center", va="center")
+            text.set_zorder(9)
+            text.set_clip_on(False)
+            extent = text.get_window_extent(renderer)
+            half = (0.5 * extent.width + per_point, 0.5 * extent.height + per_point)
+            x, y = axes.transData.transform(label.at)
+            sx, sy = axes.transData.transform(label.shun)
+            away = math.atan2(y - sy, x - sx) if (x, y) != (sx, sy) else math.pi / 2
+            dots = np.concatenate(samples[id(axes)]) if id(axes) in samples else np.empty((0, 2))
+            boxes = [box for owner, box in taken if owner is axes]
+            centre = _spot((x, y), away, half, dots, boxes, per_point, label.dots_clear, _inside(axes))
+            taken.append((axes, (centre[0] - half[0], centre[1] - half[1], centre[0] + half[0], centre[1] + half[1])))
+            text.set_position(tuple(axes.transData.inverted().transform(centre)))
+
+
+def _inside(axes: "Axes") -> Box:
+    """The panel in pixels."""
+    box = axes.get_window_extent()
+    return (box.x0, box.y0, box.x1, box.y1)
+
+
+STEP, MARK = 3.0, 4.5
+"""Of the points along a line, and radius of a mark, typographic points."""
+RING = np.array([(math.cos(k * math.tau / 12), math.sin(k * math.tau / 12)) for k in range(12)])
+
+
+def _sampled(points: np.ndarray, per_point: float) -> np.ndarray:
+    """Points along a polyline, or around a mark: a line that ends where it begins."""
+    pieces, step = [], STEP * per_point
+    for p, q in pairwise(points):
+        if not (np.all(np.isfinite(p)) and np.all(np.isfinite(q))):
+            continue
+        if np.array_equal(p, q):
+            pieces.append(p + MARK * per_point * RING)
+        share = np.linspace(0.0, 1.0, 2 + int(min(np.hypot(*(q - p)) / step, 2000)))
+        pieces.append(p + share[:, None] * (q - p))
+    return np.concatenate(pieces) if pieces else np.empty((0, 2))
+
+
+def _spot(
+    at: Point,
+    away: float,
+    half: Point,
+    dots: np.ndarray,
+    boxes: list[Box],
+    per_point: float,
+    mark: float,
+    inside: Box,
+) -> Point:
+    """The centre of the label: the candidate that covers least, the nearest and most outward first."""
+    best, best_cost = at, math.inf
+    for reach in REACH:
+        for k in range(DIRECTIONS):
+            angle = away + (k + 1) // 2 * (1 if k % 2 else -1) * math.tau / DIRECTIONS
+            cosine, sine = math.cos(angle), math.sin(angle)
+            gap = (reach + mark) * per_point
+            x, y = at[0] + cosine * (gap + half[0]), at[1] + sine * (gap + half[1])
+            hit = (np.abs(dots[:, 0] - x) < half[0]) & (np.abs(dots[:, 1] - y) < half[1])
+            clashes = sum(abs(x - 0.5 * (b[0] + b[2])) < half[0] + 0.5 * (b[2] - b[0]) and
+                          abs(y - 0.5 * (b[1] + b[3])) < half[1] + 0.5 * (b[3] - b[1]) for b in boxes)  # fmt: skip
+            outside = x - half[0] < inside[0] or x + half[0] > inside[2]
+            outside = outside or y - half[1] < inside[1] or y + half[1] > inside[3]
+            cost = 100.0 * clashes + 30.0 * outside + float(hit.sum()) + 0.04 * reach + 0.05 * k
+            if cost < best_cost:
+                best, best_cost = (x, y), cost
+    return best

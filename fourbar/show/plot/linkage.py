@@ -1,0 +1,189 @@
+"""The linkage drawn to scale: bars, pins, ground, mass centres and coupler curves."""
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fourbar.linkage import MOVING_BARS
+from fourbar.show.plot.labels import Label, Labels
+from fourbar.show.plot.style import BAR_COLOURS, INK, MUTED, largest, length_unit
+from fourbar.show.plot.view import View
+from fourbar.solution import Array
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.lines import Line2D
+
+Point = tuple[float, float]
+ENDS = {2: ("O2", "A"), 3: ("A", "B"), 4: ("O4", "B")}
+
+
+def pins(view: View) -> dict[str, Point]:
+    """The four pins at the position drawn, m."""
+    linkage, state = view.scene.linkage, view.state()
+    A, B = state.foot(3), state.point(4, linkage.output.length)
+    return {name: components(point) for name, point in (("O2", 0.0j), ("A", A), ("B", B), ("O4", state.foot(4)))}
+
+
+def components(vector: Any) -> Point:
+    """x and y of a complex vector at the one position drawn."""
+    value = complex(np.ravel(vector)[0])
+    return (value.real, value.imag)
+
+
+def centres(view: View) -> dict[int, Point]:
+    """The mass centres of the bars that have mass, m."""
+    bars, state = zip(MOVING_BARS, view.scene.linkage.moving, strict=True), view.state()
+    return {number: components(state.point(number, bar.to_centre)) for number, bar in bars if bar.mass > 0.0}
+
+
+def draw_linkage(axes: "Axes", view: View, labels: Labels) -> None:
+    """The linkage at the position drawn, over the paths of A, B and the coupler's centre."""
+    sweep = view.sweep
+    where, masses = pins(view), centres(view)
+    reached = np.concatenate([sweep.A, sweep.B, sweep.G3, list(where.values())])
+    factor, unit = _unit(view)
+    where = {name: (factor * x, factor * y) for name, (x, y) in where.items()}
+    _paths(axes, view, labels, factor)
+    size = 0.03 * factor * float(np.max(np.nanmax(reached, axis=0) - np.nanmin(reached, axis=0)))
+    _ground(axes, labels, where["O2"], where["O4"], size)
+    middle = (float(np.mean([p[0] for p in where.values()])), float(np.mean([p[1] for p in where.values()])))
+    for number, (start, stop) in ENDS.items():
+        (x, y), colour = zip(where[start], where[stop], strict=True), BAR_COLOURS[number]
+        axes.plot(x, y, color=colour, lw=4.5, solid_capstyle="round", zorder=4)
+        labels.keep_off(axes, where[start], where[stop])
+        labels.add(Label(axes, str(number), (0.5 * sum(x), 0.5 * sum(y)), middle, colour, 9.0, 2.0))
+    for name, point in where.items():
+        axes.plot(*[[v] for v in point], "o", ms=6.0, mfc="white", mec=INK, mew=1.2, zorder=6)
+        labels.add(Label(axes, pin_name(name), point, middle, INK, 9.0, 2.5))
+    for number, (x_centre, y_centre) in masses.items():
+        here = (factor * x_centre, factor * y_centre)
+        bar, colour = view.scene.linkage.bar(number), BAR_COLOURS[number]
+        r_along, r_across = bar.to_centre.real, bar.to_centre.imag
+        if r_across != 0.0 or not 0.0 <= r_along <= bar.length:  # off the bar: tied to it by a line
+            axes.plot(*zip(where[ENDS[number][0]], here, strict=True), color=colour, lw=0.8, ls=":", zorder=3)
+            labels.keep_off(axes, where[ENDS[number][0]], here)
+        mass_centre(axes, here)
+        labels.keep_off(axes, here, here)
+        labels.add(Label(axes, f"$G_{number}$", here, middle, colour, 8.0, 3.0))
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.margins(0.08)
+    axes.set_xlabel(f"$x$ ({unit})")
+    axes.set_ylabel(f"$y$ ({unit})")
+    axes.set_title(f"Linkage at {view.at}, {view.branch_name} branch")
+
+
+def _unit(view: View) -> tuple[float, str]:
+    """The unit of length of a drawing, the same for both branches."""
+    return length_unit(
+        max(largest(v.sweep.A, v.sweep.B, v.sweep.G3, *np.array(list(pins(v).values()))) for v in view.alike)
+    )
+
+
+def pin_name(name: str) -> str:
+    """A pin as it is typeset."""
+    return f"${name[0]}_{name[1]}$" if len(name) == 2 else f"${name}$"
+
+
+def paths(view: View) -> list[tuple[Array, str, Any, str]]:
+    """Paths of A, B and the coupler's mass centre (or its mid-point): points (n, 2) in m, colour, dashes, name."""
+    sweep = view.sweep
+    massive = view.scene.linkage.coupler.mass > 0.0
+    middle = sweep.G3 if massive else 0.5 * (sweep.A + sweep.B)
+    found = (
+        (sweep.A, BAR_COLOURS[2], (0, (1, 2)), "path of $A$"),
+        (sweep.B, BAR_COLOURS[4], (0, (1, 2)), "path of $B$"),
+        (middle, BAR_COLOURS[3], (0, (4, 1.5)), "coupler curve of " + ("$G_3$" if massive else "its mid-point")),
+    )
+    return [(np.where(sweep.assembled[:, None], path, np.nan), *look) for path, *look in found]
+
+
+def _paths(axes: "Axes", view: View, labels: Labels, factor: float) -> None:
+    for path, colour, dashes, name in paths(view):
+        scaled = factor * path
+        axes.plot(scaled[:, 0], scaled[:, 1], color=colour, lw=1.0, ls=dashes, zorder=2, label=name)
+        labels.keep_off(axes, *[(float(x), float(y)) for x, y in scaled[:: max(1, len(scaled) // 120)]])
+
+
+def _ground(axes: "Axes", labels: Labels, O2: Point, O4: Point, size: float) -> None:
+    supports(axes, O2, O4, size)
+    labels.keep_off(axes, O2, O4)
+    for x, y in (O2, O4):
+        for share in (0.5, 1.0, 1.7, 2.1, 2.5):
+            wide = size * (share / 1.7 if share <= 1.7 else 1.7)
+            labels.keep_off(axes, (x - wide, y - share * size), (x + wide, y - share * size))
+
+
+def supports(axes: "Axes", O2: Point, O4: Point, size: float) -> None:
+    """The ground line between the fixed pins, and a hatched support under each."""
+    from matplotlib.patches import Polygon, Rectangle
+
+    axes.plot(*zip(O2, O4, strict=True), color=MUTED, lw=1.0, ls=(0, (8, 3, 2, 3)), zorder=1)
+    for x, y in (O2, O4):
+        wide, foot = 1.7 * size, y - 1.7 * size
+        triangle = [(x, y), (x - size, foot), (x + size, foot)]
+        axes.add_patch(Polygon(triangle, closed=True, fc="white", ec=INK, lw=1.0, zorder=3))
+        strip = ((x - wide, foot - 0.8 * size), 2.0 * wide, 0.8 * size)
+        axes.add_patch(Rectangle(*strip, fc="none", ec=INK, lw=0.0, hatch="//////", zorder=2))
+        axes.plot([x - wide, x + wide], [foot, foot], color=INK, lw=1.0, zorder=3)
+
+
+def mass_centre(axes: "Axes", point: Point, ms: float = 7.0) -> "list[Line2D]":
+    """The quartered circle that marks a mass centre."""
+    x, y = point
+    marks = axes.plot([x], [y], "o", ms=ms, mfc="white", mec=INK, mew=0.8, zorder=7)
+    for quarter in ((0, 90), (180, 270)):
+        marks += axes.plot([x], [y], marker=_wedge(*quarter), ms=ms, mfc=INK, mec="none", zorder=7)
+    return marks
+
+
+def _wedge(start: int, stop: int) -> Any:
+    from matplotlib.path import Path
+
+    return Path.wedge(start, stop)
+
+
+def draw_coupler_curves(axes: "Axes", view: View, labels: Labels) -> None:
+    """Paths of points along the coupler's line and beside it, from one full sweep."""
+    sweep = view.sweep
+    along = sweep.B - sweep.A
+    across = np.stack([-along[:, 1], along[:, 0]], axis=1)
+    points = ((0.0, 0.0), (0.25, 0.0), (0.5, 0.0), (0.75, 0.0), (1.0, 0.0), (0.5, 0.5), (0.5, -0.5))
+    paths = [sweep.A + u * along + v * across for u, v in points]
+    factor, unit = _unit(view)
+    greys = ("#0072B2", "#56A0C8", "#D55E00", "#5FA48B", "#007A5A", "#8A3B78", "#8A3B78")
+    for (u, v), path, colour in zip(points, paths, greys, strict=True):
+        dashes = "-" if v == 0.0 else (0, (5, 1.5)) if v > 0 else (0, (1.4, 1.4))
+        lw = 1.8 if (u, v) == (0.5, 0.0) else 1.1
+        name = {0.0: "$A$", 1.0: "$B$"}.get(u, f"{u:g}") if v == 0.0 else f"{u:g}, {v:+g}".replace("-", "−")
+        scaled = factor * path
+        axes.plot(scaled[:, 0], scaled[:, 1], color=colour, lw=lw, ls=dashes, label=name, zorder=3)
+    where = pins(view)
+    for ends in ENDS.values():
+        x, y = zip(*(where[end] for end in ends), strict=True)
+        axes.plot(
+            np.multiply(x, factor),
+            np.multiply(y, factor),
+            color=MUTED,
+            lw=2.5,
+            alpha=0.55,
+            solid_capstyle="round",
+            zorder=2,
+        )
+    for name, point in where.items():
+        axes.plot([factor * point[0]], [factor * point[1]], "o", ms=4.5, mfc="white", mec=INK, mew=1.0, zorder=5)
+        if name in ("O2", "O4"):
+            labels.add(Label(axes, f"$O_{name[1]}$", (factor * point[0], factor * point[1]), (0.0, 1e9), INK, 8.5, 2.0))
+    labels.keep_off(axes, *[(factor * where[k][0], factor * where[k][1]) for k in ("O2", "A", "B", "O4")])
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.set_xlabel(f"$x$ ({unit})")
+    axes.set_ylabel(f"$y$ ({unit})")
+    axes.set_title(f"Coupler curves, {view.branch_name} branch")
+    axes.legend(
+        loc="upper center",
+        bbox_to_anchor=(0.5, -0.14),
+        ncols=4,
+        title="point along AB (and beside it), in lengths of the coupler",
+        title_fontsize=7.5,
+    )
+    view.notes.append(f"The linkage is drawn at {view.at}.")

@@ -1,0 +1,169 @@
+"""The look of the drawings, and how they reach a file: object interface of matplotlib, no global state left behind."""
+
+import io
+import math
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fourbar.errors import DependencyError
+from fourbar.quantities import PIN_FORCES
+from fourbar.solution import Array
+from fourbar.writing import write_bytes
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+INK, MUTED, FAINT = "#1a1a1a", "#6b6b6b", "#d9d9d9"
+# Okabe and Ito's palette: told apart by colour-blind readers, and by lightness and dashes in grey
+BAR_COLOURS = {2: "#0072B2", 3: "#D55E00", 4: "#007A5A"}
+BAR_DASHES: dict[int, Any] = {2: "-", 3: (0, (5, 1.6)), 4: (0, (7, 1.6, 1.4, 1.6))}
+FORCE_COLOURS = dict(zip(PIN_FORCES, ("#0072B2", "#D55E00", "#8A3B78", "#007A5A"), strict=True))
+FORCE_DASHES: dict[str, Any] = dict(
+    zip(PIN_FORCES, ("-", (0, (5, 1.6)), (0, (1.4, 1.4)), (0, (7, 1.6, 1.4, 1.6))), strict=True)
+)
+FORCE_WIDTHS = dict(zip(PIN_FORCES, (2.6, 2.0, 1.6, 1.1), strict=True))
+"""Thick beneath thin: forces that are equal still show all four lines."""
+SETTINGS: dict[Any, Any] = {
+    "font.family": "DejaVu Sans",  # ships with matplotlib: the same picture on every machine
+    "font.size": 8.0,
+    "mathtext.fontset": "dejavusans",
+    "axes.titlesize": 8.5,
+    "axes.titleweight": "bold",
+    "axes.titlelocation": "left",
+    "axes.labelsize": 8.0,
+    "axes.edgecolor": INK,
+    "axes.linewidth": 0.7,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "axes.unicode_minus": True,
+    "axes.formatter.use_mathtext": True,
+    "axes.formatter.limits": (-4, 5),
+    "grid.color": "#e4e4e4",
+    "grid.linewidth": 0.6,
+    "lines.linewidth": 1.4,
+    "lines.solid_capstyle": "butt",
+    "legend.frameon": False,
+    "legend.fontsize": 7.5,
+    "legend.handlelength": 2.6,
+    "legend.columnspacing": 1.2,
+    "legend.borderaxespad": 0.0,
+    "legend.borderpad": 0.0,
+    "xtick.labelsize": 7.5,
+    "ytick.labelsize": 7.5,
+    "xtick.major.width": 0.7,
+    "ytick.major.width": 0.7,
+    "hatch.linewidth": 0.6,
+    "figure.facecolor": "white",
+    "savefig.facecolor": "white",
+    "svg.hashsalt": "fourbar",  # the same input gives the same bytes
+    "svg.fonttype": "path",
+    "pdf.fonttype": 42,
+}
+DPI = 200
+
+
+@contextmanager
+def matplotlib_style() -> Iterator[None]:
+    """The settings above, for the time of one drawing.
+
+    Raises DependencyError where matplotlib is not installed.
+    """
+    try:
+        import matplotlib as mpl
+    except ImportError:
+        raise DependencyError('drawing needs matplotlib: pip install "fourbar[plot]"') from None
+    with mpl.rc_context():
+        mpl.rcdefaults()  # a user's matplotlibrc does not change a published figure
+        mpl.rcParams.update(SETTINGS)
+        yield
+
+
+def save(figure: "Figure", path: Path, file_format: str) -> None:
+    """Write a figure whole or not at all, without a date in it."""
+    metadata: dict[str, dict[str, Any]] = {
+        "svg": {"Date": None, "Creator": "fourbar"},
+        "pdf": {"CreationDate": None, "Producer": None, "Creator": "fourbar"},
+        "png": {"Software": "fourbar"},
+    }
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format=file_format, dpi=DPI, metadata=metadata[file_format])
+    write_bytes(path, buffer.getvalue())
+
+
+CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f\u2028\u2029]+")
+
+
+def plain(text: str, width: int) -> str:
+    """A stranger's text as one line of at most `width` characters."""
+    line = " ".join(CONTROL.sub(" ", text).split())
+    return line if len(line) <= width else line[: width - 1].rstrip() + "…"
+
+
+PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
+
+
+def unit_for(largest: float, unit: str) -> tuple[float, str]:
+    """The factor from SI and the unit with the prefix that suits the largest magnitude."""
+    if not math.isfinite(largest) or largest <= 0.0:
+        return 1.0, unit
+    for size, prefix in PREFIXES:
+        if largest >= size:
+            return 1.0 / size, prefix + unit
+    return 1.0 / PREFIXES[-1][0], PREFIXES[-1][1] + unit
+
+
+def length_unit(largest: float) -> tuple[float, str]:
+    """Lengths in m, or in mm or µm where they are small."""
+    for size, unit in ((1e3, "km"), (1.0, "m"), (1e-3, "mm")):
+        if largest >= size:
+            return 1.0 / size, unit
+    return 1e6, "µm"
+
+
+def largest(*values: Array) -> float:
+    """Largest finite magnitude, or 0."""
+    flat = np.concatenate([np.abs(np.ravel(value)) for value in values])
+    flat = flat[np.isfinite(flat)]
+    return float(flat.max()) if flat.size else 0.0
+
+
+RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
+def number(value: float) -> str:
+    """Three significant digits, never in exponent form where four digits do."""
+    if value == 0.0:
+        return "0"
+    size = math.floor(math.log10(abs(value)))
+    if -3 <= size < 5:
+        text = f"{value:.{max(0, 2 - size)}f}"
+        return text.replace("-", "−")
+    mantissa, exponent = f"{value:.2e}".split("e")
+    return f"{mantissa}·10".replace("-", "−") + str(int(exponent)).translate(RAISED)
+
+
+def degree_ticks(axis: Any, span: float) -> None:
+    """Ticks at round numbers of degrees."""
+    from matplotlib.ticker import MultipleLocator
+
+    for step in (1, 2, 5, 10, 15, 30, 45, 60, 90, 180, 360):
+        if span / step <= 8.0:
+            axis.set_major_locator(MultipleLocator(step))
+            return
+
+
+def legend_above(axes: "Axes", columns: int = 4) -> None:
+    """The legend between title and panel, where it covers no curve; none where no curve has a value."""
+    if not axes.get_legend_handles_labels()[1]:
+        return
+    legend = axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.02), ncols=columns)
+    rows = math.ceil(len(legend.get_texts()) / columns)
+    axes.set_title(axes.get_title(loc="left"), pad=7.0 + 11.0 * rows)

@@ -1,0 +1,144 @@
+"""What `fourbar analyze` prints: JSON, CSV, or a table for the reader; the quantities are those of `Solution`."""
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from fourbar.linkage import BAR_NAMES, PIN_FORCE
+from fourbar.quantities import ANGLES, PIN_FORCES, STATUS_NAMES, UNITS
+from fourbar.scene import Scene
+from fourbar.scene.motion import BRANCH_NAMES
+from fourbar.show.bearing import bearing_load
+from fourbar.solution import Array, Solution
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+MOST_DIGITS = 16
+"""Of a double."""
+GAP = 2
+"""Blanks between two columns of the table, the divider among them."""
+
+
+def heading(scene: Scene, solution: Solution) -> list[str]:
+    """The lines above the table: what was asked, and how many of the positions have an answer."""
+    d, a, b, c = scene.linkage.lengths
+    drive = f"drive on bar {scene.drive_bar} ({BAR_NAMES[scene.drive_bar]})"
+    if scene.motion.free is not None:
+        drive = "released, no drive"
+    branch = BRANCH_NAMES[scene.motion.branch]
+    lines = [
+        f"ground {d:.6g} m, input {a:.6g} m, coupler {b:.6g} m, output {c:.6g} m",
+        f"{branch} branch; {drive}",
+    ]
+    counts = np.bincount(solution.status_code, minlength=len(STATUS_NAMES))
+    parts = [
+        f"{count} {name.replace('_', ' ')}" for name, count in zip(STATUS_NAMES, counts.tolist(), strict=True) if count
+    ]
+    lines.append(f"{len(solution)} position{'s' if len(solution) != 1 else ''}: " + ", ".join(parts))
+    if solution.stopped_at is not None:
+        lines.append(f"the motion ends at {solution.stopped_at:.6g} s: bars 3 and 4 lie in one line there")
+    if scene.motion.free is None and solution.torque is not None and np.isfinite(solution.torque).any():
+        worst = int(np.nanargmax(np.abs(solution.torque)))
+        where = math.degrees(solution.theta_2[worst])
+        lines.append(f"largest torque {solution.torque[worst]:.6g} N m at theta_2 = {where:.6g} deg")
+        lines += _warning(scene, solution)
+    if solution.F12 is not None and np.isfinite(solution.F12).any():
+        loads = {pin: bearing_load(solution, pin) for pin in PIN_FORCE}
+        parts = [f"{pin} {load.largest:.6g} N at {math.degrees(load.where):.6g} deg" for pin, load in loads.items()]
+        lines.append("largest pin loads: " + ", ".join(parts))
+    return lines
+
+
+def _warning(scene: Scene, solution: Solution) -> list[str]:
+    """Where the torque has few digits left, and how far from in line the two bars are that cost them."""
+    assert solution.torque is not None
+    if solution.torque_error is None or solution.drive_condition is None:
+        return []
+    # of torques that matter: one that passes through zero has no digits, and needs none
+    with np.errstate(invalid="ignore"):
+        share = solution.torque_error / np.maximum(np.abs(solution.torque), np.nanmedian(np.abs(solution.torque)))
+    if not np.nanmax(share, initial=0.0) > FEW_DIGITS:
+        return []
+    worst = int(np.nanargmax(share))
+    left = max(math.floor(-math.log10(share[worst])), 0)
+    where = f"at theta_2 = {math.degrees(solution.theta_2[worst]):.6g} deg"
+    sines = {"3 and 4": abs(solution.sin_mu[worst])}
+    if scene.drive_bar != 2:
+        sines[{3: "2 and 4", 4: "2 and 3"}[scene.drive_bar]] = solution.drive_condition[worst]
+    bars = min(sines, key=lambda pair: sines[pair])
+    gap = math.asin(min(sines[bars], 1.0))
+    return [f"{left} digits left of T{scene.drive_bar} {where}: bars {bars} are {gap:.2g} rad from being in line"]
+
+
+FEW_DIGITS = 1e-8
+"""Relative error of the torque above which the heading says so: half of what a double carries is lost."""
+
+
+def columns(solution: Solution, *, degrees: bool = True) -> dict[str, list[str]]:
+    """The columns of the table, most wanted first: heading with unit -> cells."""
+    unit, factor = ("deg", 180.0 / math.pi) if degrees else ("rad", 1.0)
+    shown: dict[str, list[str]] = {}
+    if solution.time is not None:
+        shown["time\ns"] = _cells(solution.time)
+    shown[f"theta_2\n{unit}"] = _cells(solution.theta_2 * factor, "angle")
+    if solution.torque is not None:
+        if solution.time is None:  # released, it has no drive: its torque is rounding
+            shown[f"T{solution.drive_bar}\nN m"] = _cells(solution.torque)
+            shown["digits\nof T"] = _digits(solution)
+        for name in PIN_FORCES:
+            shown[f"|{name}|\nN"] = _cells(np.hypot(*getattr(solution, name).T))
+    for name in ANGLES:
+        shown[f"{name}\n{unit}"] = _cells(getattr(solution, name) * factor, "angle")
+    for name in ("omega_3", "omega_4", "alpha_3", "alpha_4"):
+        values = getattr(solution, name)
+        if values is not None:
+            shown[f"{name}\n{UNITS[name]}"] = _cells(values)
+    shown["sin mu\n"] = _cells(solution.sin_mu)
+    return shown
+
+
+def table(solution: Solution, width: int | None, *, degrees: bool = True) -> "tuple[Table, list[str]]":
+    """The table for a terminal of the given width (None: as wide as it needs), and the columns left out of it."""
+    from rich import box
+    from rich.table import Table
+    from rich.text import Text
+
+    cells = columns(solution, degrees=degrees)
+    if (solution.status_code != 0).any():
+        cells = {"status\n": [status.replace("_", " ") for status in solution.status], **cells}
+    needed = -GAP
+    kept: list[str] = []
+    for name, column in cells.items():
+        needed += GAP + max(len(cell) for cell in (*name.split("\n"), *column))
+        if width is not None and needed > width:
+            break
+        kept.append(name)
+    shown = Table(box=box.SIMPLE_HEAD, show_edge=False, pad_edge=False, padding=(0, GAP - 1, 0, 0))
+    for name in kept:
+        shown.add_column(Text(name), justify="right", no_wrap=True)
+    for row in zip(*(cells[name] for name in kept), strict=True):
+        shown.add_row(*(Text(cell) for cell in row))
+    return shown, [name.split("\n")[0] for name in cells if name not in kept]
+
+
+def _cells(values: Array, kind: str = "") -> list[str]:
+    """Six digits; angles with four decimals; a dash where there is no value."""
+    form = "{:.4f}" if kind == "angle" else "{:.6g}"
+    return [form.format(value) if math.isfinite(value) else "-" for value in values.tolist()]
+
+
+def _digits(solution: Solution) -> list[str]:
+    """How many digits of the torque are not rounding."""
+    if solution.torque is None or solution.torque_error is None:
+        return ["-"] * len(solution)
+    cells = []
+    for value, error in zip(solution.torque.tolist(), solution.torque_error.tolist(), strict=True):
+        if not math.isfinite(value) or not math.isfinite(error):
+            cells.append("-")
+        elif value == 0.0 or error == 0.0:
+            cells.append(str(MOST_DIGITS) if error == 0.0 else "0")
+        else:
+            cells.append(str(min(max(math.floor(math.log10(abs(value) / error)), 0), MOST_DIGITS)))
+    return cells

@@ -1,0 +1,42 @@
+"""In words, what a linkage can do whatever drives it: swings, limit positions, change points, transmission."""
+
+import math
+from collections.abc import Iterator
+
+from fourbar.formulas.mobility import change_points, limit_positions, swing, time_ratio, turns_fully
+from fourbar.formulas.transmission import transmission_extremes
+from fourbar.linkage import BAR_NAMES, MOVING_BARS, FourBar
+from fourbar.scene.motion import BRANCH_NAMES
+
+BRANCHES = {**BRANCH_NAMES, 0: "both"}
+
+
+def told(linkage: FourBar) -> Iterator[str]:
+    """Line by line; angles in deg, digits as far as a drawing needs them."""
+    swings = [f"{BAR_NAMES[bar]} {_deg(swing(linkage, bar))}" for bar in MOVING_BARS if not turns_fully(linkage, bar)]
+    if swings:
+        yield f"bars that swing: {', '.join(swings)}"
+    limits = [(bar, limit) for bar in MOVING_BARS for limit in limit_positions(linkage, bar)]
+    if limits:
+        names = "".join(f"{name:>10}" for name in ("theta_2", "theta_3", "theta_4"))
+        yield f"{'limit positions (deg)':<34}{names}  branch"
+    for bar, limit in limits:
+        one, other = (BAR_NAMES[number] for number in MOVING_BARS if number != bar)
+        what = f"  {BAR_NAMES[bar]}: {one}, {other} {'stretched' if limit.stretched else 'folded'}"
+        angles = "".join(f"{math.degrees(angle):10.4f}" for angle in limit[:3])
+        yield f"{what:<34}{angles}  {BRANCHES[limit.branch]}"
+    if points := change_points(linkage):
+        yield f"change points: theta_2 = {' and '.join(_deg(point) for point in points)}"
+    found = transmission_extremes(linkage)
+    yield (
+        f"angle between coupler and output: {_deg(found.least)} at theta_2 = {_deg(found.theta_2_least)} "
+        f"to {_deg(found.greatest)} at {_deg(found.theta_2_greatest)}"
+    )
+    if found.worst > 0.0:
+        yield f"smallest transmission angle: {_deg(found.worst)}"
+    if (ratio := time_ratio(linkage)) is not None:
+        yield f"slower stroke of the output over the faster, at constant omega_2: {ratio:.4f}"
+
+
+def _deg(angle: float) -> str:
+    return f"{math.degrees(angle):.4f} deg"

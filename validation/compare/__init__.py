@@ -1,0 +1,1 @@
+"""An answer against the formulas: tolerances, scales, errors, rows, identities."""

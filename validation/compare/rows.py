@@ -1,0 +1,112 @@
+"""The flat sorted table that joins run and report: one row per scene, engine, setting and quantity."""
+
+import csv
+import io
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+
+from fourbar.writing import write_text
+from validation.compare.plain import plain
+
+AGREES, DEGRADED, UNTOLD, REFUSES, FAILS = (
+    *("agrees", "degraded as predicted"),
+    *("nothing can be told", "refuses", "fails"),
+)
+VERDICTS = (AGREES, DEGRADED, UNTOLD, REFUSES, FAILS)
+"""From the best to the worst."""
+HELD = (AGREES, DEGRADED)
+COMPARED = (*HELD, FAILS)
+"""Of the others nothing was compared: no digit of the quantity is left to be told, or the engine declared a limit."""
+
+
+@dataclass(frozen=True, slots=True, order=True)
+class Row:
+    """One comparison at the position where error/allowed is worst."""
+
+    scene: str
+    engine: str
+    setting: str
+    quantity: str
+    error: float
+    """Relative to the scale of the quantity (angles: rad); NaN where there is no answer."""
+    allowed: float
+    passed: bool = field(init=False)
+    """Whether it was compared and holds; the verdict decides."""
+    verdict: str
+    reason: str
+    theta_2: float
+    condition: float
+
+    def __post_init__(self) -> None:
+        """Raise ValueError for a verdict that nobody knows, and for one that holds without a number."""
+        if self.verdict not in VERDICTS or (self.verdict in HELD and math.isnan(self.error)):
+            raise ValueError(f"{self.verdict!r} is no verdict on an error of {self.error!r}")
+        object.__setattr__(self, "passed", self.verdict in HELD)
+
+    @property
+    def compared(self) -> bool:
+        """Whether anything was compared."""
+        return self.verdict in COMPARED
+
+    @property
+    def failed(self) -> bool:
+        """Whether it was compared and does not hold, or an answer that was due is missing."""
+        return self.verdict == FAILS
+
+
+COLUMNS = tuple(column.name for column in fields(Row))
+
+
+def sorted_rows(rows: Iterable[Row]) -> list[Row]:
+    """The rows by scene, engine, setting and quantity."""
+    return sorted(rows, key=lambda row: (row.scene, row.engine, row.setting, row.quantity))
+
+
+def to_csv(rows: Iterable[Row]) -> str:
+    """The table as text, sorted, floats as repr, a missing number left empty."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(COLUMNS)
+    for row in sorted_rows(rows):
+        writer.writerow([_cell(getattr(row, name)) for name in COLUMNS])
+    return text.getvalue()
+
+
+def _cell(value: object) -> str:
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, float):
+        return "" if math.isnan(value) else repr(value)
+    return str(value)
+
+
+def from_csv(path: Path) -> list[Row]:
+    """Read a table written by `to_csv`."""
+    with path.open(newline="", encoding="utf-8") as file:
+        records = list(csv.DictReader(file))
+
+    def number(cell: str) -> float:
+        return float(cell) if cell else math.nan
+
+    return [
+        Row(
+            plain(record["scene"]),
+            plain(record["engine"]),
+            plain(record["setting"]),
+            plain(record["quantity"]),
+            number(record["error"]),
+            number(record["allowed"]),
+            plain(record["verdict"]),
+            plain(record["reason"]),
+            number(record["theta_2"]),
+            number(record["condition"]),
+        )
+        for record in records
+    ]
+
+
+def write_results(rows: Iterable[Row], path: Path) -> None:
+    """Write the table, all of it or nothing."""
+    write_text(path, to_csv(rows))

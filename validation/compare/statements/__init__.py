@@ -1,0 +1,1 @@
+"""What the formulas state of a linkage whatever its motion, asked of the engines."""

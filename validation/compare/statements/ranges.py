@@ -1,0 +1,88 @@
+"""Where each bar can stand: within its stated range the engine closes the loop, just beyond each limit it does not.
+
+The loop is a sum of vectors, d u_1 = a u_2 + b u_3 - c u_4, and any moving bar may come first in it: an engine
+that turns bar 2 alone is given the linkage with bar k in that place. The distance that the other two bars have to
+span grows steadily while bar k turns from the ground's direction to the opposite one, so the answers beyond and on
+the limits and along the ground settle every angle.
+"""
+
+import math
+from collections.abc import Iterator
+from fractions import Fraction
+
+import numpy as np
+
+from fourbar.formulas import mobility
+from fourbar.linkage import MOVING_BARS, FourBar
+from fourbar.scene import Command, Scene
+from validation.compare.answer import Engine
+from validation.compare.compare import TOUCHING_MARGIN, closing_margin
+from validation.compare.statements.finding import TURN, Finding, same
+from validation.compare.tolerance import EPS, EQUIVALENCE
+
+BESIDE = 4.0 * TOUCHING_MARGIN
+"""Of the sum of the lengths: by this much the loop closes, or misses, beside a limit where the engine is asked."""
+
+LENGTHS_ROUNDED = (EPS / 4.0, EPS)
+"""Of the perimeter: the lengths were rounded themselves, and between these two a change point may be stated or not."""
+
+
+def ranges(linkage: FourBar, engine: Engine) -> Iterator[Finding]:
+    """Ranges, limits and full turns of every moving bar, the range of a sweep, and the change points."""
+    for bar in MOVING_BARS:
+        yield from _of_bar(linkage, bar, engine)
+    yield _change_points(linkage)
+
+
+def _change_points(linkage: FourBar) -> Finding:
+    """By the exact sums of the lengths: which of the two positions with input and ground in line have all bars so."""
+    d, a, b, c = (Fraction(length) for length in linkage.lengths)
+    missing = {0.0: abs(abs(d - a) - abs(b - c)), math.pi: abs(d + a - b - c)}
+    stated, wrong, known = mobility.change_points(linkage), 0, 0
+    for psi, gap in missing.items():
+        part, angle = float(gap / (d + a + b + c)), linkage.ground_angle + psi
+        allowed = EQUIVALENCE.factor * max(1.0, abs(angle))
+        here = any(abs(math.remainder(point - angle, TURN)) <= allowed for point in stated)
+        known += here
+        wrong += part > LENGTHS_ROUNDED[1] if here else part < LENGTHS_ROUNDED[0]
+    return Finding(float(wrong + len(stated) - known), 0.0, linkage.ground_angle, "change points")
+
+
+def beside(linkage: FourBar, theta_2: float) -> float:
+    """The angle, rad, by which bar 2 turns until the loop closes, or misses, by BESIDE more."""
+    d, a, *_ = linkage.lengths
+    psi, little = theta_2 - linkage.ground_angle, BESIDE * sum(linkage.lengths)
+    e = max(abs(d - a * np.exp(1j * psi)), little)
+    # e grows by d a sin(psi)/e to first order, by d a/(2 e) to second where the bar lies along the ground
+    slope = max(d * a * abs(math.sin(psi)) / e, math.sqrt(0.5 * little * d * a / e))
+    return float(little / slope) + 4.0 * EPS * (abs(theta_2) + TURN)
+
+
+def _of_bar(linkage: FourBar, bar: int, engine: Engine) -> Iterator[Finding]:
+    second, third = (linkage.bar(k) for k in MOVING_BARS if k != bar)
+    first = FourBar(linkage.ground, linkage.bar(bar), second, third, linkage.ground_angle)
+    shift = math.pi if bar == 4 else 0.0  # the loop runs along bar 4 from B to O4
+    spans, full = mobility.intervals(linkage, bar), mobility.turns_fully(linkage, bar)
+    expected = [((start + stop) / 2.0, True) for start, stop in spans]
+    # that the loop closes up to its limits is seen where the limit positions themselves are asked for
+    for i, (start, stop) in enumerate(() if full else spans):
+        before, after = (start - spans[i - 1][1]) % TURN, (spans[i + 1 - len(spans)][0] - stop) % TURN
+        expected.append((start - min(beside(first, start + shift), 0.5 * before), False))
+        expected.append((stop + min(beside(first, stop + shift), 0.5 * after), False))
+    along = [linkage.ground_angle + angle - shift for angle in (0.0, math.pi)]  # the ground, either way
+    within = [any((angle - start) % TURN < stop - start for start, stop in spans) for angle in along]
+    expected += zip(along, within, strict=True)
+    if bar == 2:
+        expected += [(angle, True) for angle in mobility.default_range(linkage)]
+    angles = np.array([angle for angle, _ in expected])
+    told = np.abs(closing_margin(Scene(first), angles + shift)) > TOUCHING_MARGIN
+    closes = engine.answer(Scene(first), Command(angles + shift, np.ones(len(angles), np.int8), None, 0.0)).assembled
+    assert closes is not None
+    wrong = told & (closes != [inside for _, inside in expected])
+    where = float(angles[int(np.argmax(wrong))])
+    said = f"bar {bar} at {where!r} rad: the engine finds the opposite" if wrong.any() else "closes where stated"
+    yield Finding(float(np.count_nonzero(wrong)), 0.0, where, said)
+    limits = [limit[MOVING_BARS.index(bar)] for limit in mobility.limit_positions(linkage, bar)]
+    yield same(f"limits of bar {bar}", limits, [] if full else [end for span in spans for end in span])
+    yield same(f"swing of bar {bar}", [mobility.swing(linkage, bar)], [spans[0][1] - spans[0][0]])
+    yield Finding(float(full != all(within)), 0.0, where, f"whether bar {bar} turns fully")

@@ -1,0 +1,63 @@
+"""The scene in 320-bit ball arithmetic as a witness: the loop as a quadratic, all thirteen equations, no shortcuts."""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from fourbar.effects import Friction, Gravity, Viscous
+from fourbar.quantities import VECTORS
+from fourbar.scene import Command, Scene
+from validation.compare.answer import Answer
+from validation.compare.compare import COMPARED
+
+NAME = "ball-arithmetic"
+KNOWN = (Gravity, Viscous, Friction)
+
+
+class BallArithmetic:
+    """Every compared quantity at each position, rounded once from 320 bits."""
+
+    name = NAME
+
+    def answer(self, scene: Scene, command: Command) -> Answer:
+        """Its answer, or the refusal that names an effect it does not know."""
+        from flint import arb, ctx
+
+        from validation.engines.balls import BITS, inputs, outputs
+
+        for effect in scene.effects:
+            if not isinstance(effect, KNOWN):
+                return Answer(NAME, "exact", refusal=f"the effect {effect.key!r} has no model here")
+        ctx.prec = BITS
+        n = len(command.theta_2)
+        names = [q for q in COMPARED if command.omega_2 is not None or q.startswith("theta")]
+        out = {name: np.full((n, 2) if name in VECTORS else n, np.nan) for name in names}
+        assembled = np.zeros(n, dtype=bool)
+        omega = np.broadcast_to(np.asarray(0.0 if command.omega_2 is None else command.omega_2, float), (n,))
+        alpha = np.broadcast_to(np.asarray(command.alpha_2, float), (n,))
+        for i in range(n):
+            stored = inputs(scene, float(command.theta_2[i])) | {"omega_2": omega[i], "alpha_2": alpha[i]}
+            exact = {name: arb(float(value)) for name, value in stored.items()}
+            values = outputs(scene, int(command.branch[i]), exact, scene.drive_bar)
+            if values is None:
+                continue
+            assembled[i] = True
+            for name, array in out.items():
+                if name in VECTORS:
+                    array[i] = _number(values.get(f"{name}_x")), _number(values.get(f"{name}_y"))
+                else:
+                    array[i] = _number(values.get(name))
+        return Answer(
+            NAME,
+            "exact",
+            at=command,
+            assembled=assembled,
+            quantities=out,
+            shared="the description, theta_2, omega_2, alpha_2 and the branch",
+            own="closure as a complex quadratic, linear speeds and accelerations, thirteen Newton-Euler equations",
+        )
+
+
+def _number(ball: Any) -> float:
+    return math.nan if ball is None else float(ball.mid())

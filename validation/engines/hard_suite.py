@@ -1,0 +1,57 @@
+"""The hard cases as a suite of a run, and the witnesses with their predictions."""
+
+from dataclasses import dataclass, field, replace
+
+from fourbar.scene import Scene
+from validation.compare.tolerance import FULL_ACCURACY, SIMULATED
+from validation.engines.witnesses import WITNESSES, Witness
+from validation.scenes.hard_families import FAMILIES
+
+PREDICTION = "validation.engines.prediction:"
+PREDICTORS = {"pinocchio-inverse": "in_world_axes", "mujoco-inverse": "about_mass_centre"}
+"""How each exact engine measures lever arms; others work with the data as they are."""
+BALLS = Witness("ball-arithmetic", "validation.engines.exact:BallArithmetic", FULL_ACCURACY, library="flint")
+
+
+def predicting(witness: Witness) -> Witness:
+    """The witness held to full accuracy, or else to the error predicted for each position."""
+    if witness.tolerance is SIMULATED:
+        return witness
+    predictor = PREDICTION + PREDICTORS.get(witness.name, "from_data")
+    return replace(witness, tolerance=FULL_ACCURACY, predictor=predictor)
+
+
+HARD_WITNESSES = tuple(predicting(witness) for witness in (BALLS, *WITNESSES))
+
+
+@dataclass(frozen=True, slots=True)
+class Hard:
+    """Every scene of every family, by name; a worker makes them again from the parameters alone."""
+
+    families: tuple[str, ...] = tuple(family.name for family in FAMILIES)
+    _scenes: list[tuple[str, Scene]] = field(default_factory=list, compare=False, repr=False)
+
+    def _all(self) -> list[tuple[str, Scene]]:
+        if not self._scenes:
+            for family in FAMILIES:
+                if family.name in self.families:
+                    for label, scene in family.scenes():
+                        said = replace(scene, title=f"{family.name}: {label}", source=family.statement)
+                        self._scenes.append((f"{family.name} {label}".replace(" ", "-"), said))
+            self._scenes.sort(key=lambda pair: pair[0])
+        return self._scenes
+
+    def __len__(self) -> int:
+        return len(self._all())
+
+    def name(self, index: int) -> str:
+        """Name of a scene; ascending."""
+        return self._all()[index][0]
+
+    def scene(self, index: int) -> Scene:
+        """The scene itself."""
+        return self._all()[index][1]
+
+    def fingerprint(self) -> str:
+        """The families by name, and how many scenes they make."""
+        return f"hard {' '.join(self.families)} {len(self)}"

@@ -1,0 +1,159 @@
+"""What the engines cannot do, as data: where, why, and a measurement that says whether it is still so.
+
+`holds(x)` asks the engine itself at the value x of the limited quantity. It must hold at `inside` and not
+at `outside`: an engine upgrade that lifts a limit, or makes it worse, is then noticed by the test.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fourbar.linkage import Bar
+from fourbar.mjcf.document import load_ratio
+from fourbar.scene import Scene, command
+from fourbar.scene.motion import Motion
+from validation.compare.answer import Answer
+from validation.compare.tolerance import SIMULATED
+from validation.engines.mujoco.limits import FASTEST, HEAVIEST, NEAREST_CENTRE, NEAREST_TOGGLE, SLOWEST, Boundary
+from validation.scenes.hard_families import loads, sweep_of, with_bars
+from validation.scenes.hard_linkages import at, dressed, linkage_of
+from validation.scenes.random import LinkageType
+
+
+@dataclass(frozen=True, slots=True)
+class Limit:
+    """One limit of one engine."""
+
+    engine: str
+    what: str
+    unit: str
+    boundary: float
+    reason: str
+    inside: float
+    outside: float
+    holds: Callable[[float], bool]
+
+
+def _simulated(scene: Scene) -> Answer:
+    """The simulation itself, its declared limits not asked."""
+    from fourbar.mjcf import RECIPE
+    from validation.engines.mujoco import simulate
+
+    return simulate._Simulation(RECIPE, scene, command(scene), bounded=False).answer()
+
+
+def _healthy(scene: Scene) -> bool:
+    return not _simulated(scene).alarms
+
+
+def _near_toggle(sine: float) -> bool:
+    """Whether a sweep that ends where |sin mu| has this value is followed without an alarm."""
+    d, a, b, c = linkage_of(LinkageType.TRIPLE_ROCKER, 1)
+    cosine = -math.sqrt(1.0 - sine * sine)
+    squared = b * b + c * c - 2.0 * b * c * cosine
+    psi = math.acos((d * d + a * a - squared) / (2.0 * d * a))
+    return _healthy(at(dressed((d, a, b, c), 1), np.linspace(psi - 0.5, psi, 20)))
+
+
+def _base() -> Scene:
+    return sweep_of(dressed((0.3, 0.1, 0.25, 0.22)))
+
+
+def _at_speed(omega_2: float, *, bare: bool = False) -> bool:
+    base = _base()
+    scene = replace(base, motion=replace(base.motion, omega_2=omega_2))
+    return _healthy(replace(scene, loads=(), effects=()) if bare else scene)
+
+
+def _crank_acceleration(value: float) -> bool:
+    answer = _simulated_bare(math.sqrt(value / 0.1))
+    return not answer.alarms and answer.evidence["force_gap"] < 1e-3
+
+
+def _simulated_bare(omega_2: float) -> Answer:
+    base = _base()
+    return _simulated(replace(base, motion=replace(base.motion, omega_2=omega_2), loads=(), effects=()))
+
+
+def _loaded(ratio: float) -> bool:
+    (_, scene), *_ = loads(exponents=(3,))
+    times = ratio / load_ratio(scene)
+    heavier = tuple(
+        replace(load, force=load.force and (load.force[0] * times, load.force[1]), moment=load.moment * times)
+        for load in scene.loads
+    )
+    answer = _simulated(replace(scene, loads=heavier))
+    return not answer.alarms and answer.evidence["acceleration_gap"] < SIMULATED.factor
+
+
+def _compiles(inertia: float) -> bool:
+    from validation.engines.mujoco.inverse import MujocoTree
+
+    base = _base()
+    bar: Bar = base.linkage.output
+    try:
+        MujocoTree(with_bars(base, output=replace(bar, inertia=inertia)))
+    except ValueError:
+        return False
+    return True
+
+
+def _centre_kept(r: float) -> bool:
+    """Whether the compiled MJCF places a mass centre at this distance from its pin where it was put."""
+    from fourbar.mjcf import RECIPE, mjcf
+    from validation.engines.mujoco.closed_loop import ClosedLoop
+
+    base = _base()
+    scene = with_bars(base, output=replace(base.linkage.output, centre=(r, 0.5)))
+    return ClosedLoop(mjcf(scene, replace(RECIPE, timestep=1e-3), keyframe=False)).keeps_centre("output")
+
+
+def _proximal(mu: float) -> bool:
+    """Whether Pinocchio's constrained acceleration is a number with this proximal parameter."""
+    from validation.engines import pinocchio_released as forward
+
+    scene = replace(_base(), loads=(), motion=Motion(1.0, 3.0))
+    kept = forward.PROXIMAL
+    try:
+        forward.PROXIMAL = (kept[0], mu, kept[2] if mu else 1)
+        released = forward.PinocchioReleased().release(scene, np.array([0.0, 0.01]))
+    finally:
+        forward.PROXIMAL = kept
+    return bool(np.isfinite(released.theta_2).all())
+
+
+def _declared(boundary: Boundary, inside: float, outside: float, holds: Callable[[float], bool]) -> Limit:
+    return Limit(
+        "mujoco-simulated", boundary.name, boundary.unit, boundary.boundary, boundary.reason, inside, outside, holds
+    )
+
+
+LIMITS = (
+    _declared(NEAREST_TOGGLE, 0.06, 0.01, _near_toggle),
+    _declared(FASTEST, 3e4, 3e5, _at_speed),
+    _declared(SLOWEST, 1e-10, 1e-11, _crank_acceleration),
+    _declared(HEAVIEST, 1e10, 1e11, _loaded),
+    _declared(NEAREST_CENTRE, 2e-6, 5e-7, _centre_kept),
+    Limit(
+        "mujoco-inverse and mujoco-simulated",
+        "mass or inertia of a moving bar, least",
+        "kg or kg m^2",
+        1e-15,
+        "mjMINVAL: the compiler raises ValueError for a moving body below it",
+        1.001e-15,
+        0.999e-15,
+        _compiles,
+    ),
+    Limit(
+        "pinocchio-forward",
+        "mu of the proximal iteration, least",
+        "1",
+        0.0,
+        "the third row of the planar loop is redundant: without proximal regularisation every number is NaN",
+        1e-8,
+        0.0,
+        _proximal,
+    ),
+)

@@ -1,0 +1,127 @@
+"""Who is asked: each witness, where its adapter lives, what it needs, and what it is held to."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from importlib import import_module
+from importlib.util import find_spec
+from typing import NamedTuple
+
+import numpy as np
+
+from fourbar.quantities import ANGLES
+from fourbar.scene import Command, Scene
+from validation.compare.answer import Answer, Engine
+from validation.compare.compare import COMPARED
+from validation.compare.tolerance import EQUIVALENCE, SIMULATED, Array, Tolerance
+
+
+@dataclass(frozen=True, slots=True)
+class Witness:
+    """An engine that the harness asks, where its adapter lives, and what it is held to."""
+
+    name: str
+    adapter: str
+    """ "module:class"; imported when it is asked, so a missing engine costs only its own rows."""
+    tolerance: Tolerance
+    expected: tuple[str, ...] = COMPARED
+    order: str = ""
+    """ "module:function" that runs the engine at two coarser timesteps; its observed order is shown."""
+    positions: tuple[str, ...] = ()
+    """What it is held to where only positions are asked for; nothing: it is then not started."""
+    through_time: bool = False
+    """Whether it runs through the motion in time."""
+    predictor: str = ""
+    """ "module:function" that predicts errors from the description; "own": the engine's own residuals do."""
+    library: str = ""
+    """The module that its adapter imports, a key of `REQUIREMENT`; nothing: it needs no more than the formulas."""
+
+    def engine(self) -> Engine:
+        """The adapter."""
+        module, _, name = self.adapter.partition(":")
+        return getattr(import_module(module), name)()  # type: ignore[no-any-return]
+
+    def missing(self) -> str | None:
+        """Why it cannot be asked in this environment, or None."""
+        return not_installed(self.library) if self.library else None
+
+
+REQUIREMENT = {"mujoco": "fourbar[mujoco]", "pinocchio": "fourbar[pinocchio]", "flint": "python-flint"}
+"""Module of an engine: what pip installs it by."""
+
+
+def not_installed(library: str) -> str | None:
+    """The reason to give where a module cannot be found, or None; one that is found but broken fails in its rows."""
+    try:
+        found = find_spec(library) is not None
+    except ModuleNotFoundError:
+        found = False
+    return None if found else f'{library} is not installed: pip install "{REQUIREMENT[library]}"'
+
+
+class Work(NamedTuple):
+    """What the time of an answer goes into."""
+
+    short: str
+    """For a legend."""
+    said: str
+    """For a table."""
+
+
+ONE_BY_ONE = (
+    "each position by itself, in Python: Newton on its own gap, its own speeds and accelerations, then inverse "
+    "dynamics with the loop's multipliers: pin forces and torque"
+)
+WORK = {
+    "formulas": Work(
+        "forces and torque, all positions at once",
+        "all positions in one call on arrays: angles, speeds, accelerations, pin forces and torque",
+    ),
+    "pinocchio-inverse": Work("assembly, forces and torque, one by one", ONE_BY_ONE),
+    "mujoco-inverse": Work("assembly, forces and torque, one by one", ONE_BY_ONE),
+    "mujoco-simulated": Work(
+        "steps from position to position, forces and torque",
+        "one motion: every position assembled, the model compiled, Runge-Kutta steps from position to position (the "
+        "fewer positions, the dearer each), then pin forces and torque read",
+    ),
+    "free-body": Work(
+        "thirteen equations, all positions at once",
+        "all positions in one call on arrays: Newton on the closure, speeds and accelerations, thirteen equations each "
+        "for pin forces and torque",
+    ),
+    "ball-arithmetic": Work(
+        "forces and torque in many digits, one by one",
+        "each position by itself, in Python, in many digits with an error bound: pin forces and torque",
+    ),
+}
+"""By witness: what is compared is not the same work."""
+WITNESSES = (
+    Witness("pinocchio-inverse", "validation.engines.pinocchio:PinocchioInverse", EQUIVALENCE, library="pinocchio"),
+    Witness("mujoco-inverse", "validation.engines.mujoco.inverse:MujocoInverse", EQUIVALENCE, library="mujoco"),
+    Witness(
+        "mujoco-simulated",
+        "validation.engines.mujoco.simulate:MujocoSimulated",
+        SIMULATED,
+        order="validation.engines.mujoco.simulate:observed_order",
+        through_time=True,
+        predictor="own",
+        library="mujoco",
+    ),
+    Witness("free-body", "validation.engines.free_body:FreeBody", EQUIVALENCE, positions=ANGLES),
+)
+
+
+def predicting_from(
+    witness: Witness, scene: Scene, at: Command, answer: Answer
+) -> Callable[[], dict[str, Array]] | None:
+    """What computes the errors to be expected, should any be called for; an alarm leaves an engine no own excuse."""
+    if not witness.predictor or answer.refusal is not None:
+        return None
+    if witness.predictor == "own":
+        if answer.alarms:
+            return None
+        zero = np.zeros(len(at.theta_2))
+        return lambda: {quantity: answer.predicted.get(quantity, zero) for quantity in witness.expected}
+    module, _, name = witness.predictor.partition(":")
+    predict = getattr(import_module(module), name)
+    return cache(lambda: predict(scene, at, witness.expected))

@@ -1,0 +1,183 @@
+"""The page "where it gets hard": error against distance to the singular position, per engine, and the limits."""
+
+import base64
+import html
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from fourbar.quantities import OK
+from fourbar.scene import Command, Scene, command
+from fourbar.solve import solve
+from validation.compare.answer import Answer, Array
+from validation.compare.compare import angle_aware_difference
+from validation.compare.scales import divisor, magnitude
+from validation.compare.tolerance import DEGRADED, EPS, K, condition_of
+from validation.engines.hard_suite import HARD_WITNESSES
+from validation.engines.limits import LIMITS, Limit
+from validation.engines.prediction import in_world_axes
+from validation.engines.witnesses import Witness
+from validation.report.colours import OTHER, STYLES, declarations
+from validation.report.svg import drawn, inline
+from validation.scenes.hard_families import CHANGE_POINTS, CRANK, FAMILIES, ROCKER
+from validation.scenes.hard_linkages import at, collinear_2_3, collinear_3_4, dressed, linkage_of
+
+DISTANCES = np.logspace(-1, -12, 23)
+"""rad from the singular position."""
+INK = "#777777"
+"""Grey that reads on white and on black."""
+FLOOR = 1e-17
+"""Differences of exactly zero are drawn here."""
+SHOWN = ("torque", "F32")
+SIMULATED_FROM = 3e-3
+"""rad; nearer than this the simulation refuses."""
+
+
+@dataclass(frozen=True, slots=True)
+class Approach:
+    """One way towards a singular position."""
+
+    title: str
+    scene: Scene
+    distances: Array
+
+
+def approaches() -> list[Approach]:
+    """A toggle, a pole of T4, a change point."""
+    rocker, crank = linkage_of(ROCKER, 1), linkage_of(CRANK, 0)
+    (limit, stretched), *_ = collinear_3_4(rocker)
+    (pole, branch), *_ = collinear_2_3(crank)
+    lengths, _, (_, half_turn) = CHANGE_POINTS["parallelogram"]
+    near = DISTANCES[DISTANCES >= 0.99e-8]
+    inward = -1.0 if stretched else 1.0
+    return [
+        Approach("toggle: bars 3, 4 collinear", at(dressed(rocker, 1), limit + inward * DISTANCES), DISTANCES),
+        Approach("pole of T4: omega_4 = 0", at(dressed(crank), pole + DISTANCES, branch, drive_bar=4), DISTANCES),
+        # on the branch that crosses: the one that stays parallel is regular
+        Approach("change point of a parallelogram", at(dressed(lengths), half_turn + near, 1), near),
+    ]
+
+
+def errors(scene: Scene, quantity: str, witness: Witness) -> tuple[Array, Array] | None:
+    """(theta_2, error relative to the value itself) of one engine, or None where it refuses."""
+    where = command(scene)
+    if witness.name == "mujoco-simulated":
+        psi = np.abs(where.theta_2 - where.theta_2[0]) - abs(where.theta_2[-1] - where.theta_2[0])
+        where = Command(where.theta_2[-psi > SIMULATED_FROM], where.branch[-psi > SIMULATED_FROM], *where[2:4])
+    answer: Answer = witness.engine().answer(scene, where)
+    if answer.refusal is not None or quantity not in answer.quantities or answer.at is None:
+        return None
+    ours = solve(scene, "force", at=answer.at)
+    values = getattr(ours, quantity)
+    error = angle_aware_difference(quantity, values, answer.quantities[quantity]) / divisor(magnitude(values))
+    keep = (ours.status_code == OK) & np.isfinite(error)
+    return answer.at.theta_2[keep], np.maximum(error[keep], FLOOR)
+
+
+def picture() -> str:
+    """SVG that stands by itself: a column per singular position, a row per quantity; law and prediction drawn in."""
+    from matplotlib.backends.backend_svg import FigureCanvasSVG
+    from matplotlib.figure import Figure
+
+    ways = approaches()
+    figure = Figure(figsize=(10.5, 6.4), layout="constrained", facecolor="none")
+    FigureCanvasSVG(figure)
+    axes = figure.subplots(len(SHOWN), len(ways), squeeze=False, sharex="col")
+    for column, way in enumerate(ways):
+        for row, quantity in enumerate(SHOWN):
+            _draw(axes[row][column], way, quantity)
+        axes[0][column].set_title(way.title, fontsize=9)
+        axes[-1][column].set_xlabel("distance in theta_2 [rad]")
+    for row, quantity in enumerate(SHOWN):
+        axes[row][0].set_ylabel(f"error of {quantity}, of its own size")
+    handles, labels = axes[0][0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper center", ncols=4, frameon=False, fontsize=8)
+    return drawn(figure, "where it gets hard")
+
+
+def _draw(axes: Any, way: Approach, quantity: str) -> None:
+    solution = solve(way.scene, "force")
+    values = divisor(magnitude(getattr(solution, quantity)))
+    singular = _singular(way)
+    predicted = in_world_axes(way.scene, command(way.scene), (quantity,))[quantity] / values
+    law = K * EPS / condition_of(quantity, way.scene.linkage, solution)
+    shown = np.isfinite(predicted)
+    axes.loglog(way.distances, law, color=INK, linestyle=(0, (1, 1)), linewidth=1, label="law K eps/condition")
+    axes.fill_between(
+        way.distances[shown],
+        predicted[shown],
+        DEGRADED * predicted[shown],
+        color=INK,
+        alpha=0.25,
+        linewidth=0,
+        label="computed: predicted to ten times that",
+    )
+    for witness in HARD_WITNESSES:
+        found = errors(way.scene, quantity, witness)
+        if found is not None and len(found[0]):
+            style = STYLES.get(witness.name, OTHER)
+            axes.loglog(
+                np.abs(found[0] - singular),
+                found[1],
+                color=style.colour,
+                marker=style.marker,
+                markersize=3.5,
+                linewidth=0.8,
+                label=witness.name,
+            )
+    axes.set_xlim(way.distances[0] * 2, way.distances[-1] / 2)
+    axes.set_ylim(FLOOR, 1e3)
+    axes.grid(visible=True, color=INK, alpha=0.2)
+
+
+def _singular(way: Approach) -> float:
+    """theta_2 of the singular position: the positions lie at the distances from it."""
+    theta_2 = command(way.scene).theta_2
+    side = math.copysign(1.0, float(theta_2[0] - theta_2[-1]))
+    return float(theta_2[0]) - side * float(way.distances[0])
+
+
+def limit_rows(limits: Sequence[Limit] = LIMITS) -> list[tuple[str, str, str, str]]:
+    """(engine, what, boundary, reason) of every declared limit."""
+    return [
+        (limit.engine, limit.what, f"{limit.boundary:g} {limit.unit}".removesuffix(" 1"), limit.reason)
+        for limit in limits
+    ]
+
+
+def page(svg: str) -> str:
+    """The page, self-contained: the picture, what each family must show, the limits."""
+    families = "".join(f"<tr><td>{html.escape(f.name)}</td><td>{html.escape(f.statement)}</td></tr>" for f in FAMILIES)
+    limits = "".join(
+        "<tr>" + "".join(f"<td>{html.escape(cell)}</td>" for cell in row) + "</tr>" for row in limit_rows()
+    )
+    source = base64.b64encode(svg.encode()).decode("ascii")
+    light, dark = declarations(dark=False), declarations(dark=True)
+    return PAGE.format(svg=inline(svg), source=source, families=families, limits=limits, light=light, dark=dark)
+
+
+PAGE = """<!doctype html>
+<html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">
+<title>Where it gets hard</title>
+<style>:root {{ color-scheme: light dark; {light} }}
+@media screen and (prefers-color-scheme: dark) {{ :root {{ {dark} }} }}
+body {{ font: 15px/1.5 system-ui, sans-serif; max-width: 76rem; margin: 0 auto; padding: 1rem; color: var(--ink);
+background: var(--paper); overflow-wrap: anywhere; }}
+a {{ color: inherit; }} figure {{ margin: 1rem 0; overflow-x: auto; }} .wide {{ overflow-x: auto; }}
+svg {{ width: 100%; min-width: 40rem; height: auto; fill: var(--ink); }}
+table {{ border-collapse: collapse; width: 100%; font-size: .9rem; }}
+td, th {{ text-align: left; padding: .2rem .6rem; border-bottom: 1px solid #8884; vertical-align: top; }}</style>
+</head><body>
+<h1>Where it gets hard</h1>
+<p>Error of each engine against the formulas, relative to the value itself, on the way to a singular position.
+The dotted line is the law in powers of the sines; the band is what rounding was computed to do at each position,
+and ten times that: above it a row fails, whoever agrees.</p>
+<figure>{svg}</figure><p><a download="hard.svg" href="data:image/svg+xml;base64,{source}">Download the picture</a></p>
+<h2>What must happen</h2><div class="wide"><table><tr><th>family</th><th>statement</th></tr>{families}</table></div>
+<h2>Limits of the engines</h2>
+<div class="wide"><table><tr><th>engine</th><th>of what</th><th>boundary</th><th>why</th></tr>{limits}</table></div>
+</body></html>
+"""

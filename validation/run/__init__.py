@@ -1,0 +1,1 @@
+"""The run: every witness asked about every scene, in parallel, resumable."""

@@ -1,0 +1,183 @@
+"""One scene through the formulas and every engine: its rows, its timings, and what was left out and why."""
+
+import math
+import time
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import replace
+from importlib import import_module
+from typing import Any
+
+import numpy as np
+
+from fourbar.quantities import FORCES
+from fourbar.scene import Command, Scene, command
+from fourbar.solution import Solution
+from fourbar.solve import solve
+from validation.compare.answer import Answer
+from validation.compare.compare import closure, compare
+from validation.compare.identities import FORMULAS, identities
+from validation.compare.plain import plain
+from validation.compare.reversals import reversals
+from validation.compare.rows import FAILS, REFUSES, VERDICTS, Row
+from validation.compare.statements.statements import statements
+from validation.compare.tolerance import EQUIVALENCE
+from validation.engines.witnesses import WITNESSES, Witness, predicting_from
+from validation.report.page import Page, Record, Timing
+from validation.run.breakdown import failure
+
+
+def judged_page(name: str, scene: Scene, witnesses: Sequence[Witness] = WITNESSES, *, draw: bool = True) -> Page:
+    """Judge a scene and keep what the report needs of it."""
+    record = judge(name, scene, witnesses)
+    figure = None
+    if draw:
+        from validation.report.figures import scene_figure
+
+        figure = scene_figure(record)
+    return Page(
+        name,
+        plain(scene.title),
+        plain(scene.source),
+        record.rows,
+        record.timings,
+        record.left_out,
+        [str(reversal) for reversal in record.reversals],
+        {answer.engine: (answer.shared, answer.own) for answer in record.answers if answer.own},
+        {answer.engine: answer.evidence for answer in record.answers if answer.evidence},
+        figure,
+    )
+
+
+def judge(name: str, scene: Scene, witnesses: Sequence[Witness] = WITNESSES) -> Record:
+    """Ask every witness about one scene and compare; an engine that breaks down costs its own rows."""
+    record = Record(name, scene)
+    if scene.motion.free is not None:
+        from validation.run.released import judge_released
+
+        return judge_released(record)
+    at = _once(command(scene), record)
+    witnesses = list(_called_for(witnesses, at, record))
+    stage = _stage(at)
+    solve(scene, stage, at=at)  # untimed: the first call of a process pays for what every later one finds loaded
+    record.solution, seconds = _timed(lambda: solve(scene, stage, at=at))
+    record.timings.append(Timing(name, FORMULAS, "exact", len(at.theta_2), seconds))
+    record.rows += identities(name, scene, at, record.solution)
+    record.reversals = reversals(scene, at, record.solution)
+    for witness in witnesses:
+        answer = _ask(witness, scene, at, record)
+        if answer is None:
+            continue
+        record.answers.append(answer)
+        record.rows += _judged(name, scene, at, record.solution, answer, witness)
+        if witness.tolerance == EQUIVALENCE and answer.refusal is None and "theta_3" in witness.expected:
+            record.rows += _stated(name, scene, witness, answer)
+        if witness.order and answer.refusal is None:
+            answer.evidence |= _observed_order(name, scene, at, record.solution, witness)
+    _judge_inertia(record, at, witnesses)
+    return record
+
+
+def _stage(at: Command) -> str:
+    """As far as anything is compared: the formulas' own error bars take ten times as long as all the rest."""
+    return "position" if at.omega_2 is None else "force"
+
+
+def _once(at: Command, record: Record) -> Command:
+    """One position where all of them are the same: constant conditions are not swept."""
+    numbers = (at.theta_2, at.branch, 0.0 if at.omega_2 is None else at.omega_2, at.alpha_2)
+    if len(at.theta_2) == 1 or any(np.ptp(values) != 0 for values in numbers):
+        return at
+    record.left_out.append("positions: all are the same, one is evaluated")
+    omega_2, alpha_2 = (x if x is None or np.ndim(x) == 0 else x[:1] for x in (at.omega_2, at.alpha_2))  # type: ignore[index]
+    return at._replace(theta_2=at.theta_2[:1], branch=at.branch[:1], omega_2=omega_2, alpha_2=alpha_2, time=None)  # type: ignore[arg-type]
+
+
+def _called_for(witnesses: Iterable[Witness], at: Command, record: Record) -> Iterator[Witness]:
+    """The witnesses that the question needs; the others are left out before their engine is imported."""
+    for witness in witnesses:
+        reason = None
+        if at.omega_2 is None:
+            reason = None if witness.positions else "only positions are asked for, and it gives forces"
+        elif witness.through_time and not np.any(at.omega_2):
+            reason = "omega_2 is 0: nothing moves through time"
+        elif witness.through_time and len(at.theta_2) == 1:
+            reason = "one position is no motion through time"
+        if reason is None:
+            yield witness if at.omega_2 is not None else replace(witness, expected=witness.positions)
+        else:
+            record.left_out.append(f"{witness.name}: {reason}")
+
+
+def _judged(name: str, scene: Scene, at: Command, solution: Solution, answer: Answer, witness: Witness) -> list[Row]:
+    """The rows of one answer, against the formulas at the motion that the engine really made."""
+    theirs = answer.at if answer.at is not None else at
+    formulas = solution if theirs is at else solve(scene, _stage(theirs), at=theirs)
+    predicted = predicting_from(witness, scene, theirs, answer)
+    rows = compare(name, scene, answer, formulas, witness.tolerance, witness.expected, predicted)
+    said = answer.assembled is not None and len(answer.assembled) == len(formulas)  # otherwise a row has failed
+    if said and answer.at is not None and {"theta_3", "theta_4"} <= answer.quantities.keys():
+        rows.append(closure(name, scene, answer, witness.tolerance))
+    return rows
+
+
+def _stated(name: str, scene: Scene, witness: Witness, answer: Answer) -> list[Row]:
+    """What the formulas state of the linkage whatever its motion, asked of an exact engine."""
+    try:
+        return statements(name, scene, witness.engine(), answer)
+    except Exception as error:  # whatever an engine raises is its own failure, told in its own row
+        reason = f"{type(error).__name__}: {error}".splitlines()[0]
+        return [failure(name, witness.name, "statements of the linkage", reason)]
+
+
+def _observed_order(name: str, scene: Scene, at: Command, solution: Solution, witness: Witness) -> dict[str, float]:
+    """The worst error of the torque and the pin forces at 4h and 2h, and the order in h that they show."""
+    module, _, function = witness.order.partition(":")
+
+    def error(answer: Answer) -> float:
+        rows = _judged(name, scene, at, solution, answer, replace(witness, expected=FORCES))
+        return max((row.error for row in rows if row.quantity in FORCES), default=math.nan)  # a refusal has none
+
+    coarse, fine, order = getattr(import_module(module), function)(scene, at, error)
+    seen = {"error_at_4h": coarse, "error_at_2h": fine, "observed_order": order}
+    return seen if all(map(math.isfinite, seen.values())) else {}  # a coarse run may leave what the scene covers
+
+
+def _judge_inertia(record: Record, at: Command, witnesses: Iterable[Witness]) -> None:
+    """The inertial part of the torque by itself: loads can hide an inertia that is 24 times wrong."""
+    scene = record.scene
+    if at.omega_2 is None or not (scene.loads or scene.effects):
+        return
+    bare = replace(scene, loads=(), effects=())
+    ours = solve(bare, _stage(at), at=at)
+    refused = {answer.engine for answer in record.answers if answer.refusal is not None}  # and has said so
+    for witness in witnesses:
+        answer = _ask(replace(witness, expected=("torque",)), bare, at, record, part="inertia alone")
+        if answer is None or (answer.refusal is not None and answer.engine in refused):
+            continue
+        rows = _judged(record.name, bare, at, ours, answer, replace(witness, expected=("torque",)))
+        rows = [row for row in rows if row.quantity == "torque" or row.verdict in (REFUSES, FAILS)]
+        if rows:  # what fails besides the torque, or stands in place of it, is not left out
+            worst = max(rows, key=lambda row: VERDICTS.index(row.verdict))
+            reason = worst.reason if worst.quantity in ("torque", "all") else f"{worst.quantity}: {worst.reason}"
+            record.rows.append(replace(worst, quantity="torque_inertia", reason=reason))
+
+
+def _ask(witness: Witness, scene: Scene, at: Command, record: Record, part: str = "") -> Answer | None:
+    try:
+        answer: Answer
+        answer, seconds = _timed(lambda: witness.engine().answer(scene, at))
+    except Exception as error:  # whatever an engine raises is its own failure, told in its own row
+        reason = f"{type(error).__name__}: {error}".splitlines()[0]
+        record.rows.append(failure(record.name, witness.name, part, reason))
+        return None
+    if not part:
+        record.timings.append(Timing(record.name, answer.engine, answer.setting, len(at.theta_2), seconds))
+        if answer.refusal is not None:
+            record.left_out.append(f"{answer.engine}: {answer.refusal}")
+    return answer
+
+
+def _timed(action: Callable[[], Any]) -> tuple[Any, float]:
+    start = time.perf_counter()
+    result = action()
+    return result, time.perf_counter() - start

@@ -1,0 +1,197 @@
+"""Free motions: every engine against the exact solution where there is one, otherwise against the formulas.
+
+An engine's error is predicted by itself: it is asked twice, with its step and with twice its step, and
+the difference is what the coarser motion errs by. The finer one must not err by more than ten times that.
+"""
+
+import math
+import time
+from collections.abc import Callable
+from importlib import import_module
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from fourbar.effects import Gravity
+from fourbar.linkage import MOVING_BARS
+from fourbar.scene import Scene
+from fourbar.solve import solve
+from validation.compare.answer import Array, Released
+from validation.compare.rows import AGREES, DEGRADED, FAILS, REFUSES, Row
+from validation.compare.tolerance import DEGRADED as TIMES_PREDICTED
+from validation.engines.witnesses import not_installed
+from validation.report.page import Record, Timing
+from validation.run.breakdown import breakdown
+
+ENGINES = {
+    "mujoco-forward": ("validation.engines.mujoco.released:MujocoForward", 1e-3, "mujoco"),
+    "pinocchio-forward": ("validation.engines.pinocchio_released:PinocchioReleased", 2e-3, "pinocchio"),
+}
+"""Adapter, step (s) and library of each engine that integrates by itself."""
+FULL = {"theta_2": 1e-9, "omega_2": 1e-8, "energy": 1e-10, "stopped_at": 1e-9}
+"""Errors (rad, of the greatest speed, of the greatest energy, of the duration) at which a free motion agrees: the
+formulas hold theta_2 to 1e-9 rad over 5 s; a motion of 100 s may amplify that by its duration, so 5 s is the unit."""
+UNIT = 5.0
+
+
+class Pendulum(NamedTuple):
+    """A parallelogram that stays parallel is a pendulum: J phi'' = W sin phi, phi from the upright."""
+
+    J: float
+    W: float
+    phi_0: float
+    omega_0: float
+
+    def motion(self, times: Array) -> tuple[Array, Array]:
+        """phi and phi' (rad, rad/s) of a pendulum that turns over, by Jacobi's elliptic functions."""
+        from scipy.special import ellipj, ellipk, ellipkinc
+
+        k, sense = self.W / self.J, math.copysign(1.0, self.omega_0)
+        bottom = math.sqrt(self.omega_0**2 + 2.0 * k * (1.0 + math.cos(self.phi_0)))  # speed at the lowest point
+        m = 4.0 * k / bottom**2
+        # half the angle from the lowest point is the amplitude; it starts at phi_0 - pi, seen along the motion
+        start = ellipkinc(0.5 * (sense * self.phi_0 - math.pi), m)
+        turns = 0.5 * bottom * times + start
+        whole = np.round(turns / (2.0 * ellipk(m)))  # the amplitude grows by pi in every 2 K
+        _, _, dn, amplitude = ellipj(turns - whole * 2.0 * ellipk(m), m)
+        return sense * (2.0 * (amplitude + math.pi * whole) + math.pi), sense * bottom * dn
+
+
+def as_pendulum(scene: Scene) -> Pendulum | None:
+    """The pendulum that the scene is, or None; it must turn over, or none of this is an answer."""
+    d, a, b, c = scene.linkage.lengths
+    effects = scene.effects
+    if not (a == c and b == d and scene.motion.through == "follow" and not scene.loads and len(effects) == 1):
+        return None
+    down = effects[0]
+    if not (isinstance(down, Gravity) and math.isclose(down.angle, -math.pi / 2) and scene.motion.omega_2):
+        return None
+    J = W = 0.0
+    for number in MOVING_BARS:
+        bar = scene.linkage.bar(number)
+        r, phi = bar.mass_centre
+        if phi != 0.0:
+            return None
+        J += bar.mass * a * a if number == 3 else bar.moment_of_inertia + bar.mass * r * r
+        W += bar.mass * down.magnitude * (a if number == 3 else r)
+    phi_0 = float(np.asarray(scene.motion.theta_2)) - math.pi / 2
+    pendulum = Pendulum(J, W, phi_0, scene.motion.omega_2)
+    over_the_top = scene.motion.omega_2**2 > 2.0 * W / J * (1.0 - math.cos(phi_0))
+    return pendulum if over_the_top else None
+
+
+def judge_released(record: Record) -> Record:
+    """Rows of the formulas and of every forward engine for a scene with a free motion.
+
+    The motion of the formulas ends where bars 3 and 4 come to lie in one line, unless it follows the path through;
+    an engine moves on. Both are compared as long as both are there, and the instant itself is compared too.
+    """
+    free = record.scene.motion.free
+    assert free is not None
+    times = np.linspace(0.0, free.duration, free.steps + 1)
+    begin = time.perf_counter()
+    solution = solve(record.scene)
+    record.timings.append(Timing(record.name, "formulas", "exact", len(solution), time.perf_counter() - begin))
+    record.solution = solution
+    assert solution.omega_2 is not None
+    pendulum = as_pendulum(record.scene)
+    truth = _Truth(solution.theta_2, solution.omega_2, solution.stopped_at)
+    if pendulum is not None:
+        phi, rate = pendulum.motion(times)
+        truth = _Truth(phi + math.pi / 2, rate)
+        ours = Released("formulas", "exact", solution.theta_2, solution.omega_2, np.zeros(len(solution)))
+        record.rows += _rows(record, ours, None, truth)
+    for name, (adapter, step, library) in ENGINES.items():
+        if reason := not_installed(library):
+            record.left_out.append(f"{name}: {reason}")
+            continue
+        try:
+            asked = _adapter(adapter)
+            begin = time.perf_counter()
+            fine = asked(step).release(record.scene, times)
+            seconds = time.perf_counter() - begin
+            coarse = None if fine.refusal else asked(2.0 * step).release(record.scene, times)
+        except Exception as error:  # whatever an engine raises is its own failure, told in its own row
+            record.rows.append(breakdown(record.name, name, error))
+            continue
+        record.timings.append(Timing(record.name, fine.engine, fine.setting, len(times), seconds))
+        if fine.refusal is not None:
+            record.left_out.append(f"{fine.engine}: {fine.refusal}")
+        record.rows += _rows(record, fine, coarse, truth)
+    return record
+
+
+class _Truth(NamedTuple):
+    """The motion that engines are held against, to its end."""
+
+    theta_2: Array
+    omega_2: Array
+    stopped_at: float | None = None
+
+
+def _adapter(adapter: str) -> Callable[[float], Any]:
+    module, _, name = adapter.partition(":")
+    return getattr(import_module(module), name)  # type: ignore[no-any-return]
+
+
+def _rows(record: Record, fine: Released, coarse: Released | None, truth: _Truth) -> list[Row]:
+    free, nan, n = record.scene.motion.free, math.nan, len(truth.theta_2)
+    assert free is not None
+    if fine.refusal is not None:
+        return [Row(record.name, fine.engine, fine.setting, "all", nan, nan, REFUSES, fine.refusal, nan, nan)]
+    if len(fine.theta_2) < n:
+        reason = f"it stopped after {len(fine.theta_2)} of {n} instants"
+        return [Row(record.name, fine.engine, fine.setting, "all", nan, nan, FAILS, reason, nan, nan)]
+    speed = float(np.abs(truth.omega_2).max())
+    sizes = {"theta_2": 1.0, "omega_2": speed, "energy": float(np.abs(fine.energy[:n]).max()), "stopped_at": 1.0}
+
+    def numbers(of: Released) -> dict[str, Array]:
+        found = {"theta_2": of.theta_2[:n], "omega_2": of.omega_2[:n]}
+        if coarse is not None:  # the formulas integrate the energy equation itself; their drift is part of their test
+            found["energy"] = of.energy[:n] - of.energy[0]
+            if record.scene.motion.through == "sign":
+                found["stopped_at"] = _end(of.stopped_at, free.duration)
+        return found
+
+    right = {
+        "theta_2": truth.theta_2,
+        "omega_2": truth.omega_2,
+        "energy": np.zeros(n),
+        "stopped_at": _end(truth.stopped_at, free.duration),
+    }
+    rows = []
+    for name, values in numbers(fine).items():
+        size = sizes[name] or 1.0
+        relative, expected = np.abs(values - right[name]) / size, 0.0
+        if coarse is not None:
+            other = numbers(coarse)[name]
+            expected = float(np.abs(values - other).max()) / size if len(other) == len(values) else nan
+        worst = int(np.argmax(np.where(np.isnan(relative), np.inf, relative)))
+        full = FULL[name] * max(1.0, free.duration / UNIT)
+        allowed = max(full, TIMES_PREDICTED * expected)
+        if relative[worst] <= full:
+            verdict, reason = AGREES, f"a free motion of {free.duration:g} s"
+        elif relative[worst] <= allowed and math.isfinite(expected):
+            verdict, reason = DEGRADED, f"{relative[worst]:.1e} of {expected:.1e} predicted from twice the step"
+        else:
+            verdict, reason = FAILS, f"{relative[worst]:.1e} where {expected:.1e} was predicted"
+        rows.append(
+            Row(
+                record.name,
+                fine.engine,
+                fine.setting,
+                name,
+                float(relative[worst]),
+                allowed,
+                verdict,
+                reason,
+                float(fine.theta_2[n - 1 if name == "stopped_at" else worst]),
+                1.0,
+            )
+        )
+    return rows
+
+
+def _end(stopped_at: float | None, duration: float) -> Array:
+    """When a motion reached its limit, or the end that was asked for, as a part of that duration, (1,)."""
+    return np.array([1.0 if stopped_at is None else stopped_at / duration])

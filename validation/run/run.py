@@ -1,0 +1,255 @@
+"""The run: every scene judged, the results streamed to disk, the report written."""
+
+import csv
+import io
+import os
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import click
+
+from fourbar.errors import DependencyError, FourBarError, InputError
+from fourbar.exits import FAILED
+from fourbar.mjcf import mjcf
+from fourbar.writing import write_text
+from validation.compare.columns import write_columns
+from validation.compare.rows import FAILS, Row
+from validation.compare.tolerance import IDENTITY, SIMULATED
+from validation.engines.hard_suite import Hard
+from validation.engines.mujoco.picture import pictures
+from validation.engines.witnesses import Witness
+from validation.published import ladder_rows
+from validation.regression.accept import output_options, told
+from validation.regression.record import about, baseline, read_run, write_about
+from validation.report import cost_section, hard_section
+from validation.report.html import Section, html
+from validation.report.machine import versions
+from validation.report.markdown import markdown
+from validation.report.page import Page
+from validation.report.summary import SCENES_SHOWN, Summary, summarise
+from validation.run import pool
+from validation.run.elsewhere import run_elsewhere
+from validation.run.selection import askable, chosen, selected
+from validation.run.store import Store
+from validation.scenes.random import LinkageType
+from validation.scenes.suites import Suite, scene_files
+
+WORKERS = 2
+ALL_TYPES = ",".join(kind.value for kind in LinkageType)
+CHUNK = {True: 1, False: 20}
+"""Scenes per task: one where something is simulated or drawn (a second each), else twenty (a second together)."""
+
+
+def run(
+    suite: Suite,
+    out: Path,
+    witnesses: tuple[Witness, ...],
+    *,
+    workers: int = WORKERS,
+    scheduler: str | None = None,
+    published: bool = False,
+    missing: Sequence[tuple[str, str]] = (),
+) -> Iterator[int | Summary]:
+    """Judge a suite into a folder; yields the number of scenes done as they come, at last the summary.
+
+    With `published` the report sets what the thesis printed beside what is right, error by error.
+    `missing` are the witnesses that cannot be asked here, each with the reason.
+
+    What an interrupted run of the same suite with the same engines and versions left is kept.
+    """
+    simulated = any(witness.name == "mujoco-simulated" for witness in witnesses)
+    draw = len(suite) <= SCENES_SHOWN
+    size = CHUNK[simulated or draw]
+    chunks = [range(start, min(start + size, len(suite))) for start in range(0, len(suite), size)]
+    identity = {
+        "scenes": suite.fingerprint(),
+        "witnesses": [f"{witness.name} {witness.tolerance.factor!r}" for witness in witnesses],
+        "versions": versions(),
+        "draw": draw,
+    }
+    with Store(out, identity).held() as store:
+        done = store.done()
+        yield sum(len(chunks[number]) for number in done)
+        todo = [(number, scenes) for number, scenes in enumerate(chunks) if number not in done]
+        if scheduler is not None:
+            answers = pool.over_machines(suite, todo, witnesses, draw, scheduler)
+        else:
+            answers = pool.over_processes(suite, todo, witnesses, draw, workers)
+        for number, pages in answers:
+            store.put(number, pages)
+            yield len(pages)
+        held_to = list(dict.fromkeys((IDENTITY, *(witness.tolerance for witness in witnesses))))
+        ladder = ladder_rows() if published else []
+        summary = summarise(store.pages(len(chunks)), ladder, held_to, missing)
+        first_lines = write_columns(store.rows(len(chunks)), out)
+        factors = {witness.name: witness.tolerance.factor for witness in witnesses}
+        write_about(about(factors, suite.fingerprint()), out)
+        write_text(out / "timings.csv", timings_csv(store.pages(len(chunks))))
+        write_text(out / "report.md", markdown(summary))
+        drawn, why_not = mjcf_pictures(suite) if draw and simulated else ({}, "")
+        rows = (row for chunk in store.rows(len(chunks)) for row in chunk)
+        more = sections(rows if isinstance(suite, Hard) else None, out)
+        page = html(summary, first_lines, pictures=drawn, no_pictures=why_not, sections=more)
+        write_text(out / "report.html", page)
+        store.finish()
+    yield summary
+
+
+def sections(hard: Iterable[Row] | None, out: Path) -> list[Section]:
+    """Parts of the report from elsewhere: the hard cases of this run or one in OUT/hard, the study in OUT/cost.
+
+    Of rows of the hard suite the page hard.html is written too.
+    """
+    if hard is None:
+        found = hard_section.beside(out)
+        return [*([found] if found else []), *cost_section.beside(out)]
+    from validation.report.hard_page import page, picture
+    from validation.report.svg import inline
+
+    svg = picture()
+    write_text(out / hard_section.PAGE, page(svg))
+    return [hard_section.section(hard, inline(svg)), *cost_section.beside(out)]
+
+
+def mjcf_pictures(suite: Suite) -> tuple[dict[str, str], str]:
+    """MuJoCo's own pictures of the scenes' MJCF, base64 PNGs by name, and the reason where there are none."""
+    texts = {}
+    for index in range(len(suite)):
+        try:
+            texts[suite.name(index)] = mjcf(suite.scene(index))
+        except FourBarError:  # bars without mass, a motion law: the engines' own rows say so
+            continue
+    return pictures(texts)
+
+
+def timings_csv(pages: Iterator[Page]) -> str:
+    """Seconds per answer, and their ratio to the formulas' on the same scene in the same process."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(["scene", "engine", "setting", "positions", "seconds", "times_formulas"])
+    for page in pages:
+        for t in page.timings:
+            ratio = t.seconds / page.timings[0].seconds
+            writer.writerow([t.scene, t.engine, t.setting, t.positions, f"{t.seconds:.6f}", f"{ratio:.1f}"])
+    return text.getvalue()
+
+
+def examine(scenes: tuple[Path, ...], mjcf: Path, names: tuple[str, ...], out: Path, asked: float | None) -> int:
+    """What a user's own MJCF of one scene differs in, and what it costs; 1 where it is wrong by more than asked."""
+    from validation.check.model import examine_model, named, tell
+    from validation.run.dial import held_to
+
+    if len(scenes) != 1:
+        raise InputError("--mjcf", str(mjcf), f"needs the one scene it is a model of, not {len(scenes)}")
+    suite = scene_files(scenes)
+    tolerance = SIMULATED if asked is None else held_to(asked, "what this file may be wrong by")
+    report = examine_model(suite.name(0), suite.scene(0), mjcf, named(names), tolerance)
+    tell(report, mjcf, out)
+    return report.counts.status
+
+
+@click.command(name="run")
+@click.argument("scenes", nargs=-1, type=click.Path(path_type=Path))
+@click.option("--out", type=click.Path(path_type=Path, file_okay=False), default=Path("results"), show_default=True)
+@click.option("--engines", metavar="NAMES", help="Comma-separated witnesses; left out: all.")
+@click.option(
+    "--error",
+    "asked",
+    type=float,
+    metavar="E",
+    help="Simulate no more precisely than this relative error; with --mjcf: what that file may be wrong by.",
+)
+@click.option("--suite", "named", metavar="hard|FILE", help="Judge the hard cases, or the scenes that FILE lists.")
+@click.option("--random", "count", type=click.IntRange(min=1), help="Judge this many random linkages instead.")
+@click.option("--seed", type=click.IntRange(min=0), metavar="S", help="Of the random linkages; left out: 0.")
+@click.option("--type", "types", metavar="TYPES", help=f"Of the random linkages, comma-separated: {ALL_TYPES} (all).")
+@click.option("--workers", type=click.IntRange(min=1), default=WORKERS, show_default=True, help="Processes.")
+@click.option("--scheduler", metavar="ADDRESS", help="Spread over the workers of this Dask scheduler.")
+@click.option("--against", metavar="BASELINE", help="Compare with an accepted name or an earlier run's folder.")
+@click.option(
+    "--python",
+    type=click.Path(path_type=Path),
+    help="Run the suite under this interpreter too (into OUT/elsewhere), and say what changes from there to here.",
+)
+@click.option("--mjcf", type=click.Path(path_type=Path), help="Examine this MJCF of the one SCENE instead.")
+@click.option("--name", "names", metavar="ROLE=NAME", multiple=True, help="Body or site of --mjcf named otherwise.")
+@output_options
+def command(
+    scenes: tuple[Path, ...],
+    out: Path,
+    engines: str | None,
+    asked: float | None,
+    named: str | None,
+    count: int | None,
+    seed: int | None,
+    types: str | None,
+    workers: int,
+    scheduler: str | None,
+    against: str | None,
+    python: Path | None,
+    mjcf: Path | None,
+    names: tuple[str, ...],
+    **forms: Path | None,
+) -> int:
+    """Judge scenes (default: all of models/); write results.csv, timings.csv, report.md and report.html."""
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    from validation.report.terminal import table
+
+    if mjcf is not None:
+        others = {"engines": engines, "suite": named, "random": count, "seed": seed, "type": types, "against": against}
+        for option, said in {**others, "scheduler": scheduler, "python": python, **forms}.items():
+            if said is not None:
+                raise InputError(f"--{option}", str(said), "is not of --mjcf, which examines one file beside its scene")
+        return examine(scenes, mjcf, names, out, asked)
+    if names:
+        raise InputError("--name", names[0], "names a body or site of --mjcf; say which file that is")
+    if count is not None and scenes:
+        raise InputError("--random", count, "judges random linkages; leave out the scene files")
+    if named is not None and (scenes or count is not None):
+        raise InputError("--suite", named, "has its own scenes; leave out scene files and --random")
+    for option, value in (("--seed", seed), ("--type", types)):
+        if value is not None and count is None:
+            raise InputError(option, value, "is of random linkages; say --random N too")
+    if python is not None and against is not None:
+        raise InputError("--against", against, "cannot be said with --python, which compares with the run made there")
+    for form, path in forms.items():
+        if path is not None and python is None and against is None:
+            raise InputError(f"--{form}", str(path), "tells differences; say --against BASELINE or --python PATH too")
+    if against is not None:
+        read_run(baseline(against))  # before anything runs
+    seed, types = seed or 0, types or ALL_TYPES
+    suite, witnesses = selected(scenes, named, count, seed, types)
+    if asked is not None:
+        from validation.run.dial import dialled
+
+        witnesses = dialled(witnesses, asked)
+    if python is not None:
+        passed_on = [*map(os.path.abspath, scenes), f"--workers={workers}"]
+        passed_on += [f"--engines={engines}"] if engines else []
+        passed_on += [f"--random={count}", f"--seed={seed}", f"--type={types}"] if count else []
+        passed_on += [f"--error={asked!r}"] if asked is not None else []
+        passed_on += [f"--suite={named if named == 'hard' else os.path.abspath(named)}"] if named else []
+        against = str(run_elsewhere(python, passed_on, out / "elsewhere"))
+    present, missing = askable(chosen(engines, witnesses), by_name=engines is not None)
+    columns = (TextColumn("judging"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    result: Any = None
+    with Progress(*columns, console=Console(stderr=True)) as progress:
+        task = progress.add_task("judging", total=len(suite))
+        published = not scenes and named is None and count is None  # the models, the thesis's among them
+        for result in run(
+            suite, out, present, workers=workers, scheduler=scheduler, published=published, missing=missing
+        ):
+            if isinstance(result, int):
+                progress.advance(task, result)
+    assert isinstance(result, Summary)
+    table(result, out)
+    worse = told(baseline(against), out, forms) if against is not None else 0
+    if result.counts[FAILS] or worse:
+        return FAILED
+    if missing:
+        there = ",".join(witness.name for witness in present)
+        raise DependencyError(f"{missing[0][1]}, or say --engines {there} where those are all that is wanted")
+    return result.counts.status

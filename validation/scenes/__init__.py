@@ -1,0 +1,1 @@
+"""Scenes to judge: suites, random linkages, hard families."""

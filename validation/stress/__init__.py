@@ -1,0 +1,1 @@
+"""What is stressed: forward error, fuzzing, mutation, speed."""

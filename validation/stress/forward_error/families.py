@@ -1,0 +1,153 @@
+"""Families of hard positions, each a generator of scenes of one position from a random generator alone."""
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from fourbar.effects import Friction, Gravity, Load, Viscous
+from fourbar.linkage import MOVING_BARS, PINS, Bar, FourBar
+from fourbar.scene import Scene
+from fourbar.scene.motion import Motion
+
+
+def triangle(rng: np.random.Generator, diagonal: float, low: float, high: float) -> tuple[float, float]:
+    """Lengths b, c that close over a diagonal, b/e log-uniform."""
+    b = diagonal * 10.0 ** rng.uniform(low, high)
+    c = abs(diagonal - b) + 2.0 * min(diagonal, b) * rng.uniform(0.02, 0.98)
+    return float(b), float(c)
+
+
+def dressed(rng: np.random.Generator, lengths: tuple[float, ...], spread: float = 0.0) -> Scene:
+    """A scene with masses, offset centres, loads and effects at random on bars of the given lengths (d, a, b, c)."""
+    d, *moving = (float(length) for length in lengths)
+    size = max(d, *moving)
+    bars = []
+    for length in moving:
+        mass = float(10.0 ** rng.uniform(-spread, spread) * rng.uniform(0.2, 5.0)) if rng.random() < 0.9 else 0.0
+        centre = (length * float(rng.uniform(-0.5, 1.5)), float(rng.choice([0.0, rng.uniform(-3, 3)])))
+        bars.append(Bar(length, mass, mass * length**2 * float(rng.uniform(0.0, 0.5)), centre))
+    theta_1 = float(rng.choice([0.0, rng.uniform(-3.0, 3.0)]))
+    loads = []
+    for _ in range(rng.integers(0, 3)):
+        force = (float(rng.uniform(-20, 20)), float(rng.uniform(-3, 3)))
+        at = (float(rng.uniform(0, 1)) * size, float(rng.uniform(-3, 3)))
+        moment = float(rng.choice([0.0, rng.uniform(-5, 5)])) * size
+        loads.append(Load(int(rng.integers(2, 5)), force, at, moment, str(rng.choice(["world", "bar"]))))
+    effects: list[Any] = []
+    if rng.random() < 0.5:
+        effects.append(Gravity())
+    if rng.random() < 0.3:
+        effects.append(Viscous.at(**{pin: float(rng.uniform(0, 1)) * size**2 for pin in PINS if rng.random() < 0.5}))
+    if rng.random() < 0.2:
+        effects.append(Friction.at(**{pin: float(rng.uniform(0, 1)) * size for pin in PINS if rng.random() < 0.5}))
+    motion = Motion(
+        0.0,
+        float(rng.choice([-1.0, 1.0]) * 10.0 ** rng.uniform(-1, 2)),
+        float(rng.choice([0.0, rng.uniform(-50, 50)])),
+        branch=int(rng.choice([-1, 1])),
+    )
+    return Scene(
+        FourBar(d, bars[0], bars[1], bars[2], theta_1),
+        motion,
+        int(rng.choice(MOVING_BARS)),
+        tuple(loads),
+        tuple(effects),
+    )
+
+
+def at_angle(scene: Scene, theta_2: float) -> Scene:
+    """The same scene at theta_2 (rad from theta_1 on)."""
+    angle = scene.linkage.ground_angle + theta_2
+    return replace(scene, motion=replace(scene.motion, theta_2=angle))
+
+
+def random(rng: np.random.Generator) -> Scene:
+    """Lengths within a factor of ten, theta_2 anywhere it assembles."""
+    while True:
+        d, a = rng.uniform(0.1, 1.0, 2)
+        angle = float(rng.uniform(-7.0, 7.0))
+        diagonal = abs(d - a * complex(math.cos(angle), math.sin(angle)))
+        b, c = rng.uniform(0.1, 1.0, 2)
+        if abs(b - c) < diagonal < b + c:
+            return at_angle(dressed(rng, (d, a, b, c)), angle)
+
+
+def limit(rng: np.random.Generator) -> Scene:
+    """Within 1e-12..1e-2 rad of a limit position of the input."""
+    while True:
+        d, a, b, c = rng.uniform(0.1, 1.0, 4)
+        folded = bool(rng.random() < 0.5)
+        cosine = (a * a + d * d - (b - c if folded else b + c) ** 2) / (2 * a * d)
+        if abs(cosine) < 0.999:
+            offset = 10.0 ** rng.uniform(-12, -2) * (1.0 if folded else -1.0)
+            angle = float(rng.choice([-1.0, 1.0])) * (math.acos(cosine) + offset)
+            return at_angle(dressed(rng, (d, a, b, c)), angle)
+
+
+def change_point(rng: np.random.Generator) -> Scene:
+    """Within 1e-8..1 rad of a change point: parallelograms, kites, and any s + l = p + q, some off by as little."""
+    x, y = rng.uniform(0.1, 1.0, 2)
+    kind = rng.integers(0, 4)
+    straight = 0.0
+    if kind == 0:  # parallelogram, antiparallelogram
+        lengths = (x, y, x, y)
+        straight = float(rng.choice([0.0, math.pi]))
+    elif kind == 1:  # kite a = b, c = d
+        lengths, straight = (x, y, y, x), math.pi
+    elif kind == 2:  # kite a = d, b = c
+        lengths, straight = (x, x, y, y), 0.0
+    else:
+        # multiples of 2^-20 so that d + a = b + c, or d - a = b - c, holds exactly
+        d, a, b = (float(round(v * 2**20)) / 2**20 for v in sorted(rng.uniform(0.1, 1.0, 3), reverse=True))
+        b = float(min(b, d + a - 0.01))
+        lengths, straight = ((d, a, b, d + a - b), math.pi) if rng.random() < 0.5 else ((d, a, d - a + b, b), 0.0)
+    distance = float(rng.choice([-1.0, 1.0]) * 10.0 ** rng.uniform(-8, 0))
+    if rng.random() < 0.3:
+        k = int(rng.integers(0, 4))
+        lengths = tuple(v * (1.0 + 0.1 * distance**2) if i == k else v for i, v in enumerate(lengths))
+    return at_angle(dressed(rng, lengths), straight + distance)
+
+
+def ratios(rng: np.random.Generator) -> Scene:
+    """Crank to ground, coupler to diagonal, and masses, each in ratios from 1e-6 to 1e6."""
+    d = float(rng.uniform(0.1, 1.0))
+    a = d * float(10.0 ** rng.uniform(-6, 6))
+    angle = float(rng.uniform(-7.0, 7.0))
+    diagonal = abs(d - a * complex(math.cos(angle), math.sin(angle)))
+    b, c = triangle(rng, diagonal, -1, 1)
+    return at_angle(dressed(rng, (d, a, b, c), spread=3.0), angle)
+
+
+def scales(rng: np.random.Generator) -> Scene:
+    """All lengths times 1e-9..1e9."""
+    scene = random(rng)
+    link, k = scene.linkage, float(10.0 ** rng.uniform(-9, 9))
+    bars = []
+    for number in MOVING_BARS:
+        bar = link.bar(number)
+        bars.append(
+            Bar(bar.length * k, bar.mass, bar.moment_of_inertia * k * k, (bar.mass_centre[0] * k, bar.mass_centre[1]))
+        )
+    loads = tuple(replace(load, at=(load.at[0] * k, load.at[1]), moment=load.moment * k) for load in scene.loads)
+    return replace(scene, linkage=FourBar(link.ground * k, bars[0], bars[1], bars[2], link.ground_angle), loads=loads)
+
+
+def speeds(rng: np.random.Generator) -> Scene:
+    """omega_2 up to 1e6 rad/s, alpha_2 up to 1e12 rad/s^2, and the static case."""
+    scene = random(rng)
+    omega = float(rng.choice([-1.0, 1.0]) * 10.0 ** rng.uniform(-3, 6)) * bool(rng.random() < 0.9)
+    alpha = float(rng.choice([0.0, rng.choice([-1.0, 1.0]) * 10.0 ** rng.uniform(-3, 12)]))
+    return replace(scene, motion=replace(scene.motion, omega_2=omega, alpha_2=alpha))
+
+
+FAMILIES: dict[str, Callable[[np.random.Generator], Scene]] = {
+    "random": random,
+    "limit": limit,
+    "change_point": change_point,
+    "ratios": ratios,
+    "scales": scales,
+    "speeds": speeds,
+}

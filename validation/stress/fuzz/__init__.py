@@ -1,0 +1,1 @@
+"""Random and mutated scenes through everything."""

@@ -1,0 +1,1 @@
+"""Studies that use the harness: what accuracy costs, what effects cost, the models."""

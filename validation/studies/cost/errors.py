@@ -1,0 +1,62 @@
+"""How wrong an answer is: the torque and each pin force, each on its scale against the formulas."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from fourbar.quantities import OK
+from fourbar.scene import Command, Scene
+from fourbar.solve import solve
+from validation.compare.answer import Array
+from validation.compare.compare import SLOW_DRIVE, angle_aware_difference
+from validation.compare.scales import divisor, yardstick
+
+
+class Errors(NamedTuple):
+    """Worst relative errors over the positions; inf where there is no answer."""
+
+    torque: float
+    F12: float
+    F32: float
+    F43: float
+    F14: float
+
+    @property
+    def force(self) -> float:
+        """Of the worst pin force."""
+        return max(self[1:])
+
+    @property
+    def worst(self) -> float:
+        """What an asked error is compared with."""
+        return max(self)
+
+
+QUANTITIES = Errors._fields
+NO_ANSWER = Errors(*[float("inf")] * len(QUANTITIES))
+
+
+def errors(scene: Scene, at: Command, quantities: dict[str, Array]) -> Errors:
+    """Of an answer at the motion that its engine really made.
+
+    The torque on bar 3 or 4 has poles where that bar stands still: it is judged where the bar turns
+    at more than a tenth of its greatest speed, as in the regression report.
+    """
+    if not np.isfinite(at.theta_2).all():
+        return NO_ANSWER
+    formulas = solve(scene, "force", at=at)
+    judged = formulas.status_code == OK
+    if not judged.any():
+        return NO_ANSWER
+    worst = {}
+    for name in QUANTITIES:
+        ours, where = getattr(formulas, name), judged
+        if name == "torque" and scene.drive_bar != 2:
+            speed = np.abs(np.nan_to_num(getattr(formulas, f"omega_{scene.drive_bar}")))
+            where = judged & (speed > SLOW_DRIVE * speed.max())
+        relative = angle_aware_difference(name, ours, quantities[name]) / divisor(
+            yardstick(name, scene, formulas, ours)
+        )
+        value = float(np.max(relative[where]))
+        worst[name] = value if np.isfinite(value) else float("inf")
+    return Errors(**worst)

@@ -1,0 +1,254 @@
+"""Pictures of the study: work and precision, each quantity over the timestep, and the three sources of error."""
+
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from fourbar.show.plot.style import matplotlib_style, save
+from validation.studies.cost import orders
+from validation.studies.cost.laws import pareto
+from validation.studies.cost.orders import CURVES
+from validation.studies.cost.study import EXACT, FORMULAS, STEPPED, Point
+
+SHOWN = {
+    "Euler, MuJoCo's defaults": ("Euler, MuJoCo's defaults", "#d55e00", "s", (0, (4, 2))),
+    "RK4, MuJoCo's defaults": ("RK4, MuJoCo's defaults", "#e69f00", "D", (0, (1, 1.5))),
+    "Euler, tc held": ("Euler, stiff closure", "#cc79a7", "v", (0, (6, 2, 1, 2))),
+    "RK4, no pads, tc = 10 h": ("RK4, d = 0.9999, tc = 10 h", "#56b4e9", "P", (0, (5, 1))),
+    "Pinocchio forward": ("Pinocchio forward, RK4", "#999999", "x", (0, (3, 2))),
+    "recommended": ("MuJoCo, recommended", "#0072b2", "o", "solid"),
+}
+"""Curve: name in the legend, colour for all kinds of colour vision, marker and line that tell it apart in grey."""
+DEFAULT = "MuJoCo's defaults"
+"""Label of the point that a new user gets."""
+LOWEST = 1e-17
+"""Bottom of the picture; fifty digits lie far below and are named at the edge."""
+NONE = 1e-18
+"""Where a tolerance of 0 is drawn."""
+TURN = 5e-6
+"""Labels of the recommended settings stand left of the curve above this error, right of it below."""
+LEFT = frozenset(("formulas, double", "pinocchio-inverse", "MuJoCo at one state, extrapolated", "50 digits"))
+"""Names that stand left of their mark, where the right is taken."""
+NAMES = {"torque": "driving torque", "force": "worst pin force"}
+INK = "#333333"
+PALE = "#d9d9d9"
+
+
+def draw(curves: Mapping[str, Sequence[Point]], title: str, folder: Path) -> list[Path]:
+    """All pictures of a scene as SVG and PNG; the files written."""
+    written = []
+    with matplotlib_style():
+        for quantity in ("torque", "force"):
+            written += _both(_work_precision(curves, quantity, title), folder / f"work-precision-{quantity}")
+        if any(name in curves for name, *_ in CURVES.values()):
+            written += _both(orders.picture(curves, title), folder / "orders")
+        if "tolerance, Newton" in curves:
+            written += _both(_sources(curves, title), folder / "sources")
+    return written
+
+
+def _both(figure: Any, stem: Path) -> list[Path]:
+    paths = []
+    for kind in ("svg", "png"):
+        path = stem.with_suffix(f".{kind}")
+        save(figure, path, kind)
+        paths.append(path)
+    return paths
+
+
+def _work_precision(curves: Mapping[str, Sequence[Point]], quantity: str, title: str) -> Any:
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(9.6, 6.4))
+    axes = figure.add_axes((0.085, 0.1, 0.885, 0.735))
+    points = [point for name, row in curves.items() for point in row if "slow" not in name]
+    stepped = [p for p in points if p.kind == STEPPED]
+    front = pareto(stepped, quantity)
+    broad: dict[str, Any] = {"lw": 9.0, "solid_capstyle": "round", "solid_joinstyle": "round", "zorder": 1}
+    axes.plot(
+        *(_ms(front), [getattr(p, quantity) for p in front]),
+        **broad,
+        color=PALE,
+        label="Pareto front of everything stepped",
+    )
+    for name, (label, colour, marker, line) in SHOWN.items():
+        row = [p for p in curves.get(name, ()) if math.isfinite(getattr(p, quantity))]
+        if row:
+            style: dict[str, Any] = {"color": colour, "ls": line, "marker": marker, "ms": 5.5, "lw": 1.8}
+            # a cross has no face: with a white edge it would vanish
+            style |= {"mec": colour, "mew": 1.4} if marker == "x" else {"mec": "white", "mew": 0.6}
+            style["zorder"] = 3 if name == "recommended" else 2
+            axes.plot(_ms(row), [getattr(p, quantity) for p in row], label=label, **style)
+    _label_recommended(axes, curves.get("recommended", ()), quantity)
+    if front and front[-1].curve != "recommended":
+        _label_end(axes, front[-1], quantity)
+    _mark_default(axes, points, quantity)
+    _exact(axes, points, quantity)
+    axes.set(xscale="log", yscale="log", xlabel="CPU time per revolution [ms]")
+    axes.set_ylabel(f"error of the {NAMES[quantity]}, relative to its scale")
+    axes.set_ylim(LOWEST / 4.0, 3.0)
+    low, high = axes.get_xlim()
+    axes.set_xlim(low / 1.3, high * 1.6)
+    axes.grid(visible=True, which="major")
+    axes.tick_params(labelsize=10)
+    axes.xaxis.label.set_fontsize(11)
+    axes.yaxis.label.set_fontsize(11)
+    axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=4, fontsize=8.5)
+    figure.text(0.02, 0.965, statement(curves, quantity), fontsize=12, weight="bold", va="center")
+    figure.text(0.02, 0.928, title, fontsize=9.5, color="#666666", va="center")
+    return figure
+
+
+def _ms(points: Sequence[Point]) -> list[float]:
+    return [1e3 * p.seconds_per_revolution for p in points]
+
+
+def _label_recommended(axes: Any, row: Sequence[Point], quantity: str) -> None:
+    """Steps and time constant at every second point; left of the curve above the plain settings' floor, then right."""
+    for point in row[::2]:
+        tc, error = point.setting.partition("tc = ")[2], getattr(point, quantity)
+        left = error > TURN
+        axes.annotate(
+            f"{point.steps_per_revolution:.0f} steps, tc = {tc}",
+            (1e3 * point.seconds_per_revolution, error),
+            xytext=(-10, -5) if left else (12, 4),
+            textcoords="offset points",
+            ha="right" if left else "left",
+            fontsize=8.5,
+            color="#0072b2",
+        )
+
+
+def _label_end(axes: Any, point: Point, quantity: str) -> None:
+    """The most accurate of everything stepped."""
+    at = (1e3 * point.seconds_per_revolution, getattr(point, quantity))
+    axes.annotate(
+        point.setting.replace("tc held", "tc a quarter turn"),
+        at,
+        xytext=(0, -16),
+        textcoords="offset points",
+        ha="center",
+        fontsize=8.5,
+        color="#666666",
+    )
+
+
+def _mark_default(axes: Any, points: Sequence[Point], quantity: str) -> None:
+    """The point that a new user gets."""
+    for point in points:
+        if point.setting == DEFAULT and math.isfinite(getattr(point, quantity)):
+            at = (1e3 * point.seconds_per_revolution, getattr(point, quantity))
+            axes.plot(*at, marker="*", ms=19, color="#d55e00", mec="black", mew=0.9, ls="none", zorder=5)
+            axes.annotate(
+                f"MuJoCo's defaults (Euler, 2 ms): {short(at[1])}",
+                at,
+                xytext=(14, 16),
+                textcoords="offset points",
+                fontsize=10,
+                weight="bold",
+            )
+
+
+def _exact(axes: Any, points: Sequence[Point], quantity: str) -> None:
+    """Methods that answer each position by itself: one mark each, named beside it."""
+    marks = {EXACT: ("h", "#009e73"), FORMULAS: ("*", "black")}
+    for point in points:
+        if point.kind == STEPPED or (point.curve == "one state" and point.dial > 0.0):
+            continue
+        marker, colour = marks[point.kind]
+        value = getattr(point, quantity)
+        x, y = 1e3 * point.seconds_per_revolution, max(value, LOWEST)
+        axes.plot(x, y, marker=marker, ms=9, color=colour, mec="white", mew=0.6, ls="none", zorder=4)
+        name = point.setting if value >= LOWEST else f"{point.setting}: {short(value)}, far below"
+        right = point.setting not in LEFT
+        axes.annotate(
+            name,
+            (x, y),
+            xytext=(8 if right else -8, 0),
+            textcoords="offset points",
+            ha="left" if right else "right",
+            va="center",
+            fontsize=8.5,
+        )
+
+
+def short(value: float) -> str:
+    """One digit and its power of ten."""
+    mantissa, _, exponent = f"{value:.0e}".partition("e")
+    return f"{mantissa}e{int(exponent)}"
+
+
+def statement(curves: Mapping[str, Sequence[Point]], quantity: str) -> str:
+    """What the picture means."""
+    four = [p for p in curves.get("recommended", ()) if getattr(p, quantity) <= 1e-4]
+    default = [p for row in curves.values() for p in row if p.setting == DEFAULT]
+    parts = []
+    if four:
+        cheap = min(four, key=lambda p: p.seconds_per_revolution)
+        parts.append(
+            f"Four digits of {NAMES[quantity].removeprefix('driving ').removeprefix('worst ')} cost "
+            f"{1e3 * cheap.seconds_per_revolution:.2g} ms a revolution"
+        )
+    if default and math.isfinite(error := getattr(default[0], quantity)):
+        parts.append(
+            f"the defaults pay {1e3 * default[0].seconds_per_revolution:.2g} ms for an error of {short(error)}"
+        )
+    return "; ".join(parts) or f"Error of the {NAMES[quantity]} against its cost"
+
+
+def _sources(curves: Mapping[str, Sequence[Point]], title: str) -> Any:
+    """Time step, softness and solver tolerance, each with the other two out of the way."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(11.5, 5.6))
+    left, right, both = 0.075, 0.985, 0.3
+    panels = [figure.add_axes((left + i * (right - left + 0.012) / 3.0, 0.105, both - 0.008, 0.6)) for i in range(3)]
+    softness = {
+        "at the scene's speed": ("softness d", "#0072b2", "o", "solid"),
+        "at 0.1 rad/s, sag under gravity and loads": ("sag d, slow", "#d55e00", "s", (0, (4, 2))),
+        "at 0.1 rad/s, nothing acts": ("sag d, slow, nothing acts", "#009e73", "^", (0, (1, 1.5))),
+    }
+    solvers = {
+        name: (f"tolerance, {name}", colour, marker, line)
+        for name, colour, marker, line in (
+            ("Newton", "#0072b2", "o", "solid"),
+            ("PGS", "#d55e00", "s", (0, (4, 2))),
+            ("CG", "#009e73", "^", (0, (1, 1.5))),
+        )
+    }
+    for axes, heading, label, rows in (
+        (panels[0], "Time step", "time step, part of a revolution", CURVES),
+        (panels[1], "Softness of the closure", "1 - d", softness),
+        (panels[2], "Solver", "tolerance", solvers),
+    ):
+        for name, (curve, colour, marker, line) in rows.items():
+            row = [p for p in curves.get(curve, ()) if math.isfinite(p.worst) and p.worst < 10.0]
+            x = [1.0 / p.dial if axes is panels[0] else p.dial or NONE for p in row]
+            style: dict[str, Any] = {"color": colour, "ls": line, "marker": marker, "ms": 5, "lw": 1.8}
+            style |= {"mec": "white", "mew": 0.5}
+            axes.plot(x, [p.worst for p in row], label=name, **style)
+        axes.set(xscale="log", yscale="log", ylim=(1e-12, 20.0), xlabel=label)
+        axes.set_title(heading, loc="left", fontsize=11, weight="bold", pad=44.0)
+        axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), fontsize=8.5, ncols=2 if axes is panels[0] else 1)
+        axes.grid(visible=True)
+        axes.tick_params(labelsize=9)
+        if axes is not panels[0]:
+            axes.tick_params(labelleft=False)
+    panels[2].set_xticks([NONE, 1e-15, 1e-12, 1e-9, 1e-6], ["0", "1e-15", "1e-12", "1e-9", "1e-6"])
+    _slope(panels[0], 1.0, 4e-3, 3e-3, "1")
+    _slope(panels[0], 4.0, 8e-3, 1e-8, "4")
+    _slope(panels[1], 1.0, 2e-3, 2e-5, "1")
+    panels[0].set_ylabel("worst error of torque and pin forces")
+    sentence = "Three sources, one at a time: time step by its order, softness in proportion, the solver unless at 0"
+    figure.text(0.02, 0.955, sentence, fontsize=12.5, weight="bold", va="center")
+    figure.text(0.02, 0.912, title, fontsize=9.5, color="#666666", va="center")
+    return figure
+
+
+def _slope(axes: Any, exponent: float, x: float, y: float, name: str) -> None:
+    """A triangle's hypotenuse with the exponent beside it."""
+    axes.plot([x, 4.0 * x], [y, y * 4.0**exponent], color=INK, lw=1.0)
+    axes.annotate(
+        f"slope {name}", (2.0 * x, y * 2.0**exponent), xytext=(6, -8), textcoords="offset points", fontsize=8.5
+    )

@@ -1,0 +1,290 @@
+"""The work-precision study of one scene: curve after curve, each kept once it is done."""
+
+import json
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import asdict, dataclass, fields, replace
+from pathlib import Path
+from statistics import median
+from typing import Any
+
+import numpy as np
+
+from fourbar.errors import FourBarError, LimitError
+from fourbar.files import dump
+from fourbar.formulas.mobility import turns_fully
+from fourbar.scene import Command, Scene, command
+from fourbar.writing import write_text
+from validation.compare.answer import Engine
+from validation.engines.mujoco.trial import Rig, Trial
+from validation.report.machine import versions
+from validation.studies.cost import formulas
+from validation.studies.cost.advise import advise, judged
+from validation.studies.cost.curves import BEST, SLOW, Curve, Spot, curves
+from validation.studies.cost.errors import Errors, errors
+
+ROUNDS = 7
+TIMED_STEPS = 200
+"""Steps per timing: some 3 ms of RK4, so that a round of a curve passes within one spell of the machine."""
+FORWARD_STEPS = (20, 40, 80, 160, 320, 640)
+FORWARD_TIME_CONSTANT = 0.25
+ASKED = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 2e-9)
+"""Errors for which the advice is drawn."""
+ONE_STATE = (0.9, 0.99, 0.999, 0.9999)
+VERSION = 5
+"""Of what is tried; parts of another one are done again."""
+EXACT, STEPPED, FORMULAS = "exact", "stepped", "formulas"
+
+
+@dataclass(frozen=True, slots=True)
+class Point:
+    """One setting of one method: its errors, and what it costs."""
+
+    curve: str
+    kind: str
+    """ "stepped" through time, "exact" at each position, or "formulas"."""
+    setting: str
+    dial: float
+    """What the curve's dial stands at: steps per revolution, 1-d, tc in steps, tolerance, ..."""
+    steps: int
+    """Of one run through the scene; positions, where nothing is stepped."""
+    steps_per_revolution: float
+    torque: float
+    F12: float
+    F32: float
+    F43: float
+    F14: float
+    seconds_per_revolution: float
+    """CPU; of an exact method: the scene's positions in one revolution."""
+    seconds_per_sample: float
+    """CPU, of reading a sample; of an exact method: of a position."""
+    rk4_steps: float
+    """seconds_per_revolution in steps of the recommended RK4 model."""
+    broken: str = ""
+
+    @property
+    def force(self) -> float:
+        """The error of the worst pin force."""
+        return max(self.F12, self.F32, self.F43, self.F14)
+
+    @property
+    def worst(self) -> float:
+        """The largest of the errors."""
+        return max(self.torque, self.force)
+
+
+COLUMNS = tuple(field.name for field in fields(Point))
+
+
+class Study:
+    """The parts of a study of one scene, each in its own file."""
+
+    def __init__(self, name: str, scene: Scene, folder: Path) -> None:
+        self.name, self.scene, self.folder = name, scene, folder / "parts"
+        self.command = command(scene)
+        self.left_out: list[str] = []
+        self._rigs: dict[tuple[bool, bool, bool], Rig] = {}
+        identity = json.dumps({"scene": dump(scene), "versions": versions(), "study": VERSION}, sort_keys=True)
+        marker = self.folder / "study.json"
+        if not (marker.is_file() and marker.read_text(encoding="utf-8") == identity):
+            for old in self.folder.glob("*.json"):
+                old.unlink()
+            self.folder.mkdir(parents=True, exist_ok=True)
+            write_text(marker, identity)
+        self.units: dict[str, Callable[[], list[Point]]] = {"formulas": self._formulas, "inverse": self._inverse}
+        self.units["one state"] = self._one_state
+        self.units["Pinocchio forward"] = self._pinocchio_forward
+        self.units["recommended"] = self._recommended
+        for curve in curves(scene):
+            self.units[curve.name] = lambda curve=curve: self._curve(curve)  # type: ignore[misc]
+
+    def __len__(self) -> int:
+        return len(self.units)
+
+    def points(self) -> Iterator[tuple[str, list[Point]]]:
+        """Curve after curve; what is on disk is not done again."""
+        for number, (name, unit) in enumerate(self.units.items()):
+            path = self.folder / f"{number:03d}.json"
+            if path.is_file():
+                kept = json.loads(path.read_text(encoding="utf-8"))
+                self.left_out += kept["left_out"]
+                yield name, [Point(**row) for row in kept["points"]]
+                continue
+            reasons: list[str] = []
+            try:
+                found = unit()
+            except (FourBarError, NotImplementedError) as error:
+                found, reasons = [], [f"{name}: {error}"]
+            self.left_out += reasons
+            write_text(path, json.dumps({"points": [asdict(point) for point in found], "left_out": reasons}))
+            yield name, found
+
+    def rig(self, slow: bool = False, bare: bool = False, settled: bool = False) -> Rig:
+        """The scene assembled for trials: at its own speed or slow, as it is or bare, after a turn or not."""
+        if (slow, bare, settled) not in self._rigs:
+            scene = self.scene
+            if slow:
+                sign = math.copysign(1.0, scene.motion.omega_2 or 1.0)
+                scene = replace(scene, motion=replace(scene.motion, omega_2=sign * SLOW, alpha_2=0.0))
+            if bare:
+                scene = replace(scene, loads=(), effects=())
+            at = command(scene)
+            if settled:
+                before = float(at.theta_2.min() if at.omega_2 > 0.0 else at.theta_2.max())  # type: ignore[operator]
+                before -= math.copysign(2.0 * math.pi, at.omega_2)  # type: ignore[arg-type]
+                at = at._replace(theta_2=np.append(at.theta_2, before), branch=np.append(at.branch, at.branch[0]))
+            self._rigs[slow, bare, settled] = Rig(scene, at)
+        return self._rigs[slow, bare, settled]
+
+    def _curve(self, curve: Curve) -> list[Point]:
+        settled = curve.settled and turns_fully(self.scene.linkage) and self.scene.motion.alpha_2 == 0.0
+        rig = self.rig(curve.slow, curve.bare, settled)
+        return self._stepped(curve.name, curve.spots, rig, settled)
+
+    def _stepped(self, name: str, spots: tuple[Spot, ...], rig: Rig, settled: bool = False) -> list[Point]:
+        """Errors of each spot, and the CPU time of its steps beside that of the recommended model, interleaved."""
+        trials = [rig.try_out(spot.settings, spot.build) for spot in spots]
+        if settled:
+            for trial in trials:
+                _leave_out_first(trial)
+        clocks = [rig.seconds_per_step(spot.settings, spot.build) for spot in spots]
+        per_step, reference = _interleaved(
+            clocks, rig.seconds_per_step(BEST), [min(t.steps, TIMED_STEPS) or 1 for t in trials]
+        )
+        points = []
+        for spot, trial, seconds in zip(spots, trials, per_step, strict=True):
+            found = judged(rig.scene, trial)
+            n = trial.steps_per_revolution or spot.settings.steps_per_revolution
+            samples = max(len(trial.at.theta_2), 1)
+            points.append(
+                Point(
+                    *(name, STEPPED, spot.label, spot.x, trial.steps, n, *found),
+                    *(seconds * n, trial.reading / samples, seconds * n / reference, trial.broken),
+                )
+            )
+        return points
+
+    def _recommended(self) -> list[Point]:
+        """What the advice gives for each asked error, where it is reached."""
+        rig, spots = self.rig(), []
+        for asked in ASKED:
+            advice = advise(self.scene, asked, rig)
+            if advice.reached:
+                spots.append(
+                    Spot(
+                        f"asked {asked:g}: tc = {advice.best.settings.time_constant_steps:.3g} h",
+                        advice.best.settings,
+                        None,
+                        asked,
+                    )
+                )
+            else:
+                self.left_out.append(f"recommended: {advice.reason}")
+        return self._stepped("recommended", tuple(spots), rig)
+
+    def _at_positions(
+        self, name: str, kind: str, label: str, found: Errors, seconds: float, n: int, dial: float = math.nan
+    ) -> Point:
+        """A point of a method that answers each position by itself."""
+        per_revolution = self._positions_per_revolution()
+        reference = self._rk4_step()
+        cost = seconds / n * per_revolution
+        return Point(name, kind, label, dial, n, per_revolution, *found, cost, seconds / n, cost / reference)
+
+    def _positions_per_revolution(self) -> float:
+        span = float(np.ptp(self.command.theta_2)) or 2.0 * math.pi
+        return 2.0 * math.pi / span * max(len(self.command.theta_2) - 1, 1)
+
+    def _rk4_step(self) -> float:
+        try:
+            clock = self.rig().seconds_per_step(BEST)
+        except LimitError:
+            return math.nan
+        return median(clock(TIMED_STEPS) / TIMED_STEPS for _ in range(ROUNDS))
+
+    def _formulas(self) -> list[Point]:
+        few = formulas.few(self.command)
+        exact = formulas.fifty_digits(self.scene, few, 2 * formulas.FIFTY_DIGITS)
+        points = []
+        for label, method in formulas.METHODS.items():
+            try:
+                found = formulas.against_reference(self.scene, few, method(self.scene, few), exact)
+            except (NotImplementedError, AssertionError) as error:
+                self.left_out.append(f"{label}: {error}")
+                continue
+            at = few if label == "50 digits" else self.command
+            seconds = median(formulas.seconds(method, self.scene, at) for _ in range(ROUNDS))
+            points.append(self._at_positions("formulas", FORMULAS, label, found, seconds, len(at.theta_2)))
+        return points
+
+    def _inverse(self) -> list[Point]:
+        from validation.engines.mujoco.inverse import MujocoInverse
+        from validation.engines.pinocchio import PinocchioInverse
+
+        return [self._asked("inverse", engine) for engine in (PinocchioInverse(), MujocoInverse())]
+
+    def _asked(self, curve: str, engine: Engine, label: str = "", dial: float = math.nan) -> Point:
+        """An engine that answers each position."""
+        import time
+
+        began = time.process_time()
+        answer = engine.answer(self.scene, self.command)
+        seconds = time.process_time() - began
+        if answer.refusal is not None:
+            raise LimitError(f"{engine.name}: {answer.refusal}")
+        assert answer.assembled is not None
+        rows = np.flatnonzero(answer.assembled)
+        at = self.command._replace(theta_2=self.command.theta_2[rows], branch=self.command.branch[rows])
+        found = errors(self.scene, at, {name: value[rows] for name, value in answer.quantities.items()})
+        return self._at_positions(curve, EXACT, label or engine.name, found, seconds, len(self.command.theta_2), dial)
+
+    def _one_state(self) -> list[Point]:
+        from validation.engines.mujoco.one_state import MujocoOneState
+
+        points = [
+            self._asked("one state", MujocoOneState((d,)), f"MuJoCo at one state, d = {d:g}", (1.0 - d) / d)
+            for d in ONE_STATE
+        ]
+        return [*points, self._asked("one state", MujocoOneState(), "MuJoCo at one state, extrapolated", 0.0)]
+
+    def _pinocchio_forward(self) -> list[Point]:
+        from validation.engines.pinocchio_forward import PinocchioForward
+
+        points = []
+        reference = self._rk4_step()
+        for n in FORWARD_STEPS:
+            ran = PinocchioForward(self.scene, self.command, n, FORWARD_TIME_CONSTANT * n).forward()
+            found = errors(self.scene, ran.at, ran.quantities)
+            cost = ran.stepping / ran.steps * ran.steps_per_revolution
+            points.append(
+                Point(
+                    *("Pinocchio forward", STEPPED, f"Pinocchio RK4, {n}/rev", n, ran.steps, ran.steps_per_revolution),
+                    *(*found, cost, math.nan, cost / reference),
+                )
+            )
+        return points
+
+
+def _leave_out_first(trial: Trial) -> None:
+    """The turn that a soft closure takes to settle from its exact start."""
+    at = trial.at
+    trial.at = Command(at.theta_2[1:], at.branch[1:], at.omega_2[1:], at.alpha_2[1:])  # type: ignore[index]
+    trial.quantities = {name: values[1:] for name, values in trial.quantities.items()}
+
+
+def _interleaved(
+    clocks: list[Callable[[int], float]], reference: Callable[[int], float], steps: list[int]
+) -> tuple[list[float], float]:
+    """Medians over rounds of CPU seconds per step; all take turns, so that a slow spell hits all of them."""
+    times: list[list[float]] = [[] for _ in clocks]
+    base = []
+    for _ in range(ROUNDS):
+        base.append(reference(TIMED_STEPS) / TIMED_STEPS)
+        for clock, n, kept in zip(clocks, steps, times, strict=True):
+            kept.append(clock(n) / n)
+    return [median(kept) for kept in times], median(base)
+
+
+def table(points: list[Point]) -> list[dict[str, Any]]:
+    """The rows of the CSV."""
+    return [asdict(point) for point in points]

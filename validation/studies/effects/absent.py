@@ -1,0 +1,137 @@
+"""A build that never heard of an effect: the same bits, MJCF, compiled model and calls, and as many instructions."""
+
+import ast
+import json
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from importlib import import_module
+from pathlib import Path
+
+from fourbar import effects
+from fourbar.errors import FourBarError
+from validation.engines.witnesses import not_installed
+from validation.studies.effects.counted import REPEATS, available, counts
+
+WORKLOADS = (
+    *("__init__.py", "studies/__init__.py", "studies/effects/__init__.py", "studies/effects/work.py"),
+    *("engines/__init__.py", "engines/mujoco/__init__.py", "engines/mujoco/stepping.py"),
+)
+"""Of the harness, what runs a workload; it names no effect but those it is asked for."""
+KINDS = {getattr(effects, name).key: getattr(effects, name) for name in (*effects.FILE_OF, "Load")}
+"""Everything that can act, by key."""
+ABSENT = tuple(KINDS)
+TABLES = ("files/effects.py", "mjcf/effects.py")
+"""Of the package, where an effect has a row."""
+PROBE = """
+import hashlib, json, sys
+sys.path.insert(0, sys.argv[1])
+import fourbar
+from fourbar.mjcf import mjcf
+link = fourbar.FourBar(0.3, fourbar.Bar(0.1, 0.2), fourbar.Bar(0.25, 0.5, 0.004, (0.13, 0.3)), fourbar.Bar(0.22, 0.4))
+scene = fourbar.Scene(link, fourbar.Motion(fourbar.Sweep(0.1, 6.3, 60), 10.0, 5.0))
+fourbar.solve(scene)
+calls = []
+def note(frame, event, argument):
+    if event == "call" and "fourbar" in frame.f_code.co_filename:
+        calls.append(frame.f_code.co_qualname)
+sys.setprofile(note)
+solution = fourbar.solve(scene)
+sys.setprofile(None)
+numbers = {name: hashlib.sha256(getattr(solution, name).tobytes()).hexdigest() for name in solution.evaluated()}
+print(json.dumps({"file": fourbar.__file__, "numbers": numbers, "calls": calls, "mjcf": mjcf(scene)}))
+"""
+"""What a checkout makes of a scene without effects: digests of every array, the calls made, the MJCF."""
+
+
+def build(folder: Path, without: str | None = None) -> Path:
+    """A copy of the package and of the workloads; one that has never heard of an effect where one is named.
+
+    Its file, its registration, its rows and its names are gone.
+    """
+    root = Path(__file__).parents[3]
+    copy = folder / "fourbar"
+    shutil.copytree(root / "fourbar", copy, ignore=shutil.ignore_patterns("__pycache__", "page", "plot"))
+    for file in WORKLOADS:
+        target = folder / "validation" / file
+        target.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(root / "validation" / file, target)
+    if without is None:
+        return folder
+    effect = KINDS[without]
+    name, module = effect.__name__, effect.__module__.rpartition(".")[2]
+    (copy / "effects" / f"{module}.py").unlink()
+    gone = (f"import {name} as {name}", f'"{name}": "{module}",', f'), "{module}"),')
+    for path in (copy / "__init__.py", copy / "effects" / "__init__.py"):
+        lines = [line for line in path.read_text().splitlines() if f".{module} import" not in line]
+        lines = [line for line in lines if not line.endswith(gone)]
+        path.write_text(re.sub(rf'"{name}", |\b{name}, |, {name}(?=\))', "", "\n".join(lines)) + "\n")
+    for table in TABLES:
+        path = copy / table
+        path.write_text(without_row(path.read_text(), without))
+    return folder
+
+
+def without_row(text: str, key: str) -> str:
+    """A module without the rows that its tables have under a key."""
+    lines = text.splitlines(keepends=True)
+    for table in ast.walk(ast.parse(text)):
+        if isinstance(table, ast.Dict):
+            for name, row in zip(table.keys, table.values, strict=True):
+                if isinstance(name, ast.Constant) and name.value == key:
+                    lines[name.lineno - 1 : row.end_lineno] = [""] * (row.end_lineno - name.lineno + 1)  # type: ignore[operator]
+    return "".join(lines)
+
+
+def made(root: Path) -> dict[str, object]:
+    """What a checkout makes of the bare scene: bits, calls, MJCF."""
+    done = subprocess.run(
+        [sys.executable, "-c", PROBE, str(root)], capture_output=True, text=True, check=False, cwd=root
+    )
+    if done.returncode:
+        raise FourBarError(f"the build in {root} does not run: {done.stderr.strip()[-300:]}")
+    answer: dict[str, object] = json.loads(done.stdout)
+    if not Path(str(answer.pop("file"))).is_relative_to(root):
+        raise FourBarError(f"not the build in {root} was run, but another")
+    return answer
+
+
+def differences(whole: dict[str, object], other: dict[str, object]) -> list[str]:
+    """What a build makes otherwise than the whole one, in words."""
+    texts = {"numbers": "bits of the results", "mjcf": "bytes of the MJCF", "calls": "list of the terms that run"}
+    found = [text for key, text in texts.items() if whole[key] != other[key]]
+    if not_installed("mujoco") is not None:
+        return found
+    compiled = import_module("validation.engines.mujoco.stepping").compiled
+    one, two = (compiled(answer["mjcf"]) for answer in (whole, other))
+    return found + [f"{key} of the compiled model" for key in one if one[key] != two[key]]
+
+
+def compared(effects: tuple[str, ...]) -> Iterator[tuple[str, list[str], float | None]]:
+    """For each effect what a build without it makes otherwise of a bare scene, and its instructions.
+
+    These relative to the whole build's, less 1; None where instructions cannot be counted.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        roots = {}
+        for number, effect in enumerate((None, *effects)):
+            # names of one length: paths are part of what is counted
+            roots[effect] = Path(folder).resolve() / f"{number:03d}"
+            roots[effect].mkdir()
+            build(roots[effect], effect)
+        whole = made(roots[None])
+        counted = counts("formulas", ["none"], roots[None])["none"] if available() else None
+        for effect in effects:
+            differs = differences(whole, made(roots[effect]))
+            more = None
+            if counted is not None:
+                more = counts("formulas", ["none"], roots[effect])["none"] / counted - 1.0
+            yield effect, differs, more
+
+
+def holds(differs: list[str], more: float | None) -> bool:
+    """Whether a build without the effect is the same in everything that was looked at."""
+    return not differs and (more is None or abs(more) < REPEATS)

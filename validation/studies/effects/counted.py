@@ -1,0 +1,54 @@
+"""Instructions of one workload: valgrind, of the work alone.
+
+Wall clock on a busy machine scatters by a third; instructions repeat to some 0.01 % where hashing
+and addresses are fixed (PYTHONHASHSEED, setarch -R) and one thread runs.
+"""
+
+import os
+import platform
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+
+from fourbar.errors import DependencyError, FourBarError
+from validation.studies.effects.work import POSITIONS
+
+AMOUNTS = {"formulas": (1, 5), "mujoco-simulated": (10, 210), "mujoco-inverse": (5, 45), "pinocchio-inverse": (5, 45)}
+"""Two amounts of work, in steps or positions, of the formulas in thousands of positions: their difference counts."""
+BRACKET = "ffi_call"
+"""The function of libffi within which a workload runs."""
+REPEATS = 1e-3
+"""Counts of the same work differ by less than this part."""
+
+
+def available() -> bool:
+    """Whether instructions can be counted here."""
+    return shutil.which("valgrind") is not None and shutil.which("setarch") is not None
+
+
+def counts(engine: str, effects: Sequence[str], root: Path | None = None) -> dict[str, float]:
+    """Instructions of each effect per step or position, from another checkout where one is given."""
+    if not available():
+        raise DependencyError("valgrind and setarch are needed to count instructions")
+    here = Path(__file__).parents[3] if root is None else root
+    few, many = AMOUNTS[engine]
+    threads = {name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")}
+    with tempfile.TemporaryDirectory() as folder:  # MuJoCo writes its log where it runs
+        told = {**os.environ, **threads, "PYTHONHASHSEED": "0", "PYTHONPATH": str(here), "PYTHONDONTWRITEBYTECODE": "1"}
+        command = ["setarch", platform.machine(), "-R", "valgrind", "--tool=callgrind", "--callgrind-out-file=counted"]
+        command += ["--collect-atstart=no", f"--toggle-collect={BRACKET}", f"--dump-after={BRACKET}"]
+        command += [sys.executable, "-m", "validation.studies.effects.work", engine, str(few), str(many), *effects]
+        done = subprocess.run(command, env=told, cwd=folder, capture_output=True, text=True, check=False)
+        dumps = sorted(Path(folder).glob("counted.*"), key=lambda path: int(path.suffix[1:]))
+        totals = [re.findall(r"^totals: (\d+)", dump.read_text(), re.MULTILINE) for dump in dumps[-2 * len(effects) :]]
+    if done.returncode or len(totals) < 2 * len(effects) or not all(totals):
+        raise FourBarError(
+            f"{engine} with {', '.join(effects)} did not run under valgrind: {done.stderr.strip()[-300:]}"
+        )
+    each = iter(int(total[-1]) for total in totals)
+    units = (many - few) * (POSITIONS if engine == "formulas" else 1)
+    return {effect: (more - less) / units for effect, less, more in zip(effects, each, each, strict=False)}
