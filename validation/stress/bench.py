@@ -52,11 +52,13 @@ class Limit(NamedTuple):
 
 
 LIMITS = {
-    "13x13 / formulas": Limit(">=", 10.0, "an order of magnitude is what deriving closed formulas is worth"),
+    "13x13 / formulas": Limit(">=", 5.0, "closed formulas are worth several times the system that they eliminate"),
     "formulas / positions only": Limit(">=", 3.0, "who asks for two angles does not pay for nine more unknowns"),
     "positions only / floor": Limit("<=", 6.0, "the rest of two angles is arithmetic on arrays of a block"),
     "solve to forces / formulas": Limit("<=", 2.0, "new arrays and the points come on top, no second evaluation"),
-    "solve with error bars / to forces": Limit("<=", 25.0, "the forces are evaluated 17 times, and compared"),
+    "solve with error bars / to forces": Limit(
+        "<=", 35.0, "the forces are evaluated 17 times, and every number is rounded anew"
+    ),
     "growth from 1000 positions on": Limit("<=", 1.3, "the work is linear in the positions: blocks fit the cache"),
     "memory beyond the result, MB": Limit("<=", 50.0, "work space is that of a block, not of the sweep"),
     "import fourbar / import numpy": Limit("<=", 1.0, "it loads numpy alone, and less than that of its own"),
