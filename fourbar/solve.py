@@ -87,8 +87,11 @@ def solve(
     code = np.zeros(n, dtype=np.uint8)
     with np.errstate(all="ignore"):
         case = Case.of(_begun(scene) if wanted >= STAGES.index("force") else scene)._replace(side=side)
-        # error bars evaluate each position so many times at once
-        size = BLOCK if wanted < len(STAGES) - 1 else BLOCK // 16
+        size = BLOCK
+        if wanted == len(STAGES) - 1:
+            from fourbar.error_bars import EVALUATIONS
+
+            size = BLOCK // EVALUATIONS  # each position is evaluated so many times at once
         parts: Iterable[Any] = (slice(start, min(start + size, n)) for start in range(0, n, size))
         if moved is not None:
             parts = (np.flatnonzero(moved.bar == bar) for bar in (2, 4))
@@ -324,16 +327,10 @@ def _begun(scene: Scene) -> Scene:
     if not any(effect.counts_turns for effect in scene.effects):
         return scene
     begins = command(scene)
-    state, assembled = _still(scene, begins)
+    state = state_at(scene, begins)
+    half = state.at.half
+    assembled = (half.outer >= 0.0) & (half.inner >= 0.0)
     return replace(scene, effects=tuple(effect.begun(state, assembled, begins.branch) for effect in scene.effects))
-
-
-def _still(scene: Scene, at: Command) -> tuple[State, NDArray[np.bool_]]:
-    """The positions of a command, at rest, and whether they assemble."""
-    case = Case.of(scene)
-    half, _ = case.half_angle(at.theta_2, at.remainder)
-    found = case.path.position(at.theta_2, half, at.branch)
-    return case.state(case.path, at.theta_2, found, at.branch, 0.0, 0.0), (half.outer >= 0.0) & (half.inner >= 0.0)
 
 
 def _refuse_wound(scene: Scene, at: Command) -> None:
@@ -341,7 +338,7 @@ def _refuse_wound(scene: Scene, at: Command) -> None:
     if not any(effect.counts_turns for effect in scene.effects):
         return
     with np.errstate(all="ignore"):
-        state, _ = _still(scene, at)
+        state = state_at(scene, at)
         for effect in _begun(scene).effects:
             codes = effect.status(state, at.branch) if effect.counts_turns else None
             if codes is not None and codes.any():
