@@ -14,7 +14,7 @@ from fourbar.scene import Scene
 from fourbar.solution import Solution
 from validation.compare.answer import Answer
 from validation.compare.reversals import reversing
-from validation.compare.rows import AGREES, DEGRADED, FAILS, REFUSES, UNTOLD, Row
+from validation.compare.rows import AGREES, DEGRADED, FAILS, REFUSES, UNDECIDED, Row
 from validation.compare.scales import divisor, magnitude, of_length, yardstick
 from validation.compare.tolerance import DEGRADED as TIMES_PREDICTED
 from validation.compare.tolerance import (
@@ -100,7 +100,7 @@ def compare(
         jumping = where & _jumping(quantity, scene, formulas, tolerance)
         where &= ~jumping
         if not where.any():
-            rows.append(row(quantity, UNTOLD, "no position at which both may be held to it"))
+            rows.append(row(quantity, UNDECIDED, "no position at which both may be held to it"))
         else:
             yard = divisor(yardstick(quantity, scene, formulas, ours))
             difference = angle_aware_difference(quantity, ours, theirs)
@@ -147,7 +147,7 @@ def closure(name: str, scene: Scene, answer: Answer, simulated: Tolerance = SIMU
         quantity="closure",
         error=float(error[worst]),
         allowed=allowed,
-        verdict=(AGREES if holds else FAILS) if answer.assembled.any() else UNTOLD,
+        verdict=(AGREES if holds else FAILS) if answer.assembled.any() else UNDECIDED,
         reason="identity: a e^{i theta_2} + b e^{i theta_3} = d e^{i theta_1} + c e^{i theta_4}",
         theta_2=float(answer.at.theta_2[worst]),
         condition=condition,
@@ -172,17 +172,17 @@ class _Finding(NamedTuple):
 def _by_condition(error: Array, condition: Array, where: Mask, tolerance: Tolerance) -> _Finding:
     """Errors over the positions `where` against the law in the condition; NaN at any of them fails."""
     allowed = tolerance.allowed(condition)
-    told = where & (condition * NOTHING_TO_TELL > EPS)
-    untold = int(np.count_nonzero(where & ~told))
-    note = f"; {untold} positions with eps/condition > {NOTHING_TO_TELL:g} not judged" if untold else ""
-    if not told.any():
+    decidable = where & (condition * NOTHING_TO_TELL > EPS)
+    undecided = int(np.count_nonzero(where & ~decidable))
+    note = f"; {undecided} positions with eps/condition > {NOTHING_TO_TELL:g} not judged" if undecided else ""
+    if not decidable.any():
         index = int(np.flatnonzero(where)[0])
-        verdict, reason = UNTOLD, f"eps/condition = {EPS / condition[index]:.1e}"
+        verdict, reason = UNDECIDED, f"eps/condition = {EPS / condition[index]:.1e}"
         if not np.isfinite(error[where]).all():
             verdict, reason = FAILS, "NaN"
         return _Finding(index, verdict, reason, allowed[index])
     with np.errstate(divide="ignore", invalid="ignore"):
-        ratio = np.where(told, error / allowed, -1.0)
+        ratio = np.where(decidable, error / allowed, -1.0)
     ratio[where & ~np.isfinite(error)] = np.inf
     index = int(np.argmax(ratio))
     reason = ("NaN" if math.isnan(error[index]) else tolerance.name) + note
@@ -210,7 +210,7 @@ def _by_prediction(
     if not beyond.any():
         verdict, reason = AGREES, tolerance.name
     elif lost[index] and math.isfinite(error[index]):
-        verdict, reason = UNTOLD, f"an error of {expected[index]:.1e} of the value is predicted"
+        verdict, reason = UNDECIDED, f"an error of {expected[index]:.1e} of the value is predicted"
     elif ratio[index] <= 1.0:
         verdict, reason = DEGRADED, f"{error[index]:.1e} of {expected[index]:.1e} predicted for this position"
     elif math.isnan(error[index]):
@@ -268,7 +268,7 @@ def _jumping(quantity: str, scene: Scene, formulas: Solution, tolerance: Toleran
 
 
 def _answerable(quantity: str, scene: Scene, formulas: Solution, tolerance: Tolerance) -> Mask:
-    """Where a quantity may be asked of an engine of this class."""
+    """Where a quantity may be demanded of an engine of this class."""
     if quantity == "torque" and scene.drive_bar != 2 and tolerance.name == SIMULATED.name:
         speed = formulas.omega_3 if scene.drive_bar == 3 else formulas.omega_4
         assert speed is not None

@@ -17,7 +17,7 @@ from fourbar.solve import state_at
 from validation.compare.answer import Answer
 from validation.compare.compare import closure, turned
 from validation.compare.reversals import reversing
-from validation.compare.rows import AGREES, FAILS, UNTOLD, Row
+from validation.compare.rows import AGREES, FAILS, UNDECIDED, Row
 from validation.compare.scales import magnitude
 from validation.compare.tolerance import IDENTITY, Array
 
@@ -87,7 +87,7 @@ def _sums(name: str, scene: Scene, at: Command, solution: Solution) -> list[Row]
     with np.errstate(divide="ignore", invalid="ignore"):
         moment_terms = moment_terms / (solution.condition**2 * solution.drive_condition)
     where = solution.status_code == OK
-    # which way dry friction acts at a pin at rest is decided by rounding: not the same here as in the answer
+    # the sense of dry friction at a pin at rest is decided by rounding: not the same here as in the answer
     where &= ~reversing(scene, solution, IDENTITY.factor)
     return [
         _row(name, "force_sum", magnitude(force), force_terms, where, solution, "F12 + F14 + loads = sum of m a_G"),
@@ -110,8 +110,8 @@ def _row(
         quantity=quantity,
         error=float(relative[worst]),
         allowed=allowed,
-        verdict=(AGREES if holds else FAILS) if where.any() else UNTOLD,
-        reason=f"identity: {equation}" if where.any() else "no position at which it is asked",
+        verdict=(AGREES if holds else FAILS) if where.any() else UNDECIDED,
+        reason=f"identity: {equation}" if where.any() else "no position at which it is demanded",
         theta_2=float(solution.theta_2[worst]),
         condition=condition,
     )

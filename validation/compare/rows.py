@@ -10,15 +10,15 @@ from pathlib import Path
 from fourbar.writing import write_text
 from validation.compare.plain import plain
 
-AGREES, DEGRADED, UNTOLD, REFUSES, FAILS = (
+AGREES, DEGRADED, UNDECIDED, REFUSES, FAILS = (
     *("agrees", "degraded as predicted"),
-    *("nothing can be told", "refuses", "fails"),
+    *("undecided", "refuses", "fails"),
 )
-VERDICTS = (AGREES, DEGRADED, UNTOLD, REFUSES, FAILS)
+VERDICTS = (AGREES, DEGRADED, UNDECIDED, REFUSES, FAILS)
 """From the best to the worst."""
 HELD = (AGREES, DEGRADED)
 COMPARED = (*HELD, FAILS)
-"""Of the others nothing was compared: no digit of the quantity is left to be told, or the engine declared a limit."""
+"""Of the others nothing was compared: no digit of the quantity is left to decide by, or the engine declared a limit."""
 
 
 @dataclass(frozen=True, slots=True, order=True)

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 from fourbar.quantities import UNKNOWNS
 from validation.compare.counts import Counts
-from validation.compare.rows import FAILS, REFUSES, UNTOLD, Row, sorted_rows, to_csv
+from validation.compare.rows import FAILS, REFUSES, UNDECIDED, Row, sorted_rows, to_csv
 from validation.report.colours import by_variable, declarations, style_of
 from validation.report.costs import cost_figure
 from validation.report.page import Page
@@ -37,7 +37,7 @@ class Cell(NamedTuple):
     @property
     def kind(self) -> str:
         """Word for its colour."""
-        return {FAILS: "fails", REFUSES: "refuses", UNTOLD: "untold"}.get(self.row.verdict, "holds")
+        return {FAILS: "fails", REFUSES: "refuses", UNDECIDED: "untold"}.get(self.row.verdict, "holds")
 
     @property
     def shown(self) -> str:

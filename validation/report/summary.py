@@ -168,7 +168,7 @@ def summarise(
                 _settings(values),
                 median(t.times for t in values),
                 median(t.microseconds for t in values),
-                WORK[engine].said if engine in WORK else "",
+                WORK[engine].full if engine in WORK else "",
             )
             for (engine, _), values in sorted(costs.items())
         ],

@@ -1,4 +1,4 @@
-"""The row of an engine that broke down: its own failure, told in its own row."""
+"""The row of an engine that broke down: its own failure, in its own row."""
 
 from validation.compare.plain import plain
 from validation.compare.rows import FAILS, Row

@@ -49,7 +49,7 @@ def judged_page(name: str, scene: Scene, witnesses: Sequence[Witness] = WITNESSE
 
 
 def judge(name: str, scene: Scene, witnesses: Sequence[Witness] = WITNESSES) -> Record:
-    """Ask every witness about one scene and compare; an engine that breaks down costs its own rows."""
+    """Let every witness answer one scene and compare; an engine that breaks down costs its own rows."""
     record = Record(name, scene)
     if scene.motion.free is not None:
         from validation.run.released import judge_released
@@ -97,7 +97,7 @@ def _called_for(witnesses: Iterable[Witness], at: Command, record: Record) -> It
     for witness in witnesses:
         reason = None
         if at.omega_2 is None:
-            reason = None if witness.positions else "only positions are asked for, and it gives forces"
+            reason = None if witness.positions else "the scene states positions only, and it gives forces"
         elif witness.through_time and not np.any(at.omega_2):
             reason = "omega_2 is 0: nothing moves through time"
         elif witness.through_time and len(at.theta_2) == 1:
@@ -114,17 +114,17 @@ def _judged(name: str, scene: Scene, at: Command, solution: Solution, answer: An
     formulas = solution if theirs is at else solve(scene, _stage(theirs), at=theirs)
     predicted = predicting_from(witness, scene, theirs, answer)
     rows = compare(name, scene, answer, formulas, witness.tolerance, witness.expected, predicted)
-    said = answer.assembled is not None and len(answer.assembled) == len(formulas)  # otherwise a row has failed
-    if said and answer.at is not None and {"theta_3", "theta_4"} <= answer.quantities.keys():
+    answers = answer.assembled is not None and len(answer.assembled) == len(formulas)  # otherwise a row has failed
+    if answers and answer.at is not None and {"theta_3", "theta_4"} <= answer.quantities.keys():
         rows.append(closure(name, scene, answer, witness.tolerance))
     return rows
 
 
 def _stated(name: str, scene: Scene, witness: Witness, answer: Answer) -> list[Row]:
-    """What the formulas state of the linkage whatever its motion, asked of an exact engine."""
+    """What the formulas state of the linkage whatever its motion, held against an exact engine."""
     try:
         return statements(name, scene, witness.engine(), answer)
-    except Exception as error:  # whatever an engine raises is its own failure, told in its own row
+    except Exception as error:  # whatever an engine raises is its own failure, in its own row
         reason = f"{type(error).__name__}: {error}".splitlines()[0]
         return [failure(name, witness.name, "statements of the linkage", reason)]
 
@@ -149,7 +149,7 @@ def _judge_inertia(record: Record, at: Command, witnesses: Iterable[Witness]) ->
         return
     bare = replace(scene, loads=(), effects=())
     ours = solve(bare, _stage(at), at=at)
-    refused = {answer.engine for answer in record.answers if answer.refusal is not None}  # and has said so
+    refused = {answer.engine for answer in record.answers if answer.refusal is not None}  # and has its row
     for witness in witnesses:
         answer = _ask(replace(witness, expected=("torque",)), bare, at, record, part="inertia alone")
         if answer is None or (answer.refusal is not None and answer.engine in refused):
@@ -166,7 +166,7 @@ def _ask(witness: Witness, scene: Scene, at: Command, record: Record, part: str 
     try:
         answer: Answer
         answer, seconds = _timed(lambda: witness.engine().answer(scene, at))
-    except Exception as error:  # whatever an engine raises is its own failure, told in its own row
+    except Exception as error:  # whatever an engine raises is its own failure, in its own row
         reason = f"{type(error).__name__}: {error}".splitlines()[0]
         record.rows.append(failure(record.name, witness.name, part, reason))
         return None

@@ -112,17 +112,17 @@ def _over_one_pool(
     with ProcessPool(max_workers=workers, context=get_context("spawn"), initializer=ready) as pool:
         try:
 
-            def submit(scenes: Sequence[int], asked: Sequence[Witness]) -> Future[list[Page]]:
+            def submit(scenes: Sequence[int], who: Sequence[Witness]) -> Future[list[Page]]:
                 seconds = longest(suite) * len(scenes)
-                task = (*part(suite, scenes), asked, draw)
+                task = (*part(suite, scenes), who, draw)
                 try:
                     future: Future[list[Page]] = pool.schedule(judge_chunk, args=task, timeout=seconds)
                 except RuntimeError:  # a broken pool takes no more
                     raise StalledError from None
                 return future
 
-            def lost(under_way: Iterable[Future[list[Page]]]) -> bool:
-                return not pool.active or not any(future.running() for future in under_way)
+            def lost(running: Iterable[Future[list[Page]]]) -> bool:
+                return not pool.active or not any(future.running() for future in running)
 
             yield from _as_done(suite, chunks, witnesses, submit, IN_FLIGHT * workers, lost)
         except BaseException:
@@ -142,12 +142,12 @@ def over_machines(
         why = str(error) or "no answer"
         raise InputError("--scheduler", scheduler, f"must be the address of a Dask scheduler: {why}") from None
     workers = max(1, len(connected.nthreads()))  # type: ignore[no-untyped-call]
-    # threads that wait for Dask's futures: those of its executor never end where a result was lost on its way here;
+    # threads that wait for Dask's futures: those of its executor never end where a result was lost in transit;
     # the client is left first, which ends what is still waited for
     with ThreadPoolExecutor(IN_FLIGHT * workers) as waiting, connected as client:
 
-        def submit(scenes: Sequence[int], asked: Sequence[Witness]) -> Future[list[Page]]:
-            task = (longest(suite) * len(scenes), *part(suite, scenes), asked, draw)
+        def submit(scenes: Sequence[int], who: Sequence[Witness]) -> Future[list[Page]]:
+            task = (longest(suite) * len(scenes), *part(suite, scenes), who, draw)
             return waiting.submit(client.submit(judge_watched, *task, retries=0, pure=False).result)
 
         def deserted(_: Iterable[Future[list[Page]]]) -> bool:
@@ -167,24 +167,24 @@ def _as_done(
     in_flight: int,
     lost: "Callable[[Iterable[Future[list[Page]]]], bool]",
 ) -> Iterator[tuple[int, list[Page]]]:
-    """Keep a bounded number of chunks under way; yield each as it is done."""
+    """Keep a bounded number of chunks running; yield each as it is done."""
     waiting = iter(chunks)
-    under_way: dict[Future[list[Page]], Chunk] = {}
+    running: dict[Future[list[Page]], Chunk] = {}
     exhausted = False
     while True:
-        while not exhausted and len(under_way) < in_flight:
+        while not exhausted and len(running) < in_flight:
             chunk = next(waiting, None)
             if chunk is None:
                 exhausted = True
             else:
-                under_way[submit(chunk[1], witnesses)] = chunk
-        if not under_way:
+                running[submit(chunk[1], witnesses)] = chunk
+        if not running:
             return
-        done, _ = wait(under_way, STALL, FIRST_COMPLETED)
-        if not done and lost(under_way):
+        done, _ = wait(running, STALL, FIRST_COMPLETED)
+        if not done and lost(running):
             raise StalledError
         for future in done:
-            number, scenes = under_way.pop(future)
+            number, scenes = running.pop(future)
             try:
                 yield number, _outcome(future, lost)
             except StalledError:
@@ -223,16 +223,16 @@ def _alone(
     name = plain(suite.name(scene))
     page: Page | None = None
     failed = []
-    for asked in ([], *([witness] for witness in witnesses)):
+    for who in ([], *([witness] for witness in witnesses)):
         for attempt in range(ATTEMPTS):
             try:
-                part = _outcome(submit([scene], asked), lost)[0]
+                part = _outcome(submit([scene], who), lost)[0]
             except StalledError:
                 raise
             except Exception as error:
                 if getattr(error, "exitcode", None) in FROM_OUTSIDE and attempt + 1 < ATTEMPTS:
                     continue  # somebody killed it: that is not the engine's doing
-                failed.append(breakdown(name, asked[0].name if asked else "formulas", error))
+                failed.append(breakdown(name, who[0].name if who else "formulas", error))
             else:
                 page = part if page is None else page.joined(part)
             break

@@ -1,6 +1,6 @@
 """Free motions: every engine against the exact solution where there is one, otherwise against the formulas.
 
-An engine's error is predicted by itself: it is asked twice, with its step and with twice its step, and
+An engine's error is predicted by itself: it runs twice, with its step and with twice its step, and
 the difference is what the coarser motion errs by. The finer one must not err by more than ten times that.
 """
 
@@ -106,12 +106,12 @@ def judge_released(record: Record) -> Record:
             record.left_out.append(f"{name}: {reason}")
             continue
         try:
-            asked = _adapter(adapter)
+            engine = _adapter(adapter)
             begin = time.perf_counter()
-            fine = asked(step).release(record.scene, times)
+            fine = engine(step).release(record.scene, times)
             seconds = time.perf_counter() - begin
-            coarse = None if fine.refusal else asked(2.0 * step).release(record.scene, times)
-        except Exception as error:  # whatever an engine raises is its own failure, told in its own row
+            coarse = None if fine.refusal else engine(2.0 * step).release(record.scene, times)
+        except Exception as error:  # whatever an engine raises is its own failure, in its own row
             record.rows.append(breakdown(record.name, name, error))
             continue
         record.timings.append(Timing(record.name, fine.engine, fine.setting, len(times), seconds))
@@ -193,5 +193,5 @@ def _rows(record: Record, fine: Released, coarse: Released | None, truth: _Truth
 
 
 def _end(stopped_at: float | None, duration: float) -> Array:
-    """When a motion reached its limit, or the end that was asked for, as a part of that duration, (1,)."""
+    """When a motion reached its limit, or the stated end, as a part of that duration, (1,)."""
     return np.array([1.0 if stopped_at is None else stopped_at / duration])

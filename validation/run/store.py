@@ -1,6 +1,6 @@
 """The folder of a run: a lock, finished parts, and at the end the results.
 
-lock               held while a run is under way; the system frees it when the process dies
+lock               held while a run goes on; the system frees it when the process dies
 run.json           what is being run; a rerun of the same thing resumes, of another starts over
 parts/000012.csv   the rows of chunk 12, written whole; its presence says the chunk is done
 parts/000012.json  what the report needs of it: timings, evidence, pictures

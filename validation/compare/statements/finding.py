@@ -23,7 +23,7 @@ class Finding(NamedTuple):
     error: float
     allowed: float
     theta_2: float
-    said: str
+    what: str
 
 
 def worst(name: str, answer: Answer, quantity: str, findings: Iterable[Finding]) -> Row:
@@ -38,7 +38,7 @@ def worst(name: str, answer: Answer, quantity: str, findings: Iterable[Finding])
         error=float(found.error),
         allowed=float(found.allowed),
         verdict=AGREES if holds else FAILS,
-        reason=found.said,
+        reason=found.what,
         theta_2=float(found.theta_2),
         condition=float(EQUIVALENCE.factor / max(found.allowed, EQUIVALENCE.factor)),
     )
@@ -51,8 +51,8 @@ def _excess(found: Finding) -> float:
     return found.error / found.allowed if found.allowed > 0.0 else math.inf if found.error > 0.0 else 0.0
 
 
-def asked(engine: Engine, linkage: FourBar, theta_2: Sequence[float], branch: Sequence[int]) -> dict[str, Array]:
-    """What the engine finds where bar 2 turns at 1 rad/s; the bars are uniform: nothing is asked of their masses."""
+def answered(engine: Engine, linkage: FourBar, theta_2: Sequence[float], branch: Sequence[int]) -> dict[str, Array]:
+    """What the engine finds where bar 2 turns at 1 rad/s; the bars are uniform: their masses play no part."""
     bars = uniform(*linkage.lengths)
     scene = Scene(FourBar(bars.ground, bars.input, bars.coupler, bars.output, linkage.ground_angle), Motion(0.0, 1.0))
     at = Command(np.array(theta_2, dtype=float), np.array(branch, dtype=np.int8), 1.0, 0.0)

@@ -16,7 +16,7 @@ from fourbar.scene import Command, Scene
 from fourbar.scene.motion import Motion
 from validation.compare.answer import Answer
 from validation.engines.loop import Position
-from validation.engines.mujoco.called_back import Told, at_full_size, listening, of_loads, telling, within
+from validation.engines.mujoco.called_back import ActuatorForce, at_full_size, of_loads, receiving, supplying, within
 from validation.engines.mujoco.closed_loop import O2, O4, A, ClosedLoop, couple_elsewhere
 from validation.engines.mujoco.limits import NEAREST_TOGGLE, least_sine, too_fast_or_loaded
 from validation.engines.mujoco.motions import Lawful, Passage, Steady, extremes, order_in_time
@@ -28,10 +28,10 @@ SHARED = (
 )
 OWN = "assembly, velocities at the start, the motion through time, accelerations, drive torque, pin forces"
 LIGHT_FLYWHEEL = 1e4
-"""Flywheel of the model that is asked for T3 or T4: heavy enough to keep the closure's softness
+"""Flywheel of the model that gives T3 or T4: heavy enough to keep the closure's softness
 small, light enough that the torque it needs does not drown in its rounding."""
 FINE = np.radians(2.0)
-"""Between positions further apart than this it is looked whether the loop closes on the way."""
+"""Between positions further apart than this the loop is tried for closure."""
 COLLINEAR = 1e-9
 """Part of the sum of the lengths, and of half a turn: below what the time step itself can resolve."""
 FIELDS = tuple(name for name in UNKNOWNS if name not in PIN_FORCES)
@@ -110,7 +110,7 @@ class _Simulation:
         self.settings, self.command, self.law = settings, command, scene.motion.law
         # the text is that of the command, which a caller may have given instead of the scene's own
         self.scene = as_run(scene, command)
-        self.told = of_loads(scene)
+        self.supplied = of_loads(scene)
         n = len(command.theta_2)
         self.order = order_in_time(command, self.scene.motion.omega_2 or 0.0, self.law)
         self.theta_2 = command.theta_2.copy()
@@ -161,9 +161,9 @@ class _Simulation:
         motion = self.scene.motion
         return Steady(self.command, stretch, motion.omega_2 or 0.0, motion.alpha_2)
 
-    def _loop(self, timestep: float, told: dict[str, Told], flywheel: float | None = None) -> ClosedLoop:
-        """A compiled model that takes from `telling` what its text cannot say."""
-        return listening(ClosedLoop(self._text(timestep, flywheel)), told)
+    def _loop(self, timestep: float, supplied: dict[str, ActuatorForce], flywheel: float | None = None) -> ClosedLoop:
+        """A compiled model that takes from `supplying` what its text cannot say."""
+        return receiving(ClosedLoop(self._text(timestep, flywheel)), supplied)
 
     def _text(self, timestep: float, flywheel: float | None = None) -> str:
         """The generated MJCF without its keyframe."""
@@ -189,7 +189,7 @@ class _Simulation:
         return [stretch for stretch in stretches if stretch]
 
     def _closes_between(self, position: Position, one: int, other: int) -> bool:
-        """Whether the loop closes all the way between two positions."""
+        """Whether the loop closes everywhere between two positions."""
         start, stop = float(self.command.theta_2[one]), float(self.command.theta_2[other])
         pieces = int(np.ceil(abs(stop - start) / FINE))
         branch = int(self.command.branch[one])
@@ -204,23 +204,23 @@ class _Simulation:
         if len(stretch) > 1:
             turn = 2.0 * np.pi / run.fastest
             self.steps_per_revolution = max(self.steps_per_revolution, turn / timestep)
-        told = self.told
+        supplied = self.supplied
         if self.law is not None:
-            told = {**told, "drive": lambda m, d: m.dof_armature[O2] * run.alpha(d.time)}
-        with telling(told):
-            self._run_told(stretch, found, run, timestep, told)
+            supplied = {**supplied, "drive": lambda m, d: m.dof_armature[O2] * run.alpha(d.time)}
+        with supplying(supplied):
+            self._run_supplied(stretch, found, run, timestep, supplied)
 
-    def _run_told(
-        self, stretch: list[int], found: list[Found], run: Passage, timestep: float, told: dict[str, Told]
+    def _run_supplied(
+        self, stretch: list[int], found: list[Found], run: Passage, timestep: float, supplied: dict[str, ActuatorForce]
     ) -> None:
         """The same with everything that acts in place."""
-        loop = self._loop(timestep, told)
-        light = None if self.scene.drive_bar == 2 else self._loop(timestep, told, LIGHT_FLYWHEEL)
+        loop = self._loop(timestep, supplied)
+        light = None if self.scene.drive_bar == 2 else self._loop(timestep, supplied, LIGHT_FLYWHEEL)
         start = found[stretch[0]]
         assert start is not None
         wound = unwound(self.scene, start)
         self.turns = wound[O2] - start[O2]
-        watch = Watch(self._loop(timestep, told), self.scene.drive_bar)
+        watch = Watch(self._loop(timestep, supplied), self.scene.drive_bar)
         loop.set_state(wound, run.omega)
         begins = float(self.command.theta_2[stretch[0]])
         done = 0

@@ -1,4 +1,4 @@
-"""Somebody's own MJCF of a linkage, asked for the torque and the pin forces of a scene.
+"""Somebody's own MJCF of a linkage, and its torque and pin forces on a scene.
 
 At one state: its own assembly and speeds, then the couple on the driven bar with which its crank
 accelerates as commanded; the accelerations are linear in that couple, so a few `mj_forward` find it.
@@ -29,7 +29,7 @@ from validation.engines.mujoco.describe import called, described
 
 ONE_STATE, THROUGH_TIME = "mjcf-one-state", "mjcf-simulated"
 POSITIONS = 37
-"""Positions asked of a sweep: a file is judged as a whole, not position by position."""
+"""Positions taken of a sweep: a file is judged as a whole, not position by position."""
 MOST_STEPS = 400_000
 """A revolution at 628 steps per turn is a thousandth of this; more would be minutes."""
 REFINEMENTS = 3

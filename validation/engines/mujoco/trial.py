@@ -1,7 +1,7 @@
 """One scene run through in time with any settings of MuJoCo: what accuracy costs, tried out.
 
 The scene is assembled once by the engine itself; each trial compiles the generated MJCF anew, with
-the drive it is asked to try, and reports its own motion, torque, pin forces and CPU seconds.
+the drive to be tried, and reports its own motion, torque, pin forces and CPU seconds.
 """
 
 import time
@@ -21,7 +21,7 @@ from validation.compare.answer import Array
 from validation.engines.mujoco.closed_loop import O2, ClosedLoop, couple_elsewhere
 
 LIGHT_FLYWHEEL = 1e4
-"""Flywheel of the model that is asked for T3 or T4: heavy enough to keep the closure's softness
+"""Flywheel of the model that gives T3 or T4: heavy enough to keep the closure's softness
 small, light enough that the torque it needs does not drown in its rounding."""
 Build = Callable[[str, float], ClosedLoop]
 """From the MJCF text and the speed to keep (rad/s) to the loop that is stepped."""
@@ -54,7 +54,7 @@ class Trial:
     reading: float
     """CPU seconds in reading the samples."""
     broken: str = ""
-    """What MuJoCo said of itself, where it lost the motion."""
+    """What MuJoCo reported of itself, where it lost the motion."""
 
 
 class Rig:

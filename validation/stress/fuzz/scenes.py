@@ -70,7 +70,7 @@ def _draw(rng: np.random.Generator, kind: str) -> Scene:
 
 
 def _lengths(rng: np.random.Generator, hard: bool) -> Any:
-    """(ground, input, coupler, output), some of them equal, in extreme ratios, or beside s + l = p + q."""
+    """(ground, input, coupler, output), some of them equal, in extreme ratios, or near s + l = p + q."""
     choice = rng.random() if hard else 1.0
     x = rng.uniform(0.1, 1.0, 4)
     if choice < 0.1:
@@ -94,7 +94,7 @@ def _lengths(rng: np.random.Generator, hard: bool) -> Any:
 
 
 def _angles(rng: np.random.Generator, hard: bool, lengths: tuple[float, ...]) -> Any:
-    """theta_2 - theta_1: anywhere, or beside a limit position, a change point, or many turns away."""
+    """theta_2 - theta_1: anywhere, or near a limit position, a change point, or many turns away."""
     psi = rng.uniform(-3.2, 3.2, POSITIONS)
     if not hard:
         return psi
