@@ -45,6 +45,12 @@ class Row:
             raise ValueError(f"{self.verdict!r} is no verdict on an error of {self.error!r}")
         object.__setattr__(self, "passed", self.verdict in HELD)
 
+    @classmethod
+    def unmeasured(cls, scene: str, engine: str, setting: str, quantity: str, verdict: str, reason: str) -> "Row":
+        """A verdict without numbers: a refusal, a breakdown, an answer that is missing."""
+        nan = math.nan
+        return cls(scene, engine, setting or "-", quantity, nan, nan, verdict, plain(reason), nan, nan)
+
     @property
     def compared(self) -> bool:
         """Whether anything was compared."""

@@ -11,9 +11,9 @@ from fourbar.show.drawing import drawing
 from fourbar.solution import Solution
 from fourbar.solve import solve
 from validation.compare.answer import Answer
-from validation.compare.compare import angle_aware_difference
+from validation.compare.error import magnitude, relative_error
 from validation.compare.reversals import Reversal, broken
-from validation.compare.scales import divisor, magnitude, yardstick
+from validation.compare.scales import yardstick
 from validation.compare.tolerance import EPS, EQUIVALENCE, SIMULATED, Array, condition_of
 from validation.report.colours import ALLOWED, BAND, GRID, INK, PAPER, by_variable, style_of
 from validation.report.page import Record
@@ -108,9 +108,8 @@ def _draw_errors(axes: "Axes", quantity: str, record: Record, solution: Solution
     for turn, answer in enumerate(answers):
         formulas = solution if answer.at is None else solve(record.scene, at=answer.at)
         mine = getattr(formulas, quantity)
-        error = angle_aware_difference(quantity, mine, answer.quantities[quantity]) / divisor(
-            yardstick(quantity, record.scene, formulas, mine)
-        )
+        size = yardstick(quantity, record.scene, formulas, mine)
+        error = relative_error(quantity, mine, answer.quantities[quantity], size)
         places = worst_of_stretches(error, turn / len(answers))
         if not len(places):
             continue

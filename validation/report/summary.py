@@ -11,6 +11,7 @@ from typing import NamedTuple, TypeVar
 
 from fourbar.exits import HOLDS
 from validation.compare.counts import Counts
+from validation.compare.error import used as of_allowance
 from validation.compare.rows import REFUSES, Row
 from validation.compare.tolerance import EPS, EQUIVALENCE, IDENTITY, NOTHING_TO_TELL, SIMULATED, K, Tolerance
 from validation.engines.witnesses import WORK
@@ -191,13 +192,7 @@ def _left_out(page: Page) -> set[tuple[str, str]]:
 
 def used(row: Row) -> float:
     """error/allowed; infinite without an answer, 0 where nothing is allowed and errs, or nothing was compared."""
-    if not row.compared:
-        return 0.0
-    if math.isnan(row.error):
-        return math.inf
-    if row.allowed == 0.0:
-        return 0.0 if row.error == 0.0 else math.inf
-    return row.error / row.allowed
+    return float(of_allowance(row.error, row.allowed)) if row.compared else 0.0
 
 
 def _worst(rows: Sequence[Row]) -> list[Worst]:

@@ -13,8 +13,8 @@ import numpy as np
 from fourbar.errors import InputError
 from fourbar.scene import Command, Scene
 from validation.compare.answer import Answer, Engine
-from validation.compare.compare import COMPARED, SLOW_DRIVE
-from validation.compare.scales import magnitude
+from validation.compare.compare import COMPARED, turning
+from validation.compare.error import magnitude, relative
 from validation.compare.tolerance import SIMULATED, Tolerance
 from validation.engines.witnesses import Witness
 
@@ -111,8 +111,7 @@ def expected_error(scene: Scene, answer: Answer) -> float:
         sizes = np.where(np.isfinite(values), 1.0, np.nan) if name.startswith("theta") else magnitude(values)
         known = np.isfinite(sizes)
         if name == "torque" and scene.drive_bar != 2:
-            speed = np.abs(np.nan_to_num(answer.quantities[f"omega_{scene.drive_bar}"]))
-            known &= speed > SLOW_DRIVE * speed.max()
+            known &= turning(answer.quantities[f"omega_{scene.drive_bar}"])
         if known.any() and sizes[known].max() > 0.0:
-            worst = max(worst, float(predicted[known].max() / sizes[known].max()))
+            worst = max(worst, float(relative(predicted[known].max(), sizes[known].max())))
     return worst if np.isfinite(worst) else float("inf")

@@ -14,8 +14,8 @@ from fourbar.scene import Command, Scene, command
 from fourbar.solution import Solution
 from fourbar.solve import solve
 from validation.compare.answer import Answer
-from validation.compare.compare import closure, compare
-from validation.compare.identities import FORMULAS, identities
+from validation.compare.compare import compare
+from validation.compare.identities import FORMULAS, closure, identities
 from validation.compare.plain import plain
 from validation.compare.reversals import reversals
 from validation.compare.rows import FAILS, REFUSES, VERDICTS, Row
@@ -23,7 +23,7 @@ from validation.compare.statements.statements import statements
 from validation.compare.tolerance import EQUIVALENCE
 from validation.engines.witnesses import WITNESSES, Witness, predicting_from
 from validation.report.page import Page, Record, Timing
-from validation.run.breakdown import failure
+from validation.run.breakdown import breakdown
 
 
 def judged_page(name: str, scene: Scene, witnesses: Sequence[Witness] = WITNESSES, *, draw: bool = True) -> Page:
@@ -125,8 +125,7 @@ def _stated(name: str, scene: Scene, witness: Witness, answer: Answer) -> list[R
     try:
         return statements(name, scene, witness.engine(), answer)
     except Exception as error:  # whatever an engine raises is its own failure, in its own row
-        reason = f"{type(error).__name__}: {error}".splitlines()[0]
-        return [failure(name, witness.name, "statements of the linkage", reason)]
+        return [breakdown(name, witness.name, error, "statements of the linkage")]
 
 
 def _observed_order(name: str, scene: Scene, at: Command, solution: Solution, witness: Witness) -> dict[str, float]:
@@ -167,8 +166,7 @@ def _ask(witness: Witness, scene: Scene, at: Command, record: Record, part: str 
         answer: Answer
         answer, seconds = _timed(lambda: witness.engine().answer(scene, at))
     except Exception as error:  # whatever an engine raises is its own failure, in its own row
-        reason = f"{type(error).__name__}: {error}".splitlines()[0]
-        record.rows.append(failure(record.name, witness.name, part, reason))
+        record.rows.append(breakdown(record.name, witness.name, error, part))
         return None
     if not part:
         record.timings.append(Timing(record.name, answer.engine, answer.setting, len(at.theta_2), seconds))

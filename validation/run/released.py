@@ -17,6 +17,7 @@ from fourbar.linkage import MOVING_BARS
 from fourbar.scene import Scene
 from fourbar.solve import solve
 from validation.compare.answer import Array, Released
+from validation.compare.error import in_own_unit, relative, worst
 from validation.compare.rows import AGREES, DEGRADED, FAILS, REFUSES, Row
 from validation.compare.tolerance import DEGRADED as TIMES_PREDICTED
 from validation.engines.witnesses import not_installed
@@ -135,13 +136,13 @@ def _adapter(adapter: str) -> Callable[[float], Any]:
 
 
 def _rows(record: Record, fine: Released, coarse: Released | None, truth: _Truth) -> list[Row]:
-    free, nan, n = record.scene.motion.free, math.nan, len(truth.theta_2)
+    free, n = record.scene.motion.free, len(truth.theta_2)
     assert free is not None
     if fine.refusal is not None:
-        return [Row(record.name, fine.engine, fine.setting, "all", nan, nan, REFUSES, fine.refusal, nan, nan)]
+        return [Row.unmeasured(record.name, fine.engine, fine.setting, "all", REFUSES, fine.refusal)]
     if len(fine.theta_2) < n:
         reason = f"it stopped after {len(fine.theta_2)} of {n} instants"
-        return [Row(record.name, fine.engine, fine.setting, "all", nan, nan, FAILS, reason, nan, nan)]
+        return [Row.unmeasured(record.name, fine.engine, fine.setting, "all", FAILS, reason)]
     speed = float(np.abs(truth.omega_2).max())
     sizes = {"theta_2": 1.0, "omega_2": speed, "energy": float(np.abs(fine.energy[:n]).max()), "stopped_at": 1.0}
 
@@ -161,31 +162,32 @@ def _rows(record: Record, fine: Released, coarse: Released | None, truth: _Truth
     }
     rows = []
     for name, values in numbers(fine).items():
-        size = sizes[name] or 1.0
-        relative, expected = np.abs(values - right[name]) / size, 0.0
+        size = in_own_unit(np.array(sizes[name]))
+        error, expected = relative(np.abs(values - right[name]), size), 0.0
         if coarse is not None:
             other = numbers(coarse)[name]
-            expected = float(np.abs(values - other).max()) / size if len(other) == len(values) else nan
-        worst = int(np.argmax(np.where(np.isnan(relative), np.inf, relative)))
+            alike = len(other) == len(values)
+            expected = float(relative(np.abs(values - other).max(), size)) if alike else math.nan
+        index = worst(error)
         full = FULL[name] * max(1.0, free.duration / UNIT)
         allowed = max(full, TIMES_PREDICTED * expected)
-        if relative[worst] <= full:
+        if error[index] <= full:
             verdict, reason = AGREES, f"a free motion of {free.duration:g} s"
-        elif relative[worst] <= allowed and math.isfinite(expected):
-            verdict, reason = DEGRADED, f"{relative[worst]:.1e} of {expected:.1e} predicted from twice the step"
+        elif error[index] <= allowed and math.isfinite(expected):
+            verdict, reason = DEGRADED, f"{error[index]:.1e} of {expected:.1e} predicted from twice the step"
         else:
-            verdict, reason = FAILS, f"{relative[worst]:.1e} where {expected:.1e} was predicted"
+            verdict, reason = FAILS, f"{error[index]:.1e} where {expected:.1e} was predicted"
         rows.append(
             Row(
                 record.name,
                 fine.engine,
                 fine.setting,
                 name,
-                float(relative[worst]),
+                float(error[index]),
                 allowed,
                 verdict,
                 reason,
-                float(fine.theta_2[n - 1 if name == "stopped_at" else worst]),
+                float(fine.theta_2[n - 1 if name == "stopped_at" else index]),
                 1.0,
             )
         )
