@@ -32,7 +32,7 @@ from validation.report.html import html as page_of
 from validation.report.markdown import markdown
 from validation.report.summary import summarise
 from validation.run import released as free
-from validation.run.judge import judge, judged_page
+from validation.run.judge import judge, judged
 from validation.stress.mutation import mutation
 from validation.studies.cost.laws import Law
 
@@ -197,7 +197,7 @@ def test_every_form_of_a_report_says_the_same_counts() -> None:
     refused = Witness("echo", "tests.test_harness:Refuses", EQUIVALENCE)
     exact = next(w for w in WITNESSES if w.name == "free-body")
     good, bad = (
-        judged_page(name, crank_rocker(title=name), witnesses, draw=False)
+        judged(name, crank_rocker(title=name), witnesses, draw=False)
         for name, witnesses in (("good", (exact, refused)), ("refused", (refused,)))
     )
     summary = summarise([good, bad])
@@ -221,7 +221,7 @@ def test_a_free_motion_that_every_engine_refuses_is_not_held(monkeypatch: pytest
 
     monkeypatch.setattr(free, "_adapter", lambda _: Refusing)
     scene = crank_rocker(motion=fourbar.Motion(1.0, 0.0, free=fourbar.Free(0.2, 20)))
-    page = judged_page("free", scene, (), draw=False)
+    page = judged("free", scene, (), draw=False)
     assert summarise([page]).verdict == "Nothing was compared on 1 scene: 2 refuse"
 
 

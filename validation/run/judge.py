@@ -22,11 +22,11 @@ from validation.compare.rows import FAILS, REFUSES, VERDICTS, Row
 from validation.compare.statements.statements import statements
 from validation.compare.tolerance import EQUIVALENCE
 from validation.engines.witnesses import WITNESSES, Witness, predicting_from
-from validation.report.page import Page, Record, Timing
+from validation.report.record import Record, Timing
 from validation.run.breakdown import breakdown
 
 
-def judged_page(name: str, scene: Scene, witnesses: Sequence[Witness] = WITNESSES, *, draw: bool = True) -> Page:
+def judged(name: str, scene: Scene, witnesses: Sequence[Witness] = WITNESSES, *, draw: bool = True) -> Record:
     """Judge a scene and keep what the report needs of it."""
     record = judge(name, scene, witnesses)
     figure = None
@@ -34,23 +34,12 @@ def judged_page(name: str, scene: Scene, witnesses: Sequence[Witness] = WITNESSE
         from validation.report.figures import scene_figure
 
         figure = scene_figure(record)
-    return Page(
-        name,
-        plain(scene.title),
-        plain(scene.source),
-        record.rows,
-        record.timings,
-        record.left_out,
-        [str(reversal) for reversal in record.reversals],
-        {answer.engine: (answer.shared, answer.own) for answer in record.answers if answer.own},
-        {answer.engine: answer.evidence for answer in record.answers if answer.evidence},
-        figure,
-    )
+    return record.kept(figure)
 
 
 def judge(name: str, scene: Scene, witnesses: Sequence[Witness] = WITNESSES) -> Record:
     """Let every witness answer one scene and compare; an engine that breaks down costs its own rows."""
-    record = Record(name, scene)
+    record = Record(name, scene, plain(scene.title), plain(scene.source))
     if scene.motion.free is not None:
         from validation.run.released import judge_released
 
@@ -62,7 +51,7 @@ def judge(name: str, scene: Scene, witnesses: Sequence[Witness] = WITNESSES) -> 
     record.solution, seconds = _timed(lambda: solve(scene, stage, at=at))
     record.timings.append(Timing(name, FORMULAS, "exact", len(at.theta_2), seconds))
     record.rows += identities(name, scene, at, record.solution)
-    record.reversals = reversals(scene, at, record.solution)
+    record.jumps = reversals(scene, at, record.solution)
     for witness in witnesses:
         answer = _ask(witness, scene, at, record)
         if answer is None:
@@ -73,7 +62,7 @@ def judge(name: str, scene: Scene, witnesses: Sequence[Witness] = WITNESSES) -> 
             record.rows += _stated(name, scene, witness, answer)
         if witness.order and answer.refusal is None:
             answer.evidence |= _observed_order(name, scene, at, record.solution, witness)
-    _judge_inertia(record, at, witnesses)
+    _judge_inertia(record, scene, at, witnesses)
     return record
 
 
@@ -141,9 +130,8 @@ def _observed_order(name: str, scene: Scene, at: Command, solution: Solution, wi
     return seen if all(map(math.isfinite, seen.values())) else {}  # a coarse run may leave what the scene covers
 
 
-def _judge_inertia(record: Record, at: Command, witnesses: Iterable[Witness]) -> None:
+def _judge_inertia(record: Record, scene: Scene, at: Command, witnesses: Iterable[Witness]) -> None:
     """The inertial part of the torque by itself: loads can hide an inertia that is 24 times wrong."""
-    scene = record.scene
     if at.omega_2 is None or not (scene.loads or scene.effects):
         return
     bare = replace(scene, loads=(), effects=())

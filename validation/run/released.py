@@ -21,7 +21,7 @@ from validation.compare.error import in_own_unit, relative, worst
 from validation.compare.rows import AGREES, DEGRADED, FAILS, REFUSES, Row
 from validation.compare.tolerance import DEGRADED as TIMES_PREDICTED
 from validation.engines.witnesses import not_installed
-from validation.report.page import Record, Timing
+from validation.report.record import Record, Timing
 from validation.run.breakdown import breakdown
 
 ENGINES = {
@@ -87,8 +87,8 @@ def judge_released(record: Record) -> Record:
     The motion of the formulas ends where bars 3 and 4 come to lie in one line, unless it follows the path through;
     an engine moves on. Both are compared as long as both are there, and the instant itself is compared too.
     """
+    assert record.scene is not None and record.scene.motion.free is not None
     free = record.scene.motion.free
-    assert free is not None
     times = np.linspace(0.0, free.duration, free.steps + 1)
     begin = time.perf_counter()
     solution = solve(record.scene)
@@ -136,8 +136,8 @@ def _adapter(adapter: str) -> Callable[[float], Any]:
 
 
 def _rows(record: Record, fine: Released, coarse: Released | None, truth: _Truth) -> list[Row]:
-    free, n = record.scene.motion.free, len(truth.theta_2)
-    assert free is not None
+    assert record.scene is not None and record.scene.motion.free is not None
+    free, through, n = record.scene.motion.free, record.scene.motion.through, len(truth.theta_2)
     if fine.refusal is not None:
         return [Row.unmeasured(record.name, fine.engine, fine.setting, "all", REFUSES, fine.refusal)]
     if len(fine.theta_2) < n:
@@ -150,7 +150,7 @@ def _rows(record: Record, fine: Released, coarse: Released | None, truth: _Truth
         found = {"theta_2": of.theta_2[:n], "omega_2": of.omega_2[:n]}
         if coarse is not None:  # the formulas integrate the energy equation itself; their drift is part of their test
             found["energy"] = of.energy[:n] - of.energy[0]
-            if record.scene.motion.through == "sign":
+            if through == "sign":
                 found["stopped_at"] = _end(of.stopped_at, free.duration)
         return found
 

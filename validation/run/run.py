@@ -26,7 +26,7 @@ from validation.report import cost_section, hard_section
 from validation.report.html import Section, html
 from validation.report.machine import versions
 from validation.report.markdown import markdown
-from validation.report.page import Page
+from validation.report.record import Record
 from validation.report.summary import SCENES_SHOWN, Summary, summarise
 from validation.run import pool
 from validation.run.elsewhere import run_elsewhere
@@ -76,16 +76,16 @@ def run(
             answers = pool.over_machines(suite, todo, witnesses, draw, scheduler)
         else:
             answers = pool.over_processes(suite, todo, witnesses, draw, workers)
-        for number, pages in answers:
-            store.put(number, pages)
-            yield len(pages)
+        for number, records in answers:
+            store.put(number, records)
+            yield len(records)
         held_to = list(dict.fromkeys((IDENTITY, *(witness.tolerance for witness in witnesses))))
         ladder = ladder_rows() if published else []
-        summary = summarise(store.pages(len(chunks)), ladder, held_to, missing)
+        summary = summarise(store.records(len(chunks)), ladder, held_to, missing)
         first_lines = write_columns(store.rows(len(chunks)), out)
         factors = {witness.name: witness.tolerance.factor for witness in witnesses}
         write_about(about(factors, suite.fingerprint()), out)
-        write_text(out / "timings.csv", timings_csv(store.pages(len(chunks))))
+        write_text(out / "timings.csv", timings_csv(store.records(len(chunks))))
         write_text(out / "report.md", markdown(summary))
         drawn, why_not = mjcf_pictures(suite) if draw and simulated else ({}, "")
         rows = (row for chunk in store.rows(len(chunks)) for row in chunk)
@@ -123,14 +123,14 @@ def mjcf_pictures(suite: Suite) -> tuple[dict[str, str], str]:
     return pictures(texts)
 
 
-def timings_csv(pages: Iterator[Page]) -> str:
+def timings_csv(records: Iterator[Record]) -> str:
     """Seconds per answer, and their ratio to the formulas' on the same scene in the same process."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(["scene", "engine", "setting", "positions", "seconds", "times_formulas"])
-    for page in pages:
-        for t in page.timings:
-            ratio = t.seconds / page.timings[0].seconds
+    for record in records:
+        for t in record.timings:
+            ratio = t.seconds / record.timings[0].seconds
             writer.writerow([t.scene, t.engine, t.setting, t.positions, f"{t.seconds:.6f}", f"{ratio:.1f}"])
     return text.getvalue()
 
