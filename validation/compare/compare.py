@@ -1,22 +1,35 @@
 """An engine's answer against the formulas: one row per quantity, at the position where it is worst."""
 
 import math
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import replace
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
 from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.quantities import FORCES, OK, OVERFLOW, SINGULAR, STATUS_NAMES, UNKNOWNS
+from fourbar.quantities import (
+    FORCES,
+    JAMMED,
+    OF_DRY_FRICTION,
+    OF_PIN_LOADS,
+    OK,
+    OVERFLOW,
+    SEVERAL,
+    SINGULAR,
+    STAGE_OF,
+    STATUS_NAMES,
+)
 from fourbar.scene import Scene
 from fourbar.solution import Solution
 from validation.compare.answer import Answer
-from validation.compare.error import in_own_unit, relative, relative_error, used
+from validation.compare.basis import basis_of, smallest_yardstick, strictest_condition
+from validation.compare.error import in_own_unit, magnitude, relative, relative_error, used
+from validation.compare.plain import plain
 from validation.compare.reversals import reversing
 from validation.compare.rows import AGREES, DEGRADED, FAILS, REFUSES, UNDECIDED, Row
-from validation.compare.scales import of_length, yardstick
+from validation.compare.scales import of_length
 from validation.compare.tolerance import DEGRADED as TIMES_PREDICTED
 from validation.compare.tolerance import (
     EPS,
@@ -24,13 +37,17 @@ from validation.compare.tolerance import (
     SIMULATED,
     Array,
     Tolerance,
-    condition_of,
 )
 
 Mask = NDArray[np.bool_]
 
-COMPARED = UNKNOWNS
-"""Every quantity that an engine may be held to."""
+OF_THE_FORMULAS = (*OF_DRY_FRICTION, *OF_PIN_LOADS, "torque_error", "force_error")
+"""What has judges of its own: the range in which dry friction holds, what it leaves, and the error bars."""
+COMPARED = tuple(name for name in STAGE_OF if name not in OF_THE_FORMULAS)
+"""Every quantity that an exact engine is held to: all that is printed of a position."""
+OF_FORCES = (*FORCES, *OF_DRY_FRICTION, "drive_condition")
+MOST_UNTOLD = 0.5
+"""Share of the numbers of a scene of which nothing can be told, beyond which it does not hold."""
 SLOW_DRIVE = 0.1
 """T3 and T4 have poles where omega_3, omega_4 vanish: a simulation is judged where the driven bar
 turns at more than this part of its greatest speed."""
@@ -49,75 +66,128 @@ def compare(
     tolerance: Tolerance,
     expected: Iterable[str],
     predicted: Callable[[], Mapping[str, Array]] | None = None,
+    basis: Solution | None = None,
 ) -> list[Row]:
     """Judge an answer; `formulas` is the solution at `answer.at`, `expected` what the engine must answer.
+
+    What the formulas may be wrong by is decided by the stricter of their own conditions and sizes and those of
+    `basis`, another derivation at the same positions; left out: the answer itself.
 
     With `predicted`, which gives the error to be expected of each quantity at each position in its own unit,
     an error beyond full accuracy must be within DEGRADED times that, and the law in the condition plays no part.
     """
 
-    def row(quantity: str, verdict: str, reason: str, **numbers: float) -> Row:
-        error, allowed, theta_2, condition = (float(numbers.get(key, math.nan)) for key in NUMBERS)
-        return Row(name, answer.engine, answer.setting, quantity, error, allowed, verdict, reason, theta_2, condition)
-
     if answer.refusal is not None:
-        return [row("all", REFUSES, answer.refusal)]
-    rows = []
+        return [Row.unmeasured(name, answer.engine, answer.setting, "all", REFUSES, answer.refusal)]
     if answer.assembled is None or len(answer.assembled) != len(formulas):
-        return [row("assembled", FAILS, "the engine did not say where the loop closes")]
-    differ = (answer.assembled != formulas.assembled) & ~_undecided(scene, formulas.theta_2)
-    worst = int(np.argmax(differ))
-    rows.append(
-        row(
+        what = "the engine did not say where the loop closes"
+        return [Row.unmeasured(name, answer.engine, answer.setting, "assembled", FAILS, what)]
+    own = basis_of(scene, answer)
+    each = _Comparison(name, scene, answer, formulas, tolerance, predicted, own, own if basis is None else basis)
+    rows = [each.assembled()]
+    rows += [row for quantity in STAGE_OF if quantity in expected for row in each.judged(quantity)]
+    rows += [each.row("watch", FAILS, alarm) for alarm in answer.alarms]
+    return [*rows, *each.untold()]
+
+
+@dataclass(slots=True)
+class _Comparison:
+    """One answer, quantity by quantity; counts how many numbers there are and of how many a verdict is drawn."""
+
+    name: str
+    scene: Scene
+    answer: Answer
+    formulas: Solution
+    tolerance: Tolerance
+    predicted: Callable[[], Mapping[str, Array]] | None
+    own: Solution | None
+    basis: Solution | None
+    numbers: int = 0
+    told: int = 0
+
+    def row(self, quantity: str, verdict: str, reason: str, **numbers: float) -> Row:
+        """A row of this answer."""
+        error, allowed, theta_2, condition = (float(numbers.get(key, math.nan)) for key in NUMBERS)
+        engine, setting = self.answer.engine, self.answer.setting or "-"
+        return Row(self.name, engine, setting, quantity, error, allowed, verdict, plain(reason), theta_2, condition)
+
+    def assembled(self) -> Row:
+        """Whether both close the loop at the same positions."""
+        theirs, ours = self.answer.assembled, self.formulas
+        assert theirs is not None
+        differ = (theirs != ours.assembled) & ~_undecided(self.scene, ours.theta_2)
+        count = np.count_nonzero(differ)
+        return self.row(
             "assembled",
-            FAILS if differ.any() else AGREES,
-            f"{np.count_nonzero(differ)} of {len(differ)} positions differ" if differ.any() else "the same positions",
-            error=float(np.count_nonzero(differ)),
+            FAILS if count else AGREES,
+            f"{count} of {len(differ)} positions differ" if count else "the same positions",
+            error=float(count),
             allowed=0.0,
-            theta_2=formulas.theta_2[worst],
+            theta_2=ours.theta_2[int(np.argmax(differ))],
             condition=1.0,
         )
-    )
-    both = formulas.assembled & answer.assembled
-    for quantity in (q for q in COMPARED if q in expected):
-        ours, theirs = getattr(formulas, quantity, None), answer.quantities.get(quantity)
+
+    def judged(self, quantity: str) -> Iterator[Row]:
+        """The row of a quantity, if either side has it."""
+        formulas, scene, tolerance = self.formulas, self.scene, self.tolerance
+        ours, theirs = getattr(formulas, quantity, None), self.answer.quantities.get(quantity)
+        if theirs is None and self.own is not None:
+            if quantity == "drive_condition" and any(effect.loaded_pins for effect in scene.effects):
+                return  # an engine that passes over loads and friction does not know how near they are to jamming
+            theirs = getattr(self.own, quantity)
         if ours is None or theirs is None:
             if ours is not theirs:  # both are missing where the scene states positions only
-                rows.append(row(quantity, FAILS, "no answer" if theirs is None else "the formulas have no answer"))
-            continue
+                yield self.row(quantity, FAILS, "no answer" if theirs is None else "the formulas have no answer")
+            return
+        assert self.answer.assembled is not None
+        both = formulas.assembled & self.answer.assembled
         judged = both & _stated(quantity, formulas, ours)
+        self.numbers += int(np.count_nonzero(both))
         withheld = _counted(formulas.status_code[both & ~judged])
         if withheld and not judged.any():
-            rows.append(row(quantity, REFUSES, f"the formulas state no value: {withheld}"))
-            continue
+            yield self.row(quantity, REFUSES, f"the formulas state no value: {withheld}")
+            return
         where = judged & _answerable(quantity, scene, formulas, tolerance)
         jumping = where & _jumping(quantity, scene, formulas, tolerance)
         where &= ~jumping
-        if not where.any():
-            rows.append(row(quantity, UNDECIDED, "no position at which both may be held to it"))
-        else:
-            size = yardstick(quantity, scene, formulas, ours)
-            vanishing = size == 0.0
-            if predicted is not None:
-                size = in_own_unit(size)
-            error = relative_error(quantity, ours, theirs, size)
-            condition = condition_of(quantity, scene.linkage, formulas)
-            if predicted is None:
-                found = _by_condition(error, condition, where, tolerance)
-            else:
-                expected_error = partial(_relative, predicted, quantity, size)
-                found = _by_prediction(
-                    error, where, np.where(vanishing, 0.0, tolerance.factor), tolerance, expected_error
-                )
-            at = {"theta_2": formulas.theta_2[found.worst], "condition": condition[found.worst]}
-            numbers = {"error": error[found.worst], "allowed": found.allowed, **at}
-            rows.append(row(quantity, found.verdict, found.reason, **numbers))
         note = f"; not judged: {withheld}" if withheld else ""
         if jumping.any():
-            note += f"; {np.count_nonzero(jumping)} positions at which dry friction reverses not judged"
-        rows[-1] = replace(rows[-1], reason=rows[-1].reason + note)
-    rows += [row("watch", FAILS, alarm) for alarm in answer.alarms]
-    return rows
+            count = int(np.count_nonzero(jumping))  # of either side of a reversal the forces are right
+            self.told += count
+            note += f"; {count} positions at which dry friction reverses not judged"
+        if not where.any():
+            yield self.row(quantity, UNDECIDED, "no position at which both may be held to it" + note)
+            return
+        found, error, condition = self._measured(quantity, ours, theirs, where)
+        self.told += found.told
+        at = {"theta_2": formulas.theta_2[found.worst], "condition": condition[found.worst]}
+        yield self.row(
+            quantity, found.verdict, found.reason + note, error=error[found.worst], allowed=found.allowed, **at
+        )
+
+    def _measured(self, quantity: str, ours: Array, theirs: Array, where: Mask) -> "tuple[_Finding, Array, Array]":
+        """What is found over the positions `where`, with the errors and the conditions, (n,)."""
+        size = smallest_yardstick(quantity, self.scene, self.formulas, self.basis)
+        vanishing = size == 0.0
+        if self.predicted is not None:
+            size = in_own_unit(size)
+        error = relative_error(quantity, ours, theirs, size)
+        condition = strictest_condition(quantity, self.scene.linkage, self.formulas, self.basis)
+        if self.predicted is None:
+            return _by_condition(error, condition, where, self.tolerance), error, condition
+        full = np.where(vanishing, 0.0, self.tolerance.factor)
+        expected = partial(_relative, self.predicted, quantity, size)
+        return _by_prediction(error, where, full, self.tolerance, expected), error, condition
+
+    def untold(self) -> Iterator[Row]:
+        """A scene of which most numbers cannot be told does not hold."""
+        if not self.numbers:
+            return
+        missing = self.numbers - self.told
+        share = missing / self.numbers
+        reason = f"of {missing} of {self.numbers} numbers nothing can be told"
+        verdict = AGREES if share <= MOST_UNTOLD else FAILS
+        yield self.row("untold", verdict, reason, error=share, allowed=MOST_UNTOLD, condition=1.0)
 
 
 def _relative(predicted: Callable[[], Mapping[str, Array]], quantity: str, size: Array) -> Array:
@@ -132,6 +202,8 @@ class _Finding(NamedTuple):
     verdict: str
     reason: str
     allowed: float
+    told: int
+    """Positions of which a verdict is drawn."""
 
 
 def _by_condition(error: Array, condition: Array, where: Mask, tolerance: Tolerance) -> _Finding:
@@ -145,12 +217,13 @@ def _by_condition(error: Array, condition: Array, where: Mask, tolerance: Tolera
         verdict, reason = UNDECIDED, f"eps/condition = {EPS / condition[index]:.1e}"
         if not np.isfinite(error[where]).all():
             verdict, reason = FAILS, "NaN"
-        return _Finding(index, verdict, reason, allowed[index])
+        return _Finding(index, verdict, reason, allowed[index], 0)
     ratio = np.where(decidable, used(error, allowed), -1.0)
     ratio[where & ~np.isfinite(error)] = np.inf
     index = int(np.argmax(ratio))
     reason = ("NaN" if math.isnan(error[index]) else tolerance.name) + note
-    return _Finding(index, AGREES if ratio[index] <= 1.0 else FAILS, reason, allowed[index])
+    verdict = AGREES if ratio[index] <= 1.0 else FAILS
+    return _Finding(index, verdict, reason, allowed[index], int(np.count_nonzero(decidable)))
 
 
 def _by_prediction(
@@ -180,7 +253,7 @@ def _by_prediction(
         verdict, reason = FAILS, "NaN"
     else:
         verdict, reason = FAILS, f"{error[index]:.1e} where {expected[index]:.1e} was predicted"
-    return _Finding(index, verdict, reason, allowed[index])
+    return _Finding(index, verdict, reason, allowed[index], int(np.count_nonzero(where & ~(beyond & lost))))
 
 
 def turned(theta_2: Array) -> float:
@@ -190,9 +263,11 @@ def turned(theta_2: Array) -> float:
 
 def _stated(quantity: str, formulas: Solution, ours: Array) -> Mask:
     """Where the formulas state one value: beyond the range of doubles the motion is, up to the stage that met it."""
-    if quantity in FORCES:
-        return np.asarray(formulas.status_code == OK)
-    return np.asarray((formulas.status_code != SINGULAR) & ~((formulas.status_code == OVERFLOW) & np.isnan(ours)))
+    if quantity in OF_FORCES:
+        stated = np.isin(formulas.status_code, (SEVERAL, JAMMED)) & np.isfinite(magnitude(ours))
+        return np.asarray(stated | (formulas.status_code == OK))
+    beyond = (formulas.status_code == OVERFLOW) & np.isnan(magnitude(ours))
+    return np.asarray((formulas.status_code != SINGULAR) & ~beyond)
 
 
 def _counted(codes: NDArray[np.uint8]) -> str:
@@ -215,7 +290,7 @@ def _undecided(scene: Scene, theta_2: Array) -> Mask:
 
 def _jumping(quantity: str, scene: Scene, formulas: Solution, tolerance: Tolerance) -> Mask:
     """Where dry friction reverses and a force may have either value; the motion is prescribed and has one."""
-    if quantity not in FORCES:
+    if quantity not in OF_FORCES:
         return np.zeros(len(formulas), dtype=bool)
     return reversing(scene, formulas, tolerance.factor, in_time=tolerance.name == SIMULATED.name)
 

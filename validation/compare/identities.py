@@ -24,7 +24,7 @@ from validation.compare.scales import of_length
 from validation.compare.tolerance import IDENTITY, SIMULATED, Array, Tolerance
 
 FORMULAS = "formulas"
-IDENTITIES = ("closure", "force_sum", "moment_sum")
+IDENTITIES = ("closure", "force_sum", "moment_sum", "status")
 """Quantities of the rows made here: the formulas against themselves."""
 
 

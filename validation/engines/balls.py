@@ -11,8 +11,9 @@ from typing import Any, TypeAlias
 from flint import arb, arb_mat, ctx
 
 from fourbar.effects import Friction, Gravity, Load, Viscous
-from fourbar.linkage import MOVING_BARS, PINS
+from fourbar.linkage import MOVING_BARS
 from fourbar.scene import Scene
+from validation.engines.description import PINS, centre, inertia
 
 BITS = 320
 """Working precision; 50 digits are 167 bits, the rest is what the worst sample (a limit position at 1e-20) cancels."""
@@ -35,9 +36,9 @@ def inputs(scene: Scene, theta_2: float) -> dict[str, float]:
         bar = link.bar(k)
         values |= {
             f"m{k}": bar.mass,
-            f"I{k}": bar.moment_of_inertia,
-            f"r{k}": bar.mass_centre[0],
-            f"phi{k}": bar.mass_centre[1],
+            f"I{k}": inertia(bar),
+            f"r{k}": centre(bar)[0],
+            f"phi{k}": centre(bar)[1],
         }
     for k, load in enumerate(scene.loads):
         f, f_angle = load.force or (0.0, 0.0)

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from fourbar.linkage import PINS
 from fourbar.scene import Scene
 from validation.compare.answer import Array
+from validation.engines.description import PINS, along_and_across, field
 
 if TYPE_CHECKING:
     from fourbar.effects import Flywheel, Friction, Gravity, Load, PinFriction, Springs, Table, Torsion, Viscous
@@ -59,7 +59,7 @@ class Tree(Protocol):
 
 def _gravity(effect: "Gravity", tree: Tree) -> None:
     """The engine's own gravity, set once and for all."""
-    tree.gravity(effect.vector)
+    tree.gravity(field(effect))
 
 
 def _viscous(effect: "Viscous", tree: Tree) -> Act:
@@ -123,7 +123,7 @@ def _springs(effect: "Springs", tree: Tree) -> Act:
     def act() -> None:
         for spring in effect.springs:
             one, other = (
-                tree.foot(point.bar) + tree.turned(point.bar, point.in_bar.real, point.in_bar.imag)
+                tree.foot(point.bar) + tree.turned(point.bar, *along_and_across(point.distance, point.angle))
                 for point in (spring.start, spring.end)
             )
             vector = np.asarray(other - one)

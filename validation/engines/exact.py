@@ -15,6 +15,14 @@ NAME = "ball-arithmetic"
 KNOWN = (Gravity, Viscous, Friction)
 
 
+def unknown(scene: Scene) -> str | None:
+    """The reason to refuse a scene, or None."""
+    for effect in scene.effects:
+        if not isinstance(effect, KNOWN):
+            return f"the effect {effect.key!r} has no model here"
+    return "a load that is a table has no model here" if any(load.table for load in scene.loads) else None
+
+
 class BallArithmetic:
     """Every compared quantity at each position, rounded once from 320 bits."""
 
@@ -26,9 +34,8 @@ class BallArithmetic:
 
         from validation.engines.balls import BITS, inputs, outputs
 
-        for effect in scene.effects:
-            if not isinstance(effect, KNOWN):
-                return Answer(NAME, "exact", refusal=f"the effect {effect.key!r} has no model here")
+        if (reason := unknown(scene)) is not None:
+            return Answer(NAME, "exact", refusal=reason)
         ctx.prec = BITS
         n = len(command.theta_2)
         names = [q for q in COMPARED if command.omega_2 is not None or q.startswith("theta")]

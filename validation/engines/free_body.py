@@ -7,14 +7,17 @@ torque (R. L. Norton, Design of Machinery, ch. 11, has them about the mass centr
 are complex numbers, x + i y.
 """
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.linkage import MOVING_BARS, PIN_FORCE, FourBar
+from fourbar.linkage import MOVING_BARS, FourBar
 from fourbar.scene import Command, Scene
 from validation.compare.answer import Answer, Array
-from validation.engines.free_body_closure import Complex, close
-from validation.engines.free_body_effects import Motion, Wrenches, acting, sliding_pins, unknown
+from validation.engines.description import FORCE_AT, centre, inertia
+from validation.engines.free_body_closure import Complex, close, cross
+from validation.engines.free_body_effects import Motion, Wrenches, acting, polar, sliding_pins, unknown, wound
 
 NAME = "free-body"
 COLUMN = {"F12": 0, "F32": 2, "F23": 4, "F43": 6, "F34": 8, "F14": 10}
@@ -46,7 +49,7 @@ class FreeBody:
             "exact",
             at=command,
             assembled=closed.assembled,
-            quantities={"theta_3": closed.theta[0], "theta_4": closed.theta[1]},
+            quantities=_places(scene.linkage, command.theta_2, *closed.theta),
             evidence={"closure_gap": float(np.max(closed.gap, initial=0.0, where=closed.assembled))},
             shared="the description, theta_2, omega_2, alpha_2 and the branch",
             own="assembly (Newton on the two closure equations), speeds and accelerations (own 2x2 Jacobian), every "
@@ -64,15 +67,43 @@ class FreeBody:
         return answer
 
 
+def _places(linkage: FourBar, theta_2: Array, theta_3: Array, theta_4: Array) -> dict[str, Array]:
+    """Angles of bars 3 and 4, their sine, pins A, B and the mass centres."""
+    unit = {2: np.exp(1j * theta_2), 3: np.exp(1j * theta_3), 4: np.exp(1j * theta_4)}
+    O4 = linkage.ground * np.exp(1j * linkage.ground_angle)
+    foot = {2: 0.0, 3: linkage.input.length * unit[2], 4: O4}
+    found = {"theta_3": theta_3, "theta_4": theta_4, "sin_mu": np.sin(theta_4 - theta_3)}
+    found |= {"A": _plane(foot[3]), "B": _plane(O4 + linkage.output.length * unit[4])}
+    for bar in MOVING_BARS:
+        found[f"G{bar}"] = _plane(foot[bar] + polar(centre(linkage.bar(bar))) * unit[bar])
+    return found
+
+
 def _answered(
     scene: Scene, theta_2: Array, omega_2: Array, alpha_2: Array, theta_3: Array, theta_4: Array
 ) -> tuple[dict[str, Array], float]:
     """Motion, pin forces and torque at some positions, and the residual of their thirteen equations."""
     motion = move(scene.linkage, theta_2, omega_2, alpha_2, theta_3, theta_4)
-    unknowns, residual = balance(scene, motion)
-    found = {name: unknowns[:, COLUMN[name] : COLUMN[name] + 2] for name in PIN_FORCE.values()}
-    for bar in (3, 4):
+    unknowns, residual, from_jamming = balance(scene, motion)
+    one, other = (motion.unit[bar] for bar in MOVING_BARS if bar != scene.drive_bar)
+    if (gone := wound(scene, motion)) is not None:
+        unknowns[gone] = np.nan
+    found = {name: unknowns[:, COLUMN[name] : COLUMN[name] + 2] for name in FORCE_AT.values()}
+    for bar in MOVING_BARS:
         found |= {f"omega_{bar}": motion.omega[bar], f"alpha_{bar}": motion.alpha[bar]}
+    a_A = motion.swing(2, motion.foot[3])
+    found["drive_condition"] = np.abs(cross(one, other)) * from_jamming
+    found |= {"a_A": _plane(a_A), "a_B": _plane(motion.swing(4, scene.linkage.output.length * motion.unit[4]))}
+    for bar in MOVING_BARS:
+        found[f"a_G{bar}"] = _plane(motion.swing(bar, motion.to_centre(bar)) + (a_A if bar == 3 else 0.0))
+    if any(effect.dry for effect in scene.effects):
+        ends = []
+        for side in (1.0, -1.0):
+            begins = move(scene.linkage, theta_2, np.full_like(theta_2, side), 0.0 * theta_2, theta_3, theta_4)
+            ends.append(balance(scene, motion._replace(beginning=begins.omega))[0][:, TORQUE])
+        found |= {"torque_low": np.minimum(*ends), "torque_high": np.maximum(*ends)}
+    if scene.loads or scene.effects:
+        found["torque_inertia"] = balance(replace(scene, loads=(), effects=()), motion)[0][:, TORQUE]
     return found | {"torque": unknowns[:, TORQUE]}, residual
 
 
@@ -93,36 +124,39 @@ def move(linkage: FourBar, theta_2: Array, omega_2: Array, alpha_2: Array, theta
     return Motion(linkage, theta_2, {1: zero + u_1, 2: u_2, 3: u_3, 4: u_4}, foot, omega, alpha)
 
 
-def balance(scene: Scene, motion: Motion) -> tuple[Array, float]:
-    """The thirteen unknowns (n, 13), N and N m, and the largest residual of the system, relative to its terms."""
+def balance(scene: Scene, motion: Motion) -> tuple[Array, float, Array | float]:
+    """The thirteen unknowns (n, 13), N and N m, the largest residual of the system, relative to its terms, and how far
+    sliding friction is from jamming, in (0, 1]."""
     wrenches = acting(scene, motion)
     _add_inertia(motion, wrenches)
     pins = sliding_pins(scene)
     columns = [_right(motion.linkage, wrenches)]
     for pin in pins:
         unit = Wrenches(len(motion.theta_2))
-        unit.twist_at(pin, -np.sign(motion.slip(pin)))
+        unit.twist_at(pin, -motion.sense(pin))
         columns.append(_right(motion.linkage, unit))
     unknowns, residual = solved(_matrix(motion, scene.drive_bar), np.stack(columns, axis=-1))
     unknowns[:, TORQUE] *= motion.linkage.bar(scene.drive_bar).length
-    total = unknowns[..., 0]
+    total: Array = unknowns[..., 0]
+    from_jamming: Array | float = 1.0
     if pins:
-        of_pin = [unknowns[:, COLUMN[PIN_FORCE[pin]] : COLUMN[PIN_FORCE[pin]] + 2] for pin in pins]
+        of_pin = [unknowns[:, COLUMN[FORCE_AT[pin]] : COLUMN[FORCE_AT[pin]] + 2] for pin in pins]
         loads = np.stack([force[:, 0] + 1j * force[:, 1] for force in of_pin], axis=1)
-        couples = slide(loads[..., 0], loads[..., 1:], np.array(list(pins.values())))
+        arms = np.array(list(pins.values()))
+        couples = slide(loads[..., 0], loads[..., 1:], arms)
+        from_jamming = distance_from_jamming(loads[..., 0], loads[..., 1:], arms, couples)
         total = total + (unknowns[..., 1:] * couples[:, None, :]).sum(axis=-1)
-    return total, residual
+    return total, residual, from_jamming
 
 
 def _add_inertia(motion: Motion, wrenches: Wrenches) -> None:
     """-m a_G and -I alpha (d'Alembert), moments about the first pin, of which that of bar 3 moves."""
     for number in MOVING_BARS:
         bar = motion.linkage.bar(number)
-        arm, omega, alpha = motion.to_centre(number), motion.omega[number], motion.alpha[number]
-        wrenches.push(number, -bar.mass * (1j * alpha - omega**2) * arm, 0.0)
-        wrenches.twist(number, -(bar.moment_of_inertia + bar.mass * bar.mass_centre[0] ** 2) * alpha)
-    a_A = (1j * motion.alpha[2] - motion.omega[2] ** 2) * motion.foot[3]
-    wrenches.push(3, -motion.linkage.coupler.mass * a_A, motion.to_centre(3))
+        arm, alpha = motion.to_centre(number), motion.alpha[number]
+        wrenches.push(number, -bar.mass * motion.swing(number, arm), 0.0)
+        wrenches.twist(number, -(inertia(bar) + bar.mass * centre(bar)[0] ** 2) * alpha)
+    wrenches.push(3, -motion.linkage.coupler.mass * motion.swing(2, motion.foot[3]), motion.to_centre(3))
 
 
 def _matrix(motion: Motion, drive_bar: int) -> Array:
@@ -185,6 +219,18 @@ def slide(F: Complex, C: Complex, k: Array) -> Array:
         x[left[~grown]] = np.nan
         left = left[grown]
     return x
+
+
+def distance_from_jamming(F: Complex, C: Complex, k: Array, x: Array) -> Array:
+    """Least singular value of the slope of the equations of `slide` at their solution, at most 1, (n,)."""
+    force = F + (C * x[:, None, :]).sum(axis=-1)
+    with np.errstate(invalid="ignore"):
+        direction = force / np.where(force == 0.0, 1.0, np.abs(force))
+    matrix = np.eye(len(k)) - k[:, None] * (np.conj(direction)[..., None] * C).real
+    far = np.full(len(x), np.nan)
+    known = np.isfinite(matrix).all(axis=(1, 2))
+    far[known] = np.minimum(np.linalg.svd(matrix[known], compute_uv=False)[:, -1], 1.0)
+    return far
 
 
 def _grow(F: Complex, C: Complex, k: Array, x: Array) -> tuple[Array, NDArray[np.bool_]]:

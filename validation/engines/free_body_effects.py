@@ -4,15 +4,18 @@ Definitions as in docs/effects.md, from the numbers of the description alone. Ve
 complex numbers, x + i y.
 """
 
+import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from fourbar.linkage import MOVING_BARS, PINS, FourBar
-from fourbar.scene import Scene
+from fourbar.linkage import MOVING_BARS, FourBar
+from fourbar.scene import Scene, command
 from validation.compare.answer import Array
-from validation.engines.free_body_closure import Complex, cross
+from validation.engines.description import PINS, centre
+from validation.engines.free_body_closure import Complex, close, cross
 
 
 class Motion(NamedTuple):
@@ -26,15 +29,35 @@ class Motion(NamedTuple):
     """Where the first pin of each bar is (O2, O2, A, O4), m."""
     omega: dict[int, Array]
     alpha: dict[int, Array]
+    beginning: dict[int, Array] | None = None
+    """Speeds of the motion that is about to begin where the linkage rests, rad/s; None: it stays at rest."""
 
     def to_centre(self, bar: int) -> Complex:
         """From the first pin of a moving bar to its mass centre, m."""
-        return self.unit[bar] * polar(self.linkage.bar(bar).mass_centre)
+        return self.unit[bar] * polar(centre(self.linkage.bar(bar)))
+
+    def swing(self, bar: int, arm: Complex) -> Complex:
+        """Acceleration of the end of an arm of a bar about its foot, m/s^2."""
+        return (1j * self.alpha[bar] - self.omega[bar] ** 2) * arm
 
     def slip(self, pin: str) -> Array:
         """omega_j - omega_i of the bars that meet at a pin, rad/s."""
         i, j = PINS[pin]
         return self.omega[j] - self.omega[i]
+
+    def sense(self, pin: str) -> Array:
+        """Sign of the slip; where the linkage rests that of the motion about to begin."""
+        slip = self.slip(pin)
+        if self.beginning is None:
+            return np.sign(slip)
+        i, j = PINS[pin]
+        begins = self.beginning[j] - self.beginning[i]
+        begins[np.abs(begins) < TURNS_AS_ONE * (np.abs(self.beginning[j]) + np.abs(self.beginning[i]))] = 0.0
+        return np.where(self.omega[2] == 0.0, np.sign(begins), np.sign(slip))
+
+
+TURNS_AS_ONE = 64.0 * 2.0**-52
+"""Two bars whose speeds differ by less than this part of them turn as one."""
 
 
 class Wrenches:
@@ -62,6 +85,14 @@ class Wrenches:
         self.twist(i, -couple)
 
 
+MEET = 16.0 * 2.0**-52
+"""Two points nearer than this part of the lengths by which they are reached lie in one."""
+
+
+FOLLOWED = np.radians(2.0)
+"""Step in which angles are followed from where a motion begins, rad."""
+
+
 def polar(pair: Any) -> complex:
     """(distance, angle) as a vector."""
     length, angle = pair
@@ -85,7 +116,7 @@ def _viscous(effect: Any, motion: Motion, wrenches: Wrenches) -> None:
 def _friction(effect: Any, motion: Motion, wrenches: Wrenches) -> None:
     """Couple -f sign(omega_j - omega_i), none at rest."""
     for pin, f in effect.torques:
-        wrenches.twist_at(pin, -f * np.sign(motion.slip(pin)))
+        wrenches.twist_at(pin, -f * motion.sense(pin))
 
 
 def _torsion(effect: Any, motion: Motion, wrenches: Wrenches) -> None:
@@ -104,7 +135,8 @@ def _springs(effect: Any, motion: Motion, wrenches: Wrenches) -> None:
         if spring.preload == spring.stiffness * spring.length:
             pull = spring.stiffness * across
         else:
-            distance = np.where(across == 0.0, np.nan, np.abs(across))
+            reach = sum(motion.linkage.lengths) + abs(spring.start.distance) + abs(spring.end.distance)
+            distance = np.where(np.abs(across) <= MEET * reach, np.nan, np.abs(across))
             pull = (spring.preload + spring.stiffness * (distance - spring.length)) / distance * across
         wrenches.push(spring.start.bar, pull, arms[0])
         wrenches.push(spring.end.bar, -pull, arms[1])
@@ -161,6 +193,36 @@ def _factor(table: Any, theta_2: Array) -> Array:
     middle = 0.5 * (table.theta_2[0] + table.theta_2[-1])
     around = np.remainder(theta_2 - middle + np.pi, 2.0 * np.pi) - np.pi
     return np.asarray(np.interp(middle + around, table.theta_2, table.factor))
+
+
+def wound(scene: Scene, motion: Motion) -> NDArray[np.bool_] | None:
+    """Where a torsion spring is turned by more than half a turn from its rest, followed from where the motion begins.
+
+    None where no spring counts turns, or the motion changes its branch.
+    """
+    springs = [spring for effect in scene.effects if effect.key == "torsion" for spring in effect.springs]  # type: ignore[attr-defined]
+    if not springs or scene.motion.free is not None:
+        return None
+    begins = command(scene)
+    if np.ptp(begins.branch) != 0:
+        return None
+    link, gone = scene.linkage, np.zeros(len(motion.theta_2), dtype=bool)
+    ends = np.concatenate((begins.theta_2, motion.theta_2))
+    steps = math.ceil(float(np.ptp(ends)) / FOLLOWED) + 1
+    path = np.unique(np.concatenate((ends, np.linspace(ends.min(), ends.max(), steps))))
+    closed = close(link, path, np.full(len(path), begins.branch[0]))
+    if not closed.assembled.any():
+        return gone
+    path = path[closed.assembled]
+    theta = {1: np.full(len(path), link.ground_angle), 2: path}
+    theta |= {bar: np.unwrap(closed.theta[bar - 3][closed.assembled]) for bar in (3, 4)}
+    start = begins.theta_2[np.isin(begins.theta_2, path)][0]
+    first, here = int(np.searchsorted(path, start)), np.clip(np.searchsorted(path, motion.theta_2), 0, len(path) - 1)
+    for pin, _, rest, _ in springs:
+        i, j = PINS[pin]
+        away = theta[j] - theta[i] - rest
+        gone |= np.abs(away[here] - 2.0 * np.pi * np.floor(away[first] / (2.0 * np.pi) + 0.5)) > np.pi
+    return gone
 
 
 def sliding_pins(scene: Scene) -> dict[str, float]:

@@ -11,15 +11,17 @@ lambda = F43 and e_drive = the derivative of the driven bar's rotation. Every nu
 import math
 import time
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from typing import Any, Protocol
 
 import numpy as np
 
-from fourbar.linkage import MOVING_BARS, PIN_FORCE
+from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import ANGLES, STAGE_OF, STAGES, VECTORS
 from fourbar.scene import Command, Scene
 from validation.compare.answer import Answer, Array
 from validation.engines import effects
+from validation.engines.description import FORCE_AT
 
 START_ANGLES = (
     *((30, 30), (15, 15), (45, 45), (5, 5), (5, 120)),
@@ -172,8 +174,11 @@ def answer_exactly(engine: str, build: Callable[[Scene], Tree], scene: Scene, co
     """Every position by itself: assembly, velocities, accelerations, drive torque and pin forces of one engine."""
     start = time.perf_counter()
     tree, n = build(scene), len(command.theta_2)
+    loaded_otherwise = bool(scene.loads or scene.effects) and command.omega_2 is not None
+    bare = build(replace(scene, loads=(), effects=())) if loaded_otherwise else None
     wanted = ("position",) if command.omega_2 is None else STAGES
     names = [name for name, stage in STAGE_OF.items() if stage in wanted and name not in NOT_ANSWERED]
+    names += ["torque_inertia"] if bare is not None else []
     out = {name: np.full((n, 2) if name in VECTORS else n, np.nan) for name in names}
     assembled = np.zeros(n, dtype=bool)
     gap = 0.0
@@ -195,6 +200,10 @@ def answer_exactly(engine: str, build: Callable[[Scene], Tree], scene: Scene, co
         gap = max(gap, math.hypot(*tree.gap()))
         if command.omega_2 is not None:
             values.update(_motion_and_forces(tree, e_drive, omega_2[i], alpha_2[i], loaded))
+            if bare is not None:
+                bare.place(q)
+                alone = _motion_and_forces(bare, e_drive, omega_2[i], alpha_2[i], ())
+                values["torque_inertia"] = alone.get("torque", math.nan)
         for name, value in values.items():
             out[name][i] = value
     for name in ANGLES:
@@ -253,7 +262,7 @@ def _settle(
     """Passes over pin loads and the friction they make, until they repeat; None where they never do."""
     before = math.inf
     for _ in range(PASSES):
-        loads = {pin: math.hypot(*forces[PIN_FORCE[pin]]) for pin in loaded}
+        loads = {pin: math.hypot(*forces[FORCE_AT[pin]]) for pin in loaded}
         most = max(loads.values())
         change = max(abs(load - tree.pin_loads.get(pin, 0.0)) for pin, load in loads.items())
         # once down to the rounding of a pass, the change falls no further

@@ -7,9 +7,10 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from fourbar.linkage import FIRST_PIN, MOVING_BARS
+from fourbar.linkage import MOVING_BARS
 from fourbar.scene import Command, Scene
 from validation.compare.answer import Answer, Array
+from validation.engines import description
 from validation.engines.effects import acting, unknown_effect
 from validation.engines.loop import answer_exactly, turned_ground
 
@@ -42,12 +43,12 @@ class PinocchioTree:
         self.frame: dict[str, int] = {}
         for bar in MOVING_BARS:
             parent = self.joint[2] if bar == 3 else 0
-            joint = model.addJoint(parent, pin.JointModelRZ(), _at(*foot[bar]), FIRST_PIN[bar])
+            joint = model.addJoint(parent, pin.JointModelRZ(), _at(*foot[bar]), description.FIRST_PIN[bar])
             self.joint[bar] = joint
             part = linkage.bar(bar)
-            r, phi = part.mass_centre
+            r, phi = description.centre(part)
             centre = _at(r * math.cos(phi), r * math.sin(phi))
-            inertia = pin.Inertia(part.mass, centre.translation, np.diag([0.0, 0.0, part.moment_of_inertia]))
+            inertia = pin.Inertia(part.mass, centre.translation, np.diag([0.0, 0.0, description.inertia(part)]))
             model.appendBodyToJoint(joint, inertia, pin.SE3.Identity())
             self._add_frame(f"G{bar}", joint, centre)
             self._add_frame(f"end{bar}", joint, _at(part.length, 0.0))

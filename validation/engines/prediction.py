@@ -24,6 +24,7 @@ from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import PIN_FORCES, VECTORS
 from fourbar.scene import Command, Scene
 from validation.compare.tolerance import EPS, Array
+from validation.engines.description import centre
 
 ROUNDINGS = 8.0
 """R: a chain of some fifty roundings moves a result by sqrt(50) = 7 last digits, as a random walk."""
@@ -48,7 +49,7 @@ def about_mass_centre(scene: Scene, at: Command, quantities: Iterable[str]) -> d
 
     Every bar is accelerated with the first of its tree and back again by its own joint.
     """
-    furthest = max(abs(scene.linkage.bar(number).mass_centre[0]) for number in MOVING_BARS)
+    furthest = max(abs(centre(scene.linkage.bar(number))[0]) for number in MOVING_BARS)
     return predicted_error(scene, at, quantities, _extent(scene) + furthest, carried=True)
 
 
@@ -99,6 +100,7 @@ class Sensitivity(NamedTuple):
     def first_order(self, name: str, reach: float, *, carried: bool = False) -> float:
         """The error predicted for an output, vectors by their norm; infinite where it has none."""
         parts = []
+        name = "sin_mu" if name == "condition" else name
         for axis in ("_x", "_y") if name in VECTORS else ("",):
             part = ROUNDINGS * self.data.get(name + axis, math.inf) + reach * self.loop.get(name + axis, 0.0)
             parts.append(part + reach * reach * self.carried.get(name + axis, 0.0) if carried else part)
@@ -145,6 +147,9 @@ def _sensitivity(scene: Scene, theta_2: float, branch: int, omega_2: float, alph
     if "omega_3" in base:
         fastest = max(abs(base[f"omega_{bar}"]) for bar in MOVING_BARS)
         hardest = max(abs(base[f"alpha_{bar}"]) for bar in MOVING_BARS) + fastest * fastest
+        for name in VECTORS:  # points of the bars, by their places in world axes
+            if name.startswith("a_"):
+                loop[f"{name}_x"] = loop[f"{name}_y"] = float(hardest)
         for name, most in (("slip", fastest), ("jerk", hardest)):
             for x, y in ((most * step, arb(0)), (arb(0), most * step)):
                 add(loop, [{name: (x, y)}])

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fourbar.quantities import ANGLES
+from fourbar.quantities import OF_DRY_FRICTION, STAGE_OF, UNKNOWNS
 from fourbar.scene import Command, Scene
 from validation.compare.answer import Answer, Engine
 from validation.compare.compare import COMPARED
@@ -95,6 +95,7 @@ WORK = {
     ),
 }
 """By witness: what is compared is not the same work."""
+OF_A_POSITION = tuple(name for name in COMPARED if STAGE_OF[name] == "position")
 WITNESSES = (
     Witness("pinocchio-inverse", "validation.engines.pinocchio:PinocchioInverse", EQUIVALENCE, library="pinocchio"),
     Witness("mujoco-inverse", "validation.engines.mujoco.inverse:MujocoInverse", EQUIVALENCE, library="mujoco"),
@@ -102,12 +103,19 @@ WITNESSES = (
         "mujoco-simulated",
         "validation.engines.mujoco.simulate:MujocoSimulated",
         SIMULATED,
+        UNKNOWNS,
         order="validation.engines.mujoco.simulate:observed_order",
         through_time=True,
         predictor="own",
         library="mujoco",
     ),
-    Witness("free-body", "validation.engines.free_body:FreeBody", EQUIVALENCE, positions=ANGLES),
+    Witness(
+        "free-body",
+        "validation.engines.free_body:FreeBody",
+        EQUIVALENCE,
+        (*COMPARED, *OF_DRY_FRICTION),
+        positions=OF_A_POSITION,
+    ),
 )
 
 

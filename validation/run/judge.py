@@ -14,6 +14,7 @@ from fourbar.scene import Command, Scene, command
 from fourbar.solution import Solution
 from fourbar.solve import solve
 from validation.compare.answer import Answer
+from validation.compare.basis import basis_of
 from validation.compare.compare import compare
 from validation.compare.identities import FORMULAS, closure, identities
 from validation.compare.plain import plain
@@ -21,9 +22,15 @@ from validation.compare.reversals import reversals
 from validation.compare.rows import FAILS, REFUSES, VERDICTS, Row
 from validation.compare.statements.statements import statements
 from validation.compare.tolerance import EQUIVALENCE
+from validation.compare.withheld import withheld
+from validation.engines.free_body import FreeBody
 from validation.engines.witnesses import WITNESSES, Witness, predicting_from
 from validation.report.record import Record, Timing
 from validation.run.breakdown import breakdown
+from validation.run.printed import printed
+
+SIMULATION = "mujoco-simulated"
+"""The witness that runs the generated MJCF."""
 
 
 def judged(name: str, scene: Scene, witnesses: Sequence[Witness] = WITNESSES, *, draw: bool = True) -> Record:
@@ -43,7 +50,7 @@ def judge(name: str, scene: Scene, witnesses: Sequence[Witness] = WITNESSES) -> 
     if scene.motion.free is not None:
         from validation.run.released import judge_released
 
-        return judge_released(record)
+        return judge_released(record, witnesses)
     at = _once(command(scene), record)
     witnesses = list(_called_for(witnesses, at, record))
     stage = _stage(at)
@@ -51,19 +58,34 @@ def judge(name: str, scene: Scene, witnesses: Sequence[Witness] = WITNESSES) -> 
     record.solution, seconds = _timed(lambda: solve(scene, stage, at=at))
     record.timings.append(Timing(name, FORMULAS, "exact", len(at.theta_2), seconds))
     record.rows += identities(name, scene, at, record.solution)
+    basis = _basis(scene, at)
+    if basis is not None:
+        record.rows.append(withheld(name, scene, record.solution, basis))
+    record.rows += printed(name, scene, at, record.solution)
     record.jumps = reversals(scene, at, record.solution)
     for witness in witnesses:
         answer = _ask(witness, scene, at, record)
         if answer is None:
             continue
         record.answers.append(answer)
-        record.rows += _judged(name, scene, at, record.solution, answer, witness)
+        record.rows += _judged(name, scene, at, record.solution, answer, witness, basis)
         if witness.tolerance == EQUIVALENCE and answer.refusal is None and "theta_3" in witness.expected:
             record.rows += _stated(name, scene, witness, answer)
         if witness.order and answer.refusal is None:
             answer.evidence |= _observed_order(name, scene, at, record.solution, witness)
+    if any(witness.name == SIMULATION for witness in witnesses):
+        record.rows += _shipped(name, scene, at)
     _judge_inertia(record, scene, at, witnesses)
     return record
+
+
+def _shipped(name: str, scene: Scene, at: Command) -> list[Row]:
+    """The generated MJCF as it is shipped, if one is."""
+    try:
+        row = import_module("validation.engines.mujoco.shipped").shipped(name, scene, at)
+    except Exception as error:  # as of any engine
+        return [breakdown(name, SIMULATION, error, "MJCF as shipped")]
+    return [] if row is None else [row]
 
 
 def _stage(at: Command) -> str:
@@ -97,12 +119,24 @@ def _called_for(witnesses: Iterable[Witness], at: Command, record: Record) -> It
             record.left_out.append(f"{witness.name}: {reason}")
 
 
-def _judged(name: str, scene: Scene, at: Command, solution: Solution, answer: Answer, witness: Witness) -> list[Row]:
+def _basis(scene: Scene, at: Command) -> Solution | None:
+    """Conditions and sizes of the positions by free bodies: nothing is allowed on the word of the formulas alone."""
+    try:
+        return basis_of(scene, FreeBody().answer(scene, at))
+    except ArithmeticError:  # a row of its own fails; each answer is then measured by itself
+        return None
+
+
+def _judged(
+    name: str, scene: Scene, at: Command, solution: Solution, answer: Answer, witness: Witness, basis: Solution | None
+) -> list[Row]:
     """The rows of one answer, against the formulas at the motion that the engine really made."""
     theirs = answer.at if answer.at is not None else at
-    formulas = solution if theirs is at else solve(scene, _stage(theirs), at=theirs)
+    formulas = solution
+    if theirs is not at:
+        formulas, basis = solve(scene, _stage(theirs), at=theirs), _basis(scene, theirs)
     predicted = predicting_from(witness, scene, theirs, answer)
-    rows = compare(name, scene, answer, formulas, witness.tolerance, witness.expected, predicted)
+    rows = compare(name, scene, answer, formulas, witness.tolerance, witness.expected, predicted, basis)
     answers = answer.assembled is not None and len(answer.assembled) == len(formulas)  # otherwise a row has failed
     if answers and answer.at is not None and {"theta_3", "theta_4"} <= answer.quantities.keys():
         rows.append(closure(name, scene, answer, witness.tolerance))
@@ -122,7 +156,7 @@ def _observed_order(name: str, scene: Scene, at: Command, solution: Solution, wi
     module, _, function = witness.order.partition(":")
 
     def error(answer: Answer) -> float:
-        rows = _judged(name, scene, at, solution, answer, replace(witness, expected=FORCES))
+        rows = _judged(name, scene, at, solution, answer, replace(witness, expected=FORCES), None)
         return max((row.error for row in rows if row.quantity in FORCES), default=math.nan)  # a refusal has none
 
     coarse, fine, order = getattr(import_module(module), function)(scene, at, error)
@@ -131,22 +165,36 @@ def _observed_order(name: str, scene: Scene, at: Command, solution: Solution, wi
 
 
 def _judge_inertia(record: Record, scene: Scene, at: Command, witnesses: Iterable[Witness]) -> None:
-    """The inertial part of the torque by itself: loads can hide an inertia that is 24 times wrong."""
+    """The inertial part of the torque by itself: loads can hide an inertia that is 24 times wrong.
+
+    An exact engine answers it in the same assembly; another one is started once more.
+    """
     if at.omega_2 is None or not (scene.loads or scene.effects):
         return
     bare = replace(scene, loads=(), effects=())
     ours = solve(bare, _stage(at), at=at)
     refused = {answer.engine for answer in record.answers if answer.refusal is not None}  # and has its row
+    of_bare = _basis(bare, at)
     for witness in witnesses:
-        answer = _ask(replace(witness, expected=("torque",)), bare, at, record, part="inertia alone")
+        answer = _of_inertia(next((each for each in record.answers if each.engine == witness.name), None))
+        if answer is None:
+            answer = _ask(replace(witness, expected=("torque",)), bare, at, record, part="inertia alone")
         if answer is None or (answer.refusal is not None and answer.engine in refused):
             continue
-        rows = _judged(record.name, bare, at, ours, answer, replace(witness, expected=("torque",)))
+        rows = _judged(record.name, bare, at, ours, answer, replace(witness, expected=("torque",)), of_bare)
         rows = [row for row in rows if row.quantity == "torque" or row.verdict in (REFUSES, FAILS)]
         if rows:  # what fails besides the torque, or stands in place of it, is not left out
             worst = max(rows, key=lambda row: VERDICTS.index(row.verdict))
             reason = worst.reason if worst.quantity in ("torque", "all") else f"{worst.quantity}: {worst.reason}"
             record.rows.append(replace(worst, quantity="torque_inertia", reason=reason))
+
+
+def _of_inertia(answer: Answer | None) -> Answer | None:
+    """The part of an answer that is of the bars alone, or None."""
+    if answer is None or "torque_inertia" not in answer.quantities:
+        return None
+    torque = {"torque": answer.quantities["torque_inertia"]}
+    return replace(answer, quantities={**answer.quantities, **torque}, evidence={}, alarms=[])
 
 
 def _ask(witness: Witness, scene: Scene, at: Command, record: Record, part: str = "") -> Answer | None:

@@ -6,7 +6,8 @@ the difference is what the coarser motion errs by. The finer one must not err by
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from importlib import import_module
 from typing import Any, NamedTuple
 
@@ -14,13 +15,19 @@ import numpy as np
 
 from fourbar.effects import Gravity
 from fourbar.linkage import MOVING_BARS
-from fourbar.scene import Scene
+from fourbar.quantities import UNKNOWNS
+from fourbar.scene import Command, Scene
+from fourbar.solution import Solution
 from fourbar.solve import solve
 from validation.compare.answer import Array, Released
+from validation.compare.basis import basis_of
+from validation.compare.compare import compare
 from validation.compare.error import in_own_unit, relative, worst
 from validation.compare.rows import AGREES, DEGRADED, FAILS, REFUSES, Row
 from validation.compare.tolerance import DEGRADED as TIMES_PREDICTED
-from validation.engines.witnesses import not_installed
+from validation.compare.tolerance import EQUIVALENCE
+from validation.compare.withheld import FORMULAS
+from validation.engines.witnesses import WITNESSES, Witness, not_installed
 from validation.report.record import Record, Timing
 from validation.run.breakdown import breakdown
 
@@ -81,7 +88,7 @@ def as_pendulum(scene: Scene) -> Pendulum | None:
     return pendulum if over_the_top else None
 
 
-def judge_released(record: Record) -> Record:
+def judge_released(record: Record, witnesses: Sequence[Witness] = WITNESSES) -> Record:
     """Rows of the formulas and of every forward engine for a scene with a free motion.
 
     The motion of the formulas ends where bars 3 and 4 come to lie in one line, unless it follows the path through;
@@ -95,6 +102,7 @@ def judge_released(record: Record) -> Record:
     record.timings.append(Timing(record.name, "formulas", "exact", len(solution), time.perf_counter() - begin))
     record.solution = solution
     assert solution.omega_2 is not None
+    record.rows += _forces(record.name, record.scene, solution, witnesses)
     pendulum = as_pendulum(record.scene)
     truth = _Truth(solution.theta_2, solution.omega_2, solution.stopped_at)
     if pendulum is not None:
@@ -120,6 +128,40 @@ def judge_released(record: Record) -> Record:
             record.left_out.append(f"{fine.engine}: {fine.refusal}")
         record.rows += _rows(record, fine, coarse, truth)
     return record
+
+
+def _forces(name: str, scene: Scene, solution: Solution, witnesses: Sequence[Witness]) -> Iterator[Row]:
+    """Motion, pin forces and the torque, which is none, of every instant, by the engines that answer one by one.
+
+    They are given theta_2, omega_2 and alpha_2; that these balance without a torque is the equation of motion.
+    """
+    assert solution.omega_2 is not None and solution.alpha_2 is not None and solution.torque is not None
+    held = replace(scene, motion=replace(scene.motion, free=None, alpha_2=0.0), drive_bar=2)
+    at = Command(solution.theta_2, solution.branch, solution.omega_2, solution.alpha_2)
+    driven = worst(np.abs(solution.torque))
+    torque = float(np.abs(solution.torque[driven]))
+    what = "a released linkage has no drive"
+    place = float(solution.theta_2[driven])
+    yield Row(name, FORMULAS, "exact", "torque", torque, 0.0, FAILS if torque else AGREES, what, place, 1.0)
+    for witness in witnesses:
+        if witness.tolerance != EQUIVALENCE or "theta_3" not in witness.expected or witness.missing():
+            continue
+        try:
+            answer = witness.engine().answer(held, at)
+        except Exception as error:  # whatever an engine raises is its own failure, in its own row
+            yield breakdown(name, witness.name, error, "forces")
+            continue
+        if answer.refusal is not None:
+            yield Row.unmeasured(name, answer.engine, answer.setting, "all", REFUSES, answer.refusal)
+            continue
+        basis = basis_of(held, answer)
+        assert basis is not None
+        # the formulas are conditioned by the angle that is independent there, an engine by theta_2
+        conditioned = replace(solution, condition=basis.condition, drive_condition=basis.drive_condition)
+        conditioned.drive_bar = 2
+        names = [q for q in UNKNOWNS if q in witness.expected]
+        rows = compare(name, held, answer, conditioned, witness.tolerance, names, None, basis)
+        yield from (row for row in rows if row.quantity != "untold")
 
 
 class _Truth(NamedTuple):

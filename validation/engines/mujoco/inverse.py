@@ -8,9 +8,10 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from fourbar.linkage import FIRST_PIN, MOVING_BARS
+from fourbar.linkage import MOVING_BARS
 from fourbar.scene import Command, Scene
 from validation.compare.answer import Answer, Array
+from validation.engines import description
 from validation.engines.effects import acting, unknown_effect
 from validation.engines.loop import answer_exactly, turned_ground
 
@@ -38,9 +39,9 @@ def refusal(scene: Scene) -> str | None:
         return reason
     for number in MOVING_BARS:
         bar = scene.linkage.bar(number)
-        if bar.mass < LEAST or bar.moment_of_inertia < LEAST:
+        if bar.mass < LEAST or description.inertia(bar) < LEAST:
             return (
-                f"bar {number} has mass {bar.mass:g} kg and inertia {bar.moment_of_inertia:g} kg m^2; "
+                f"bar {number} has mass {bar.mass:g} kg and inertia {description.inertia(bar):g} kg m^2; "
                 f"MuJoCo compiles no moving body below {LEAST:g} of either"
             )
     return None
@@ -59,13 +60,13 @@ class MujocoTree:
         bodies: dict[int, Any] = {}
         for number in MOVING_BARS:
             part = linkage.bar(number)
-            r, phi = part.mass_centre
+            r, phi = description.centre(part)
             centre = [r * math.cos(phi), r * math.sin(phi), 0.0]
             parent = bodies[2] if number == 3 else spec.worldbody
             body = parent.add_body(name=f"bar{number}", pos=[*foot[number], 0.0])
             body.explicitinertial = True
-            body.mass, body.ipos, body.inertia = part.mass, centre, [part.moment_of_inertia] * 3
-            body.add_joint(name=FIRST_PIN[number], type=mujoco.mjtJoint.mjJNT_HINGE, axis=[0.0, 0.0, 1.0])
+            body.mass, body.ipos, body.inertia = part.mass, centre, [description.inertia(part)] * 3
+            body.add_joint(name=description.FIRST_PIN[number], type=mujoco.mjtJoint.mjJNT_HINGE, axis=[0.0, 0.0, 1.0])
             body.add_site(name=f"G{number}", pos=centre)
             body.add_site(name=f"end{number}", pos=[part.length, 0.0, 0.0])
             bodies[number] = body
@@ -79,7 +80,7 @@ class MujocoTree:
         model.body_simple[:] = model.dof_simplenum[:] = 0
         self.data = mujoco.MjData(model)
         self.body = {n: model.body(f"bar{n}").id for n in MOVING_BARS}
-        self.dof = [int(model.joint(FIRST_PIN[n]).dofadr[0]) for n in MOVING_BARS]
+        self.dof = [int(model.joint(description.FIRST_PIN[n]).dofadr[0]) for n in MOVING_BARS]
         self.site = {name: model.site(name).id for n in MOVING_BARS for name in (f"G{n}", f"end{n}")}
         self.on_bar = {name: self.body[int(name[-1])] for name in self.site}
         self.linear, self.linear_dot, self.angular = (np.zeros((3, 3)) for _ in range(3))

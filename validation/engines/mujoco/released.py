@@ -20,6 +20,9 @@ TIME_CONSTANT_STEPS = 2.0
 1 ms with 2, three hundred times as much with 10."""
 
 
+FRICTION = (mujoco.mjtConstraint.mjCNSTR_FRICTION_DOF, mujoco.mjtConstraint.mjCNSTR_FRICTION_TENDON)
+
+
 class MujocoForward:
     """Free motion of the closed loop with a fixed step, s."""
 
@@ -45,10 +48,41 @@ class MujocoForward:
         loop.model.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_ENERGY
         loop.set_state(q_0, scene.motion.omega_2 or 0.0)
         rows, q, watch = [], loop.data.qpos, LimitWatch(int(start.branch[0]))
-        stepper = Stepper(loop.model, loop.data, timestep)
+        stepper, work = Stepper(loop.model, loop.data, timestep), _Work(loop.model, loop.data, timestep)
+
+        def look(time: float) -> None:
+            watch.look(time, q[O2] + q[A], q[O4])
+            work.add()
+
         for t in times:
-            stepper.to(float(t), lambda time: watch.look(time, q[O2] + q[A], q[O4]))
+            stepper.to(float(t), look)
             mujoco.mj_forward(loop.model, loop.data)
-            rows.append((loop.data.qpos[O2], loop.data.qvel[O2], loop.data.energy.sum()))
+            rows.append((loop.data.qpos[O2], loop.data.qvel[O2], loop.data.energy.sum() - work.done))
         theta_2, omega, energy = np.array(rows).T
         return Released(NAME, setting, theta_2, omega, energy, watch.stopped_at)
+
+
+class _Work:
+    """What loads, damping and dry friction do to the bars, by MuJoCo's own powers at the ends of each step, J."""
+
+    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, timestep: float) -> None:
+        self.model, self.data, self.timestep, self.done = model, data, timestep, 0.0
+        damped = model.dof_damping.any() or model.tendon_damping.any()
+        dry = model.dof_frictionloss.any() or model.tendon_frictionloss.any()
+        self.any = bool(model.nu or damped or dry)
+        mujoco.mj_forward(model, data)
+        self.before = self._power()
+
+    def add(self) -> None:
+        """Of the step just made; after a Runge-Kutta step some fields are still of the step before."""
+        if self.any:
+            mujoco.mj_forward(self.model, self.data)
+            now = self._power()
+            self.done += 0.5 * self.timestep * (self.before + now)
+            self.before = now
+
+    def _power(self) -> float:
+        d = self.data
+        rubbing = np.isin(d.efc_type, FRICTION)
+        own = float(d.qvel @ (d.qfrc_actuator + d.qfrc_damper))
+        return own + float(d.efc_force[rubbing] @ d.efc_vel[rubbing])

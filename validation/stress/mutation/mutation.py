@@ -13,6 +13,8 @@ import click
 from fourbar.errors import DependencyError, InputError
 from fourbar.writing import write_text
 from validation.stress.mutation.harness import MODULES
+from validation.stress.mutation.planted import planted as every_fault
+from validation.stress.mutation.planting import faults
 
 ROOT = Path(__file__).parents[3]
 COPIED = ("fourbar", "validation", "tests", "models", "docs", "README.md", "CHANGELOG.md", "Makefile", "pyproject.toml")
@@ -28,18 +30,23 @@ UNTRIED = ("", "not checked", "check was interrupted by user")
 
 @click.command()
 @click.option("--harness", is_flag=True, help="The harness alone, on mutants that change a number by more than 1e-9.")
+@click.option("--planted", is_flag=True, help="The faults of planted.toml, one at a time, against the harness.")
 @click.option("--module", type=click.Choice(MODULES), help="Only this one.")
 @click.option("--most", default=0, type=click.IntRange(0), help="With --harness: at most this many per module.")
 @click.option("--whole", is_flag=True, help="Try survivors without a reason on the whole suite (minutes each).")
 @click.option("--again", is_flag=True, help="Only what survived the last run into --out, after tests were added.")
 @click.option("--workers", default=2, show_default=True, type=click.IntRange(1))
 @click.option("--out", type=click.Path(path_type=Path, file_okay=False), default=Path("results/mutation"))
-def mutation(harness: bool, module: str | None, most: int, whole: bool, again: bool, workers: int, out: Path) -> int:
+def mutation(
+    harness: bool, planted: bool, module: str | None, most: int, whole: bool, again: bool, workers: int, out: Path
+) -> int:
     """Measure the checks: small faults in the formulas, one at a time, against `make test` or the harness alone.
 
     The tests of the formulas are tried (pyproject.toml names them), the fast ones first: what they
     catch, `make test` catches. Every survivor needs a reason in harmless.json.
     """
+    if planted:
+        return _planted(workers)
     if most and not harness:
         raise InputError("--most", most, "is for --harness; mutmut itself runs whole modules")
     if again and harness:
@@ -69,6 +76,19 @@ def mutation(harness: bool, module: str | None, most: int, whole: bool, again: b
             states[name] = "killed"
             del survivors[name]
     return _reported(states, survivors, out)
+
+
+def _planted(workers: int) -> int:
+    """Every planted fault; 1 where one survives without a reason, or the harness fails without a fault."""
+    from rich.console import Console
+    from rich.progress import track
+
+    results = list(track(every_fault(workers), "planting", total=len(faults()) + 1, console=Console(stderr=True)))
+    survivors = [(fault, why) for fault, why in results if why is not None]
+    for fault, why in survivors:
+        print(f"{fault}: {why}")
+    print(f"{len(results) - 1} planted faults, {len(survivors)} of them survive without a reason on record")
+    return 1 if survivors else 0
 
 
 def _copy(tree: Path) -> None:

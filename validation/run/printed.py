@@ -1,0 +1,122 @@
+"""What is printed and no engine answers: error bars, the residual of friction, the law of the motion, long sweeps."""
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fourbar.linkage import PIN_FORCE
+from fourbar.quantities import FORCES, OK, PIN_FORCES
+from fourbar.scene import Command, Scene
+from fourbar.solution import Solution
+from fourbar.solve import BLOCK, solve
+from validation.compare.basis import basis_of, strictest_condition
+from validation.compare.error import magnitude, relative, relative_error, worst
+from validation.compare.law import law_row
+from validation.compare.rows import AGREES, FAILS, UNDECIDED, Row
+from validation.compare.scales import yardstick
+from validation.compare.tolerance import EPS, EQUIVALENCE, NOTHING_TO_TELL, Array, K, condition_of
+from validation.compare.withheld import FORMULAS
+from validation.engines.exact import BallArithmetic, unknown
+from validation.engines.witnesses import not_installed
+
+SAMPLE = 5
+"""Positions of a scene at which the error bars are held to the true error."""
+BARS = 10.0
+"""Error bars: 2 in 100 million normal errors exceed ten of them."""
+ROUNDED_SOMEWHERE = 20
+"""Positions with loaded friction of which at least one leaves a residual: by rounding half of them do."""
+
+
+def printed(name: str, scene: Scene, at: Command, solution: Solution) -> Iterator[Row]:
+    """One row per statement that the scene makes."""
+    if scene.motion.law is not None and at.time is not None:
+        yield law_row(name, scene, at)
+    if at.omega_2 is None:
+        return
+    if at.remainder is None:
+        yield _blocks(name, scene, at, solution)
+        if unknown(scene) is None and not_installed("flint") is None:
+            yield from _error_bars(name, scene, at, solution)
+    if solution.friction_residual is not None:
+        yield _residual(name, scene, solution)
+
+
+def piece(at: Command, where: NDArray[np.intp]) -> Command:
+    """Some positions of a command."""
+
+    def of(value: float | Array | None) -> float | Array | None:
+        return value if value is None or np.ndim(value) == 0 else value[where]  # type: ignore[index]
+
+    time = None if at.time is None else at.time[where]
+    return Command(at.theta_2[where], at.branch[where], of(at.omega_2), of(at.alpha_2), None, time)  # type: ignore[arg-type]
+
+
+def _blocks(name: str, scene: Scene, at: Command, solution: Solution) -> Row:
+    """A sweep of more than one block of positions, at the ends of its blocks, against the scene's own sweep."""
+    n = len(at.theta_2)
+    long = np.arange(max(n, BLOCK + n)) % n
+    ends = np.unique([0, BLOCK - 1, BLOCK, len(long) - 1])
+    whole = solve(scene, "force", at=piece(at, long))
+    error = (whole.status_code[ends] != solution.status_code[long[ends]]).astype(float)
+    for quantity in ("sin_mu", "B", "alpha_3", *FORCES):
+        ours = getattr(solution, quantity)
+        one, other = getattr(whole, quantity)[ends], ours[long[ends]]
+        known = np.isfinite(magnitude(other))
+        error[known != np.isfinite(magnitude(one))] = np.inf
+        size = yardstick(quantity, scene, solution, ours)[long[ends]]
+        condition = condition_of(quantity, scene.linkage, solution)[long[ends]]
+        # evaluated by the same code, but not in the same company of a processor's registers
+        apart = relative_error(quantity, one, other, size) * condition
+        error[known] = np.maximum(error[known], apart[known])
+    index = worst(error)
+    verdict = AGREES if error[index] <= EQUIVALENCE.factor else FAILS
+    reason = f"{len(long)} positions at once against {n}"
+    theta_2, allowed = float(whole.theta_2[ends[index]]), EQUIVALENCE.factor
+    return Row(name, FORMULAS, "exact", "blocks", float(error[index]), allowed, verdict, reason, theta_2, 1.0)
+
+
+def _error_bars(name: str, scene: Scene, at: Command, solution: Solution) -> Iterator[Row]:
+    """Against the true error, by 320-bit arithmetic; no bar may be larger than what a comparison is allowed."""
+    usable = np.flatnonzero(solution.status_code == OK)
+    if not len(usable):
+        return
+    where = usable[np.unique(np.linspace(0, len(usable) - 1, SAMPLE).astype(int))]
+    sampled = piece(at, where)
+    exact, ours = BallArithmetic().answer(scene, sampled), solve(scene, "error", at=sampled)
+    other = basis_of(scene, exact)
+    for bar, quantities in (("torque_error", ("torque",)), ("force_error", PIN_FORCES)):
+        width = getattr(ours, bar)
+        true = np.max([magnitude(getattr(ours, q) - exact.quantities[q]) for q in quantities], axis=0)
+        size = np.max([magnitude(exact.quantities[q]) for q in quantities], axis=0)
+        condition = strictest_condition(quantities[0], scene.linkage, ours, other)
+        tells = condition * NOTHING_TO_TELL > EPS
+        wide = relative(width, size) * condition / (K * EPS)
+        share = np.where(tells, np.fmax(relative(true, BARS * width), wide), 0.0)
+        share[tells & ~np.isfinite(width)] = np.inf
+        index = worst(share)
+        verdict = UNDECIDED if not tells.any() else AGREES if share[index] <= 1.0 else FAILS
+        reason = f"the error is {true[index]:.1e}, the bar {width[index]:.1e}, of {size[index]:.1e}"
+        place = float(sampled.theta_2[index])
+        yield Row(
+            name, FORMULAS, "exact", bar, float(share[index]), 1.0, verdict, reason, place, float(condition[index])
+        )
+
+
+def _residual(name: str, scene: Scene, solution: Solution) -> Row:
+    """What is left of friction couples is rounding: not more, and somewhere not less."""
+    residual, terms = solution.friction_residual, np.zeros(len(solution))
+    assert residual is not None and solution.drive_condition is not None
+    for effect in scene.effects:
+        for pin, mu, r in getattr(effect, "pins", ()):
+            terms = np.fmax(terms, mu * r * magnitude(getattr(solution, PIN_FORCE[pin])))
+    known = np.isfinite(terms) & (terms > 0.0) & (solution.status_code == OK)
+    if np.any(solution.omega_2 == 0.0) or not known.any():
+        return Row.unmeasured(name, FORMULAS, "exact", "friction_residual", UNDECIDED, "no pin slides under load")
+    error = np.where(known, residual / np.where(known, terms, 1.0) * solution.drive_condition, 0.0)
+    index = worst(error)
+    nowhere = np.count_nonzero(known) >= ROUNDED_SOMEWHERE and not residual[known].any()
+    verdict = FAILS if nowhere or not error[index] <= K * EPS else AGREES
+    reason = "not even rounding is left at any position" if nowhere else "couples of mu r |F|, relative to the largest"
+    place = float(solution.theta_2[index])
+    return Row(name, FORMULAS, "exact", "friction_residual", float(error[index]), K * EPS, verdict, reason, place, 1.0)

@@ -1,0 +1,94 @@
+"""One planted fault in one process: its module is loaded with another text, then the harness judges the specimens.
+
+`python -m validation.stress.mutation.planting NUMBER` prints what failed as JSON; without a number nothing is planted
+and every specimen must hold. Nothing of the project is imported before the fault is in place.
+"""
+
+import importlib.abc
+import importlib.machinery
+import json
+import sys
+import tomllib
+from pathlib import Path
+from types import CodeType
+from typing import Any
+
+FAULTS = Path(__file__).parent / "planted.toml"
+ROOT = Path(__file__).parents[3]
+
+
+def faults() -> list[dict[str, Any]]:
+    """Every entry of the list, with the keys fault, file, old, new, specimens, caught_by and perhaps harmless."""
+    entries: list[dict[str, Any]] = tomllib.loads(FAULTS.read_text(encoding="utf-8"))["planted"]
+    return entries
+
+
+def planted(entry: dict[str, Any]) -> dict[str, str]:
+    """By the module's name: its text with the fault; ValueError where the entry no longer fits it."""
+    texts = {}
+    for change in (entry, *([entry["also"]] if "also" in entry else [])):
+        text = (ROOT / change["file"]).read_text(encoding="utf-8")
+        if text.count(change["old"]) != 1:
+            count = text.count(change["old"])
+            raise ValueError(f"{entry['fault']}: {count} places in {change['file']} read {change['old']!r}")
+        name = change["file"].removesuffix(".py").removesuffix("/__init__").replace("/", ".")
+        texts[name] = text.replace(change["old"], change["new"])
+    return texts
+
+
+class Planter(importlib.abc.MetaPathFinder):
+    """Finds a module that has a fault; all others are found as ever."""
+
+    def __init__(self, entry: dict[str, Any]) -> None:
+        self.texts = planted(entry)
+
+    def find_spec(self, fullname: str, path: Any, target: Any = None) -> importlib.machinery.ModuleSpec | None:
+        """The module with the fault, or None."""
+        if fullname not in self.texts:
+            return None
+        spec = importlib.machinery.PathFinder.find_spec(fullname, path)
+        assert spec is not None and spec.origin is not None
+        spec.loader = _Text(fullname, spec.origin, self.texts[fullname])
+        return spec
+
+
+class _Text(importlib.machinery.SourceFileLoader):
+    """Loads a module from a text in place of its file's."""
+
+    def __init__(self, fullname: str, path: str, text: str) -> None:
+        super().__init__(fullname, path)
+        self.text = text
+
+    def get_code(self, fullname: str) -> CodeType:
+        """Compiled anew: the cache is of the file."""
+        code: CodeType = self.source_to_code(self.text.encode(), self.path)
+        return code
+
+
+def failing(names: list[str]) -> dict[str, list[str]]:
+    """By specimen: the rows that fail, as "engine quantity: reason"."""
+    from validation.engines.witnesses import WITNESSES
+    from validation.run.judge import judge
+    from validation.stress.mutation.specimens import SPECIMENS
+
+    found = {}
+    for name in names or SPECIMENS:
+        simulated = name.startswith("simulated")
+        witnesses = [w for w in WITNESSES if simulated or not w.through_time]
+        rows = judge(name, SPECIMENS[name], witnesses).rows
+        found[name] = [f"{row.engine} {row.quantity}: {row.reason}" for row in rows if row.failed]
+    return found
+
+
+def main() -> None:
+    """Plant the fault of a number, judge its specimens, print what fails."""
+    names: list[str] = []
+    if len(sys.argv) > 1:
+        entry = faults()[int(sys.argv[1])]
+        sys.meta_path.insert(0, Planter(entry))
+        names = entry["specimens"]
+    print(json.dumps(failing(names)))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,135 @@
+"""Scenes on which planted faults are tried: each effect, drive, branch and kind of motion in one of them."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from fourbar.effects import (
+    Flywheel,
+    Friction,
+    Gravity,
+    Load,
+    PinFriction,
+    Point,
+    Spring,
+    Springs,
+    Table,
+    Torsion,
+    Viscous,
+)
+from fourbar.formulas.mobility import limit_positions
+from fourbar.linkage import Bar, FourBar, uniform
+from fourbar.scene import Scene
+from fourbar.scene.motion import CROSSED, Free, FromLimit, Motion, Sweep
+from fourbar.scene.motion_law import Law
+
+CRANK = FourBar(
+    0.3,
+    Bar(0.1, 0.2, centre=(0.04, 0.4)),
+    Bar(0.25, 0.5, 0.004, (0.13, 0.3)),
+    Bar(0.22, 0.4, 0.002, (0.12, -0.2)),
+    ground_angle=0.2,
+)
+SLENDER = FourBar(0.3, Bar(0.1, 0.2), Bar(0.25, 0.5), Bar(0.22, 0.4), ground_angle=0.2)
+ROCKER = FourBar(0.3, Bar(0.25, 0.7), Bar(0.1, 1.3), Bar(0.22, 0.9))
+TURN = Motion(Sweep(0.1, 0.1 + 2.0 * math.pi, 24), 10.0, 5.0)
+LOADS = (
+    Load(4, (3.0, 0.7), (0.05, 1.0)),
+    Load(3, (2.0, -0.4), (0.06, 0.5), 0.1, frame="bar"),
+    Load(2, (1.0, 0.3), (0.02, -0.7)),
+)
+WEIGHT = Gravity(9.81, -1.3)
+CRANK_ROCKER = Scene(CRANK, TURN, 2, LOADS, (WEIGHT,))
+SPECIMENS: dict[str, Scene] = {
+    "crank-rocker": CRANK_ROCKER,
+    "coupler driven": replace(CRANK_ROCKER, motion=replace(TURN, branch=CROSSED), drive_bar=3),
+    "output driven": replace(CRANK_ROCKER, motion=Motion(Sweep(0.5, 1.5, 12), -10.0, 5.0), drive_bar=4),
+    "slender bars": Scene(SLENDER, TURN),
+    "drag link": Scene(uniform(0.08, 0.24, 0.2, 0.26), TURN, 4, effects=(Gravity(),)),
+    "limited": Scene(ROCKER, Motion(Sweep(0.3, 1.4, 22), 3.0), effects=(WEIGHT,)),
+    "parallelogram": Scene(
+        FourBar(0.3, Bar(0.1, 0.2), Bar(0.3, 0.5), Bar(0.1, 0.4)),
+        Motion(Sweep(-1.0, 1.1, 14), 4.0, through="follow"),
+        effects=(WEIGHT,),
+    ),
+    "near a limit": Scene(
+        ROCKER, Motion(limit_positions(ROCKER)[0].theta_2 + np.array([1e-2, 1e-3]), 1.0), effects=(WEIGHT,)
+    ),
+    "a hair from a limit": Scene(ROCKER, Motion(FromLimit(1, 1e-9), 1.0), effects=(WEIGHT,)),
+    "positions": Scene(CRANK, Motion(Sweep(0.0, 6.0, 12))),
+    "damped": replace(
+        CRANK_ROCKER,
+        effects=(Viscous.at(O2=0.01, A=0.02, B=0.03, O4=0.015), Friction.at(O2=0.02, A=0.05, B=0.04, O4=0.03)),
+    ),
+    "sprung": replace(
+        CRANK_ROCKER,
+        effects=(
+            Springs(
+                (
+                    Spring(Point(1, 0.2, 0.6), Point(3, 0.15, -0.4), 80.0, 0.1, 2.0),
+                    Spring(Point(2, 0.05, 0.3), Point(4, 0.1, 0.5), 50.0, 0.12),
+                )
+            ),
+            Torsion.at(B=(0.5, 0.7, 0.1), O4=(0.3, 1.2, -0.05)),
+            Flywheel(0.003, 4),
+        ),
+    ),
+    "flywheel": replace(CRANK_ROCKER, effects=(Flywheel(0.003, 2), Torsion.at(A=(0.5, 0.2, 0.1)))),
+    "wound": Scene(CRANK, Motion(Sweep(0.0, 9.0, 30), 5.0), effects=(Torsion.at(O2=(0.5, 1.0, 0.1)),)),
+    "sliding pins": replace(CRANK_ROCKER, effects=(WEIGHT, PinFriction.at(A=(0.2, 0.02), O4=(0.3, 0.03)))),
+    "one sliding pin": replace(CRANK_ROCKER, effects=(WEIGHT, PinFriction.at(B=(0.3, 0.03))), drive_bar=4),
+    "at rest": Scene(
+        CRANK,
+        Motion(Sweep(0.1, 6.0, 12), 0.0),
+        2,
+        LOADS,
+        (WEIGHT, Friction.at(A=0.05, B=0.02), PinFriction.at(O4=(0.2, 0.02))),
+    ),
+    "table": replace(
+        CRANK_ROCKER,
+        loads=(
+            Load(
+                4,
+                (3.0, 0.7),
+                (0.05, 1.0),
+                0.2,
+                table=Table((0.1, 2.0, 4.0, 0.1 + 2.0 * math.pi), (1.0, -0.5, 2.0, 1.0)),
+            ),
+        ),
+    ),
+    "law": Scene(
+        CRANK,
+        Motion(law=Law((0.0, 0.2, 0.5, 0.9, 1.2), (0.3, 1.5, 3.1, 5.2, 0.3 + 2.0 * math.pi), 16, "periodic")),
+        effects=(WEIGHT,),
+    ),
+    "law at rest": Scene(CRANK, Motion(law=Law((0.0, 0.3, 0.7, 1.0), (0.3, 1.0, 2.2, 3.0), 16, "rest"))),
+    "free law": Scene(CRANK, Motion(law=Law((0.0, 0.3, 0.7, 1.0, 1.4), (0.3, 1.0, 2.2, 3.0, 3.3), 16))),
+    "released": Scene(CRANK, Motion(1.0, 3.0, free=Free(0.5, 50)), effects=(WEIGHT,)),
+    "released, damped": Scene(
+        CRANK,
+        Motion(1.0, 3.0, free=Free(0.5, 50)),
+        2,
+        (Load(4, moment=0.1),),
+        (WEIGHT, Viscous.at(O4=0.01, B=0.003), Friction.at(O2=0.02)),
+    ),
+    "double rocker released": Scene(
+        ROCKER, Motion(math.radians(50.0), 0.0, through="follow", free=Free(1.0, 100)), effects=(Gravity(),)
+    ),
+    "simulated": Scene(
+        CRANK,
+        Motion(Sweep(0.1, 6.0, 12), 10.0),
+        2,
+        LOADS,
+        (
+            WEIGHT,
+            Viscous.at(A=0.002, B=0.003),
+            Springs((Spring(Point(1, 0.2, 0.6), Point(3, 0.15, -0.4), 80.0, 0.1, 2.0),)),
+        ),
+    ),
+    "simulated, dry": Scene(
+        CRANK, Motion(Sweep(0.1, 3.0, 8), 10.0), effects=(Friction.at(A=0.05, B=0.04), Torsion.at(O4=(0.3, 1.2, -0.05)))
+    ),
+    "simulated, quickening": Scene(CRANK, Motion(Sweep(0.1, 3.0, 8), 10.0, 20.0), 4, effects=(Flywheel(0.003, 4),)),
+}
+"""By the name under which an entry of planted.toml tries its fault."""
