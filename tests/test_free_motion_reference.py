@@ -22,7 +22,7 @@ TIMES = np.linspace(0.0, 5.0, 51)
 NUDGE = 1e-6
 """Of the angle at the start (rad), and of the speed by the greatest speed."""
 SURE = 1e-6
-"""|sin(theta_4 - theta_3)| from which on the branch is told from its sign."""
+"""|sin(theta_4 - theta_3)| from which on the branch is known from its sign."""
 LOOSE = 1e-10
 """Tolerance of the motions whose difference over NUDGE is the amplification: 1e-4 of it."""
 

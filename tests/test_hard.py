@@ -24,7 +24,7 @@ from validation.engines.mujoco.closed_loop import ClosedLoop
 from validation.engines.prediction import from_data, in_world_axes
 from validation.engines.witnesses import Witness
 from validation.report.hard_page import limit_rows, page
-from validation.report.page import Record
+from validation.report.judged import Record
 from validation.run.judge import judge
 from validation.run.released import as_pendulum, judge_released
 from validation.scenes import hard_families as families
@@ -105,7 +105,7 @@ def _equivalence() -> Any:
     return EQUIVALENCE
 
 
-def test_beside_a_toggle_a_wrong_force_fails_that_the_law_excuses() -> None:
+def test_near_a_toggle_a_wrong_force_fails_that_the_law_excuses() -> None:
     """1e-8 rad from a toggle K eps/s^3 allows all; roundings of the data allow 4e-5."""
     lengths = linkage_of(LinkageType.TRIPLE_ROCKER, 1)
     (psi, _), *_ = collinear_3_4(lengths)
@@ -175,7 +175,7 @@ def test_a_gap_is_seen() -> None:
     assert alarm(simulated(replace(RECIPE, impedance=0.1, pad=None, time_constant_steps=300.0)), "closure_gap")
 
 
-def test_a_crank_that_does_not_turn_as_told_is_seen() -> None:
+def test_a_crank_that_does_not_turn_as_commanded_is_seen() -> None:
     assert alarm(simulated(replace(RECIPE, flywheel=1.0)), "speed_error")
 
 

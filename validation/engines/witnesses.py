@@ -64,7 +64,7 @@ class Work(NamedTuple):
 
     short: str
     """For a legend."""
-    said: str
+    description: str
     """For a table."""
 
 

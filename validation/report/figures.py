@@ -16,7 +16,7 @@ from validation.compare.reversals import Reversal, broken
 from validation.compare.scales import divisor, magnitude, yardstick
 from validation.compare.tolerance import EPS, EQUIVALENCE, SIMULATED, Array, condition_of
 from validation.report.colours import ALLOWED, BAND, GRID, INK, PAPER, by_variable, style_of
-from validation.report.page import Record
+from validation.report.judged import Record
 from validation.report.svg import svg_text
 
 if TYPE_CHECKING:

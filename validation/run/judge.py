@@ -22,11 +22,11 @@ from validation.compare.rows import FAILS, REFUSES, VERDICTS, Row
 from validation.compare.statements.statements import statements
 from validation.compare.tolerance import EQUIVALENCE
 from validation.engines.witnesses import WITNESSES, Witness, predicting_from
-from validation.report.page import Page, Record, Timing
+from validation.report.judged import Judged, Record, Timing
 from validation.run.breakdown import failure
 
 
-def judged_page(name: str, scene: Scene, witnesses: Sequence[Witness] = WITNESSES, *, draw: bool = True) -> Page:
+def judged_page(name: str, scene: Scene, witnesses: Sequence[Witness] = WITNESSES, *, draw: bool = True) -> Judged:
     """Judge a scene and keep what the report needs of it."""
     record = judge(name, scene, witnesses)
     figure = None
@@ -34,7 +34,7 @@ def judged_page(name: str, scene: Scene, witnesses: Sequence[Witness] = WITNESSE
         from validation.report.figures import scene_figure
 
         figure = scene_figure(record)
-    return Page(
+    return Judged(
         name,
         plain(scene.title),
         plain(scene.source),

@@ -15,7 +15,7 @@ from fourbar.errors import DependencyError, InputError
 from validation.compare.plain import plain
 from validation.engines.memory import bound_memory
 from validation.engines.witnesses import Witness
-from validation.report.page import Page
+from validation.report.judged import Judged
 from validation.run.breakdown import breakdown
 from validation.run.judge import judged_page
 from validation.scenes.suites import Files, Suite
@@ -60,14 +60,14 @@ def longest(suite: Suite) -> float:
     return SECONDS_PER_SCENE + SECONDS_PER_POSITION * (suite.positions if isinstance(suite, Files) else 0)
 
 
-def judge_chunk(suite: Suite, scenes: Sequence[int], witnesses: Sequence[Witness], draw: bool) -> list[Page]:
+def judge_chunk(suite: Suite, scenes: Sequence[int], witnesses: Sequence[Witness], draw: bool) -> list[Judged]:
     """The pages of some scenes; runs in a worker."""
     return [judged_page(plain(suite.name(i)), suite.scene(i), witnesses, draw=draw) for i in scenes]
 
 
 def judge_watched(
     seconds: float, suite: Suite, scenes: Sequence[int], witnesses: Sequence[Witness], draw: bool
-) -> list[Page]:
+) -> list[Judged]:
     """The same in a worker that nobody stops from outside: it ends its own process where it takes longer."""
     faulthandler.dump_traceback_later(seconds, exit=True)
     try:
@@ -85,7 +85,7 @@ def ready() -> None:
 
 def over_processes(
     suite: Suite, chunks: Iterable[Chunk], witnesses: Sequence[Witness], draw: bool, workers: int
-) -> Iterator[tuple[int, list[Page]]]:
+) -> Iterator[tuple[int, list[Judged]]]:
     """Over processes of this machine."""
     left = dict(chunks)
     in_vain = 0
@@ -103,7 +103,7 @@ def over_processes(
 
 def _over_one_pool(
     suite: Suite, chunks: Iterable[Chunk], witnesses: Sequence[Witness], draw: bool, workers: int
-) -> Iterator[tuple[int, list[Page]]]:
+) -> Iterator[tuple[int, list[Judged]]]:
     from multiprocessing import get_context
 
     from pebble import ProcessPool
@@ -112,16 +112,16 @@ def _over_one_pool(
     with ProcessPool(max_workers=workers, context=get_context("spawn"), initializer=ready) as pool:
         try:
 
-            def submit(scenes: Sequence[int], asked: Sequence[Witness]) -> Future[list[Page]]:
+            def submit(scenes: Sequence[int], asked: Sequence[Witness]) -> Future[list[Judged]]:
                 seconds = longest(suite) * len(scenes)
                 task = (*part(suite, scenes), asked, draw)
                 try:
-                    future: Future[list[Page]] = pool.schedule(judge_chunk, args=task, timeout=seconds)
+                    future: Future[list[Judged]] = pool.schedule(judge_chunk, args=task, timeout=seconds)
                 except RuntimeError:  # a broken pool takes no more
                     raise StalledError from None
                 return future
 
-            def lost(under_way: Iterable[Future[list[Page]]]) -> bool:
+            def lost(under_way: Iterable[Future[list[Judged]]]) -> bool:
                 return not pool.active or not any(future.running() for future in under_way)
 
             yield from _as_done(suite, chunks, witnesses, submit, IN_FLIGHT * workers, lost)
@@ -132,7 +132,7 @@ def _over_one_pool(
 
 def over_machines(
     suite: Suite, chunks: Iterable[Chunk], witnesses: Sequence[Witness], draw: bool, scheduler: str
-) -> Iterator[tuple[int, list[Page]]]:
+) -> Iterator[tuple[int, list[Judged]]]:
     """Over the workers of a Dask scheduler; each needs this checkout importable."""
     from distributed import Client
 
@@ -146,11 +146,11 @@ def over_machines(
     # the client is left first, which ends what is still waited for
     with ThreadPoolExecutor(IN_FLIGHT * workers) as waiting, connected as client:
 
-        def submit(scenes: Sequence[int], asked: Sequence[Witness]) -> Future[list[Page]]:
+        def submit(scenes: Sequence[int], asked: Sequence[Witness]) -> Future[list[Judged]]:
             task = (longest(suite) * len(scenes), *part(suite, scenes), asked, draw)
             return waiting.submit(client.submit(judge_watched, *task, retries=0, pure=False).result)
 
-        def deserted(_: Iterable[Future[list[Page]]]) -> bool:
+        def deserted(_: Iterable[Future[list[Judged]]]) -> bool:
             return not client.nthreads()
 
         try:
@@ -163,13 +163,13 @@ def _as_done(
     suite: Suite,
     chunks: Iterable[Chunk],
     witnesses: Sequence[Witness],
-    submit: Callable[[Sequence[int], Sequence[Witness]], "Future[list[Page]]"],
+    submit: Callable[[Sequence[int], Sequence[Witness]], "Future[list[Judged]]"],
     in_flight: int,
-    lost: "Callable[[Iterable[Future[list[Page]]]], bool]",
-) -> Iterator[tuple[int, list[Page]]]:
+    lost: "Callable[[Iterable[Future[list[Judged]]]], bool]",
+) -> Iterator[tuple[int, list[Judged]]]:
     """Keep a bounded number of chunks under way; yield each as it is done."""
     waiting = iter(chunks)
-    under_way: dict[Future[list[Page]], Chunk] = {}
+    under_way: dict[Future[list[Judged]], Chunk] = {}
     exhausted = False
     while True:
         while not exhausted and len(under_way) < in_flight:
@@ -193,7 +193,7 @@ def _as_done(
                 yield number, [_alone(suite, scene, witnesses, submit, lost) for scene in scenes]
 
 
-def _outcome(future: "Future[list[Page]]", lost: "Callable[[Iterable[Future[list[Page]]]], bool]") -> list[Page]:
+def _outcome(future: "Future[list[Judged]]", lost: "Callable[[Iterable[Future[list[Judged]]]], bool]") -> list[Judged]:
     """The result of a task, or StalledError where no worker takes it up or the pool breaks."""
     while True:
         wait([future], STALL)
@@ -210,9 +210,9 @@ def _alone(
     suite: Suite,
     scene: int,
     witnesses: Sequence[Witness],
-    submit: Callable[[Sequence[int], Sequence[Witness]], "Future[list[Page]]"],
-    lost: "Callable[[Iterable[Future[list[Page]]]], bool]",
-) -> Page:
+    submit: Callable[[Sequence[int], Sequence[Witness]], "Future[list[Judged]]"],
+    lost: "Callable[[Iterable[Future[list[Judged]]]], bool]",
+) -> Judged:
     """One scene by itself, and if that breaks down too, one engine at a time."""
     try:
         return _outcome(submit([scene], witnesses), lost)[0]
@@ -221,7 +221,7 @@ def _alone(
     except Exception:
         pass
     name = plain(suite.name(scene))
-    page: Page | None = None
+    page: Judged | None = None
     failed = []
     for asked in ([], *([witness] for witness in witnesses)):
         for attempt in range(ATTEMPTS):
@@ -236,5 +236,5 @@ def _alone(
             else:
                 page = part if page is None else page.joined(part)
             break
-    page = page or Page(name)
+    page = page or Judged(name)
     return replace(page, rows=[*page.rows, *failed])

@@ -20,7 +20,7 @@ from validation.compare.answer import Array, Released
 from validation.compare.rows import AGREES, DEGRADED, FAILS, REFUSES, Row
 from validation.compare.tolerance import DEGRADED as TIMES_PREDICTED
 from validation.engines.witnesses import not_installed
-from validation.report.page import Record, Timing
+from validation.report.judged import Record, Timing
 from validation.run.breakdown import breakdown
 
 ENGINES = {

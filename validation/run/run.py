@@ -24,9 +24,9 @@ from validation.regression.accept import output_options, told
 from validation.regression.record import about, baseline, read_run, write_about
 from validation.report import cost_section, hard_section
 from validation.report.html import Section, html
+from validation.report.judged import Judged
 from validation.report.machine import versions
 from validation.report.markdown import markdown
-from validation.report.page import Page
 from validation.report.summary import SCENES_SHOWN, Summary, summarise
 from validation.run import pool
 from validation.run.elsewhere import run_elsewhere
@@ -102,14 +102,14 @@ def sections(hard: Iterable[Row] | None, out: Path) -> list[Section]:
     Of rows of the hard suite the page hard.html is written too.
     """
     if hard is None:
-        found = hard_section.beside(out)
-        return [*([found] if found else []), *cost_section.beside(out)]
+        found = hard_section.found_in(out)
+        return [*([found] if found else []), *cost_section.found_in(out)]
     from validation.report.hard_page import page, picture
     from validation.report.svg import inline
 
     svg = picture()
     write_text(out / hard_section.PAGE, page(svg))
-    return [hard_section.section(hard, inline(svg)), *cost_section.beside(out)]
+    return [hard_section.section(hard, inline(svg)), *cost_section.found_in(out)]
 
 
 def mjcf_pictures(suite: Suite) -> tuple[dict[str, str], str]:
@@ -123,7 +123,7 @@ def mjcf_pictures(suite: Suite) -> tuple[dict[str, str], str]:
     return pictures(texts)
 
 
-def timings_csv(pages: Iterator[Page]) -> str:
+def timings_csv(pages: Iterator[Judged]) -> str:
     """Seconds per answer, and their ratio to the formulas' on the same scene in the same process."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")

@@ -16,7 +16,7 @@ from typing import Any
 from fourbar.errors import FourBarError
 from fourbar.writing import write_text
 from validation.compare.rows import Row, from_csv, to_csv
-from validation.report.page import Page
+from validation.report.judged import Judged
 
 
 class RunningError(FourBarError):
@@ -63,7 +63,7 @@ class Store:
         """The chunks whose parts are complete."""
         return {int(path.stem) for path in self.parts.glob("*.csv")}
 
-    def put(self, chunk: int, pages: list[Page]) -> None:
+    def put(self, chunk: int, pages: list[Judged]) -> None:
         """Write a finished chunk; the rows come last, since they say that it is done."""
         rows = [row for page in pages for row in page.rows]
         text = json.dumps([page.without_rows() for page in pages])
@@ -75,14 +75,14 @@ class Store:
         for chunk in range(chunks):
             yield from_csv(self.parts / f"{chunk:06d}.csv")
 
-    def pages(self, chunks: int) -> Iterator[Page]:
+    def pages(self, chunks: int) -> Iterator[Judged]:
         """The pages, in order, with their rows."""
         for chunk, rows in enumerate(self.rows(chunks)):
             by_scene: dict[str, list[Row]] = {}
             for row in rows:
                 by_scene.setdefault(row.scene, []).append(row)
             for page in json.loads((self.parts / f"{chunk:06d}.json").read_text(encoding="utf-8")):
-                yield Page.restore(page, by_scene.get(page["name"], []))
+                yield Judged.restore(page, by_scene.get(page["name"], []))
 
     def finish(self) -> None:
         """The results are written: the parts have served."""

@@ -1,4 +1,4 @@
-"""What is known of one scene once it is judged: a record while it is, a page for the report."""
+"""What is known of one scene once it is judged: a record while it is, what the report keeps of it afterwards."""
 
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any
@@ -37,7 +37,7 @@ class Record:
 
 
 @dataclass(slots=True)
-class Page:
+class Judged:
     """What is kept of one scene once it is judged: small, and storable as JSON but for its rows."""
 
     name: str
@@ -61,14 +61,14 @@ class Page:
         return kept
 
     @classmethod
-    def restore(cls, kept: dict[str, Any], rows: list[Row]) -> "Page":
+    def restore(cls, kept: dict[str, Any], rows: list[Row]) -> "Judged":
         """From what `without_rows` gave."""
         timings = [Timing(**timing) for timing in kept["timings"]]
         independence = {engine: (shared, own) for engine, (shared, own) in kept["independence"].items()}
         return cls(**{**kept, "timings": timings, "independence": independence}, rows=rows)
 
-    def joined(self, other: "Page") -> "Page":
-        """The same scene with what another set of engines said; the rows of the formulas stand once."""
+    def joined(self, other: "Judged") -> "Judged":
+        """The same scene with the answers of another set of engines; the rows of the formulas stand once."""
         known = set(self.rows)
         return replace(
             self,
