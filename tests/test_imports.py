@@ -31,7 +31,8 @@ LAYERS = {
         "report",
         "regression",
         "check run",
-        "studies stress",
+        "stress",
+        "studies",
         "cli",
     ),
 }
@@ -41,7 +42,6 @@ ON_ONE_FLOOR = {
     ("scenes", "compare"),
     ("published", "engines"),
     ("run", "check"),
-    ("stress", "studies"),
 }
 """Of two layers on one floor the first may use the second."""
 MOST = {"fourbar": 18, "validation": 15}

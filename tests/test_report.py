@@ -18,10 +18,10 @@ from validation.engines.witnesses import WITNESSES
 from validation.report.costs import cost_points
 from validation.report.figures import FLOOR, STRETCHES, worst_of_stretches
 from validation.report.html import ALL_OPEN, Section, html
-from validation.report.judged import Judged
 from validation.report.markdown import markdown
+from validation.report.record import Record
 from validation.report.summary import Summary, summarise
-from validation.run.judge import judged_page
+from validation.run.judge import judged
 
 COMMENT_LIMIT = 65_536
 """Characters of a comment on GitHub."""
@@ -29,26 +29,26 @@ HOSTILE = "</script><img src=x onerror=alert(1)>\"'&|`*"
 
 
 @cache
-def demo() -> Judged:
+def page() -> Record:
     """A small scene as two exact engines and the free bodies judge it."""
     scene = crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.0, 6.0, 36), 5.0))
-    return judged_page("demo", scene, tuple(w for w in WITNESSES if w.name != "mujoco-simulated"))
+    return judged("demo", scene, tuple(w for w in WITNESSES if w.name != "mujoco-simulated"))
 
 
-def copies(count: int, *, failing: int = 0) -> list[Judged]:
+def copies(count: int, *, failing: int = 0) -> list[Record]:
     """The scene under many names; in the first ones a torque fails."""
     made = []
     for number in range(count):
         name = f"scene-{number:03d}"
-        rows = [replace(row, scene=name) for row in demo().rows]
+        rows = [replace(row, scene=name) for row in page().rows]
         if number < failing:
             at = next(i for i, row in enumerate(rows) if row.quantity == "torque")
             rows[at] = replace(rows[at], error=0.5, verdict=FAILS)
-        made.append(replace(demo(), name=name, rows=rows))
+        made.append(replace(page(), name=name, rows=rows))
     return made
 
 
-def report(pages: list[Judged], **more) -> tuple[Summary, str]:
+def report(pages: list[Record], **more) -> tuple[Summary, str]:
     """Summary and page, the lines of results.csv counted as `write_columns` does."""
     lines, line = {}, 2
     for each in pages:
@@ -101,8 +101,8 @@ def test_the_verdict_stands_first_and_a_failure_is_named_before_anything_else() 
     assert "What fails</h2>" not in report(copies(3))[1]
 
 
-def test_a_scene_cannot_write_into_the_demo() -> None:
-    hostile = replace(demo(), title=HOSTILE, source=HOSTILE, name=HOSTILE, left_out=[HOSTILE])
+def test_a_scene_cannot_write_into_the_page() -> None:
+    hostile = replace(page(), title=HOSTILE, source=HOSTILE, name=HOSTILE, left_out=[HOSTILE])
     summary, text = report([hostile], sections=[Section("more", HOSTILE, HOSTILE, [HOSTILE], [[HOSTILE]])])
     assert "<img src=x" not in text
     assert len(re.findall("<script", text)) == 1
@@ -139,9 +139,9 @@ def test_the_errors_drawn_are_the_largest_of_their_stretches() -> None:
 
 
 def test_costs_are_those_of_the_run() -> None:
-    points, formulas = cost_points([demo()])
-    timings = {timing.engine: timing for timing in demo().timings}
-    errors = {row.engine: row.error for row in demo().rows if row.quantity == "torque"}
+    points, formulas = cost_points([page()])
+    timings = {timing.engine: timing for timing in page().timings}
+    errors = {row.engine: row.error for row in page().rows if row.quantity == "torque"}
     assert formulas == [1e6 * timings["formulas"].seconds / 37]
     assert points == {name: [(1e6 * timings[name].seconds / 37, error)] for name, error in errors.items()}
     assert set(points) == {"pinocchio-inverse", "mujoco-inverse", "free-body"}
@@ -159,7 +159,7 @@ def test_costs_are_those_of_the_run() -> None:
 )
 def test_every_kind_of_scene_is_drawn(motion: fourbar.Motion, pictures: int) -> None:
     witnesses = tuple(w for w in WITNESSES if w.name == "free-body")
-    made = judged_page("kind", crank_rocker(motion=motion), witnesses)
+    made = judged("kind", crank_rocker(motion=motion), witnesses)
     assert made.figure is not None and made.figure.count("<svg") == pictures
     _, text = report([made])
     assert "kind: crank-rocker" in text
@@ -167,7 +167,7 @@ def test_every_kind_of_scene_is_drawn(motion: fourbar.Motion, pictures: int) -> 
 
 def test_an_engine_that_is_missing_is_reported_as_failing() -> None:
     absent = replace(WITNESSES[0], adapter="validation.engines.absent:Absent")
-    summary, text = report([judged_page("demo", crank_rocker(), (absent,))])
+    summary, text = report([judged("demo", crank_rocker(), (absent,))])
     assert summary.verdict.startswith("FAILS")
     assert "What fails</h2>" in text and "No module named" in text and "∞" in text
 
@@ -181,7 +181,7 @@ def test_many_scenes_give_a_short_report_of_the_worst() -> None:
         each.timings = [*each.timings, replace(each.timings[0], engine="sim", setting=f"RK4 {628 + number}/rev")]
     summary, text = report(pages)
     assert [w.row.scene for w in summary.worst[:2]] == ["scene-499", "scene-498"]
-    assert {"scene-499", "scene-300"} <= {scene.name for scene in summary.shown}
+    assert {"scene-499", "scene-300"} <= {page.name for page in summary.pages}
     assert summary.refusals == [("mujoco-simulated", "falls to 0.0e+00; below 0.05 it is not simulated", 500)]
     assert [cost.setting for cost in summary.costs if cost.engine == "sim"] == ["RK4 628/rev to 1127/rev"]
     assert summary.orders[0][0] == "scene-000"

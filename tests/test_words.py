@@ -22,8 +22,8 @@ BETTER = {
     "said": "stated, named, reported",
 }
 """Words of this project alone, and words that a mechanical engineer uses for the same."""
-STORED = ("nothing can be told", "asked_error", "asked: float", "self.asked", '"asked", "error"')
-"""Names that stand in stored results: a verdict, a number of an answer, a column of `advise-study`."""
+STORED = ("asked: float", "self.asked", '"asked", "error"')
+"""A column that `advise-study` stores."""
 KINDS = {".py", ".md", ".toml", ".js", ".css", ".html", ".j2", ".yml"}
 GENERATED = {"docs/examples"}
 PENDING = [
@@ -40,17 +40,11 @@ PENDING = [
     "fourbar/show",
     "fourbar/solve.py",
     "validation/check",
-    "validation/compare",
     "validation/engines",
     "validation/regression",
-    "validation/run",
-    "validation/scenes",
-    "validation/stress",
+    "validation/run/run.py",
     "tests/test_check.py",
-    "tests/test_effects_absent.py",
-    "tests/test_mujoco_over_time.py",
-    "tests/test_mutation.py",
-    "tests/test_regression.py",
+    "tests/test_counts.py",
     "README.md",
     "CHANGELOG.md",
 ]
@@ -94,7 +88,7 @@ def test_what_is_clean_leaves_the_list(entry: str) -> None:
 
 @pytest.mark.parametrize(
     ("line", "count"),
-    [("x = asked_for + BESIDE", 2), ("half-way, always away", 1), ("class Told: ...", 1), ("'nothing can be told'", 0)],
+    [("x = asked_for + BESIDE", 2), ("half-way, always away", 1), ("class Told: ...", 1), ('row["asked", "error"]', 0)],
 )
 def test_a_banned_word_is_found_in_names_and_sentences(line: str, count: int) -> None:
     assert len(found(line)) == count

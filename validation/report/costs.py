@@ -7,7 +7,7 @@ from statistics import median
 from validation.compare.tolerance import EPS
 from validation.engines.witnesses import WORK
 from validation.report.colours import GRID, INK, PAPER, SOFT, style_of
-from validation.report.judged import Judged
+from validation.report.record import Record
 from validation.report.svg import svg_text
 
 FLOOR = EPS / 4.0
@@ -15,13 +15,13 @@ FLOOR = EPS / 4.0
 Point = tuple[float, float]
 
 
-def cost_points(scenes: Iterable[Judged]) -> tuple[dict[str, list[Point]], list[float]]:
+def cost_points(pages: Iterable[Record]) -> tuple[dict[str, list[Point]], list[float]]:
     """(microseconds per position, error of the torque) of every scene by engine; the same cost of the formulas."""
     points: dict[str, list[Point]] = {}
     formulas: list[float] = []
-    for scene in scenes:
-        errors = {row.engine: row.error for row in scene.rows if row.quantity == "torque" and math.isfinite(row.error)}
-        for timing in scene.timings:
+    for page in pages:
+        errors = {row.engine: row.error for row in page.rows if row.quantity == "torque" and math.isfinite(row.error)}
+        for timing in page.timings:
             cost = 1e6 * timing.seconds / max(1, timing.positions)
             if timing.engine == "formulas":
                 formulas.append(cost)
@@ -30,9 +30,9 @@ def cost_points(scenes: Iterable[Judged]) -> tuple[dict[str, list[Point]], list[
     return points, formulas
 
 
-def cost_figure(scenes: Iterable[Judged]) -> str | None:
+def cost_figure(pages: Iterable[Record]) -> str | None:
     """An SVG of these points with each engine's median; None where no torque was compared."""
-    points, formulas = cost_points(scenes)
+    points, formulas = cost_points(pages)
     if not points or not formulas:
         return None
     from matplotlib.backends.backend_svg import FigureCanvasSVG

@@ -10,10 +10,10 @@ from typing import Any, NamedTuple
 
 from fourbar.quantities import UNKNOWNS
 from validation.compare.counts import Counts
-from validation.compare.rows import FAILS, REFUSES, UNTOLD, Row, sorted_rows, to_csv
+from validation.compare.rows import FAILS, REFUSES, UNDECIDED, Row, sorted_rows, to_csv
 from validation.report.colours import by_variable, declarations, style_of
 from validation.report.costs import cost_figure
-from validation.report.judged import Judged
+from validation.report.record import Record
 from validation.report.summary import STATEMENT, Summary, used
 from validation.report.templating import environment
 
@@ -37,7 +37,7 @@ class Cell(NamedTuple):
     @property
     def kind(self) -> str:
         """Word for its colour."""
-        return {FAILS: "fails", REFUSES: "refuses", UNTOLD: "undecided"}.get(self.row.verdict, "holds")
+        return {FAILS: "fails", REFUSES: "refuses", UNDECIDED: "undecided"}.get(self.row.verdict, "holds")
 
     @property
     def shown(self) -> str:
@@ -77,7 +77,7 @@ class Section:
 class SceneView:
     """What the page shows of one scene."""
 
-    scene: Judged
+    page: Record
     cells: list[Cell]
     engines: list[str]
     quantities: list[str]
@@ -118,17 +118,17 @@ def html(
     templates.filters["packed"] = lambda text: base64.b64encode(gzip.compress(text.encode("utf-8"), mtime=0)).decode()
     templates.filters["colour"] = lambda engine: by_variable(style_of(engine).colour)
     templates.filters["symbol"] = lambda engine: style_of(engine).symbol
-    views = [_view(scene, first_lines.get(scene.name, 2), pictures or {}) for scene in summary.shown]
+    views = [_view(page, first_lines.get(page.name, 2), pictures or {}) for page in summary.pages]
     csv = base64.b64encode(to_csv(cell.row for view in views for cell in view.cells).encode("utf-8"))
     failing = sorted((cell for view in views for cell in view.cells if cell.row.failed), key=lambda c: c.line)
-    costs = cost_figure(summary.shown)
+    costs = cost_figure(summary.pages)
     return templates.get_template("report.html.j2").render(
         s=summary,
         views=views,
         engines=[engine for engine in _engines(cell.row for view in views for cell in view.cells)],
         failing=failing,
         lazy=len(views) > ALL_OPEN,
-        figures={scene.name: Markup(scene.figure) for scene in summary.shown if scene.figure},  # drawn by our own code
+        figures={page.name: Markup(page.figure) for page in summary.pages if page.figure},  # drawn by our own code
         cost_figure=Markup(costs) if costs else None,
         no_pictures=no_pictures,
         sections=sections,
@@ -147,8 +147,8 @@ def share(value: float) -> str:
     return "0" if value == 0.0 else "<0.01" if value < 0.01 else f"{value:.2f}" if value < 10.0 else f"{value:.1e}"
 
 
-def _view(scene: Judged, first_line: int, pictures: Mapping[str, str]) -> SceneView:
-    cells = [Cell(line, row) for line, row in enumerate(sorted_rows(scene.rows), first_line)]
+def _view(page: Record, first_line: int, pictures: Mapping[str, str]) -> SceneView:
+    cells = [Cell(line, row) for line, row in enumerate(sorted_rows(page.rows), first_line)]
     by_place: dict[tuple[str, str], Cell] = {}
     worst: dict[str, Cell] = {}
     for cell in cells:
@@ -159,7 +159,7 @@ def _view(scene: Judged, first_line: int, pictures: Mapping[str, str]) -> SceneV
     found = {cell.row.quantity for cell in cells}
     quantities = [name for name in ORDER if name in found] + sorted(found.difference(ORDER))
     engines = _engines(cell.row for cell in cells)
-    return SceneView(scene, cells, engines, quantities, by_place, worst, pictures.get(scene.name))
+    return SceneView(page, cells, engines, quantities, by_place, worst, pictures.get(page.name))
 
 
 def _rank(cell: Cell) -> tuple[bool, float]:

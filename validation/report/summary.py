@@ -1,4 +1,4 @@
-"""What every form of the report says, computed once from its scenes."""
+"""What every form of the report says, computed once from the pages."""
 
 import math
 import re
@@ -11,12 +11,13 @@ from typing import NamedTuple, TypeVar
 
 from fourbar.exits import HOLDS
 from validation.compare.counts import Counts
+from validation.compare.error import used as of_allowance
 from validation.compare.rows import REFUSES, Row
 from validation.compare.tolerance import EPS, EQUIVALENCE, IDENTITY, NOTHING_TO_TELL, SIMULATED, K, Tolerance
 from validation.engines.witnesses import WORK
 from validation.published.ladder import LadderRow
-from validation.report.judged import Judged
 from validation.report.machine import machine, versions
+from validation.report.record import Record
 
 T = TypeVar("T")
 
@@ -84,7 +85,7 @@ class Summary:
         """Whether all that was to be compared was, and holds."""
         return self.counts.status == HOLDS and not self.missing
 
-    shown: list[Judged]
+    pages: list[Record]
     """The scenes shown one by one, at most SCENES_SHOWN: those that fail, then those that used most of what is
     allowed."""
 
@@ -99,14 +100,14 @@ NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 TOLERANCES = (IDENTITY, EQUIVALENCE, SIMULATED)
 """Of a run with the standing witnesses."""
 STATEMENT = (
-    f"K = {K:g} for every exact comparison; where eps/condition > {NOTHING_TO_TELL:g} the row says that "
-    "nothing can be told. Errors are relative to the largest magnitude over the positions whose condition is at least "
-    "0.1; below that to the position's own magnitude; angles modulo 2 pi, in rad."
+    f"K = {K:g} for every exact comparison; where eps/condition > {NOTHING_TO_TELL:g} the row is undecided. "
+    "Errors are relative to the largest magnitude over the positions whose condition is at least 0.1; below that "
+    "to the position's own magnitude; angles modulo 2 pi, in rad."
 )
 
 
 def summarise(
-    scenes: Iterable[Judged],
+    pages: Iterable[Record],
     ladder: Sequence[LadderRow] = (),
     tolerances: Sequence[Tolerance] = TOLERANCES,
     missing: Sequence[tuple[str, str]] = (),
@@ -122,34 +123,34 @@ def summarise(
     independence: dict[str, tuple[str, str]] = {}
     costs: dict[tuple[str, str], list[Timed]] = {}
     orders: list[tuple[str, dict[str, float]]] = []
-    failing: list[Judged] = []
-    holding: list[tuple[float, Judged]] = []
-    for scene in scenes:
-        counts.add_scene(scene.rows)
-        bad = [row for row in scene.rows if row.failed]
+    failing: list[Record] = []
+    holding: list[tuple[float, Record]] = []
+    for page in pages:
+        counts.add_scene(page.rows)
+        bad = [row for row in page.rows if row.failed]
         failures += bad[: FAILURES_KEPT - len(failures)]
-        for engine, reason in sorted(_left_out(scene)):
+        for engine, reason in sorted(_left_out(page)):
             kind = (engine, NUMBER.sub("#", reason))
             refusals[kind] += 1
             first_reason.setdefault(kind, reason)
-        found = _worst(scene.rows)
+        found = _worst(page.rows)
         judged += len(found)
         worst = _top(WORST_SHOWN, [*worst, *found], lambda w: w.used)
-        _measure_k(scene.rows, measured_k)
-        independence.update(scene.independence)
-        _add_costs(scene, costs)
-        known = [(scene.name, each) for each in scene.evidence.values() if "observed_order" in each]
+        _measure_k(page.rows, measured_k)
+        independence.update(page.independence)
+        _add_costs(page, costs)
+        known = [(page.name, each) for each in page.evidence.values() if "observed_order" in each]
         orders = _top(ORDERS_SHOWN, [*orders, *known], _lowest)
         if bad:
-            failing += [scene][: SCENES_SHOWN - len(failing)]
+            failing += [page][: SCENES_SHOWN - len(failing)]
         else:
             most = max((w.used for w in found), default=0.0)
-            holding = _top(SCENES_SHOWN, [*holding, (most, scene)], lambda each: each[0])
+            holding = _top(SCENES_SHOWN, [*holding, (most, page)], lambda each: each[0])
     verdict = counts.sentence()
     if missing:
         verdict += f"; not run: {', '.join(engine for engine, _ in missing)}"
     holding = nlargest(SCENES_SHOWN - len(failing), holding, key=lambda each: each[0])
-    shown = sorted([*failing, *(scene for _, scene in holding)], key=lambda scene: scene.name)
+    shown = sorted([*failing, *(page for _, page in holding)], key=lambda page: page.name)
     return Summary(
         verdict=verdict,
         scenes=counts.scenes,
@@ -168,7 +169,7 @@ def summarise(
                 _settings(values),
                 median(t.times for t in values),
                 median(t.microseconds for t in values),
-                WORK[engine].description if engine in WORK else "",
+                WORK[engine].full if engine in WORK else "",
             )
             for (engine, _), values in sorted(costs.items())
         ],
@@ -176,14 +177,14 @@ def summarise(
         ladder=list(ladder),
         tolerances=list(tolerances),
         missing=list(missing),
-        shown=shown,
+        pages=shown,
     )
 
 
-def _left_out(scene: Judged) -> set[tuple[str, str]]:
+def _left_out(page: Record) -> set[tuple[str, str]]:
     """What was not run, or refused to answer: (engine, reason)."""
-    found = {(row.engine, row.reason) for row in scene.rows if row.verdict == REFUSES}
-    for line in scene.left_out:
+    found = {(row.engine, row.reason) for row in page.rows if row.verdict == REFUSES}
+    for line in page.left_out:
         engine, _, reason = line.partition(": ")
         found.add((engine, reason))
     return found
@@ -191,13 +192,7 @@ def _left_out(scene: Judged) -> set[tuple[str, str]]:
 
 def used(row: Row) -> float:
     """error/allowed; infinite without an answer, 0 where nothing is allowed and errs, or nothing was compared."""
-    if not row.compared:
-        return 0.0
-    if math.isnan(row.error):
-        return math.inf
-    if row.allowed == 0.0:
-        return 0.0 if row.error == 0.0 else math.inf
-    return row.error / row.allowed
+    return float(of_allowance(row.error, row.allowed)) if row.compared else 0.0
 
 
 def _worst(rows: Sequence[Row]) -> list[Worst]:
@@ -235,10 +230,10 @@ class Timed(NamedTuple):
     microseconds: float
 
 
-def _add_costs(scene: Judged, costs: dict[tuple[str, str], list[Timed]]) -> None:
-    formulas = scene.timings[0].seconds if scene.timings else math.nan
-    refused = {row.engine for row in scene.rows if row.verdict == REFUSES}
-    for t in scene.timings:
+def _add_costs(page: Record, costs: dict[tuple[str, str], list[Timed]]) -> None:
+    formulas = page.timings[0].seconds if page.timings else math.nan
+    refused = {row.engine for row in page.rows if row.verdict == REFUSES}
+    for t in page.timings:
         kept = costs.setdefault((t.engine, t.setting.partition(" ")[0]), [])  # an integrator, whatever its steps
         if t.engine not in refused and len(kept) < TIMED:
             kept.append(Timed(t.setting, t.seconds / formulas, 1e6 * t.seconds / t.positions))
