@@ -8,14 +8,15 @@ changes of different numbers do not cancel over the evaluations, which run as on
 
 from collections.abc import Iterator
 from dataclasses import fields, is_dataclass
-from itertools import count
+from functools import cache
+from itertools import cycle
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.case import Case, Dynamics
-from fourbar.formulas.motion import Coefficients, Rates, State, rates
+from fourbar.formulas.motion import Coefficients, State, rates
 from fourbar.formulas.path import Path, read_backwards
 from fourbar.formulas.pin_forces import Body
 from fourbar.formulas.position import HalfAngle, Loop, Position, two_sum
@@ -44,13 +45,9 @@ class Roundings:
             return self(number.real) + 1j * self(number.imag)
         return number + number * next(self.signs)
 
-    def each(self, number: Any) -> Any:
-        """A number that is one for all positions is exact."""
-        return self(number) if np.ndim(number) else number
-
     def of(self, value: Any) -> Any:
         """The numbers of an effect likewise: its floats, in tuples and parts too; all else stays."""
-        if isinstance(value, float):
+        if isinstance(value, (float, np.ndarray)):
             return self(value)
         if isinstance(value, tuple):
             parts = [self.of(part) for part in value]
@@ -91,7 +88,9 @@ def error_bars(
     near = near._replace(sin_mu=rounded(near.sin_mu), diagonal=rounded(near.diagonal))
     near = near._replace(u2=rounded(near.u2), u3=rounded(near.u3), u4=rounded(near.u4))
     k = _rounded_coefficients(path, near, k, rounded)
-    moving = Rates(*map(rounded.each, rates(k, state.speed, acceleration)))
+    moving = rates(k, state.speed, acceleration)
+    stated = ("omega_2", "alpha_2") if path.bar == 2 else ()
+    moving = moving._replace(**{name: rounded(rate) for name, rate in moving._asdict().items() if name not in stated})
     beside = state._replace(at=near, k=k, moving=moving)
     other = moved.dynamics(beside, acceleration, rounded=rounded)
     torque = np.mean((other.torque - found.torque) ** 2, axis=0)
@@ -102,9 +101,10 @@ def error_bars(
     torque_error = TYPICAL * np.sqrt(torque) + LAST_ROUNDING * np.abs(found.torque)
     force_error = TYPICAL * np.sqrt(np.max(forces, axis=0)) + LAST_ROUNDING * largest
     # a change that leaves no value, or none in the range of a double: of the value itself no digit is left
+    shape = np.shape(found.torque)
     return {
-        "torque_error": np.where(np.isfinite(torque_error), torque_error, np.abs(found.torque)),
-        "force_error": np.where(np.isfinite(force_error), force_error, largest),
+        "torque_error": np.where(np.isfinite(torque_error), torque_error, np.abs(found.torque)).reshape(shape),
+        "force_error": np.where(np.isfinite(force_error), force_error, largest).reshape(shape),
     }
 
 
@@ -121,8 +121,8 @@ def _rounded_half_angle(path: Path, q: Any, half: HalfAngle, exact: NDArray[np.i
     lost = np.where(np.isin(np.arange(np.size(ss)), exact), 0.0, two_sum(q, -path.theta_1)[1])
     turned = lost * np.sign(next(rounded.signs))
     if exact.size:
-        of_outer, of_inner = np.array(of_outer), np.array(of_inner)
-        of_outer[exact], of_inner[exact] = outer[exact], inner[exact]
+        known = np.isin(np.arange(np.size(ss)), exact)
+        of_outer, of_inner = np.where(known, outer, of_outer), np.where(known, inner, of_inner)
     return HalfAngle(
         rounded(ss) + sk * turned,
         rounded(kk) - sk * turned,
@@ -156,7 +156,12 @@ def _rounded_coefficients(path: Path, at: Position, k: Coefficients, rounded: Ro
 
 def _signs() -> Iterator[NDArray[np.float64]]:
     """+- one last digit for number 1, 2, ... of each evaluation: columns of the Hadamard matrix, over and over."""
-    for column in count(1):
-        bits = np.arange(EVALUATIONS) & (column % EVALUATIONS or EVALUATIONS - 1)
-        odd = np.array([int(value).bit_count() % 2 for value in bits])
-        yield np.where(odd == 1, LAST_DIGIT, -LAST_DIGIT)[:, None]
+    return cycle(_columns())
+
+
+@cache
+def _columns() -> tuple[NDArray[np.float64], ...]:
+    """The columns but for the first, whose signs are all the same, the last one twice; each (EVALUATIONS, 1)."""
+    evaluation, column = np.arange(EVALUATIONS)[:, None], np.arange(1, EVALUATIONS + 1)
+    odd = np.bitwise_count(evaluation & np.minimum(column, EVALUATIONS - 1)) % 2
+    return tuple(np.where(odd == 1, LAST_DIGIT, -LAST_DIGIT).T[:, :, None])

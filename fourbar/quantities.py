@@ -74,7 +74,9 @@ OF_PIN_LOADS = tuple(q.name for q in QUANTITIES if q.group == "pin loads")
 
 STATUS_NAMES = (
     *("ok", "not_assembled", "singular", "jammed", "several", "no_direction", "wound"),
-    *("no_torque", "overflow"),
+    *("no_torque", "overflow", "invalid"),
 )
 """By code; `Solution.status_code` says what each means."""
-OK, NOT_ASSEMBLED, SINGULAR, JAMMED, SEVERAL, NO_DIRECTION, WOUND, NO_TORQUE, OVERFLOW = range(len(STATUS_NAMES))
+OK, NOT_ASSEMBLED, SINGULAR, JAMMED, SEVERAL, NO_DIRECTION, WOUND, NO_TORQUE, OVERFLOW, INVALID = range(
+    len(STATUS_NAMES)
+)

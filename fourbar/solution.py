@@ -25,10 +25,10 @@ SCHEMA = "fourbar-analyze/1"
 
 @dataclass(slots=True, eq=False)
 class Solution:
-    """The answer of the formulas at n positions, SI units and radians.
+    """The answer of the formulas at n positions, or at n positions of each of m linkages, SI units and radians.
 
-    Scalars have shape (n,), vectors (n, 2); NaN marks a position where a quantity has no value
-    (see `status`), None a quantity that was not asked for.
+    Scalars have shape (n,), vectors (n, 2), of a study (m, n) and (m, n, 2); NaN marks a position where a
+    quantity has no value (see `status`), None a quantity that was not asked for.
     """
 
     title: str
@@ -40,7 +40,8 @@ class Solution:
     friction); of springs, forces NaN: 5 no_direction (both ends in one point), 6 wound (turned beyond half a turn from
     rest). 7 no_torque: the two bars that are not driven are in line, no couple on the driven bar holds them in balance,
     forces are NaN (T3 and T4 have these poles where omega_3, omega_4 are 0). 8 overflow: numbers beyond the range of
-    doubles; from the first stage (position, velocity, ...) that meets them on everything is NaN."""
+    doubles; from the first stage (position, velocity, ...) that meets them on everything is NaN. 9 invalid: a member of
+    a study with numbers that a scene refuses (a length that is not positive, a mass below 0); all of it is NaN."""
     branch: NDArray[np.int8]
     """+1 open, -1 crossed."""
     theta_2: Array
@@ -100,9 +101,9 @@ class Solution:
         return np.not_equal(self.status_code, NOT_ASSEMBLED)
 
     @property
-    def status(self) -> list[str]:
-        """One of `STATUS_NAMES` for each position."""
-        return [STATUS_NAMES[code] for code in self.status_code]
+    def status(self) -> Any:
+        """One of `STATUS_NAMES` for each position, as a list; of a study a list of such lists."""
+        return np.array(STATUS_NAMES)[self.status_code].tolist()
 
     def evaluated(self) -> list[str]:
         """Names of the quantities that were evaluated, theta_2 first."""
@@ -204,14 +205,20 @@ def _number(value: float) -> float | None:
 
 
 def unwrap(angles: Array) -> None:
-    """Make angles in [-pi, pi] continuous along a sweep, in place: the first in (-pi, pi]; NaN is stepped over."""
-    if not len(angles) or angles.max() - angles.min() < np.pi:
+    """Make angles in [-pi, pi] continuous along a sweep, in place: the first in (-pi, pi]; NaN is stepped over.
+
+    Parameters
+    ----------
+    angles : (n,), or (m, n) for as many sweeps.
+    """
+    if angles.shape[-1] < 2 or (np.ptp(angles) < np.pi and not (angles[..., 0] == -np.pi).any()):
         return
-    known = np.flatnonzero(~np.isnan(angles))
-    if not len(known):
-        return
-    raw = angles[known]
+    rows = angles.reshape(-1, angles.shape[-1])
+    known = ~np.isnan(rows)
+    place = np.where(known, np.arange(rows.shape[1]), np.argmax(known, axis=1)[:, None])
+    raw = np.take_along_axis(rows, np.maximum.accumulate(place, axis=1), axis=1)
+    jumps = np.diff(raw, axis=1, prepend=raw[:, :1])
     # -pi as a double lies inside (-pi, pi], yet reads as the excluded end
-    start = 2.0 * np.pi if raw[0] == -np.pi else 0.0
-    jumps = np.diff(raw, prepend=raw[0])
-    angles[known] = raw + start - (2.0 * np.pi) * np.cumsum(np.round(jumps / (2.0 * np.pi)))
+    start = np.where(raw[:, :1] == -np.pi, 2.0 * np.pi, 0.0)
+    turned = rows + start - (2.0 * np.pi) * np.cumsum(np.round(jumps / (2.0 * np.pi)), axis=1)
+    angles[...] = turned.reshape(angles.shape)

@@ -1,18 +1,19 @@
 """From a scene to its solution: block by block over the positions, stage by stage, no further than asked."""
 
-from collections.abc import Callable, Iterable, Mapping
+import cmath
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.case import Case
+from fourbar.case import NOWHERE, Case
 from fourbar.errors import InputError, LimitError
 from fourbar.formulas.motion import State
 from fourbar.formulas.path import NO_DIGIT_LEFT
 from fourbar.formulas.path import singular as is_singular
-from fourbar.formulas.position import HalfAngle
+from fourbar.formulas.position import HalfAngle, anywhere
 from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import (
     ANGLES,
@@ -36,78 +37,67 @@ from fourbar.solution import Array, Solution, unwrap
 
 if TYPE_CHECKING:
     from fourbar.free_motion import FreeMotion
+    from fourbar.studies import Study
 
 BLOCK = 8192
 """Positions evaluated at a time, measured: fewer pay for calls, more leave the cache."""
+FORCE, ERROR = STAGES.index("force"), STAGES.index("error")
+Part = tuple[Any, ...]
+"""Index of some positions in the arrays of all."""
+Evaluated = tuple[NDArray[np.uint8], dict[str, Any], NDArray[np.bool_]]
+"""Status codes and quantities of some positions, vectors as x + i y, and where no forces can balance."""
 
 
 def solve(
-    scene: Scene,
+    scene: "Scene | Study",
     stage: str | None = None,
     *,
     at: Command | None = None,
     out: Mapping[str, Array] | None = None,
     side: int = 0,
 ) -> Solution:
-    """Evaluate a scene with the closed formulas, no further than asked.
+    """Evaluate a scene, or a study of m linkages, with the closed formulas as far as a stage.
 
     Parameters
     ----------
     stage : "position", "velocity", "acceleration", "force" or "error"; each includes those before
-        it. Left out: "error", or "position" where the scene states no omega_2.
+        it. Left out: "force", or "position" where the scene states no omega_2.
     at : other positions, velocities and accelerations of the input than the scene's own.
-    out : arrays to write into, by name, (n,) or (n, 2), which share no memory; only the quantities named are evaluated,
-        with the stages they need, and the others are None in the result.
+    out : arrays to write into, by name, (n,) or (n, 2), of a study (m, n) or (m, n, 2), which share no memory; only the
+        quantities named are evaluated, with the stages they need, and the others are None in the result.
     side : which way pins at rest are about to turn where dry friction acts: +1 as theta_2 grows, -1 as it falls, 0
         neither.
 
     Raises
     ------
-    InputError : the stage or a name in `out` is unknown, its array has the wrong shape, or the
-        scene does not state the omega_2 that is needed.
+    InputError : the stage or a name in `out` is unknown, its array has the wrong shape, the scene does not state
+        the omega_2 that is needed, or a study, which states its own positions, is given others.
     """
+    if not isinstance(scene, Scene):
+        if at is not None:
+            raise InputError("at", "a command", "a study states its own positions: vary motion.theta_2")
+        return scene.solved(stage, out=out, side=side)
     moved = _released(scene) if scene.motion.free is not None and at is None else None
     where = moved.command if moved is not None else command(scene) if at is None else at
     n = len(where.theta_2)
-    if out is None:
-        if stage is None:
-            stage = "position" if where.omega_2 is None else STAGES[-1]
-        if stage not in STAGES:
-            raise InputError("stage", stage, "must be one of " + ", ".join(STAGES))
-        wanted = STAGES.index(stage)
-        absent = _absent(scene)
-        names = [name for name, of in STAGE_OF.items() if STAGES.index(of) <= wanted and name not in absent]
-        result = {name: np.empty((n, 2) if name in VECTORS else n) for name in names}
-    else:
-        result = dict(out)
-        wanted = _highest_stage(result, n)
-        stage = STAGES[wanted]
-    if stage != "position" and where.omega_2 is None:
-        raise InputError("motion.omega_2", None, f"is needed for the stage {stage!r}")
+    wanted, result = requested(scene, (n,), where.omega_2, stage, out)
     code = np.zeros(n, dtype=np.uint8)
     with np.errstate(all="ignore"):
-        case = Case.of(_begun(scene) if wanted >= STAGES.index("force") else scene)._replace(side=side)
-        size = BLOCK
-        if wanted == len(STAGES) - 1:
-            from fourbar.error_bars import EVALUATIONS
-
-            size = BLOCK // EVALUATIONS  # each position is evaluated so many times at once
-        parts: Iterable[Any] = (slice(start, min(start + size, n)) for start in range(0, n, size))
+        case = Case.of(_begun(scene) if wanted >= FORCE else scene)._replace(side=side)
+        parts: Iterable[Part]
         if moved is not None:
-            parts = (np.flatnonzero(moved.bar == bar) for bar in (2, 4))
+            parts = ((np.flatnonzero(moved.bar == bar),) for bar in (2, 4))
+        elif n == 1:
+            parts = ((0,),)  # plain numbers: arrays of one entry cost several times as much
+        else:
+            size = positions_at_once(wanted)
+            parts = ((slice(start, start + size),) for start in range(0, n, size))
         for part in parts:
             if moved is None:
-                codes, values, in_line = _commanded(case, where, part, wanted, result.keys())
+                found = commanded(case, where, part, wanted, result.keys())
             else:
-                codes, values, in_line = _freely(case, moved, part, wanted, result.keys())
-            if not all_finite(values):
-                withhold(values, codes, in_line)
-            code[part] = codes
-            for name, value in values.items():
-                if name in VECTORS:
-                    result[name][part, 0], result[name][part, 1] = value.real, value.imag
-                else:
-                    result[name][part] = value
+                found = _freely(case, moved, part, wanted, result.keys())
+            keep(found, result, code, part)
     for name in ANGLES:
         if name in result:
             unwrap(result[name])
@@ -116,9 +106,66 @@ def solve(
     return solution
 
 
+def last_stage(scene: Scene) -> str:
+    """The last stage that a scene states enough for: error bars and all, or positions alone."""
+    motion = scene.motion
+    return "position" if motion.omega_2 is None and motion.law is None and motion.free is None else STAGES[-1]
+
+
+def requested(
+    scene: Scene, shape: tuple[int, ...], omega_2: Any, stage: str | None, out: Mapping[str, Array] | None
+) -> tuple[int, dict[str, Array]]:
+    """The number of the last stage that is evaluated, and the arrays to write into; an InputError as of `solve`.
+
+    Parameters
+    ----------
+    shape : of the positions.
+    omega_2 : None where the scene states none.
+    """
+    if out is None:
+        if stage is None:
+            stage = "position" if omega_2 is None else "force"
+        if stage not in STAGES:
+            raise InputError("stage", stage, "must be one of " + ", ".join(STAGES))
+        wanted, absent = STAGES.index(stage), _absent(scene)
+        result = {
+            name: np.empty((*shape, 2) if name in VECTORS else shape)
+            for name, of in STAGE_OF.items()
+            if STAGES.index(of) <= wanted and name not in absent
+        }
+    else:
+        result = dict(out)
+        wanted = _highest_stage(result, shape)
+    if wanted > 0 and omega_2 is None:
+        raise InputError("motion.omega_2", None, f"is needed for the stage {STAGES[wanted]!r}")
+    return wanted, result
+
+
+def positions_at_once(wanted: int) -> int:
+    """Of a stage: for the error bars each position is evaluated many times."""
+    if wanted < ERROR:
+        return BLOCK
+    from fourbar.error_bars import EVALUATIONS
+
+    return BLOCK // EVALUATIONS
+
+
+def keep(found: Evaluated, result: Mapping[str, Array], code: NDArray[np.uint8], part: Part) -> None:
+    """Write what was evaluated into the arrays of all positions, where it is no number with the status that says so."""
+    codes, values, in_line = found
+    if not all_finite(values):
+        withhold(values, codes, in_line)
+    code[part] = codes
+    for name, value in values.items():
+        if name in VECTORS:
+            result[name][*part, 0], result[name][*part, 1] = value.real, value.imag
+        else:
+            result[name][part] = value
+
+
 def all_finite(values: Mapping[str, Any]) -> bool:
-    """Whether every entry is a number, told by their sums; False also where a sum alone leaves the range of doubles."""
-    return all(np.isfinite(np.sum(value)) for value in values.values())
+    """Whether every entry is a number, seen by their sums; False also where a sum alone leaves the range of doubles."""
+    return all(cmath.isfinite(value.sum() if isinstance(value, np.ndarray) else value) for value in values.values())
 
 
 def withhold(values: dict[str, Any], code: NDArray[np.uint8], in_line: NDArray[np.bool_]) -> None:
@@ -153,33 +200,37 @@ def _no_value(quantity: Any) -> complex:
     return complex(np.nan, np.nan) if np.iscomplexobj(quantity) else np.nan
 
 
-def _commanded(
-    case: Case, where: Command, part: slice, wanted: int, names: Iterable[str]
-) -> tuple[NDArray[np.uint8], dict[str, Any], NDArray[np.bool_]]:
-    """Status codes and quantities of some positions of a command to the input, and where no forces can balance."""
+def commanded(case: Case, where: Command, part: Part, wanted: int, names: Collection[str]) -> Evaluated:
+    """Some positions of a command to the input, evaluated.
+
+    Parameters
+    ----------
+    wanted : number of the last stage that the quantities named need.
+    """
     theta_2, branch = where.theta_2[part], where.branch[part]
     half, exact = case.half_angle(theta_2, where.remainder)
     if set(names) <= set(ANGLES) and where.remainder is None and not case.path.may_stay_parallel:
         return _angles(case, half, branch, names)
     at = case.path.position(theta_2, half, branch)
     assembled = (half.outer >= 0.0) & (half.inner >= 0.0)
-    singular = assembled & (is_singular(at, NO_DIGIT_LEFT if where.remainder is None else 0.0))
-    codes = np.where(assembled, np.where(singular, SINGULAR, OK), NOT_ASSEMBLED).astype(np.uint8)
-    codes[np.isnan(half.kk)] = OVERFLOW  # of theta_2 - theta_1: not even where it closes is known
-    if singular.any():  # velocities are 0/0
+    singular = assembled & is_singular(at, NO_DIGIT_LEFT if where.remainder is None else 0.0)
+    codes = np.full(np.shape(theta_2), OK, dtype=np.uint8)
+    # of an angle that is no number against the ground not even whether the loop closes is known
+    for mask, code in ((singular, SINGULAR), (~assembled, NOT_ASSEMBLED), (np.isnan(half.kk), OVERFLOW)):
+        if anywhere(mask):
+            codes[mask] = code
+    if anywhere(singular):  # velocities are 0/0
         at = at._replace(root=np.where(singular, np.nan, at.root))
     omega_2, alpha_2 = _piece(where.omega_2, part), _piece(where.alpha_2, part)
     state = case.state(case.path, theta_2, at, branch, omega_2, alpha_2, moving=wanted > 0)
     values = {name: KINEMATIC[name](case, state) for name in names if name in KINEMATIC}
-    if wanted >= STAGES.index("force"):
-        known = exact if wanted == len(STAGES) - 1 else None
+    if wanted >= FORCE:
+        known = exact if wanted == ERROR else None
         values |= _forces(case, state, alpha_2, branch, branch, codes, names, known)
     return codes, values, np.abs(case.drive_sine(at)) <= NO_DIGIT_LEFT
 
 
-def _angles(
-    case: Case, half: HalfAngle, branch: Any, names: Iterable[str]
-) -> tuple[NDArray[np.uint8], dict[str, Any], NDArray[np.bool_]]:
+def _angles(case: Case, half: HalfAngle, branch: Any, names: Iterable[str]) -> Evaluated:
     """The same where two angles are all that is asked for: without vectors and the rest of the triangle."""
     theta_3, theta_4, root = case.path.angles(half, branch)
     codes = np.zeros(theta_3.shape, dtype=np.uint8)
@@ -193,24 +244,24 @@ def _angles(
     return codes, {name: found[name] for name in names}, codes > OK
 
 
-def _freely(
-    case: Case, moved: "FreeMotion", part: NDArray[np.intp], wanted: int, names: Iterable[str]
-) -> tuple[NDArray[np.uint8], dict[str, Any], NDArray[np.bool_]]:
+def _freely(case: Case, moved: "FreeMotion", part: Part, wanted: int, names: Collection[str]) -> Evaluated:
     """The same at instants of a free motion that have one independent angle; there is no driving torque."""
-    codes = np.zeros(len(part), dtype=np.uint8)
-    if not len(part):
+    codes = np.zeros(len(part[0]), dtype=np.uint8)
+    if not codes.size:
         return codes, {}, codes > 0
-    bar = int(moved.bar[part[0]])
+    bar = int(moved.bar[part][0])
     free = case._replace(drive_bar=bar, path=moved.paths[bar])
     q, speed, growth, branch = (x[part] for x in (moved.q, moved.speed, moved.acceleration, moved.sign))
     at = free.path.position(q, free.path.half_angle(q), branch)
     state = free.state(free.path, q, at, branch, speed, growth)._replace(theta_2=moved.command.theta_2[part])
     values = {name: KINEMATIC[name](case, state) for name in names if name in KINEMATIC}
-    if wanted >= STAGES.index("force"):
-        exact = np.empty(0, dtype=np.intp) if wanted == len(STAGES) - 1 else None
+    if wanted >= FORCE:
+        exact = NOWHERE if wanted == ERROR else None
         values |= _forces(free, state, growth, None, branch, codes, names, exact)
-        values |= {name: np.zeros(len(part)) for name in values if name in ("torque", "torque_error", *OF_DRY_FRICTION)}
-    return codes, values, np.zeros(len(part), dtype=bool)
+        values |= {
+            name: np.zeros(codes.shape) for name in values if name in ("torque", "torque_error", *OF_DRY_FRICTION)
+        }
+    return codes, values, np.zeros(codes.shape, dtype=bool)
 
 
 def _forces(
@@ -220,7 +271,7 @@ def _forces(
     branch: NDArray[np.int8] | None,
     sign: Any,
     codes: NDArray[np.uint8],
-    names: Iterable[str],
+    names: Collection[str],
     exact: NDArray[np.intp] | None,
 ) -> dict[str, Any]:
     """The quantities of the force stage; statuses of effects go into the codes.
@@ -252,8 +303,8 @@ def _forces(
         without.append(found.status)
     if without:
         status = np.max(without, axis=0)
-        codes[:] = np.where(codes == OK, status, codes)
-    if (codes > SINGULAR).any():
+        codes[...] = np.where(codes == OK, status, codes)
+    if anywhere(codes > SINGULAR):
         gone = np.isin(codes, WITHOUT_FORCES)
         values |= {
             name: np.where(gone, _no_value(value), value) for name, value in values.items() if name != "drive_condition"
@@ -323,14 +374,22 @@ def state_at(scene: Scene, at: Command) -> State:
 
 
 def _begun(scene: Scene) -> Scene:
-    """The scene with effects that know where its motion begins."""
+    """The scene with effects that know where its motion begins: where it first assembles, if it keeps its branch."""
     if not any(effect.counts_turns for effect in scene.effects):
         return scene
-    begins = command(scene)
-    state = state_at(scene, begins)
-    half = state.at.half
+    at = command(scene)
+    half, _ = Case.of(scene).half_angle(at.theta_2, at.remainder)
     assembled = (half.outer >= 0.0) & (half.inner >= 0.0)
-    return replace(scene, effects=tuple(effect.begun(state, assembled, begins.branch) for effect in scene.effects))
+    if not assembled.any() or np.ptp(at.branch) != 0:
+        return scene
+    first = int(np.argmax(assembled))
+    return begun(scene, Command(at.theta_2[first], at.branch[first], 0.0, 0.0, at.remainder))
+
+
+def begun(scene: Scene, at: Command) -> Scene:
+    """The scene with effects that know that its motion begins at a position, of as many linkages as there are."""
+    state = state_at(scene, at)
+    return replace(scene, effects=tuple(effect.begun(state, at.branch) for effect in scene.effects))
 
 
 def _refuse_wound(scene: Scene, at: Command) -> None:
@@ -355,18 +414,18 @@ def _absent(scene: Scene) -> tuple[str, ...]:
     return absent if any(effect.loaded_pins for effect in scene.effects) else (*absent, *OF_PIN_LOADS)
 
 
-def _highest_stage(out: Mapping[str, Array], n: int) -> int:
+def _highest_stage(out: Mapping[str, Array], positions: tuple[int, ...]) -> int:
     """The last stage that the quantities named need; an InputError where one cannot be written."""
     for name, array in out.items():
         if name not in STAGE_OF:
             raise InputError("out", name, "must be among " + ", ".join(STAGE_OF))
-        shape = (n, 2) if name in VECTORS else (n,)
+        shape = (*positions, 2) if name in VECTORS else positions
         if array.shape != shape or array.dtype != np.float64:
             raise InputError(f"out.{name}", (array.shape, str(array.dtype)), f"must be float64 of shape {shape}")
     return max((STAGES.index(STAGE_OF[name]) for name in out), default=0)
 
 
-def _piece(value: float | Array | None, part: slice) -> float | Array:
+def _piece(value: float | Array | None, part: Part) -> float | Array:
     """A number for all positions, or the part of an array that belongs to a block."""
     if value is None or np.ndim(value) == 0:
         return value or 0.0

@@ -21,7 +21,7 @@ ROOMS = {
         "case free_motion",
         "error_bars",
         "solve",
-        "files mjcf",
+        "files mjcf studies",
         "show",
         "cli",
     ),
@@ -44,7 +44,7 @@ BESIDE = {
     ("stress", "studies"),
 }
 """Of two rooms on one floor the first may use the second."""
-MOST = {"fourbar": 18, "validation": 15}
+MOST = {"fourbar": 19, "validation": 15}
 """Entries at a package's own level, dunder files not counted: what a stranger can take in at a glance."""
 
 

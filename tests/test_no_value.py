@@ -30,7 +30,7 @@ EXAMPLES = settings(max_examples=120, deadline=None, derandomize=True, suppress_
 FORCES = ("F12", "F32", "F43", "F14", "torque", "torque_error", "force_error")
 
 
-def asked(scene: Scene, stage: str | None = None) -> Solution:
+def asked(scene: Scene, stage: str | None = "error") -> Solution:
     """Solved, with every warning an error."""
     with warnings.catch_warnings():
         warnings.simplefilter("error")

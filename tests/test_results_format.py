@@ -61,7 +61,7 @@ def test_the_fields_of_a_solution_are_the_rows_of_the_table() -> None:
 
 
 def test_a_solution_has_the_shapes_of_the_table_and_no_other_quantity() -> None:
-    solution = solve(crank_rocker(effects=(PinFriction.at(A=(0.1, 0.01)),)))
+    solution = solve(crank_rocker(effects=(PinFriction.at(A=(0.1, 0.01)),)), "error")
     for q in QUANTITIES:
         values = getattr(solution, q.name)
         assert (values is None) == (q.name == "time")

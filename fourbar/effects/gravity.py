@@ -9,6 +9,7 @@ import numpy as np
 from fourbar.effects.actions import Actions
 from fourbar.effects.effect import Effect
 from fourbar.formulas.motion import State
+from fourbar.formulas.position import anywhere
 from fourbar.linkage import MOVING_BARS, require
 
 U = 2.0**-53
@@ -41,6 +42,7 @@ class Gravity(Effect):
 
     def act(self, actions: Actions, state: State) -> None:
         """F = m g at G."""
+        field = self.field
         for number, body in zip(MOVING_BARS, actions.bodies, strict=True):
-            if np.any(body.m):
-                actions.force(number, body.m * self.field, body.z * state.direction(number))
+            if anywhere(body.m != 0.0):
+                actions.force(number, body.m * field, body.z * state.direction(number))

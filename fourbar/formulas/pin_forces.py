@@ -12,10 +12,8 @@ Source: Linares Mendoza, section 5.7 (the thirteen equations); R. L. Norton, Des
 
 from typing import NamedTuple
 
-import numpy as np
-
 from fourbar.formulas.motion import Rates
-from fourbar.formulas.position import Loop, Number, Position
+from fourbar.formulas.position import Loop, Number, Position, anywhere
 
 
 class Body(NamedTuple):
@@ -84,7 +82,7 @@ def inertia_wrenches(a: Number, bodies: Bodies, at: Position, moving: Rates) -> 
     G3 = three.z * at.u3
     at_A = (three.m * a) * (w2 * w2 - 1j * alpha_2) * at.u2
     return Wrenches(
-        (two.m * two.z) * (w2 * w2 - 1j * alpha_2) * at.u2,
+        (two.m * two.z) * at.u2 * (w2 * w2 - 1j * alpha_2),
         three.m * (w3 * w3 - 1j * alpha_3) * G3,
         (four.m * four.z) * (w4 * w4 - 1j * alpha_4) * at.u4,
         -(about_first_pin(two) + three.m * a * a) * alpha_2,
@@ -114,10 +112,11 @@ def pin_forces(
     w, at_A : everything that acts, as from `inertia_wrenches`.
     moment_of_F32 : a u2 x F32 (N m), which the virtual work of bars 3 and 4 knows; read for drive bar 2 alone.
 
+    >>> from math import pi
     >>> from fourbar.formulas.path import state
     >>> from fourbar.formulas.position import polar
     >>> from fourbar.linkage import uniform  # below, Norton, example 11-3: in, lbf, s
-    >>> s, deg = state(uniform(19, 5, 15, 10), np.pi / 3, 1, 25.0, -40.0), np.pi / 180
+    >>> s, deg = state(uniform(19, 5, 15, 10), pi / 3, 1, 25.0, -40.0), pi / 180
     >>> G3, P = polar(9, 45 * deg), polar(80, 330 * deg)  # a force on the coupler
     >>> bars = Body(0.004, 0.4, polar(3, 30 * deg)), Body(0.020, 1.5, G3), Body(0.015, 0.8, 5 + 0j)
     >>> w, at_A = inertia_wrenches(5, bars, s.at, s.moving)
@@ -141,6 +140,6 @@ def pin_forces(
         F43 = (M3 * k / b) * at.diagonal - ((M3 + M4) * k) * at.u3
         F32 = R3 + F43 + at_A
         short = d < a
-        if np.any(short):  # all bars turn as one, and the sum loses the small component across bar 2
+        if anywhere(short):  # all bars turn as one, and the sum loses the small component across bar 2
             F32 = F32 + short * (moment_of_F32 / a - cross(at.u2, F32)) * 1j * at.u2
     return PinForces(-(R2 + F32), F32, F43, F43 - R4)

@@ -86,7 +86,8 @@ def columns(solution: Solution, *, degrees: bool = True) -> dict[str, list[str]]
     if solution.torque is not None:
         if solution.time is None:  # released, it has no drive: its torque is rounding
             shown[f"T{solution.drive_bar}\nN m"] = _cells(solution.torque)
-            shown["digits\nof T"] = _digits(solution)
+            if solution.torque_error is not None:
+                shown["digits\nof T"] = _digits(solution)
         for name in PIN_FORCES:
             shown[f"|{name}|\nN"] = _cells(np.hypot(*getattr(solution, name).T))
     for name in ANGLES:
