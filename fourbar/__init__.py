@@ -14,6 +14,7 @@ from fourbar.scene.motion import Free as Free
 from fourbar.scene.motion import FromLimit as FromLimit
 from fourbar.scene.motion import Motion as Motion
 from fourbar.scene.motion import Sweep as Sweep
+from fourbar.scene.point import Point as Point
 from fourbar.solution import Solution as Solution
 from fourbar.solve import solve as solve
 

@@ -10,7 +10,7 @@ from fourbar.effects.actions import Actions, bodies
 from fourbar.formulas.motion import Coefficients, State, rates
 from fourbar.formulas.path import Path, path
 from fourbar.formulas.pin_forces import Bodies, PinForces, Wrenches, inertia_wrenches, pin_forces
-from fourbar.formulas.position import HalfAngle, Loop, Position, anywhere, parallel_pairs
+from fourbar.formulas.position import HalfAngle, Loop, Position, anywhere, parallel_pairs, polar
 from fourbar.formulas.torque import driving_torque, half_slope, inertia
 from fourbar.formulas.transmission import drive_sine, drive_sine_of_triangle
 from fourbar.linkage import FourBar
@@ -53,6 +53,8 @@ class Case(NamedTuple):
     terms: "tuple[Effect, ...]"
     drive_bar: int
     path: Path
+    points: tuple[tuple[str, int, Any], ...] = ()
+    """The scene's own: name, bar, and place in the bar's frame at its first pin, complex, m."""
     side: int = 0
     """Which way pins at rest are about to turn."""
 
@@ -63,7 +65,8 @@ class Case(NamedTuple):
         own = path(Loop(*linkage.lengths, 0.0, 0.0), linkage.ground_angle)
         square = own.unit * own.unit
         lengths = Loop(*linkage.lengths, own.lengths.E1 * square, own.lengths.E2 * square)
-        return cls(linkage, lengths, bodies(linkage, terms), terms, scene.drive_bar, own)
+        points = tuple((point.name, point.bar, polar(*point.from_pin)) for point in scene.points)
+        return cls(linkage, lengths, bodies(linkage, terms), terms, scene.drive_bar, own, points)
 
     def state(
         self, path: Path, q: Any, at: Position, branch: Any, speed: Any, acceleration: Any, *, moving: bool = True

@@ -60,6 +60,11 @@ class Solution:
     omega_2: Array | None = None
     omega_3: Array | None = None
     omega_4: Array | None = None
+    v_A: Array | None = None
+    v_B: Array | None = None
+    v_G2: Array | None = None
+    v_G3: Array | None = None
+    v_G4: Array | None = None
     alpha_2: Array | None = None
     alpha_3: Array | None = None
     alpha_4: Array | None = None
@@ -89,6 +94,12 @@ class Solution:
 
     time: Array | None = None
     """Of a motion law, or of a free motion, s; the latter ends where the linkage stops at a limit position."""
+    points: dict[str, Array] = field(default_factory=dict, init=False)
+    """Positions of the scene's own points by name, (n, 2), m."""
+    velocity: dict[str, Array] = field(default_factory=dict, init=False)
+    """Their velocities, m/s."""
+    acceleration: dict[str, Array] = field(default_factory=dict, init=False)
+    """Their accelerations, m/s^2."""
     stopped_at: float | None = field(default=None, init=False)
     """When a free motion reached that limit position or change point, s; None: it did not."""
 
@@ -106,7 +117,7 @@ class Solution:
         return np.array(STATUS_NAMES)[self.status_code].tolist()
 
     def evaluated(self) -> list[str]:
-        """Names of the quantities that were evaluated, theta_2 first."""
+        """Names of the quantities that were evaluated, theta_2 first; without the scene's own points."""
         return [name for name in UNITS if getattr(self, name) is not None]
 
     def to_csv(self, path: "str | Path | None" = None, *, degrees: bool = False) -> str | None:
@@ -129,7 +140,7 @@ class Solution:
         except ImportError:
             raise DependencyError('to_pandas needs pandas: pip install "fourbar[pandas]"') from None
         known = {name: values for name, values in scalars(self).items() if values is not None}
-        return DataFrame({"status": self.status, "branch": self.branch, "drive_bar": self.drive_bar, **known})
+        return DataFrame({**leading(self), **known})
 
 
 def json_text(solution: Solution, *, degrees: bool = False) -> str:
@@ -151,17 +162,30 @@ def json_text(solution: Solution, *, degrees: bool = False) -> str:
 
 def csv_text(solution: Solution, *, degrees: bool = False) -> str:
     """One line per position; vectors as columns `A_x`, `A_y`, empty where there is no value."""
+    size, first = solution.theta_2.size, leading(solution)
     columns = {
-        name: [None] * len(solution) if values is None else _nulled(values)
+        name: [None] * size if values is None else _nulled(values)
         for name, values in scalars(solution, degrees=degrees).items()
     }
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(["status", "branch", "drive_bar", *columns])
-    rows = zip(solution.status, solution.branch.tolist(), *columns.values(), strict=True)
-    for status, branch, *row in rows:
-        writer.writerow([status, branch, solution.drive_bar, *("" if cell is None else repr(cell) for cell in row)])
+    writer.writerow([*first, *columns])
+    for start, row in zip(zip(*first.values(), strict=True), zip(*columns.values(), strict=True), strict=True):
+        writer.writerow([*start, *("" if cell is None else repr(cell) for cell in row)])
     return text.getvalue()
+
+
+def leading(solution: Solution) -> dict[str, list[Any]]:
+    """The first columns of a table, one entry for each position; of a study also the number of the member."""
+    size = solution.theta_2.size
+    first = {
+        "status": np.array(STATUS_NAMES)[solution.status_code.ravel()].tolist(),
+        "branch": np.ravel(solution.branch).tolist(),
+        "drive_bar": [solution.drive_bar] * size,
+    }
+    if solution.theta_2.ndim == 1:
+        return first
+    return {"member": np.repeat(np.arange(len(solution)), size // len(solution)).tolist(), **first}
 
 
 def scalars(solution: Solution, *, degrees: bool = False) -> dict[str, Array | None]:
@@ -170,21 +194,28 @@ def scalars(solution: Solution, *, degrees: bool = False) -> dict[str, Array | N
     for name in _quantities(solution):
         values = _values(solution, name, degrees)
         heading = f"{name} [deg]" if degrees and name in IN_DEGREES else name
-        if name in VECTORS:
+        if name in VECTORS or name not in UNITS:
             for axis, letter in enumerate("xy"):
-                found[f"{heading}_{letter}"] = None if values is None else values[:, axis]
+                found[f"{heading}_{letter}"] = None if values is None else values[..., axis].ravel()
         else:
-            found[heading] = values
+            found[heading] = None if values is None else values.ravel()
     return found
 
 
 def _quantities(solution: "Solution") -> list[str]:
     """Every quantity of a solution, evaluated or not; the time only where a free motion has one."""
-    return [name for name in UNITS if name != "time" or getattr(solution, name) is not None]
+    names = [name for name in UNITS if name != "time" or getattr(solution, name) is not None]
+    points = dict.fromkeys((*solution.points, *solution.velocity, *solution.acceleration))
+    return names + [f"{start}{name}" for name in points for start in ("", "v_", "a_")]
 
 
 def _values(solution: Solution, name: str, degrees: bool) -> Array | None:
-    values: Array | None = getattr(solution, name)
+    values: Array | None
+    if name in UNITS:
+        values = getattr(solution, name)
+    else:
+        table = {"v_": solution.velocity, "a_": solution.acceleration}.get(name[:2])
+        values = solution.points.get(name) if table is None else table.get(name[2:])
     if values is not None and degrees and name in IN_DEGREES:
         return np.degrees(values)
     return values
@@ -195,13 +226,14 @@ def _nulled(values: Array) -> list[Any]:
     plain = values.tolist()
     if np.isfinite(values).all():
         return plain  # type: ignore[no-any-return]
-    if values.ndim == 2:
-        return [[_number(x), _number(y)] for x, y in plain]
-    return [_number(x) for x in plain]
+    return _numbers(plain)  # type: ignore[no-any-return]
 
 
-def _number(value: float) -> float | None:
-    return value if math.isfinite(value) else None
+def _numbers(plain: Any) -> Any:
+    """Numbers, in lists or lists of lists, None for what is not finite."""
+    if isinstance(plain, list):
+        return [_numbers(inner) for inner in plain]
+    return plain if math.isfinite(plain) else None
 
 
 def unwrap(angles: Array) -> None:

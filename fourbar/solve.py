@@ -25,14 +25,15 @@ from fourbar.quantities import (
     OF_PIN_LOADS,
     OK,
     OVERFLOW,
+    QUANTITIES,
     SEVERAL,
     SINGULAR,
     STAGE_OF,
     STAGES,
-    VECTORS,
     WOUND,
 )
 from fourbar.scene import Command, Scene, command
+from fourbar.scene.point import OF_POINTS
 from fourbar.solution import Array, Solution, unwrap
 
 if TYPE_CHECKING:
@@ -101,7 +102,7 @@ def solve(
     for name in ANGLES:
         if name in result:
             unwrap(result[name])
-    solution = Solution(scene.title, scene.drive_bar, code, np.asarray(where.branch), where.theta_2, **result)
+    solution = solved(scene, where, code, result)
     solution.time, solution.stopped_at = where.time, None if moved is None else moved.stopped_at
     return solution
 
@@ -129,16 +130,44 @@ def requested(
             raise InputError("stage", stage, "must be one of " + ", ".join(STAGES))
         wanted, absent = STAGES.index(stage), _absent(scene)
         result = {
-            name: np.empty((*shape, 2) if name in VECTORS else shape)
-            for name, of in STAGE_OF.items()
+            name: np.empty(shape if is_scalar(name) else (*shape, 2))
+            for name, of in _stages(scene).items()
             if STAGES.index(of) <= wanted and name not in absent
         }
     else:
         result = dict(out)
-        wanted = _highest_stage(result, shape)
+        wanted = _highest_stage(result, shape, _stages(scene))
     if wanted > 0 and omega_2 is None:
         raise InputError("motion.omega_2", None, f"is needed for the stage {STAGES[wanted]!r}")
     return wanted, result
+
+
+def is_scalar(name: str) -> bool:
+    """Whether a quantity is a number at each position; the others, a scene's own points too, are vectors."""
+    return KIND.get(name) == "scalar"
+
+
+KIND = {q.name: q.kind for q in QUANTITIES}
+
+
+def _stages(scene: Scene) -> dict[str, str]:
+    """Every quantity of a scene, those of its own points too, and its stage."""
+    if not scene.points:
+        return STAGE_OF
+    return STAGE_OF | {f"{start}{p.name}": stage for p in scene.points for start, stage in OF_POINTS.items()}
+
+
+def solved(scene: Scene, at: Command, code: NDArray[np.uint8], result: Mapping[str, Array]) -> Solution:
+    """The solution with its arrays in their places."""
+    own: dict[str, dict[str, Array]] = {start: {} for start in OF_POINTS}
+    for point in scene.points:
+        for start, arrays in own.items():
+            if (array := result.get(start + point.name)) is not None:
+                arrays[point.name] = array
+    known = {name: array for name, array in result.items() if name in STAGE_OF}
+    solution = Solution(scene.title, scene.drive_bar, code, np.asarray(at.branch), at.theta_2, **known)
+    solution.points, solution.velocity, solution.acceleration = own[""], own["v_"], own["a_"]
+    return solution
 
 
 def positions_at_once(wanted: int) -> int:
@@ -157,10 +186,10 @@ def keep(found: Evaluated, result: Mapping[str, Array], code: NDArray[np.uint8],
         withhold(values, codes, in_line)
     code[part] = codes
     for name, value in values.items():
-        if name in VECTORS:
-            result[name][*part, 0], result[name][*part, 1] = value.real, value.imag
-        else:
+        if is_scalar(name):
             result[name][part] = value
+        else:
+            result[name][*part, 0], result[name][*part, 1] = value.real, value.imag
 
 
 def all_finite(values: Mapping[str, Any]) -> bool:
@@ -178,7 +207,7 @@ def withhold(values: dict[str, Any], code: NDArray[np.uint8], in_line: NDArray[n
     """
     gone = np.zeros(code.shape, dtype=bool)
     for stage in STAGES:
-        names = [name for name in values if STAGE_OF[name] == stage]
+        names = [name for name in values if STAGE_OF.get(name, OF_POINTS.get(name[:2], "position")) == stage]
         of_forces = stage in STAGES[3:]
         promised = np.isin(code, (OK, SEVERAL)) if of_forces else ~np.isin(code, (NOT_ASSEMBLED, SINGULAR))
         found = np.zeros_like(gone)
@@ -223,7 +252,7 @@ def commanded(case: Case, where: Command, part: Part, wanted: int, names: Collec
         at = at._replace(root=np.where(singular, np.nan, at.root))
     omega_2, alpha_2 = _piece(where.omega_2, part), _piece(where.alpha_2, part)
     state = case.state(case.path, theta_2, at, branch, omega_2, alpha_2, moving=wanted > 0)
-    values = {name: KINEMATIC[name](case, state) for name in names if name in KINEMATIC}
+    values = kinematics(case, state, names)
     if wanted >= FORCE:
         known = exact if wanted == ERROR else None
         values |= _forces(case, state, alpha_2, branch, branch, codes, names, known)
@@ -254,7 +283,7 @@ def _freely(case: Case, moved: "FreeMotion", part: Part, wanted: int, names: Col
     q, speed, growth, branch = (x[part] for x in (moved.q, moved.speed, moved.acceleration, moved.sign))
     at = free.path.position(q, free.path.half_angle(q), branch)
     state = free.state(free.path, q, at, branch, speed, growth)._replace(theta_2=moved.command.theta_2[part])
-    values = {name: KINEMATIC[name](case, state) for name in names if name in KINEMATIC}
+    values = kinematics(case, state, names)
     if wanted >= FORCE:
         exact = NOWHERE if wanted == ERROR else None
         values |= _forces(free, state, growth, None, branch, codes, names, exact)
@@ -335,11 +364,24 @@ KINEMATIC: dict[str, Quantity] = {
     **_of_bars("G{}", lambda case, state, bar: state.point(bar, case.bodies[bar - 2].z)),
     **_of_bars("omega_{}", lambda case, state, bar: state.omega(bar)),
     **_of_bars("alpha_{}", lambda case, state, bar: state.alpha(bar)),
+    "v_A": lambda case, state: state.velocity(2, case.lengths.a),
+    "v_B": lambda case, state: state.velocity(4, case.lengths.c),
+    **_of_bars("v_G{}", lambda case, state, bar: state.velocity(bar, case.bodies[bar - 2].z)),
     "a_A": lambda case, state: state.acceleration(2, case.lengths.a),
     "a_B": lambda case, state: state.acceleration(4, case.lengths.c),
     **_of_bars("a_G{}", lambda case, state, bar: state.acceleration(bar, case.bodies[bar - 2].z)),
 }
 """The quantities before the forces."""
+
+
+def kinematics(case: Case, state: State, names: Collection[str]) -> dict[str, Any]:
+    """Those of the quantities that come before the forces, a scene's own points among them."""
+    values = {name: KINEMATIC[name](case, state) for name in names if name in KINEMATIC}
+    for name, bar, z in case.points:
+        for start, evaluate in (("", state.point), ("v_", state.velocity), ("a_", state.acceleration)):
+            if start + name in names:
+                values[start + name] = evaluate(bar, z)
+    return values
 
 
 def _released(scene: Scene) -> "FreeMotion":
@@ -414,15 +456,15 @@ def _absent(scene: Scene) -> tuple[str, ...]:
     return absent if any(effect.loaded_pins for effect in scene.effects) else (*absent, *OF_PIN_LOADS)
 
 
-def _highest_stage(out: Mapping[str, Array], positions: tuple[int, ...]) -> int:
+def _highest_stage(out: Mapping[str, Array], positions: tuple[int, ...], stages: Mapping[str, str]) -> int:
     """The last stage that the quantities named need; an InputError where one cannot be written."""
     for name, array in out.items():
-        if name not in STAGE_OF:
-            raise InputError("out", name, "must be among " + ", ".join(STAGE_OF))
-        shape = (*positions, 2) if name in VECTORS else positions
+        if name not in stages:
+            raise InputError("out", name, "must be among " + ", ".join(stages))
+        shape = positions if is_scalar(name) else (*positions, 2)
         if array.shape != shape or array.dtype != np.float64:
             raise InputError(f"out.{name}", (array.shape, str(array.dtype)), f"must be float64 of shape {shape}")
-    return max((STAGES.index(STAGE_OF[name]) for name in out), default=0)
+    return max((STAGES.index(stages[name]) for name in out), default=0)
 
 
 def _piece(value: float | Array | None, part: Part) -> float | Array:

@@ -282,7 +282,7 @@ def test_plot_and_animate_write_what_their_ending_says(tmp_path: Path, run: Four
 def test_what_goes_wrong_is_one_line_and_a_status(
     error: BaseException, code: int, run: Fourbar, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    def broken(_: object) -> None:
+    def broken(_: object, stage: str) -> None:
         raise error
 
     monkeypatch.setattr(import_module("fourbar.solve"), "solve", broken)

@@ -22,7 +22,10 @@ from validation.scenes.random import LinkageType
 from validation.scenes.suites import Random
 
 PAGE = (Path(__file__).parents[1] / "docs" / "results-format.md").read_text()
-NOT_QUANTITIES = ("title", "drive_bar", "status_code", "branch", "stopped_at")
+NOT_QUANTITIES = (
+    *("title", "drive_bar", "status_code", "branch", "stopped_at"),
+    *("points", "velocity", "acceleration"),
+)
 TYPES = {"string": str, "double": float, "boolean": bool}
 
 

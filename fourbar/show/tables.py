@@ -90,6 +90,13 @@ def columns(solution: Solution, *, degrees: bool = True) -> dict[str, list[str]]
                 shown["digits\nof T"] = _digits(solution)
         for name in PIN_FORCES:
             shown[f"|{name}|\nN"] = _cells(np.hypot(*getattr(solution, name).T))
+    for start, unit_of, arrays in (
+        ("", "m", solution.points),
+        ("v_", "m/s", solution.velocity),
+        ("a_", "m/s^2", solution.acceleration),
+    ):
+        for name, values in arrays.items():
+            shown |= {f"{start}{name}_{letter}\n{unit_of}": _cells(values[:, i]) for i, letter in enumerate("xy")}
     for name in ANGLES:
         shown[f"{name}\n{unit}"] = _cells(getattr(solution, name) * factor, "angle")
     for name in ("omega_3", "omega_4", "alpha_3", "alpha_4"):

@@ -93,6 +93,8 @@ def entries(scene: Scene) -> dict[str, Entry]:
             found |= _pair(f"loads.{index}.force", ("loads", index, "force"))
             found |= _pair(f"loads.{index}.at", ("loads", index, "at"))
         found[f"loads.{index}.moment"] = Entry(("loads", index, "moment"))
+    for index, point in enumerate(scene.points):
+        found |= _pair(f"{point.key}.from_pin", ("points", index, "from_pin"))
     for index, effect in enumerate(scene.effects):
         for key, entry in OF_EFFECT.get(effect.key, lambda effect: {})(effect).items():
             found[f"effects.{effect.key}.{key}"] = entry._replace(place=("effects", index, *entry.place))

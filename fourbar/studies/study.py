@@ -15,7 +15,7 @@ from fourbar.quantities import ANGLES, INVALID
 from fourbar.scene import Command, Scene, command
 from fourbar.scene.motion import FromLimit
 from fourbar.solution import Array, Solution, unwrap
-from fourbar.solve import BLOCK, FORCE, begun, commanded, keep, positions_at_once, requested
+from fourbar.solve import BLOCK, FORCE, begun, commanded, keep, positions_at_once, requested, solved
 from fourbar.studies.keys import entries, placed, refusal
 
 THETA_2 = "motion.theta_2"
@@ -61,7 +61,7 @@ class Study:
         code[self.invalid] = INVALID
         for array in result.values():
             array[self.invalid] = np.nan
-        return Solution(self.scene.title, self.scene.drive_bar, code, at.branch, at.theta_2, **result)
+        return solved(self.scene, at, code, result)
 
     def _command(self, rows: slice, columns: slice) -> Command:
         """Some positions of some members, one after the other, (k,)."""
