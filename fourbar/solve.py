@@ -12,8 +12,7 @@ from fourbar.case import NOWHERE, Case
 from fourbar.errors import InputError, LimitError
 from fourbar.formulas.motion import State
 from fourbar.formulas.path import NO_DIGIT_LEFT
-from fourbar.formulas.path import singular as is_singular
-from fourbar.formulas.position import HalfAngle, anywhere
+from fourbar.formulas.position import HalfAngle, Position, anywhere
 from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import (
     ANGLES,
@@ -45,8 +44,8 @@ BLOCK = 8192
 FORCE, ERROR = STAGES.index("force"), STAGES.index("error")
 Part = tuple[Any, ...]
 """Index of some positions in the arrays of all."""
-Evaluated = tuple[NDArray[np.uint8], dict[str, Any], NDArray[np.bool_]]
-"""Status codes and quantities of some positions, vectors as x + i y, and where no forces can balance."""
+Evaluated = tuple[NDArray[np.uint8], dict[str, Any], Position | None]
+"""Status codes and quantities of some positions, vectors as x + i y, and where the drive must balance."""
 
 
 def solve(
@@ -98,7 +97,7 @@ def solve(
                 found = commanded(case, where, part, wanted, result.keys())
             else:
                 found = _freely(case, moved, part, wanted, result.keys())
-            keep(found, result, code, part)
+            keep(case, found, result, code, part)
     for name in ANGLES:
         if name in result:
             unwrap(result[name])
@@ -179,13 +178,28 @@ def positions_at_once(wanted: int) -> int:
     return BLOCK // EVALUATIONS
 
 
-def keep(found: Evaluated, result: Mapping[str, Array], code: NDArray[np.uint8], part: Part) -> None:
-    """Write what was evaluated into the arrays of all positions, where it is no number with the status that says so."""
-    codes, values, in_line = found
+def keep(
+    case: Case,
+    found: Evaluated,
+    result: Mapping[str, Array],
+    code: NDArray[np.uint8],
+    part: Part,
+    shape: tuple[int, ...] | None = None,
+) -> None:
+    """Write what was evaluated into the arrays of all positions, where it is no number with the status that says so.
+
+    Parameters
+    ----------
+    shape : of the part of the arrays; None: that of what was evaluated.
+    """
+    codes, values, driven = found
     if not all_finite(values):
-        withhold(values, codes, in_line)
-    code[part] = codes
+        in_line = driven is not None and np.abs(case.drive_sine(driven)) <= NO_DIGIT_LEFT
+        withhold(values, codes, np.broadcast_to(in_line, codes.shape))
+    code[part] = codes if shape is None else codes.reshape(shape)
     for name, value in values.items():
+        if shape is not None and np.ndim(value):
+            value = value.reshape(shape)  # noqa: PLW2901
         if is_scalar(name):
             result[name][part] = value
         else:
@@ -236,48 +250,51 @@ def commanded(case: Case, where: Command, part: Part, wanted: int, names: Collec
     ----------
     wanted : number of the last stage that the quantities named need.
     """
-    theta_2, branch = where.theta_2[part], where.branch[part]
+    theta_2, branch = where.theta_2[part], _sign(where.branch[part])
     half, exact = case.half_angle(theta_2, where.remainder)
     if set(names) <= set(ANGLES) and where.remainder is None and not case.path.may_stay_parallel:
         return _angles(case, half, branch, names)
     at = case.path.position(theta_2, half, branch)
-    assembled = (half.outer >= 0.0) & (half.inner >= 0.0)
-    singular = assembled & is_singular(at, NO_DIGIT_LEFT if where.remainder is None else 0.0)
-    codes = np.full(np.shape(theta_2), OK, dtype=np.uint8)
-    # of an angle that is no number against the ground not even whether the loop closes is known
-    for mask, code in ((singular, SINGULAR), (~assembled, NOT_ASSEMBLED), (np.isnan(half.kk), OVERFLOW)):
-        if anywhere(mask):
-            codes[mask] = code
-    if anywhere(singular):  # velocities are 0/0
-        at = at._replace(root=np.where(singular, np.nan, at.root))
+    codes = _codes(at.sin_mu, half, NO_DIGIT_LEFT if where.remainder is None else 0.0)
+    if anywhere(codes):  # velocities are 0/0
+        at = at._replace(root=np.where(codes == SINGULAR, np.nan, at.root))
     omega_2, alpha_2 = _piece(where.omega_2, part), _piece(where.alpha_2, part)
     state = case.state(case.path, theta_2, at, branch, omega_2, alpha_2, moving=wanted > 0)
     values = kinematics(case, state, names)
     if wanted >= FORCE:
         known = exact if wanted == ERROR else None
         values |= _forces(case, state, alpha_2, branch, branch, codes, names, known)
-    return codes, values, np.abs(case.drive_sine(at)) <= NO_DIGIT_LEFT
+    return codes, values, at
+
+
+def _codes(sine: Array, half: HalfAngle, margin: float) -> NDArray[np.uint8]:
+    """Statuses of positions from the sine of the transmission angle, or a multiple of it."""
+    codes, size = np.zeros(sine.shape, dtype=np.uint8), np.abs(sine)
+    if not size.min(initial=np.inf) > margin:  # NaN where the loop does not close
+        codes[size <= margin] = SINGULAR
+        codes[np.isnan(sine)] = NOT_ASSEMBLED
+        codes[np.isnan(half.kk)] = OVERFLOW  # of theta_2 - theta_1: not even where it closes is known
+    return codes
+
+
+def _sign(branch: NDArray[np.int8]) -> Any:
+    """The branch of each position, or one number where all have the same."""
+    return float(branch[0]) if branch.size and branch.min() == branch.max() else branch
 
 
 def _angles(case: Case, half: HalfAngle, branch: Any, names: Iterable[str]) -> Evaluated:
     """The same where two angles are all that is asked for: without vectors and the rest of the triangle."""
     theta_3, theta_4, root = case.path.angles(half, branch)
-    codes = np.zeros(theta_3.shape, dtype=np.uint8)
-    size = np.abs(root)
-    least = NO_DIGIT_LEFT * 2.0 * case.path.lengths.b * case.path.lengths.c
-    if not size.min() > least:  # NaN where the loop does not close
-        codes[size <= least] = SINGULAR
-        codes[np.isnan(root)] = NOT_ASSEMBLED
-        codes[np.isnan(half.kk)] = OVERFLOW
+    codes = _codes(root, half, NO_DIGIT_LEFT * 2.0 * case.path.lengths.b * case.path.lengths.c)
     found = {"theta_3": theta_3, "theta_4": theta_4}
-    return codes, {name: found[name] for name in names}, codes > OK
+    return codes, {name: found[name] for name in names}, None
 
 
 def _freely(case: Case, moved: "FreeMotion", part: Part, wanted: int, names: Collection[str]) -> Evaluated:
     """The same at instants of a free motion that have one independent angle; there is no driving torque."""
     codes = np.zeros(len(part[0]), dtype=np.uint8)
     if not codes.size:
-        return codes, {}, codes > 0
+        return codes, {}, None
     bar = int(moved.bar[part][0])
     free = case._replace(drive_bar=bar, path=moved.paths[bar])
     q, speed, growth, branch = (x[part] for x in (moved.q, moved.speed, moved.acceleration, moved.sign))
@@ -290,7 +307,7 @@ def _freely(case: Case, moved: "FreeMotion", part: Part, wanted: int, names: Col
         values |= {
             name: np.zeros(codes.shape) for name in values if name in ("torque", "torque_error", *OF_DRY_FRICTION)
         }
-    return codes, values, np.zeros(codes.shape, dtype=bool)
+    return codes, values, None
 
 
 def _forces(

@@ -52,9 +52,8 @@ class Study:
                     block = (rows.stop - rows.start, columns.stop - columns.start)
                     case = Case.of(self._members(rows, block[1], begun))._replace(side=side)
                     where = self._command(rows, columns)
-                    codes, values, in_line = commanded(case, where, (), wanted, result.keys())
-                    values = {name: value.reshape(block) if np.ndim(value) else value for name, value in values.items()}
-                    keep((codes.reshape(block), values, in_line.reshape(block)), result, code, (rows, columns))
+                    found = commanded(case, where, (), wanted, result.keys())
+                    keep(case, found, result, code, (rows, columns), block)
                 for name in ANGLES:
                     if name in result:
                         unwrap(result[name][rows])
