@@ -80,24 +80,29 @@ def solve(
     moved = _released(scene) if scene.motion.free is not None and at is None else None
     where = moved.command if moved is not None else command(scene) if at is None else at
     n = len(where.theta_2)
-    wanted, result = requested(scene, (n,), where.omega_2, stage, out)
+    wanted, names = requested(scene, (n,), where.omega_2, stage, out)
+    alone = n == 1 and moved is None and out is None
+    result = {} if alone else arrays(names, (n,), out)
     code = np.zeros(n, dtype=np.uint8)
     with np.errstate(all="ignore"):
         case = Case.of(_begun(scene) if wanted >= FORCE else scene)._replace(side=side)
         parts: Iterable[Part]
         if moved is not None:
             parts = ((np.flatnonzero(moved.bar == bar),) for bar in (2, 4))
-        elif n == 1:
-            parts = ((0,),)  # plain numbers: arrays of one entry cost several times as much
+        elif n == 1:  # in plain numbers: arrays of one entry cost several times as much
+            parts = ((0,),)
         else:
             size = positions_at_once(wanted)
             parts = ((slice(start, start + size),) for start in range(0, n, size))
         for part in parts:
             if moved is None:
-                found = commanded(case, where, part, wanted, result.keys())
+                found = commanded(case, where, part, wanted, names)
             else:
-                found = _freely(case, moved, part, wanted, result.keys())
-            keep(case, found, result, code, part)
+                found = _freely(case, moved, part, wanted, names)
+            if alone:
+                code[0], result = _of_one(case, found)
+            else:
+                keep(case, found, result, code, part)
     for name in ANGLES:
         if name in result:
             unwrap(result[name])
@@ -114,8 +119,8 @@ def last_stage(scene: Scene) -> str:
 
 def requested(
     scene: Scene, shape: tuple[int, ...], omega_2: Any, stage: str | None, out: Mapping[str, Array] | None
-) -> tuple[int, dict[str, Array]]:
-    """The number of the last stage that is evaluated, and the arrays to write into; an InputError as of `solve`.
+) -> tuple[int, Collection[str]]:
+    """The number of the last stage that is evaluated, and the names of the quantities; an InputError as of `solve`.
 
     Parameters
     ----------
@@ -128,17 +133,23 @@ def requested(
         if stage not in STAGES:
             raise InputError("stage", stage, "must be one of " + ", ".join(STAGES))
         wanted, absent = STAGES.index(stage), _absent(scene)
-        result = {
-            name: np.empty(shape if is_scalar(name) else (*shape, 2))
-            for name, of in _stages(scene).items()
-            if STAGES.index(of) <= wanted and name not in absent
-        }
+        before = STAGES[: wanted + 1]
+        names: Collection[str] = {
+            name: None for name, of in _stages(scene).items() if of in before and name not in absent
+        }.keys()
     else:
-        result = dict(out)
-        wanted = _highest_stage(result, shape, _stages(scene))
+        names = out.keys()
+        wanted = _highest_stage(out, shape, _stages(scene))
     if wanted > 0 and omega_2 is None:
         raise InputError("motion.omega_2", None, f"is needed for the stage {STAGES[wanted]!r}")
-    return wanted, result
+    return wanted, names
+
+
+def arrays(names: Iterable[str], shape: tuple[int, ...], out: Mapping[str, Array] | None) -> dict[str, Array]:
+    """To write into: new ones, or those given."""
+    if out is not None:
+        return dict(out)
+    return {name: np.empty(shape if is_scalar(name) else (*shape, 2)) for name in names}
 
 
 def is_scalar(name: str) -> bool:
@@ -206,9 +217,22 @@ def keep(
             result[name][*part, 0], result[name][*part, 1] = value.real, value.imag
 
 
+def _of_one(case: Case, found: Evaluated) -> tuple[Any, dict[str, Array]]:
+    """The same of a single position: its status code, and all of its arrays at once."""
+    codes, values, driven = found
+    if not all_finite(values):
+        withhold(values, codes, np.asarray(driven is not None and np.abs(case.drive_sine(driven)) <= NO_DIGIT_LEFT))
+    numbers = [name for name in values if KIND.get(name) == "scalar"]
+    vectors = [name for name in values if KIND.get(name) != "scalar"]
+    rows = np.array([values[name] for name in numbers], dtype=float)[:, None]
+    pairs = np.array([values[name] for name in vectors], dtype=complex)[:, None].view(float).reshape(-1, 1, 2)
+    return codes, dict(zip((*numbers, *vectors), (*rows, *pairs), strict=True))
+
+
 def all_finite(values: Mapping[str, Any]) -> bool:
-    """Whether every entry is a number, seen by their sums; False also where a sum alone leaves the range of doubles."""
-    return all(cmath.isfinite(value.sum() if isinstance(value, np.ndarray) else value) for value in values.values())
+    """Whether every entry is a number, from their squares; False also where a square leaves the range of doubles."""
+    squares = (np.vdot(value, value) if isinstance(value, np.ndarray) else value for value in values.values())
+    return all(cmath.isfinite(square) for square in squares)
 
 
 def withhold(values: dict[str, Any], code: NDArray[np.uint8], in_line: NDArray[np.bool_]) -> None:
@@ -252,7 +276,8 @@ def commanded(case: Case, where: Command, part: Part, wanted: int, names: Collec
     """
     theta_2, branch = where.theta_2[part], _sign(where.branch[part])
     half, exact = case.half_angle(theta_2, where.remainder)
-    if set(names) <= set(ANGLES) and where.remainder is None and not case.path.may_stay_parallel:
+    of_angles = len(names) <= len(ANGLES) and set(names) <= set(ANGLES)
+    if of_angles and where.remainder is None and not case.path.may_stay_parallel:
         return _angles(case, half, branch, names)
     at = case.path.position(theta_2, half, branch)
     codes = _codes(at.sin_mu, half, NO_DIGIT_LEFT if where.remainder is None else 0.0)
@@ -267,10 +292,10 @@ def commanded(case: Case, where: Command, part: Part, wanted: int, names: Collec
     return codes, values, at
 
 
-def _codes(sine: Array, half: HalfAngle, margin: float) -> NDArray[np.uint8]:
+def _codes(sine: Any, half: HalfAngle, margin: float) -> NDArray[np.uint8]:
     """Statuses of positions from the sine of the transmission angle, or a multiple of it."""
-    codes, size = np.zeros(sine.shape, dtype=np.uint8), np.abs(sine)
-    if not size.min(initial=np.inf) > margin:  # NaN where the loop does not close
+    codes, size = np.zeros(np.shape(sine), dtype=np.uint8), np.abs(sine)
+    if not (size.min(initial=np.inf) if codes.ndim else size) > margin:  # NaN where the loop does not close
         codes[size <= margin] = SINGULAR
         codes[np.isnan(sine)] = NOT_ASSEMBLED
         codes[np.isnan(half.kk)] = OVERFLOW  # of theta_2 - theta_1: not even where it closes is known
@@ -279,7 +304,9 @@ def _codes(sine: Array, half: HalfAngle, margin: float) -> NDArray[np.uint8]:
 
 def _sign(branch: NDArray[np.int8]) -> Any:
     """The branch of each position, or one number where all have the same."""
-    return float(branch[0]) if branch.size and branch.min() == branch.max() else branch
+    if branch.ndim == 0 or (branch.size and branch.min() == branch.max()):
+        return float(branch.flat[0]) if branch.ndim else float(branch)
+    return branch
 
 
 def _angles(case: Case, half: HalfAngle, branch: Any, names: Iterable[str]) -> Evaluated:
@@ -372,8 +399,8 @@ def _of_bars(name: str, evaluate: Callable[[Case, State, int], Any]) -> dict[str
 
 
 KINEMATIC: dict[str, Quantity] = {
-    "theta_3": lambda case, state: np.angle(state.at.u3),
-    "theta_4": lambda case, state: np.angle(state.at.u4),
+    "theta_3": lambda case, state: np.arctan2(state.at.u3.imag, state.at.u3.real),
+    "theta_4": lambda case, state: np.arctan2(state.at.u4.imag, state.at.u4.real),
     "sin_mu": lambda case, state: state.at.sin_mu,
     "condition": lambda case, state: np.abs(state.at.sin_mu),
     "A": lambda case, state: state.point(2, case.lengths.a),

@@ -15,7 +15,7 @@ from fourbar.quantities import ANGLES, INVALID
 from fourbar.scene import Command, Scene, command
 from fourbar.scene.motion import FromLimit
 from fourbar.solution import Array, Solution, unwrap
-from fourbar.solve import BLOCK, FORCE, begun, commanded, keep, positions_at_once, requested, solved
+from fourbar.solve import BLOCK, FORCE, arrays, begun, commanded, keep, positions_at_once, requested, solved
 from fourbar.studies.keys import entries, placed, refusal
 
 THETA_2 = "motion.theta_2"
@@ -43,7 +43,8 @@ class Study:
     def solved(self, stage: str | None, *, out: Mapping[str, Array] | None = None, side: int = 0) -> Solution:
         """What `fourbar.solve` returns for a study: every quantity as (m, n) or (m, n, 2)."""
         at, shape = self.at, self.at.theta_2.shape
-        wanted, result = requested(self.scene, shape, at.omega_2, stage, out)
+        wanted, names = requested(self.scene, shape, at.omega_2, stage, out)
+        result = arrays(names, shape, out)
         code = np.zeros(shape, dtype=np.uint8)
         with np.errstate(all="ignore"):
             for rows in _parts(len(self), max(1, positions_at_once(wanted) // shape[1])):
@@ -52,7 +53,7 @@ class Study:
                     block = (rows.stop - rows.start, columns.stop - columns.start)
                     case = Case.of(self._members(rows, block[1], begun))._replace(side=side)
                     where = self._command(rows, columns)
-                    found = commanded(case, where, (), wanted, result.keys())
+                    found = commanded(case, where, (), wanted, names)
                     keep(case, found, result, code, (rows, columns), block)
                 for name in ANGLES:
                     if name in result:
