@@ -1,4 +1,4 @@
-"""From a scene to its solution: block by block over the positions, stage by stage, no further than asked."""
+"""From a scene to its solution: block by block over the positions, stage by stage, no further than wanted."""
 
 import cmath
 from collections.abc import Callable, Collection, Iterable, Mapping
@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.case import NOWHERE, Case
 from fourbar.errors import InputError, LimitError
 from fourbar.formulas.motion import State
 from fourbar.formulas.path import NO_DIGIT_LEFT
@@ -32,6 +31,7 @@ from fourbar.quantities import (
     WOUND,
 )
 from fourbar.scene import Command, Scene, command
+from fourbar.scene.case import NOWHERE, Case
 from fourbar.scene.point import OF_POINTS
 from fourbar.solution import Array, Solution, unwrap
 
@@ -65,7 +65,7 @@ def solve(
     at : other positions, velocities and accelerations of the input than the scene's own.
     out : arrays to write into, by name, (n,) or (n, 2), of a study (m, n) or (m, n, 2), which share no memory; only the
         quantities named are evaluated, with the stages they need, and the others are None in the result.
-    side : which way pins at rest are about to turn where dry friction acts: +1 as theta_2 grows, -1 as it falls, 0
+    side : in which sense pins at rest are about to turn where dry friction acts: +1 as theta_2 grows, -1 as it falls, 0
         neither.
 
     Raises
@@ -85,7 +85,7 @@ def solve(
     result = {} if alone else arrays(names, (n,), out)
     code = np.zeros(n, dtype=np.uint8)
     with np.errstate(all="ignore"):
-        case = Case.of(_begun(scene) if wanted >= FORCE else scene)._replace(side=side)
+        case = Case.of(_started(scene) if wanted >= FORCE else scene)._replace(side=side)
         parts: Iterable[Part]
         if moved is not None:
             parts = ((np.flatnonzero(moved.bar == bar),) for bar in (2, 4))
@@ -310,7 +310,7 @@ def _sign(branch: NDArray[np.int8]) -> Any:
 
 
 def _angles(case: Case, half: HalfAngle, branch: Any, names: Iterable[str]) -> Evaluated:
-    """The same where two angles are all that is asked for: without vectors and the rest of the triangle."""
+    """The same where two angles alone are wanted: without vectors and the rest of the triangle."""
     theta_3, theta_4, root = case.path.angles(half, branch)
     codes = _codes(root, half, NO_DIGIT_LEFT * 2.0 * case.path.lengths.b * case.path.lengths.c)
     found = {"theta_3": theta_3, "theta_4": theta_4}
@@ -459,7 +459,7 @@ def state_at(scene: Scene, at: Command) -> State:
         return case.state(case.path, at.theta_2, found, at.branch, omega_2, at.alpha_2)
 
 
-def _begun(scene: Scene) -> Scene:
+def _started(scene: Scene) -> Scene:
     """The scene with effects that know where its motion begins: where it first assembles, if it keeps its branch."""
     if not any(effect.counts_turns for effect in scene.effects):
         return scene
@@ -469,10 +469,10 @@ def _begun(scene: Scene) -> Scene:
     if not assembled.any() or np.ptp(at.branch) != 0:
         return scene
     first = int(np.argmax(assembled))
-    return begun(scene, Command(at.theta_2[first], at.branch[first], 0.0, 0.0, at.remainder))
+    return started(scene, Command(at.theta_2[first], at.branch[first], 0.0, 0.0, at.remainder))
 
 
-def begun(scene: Scene, at: Command) -> Scene:
+def started(scene: Scene, at: Command) -> Scene:
     """The scene with effects that know that its motion begins at a position, of as many linkages as there are."""
     state = state_at(scene, at)
     return replace(scene, effects=tuple(effect.begun(state, at.branch) for effect in scene.effects))
@@ -484,7 +484,7 @@ def _refuse_wound(scene: Scene, at: Command) -> None:
         return
     with np.errstate(all="ignore"):
         state = state_at(scene, at)
-        for effect in _begun(scene).effects:
+        for effect in _started(scene).effects:
             codes = effect.status(state, at.branch) if effect.counts_turns else None
             if codes is not None and codes.any():
                 assert at.time is not None

@@ -7,15 +7,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.case import Case
 from fourbar.errors import InputError
 from fourbar.formulas.mobility import on_smooth_path
 from fourbar.formulas.position import loop
 from fourbar.quantities import ANGLES, INVALID
 from fourbar.scene import Command, Scene, command
+from fourbar.scene.case import Case
 from fourbar.scene.motion import FromLimit
 from fourbar.solution import Array, Solution, unwrap
-from fourbar.solve import BLOCK, FORCE, arrays, begun, commanded, keep, positions_at_once, requested, solved
+from fourbar.solve import BLOCK, FORCE, arrays, commanded, keep, positions_at_once, requested, solved, started
 from fourbar.studies.keys import entries, placed, refusal
 
 THETA_2 = "motion.theta_2"
@@ -48,10 +48,10 @@ class Study:
         code = np.zeros(shape, dtype=np.uint8)
         with np.errstate(all="ignore"):
             for rows in _parts(len(self), max(1, positions_at_once(wanted) // shape[1])):
-                begun = self._begun(rows) if wanted >= FORCE else self.scene
+                begins = self._started(rows) if wanted >= FORCE else self.scene
                 for columns in _parts(shape[1], positions_at_once(wanted)):
                     block = (rows.stop - rows.start, columns.stop - columns.start)
-                    case = Case.of(self._members(rows, block[1], begun))._replace(side=side)
+                    case = Case.of(self._members(rows, block[1], begins))._replace(side=side)
                     where = self._command(rows, columns)
                     found = commanded(case, where, (), wanted, names)
                     keep(case, found, result, code, (rows, columns), block)
@@ -83,7 +83,7 @@ class Study:
             scene = placed(scene, ("effects", index, "turns"), tuple(_repeated(turn, count) for turn in turns))
         return scene
 
-    def _begun(self, rows: slice) -> Scene:
+    def _started(self, rows: slice) -> Scene:
         """The scene with effects that know where the motion of each member begins: where it first assembles."""
         if not any(effect.counts_turns for effect in self.scene.effects):
             return self.scene
@@ -102,7 +102,7 @@ class Study:
         one_branch = np.ptp(self.at.branch[rows], axis=1) == 0
         at = Command(np.where(one_branch, theta_2, np.nan), self.at.branch[rows, 0], 0.0, 0.0)
         scene = self.scene
-        for index, turns in _turns(begun(self._members(rows, 1, scene), at)).items():
+        for index, turns in _turns(started(self._members(rows, 1, scene), at)).items():
             scene = placed(scene, ("effects", index, "turns"), turns)
         return scene
 

@@ -31,7 +31,7 @@ by at most about 12 U times them."""
 NOWHERE = np.empty(0, dtype=np.intp)
 
 NO_MOTION = Coefficients(*[np.nan] * 8)
-"""Where positions are all that is asked for."""
+"""Where positions alone are wanted."""
 
 
 class Dynamics(NamedTuple):
@@ -56,7 +56,7 @@ class Case(NamedTuple):
     points: tuple[tuple[str, int, Any], ...] = ()
     """The scene's own: name, bar, and place in the bar's frame at its first pin, complex, m."""
     side: int = 0
-    """Which way pins at rest are about to turn."""
+    """In which sense pins at rest are about to turn."""
 
     @classmethod
     def of(cls, scene: Scene) -> "Case":
@@ -71,7 +71,7 @@ class Case(NamedTuple):
     def state(
         self, path: Path, q: Any, at: Position, branch: Any, speed: Any, acceleration: Any, *, moving: bool = True
     ) -> State:
-        """Positions and, unless they are all that is asked for, motion.
+        """Positions and, where more than they is wanted, motion.
 
         Parameters
         ----------
@@ -155,7 +155,7 @@ class Case(NamedTuple):
         """Least and greatest driving torque where dry friction holds a pin at rest, elsewhere the torque twice, N m.
 
         The third is where one of them is NaN because friction jams the motion that would begin; None: nowhere.
-        The ends are the torques at which the linkage would begin to move either way, or, where only a
+        The ends are the torques at which the linkage would begin to move forwards or backwards, or, where only a
         pin comes to rest while the linkage moves, the torques just before and after its reversal.
         """
         actions = Actions(state, self.bodies)
