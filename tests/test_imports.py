@@ -9,7 +9,7 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 HEAVY = ("pint", "click", "rich", "jinja2", "matplotlib", "scipy", "joblib", "mujoco", "pinocchio", "flint", "mpmath")
-ENGINES = {"mujoco": "mujoco", "pinocchio": "pinocchio"}
+ENGINES = {name: name for name in ("mujoco", "pinocchio", "exudyn", "opensim")}
 ROOMS = {
     "fourbar": (
         "errors quantities writing",

@@ -8,7 +8,10 @@ from validation.engines.witnesses import WITNESSES, Witness
 from validation.scenes.hard_families import FAMILIES
 
 PREDICTION = "validation.engines.prediction:"
-PREDICTORS = {"pinocchio-inverse": "in_world_axes", "mujoco-inverse": "about_mass_centre"}
+PREDICTORS = {
+    **dict.fromkeys(("pinocchio-inverse", "exudyn-constraints", "opensim-constraints"), "in_world_axes"),
+    "mujoco-inverse": "about_mass_centre",
+}
 """How each exact engine measures lever arms; others work with the data as they are."""
 BALLS = Witness("ball-arithmetic", "validation.engines.exact:BallArithmetic", FULL_ACCURACY, library="flint")
 

@@ -46,7 +46,10 @@ class Witness:
         return not_installed(self.library) if self.library else None
 
 
-REQUIREMENT = {"mujoco": "fourbar[mujoco]", "pinocchio": "fourbar[pinocchio]", "flint": "python-flint"}
+REQUIREMENT = {
+    **{name: f"fourbar[{name}]" for name in ("mujoco", "pinocchio", "exudyn", "opensim")},
+    "flint": "python-flint",
+}
 """Module of an engine: what pip installs it by."""
 
 
@@ -84,6 +87,8 @@ WORK = {
         "one motion: every position assembled, the model compiled, Runge-Kutta steps from position to position (the "
         "fewer positions, the dearer each), then pin forces and torque read",
     ),
+    "exudyn-constraints": Work("assembly, constraints and multipliers, one by one", ONE_BY_ONE),
+    "opensim-constraints": Work("assembly, constrained dynamics, one by one", ONE_BY_ONE),
     "free-body": Work(
         "thirteen equations, all positions at once",
         "all positions in one call on arrays: Newton on the closure, speeds and accelerations, thirteen equations each "
@@ -109,6 +114,11 @@ WITNESSES = (
     ),
     Witness("free-body", "validation.engines.free_body:FreeBody", EQUIVALENCE, positions=ANGLES),
 )
+FURTHER = (
+    Witness("exudyn-constraints", "validation.engines.exudyn:ExudynConstraints", EQUIVALENCE, library="exudyn"),
+    Witness("opensim-constraints", "validation.engines.opensim:OpenSimConstraints", EQUIVALENCE, library="opensim"),
+)
+"""Engines with extras of their own: they join a run where they are installed, and where they are named."""
 
 
 def predicting_from(

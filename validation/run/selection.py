@@ -3,8 +3,8 @@
 from pathlib import Path
 
 from fourbar.errors import DependencyError, InputError
-from validation.engines.hard_suite import HARD_WITNESSES, Hard
-from validation.engines.witnesses import WITNESSES, Witness
+from validation.engines.hard_suite import HARD_WITNESSES, Hard, predicting
+from validation.engines.witnesses import FURTHER, WITNESSES, Witness
 from validation.scenes.random import LinkageType
 from validation.scenes.suites import Random, Suite, model_files, scene_files, suite_file
 
@@ -14,18 +14,20 @@ def selected(
 ) -> tuple[Suite, tuple[Witness, ...]]:
     """The scenes asked for, and the witnesses with what they are held to there."""
     if named == "hard":
-        return Hard(), HARD_WITNESSES
+        return Hard(), (*HARD_WITNESSES, *map(predicting, FURTHER))
+    witnesses = (*WITNESSES, *FURTHER)
     if named is not None:
-        return suite_file(Path(named)), WITNESSES
+        return suite_file(Path(named)), witnesses
     if count:
-        return Random(count, seed, linkage_types(types)), WITNESSES
-    return scene_files(scenes or model_files()), WITNESSES
+        return Random(count, seed, linkage_types(types)), witnesses
+    return scene_files(scenes or model_files()), witnesses
 
 
 def chosen(engines: str | None, witnesses: tuple[Witness, ...] = WITNESSES) -> tuple[Witness, ...]:
-    """The witnesses named in a comma-separated list; all of them where there is none."""
+    """The witnesses named in a comma-separated list; where there is none, all but those that need not be installed."""
     if engines is None:
-        return witnesses
+        further = {witness.name for witness in FURTHER}
+        return tuple(witness for witness in witnesses if witness.name not in further or not witness.missing())
     known = {witness.name: witness for witness in witnesses}
     names = [name.strip() for name in engines.split(",") if name.strip()]
     for name in names or [engines]:
