@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field, replace
 
 from fourbar.scene import Scene
-from validation.compare.tolerance import FULL_ACCURACY, SIMULATED
+from validation.compare.tolerance import EQUIVALENCE, FULL_ACCURACY
 from validation.engines.witnesses import WITNESSES, Witness
 from validation.scenes.hard_families import FAMILIES
 
@@ -18,7 +18,7 @@ BALLS = Witness("ball-arithmetic", "validation.engines.exact:BallArithmetic", FU
 
 def predicting(witness: Witness) -> Witness:
     """The witness held to full accuracy, or else to the error predicted for each position."""
-    if witness.tolerance is SIMULATED:
+    if witness.tolerance is not EQUIVALENCE:
         return witness
     predictor = PREDICTION + PREDICTORS.get(witness.name, "from_data")
     return replace(witness, tolerance=FULL_ACCURACY, predictor=predictor)

@@ -33,6 +33,8 @@ class Witness:
     """Whether it runs through the motion in time."""
     predictor: str = ""
     """ "module:function" that predicts errors from the description; "own": the engine's own residuals do."""
+    stated: bool = True
+    """Whether an exact engine is held to what the formulas state of the linkage too, whatever its motion."""
     library: str = ""
     """The module that its adapter imports, a key of `REQUIREMENT`; nothing: it needs no more than the formulas."""
 

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from fourbar.errors import LimitError
 from fourbar.linkage import FourBar, uniform
 from fourbar.scene import Command, Scene
 from fourbar.scene.motion import Motion
@@ -46,11 +47,17 @@ def worst(name: str, answer: Answer, quantity: str, findings: Iterable[Finding])
 
 
 def answered(engine: Engine, linkage: FourBar, theta_2: Sequence[float], branch: Sequence[int]) -> dict[str, Array]:
-    """What the engine finds where bar 2 turns at 1 rad/s; the bars are uniform: their masses play no part."""
+    """What the engine finds where bar 2 turns at 1 rad/s; the bars are uniform: their masses play no part.
+
+    Raises LimitError where the engine refuses those positions.
+    """
     bars = uniform(*linkage.lengths)
     scene = Scene(FourBar(bars.ground, bars.input, bars.coupler, bars.output, linkage.ground_angle), Motion(0.0, 1.0))
     at = Command(np.array(theta_2, dtype=float), np.array(branch, dtype=np.int8), 1.0, 0.0)
-    return engine.answer(scene, at).quantities
+    answer = engine.answer(scene, at)
+    if answer.refusal is not None:
+        raise LimitError(answer.refusal)
+    return answer.quantities
 
 
 def wrapped(angle: Array) -> Array:
