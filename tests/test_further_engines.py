@@ -16,7 +16,8 @@ from fourbar.scene.motion import Motion
 from fourbar.solve import solve
 from tests.scenes import thesis
 from tests.test_effects import ACTING, scene
-from validation.compare.compare import COMPARED, closure, compare
+from validation.compare.compare import COMPARED, compare
+from validation.compare.identities import closure
 from validation.compare.tolerance import EQUIVALENCE
 from validation.engines.witnesses import FURTHER
 from validation.scenes.random import LinkageType
