@@ -8,10 +8,8 @@ from validation.engines.witnesses import WITNESSES, Witness
 from validation.scenes.hard_families import FAMILIES
 
 PREDICTION = "validation.engines.prediction:"
-PREDICTORS = {
-    **dict.fromkeys(("pinocchio-inverse", "exudyn-constraints", "opensim-constraints"), "in_world_axes"),
-    "mujoco-inverse": "about_mass_centre",
-}
+WORLD_AXES = ("pinocchio-inverse", "drake-inverse", "exudyn-constraints", "opensim-constraints")
+PREDICTORS = {**dict.fromkeys(WORLD_AXES, "in_world_axes"), "mujoco-inverse": "about_mass_centre"}
 """How each exact engine measures lever arms; others work with the data as they are."""
 BALLS = Witness("ball-arithmetic", "validation.engines.exact:BallArithmetic", FULL_ACCURACY, library="flint")
 

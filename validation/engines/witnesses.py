@@ -50,6 +50,7 @@ class Witness:
 
 REQUIREMENT = {
     **{name: f"fourbar[{name}]" for name in ("mujoco", "pinocchio", "exudyn", "opensim")},
+    "pydrake": "fourbar[drake]",
     "flint": "python-flint",
 }
 """Module of an engine: what pip installs it by."""
@@ -91,6 +92,7 @@ WORK = {
     ),
     "exudyn-constraints": Work("assembly, constraints and multipliers, one by one", ONE_BY_ONE),
     "opensim-constraints": Work("assembly, constrained dynamics, one by one", ONE_BY_ONE),
+    "drake-inverse": Work("assembly, forces and torque, one by one", ONE_BY_ONE),
     "free-body": Work(
         "thirteen equations, all positions at once",
         "all positions in one call on arrays: Newton on the closure, speeds and accelerations, thirteen equations each "
@@ -119,6 +121,7 @@ WITNESSES = (
 FURTHER = (
     Witness("exudyn-constraints", "validation.engines.exudyn:ExudynConstraints", EQUIVALENCE, library="exudyn"),
     Witness("opensim-constraints", "validation.engines.opensim:OpenSimConstraints", EQUIVALENCE, library="opensim"),
+    Witness("drake-inverse", "validation.engines.drake:DrakeInverse", EQUIVALENCE, library="pydrake"),
 )
 """Engines with extras of their own: they join a run where they are installed, and where they are named."""
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 PACKAGES = {"fourbar": "fourbar", "numpy": "numpy", "mujoco": "mujoco", "pinocchio": "pin", "scipy": "scipy"}
 """Name in the report and name of the distribution."""
-WHERE_INSTALLED = ("exudyn", "opensim")
+WHERE_INSTALLED = ("drake", "exudyn", "opensim")
 """Distributions that need not be there."""
 
 
