@@ -135,7 +135,7 @@ class DrakeTree:
 
     def positions(self) -> dict[str, Array]:
         """Points of the bars."""
-        names = {"A": "foot3", "A2": "end2", "O4": "foot4", "B": "end3", "B4": "end4"}
+        names = {"A": "foot3", "O4": "foot4", "B": "end3", "B4": "end4"}
         return {name: self.point(names.get(name, name)) for name in (*names, "G2", "G3", "G4")}
 
     def gravity(self, vector: tuple[float, float]) -> None:

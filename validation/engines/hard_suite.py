@@ -16,7 +16,7 @@ BALLS = Witness("ball-arithmetic", "validation.engines.exact:BallArithmetic", FU
 
 def predicting(witness: Witness) -> Witness:
     """The witness held to full accuracy, or else to the error predicted for each position."""
-    if witness.tolerance is not EQUIVALENCE:
+    if witness.tolerance not in (EQUIVALENCE, FULL_ACCURACY):
         return witness
     predictor = PREDICTION + PREDICTORS.get(witness.name, "from_data")
     return replace(witness, tolerance=FULL_ACCURACY, predictor=predictor)

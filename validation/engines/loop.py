@@ -67,7 +67,7 @@ class Bars(Protocol):
         """Direction of a bar's line, in (-pi, pi], rad."""
 
     def positions(self) -> dict[str, Array]:
-        """Points O4, A and B of bar 3, "A2" and "B4", the ends of bars 2 and 4, and G2, G3, G4, (2,) each, m."""
+        """Points O4, A, B, G2, G3, G4, "B4", the end of bar 4, and where pin A is open "A2", that of bar 2; (2,), m."""
 
 
 class Tree(Bars, effects.Tree, Protocol):
@@ -104,10 +104,11 @@ class Position:
         tree = self.tree
         tree.place((theta_2, 0.0, 0.0))
         at = tree.positions()
-        diagonal = at["O4"] - at["A2"]
+        pin_a = at.get("A2", at["A"])
+        diagonal = at["O4"] - pin_a
         e = math.hypot(*diagonal)
         b, c = math.hypot(*(at["B"] - at["A"])), math.hypot(*(at["B4"] - at["O4"]))
-        closed = ROUNDING * (math.hypot(*at["A2"]) + math.hypot(*at["O4"]) + b + c)
+        closed = ROUNDING * (math.hypot(*pin_a) + math.hypot(*at["O4"]) + b + c)
         # with bar 2 held, the gap is stationary only where bars 3 and 4 lie along the diagonal: this is its least value
         if max(e - (b + c), abs(b - c) - e) > closed:
             return None

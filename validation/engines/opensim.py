@@ -232,7 +232,7 @@ class OpenSimBars:
             couple, force = self._couple_on_2(), self._closing_force()
             torque, closing = torque + couple / leverage, closing + force
             size = abs(couple), math.hypot(*force)
-            if number > 1 and not (size[0] < before[0] or size[1] < before[1]):  # the first two give way to each other
+            if number > 1 and not (size[0] < before[0] or size[1] < before[1]):  # torque, then force, come first
                 break
             before = size
         reactions = {name: self._reaction(pin) for pin, name in {"O2": "F12", "B": "F43", "O4": "F14"}.items()}

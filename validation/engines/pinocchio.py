@@ -92,9 +92,7 @@ class PinocchioTree:
     def positions(self) -> dict[str, Array]:
         """Points of the bars."""
         where = {name: self.point(name) for name in ("G2", "G3", "G4")}
-        where.update(
-            A=self.foot(3), A2=self.point("end2"), O4=self.foot(4), B=self.point("end3"), B4=self.point("end4")
-        )
+        where.update(A=self.foot(3), O4=self.foot(4), B=self.point("end3"), B4=self.point("end4"))
         return where
 
     def gravity(self, vector: tuple[float, float]) -> None:

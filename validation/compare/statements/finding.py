@@ -47,17 +47,19 @@ def worst(name: str, answer: Answer, quantity: str, findings: Iterable[Finding])
 
 
 def answered(engine: Engine, linkage: FourBar, theta_2: Sequence[float], branch: Sequence[int]) -> dict[str, Array]:
-    """What the engine finds where bar 2 turns at 1 rad/s; the bars are uniform: their masses play no part.
-
-    Raises LimitError where the engine refuses those positions.
-    """
+    """What the engine finds where bar 2 turns at 1 rad/s; the bars are uniform: their masses play no part."""
     bars = uniform(*linkage.lengths)
     scene = Scene(FourBar(bars.ground, bars.input, bars.coupler, bars.output, linkage.ground_angle), Motion(0.0, 1.0))
     at = Command(np.array(theta_2, dtype=float), np.array(branch, dtype=np.int8), 1.0, 0.0)
+    return given(engine, scene, at).quantities
+
+
+def given(engine: Engine, scene: Scene, at: Command) -> Answer:
+    """An engine's answer; LimitError where it refuses those positions."""
     answer = engine.answer(scene, at)
     if answer.refusal is not None:
         raise LimitError(answer.refusal)
-    return answer.quantities
+    return answer
 
 
 def wrapped(angle: Array) -> Array:

@@ -124,7 +124,7 @@ class MujocoTree:
         """Points of the bars."""
         where = {name: self.point(name) for name in ("G2", "G3", "G4")}
         where["A"], where["O4"] = (np.array(self.data.xpos[self.body[bar], :2]) for bar in (3, 4))
-        where["A2"], where["B"], where["B4"] = (self.point(f"end{bar}") for bar in MOVING_BARS)
+        where["B"], where["B4"] = self.point("end3"), self.point("end4")
         return where
 
     def gravity(self, vector: tuple[float, float]) -> None:
