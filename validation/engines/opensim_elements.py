@@ -21,7 +21,7 @@ ZERO = (0.0, 0.0, 0.0)
 
 def vec(x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Any:
     """Three components."""
-    return osim.Vec3(x, y, z)
+    return osim.Vec3(float(x), float(y), float(z))
 
 
 def vector(values: Iterable[float]) -> Any:
