@@ -13,7 +13,8 @@ from fourbar.linkage import Bar, FourBar
 from fourbar.scene import Command, Scene, command
 from fourbar.scene.motion import Motion
 from fourbar.solve import solve
-from validation.compare.compare import COMPARED, closure, compare
+from validation.compare.compare import COMPARED, compare
+from validation.compare.identities import closure
 from validation.compare.tolerance import EPS, EQUIVALENCE, K
 from validation.engines import loop
 from validation.engines.free_body import FreeBody
@@ -186,7 +187,7 @@ def test_massless_bars() -> None:
     assert refused.refusal is not None and "bar 3" in refused.refusal and not refused.quantities
 
 
-def test_the_floor_of_mujoco_is_where_it_is_said_to_be() -> None:
+def test_the_floor_of_mujoco_is_where_it_is_stated_to_be() -> None:
     d, a, b, c = MECHANISMS["crank-rocker"]
     scene = Scene(FourBar(d, Bar(a, 1.0), Bar(b, 1.0), Bar(c, LEAST, LEAST)))
     MujocoTree(scene)

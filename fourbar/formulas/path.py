@@ -16,6 +16,7 @@ from fourbar.formulas.position import (
     Loop,
     Number,
     Position,
+    anywhere,
     close_loop,
     direction,
     half_angle,
@@ -28,7 +29,7 @@ from fourbar.formulas.position import with_parallel_pairs as parallel_position
 from fourbar.linkage import FourBar
 
 NO_DIGIT_LEFT = 16.0 * 2.0**-53
-"""|sin mu| at or below this: the directions of bars 3 and 4 cannot be told apart in doubles."""
+"""|sin mu| at or below this: the directions of bars 3 and 4 are the same in doubles."""
 
 
 class Path(NamedTuple):
@@ -42,6 +43,8 @@ class Path(NamedTuple):
     """Direction of the ground in the order of the reading, rad."""
     unit: Number = 1.0
     """Of the lengths, a power of two near the longest, m: no product of them leaves the range of doubles."""
+    may_stay_parallel: bool = False
+    """Whether there are two pairs of equal bars."""
 
     def half_angle(self, q: Number) -> HalfAngle:
         """Of the independent angle q (rad) against the ground."""
@@ -56,8 +59,10 @@ class Path(NamedTuple):
         half : of q.
         branch : sign of the root in that order: for bar 2 the branch, for bar 4 that of sin(theta_3 - theta_2).
         """
-        turned = np.any(self.theta_1)
-        u1, u2 = polar(1.0, self.theta_1), direction(q) if turned else vector(half.kk - half.ss, 2.0 * half.sk)
+        turned = self.theta_1 != 0.0
+        u1, u2 = polar(1.0, self.theta_1), direction(q) if np.all(turned) else vector(half.kk - half.ss, 2.0 * half.sk)
+        if np.ndim(turned):  # of linkages
+            u2 = np.where(turned, direction(q), u2)
         at = close_loop(self.lengths, u1, u2, half, branch)
         return parallel_position(at, *parallel_pairs(self.lengths, half, branch)) if self.may_stay_parallel else at
 
@@ -87,20 +92,16 @@ class Path(NamedTuple):
             k = parallel_motion(k, first & known, second & known)
         return (at, k) if self.bar == 2 else (_turned_round(self, at), read_backwards(k))
 
-    @property
-    def may_stay_parallel(self) -> bool:
-        """Whether there are two pairs of equal bars."""
-        return bool(np.any(np.equal(self.lengths.E1, 0.0) & np.equal(self.lengths.E2, 0.0)))
-
 
 def path(lengths: Loop, theta_1: Number, bar: int = 2) -> Path:
     """The path in the angle of bar 2 or 4."""
     d, a, b, c, _, _ = lengths
-    unit = np.ldexp(1.0, np.frexp(np.maximum(np.maximum(d, a), np.maximum(b, c)))[1])
+    unit = np.ldexp(1.0, np.frexp(0.25 * (d + a + b + c))[1])
     d, a, b, c = d / unit, a / unit, b / unit, c / unit
-    if bar == 2:
-        return Path(2, loop(d, a, b, c), theta_1, unit)
-    return Path(4, loop(d, c, b, a), theta_1 + np.pi, unit)
+    if bar == 4:
+        a, c, theta_1 = c, a, theta_1 + np.pi
+    own = loop(d, a, b, c)
+    return Path(bar, own, theta_1, unit, anywhere((own.E1 == 0.0) & (own.E2 == 0.0)))
 
 
 def singular(at: Position, margin: float = NO_DIGIT_LEFT) -> Number:
@@ -119,9 +120,9 @@ def state(linkage: FourBar, theta_2: Number, branch: Number, omega_2: Number = 1
     """
     with np.errstate(all="ignore"):
         lengths = loop(*linkage.lengths)
-        way = path(lengths, linkage.ground_angle)
-        at = way.position(theta_2, way.half_angle(theta_2), branch)
-        at, k = way.motion(at._replace(root=np.where(singular(at), np.nan, at.root)), branch)
+        reading = path(lengths, linkage.ground_angle)
+        at = reading.position(theta_2, reading.half_angle(theta_2), branch)
+        at, k = reading.motion(at._replace(root=np.where(singular(at), np.nan, at.root)), branch)
         return State(lengths, linkage.ground_angle, theta_2, at, k, omega_2, rates(k, omega_2, alpha_2))
 
 
@@ -139,9 +140,9 @@ def smooth_branch(lengths: Loop, psi: Number, sign: Number) -> Number:
     return sign * at_stretched * at_folded
 
 
-def _turned_round(way: Path, at: Position) -> Position:
+def _turned_round(reading: Path, at: Position) -> Position:
     """A position of the loop read backwards, in the usual order of the bars."""
-    d, c, b, a, _, _ = way.lengths
+    d, c, b, a, _, _ = reading.lengths
     u1, u2, u3, u4 = -at.u1, at.u4, -at.u3, at.u2
     diagonal = d * u1 - a * u2
     sine, foot = cross(u3, u4), dot(diagonal, u3) / b

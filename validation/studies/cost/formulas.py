@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from fourbar.case import Case
 from fourbar.effects import Actions
 from fourbar.effects.actions import bodies
 from fourbar.formulas.motion import State, coefficients, rates
@@ -18,6 +17,7 @@ from fourbar.formulas.transmission import drive_sine
 from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import PIN_FORCES
 from fourbar.scene import Command, Scene
+from fourbar.scene.case import Case
 from fourbar.solve import solve, state_at
 from validation.compare.answer import Array
 from validation.compare.error import relative
@@ -52,6 +52,8 @@ def single(scene: Scene, at: Command) -> Quantities:
         half = half_angle(case.lengths, theta_2 - scene.linkage.ground_angle)
         u1 = np.complex64(polar(1.0, scene.linkage.ground_angle))
         position = close_loop(case.lengths, u1, direction(theta_2), half, at.branch)
+        sides = ("u2", "u3", "u4", "diagonal")  # made of complex doubles whatever their parts are
+        position = position._replace(**{name: _single(getattr(position, name)) for name in sides})
         k = coefficients(case.lengths, position)
         speed, growth = (np.float32(value) for value in (at.omega_2 or 0.0, at.alpha_2))
         moving = rates(k, speed, growth)
