@@ -35,7 +35,7 @@ def test_every_engine_is_judged_up_to_the_limit_and_by_its_instant(coupler: floa
     assert solution.stopped_at is not None and solution.time is not None
     assert solution.time[-1] <= solution.stopped_at < solution.time[-1] + 0.01
     page = judged("falling", scene)
-    assert {row.engine for row in page.rows} == set(free.ENGINES)
+    assert {row.engine for row in page.rows} > set(free.ENGINES)
     assert all(row.passed for row in page.rows)
     for engine in free.ENGINES:
         assert row(page.rows, engine, "stopped_at").error < 2e-5  # of the second, as measured

@@ -6,7 +6,7 @@ acceleration that is too large.
 
 import numpy as np
 
-from fourbar.linkage import FourBar
+from fourbar.linkage import MOVING_BARS, FourBar
 from fourbar.quantities import OK, UNITS
 from fourbar.scene import Scene
 from fourbar.solution import Solution
@@ -33,12 +33,27 @@ def basis_of(scene: Scene, answer: Answer) -> Solution | None:
         basis.omega_2, basis.alpha_2 = (
             np.broadcast_to(np.asarray(x, float), theta_2.shape) for x in (answer.at.omega_2, answer.at.alpha_2)
         )
+        if basis.omega_3 is not None and basis.omega_4 is not None:
+            _add_velocities(scene.linkage, theta, basis)
     one, other = (theta[bar] for bar in theta if bar != scene.drive_bar)
     basis.sin_mu = np.sin(theta[4] - theta[3])
     basis.condition = np.abs(basis.sin_mu)
     if basis.drive_condition is None:  # one that knows how near friction is to jamming answers it
         basis.drive_condition = np.abs(np.sin(other - one))
     return basis
+
+
+def _add_velocities(linkage: FourBar, theta: dict[int, Array], basis: Solution) -> None:
+    """Of A, B and the mass centres, from the answer's own angles and speeds, m/s."""
+
+    def swung(bar: int, distance: float, angle: float) -> Array:
+        speed, direction = distance * getattr(basis, f"omega_{bar}"), theta[bar] + angle
+        return np.stack((-speed * np.sin(direction), speed * np.cos(direction)), axis=1)
+
+    basis.v_A, basis.v_B = swung(2, linkage.input.length, 0.0), swung(4, linkage.output.length, 0.0)
+    for bar in MOVING_BARS:
+        centre = swung(bar, *linkage.bar(bar).mass_centre)
+        setattr(basis, f"v_G{bar}", centre + basis.v_A if bar == 3 else centre)
 
 
 def strictest_condition(quantity: str, linkage: FourBar, formulas: Solution, basis: Solution | None) -> Array:

@@ -45,7 +45,7 @@ OF_THE_FORMULAS = (*OF_DRY_FRICTION, *OF_PIN_LOADS, "torque_error", "force_error
 """What has judges of its own: the range in which dry friction holds, what it leaves, and the error bars."""
 COMPARED = tuple(name for name in STAGE_OF if name not in OF_THE_FORMULAS)
 """Every quantity that an exact engine is held to: all that is printed of a position."""
-OF_FORCES = (*FORCES, *OF_DRY_FRICTION, "drive_condition")
+OF_FORCES = (*FORCES, *OF_DRY_FRICTION)
 MOST_UNTOLD = 0.5
 """Share of the numbers of a scene of which nothing can be told, beyond which it does not hold."""
 SLOW_DRIVE = 0.1
@@ -264,10 +264,12 @@ def turned(theta_2: Array) -> float:
 def _stated(quantity: str, formulas: Solution, ours: Array) -> Mask:
     """Where the formulas state one value: beyond the range of doubles the motion is, up to the stage that met it."""
     if quantity in OF_FORCES:
+        # at rest a jam is of the motion that would begin
         stated = np.isin(formulas.status_code, (SEVERAL, JAMMED)) & np.isfinite(magnitude(ours))
         return np.asarray(stated | (formulas.status_code == OK))
     beyond = (formulas.status_code == OVERFLOW) & np.isnan(magnitude(ours))
-    return np.asarray((formulas.status_code != SINGULAR) & ~beyond)
+    jammed = (formulas.status_code == JAMMED) & (quantity == "drive_condition")  # which holds how near that is
+    return np.asarray((formulas.status_code != SINGULAR) & ~beyond & ~jammed)
 
 
 def _counted(codes: NDArray[np.uint8]) -> str:
@@ -290,7 +292,8 @@ def _undecided(scene: Scene, theta_2: Array) -> Mask:
 
 def _jumping(quantity: str, scene: Scene, formulas: Solution, tolerance: Tolerance) -> Mask:
     """Where dry friction reverses and a force may have either value; the motion is prescribed and has one."""
-    if quantity not in OF_FORCES:
+    near_jamming = quantity == "drive_condition" and any(effect.loaded_pins for effect in scene.effects)
+    if quantity not in OF_FORCES and not near_jamming:
         return np.zeros(len(formulas), dtype=bool)
     return reversing(scene, formulas, tolerance.factor, in_time=tolerance.name == SIMULATED.name)
 

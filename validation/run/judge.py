@@ -60,9 +60,9 @@ def judge(name: str, scene: Scene, witnesses: Sequence[Witness] = WITNESSES) -> 
     record.timings.append(Timing(name, FORMULAS, "exact", len(at.theta_2), seconds))
     record.rows += identities(name, scene, at, record.solution)
     basis = _basis(scene, at)
-    if basis is not None:
+    if basis is not None and at.omega_2 is not None:
         record.rows.append(withheld(name, scene, record.solution, basis))
-    record.rows += printed(name, scene, at, record.solution)
+    record.rows += printed(name, scene, at, record.solution, basis)
     record.jumps = reversals(scene, at, record.solution)
     for witness in witnesses:
         answer = _ask(witness, scene, at, record)
@@ -124,7 +124,8 @@ def _called_for(witnesses: Iterable[Witness], at: Command, record: Record) -> It
 def _basis(scene: Scene, at: Command) -> Solution | None:
     """Conditions and sizes of the positions by free bodies: nothing is allowed on the word of the formulas alone."""
     try:
-        return basis_of(scene, FreeBody().answer(scene, at))
+        with np.errstate(all="ignore"):
+            return basis_of(scene, FreeBody().answer(scene, at))
     except ArithmeticError:  # a row of its own fails; each answer is then measured by itself
         return None
 
@@ -187,6 +188,7 @@ def _judge_inertia(record: Record, scene: Scene, at: Command, witnesses: Iterabl
             continue
         rows = _judged(record.name, bare, at, ours, answer, replace(witness, expected=("torque",)), of_bare)
         rows = [row for row in rows if row.quantity == "torque" or row.verdict in (REFUSES, FAILS)]
+        rows = [row for row in rows if row.quantity != "untold"]
         if rows:  # what fails besides the torque, or stands in place of it, is not left out
             worst = max(rows, key=lambda row: VERDICTS.index(row.verdict))
             reason = worst.reason if worst.quantity in ("torque", "all") else f"{worst.quantity}: {worst.reason}"

@@ -14,7 +14,7 @@ from validation.compare.basis import basis_of, strictest_condition
 from validation.compare.error import magnitude, relative, relative_error, worst
 from validation.compare.law import law_row
 from validation.compare.rows import AGREES, FAILS, UNDECIDED, Row
-from validation.compare.scales import yardstick
+from validation.compare.scales import of_length, term_sizes, yardstick
 from validation.compare.tolerance import EPS, EQUIVALENCE, NOTHING_TO_TELL, Array, K, condition_of
 from validation.compare.withheld import FORMULAS
 from validation.engines.exact import BallArithmetic, unknown
@@ -28,8 +28,10 @@ ROUNDED_SOMEWHERE = 20
 """Positions with loaded friction of which at least one leaves a residual: by rounding half of them do."""
 
 
-def printed(name: str, scene: Scene, at: Command, solution: Solution) -> Iterator[Row]:
+def printed(name: str, scene: Scene, at: Command, solution: Solution, basis: Solution | None) -> Iterator[Row]:
     """One row per statement that the scene makes."""
+    if scene.points and basis is not None and at.omega_2 is not None:
+        yield _points(name, scene, solution, basis)
     if scene.motion.law is not None and at.time is not None:
         yield law_row(name, scene, at)
     if at.omega_2 is None:
@@ -40,6 +42,43 @@ def printed(name: str, scene: Scene, at: Command, solution: Solution) -> Iterato
             yield from _error_bars(name, scene, at, solution)
     if solution.friction_residual is not None:
         yield _residual(name, scene, solution)
+
+
+def _points(name: str, scene: Scene, solution: Solution, basis: Solution) -> Row:
+    """Places, velocities and accelerations of the scene's own points, from the angles of another derivation."""
+    link, n = scene.linkage, len(basis)
+    zero = np.zeros(n)
+    theta = {1: zero + link.ground_angle, 2: basis.theta_2, 3: basis.theta_3, 4: basis.theta_4}
+    speed = {bar: zero if bar == 1 else _known(basis, f"omega_{bar}", n) for bar in theta}
+    growth = {bar: zero if bar == 1 else _known(basis, f"alpha_{bar}", n) for bar in theta}
+
+    def swing(bar: int, distance: float, angle: float) -> list[NDArray[np.complex128]]:
+        arm = distance * np.exp(1j * (theta[bar] + angle))
+        return [arm, 1j * speed[bar] * arm, (1j * growth[bar] - speed[bar] ** 2) * arm]
+
+    feet = {3: swing(2, link.input.length, 0.0), 4: [link.ground * np.exp(1j * theta[1]), 0.0 * zero, 0.0 * zero]}
+    error = np.zeros(n)
+    usable = (solution.status_code == OK) & (condition_of("F12", link, basis) * NOTHING_TO_TELL > EPS)
+    for point in scene.points:
+        own, foot = swing(point.bar, *point.from_pin), feet.get(point.bar, [zero, zero, zero])
+        tables, like = (solution.points, solution.velocity, solution.acceleration), ("B", "v_B", "a_B")
+        for ours, kind, arm, at_foot in zip(tables, like, own, foot, strict=True):
+            if point.name in ours:
+                theirs = np.stack(((arm + at_foot).real, (arm + at_foot).imag), axis=1)
+                size = np.abs(arm) + np.abs(at_foot) + of_length(scene)
+                if kind != "B":
+                    size = np.abs(arm) + np.abs(at_foot) + term_sizes(kind, scene, basis)
+                apart = relative_error(kind, ours[point.name], theirs, size) * condition_of(kind, link, basis)
+                error = np.where(usable, np.maximum(error, np.where(np.isnan(apart), np.inf, apart)), error)
+    index = worst(error)
+    verdict = UNDECIDED if not usable.any() else AGREES if error[index] <= EQUIVALENCE.factor else FAILS
+    what, place = f"the {len(scene.points)} points of the scene", float(solution.theta_2[index])
+    return Row(name, FORMULAS, "exact", "points", float(error[index]), EQUIVALENCE.factor, verdict, what, place, 1.0)
+
+
+def _known(basis: Solution, quantity: str, n: int) -> Array:
+    values: Array | None = getattr(basis, quantity)
+    return np.zeros(n) if values is None else values
 
 
 def piece(at: Command, where: NDArray[np.intp]) -> Command:

@@ -1,12 +1,14 @@
 """Every planted fault against the harness, each in a process of its own; none may survive without a reason."""
 
 import json
+import os
 import subprocess
 import sys
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
+from validation.stress.mutation import planting
 from validation.stress.mutation.planting import ROOT, faults
 
 SECONDS = 300
@@ -15,9 +17,12 @@ SECONDS = 300
 
 def outcome(number: int | None) -> dict[str, list[str]] | str:
     """The failing rows by specimen with the fault of a number, or why there are none; None: without a fault."""
-    line = [sys.executable, "-m", "validation.stress.mutation.planting", *([] if number is None else [str(number)])]
+    line = [sys.executable, "-P", planting.__file__, *([] if number is None else [str(number)])]
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     try:
-        done = subprocess.run(line, cwd=ROOT, check=False, capture_output=True, text=True, timeout=SECONDS)
+        done = subprocess.run(
+            line, cwd=ROOT, check=False, capture_output=True, text=True, timeout=SECONDS, env=environment
+        )
     except subprocess.TimeoutExpired:
         return f"it took more than {SECONDS} s"
     if done.returncode:

@@ -1,7 +1,7 @@
 """One planted fault in one process: its module is loaded with another text, then the harness judges the specimens.
 
-`python -m validation.stress.mutation.planting NUMBER` prints what failed as JSON; without a number nothing is planted
-and every specimen must hold. Nothing of the project is imported before the fault is in place.
+Run by its path, with the checkout on PYTHONPATH: `python -P planting.py NUMBER` prints what failed as JSON; without a
+number nothing is planted and every specimen must hold. As a module it would import the project before the fault stands.
 """
 
 import importlib.abc
@@ -41,6 +41,10 @@ class Planter(importlib.abc.MetaPathFinder):
 
     def __init__(self, entry: dict[str, Any]) -> None:
         self.texts = planted(entry)
+        self.left = set(self.texts)
+        """Modules that are not loaded yet."""
+        if early := [name for name in sys.modules if name.partition(".")[0] in ("fourbar", "validation")]:
+            raise RuntimeError(f"imported before the fault was planted: {early}")
 
     def find_spec(self, fullname: str, path: Any, target: Any = None) -> importlib.machinery.ModuleSpec | None:
         """The module with the fault, or None."""
@@ -48,6 +52,7 @@ class Planter(importlib.abc.MetaPathFinder):
             return None
         spec = importlib.machinery.PathFinder.find_spec(fullname, path)
         assert spec is not None and spec.origin is not None
+        self.left.discard(fullname)
         spec.loader = _Text(fullname, spec.origin, self.texts[fullname])
         return spec
 
@@ -82,12 +87,16 @@ def failing(names: list[str]) -> dict[str, list[str]]:
 
 def main() -> None:
     """Plant the fault of a number, judge its specimens, print what fails."""
-    names: list[str] = []
-    if len(sys.argv) > 1:
-        entry = faults()[int(sys.argv[1])]
-        sys.meta_path.insert(0, Planter(entry))
-        names = entry["specimens"]
-    print(json.dumps(failing(names)))
+    if len(sys.argv) == 1:
+        print(json.dumps(failing([])))
+        return
+    entry = faults()[int(sys.argv[1])]
+    planter = Planter(entry)
+    sys.meta_path.insert(0, planter)
+    found = failing(entry["specimens"])
+    if planter.left:
+        raise RuntimeError(f"the specimens use no {', '.join(planter.left)}")
+    print(json.dumps(found))
 
 
 if __name__ == "__main__":

@@ -23,6 +23,7 @@ from fourbar.linkage import Bar, FourBar, uniform
 from fourbar.scene import Scene
 from fourbar.scene.motion import CROSSED, Free, FromLimit, Motion, Sweep
 from fourbar.scene.motion_law import Law
+from fourbar.scene.point import Point as OwnPoint
 
 CRANK = FourBar(
     0.3,
@@ -40,7 +41,8 @@ LOADS = (
     Load(2, (1.0, 0.3), (0.02, -0.7)),
 )
 WEIGHT = Gravity(9.81, -1.3)
-CRANK_ROCKER = Scene(CRANK, TURN, 2, LOADS, (WEIGHT,))
+POINTS = (OwnPoint("P", 3, (0.1, 0.7)), OwnPoint("Q", 4, (0.05, -0.3)), OwnPoint("R", 2, (0.03, 0.2)))
+CRANK_ROCKER = Scene(CRANK, TURN, 2, LOADS, (WEIGHT,), points=POINTS)
 SPECIMENS: dict[str, Scene] = {
     "crank-rocker": CRANK_ROCKER,
     "coupler driven": replace(CRANK_ROCKER, motion=replace(TURN, branch=CROSSED), drive_bar=3),
