@@ -10,7 +10,7 @@ from fourbar.quantities import FORCES, OK, PIN_FORCES
 from fourbar.scene import Command, Scene
 from fourbar.solution import Solution
 from fourbar.solve import BLOCK, solve
-from validation.compare.basis import basis_of, strictest_condition
+from validation.compare.basis import basis_of, smallest_yardstick, strictest_condition
 from validation.compare.error import magnitude, relative, relative_error, worst
 from validation.compare.law import law_row
 from validation.compare.rows import AGREES, FAILS, UNDECIDED, Row
@@ -127,7 +127,7 @@ def _error_bars(name: str, scene: Scene, at: Command, solution: Solution) -> Ite
     for bar, quantities in (("torque_error", ("torque",)), ("force_error", PIN_FORCES)):
         width = getattr(ours, bar)
         true = np.max([magnitude(getattr(ours, q) - exact.quantities[q]) for q in quantities], axis=0)
-        size = np.max([magnitude(exact.quantities[q]) for q in quantities], axis=0)
+        size = np.max([smallest_yardstick(q, scene, ours, other) for q in quantities], axis=0)
         condition = strictest_condition(quantities[0], scene.linkage, ours, other)
         tells = condition * NOTHING_TO_TELL > EPS
         wide = relative(width, size) * condition / (K * EPS)
