@@ -167,7 +167,7 @@ MISTAKES: list[tuple[str, str, tuple[str, ...], Callable[[Scene], Numbers], str]
     ("other branch", "thesis", ALL, solved(same, branch=np.full(12, -1, np.int8)), "other branch"),
     ("gravity missing", "crank_rocker", FORCES, solved(lambda s: replace(s, effects=())), "gravity is missing"),
     ("gravity upwards", "crank_rocker", FORCES,
-     solved(lambda s: replace(s, effects=(fourbar.Gravity(-9.81),))), "gravity points the other way"),
+     solved(lambda s: replace(s, effects=(fourbar.Gravity(-9.81),))), "gravity is reversed"),
     ("gravity added", "thesis", FORCES,
      solved(lambda s: replace(s, effects=(fourbar.Gravity(),))), "gravity along -y is included"),
     ("loads missing", "thesis", FORCES, solved(lambda s: replace(s, loads=())), "the loads are missing"),

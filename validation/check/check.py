@@ -35,14 +35,14 @@ class Finding:
     theta_2: float
 
     @property
-    def told(self) -> bool:
+    def judged(self) -> bool:
         """Whether any digit is left by which it can be judged."""
         return self.allowed != math.inf
 
     @property
     def agrees(self) -> bool:
         """Whether it is within what is allowed."""
-        return self.told and self.error <= self.allowed
+        return self.judged and self.error <= self.allowed
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,8 +56,8 @@ class Judgement:
 
     @property
     def differing(self) -> list[Finding]:
-        """The findings that do not agree, though there are digits to tell by."""
-        return [finding for finding in self.findings if finding.told and not finding.agrees]
+        """The findings that do not agree, though there are digits to judge by."""
+        return [finding for finding in self.findings if finding.judged and not finding.agrees]
 
     @property
     def agreeing(self) -> int:
@@ -65,9 +65,9 @@ class Judgement:
         return sum(finding.agrees for finding in self.findings)
 
     @property
-    def untold(self) -> int:
-        """How many numbers nothing can be told of."""
-        return sum(not finding.told for finding in self.findings)
+    def not_judged(self) -> int:
+        """How many numbers have no digit left to judge by."""
+        return sum(not finding.judged for finding in self.findings)
 
 
 def judge_table(scene: Scene, table: Table) -> Judgement:
@@ -81,11 +81,11 @@ def judge_table(scene: Scene, table: Table) -> Judgement:
     at = Command(table.theta_2, branch, base.omega_2, base.alpha_2)
     right = solve(scene, "position" if at.omega_2 is None else "force", at=at)
     ok = right.status_code == OK
-    beside = []  # the same half a unit of a rounded theta_2 away
+    near = []  # the same half a unit of a rounded theta_2 away
     if table.theta_2_rounding.any():
         for shift in (-table.theta_2_rounding, table.theta_2_rounding):
             moved = at._replace(theta_2=at.theta_2 + shift)
-            beside.append(solve(scene, "position" if at.omega_2 is None else "force", at=moved))
+            near.append(solve(scene, "position" if at.omega_2 is None else "force", at=moved))
 
     def judged(quantity: str, ours: Array, theirs: Array) -> tuple[Array, Array]:
         yard = yardstick(quantity, scene, right, getattr(right, quantity))
@@ -97,7 +97,7 @@ def judge_table(scene: Scene, table: Table) -> Judgement:
         size = np.nanmax(magnitude(ours)[ok], initial=0.0) if not quantity.startswith("theta") else 0.0
         there = getattr(right, quantity)
         larger = 1.0 if ours is there else np.maximum(size / scale, 1.0)
-        moves = [angle_aware_difference(quantity, there, getattr(other, quantity)) for other in beside]
+        moves = [angle_aware_difference(quantity, there, getattr(other, quantity)) for other in near]
         spread = np.fmax.reduce(moves) / scale if moves else 0.0
         exact = np.where(yard == 0.0, 0.0, EQUIVALENCE.allowed(condition))
         allowed = (exact + spread) * larger + table.rounding[quantity] / scale
@@ -114,13 +114,13 @@ def judge_table(scene: Scene, table: Table) -> Judgement:
         label = table.label(quantity)
         for index, e, most in zip(np.flatnonzero(ok).tolist(), error.tolist(), allowed.tolist(), strict=True):
             findings.append(Finding(table.lines[index], label, e, most, float(table.theta_2[index])))
-    found = {finding.quantity for finding in findings if finding.told and not finding.agrees}
+    found = {finding.quantity for finding in findings if finding.judged and not finding.agrees}
     differing = sorted(quantity for quantity in table.values if table.label(quantity) in found)
     known = explain(table, scene, at, right, differing, judged) if differing else []
     return Judgement(findings, [table.lines[index] for index in np.flatnonzero(~ok)], known)
 
 
-def said(explanation: Explanation) -> str:
+def extent(explanation: Explanation) -> str:
     """How far a mistake explains what differs."""
     if explanation.complete:
         return "explains everything that differs: " + ", ".join(explanation.quantities)
@@ -160,11 +160,11 @@ def check(scene: Path, theirs: Path) -> int:
     for line in judgement.not_assembled:
         console.print(f"line {line}: the linkage has no motion there (it does not assemble, or is singular)")
     for explanation in judgement.explanations:
-        console.print(f"looks like: {escape(explanation.text)} ({said(explanation)})")
+        console.print(f"looks like: {escape(explanation.text)} ({extent(explanation)})")
     if differing and not any(explanation.complete for explanation in judgement.explanations):
         console.print("no single known mistake explains all of it")
-    count = len(judgement.findings) - judgement.untold
-    apart = f"; nothing can be told of {judgement.untold} more" if judgement.untold else ""
-    told = f"{judgement.agreeing} of {count} numbers agree" if count else "Nothing was compared"
-    console.print(f"[bold]{told}{apart}[/]")
+    count = len(judgement.findings) - judgement.not_judged
+    apart = f"; no digit left to judge {judgement.not_judged} more by" if judgement.not_judged else ""
+    agreed = f"{judgement.agreeing} of {count} numbers agree" if count else "Nothing was compared"
+    console.print(f"[bold]{agreed}{apart}[/]")
     return FAILED if differing or judgement.not_assembled or not count else HOLDS

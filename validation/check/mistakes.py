@@ -19,9 +19,9 @@ POWERS_OF_TEN = (-6, -5, -4, -3, -2, -1, 1, 2, 3, 4, 5, 6)
 GRAVITATIONAL = 9.80665
 """kgf in N."""
 SHOWN = 5
-"""Explanations that are told."""
+"""Explanations that are printed."""
 NEARER = 10.0
-"""A mistake that brings every row of a quantity this much nearer is told, though it does not explain it wholly."""
+"""A mistake that brings every row of a quantity this much nearer is named, though it does not explain it wholly."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,7 +36,7 @@ class Mistake:
 
 
 def hypotheses(scene: Scene, at: Command) -> Iterator[Mistake]:
-    """Every mistake that this scene gives room for, the simplest first."""
+    """Every mistake that can be made on this scene, the simplest first."""
     yield Mistake(
         "sign reversed, or F_ij given for F_ji",
         lambda quantity, right: _where(quantity, right, lambda v: -v),
@@ -134,7 +134,7 @@ def _other_problems(scene: Scene, at: Command) -> Iterator[tuple[str, Scene, Com
         others = tuple(effect for effect in scene.effects if not isinstance(effect, Gravity))
         yield "gravity is missing", replace(scene, effects=others), at
         flipped = tuple(replace(g, magnitude=-g.magnitude) for g in gravity)
-        yield "gravity points the other way", replace(scene, effects=(*others, *flipped)), at
+        yield "gravity is reversed", replace(scene, effects=(*others, *flipped)), at
     else:
         yield "gravity along -y is included though the scene has none", _with_gravity(scene), at
     if scene.loads:

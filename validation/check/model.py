@@ -37,14 +37,14 @@ EXAMINE = "validation.engines.mujoco.theirs:examine"
 
 @dataclass(frozen=True, slots=True)
 class Cost:
-    """One quantity, asked in one way: the error of their file, and of the generated one beside it."""
+    """One quantity by one method: the error of their file, and of the generated one."""
 
     row: Row
     generated: float
 
     @property
-    def asked(self) -> str:
-        """How."""
+    def method(self) -> str:
+        """Engine and setting."""
         return f"{self.row.engine} {self.row.setting}"
 
     def cells(self) -> tuple[str, ...]:
@@ -56,15 +56,15 @@ class Cost:
 
 @dataclass(frozen=True, slots=True)
 class ModelReport:
-    """All that is said about somebody's file."""
+    """All that is reported of somebody's file."""
 
     differences: list[Difference]
     costs: list[Cost]
     notes: list[str]
 
-    def asked(self) -> list[str]:
-        """The ways in which their file was asked."""
-        return list(dict.fromkeys(cost.asked for cost in self.costs))
+    def methods(self) -> list[str]:
+        """The methods by which their file was evaluated."""
+        return list(dict.fromkeys(cost.method for cost in self.costs))
 
     @property
     def counts(self) -> Counts:
@@ -87,12 +87,12 @@ def named(pairs: tuple[str, ...]) -> dict[str, str]:
 def examine_model(
     name: str, scene: Scene, mjcf: Path, names: Mapping[str, str], tolerance: Tolerance = SIMULATED
 ) -> ModelReport:
-    """Examine a file in a guarded process, and the generated one in the same way; theirs is held to the tolerance."""
+    """Examine a file in a guarded process, and the generated one likewise; theirs is held to the tolerance."""
     text = read_mjcf(mjcf)
     generated, theirs = _guarded(scene, None, {}), _guarded(scene, text, names)
-    beside = {(row.engine, row.quantity): row.error for row in _rows(name, scene, generated.answers, SIMULATED)}
+    ours = {(row.engine, row.quantity): row.error for row in _rows(name, scene, generated.answers, SIMULATED)}
     rows = _rows(name, scene, theirs.answers, tolerance)
-    costs = [Cost(row, beside.get((row.engine, row.quantity), math.nan)) for row in rows]
+    costs = [Cost(row, ours.get((row.engine, row.quantity), math.nan)) for row in rows]
     return ModelReport(differences(generated.described, theirs.described, theirs.called), costs, theirs.notes)
 
 
@@ -142,7 +142,7 @@ def _examine(adapter: str, scene: Scene, text: str | None, names: dict[str, str]
     return getattr(import_module(module), function)(scene, text, names)
 
 
-def tell(report: ModelReport, mjcf: Path, out: Path) -> None:
+def show(report: ModelReport, mjcf: Path, out: Path) -> None:
     """Print the report and write theirs.md and results.csv."""
     from rich.box import SIMPLE_HEAD
     from rich.console import Console
@@ -158,20 +158,20 @@ def tell(report: ModelReport, mjcf: Path, out: Path) -> None:
     console.print(shown if report.differences else "It differs in nothing from the generated MJCF.")
     for note in report.notes:
         console.print(f"note: {escape(plain(note))}")
-    for asked in report.asked():
-        costs = Table(title=f"what it costs, {escape(plain(asked))}: error", box=SIMPLE_HEAD, pad_edge=False)
+    for method in report.methods():
+        costs = Table(title=f"what it costs, {escape(plain(method))}: error", box=SIMPLE_HEAD, pad_edge=False)
         for heading in HEADINGS:
             costs.add_column(heading, overflow="fold")
         for cost in report.costs:
-            if cost.asked == asked:
+            if cost.method == method:
                 style = "bold red" if cost.row.failed else ""
                 costs.add_row(*(escape(plain(text)) for text in cost.cells()), style=style)
         console.print(costs)
     out.mkdir(parents=True, exist_ok=True)
     write_text(out / "theirs.md", markdown(report, mjcf))
     write_results([cost.row for cost in report.costs], out / "results.csv")
-    said = f"{report.counts.sentence()}. It differs in {len(report.differences)} entries"
-    console.print(f"[bold]{said}[/]; written to {escape(plain(str(out)))}")
+    sentence = f"{report.counts.sentence()}. It differs in {len(report.differences)} entries"
+    console.print(f"[bold]{sentence}[/]; written to {escape(plain(str(out)))}")
 
 
 def markdown(report: ModelReport, mjcf: Path) -> str:
@@ -186,9 +186,9 @@ def markdown(report: ModelReport, mjcf: Path) -> str:
         lines.append("| " + " | ".join(cell(plain(text)) for text in entries(d)) + " |")
     lines += ["", *(f"- {cell(plain(note))}" for note in report.notes), "", "## What it costs", ""]
     lines += [f"{report.counts.sentence()}.", ""]
-    lines += [f"| asked | {' | '.join(HEADINGS)} |", "|---|---|---|---|---|---|"]
+    lines += [f"| method | {' | '.join(HEADINGS)} |", "|---|---|---|---|---|---|"]
     for cost in report.costs:
-        lines.append("| " + " | ".join(cell(plain(text)) for text in (cost.asked, *cost.cells())) + " |")
+        lines.append("| " + " | ".join(cell(plain(text)) for text in (cost.method, *cost.cells())) + " |")
     return "\n".join(lines) + "\n"
 
 
@@ -199,7 +199,7 @@ def entries(difference: Difference) -> tuple[str, ...]:
 
 
 def value(entry: Value) -> str:
-    """Numbers with the digits that tell them apart, or the word itself."""
+    """Numbers with the digits that set them apart, or the word itself."""
     if isinstance(entry, str):
         return entry
     return " ".join(f"{x:.12g}" for x in (entry if isinstance(entry, tuple) else (entry,)))

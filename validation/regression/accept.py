@@ -28,8 +28,8 @@ def output_options(command: Callable[..., Any]) -> Callable[..., Any]:
     return command
 
 
-def told(old: Path, new: Path, forms: dict[str, Path | None]) -> int:
-    """Print the differences, write the forms asked for; 1 on a regression, or where nothing was compared."""
+def report_differences(old: Path, new: Path, forms: dict[str, Path | None]) -> int:
+    """Print the differences, write the forms wanted; 1 on a regression, or where nothing was compared."""
     found = differences(read_run(old), read_run(new))
     for form, path in forms.items():
         if path is not None:
@@ -48,7 +48,7 @@ def compare(old: str, new: Path, **forms: Path | None) -> int:
     Exit status 1 on a regression: a verdict that got worse, an error that grew beyond round-off,
     a row that is gone, a new row that fails; and where nothing was compared.
     """
-    return told(baseline(old), new, forms)
+    return report_differences(baseline(old), new, forms)
 
 
 @click.command(name="accept")

@@ -61,7 +61,7 @@ class Differences:
     """Everything that differs between two runs."""
 
     surroundings: list[tuple[str, str, str]]
-    """(what, old, new) of versions, machine and settings; said first."""
+    """(what, old, new) of versions, machine and settings; reported first."""
     changes: list[Change]
 
     def of(self, kind: Kind) -> list[Change]:

@@ -27,7 +27,7 @@ class About:
     versions: dict[str, str]
     machine: str
     settings: dict[str, str]
-    """Engines asked, suite, and the factors of the tolerances."""
+    """Engines, suite, and the factors of the tolerances."""
 
 
 def about(factors: Mapping[str, float], suite: str) -> About:
@@ -38,7 +38,7 @@ def about(factors: Mapping[str, float], suite: str) -> About:
 
 
 def write_about(record: About, folder: Path) -> None:
-    """Write record.json beside the results."""
+    """Write record.json next to the results."""
     write_text(folder / ABOUT, json.dumps(asdict(record), indent=1, sort_keys=True) + "\n")
 
 
@@ -57,13 +57,13 @@ def read_run(path: Path) -> tuple[About, list[Row]]:
         rows = list(read_columns(table)) if table.suffix == ".parquet" else from_csv(table)
     except (KeyError, TypeError, ValueError, csv.Error):  # a column, a cell or a number is missing, or it is no text
         raise InputError("RESULTS", str(table), "is not a table written by `run`") from None
-    beside = table.parent / ABOUT
-    if not beside.is_file():
+    record = table.parent / ABOUT
+    if not record.is_file():
         return About({}, "unknown machine", {}), rows
     try:
-        return _about(json.loads(beside.read_text(encoding="utf-8"))), rows
+        return _about(json.loads(record.read_text(encoding="utf-8"))), rows
     except (AttributeError, KeyError, TypeError, ValueError, RecursionError):
-        raise InputError("RESULTS", str(beside), "is not a record written by `run`") from None
+        raise InputError("RESULTS", str(record), "is not a record written by `run`") from None
 
 
 def _about(kept: dict[str, Any]) -> About:

@@ -4,7 +4,7 @@ from validation.regression.changes import Change, Differences, Kind
 from validation.report.markdown import cell
 from validation.report.templating import environment, number
 
-TOLD = tuple(kind for kind in Kind if kind not in (Kind.SAME, Kind.ROUND_OFF))
+SHOWN = tuple(kind for kind in Kind if kind not in (Kind.SAME, Kind.ROUND_OFF))
 AT_MOST = 50
 """Rows of one kind listed in text and Markdown."""
 
@@ -38,7 +38,7 @@ def line(change: Change) -> str:
 def text(found: Differences) -> str:
     """For a terminal."""
     lines = [f"{what}: {old} -> {new}" for what, old, new in found.surroundings]
-    for kind in TOLD:
+    for kind in SHOWN:
         changes = found.of(kind)
         lines += [f"{kind.value}: {line(change)}" for change in changes[:AT_MOST]]
         if len(changes) > AT_MOST:
@@ -53,7 +53,7 @@ def markdown(found: Differences) -> str:
         lines += ["| made with | old | new |", "|---|---|---|"]
         lines += [f"| {cell(what)} | {cell(old)} | {cell(new)} |" for what, old, new in found.surroundings]
         lines.append("")
-    for kind in TOLD:
+    for kind in SHOWN:
         if changes := found.of(kind):
             lines += [f"## {kind.value}: {len(changes)}", ""]
             lines += [f"- {cell(line(change))}" for change in changes[:AT_MOST]]
@@ -65,7 +65,7 @@ def markdown(found: Differences) -> str:
 
 def html(found: Differences) -> str:
     """A page of its own."""
-    kinds = [(kind, found.of(kind)) for kind in TOLD if found.of(kind)]
+    kinds = [(kind, found.of(kind)) for kind in SHOWN if found.of(kind)]
     template = environment("validation.regression", escape=True).get_template("changes.html.j2")
     return template.render(found=found, verdict=verdict(found), kinds=kinds)
 

@@ -20,7 +20,7 @@ from validation.engines.hard_suite import Hard
 from validation.engines.mujoco.picture import pictures
 from validation.engines.witnesses import Witness
 from validation.published import ladder_rows
-from validation.regression.accept import output_options, told
+from validation.regression.accept import output_options, report_differences
 from validation.regression.record import about, baseline, read_run, write_about
 from validation.report import cost_section, hard_section
 from validation.report.html import Section, html
@@ -137,7 +137,7 @@ def timings_csv(pages: Iterator[Page]) -> str:
 
 def examine(scenes: tuple[Path, ...], mjcf: Path, names: tuple[str, ...], out: Path, asked: float | None) -> int:
     """What a user's own MJCF of one scene differs in, and what it costs; 1 where it is wrong by more than asked."""
-    from validation.check.model import examine_model, named, tell
+    from validation.check.model import examine_model, named, show
     from validation.run.dial import held_to
 
     if len(scenes) != 1:
@@ -145,7 +145,7 @@ def examine(scenes: tuple[Path, ...], mjcf: Path, names: tuple[str, ...], out: P
     suite = scene_files(scenes)
     tolerance = SIMULATED if asked is None else held_to(asked, "what this file may be wrong by")
     report = examine_model(suite.name(0), suite.scene(0), mjcf, named(names), tolerance)
-    tell(report, mjcf, out)
+    show(report, mjcf, out)
     return report.counts.status
 
 
@@ -246,7 +246,7 @@ def command(
                 progress.advance(task, result)
     assert isinstance(result, Summary)
     table(result, out)
-    worse = told(baseline(against), out, forms) if against is not None else 0
+    worse = report_differences(baseline(against), out, forms) if against is not None else 0
     if result.counts[FAILS] or worse:
         return FAILED
     if missing:
