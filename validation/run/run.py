@@ -173,7 +173,14 @@ def examine(scenes: tuple[Path, ...], mjcf: Path, names: tuple[str, ...], out: P
     help="Run the suite under this interpreter too (into OUT/elsewhere), and say what changes from there to here.",
 )
 @click.option("--mjcf", type=click.Path(path_type=Path), help="Examine this MJCF of the one SCENE instead.")
-@click.option("--name", "names", metavar="ROLE=NAME", multiple=True, help="Body or site of --mjcf named otherwise.")
+@click.option(
+    "--name",
+    "names",
+    metavar="ROLE=NAME",
+    multiple=True,
+    help="Of --mjcf: the body that is the input, coupler or output; B3, B4: the sites of pin B on the coupler and the "
+    "output, where no connect or weld closes the loop. Left out: guessed from structure and lengths, and printed.",
+)
 @output_options
 def command(
     scenes: tuple[Path, ...],
