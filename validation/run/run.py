@@ -22,6 +22,7 @@ from validation.engines.witnesses import Witness
 from validation.published import ladder_rows
 from validation.regression.accept import output_options, report_differences
 from validation.regression.record import about, baseline, read_run, write_about
+from validation.regression.scenes import descriptions
 from validation.report import cost_section, hard_section
 from validation.report.html import Section, html
 from validation.report.machine import versions
@@ -84,7 +85,7 @@ def run(
         summary = summarise(store.pages(len(chunks)), ladder, held_to, missing)
         first_lines = write_columns(store.rows(len(chunks)), out)
         factors = {witness.name: witness.tolerance.factor for witness in witnesses}
-        write_about(about(factors, suite.fingerprint()), out)
+        write_about(about(factors, suite.fingerprint(), descriptions(suite)), out)
         write_text(out / "timings.csv", timings_csv(store.pages(len(chunks))))
         write_text(out / "report.md", markdown(summary))
         drawn, why_not = mjcf_pictures(suite) if draw and simulated else ({}, "")
