@@ -18,7 +18,7 @@ from fourbar.solve import solve
 from validation.check.judge import Judge
 from validation.check.mistake import Mistake
 from validation.check.theirs import Array, quantity_of
-from validation.compare.compare import angle_aware_difference
+from validation.compare.error import difference, in_own_unit
 
 OTHER_UNITS = {
     "rad": ("deg",),
@@ -180,11 +180,11 @@ def _offset(judge: Judge) -> Iterator[Mistake]:
         parts = []
         for key in keys:
             ours, theirs = judge.ours(key, moved), judge.table.values[key][rows]
-            difference = ours - theirs
+            apart = ours - theirs
             if quantity_of(key).startswith("theta"):
-                difference = np.remainder(difference + np.pi, 2.0 * np.pi) - np.pi
+                apart = np.remainder(apart + np.pi, 2.0 * np.pi) - np.pi
             yard = judge.yard(key)[rows]
-            scaled = difference / np.where(yard > 0.0, yard, 1.0).reshape(-1, *[1] * (difference.ndim - 1))
+            scaled = apart / in_own_unit(yard).reshape(-1, *[1] * (apart.ndim - 1))
             parts.append(np.where(np.isfinite(theirs), scaled, 0.0).ravel())
         return np.concatenate(parts)
 
@@ -224,7 +224,7 @@ def _order(judge: Judge) -> Iterator[Mistake]:
         ours, theirs, yard = judge.ours(key), table.values[key], judge.yard(key).max()
         for i in range(n):
             there = np.where(np.isnan(theirs[i]), ours, theirs[i]) if ours.ndim == 2 else np.full(n, theirs[i])
-            apart[i] += angle_aware_difference(quantity_of(key), ours, there) / yard
+            apart[i] += difference(quantity_of(key), ours, there) / yard
     nearest = np.argmin(apart, axis=1)
     if len(np.unique(nearest)) < n - 1 or np.array_equal(nearest, np.arange(n)):  # a revolution ends where it began
         return

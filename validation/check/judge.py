@@ -14,8 +14,8 @@ from fourbar.scene import Command, Scene, command
 from fourbar.solution import Solution
 from fourbar.solve import solve
 from validation.check.theirs import Array, Table, quantity_of
-from validation.compare.compare import angle_aware_difference
-from validation.compare.scales import magnitude, yardstick
+from validation.compare.error import difference, in_own_unit, magnitude, relative
+from validation.compare.scales import yardstick
 from validation.compare.tolerance import EPS, EQUIVALENCE, NOTHING_TO_TELL, condition_of
 
 Mask = NDArray[np.bool_]
@@ -110,23 +110,23 @@ class Judge:
         return [solve(self.scene, self.stage, at=self.at._replace(theta_2=x, remainder=None)) for x in moved]
 
     def judged(self, key: str, ours: Array) -> tuple[Array, Array, Array]:
-        """(error, allowed, difference) of the table where `ours` is taken for the right numbers, each (n,)."""
+        """(error, allowed, apart) of the table where `ours` is taken for the right numbers, each (n,)."""
         quantity, yard = quantity_of(key), self.yard(key)
-        scale = np.where(yard == 0.0, 1.0, yard)  # what all its terms leave 0 is judged in its own unit
+        scale = in_own_unit(yard)  # what all its terms leave 0
         theirs = self.table.values[key]
         theirs = np.where(np.isnan(theirs), ours, theirs)  # a component that their table does not have
-        difference = angle_aware_difference(quantity, ours, theirs)
+        apart = difference(quantity, ours, theirs)
         condition = condition_of(quantity, self.scene.linkage, self.right)
         # what a mistake would have printed is rounded at its own size, however much larger
         there = self.ours(key)
         larger: Array | float = 1.0
         if ours is not there and not quantity.startswith("theta"):
             larger = np.maximum(np.nanmax(magnitude(ours)[self.ok], initial=0.0) / scale, 1.0)
-        moves = [angle_aware_difference(quantity, there, self.ours(key, other)) for other in self.near]
-        spread = np.fmax.reduce(moves) / scale if moves else 0.0
+        moves = [difference(quantity, there, self.ours(key, other)) for other in self.near]
+        spread = relative(np.fmax.reduce(moves), scale) if moves else 0.0
         exact = np.where(yard == 0.0, 0.0, EQUIVALENCE.allowed(condition))
-        allowed = (exact + spread) * larger + self.table.rounding[key] / scale
-        return difference / scale, np.where(condition * NOTHING_TO_TELL > EPS, allowed, np.inf), difference
+        allowed = (exact + spread) * larger + relative(self.table.rounding[key], scale)
+        return relative(apart, scale), np.where(condition * NOTHING_TO_TELL > EPS, allowed, np.inf), apart
 
     def permitted(self, key: str, ours: Array) -> Array | None:
         """The difference that the stated tolerance allows, (n,), in the quantity's unit."""
@@ -137,11 +137,11 @@ class Judge:
     def explained(self, key: str, predicted: Array, times: float = 1.0) -> bool:
         """Whether all of a key is what `predicted` says, within `times` what is allowed."""
         where = self.where(key)
-        error, allowed, difference = (values[where] for values in self.judged(key, predicted))
+        error, allowed, apart = (values[where] for values in self.judged(key, predicted))
         within = error <= times * allowed
         permitted = self.permitted(key, predicted)
         if permitted is not None:
-            within |= difference <= permitted[where]
+            within |= apart <= permitted[where]
         return bool(where.any() and np.all(within))
 
     def findings(self) -> list[Finding]:
@@ -149,7 +149,7 @@ class Judge:
         found = []
         for key, theirs in self.table.values.items():
             ours, label = self.ours(key), self.table.label(key)
-            error, allowed, difference = self.judged(key, ours)
+            error, allowed, apart = self.judged(key, ours)
             permitted = self.permitted(key, ours)
             for i in np.flatnonzero(self.where(key)).tolist():
                 stated = np.isfinite(np.atleast_1d(theirs[i]))
@@ -161,7 +161,7 @@ class Judge:
                         tuple(np.atleast_1d(ours[i])[stated].tolist()),
                         float(error[i]),
                         float(allowed[i]),
-                        float(difference[i]),
+                        float(apart[i]),
                         None if permitted is None else float(permitted[i]),
                         float(self.at.theta_2[i]),
                     )

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from fourbar.solution import Solution
 from validation.check.theirs import Array, quantity_of
-from validation.compare.scales import magnitude
+from validation.compare.error import magnitude
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,8 +7,9 @@ from datetime import datetime
 from statistics import fmean, stdev
 from typing import TYPE_CHECKING, Any
 
+from validation.compare.error import used
 from validation.compare.identities import FORMULAS
-from validation.compare.rows import AGREES, COMPARED, DEGRADED, FAILS, REFUSES, VERDICTS, Row
+from validation.compare.rows import AGREES, DEGRADED, FAILS, REFUSES, VERDICTS
 from validation.compare.tolerance import EPS
 from validation.regression.changes import Key
 from validation.regression.history import Run
@@ -137,7 +138,7 @@ def _engines(runs: Sequence[Run]) -> list[str]:
 def _errors(runs: Sequence[Run]) -> str:
     def draw(axes: "Axes") -> None:
         for engine in _engines(runs):
-            worst = [max((_share(row) for row in run.rows if row.engine == engine and row.verdict in COMPARED),
+            worst = [max((max(float(used(row.error, row.allowed)), FLOOR) for row in run.rows if row.engine == engine and row.compared and math.isfinite(row.error)),
                          default=math.nan) for run in runs]  # fmt: skip
             style = style_of(engine)
             axes.plot(range(len(runs)), worst, color=style.colour, marker=style.marker, markersize=3.5,
@@ -149,13 +150,6 @@ def _errors(runs: Sequence[Run]) -> str:
         _legend(axes)
 
     return _figure(draw, "errors")
-
-
-def _share(row: Row) -> float:
-    """Error over what is allowed; what should vanish and does is drawn at the floor."""
-    if not row.allowed > 0.0:
-        return FLOOR if row.error == 0.0 else math.nan
-    return max(row.error / row.allowed, FLOOR)
 
 
 def _times(runs: Sequence[Run]) -> str:
