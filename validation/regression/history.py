@@ -115,7 +115,8 @@ def _table(about: About, rows: list[Row], times: Times) -> Any:
 
     hashes = {name: _hash(entries) for name, entries in about.scenes.items()}
     lines: list[dict[str, Any]] = [
-        {name: getattr(row, name) for name in OF_A_ROW} | {"times_formulas": None} for row in sorted_rows(rows)
+        {name: _or_none(getattr(row, name)) for name in OF_A_ROW} | {"times_formulas": None}
+        for row in sorted_rows(rows)
     ]
     nothing = dict.fromkeys(OF_A_ROW)
     for (scene, engine), ratio in sorted(times.items()):
@@ -132,6 +133,11 @@ def _table(about: About, rows: list[Row], times: Times) -> Any:
     schema = pa.schema([(name, number if name == "times_formulas" else kinds.get(name, word)) for name in names])
     kept = {hashes[name]: dict(entries) for name, entries in about.scenes.items()}
     return pa.table(columns, schema=schema.with_metadata({SCENES: json.dumps(kept, sort_keys=True).encode()}))
+
+
+def _or_none(value: object) -> object:
+    """A missing number as null: no maximum of a column is NaN by it."""
+    return None if isinstance(value, float) and math.isnan(value) else value
 
 
 def _hash(entries: Mapping[str, str]) -> str:

@@ -138,8 +138,10 @@ def _engines(runs: Sequence[Run]) -> list[str]:
 def _errors(runs: Sequence[Run]) -> str:
     def draw(axes: "Axes") -> None:
         for engine in _engines(runs):
-            worst = [max((max(float(used(row.error, row.allowed)), FLOOR) for row in run.rows if row.engine == engine and row.compared and math.isfinite(row.error)),
-                         default=math.nan) for run in runs]  # fmt: skip
+            judged = [[row for row in run.rows if row.engine == engine and row.compared and math.isfinite(row.error)]
+                      for run in runs]  # fmt: skip
+            shares = [[max(float(used(row.error, row.allowed)), FLOOR) for row in rows] for rows in judged]
+            worst = [max(each, default=math.nan) for each in shares]
             style = style_of(engine)
             axes.plot(range(len(runs)), worst, color=style.colour, marker=style.marker, markersize=3.5,
                       linewidth=1.0, label=engine)  # fmt: skip
