@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 
 def _notebook(name: str) -> Any:
-    """How a notebook shows a scene or a solution; what draws it is loaded when it is asked to."""
+    """How a notebook shows a scene or a solution; what draws it is loaded when it does."""
 
     def show(self: Any) -> str:
         return str(getattr(import_module("fourbar.show.notebook"), name)(self))

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from fourbar import __version__
-from fourbar.errors import InputError, NotAssembledError
-from fourbar.exits import printable, run
+from fourbar.errors import InputError, NotAssembledError, printable, run
 
 if TYPE_CHECKING:
     from fourbar.scene import Scene

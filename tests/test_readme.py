@@ -10,7 +10,7 @@ import pytest
 
 import fourbar
 from fourbar.cli import status
-from fourbar.exits import HOLDS
+from fourbar.errors import HOLDS
 from fourbar.files.effects import REGISTRY
 from validation.cli import COMMANDS
 
@@ -36,12 +36,12 @@ def test_every_command_prints_what_is_shown(checkout: Path, capsys: pytest.Captu
     for command, shown in sessions:
         program, *arguments = shlex.split(command)
         assert program == "fourbar" and status(arguments) == HOLDS, command
-        told = capsys.readouterr()
-        printed = told.out
+        captured = capsys.readouterr()
+        printed = captured.out
         beginning = shown.removesuffix("...\n")
         assert printed.startswith(beginning), command
         assert (len(printed) > len(beginning)) == (shown != beginning), command
-        assert told.err == ""
+        assert captured.err == ""
         for file in re.findall(r"-o (\S+)", command):
             assert (checkout / file).stat().st_size > 0, command
 

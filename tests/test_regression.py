@@ -1,4 +1,4 @@
-"""What changed since the accepted state: real changes told apart from round-off, the surroundings first."""
+"""What changed since the accepted state: real changes distinguished from round-off, the surroundings first."""
 
 import json
 import math
@@ -63,7 +63,7 @@ def test_better_and_new_rows_are_no_regression_but_a_new_failure_is() -> None:
     assert differences((HERE, [ROW]), (HERE, [ROW, failing])).regressions
 
 
-def test_other_versions_are_said_first() -> None:
+def test_other_versions_are_reported_first() -> None:
     other = About({**HERE.versions, "mujoco": "3.3.7"}, HERE.machine, HERE.settings)
     found = differences((other, [ROW]), (HERE, [ROW]))
     assert [what for what, _, _ in found.surroundings] == ["mujoco"]
@@ -95,7 +95,7 @@ def test_command_writes_every_form_and_leaves_with_the_status(tmp_path: Path) ->
     assert "No regression" in same.output
 
 
-def test_accept_keeps_the_run_next_to_the_results_or_where_it_is_told(tmp_path: Path) -> None:
+def test_accept_keeps_the_run_next_to_the_results_or_in_a_stated_folder(tmp_path: Path) -> None:
     run = save(tmp_path / "run", [ROW])
     (run / "timings.csv").write_text("scene,engine,setting,positions,seconds,times_formulas\nscene,engine,-,1,1,3.0\n")
     runner = CliRunner()
@@ -110,7 +110,7 @@ def test_accept_keeps_the_run_next_to_the_results_or_where_it_is_told(tmp_path: 
 
 
 @pytest.mark.parametrize(
-    ("arguments", "said"),
+    ("arguments", "words"),
     [
         (["--type", "crank-rocker"], "say --random N too"),
         (["--seed", "3"], "say --random N too"),
@@ -123,11 +123,11 @@ def test_accept_keeps_the_run_next_to_the_results_or_where_it_is_told(tmp_path: 
     ],
 )
 def test_options_of_a_run_that_would_do_nothing_are_refused_before_it(
-    arguments: list[str], said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    arguments: list[str], words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert status(["run", *arguments, "--out", str(tmp_path / "out")]) == 2
     message = capsys.readouterr().err.strip()
-    assert message.startswith("error: ") and said in message and "\n" not in message
+    assert message.startswith("error: ") and words in message and "\n" not in message
     assert not (tmp_path / "out").exists()
 
 
@@ -195,7 +195,7 @@ def test_more_positions_and_other_settings_are_named_so() -> None:
     finer = replace(SCENE, motion=replace(SCENE.motion, theta_2=fourbar.Sweep(0.0, 2.0 * math.pi, 720)))
     worse = replace(ROW, error=1e-9, allowed=1e-8)
     found = differences(made([ROW], {"scene": SCENE}), made([worse], {"scene": finer}))
-    assert found.not_compared == ["scene scene is asked at other positions (1 rows)"] and not found.regressions
+    assert found.not_compared == ["scene scene has other positions (1 rows)"] and not found.regressions
     assert "360} -> " in str(found.scenes[0]) or "steps" in str(found.scenes[0])
     old, new = replace(ROW, setting="RK4 628/rev"), replace(worse, setting="RK4 1256/rev")
     found = differences(made([old], {"scene": SCENE}), made([new], {"scene": SCENE}))
@@ -210,7 +210,7 @@ def test_of_an_older_record_only_the_hash_can_say_that_scenes_changed() -> None:
     assert "0123456789ab -> suite" in note and "the older record does not say what they ask" in note
 
 
-def test_what_was_not_asked_for_is_not_run_and_what_was_asked_for_is_gone() -> None:
+def test_what_was_not_wanted_is_not_run_and_what_was_wanted_is_gone() -> None:
     rows = [replace(ROW, scene=scene, engine=engine) for scene in ("a", "b") for engine in ("engine", "formulas")]
     rows.append(replace(ROW, scene="a", engine="other"))
     old = made(rows, dict.fromkeys("ab", SCENE), ("engine", "other"))
@@ -284,7 +284,7 @@ def test_a_history_names_the_step_at_which_a_row_changed(nights: Path, capsys: p
     assert "1 step changed" in capsys.readouterr().out
 
 
-def test_a_history_is_read_by_pandas_and_keeps_what_each_scene_asked(nights: Path) -> None:
+def test_a_history_is_read_by_pandas_and_keeps_what_each_scene_states(nights: Path) -> None:
     import pandas as pd
 
     table = pd.read_parquet(nights / HISTORY)

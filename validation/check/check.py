@@ -7,8 +7,7 @@ from pathlib import Path
 
 import click
 
-from fourbar.errors import InputError
-from fourbar.exits import FAILED, HOLDS
+from fourbar.errors import FAILED, HOLDS, InputError
 from fourbar.files import load
 from fourbar.scene import Scene
 from fourbar.writing import write_text

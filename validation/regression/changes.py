@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 
-from fourbar.exits import FAILED, HOLDS
+from fourbar.errors import FAILED, HOLDS
 from validation.compare.counts import Counts
 from validation.compare.identities import FORMULAS
 from validation.compare.rows import FAILS, VERDICTS, Row
@@ -34,7 +34,7 @@ class Kind(Enum):
     NEW = "new"
     NEW_FAILURE = "new, and fails"
     OTHER_SCENE = "asks something else"
-    OTHER_POSITIONS = "is asked at other positions"
+    OTHER_POSITIONS = "has other positions"
     OTHER_SETTING = "with another setting"
     NOT_RUN = "not run"
     ROUND_OFF = "moved within round-off"
@@ -95,7 +95,7 @@ class Differences:
 
     @property
     def not_run(self) -> list[str]:
-        """Scenes and engines of the old run that the new one was not asked for, each with its number of rows."""
+        """Scenes and engines of the old run that the new one was not run for, each with its number of rows."""
         found = self.of(Kind.NOT_RUN)
         there = {change.key[0] for change in self.changes if change.new is not None}
         lines = []
@@ -137,7 +137,7 @@ class Differences:
 def differences(
     old: tuple[About, Iterable[Row]], new: tuple[About, Iterable[Row]], times: tuple[Times, Times] = ({}, {})
 ) -> Differences:
-    """Compare two runs: only what both were asked alike."""
+    """Compare two runs: only where both answer the same question."""
     before, after = _by_key(old[1]), _by_key(new[1])
     scenes = {change.scene: change for change in scene_changes(old[0].scenes, new[0].scenes)}
     settings = _other_settings(before, after)
@@ -176,7 +176,7 @@ def _other_settings(before: Mapping[Key, Row], after: Mapping[Key, Row]) -> dict
 
 
 def _was_run(key: Key, new: About, rows: Mapping[Key, Row]) -> bool:
-    """Whether the new run was asked for the scene and the engine of a row; without a record its rows say so."""
+    """Whether the new run was made for the scene and the engine of a row; without a record its rows say so."""
     scenes = new.scenes.keys() or {each[0] for each in rows} or {key[0]}
     engines = new.engines or {each[1] for each in rows}
     known = {each[1] for each in rows} | engines

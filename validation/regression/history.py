@@ -2,7 +2,7 @@
 
 One line per row of a run, and one per time (quantity "time": `times_formulas` is the engine's time over the
 formulas' on that scene), with the run's date, commit, machine and versions in columns of their own
-(`version_mujoco`). What each scene asked stands once in the file's own notes, by its `scene_hash`.
+(`version_mujoco`). What each scene states stands once in the file's own notes, by its `scene_hash`.
 """
 
 import hashlib
@@ -22,7 +22,7 @@ from validation.regression.times import Times
 
 HISTORY = "history.parquet"
 SCENES = b"fourbar.scenes"
-"""Of the file's notes: JSON, what each scene asked by its hash."""
+"""Of the file's notes: JSON, what each scene states by its hash."""
 TIME = "time"
 OF_A_ROW = tuple(column.name for column in fields(Row) if column.name != "passed")
 OF_A_RUN = ("run", "date", "commit", "machine", "settings")
@@ -81,8 +81,8 @@ def read_history(file: Path) -> list[Run]:
                 runs[name] = Run(_about(cells), [], {})
             _put(runs[name], hashes.setdefault(name, {}), cells)
         for name, run in runs.items():
-            asked = {scene: scenes[each] for scene, each in hashes[name].items() if each in scenes}
-            runs[name] = replace(run, about=replace(run.about, scenes=asked))
+            stated = {scene: scenes[each] for scene, each in hashes[name].items() if each in scenes}
+            runs[name] = replace(run, about=replace(run.about, scenes=stated))
     except (AttributeError, KeyError, TypeError, ValueError):
         raise InputError("HISTORY", str(file), "is no history written by `accept`") from None
     return sorted(runs.values(), key=lambda run: run.about.date)

@@ -57,8 +57,8 @@ def about(factors: Mapping[str, float], suite: str, scenes: Mapping[str, Mapping
 
 def _commit() -> str:
     """Of the folder of this harness, marked where it holds what is not committed; what CI says of itself first."""
-    if told := os.environ.get("GITHUB_SHA") or os.environ.get("CI_COMMIT_SHA"):
-        return told[:12]
+    if stated := os.environ.get("GITHUB_SHA") or os.environ.get("CI_COMMIT_SHA"):
+        return stated[:12]
     command = ["git", "describe", "--always", "--dirty", "--abbrev=12", "--exclude=*"]
     try:
         done = subprocess.run(command, cwd=SHIPPED, capture_output=True, text=True, check=True, timeout=10)

@@ -8,7 +8,7 @@ from validation.report.markdown import cell
 from validation.report.templating import environment, number
 
 SHOWN = tuple(kind for kind in Kind if kind not in (Kind.SAME, Kind.ROUND_OFF, Kind.NOT_RUN, *OTHER_QUESTION))
-"""Listed row by row; what was not run, or asked otherwise, is named as a whole."""
+"""Listed row by row; what was not run, or is another question, is named as a whole."""
 AT_MOST = 50
 """Rows of one kind listed in text and Markdown."""
 
@@ -40,7 +40,7 @@ def line(change: Change) -> str:
 
 
 def text(found: Differences) -> str:
-    """For a terminal: what was asked differently first, then what it was made with, then the rows."""
+    """For a terminal: what is another question first, then what it was made with, then the rows."""
     lines = [*map(str, found.scenes), *found.notes]
     lines += [f"{what}: {old} -> {new}" for what, old, new in found.surroundings]
     lines += [f"not compared: {name}" for name in found.not_compared]
@@ -55,7 +55,7 @@ def text(found: Differences) -> str:
 
 
 def other_questions(found: Differences) -> list[tuple[str, list[str]]]:
-    """What was asked differently, not run, or took longer, under its headings."""
+    """What is another question, was not run, or took longer, under its headings."""
     parts = {
         "The scenes changed": [*map(str, found.scenes), *found.notes],
         "Not compared": found.not_compared,

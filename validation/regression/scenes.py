@@ -1,4 +1,4 @@
-"""What a scene asks, as flat entries of its file in SI: two runs are compared where they were asked the same."""
+"""What a scene states, as flat entries of its file in SI: two runs are compared where it is the same."""
 
 import tomllib
 from collections.abc import Iterable, Mapping
@@ -60,7 +60,7 @@ def _flat(prefix: str, value: Any) -> Iterable[tuple[str, str]]:
 
 @dataclass(frozen=True, slots=True)
 class SceneChange:
-    """What a scene says now, and what it said."""
+    """What a scene states now, and what it stated."""
 
     scene: str
     entries: tuple[tuple[str, str, str], ...]
@@ -68,7 +68,7 @@ class SceneChange:
 
     @property
     def positions_alone(self) -> bool:
-        """Whether the same is asked, at other positions."""
+        """Whether the question is the same, at other positions."""
         return all(key.startswith(WHERE) for key, _, _ in self.entries)
 
     def __str__(self) -> str:

@@ -9,8 +9,7 @@ from typing import Any
 
 import click
 
-from fourbar.errors import DependencyError, FourBarError, InputError
-from fourbar.exits import FAILED
+from fourbar.errors import FAILED, DependencyError, FourBarError, InputError
 from fourbar.mjcf import mjcf
 from fourbar.writing import write_text
 from validation.compare.columns import write_columns
@@ -103,14 +102,14 @@ def sections(hard: Iterable[Row] | None, out: Path) -> list[Section]:
     Of rows of the hard suite the page hard.html is written too.
     """
     if hard is None:
-        found = hard_section.beside(out)
-        return [*([found] if found else []), *cost_section.beside(out)]
+        found = hard_section.found_in(out)
+        return [*([found] if found else []), *cost_section.found_in(out)]
     from validation.report.hard_page import page, picture
     from validation.report.svg import inline
 
     svg = picture()
     write_text(out / hard_section.PAGE, page(svg))
-    return [hard_section.section(hard, inline(svg)), *cost_section.beside(out)]
+    return [hard_section.section(hard, inline(svg)), *cost_section.found_in(out)]
 
 
 def mjcf_pictures(suite: Suite) -> tuple[dict[str, str], str]:

@@ -13,7 +13,7 @@ from validation.engines.mujoco.anatomy import Anatomy
 ROLES = tuple(BAR_NAMES[bar] for bar in MOVING_BARS)
 SITES = ("B3", "B4")
 ALIKE = 1e-9
-"""Two guesses whose lengths fit equally well to this are told apart by the drive."""
+"""Two guesses whose lengths fit equally well to this are distinguished by the drive."""
 MOST_BODIES = 8
 """Bodies on hinges among which three are looked for."""
 
@@ -56,8 +56,8 @@ def anatomy_of(model: mujoco.MjModel, names: Mapping[str, str], lengths: Sequenc
         raise InputError("--mjcf", _bodies(model), f"{nowhere}; say which is which: --name input=BODY, and so on")
     best = min(each[0] for each in found)
     _, _, anatomy, guessed = min((each for each in found if each[0] <= best + ALIKE), key=lambda each: each[1])
-    said = ", ".join(f"{role}={name}" for role, name in guessed.items())
-    return anatomy, [f"guessed from what hangs together and from the lengths: {said} (--name states it otherwise)"]
+    pairs = ", ".join(f"{role}={name}" for role, name in guessed.items())
+    return anatomy, [f"guessed from what hangs together and from the lengths: {pairs} (--name states it otherwise)"]
 
 
 def _body(model: mujoco.MjModel, name: str) -> int | None:

@@ -1,4 +1,4 @@
-"""The cheapest settings of MuJoCo that keep torque and pin forces within an asked error on a given scene.
+"""The cheapest settings of MuJoCo that keep torque and pin forces within a required error on a given scene.
 
 The laws of the study say where to look, and short runs of the scene itself decide:
 
@@ -25,7 +25,7 @@ from validation.studies.cost.errors import Errors
 from validation.studies.cost.matters import MATTERS, influences, judged, print_table, sentence
 
 MARGIN = 0.7
-"""The run must stay within this part of the asked error: between the positions it may be larger."""
+"""The run must stay within this part of the required error: between the positions it may be larger."""
 CLOSE_ENOUGH = 1.15
 """The search stops where the least steps that serve and the most that do not are this close."""
 BETWEEN = 180
@@ -50,7 +50,7 @@ class Attempt:
 class Advice:
     """What serves, or how near the best came."""
 
-    asked: float
+    required: float
     best: Attempt
     """The cheapest that serves; where nothing does, the most accurate."""
     attempts: tuple[Attempt, ...]
@@ -72,9 +72,9 @@ class Advice:
             f"tc = {s.time_constant_steps:.3g} steps, pads {s.pad}, tolerance 0, flywheel {s.flywheel:g}"
         )
         if self.reached:
-            return f"{dial}: {found}, asked {self.asked:g}"
+            return f"{dial}: {found}, required {self.required:g}"
         return (
-            f"no setting of plain MJCF within {MOST_STEPS} steps was found to reach {self.asked:g}; "
+            f"no setting of plain MJCF within {MOST_STEPS} steps was found to reach {self.required:g}; "
             f"the best was {dial}: {found}. "
             f"The formulas, and inverse dynamics of either engine with loop multipliers, reach round-off"
         )
@@ -91,7 +91,7 @@ def advise(scene: Scene, error: float, rig: Rig | None = None) -> Advice:
 
 
 def looked_at(scene: Scene) -> Command:
-    """The scene's own positions and others between them: the error peaks there, most of all beside a pole of T3, T4."""
+    """The scene's own positions and others between them: the error peaks there, most of all near a pole of T3, T4."""
     own = command_of(scene)
     if np.ptp(own.branch) != 0:
         return own
@@ -101,7 +101,7 @@ def looked_at(scene: Scene) -> Command:
 
 
 class _Search:
-    """Settings tried on one scene, for one asked error."""
+    """Settings tried on one scene, for one required error."""
 
     def __init__(self, scene: Scene, error: float, rig: Rig) -> None:
         self.scene, self.error, self.rig = scene, error, rig
