@@ -33,8 +33,8 @@ class Kind(Enum):
     GONE_FAILURE = "gone, and had failed"
     NEW = "new"
     NEW_FAILURE = "new, and fails"
-    OTHER_SCENE = "asks something else"
-    OTHER_POSITIONS = "has other positions"
+    OTHER_SCENE = "of a changed scene"
+    OTHER_POSITIONS = "at other positions"
     OTHER_SETTING = "with another setting"
     NOT_RUN = "not run"
     ROUND_OFF = "moved within round-off"
@@ -110,7 +110,8 @@ class Differences:
         found: Counter[str] = Counter()
         for change in self.changes:
             if change.kind in OTHER_QUESTION and change.old is not None and change.new is not None:
-                name = f"scene {change.key[0]} {change.kind.value}"
+                what = "changed" if change.kind is Kind.OTHER_SCENE else "has other positions"
+                name = f"scene {change.key[0]} {what}"
                 if change.kind is Kind.OTHER_SETTING:
                     name = f"{change.key[0]} / {change.key[1]}: {change.old.setting} -> {change.new.setting}"
                 found[name] += 1
