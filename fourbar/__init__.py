@@ -14,6 +14,7 @@ from fourbar.scene.motion import Free as Free
 from fourbar.scene.motion import FromLimit as FromLimit
 from fourbar.scene.motion import Motion as Motion
 from fourbar.scene.motion import Sweep as Sweep
+from fourbar.scene.point import Point as Point
 from fourbar.solution import Solution as Solution
 from fourbar.solve import solve as solve
 
@@ -26,6 +27,8 @@ if TYPE_CHECKING:
     from fourbar.effects import Viscous as Viscous
     from fourbar.files import dump as dump
     from fourbar.files import load as load
+    from fourbar.studies import Study as Study
+    from fourbar.studies import vary as vary
 
 
 def _notebook(name: str) -> Any:
@@ -42,9 +45,11 @@ setattr(Solution, "_repr_html_", _notebook("solution_html"))  # noqa: B010
 
 
 def __getattr__(name: str) -> Any:
-    # the file edge needs a units library, most scenes few effects: loaded on first use, not by `import fourbar`
+    # the file edge needs a units library, most scenes few effects, and few are varied: loaded on first use
     if name in ("load", "dump"):
         return getattr(import_module("fourbar.files"), name)
     if name in ("Friction", "Gravity", "Load", "Viscous"):
         return getattr(import_module("fourbar.effects"), name)
+    if name in ("Study", "vary"):
+        return getattr(import_module("fourbar.studies"), name)
     raise AttributeError(f"module 'fourbar' has no attribute {name!r}")

@@ -84,12 +84,12 @@ def new(file: Path, lengths: tuple[str, ...]) -> None:
 def analyze(scene: Path, form: str | None, degrees: bool | None, out: Path | None) -> None:
     """Solve a scene: angles, speeds, accelerations, driving torque and pin forces."""
     from fourbar.solution import csv_text, json_text
-    from fourbar.solve import solve
+    from fourbar.solve import last_stage, solve
     from fourbar.writing import write_text
 
     asked = _load(scene)
     with _named(scene), _waiting(asked):
-        solution = solve(asked)
+        solution = solve(asked, last_stage(asked))
     if not solution.assembled.any():
         raise NotAssembledError(f"{scene}: motion.theta_2: the linkage assembles at none of the positions asked for")
     if form is None:

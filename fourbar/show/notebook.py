@@ -71,6 +71,9 @@ def solution_html(solution: Solution) -> str:
     """The first and last positions as a table; angles in degrees."""
     from fourbar.show.tables import columns
 
+    if solution.theta_2.ndim == 2:
+        members, count = solution.theta_2.shape
+        return f"<div><b>{escape(solution.title or 'Study')}</b>: {members} linkages, {count} positions each</div>"
     cells = columns(solution)
     if (solution.status_code != 0).any():
         cells = {"status": [status.replace("_", " ") for status in solution.status], **cells}

@@ -86,9 +86,17 @@ def columns(solution: Solution, *, degrees: bool = True) -> dict[str, list[str]]
     if solution.torque is not None:
         if solution.time is None:  # released, it has no drive: its torque is rounding
             shown[f"T{solution.drive_bar}\nN m"] = _cells(solution.torque)
-            shown["digits\nof T"] = _digits(solution)
+            if solution.torque_error is not None:
+                shown["digits\nof T"] = _digits(solution)
         for name in PIN_FORCES:
             shown[f"|{name}|\nN"] = _cells(np.hypot(*getattr(solution, name).T))
+    for start, unit_of, arrays in (
+        ("", "m", solution.points),
+        ("v_", "m/s", solution.velocity),
+        ("a_", "m/s^2", solution.acceleration),
+    ):
+        for name, values in arrays.items():
+            shown |= {f"{start}{name}_{letter}\n{unit_of}": _cells(values[:, i]) for i, letter in enumerate("xy")}
     for name in ANGLES:
         shown[f"{name}\n{unit}"] = _cells(getattr(solution, name) * factor, "angle")
     for name in ("omega_3", "omega_4", "alpha_3", "alpha_4"):

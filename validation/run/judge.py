@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from fourbar.errors import LimitError
 from fourbar.mjcf.settings import LIGHT
 from fourbar.quantities import FORCES
 from fourbar.scene import Command, Scene, command
@@ -59,7 +60,8 @@ def judge(name: str, scene: Scene, witnesses: Sequence[Witness] = WITNESSES) -> 
             continue
         record.answers.append(answer)
         record.rows += _judged(name, scene, at, record.solution, answer, witness)
-        if witness.tolerance == EQUIVALENCE and answer.refusal is None and "theta_3" in witness.expected:
+        exact = witness.tolerance == EQUIVALENCE and answer.refusal is None and "theta_3" in witness.expected
+        if exact and witness.stated:
             record.rows += _stated(name, scene, witness, answer)
         if witness.order and answer.refusal is None:
             answer.evidence |= _observed_order(name, scene, at, record.solution, witness)
@@ -117,6 +119,8 @@ def _stated(name: str, scene: Scene, witness: Witness, answer: Answer) -> list[R
     """What the formulas state of the linkage whatever its motion, held against an exact engine."""
     try:
         return statements(name, scene, witness.engine(), answer)
+    except LimitError as limit:
+        return [Row.unmeasured(name, witness.name, "statements of the linkage", "all", REFUSES, str(limit))]
     except Exception as error:  # whatever an engine raises is its own failure, in its own row
         return [breakdown(name, witness.name, error, "statements of the linkage")]
 
