@@ -236,7 +236,7 @@ def everything(d: Any, a: Any, b: Any, c: Any, theta_1: Any, q: Any, branch: Any
     moving = rates(k, 2.0, -3.0)
     here = State(lengths, theta_1, q, at, k, 2.0, moving)
     bodies = Body(0.2, 0.01, 0.3 * a + 0.01j), Body(0.5, 0.02, 0.6 * b - 0.02j), Body(0.4, 0.03, 0.5 * c + 0j)
-    w, at_A = inertia_wrenches(a, bodies, at, moving)
+    w, mass_at_A = inertia_wrenches(a, bodies, at, moving)
     inertial = sum(inertia(a, bodies, at, k)) * -3.0 + half_slope(a, bodies, at, k) * 4.0
     values = {**half._asdict(), **k._asdict(), **moving._asdict(), "u3": at.u3, "u4": at.u4, "sin_mu": at.sin_mu}
     values |= {"sine_A": cross(at.u2, at.u3), "sine_24": cross(at.u2, at.u4)}
@@ -244,7 +244,7 @@ def everything(d: Any, a: Any, b: Any, c: Any, theta_1: Any, q: Any, branch: Any
         values[f"G{k_th}"] = here.point(k_th, bodies[k_th - 2].z)
         values[f"a_G{k_th}"] = here.acceleration(k_th, bodies[k_th - 2].z)
         values[f"T{k_th}"] = driving_torque(k, k_th, inertial, 0.5)
-        pins = pin_forces(lengths, at, k_th, drive_sine(at, k_th), w, at_A, 0.25)
+        pins = pin_forces(lengths, at, k_th, drive_sine(at, k_th), w, mass_at_A, 0.25)
         values |= {f"{name} of drive {k_th}": value for name, value in pins._asdict().items()}
     return values
 
