@@ -32,7 +32,7 @@ def group(traceback: bool) -> None:
     Exit status: 0 all well (also when some positions do not assemble), 2 the input is bad, 3 the
     environment or the program failed, 130 interrupted.
     """
-    del traceback  # looked at where errors are told
+    del traceback  # looked at where errors are reported
 
 
 @group.command()
@@ -44,7 +44,7 @@ def classify(lengths: tuple[str, ...]) -> None:
     """
     from fourbar.formulas.linkage_type import classify as type_of
     from fourbar.linkage import BAR_NAMES, Bar, FourBar
-    from fourbar.show.words import told
+    from fourbar.show.words import mobility_lines
 
     d, a, b, c = _lengths(lengths)
     linkage = FourBar(d, Bar(a), Bar(b), Bar(c))
@@ -55,7 +55,7 @@ def classify(lengths: tuple[str, ...]) -> None:
     click.echo(found.name)
     click.echo(f"s + l = {outer:.6g} m {relation} p + q = {sum(linkage.lengths) - outer:.6g} m")
     click.echo(f"bars that turn fully: {turning}")
-    for line in told(linkage) if found.barker is not None else ():  # a structure does not move
+    for line in mobility_lines(linkage) if found.barker is not None else ():  # a structure does not move
         click.echo(line)
 
 
@@ -88,13 +88,13 @@ def analyze(scene: Path, form: str | None, degrees: bool | None, out: Path | Non
     from fourbar.solve import solve
     from fourbar.writing import write_text
 
-    asked = _load(scene)
-    with _named(scene), _waiting(asked):
-        solution = solve(asked)
+    described = _load(scene)
+    with _named(scene), _waiting(described):
+        solution = solve(described)
     if not solution.assembled.any():
-        raise NotAssembledError(f"{scene}: motion.theta_2: the linkage assembles at none of the positions asked for")
+        raise NotAssembledError(f"{scene}: motion.theta_2: the linkage assembles at none of the positions requested")
     if form is None:
-        text = _table_text(asked, solution, None if out else _terminal_width(), degrees is not False)
+        text = _table_text(described, solution, None if out else _terminal_width(), degrees is not False)
     else:
         write = json_text if form == "json" else csv_text
         text = write(solution, degrees=bool(degrees))
@@ -148,9 +148,9 @@ def plot(scene: Path, out: Path, figure: str, position: str | None, branches: st
     from fourbar.show.plot import draw
 
     at = None if position is None else _number("--position", position, "rad")
-    asked = _load(scene)
-    with _named(scene), _waiting(asked):
-        draw(asked, out, figure, position=at, branches=branches)
+    described = _load(scene)
+    with _named(scene), _waiting(described):
+        draw(described, out, figure, position=at, branches=branches)
 
 
 @group.command()
@@ -178,9 +178,9 @@ def animate(scene: Path, out: Path, pictures: tuple[str, ...], seconds: float | 
         if not equals:
             raise InputError("--picture", entry, "must be like coupler=FILE")
         attached[bar] = file
-    asked = _load(scene)
-    with _named(scene), _waiting(asked):
-        write(asked, out, pictures=attached, seconds=seconds)
+    described = _load(scene)
+    with _named(scene), _waiting(described):
+        write(described, out, pictures=attached, seconds=seconds)
 
 
 @contextmanager
@@ -196,14 +196,14 @@ def _named(path: Path) -> Iterator[None]:
 
 @contextmanager
 def _waiting(scene: "Scene") -> Iterator[None]:
-    """A long free motion takes minutes: a terminal shows that it is under way."""
+    """A long free motion takes minutes: a terminal shows that it is running."""
     if scene.motion.free is None:
         yield
         return
     from fourbar.free_motion import STEPS
-    from fourbar.show.under_way import under_way
+    from fourbar.show.progress import running
 
-    with under_way(f"the free motion is integrated, in {STEPS} steps at most"):
+    with running(f"the free motion is integrated, in {STEPS} steps at most"):
         yield
 
 
@@ -212,9 +212,9 @@ def _load(path: Path) -> "Scene":
     from fourbar.scene.motion import Free, Sweep
 
     scene = load(path)
-    for key, asked in (("motion.theta_2", scene.motion.theta_2), ("motion.free", scene.motion.free)):
-        if isinstance(asked, (Sweep, Free)) and asked.steps >= MOST_POSITIONS:
-            raise InputError(f"{key}.steps", asked.steps, f"must be below {MOST_POSITIONS} here", str(path))
+    for key, described in (("motion.theta_2", scene.motion.theta_2), ("motion.free", scene.motion.free)):
+        if isinstance(described, (Sweep, Free)) and described.steps >= MOST_POSITIONS:
+            raise InputError(f"{key}.steps", described.steps, f"must be below {MOST_POSITIONS} here", str(path))
     return scene
 
 

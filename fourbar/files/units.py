@@ -51,7 +51,7 @@ LONGEST_UNIT = 60
 
 
 class UnitError(ValueError):
-    """A text that is not a quantity of the asked dimension; says why in one phrase."""
+    """A text that is not a quantity of another dimension than wanted; says why in one phrase."""
 
 
 def to_si(text: str, unit: str) -> float:
@@ -68,11 +68,11 @@ def to_si(text: str, unit: str) -> float:
     if not name:
         raise UnitError("the unit is missing")
     factor, dimension = _factor(name)
-    asked, asked_dimension = _factor(unit)
-    if dimension != asked_dimension:
+    wanted, wanted_dimension = _factor(unit)
+    if dimension != wanted_dimension:
         raise UnitError(f'"{name}" does not convert to {unit}')
     try:
-        value = float(Fraction(found[0]) * factor / asked)
+        value = float(Fraction(found[0]) * factor / wanted)
     except OverflowError:
         value = math.inf
     if not math.isfinite(value):

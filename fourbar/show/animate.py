@@ -148,8 +148,8 @@ def page_data(scene: Scene, pictures: Mapping[str, str | Path]) -> dict[str, Any
 def _sweep(scene: Scene) -> dict[str, Any]:
     """Both branches over theta_2."""
     motion = scene.motion
-    asked = sweep_command(scene)
-    where = thinned(asked)
+    swept = sweep_command(scene)
+    where = thinned(swept)
     own, start = command(scene).theta_2, None
     if len(own) == 1:
         start = int(np.argmin(np.abs(np.angle(np.exp(1j * (where.theta_2 - own[0]))))))
@@ -161,15 +161,15 @@ def _sweep(scene: Scene) -> dict[str, Any]:
         "rate": None,
         "start": start,
         "branches": {str(sign): _columns(on_branch(scene, sign), where.theta_2) for sign in (1, -1)},
-        "pace": _pace(motion.omega_2, where.theta_2, len(asked.theta_2)),
+        "pace": _pace(motion.omega_2, where.theta_2, len(swept.theta_2)),
     }
 
 
 def _through_time(scene: Scene) -> dict[str, Any]:
     """The one motion that the scene makes: released, or by a law."""
-    asked = solve(scene)
-    assert asked.time is not None and asked.omega_2 is not None and asked.alpha_2 is not None
-    where = thinned(Command(asked.theta_2, asked.branch, asked.omega_2, asked.alpha_2, time=asked.time))
+    whole = solve(scene)
+    assert whole.time is not None and whole.omega_2 is not None and whole.alpha_2 is not None
+    where = thinned(Command(whole.theta_2, whole.branch, whole.omega_2, whole.alpha_2, time=whole.time))
     assert where.time is not None
     solution = solve(scene, at=where)
     solution.time = where.time
@@ -188,7 +188,7 @@ def _through_time(scene: Scene) -> dict[str, Any]:
         "rate": rate,
         "start": None,
         "branches": {str(scene.motion.branch): columns},
-        "pace": _pace_in_time(scene, asked, rate, len(where.time)),
+        "pace": _pace_in_time(scene, whole, rate, len(where.time)),
     }
 
 
@@ -202,14 +202,14 @@ def thinned(where: Command) -> Command:
     return where._replace(**rows)
 
 
-def _pace(omega_2: float | None, theta_2: Array, asked: int) -> str:
+def _pace(omega_2: float | None, theta_2: Array, count: int) -> str:
     """What speed 1 means, and whether positions were left out."""
     words = "At speed 1× one sweep takes 6 s"
     if omega_2:
         real = abs(float(theta_2[-1] - theta_2[0]) / omega_2)
         words += f"; at ω₂ = {omega_2:.4g} rad/s the mechanism takes {real:.3g} s"
-    if asked > len(theta_2):
-        words += f". Shown are {len(theta_2)} of the {asked} positions"
+    if count > len(theta_2):
+        words += f". Shown are {len(theta_2)} of the {count} positions"
     return words + "."
 
 
@@ -223,19 +223,19 @@ def _rate(duration: float) -> float:
     return float(10.0 ** math.ceil(math.log10(duration / longest))) if duration > longest else 1.0
 
 
-def _pace_in_time(scene: Scene, asked: Solution, rate: float, shown: int) -> str:
+def _pace_in_time(scene: Scene, whole: Solution, rate: float, shown: int) -> str:
     """What speed 1 means, where the motion ends before its time, and whether instants were left out."""
-    assert asked.time is not None
+    assert whole.time is not None
     words = "At speed 1× it moves in real time"
     if rate < 1.0:
         words = f"At speed 1× it moves {1.0 / rate:.0f} times slower than it really does"
     elif rate > 1.0:
         words = f"At speed 1× it moves {rate:.0f} times faster than it really does"
     free = scene.motion.free
-    if free is not None and len(asked) <= free.steps:
-        words += f". It ends at {asked.time[-1]:.4g} s, where the linkage stops at a limit position"
-    if len(asked) > shown:
-        words += f". Shown are {shown} of the {len(asked)} instants"
+    if free is not None and len(whole) <= free.steps:
+        words += f". It ends at {whole.time[-1]:.4g} s, where the linkage stops at a limit position"
+    if len(whole) > shown:
+        words += f". Shown are {shown} of the {len(whole)} instants"
     return words + "."
 
 

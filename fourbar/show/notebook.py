@@ -15,7 +15,7 @@ SHOWN = 5
 
 
 def scene_html(scene: "Scene") -> str:
-    """The linkage drawn, beside what the scene states."""
+    """The linkage drawn, next to what the scene states."""
     from fourbar.show.drawing import drawing
     from fourbar.solve import solve
 

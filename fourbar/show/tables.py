@@ -22,7 +22,7 @@ GAP = 2
 
 
 def heading(scene: Scene, solution: Solution) -> list[str]:
-    """The lines above the table: what was asked, and how many of the positions have an answer."""
+    """The lines above the table: what was requested, and how many of the positions have an answer."""
     d, a, b, c = scene.linkage.lengths
     drive = f"drive on bar {scene.drive_bar} ({BAR_NAMES[scene.drive_bar]})"
     if scene.motion.free is not None:

@@ -11,7 +11,7 @@ from fourbar.scene.motion import BRANCH_NAMES
 BRANCHES = {**BRANCH_NAMES, 0: "both"}
 
 
-def told(linkage: FourBar) -> Iterator[str]:
+def mobility_lines(linkage: FourBar) -> Iterator[str]:
     """Line by line; angles in deg, digits as far as a drawing needs them."""
     swings = [f"{BAR_NAMES[bar]} {_deg(swing(linkage, bar))}" for bar in MOVING_BARS if not turns_fully(linkage, bar)]
     if swings:

@@ -11,7 +11,7 @@ const REASONS = {   // why a position has no forces, or more than one set of the
 };
 const FORCE_PIN = { F12: "O2", F32: "A", F43: "B", F14: "O4" };
 const SWEEP_SECONDS = 6, ROWS = 360;   // one sweep at speed 1; positions of a sweep whose lengths were edited
-const ORDINARY = 0.95, OUTLIER = 3, ROOM = 1.6;   // a scale ends at ROOM times the 95th percentile where values diverge
+const ORDINARY = 0.95, OUTLIER = 3, CLIPPED = 1.6;   // a scale ends at CLIPPED times the 95th percentile where values diverge
 const unit = data.unit, still = window.matchMedia("(prefers-reduced-motion: reduce)").matches;
 
 let lengths = data.lengths.slice(), edited = false, branch = data.branch, grid = data.theta_2, row = data.start;

@@ -95,7 +95,7 @@ function ceiling(values) {
   const sizes = values.filter(Number.isFinite).map(Math.abs).sort((x, y) => x - y);
   if (!sizes.length) return { top: 0, cut: false };
   const ordinary = sizes[Math.floor(ORDINARY * (sizes.length - 1))], largest = sizes[sizes.length - 1];
-  return ordinary > 0 && largest > OUTLIER * ordinary ? { top: ROOM * ordinary, cut: true } : { top: largest, cut: false };
+  return ordinary > 0 && largest > OUTLIER * ordinary ? { top: CLIPPED * ordinary, cut: true } : { top: largest, cut: false };
 }
 
 function scaleForces() {
@@ -125,7 +125,7 @@ function forceLegend() {
 function insideTip(i, s, top) {
   let length = Infinity;
   for (const name of FORCES) {
-    const [fx, fy] = table()[name][i], [x, y] = s[FORCE_PIN[name]], edge = 24;   // room for its name
+    const [fx, fy] = table()[name][i], [x, y] = s[FORCE_PIN[name]], edge = 24;   // space for its name
     if (fx) length = Math.min(length, (fx > 0 ? view.width - edge - x : x - edge) * top / Math.abs(fx));
     if (fy) length = Math.min(length, (fy > 0 ? y - edge : view.height - edge - y) * top / Math.abs(fy));
   }
@@ -162,11 +162,11 @@ function drawLinkage(p, i) {
     if (!drawn) continue;
     set(parts.bars[k], { x1: p1[0], y1: p1[1], x2: p2[0], y2: p2[1] });
     visible(String(k), true);
-    const half = [0.5 * (p1[0] + p2[0]), 0.5 * (p1[1] + p2[1])], long = Math.hypot(p2[0] - p1[0], p2[1] - p1[1]) || 1;
+    const mid = [0.5 * (p1[0] + p2[0]), 0.5 * (p1[1] + p2[1])], long = Math.hypot(p2[0] - p1[0], p2[1] - p1[1]) || 1;
     const normal = [-(p2[1] - p1[1]) / long, (p2[0] - p1[0]) / long];
-    let side = (half[0] - middle[0]) * normal[0] + (half[1] - middle[1]) * normal[1] >= 0 ? 15 : -15;
-    if (data.centres[k] && Math.abs(data.centres[k][1]) * view.k > 10) side = data.centres[k][1] > 0 ? 15 : -15;   // beside the bar, G has the other side
-    set(parts.label[k], { x: half[0] + side * normal[0], y: half[1] + side * normal[1] });
+    let side = (mid[0] - middle[0]) * normal[0] + (mid[1] - middle[1]) * normal[1] >= 0 ? 15 : -15;
+    if (data.centres[k] && Math.abs(data.centres[k][1]) * view.k > 10) side = data.centres[k][1] > 0 ? 15 : -15;   // off the bar, G has the other side
+    set(parts.label[k], { x: mid[0] + side * normal[0], y: mid[1] + side * normal[1] });
     if (parts.image[k]) {
       const height = long * (parts.image[k].ratio ?? 0.3), angle = Math.atan2(p2[1] - p1[1], p2[0] - p1[0]) * DEG;
       set(parts.image[k], { x: 0, y: -0.5 * height, width: long, height, transform: `translate(${p1[0]} ${p1[1]}) rotate(${angle})` });
@@ -182,8 +182,8 @@ function drawLinkage(p, i) {
   }
   const forces = dynamic() && show("show-forces");
   if (forces && p && byId("arrow-scale").value === "position") {
-    const top = Math.max(...FORCES.map(name => Math.hypot(...table()[name][i]))), room = Math.min(view.width, view.height);
-    forceScale = { top, cut: false, pixels: top > 0 ? Math.max(0.15 * room, Math.min(0.3 * room, insideTip(i, s, top))) / top : 0 };
+    const top = Math.max(...FORCES.map(name => Math.hypot(...table()[name][i]))), side = Math.min(view.width, view.height);
+    forceScale = { top, cut: false, pixels: top > 0 ? Math.max(0.15 * side, Math.min(0.3 * side, insideTip(i, s, top))) / top : 0 };
     if (top > 0) forceLegend(); else parts.legend.replaceChildren();
   }
   for (const name of FORCES) {
@@ -191,7 +191,7 @@ function drawLinkage(p, i) {
     const size = f[0] === null ? 0 : Math.hypot(f[0], f[1]), cut = size > forceScale.top;
     const long = Math.min(size, forceScale.top) * forceScale.pixels, drawn = long > 2;
     for (const element of Object.values(arrow)) element.style.display = drawn ? "" : "none";
-    visible(name, long > 10);   // beside a shorter arrow its name would stand on the pin's
+    visible(name, long > 10);   // next to a shorter arrow its name would stand on the pin's
     if (!drawn) continue;
     const [x, y] = s[FORCE_PIN[name]], ux = f[0] / size, uy = -f[1] / size, head = Math.min(11, long);
     const tip = [x + long * ux, y + long * uy], neck = [tip[0] - head * ux, tip[1] - head * uy];
@@ -203,7 +203,7 @@ function drawLinkage(p, i) {
   separateLabels();
 }
 
-// Labels that would cover each other give way, the less important one first; one without room is left out.
+// Labels that would cover each other move aside, the less important one first; one without a free spot is left out.
 function separateLabels() {
   const kept = [];
   for (const name of ["O2", "A", "B", "O4", ...FORCES, "2", "3", "4", "G2", "G3", "G4"]) {

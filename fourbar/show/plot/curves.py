@@ -35,12 +35,12 @@ ORDINARY = 95.0
 """Percentile of the magnitudes that counts as the ordinary size of a curve ..."""
 OUTLIER = 3.0
 """... and the multiple of it that a curve must exceed to be clipped."""
-ROOM = 1.6
+CLIPPED = 1.6
 """A clipped axis ends at this multiple of the ordinary size."""
 RECOMMENDED = 40.0
 """Smallest transmission angle that is usually recommended, deg (R. L. Norton, Design of Machinery)."""
 REMARK = 0.34
-"""Room that a remark takes along an axis, as a part of its length."""
+"""Part that a remark takes along an axis, as a part of its length."""
 Indices = NDArray[np.intp]
 WORKS: tuple[tuple[str, Any], ...] = tuple((FORCE_COLOURS[name], FORCE_DASHES[name]) for name in PIN_FORCES)
 BINDING = re.compile(r" (?==)|(?<==) |(?<=[\d]) (?=[A-Za-zµ])|(?<=N) (?=m\b)")
@@ -97,7 +97,7 @@ def poles(view: View) -> Indices:
 
 
 def broken(values: Array, where: Indices) -> Array:
-    """Copies of a curve's values with NaN at the positions beside a pole, so that no line crosses it."""
+    """Copies of a curve's values with NaN at the positions next to a pole, so that no line crosses it."""
     out = np.array(values, dtype=float)
     out[~np.isfinite(out)] = np.nan
     return np.insert(out, where + 1, np.nan)
@@ -109,7 +109,7 @@ def limit_of(values: list[Array]) -> float | None:
     if size.size == 0:
         return None
     ordinary = float(np.percentile(size, ORDINARY))
-    return ROOM * ordinary if ordinary > 0.0 and size.max() > OUTLIER * ordinary else None
+    return CLIPPED * ordinary if ordinary > 0.0 and size.max() > OUTLIER * ordinary else None
 
 
 def clip(
@@ -256,12 +256,12 @@ def draw_transmission(axes: "Axes", view: View) -> None:
 def free_place(mu: Array) -> float:
     """Where along the axis the curve keeps furthest from a remark at 40 deg, as a part of its length."""
     half = REMARK / 2.0
-    best, room = 1.0 - half, -1.0
+    best, clearance = 1.0 - half, -1.0
     for place in np.linspace(1.0 - half, half, 25):
         part = mu[int((place - half) * len(mu)) : max(1, math.ceil((place + half) * len(mu)))]
         away = np.abs(part[np.isfinite(part)] - RECOMMENDED - 3.0)  # the remark stands on the line
-        if away.size and away.min() > room:
-            best, room = float(place), float(away.min())
+        if away.size and away.min() > clearance:
+            best, clearance = float(place), float(away.min())
     return best
 
 
@@ -269,7 +269,7 @@ def draw_energy(axes: "Axes", view: View) -> None:
     """Kinetic energy of a free motion, and the work that made it."""
     over = _bases(axes, view)
     own = energies(view.scene, view.sweep)
-    shared = [energies(other.scene, other.sweep) for other in view.beside] + [own]
+    shared = [energies(other.scene, other.sweep) for other in view.others] + [own]
     factor, unit = unit_for(
         largest(*(values for each in shared for values in (each.kinetic, *each.work.values()))), "J"
     )

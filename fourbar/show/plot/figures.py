@@ -1,4 +1,4 @@
-"""The figures by name, and the way from a scene to a file."""
+"""The figures by name, and how a scene becomes a file."""
 
 import math
 import textwrap
@@ -171,7 +171,7 @@ def compose(
         position = common_position(scenes)
     views = [view(each, position) for each in scenes]
     for shown in views:
-        shown.beside = [other for other in views if other is not shown]
+        shown.others = [other for other in views if other is not shown]
     stacked = size[0] > 9.0
     figure = Figure(
         figsize=(size[0], size[1] * len(views)) if stacked else (size[0] * len(views), size[1]), layout="constrained"

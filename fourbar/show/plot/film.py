@@ -25,7 +25,7 @@ DPI = 100
 
 
 SWEEP_SECONDS = 6.0
-"""Of a film of a sweep, where nothing else is asked for."""
+"""Of a film of a sweep, where nothing else is stated."""
 SHORTEST = 1.0
 """A motion through time shorter than this, s, is slowed down to be seen."""
 

@@ -25,8 +25,8 @@ PIN_FORCES = {
     4: (("B", "F43", -1.0), ("O4", "F14", 1.0)),
 }
 """The pins of a bar, the force there among the independent ones, and its sign on this bar."""
-ROOM = 1.3
-"""The window is this much wider than what it shows: room for the labels."""
+WINDOW = 1.3
+"""The window is this much wider than what it shows: space for the labels."""
 Points = NDArray[np.float64]
 SHOWN = 0.02
 """Forces below this share of the largest would be shorter than their head: named in the caption only."""
@@ -103,7 +103,7 @@ def draw_free_bodies(panels: "list[Axes]", view: View, labels: Labels) -> None:
     scale = 0.75 * longest / biggest if biggest > 0.0 else 0.0
     reach = {bar: _reach(view, bar, freed[bar][0], scale) for bar in MOVING_BARS}
     # one window size: the bars, too, are to one scale
-    span = ROOM * max(float(np.ptp(_reach(v, bar, arrows, scale), axis=0).max()) for v, arrows, bar in drawn)
+    span = WINDOW * max(float(np.ptp(_reach(v, bar, arrows, scale), axis=0).max()) for v, arrows, bar in drawn)
     for axes, bar in zip(panels, MOVING_BARS, strict=True):
         _draw_one(axes, view, bar, freed[bar], scale, biggest, labels, reach[bar], span)
     _scale_bar(panels[0], scale, biggest)

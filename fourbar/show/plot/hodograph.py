@@ -35,7 +35,7 @@ def draw_hodograph(axes: "PolarAxes", view: View, names: tuple[str, ...] = tuple
     dots = [int(np.argmin(np.abs(over - over[0] - every * k))) for k in marks]
     for name, force in forces.items():
         direction = np.arctan2(force[:, 1], force[:, 0])
-        # drawn as a polyline in x, y: unwrapped angles keep matplotlib from going round the long way
+        # drawn as a polyline in x, y: unwrapped angles keep matplotlib from going round by the longer arc
         known = np.isfinite(direction)
         direction[known] = np.unwrap(direction[known])
         size = np.where(sizes[name] <= top, sizes[name], np.nan) if limit else sizes[name]

@@ -144,7 +144,7 @@ def _wedge(start: int, stop: int) -> Any:
 
 
 def draw_coupler_curves(axes: "Axes", view: View, labels: Labels) -> None:
-    """Paths of points along the coupler's line and beside it, from one full sweep."""
+    """Paths of points along the coupler's line and off it, from one full sweep."""
     sweep = view.sweep
     along = sweep.B - sweep.A
     across = np.stack([-along[:, 1], along[:, 0]], axis=1)
@@ -183,7 +183,7 @@ def draw_coupler_curves(axes: "Axes", view: View, labels: Labels) -> None:
         loc="upper center",
         bbox_to_anchor=(0.5, -0.14),
         ncols=4,
-        title="point along AB (and beside it), in lengths of the coupler",
+        title="point along AB (and off it), in lengths of the coupler",
         title_fontsize=7.5,
     )
     view.notes.append(f"The linkage is drawn at {view.at}.")

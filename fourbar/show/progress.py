@@ -1,11 +1,11 @@
-"""What takes minutes is seen to be under way."""
+"""What takes minutes shows that it is running."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
 
 
 @contextmanager
-def under_way(text: str) -> Iterator[None]:
+def running(text: str) -> Iterator[None]:
     """A line that moves on standard error while the body runs; nothing where that is no terminal."""
     from rich.console import Console
 
