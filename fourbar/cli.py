@@ -1,17 +1,16 @@
 """The command `fourbar`; what a command needs is imported when it is called."""
 
-import io
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
 from fourbar import __version__
 from fourbar.errors import InputError, NotAssembledError
-from fourbar.exits import printable, run
+from fourbar.exits import run
 
 if TYPE_CHECKING:
     from fourbar.scene import Scene
@@ -21,48 +20,52 @@ MOST_POSITIONS = 1_000_000
 
 scene_argument = click.argument("scene", type=click.Path(path_type=Path))
 out_option = click.option("-o", "--out", type=click.Path(path_type=Path), required=True, metavar="FILE")
+or_out_option = click.option(
+    "-o", "--out", type=click.Path(path_type=Path), metavar="FILE", help="Write there instead."
+)
 
 
-@click.group(context_settings={"help_option_names": ["-h", "--help"]})
-@click.version_option(__version__, prog_name="fourbar")
+@click.group(
+    invoke_without_command=True,
+    context_settings={"help_option_names": ["-h", "--help"]},
+    epilog="Begin with: fourbar new first.toml --lengths 300mm 100mm 250mm 220mm",
+)
+@click.version_option(__version__, "-V", "--version", prog_name="fourbar")
 @click.option("--traceback", is_flag=True, help="Show where an internal error happened.")
-def group(traceback: bool) -> None:
+@click.pass_context
+def group(context: click.Context, traceback: bool) -> None:
     """Closed formulas of the planar four-bar linkage: from a scene file to driving torque and pin forces.
+
+    The checks against MuJoCo and Pinocchio are no part of the installed package: in a checkout, python -m validation.
 
     Exit status: 0 all well (also when some positions do not assemble), 2 the input is bad, 3 the
     environment or the program failed, 130 interrupted.
     """
     del traceback  # looked at where errors are reported
+    if context.invoked_subcommand is None:
+        click.echo(context.get_help())
 
 
 @group.command()
 @click.argument("lengths", nargs=4, metavar="D A B C")
-def classify(lengths: tuple[str, ...]) -> None:
+@or_out_option
+def classify(lengths: tuple[str, ...], out: Path | None) -> None:
     """Name a linkage by its bar lengths (ground, input, coupler, output), and say what turns and how far.
 
     Bare numbers are metres; "30 cm" works too.
     """
-    from fourbar.formulas.linkage_type import classify as type_of
-    from fourbar.linkage import BAR_NAMES, Bar, FourBar
-    from fourbar.show.words import mobility_lines
+    from fourbar.linkage import Bar, FourBar
+    from fourbar.show.words import type_lines
 
     d, a, b, c = _lengths(lengths)
-    linkage = FourBar(d, Bar(a), Bar(b), Bar(c))
-    found = type_of(linkage)
-    relation = "<" if found.surplus > 0.0 else ">" if found.surplus < 0.0 else "="
-    outer = min(linkage.lengths) + max(linkage.lengths)
-    turning = ", ".join(BAR_NAMES[number] for number in found.turning) or "none"
-    click.echo(found.name)
-    click.echo(f"s + l = {outer:.6g} m {relation} p + q = {sum(linkage.lengths) - outer:.6g} m")
-    click.echo(f"bars that turn fully: {turning}")
-    for line in mobility_lines(linkage) if found.barker is not None else ():  # a structure does not move
-        click.echo(line)
+    _print("\n".join(type_lines(FourBar(d, Bar(a), Bar(b), Bar(c)))) + "\n", out)
 
 
 @group.command()
-@click.argument("file", type=click.Path(path_type=Path))
+@click.argument("file", type=click.Path(path_type=Path), required=False)
+@click.option("-o", "--out", type=click.Path(path_type=Path), metavar="FILE", help="The same, as an option.")
 @click.option("--lengths", nargs=4, required=True, metavar="D A B C", help="Ground, input, coupler, output.")
-def new(file: Path, lengths: tuple[str, ...]) -> None:
+def new(file: Path | None, out: Path | None, lengths: tuple[str, ...]) -> None:
     """Write a new scene file with the four lengths, the rest explained in comments.
 
     Bare numbers are metres; "30 cm" works too.
@@ -70,6 +73,10 @@ def new(file: Path, lengths: tuple[str, ...]) -> None:
     from fourbar.files.new import new_scene
     from fourbar.writing import write_text
 
+    if (file is None) == (out is None):
+        raise click.UsageError("name the new file once: FILE, or -o FILE")
+    file = file or out
+    assert file is not None
     if file.exists():
         raise InputError("FILE", str(file), "is there already; a new scene needs a new name")
     write_text(file, new_scene(lengths))
@@ -78,30 +85,35 @@ def new(file: Path, lengths: tuple[str, ...]) -> None:
 
 @group.command()
 @scene_argument
-@click.option("--json", "form", flag_value="json", help="One object, SI, every digit.")
-@click.option("--csv", "form", flag_value="csv", help="One line per position, SI, every digit.")
+@click.option("--json", "as_json", is_flag=True, help="One object, SI, every digit.")
+@click.option("--csv", "as_csv", is_flag=True, help="One line per position, SI, every digit.")
 @click.option("--degrees/--radians", default=None, help="Angles theta; left out: degrees in the table, else radians.")
-@click.option("-o", "--out", type=click.Path(path_type=Path), metavar="FILE", help="Write there instead.")
-def analyze(scene: Path, form: str | None, degrees: bool | None, out: Path | None) -> None:
+@click.option("--every", type=click.IntRange(min=1), metavar="N", help="Show every N-th position in the table.")
+@click.option("--all", "every", flag_value=1, help="Show every position; a terminal gets some forty at most.")
+@or_out_option
+def analyze(
+    scene: Path, as_json: bool, as_csv: bool, degrees: bool | None, every: int | None, out: Path | None
+) -> None:
     """Solve a scene: angles, speeds, accelerations, driving torque and pin forces."""
+    from fourbar.show.tables import printed
     from fourbar.solution import csv_text, json_text
     from fourbar.solve import solve
-    from fourbar.writing import write_text
 
+    if as_json and as_csv:
+        raise click.UsageError("--json and --csv are two forms of the output; give one of them")
+    if every is not None and (as_json or as_csv):
+        raise click.UsageError("--every and --all are of the table; --json and --csv hold every position")
     described = _load(scene)
     with _named(scene), _waiting(described):
         solution = solve(described)
     if not solution.assembled.any():
         raise NotAssembledError(f"{scene}: motion.theta_2: the linkage assembles at none of the positions requested")
-    if form is None:
-        text = _table_text(described, solution, None if out else _terminal_width(), degrees is not False)
+    if as_json or as_csv:
+        text = (json_text if as_json else csv_text)(solution, degrees=bool(degrees))
     else:
-        write = json_text if form == "json" else csv_text
-        text = write(solution, degrees=bool(degrees))
-    if out is None:
-        click.echo(text, nl=False)
-    else:
-        write_text(out, text)
+        width = None if out else _terminal_width()
+        text = printed(described, solution, width, degrees=degrees is not False, every=every)
+    _print(text, out)
 
 
 @group.command()
@@ -147,7 +159,7 @@ def plot(scene: Path, out: Path, figure: str, position: str | None, branches: st
     """Draw a scene as SVG, PNG or PDF (by the ending of FILE)."""
     from fourbar.show.plot import draw
 
-    at = None if position is None else _number("--position", position, "rad")
+    at = None if position is None else _angle("--position", position)
     described = _load(scene)
     with _named(scene), _waiting(described):
         draw(described, out, figure, position=at, branches=branches)
@@ -238,6 +250,15 @@ def _number(key: str, text: str, unit: str, *, positive: bool = False) -> float:
             raise InputError(key, text, f"{error}; must be a number in {unit}, or one with a unit") from None
 
 
+def _angle(key: str, text: str) -> float:
+    """An angle with its unit, rad: a bare number may have been meant in either."""
+    try:
+        float(text)
+    except ValueError:
+        return _number(key, text, "rad")
+    raise InputError(key, text, f'the unit is missing; did you mean "{text} deg"?')
+
+
 def _terminal_width() -> int | None:
     """Columns of the terminal; None where the output goes elsewhere."""
     if not sys.stdout.isatty():
@@ -247,23 +268,14 @@ def _terminal_width() -> int | None:
     return shutil.get_terminal_size().columns
 
 
-def _table_text(scene: "Scene", solution: Any, width: int | None, degrees: bool) -> str:
-    from rich.console import Console
-    from rich.text import Text
+def _print(text: str, out: Path | None) -> None:
+    """To standard output, or to a file, whole or not at all."""
+    from fourbar.writing import write_text
 
-    from fourbar.show import tables
-
-    shown, left_out = tables.table(solution, width, degrees=degrees)
-    text = io.StringIO()
-    console = Console(file=text, width=width or 10_000, color_system=None)
-    if scene.title:
-        console.print(Text(printable(scene.title)))
-    for line in tables.heading(scene, solution):
-        console.print(Text(line))
-    console.print(shown)
-    if left_out:
-        console.print(Text(f"not shown: {', '.join(left_out)} (a wider terminal, --csv or --json has them)"))
-    return "\n".join(line.rstrip() for line in text.getvalue().split("\n"))
+    if out is None:
+        click.echo(text, nl=False)
+    else:
+        write_text(out, text)
 
 
 def main(arguments: list[str] | None = None) -> None:

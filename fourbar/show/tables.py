@@ -1,10 +1,12 @@
 """What `fourbar analyze` prints: JSON, CSV, or a table for the reader; the quantities are those of `Solution`."""
 
+import io
 import math
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from fourbar.exits import printable
 from fourbar.linkage import BAR_NAMES, PIN_FORCE
 from fourbar.quantities import ANGLES, PIN_FORCES, STATUS_NAMES, UNITS
 from fourbar.scene import Scene
@@ -19,6 +21,59 @@ MOST_DIGITS = 16
 """Of a double."""
 GAP = 2
 """Blanks between two columns of the table, the divider among them."""
+
+
+MOST_ROWS = 40
+"""Rows of the table on a terminal where --every does not state them: they and the summary can be read at a glance."""
+STEPS = (1, 2, 5, 10, 15, 20, 30, 45, 60, 90)
+"""A terminal is shown every so many positions, of a longer sweep a multiple of the last."""
+
+
+def printed(
+    scene: Scene, solution: Solution, width: int | None, *, degrees: bool = True, every: int | None = None
+) -> str:
+    """The summary and the table as text.
+
+    Parameters
+    ----------
+    width : columns of a terminal, where the summary stands last and the positions are thinned out; None: a file or
+        a pipe, which gets the summary first and every position.
+    every : show every so many positions; left out: as `width` says.
+    """
+    from rich.console import Console
+    from rich.text import Text
+
+    step = every or (1 if width is None else _step(len(solution)))
+    shown, left_out = table(solution, width, degrees=degrees, every=step)
+    text = io.StringIO()
+    console = Console(file=text, width=width or 10_000, color_system=None)
+    title = [printable(scene.title)] if scene.title else []
+    summary = [*title, *heading(scene, solution)]
+    notes = []
+    if step > 1:
+        more = "; --all shows each" if every is None else ""
+        notes.append(f"shown: every {step}{_ordinal(step)} of the {len(solution)} positions{more}")
+    if left_out:
+        notes.append(f"not shown: {', '.join(left_out)} (a wider terminal, --csv or --json has them)")
+    before, after = (summary, notes) if width is None else ([], [*notes, *summary])
+    for line in before:
+        console.print(Text(line))
+    console.print(shown)
+    for line in after:
+        console.print(Text(line))
+    return "\n".join(line.rstrip() for line in text.getvalue().split("\n"))
+
+
+def _step(count: int) -> int:
+    """Show every so many of the positions, so that no more than MOST_ROWS are."""
+    wanted = math.ceil((count - 1) / (MOST_ROWS - 1))
+    return next((step for step in STEPS if step >= wanted), STEPS[-1] * math.ceil(wanted / STEPS[-1]))
+
+
+def _ordinal(number: int) -> str:
+    if number % 100 in (11, 12, 13):
+        return "th"
+    return {1: "st", 2: "nd", 3: "rd"}.get(number % 10, "th")
 
 
 def heading(scene: Scene, solution: Solution) -> list[str]:
@@ -99,8 +154,11 @@ def columns(solution: Solution, *, degrees: bool = True) -> dict[str, list[str]]
     return shown
 
 
-def table(solution: Solution, width: int | None, *, degrees: bool = True) -> "tuple[Table, list[str]]":
-    """The table for a terminal of the given width (None: as wide as it needs), and the columns left out of it."""
+def table(solution: Solution, width: int | None, *, degrees: bool = True, every: int = 1) -> "tuple[Table, list[str]]":
+    """The table for a terminal of the given width (None: as wide as it needs), and the columns left out of it.
+
+    Every so many positions are shown, the last one always.
+    """
     from rich import box
     from rich.table import Table
     from rich.text import Text
@@ -118,7 +176,9 @@ def table(solution: Solution, width: int | None, *, degrees: bool = True) -> "tu
     shown = Table(box=box.SIMPLE_HEAD, show_edge=False, pad_edge=False, padding=(0, GAP - 1, 0, 0))
     for name in kept:
         shown.add_column(Text(name), justify="right", no_wrap=True)
-    for row in zip(*(cells[name] for name in kept), strict=True):
+    rows = list(zip(*(cells[name] for name in kept), strict=True))
+    last = rows[-1:] if (len(rows) - 1) % every else []
+    for row in rows[::every] + last:
         shown.add_row(*(Text(cell) for cell in row))
     return shown, [name.split("\n")[0] for name in cells if name not in kept]
 

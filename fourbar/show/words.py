@@ -3,12 +3,25 @@
 import math
 from collections.abc import Iterator
 
+from fourbar.formulas.linkage_type import classify
 from fourbar.formulas.mobility import change_points, limit_positions, swing, time_ratio, turns_fully
 from fourbar.formulas.transmission import transmission_extremes
 from fourbar.linkage import BAR_NAMES, MOVING_BARS, FourBar
 from fourbar.scene.motion import BRANCH_NAMES
 
 BRANCHES = {**BRANCH_NAMES, 0: "both"}
+
+
+def type_lines(linkage: FourBar) -> Iterator[str]:
+    """The type of a linkage, the condition that decides it, what turns, and `mobility_lines`."""
+    found = classify(linkage)
+    relation = "<" if found.surplus > 0.0 else ">" if found.surplus < 0.0 else "="
+    outer = min(linkage.lengths) + max(linkage.lengths)
+    yield found.name
+    yield f"s + l = {outer:.6g} m {relation} p + q = {sum(linkage.lengths) - outer:.6g} m"
+    yield "bars that turn fully: " + (", ".join(BAR_NAMES[number] for number in found.turning) or "none")
+    if found.barker is not None:  # a structure does not move
+        yield from mobility_lines(linkage)
 
 
 def mobility_lines(linkage: FourBar) -> Iterator[str]:

@@ -13,6 +13,7 @@ from fourbar.scene import Scene
 from fourbar.show.plot.linkage import ENDS, mass_centre, paths, supports
 from fourbar.show.plot.style import BAR_COLOURS, INK, largest, length_unit, matplotlib_style, plain
 from fourbar.show.plot.view import View, view
+from fourbar.show.progress import counted
 from fourbar.writing import write_bytes
 
 if TYPE_CHECKING:
@@ -64,7 +65,7 @@ def write_film(scene: Scene, path: Path, kind: str, seconds: float | None) -> No
             draft = Path(folder) / f"film.{kind}"
             try:
                 with writer.saving(figure, str(draft), DPI):
-                    for index in order:
+                    for index in counted(order, f"{len(order)} frames"):
                         move(index)
                         writer.grab_frame()
             except (subprocess.CalledProcessError, BrokenPipeError):

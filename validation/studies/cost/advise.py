@@ -182,7 +182,9 @@ def judged(scene: Scene, trial: Trial) -> Errors:
 @click.command(name="advise")
 @click.argument("scene", type=click.Path(path_type=Path, dir_okay=False))
 @click.option("--error", "asked", type=float, required=True, help="Relative error of torque and pin forces.")
-@click.option("-o", "--output", type=click.Path(path_type=Path, dir_okay=False), help="Write the MJCF there.")
+@click.option(
+    "-o", "--out", "--output", "output", type=click.Path(path_type=Path, dir_okay=False), help="Write the MJCF there."
+)
 def command(scene: Path, asked: float, output: Path | None) -> int:
     """The cheapest MuJoCo settings that keep SCENE within an error; exit 1 where none is found."""
     from fourbar.files import load
