@@ -26,6 +26,8 @@ if TYPE_CHECKING:
     from fourbar.effects import Viscous as Viscous
     from fourbar.files import dump as dump
     from fourbar.files import load as load
+    from fourbar.show.notebook import in_units as in_units
+    from fourbar.show.units import units as units
 
 
 def _notebook(name: str) -> Any:
@@ -45,6 +47,10 @@ def __getattr__(name: str) -> Any:
     # the file edge needs a units library, most scenes few effects: loaded on first use, not by `import fourbar`
     if name in ("load", "dump"):
         return getattr(import_module("fourbar.files"), name)
+    if name == "in_units":
+        return import_module("fourbar.show.notebook").in_units
+    if name == "units":
+        return import_module("fourbar.show.units").units
     if name in ("Friction", "Gravity", "Load", "Viscous"):
         return getattr(import_module("fourbar.effects"), name)
     raise AttributeError(f"module 'fourbar' has no attribute {name!r}")

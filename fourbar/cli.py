@@ -25,6 +25,11 @@ or_out_option = click.option(
 )
 
 
+units_option = click.option(
+    "--units", default="SI", metavar="UNITS", help='"imperial", or a list like "mm N.mm deg"; left out: SI.'
+)
+
+
 @click.group(
     invoke_without_command=True,
     context_settings={"help_option_names": ["-h", "--help"]},
@@ -88,31 +93,44 @@ def new(file: Path | None, out: Path | None, lengths: tuple[str, ...]) -> None:
 @click.option("--json", "as_json", is_flag=True, help="One object, SI, every digit.")
 @click.option("--csv", "as_csv", is_flag=True, help="One line per position, SI, every digit.")
 @click.option("--degrees/--radians", default=None, help="Angles theta; left out: degrees in the table, else radians.")
+@units_option
 @click.option("--every", type=click.IntRange(min=1), metavar="N", help="Show every N-th position in the table.")
 @click.option("--all", "every", flag_value=1, help="Show every position; a terminal gets some forty at most.")
 @or_out_option
 def analyze(
-    scene: Path, as_json: bool, as_csv: bool, degrees: bool | None, every: int | None, out: Path | None
+    scene: Path,
+    as_json: bool,
+    as_csv: bool,
+    degrees: bool | None,
+    units: str,
+    every: int | None,
+    out: Path | None,
 ) -> None:
     """Solve a scene: angles, speeds, accelerations, driving torque and pin forces."""
     from fourbar.show.tables import printed
-    from fourbar.solution import csv_text, json_text
+    from fourbar.show.units import units as units_of
+    from fourbar.solution import DEGREES, csv_text, json_text
     from fourbar.solve import solve
 
     if as_json and as_csv:
         raise click.UsageError("--json and --csv are two forms of the output; give one of them")
     if every is not None and (as_json or as_csv):
         raise click.UsageError("--every and --all are of the table; --json and --csv hold every position")
+    shown = dict(units_of(units))
+    if degrees or (degrees is None and "rad" not in shown and not (as_json or as_csv)):
+        shown |= DEGREES
+    elif degrees is False:
+        shown.pop("rad", None)
     described = _load(scene)
     with _named(scene), _waiting(described):
         solution = solve(described)
     if not solution.assembled.any():
         raise NotAssembledError(f"{scene}: motion.theta_2: the linkage assembles at none of the positions requested")
     if as_json or as_csv:
-        text = (json_text if as_json else csv_text)(solution, degrees=bool(degrees))
+        text = (json_text if as_json else csv_text)(solution, shown)
     else:
         width = None if out else _terminal_width()
-        text = printed(described, solution, width, degrees=degrees is not False, every=every)
+        text = printed(described, solution, width, shown, every=every)
     _print(text, out)
 
 
@@ -155,14 +173,16 @@ def mjcf(scene: Path | None, lengths: tuple[str, ...] | None, omega: str | None,
 )
 @click.option("--position", metavar="ANGLE", help='theta_2 of the linkage and free bodies, like "135 deg".')
 @click.option("--branches", default="one", show_default=True, metavar="WHICH", help="one or both.")
-def plot(scene: Path, out: Path, figure: str, position: str | None, branches: str) -> None:
+@units_option
+def plot(scene: Path, out: Path, figure: str, position: str | None, branches: str, units: str) -> None:
     """Draw a scene as SVG, PNG or PDF (by the ending of FILE)."""
     from fourbar.show.plot import draw
+    from fourbar.show.units import units as units_of
 
     at = None if position is None else _angle("--position", position)
     described = _load(scene)
     with _named(scene), _waiting(described):
-        draw(described, out, figure, position=at, branches=branches)
+        draw(described, out, figure, position=at, branches=branches, units=units_of(units))
 
 
 @group.command()
@@ -180,9 +200,11 @@ def plot(scene: Path, out: Path, figure: str, position: str | None, branches: st
     type=click.FloatRange(min=0.1, max=60.0),
     help="Length of a film; left out: 6, of a motion through time its own.",
 )
-def animate(scene: Path, out: Path, pictures: tuple[str, ...], seconds: float | None) -> None:
+@units_option
+def animate(scene: Path, out: Path, pictures: tuple[str, ...], seconds: float | None, units: str) -> None:
     """Show a scene moving: one web page (.html), or a film (.gif, .mp4)."""
     from fourbar.show.animate import write
+    from fourbar.show.units import units as units_of
 
     attached = {}
     for entry in pictures:
@@ -192,7 +214,7 @@ def animate(scene: Path, out: Path, pictures: tuple[str, ...], seconds: float | 
         attached[bar] = file
     described = _load(scene)
     with _named(scene), _waiting(described):
-        write(described, out, pictures=attached, seconds=seconds)
+        write(described, out, pictures=attached, seconds=seconds, units=units_of(units))
 
 
 @contextmanager

@@ -27,7 +27,7 @@ from fourbar.scene import Command, Scene, command
 from fourbar.show.plot.energy import energies
 from fourbar.show.plot.style import length_unit, plain
 from fourbar.show.plot.view import on_branch, over_time, sweep_command
-from fourbar.solution import Array, Solution
+from fourbar.solution import SI, Array, Conversion, Solution
 from fourbar.solve import solve
 from fourbar.writing import write_text
 
@@ -58,6 +58,7 @@ def write(
     pictures: Mapping[str, str | Path] | None = None,
     file_format: str | None = None,
     seconds: float | None = None,
+    units: Conversion = SI,
 ) -> None:
     """Write a moving scene to a file, whole or not at all.
 
@@ -68,6 +69,7 @@ def write(
         that is laid along the bar, its left edge at the bar's first pin (O2, A, O4) and its right
         edge at the second. Pages only.
     file_format : html, gif or mp4 where the path's ending does not say it.
+    units : in which numbers are shown; left out: SI. Angles are in degrees.
     seconds : duration of a film; left out: 6 s for a sweep, of a motion through time its own.
 
     Raises
@@ -81,16 +83,16 @@ def write(
     if kind not in FORMATS:
         raise InputError("output", str(path), "must end in one of " + ", ".join(f".{end}" for end in FORMATS))
     if kind == "html":
-        write_text(target, page(scene, pictures or {}))
+        write_text(target, page(scene, pictures or {}, units))
         return
     if pictures:
         raise InputError("picture", sorted(pictures), "pictures are shown in an .html page only")
     from fourbar.show.plot.film import write_film
 
-    write_film(scene, target, kind, seconds)
+    write_film(scene, target, kind, seconds, units)
 
 
-def page(scene: Scene, pictures: Mapping[str, str | Path] | None = None) -> str:
+def page(scene: Scene, pictures: Mapping[str, str | Path] | None = None, units: Conversion = SI) -> str:
     """The page as text."""
     from fourbar import __version__
 
@@ -105,7 +107,7 @@ def page(scene: Scene, pictures: Mapping[str, str | Path] | None = None) -> str:
         style_hash=_content_hash(style),
         script=script,
         script_hash=_content_hash(script),
-        data=embedded(page_data(scene, pictures or {})),
+        data=embedded(page_data(scene, pictures or {}, units)),
     )
 
 
@@ -120,7 +122,7 @@ def embedded(value: object) -> str:
     return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
 
 
-def page_data(scene: Scene, pictures: Mapping[str, str | Path]) -> dict[str, Any]:
+def page_data(scene: Scene, pictures: Mapping[str, str | Path], units: Conversion = SI) -> dict[str, Any]:
     """Everything the page's script needs: SI units, radians, null where there is no value."""
     linkage, motion = scene.linkage, scene.motion
     shown = _through_time(scene) if over_time(scene) else _sweep(scene)
@@ -128,11 +130,12 @@ def page_data(scene: Scene, pictures: Mapping[str, str | Path]) -> dict[str, Any
     if not any(closes):
         raise NotAssembledError("nothing to show: the linkage assembles at none of the scene's positions")
     shown["start"] = closes.index(True) if shown["start"] is None else shown["start"]
-    factor, unit = length_unit(max(linkage.lengths))
+    factor, unit = length_unit(max(linkage.lengths), units)
     return {
         "lengths": list(linkage.lengths),
         "theta_1": linkage.ground_angle,
         "unit": {"factor": factor, "name": unit},
+        "units": {unit: list(entry) for unit, entry in units.items()},
         "centres": {
             str(number): [(z := linkage.bar(number).to_centre).real, z.imag] if linkage.bar(number).mass > 0.0 else None
             for number in MOVING_BARS

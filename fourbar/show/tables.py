@@ -6,13 +6,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fourbar.exits import printable
 from fourbar.linkage import BAR_NAMES, PIN_FORCE
 from fourbar.quantities import ANGLES, PIN_FORCES, STATUS_NAMES, UNITS
 from fourbar.scene import Scene
 from fourbar.scene.motion import BRANCH_NAMES
 from fourbar.show.bearing import bearing_load
-from fourbar.solution import Array, Solution
+from fourbar.solution import DEGREES, Array, Conversion, Solution, unit_in
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -30,7 +29,7 @@ STEPS = (1, 2, 5, 10, 15, 20, 30, 45, 60, 90)
 
 
 def printed(
-    scene: Scene, solution: Solution, width: int | None, *, degrees: bool = True, every: int | None = None
+    scene: Scene, solution: Solution, width: int | None, units: Conversion = DEGREES, *, every: int | None = None
 ) -> str:
     """The summary and the table as text.
 
@@ -43,12 +42,14 @@ def printed(
     from rich.console import Console
     from rich.text import Text
 
+    from fourbar.exits import printable
+
     step = every or (1 if width is None else _step(len(solution)))
-    shown, left_out = table(solution, width, degrees=degrees, every=step)
+    shown, left_out = table(solution, width, units, every=step)
     text = io.StringIO()
     console = Console(file=text, width=width or 10_000, color_system=None)
     title = [printable(scene.title)] if scene.title else []
-    summary = [*title, *heading(scene, solution)]
+    summary = [*title, *heading(scene, solution, units)]
     notes = []
     if step > 1:
         more = "; --all shows each" if every is None else ""
@@ -76,15 +77,15 @@ def _ordinal(number: int) -> str:
     return {1: "st", 2: "nd", 3: "rd"}.get(number % 10, "th")
 
 
-def heading(scene: Scene, solution: Solution) -> list[str]:
+def heading(scene: Scene, solution: Solution, units: Conversion = DEGREES) -> list[str]:
     """The lines above the table: what was requested, and how many of the positions have an answer."""
-    d, a, b, c = scene.linkage.lengths
+    lengths = zip(BAR_NAMES.values(), scene.linkage.lengths, strict=True)
     drive = f"drive on bar {scene.drive_bar} ({BAR_NAMES[scene.drive_bar]})"
     if scene.motion.free is not None:
         drive = "released, no drive"
     branch = BRANCH_NAMES[scene.motion.branch]
     lines = [
-        f"ground {d:.6g} m, input {a:.6g} m, coupler {b:.6g} m, output {c:.6g} m",
+        ", ".join(f"{name} {value(length, 'm', units)}" for name, length in lengths),
         f"{branch} branch; {drive}",
     ]
     counts = np.bincount(solution.status_code, minlength=len(STATUS_NAMES))
@@ -96,17 +97,26 @@ def heading(scene: Scene, solution: Solution) -> list[str]:
         lines.append(f"the motion ends at {solution.stopped_at:.6g} s: bars 3 and 4 lie in one line there")
     if scene.motion.free is None and solution.torque is not None and np.isfinite(solution.torque).any():
         worst = int(np.nanargmax(np.abs(solution.torque)))
-        where = math.degrees(solution.theta_2[worst])
-        lines.append(f"largest torque {solution.torque[worst]:.6g} N m at theta_2 = {where:.6g} deg")
-        lines += _warning(scene, solution)
+        where = value(solution.theta_2[worst], "rad", units)
+        lines.append(f"largest torque {value(solution.torque[worst], 'N m', units)} at theta_2 = {where}")
+        lines += _warning(scene, solution, units)
     if solution.F12 is not None and np.isfinite(solution.F12).any():
         loads = {pin: bearing_load(solution, pin) for pin in PIN_FORCE}
-        parts = [f"{pin} {load.largest:.6g} N at {math.degrees(load.where):.6g} deg" for pin, load in loads.items()]
+        parts = [
+            f"{pin} {value(load.largest, 'N', units)} at {value(load.where, 'rad', units)}"
+            for pin, load in loads.items()
+        ]
         lines.append("largest pin loads: " + ", ".join(parts))
     return lines
 
 
-def _warning(scene: Scene, solution: Solution) -> list[str]:
+def value(number: float, unit: str, units: Conversion) -> str:
+    """A number of an SI unit with six digits and the unit it is shown in."""
+    name, factor = unit_in(unit, units)
+    return f"{number * factor:.6g} {name}"
+
+
+def _warning(scene: Scene, solution: Solution, units: Conversion) -> list[str]:
     """Where the torque has few digits left, and how far from in line the two bars are that cost them."""
     assert solution.torque is not None
     if solution.torque_error is None or solution.drive_condition is None:
@@ -118,7 +128,7 @@ def _warning(scene: Scene, solution: Solution) -> list[str]:
         return []
     worst = int(np.nanargmax(share))
     left = max(math.floor(-math.log10(share[worst])), 0)
-    where = f"at theta_2 = {math.degrees(solution.theta_2[worst]):.6g} deg"
+    where = f"at theta_2 = {value(solution.theta_2[worst], 'rad', units)}"
     sines = {"3 and 4": abs(solution.sin_mu[worst])}
     if scene.drive_bar != 2:
         sines[{3: "2 and 4", 4: "2 and 3"}[scene.drive_bar]] = solution.drive_condition[worst]
@@ -131,30 +141,35 @@ FEW_DIGITS = 1e-8
 """Relative error of the torque above which the heading says so: half of what a double carries is lost."""
 
 
-def columns(solution: Solution, *, degrees: bool = True) -> dict[str, list[str]]:
+def columns(solution: Solution, units: Conversion = DEGREES) -> dict[str, list[str]]:
     """The columns of the table, most wanted first: heading with unit -> cells."""
-    unit, factor = ("deg", 180.0 / math.pi) if degrees else ("rad", 1.0)
     shown: dict[str, list[str]] = {}
+
+    def add(name: str, unit: str, values: Array) -> None:
+        label, factor = unit_in(unit, units)
+        shown[f"{name}\n{label}"] = _cells(values * factor, "angle" if unit == "rad" else "")
+
     if solution.time is not None:
-        shown["time\ns"] = _cells(solution.time)
-    shown[f"theta_2\n{unit}"] = _cells(solution.theta_2 * factor, "angle")
+        add("time", "s", solution.time)
+    add("theta_2", "rad", solution.theta_2)
     if solution.torque is not None:
         if solution.time is None:  # released, it has no drive: its torque is rounding
-            shown[f"T{solution.drive_bar}\nN m"] = _cells(solution.torque)
+            add(f"T{solution.drive_bar}", "N m", solution.torque)
             shown["digits\nof T"] = _digits(solution)
         for name in PIN_FORCES:
-            shown[f"|{name}|\nN"] = _cells(np.hypot(*getattr(solution, name).T))
+            add(f"|{name}|", "N", np.hypot(*getattr(solution, name).T))
     for name in ANGLES:
-        shown[f"{name}\n{unit}"] = _cells(getattr(solution, name) * factor, "angle")
+        add(name, "rad", getattr(solution, name))
     for name in ("omega_3", "omega_4", "alpha_3", "alpha_4"):
-        values = getattr(solution, name)
-        if values is not None:
-            shown[f"{name}\n{UNITS[name]}"] = _cells(values)
+        if getattr(solution, name) is not None:
+            add(name, UNITS[name], getattr(solution, name))
     shown["sin mu\n"] = _cells(solution.sin_mu)
     return shown
 
 
-def table(solution: Solution, width: int | None, *, degrees: bool = True, every: int = 1) -> "tuple[Table, list[str]]":
+def table(
+    solution: Solution, width: int | None, units: Conversion = DEGREES, *, every: int = 1
+) -> "tuple[Table, list[str]]":
     """The table for a terminal of the given width (None: as wide as it needs), and the columns left out of it.
 
     Every so many positions are shown, the last one always.
@@ -163,7 +178,7 @@ def table(solution: Solution, width: int | None, *, degrees: bool = True, every:
     from rich.table import Table
     from rich.text import Text
 
-    cells = columns(solution, degrees=degrees)
+    cells = columns(solution, units)
     if (solution.status_code != 0).any():
         cells = {"status\n": [status.replace("_", " ") for status in solution.status], **cells}
     needed = -GAP

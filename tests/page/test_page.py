@@ -54,6 +54,20 @@ def type_length(driver, bar: int, value: float | str) -> None:
     driver.execute_script(script, f"length-{bar}", str(value))
 
 
+def test_numbers_are_shown_in_the_units_of_the_page(browse) -> None:
+    scene = crank_rocker()
+    driver = browse(animate.page(scene, units=fourbar.units("mm kN N.mm rpm")))
+    s = fourbar.solve(scene)
+    expected = [s.torque[0] * 1e3, s.F43[0, 0] * 1e-3, s.omega_4[0] * 30.0 / math.pi]
+    assert shown(driver, "torque", "F43_x", "omega_4") == pytest.approx(expected, rel=PRINTED)
+    text = driver.find_element("tag name", "body").text
+    assert "N mm" in text and "kN" in text and "rpm" in text and "rad/s²" in text and "Lengths (mm)" in text
+    labels = [option.text for option in driver.find_elements("css selector", "#quantity option")]
+    assert "torque on bar 2, N mm" in labels and "|F₁₂|, kN" in labels
+    top = max(number(text.text) for text in driver.find_elements("css selector", "#chart text")[-3:] if text.text)
+    assert top == pytest.approx(1e3 * s.torque.max(), rel=0.01)
+
+
 def test_it_loads_and_shows_the_first_position(browse) -> None:
     scene = crank_rocker()
     driver = browse(animate.page(scene))

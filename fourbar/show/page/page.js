@@ -187,6 +187,7 @@ document.addEventListener("keydown", event => {
 new ResizeObserver(() => { if (Math.max(280, picture.parentElement.clientWidth) !== view.width) refresh(); }).observe(picture.parentElement);
 
 byId("drive").textContent = data.drive_bar;
+for (const element of document.querySelectorAll("[data-unit]")) element.textContent = nameOf(element.dataset.unit);
 byId("branch").value = branch;
 for (const element of document.querySelectorAll(".unit")) element.textContent = unit.name;
 if (data.followed) byId("branch").options[branch === 1 ? 0 : 1].textContent += " (followed)";

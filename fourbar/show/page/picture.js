@@ -113,12 +113,12 @@ function scaleForces() {
 // position, small forces stay visible where others diverge.
 function forceLegend() {
   parts.legend.replaceChildren();
-  const step = 10 ** Math.floor(Math.log10(forceScale.top));
-  const round = [5, 2, 1].map(m => m * step).find(v => v <= 0.75 * forceScale.top) ?? 0.5 * step;
-  const y = view.height - 12, long = round * forceScale.pixels;
+  const top = inUnit("N", forceScale.top), step = 10 ** Math.floor(Math.log10(top));
+  const round = [5, 2, 1].map(m => m * step).find(v => v <= 0.75 * top) ?? 0.5 * step;
+  const y = view.height - 12, long = round * forceScale.pixels * forceScale.top / top;
   make(parts.legend, "line", { class: "scale", x1: 14, x2: 14 + long, y1: y, y2: y });
   make(parts.legend, "text", { class: "small", x: 14, y: y - 7 }).textContent =
-    `${rounded(round, 1)} N` + (forceScale.cut ? `, arrows over ${rounded(forceScale.top, 2)} N cut (dashed)` : "");
+    `${rounded(round, 1)} ${nameOf("N")}` + (forceScale.cut ? `, arrows over ${rounded(top, 2)} ${nameOf("N")} cut (dashed)` : "");
 }
 
 // The length, in pixels, of the greatest force with which no arrow of a position leaves the picture.

@@ -23,6 +23,7 @@ from fourbar.show.plot.style import (
     largest,
     legend_above,
     number,
+    quantity,
     unit_for,
 )
 from fourbar.show.plot.view import View
@@ -112,12 +113,11 @@ def limit_of(values: list[Array]) -> float | None:
     return CLIPPED * ordinary if ordinary > 0.0 and size.max() > OUTLIER * ordinary else None
 
 
-def clip(
-    axes: "Axes", view: View, curves: dict[str, Array], limit: float | None, what: str, factor: float, unit: str
-) -> None:
-    """End the axis short of what diverges, and say so."""
+def clip(axes: "Axes", view: View, curves: dict[str, Array], limit: float | None, what: str, unit: str) -> None:
+    """End the axis short of what diverges, and say so; `unit` is that of SI."""
     if limit is None:
         return
+    factor, name_of_unit = unit_for(limit, unit, view.units)
     lowest = min(float(np.nanmin(value)) for value in curves.values())
     axes.set_ylim(0.0 if lowest >= 0.0 else -limit * factor, limit * factor)
     name, worst = max(curves.items(), key=lambda item: largest(item[1]))
@@ -125,11 +125,10 @@ def clip(
     if abs(worst[index]) <= limit:
         return
     where = f"θ₂ = {view.degrees[index]:.5g}°" if view.time is None else f"t = {view.time[index]:.4g} s"
-    own_factor, own_unit = (1.0, unit) if "/" in unit else unit_for(abs(worst[index]), unit.lstrip("GMkmµn ") or unit)
     note(
         view,
-        f"{what} clipped at {number(limit * factor)} {unit}; the largest evaluated, {name} = "
-        f"{number(worst[index] * own_factor)} {own_unit}, is at {where}.",
+        f"{what} clipped at {number(limit * factor)} {name_of_unit}; the largest evaluated, {name} = "
+        f"{quantity(worst[index], unit, view.units)}, is at {where}.",
     )
 
 
@@ -152,16 +151,17 @@ def _rates(axes: "Axes", view: View, letter: str, unit: str, title: str, what: s
     name = {"omega": "ω", "alpha": "α"}[letter]
     digits = {2: "₂", 3: "₃", 4: "₄"}
     curves = {name + digits[bar]: getattr(view.sweep, f"{letter}_{bar}") for bar in (3, 4)}
+    factor, shown_unit = unit_for(0.0, unit, view.units)
     command = getattr(view.sweep, f"{letter}_2")
     if np.any(command):
-        axes.plot(over, command, color=BAR_COLOURS[2], lw=1.0, label=rf"$\{letter}_2$")
+        axes.plot(over, factor * command, color=BAR_COLOURS[2], lw=1.0, label=rf"$\{letter}_2$")
     for bar, values in zip((3, 4), curves.values(), strict=True):
-        axes.plot(over, values, color=BAR_COLOURS[bar], ls=BAR_DASHES[bar], label=rf"$\{letter}_{bar}$")
+        axes.plot(over, factor * values, color=BAR_COLOURS[bar], ls=BAR_DASHES[bar], label=rf"$\{letter}_{bar}$")
     axes.axhline(0.0, color=INK, lw=0.6, zorder=1)
-    axes.set_ylabel(rf"$\{letter}$ ({unit})")
+    axes.set_ylabel(rf"$\{letter}$ ({shown_unit})")
     axes.set_title(title)
     limit = limit_of([getattr(other.sweep, f"{letter}_{bar}") for other in view.alike for bar in (3, 4)])
-    clip(axes, view, curves, limit, what, 1.0, unit)
+    clip(axes, view, curves, limit, what, unit)
     legend_above(axes)
 
 
@@ -172,7 +172,7 @@ def draw_velocities(axes: "Axes", view: View) -> None:
 
 def draw_accelerations(axes: "Axes", view: View) -> None:
     """alpha_2 (where it is not zero), alpha_3, alpha_4."""
-    _rates(axes, view, "alpha", "rad/s²", "Angular accelerations", "Angular acceleration")
+    _rates(axes, view, "alpha", "rad/s^2", "Angular accelerations", "Angular acceleration")
 
 
 def draw_torque(axes: "Axes", view: View) -> None:
@@ -182,7 +182,7 @@ def draw_torque(axes: "Axes", view: View) -> None:
     assert torque is not None
     torques = [other.sweep.torque for other in view.alike if other.sweep.torque is not None]
     limit = limit_of(torques)
-    factor, unit = unit_for(limit or largest(*torques), "N m")
+    factor, unit = unit_for(limit or largest(*torques), "N m", view.units)
     where = poles(view)
     axes.plot(broken(over, where), factor * broken(torque, where), color=INK, label=f"$T_{bar}$")
     for index in where:
@@ -192,7 +192,7 @@ def draw_torque(axes: "Axes", view: View) -> None:
     axes.axhline(0.0, color=INK, lw=0.6, zorder=1)
     axes.set_ylabel(f"$T_{bar}$ ({unit})")
     axes.set_title(f"Driving torque on bar {bar}")
-    clip(axes, view, {f"T{'₂₃₄'[bar - 2]}": torque}, limit, "Torque", factor, unit)
+    clip(axes, view, {f"T{'₂₃₄'[bar - 2]}": torque}, limit, "Torque", "N m")
 
 
 def draw_forces(axes: "Axes", view: View) -> None:
@@ -201,7 +201,7 @@ def draw_forces(axes: "Axes", view: View) -> None:
     sizes = {name: np.hypot(*getattr(view.sweep, name).T) for name in FORCE_COLOURS}
     everywhere = [np.hypot(*getattr(other.sweep, name).T) for other in view.alike for name in FORCE_COLOURS]
     limit = limit_of(everywhere)
-    factor, unit = unit_for(limit or largest(*everywhere), "N")
+    factor, unit = unit_for(limit or largest(*everywhere), "N", view.units)
     where = poles(view)
     for name, values in sizes.items():
         axes.plot(
@@ -215,7 +215,7 @@ def draw_forces(axes: "Axes", view: View) -> None:
     axes.set_ylim(bottom=0.0)
     axes.set_ylabel(f"$|F|$ ({unit})")
     axes.set_title("Pin forces")
-    clip(axes, view, sizes, limit, "Pin forces", factor, unit)
+    clip(axes, view, sizes, limit, "Pin forces", "N")
     legend_above(axes)
 
 
@@ -271,7 +271,7 @@ def draw_energy(axes: "Axes", view: View) -> None:
     own = energies(view.scene, view.sweep)
     shared = [energies(other.scene, other.sweep) for other in view.others] + [own]
     factor, unit = unit_for(
-        largest(*(values for each in shared for values in (each.kinetic, *each.work.values()))), "J"
+        largest(*(values for each in shared for values in (each.kinetic, *each.work.values()))), "J", view.units
     )
     axes.plot(over, factor * own.kinetic, color=INK, lw=2.2, label="kinetic energy")
     for (name, values), (colour, dashes) in zip(own.work.items(), cycle(WORKS), strict=False):

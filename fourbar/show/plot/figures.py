@@ -14,6 +14,7 @@ from fourbar.show.plot import curves, freebody, hodograph, linkage
 from fourbar.show.plot.labels import Labels
 from fourbar.show.plot.style import FORCE_COLOURS, MUTED, matplotlib_style, plain, save
 from fourbar.show.plot.view import View, common_position, on_branch, over_time, view
+from fourbar.solution import SI, Conversion
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -122,6 +123,7 @@ def draw(
     *,
     position: float | None = None,
     branches: str = "one",
+    units: Conversion = SI,
     file_format: str | None = None,
 ) -> None:
     """Draw a figure of a scene into a file, whole or not at all; the same scene gives the same bytes.
@@ -133,6 +135,7 @@ def draw(
         "forces", "hodograph", "energy", "transmission", "freebody".
     position : theta_2 of the linkage and the free bodies, rad; left out: the scene's own.
     branches : "one" (the scene's) or "both" (open and crossed, to the same scales).
+    units : in which numbers are drawn; left out: SI with the prefix that suits. Angles are in degrees.
     file_format : svg, png or pdf where the path's ending does not say it.
 
     Raises
@@ -156,11 +159,16 @@ def draw(
     if figure == "torque" and scene.motion.free is not None:
         raise InputError("figure", figure, "a free motion has no driving torque; energy shows what moves it")
     with matplotlib_style():
-        save(compose(scene, painter, size, position, branches), target, kind)
+        save(compose(scene, painter, size, position, branches, units), target, kind)
 
 
 def compose(
-    scene: Scene, painter: Painter, size: tuple[float, float], position: float | None, branches: str
+    scene: Scene,
+    painter: Painter,
+    size: tuple[float, float],
+    position: float | None,
+    branches: str,
+    units: Conversion = SI,
 ) -> "Figure":
     """The figure itself, laid out and labelled."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -171,6 +179,7 @@ def compose(
         position = common_position(scenes)
     views = [view(each, position) for each in scenes]
     for shown in views:
+        shown.units = units
         shown.others = [other for other in views if other is not shown]
     stacked = size[0] > 9.0
     figure = Figure(

@@ -14,6 +14,7 @@ from fourbar.show.plot.linkage import ENDS, mass_centre, paths, supports
 from fourbar.show.plot.style import BAR_COLOURS, INK, largest, length_unit, matplotlib_style, plain
 from fourbar.show.plot.view import View, view
 from fourbar.show.progress import counted
+from fourbar.solution import SI, Conversion
 from fourbar.writing import write_bytes
 
 if TYPE_CHECKING:
@@ -31,7 +32,7 @@ SHORTEST = 1.0
 """A motion through time shorter than this, s, is slowed down to be seen."""
 
 
-def write_film(scene: Scene, path: Path, kind: str, seconds: float | None) -> None:
+def write_film(scene: Scene, path: Path, kind: str, seconds: float | None, units: Conversion = SI) -> None:
     """One sweep; where the input does not turn fully, there and back. A motion through time is shown as it is.
 
     Parameters
@@ -50,6 +51,7 @@ def write_film(scene: Scene, path: Path, kind: str, seconds: float | None) -> No
         if kind == "mp4" and not FFMpegWriter.isAvailable():
             raise DependencyError("an .mp4 film needs the program ffmpeg; .gif and .html do not")
         shown = view(scene)
+        shown.units = units
         if seconds is None:
             seconds = SWEEP_SECONDS
             if shown.time is not None:
@@ -100,7 +102,7 @@ def _stage(shown: View) -> tuple["Figure", Any]:
 
     sweep, linkage = shown.sweep, shown.scene.linkage
     O4 = (linkage.ground * math.cos(linkage.ground_angle), linkage.ground * math.sin(linkage.ground_angle))
-    factor, unit = length_unit(largest(sweep.A, sweep.B, sweep.G3, np.array(O4)))
+    factor, unit = length_unit(largest(sweep.A, sweep.B, sweep.G3, np.array(O4)), shown.units)
     figure = Figure(figsize=SIZE, dpi=DPI, layout="constrained")
     FigureCanvasAgg(figure)
     axes = figure.subplots()

@@ -76,7 +76,8 @@ def draw_linkage(axes: "Axes", view: View, labels: Labels) -> None:
 def _unit(view: View) -> tuple[float, str]:
     """The unit of length of a drawing, the same for both branches."""
     return length_unit(
-        max(largest(v.sweep.A, v.sweep.B, v.sweep.G3, *np.array(list(pins(v).values()))) for v in view.alike)
+        max(largest(v.sweep.A, v.sweep.B, v.sweep.G3, *np.array(list(pins(v).values()))) for v in view.alike),
+        view.units,
     )
 
 

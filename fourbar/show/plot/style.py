@@ -12,7 +12,7 @@ import numpy as np
 
 from fourbar.errors import DependencyError
 from fourbar.quantities import PIN_FORCES
-from fourbar.solution import Array
+from fourbar.solution import SI, Array, Conversion, unit_in
 from fourbar.writing import write_bytes
 
 if TYPE_CHECKING:
@@ -110,8 +110,11 @@ def plain(text: str, width: int) -> str:
 PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
 
 
-def unit_for(largest: float, unit: str) -> tuple[float, str]:
-    """The factor from SI and the unit with the prefix that suits the largest magnitude."""
+def unit_for(largest: float, unit: str, units: Conversion = SI) -> tuple[float, str]:
+    """The factor from SI and the unit stated, or with the prefix that suits the largest magnitude; a rate has none."""
+    if unit in units or "/" in unit:
+        name, factor = unit_in(unit, units)
+        return factor, name.replace("^2", "²")
     if not math.isfinite(largest) or largest <= 0.0:
         return 1.0, unit
     for size, prefix in PREFIXES:
@@ -120,8 +123,10 @@ def unit_for(largest: float, unit: str) -> tuple[float, str]:
     return 1.0 / PREFIXES[-1][0], PREFIXES[-1][1] + unit
 
 
-def length_unit(largest: float) -> tuple[float, str]:
-    """Lengths in m, or in mm or µm where they are small."""
+def length_unit(largest: float, units: Conversion = SI) -> tuple[float, str]:
+    """Lengths in the unit stated, else in m, or in mm or µm where they are small."""
+    if "m" in units:
+        return unit_for(largest, "m", units)
     for size, unit in ((1e3, "km"), (1.0, "m"), (1e-3, "mm")):
         if largest >= size:
             return 1.0 / size, unit
@@ -148,6 +153,12 @@ def number(value: float) -> str:
         return text.replace("-", "−")
     mantissa, exponent = f"{value:.2e}".split("e")
     return f"{mantissa}·10".replace("-", "−") + str(int(exponent)).translate(RAISED)
+
+
+def quantity(value: float, unit: str, units: Conversion = SI) -> str:
+    """A number of an SI unit in the unit stated, or with the prefix that suits it."""
+    factor, name = unit_for(abs(value), unit, units)
+    return f"{number(factor * value)} {name}"
 
 
 def degree_ticks(axis: Any, span: float) -> None:

@@ -12,7 +12,7 @@ from fourbar.formulas.position import Number
 from fourbar.linkage import PINS
 from fourbar.scene import Command, Scene, command
 from fourbar.scene.motion import FromLimit
-from fourbar.solution import Array, Solution
+from fourbar.solution import Array, Conversion, Solution
 from fourbar.solve import solve, state_at
 
 CLEAR = 0.3
@@ -33,6 +33,8 @@ class View:
     sweep: Solution
     here: Solution
     notes: list[str] = field(default_factory=list)
+    units: Conversion = field(default_factory=dict)
+    """Of the numbers drawn; what is left out has the SI unit with a prefix."""
     others: "list[View]" = field(default_factory=list)
     """The other branch, where it is drawn next to this one: to the same scales."""
 
