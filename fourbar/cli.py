@@ -53,17 +53,19 @@ def group(context: click.Context, traceback: bool) -> None:
 
 @group.command()
 @click.argument("lengths", nargs=4, metavar="D A B C")
+@click.option("--json", "as_json", is_flag=True, help="One object, SI and radians, every digit.")
 @or_out_option
-def classify(lengths: tuple[str, ...], out: Path | None) -> None:
+def classify(lengths: tuple[str, ...], as_json: bool, out: Path | None) -> None:
     """Name a linkage by its bar lengths (ground, input, coupler, output), and say what turns and how far.
 
     Bare numbers are metres; "30 cm" works too.
     """
     from fourbar.linkage import Bar, FourBar
-    from fourbar.show.words import type_lines
+    from fourbar.show.words import type_json, type_lines
 
     d, a, b, c = _lengths(lengths)
-    _print("\n".join(type_lines(FourBar(d, Bar(a), Bar(b), Bar(c)))) + "\n", out)
+    linkage = FourBar(d, Bar(a), Bar(b), Bar(c))
+    _print((type_json(linkage) if as_json else "\n".join(type_lines(linkage))) + "\n", out)
 
 
 @group.command()

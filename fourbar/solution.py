@@ -156,6 +156,8 @@ def json_text(solution: Solution, units: Conversion = SI) -> str:
     for name in names:
         values = _values(solution, name, units)
         document[name] = None if values is None else _nulled(values)
+    if solution.time is not None:
+        document["stopped_at"] = solution.stopped_at
     document["drive_bar"] = solution.drive_bar
     document["assembled"] = solution.assembled.tolist()
     return json.dumps(document, allow_nan=False) + "\n"

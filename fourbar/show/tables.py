@@ -93,8 +93,13 @@ def heading(scene: Scene, solution: Solution, units: Conversion = DEGREES) -> li
         f"{count} {name.replace('_', ' ')}" for name, count in zip(STATUS_NAMES, counts.tolist(), strict=True) if count
     ]
     lines.append(f"{len(solution)} position{'s' if len(solution) != 1 else ''}: " + ", ".join(parts))
-    if solution.stopped_at is not None:
-        lines.append(f"the motion ends at {solution.stopped_at:.6g} s: bars 3 and 4 lie in one line there")
+    if solution.stopped_at is not None and scene.motion.free is not None:
+        lines.append(
+            f"{scene.motion.free.steps + 1} instants were wanted: the motion stops at a limit position at "
+            f"t = {solution.stopped_at:.6g} s, where bars 3 and 4 are in line"
+        )
+    if scene.motion.omega_2 is None and solution.torque is None and _acting(scene):
+        lines.append(f"positions only, since omega_2 is left out; {STATIC}")
     if scene.motion.free is None and solution.torque is not None and np.isfinite(solution.torque).any():
         worst = int(np.nanargmax(np.abs(solution.torque)))
         where = value(solution.theta_2[worst], "rad", units)
@@ -108,6 +113,14 @@ def heading(scene: Scene, solution: Solution, units: Conversion = DEGREES) -> li
         ]
         lines.append("largest pin loads: " + ", ".join(parts))
     return lines
+
+
+STATIC = 'omega_2 = "0 rad/s" gives the static torque and pin forces'
+
+
+def _acting(scene: Scene) -> bool:
+    """Whether anything in the scene would need a torque."""
+    return bool(scene.loads or scene.effects or any(bar.mass > 0.0 for bar in scene.linkage.moving))
 
 
 def value(number: float, unit: str, units: Conversion) -> str:

@@ -1,8 +1,10 @@
 """In words, what a linkage can do whatever drives it: swings, limit positions, change points, transmission."""
 
+import json
 import math
 from collections.abc import Iterator
 
+from fourbar.formulas.circuits import circuits
 from fourbar.formulas.linkage_type import classify
 from fourbar.formulas.mobility import change_points, limit_positions, swing, time_ratio, turns_fully
 from fourbar.formulas.transmission import transmission_extremes
@@ -22,6 +24,29 @@ def type_lines(linkage: FourBar) -> Iterator[str]:
     yield "bars that turn fully: " + (", ".join(BAR_NAMES[number] for number in found.turning) or "none")
     if found.barker is not None:  # a structure does not move
         yield from mobility_lines(linkage)
+
+
+def type_json(linkage: FourBar) -> str:
+    """The same as one object: SI and radians, null where there is nothing; positions as `LimitPosition` has them."""
+    found = classify(linkage)
+    document: dict[str, object] = {
+        "schema": "fourbar-classify/1",
+        "lengths": dict(zip(BAR_NAMES.values(), linkage.lengths, strict=True)),
+        **found._asdict(),
+    }
+    if found.barker is not None:
+        transmission = transmission_extremes(linkage)
+        document |= {
+            "swing": {BAR_NAMES[bar]: swing(linkage, bar) for bar in MOVING_BARS},
+            "limit_positions": {
+                BAR_NAMES[bar]: [limit._asdict() for limit in limit_positions(linkage, bar)] for bar in MOVING_BARS
+            },
+            "change_points": change_points(linkage),
+            "circuits": [circuit._asdict() for circuit in circuits(linkage)],
+            "transmission": {**transmission._asdict(), "worst": transmission.worst},
+            "time_ratio": time_ratio(linkage),
+        }
+    return json.dumps(document, allow_nan=False)
 
 
 def mobility_lines(linkage: FourBar) -> Iterator[str]:

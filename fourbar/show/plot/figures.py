@@ -12,8 +12,9 @@ from fourbar.errors import InputError
 from fourbar.scene import Scene
 from fourbar.show.plot import curves, freebody, hodograph, linkage
 from fourbar.show.plot.labels import Labels
-from fourbar.show.plot.style import FORCE_COLOURS, MUTED, matplotlib_style, plain, save
+from fourbar.show.plot.style import FORCE_COLOURS, MUTED, matplotlib_style, plain, rendered, save
 from fourbar.show.plot.view import View, common_position, on_branch, over_time, view
+from fourbar.show.tables import STATIC
 from fourbar.solution import SI, Conversion
 
 if TYPE_CHECKING:
@@ -144,22 +145,62 @@ def draw(
     NotAssembledError : there is no position to draw.
     DependencyError : matplotlib is missing.
     """
-    target = Path(path)
-    kind = (file_format or target.suffix.removeprefix(".")).lower()
+    kind = _format_of(path, file_format)
+    painter, size = _painter(scene, figure, branches)
+    with matplotlib_style():
+        save(compose(scene, painter, size, position, branches, units), Path(path), kind)
+
+
+def _format_of(path: str | Path, file_format: str | None = None) -> str:
+    kind = (file_format or Path(path).suffix.removeprefix(".")).lower()
+    if kind not in FORMATS:
+        raise InputError("output", str(path), "must end in one of " + ", ".join(f".{end}" for end in FORMATS))
+    return kind
+
+
+def _painter(scene: Scene, figure: str, branches: str) -> tuple[Painter, tuple[float, float]]:
+    """The painter and the size of a figure, where the scene has what it shows."""
     for key, value, allowed in (("figure", figure, tuple(FIGURES)), ("branches", branches, BRANCHES)):
         if value not in allowed:
             raise InputError(key, value, "must be one of " + ", ".join(allowed))
-    if kind not in FORMATS:
-        raise InputError("output", str(path), "must end in one of " + ", ".join(f".{end}" for end in FORMATS))
     painter, size, dynamic = FIGURES[figure]
     if dynamic and scene.motion.omega_2 is None and not over_time(scene):
-        raise InputError("motion.omega_2", None, f"is needed for the figure {figure!r}")
+        raise InputError("motion.omega_2", None, f"is needed for the figure {figure!r}; {STATIC}")
     if figure == "energy" and scene.motion.free is None:
         raise InputError("figure", figure, "needs a free motion: motion.free")
     if figure == "torque" and scene.motion.free is not None:
         raise InputError("figure", figure, "a free motion has no driving torque; energy shows what moves it")
+    return painter, size
+
+
+class Drawing:
+    """A figure that a notebook shows, and that `save` writes."""
+
+    def __init__(self, figure: "Figure") -> None:
+        self.figure = figure
+
+    def _repr_svg_(self) -> str:
+        with matplotlib_style():
+            return rendered(self.figure, "svg").decode("utf-8")
+
+    def save(self, path: str | Path) -> None:
+        """Write it as SVG, PNG or PDF by the ending of the path, whole or not at all."""
+        with matplotlib_style():
+            save(self.figure, Path(path), _format_of(path))
+
+
+def drawn(
+    scene: Scene,
+    figure: str = "overview",
+    *,
+    position: float | None = None,
+    branches: str = "one",
+    units: Conversion = SI,
+) -> Drawing:
+    """A figure of a scene for a notebook (`scene.plot()`); parameters and errors are those of `draw`."""
+    painter, size = _painter(scene, figure, branches)
     with matplotlib_style():
-        save(compose(scene, painter, size, position, branches, units), target, kind)
+        return Drawing(compose(scene, painter, size, position, branches, units))
 
 
 def compose(

@@ -88,6 +88,11 @@ def matplotlib_style() -> Iterator[None]:
 
 def save(figure: "Figure", path: Path, file_format: str) -> None:
     """Write a figure whole or not at all, without a date in it."""
+    write_bytes(path, rendered(figure, file_format))
+
+
+def rendered(figure: "Figure", file_format: str) -> bytes:
+    """A figure as SVG, PNG or PDF."""
     metadata: dict[str, dict[str, Any]] = {
         "svg": {"Date": None, "Creator": "fourbar"},
         "pdf": {"CreationDate": None, "Producer": None, "Creator": "fourbar"},
@@ -95,7 +100,7 @@ def save(figure: "Figure", path: Path, file_format: str) -> None:
     }
     buffer = io.BytesIO()
     figure.savefig(buffer, format=file_format, dpi=DPI, metadata=metadata[file_format])
-    write_bytes(path, buffer.getvalue())
+    return buffer.getvalue()
 
 
 CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f\u2028\u2029]+")
