@@ -51,6 +51,7 @@ if _TYPE_CHECKING:
     from fourbar.show.bearing import bearing_load as bearing_load
     from fourbar.show.bearing import shaking_force as shaking_force
     from fourbar.show.bearing import shaking_moment as shaking_moment
+    from fourbar.show.motor import motor_duty as motor_duty
     from fourbar.show.notebook import in_units as in_units
     from fourbar.show.units import units as units
 
@@ -61,6 +62,7 @@ _ON_FIRST_USE = {
     **{name: "fourbar.effects" for name in _EFFECTS},
     **{name: "fourbar.files" for name in ("dump", "load", "save")},
     **{name: "fourbar.show.bearing" for name in ("bearing_load", "shaking_force", "shaking_moment")},
+    "motor_duty": "fourbar.show.motor",
     "in_units": "fourbar.show.notebook",
     "units": "fourbar.show.units",
 }

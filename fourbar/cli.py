@@ -109,6 +109,7 @@ def analyze(
     out: Path | None,
 ) -> None:
     """Solve a scene: angles, speeds, accelerations, driving torque and pin forces."""
+    from fourbar.show.motor import motor_entry
     from fourbar.show.tables import printed
     from fourbar.show.units import units as units_of
     from fourbar.solution import DEGREES, csv_text, json_text
@@ -128,8 +129,10 @@ def analyze(
         solution = solve(described)
     if not solution.assembled.any():
         raise NotAssembledError(f"{scene}: motion.theta_2: the linkage assembles at none of the positions requested")
-    if as_json or as_csv:
-        text = (json_text if as_json else csv_text)(solution, shown)
+    if as_json:
+        text = json_text(solution, shown, motor=motor_entry(solution, shown))
+    elif as_csv:
+        text = csv_text(solution, shown)
     else:
         width = None if out else _terminal_width()
         text = printed(described, solution, width, shown, every=every)

@@ -142,8 +142,11 @@ class Solution:
         return DataFrame({"status": self.status, "branch": self.branch, "drive_bar": self.drive_bar, **known})
 
 
-def json_text(solution: Solution, units: Conversion = SI) -> str:
-    """One object; arrays over the positions, vectors as [x, y], null where there is no value; `units` says in what."""
+def json_text(solution: Solution, units: Conversion = SI, **more: Any) -> str:
+    """One object; arrays over the positions, vectors as [x, y], null where there is no value; `units` says in what.
+
+    Entries of other names follow as they are given.
+    """
     names = _quantities(solution)
     document: dict[str, Any] = {
         "schema": SCHEMA,
@@ -160,6 +163,7 @@ def json_text(solution: Solution, units: Conversion = SI) -> str:
         document["stopped_at"] = solution.stopped_at
     document["drive_bar"] = solution.drive_bar
     document["assembled"] = solution.assembled.tolist()
+    document |= more
     return json.dumps(document, allow_nan=False) + "\n"
 
 

@@ -1,5 +1,6 @@
 """A released linkage that reaches a limit position: judged to its end, whatever an engine does there."""
 
+import json
 from dataclasses import replace
 from typing import Any
 

@@ -11,6 +11,7 @@ from fourbar.quantities import ANGLES, PIN_FORCES, STATUS_NAMES, UNITS
 from fourbar.scene import Scene
 from fourbar.scene.motion import BRANCH_NAMES
 from fourbar.show.bearing import bearing_load
+from fourbar.show.motor import motor_duty
 from fourbar.solution import DEGREES, Array, Conversion, Solution, unit_in
 
 if TYPE_CHECKING:
@@ -105,13 +106,31 @@ def heading(scene: Scene, solution: Solution, units: Conversion = DEGREES) -> li
         where = value(solution.theta_2[worst], "rad", units)
         lines.append(f"largest torque {value(solution.torque[worst], 'N m', units)} at theta_2 = {where}")
         lines += _warning(scene, solution, units)
+        lines += _motor(solution, units)
     if solution.F12 is not None and np.isfinite(solution.F12).any():
         loads = {pin: bearing_load(solution, pin) for pin in PIN_FORCE}
         parts = [
             f"{pin} {value(load.largest, 'N', units)} at {value(load.where, 'rad', units)}"
             for pin, load in loads.items()
         ]
-        lines.append("largest pin loads: " + ", ".join(parts))
+        rms = [f"{pin} {value(load.rms, 'N', units)}" for pin, load in loads.items()]
+        lines += ["largest pin loads: " + ", ".join(parts), "RMS pin loads: " + ", ".join(rms)]
+    return lines
+
+
+def _motor(solution: Solution, units: Conversion) -> list[str]:
+    """What the drive delivers, for the choice of a motor."""
+    duty = motor_duty(solution)
+    if duty is None or len(solution) == 1:
+        return []
+    lines = [
+        f"motor: RMS torque {value(duty.rms_torque, 'N m', units)}, peak speed {value(duty.peak_speed, 'rad/s', units)}"
+        f", power peak {value(duty.peak_power, 'W', units)}, RMS {value(duty.rms_power, 'W', units)}"
+    ]
+    if duty.energy_in is not None and duty.energy_out is not None:
+        over = "per turn" if duty.closed else "over the sweep"
+        energy_in, energy_out = value(duty.energy_in, "J", units), value(duty.energy_out, "J", units)
+        lines.append(f"the drive gives {energy_in} {over} and takes back {energy_out}")
     return lines
 
 
