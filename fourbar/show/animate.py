@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 
 from fourbar.errors import InputError, NotAssembledError
+from fourbar.files import dump
 from fourbar.files.pictures import data_uri
 from fourbar.linkage import BAR_NAMES, MOVING_BARS
 from fourbar.quantities import OK, PIN_FORCES
@@ -142,10 +143,19 @@ def page_data(scene: Scene, pictures: Mapping[str, str | Path], units: Conversio
         },
         "drive_bar": scene.drive_bar,
         "branch": motion.branch,
+        "toml": _scene_file(scene),
         "followed": motion.through == "follow",
         "pictures": {str(number): picture for number, picture in _pictures(scene, pictures).items()},
         **shown,
     }
+
+
+def _scene_file(scene: Scene) -> str | None:
+    """The scene as its file, to be downloaded; None where a file has no form of what acts."""
+    try:
+        return dump(scene)
+    except InputError:
+        return None
 
 
 def _sweep(scene: Scene) -> dict[str, Any]:
@@ -164,7 +174,8 @@ def _sweep(scene: Scene) -> dict[str, Any]:
         "rate": None,
         "start": start,
         "branches": {str(sign): _columns(on_branch(scene, sign), where.theta_2) for sign in (1, -1)},
-        "pace": _pace(motion.omega_2, where.theta_2, len(swept.theta_2)),
+        "pace": None,
+        "positions": len(swept.theta_2),
     }
 
 
@@ -192,6 +203,7 @@ def _through_time(scene: Scene) -> dict[str, Any]:
         "start": None,
         "branches": {str(scene.motion.branch): columns},
         "pace": _pace_in_time(scene, whole, rate, len(where.time)),
+        "positions": len(whole),
     }
 
 
@@ -203,17 +215,6 @@ def thinned(where: Command) -> Command:
     keep = np.round(np.linspace(0, n - 1, MAX_ROWS)).astype(int)
     rows = {name: value[keep] for name, value in where._asdict().items() if isinstance(value, np.ndarray)}
     return where._replace(**rows)
-
-
-def _pace(omega_2: float | None, theta_2: Array, count: int) -> str:
-    """What speed 1 means, and whether positions were left out."""
-    words = "At speed 1× one sweep takes 6 s"
-    if omega_2:
-        real = abs(float(theta_2[-1] - theta_2[0]) / omega_2)
-        words += f"; at ω₂ = {omega_2:.4g} rad/s the mechanism takes {real:.3g} s"
-    if count > len(theta_2):
-        words += f". Shown are {len(theta_2)} of the {count} positions"
-    return words + "."
 
 
 def _rate(duration: float) -> float:

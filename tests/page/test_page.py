@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import fourbar
+from fourbar.files import loads
 from fourbar.show import animate
 from tests.scenes import crank_rocker, thesis
 from tests.test_animate import HOSTILE, PNG, RELEASED, embedded
@@ -211,6 +212,33 @@ def test_a_changed_length_redraws_by_the_formulas_and_hides_the_forces(browse) -
     assert shown(driver, "theta_2")[0] == pytest.approx(math.degrees(fourbar.solve(scene).theta_2[7]), abs=PRINTED_DEG)
 
 
+def test_type_time_and_scene_file_follow_the_lengths(browse) -> None:
+    scene = crank_rocker(title="a\\nb", motion=fourbar.Motion(np.array([0.1, 0.2, 0.3, 0.4]), 10.0, 5.0))
+    driver = browse(animate.page(scene))
+    assert driver.find_element("id", "type").text == "crank-rocker"
+    assert loads(state_of(driver, "sceneFile()")).linkage == scene.linkage
+    type_length(driver, 2, 200.0)
+    driver.execute_script("chooseBranch(-1)")
+    assert driver.find_element("id", "type").text.startswith("triple rocker (longest: ground); with the original")
+    swept = state_of(driver, "grid[grid.length - 1] - grid[0]")
+    assert f"at ω₂ = 10 rad/s the mechanism takes {swept / 10.0:.3g} s." in driver.find_element("id", "pace").text
+    saved = loads(state_of(driver, "sceneFile()"))
+    assert saved.linkage.lengths == (0.3, 0.2, 0.25, 0.22) and saved.linkage.coupler.mass == scene.linkage.coupler.mass
+    assert saved.motion.branch == -1 and saved.title == "a\\nb" and len(saved.loads) == len(scene.loads)
+    assert fourbar.solve(saved).theta_2[-1] == state_of(driver, "grid[grid.length - 1]")
+    driver.find_element("id", "download").click()
+
+
+def test_the_page_names_a_linkage_as_fourbar_does(browse) -> None:
+    driver = browse(animate.page(crank_rocker()))
+    rng = np.random.default_rng(19)
+    cases = [[*map(float, rng.integers(1, 6, 4) / 10.0)] for _ in range(300)]
+    cases = [lengths for lengths in cases if 2 * max(lengths) <= sum(lengths)]
+    names = [fourbar.classify(fourbar.uniform(*lengths)).name for lengths in cases]
+    assert len(set(names)) > 12
+    assert driver.execute_script("return arguments[0].map(typeName)", cases) == names
+
+
 @pytest.mark.parametrize("value", ("-1", "0", "5000", ""))
 def test_lengths_that_cannot_be_are_refused_and_the_picture_stays(browse, value: str) -> None:
     driver = browse(animate.page(crank_rocker()))
@@ -301,18 +329,18 @@ def test_arrows_point_along_the_forces_to_the_scale_of_the_legend(browse, scalin
         np.testing.assert_allclose(drawn, getattr(s, name)[50] * bar / newtons, atol=PIXEL)
 
 
-@pytest.mark.parametrize("width", (360, 1100))
-def test_no_arrow_that_fits_the_position_leaves_the_picture(browse, width: int) -> None:
-    driver = browse(animate.page(thesis()), width)
-    script = """const choice = document.getElementById("arrow-scale"); choice.value = "position";
+@pytest.mark.parametrize(("width", "scaling"), [(360, "position"), (1100, "position"), (360, "sweep"), (1100, "sweep")])
+def test_no_arrow_and_no_name_of_one_leaves_the_picture(browse, width: int, scaling: str) -> None:
+    driver = browse(animate.page(thesis() if scaling == "position" else crank_rocker()), width)
+    script = """const choice = document.getElementById("arrow-scale"); choice.value = arguments[0];
         choice.dispatchEvent(new Event("change"));
         const least = []; for (let i = 0; i < grid.length; i += 7) { go(i);
           for (const e of document.querySelectorAll("#arrows .head")) { if (e.style.display === "none") continue;
             const [x, y] = e.getAttribute("d").slice(1).split("L")[0].split(" ").map(Number);
             least.push(Math.min(x, y, view.width - x, view.height - y)); } }
         return least;"""
-    room = driver.execute_script(script)
-    assert len(room) > 100 and min(room) > 0.0
+    distances = driver.execute_script(script, scaling)
+    assert len(distances) > 30 and min(distances) > 15.0  # its name stands beyond the tip
 
 
 def test_keyboard_drives_it(browse) -> None:

@@ -59,25 +59,54 @@ function fit() {
   view.height = Math.round(small ? view.width : Math.min(560, 0.68 * view.width));
   picture.classList.toggle("small", small);
   set(picture, { viewBox: `0 0 ${view.width} ${view.height}` });
-  let low = [0, 0], high = [0, 0];
-  const curve = [];
+  const points = [[0, 0]], tips = [], curve = [];
   let broken = true;
   for (let i = 0; i < grid.length; i++) {
     const p = at(i);
     if (!p) { broken = true; continue; }
     const g = coupler(p), reached = [p.A, p.B, p.O4, g];
     for (const k of [2, 4]) if (data.centres[k]) reached.push(barPoint(p, k, data.centres[k]));
-    for (const q of reached) for (const j of [0, 1]) { low[j] = Math.min(low[j], q[j]); high[j] = Math.max(high[j], q[j]); }
+    points.push(...reached);
+    if (dynamic()) for (const name of FORCES) tips.push([p[FORCE_PIN[name]], ...arrowShares(name, i)]);
     curve.push([broken ? "M" : "L", g]);
     broken = false;
   }
-  const margin = small ? 30 : 58;
-  view.k = Math.min((view.width - 2 * margin) / (high[0] - low[0]), (view.height - 2 * margin) / (high[1] - low[1]));
-  view.x = 0.5 * view.width - 0.5 * view.k * (low[0] + high[0]);
-  view.y = 0.5 * view.height + 0.5 * view.k * (low[1] + high[1]);
+  const frame = fitted(points, tips, small ? 30 : 58);
+  Object.assign(view, frame);
   parts.curve.setAttribute("d", curve.map(([step, g]) => step + toScreen(g).map(v => v.toFixed(2)).join(" ")).join(""));
   drawGround();
   scaleForces();
+}
+
+// Both components of a force as shares of the longest arrow of the sweep, and of half the longest of its position.
+function arrowShares(name, i) {
+  const force = table()[name][i], sizes = FORCES.map(other => Math.hypot(...table()[other][i]));
+  const size = Math.hypot(...force), top = sweepCeiling().top, here = Math.max(...sizes);
+  if (!(size > 0) || force[0] === null) return [[0, 0]];
+  return [Math.min(size, top) / top, 0.5 * size / here].map(share => [share * force[0] / size, share * force[1] / size]);
+}
+
+// The greatest scale at which pins keep a margin and arrows with their names stay inside, and the length of an arrow.
+function fitted(points, tips, margin) {
+  const edge = 30, side = Math.min(view.width, view.height);
+  const reach = (j, k, arrow) => {
+    let low = Infinity, high = -Infinity;
+    const take = (value, around) => { low = Math.min(low, value - around); high = Math.max(high, value + around); };
+    for (const point of points) take(k * point[j], margin);
+    for (const [foot, ...shares] of tips) for (const share of shares) take(k * foot[j] + arrow * share[j], edge);
+    return [low, high];
+  };
+  const fits = (k, arrow) => [view.width, view.height].every((size, j) => { const [low, high] = reach(j, k, arrow); return high - low <= size; });
+  const largest = arrow => {
+    let low = 0, high = side / Math.max(...lengths);
+    for (let n = 0; n < 24; n++) { const k = 0.5 * (low + high); if (fits(k, arrow)) low = k; else high = k; }
+    return low;
+  };
+  const bare = largest(0);
+  let arrow = 0.3 * side, k = largest(arrow);
+  while (k < 0.6 * bare && arrow > 0.1 * side) { arrow *= 0.85; k = largest(arrow); }   // a linkage too small to see is worse than short arrows
+  const [left, right] = reach(0, k, arrow), [bottom, top] = reach(1, k, arrow);
+  return { k, arrow, x: 0.5 * (view.width - left - right), y: 0.5 * (view.height + bottom + top) };
 }
 
 function drawGround() {
@@ -98,13 +127,18 @@ function ceiling(values) {
   return ordinary > 0 && largest > OUTLIER * ordinary ? { top: CLIPPED * ordinary, cut: true } : { top: largest, cut: false };
 }
 
+let ceilings = {};   // by branch
+function sweepCeiling() {
+  return ceilings[branch] ??= ceiling(FORCES.flatMap(name => table()[name].map(f => f[0] === null ? NaN : Math.hypot(f[0], f[1]))));
+}
+
 function scaleForces() {
   parts.legend.replaceChildren();
   const shown = dynamic() && byId("show-forces").checked;
   parts.forces.style.display = shown ? "" : "none";
   if (!dynamic()) return;
-  forceScale = ceiling(FORCES.flatMap(name => table()[name].map(f => f[0] === null ? NaN : Math.hypot(f[0], f[1]))));
-  forceScale.pixels = forceScale.top > 0 ? 0.3 * Math.min(view.width, view.height) / forceScale.top : 0;
+  forceScale = { ...sweepCeiling() };
+  forceScale.pixels = forceScale.top > 0 ? view.arrow / forceScale.top : 0;
   if (!shown || forceScale.pixels === 0) return;
   forceLegend();
 }
@@ -125,7 +159,7 @@ function forceLegend() {
 function insideTip(i, s, top) {
   let length = Infinity;
   for (const name of FORCES) {
-    const [fx, fy] = table()[name][i], [x, y] = s[FORCE_PIN[name]], edge = 24;   // space for its name
+    const [fx, fy] = table()[name][i], [x, y] = s[FORCE_PIN[name]], edge = 30;   // space for its name
     if (fx) length = Math.min(length, (fx > 0 ? view.width - edge - x : x - edge) * top / Math.abs(fx));
     if (fy) length = Math.min(length, (fy > 0 ? y - edge : view.height - edge - y) * top / Math.abs(fy));
   }
@@ -182,8 +216,8 @@ function drawLinkage(p, i) {
   }
   const forces = dynamic() && show("show-forces");
   if (forces && p && byId("arrow-scale").value === "position") {
-    const top = Math.max(...FORCES.map(name => Math.hypot(...table()[name][i]))), side = Math.min(view.width, view.height);
-    forceScale = { top, cut: false, pixels: top > 0 ? Math.max(0.15 * side, Math.min(0.3 * side, insideTip(i, s, top))) / top : 0 };
+    const top = Math.max(...FORCES.map(name => Math.hypot(...table()[name][i])));
+    forceScale = { top, cut: false, pixels: top > 0 ? Math.max(0.5 * view.arrow, Math.min(view.arrow, insideTip(i, s, top))) / top : 0 };
     if (top > 0) forceLegend(); else parts.legend.replaceChildren();
   }
   for (const name of FORCES) {
