@@ -178,8 +178,11 @@ def mjcf(scene: Path | None, lengths: tuple[str, ...] | None, omega: str | None,
 )
 @click.option("--position", metavar="ANGLE", help='theta_2 of the linkage and free bodies, like "135 deg".')
 @click.option("--branches", default="one", show_default=True, metavar="WHICH", help="one or both.")
+@click.option("--dimensions", is_flag=True, help="Write the lengths of the bars at them.")
 @units_option
-def plot(scene: Path, out: Path, figure: str, position: str | None, branches: str, units: str) -> None:
+def plot(
+    scene: Path, out: Path, figure: str, position: str | None, branches: str, dimensions: bool, units: str
+) -> None:
     """Draw a scene as SVG, PNG or PDF (by the ending of FILE)."""
     from fourbar.show.plot import draw
     from fourbar.show.units import units as units_of
@@ -187,7 +190,7 @@ def plot(scene: Path, out: Path, figure: str, position: str | None, branches: st
     at = None if position is None else _angle("--position", position)
     described = _load(scene)
     with _named(scene), _waiting(described):
-        draw(described, out, figure, position=at, branches=branches, units=units_of(units))
+        draw(described, out, figure, position=at, branches=branches, units=units_of(units), dimensions=dimensions)
 
 
 @group.command()

@@ -25,6 +25,7 @@ from fourbar.files.pictures import data_uri
 from fourbar.linkage import BAR_NAMES, MOVING_BARS
 from fourbar.quantities import OK, PIN_FORCES
 from fourbar.scene import Command, Scene, command
+from fourbar.show.acting import Symbol, acting
 from fourbar.show.plot.energy import energies
 from fourbar.show.plot.style import length_unit, plain
 from fourbar.show.plot.view import on_branch, over_time, sweep_command
@@ -49,7 +50,7 @@ SCALARS = (
     "alpha_4",
     "torque",
 )
-SCRIPTS = ("linkage.js", "numbers.js", "picture.js", "chart.js", "page.js")
+SCRIPTS = ("linkage.js", "numbers.js", "picture.js", "acting.js", "chart.js", "page.js")
 
 
 def write(
@@ -143,11 +144,23 @@ def page_data(scene: Scene, pictures: Mapping[str, str | Path], units: Conversio
         },
         "drive_bar": scene.drive_bar,
         "branch": motion.branch,
+        "acting": [_symbol(symbol, shown["theta_2"]) for symbol in acting(scene)],
         "toml": _scene_file(scene),
         "followed": motion.through == "follow",
         "pictures": {str(number): picture for number, picture in _pictures(scene, pictures).items()},
         **shown,
     }
+
+
+def _symbol(symbol: Symbol, theta_2: list[float]) -> dict[str, Any]:
+    """One thing that acts, as the page's script draws it."""
+    entry: dict[str, Any] = symbol._asdict()
+    for name in ("at", "beyond", "vector"):
+        entry[name] = [entry[name].real, entry[name].imag]
+    entry["end"] = None if symbol.end is None else [symbol.end[0], [symbol.end[1].real, symbol.end[1].imag]]
+    table = entry.pop("table")
+    entry["factor"] = None if table is None else np.asarray(table.at(theta_2)).tolist()
+    return entry
 
 
 def _scene_file(scene: Scene) -> str | None:

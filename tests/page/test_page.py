@@ -212,7 +212,7 @@ def test_a_changed_length_redraws_by_the_formulas_and_hides_the_forces(browse) -
     assert shown(driver, "theta_2")[0] == pytest.approx(math.degrees(fourbar.solve(scene).theta_2[7]), abs=PRINTED_DEG)
 
 
-def test_type_time_and_scene_file_follow_the_lengths(browse) -> None:
+def test_type_time_and_scene_file_follow_the_lengths(browse, tmp_path: Path) -> None:
     scene = crank_rocker(title="a\\nb", motion=fourbar.Motion(np.array([0.1, 0.2, 0.3, 0.4]), 10.0, 5.0))
     driver = browse(animate.page(scene))
     assert driver.find_element("id", "type").text == "crank-rocker"
@@ -226,7 +226,12 @@ def test_type_time_and_scene_file_follow_the_lengths(browse) -> None:
     assert saved.linkage.lengths == (0.3, 0.2, 0.25, 0.22) and saved.linkage.coupler.mass == scene.linkage.coupler.mass
     assert saved.motion.branch == -1 and saved.title == "a\\nb" and len(saved.loads) == len(scene.loads)
     assert fourbar.solve(saved).theta_2[-1] == state_of(driver, "grid[grid.length - 1]")
+    driver.execute_cdp_cmd("Browser.setDownloadBehavior", {"behavior": "allow", "downloadPath": str(tmp_path)})
     driver.find_element("id", "download").click()
+    until = time.monotonic() + 10.0
+    while not (tmp_path / "linkage.toml").exists() and time.monotonic() < until:
+        time.sleep(0.02)
+    assert (tmp_path / "linkage.toml").read_text() == state_of(driver, "sceneFile()")
 
 
 def test_the_page_names_a_linkage_as_fourbar_does(browse) -> None:
@@ -237,6 +242,32 @@ def test_the_page_names_a_linkage_as_fourbar_does(browse) -> None:
     names = [fourbar.classify(fourbar.uniform(*lengths)).name for lengths in cases]
     assert len(set(names)) > 12
     assert driver.execute_script("return arguments[0].map(typeName)", cases) == names
+
+
+def test_what_acts_is_drawn_at_its_place_and_dimensions_on_request(browse) -> None:
+    spring = fourbar.Spring(fourbar.Point(1, 0.1, -0.5), fourbar.Point(4, 0.08, 0.0), 20.0, 0.1)
+    load = fourbar.Load(3, (2.0, 0.5), (0.03, 1.0), frame="bar")
+    scene = crank_rocker(loads=(load,), effects=(fourbar.Springs((spring,)), fourbar.Gravity()))
+    driver = browse(animate.page(scene))
+    driver.execute_script("go(20)")
+    s = fourbar.solve(scene)
+    script = """return [...document.querySelectorAll("#acting path.act")].map(e => [e.getAttribute("class"),
+        [...e.getAttribute("d").matchAll(/[ML]([^ ]+) ([^ML]+)/g)].map(
+            m => [(m[1] - view.x) / view.k, (view.y - m[2]) / view.k])])"""
+    found = dict(driver.execute_script(script))
+    zigzag, arrow = found["act act-spring"], found["act act-force"]
+    end = s.B[20] + (0.08 - 0.22) * np.array([math.cos(s.theta_4[20]), math.sin(s.theta_4[20])])
+    np.testing.assert_allclose(zigzag[-1], end, atol=1e-4)
+    angle = s.theta_3[20] + 1.0
+    np.testing.assert_allclose(arrow[0], s.G3[20] + 0.03 * np.array([math.cos(angle), math.sin(angle)]), atol=1e-4)
+    towards = np.subtract(arrow[1], arrow[0])
+    assert math.atan2(towards[1], towards[0]) == pytest.approx(s.theta_3[20] + 0.5, abs=0.01)
+    assert found.keys() >= {"act act-drive", "act act-gravity"}
+    names = 'return ["1", "3"].map(k => [parts.label[k].textContent, parts.label[k].style.display])'
+    assert driver.execute_script(names) == [["1", "none"], ["3", ""]]
+    driver.execute_script("toggle('show-dimensions'); toggle('show-acting')")
+    assert [text for text, _ in driver.execute_script(names)] == ["1: 300 mm", "3: 250 mm"]
+    assert not driver.find_elements("css selector", "#acting *")
 
 
 @pytest.mark.parametrize("value", ("-1", "0", "5000", ""))

@@ -30,7 +30,7 @@ for (const k of [2, 3, 4]) if (data.centres[k]) {
 }
 parts.labels = make(picture, "g", { id: "labels" });
 parts.label = {};
-for (const name of ["O2", "A", "B", "O4", "2", "3", "4", "G2", "G3", "G4", ...FORCES]) {
+for (const name of ["O2", "A", "B", "O4", "1", "2", "3", "4", "G2", "G3", "G4", ...FORCES]) {
   const element = make(parts.labels, "text", { class: "label" + (FORCES.includes(name) ? ` f-${name}` : "") });
   element.append(name[0]);
   if (name.length > 1) {
@@ -40,6 +40,11 @@ for (const name of ["O2", "A", "B", "O4", "2", "3", "4", "G2", "G3", "G4", ...FO
   parts.label[name] = element;
 }
 parts.legend = make(picture, "g", { id: "force-scale" });
+
+// A bar is named by its number, and by its length where dimensions are wanted; the ground has a name only then.
+function showDimensions() {
+  for (const k of [1, 2, 3, 4]) parts.label[k].textContent = byId("show-dimensions").checked ? `${k}: ${shown(lengths[k - 1])} ${unit.name}` : String(k);
+}
 
 const toScreen = p => [view.x + view.k * p[0], view.y - view.k * p[1]];
 const FIRST_PIN = { 2: "O2", 3: "A", 4: "O4" }, LAST_PIN = { 2: "A", 3: "B", 4: "B" };
@@ -66,7 +71,7 @@ function fit() {
     if (!p) { broken = true; continue; }
     const g = coupler(p), reached = [p.A, p.B, p.O4, g];
     for (const k of [2, 4]) if (data.centres[k]) reached.push(barPoint(p, k, data.centres[k]));
-    points.push(...reached);
+    points.push(...reached, ...actingPoints(p));
     if (dynamic()) for (const name of FORCES) tips.push([p[FORCE_PIN[name]], ...arrowShares(name, i)]);
     curve.push([broken ? "M" : "L", g]);
     broken = false;
@@ -188,6 +193,10 @@ function drawLinkage(p, i) {
     if (name[0] === "O") set(parts.label[name], { x: s[name][0] + (s[name][0] < middle[0] ? -24 : 24), y: s[name][1] + 8 });
     else place(name, s[name], middle, 18);
   }
+  if (show("show-dimensions")) {
+    visible("1", true);
+    set(parts.label["1"], { x: 0.5 * (s.O2[0] + s.O4[0]), y: 0.5 * (s.O2[1] + s.O4[1]) + 14 });
+  }
   for (const k of [2, 3, 4]) {
     const p1 = s[FIRST_PIN[k]], p2 = s[LAST_PIN[k]], drawn = Boolean(p1 && p2);
     parts.bars[k].style.display = drawn ? "" : "none";
@@ -235,15 +244,16 @@ function drawLinkage(p, i) {
     set(parts.label[name], { x: tip[0] + 15 * ux, y: tip[1] + 13 * uy });
   }
   separateLabels();
+  drawActing(p, i);
 }
 
 // Labels that would cover each other move aside, the less important one first; one without a free spot is left out.
 function separateLabels() {
   const kept = [];
-  for (const name of ["O2", "A", "B", "O4", ...FORCES, "2", "3", "4", "G2", "G3", "G4"]) {
+  for (const name of ["O2", "A", "B", "O4", ...FORCES, "1", "2", "3", "4", "G2", "G3", "G4"]) {
     const label = parts.label[name];
     if (label.style.display === "none") continue;
-    const x = Number(label.getAttribute("x")), y = Number(label.getAttribute("y")), wide = 6 + 6 * name.length;
+    const x = Number(label.getAttribute("x")), y = Number(label.getAttribute("y")), wide = 6 + 6 * (label.childElementCount ? name.length : label.textContent.length);
     const free = SHIFTS.map(([dx, dy]) => [x + dx, y + dy]).find(([u, v]) =>
       u > 10 && v > 10 && u < view.width - 10 && v < view.height - 10
       && kept.every(([s, t, w]) => Math.abs(u - s) > 0.5 * (wide + w) || Math.abs(v - t) > 15));

@@ -125,6 +125,7 @@ def draw(
     position: float | None = None,
     branches: str = "one",
     units: Conversion = SI,
+    dimensions: bool = False,
     file_format: str | None = None,
 ) -> None:
     """Draw a figure of a scene into a file, whole or not at all; the same scene gives the same bytes.
@@ -137,6 +138,7 @@ def draw(
     position : theta_2 of the linkage and the free bodies, rad; left out: the scene's own.
     branches : "one" (the scene's) or "both" (open and crossed, to the same scales).
     units : in which numbers are drawn; left out: SI with the prefix that suits. Angles are in degrees.
+    dimensions : write the lengths of the bars at them.
     file_format : svg, png or pdf where the path's ending does not say it.
 
     Raises
@@ -148,7 +150,7 @@ def draw(
     kind = _format_of(path, file_format)
     painter, size = _painter(scene, figure, branches)
     with matplotlib_style():
-        save(compose(scene, painter, size, position, branches, units), Path(path), kind)
+        save(compose(scene, painter, size, position, branches, units, dimensions), Path(path), kind)
 
 
 def _format_of(path: str | Path, file_format: str | None = None) -> str:
@@ -196,11 +198,12 @@ def drawn(
     position: float | None = None,
     branches: str = "one",
     units: Conversion = SI,
+    dimensions: bool = False,
 ) -> Drawing:
     """A figure of a scene for a notebook (`scene.plot()`); parameters and errors are those of `draw`."""
     painter, size = _painter(scene, figure, branches)
     with matplotlib_style():
-        return Drawing(compose(scene, painter, size, position, branches, units))
+        return Drawing(compose(scene, painter, size, position, branches, units, dimensions))
 
 
 def compose(
@@ -210,6 +213,7 @@ def compose(
     position: float | None,
     branches: str,
     units: Conversion = SI,
+    dimensions: bool = False,
 ) -> "Figure":
     """The figure itself, laid out and labelled."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -220,7 +224,7 @@ def compose(
         position = common_position(scenes)
     views = [view(each, position) for each in scenes]
     for shown in views:
-        shown.units = units
+        shown.units, shown.dimensions = units, dimensions
         shown.others = [other for other in views if other is not shown]
     stacked = size[0] > 9.0
     figure = Figure(

@@ -5,8 +5,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fourbar.linkage import MOVING_BARS
+from fourbar.show.acting import acting
+from fourbar.show.plot import symbols
 from fourbar.show.plot.labels import Label, Labels
-from fourbar.show.plot.style import BAR_COLOURS, INK, MUTED, largest, length_unit
+from fourbar.show.plot.style import BAR_COLOURS, INK, MUTED, largest, length_unit, quantity
+from fourbar.show.plot.symbols import place_of
 from fourbar.show.plot.view import View
 from fourbar.solution import Array
 
@@ -47,12 +50,20 @@ def draw_linkage(axes: "Axes", view: View, labels: Labels) -> None:
     _paths(axes, view, labels, factor)
     size = 0.03 * factor * float(np.max(np.nanmax(reached, axis=0) - np.nanmin(reached, axis=0)))
     _ground(axes, labels, where["O2"], where["O4"], size)
+    if view.dimensions:
+        at = tuple(0.5 * (a + b) for a, b in zip(where["O2"], where["O4"], strict=True))
+        labels.add(Label(axes, _bar_name(view, 1), (at[0], at[1]), where["B"], MUTED, 9.0, 2.0))
     middle = (float(np.mean([p[0] for p in where.values()])), float(np.mean([p[1] for p in where.values()])))
     for number, (start, stop) in ENDS.items():
         (x, y), colour = zip(where[start], where[stop], strict=True), BAR_COLOURS[number]
         axes.plot(x, y, color=colour, lw=4.5, solid_capstyle="round", zorder=4)
         labels.keep_off(axes, where[start], where[stop])
-        labels.add(Label(axes, str(number), (0.5 * sum(x), 0.5 * sum(y)), middle, colour, 9.0, 2.0))
+        name = (
+            f"{number}: {quantity(view.scene.linkage.lengths[number - 1], 'm', view.units)}"
+            if view.dimensions
+            else str(number)
+        )
+        labels.add(Label(axes, name, (0.5 * sum(x), 0.5 * sum(y)), middle, colour, 9.0, 2.0))
     for name, point in where.items():
         axes.plot(*[[v] for v in point], "o", ms=6.0, mfc="white", mec=INK, mew=1.2, zorder=6)
         labels.add(Label(axes, pin_name(name), point, middle, INK, 9.0, 2.5))
@@ -66,11 +77,24 @@ def draw_linkage(axes: "Axes", view: View, labels: Labels) -> None:
         mass_centre(axes, here)
         labels.keep_off(axes, here, here)
         labels.add(Label(axes, f"$G_{number}$", here, middle, colour, 8.0, 3.0))
+    place = place_of(view.scene.linkage, view.here, 0, factor)
+    for symbol in acting(view.scene):
+        drawn = symbols.draw(axes, symbol, place, size)
+        for line in drawn.lines:
+            labels.keep_off(axes, *line)
+        if drawn.label is not None:
+            labels.add(Label(axes, drawn.text, drawn.label, middle, symbols.COLOURS[symbol.kind], 8.0))
     axes.set_aspect("equal", adjustable="datalim")
     axes.margins(0.08)
     axes.set_xlabel(f"$x$ ({unit})")
     axes.set_ylabel(f"$y$ ({unit})")
     axes.set_title(f"Linkage at {view.at}, {view.branch_name} branch")
+
+
+def _bar_name(view: View, number: int) -> str:
+    """The number of a bar, with its length where dimensions are wanted."""
+    length = quantity(view.scene.linkage.lengths[number - 1], "m", view.units)
+    return f"{number}: {length}" if view.dimensions else str(number)
 
 
 def _unit(view: View) -> tuple[float, str]:

@@ -35,6 +35,8 @@ class View:
     notes: list[str] = field(default_factory=list)
     units: Conversion = field(default_factory=dict)
     """Of the numbers drawn; what is left out has the SI unit with a prefix."""
+    dimensions: bool = False
+    """The lengths of the bars are written at them."""
     others: "list[View]" = field(default_factory=list)
     """The other branch, where it is drawn next to this one: to the same scales."""
 
