@@ -116,19 +116,19 @@ class Case(NamedTuple):
             own, at_A = Wrenches(*map(rounded, own)), rounded(at_A)
             inertial, others = rounded(inertial), rounded(others)
 
-        sine = self.drive_sine(at)
+        sine, short = self.drive_sine(at), np.any(self.lengths.d < self.lengths.a)
         if rounded is not None:
             sine = rounded(sine)
 
+        def solved(acting: Actions, own: Wrenches, at_A: Any, others: Any) -> PinForces:
+            w, moment = acting.wrenches(own), acting.work()[1] - others if short else 0.0
+            return pin_forces(self.lengths, at, self.drive_bar, sine, w, at_A, moment)
+
         def eliminate(acting: Actions) -> PinForces:
-            return pin_forces(
-                self.lengths, at, self.drive_bar, sine, acting.wrenches(own), at_A, acting.work()[1] - others
-            )
+            return solved(acting, own, at_A, others)
 
         def by_couples(acting: Actions) -> PinForces:
-            return pin_forces(
-                self.lengths, at, self.drive_bar, sine, acting.wrenches(Wrenches()), 0.0j, acting.work()[1]
-            )
+            return solved(acting, Wrenches(), 0.0j, 0.0)
 
         pins = eliminate(actions)
         found = Dynamics(pins, None)

@@ -2,26 +2,25 @@
 
 The forces are evaluated again with every number of the position, coefficient, arm and term changed in its last
 digit. All roundings then fall differently, so the root mean square of the changes is of the size of the error
-itself, whatever the formulas lose at this position. Signs are taken from a Hadamard matrix: the
-changes of different numbers do not cancel over the evaluations, which run as one batch.
+itself, whatever the formulas lose at this position. As many changes go up as down, in an order drawn at random
+for each number, so that those of different numbers do not cancel over the evaluations, which run as one batch.
 """
 
 from collections.abc import Iterator
 from dataclasses import fields, is_dataclass
-from itertools import count
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.case import Case, Dynamics
-from fourbar.formulas.motion import Coefficients, Rates, State, rates
+from fourbar.formulas.motion import Coefficients, Rates, State, rates, side_turns_fast
 from fourbar.formulas.path import Path, read_backwards
 from fourbar.formulas.pin_forces import Body
 from fourbar.formulas.position import HalfAngle, Loop, Position, two_sum
 
 EVALUATIONS = 16
-"""A power of two. With fewer, all of them may by chance come out as far off as the answer itself."""
+"""With fewer, all of them may by chance come out as far off as the answer itself."""
 LAST_DIGIT = 1.01 * 2.0**-53
 """Relative: x + x LAST_DIGIT is the next double, whatever x."""
 LAST_ROUNDING = 2.0**-56
@@ -35,13 +34,20 @@ are below a hundredth of one."""
 class Roundings:
     """Changes of numbers in their last digit, up or down, in EVALUATIONS ways at once."""
 
-    def __init__(self) -> None:
+    def __init__(self, u1: Any) -> None:
         self.signs = _signs()
+        self.turned = (np.real(u1) != 0.0) & (np.imag(u1) != 0.0)
 
     def __call__(self, number: Any) -> Any:
-        """Real numbers: the next double up or down, (EVALUATIONS, ...); each part of a complex one by itself."""
+        """Real numbers: the next double up or down, (EVALUATIONS, ...); each part of a complex one by itself.
+
+        A ground at an angle mixes the parts of every direction, and each carries the rounding of the larger one.
+        """
         if np.iscomplexobj(number):
-            return self(number.real) + 1j * self(number.imag)
+            x, y = number.real, number.imag
+            size = np.maximum(np.abs(x), np.abs(y))
+            of_x, of_y = np.where(self.turned, size, x), np.where(self.turned, size, y)
+            return number + (of_x * next(self.signs) + 1j * (of_y * next(self.signs)))
         return number + number * next(self.signs)
 
     def each(self, number: Any) -> Any:
@@ -73,7 +79,7 @@ def error_bars(
     state, acceleration, sign, found : the evaluation that the error bars are for; the sign is that of the path's root.
     exact : indices of the positions whose half angle is known in many digits.
     """
-    rounded = Roundings()
+    rounded = Roundings(state.at.u1)
 
     def rounded_body(body: Body) -> Body:
         return Body(body.m, rounded(body.I), rounded(body.z))
@@ -88,7 +94,7 @@ def error_bars(
         bodies=(rounded_body(case.bodies[0]), rounded_body(case.bodies[1]), rounded_body(case.bodies[2])),
         terms=tuple(rounded.of(term) for term in case.terms),
     )
-    near = near._replace(sin_mu=rounded(near.sin_mu), diagonal=rounded(near.diagonal))
+    near = near._replace(sin_mu=rounded(near.sin_mu), foot=rounded(near.foot))
     near = near._replace(u2=rounded(near.u2), u3=rounded(near.u3), u4=rounded(near.u4))
     k = _rounded_coefficients(path, near, k, rounded)
     moving = Rates(*map(rounded.each, rates(k, state.speed, acceleration)))
@@ -133,30 +139,35 @@ def _rounded_half_angle(path: Path, q: Any, half: HalfAngle, exact: NDArray[np.i
 
 
 def _rounded_coefficients(path: Path, at: Position, k: Coefficients, rounded: Roundings) -> Coefficients:
-    """The coefficients from parts rounded each: h3 = t - (1 - q) g, h4 = t + (1 + q) g, and so their slopes."""
+    """The coefficients from parts rounded each: h3 = m - g, h4 = m + g with m = t + q g, and so their slopes."""
     k = k if path.bar == 2 else read_backwards(k)
-    _, _, b, c, _, _ = path.lengths
-    q = ((b - c) * (b + c)) / at.e2
-    g, dg, dq = 0.5 * k.h43, 0.5 * (k.dh4 - k.dh3), q * next(rounded.signs)
-    t, of_slope = k.h3 + (1.0 - q) * g, k.dh3 + (1.0 - q) * dg
-    t_moved, g_moved = t * next(rounded.signs), g * next(rounded.signs)
-    slope_moved, dg_moved = of_slope * next(rounded.signs), dg * next(rounded.signs)
+    d, a, b, c, _, _ = path.lengths
+    g, dg = 0.5 * k.h43, 0.5 * (k.dh4 - k.dh3)
+    m, x = k.h3 + g, ((b - c) * (b + c)) / at.e2
+    fast = side_turns_fast(path.lengths, at)
+    of_t, of_qg = np.where(fast, m, m - x * g), np.where(fast, 0.5, x * g)
+    of_rest = np.where(fast, 1.0 - m, 1.0 - of_t)
+    w = np.where(fast, m - 0.5, x * g - 0.5 * ((d - a) * (d + a)) / at.e2)
+    of_slope, of_side = x * dg, (4.0 * a * d * at.half.sk) * w / at.e2
+    g_moved, dg_moved, qg_moved = g * next(rounded.signs), dg * next(rounded.signs), of_qg * next(rounded.signs)
+    m_moved = of_t * next(rounded.signs) + qg_moved
+    slope_moved = of_slope * next(rounded.signs) + of_side * next(rounded.signs)
     k = Coefficients(
         k.h2,
-        rounded(k.h3) + t_moved - (1.0 - q) * g_moved + g * dq,
-        rounded(k.h4) + t_moved + (1.0 + q) * g_moved + g * dq,
-        rounded(k.h23) + (1.0 - q) * g_moved - g * dq,
+        rounded(k.h3) + m_moved - g_moved,
+        rounded(k.h4) + m_moved + g_moved,
+        rounded(k.h23) + of_rest * next(rounded.signs) - qg_moved + g_moved,
         rounded(k.h43) + 2.0 * g_moved,
         k.dh2,
-        rounded(k.dh3) + slope_moved - (1.0 - q) * dg_moved + dg * dq,
-        rounded(k.dh4) + slope_moved + (1.0 + q) * dg_moved + dg * dq,
+        rounded(k.dh3) + slope_moved - dg_moved,
+        rounded(k.dh4) + slope_moved + dg_moved,
     )
     return k if path.bar == 2 else read_backwards(k)
 
 
 def _signs() -> Iterator[NDArray[np.float64]]:
-    """+- one last digit for number 1, 2, ... of each evaluation: columns of the Hadamard matrix, over and over."""
-    for column in count(1):
-        bits = np.arange(EVALUATIONS) & (column % EVALUATIONS or EVALUATIONS - 1)
-        odd = np.array([int(value).bit_count() % 2 for value in bits])
-        yield np.where(odd == 1, LAST_DIGIT, -LAST_DIGIT)[:, None]
+    """+- one last digit for number 1, 2, ... of each evaluation, from a generator with a fixed seed."""
+    rng = np.random.default_rng(0)
+    ends = np.repeat([LAST_DIGIT, -LAST_DIGIT], EVALUATIONS // 2)
+    while True:
+        yield rng.permutation(ends)[:, None]

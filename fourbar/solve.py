@@ -11,8 +11,7 @@ from fourbar.case import Case
 from fourbar.errors import InputError, LimitError
 from fourbar.formulas.motion import State
 from fourbar.formulas.path import NO_DIGIT_LEFT
-from fourbar.formulas.path import singular as is_singular
-from fourbar.formulas.position import HalfAngle
+from fourbar.formulas.position import HalfAngle, Position
 from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import (
     ANGLES,
@@ -97,11 +96,13 @@ def solve(
             parts = (np.flatnonzero(moved.bar == bar) for bar in (2, 4))
         for part in parts:
             if moved is None:
-                codes, values, in_line = _commanded(case, where, part, wanted, result.keys())
+                codes, values, driven = _commanded(case, where, part, wanted, result.keys())
             else:
-                codes, values, in_line = _freely(case, moved, part, wanted, result.keys())
+                codes, values = _freely(case, moved, part, wanted, result.keys())
+                driven = None
             if not all_finite(values):
-                withhold(values, codes, in_line)
+                in_line = driven is not None and np.abs(case.drive_sine(driven)) <= NO_DIGIT_LEFT
+                withhold(values, codes, np.broadcast_to(in_line, codes.shape))
             code[part] = codes
             for name, value in values.items():
                 if name in VECTORS:
@@ -117,8 +118,8 @@ def solve(
 
 
 def all_finite(values: Mapping[str, Any]) -> bool:
-    """Whether every entry is a number, told by their sums; False also where a sum alone leaves the range of doubles."""
-    return all(np.isfinite(np.sum(value)) for value in values.values())
+    """Whether every entry is a number, from their squares; False also where a square leaves the range of doubles."""
+    return all(np.isfinite(np.vdot(value, value)) for value in values.values())
 
 
 def withhold(values: dict[str, Any], code: NDArray[np.uint8], in_line: NDArray[np.bool_]) -> None:
@@ -155,51 +156,57 @@ def _no_value(quantity: Any) -> complex:
 
 def _commanded(
     case: Case, where: Command, part: slice, wanted: int, names: Iterable[str]
-) -> tuple[NDArray[np.uint8], dict[str, Any], NDArray[np.bool_]]:
-    """Status codes and quantities of some positions of a command to the input, and where no forces can balance."""
-    theta_2, branch = where.theta_2[part], where.branch[part]
+) -> tuple[NDArray[np.uint8], dict[str, Any], Position | None]:
+    """Status codes and quantities of some positions of a command to the input, and where the drive must balance."""
+    theta_2, branch = where.theta_2[part], _sign(where.branch[part])
     half, exact = case.half_angle(theta_2, where.remainder)
     if set(names) <= set(ANGLES) and where.remainder is None and not case.path.may_stay_parallel:
         return _angles(case, half, branch, names)
     at = case.path.position(theta_2, half, branch)
-    assembled = (half.outer >= 0.0) & (half.inner >= 0.0)
-    singular = assembled & (is_singular(at, NO_DIGIT_LEFT if where.remainder is None else 0.0))
-    codes = np.where(assembled, np.where(singular, SINGULAR, OK), NOT_ASSEMBLED).astype(np.uint8)
-    codes[np.isnan(half.kk)] = OVERFLOW  # of theta_2 - theta_1: not even where it closes is known
-    if singular.any():  # velocities are 0/0
-        at = at._replace(root=np.where(singular, np.nan, at.root))
+    codes = _codes(at.sin_mu, half, NO_DIGIT_LEFT if where.remainder is None else 0.0)
+    if codes.any():  # velocities are 0/0
+        at = at._replace(root=np.where(codes == SINGULAR, np.nan, at.root))
     omega_2, alpha_2 = _piece(where.omega_2, part), _piece(where.alpha_2, part)
     state = case.state(case.path, theta_2, at, branch, omega_2, alpha_2, moving=wanted > 0)
     values = {name: KINEMATIC[name](case, state) for name in names if name in KINEMATIC}
     if wanted >= STAGES.index("force"):
         known = exact if wanted == len(STAGES) - 1 else None
         values |= _forces(case, state, alpha_2, branch, branch, codes, names, known)
-    return codes, values, np.abs(case.drive_sine(at)) <= NO_DIGIT_LEFT
+    return codes, values, at
+
+
+def _codes(sine: Array, half: HalfAngle, margin: float) -> NDArray[np.uint8]:
+    """Statuses of positions from the sine of the transmission angle, or a multiple of it."""
+    codes, size = np.zeros(sine.shape, dtype=np.uint8), np.abs(sine)
+    if not size.min(initial=np.inf) > margin:  # NaN where the loop does not close
+        codes[size <= margin] = SINGULAR
+        codes[np.isnan(sine)] = NOT_ASSEMBLED
+        codes[np.isnan(half.kk)] = OVERFLOW  # of theta_2 - theta_1: not even where it closes is known
+    return codes
+
+
+def _sign(branch: NDArray[np.int8]) -> Any:
+    """The branch of each position, or one number where all have the same."""
+    return float(branch[0]) if branch.size and branch.min() == branch.max() else branch
 
 
 def _angles(
     case: Case, half: HalfAngle, branch: Any, names: Iterable[str]
-) -> tuple[NDArray[np.uint8], dict[str, Any], NDArray[np.bool_]]:
+) -> tuple[NDArray[np.uint8], dict[str, Any], None]:
     """The same where two angles are all that is asked for: without vectors and the rest of the triangle."""
     theta_3, theta_4, root = case.path.angles(half, branch)
-    codes = np.zeros(theta_3.shape, dtype=np.uint8)
-    size = np.abs(root)
-    least = NO_DIGIT_LEFT * 2.0 * case.path.lengths.b * case.path.lengths.c
-    if not size.min() > least:  # NaN where the loop does not close
-        codes[size <= least] = SINGULAR
-        codes[np.isnan(root)] = NOT_ASSEMBLED
-        codes[np.isnan(half.kk)] = OVERFLOW
+    codes = _codes(root, half, NO_DIGIT_LEFT * 2.0 * case.path.lengths.b * case.path.lengths.c)
     found = {"theta_3": theta_3, "theta_4": theta_4}
-    return codes, {name: found[name] for name in names}, codes > OK
+    return codes, {name: found[name] for name in names}, None
 
 
 def _freely(
     case: Case, moved: "FreeMotion", part: NDArray[np.intp], wanted: int, names: Iterable[str]
-) -> tuple[NDArray[np.uint8], dict[str, Any], NDArray[np.bool_]]:
+) -> tuple[NDArray[np.uint8], dict[str, Any]]:
     """The same at instants of a free motion that have one independent angle; there is no driving torque."""
     codes = np.zeros(len(part), dtype=np.uint8)
     if not len(part):
-        return codes, {}, codes > 0
+        return codes, {}
     bar = int(moved.bar[part[0]])
     free = case._replace(drive_bar=bar, path=moved.paths[bar])
     q, speed, growth, branch = (x[part] for x in (moved.q, moved.speed, moved.acceleration, moved.sign))
@@ -210,7 +217,7 @@ def _freely(
         exact = np.empty(0, dtype=np.intp) if wanted == len(STAGES) - 1 else None
         values |= _forces(free, state, growth, None, branch, codes, names, exact)
         values |= {name: np.zeros(len(part)) for name in values if name in ("torque", "torque_error", *OF_DRY_FRICTION)}
-    return codes, values, np.zeros(len(part), dtype=bool)
+    return codes, values
 
 
 def _forces(

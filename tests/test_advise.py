@@ -139,7 +139,7 @@ def test_a_run_is_no_more_precise_than_asked(asked: float) -> None:
     assert not [row for row in record.rows if row.verdict == FAILS]
     (answer,) = record.answers
     worst = max(row.error for row in record.rows if row.engine == "mujoco-simulated")
-    assert answer.evidence["asked_error"] == asked and answer.evidence["expected_error"] <= asked
+    assert answer.evidence["wanted_error"] == asked and answer.evidence["expected_error"] <= asked
     # the engine's own prediction is what the formulas find, though it never saw them
     assert worst == pytest.approx(answer.evidence["expected_error"], rel=0.5)
     assert answer.evidence["steps"] < 628

@@ -23,7 +23,7 @@ from validation.cli import status
 from validation.compare.answer import Answer, Released
 from validation.compare.compare import compare
 from validation.compare.counts import Counts
-from validation.compare.rows import AGREES, DEGRADED, FAILS, REFUSES, UNTOLD, VERDICTS, Row, from_csv, write_results
+from validation.compare.rows import AGREES, DEGRADED, FAILS, REFUSES, UNDECIDED, VERDICTS, Row, from_csv, write_results
 from validation.compare.tolerance import EQUIVALENCE
 from validation.engines.witnesses import WITNESSES, Witness
 from validation.regression import render
@@ -32,7 +32,7 @@ from validation.report.html import html as page_of
 from validation.report.markdown import markdown
 from validation.report.summary import summarise
 from validation.run import released as free
-from validation.run.judge import judge, judged_page
+from validation.run.judge import judge, judged
 from validation.stress.mutation import mutation
 from validation.studies.cost.laws import Law
 
@@ -41,7 +41,7 @@ NAN = math.nan
 
 def rows(**counts: int) -> list[Row]:
     """So many rows of each verdict."""
-    names = {"agree": AGREES, "degraded": DEGRADED, "untold": UNTOLD, "refuse": REFUSES, "fail": FAILS}
+    names = {"agree": AGREES, "degraded": DEGRADED, "undecided": UNDECIDED, "refuse": REFUSES, "fail": FAILS}
     return [replace(ROW, verdict=names[name]) for name, many in counts.items() for _ in range(many)]
 
 
@@ -53,9 +53,8 @@ IDENTITY = replace(ROW, engine="formulas", quantity="closure")
     [
         (rows(agree=2), "All 2 comparisons hold: 2 agree", HOLDS),
         (
-            rows(agree=1, degraded=2, untold=1, refuse=3),
-            "All 3 comparisons hold: 1 agrees, 2 degraded as predicted; "
-            "not compared: 1 of which nothing can be told, 3 refuse",
+            rows(agree=1, degraded=2, undecided=1, refuse=3),
+            "All 3 comparisons hold: 1 agrees, 2 degraded as predicted; not compared: 1 undecided, 3 refuse",
             HOLDS,
         ),
         (
@@ -64,7 +63,7 @@ IDENTITY = replace(ROW, engine="formulas", quantity="closure")
             FAILED,
         ),
         (rows(refuse=2), "Nothing was compared: 2 refuse", FAILED),
-        (rows(untold=1), "Nothing was compared: 1 of which nothing can be told", FAILED),
+        (rows(undecided=1), "Nothing was compared: 1 undecided", FAILED),
         ([], "Nothing was compared", FAILED),
         ([IDENTITY], "Nothing was compared: 1 of the formulas' own identities hold", FAILED),
         (
@@ -83,7 +82,7 @@ def test_all_hold_is_said_of_what_was_compared_alone(of: list[Row], sentence: st
 def test_a_row_passes_where_it_was_compared_and_holds() -> None:
     assert {verdict: replace(ROW, verdict=verdict).passed for verdict in VERDICTS} == {
         **dict.fromkeys((AGREES, DEGRADED), True),
-        **dict.fromkeys((UNTOLD, REFUSES, FAILS), False),
+        **dict.fromkeys((UNDECIDED, REFUSES, FAILS), False),
     }
     for changed in ({"error": NAN}, {"verdict": DEGRADED, "error": NAN}, {"verdict": "passes"}):
         with pytest.raises(ValueError, match="no verdict"):
@@ -146,7 +145,7 @@ def test_where_no_loop_closes_no_identity_is_counted_as_held() -> None:
     assert not fourbar.solve(scene).assembled.any()
     found = judge("scene", scene, [w for w in WITNESSES if w.name == "free-body"]).rows
     verdicts = {(row.engine, row.quantity): row.verdict for row in found}
-    assert verdicts["formulas", "closure"] == verdicts["free-body", "torque"] == UNTOLD
+    assert verdicts["formulas", "closure"] == verdicts["free-body", "torque"] == UNDECIDED
     assert verdicts["free-body", "assembled"] == AGREES
 
 
@@ -155,7 +154,7 @@ def test_an_identity_that_is_asked_nowhere_is_not_counted_as_held(monkeypatch: p
         "validation.compare.identities.reversing", lambda scene, solution, _: np.ones(len(solution), bool)
     )
     verdicts = {row.quantity: row.verdict for row in judge("scene", crank_rocker(), []).rows}
-    assert verdicts == {"closure": AGREES, "force_sum": UNTOLD, "moment_sum": UNTOLD}
+    assert verdicts == {"closure": AGREES, "force_sum": UNDECIDED, "moment_sum": UNDECIDED}
 
 
 def test_formulas_without_an_answer_fail() -> None:
@@ -198,7 +197,7 @@ def test_every_form_of_a_report_says_the_same_counts() -> None:
     refused = Witness("echo", "tests.test_harness:Refuses", EQUIVALENCE)
     exact = next(w for w in WITNESSES if w.name == "free-body")
     good, bad = (
-        judged_page(name, crank_rocker(title=name), witnesses, draw=False)
+        judged(name, crank_rocker(title=name), witnesses, draw=False)
         for name, witnesses in (("good", (exact, refused)), ("refused", (refused,)))
     )
     summary = summarise([good, bad])
@@ -222,7 +221,7 @@ def test_a_free_motion_that_every_engine_refuses_is_not_held(monkeypatch: pytest
 
     monkeypatch.setattr(free, "_adapter", lambda _: Refusing)
     scene = crank_rocker(motion=fourbar.Motion(1.0, 0.0, free=fourbar.Free(0.2, 20)))
-    page = judged_page("free", scene, (), draw=False)
+    page = judged("free", scene, (), draw=False)
     assert summarise([page]).verdict == "Nothing was compared on 1 scene: 2 refuse"
 
 
@@ -234,7 +233,7 @@ def test_junit_skips_what_was_not_compared_and_fails_what_fails_as_before() -> N
     def of(quantity: str, verdict: str) -> Row:
         return replace(ROW, quantity=quantity, verdict=verdict, error=1e-15 if verdict == AGREES else NAN)
 
-    both = [of("torque", AGREES), of("all", REFUSES), of("F12", UNTOLD), of("F14", FAILS)]
+    both = [of("torque", AGREES), of("all", REFUSES), of("F12", UNDECIDED), of("F14", FAILS)]
     suites = junit(both, both)
     kinds = {case.get("name"): [child.tag for child in case] for case in suites.iter("testcase")}
     assert kinds == {"torque": [], "all": ["skipped"], "F12": ["skipped"], "F14": ["failure"]}

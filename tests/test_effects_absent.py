@@ -149,7 +149,7 @@ def test_positions_alone_start_no_force_engine() -> None:
     engines, *left_out, answered = asked("fourbar.Motion(fourbar.Sweep(0.0, 6.0, 20))")
     assert engines == "[]" and answered == "formulas free-body"
     assert {line.split(":")[0] for line in left_out} == {"pinocchio-inverse", "mujoco-inverse", "mujoco-simulated"}
-    assert all("only positions are asked for" in line for line in left_out)
+    assert all("the scene states positions only" in line for line in left_out)
 
 
 @pytest.mark.parametrize(

@@ -24,7 +24,7 @@ from validation.engines.mujoco.closed_loop import ClosedLoop
 from validation.engines.prediction import from_data, in_world_axes
 from validation.engines.witnesses import Witness
 from validation.report.hard_page import limit_rows, page
-from validation.report.page import Record
+from validation.report.record import Record
 from validation.run.judge import judge
 from validation.run.released import as_pendulum, judge_released
 from validation.scenes import hard_families as families

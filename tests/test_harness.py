@@ -12,7 +12,7 @@ from fourbar.scene import Command, Scene, command
 from tests.scenes import crank_rocker
 from validation.compare.answer import Answer
 from validation.compare.compare import COMPARED
-from validation.compare.rows import AGREES, FAILS, REFUSES, UNTOLD, Row, from_csv, to_csv, write_results
+from validation.compare.rows import AGREES, FAILS, REFUSES, UNDECIDED, Row, from_csv, to_csv, write_results
 from validation.compare.tolerance import EPS, EQUIVALENCE, K
 from validation.engines.witnesses import WITNESSES, Witness, predicting_from
 from validation.run.judge import judge
@@ -158,7 +158,7 @@ def test_where_no_digit_is_left_nothing_is_told() -> None:
         near = Scene(rocker, fourbar.Motion(np.array([first + side * 1e-13]), 1.0))
         if fourbar.solve(near).assembled.all():
             rows = rows_of(Echo, near)
-            assert rows["torque"].verdict == UNTOLD and not rows["torque"].passed
+            assert rows["torque"].verdict == UNDECIDED and not rows["torque"].passed
             assert "eps/condition" in rows["torque"].reason
             return
     pytest.fail("neither side of the limit assembles")

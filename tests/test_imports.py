@@ -31,7 +31,8 @@ ROOMS = {
         "report",
         "regression",
         "check run",
-        "studies stress",
+        "stress",
+        "studies",
         "cli",
     ),
 }
@@ -41,7 +42,6 @@ BESIDE = {
     ("scenes", "compare"),
     ("published", "engines"),
     ("run", "check"),
-    ("stress", "studies"),
 }
 """Of two rooms on one floor the first may use the second."""
 MOST = {"fourbar": 18, "validation": 15}

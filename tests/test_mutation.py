@@ -53,15 +53,15 @@ def test_survivors_need_a_reason(
     survivors = {"fourbar.formulas.torque.x_f__mutmut_20": "torque.f: return a -> return b"}
     reasons = tmp_path / "harmless.json"
     monkeypatch.setattr(command, "HARMLESS", reasons)
-    assert command._told(states, survivors, tmp_path) == 1
+    assert command._reported(states, survivors, tmp_path) == 1
     assert "19 of 20" in capsys.readouterr().out
     assert "NO REASON" in (tmp_path / "survivors.txt").read_text(encoding="utf-8")
     reasons.write_text('{"torque.f": {"return a -> return b": "a is b"}}', encoding="utf-8")
-    assert command._told(states, survivors, tmp_path) == 0
+    assert command._reported(states, survivors, tmp_path) == 0
     assert "a is b" in (tmp_path / "survivors.txt").read_text(encoding="utf-8")
     assert "of no survivor" not in capsys.readouterr().out
     # a run that ended early proves nothing, nor do nineteen dead of one module speak for another
-    assert command._told(every, survivors, tmp_path) == 1
+    assert command._reported(every, survivors, tmp_path) == 1
     assert "1 mutants were not tried" in capsys.readouterr().out
     more = {
         **states,
@@ -70,14 +70,14 @@ def test_survivors_need_a_reason(
     }
     more |= {f"fourbar.formulas.torque.x_h__mutmut_{i}": "killed" for i in range(40)}
     same = "torque.f: return a -> return b"  # on record too
-    assert command._told(more, {**survivors, "fourbar.formulas.mobility.x_g__mutmut_1": same}, tmp_path) == 1
+    assert command._reported(more, {**survivors, "fourbar.formulas.mobility.x_g__mutmut_1": same}, tmp_path) == 1
     capsys.readouterr()
-    assert command._told(states | {"fourbar.formulas.torque.x_f__mutmut_20": "killed"}, {}, tmp_path) == 0
+    assert command._reported(states | {"fourbar.formulas.torque.x_f__mutmut_20": "killed"}, {}, tmp_path) == 0
     assert "of no survivor:\n    torque.f: return a -> return b" in capsys.readouterr().out
     # with a reason each, but too many
     del states["fourbar.formulas.torque.x_f__mutmut_1"]
-    assert command._told(states, survivors, tmp_path) == 1
-    assert command._told({}, {}, tmp_path) == 1
+    assert command._reported(states, survivors, tmp_path) == 1
+    assert command._reported({}, {}, tmp_path) == 1
 
 
 SHOWN = """# fourbar.formulas.mobility.xǁReachǁsum__mutmut_11: survived

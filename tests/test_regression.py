@@ -111,7 +111,7 @@ def test_accept_records_the_run_under_a_name(tmp_path: Path, monkeypatch: pytest
         (["--random", "3", "--type", "crank"], "crank-rocker, drag-link"),
         (["--engines", ","], "must be among pinocchio-inverse"),
         (["--against", "no-such-run"], "must be a folder with results.csv"),
-        (["--against", "accepted", "--python", "python"], "cannot be said with --python"),
+        (["--against", "accepted", "--python", "python"], "cannot be combined with --python"),
         (["--junit", "changes.xml"], "say --against BASELINE or --python PATH too"),
         (["--name", "coupler=link"], "names a body or site of --mjcf"),
     ],

@@ -12,9 +12,9 @@ from fourbar.scene import Scene
 from fourbar.solve import solve
 from validation.compare.rows import FAILS, Row
 from validation.engines.loop import LimitWatch
-from validation.report.page import Record
+from validation.report.record import Record
 from validation.run import released as free
-from validation.run.judge import judge, judged_page
+from validation.run.judge import judge, judged
 
 
 def falling(coupler: float = 0.15, **motion: Any) -> Scene:
@@ -35,7 +35,7 @@ def test_every_engine_is_judged_up_to_the_limit_and_by_its_instant(coupler: floa
     solution = solve(scene)
     assert solution.stopped_at is not None and solution.time is not None
     assert solution.time[-1] <= solution.stopped_at < solution.time[-1] + 0.01
-    page = judged_page("falling", scene)
+    page = judged("falling", scene)
     assert {row.engine for row in page.rows} == set(free.ENGINES)
     assert all(row.passed for row in page.rows)
     for engine in free.ENGINES:

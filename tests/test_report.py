@@ -19,9 +19,9 @@ from validation.report.costs import cost_points
 from validation.report.figures import FLOOR, STRETCHES, worst_of_stretches
 from validation.report.html import ALL_OPEN, Section, html
 from validation.report.markdown import markdown
-from validation.report.page import Page
+from validation.report.record import Record
 from validation.report.summary import Summary, summarise
-from validation.run.judge import judged_page
+from validation.run.judge import judged
 
 COMMENT_LIMIT = 65_536
 """Characters of a comment on GitHub."""
@@ -29,13 +29,13 @@ HOSTILE = "</script><img src=x onerror=alert(1)>\"'&|`*"
 
 
 @cache
-def page() -> Page:
+def page() -> Record:
     """A small scene as two exact engines and the free bodies judge it."""
     scene = crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.0, 6.0, 36), 5.0))
-    return judged_page("demo", scene, tuple(w for w in WITNESSES if w.name != "mujoco-simulated"))
+    return judged("demo", scene, tuple(w for w in WITNESSES if w.name != "mujoco-simulated"))
 
 
-def copies(count: int, *, failing: int = 0) -> list[Page]:
+def copies(count: int, *, failing: int = 0) -> list[Record]:
     """The scene under many names; in the first ones a torque fails."""
     made = []
     for number in range(count):
@@ -48,7 +48,7 @@ def copies(count: int, *, failing: int = 0) -> list[Page]:
     return made
 
 
-def report(pages: list[Page], **more) -> tuple[Summary, str]:
+def report(pages: list[Record], **more) -> tuple[Summary, str]:
     """Summary and page, the lines of results.csv counted as `write_columns` does."""
     lines, line = {}, 2
     for each in pages:
@@ -159,7 +159,7 @@ def test_costs_are_those_of_the_run() -> None:
 )
 def test_every_kind_of_scene_is_drawn(motion: fourbar.Motion, pictures: int) -> None:
     witnesses = tuple(w for w in WITNESSES if w.name == "free-body")
-    made = judged_page("kind", crank_rocker(motion=motion), witnesses)
+    made = judged("kind", crank_rocker(motion=motion), witnesses)
     assert made.figure is not None and made.figure.count("<svg") == pictures
     _, text = report([made])
     assert "kind: crank-rocker" in text
@@ -167,7 +167,7 @@ def test_every_kind_of_scene_is_drawn(motion: fourbar.Motion, pictures: int) -> 
 
 def test_an_engine_that_is_missing_is_said_to_fail() -> None:
     absent = replace(WITNESSES[0], adapter="validation.engines.absent:Absent")
-    summary, text = report([judged_page("demo", crank_rocker(), (absent,))])
+    summary, text = report([judged("demo", crank_rocker(), (absent,))])
     assert summary.verdict.startswith("FAILS")
     assert "What fails</h2>" in text and "No module named" in text and "∞" in text
 

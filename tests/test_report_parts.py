@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from tests.test_report import page, report
-from validation.compare.rows import AGREES, FAILS, REFUSES, UNTOLD, Row, write_results
+from validation.compare.rows import AGREES, FAILS, REFUSES, UNDECIDED, Row, write_results
 from validation.engines.hard_suite import HARD_WITNESSES, Hard
 from validation.engines.witnesses import WORK
 from validation.report import cost_section as cost
@@ -38,7 +38,7 @@ def test_a_failing_row_fails_its_family_in_the_report(tmp_path: Path) -> None:
     toggle, near = section(rows).rows
     assert toggle[:8] == ("toggle", "1", "0", "0", "0", "0", "1", "1 fail")
     assert near[:8] == ("toggle-near", "1", "1", "0", "0", "1", "0", "holds")
-    (refused,) = section([judged("toggle-near-a", REFUSES), judged("toggle-near-a", UNTOLD)]).rows
+    (refused,) = section([judged("toggle-near-a", REFUSES), judged("toggle-near-a", UNDECIDED)]).rows
     assert refused[:8] == ("toggle-near", "1", "0", "0", "1", "1", "0", "nothing compared")
     assert beside(tmp_path) is None
     (tmp_path / "hard").mkdir()
@@ -70,7 +70,7 @@ def test_the_picture_of_costs_says_what_each_did_for_a_position() -> None:
     assert drawn is not None
     for engine in ("formulas", "pinocchio-inverse", "mujoco-inverse", "free-body"):
         assert f"{engine}: {WORK[engine].short}" in drawn
-        assert WORK[engine].said in unescape(text)
+        assert WORK[engine].full in unescape(text)
     assert {each.engine for each in summary.costs} == {
         "formulas",
         "pinocchio-inverse",

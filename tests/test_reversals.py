@@ -59,7 +59,7 @@ def test_both_sides_are_judged_and_the_reversal_itself_is_not(start: float) -> N
     assert all(row.passed for row in record.rows), [row for row in record.rows if not row.passed]
     noted = [row.reason for row in record.rows if "reverses not judged" in row.reason]
     assert bool(noted) == (start == 0.0)
-    assert len(record.reversals) == (2 if start else 1)  # the ends of a sweep that starts in one have a single side
+    assert len(record.jumps) == (2 if start else 1)  # the ends of a sweep that starts in one have a single side
 
 
 def test_a_curve_is_not_drawn_across_the_jump() -> None:

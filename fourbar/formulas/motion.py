@@ -11,7 +11,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fourbar.formulas.position import Loop, Number, Position
+from fourbar.formulas.position import Loop, Number, Position, vector
+
+FAST = 4.0
+"""|d^2 - a^2|/e^2, of twice 1/2 - t: from there on the triangle's side turns fast against the bars."""
 
 
 class Coefficients(NamedTuple):
@@ -33,8 +36,12 @@ class Coefficients(NamedTuple):
 def coefficients(lengths: Loop, at: Position) -> Coefficients:
     """The coefficients by theta_2, from the triangle A, B, O4 whose side e turns by t and whose height changes by g:
 
-        h3 = t - (1 - q) g,   h4 = t + (1 + q) g,
+        h3 = m - g,   h4 = m + g,   m = t + q g = 1/2 + w,
         t = (a (a - d) + 2 a d sin^2 h)/e^2,   g = 2 a d sin h cos h/root,   q = (b^2 - c^2)/e^2.
+
+    Where e is short its sides turn fast and the bars do not; there w comes without e, from Heron's formula
+    for both triangles on e, with S = 4 a d sin h cos h, x = b^2 - c^2, y = d^2 - a^2:
+        w = -(E2 (d + a)^2 outer + E1 (b - c)^2 4 a d sin^2 h)/(2 root (x S + y root)).
 
     >>> from fourbar.formulas.position import close_loop, direction, half_angle, loop
     >>> lengths, theta_2 = loop(100, 40, 120, 80), np.radians(40)  # mm; Norton, examples 6-7 and 7-1
@@ -45,27 +52,29 @@ def coefficients(lengths: Loop, at: Position) -> Coefficients:
     """
     d, a, b, c, E1, E2 = lengths
     ss, kk, sk, outer, inner = at.half
-    ad, per_e2, per_root = a * d, 1.0 / at.e2, 1.0 / at.root
-    q = ((b - c) * (b + c)) * per_e2
-    s = (2.0 * ad) * sk
-    g = s * per_root
-    less, more = 1.0 - q, 1.0 + q
-    grown = (2.0 * ad) * ss
-    t = (grown + a * (a - d)) * per_e2
-    growth = s * per_e2
-    dt = growth * (((d - a) * (d + a)) * per_e2)
-    dg = ((ad * E2) * kk / inner - (ad * E1) * ss / outer) * per_root
-    shared = dt - (2.0 * q * growth) * g
-    return Coefficients(
-        1.0,
-        t - less * g,
-        t + more * g,
-        (grown + d * (d - a)) * per_e2 + less * g,
-        2.0 * g,
-        0.0,
-        shared - less * dg,
-        shared + more * dg,
-    )
+    ad, per_e2, per_root = a * d, 1.0 / at.e2, 0.5 / at.root
+    x, y = (b - c) * (b + c), (d - a) * (d + a)
+    S, grown = (4.0 * ad) * sk, (2.0 * ad) * ss
+    g = S * per_root
+    xg = x * g
+    qg = xg * per_e2
+    m, rest = (grown + a * (a - d)) * per_e2 + qg, (grown + d * (d - a)) * per_e2 - qg
+    w = (xg - 0.5 * y) * per_e2
+    if np.any(abs(y) > FAST * (d - a) * (d - a)):
+        fast = side_turns_fast(lengths, at)
+        heron = E2 * (d + a) * (d + a) * outer + E1 * (b - c) * (b - c) * (2.0 * grown)
+        w = np.where(fast, -heron * per_root / (x * S + y * at.root), w)
+        m, rest = np.where(fast, 0.5 + w, m), np.where(fast, 0.5 - w, rest)
+    dg = ((2.0 * ad * E2) * kk / inner - (2.0 * ad * E1) * ss / outer) * per_root
+    dm = (x * dg - S * w) * per_e2
+    return Coefficients(1.0, m - g, m + g, rest + g, 2.0 * g, 0.0, dm - dg, dm + dg)
+
+
+def side_turns_fast(lengths: Loop, at: Position) -> Number:
+    """Where t and q g are large and cancel: |d^2 - a^2| > FAST e^2, and x S, y root of one sign."""
+    d, a, b, c, _, _ = lengths
+    y = (d - a) * (d + a)
+    return (abs(y) > FAST * at.e2) & ((y * at.root) * ((b - c) * at.half.sk) > 0.0)
 
 
 def with_parallel_pairs(k: Coefficients, first: Number, second: Number) -> Coefficients:
@@ -95,19 +104,17 @@ def rates(k: Coefficients, speed: Number, acceleration: Number) -> Rates:
     speed, acceleration : q' and q'' of the independent angle, rad/s and rad/s^2.
     """
     square = speed * speed
-    return Rates(
-        k.h2 * speed,
-        k.h3 * speed,
-        k.h4 * speed,
-        k.h2 * acceleration + k.dh2 * square,
-        k.h3 * acceleration + k.dh3 * square,
-        k.h4 * acceleration + k.dh4 * square,
-    )
+    alpha_2, alpha_3, alpha_4 = k.dh2 * square, k.dh3 * square, k.dh4 * square
+    if np.any(acceleration):
+        alpha_2, alpha_3, alpha_4 = (
+            alpha + h * acceleration for alpha, h in ((alpha_2, k.h2), (alpha_3, k.h3), (alpha_4, k.h4))
+        )
+    return Rates(k.h2 * speed, k.h3 * speed, k.h4 * speed, alpha_2, alpha_3, alpha_4)
 
 
 def swing(arm: Number, omega: Number, alpha: Number) -> Number:
     """Acceleration of the end of an arm (complex, m) about its foot: (i alpha - omega^2) r."""
-    return (1j * alpha - omega * omega) * arm
+    return vector(-omega * omega, alpha) * arm
 
 
 class State(NamedTuple):

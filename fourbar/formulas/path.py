@@ -10,7 +10,7 @@ import numpy as np
 
 from fourbar.formulas.motion import Coefficients, State, coefficients, rates
 from fourbar.formulas.motion import with_parallel_pairs as parallel_motion
-from fourbar.formulas.pin_forces import cross
+from fourbar.formulas.pin_forces import cross, dot
 from fourbar.formulas.position import (
     HalfAngle,
     Loop,
@@ -22,6 +22,7 @@ from fourbar.formulas.position import (
     loop,
     parallel_pairs,
     polar,
+    vector,
 )
 from fourbar.formulas.position import with_parallel_pairs as parallel_position
 from fourbar.linkage import FourBar
@@ -55,10 +56,10 @@ class Path(NamedTuple):
         half : of q.
         branch : sign of the root in that order: for bar 2 the branch, for bar 4 that of sin(theta_3 - theta_2).
         """
-        at = close_loop(self.lengths, polar(1.0, self.theta_1), direction(q), half, branch)
-        if self.may_stay_parallel:
-            at = parallel_position(at, *parallel_pairs(self.lengths, half, branch))
-        return at._replace(diagonal=at.diagonal * self.unit)
+        turned = np.any(self.theta_1)
+        u1, u2 = polar(1.0, self.theta_1), direction(q) if turned else vector(half.kk - half.ss, 2.0 * half.sk)
+        at = close_loop(self.lengths, u1, u2, half, branch)
+        return parallel_position(at, *parallel_pairs(self.lengths, half, branch)) if self.may_stay_parallel else at
 
     def angles(self, half: HalfAngle, branch: Number) -> tuple[Number, Number, Number]:
         """theta_3, theta_4 and the root alone, the arguments of what `close_loop` divides by lengths, in (-pi, pi].
@@ -143,9 +144,8 @@ def _turned_round(way: Path, at: Position) -> Position:
     d, c, b, a, _, _ = way.lengths
     u1, u2, u3, u4 = -at.u1, at.u4, -at.u3, at.u2
     diagonal = d * u1 - a * u2
-    sine = cross(u3, u4)
-    e2 = diagonal.real * diagonal.real + diagonal.imag * diagonal.imag
-    return Position(u1, u2, u3, u4, sine, diagonal * way.unit, e2, 2.0 * b * c * sine, at.half)
+    sine, foot = cross(u3, u4), dot(diagonal, u3) / b
+    return Position(u1, u2, u3, u4, sine, diagonal, dot(diagonal, diagonal), foot, 2.0 * b * c * sine, at.half)
 
 
 def read_backwards(k: Coefficients) -> Coefficients:

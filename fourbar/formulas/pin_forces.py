@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fourbar.formulas.motion import Rates
-from fourbar.formulas.position import Loop, Number, Position
+from fourbar.formulas.position import Loop, Number, Position, vector
 
 
 class Body(NamedTuple):
@@ -81,12 +81,12 @@ def inertia_wrenches(a: Number, bodies: Bodies, at: Position, moving: Rates) -> 
     """
     two, three, four = bodies
     w2, w3, w4, alpha_2, alpha_3, alpha_4 = moving
-    G3 = three.z * at.u3
-    at_A = (three.m * a) * (w2 * w2 - 1j * alpha_2) * at.u2
+    G3, of_2 = three.z * at.u3, vector(w2 * w2, -alpha_2) * at.u2
+    at_A = (three.m * a) * of_2
     return Wrenches(
-        (two.m * two.z) * (w2 * w2 - 1j * alpha_2) * at.u2,
-        three.m * (w3 * w3 - 1j * alpha_3) * G3,
-        (four.m * four.z) * (w4 * w4 - 1j * alpha_4) * at.u4,
+        (two.m * two.z) * of_2,
+        three.m * vector(w3 * w3, -alpha_3) * G3,
+        (four.m * four.z) * vector(w4 * w4, -alpha_4) * at.u4,
         -(about_first_pin(two) + three.m * a * a) * alpha_2,
         cross(G3, at_A) - about_first_pin(three) * alpha_3,
         -about_first_pin(four) * alpha_4,
@@ -103,9 +103,9 @@ def pin_forces(
 ) -> PinForces:
     """The four pin forces; inf or NaN where the two bars that are not driven lie in one line.
 
-    With the drive on bar 2 the force at B is written with the diagonal D from A to O4, which closes the
-    triangle of bars 3 and 4, so that a couple between them keeps its digits:
-        F43 = (M3 D - (M3 + M4) b u3)/(b c sin(theta_4 - theta_3)).
+    With the drive on bar 2 the force at B along the coupler is written with f, the share of b at which the
+    perpendicular from O4 meets it, so that a couple between bars 3 and 4 keeps its digits:
+        F43 = ((M3 f - (M3 + M4))/(c sin(theta_4 - theta_3)) - i M3/b) u3,   f = (e^2 + b^2 - c^2)/(2 b^2).
 
     Parameters
     ----------
@@ -137,10 +137,9 @@ def pin_forces(
         F32 = between(-M2 / a, M4 / c + cross(at.u4, R3), at.u2, at.u4, sine)
         F32 = (dot(at.u2, F32) - 1j * (M2 / a)) * at.u2 + at_A  # across bar 2 its own moment knows it best
     else:
-        k = 1.0 / (c * sine)
-        F43 = (M3 * k / b) * at.diagonal - ((M3 + M4) * k) * at.u3
+        F43 = vector((M3 * at.foot - (M3 + M4)) / (c * sine), M3 * (-1.0 / b)) * at.u3
         F32 = R3 + F43 + at_A
         short = d < a
         if np.any(short):  # all bars turn as one, and the sum loses the small component across bar 2
             F32 = F32 + short * (moment_of_F32 / a - cross(at.u2, F32)) * 1j * at.u2
-    return PinForces(-(R2 + F32), F32, F43, F43 - R4)
+    return PinForces(-1.0 * (R2 + F32), F32, F43, F43 - R4)

@@ -83,8 +83,8 @@ def drive_sine_of_triangle(lengths: Loop, at: Position, drive_bar: int) -> Numbe
     if drive_bar == 2:
         return at.sin_mu
     d, a, b, c, _, _ = lengths
-    ss, kk, sk, _, inner = at.half
-    along = (d * (kk - ss) - a) * at.root
+    ss, _, sk, _, inner = at.half
+    along = ((d - a) - 2.0 * d * ss) * at.root
     if drive_bar == 3:
         return (along + 2.0 * d * sk * (inner - 2.0 * c * (b - c))) / (2.0 * c * at.e2)
     return (along - 2.0 * d * sk * (inner + 2.0 * b * (b - c))) / (2.0 * b * at.e2)

@@ -15,9 +15,9 @@ from fourbar.scene import Command, Scene, command
 from fourbar.solve import solve
 from validation.check.mistakes import NEARER, Explanation, explain
 from validation.check.theirs import Array, Table, read_table
-from validation.compare.compare import angle_aware_difference
+from validation.compare.error import difference, in_own_unit, magnitude, relative, relative_error
 from validation.compare.plain import plain
-from validation.compare.scales import magnitude, yardstick
+from validation.compare.scales import yardstick
 from validation.compare.tolerance import EPS, EQUIVALENCE, NOTHING_TO_TELL, condition_of
 
 SHOWN = 20
@@ -89,18 +89,18 @@ def judge_table(scene: Scene, table: Table) -> Judgement:
 
     def judged(quantity: str, ours: Array, theirs: Array) -> tuple[Array, Array]:
         yard = yardstick(quantity, scene, right, getattr(right, quantity))
-        scale = np.where(yard == 0.0, 1.0, yard)  # what all its terms leave 0 is judged in its own unit
+        scale = in_own_unit(yard)  # what all its terms leave 0
         theirs = np.where(np.isnan(theirs), ours, theirs)  # a component that their table does not have
-        error = angle_aware_difference(quantity, ours, theirs) / scale
+        error = relative_error(quantity, ours, theirs, scale)
         condition = condition_of(quantity, scene.linkage, right)
         # what a mistake would have printed is rounded at its own size, however much larger
         size = np.nanmax(magnitude(ours)[ok], initial=0.0) if not quantity.startswith("theta") else 0.0
         there = getattr(right, quantity)
         larger = 1.0 if ours is there else np.maximum(size / scale, 1.0)
-        moves = [angle_aware_difference(quantity, there, getattr(other, quantity)) for other in beside]
-        spread = np.fmax.reduce(moves) / scale if moves else 0.0
+        moves = [difference(quantity, there, getattr(other, quantity)) for other in beside]
+        spread = relative(np.fmax.reduce(moves), scale) if moves else 0.0
         exact = np.where(yard == 0.0, 0.0, EQUIVALENCE.allowed(condition))
-        allowed = (exact + spread) * larger + table.rounding[quantity] / scale
+        allowed = (exact + spread) * larger + relative(table.rounding[quantity], scale)
         return error[ok], np.where(condition * NOTHING_TO_TELL > EPS, allowed, np.inf)[ok]
 
     findings = []

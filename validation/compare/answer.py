@@ -41,7 +41,7 @@ class Answer:
 
 
 class Engine(Protocol):
-    """One way of asking one engine."""
+    """One engine, in one of its forms."""
 
     name: str
 
@@ -51,7 +51,7 @@ class Engine(Protocol):
 
 @dataclass(slots=True, eq=False)
 class Released:
-    """A free motion as one engine integrated it, at the times asked for."""
+    """A free motion as one engine integrated it, at stated times."""
 
     engine: str
     setting: str

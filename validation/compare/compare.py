@@ -13,13 +13,13 @@ from fourbar.quantities import FORCES, OK, OVERFLOW, SINGULAR, STATUS_NAMES, UNK
 from fourbar.scene import Scene
 from fourbar.solution import Solution
 from validation.compare.answer import Answer
+from validation.compare.error import in_own_unit, relative, relative_error, used
 from validation.compare.reversals import reversing
-from validation.compare.rows import AGREES, DEGRADED, FAILS, REFUSES, UNTOLD, Row
-from validation.compare.scales import divisor, magnitude, of_length, yardstick
+from validation.compare.rows import AGREES, DEGRADED, FAILS, REFUSES, UNDECIDED, Row
+from validation.compare.scales import of_length, yardstick
 from validation.compare.tolerance import DEGRADED as TIMES_PREDICTED
 from validation.compare.tolerance import (
     EPS,
-    IDENTITY,
     NOTHING_TO_TELL,
     SIMULATED,
     Array,
@@ -34,6 +34,8 @@ COMPARED = UNKNOWNS
 SLOW_DRIVE = 0.1
 """T3 and T4 have poles where omega_3, omega_4 vanish: a simulation is judged where the driven bar
 turns at more than this part of its greatest speed."""
+NUMBERS = ("error", "allowed", "theta_2", "condition")
+"""Of a row."""
 TOUCHING_MARGIN = 32.0 * EPS
 """A loop that closes, or misses, by less than this part of the sum of its lengths does so by the
 rounding of the data, and the engines may differ on whether it closes."""
@@ -55,16 +57,8 @@ def compare(
     """
 
     def row(quantity: str, verdict: str, reason: str, **numbers: float) -> Row:
-        keys = ("error", "allowed", "theta_2", "condition")
-        return Row(
-            scene=name,
-            engine=answer.engine,
-            setting=answer.setting,
-            quantity=quantity,
-            verdict=verdict,
-            reason=reason,
-            **{key: float(numbers.get(key, math.nan)) for key in keys},
-        )
+        error, allowed, theta_2, condition = (float(numbers.get(key, math.nan)) for key in NUMBERS)
+        return Row(name, answer.engine, answer.setting, quantity, error, allowed, verdict, reason, theta_2, condition)
 
     if answer.refusal is not None:
         return [row("all", REFUSES, answer.refusal)]
@@ -100,20 +94,18 @@ def compare(
         jumping = where & _jumping(quantity, scene, formulas, tolerance)
         where &= ~jumping
         if not where.any():
-            rows.append(row(quantity, UNTOLD, "no position at which both may be held to it"))
+            rows.append(row(quantity, UNDECIDED, "no position at which both may be held to it"))
         else:
-            yard = divisor(yardstick(quantity, scene, formulas, ours))
-            difference = angle_aware_difference(quantity, ours, theirs)
-            if predicted is not None:  # nothing to be relative to where the quantity vanishes: in its own unit
-                vanishing = yard == divisor(np.zeros(1))
-                yard = np.where(vanishing, 1.0, yard)
-            with np.errstate(over="ignore"):
-                error = difference / yard
+            size = yardstick(quantity, scene, formulas, ours)
+            vanishing = size == 0.0
+            if predicted is not None:
+                size = in_own_unit(size)
+            error = relative_error(quantity, ours, theirs, size)
             condition = condition_of(quantity, scene.linkage, formulas)
             if predicted is None:
                 found = _by_condition(error, condition, where, tolerance)
             else:
-                expected_error = partial(_relative, predicted, quantity, yard)
+                expected_error = partial(_relative, predicted, quantity, size)
                 found = _by_prediction(
                     error, where, np.where(vanishing, 0.0, tolerance.factor), tolerance, expected_error
                 )
@@ -128,36 +120,9 @@ def compare(
     return rows
 
 
-def closure(name: str, scene: Scene, answer: Answer, simulated: Tolerance = SIMULATED) -> Row:
-    """Identity: do the engine's own angles close the loop? Relative to the sum of the lengths."""
-    d, a, b, c = scene.linkage.lengths
-    assert answer.at is not None and answer.assembled is not None
-    theta_3, theta_4 = answer.quantities["theta_3"], answer.quantities["theta_4"]
-    ground = d * np.exp(1j * scene.linkage.ground_angle)
-    gap = np.abs(a * np.exp(1j * answer.at.theta_2) + b * np.exp(1j * theta_3) - ground - c * np.exp(1j * theta_4))
-    error = np.where(answer.assembled, gap / of_length(scene), 0.0)
-    worst = int(np.argmax(np.where(np.isnan(error), np.inf, error)))
-    condition = 1.0 / turned(answer.at.theta_2)
-    allowed = (IDENTITY.factor if answer.setting == "exact" else simulated.factor) / condition
-    holds = bool(error[worst] <= allowed)
-    return Row(
-        scene=name,
-        engine=answer.engine,
-        setting=answer.setting,
-        quantity="closure",
-        error=float(error[worst]),
-        allowed=allowed,
-        verdict=(AGREES if holds else FAILS) if answer.assembled.any() else UNTOLD,
-        reason="identity: a e^{i theta_2} + b e^{i theta_3} = d e^{i theta_1} + c e^{i theta_4}",
-        theta_2=float(answer.at.theta_2[worst]),
-        condition=condition,
-    )
-
-
-def _relative(predicted: Callable[[], Mapping[str, Array]], quantity: str, yard: Array) -> Array:
-    """The predicted error of a quantity in parts of its yardstick; computed when it is called for."""
-    with np.errstate(over="ignore"):
-        return predicted()[quantity] / yard
+def _relative(predicted: Callable[[], Mapping[str, Array]], quantity: str, size: Array) -> Array:
+    """The predicted error of a quantity in parts of its size; computed when it is called for."""
+    return relative(predicted()[quantity], size)
 
 
 class _Finding(NamedTuple):
@@ -172,17 +137,16 @@ class _Finding(NamedTuple):
 def _by_condition(error: Array, condition: Array, where: Mask, tolerance: Tolerance) -> _Finding:
     """Errors over the positions `where` against the law in the condition; NaN at any of them fails."""
     allowed = tolerance.allowed(condition)
-    told = where & (condition * NOTHING_TO_TELL > EPS)
-    untold = int(np.count_nonzero(where & ~told))
-    note = f"; {untold} positions with eps/condition > {NOTHING_TO_TELL:g} not judged" if untold else ""
-    if not told.any():
+    decidable = where & (condition * NOTHING_TO_TELL > EPS)
+    undecided = int(np.count_nonzero(where & ~decidable))
+    note = f"; {undecided} positions with eps/condition > {NOTHING_TO_TELL:g} not judged" if undecided else ""
+    if not decidable.any():
         index = int(np.flatnonzero(where)[0])
-        verdict, reason = UNTOLD, f"eps/condition = {EPS / condition[index]:.1e}"
+        verdict, reason = UNDECIDED, f"eps/condition = {EPS / condition[index]:.1e}"
         if not np.isfinite(error[where]).all():
             verdict, reason = FAILS, "NaN"
         return _Finding(index, verdict, reason, allowed[index])
-    with np.errstate(divide="ignore", invalid="ignore"):
-        ratio = np.where(told, error / allowed, -1.0)
+    ratio = np.where(decidable, used(error, allowed), -1.0)
     ratio[where & ~np.isfinite(error)] = np.inf
     index = int(np.argmax(ratio))
     reason = ("NaN" if math.isnan(error[index]) else tolerance.name) + note
@@ -201,8 +165,7 @@ def _by_prediction(
     if beyond.any():
         expected = np.nan_to_num(predicted(), nan=0.0, posinf=np.inf)
     allowed = np.maximum(full, TIMES_PREDICTED * expected)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        ratio = np.where(where & (error != 0.0), error / allowed, -1.0)
+    ratio = np.where(where, used(error, allowed), -1.0)
     lost = np.where(full > 0.0, expected >= 1.0, expected == np.inf)  # first order says that no digit is left, no more
     ratio[lost] = np.minimum(ratio[lost], 1.0)
     ratio[where & ~np.isfinite(error)] = np.inf
@@ -210,7 +173,7 @@ def _by_prediction(
     if not beyond.any():
         verdict, reason = AGREES, tolerance.name
     elif lost[index] and math.isfinite(error[index]):
-        verdict, reason = UNTOLD, f"an error of {expected[index]:.1e} of the value is predicted"
+        verdict, reason = UNDECIDED, f"an error of {expected[index]:.1e} of the value is predicted"
     elif ratio[index] <= 1.0:
         verdict, reason = DEGRADED, f"{error[index]:.1e} of {expected[index]:.1e} predicted for this position"
     elif math.isnan(error[index]):
@@ -238,16 +201,6 @@ def _counted(codes: NDArray[np.uint8]) -> str:
     return ", ".join(f"{count} {name}" for name, count in zip(STATUS_NAMES, counts, strict=True) if count)
 
 
-def angle_aware_difference(quantity: str, ours: Array, theirs: Array) -> Array:
-    """Angles modulo 2 pi, vectors by Euclidean norm, (n,)."""
-    if theirs.shape != ours.shape:
-        return np.full(len(ours), np.nan)
-    difference = ours - theirs
-    if quantity.startswith("theta"):
-        difference = np.remainder(difference + np.pi, 2.0 * np.pi) - np.pi
-    return magnitude(difference)
-
-
 def closing_margin(scene: Scene, theta_2: Array) -> Array:
     """By what part of the sum of the lengths the loop closes (> 0) or misses (< 0)."""
     d, a, b, c = scene.linkage.lengths
@@ -268,10 +221,15 @@ def _jumping(quantity: str, scene: Scene, formulas: Solution, tolerance: Toleran
 
 
 def _answerable(quantity: str, scene: Scene, formulas: Solution, tolerance: Tolerance) -> Mask:
-    """Where a quantity may be asked of an engine of this class."""
+    """Where a quantity may be demanded of an engine of this class."""
     if quantity == "torque" and scene.drive_bar != 2 and tolerance.name == SIMULATED.name:
         speed = formulas.omega_3 if scene.drive_bar == 3 else formulas.omega_4
         assert speed is not None
-        fast = np.abs(np.nan_to_num(speed))
-        return np.asarray(fast > SLOW_DRIVE * fast.max())
+        return turning(speed)
     return np.ones(len(formulas), dtype=bool)
+
+
+def turning(speed: Array) -> Mask:
+    """Where a driven bar turns fast enough that its torque is no pole's, (n,)."""
+    fast = np.abs(np.nan_to_num(speed))
+    return np.asarray(fast > SLOW_DRIVE * fast.max())

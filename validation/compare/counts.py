@@ -1,18 +1,18 @@
-"""How many comparisons agree, are degraded, refuse or fail, and the one sentence that every form of a result says."""
+"""How many comparisons agree, are degraded, refuse or fail, and the one sentence that every form of a result states."""
 
 from collections import Counter
 from collections.abc import Iterable
 
 from fourbar.exits import FAILED, HOLDS
 from validation.compare.identities import FORMULAS, IDENTITIES
-from validation.compare.rows import AGREES, COMPARED, DEGRADED, FAILS, REFUSES, UNTOLD, VERDICTS, Row
+from validation.compare.rows import AGREES, COMPARED, DEGRADED, FAILS, REFUSES, UNDECIDED, VERDICTS, Row
 
-SAID = {
+WORDING = {
     AGREES: ("agrees", "agree"),
     DEGRADED: ("degraded as predicted", "degraded as predicted"),
     FAILS: ("fails", "fail"),
     REFUSES: ("refuses", "refuse"),
-    UNTOLD: ("of which nothing can be told", "of which nothing can be told"),
+    UNDECIDED: ("undecided", "undecided"),
 }
 """Of one comparison, and of several."""
 
@@ -62,7 +62,7 @@ class Counts:
         return f"{self[FAILS]} fail" if self[FAILS] else "nothing compared" if self.nothing else "holds"
 
     def sentence(self) -> str:
-        """The verdict in one sentence: "all hold" is said only of what was compared."""
+        """The verdict in one sentence: "all hold" is stated only of what was compared."""
         total, failed = self.compared, self[FAILS]
         if failed:
             verdict = f"FAILS: {failed} of {total} comparisons{self._where()} do not hold"
@@ -73,8 +73,8 @@ class Counts:
         if self.nothing:
             held = [f"{total} of the formulas' own identities hold"] if total else []
         else:
-            held = self._said(COMPARED)
-        apart = self._said((UNTOLD, REFUSES))
+            held = self._worded(COMPARED)
+        apart = self._worded((UNDECIDED, REFUSES))
         if apart and not self.nothing:
             apart[0] = "not compared: " + apart[0]
         parts = "; ".join(", ".join(each) for each in (held, apart) if each)
@@ -86,5 +86,5 @@ class Counts:
         of = "" if self.nothing or self.scenes_compared == self.scenes else f"{self.scenes_compared} of "
         return f" on {of}{self.scenes} scene{'s' if self.scenes != 1 else ''}"
 
-    def _said(self, verdicts: Iterable[str]) -> list[str]:
-        return [f"{self[each]} {SAID[each][self[each] != 1]}" for each in verdicts if self[each]]
+    def _worded(self, verdicts: Iterable[str]) -> list[str]:
+        return [f"{self[each]} {WORDING[each][self[each] != 1]}" for each in verdicts if self[each]]

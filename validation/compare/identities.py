@@ -5,6 +5,7 @@ that produced them: closure, the sum of forces on the three bars, and the sum of
 """
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fourbar.effects import Actions
 from fourbar.effects.actions import bodies
@@ -15,11 +16,12 @@ from fourbar.scene import Command, Scene
 from fourbar.solution import Solution
 from fourbar.solve import state_at
 from validation.compare.answer import Answer
-from validation.compare.compare import closure, turned
+from validation.compare.compare import turned
+from validation.compare.error import magnitude, relative, worst
 from validation.compare.reversals import reversing
-from validation.compare.rows import AGREES, FAILS, UNTOLD, Row
-from validation.compare.scales import magnitude
-from validation.compare.tolerance import IDENTITY, Array
+from validation.compare.rows import AGREES, FAILS, UNDECIDED, Row
+from validation.compare.scales import of_length
+from validation.compare.tolerance import IDENTITY, SIMULATED, Array, Tolerance
 
 FORMULAS = "formulas"
 IDENTITIES = ("closure", "force_sum", "moment_sum")
@@ -30,13 +32,26 @@ def identities(name: str, scene: Scene, at: Command, solution: Solution) -> list
     """One row per identity that the stage of the solution allows."""
     angles = {"theta_3": solution.theta_3, "theta_4": solution.theta_4}
     closing = solution.assembled & (solution.status_code != OVERFLOW)
-    rows = [closure(name, scene, Answer(FORMULAS, "exact", at, closing, angles))]
+    ours = Answer(FORMULAS, "exact", at, closing, angles)
+    rows = [closure(name, scene, ours)]
     if solution.torque is not None and (solution.status_code == OK).any():
-        rows += _sums(name, scene, at, solution)
+        rows += _sums(name, scene, at, solution, ours)
     return rows
 
 
-def _sums(name: str, scene: Scene, at: Command, solution: Solution) -> list[Row]:
+def closure(name: str, scene: Scene, answer: Answer, simulated: Tolerance = SIMULATED) -> Row:
+    """Do the own angles of an engine close the loop? Relative to the sum of the lengths."""
+    d, a, b, c = scene.linkage.lengths
+    assert answer.at is not None and answer.assembled is not None
+    theta_3, theta_4 = answer.quantities["theta_3"], answer.quantities["theta_4"]
+    ground = d * np.exp(1j * scene.linkage.ground_angle)
+    gap = np.abs(a * np.exp(1j * answer.at.theta_2) + b * np.exp(1j * theta_3) - ground - c * np.exp(1j * theta_4))
+    tolerance = IDENTITY if answer.setting == "exact" else simulated
+    equation = "a e^{i theta_2} + b e^{i theta_3} = d e^{i theta_1} + c e^{i theta_4}"
+    return _row(name, answer, "closure", equation, gap, of_length(scene), answer.assembled, tolerance.factor)
+
+
+def _sums(name: str, scene: Scene, at: Command, solution: Solution, ours: Answer) -> list[Row]:
     """F12 + F14 + sum of loads = sum of m a_G, and the moments of the same about O2 with the torque."""
     assert at.omega_2 is not None and solution.F12 is not None and solution.F14 is not None
     assert solution.torque is not None and solution.F32 is not None and solution.F43 is not None
@@ -87,32 +102,42 @@ def _sums(name: str, scene: Scene, at: Command, solution: Solution) -> list[Row]
     with np.errstate(divide="ignore", invalid="ignore"):
         moment_terms = moment_terms / (solution.condition**2 * solution.drive_condition)
     where = solution.status_code == OK
-    # which way dry friction acts at a pin at rest is decided by rounding: not the same here as in the answer
+    # the sense of dry friction at a pin at rest is decided by rounding: not the same here as in the answer
     where &= ~reversing(scene, solution, IDENTITY.factor)
     return [
-        _row(name, "force_sum", magnitude(force), force_terms, where, solution, "F12 + F14 + loads = sum of m a_G"),
-        _row(name, "moment_sum", np.abs(moment), moment_terms, where, solution, "moments about O2, with the torque"),
+        _row(name, ours, "force_sum", "F12 + F14 + loads = sum of m a_G", magnitude(force), force_terms, where),
+        _row(name, ours, "moment_sum", "moments about O2, with the torque", np.abs(moment), moment_terms, where),
     ]
 
 
 def _row(
-    name: str, quantity: str, error: Array, terms: Array, where: np.ndarray, solution: Solution, equation: str
+    name: str,
+    answer: Answer,
+    quantity: str,
+    equation: str,
+    gap: Array,
+    terms: Array | float,
+    where: NDArray[np.bool_],
+    factor: float = IDENTITY.factor,
 ) -> Row:
-    relative = np.where(where, error / np.where(terms == 0.0, np.nextafter(0.0, 1.0), terms), 0.0)
-    worst = int(np.argmax(np.where(np.isnan(relative), np.inf, relative)))
-    condition = 1.0 / turned(solution.theta_2)
-    allowed = IDENTITY.factor / condition
-    holds = bool(relative[worst] <= allowed)
+    """By how much an equation is missed, in parts of its terms, where it is worst; NaN is beyond all."""
+    assert answer.at is not None
+    theta_2 = answer.at.theta_2
+    error = np.where(where, relative(gap, terms), 0.0)
+    index = worst(error)
+    condition = 1.0 / turned(theta_2)
+    allowed = factor / condition
+    verdict = UNDECIDED if not where.any() else AGREES if error[index] <= allowed else FAILS
     return Row(
         scene=name,
-        engine=FORMULAS,
-        setting="exact",
+        engine=answer.engine,
+        setting=answer.setting,
         quantity=quantity,
-        error=float(relative[worst]),
+        error=float(error[index]),
         allowed=allowed,
-        verdict=(AGREES if holds else FAILS) if where.any() else UNTOLD,
-        reason=f"identity: {equation}" if where.any() else "no position at which it is asked",
-        theta_2=float(solution.theta_2[worst]),
+        verdict=verdict,
+        reason=f"identity: {equation}" if where.any() else "no position at which it is demanded",
+        theta_2=float(theta_2[index]),
         condition=condition,
     )
 

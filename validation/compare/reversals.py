@@ -122,7 +122,7 @@ def _speeds(solution: Solution) -> dict[int, Any]:
 
 
 def _between(scene: Scene, at: Command, pin: str, i: int, j: int, slip: float) -> Reversal:
-    """Halve the interval between positions i and j; there, friction leaning to either side."""
+    """Halve the interval between positions i and j; there, friction in the sense of either side."""
 
     def look(theta_2: float, side: int, stage: str) -> Solution:
         where = at._replace(theta_2=np.array([theta_2]), branch=at.branch[i : i + 1], remainder=None, time=None)

@@ -10,15 +10,15 @@ from pathlib import Path
 from fourbar.writing import write_text
 from validation.compare.plain import plain
 
-AGREES, DEGRADED, UNTOLD, REFUSES, FAILS = (
+AGREES, DEGRADED, UNDECIDED, REFUSES, FAILS = (
     *("agrees", "degraded as predicted"),
-    *("nothing can be told", "refuses", "fails"),
+    *("undecided", "refuses", "fails"),
 )
-VERDICTS = (AGREES, DEGRADED, UNTOLD, REFUSES, FAILS)
+VERDICTS = (AGREES, DEGRADED, UNDECIDED, REFUSES, FAILS)
 """From the best to the worst."""
 HELD = (AGREES, DEGRADED)
 COMPARED = (*HELD, FAILS)
-"""Of the others nothing was compared: no digit of the quantity is left to be told, or the engine declared a limit."""
+"""Of the others nothing was compared: no digit of the quantity is left to decide by, or the engine declared a limit."""
 
 
 @dataclass(frozen=True, slots=True, order=True)
@@ -44,6 +44,12 @@ class Row:
         if self.verdict not in VERDICTS or (self.verdict in HELD and math.isnan(self.error)):
             raise ValueError(f"{self.verdict!r} is no verdict on an error of {self.error!r}")
         object.__setattr__(self, "passed", self.verdict in HELD)
+
+    @classmethod
+    def unmeasured(cls, scene: str, engine: str, setting: str, quantity: str, verdict: str, reason: str) -> "Row":
+        """A verdict without numbers: a refusal, a breakdown, an answer that is missing."""
+        nan = math.nan
+        return cls(scene, engine, setting or "-", quantity, nan, nan, verdict, plain(reason), nan, nan)
 
     @property
     def compared(self) -> bool:

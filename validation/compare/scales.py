@@ -16,15 +16,11 @@ from fourbar.quantities import UNITS
 from fourbar.scene import Scene
 from fourbar.solution import Solution
 from validation.compare.effects import size as size_of
+from validation.compare.error import magnitude
 from validation.compare.tolerance import WELL_CONDITIONED, Array, K
 
 VANISHING = 1.0 / K
 """A quantity below this part of the sum of its terms has lost more to cancellation than K covers."""
-
-
-def magnitude(values: Array) -> Array:
-    """Absolute value of a scalar, Euclidean norm of a vector, (n,)."""
-    return np.asarray(np.hypot(values[:, 0], values[:, 1]) if values.ndim == 2 else np.abs(values))
 
 
 def yardstick(quantity: str, scene: Scene, formulas: Solution, values: Array) -> Array:
@@ -43,11 +39,6 @@ def yardstick(quantity: str, scene: Scene, formulas: Solution, values: Array) ->
     scale = float(size[well].max())
     most = float(terms[well].max())
     return np.where(well, most if scale < VANISHING * most else scale, own)
-
-
-def divisor(sizes: Array) -> Array:
-    """A yardstick of zero demands an error of exactly zero: over the least double any other is huge."""
-    return np.where(sizes == 0.0, np.nextafter(0.0, 1.0), sizes)
 
 
 def term_sizes(quantity: str, scene: Scene, formulas: Solution) -> Array:

@@ -55,9 +55,9 @@ class FreeBody:
         if command.omega_2 is not None:
             n = len(command.theta_2)
             omega_2, alpha_2 = (np.broadcast_to(np.asarray(x, float), (n,)) for x in (command.omega_2, command.alpha_2))
-            asked = (command.theta_2, omega_2, alpha_2, *closed.theta)
+            commanded = (command.theta_2, omega_2, alpha_2, *closed.theta)
             blocks = [slice(start, start + BLOCK) for start in range(0, n, BLOCK)]
-            parts = [_answered(scene, *(array[block] for array in asked)) for block in blocks]
+            parts = [_answered(scene, *(array[block] for array in commanded)) for block in blocks]
             answer.evidence["residual"] = max((residual for _, residual in parts), default=0.0)
             for name in parts[0][0] if parts else ():
                 answer.quantities[name] = np.concatenate([part[name] for part, _ in parts])

@@ -36,8 +36,8 @@ class Hard:
             for family in FAMILIES:
                 if family.name in self.families:
                     for label, scene in family.scenes():
-                        said = replace(scene, title=f"{family.name}: {label}", source=family.statement)
-                        self._scenes.append((f"{family.name} {label}".replace(" ", "-"), said))
+                        titled = replace(scene, title=f"{family.name}: {label}", source=family.statement)
+                        self._scenes.append((f"{family.name} {label}".replace(" ", "-"), titled))
             self._scenes.sort(key=lambda pair: pair[0])
         return self._scenes
 

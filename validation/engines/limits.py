@@ -37,7 +37,7 @@ class Limit:
 
 
 def _simulated(scene: Scene) -> Answer:
-    """The simulation itself, its declared limits not asked."""
+    """The simulation itself, whatever its declared limits."""
     from fourbar.mjcf import RECIPE
     from validation.engines.mujoco import simulate
 

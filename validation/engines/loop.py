@@ -31,13 +31,13 @@ LONGEST_STEP = 0.5
 SHORTEST_STEP = 2.0**-40
 """A step halved this often moves nothing that a gap above the rounding could tell."""
 NEWTON_STEPS = 100
-"""Beside a toggle Newton halves its distance: fifty steps reach the last digit from any start."""
+"""Near a toggle Newton halves its distance: fifty steps reach the last digit from any start."""
 PASSES = 1000
 """Passes over pin loads and the friction they make; each lessens the error where the friction is unique."""
 REPEATED = 2.0 * 2.0**-52
 """Change of a pin load, relative, that is rounding."""
 ROUNDED = 1e-11
-"""Change, relative, at or below which one that no longer falls is rounding, beside a pole of the torque too."""
+"""Change, relative, at or below which one that no longer falls is rounding, near a pole of the torque too."""
 DIVERGED = 1e100
 """Load, N, that only passes running away from each other reach."""
 NOT_ANSWERED = frozenset(
@@ -46,7 +46,7 @@ NOT_ANSWERED = frozenset(
         *("torque_error", "force_error", "torque_low", "torque_high", "friction_residual"),
     )
 )
-"""What is commanded, or asked of the formulas alone."""
+"""What is commanded, or of the formulas alone."""
 ROUNDING = 16.0 * 2.0**-52
 """Gap, relative to the sum of the lengths, that the roundings of a chain of three bars alone can leave."""
 

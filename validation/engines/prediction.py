@@ -9,8 +9,8 @@ an engine whose lever arms are differences of coordinates as long as `reach` (z_
 Where the first order of a torque vanishes, the product of two first orders is what remains: the error of a
 force times that of its lever arm.
 
-It replaces K eps/condition where no power of a sine is the right law: beside change points, where a
-torque cancels, and for forces beside a toggle, which a law in s^2 would excuse too much.
+It replaces K eps/condition where no power of a sine is the right law: near change points, where a
+torque cancels, and for forces near a toggle, which a law in s^2 would excuse too much.
 """
 
 import math

@@ -1,4 +1,4 @@
-"""Who is asked: each witness, where its adapter lives, what it needs, and what it is held to."""
+"""The witnesses: each one, where its adapter lives, what it needs, and what it is held to."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -18,17 +18,17 @@ from validation.compare.tolerance import EQUIVALENCE, SIMULATED, Array, Toleranc
 
 @dataclass(frozen=True, slots=True)
 class Witness:
-    """An engine that the harness asks, where its adapter lives, and what it is held to."""
+    """An engine that bears witness, where its adapter lives, and what it is held to."""
 
     name: str
     adapter: str
-    """ "module:class"; imported when it is asked, so a missing engine costs only its own rows."""
+    """ "module:class"; imported when it answers, so a missing engine costs only its own rows."""
     tolerance: Tolerance
     expected: tuple[str, ...] = COMPARED
     order: str = ""
     """ "module:function" that runs the engine at two coarser timesteps; its observed order is shown."""
     positions: tuple[str, ...] = ()
-    """What it is held to where only positions are asked for; nothing: it is then not started."""
+    """What it is held to where the scene states positions only; nothing: it is then not started."""
     through_time: bool = False
     """Whether it runs through the motion in time."""
     predictor: str = ""
@@ -42,7 +42,7 @@ class Witness:
         return getattr(import_module(module), name)()  # type: ignore[no-any-return]
 
     def missing(self) -> str | None:
-        """Why it cannot be asked in this environment, or None."""
+        """Why it cannot answer in this environment, or None."""
         return not_installed(self.library) if self.library else None
 
 
@@ -64,7 +64,7 @@ class Work(NamedTuple):
 
     short: str
     """For a legend."""
-    said: str
+    full: str
     """For a table."""
 
 

@@ -7,7 +7,7 @@ from statistics import median
 from validation.compare.tolerance import EPS
 from validation.engines.witnesses import WORK
 from validation.report.colours import GRID, INK, PAPER, SOFT, style_of
-from validation.report.page import Page
+from validation.report.record import Record
 from validation.report.svg import svg_text
 
 FLOOR = EPS / 4.0
@@ -15,7 +15,7 @@ FLOOR = EPS / 4.0
 Point = tuple[float, float]
 
 
-def cost_points(pages: Iterable[Page]) -> tuple[dict[str, list[Point]], list[float]]:
+def cost_points(pages: Iterable[Record]) -> tuple[dict[str, list[Point]], list[float]]:
     """(microseconds per position, error of the torque) of every scene by engine; the same cost of the formulas."""
     points: dict[str, list[Point]] = {}
     formulas: list[float] = []
@@ -30,7 +30,7 @@ def cost_points(pages: Iterable[Page]) -> tuple[dict[str, list[Point]], list[flo
     return points, formulas
 
 
-def cost_figure(pages: Iterable[Page]) -> str | None:
+def cost_figure(pages: Iterable[Record]) -> str | None:
     """An SVG of these points with each engine's median; None where no torque was compared."""
     points, formulas = cost_points(pages)
     if not points or not formulas:

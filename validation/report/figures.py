@@ -11,12 +11,12 @@ from fourbar.show.drawing import drawing
 from fourbar.solution import Solution
 from fourbar.solve import solve
 from validation.compare.answer import Answer
-from validation.compare.compare import angle_aware_difference
+from validation.compare.error import magnitude, relative_error
 from validation.compare.reversals import Reversal, broken
-from validation.compare.scales import divisor, magnitude, yardstick
+from validation.compare.scales import yardstick
 from validation.compare.tolerance import EPS, EQUIVALENCE, SIMULATED, Array, condition_of
 from validation.report.colours import ALLOWED, BAND, GRID, INK, PAPER, by_variable, style_of
-from validation.report.page import Record
+from validation.report.record import Record
 from validation.report.svg import svg_text
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ SUBSCRIPT = str.maketrans("234", "₂₃₄")
 def scene_figure(record: Record) -> str | None:
     """SVGs of the linkage and, for a sweep, of the answers; None where nothing assembles."""
     solution = record.solution
-    if solution is None or not np.any(solution.status_code == OK):
+    if record.scene is None or solution is None or not np.any(solution.status_code == OK):
         return None
     linkage = by_variable(drawing(record.scene, solution))
     if np.count_nonzero(solution.status_code == OK) < 2:
@@ -61,7 +61,7 @@ def _picture(quantity: str, record: Record, solution: Solution, answers: list[An
     FigureCanvasSVG(figure)
     panels = figure.subplots(1 + len(groups), 1, sharex=True, height_ratios=[1.9, *[1.0] * len(groups)], squeeze=False)
     axes = list(panels[:, 0])
-    _draw_values(axes[0], quantity, solution, [*exact, *simulated], record.reversals)
+    _draw_values(axes[0], quantity, solution, [*exact, *simulated], record.jumps)
     for below, group in zip(axes[1:], groups, strict=True):
         _draw_errors(below, quantity, record, solution, group)
         below.set_ylabel("error / scale" if quantity in TORQUE_AND_FORCE else "error (rad)", fontsize=7.5)
@@ -97,20 +97,20 @@ def _draw_errors(axes: "Axes", quantity: str, record: Record, solution: Solution
     """The largest error of each stretch on a logarithmic axis, the worst one ringed, and what is allowed."""
     from matplotlib.ticker import LogLocator, NullLocator
 
-    good = solution.status_code == OK
+    good, scene = solution.status_code == OK, record.scene
+    assert scene is not None
     if style_of(answers[0].engine).simulated:
         held_to = (r.allowed for r in record.rows if (r.engine, r.quantity) == (answers[0].engine, quantity))
         allowed = np.full(len(solution), next(held_to, SIMULATED.factor))
     else:
-        allowed = EQUIVALENCE.allowed(condition_of(quantity, record.scene.linkage, solution))
+        allowed = EQUIVALENCE.allowed(condition_of(quantity, scene.linkage, solution))
     axes.plot(_base(solution, None), np.where(good, allowed, np.nan), color=ALLOWED, lw=1.1, ls=(0, (5, 2)))
     low, high = float(np.nanmin(allowed[good])), float(np.nanmax(allowed[good]))
     for turn, answer in enumerate(answers):
-        formulas = solution if answer.at is None else solve(record.scene, at=answer.at)
+        formulas = solution if answer.at is None else solve(scene, at=answer.at)
         mine = getattr(formulas, quantity)
-        error = angle_aware_difference(quantity, mine, answer.quantities[quantity]) / divisor(
-            yardstick(quantity, record.scene, formulas, mine)
-        )
+        size = yardstick(quantity, scene, formulas, mine)
+        error = relative_error(quantity, mine, answer.quantities[quantity], size)
         places = worst_of_stretches(error, turn / len(answers))
         if not len(places):
             continue

@@ -13,8 +13,7 @@ from fourbar.quantities import OK
 from fourbar.scene import Command, Scene, command
 from fourbar.solve import solve
 from validation.compare.answer import Answer, Array
-from validation.compare.compare import angle_aware_difference
-from validation.compare.scales import divisor, magnitude
+from validation.compare.error import magnitude, relative, relative_error
 from validation.compare.tolerance import DEGRADED, EPS, K, condition_of
 from validation.engines.hard_suite import HARD_WITNESSES
 from validation.engines.limits import LIMITS, Limit
@@ -72,7 +71,7 @@ def errors(scene: Scene, quantity: str, witness: Witness) -> tuple[Array, Array]
         return None
     ours = solve(scene, "force", at=answer.at)
     values = getattr(ours, quantity)
-    error = angle_aware_difference(quantity, values, answer.quantities[quantity]) / divisor(magnitude(values))
+    error = relative_error(quantity, values, answer.quantities[quantity], magnitude(values))
     keep = (ours.status_code == OK) & np.isfinite(error)
     return answer.at.theta_2[keep], np.maximum(error[keep], FLOOR)
 
@@ -100,9 +99,9 @@ def picture() -> str:
 
 def _draw(axes: Any, way: Approach, quantity: str) -> None:
     solution = solve(way.scene, "force")
-    values = divisor(magnitude(getattr(solution, quantity)))
+    size = magnitude(getattr(solution, quantity))
     singular = _singular(way)
-    predicted = in_world_axes(way.scene, command(way.scene), (quantity,))[quantity] / values
+    predicted = relative(in_world_axes(way.scene, command(way.scene), (quantity,))[quantity], size)
     law = K * EPS / condition_of(quantity, way.scene.linkage, solution)
     shown = np.isfinite(predicted)
     axes.loglog(way.distances, law, color=INK, linestyle=(0, (1, 1)), linewidth=1, label="law K eps/condition")

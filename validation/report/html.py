@@ -10,10 +10,10 @@ from typing import Any, NamedTuple
 
 from fourbar.quantities import UNKNOWNS
 from validation.compare.counts import Counts
-from validation.compare.rows import FAILS, REFUSES, UNTOLD, Row, sorted_rows, to_csv
+from validation.compare.rows import FAILS, REFUSES, UNDECIDED, Row, sorted_rows, to_csv
 from validation.report.colours import by_variable, declarations, style_of
 from validation.report.costs import cost_figure
-from validation.report.page import Page
+from validation.report.record import Record
 from validation.report.summary import STATEMENT, Summary, used
 from validation.report.templating import environment
 
@@ -37,7 +37,7 @@ class Cell(NamedTuple):
     @property
     def kind(self) -> str:
         """Word for its colour."""
-        return {FAILS: "fails", REFUSES: "refuses", UNTOLD: "untold"}.get(self.row.verdict, "holds")
+        return {FAILS: "fails", REFUSES: "refuses", UNDECIDED: "untold"}.get(self.row.verdict, "holds")
 
     @property
     def shown(self) -> str:
@@ -77,7 +77,7 @@ class Section:
 class SceneView:
     """What the page shows of one scene."""
 
-    page: Page
+    page: Record
     cells: list[Cell]
     engines: list[str]
     quantities: list[str]
@@ -147,7 +147,7 @@ def share(value: float) -> str:
     return "0" if value == 0.0 else "<0.01" if value < 0.01 else f"{value:.2f}" if value < 10.0 else f"{value:.1e}"
 
 
-def _view(page: Page, first_line: int, pictures: Mapping[str, str]) -> SceneView:
+def _view(page: Record, first_line: int, pictures: Mapping[str, str]) -> SceneView:
     cells = [Cell(line, row) for line, row in enumerate(sorted_rows(page.rows), first_line)]
     by_place: dict[tuple[str, str], Cell] = {}
     worst: dict[str, Cell] = {}

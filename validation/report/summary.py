@@ -11,12 +11,13 @@ from typing import NamedTuple, TypeVar
 
 from fourbar.exits import HOLDS
 from validation.compare.counts import Counts
+from validation.compare.error import used as of_allowance
 from validation.compare.rows import REFUSES, Row
 from validation.compare.tolerance import EPS, EQUIVALENCE, IDENTITY, NOTHING_TO_TELL, SIMULATED, K, Tolerance
 from validation.engines.witnesses import WORK
 from validation.published.ladder import LadderRow
 from validation.report.machine import machine, versions
-from validation.report.page import Page
+from validation.report.record import Record
 
 T = TypeVar("T")
 
@@ -84,7 +85,7 @@ class Summary:
         """Whether all that was to be compared was, and holds."""
         return self.counts.status == HOLDS and not self.missing
 
-    pages: list[Page]
+    pages: list[Record]
     """The scenes shown one by one, at most SCENES_SHOWN: those that fail, then those that used most of what is
     allowed."""
 
@@ -106,7 +107,7 @@ STATEMENT = (
 
 
 def summarise(
-    pages: Iterable[Page],
+    pages: Iterable[Record],
     ladder: Sequence[LadderRow] = (),
     tolerances: Sequence[Tolerance] = TOLERANCES,
     missing: Sequence[tuple[str, str]] = (),
@@ -122,8 +123,8 @@ def summarise(
     independence: dict[str, tuple[str, str]] = {}
     costs: dict[tuple[str, str], list[Timed]] = {}
     orders: list[tuple[str, dict[str, float]]] = []
-    failing: list[Page] = []
-    holding: list[tuple[float, Page]] = []
+    failing: list[Record] = []
+    holding: list[tuple[float, Record]] = []
     for page in pages:
         counts.add_scene(page.rows)
         bad = [row for row in page.rows if row.failed]
@@ -168,7 +169,7 @@ def summarise(
                 _settings(values),
                 median(t.times for t in values),
                 median(t.microseconds for t in values),
-                WORK[engine].said if engine in WORK else "",
+                WORK[engine].full if engine in WORK else "",
             )
             for (engine, _), values in sorted(costs.items())
         ],
@@ -180,7 +181,7 @@ def summarise(
     )
 
 
-def _left_out(page: Page) -> set[tuple[str, str]]:
+def _left_out(page: Record) -> set[tuple[str, str]]:
     """What was not asked, or refused to answer: (engine, reason)."""
     told = {(row.engine, row.reason) for row in page.rows if row.verdict == REFUSES}
     for line in page.left_out:
@@ -191,13 +192,7 @@ def _left_out(page: Page) -> set[tuple[str, str]]:
 
 def used(row: Row) -> float:
     """error/allowed; infinite without an answer, 0 where nothing is allowed and errs, or nothing was compared."""
-    if not row.compared:
-        return 0.0
-    if math.isnan(row.error):
-        return math.inf
-    if row.allowed == 0.0:
-        return 0.0 if row.error == 0.0 else math.inf
-    return row.error / row.allowed
+    return float(of_allowance(row.error, row.allowed)) if row.compared else 0.0
 
 
 def _worst(rows: Sequence[Row]) -> list[Worst]:
@@ -235,7 +230,7 @@ class Timed(NamedTuple):
     microseconds: float
 
 
-def _add_costs(page: Page, costs: dict[tuple[str, str], list[Timed]]) -> None:
+def _add_costs(page: Record, costs: dict[tuple[str, str], list[Timed]]) -> None:
     formulas = page.timings[0].seconds if page.timings else math.nan
     refused = {row.engine for row in page.rows if row.verdict == REFUSES}
     for t in page.timings:

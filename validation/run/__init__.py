@@ -1,1 +1,1 @@
-"""The run: every witness asked about every scene, in parallel, resumable."""
+"""The run: every witness on every scene, in parallel, resumable."""

@@ -1,4 +1,4 @@
-"""A run no more precise than asked: the simulation's settings from the laws, confirmed by the engine itself.
+"""A run no more precise than wanted: the simulation's settings from the laws, confirmed by the engine itself.
 
 The settings are chosen by the error that the engine predicts from its own residuals, never by what
 the formulas say: how wrong it is against them stays a finding.
@@ -13,22 +13,22 @@ import numpy as np
 from fourbar.errors import InputError
 from fourbar.scene import Command, Scene
 from validation.compare.answer import Answer, Engine
-from validation.compare.compare import COMPARED, SLOW_DRIVE
-from validation.compare.scales import magnitude
+from validation.compare.compare import COMPARED, turning
+from validation.compare.error import magnitude, relative
 from validation.compare.tolerance import SIMULATED, Tolerance
 from validation.engines.witnesses import Witness
 
 ROUNDS = 6
 """Simulations of a scene at most; the laws are seldom wrong by more than one."""
 MARGIN = 0.5
-"""The engine's own prediction must stay within this part of the asked error."""
+"""The engine's own prediction must stay within this part of the wanted error."""
 LEAST_GROWTH, MOST_GROWTH = 1.15, 3.0
 """Factor on the steps from one round to the next."""
 
 
 @dataclass(frozen=True, slots=True)
 class DialledWitness(Witness):
-    """The simulated witness at an asked error."""
+    """The simulated witness at a wanted error."""
 
     error: float = SIMULATED.factor
 
@@ -38,10 +38,10 @@ class DialledWitness(Witness):
 
 
 def held_to(error: float, why: str) -> Tolerance:
-    """What runs through time, held to an asked error."""
+    """What runs through time, held to a wanted error."""
     if not 0.0 < error < 1.0:
         raise InputError("--error", error, "must be a relative error, above 0 and below 1")
-    return replace(SIMULATED, factor=error, reason=f"{error:g} of the scale, as asked: {why}")
+    return replace(SIMULATED, factor=error, reason=f"{error:g} of the scale, as wanted: {why}")
 
 
 def dialled(witnesses: Sequence[Witness], error: float) -> tuple[Witness, ...]:
@@ -61,7 +61,7 @@ def _parts(witness: Witness) -> dict[str, Any]:
 
 @dataclass(slots=True)
 class Dialled:
-    """Engine "mujoco-simulated" with settings for an asked error."""
+    """Engine "mujoco-simulated" with settings for a wanted error."""
 
     error: float
     name: str = "mujoco-simulated"
@@ -88,7 +88,7 @@ class Dialled:
             steps = max(steps, steps_per_revolution(answer)) * growth
             tc = min(tc * growth, LONGEST)
         answer.evidence |= {
-            "asked_error": self.error,
+            "wanted_error": self.error,
             "expected_error": expected,
             "steps_with_the_search": spent,
             "runs": float(runs),
@@ -109,10 +109,9 @@ def expected_error(scene: Scene, answer: Answer) -> float:
             continue
         values = answer.quantities[name]
         sizes = np.where(np.isfinite(values), 1.0, np.nan) if name.startswith("theta") else magnitude(values)
-        told = np.isfinite(sizes)
+        known = np.isfinite(sizes)
         if name == "torque" and scene.drive_bar != 2:
-            speed = np.abs(np.nan_to_num(answer.quantities[f"omega_{scene.drive_bar}"]))
-            told &= speed > SLOW_DRIVE * speed.max()
-        if told.any() and sizes[told].max() > 0.0:
-            worst = max(worst, float(predicted[told].max() / sizes[told].max()))
+            known &= turning(answer.quantities[f"omega_{scene.drive_bar}"])
+        if known.any() and sizes[known].max() > 0.0:
+            worst = max(worst, float(relative(predicted[known].max(), sizes[known].max())))
     return worst if np.isfinite(worst) else float("inf")

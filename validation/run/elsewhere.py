@@ -30,7 +30,7 @@ def run_elsewhere(python: Path, arguments: Sequence[str], out: Path) -> Path:
     except OSError as error:
         raise InputError("--python", str(python), f"cannot be run: {error.strerror}") from None
     if done.returncode not in (0, 1) or not results.is_file():
-        said = done.stderr.decode(errors="replace").strip().splitlines()
-        reason = said[-1].removeprefix("error: ") if said else f"exit status {done.returncode}"
+        words = done.stderr.decode(errors="replace").strip().splitlines()
+        reason = words[-1].removeprefix("error: ") if words else f"exit status {done.returncode}"
         raise ElsewhereError(f"{python}: the suite did not run there: {reason} (it needs {NEEDS})")
     return out

@@ -14,19 +14,19 @@ from fourbar.scene import Command, Scene, command
 from fourbar.solution import Solution
 from fourbar.solve import solve
 from validation.compare.answer import Answer
-from validation.compare.compare import closure, compare
-from validation.compare.identities import FORMULAS, identities
+from validation.compare.compare import compare
+from validation.compare.identities import FORMULAS, closure, identities
 from validation.compare.plain import plain
 from validation.compare.reversals import reversals
 from validation.compare.rows import FAILS, REFUSES, VERDICTS, Row
 from validation.compare.statements.statements import statements
 from validation.compare.tolerance import EQUIVALENCE
 from validation.engines.witnesses import WITNESSES, Witness, predicting_from
-from validation.report.page import Page, Record, Timing
-from validation.run.breakdown import failure
+from validation.report.record import Record, Timing
+from validation.run.breakdown import breakdown
 
 
-def judged_page(name: str, scene: Scene, witnesses: Sequence[Witness] = WITNESSES, *, draw: bool = True) -> Page:
+def judged(name: str, scene: Scene, witnesses: Sequence[Witness] = WITNESSES, *, draw: bool = True) -> Record:
     """Judge a scene and keep what the report needs of it."""
     record = judge(name, scene, witnesses)
     figure = None
@@ -34,23 +34,12 @@ def judged_page(name: str, scene: Scene, witnesses: Sequence[Witness] = WITNESSE
         from validation.report.figures import scene_figure
 
         figure = scene_figure(record)
-    return Page(
-        name,
-        plain(scene.title),
-        plain(scene.source),
-        record.rows,
-        record.timings,
-        record.left_out,
-        [str(reversal) for reversal in record.reversals],
-        {answer.engine: (answer.shared, answer.own) for answer in record.answers if answer.own},
-        {answer.engine: answer.evidence for answer in record.answers if answer.evidence},
-        figure,
-    )
+    return record.kept(figure)
 
 
 def judge(name: str, scene: Scene, witnesses: Sequence[Witness] = WITNESSES) -> Record:
-    """Ask every witness about one scene and compare; an engine that breaks down costs its own rows."""
-    record = Record(name, scene)
+    """Let every witness answer one scene and compare; an engine that breaks down costs its own rows."""
+    record = Record(name, scene, plain(scene.title), plain(scene.source))
     if scene.motion.free is not None:
         from validation.run.released import judge_released
 
@@ -62,7 +51,7 @@ def judge(name: str, scene: Scene, witnesses: Sequence[Witness] = WITNESSES) -> 
     record.solution, seconds = _timed(lambda: solve(scene, stage, at=at))
     record.timings.append(Timing(name, FORMULAS, "exact", len(at.theta_2), seconds))
     record.rows += identities(name, scene, at, record.solution)
-    record.reversals = reversals(scene, at, record.solution)
+    record.jumps = reversals(scene, at, record.solution)
     for witness in witnesses:
         answer = _ask(witness, scene, at, record)
         if answer is None:
@@ -73,7 +62,7 @@ def judge(name: str, scene: Scene, witnesses: Sequence[Witness] = WITNESSES) -> 
             record.rows += _stated(name, scene, witness, answer)
         if witness.order and answer.refusal is None:
             answer.evidence |= _observed_order(name, scene, at, record.solution, witness)
-    _judge_inertia(record, at, witnesses)
+    _judge_inertia(record, scene, at, witnesses)
     return record
 
 
@@ -97,7 +86,7 @@ def _called_for(witnesses: Iterable[Witness], at: Command, record: Record) -> It
     for witness in witnesses:
         reason = None
         if at.omega_2 is None:
-            reason = None if witness.positions else "only positions are asked for, and it gives forces"
+            reason = None if witness.positions else "the scene states positions only, and it gives forces"
         elif witness.through_time and not np.any(at.omega_2):
             reason = "omega_2 is 0: nothing moves through time"
         elif witness.through_time and len(at.theta_2) == 1:
@@ -114,19 +103,18 @@ def _judged(name: str, scene: Scene, at: Command, solution: Solution, answer: An
     formulas = solution if theirs is at else solve(scene, _stage(theirs), at=theirs)
     predicted = predicting_from(witness, scene, theirs, answer)
     rows = compare(name, scene, answer, formulas, witness.tolerance, witness.expected, predicted)
-    said = answer.assembled is not None and len(answer.assembled) == len(formulas)  # otherwise a row has failed
-    if said and answer.at is not None and {"theta_3", "theta_4"} <= answer.quantities.keys():
+    answers = answer.assembled is not None and len(answer.assembled) == len(formulas)  # otherwise a row has failed
+    if answers and answer.at is not None and {"theta_3", "theta_4"} <= answer.quantities.keys():
         rows.append(closure(name, scene, answer, witness.tolerance))
     return rows
 
 
 def _stated(name: str, scene: Scene, witness: Witness, answer: Answer) -> list[Row]:
-    """What the formulas state of the linkage whatever its motion, asked of an exact engine."""
+    """What the formulas state of the linkage whatever its motion, held against an exact engine."""
     try:
         return statements(name, scene, witness.engine(), answer)
-    except Exception as error:  # whatever an engine raises is its own failure, told in its own row
-        reason = f"{type(error).__name__}: {error}".splitlines()[0]
-        return [failure(name, witness.name, "statements of the linkage", reason)]
+    except Exception as error:  # whatever an engine raises is its own failure, in its own row
+        return [breakdown(name, witness.name, error, "statements of the linkage")]
 
 
 def _observed_order(name: str, scene: Scene, at: Command, solution: Solution, witness: Witness) -> dict[str, float]:
@@ -142,14 +130,13 @@ def _observed_order(name: str, scene: Scene, at: Command, solution: Solution, wi
     return seen if all(map(math.isfinite, seen.values())) else {}  # a coarse run may leave what the scene covers
 
 
-def _judge_inertia(record: Record, at: Command, witnesses: Iterable[Witness]) -> None:
+def _judge_inertia(record: Record, scene: Scene, at: Command, witnesses: Iterable[Witness]) -> None:
     """The inertial part of the torque by itself: loads can hide an inertia that is 24 times wrong."""
-    scene = record.scene
     if at.omega_2 is None or not (scene.loads or scene.effects):
         return
     bare = replace(scene, loads=(), effects=())
     ours = solve(bare, _stage(at), at=at)
-    refused = {answer.engine for answer in record.answers if answer.refusal is not None}  # and has said so
+    refused = {answer.engine for answer in record.answers if answer.refusal is not None}  # and has its row
     for witness in witnesses:
         answer = _ask(replace(witness, expected=("torque",)), bare, at, record, part="inertia alone")
         if answer is None or (answer.refusal is not None and answer.engine in refused):
@@ -166,9 +153,8 @@ def _ask(witness: Witness, scene: Scene, at: Command, record: Record, part: str 
     try:
         answer: Answer
         answer, seconds = _timed(lambda: witness.engine().answer(scene, at))
-    except Exception as error:  # whatever an engine raises is its own failure, told in its own row
-        reason = f"{type(error).__name__}: {error}".splitlines()[0]
-        record.rows.append(failure(record.name, witness.name, part, reason))
+    except Exception as error:  # whatever an engine raises is its own failure, in its own row
+        record.rows.append(breakdown(record.name, witness.name, error, part))
         return None
     if not part:
         record.timings.append(Timing(record.name, answer.engine, answer.setting, len(at.theta_2), seconds))

@@ -15,9 +15,9 @@ from fourbar.errors import DependencyError, InputError
 from validation.compare.plain import plain
 from validation.engines.memory import bound_memory
 from validation.engines.witnesses import Witness
-from validation.report.page import Page
+from validation.report.record import Record
 from validation.run.breakdown import breakdown
-from validation.run.judge import judged_page
+from validation.run.judge import judged
 from validation.scenes.suites import Files, Suite
 
 SECONDS_PER_SCENE = 60.0
@@ -60,14 +60,14 @@ def longest(suite: Suite) -> float:
     return SECONDS_PER_SCENE + SECONDS_PER_POSITION * (suite.positions if isinstance(suite, Files) else 0)
 
 
-def judge_chunk(suite: Suite, scenes: Sequence[int], witnesses: Sequence[Witness], draw: bool) -> list[Page]:
-    """The pages of some scenes; runs in a worker."""
-    return [judged_page(plain(suite.name(i)), suite.scene(i), witnesses, draw=draw) for i in scenes]
+def judge_chunk(suite: Suite, scenes: Sequence[int], witnesses: Sequence[Witness], draw: bool) -> list[Record]:
+    """The records of some scenes; runs in a worker."""
+    return [judged(plain(suite.name(i)), suite.scene(i), witnesses, draw=draw) for i in scenes]
 
 
 def judge_watched(
     seconds: float, suite: Suite, scenes: Sequence[int], witnesses: Sequence[Witness], draw: bool
-) -> list[Page]:
+) -> list[Record]:
     """The same in a worker that nobody stops from outside: it ends its own process where it takes longer."""
     faulthandler.dump_traceback_later(seconds, exit=True)
     try:
@@ -85,14 +85,14 @@ def ready() -> None:
 
 def over_processes(
     suite: Suite, chunks: Iterable[Chunk], witnesses: Sequence[Witness], draw: bool, workers: int
-) -> Iterator[tuple[int, list[Page]]]:
+) -> Iterator[tuple[int, list[Record]]]:
     """Over processes of this machine."""
     left = dict(chunks)
     in_vain = 0
     while left:
         try:
-            for number, pages in _over_one_pool(suite, list(left.items()), witnesses, draw, workers):
-                yield number, pages
+            for number, records in _over_one_pool(suite, list(left.items()), witnesses, draw, workers):
+                yield number, records
                 del left[number]
                 in_vain = 0
         except StalledError:
@@ -103,7 +103,7 @@ def over_processes(
 
 def _over_one_pool(
     suite: Suite, chunks: Iterable[Chunk], witnesses: Sequence[Witness], draw: bool, workers: int
-) -> Iterator[tuple[int, list[Page]]]:
+) -> Iterator[tuple[int, list[Record]]]:
     from multiprocessing import get_context
 
     from pebble import ProcessPool
@@ -112,17 +112,17 @@ def _over_one_pool(
     with ProcessPool(max_workers=workers, context=get_context("spawn"), initializer=ready) as pool:
         try:
 
-            def submit(scenes: Sequence[int], asked: Sequence[Witness]) -> Future[list[Page]]:
+            def submit(scenes: Sequence[int], who: Sequence[Witness]) -> Future[list[Record]]:
                 seconds = longest(suite) * len(scenes)
-                task = (*part(suite, scenes), asked, draw)
+                task = (*part(suite, scenes), who, draw)
                 try:
-                    future: Future[list[Page]] = pool.schedule(judge_chunk, args=task, timeout=seconds)
+                    future: Future[list[Record]] = pool.schedule(judge_chunk, args=task, timeout=seconds)
                 except RuntimeError:  # a broken pool takes no more
                     raise StalledError from None
                 return future
 
-            def lost(under_way: Iterable[Future[list[Page]]]) -> bool:
-                return not pool.active or not any(future.running() for future in under_way)
+            def lost(running: Iterable[Future[list[Record]]]) -> bool:
+                return not pool.active or not any(future.running() for future in running)
 
             yield from _as_done(suite, chunks, witnesses, submit, IN_FLIGHT * workers, lost)
         except BaseException:
@@ -132,7 +132,7 @@ def _over_one_pool(
 
 def over_machines(
     suite: Suite, chunks: Iterable[Chunk], witnesses: Sequence[Witness], draw: bool, scheduler: str
-) -> Iterator[tuple[int, list[Page]]]:
+) -> Iterator[tuple[int, list[Record]]]:
     """Over the workers of a Dask scheduler; each needs this checkout importable."""
     from distributed import Client
 
@@ -142,15 +142,15 @@ def over_machines(
         why = str(error) or "no answer"
         raise InputError("--scheduler", scheduler, f"must be the address of a Dask scheduler: {why}") from None
     workers = max(1, len(connected.nthreads()))  # type: ignore[no-untyped-call]
-    # threads that wait for Dask's futures: those of its executor never end where a result was lost on its way here;
+    # threads that wait for Dask's futures: those of its executor never end where a result was lost in transit;
     # the client is left first, which ends what is still waited for
     with ThreadPoolExecutor(IN_FLIGHT * workers) as waiting, connected as client:
 
-        def submit(scenes: Sequence[int], asked: Sequence[Witness]) -> Future[list[Page]]:
-            task = (longest(suite) * len(scenes), *part(suite, scenes), asked, draw)
+        def submit(scenes: Sequence[int], who: Sequence[Witness]) -> Future[list[Record]]:
+            task = (longest(suite) * len(scenes), *part(suite, scenes), who, draw)
             return waiting.submit(client.submit(judge_watched, *task, retries=0, pure=False).result)
 
-        def deserted(_: Iterable[Future[list[Page]]]) -> bool:
+        def deserted(_: Iterable[Future[list[Record]]]) -> bool:
             return not client.nthreads()
 
         try:
@@ -163,28 +163,28 @@ def _as_done(
     suite: Suite,
     chunks: Iterable[Chunk],
     witnesses: Sequence[Witness],
-    submit: Callable[[Sequence[int], Sequence[Witness]], "Future[list[Page]]"],
+    submit: Callable[[Sequence[int], Sequence[Witness]], "Future[list[Record]]"],
     in_flight: int,
-    lost: "Callable[[Iterable[Future[list[Page]]]], bool]",
-) -> Iterator[tuple[int, list[Page]]]:
-    """Keep a bounded number of chunks under way; yield each as it is done."""
+    lost: "Callable[[Iterable[Future[list[Record]]]], bool]",
+) -> Iterator[tuple[int, list[Record]]]:
+    """Keep a bounded number of chunks running; yield each as it is done."""
     waiting = iter(chunks)
-    under_way: dict[Future[list[Page]], Chunk] = {}
+    running: dict[Future[list[Record]], Chunk] = {}
     exhausted = False
     while True:
-        while not exhausted and len(under_way) < in_flight:
+        while not exhausted and len(running) < in_flight:
             chunk = next(waiting, None)
             if chunk is None:
                 exhausted = True
             else:
-                under_way[submit(chunk[1], witnesses)] = chunk
-        if not under_way:
+                running[submit(chunk[1], witnesses)] = chunk
+        if not running:
             return
-        done, _ = wait(under_way, STALL, FIRST_COMPLETED)
-        if not done and lost(under_way):
+        done, _ = wait(running, STALL, FIRST_COMPLETED)
+        if not done and lost(running):
             raise StalledError
         for future in done:
-            number, scenes = under_way.pop(future)
+            number, scenes = running.pop(future)
             try:
                 yield number, _outcome(future, lost)
             except StalledError:
@@ -193,7 +193,7 @@ def _as_done(
                 yield number, [_alone(suite, scene, witnesses, submit, lost) for scene in scenes]
 
 
-def _outcome(future: "Future[list[Page]]", lost: "Callable[[Iterable[Future[list[Page]]]], bool]") -> list[Page]:
+def _outcome(future: "Future[list[Record]]", lost: "Callable[[Iterable[Future[list[Record]]]], bool]") -> list[Record]:
     """The result of a task, or StalledError where no worker takes it up or the pool breaks."""
     while True:
         wait([future], STALL)
@@ -210,9 +210,9 @@ def _alone(
     suite: Suite,
     scene: int,
     witnesses: Sequence[Witness],
-    submit: Callable[[Sequence[int], Sequence[Witness]], "Future[list[Page]]"],
-    lost: "Callable[[Iterable[Future[list[Page]]]], bool]",
-) -> Page:
+    submit: Callable[[Sequence[int], Sequence[Witness]], "Future[list[Record]]"],
+    lost: "Callable[[Iterable[Future[list[Record]]]], bool]",
+) -> Record:
     """One scene by itself, and if that breaks down too, one engine at a time."""
     try:
         return _outcome(submit([scene], witnesses), lost)[0]
@@ -221,20 +221,20 @@ def _alone(
     except Exception:
         pass
     name = plain(suite.name(scene))
-    page: Page | None = None
+    record: Record | None = None
     failed = []
-    for asked in ([], *([witness] for witness in witnesses)):
+    for who in ([], *([witness] for witness in witnesses)):
         for attempt in range(ATTEMPTS):
             try:
-                part = _outcome(submit([scene], asked), lost)[0]
+                part = _outcome(submit([scene], who), lost)[0]
             except StalledError:
                 raise
             except Exception as error:
                 if getattr(error, "exitcode", None) in FROM_OUTSIDE and attempt + 1 < ATTEMPTS:
                     continue  # somebody killed it: that is not the engine's doing
-                failed.append(breakdown(name, asked[0].name if asked else "formulas", error))
+                failed.append(breakdown(name, who[0].name if who else "formulas", error))
             else:
-                page = part if page is None else page.joined(part)
+                record = part if record is None else record.joined(part)
             break
-    page = page or Page(name)
-    return replace(page, rows=[*page.rows, *failed])
+    record = record or Record(name)
+    return replace(record, rows=[*record.rows, *failed])

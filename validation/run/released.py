@@ -1,6 +1,6 @@
 """Free motions: every engine against the exact solution where there is one, otherwise against the formulas.
 
-An engine's error is predicted by itself: it is asked twice, with its step and with twice its step, and
+An engine's error is predicted by itself: it runs twice, with its step and with twice its step, and
 the difference is what the coarser motion errs by. The finer one must not err by more than ten times that.
 """
 
@@ -17,10 +17,11 @@ from fourbar.linkage import MOVING_BARS
 from fourbar.scene import Scene
 from fourbar.solve import solve
 from validation.compare.answer import Array, Released
+from validation.compare.error import in_own_unit, relative, worst
 from validation.compare.rows import AGREES, DEGRADED, FAILS, REFUSES, Row
 from validation.compare.tolerance import DEGRADED as TIMES_PREDICTED
 from validation.engines.witnesses import not_installed
-from validation.report.page import Record, Timing
+from validation.report.record import Record, Timing
 from validation.run.breakdown import breakdown
 
 ENGINES = {
@@ -86,8 +87,8 @@ def judge_released(record: Record) -> Record:
     The motion of the formulas ends where bars 3 and 4 come to lie in one line, unless it follows the path through;
     an engine moves on. Both are compared as long as both are there, and the instant itself is compared too.
     """
+    assert record.scene is not None and record.scene.motion.free is not None
     free = record.scene.motion.free
-    assert free is not None
     times = np.linspace(0.0, free.duration, free.steps + 1)
     begin = time.perf_counter()
     solution = solve(record.scene)
@@ -106,12 +107,12 @@ def judge_released(record: Record) -> Record:
             record.left_out.append(f"{name}: {reason}")
             continue
         try:
-            asked = _adapter(adapter)
+            engine = _adapter(adapter)
             begin = time.perf_counter()
-            fine = asked(step).release(record.scene, times)
+            fine = engine(step).release(record.scene, times)
             seconds = time.perf_counter() - begin
-            coarse = None if fine.refusal else asked(2.0 * step).release(record.scene, times)
-        except Exception as error:  # whatever an engine raises is its own failure, told in its own row
+            coarse = None if fine.refusal else engine(2.0 * step).release(record.scene, times)
+        except Exception as error:  # whatever an engine raises is its own failure, in its own row
             record.rows.append(breakdown(record.name, name, error))
             continue
         record.timings.append(Timing(record.name, fine.engine, fine.setting, len(times), seconds))
@@ -135,13 +136,13 @@ def _adapter(adapter: str) -> Callable[[float], Any]:
 
 
 def _rows(record: Record, fine: Released, coarse: Released | None, truth: _Truth) -> list[Row]:
-    free, nan, n = record.scene.motion.free, math.nan, len(truth.theta_2)
-    assert free is not None
+    assert record.scene is not None and record.scene.motion.free is not None
+    free, through, n = record.scene.motion.free, record.scene.motion.through, len(truth.theta_2)
     if fine.refusal is not None:
-        return [Row(record.name, fine.engine, fine.setting, "all", nan, nan, REFUSES, fine.refusal, nan, nan)]
+        return [Row.unmeasured(record.name, fine.engine, fine.setting, "all", REFUSES, fine.refusal)]
     if len(fine.theta_2) < n:
         reason = f"it stopped after {len(fine.theta_2)} of {n} instants"
-        return [Row(record.name, fine.engine, fine.setting, "all", nan, nan, FAILS, reason, nan, nan)]
+        return [Row.unmeasured(record.name, fine.engine, fine.setting, "all", FAILS, reason)]
     speed = float(np.abs(truth.omega_2).max())
     sizes = {"theta_2": 1.0, "omega_2": speed, "energy": float(np.abs(fine.energy[:n]).max()), "stopped_at": 1.0}
 
@@ -149,7 +150,7 @@ def _rows(record: Record, fine: Released, coarse: Released | None, truth: _Truth
         found = {"theta_2": of.theta_2[:n], "omega_2": of.omega_2[:n]}
         if coarse is not None:  # the formulas integrate the energy equation itself; their drift is part of their test
             found["energy"] = of.energy[:n] - of.energy[0]
-            if record.scene.motion.through == "sign":
+            if through == "sign":
                 found["stopped_at"] = _end(of.stopped_at, free.duration)
         return found
 
@@ -161,31 +162,32 @@ def _rows(record: Record, fine: Released, coarse: Released | None, truth: _Truth
     }
     rows = []
     for name, values in numbers(fine).items():
-        size = sizes[name] or 1.0
-        relative, expected = np.abs(values - right[name]) / size, 0.0
+        size = in_own_unit(np.array(sizes[name]))
+        error, expected = relative(np.abs(values - right[name]), size), 0.0
         if coarse is not None:
             other = numbers(coarse)[name]
-            expected = float(np.abs(values - other).max()) / size if len(other) == len(values) else nan
-        worst = int(np.argmax(np.where(np.isnan(relative), np.inf, relative)))
+            alike = len(other) == len(values)
+            expected = float(relative(np.abs(values - other).max(), size)) if alike else math.nan
+        index = worst(error)
         full = FULL[name] * max(1.0, free.duration / UNIT)
         allowed = max(full, TIMES_PREDICTED * expected)
-        if relative[worst] <= full:
+        if error[index] <= full:
             verdict, reason = AGREES, f"a free motion of {free.duration:g} s"
-        elif relative[worst] <= allowed and math.isfinite(expected):
-            verdict, reason = DEGRADED, f"{relative[worst]:.1e} of {expected:.1e} predicted from twice the step"
+        elif error[index] <= allowed and math.isfinite(expected):
+            verdict, reason = DEGRADED, f"{error[index]:.1e} of {expected:.1e} predicted from twice the step"
         else:
-            verdict, reason = FAILS, f"{relative[worst]:.1e} where {expected:.1e} was predicted"
+            verdict, reason = FAILS, f"{error[index]:.1e} where {expected:.1e} was predicted"
         rows.append(
             Row(
                 record.name,
                 fine.engine,
                 fine.setting,
                 name,
-                float(relative[worst]),
+                float(error[index]),
                 allowed,
                 verdict,
                 reason,
-                float(fine.theta_2[n - 1 if name == "stopped_at" else worst]),
+                float(fine.theta_2[n - 1 if name == "stopped_at" else index]),
                 1.0,
             )
         )
@@ -193,5 +195,5 @@ def _rows(record: Record, fine: Released, coarse: Released | None, truth: _Truth
 
 
 def _end(stopped_at: float | None, duration: float) -> Array:
-    """When a motion reached its limit, or the end that was asked for, as a part of that duration, (1,)."""
+    """When a motion reached its limit, or the stated end, as a part of that duration, (1,)."""
     return np.array([1.0 if stopped_at is None else stopped_at / duration])

@@ -26,7 +26,7 @@ from validation.report import cost_section, hard_section
 from validation.report.html import Section, html
 from validation.report.machine import versions
 from validation.report.markdown import markdown
-from validation.report.page import Page
+from validation.report.record import Record
 from validation.report.summary import SCENES_SHOWN, Summary, summarise
 from validation.run import pool
 from validation.run.elsewhere import run_elsewhere
@@ -53,8 +53,8 @@ def run(
 ) -> Iterator[int | Summary]:
     """Judge a suite into a folder; yields the number of scenes done as they come, at last the summary.
 
-    With `published` the report sets what the thesis printed beside what is right, error by error.
-    `missing` are the witnesses that cannot be asked here, each with the reason.
+    With `published` the report sets what the thesis printed against what is right, error by error.
+    `missing` are the witnesses that cannot answer here, each with the reason.
 
     What an interrupted run of the same suite with the same engines and versions left is kept.
     """
@@ -76,16 +76,16 @@ def run(
             answers = pool.over_machines(suite, todo, witnesses, draw, scheduler)
         else:
             answers = pool.over_processes(suite, todo, witnesses, draw, workers)
-        for number, pages in answers:
-            store.put(number, pages)
-            yield len(pages)
+        for number, records in answers:
+            store.put(number, records)
+            yield len(records)
         held_to = list(dict.fromkeys((IDENTITY, *(witness.tolerance for witness in witnesses))))
         ladder = ladder_rows() if published else []
-        summary = summarise(store.pages(len(chunks)), ladder, held_to, missing)
+        summary = summarise(store.records(len(chunks)), ladder, held_to, missing)
         first_lines = write_columns(store.rows(len(chunks)), out)
         factors = {witness.name: witness.tolerance.factor for witness in witnesses}
         write_about(about(factors, suite.fingerprint()), out)
-        write_text(out / "timings.csv", timings_csv(store.pages(len(chunks))))
+        write_text(out / "timings.csv", timings_csv(store.records(len(chunks))))
         write_text(out / "report.md", markdown(summary))
         drawn, why_not = mjcf_pictures(suite) if draw and simulated else ({}, "")
         rows = (row for chunk in store.rows(len(chunks)) for row in chunk)
@@ -123,27 +123,27 @@ def mjcf_pictures(suite: Suite) -> tuple[dict[str, str], str]:
     return pictures(texts)
 
 
-def timings_csv(pages: Iterator[Page]) -> str:
+def timings_csv(records: Iterator[Record]) -> str:
     """Seconds per answer, and their ratio to the formulas' on the same scene in the same process."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(["scene", "engine", "setting", "positions", "seconds", "times_formulas"])
-    for page in pages:
-        for t in page.timings:
-            ratio = t.seconds / page.timings[0].seconds
+    for record in records:
+        for t in record.timings:
+            ratio = t.seconds / record.timings[0].seconds
             writer.writerow([t.scene, t.engine, t.setting, t.positions, f"{t.seconds:.6f}", f"{ratio:.1f}"])
     return text.getvalue()
 
 
-def examine(scenes: tuple[Path, ...], mjcf: Path, names: tuple[str, ...], out: Path, asked: float | None) -> int:
-    """What a user's own MJCF of one scene differs in, and what it costs; 1 where it is wrong by more than asked."""
+def examine(scenes: tuple[Path, ...], mjcf: Path, names: tuple[str, ...], out: Path, wanted: float | None) -> int:
+    """What a user's own MJCF of one scene differs in, and what it costs; 1 where it is wrong by more than wanted."""
     from validation.check.model import examine_model, named, tell
     from validation.run.dial import held_to
 
     if len(scenes) != 1:
         raise InputError("--mjcf", str(mjcf), f"needs the one scene it is a model of, not {len(scenes)}")
     suite = scene_files(scenes)
-    tolerance = SIMULATED if asked is None else held_to(asked, "what this file may be wrong by")
+    tolerance = SIMULATED if wanted is None else held_to(wanted, "what this file may be wrong by")
     report = examine_model(suite.name(0), suite.scene(0), mjcf, named(names), tolerance)
     tell(report, mjcf, out)
     return report.counts.status
@@ -157,7 +157,7 @@ def examine(scenes: tuple[Path, ...], mjcf: Path, names: tuple[str, ...], out: P
 @click.option("--engines", metavar="NAMES", help="Comma-separated witnesses; left out: all.")
 @click.option(
     "--error",
-    "asked",
+    "wanted",
     type=float,
     metavar="E",
     help="Simulate no more precisely than this relative error; with --mjcf: what that file may be wrong by.",
@@ -181,7 +181,7 @@ def command(
     scenes: tuple[Path, ...],
     out: Path,
     engines: str | None,
-    asked: float | None,
+    wanted: float | None,
     named: str | None,
     count: int | None,
     seed: int | None,
@@ -202,10 +202,12 @@ def command(
 
     if mjcf is not None:
         others = {"engines": engines, "suite": named, "random": count, "seed": seed, "type": types, "against": against}
-        for option, said in {**others, "scheduler": scheduler, "python": python, **forms}.items():
-            if said is not None:
-                raise InputError(f"--{option}", str(said), "is not of --mjcf, which examines one file beside its scene")
-        return examine(scenes, mjcf, names, out, asked)
+        for option, value in {**others, "scheduler": scheduler, "python": python, **forms}.items():
+            if value is not None:
+                raise InputError(
+                    f"--{option}", str(value), "is not of --mjcf, which examines one file together with its scene"
+                )
+        return examine(scenes, mjcf, names, out, wanted)
     if names:
         raise InputError("--name", names[0], "names a body or site of --mjcf; say which file that is")
     if count is not None and scenes:
@@ -216,7 +218,9 @@ def command(
         if value is not None and count is None:
             raise InputError(option, value, "is of random linkages; say --random N too")
     if python is not None and against is not None:
-        raise InputError("--against", against, "cannot be said with --python, which compares with the run made there")
+        raise InputError(
+            "--against", against, "cannot be combined with --python, which compares with the run made there"
+        )
     for form, path in forms.items():
         if path is not None and python is None and against is None:
             raise InputError(f"--{form}", str(path), "tells differences; say --against BASELINE or --python PATH too")
@@ -224,15 +228,15 @@ def command(
         read_run(baseline(against))  # before anything runs
     seed, types = seed or 0, types or ALL_TYPES
     suite, witnesses = selected(scenes, named, count, seed, types)
-    if asked is not None:
+    if wanted is not None:
         from validation.run.dial import dialled
 
-        witnesses = dialled(witnesses, asked)
+        witnesses = dialled(witnesses, wanted)
     if python is not None:
         passed_on = [*map(os.path.abspath, scenes), f"--workers={workers}"]
         passed_on += [f"--engines={engines}"] if engines else []
         passed_on += [f"--random={count}", f"--seed={seed}", f"--type={types}"] if count else []
-        passed_on += [f"--error={asked!r}"] if asked is not None else []
+        passed_on += [f"--error={wanted!r}"] if wanted is not None else []
         passed_on += [f"--suite={named if named == 'hard' else os.path.abspath(named)}"] if named else []
         against = str(run_elsewhere(python, passed_on, out / "elsewhere"))
     present, missing = askable(chosen(engines, witnesses), by_name=engines is not None)

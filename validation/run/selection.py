@@ -1,4 +1,4 @@
-"""What a run was asked for: which scenes, of which types, by which witnesses."""
+"""What a run is of: which scenes, of which types, by which witnesses."""
 
 from pathlib import Path
 
@@ -12,7 +12,7 @@ from validation.scenes.suites import Random, Suite, model_files, scene_files, su
 def selected(
     scenes: tuple[Path, ...], named: str | None, count: int | None, seed: int, types: str
 ) -> tuple[Suite, tuple[Witness, ...]]:
-    """The scenes asked for, and the witnesses with what they are held to there."""
+    """The scenes wanted, and the witnesses with what they are held to there."""
     if named == "hard":
         return Hard(), HARD_WITNESSES
     if named is not None:
@@ -35,7 +35,7 @@ def chosen(engines: str | None, witnesses: tuple[Witness, ...] = WITNESSES) -> t
 
 
 def askable(witnesses: tuple[Witness, ...], *, by_name: bool) -> tuple[tuple[Witness, ...], list[tuple[str, str]]]:
-    """Those that can be asked here, and the others with the reason; DependencyError where those were named."""
+    """Those that can answer here, and the others with the reason; DependencyError where those were named."""
     missing = [(witness.name, reason) for witness in witnesses if (reason := witness.missing())]
     if missing and by_name:
         raise DependencyError("; ".join(f"{name}: {reason}" for name, reason in missing))

@@ -1,6 +1,6 @@
 """The folder of a run: a lock, finished parts, and at the end the results.
 
-lock               held while a run is under way; the system frees it when the process dies
+lock               held while a run goes on; the system frees it when the process dies
 run.json           what is being run; a rerun of the same thing resumes, of another starts over
 parts/000012.csv   the rows of chunk 12, written whole; its presence says the chunk is done
 parts/000012.json  what the report needs of it: timings, evidence, pictures
@@ -16,7 +16,7 @@ from typing import Any
 from fourbar.errors import FourBarError
 from fourbar.writing import write_text
 from validation.compare.rows import Row, from_csv, to_csv
-from validation.report.page import Page
+from validation.report.record import Record
 
 
 class RunningError(FourBarError):
@@ -63,10 +63,10 @@ class Store:
         """The chunks whose parts are complete."""
         return {int(path.stem) for path in self.parts.glob("*.csv")}
 
-    def put(self, chunk: int, pages: list[Page]) -> None:
+    def put(self, chunk: int, records: list[Record]) -> None:
         """Write a finished chunk; the rows come last, since they say that it is done."""
-        rows = [row for page in pages for row in page.rows]
-        text = json.dumps([page.without_rows() for page in pages])
+        rows = [row for record in records for row in record.rows]
+        text = json.dumps([record.without_rows() for record in records])
         write_text(self.parts / f"{chunk:06d}.json", text)
         write_text(self.parts / f"{chunk:06d}.csv", to_csv(rows))
 
@@ -75,14 +75,14 @@ class Store:
         for chunk in range(chunks):
             yield from_csv(self.parts / f"{chunk:06d}.csv")
 
-    def pages(self, chunks: int) -> Iterator[Page]:
-        """The pages, in order, with their rows."""
+    def records(self, chunks: int) -> Iterator[Record]:
+        """The records, in order, with their rows."""
         for chunk, rows in enumerate(self.rows(chunks)):
             by_scene: dict[str, list[Row]] = {}
             for row in rows:
                 by_scene.setdefault(row.scene, []).append(row)
-            for page in json.loads((self.parts / f"{chunk:06d}.json").read_text(encoding="utf-8")):
-                yield Page.restore(page, by_scene.get(page["name"], []))
+            for record in json.loads((self.parts / f"{chunk:06d}.json").read_text(encoding="utf-8")):
+                yield Record.restore(record, by_scene.get(record["name"], []))
 
     def finish(self) -> None:
         """The results are written: the parts have served."""

@@ -151,7 +151,7 @@ def sizes(*, exponents: range = range(-6, 7, 2)) -> Scenes:
 
 
 def speeds(*, exponents: tuple[int, ...] = (-6, -3, 0, 3, 6)) -> Scenes:
-    """omega_2 from 1e-6 to 1e6 rad/s, both ways."""
+    """omega_2 from 1e-6 to 1e6 rad/s, in both senses."""
     base = sweep_of(dressed((0.3, 0.1, 0.25, 0.22)))
     for k in exponents:
         for sign, name in ((1.0, "+"), (-1.0, "-")):
@@ -175,9 +175,9 @@ def out_and_back(*, beyond: float = 0.5, steps: int = 40, seeds: range = range(2
         lengths = linkage_of(ROCKER, seed)
         (psi, stretched), *_ = collinear_3_4(lengths)
         outward = 1.0 if stretched else -1.0
-        way = np.linspace(psi - outward * 0.6, psi + outward * beyond, steps)
+        out = np.linspace(psi - outward * 0.6, psi + outward * beyond, steps)
         for branch, name in BRANCH_NAMES.items():
-            yield f"{seed} {name}", at(dressed(lengths, seed), [*way, *way[::-1]], branch)
+            yield f"{seed} {name}", at(dressed(lengths, seed), [*out, *out[::-1]], branch)
 
 
 def thesis_limits(*, steps: int = 120) -> Scenes:
@@ -249,7 +249,7 @@ FAMILIES = (
     Family("sizes", "1e-6 to 1e6 m: exact engines keep all digits", sizes),
     Family("speeds", "1e-6 to 1e6 rad/s: exact engines keep all digits", speeds),
     Family("loads", "1e-9 to 1e9 of the weights: exact engines keep all digits", loads),
-    Family("out-and-back", "not assembled outside, the same answers on the way out and on the way back", out_and_back),
+    Family("out-and-back", "not assembled outside, the same answers going out and coming back", out_and_back),
     Family(
         "thesis-limits", "both limit positions are singular or not assembled, all between is answered", thesis_limits
     ),

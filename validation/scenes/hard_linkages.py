@@ -6,13 +6,19 @@ from dataclasses import replace
 import numpy as np
 
 from fourbar.effects import Gravity, Load
-from fourbar.linkage import Bar, FourBar
+from fourbar.linkage import FourBar
 from fourbar.scene import Scene
 from fourbar.scene.motion import Motion
-from validation.scenes.random import LinkageType, random_lengths
+from validation.scenes.random import LinkageType, Ranges, random_bars, random_lengths, uniform
 
 Lengths = tuple[float, float, float, float]
 """(ground, input, coupler, output), m."""
+BARS = Ranges(
+    mass=uniform(0.2, 2.0),
+    inertia=uniform(0.05, 0.2),
+    centre=uniform(0.2, 0.8),
+    centre_angle=uniform(-0.5, 0.5),
+)
 
 
 def linkage_of(kind: LinkageType, seed: int) -> Lengths:
@@ -24,11 +30,7 @@ def dressed(lengths: Lengths, seed: int = 0) -> Scene:
     """A scene on these lengths: offset mass centres, gravity, a force and a couple; omega_2 = 3 rad/s, alpha_2 = 2."""
     rng = np.random.default_rng([seed, 4])
     d, *moving = lengths
-    bars = []
-    for length in moving:
-        mass = float(rng.uniform(0.2, 2.0)) * length
-        centre = (float(rng.uniform(0.2, 0.8)) * length, float(rng.uniform(-0.5, 0.5)))
-        bars.append(Bar(length, mass, mass * length**2 * float(rng.uniform(0.05, 0.2)), centre))
+    bars = random_bars(rng, moving, BARS)
     weight = 9.81 * sum(bar.mass for bar in bars)
     loads = (
         Load(4, (weight, float(rng.uniform(-3, 3))), (0.2 * moving[2], float(rng.uniform(-3, 3)))),

@@ -1,15 +1,75 @@
-"""Random linkages of a stated type, each from (seed, index) alone."""
+"""Random linkages and scenes, from stated types and ranges and a random generator alone."""
 
 import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from enum import Enum
+from typing import Any
 
 import numpy as np
 
-from fourbar.effects import Gravity, Load
+from fourbar.effects import Friction, Gravity, Load, Viscous
 from fourbar.formulas.mobility import default_range
-from fourbar.linkage import Bar, FourBar
+from fourbar.linkage import MOVING_BARS, PINS, Bar, FourBar
 from fourbar.scene import Scene
 from fourbar.scene.motion import CROSSED, OPEN, Motion, Sweep
+
+Draw = Callable[[np.random.Generator], float]
+"""A number drawn at random."""
+
+
+def uniform(low: float, high: float) -> Draw:
+    """Between two numbers."""
+    return lambda rng: float(rng.uniform(low, high))
+
+
+def decades(low: float, high: float) -> Draw:
+    """Ten to a power between two numbers."""
+    return lambda rng: float(10.0 ** rng.uniform(low, high))
+
+
+def sometimes(share: float, draw: Draw, otherwise: float = 0.0) -> Draw:
+    """Drawn in this share of all cases."""
+    return lambda rng: draw(rng) if rng.random() < share else otherwise
+
+
+def product(*draws: Draw) -> Draw:
+    """Of several draws."""
+    return lambda rng: math.prod(draw(rng) for draw in draws)
+
+
+ANY_ANGLE, ANY_PART, EITHER_SIGN = uniform(-math.pi, math.pi), uniform(0.0, 1.0), uniform(-1.0, 1.0)
+ANY_SPEED = decades(-1.0, 2.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Ranges:
+    """What a random scene is drawn from."""
+
+    mass: Draw
+    """kg per metre of bar, or kg."""
+    inertia: Draw
+    """About G, of mass times length squared."""
+    centre: Draw
+    """Of the length."""
+    centre_angle: Draw
+    ground_angle: Draw = ANY_ANGLE
+    load: Draw = ANY_PART
+    """Of a force, of the weight of all bars; of a moment, of that weight at the bar's length."""
+    arm: Draw = ANY_PART
+    """Where a load acts, from G, of the length."""
+    without_force: float = 0.0
+    """Share of the loads that are a moment alone."""
+    speed: Draw = ANY_SPEED
+    """|omega_2|, rad/s."""
+    acceleration: Draw = EITHER_SIGN
+    """alpha_2 where there is one, of omega_2 squared."""
+    gravity: float = 0.5
+    viscous: float = 0.0
+    friction: float = 0.0
+    """Shares of the scenes that have such an effect."""
+    by_length: bool = True
+    """Whether the mass is per metre."""
 
 
 class LinkageType(Enum):
@@ -52,34 +112,61 @@ def random_lengths(rng: np.random.Generator, kind: LinkageType) -> tuple[float, 
             return tuple(float(x) for x in others)  # type: ignore[return-value]
 
 
+def random_bars(rng: np.random.Generator, lengths: Sequence[float], ranges: Ranges) -> list[Bar]:
+    """Bars 2, 3, 4 of these lengths (m)."""
+    bars = []
+    for length in lengths:
+        mass = ranges.mass(rng) * (length if ranges.by_length else 1.0)
+        centre = (length * ranges.centre(rng), ranges.centre_angle(rng))
+        bars.append(Bar(length, mass, mass * length**2 * ranges.inertia(rng), centre))
+    return bars
+
+
+def drawn(rng: np.random.Generator, lengths: Sequence[float], ranges: Ranges) -> Scene:
+    """A scene on (ground, input, coupler, output), m, at theta_2 = 0."""
+    d, *moving = (float(length) for length in lengths)
+    bars = random_bars(rng, moving, ranges)
+    linkage = FourBar(d, bars[0], bars[1], bars[2], ranges.ground_angle(rng))
+    weight = 9.81 * (math.fsum(bar.mass for bar in bars) or 1.0)
+    loads = tuple(_load(rng, linkage, weight, ranges) for _ in range(int(rng.integers(0, 3))))
+    effects: list[Any] = [Gravity()] if rng.random() < ranges.gravity else []
+    couple = 0.1 * weight * max(moving)
+    for kind, share in ((Viscous, ranges.viscous), (Friction, ranges.friction)):
+        if rng.random() < share:
+            effects.append(kind.at(**{pin: couple * float(rng.random()) for pin in PINS if rng.random() < 0.5}))
+    omega = float(rng.choice([-1.0, 1.0])) * ranges.speed(rng)
+    alpha = float(rng.choice([0.0, omega**2 * ranges.acceleration(rng)]))
+    motion = Motion(0.0, omega, alpha, OPEN if rng.random() < 0.5 else CROSSED)
+    return Scene(linkage, motion, int(rng.choice(MOVING_BARS)), loads, tuple(effects))
+
+
+def _load(rng: np.random.Generator, linkage: FourBar, weight: float, ranges: Ranges) -> Load:
+    """A force and a moment, or one of them, on any bar."""
+    bar = int(rng.choice(MOVING_BARS))
+    length, size = linkage.bar(bar).length, weight * ranges.load(rng)
+    force = None if rng.random() < ranges.without_force else (size, ANY_ANGLE(rng))
+    at = (length * ranges.arm(rng), ANY_ANGLE(rng))
+    moment = float(rng.choice([0.0, size * length * EITHER_SIGN(rng)]))
+    return Load(bar, force, at, moment, "bar" if rng.random() < 0.5 else "world")
+
+
+MACHINES = Ranges(
+    mass=decades(-1.0, 1.0),
+    inertia=uniform(1.0 / 24.0, 1.0 / 6.0),
+    centre=uniform(0.2, 0.8),
+    centre_angle=uniform(-1.0, 1.0),
+    arm=uniform(0.0, 0.5),
+    speed=decades(-0.5, 1.5),
+    acceleration=uniform(-0.1, 0.1),
+)
+"""Bars as machines have them."""
+
+
 def random_scene(seed: int, index: int, types: tuple[LinkageType, ...]) -> Scene:
     """A linkage with random bars, loads, gravity and drive, at POSITIONS positions over the range it can move."""
     rng = np.random.default_rng([seed, index])
     kind = types[index % len(types)]
     size = 10.0 ** rng.uniform(-1.5, 1.0)
-    d, *moving = (size * x for x in random_lengths(rng, kind))
-    bars = []
-    for length in moving:
-        mass = length * 10.0 ** rng.uniform(-1.0, 1.0)
-        about_g = mass * length**2 / 12.0 * rng.uniform(0.5, 2.0)
-        bars.append(Bar(length, mass, about_g, (length * rng.uniform(0.2, 0.8), rng.uniform(-1.0, 1.0))))
-    linkage = FourBar(d, bars[0], bars[1], bars[2], float(rng.uniform(-math.pi, math.pi)))
-    weight = 9.81 * sum(bar.mass for bar in bars)
-    loads = []
-    for number in rng.choice([2, 3, 4], rng.integers(0, 3), replace=False):
-        length = linkage.bar(int(number)).length
-        force = (float(weight * rng.uniform(0.0, 1.0)), float(rng.uniform(-math.pi, math.pi)))
-        at = (float(length * rng.uniform(0.0, 0.5)), float(rng.uniform(-math.pi, math.pi)))
-        frame = "bar" if rng.random() < 0.5 else "world"
-        loads.append(Load(int(number), force, at, float(weight * length * rng.uniform(-1.0, 1.0)), frame))
-    omega_2 = float(rng.choice([-1.0, 1.0]) * 10.0 ** rng.uniform(-0.5, 1.5))
-    alpha_2 = float(rng.choice([0.0, omega_2**2 * rng.uniform(-0.1, 0.1)]))
-    branch = OPEN if rng.random() < 0.5 else CROSSED
-    return Scene(
-        linkage,
-        Motion(Sweep(*default_range(linkage), POSITIONS - 1), omega_2, alpha_2, branch),
-        int(rng.choice([2, 3, 4])),
-        tuple(loads),
-        (Gravity(),) if rng.random() < 0.5 else (),
-        title=f"{kind.value} {index}",
-    )
+    scene = drawn(rng, [size * x for x in random_lengths(rng, kind)], MACHINES)
+    sweep = Sweep(*default_range(scene.linkage), POSITIONS - 1)
+    return replace(scene, motion=replace(scene.motion, theta_2=sweep), title=f"{kind.value} {index}")

@@ -20,7 +20,7 @@ MOST_POSITIONS = 100_000
 MOST_SECONDS = 100.0
 """Of a free motion in a run: the engines go through it in steps of 1 to 4 ms, a second in about a second."""
 AS_LONG_AS = 100
-"""Positions that take as long as a second of free motion, with room."""
+"""Positions that take as long as a second of free motion, generously."""
 MODELS = Path(__file__).parent.parent.parent / "models"
 
 
@@ -109,15 +109,15 @@ def scene_files(paths: Iterable[Path]) -> Files:
 
 def _positions(scene: Scene, file: Path) -> int:
     """How many positions a scene asks for, or what takes as long; InputError beyond the most."""
-    for key, asked in (("motion.theta_2", scene.motion.theta_2), ("motion.free", scene.motion.free)):
-        if isinstance(asked, (Sweep, Free)):
-            if asked.steps >= MOST_POSITIONS:
-                raise InputError(f"{key}.steps", asked.steps, f"must be below {MOST_POSITIONS} in a run", str(file))
-            seconds = asked.duration if isinstance(asked, Free) else 0.0
+    for key, stated in (("motion.theta_2", scene.motion.theta_2), ("motion.free", scene.motion.free)):
+        if isinstance(stated, (Sweep, Free)):
+            if stated.steps >= MOST_POSITIONS:
+                raise InputError(f"{key}.steps", stated.steps, f"must be below {MOST_POSITIONS} in a run", str(file))
+            seconds = stated.duration if isinstance(stated, Free) else 0.0
             if seconds > MOST_SECONDS:
                 allowed = f"must not exceed {MOST_SECONDS:g} s in a run: engines go through it in steps of 1 ms"
                 raise InputError(f"{key}.duration", seconds, allowed, str(file))
-            return asked.steps + 1 + math.ceil(AS_LONG_AS * seconds)
+            return stated.steps + 1 + math.ceil(AS_LONG_AS * seconds)
     return DEFAULT_STEPS + 1
 
 

@@ -1,4 +1,4 @@
-"""This tree's speed beside that of another revision: the same timings of both, in turns, within one command."""
+"""This tree's speed against that of another revision: the same timings of both, in turns, within one command."""
 
 import io
 import json
@@ -58,8 +58,8 @@ def unpack(revision: str, tree: Path, folder: Path) -> None:
     """The package as it stood at a revision, into a folder."""
     if shutil.which("git") is None:
         raise DependencyError("bench --against needs git, which is not installed")
-    asked = ["rev-parse", "--verify", "--quiet", "--end-of-options", f"{revision}^{{commit}}"]
-    commit = _git(tree, asked).decode().strip()
+    arguments_of_git = ["rev-parse", "--verify", "--quiet", "--end-of-options", f"{revision}^{{commit}}"]
+    commit = _git(tree, arguments_of_git).decode().strip()
     archive = _git(tree, ["archive", "--format=tar", commit, "fourbar"]) if commit else b""
     if not archive:
         raise InputError("--against", revision, f"must be a revision of the git repository of {tree} that has fourbar")
@@ -69,8 +69,8 @@ def unpack(revision: str, tree: Path, folder: Path) -> None:
 
 def _git(tree: Path, arguments: list[str]) -> bytes:
     """What git says; nothing where it fails."""
-    told = subprocess.run(["git", "-C", str(tree), *arguments], capture_output=True, check=False)
-    return told.stdout if told.returncode == 0 else b""
+    done = subprocess.run(["git", "-C", str(tree), *arguments], capture_output=True, check=False)
+    return done.stdout if done.returncode == 0 else b""
 
 
 def timings(tree: Path, name: str, positions: int) -> dict[str, float]:
@@ -79,11 +79,11 @@ def timings(tree: Path, name: str, positions: int) -> dict[str, float]:
     line = [sys.executable, "-P", script, str(positions), *(" ".join(names) for names in (UNKNOWNS, ANGLES, VECTORS))]
     path = os.pathsep.join(filter(None, (str(tree), os.environ.get("PYTHONPATH"))))
     environment = os.environ | dict.fromkeys(ONE_THREAD, "1") | {"PYTHONPATH": path}
-    told = subprocess.run(line, env=environment, capture_output=True, text=True, check=False)
-    if told.returncode != 0:
-        reason = told.stderr.strip().rpartition("\n")[2] or f"ended with {told.returncode}"
+    done = subprocess.run(line, env=environment, capture_output=True, text=True, check=False)
+    if done.returncode != 0:
+        reason = done.stderr.strip().rpartition("\n")[2] or f"ended with {done.returncode}"
         raise FourBarError(f"{name} cannot be timed: {reason}")
-    found = json.loads(told.stdout)
+    found = json.loads(done.stdout)
     if not Path(found["from"]).resolve().is_relative_to(tree.resolve()):
         raise FourBarError(f"{name} cannot be timed: {found['from']} was imported instead")
     times: dict[str, float] = found["times"]

@@ -158,7 +158,7 @@ def floor(theta_2: Array, out: dict[str, Array]) -> Callable[[], object]:
 def bench(positions: int, rounds: int, largest: int, against: str | None) -> int:
     """Ratios of speed: formulas, the 13x13 system, a C loop; sizes, stages, import, memory."""
     if against is not None:
-        return beside(against, positions, rounds)
+        return compared_with(against, positions, rounds)
     from rich.console import Console
     from rich.table import Table
 
@@ -166,8 +166,8 @@ def bench(positions: int, rounds: int, largest: int, against: str | None) -> int
         # read when numpy is loaded: too late in this process
         arguments = ["--positions", positions, "--rounds", rounds, "--largest", largest]
         line = [sys.executable, "-m", "validation", "bench", *map(str, arguments)]
-        told = subprocess.run(line, env=os.environ | dict.fromkeys(ONE_THREAD, "1"), check=False).returncode
-        return told if told >= 0 else BROKEN  # below 0: a signal ended it
+        status = subprocess.run(line, env=os.environ | dict.fromkeys(ONE_THREAD, "1"), check=False).returncode
+        return status if status >= 0 else BROKEN  # below 0: a signal ended it
     rows = measure(positions, rounds, largest)
     table = Table(title=f"{positions} positions, one core, medians of {rounds} interleaved rounds; {machine()}")
     for column in ("what", "measured", "needed", ""):
@@ -187,7 +187,7 @@ def bench(positions: int, rounds: int, largest: int, against: str | None) -> int
     return FAILED if broken else HOLDS
 
 
-def beside(revision: str, positions: int, rounds: int) -> int:
+def compared_with(revision: str, positions: int, rounds: int) -> int:
     """The table of this tree's times over those of a revision; a measurement, held to nothing."""
     from rich.console import Console
     from rich.markup import escape

@@ -85,7 +85,7 @@ def try_out(index: int, text: str) -> Found | None:
         if "\n" in str(error):
             return Found(index, f"more than one line: {error}", text)
     except MemoryError:
-        pass  # asked for more positions than there is memory: said as such by the command line
+        pass  # more positions than there is memory for: stated as such by the command line
     except Exception as error:
         return Found(index, f"{type(error).__name__}: {error}", text)
     if time.perf_counter() - start > HANG:

@@ -26,7 +26,7 @@ def example(linkage: FourBar = LINKAGE, theta_2: float | None = 0.0) -> Scene:
 
 
 def command(n: int, start: float = 0.0, stop: float = 2.0 * np.pi) -> Command:
-    """n positions, over a revolution unless told otherwise."""
+    """n positions, over a revolution unless stated otherwise."""
     return Command(np.linspace(start, stop, n), np.broadcast_to(np.int8(1), (n,)), 10.0, 0.0)
 
 

@@ -1,1 +1,1 @@
-"""What the formulas state of a linkage whatever its motion, asked of the engines."""
+"""What the formulas state of a linkage whatever its motion, held against the engines."""

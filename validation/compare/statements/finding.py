@@ -11,6 +11,7 @@ from fourbar.scene import Command, Scene
 from fourbar.scene.motion import Motion
 from validation.compare.answer import Answer, Engine
 from validation.compare.compare import turned
+from validation.compare.error import used
 from validation.compare.rows import AGREES, FAILS, Row
 from validation.compare.tolerance import EQUIVALENCE, Array
 
@@ -23,12 +24,12 @@ class Finding(NamedTuple):
     error: float
     allowed: float
     theta_2: float
-    said: str
+    what: str
 
 
 def worst(name: str, answer: Answer, quantity: str, findings: Iterable[Finding]) -> Row:
     """The row of a quantity: the finding that exceeds what it is allowed by most."""
-    found = max(findings, key=_excess)
+    found = max(findings, key=lambda each: float(used(each.error, each.allowed)))
     holds = found.error <= found.allowed
     return Row(
         scene=name,
@@ -38,21 +39,14 @@ def worst(name: str, answer: Answer, quantity: str, findings: Iterable[Finding])
         error=float(found.error),
         allowed=float(found.allowed),
         verdict=AGREES if holds else FAILS,
-        reason=found.said,
+        reason=found.what,
         theta_2=float(found.theta_2),
         condition=float(EQUIVALENCE.factor / max(found.allowed, EQUIVALENCE.factor)),
     )
 
 
-def _excess(found: Finding) -> float:
-    """The error as a multiple of what is allowed; NaN is beyond all."""
-    if math.isnan(found.error) or math.isnan(found.allowed):
-        return math.inf
-    return found.error / found.allowed if found.allowed > 0.0 else math.inf if found.error > 0.0 else 0.0
-
-
-def asked(engine: Engine, linkage: FourBar, theta_2: Sequence[float], branch: Sequence[int]) -> dict[str, Array]:
-    """What the engine finds where bar 2 turns at 1 rad/s; the bars are uniform: nothing is asked of their masses."""
+def answered(engine: Engine, linkage: FourBar, theta_2: Sequence[float], branch: Sequence[int]) -> dict[str, Array]:
+    """What the engine finds where bar 2 turns at 1 rad/s; the bars are uniform: their masses play no part."""
     bars = uniform(*linkage.lengths)
     scene = Scene(FourBar(bars.ground, bars.input, bars.coupler, bars.output, linkage.ground_angle), Motion(0.0, 1.0))
     at = Command(np.array(theta_2, dtype=float), np.array(branch, dtype=np.int8), 1.0, 0.0)

@@ -10,13 +10,13 @@ from fourbar.linkage import MOVING_BARS, FourBar
 from fourbar.scene import Scene
 from validation.compare.answer import Engine
 from validation.compare.compare import TOUCHING_MARGIN, closing_margin
-from validation.compare.statements.finding import Finding, asked, wrapped
-from validation.compare.statements.ranges import beside
+from validation.compare.statements.finding import Finding, answered, wrapped
+from validation.compare.statements.ranges import step_beyond
 from validation.compare.tolerance import EPS, EQUIVALENCE, NOTHING_TO_TELL, lever
 
 
 def limit_positions(linkage: FourBar, engine: Engine) -> Iterator[Finding]:
-    """The limits of every moving bar; where all bars are collinear there is nothing to be told."""
+    """The limits of every moving bar; where all bars are collinear no side can be stated."""
     yield Finding(0.0, 0.0, linkage.ground_angle, "the same positions")
     yield from _of_input(linkage, engine)
     for bar in (3, 4):
@@ -30,7 +30,9 @@ def _of_input(linkage: FourBar, engine: Engine) -> Iterator[Finding]:
     # at the limit itself rounding decides whether the loop closes
     steps = [_inwards(linkage, limit.theta_2) for limit in limits]
     angles = [limit.theta_2 + step for limit, step in zip(limits, steps, strict=True)]
-    open_, crossed = (asked(engine, linkage, angles, [sign] * len(limits)) for sign in (1, -1)) if limits else ({}, {})
+    open_, crossed = (
+        (answered(engine, linkage, angles, [sign] * len(limits)) for sign in (1, -1)) if limits else ({}, {})
+    )
     for i, (limit, step) in enumerate(zip(limits, steps, strict=True)):
         yield Finding(float(limit.branch != 0), 0.0, limit.theta_2, "both branches meet at a limit of bar 2")
         digits = lever(linkage) * abs(math.sin(open_["theta_4"][i] - open_["theta_3"][i]))
@@ -49,7 +51,7 @@ def _of_input(linkage: FourBar, engine: Engine) -> Iterator[Finding]:
 
 def _inwards(linkage: FourBar, theta_2: float) -> float:
     """The little that bar 2 turns from its limit to where the loop closes, rad."""
-    step = beside(linkage, theta_2)
+    step = step_beyond(linkage, theta_2)
     ahead, behind = closing_margin(Scene(linkage), np.array([theta_2 + step, theta_2 - step]))
     return step if ahead > behind else -step
 
@@ -67,12 +69,12 @@ def _dead_centres(linkage: FourBar, bar: int, engine: Engine) -> Iterator[Findin
     limits = []
     for limit in mobility.limit_positions(linkage, bar):
         margin = abs(float(closing_margin(Scene(linkage), np.array([limit.theta_2]))[0]))
-        told = (1, -1) if margin > TOUCHING_MARGIN else (0, 1, -1)  # all bars collinear: rounding decides
-        yield Finding(float(limit.branch not in told), 0.0, limit.theta_2, f"branch of a limit of bar {bar}")
+        known = (1, -1) if margin > TOUCHING_MARGIN else (0, 1, -1)  # all bars collinear: rounding decides
+        yield Finding(float(limit.branch not in known), 0.0, limit.theta_2, f"branch of a limit of bar {bar}")
         limits += [limit] if margin > TOUCHING_MARGIN and limit.branch != 0 else []
     if not limits:
         return
-    seen = asked(engine, linkage, [limit.theta_2 for limit in limits], [limit.branch for limit in limits])
+    seen = answered(engine, linkage, [limit.theta_2 for limit in limits], [limit.branch for limit in limits])
     for i, limit in enumerate(limits):
         what = f"bar {bar} at theta_2 = {limit.theta_2!r}"
         theta_3, theta_4, omega_3, omega_4 = (float(seen[q][i]) for q in ("theta_3", "theta_4", "omega_3", "omega_4"))

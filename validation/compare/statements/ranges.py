@@ -20,8 +20,8 @@ from validation.compare.compare import TOUCHING_MARGIN, closing_margin
 from validation.compare.statements.finding import TURN, Finding, same
 from validation.compare.tolerance import EPS, EQUIVALENCE
 
-BESIDE = 4.0 * TOUCHING_MARGIN
-"""Of the sum of the lengths: by this much the loop closes, or misses, beside a limit where the engine is asked."""
+BEYOND = 4.0 * TOUCHING_MARGIN
+"""Of the sum of the lengths: by this much the loop closes, or misses, past a limit where the engine is tried."""
 
 LENGTHS_ROUNDED = (EPS / 4.0, EPS)
 """Of the perimeter: the lengths were rounded themselves, and between these two a change point may be stated or not."""
@@ -48,10 +48,10 @@ def _change_points(linkage: FourBar) -> Finding:
     return Finding(float(wrong + len(stated) - known), 0.0, linkage.ground_angle, "change points")
 
 
-def beside(linkage: FourBar, theta_2: float) -> float:
-    """The angle, rad, by which bar 2 turns until the loop closes, or misses, by BESIDE more."""
+def step_beyond(linkage: FourBar, theta_2: float) -> float:
+    """The angle, rad, by which bar 2 turns until the loop closes, or misses, by BEYOND more."""
     d, a, *_ = linkage.lengths
-    psi, little = theta_2 - linkage.ground_angle, BESIDE * sum(linkage.lengths)
+    psi, little = theta_2 - linkage.ground_angle, BEYOND * sum(linkage.lengths)
     e = max(abs(d - a * np.exp(1j * psi)), little)
     # e grows by d a sin(psi)/e to first order, by d a/(2 e) to second where the bar lies along the ground
     slope = max(d * a * abs(math.sin(psi)) / e, math.sqrt(0.5 * little * d * a / e))
@@ -64,24 +64,24 @@ def _of_bar(linkage: FourBar, bar: int, engine: Engine) -> Iterator[Finding]:
     shift = math.pi if bar == 4 else 0.0  # the loop runs along bar 4 from B to O4
     spans, full = mobility.intervals(linkage, bar), mobility.turns_fully(linkage, bar)
     expected = [((start + stop) / 2.0, True) for start, stop in spans]
-    # that the loop closes up to its limits is seen where the limit positions themselves are asked for
+    # that the loop closes up to its limits is seen where the limit positions themselves are examined
     for i, (start, stop) in enumerate(() if full else spans):
         before, after = (start - spans[i - 1][1]) % TURN, (spans[i + 1 - len(spans)][0] - stop) % TURN
-        expected.append((start - min(beside(first, start + shift), 0.5 * before), False))
-        expected.append((stop + min(beside(first, stop + shift), 0.5 * after), False))
-    along = [linkage.ground_angle + angle - shift for angle in (0.0, math.pi)]  # the ground, either way
+        expected.append((start - min(step_beyond(first, start + shift), 0.5 * before), False))
+        expected.append((stop + min(step_beyond(first, stop + shift), 0.5 * after), False))
+    along = [linkage.ground_angle + angle - shift for angle in (0.0, math.pi)]  # the ground, in both directions
     within = [any((angle - start) % TURN < stop - start for start, stop in spans) for angle in along]
     expected += zip(along, within, strict=True)
     if bar == 2:
         expected += [(angle, True) for angle in mobility.default_range(linkage)]
     angles = np.array([angle for angle, _ in expected])
-    told = np.abs(closing_margin(Scene(first), angles + shift)) > TOUCHING_MARGIN
+    decidable = np.abs(closing_margin(Scene(first), angles + shift)) > TOUCHING_MARGIN
     closes = engine.answer(Scene(first), Command(angles + shift, np.ones(len(angles), np.int8), None, 0.0)).assembled
     assert closes is not None
-    wrong = told & (closes != [inside for _, inside in expected])
+    wrong = decidable & (closes != [inside for _, inside in expected])
     where = float(angles[int(np.argmax(wrong))])
-    said = f"bar {bar} at {where!r} rad: the engine finds the opposite" if wrong.any() else "closes where stated"
-    yield Finding(float(np.count_nonzero(wrong)), 0.0, where, said)
+    what = f"bar {bar} at {where!r} rad: the engine finds the opposite" if wrong.any() else "closes where stated"
+    yield Finding(float(np.count_nonzero(wrong)), 0.0, where, what)
     limits = [limit[MOVING_BARS.index(bar)] for limit in mobility.limit_positions(linkage, bar)]
     yield same(f"limits of bar {bar}", limits, [] if full else [end for span in spans for end in span])
     yield same(f"swing of bar {bar}", [mobility.swing(linkage, bar)], [spans[0][1] - spans[0][0]])

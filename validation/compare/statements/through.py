@@ -7,21 +7,21 @@ import numpy as np
 from fourbar.formulas import mobility
 from fourbar.linkage import FourBar
 from validation.compare.answer import Engine
-from validation.compare.statements.finding import Finding, asked
+from validation.compare.statements.finding import Finding, answered
 
 PAST = 1e-3
-"""rad. This far on either side of a change point the speeds of the two motions are told apart."""
+"""rad. This far on either side of a change point the speeds of the two motions differ visibly."""
 FAR = 0.1
 """rad. As far as a sweep goes on."""
 
 
 def through(linkage: FourBar, engine: Engine) -> Iterator[Finding]:
-    """Every change point, both ways and from both branches, with a position on the point itself and without."""
+    """Every change point, in both senses and from both branches, with a position on the point itself and without."""
     for point in mobility.change_points(linkage):
-        for way in (1.0, -1.0):
+        for sense in (1.0, -1.0):
             for start in (1, -1):
-                angles = point + way * np.array([-FAR, -PAST, PAST, FAR])
-                seen = asked(engine, linkage, [angles[1], angles[2], angles[2]], [start, 1, -1])
+                angles = point + sense * np.array([-FAR, -PAST, PAST, FAR])
+                seen = answered(engine, linkage, [angles[1], angles[2], angles[2]], [start, 1, -1])
                 rates = np.stack((seen["omega_3"], seen["omega_4"]))
                 goes_on = (1, -1)[int(np.argmin(np.abs(rates[:, 1:] - rates[:, :1]).max(axis=0)))]
                 expected = [start, start, goes_on, goes_on]

@@ -13,7 +13,7 @@ from fourbar.linkage import MOVING_BARS, FourBar
 from fourbar.scene import Scene
 from validation.compare.answer import Answer, Engine
 from validation.compare.compare import turned
-from validation.compare.statements.finding import TURN, Finding, asked, wrapped
+from validation.compare.statements.finding import TURN, Finding, answered, wrapped
 from validation.compare.tolerance import EPS, EQUIVALENCE, NOTHING_TO_TELL, Array, lever
 
 RADII = (0.2, 0.3)
@@ -95,7 +95,7 @@ def _extremes(linkage: FourBar, engine: Engine, stated: transmission.Transmissio
             error = min((float(np.abs(wrapped(np.array(theta_2 - point)))) for point in singular), default=math.inf)
             yield Finding(error, EQUIVALENCE.factor * turned(np.array([theta_2])), theta_2, "extreme at a limit")
             continue
-        seen = asked(engine, linkage, [theta_2], [1])
+        seen = answered(engine, linkage, [theta_2], [1])
         angle = abs(float(wrapped(seen["theta_4"] - seen["theta_3"])[0]))
         digits = lever(linkage) * math.sin(angle)
         if not digits * NOTHING_TO_TELL <= EPS:
@@ -105,15 +105,15 @@ def _extremes(linkage: FourBar, engine: Engine, stated: transmission.Transmissio
 
 
 def _strokes(linkage: FourBar, engine: Engine) -> Iterator[Finding]:
-    """Bar 4 goes one way between its two limits on a branch, and the other way for the rest of the turn."""
+    """Bar 4 turns in one sense between its two limits on a branch, and in the other for the rest of the turn."""
     stated = mobility.time_ratio(linkage)
     dead = [limit.theta_2 for limit in mobility.limit_positions(linkage, 4) if limit.branch == -1]
     strokes = len(dead) == 2 and mobility.turns_fully(linkage) and not mobility.change_points(linkage)
     yield Finding(float(strokes != (stated is not None)), 0.0, linkage.ground_angle, "whether there is a time ratio")
     if strokes and stated is not None:
         there = (dead[1] - dead[0]) % TURN
-        rates = asked(engine, linkage, [dead[0] + there / 2.0, dead[1] + (TURN - there) / 2.0], [-1, -1])["omega_4"]
-        yield Finding(float(not rates[0] * rates[1] < 0.0), 0.0, dead[0], "bar 4 goes both ways")
+        rates = answered(engine, linkage, [dead[0] + there / 2.0, dead[1] + (TURN - there) / 2.0], [-1, -1])["omega_4"]
+        yield Finding(float(not rates[0] * rates[1] < 0.0), 0.0, dead[0], "bar 4 turns in both senses")
         ratio = max(there, TURN - there) / min(there, TURN - there)
         # both angles are differences of two that were rounded
         allowed = EQUIVALENCE.factor * TURN / min(there, TURN - there)

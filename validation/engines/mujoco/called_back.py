@@ -1,4 +1,4 @@
-"""What MJCF cannot say, told to MuJoCo at each stage of each step: loads over theta_2, the acceleration of a law.
+"""What MJCF cannot express, supplied to MuJoCo at each stage of a step: loads over theta_2, the acceleration of a law.
 
 Both come from the description alone, at MuJoCo's own angle and time; nothing of the formulas is passed.
 """
@@ -20,7 +20,7 @@ from validation.engines.mujoco.closed_loop import O2, ClosedLoop
 
 OVERRUN = 1e-7
 """rad; by so little a simulated crank may turn too far, 1e-9 in healthy runs, and 1e-5 is what it is judged by."""
-Told = Callable[[mujoco.MjModel, mujoco.MjData], float]
+ActuatorForce = Callable[[mujoco.MjModel, mujoco.MjData], float]
 """The force of an actuator, in units of its gear."""
 
 
@@ -38,10 +38,10 @@ def _peak(load: Load) -> float:
     return 1.0 if load.table is None else max(map(abs, load.table.factor)) or 1.0
 
 
-def of_loads(scene: Scene) -> dict[str, Told]:
+def of_loads(scene: Scene) -> dict[str, ActuatorForce]:
     """For each load over theta_2, by the actuator's name, its factor at MuJoCo's own theta_2, by the largest."""
 
-    def told(load: Load) -> Told:
+    def force_of(load: Load) -> ActuatorForce:
         table, peak = load.table, _peak(load)
         assert table is not None
         first, last = table.theta_2[0], table.theta_2[-1]
@@ -54,7 +54,7 @@ def of_loads(scene: Scene) -> dict[str, Told]:
 
         return factor
 
-    return {f"load_{index}": told(load) for index, load in enumerate(scene.loads, 1) if load.table is not None}
+    return {f"load_{index}": force_of(load) for index, load in enumerate(scene.loads, 1) if load.table is not None}
 
 
 def within(scene: Scene, theta_2: Array) -> Array:
@@ -73,22 +73,22 @@ def within(scene: Scene, theta_2: Array) -> Array:
     return inside
 
 
-def listening(loop: ClosedLoop, told: dict[str, Told]) -> ClosedLoop:
-    """A loop whose actuators of these names take their force from `telling`."""
+def receiving(loop: ClosedLoop, supplied: dict[str, ActuatorForce]) -> ClosedLoop:
+    """A loop whose actuators of these names take their force from `supplying`."""
     for number in range(loop.model.nu):
-        if loop.model.actuator(number).name in told:
+        if loop.model.actuator(number).name in supplied:
             loop.model.actuator_biastype[number] = mujoco.mjtBias.mjBIAS_USER
     return loop
 
 
 @contextmanager
-def telling(told: dict[str, Told]) -> Iterator[None]:
-    """MuJoCo asks for these forces as long as this lasts; its callbacks are of the whole process."""
-    if not told:
+def supplying(supplied: dict[str, ActuatorForce]) -> Iterator[None]:
+    """MuJoCo takes these forces as long as this lasts; its callbacks are of the whole process."""
+    if not supplied:
         yield
         return
     before = mujoco.get_mjcb_act_bias()
-    mujoco.set_mjcb_act_bias(lambda m, d, number: told[m.actuator(number).name](m, d))
+    mujoco.set_mjcb_act_bias(lambda m, d, number: supplied[m.actuator(number).name](m, d))
     try:
         yield
     finally:

@@ -103,7 +103,7 @@ class ClosedLoop:
         return np.asarray((axes @ gear)[:2] * self.data.actuator_force[actuator])
 
     def crank_torque(self) -> float:
-        """T2: what the flywheel gives the crank, and the motor beside it, N m."""
+        """T2: what the flywheel gives the crank, and the motor next to it, N m."""
         flywheel = -self.model.dof_armature[O2] * self.data.qacc[O2]
         motor = 0.0 if self.drive is None else self.data.actuator_force[self.drive]
         return float(flywheel + motor)
@@ -128,7 +128,7 @@ def couple_elsewhere(
     ----------
     loop : at the simulated state.
     light : the same linkage with a light flywheel.
-    alpha_2 : what the flywheel's motor was told, rad/s^2.
+    alpha_2 : what the flywheel's motor was given, rad/s^2.
     crank_torque : T2 at that state, N m: the size of the trials.
     """
     d = light.data

@@ -156,8 +156,8 @@ def _options(model: mujoco.MjModel) -> Described:
         bits = getattr(option, "disableflags" if state == "off" else "enableflags")
         names = [name for name in flags.__members__ if name.startswith(prefix)]
         named = [name.removeprefix(prefix) for name in names if bits & int(flags.__members__[name])]
-        told = [name.lower() for name in named if name not in FLAGS]
-        found[f"option.switched {state}"] = ", ".join(told) or "nothing that matters here"
+        names = [name.lower() for name in named if name not in FLAGS]
+        found[f"option.switched {state}"] = ", ".join(names) or "nothing that matters here"
     groups = [str(group) for group in range(31) if option.disableactuator >> group & 1]
     found["option.actuatorgroupdisable"] = " ".join(groups) or "none"
     possible = _on(model, "CONTACT") and (model.npair or (model.geom_contype.any() and model.geom_conaffinity.any()))

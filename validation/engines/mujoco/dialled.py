@@ -1,4 +1,4 @@
-"""MuJoCo's settings for an asked error, from the laws that the study of cost measured.
+"""MuJoCo's settings for a wanted error, from the laws that the study of cost measured.
 
 the closure's time constant    error = STIFF (h/tc)^4, whatever the timestep        -> tc in steps
 the timestep                   error ~ h^ORDER until a floor                         -> steps

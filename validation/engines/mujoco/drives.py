@@ -1,4 +1,4 @@
-"""Other ways to soften the closure and to drive the crank than the generated MJCF's, for the study of their cost.
+"""Other means to soften the closure and to drive the crank than the generated MJCF's, for the study of their cost.
 
 Each builds a loop from the generated text; the flywheel of the text is taken out where another
 drive takes its place, and the torque is read where that drive exerts it.
@@ -99,7 +99,7 @@ class Servo(Driven):
 
 
 class WheelEquality(Driven):
-    """A joint equality to a kinematic wheel: a second, heavy body that turns at omega beside the linkage."""
+    """A joint equality to a kinematic wheel: a second, heavy body that turns at omega next to the linkage."""
 
     softness = 1.0
     """Factor on dof_invweight0: how soft the equality is, edited after compile; 1: plain MJCF."""

@@ -162,7 +162,7 @@ FLAGS = {
     **dict.fromkeys(("CONTACT", "FILTERPARENT", "MIDPHASE", "NATIVECCD", "MULTICCD", "OVERRIDE"), "counts in contacts"),
     **dict.fromkeys(("IPC", "SPECULATIVE"), "counts in contacts"),
     **dict.fromkeys(("SENSOR", "ENERGY"), "is read, and moves nothing"),
-    **dict.fromkeys(("FWDINV", "INVDISCRETE"), "of inverse dynamics, which is not asked for"),
+    **dict.fromkeys(("FWDINV", "INVDISCRETE"), "of inverse dynamics, which plays no part"),
     "CLAMPCTRL": "no control is given",
     "ISLAND": "the same equations in parts, up to round-off",
 }

@@ -74,7 +74,7 @@ def too_fast_or_loaded(scene: Scene, speed: float) -> str | None:
 
 
 def least_sine(linkage: FourBar, theta_2: NDArray[np.float64], assembled: NDArray[np.bool_]) -> float:
-    """The least |sin(theta_4 - theta_3)| on the way from one assembled position to the next, by the cosine rule."""
+    """The least |sin(theta_4 - theta_3)| between one assembled position and the next, by the cosine rule."""
     d, a, b, c = linkage.lengths
     psi = np.sort(theta_2[assembled] - linkage.ground_angle)
     if not len(psi):
@@ -83,5 +83,5 @@ def least_sine(linkage: FourBar, theta_2: NDArray[np.float64], assembled: NDArra
     squared = d * d + a * a - 2.0 * d * a * np.cos(np.concatenate((psi, turns)))
     cosine = (b * b + c * c - squared) / (2.0 * b * c)
     sine = np.sqrt(np.clip(1.0 - cosine**2, 0.0, None))
-    between = np.abs(cosine[len(psi) :]) <= 1.0  # a turn at which the loop is open splits the way
+    between = np.abs(cosine[len(psi) :]) <= 1.0  # a turn at which the loop is open splits the motion
     return float(np.concatenate((sine[: len(psi)], sine[len(psi) :][between])).min())

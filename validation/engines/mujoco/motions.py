@@ -35,7 +35,7 @@ class Passage(Protocol):
         """|omega_2| that is due after a turn (rad) and a time."""
 
     def alpha(self, seconds: float) -> float:
-        """What the drive is told, rad/s^2."""
+        """What the drive is given, rad/s^2."""
 
 
 class Steady:
@@ -61,7 +61,7 @@ class Steady:
         return math.sqrt(max(self.run.omega**2 + 2.0 * self.run.alpha * turned, 0.0))
 
     def alpha(self, seconds: float) -> float:
-        """The same all the way."""
+        """The same throughout."""
         return self.run.alpha
 
 

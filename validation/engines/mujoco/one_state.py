@@ -1,4 +1,4 @@
-"""MuJoCo's forward dynamics at one state: the torque with which the closed loop accelerates as it is told.
+"""MuJoCo's forward dynamics at one state: the torque with which the closed loop accelerates as commanded.
 
 At an exactly closed state the only error is the closure's softness, in proportion to (1-d)/d with
 d the impedance: the values at several d, extrapolated to (1-d)/d = 0, are free of it.

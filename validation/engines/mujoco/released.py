@@ -12,6 +12,7 @@ from fourbar.scene import Scene, command
 from validation.compare.answer import Array, Released
 from validation.engines.loop import LimitWatch
 from validation.engines.mujoco.closed_loop import O2, O4, A, ClosedLoop
+from validation.engines.mujoco.runner import Stepper
 
 NAME = "mujoco-forward"
 TIME_CONSTANT_STEPS = 2.0
@@ -43,14 +44,10 @@ class MujocoForward:
             return Released.refused(NAME, setting, "the loop does not close at the start")
         loop.model.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_ENERGY
         loop.set_state(q_0, scene.motion.omega_2 or 0.0)
-        rows, done, watch = [], 0, LimitWatch(int(start.branch[0]))
+        rows, q, watch = [], loop.data.qpos, LimitWatch(int(start.branch[0]))
+        stepper = Stepper(loop.model, loop.data, timestep)
         for t in times:
-            wanted = round(float(t) / timestep)
-            while done < wanted:
-                mujoco.mj_step(loop.model, loop.data)
-                done += 1
-                q = loop.data.qpos
-                watch.look(done * timestep, q[O2] + q[A], q[O4])
+            stepper.to(float(t), lambda time: watch.look(time, q[O2] + q[A], q[O4]))
             mujoco.mj_forward(loop.model, loop.data)
             rows.append((loop.data.qpos[O2], loop.data.qvel[O2], loop.data.energy.sum()))
         theta_2, omega, energy = np.array(rows).T

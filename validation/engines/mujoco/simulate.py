@@ -4,8 +4,8 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 
-import mujoco
 import numpy as np
 
 from fourbar.errors import InputError, LimitError
@@ -16,10 +16,11 @@ from fourbar.scene import Command, Scene
 from fourbar.scene.motion import Motion
 from validation.compare.answer import Answer
 from validation.engines.loop import Position
-from validation.engines.mujoco.called_back import Told, at_full_size, listening, of_loads, telling, within
-from validation.engines.mujoco.closed_loop import O2, O4, A, ClosedLoop, couple_elsewhere
+from validation.engines.mujoco.called_back import ActuatorForce, at_full_size, of_loads, receiving, supplying, within
+from validation.engines.mujoco.closed_loop import O2, O4, A, ClosedLoop
 from validation.engines.mujoco.limits import NEAREST_TOGGLE, least_sine, too_fast_or_loaded
 from validation.engines.mujoco.motions import Lawful, Passage, Steady, extremes, order_in_time
+from validation.engines.mujoco.runner import LIGHT_FLYWHEEL, Run, assembled, stretches
 from validation.engines.mujoco.watch import Watch, alarms
 
 SHARED = (
@@ -27,16 +28,11 @@ SHARED = (
     "motion law, and the branch"
 )
 OWN = "assembly, velocities at the start, the motion through time, accelerations, drive torque, pin forces"
-LIGHT_FLYWHEEL = 1e4
-"""Flywheel of the model that is asked for T3 or T4: heavy enough to keep the closure's softness
-small, light enough that the torque it needs does not drown in its rounding."""
 FINE = np.radians(2.0)
-"""Between positions further apart than this it is looked whether the loop closes on the way."""
+"""Between positions further apart than this the loop is tried for closure."""
 COLLINEAR = 1e-9
 """Part of the sum of the lengths, and of half a turn: below what the time step itself can resolve."""
 FIELDS = tuple(name for name in UNKNOWNS if name not in PIN_FORCES)
-Found = tuple[float, float, float] | None
-"""Own joint angles (O2, A, O4), None where the loop does not close."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,7 +106,7 @@ class _Simulation:
         self.settings, self.command, self.law = settings, command, scene.motion.law
         # the text is that of the command, which a caller may have given instead of the scene's own
         self.scene = as_run(scene, command)
-        self.told = of_loads(scene)
+        self.supplied = of_loads(scene)
         n = len(command.theta_2)
         self.order = order_in_time(command, self.scene.motion.omega_2 or 0.0, self.law)
         self.theta_2 = command.theta_2.copy()
@@ -128,26 +124,26 @@ class _Simulation:
         }
         self.steps_per_revolution = 0.0
         self.predicted = {name: np.zeros(n) for name in (*FIELDS, *PIN_FORCES)}
-        self.turns = 0.0
-        """Whole turns by which MuJoCo's theta_2 is ahead: springs at pins count them, rad."""
 
     def answer(self) -> Answer:
         """The answer over all positions."""
         position = ClosedLoop(self._text(1e-3)).position()  # kinematics alone: the timestep plays no part
-        found = self._assemble(position)
+        found = assembled(position, self.command, self.order)
         least = least_sine(self.scene.linkage, self.command.theta_2, np.array([q is not None for q in found]))
         if self.bounded and least < NEAREST_TOGGLE.boundary:
             raise LimitError(f"|sin(theta_4 - theta_3)| falls to {least:.1e}; {NEAREST_TOGGLE.reason}")
-        for stretch in self._stretches(position, found):
-            self._run(stretch, found)
+        for stretch in stretches(found, self.order, partial(self._closes_between, position)):
+            start = found[stretch[0]]
+            assert start is not None
+            self._run(stretch, start)
         at = Command(within(self.scene, self.theta_2), self.branch, self.omega_2, self.alpha_2)
         setting = f"{self.settings.integrator} {self.steps_per_revolution:.0f}/rev"
-        assembled = np.array([angles is not None for angles in found])
+        closes = np.array([angles is not None for angles in found])
         return Answer(
             "mujoco-simulated",
             setting,
             at,
-            assembled,
+            closes,
             self.values,
             predicted=self.predicted,
             alarms=alarms(self.evidence, sum(self.scene.linkage.lengths)),
@@ -161,9 +157,9 @@ class _Simulation:
         motion = self.scene.motion
         return Steady(self.command, stretch, motion.omega_2 or 0.0, motion.alpha_2)
 
-    def _loop(self, timestep: float, told: dict[str, Told], flywheel: float | None = None) -> ClosedLoop:
-        """A compiled model that takes from `telling` what its text cannot say."""
-        return listening(ClosedLoop(self._text(timestep, flywheel)), told)
+    def _loop(self, timestep: float, supplied: dict[str, ActuatorForce], flywheel: float | None = None) -> ClosedLoop:
+        """A compiled model that takes from `supplying` what its text cannot say."""
+        return receiving(ClosedLoop(self._text(timestep, flywheel)), supplied)
 
     def _text(self, timestep: float, flywheel: float | None = None) -> str:
         """The generated MJCF without its keyframe."""
@@ -171,25 +167,8 @@ class _Simulation:
         settings = replace(self.settings, timestep=timestep, timestep_scale=1.0, flywheel=heavy)
         return mjcf(at_full_size(self.scene), settings, keyframe=False)
 
-    def _assemble(self, position: Position) -> list[Found]:
-        """Own joint angles of every commanded position."""
-        found: list[Found] = [None] * len(self.order)
-        for index in self.order:
-            found[index] = position.find(float(self.command.theta_2[index]), int(self.command.branch[index]))
-        return found
-
-    def _stretches(self, position: Position, found: list[Found]) -> list[list[int]]:
-        """Positions in order of time, split where the loop does not close between them."""
-        stretches: list[list[int]] = [[]]
-        for index in self.order:
-            if found[index] is None or (stretches[-1] and not self._closes_between(position, stretches[-1][-1], index)):
-                stretches.append([])
-            if found[index] is not None:
-                stretches[-1].append(int(index))
-        return [stretch for stretch in stretches if stretch]
-
     def _closes_between(self, position: Position, one: int, other: int) -> bool:
-        """Whether the loop closes all the way between two positions."""
+        """Whether the loop closes everywhere between two positions."""
         start, stop = float(self.command.theta_2[one]), float(self.command.theta_2[other])
         pieces = int(np.ceil(abs(stop - start) / FINE))
         branch = int(self.command.branch[one])
@@ -197,98 +176,64 @@ class _Simulation:
             position.find(float(theta_2), branch) is not None for theta_2 in np.linspace(start, stop, pieces + 1)[1:-1]
         )
 
-    def _run(self, stretch: list[int], found: list[Found]) -> None:
+    def _run(self, stretch: list[int], start: tuple[float, float, float]) -> None:
         """Step through one stretch and read at the step nearest to each position."""
-        run = self._passage(stretch)
-        timestep = run.timestep(self.settings)
+        passage = self._passage(stretch)
+        timestep = passage.timestep(self.settings)
         if len(stretch) > 1:
-            turn = 2.0 * np.pi / run.fastest
+            turn = 2.0 * np.pi / passage.fastest
             self.steps_per_revolution = max(self.steps_per_revolution, turn / timestep)
-        told = self.told
+        supplied = self.supplied
         if self.law is not None:
-            told = {**told, "drive": lambda m, d: m.dof_armature[O2] * run.alpha(d.time)}
-        with telling(told):
-            self._run_told(stretch, found, run, timestep, told)
-
-    def _run_told(
-        self, stretch: list[int], found: list[Found], run: Passage, timestep: float, told: dict[str, Told]
-    ) -> None:
-        """The same with everything that acts in place."""
-        loop = self._loop(timestep, told)
-        light = None if self.scene.drive_bar == 2 else self._loop(timestep, told, LIGHT_FLYWHEEL)
-        start = found[stretch[0]]
-        assert start is not None
-        wound = unwound(self.scene, start)
-        self.turns = wound[O2] - start[O2]
-        watch = Watch(self._loop(timestep, told), self.scene.drive_bar)
-        loop.set_state(wound, run.omega)
-        begins = float(self.command.theta_2[stretch[0]])
-        done = 0
-        for index in stretch:
-            step = round(run.seconds(index) / timestep)
-            if step > done:
-                mujoco.mj_step(loop.model, loop.data, step - done)
-                done = step
-            self._read(loop, light, watch, index, run, done * timestep, begins)
-        self.evidence["steps"] += done
+            supplied = {**supplied, "drive": lambda m, d: m.dof_armature[O2] * passage.alpha(d.time)}
+        with supplying(supplied):
+            loop = self._loop(timestep, supplied)
+            light = None if self.scene.drive_bar == 2 else self._loop(timestep, supplied, LIGHT_FLYWHEEL)
+            watch = Watch(self._loop(timestep, supplied), self.scene.drive_bar)
+            run = Run(self.scene, loop, light, passage, start, timestep)
+            begins = float(self.command.theta_2[stretch[0]])
+            for index in stretch:
+                run.to(index)
+                self._read(run, watch, index, begins)
+        self.evidence["steps"] += run.stepper.done
         for name, value in watch.evidence().items():
             self.evidence[name] = float(np.fmax(self.evidence.get(name, 0.0), value))
 
-    def _read(
-        self,
-        loop: ClosedLoop,
-        light: ClosedLoop | None,
-        watch: Watch,
-        index: int,
-        run: Passage,
-        expected_time: float,
-        begins: float,
-    ) -> None:
+    def _read(self, run: Run, watch: Watch, index: int, begins: float) -> None:
         """Everything of one sample, and what the engine says of itself there."""
+        loop, d, turns = run.loop, run.loop.data, run.turns
         loop.forward()
-        d = loop.data
-        self._watch(loop, run, expected_time, begins)
+        self._watch(run, begins)
         q = (float(d.qpos[O2]), float(d.qpos[A]), float(d.qpos[O4]))
         if unwound(self.scene, q) != q:
             raise LimitError("a torsion spring is wound by more than half a turn from its rest")
-        self.theta_2[index], self.omega_2[index] = d.qpos[O2] - self.turns, d.qvel[O2]
+        self.theta_2[index], self.omega_2[index] = d.qpos[O2] - turns, d.qvel[O2]
         self.branch[index] = loop.branch()
         self.alpha_2[index] = d.qacc[O2]
-        torque, forces = loop.crank_torque(), loop.forces
-        if light is not None:
-            torque, forces = self._drive_elsewhere(loop, light, torque, run.alpha(expected_time)), light.forces
+        torque, pins = run.read()
+        if torque is None:
+            raise LimitError(f"the couple on bar {self.scene.drive_bar} does not move the input: a pole of the torque")
         numbers = (
-            *(d.qpos[O2] + d.qpos[A] - self.turns, d.qpos[O4]),
+            *(d.qpos[O2] + d.qpos[A] - turns, d.qpos[O4]),
             *(d.qvel[O2] + d.qvel[A], d.qvel[O4]),
             *(d.qacc[O2] + d.qacc[A], d.qacc[O4]),
             torque,
         )
-        for name, number in zip(FIELDS, numbers, strict=True):
-            self.values[name][index] = number
-        pins = forces()
-        for name, force in pins.items():
-            self.values[name][index] = force
+        for name, value in (*zip(FIELDS, numbers, strict=True), *pins.items()):
+            self.values[name][index] = value
         for name, error in watch.look(loop, torque, pins["F43"]).items():
             self.predicted[name][index] = error
 
-    def _drive_elsewhere(self, loop: ClosedLoop, light: ClosedLoop, crank_torque: float, alpha: float) -> float:
-        """The couple on bar 3 or 4, or LimitError at a pole of the torque."""
-        couple = couple_elsewhere(loop, light, self.scene.drive_bar, alpha, crank_torque)
-        if couple is None:
-            raise LimitError(f"the couple on bar {self.scene.drive_bar} does not move the input: a pole of the torque")
-        return couple
-
-    def _watch(self, loop: ClosedLoop, run: Passage, expected_time: float, begins: float) -> None:
+    def _watch(self, run: Run, begins: float) -> None:
         """Keep the worst of what the engine says of itself."""
-        d, seen = loop.data, self.evidence
-        speed = run.speed(float(d.qpos[O2]) - self.turns - begins, expected_time)
+        loop, d, seen = run.loop, run.loop.data, self.evidence
+        speed = run.passage.speed(float(d.qpos[O2]) - run.turns - begins, run.stepper.time)
         worst = {
             "closure_gap_m": float(np.hypot(*loop.gap())),
-            "speed_error": float(abs(abs(d.qvel[O2]) - speed) / run.fastest),
+            "speed_error": float(abs(abs(d.qvel[O2]) - speed) / run.passage.fastest),
             "solver_iterations": float(d.solver_niter.max()),
             "bad_states": float(loop.bad()),
-            # a reset starts time again
-            "time_went_back": float(d.time < expected_time * (1.0 - 1e-6)),
+            "time_went_back": float(run.stepper.lost()),
         }
         for name, value in worst.items():
             seen[name] = float(np.fmax(seen[name], value))

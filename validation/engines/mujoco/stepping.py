@@ -7,7 +7,7 @@ import numpy as np
 
 
 def steps(text: str) -> Callable[[int], None]:
-    """A function that steps the model on from its first keyframe, as often as asked."""
+    """A function that steps the model on from its first keyframe, as often as wanted."""
     model = mujoco.MjModel.from_xml_string(text)
     data = mujoco.MjData(model)
     mujoco.mj_resetDataKeyframe(model, data, 0)

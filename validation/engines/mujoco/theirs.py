@@ -1,4 +1,4 @@
-"""Somebody's own MJCF of a linkage, asked for the torque and the pin forces of a scene.
+"""Somebody's own MJCF of a linkage, and its torque and pin forces on a scene.
 
 At one state: its own assembly and speeds, then the couple on the driven bar with which its crank
 accelerates as commanded; the accelerations are linear in that couple, so a few `mj_forward` find it.
@@ -26,10 +26,12 @@ from validation.engines.mujoco.anatomy import Anatomy
 from validation.engines.mujoco.attached import Described
 from validation.engines.mujoco.closed_loop import WARNINGS
 from validation.engines.mujoco.describe import called, described
+from validation.engines.mujoco.motions import order_in_time
+from validation.engines.mujoco.runner import Stepper, assembled, stretches
 
 ONE_STATE, THROUGH_TIME = "mjcf-one-state", "mjcf-simulated"
 POSITIONS = 37
-"""Positions asked of a sweep: a file is judged as a whole, not position by position."""
+"""Positions taken of a sweep: a file is judged as a whole, not position by position."""
 MOST_STEPS = 400_000
 """A revolution at 628 steps per turn is a thousandth of this; more would be minutes."""
 REFINEMENTS = 3
@@ -260,7 +262,8 @@ def through_time(loop: Loop, at: Command) -> Answer:
         raise LimitError("pin O2 is not a hinge in this file: nothing can keep its crank at a speed")
     assert isinstance(at.omega_2, float) and isinstance(at.alpha_2, float)
     position = Position(loop)  # type: ignore[arg-type]
-    stretch = _longest_stretch(position, at)
+    order = order_in_time(at, at.omega_2, None)
+    stretch = max(stretches(assembled(position, at, order), order), key=len, default=[])
     if len(stretch) < 2:
         raise LimitError("nowhere do two neighbouring positions assemble in this file")
     run = run_through(at.theta_2[stretch], at.omega_2, at.alpha_2)
@@ -273,17 +276,15 @@ def through_time(loop: Loop, at: Command) -> Answer:
     position.find(float(at.theta_2[stretch[0]]), int(at.branch[stretch[0]]))
     data.qpos[:], data.qvel[:] = loop.data.qpos, loop.speeds(at.omega_2)
     heavy = max(loop.armature, flywheel(loop.scene))
-    out, seen, done = _empty(len(stretch)), {"closure_gap_m": 0.0, "speed_error": 0.0}, 0
+    out, seen = _empty(len(stretch)), {"closure_gap_m": 0.0, "speed_error": 0.0}
     alarms: list[str] = []
+    stepper = Stepper(model, data, timestep)
     for i, index in enumerate(stretch):
-        step = round(run.time(float(at.theta_2[index])) / timestep)
         model.dof_armature[loop.crank] = heavy
         data.qfrc_applied[loop.crank] = heavy * sense * at.alpha_2
-        if step > done:
-            mujoco.mj_step(model, data, step - done)
-            done = step
+        stepper.to(run.time(float(at.theta_2[index])))
         mujoco.mj_forward(model, data)
-        if data.time < (done - 0.5) * timestep or any(data.warning[kind].number for kind in WARNINGS):
+        if stepper.lost() or any(data.warning[kind].number for kind in WARNINGS):
             alarms.append("the simulation of this file blew up")
             break
         alpha_2 = float((loop.from_joints @ data.qacc)[0])
@@ -299,19 +300,6 @@ def through_time(loop: Loop, at: Command) -> Answer:
     where = Command(out["theta_2"], at.branch[stretch][known], out["omega_2"], out["alpha_2"])
     setting = f"{mujoco.mjtIntegrator(model.opt.integrator).name.removeprefix('mjINT_')} {timestep:g} s"
     return Answer(THROUGH_TIME, setting, where, np.ones(known.sum(), dtype=bool), out, evidence=seen, alarms=alarms)
-
-
-def _longest_stretch(position: Position, at: Command) -> list[int]:
-    """Neighbouring positions that assemble, in order of time."""
-    assert isinstance(at.omega_2, float)
-    order = np.argsort(at.theta_2 if at.omega_2 > 0.0 else -at.theta_2, kind="stable").tolist()
-    stretches: list[list[int]] = [[]]
-    for index in order:
-        if position.find(float(at.theta_2[index]), int(at.branch[index])) is None:
-            stretches.append([])
-        else:
-            stretches[-1].append(index)
-    return max(stretches, key=len)
 
 
 def _empty(n: int) -> dict[str, Array]:

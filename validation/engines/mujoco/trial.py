@@ -1,7 +1,7 @@
 """One scene run through in time with any settings of MuJoCo: what accuracy costs, tried out.
 
 The scene is assembled once by the engine itself; each trial compiles the generated MJCF anew, with
-the drive it is asked to try, and reports its own motion, torque, pin forces and CPU seconds.
+the drive to be tried, and reports its own motion, torque, pin forces and CPU seconds.
 """
 
 import time
@@ -13,16 +13,14 @@ import mujoco
 import numpy as np
 
 from fourbar.errors import LimitError
-from fourbar.mjcf import Settings, mjcf, run_through
-from fourbar.mjcf.effects import unwound
+from fourbar.mjcf import Settings, mjcf
 from fourbar.quantities import PIN_FORCES
 from fourbar.scene import Command, Scene
 from validation.compare.answer import Array
-from validation.engines.mujoco.closed_loop import O2, ClosedLoop, couple_elsewhere
+from validation.engines.mujoco.closed_loop import O2, ClosedLoop
+from validation.engines.mujoco.motions import Steady, order_in_time
+from validation.engines.mujoco.runner import LIGHT_FLYWHEEL, Run, assembled, stretches
 
-LIGHT_FLYWHEEL = 1e4
-"""Flywheel of the model that is asked for T3 or T4: heavy enough to keep the closure's softness
-small, light enough that the torque it needs does not drown in its rounding."""
 Build = Callable[[str, float], ClosedLoop]
 """From the MJCF text and the speed to keep (rad/s) to the loop that is stepped."""
 
@@ -54,7 +52,7 @@ class Trial:
     reading: float
     """CPU seconds in reading the samples."""
     broken: str = ""
-    """What MuJoCo said of itself, where it lost the motion."""
+    """What MuJoCo reported of itself, where it lost the motion."""
 
 
 class Rig:
@@ -69,19 +67,11 @@ class Rig:
         self.omega, self.alpha = float(np.max(command.omega_2)), float(np.max(command.alpha_2))  # type: ignore[arg-type]
         motion = replace(scene.motion, theta_2=command.theta_2, omega_2=self.omega, alpha_2=self.alpha)
         self.scene, self.command = replace(scene, motion=motion), command
-        order = np.argsort(command.theta_2 if self.omega > 0.0 else -command.theta_2, kind="stable")
+        order = order_in_time(command, self.omega, None)
         position = ClosedLoop(mjcf(self.scene, Settings(timestep=1e-3), keyframe=False)).position()
-        self.stretches: list[list[int]] = [[]]
-        self.start: dict[int, tuple[float, float, float]] = {}
-        for index in order:
-            found = position.find(float(command.theta_2[index]), int(command.branch[index]))
-            if found is None:
-                self.stretches.append([])
-                continue
-            if not self.stretches[-1]:
-                self.start[int(index)] = found
-            self.stretches[-1].append(int(index))
-        self.stretches = [stretch for stretch in self.stretches if len(stretch) > 1]
+        found = assembled(position, command, order)
+        self.stretches = [stretch for stretch in stretches(found, order) if len(stretch) > 1]
+        self.start = {index: angles for index, angles in enumerate(found) if angles is not None}
         if not self.stretches:
             raise LimitError("the loop closes at no two neighbouring positions: nothing to run through in time")
 
@@ -89,15 +79,15 @@ class Rig:
         """The generated MJCF, without its keyframe."""
         return mjcf(self.scene, replace(settings, timestep=timestep, timestep_scale=1.0), keyframe=False)
 
-    def timestep(self, settings: Settings, stretch: list[int]) -> float:
-        """A whole number of steps over the stretch."""
-        return run_through(self.command.theta_2[stretch], self.omega, self.alpha).timestep(settings)
+    def passage(self, stretch: list[int]) -> Steady:
+        """How the input moves through a stretch."""
+        return Steady(self.command, stretch, self.omega, self.alpha)
 
     def steps(self, settings: Settings) -> int:
         """Steps of one run, without making it."""
         total = 0
         for stretch in self.stretches:
-            run = run_through(self.command.theta_2[stretch], self.omega, self.alpha)
+            run = self.passage(stretch).run  # a whole number of steps over the stretch
             total += round(run.time(run.stop) / run.timestep(settings))
         return total
 
@@ -129,49 +119,37 @@ class Rig:
         forces: dict[str, Array],
         trial: Trial,
     ) -> None:
-        run = run_through(self.command.theta_2[stretch], self.omega, self.alpha)
-        timestep = self.timestep(settings, stretch)
+        passage = self.passage(stretch)
+        timestep = passage.run.timestep(settings)
         loop = build(self.text(settings, timestep), self.omega)
         light = None
         if self.scene.drive_bar != 2:
             light = ClosedLoop(self.text(replace(settings, flywheel=LIGHT_FLYWHEEL), timestep))
-        start = self.start[stretch[0]]
-        wound = unwound(self.scene, start)
-        loop.set_state(wound, self.omega)
-        turns, done = wound[O2] - start[O2], 0
+        run = Run(self.scene, loop, light, passage, self.start[stretch[0]], timestep)
         for row, index in enumerate(stretch, first):
-            step = round(run.time(float(self.command.theta_2[index])) / timestep)
             began = time.process_time()
-            if step > done:
-                mujoco.mj_step(loop.model, loop.data, step - done)
-                done = step
+            run.to(index)
             stepped = time.process_time()
             loop.forward()
             d = loop.data
-            lost = d.time < done * timestep * (1.0 - 1e-6)  # a reset starts time again, and clears the warnings
-            if lost or loop.bad() or not np.isfinite(d.qacc).all():
+            if run.stepper.lost() or loop.bad() or not np.isfinite(d.qacc).all():
                 trial.broken = "MuJoCo lost the motion: a value not finite, or too large"
                 break
-            motion["theta_2"][row] = d.qpos[O2] - turns
+            motion["theta_2"][row] = d.qpos[O2] - run.turns
             motion["omega_2"][row], motion["alpha_2"][row] = d.qvel[O2], d.qacc[O2]
-            motion["torque"][row] = loop.crank_torque()
-            read = loop.forces
-            if light is not None:
-                crank = float(motion["torque"][row])
-                couple = couple_elsewhere(loop, light, self.scene.drive_bar, self.alpha, crank)
-                motion["torque"][row] = np.nan if couple is None else couple
-                read = light.forces
-            for name, force in read().items():
+            torque, pins = run.read()
+            motion["torque"][row] = np.nan if torque is None else torque
+            for name, force in pins.items():
                 forces[name][row] = force
             trial.stepping += stepped - began
             trial.reading += time.process_time() - stepped
-        trial.steps += done
-        trial.steps_per_revolution = max(trial.steps_per_revolution, 2.0 * np.pi / run.fastest / timestep)
+        trial.steps += run.stepper.done
+        trial.steps_per_revolution = max(trial.steps_per_revolution, 2.0 * np.pi / passage.fastest / timestep)
 
     def seconds_per_step(self, settings: Settings, build: Build | None = None) -> Callable[[int], float]:
         """CPU seconds of a number of steps from the start of the longest stretch; each call starts there again."""
         stretch = max(self.stretches, key=len)
-        timestep = self.timestep(settings, stretch)
+        timestep = self.passage(stretch).run.timestep(settings)
         make = build or (lambda text, _: ClosedLoop(text))
         loop = make(self.text(settings, timestep), self.omega)
 

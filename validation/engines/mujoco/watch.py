@@ -9,7 +9,7 @@ the gap at micrometres while accelerations and forces are anything. At every sam
 - how far speeds, accelerations, forces and torque would move if the loop were closed exactly at the
   same theta_2, omega_2, alpha_2: the error to expect, by MuJoCo's own inverse dynamics.
 
-The bars alone are asked, without flywheel, motor and closure, on data of their own.
+The bars alone are evaluated, without flywheel, motor and closure, on data of their own.
 """
 
 import math
@@ -41,11 +41,11 @@ LIMITS = {
 """Residuals of motion and forces that `Watch` measures."""
 EXCUSED = 1e-3
 """A solver's residual excuses an error of this part of a force, not more."""
-SELF_TOLD = {
+OF_THE_DATA = {
     "bad_states": Limit(0.0, "MuJoCo warned of a bad position, velocity or acceleration, and reset its data"),
     "time_went_back": Limit(0.0, "the time ran backwards: the data were reset"),
     "closure_gap": Limit(1e-5, "of the sum of the lengths: the loop is open"),
-    "speed_error": Limit(1e-4, "of the greatest speed: the crank does not turn as told"),
+    "speed_error": Limit(1e-4, "of the greatest speed: the crank does not turn as commanded"),
 }
 """What the data of the simulation tell without a second look."""
 
@@ -58,11 +58,11 @@ def alarms(evidence: dict[str, float], size: float) -> list[str]:
     evidence : the worst of each residual over the run.
     size : sum of the lengths, m.
     """
-    told = {**evidence, "closure_gap": evidence["closure_gap_m"] / size}
+    seen = {**evidence, "closure_gap": evidence["closure_gap_m"] / size}
     return [
-        f"{name} = {told[name]:.1e} > {limit.value:g}: {limit.reason}"
-        for name, limit in {**SELF_TOLD, **LIMITS}.items()
-        if name in told and not told[name] <= limit.value
+        f"{name} = {seen[name]:.1e} > {limit.value:g}: {limit.reason}"
+        for name, limit in {**OF_THE_DATA, **LIMITS}.items()
+        if name in seen and not seen[name] <= limit.value
     ]
 
 

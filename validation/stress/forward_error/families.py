@@ -3,14 +3,12 @@
 import math
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
-from fourbar.effects import Friction, Gravity, Load, Viscous
-from fourbar.linkage import MOVING_BARS, PINS, Bar, FourBar
+from fourbar.linkage import MOVING_BARS, Bar, FourBar
 from fourbar.scene import Scene
-from fourbar.scene.motion import Motion
+from validation.scenes.random import Ranges, decades, drawn, product, sometimes, uniform
 
 
 def triangle(rng: np.random.Generator, diagonal: float, low: float, high: float) -> tuple[float, float]:
@@ -20,42 +18,21 @@ def triangle(rng: np.random.Generator, diagonal: float, low: float, high: float)
     return float(b), float(c)
 
 
-def dressed(rng: np.random.Generator, lengths: tuple[float, ...], spread: float = 0.0) -> Scene:
-    """A scene with masses, offset centres, loads and effects at random on bars of the given lengths (d, a, b, c)."""
-    d, *moving = (float(length) for length in lengths)
-    size = max(d, *moving)
-    bars = []
-    for length in moving:
-        mass = float(10.0 ** rng.uniform(-spread, spread) * rng.uniform(0.2, 5.0)) if rng.random() < 0.9 else 0.0
-        centre = (length * float(rng.uniform(-0.5, 1.5)), float(rng.choice([0.0, rng.uniform(-3, 3)])))
-        bars.append(Bar(length, mass, mass * length**2 * float(rng.uniform(0.0, 0.5)), centre))
-    theta_1 = float(rng.choice([0.0, rng.uniform(-3.0, 3.0)]))
-    loads = []
-    for _ in range(rng.integers(0, 3)):
-        force = (float(rng.uniform(-20, 20)), float(rng.uniform(-3, 3)))
-        at = (float(rng.uniform(0, 1)) * size, float(rng.uniform(-3, 3)))
-        moment = float(rng.choice([0.0, rng.uniform(-5, 5)])) * size
-        loads.append(Load(int(rng.integers(2, 5)), force, at, moment, str(rng.choice(["world", "bar"]))))
-    effects: list[Any] = []
-    if rng.random() < 0.5:
-        effects.append(Gravity())
-    if rng.random() < 0.3:
-        effects.append(Viscous.at(**{pin: float(rng.uniform(0, 1)) * size**2 for pin in PINS if rng.random() < 0.5}))
-    if rng.random() < 0.2:
-        effects.append(Friction.at(**{pin: float(rng.uniform(0, 1)) * size for pin in PINS if rng.random() < 0.5}))
-    motion = Motion(
-        0.0,
-        float(rng.choice([-1.0, 1.0]) * 10.0 ** rng.uniform(-1, 2)),
-        float(rng.choice([0.0, rng.uniform(-50, 50)])),
-        branch=int(rng.choice([-1, 1])),
+def ranges_of(spread: float) -> Ranges:
+    """Masses over so many decades to either side, one bar of ten without any; centres anywhere about the bar."""
+    return Ranges(
+        mass=sometimes(0.9, product(decades(-spread, spread), uniform(0.2, 5.0))),
+        inertia=uniform(0.0, 0.5),
+        centre=uniform(-0.5, 1.5),
+        centre_angle=sometimes(0.5, uniform(-3.0, 3.0)),
+        ground_angle=sometimes(0.5, uniform(-3.0, 3.0)),
+        viscous=0.3,
+        friction=0.2,
+        by_length=False,
     )
-    return Scene(
-        FourBar(d, bars[0], bars[1], bars[2], theta_1),
-        motion,
-        int(rng.choice(MOVING_BARS)),
-        tuple(loads),
-        tuple(effects),
-    )
+
+
+EVEN, UNEVEN = ranges_of(0.0), ranges_of(3.0)
 
 
 def at_angle(scene: Scene, theta_2: float) -> Scene:
@@ -72,7 +49,7 @@ def random(rng: np.random.Generator) -> Scene:
         diagonal = abs(d - a * complex(math.cos(angle), math.sin(angle)))
         b, c = rng.uniform(0.1, 1.0, 2)
         if abs(b - c) < diagonal < b + c:
-            return at_angle(dressed(rng, (d, a, b, c)), angle)
+            return at_angle(drawn(rng, (d, a, b, c), EVEN), angle)
 
 
 def limit(rng: np.random.Generator) -> Scene:
@@ -84,7 +61,7 @@ def limit(rng: np.random.Generator) -> Scene:
         if abs(cosine) < 0.999:
             offset = 10.0 ** rng.uniform(-12, -2) * (1.0 if folded else -1.0)
             angle = float(rng.choice([-1.0, 1.0])) * (math.acos(cosine) + offset)
-            return at_angle(dressed(rng, (d, a, b, c)), angle)
+            return at_angle(drawn(rng, (d, a, b, c), EVEN), angle)
 
 
 def change_point(rng: np.random.Generator) -> Scene:
@@ -108,7 +85,7 @@ def change_point(rng: np.random.Generator) -> Scene:
     if rng.random() < 0.3:
         k = int(rng.integers(0, 4))
         lengths = tuple(v * (1.0 + 0.1 * distance**2) if i == k else v for i, v in enumerate(lengths))
-    return at_angle(dressed(rng, lengths), straight + distance)
+    return at_angle(drawn(rng, lengths, EVEN), straight + distance)
 
 
 def ratios(rng: np.random.Generator) -> Scene:
@@ -118,7 +95,7 @@ def ratios(rng: np.random.Generator) -> Scene:
     angle = float(rng.uniform(-7.0, 7.0))
     diagonal = abs(d - a * complex(math.cos(angle), math.sin(angle)))
     b, c = triangle(rng, diagonal, -1, 1)
-    return at_angle(dressed(rng, (d, a, b, c), spread=3.0), angle)
+    return at_angle(drawn(rng, (d, a, b, c), UNEVEN), angle)
 
 
 def scales(rng: np.random.Generator) -> Scene:

@@ -14,6 +14,7 @@ import numpy as np
 from fourbar.quantities import OK, PIN_FORCES, UNITS, VECTORS
 from fourbar.scene import Command, Scene
 from fourbar.solve import solve
+from validation.compare.error import used
 from validation.engines.balls import reference
 
 EPS = 2.0**-52
@@ -56,8 +57,7 @@ class Tally:
             self.too_large[name] = self.too_large.get(name, 0) + count
 
     def note(self, output: str, ratio: float, sample: str) -> None:
-        """One error over what is allowed; NaN is beyond all."""
-        ratio = math.inf if math.isnan(ratio) else ratio
+        """One error over what is allowed."""
         self.worst[output] = max(self.worst.get(output, (0.0, "")), (ratio, sample))
 
     def held(self) -> bool:
@@ -113,8 +113,7 @@ def judge(scene: Scene, tally: Tally, sample: str) -> None:
         ("force_error", force, strongest),
     ):
         bar = float(getattr(solution, name)[0])
-        ratio = 0.0 if error == 0.0 else error / bar if bar else math.inf
-        tally.too_small[name] = max(tally.too_small.get(name, 0.0), math.inf if math.isnan(ratio) else ratio)
+        tally.too_small[name] = max(tally.too_small.get(name, 0.0), float(used(error, bar)))
         tally.too_large[name] = tally.too_large.get(name, 0) + (bar > TOO_LARGE * max(error, HALF_A_DIGIT * size))
 
 
@@ -126,4 +125,4 @@ def _ratio(name: str, ours: float, value: Any, sensitivity: float) -> tuple[floa
         error, size = math.remainder(float(error), 2.0 * math.pi), 1.0
     wrong = abs(float(error)) if value.rad() < abs(error) else 0.0
     allowed = FACTOR * EPS * (size + sensitivity)
-    return 0.0 if wrong == 0.0 else wrong / allowed if allowed else math.inf, wrong
+    return float(used(wrong, allowed)), wrong

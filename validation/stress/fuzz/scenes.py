@@ -1,76 +1,68 @@
 """Scenes to break things with: even numbers ordinary, odd ones adversarial; scene i depends on (seed, i) alone."""
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from fourbar.effects import Friction, Gravity, Load, Viscous
 from fourbar.errors import InputError
-from fourbar.linkage import MOVING_BARS, PINS, Bar, FourBar
 from fourbar.scene import Scene
-from fourbar.scene.motion import Motion
+from validation.scenes.random import Ranges, decades, drawn, product, sometimes, uniform
 
 POSITIONS = 2
-RANGES: dict[str, tuple[float, float]] = {"ordinary": (-0.7, 0.7), "adversarial": (-6.0, 6.0)}
-"""Powers of ten between which lengths, masses, speeds and loads are drawn."""
+SIZES = {False: decades(-0.7, 0.7), True: decades(-6.0, 6.0)}
+"""Lengths, masses, speeds and loads: ordinary, adversarial."""
+RANGES = {
+    False: Ranges(
+        mass=SIZES[False],
+        inertia=uniform(0.02, 0.4),
+        centre=uniform(-1.0, 2.0),
+        centre_angle=sometimes(0.5, uniform(-3.0, 3.0)),
+        load=uniform(-1.0, 1.0),
+        without_force=0.2,
+        speed=sometimes(0.95, SIZES[False]),
+        viscous=0.2,
+        friction=0.1,
+    ),
+    True: Ranges(
+        mass=sometimes(0.85, SIZES[True]),
+        inertia=sometimes(0.85, uniform(0.02, 0.4)),
+        centre=product(uniform(-1.0, 2.0), sometimes(0.2, decades(0.0, 3.0), 1.0)),
+        centre_angle=sometimes(0.5, uniform(-3.0, 3.0)),
+        ground_angle=lambda rng: float(rng.choice([0.0, math.pi, rng.uniform(-3.2, 3.2)])),
+        load=product(uniform(-1.0, 1.0), SIZES[True]),
+        without_force=0.2,
+        speed=sometimes(0.95, SIZES[True]),
+        viscous=0.2,
+        friction=0.1,
+    ),
+}
+"""What the scenes are drawn from: ordinary, adversarial."""
 
 
 def scene_of(seed: int, index: int) -> Scene:
     """The scene of that number; redrawn until its lengths can close at all."""
     rng = np.random.default_rng([seed, index])
-    adversarial = index % 2 == 1
     while True:
         try:
-            return _draw(rng, "adversarial" if adversarial else "ordinary")
+            return _draw(rng, index % 2 == 1)
         except InputError:
             continue
 
 
-def _draw(rng: np.random.Generator, kind: str) -> Scene:
-    low, high = RANGES[kind]
-    hard = kind == "adversarial"
-
-    def power() -> float:
-        return float(10.0 ** rng.uniform(low, high))
-
-    lengths = _lengths(rng, hard)
-    size = power()
-    d, *moving = (float(x * size) for x in lengths)
-    bars = []
-    for length in moving:
-        mass = 0.0 if hard and rng.random() < 0.15 else power() * length
-        inertia = 0.0 if hard and rng.random() < 0.15 else mass * length * length * float(rng.uniform(0.02, 0.4))
-        reach = (
-            length * float(rng.uniform(-1.0, 2.0)) * (10.0 ** rng.uniform(0, 3) if hard and rng.random() < 0.2 else 1)
-        )
-        bars.append(Bar(length, mass, inertia, (reach, float(rng.choice([0.0, rng.uniform(-3.0, 3.0)])))))
-    theta_1 = float(rng.choice([0.0, math.pi, rng.uniform(-3.2, 3.2)]) if hard else rng.uniform(-3.2, 3.2))
-    linkage = FourBar(d, bars[0], bars[1], bars[2], theta_1)
-    weight = 9.81 * (sum(bar.mass for bar in bars) or 1.0)
-    loads = []
-    for _ in range(int(rng.integers(0, 3))):
-        bar = int(rng.choice(MOVING_BARS))
-        scale = weight * (power() if hard else 1.0)
-        force = (scale * float(rng.uniform(-1, 1)), float(rng.uniform(-3.2, 3.2))) if rng.random() < 0.8 else None
-        arm = (float(linkage.bar(bar).length * rng.uniform(0, 1)), float(rng.uniform(-3.2, 3.2)))
-        moment = float(rng.choice([0.0, scale * linkage.bar(bar).length * rng.uniform(-1, 1)]))
-        loads.append(Load(bar, force, arm, moment, "bar" if rng.random() < 0.5 else "world"))
-    effects: list[Any] = [Gravity()] if rng.random() < 0.5 else []
-    torque = weight * max(moving) * 0.1
-    if rng.random() < 0.2:
-        effects.append(Viscous.at(**{pin: float(torque * rng.uniform(0, 1)) for pin in PINS if rng.random() < 0.5}))
-    if rng.random() < 0.1:
-        effects.append(Friction.at(**{pin: float(torque * rng.uniform(0, 1)) for pin in PINS if rng.random() < 0.5}))
-    omega = float(rng.choice([-1.0, 1.0])) * power() * (0.0 if rng.random() < 0.05 else 1.0)
-    alpha = float(rng.choice([0.0, omega * omega * rng.uniform(-1, 1), rng.uniform(-10, 10)]))
-    psi = _angles(rng, hard, (d, *moving))
-    motion = Motion(theta_1 + psi, omega, alpha, int(rng.choice([-1, 1])))
-    return Scene(linkage, motion, int(rng.choice(MOVING_BARS)), tuple(loads), tuple(effects))
+def _draw(rng: np.random.Generator, hard: bool) -> Scene:
+    size = SIZES[hard](rng)
+    lengths = tuple(float(x * size) for x in _lengths(rng, hard))
+    scene = drawn(rng, lengths, RANGES[hard])
+    psi = _angles(rng, hard, lengths)
+    alpha = float(rng.uniform(-10.0, 10.0)) if rng.random() < 1.0 / 3.0 else scene.motion.alpha_2
+    motion = replace(scene.motion, theta_2=scene.linkage.ground_angle + psi, alpha_2=alpha)
+    return replace(scene, motion=motion)
 
 
 def _lengths(rng: np.random.Generator, hard: bool) -> Any:
-    """(ground, input, coupler, output), some of them equal, in extreme ratios, or beside s + l = p + q."""
+    """(ground, input, coupler, output), some of them equal, in extreme ratios, or near s + l = p + q."""
     choice = rng.random() if hard else 1.0
     x = rng.uniform(0.1, 1.0, 4)
     if choice < 0.1:
@@ -94,7 +86,7 @@ def _lengths(rng: np.random.Generator, hard: bool) -> Any:
 
 
 def _angles(rng: np.random.Generator, hard: bool, lengths: tuple[float, ...]) -> Any:
-    """theta_2 - theta_1: anywhere, or beside a limit position, a change point, or many turns away."""
+    """theta_2 - theta_1: anywhere, or near a limit position, a change point, or many turns away."""
     psi = rng.uniform(-3.2, 3.2, POSITIONS)
     if not hard:
         return psi

@@ -46,7 +46,7 @@ def mutants(module: str) -> list[str]:
 
 
 def scenes() -> list[Scene]:
-    """Random linkages of every type, drive and branch, and a parallelogram beside and on its change point."""
+    """Random linkages of every type, drive and branch, and a parallelogram near and on its change point."""
     from validation.scenes.hard_families import change_point, sweep_of
     from validation.scenes.hard_linkages import dressed
     from validation.scenes.random import LinkageType, random_scene
@@ -60,27 +60,27 @@ def scenes() -> list[Scene]:
 def numbers(scene: Scene, at: Command) -> dict[str, Any]:
     """Everything that the formulas say of a scene and of its linkage."""
     solution = solve(scene, "force", at=at)
-    said = {name: getattr(solution, name) for name in UNITS if getattr(solution, name) is not None}
-    said["status"] = solution.status_code.astype(float)
-    return said | stated(scene.linkage) | stated_of_motion(scene, at)
+    found = {name: getattr(solution, name) for name in UNITS if getattr(solution, name) is not None}
+    found["status"] = solution.status_code.astype(float)
+    return found | stated(scene.linkage) | stated_of_motion(scene, at)
 
 
 def stated(linkage: FourBar) -> dict[str, Any]:
     """What the formulas state of a linkage whatever its motion."""
-    said: dict[str, Any] = {
+    found: dict[str, Any] = {
         "default_range": mobility.default_range(linkage),
         "change_points": mobility.change_points(linkage),
         "time_ratio": mobility.time_ratio(linkage) or math.nan,
         "extremes": [*transmission.transmission_extremes(linkage), transmission.transmission_extremes(linkage).worst],
     }
     for bar in MOVING_BARS:
-        said[f"limits_{bar}"] = mobility.limit_positions(linkage, bar)
-        said[f"intervals_{bar}"] = mobility.intervals(linkage, bar)
-        said[f"turns_{bar}"] = mobility.turns_fully(linkage, bar)
-        said[f"swing_{bar}"] = mobility.swing(linkage, bar)
+        found[f"limits_{bar}"] = mobility.limit_positions(linkage, bar)
+        found[f"intervals_{bar}"] = mobility.intervals(linkage, bar)
+        found[f"turns_{bar}"] = mobility.turns_fully(linkage, bar)
+        found[f"swing_{bar}"] = mobility.swing(linkage, bar)
     sweep = linkage.ground_angle + np.array([-0.5, 0.5, 4.0, 2.0])  # through both change points, and back
-    said["through"] = mobility.on_smooth_path(linkage, sweep, 1)
-    return {name: np.array(value, dtype=float) for name, value in said.items()}
+    found["through"] = mobility.on_smooth_path(linkage, sweep, 1)
+    return {name: np.array(value, dtype=float) for name, value in found.items()}
 
 
 def stated_of_motion(scene: Scene, at: Command) -> dict[str, Any]:

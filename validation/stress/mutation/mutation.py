@@ -68,7 +68,7 @@ def mutation(harness: bool, module: str | None, most: int, whole: bool, again: b
         for name in _caught_by_all(tree, [n for n, change in survivors.items() if change not in reasons], workers):
             states[name] = "killed"
             del survivors[name]
-    return _told(states, survivors, out)
+    return _reported(states, survivors, out)
 
 
 def _copy(tree: Path) -> None:
@@ -84,7 +84,7 @@ def _copy(tree: Path) -> None:
 
 
 def _generate(mutmut: Path, tree: Path) -> None:
-    """All mutants, those of changed functions anew: asked for a name that none has, mutmut then stops."""
+    """All mutants, those of changed functions anew: given a name that none has, mutmut then stops."""
     subprocess.run([mutmut, "run", "fourbar.none*"], cwd=tree, check=False, capture_output=True)
 
 
@@ -151,7 +151,7 @@ def _caught_by_all(tree: Path, names: list[str], workers: int) -> list[str]:
     return [name for name in names if tested(name, "-x", *without).returncode == CAUGHT]
 
 
-def _told(states: dict[str, str], survivors: dict[str, str], out: Path) -> int:
+def _reported(states: dict[str, str], survivors: dict[str, str], out: Path) -> int:
     """Kill rate per module, and the survivors with the reason that is on record for them."""
     reasons = _reasons()
     untried = [name for name, state in states.items() if state in UNTRIED]

@@ -8,8 +8,9 @@ from fourbar.quantities import OK
 from fourbar.scene import Command, Scene
 from fourbar.solve import solve
 from validation.compare.answer import Array
-from validation.compare.compare import SLOW_DRIVE, angle_aware_difference
-from validation.compare.scales import divisor, yardstick
+from validation.compare.compare import turning
+from validation.compare.error import relative_error
+from validation.compare.scales import yardstick
 
 
 class Errors(NamedTuple):
@@ -52,11 +53,8 @@ def errors(scene: Scene, at: Command, quantities: dict[str, Array]) -> Errors:
     for name in QUANTITIES:
         ours, where = getattr(formulas, name), judged
         if name == "torque" and scene.drive_bar != 2:
-            speed = np.abs(np.nan_to_num(getattr(formulas, f"omega_{scene.drive_bar}")))
-            where = judged & (speed > SLOW_DRIVE * speed.max())
-        relative = angle_aware_difference(name, ours, quantities[name]) / divisor(
-            yardstick(name, scene, formulas, ours)
-        )
-        value = float(np.max(relative[where]))
+            where = judged & turning(getattr(formulas, f"omega_{scene.drive_bar}"))
+        error = relative_error(name, ours, quantities[name], yardstick(name, scene, formulas, ours))
+        value = float(np.max(error[where]))
         worst[name] = value if np.isfinite(value) else float("inf")
     return Errors(**worst)

@@ -20,7 +20,8 @@ from fourbar.quantities import PIN_FORCES
 from fourbar.scene import Command, Scene
 from fourbar.solve import solve, state_at
 from validation.compare.answer import Array
-from validation.compare.scales import divisor, yardstick
+from validation.compare.error import relative
+from validation.compare.scales import yardstick
 from validation.published import thirteen
 from validation.studies.cost.errors import Errors
 
@@ -132,13 +133,13 @@ def against_reference(scene: Scene, at: Command, quantities: Quantities, referen
     formulas = solve(scene, "force", at=at)
     worst = {}
     for name in ("torque", *PIN_FORCES):
-        sizes = divisor(yardstick(name, scene, formulas, getattr(formulas, name)))
+        sizes = yardstick(name, scene, formulas, getattr(formulas, name))
         value = 0.0
         for ours, exact, size in zip(quantities[name], reference[name], sizes.tolist(), strict=True):
             pairs = ((ours, exact),) if name == "torque" else tuple(zip(ours, exact, strict=True))
             if any(y is None for _, y in pairs):
                 continue
-            value = max(value, math.hypot(*(_difference(x, y) for x, y in pairs)) / size)
+            value = max(value, float(relative(math.hypot(*(_difference(x, y) for x, y in pairs)), size)))
         worst[name] = value
     return Errors(**worst)
 

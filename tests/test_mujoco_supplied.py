@@ -98,7 +98,7 @@ def test_a_drive_that_does_not_follow_the_law_fails_the_run(factor: float, monke
     monkeypatch.setattr(motions.Lawful, "alpha", changed(motions.Lawful.alpha, factor))
     asked = crank_rocker(motion=fourbar.Motion(law=LAWS["periodic"]), loads=(), effects=())
     failed = [row for row in simulated(asked) if not row.passed]
-    assert any("does not turn as told" in row.reason for row in failed)
+    assert any("does not turn as commanded" in row.reason for row in failed)
 
 
 def test_the_callback_ends_with_the_run() -> None:

@@ -1,4 +1,4 @@
-"""What is known of one scene once it is judged: a record while it is, a page for the report."""
+"""What is known of one scene once it is judged: one record, whatever it is read for."""
 
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any
@@ -24,23 +24,10 @@ class Timing:
 
 @dataclass(slots=True)
 class Record:
-    """Everything the report needs of one scene."""
+    """What is known of one scene: while it is judged all that its picture needs, then what is small and storable."""
 
     name: str
-    scene: Scene
-    rows: list[Row] = field(default_factory=list)
-    timings: list[Timing] = field(default_factory=list)
-    left_out: list[str] = field(default_factory=list)
-    reversals: list[Reversal] = field(default_factory=list)
-    solution: Solution | None = None
-    answers: list[Answer] = field(default_factory=list)
-
-
-@dataclass(slots=True)
-class Page:
-    """What is kept of one scene once it is judged: small, and storable as JSON but for its rows."""
-
-    name: str
+    scene: Scene | None = None
     title: str = ""
     source: str = ""
     rows: list[Row] = field(default_factory=list)
@@ -53,21 +40,39 @@ class Page:
     evidence: dict[str, dict[str, float]] = field(default_factory=dict)
     figure: str | None = None
     """SVG of the answers, or None where there is nothing to draw."""
+    solution: Solution | None = None
+    answers: list[Answer] = field(default_factory=list)
+    jumps: list[Reversal] = field(default_factory=list)
+
+    def kept(self, figure: str | None = None) -> "Record":
+        """Without the scene, the solution and the answers."""
+        return replace(
+            self,
+            independence={answer.engine: (answer.shared, answer.own) for answer in self.answers if answer.own},
+            evidence={answer.engine: answer.evidence for answer in self.answers if answer.evidence},
+            reversals=[str(jump) for jump in self.jumps],
+            figure=figure,
+            scene=None,
+            solution=None,
+            answers=[],
+            jumps=[],
+        )
 
     def without_rows(self) -> dict[str, Any]:
-        """Everything but the rows, which have their own table."""
+        """Everything that is kept but the rows, which have their own table."""
         kept = asdict(replace(self, rows=[]))
-        del kept["rows"]
+        for name in ("rows", "scene", "solution", "answers", "jumps"):
+            del kept[name]
         return kept
 
     @classmethod
-    def restore(cls, kept: dict[str, Any], rows: list[Row]) -> "Page":
+    def restore(cls, kept: dict[str, Any], rows: list[Row]) -> "Record":
         """From what `without_rows` gave."""
         timings = [Timing(**timing) for timing in kept["timings"]]
         independence = {engine: (shared, own) for engine, (shared, own) in kept["independence"].items()}
         return cls(**{**kept, "timings": timings, "independence": independence}, rows=rows)
 
-    def joined(self, other: "Page") -> "Page":
+    def joined(self, other: "Record") -> "Record":
         """The same scene with what another set of engines said; the rows of the formulas stand once."""
         known = set(self.rows)
         return replace(
