@@ -121,3 +121,13 @@ def test_the_table_says_that_the_motion_ended() -> None:
     wanted = f"{free.steps + 1} instants were wanted: the motion stops at a limit position at t = 0.43991 s"
     assert any(line.startswith(wanted) for line in heading(scene, solution))
     assert json.loads(json_text(solution))["stopped_at"] == solution.stopped_at
+
+
+def test_a_released_scene_is_reported_without_a_torque_that_is_rounding(monkeypatch: pytest.MonkeyPatch) -> None:
+    from validation.report import figures
+
+    scene = falling()
+    shown: list[str] = []
+    monkeypatch.setattr(figures, "_picture", lambda quantity, *_: shown.append(quantity) or "")
+    figures.scene_figure(Record("falling", scene, solve(scene)))
+    assert shown == ["theta_4", "F32"]
