@@ -129,5 +129,5 @@ def test_a_released_scene_is_reported_without_a_torque_that_is_rounding(monkeypa
     scene = falling()
     shown: list[str] = []
     monkeypatch.setattr(figures, "_picture", lambda quantity, *_: shown.append(quantity) or "")
-    figures.scene_figure(Record("falling", scene, solve(scene)))
+    figures.scene_figure(Record("falling", scene, solution=solve(scene)))
     assert shown == ["theta_4", "F32"]
