@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from fourbar import __version__
-from fourbar.errors import InputError, NotAssembledError
-from fourbar.exits import run
+from fourbar.errors import InputError, NotAssembledError, run
 
 if TYPE_CHECKING:
     from fourbar.scene import Scene

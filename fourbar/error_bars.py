@@ -13,11 +13,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.case import Case, Dynamics
 from fourbar.formulas.motion import Coefficients, Rates, State, rates, side_turns_fast
 from fourbar.formulas.path import Path, read_backwards
 from fourbar.formulas.pin_forces import Body
 from fourbar.formulas.position import HalfAngle, Loop, Position, two_sum
+from fourbar.scene.case import Case, Dynamics
 
 EVALUATIONS = 16
 """With fewer, all of them may by chance come out as far off as the answer itself."""
@@ -98,8 +98,8 @@ def error_bars(
     near = near._replace(u2=rounded(near.u2), u3=rounded(near.u3), u4=rounded(near.u4))
     k = _rounded_coefficients(path, near, k, rounded)
     moving = Rates(*map(rounded.each, rates(k, state.speed, acceleration)))
-    beside = state._replace(at=near, k=k, moving=moving)
-    other = moved.dynamics(beside, acceleration, rounded=rounded)
+    nearby = state._replace(at=near, k=k, moving=moving)
+    other = moved.dynamics(nearby, acceleration, rounded=rounded)
     torque = np.mean((other.torque - found.torque) ** 2, axis=0)
     forces = [
         np.mean(np.abs(after - before) ** 2, axis=0) for before, after in zip(found.pins, other.pins, strict=True)

@@ -1,7 +1,13 @@
-"""Errors: one root, one class per kind of mistake."""
+"""Errors: one root, one class per kind of mistake; and how a command ends, with a status and one line."""
 
-__all__ = ["DependencyError", "FourBarError", "InputError", "LimitError", "NotAssembledError"]
+import io
+import os
+import select
+import sys
+from typing import TYPE_CHECKING, TextIO
 
+if TYPE_CHECKING:
+    import click
 
 LONGEST_SHOWN = 160
 """Characters of a value that an error repeats."""
@@ -40,7 +46,7 @@ class InputError(FourBarError):
 
 
 class NotAssembledError(FourBarError):
-    """The linkage closes at none of the positions that were asked for."""
+    """The linkage closes at none of the positions of the scene."""
 
 
 class LimitError(FourBarError):
@@ -49,3 +55,88 @@ class LimitError(FourBarError):
 
 class DependencyError(FourBarError):
     """A library that the request needs is not installed."""
+
+
+HOLDS, FAILED, BAD_INPUT, BROKEN, INTERRUPTED = 0, 1, 2, 3, 130
+"""All holds; a comparison fails or none was made; bad input; the environment or the program failed; interrupted."""
+
+
+def run(group: "click.Group", program: str, arguments: list[str] | None = None) -> int:
+    """Run a command of a group; the exit status is what the command returns, or says what went wrong."""
+    import click  # on the command line alone
+
+    given = sys.argv[1:] if arguments is None else arguments
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="replace")  # a terminal that has no Greek still gets its table
+    streams = (sys.stdout, sys.stderr)
+    try:
+        result = group.main(args=given, prog_name=program, standalone_mode=False)
+        status = HOLDS if result is None else int(result)
+        _flush()
+        return status
+    except SystemExit as left:
+        return _left(left, streams)
+    except (click.exceptions.Abort, KeyboardInterrupt):
+        return _say("interrupted", INTERRUPTED)
+    except click.ClickException as error:
+        return _say(error.format_message(), BAD_INPUT)
+    except DependencyError as error:
+        return _say(str(error), BROKEN)
+    except FourBarError as error:
+        return _say(str(error), BAD_INPUT)
+    except ModuleNotFoundError as error:
+        return _say(f'{error.name} is not installed: pip install "fourbar[all]"', BROKEN)
+    except OSError as error:
+        return _say(f"{error.filename or 'output'}: {error.strerror}", BROKEN)
+    except Exception as error:
+        if "--traceback" in given or os.environ.get("FOURBAR_TRACEBACK"):
+            raise
+        return _say(f"internal error: {type(error).__name__}: {error} (FOURBAR_TRACEBACK=1 shows where)", BROKEN)
+
+
+def _left(left: SystemExit, streams: tuple[TextIO | None, ...]) -> int:
+    """The status of a command that was left by SystemExit.
+
+    Click and rich leave with 1 where the reader of a pipe has gone; it has what it wants. Click lets go of standard
+    output then, and does so for every pipe that breaks, that of a worker too.
+    """
+    if sys.stdout is not streams[0]:
+        return HOLDS if any(map(_unread, streams)) else _say("a pipe inside the program broke", BROKEN)
+    if isinstance(left.__context__, BrokenPipeError):
+        return HOLDS
+    if left.code is None or isinstance(left.code, int):
+        return left.code or HOLDS
+    return _say(left.code, BROKEN)
+
+
+def _unread(stream: TextIO | None) -> bool:
+    """Whether a stream is a pipe that nobody reads any more; taken for one where the system does not know."""
+    if not hasattr(select, "poll"):
+        return True
+    try:
+        poll = select.poll()
+        poll.register(stream.fileno(), select.POLLOUT)  # type: ignore[union-attr]
+        return any(event & (select.POLLERR | select.POLLHUP) for _, event in poll.poll(0))
+    except (AttributeError, OSError, ValueError):  # no stream, or one without a file
+        return False
+
+
+def _flush() -> None:
+    """Write out what was printed while an error can still be reported; a reader that has gone is none."""
+    try:
+        if sys.stdout is not None:
+            sys.stdout.flush()
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # or the interpreter reports it at its end
+
+
+def _say(message: str, status: int) -> int:
+    import click
+
+    click.echo("error: " + printable(message), err=True)
+    return status
+
+
+def printable(text: str) -> str:
+    """One line without control characters: a title or file name does not steer the terminal."""
+    return " ".join("".join(letter if letter.isprintable() else " " for letter in text).split())

@@ -45,7 +45,7 @@ TOUCHING = 2.0**-53
 
 @dataclass(slots=True, eq=False)
 class FreeMotion:
-    """What the linkage did at the times asked for, until it stopped."""
+    """What the linkage did at the times of the scene, until it stopped."""
 
     command: Command
     """theta_2 (continuous), branch, omega_2, alpha_2 and time; ends before `stopped_at` where the motion did."""
@@ -163,7 +163,7 @@ class _Run:
         if not float(self._inertia(at, k)) > 0.0:
             raise FourBarError("nothing that moves has inertia: the free motion is undetermined")
         self._change_over()
-        self.side = 0.0  # the way it moves, where dry friction makes the two ways different
+        self.side = 0.0  # the sense of motion, where dry friction tells the two apart
         self.dry = self._is_dry()
         self.start_energy = self._kinetic_energy()
 

@@ -8,7 +8,7 @@ from fourbar.formulas.position import HalfAngle
 from fourbar.linkage import FourBar
 
 DIGITS = 120
-"""The angle of a limit position beside a change point keeps half of them."""
+"""The angle of a limit position near a change point keeps half of them."""
 RESIDUE = 1e-55
 """Relative: what so many digits leave of a factor that is zero at the limit position itself."""
 TOUCHING = 2.0**-53

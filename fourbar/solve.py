@@ -1,4 +1,4 @@
-"""From a scene to its solution: block by block over the positions, stage by stage, no further than asked."""
+"""From a scene to its solution: block by block over the positions, stage by stage, no further than wanted."""
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.case import Case
 from fourbar.errors import InputError, LimitError
 from fourbar.formulas.motion import State
 from fourbar.formulas.path import NO_DIGIT_LEFT
@@ -31,6 +30,7 @@ from fourbar.quantities import (
     WOUND,
 )
 from fourbar.scene import Command, Scene, command
+from fourbar.scene.case import Case
 from fourbar.solution import Array, Solution, unwrap
 
 if TYPE_CHECKING:
@@ -48,7 +48,7 @@ def solve(
     out: Mapping[str, Array] | None = None,
     side: int = 0,
 ) -> Solution:
-    """Evaluate a scene with the closed formulas, no further than asked.
+    """Evaluate a scene with the closed formulas, as far as a stage.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ def solve(
     at : other positions, velocities and accelerations of the input than the scene's own.
     out : arrays to write into, by name, (n,) or (n, 2), which share no memory; only the quantities named are evaluated,
         with the stages they need, and the others are None in the result.
-    side : which way pins at rest are about to turn where dry friction acts: +1 as theta_2 grows, -1 as it falls, 0
+    side : in which sense pins at rest are about to turn where dry friction acts: +1 as theta_2 grows, -1 as it falls, 0
         neither.
 
     Raises
@@ -85,7 +85,7 @@ def solve(
         raise InputError("motion.omega_2", None, f"is needed for the stage {stage!r}")
     code = np.zeros(n, dtype=np.uint8)
     with np.errstate(all="ignore"):
-        case = Case.of(_begun(scene) if wanted >= STAGES.index("force") else scene)._replace(side=side)
+        case = Case.of(_started(scene) if wanted >= STAGES.index("force") else scene)._replace(side=side)
         size = BLOCK
         if wanted == len(STAGES) - 1:
             from fourbar.error_bars import EVALUATIONS
@@ -193,7 +193,7 @@ def _sign(branch: NDArray[np.int8]) -> Any:
 def _angles(
     case: Case, half: HalfAngle, branch: Any, names: Iterable[str]
 ) -> tuple[NDArray[np.uint8], dict[str, Any], None]:
-    """The same where two angles are all that is asked for: without vectors and the rest of the triangle."""
+    """The same where two angles alone are wanted: without vectors and the rest of the triangle."""
     theta_3, theta_4, root = case.path.angles(half, branch)
     codes = _codes(root, half, NO_DIGIT_LEFT * 2.0 * case.path.lengths.b * case.path.lengths.c)
     found = {"theta_3": theta_3, "theta_4": theta_4}
@@ -329,7 +329,7 @@ def state_at(scene: Scene, at: Command) -> State:
         return case.state(case.path, at.theta_2, found, at.branch, omega_2, at.alpha_2)
 
 
-def _begun(scene: Scene) -> Scene:
+def _started(scene: Scene) -> Scene:
     """The scene with effects that know where its motion begins."""
     if not any(effect.counts_turns for effect in scene.effects):
         return scene
@@ -346,7 +346,7 @@ def _refuse_wound(scene: Scene, at: Command) -> None:
         return
     with np.errstate(all="ignore"):
         state = state_at(scene, at)
-        for effect in _begun(scene).effects:
+        for effect in _started(scene).effects:
             codes = effect.status(state, at.branch) if effect.counts_turns else None
             if codes is not None and codes.any():
                 assert at.time is not None

@@ -8,8 +8,7 @@ from pathlib import Path
 import pytest
 
 from fourbar.cli import status
-from fourbar.errors import FourBarError, InputError
-from fourbar.exits import BAD_INPUT
+from fourbar.errors import BAD_INPUT, FourBarError, InputError
 from fourbar.files import loads, read_text
 from fourbar.files.scene_file import LARGEST_FILE
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from fourbar.exits import BAD_INPUT, BROKEN, HOLDS
+from fourbar.errors import BAD_INPUT, BROKEN, HOLDS
 from validation.cli import status as ended
 from validation.stress import against, bench
 

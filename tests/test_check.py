@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import fourbar
-from fourbar.exits import BAD_INPUT, FAILED, HOLDS
+from fourbar.errors import BAD_INPUT, FAILED, HOLDS
 from fourbar.quantities import OK, UNITS, VECTORS
 from fourbar.scene import Command, Scene, command
 from fourbar.solve import solve

@@ -18,8 +18,7 @@ import pytest
 
 import fourbar
 from fourbar.cli import status
-from fourbar.errors import DependencyError
-from fourbar.exits import BROKEN, HOLDS, INTERRUPTED
+from fourbar.errors import BROKEN, HOLDS, INTERRUPTED, DependencyError
 from fourbar.files import load, save
 from fourbar.quantities import UNITS, VECTORS
 from fourbar.show import tables

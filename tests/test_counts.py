@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import fourbar
-from fourbar.exits import FAILED, HOLDS
+from fourbar.errors import FAILED, HOLDS
 from fourbar.formulas.mobility import limit_positions
 from fourbar.scene import Command, Scene, command
 from tests.scenes import crank_rocker

@@ -12,7 +12,7 @@ import pytest
 import fourbar.cli
 import validation.cli
 from fourbar import free_motion
-from fourbar.exits import BAD_INPUT, INTERRUPTED
+from fourbar.errors import BAD_INPUT, INTERRUPTED
 
 ROOT = Path(__file__).parents[1]
 SCENE = str(ROOT / "models" / "crank_rocker.toml")

@@ -13,8 +13,7 @@ import pytest
 import fourbar
 import fourbar.cli
 import validation.cli
-from fourbar.errors import DependencyError, InputError
-from fourbar.exits import BAD_INPUT, BROKEN, FAILED, HOLDS, INTERRUPTED, run
+from fourbar.errors import BAD_INPUT, BROKEN, FAILED, HOLDS, INTERRUPTED, DependencyError, InputError, run
 from tests.scenes import crank_rocker
 from validation.compare.rows import AGREES, FAILS, Row, write_results
 from validation.published.figures import Figure
@@ -258,7 +257,7 @@ def test_every_command_is_in_the_table_of_processes() -> None:
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="only Linux has a device that is always full")
 def test_what_was_printed_without_being_written_out_is_not_lost_in_silence() -> None:
-    code = "import click, sys; from fourbar.exits import run; "
+    code = "import click, sys; from fourbar.errors import run; "
     code += "sys.exit(run(click.Group(commands={'go': click.command(name='go')(lambda: print('said'))}), 'p', ['go']))"
     reading, writing = os.pipe()
     os.close(reading)

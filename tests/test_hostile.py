@@ -11,8 +11,7 @@ import pytest
 
 import fourbar
 import validation.run.run
-from fourbar.errors import InputError
-from fourbar.exits import BAD_INPUT, FAILED, HOLDS
+from fourbar.errors import BAD_INPUT, FAILED, HOLDS, InputError
 from fourbar.mjcf import mjcf
 from fourbar.scene import Command, Scene
 from tests.scenes import crank_rocker

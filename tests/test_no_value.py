@@ -14,8 +14,7 @@ from hypothesis import strategies as st
 import fourbar
 from fourbar.cli import status
 from fourbar.effects import Friction, Gravity, Load, PinFriction, Point, Spring, Springs, Torsion, Viscous
-from fourbar.errors import InputError
-from fourbar.exits import HOLDS
+from fourbar.errors import HOLDS, InputError
 from fourbar.linkage import MOVING_BARS, PINS
 from fourbar.quantities import JAMMED, OK, STAGE_OF, STAGES
 from fourbar.scene import Scene

@@ -119,7 +119,7 @@ def torque_off(solution: Solution) -> None:
     solution.torque *= 1.0 + 1e-9
 
 
-solving = import_module("fourbar.case")
+solving = import_module("fourbar.scene.case")
 """Where the forces of a scene are put together."""
 close_loop, inertia_wrenches, half_slope, inertia = (
     path.close_loop,

@@ -10,7 +10,7 @@ import pytest
 
 import fourbar
 from fourbar.cli import status
-from fourbar.exits import HOLDS
+from fourbar.errors import HOLDS
 from fourbar.files.effects import REGISTRY
 from validation.cli import COMMANDS
 

@@ -11,8 +11,7 @@ import pytest
 
 import fourbar
 from fourbar.cli import status
-from fourbar.errors import InputError
-from fourbar.exits import HOLDS
+from fourbar.errors import HOLDS, InputError
 from fourbar.quantities import UNITS
 from fourbar.show import notebook
 from fourbar.show.units import units

@@ -5,7 +5,7 @@ from importlib import import_module
 
 import click
 
-from fourbar.exits import run
+from fourbar.errors import run
 
 COMMANDS = {
     "run": "validation.run.run:command",

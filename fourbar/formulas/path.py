@@ -28,7 +28,7 @@ from fourbar.formulas.position import with_parallel_pairs as parallel_position
 from fourbar.linkage import FourBar
 
 NO_DIGIT_LEFT = 16.0 * 2.0**-53
-"""|sin mu| at or below this: the directions of bars 3 and 4 cannot be told apart in doubles."""
+"""|sin mu| at or below this: the directions of bars 3 and 4 are the same in doubles."""
 
 
 class Path(NamedTuple):
@@ -119,9 +119,9 @@ def state(linkage: FourBar, theta_2: Number, branch: Number, omega_2: Number = 1
     """
     with np.errstate(all="ignore"):
         lengths = loop(*linkage.lengths)
-        way = path(lengths, linkage.ground_angle)
-        at = way.position(theta_2, way.half_angle(theta_2), branch)
-        at, k = way.motion(at._replace(root=np.where(singular(at), np.nan, at.root)), branch)
+        reading = path(lengths, linkage.ground_angle)
+        at = reading.position(theta_2, reading.half_angle(theta_2), branch)
+        at, k = reading.motion(at._replace(root=np.where(singular(at), np.nan, at.root)), branch)
         return State(lengths, linkage.ground_angle, theta_2, at, k, omega_2, rates(k, omega_2, alpha_2))
 
 
@@ -139,9 +139,9 @@ def smooth_branch(lengths: Loop, psi: Number, sign: Number) -> Number:
     return sign * at_stretched * at_folded
 
 
-def _turned_round(way: Path, at: Position) -> Position:
+def _turned_round(reading: Path, at: Position) -> Position:
     """A position of the loop read backwards, in the usual order of the bars."""
-    d, c, b, a, _, _ = way.lengths
+    d, c, b, a, _, _ = reading.lengths
     u1, u2, u3, u4 = -at.u1, at.u4, -at.u3, at.u2
     diagonal = d * u1 - a * u2
     sine, foot = cross(u3, u4), dot(diagonal, u3) / b

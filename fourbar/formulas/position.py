@@ -7,7 +7,7 @@ Heron's formula are >= 0; their product is the square of four times the area of 
     outer = (b + c)^2 - e^2 = E1 + 4 a d cos^2 h,   E1 = (b + c - a - d)(a + b + c + d),
     inner = e^2 - (b - c)^2 = E2 + 4 a d sin^2 h,   E2 = (d - a - b + c)(d - a + b - c).
 outer = 0 is bars 3, 4 stretched, inner = 0 is bars 3, 4 folded. At a change point E1 or E2 is zero
-exactly and nothing cancels beside it; nothing passes through zero at theta = 180 deg.
+exactly and nothing cancels near it; nothing passes through zero at theta = 180 deg.
 
 Source: R. L. Norton, Design of Machinery, ch. 4 (the loop and its two branches).
 """

@@ -43,7 +43,7 @@ def printed(
     from rich.console import Console
     from rich.text import Text
 
-    from fourbar.exits import printable
+    from fourbar.errors import printable
 
     step = every or (1 if width is None else _step(len(solution)))
     shown, left_out = table(solution, width, units, every=step)

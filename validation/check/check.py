@@ -7,8 +7,7 @@ from pathlib import Path
 import click
 import numpy as np
 
-from fourbar.errors import InputError
-from fourbar.exits import FAILED, HOLDS
+from fourbar.errors import FAILED, HOLDS, InputError
 from fourbar.files import load
 from fourbar.quantities import OK
 from fourbar.scene import Command, Scene, command

@@ -3,7 +3,7 @@
 from collections import Counter
 from collections.abc import Iterable
 
-from fourbar.exits import FAILED, HOLDS
+from fourbar.errors import FAILED, HOLDS
 from validation.compare.identities import FORMULAS, IDENTITIES
 from validation.compare.rows import AGREES, COMPARED, DEGRADED, FAILS, REFUSES, UNDECIDED, VERDICTS, Row
 

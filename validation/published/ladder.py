@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import click
 
-from fourbar.exits import FAILED, HOLDS
+from fourbar.errors import FAILED, HOLDS
 from validation.published.errata import ERRATA
 from validation.published.figures import VERDICTS, Figure
 from validation.published.maple import maple_figures

@@ -5,7 +5,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import Enum
 
-from fourbar.exits import FAILED, HOLDS
+from fourbar.errors import FAILED, HOLDS
 from validation.compare.counts import Counts
 from validation.compare.rows import FAILS, VERDICTS, Row
 from validation.compare.tolerance import EPS, K

@@ -9,7 +9,7 @@ from heapq import nlargest
 from statistics import median
 from typing import NamedTuple, TypeVar
 
-from fourbar.exits import HOLDS
+from fourbar.errors import HOLDS
 from validation.compare.counts import Counts
 from validation.compare.error import used as of_allowance
 from validation.compare.rows import REFUSES, Row

@@ -4,7 +4,7 @@ import math
 from itertools import groupby
 from pathlib import Path
 
-from fourbar.exits import printable
+from fourbar.errors import printable
 from validation.report.summary import Summary
 from validation.report.templating import number
 

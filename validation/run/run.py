@@ -9,8 +9,7 @@ from typing import Any
 
 import click
 
-from fourbar.errors import DependencyError, FourBarError, InputError
-from fourbar.exits import FAILED
+from fourbar.errors import FAILED, DependencyError, FourBarError, InputError
 from fourbar.mjcf import mjcf
 from fourbar.writing import write_text
 from validation.compare.columns import write_columns

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.effects import Gravity
-from fourbar.exits import BROKEN, FAILED, HOLDS
+from fourbar.errors import BROKEN, FAILED, HOLDS
 from fourbar.formulas.mobility import default_range
 from fourbar.linkage import MOVING_BARS, Bar, FourBar
 from fourbar.quantities import ANGLES, UNKNOWNS, VECTORS

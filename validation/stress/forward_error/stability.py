@@ -6,7 +6,7 @@ from collections.abc import Iterator
 import click
 import numpy as np
 
-from fourbar.exits import FAILED, HOLDS
+from fourbar.errors import FAILED, HOLDS
 from validation.stress.forward_error.families import FAMILIES
 from validation.stress.forward_error.judge import TOO_LARGE, Tally, judge
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import click
 
-from fourbar.exits import FAILED, HOLDS
+from fourbar.errors import FAILED, HOLDS
 from fourbar.scene import Scene
 from fourbar.writing import write_text
 from validation.report.machine import machine, versions

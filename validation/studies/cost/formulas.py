@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from fourbar.case import Case
 from fourbar.effects import Actions
 from fourbar.effects.actions import bodies
 from fourbar.formulas.motion import State, coefficients, rates
@@ -18,6 +17,7 @@ from fourbar.formulas.transmission import drive_sine
 from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import PIN_FORCES
 from fourbar.scene import Command, Scene
+from fourbar.scene.case import Case
 from fourbar.solve import solve, state_at
 from validation.compare.answer import Array
 from validation.compare.error import relative

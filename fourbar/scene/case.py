@@ -30,7 +30,7 @@ by at most about 12 U times them."""
 
 
 NO_MOTION = Coefficients(*[np.nan] * 8)
-"""Where positions are all that is asked for."""
+"""Where positions alone are wanted."""
 
 
 class Dynamics(NamedTuple):
@@ -53,7 +53,7 @@ class Case(NamedTuple):
     drive_bar: int
     path: Path
     side: int = 0
-    """Which way pins at rest are about to turn."""
+    """In which sense pins at rest are about to turn."""
 
     @classmethod
     def of(cls, scene: Scene) -> "Case":
@@ -67,7 +67,7 @@ class Case(NamedTuple):
     def state(
         self, path: Path, q: Any, at: Position, branch: Any, speed: Any, acceleration: Any, *, moving: bool = True
     ) -> State:
-        """Positions and, unless they are all that is asked for, motion.
+        """Positions and, where more than they is wanted, motion.
 
         Parameters
         ----------
@@ -152,7 +152,7 @@ class Case(NamedTuple):
         """Least and greatest driving torque where dry friction holds a pin at rest, elsewhere the torque twice, N m.
 
         The third is where one of them is NaN because friction jams the motion that would begin; None: nowhere.
-        The ends are the torques at which the linkage would begin to move either way, or, where only a
+        The ends are the torques at which the linkage would begin to move forwards or backwards, or, where only a
         pin comes to rest while the linkage moves, the torques just before and after its reversal.
         """
         actions = Actions(state, self.bodies)
