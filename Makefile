@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: validate test long-test models setup clean
+.PHONY: validate test long-test models docs setup clean
 
 validate: setup
 	$(BIN)/python -m validation run
@@ -27,6 +27,11 @@ long-test: setup
 	$(BIN)/python -m validation run --suite hard --out results/hard
 	$(BIN)/python -m validation run --random 1000 --out results/random
 
+# the site of docs/, in site/
+docs: setup
+	$(BIN)/python -m pip install --quiet --editable ".[docs]"
+	$(BIN)/sphinx-build -W -q docs site
+
 models: setup
 	$(BIN)/python -m validation models
 
@@ -39,4 +44,4 @@ $(STAMP): pyproject.toml
 	touch $(STAMP)
 
 clean:
-	rm -rf $(VENV) results
+	rm -rf $(VENV) results site
