@@ -32,7 +32,7 @@ are below a hundredth of one."""
 
 
 class Roundings:
-    """Changes of numbers in their last digit, up or down, in EVALUATIONS ways at once."""
+    """Changes of numbers in their last digit, up or down, EVALUATIONS times at once."""
 
     def __init__(self, u1: Any) -> None:
         self.signs = _signs()

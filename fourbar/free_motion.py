@@ -185,12 +185,12 @@ class _Run:
             term.act(actions, state)
         return float(actions.work()[0])
 
-    def _either_way(self) -> list[float]:
+    def _both_senses(self) -> list[float]:
         q = float(self.y[0])
         return [self._generalised_force(q, *self._at(), rate) for rate in (VANISHING, -VANISHING)]
 
     def _is_dry(self) -> bool:
-        ahead, back = self._either_way()
+        ahead, back = self._both_senses()
         return ahead != back
 
     def _rates(self, _: float, y: Array) -> list[float]:
@@ -227,7 +227,7 @@ class _Run:
         if not self.dry:
             return True
         if rate == 0.0:
-            ahead, back = self._either_way()
+            ahead, back = self._both_senses()
             if ahead <= 0.0 <= back:
                 return False
             rate = 1.0 if ahead > 0.0 else -1.0

@@ -41,7 +41,7 @@ def require(key: str, value: object, *, positive: bool = False, at_least_zero: b
 
 @dataclass(frozen=True, slots=True)
 class Bar:
-    """A moving bar; massless unless told otherwise.
+    """A moving bar; massless unless stated otherwise.
 
     Parameters
     ----------

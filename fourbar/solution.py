@@ -1,4 +1,4 @@
-"""What `solve` returns: one array per quantity, and `None` for what was not asked for."""
+"""What `solve` returns: one array per quantity, and `None` for what was not requested."""
 
 import csv
 import io
@@ -33,13 +33,13 @@ class Solution:
     """The answer of the formulas at n positions, SI units and radians.
 
     Scalars have shape (n,), vectors (n, 2); NaN marks a position where a quantity has no value
-    (see `status`), None a quantity that was not asked for.
+    (see `status`), None a quantity that was not requested.
     """
 
     title: str
     drive_bar: int
     status_code: NDArray[np.uint8]
-    """0 ok: every quantity that was asked for is a number. 1 not_assembled, 2 singular (velocities are 0/0); of
+    """0 ok: every quantity that was requested is a number. 1 not_assembled, 2 singular (velocities are 0/0); of
     friction that depends on the pin forces: 3 jammed (no forces fulfil it: they are NaN; at rest, where it is the
     motion that would begin, torque_low or torque_high is), 4 several (more than one set does: those of the least
     friction); of springs, forces NaN: 5 no_direction (both ends in one point), 6 wound (turned beyond half a turn from

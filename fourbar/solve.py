@@ -337,7 +337,9 @@ def _started(scene: Scene) -> Scene:
     state = state_at(scene, begins)
     half = state.at.half
     assembled = (half.outer >= 0.0) & (half.inner >= 0.0)
-    return replace(scene, effects=tuple(effect.begun(state, assembled, begins.branch) for effect in scene.effects))
+    return replace(
+        scene, effects=tuple(effect.counted_from(state, assembled, begins.branch) for effect in scene.effects)
+    )
 
 
 def _refuse_wound(scene: Scene, at: Command) -> None:

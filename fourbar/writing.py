@@ -1,4 +1,4 @@
-"""Files appear whole or not at all: written under a temporary name beside the target, then renamed."""
+"""Files appear whole or not at all: written under a temporary name next to the target, then renamed."""
 
 import os
 import tempfile
@@ -8,7 +8,7 @@ from pathlib import Path
 def write_bytes(path: str | Path, data: bytes) -> None:
     """Write a file whole; on any failure the old file, or none, stays.
 
-    Raises OSError (full disk, read-only folder, a folder in the way).
+    Raises OSError (full disk, read-only folder, a folder of that name).
     """
     target = Path(path)
     if target.exists() and not target.is_file():

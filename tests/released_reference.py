@@ -1,7 +1,7 @@
 """A released linkage by Taylor series in 77 digits: the reference of the free motions.
 
 Shares nothing with the formulas. The coordinates are the three angles themselves, the equations
-d'Alembert's: with P the derivative of the loop's closure and t = P_x x P_y, the one way it can move,
+d'Alembert's: with P the derivative of the loop's closure and t = P_x x P_y, the one motion it can make,
     P alpha = gamma,   t . (M alpha - f) = 0,   so
     alpha = ((gamma_x P_y - gamma_y P_x) x M t + (t . f) t)/(t . M t).
 Nothing happens to them at a limit position. At a change point t = 0 and the quotient is 0/0, but the
@@ -21,7 +21,7 @@ from fourbar.linkage import MOVING_BARS, PINS
 from validation.engines.balls import closure
 
 BITS = 256
-"""Beside a change point the terms of 1/(t . M t) grow as SINGULAR^-ORDER = 1e-34, and cancel."""
+"""Near a change point the terms of 1/(t . M t) grow as SINGULAR^-ORDER = 1e-34, and cancel."""
 ORDER = 20
 TRUNCATION = 1e-16
 """Last terms of a step, rad; some hundred steps err by less than 1e-13."""
@@ -37,7 +37,7 @@ Three = Sequence[Ball]
 
 
 class Reference(NamedTuple):
-    """The motion at the times asked for, until it stopped."""
+    """The motion at the requested times, until it stopped."""
 
     theta_2: np.ndarray
     sine: np.ndarray
@@ -126,7 +126,7 @@ class Equations:
         closed = closure(x | {"theta_1": arb(linkage.ground_angle), "theta_2": arb(theta_2)}, branch)
         assert closed is not None
         theta = [arb(theta_2), *(arb.atan2(u[1], u[0]).mid() for u in closed[1:])]
-        t = self.way(theta)
+        t = self.direction(theta)
         return theta, [(arb(omega_2) * w / t[0]).mid() for w in t]
 
     def loop(self, C: Three, S: Three) -> tuple[list[Ball], list[Ball]]:
@@ -134,13 +134,13 @@ class Equations:
         _, a, b, c = self.lengths
         return [-a * S[0], -b * S[1], c * S[2]], [a * C[0], b * C[1], -c * C[2]]
 
-    def way(self, theta: Three) -> list[Ball]:
+    def direction(self, theta: Three) -> list[Ball]:
         """t = P_x x P_y."""
         return _cross(*self.loop([q.cos() for q in theta], [q.sin() for q in theta]))
 
     def stretch(self, theta: Three) -> float:
         """|t| of the product of the two longest moving bars: 0 at a change point."""
-        t = self.way(theta)
+        t = self.direction(theta)
         return float(_dot(t, t).sqrt()) / math.prod(sorted(map(float, self.lengths[1:]))[1:])
 
     def closed(self, theta: Three, omega: Three) -> tuple[list[Ball], list[Ball]]:
@@ -152,7 +152,7 @@ class Equations:
             det = xx * yy - xy * xy
             p, q = (yy * gap[0] - xy * gap[1]) / det, (xx * gap[1] - xy * gap[0]) / det
             theta = [(angle - p * x - q * y).mid() for angle, x, y in zip(theta, S, y_C, strict=True)]
-        t = self.way(theta)
+        t = self.direction(theta)
         share = _dot(t, omega) / _dot(t, t)
         return list(theta), [(w * share).mid() for w in t]
 

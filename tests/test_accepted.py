@@ -31,7 +31,7 @@ def test_nothing_got_worse_since_the_accepted_state() -> None:
 
 @pytest.mark.parametrize("turns", [0, 800])
 def test_a_row_states_the_condition_that_its_allowance_comes_from(turns: int) -> None:
-    """By which a move is told from round-off: one limit position has 7 digits, the next 13."""
+    """By which a move is distinguished from round-off: one limit position has 7 digits, the next 13."""
     name, scene = next((name, scene) for name, scene in SCENES if name == "triple_rocker")
     if turns:
         motion = replace(scene.motion, theta_2=np.array([2.0, 3.0]) + turns * 2.0 * np.pi)

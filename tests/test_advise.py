@@ -25,12 +25,12 @@ from validation.studies.cost.exhaustive import cheapest
 
 
 @pytest.mark.parametrize("omega", [10.0, 100.0, 1000.0])
-@pytest.mark.parametrize(("asked", "most"), [(1e-4, 75), (1e-6, 300), (2e-9, 1000)])
-def test_figures_of_the_crank_rocker(omega: float, asked: float, most: int) -> None:
-    advice = advise.advise(turning(omega, 72), asked)
+@pytest.mark.parametrize(("required", "most"), [(1e-4, 75), (1e-6, 300), (2e-9, 1000)])
+def test_figures_of_the_crank_rocker(omega: float, required: float, most: int) -> None:
+    advice = advise.advise(turning(omega, 72), required)
     assert advice.reached and advice.steps_per_revolution <= most, advice.reason
-    assert advice.best.errors.worst <= asked and advice.best.settings.integrator == "RK4"
-    serves = [attempt for attempt in advice.attempts if attempt.errors.worst <= advise.MARGIN * asked]
+    assert advice.best.errors.worst <= required and advice.best.settings.integrator == "RK4"
+    serves = [attempt for attempt in advice.attempts if attempt.errors.worst <= advise.MARGIN * required]
     assert advice.best.steps == min(attempt.steps for attempt in serves) < max(attempt.steps for attempt in serves)
 
 
@@ -61,7 +61,7 @@ def test_the_file_alone_keeps_the_error(tmp_path: Path) -> None:
     assert steps < 100 and errors(turning(), at, found).worst <= 1e-5
 
 
-def test_out_of_reach_is_said_with_what_would_reach_it(tmp_path: Path) -> None:
+def test_out_of_reach_is_reported_with_what_would_reach_it(tmp_path: Path) -> None:
     scene = tmp_path / "scene.toml"
     scene.write_text(fourbar.dump(turning(positions=12)))
     out = tmp_path / "none.xml"
@@ -74,12 +74,12 @@ def test_out_of_reach_is_said_with_what_would_reach_it(tmp_path: Path) -> None:
     assert result.return_value == 1 and "nothing to run through" in result.output
 
 
-@pytest.mark.parametrize("asked", [0.0, 1.0, -1e-3, math.nan])
-def test_an_error_is_between_0_and_1(asked: float) -> None:
+@pytest.mark.parametrize("required", [0.0, 1.0, -1e-3, math.nan])
+def test_an_error_is_between_0_and_1(required: float) -> None:
     with pytest.raises(fourbar.errors.InputError, match="above 0 and below 1"):
-        advise.advise(turning(), asked)
+        advise.advise(turning(), required)
     with pytest.raises(fourbar.errors.InputError, match="above 0 and below 1"):
-        dial.dialled(WITNESSES, asked)
+        dial.dialled(WITNESSES, required)
 
 
 def test_unseen_linkages_are_served_and_not_at_three_times_the_cheapest() -> None:
@@ -131,15 +131,15 @@ def test_a_measure_is_resumed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
     assert made == [0]
 
 
-@pytest.mark.parametrize("asked", [1e-3, 1e-7])
-def test_a_run_is_no_more_precise_than_asked(asked: float) -> None:
+@pytest.mark.parametrize("required", [1e-3, 1e-7])
+def test_a_run_is_no_more_precise_than_required(required: float) -> None:
     scene = turning(positions=90)
     witnesses = [witness for witness in WITNESSES if witness.through_time]
-    record = judge("s", scene, dial.dialled(witnesses, asked))
+    record = judge("s", scene, dial.dialled(witnesses, required))
     assert not [row for row in record.rows if row.verdict == FAILS]
     (answer,) = record.answers
     worst = max(row.error for row in record.rows if row.engine == "mujoco-simulated")
-    assert answer.evidence["wanted_error"] == asked and answer.evidence["expected_error"] <= asked
+    assert answer.evidence["wanted_error"] == required and answer.evidence["expected_error"] <= required
     # the engine's own prediction is what the formulas find, though it never saw them
     assert worst == pytest.approx(answer.evidence["expected_error"], rel=0.5)
     assert answer.evidence["steps"] < 628

@@ -135,13 +135,13 @@ def refused(arguments: list[str], words: list[str], folder: Path, capsys: pytest
     started = time.process_time()
     assert status([*arguments, "-o", str(folder / "written")]) == BAD_INPUT
     assert time.process_time() - started < PATIENCE
-    told = capsys.readouterr()
-    assert told.out == ""
-    assert told.err.startswith("error: ") and told.err.endswith("\n") and told.err.count("\n") == 1
-    assert "Traceback" not in told.err and len(told.err) <= LONGEST_LINE
-    assert told.err[:-1].isprintable()
+    printed = capsys.readouterr()
+    assert printed.out == ""
+    assert printed.err.startswith("error: ") and printed.err.endswith("\n") and printed.err.count("\n") == 1
+    assert "Traceback" not in printed.err and len(printed.err) <= LONGEST_LINE
+    assert printed.err[:-1].isprintable()
     for word in words:
-        assert word in told.err, told.err
+        assert word in printed.err, printed.err
     assert sorted(folder.rglob("*")) == before
 
 

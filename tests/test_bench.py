@@ -1,4 +1,4 @@
-"""The limits of speed: each is of a row that is measured, is told with its reason, and costs the run."""
+"""The limits of speed: each is of a row that is measured, is reported with its reason, and costs the run."""
 
 import math
 import shutil
@@ -74,7 +74,7 @@ def repository(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def test_a_slower_tree_is_told_by_every_timing(repository: Path) -> None:
+def test_a_slower_tree_is_found_by_every_timing(repository: Path) -> None:
     with (repository / "fourbar" / "__init__.py").open("a") as module:
         module.write(SLOWER)
     before = sorted(path for path in repository.iterdir())
@@ -95,13 +95,13 @@ def test_the_quicker_of_two_is_the_one_without_the_delay(repository: Path) -> No
     assert all(row.most < 0.7 for row in against.against("HEAD", 1000, 1, repository).values())
 
 
-def told(capsys: pytest.CaptureFixture[str], revision: str) -> tuple[int, str]:
+def reported(capsys: pytest.CaptureFixture[str], revision: str) -> tuple[int, str]:
     status = ended(["bench", "--against", revision, "--positions", "1000", "--rounds", "1"])
     return status, capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
-    ("revision", "said"),
+    ("revision", "words"),
     [
         ("no-such-revision", "must be a revision of the git repository"),
         ("--output=made", "must be a revision of the git repository"),
@@ -110,11 +110,11 @@ def told(capsys: pytest.CaptureFixture[str], revision: str) -> tuple[int, str]:
     ],
 )
 def test_a_revision_that_cannot_be_timed_is_one_line(
-    revision: str, said: str, repository: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    revision: str, words: str, repository: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(against, "TREE", repository)
-    status, line = told(capsys, revision)
-    assert status == BAD_INPUT and line.startswith("error: ") and line.count("\n") == 1 and said in line
+    status, line = reported(capsys, revision)
+    assert status == BAD_INPUT and line.startswith("error: ") and line.count("\n") == 1 and words in line
     assert {path.name for path in repository.iterdir()} == {".git", "fourbar"}
 
 
@@ -122,13 +122,13 @@ def test_without_a_repository_no_revision_exists(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(against, "TREE", tmp_path)
-    status, line = told(capsys, "HEAD")
+    status, line = reported(capsys, "HEAD")
     assert status == BAD_INPUT and line.count("\n") == 1
 
 
 def test_without_git_the_command_says_so(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     monkeypatch.setenv("PATH", "")
-    assert told(capsys, "HEAD") == (BROKEN, "error: bench --against needs git, which is not installed\n")
+    assert reported(capsys, "HEAD") == (BROKEN, "error: bench --against needs git, which is not installed\n")
 
 
 def test_the_ratios_are_printed_whole_on_a_narrow_terminal(

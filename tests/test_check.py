@@ -118,7 +118,7 @@ def same(scene: Scene) -> Scene:
 
 
 def inertial_times(scene: Scene, by_mass: float, by_inertia: float) -> Numbers:
-    """m a and I alpha by hand: what they add to static equilibrium is put on as loads at G, d'Alembert's way."""
+    """m a and I alpha by hand: what they add to static equilibrium is put on as loads at G, as d'Alembert does."""
     motion = solve(scene, at=(at := command(scene)))
     numbers: dict[str, list[np.ndarray]] = {name: [] for name in ("theta_2", *ALL)}
     for i in range(0, len(at.theta_2), EVERY):
@@ -216,9 +216,9 @@ def test_two_mistakes_in_two_columns_are_both_named(tmp_path: Path) -> None:
     numbers = right(scene)
     numbers |= {"torque": numbers["torque"] * 100.0, "F43": -numbers["F43"]}
     found = judged(scene, write(tmp_path / "theirs.csv", numbers))
-    told = {explanation.text[:14]: explanation for explanation in found.explanations}
-    assert told["units: every n"].quantities == ("torque",)
-    assert told["sign reversed,"].quantities == ("F43",)
+    found_causes = {explanation.text[:14]: explanation for explanation in found.explanations}
+    assert found_causes["units: every n"].quantities == ("torque",)
+    assert found_causes["sign reversed,"].quantities == ("F43",)
     assert not any(explanation.complete for explanation in found.explanations)
 
 
@@ -312,9 +312,9 @@ def test_the_thesis_itself_differs_and_its_unit_slip_is_hinted(
     cells = ",".join(x for name in forces for x in PUBLISHED[name])
     path.write_text(f"theta_2 [deg],torque [N cm],{heading}\n135,{PUBLISHED['T4']},{cells}\n")
     assert status(["check", str(MODELS / "thesis.toml"), str(path)]) == FAILED
-    told = capsys.readouterr().out
-    assert "0 of 5 numbers agree" in told
-    hint = next(line for line in told.splitlines() if line.startswith("looks like: m a"))
+    printed = capsys.readouterr().out
+    assert "0 of 5 numbers agree" in printed
+    hint = next(line for line in printed.splitlines() if line.startswith("looks like: m a"))
     assert "kg cm/s^2 added to N" in hint
     assert "F12" in hint
 
@@ -350,14 +350,14 @@ def test_a_bad_table_is_one_line(
     path = tmp_path / "theirs.csv"
     path.write_bytes(text if isinstance(text, bytes) else text.encode())
     code = status(["check", str(MODELS / "thesis.toml"), str(path)])
-    said = capsys.readouterr()
+    printed = capsys.readouterr()
     if what == "endless exponent":  # a zero, printed to many digits: judged like any other
         assert code == FAILED
         return
     assert code == BAD_INPUT
-    assert words in said.err
-    assert len(said.err.splitlines()) == 1
-    assert "\x1b" not in said.err
+    assert words in printed.err
+    assert len(printed.err.splitlines()) == 1
+    assert "\x1b" not in printed.err
 
 
 def test_a_table_that_is_too_large_or_missing_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

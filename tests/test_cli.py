@@ -32,18 +32,18 @@ CONTRACT = (
     "torque", "drive_bar", "sin_mu", "condition", "assembled",
 )  # fmt: skip
 """The keys that programs which read the JSON rely on."""
-Told = tuple[int, str, str]
-Fourbar = Callable[..., Told]
+Ended = tuple[int, str, str]
+Fourbar = Callable[..., Ended]
 
 
 @pytest.fixture
 def run(capsys: pytest.CaptureFixture[str]) -> Fourbar:
     """Runs a command in this process: exit status, standard output, standard error."""
 
-    def call(*arguments: object) -> Told:
+    def call(*arguments: object) -> Ended:
         code = status([str(argument) for argument in arguments])
-        told = capsys.readouterr()
-        return code, told.out, told.err
+        printed = capsys.readouterr()
+        return code, printed.out, printed.err
 
     return call
 
@@ -141,7 +141,7 @@ def test_degrees_are_of_angles_alone_and_named(run: Fourbar) -> None:
     assert float(rows[90]["theta_2 [deg]"]) == pytest.approx(90.0, rel=1e-15) and "theta_2" not in rows[0]
 
 
-def test_the_table_says_what_was_asked_and_in_what_units(run: Fourbar) -> None:
+def test_the_table_says_what_was_requested_and_in_what_units(run: Fourbar) -> None:
     code, out, err = run("analyze", MODELS / "thesis.toml")
     assert (code, err) == (HOLDS, "")
     lines = out.split("\n")
@@ -210,7 +210,7 @@ def test_the_shell_completes(run: Fourbar, monkeypatch: pytest.MonkeyPatch) -> N
     assert code == HOLDS and "compdef" in out
 
 
-def test_a_narrow_terminal_gets_whole_columns_and_is_told_what_is_missing() -> None:
+def test_a_narrow_terminal_gets_whole_columns_and_the_names_of_what_is_missing() -> None:
     scene = crank_rocker()
     for width in (40, 80, 120):
         text = tables_text(scene, width)
@@ -284,14 +284,14 @@ def test_classify_says_what_turns_and_how_far(run: Fourbar) -> None:
     assert [float(cell) for cell in row[4:6]] == pytest.approx([folded, folded - 180.0], abs=6e-5)
     least, greatest = angle(d - a, b, c), angle(d + a, b, c)
     swung = angle(b - a, d, c) - angle(b + a, d, c)
-    one_way = folded - stretched
-    for said in (
+    one_stroke = folded - stretched
+    for line in (
         f"angle between coupler and output: {least:.4f} deg at theta_2 = 0.0000 deg "
         f"to {greatest:.4f} deg at 180.0000 deg",
         f"smallest transmission angle: {least:.4f} deg",
-        f"slower stroke of the output over the faster, at constant omega_2: {one_way / (360.0 - one_way):.4f}",
+        f"slower stroke of the output over the faster, at constant omega_2: {one_stroke / (360.0 - one_stroke):.4f}",
     ):
-        assert said in lines
+        assert line in lines
     assert f"output {abs(swung):.4f} deg" in lines[3]
     assert "change points: theta_2 = 0.0000 deg and 180.0000 deg" in run("classify", 2, 1, 2, 1)[1]
     assert len(run("classify", 3, 1, 1, 1)[1].splitlines()) == 3  # a structure does not move
@@ -339,7 +339,7 @@ def test_what_goes_wrong_is_one_line_and_a_status(
     monkeypatch.setattr(import_module("fourbar.solve"), "solve", broken)
     monkeypatch.delenv("FOURBAR_TRACEBACK", raising=False)
     found, out, err = run("analyze", MODELS / "thesis.toml", "--json", "-o", tmp_path / "out")
-    # after an interrupt click ends the line that the terminal has begun with ^C
+    # after an interrupt click ends the line that the terminal has started with ^C
     assert (found, out, err.strip().count("\n")) == (code, "", 0) and not list(tmp_path.iterdir())
     if isinstance(error, RuntimeError):
         monkeypatch.setenv("FOURBAR_TRACEBACK", "1")
@@ -387,8 +387,8 @@ def test_the_command_line_starts_light() -> None:
     heavy = "pint rich matplotlib scipy mujoco pinocchio jinja2"
     code = f"import sys, fourbar.cli; print([m for m in {heavy.split()!r} if m in sys.modules])"
     assert child("-c", code).stdout == "[]\n"
-    told = child("-m", "fourbar", "--version")
-    assert (told.returncode, told.stdout) == (0, f"fourbar, version {fourbar.__version__}\n")
+    done = child("-m", "fourbar", "--version")
+    assert (done.returncode, done.stdout) == (0, f"fourbar, version {fourbar.__version__}\n")
 
 
 @pytest.mark.parametrize("arguments", [("classify", "3", "1", "2", "3"), ("analyze", "models/thesis.toml", "--json")])
@@ -396,16 +396,16 @@ def test_a_reader_that_leaves_early_is_no_error(arguments: tuple[str, ...]) -> N
     reading, writing = os.pipe()
     os.close(reading)
     command = [sys.executable, "-m", "fourbar", *arguments]
-    told = subprocess.run(command, cwd=ROOT, stdout=writing, stderr=subprocess.PIPE, text=True, check=False)
+    done = subprocess.run(command, cwd=ROOT, stdout=writing, stderr=subprocess.PIPE, text=True, check=False)
     os.close(writing)
-    assert (told.returncode, told.stderr) == (HOLDS, "")
+    assert (done.returncode, done.stderr) == (HOLDS, "")
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="only Linux has a device that is always full")
 def test_standard_output_that_is_full() -> None:
     with Path("/dev/full").open("w") as full:
-        told = subprocess.run(
+        done = subprocess.run(
             [sys.executable, "-m", "fourbar", "analyze", "models/thesis.toml"],
             cwd=ROOT, stdout=full, stderr=subprocess.PIPE, text=True, check=False,
         )  # fmt: skip
-    assert (told.returncode, told.stderr.count("\n")) == (BROKEN, 1) and "No space left" in told.stderr
+    assert (done.returncode, done.stderr.count("\n")) == (BROKEN, 1) and "No space left" in done.stderr

@@ -1,4 +1,4 @@
-"""Two compiled models are compared by every field that MuJoCo has: each is told apart, or it cannot act."""
+"""Two compiled models are compared by every field that MuJoCo has: each is distinguished, or it cannot act."""
 
 import re
 from collections.abc import Iterator
@@ -61,7 +61,7 @@ def compiled(text: str) -> mujoco.MjModel:
 
 
 @cache
-def told(text: str) -> Described:
+def written(text: str) -> Described:
     return described(Anatomy(compiled(text), {}))
 
 
@@ -89,7 +89,7 @@ def differing(text: str, field: str, element: int) -> set[str]:
         else:
             setattr(thing, field, type(getattr(thing, field))(value))
         try:
-            found |= {d.key for d in differences(told(text), described(Anatomy(model, {})))}
+            found |= {d.key for d in differences(written(text), described(Anatomy(model, {})))}
         except (InputError, IndexError, StopIteration, ValueError):  # no compiled model has an index out of range
             found.add("refused")
     return found
@@ -100,7 +100,7 @@ def test_every_field_is_on_a_list() -> None:
     assert set(COMPARED) <= set(ALL)
     for known in (fields.GATED, fields.FOLLOWS, fields.CANNOT_ACT):  # and no list has what MuJoCo has not
         assert [each for each in known if not any(fnmatchcase(field, each) for field in ALL)] == []
-    keys = {re.sub(r"\d+", "*", key) for key in told(GENERATED)}
+    keys = {re.sub(r"\d+", "*", key) for key in written(GENERATED)}
     assert {key for key in fields.GATED.values() if key not in keys} == set()
 
 

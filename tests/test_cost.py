@@ -92,7 +92,7 @@ def test_pads_do_what_an_edit_of_the_compiled_model_does() -> None:
     assert padded == pytest.approx(edited, rel=0.5) and padded < soft / 30.0
 
 
-def test_only_tolerance_0_is_tight_beside_a_heavy_flywheel() -> None:
+def test_only_tolerance_0_is_tight_with_a_heavy_flywheel() -> None:
     error = tried(turning())
     heavy = replace(BEST, flywheel=1e8)
     assert error(replace(heavy, tolerance=1e-8)).worst > 10.0 * error(heavy).worst
@@ -191,14 +191,14 @@ def test_a_jump_in_one_pin_force_is_named_and_its_law_fails(jumping: tuple[float
     ladder = [replace(each, F43=error) for each, error in zip(ladder, jumping, strict=True)]
     found = {law.quantity: law for law in laws.laws({"Euler, tc held": ladder})}
     assert {name for name, law in found.items() if not law.holds} == {"F43"} and found["F43"].decided
-    said = f"jumps from 4.0e-03 to {jumping[5]:.1e} at 640/rev"
-    assert laws.warnings({"Euler, tc held": ladder}) == [f"Euler, tc held: F43: {said}"]
+    jump = f"jumps from 4.0e-03 to {jumping[5]:.1e} at 640/rev"
+    assert laws.warnings({"Euler, tc held": ladder}) == [f"Euler, tc held: F43: {jump}"]
     assert "F43 jumps" in orders.statement({"Euler, tc held": ladder})
     drawn = {line.get_gid(): len(line.get_xdata()) for axes in orders.picture({"Euler, tc held": ladder}, "").axes
              for line in axes.lines if line.get_gid() and len(line.get_xdata())}  # fmt: skip
     assert drawn == {"jump-F43": 1}
     (line,) = laws.lines(list(found.values()))
-    assert f"; F43: FAILS, {said}" in line and "torque, F12, F32, F14: holds, 1.00" in line
+    assert f"; F43: FAILS, {jump}" in line and "torque, F12, F32, F14: holds, 1.00" in line
 
 
 def test_each_quantity_has_its_own_order_and_floor() -> None:
@@ -209,7 +209,7 @@ def test_each_quantity_has_its_own_order_and_floor() -> None:
     assert line.endswith("F32 beyond 20 (1.0e-03)") and "torque" not in line
 
 
-def test_a_quantity_that_no_timestep_brings_down_is_no_law_and_is_said() -> None:
+def test_a_quantity_that_no_timestep_brings_down_is_no_law_and_is_reported() -> None:
     """In the thesis's mechanism the torque falls by its order with Euler, and the pin forces are wrong throughout."""
     ladder = [replace(point(160.0 * 2**k, 0.05 / 2**k), F12=error) for k, error in enumerate((1.8, 0.9, 1.1, 0.7))]
     found = {law.quantity: law for law in laws.laws({"Euler, tc held": ladder})}
@@ -262,7 +262,7 @@ def test_the_command_writes_table_report_and_pictures(tmp_path: Path, monkeypatc
     every = study.curves
     monkeypatch.setattr(study, "curves", lambda scene: [c for c in every(scene) if c.name in few])
     monkeypatch.setattr(study, "FORWARD_STEPS", (20, 40))
-    monkeypatch.setattr(study, "ASKED", (1e-3, 1e-5))
+    monkeypatch.setattr(study, "REQUIRED", (1e-3, 1e-5))
     monkeypatch.setattr(study, "ROUNDS", 1)
     result = CliRunner().invoke(cost, [str(scene), "--out", str(tmp_path / "out")], standalone_mode=False)
     assert result.exception is None and result.return_value == 0, result.output

@@ -74,7 +74,7 @@ IDENTITY = replace(ROW, engine="formulas", quantity="closure")
         ([replace(IDENTITY, quantity="theta_2")], "All 1 comparisons hold: 1 agrees", HOLDS),  # with an exact solution
     ],
 )
-def test_all_hold_is_said_of_what_was_compared_alone(of: list[Row], sentence: str, status: int) -> None:
+def test_all_hold_counts_what_was_compared_alone(of: list[Row], sentence: str, status: int) -> None:
     counts = Counts(of)
     assert (counts.sentence(), counts.status) == (sentence, status)
 
@@ -149,7 +149,7 @@ def test_where_no_loop_closes_no_identity_is_counted_as_held() -> None:
     assert verdicts["free-body", "assembled"] == AGREES
 
 
-def test_an_identity_that_is_asked_nowhere_is_not_counted_as_held(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_identity_that_is_due_nowhere_is_not_counted_as_held(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(
         "validation.compare.identities.reversing", lambda scene, solution, _: np.ones(len(solution), bool)
     )
@@ -245,7 +245,7 @@ def test_junit_skips_what_was_not_compared_and_fails_what_fails_as_before() -> N
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "said", "code"),
+    ("old", "new", "sentence", "code"),
     [
         (rows(agree=1), rows(agree=1), "No regression in 1 rows: 1 same. New run: All 1 comparisons hold", HOLDS),
         (rows(refuse=1), rows(refuse=1), "Nothing was compared with the old run in 1 rows: 1 same", FAILED),
@@ -256,11 +256,11 @@ def test_junit_skips_what_was_not_compared_and_fails_what_fails_as_before() -> N
     ],
 )
 def test_two_runs_without_a_comparison_in_common_are_no_success(
-    old: list[Row], new: list[Row], said: str, code: int, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    old: list[Row], new: list[Row], sentence: str, code: int, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     folders = [str(save(tmp_path / name, each)) for name, each in (("old", old), ("new", new))]
     assert status(["compare", *folders]) == code
-    assert said in capsys.readouterr().out
+    assert sentence in capsys.readouterr().out
     found = differences((HERE, old), (HERE, new))
     sentence = render.verdict(found)
     assert sentence in html.unescape(render.html(found)) and sentence in render.markdown(found)
@@ -271,12 +271,12 @@ def test_of_two_rows_of_one_name_the_worse_one_counts() -> None:
     assert differences((HERE, rows(agree=1)), (HERE, both)).regressions
 
 
-def test_numbers_that_nothing_can_be_told_of_do_not_agree(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    # 1e-13 rad beside a limit of theta_2 the condition of the accelerations is about 1e-13
+def test_numbers_without_a_digit_do_not_agree(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    # 1e-13 rad from a limit of theta_2 the condition of the accelerations is about 1e-13
     rocker = fourbar.uniform(0.3, 0.25, 0.1, 0.22)
     limit = limit_positions(rocker)[0].theta_2
-    beside = (Scene(rocker, fourbar.Motion(limit + side * 1e-13, 1.0)) for side in (1.0, -1.0))
-    scene = next(each for each in beside if fourbar.solve(each).assembled.all())
+    near = (Scene(rocker, fourbar.Motion(limit + side * 1e-13, 1.0)) for side in (1.0, -1.0))
+    scene = next(each for each in near if fourbar.solve(each).assembled.all())
     (tmp_path / "scene.toml").write_text(fourbar.dump(scene))
     (tmp_path / "theirs.csv").write_text(f"theta_2, torque\n{scene.motion.theta_2!r}, 17.0\n")
     assert status(["check", str(tmp_path / "scene.toml"), str(tmp_path / "theirs.csv")]) == FAILED
@@ -301,7 +301,7 @@ def test_a_harness_that_was_tried_on_no_changing_mutant_is_no_success(
     tally = {"mutants": 0, "changing": 0, "caught": 0, "missed": []}
     monkeypatch.setattr(mutation, "_generate", lambda *_: None)
     for changing, caught, code in ((0, 0, FAILED), (100, 94, FAILED), (100, 95, HOLDS)):
-        told = json.dumps({"mobility": tally | {"changing": changing, "caught": caught}})
-        done = subprocess.CompletedProcess([], 0, told)
+        printed = json.dumps({"mobility": tally | {"changing": changing, "caught": caught}})
+        done = subprocess.CompletedProcess([], 0, printed)
         monkeypatch.setattr(mutation.subprocess, "run", lambda *_, done=done, **__: done)
         assert mutation._harness(tmp_path, tmp_path, "mobility", 0, tmp_path) == code

@@ -1,4 +1,4 @@
-"""Over the workers of a Dask scheduler: the same bytes, also when a worker is killed on the way."""
+"""Over the workers of a Dask scheduler: the same bytes, also when a worker is killed during the run."""
 
 import json
 import os
@@ -86,17 +86,17 @@ def test_no_scheduler_is_one_line(address: str, tmp_path: Path) -> None:
 
 
 def test_a_scheduler_without_workers_is_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A process of its own: a second event loop beside the cluster's may take long to start."""
+    """A process of its own: a second event loop next to the cluster's may take long to start."""
     monkeypatch.setattr(pool, "STALL", 0.5)
-    told = tmp_path / "scheduler.json"
+    written = tmp_path / "scheduler.json"
     line = [sys.executable, "-m", "distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", "0"]
-    line += ["--no-dashboard", "--scheduler-file", str(told)]
+    line += ["--no-dashboard", "--scheduler-file", str(written)]
     empty = subprocess.Popen(line, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     try:
-        while not (told.is_file() and told.read_text()):
+        while not (written.is_file() and written.read_text()):
             assert empty.poll() is None
             time.sleep(0.1)
-        address = json.loads(told.read_text())["address"]
+        address = json.loads(written.read_text())["address"]
         with pytest.raises(pool.NoWorkersError, match="no workers; start some"):
             list(run(Random(1, SEED, TYPES), tmp_path / "out", EXACT, scheduler=address))
     finally:

@@ -213,7 +213,7 @@ SHAPES = {
 
 
 def of(lengths: tuple[float, ...]) -> fourbar.FourBar:
-    """A linkage with masses beside their bars."""
+    """A linkage with masses off their bars."""
     d, *moving, theta_1 = lengths
     bars = (fourbar.Bar(x, 2.0 + x, 0.01, (0.4 * x, phase)) for x, phase in zip(moving, (0.5, -0.7, 2.0), strict=True))
     return fourbar.FourBar(d, *bars, ground_angle=theta_1)
@@ -330,7 +330,7 @@ def test_bars_whose_inertia_about_the_pin_is_one() -> None:
 
 @pytest.mark.parametrize("drive", [2, 3, 4])
 def test_springs_tables_and_rest_have_the_torque_of_the_thirteen_equations(drive: int) -> None:
-    """What depends on O4, on theta_2 and on rest beside motion, in one sweep."""
+    """What depends on O4, on theta_2 and on rest next to motion, in one sweep."""
     linkage = of(SHAPES["crank-rocker"])
     ends = fourbar.effects.Point(1, 0.2, 0.3), fourbar.effects.Point(4, 0.15, 0.2)
     table = fourbar.effects.Table((0.0, 2.0, 6.0), (1.0, 3.0, -1.0))

@@ -73,12 +73,12 @@ def scene(*names: str, steps: int = 12) -> Scene:
     )
 
 
-def failing(asked: Scene, witnesses: list[Any]) -> list[tuple[str, str, str]]:
-    return [(r.engine, r.quantity, r.reason) for r in judge("scene", asked, witnesses).rows if r.failed]
+def failing(posed: Scene, witnesses: list[Any]) -> list[tuple[str, str, str]]:
+    return [(r.engine, r.quantity, r.reason) for r in judge("scene", posed, witnesses).rows if r.failed]
 
 
-def refusing(asked: Scene, witnesses: list[Any]) -> set[str]:
-    return {r.engine for r in judge("scene", asked, witnesses).rows if r.verdict == "refuses"}
+def refusing(posed: Scene, witnesses: list[Any]) -> set[str]:
+    return {r.engine for r in judge("scene", posed, witnesses).rows if r.verdict == "refuses"}
 
 
 def test_every_effect_of_the_registry_is_here() -> None:
@@ -87,17 +87,17 @@ def test_every_effect_of_the_registry_is_here() -> None:
 
 @pytest.mark.parametrize("names", [*((one,) for one in ACTING), *combinations(ACTING, 2)], ids="+".join)
 def test_exact_engines_agree(names: tuple[str, ...]) -> None:
-    asked = scene(*names)
-    assert failing(asked, EXACT) == []
-    assert refusing(asked, EXACT) == set()
+    posed = scene(*names)
+    assert failing(posed, EXACT) == []
+    assert refusing(posed, EXACT) == set()
 
 
 @pytest.mark.parametrize("names", [*((one,) for one in ACTING), tuple(ACTING)], ids="+".join)
 def test_the_simulation_agrees_or_says_what_it_has_no_counterpart_for(names: tuple[str, ...]) -> None:
-    asked = scene(*names)
-    assert failing(asked, SIMULATED) == []
+    posed = scene(*names)
+    assert failing(posed, SIMULATED) == []
     missing = NO_COUNTERPART["mujoco-simulated"] & set(names)
-    assert refusing(asked, SIMULATED) == ({"mujoco-simulated"} if missing else set())
+    assert refusing(posed, SIMULATED) == ({"mujoco-simulated"} if missing else set())
 
 
 @pytest.mark.parametrize("pair", list(combinations(sorted(ACTING.keys() - NO_COUNTERPART["mujoco-simulated"]), 2)))
@@ -108,22 +108,22 @@ def test_the_simulation_agrees_on_pairs(pair: tuple[str, str]) -> None:
 @pytest.mark.parametrize("drive", [2, 3, 4])
 @pytest.mark.parametrize("branch", [1, -1])
 def test_all_at_once_on_every_drive_and_branch(drive: int, branch: int) -> None:
-    asked = scene(*ACTING)
-    motion = replace(asked.motion, branch=branch, omega_2=-7.0)
-    assert failing(replace(asked, drive_bar=drive, motion=motion), EXACT) == []
+    posed = scene(*ACTING)
+    motion = replace(posed.motion, branch=branch, omega_2=-7.0)
+    assert failing(replace(posed, drive_bar=drive, motion=motion), EXACT) == []
 
 
 def test_a_turned_frame_turns_gravity_with_it() -> None:
     """Ground, input and gravity turned by one angle: the same torque and the same forces, turned."""
-    asked, by = scene("gravity"), 0.7
-    motion = replace(asked.motion, theta_2=fourbar.Sweep(0.13 + by, 0.13 + by + 2 * np.pi, 12))
+    posed, by = scene("gravity"), 0.7
+    motion = replace(posed.motion, theta_2=fourbar.Sweep(0.13 + by, 0.13 + by + 2 * np.pi, 12))
     turned = replace(
-        asked,
-        linkage=replace(asked.linkage, ground_angle=asked.linkage.ground_angle + by),
+        posed,
+        linkage=replace(posed.linkage, ground_angle=posed.linkage.ground_angle + by),
         motion=motion,
         effects=(Gravity(9.81, 0.3 + by),),
     )
-    one, other = fourbar.solve(asked), fourbar.solve(turned)
+    one, other = fourbar.solve(posed), fourbar.solve(turned)
     assert one.torque is not None and one.F32 is not None and other.F32 is not None
     # 60 roundings of numbers of the size of the largest
     assert other.torque == pytest.approx(one.torque, abs=60 * 2.0**-52 * np.abs(one.torque).max(), rel=0)
@@ -190,10 +190,10 @@ def formulas_see(change: Callable[[Scene], Scene]) -> Iterator[None]:
 
 
 def each_term(change: Callable[[Effect], list[Effect]]) -> Callable[[Scene], Scene]:
-    def changed_scene(asked: Scene) -> Scene:
-        terms = [new for term in (*asked.loads, *asked.effects) for new in change(term)]
+    def changed_scene(posed: Scene) -> Scene:
+        terms = [new for term in (*posed.loads, *posed.effects) for new in change(term)]
         loads = tuple(term for term in terms if isinstance(term, Load))
-        return replace(asked, loads=loads, effects=tuple(term for term in terms if not isinstance(term, Load)))
+        return replace(posed, loads=loads, effects=tuple(term for term in terms if not isinstance(term, Load)))
 
     return changed_scene
 
@@ -215,27 +215,27 @@ class Lightening(Flywheel):
 @pytest.mark.parametrize("name", ACTING)
 @pytest.mark.parametrize("fault", ["wrong sign", "wrong pin or bar", "applied twice", "missing"])
 def test_a_fault_in_the_formulas_fails_the_run(name: str, fault: str) -> None:
-    asked, effect = scene(name), ACTING[name]
+    posed, effect = scene(name), ACTING[name]
     inverse = [witness for witness in EXACT if witness.name in INVERSE]
     if fault == "missing":
         with formulas_see(each_term(lambda term: [])):
-            found = failing(asked, inverse)
+            found = failing(posed, inverse)
     elif fault == "wrong pin or bar":
         with formulas_see(each_term(lambda term: [moved(term)])):
-            found = failing(asked, inverse)
+            found = failing(posed, inverse)
     elif fault == "applied twice":
         with formulas_see(each_term(lambda term: [term, term])):
-            found = failing(asked, inverse)
+            found = failing(posed, inverse)
     elif name == "pin_friction":
         with formulas_see(each_term(reversed_slip)):
-            found = failing(asked, inverse)
+            found = failing(posed, inverse)
     elif name == "flywheel":
         with formulas_see(each_term(lambda term: [Lightening(0.02, 2)])):
-            found = failing(asked, inverse)
+            found = failing(posed, inverse)
     else:
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr(type(effect), "act", changed(effect, -1.0))
-            found = failing(asked, inverse)
+            found = failing(posed, inverse)
     assert {engine for engine, _, _ in found} >= INVERSE
     assert "torque" in {quantity for _, quantity, _ in found}
 
@@ -297,13 +297,13 @@ def test_the_work_of_an_effect_is_that_of_the_forces_on_the_free_bodies(
     name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Power = sum of F v + M omega, with F and M of the witness and velocities of the first pins; a sign must show."""
-    asked, effect = scene(name), ACTING[name]
-    where, linkage = command(asked), asked.linkage
+    posed, effect = scene(name), ACTING[name]
+    where, linkage = command(posed), posed.linkage
     moving = state(linkage, where.theta_2, where.branch, 10.0, 3.0)
     n = len(where.theta_2)
     closed = close(linkage, where.theta_2, where.branch)
     on = free_body_effects.acting(
-        asked, free_body.move(linkage, where.theta_2, np.full(n, 10.0), np.full(n, 3.0), *closed.theta)
+        posed, free_body.move(linkage, where.theta_2, np.full(n, 10.0), np.full(n, 3.0), *closed.theta)
     )
     pin = {2: 0.0j, 3: moving.velocity(2, linkage.input.length), 4: 0.0j}
     by_bar = {bar: dot(on.force[bar], pin[bar]) + on.moment[bar] * moving.omega(bar) for bar in MOVING_BARS}

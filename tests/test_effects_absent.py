@@ -139,14 +139,14 @@ print(*sorted({{row.engine for row in record.rows}}))
 """
 
 
-def asked(motion: str) -> list[str]:
+def answers_of(motion: str) -> list[str]:
     code = POSITIONS_ONLY.format(motion=motion)
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT)
     return done.stdout.splitlines()
 
 
 def test_positions_alone_start_no_force_engine() -> None:
-    engines, *left_out, answered = asked("fourbar.Motion(fourbar.Sweep(0.0, 6.0, 20))")
+    engines, *left_out, answered = answers_of("fourbar.Motion(fourbar.Sweep(0.0, 6.0, 20))")
     assert engines == "[]" and answered == "formulas free-body"
     assert {line.split(":")[0] for line in left_out} == {"pinocchio-inverse", "mujoco-inverse", "mujoco-simulated"}
     assert all("the scene states positions only" in line for line in left_out)
@@ -160,11 +160,11 @@ def test_positions_alone_start_no_force_engine() -> None:
     ],
 )
 def test_what_does_not_move_through_time_is_not_simulated(motion: str, reason: str) -> None:
-    _, *left_out, answered = asked(motion)
+    _, *left_out, answered = answers_of(motion)
     assert left_out == [f"mujoco-simulated: {reason}"]
     assert answered == "formulas free-body mujoco-inverse pinocchio-inverse"
 
 
 def test_equal_positions_are_evaluated_once() -> None:
-    _, *left_out, _ = asked("fourbar.Motion([1.0, 1.0, 1.0], 2.0)")
+    _, *left_out, _ = answers_of("fourbar.Motion([1.0, 1.0, 1.0], 2.0)")
     assert "positions: all are the same, one is evaluated" in left_out

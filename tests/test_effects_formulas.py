@@ -203,12 +203,12 @@ def test_jamming_is_a_status_and_leaves_no_force() -> None:
 
 @pytest.mark.parametrize("friction", [Friction.at(O2=0.02, B=0.03), PinFriction.at(O2=(0.2, 0.01), B=(0.3, 0.02))])
 def test_at_rest_the_interval_is_that_of_beginning_to_move(friction: object) -> None:
-    """Its ends are the limits of the torque for slow motions either way; at rest itself it is their inside."""
+    """Its ends are the limits of the torque for slow motions in either sense; at rest itself it is their inside."""
     scene = alone(Gravity(), friction)
     rest = solve(scene)
     slow = [solve(replace(scene, motion=replace(scene.motion, omega_2=speed))).torque for speed in (1e-9, -1e-9)]
     assert rest.torque_low is not None and rest.torque_high is not None and rest.torque is not None
-    # (1e-9 rad/s)^2 of inertia is nothing beside these torques
+    # (1e-9 rad/s)^2 of inertia is nothing against these torques
     assert rest.torque_high == pytest.approx(np.maximum(*slow), rel=1e-13)
     assert rest.torque_low == pytest.approx(np.minimum(*slow), rel=1e-13)
     assert ((rest.torque_low < rest.torque) & (rest.torque < rest.torque_high)).all()

@@ -71,7 +71,7 @@ def windage(monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
     vars(effects).pop("Windage", None)
 
 
-def asked() -> Scene:
+def guide_scene() -> Scene:
     return loads(SCENE + block("toml"))
 
 
@@ -85,7 +85,7 @@ def test_the_page_is_one_page() -> None:
 
 
 def test_the_example_is_read_written_and_agreed_on(windage: Any) -> None:
-    scene = asked()
+    scene = guide_scene()
     assert scene.effects == (windage(4, 0.002),)
     assert loads(dump(scene)).effects == scene.effects
     assert REGISTRY["windage"].example in block("toml")
@@ -100,40 +100,40 @@ def test_engines_without_its_row_refuse_the_example(
     windage: Any, table: dict[str, Any], engines: set[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.delitem(table, "windage")
-    assert failing(asked(), EXACT) == []
-    found = refusals(asked(), EXACT)
+    assert failing(guide_scene(), EXACT) == []
+    found = refusals(guide_scene(), EXACT)
     assert found.keys() == engines
     assert all("'windage'" in reason for reason in found.values())
 
 
 def test_mjcf_has_no_row_of_the_example_and_refuses_it(windage: Any) -> None:
-    assert failing(asked(), SIMULATED) == []
-    found = refusals(asked(), SIMULATED)
+    assert failing(guide_scene(), SIMULATED) == []
+    found = refusals(guide_scene(), SIMULATED)
     assert found.keys() == {"mujoco-simulated"} and "'windage'" in found["mujoco-simulated"]
     with pytest.raises(LimitError, match="'windage'"):
-        mjcf(asked())
+        mjcf(guide_scene())
 
 
 def test_without_its_row_nothing_is_judged_by_another_scale(windage: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delitem(in_scales.SIZE_OF, "windage")
     with pytest.raises(FourBarError, match="'windage'"):
-        judge("scene", asked(), EXACT)
+        judge("scene", guide_scene(), EXACT)
 
 
 def test_without_its_row_a_file_neither_reads_nor_writes_the_example(
     windage: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    scene = asked()
+    scene = guide_scene()
     monkeypatch.delitem(REGISTRY, "windage")
     with pytest.raises(InputError, match=r"effects\.windage"):
-        asked()
+        guide_scene()
     with pytest.raises(InputError, match=r"effects\.windage"):
         dump(scene)
 
 
 def test_the_drive_makes_up_for_what_the_example_takes(windage: Any) -> None:
     """Power c |omega|^3, omega that of the free bodies."""
-    scene = asked()
+    scene = guide_scene()
     with_it, without = solve(scene).torque, solve(replace(scene, effects=())).torque
     assert with_it is not None and without is not None
     omega_4 = FreeBody().answer(scene, command(scene)).quantities["omega_4"]
@@ -154,7 +154,7 @@ def test_a_fault_in_the_example_is_caught(windage: Any, place: str, monkeypatch:
         monkeypatch.setattr(windage, "act", three_times)
     else:
         monkeypatch.setitem(on_trees.TERM_OF, "windage", three_times)
-    assert "torque" in {quantity for _, quantity, _ in failing(asked(), EXACT)}
+    assert "torque" in {quantity for _, quantity, _ in failing(guide_scene(), EXACT)}
 
 
 @pytest.mark.parametrize("key", REGISTRY)

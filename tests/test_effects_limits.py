@@ -48,7 +48,7 @@ def test_a_spring_with_both_ends_in_one_pin_has_no_direction(name: str, pin: str
     for quantity in ("F12", "F32", "F43", "F14", "torque", "torque_error", "force_error"):
         assert np.isnan(getattr(solution, quantity)).all(), quantity
     assert solution.omega_4 is not None and np.isfinite(solution.omega_4).all()
-    assert solve(scene, "velocity").status == ["ok"] * 41  # nothing is asked of the spring
+    assert solve(scene, "velocity").status == ["ok"] * 41  # the spring plays no part
     assert [row for row in judge("scene", scene).rows if row.failed] == []
 
 

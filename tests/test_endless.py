@@ -39,20 +39,20 @@ READING = [
 
 @pytest.mark.timeout(30)
 @pytest.mark.parametrize("what", ["pipe", "device", "directory"])
-@pytest.mark.parametrize("asked", READING, ids=lambda asked: " ".join(asked[:2]))
+@pytest.mark.parametrize("line", READING, ids=lambda line: " ".join(line[:2]))
 def test_what_may_never_end_is_not_waited_for(
-    asked: list[str], what: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    line: list[str], what: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     endless = {"pipe": tmp_path / "pipe", "device": Path("/dev/zero"), "directory": tmp_path / "folder"}[what]
     os.mkfifo(tmp_path / "pipe")
     (tmp_path / "folder").mkdir()
     before = sorted(tmp_path.rglob("*"))
     out = str(tmp_path / "out")
-    program, *arguments = (part.replace("ENDLESS", str(endless)).replace("OUT", out) for part in asked)
+    program, *arguments = (part.replace("ENDLESS", str(endless)).replace("OUT", out) for part in line)
     status = fourbar.cli.status if program == "fourbar" else validation.cli.status
     assert status(arguments) == BAD_INPUT
-    told = capsys.readouterr()
-    assert told.err.count("\n") == 1 and endless.name in told.err
+    printed = capsys.readouterr()
+    assert printed.err.count("\n") == 1 and endless.name in printed.err
     assert sorted(tmp_path.rglob("*")) == before
 
 
@@ -89,9 +89,9 @@ def test_a_free_motion_without_end_is_given_up_with_its_reason(
     for command in ("analyze", "plot", "animate"):
         out = tmp_path / ("out.html" if command == "animate" else "out.svg")
         assert fourbar.cli.status([command, str(tmp_path / "released.toml"), "-o", str(out)]) == BAD_INPUT
-        told = capsys.readouterr().err
-        assert told.count("\n") == 1 and "released.toml: motion.free.duration = 1000000000.0" in told
-        assert "followed for 500 steps" in told and not out.exists()
+        printed = capsys.readouterr().err
+        assert printed.count("\n") == 1 and "released.toml: motion.free.duration = 1000000000.0" in printed
+        assert "followed for 500 steps" in printed and not out.exists()
 
 
 def test_a_long_free_motion_stops_at_ctrl_c(tmp_path: Path) -> None:
@@ -106,8 +106,8 @@ def test_a_long_free_motion_stops_at_ctrl_c(tmp_path: Path) -> None:
         time.sleep(5.0)
         assert running.poll() is None
         running.send_signal(signal.SIGINT)
-        _, told = running.communicate(timeout=30.0)
-    assert running.returncode == INTERRUPTED and told.strip() == b"error: interrupted"
+        _, printed = running.communicate(timeout=30.0)
+    assert running.returncode == INTERRUPTED and printed.strip() == b"error: interrupted"
 
 
 def test_a_free_motion_too_long_for_the_engines_is_refused_before_a_run(
@@ -115,6 +115,6 @@ def test_a_free_motion_too_long_for_the_engines_is_refused_before_a_run(
 ) -> None:
     (tmp_path / "released.toml").write_text(RELEASED)
     assert validation.cli.status(["run", str(tmp_path / "released.toml"), "--out", str(tmp_path / "out")]) == BAD_INPUT
-    told = capsys.readouterr().err
-    assert "motion.free.duration" in told and "must not exceed 100 s in a run" in told
+    printed = capsys.readouterr().err
+    assert "motion.free.duration" in printed and "must not exceed 100 s in a run" in printed
     assert not (tmp_path / "out").exists()

@@ -186,7 +186,7 @@ def test_massless_bars() -> None:
     assert refused.refusal is not None and "bar 3" in refused.refusal and not refused.quantities
 
 
-def test_the_floor_of_mujoco_is_where_it_is_said_to_be() -> None:
+def test_the_floor_of_mujoco_is_where_it_is_stated_to_be() -> None:
     d, a, b, c = MECHANISMS["crank-rocker"]
     scene = Scene(FourBar(d, Bar(a, 1.0), Bar(b, 1.0), Bar(c, LEAST, LEAST)))
     MujocoTree(scene)

@@ -79,15 +79,17 @@ def leaving() -> click.Group:
         (raising(click.Abort()), INTERRUPTED),
     ],
 )
-def test_every_way_to_end_has_its_status(
+def test_every_end_has_its_status(
     group: click.Group, status: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.delenv("FOURBAR_TRACEBACK", raising=False)
     monkeypatch.setattr(sys, "stdout", sys.stdout)  # click lets go of it where a pipe breaks
     monkeypatch.setattr(sys, "stderr", sys.stderr)
     assert run(group, "program", ["go"]) == status
-    said = capsys.readouterr().err.strip()
-    assert "\n" not in said and bool(said) == (status in (BROKEN, INTERRUPTED) or "must be" in said or "such" in said)
+    printed = capsys.readouterr().err.strip()
+    assert "\n" not in printed and bool(printed) == (
+        status in (BROKEN, INTERRUPTED) or "must be" in printed or "such" in printed
+    )
 
 
 ROW = Row("scene", "engine", "exact", "torque", 1e-15, 1e-14, AGREES, "equivalence", 1.0, 1.0)
@@ -258,13 +260,15 @@ def test_every_command_is_in_the_table_of_processes() -> None:
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="only Linux has a device that is always full")
 def test_what_was_printed_without_being_written_out_is_not_lost_in_silence() -> None:
     code = "import click, sys; from fourbar.errors import run; "
-    code += "sys.exit(run(click.Group(commands={'go': click.command(name='go')(lambda: print('said'))}), 'p', ['go']))"
+    code += (
+        "sys.exit(run(click.Group(commands={'go': click.command(name='go')(lambda: print('printed'))}), 'p', ['go']))"
+    )
     reading, writing = os.pipe()
     os.close(reading)
     full = os.open("/dev/full", os.O_WRONLY)
-    for out, status, said in ((full, BROKEN, "error: output: No space left on device\n"), (writing, HOLDS, "")):
+    for out, status, printed in ((full, BROKEN, "error: output: No space left on device\n"), (writing, HOLDS, "")):
         done = subprocess.run(
             [sys.executable, "-c", code], cwd=ROOT, stdout=out, stderr=subprocess.PIPE, text=True, check=False
         )
         os.close(out)
-        assert (done.returncode, done.stderr) == (status, said)
+        assert (done.returncode, done.stderr) == (status, printed)

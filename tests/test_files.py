@@ -25,9 +25,9 @@ PRINTED = 0.5e-9
 def facts(scene: fourbar.Scene) -> tuple[object, ...]:
     """Every number of a scene, in a form that compares bit for bit (repr tells -0.0 from 0.0)."""
     motion = scene.motion
-    asked = motion.theta_2.tolist() if isinstance(motion.theta_2, np.ndarray) else motion.theta_2
+    angles = motion.theta_2.tolist() if isinstance(motion.theta_2, np.ndarray) else motion.theta_2
     rest = (motion.omega_2, motion.alpha_2, motion.branch, motion.through, motion.free)
-    parts = (scene.linkage, asked, rest, scene.drive_bar, scene.loads, scene.effects)
+    parts = (scene.linkage, angles, rest, scene.drive_bar, scene.loads, scene.effects)
     return (*(repr(part) for part in parts), scene.title, scene.source)
 
 

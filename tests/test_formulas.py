@@ -42,9 +42,9 @@ TANGENT = 10.0 * U
 """Relative, of sin^2 h, cos^2 h and sin h cos h from a tangent that a library gives to 2 U: two or three of it, a
 square, a sum, a quotient and a product; of a factor of Heron's formula likewise, relative to its terms."""
 FROM_EITHER_END = 64.0 * 2.0**-52
-"""Roundings of two ways to one position; for the n-th derivative magnified as those of the coefficients are."""
+"""Roundings of two methods for one position; for the n-th derivative magnified as those of the coefficients are."""
 DIGITS_LEFT = 1e-40
-"""Relative to the offset: of 120 digits an offset of 1e-40 takes 40, and a limit beside a change point some 20 more."""
+"""Relative to the offset: of 120 digits an offset of 1e-40 takes 40, and a limit near a change point some 20 more."""
 
 
 MODULES = [module.name for module in pkgutil.iter_modules(fourbar.formulas.__path__)]
@@ -144,11 +144,11 @@ def test_pairs_stay_parallel_on_one_side_of_the_change_points_alone() -> None:
 
 def read_from_the_output(drawn: Drawn) -> tuple[State, Any, Any]:
     """The state read in theta_2, and position and coefficients read in theta_4."""
-    moving, way = drawn.moving(), path(loop(*drawn.bars.lengths), drawn.bars.ground_angle, 4)
+    moving, from_output = drawn.moving(), path(loop(*drawn.bars.lengths), drawn.bars.ground_angle, 4)
     theta_4 = np.angle(moving.at.u4)
     # of the triangle B, A, O2: bars 3 and 2 there are as bars 4 and 3 in the order of theta_2
     sign = -np.sign((moving.at.u2 * moving.at.u3.conjugate()).imag)
-    return moving, *way.motion(way.position(theta_4, way.half_angle(theta_4), sign), sign)
+    return moving, *from_output.motion(from_output.position(theta_4, from_output.half_angle(theta_4), sign), sign)
 
 
 def test_read_in_theta_4_the_linkage_lies_and_moves_the_same() -> None:
@@ -185,19 +185,21 @@ def test_read_in_theta_4_the_input_stands_at_its_limit() -> None:
     """There theta_4 alone is an independent angle: the input has no speed and the output may have any."""
     bars = FourBar(0.5, Bar(0.4), Bar(0.3), Bar(0.25), 0.2)
     for limit in limit_positions(bars):
-        way = path(loop(*bars.lengths), bars.ground_angle, 4)
+        from_output = path(loop(*bars.lengths), bars.ground_angle, 4)
         sign = math.copysign(1.0, math.sin(limit.theta_3 - limit.theta_2))
-        at, k = way.motion(way.position(limit.theta_4, way.half_angle(limit.theta_4), sign), sign)
+        at, k = from_output.motion(
+            from_output.position(limit.theta_4, from_output.half_angle(limit.theta_4), sign), sign
+        )
         assert math.remainder(float(np.angle(at.u2)) - limit.theta_2, math.tau) == pytest.approx(0.0, abs=8.0 * U)
         assert abs(at.sin_mu) <= 16.0 * U and abs(k.h2) <= 32.0 * U
         assert np.isfinite(k).all() and k.h4 == 1.0 and abs(k.h43) > 0.1 and abs(k.dh2) > 0.1
 
 
 def test_read_in_theta_4_a_parallelogram_stays_parallel_exactly() -> None:
-    way = path(loop(0.3, 0.1, 0.3, 0.1), 0.0, 4)
+    from_output = path(loop(0.3, 0.1, 0.3, 0.1), 0.0, 4)
     theta_4 = np.array([1e-9, 0.5, 3.0])
     sign = -1.0  # of sin(theta_3 - theta_2): the coupler lies as the ground
-    at, k = way.motion(way.position(theta_4, way.half_angle(theta_4), sign), sign)
+    at, k = from_output.motion(from_output.position(theta_4, from_output.half_angle(theta_4), sign), sign)
     assert at.u2 == pytest.approx(np.exp(1j * theta_4), abs=4.0 * U)
     assert at.u3 == pytest.approx(np.ones(3), abs=4.0 * U)
     for found, expected in ((k.h2, 1.0), (k.h3, 0.0), (k.dh2, 0.0), (k.dh3, 0.0)):
@@ -228,9 +230,9 @@ FUSED = 64.0 * U
 def everything(d: Any, a: Any, b: Any, c: Any, theta_1: Any, q: Any, branch: Any, bar: int = 2) -> dict[str, Any]:
     """All that the formulas give, on the path in theta_2 or theta_4."""
     lengths = loop(d, a, b, c)
-    way = path(lengths, theta_1, bar)
-    half = way.half_angle(q)
-    at, k = way.motion(way.position(q, half, branch), branch)
+    from_output = path(lengths, theta_1, bar)
+    half = from_output.half_angle(q)
+    at, k = from_output.motion(from_output.position(q, half, branch), branch)
     moving = rates(k, 2.0, -3.0)
     here = State(lengths, theta_1, q, at, k, 2.0, moving)
     bodies = Body(0.2, 0.01, 0.3 * a + 0.01j), Body(0.5, 0.02, 0.6 * b - 0.02j), Body(0.4, 0.03, 0.5 * c + 0j)
@@ -302,8 +304,8 @@ def test_the_half_angle_in_many_digits_is_rounded_once() -> None:
             for found, exact in zip(exact_half_angle(bars, theta_2), expected, strict=True):
                 assert abs(found - exact) <= U * abs(exact)
             offset = mp.mpf("1e-25") * theta_2
-            beside = five(bars, mp.mpf(theta_2) + offset - mp.mpf(bars.ground_angle))
-            for found, exact in zip(exact_half_angle(bars, theta_2, offset), beside, strict=True):
+            expected = five(bars, mp.mpf(theta_2) + offset - mp.mpf(bars.ground_angle))
+            for found, exact in zip(exact_half_angle(bars, theta_2, offset), expected, strict=True):
                 assert abs(found - exact) <= U * abs(exact)
 
 
@@ -347,7 +349,7 @@ def exact_limit(bars: FourBar, stretched: bool) -> mp.mpf:
         (FourBar(0.5, Bar(0.5), Bar(0.7), Bar(0.3 - 1e-9), 0.0), True),
         (FourBar(0.5, Bar(0.1), Bar(0.7), Bar(0.3 - 1e-9), 0.0), False),  # a billionth short of a change point
     ],
-    ids=["rocker", "double rocker, outer", "double rocker, inner", "equal ground and input", "beside a change point"],
+    ids=["rocker", "double rocker, outer", "double rocker, inner", "equal ground and input", "near a change point"],
 )
 def test_an_offset_from_a_limit_in_many_digits(bars: FourBar, stretched: bool, size: float) -> None:
     first = next(limit.theta_2 for limit in limit_positions(bars) if limit.stretched == stretched)

@@ -28,7 +28,7 @@ ONE = [witness for witness in WITNESSES if witness.name == "free-body"]
 RECTANGLE = fourbar.FourBar(0.3, fourbar.Bar(0.1), fourbar.Bar(0.3), fourbar.Bar(0.1))
 
 
-def asked(scene: Scene) -> dict[str, Any]:
+def answered(scene: Scene) -> dict[str, Any]:
     answer = FreeBody().answer(scene, command(scene))
     assert answer.refusal is None and answer.assembled is not None and answer.assembled.all()
     return answer.quantities
@@ -76,7 +76,7 @@ def test_the_angles_solve_the_closure_equations_to_50_digits() -> None:
     assert checked > 80
 
 
-def test_it_assembles_where_the_circles_meet_and_on_the_branch_that_is_asked() -> None:
+def test_it_assembles_where_the_circles_meet_and_on_the_requested_branch() -> None:
     """B lies to the left of the diagonal from A to O4 on branch +1; bars up to a million times shorter than others."""
     rng = np.random.default_rng(7)
     missing = 0
@@ -112,7 +112,7 @@ def test_a_lever_of_an_upright_rectangle(
 ) -> None:
     """10 N push bar 4 at B along the coupler; the bars are upright and 0.1 m long, and the coupler a two-force bar."""
     load = Load(4, (10.0, 0.0), (0.05, math.pi / 2))
-    got = asked(Scene(RECTANGLE, fourbar.Motion(math.pi / 2, 0.0), drive, (load,)))
+    got = answered(Scene(RECTANGLE, fourbar.Motion(math.pi / 2, 0.0), drive, (load,)))
     assert got["torque"][0] == pytest.approx(torque, abs=1e-14)
     for name, force in {"F12": F12, "F32": F32, "F43": F43, "F14": F14}.items():
         assert got[name][0] == pytest.approx(force, abs=1e-13), name
@@ -123,7 +123,7 @@ def test_weight_of_a_crank_and_a_flywheel() -> None:
     bar = fourbar.Bar(0.1, 2.0, 0.003, (0.04, 0.0))
     linkage = replace(RECTANGLE, input=bar)
     scene = Scene(linkage, fourbar.Motion(0.7, 3.0, 5.0), 2, (), (Gravity(), Flywheel(0.02)))
-    got = asked(scene)
+    got = answered(scene)
     assert got["torque"][0] == pytest.approx((0.003 + 2.0 * 0.04**2 + 0.02) * 5.0 + 2.0 * 9.81 * 0.04 * math.cos(0.7))
     a_G = 0.04 * np.exp(0.7j) * (5.0j - 9.0)
     assert got["F12"][0] == pytest.approx([2.0 * a_G.real, 2.0 * (a_G.imag + 9.81)])
@@ -139,9 +139,9 @@ TORSION = fourbar.effects.Torsion.at(O4=(2.0, 1.9, 0.1))
 def test_over_a_turn_what_stores_energy_gives_it_back(drive: int) -> None:
     """The work of the drive over a revolution at constant speed is zero; the sum over a period converges like n^-n."""
     motion = fourbar.Motion(np.arange(512) * (2.0 * math.pi / 512), 10.0)
-    got = asked(crank_rocker(motion=motion, loads=(), effects=(Gravity(), SPRING, TORSION), drive_bar=2))
+    got = answered(crank_rocker(motion=motion, loads=(), effects=(Gravity(), SPRING, TORSION), drive_bar=2))
     if drive == 4:
-        four = asked(crank_rocker(motion=motion, loads=(), effects=(Gravity(), SPRING, TORSION), drive_bar=4))
+        four = answered(crank_rocker(motion=motion, loads=(), effects=(Gravity(), SPRING, TORSION), drive_bar=4))
         power = four["torque"] * four["omega_4"]
         assert power == pytest.approx(got["torque"] * 10.0, abs=1e-10 * np.abs(power).max(), rel=0)
     assert abs(got["torque"].sum()) < 512 * 1e-14 * np.abs(got["torque"]).max()
@@ -159,7 +159,7 @@ def test_over_a_turn_what_stores_energy_gives_it_back(drive: int) -> None:
 )
 def test_what_brakes_takes_the_power_that_the_drive_gives_more(effect: Any) -> None:
     """Couple times slip at each pin, at every position; of pin friction with the forces that it changes itself."""
-    with_, without = asked(crank_rocker(effects=(effect,))), asked(crank_rocker(effects=()))
+    with_, without = answered(crank_rocker(effects=(effect,))), answered(crank_rocker(effects=()))
     omega = {1: 0.0, 2: 10.0, 3: with_["omega_3"], 4: with_["omega_4"]}
     loss = np.zeros(len(with_["torque"]))
     for pin, *numbers in getattr(effect, {"viscous": "coefficients", "friction": "torques"}.get(effect.key, "pins")):
@@ -175,7 +175,7 @@ def test_what_brakes_takes_the_power_that_the_drive_gives_more(effect: Any) -> N
 def test_dry_friction_does_nothing_at_rest() -> None:
     dry = (Friction.at(A=1.0), PinFriction.at(B=(0.2, 0.1)))
     still = crank_rocker(motion=fourbar.Motion([0.3, 2.0], 0.0), effects=dry)
-    assert asked(still)["torque"] == pytest.approx(asked(replace(still, effects=()))["torque"], rel=1e-14)
+    assert answered(still)["torque"] == pytest.approx(answered(replace(still, effects=()))["torque"], rel=1e-14)
 
 
 @pytest.mark.parametrize(
@@ -261,7 +261,7 @@ def test_faults_in_the_free_bodies_show(monkeypatch: pytest.MonkeyPatch) -> None
 
 
 def test_blocks_of_positions_make_no_difference(monkeypatch: pytest.MonkeyPatch) -> None:
-    whole = asked(crank_rocker())
+    whole = answered(crank_rocker())
     monkeypatch.setattr(free_body, "BLOCK", 7)
-    for name, values in asked(crank_rocker()).items():
+    for name, values in answered(crank_rocker()).items():
         assert np.array_equal(values, whole[name]), name

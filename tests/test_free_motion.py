@@ -37,11 +37,11 @@ def test_needs_no_driving_torque() -> None:
 
 
 @pytest.mark.parametrize("coupler", [0.12, 0.15])  # the first has a change point, the second a limit position only
-def test_stops_at_a_limit_unless_told_to_follow(coupler: float) -> None:
+def test_stops_at_a_limit_unless_set_to_follow(coupler: float) -> None:
     linkage = fourbar.FourBar(0.3, fourbar.Bar(0.2, 0.2), fourbar.Bar(coupler, 0.5), fourbar.Bar(0.22, 0.4))
-    times = np.linspace(0.0, 5.0, 101)
+    times = np.linspace(0.0, 1.0, 21)  # there, back and there again
     halted = release(linkage, (fourbar.Gravity(),), 1.0, 0.0, 1, times)
-    assert halted.stopped_at is not None and halted.command.time[-1] <= halted.stopped_at < 5.0
+    assert halted.stopped_at is not None and halted.command.time[-1] <= halted.stopped_at < 0.5
     assert set(halted.command.branch) == {1}
     passed = release(linkage, (fourbar.Gravity(),), 1.0, 0.0, 1, times, follow=True)
     assert passed.stopped_at is None and set(passed.command.branch) == {1, -1} and passed.energy_drift < 1e-11
@@ -95,11 +95,11 @@ def forces_by_energy(theta: np.ndarray, start: np.ndarray) -> np.ndarray:
 
     x, y = np.cos(theta), np.sin(theta)
     unit, across = np.array([x, y]), np.array([-y, x])
-    way = np.cross(*(across * [a, b, -c]))
-    speed = across * half * way
-    speed[:, 1] += across[:, 0] * a * way[0]
-    of_way = float(m @ (speed * speed).sum(axis=0) + inertia @ (way * way))
-    squared = way * way * (2.0 * 9.81 * (height(start) - height(theta)) / of_way)
+    moves = np.cross(*(across * [a, b, -c]))
+    speed = across * half * moves
+    speed[:, 1] += across[:, 0] * a * moves[0]
+    of_moves = float(m @ (speed * speed).sum(axis=0) + inertia @ (moves * moves))
+    squared = moves * moves * (2.0 * 9.81 * (height(start) - height(theta)) / of_moves)
     # unknown: a_G2, alpha_2, a_G3, alpha_3, a_G4, alpha_4, then the forces; row by row Newton and Euler ...
     left, right = np.zeros((17, 17)), np.zeros(17)
     pins = ((0, -1, 9, 1), (0, 1, 11, 1), (1, -1, 11, -1), (1, 1, 13, 1), (2, 1, 13, -1), (2, -1, 15, 1))
@@ -123,9 +123,9 @@ def test_pin_forces_pass_a_limit_position_smoothly(monkeypatch: pytest.MonkeyPat
     motion = SWING.motion
     halted = solve(replace(SWING, motion=replace(motion, through="sign")), "position")
     assert halted.stopped_at is not None and halted.stopped_at < 1.0
-    beside = np.logspace(-14, -2, 49)
+    distances = np.logspace(-14, -2, 49)
     evenly = np.linspace(0.0, 1.2, 121)
-    dense = halted.stopped_at + np.concatenate([-beside[::-1], [0.0], beside])
+    dense = halted.stopped_at + np.concatenate([-distances[::-1], [0.0], distances])
     times = np.unique(np.concatenate([evenly, dense]))
     true = free_motion.release
     monkeypatch.setattr(free_motion, "release", lambda *given, **how: true(*given[:-1], times, **how))

@@ -22,7 +22,7 @@ TIMES = np.linspace(0.0, 5.0, 51)
 NUDGE = 1e-6
 """Of the angle at the start (rad), and of the speed by the greatest speed."""
 SURE = 1e-6
-"""|sin(theta_4 - theta_3)| from which on the branch is told from its sign."""
+"""|sin(theta_4 - theta_3)| from which on the branch is known from its sign."""
 LOOSE = 1e-10
 """Tolerance of the motions whose difference over NUDGE is the amplification: 1e-4 of it."""
 
@@ -149,11 +149,11 @@ SHOWN = {
     ("double-crank", 10): AMPLIFIES,
     ("crank-rocker", 8): TURNS,
     ("double-rocker", 3): STOPS,
-    ("rocker-crank", 1): AT_LIMITS,
+    ("rocker-crank", 2): STOPS,
     ("triple rocker, longest ground", 0): STOPS,
     ("triple rocker, longest input", 0): AT_LIMITS,
     ("triple rocker, longest coupler", 0): STOPS,
-    ("triple rocker, longest output", 9): TURNS,
+    ("triple rocker, longest output", 6): STOPS,
     ("change point", 5): STOPS,
     ("change point", 10): AT_CHANGE_POINTS,
     ("parallelogram", 4): AT_CHANGE_POINTS,
@@ -167,17 +167,21 @@ MANY = [(kind, number) for kind in KINDS for number in range(int(os.environ.get(
 def test_nine_digits_over_five_seconds(kind: str, number: int) -> None:
     of = motion(kind, number)
     m, theirs = ours(of), released(*of[:5], TIMES, follow=of.follow)
-    amplified = amplification(of)
-    promised = PROMISED * max(1.0, amplified / AMPLIFIED)
+    shown = SHOWN.get((kind, number))
+    promised, amplified = PROMISED, 0.0
     n = len(theirs.theta_2)
     assert len(m.command.time) == n
-    assert np.abs(m.command.theta_2 - theirs.theta_2).max() <= promised
+    off = [float(np.abs(m.command.theta_2 - theirs.theta_2).max())]
+    if m.stopped_at is not None and theirs.stopped_at is not None:
+        off.append(abs(m.stopped_at - theirs.stopped_at) * float(np.abs(m.command.omega_2).max()))
+    worst = float(np.max(off))  # NaN where one is
+    if worst > PROMISED or shown == AMPLIFIES:  # three more motions, only where they decide
+        amplified = amplification(of)
+        promised *= max(1.0, amplified / AMPLIFIED)
+    assert worst <= promised
     sure = np.abs(theirs.sine) > SURE
     assert np.array_equal(m.command.branch[sure], np.sign(theirs.sine[sure]))
     assert (m.stopped_at is None) is (theirs.stopped_at is None)
-    if m.stopped_at is not None and theirs.stopped_at is not None:
-        assert abs(m.stopped_at - theirs.stopped_at) * np.abs(m.command.omega_2).max() <= promised
-    shown = SHOWN.get((kind, number))
     if shown is not None:
         passed = theirs.limits > 0, theirs.change_points > 0
         kinds = [not any(passed), any(passed) and not of.follow, *(of.follow and one for one in passed)]

@@ -105,7 +105,7 @@ def _equivalence() -> Any:
     return EQUIVALENCE
 
 
-def test_beside_a_toggle_a_wrong_force_fails_that_the_law_excuses() -> None:
+def test_near_a_toggle_a_wrong_force_fails_that_the_law_excuses() -> None:
     """1e-8 rad from a toggle K eps/s^3 allows all; roundings of the data allow 4e-5."""
     lengths = linkage_of(LinkageType.TRIPLE_ROCKER, 1)
     (psi, _), *_ = collinear_3_4(lengths)
@@ -175,7 +175,7 @@ def test_a_gap_is_seen() -> None:
     assert alarm(simulated(replace(RECIPE, impedance=0.1, pad=None, time_constant_steps=300.0)), "closure_gap")
 
 
-def test_a_crank_that_does_not_turn_as_told_is_seen() -> None:
+def test_a_crank_that_does_not_turn_as_commanded_is_seen() -> None:
     assert alarm(simulated(replace(RECIPE, flywheel=1.0)), "speed_error")
 
 

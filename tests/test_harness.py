@@ -1,4 +1,4 @@
-"""The harness itself, with witnesses that are told what to say: silence, NaN and breakdowns must cost the run."""
+"""The harness itself, with witnesses with given answers: silence, NaN and breakdowns must cost the run."""
 
 from dataclasses import replace
 
@@ -93,7 +93,7 @@ def test_silence_nan_and_a_missing_position_fail(engine: type, quantity: str) ->
     assert not row.passed
 
 
-def test_a_declared_refusal_is_told_and_does_not_fail() -> None:
+def test_a_declared_refusal_is_reported_and_does_not_fail() -> None:
     rows = rows_of(Refuses)
     assert set(rows) == {"all"}
     assert rows["all"].verdict == REFUSES
@@ -150,8 +150,8 @@ def test_where_dry_friction_reverses_forces_are_not_judged_and_the_motion_is() -
             assert row.theta_2 == with_friction().motion.theta_2[AT_REST], quantity  # type: ignore[index]
 
 
-def test_where_no_digit_is_left_nothing_is_told() -> None:
-    # 1e-13 rad beside a limit of theta_2 the condition of the accelerations is about 1e-13
+def test_where_no_digit_is_left_nothing_is_judged() -> None:
+    # 1e-13 rad from a limit of theta_2 the condition of the accelerations is about 1e-13
     rocker = fourbar.uniform(0.3, 0.25, 0.1, 0.22)
     first = limit_positions(rocker)[0].theta_2
     for side in (1.0, -1.0):
@@ -210,7 +210,7 @@ def test_an_answer_that_the_formulas_withhold_is_not_compared() -> None:
             assert (row.verdict, row.reason) == (expected if quantity in FORCES else (AGREES, EQUIVALENCE.name))
 
 
-def test_positions_without_a_value_are_counted_beside_those_that_were_compared() -> None:
+def test_positions_without_a_value_are_counted_next_to_those_that_were_compared() -> None:
     """A parallelogram from the crossed branch through its change point into bars that stay parallel."""
     motion = fourbar.Motion(np.array([-0.5, -0.3, 0.0, 0.3]), 1.0)
     scene = Scene(fourbar.uniform(1.0, 0.5, 1.0, 0.5), motion, 3)

@@ -1,4 +1,4 @@
-"""Imports run downwards from room to room, and `import fourbar` loads numpy alone."""
+"""Imports run downwards from layer to layer, and `import fourbar` loads numpy alone."""
 
 import ast
 import subprocess
@@ -10,7 +10,7 @@ import pytest
 ROOT = Path(__file__).parents[1]
 HEAVY = ("pint", "click", "rich", "jinja2", "matplotlib", "scipy", "joblib", "mujoco", "pinocchio", "flint", "mpmath")
 ENGINES = {"mujoco": "mujoco", "pinocchio": "pinocchio"}
-ROOMS = {
+LAYERS = {
     "fourbar": (
         "errors quantities writing",
         "linkage",
@@ -36,13 +36,13 @@ ROOMS = {
         "cli",
     ),
 }
-"""From the ground up: a room imports none that stands above it or beside it, at import time or inside a function."""
-BESIDE = {
+"""From the ground up: no layer imports one above it or on its own floor, not even inside a function."""
+ON_ONE_FLOOR = {
     ("scenes", "compare"),
     ("published", "engines"),
     ("run", "check"),
 }
-"""Of two rooms on one floor the first may use the second."""
+"""Of two layers on one floor the first may use the second."""
 MOST = {"fourbar": 17, "validation": 15}
 """Entries at a package's own level, dunder files not counted: what a stranger can take in at a glance."""
 
@@ -89,8 +89,8 @@ def test_each_engine_is_imported_under_its_own_name_alone(path: Path) -> None:
             assert engine in path.relative_to(ROOT).as_posix()
 
 
-def room(name: str) -> str:
-    """The room of a module: the second part of its name."""
+def layer(name: str) -> str:
+    """The layer of a module: the second part of its name."""
     return name.split(".")[1]
 
 
@@ -101,9 +101,9 @@ def modules(package: str) -> dict[str, Path]:
     return {name: path for name, path in names.items() if not name.split(".")[1].startswith("__")}
 
 
-@pytest.mark.parametrize("package", ROOMS)
-def test_rooms_stand_on_floors(package: str) -> None:
-    floors = [floor.split() for floor in ROOMS[package]]
+@pytest.mark.parametrize("package", LAYERS)
+def test_layers_stand_on_floors(package: str) -> None:
+    floors = [floor.split() for floor in LAYERS[package]]
     entries = {
         path.name.removesuffix(".py")
         for path in (ROOT / package).iterdir()
@@ -114,12 +114,12 @@ def test_rooms_stand_on_floors(package: str) -> None:
     height = {name: number for number, floor in enumerate(floors) for name in floor}
     for name, path in modules(package).items():
         for other in (each for each in imported(path) if each.startswith(f"{package}.")):
-            own, used = room(name), room(other)
+            own, used = layer(name), layer(other)
             if used in height and used != own:
-                assert height[used] < height[own] or (own, used) in BESIDE, f"{name} imports {other}"
+                assert height[used] < height[own] or (own, used) in ON_ONE_FLOOR, f"{name} imports {other}"
 
 
-@pytest.mark.parametrize("package", ROOMS)
+@pytest.mark.parametrize("package", LAYERS)
 def test_no_modules_import_each_other_in_a_circle(package: str) -> None:
     names = modules(package)
     uses = {name: {other for other in imported(path) if other in names} - {name} for name, path in names.items()}
@@ -131,7 +131,7 @@ def test_no_modules_import_each_other_in_a_circle(package: str) -> None:
 def test_the_formulas_know_numpy_and_the_linkage_alone() -> None:
     for path in (ROOT / "fourbar" / "formulas").glob("*.py"):
         known = {name for name in imported(path) if name.startswith("fourbar.")}
-        assert {room(name) for name in known} <= {"formulas", "linkage", "errors"}, path
+        assert {layer(name) for name in known} <= {"formulas", "linkage", "errors"}, path
 
 
 @pytest.mark.parametrize("name", ["compare", "report"])

@@ -55,7 +55,7 @@ def newton(link: fourbar.FourBar, theta_2: mpmath.mpf, start: tuple[float, float
 @pytest.mark.parametrize("branch", [1, -1])
 @pytest.mark.parametrize("theta_1", [0.0, 0.4, 1.0, -2.5])
 @pytest.mark.parametrize("lengths", [LENGTHS, (0.3, 0.1, 0.3, 0.1), (0.3, 0.1, 0.1, 0.3)])
-def test_the_loop_closes_on_the_branch_asked_for(lengths: tuple[float, ...], branch: int, theta_1: float) -> None:
+def test_the_loop_closes_on_the_requested_branch(lengths: tuple[float, ...], branch: int, theta_1: float) -> None:
     d, a, b, c = lengths
     link = fourbar.FourBar(d, fourbar.Bar(a), fourbar.Bar(b), fourbar.Bar(c), theta_1)
     moving = state(link, theta_1 + ANGLES, branch)
@@ -88,7 +88,7 @@ def test_mirror_image() -> None:
 
 
 @pytest.mark.parametrize("lengths", [(0.3, 0.1, 0.3, 0.1), (0.1, 0.3, 0.3, 0.1)], ids=["parallelogram", "kite"])
-def test_parallel_bars_are_exact_beside_the_change_point(lengths: tuple[float, ...]) -> None:
+def test_parallel_bars_are_exact_near_the_change_point(lengths: tuple[float, ...]) -> None:
     d, a, b, c = lengths
     link = fourbar.FourBar(d, fourbar.Bar(a), fourbar.Bar(b), fourbar.Bar(c))
     parallelogram = a == c
@@ -301,23 +301,23 @@ def test_a_kite_whose_A_lies_on_O4_has_no_speed_there_and_no_warning() -> None:
 @pytest.mark.parametrize("theta_1", [0.0, 0.4, -2.5])
 @pytest.mark.parametrize("branch", [1, -1])
 def test_a_kite_whose_A_lies_on_O4_lies_where_its_neighbours_do(branch: int, theta_1: float) -> None:
-    """As theta_2 falls to theta_1 bars 3 and 4 come to lie on the ground's line, both the same way."""
+    """As theta_2 falls to theta_1 bars 3 and 4 come to lie on the ground's line, both in the same direction."""
     link = fourbar.FourBar(0.3, fourbar.Bar(0.3), fourbar.Bar(0.2), fourbar.Bar(0.2), theta_1)
-    beside = 2.0**-30
+    step = 2.0**-30
     # on it, and so near that e^2 leaves the range of doubles
     for psi, towards in ((0.0, 1.0), *((side * psi, side) for psi in (1e-170, 1e-157) for side in (1.0, -1.0))):
         if psi != 0.0 and theta_1 != 0.0:
             continue
-        on, near = (state(link, theta_1 + np.array([psi, 0.5]), branch, 2.0, 3.0) for psi in (psi, towards * beside))
+        on, near = (state(link, theta_1 + np.array([psi, 0.5]), branch, 2.0, 3.0) for psi in (psi, towards * step))
         for bar in (3, 4):
-            assert on.direction(bar) == pytest.approx(near.direction(bar), abs=2.0 * beside)
+            assert on.direction(bar) == pytest.approx(near.direction(bar), abs=2.0 * step)
         assert singular(on.at).tolist() == [True, False]
         assert np.isnan(on.omega(3)).tolist() == np.isnan(on.alpha(4)).tolist() == [True, False]
     # with b and c unlike each other nothing closes there
     assert not assembled(state(fourbar.uniform(0.3, 0.3, 0.2, 0.25), np.zeros(1), branch)).any()
 
 
-def test_beside_parallel_bars_mu_is_the_angle_of_the_input_to_the_last_bit() -> None:
+def test_near_parallel_bars_mu_is_the_angle_of_the_input_to_the_last_bit() -> None:
     """Bars 3 and 4 of a parallelogram lie as its ground and input do: so does the angle between them."""
     link = fourbar.uniform(0.3, 0.1, 0.3, 0.1)
     at = state(link, np.linspace(0.01, 3.1, 200), 1).at

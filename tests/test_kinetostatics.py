@@ -152,7 +152,7 @@ def test_bars_without_mass_or_inertia(bodies: tuple[tuple[float, float], ...], a
     assert np.max(np.abs(unknowns[:, 12] - solution.torque)) <= SOLVED * size
 
 
-def test_a_centre_one_metre_beside_its_bar() -> None:
+def test_a_centre_one_metre_from_its_bar() -> None:
     """Across the bar by exactly 1 m, and not along it."""
     across = fourbar.Bar(0.25, 0.5, 0.1, (1.0, math.pi / 2))
     case = fourbar.Scene(fourbar.FourBar(0.3, fourbar.Bar(0.1), across, fourbar.Bar(0.22)), fourbar.Motion(0.0, 10.0))
@@ -232,7 +232,7 @@ def test_a_force_between_two_bars_in_line_does_not_exist() -> None:
 
 @pytest.mark.parametrize("drive_bar", [2, 3, 4])
 def test_dry_friction_at_rest_holds_as_much_as_its_work(drive_bar: int) -> None:
-    """Virtual work: the torque may move by the friction couples times the turns of their pins, either way."""
+    """Virtual work: the torque may move by the friction couples times the turns of their pins, in either sense."""
     couples = {"O2": 0.04, "A": 0.02, "B": 0.03, "O4": 0.01}
     case = replace(scene(drive_bar), motion=fourbar.Motion(np.linspace(0.1, 6.0, 7), 0.0))
     loads_and_gravity = replace(case, effects=case.effects[:1])
@@ -251,18 +251,18 @@ def test_dry_friction_at_rest_holds_as_much_as_its_work(drive_bar: int) -> None:
 
 
 def test_bars_without_mass_hold_a_load_where_the_input_turns_back() -> None:
-    """Beside a limit position what they hold tends to a limit; in it the speeds are 0/0, and with them no force is."""
+    """Near a limit position what they hold tends to a limit; in it the speeds are 0/0, and with them no force is."""
     link = fourbar.FourBar(0.5, fourbar.Bar(0.4), fourbar.Bar(0.3), fourbar.Bar(0.25), 0.2)
     loads = (fourbar.Load(3, (2.0, 0.3), (0.1, 0.02)),)
-    on, beside, near = (
+    on, close, near = (
         fourbar.solve(fourbar.Scene(link, fourbar.Motion(fourbar.FromLimit(1, offset), 1.0), 4, loads))
         for offset in (0.0, -1e-20, -1e-22)
     )
-    assert on.status == ["singular"] and beside.status == near.status == ["ok"]
+    assert on.status == ["singular"] and close.status == near.status == ["ok"]
     forces = ("torque", "F12", "F32", "F43", "F14")
     for name in forces:
         # mu grows as the root of the offset
-        assert getattr(near, name) == pytest.approx(getattr(beside, name), rel=1e-8)
+        assert getattr(near, name) == pytest.approx(getattr(close, name), rel=1e-8)
     speeds = ("omega_3", "omega_4", "alpha_3", "alpha_4", "a_B", "a_G3", "a_G4")
     for name in (*forces, *speeds, "torque_error", "force_error"):
         assert np.isnan(getattr(on, name)).all()

@@ -1,4 +1,4 @@
-"""An environment without one of the engines: what is left is judged, and what is missing is said."""
+"""An environment without one of the engines: what is left is judged, and what is missing is named."""
 
 import csv
 import os
@@ -58,7 +58,7 @@ def without(library: str, folder: Path, *arguments: str) -> subprocess.Completed
 
 
 @pytest.mark.parametrize("library", WITNESSES)
-def test_the_others_are_asked_and_the_missing_named_with_the_reason(library: str, tmp_path: Path) -> None:
+def test_the_others_run_and_the_missing_named_with_the_reason(library: str, tmp_path: Path) -> None:
     done = without(library, tmp_path)
     reason = f'{library} is not installed: pip install "fourbar[{library}]"'
     with (tmp_path / "out" / "results.csv").open() as table:
@@ -66,15 +66,15 @@ def test_the_others_are_asked_and_the_missing_named_with_the_reason(library: str
     assert {row["engine"] for row in rows} == {"formulas", *(ALL - WITNESSES[library])}
     assert "fails" not in {row["verdict"] for row in rows}  # MuJoCo refuses bars without mass
     for name in WITNESSES[library]:
-        assert f"not asked {name}: {reason}" in done.stdout
-        assert f"Not asked: {name}: " in (tmp_path / "out" / "report.html").read_text()
-        assert f"not asked: {name}: " in (tmp_path / "out" / "report.md").read_text()
-    said = done.stderr.strip().splitlines()[-1]
-    assert said.startswith(f"error: {reason}, or say --engines ")
+        assert f"not run {name}: {reason}" in done.stdout
+        assert f"Not run: {name}: " in (tmp_path / "out" / "report.html").read_text()
+        assert f"not run: {name}: " in (tmp_path / "out" / "report.md").read_text()
+    printed = done.stderr.strip().splitlines()[-1]
+    assert printed.startswith(f"error: {reason}, or say --engines ")
     assert done.returncode == 3  # the environment, not the formulas
 
 
-def test_asked_for_by_name_nothing_is_run(tmp_path: Path) -> None:
+def test_requested_by_name_nothing_is_run(tmp_path: Path) -> None:
     done = without("mujoco", tmp_path, "--engines", "free-body,mujoco-inverse")
     assert done.stderr.strip() == 'error: mujoco-inverse: mujoco is not installed: pip install "fourbar[mujoco]"'
     assert done.returncode == 3

@@ -24,7 +24,7 @@ SEED = 20261121
 
 
 def limits(d: float, a: float, b: float, c: float) -> tuple[float, float] | None:
-    """The input's range about theta_1 by the cosine rule, both ends 2 deg short; None: change point or no room."""
+    """The input's range about theta_1 by the cosine rule, both ends 2 deg short; None: change point or no range."""
     cosines = [(a * a + d * d - e * e) / (2 * a * d) for e in (abs(b - c), b + c)]
     least, most = (math.acos(x) if abs(x) < 1 else None for x in cosines)
     if least is None and most is None:
@@ -122,8 +122,8 @@ def test_opens_assembled_and_moves_without_keyframe_or_control() -> None:
         assert omega and not data.qvel.any() and not data.ctrl.any()
         # a second, or what is left of the range where it ends before
         travel = scene.motion.theta_2
-        room = 0.9 * (travel.stop - travel.start) if isinstance(travel, fourbar.Sweep) else 0.5
-        steps = int(min(1.0, room / abs(omega)) / model.opt.timestep)
+        travelled = 0.9 * (travel.stop - travel.start) if isinstance(travel, fourbar.Sweep) else 0.5
+        steps = int(min(1.0, travelled / abs(omega)) / model.opt.timestep)
         worst = 0.0
         for _ in range(steps):
             mujoco.mj_step(model, data)
@@ -179,7 +179,7 @@ def test_past_a_limit_position_it_starts_anew_assembled(tmp_path: Path, monkeypa
     assert starts >= 1
 
 
-def test_keyframe_is_on_the_asked_branch_and_closed() -> None:
+def test_keyframe_is_on_the_requested_branch_and_closed() -> None:
     for branch in (1, -1):
         scene = crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.1, 6.0, 60), 10.0, 0.0, branch))
         model = mujoco.MjModel.from_xml_string(mjcf(scene))

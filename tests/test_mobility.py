@@ -158,7 +158,7 @@ def test_ranges_and_circuits_agree_with_a_scan(bars: FourBar) -> None:
     assert (inside(theta_2, intervals(bars))[sure] == (margin >= 0.0)[sure]).all()
     assert turns_fully(bars) == bool((margin[sure] >= 0.0).all())
 
-    # positions as a graph: neighbours on a branch, both branches beside a gap or across a change point
+    # positions as a graph: neighbours on a branch, both branches next to a gap or across a change point
     node = {(i, s): (i, s) for i in range(GRID) for s in (1, -1) if margin[i] >= 0.0}
 
     def root(x: tuple[int, int]) -> tuple[int, int]:
@@ -231,7 +231,7 @@ def nearly_special(seed: int, count: int) -> list[FourBar]:
     return found
 
 
-def test_limits_keep_their_digits_beside_special_linkages() -> None:
+def test_limits_keep_their_digits_near_special_linkages() -> None:
     checked = 0
     with mp.workdps(50):
         for bars in nearly_special(3, 300) + random_linkages(4, 100):
@@ -369,11 +369,11 @@ def test_a_position_on_a_change_point_belongs_to_the_side_it_is_reached_from() -
     assert on_smooth_path(bars, np.array([0.5, -1.0, 0.0, -1.0]), 1).tolist() == [1, -1, -1, -1]
 
 
-def test_a_single_precision_angle_beside_a_change_point_is_beside_it() -> None:
+def test_a_single_precision_angle_next_to_a_change_point_is_next_to_it() -> None:
     bars = linkage(2, 1, 2, 1, 0.4)
-    beside = np.array([0.4, 0.5], dtype=np.float32)  # 6e-9 beyond 0.4
-    assert beside[0].item() > 0.4
-    assert on_smooth_path(bars, beside, 1).tolist() == [1, 1]
+    near = np.array([0.4, 0.5], dtype=np.float32)  # 6e-9 beyond 0.4
+    assert near[0].item() > 0.4
+    assert on_smooth_path(bars, near, 1).tolist() == [1, 1]
 
 
 def test_change_points_lie_along_the_ground_and_opposite() -> None:

@@ -57,10 +57,10 @@ SCENES = {
 
 @pytest.mark.parametrize("name", SCENES)
 def test_within_1e_5_of_the_scale(name: str) -> None:
-    asked = SCENES[name]
-    answer = MujocoSimulated().answer(asked, fourbar.command(asked))
+    posed = SCENES[name]
+    answer = MujocoSimulated().answer(posed, fourbar.command(posed))
     assert answer.refusal is None and answer.at is not None
-    rows = compare(name, asked, answer, fourbar.solve(asked, at=answer.at), SIMULATED, COMPARED)
+    rows = compare(name, posed, answer, fourbar.solve(posed, at=answer.at), SIMULATED, COMPARED)
     assert {row.quantity for row in rows} == {"assembled", *COMPARED}
     assert all(row.passed for row in rows), [row for row in rows if not row.passed]
     assert answer.evidence["time_went_back"] == answer.evidence["bad_states"] == 0.0
@@ -72,9 +72,9 @@ def test_slow_linkages_hold_as_well(loaded: bool, index: int) -> None:
     """One pass of Newton's method is all they get; under loads the closure must be the stiffer for it."""
     drawn = random_scene(7, index, tuple(LinkageType))
     slow = replace(drawn, motion=replace(drawn.motion, omega_2=0.001 if loaded else 0.01, alpha_2=0.0), drive_bar=2)
-    asked = slow if loaded else replace(slow, loads=(), effects=())
-    answer = MujocoSimulated().answer(asked, fourbar.command(asked))
-    rows = compare("", asked, answer, fourbar.solve(asked, at=answer.at), SIMULATED, COMPARED)
+    posed = slow if loaded else replace(slow, loads=(), effects=())
+    answer = MujocoSimulated().answer(posed, fourbar.command(posed))
+    rows = compare("", posed, answer, fourbar.solve(posed, at=answer.at), SIMULATED, COMPARED)
     assert all(row.passed for row in rows), [row for row in rows if not row.passed]
 
 
@@ -83,26 +83,26 @@ def test_an_input_that_speeds_up_covers_the_end_of_its_window_in_as_many_steps()
     assert run.fastest * run.timestep(RECIPE) <= 3.0 / RECIPE.steps_per_window
 
 
-def test_it_is_run_near_the_positions_asked_for() -> None:
-    asked = SCENES["crank-rocker"]
-    command = fourbar.command(asked)
-    at = MujocoSimulated().answer(asked, command).at
+def test_it_is_run_near_the_requested_positions() -> None:
+    posed = SCENES["crank-rocker"]
+    command = fourbar.command(posed)
+    at = MujocoSimulated().answer(posed, command).at
     assert at is not None
     assert np.abs(at.theta_2 - command.theta_2).max() <= math.pi / 600  # half a step of some 628 a turn
 
 
 def test_a_wrong_load_is_seen() -> None:
-    asked = SCENES["crank-rocker"]
-    answer = MujocoSimulated().answer(asked, fourbar.command(asked))
-    other = replace(asked, loads=(replace(asked.loads[0], bar=3), *asked.loads[1:]))
+    posed = SCENES["crank-rocker"]
+    answer = MujocoSimulated().answer(posed, fourbar.command(posed))
+    other = replace(posed, loads=(replace(posed.loads[0], bar=3), *posed.loads[1:]))
     rows = compare("", other, answer, fourbar.solve(other, at=answer.at), SIMULATED, COMPARED)
     assert {row.quantity for row in rows if not row.passed} >= {"F12", "F32", "F43", "F14", "torque"}
 
 
 def test_positions_outside_the_range_are_not_assembled() -> None:
-    asked = scene(TRIPLE, fourbar.Sweep(0.2 - math.pi, 0.2 + math.pi, 72), 10.0)
-    command = fourbar.command(asked)
-    answer = MujocoSimulated().answer(asked, command)
+    posed = scene(TRIPLE, fourbar.Sweep(0.2 - math.pi, 0.2 + math.pi, 72), 10.0)
+    command = fourbar.command(posed)
+    answer = MujocoSimulated().answer(posed, command)
     inside = np.abs(command.theta_2 - 0.2) < math.radians(95.739)  # cosine rule at b + c
     assert answer.assembled is not None and np.array_equal(answer.assembled, inside)
     assert np.isfinite(answer.quantities["F43"]).all(axis=1).tolist() == inside.tolist()
@@ -118,8 +118,8 @@ def test_positions_outside_the_range_are_not_assembled() -> None:
     ],
 )
 def test_refusals_state_their_reason(motion: fourbar.Motion, reason: str) -> None:
-    asked = crank_rocker(motion=motion)
-    refusal = MujocoSimulated().answer(asked, fourbar.command(asked)).refusal
+    posed = crank_rocker(motion=motion)
+    refusal = MujocoSimulated().answer(posed, fourbar.command(posed)).refusal
     assert refusal is not None and reason in refusal and "\n" not in refusal
 
 
@@ -130,17 +130,17 @@ def test_a_change_point_is_a_declared_limit() -> None:
         ((0.1, 0.1, 0.25, 0.25), True),
         ((0.3, 0.1, 0.3, 0.11), False),
     ):
-        asked = fourbar.Scene(fourbar.uniform(*lengths), motion)
-        refusal = MujocoSimulated().answer(asked, fourbar.command(asked)).refusal
+        posed = fourbar.Scene(fourbar.uniform(*lengths), motion)
+        refusal = MujocoSimulated().answer(posed, fourbar.command(posed)).refusal
         assert (refusal is not None and "change point" in refusal) == refused
 
 
 def test_error_falls_with_the_fourth_power_of_the_timestep() -> None:
     """RK4, the closure's time constant held in seconds, so that the softness stays what it is."""
-    asked = crank_rocker(motion=fourbar.Motion(TURN, 10.0))
+    posed = crank_rocker(motion=fourbar.Motion(TURN, 10.0))
 
     def error(answer: Answer) -> float:
-        return float(np.abs(answer.quantities["F43"] - fourbar.solve(asked, at=answer.at).F43).max())  # type: ignore[operator]
+        return float(np.abs(answer.quantities["F43"] - fourbar.solve(posed, at=answer.at).F43).max())  # type: ignore[operator]
 
-    coarse, fine, order = observed_order(asked, fourbar.command(asked), error)
+    coarse, fine, order = observed_order(posed, fourbar.command(posed), error)
     assert fine < coarse and 3.0 < order < 6.0, (coarse, fine, order)

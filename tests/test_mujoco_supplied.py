@@ -1,4 +1,4 @@
-"""What MJCF cannot say and MuJoCo is told at each stage of a step: motion laws and loads over theta_2."""
+"""What MJCF cannot say and MuJoCo is given at each stage of a step: motion laws and loads over theta_2."""
 
 import math
 from collections.abc import Callable
@@ -33,14 +33,14 @@ PART_OF_A_TURN = Load(4, (3.0, 0.7), (0.05, 1.0), 0.2, "bar", Table((0.1, 1.0, 2
 WHOLE_TURN = Load(3, (4.0, 0.7), (0.05, 1.0), 0.2, "world", Table((0.0, 1.0, 2.5, 2 * np.pi), (0.0, 1.0, -0.5, 0.0)))
 
 
-def simulated(asked: Scene) -> list[Row]:
-    record = judge("scene", asked, SIMULATED)
+def simulated(posed: Scene) -> list[Row]:
+    record = judge("scene", posed, SIMULATED)
     assert record.left_out == []
     return [row for row in record.rows if row.engine == "mujoco-simulated"]
 
 
-def failing(asked: Scene) -> set[str]:
-    return {row.quantity for row in simulated(asked) if not row.passed}
+def failing(posed: Scene) -> set[str]:
+    return {row.quantity for row in simulated(posed) if not row.passed}
 
 
 @pytest.mark.parametrize("drive", [2, 4])
@@ -48,16 +48,16 @@ def failing(asked: Scene) -> set[str]:
 def test_a_motion_law_is_run_through(name: str, drive: int) -> None:
     """The whole scene at once: a table of a load too, gravity, and dry friction whose sense changes with the law's."""
     effects = (Gravity(), Friction.at(O2=0.02, O4=0.03))
-    asked = crank_rocker(motion=fourbar.Motion(law=LAWS[name]), loads=(WHOLE_TURN,), effects=effects, drive_bar=drive)
-    rows = simulated(asked)
+    posed = crank_rocker(motion=fourbar.Motion(law=LAWS[name]), loads=(WHOLE_TURN,), effects=effects, drive_bar=drive)
+    rows = simulated(posed)
     assert [row for row in rows if not row.passed] == []
     assert {"theta_4", "alpha_4", "F32", "torque"} <= {row.quantity for row in rows}
 
 
 def test_the_law_is_followed_at_its_own_times() -> None:
-    asked = crank_rocker(motion=fourbar.Motion(law=LAWS["periodic"]), loads=(), effects=())
-    command = fourbar.command(asked)
-    answer = simulate.MujocoSimulated().answer(asked, command)
+    posed = crank_rocker(motion=fourbar.Motion(law=LAWS["periodic"]), loads=(), effects=())
+    command = fourbar.command(posed)
+    answer = simulate.MujocoSimulated().answer(posed, command)
     assert answer.at is not None and command.omega_2 is not None and answer.at.omega_2 is not None
     assert np.abs(answer.at.theta_2 - command.theta_2).max() < KINK
     assert np.abs(answer.at.omega_2 - command.omega_2).max() < 1e-5 * np.abs(command.omega_2).max()
@@ -70,23 +70,23 @@ def test_a_table_that_ends_where_the_sweep_does(omega: float) -> None:
 
 
 def test_an_overrun_is_put_back_only_if_it_is_a_rounding() -> None:
-    asked = crank_rocker(loads=(PART_OF_A_TURN,))
+    posed = crank_rocker(loads=(PART_OF_A_TURN,))
     angles = np.array([0.1, 2.0, 2.0 * math.pi + 0.5])
-    put_back = within(asked, angles + np.array([-OVERRUN, OVERRUN, 0.0]) / 2.0)
+    put_back = within(posed, angles + np.array([-OVERRUN, OVERRUN, 0.0]) / 2.0)
     assert put_back == pytest.approx(angles, abs=1e-15)
     with pytest.raises(fourbar.FourBarError, match="leaves the table"):
-        within(asked, angles + 2.0 * OVERRUN)
+        within(posed, angles + 2.0 * OVERRUN)
 
 
-def changed(told: Callable[..., Any], factor: float) -> Callable[..., Any]:
-    return lambda *given: factor * told(*given)
+def changed(right: Callable[..., Any], factor: float) -> Callable[..., Any]:
+    return lambda *given: factor * right(*given)
 
 
 @pytest.mark.parametrize("factor", [-1.0, 2.0, 0.0], ids=["wrong sign", "applied twice", "missing"])
 def test_a_fault_in_a_table_fails_the_run(factor: float, monkeypatch: pytest.MonkeyPatch) -> None:
     right = simulate.of_loads
     monkeypatch.setattr(
-        simulate, "of_loads", lambda scene: {name: changed(told, factor) for name, told in right(scene).items()}
+        simulate, "of_loads", lambda scene: {name: changed(of_load, factor) for name, of_load in right(scene).items()}
     )
     motion = fourbar.Motion(fourbar.Sweep(0.13, 0.13 + 2 * math.pi, 12), 10.0)
     assert "torque" in failing(crank_rocker(motion=motion, loads=(WHOLE_TURN,), effects=()))
@@ -96,8 +96,8 @@ def test_a_fault_in_a_table_fails_the_run(factor: float, monkeypatch: pytest.Mon
 def test_a_drive_that_does_not_follow_the_law_fails_the_run(factor: float, monkeypatch: pytest.MonkeyPatch) -> None:
     """The engine is judged at the motion it made; that it is not the law's, its own speed says."""
     monkeypatch.setattr(motions.Lawful, "alpha", changed(motions.Lawful.alpha, factor))
-    asked = crank_rocker(motion=fourbar.Motion(law=LAWS["periodic"]), loads=(), effects=())
-    failed = [row for row in simulated(asked) if not row.passed]
+    posed = crank_rocker(motion=fourbar.Motion(law=LAWS["periodic"]), loads=(), effects=())
+    failed = [row for row in simulated(posed) if not row.passed]
     assert any("does not turn as commanded" in row.reason for row in failed)
 
 

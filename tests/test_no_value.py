@@ -1,4 +1,4 @@
-"""No value, and said so: where the status is ok every quantity that was asked for is a number."""
+"""No value, and a status that names it: where the status is ok every requested quantity is a number."""
 
 import json
 import math
@@ -29,7 +29,7 @@ EXAMPLES = settings(max_examples=120, deadline=None, derandomize=True, suppress_
 FORCES = ("F12", "F32", "F43", "F14", "torque", "torque_error", "force_error")
 
 
-def asked(scene: Scene, stage: str | None = None) -> Solution:
+def solved(scene: Scene, stage: str | None = None) -> Solution:
     """Solved, with every warning an error."""
     with warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -100,8 +100,8 @@ def scenes(draw: st.DrawFn) -> Scene:
 
 @EXAMPLES
 @given(scenes(), st.sampled_from(STAGES))
-def test_where_the_status_is_ok_every_quantity_asked_for_is_a_number(scene: Scene, stage: str) -> None:
-    solution = asked(scene, stage)
+def test_where_the_status_is_ok_every_requested_quantity_is_a_number(scene: Scene, stage: str) -> None:
+    solution = solved(scene, stage)
     assert without_value(solution) == {}
     infinite = [name for name in STAGE_OF if (values := getattr(solution, name)) is not None and np.isinf(values).any()]
     assert infinite == [], "no value is NaN, never infinite"
@@ -116,20 +116,20 @@ def test_a_bar_that_does_not_turn_takes_no_torque(linkage: fourbar.FourBar, bran
     """T3 of a parallelogram and T4 of a folded kite would have a pole at every position."""
     motion = Motion(np.linspace(0.3, 2.0, 5), 1.0, 2.0, branch)
     for effects in ((), (Gravity(),), (Friction.at(A=0.1), PinFriction.at(B=(0.1, 0.01)))):
-        solution = asked(Scene(linkage, motion, drive_bar, effects=effects))
+        solution = solved(Scene(linkage, motion, drive_bar, effects=effects))
         assert solution.status == ["no_torque"] * 5
         assert getattr(solution, f"omega_{drive_bar}") == pytest.approx(np.zeros(5))
         assert all(np.isnan(getattr(solution, name)).all() for name in FORCES)
         assert np.isfinite(solution.alpha_4).all() and not solution.drive_condition.any()  # type: ignore[union-attr, arg-type]
-    assert asked(Scene(linkage, motion, drive_bar), "acceleration").status == ["ok"] * 5
-    assert asked(Scene(linkage, motion, 2)).status == ["ok"] * 5
+    assert solved(Scene(linkage, motion, drive_bar), "acceleration").status == ["ok"] * 5
+    assert solved(Scene(linkage, motion, 2)).status == ["ok"] * 5
 
 
 def test_a_sweep_through_a_change_point_loses_that_position_alone() -> None:
     motion = Motion(np.array([-0.4, 0.0, 0.4]), 1.0)
-    assert asked(Scene(PARALLELOGRAM, motion)).status == ["ok", "singular", "ok"]
+    assert solved(Scene(PARALLELOGRAM, motion)).status == ["ok", "singular", "ok"]
     # the drive on 3: in the crossed branch for theta_2 < 0 all bars stay parallel to the other pair
-    assert asked(Scene(PARALLELOGRAM, motion, 3)).status == ["ok", "singular", "no_torque"]
+    assert solved(Scene(PARALLELOGRAM, motion, 3)).status == ["ok", "singular", "no_torque"]
 
 
 def heavy(mass: float) -> fourbar.FourBar:
@@ -138,15 +138,15 @@ def heavy(mass: float) -> fourbar.FourBar:
 
 def test_beyond_the_range_of_doubles_the_status_says_so_from_that_stage_on() -> None:
     motion = Motion(np.linspace(0.3, 2.0, 5), 10.0)
-    solution = asked(Scene(heavy(1e308), motion))
+    solution = solved(Scene(heavy(1e308), motion))
     assert solution.status == ["overflow"] * 5
     assert all(np.isnan(getattr(solution, name)).all() for name in FORCES)
     assert all(np.isfinite(getattr(solution, name)).all() for name in ("theta_3", "omega_3", "alpha_3", "a_G3"))
-    assert asked(Scene(heavy(1e308), motion), "acceleration").status == ["ok"] * 5
+    assert solved(Scene(heavy(1e308), motion), "acceleration").status == ["ok"] * 5
     at_rest = Motion(np.linspace(0.3, 2.0, 5), 0.0)
-    assert asked(Scene(heavy(1e308), at_rest)).status == ["ok"] * 5
+    assert solved(Scene(heavy(1e308), at_rest)).status == ["ok"] * 5
     long = fourbar.uniform(30.0, 10.0, 25.0, 22.0)
-    fast = asked(Scene(long, Motion(np.array([0.3]), 1e154)))
+    fast = solved(Scene(long, Motion(np.array([0.3]), 1e154)))
     assert fast.status == ["overflow"] and fast.omega_2 == [1e154] and np.isfinite(fast.omega_4).all()  # type: ignore[arg-type]
     assert np.isnan(fast.alpha_3).all() and np.isnan(fast.a_A).all() and np.isnan(fast.torque).all()  # type: ignore[arg-type]
 
@@ -154,7 +154,7 @@ def test_beyond_the_range_of_doubles_the_status_says_so_from_that_stage_on() -> 
 def test_where_it_depends_on_the_position_only_those_positions_are_lost() -> None:
     """The force of a spring of 1e308 N/m, 0.8 m long, at a distance that grows with theta_2."""
     spring = Spring(Point(1, 3.0, 0.0), Point(2, 1.0, 0.0), 1e308, 0.0)
-    solution = asked(
+    solution = solved(
         Scene(heavy(1.0), Motion(np.array([0.1, 1.0, 3.0]), 1.0), 4, effects=(Springs((spring,)),)), "force"
     )
     assert solution.status[2] == "overflow"
@@ -171,23 +171,23 @@ def test_a_speed_whose_square_is_no_number_is_refused_in_one_line(omega: float) 
 def test_lengths_and_sweeps_beyond_the_range_of_doubles_are_refused() -> None:
     with pytest.raises(InputError, match="lengths = "):
         fourbar.FourBar(1e308, *[fourbar.Bar(1e308, inertia=0.0)] * 3)
-    assert asked(Scene(fourbar.FourBar(4e307, *[fourbar.Bar(4e307)] * 3), Motion(1.0, 1e-200))).status == ["ok"]
+    assert solved(Scene(fourbar.FourBar(4e307, *[fourbar.Bar(4e307)] * 3), Motion(1.0, 1e-200))).status == ["ok"]
     with pytest.raises(InputError, match=r"motion\.theta_2\.to = 1e\+308"):
         Sweep(-1e308, 1e308, 3)
 
 
-def test_an_angle_that_is_no_number_is_not_said_not_to_close() -> None:
+def test_an_angle_that_is_no_number_is_not_reported_as_not_closing() -> None:
     for lengths in ((3.0, 1.0, 2.5, 2.2), (4.0, 2.5, 2.5, 2.8)):  # the second closes in a part of the turn alone
         linkage = fourbar.FourBar(lengths[0], *(fourbar.Bar(length) for length in lengths[1:]), 1e308)
         closing = next(x for x in 1e308 + 1e292 * np.arange(9) if solve(Scene(linkage, Motion(x))).assembled[0])
-        solution = asked(Scene(linkage, Motion(np.array([-1e308, closing]), 1.0)))
+        solution = solved(Scene(linkage, Motion(np.array([-1e308, closing]), 1.0)))
         assert solution.status == ["overflow", "ok"] and without_value(solution) == {}
 
 
 def test_error_bars_beyond_the_range_of_doubles_say_that_no_digit_is_left() -> None:
-    """Of a torque of 1e200 N m they are squared on their way."""
+    """Of a torque of 1e200 N m they are squared in between."""
     motion = Motion(np.linspace(0.3, 2.0, 5), 10.0)
-    solution = asked(Scene(heavy(1e200), motion))
+    solution = solved(Scene(heavy(1e200), motion))
     assert solution.status == ["ok"] * 5
     assert np.array_equal(solution.torque_error, np.abs(solution.torque))  # type: ignore[arg-type]
     largest = np.max([np.hypot(*getattr(solution, name).T) for name in FORCES[:4]], axis=0)
@@ -196,7 +196,7 @@ def test_error_bars_beyond_the_range_of_doubles_say_that_no_digit_is_left() -> N
 
 def test_what_is_beyond_the_range_of_doubles_is_nan_where_the_loop_does_not_close_too() -> None:
     rocker = fourbar.uniform(40.0, 25.0, 25.0, 28.0)
-    solution = asked(Scene(rocker, Motion(np.array([2.5]), 1.0, 1e308)))
+    solution = solved(Scene(rocker, Motion(np.array([2.5]), 1.0, 1e308)))
     assert solution.status == ["not_assembled"] and np.isnan(solution.a_A).all()  # type: ignore[arg-type]
 
 
@@ -205,7 +205,7 @@ def test_where_friction_jams_the_motion_that_would_begin_the_status_says_so() ->
     scene = Scene(
         CRANK_ROCKER, Motion(np.linspace(0.1, 6.2, 60), 0.0), 4, effects=(Gravity(), PinFriction.at(A=(0.9, 0.2)))
     )
-    solution = asked(scene)
+    solution = solved(scene)
     jammed = solution.status_code == JAMMED
     assert jammed.any() and np.isfinite(solution.torque).all()  # type: ignore[arg-type]
     lost = np.isnan(solution.torque_low) | np.isnan(solution.torque_high)  # type: ignore[arg-type]
@@ -230,18 +230,18 @@ bar = {drive_bar}
 
 
 @pytest.mark.parametrize(
-    ("changes", "said"),
+    ("changes", "words"),
     [({"drive_bar": 3}, "no torque"), ({"mass": "1e308 kg", "omega": "100 rad/s"}, "overflow")],
 )
-def test_analyze_says_it_in_every_form(changes: dict[str, Any], said: str, tmp_path: Path, capfd: Any) -> None:
+def test_analyze_says_it_in_every_form(changes: dict[str, Any], words: str, tmp_path: Path, capfd: Any) -> None:
     file = tmp_path / "scene.toml"
     file.write_text(SCENE.format(**{"mass": "1 kg", "omega": "1 rad/s", "drive_bar": 2, **changes}))
-    name = said.replace(" ", "_")
+    name = words.replace(" ", "_")
     with warnings.catch_warnings():
         warnings.simplefilter("always")
         assert status(["analyze", str(file)]) == HOLDS
         table, errors = capfd.readouterr()
-        assert f"5 positions: 5 {said}" in table and errors == ""
+        assert f"5 positions: 5 {words}" in table and errors == ""
         assert status(["analyze", str(file), "--json"]) == HOLDS
         document = json.loads(capfd.readouterr().out)
         assert document["status"] == [name] * 5 and document["torque"] == [None] * 5

@@ -33,8 +33,8 @@ def test_the_bars_are_seen_where_the_formulas_put_them() -> None:
     ends = {2: (np.zeros(2), s.A[0]), 3: (s.A[0], s.B[0]), 4: (np.array([O4.real, O4.imag]), s.B[0])}
     for number, (start, end) in ends.items():
         middle = start + 0.4 * (end - start)  # at 0.5 lies the site of a load
-        x = WIDTH / 2 + (middle[0] - seen.x) / seen.half * HEIGHT / 2
-        y = HEIGHT / 2 - (middle[1] - seen.y) / seen.half * HEIGHT / 2
+        x = WIDTH / 2 + (middle[0] - seen.x) / seen.half_height * HEIGHT / 2
+        y = HEIGHT / 2 - (middle[1] - seen.y) / seen.half_height * HEIGHT / 2
         around = image[round(y) - 2 : round(y) + 3, round(x) - 2 : round(x) + 3].reshape(-1, 3)
         assert np.linalg.norm(around - HUES[number], axis=1).min() < NEAR, number
     assert image[3, 3].min() > 0.85  # a light background
@@ -49,7 +49,7 @@ def test_no_position_leaves_the_frame(scene: fourbar.Scene) -> None:
         s = fourbar.solve(fourbar.Scene(linkage, motion))
         for points in (s.A, s.B):
             offset = np.abs(points[s.assembled] - (seen.x, seen.y)).max(axis=0)
-            assert offset[1] < seen.half and offset[0] < seen.half * WIDTH / HEIGHT
+            assert offset[1] < seen.half_height and offset[0] < seen.half_height * WIDTH / HEIGHT
 
 
 def test_without_opengl_there_is_a_reason(monkeypatch: pytest.MonkeyPatch) -> None:

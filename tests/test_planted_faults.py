@@ -30,9 +30,9 @@ EXACT = {name: [w for w in WITNESSES if w.name in name] for name in ("pinocchio-
 """The engines, and the witness that needs none: each has to notice by itself."""
 
 
-def outcome(scene: Scene, asked: str = "pinocchio-inverse, mujoco-inverse") -> tuple[bool, set[str]]:
+def outcome(scene: Scene, engines: str = "pinocchio-inverse, mujoco-inverse") -> tuple[bool, set[str]]:
     """Whether the run passes, and which quantities fail."""
-    rows = judge("scene", scene, EXACT[asked]).rows
+    rows = judge("scene", scene, EXACT[engines]).rows
     return all(row.passed for row in rows), {row.quantity for row in rows if not row.passed}
 
 
@@ -215,16 +215,16 @@ FAULTS = {
 
 def test_without_a_fault_the_run_passes() -> None:
     for scene in (crank_rocker(), thesis()):
-        for asked in EXACT:
-            passed, failing = outcome(scene, asked)
+        for engines in EXACT:
+            passed, failing = outcome(scene, engines)
             assert passed, failing
 
 
-@pytest.mark.parametrize("asked", EXACT)
+@pytest.mark.parametrize("engines", EXACT)
 @pytest.mark.parametrize("fault", FAULTS)
-def test_each_planted_fault_fails_the_run(fault: str, asked: str) -> None:
+def test_each_planted_fault_fails_the_run(fault: str, engines: str) -> None:
     with FAULTS[fault]():
-        passed, failing = outcome(crank_rocker(), asked)
+        passed, failing = outcome(crank_rocker(), engines)
     assert not passed, f"{fault}: not noticed"
     assert failing
 
@@ -243,8 +243,8 @@ def test_positions_outside_the_range_fail_the_run() -> None:
         solution.status_code[:] = 0
 
     scene = thesis(np.radians([80.0, 135.0]))  # the range starts at 84.6 deg
-    for asked in EXACT:
+    for engines in EXACT:
         with formulas_say(pretend):
-            passed, failing = outcome(scene, asked)
+            passed, failing = outcome(scene, engines)
         assert not passed
         assert "assembled" in failing

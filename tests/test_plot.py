@@ -119,7 +119,7 @@ def test_drawn_curves_are_those_of_the_solution() -> None:
     np.testing.assert_allclose(torque.lines[1].get_ydata(), 1e3 * solution.torque)
 
 
-def test_bars_are_drawn_to_scale_at_the_position_asked_for() -> None:
+def test_bars_are_drawn_to_scale_at_the_requested_position() -> None:
     scene = crank_rocker()
     axes = composed(scene, "linkage", position=1.3).axes[0]
     bars = [line for line in axes.lines if line.get_linewidth() == 4.5]

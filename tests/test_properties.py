@@ -18,7 +18,7 @@ from fourbar.solution import Solution
 WORST_CONDITION = 0.2
 """Sines below this are drawn elsewhere: here every relation must hold to round-off."""
 ROUND_OFF = 100.0 * 2.0**-52 / WORST_CONDITION**3
-"""Two ways through fifty roundings each, divided by the motion condition squared and the drive condition: 2.8e-12."""
+"""Two methods of fifty roundings each, divided by the motion condition squared and the drive condition: 2.8e-12."""
 EXAMPLES = settings(max_examples=60, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
 """The same examples on every run: what is new is looked for by fuzzing."""
 FORCES = ("F12", "F32", "F43", "F14")
@@ -332,7 +332,7 @@ def test_relabelled_from_the_other_end(scene: Scene) -> None:
     names = {2: 4, 3: 3, 4: 2}
 
     def relabelled(load: Load) -> Load:
-        if load.bar == 3 and load.frame == "bar":  # the bar's line points the other way
+        if load.bar == 3 and load.frame == "bar":  # the bar's line points in the opposite direction
             return replace(load, force=(load.force[0], load.force[1] + math.pi), at=(load.at[0], load.at[1] + math.pi))
         return replace(load, bar=names[load.bar])
 
@@ -353,7 +353,7 @@ def test_relabelled_from_the_other_end(scene: Scene) -> None:
     o = fourbar.solve(other_end)
     # F32 at A is now F34 = -F43, F43 at B is F23 = -F32
     exchanged = {"F12": o.F14[0], "F14": o.F12[0], "F32": -o.F43[0], "F43": -o.F32[0]}
-    # omega_4 and alpha_4 were rounded on the way, and lose what the shape of the linkage makes of it
+    # omega_4 and alpha_4 were rounded before, and lose what the shape of the linkage makes of it
     same_forces(scene, s, exchanged, float(o.torque[0]), factor=10.0 * shape(scene) / WORST_CONDITION)
 
 

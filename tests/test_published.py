@@ -37,7 +37,7 @@ from validation.published.textbook import SCENES, answers, textbook_figures, val
 LISTED = 0.5e-12
 """Half a unit of the last digit listed below."""
 TYPED = 4.0 * 2.0**-52
-"""Relative; two ways to type one input, 57*153^2/12 cm^2 or 11.119275 m^2, differ by a few roundings."""
+"""Relative; two spellings of one input, 57*153^2/12 cm^2 or 11.119275 m^2, differ by a few roundings."""
 PRINTED_GAP = 20.0 * np.radians(0.5e-5) + 55.0 * np.radians(0.5e-6)
 """cm; theta_4 is printed to five decimals of a degree at least, theta_3 to six: half a unit of each, by its bar."""
 T4 = (

@@ -1,4 +1,4 @@
-"""What changed since the accepted state: real changes told apart from round-off, the surroundings first."""
+"""What changed since the accepted state: real changes distinguished from round-off, the surroundings first."""
 
 import json
 import math
@@ -58,7 +58,7 @@ def test_better_and_new_rows_are_no_regression_but_a_new_failure_is() -> None:
     assert differences((HERE, [ROW]), (HERE, [ROW, failing])).regressions
 
 
-def test_other_versions_are_said_first() -> None:
+def test_other_versions_are_reported_first() -> None:
     other = About({**HERE.versions, "mujoco": "3.3.7"}, HERE.machine, HERE.settings)
     found = differences((other, [ROW]), (HERE, [ROW]))
     assert [what for what, _, _ in found.surroundings] == ["mujoco"]
@@ -104,7 +104,7 @@ def test_accept_records_the_run_under_a_name(tmp_path: Path, monkeypatch: pytest
 
 
 @pytest.mark.parametrize(
-    ("arguments", "said"),
+    ("arguments", "words"),
     [
         (["--type", "crank-rocker"], "say --random N too"),
         (["--seed", "3"], "say --random N too"),
@@ -117,11 +117,11 @@ def test_accept_records_the_run_under_a_name(tmp_path: Path, monkeypatch: pytest
     ],
 )
 def test_options_of_a_run_that_would_do_nothing_are_refused_before_it(
-    arguments: list[str], said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    arguments: list[str], words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert status(["run", *arguments, "--out", str(tmp_path / "out")]) == 2
     message = capsys.readouterr().err.strip()
-    assert message.startswith("error: ") and said in message and "\n" not in message
+    assert message.startswith("error: ") and words in message and "\n" not in message
     assert not (tmp_path / "out").exists()
 
 

@@ -55,7 +55,7 @@ def answering(monkeypatch: pytest.MonkeyPatch, change: Any) -> list[Row]:
     from validation.engines.pinocchio_released import PinocchioReleased
 
     true = PinocchioReleased.release
-    monkeypatch.setattr(PinocchioReleased, "release", lambda *asked: change(true(*asked)))
+    monkeypatch.setattr(PinocchioReleased, "release", lambda *given: change(true(*given)))
     return [row for row in judge("falling", falling()).rows if row.engine == "pinocchio-forward"]
 
 
@@ -67,7 +67,7 @@ def test_an_engine_that_stops_before_fails(monkeypatch: pytest.MonkeyPatch) -> N
     assert only.verdict == FAILS and "20 of 44 instants" in only.reason
 
 
-def test_an_engine_that_is_nan_on_the_way_fails_and_one_that_is_nan_behind_the_limit_does_not(
+def test_an_engine_that_is_nan_before_it_fails_and_one_that_is_nan_behind_the_limit_does_not(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     def struck(at: int) -> Any:

@@ -165,7 +165,7 @@ def test_every_kind_of_scene_is_drawn(motion: fourbar.Motion, pictures: int) -> 
     assert "kind: crank-rocker" in text
 
 
-def test_an_engine_that_is_missing_is_said_to_fail() -> None:
+def test_an_engine_that_is_missing_is_reported_as_failing() -> None:
     absent = replace(WITNESSES[0], adapter="validation.engines.absent:Absent")
     summary, text = report([judged("demo", crank_rocker(), (absent,))])
     assert summary.verdict.startswith("FAILS")
@@ -181,7 +181,7 @@ def test_many_scenes_give_a_short_report_of_the_worst() -> None:
         each.timings = [*each.timings, replace(each.timings[0], engine="sim", setting=f"RK4 {628 + number}/rev")]
     summary, text = report(pages)
     assert [w.row.scene for w in summary.worst[:2]] == ["scene-499", "scene-498"]
-    assert {"scene-499", "scene-300"} <= {page.name for page in summary.pages}
+    assert {"scene-499", "scene-300"} <= {page.name for page in summary.shown}
     assert summary.refusals == [("mujoco-simulated", "falls to 0.0e+00; below 0.05 it is not simulated", 500)]
     assert [cost.setting for cost in summary.costs if cost.engine == "sim"] == ["RK4 628/rev to 1127/rev"]
     assert summary.orders[0][0] == "scene-000"

@@ -12,7 +12,7 @@ from validation.engines.hard_suite import HARD_WITNESSES, Hard
 from validation.engines.witnesses import WORK
 from validation.report import cost_section as cost
 from validation.report.costs import cost_figure
-from validation.report.hard_section import beside, section
+from validation.report.hard_section import found_in, section
 from validation.report.html import html
 from validation.report.summary import summarise
 from validation.report.templating import count_or_size
@@ -41,12 +41,12 @@ def test_a_failing_row_fails_its_family_in_the_report(tmp_path: Path) -> None:
     assert near[:8] == ("toggle-near", "1", "1", "0", "0", "1", "0", "holds")
     (refused,) = section([judged("toggle-near-a", REFUSES), judged("toggle-near-a", UNDECIDED)]).rows
     assert refused[:8] == ("toggle-near", "1", "0", "0", "1", "1", "0", "nothing compared")
-    assert beside(tmp_path) is None
+    assert found_in(tmp_path) is None
     (tmp_path / "hard").mkdir()
     write_results(rows, tmp_path / "hard" / "results.csv")
-    assert beside(tmp_path) is None  # unfinished: its page is not written yet
+    assert found_in(tmp_path) is None  # unfinished: its page is not written yet
     (tmp_path / "hard" / "hard.html").touch()
-    found = beside(tmp_path)
+    found = found_in(tmp_path)
     assert found is not None and found.rows == section(rows).rows
     assert [file for _, file in found.links] == ["hard/hard.html", "hard/report.html"]
 
@@ -80,14 +80,14 @@ def test_the_picture_of_costs_says_what_each_did_for_a_position() -> None:
     }
 
 
-def test_a_study_of_cost_beside_the_report_is_part_of_it(tmp_path: Path) -> None:
-    assert cost.beside(tmp_path) == []
+def test_a_study_of_cost_next_to_the_report_is_part_of_it(tmp_path: Path) -> None:
+    assert cost.found_in(tmp_path) == []
     folder = tmp_path / "cost" / "demo"
     folder.mkdir(parents=True)
     (folder / "cost.csv").touch()
     (folder / "sources.svg").write_text("<svg onload='alert(1)'/>")
     (folder / "work-precision-force.svg").write_bytes(bytes(cost.LARGEST + 1))
-    _, text = report([page()], sections=cost.beside(tmp_path))
+    _, text = report([page()], sections=cost.found_in(tmp_path))
     assert "The study of demo" in text and 'href="cost/demo/cost.md"' in text
     data = base64.b64encode(b"<svg onload='alert(1)'/>").decode()
     # an image runs no script; what is too large stays outside

@@ -92,9 +92,9 @@ def test_the_pandas_snippet_runs(
     pytest.importorskip("pandas", reason="pandas is optional")
     monkeypatch.chdir(results)
     exec(block("python"), {})
-    told = capsys.readouterr().out
-    assert "free-body" in told
-    assert "0 of " in told
+    printed = capsys.readouterr().out
+    assert "free-body" in printed
+    assert "0 of " in printed
 
 
 def test_the_sql_runs(results: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -18,7 +18,7 @@ D, A, B, C = 0.3, 0.1, 0.25, 0.22
 FRICTION = 0.5
 LINKAGE = fourbar.FourBar(D, fourbar.Bar(A, 0.2), fourbar.Bar(B, 0.5), fourbar.Bar(C, 0.4))
 ROUNDING = 1e-13
-"""rad; beside the reversal the speed that vanishes carries some hundred roundings."""
+"""rad; near the reversal the speed that vanishes carries some hundred roundings."""
 
 
 def scene(pin: str, drive: int = 2, start: float = 0.1) -> Scene:
@@ -36,16 +36,16 @@ def dead_centres() -> list[float]:
 @pytest.mark.parametrize(("pin", "places"), [("O4", dead_centres()), ("B", [math.pi, 2 * math.pi]), ("O2", [])])
 def test_they_are_where_geometry_puts_them(pin: str, places: list[float]) -> None:
     """The rocker turns at its dead centres; bars 3 and 4 turn together where A lies on the line of centres."""
-    asked = scene(pin)
-    found = reversals(asked, command(asked), solve(asked))
+    posed = scene(pin)
+    found = reversals(posed, command(posed), solve(posed))
     assert [reversal.theta_2 for reversal in found] == pytest.approx(places, abs=ROUNDING)
     assert {reversal.pin for reversal in found} <= {pin}
 
 
 def test_the_jump_is_that_of_statics() -> None:
     """The couple on bar 4 changes by 2 f; bar 3 takes the change as a force along itself: 2 f = c |sin mu| |dF43|."""
-    asked = scene("O4")
-    for reversal in reversals(asked, command(asked), solve(asked)):
+    posed = scene("O4")
+    for reversal in reversals(posed, command(posed), solve(posed)):
         sine = abs(float(reversal.before.sin_mu[0]))
         assert reversal.jump("F43") == pytest.approx(2 * FRICTION / (C * sine), rel=1e-9)
         assert reversal.jump("torque") < 1e-9  # its power f |slip| is continuous
@@ -63,9 +63,9 @@ def test_both_sides_are_judged_and_the_reversal_itself_is_not(start: float) -> N
 
 
 def test_a_curve_is_not_drawn_across_the_jump() -> None:
-    asked = scene("O4")
-    solution = solve(asked)
-    found = reversals(asked, command(asked), solution)
+    posed = scene("O4")
+    solution = solve(posed)
+    found = reversals(posed, command(posed), solution)
     assert solution.F43 is not None
     x, y = broken(solution.theta_2, solution.F43[:, 0], found, lambda side: side.F43[:, 0])  # type: ignore[index]
     gaps = np.flatnonzero(np.isnan(y))

@@ -20,7 +20,7 @@ ONCE_BAD = {
     "random": [
         (0, 131),  # bar of the torque
         (0, 986),  # F43, F14: the moment of -m a_A about O2 as a difference of large numbers
-        (3, 78),  # sin mu: Heron's factor of a short coupler and output by the long way round
+        (3, 78),  # sin mu: Heron's factor of a short coupler and output by the longer route
         (3, 1063),  # bars: rounding of theta_2 - theta_1 near a whole turn
     ],
     "scales": [(0, 347), (0, 952), (0, 1091)],  # bars, likewise
@@ -102,10 +102,10 @@ def test_a_tally_adds_up() -> None:
 def test_the_command_line_says_how_few_digits_are_left() -> None:
     linkage = fourbar.uniform(0.3, 0.1, 0.25, 0.22)
     dead = float(np.arccos((0.3**2 + 0.35**2 - 0.22**2) / (2 * 0.3 * 0.35)))  # bars 2, 3 in line
-    for angle, said in ((dead + 1e-11, True), (dead + 0.5, False)):
+    for angle, warned in ((dead + 1e-11, True), (dead + 0.5, False)):
         scene = fourbar.Scene(linkage, fourbar.Motion(angle, 10.0), drive_bar=4)
         lines = heading(scene, fourbar.solve(scene))
-        assert any("digits left of T4" in line and "bars 2 and 3" in line for line in lines) is said
+        assert any("digits left of T4" in line and "bars 2 and 3" in line for line in lines) is warned
     nothing = fourbar.FourBar(0.3, fourbar.Bar(0.1), fourbar.Bar(0.25), fourbar.Bar(0.22))
     scene = fourbar.Scene(nothing, fourbar.Motion(1.0, 5.0))
     assert not any("digits" in line for line in heading(scene, fourbar.solve(scene)))

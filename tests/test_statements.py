@@ -1,4 +1,4 @@
-"""What the formulas state of a linkage, asked of engines: it holds on every type, and each planted error is seen."""
+"""What the formulas state of a linkage, compared with engines: it holds on every type, and planted errors are seen."""
 
 import math
 from collections.abc import Callable
@@ -33,8 +33,8 @@ def judged(lengths: tuple[float, ...], engine: type = PinocchioInverse, theta_1:
     linkage = fourbar.FourBar(bars.ground, bars.input, bars.coupler, bars.output, theta_1)
     low, high = mobility.default_range(linkage)
     scene = Scene(linkage, fourbar.Motion(fourbar.Sweep(low + 0.01, high - 0.01, 7), 2.0), drive_bar=4)
-    asked = engine()
-    rows = statements("scene", scene, asked, asked.answer(scene, command(scene)))
+    witness = engine()
+    rows = statements("scene", scene, witness, witness.answer(scene, command(scene)))
     return {row.quantity: row for row in rows}
 
 

@@ -67,7 +67,7 @@ class Unlucky:
             if life.name.startswith("killed"):
                 os.kill(os.getpid(), signal.SIGKILL)
             os._exit(1)
-        return Answer("unlucky", "exact", refusal="not asked")
+        return Answer("unlucky", "exact", refusal="declined")
 
 
 class Moody:
@@ -80,7 +80,7 @@ class Moody:
             os.kill(os.getpid(), signal.SIGSEGV)
         if scene.title == "c":
             time.sleep(3600.0)
-        return Answer("moody", "exact", refusal="not asked")
+        return Answer("moody", "exact", refusal="declined")
 
 
 def judge_all(suite: object, out: Path, witnesses: tuple[Witness, ...] = EXACT, workers: int = 2) -> Summary:
@@ -108,7 +108,7 @@ def test_an_engine_that_crashes_or_hangs_costs_its_own_rows(tmp_path: Path, monk
 def test_what_comes_from_outside_is_not_held_against_the_engine(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, how: str
 ) -> None:
-    """Three times: in a chunk, in the scene by itself, and when it is the only engine asked."""
+    """Three times: in a chunk, in the scene by itself, and when it is the only engine that runs."""
     (tmp_path / "lives").mkdir()
     for life in range(3):
         (tmp_path / "lives" / f"{how} {life}").touch()
@@ -119,7 +119,7 @@ def test_what_comes_from_outside_is_not_held_against_the_engine(
 
 
 def dies_at_first() -> None:
-    """Starts no worker as long as some of its lives are left in the folder that the run was told."""
+    """Starts no worker as long as some of its lives are left in the folder that the run was given."""
     lives = sorted(Path(os.environ["LIVES"]).iterdir())
     if lives:
         lives[0].unlink(missing_ok=True)
@@ -269,36 +269,36 @@ def test_interrupted_it_says_130_and_resumes(tmp_path: Path, undisturbed: Path) 
 
 def test_a_full_disk_is_one_line_and_status_3_and_resumes(tmp_path: Path, undisturbed: Path) -> None:
     process = start(tmp_path, COUNT, "-c", LIMITED, stderr=subprocess.PIPE)
-    _, said = process.communicate(timeout=100)
+    _, printed = process.communicate(timeout=100)
     assert process.returncode == 3
-    assert b"Traceback" not in said
-    assert said.strip().splitlines()[-1].startswith(b"error: ")
+    assert b"Traceback" not in printed
+    assert printed.strip().splitlines()[-1].startswith(b"error: ")
     assert not (tmp_path / "results.csv").exists()
     assert_resumes(tmp_path, undisturbed)
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")
-def test_a_read_only_folder_is_said(tmp_path: Path) -> None:
+def test_a_read_only_folder_is_reported(tmp_path: Path) -> None:
     tmp_path.chmod(0o500)
     with pytest.raises((OSError, FourBarError)):
         judge_all(Few(), tmp_path / "run")
 
 
 @pytest.mark.parametrize(
-    ("asked", "key"),
+    ("motion", "key"),
     [
         ('theta_2 = { from = "0 deg", to = "9 deg", steps = %d }', "motion.theta_2"),
         ('theta_2 = "1 deg"\nfree = { duration = "1 s", steps = %d }', "motion.free"),
     ],
 )
-def test_a_scene_of_too_many_positions_is_refused_before_anything_runs(asked: str, key: str, tmp_path: Path) -> None:
+def test_a_scene_of_too_many_positions_is_refused_before_anything_runs(motion: str, key: str, tmp_path: Path) -> None:
     lengths = '[lengths]\nground = "4 m"\ninput = "1 m"\ncoupler = "3 m"\noutput = "3 m"\n'
     masses = '[bars.input]\nmass = "1 kg"\n[bars.coupler]\nmass = "1 kg"\n[bars.output]\nmass = "1 kg"\n'
     path = tmp_path / "long.toml"
-    path.write_text(f"{lengths}{masses}[motion]\n{asked % (MOST_POSITIONS - 1)}\n")
+    path.write_text(f"{lengths}{masses}[motion]\n{motion % (MOST_POSITIONS - 1)}\n")
     a_second = AS_LONG_AS if key == "motion.free" else 0
     assert scene_files([path]).positions == MOST_POSITIONS + a_second
-    path.write_text(f"{lengths}{masses}[motion]\n{asked % MOST_POSITIONS}\n")
+    path.write_text(f"{lengths}{masses}[motion]\n{motion % MOST_POSITIONS}\n")
     with pytest.raises(InputError, match=rf"{key}.steps = {MOST_POSITIONS}: must be below {MOST_POSITIONS} in a run"):
         scene_files([path])
 

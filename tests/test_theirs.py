@@ -72,19 +72,19 @@ def test_the_description_is_that_of_the_scene() -> None:
         bar = linkage.bar(number)
         expected = (bar.length, bar.mass, bar.moment_of_inertia, *bar.mass_centre)
         parts = ("mass", "inertia", "centre.distance", "centre.angle")
-        told = (found[f"lengths.{name}"], *(found[f"bars.{name}.{part}"] for part in parts))
-        assert told == pytest.approx(expected, rel=1e-14)
+        described = (found[f"lengths.{name}"], *(found[f"bars.{name}.{part}"] for part in parts))
+        assert described == pytest.approx(expected, rel=1e-14)
 
 
 def test_what_is_welded_to_a_bar_is_part_of_it() -> None:
-    """Two masses m at distance s of each other: G half-way, inertia 2 I + m s^2/2."""
+    """Two masses m at distance s of each other: G in the middle, inertia 2 I + m s^2/2."""
     half = '<body pos="{} 0 0"><inertial pos="0 0 0" mass="0.2" diaginertia="1e-3 1e-3 1e-3"/></body>'
     text = re.sub(
         '(name="rocker"[^>]*><joint/>)<inertial[^>]*>', r"\1" + half.format(0.05) + half.format(0.15), other_plane()
     )
     found = examine(BARE, text, MINE).described
-    told = [found[f"bars.output.{part}"] for part in ("mass", "centre.distance", "centre.angle", "inertia")]
-    assert told == pytest.approx([0.4, 0.1, 0.0, 2e-3 + 0.2 * 0.1**2 / 2.0], rel=1e-12, abs=1e-14)
+    described = [found[f"bars.output.{part}"] for part in ("mass", "centre.distance", "centre.angle", "inertia")]
+    assert described == pytest.approx([0.4, 0.1, 0.0, 2e-3 + 0.2 * 0.1**2 / 2.0], rel=1e-12, abs=1e-14)
 
 
 STOP = 'range="0 1" solreflimit="0.1 1"'
@@ -133,15 +133,15 @@ def test_how_softly_dry_friction_slips_is_named_and_costs() -> None:
     """By default its couple rises over 0.02 s of slip."""
     text = re.sub(' sol(ref|imp)friction="[^"]*"', "", mjcf(DRY))
     found = examine(DRY, text.replace('joint name="A"', 'joint name="rod"').replace('joint="A"', 'joint="rod"'), {})
-    told = {d.key: d for d in differences(generated(DRY).described, found.described, found.called)}
+    by_key = {d.key: d for d in differences(generated(DRY).described, found.described, found.called)}
     fields = {f"pins.{pin}.{field}" for pin in ("A", "O4") for field in ("solreffriction", "solimpfriction")}
-    assert told.keys() == fields
-    assert told["pins.A.solreffriction"].written == 'joint "rod" solreffriction'
-    assert told["pins.A.solreffriction"].theirs == (0.02, 1.0)
+    assert by_key.keys() == fields
+    assert by_key["pins.A.solreffriction"].written == 'joint "rod" solreffriction'
+    assert by_key["pins.A.solreffriction"].theirs == (0.02, 1.0)
     assert errors(DRY, found, ONE_STATE)["F12"] > 100.0 * SIMULATED.factor
 
 
-def test_a_cause_is_told_without_what_hangs_on_it() -> None:
+def test_a_cause_is_named_without_what_hangs_on_it() -> None:
     """Solver parameters of friction and of a stop that a file does not have, and what MuJoCo derives from a mass."""
     soft = GENERATED.replace('type="hinge"', 'type="hinge" solreffriction="0.1 1" solreflimit="0.1 1" margin="0.1"')
     assert {d.key for d in differences(generated(CRANK_ROCKER).described, described(soft))} == set()
@@ -230,7 +230,7 @@ def test_cut_at_another_pin_it_is_the_same_linkage() -> None:
     assert max(errors(BARE, found, ONE_STATE).values()) < STIFF_ENOUGH
 
 
-def test_a_servo_and_another_equality_are_taken_off_and_said() -> None:
+def test_a_servo_and_another_equality_are_taken_off_and_reported() -> None:
     text = GENERATED.replace("</actuator>", '<velocity name="servo" joint="O2" kv="10"/></actuator>')
     text = text.replace("</equality>", '<joint joint1="O2" joint2="O4"/></equality>')
     found = examine(CRANK_ROCKER, text, {})
@@ -286,7 +286,7 @@ def test_what_an_mjcf_may_not_hold(what: str, text: str | bytes, word: str, tmp_
 
 
 @pytest.mark.parametrize("timestep", ["1e-12", "1e9", "nan", "0", "-1"])
-def test_an_absurd_timestep_is_said_and_not_run_through(timestep: str) -> None:
+def test_an_absurd_timestep_is_reported_and_not_run_through(timestep: str) -> None:
     """One so long that no step is made once agreed in every position: the state at the start, again and again."""
     text = re.sub('timestep="[^"]*"', f'timestep="{timestep}"', GENERATED)
     assert text != GENERATED
@@ -360,13 +360,13 @@ def test_the_command_writes_and_prints_what_it_found(tmp_path: Path) -> None:
     assert result.return_value == 1, result.output
     assert "\x1b" not in result.output
     assert "closure.softness" in result.output
-    told = (tmp_path / "out" / "theirs.md").read_text()
-    assert "\x1b" not in told
+    report = (tmp_path / "out" / "theirs.md").read_text()
+    assert "\x1b" not in report
     assert any(row.verdict == FAILS and row.engine == ONE_STATE for row in from_csv(tmp_path / "out" / "results.csv"))
 
 
 @pytest.mark.parametrize("arguments", [["--mjcf", "x.xml"], ["SCENE", "--mjcf", "x.xml", "--name", "wheel=a"]])
-def test_bad_options_are_said(arguments: list[str], tmp_path: Path) -> None:
+def test_bad_options_are_reported(arguments: list[str], tmp_path: Path) -> None:
     scene = tmp_path / "scene.toml"
     scene.write_text(fourbar.dump(BARE))
     result = CliRunner().invoke(
@@ -390,7 +390,7 @@ def run(tmp_path: Path, text: str, *options: str) -> tuple[int | None, list[floa
     return result.return_value, sorted({row.allowed for row in from_csv(out / "results.csv")})
 
 
-def test_an_asked_error_is_what_their_file_is_held_to(tmp_path: Path) -> None:
+def test_a_required_error_is_what_their_file_is_held_to(tmp_path: Path) -> None:
     text = mjcf(BARE).replace("0.0016133333333333336", "0.0017")
     assert run(tmp_path, text) == (1, [0.0, SIMULATED.factor])
     assert run(tmp_path, text, "--error", "0.5") == (0, [0.0, 0.5])

@@ -76,7 +76,7 @@ def test_extremes_are_those_of_a_scan() -> None:
     assert kinds == {(True, True), (True, False), (False, True), (False, False)}
 
 
-def test_extremes_keep_their_digits_beside_a_change_point() -> None:
+def test_extremes_keep_their_digits_near_a_change_point() -> None:
     with mp.workdps(50):
         for gap in (1e-3, 1e-7, 1e-11, 1e-14):
             d, a, b, c = 0.3, 0.1, 0.25, 0.15 + gap

@@ -30,7 +30,7 @@ class Actions:
     ----------
     state : positions and motion.
     bodies : of bars 2, 3, 4.
-    side : which way pins at rest are about to turn: +1 as theta_2 grows, -1 as it falls, 0 neither.
+    side : the sense in which pins at rest are about to turn: +1 as theta_2 grows, -1 as it falls, 0 neither.
     rounded : what a term becomes when it is rounded otherwise, for the error bars.
     """
 
@@ -89,7 +89,7 @@ class Actions:
         """Sign of omega_j - omega_i at a pin; at rest the one that a motion beginning to `side` would have.
 
         A linkage at rest begins to move as theta_2 grows or falls; a pin that is at rest in a linkage that
-        moves turns either way.
+        moves turns in either sense.
         """
         slip, turning = self.state.slip(pin)[0], self.turning(pin)
         if self.side == 0:

@@ -27,7 +27,7 @@ class Effect:
     """Whether its couples jump where the relative rotation at a pin changes its sense."""
 
     counts_turns: ClassVar[bool] = False
-    """Whether it depends on where the motion began (`begun`)."""
+    """Whether it depends on where the motion began (`counted_from`)."""
 
     @property
     def loaded_pins(self) -> tuple[str, ...]:
@@ -49,7 +49,7 @@ class Effect:
         """The bars 2, 3, 4 with the inertia that the effect adds."""
         return bodies
 
-    def begun(self, start: State, assembled: NDArray[np.bool_], branch: NDArray[np.int8]) -> Self:
+    def counted_from(self, start: State, assembled: NDArray[np.bool_], branch: NDArray[np.int8]) -> Self:
         """The same effect in a motion that begins at the first of these positions that assembles."""
         return self
 

@@ -15,7 +15,7 @@ from fourbar.linkage import BAR_NAMES, FourBar, require
 from fourbar.quantities import NO_DIRECTION, OK
 
 COINCIDE = 16.0 * 2.0**-52
-"""Two points nearer than this part of their ways from O2, bar by bar, do not tell where the other lies."""
+"""Two points nearer than this part of their paths from O2, bar by bar, have no direction between them."""
 
 
 class Point(NamedTuple):

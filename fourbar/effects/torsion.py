@@ -17,7 +17,7 @@ from fourbar.quantities import OK, WOUND
 from fourbar.solution import Array
 
 HALF_TURN = math.pi * (1.0 - 1e-12)
-"""rad; at half a turn itself rounding would decide which way the spring turns."""
+"""rad; at half a turn itself rounding would decide in which sense the spring turns."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +53,7 @@ class Torsion(Effect):
             angle = np.angle(state.direction(j) * np.conj(state.direction(i)))
             actions.couple(pin, -(preload + k * _wound(angle - rest)))
 
-    def begun(self, start: State, assembled: NDArray[np.bool_], branch: NDArray[np.int8]) -> "Torsion":
+    def counted_from(self, start: State, assembled: NDArray[np.bool_], branch: NDArray[np.int8]) -> "Torsion":
         """Whole turns counted at the first position that assembles; none where the motion changes its branch."""
         if not assembled.any() or np.ptp(branch) != 0:
             return self

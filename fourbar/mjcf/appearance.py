@@ -10,8 +10,8 @@ FOVY = 45.0
 """Vertical field of view, deg."""
 ASPECT = 4.0 / 3.0
 """Narrowest window that shows the whole linkage."""
-ROOM = 1.15
-"""Free room around it."""
+MARGIN = 1.15
+"""Width and height of the picture over those of the linkage."""
 
 
 class Frame(NamedTuple):
@@ -19,13 +19,13 @@ class Frame(NamedTuple):
 
     x: float
     y: float
-    half: float
-    """Half the height of the picture, m."""
+    half_height: float
+    """Of the picture, m."""
 
     @property
     def distance(self) -> float:
         """Of the camera from the plane, m."""
-        return self.half / math.tan(math.radians(0.5 * FOVY))
+        return self.half_height / math.tan(math.radians(0.5 * FOVY))
 
 
 def frame(linkage: FourBar) -> Frame:
@@ -34,7 +34,7 @@ def frame(linkage: FourBar) -> Frame:
     x, y = d * math.cos(linkage.ground_angle), d * math.sin(linkage.ground_angle)
     left, right = min(-a, x - c), max(a, x + c)
     low, high = min(-a, y - c), max(a, y + c)
-    half = ROOM * max(0.5 * (high - low), 0.5 * (right - left) / ASPECT)
+    half = MARGIN * max(0.5 * (high - low), 0.5 * (right - left) / ASPECT)
     return Frame(0.5 * (left + right), 0.5 * (low + high), half)
 
 
@@ -52,7 +52,7 @@ def add_appearance(root: ET.Element, linkage: FourBar) -> None:
 
 
 def add_camera(world: ET.Element, linkage: FourBar) -> None:
-    """The camera `plane`, and a light beside it."""
+    """The camera `plane`, and a light at the same place."""
     seen = frame(linkage)
     place = f"{seen.x!r} {seen.y!r} {seen.distance!r}"
     shining = {

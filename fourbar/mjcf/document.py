@@ -67,7 +67,7 @@ def mjcf(scene: Scene, settings: Settings = RECIPE, *, keyframe: bool = True) ->
     elif settings.timestep is not None:
         timestep = settings.timestep * settings.timestep_scale
     else:
-        raise InputError("timestep", None, "is needed where no keyframe is asked for")
+        raise InputError("timestep", None, "is needed where no keyframe is requested")
     if settings.pad == "fitted":
         settings = replace(settings, pad=_pad(scene))
     model = Model(scene.linkage, settings, timestep)
@@ -178,7 +178,7 @@ def _start(scene: Scene) -> Start:
     omega = (speed, float(solution.omega_3[first]), float(solution.omega_4[first]))
     if np.ptp(theta_2) == 0.0:
         theta_2 = theta[0] + np.array([0.0, _span(scene.linkage)])
-        alpha = 0.0  # nobody asked for a window: its length only sets the timestep
+        alpha = 0.0  # no window is requested: its length only sets the timestep
     return Start(
         (theta[0], theta[1] - theta[0], theta[2]),
         (omega[0], omega[1] - omega[0], omega[2]),

@@ -1,4 +1,4 @@
-"""What is asked: linkage, motion, drive, loads and effects."""
+"""The problem as stated: linkage, motion, drive, loads and effects."""
 
 from fourbar.scene.scene import Command as Command
 from fourbar.scene.scene import Scene as Scene

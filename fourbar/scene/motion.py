@@ -72,7 +72,7 @@ class Motion:
     Parameters
     ----------
     theta_2 : one angle, an array of them (n,), a Sweep, a FromLimit, or None (the default range), rad.
-    omega_2 : rad/s; None: only positions are asked for.
+    omega_2 : rad/s; None: positions only.
     alpha_2 : rad/s^2.
     branch : +1 open (B left of the diagonal A to O4), -1 crossed.
     through : at a change point keep the "sign" of the branch, or "follow" the smooth path.

@@ -1,4 +1,4 @@
-"""A scene: linkage, motion, drive, loads and effects; `solve` evaluates only the stages asked for."""
+"""A scene: linkage, motion, drive, loads and effects; `solve` evaluates only the stages requested."""
 
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scene:
-    """Everything that is asked of a linkage; `effects` and `loads` hold only what acts."""
+    """A linkage and everything that is stated about it; `effects` and `loads` hold only what acts."""
 
     linkage: FourBar
     motion: Motion = field(default_factory=Motion)
@@ -41,7 +41,7 @@ class Scene:
 
 
 class Command(NamedTuple):
-    """What the input bar is told to do at each of n independent positions."""
+    """What the input bar must do at each of n independent positions."""
 
     theta_2: Array
     """(n,), rad."""
@@ -60,29 +60,29 @@ class Command(NamedTuple):
 def command(scene: Scene) -> Command:
     """The positions that the scene's motion names, each with its branch."""
     motion, linkage = scene.motion, scene.linkage
-    asked, remainder, time = motion.theta_2, None, None
+    stated, remainder, time = motion.theta_2, None, None
     omega_2: float | Array | None = motion.omega_2
     alpha_2: float | Array = motion.alpha_2
     if motion.law is not None:
         time = motion.law.times()
         theta_2, omega_2, alpha_2 = motion.law.at(time)
-    elif asked is None:
+    elif stated is None:
         theta_2 = np.linspace(*default_range(linkage), DEFAULT_STEPS + 1)
-    elif isinstance(asked, Sweep):
-        theta_2 = np.linspace(asked.start, asked.stop, asked.steps + 1)
-    elif isinstance(asked, FromLimit):
+    elif isinstance(stated, Sweep):
+        theta_2 = np.linspace(stated.start, stated.stop, stated.steps + 1)
+    elif isinstance(stated, FromLimit):
         limits = limit_positions(linkage)
         if not limits:
-            raise InputError("motion.theta_2.limit", asked.limit, "the input of this linkage has no limit positions")
-        if asked.limit > len(limits):
-            raise InputError("motion.theta_2.limit", asked.limit, f"must be from 1 to {len(limits)}")
+            raise InputError("motion.theta_2.limit", stated.limit, "the input of this linkage has no limit positions")
+        if stated.limit > len(limits):
+            raise InputError("motion.theta_2.limit", stated.limit, f"must be from 1 to {len(limits)}")
         from fourbar.many_digits import limit_remainder
 
-        limit = limits[asked.limit - 1].theta_2
-        theta_2 = np.array([limit + asked.offset])
-        remainder = limit_remainder(linkage, limit, float(theta_2[0]), asked.offset)
+        limit = limits[stated.limit - 1].theta_2
+        theta_2 = np.array([limit + stated.offset])
+        remainder = limit_remainder(linkage, limit, float(theta_2[0]), stated.offset)
     else:
-        theta_2 = np.atleast_1d(np.asarray(asked, dtype=float))
+        theta_2 = np.atleast_1d(np.asarray(stated, dtype=float))
     branch = np.full(theta_2.shape, motion.branch, dtype=np.int8)
     if motion.through == "follow":
         branch = on_smooth_path(linkage, theta_2, motion.branch)

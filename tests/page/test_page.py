@@ -459,7 +459,7 @@ def test_labels_of_the_picture_do_not_cover_each_other(browse) -> None:
         for k, a in enumerate(boxes):
             for b in boxes[k + 1 :]:
                 wide, high = min(a[2], b[2]) - max(a[0], b[0]), min(a[3], b[3]) - max(a[1], b[1])
-                assert wide < 3 or high < 6  # a box holds room for accents and descenders around the ink
+                assert wide < 3 or high < 6  # a box leaves space for accents and descenders around the ink
 
 
 def test_hostile_titles_do_nothing_but_appear(browse) -> None:
@@ -502,9 +502,9 @@ def test_positions_alone_show_no_dynamics(browse) -> None:
 
 
 def test_it_says_why_a_position_has_no_forces(browse) -> None:
-    """T3 of a parallelogram exists nowhere; on its input the drive has forces everywhere, and nothing is said."""
+    """T3 of a parallelogram exists nowhere; on its input the drive has forces everywhere, and no remark is shown."""
     motion = fourbar.Motion(fourbar.Sweep(0.3, 2.0, 4), 1.0)
-    for drive_bar, said in ((3, "no torque of the drive holds them in balance"), (2, "")):
+    for drive_bar, remark in ((3, "no torque of the drive holds them in balance"), (2, "")):
         scene = fourbar.Scene(fourbar.uniform(1.0, 0.5, 1.0, 0.5), motion, drive_bar)
         status = browse(animate.page(scene)).find_element("id", "status")
-        assert (said in status.text) and status.is_displayed() == bool(said)
+        assert (remark in status.text) and status.is_displayed() == bool(remark)

@@ -85,7 +85,7 @@ def test_the_download_is_results_csv(browse) -> None:
     assert base64.b64decode(data).decode() == to_csv(row for page in pages for row in page.rows)
 
 
-def test_200_scenes_open_quickly_and_a_scene_when_asked(browse) -> None:
+def test_200_scenes_open_quickly_and_a_scene_when_opened(browse) -> None:
     driver = browse(report(copies(200))[1])
     times = driver.execute_script("return JSON.stringify(performance.getEntriesByType('navigation')[0])")
     assert json.loads(times)["loadEventEnd"] / 1e3 < LOADED

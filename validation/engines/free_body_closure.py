@@ -25,7 +25,7 @@ LONGEST_STEP = 0.5
 HALVINGS = 40
 """A step halved this often moves nothing that a gap above the rounding could tell."""
 NEWTON_STEPS = 100
-"""Beside a toggle Newton halves its distance: fifty steps reach the last digit from any start."""
+"""Near a toggle Newton halves its distance: fifty steps reach the last digit from any start."""
 ROUNDING = 16.0 * 2.0**-52
 """Gap, relative to the sum of the lengths, that the roundings of a sum of four bars can leave."""
 

@@ -7,7 +7,7 @@ from validation.report.html import Figure, Section
 
 FOLDER = "cost"
 PICTURES = {
-    "work-precision-force.svg": "Error of the worst pin force over the CPU time of a revolution, for every way to it",
+    "work-precision-force.svg": "Error of the worst pin force over the CPU time of a revolution, for every method",
     "orders.svg": "Error of the driving torque and of each pin force over the time step; a jump is ringed",
     "sources.svg": "Error over time step, softness of the closure and tolerance of the solver, one at a time",
 }
@@ -18,7 +18,7 @@ MOST = 3
 """Scenes whose study is shown."""
 
 
-def beside(out: Path) -> list[Section]:
+def found_in(out: Path) -> list[Section]:
     """One for each scene of which OUT/cost holds a study."""
     folders = sorted(path.parent for path in (out / FOLDER).glob("*/cost.csv"))
     return [_section(folder) for folder in folders[:MOST]]

@@ -37,7 +37,7 @@ SIMULATED_FROM = 3e-3
 
 @dataclass(frozen=True, slots=True)
 class Approach:
-    """One way towards a singular position."""
+    """One approach to a singular position."""
 
     title: str
     scene: Scene
@@ -81,14 +81,14 @@ def picture() -> str:
     from matplotlib.backends.backend_svg import FigureCanvasSVG
     from matplotlib.figure import Figure
 
-    ways = approaches()
+    columns = approaches()
     figure = Figure(figsize=(10.5, 6.4), layout="constrained", facecolor="none")
     FigureCanvasSVG(figure)
-    axes = figure.subplots(len(SHOWN), len(ways), squeeze=False, sharex="col")
-    for column, way in enumerate(ways):
+    axes = figure.subplots(len(SHOWN), len(columns), squeeze=False, sharex="col")
+    for column, approach in enumerate(columns):
         for row, quantity in enumerate(SHOWN):
-            _draw(axes[row][column], way, quantity)
-        axes[0][column].set_title(way.title, fontsize=9)
+            _draw(axes[row][column], approach, quantity)
+        axes[0][column].set_title(approach.title, fontsize=9)
         axes[-1][column].set_xlabel("distance in theta_2 [rad]")
     for row, quantity in enumerate(SHOWN):
         axes[row][0].set_ylabel(f"error of {quantity}, of its own size")
@@ -97,16 +97,16 @@ def picture() -> str:
     return drawn(figure, "where it gets hard")
 
 
-def _draw(axes: Any, way: Approach, quantity: str) -> None:
-    solution = solve(way.scene, "force")
+def _draw(axes: Any, approach: Approach, quantity: str) -> None:
+    solution = solve(approach.scene, "force")
     size = magnitude(getattr(solution, quantity))
-    singular = _singular(way)
-    predicted = relative(in_world_axes(way.scene, command(way.scene), (quantity,))[quantity], size)
-    law = K * EPS / condition_of(quantity, way.scene.linkage, solution)
+    singular = _singular(approach)
+    predicted = relative(in_world_axes(approach.scene, command(approach.scene), (quantity,))[quantity], size)
+    law = K * EPS / condition_of(quantity, approach.scene.linkage, solution)
     shown = np.isfinite(predicted)
-    axes.loglog(way.distances, law, color=INK, linestyle=(0, (1, 1)), linewidth=1, label="law K eps/condition")
+    axes.loglog(approach.distances, law, color=INK, linestyle=(0, (1, 1)), linewidth=1, label="law K eps/condition")
     axes.fill_between(
-        way.distances[shown],
+        approach.distances[shown],
         predicted[shown],
         DEGRADED * predicted[shown],
         color=INK,
@@ -115,7 +115,7 @@ def _draw(axes: Any, way: Approach, quantity: str) -> None:
         label="computed: predicted to ten times that",
     )
     for witness in HARD_WITNESSES:
-        found = errors(way.scene, quantity, witness)
+        found = errors(approach.scene, quantity, witness)
         if found is not None and len(found[0]):
             style = STYLES.get(witness.name, OTHER)
             axes.loglog(
@@ -127,16 +127,16 @@ def _draw(axes: Any, way: Approach, quantity: str) -> None:
                 linewidth=0.8,
                 label=witness.name,
             )
-    axes.set_xlim(way.distances[0] * 2, way.distances[-1] / 2)
+    axes.set_xlim(approach.distances[0] * 2, approach.distances[-1] / 2)
     axes.set_ylim(FLOOR, 1e3)
     axes.grid(visible=True, color=INK, alpha=0.2)
 
 
-def _singular(way: Approach) -> float:
+def _singular(approach: Approach) -> float:
     """theta_2 of the singular position: the positions lie at the distances from it."""
-    theta_2 = command(way.scene).theta_2
+    theta_2 = command(approach.scene).theta_2
     side = math.copysign(1.0, float(theta_2[0] - theta_2[-1]))
-    return float(theta_2[0]) - side * float(way.distances[0])
+    return float(theta_2[0]) - side * float(approach.distances[0])
 
 
 def limit_rows(limits: Sequence[Limit] = LIMITS) -> list[tuple[str, str, str, str]]:
@@ -171,7 +171,7 @@ table {{ border-collapse: collapse; width: 100%; font-size: .9rem; }}
 td, th {{ text-align: left; padding: .2rem .6rem; border-bottom: 1px solid #8884; vertical-align: top; }}</style>
 </head><body>
 <h1>Where it gets hard</h1>
-<p>Error of each engine against the formulas, relative to the value itself, on the way to a singular position.
+<p>Error of each engine against the formulas, relative to the value itself, towards a singular position.
 The dotted line is the law in powers of the sines; the band is what rounding was computed to do at each position,
 and ten times that: above it a row fails, whoever agrees.</p>
 <figure>{svg}</figure><p><a download="hard.svg" href="data:image/svg+xml;base64,{source}">Download the picture</a></p>

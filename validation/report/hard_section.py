@@ -11,7 +11,7 @@ from validation.scenes.hard_families import FAMILIES
 KEY, TITLE, FOLDER, PAGE = "hard", "Hard cases", "hard", "hard.html"
 ALT = "Error of each engine over the distance to a toggle, a pole of T4 and a change point"
 CAPTION = (
-    "Error against the formulas, relative to the value itself, on the way to a singular position. Dotted: the law "
+    "Error against the formulas, relative to the value itself, towards a singular position. Dotted: the law "
     "K eps/condition. Band: what rounding was computed to do there, up to ten times that; above it a row fails."
 )
 
@@ -23,7 +23,7 @@ def section(rows: Iterable[Row], picture: str | None = None) -> Section:
     return _section(rows, text, figures, [("Limits of the engines, and the picture to download: " + PAGE, PAGE)])
 
 
-def beside(out: Path) -> Section | None:
+def found_in(out: Path) -> Section | None:
     """Of an earlier run of the hard suite into OUT/hard, or None where there is none."""
     folder = out / FOLDER
     results = folder / "results.csv"

@@ -37,12 +37,12 @@ class Cell(NamedTuple):
     @property
     def kind(self) -> str:
         """Word for its colour."""
-        return {FAILS: "fails", REFUSES: "refuses", UNDECIDED: "untold"}.get(self.row.verdict, "holds")
+        return {FAILS: "fails", REFUSES: "refuses", UNDECIDED: "undecided"}.get(self.row.verdict, "holds")
 
     @property
     def shown(self) -> str:
         """What stands in its cell."""
-        return {"refuses": "refuses", "untold": "not told"}.get(self.kind, share(self.used))
+        return {"refuses": "refuses", "undecided": "undecided"}.get(self.kind, share(self.used))
 
 
 class Figure(NamedTuple):
@@ -66,7 +66,7 @@ class Section:
     rows: Sequence[Sequence[str]] = ()
     figures: Sequence[Figure] = ()
     links: Sequence[tuple[str, str]] = ()
-    """(words, file beside the report)."""
+    """(words, file next to the report)."""
     numbers: tuple[int, int] = (0, 0)
     """The columns that hold numbers: from, up to."""
     under: str = ""
@@ -77,7 +77,7 @@ class Section:
 class SceneView:
     """What the page shows of one scene."""
 
-    page: Record
+    scene: Record
     cells: list[Cell]
     engines: list[str]
     quantities: list[str]
@@ -118,17 +118,17 @@ def html(
     templates.filters["packed"] = lambda text: base64.b64encode(gzip.compress(text.encode("utf-8"), mtime=0)).decode()
     templates.filters["colour"] = lambda engine: by_variable(style_of(engine).colour)
     templates.filters["symbol"] = lambda engine: style_of(engine).symbol
-    views = [_view(page, first_lines.get(page.name, 2), pictures or {}) for page in summary.pages]
+    views = [_view(scene, first_lines.get(scene.name, 2), pictures or {}) for scene in summary.shown]
     csv = base64.b64encode(to_csv(cell.row for view in views for cell in view.cells).encode("utf-8"))
     failing = sorted((cell for view in views for cell in view.cells if cell.row.failed), key=lambda c: c.line)
-    costs = cost_figure(summary.pages)
+    costs = cost_figure(summary.shown)
     return templates.get_template("report.html.j2").render(
         s=summary,
         views=views,
         engines=[engine for engine in _engines(cell.row for view in views for cell in view.cells)],
         failing=failing,
         lazy=len(views) > ALL_OPEN,
-        figures={page.name: Markup(page.figure) for page in summary.pages if page.figure},  # drawn by our own code
+        figures={scene.name: Markup(scene.figure) for scene in summary.shown if scene.figure},  # drawn by our own code
         cost_figure=Markup(costs) if costs else None,
         no_pictures=no_pictures,
         sections=sections,
@@ -147,8 +147,8 @@ def share(value: float) -> str:
     return "0" if value == 0.0 else "<0.01" if value < 0.01 else f"{value:.2f}" if value < 10.0 else f"{value:.1e}"
 
 
-def _view(page: Record, first_line: int, pictures: Mapping[str, str]) -> SceneView:
-    cells = [Cell(line, row) for line, row in enumerate(sorted_rows(page.rows), first_line)]
+def _view(scene: Record, first_line: int, pictures: Mapping[str, str]) -> SceneView:
+    cells = [Cell(line, row) for line, row in enumerate(sorted_rows(scene.rows), first_line)]
     by_place: dict[tuple[str, str], Cell] = {}
     worst: dict[str, Cell] = {}
     for cell in cells:
@@ -159,7 +159,7 @@ def _view(page: Record, first_line: int, pictures: Mapping[str, str]) -> SceneVi
     found = {cell.row.quantity for cell in cells}
     quantities = [name for name in ORDER if name in found] + sorted(found.difference(ORDER))
     engines = _engines(cell.row for cell in cells)
-    return SceneView(page, cells, engines, quantities, by_place, worst, pictures.get(page.name))
+    return SceneView(scene, cells, engines, quantities, by_place, worst, pictures.get(scene.name))
 
 
 def _rank(cell: Cell) -> tuple[bool, float]:

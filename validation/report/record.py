@@ -73,7 +73,7 @@ class Record:
         return cls(**{**kept, "timings": timings, "independence": independence}, rows=rows)
 
     def joined(self, other: "Record") -> "Record":
-        """The same scene with what another set of engines said; the rows of the formulas stand once."""
+        """The same scene with the answers of another set of engines; the rows of the formulas stand once."""
         known = set(self.rows)
         return replace(
             self,

@@ -1,4 +1,4 @@
-"""What every form of the report says, computed once from the pages."""
+"""What every form of the report says, computed once from its scenes."""
 
 import math
 import re
@@ -74,18 +74,18 @@ class Summary:
     orders: list[tuple[str, dict[str, float]]]
     """(scene, errors at 4h and 2h and observed order) of the simulated engine: at most ORDERS_SHOWN, lowest first."""
     ladder: list[LadderRow]
-    """The thesis's errors one by one, from the right answer to the printed ones; empty where not asked for."""
+    """The thesis's errors one by one, from the right answer to the printed ones; empty where not requested."""
     tolerances: list[Tolerance]
     """What the witnesses were held to."""
     missing: list[tuple[str, str]]
-    """(engine, why it could not be asked here)."""
+    """(engine, why it could not run here)."""
 
     @property
     def good(self) -> bool:
         """Whether all that was to be compared was, and holds."""
         return self.counts.status == HOLDS and not self.missing
 
-    pages: list[Record]
+    shown: list[Record]
     """The scenes shown one by one, at most SCENES_SHOWN: those that fail, then those that used most of what is
     allowed."""
 
@@ -100,14 +100,14 @@ NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 TOLERANCES = (IDENTITY, EQUIVALENCE, SIMULATED)
 """Of a run with the standing witnesses."""
 STATEMENT = (
-    f"K = {K:g} for every exact comparison; where eps/condition > {NOTHING_TO_TELL:g} the row says that nothing can be "
-    "told. Errors are relative to the largest magnitude over the positions whose condition is at least 0.1; below that "
+    f"K = {K:g} for every exact comparison; where eps/condition > {NOTHING_TO_TELL:g} the row is undecided. "
+    "Errors are relative to the largest magnitude over the positions whose condition is at least 0.1; below that "
     "to the position's own magnitude; angles modulo 2 pi, in rad."
 )
 
 
 def summarise(
-    pages: Iterable[Record],
+    scenes: Iterable[Record],
     ladder: Sequence[LadderRow] = (),
     tolerances: Sequence[Tolerance] = TOLERANCES,
     missing: Sequence[tuple[str, str]] = (),
@@ -125,32 +125,32 @@ def summarise(
     orders: list[tuple[str, dict[str, float]]] = []
     failing: list[Record] = []
     holding: list[tuple[float, Record]] = []
-    for page in pages:
-        counts.add_scene(page.rows)
-        bad = [row for row in page.rows if row.failed]
+    for scene in scenes:
+        counts.add_scene(scene.rows)
+        bad = [row for row in scene.rows if row.failed]
         failures += bad[: FAILURES_KEPT - len(failures)]
-        for engine, reason in sorted(_left_out(page)):
+        for engine, reason in sorted(_left_out(scene)):
             kind = (engine, NUMBER.sub("#", reason))
             refusals[kind] += 1
             first_reason.setdefault(kind, reason)
-        found = _worst(page.rows)
+        found = _worst(scene.rows)
         judged += len(found)
         worst = _top(WORST_SHOWN, [*worst, *found], lambda w: w.used)
-        _measure_k(page.rows, measured_k)
-        independence.update(page.independence)
-        _add_costs(page, costs)
-        known = [(page.name, each) for each in page.evidence.values() if "observed_order" in each]
+        _measure_k(scene.rows, measured_k)
+        independence.update(scene.independence)
+        _add_costs(scene, costs)
+        known = [(scene.name, each) for each in scene.evidence.values() if "observed_order" in each]
         orders = _top(ORDERS_SHOWN, [*orders, *known], _lowest)
         if bad:
-            failing += [page][: SCENES_SHOWN - len(failing)]
+            failing += [scene][: SCENES_SHOWN - len(failing)]
         else:
             most = max((w.used for w in found), default=0.0)
-            holding = _top(SCENES_SHOWN, [*holding, (most, page)], lambda each: each[0])
+            holding = _top(SCENES_SHOWN, [*holding, (most, scene)], lambda each: each[0])
     verdict = counts.sentence()
     if missing:
-        verdict += f"; not asked: {', '.join(engine for engine, _ in missing)}"
+        verdict += f"; not run: {', '.join(engine for engine, _ in missing)}"
     holding = nlargest(SCENES_SHOWN - len(failing), holding, key=lambda each: each[0])
-    shown = sorted([*failing, *(page for _, page in holding)], key=lambda page: page.name)
+    shown = sorted([*failing, *(scene for _, scene in holding)], key=lambda scene: scene.name)
     return Summary(
         verdict=verdict,
         scenes=counts.scenes,
@@ -177,17 +177,17 @@ def summarise(
         ladder=list(ladder),
         tolerances=list(tolerances),
         missing=list(missing),
-        pages=shown,
+        shown=shown,
     )
 
 
-def _left_out(page: Record) -> set[tuple[str, str]]:
-    """What was not asked, or refused to answer: (engine, reason)."""
-    told = {(row.engine, row.reason) for row in page.rows if row.verdict == REFUSES}
-    for line in page.left_out:
+def _left_out(scene: Record) -> set[tuple[str, str]]:
+    """What was not run, or refused to answer: (engine, reason)."""
+    found = {(row.engine, row.reason) for row in scene.rows if row.verdict == REFUSES}
+    for line in scene.left_out:
         engine, _, reason = line.partition(": ")
-        told.add((engine, reason))
-    return told
+        found.add((engine, reason))
+    return found
 
 
 def used(row: Row) -> float:
@@ -230,10 +230,10 @@ class Timed(NamedTuple):
     microseconds: float
 
 
-def _add_costs(page: Record, costs: dict[tuple[str, str], list[Timed]]) -> None:
-    formulas = page.timings[0].seconds if page.timings else math.nan
-    refused = {row.engine for row in page.rows if row.verdict == REFUSES}
-    for t in page.timings:
+def _add_costs(scene: Record, costs: dict[tuple[str, str], list[Timed]]) -> None:
+    formulas = scene.timings[0].seconds if scene.timings else math.nan
+    refused = {row.engine for row in scene.rows if row.verdict == REFUSES}
+    for t in scene.timings:
         kept = costs.setdefault((t.engine, t.setting.partition(" ")[0]), [])  # an integrator, whatever its steps
         if t.engine not in refused and len(kept) < TIMED:
             kept.append(Timed(t.setting, t.seconds / formulas, 1e6 * t.seconds / t.positions))

@@ -46,7 +46,7 @@ def table(summary: Summary, out: Path) -> None:
     for engine, reason, count in summary.refusals:
         console.print(f"left out in {count} scene(s): {escape(engine)}: {escape(printable(reason))}")
     for engine, reason in summary.missing:
-        console.print(f"[bold red]not asked[/] {escape(engine)}: {escape(reason)}")
+        console.print(f"[bold red]not run[/] {escape(engine)}: {escape(reason)}")
     console.print(f"[bold]{escape(summary.verdict)}[/]; written to {escape(printable(str(out)))}")
 
 

@@ -101,14 +101,14 @@ def sections(hard: Iterable[Row] | None, out: Path) -> list[Section]:
     Of rows of the hard suite the page hard.html is written too.
     """
     if hard is None:
-        found = hard_section.beside(out)
-        return [*([found] if found else []), *cost_section.beside(out)]
+        found = hard_section.found_in(out)
+        return [*([found] if found else []), *cost_section.found_in(out)]
     from validation.report.hard_page import page, picture
     from validation.report.svg import inline
 
     svg = picture()
     write_text(out / hard_section.PAGE, page(svg))
-    return [hard_section.section(hard, inline(svg)), *cost_section.beside(out)]
+    return [hard_section.section(hard, inline(svg)), *cost_section.found_in(out)]
 
 
 def mjcf_pictures(suite: Suite) -> tuple[dict[str, str], str]:

@@ -1,4 +1,4 @@
-"""`python -m validation models`: write the MJCF of every scene in models/ beside it."""
+"""`python -m validation models`: write the MJCF of every scene in models/ next to it."""
 
 import math
 import re

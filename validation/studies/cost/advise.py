@@ -1,4 +1,4 @@
-"""The cheapest settings of MuJoCo that keep torque and pin forces within an asked error on a given scene.
+"""The cheapest settings of MuJoCo that keep torque and pin forces within a required error on a given scene.
 
 The laws of the study say where to look, and short runs of the scene itself decide:
 
@@ -24,7 +24,7 @@ from validation.engines.mujoco.trial import Rig, Trial
 from validation.studies.cost.errors import NO_ANSWER, Errors, errors
 
 MARGIN = 0.7
-"""The run must stay within this part of the asked error: between the positions it may be larger."""
+"""The run must stay within this part of the required error: between the positions it may be larger."""
 CLOSE_ENOUGH = 1.15
 """The search stops where the least steps that serve and the most that do not are this close."""
 BETWEEN = 180
@@ -49,7 +49,7 @@ class Attempt:
 class Advice:
     """What serves, or how near the best came."""
 
-    asked: float
+    required: float
     best: Attempt
     """The cheapest that serves; where nothing does, the most accurate."""
     attempts: tuple[Attempt, ...]
@@ -66,9 +66,9 @@ class Advice:
             f"tc = {s.time_constant_steps:.3g} steps, pads {s.pad}, tolerance 0, flywheel {s.flywheel:g}"
         )
         if self.reached:
-            return f"{dial}: {found}, asked {self.asked:g}"
+            return f"{dial}: {found}, required {self.required:g}"
         return (
-            f"no setting of plain MJCF within {MOST_STEPS} steps was found to reach {self.asked:g}; "
+            f"no setting of plain MJCF within {MOST_STEPS} steps was found to reach {self.required:g}; "
             f"the best was {dial}: {found}. "
             f"The formulas, and inverse dynamics of either engine with loop multipliers, reach round-off"
         )
@@ -85,7 +85,7 @@ def advise(scene: Scene, error: float, rig: Rig | None = None) -> Advice:
 
 
 def looked_at(scene: Scene) -> Command:
-    """The scene's own positions and others between them: the error peaks there, most of all beside a pole of T3, T4."""
+    """The scene's own positions and others between them: the error peaks there, most of all near a pole of T3, T4."""
     own = command_of(scene)
     if np.ptp(own.branch) != 0:
         return own
@@ -95,7 +95,7 @@ def looked_at(scene: Scene) -> Command:
 
 
 class _Search:
-    """Settings tried on one scene, for one asked error."""
+    """Settings tried on one scene, for one required error."""
 
     def __init__(self, scene: Scene, error: float, rig: Rig) -> None:
         self.scene, self.error, self.rig = scene, error, rig
@@ -181,19 +181,19 @@ def judged(scene: Scene, trial: Trial) -> Errors:
 
 @click.command(name="advise")
 @click.argument("scene", type=click.Path(path_type=Path, dir_okay=False))
-@click.option("--error", "asked", type=float, required=True, help="Relative error of torque and pin forces.")
+@click.option("--error", "error", type=float, required=True, help="Relative error of torque and pin forces.")
 @click.option(
     "-o", "--out", "--output", "output", type=click.Path(path_type=Path, dir_okay=False), help="Write the MJCF there."
 )
-def command(scene: Path, asked: float, output: Path | None) -> int:
+def command(scene: Path, error: float, output: Path | None) -> int:
     """The cheapest MuJoCo settings that keep SCENE within an error; exit 1 where none is found."""
     from fourbar.files import load
 
     given = load(scene)
     try:
-        advice = advise(given, asked)
-    except LimitError as error:
-        click.echo(f"{scene.name}: cannot be simulated: {error}; inverse dynamics with loop multipliers can answer it")
+        advice = advise(given, error)
+    except LimitError as reason:
+        click.echo(f"{scene.name}: cannot be simulated: {reason}; inverse dynamics with loop multipliers can answer it")
         return 1
     click.echo(f"{scene.name}: {advice.reason}")
     click.echo(f"{len(advice.attempts)} runs of the scene, {sum(a.steps for a in advice.attempts)} steps")

@@ -28,7 +28,7 @@ ORDERS = "Errors are the worst over the scene's positions, each on its scale, ag
 )
 @click.option("--effects", is_flag=True, help="Count instead what each effect costs in each engine (`effects-cost`).")
 def cost(scenes: tuple[Path, ...], out: Path, effects: bool) -> int:
-    """What accuracy costs in time: work and precision of every way to an answer, on SCENES (default: the crank-rocker).
+    """What accuracy costs in time: work and precision of every method, on SCENES (default: the crank-rocker).
 
     An interrupted study is resumed where it stopped. Exit status 1 where the law of any quantity does not hold, or
     none is decided.
@@ -101,9 +101,9 @@ def to_csv(curves: Mapping[str, Sequence[Point]]) -> str:
 
 def summary(name: str, curves: Mapping[str, Sequence[Point]], found: Sequence[Law], left_out: Sequence[str]) -> str:
     """What the terminal shows."""
-    told = [f"{name}: what accuracy costs", "", *front_lines(curves), "", *lines(found), ""]
-    told += [f"warning: {line}" for line in warnings(curves)]
-    return "\n".join((*told, *(f"left out: {line}" for line in left_out)))
+    text = [f"{name}: what accuracy costs", "", *front_lines(curves), "", *lines(found), ""]
+    text += [f"warning: {line}" for line in warnings(curves)]
+    return "\n".join((*text, *(f"left out: {line}" for line in left_out)))
 
 
 def front_lines(curves: Mapping[str, Sequence[Point]]) -> list[str]:
@@ -127,13 +127,13 @@ def report(
 ) -> str:
     """The study as Markdown."""
     about = ", ".join(f"{name} {version}" for name, version in versions().items())
-    told = [f"# What accuracy costs: {title}", "", f"{machine()}; {about}. {ORDERS}", ""]
-    told += [f"![{path.stem}]({path.name})" for path in pictures if path.suffix == ".svg"]
-    told += ["", "## Laws", "", *(f"- {law}" for law in lines(found))]
-    told += ["", "## Cheapest for each error", "", "```", *front_lines(curves), "```"]
-    told += ["", "## Where an error jumps, and where more steps buy nothing", ""]
-    told += [f"- {line}" for line in warnings(curves) or ["none"]]
-    told += [
+    text = [f"# What accuracy costs: {title}", "", f"{machine()}; {about}. {ORDERS}", ""]
+    text += [f"![{path.stem}]({path.name})" for path in pictures if path.suffix == ".svg"]
+    text += ["", "## Laws", "", *(f"- {law}" for law in lines(found))]
+    text += ["", "## Cheapest for each error", "", "```", *front_lines(curves), "```"]
+    text += ["", "## Where an error jumps, and where more steps buy nothing", ""]
+    text += [f"- {line}" for line in warnings(curves) or ["none"]]
+    text += [
         "",
         "## All points",
         "",
@@ -142,11 +142,11 @@ def report(
     ]
     for name, points in curves.items():
         for p in points:
-            told.append(
+            text.append(
                 f"| {name}: {p.setting} | {' | '.join(f'{getattr(p, q):.1e}' for q in QUANTITIES)} "
                 f"| {p.steps_per_revolution:.0f} "
                 f"| {1e3 * p.seconds_per_revolution:.3g} | {1e6 * p.seconds_per_sample:.3g} | {p.rk4_steps:.0f} |"
             )
     if left_out:
-        told += ["", "## Left out", "", *(f"- {line}" for line in left_out)]
-    return "\n".join(told) + "\n"
+        text += ["", "## Left out", "", *(f"- {line}" for line in left_out)]
+    return "\n".join(text) + "\n"

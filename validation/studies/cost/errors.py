@@ -29,7 +29,7 @@ class Errors(NamedTuple):
 
     @property
     def worst(self) -> float:
-        """What an asked error is compared with."""
+        """What a required error is compared with."""
         return max(self)
 
 

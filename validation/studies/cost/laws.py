@@ -42,7 +42,7 @@ class Law:
     expected: float
     points: int
     jumps: tuple[str, ...] = ()
-    """Where the error jumps up on the way: no law then, whatever the other points fit."""
+    """Where the error jumps up as the steps get finer: no law then, whatever the other points fit."""
 
     @property
     def decided(self) -> bool:
@@ -64,18 +64,18 @@ class Law:
 
 def lines(found: Sequence[Law]) -> list[str]:
     """Each law in one line, quantity by quantity."""
-    told = []
+    shown = []
     for name in dict.fromkeys(law.name for law in found):
         each = [law for law in found if law.name == name]
-        said = _grouped([(law.quantity, str(law)) for law in each])
-        told.append(f"{name}, expected {each[0].expected:g}: {'; '.join(said)}")
-    return told
+        texts = _grouped([(law.quantity, str(law)) for law in each])
+        shown.append(f"{name}, expected {each[0].expected:g}: {'; '.join(texts)}")
+    return shown
 
 
-def _grouped(said: Sequence[tuple[str, str]]) -> list[str]:
-    """Quantities of which the same is said, together."""
-    texts = dict.fromkeys(text for _, text in said)
-    return [f"{', '.join(quantity for quantity, other in said if other == text)}: {text}" for text in texts]
+def _grouped(pairs: Sequence[tuple[str, str]]) -> list[str]:
+    """Quantities with the same text, together."""
+    texts = dict.fromkeys(text for _, text in pairs)
+    return [f"{', '.join(quantity for quantity, other in pairs if other == text)}: {text}" for text in texts]
 
 
 def fit(x: Sequence[float], y: Sequence[float]) -> tuple[float, float]:
@@ -93,7 +93,7 @@ def floor(points: Sequence[Point], quantity: str) -> float | None:
     found = [getattr(point, quantity) for point in _by_steps(points)]
     if len(found) < 2 or not math.isfinite(found[-1]) or found[-1] < FLOORED * found[-2]:
         return None
-    return float(found[-1])  # on the way there two sources may cancel: a dip is not a floor
+    return float(found[-1])  # before it two sources may cancel: a dip is not a floor
 
 
 def steps_at_floor(points: Sequence[Point], quantity: str) -> Point | None:
@@ -114,7 +114,7 @@ def jumps(points: Sequence[Point], quantity: str) -> list[Point]:
     found = []
     for i, point in enumerate(points[1:], 1):
         value, before = getattr(point, quantity), [getattr(each, quantity) for each in points[max(i - 2, 0) : i]]
-        # two sources that cancel make a dip, and the way out of it is no jump; a motion that is lost again is one
+        # two sources that cancel make a dip, and its far side is no jump; a motion that is lost again is one
         if before[-1] < TOO_LARGE and not value <= JUMP * (max(before) if value < TOO_LARGE else before[-1]):
             found.append(point)
     return found
@@ -170,7 +170,7 @@ def _stiff(curves: Mapping[str, Sequence[Point]], quantity: str) -> Law:
 
 
 def warnings(curves: Mapping[str, Sequence[Point]]) -> list[str]:
-    """Where a quantity jumps on the way to finer steps, and where it has passed its floor."""
+    """Where a quantity jumps towards finer steps, and where it has passed its floor."""
     found = []
     for name, points in curves.items():
         ladder = _by_steps([p for p in points if p.kind == STEPPED and p.dial == p.dial and p.dial >= 2.0])
@@ -182,8 +182,8 @@ def warnings(curves: Mapping[str, Sequence[Point]]) -> list[str]:
         found += [f"{name}: {line}" for line in _grouped(leaps)]
         floored = [(q, p) for q in QUANTITIES if (p := steps_at_floor(ladder, q)) is not None]
         if floored:
-            told = (f"{q} beyond {p.steps_per_revolution:.0f} ({floor(ladder, q):.1e})" for q, p in floored)
-            found.append(f"{name}: more steps per revolution buy nothing: {', '.join(told)}")
+            beyond = (f"{q} beyond {p.steps_per_revolution:.0f} ({floor(ladder, q):.1e})" for q, p in floored)
+            found.append(f"{name}: more steps per revolution buy nothing: {', '.join(beyond)}")
         never = [q for q in QUANTITIES if not any(getattr(p, q) < TOO_LARGE for p in ladder)]
         if never:
             found.append(f"{name}: no timestep of the ladder brings {', '.join(never)} below {TOO_LARGE:g}")

@@ -26,7 +26,7 @@ TYPES = (
 SPEEDS = (-1.0, 3.0)
 """log10 of rad/s."""
 ERRORS = (-7.0, -2.0)
-"""log10 of the asked error."""
+"""log10 of the required error."""
 WINDOW = 0.8
 """Part of the range of a rocker that is run through: away from its limits."""
 GENTLE = 0.02
@@ -40,7 +40,7 @@ QUANTILE = 1.959963984540054
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """One linkage, one asked error."""
+    """One linkage, one required error."""
 
     index: int
     kind: str
@@ -48,6 +48,7 @@ class Case:
     gravity: bool
     drive_bar: int
     asked: float
+    """The required error: a column of its file."""
     reached: bool
     """The advice says that it serves."""
     error: float
@@ -60,7 +61,7 @@ class Case:
 
     @property
     def met(self) -> bool:
-        """Within the asked error, or rightly called unreachable."""
+        """Within the required error, or rightly called unreachable."""
         return self.error <= self.asked if self.reached else math.isnan(self.cheapest)
 
     @property
@@ -72,7 +73,7 @@ class Case:
 
 
 def scene_of(seed: int, index: int) -> tuple[Scene, float]:
-    """A random linkage away from its limits, at a random speed, and the error asked of it."""
+    """A random linkage away from its limits, at a random speed, and the error required of it."""
     scene = random_scene(seed, index, TYPES)
     rng = np.random.default_rng([seed, index, 1])
     omega = float(rng.choice([-1.0, 1.0]) * 10.0 ** rng.uniform(*SPEEDS))
@@ -96,18 +97,18 @@ def denser(scene: Scene, times: int) -> Scene:
 
 def case(seed: int, index: int, costs: dict[tuple[str, bool], float]) -> Case:
     """Ask for advice, judge it at denser positions, and search exhaustively."""
-    scene, asked = scene_of(seed, index)
-    advice = advise(scene, asked)
+    scene, required = scene_of(seed, index)
+    advice = advise(scene, required)
     dense, searched = denser(scene, DENSER), denser(scene, SEARCHED)
     error = judged(dense, Rig(dense, command(dense)).try_out(advice.best.settings)).worst
-    found = cheapest(Rig(searched, command(searched)), asked, costs)
+    found = cheapest(Rig(searched, command(searched)), required, costs)
     return Case(
         index,
         scene.title.rpartition(" ")[0],
         scene.motion.omega_2 or 0.0,
         bool(scene.effects),
         scene.drive_bar,
-        asked,
+        required,
         advice.reached,
         error,
         float(advice.best.steps),

@@ -68,4 +68,4 @@ def statement(curves: Mapping[str, Sequence[Point]]) -> str:
     if never:
         lost = dict.fromkeys(quantity for quantities in never.values() for quantity in quantities)
         return f"No time step brings {', '.join(lost)} below {TOO_LARGE:g} with {', '.join(never)}"
-    return "Torque and each pin force over the time step: no error jumps on the way to finer steps"
+    return "Torque and each pin force over the time step: no error jumps towards finer steps"

@@ -153,7 +153,7 @@ def _mark_default(axes: Any, points: Sequence[Point], quantity: str) -> None:
 
 
 def _exact(axes: Any, points: Sequence[Point], quantity: str) -> None:
-    """Methods that answer each position by itself: one mark each, named beside it."""
+    """Methods that answer each position by itself: one mark each, named next to it."""
     marks = {EXACT: ("h", "#009e73"), FORMULAS: ("*", "black")}
     for point in points:
         if point.kind == STEPPED or (point.curve == "one state" and point.dial > 0.0):
@@ -200,7 +200,7 @@ def statement(curves: Mapping[str, Sequence[Point]], quantity: str) -> str:
 
 
 def _sources(curves: Mapping[str, Sequence[Point]], title: str) -> Any:
-    """Time step, softness and solver tolerance, each with the other two out of the way."""
+    """Time step, softness and solver tolerance, each with the other two too fine to matter."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(11.5, 5.6))
@@ -249,7 +249,7 @@ def _sources(curves: Mapping[str, Sequence[Point]], title: str) -> Any:
 
 
 def _slope(axes: Any, exponent: float, x: float, y: float, name: str) -> None:
-    """A triangle's hypotenuse with the exponent beside it."""
+    """A triangle's hypotenuse with the exponent next to it."""
     axes.plot([x, 4.0 * x], [y, y * 4.0**exponent], color=INK, lw=1.0)
     axes.annotate(
         f"slope {name}", (2.0 * x, y * 2.0**exponent), xytext=(6, -8), textcoords="offset points", fontsize=8.5

@@ -28,7 +28,7 @@ TIMED_STEPS = 200
 """Steps per timing: some 3 ms of RK4, so that a round of a curve passes within one spell of the machine."""
 FORWARD_STEPS = (20, 40, 80, 160, 320, 640)
 FORWARD_TIME_CONSTANT = 0.25
-ASKED = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 2e-9)
+REQUIRED = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 2e-9)
 """Errors for which the advice is drawn."""
 ONE_STATE = (0.9, 0.99, 0.999, 0.9999)
 VERSION = 5
@@ -142,7 +142,7 @@ class Study:
         return self._stepped(curve.name, curve.spots, rig, settled)
 
     def _stepped(self, name: str, spots: tuple[Spot, ...], rig: Rig, settled: bool = False) -> list[Point]:
-        """Errors of each spot, and the CPU time of its steps beside that of the recommended model, interleaved."""
+        """Errors of each spot, and the CPU time of its steps next to that of the recommended model, interleaved."""
         trials = [rig.try_out(spot.settings, spot.build) for spot in spots]
         if settled:
             for trial in trials:
@@ -165,17 +165,17 @@ class Study:
         return points
 
     def _recommended(self) -> list[Point]:
-        """What the advice gives for each asked error, where it is reached."""
+        """What the advice gives for each required error, where it is reached."""
         rig, spots = self.rig(), []
-        for asked in ASKED:
-            advice = advise(self.scene, asked, rig)
+        for required in REQUIRED:
+            advice = advise(self.scene, required, rig)
             if advice.reached:
                 spots.append(
                     Spot(
-                        f"asked {asked:g}: tc = {advice.best.settings.time_constant_steps:.3g} h",
+                        f"required {required:g}: tc = {advice.best.settings.time_constant_steps:.3g} h",
                         advice.best.settings,
                         None,
-                        asked,
+                        required,
                     )
                 )
             else:
@@ -221,9 +221,9 @@ class Study:
         from validation.engines.mujoco.inverse import MujocoInverse
         from validation.engines.pinocchio import PinocchioInverse
 
-        return [self._asked("inverse", engine) for engine in (PinocchioInverse(), MujocoInverse())]
+        return [self._answered("inverse", engine) for engine in (PinocchioInverse(), MujocoInverse())]
 
-    def _asked(self, curve: str, engine: Engine, label: str = "", dial: float = math.nan) -> Point:
+    def _answered(self, curve: str, engine: Engine, label: str = "", dial: float = math.nan) -> Point:
         """An engine that answers each position."""
         import time
 
@@ -242,10 +242,10 @@ class Study:
         from validation.engines.mujoco.one_state import MujocoOneState
 
         points = [
-            self._asked("one state", MujocoOneState((d,)), f"MuJoCo at one state, d = {d:g}", (1.0 - d) / d)
+            self._answered("one state", MujocoOneState((d,)), f"MuJoCo at one state, d = {d:g}", (1.0 - d) / d)
             for d in ONE_STATE
         ]
-        return [*points, self._asked("one state", MujocoOneState(), "MuJoCo at one state, extrapolated", 0.0)]
+        return [*points, self._answered("one state", MujocoOneState(), "MuJoCo at one state, extrapolated", 0.0)]
 
     def _pinocchio_forward(self) -> list[Point]:
         from validation.engines.pinocchio_forward import PinocchioForward

@@ -20,7 +20,7 @@ WORKLOADS = (
     *("__init__.py", "studies/__init__.py", "studies/effects/__init__.py", "studies/effects/work.py"),
     *("engines/__init__.py", "engines/mujoco/__init__.py", "engines/mujoco/stepping.py"),
 )
-"""Of the harness, what runs a workload; it names no effect but those it is asked for."""
+"""Of the harness, what runs a workload; it names no effect but those that are requested."""
 KINDS = {getattr(effects, name).key: getattr(effects, name) for name in (*effects.FILE_OF, "Load")}
 """Everything that can act, by key."""
 ABSENT = tuple(KINDS)

@@ -14,7 +14,7 @@ from validation.studies.effects.work import ENGINES
 ROUNDS = 31
 """Pairs of runs, first one ahead and then the other."""
 AMOUNTS = {"formulas": 40, "mujoco-simulated": 1000, "mujoco-inverse": 100, "pinocchio-inverse": 100}
-"""Of one run: 10 to 20 ms, long beside the clock and short beside what disturbs it."""
+"""Of one run: 10 to 20 ms, long against the clock's resolution and short against what disturbs it."""
 
 
 class Ratio(NamedTuple):

@@ -25,10 +25,10 @@ def pairs(engines: tuple[str, ...], effects: tuple[str, ...]) -> list[tuple[str,
     return found
 
 
-def costs(asked: list[tuple[str, str]], workers: int) -> dict[tuple[str, str], float]:
+def costs(work: list[tuple[str, str]], workers: int) -> dict[tuple[str, str], float]:
     """Instructions of each; one process for each engine."""
-    engines = list(dict.fromkeys(engine for engine, _ in asked))
-    effects = [[effect for engine, effect in asked if engine == each] for each in engines]
+    engines = list(dict.fromkeys(engine for engine, _ in work))
+    effects = [[effect for engine, effect in work if engine == each] for each in engines]
     with ThreadPoolExecutor(workers) as pool:
         found = pool.map(counts, engines, effects)
     return {(engine, name): n for engine, of in zip(engines, found, strict=True) for name, n in of.items()}
@@ -44,8 +44,8 @@ def command(engines: str, effects: str | None, workers: int, out: Path | None, a
     """Count the instructions that each effect costs in each engine (valgrind; some minutes)."""
     if absent:
         return check_absent()
-    asked = tuple(name.strip() for name in engines.split(","))
-    for name in asked:
+    wanted = tuple(name.strip() for name in engines.split(","))
+    for name in wanted:
         if name not in ENGINES:
             raise InputError("--engines", name, "must be among " + ", ".join(ENGINES))
     chosen = tuple(EFFECTS) if effects is None else tuple(dict.fromkeys(["none", *effects.split(",")]))
@@ -59,7 +59,7 @@ def command(engines: str, effects: str | None, workers: int, out: Path | None, a
     from validation.studies.effects.clock import ratio
     from validation.studies.effects.table import Entry, markdown, show
 
-    work = pairs(asked, chosen)
+    work = pairs(wanted, chosen)
     counted = costs(work, workers)
     clocked = [ratio(*pair) for pair in track(work, description="wall clock", transient=True)]  # by itself, undisturbed
     entries = [Entry(*pair, counted[pair], times) for pair, times in zip(work, clocked, strict=True)]
@@ -81,6 +81,6 @@ def check_absent() -> int:
         same = "differs in " + ", ".join(differs) if differs else "bits, MJCF, compiled model and terms are equal"
         counted = "instructions not counted: no valgrind" if more is None else f"instructions {100.0 * more:+.3f} %"
         click.echo(f"without {effect}: {same}; {counted}")
-    asked = "no difference is" if uncounted else f"less than {100.0 * REPEATS:g} % and no difference are"
-    click.echo(f"{'FAILS' if failed else 'holds'}: {asked} asked for")
+    required = "no difference is" if uncounted else f"less than {100.0 * REPEATS:g} % and no difference are"
+    click.echo(f"{'FAILS' if failed else 'holds'}: {required} required")
     return int(failed)

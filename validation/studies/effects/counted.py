@@ -38,11 +38,17 @@ def counts(engine: str, effects: Sequence[str], root: Path | None = None) -> dic
     few, many = AMOUNTS[engine]
     threads = {name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")}
     with tempfile.TemporaryDirectory() as folder:  # MuJoCo writes its log where it runs
-        told = {**os.environ, **threads, "PYTHONHASHSEED": "0", "PYTHONPATH": str(here), "PYTHONDONTWRITEBYTECODE": "1"}
+        settings = {
+            **os.environ,
+            **threads,
+            "PYTHONHASHSEED": "0",
+            "PYTHONPATH": str(here),
+            "PYTHONDONTWRITEBYTECODE": "1",
+        }
         command = ["setarch", platform.machine(), "-R", "valgrind", "--tool=callgrind", "--callgrind-out-file=counted"]
         command += ["--collect-atstart=no", f"--toggle-collect={BRACKET}", f"--dump-after={BRACKET}"]
         command += [sys.executable, "-m", "validation.studies.effects.work", engine, str(few), str(many), *effects]
-        done = subprocess.run(command, env=told, cwd=folder, capture_output=True, text=True, check=False)
+        done = subprocess.run(command, env=settings, cwd=folder, capture_output=True, text=True, check=False)
         dumps = sorted(Path(folder).glob("counted.*"), key=lambda path: int(path.suffix[1:]))
         totals = [re.findall(r"^totals: (\d+)", dump.read_text(), re.MULTILINE) for dump in dumps[-2 * len(effects) :]]
     if done.returncode or len(totals) < 2 * len(effects) or not all(totals):

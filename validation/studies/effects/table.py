@@ -1,4 +1,4 @@
-"""The table of what effects and flags cost: instructions, and wall clock beside them."""
+"""The table of what effects and flags cost: instructions, and wall clock with them."""
 
 from collections.abc import Iterable
 from typing import NamedTuple

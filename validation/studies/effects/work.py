@@ -36,7 +36,7 @@ EFFECTS: dict[str, "Callable[[], Effect | None]"] = {
         4, (3.0, 0.7), (0.05, 1.0), 0.2, "world", kinds.Table((0.0, 3.0, math.tau), (0.0, 1.0, 0.0))
     ),
 }
-"""What is counted, each by itself on the same linkage; made when asked for, so that a build without one still works."""
+"""What is counted, each by itself on the same linkage; made when requested, so that a build without one still works."""
 DEFAULT_FLAGS = "none, MuJoCo's default flags"
 LEFT_ON = "none, {} left on"
 """One flag of MuJoCo as it is by default, the others as the generated MJCF has them."""
@@ -54,18 +54,18 @@ def scene(effect: str, positions: int) -> Scene:
 
 
 def formulas(effect: str) -> Callable[[int], Any]:
-    """Pin forces and torque at POSITIONS positions, as often as asked."""
-    asked = scene(effect, POSITIONS)
+    """Pin forces and torque at POSITIONS positions, a given number of times."""
+    given = scene(effect, POSITIONS)
 
     def work(amount: int) -> None:
         for _ in range(amount):
-            solve(asked, "force")
+            solve(given, "force")
 
     return work
 
 
 def simulated(effect: str) -> Callable[[int], Any]:
-    """Steps of the generated MJCF, as many as asked."""
+    """A given number of steps of the generated MJCF."""
     from fourbar.mjcf import mjcf
     from validation.engines.mujoco.stepping import steps
 
@@ -87,7 +87,7 @@ def flags() -> dict[str, str]:
 
 
 def inverse(adapter: str) -> Callable[[str], Callable[[int], Any]]:
-    """Answers of an inverse engine at as many positions as asked."""
+    """Answers of an inverse engine at a given number of positions."""
 
     def prepare(effect: str) -> Callable[[int], Any]:
         from importlib import import_module
@@ -96,8 +96,8 @@ def inverse(adapter: str) -> Callable[[str], Callable[[int], Any]]:
         engine = getattr(import_module(module), name)()
 
         def work(amount: int) -> None:
-            asked = scene(effect, amount)
-            engine.answer(asked, command(asked))
+            given = scene(effect, amount)
+            engine.answer(given, command(given))
 
         return work
 
@@ -126,7 +126,7 @@ def bracketed(work: Callable[[int], Any], amount: int) -> None:
 
 
 def main() -> None:
-    """Prepare everything asked for, then work, each by itself, a little and more: what a call costs is in both."""
+    """Prepare everything requested, then work, each by itself, a little and more: what a call costs is in both."""
     engine, few, many, *effects = sys.argv[1:]
     works = [ENGINES[engine](effect) for effect in effects]
     for work in works:

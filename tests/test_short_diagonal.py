@@ -1,0 +1,102 @@
+"""Kinematic coefficients near change points, against differences of the angles in many digits."""
+
+import mpmath as mp
+import numpy as np
+import pytest
+from mpmath import mpf
+
+from fourbar.formulas.motion import State, coefficients, rates, with_parallel_pairs
+from fourbar.formulas.path import path, state
+from fourbar.formulas.position import close_loop, direction, half_angle, loop, parallel_pairs
+from fourbar.formulas.transmission import drive_sine
+from fourbar.linkage import uniform
+
+FEW_ROUNDINGS = 8.0 * 2.0**-52
+"""Of 1 + |h3| + |h4|, which the coefficients are sums of; their slopes are quotients of these and h."""
+STEP = 30
+"""Digits of the step: differences of angles with 90 digits keep 30."""
+SHORT = (
+    # (d, a, b, c), psi, branch: d - a = +-(b - c) exactly, so that the diagonal turns fast and the bars do not
+    ((0.859375, 0.853515625, 0.58984375, 0.583984375), -0.0018, -1),
+    ((0.859375, 0.853515625, 0.58984375, 0.583984375), 0.0018, 1),
+    ((0.859375, 0.853515625, 0.583984375, 0.58984375), 0.0018, -1),
+    ((0.859375, 0.853515625, 0.583984375, 0.58984375), 0.0018, 1),
+    ((0.853515625, 0.859375, 0.58984375, 0.583984375), 0.0018, -1),
+    ((0.853515625, 0.859375, 0.58984375, 0.583984375), 0.0018, 1),
+    ((0.853515625, 0.859375, 0.583984375, 0.58984375), -0.0005, -1),
+    ((0.8125, 0.810546875, 0.140625, 0.138671875), 0.0008, 1),
+    ((0.75, 0.71875, 0.53125, 0.5), 0.01, 1),
+)
+
+
+def differences(lengths: tuple[float, ...], psi: float, branch: int) -> list[mpf]:
+    """h3, h4, h3', h4' from the directions of the triangle A, B, O4 at psi and to either side of it."""
+    d, a, b, c = map(mpf, lengths)
+
+    def angles(theta: mpf) -> tuple[mpf, mpf]:
+        A = a * mp.expj(theta)
+        e = abs(d - A)
+        B = A + b * ((d - A) / e) * mp.expj(branch * mp.acos((b * b + e * e - c * c) / (2 * b * e)))
+        return mp.arg(B - A), mp.arg(B - d)
+
+    with mp.workdps(90):
+        step = mpf(10) ** -STEP
+        before, at, after = (angles(mpf(psi) + k * step) for k in (-1, 0, 1))
+        first = [(y - x) / (2 * step) for x, y in zip(before, after, strict=True)]
+        return first + [(x - 2 * y + z) / step**2 for x, y, z in zip(before, at, after, strict=True)]
+
+
+@pytest.mark.parametrize(("lengths", "psi", "branch"), SHORT)
+def test_coefficients_keep_their_digits_where_the_diagonal_is_short(
+    lengths: tuple[float, ...], psi: float, branch: int
+) -> None:
+    k = state(uniform(*lengths), psi, branch).k
+    h3, h4, dh3, dh4 = differences(lengths, psi, branch)
+    size = FEW_ROUNDINGS * (1 + abs(h3) + abs(h4))
+    for found, exact in ((k.h3, h3), (k.h4, h4), (k.h23, 1 - h3), (k.h43, h4 - h3)):
+        assert abs(exact - float(found)) < size
+    for found, exact in ((k.dh3, dh3), (k.dh4, dh4)):
+        assert abs(exact - float(found)) < size / abs(psi)
+
+
+@pytest.mark.parametrize(("lengths", "branch"), [((3.0, 1.0, 3.0, 1.0), 1), ((3.0, 1.0, 1.0, 3.0), -1)])
+def test_bars_that_stay_parallel_turn_as_one(lengths: tuple[float, ...], branch: int) -> None:
+    bars, theta_2 = loop(*lengths), np.array([1e-12, 0.7, -0.7, 2.0])
+    half = half_angle(bars, theta_2)
+    at = close_loop(bars, 1.0 + 0.0j, direction(theta_2), half, branch)
+    first, second = parallel_pairs(bars, half, branch)
+    assert np.any(first | second) and not np.all(first | second)
+    k = coefficients(bars, at)
+    exact = with_parallel_pairs(k, first, second)
+    assert set(exact.h23[first]) <= {1.0} and set(exact.h23[second]) <= {0.0}  # however near the change point
+    for name in ("h3", "h4", "h23", "h43"):  # the formulas themselves, away from the change point, up to rounding
+        assert np.allclose(getattr(k, name)[1:], getattr(exact, name)[1:], rtol=0.0, atol=64 * FEW_ROUNDINGS)
+
+
+def two_readings() -> tuple[State, State]:
+    """The same positions with theta_2 and with theta_4 as the independent angle."""
+    bars = uniform(0.3, 0.1, 0.25, 0.22)
+    by_2 = state(bars, np.array([0.4, 1.0, 4.0]), 1)
+    lengths, theta_4 = by_2.lengths, np.angle(by_2.at.u4)
+    reading = path(lengths, 0.0, 4)
+    sign = np.sign(drive_sine(by_2.at, 4))
+    at, k = reading.motion(reading.position(theta_4, reading.half_angle(theta_4), sign), sign)
+    return by_2, State(lengths, 0.0, by_2.theta_2, at, k, 1.0, rates(k, 1.0, 0.0))
+
+
+@pytest.mark.parametrize("pin", ["O2", "A", "B", "O4"])
+def test_slip_and_its_growth_are_those_of_the_two_bars(pin: str) -> None:
+    i, j = {"O2": (1, 2), "A": (2, 3), "B": (3, 4), "O4": (1, 4)}[pin]
+    for s in two_readings():
+        h, dh = (0.0, s.k.h2, s.k.h3, s.k.h4), (0.0, s.k.dh2, s.k.dh3, s.k.dh4)
+        slip, growth = s.slip(pin)
+        assert np.allclose(slip, np.subtract(h[j - 1], h[i - 1]), rtol=0.0, atol=64 * FEW_ROUNDINGS)
+        assert np.allclose(growth, np.subtract(dh[j - 1], dh[i - 1]), rtol=0.0, atol=64 * FEW_ROUNDINGS)
+
+
+def test_a_point_moves_by_either_angle_alike() -> None:
+    by_2, by_4 = two_readings()
+    for bar in (2, 3, 4):
+        z = 0.07 + 0.03j
+        chain = by_4.point_coefficient(bar, z) * by_2.k.h4
+        assert np.allclose(by_2.point_coefficient(bar, z), chain, rtol=0.0, atol=64 * FEW_ROUNDINGS)
