@@ -29,6 +29,7 @@ from fourbar.scene.motion import FromLimit as FromLimit
 from fourbar.scene.motion import Motion as Motion
 from fourbar.scene.motion import Sweep as Sweep
 from fourbar.scene.motion_law import Law as Law
+from fourbar.scene.point import Point as Point
 from fourbar.solution import Solution as Solution
 from fourbar.solve import solve as solve
 
@@ -40,7 +41,6 @@ if _TYPE_CHECKING:
     from fourbar.effects import Gravity as Gravity
     from fourbar.effects import Load as Load
     from fourbar.effects import PinFriction as PinFriction
-    from fourbar.effects import Point as Point
     from fourbar.effects import Spring as Spring
     from fourbar.effects import Springs as Springs
     from fourbar.effects import Torsion as Torsion
@@ -54,14 +54,15 @@ if _TYPE_CHECKING:
     from fourbar.show.motor import motor_duty as motor_duty
     from fourbar.show.notebook import in_units as in_units
     from fourbar.show.units import units as units
+    from fourbar.studies import Study as Study
+    from fourbar.studies import vary as vary
 
-_EFFECTS = (
-    *("Flywheel", "Friction", "Gravity", "Load", "PinFriction", "Point", "Spring", "Springs", "Torsion", "Viscous"),
-)
+_EFFECTS = (*("Flywheel", "Friction", "Gravity", "Load", "PinFriction", "Spring", "Springs", "Torsion", "Viscous"),)
 _ON_FIRST_USE = {
     **{name: "fourbar.effects" for name in _EFFECTS},
     **{name: "fourbar.files" for name in ("dump", "load", "save")},
     **{name: "fourbar.show.bearing" for name in ("bearing_load", "shaking_force", "shaking_moment")},
+    **{name: "fourbar.studies" for name in ("Study", "vary")},
     "motor_duty": "fourbar.show.motor",
     "in_units": "fourbar.show.notebook",
     "units": "fourbar.show.units",

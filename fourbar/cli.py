@@ -112,7 +112,7 @@ def analyze(
     from fourbar.show.tables import printed
     from fourbar.show.units import units as units_of
     from fourbar.solution import DEGREES, csv_text, json_text
-    from fourbar.solve import solve
+    from fourbar.solve import last_stage, solve
 
     if as_json and as_csv:
         raise click.UsageError("--json and --csv are two forms of the output; give one of them")
@@ -125,7 +125,7 @@ def analyze(
         shown.pop("rad", None)
     described = _load(scene)
     with _named(scene), _waiting(described):
-        solution = solve(described)
+        solution = solve(described, last_stage(described))
     if not solution.assembled.any():
         raise NotAssembledError(f"{scene}: motion.theta_2: the linkage assembles at none of the positions requested")
     if as_json:
@@ -173,7 +173,7 @@ def mjcf(scene: Path | None, lengths: tuple[str, ...] | None, omega: str | None,
     default="overview",
     show_default=True,
     metavar="NAME",
-    help="overview, linkage, coupler, kinematics, torque, forces, hodograph, energy, transmission or freebody.",
+    help="overview, linkage, coupler, kinematics, points, torque, forces, hodograph, energy, transmission or freebody.",
 )
 @click.option("--position", metavar="ANGLE", help='theta_2 of the linkage and free bodies, like "135 deg".')
 @click.option("--branches", default="one", show_default=True, metavar="WHICH", help="one or both.")

@@ -8,12 +8,14 @@ for each number, so that those of different numbers do not cancel over the evalu
 
 from collections.abc import Iterator
 from dataclasses import fields, is_dataclass
+from functools import cache
+from itertools import cycle
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.formulas.motion import Coefficients, Rates, State, rates, side_turns_fast
+from fourbar.formulas.motion import Coefficients, State, rates, side_turns_fast
 from fourbar.formulas.path import Path, read_backwards
 from fourbar.formulas.pin_forces import Body
 from fourbar.formulas.position import HalfAngle, Loop, Position, two_sum
@@ -21,6 +23,8 @@ from fourbar.scene.case import Case, Dynamics
 
 EVALUATIONS = 16
 """With fewer, all of them may by chance come out as far off as the answer itself."""
+NUMBERS = 256
+"""Whose signs are independent; a scene has about sixty, and a few for each load and effect."""
 LAST_DIGIT = 1.01 * 2.0**-53
 """Relative: x + x LAST_DIGIT is the next double, whatever x."""
 LAST_ROUNDING = 2.0**-56
@@ -50,13 +54,9 @@ class Roundings:
             return number + (of_x * next(self.signs) + 1j * (of_y * next(self.signs)))
         return number + number * next(self.signs)
 
-    def each(self, number: Any) -> Any:
-        """A number that is one for all positions is exact."""
-        return self(number) if np.ndim(number) else number
-
     def of(self, value: Any) -> Any:
         """The numbers of an effect likewise: its floats, in tuples and parts too; all else stays."""
-        if isinstance(value, float):
+        if isinstance(value, (float, np.ndarray)):
             return self(value)
         if isinstance(value, tuple):
             parts = [self.of(part) for part in value]
@@ -97,7 +97,9 @@ def error_bars(
     near = near._replace(sin_mu=rounded(near.sin_mu), foot=rounded(near.foot))
     near = near._replace(u2=rounded(near.u2), u3=rounded(near.u3), u4=rounded(near.u4))
     k = _rounded_coefficients(path, near, k, rounded)
-    moving = Rates(*map(rounded.each, rates(k, state.speed, acceleration)))
+    moving = rates(k, state.speed, acceleration)
+    stated = ("omega_2", "alpha_2") if path.bar == 2 else ()
+    moving = moving._replace(**{name: rounded(rate) for name, rate in moving._asdict().items() if name not in stated})
     nearby = state._replace(at=near, k=k, moving=moving)
     other = moved.dynamics(nearby, acceleration, rounded=rounded)
     torque = np.mean((other.torque - found.torque) ** 2, axis=0)
@@ -108,9 +110,10 @@ def error_bars(
     torque_error = TYPICAL * np.sqrt(torque) + LAST_ROUNDING * np.abs(found.torque)
     force_error = TYPICAL * np.sqrt(np.max(forces, axis=0)) + LAST_ROUNDING * largest
     # a change that leaves no value, or none in the range of a double: of the value itself no digit is left
+    shape = np.shape(found.torque)
     return {
-        "torque_error": np.where(np.isfinite(torque_error), torque_error, np.abs(found.torque)),
-        "force_error": np.where(np.isfinite(force_error), force_error, largest),
+        "torque_error": np.where(np.isfinite(torque_error), torque_error, np.abs(found.torque)).reshape(shape),
+        "force_error": np.where(np.isfinite(force_error), force_error, largest).reshape(shape),
     }
 
 
@@ -127,8 +130,8 @@ def _rounded_half_angle(path: Path, q: Any, half: HalfAngle, exact: NDArray[np.i
     lost = np.where(np.isin(np.arange(np.size(ss)), exact), 0.0, two_sum(q, -path.theta_1)[1])
     turned = lost * np.sign(next(rounded.signs))
     if exact.size:
-        of_outer, of_inner = np.array(of_outer), np.array(of_inner)
-        of_outer[exact], of_inner[exact] = outer[exact], inner[exact]
+        known = np.isin(np.arange(np.size(ss)), exact)
+        of_outer, of_inner = np.where(known, outer, of_outer), np.where(known, inner, of_inner)
     return HalfAngle(
         rounded(ss) + sk * turned,
         rounded(kk) - sk * turned,
@@ -166,8 +169,13 @@ def _rounded_coefficients(path: Path, at: Position, k: Coefficients, rounded: Ro
 
 
 def _signs() -> Iterator[NDArray[np.float64]]:
-    """+- one last digit for number 1, 2, ... of each evaluation, from a generator with a fixed seed."""
+    """+- one last digit for number 1, 2, ... of each evaluation, over and over; each (EVALUATIONS, 1)."""
+    return cycle(_columns())
+
+
+@cache
+def _columns() -> tuple[NDArray[np.float64], ...]:
+    """As many as a scene of few effects has numbers, from a generator with a fixed seed."""
     rng = np.random.default_rng(0)
     ends = np.repeat([LAST_DIGIT, -LAST_DIGIT], EVALUATIONS // 2)
-    while True:
-        yield rng.permutation(ends)[:, None]
+    return tuple(rng.permutation(ends)[:, None] for _ in range(NUMBERS))

@@ -16,7 +16,7 @@ TOUCHING = 2.0**-53
 was itself rounded by up to that, so the linkage meant closes there as well as not."""
 
 
-def half_angle(linkage: FourBar, theta_2: float, offset: Any = None, unit: float = 1.0) -> HalfAngle:
+def half_angle(linkage: FourBar, theta_2: float, offset: Any = None, unit: Any = 1.0, member: int = 0) -> HalfAngle:
     """The five numbers of `formulas.position.half_angle`, each rounded once.
 
     Parameters
@@ -25,12 +25,16 @@ def half_angle(linkage: FourBar, theta_2: float, offset: Any = None, unit: float
     offset : what theta_2 as a double leaves out of the angle meant (rad, mpmath), where that is known. A position
         beyond the limit then does not assemble, however near.
     unit : of the lengths, m.
+    member : index into numbers of the linkage that are arrays.
     """
     from mpmath import mp, mpf
 
+    def own(number: Any) -> Any:
+        return mpf(float(number[member] if np.ndim(number) else number))
+
     with mp.workdps(DIGITS):
-        d, a, b, c = (mpf(length) / unit for length in linkage.lengths)
-        h = (mpf(theta_2) - mpf(linkage.ground_angle) + (0 if offset is None else offset)) / 2
+        d, a, b, c = (own(length) / own(unit) for length in linkage.lengths)
+        h = (mpf(theta_2) - own(linkage.ground_angle) + (0 if offset is None else offset)) / 2
         s, k = mp.sin(h), mp.cos(h)
         e2 = (d - a) ** 2 + 4 * a * d * s * s
         whole = 2 * (a + b + c + d) * mp.sqrt(e2)
@@ -42,11 +46,12 @@ def half_angle(linkage: FourBar, theta_2: float, offset: Any = None, unit: float
 
 def decided(linkage: FourBar, unit: float, half: HalfAngle, index: Any, theta_2: Any, offset: Any = None) -> HalfAngle:
     """The half angles with those of some positions (an index) replaced."""
-    exact = [half_angle(linkage, float(theta_2[i]), offset, unit) for i in index]
-    numbers = [np.array(np.broadcast_to(number, np.shape(theta_2))) for number in half]
-    for number, values in zip(numbers, zip(*exact, strict=True), strict=True):
-        number[index] = values
-    return HalfAngle(*numbers)
+    flat, shape = np.ravel(theta_2), np.shape(theta_2)
+    numbers = [np.array(np.broadcast_to(number, shape)).ravel() for number in half]
+    for i in index:
+        for number, value in zip(numbers, half_angle(linkage, float(flat[i]), offset, unit, i), strict=True):
+            number[i] = value
+    return HalfAngle(*(number.reshape(shape)[()] for number in numbers))
 
 
 def limit_remainder(linkage: FourBar, limit: float, theta_2: float, offset: float) -> Any:

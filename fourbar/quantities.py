@@ -34,6 +34,11 @@ QUANTITIES = tuple(
         ("omega_2", "rad/s", "velocity", "scalar", "angular velocity of the input"),
         ("omega_3", "rad/s", "velocity", "scalar", "angular velocity of the coupler", "unknown"),
         ("omega_4", "rad/s", "velocity", "scalar", "angular velocity of the output", "unknown"),
+        ("v_A", "m/s", "velocity", "vector", "velocity of A"),
+        ("v_B", "m/s", "velocity", "vector", "velocity of B"),
+        ("v_G2", "m/s", "velocity", "vector", "velocity of G2"),
+        ("v_G3", "m/s", "velocity", "vector", "velocity of G3"),
+        ("v_G4", "m/s", "velocity", "vector", "velocity of G4"),
         ("alpha_2", "rad/s^2", "acceleration", "scalar", "angular acceleration of the input"),
         ("alpha_3", "rad/s^2", "acceleration", "scalar", "angular acceleration of the coupler", "unknown"),
         ("alpha_4", "rad/s^2", "acceleration", "scalar", "angular acceleration of the output", "unknown"),
@@ -73,7 +78,9 @@ OF_PIN_LOADS = tuple(q.name for q in QUANTITIES if q.group == "pin loads")
 
 STATUS_NAMES = (
     *("ok", "not_assembled", "singular", "jammed", "several", "no_direction", "wound"),
-    *("no_torque", "overflow"),
+    *("no_torque", "overflow", "invalid"),
 )
 """By code; `Solution.status_code` says what each means."""
-OK, NOT_ASSEMBLED, SINGULAR, JAMMED, SEVERAL, NO_DIRECTION, WOUND, NO_TORQUE, OVERFLOW = range(len(STATUS_NAMES))
+OK, NOT_ASSEMBLED, SINGULAR, JAMMED, SEVERAL, NO_DIRECTION, WOUND, NO_TORQUE, OVERFLOW, INVALID = range(
+    len(STATUS_NAMES)
+)

@@ -30,10 +30,10 @@ DEGREES: Conversion = {"rad": ("deg", 180.0 / math.pi)}
 
 @dataclass(slots=True, eq=False)
 class Solution:
-    """The answer of the formulas at n positions, SI units and radians.
+    """The answer of the formulas at n positions, or at n positions of each of m linkages, SI units and radians.
 
-    Scalars have shape (n,), vectors (n, 2); NaN marks a position where a quantity has no value
-    (see `status`), None a quantity that was not requested.
+    Scalars have shape (n,), vectors (n, 2), of a study (m, n) and (m, n, 2); NaN marks a position where a
+    quantity has no value (see `status`), None a quantity that was not requested.
     """
 
     title: str
@@ -45,7 +45,8 @@ class Solution:
     friction); of springs, forces NaN: 5 no_direction (both ends in one point), 6 wound (turned beyond half a turn from
     rest). 7 no_torque: the two bars that are not driven are in line, no couple on the driven bar holds them in balance,
     forces are NaN (T3 and T4 have these poles where omega_3, omega_4 are 0). 8 overflow: numbers beyond the range of
-    doubles; from the first stage (position, velocity, ...) that meets them on everything is NaN."""
+    doubles; from the first stage (position, velocity, ...) that meets them on everything is NaN. 9 invalid: a member of
+    a study with numbers that a scene refuses (a length that is not positive, a mass below 0); all of it is NaN."""
     branch: NDArray[np.int8]
     """+1 open, -1 crossed."""
     theta_2: Array
@@ -64,6 +65,11 @@ class Solution:
     omega_2: Array | None = None
     omega_3: Array | None = None
     omega_4: Array | None = None
+    v_A: Array | None = None
+    v_B: Array | None = None
+    v_G2: Array | None = None
+    v_G3: Array | None = None
+    v_G4: Array | None = None
     alpha_2: Array | None = None
     alpha_3: Array | None = None
     alpha_4: Array | None = None
@@ -93,6 +99,12 @@ class Solution:
 
     time: Array | None = None
     """Of a motion law, or of a free motion, s; the latter ends where the linkage stops at a limit position."""
+    points: dict[str, Array] = field(default_factory=dict, init=False)
+    """Positions of the scene's own points by name, (n, 2), m."""
+    velocity: dict[str, Array] = field(default_factory=dict, init=False)
+    """Their velocities, m/s."""
+    acceleration: dict[str, Array] = field(default_factory=dict, init=False)
+    """Their accelerations, m/s^2."""
     stopped_at: float | None = field(default=None, init=False)
     """When a free motion reached that limit position or change point, s; None: it did not."""
 
@@ -105,12 +117,12 @@ class Solution:
         return np.not_equal(self.status_code, NOT_ASSEMBLED)
 
     @property
-    def status(self) -> list[str]:
-        """One of `STATUS_NAMES` for each position."""
-        return [STATUS_NAMES[code] for code in self.status_code]
+    def status(self) -> Any:
+        """One of `STATUS_NAMES` for each position, as a list; of a study a list of such lists."""
+        return np.array(STATUS_NAMES)[self.status_code].tolist()
 
     def evaluated(self) -> list[str]:
-        """Names of the quantities that were evaluated, theta_2 first."""
+        """Names of the quantities that were evaluated, theta_2 first; without the scene's own points."""
         return [name for name in UNITS if getattr(self, name) is not None]
 
     def to_csv(self, path: "str | Path | None" = None, *, degrees: bool = False, units: Conversion = SI) -> str | None:
@@ -139,7 +151,7 @@ class Solution:
         except ImportError:
             raise DependencyError('to_pandas needs pandas: pip install "fourbar[pandas]"') from None
         known = {name: values for name, values in scalars(self, units).items() if values is not None}
-        return DataFrame({"status": self.status, "branch": self.branch, "drive_bar": self.drive_bar, **known})
+        return DataFrame({**leading(self), **known})
 
 
 def json_text(solution: Solution, units: Conversion = SI, **more: Any) -> str:
@@ -152,7 +164,7 @@ def json_text(solution: Solution, units: Conversion = SI, **more: Any) -> str:
         "schema": SCHEMA,
         "title": solution.title,
         "angle_unit": unit_in("rad", units)[0],
-        "units": {name: unit_in(UNITS[name], units)[0] for name in names},
+        "units": {name: unit_in(unit_of(name), units)[0] for name in names},
         "status": solution.status,
         "branch": solution.branch.tolist(),
     }
@@ -169,17 +181,29 @@ def json_text(solution: Solution, units: Conversion = SI, **more: Any) -> str:
 
 def csv_text(solution: Solution, units: Conversion = SI) -> str:
     """One line per position; vectors as columns `A_x`, `A_y`, empty where there is no value."""
+    size, first = solution.theta_2.size, leading(solution)
     columns = {
-        name: [None] * len(solution) if values is None else _nulled(values)
-        for name, values in scalars(solution, units).items()
+        name: [None] * size if values is None else _nulled(values) for name, values in scalars(solution, units).items()
     }
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(["status", "branch", "drive_bar", *columns])
-    rows = zip(solution.status, solution.branch.tolist(), *columns.values(), strict=True)
-    for status, branch, *row in rows:
-        writer.writerow([status, branch, solution.drive_bar, *("" if cell is None else repr(cell) for cell in row)])
+    writer.writerow([*first, *columns])
+    for start, row in zip(zip(*first.values(), strict=True), zip(*columns.values(), strict=True), strict=True):
+        writer.writerow([*start, *("" if cell is None else repr(cell) for cell in row)])
     return text.getvalue()
+
+
+def leading(solution: Solution) -> dict[str, list[Any]]:
+    """The first columns of a table, one entry for each position; of a study also the number of the member."""
+    size = solution.theta_2.size
+    first = {
+        "status": np.array(STATUS_NAMES)[solution.status_code.ravel()].tolist(),
+        "branch": np.ravel(solution.branch).tolist(),
+        "drive_bar": [solution.drive_bar] * size,
+    }
+    if solution.theta_2.ndim == 1:
+        return first
+    return {"member": np.repeat(np.arange(len(solution)), size // len(solution)).tolist(), **first}
 
 
 def scalars(solution: Solution, units: Conversion = SI) -> dict[str, Array | None]:
@@ -189,13 +213,13 @@ def scalars(solution: Solution, units: Conversion = SI) -> dict[str, Array | Non
     """
     found: dict[str, Array | None] = {}
     for name in _quantities(solution):
-        values = _values(solution, name, units)
-        heading = f" [{units[UNITS[name]][0]}]" if UNITS[name] in units else ""
-        if name in VECTORS:
+        values, unit = _values(solution, name, units), unit_of(name)
+        heading = f" [{units[unit][0]}]" if unit in units else ""
+        if name in VECTORS or name not in UNITS:
             for axis, letter in enumerate("xy"):
-                found[f"{name}_{letter}{heading}"] = None if values is None else values[:, axis]
+                found[f"{name}_{letter}{heading}"] = None if values is None else values[..., axis].ravel()
         else:
-            found[name + heading] = values
+            found[name + heading] = None if values is None else values.ravel()
     return found
 
 
@@ -206,12 +230,25 @@ def unit_in(unit: str, units: Conversion) -> tuple[str, float]:
 
 def _quantities(solution: "Solution") -> list[str]:
     """Every quantity of a solution, evaluated or not; the time only where a free motion has one."""
-    return [name for name in UNITS if name != "time" or getattr(solution, name) is not None]
+    names = [name for name in UNITS if name != "time" or getattr(solution, name) is not None]
+    points = dict.fromkeys((*solution.points, *solution.velocity, *solution.acceleration))
+    return names + [f"{start}{name}" for name in points for start in ("", "v_", "a_")]
+
+
+def unit_of(name: str) -> str:
+    """SI unit of a quantity, or of a point of the scene: its path, velocity or acceleration."""
+    return UNITS.get(name) or {"v_": "m/s", "a_": "m/s^2"}.get(name[:2], "m")
 
 
 def _values(solution: Solution, name: str, units: Conversion) -> Array | None:
-    values: Array | None = getattr(solution, name)
-    return values if values is None or UNITS[name] not in units else values * units[UNITS[name]][1]
+    values: Array | None
+    if name in UNITS:
+        values = getattr(solution, name)
+    else:
+        table = {"v_": solution.velocity, "a_": solution.acceleration}.get(name[:2])
+        values = solution.points.get(name) if table is None else table.get(name[2:])
+    unit = unit_of(name)
+    return values if values is None or unit not in units else values * units[unit][1]
 
 
 def _nulled(values: Array) -> list[Any]:
@@ -219,24 +256,31 @@ def _nulled(values: Array) -> list[Any]:
     plain = values.tolist()
     if np.isfinite(values).all():
         return plain  # type: ignore[no-any-return]
-    if values.ndim == 2:
-        return [[_number(x), _number(y)] for x, y in plain]
-    return [_number(x) for x in plain]
+    return _numbers(plain)  # type: ignore[no-any-return]
 
 
-def _number(value: float) -> float | None:
-    return value if math.isfinite(value) else None
+def _numbers(plain: Any) -> Any:
+    """Numbers, in lists or lists of lists, None for what is not finite."""
+    if isinstance(plain, list):
+        return [_numbers(inner) for inner in plain]
+    return plain if math.isfinite(plain) else None
 
 
 def unwrap(angles: Array) -> None:
-    """Make angles in [-pi, pi] continuous along a sweep, in place: the first in (-pi, pi]; NaN is stepped over."""
-    if not len(angles) or angles.max() - angles.min() < np.pi:
+    """Make angles in [-pi, pi] continuous along a sweep, in place: the first in (-pi, pi]; NaN is stepped over.
+
+    Parameters
+    ----------
+    angles : (n,), or (m, n) for as many sweeps.
+    """
+    if angles.shape[-1] < 2 or (np.ptp(angles) < np.pi and not (angles[..., 0] == -np.pi).any()):
         return
-    known = np.flatnonzero(~np.isnan(angles))
-    if not len(known):
-        return
-    raw = angles[known]
+    rows = angles.reshape(-1, angles.shape[-1])
+    known = ~np.isnan(rows)
+    place = np.where(known, np.arange(rows.shape[1]), np.argmax(known, axis=1)[:, None])
+    raw = np.take_along_axis(rows, np.maximum.accumulate(place, axis=1), axis=1)
+    jumps = np.diff(raw, axis=1, prepend=raw[:, :1])
     # -pi as a double lies inside (-pi, pi], yet reads as the excluded end
-    start = 2.0 * np.pi if raw[0] == -np.pi else 0.0
-    jumps = np.diff(raw, prepend=raw[0])
-    angles[known] = raw + start - (2.0 * np.pi) * np.cumsum(np.round(jumps / (2.0 * np.pi)))
+    start = np.where(raw[:, :1] == -np.pi, 2.0 * np.pi, 0.0)
+    turned = rows + start - (2.0 * np.pi) * np.cumsum(np.round(jumps / (2.0 * np.pi)), axis=1)
+    angles[...] = turned.reshape(angles.shape)

@@ -1,6 +1,7 @@
 """From a scene to its solution: block by block over the positions, stage by stage, no further than wanted."""
 
-from collections.abc import Callable, Iterable, Mapping
+import cmath
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -10,7 +11,7 @@ from numpy.typing import NDArray
 from fourbar.errors import InputError, LimitError
 from fourbar.formulas.motion import State
 from fourbar.formulas.path import NO_DIGIT_LEFT
-from fourbar.formulas.position import HalfAngle, Position
+from fourbar.formulas.position import HalfAngle, Position, anywhere
 from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import (
     ANGLES,
@@ -22,104 +23,216 @@ from fourbar.quantities import (
     OF_PIN_LOADS,
     OK,
     OVERFLOW,
+    QUANTITIES,
     SEVERAL,
     SINGULAR,
     STAGE_OF,
     STAGES,
-    VECTORS,
     WOUND,
 )
 from fourbar.scene import Command, Scene, command
-from fourbar.scene.case import Case
+from fourbar.scene.case import NOWHERE, Case
+from fourbar.scene.point import OF_POINTS
 from fourbar.solution import Array, Solution, unwrap
 
 if TYPE_CHECKING:
     from fourbar.free_motion import FreeMotion
+    from fourbar.studies import Study
 
 BLOCK = 8192
 """Positions evaluated at a time, measured: fewer pay for calls, more leave the cache."""
+FORCE, ERROR = STAGES.index("force"), STAGES.index("error")
+Part = tuple[Any, ...]
+"""Index of some positions in the arrays of all."""
+Evaluated = tuple[NDArray[np.uint8], dict[str, Any], Position | None]
+"""Status codes and quantities of some positions, vectors as x + i y, and where the drive must balance."""
 
 
 def solve(
-    scene: Scene,
+    scene: "Scene | Study",
     stage: str | None = None,
     *,
     at: Command | None = None,
     out: Mapping[str, Array] | None = None,
     side: int = 0,
 ) -> Solution:
-    """Evaluate a scene with the closed formulas, as far as a stage.
+    """Evaluate a scene, or a study of m linkages, with the closed formulas as far as a stage.
 
     Parameters
     ----------
     stage : "position", "velocity", "acceleration", "force" or "error"; each includes those before
-        it. Left out: "error", or "position" where the scene states no omega_2.
+        it. Left out: "force", or "position" where the scene states no omega_2.
     at : other positions, velocities and accelerations of the input than the scene's own.
-    out : arrays to write into, by name, (n,) or (n, 2), which share no memory; only the quantities named are evaluated,
-        with the stages they need, and the others are None in the result.
+    out : arrays to write into, by name, (n,) or (n, 2), of a study (m, n) or (m, n, 2), which share no memory; only the
+        quantities named are evaluated, with the stages they need, and the others are None in the result.
     side : in which sense pins at rest are about to turn where dry friction acts: +1 as theta_2 grows, -1 as it falls, 0
         neither.
 
     Raises
     ------
-    InputError : the stage or a name in `out` is unknown, its array has the wrong shape, or the
-        scene does not state the omega_2 that is needed.
+    InputError : the stage or a name in `out` is unknown, its array has the wrong shape, the scene does not state
+        the omega_2 that is needed, or a study, which states its own positions, is given others.
     """
+    if not isinstance(scene, Scene):
+        if at is not None:
+            raise InputError("at", "a command", "a study states its own positions: vary motion.theta_2")
+        return scene.solved(stage, out=out, side=side)
     moved = _released(scene) if scene.motion.free is not None and at is None else None
     where = moved.command if moved is not None else command(scene) if at is None else at
     n = len(where.theta_2)
-    if out is None:
-        if stage is None:
-            stage = "position" if where.omega_2 is None else STAGES[-1]
-        if stage not in STAGES:
-            raise InputError("stage", stage, "must be one of " + ", ".join(STAGES))
-        wanted = STAGES.index(stage)
-        absent = _absent(scene)
-        names = [name for name, of in STAGE_OF.items() if STAGES.index(of) <= wanted and name not in absent]
-        result = {name: np.empty((n, 2) if name in VECTORS else n) for name in names}
-    else:
-        result = dict(out)
-        wanted = _highest_stage(result, n)
-        stage = STAGES[wanted]
-    if stage != "position" and where.omega_2 is None:
-        raise InputError("motion.omega_2", None, f"is needed for the stage {stage!r}")
+    wanted, names = requested(scene, (n,), where.omega_2, stage, out)
+    alone = n == 1 and moved is None and out is None
+    result = {} if alone else arrays(names, (n,), out)
     code = np.zeros(n, dtype=np.uint8)
     with np.errstate(all="ignore"):
-        case = Case.of(_started(scene) if wanted >= STAGES.index("force") else scene)._replace(side=side)
-        size = BLOCK
-        if wanted == len(STAGES) - 1:
-            from fourbar.error_bars import EVALUATIONS
-
-            size = BLOCK // EVALUATIONS  # each position is evaluated so many times at once
-        parts: Iterable[Any] = (slice(start, min(start + size, n)) for start in range(0, n, size))
+        case = Case.of(_started(scene) if wanted >= FORCE else scene)._replace(side=side)
+        parts: Iterable[Part]
         if moved is not None:
-            parts = (np.flatnonzero(moved.bar == bar) for bar in (2, 4))
+            parts = ((np.flatnonzero(moved.bar == bar),) for bar in (2, 4))
+        elif n == 1:  # in plain numbers: arrays of one entry cost several times as much
+            parts = ((0,),)
+        else:
+            size = positions_at_once(wanted)
+            parts = ((slice(start, start + size),) for start in range(0, n, size))
         for part in parts:
             if moved is None:
-                codes, values, driven = _commanded(case, where, part, wanted, result.keys())
+                found = commanded(case, where, part, wanted, names)
             else:
-                codes, values = _freely(case, moved, part, wanted, result.keys())
-                driven = None
-            if not all_finite(values):
-                in_line = driven is not None and np.abs(case.drive_sine(driven)) <= NO_DIGIT_LEFT
-                withhold(values, codes, np.broadcast_to(in_line, codes.shape))
-            code[part] = codes
-            for name, value in values.items():
-                if name in VECTORS:
-                    result[name][part, 0], result[name][part, 1] = value.real, value.imag
-                else:
-                    result[name][part] = value
+                found = _freely(case, moved, part, wanted, names)
+            if alone:
+                code[0], result = _of_one(case, found)
+            else:
+                keep(case, found, result, code, part)
     for name in ANGLES:
         if name in result:
             unwrap(result[name])
-    solution = Solution(scene.title, scene.drive_bar, code, np.asarray(where.branch), where.theta_2, **result)
+    solution = solved(scene, where, code, result)
     solution.time, solution.stopped_at = where.time, None if moved is None else moved.stopped_at
     return solution
 
 
+def last_stage(scene: Scene) -> str:
+    """The last stage that a scene states enough for: error bars and all, or positions alone."""
+    motion = scene.motion
+    return "position" if motion.omega_2 is None and motion.law is None and motion.free is None else STAGES[-1]
+
+
+def requested(
+    scene: Scene, shape: tuple[int, ...], omega_2: Any, stage: str | None, out: Mapping[str, Array] | None
+) -> tuple[int, Collection[str]]:
+    """The number of the last stage that is evaluated, and the names of the quantities; an InputError as of `solve`.
+
+    Parameters
+    ----------
+    shape : of the positions.
+    omega_2 : None where the scene states none.
+    """
+    if out is None:
+        if stage is None:
+            stage = "position" if omega_2 is None else "force"
+        if stage not in STAGES:
+            raise InputError("stage", stage, "must be one of " + ", ".join(STAGES))
+        wanted, absent = STAGES.index(stage), _absent(scene)
+        before = STAGES[: wanted + 1]
+        names: Collection[str] = {
+            name: None for name, of in _stages(scene).items() if of in before and name not in absent
+        }.keys()
+    else:
+        names = out.keys()
+        wanted = _highest_stage(out, shape, _stages(scene))
+    if wanted > 0 and omega_2 is None:
+        raise InputError("motion.omega_2", None, f"is needed for the stage {STAGES[wanted]!r}")
+    return wanted, names
+
+
+def arrays(names: Iterable[str], shape: tuple[int, ...], out: Mapping[str, Array] | None) -> dict[str, Array]:
+    """To write into: new ones, or those given."""
+    if out is not None:
+        return dict(out)
+    return {name: np.empty(shape if is_scalar(name) else (*shape, 2)) for name in names}
+
+
+def is_scalar(name: str) -> bool:
+    """Whether a quantity is a number at each position; the others, a scene's own points too, are vectors."""
+    return KIND.get(name) == "scalar"
+
+
+KIND = {q.name: q.kind for q in QUANTITIES}
+
+
+def _stages(scene: Scene) -> dict[str, str]:
+    """Every quantity of a scene, those of its own points too, and its stage."""
+    if not scene.points:
+        return STAGE_OF
+    return STAGE_OF | {f"{start}{p.name}": stage for p in scene.points for start, stage in OF_POINTS.items()}
+
+
+def solved(scene: Scene, at: Command, code: NDArray[np.uint8], result: Mapping[str, Array]) -> Solution:
+    """The solution with its arrays in their places."""
+    own: dict[str, dict[str, Array]] = {start: {} for start in OF_POINTS}
+    for point in scene.points:
+        for start, arrays in own.items():
+            if (array := result.get(start + point.name)) is not None:
+                arrays[point.name] = array
+    known = {name: array for name, array in result.items() if name in STAGE_OF}
+    solution = Solution(scene.title, scene.drive_bar, code, np.asarray(at.branch), at.theta_2, **known)
+    solution.points, solution.velocity, solution.acceleration = own[""], own["v_"], own["a_"]
+    return solution
+
+
+def positions_at_once(wanted: int) -> int:
+    """Of a stage: for the error bars each position is evaluated many times."""
+    if wanted < ERROR:
+        return BLOCK
+    from fourbar.error_bars import EVALUATIONS
+
+    return BLOCK // EVALUATIONS
+
+
+def keep(
+    case: Case,
+    found: Evaluated,
+    result: Mapping[str, Array],
+    code: NDArray[np.uint8],
+    part: Part,
+    shape: tuple[int, ...] | None = None,
+) -> None:
+    """Write what was evaluated into the arrays of all positions, where it is no number with the status that says so.
+
+    Parameters
+    ----------
+    shape : of the part of the arrays; None: that of what was evaluated.
+    """
+    codes, values, driven = found
+    if not all_finite(values):
+        in_line = driven is not None and np.abs(case.drive_sine(driven)) <= NO_DIGIT_LEFT
+        withhold(values, codes, np.broadcast_to(in_line, codes.shape))
+    code[part] = codes if shape is None else codes.reshape(shape)
+    for name, value in values.items():
+        if shape is not None and np.ndim(value):
+            value = value.reshape(shape)  # noqa: PLW2901
+        if is_scalar(name):
+            result[name][part] = value
+        else:
+            result[name][*part, 0], result[name][*part, 1] = value.real, value.imag
+
+
+def _of_one(case: Case, found: Evaluated) -> tuple[Any, dict[str, Array]]:
+    """The same of a single position: its status code, and all of its arrays at once."""
+    codes, values, driven = found
+    if not all_finite(values):
+        withhold(values, codes, np.asarray(driven is not None and np.abs(case.drive_sine(driven)) <= NO_DIGIT_LEFT))
+    numbers = [name for name in values if KIND.get(name) == "scalar"]
+    vectors = [name for name in values if KIND.get(name) != "scalar"]
+    rows = np.array([values[name] for name in numbers], dtype=float)[:, None]
+    pairs = np.array([values[name] for name in vectors], dtype=complex)[:, None].view(float).reshape(-1, 1, 2)
+    return codes, dict(zip((*numbers, *vectors), (*rows, *pairs), strict=True))
+
+
 def all_finite(values: Mapping[str, Any]) -> bool:
     """Whether every entry is a number, from their squares; False also where a square leaves the range of doubles."""
-    return all(np.isfinite(np.vdot(value, value)) for value in values.values())
+    squares = (np.vdot(value, value) if isinstance(value, np.ndarray) else value for value in values.values())
+    return all(cmath.isfinite(square) for square in squares)
 
 
 def withhold(values: dict[str, Any], code: NDArray[np.uint8], in_line: NDArray[np.bool_]) -> None:
@@ -132,7 +245,7 @@ def withhold(values: dict[str, Any], code: NDArray[np.uint8], in_line: NDArray[n
     """
     gone = np.zeros(code.shape, dtype=bool)
     for stage in STAGES:
-        names = [name for name in values if STAGE_OF[name] == stage]
+        names = [name for name in values if STAGE_OF.get(name, OF_POINTS.get(name[:2], "position")) == stage]
         of_forces = stage in STAGES[3:]
         promised = np.isin(code, (OK, SEVERAL)) if of_forces else ~np.isin(code, (NOT_ASSEMBLED, SINGULAR))
         found = np.zeros_like(gone)
@@ -154,31 +267,35 @@ def _no_value(quantity: Any) -> complex:
     return complex(np.nan, np.nan) if np.iscomplexobj(quantity) else np.nan
 
 
-def _commanded(
-    case: Case, where: Command, part: slice, wanted: int, names: Iterable[str]
-) -> tuple[NDArray[np.uint8], dict[str, Any], Position | None]:
-    """Status codes and quantities of some positions of a command to the input, and where the drive must balance."""
+def commanded(case: Case, where: Command, part: Part, wanted: int, names: Collection[str]) -> Evaluated:
+    """Some positions of a command to the input, evaluated.
+
+    Parameters
+    ----------
+    wanted : number of the last stage that the quantities named need.
+    """
     theta_2, branch = where.theta_2[part], _sign(where.branch[part])
     half, exact = case.half_angle(theta_2, where.remainder)
-    if set(names) <= set(ANGLES) and where.remainder is None and not case.path.may_stay_parallel:
+    of_angles = len(names) <= len(ANGLES) and set(names) <= set(ANGLES)
+    if of_angles and where.remainder is None and not case.path.may_stay_parallel:
         return _angles(case, half, branch, names)
     at = case.path.position(theta_2, half, branch)
     codes = _codes(at.sin_mu, half, NO_DIGIT_LEFT if where.remainder is None else 0.0)
-    if codes.any():  # velocities are 0/0
+    if anywhere(codes):  # velocities are 0/0
         at = at._replace(root=np.where(codes == SINGULAR, np.nan, at.root))
     omega_2, alpha_2 = _piece(where.omega_2, part), _piece(where.alpha_2, part)
     state = case.state(case.path, theta_2, at, branch, omega_2, alpha_2, moving=wanted > 0)
-    values = {name: KINEMATIC[name](case, state) for name in names if name in KINEMATIC}
-    if wanted >= STAGES.index("force"):
-        known = exact if wanted == len(STAGES) - 1 else None
+    values = kinematics(case, state, names)
+    if wanted >= FORCE:
+        known = exact if wanted == ERROR else None
         values |= _forces(case, state, alpha_2, branch, branch, codes, names, known)
     return codes, values, at
 
 
-def _codes(sine: Array, half: HalfAngle, margin: float) -> NDArray[np.uint8]:
+def _codes(sine: Any, half: HalfAngle, margin: float) -> NDArray[np.uint8]:
     """Statuses of positions from the sine of the transmission angle, or a multiple of it."""
-    codes, size = np.zeros(sine.shape, dtype=np.uint8), np.abs(sine)
-    if not size.min(initial=np.inf) > margin:  # NaN where the loop does not close
+    codes, size = np.zeros(np.shape(sine), dtype=np.uint8), np.abs(sine)
+    if not (size.min(initial=np.inf) if codes.ndim else size) > margin:  # NaN where the loop does not close
         codes[size <= margin] = SINGULAR
         codes[np.isnan(sine)] = NOT_ASSEMBLED
         codes[np.isnan(half.kk)] = OVERFLOW  # of theta_2 - theta_1: not even where it closes is known
@@ -187,12 +304,12 @@ def _codes(sine: Array, half: HalfAngle, margin: float) -> NDArray[np.uint8]:
 
 def _sign(branch: NDArray[np.int8]) -> Any:
     """The branch of each position, or one number where all have the same."""
-    return float(branch[0]) if branch.size and branch.min() == branch.max() else branch
+    if branch.ndim == 0 or (branch.size and branch.min() == branch.max()):
+        return float(branch.flat[0]) if branch.ndim else float(branch)
+    return branch
 
 
-def _angles(
-    case: Case, half: HalfAngle, branch: Any, names: Iterable[str]
-) -> tuple[NDArray[np.uint8], dict[str, Any], None]:
+def _angles(case: Case, half: HalfAngle, branch: Any, names: Iterable[str]) -> Evaluated:
     """The same where two angles alone are wanted: without vectors and the rest of the triangle."""
     theta_3, theta_4, root = case.path.angles(half, branch)
     codes = _codes(root, half, NO_DIGIT_LEFT * 2.0 * case.path.lengths.b * case.path.lengths.c)
@@ -200,24 +317,24 @@ def _angles(
     return codes, {name: found[name] for name in names}, None
 
 
-def _freely(
-    case: Case, moved: "FreeMotion", part: NDArray[np.intp], wanted: int, names: Iterable[str]
-) -> tuple[NDArray[np.uint8], dict[str, Any]]:
+def _freely(case: Case, moved: "FreeMotion", part: Part, wanted: int, names: Collection[str]) -> Evaluated:
     """The same at instants of a free motion that have one independent angle; there is no driving torque."""
-    codes = np.zeros(len(part), dtype=np.uint8)
-    if not len(part):
-        return codes, {}
-    bar = int(moved.bar[part[0]])
+    codes = np.zeros(len(part[0]), dtype=np.uint8)
+    if not codes.size:
+        return codes, {}, None
+    bar = int(moved.bar[part][0])
     free = case._replace(drive_bar=bar, path=moved.paths[bar])
     q, speed, growth, branch = (x[part] for x in (moved.q, moved.speed, moved.acceleration, moved.sign))
     at = free.path.position(q, free.path.half_angle(q), branch)
     state = free.state(free.path, q, at, branch, speed, growth)._replace(theta_2=moved.command.theta_2[part])
-    values = {name: KINEMATIC[name](case, state) for name in names if name in KINEMATIC}
-    if wanted >= STAGES.index("force"):
-        exact = np.empty(0, dtype=np.intp) if wanted == len(STAGES) - 1 else None
+    values = kinematics(case, state, names)
+    if wanted >= FORCE:
+        exact = NOWHERE if wanted == ERROR else None
         values |= _forces(free, state, growth, None, branch, codes, names, exact)
-        values |= {name: np.zeros(len(part)) for name in values if name in ("torque", "torque_error", *OF_DRY_FRICTION)}
-    return codes, values
+        values |= {
+            name: np.zeros(codes.shape) for name in values if name in ("torque", "torque_error", *OF_DRY_FRICTION)
+        }
+    return codes, values, None
 
 
 def _forces(
@@ -227,7 +344,7 @@ def _forces(
     branch: NDArray[np.int8] | None,
     sign: Any,
     codes: NDArray[np.uint8],
-    names: Iterable[str],
+    names: Collection[str],
     exact: NDArray[np.intp] | None,
 ) -> dict[str, Any]:
     """The quantities of the force stage; statuses of effects go into the codes.
@@ -259,8 +376,8 @@ def _forces(
         without.append(found.status)
     if without:
         status = np.max(without, axis=0)
-        codes[:] = np.where(codes == OK, status, codes)
-    if (codes > SINGULAR).any():
+        codes[...] = np.where(codes == OK, status, codes)
+    if anywhere(codes > SINGULAR):
         gone = np.isin(codes, WITHOUT_FORCES)
         values |= {
             name: np.where(gone, _no_value(value), value) for name, value in values.items() if name != "drive_condition"
@@ -282,8 +399,8 @@ def _of_bars(name: str, evaluate: Callable[[Case, State, int], Any]) -> dict[str
 
 
 KINEMATIC: dict[str, Quantity] = {
-    "theta_3": lambda case, state: np.angle(state.at.u3),
-    "theta_4": lambda case, state: np.angle(state.at.u4),
+    "theta_3": lambda case, state: np.arctan2(state.at.u3.imag, state.at.u3.real),
+    "theta_4": lambda case, state: np.arctan2(state.at.u4.imag, state.at.u4.real),
     "sin_mu": lambda case, state: state.at.sin_mu,
     "condition": lambda case, state: np.abs(state.at.sin_mu),
     "A": lambda case, state: state.point(2, case.lengths.a),
@@ -291,11 +408,24 @@ KINEMATIC: dict[str, Quantity] = {
     **_of_bars("G{}", lambda case, state, bar: state.point(bar, case.bodies[bar - 2].z)),
     **_of_bars("omega_{}", lambda case, state, bar: state.omega(bar)),
     **_of_bars("alpha_{}", lambda case, state, bar: state.alpha(bar)),
+    "v_A": lambda case, state: state.velocity(2, case.lengths.a),
+    "v_B": lambda case, state: state.velocity(4, case.lengths.c),
+    **_of_bars("v_G{}", lambda case, state, bar: state.velocity(bar, case.bodies[bar - 2].z)),
     "a_A": lambda case, state: state.acceleration(2, case.lengths.a),
     "a_B": lambda case, state: state.acceleration(4, case.lengths.c),
     **_of_bars("a_G{}", lambda case, state, bar: state.acceleration(bar, case.bodies[bar - 2].z)),
 }
 """The quantities before the forces."""
+
+
+def kinematics(case: Case, state: State, names: Collection[str]) -> dict[str, Any]:
+    """Those of the quantities that come before the forces, a scene's own points among them."""
+    values = {name: KINEMATIC[name](case, state) for name in names if name in KINEMATIC}
+    for name, bar, z in case.points:
+        for start, evaluate in (("", state.point), ("v_", state.velocity), ("a_", state.acceleration)):
+            if start + name in names:
+                values[start + name] = evaluate(bar, z)
+    return values
 
 
 def _released(scene: Scene) -> "FreeMotion":
@@ -330,16 +460,22 @@ def state_at(scene: Scene, at: Command) -> State:
 
 
 def _started(scene: Scene) -> Scene:
-    """The scene with effects that know where its motion begins."""
+    """The scene with effects that know where its motion begins: where it first assembles, if it keeps its branch."""
     if not any(effect.counts_turns for effect in scene.effects):
         return scene
-    begins = command(scene)
-    state = state_at(scene, begins)
-    half = state.at.half
+    at = command(scene)
+    half, _ = Case.of(scene).half_angle(at.theta_2, at.remainder)
     assembled = (half.outer >= 0.0) & (half.inner >= 0.0)
-    return replace(
-        scene, effects=tuple(effect.counted_from(state, assembled, begins.branch) for effect in scene.effects)
-    )
+    if not assembled.any() or np.ptp(at.branch) != 0:
+        return scene
+    first = int(np.argmax(assembled))
+    return started(scene, Command(at.theta_2[first], at.branch[first], 0.0, 0.0, at.remainder))
+
+
+def started(scene: Scene, at: Command) -> Scene:
+    """The scene with effects that know that its motion begins at a position, of as many linkages as there are."""
+    state = state_at(scene, at)
+    return replace(scene, effects=tuple(effect.counted_from(state, at.branch) for effect in scene.effects))
 
 
 def _refuse_wound(scene: Scene, at: Command) -> None:
@@ -364,18 +500,18 @@ def _absent(scene: Scene) -> tuple[str, ...]:
     return absent if any(effect.loaded_pins for effect in scene.effects) else (*absent, *OF_PIN_LOADS)
 
 
-def _highest_stage(out: Mapping[str, Array], n: int) -> int:
+def _highest_stage(out: Mapping[str, Array], positions: tuple[int, ...], stages: Mapping[str, str]) -> int:
     """The last stage that the quantities named need; an InputError where one cannot be written."""
     for name, array in out.items():
-        if name not in STAGE_OF:
-            raise InputError("out", name, "must be among " + ", ".join(STAGE_OF))
-        shape = (n, 2) if name in VECTORS else (n,)
+        if name not in stages:
+            raise InputError("out", name, "must be among " + ", ".join(stages))
+        shape = positions if is_scalar(name) else (*positions, 2)
         if array.shape != shape or array.dtype != np.float64:
             raise InputError(f"out.{name}", (array.shape, str(array.dtype)), f"must be float64 of shape {shape}")
-    return max((STAGES.index(STAGE_OF[name]) for name in out), default=0)
+    return max((STAGES.index(stages[name]) for name in out), default=0)
 
 
-def _piece(value: float | Array | None, part: slice) -> float | Array:
+def _piece(value: float | Array | None, part: Part) -> float | Array:
     """A number for all positions, or the part of an array that belongs to a block."""
     if value is None or np.ndim(value) == 0:
         return value or 0.0

@@ -224,7 +224,7 @@ def tables_text(scene: fourbar.Scene, width: int) -> str:
 
 
 def test_the_digits_of_the_torque() -> None:
-    solution = fourbar.solve(crank_rocker())
+    solution = fourbar.solve(crank_rocker(), "error")
     assert solution.torque is not None and solution.torque_error is not None
     column = next(cells for name, cells in tables.columns(solution).items() if "digits" in name)
     for cell, torque, error in zip(column, solution.torque, solution.torque_error, strict=True):
@@ -333,7 +333,7 @@ def test_plot_and_animate_write_what_their_ending_says(tmp_path: Path, run: Four
 def test_what_goes_wrong_is_one_line_and_a_status(
     error: BaseException, code: int, run: Fourbar, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    def broken(_: object) -> None:
+    def broken(_: object, stage: str) -> None:
         raise error
 
     monkeypatch.setattr(import_module("fourbar.solve"), "solve", broken)

@@ -43,7 +43,7 @@ def test_a_spring_with_both_ends_in_one_pin_has_no_direction(name: str, pin: str
         "B": (Point(3, link.coupler.length, 0.0), Point(4, link.output.length, 0.0)),
     }[pin]
     scene = Scene(link, Motion(Sweep(0.3, 5.9, 40), 8.0), effects=(Springs((Spring(*ends, 150.0, 0.05),)),))
-    solution = solve(scene)
+    solution = solve(scene, "error")
     assert set(solution.status) == {"no_direction"}
     for quantity in ("F12", "F32", "F43", "F14", "torque", "torque_error", "force_error"):
         assert np.isnan(getattr(solution, quantity)).all(), quantity

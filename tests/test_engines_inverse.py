@@ -13,7 +13,8 @@ from fourbar.linkage import Bar, FourBar
 from fourbar.scene import Command, Scene, command
 from fourbar.scene.motion import Motion
 from fourbar.solve import solve
-from validation.compare.compare import COMPARED, closure, compare
+from validation.compare.compare import COMPARED, compare
+from validation.compare.identities import closure
 from validation.compare.tolerance import EPS, EQUIVALENCE, K
 from validation.engines import loop
 from validation.engines.free_body import FreeBody

@@ -51,9 +51,9 @@ def scene_text(title: str) -> str:
 
 @dataclass(frozen=True)
 class Named:
-    """Scenes whose name, title and source are hostile."""
+    """Scenes whose name, title and source are hostile: where the beginning or the whole matters each by itself."""
 
-    texts: tuple[str, ...] = (HOSTILE["path"], HOSTILE["markdown"], " ".join(HOSTILE.values()))
+    texts: tuple[str, ...] = (*(HOSTILE[kind] for kind in ("path", "markdown", "rich")), " ".join(HOSTILE.values()))
 
     def __len__(self) -> int:
         return len(self.texts)

@@ -21,7 +21,7 @@ LAYERS = {
         "free_motion",
         "error_bars",
         "solve",
-        "files mjcf",
+        "files mjcf studies",
         "show",
         "cli",
     ),

@@ -255,7 +255,7 @@ def test_bars_without_mass_hold_a_load_where_the_input_turns_back() -> None:
     link = fourbar.FourBar(0.5, fourbar.Bar(0.4), fourbar.Bar(0.3), fourbar.Bar(0.25), 0.2)
     loads = (fourbar.Load(3, (2.0, 0.3), (0.1, 0.02)),)
     on, close, near = (
-        fourbar.solve(fourbar.Scene(link, fourbar.Motion(fourbar.FromLimit(1, offset), 1.0), 4, loads))
+        fourbar.solve(fourbar.Scene(link, fourbar.Motion(fourbar.FromLimit(1, offset), 1.0), 4, loads), "error")
         for offset in (0.0, -1e-20, -1e-22)
     )
     assert on.status == ["singular"] and close.status == near.status == ["ok"]

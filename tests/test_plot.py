@@ -262,9 +262,9 @@ def test_a_position_that_does_not_assemble_is_refused(tmp_path: Path) -> None:
         plot.draw(thesis(), tmp_path / "a.png", "linkage", position=math.radians(45.0))
 
 
-def released(steps: int = 600, **changes: object) -> fourbar.Scene:
+def released(steps: int = 300, duration: float = 0.6, **changes: object) -> fourbar.Scene:
     """The crank-rocker let go from rest under gravity, a load and damping."""
-    motion = fourbar.Motion(0.5, 0.0, free=fourbar.Free(1.2, steps))
+    motion = fourbar.Motion(0.5, 0.0, free=fourbar.Free(duration, steps))
     parts = {"motion": motion, "effects": (fourbar.Gravity(), fourbar.Viscous.at(O2=0.002, B=0.001)), **changes}
     return crank_rocker(**parts)
 
@@ -274,7 +274,7 @@ def by_law() -> fourbar.Scene:
     return crank_rocker(motion=fourbar.Motion(law=law), drive_bar=4)
 
 
-@pytest.mark.parametrize("scene", (released(60), by_law()), ids=("released", "by law"))
+@pytest.mark.parametrize("scene", (released(60, 1.2), by_law()), ids=("released", "by law"))
 def test_a_motion_through_time_is_drawn_over_time(scene: fourbar.Scene) -> None:
     solution = fourbar.solve(scene)
     drawn = {line.get_label(): line for panel in composed(scene, "kinematics").axes for line in panel.lines}

@@ -29,7 +29,7 @@ HOSTILE = "</script><img src=x onerror=alert(1)>\"'&|`*"
 
 
 @cache
-def page() -> Record:
+def demo() -> Record:
     """A small scene as two exact engines and the free bodies judge it."""
     scene = crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.0, 6.0, 36), 5.0))
     return judged("demo", scene, tuple(w for w in WITNESSES if w.name != "mujoco-simulated"))
@@ -40,11 +40,11 @@ def copies(count: int, *, failing: int = 0) -> list[Record]:
     made = []
     for number in range(count):
         name = f"scene-{number:03d}"
-        rows = [replace(row, scene=name) for row in page().rows]
+        rows = [replace(row, scene=name) for row in demo().rows]
         if number < failing:
             at = next(i for i, row in enumerate(rows) if row.quantity == "torque")
             rows[at] = replace(rows[at], error=0.5, verdict=FAILS)
-        made.append(replace(page(), name=name, rows=rows))
+        made.append(replace(demo(), name=name, rows=rows))
     return made
 
 
@@ -101,8 +101,8 @@ def test_the_verdict_stands_first_and_a_failure_is_named_before_anything_else() 
     assert "What fails</h2>" not in report(copies(3))[1]
 
 
-def test_a_scene_cannot_write_into_the_page() -> None:
-    hostile = replace(page(), title=HOSTILE, source=HOSTILE, name=HOSTILE, left_out=[HOSTILE])
+def test_a_scene_cannot_write_into_the_demo() -> None:
+    hostile = replace(demo(), title=HOSTILE, source=HOSTILE, name=HOSTILE, left_out=[HOSTILE])
     summary, text = report([hostile], sections=[Section("more", HOSTILE, HOSTILE, [HOSTILE], [[HOSTILE]])])
     assert "<img src=x" not in text
     assert len(re.findall("<script", text)) == 1
@@ -139,9 +139,9 @@ def test_the_errors_drawn_are_the_largest_of_their_stretches() -> None:
 
 
 def test_costs_are_those_of_the_run() -> None:
-    points, formulas = cost_points([page()])
-    timings = {timing.engine: timing for timing in page().timings}
-    errors = {row.engine: row.error for row in page().rows if row.quantity == "torque"}
+    points, formulas = cost_points([demo()])
+    timings = {timing.engine: timing for timing in demo().timings}
+    errors = {row.engine: row.error for row in demo().rows if row.quantity == "torque"}
     assert formulas == [1e6 * timings["formulas"].seconds / 37]
     assert points == {name: [(1e6 * timings[name].seconds / 37, error)] for name, error in errors.items()}
     assert set(points) == {"pinocchio-inverse", "mujoco-inverse", "free-body"}
@@ -181,7 +181,7 @@ def test_many_scenes_give_a_short_report_of_the_worst() -> None:
         each.timings = [*each.timings, replace(each.timings[0], engine="sim", setting=f"RK4 {628 + number}/rev")]
     summary, text = report(pages)
     assert [w.row.scene for w in summary.worst[:2]] == ["scene-499", "scene-498"]
-    assert {"scene-499", "scene-300"} <= {page.name for page in summary.shown}
+    assert {"scene-499", "scene-300"} <= {scene.name for scene in summary.shown}
     assert summary.refusals == [("mujoco-simulated", "falls to 0.0e+00; below 0.05 it is not simulated", 500)]
     assert [cost.setting for cost in summary.costs if cost.engine == "sim"] == ["RK4 628/rev to 1127/rev"]
     assert summary.orders[0][0] == "scene-000"

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.test_report import page, report
+from tests.test_report import demo, report
 from validation.compare.rows import AGREES, FAILS, REFUSES, UNDECIDED, Row, write_results
 from validation.engines.hard_suite import HARD_WITNESSES, Hard
 from validation.engines.witnesses import WORK
@@ -66,8 +66,8 @@ def test_a_run_of_the_hard_suite_writes_its_page_and_its_part_of_the_report(
 
 def test_the_picture_of_costs_says_what_each_did_for_a_position() -> None:
     assert set(WORK) == {"formulas", *(witness.name for witness in HARD_WITNESSES)}
-    summary, text = report([page()])
-    drawn = cost_figure([page()])
+    summary, text = report([demo()])
+    drawn = cost_figure([demo()])
     assert drawn is not None
     for engine in ("formulas", "pinocchio-inverse", "mujoco-inverse", "free-body"):
         assert f"{engine}: {WORK[engine].short}" in drawn
@@ -87,7 +87,7 @@ def test_a_study_of_cost_next_to_the_report_is_part_of_it(tmp_path: Path) -> Non
     (folder / "cost.csv").touch()
     (folder / "sources.svg").write_text("<svg onload='alert(1)'/>")
     (folder / "work-precision-force.svg").write_bytes(bytes(cost.LARGEST + 1))
-    _, text = report([page()], sections=cost.found_in(tmp_path))
+    _, text = report([demo()], sections=cost.found_in(tmp_path))
     assert "The study of demo" in text and 'href="cost/demo/cost.md"' in text
     data = base64.b64encode(b"<svg onload='alert(1)'/>").decode()
     # an image runs no script; what is too large stays outside

@@ -104,11 +104,11 @@ def test_the_command_line_says_how_few_digits_are_left() -> None:
     dead = float(np.arccos((0.3**2 + 0.35**2 - 0.22**2) / (2 * 0.3 * 0.35)))  # bars 2, 3 in line
     for angle, warned in ((dead + 1e-11, True), (dead + 0.5, False)):
         scene = fourbar.Scene(linkage, fourbar.Motion(angle, 10.0), drive_bar=4)
-        lines = heading(scene, fourbar.solve(scene))
+        lines = heading(scene, fourbar.solve(scene, "error"))
         assert any("digits left of T4" in line and "bars 2 and 3" in line for line in lines) is warned
     nothing = fourbar.FourBar(0.3, fourbar.Bar(0.1), fourbar.Bar(0.25), fourbar.Bar(0.22))
     scene = fourbar.Scene(nothing, fourbar.Motion(1.0, 5.0))
-    assert not any("digits" in line for line in heading(scene, fourbar.solve(scene)))
+    assert not any("digits" in line for line in heading(scene, fourbar.solve(scene, "error")))
 
 
 def test_error_bars_grow_towards_a_dead_centre() -> None:
@@ -117,7 +117,7 @@ def test_error_bars_grow_towards_a_dead_centre() -> None:
     reach = 0.35
     theta = float(np.arccos((0.3**2 + reach**2 - 0.22**2) / (2 * 0.3 * reach)))
     bars = [
-        fourbar.solve(fourbar.Scene(linkage, fourbar.Motion(theta + offset, 10.0), drive_bar=4)).torque_error
+        fourbar.solve(fourbar.Scene(linkage, fourbar.Motion(theta + offset, 10.0), drive_bar=4), "error").torque_error
         for offset in (1e-1, 1e-4, 1e-7)
     ]
     assert bars[0] is not None and bars[1] is not None and bars[2] is not None

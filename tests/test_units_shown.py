@@ -20,14 +20,14 @@ from tests.scenes import crank_rocker
 MODEL = Path(__file__).parents[1] / "models" / "crank_rocker.toml"
 INCH, POUND = 0.0254, 0.45359237 * 9.80665
 IN_SI = {
-    **{"in": INCH, "in/s^2": INCH, "lbf": POUND, "lbf in": POUND * INCH, "rpm": math.tau / 60.0},
+    **{"in": INCH, "in/s": INCH, "in/s^2": INCH, "lbf": POUND, "lbf in": POUND * INCH, "rpm": math.tau / 60.0},
     **{"deg": math.pi / 180.0, "rad/s^2": 1.0, "1": 1.0, "J": 1.0},
 }
 """Size of each unit that a result of the model has in imperial units, by definition."""
 
 
 def test_every_number_is_in_the_unit_that_is_named(capsys: pytest.CaptureFixture[str]) -> None:
-    solution = fourbar.solve(fourbar.load(MODEL))
+    solution = fourbar.solve(fourbar.load(MODEL), "error")
     for form in ("--json", "--csv"):
         assert status(["analyze", str(MODEL), form, "--units", "imperial"]) == HOLDS
         out = capsys.readouterr().out

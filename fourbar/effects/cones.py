@@ -107,13 +107,15 @@ def newton_step(gap: Array, slope: Array) -> Array:
 
 def _iterate(F: Array, C: Array, k: Array, x: Array) -> Array:
     """Newton's step where it lessens the gap, else the plain one of the contraction."""
+    done = np.zeros(len(x), dtype=bool)
     for _ in range(STEPS):
         right, slope = _right_side(F, C, k, x)
         newton = np.maximum(x + newton_step(right - x, slope), 0.0)
         plain_gap = np.abs(_right_side(F, C, k, right)[0] - right).max(axis=1)
         newton_gap = np.abs(_right_side(F, C, k, newton)[0] - newton).max(axis=1)
         new = np.where((newton_gap < plain_gap)[:, None], newton, right)
-        done = np.abs(new - x).max(axis=1, initial=0.0) <= ROUNDING * new.max(axis=1, initial=0.0)
+        new = np.where(done[:, None], x, new)  # what others need changes no digit of this one
+        done |= np.abs(new - x).max(axis=1, initial=0.0) <= ROUNDING * new.max(axis=1, initial=0.0)
         x = new
         if done.all():
             break

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from fourbar.effects.actions import Actions
 from fourbar.formulas.motion import State
 from fourbar.formulas.pin_forces import Bodies
+from fourbar.formulas.position import Number
 from fourbar.solution import Array
 
 
@@ -49,8 +50,8 @@ class Effect:
         """The bars 2, 3, 4 with the inertia that the effect adds."""
         return bodies
 
-    def counted_from(self, start: State, assembled: NDArray[np.bool_], branch: NDArray[np.int8]) -> Self:
-        """The same effect in a motion that begins at the first of these positions that assembles."""
+    def counted_from(self, start: State, branch: Number) -> Self:
+        """The same effect in a motion that begins at this position, on this branch."""
         return self
 
     def status(self, state: State, branch: NDArray[np.int8] | None) -> NDArray[np.uint8] | None:

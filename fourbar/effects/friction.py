@@ -7,6 +7,7 @@ from fourbar.effects.actions import Actions
 from fourbar.effects.effect import Effect
 from fourbar.effects.pins import pin_values
 from fourbar.formulas.motion import State
+from fourbar.formulas.position import anywhere
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,7 +30,7 @@ class Friction(Effect):
     @property
     def dry_pins(self) -> tuple[str, ...]:
         """The pins at which it acts."""
-        return tuple(pin for pin, f in self.torques if f != 0.0)
+        return tuple(pin for pin, f in self.torques if anywhere(f != 0.0))
 
     def act(self, actions: Actions, state: State) -> None:
         """M on bar j = -f sign(omega_j - omega_i), its opposite on bar i."""

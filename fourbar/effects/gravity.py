@@ -9,6 +9,7 @@ import numpy as np
 from fourbar.effects.actions import Actions
 from fourbar.effects.effect import Effect
 from fourbar.formulas.motion import State
+from fourbar.formulas.position import anywhere
 from fourbar.linkage import MOVING_BARS, require
 
 U = 2.0**-53
@@ -31,7 +32,7 @@ class Gravity(Effect):
     def field(self) -> Any:
         """g_x + i g_y, m/s^2; a component that the angle as a double cannot tell from zero is zero."""
         u = np.exp(1j * self.angle)
-        cosine, sine = (np.where(np.abs(x) > U, x, 0.0) for x in (u.real, u.imag))
+        cosine, sine = (x * (np.abs(x) > U) for x in (u.real, u.imag))
         return self.magnitude * (cosine + 1j * sine)
 
     @property
@@ -41,6 +42,7 @@ class Gravity(Effect):
 
     def act(self, actions: Actions, state: State) -> None:
         """F = m g at G."""
+        field = self.field
         for number, body in zip(MOVING_BARS, actions.bodies, strict=True):
-            if np.any(body.m):
-                actions.force(number, body.m * self.field, body.z * state.direction(number))
+            if anywhere(body.m != 0.0):
+                actions.force(number, body.m * field, body.z * state.direction(number))

@@ -11,7 +11,7 @@ from fourbar.effects.actions import Actions
 from fourbar.effects.effect import Effect
 from fourbar.errors import InputError
 from fourbar.formulas.motion import State
-from fourbar.formulas.position import polar
+from fourbar.formulas.position import anywhere, polar
 from fourbar.linkage import MOVING_BARS, FourBar, require
 from fourbar.solution import Array
 
@@ -108,7 +108,7 @@ class Load(Effect):
             if self.frame == "bar":
                 force, arm = force * u, arm * u
             actions.force(self.bar, factor * force, to_G + arm)
-        if np.any(self.moment):
+        if anywhere(self.moment != 0.0):
             actions.moment(self.bar, factor * self.moment)
 
     def greatest_force(self, linkage: FourBar) -> float:

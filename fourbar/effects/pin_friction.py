@@ -13,6 +13,7 @@ from fourbar.effects.effect import Effect
 from fourbar.effects.pins import known
 from fourbar.errors import InputError
 from fourbar.formulas.pin_forces import PinForces
+from fourbar.formulas.position import anywhere
 from fourbar.linkage import PIN_FORCE, PINS, require
 from fourbar.quantities import JAMMED, OK, SEVERAL
 from fourbar.solution import Array
@@ -50,7 +51,7 @@ class PinFriction(Effect):
     @property
     def loaded_pins(self) -> tuple[str, ...]:
         """The pins whose forces it depends on."""
-        return tuple(pin for pin, mu, r in self.pins if np.any(mu * r))
+        return tuple(pin for pin, mu, r in self.pins if anywhere(mu * r != 0.0))
 
     @property
     def dry_pins(self) -> tuple[str, ...]:

@@ -10,7 +10,7 @@ from fourbar.effects.actions import Actions
 from fourbar.effects.effect import Effect
 from fourbar.errors import InputError
 from fourbar.formulas.motion import State
-from fourbar.formulas.position import polar
+from fourbar.formulas.position import anywhere, polar
 from fourbar.linkage import BAR_NAMES, FourBar, require
 from fourbar.quantities import NO_DIRECTION, OK
 
@@ -27,8 +27,8 @@ class Point(NamedTuple):
 
     @property
     def in_bar(self) -> Any:
-        """In the bar's frame, along + i across its line, m."""
-        return polar(self.distance, self.angle)
+        """In the bar's frame, along + i across its line, m; an array, whose products all round alike."""
+        return np.asarray(polar(self.distance, self.angle))
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,11 +95,11 @@ class Springs(Effect):
         """NO_DIRECTION where the two points of a spring with slack coincide."""
         codes = None
         for spring in self.springs:
-            if spring.slack == 0.0:
+            if not anywhere(spring.slack != 0.0):
                 continue
             across = _place(state, spring.end) - _place(state, spring.start)
             away = sum(state.lengths[:4]) + abs(spring.start.distance) + abs(spring.end.distance)
-            here = np.abs(across) <= COINCIDE * away
+            here = (np.abs(across) <= COINCIDE * away) & (spring.slack != 0.0)
             codes = np.where(here, NO_DIRECTION, OK if codes is None else codes).astype(np.uint8)
         return codes
 
@@ -110,7 +110,7 @@ def _place(state: State, point: Point) -> Any:
 
 def _per_distance(spring: Spring, across: Any) -> Any:
     """Tension over distance, N/m."""
-    if np.all(spring.slack == 0.0):
+    if not anywhere(spring.slack != 0.0):
         return spring.stiffness
     distance = np.abs(across)
     # a distance of 0 has no direction, which the status says

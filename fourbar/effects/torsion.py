@@ -12,6 +12,7 @@ from fourbar.effects.actions import Actions
 from fourbar.effects.effect import Effect
 from fourbar.effects.pins import known
 from fourbar.formulas.motion import State
+from fourbar.formulas.position import Number
 from fourbar.linkage import PINS, require
 from fourbar.quantities import OK, WOUND
 from fourbar.solution import Array
@@ -31,7 +32,7 @@ class Torsion(Effect):
     """
 
     springs: tuple[tuple[str, float, float, float], ...]
-    turns: tuple[float, ...] | None = None
+    turns: tuple[Number, ...] | None = None
     """Whole turns of each pin where the motion begins, rad; not part of a scene."""
     counts_turns: ClassVar[bool] = True
     key: ClassVar[str] = "torsion"
@@ -53,16 +54,10 @@ class Torsion(Effect):
             angle = np.angle(state.direction(j) * np.conj(state.direction(i)))
             actions.couple(pin, -(preload + k * _wound(angle - rest)))
 
-    def counted_from(self, start: State, assembled: NDArray[np.bool_], branch: NDArray[np.int8]) -> "Torsion":
-        """Whole turns counted at the first position that assembles; none where the motion changes its branch."""
-        if not assembled.any() or np.ptp(branch) != 0:
-            return self
-        first = int(np.argmax(assembled))
-        away = [
-            float(angle[first]) - rest
-            for angle, (_, _, rest, _) in zip(self._along(start, branch), self.springs, strict=True)
-        ]
-        return replace(self, turns=tuple(math.tau * math.floor(angle / math.tau + 0.5) for angle in away))
+    def counted_from(self, start: State, branch: Number) -> "Torsion":
+        """Whole turns counted where the motion begins."""
+        away = [angle - rest for angle, (_, _, rest, _) in zip(self._along(start, branch), self.springs, strict=True)]
+        return replace(self, turns=tuple(math.tau * np.floor(angle / math.tau + 0.5) for angle in away))
 
     def status(self, state: State, branch: NDArray[np.int8] | None) -> NDArray[np.uint8] | None:
         """WOUND at half a turn from rest and beyond."""
@@ -73,13 +68,13 @@ class Torsion(Effect):
             wound |= np.abs(angle - rest - turns) > HALF_TURN
         return np.where(wound, WOUND, OK).astype(np.uint8)
 
-    def _along(self, state: State, branch: NDArray[np.int8]) -> list[Array]:
+    def _along(self, state: State, branch: Number) -> list[Array]:
         """theta_j - theta_i of each sprung pin, continuous in theta_2 on one branch."""
         angles = _continuous(state, branch)
         return [angles[PINS[pin][1]] - angles[PINS[pin][0]] for pin, *_ in self.springs]
 
 
-def _continuous(state: State, branch: NDArray[np.int8]) -> dict[int, Array]:
+def _continuous(state: State, branch: Number) -> dict[int, Array]:
     """theta_1 .. theta_4 without jumps at a whole turn, on one branch.
 
     The diagonal from A to O4 swings about the ground's line where a < d, and otherwise about the input's, never by

@@ -29,6 +29,10 @@ omega_2 = "1 rad/s"  # left out: positions only
 [drive]
 bar = 2  # or 3, 4: the bar that the torque acts on
 
+# Points whose position, velocity and acceleration are wanted: [distance, angle] from the bar's first pin (O2, A, O4).
+# [points]
+# P = {{ bar = 3, from_pin = ["5 cm", "20 deg"] }}
+
 # As many loads as act; their angles turn with the bar where frame = "bar".
 # [[loads]]
 # bar = 3

@@ -15,13 +15,14 @@ from fourbar.effects import Load, Table
 from fourbar.errors import InputError
 from fourbar.files import reading
 from fourbar.files.effects import REGISTRY
-from fourbar.files.fields import Reader
+from fourbar.files.fields import BARE_KEY, Reader
 from fourbar.files.pictures import Picture
 from fourbar.files.scene_text import BARS, BRANCHES, dump, save
 from fourbar.linkage import BAR_NAMES, Bar, FourBar
 from fourbar.scene import Scene
 from fourbar.scene.motion import DEFAULT_STEPS, Free, FromLimit, Motion, Sweep
 from fourbar.scene.motion_law import ENDS, Law
+from fourbar.scene.point import Point
 from fourbar.solution import Array
 
 __all__ = ["dump", "load", "loads", "read_text", "save"]
@@ -37,6 +38,9 @@ LONGEST_LINE = 60
 MOST_LOADS = 1000
 """Each load is a term at every position."""
 THROUGH = ("sign", "follow")
+TABLES = ("title", "source", "lengths", "bars", "motion", "drive", "points", "loads", "effects")
+MOST_POINTS = 1000
+"""Each is three columns of every table."""
 
 
 def load(path: str | Path) -> Scene:
@@ -88,7 +92,7 @@ def _unreadable(text: str, reason: str, shown: str) -> InputError:
 
 
 def _scene(read: Reader, document: dict[str, Any], folder: str) -> Scene:
-    top = read.table("", document, ("title", "source", "lengths", "bars", "motion", "drive", "loads", "effects"))
+    top = read.table("", document, TABLES)
     linkage = _linkage(read, top)
     drive = read.table("drive", top.get("drive", {}), ("bar",))
     entries = top.get("loads", [])
@@ -104,7 +108,20 @@ def _scene(read: Reader, document: dict[str, Any], folder: str) -> Scene:
         read.text("title", top.get("title", "")),
         read.text("source", top.get("source", "")),
         _pictures(read, top.get("bars", {}), folder),
+        _points(read, top.get("points", {})),
     )
+
+
+def _points(read: Reader, value: object) -> tuple[Point, ...]:
+    if not isinstance(value, dict) or len(value) > MOST_POINTS:
+        raise read.refuse("points", value, f"must be a table of points, at most {MOST_POINTS}")
+    found = []
+    for name, point in value.items():
+        key = f"points.{name}" if BARE_KEY.fullmatch(name) else "points"
+        entry = read.table(key, point, ("bar", "from_pin"))
+        bar = read.whole(f"{key}.bar", entry.get("bar"), 1, 4)
+        found.append(Point(name, bar, read.polar(f"{key}.from_pin", entry.get("from_pin"), "m")))
+    return tuple(found)
 
 
 def _pictures(read: Reader, bars: dict[str, Any], folder: str) -> tuple[Picture, ...]:

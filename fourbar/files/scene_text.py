@@ -69,6 +69,10 @@ def dump(scene: Scene) -> str:
         parts.append(_table(f"bars.{name}", entry))
     parts.append(_table("motion", _motion_entry(write, motion)))
     parts.append(_table("drive", {"bar": scene.drive_bar}))
+    points: dict[str, Any] = {
+        point.name: {"bar": point.bar, "from_pin": write.polar(*point.from_pin, "m")} for point in scene.points
+    }
+    parts.append(_table("points", points))
     parts += [_table("[loads]", _load_entry(write, load)) for load in scene.loads]
     effects = {effect.key: written(effect, write) for effect in scene.effects}
     if len(effects) != len(scene.effects):

@@ -16,6 +16,7 @@ from fourbar.formulas.position import (
     Loop,
     Number,
     Position,
+    anywhere,
     close_loop,
     direction,
     half_angle,
@@ -42,6 +43,8 @@ class Path(NamedTuple):
     """Direction of the ground in the order of the reading, rad."""
     unit: Number = 1.0
     """Of the lengths, a power of two near the longest, m: no product of them leaves the range of doubles."""
+    may_stay_parallel: bool = False
+    """Whether there are two pairs of equal bars."""
 
     def half_angle(self, q: Number) -> HalfAngle:
         """Of the independent angle q (rad) against the ground."""
@@ -56,8 +59,10 @@ class Path(NamedTuple):
         half : of q.
         branch : sign of the root in that order: for bar 2 the branch, for bar 4 that of sin(theta_3 - theta_2).
         """
-        turned = np.any(self.theta_1)
-        u1, u2 = polar(1.0, self.theta_1), direction(q) if turned else vector(half.kk - half.ss, 2.0 * half.sk)
+        turned = self.theta_1 != 0.0
+        u1, u2 = polar(1.0, self.theta_1), direction(q) if np.all(turned) else vector(half.kk - half.ss, 2.0 * half.sk)
+        if np.ndim(turned):  # of linkages
+            u2 = np.where(turned, direction(q), u2)
         at = close_loop(self.lengths, u1, u2, half, branch)
         return parallel_position(at, *parallel_pairs(self.lengths, half, branch)) if self.may_stay_parallel else at
 
@@ -87,20 +92,16 @@ class Path(NamedTuple):
             k = parallel_motion(k, first & known, second & known)
         return (at, k) if self.bar == 2 else (_turned_round(self, at), read_backwards(k))
 
-    @property
-    def may_stay_parallel(self) -> bool:
-        """Whether there are two pairs of equal bars."""
-        return bool(np.any(np.equal(self.lengths.E1, 0.0) & np.equal(self.lengths.E2, 0.0)))
-
 
 def path(lengths: Loop, theta_1: Number, bar: int = 2) -> Path:
     """The path in the angle of bar 2 or 4."""
     d, a, b, c, _, _ = lengths
-    unit = np.ldexp(1.0, np.frexp(np.maximum(np.maximum(d, a), np.maximum(b, c)))[1])
+    unit = np.ldexp(1.0, np.frexp(0.25 * (d + a + b + c))[1])
     d, a, b, c = d / unit, a / unit, b / unit, c / unit
-    if bar == 2:
-        return Path(2, loop(d, a, b, c), theta_1, unit)
-    return Path(4, loop(d, c, b, a), theta_1 + np.pi, unit)
+    if bar == 4:
+        a, c, theta_1 = c, a, theta_1 + np.pi
+    own = loop(d, a, b, c)
+    return Path(bar, own, theta_1, unit, anywhere((own.E1 == 0.0) & (own.E2 == 0.0)))
 
 
 def singular(at: Position, margin: float = NO_DIGIT_LEFT) -> Number:

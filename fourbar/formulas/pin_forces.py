@@ -12,10 +12,8 @@ Source: Linares Mendoza, section 5.7 (the thirteen equations); R. L. Norton, Des
 
 from typing import NamedTuple
 
-import numpy as np
-
 from fourbar.formulas.motion import Rates
-from fourbar.formulas.position import Loop, Number, Position, vector
+from fourbar.formulas.position import Loop, Number, Position, anywhere, vector
 
 
 class Body(NamedTuple):
@@ -114,10 +112,11 @@ def pin_forces(
     w, at_A : everything that acts, as from `inertia_wrenches`.
     moment_of_F32 : a u2 x F32 (N m), which the virtual work of bars 3 and 4 knows; read for drive bar 2 alone.
 
+    >>> from math import pi
     >>> from fourbar.formulas.path import state
     >>> from fourbar.formulas.position import polar
     >>> from fourbar.linkage import uniform  # below, Norton, example 11-3: in, lbf, s
-    >>> s, deg = state(uniform(19, 5, 15, 10), np.pi / 3, 1, 25.0, -40.0), np.pi / 180
+    >>> s, deg = state(uniform(19, 5, 15, 10), pi / 3, 1, 25.0, -40.0), pi / 180
     >>> G3, P = polar(9, 45 * deg), polar(80, 330 * deg)  # a force on the coupler
     >>> bars = Body(0.004, 0.4, polar(3, 30 * deg)), Body(0.020, 1.5, G3), Body(0.015, 0.8, 5 + 0j)
     >>> w, at_A = inertia_wrenches(5, bars, s.at, s.moving)
@@ -140,6 +139,6 @@ def pin_forces(
         F43 = vector((M3 * at.foot - (M3 + M4)) / (c * sine), M3 * (-1.0 / b)) * at.u3
         F32 = R3 + F43 + at_A
         short = d < a
-        if np.any(short):  # all bars turn as one, and the sum loses the small component across bar 2
+        if anywhere(short):  # all bars turn as one, and the sum loses the small component across bar 2
             F32 = F32 + short * (moment_of_F32 / a - cross(at.u2, F32)) * 1j * at.u2
     return PinForces(-1.0 * (R2 + F32), F32, F43, F43 - R4)

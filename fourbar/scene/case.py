@@ -10,7 +10,7 @@ from fourbar.effects.actions import Actions, bodies
 from fourbar.formulas.motion import Coefficients, State, rates
 from fourbar.formulas.path import Path, path
 from fourbar.formulas.pin_forces import Bodies, PinForces, Wrenches, inertia_wrenches, pin_forces
-from fourbar.formulas.position import HalfAngle, Loop, Position, loop, parallel_pairs
+from fourbar.formulas.position import HalfAngle, Loop, Position, anywhere, parallel_pairs, polar
 from fourbar.formulas.torque import driving_torque, half_slope, inertia
 from fourbar.formulas.transmission import drive_sine, drive_sine_of_triangle
 from fourbar.linkage import FourBar
@@ -28,6 +28,7 @@ UNDECIDED = 32.0 * U
 """A factor of Heron's formula smaller than this times its terms is evaluated in many digits: in doubles it is wrong
 by at most about 12 U times them."""
 
+NOWHERE = np.empty(0, dtype=np.intp)
 
 NO_MOTION = Coefficients(*[np.nan] * 8)
 """Where positions alone are wanted."""
@@ -52,6 +53,8 @@ class Case(NamedTuple):
     terms: "tuple[Effect, ...]"
     drive_bar: int
     path: Path
+    points: tuple[tuple[str, int, Any], ...] = ()
+    """The scene's own: name, bar, and place in the bar's frame at its first pin, complex, m."""
     side: int = 0
     """In which sense pins at rest are about to turn."""
 
@@ -59,10 +62,11 @@ class Case(NamedTuple):
     def of(cls, scene: Scene) -> "Case":
         """The numbers that stay the same over the positions."""
         terms, linkage = (*scene.loads, *scene.effects), scene.linkage
-        lengths = loop(*linkage.lengths)
-        return cls(
-            linkage, lengths, bodies(linkage, terms), terms, scene.drive_bar, path(lengths, linkage.ground_angle)
-        )
+        own = path(Loop(*linkage.lengths, 0.0, 0.0), linkage.ground_angle)
+        square = own.unit * own.unit
+        lengths = Loop(*linkage.lengths, own.lengths.E1 * square, own.lengths.E2 * square)
+        points = tuple((point.name, point.bar, polar(*point.from_pin)) for point in scene.points)
+        return cls(linkage, lengths, bodies(linkage, terms), terms, scene.drive_bar, own, points)
 
     def state(
         self, path: Path, q: Any, at: Position, branch: Any, speed: Any, acceleration: Any, *, moving: bool = True
@@ -82,19 +86,18 @@ class Case(NamedTuple):
     def half_angle(self, theta_2: Array, remainder: Any) -> tuple[HalfAngle, NDArray[np.intp]]:
         """The half angles, and the indices of those evaluated in many digits."""
         lengths, half = self.path.lengths, self.path.half_angle(theta_2)
-        if remainder is not None:
-            index = np.arange(len(theta_2))
-        else:
+        close: Any = remainder is not None
+        if remainder is None:
             size = 4.0 * lengths.a * lengths.d
-            index = np.empty(0, dtype=np.intp)
             for factor, constant in ((half.outer, lengths.E1), (half.inner, lengths.E2)):
-                if constant < 0.0:  # else it is a sum of two positive terms
-                    close = np.abs(factor) < UNDECIDED * (abs(constant) + size)
-                    index = np.union1d(index, np.flatnonzero(close))
-        if index.size:
-            from fourbar.many_digits import decided
+                if anywhere(constant < 0.0):  # else it is a sum of two positive terms
+                    close = close | ((constant < 0.0) & (np.abs(factor) < UNDECIDED * (np.abs(constant) + size)))
+        if not anywhere(close):
+            return half, NOWHERE
+        from fourbar.many_digits import decided
 
-            half = decided(self.linkage, self.path.unit, half, index, theta_2, remainder)
+        index = np.flatnonzero(np.broadcast_to(close, np.shape(theta_2)))
+        half = decided(self.linkage, self.path.unit, half, index, theta_2, remainder)
         return half, index
 
     def dynamics(
@@ -108,7 +111,7 @@ class Case(NamedTuple):
         own, at_A = inertia_wrenches(a, self.bodies, at, state.moving)
         # J q'' + J'/2 q'^2 of all bars, and of bars 3 and 4
         inertial = others = half_slope(a, self.bodies, at, k) * (state.speed * state.speed)
-        if np.any(acceleration):
+        if anywhere(acceleration != 0.0):
             of_input, of_others = inertia(a, self.bodies, at, k)
             others = others + of_others * acceleration
             inertial = others + of_input * acceleration

@@ -10,6 +10,7 @@ from fourbar.errors import InputError
 from fourbar.formulas.mobility import default_range, limit_positions, on_smooth_path
 from fourbar.linkage import MOVING_BARS, FourBar
 from fourbar.scene.motion import DEFAULT_STEPS, FromLimit, Motion, Sweep
+from fourbar.scene.point import Point
 from fourbar.solution import Array
 
 if TYPE_CHECKING:
@@ -29,6 +30,7 @@ class Scene:
     title: str = ""
     source: str = ""
     pictures: "tuple[Picture, ...]" = ()
+    points: tuple[Point, ...] = ()
 
     def __post_init__(self) -> None:
         if self.drive_bar not in MOVING_BARS or isinstance(self.drive_bar, bool):
@@ -36,6 +38,10 @@ class Scene:
         object.__setattr__(self, "loads", tuple(self.loads))
         object.__setattr__(self, "effects", tuple(self.effects))
         object.__setattr__(self, "pictures", tuple(self.pictures))
+        object.__setattr__(self, "points", tuple(self.points))
+        names = [point.name for point in self.points]
+        if len(set(names)) < len(names):
+            raise InputError("points", names, "each point has a name of its own")
         if len({picture.bar for picture in self.pictures}) < len(self.pictures):
             raise InputError("pictures", [picture.bar for picture in self.pictures], "a bar has one picture")
 

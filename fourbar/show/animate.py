@@ -144,6 +144,10 @@ def page_data(scene: Scene, pictures: Mapping[str, str | Path], units: Conversio
         },
         "drive_bar": scene.drive_bar,
         "branch": motion.branch,
+        "points": [
+            {"name": p.name, "bar": p.bar, "at": [p.from_pin[0] * f(p.from_pin[1]) for f in (math.cos, math.sin)]}
+            for p in scene.points
+        ],
         "acting": [_symbol(symbol, shown["theta_2"]) for symbol in acting(scene)],
         "toml": _scene_file(scene),
         "followed": motion.through == "follow",
@@ -271,6 +275,12 @@ def _solved(solution: Solution) -> dict[str, Any]:
         values = getattr(solution, name)
         if values is not None:
             columns[name] = [_or_null(value) for value in values.tolist()]
+    points = {**{name: getattr(solution, name) for name in ("v_A", "v_B", "a_A", "a_B")}}
+    points |= {f"v_{name}": values for name, values in solution.velocity.items()}
+    points |= {f"a_{name}": values for name, values in solution.acceleration.items()}
+    for name, values in points.items():
+        if values is not None:
+            columns[name] = [_or_null(size) for size in np.hypot(*values.T).tolist()]
     for name in PIN_FORCES:
         values = getattr(solution, name)
         if values is not None:

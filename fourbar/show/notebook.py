@@ -75,6 +75,9 @@ def solution_html(solution: Solution, units: Conversion = DEGREES) -> str:
     """The first and last positions as a table; angles in degrees by default."""
     from fourbar.show.tables import columns
 
+    if solution.theta_2.ndim == 2:
+        members, count = solution.theta_2.shape
+        return f"<div><b>{escape(solution.title or 'Study')}</b>: {members} linkages, {count} positions each</div>"
     cells = columns(solution, units)
     if (solution.status_code != 0).any():
         cells = {"status": [status.replace("_", " ") for status in solution.status], **cells}

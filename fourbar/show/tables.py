@@ -187,9 +187,18 @@ def columns(solution: Solution, units: Conversion = DEGREES) -> dict[str, list[s
     if solution.torque is not None:
         if solution.time is None:  # released, it has no drive: its torque is rounding
             add(f"T{solution.drive_bar}", "N m", solution.torque)
-            shown["digits\nof T"] = _digits(solution)
+            if solution.torque_error is not None:
+                shown["digits\nof T"] = _digits(solution)
         for name in PIN_FORCES:
             add(f"|{name}|", "N", np.hypot(*getattr(solution, name).T))
+    for start, unit, arrays in (
+        ("", "m", solution.points),
+        ("v_", "m/s", solution.velocity),
+        ("a_", "m/s^2", solution.acceleration),
+    ):
+        for name, values in arrays.items():
+            for axis, letter in enumerate("xy"):
+                add(f"{start}{name}_{letter}", unit, values[:, axis])
     for name in ANGLES:
         add(name, "rad", getattr(solution, name))
     for name in ("omega_3", "omega_4", "alpha_3", "alpha_4"):

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import fourbar
+from fourbar.effects import Point
 from fourbar.files import loads
 from fourbar.show import animate
 from tests.scenes import crank_rocker, thesis
@@ -245,7 +246,7 @@ def test_the_page_names_a_linkage_as_fourbar_does(browse) -> None:
 
 
 def test_what_acts_is_drawn_at_its_place_and_dimensions_on_request(browse) -> None:
-    spring = fourbar.Spring(fourbar.Point(1, 0.1, -0.5), fourbar.Point(4, 0.08, 0.0), 20.0, 0.1)
+    spring = fourbar.Spring(Point(1, 0.1, -0.5), Point(4, 0.08, 0.0), 20.0, 0.1)
     load = fourbar.Load(3, (2.0, 0.5), (0.03, 1.0), frame="bar")
     scene = crank_rocker(loads=(load,), effects=(fourbar.Springs((spring,)), fourbar.Gravity()))
     driver = browse(animate.page(scene))

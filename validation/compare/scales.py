@@ -77,6 +77,13 @@ def _angular_accelerations(quantity: str, scene: Scene, formulas: Solution) -> A
     return np.asarray(terms / ((b if quantity == "alpha_3" else c) * formulas.condition))
 
 
+def _velocities(quantity: str, scene: Scene, formulas: Solution) -> Array:
+    total = np.zeros(len(formulas))
+    for number in MOVING_BARS:
+        total += (scene.linkage.bar(number).length + _arm(scene, number)) * np.abs(getattr(formulas, f"omega_{number}"))
+    return total
+
+
 def _accelerations(quantity: str, scene: Scene, formulas: Solution) -> Array:
     total = np.zeros(len(formulas))
     for number in MOVING_BARS:
@@ -99,6 +106,7 @@ TERMS: dict[str, Callable[[str, Scene, Solution], Array]] = {
     "1": _one,
     "m": _lengths,
     "rad/s": _speeds,
+    "m/s": _velocities,
     "rad/s^2": _angular_accelerations,
     "m/s^2": _accelerations,
     "N": _forces,

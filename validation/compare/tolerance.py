@@ -74,9 +74,9 @@ FULL_ACCURACY = Tolerance(
     conditioned=False,
 )
 
-POWER = {**dict.fromkeys(("rad", "m", "1"), 1), **dict.fromkeys(("rad/s", "rad/s^2", "m/s^2", "N", "N m"), 2)}
+POWER = {**dict.fromkeys(("rad", "m", "1"), 1), **dict.fromkeys(("rad/s", "m/s", "rad/s^2", "m/s^2", "N", "N m"), 2)}
 """By unit: angles and positions lose digits as 1/s, everything that follows from them as 1/s^2."""
-OF_THE_INPUT = frozenset(("theta_2", "omega_2", "alpha_2", "A", "G2", "a_A", "a_G2"))
+OF_THE_INPUT = frozenset(("theta_2", "omega_2", "alpha_2", "A", "G2", "v_A", "v_G2", "a_A", "a_G2"))
 """Quantities that the input alone decides: they lose none."""
 
 

@@ -130,6 +130,9 @@ def outputs(scene: Scene, branch: int, x: Values, drive_bar: int) -> Values | No
     def swing(k: int, arm: Pair) -> Pair:
         return turn(arm, (-omega[k] * omega[k], alpha[k]))
 
+    def turning(k: int, arm: Pair) -> Pair:
+        return turn(arm, (arb(0), omega[k]))
+
     O4 = polar(x["d"], x["theta_1"])
     foot = {2: zero, 3: times(a, w[2]), 4: O4}
     foot_acceleration = {2: zero, 3: swing(2, times(a, w[2])), 4: zero}
@@ -139,6 +142,9 @@ def outputs(scene: Scene, branch: int, x: Values, drive_bar: int) -> Values | No
     points = {"A": tip[2], "B": plus(O4, tip[4]), "a_A": foot_acceleration[3], "a_B": swing(4, tip[4])}
     points |= {f"G{k}": plus(foot[k], centre[k]) for k in MOVING_BARS}
     points |= {f"a_G{k}": acceleration[k] for k in MOVING_BARS}
+    foot_velocity = {2: zero, 3: turning(2, tip[2]), 4: zero}
+    points |= {"v_A": foot_velocity[3], "v_B": turning(4, tip[4])}
+    points |= {f"v_G{k}": plus(foot_velocity[k], turning(k, centre[k])) for k in MOVING_BARS}
 
     force = dict.fromkeys(MOVING_BARS, zero)
     moment = {k: x.get(f"couple_{k}", arb(0)) for k in MOVING_BARS}  # about G; a probe may add one

@@ -44,9 +44,10 @@ NOT_ANSWERED = frozenset(
     (
         *("theta_2", "omega_2", "alpha_2", "condition", "drive_condition"),
         *("torque_error", "force_error", "torque_low", "torque_high", "friction_residual"),
+        *("v_A", "v_B", "v_G2", "v_G3", "v_G4"),
     )
 )
-"""What is commanded, or of the formulas alone."""
+"""What is commanded, follows from others that are answered, or is of the formulas alone."""
 ROUNDING = 16.0 * 2.0**-52
 """Gap, relative to the sum of the lengths, that the roundings of a chain of three bars alone can leave."""
 

@@ -15,13 +15,13 @@ FLOOR = EPS / 4.0
 Point = tuple[float, float]
 
 
-def cost_points(pages: Iterable[Record]) -> tuple[dict[str, list[Point]], list[float]]:
+def cost_points(scenes: Iterable[Record]) -> tuple[dict[str, list[Point]], list[float]]:
     """(microseconds per position, error of the torque) of every scene by engine; the same cost of the formulas."""
     points: dict[str, list[Point]] = {}
     formulas: list[float] = []
-    for page in pages:
-        errors = {row.engine: row.error for row in page.rows if row.quantity == "torque" and math.isfinite(row.error)}
-        for timing in page.timings:
+    for scene in scenes:
+        errors = {row.engine: row.error for row in scene.rows if row.quantity == "torque" and math.isfinite(row.error)}
+        for timing in scene.timings:
             cost = 1e6 * timing.seconds / max(1, timing.positions)
             if timing.engine == "formulas":
                 formulas.append(cost)
@@ -30,9 +30,9 @@ def cost_points(pages: Iterable[Record]) -> tuple[dict[str, list[Point]], list[f
     return points, formulas
 
 
-def cost_figure(pages: Iterable[Record]) -> str | None:
+def cost_figure(scenes: Iterable[Record]) -> str | None:
     """An SVG of these points with each engine's median; None where no torque was compared."""
-    points, formulas = cost_points(pages)
+    points, formulas = cost_points(scenes)
     if not points or not formulas:
         return None
     from matplotlib.backends.backend_svg import FigureCanvasSVG

@@ -10,7 +10,7 @@ import numpy as np
 from fourbar.errors import FourBarError
 from fourbar.files import loads
 from fourbar.scene import command
-from fourbar.solve import solve
+from fourbar.solve import last_stage, solve
 from validation.scenes.suites import model_files
 
 HANG = 5.0
@@ -80,7 +80,7 @@ def try_out(index: int, text: str) -> Found | None:
         if scene.motion.free is None:
             at = command(scene)
             if len(at.theta_2) <= MOST_POSITIONS:
-                solve(scene, at=at)
+                solve(scene, last_stage(scene), at=at)
     except FourBarError as error:
         if "\n" in str(error):
             return Found(index, f"more than one line: {error}", text)

@@ -75,3 +75,15 @@ function drawActing(p, i) {
     }
   }
 }
+
+// The scene's own points, each with its name.
+parts.points = make(picture, "g", { id: "points" });
+function drawPoints(p) {
+  parts.points.replaceChildren();
+  if (!p) return;
+  for (const point of data.points) {
+    const [x, y] = toScreen(framed(p, point.bar, point.at));
+    make(parts.points, "path", { class: "own-point", d: `M${x - 5} ${y}L${x} ${y - 5}L${x + 5} ${y}L${x} ${y + 5}Z` });
+    if (byId("show-labels").checked) make(parts.points, "text", { class: "act-name", x: x + 12, y: y - 9 }).textContent = point.name;
+  }
+}

@@ -9,6 +9,7 @@ function make(parent, name, attributes) {
 const set = (element, attributes) => { for (const key in attributes) element.setAttribute(key, attributes[key]); };
 const picture = byId("picture");
 const parts = { ground: make(picture, "g", {}), images: make(picture, "g", { id: "images" }), curve: make(picture, "path", { class: "path", id: "curve" }) };
+parts.traces = make(picture, "g", { id: "traces" });
 parts.bars = {}; parts.image = {};
 for (const k of [2, 3, 4]) {
   if (data.pictures[k]) parts.image[k] = make(parts.images, "image", { href: data.pictures[k], preserveAspectRatio: "none", id: `picture-${k}` });
@@ -64,14 +65,16 @@ function fit() {
   view.height = Math.round(small ? view.width : Math.min(560, 0.68 * view.width));
   picture.classList.toggle("small", small);
   set(picture, { viewBox: `0 0 ${view.width} ${view.height}` });
-  const points = [[0, 0]], tips = [], curve = [];
+  const points = [[0, 0]], tips = [], curve = [], traces = [];
   let broken = true;
   for (let i = 0; i < grid.length; i++) {
     const p = at(i);
     if (!p) { broken = true; continue; }
     const g = coupler(p), reached = [p.A, p.B, p.O4, g];
     for (const k of [2, 4]) if (data.centres[k]) reached.push(barPoint(p, k, data.centres[k]));
-    points.push(...reached, ...actingPoints(p));
+    const own = data.points.map(point => framed(p, point.bar, point.at));
+    own.forEach((place, n) => { traces[n] = (traces[n] ?? "") + `${broken ? "M" : "L"}${place[0]} ${place[1]} `; });
+    points.push(...reached, ...actingPoints(p), ...own);
     if (dynamic()) for (const name of FORCES) tips.push([p[FORCE_PIN[name]], ...arrowShares(name, i)]);
     curve.push([broken ? "M" : "L", g]);
     broken = false;
@@ -79,6 +82,9 @@ function fit() {
   const frame = fitted(points, tips, small ? 30 : 58);
   Object.assign(view, frame);
   parts.curve.setAttribute("d", curve.map(([step, g]) => step + toScreen(g).map(v => v.toFixed(2)).join(" ")).join(""));
+  parts.traces.replaceChildren();   // in metres: the group carries the scale
+  parts.traces.setAttribute("transform", `translate(${view.x} ${view.y}) scale(${view.k} ${-view.k})`);
+  for (const d of traces) make(parts.traces, "path", { class: "trace", d, "vector-effect": "non-scaling-stroke" });
   drawGround();
   scaleForces();
 }
@@ -178,7 +184,7 @@ function place(name, point, from, distance) {
 
 function drawLinkage(p, i) {
   const show = id => byId(id).checked;
-  parts.curve.style.display = show("show-curve") ? "" : "none";
+  parts.curve.style.display = parts.traces.style.display = show("show-curve") ? "" : "none";
   parts.labels.style.display = show("show-labels") ? "" : "none";
   for (const element of Object.values(parts.label)) element.style.display = "none";
   const visible = (name, on) => { parts.label[name].style.display = on ? "" : "none"; };
@@ -245,6 +251,7 @@ function drawLinkage(p, i) {
   }
   separateLabels();
   drawActing(p, i);
+  drawPoints(p);
 }
 
 // Labels that would cover each other move aside, the less important one first; one without a free spot is left out.

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import PIN_FORCES
 from fourbar.show.plot.energy import energies
 from fourbar.show.plot.style import (
@@ -173,6 +174,32 @@ def draw_velocities(axes: "Axes", view: View) -> None:
 def draw_accelerations(axes: "Axes", view: View) -> None:
     """alpha_2 (where it is not zero), alpha_3, alpha_4."""
     _rates(axes, view, "alpha", "rad/s^2", "Angular accelerations", "Angular acceleration")
+
+
+def draw_speeds(axes: "Axes", view: View) -> None:
+    """Speeds of A, B, the mass centres and the scene's own points."""
+    _of_points(axes, view, "v", "m/s", view.sweep.velocity, "Speeds of points")
+
+
+def draw_point_accelerations(axes: "Axes", view: View) -> None:
+    """Sizes of the accelerations of the same points."""
+    _of_points(axes, view, "a", "m/s^2", view.sweep.acceleration, "Accelerations of points")
+
+
+def _of_points(axes: "Axes", view: View, letter: str, unit: str, own: dict[str, Array], title: str) -> None:
+    over = _bases(axes, view)
+    masses = [f"G{bar}" for bar in MOVING_BARS if view.scene.linkage.bar(bar).mass > 0.0]
+    vectors = {name: getattr(view.sweep, f"{letter}_{name}") for name in ("A", "B", *masses)} | own
+    curves = {name: np.hypot(*vector.T) for name, vector in vectors.items()}
+    limit = limit_of(list(curves.values()))
+    factor, shown_unit = unit_for(limit or largest(*curves.values()), unit, view.units)
+    for (name, values), (colour, dashes) in zip(curves.items(), cycle(WORKS), strict=False):
+        axes.plot(over, factor * values, color=colour, ls=dashes, label=name, lw=2.0 if name in own else 1.2)
+    axes.set_ylim(bottom=0.0)
+    axes.set_ylabel(f"$|{letter}|$ ({shown_unit})")
+    axes.set_title(title)
+    clip(axes, view, curves, limit, title, unit)
+    legend_above(axes, 6)
 
 
 def draw_torque(axes: "Axes", view: View) -> None:

@@ -79,6 +79,15 @@ def _kinematics(figure: "SubFigure", shown: View, labels: Labels) -> None:
         paint(axes, shown)
 
 
+def _points(figure: "SubFigure", shown: View, labels: Labels) -> None:
+    """Paths, speeds and accelerations of points."""
+    panels = figure.subplot_mosaic([["linkage", "speeds"], ["linkage", "accelerations"]], width_ratios=[1.15, 1.0])
+    linkage.draw_linkage(panels["linkage"], shown, labels)
+    _path_legend(panels["linkage"])
+    curves.draw_speeds(panels["speeds"], shown)
+    curves.draw_point_accelerations(panels["accelerations"], shown)
+
+
 def _single(paint: Callable[[Any, View], None]) -> Painter:
     def painter(figure: "SubFigure", shown: View, labels: Labels) -> None:
         del labels
@@ -107,6 +116,7 @@ FIGURES: dict[str, tuple[Painter, tuple[float, float], bool]] = {
     "linkage": (_linkage, (5.6, 5.2), False),
     "coupler": (_coupler, (5.6, 5.4), False),
     "kinematics": (_kinematics, (5.6, 6.8), False),
+    "points": (_points, (11.0, 5.6), True),
     "torque": (_single(curves.draw_torque), (5.6, 3.2), True),
     "forces": (_single(curves.draw_forces), (5.6, 3.2), True),
     "hodograph": (_hodographs, (6.4, 6.6), True),
@@ -133,7 +143,7 @@ def draw(
     Parameters
     ----------
     path : the file; its ending says which of svg, png and pdf is meant.
-    figure : one of `FIGURES`: "overview", "linkage", "coupler", "kinematics", "torque",
+    figure : one of `FIGURES`: "overview", "linkage", "coupler", "kinematics", "points", "torque",
         "forces", "hodograph", "energy", "transmission", "freebody".
     position : theta_2 of the linkage and the free bodies, rad; left out: the scene's own.
     branches : "one" (the scene's) or "both" (open and crossed, to the same scales).

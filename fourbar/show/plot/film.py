@@ -12,7 +12,7 @@ from fourbar.errors import DependencyError, InputError
 from fourbar.scene import Scene
 from fourbar.show.acting import acting
 from fourbar.show.plot import symbols
-from fourbar.show.plot.linkage import ENDS, mass_centre, paths, pin_name, supports
+from fourbar.show.plot.linkage import ENDS, POINT, mass_centre, paths, pin_name, supports
 from fourbar.show.plot.style import BAR_COLOURS, INK, largest, length_unit, matplotlib_style, plain
 from fourbar.show.plot.view import View, view
 from fourbar.show.progress import counted
@@ -147,7 +147,7 @@ def _stage(shown: View) -> tuple["Figure", Any]:
     figure.suptitle(plain(shown.scene.title, 70), parse_math=False, size=10.5, weight="bold", x=0.02, ha="left")
     for path, colour, dashes, name in paths(shown):
         axes.plot(*(factor * path).T, color=colour, lw=1.0, ls=dashes, label=name, zorder=2)
-    reached = np.concatenate([sweep.A, sweep.B, sweep.G3, [(0.0, 0.0), O4]])
+    reached = np.concatenate([sweep.A, sweep.B, sweep.G3, *sweep.points.values(), [(0.0, 0.0), O4]])
     size = 0.03 * factor * float(np.nanmax(np.nanmax(reached, 0) - np.nanmin(reached, 0)))
     supports(axes, (0.0, 0.0), (factor * O4[0], factor * O4[1]), size)
     bars = {
@@ -157,6 +157,7 @@ def _stage(shown: View) -> tuple["Figure", Any]:
         for number in ENDS
     }
     centres = {number: mass_centre(axes, (0.0, 0.0)) for number in ENDS if linkage.bar(number).mass > 0.0}
+    own = {name: axes.plot([], [], "D", ms=4.5, mfc="white", mec=POINT, mew=1.2, zorder=8)[0] for name in sweep.points}
     arms = {number: axes.plot([], [], color=BAR_COLOURS[number], lw=0.8, ls=":", zorder=3)[0] for number in centres}
     names = {pin: axes.annotate(pin_name(pin), (0.0, 0.0), **NAME) for pin in ("O2", "A", "B", "O4")}
     acts = _Acting(axes, shown, factor, size)
@@ -185,6 +186,8 @@ def _stage(shown: View) -> tuple["Figure", Any]:
             away = np.array(pins[pin]) - middle
             text.xy = tuple(factor * np.array(pins[pin]))
             text.set_position(tuple(13.0 * away / max(float(np.hypot(*away)), 1e-300)))
+        for name, mark in own.items():
+            mark.set_data(*(factor * sweep.points[name][index][:, None]))
         acts.draw(index)
         theta = f"{math.degrees(sweep.theta_2[index]):.1f}".replace("-", "−")
         when = "" if shown.time is None else f"$t$ = {shown.time[index]:.2f} s, "

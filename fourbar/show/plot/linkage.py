@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from matplotlib.lines import Line2D
 
 Point = tuple[float, float]
+POINT = "#8A3B78"
+"""Of the scene's own points."""
 ENDS = {2: ("O2", "A"), 3: ("A", "B"), 4: ("O4", "B")}
 
 
@@ -44,7 +46,7 @@ def draw_linkage(axes: "Axes", view: View, labels: Labels) -> None:
     """The linkage at the position drawn, over the paths of A, B and the coupler's centre."""
     sweep = view.sweep
     where, masses = pins(view), centres(view)
-    reached = np.concatenate([sweep.A, sweep.B, sweep.G3, list(where.values())])
+    reached = np.concatenate([sweep.A, sweep.B, sweep.G3, *sweep.points.values(), list(where.values())])
     factor, unit = _unit(view)
     where = {name: (factor * x, factor * y) for name, (x, y) in where.items()}
     _paths(axes, view, labels, factor)
@@ -67,6 +69,11 @@ def draw_linkage(axes: "Axes", view: View, labels: Labels) -> None:
     for name, point in where.items():
         axes.plot(*[[v] for v in point], "o", ms=6.0, mfc="white", mec=INK, mew=1.2, zorder=6)
         labels.add(Label(axes, pin_name(name), point, middle, INK, 9.0, 2.5))
+    for name, path in view.here.points.items():
+        x, y = factor * path[0]
+        axes.plot([x], [y], "D", ms=4.5, mfc="white", mec=POINT, mew=1.2, zorder=8)
+        labels.keep_off(axes, (float(x), float(y)), (float(x), float(y)))
+        labels.add(Label(axes, name, (float(x), float(y)), middle, POINT, 8.5, 2.5))
     for number, (x_centre, y_centre) in masses.items():
         here = (factor * x_centre, factor * y_centre)
         bar, colour = view.scene.linkage.bar(number), BAR_COLOURS[number]
@@ -120,7 +127,8 @@ def paths(view: View) -> list[tuple[Array, str, Any, str]]:
         (sweep.B, BAR_COLOURS[4], (0, (1, 2)), "path of $B$"),
         (middle, BAR_COLOURS[3], (0, (4, 1.5)), "coupler curve of " + ("$G_3$" if massive else "its mid-point")),
     )
-    return [(np.where(sweep.assembled[:, None], path, np.nan), *look) for path, *look in found]
+    own = ((path, POINT, (0, (3, 1, 1, 1)), f"path of {name}") for name, path in sweep.points.items())
+    return [(np.where(sweep.assembled[:, None], path, np.nan), *look) for path, *look in (*found, *own)]
 
 
 def _paths(axes: "Axes", view: View, labels: Labels, factor: float) -> None:

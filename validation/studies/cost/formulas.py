@@ -52,6 +52,8 @@ def single(scene: Scene, at: Command) -> Quantities:
         half = half_angle(case.lengths, theta_2 - scene.linkage.ground_angle)
         u1 = np.complex64(polar(1.0, scene.linkage.ground_angle))
         position = close_loop(case.lengths, u1, direction(theta_2), half, at.branch)
+        sides = ("u2", "u3", "u4", "diagonal")  # made of complex doubles whatever their parts are
+        position = position._replace(**{name: _single(getattr(position, name)) for name in sides})
         k = coefficients(case.lengths, position)
         speed, growth = (np.float32(value) for value in (at.omega_2 or 0.0, at.alpha_2))
         moving = rates(k, speed, growth)

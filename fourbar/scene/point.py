@@ -1,0 +1,55 @@
+"""A point of a bar whose position, velocity and acceleration a scene wants."""
+
+from dataclasses import dataclass
+
+from fourbar.errors import InputError
+from fourbar.linkage import BAR_NAMES, require
+from fourbar.quantities import UNITS
+
+LETTERS = frozenset("ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_")
+LONGEST_NAME = 40
+OF_POINTS = {"": "position", "v_": "velocity", "a_": "acceleration"}
+"""What is evaluated of a point: the beginning of the quantity's name, and the stage."""
+
+
+@dataclass(frozen=True, slots=True)
+class Point:
+    """A point of a bar.
+
+    Parameters
+    ----------
+    name : letters, digits and underlines; no name of a quantity, as v_ and a_ with it.
+    bar : 1, 2, 3 or 4.
+    from_pin : (distance, angle), from the bar's first pin (O2, O2, A, O4), the angle from its line, m and rad.
+    """
+
+    name: str
+    bar: int
+    from_pin: tuple[float, float]
+
+    def __post_init__(self) -> None:
+        plain = isinstance(self.name, str) and 0 < len(self.name) <= LONGEST_NAME and set(self.name) <= LETTERS
+        if not plain or self.name.startswith(("v_", "a_")) or self.name[0].isdigit():
+            allowed = "must be a word of letters, digits and _, not beginning with a digit, v_ or a_"
+            raise InputError("points", self.name, allowed)
+        if {self.name, f"{self.name}_x", f"{self.name}_y"} & COLUMNS:
+            raise InputError(self.key, self.name, "is the name of a quantity; a point needs another")
+        if self.bar not in BAR_NAMES or isinstance(self.bar, bool):
+            raise InputError(f"{self.key}.bar", self.bar, "must be 1, 2, 3 or 4")
+        try:
+            r, phi = self.from_pin
+        except (TypeError, ValueError):
+            raise InputError(f"{self.key}.from_pin", self.from_pin, "must be a pair (distance, angle)") from None
+        ends = tuple(require(f"{self.key}.from_pin", number) for number in (r, phi))
+        object.__setattr__(self, "from_pin", ends)
+
+    @property
+    def key(self) -> str:
+        """Its entry in a scene file."""
+        return f"points.{self.name}"
+
+
+COLUMNS = frozenset(
+    (*UNITS, "status", "branch", "drive_bar", "member", "title", "schema", "angle_unit", "assembled", "O2", "O4")
+)
+"""Names that a table or a JSON object has already, and the pins."""

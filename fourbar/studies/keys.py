@@ -1,0 +1,149 @@
+"""The numbers of a scene by their keys in its file, and scenes in which they are arrays."""
+
+import math
+from collections.abc import Callable
+from dataclasses import fields
+from difflib import get_close_matches
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from fourbar.errors import InputError
+from fourbar.linkage import BAR_NAMES, MOVING_BARS, Bar
+from fourbar.scene import Scene
+
+ANY, AT_LEAST_ZERO, POSITIVE = "a finite number", "a finite number >= 0", "a finite number > 0"
+SAME_FOR_ALL = (
+    *("title", "source", "drive", "bar", "branch", "through", "free", "law", "frame", "table", "picture"),
+    *("from", "to", "steps", "limit", "offset"),
+)
+"""Parts of keys that name a word, a whole number, or what has another form in a study."""
+Place = tuple[str | int, ...]
+"""Attributes and indices that lead from a scene to one of its numbers."""
+
+
+class Entry(NamedTuple):
+    """One number of a scene."""
+
+    place: Place
+    bound: str = ANY
+
+    def holds(self, values: Any) -> Any:
+        """Where a scene would take the numbers."""
+        low = {ANY: True, AT_LEAST_ZERO: values >= 0.0, POSITIVE: values > 0.0}[self.bound]
+        return np.isfinite(values) & low
+
+
+def _pair(key: str, place: Place, names: tuple[str | int, str | int] = (0, 1)) -> dict[str, Entry]:
+    return {f"{key}.{index}": Entry((*place, name)) for index, name in enumerate(names)}
+
+
+def _per_pin(rows: str, **columns: str) -> Callable[[Any], dict[str, Entry]]:
+    """Entries of an effect that holds rows (pin, number, ...), by the names of the numbers and their bounds."""
+
+    def entries(effect: Any) -> dict[str, Entry]:
+        return {
+            f"{row[0]}.{name}".removesuffix("._"): Entry((rows, index, column), bound)
+            for index, row in enumerate(getattr(effect, rows))
+            for column, (name, bound) in enumerate(columns.items(), 1)
+        }
+
+    return entries
+
+
+def _of_springs(effect: Any) -> dict[str, Entry]:
+    found = {}
+    for index in range(len(effect.springs)):
+        own: Place = ("springs", index)
+        found[f"{index}.stiffness"] = Entry((*own, "stiffness"), POSITIVE)
+        found[f"{index}.length"] = Entry((*own, "length"), AT_LEAST_ZERO)
+        found[f"{index}.preload"] = Entry((*own, "preload"))
+        for key, end in (("from", "start"), ("to", "end")):
+            found |= _pair(f"{index}.{key}.at", (*own, end), ("distance", "angle"))
+    return found
+
+
+OF_EFFECT: dict[str, Callable[[Any], dict[str, Entry]]] = {
+    "gravity": lambda effect: {"0": Entry(("magnitude",)), "1": Entry(("angle",))},
+    "viscous": _per_pin("coefficients", _=AT_LEAST_ZERO),
+    "friction": _per_pin("torques", _=AT_LEAST_ZERO),
+    "pin_friction": _per_pin("pins", coefficient=AT_LEAST_ZERO, radius=AT_LEAST_ZERO),
+    "torsion": _per_pin("springs", stiffness=POSITIVE, rest=ANY, preload=ANY),
+    "springs": _of_springs,
+    "flywheel": lambda effect: {"inertia": Entry(("inertia",), AT_LEAST_ZERO)},
+}
+"""The numbers of an effect, by its key; the places lead from the effect."""
+
+
+def entries(scene: Scene) -> dict[str, Entry]:
+    """The numbers of a scene that a study varies, lengths first, by key; motion.theta_2 is not among them."""
+    found = {"lengths.ground": Entry(("linkage", "ground"), POSITIVE)}
+    bars = [BAR_NAMES[number] for number in MOVING_BARS]
+    found |= {f"lengths.{name}": Entry(("linkage", name, "length"), POSITIVE) for name in bars}
+    found["lengths.ground_angle"] = Entry(("linkage", "ground_angle"))
+    for name in bars:
+        own: Place = ("linkage", name)
+        found[f"bars.{name}.mass"] = Entry((*own, "mass"), AT_LEAST_ZERO)
+        found[f"bars.{name}.inertia"] = Entry((*own, "inertia"), AT_LEAST_ZERO)
+        found |= _pair(f"bars.{name}.centre", (*own, "centre"))
+    if scene.motion.law is None:
+        found |= {f"motion.{name}": Entry(("motion", name)) for name in ("omega_2", "alpha_2")}
+    for index, load in enumerate(scene.loads):
+        if load.force is not None:
+            found |= _pair(f"loads.{index}.force", ("loads", index, "force"))
+            found |= _pair(f"loads.{index}.at", ("loads", index, "at"))
+        found[f"loads.{index}.moment"] = Entry(("loads", index, "moment"))
+    for index, point in enumerate(scene.points):
+        found |= _pair(f"{point.key}.from_pin", ("points", index, "from_pin"))
+    for index, effect in enumerate(scene.effects):
+        for key, entry in OF_EFFECT.get(effect.key, lambda effect: {})(effect).items():
+            found[f"effects.{effect.key}.{key}"] = entry._replace(place=("effects", index, *entry.place))
+    return found
+
+
+def refusal(key: str, value: object, known: list[str]) -> InputError:
+    """The error for a key that a study cannot vary."""
+    inner = [name for name in known if name.startswith(f"{key}.")]
+    if inner:
+        return InputError(key, value, "is more than one number; vary " + ", ".join(inner))
+    if any(part in SAME_FOR_ALL for part in key.split(".")):
+        return InputError(key, value, "is the same for every member of a study: only numbers vary, theta_2 as angles")
+    close = get_close_matches(key, known, 1, 0.0)
+    return InputError(key, value, f'unknown key; did you mean "{close[0]}"?')
+
+
+class Bars(Bar):
+    """The same bar of many linkages: its numbers may be arrays."""
+
+    __slots__ = ()
+
+    @property
+    def to_centre(self) -> Any:
+        """As of one bar, whose cosine and sine are those of the C library, not of NumPy."""
+        r, phi = self.mass_centre
+        if np.ndim(phi):
+            angles = np.asarray(phi).tolist()
+            cosine: Any = np.array([math.cos(angle) for angle in angles])
+            return r * cosine + 1j * (r * np.array([math.sin(angle) for angle in angles]))
+        return r * math.cos(phi) + 1j * (r * math.sin(phi)) if phi else r + 0j
+
+
+def placed(whole: Any, place: Place, values: Any) -> Any:
+    """A copy with one number replaced; what a constructor checks is not checked again."""
+    if not place:
+        return values
+    name, *rest = place
+    if isinstance(name, int):
+        parts = [placed(part, tuple(rest), values) if i == name else part for i, part in enumerate(whole)]
+        return tuple(parts)
+    if isinstance(whole, tuple):  # a named one
+        named: Any = whole
+        return named._replace(**{name: placed(getattr(named, name), tuple(rest), values)})
+    old = getattr(whole, name)
+    if isinstance(whole, Bar) and name == "centre" and old is None:
+        old = whole.mass_centre
+    new = object.__new__(Bars if isinstance(whole, Bar) else type(whole))
+    for field in fields(whole):
+        value = placed(old, tuple(rest), values) if field.name == name else getattr(whole, field.name)
+        object.__setattr__(new, field.name, value)
+    return new

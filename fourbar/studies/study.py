@@ -1,0 +1,228 @@
+"""A scene with arrays in the place of some of its numbers: one linkage for each entry."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fourbar.errors import InputError
+from fourbar.formulas.mobility import on_smooth_path
+from fourbar.formulas.position import loop
+from fourbar.quantities import ANGLES, INVALID
+from fourbar.scene import Command, Scene, command
+from fourbar.scene.case import Case
+from fourbar.scene.motion import FromLimit
+from fourbar.solution import Array, Solution, unwrap
+from fourbar.solve import BLOCK, FORCE, arrays, commanded, keep, positions_at_once, requested, solved, started
+from fourbar.studies.keys import entries, placed, refusal
+
+THETA_2 = "motion.theta_2"
+LENGTHS = tuple(f"lengths.{name}" for name in ("ground", "input", "coupler", "output", "ground_angle"))
+NEAR_A_CHANGE_POINT = 1e-12
+"""Relative to the sum of the lengths, squared: who is not so near has no change point, whatever rounding does."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Study:
+    """m linkages at n positions each, from one scene; made by `vary`."""
+
+    scene: Scene
+    """What does not vary."""
+    values: dict[str, Array]
+    """By key, lengths first, (m,); NaN in a member that a scene would refuse."""
+    invalid: NDArray[np.bool_]
+    """The members that a scene would refuse, (m,)."""
+    at: Command
+    """theta_2 and branch (m, n), omega_2 and alpha_2 of the scene, or (m, 1)."""
+
+    def __len__(self) -> int:
+        return len(self.invalid)
+
+    def solved(self, stage: str | None, *, out: Mapping[str, Array] | None = None, side: int = 0) -> Solution:
+        """What `fourbar.solve` returns for a study: every quantity as (m, n) or (m, n, 2)."""
+        at, shape = self.at, self.at.theta_2.shape
+        wanted, names = requested(self.scene, shape, at.omega_2, stage, out)
+        result = arrays(names, shape, out)
+        code = np.zeros(shape, dtype=np.uint8)
+        with np.errstate(all="ignore"):
+            for rows in _parts(len(self), max(1, positions_at_once(wanted) // shape[1])):
+                begins = self._started(rows) if wanted >= FORCE else self.scene
+                for columns in _parts(shape[1], positions_at_once(wanted)):
+                    block = (rows.stop - rows.start, columns.stop - columns.start)
+                    case = Case.of(self._members(rows, block[1], begins))._replace(side=side)
+                    where = self._command(rows, columns)
+                    found = commanded(case, where, (), wanted, names)
+                    keep(case, found, result, code, (rows, columns), block)
+                for name in ANGLES:
+                    if name in result:
+                        unwrap(result[name][rows])
+        code[self.invalid] = INVALID
+        for array in result.values():
+            array[self.invalid] = np.nan
+        return solved(self.scene, at, code, result)
+
+    def _command(self, rows: slice, columns: slice) -> Command:
+        """Some positions of some members, one after the other, (k,)."""
+        count = columns.stop - columns.start
+
+        def flat(value: Any) -> Any:
+            if np.ndim(value) != 2:
+                return value
+            return _repeated(value[rows, 0], count) if value.shape[1] == 1 else value[rows, columns].ravel()
+
+        return Command(*(flat(value) for value in self.at[:4]))
+
+    def _members(self, rows: slice, count: int, scene: Scene) -> Scene:
+        """The scene of some members whose numbers are arrays, each repeated for `count` positions."""
+        known = entries(self.scene)
+        for key, values in self.values.items():
+            scene = placed(scene, known[key].place, _repeated(values[rows], count))
+        for index, turns in _turns(scene).items():
+            scene = placed(scene, ("effects", index, "turns"), tuple(_repeated(turn, count) for turn in turns))
+        return scene
+
+    def _started(self, rows: slice) -> Scene:
+        """The scene with effects that know where the motion of each member begins: where it first assembles."""
+        if not any(effect.counts_turns for effect in self.scene.effects):
+            return self.scene
+        count = rows.stop - rows.start
+        first = np.full(count, -1)
+        for columns in _parts(self.at.theta_2.shape[1], BLOCK):
+            width = columns.stop - columns.start
+            half, _ = Case.of(self._members(rows, width, self.scene)).half_angle(
+                self._command(rows, columns).theta_2, None
+            )
+            assembled = ((half.outer >= 0.0) & (half.inner >= 0.0)).reshape(count, width)
+            here = (first < 0) & assembled.any(axis=1)
+            first[here] = columns.start + np.argmax(assembled, axis=1)[here]
+        member = np.arange(count)
+        theta_2 = np.where(first < 0, np.nan, self.at.theta_2[rows][member, first])
+        one_branch = np.ptp(self.at.branch[rows], axis=1) == 0
+        at = Command(np.where(one_branch, theta_2, np.nan), self.at.branch[rows, 0], 0.0, 0.0)
+        scene = self.scene
+        for index, turns in _turns(started(self._members(rows, 1, scene), at)).items():
+            scene = placed(scene, ("effects", index, "turns"), turns)
+        return scene
+
+
+def _turns(scene: Scene) -> dict[int, Any]:
+    """Of the effects that know where the motion begins, by their index: the whole turns of each of their pins."""
+    found = {index: getattr(effect, "turns", None) for index, effect in enumerate(scene.effects)}
+    return {index: turns for index, turns in found.items() if turns is not None}
+
+
+def _repeated(values: Array, count: int) -> Array:
+    return values if count == 1 else np.repeat(values, count)
+
+
+def _parts(size: int, most: int) -> Iterator[slice]:
+    return (slice(start, min(start + most, size)) for start in range(0, size, most))
+
+
+def vary(scene: Scene, values: Mapping[str, Any]) -> Study:
+    """m linkages from one scene, for `solve`: some of its numbers as arrays, one entry for each member.
+
+    Parameters
+    ----------
+    values : arrays of one length m, or single numbers, SI and rad, by keys as in the scene file: lists by index
+        ("loads.0.moment"), pairs likewise ("bars.coupler.centre.0"). "motion.theta_2" is (n,), for all members, or
+        (m, n); a scene that states no angles needs it. What the scene leaves out (the inertia of a uniform bar, its
+        centre at mid-bar) follows the length of each member.
+
+    Raises
+    ------
+    InputError : a key that the scene does not have or that is no number, a value that is no array of numbers, shapes
+        that do not fit, a free motion. A member with numbers that a scene refuses has the status "invalid", one that
+        never closes "not_assembled".
+
+    >>> from fourbar import Motion, Scene, solve, uniform
+    >>> scene = Scene(uniform(0.3, 0.1, 0.25, 0.22), Motion(1.0, 10.0))
+    >>> solve(vary(scene, {"lengths.input": [0.1, 0.11, 2.0]})).status
+    [['ok'], ['ok'], ['not_assembled']]
+    """
+    if scene.motion.free is not None:
+        raise InputError("motion.free", "a free motion", "is integrated for one linkage; a study prescribes theta_2")
+    known = entries(scene)
+    given = {key: _numbers(key, value, [*known, THETA_2]) for key, value in values.items()}
+    angles = _angles(scene, given)
+    sizes = {key: array.size for key, array in given.items() if key != THETA_2 and array.size != 1}
+    if angles.shape[0] != 1:
+        sizes[THETA_2] = angles.shape[0]
+    m = next(iter(sizes.values()), 1)
+    for key, size in sizes.items():
+        if size != m:
+            first = next(iter(sizes))
+            raise InputError(key, f"{size} members", f"must have one length: {first} has {m}")
+    numbers = {key: np.broadcast_to(given[key].ravel(), (m,)) for key in known if key in given}
+    invalid = ~np.broadcast_to(np.isfinite(angles).all(axis=1), (m,))
+    for key, array in numbers.items():
+        invalid = invalid | ~known[key].holds(array)
+    numbers = {key: np.where(invalid, np.nan, array) for key, array in numbers.items()}
+    theta_2 = np.broadcast_to(angles, (m, angles.shape[1]))
+    motion: Any = scene.motion if scene.motion.law is None else command(scene)
+    omega_2, alpha_2 = (
+        numbers.pop(f"motion.{name}")[:, None] if f"motion.{name}" in numbers else getattr(motion, name)
+        for name in ("omega_2", "alpha_2")
+    )
+    if scene.motion.law is not None:
+        omega_2, alpha_2 = (np.broadcast_to(value, theta_2.shape) for value in (omega_2, alpha_2))
+    branch = _branches(scene, numbers, angles, m)
+    return Study(scene, numbers, invalid, Command(theta_2, branch, omega_2, alpha_2))
+
+
+def _branches(scene: Scene, numbers: Mapping[str, Array], angles: Array, m: int) -> NDArray[np.int8]:
+    """The branch of each position, (m, n); only a member with a change point can follow a path through it."""
+    motion, known, shape = scene.motion, entries(scene), (m, angles.shape[1])
+    own = {key: array for key, array in numbers.items() if key in LENGTHS}
+    if motion.through == "follow" and not own and len(angles) == 1:
+        return np.broadcast_to(on_smooth_path(scene.linkage, angles[0], motion.branch), shape)
+    branch = np.full(shape, motion.branch, dtype=np.int8)
+    if motion.through == "follow":
+        linkage = scene
+        for key, array in own.items():
+            linkage = placed(linkage, known[key].place, array)
+        lengths = linkage.linkage.lengths
+        _, _, _, _, E1, E2 = loop(*lengths)
+        size = NEAR_A_CHANGE_POINT * sum(lengths) ** 2
+        for member in np.flatnonzero(np.broadcast_to((np.abs(E1) <= size) | (np.abs(E2) <= size), (m,))):
+            linkage = scene
+            for key, array in own.items():
+                linkage = placed(linkage, known[key].place, float(array[member]))
+            branch[member] = on_smooth_path(linkage.linkage, angles[member % len(angles)], motion.branch)
+    return branch
+
+
+def _numbers(key: str, value: Any, known: list[str]) -> Array:
+    """The array given for a key, (m,) or (1,); the angles as they are."""
+    if key not in known:
+        raise refusal(key, _shown(value), known)
+    try:
+        array = np.asarray(value)
+    except ValueError:  # rows of different lengths
+        raise InputError(key, "a ragged list", "must be an array of numbers") from None
+    if array.dtype.kind not in "iuf" or array.size == 0:
+        raise InputError(key, _shown(value), "must be an array of numbers, at least one")
+    most = 2 if key == THETA_2 else 1
+    if array.ndim > most:
+        allowed = "must have the shape (n,) or (m, n)" if key == THETA_2 else "must have the shape (m,)"
+        raise InputError(key, f"shape {array.shape}", allowed)
+    return array.astype(float)
+
+
+def _shown(value: Any) -> object:
+    """A value as far as one line shows it."""
+    return value if isinstance(value, (str, int, float)) else f"{type(value).__name__} of shape {np.shape(value)}"
+
+
+def _angles(scene: Scene, given: Mapping[str, Array]) -> Array:
+    """theta_2 of all members, (1, n) or (m, n)."""
+    motion = scene.motion
+    if THETA_2 in given:
+        if motion.law is not None:
+            raise InputError(THETA_2, "angles", "are those of the scene's motion law")
+        return np.atleast_2d(given[THETA_2])
+    if motion.law is None and (motion.theta_2 is None or isinstance(motion.theta_2, FromLimit)):
+        raise InputError(THETA_2, motion.theta_2, "depends on the linkage; a study states it: (n,) or (m, n) angles")
+    return command(scene).theta_2[None, :]

@@ -1,0 +1,211 @@
+"""Studies: a member of many linkages is that linkage alone, to the last digit; what no scene takes has a status."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from fourbar import Bar, FourBar, InputError, Motion, Scene, Sweep, solve, uniform
+from fourbar.effects import (
+    Flywheel,
+    Friction,
+    Gravity,
+    Load,
+    PinFriction,
+    Point,
+    Spring,
+    Springs,
+    Torsion,
+    Viscous,
+)
+from fourbar.quantities import VECTORS
+from fourbar.scene import command
+from fourbar.scene.motion import Free, FromLimit
+from fourbar.scene.motion_law import Law
+from fourbar.studies import Study, vary
+from fourbar.studies import study as studying
+from fourbar.studies.keys import entries, placed
+
+M, ANGLES = 9, np.array([0.2, 0.9, 2.5, 3.9, 5.6])
+LINK = FourBar(0.3, Bar(0.1, 0.2, 0.001, (0.04, 0.2)), Bar(0.25, 0.5), Bar(0.22, 0.4, None, (0.1, -0.3)), 0.4)
+LOADS = (
+    Load(3, (10.0, 0.3), (0.05, 0.2)),
+    Load(4, None, (0.0, 0.0), -0.15),
+    Load(2, (3.0, 0.2), (0.01, 0.1), 0.0, "bar"),
+)
+SPRINGS = Springs((Spring(Point(1, 0.1, -1.5), Point(4, 0.08, 0.1), 200.0, 0.12, 3.0),))
+DRIVEN = (
+    *(Gravity(9.81, -1.5), Viscous.at(O2=0.01, A=0.02), Friction.at(B=0.05)),
+    *(Torsion.at(B=(2.0, 0.5, 0.1)), SPRINGS, Flywheel(0.02, 2)),
+)
+RUBBING = (Gravity(), PinFriction.at(A=(0.1, 0.008), O4=(0.2, 0.01)))
+RANGES = {
+    "lengths.ground": (0.25, 0.35),
+    "lengths.input": (0.08, 0.3),
+    "lengths.coupler": (0.2, 0.3),
+    "lengths.output": (0.2, 0.3),
+    "lengths.ground_angle": (-1.0, 1.0),
+    "bars.input.mass": (0.1, 0.4),
+    "bars.input.centre.1": (-1.0, 1.0),
+    "bars.coupler.centre.0": (0.0, 0.1),
+    "bars.coupler.inertia": (0.0, 0.01),
+    "motion.omega_2": (-5.0, 5.0),
+    "motion.alpha_2": (-5.0, 5.0),
+    "loads.0.force.0": (0.0, 5.0),
+    "loads.0.at.1": (0.0, 5.0),
+    "loads.1.moment": (-1.0, 1.0),
+    "effects.gravity.0": (5.0, 10.0),
+    "effects.gravity.1": (-2.0, 2.0),
+    "effects.viscous.A": (0.0, 0.1),
+    "effects.friction.B": (0.0, 0.1),
+    "effects.torsion.B.rest": (-1.0, 1.0),
+    "effects.springs.0.stiffness": (100.0, 200.0),
+    "effects.springs.0.from.at.0": (0.0, 0.2),
+    "effects.flywheel.inertia": (0.0, 0.1),
+    "effects.pin_friction.A.coefficient": (0.0, 0.3),
+    "effects.pin_friction.O4.radius": (0.001, 0.03),
+}
+
+
+def scene(effects: tuple[Any, ...] = (), drive: int = 2, **motion: Any) -> Scene:
+    return Scene(LINK, Motion(**({"theta_2": ANGLES, "omega_2": 3.0, "alpha_2": 0.5} | motion)), drive, LOADS, effects)
+
+
+def spread(of: Scene) -> dict[str, Any]:
+    """A random array for each key of RANGES that the scene has."""
+    random, known = np.random.default_rng(3), entries(of)
+    return {key: random.uniform(*ends, M) for key, ends in RANGES.items() if key in known}
+
+
+def alone(study: Study, given: dict[str, Any], member: int) -> Scene:
+    """The scene of one member, its numbers floats."""
+    one, known = study.scene, entries(study.scene)
+    for key in known:
+        if key in given:
+            one = placed(one, known[key].place, float(given[key][member]))
+    return one
+
+
+@pytest.mark.parametrize(
+    ("effects", "drive", "stage"), [(DRIVEN, 4, "error"), (RUBBING, 2, "force"), (DRIVEN, 3, None), ((), 2, "position")]
+)
+def test_a_member_is_its_linkage_alone(effects: tuple[Any, ...], drive: int, stage: str | None) -> None:
+    whole = scene(effects, drive)
+    given = spread(whole)
+    study = vary(whole, given)
+    solution = solve(study, stage)
+    for member in range(M):
+        own = solve(alone(study, given, member), stage)
+        assert own.evaluated() == solution.evaluated()
+        assert solution.status[member] == own.status
+        for name in own.evaluated():
+            array = getattr(solution, name)
+            assert array.shape == ((M, len(ANGLES), 2) if name in VECTORS else (M, len(ANGLES)))
+            np.testing.assert_array_equal(array[member], getattr(own, name), err_msg=name)
+
+
+def test_blocks_over_members_and_positions_change_no_digit(monkeypatch: pytest.MonkeyPatch) -> None:
+    whole = scene(DRIVEN)
+    study = vary(whole, spread(whole))
+    at_once = solve(study)
+    for size in (3, 12):  # positions of one member, and members
+        monkeypatch.setattr(studying, "positions_at_once", lambda wanted, size=size: size)
+        monkeypatch.setattr(studying, "BLOCK", size)
+        piece = solve(study)
+        for name in at_once.evaluated():
+            np.testing.assert_array_equal(getattr(piece, name), getattr(at_once, name), err_msg=name)
+
+
+def test_angles_of_its_own_for_each_member_and_arrays_to_write_into() -> None:
+    theta_2 = np.array([[0.2, 0.4, 0.6], [1.2, 1.4, 1.6]])
+    study = vary(scene(), {"motion.theta_2": theta_2, "lengths.input": [0.1, 0.12]})
+    out = {"torque": np.zeros((2, 3)), "a_G3": np.zeros((2, 2, 3)).swapaxes(1, 2)}
+    solution = solve(study, out=out)
+    assert solution.torque is out["torque"] and solution.F12 is None
+    for member, length in enumerate((0.1, 0.12)):
+        given = {"lengths.input": [length] * 2}
+        one = alone(study, given, 0)
+        own = solve(Scene(one.linkage, Motion(theta_2[member], 3.0, 0.5), 2, LOADS))
+        np.testing.assert_array_equal(out["torque"][member], own.torque)
+        np.testing.assert_array_equal(out["a_G3"][member], own.a_G3)
+
+
+def test_what_the_scene_leaves_out_follows_the_length() -> None:
+    plain = Scene(uniform(0.3, 0.1, 0.25, 0.22), Motion(1.0, 5.0), effects=(Gravity(),))
+    solution = solve(vary(plain, {"lengths.coupler": [0.25, 0.28], "bars.coupler.mass": 0.5}))
+    longer = FourBar(0.3, Bar(0.1, 0.1), Bar(0.28, 0.5), Bar(0.22, 0.22))
+    own = solve(Scene(longer, Motion(1.0, 5.0), effects=(Gravity(),)))
+    assert solution.torque is not None and own.torque is not None
+    assert solution.torque[1, 0] == pytest.approx(own.torque[0], rel=1e-14)
+
+
+def test_a_bad_member_has_a_status_and_disturbs_no_other() -> None:
+    plain = Scene(uniform(0.3, 0.1, 0.25, 0.22), Motion(Sweep(0.0, 6.0, 3), 5.0))
+    lengths = [0.1, -0.1, 0.0, np.nan, 3.0, 0.1]
+    solution = solve(vary(plain, {"lengths.input": lengths, "bars.coupler.mass": [1.0, 1.0, 1.0, 1.0, 1.0, -1.0]}))
+    assert [row[0] for row in solution.status] == ["ok", "invalid", "invalid", "invalid", "not_assembled", "invalid"]
+    for name in solution.evaluated():
+        if name != "theta_2":
+            assert np.isnan(getattr(solution, name)[[1, 2, 3, 5]]).all(), name
+    assert solution.torque is not None
+    np.testing.assert_array_equal(solution.torque[0], solve(vary(plain, {"bars.coupler.mass": 1.0})).torque[0])  # type: ignore[index]
+
+
+def test_a_law_and_a_path_through_change_points() -> None:
+    law = Law((0.0, 0.5, 1.0), (0.0, 2.0, 6.0), 6, "rest")
+    given = {"lengths.input": np.array([0.1, 0.11])}
+    study = vary(Scene(LINK, Motion(law=law)), given)
+    solution = solve(study)
+    np.testing.assert_array_equal(solution.torque[1], solve(alone(study, given, 1)).torque)  # type: ignore[index]
+    kite = Scene(uniform(0.3, 0.1, 0.3, 0.1), Motion(Sweep(2.0, 8.0, 8), 1.0, through="follow"))
+    for given in ({"lengths.input": np.array([0.1, 0.09])}, {"bars.coupler.mass": np.array([1.0, 2.0])}):
+        study = vary(kite, given)
+        solution = solve(study)
+        assert -1 in solution.branch[0]
+        for member in (0, 1):
+            own = solve(alone(study, given, member))
+            np.testing.assert_array_equal(solution.branch[member], own.branch)
+            np.testing.assert_array_equal(solution.theta_4[member], own.theta_4)
+
+
+REFUSED = {
+    "a slip of the pen": ({"lengths.inptu": [1.0]}, 'did you mean "lengths.input"?'),
+    "an effect that does not act": ({"effects.viscous.O2": [1.0]}, "unknown key"),
+    "a pair": ({"bars.coupler.centre": [0.1]}, "vary bars.coupler.centre.0, bars.coupler.centre.1"),
+    "a bar's number": ({"drive.bar": [2, 3]}, "is the same for every member"),
+    "the branch": ({"motion.branch": [1, -1]}, "is the same for every member"),
+    "two lengths": ({"lengths.input": [0.1, 0.2], "lengths.output": [0.2, 0.2, 0.2]}, "lengths.input has 2"),
+    "two lengths, of angles": ({"lengths.input": [0.1, 0.2], "motion.theta_2": np.ones((3, 2))}, "has 2"),
+    "words": ({"lengths.input": ["10 cm"]}, "must be an array of numbers"),
+    "truths": ({"lengths.input": [True]}, "must be an array of numbers"),
+    "rows of different lengths": ({"lengths.input": [[0.1], [0.1, 0.2]]}, "must be an array of numbers"),
+    "nothing": ({"lengths.input": []}, "at least one"),
+    "a table": ({"lengths.input": np.ones((2, 2))}, "must have the shape (m,)"),
+}
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_what_cannot_vary_is_refused_in_one_line(name: str) -> None:
+    given, words = REFUSED[name]
+    with pytest.raises(InputError) as caught:
+        vary(scene(), given)
+    assert words in str(caught.value) and "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("motion", "words"),
+    [
+        (Motion(None, 1.0), "a study states it"),
+        (Motion(FromLimit(1, 0.1), 1.0), "a study states it"),
+        (Motion(1.0, free=Free(1.0, 10)), "is integrated for one linkage"),
+    ],
+)
+def test_a_motion_of_one_linkage_is_refused_in_one_line(motion: Motion, words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        vary(Scene(LINK, motion), {"bars.coupler.mass": [1.0, 2.0]})
+
+
+def test_a_study_is_given_no_other_positions() -> None:
+    study = vary(scene(), {"bars.coupler.mass": [1.0, 2.0]})
+    with pytest.raises(InputError, match="states its own positions"):
+        solve(study, at=command(scene()))
