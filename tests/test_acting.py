@@ -76,3 +76,27 @@ def test_the_page_is_given_the_same_symbols(everything: Scene) -> None:
     assert [one["kind"] for one in data["acting"]] == [symbol.kind for symbol in acting(everything)]
     factors = next(one["factor"] for one in data["acting"] if one["name"] == "load 2")
     assert np.allclose(factors, TABLED.table.at(np.array(data["theta_2"])), rtol=1e-15)  # type: ignore[union-attr]
+
+
+def test_the_points_of_a_scene_are_drawn_where_they_are() -> None:
+    """Path, speed and mark in the plot, path in the notebook's drawing, place and columns in the page."""
+    pytest.importorskip("matplotlib", reason="drawing needs matplotlib: pip install matplotlib")
+    from fourbar.show.drawing import POINT, drawing
+    from fourbar.show.plot.figures import FIGURES, compose
+    from fourbar.show.plot.style import matplotlib_style
+
+    scene = crank_rocker(points=(fourbar.Point("P", 3, (0.15, 0.7)),))
+    solution = fourbar.solve(scene)
+    painter, size, _ = FIGURES["points"]
+    with matplotlib_style():
+        panels = compose(scene, painter, size, None, "one", fourbar.units("m m/s m/s^2")).subfigs[0].axes
+    path = next(line for line in panels[0].lines if line.get_label() == "path of P")
+    assert np.allclose(path.get_xydata(), solution.points["P"], rtol=0.0, atol=1e-15)
+    for panel, own in zip(panels[1:], (solution.velocity, solution.acceleration), strict=True):
+        line = next(line for line in panel.lines if line.get_label() == "P")
+        assert np.allclose(line.get_ydata(), np.hypot(*own["P"].T), rtol=1e-15)
+    assert drawing(scene, solution).count(f'stroke="{POINT}"') == 1
+    data = animate.page_data(scene, {})
+    assert data["points"][0]["name"] == "P" and abs(complex(*data["points"][0]["at"]) - cmath.rect(0.15, 0.7)) < 1e-15
+    here = data["theta_2"].index(float(solution.theta_2[7]))
+    assert data["branches"]["1"]["v_P"][here] == pytest.approx(float(np.hypot(*solution.velocity["P"][7])), rel=1e-12)

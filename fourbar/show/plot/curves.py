@@ -193,8 +193,10 @@ def _of_points(axes: "Axes", view: View, letter: str, unit: str, own: dict[str, 
     curves = {name: np.hypot(*vector.T) for name, vector in vectors.items()}
     limit = limit_of(list(curves.values()))
     factor, shown_unit = unit_for(limit or largest(*curves.values()), unit, view.units)
-    for (name, values), (colour, dashes) in zip(curves.items(), cycle(WORKS), strict=False):
-        axes.plot(over, factor * values, color=colour, ls=dashes, label=name, lw=2.0 if name in own else 1.2)
+    looks = {"A": BAR_COLOURS[2], "B": BAR_COLOURS[4], **{f"G{bar}": BAR_COLOURS[bar] for bar in MOVING_BARS}}
+    for (name, values), dashes in zip(curves.items(), cycle(("-", "--", "-.", ":")), strict=False):
+        colour, width = looks.get(name, FORCE_COLOURS["F43"]), 2.0 if name in own else 1.2
+        axes.plot(over, factor * values, color=colour, ls=":" if name[0] == "G" else dashes, label=name, lw=width)
     axes.set_ylim(bottom=0.0)
     axes.set_ylabel(f"$|{letter}|$ ({shown_unit})")
     axes.set_title(title)

@@ -57,8 +57,8 @@ def _drive(axes: Any, shown: View) -> None:
 
 
 def _path_legend(axes: Any) -> None:
-    axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.005), ncols=3)
-    axes.set_title(axes.get_title(loc="left"), pad=18.0)
+    legend = axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.005), ncols=3)
+    axes.set_title(axes.get_title(loc="left"), pad=6.0 + 12.0 * math.ceil(len(legend.get_texts()) / 3))
 
 
 def _linkage(figure: "SubFigure", shown: View, labels: Labels) -> None:

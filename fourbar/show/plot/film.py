@@ -166,7 +166,8 @@ def _stage(shown: View) -> tuple["Figure", Any]:
     axes.set_aspect("equal", adjustable="datalim")
     axes.set_xlabel(f"$x$ ({unit})")
     axes.set_ylabel(f"$y$ ({unit})")
-    axes.set_title("θ", pad=18.0)
+    pad = 6.0 + 12.0 * math.ceil((3 + len(sweep.points)) / 3)
+    axes.set_title("θ", pad=pad)
     axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.005), ncols=3)
     figure.draw_without_rendering()
     figure.set_layout_engine("none")  # nothing jumps from frame to frame
@@ -191,6 +192,6 @@ def _stage(shown: View) -> tuple["Figure", Any]:
         acts.draw(index)
         theta = f"{math.degrees(sweep.theta_2[index]):.1f}".replace("-", "−")
         when = "" if shown.time is None else f"$t$ = {shown.time[index]:.2f} s, "
-        axes.set_title(rf"{when}$\theta_2$ = {theta}°, {shown.branch_name} branch", pad=18.0)
+        axes.set_title(rf"{when}$\theta_2$ = {theta}°, {shown.branch_name} branch", pad=pad)
 
     return figure, move

@@ -122,13 +122,14 @@ def paths(view: View) -> list[tuple[Array, str, Any, str]]:
     sweep = view.sweep
     massive = view.scene.linkage.coupler.mass > 0.0
     middle = sweep.G3 if massive else 0.5 * (sweep.A + sweep.B)
-    found = (
+    found: list[tuple[Array, str, Any, str]] = [
         (sweep.A, BAR_COLOURS[2], (0, (1, 2)), "path of $A$"),
         (sweep.B, BAR_COLOURS[4], (0, (1, 2)), "path of $B$"),
         (middle, BAR_COLOURS[3], (0, (4, 1.5)), "coupler curve of " + ("$G_3$" if massive else "its mid-point")),
-    )
-    own = ((path, POINT, (0, (3, 1, 1, 1)), f"path of {name}") for name, path in sweep.points.items())
-    return [(np.where(sweep.assembled[:, None], path, np.nan), *look) for path, *look in (*found, *own)]
+    ]
+    found += [(path, POINT, (0, (3, 1, 1, 1)), f"path of {name}") for name, path in sweep.points.items()]
+    closes = sweep.assembled[:, None]
+    return [(np.where(closes, path, np.nan), colour, dashes, name) for path, colour, dashes, name in found]
 
 
 def _paths(axes: "Axes", view: View, labels: Labels, factor: float) -> None:
