@@ -20,6 +20,7 @@ long-test: setup
 	KILLS=50 $(BIN)/python -m pytest tests/test_suite.py tests/test_dask.py
 	PACKAGE=all $(BIN)/python -m pytest tests/test_package.py
 	MACHINES=all $(BIN)/python -m pytest tests/test_machines.py
+	$(BIN)/python -m pytest tests/test_further_engines.py
 	FREE_MOTIONS=30 $(BIN)/python -m pytest -n 2 tests/test_free_motion_reference.py
 	$(BIN)/python -m validation fuzz-files --count 100000
 	$(BIN)/python -m validation fuzz

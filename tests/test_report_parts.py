@@ -9,7 +9,7 @@ import pytest
 from tests.test_report import demo, report
 from validation.compare.rows import AGREES, FAILS, REFUSES, UNDECIDED, Row, write_results
 from validation.engines.hard_suite import HARD_WITNESSES, Hard
-from validation.engines.witnesses import WORK
+from validation.engines.witnesses import FURTHER, WORK
 from validation.report import cost_section as cost
 from validation.report.costs import cost_figure
 from validation.report.hard_section import found_in, section
@@ -65,7 +65,7 @@ def test_a_run_of_the_hard_suite_writes_its_page_and_its_part_of_the_report(
 
 
 def test_the_picture_of_costs_says_what_each_did_for_a_position() -> None:
-    assert set(WORK) == {"formulas", *(witness.name for witness in HARD_WITNESSES)}
+    assert set(WORK) == {"formulas", *(witness.name for witness in (*HARD_WITNESSES, *FURTHER))}
     summary, text = report([demo()])
     drawn = cost_figure([demo()])
     assert drawn is not None

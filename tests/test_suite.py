@@ -19,6 +19,7 @@ from tests.scenes import crank_rocker
 from validation.compare.answer import Answer
 from validation.compare.rows import FAILS, from_csv
 from validation.compare.tolerance import EQUIVALENCE
+from validation.engines import added
 from validation.engines.witnesses import Witness
 from validation.report.summary import SCENES_SHOWN, Summary
 from validation.run import pool
@@ -83,18 +84,19 @@ class Moody:
         return Answer("moody", "exact", refusal="declined")
 
 
-def judge_all(suite: object, out: Path, witnesses: tuple[Witness, ...] = EXACT, workers: int = 2) -> Summary:
-    *_, last = run(suite, out, witnesses, workers=workers)  # type: ignore[arg-type]
+def judge_all(
+    suite: object, out: Path, witnesses: tuple[Witness, ...] = EXACT, workers: int = 2, seconds: float | None = None
+) -> Summary:
+    *_, last = run(suite, out, witnesses, workers=workers, seconds=seconds)  # type: ignore[arg-type]
     assert isinstance(last, Summary)
     return last
 
 
 @pytest.mark.timeout(300)  # its hangs alone take half a minute, and every new worker imports the harness again
 def test_an_engine_that_crashes_or_hangs_costs_its_own_rows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(pool, "SECONDS_PER_SCENE", 8.0)
     monkeypatch.setattr(validation.run.run, "CHUNK", {True: 2, False: 2})
-    moody = Witness("moody", f"{__name__}:Moody", EQUIVALENCE)
-    judge_all(Few(), tmp_path / "run", (*EXACT, moody))
+    moody = added.named([f"{__name__}:Moody"], ())
+    judge_all(Few(), tmp_path / "run", (*EXACT, *moody), seconds=8.0)
     rows = from_csv(tmp_path / "run" / "results.csv")
     failing = {(row.scene, row.engine): row.reason for row in rows if row.verdict == FAILS}
     assert set(failing) == {("b", "moody"), ("c", "moody")}

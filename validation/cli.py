@@ -11,6 +11,7 @@ COMMANDS = {
     "run": "validation.run.run:command",
     "accept": "validation.regression.accept:accept_command",
     "compare": "validation.regression.accept:compare",
+    "history": "validation.regression.accept:history",
     "check": "validation.check:check",
     "fuzz-files": "validation.stress.mutants:fuzz_files",
     "models": "validation.studies.models:models",

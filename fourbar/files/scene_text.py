@@ -10,6 +10,7 @@ import numpy as np
 from fourbar.effects import Load
 from fourbar.errors import InputError
 from fourbar.files.effects import written
+from fourbar.files.fields import Writer
 from fourbar.linkage import BAR_NAMES, MOVING_BARS, Bar
 from fourbar.scene import Scene
 from fourbar.scene.motion import BRANCH_NAMES, FromLimit, Motion, Sweep
@@ -17,18 +18,6 @@ from fourbar.writing import write_text
 
 BRANCHES = {name: branch for branch, name in BRANCH_NAMES.items()}
 BARS = {BAR_NAMES[number]: number for number in MOVING_BARS}
-
-
-class Writer:
-    """Writes entries in SI and radians, every digit kept; effects are written through it too."""
-
-    def quantity(self, value: float, unit: str) -> str:
-        """A number with its unit."""
-        return f"{float(value)!r} {unit}"
-
-    def polar(self, magnitude: float, angle: float, unit: str) -> list[str]:
-        """A pair [magnitude, angle]."""
-        return [self.quantity(magnitude, unit), self.quantity(angle, "rad")]
 
 
 def save(scene: Scene, path: str | Path) -> None:

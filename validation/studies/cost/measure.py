@@ -16,8 +16,9 @@ from fourbar.scene import Scene, command
 from fourbar.scene.motion import Motion, Sweep
 from validation.engines.mujoco.trial import Rig
 from validation.scenes.random import LinkageType, random_scene
-from validation.studies.cost.advise import advise, judged
+from validation.studies.cost.advise import advise
 from validation.studies.cost.exhaustive import cheapest, relative_costs
+from validation.studies.cost.matters import judged
 
 TYPES = (
     *(LinkageType.CRANK_ROCKER, LinkageType.DRAG_LINK),
