@@ -13,7 +13,7 @@ from typing import Any
 
 from fourbar.errors import FourBarError, InputError
 from fourbar.scene import Scene
-from fourbar.show.under_way import under_way
+from fourbar.show.progress import running
 from fourbar.solve import solve
 from fourbar.writing import write_text
 from validation.check.causes import Cause, causes
@@ -122,7 +122,7 @@ def _guarded(
 
     from pebble import ProcessExpired, ProcessPool
 
-    waiting = under_way(f"MuJoCo examines the file, in {SECONDS:g} s at most")
+    waiting = running(f"MuJoCo examines the file, in {SECONDS:g} s at most")
     with waiting, ProcessPool(max_workers=1, context=get_context("spawn"), initializer=_confine) as pool:
         future = pool.schedule(_examine, args=(examine or EXAMINE, scene, text, dict(names), *more), timeout=SECONDS)
         try:

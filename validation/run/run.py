@@ -152,7 +152,9 @@ def examine(scenes: tuple[Path, ...], mjcf: Path, names: tuple[str, ...], out: P
 
 @click.command(name="run")
 @click.argument("scenes", nargs=-1, type=click.Path(path_type=Path))
-@click.option("--out", type=click.Path(path_type=Path, file_okay=False), default=Path("results"), show_default=True)
+@click.option(
+    "-o", "--out", type=click.Path(path_type=Path, file_okay=False), default=Path("results"), show_default=True
+)
 @click.option("--engines", metavar="NAMES", help="Comma-separated witnesses; left out: all.")
 @click.option(
     "--error",

@@ -183,7 +183,11 @@ class _Search:
 @click.command(name="advise")
 @click.argument("scenes", nargs=-1, required=True, type=click.Path(path_type=Path, dir_okay=False))
 @click.option("--error", "wanted", type=float, required=True, help="Relative error of torque and pin forces.")
-@click.option("-o", "--output", type=click.Path(path_type=Path, dir_okay=False), help="Write the MJCF of one SCENE.")
+@click.option(
+    *("-o", "--out", "--output", "output"),
+    type=click.Path(path_type=Path, dir_okay=False),
+    help="Write the MJCF of one SCENE.",
+)
 def command(scenes: tuple[Path, ...], wanted: float, output: Path | None) -> int:
     """The cheapest MuJoCo settings that keep SCENES within an error; exit 1 where none is found for one of them.
 

@@ -30,7 +30,7 @@ ORDERS = "Errors are the worst over the scene's positions, each on its scale, ag
 @click.command(name="cost")
 @click.argument("scenes", nargs=-1, type=click.Path(path_type=Path))
 @click.option(
-    "--out", type=click.Path(path_type=Path, file_okay=False), default=Path("results/cost"), show_default=True
+    "-o", "--out", type=click.Path(path_type=Path, file_okay=False), default=Path("results/cost"), show_default=True
 )
 @click.option("--effects", is_flag=True, help="Count instead what each effect costs in each engine (`effects-cost`).")
 def cost(scenes: tuple[Path, ...], out: Path, effects: bool) -> int:
