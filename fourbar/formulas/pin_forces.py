@@ -17,7 +17,7 @@ from fourbar.formulas.position import Loop, Number, Position, anywhere, vector
 
 
 class Body(NamedTuple):
-    """Mass (kg), moment of inertia about G (kg m^2), and G from the first pin in the bar's frame, along + i across (m)."""
+    """Mass, kg; moment of inertia about G, kg m^2; G from the first pin in the bar's frame, along + i across, m."""
 
     m: Number
     I: Number  # noqa: E741 - the literature's letter

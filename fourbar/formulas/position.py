@@ -17,10 +17,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 Number = Any
-"""A float, or an array that broadcasts with the others over positions and linkages."""
+"""A float, or an array that broadcasts over positions and linkages."""
 HAIR = 1e-100
-"""Added to the size of tan h, where zero alone feels it: with A on O4 bars 3, 4 get the directions to which they tend
-from theta_2 > theta_1, and so near to it that e^2 leaves the range of doubles those of their own side."""
+"""Added to the size of tan h: with A on O4 bars 3, 4 get the directions to which they tend from theta_2 > theta_1."""
 
 
 class Loop(NamedTuple):

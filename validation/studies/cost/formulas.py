@@ -47,6 +47,7 @@ def double(scene: Scene, at: Command) -> Quantities:
 def single(scene: Scene, at: Command) -> Quantities:
     """The same formulas on float32 arrays."""
     case = Case.of(scene)
+    case = case._replace(lengths=type(case.lengths)(*map(float, case.lengths)))  # NumPy's doubles would prevail
     with np.errstate(all="ignore"):
         theta_2 = at.theta_2.astype(np.float32)
         half = half_angle(case.lengths, theta_2 - scene.linkage.ground_angle)
