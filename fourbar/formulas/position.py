@@ -73,6 +73,11 @@ def anywhere(mask: Number) -> bool:
     return bool(mask.any()) if isinstance(mask, np.ndarray) else bool(mask)
 
 
+def select(mask: Number, x: Number, y: Number) -> Number:
+    """x where a mask holds, y elsewhere; for a plain one the number itself."""
+    return np.where(mask, x, y) if isinstance(mask, np.ndarray) else (x if mask else y)
+
+
 def two_sum(x: Number, y: Number) -> tuple[Number, Number]:
     """x + y = s + r exactly, s the rounded sum.
 
@@ -113,8 +118,12 @@ def vector(x: Number, y: Number) -> Number:
 
 
 def direction(theta: Number) -> Number:
-    """e^{i theta} from one tangent: ((1 - t^2) + 2 i t)/(1 + t^2), t = tan(theta/2)."""
-    t = np.tan(0.5 * theta)
+    """e^{i theta} from one tangent."""
+    return direction_of_tangent(np.tan(0.5 * theta))
+
+
+def direction_of_tangent(t: Number) -> Number:
+    """e^{i theta} = ((1 - t^2) + 2 i t)/(1 + t^2), t = tan(theta/2)."""
     kk = 1.0 / (1.0 + t * t)
     return vector((1.0 - t * t) * kk, 2.0 * t * kk)
 
@@ -125,11 +134,15 @@ def polar(r: Number, phi: Number) -> Number:
 
 
 def half_angle(lengths: Loop, psi: Number) -> HalfAngle:
-    """The half angle h of psi = theta_2 - theta_1 (rad) by its tangent, and the factors of Heron's formula."""
-    t = np.tan(0.5 * psi)
+    """The half angle h of psi = theta_2 - theta_1 (rad), and the factors of Heron's formula."""
+    return half_angle_of_tangent(lengths, np.tan(0.5 * psi))
+
+
+def half_angle_of_tangent(lengths: Loop, t: Number) -> HalfAngle:
+    """The same of t = tan h."""
     meets = lengths.E2 == 0.0
     if anywhere(meets):
-        t = np.where(meets, t + np.copysign(HAIR, t), t)
+        t = select(meets, t + np.copysign(HAIR, t), t)
     kk = 1.0 / (1.0 + t * t)
     sk = t * kk
     ss = t * sk
@@ -138,8 +151,8 @@ def half_angle(lengths: Loop, psi: Number) -> HalfAngle:
     short = four_ad > four_bc
     if anywhere(short):  # outer + inner = 4 b c: of the two, the one that changes less over psi has the digits
         outer, inner = (
-            np.where(short & (ss < kk), four_bc - inner, outer),
-            np.where(short & (kk <= ss), four_bc - outer, inner),
+            select(short & (ss < kk), four_bc - inner, outer),
+            select(short & (kk <= ss), four_bc - outer, inner),
         )
     return HalfAngle(ss, kk, sk, outer, inner)
 
