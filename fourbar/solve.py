@@ -32,6 +32,7 @@ from fourbar.quantities import (
     SINGULAR,
     STAGE_OF,
     STAGES,
+    UNKNOWNS,
     WOUND,
 )
 from fourbar.scene import Command, Scene, command
@@ -121,7 +122,7 @@ def solve(
         if alone and not quick:
             code[0], result = _of_one(case, found)
         else:
-            keep(case, found, result, code, part)
+            keep(case, found, result, code, part, seen=quick)
 
     each(evaluate, parts, at_once=quick)
     for name in ANGLES:
@@ -146,8 +147,15 @@ def is_compiled(case: Case, wanted: int, count: int, compiled: bool | None) -> b
     return carries(case)
 
 
+def threads() -> int:
+    """As many as this process may use cores, or as OMP_NUM_THREADS states."""
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    stated = os.environ.get("OMP_NUM_THREADS", "")
+    return min(cores, int(stated)) if stated.isdecimal() and int(stated) else cores
+
+
 def each(evaluate: Callable[[Any], None], parts: Iterable[Any], *, at_once: bool) -> None:
-    """Evaluate the parts, one after the other or on all cores: who is compiled holds no lock of the interpreter."""
+    """Evaluate the parts, one after the other or on all cores: compiled code holds no lock of the interpreter."""
 
     def quietly(part: Any) -> None:
         with np.errstate(all="ignore"):  # which each thread has of its own
@@ -158,8 +166,7 @@ def each(evaluate: Callable[[Any], None], parts: Iterable[Any], *, at_once: bool
         quietly(part)
         if at_once:
             break
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    rest = list(parts) if at_once else []
+    rest, cores = list(parts) if at_once else [], threads()
     if cores == 1 or len(rest) < PARTS_FOR_THREADS:
         for part in rest:
             quietly(part)
@@ -254,15 +261,19 @@ def keep(
     code: NDArray[np.uint8],
     part: Part,
     shape: tuple[int, ...] | None = None,
+    *,
+    seen: bool = False,
 ) -> None:
     """Write what was evaluated into the arrays of all positions, where it is no number with the status that says so.
 
     Parameters
     ----------
+    seen : whether what is no number has its status already.
     shape : of the part of the arrays; None: that of what was evaluated.
     """
     codes, values, _ = found
-    withheld(case, found)
+    if not seen:
+        withheld(case, found)
     code[part] = codes if shape is None else codes.reshape(shape)
     for name, value in values.items():
         if shape is not None and np.ndim(value):
@@ -388,6 +399,9 @@ def evaluated(case: Case, where: Command, part: Part, wanted: int, names: Collec
             whole = np.array(np.broadcast_to(values[name], theta_2.shape))
             whole[index] = value
             values[name] = whole
+    elif all_finite({name: value for name, value in values.items() if name not in UNKNOWNS}):  # the loop saw to these
+        return codes, values, None
+    withheld(case, (codes, values, None))
     return codes, values, None
 
 

@@ -5,6 +5,7 @@ bar. Positions that it leaves open (those that need many digits, singular, not a
 are evaluated by NumPy, as is every scene with other effects or with two pairs of equal bars.
 """
 
+import threading
 import zlib
 from functools import cache
 from importlib.util import find_spec
@@ -123,8 +124,8 @@ def numbers(case: Case, theta_2: Array, branch: Any, omega_2: Any, alpha_2: Any)
     lost = two_sum(theta_2, -theta_1)[1] if anywhere(theta_1 != 0.0) else 0.0
     found = [*case.path.lengths, *case.lengths[:4], u1.real, u1.imag, omega_2, alpha_2, branch, lost]
     found += [*of_bodies, *of_pins.values(), *of_loads]
-    if max(map(np.size, found)) == 1:
-        return tuple(map(float, found))
+    if not any(isinstance(number, np.ndarray) and number.size > 1 for number in found):
+        return tuple(float(np.ravel(number)[0]) for number in found)
     rows = np.empty((ROWS, np.size(theta_2)))
     for row, number in zip(rows, found, strict=True):
         row[:] = number
@@ -284,14 +285,14 @@ def run(
     Parameters
     ----------
     tangents : tan of half theta_2 - theta_1, (n,).
-    of_theta_2 : tan of half theta_2, (n,); (1,) where no ground is turned.
+    of_theta_2 : tan of half theta_2, (n,); empty where no ground is turned.
     rows : as of `numbers`.
     signs : (evaluations, numbers); None where no error bars are wanted.
     vectors : u2, u3, u4 and the pin forces, complex, (7, n), written.
     scalars : sin mu, omega_3, omega_4, alpha_3, alpha_4, torque, sine of the drive, error bars, (9, n), written.
     left : whether a position is left to NumPy, (n,), written.
     """
-    turns = len(of_theta_2) > 1
+    turns = len(of_theta_2) > 0
     changes = np.empty((5, EVALUATIONS))
     for i in range(len(tangents)):
         in_unit = Loop(
@@ -379,8 +380,19 @@ def loop(on_disk: bool = True) -> Any:
         return loop(False)
 
 
+SPACE = threading.local()
+"""Of each thread, what the loop writes of a block: fresh pages for each would cost a tenth of the time."""
+
+
+def space(numbers: int) -> Array:
+    """So many numbers to write into, the same memory each time."""
+    if getattr(SPACE, "numbers", np.empty(0)).size < numbers:
+        SPACE.numbers = np.empty(numbers)
+    return SPACE.numbers[:numbers]  # type: ignore[no-any-return]
+
+
 class Found(NamedTuple):
-    """What the loop writes, for n positions."""
+    """What the loop writes, for n positions; the next call of the same thread writes over it."""
 
     vectors: NDArray[np.complex128]
     scalars: Array
@@ -390,9 +402,11 @@ class Found(NamedTuple):
 def evaluate(case: Case, theta_2: Array, branch: Any, omega_2: Any, alpha_2: Any, *, error_bars: bool) -> Found:
     """Some positions of a case that the loop carries; for the parameters see `run`."""
     n, theta_1 = len(theta_2), case.path.theta_1
-    of_theta_2 = np.tan(0.5 * theta_2) if anywhere(theta_1 != 0.0) else np.zeros(1)
+    of_theta_2 = np.tan(0.5 * theta_2) if anywhere(theta_1 != 0.0) else np.empty(0)
     rows = numbers(case, theta_2, branch, omega_2, alpha_2)
-    found = Found(np.empty((7, n), dtype=complex), np.empty((9, n)), np.empty(n, dtype=bool))
+    written = space(23 * n)
+    vectors, scalars = written[: 14 * n].view(complex).reshape(7, n), written[14 * n :].reshape(9, n)
+    found = Found(vectors, scalars, np.empty(n, dtype=bool))
     given = np.tan(0.5 * (theta_2 - theta_1)), of_theta_2, rows, case.drive_bar, signs() if error_bars else None
     try:
         loop()(*given, *found)
