@@ -91,7 +91,8 @@ class _Reading:
 
     def __init__(self, linkage: FourBar, bar: int, sign: float = 1.0) -> None:
         found = path(loop(*linkage.lengths), linkage.ground_angle, bar)
-        self.path = found._replace(lengths=_plain(_meeting(found.lengths)), u1=complex(found.u1))
+        own = {"lengths": _plain(_meeting(found.lengths)), "u1": complex(found.u1), "unit": float(found.unit)}
+        self.path = found._replace(**own)
         self.bar, self.sign = bar, sign
         self.changes = 0.0 in (self.path.lengths.E1, self.path.lengths.E2)
         self.last: tuple[tuple[float, float], tuple[Position, Coefficients]] | None = None

@@ -66,7 +66,9 @@ class Path(NamedTuple):
         if isinstance(turned, np.ndarray):  # of linkages
             u2 = np.where(turned, direction(q), u2)
         at = close_loop(self.lengths, self.u1, u2, half, branch)
-        return parallel_position(at, *parallel_pairs(self.lengths, half, branch)) if self.may_stay_parallel else at
+        if self.may_stay_parallel:
+            at = parallel_position(at, *parallel_pairs(self.lengths, half, branch))
+        return at._replace(diagonal=at.diagonal * self.unit)
 
     def angles(self, half: HalfAngle, branch: Number) -> tuple[Number, Number, Number]:
         """theta_3, theta_4 and the root alone, the arguments of what `close_loop` divides by lengths, in (-pi, pi].
@@ -147,8 +149,8 @@ def _turned_round(reading: Path, at: Position) -> Position:
     d, c, b, a, _, _ = reading.lengths
     u1, u2, u3, u4 = -at.u1, at.u4, -at.u3, at.u2
     diagonal = d * u1 - a * u2
-    sine, foot = cross(u3, u4), dot(diagonal, u3) / b
-    return Position(u1, u2, u3, u4, sine, diagonal, dot(diagonal, diagonal), foot, 2.0 * b * c * sine, at.half)
+    sine, e2 = cross(u3, u4), dot(diagonal, diagonal)
+    return Position(u1, u2, u3, u4, sine, diagonal * reading.unit, e2, 2.0 * b * c * sine, at.half)
 
 
 def read_backwards(k: Coefficients) -> Coefficients:

@@ -18,10 +18,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 Number = Any
-"""A float, or an array that broadcasts with the others over positions and linkages."""
+"""A float, or an array that broadcasts over positions and linkages."""
 HAIR = 1e-100
-"""Added to the size of tan h, where zero alone feels it: with A on O4 bars 3, 4 get the directions to which they tend
-from theta_2 > theta_1, and so near to it that e^2 leaves the range of doubles those of their own side."""
+"""Added to the size of tan h: with A on O4 bars 3, 4 get the directions to which they tend from theta_2 > theta_1."""
 
 
 class Loop(NamedTuple):
@@ -48,22 +47,16 @@ class HalfAngle(NamedTuple):
 class Position(NamedTuple):
     """Directions of the bars as complex numbers, and the triangle A, B, O4."""
 
-    u1: Number
-    """e^{i theta_1}, from O2 to O4."""
-    u2: Number
-    """From O2 to A."""
-    u3: Number
-    """From A to B."""
-    u4: Number
-    """From O4 to B."""
+    u1: Number  # e^{i theta_1}, from O2 to O4
+    u2: Number  # from O2 to A
+    u3: Number  # from A to B
+    u4: Number  # from O4 to B
     sin_mu: Number
     """sin(theta_4 - theta_3), signed like the branch."""
     diagonal: Number
-    """From A to O4, complex, in the unit of the lengths that the loop was closed with."""
+    """From A to O4, complex, m."""
     e2: Number
-    """Its square e^2."""
-    foot: Number
-    """Of the perpendicular from O4 on the coupler: its distance from A over b."""
+    """Its square e^2, like the root in the unit of the lengths that the loop was closed with."""
     root: Number
     """sigma sqrt(outer inner); NaN where the loop does not close."""
     half: HalfAngle
@@ -185,7 +178,7 @@ def close_loop(lengths: Loop, u1: Number, u2: Number, half: HalfAngle, branch: N
     to_3, to_4 = 0.5 / (b * e2), 0.5 / (c * e2)
     u3 = diagonal * vector(at_A * to_3, root * to_3)
     u4 = diagonal * vector(at_O4 * to_4, root * to_4)
-    return Position(u1, u2, u3, u4, root * (0.5 / (b * c)), diagonal, e2, at_A * (0.5 / (b * b)), root, half)
+    return Position(u1, u2, u3, u4, root * (0.5 / (b * c)), diagonal, e2, root, half)
 
 
 def parallel_pairs(lengths: Loop, half: HalfAngle, branch: Number) -> tuple[Number, Number]:
