@@ -376,7 +376,7 @@ def evaluated(case: Case, where: Command, part: Part, wanted: int, names: Collec
     found = compiled.evaluate(case, theta_2, branch, omega_2, alpha_2, error_bars=wanted == ERROR)
     u2, u3, u4, *pins = found.vectors
     sin_mu, omega_3, omega_4, alpha_3, alpha_4, torque, sine, *errors = found.scalars
-    at = Position(polar(1.0, case.path.theta_1), u2, u3, u4, sin_mu, np.nan, np.nan, np.nan, np.nan, NO_HALF_ANGLE)
+    at = Position(polar(1.0, case.path.theta_1), u2, u3, u4, sin_mu, np.nan, np.nan, np.nan, NO_HALF_ANGLE)
     moving = Rates(omega_2, omega_3, omega_4, alpha_2, alpha_3, alpha_4)
     state = State(case.lengths, case.path.theta_1, theta_2, at, NO_MOTION, omega_2, moving)
     values = kinematics(case, state, names)

@@ -9,12 +9,13 @@ import pytest
 from tests.test_report import demo, report
 from validation.compare.rows import AGREES, FAILS, REFUSES, UNDECIDED, Row, write_results
 from validation.engines.hard_suite import HARD_WITNESSES, Hard
-from validation.engines.witnesses import WORK
+from validation.engines.witnesses import FURTHER, WORK
 from validation.report import cost_section as cost
 from validation.report.costs import cost_figure
 from validation.report.hard_section import found_in, section
 from validation.report.html import html
 from validation.report.summary import summarise
+from validation.report.templating import count_or_size
 from validation.run.run import sections
 from validation.scenes.hard_families import FAMILIES
 
@@ -64,7 +65,7 @@ def test_a_run_of_the_hard_suite_writes_its_page_and_its_part_of_the_report(
 
 
 def test_the_picture_of_costs_says_what_each_did_for_a_position() -> None:
-    assert set(WORK) == {"formulas", *(witness.name for witness in HARD_WITNESSES)}
+    assert set(WORK) == {"formulas", *(witness.name for witness in (*HARD_WITNESSES, *FURTHER))}
     summary, text = report([demo()])
     drawn = cost_figure([demo()])
     assert drawn is not None
@@ -92,3 +93,10 @@ def test_a_study_of_cost_next_to_the_report_is_part_of_it(tmp_path: Path) -> Non
     # an image runs no script; what is too large stays outside
     assert text.count('<figure class="part">') == 1 and f'src="data:image/svg+xml;base64,{data}"' in text
     assert text.index('id="cost"') < text.index("The study of demo")
+
+
+@pytest.mark.parametrize(
+    ("value", "text"), [(628.0, "628"), (0.0, "0"), (0.125, "0.125"), (3.1e-9, "3.10e-09"), (1.5e7, "1.50e+07")]
+)
+def test_what_is_counted_is_written_for_people(value: float, text: str) -> None:
+    assert count_or_size(value) == text

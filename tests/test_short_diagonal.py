@@ -7,6 +7,7 @@ from mpmath import mpf
 
 from fourbar.formulas.motion import State, coefficients, rates, with_parallel_pairs
 from fourbar.formulas.path import path, state
+from fourbar.formulas.pin_forces import Wrenches, cross, dot, pin_forces
 from fourbar.formulas.position import close_loop, direction, half_angle, loop, parallel_pairs
 from fourbar.formulas.transmission import drive_sine
 from fourbar.linkage import uniform
@@ -100,3 +101,14 @@ def test_a_point_moves_by_either_angle_alike() -> None:
         z = 0.07 + 0.03j
         chain = by_4.point_coefficient(bar, z) * by_2.k.h4
         assert np.allclose(by_2.point_coefficient(bar, z), chain, rtol=0.0, atol=64 * FEW_ROUNDINGS)
+
+
+@pytest.mark.parametrize(("ground", "taken"), [(0.01, True), (1.1, False)])
+def test_a_short_ground_takes_the_moment_of_the_force_at_A_from_virtual_work(ground: float, taken: bool) -> None:
+    s = state(uniform(ground, 1.0, 1.2, 1.1), np.array([0.4, 1.0, 4.0]), 1)
+    wrenches = Wrenches(1.0 + 2.0j, -0.5j, 0.3 + 0.1j, 0.7, -0.4, 0.2)
+    forces = [pin_forces(s.lengths, s.at, 2, s.at.sin_mu, wrenches, 0.2j, moment).F32 for moment in (0.3, -0.5)]
+    along = [dot(s.at.u2, F32) for F32 in forces]
+    assert np.allclose(*along, rtol=0.0, atol=64 * FEW_ROUNDINGS * np.max(np.abs(forces)))
+    for F32, moment in zip(forces, (0.3, -0.5), strict=True):
+        assert np.allclose(cross(s.at.u2, F32), moment, rtol=0.0, atol=FEW_ROUNDINGS * np.max(np.abs(F32))) is taken

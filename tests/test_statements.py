@@ -11,11 +11,16 @@ import fourbar
 import validation.compare.statements.transmission
 from fourbar.formulas import mobility, transmission
 from fourbar.linkage import uniform
-from fourbar.scene import Scene, command
-from validation.compare.rows import Row
+from fourbar.scene import Command, Scene, command
+from tests.scenes import crank_rocker
+from validation import Answer
+from validation.compare.rows import REFUSES, Row
 from validation.compare.statements.statements import statements
+from validation.compare.tolerance import EQUIVALENCE
 from validation.engines.mujoco.inverse import MujocoInverse
 from validation.engines.pinocchio import PinocchioInverse
+from validation.engines.witnesses import Witness
+from validation.run.judge import judge
 from validation.scenes.random import LinkageType, random_scene
 
 ROCKER, TRIPLE, CHANGE = (0.3, 0.1, 0.25, 0.22), (0.22, 0.2, 0.32, 0.18), (0.3, 0.1, 0.3, 0.1)
@@ -168,3 +173,19 @@ def test_an_engine_that_does_not_answer_agrees_with_nothing(monkeypatch: pytest.
     for lengths in (ROCKER, TRIPLE):
         assert not judged(lengths)["limit_positions"].passed
         assert not judged(lengths)["transmission"].passed
+
+
+class Shy(PinocchioInverse):
+    """Refuses whatever is not the scene of the test: the positions of the statements."""
+
+    name = "shy"
+
+    def answer(self, scene: Scene, at: Command) -> Answer:
+        return super().answer(scene, at) if scene.title else Answer("shy", "exact", refusal="too near a limit")
+
+
+def test_an_engine_that_refuses_the_positions_of_the_statements_refuses_them_in_a_row() -> None:
+    rows = judge("scene", crank_rocker(), [Witness("shy", f"{__name__}:Shy", EQUIVALENCE)]).rows
+    (row,) = (row for row in rows if row.setting == "statements of the linkage")
+    assert (row.verdict, row.reason) == (REFUSES, "too near a limit")
+    assert not any(row.failed for row in rows)

@@ -8,12 +8,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from fourbar import effects as kinds
 from fourbar.errors import InputError
-from fourbar.files.fields import Reader
+from fourbar.files.fields import Reader, Writer
 from fourbar.linkage import PINS
 
 if TYPE_CHECKING:
     from fourbar.effects import Effect, Flywheel, Friction, Gravity, PinFriction, Point, Springs, Torsion, Viscous
-    from fourbar.files.scene_text import Writer
 
 TORSION = {"stiffness": "N m/rad", "rest": "rad", "preload": "N m"}
 SPRING = {"stiffness": "N/m", "length": "m", "preload": "N"}
@@ -24,7 +23,7 @@ def _read_gravity(value: object, read: Reader) -> "Gravity":
     return kinds.Gravity(*read.polar("effects.gravity", value, "m/s^2"))
 
 
-def _write_gravity(effect: "Gravity", write: "Writer") -> Any:
+def _write_gravity(effect: "Gravity", write: Writer) -> Any:
     return write.polar(effect.magnitude, effect.angle, "m/s^2")
 
 
@@ -32,7 +31,7 @@ def _read_viscous(value: object, read: Reader) -> "Viscous":
     return kinds.Viscous.at(**read.per_pin("effects.viscous", value, "N m s/rad"))
 
 
-def _write_viscous(effect: "Viscous", write: "Writer") -> Any:
+def _write_viscous(effect: "Viscous", write: Writer) -> Any:
     return {pin: write.quantity(value, "N m s/rad") for pin, value in effect.coefficients}
 
 
@@ -40,7 +39,7 @@ def _read_friction(value: object, read: Reader) -> "Friction":
     return kinds.Friction.at(**read.per_pin("effects.friction", value, "N m"))
 
 
-def _write_friction(effect: "Friction", write: "Writer") -> Any:
+def _write_friction(effect: "Friction", write: Writer) -> Any:
     return {pin: write.quantity(value, "N m") for pin, value in effect.torques}
 
 
@@ -54,7 +53,7 @@ def _read_pin_friction(value: object, read: Reader) -> "PinFriction":
     return kinds.PinFriction.at(**pins)
 
 
-def _write_pin_friction(effect: "PinFriction", write: "Writer") -> Any:
+def _write_pin_friction(effect: "PinFriction", write: Writer) -> Any:
     return {pin: {"coefficient": mu, "radius": write.quantity(r, "m")} for pin, mu, r in effect.pins}
 
 
@@ -72,7 +71,7 @@ def _read_torsion(value: object, read: Reader) -> "Torsion":
     return kinds.Torsion.at(**springs)
 
 
-def _write_torsion(effect: "Torsion", write: "Writer") -> Any:
+def _write_torsion(effect: "Torsion", write: Writer) -> Any:
     return {
         pin: {name: write.quantity(x, TORSION[name]) for name, x in zip(TORSION, numbers, strict=True)}
         for pin, *numbers in effect.springs
@@ -101,7 +100,7 @@ def _read_point(read: Reader, key: str, value: object) -> "Point":
     return kinds.Point(bar, *(read.polar(f"{key}.at", entry["at"], "m") if "at" in entry else (0.0, 0.0)))
 
 
-def _write_springs(effect: "Springs", write: "Writer") -> Any:
+def _write_springs(effect: "Springs", write: Writer) -> Any:
     rows = []
     for spring in effect.springs:
         ends = zip(("from", "to"), (spring.start, spring.end), strict=True)
@@ -121,7 +120,7 @@ def _read_flywheel(value: object, read: Reader) -> "Flywheel":
     return kinds.Flywheel(inertia, read.whole(f"{key}.bar", entry.get("bar", 2), 2, 4))
 
 
-def _write_flywheel(effect: "Flywheel", write: "Writer") -> Any:
+def _write_flywheel(effect: "Flywheel", write: Writer) -> Any:
     return {"bar": effect.bar, "inertia": write.quantity(effect.inertia, "kg m^2")}
 
 
@@ -130,7 +129,7 @@ class Entry(NamedTuple):
 
     read: Callable[[object, Reader], "Effect"]
     """From the value under its key."""
-    write: Callable[[Any, "Writer"], Any]
+    write: Callable[[Any, Writer], Any]
     """Back to that value."""
     example: str
     """One line of a scene file."""
@@ -159,7 +158,7 @@ REGISTRY: dict[str, Entry] = {
 """By the key under ``[effects]``, in the order in which they are listed; a new one is added here."""
 
 
-def written(effect: "Effect", write: "Writer") -> Any:
+def written(effect: "Effect", write: Writer) -> Any:
     """The value of an effect under its key; InputError where a scene file has no form of it."""
     if effect.key not in REGISTRY:
         raise InputError(f"effects.{effect.key}", type(effect).__name__, "a scene file has no form of this effect")

@@ -102,6 +102,18 @@ class Reader:
         return {pin: self.quantity(f"{key}.{pin}", entry, unit, at_least_zero=True) for pin, entry in pins.items()}
 
 
+class Writer:
+    """Writes entries in SI and radians, every digit kept; effects are written through it too."""
+
+    def quantity(self, value: float, unit: str) -> str:
+        """A number with its unit."""
+        return f"{float(value)!r} {unit}"
+
+    def polar(self, magnitude: float, angle: float, unit: str) -> list[str]:
+        """A pair [magnitude, angle]."""
+        return [self.quantity(magnitude, unit), self.quantity(angle, "rad")]
+
+
 def _joined(key: str, name: str) -> str:
     """The dotted key; a name that is not a plain word is quoted, so that it stays on one line."""
     if not BARE_KEY.fullmatch(name):

@@ -10,6 +10,7 @@ import numpy as np
 from fourbar.effects import Load
 from fourbar.errors import InputError
 from fourbar.files.effects import written
+from fourbar.files.fields import Writer
 from fourbar.linkage import BAR_NAMES, MOVING_BARS, Bar
 from fourbar.scene import Scene
 from fourbar.scene.motion import BRANCH_NAMES, FromLimit, Motion, Sweep
@@ -17,18 +18,6 @@ from fourbar.writing import write_text
 
 BRANCHES = {name: branch for branch, name in BRANCH_NAMES.items()}
 BARS = {BAR_NAMES[number]: number for number in MOVING_BARS}
-
-
-class Writer:
-    """Writes entries in SI and radians, every digit kept; effects are written through it too."""
-
-    def quantity(self, value: float, unit: str) -> str:
-        """A number with its unit."""
-        return f"{float(value)!r} {unit}"
-
-    def polar(self, magnitude: float, angle: float, unit: str) -> list[str]:
-        """A pair [magnitude, angle]."""
-        return [self.quantity(magnitude, unit), self.quantity(angle, "rad")]
 
 
 def save(scene: Scene, path: str | Path) -> None:
@@ -83,16 +72,16 @@ def dump(scene: Scene) -> str:
 
 def _motion_entry(write: Writer, motion: Motion) -> dict[str, Any]:
     entry: dict[str, Any] = {}
-    asked = motion.theta_2
-    if isinstance(asked, Sweep):
-        ends = {"from": write.quantity(asked.start, "rad"), "to": write.quantity(asked.stop, "rad")}
-        entry["theta_2"] = {**ends, "steps": asked.steps}
-    elif isinstance(asked, FromLimit):
-        entry["theta_2"] = {"limit": asked.limit, "offset": write.quantity(asked.offset, "rad")}
-    elif isinstance(asked, np.ndarray):
-        entry["theta_2"] = [write.quantity(angle, "rad") for angle in asked.tolist()]
-    elif asked is not None:
-        entry["theta_2"] = write.quantity(asked, "rad")
+    wanted = motion.theta_2
+    if isinstance(wanted, Sweep):
+        ends = {"from": write.quantity(wanted.start, "rad"), "to": write.quantity(wanted.stop, "rad")}
+        entry["theta_2"] = {**ends, "steps": wanted.steps}
+    elif isinstance(wanted, FromLimit):
+        entry["theta_2"] = {"limit": wanted.limit, "offset": write.quantity(wanted.offset, "rad")}
+    elif isinstance(wanted, np.ndarray):
+        entry["theta_2"] = [write.quantity(angle, "rad") for angle in wanted.tolist()]
+    elif wanted is not None:
+        entry["theta_2"] = write.quantity(wanted, "rad")
     if motion.omega_2 is not None:
         entry["omega_2"] = write.quantity(motion.omega_2, "rad/s")
     if motion.law is None:

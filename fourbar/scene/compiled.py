@@ -30,6 +30,7 @@ from fourbar.formulas.position import (
     half_angle_of_tangent,
     polar,
     select,
+    square_root,
     two_sum,
     vector,
 )
@@ -199,7 +200,7 @@ def forces(
         body_of(rows, i, 4, turned, signs),
     )
     bodies = (two, three, four)
-    w, at_A = inertia_wrenches(a, bodies, at, moving)
+    w, mass_at_A = inertia_wrenches(a, bodies, at, moving)
     of_input, of_others = inertia(a, bodies, at, k)
     slope = half_slope(a, bodies, at, k) * (speed * speed)
     others = slope + of_others * acceleration
@@ -218,11 +219,12 @@ def forces(
         complex_rounded(w.R3, turned, signs, 44) + P3,
         complex_rounded(w.R4, turned, signs, 46) + P4,
         real_rounded(w.M2, signs, 48) + N2 + of_O2 - of_A,
-        real_rounded(w.M3, signs, 49) + N3 + of_A - of_B,
-        real_rounded(w.M4, signs, 50) + N4 + of_B + of_O4,
+        real_rounded(w.M3, signs, 49) + N3 + of_A,
+        real_rounded(w.M4, signs, 50) + N4 + of_O4,
+        of_B,
     )
-    at_A = complex_rounded(at_A, turned, signs, 51)
-    pins = pin_forces_of(lengths, at, drive_bar, sine, w, at_A, Q + of_A * k.h3 - others)
+    mass_at_A = vector(real_rounded(mass_at_A.real, signs, 51), real_rounded(mass_at_A.imag, signs, 52))
+    pins = pin_forces_of(lengths, at, drive_bar, sine, w, mass_at_A, Q + of_A * k.h3 - others)
     return pins, driving_torque(k, drive_bar, inertial, Q + of_A * slip_A + (N2 + of_O2) * k.h2), sine
 
 
@@ -250,9 +252,8 @@ def nearby(
         rounded_complex(near.u3, turned, signs[21], signs[22]),
         rounded_complex(near.u4, turned, signs[23], signs[24]),
         rounded_real(near.sin_mu, signs[17]),
-        near.diagonal,
+        rounded_complex(near.diagonal * (lengths.d / d), turned, signs[18], signs[250]),
         near.e2,
-        rounded_real(near.foot, signs[18]),
         near.root,
         half,
     )
@@ -309,6 +310,8 @@ def run(
         size = 4.0 * in_unit.a * in_unit.d
         close = undecided(half.outer, in_unit.E1, size) or undecided(half.inner, in_unit.E2, size)
         at = close_loop(in_unit, u1, u2, half, number(rows, 14, i))
+        diagonal = at.diagonal * (lengths.d / in_unit.d)
+        at = Position(at.u1, at.u2, at.u3, at.u4, at.sin_mu, diagonal, at.e2, at.root, half)
         k = coefficients(in_unit, at)
         v = rates(k, number(rows, 12, i), number(rows, 13, i))
         pins, torque, sine = forces(lengths, in_unit, at, k, v, rows, i, drive_bar, turned, None)
@@ -360,6 +363,7 @@ def loop(on_disk: bool = True) -> Any:
 
     overload(anywhere)(lambda mask: lambda mask: bool(mask))  # noqa: PLW0108 - numba reads the names
     overload(select)(lambda mask, x, y: lambda mask, x, y: x if mask else y)
+    overload(square_root)(lambda x: lambda x: np.sqrt(x))  # noqa: PLW0108
     overload(vector)(lambda x, y: lambda x, y: complex(x, y))  # noqa: PLW0108
     of_one, of_each = (lambda rows, row, i: rows[row]), (lambda rows, row, i: rows[row, i])
     overload(number)(lambda rows, row, i: of_each if isinstance(rows, types.Array) else of_one)

@@ -77,7 +77,7 @@ def error_bars(
         bodies=(rounded_body(case.bodies[0]), rounded_body(case.bodies[1]), rounded_body(case.bodies[2])),
         terms=changed(case.terms, rounded),
     )
-    near = near._replace(sin_mu=rounded(near.sin_mu), foot=rounded(near.foot))
+    near = near._replace(sin_mu=rounded(near.sin_mu), diagonal=rounded(near.diagonal))
     near = near._replace(u2=rounded(near.u2), u3=rounded(near.u3), u4=rounded(near.u4))
     k = k if path.bar == 2 else read_backwards(k)
     k = rounded_coefficients(path.lengths, near, k, rounded.next(13))

@@ -3,19 +3,20 @@
 from dataclasses import dataclass, field, replace
 
 from fourbar.scene import Scene
-from validation.compare.tolerance import FULL_ACCURACY, SIMULATED
+from validation.compare.tolerance import EQUIVALENCE, FULL_ACCURACY
 from validation.engines.witnesses import WITNESSES, Witness
 from validation.scenes.hard_families import FAMILIES
 
 PREDICTION = "validation.engines.prediction:"
-PREDICTORS = {"pinocchio-inverse": "in_world_axes", "mujoco-inverse": "about_mass_centre"}
+WORLD_AXES = ("pinocchio-inverse", "drake-inverse", "exudyn-constraints", "opensim-constraints")
+PREDICTORS = {**dict.fromkeys(WORLD_AXES, "in_world_axes"), "mujoco-inverse": "about_mass_centre"}
 """How each exact engine measures lever arms; others work with the data as they are."""
 BALLS = Witness("ball-arithmetic", "validation.engines.exact:BallArithmetic", FULL_ACCURACY, library="flint")
 
 
 def predicting(witness: Witness) -> Witness:
     """The witness held to full accuracy, or else to the error predicted for each position."""
-    if witness.tolerance is SIMULATED:
+    if witness.tolerance not in (EQUIVALENCE, FULL_ACCURACY):
         return witness
     predictor = PREDICTION + PREDICTORS.get(witness.name, "from_data")
     return replace(witness, tolerance=FULL_ACCURACY, predictor=predictor)

@@ -52,26 +52,33 @@ ROUNDING = 16.0 * 2.0**-52
 """Gap, relative to the sum of the lengths, that the roundings of a chain of three bars alone can leave."""
 
 
-class Tree(effects.Tree, Protocol):
-    """An engine holding the open tree of a scene; it computes everything from q, v, a by itself."""
-
-    pin_loads: dict[str, float]
-    """Magnitudes of its own pin forces in the last pass, by pin, N."""
+class Bars(Protocol):
+    """An engine holding the bars of a scene, opened at pin A or B; every number is the engine's own."""
 
     def place(self, q: Sequence[float]) -> None:
         """Move to a configuration."""
 
     def gap(self) -> tuple[float, float]:
-        """B on bar 3 minus B on bar 4, m."""
+        """B on bar 3 minus B on bar 4, or A on bar 2 minus A on bar 3, m."""
 
     def jacobian(self) -> Array:
         """Derivative of the gap, (2, 3), m."""
 
-    def turn(self, bar: int) -> Array:
-        """Derivative of a bar's rotation, (3,)."""
+    def angle(self, bar: int) -> float:
+        """Direction of a bar's line, in (-pi, pi], rad."""
 
     def positions(self) -> dict[str, Array]:
-        """Points O4, A, B, G2, G3, G4 and "B4", the end of bar 4, (2,) each, m."""
+        """Points O4, A, B, G2, G3, G4, "B4", the end of bar 4, and where pin A is open "A2", that of bar 2; (2,), m."""
+
+
+class Tree(Bars, effects.Tree, Protocol):
+    """An engine holding the open tree of a scene; it computes everything from q, v, a by itself."""
+
+    pin_loads: dict[str, float]
+    """Magnitudes of its own pin forces in the last pass, by pin, N."""
+
+    def turn(self, bar: int) -> Array:
+        """Derivative of a bar's rotation, (3,)."""
 
     def drift(self, v: Array) -> Array:
         """Acceleration of the gap at speeds v where a = 0, (2,), m/s^2."""
@@ -89,7 +96,7 @@ class Tree(effects.Tree, Protocol):
 class Position:
     """Assembles a tree at commanded angles of bar 2, one after another."""
 
-    def __init__(self, tree: Tree) -> None:
+    def __init__(self, tree: Bars) -> None:
         self.tree = tree
         self.last: dict[int, tuple[float, float]] = {}
 
@@ -98,10 +105,11 @@ class Position:
         tree = self.tree
         tree.place((theta_2, 0.0, 0.0))
         at = tree.positions()
-        diagonal = at["O4"] - at["A"]
+        pin_a = at.get("A2", at["A"])
+        diagonal = at["O4"] - pin_a
         e = math.hypot(*diagonal)
         b, c = math.hypot(*(at["B"] - at["A"])), math.hypot(*(at["B4"] - at["O4"]))
-        closed = ROUNDING * (math.hypot(*at["A"]) + math.hypot(*at["O4"]) + b + c)
+        closed = ROUNDING * (math.hypot(*pin_a) + math.hypot(*at["O4"]) + b + c)
         # with bar 2 held, the gap is stationary only where bars 3 and 4 lie along the diagonal: this is its least value
         if max(e - (b + c), abs(b - c) - e) > closed:
             return None
@@ -134,7 +142,7 @@ def _triangle_angle(e: float, near: float, far: float) -> float:
     return 2.0 * math.atan2(math.sqrt(max(above, 0.0)), math.sqrt(max(below, 0.0)))
 
 
-def newton(tree: Tree, q: tuple[float, float, float], branch: int, closed: float) -> tuple[float, float, float] | None:
+def newton(tree: Bars, q: tuple[float, float, float], branch: int, closed: float) -> tuple[float, float, float] | None:
     """Close the gap with bar 2 held, never leaving the branch.
 
     The determinant of the gap's derivative by (q3, q4) is -b c sin(theta_4 - theta_3): its sign is the
@@ -169,33 +177,56 @@ def newton(tree: Tree, q: tuple[float, float, float], branch: int, closed: float
     return q if math.hypot(here[0], here[1]) <= closed else None
 
 
+Act = Callable[[float, float], dict[str, Array | float]]
+"""omega_2, alpha_2: motion and forces where the bars are placed, by name; empty where a toggle leaves them 0/0."""
+
+
 def answer_exactly(engine: str, build: Callable[[Scene], Tree], scene: Scene, command: Command) -> Answer:
     """Every position by itself: assembly, velocities, accelerations, drive torque and pin forces of one engine."""
+    tree = build(scene)
+    loaded = [pin for effect in scene.effects for pin in effect.loaded_pins]
+    tree.place((0.0, 0.0, 0.0))
+    e_drive = tree.turn(scene.drive_bar)
+
+    def act(omega_2: float, alpha_2: float) -> dict[str, Array | float]:
+        return _motion_and_forces(tree, e_drive, omega_2, alpha_2, loaded)
+
+    own = (
+        "assembly (Newton on its own gap), velocities (own Jacobian), accelerations (own dJ/dt v), "
+        "inverse dynamics, effects from its own state, loop multipliers, pin forces"
+    )
+    return answer_each(engine, tree, act, command, own)
+
+
+def answer_each(engine: str, bars: Bars, act: Act, command: Command, own: str) -> Answer:
+    """Each position assembled, and then moved and loaded by an engine.
+
+    Parameters
+    ----------
+    own : what the engine finds alone, for the report.
+    """
     start = time.perf_counter()
-    tree, n = build(scene), len(command.theta_2)
+    n = len(command.theta_2)
     wanted = ("position",) if command.omega_2 is None else STAGES
     names = [name for name, stage in STAGE_OF.items() if stage in wanted and name not in NOT_ANSWERED]
     out = {name: np.full((n, 2) if name in VECTORS else n, np.nan) for name in names}
     assembled = np.zeros(n, dtype=bool)
     gap = 0.0
-    position = Position(tree)
+    position = Position(bars)
     omega_2 = np.broadcast_to(np.asarray(command.omega_2, dtype=float), (n,))
     alpha_2 = np.broadcast_to(np.asarray(command.alpha_2, dtype=float), (n,))
-    loaded = [pin for effect in scene.effects for pin in effect.loaded_pins]
-    tree.place((0.0, 0.0, 0.0))
-    e_drive = tree.turn(scene.drive_bar)
     for i, (theta_2, branch) in enumerate(zip(command.theta_2.tolist(), command.branch.tolist(), strict=True)):
         q = position.find(theta_2, branch)
         if q is None:
             continue
         assembled[i] = True
-        values: dict[str, Array | float] = {f"theta_{bar}": tree.angle(bar) for bar in (3, 4)}
-        values["sin_mu"] = math.sin(tree.angle(4) - tree.angle(3))
-        points = tree.positions()
+        values: dict[str, Array | float] = {f"theta_{bar}": bars.angle(bar) for bar in (3, 4)}
+        values["sin_mu"] = math.sin(bars.angle(4) - bars.angle(3))
+        points = bars.positions()
         values.update({name: points[name] for name in ("A", "B", "G2", "G3", "G4")})
-        gap = max(gap, math.hypot(*tree.gap()))
+        gap = max(gap, math.hypot(*bars.gap()))
         if command.omega_2 is not None:
-            values.update(_motion_and_forces(tree, e_drive, omega_2[i], alpha_2[i], loaded))
+            values.update(act(float(omega_2[i]), float(alpha_2[i])))
         for name, value in values.items():
             out[name][i] = value
     for name in ANGLES:
@@ -208,8 +239,7 @@ def answer_exactly(engine: str, build: Callable[[Scene], Tree], scene: Scene, co
         quantities=out,
         evidence={"closure_gap": gap},
         shared="the description, theta_2, omega_2, alpha_2 and the branch",
-        own="assembly (Newton on its own gap), velocities (own Jacobian), accelerations (own dJ/dt v), "
-        "inverse dynamics, effects from its own state, loop multipliers, pin forces",
+        own=own,
         seconds=time.perf_counter() - start,
     )
 

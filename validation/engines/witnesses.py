@@ -33,6 +33,8 @@ class Witness:
     """Whether it runs through the motion in time."""
     predictor: str = ""
     """ "module:function" that predicts errors from the description; "own": the engine's own residuals do."""
+    stated: bool = True
+    """Whether an exact engine is held to what the formulas state of the linkage too, whatever its motion."""
     library: str = ""
     """The module that its adapter imports, a key of `REQUIREMENT`; nothing: it needs no more than the formulas."""
 
@@ -46,7 +48,11 @@ class Witness:
         return not_installed(self.library) if self.library else None
 
 
-REQUIREMENT = {"mujoco": "fourbar[mujoco]", "pinocchio": "fourbar[pinocchio]", "flint": "python-flint"}
+REQUIREMENT = {
+    **{name: f"fourbar[{name}]" for name in ("mujoco", "pinocchio", "exudyn", "opensim")},
+    "pydrake": "fourbar[drake]",
+    "flint": "python-flint",
+}
 """Module of an engine: what pip installs it by."""
 
 
@@ -84,6 +90,9 @@ WORK = {
         "one motion: every position assembled, the model compiled, Runge-Kutta steps from position to position (the "
         "fewer positions, the dearer each), then pin forces and torque read",
     ),
+    "exudyn-constraints": Work("assembly, constraints and multipliers, one by one", ONE_BY_ONE),
+    "opensim-constraints": Work("assembly, constrained dynamics, one by one", ONE_BY_ONE),
+    "drake-inverse": Work("assembly, forces and torque, one by one", ONE_BY_ONE),
     "free-body": Work(
         "thirteen equations, all positions at once",
         "all positions in one call on arrays: Newton on the closure, speeds and accelerations, thirteen equations each "
@@ -109,6 +118,12 @@ WITNESSES = (
     ),
     Witness("free-body", "validation.engines.free_body:FreeBody", EQUIVALENCE, positions=ANGLES),
 )
+FURTHER = (
+    Witness("exudyn-constraints", "validation.engines.exudyn:ExudynConstraints", EQUIVALENCE, library="exudyn"),
+    Witness("opensim-constraints", "validation.engines.opensim:OpenSimConstraints", EQUIVALENCE, library="opensim"),
+    Witness("drake-inverse", "validation.engines.drake:DrakeInverse", EQUIVALENCE, library="pydrake"),
+)
+"""Engines with extras of their own: they join a run where they are installed, and where they are named."""
 
 
 def predicting_from(

@@ -7,16 +7,19 @@ from pathlib import Path
 
 PACKAGES = {"fourbar": "fourbar", "numpy": "numpy", "mujoco": "mujoco", "pinocchio": "pin", "scipy": "scipy"}
 """Name in the report and name of the distribution."""
+WHERE_INSTALLED = ("drake", "exudyn", "opensim")
+"""Distributions that need not be there."""
 
 
 def versions() -> dict[str, str]:
     """Version of Python and of every library that decides a number; "not installed" where missing."""
     found = {"python": platform.python_version()}
-    for name, distribution in PACKAGES.items():
+    for name, distribution in (PACKAGES | {name: name for name in WHERE_INSTALLED}).items():
         try:
             found[name] = version(distribution)
         except PackageNotFoundError:
-            found[name] = "not installed"
+            if name in PACKAGES:
+                found[name] = "not installed"
     return found
 
 

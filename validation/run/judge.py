@@ -9,6 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from fourbar.errors import LimitError
+from fourbar.mjcf.settings import LIGHT
 from fourbar.quantities import FORCES
 from fourbar.scene import Command, Scene, command
 from fourbar.solution import Solution
@@ -58,7 +60,8 @@ def judge(name: str, scene: Scene, witnesses: Sequence[Witness] = WITNESSES) -> 
             continue
         record.answers.append(answer)
         record.rows += _judged(name, scene, at, record.solution, answer, witness)
-        if witness.tolerance == EQUIVALENCE and answer.refusal is None and "theta_3" in witness.expected:
+        exact = witness.tolerance == EQUIVALENCE and answer.refusal is None and "theta_3" in witness.expected
+        if exact and witness.stated:
             record.rows += _stated(name, scene, witness, answer)
         if witness.order and answer.refusal is None:
             answer.evidence |= _observed_order(name, scene, at, record.solution, witness)
@@ -103,6 +106,9 @@ def _judged(name: str, scene: Scene, at: Command, solution: Solution, answer: An
     formulas = solution if theirs is at else solve(scene, _stage(theirs), at=theirs)
     predicted = predicting_from(witness, scene, theirs, answer)
     rows = compare(name, scene, answer, formulas, witness.tolerance, witness.expected, predicted)
+    if (ratio := answer.evidence.get("mass_ratio", 1.0)) > LIGHT:
+        why = f"; of coupler and output one is {ratio:.1e} times lighter"
+        rows = [replace(row, reason=row.reason + why) if row.failed else row for row in rows]
     answers = answer.assembled is not None and len(answer.assembled) == len(formulas)  # otherwise a row has failed
     if answers and answer.at is not None and {"theta_3", "theta_4"} <= answer.quantities.keys():
         rows.append(closure(name, scene, answer, witness.tolerance))
@@ -113,6 +119,8 @@ def _stated(name: str, scene: Scene, witness: Witness, answer: Answer) -> list[R
     """What the formulas state of the linkage whatever its motion, held against an exact engine."""
     try:
         return statements(name, scene, witness.engine(), answer)
+    except LimitError as limit:
+        return [Row.unmeasured(name, witness.name, "statements of the linkage", "all", REFUSES, str(limit))]
     except Exception as error:  # whatever an engine raises is its own failure, in its own row
         return [breakdown(name, witness.name, error, "statements of the linkage")]
 

@@ -84,14 +84,20 @@ def ready() -> None:
 
 
 def over_processes(
-    suite: Suite, chunks: Iterable[Chunk], witnesses: Sequence[Witness], draw: bool, workers: int
+    suite: Suite,
+    chunks: Iterable[Chunk],
+    witnesses: Sequence[Witness],
+    draw: bool,
+    workers: int,
+    seconds: float | None = None,
 ) -> Iterator[tuple[int, list[Record]]]:
-    """Over processes of this machine."""
+    """Over processes of this machine; `seconds`: after which a scene is taken to hang."""
+    seconds = longest(suite) if seconds is None else seconds
     left = dict(chunks)
     in_vain = 0
     while left:
         try:
-            for number, records in _over_one_pool(suite, list(left.items()), witnesses, draw, workers):
+            for number, records in _over_one_pool(suite, list(left.items()), witnesses, draw, workers, seconds):
                 yield number, records
                 del left[number]
                 in_vain = 0
@@ -102,7 +108,7 @@ def over_processes(
 
 
 def _over_one_pool(
-    suite: Suite, chunks: Iterable[Chunk], witnesses: Sequence[Witness], draw: bool, workers: int
+    suite: Suite, chunks: Iterable[Chunk], witnesses: Sequence[Witness], draw: bool, workers: int, seconds: float
 ) -> Iterator[tuple[int, list[Record]]]:
     from multiprocessing import get_context
 
@@ -113,10 +119,10 @@ def _over_one_pool(
         try:
 
             def submit(scenes: Sequence[int], who: Sequence[Witness]) -> Future[list[Record]]:
-                seconds = longest(suite) * len(scenes)
                 task = (*part(suite, scenes), who, draw)
+                allowed = seconds * len(scenes)
                 try:
-                    future: Future[list[Record]] = pool.schedule(judge_chunk, args=task, timeout=seconds)
+                    future: Future[list[Record]] = pool.schedule(judge_chunk, args=task, timeout=allowed)
                 except RuntimeError:  # a broken pool takes no more
                     raise StalledError from None
                 return future
@@ -131,9 +137,15 @@ def _over_one_pool(
 
 
 def over_machines(
-    suite: Suite, chunks: Iterable[Chunk], witnesses: Sequence[Witness], draw: bool, scheduler: str
+    suite: Suite,
+    chunks: Iterable[Chunk],
+    witnesses: Sequence[Witness],
+    draw: bool,
+    scheduler: str,
+    seconds: float | None = None,
 ) -> Iterator[tuple[int, list[Record]]]:
-    """Over the workers of a Dask scheduler; each needs this checkout importable."""
+    """Over the workers of a Dask scheduler; each needs this checkout importable, and what witnesses are added."""
+    seconds = longest(suite) if seconds is None else seconds
     from distributed import Client
 
     try:
@@ -147,7 +159,7 @@ def over_machines(
     with ThreadPoolExecutor(IN_FLIGHT * workers) as waiting, connected as client:
 
         def submit(scenes: Sequence[int], who: Sequence[Witness]) -> Future[list[Record]]:
-            task = (longest(suite) * len(scenes), *part(suite, scenes), who, draw)
+            task = (seconds * len(scenes), *part(suite, scenes), who, draw)
             return waiting.submit(client.submit(judge_watched, *task, retries=0, pure=False).result)
 
         def deserted(_: Iterable[Future[list[Record]]]) -> bool:

@@ -19,8 +19,9 @@ from validation.engines.hard_suite import Hard
 from validation.engines.mujoco.picture import pictures
 from validation.engines.witnesses import Witness
 from validation.published import ladder_rows
-from validation.regression.accept import output_options, told
+from validation.regression.accept import output_options, report_differences
 from validation.regression.record import about, baseline, read_run, write_about
+from validation.regression.scenes import descriptions
 from validation.report import cost_section, hard_section
 from validation.report.html import Section, html
 from validation.report.machine import versions
@@ -49,17 +50,18 @@ def run(
     scheduler: str | None = None,
     published: bool = False,
     missing: Sequence[tuple[str, str]] = (),
+    seconds: float | None = None,
 ) -> Iterator[int | Summary]:
     """Judge a suite into a folder; yields the number of scenes done as they come, at last the summary.
 
     With `published` the report sets what the thesis printed against what is right, error by error.
-    `missing` are the witnesses that cannot answer here, each with the reason.
+    `missing` are the witnesses that cannot answer here, each with the reason; `seconds`: after which a scene hangs.
 
     What an interrupted run of the same suite with the same engines and versions left is kept.
     """
     simulated = any(witness.name == "mujoco-simulated" for witness in witnesses)
     draw = len(suite) <= SCENES_SHOWN
-    size = CHUNK[simulated or draw]
+    size = CHUNK[simulated or draw or seconds is not None]
     chunks = [range(start, min(start + size, len(suite))) for start in range(0, len(suite), size)]
     identity = {
         "scenes": suite.fingerprint(),
@@ -72,9 +74,9 @@ def run(
         yield sum(len(chunks[number]) for number in done)
         todo = [(number, scenes) for number, scenes in enumerate(chunks) if number not in done]
         if scheduler is not None:
-            answers = pool.over_machines(suite, todo, witnesses, draw, scheduler)
+            answers = pool.over_machines(suite, todo, witnesses, draw, scheduler, seconds)
         else:
-            answers = pool.over_processes(suite, todo, witnesses, draw, workers)
+            answers = pool.over_processes(suite, todo, witnesses, draw, workers, seconds)
         for number, records in answers:
             store.put(number, records)
             yield len(records)
@@ -83,7 +85,7 @@ def run(
         summary = summarise(store.records(len(chunks)), ladder, held_to, missing)
         first_lines = write_columns(store.rows(len(chunks)), out)
         factors = {witness.name: witness.tolerance.factor for witness in witnesses}
-        write_about(about(factors, suite.fingerprint()), out)
+        write_about(about(factors, suite.fingerprint(), descriptions(suite)), out)
         write_text(out / "timings.csv", timings_csv(store.records(len(chunks))))
         write_text(out / "report.md", markdown(summary))
         drawn, why_not = mjcf_pictures(suite) if draw and simulated else ({}, "")
@@ -136,7 +138,7 @@ def timings_csv(records: Iterator[Record]) -> str:
 
 def examine(scenes: tuple[Path, ...], mjcf: Path, names: tuple[str, ...], out: Path, wanted: float | None) -> int:
     """What a user's own MJCF of one scene differs in, and what it costs; 1 where it is wrong by more than wanted."""
-    from validation.check.model import examine_model, named, tell
+    from validation.check.model import examine_model, named, show
     from validation.run.dial import held_to
 
     if len(scenes) != 1:
@@ -144,13 +146,15 @@ def examine(scenes: tuple[Path, ...], mjcf: Path, names: tuple[str, ...], out: P
     suite = scene_files(scenes)
     tolerance = SIMULATED if wanted is None else held_to(wanted, "what this file may be wrong by")
     report = examine_model(suite.name(0), suite.scene(0), mjcf, named(names), tolerance)
-    tell(report, mjcf, out)
+    show(report, mjcf, out)
     return report.counts.status
 
 
 @click.command(name="run")
 @click.argument("scenes", nargs=-1, type=click.Path(path_type=Path))
-@click.option("--out", type=click.Path(path_type=Path, file_okay=False), default=Path("results"), show_default=True)
+@click.option(
+    "-o", "--out", type=click.Path(path_type=Path, file_okay=False), default=Path("results"), show_default=True
+)
 @click.option("--engines", metavar="NAMES", help="Comma-separated witnesses; left out: all.")
 @click.option(
     "--error",
@@ -171,8 +175,28 @@ def examine(scenes: tuple[Path, ...], mjcf: Path, names: tuple[str, ...], out: P
     type=click.Path(path_type=Path),
     help="Run the suite under this interpreter too (into OUT/elsewhere), and say what changes from there to here.",
 )
+@click.option(
+    "--witness",
+    "adapters",
+    metavar="MODULE:CLASS",
+    multiple=True,
+    help="A witness of your own, to judge with the others (docs/adding-a-witness.md).",
+)
+@click.option(
+    "--time-limit",
+    type=click.FloatRange(min=0.0, min_open=True),
+    metavar="SECONDS",
+    help="End what takes longer on one scene; left out: a minute, and more for many positions.",
+)
 @click.option("--mjcf", type=click.Path(path_type=Path), help="Examine this MJCF of the one SCENE instead.")
-@click.option("--name", "names", metavar="ROLE=NAME", multiple=True, help="Body or site of --mjcf named otherwise.")
+@click.option(
+    "--name",
+    "names",
+    metavar="ROLE=NAME",
+    multiple=True,
+    help="Of --mjcf: the body that is the input, coupler or output; B3, B4: the sites of pin B on the coupler and the "
+    "output, where no connect or weld closes the loop. Left out: guessed from structure and lengths, and printed.",
+)
 @output_options
 def command(
     scenes: tuple[Path, ...],
@@ -187,19 +211,19 @@ def command(
     scheduler: str | None,
     against: str | None,
     python: Path | None,
+    adapters: tuple[str, ...],
+    time_limit: float | None,
     mjcf: Path | None,
     names: tuple[str, ...],
     **forms: Path | None,
 ) -> int:
     """Judge scenes (default: all of models/); write results.csv, timings.csv, report.md and report.html."""
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-
     from validation.report.terminal import table
 
     if mjcf is not None:
         others = {"engines": engines, "suite": named, "random": count, "seed": seed, "type": types, "against": against}
-        for option, value in {**others, "scheduler": scheduler, "python": python, **forms}.items():
+        more = {"scheduler": scheduler, "python": python, "witness": adapters or None, "time-limit": time_limit}
+        for option, value in {**others, **more, **forms}.items():
             if value is not None:
                 raise InputError(
                     f"--{option}", str(value), "is not of --mjcf, which examines one file together with its scene"
@@ -224,7 +248,7 @@ def command(
     if against is not None:
         read_run(baseline(against))  # before anything runs
     seed, types = seed or 0, types or ALL_TYPES
-    suite, witnesses = selected(scenes, named, count, seed, types)
+    suite, witnesses = selected(scenes, named, count, seed, types, adapters)
     if wanted is not None:
         from validation.run.dial import dialled
 
@@ -234,25 +258,35 @@ def command(
         passed_on += [f"--engines={engines}"] if engines else []
         passed_on += [f"--random={count}", f"--seed={seed}", f"--type={types}"] if count else []
         passed_on += [f"--error={wanted!r}"] if wanted is not None else []
+        passed_on += [f"--witness={adapter}" for adapter in adapters]
+        passed_on += [f"--time-limit={time_limit!r}"] if time_limit is not None else []
         passed_on += [f"--suite={named if named == 'hard' else os.path.abspath(named)}"] if named else []
         against = str(run_elsewhere(python, passed_on, out / "elsewhere"))
     present, missing = askable(chosen(engines, witnesses), by_name=engines is not None)
-    columns = (TextColumn("judging"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    result: Any = None
-    with Progress(*columns, console=Console(stderr=True)) as progress:
-        task = progress.add_task("judging", total=len(suite))
-        published = not scenes and named is None and count is None  # the models, the thesis's among them
-        for result in run(
-            suite, out, present, workers=workers, scheduler=scheduler, published=published, missing=missing
-        ):
-            if isinstance(result, int):
-                progress.advance(task, result)
-    assert isinstance(result, Summary)
+    published = not scenes and named is None and count is None  # the models, the thesis's among them
+    how: dict[str, Any] = {"workers": workers, "scheduler": scheduler, "seconds": time_limit}
+    result = _in_sight(len(suite), run(suite, out, present, published=published, missing=missing, **how))
     table(result, out)
-    worse = told(baseline(against), out, forms) if against is not None else 0
+    worse = report_differences(baseline(against), out, forms) if against is not None else 0
     if result.counts[FAILS] or worse:
         return FAILED
     if missing:
         there = ",".join(witness.name for witness in present)
         raise DependencyError(f"{missing[0][1]}, or say --engines {there} where those are all that is wanted")
     return result.counts.status
+
+
+def _in_sight(scenes: int, steps: Iterable[int | Summary]) -> Summary:
+    """The summary at the end of a run, its progress shown meanwhile."""
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    columns = (TextColumn("judging"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    step: int | Summary = 0
+    with Progress(*columns, console=Console(stderr=True)) as progress:
+        task = progress.add_task("judging", total=scenes)
+        for step in steps:
+            if isinstance(step, int):
+                progress.advance(task, step)
+    assert isinstance(step, Summary)
+    return step

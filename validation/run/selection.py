@@ -1,31 +1,44 @@
 """What a run is of: which scenes, of which types, by which witnesses."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from fourbar.errors import DependencyError, InputError
-from validation.engines.hard_suite import HARD_WITNESSES, Hard
-from validation.engines.witnesses import WITNESSES, Witness
+from validation.engines import added
+from validation.engines.hard_suite import HARD_WITNESSES, Hard, predicting
+from validation.engines.witnesses import FURTHER, WITNESSES, Witness
 from validation.scenes.random import LinkageType
 from validation.scenes.suites import Random, Suite, model_files, scene_files, suite_file
 
 
 def selected(
-    scenes: tuple[Path, ...], named: str | None, count: int | None, seed: int, types: str
+    scenes: tuple[Path, ...], named: str | None, count: int | None, seed: int, types: str, adapters: Sequence[str] = ()
 ) -> tuple[Suite, tuple[Witness, ...]]:
     """The scenes wanted, and the witnesses with what they are held to there."""
     if named == "hard":
-        return Hard(), HARD_WITNESSES
+        own = (*HARD_WITNESSES, *map(predicting, FURTHER))
+        return Hard(), (*own, *map(predicting, _added(adapters, own)))
+    own = (*WITNESSES, *FURTHER)
+    witnesses = (*own, *_added(adapters, own))
     if named is not None:
-        return suite_file(Path(named)), WITNESSES
+        return suite_file(Path(named)), witnesses
     if count:
-        return Random(count, seed, linkage_types(types)), WITNESSES
-    return scene_files(scenes or model_files()), WITNESSES
+        return Random(count, seed, linkage_types(types)), witnesses
+    return scene_files(scenes or model_files()), witnesses
+
+
+def _added(adapters: Sequence[str], own: tuple[Witness, ...]) -> tuple[Witness, ...]:
+    """The witnesses of the command line (`adapters`, "module:Class"), and those that installed packages bring."""
+    known = [witness.name for witness in own]
+    here = added.named(adapters, known)
+    return (*here, *added.installed([*known, *(witness.name for witness in here)]))
 
 
 def chosen(engines: str | None, witnesses: tuple[Witness, ...] = WITNESSES) -> tuple[Witness, ...]:
-    """The witnesses named in a comma-separated list; all of them where there is none."""
+    """The witnesses named in a comma-separated list; where there is none, all but those that need not be installed."""
     if engines is None:
-        return witnesses
+        further = {witness.name for witness in FURTHER}
+        return tuple(witness for witness in witnesses if witness.name not in further or not witness.missing())
     known = {witness.name: witness for witness in witnesses}
     names = [name.strip() for name in engines.split(",") if name.strip()]
     for name in names or [engines]:

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from fourbar.errors import LimitError
 from fourbar.linkage import FourBar, uniform
 from fourbar.scene import Command, Scene
 from fourbar.scene.motion import Motion
@@ -50,7 +51,15 @@ def answered(engine: Engine, linkage: FourBar, theta_2: Sequence[float], branch:
     bars = uniform(*linkage.lengths)
     scene = Scene(FourBar(bars.ground, bars.input, bars.coupler, bars.output, linkage.ground_angle), Motion(0.0, 1.0))
     at = Command(np.array(theta_2, dtype=float), np.array(branch, dtype=np.int8), 1.0, 0.0)
-    return engine.answer(scene, at).quantities
+    return given(engine, scene, at).quantities
+
+
+def given(engine: Engine, scene: Scene, at: Command) -> Answer:
+    """An engine's answer; LimitError where it refuses those positions."""
+    answer = engine.answer(scene, at)
+    if answer.refusal is not None:
+        raise LimitError(answer.refusal)
+    return answer
 
 
 def wrapped(angle: Array) -> Array:

@@ -17,7 +17,7 @@ from fourbar.linkage import MOVING_BARS, FourBar
 from fourbar.scene import Command, Scene
 from validation.compare.answer import Engine
 from validation.compare.compare import TOUCHING_MARGIN, closing_margin
-from validation.compare.statements.finding import TURN, Finding, same
+from validation.compare.statements.finding import TURN, Finding, given, same
 from validation.compare.tolerance import EPS, EQUIVALENCE
 
 BEYOND = 4.0 * TOUCHING_MARGIN
@@ -76,7 +76,7 @@ def _of_bar(linkage: FourBar, bar: int, engine: Engine) -> Iterator[Finding]:
         expected += [(angle, True) for angle in mobility.default_range(linkage)]
     angles = np.array([angle for angle, _ in expected])
     decidable = np.abs(closing_margin(Scene(first), angles + shift)) > TOUCHING_MARGIN
-    closes = engine.answer(Scene(first), Command(angles + shift, np.ones(len(angles), np.int8), None, 0.0)).assembled
+    closes = given(engine, Scene(first), Command(angles + shift, np.ones(len(angles), np.int8), None, 0.0)).assembled
     assert closes is not None
     wrong = decidable & (closes != [inside for _, inside in expected])
     where = float(angles[int(np.argmax(wrong))])

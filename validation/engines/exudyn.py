@@ -1,0 +1,216 @@
+"""Exudyn: nine absolute coordinates, the multipliers of four pins and a drive; loads and effects by its own elements.
+
+A bar is `ObjectRigidBody2D` with coordinates (x, y of its first pin, direction). With g = 0 the nine
+constraints (two of each pin and the drive of bar 2), J = dg/dq, M the mass matrix and f what acts,
+
+    J v = e omega_2,   J a = e alpha_2 - (dJ/dt) v,   [J_pins^T e_k] [F12 F32 F43 F14 T_k] = M a - f.
+
+g, J, (dJ/dt) v, M and f are Exudyn's; the three linear systems are solved here.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import exudyn as exu
+import numpy as np
+from exudyn.itemInterface import (
+    MarkerBodyPosition,
+    MarkerBodyRigid,
+    MarkerNodeCoordinate,
+    NodePointGround,
+    NodeRigidBody2D,
+    ObjectConnectorCoordinate,
+    ObjectGround,
+    ObjectJointRevolute2D,
+    ObjectRigidBody2D,
+)
+
+from fourbar.linkage import MOVING_BARS, PIN_FORCE
+from fourbar.scene import Command, Scene
+from validation.compare.answer import Answer, Array
+from validation.engines.exudyn_elements import ELEMENT_OF, add_load
+from validation.engines.loop import answer_each, turned_ground
+
+NAME = "exudyn-constraints"
+OWN = (
+    "nine absolute coordinates, constraint equations, their Jacobian and (dJ/dt) v, mass matrix, every load and effect "
+    "by an element of its own; Newton's method on its gap and the linear solves are the harness's"
+)
+SIZE = 9
+"""Coordinates, and constraints."""
+B_ROWS, OTHER_ROWS = [4, 5], [0, 1, 2, 3, 6, 7]
+"""The rows of pin B and of the others among the constraints, which stand in the order of `JOINTS`, the drive last."""
+END = {2: "A2", 3: "B", 4: "B4"}
+"""The second pin of each bar as its own point."""
+JOINTS = {"O2": (1, 2), "A": (3, 2), "B": (4, 3), "O4": (1, 4)}
+"""Of each pin the force is that on the second bar: F12, F32, F43, F14."""
+
+
+class ExudynConstraints:
+    """Positions, motion and multipliers of Exudyn's constraint equations."""
+
+    name = NAME
+
+    def answer(self, scene: Scene, command: Command) -> Answer:
+        """Its answer, or the refusal that names an effect it has no element for."""
+        for effect in scene.effects:
+            if effect.key not in ELEMENT_OF:
+                return Answer(NAME, "exact", refusal=f"Exudyn has no element for the effect {effect.key!r}")
+        bars = ExudynBars(scene)
+        return answer_each(NAME, bars, bars.move, command, OWN)
+
+
+class ExudynBars:
+    """The bars, built from the description."""
+
+    def __init__(self, scene: Scene) -> None:
+        exu.config.printToConsole = False
+        self.scene, linkage = scene, scene.linkage
+        self.container = exu.SystemContainer()
+        self.mbs = mbs = self.container.AddSystem()
+        self.ground_angle = linkage.ground_angle
+        self.ground_node = mbs.AddNode(NodePointGround())
+        self.body = {1: mbs.AddObject(ObjectGround())}
+        self.node: dict[int, Any] = {}
+        self.local: dict[str, tuple[int, tuple[float, float]]] = {}
+        for bar in MOVING_BARS:
+            part = linkage.bar(bar)
+            r, phi = part.mass_centre
+            centre = (r * math.cos(phi), r * math.sin(phi))
+            self.node[bar] = mbs.AddNode(NodeRigidBody2D())
+            about_pin = part.moment_of_inertia + part.mass * r * r
+            self.body[bar] = mbs.AddObject(
+                ObjectRigidBody2D(mass=part.mass, inertia=about_pin, centerOfMass=centre, nodeNumber=self.node[bar])
+            )
+            self.local |= {f"G{bar}": (bar, centre), END[bar]: (bar, (part.length, 0.0))}
+        self.local |= {"A": (3, (0.0, 0.0)), "O4": (4, (0.0, 0.0))}
+        foot_4 = tuple(turned_ground(self.ground_angle, linkage.ground, 0.0))
+        at = {
+            "O2": ((0.0, 0.0), (0.0, 0.0)),
+            "A": ((0.0, 0.0), self.local["A2"][1]),
+            "B": (self.local["B4"][1], self.local["B"][1]),
+            "O4": (foot_4, (0.0, 0.0)),
+        }
+        for pin, bars in JOINTS.items():
+            markers = [self.point_marker(bar, *place) for bar, place in zip(bars, at[pin], strict=True)]
+            mbs.AddObject(ObjectJointRevolute2D(markerNumbers=markers))
+        markers = [self.rotation_marker(bar) for bar in (1, 2)]
+        self.drive = mbs.AddObject(ObjectConnectorCoordinate(markerNumbers=markers))
+        self.tables: list[Callable[[float], None]] = []
+        for load in scene.loads:
+            add_load(load, self)
+        for effect in scene.effects:
+            ELEMENT_OF[effect.key](effect, self)
+        mbs.Assemble()
+        self.state = mbs.systemData
+        settings = exu.SimulationSettings()
+        settings.solution.file.write = False
+        self.solver = exu.MainSolverImplicitSecondOrder()
+        self.solver.InitializeSolver(mbs, settings)
+        self.turn = {bar: self.state.GetObjectLTGODE2(self.body[bar])[2] for bar in MOVING_BARS}
+        self.shifts = [i for i in range(SIZE) if i not in self.turn.values()]
+        self.e_drive = np.zeros(SIZE)
+        self.e_drive[self.turn[scene.drive_bar]] = 1.0
+
+    def point_marker(self, bar: int, x: float, y: float) -> Any:
+        """A point of a bar, along and across its line from its first pin; of the ground in world axes."""
+        return self.mbs.AddMarker(MarkerBodyPosition(bodyNumber=self.body[bar], localPosition=[x, y, 0.0]))
+
+    def rotation_marker(self, bar: int) -> Any:
+        """The direction of a bar as a coordinate; of the ground a zero."""
+        node, coordinate = (self.ground_node, 0) if bar == 1 else (self.node[bar], 2)
+        return self.mbs.AddMarker(MarkerNodeCoordinate(nodeNumber=node, coordinate=coordinate))
+
+    def frame_marker(self, bar: int, turn: float = 0.0, x: float = 0.0, y: float = 0.0) -> Any:
+        """Axes fixed in a bar, turned by an angle from its line, at a point from its first pin."""
+        cos, sin = math.cos(turn), math.sin(turn)
+        frame = [[cos, -sin, 0.0, x], [sin, cos, 0.0, y], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]]
+        return self.mbs.AddMarker(MarkerBodyRigid(bodyNumber=self.body[bar], localHT=frame))
+
+    def place(self, q: Sequence[float]) -> None:
+        """Angles of the bars as given; the pins O2, A and O4 closed, in which Exudyn's constraints are linear."""
+        theta_2, of_3_to_2, theta_4 = q
+        coordinates = np.zeros(SIZE)
+        for bar, angle in zip(MOVING_BARS, (theta_2, theta_2 + of_3_to_2, theta_4), strict=True):
+            coordinates[self.turn[bar]] = angle
+        self.mbs.SetObjectParameter(self.drive, "offset", theta_2)
+        self.state.SetODE2Coordinates(coordinates)
+        jacobian, gap = self._constraint_jacobian(), self._constraint_gap()
+        coordinates[self.shifts] = np.linalg.solve(jacobian[OTHER_ROWS][:, self.shifts], -gap[OTHER_ROWS])
+        self.state.SetODE2Coordinates(coordinates)
+        self.q, self.jacobians = coordinates, jacobian
+
+    def _constraint_gap(self) -> Array:
+        self.solver.ComputeAlgebraicEquations(self.mbs, False)
+        return np.array(self.solver.GetSystemResidual())[SIZE:]
+
+    def _constraint_jacobian(self) -> Array:
+        self.solver.SetSystemJacobian(np.zeros((2 * SIZE, 2 * SIZE)))  # what is computed is added
+        self.solver.ComputeJacobianAE(
+            self.mbs, scalarFactor_ODE2=1.0, scalarFactor_ODE2_t=0.0, scalarFactor_ODE1=0.0, velocityLevel=False
+        )
+        return np.array(self.solver.GetSystemJacobian())[SIZE:, :SIZE]
+
+    def gap(self) -> tuple[float, float]:
+        """B on bar 3 minus B on bar 4, from the constraint of pin B."""
+        x, y = self._constraint_gap()[B_ROWS].tolist()
+        return x, y
+
+    def jacobian(self) -> Array:
+        """Derivative of the gap by the turns, pins O2, A and O4 kept closed."""
+        turns, pins, b = list(self.turn.values()), self.jacobians[OTHER_ROWS], self.jacobians[B_ROWS]
+        shifts = np.linalg.solve(pins[:, self.shifts], -pins[:, turns])
+        by_angle = b[:, turns] + b[:, self.shifts] @ shifts
+        return np.column_stack((by_angle[:, 0] + by_angle[:, 1], by_angle[:, 1:]))
+
+    def angle(self, bar: int) -> float:
+        """Its coordinate, within half a turn."""
+        return math.remainder(self.q[self.turn[bar]], math.tau)
+
+    def _output(self, kind: Any) -> dict[str, Array]:
+        """Position or acceleration of the points known by name."""
+        found = {
+            n: self.mbs.GetObjectOutputBody(self.body[bar], kind, [*at, 0.0]) for n, (bar, at) in self.local.items()
+        }
+        return {name: np.array(vector[:2]) for name, vector in found.items()}
+
+    def positions(self) -> dict[str, Array]:
+        """Points of the bars."""
+        return self._output(exu.OutputVariableType.Position)
+
+    def move(self, omega_2: float, alpha_2: float) -> dict[str, Array | float]:
+        """Speeds, accelerations and multipliers; nothing where a toggle leaves them 0/0."""
+        jacobian = self.jacobians
+        drive = np.eye(SIZE)[-1]
+        try:
+            v = np.linalg.solve(jacobian, drive * omega_2)
+            self.state.SetODE2Coordinates_t(v)
+            self.state.SetODE2Coordinates_tt(np.zeros(SIZE))
+            at = self._output(exu.OutputVariableType.Acceleration)
+            drift = np.concatenate((np.zeros(2), at["A2"], at["B"] - at["B4"], np.zeros(3)))
+            a = np.linalg.solve(jacobian, drive * alpha_2 - drift)
+        except np.linalg.LinAlgError:
+            return {}
+        self.state.SetODE2Coordinates_tt(a)
+        at = self._output(exu.OutputVariableType.Acceleration)
+        values: dict[str, Array | float] = {f"a_{name}": at[name] for name in ("A", "B", "G2", "G3", "G4")}
+        for bar in MOVING_BARS[1:]:
+            values[f"omega_{bar}"], values[f"alpha_{bar}"] = float(v[self.turn[bar]]), float(a[self.turn[bar]])
+        try:
+            matrix = np.column_stack((jacobian[:-1].T, self.e_drive))
+            unknowns = np.linalg.solve(matrix, self._needed(a))
+        except np.linalg.LinAlgError:  # no torque on that bar balances the linkage here
+            return values
+        for number, pin in enumerate(JOINTS):
+            values[PIN_FORCE[pin]] = np.asarray(unknowns[2 * number : 2 * number + 2], dtype=np.float64)
+        return values | {"torque": float(unknowns[-1])}
+
+    def _needed(self, a: Array) -> Array:
+        """M a less what acts, (9,)."""
+        for table in self.tables:
+            table(self.q[self.turn[2]])
+        self.solver.ComputeMassMatrix(self.mbs)
+        self.solver.ComputeODE2RHS(self.mbs)
+        mass = np.array(self.solver.GetSystemMassMatrix())
+        return np.asarray(mass @ a - np.array(self.solver.GetSystemResidual())[:SIZE])

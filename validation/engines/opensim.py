@@ -1,0 +1,263 @@
+"""OpenSim (Simbody): bars 2 and 4 on the ground, bar 3 on bar 4, closed at pin A by its own constraint and solve.
+
+Coordinates are the direction of bar 2, that of bar 4, and that of bar 3 against bar 4. The closing force, the joint
+reactions, the accelerations and the torque that moves bar 2 as commanded come from Simbody's constrained dynamics;
+loads and effects are OpenSim's own elements.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+import opensim as osim
+
+from fourbar.linkage import MOVING_BARS
+from fourbar.scene import Command, Scene
+from validation.compare.answer import Answer, Array
+from validation.engines.loop import answer_each, turned_ground
+from validation.engines.opensim_elements import ELEMENT_OF, ZERO, add_load, constants, vec, vector
+
+NAME = "opensim-constraints"
+OWN = (
+    "constraint equations with the loop cut at A, joint reactions, closing force and torque by Simbody's constrained "
+    "dynamics, every load and effect by an element of its own (dry friction: its actuator against its own slip); "
+    "Newton's method on its gap, and the linear solve for speeds and accelerations, are the harness's"
+)
+PER_COORDINATE = {2: np.array([1.0, 0.0, 0.0]), 3: np.array([0.0, 1.0, 1.0]), 4: np.array([0.0, 1.0, 0.0])}
+"""Derivative of each bar's direction by the coordinates."""
+PASSES = 50
+"""Each pass leaves a millionth to a tenth of the multipliers of the one before, down to rounding."""
+LEAST_CONDITIONED = 1e-11
+"""Simbody 4.6 drops a constraint as dependent from 5e-12 to 7e-12 on: 1000 positions near limits of 40 linkages."""
+TIME_IS_ALPHA = (1.0 / 6.0, 0.0, 0.0, 0.0)
+"""t^3/6: the motion prescribed for bar 2, whose second derivative is the time, which is set to alpha_2."""
+
+
+class OpenSimConstraints:
+    """Accelerations, reactions and multipliers of Simbody's constrained dynamics."""
+
+    name = NAME
+
+    def answer(self, scene: Scene, command: Command) -> Answer:
+        """Its answer, or the refusal that names what it cannot hold."""
+        if (reason := refusal(scene)) is not None:
+            return Answer(NAME, "exact", refusal=reason)
+        bars = OpenSimBars(scene)
+        answer = answer_each(NAME, bars, bars.move, command, OWN)
+        if bars.least_conditioned < LEAST_CONDITIONED:
+            reason = (
+                f"the matrix of Simbody's multipliers is conditioned by {bars.least_conditioned:.1e} at the worst; "
+                f"below {LEAST_CONDITIONED:g} it takes constraints for dependent, and drops them"
+            )
+            return Answer(NAME, "exact", refusal=reason)
+        return answer
+
+
+def refusal(scene: Scene) -> str | None:
+    """The declared limit that a scene meets, or None."""
+    for effect in scene.effects:
+        if effect.key not in ELEMENT_OF:
+            return f"OpenSim has no element for the effect {effect.key!r}"
+    for number in MOVING_BARS:
+        if scene.linkage.bar(number).mass == 0.0:
+            return f"bar {number} has no mass; OpenSim takes no such body at the end of a chain, and drops its inertia"
+    crank = scene.linkage.input
+    if crank.moment_of_inertia + crank.mass * crank.mass_centre[0] ** 2 == 0.0:
+        return "bar 2 has no inertia about O2; Simbody divides by it"
+    return None
+
+
+class OpenSimBars:
+    """The bars, built from the description."""
+
+    def __init__(self, scene: Scene) -> None:
+        osim.Logger.setLevelString("Off")
+        osim.Logger.removeFileSink()
+        linkage = scene.linkage
+        self.ground_angle = linkage.ground_angle
+        self.model = model = osim.Model()
+        model.setGravity(vec())
+        self.body = {1: model.getGround()}
+        self.centre: dict[int, tuple[float, float]] = {}
+        for bar in MOVING_BARS:
+            part = linkage.bar(bar)
+            r, phi = part.mass_centre
+            self.centre[bar] = r * math.cos(phi), r * math.sin(phi)
+            about_z = osim.Inertia(part.moment_of_inertia, part.moment_of_inertia, part.moment_of_inertia, *ZERO)
+            self.body[bar] = osim.Body(f"bar{bar}", part.mass, vec(*self.centre[bar]), about_z)
+            model.addBody(self.body[bar])
+        foot_4 = (*turned_ground(self.ground_angle, linkage.ground, 0.0).tolist(), 0.0)
+        self.length = {bar: linkage.bar(bar).length for bar in MOVING_BARS}
+        self.joint = {
+            "O2": self._joint("O2", 1, ZERO, 2, ZERO),
+            "O4": self._joint("O4", 1, foot_4, 4, ZERO),
+            "B": self._joint("B", 4, (self.length[4], 0.0, 0.0), 3, (self.length[3], 0.0, 0.0)),
+        }
+        self.pin_a = osim.PointConstraint(self.body[2], vec(self.length[2]), self.body[3], vec())
+        self.pin_a.set_isEnforced(False)  # until a position is found: OpenSim would assemble it at angles of its own
+        model.addConstraint(self.pin_a)
+        prescribed = osim.PolynomialFunction(vector(TIME_IS_ALPHA))
+        coordinate = self.joint["O2"].updCoordinate()
+        coordinate.setPrescribedFunction(prescribed)
+        coordinate.setDefaultIsPrescribed(True)
+        self.before_move: list[Callable[[], None]] = []
+        self.actuators: list[Any] = []
+        self.drive_bar = scene.drive_bar
+        self.motor = self.torque_between(1, scene.drive_bar)
+        self.at_a = [function for bar in (2, 3) for function in self._force_at_a(bar)]
+        for load in scene.loads:
+            add_load(load, self)
+        for effect in scene.effects:
+            ELEMENT_OF[effect.key](effect, self)
+        self.state = model.initSystem()
+        for actuator in self.actuators:
+            actuator.overrideActuation(self.state, True)
+        self.pin_a.setIsEnforced(self.state, True)
+        self.matter = model.getMatterSubsystem()
+        self.least_conditioned = 1.0
+        """Of the matrix G M^-1 G^T of its multipliers, over the positions moved so far: least over greatest value."""
+
+    def _joint(self, name: str, parent: int, at: Any, child: int, on: Any) -> Any:
+        joint = osim.PinJoint(name, self.body[parent], vec(*at), vec(), self.body[child], vec(*on), vec())
+        self.model.addJoint(joint)
+        return joint
+
+    def _force_at_a(self, bar: int) -> list[Any]:
+        """The two components of a force on a bar at pin A, to be set at each position."""
+        element = osim.PrescribedForce(f"closing{bar}", self.body[bar])
+        element.setForceIsInGlobalFrame(True)
+        element.setPointFunctions(*constants(self.length[2] if bar == 2 else 0.0, 0.0, 0.0))
+        element.setForceFunctions(*constants(*ZERO))
+        self.model.addForce(element)
+        return [osim.Constant.safeDownCast(element.updForceFunctions().get(axis)) for axis in (0, 1)]
+
+    def torque_between(self, one: int, other: int) -> Any:
+        """An actuator of a couple on a bar, its opposite on another, of a value given at each position."""
+        actuator = osim.TorqueActuator(self.body[other], self.body[one], vec(0.0, 0.0, 1.0), True)
+        actuator.setName(f"couple{len(self.actuators)}")
+        self.model.addForce(actuator)
+        self.actuators.append(actuator)
+        return actuator
+
+    def place(self, q: Sequence[float]) -> None:
+        """Angles of the bars as given."""
+        theta_2, of_3_to_2, theta_4 = q
+        self.state.setQ(vector((theta_2, theta_4, theta_2 + of_3_to_2 - theta_4)))
+        self.model.realizePosition(self.state)
+
+    def _station(self, bar: int, x: float = 0.0, y: float = 0.0) -> Array:
+        return np.array(self.body[bar].findStationLocationInGround(self.state, vec(x, y)).to_numpy()[:2])
+
+    def gap(self) -> tuple[float, float]:
+        """A on bar 2 minus A on bar 3, which opens as B would."""
+        x, y = (self._station(2, self.length[2]) - self._station(3)).tolist()
+        return x, y
+
+    def jacobian(self) -> Array:
+        """Derivative of the gap by the turns of bar 2, of bar 3 against bar 2, and of bar 4."""
+        by_own = self._station_jacobian(2, self.length[2]) - self._station_jacobian(3)
+        return np.column_stack((by_own[:, 0] + by_own[:, 2], by_own[:, 2], by_own[:, 1] - by_own[:, 2]))
+
+    def _station_jacobian(self, bar: int, x: float = 0.0, y: float = 0.0) -> Array:
+        matrix = osim.Matrix()
+        self.matter.calcStationJacobian(self.state, self.body[bar].getMobilizedBodyIndex(), vec(x, y), matrix)
+        return np.array(matrix.to_numpy())[:2]
+
+    def angle(self, bar: int) -> float:
+        """From the rotation of its body; the ground's line as described."""
+        if bar == 1:
+            return self.ground_angle
+        rotation = self.body[bar].getTransformInGround(self.state).R()
+        return math.atan2(rotation.get(1, 0), rotation.get(0, 0))
+
+    def positions(self) -> dict[str, Array]:
+        """Points of the bars."""
+        where = {f"G{bar}": self._station(bar, *self.centre[bar]) for bar in MOVING_BARS}
+        where |= {"A": self._station(3), "A2": self._station(2, self.length[2]), "O4": self._station(4)}
+        return where | {"B": self._station(3, self.length[3]), "B4": self._station(4, self.length[4])}
+
+    def move(self, omega_2: float, alpha_2: float) -> dict[str, Array | float]:
+        """Speeds and accelerations, pin forces and torque; nothing where a toggle leaves them 0/0."""
+        try:
+            turns, accelerations = self._set_motion(omega_2, alpha_2)
+        except np.linalg.LinAlgError:
+            return {}
+        for act in self.before_move:
+            act()
+        leverage = float(PER_COORDINATE[self.drive_bar] @ turns)
+        forces = {} if leverage == 0.0 else self._forces(leverage)  # no torque on that bar moves bar 2
+        return self._motion(accelerations) | forces
+
+    def _set_motion(self, omega_2: float, alpha_2: float) -> tuple[Array, Array]:
+        """Turns of the coordinates per turn of bar 2, and their accelerations, from its constraint equations."""
+        equations = self._equations()
+        turns = np.linalg.solve(equations, PER_COORDINATE[2])
+        self.state.setTime(alpha_2)
+        self.state.setU(vector(turns * omega_2))
+        self.model.realizeVelocity(self.state)
+        bias, matrix = osim.Vector(), osim.Matrix()
+        self.matter.calcBiasForAccelerationConstraints(self.state, bias)
+        self.matter.calcProjectedMInv(self.state, matrix)
+        sizes = np.linalg.svd(np.array(matrix.to_numpy())[:3, :3], compute_uv=False)
+        self.least_conditioned = min(self.least_conditioned, float(sizes[-1] / sizes[0]))
+        return turns, np.linalg.solve(equations, -np.array(bias.to_numpy())[:3])
+
+    def _motion(self, accelerations: Array) -> dict[str, Array | float]:
+        values: dict[str, Array | float] = {}
+        for bar in (3, 4):
+            values[f"omega_{bar}"] = self.velocity(bar)
+            values[f"alpha_{bar}"] = float(PER_COORDINATE[bar] @ accelerations)
+        points = {"a_A": (2, self.length[2], 0.0), "a_B": (4, self.length[4], 0.0)}
+        points |= {f"a_G{bar}": (bar, *self.centre[bar]) for bar in MOVING_BARS}
+        for name, (bar, x, y) in points.items():
+            index, station = self.body[bar].getMobilizedBodyIndex(), vec(x, y)
+            drift = self.matter.calcBiasForStationJacobian(self.state, index, station)
+            values[name] = self._station_jacobian(bar, x, y) @ accelerations + np.array(drift.to_numpy()[:2])
+        return values
+
+    def _forces(self, leverage: float) -> dict[str, Array | float]:
+        """Joint reactions, closing force and torque of its constrained dynamics.
+
+        Simbody holds bar 2 to its motion by a couple: over the leverage it is a torque of the drive. What it finds is
+        given back as forces and found anew, until its multipliers hold nothing but rounding.
+        """
+        torque, closing, before = 0.0, np.zeros(2), (math.inf, math.inf)
+        for number in range(PASSES):
+            self.motor.setOverrideActuation(self.state, torque)
+            for function, value in zip(self.at_a, (*closing, *-closing), strict=True):
+                function.setValue(float(value))
+            self.state.setTime(self.state.getTime())  # Simbody computes again what depends on it
+            self.model.realizeAcceleration(self.state)
+            couple, force = self._couple_on_2(), self._closing_force()
+            torque, closing = torque + couple / leverage, closing + force
+            size = abs(couple), math.hypot(*force)
+            if number > 1 and not (size[0] < before[0] or size[1] < before[1]):  # torque, then force, come first
+                break
+            before = size
+        reactions = {name: self._reaction(pin) for pin, name in {"O2": "F12", "B": "F43", "O4": "F14"}.items()}
+        return {**reactions, "F32": closing, "torque": torque}
+
+    def _equations(self) -> Array:
+        """Derivatives of the constraints by the coordinates: the motion of bar 2, and pin A along two axes."""
+        matrix = osim.Matrix()
+        self.matter.calcG(self.state, matrix)
+        return np.array(matrix.to_numpy())[:3]
+
+    def velocity(self, bar: int) -> float:
+        """Spin of a body; the ground has none."""
+        return 0.0 if bar == 1 else float(self.body[bar].getAngularVelocityInGround(self.state).get(2))
+
+    def _reaction(self, pin: str) -> Array:
+        return np.array(self.joint[pin].calcReactionOnChildExpressedInGround(self.state).get(1).to_numpy()[:2])
+
+    def _couple_on_2(self) -> float:
+        return float(self.joint["O2"].calcReactionOnChildExpressedInGround(self.state).get(0).get(2))
+
+    def _closing_force(self) -> Array:
+        """Force of bar 3 on bar 2, from the multipliers of the constraint; a force on bodies is -G^T lambda."""
+        on_bodies, on_mobilities = osim.VectorOfSpatialVec(), osim.Vector()
+        multipliers = self.state.getMultipliers()
+        self.matter.calcConstraintForcesFromMultipliers(self.state, multipliers, on_bodies, on_mobilities)
+        found = on_bodies.get(int(self.body[2].getMobilizedBodyIndex())).get(1)
+        return np.array([-found.get(0), -found.get(1)])
