@@ -106,6 +106,21 @@ def test_an_engine_that_crashes_or_hangs_costs_its_own_rows(tmp_path: Path, monk
         assert any(row.scene == scene and row.engine == "free-body" for row in rows)
 
 
+def test_a_worker_ends_itself_in_the_scene_that_hangs_and_with_its_parent() -> None:
+    """The limit is that of a scene, whatever the others of its chunk took."""
+    judge = (
+        f"from {__name__} import Few; from validation.run import pool; "
+        "from validation.compare.tolerance import EQUIVALENCE; from validation.engines.witnesses import Witness; "
+        f"moody = [Witness('moody', '{__name__}:Moody', EQUIVALENCE)]; pool.ready(%s); print('ready', flush=True); "
+        "pool.judge_watched(%s, Few(), [0, 2], moody, False)"
+    )
+    for parent, limit in (("0", 1.0), ("1", 100.0)):  # the parent of the second is another
+        line = [sys.executable, "-c", judge % (parent, limit)]
+        began = time.monotonic()
+        done = subprocess.run(line, cwd=Path(__file__).parent.parent, capture_output=True, check=False, timeout=60)
+        assert done.returncode == 1 and time.monotonic() - began < 60.0, done.stderr
+
+
 @pytest.mark.parametrize("how", ["killed", "locked out"])
 def test_what_comes_from_outside_is_not_held_against_the_engine(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, how: str
@@ -120,7 +135,7 @@ def test_what_comes_from_outside_is_not_held_against_the_engine(
     assert not list((tmp_path / "lives").iterdir())
 
 
-def dies_at_first() -> None:
+def dies_at_first(parent: int) -> None:
     """Starts no worker as long as some of its lives are left in the folder that the run was given."""
     lives = sorted(Path(os.environ["LIVES"]).iterdir())
     if lives:

@@ -29,6 +29,7 @@ from validation.report.record import Record
 from validation.report.summary import SCENES_SHOWN, Summary, summarise
 from validation.run import pool
 from validation.run.elsewhere import run_elsewhere
+from validation.run.machines import Cluster
 from validation.run.selection import askable, chosen, selected
 from validation.run.store import Store
 from validation.scenes.random import LinkageType
@@ -72,8 +73,9 @@ def run(
         done = store.done()
         yield sum(len(chunks[number]) for number in done)
         todo = [(number, scenes) for number, scenes in enumerate(chunks) if number not in done]
-        if scheduler is not None:
-            answers = pool.over_machines(suite, todo, witnesses, draw, scheduler, seconds)
+        cluster = None if scheduler is None else Cluster(scheduler)
+        if cluster is not None:
+            answers = cluster.over(suite, todo, witnesses, draw, seconds)
         else:
             answers = pool.over_processes(suite, todo, witnesses, draw, workers, seconds)
         for number, records in answers:
@@ -84,7 +86,10 @@ def run(
         summary = summarise(store.records(len(chunks)), ladder, held_to, missing)
         first_lines = write_columns(store.rows(len(chunks)), out)
         factors = {witness.name: witness.tolerance.factor for witness in witnesses}
-        write_about(about(factors, suite.fingerprint()), out)
+        record = about(factors, suite.fingerprint())
+        if cluster is not None:
+            record.settings["machines"] = cluster.machines
+        write_about(record, out)
         write_text(out / "timings.csv", timings_csv(store.records(len(chunks))))
         write_text(out / "report.md", markdown(summary))
         drawn, why_not = mjcf_pictures(suite) if draw and simulated else ({}, "")
