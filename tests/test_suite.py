@@ -1,6 +1,8 @@
 """Nothing is lost: whatever dies, finished scenes stay, and a rerun ends with the same bytes."""
 
+import math
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -13,17 +15,19 @@ import numpy as np
 import pytest
 
 import validation.run.run
-from fourbar.errors import FourBarError, InputError
+from fourbar.errors import DependencyError, FourBarError, InputError
 from fourbar.scene import Command, Scene
 from tests.scenes import crank_rocker
 from validation.compare.answer import Answer
-from validation.compare.rows import FAILS, from_csv
+from validation.compare.rows import FAILS, REFUSES, Row, from_csv
 from validation.compare.tolerance import EQUIVALENCE
 from validation.engines import added
 from validation.engines.witnesses import Witness
+from validation.report.record import Record
 from validation.report.summary import SCENES_SHOWN, Summary
 from validation.run import pool
-from validation.run.run import run
+from validation.run.code import build, checkout, code
+from validation.run.run import Collected, run
 from validation.run.selection import chosen
 from validation.run.store import RunningError, Store
 from validation.scenes.random import LinkageType
@@ -87,8 +91,9 @@ class Moody:
 def judge_all(
     suite: object, out: Path, witnesses: tuple[Witness, ...] = EXACT, workers: int = 2, seconds: float | None = None
 ) -> Summary:
-    *_, last = run(suite, out, witnesses, workers=workers, seconds=seconds)  # type: ignore[arg-type]
+    *steps, last = run(suite, out, witnesses, workers=workers, seconds=seconds)  # type: ignore[arg-type]
     assert isinstance(last, Summary)
+    assert sum(step for step in steps if isinstance(step, Collected)) == len(suite)  # type: ignore[arg-type]
     return last
 
 
@@ -185,11 +190,57 @@ def test_two_runs_into_one_folder_refuse_each_other(tmp_path: Path) -> None:
         pass
 
 
-def test_another_suite_does_not_resume_the_parts_of_this_one(tmp_path: Path) -> None:
-    for identity, kept in (({"scenes": "one"}, 0), ({"scenes": "one"}, 1), ({"scenes": "two"}, 0)):
+def test_another_suite_or_code_does_not_resume_the_parts_of_this_one(tmp_path: Path) -> None:
+    one = {"scenes": "one", **code()}
+    for identity, kept, note in (
+        (one, 0, []),
+        (one, 1, []),
+        (one | {"scenes": "two"}, 0, ["made again: the parts of another run (scenes)"]),
+        (one | {"code": "changed"}, 0, ["made again: the parts of another run (code, scenes)"]),
+    ):
         with Store(tmp_path, identity).held() as store:
-            assert len(store.done()) == kept
+            assert (len(store.done()), store.notes) == (kept, note)
             store.put(0, [])
+
+
+def test_the_hash_of_the_code_is_that_of_its_modules(tmp_path: Path) -> None:
+    hashes = []
+    for name, text in (
+        ("fourbar/a.py", "1"),
+        ("validation/b.py", "2"),
+        ("validation/b.py", "3"),
+        ("fourbar/a.txt", ""),
+    ):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text(text)
+        hashes.append(checkout(tmp_path))
+    assert len(set(hashes)) == 3 and hashes[2] == hashes[3]
+    assert build("numpy") and build("no-such-package") == ""
+
+
+def test_damaged_swapped_and_foreign_parts_are_made_again_and_named(tmp_path: Path) -> None:
+    row = Row("a", "engine", "exact", "torque", math.nan, math.inf, REFUSES, "a limit", -0.0, 1e-300)
+    record = Record("a", title="A", rows=[row])
+    with Store(tmp_path / "foreign", {"scenes": "two"}).held() as other:
+        other.put(4, [record])
+    with Store(tmp_path / "run", {"scenes": "one"}).held() as store:
+        for chunk in range(6):
+            store.put(chunk, [record])
+        assert store.done() == set(range(6)) and repr(store.read(5)) == repr([record])
+        first = store.parts / "000000"
+        first.write_bytes(first.read_bytes()[:-1])
+        (store.parts / "000001").write_bytes(b"")
+        (store.parts / "000002").rename(store.parts / "swap")
+        (store.parts / "000003").rename(store.parts / "000002")
+        (store.parts / "swap").rename(store.parts / "000003")
+        shutil.copy(tmp_path / "foreign" / "parts" / "000004", store.parts / "000004")
+        assert store.done() == {5}
+        assert [note.rpartition(": ")[2] for note in store.notes] == [
+            *("is damaged", "is damaged", "is another part", "is another part", "is of another run")
+        ]
+        (store.parts / "000005").write_bytes(b"{}")
+        with pytest.raises(DependencyError, match="is damaged; run it again"):
+            store.read(5)
 
 
 LIMITED = (
@@ -214,7 +265,7 @@ def start(out: Path, count: int, *program: str, stderr: int = subprocess.DEVNULL
 
 def wait_for_parts(out: Path, process: subprocess.Popen[bytes], at_least: int) -> None:
     deadline = time.monotonic() + 60.0
-    while len(list(out.glob("parts/*.csv"))) < at_least and process.poll() is None and time.monotonic() < deadline:
+    while len(list(out.glob("parts/0*"))) < at_least and process.poll() is None and time.monotonic() < deadline:
         time.sleep(0.01)
 
 

@@ -78,8 +78,8 @@ class Cluster:
         there = self.client.nthreads()  # type: ignore[no-untyped-call]
         found: Counter[str] = Counter()
         try:
-            asked = {self.client.submit(here, workers=[worker], pure=False): worker for worker in there}
-            for task, worker in asked.items():
+            tasks = {self.client.submit(here, workers=[worker], pure=False): worker for worker in there}
+            for task, worker in tasks.items():
                 while not self.done([task], pool.STALL):
                     if self.lost([task]):
                         raise self._no_workers()
@@ -140,7 +140,7 @@ class Cluster:
             except TimeoutError:  # the worker that has it is gone, or the result was lost in transit
                 if self.lost([task]):
                     raise pool.StalledError from None
-            except CancelledError:  # what was under way when the scheduler was lost
+            except CancelledError:  # what was unfinished when the scheduler was lost
                 raise self._gone() from None
             except ImportError as error:  # a worker that joined later; what an engine does not find is in its row
                 raise self._unfit(error) from None

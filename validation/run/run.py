@@ -1,7 +1,7 @@
 """The run: every scene judged, the results streamed to disk, the report written."""
 
 import csv
-import io
+import math
 import os
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
@@ -12,7 +12,7 @@ import click
 from fourbar.errors import FAILED, DependencyError, FourBarError, InputError
 from fourbar.mjcf import mjcf
 from fourbar.writing import write_text
-from validation.compare.columns import write_columns
+from validation.compare.columns import Columns
 from validation.compare.rows import FAILS, Row
 from validation.compare.tolerance import IDENTITY, SIMULATED
 from validation.engines.hard_suite import Hard
@@ -23,11 +23,11 @@ from validation.regression.accept import output_options, told
 from validation.regression.record import about, baseline, read_run, write_about
 from validation.report import cost_section, hard_section
 from validation.report.html import Section, html
-from validation.report.machine import versions
 from validation.report.markdown import markdown
 from validation.report.record import Record
-from validation.report.summary import SCENES_SHOWN, Summary, summarise
+from validation.report.summary import SCENES_SHOWN, Summary, Summing
 from validation.run import pool
+from validation.run.code import code
 from validation.run.elsewhere import run_elsewhere
 from validation.run.machines import Cluster
 from validation.run.selection import askable, chosen, selected
@@ -39,6 +39,13 @@ WORKERS = 2
 ALL_TYPES = ",".join(kind.value for kind in LinkageType)
 CHUNK = {True: 1, False: 20}
 """Scenes per task: one where something is simulated or drawn (a second each), else twenty (a second together)."""
+MOST_PARTS = 10_000
+"""Files that a run keeps while it goes on: of a million scenes a hundred stand in each."""
+TIMINGS = ("scene", "engine", "setting", "positions", "seconds", "times_formulas")
+
+
+class Collected(int):
+    """Scenes that were read back for the report."""
 
 
 def run(
@@ -51,8 +58,10 @@ def run(
     published: bool = False,
     missing: Sequence[tuple[str, str]] = (),
     seconds: float | None = None,
-) -> Iterator[int | Summary]:
-    """Judge a suite into a folder; yields the number of scenes done as they come, at last the summary.
+) -> Iterator[int | str | Collected | Summary]:
+    """Judge a suite into a folder; yields the number of scenes done as they come, then collected, at last the summary.
+
+    What of an earlier run is not kept is yielded as a line of text.
 
     With `published` the report sets what the thesis printed against what is right, error by error.
     `missing` are the witnesses that cannot answer here, each with the reason; `seconds`: after which a scene hangs.
@@ -61,16 +70,17 @@ def run(
     """
     simulated = any(witness.name == "mujoco-simulated" for witness in witnesses)
     draw = len(suite) <= SCENES_SHOWN
-    size = CHUNK[simulated or draw or seconds is not None]
+    size = max(CHUNK[simulated or draw], math.ceil(len(suite) / MOST_PARTS))
     chunks = [range(start, min(start + size, len(suite))) for start in range(0, len(suite), size)]
     identity = {
         "scenes": suite.fingerprint(),
         "witnesses": [f"{witness.name} {witness.tolerance.factor!r}" for witness in witnesses],
-        "versions": versions(),
+        **code(),
         "draw": draw,
     }
     with Store(out, identity).held() as store:
         done = store.done()
+        yield from store.notes
         yield sum(len(chunks[number]) for number in done)
         todo = [(number, scenes) for number, scenes in enumerate(chunks) if number not in done]
         cluster = None if scheduler is None else Cluster(scheduler)
@@ -83,19 +93,29 @@ def run(
             yield len(records)
         held_to = list(dict.fromkeys((IDENTITY, *(witness.tolerance for witness in witnesses))))
         ladder = ladder_rows() if published else []
-        summary = summarise(store.records(len(chunks)), ladder, held_to, missing)
-        first_lines = write_columns(store.rows(len(chunks)), out)
+        summing = Summing()
+        times = out / ".timings.csv.part"
+        with Columns(out) as columns, times.open("w", encoding="utf-8", newline="") as file:
+            csv.writer(file, lineterminator="\n").writerow(TIMINGS)
+            for number, scenes in enumerate(chunks):
+                records = store.read(number)
+                for each in records:
+                    summing.add(each)
+                    csv.writer(file, lineterminator="\n").writerows(timings(each))
+                columns.add([row for each in records for row in each.rows])
+                yield Collected(len(scenes))
+        os.replace(times, out / "timings.csv")
+        summary = summing.summary(ladder, held_to, missing)
         factors = {witness.name: witness.tolerance.factor for witness in witnesses}
         record = about(factors, suite.fingerprint())
         if cluster is not None:
             record.settings["machines"] = cluster.machines
         write_about(record, out)
-        write_text(out / "timings.csv", timings_csv(store.records(len(chunks))))
         write_text(out / "report.md", markdown(summary))
         drawn, why_not = mjcf_pictures(suite) if draw and simulated else ({}, "")
-        rows = (row for chunk in store.rows(len(chunks)) for row in chunk)
+        rows = (row for number in range(len(chunks)) for each in store.read(number) for row in each.rows)
         more = sections(rows if isinstance(suite, Hard) else None, out)
-        page = html(summary, first_lines, pictures=drawn, no_pictures=why_not, sections=more)
+        page = html(summary, columns.first_lines, pictures=drawn, no_pictures=why_not, sections=more)
         write_text(out / "report.html", page)
         store.finish()
     yield summary
@@ -128,16 +148,11 @@ def mjcf_pictures(suite: Suite) -> tuple[dict[str, str], str]:
     return pictures(texts)
 
 
-def timings_csv(records: Iterator[Record]) -> str:
+def timings(record: Record) -> Iterator[list[str]]:
     """Seconds per answer, and their ratio to the formulas' on the same scene in the same process."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(["scene", "engine", "setting", "positions", "seconds", "times_formulas"])
-    for record in records:
-        for t in record.timings:
-            ratio = t.seconds / record.timings[0].seconds
-            writer.writerow([t.scene, t.engine, t.setting, t.positions, f"{t.seconds:.6f}", f"{ratio:.1f}"])
-    return text.getvalue()
+    for t in record.timings:
+        ratio = t.seconds / record.timings[0].seconds
+        yield [t.scene, t.engine, t.setting, str(t.positions), f"{t.seconds:.6f}", f"{ratio:.1f}"]
 
 
 def examine(scenes: tuple[Path, ...], mjcf: Path, names: tuple[str, ...], out: Path, wanted: float | None) -> int:
@@ -271,17 +286,21 @@ def command(
     return result.counts.status
 
 
-def _in_sight(scenes: int, steps: Iterable[int | Summary]) -> Summary:
+def _in_sight(scenes: int, steps: Iterable[int | str | Collected | Summary]) -> Summary:
     """The summary at the end of a run, its progress shown meanwhile."""
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-    columns = (TextColumn("judging"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    step: int | Summary = 0
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    step: int | str | Summary = 0
     with Progress(*columns, console=Console(stderr=True)) as progress:
-        task = progress.add_task("judging", total=scenes)
+        judging = progress.add_task("judging", total=scenes)
+        collecting = progress.add_task("collecting", total=scenes, visible=False)
         for step in steps:
-            if isinstance(step, int):
-                progress.advance(task, step)
+            if isinstance(step, str):
+                progress.console.print(step, markup=False, highlight=False)
+            elif isinstance(step, int):
+                progress.update(collecting, visible=isinstance(step, Collected))
+                progress.advance(collecting if isinstance(step, Collected) else judging, step)
     assert isinstance(step, Summary)
     return step
