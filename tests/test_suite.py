@@ -7,9 +7,11 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -24,18 +26,18 @@ from validation.compare.tolerance import EQUIVALENCE
 from validation.engines import added
 from validation.engines.witnesses import Witness
 from validation.report.record import Record
-from validation.report.summary import SCENES_SHOWN, Summary
+from validation.report.summary import Summary
 from validation.run import pool
 from validation.run.code import build, checkout, code
 from validation.run.run import Collected, run
 from validation.run.selection import chosen
 from validation.run.store import RunningError, Store
 from validation.scenes.random import LinkageType
-from validation.scenes.suites import AS_LONG_AS, MOST_POSITIONS, Files, Random, scene_files
+from validation.scenes.suites import AS_LONG_AS, MOST_POSITIONS, Files, Random, Suite, scene_files
 
 SEED = 7
-COUNT = SCENES_SHOWN + 20
-"""More than are drawn, so that the work is the judging alone."""
+COUNT = 100
+"""Five parts."""
 KILLS = int(os.environ.get("KILLS", "3"))
 """Kills in each of the tests that kill; `make long-test` asks for 50."""
 TYPES = tuple(LinkageType)
@@ -91,7 +93,7 @@ class Moody:
 def judge_all(
     suite: object, out: Path, witnesses: tuple[Witness, ...] = EXACT, workers: int = 2, seconds: float | None = None
 ) -> Summary:
-    *steps, last = run(suite, out, witnesses, workers=workers, seconds=seconds)  # type: ignore[arg-type]
+    *steps, last = run(suite, out, witnesses, workers=workers, seconds=seconds, drawn=False)  # type: ignore[arg-type]
     assert isinstance(last, Summary)
     assert sum(step for step in steps if isinstance(step, Collected)) == len(suite)  # type: ignore[arg-type]
     return last
@@ -253,7 +255,7 @@ LIMITED = (
 def start(out: Path, count: int, *program: str, stderr: int = subprocess.DEVNULL) -> subprocess.Popen[bytes]:
     command = [sys.executable, *(program or ("-m", "validation")), "run", "--random", str(count)]
     return subprocess.Popen(
-        [*command, "--engines", "free-body", "--out", str(out)],
+        [*command, "--engines", "free-body", "--no-pictures", "--out", str(out)],
         cwd=Path(__file__).parent.parent,
         stdout=subprocess.DEVNULL,
         stderr=stderr,
@@ -373,3 +375,44 @@ def test_a_scene_of_too_many_positions_is_refused_before_anything_runs(motion: s
 
 def test_a_scene_of_many_positions_has_longer_before_it_counts_as_hanging() -> None:
     assert pool.longest(Files((), 50_000)) > 20 * pool.longest(Random(1, 0, TYPES))
+
+
+class Blunders:
+    """Breaks down in scene b, answers nothing in scene c, and declines elsewhere."""
+
+    name = "blunders"
+    titles: ClassVar[list[str]] = []
+
+    def answer(self, scene: Scene, command: Command) -> Answer:
+        self.titles.append(scene.title)
+        if scene.title == "b":
+            raise RuntimeError("no licence")
+        return Answer("blunders", "exact", refusal=None if scene.title == "c" else "declined")
+
+
+def test_of_a_long_suite_what_fails_has_pictures_and_what_is_nearest_to_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Drawn at the end, without the engine that broke down; with --no-pictures not at all."""
+    drawn: list[str] = []
+
+    def here(
+        suite: Suite, chunks: Iterable[pool.Chunk], who: tuple[Witness, ...], draw: bool, *_: object
+    ) -> Iterator[tuple[int, list[Record]]]:
+        for number, scenes in chunks:
+            drawn.extend(suite.name(scene) for scene in scenes if draw)
+            yield number, pool.judge_chunk(suite, scenes, who, draw)
+
+    monkeypatch.setattr(pool, "over_processes", here)
+    monkeypatch.setattr("validation.report.summary.PICTURED", 3)
+    monkeypatch.setattr(validation.run.run, "PICTURED", 3)
+    monkeypatch.setattr(validation.run.run, "html", lambda *_, **__: "")
+    blunders = Witness("blunders", f"{__name__}:Blunders", EQUIVALENCE)
+    *_, without = run(Few(), tmp_path / "without", (*EXACT, blunders), drawn=False)
+    assert not drawn and not any(record.figure for record in without.shown)  # type: ignore[union-attr]
+    once = Blunders.titles.count("b")
+    *_, last = run(Few(), tmp_path / "with", (*EXACT, blunders))
+    assert isinstance(last, Summary) and len(drawn) == 3 and {"b", "c"} < set(drawn)
+    assert {record.name for record in last.shown if record.figure} == set(drawn)
+    assert Blunders.titles.count("b") == 2 * once
+    assert (tmp_path / "with" / "results.csv").read_bytes() == (tmp_path / "without" / "results.csv").read_bytes()

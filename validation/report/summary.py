@@ -91,6 +91,8 @@ class Summary:
 
 
 SCENES_SHOWN = 200
+PICTURED = 24
+"""Scenes with pictures, where fewer fail: to draw one takes ten times as long as to judge it by an exact engine."""
 WORST_SHOWN = 60
 ORDERS_SHOWN = 20
 FAILURES_KEPT = 1000
@@ -138,13 +140,35 @@ class Summing:
         _measure_k(scene.rows, self.measured_k)
         self.independence.update(scene.independence)
         _add_costs(scene, self.costs)
-        known = [(scene.name, each) for each in scene.evidence.values() if "observed_order" in each]
-        self.orders = _top(ORDERS_SHOWN, [*self.orders, *known], _lowest)
+        self._add_orders(scene)
         if bad:
             self.failing += [scene][: SCENES_SHOWN - len(self.failing)]
         else:
             most = max((w.used for w in found), default=0.0)
             self.holding = _top(SCENES_SHOWN, [*self.holding, (most, scene)], lambda each: each[0])
+
+    @property
+    def shown(self) -> list[Record]:
+        """The scenes shown one by one, by name."""
+        holding = nlargest(SCENES_SHOWN - len(self.failing), self.holding, key=lambda each: each[0])
+        return sorted([*self.failing, *(scene for _, scene in holding)], key=lambda scene: scene.name)
+
+    @property
+    def pictured(self) -> list[Record]:
+        """Those of them that have pictures: all that fail, and of the others those that used most."""
+        holding = nlargest(PICTURED - len(self.failing), self.holding, key=lambda each: each[0])
+        return [*self.failing, *(scene for _, scene in holding)]
+
+    def picture(self, drawn: Record) -> None:
+        """Add what was drawn and measured of a scene that is shown."""
+        for scene in self.shown:
+            if scene.name == drawn.name:
+                scene.figure = drawn.figure
+        self._add_orders(drawn)
+
+    def _add_orders(self, scene: Record) -> None:
+        known = [(scene.name, each) for each in scene.evidence.values() if "observed_order" in each]
+        self.orders = _top(ORDERS_SHOWN, [*self.orders, *known], _lowest)
 
     def summary(
         self,
@@ -160,8 +184,6 @@ class Summing:
         orders = self.orders
         if len(orders) > ORDERS_SHOWN:
             orders = nlargest(ORDERS_SHOWN, orders, key=_lowest)
-        holding = nlargest(SCENES_SHOWN - len(self.failing), self.holding, key=lambda each: each[0])
-        shown = sorted([*self.failing, *(scene for _, scene in holding)], key=lambda scene: scene.name)
         return Summary(
             verdict=verdict,
             scenes=self.counts.scenes,
@@ -188,7 +210,7 @@ class Summing:
             ladder=list(ladder),
             tolerances=list(tolerances),
             missing=list(missing),
-            shown=shown,
+            shown=self.shown,
         )
 
 
