@@ -15,8 +15,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import validation.run.run
 from fourbar.errors import InputError
-from tests.test_suite import COUNT, EXACT, KILLS, SEED, TYPES, judge_all
+from tests.test_suite import COUNT, EXACT, IN_A_CHUNK, KILLS, SEED, TYPES, judge_all
 from validation.compare.rows import FAILS
 from validation.report.summary import Summary
 from validation.run import machines, pool
@@ -52,7 +53,8 @@ def running(nanny: object) -> int | None:
 
 
 @pytest.mark.timeout(120 + 20 * KILLS)
-def test_killed_workers_change_no_byte(cluster: object, tmp_path: Path) -> None:
+def test_killed_workers_change_no_byte(cluster: object, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(validation.run.run, "CHUNK", {False: IN_A_CHUNK})
     suite = Random(COUNT, SEED, TYPES)
     judge_all(suite, tmp_path / "here")
     rng = np.random.default_rng(SEED)
@@ -137,7 +139,7 @@ def test_a_lost_scheduler_ends_the_run_and_writes_nothing(
 ) -> None:
     scheduler, address = started("scheduler", "--host", "127.0.0.1", "--port", "0")
     started("worker", *WORKER)
-    suite, steps = Random(COUNT, SEED, TYPES), 0
+    suite, steps = Random(200, SEED, TYPES), 0
     with pytest.raises(ClusterError, match="the scheduler is gone; what is finished is kept"):
         for step in run(suite, tmp_path / "out", EXACT, drawn=False, scheduler=address):
             steps += bool(step)

@@ -20,8 +20,9 @@ from validation.engines.hard_suite import Hard
 from validation.engines.mujoco.picture import pictures
 from validation.engines.witnesses import Witness
 from validation.published import ladder_rows
-from validation.regression.accept import output_options, told
+from validation.regression.accept import output_options, report_differences
 from validation.regression.record import about, baseline, read_run, write_about
+from validation.regression.scenes import descriptions
 from validation.report import cost_section, hard_section
 from validation.report.html import Section, html
 from validation.report.markdown import markdown
@@ -124,7 +125,7 @@ def run(
                 yield Drawn(1)
         summary = summing.summary(ladder, held_to, missing)
         factors = {witness.name: witness.tolerance.factor for witness in witnesses}
-        record = about(factors, suite.fingerprint())
+        record = about(factors, suite.fingerprint(), descriptions(suite))
         if cluster is not None:
             record.settings["machines"] = cluster.machines
         write_about(record, out)
@@ -198,7 +199,7 @@ def timings(record: Record) -> Iterator[list[str]]:
 
 def examine(scenes: tuple[Path, ...], mjcf: Path, names: tuple[str, ...], out: Path, wanted: float | None) -> int:
     """What a user's own MJCF of one scene differs in, and what it costs; 1 where it is wrong by more than wanted."""
-    from validation.check.model import examine_model, named, tell
+    from validation.check.model import examine_model, named, show
     from validation.run.dial import held_to
 
     if len(scenes) != 1:
@@ -206,13 +207,15 @@ def examine(scenes: tuple[Path, ...], mjcf: Path, names: tuple[str, ...], out: P
     suite = scene_files(scenes)
     tolerance = SIMULATED if wanted is None else held_to(wanted, "what this file may be wrong by")
     report = examine_model(suite.name(0), suite.scene(0), mjcf, named(names), tolerance)
-    tell(report, mjcf, out)
+    show(report, mjcf, out)
     return report.counts.status
 
 
 @click.command(name="run")
 @click.argument("scenes", nargs=-1, type=click.Path(path_type=Path))
-@click.option("--out", type=click.Path(path_type=Path, file_okay=False), default=Path("results"), show_default=True)
+@click.option(
+    "-o", "--out", type=click.Path(path_type=Path, file_okay=False), default=Path("results"), show_default=True
+)
 @click.option("--engines", metavar="NAMES", help="Comma-separated witnesses; left out: all.")
 @click.option(
     "--error",
@@ -248,7 +251,14 @@ def examine(scenes: tuple[Path, ...], mjcf: Path, names: tuple[str, ...], out: P
 )
 @click.option("--no-pictures", is_flag=True, help="Draw nothing, and measure no observed order of a simulation.")
 @click.option("--mjcf", type=click.Path(path_type=Path), help="Examine this MJCF of the one SCENE instead.")
-@click.option("--name", "names", metavar="ROLE=NAME", multiple=True, help="Body or site of --mjcf named otherwise.")
+@click.option(
+    "--name",
+    "names",
+    metavar="ROLE=NAME",
+    multiple=True,
+    help="Of --mjcf: the body that is the input, coupler or output; B3, B4: the sites of pin B on the coupler and the "
+    "output, where no connect or weld closes the loop. Left out: guessed from structure and lengths, and printed.",
+)
 @output_options
 def command(
     scenes: tuple[Path, ...],
@@ -322,7 +332,7 @@ def command(
     how: dict[str, Any] = {"workers": workers, "scheduler": scheduler, "seconds": time_limit, "drawn": not no_pictures}
     result = _in_sight(len(suite), run(suite, out, present, published=published, missing=missing, **how))
     table(result, out)
-    worse = told(baseline(against), out, forms) if against is not None else 0
+    worse = report_differences(baseline(against), out, forms) if against is not None else 0
     if result.counts[FAILS] or worse:
         return FAILED
     if missing:
