@@ -13,13 +13,14 @@ test: setup
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
-	$(BIN)/python -m pytest -n 2
+	$(BIN)/python -m pytest -n 2 --dist worksteal
 
 # hours: everything that `make test` samples, in full
 long-test: setup
 	KILLS=50 $(BIN)/python -m pytest tests/test_suite.py tests/test_dask.py
 	PACKAGE=all $(BIN)/python -m pytest tests/test_package.py
 	MACHINES=all $(BIN)/python -m pytest tests/test_machines.py
+	INSTRUCTIONS=all $(BIN)/python -m pytest tests/test_effects_cost.py
 	$(BIN)/python -m pytest tests/test_further_engines.py
 	FREE_MOTIONS=30 $(BIN)/python -m pytest -n 2 tests/test_free_motion_reference.py
 	$(BIN)/python -m validation fuzz-files --count 100000

@@ -12,6 +12,7 @@ exactly and nothing cancels near it; nothing passes through zero at theta = 180 
 Source: R. L. Norton, Design of Machinery, ch. 4 (the loop and its two branches).
 """
 
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -66,6 +67,11 @@ def anywhere(mask: Number) -> bool:
     return bool(mask.any()) if isinstance(mask, np.ndarray) else bool(mask)
 
 
+def select(mask: Number, x: Number, y: Number) -> Number:
+    """x where a mask holds, y elsewhere; for a plain one the number itself."""
+    return np.where(mask, x, y) if isinstance(mask, np.ndarray) else (x if mask else y)
+
+
 def two_sum(x: Number, y: Number) -> tuple[Number, Number]:
     """x + y = s + r exactly, s the rounded sum.
 
@@ -99,15 +105,21 @@ def loop(d: Number, a: Number, b: Number, c: Number) -> Loop:
 def vector(x: Number, y: Number) -> Number:
     """x + i y, each part written once: over arrays the sum takes three times as long."""
     if not isinstance(x, np.ndarray) and not isinstance(y, np.ndarray):
-        return np.complex128(complex(x, y))
+        plain = complex(x, y)
+        return plain if type(x) is type(y) is float else np.complex128(plain)
     z = np.empty(np.broadcast(x, y).shape, dtype=complex)
     z.real, z.imag = x, y
     return z[()]
 
 
 def direction(theta: Number) -> Number:
-    """e^{i theta} from one tangent: ((1 - t^2) + 2 i t)/(1 + t^2), t = tan(theta/2)."""
+    """e^{i theta} from one tangent."""
     t = np.tan(0.5 * theta)
+    return direction_of_tangent(t.item() if type(theta) is float else t)
+
+
+def direction_of_tangent(t: Number) -> Number:
+    """e^{i theta} = ((1 - t^2) + 2 i t)/(1 + t^2), t = tan(theta/2)."""
     kk = 1.0 / (1.0 + t * t)
     return vector((1.0 - t * t) * kk, 2.0 * t * kk)
 
@@ -117,12 +129,21 @@ def polar(r: Number, phi: Number) -> Number:
     return r * np.cos(phi) + 1j * (r * np.sin(phi))
 
 
+def square_root(x: Number) -> Number:
+    """sqrt(x), NaN where x < 0, of Python's own floats as such."""
+    return math.sqrt(x) if type(x) is float and x >= 0.0 else np.sqrt(x)
+
+
 def half_angle(lengths: Loop, psi: Number) -> HalfAngle:
-    """The half angle h of psi = theta_2 - theta_1 (rad) by its tangent, and the factors of Heron's formula."""
-    t = np.tan(0.5 * psi)
+    """The half angle h of psi = theta_2 - theta_1 (rad), and the factors of Heron's formula."""
+    return half_angle_of_tangent(lengths, np.tan(0.5 * psi))
+
+
+def half_angle_of_tangent(lengths: Loop, t: Number) -> HalfAngle:
+    """The same of t = tan h."""
     meets = lengths.E2 == 0.0
     if anywhere(meets):
-        t = np.where(meets, t + np.copysign(HAIR, t), t)
+        t = select(meets, t + np.copysign(HAIR, t), t)
     kk = 1.0 / (1.0 + t * t)
     sk = t * kk
     ss = t * sk
@@ -131,8 +152,8 @@ def half_angle(lengths: Loop, psi: Number) -> HalfAngle:
     short = four_ad > four_bc
     if anywhere(short):  # outer + inner = 4 b c: of the two, the one that changes less over psi has the digits
         outer, inner = (
-            np.where(short & (ss < kk), four_bc - inner, outer),
-            np.where(short & (kk <= ss), four_bc - outer, inner),
+            select(short & (ss < kk), four_bc - inner, outer),
+            select(short & (kk <= ss), four_bc - outer, inner),
         )
     return HalfAngle(ss, kk, sk, outer, inner)
 
@@ -157,7 +178,7 @@ def close_loop(lengths: Loop, u1: Number, u2: Number, half: HalfAngle, branch: N
     """
     d, a, b, c, _, _ = lengths
     e2 = half.inner + (b - c) * (b - c)
-    root = branch * np.sqrt(half.outer * half.inner)
+    root = branch * square_root(half.outer * half.inner)
     diagonal = vector((d - a) + 2.0 * a * half.ss, -2.0 * a * half.sk) * u1
     # e^2 + b^2 - c^2 and b^2 - e^2 - c^2 from the factor that the root is made of, so that u3, u4 keep their length
     at_A, at_O4 = half.inner + 2.0 * b * (b - c), 2.0 * c * (b - c) - half.inner
