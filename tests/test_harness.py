@@ -82,7 +82,7 @@ def rows_of(engine: type, scene: Scene | None = None) -> dict[str, Row]:
 def test_an_equal_answer_agrees_in_every_quantity() -> None:
     rows = rows_of(Echo)
     stated = {"range", "limit_positions", "transmission"}
-    assert set(rows) == {*COMPARED, "assembled", "untold", "closure", "torque_inertia"} | stated
+    assert set(rows) == {*COMPARED, "assembled", "undecided", "closure", "torque_inertia"} | stated
     assert all(row.verdict == AGREES for row in rows.values())
 
 

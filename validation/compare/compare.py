@@ -46,8 +46,8 @@ OF_THE_FORMULAS = (*OF_DRY_FRICTION, *OF_PIN_LOADS, "torque_error", "force_error
 COMPARED = tuple(name for name in STAGE_OF if name not in OF_THE_FORMULAS)
 """Every quantity that an exact engine is held to: all that is printed of a position."""
 OF_FORCES = (*FORCES, *OF_DRY_FRICTION)
-MOST_UNTOLD = 0.5
-"""Share of the numbers of a scene of which nothing can be told, beyond which it does not hold."""
+MOST_UNDECIDED = 0.5
+"""Share of the numbers of a scene that are undecided, beyond which it does not hold."""
 SLOW_DRIVE = 0.1
 """T3 and T4 have poles where omega_3, omega_4 vanish: a simulation is judged where the driven bar
 turns at more than this part of its greatest speed."""
@@ -87,7 +87,7 @@ def compare(
     rows = [each.assembled()]
     rows += [row for quantity in STAGE_OF if quantity in expected for row in each.judged(quantity)]
     rows += [each.row("watch", FAILS, alarm) for alarm in answer.alarms]
-    return [*rows, *each.untold()]
+    return [*rows, *each.undecided()]
 
 
 @dataclass(slots=True)
@@ -103,7 +103,7 @@ class _Comparison:
     own: Solution | None
     basis: Solution | None
     numbers: int = 0
-    told: int = 0
+    decided: int = 0
 
     def row(self, quantity: str, verdict: str, reason: str, **numbers: float) -> Row:
         """A row of this answer."""
@@ -153,13 +153,13 @@ class _Comparison:
         note = f"; not judged: {withheld}" if withheld else ""
         if jumping.any():
             count = int(np.count_nonzero(jumping))  # of either side of a reversal the forces are right
-            self.told += count
+            self.decided += count
             note += f"; {count} positions at which dry friction reverses not judged"
         if not where.any():
             yield self.row(quantity, UNDECIDED, "no position at which both may be held to it" + note)
             return
         found, error, condition = self._measured(quantity, ours, theirs, where)
-        self.told += found.told
+        self.decided += found.decided
         at = {"theta_2": formulas.theta_2[found.worst], "condition": condition[found.worst]}
         yield self.row(
             quantity, found.verdict, found.reason + note, error=error[found.worst], allowed=found.allowed, **at
@@ -179,15 +179,15 @@ class _Comparison:
         expected = partial(_relative, self.predicted, quantity, size)
         return _by_prediction(error, where, full, self.tolerance, expected), error, condition
 
-    def untold(self) -> Iterator[Row]:
-        """A scene of which most numbers cannot be told does not hold."""
+    def undecided(self) -> Iterator[Row]:
+        """A scene of which most numbers are undecided does not hold."""
         if not self.numbers:
             return
-        missing = self.numbers - self.told
+        missing = self.numbers - self.decided
         share = missing / self.numbers
-        reason = f"of {missing} of {self.numbers} numbers nothing can be told"
-        verdict = AGREES if share <= MOST_UNTOLD else FAILS
-        yield self.row("untold", verdict, reason, error=share, allowed=MOST_UNTOLD, condition=1.0)
+        reason = f"{missing} of {self.numbers} numbers are undecided"
+        verdict = AGREES if share <= MOST_UNDECIDED else FAILS
+        yield self.row("undecided", verdict, reason, error=share, allowed=MOST_UNDECIDED, condition=1.0)
 
 
 def _relative(predicted: Callable[[], Mapping[str, Array]], quantity: str, size: Array) -> Array:
@@ -202,7 +202,7 @@ class _Finding(NamedTuple):
     verdict: str
     reason: str
     allowed: float
-    told: int
+    decided: int
     """Positions of which a verdict is drawn."""
 
 

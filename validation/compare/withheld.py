@@ -14,7 +14,7 @@ FORMULAS = "formulas"
 STAGES = ("omega_3", "alpha_3", "torque")
 """One quantity of each stage that a position may lack."""
 LARGE = 1e75
-"""Numbers beyond this, or their squares, may leave the range of doubles on the way: 1e300 in a product of four."""
+"""Numbers beyond this, or their squares, may leave the range of doubles in between: 1e300 in a product of four."""
 
 
 def withheld(name: str, scene: Scene, formulas: Solution, basis: Solution) -> Row:

@@ -195,7 +195,7 @@ def _judge_inertia(record: Record, scene: Scene, at: Command, witnesses: Iterabl
             continue
         rows = _judged(record.name, bare, at, ours, answer, replace(witness, expected=("torque",)), of_bare)
         rows = [row for row in rows if row.quantity == "torque" or row.verdict in (REFUSES, FAILS)]
-        rows = [row for row in rows if row.quantity != "untold"]
+        rows = [row for row in rows if row.quantity != "undecided"]
         if rows:  # what fails besides the torque, or stands in place of it, is not left out
             worst = max(rows, key=lambda row: VERDICTS.index(row.verdict))
             reason = worst.reason if worst.quantity in ("torque", "all") else f"{worst.quantity}: {worst.reason}"

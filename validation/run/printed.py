@@ -103,7 +103,8 @@ def _blocks(name: str, scene: Scene, at: Command, solution: Solution) -> Row:
         one, other = getattr(whole, quantity)[ends], ours[long[ends]]
         known = np.isfinite(magnitude(other))
         error[known != np.isfinite(magnitude(one))] = np.inf
-        size = yardstick(quantity, scene, solution, ours)[long[ends]]
+        with np.errstate(all="ignore"):  # beyond the range of doubles there is no size
+            size = yardstick(quantity, scene, solution, ours)[long[ends]]
         condition = condition_of(quantity, scene.linkage, solution)[long[ends]]
         # evaluated by the same code, but not in the same company of a processor's registers
         apart = relative_error(quantity, one, other, size) * condition

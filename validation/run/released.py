@@ -161,7 +161,7 @@ def _forces(name: str, scene: Scene, solution: Solution, witnesses: Sequence[Wit
         conditioned.drive_bar = 2
         names = [q for q in UNKNOWNS if q in witness.expected]
         rows = compare(name, held, answer, conditioned, witness.tolerance, names, None, basis)
-        yield from (row for row in rows if row.quantity != "untold")
+        yield from (row for row in rows if row.quantity != "undecided")
 
 
 class _Truth(NamedTuple):

@@ -17,7 +17,7 @@ NAME = "mujoco-simulated"
 QUANTITY = "as shipped"
 OPEN = 1e4 * K * EPS
 """Gap in parts of the lengths, and gap speed in parts of the speeds: one rounding near a limit position, where |sin mu|
-is 1e-4 and less MuJoCo is not asked."""
+is 1e-4 and less MuJoCo is not run."""
 STEPS = 200
 """A servo of two steps' time constant has brought the input to its speed to e^-100 by then."""
 SPEED = 100.0 * SIMULATED.factor
