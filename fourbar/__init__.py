@@ -27,7 +27,9 @@ if TYPE_CHECKING:
     from fourbar.effects import Viscous as Viscous
     from fourbar.files import dump as dump
     from fourbar.files import load as load
+    from fourbar.studies import Sensitivity as Sensitivity
     from fourbar.studies import Study as Study
+    from fourbar.studies import sensitivity as sensitivity
     from fourbar.studies import vary as vary
 
 
@@ -50,6 +52,6 @@ def __getattr__(name: str) -> Any:
         return getattr(import_module("fourbar.files"), name)
     if name in ("Friction", "Gravity", "Load", "Viscous"):
         return getattr(import_module("fourbar.effects"), name)
-    if name in ("Study", "vary"):
+    if name in ("Sensitivity", "Study", "sensitivity", "vary"):
         return getattr(import_module("fourbar.studies"), name)
     raise AttributeError(f"module 'fourbar' has no attribute {name!r}")

@@ -80,12 +80,17 @@ def new(file: Path, lengths: tuple[str, ...]) -> None:
 @click.option("--json", "form", flag_value="json", help="One object, SI, every digit.")
 @click.option("--csv", "form", flag_value="csv", help="One line per position, SI, every digit.")
 @click.option("--degrees/--radians", default=None, help="Angles theta; left out: degrees in the table, else radians.")
+@click.option("--sensitivity", is_flag=True, help="What the quantities depend on: d(quantity)/d(number).")
 @click.option("-o", "--out", type=click.Path(path_type=Path), metavar="FILE", help="Write there instead.")
-def analyze(scene: Path, form: str | None, degrees: bool | None, out: Path | None) -> None:
+def analyze(scene: Path, form: str | None, degrees: bool | None, sensitivity: bool, out: Path | None) -> None:
     """Solve a scene: angles, speeds, accelerations, driving torque and pin forces."""
+    if sensitivity:
+        if form == "csv" or degrees:
+            raise click.UsageError("--sensitivity is a table, or with --json all of it, SI and rad")
+        _sensitivity(scene, form, out)
+        return
     from fourbar.solution import csv_text, json_text
     from fourbar.solve import last_stage, solve
-    from fourbar.writing import write_text
 
     asked = _load(scene)
     with _named(scene), _waiting(asked):
@@ -97,6 +102,30 @@ def analyze(scene: Path, form: str | None, degrees: bool | None, out: Path | Non
     else:
         write = json_text if form == "json" else csv_text
         text = write(solution, degrees=bool(degrees))
+    _write(text, out)
+
+
+def _sensitivity(scene: Path, form: str | None, out: Path | None) -> None:
+    from fourbar.show import influence
+    from fourbar.studies.influence import json_text
+    from fourbar.studies.sensitivity import sensitivity
+
+    stated = _load(scene)
+    with _named(scene):
+        found = sensitivity(stated)
+    if not found.solution.assembled.any():
+        raise NotAssembledError(f"{scene}: motion.theta_2: the linkage assembles at none of the positions")
+    if form == "json":
+        text = json_text(found)
+    else:
+        text = _printed(stated.title, influence.heading(found), influence.table(found), None)
+    _write(text, out)
+
+
+def _write(text: str, out: Path | None) -> None:
+    """To a file, or to standard output."""
+    from fourbar.writing import write_text
+
     if out is None:
         click.echo(text, nl=False)
     else:
@@ -138,7 +167,8 @@ def mjcf(scene: Path | None, lengths: tuple[str, ...] | None, omega: str | None,
     default="overview",
     show_default=True,
     metavar="NAME",
-    help="overview, linkage, coupler, kinematics, torque, forces, hodograph, energy, transmission or freebody.",
+    help="overview, linkage, coupler, kinematics, torque, forces, hodograph, energy, transmission, freebody, "
+    "sensitivity.",
 )
 @click.option("--position", metavar="ANGLE", help='theta_2 of the linkage and free bodies, like "135 deg".')
 @click.option("--branches", default="one", show_default=True, metavar="WHICH", help="one or both.")
@@ -247,21 +277,25 @@ def _terminal_width() -> int | None:
 
 
 def _table_text(scene: "Scene", solution: Any, width: int | None, degrees: bool) -> str:
-    from rich.console import Console
-    from rich.text import Text
-
     from fourbar.show import tables
 
     shown, left_out = tables.table(solution, width, degrees=degrees)
+    after = [f"not shown: {', '.join(left_out)} (a wider terminal, --csv or --json has them)"] if left_out else []
+    return _printed(scene.title, tables.heading(scene, solution), shown, width, after)
+
+
+def _printed(title: str, above: list[str], table: Any, width: int | None, below: list[str] | None = None) -> str:
+    """A table with its title and lines, as text."""
+    from rich.console import Console
+    from rich.text import Text
+
     text = io.StringIO()
     console = Console(file=text, width=width or 10_000, color_system=None)
-    if scene.title:
-        console.print(Text(printable(scene.title)))
-    for line in tables.heading(scene, solution):
+    for line in ([printable(title)] if title else []) + above:
         console.print(Text(line))
-    console.print(shown)
-    if left_out:
-        console.print(Text(f"not shown: {', '.join(left_out)} (a wider terminal, --csv or --json has them)"))
+    console.print(table)
+    for line in below or []:
+        console.print(Text(line))
     return "\n".join(line.rstrip() for line in text.getvalue().split("\n"))
 
 

@@ -154,7 +154,7 @@ def json_text(solution: Solution, *, degrees: bool = False) -> str:
     }
     for name in _quantities(solution):
         values = _values(solution, name, degrees)
-        document[name] = None if values is None else _nulled(values)
+        document[name] = None if values is None else nulled(values)
     document["drive_bar"] = solution.drive_bar
     document["assembled"] = solution.assembled.tolist()
     return json.dumps(document, allow_nan=False) + "\n"
@@ -164,7 +164,7 @@ def csv_text(solution: Solution, *, degrees: bool = False) -> str:
     """One line per position; vectors as columns `A_x`, `A_y`, empty where there is no value."""
     size, first = solution.theta_2.size, leading(solution)
     columns = {
-        name: [None] * size if values is None else _nulled(values)
+        name: [None] * size if values is None else nulled(values)
         for name, values in scalars(solution, degrees=degrees).items()
     }
     text = io.StringIO()
@@ -221,7 +221,7 @@ def _values(solution: Solution, name: str, degrees: bool) -> Array | None:
     return values
 
 
-def _nulled(values: Array) -> list[Any]:
+def nulled(values: Array) -> list[Any]:
     """Python numbers, None for what is not finite."""
     plain = values.tolist()
     if np.isfinite(values).all():
