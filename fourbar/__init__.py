@@ -15,6 +15,7 @@ from fourbar.scene.motion import FromLimit as FromLimit
 from fourbar.scene.motion import Motion as Motion
 from fourbar.scene.motion import Sweep as Sweep
 from fourbar.scene.point import Point as Point
+from fourbar.scene.tolerance import Tolerance as Tolerance
 from fourbar.solution import Solution as Solution
 from fourbar.solve import solve as solve
 
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
     from fourbar.studies import Sensitivity as Sensitivity
     from fourbar.studies import Study as Study
     from fourbar.studies import sensitivity as sensitivity
+    from fourbar.studies import tolerances as tolerances
     from fourbar.studies import vary as vary
 
 
@@ -52,6 +54,6 @@ def __getattr__(name: str) -> Any:
         return getattr(import_module("fourbar.files"), name)
     if name in ("Friction", "Gravity", "Load", "Viscous"):
         return getattr(import_module("fourbar.effects"), name)
-    if name in ("Sensitivity", "Study", "sensitivity", "vary"):
+    if name in ("Sensitivity", "Study", "sensitivity", "tolerances", "vary"):
         return getattr(import_module("fourbar.studies"), name)
     raise AttributeError(f"module 'fourbar' has no attribute {name!r}")

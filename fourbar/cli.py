@@ -107,8 +107,8 @@ def analyze(scene: Path, form: str | None, degrees: bool | None, sensitivity: bo
 
 def _sensitivity(scene: Path, form: str | None, out: Path | None) -> None:
     from fourbar.show import influence
+    from fourbar.studies.derivatives import sensitivity
     from fourbar.studies.influence import json_text
-    from fourbar.studies.sensitivity import sensitivity
 
     stated = _load(scene)
     with _named(scene):
@@ -130,6 +130,34 @@ def _write(text: str, out: Path | None) -> None:
         click.echo(text, nl=False)
     else:
         write_text(out, text)
+
+
+@group.command()
+@scene_argument
+@click.option("--samples", type=int, metavar="N", help="Linkages that are tried; left out: 8192.")
+@click.option("--seed", type=int, default=0, show_default=True, metavar="S", help="Of the quasi-random samples.")
+@click.option("--json", "as_json", is_flag=True, help="One object, SI, every digit.")
+@click.option("-o", "--out", type=click.Path(path_type=Path), metavar="PLOT", help="Draw the bands: svg, png or pdf.")
+def tolerance(scene: Path, samples: int | None, seed: int, as_json: bool, out: Path | None) -> None:
+    """What the [tolerances] of a scene do to torque, pin forces and points, and which dimension does it."""
+    from fourbar.show import tolerances as shown
+    from fourbar.show.plot import draw_tolerances, drawable
+    from fourbar.show.under_way import counted
+    from fourbar.studies.spread import SAMPLES, tolerances
+
+    if out is not None:
+        drawable(out)
+    stated = _load(scene)
+    with _named(scene), counted("samples are solved") as progress:
+        found = tolerances(stated, SAMPLES if samples is None else samples, seed, progress=progress)
+    if (found.without == found.samples).all():
+        raise NotAssembledError(f"{scene}: motion.theta_2: the linkage assembles at none of the positions")
+    if out is not None:
+        draw_tolerances(found, out)
+    if as_json:
+        click.echo(shown.json_text(found), nl=False)
+    else:
+        click.echo(_printed(stated.title, shown.heading(found), shown.table(found), None), nl=False)
 
 
 @group.command()
@@ -218,7 +246,9 @@ def _named(path: Path) -> Iterator[None]:
     try:
         yield
     except InputError as error:
-        if error.file is None and error.key.startswith(("motion", "lengths", "bars", "drive", "loads", "effects")):
+        if error.file is None and error.key.startswith(
+            ("motion", "lengths", "bars", "drive", "loads", "effects", "tolerances")
+        ):
             raise error.in_file(str(path)) from None
         raise
 

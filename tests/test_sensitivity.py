@@ -14,8 +14,8 @@ from fourbar.effects import Friction, Gravity, Load, PinFriction, Table, Viscous
 from fourbar.linkage import BAR_NAMES, MOVING_BARS
 from fourbar.scene import Scene, command
 from fourbar.scene.motion import Free, FromLimit
+from fourbar.studies.derivatives import Sensitivity, quantity_of, sensitivity
 from fourbar.studies.keys import entries
-from fourbar.studies.sensitivity import Sensitivity, quantity_of, sensitivity
 from tests.test_studies import ANGLES, DRIVEN, LINK, LOADS, RUBBING, scene
 from validation.engines.balls import BITS, Values, inputs, outputs
 

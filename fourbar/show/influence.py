@@ -3,8 +3,8 @@
 import math
 from typing import TYPE_CHECKING
 
+from fourbar.studies.derivatives import Sensitivity
 from fourbar.studies.influence import influences, largest, shown_quantities, unit_of
-from fourbar.studies.sensitivity import Sensitivity
 
 if TYPE_CHECKING:
     from rich.table import Table

@@ -8,7 +8,7 @@ import numpy as np
 
 from fourbar.quantities import PIN_FORCES, UNITS
 from fourbar.solution import nulled
-from fourbar.studies.sensitivity import Sensitivity
+from fourbar.studies.derivatives import Sensitivity
 
 SCHEMA = "fourbar-sensitivity/1"
 HUNDREDTH, DEGREE = 0.01, math.radians(1.0)

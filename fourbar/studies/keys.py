@@ -136,6 +136,17 @@ class Bars(Bar):
         return r * math.cos(phi) + 1j * (r * math.sin(phi)) if phi else r + 0j
 
 
+LEFT_OUT = "is left out of the scene and follows the length; state it to give it a tolerance"
+
+
+def left_out(scene: Scene, entry: Entry) -> bool:
+    """Whether a number is one that the scene leaves to a uniform bar."""
+    if entry.place[0] != "linkage" or len(entry.place) < 3:
+        return False
+    bar = getattr(scene.linkage, str(entry.place[1]))
+    return getattr(bar, str(entry.place[2])) is None
+
+
 def at_place(whole: Any, place: Place) -> Any:
     """The number at a place; what a bar leaves out is that of a uniform one."""
     for name in place:
