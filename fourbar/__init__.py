@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from fourbar.files import load as load
     from fourbar.studies import Sensitivity as Sensitivity
     from fourbar.studies import Study as Study
+    from fourbar.studies import extremes as extremes
     from fourbar.studies import sensitivity as sensitivity
     from fourbar.studies import tolerances as tolerances
     from fourbar.studies import vary as vary
@@ -54,6 +55,6 @@ def __getattr__(name: str) -> Any:
         return getattr(import_module("fourbar.files"), name)
     if name in ("Friction", "Gravity", "Load", "Viscous"):
         return getattr(import_module("fourbar.effects"), name)
-    if name in ("Sensitivity", "Study", "sensitivity", "tolerances", "vary"):
+    if name in ("Sensitivity", "Study", "extremes", "sensitivity", "tolerances", "vary"):
         return getattr(import_module("fourbar.studies"), name)
     raise AttributeError(f"module 'fourbar' has no attribute {name!r}")

@@ -161,6 +161,24 @@ def tolerance(scene: Path, samples: int | None, seed: int, as_json: bool, out: P
 
 
 @group.command()
+@scene_argument
+@click.option("--json", "as_json", is_flag=True, help="One object, SI and rad, every digit.")
+def extremes(scene: Path, as_json: bool) -> None:
+    """Prove the largest and smallest torque, pin forces and transmission angle over the input's whole interval."""
+    from fourbar.show import extremes as shown
+    from fourbar.show.under_way import under_way
+    from fourbar.studies.enclosure import extremes as proven
+
+    stated = _load(scene)
+    with _named(scene), under_way("the boxes are halved"):
+        found = proven(stated)
+    if as_json:
+        click.echo(shown.json_text(stated, found), nl=False)
+    else:
+        click.echo(_printed(stated.title, shown.heading(stated, found), shown.table(found), None), nl=False)
+
+
+@group.command()
 @click.argument("scene", type=click.Path(path_type=Path), required=False)
 @click.option("--lengths", nargs=4, metavar="D A B C", help="Ground, input, coupler, output (bare numbers: m).")
 @click.option("--omega", metavar="W", help="Speed of the input with --lengths (a bare number: rad/s).")

@@ -182,13 +182,18 @@ class _Sliding(PinFriction):
         return Settled(eliminate(actions), none, none, none)
 
 
-def _seeded(scene: Scene, keys: dict[str, Entry]) -> Scene:
-    """The scene with every number carrying its own unit slope; what it leaves out carries that of its length too."""
+def differentiable(scene: Scene) -> Scene:
+    """The scene with effects that say their derivatives too."""
     twins: dict[Any, Any] = {
         Gravity: lambda own: _Directed(own.magnitude, own.angle),
         PinFriction: lambda own: _Sliding(own.pins),
     }
-    scene = replace(scene, effects=tuple(twins.get(type(own), lambda own: own)(own) for own in scene.effects))
+    return replace(scene, effects=tuple(twins.get(type(own), lambda own: own)(own) for own in scene.effects))
+
+
+def _seeded(scene: Scene, keys: dict[str, Entry]) -> Scene:
+    """The scene with every number carrying its own unit slope; what it leaves out carries that of its length too."""
+    scene = differentiable(scene)
     for index, (key, entry) in enumerate(keys.items()):
         if not key.startswith("motion."):
             scene = placed(scene, entry.place, at_place(scene, entry.place) + unit_slope(index, len(keys)))

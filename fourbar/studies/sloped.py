@@ -35,7 +35,7 @@ PIECEWISE = (
 
 
 class Sloped(NDArrayOperatorsMixin):
-    """Values (n,) with their derivatives by p variables, slopes (p, n) or (p, 1).
+    """Values (n,) with their derivatives by p variables, slopes (p, n) or (p, 1): of doubles, or of balls as objects.
 
     A number is equal to a constant only where its derivatives vanish too, so that no term is left out for being zero.
     """
@@ -61,7 +61,7 @@ class Sloped(NDArrayOperatorsMixin):
 
     def conjugate(self) -> "Sloped":
         """Of both."""
-        return Sloped(np.conjugate(self.values), np.conjugate(self.slopes))
+        return Sloped(conjugate(self.values), conjugate(self.slopes))
 
     def differs(self, other: Any) -> NDArray[np.bool_]:
         """Where the value or a derivative is not that of the other, (n,)."""
@@ -78,9 +78,11 @@ class Sloped(NDArrayOperatorsMixin):
         if function is np.conjugate:
             return self.conjugate()
         plain = [values(x) for x in given]
+        if self.values.dtype == object:
+            plain = [_complex_ball(x) if isinstance(x, complex) else x for x in plain]
         if function is np.absolute:
             size = np.absolute(plain[0])
-            along = np.conjugate(plain[0]) / size
+            along = conjugate(plain[0]) / size
             return Sloped(size, real(along * self.slopes))
         found = function(*plain)
         if function in PIECEWISE:
@@ -94,6 +96,13 @@ class Sloped(NDArrayOperatorsMixin):
         if function not in FUNCTIONS or options:
             return NotImplemented
         return FUNCTIONS[function](*args)
+
+
+def _complex_ball(z: complex) -> Any:
+    """A complex constant for numbers that are balls, which know none of Python's."""
+    from flint import acb
+
+    return acb(z)
 
 
 def values(number: Any) -> Any:
@@ -116,6 +125,12 @@ def imag(z: Any) -> Any:
     return _IMAG(z) if z.dtype == object else z.imag
 
 
+def conjugate(z: Any) -> Any:
+    """Likewise."""
+    return _CONJUGATE(z) if z.dtype == object else np.conjugate(z)
+
+
+_CONJUGATE = np.frompyfunc(lambda z: z.conjugate() if hasattr(z, "conjugate") else z, 1, 1)
 _REAL, _IMAG = (np.frompyfunc(lambda z, part=part: getattr(z, part), 1, 1) for part in ("real", "imag"))
 
 
