@@ -175,12 +175,13 @@ class _Search:
         q, link = Sloped(theta_2, by_theta), scene.linkage
         d, a, b, c = link.lengths
         lengths = Loop(d, a, b, c, (b + c - a - d) * (a + b + c + d), (d - a - b + c) * (d - a + b - c))
-        theta_1: Any = link.ground_angle
+        angles: Any = (link.ground_angle, q)
+        theta_1 = angles[0]
         h = 0.5 * (q - theta_1)
         s, k = np.sin(h), np.cos(h)
         ss, kk, four_ad = s * s, k * k, 4.0 * a * d
         half = HalfAngle(ss, kk, s * k, lengths.E1 + four_ad * kk, lengths.E2 + four_ad * ss)
-        u1, u2 = (np.cos(angle) + 1j * np.sin(angle) for angle in (theta_1, q))
+        u1, u2 = (np.cos(angle) + 1j * np.sin(angle) for angle in angles)
         at = close_loop(lengths, u1, u2, half, self.branch)
         terms = (*scene.loads, *scene.effects)
         path = Path(2, lengths, theta_1)
