@@ -184,7 +184,7 @@ class _Search:
         u1, u2 = (np.cos(angle) + 1j * np.sin(angle) for angle in angles)
         at = close_loop(lengths, u1, u2, half, self.branch)
         terms = (*scene.loads, *scene.effects)
-        path = Path(2, lengths, theta_1)
+        path = Path(2, lengths, theta_1, u1)
         case = Case(link, lengths, bodies(link, terms), terms, scene.drive_bar, path)
         acceleration = numbers["motion.alpha_2"]
         state = case.state(path, q, at, self.branch, numbers["motion.omega_2"], acceleration)
