@@ -118,3 +118,18 @@ def test_the_command(rocker: tuple[Scene, Extremes], monkeypatch: pytest.MonkeyP
     assert status(["extremes", model, "--json"]) == 0
     document = json.loads(capsys.readouterr().out)
     assert document["extremes"]["torque"]["greatest"]["high"] == rocker[1].greatest["torque"].high
+
+
+def test_the_bound_of_a_box_holds_at_its_ends(rocker: tuple[Scene, Extremes]) -> None:
+    search, radius = enclosure._Search(rocker[0]), 1e-3
+    centre = np.array([0.4, 2.0, 4.5])
+    points, low, high = (np.array([search.arb(x) for x in centre + r]) for r in (0.0, -radius, radius))
+    wide = np.array([search.arb(x, radius) for x in centre])
+    none = np.zeros((0, 3))
+    over, nominal, *ends = (search.evaluate(*box) for box in ((wide, None), (points, none), (low, none), (high, none)))
+    for name in over:
+        for i in range(3):
+            top = search._bound(1, over[name], nominal[name], i, radius)
+            least = -search._bound(-1, over[name], nominal[name], i, radius)
+            for end in ends:
+                assert least <= float(end[name].values[i].mid()) <= top, name
