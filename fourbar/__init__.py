@@ -30,6 +30,7 @@ from fourbar.scene.motion import Motion as Motion
 from fourbar.scene.motion import Sweep as Sweep
 from fourbar.scene.motion_law import Law as Law
 from fourbar.scene.point import Point as Point
+from fourbar.scene.tolerance import Tolerance as Tolerance
 from fourbar.solution import Solution as Solution
 from fourbar.solve import solve as solve
 
@@ -54,15 +55,20 @@ if _TYPE_CHECKING:
     from fourbar.show.motor import motor_duty as motor_duty
     from fourbar.show.notebook import in_units as in_units
     from fourbar.show.units import units as units
+    from fourbar.studies import Sensitivity as Sensitivity
     from fourbar.studies import Study as Study
+    from fourbar.studies import extremes as extremes
+    from fourbar.studies import sensitivity as sensitivity
+    from fourbar.studies import tolerances as tolerances
     from fourbar.studies import vary as vary
 
 _EFFECTS = (*("Flywheel", "Friction", "Gravity", "Load", "PinFriction", "Spring", "Springs", "Torsion", "Viscous"),)
+_STUDIES = ("Sensitivity", "Study", "extremes", "sensitivity", "tolerances", "vary")
 _ON_FIRST_USE = {
     **{name: "fourbar.effects" for name in _EFFECTS},
     **{name: "fourbar.files" for name in ("dump", "load", "save")},
     **{name: "fourbar.show.bearing" for name in ("bearing_load", "shaking_force", "shaking_moment")},
-    **{name: "fourbar.studies" for name in ("Study", "vary")},
+    **{name: "fourbar.studies" for name in _STUDIES},
     "motor_duty": "fourbar.show.motor",
     "in_units": "fourbar.show.notebook",
     "units": "fourbar.show.units",

@@ -95,6 +95,7 @@ def new(file: Path | None, out: Path | None, lengths: tuple[str, ...]) -> None:
 @click.option("--csv", "as_csv", is_flag=True, help="One line per position, SI, every digit.")
 @click.option("--degrees/--radians", default=None, help="Angles theta; left out: degrees in the table, else radians.")
 @units_option
+@click.option("--sensitivity", is_flag=True, help="What the quantities depend on: d(quantity)/d(number).")
 @click.option("--every", type=click.IntRange(min=1), metavar="N", help="Show every N-th position in the table.")
 @click.option("--all", "every", flag_value=1, help="Show every position; a terminal gets some forty at most.")
 @or_out_option
@@ -104,10 +105,16 @@ def analyze(
     as_csv: bool,
     degrees: bool | None,
     units: str,
+    sensitivity: bool,
     every: int | None,
     out: Path | None,
 ) -> None:
     """Solve a scene: angles, speeds, accelerations, driving torque and pin forces."""
+    if sensitivity:
+        if as_csv or degrees or every is not None or units != "SI":
+            raise click.UsageError("--sensitivity is a table, or with --json all of it, SI and rad")
+        _sensitivity(scene, as_json, out)
+        return
     from fourbar.show.motor import motor_entry
     from fourbar.show.tables import printed
     from fourbar.show.units import units as units_of
@@ -136,6 +143,72 @@ def analyze(
         width = None if out else _terminal_width()
         text = printed(described, solution, width, shown, every=every)
     _print(text, out)
+
+
+def _sensitivity(scene: Path, as_json: bool, out: Path | None) -> None:
+    from fourbar.show import influence
+    from fourbar.show.tables import under_heading
+    from fourbar.studies.derivatives import sensitivity
+    from fourbar.studies.influence import json_text
+
+    stated = _load(scene)
+    with _named(scene):
+        found = sensitivity(stated)
+    if not found.solution.assembled.any():
+        raise NotAssembledError(f"{scene}: motion.theta_2: the linkage assembles at none of the positions")
+    if as_json:
+        text = json_text(found)
+    else:
+        text = under_heading(stated.title, influence.heading(found), influence.table(found))
+    _print(text, out)
+
+
+@group.command()
+@scene_argument
+@click.option("--samples", type=int, metavar="N", help="Linkages that are tried; left out: 8192.")
+@click.option("--seed", type=int, default=0, show_default=True, metavar="S", help="Of the quasi-random samples.")
+@click.option("--json", "as_json", is_flag=True, help="One object, SI, every digit.")
+@click.option("-o", "--out", type=click.Path(path_type=Path), metavar="PLOT", help="Draw the bands: svg, png or pdf.")
+def tolerance(scene: Path, samples: int | None, seed: int, as_json: bool, out: Path | None) -> None:
+    """What the [tolerances] of a scene do to torque, pin forces and points, and which dimension does it."""
+    from fourbar.show import tolerances as shown
+    from fourbar.show.plot import draw_tolerances, drawable
+    from fourbar.show.progress import share_done
+    from fourbar.show.tables import under_heading
+    from fourbar.studies.spread import SAMPLES, tolerances
+
+    if out is not None:
+        drawable(out)
+    stated = _load(scene)
+    with _named(scene), share_done("samples are solved") as progress:
+        found = tolerances(stated, SAMPLES if samples is None else samples, seed, progress=progress)
+    if (found.without == found.samples).all():
+        raise NotAssembledError(f"{scene}: motion.theta_2: the linkage assembles at none of the positions")
+    if out is not None:
+        draw_tolerances(found, out)
+    if as_json:
+        _print(shown.json_text(found), None)
+    else:
+        _print(under_heading(stated.title, shown.heading(found), shown.table(found)), None)
+
+
+@group.command()
+@scene_argument
+@click.option("--json", "as_json", is_flag=True, help="One object, SI and rad, every digit.")
+def extremes(scene: Path, as_json: bool) -> None:
+    """Prove the largest and smallest torque, pin forces and transmission angle over the input's whole interval."""
+    from fourbar.show import extremes as shown
+    from fourbar.show.progress import running
+    from fourbar.show.tables import under_heading
+    from fourbar.studies.enclosure import extremes as proven
+
+    stated = _load(scene)
+    with _named(scene), running("the boxes are halved"):
+        found = proven(stated)
+    if as_json:
+        _print(shown.json_text(stated, found), None)
+    else:
+        _print(under_heading(stated.title, shown.heading(stated, found), shown.table(found)), None)
 
 
 @group.command()
@@ -173,7 +246,8 @@ def mjcf(scene: Path | None, lengths: tuple[str, ...] | None, omega: str | None,
     default="overview",
     show_default=True,
     metavar="NAME",
-    help="overview, linkage, coupler, kinematics, points, torque, forces, hodograph, energy, transmission or freebody.",
+    help="overview, linkage, coupler, kinematics, points, torque, forces, hodograph, energy, transmission, freebody, "
+    "sensitivity.",
 )
 @click.option("--position", metavar="ANGLE", help='theta_2 of the linkage and free bodies, like "135 deg".')
 @click.option("--branches", default="one", show_default=True, metavar="WHICH", help="one or both.")
@@ -230,7 +304,9 @@ def _named(path: Path) -> Iterator[None]:
     try:
         yield
     except InputError as error:
-        if error.file is None and error.key.startswith(("motion", "lengths", "bars", "drive", "loads", "effects")):
+        if error.file is None and error.key.startswith(
+            ("motion", "lengths", "bars", "drive", "loads", "effects", "tolerances")
+        ):
             raise error.in_file(str(path)) from None
         raise
 

@@ -170,7 +170,7 @@ def json_text(solution: Solution, units: Conversion = SI, **more: Any) -> str:
     }
     for name in names:
         values = _values(solution, name, units)
-        document[name] = None if values is None else _nulled(values)
+        document[name] = None if values is None else nulled(values)
     if solution.time is not None:
         document["stopped_at"] = solution.stopped_at
     document["drive_bar"] = solution.drive_bar
@@ -183,7 +183,7 @@ def csv_text(solution: Solution, units: Conversion = SI) -> str:
     """One line per position; vectors as columns `A_x`, `A_y`, empty where there is no value."""
     size, first = solution.theta_2.size, leading(solution)
     columns = {
-        name: [None] * size if values is None else _nulled(values) for name, values in scalars(solution, units).items()
+        name: [None] * size if values is None else nulled(values) for name, values in scalars(solution, units).items()
     }
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
@@ -251,7 +251,7 @@ def _values(solution: Solution, name: str, units: Conversion) -> Array | None:
     return values if values is None or unit not in units else values * units[unit][1]
 
 
-def _nulled(values: Array) -> list[Any]:
+def nulled(values: Array) -> list[Any]:
     """Python numbers, None for what is not finite."""
     plain = values.tolist()
     if np.isfinite(values).all():

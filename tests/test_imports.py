@@ -37,6 +37,7 @@ LAYERS = {
 }
 """From the ground up: no layer imports one above it or on its own floor, not even inside a function."""
 ON_ONE_FLOOR = {
+    ("files", "studies"),
     ("scenes", "compare"),
     ("published", "engines"),
     ("run", "check"),

@@ -6,6 +6,7 @@ Numbers are rounded once when they are read; what is written reads back bit for 
 import math
 import re
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -38,7 +39,7 @@ LONGEST_LINE = 60
 MOST_LOADS = 1000
 """Each load is a term at every position."""
 THROUGH = ("sign", "follow")
-TABLES = ("title", "source", "lengths", "bars", "motion", "drive", "points", "loads", "effects")
+TABLES = ("title", "source", "lengths", "bars", "motion", "drive", "points", "loads", "effects", "tolerances")
 MOST_POINTS = 1000
 """Each is three columns of every table."""
 
@@ -99,7 +100,7 @@ def _scene(read: Reader, document: dict[str, Any], folder: str) -> Scene:
     if not isinstance(entries, list) or len(entries) > MOST_LOADS:
         raise read.refuse("loads", entries, f"must be written as [[loads]], at most {MOST_LOADS}")
     effects = read.table("effects", top.get("effects", {}), REGISTRY)
-    return Scene(
+    scene = Scene(
         linkage,
         _motion(read, top.get("motion", {})),
         read.whole("drive.bar", drive.get("bar", 2), 2, 4),
@@ -110,6 +111,11 @@ def _scene(read: Reader, document: dict[str, Any], folder: str) -> Scene:
         _pictures(read, top.get("bars", {}), folder),
         _points(read, top.get("points", {})),
     )
+    if "tolerances" not in top:
+        return scene
+    from fourbar.files.tolerances import read_tolerances
+
+    return replace(scene, tolerances=read_tolerances(read, scene, top["tolerances"]))
 
 
 def _points(read: Reader, value: object) -> tuple[Point, ...]:

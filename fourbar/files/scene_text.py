@@ -67,6 +67,10 @@ def dump(scene: Scene) -> str:
     if len(effects) != len(scene.effects):
         raise InputError("effects", [effect.key for effect in scene.effects], "a file holds one of each kind")
     parts.append(_table("effects", effects))
+    if scene.tolerances:
+        from fourbar.files.tolerances import written_tolerances
+
+        parts.append(_table("tolerances", written_tolerances(write, scene)))
     return "\n".join(part for part in parts if part)
 
 

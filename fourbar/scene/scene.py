@@ -11,6 +11,7 @@ from fourbar.formulas.mobility import default_range, limit_positions, on_smooth_
 from fourbar.linkage import MOVING_BARS, FourBar
 from fourbar.scene.motion import DEFAULT_STEPS, FromLimit, Motion, Sweep
 from fourbar.scene.point import Point
+from fourbar.scene.tolerance import Tolerance
 from fourbar.solution import Array
 
 if TYPE_CHECKING:
@@ -31,6 +32,7 @@ class Scene:
     source: str = ""
     pictures: "tuple[Picture, ...]" = ()
     points: tuple[Point, ...] = ()
+    tolerances: tuple[Tolerance, ...] = ()
 
     def __post_init__(self) -> None:
         if self.drive_bar not in MOVING_BARS or isinstance(self.drive_bar, bool):
@@ -39,6 +41,7 @@ class Scene:
         object.__setattr__(self, "effects", tuple(self.effects))
         object.__setattr__(self, "pictures", tuple(self.pictures))
         object.__setattr__(self, "points", tuple(self.points))
+        object.__setattr__(self, "tolerances", tuple(self.tolerances))
         names = [point.name for point in self.points]
         if len(set(names)) < len(names):
             raise InputError("points", names, "each point has a name of its own")

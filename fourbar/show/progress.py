@@ -1,6 +1,6 @@
 """What takes minutes shows that it is running."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import TypeVar
 
@@ -29,3 +29,16 @@ def counted(items: Sequence[T], text: str) -> Iterable[T]:
     if not console.is_terminal:
         return items
     return track(items, text, console=console, transient=True)
+
+
+@contextmanager
+def share_done(text: str) -> Iterator[Callable[[float], None] | None]:
+    """The line of `running` with the share that is done, which the body reports; None where there is no terminal."""
+    from rich.console import Console
+
+    console = Console(stderr=True)
+    if not console.is_terminal:
+        yield None
+        return
+    with console.status(f"{text}; Ctrl-C stops it") as line:
+        yield lambda share: line.update(f"{text}, {100.0 * share:.0f} % done; Ctrl-C stops it")

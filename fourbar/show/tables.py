@@ -29,6 +29,21 @@ STEPS = (1, 2, 5, 10, 15, 20, 30, 45, 60, 90)
 """A terminal is shown every so many positions, of a longer sweep a multiple of the last."""
 
 
+def under_heading(title: str, lines: list[str], shown: "Table") -> str:
+    """A table with its title and what stands above it, as text."""
+    from rich.console import Console
+    from rich.text import Text
+
+    from fourbar.errors import printable
+
+    text = io.StringIO()
+    console = Console(file=text, width=10_000, color_system=None)
+    for line in ([printable(title)] if title else []) + lines:
+        console.print(Text(line))
+    console.print(shown)
+    return "\n".join(line.rstrip() for line in text.getvalue().split("\n"))
+
+
 def printed(
     scene: Scene, solution: Solution, width: int | None, units: Conversion = DEGREES, *, every: int | None = None
 ) -> str:

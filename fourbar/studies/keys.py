@@ -7,8 +7,10 @@ from difflib import get_close_matches
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.lib.mixins import NDArrayOperatorsMixin
 
 from fourbar.errors import InputError
+from fourbar.formulas.position import polar
 from fourbar.linkage import BAR_NAMES, MOVING_BARS, Bar
 from fourbar.scene import Scene
 
@@ -26,6 +28,7 @@ class Entry(NamedTuple):
     """One number of a scene."""
 
     place: Place
+    unit: str
     bound: str = ANY
 
     def holds(self, values: Any) -> Any:
@@ -34,18 +37,20 @@ class Entry(NamedTuple):
         return np.isfinite(values) & low
 
 
-def _pair(key: str, place: Place, names: tuple[str | int, str | int] = (0, 1)) -> dict[str, Entry]:
-    return {f"{key}.{index}": Entry((*place, name)) for index, name in enumerate(names)}
+def _pair(key: str, place: Place, unit: str, names: tuple[str | int, str | int] = (0, 1)) -> dict[str, Entry]:
+    """The two entries of a magnitude with its angle."""
+    one, other = ((*place, name) for name in names)
+    return {f"{key}.0": Entry(one, unit), f"{key}.1": Entry(other, "rad")}
 
 
-def _per_pin(rows: str, **columns: str) -> Callable[[Any], dict[str, Entry]]:
-    """Entries of an effect that holds rows (pin, number, ...), by the names of the numbers and their bounds."""
+def _per_pin(rows: str, **columns: tuple[str, str]) -> Callable[[Any], dict[str, Entry]]:
+    """Entries of an effect that holds rows (pin, number, ...), by the names of the numbers, their units and bounds."""
 
     def entries(effect: Any) -> dict[str, Entry]:
         return {
-            f"{row[0]}.{name}".removesuffix("._"): Entry((rows, index, column), bound)
+            f"{row[0]}.{name}".removesuffix("._"): Entry((rows, index, column), *of)
             for index, row in enumerate(getattr(effect, rows))
-            for column, (name, bound) in enumerate(columns.items(), 1)
+            for column, (name, of) in enumerate(columns.items(), 1)
         }
 
     return entries
@@ -55,46 +60,47 @@ def _of_springs(effect: Any) -> dict[str, Entry]:
     found = {}
     for index in range(len(effect.springs)):
         own: Place = ("springs", index)
-        found[f"{index}.stiffness"] = Entry((*own, "stiffness"), POSITIVE)
-        found[f"{index}.length"] = Entry((*own, "length"), AT_LEAST_ZERO)
-        found[f"{index}.preload"] = Entry((*own, "preload"))
+        found[f"{index}.stiffness"] = Entry((*own, "stiffness"), "N/m", POSITIVE)
+        found[f"{index}.length"] = Entry((*own, "length"), "m", AT_LEAST_ZERO)
+        found[f"{index}.preload"] = Entry((*own, "preload"), "N")
         for key, end in (("from", "start"), ("to", "end")):
-            found |= _pair(f"{index}.{key}.at", (*own, end), ("distance", "angle"))
+            found |= _pair(f"{index}.{key}.at", (*own, end), "m", ("distance", "angle"))
     return found
 
 
 OF_EFFECT: dict[str, Callable[[Any], dict[str, Entry]]] = {
-    "gravity": lambda effect: {"0": Entry(("magnitude",)), "1": Entry(("angle",))},
-    "viscous": _per_pin("coefficients", _=AT_LEAST_ZERO),
-    "friction": _per_pin("torques", _=AT_LEAST_ZERO),
-    "pin_friction": _per_pin("pins", coefficient=AT_LEAST_ZERO, radius=AT_LEAST_ZERO),
-    "torsion": _per_pin("springs", stiffness=POSITIVE, rest=ANY, preload=ANY),
+    "gravity": lambda effect: {"0": Entry(("magnitude",), "m/s^2"), "1": Entry(("angle",), "rad")},
+    "viscous": _per_pin("coefficients", _=("N m s/rad", AT_LEAST_ZERO)),
+    "friction": _per_pin("torques", _=("N m", AT_LEAST_ZERO)),
+    "pin_friction": _per_pin("pins", coefficient=("1", AT_LEAST_ZERO), radius=("m", AT_LEAST_ZERO)),
+    "torsion": _per_pin("springs", stiffness=("N m/rad", POSITIVE), rest=("rad", ANY), preload=("N m", ANY)),
     "springs": _of_springs,
-    "flywheel": lambda effect: {"inertia": Entry(("inertia",), AT_LEAST_ZERO)},
+    "flywheel": lambda effect: {"inertia": Entry(("inertia",), "kg m^2", AT_LEAST_ZERO)},
 }
 """The numbers of an effect, by its key; the places lead from the effect."""
 
 
 def entries(scene: Scene) -> dict[str, Entry]:
     """The numbers of a scene that a study varies, lengths first, by key; motion.theta_2 is not among them."""
-    found = {"lengths.ground": Entry(("linkage", "ground"), POSITIVE)}
+    found = {"lengths.ground": Entry(("linkage", "ground"), "m", POSITIVE)}
     bars = [BAR_NAMES[number] for number in MOVING_BARS]
-    found |= {f"lengths.{name}": Entry(("linkage", name, "length"), POSITIVE) for name in bars}
-    found["lengths.ground_angle"] = Entry(("linkage", "ground_angle"))
+    found |= {f"lengths.{name}": Entry(("linkage", name, "length"), "m", POSITIVE) for name in bars}
+    found["lengths.ground_angle"] = Entry(("linkage", "ground_angle"), "rad")
     for name in bars:
         own: Place = ("linkage", name)
-        found[f"bars.{name}.mass"] = Entry((*own, "mass"), AT_LEAST_ZERO)
-        found[f"bars.{name}.inertia"] = Entry((*own, "inertia"), AT_LEAST_ZERO)
-        found |= _pair(f"bars.{name}.centre", (*own, "centre"))
+        found[f"bars.{name}.mass"] = Entry((*own, "mass"), "kg", AT_LEAST_ZERO)
+        found[f"bars.{name}.inertia"] = Entry((*own, "inertia"), "kg m^2", AT_LEAST_ZERO)
+        found |= _pair(f"bars.{name}.centre", (*own, "centre"), "m")
     if scene.motion.law is None:
-        found |= {f"motion.{name}": Entry(("motion", name)) for name in ("omega_2", "alpha_2")}
+        found["motion.omega_2"] = Entry(("motion", "omega_2"), "rad/s")
+        found["motion.alpha_2"] = Entry(("motion", "alpha_2"), "rad/s^2")
     for index, load in enumerate(scene.loads):
         if load.force is not None:
-            found |= _pair(f"loads.{index}.force", ("loads", index, "force"))
-            found |= _pair(f"loads.{index}.at", ("loads", index, "at"))
-        found[f"loads.{index}.moment"] = Entry(("loads", index, "moment"))
+            found |= _pair(f"loads.{index}.force", ("loads", index, "force"), "N")
+            found |= _pair(f"loads.{index}.at", ("loads", index, "at"), "m")
+        found[f"loads.{index}.moment"] = Entry(("loads", index, "moment"), "N m")
     for index, point in enumerate(scene.points):
-        found |= _pair(f"{point.key}.from_pin", ("points", index, "from_pin"))
+        found |= _pair(f"{point.key}.from_pin", ("points", index, "from_pin"), "m")
     for index, effect in enumerate(scene.effects):
         for key, entry in OF_EFFECT.get(effect.key, lambda effect: {})(effect).items():
             found[f"effects.{effect.key}.{key}"] = entry._replace(place=("effects", index, *entry.place))
@@ -121,11 +127,36 @@ class Bars(Bar):
     def to_centre(self) -> Any:
         """As of one bar, whose cosine and sine are those of the C library, not of NumPy."""
         r, phi = self.mass_centre
+        if isinstance(phi, NDArrayOperatorsMixin):  # with its derivatives
+            return polar(r, phi)
         if np.ndim(phi):
             angles = np.asarray(phi).tolist()
             cosine: Any = np.array([math.cos(angle) for angle in angles])
             return r * cosine + 1j * (r * np.array([math.sin(angle) for angle in angles]))
         return r * math.cos(phi) + 1j * (r * math.sin(phi)) if phi else r + 0j
+
+
+LEFT_OUT = "is left out of the scene and follows the length; state it to give it a tolerance"
+
+
+def left_out(scene: Scene, entry: Entry) -> bool:
+    """Whether a number is one that the scene leaves to a uniform bar."""
+    if entry.place[0] != "linkage" or len(entry.place) < 3:
+        return False
+    bar = getattr(scene.linkage, str(entry.place[1]))
+    return getattr(bar, str(entry.place[2])) is None
+
+
+def at_place(whole: Any, place: Place) -> Any:
+    """The number at a place; what a bar leaves out is that of a uniform one."""
+    for name in place:
+        if isinstance(name, int):
+            whole = whole[name]
+        elif isinstance(whole, Bar) and getattr(whole, name) is None:
+            whole = {"inertia": whole.moment_of_inertia, "centre": whole.mass_centre}[name]
+        else:
+            whole = getattr(whole, name)
+    return whole
 
 
 def placed(whole: Any, place: Place, values: Any) -> Any:

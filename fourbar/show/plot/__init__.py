@@ -7,3 +7,5 @@ from fourbar.show.plot.figures import BRANCHES as BRANCHES
 from fourbar.show.plot.figures import FIGURES as FIGURES
 from fourbar.show.plot.figures import FORMATS as FORMATS
 from fourbar.show.plot.figures import draw as draw
+from fourbar.show.plot.tolerances import draw_tolerances as draw_tolerances
+from fourbar.show.plot.tolerances import drawable as drawable

@@ -10,7 +10,7 @@ import numpy as np
 
 from fourbar.errors import InputError
 from fourbar.scene import Scene
-from fourbar.show.plot import curves, freebody, hodograph, linkage
+from fourbar.show.plot import curves, freebody, hodograph, influence, linkage
 from fourbar.show.plot.labels import Labels
 from fourbar.show.plot.style import FORCE_COLOURS, MUTED, matplotlib_style, plain, rendered, save
 from fourbar.show.plot.view import View, common_position, on_branch, over_time, view
@@ -123,6 +123,7 @@ FIGURES: dict[str, tuple[Painter, tuple[float, float], bool]] = {
     "energy": (_single(curves.draw_energy), (5.6, 3.2), True),
     "transmission": (_single(curves.draw_transmission), (5.6, 3.2), False),
     "freebody": (_free_bodies, (9.6, 4.6), True),
+    "sensitivity": (influence.draw_influences, (9.6, 3.6), True),
 }
 """Each figure: its painter, the size of one branch in inches, and whether it needs omega_2."""
 
@@ -144,7 +145,7 @@ def draw(
     ----------
     path : the file; its ending says which of svg, png and pdf is meant.
     figure : one of `FIGURES`: "overview", "linkage", "coupler", "kinematics", "points", "torque",
-        "forces", "hodograph", "energy", "transmission", "freebody".
+        "forces", "hodograph", "energy", "transmission", "freebody", "sensitivity".
     position : theta_2 of the linkage and the free bodies, rad; left out: the scene's own.
     branches : "one" (the scene's) or "both" (open and crossed, to the same scales).
     units : in which numbers are drawn; left out: SI with the prefix that suits. Angles are in degrees.

@@ -1,0 +1,59 @@
+"""The table ``[tolerances]`` of a scene file: keys as in the file, quoted or dotted."""
+
+from typing import Any
+
+from fourbar.errors import InputError
+from fourbar.files.fields import Reader, Writer
+from fourbar.scene import Scene
+from fourbar.scene.tolerance import Tolerance
+from fourbar.studies.keys import ANY, LEFT_OUT, at_place, entries, left_out, refusal
+
+SIGMA = "sigma"
+
+
+def read_tolerances(read: Reader, scene: Scene, value: object) -> tuple[Tolerance, ...]:
+    """``"lengths.input" = "0.05 mm"`` (plus or minus) or ``["0.02 mm", "sigma"]``."""
+    known, found = entries(scene), []
+    for key, given in _flat(read, value).items():
+        name = f'tolerances."{key}"'
+        if key not in known:
+            raise read.refuse(name, given, refusal(key, given, list(known)).allowed)
+        entry, sigma = known[key], isinstance(given, list)
+        if sigma and (len(given) != 2 or given[1] != SIGMA):
+            raise read.refuse(name, given, f'must be like "0.05 {entry.unit}" or ["0.02 {entry.unit}", "{SIGMA}"]')
+        width = given[0] if sigma else given
+        if left_out(scene, entry):
+            raise read.refuse(name, width, LEFT_OUT)
+        own = read.number(name, width) if entry.unit == "1" else read.quantity(name, width, entry.unit, positive=True)
+        if own <= 0.0:
+            raise read.refuse(name, width, "must be > 0")
+        tolerance, number = Tolerance(key, own, sigma), at_place(scene, entry.place)
+        if number is None:
+            raise read.refuse(name, width, "belongs to a number that the scene does not state")
+        if entry.bound != ANY and tolerance.reach >= number:
+            three = "three sigma of it " if sigma else ""
+            raise read.refuse(name, width, f"{three}must be less than the number itself, {number:.6g} {entry.unit}")
+        found.append(tolerance)
+    return tuple(found)
+
+
+def _flat(read: Reader, value: object, before: str = "") -> dict[str, Any]:
+    """A table by whole keys, whether these are quoted or dotted."""
+    if not isinstance(value, dict):
+        raise read.refuse("tolerances", value, 'must be a table of keys like "lengths.input" = "0.05 mm"')
+    found: dict[str, Any] = {}
+    for key, entry in value.items():
+        found |= _flat(read, entry, f"{before}{key}.") if isinstance(entry, dict) else {f"{before}{key}": entry}
+    return found
+
+
+def written_tolerances(write: Writer, scene: Scene) -> dict[str, Any]:
+    """The table as it is written."""
+    known, rows = entries(scene), dict[str, Any]()
+    for tolerance in scene.tolerances:
+        if tolerance.key not in known:
+            raise InputError("tolerances", tolerance.key, "is no number of the scene")
+        unit = known[tolerance.key].unit
+        width: Any = tolerance.width if unit == "1" else write.quantity(tolerance.width, unit)
+        rows[tolerance.key] = [width, SIGMA] if tolerance.sigma else width
+    return rows

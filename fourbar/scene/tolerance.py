@@ -1,0 +1,33 @@
+"""A tolerance of one number of a scene."""
+
+import math
+from dataclasses import dataclass
+
+THREE_SIGMA = 3.0
+"""What counts as the width of a normal distribution in a worst case."""
+
+
+@dataclass(frozen=True, slots=True)
+class Tolerance:
+    """How far one number of a scene may be off.
+
+    Parameters
+    ----------
+    key : of the number, as in the scene file, pairs and lists by index.
+    width : in its SI unit, > 0: plus or minus, evenly distributed, or the standard deviation of a normal distribution.
+    sigma : whether it is that.
+    """
+
+    key: str
+    width: float
+    sigma: bool = False
+
+    @property
+    def deviation(self) -> float:
+        """Standard deviation."""
+        return self.width if self.sigma else self.width / math.sqrt(3.0)
+
+    @property
+    def reach(self) -> float:
+        """The largest change that a worst case counts with."""
+        return THREE_SIGMA * self.width if self.sigma else self.width

@@ -1,0 +1,126 @@
+"""Bands of torque, pin forces and points over the sweep, and whose variance it is."""
+
+import textwrap
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fourbar.errors import InputError
+from fourbar.show.plot.figures import FORMATS
+from fourbar.show.plot.style import (
+    FAINT,
+    FORCE_COLOURS,
+    INK,
+    MUTED,
+    degree_ticks,
+    largest,
+    matplotlib_style,
+    plain,
+    save,
+    unit_for,
+)
+from fourbar.show.tolerances import parted, shown_parts, unit_of
+from fourbar.studies.spread import BAND, Tolerances
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+MOST_PANELS = 7
+"""Torque, four pin forces, and the two components of one point; the eighth is for the shares."""
+MOST_SHARES = 5
+"""Tolerances that have a colour of their own; the others are drawn together."""
+SHADES = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", FAINT)
+OFF_SCALE = 98.0
+"""Percentile of the half widths beyond which an axis is not stretched: towards a limit they grow without end."""
+
+
+def drawable(path: str | Path) -> str:
+    """The format that a file's ending names; InputError where it is none of svg, png, pdf."""
+    kind = Path(path).suffix.removeprefix(".").lower()
+    if kind not in FORMATS:
+        raise InputError("output", str(path), "must end in one of " + ", ".join(f".{end}" for end in FORMATS))
+    return kind
+
+
+def draw_tolerances(found: Tolerances, path: str | Path) -> None:
+    """Draw the deviations from the nominal with their bands into a file, whole or not at all.
+
+    Raises InputError for another ending than of svg, png, pdf, or a single position; DependencyError without
+    matplotlib.
+    """
+    target = Path(path)
+    kind = drawable(target)
+    if len(found.theta_2) < 2:
+        raise InputError("motion.theta_2", "one position", "a picture of bands needs a sweep")
+    with matplotlib_style():
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+        from matplotlib.figure import Figure
+
+        parts = shown_parts(found)[:MOST_PANELS]
+        columns = (len(parts) + 2) // 2
+        figure = Figure(figsize=(2.95 * columns, 5.6), layout="constrained")
+        FigureCanvasAgg(figure)
+        panels = figure.subplots(2, columns, squeeze=False).ravel()
+        for axes, part in zip(panels, parts, strict=False):
+            _band(axes, found, part)
+        for axes in panels[len(parts) + 1 :]:
+            axes.set_axis_off()
+        _shares(panels[len(parts)], found, parts[0])
+        title = plain(found.scene.title, 80) or "Four-bar linkage"
+        heading = f"{title}: what the tolerances do ({found.samples} samples)"
+        figure.suptitle(heading, parse_math=False, size=10.5, weight="bold", x=0.012, ha="left")
+        caption = (
+            f"Deviation from the nominal. Filled: {BAND[0]:g} to {BAND[1]:g} % of the samples; thin: least and "
+            "greatest sampled; dashed: first-order worst case."
+        )
+        lines = [caption, *(line for part in parts if (line := parted(found, part)))]
+        text = "\n".join(textwrap.fill(line, 52 * columns) for line in lines)
+        figure.supxlabel(text, size=6.8, color=MUTED, x=0.012, ha="left", parse_math=False)
+        save(figure, target, kind)
+
+
+def _over(axes: "Axes", found: Tolerances) -> Any:
+    degrees = np.degrees(found.theta_2)
+    axes.set_xlim(degrees.min(), degrees.max())
+    degree_ticks(axes.xaxis, 2.0 * float(np.ptp(degrees)))
+    axes.set_xlabel(r"$\theta_2$ (°)")
+    return degrees
+
+
+def _band(axes: "Axes", found: Tolerances, part: str) -> None:
+    spread, over = found.spreads[part], _over(axes, found)
+    ends = [spread.low, spread.high, spread.least, spread.greatest]
+    away = [end - spread.nominal for end in ends]
+    sizes = np.abs(np.concatenate([*away, spread.worst]))
+    sizes = sizes[np.isfinite(sizes)]
+    most = 1.1 * float(np.percentile(sizes, OFF_SCALE)) if sizes.size else 0.0
+    factor, unit = unit_for(most, unit_of(part))
+    colour = FORCE_COLOURS.get(part.strip("|"), INK)
+    axes.fill_between(over, factor * away[0], factor * away[1], color=colour, alpha=0.35, lw=0.0)
+    for line in away[2:]:
+        axes.plot(over, factor * line, color=colour, lw=0.7)
+    for sign in (1.0, -1.0):
+        axes.plot(over, sign * factor * spread.worst, color=INK, lw=0.9, ls=(0, (4, 2)))
+    if sizes.size and largest(sizes) > 2.0 * most > 0.0:
+        axes.set_ylim(-factor * most, factor * most)
+    axes.axhline(0.0, color=INK, lw=0.6)
+    axes.set_ylabel(f"deviation ({unit})")
+    axes.set_title(part)
+
+
+def _shares(axes: "Axes", found: Tolerances, part: str) -> None:
+    spread, over = found.spreads[part], _over(axes, found)
+    with np.errstate(all="ignore"):
+        shares = 100.0 * spread.shares / spread.shares.sum(axis=0)
+    order = np.argsort(-np.nan_to_num(shares).sum(axis=1))
+    names = [found.scene.tolerances[i].key for i in order]
+    rows = [shares[i] for i in order[:MOST_SHARES]]
+    if len(order) > MOST_SHARES:
+        rows.append(shares[order[MOST_SHARES:]].sum(axis=0))
+        names = [*names[:MOST_SHARES], "the others"]
+    axes.stackplot(over, rows, colors=SHADES[: len(rows)], labels=names, lw=0.0)
+    axes.set_ylim(0.0, 100.0)
+    axes.set_ylabel("share of the variance (%)")
+    axes.legend(loc="upper left", bbox_to_anchor=(0.0, -0.28), ncols=1, fontsize=6.5)
+    axes.set_title(f"{part}: from which dimension")

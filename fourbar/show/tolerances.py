@@ -1,0 +1,126 @@
+"""What `fourbar tolerance` prints: a table where the spread is largest, and one JSON object."""
+
+import json
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fourbar.quantities import PIN_FORCES, UNITS
+from fourbar.solution import nulled
+from fourbar.studies.spread import BAND, Spread, Tolerances
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+SCHEMA = "fourbar-tolerance/1"
+
+
+def shown_parts(found: Tolerances) -> list[str]:
+    """Torque and magnitudes of pin forces, or where the scene states no speed the angles; and its own points."""
+    own = [f"{point.name}_{letter}" for point in found.scene.points for letter in "xy"]
+    first = ["torque", *(f"|{name}|" for name in PIN_FORCES)] if "torque" in found.spreads else ["theta_3", "theta_4"]
+    return [*first, *own]
+
+
+def unit_of(part: str) -> str:
+    """Of a quantity, a component or a magnitude."""
+    return UNITS.get(part.strip("|"), "m")
+
+
+def heading(found: Tolerances) -> list[str]:
+    """The lines above the table."""
+    n = len(found.theta_2)
+    lines = [
+        f"{len(found.scene.tolerances)} tolerances, {found.samples} samples (seed {found.seed}), {n} positions",
+        "each quantity where its first-order worst case is largest; the share is that of the variance",
+    ]
+    if found.invalid:
+        lines.append(f"{_share(found.invalid, found)} have a number that no scene takes")
+    if found.apart:
+        lines.append(f"{_share(found.apart, found)} do not assemble at some position at which the nominal linkage does")
+    lines += [line for part in shown_parts(found) if (line := parted(found, part))]
+    return lines
+
+
+def _share(count: int, found: Tolerances) -> str:
+    return f"{count} of {found.samples} samples ({100.0 * count / found.samples:.3g} %)"
+
+
+def parted(found: Tolerances, part: str) -> str:
+    """The word where first order and samples part; empty where they do not."""
+    spread = found.spreads[part]
+    where = np.flatnonzero(spread.parted)
+    if not where.size:
+        return ""
+    first, last = (math.degrees(found.theta_2[index]) for index in (where[0], where[-1]))
+    return (
+        f"{part}: first order and samples part at {where.size} of {len(found.theta_2)} positions, from theta_2 = "
+        f"{first:.6g} to {last:.6g} deg: trust the samples there"
+    )
+
+
+def worst_position(spread: Spread) -> int | None:
+    """Index of the largest first-order worst case; None where no position has one."""
+    return int(np.nanargmax(spread.worst)) if np.isfinite(spread.worst).any() else None
+
+
+def table(found: Tolerances) -> "Table":
+    """One row for each quantity."""
+    from rich import box
+    from rich.table import Table
+    from rich.text import Text
+
+    shown = Table(box=box.SIMPLE_HEAD, show_edge=False, pad_edge=False, padding=(0, 1, 0, 0))
+    heads = ("", "\nunit", "theta_2\ndeg", "\nnominal", "standard\ndeviation", f"{BAND[0]:g} %\nof samples")
+    for head in (*heads, f"{BAND[1]:g} %\nof samples", "least\nsampled", "greatest\nsampled", "worst case\n+-"):
+        shown.add_column(Text(head), justify="right" if head else "left", no_wrap=True)
+    shown.add_column(Text("most of it from\n"), no_wrap=True)
+    for part in shown_parts(found):
+        spread = found.spreads[part]
+        at = worst_position(spread)
+        if at is None:
+            continue
+        columns = (spread.nominal, spread.deviation, spread.low, spread.high, spread.least, spread.greatest)
+        numbers = [f"{column[at]:.6g}" for column in columns]
+        numbers[1] = f"{spread.deviation[at]:.3g}"
+        row = [part, unit_of(part), f"{math.degrees(found.theta_2[at]):.6g}", *numbers, f"{spread.worst[at]:.3g}"]
+        shown.add_row(*map(Text, row), Text(_most(found, spread, at)))
+    return shown
+
+
+def _most(found: Tolerances, spread: Spread, at: int) -> str:
+    """The two tolerances with the largest shares."""
+    shares, total = spread.shares[:, at], float(spread.shares[:, at].sum())
+    if not total > 0.0:
+        return "-"
+    order = np.argsort(-shares)[:2]
+    return ", ".join(f"{found.scene.tolerances[i].key} {100.0 * shares[i] / total:.0f} %" for i in order)
+
+
+def json_text(found: Tolerances) -> str:
+    """One object, SI and rad; arrays over the positions, null where there is no value."""
+    keys = [tolerance.key for tolerance in found.scene.tolerances]
+    rows: dict[str, Any] = {}
+    for part, spread in found.spreads.items():
+        own: dict[str, Any] = {name: nulled(array) for name, array in spread._asdict().items() if name != "shares"}
+        own["first_order"] = nulled(spread.first_order)
+        own["shares"] = {key: nulled(share) for key, share in zip(keys, spread.shares, strict=True)}
+        own["parted"] = spread.parted.tolist()
+        rows[part] = own
+    document = {
+        "schema": SCHEMA,
+        "title": found.scene.title,
+        "samples": found.samples,
+        "seed": found.seed,
+        "tolerances": {
+            each.key: {"width": each.width, "distribution": "normal" if each.sigma else "uniform"}
+            for each in found.scene.tolerances
+        },
+        "apart": found.apart,
+        "invalid": found.invalid,
+        "theta_2": found.theta_2.tolist(),
+        "without_value": found.without.tolist(),
+        "quantities": rows,
+    }
+    return json.dumps(document, allow_nan=False) + "\n"

@@ -1,0 +1,235 @@
+"""Sensitivities: the derivative of every quantity by every number of a scene, from the formulas as they stand."""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fourbar.effects import Gravity, PinFriction
+from fourbar.effects.actions import Actions
+from fourbar.effects.cones import settle
+from fourbar.effects.pin_friction import Settled
+from fourbar.errors import InputError
+from fourbar.formulas.position import polar
+from fourbar.linkage import PIN_FORCE
+from fourbar.quantities import FORCES, NOT_ASSEMBLED, OK, SINGULAR, STATUS_NAMES
+from fourbar.scene import Command, Scene, command
+from fourbar.scene.case import Case
+from fourbar.scene.motion import FromLimit
+from fourbar.scene.point import OF_POINTS
+from fourbar.solution import Array, Solution
+from fourbar.solve import KINEMATIC, kinematics, solve
+from fourbar.studies.keys import Entry, at_place, entries, placed
+from fourbar.studies.sloped import Sloped, slopes, values
+
+THETA_2 = "motion.theta_2"
+AT_ONCE = 512
+"""Positions: each number is then as many rows as the scene has numbers, and stays in the cache."""
+AT_REST = "at_rest"
+"""Status where dry friction holds a pin at rest: its couple, and all that hangs on it, jumps with the motion."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sensitivity:
+    """d(quantity)/d(key) at n positions, SI and rad."""
+
+    scene: Scene
+    solution: Solution
+    """The quantities themselves."""
+    keys: dict[str, Entry]
+    """The p numbers by which they are derived, as in the scene file, pairs and lists by index."""
+    numbers: Array
+    """Their values, (p,); of motion.theta_2 and of what a motion law varies NaN."""
+    status: list[str]
+    """Of each position, as in `Solution.status`; "at_rest": dry friction holds a pin, torque and pin forces have no
+    derivative there. Where the status is not ok what it is about is NaN."""
+    by: dict[str, Array]
+    """By quantity, (p, n) or (p, n, 2)."""
+
+    def of(self, quantity: str, key: str) -> Array:
+        """d(quantity)/d(key), (n,) or (n, 2).
+
+        Raises InputError for a quantity or a key that is not known here.
+        """
+        for name, known in ((quantity, self.by), (key, self.keys)):
+            if name not in known:
+                raise InputError("sensitivity", name, "is not known here; known: " + ", ".join(known))
+        found: Array = self.by[quantity][list(self.keys).index(key)]
+        return found
+
+    def value(self, quantity: str) -> Array:
+        """The quantity itself, (n,) or (n, 2)."""
+        return quantity_of(self.solution, quantity)
+
+
+def quantity_of(solution: Solution, name: str) -> Array:
+    """A quantity of a solution by name, those of the scene's own points too."""
+    for start, own in (("v_", solution.velocity), ("a_", solution.acceleration), ("", solution.points)):
+        if name.startswith(start) and name[len(start) :] in own:
+            return own[name[len(start) :]]
+    found: Array = getattr(solution, name)
+    return found
+
+
+def sensitivity(scene: Scene) -> Sensitivity:
+    """The derivatives of every quantity at each position of a scene by each of its numbers.
+
+    d(quantity)/d(key), the other numbers held; what the scene leaves out (the inertia of a uniform bar, its centre
+    at mid-bar) follows the length. theta_2 is held too, and "motion.theta_2" is the derivative by it.
+
+    Raises
+    ------
+    InputError : a free motion, or a position that is described by its distance from a limit.
+
+    >>> from fourbar import Motion, Scene, uniform
+    >>> found = sensitivity(Scene(uniform(0.3, 0.1, 0.25, 0.22), Motion(1.0, 10.0)))
+    >>> found.of("torque", "motion.omega_2") * 10.0 / found.value("torque")  # it grows with the square of the speed
+    array([2.])
+    """
+    if scene.motion.free is not None:
+        raise InputError("motion.free", "a free motion", "has no sensitivities: they are those of a prescribed theta_2")
+    if isinstance(scene.motion.theta_2, FromLimit):
+        raise InputError(THETA_2, scene.motion.theta_2, "has no sensitivities: the limit moves with the lengths")
+    at, solution, known = command(scene), solve(scene), entries(scene)
+    moving = at.omega_2 is not None
+    keys = {THETA_2: Entry((), "rad")} | (known if moving else {k: e for k, e in known.items() if _of_position(k)})
+    numbers = [np.nan if key == THETA_2 else at_place(scene, entry.place) for key, entry in keys.items()]
+    forces = FORCES if any(effect.loaded_pins for effect in scene.effects) else (*FORCES, "drive_condition")
+    names = [name for name in solution.evaluated() if name in KINEMATIC or (moving and name in forces)]
+    names += [f"{start}{p.name}" for p in scene.points for start in (OF_POINTS if moving else ("",))]
+    p = len(keys)
+    by = {name: np.full((p, *quantity_of(solution, name).shape), np.nan) for name in names}
+    status = np.array(STATUS_NAMES, dtype="<U16")[solution.status_code]
+    with np.errstate(all="ignore"):
+        _, decided = Case.of(scene).half_angle(at.theta_2, None)
+        status[decided] = STATUS_NAMES[SINGULAR]  # on a limit: so near that doubles cannot tell the factors from zero
+        regular = np.flatnonzero(~np.isin(status, [STATUS_NAMES[code] for code in (NOT_ASSEMBLED, SINGULAR)]))
+        seeded = _seeded(scene, keys)
+        for start in range(0, len(regular), AT_ONCE):
+            index = regular[start : start + AT_ONCE]
+            found, held = _derivatives(seeded, keys, at, index, names, moving)
+            status[index[held & (solution.status_code[index] == OK)]] = AT_REST
+            for name, number in found.items():
+                own = np.broadcast_to(slopes(number), (p, len(index)))
+                if by[name].ndim == 3:
+                    by[name][:, index, 0], by[name][:, index, 1] = own.real, own.imag
+                else:
+                    by[name][:, index] = own.real
+    for name in set(forces) & set(names):
+        by[name][:, status != STATUS_NAMES[OK]] = np.nan
+    return Sensitivity(scene, solution, keys, np.array(numbers, dtype=float), status.tolist(), by)
+
+
+def _of_position(key: str) -> bool:
+    """Whether positions depend on a number; the rest comes in with the motion."""
+    return key.startswith(("lengths", "points")) or ".centre." in key
+
+
+class _Directed(Gravity):
+    """Gravity whose small components are kept: they have derivatives."""
+
+    __slots__ = ()
+
+    @property
+    def field(self) -> Any:
+        """g e^{i angle}."""
+        return polar(self.magnitude, self.angle)
+
+
+class _Sliding(PinFriction):
+    """Pin friction, derived by the implicit function: (1 - J) dx = d(k |F + C x|), J the slope by x."""
+
+    __slots__ = ()
+
+    def settle(self, actions: Actions, pins: Any, eliminate: Any, by_couples: Any) -> Settled:
+        names, arms = self.loaded_pins, {pin: mu * r for pin, mu, r in self.pins}
+        senses, per_unit = {pin: actions.sense(pin) for pin in names}, {}
+        for turned in names:
+            alone = Actions(actions.state, actions.bodies)
+            alone.couple(turned, -senses[turned])
+            per_unit[turned] = by_couples(alone)
+        force = [getattr(pins, PIN_FORCE[pin]) for pin in names]
+        by = [[getattr(per_unit[q], PIN_FORCE[pin]) for q in names] for pin in names]
+        shape = values(pins.F12).shape
+
+        def plain(number: Any) -> Any:
+            z = np.broadcast_to(values(number), shape)
+            return np.stack([z.real, z.imag], axis=-1) if np.iscomplexobj(z) else z
+
+        C = np.stack([np.stack([plain(c) for c in row], axis=1) for row in by], axis=1)
+        k = np.stack([plain(arms[pin]) for pin in names], axis=1)
+        found = settle(np.stack([plain(f) for f in force], axis=1), C, k)
+        x = found.x
+        gaps, J = [], np.empty((len(x), len(names), len(names)))
+        for row, pin in enumerate(names):
+            total = force[row]
+            for column in range(len(names)):
+                total = total + by[row][column] * x[:, column]
+            gaps.append(slopes(arms[pin] * np.abs(total)))
+            unit = total.values / np.abs(total.values)
+            for column in range(len(names)):
+                own = values(by[row][column])
+                J[:, row, column] = k[:, row] * (unit.conjugate() * own).real
+        rows = np.stack([np.broadcast_to(gap, (gap.shape[0], len(x))) for gap in gaps])  # (pins, p, n)
+        solvable = found.number == 0
+        dx = np.full(rows.shape, np.nan)
+        matrix = np.eye(len(names)) - J[solvable]
+        dx[:, :, solvable] = np.moveaxis(np.linalg.solve(matrix, np.moveaxis(rows[:, :, solvable], -1, 0)), 0, -1)
+        for row, pin in enumerate(names):
+            actions.couple(pin, -senses[pin] * Sloped(x[:, row], dx[row]))
+        none: Any = None
+        return Settled(eliminate(actions), none, none, none)
+
+
+def differentiable(scene: Scene) -> Scene:
+    """The scene with effects that say their derivatives too."""
+    twins: dict[Any, Any] = {
+        Gravity: lambda own: _Directed(own.magnitude, own.angle),
+        PinFriction: lambda own: _Sliding(own.pins),
+    }
+    return replace(scene, effects=tuple(twins.get(type(own), lambda own: own)(own) for own in scene.effects))
+
+
+def _seeded(scene: Scene, keys: dict[str, Entry]) -> Scene:
+    """The scene with every number carrying its own unit slope; what it leaves out carries that of its length too."""
+    scene = differentiable(scene)
+    for index, (key, entry) in enumerate(keys.items()):
+        if not key.startswith("motion."):
+            scene = placed(scene, entry.place, at_place(scene, entry.place) + unit_slope(index, len(keys)))
+    return scene
+
+
+def unit_slope(index: int, count: int) -> Sloped:
+    """Zero, with the slope 1 by one of the variables."""
+    return Sloped(0.0, np.eye(count)[:, index : index + 1])
+
+
+def _derivatives(
+    scene: Scene, keys: dict[str, Entry], at: Command, index: NDArray[np.intp], names: list[str], moving: bool
+) -> tuple[dict[str, Any], NDArray[np.bool_]]:
+    """The quantities at some positions, with their slopes; and where dry friction holds a pin at rest."""
+    place = {key: number for number, key in enumerate(keys)}
+
+    def seeded(key: str, number: Any) -> Any:
+        number = np.broadcast_to(np.asarray(0.0 if number is None else number, dtype=float), at.theta_2.shape)[index]
+        if key in place:
+            return number + unit_slope(place[key], len(keys))
+        return Sloped(number, np.zeros((len(keys), 1)))
+
+    theta_2, omega_2, alpha_2 = (
+        seeded(f"motion.{name}", getattr(at, name)) for name in ("theta_2", "omega_2", "alpha_2")
+    )
+    case, branch = Case.of(scene), at.branch[index].astype(float)
+    position = case.path.position(theta_2, case.path.half_angle(theta_2), branch)
+    state = case.state(case.path, theta_2, position, branch, omega_2, alpha_2, moving=moving)
+    found = kinematics(case, state, names)
+    held = np.zeros(len(index), dtype=bool)
+    if moving:
+        actions = Actions(state, case.bodies)
+        for pin in {pin for term in case.terms for pin in term.dry_pins}:
+            held |= ~np.broadcast_to(actions.turning(pin), held.shape) | (values(omega_2) == 0.0)
+        dynamics = case.dynamics(state, alpha_2)
+        found |= {**dynamics.pins._asdict(), "torque": dynamics.torque}
+        found["drive_condition"] = np.abs(case.drive_sine(position))
+    return {name: found[name] for name in names}, held

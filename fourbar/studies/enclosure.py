@@ -1,0 +1,284 @@
+"""Guaranteed extremes: the largest and smallest load over the input's whole interval, enclosed in ball arithmetic.
+
+A box B of theta_2 and of the toleranced numbers, with centre c, is bounded by the mean-value form
+    f(B) is in f(c) + f'(B) (B - c),
+and the boxes that may hold the extreme are halved in theta_2 until it is known.
+
+Source: R. E. Moore, R. B. Kearfott, M. J. Cloud, Introduction to Interval Analysis, ch. 6; F. Johansson, IEEE Trans.
+Comput. 66 (2017) 1281 (Arb).
+"""
+
+import math
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fourbar.effects.actions import bodies
+from fourbar.errors import DependencyError, InputError, LimitError
+from fourbar.formulas.mobility import TURN, change_points, intervals, limit_positions, turns_fully
+from fourbar.formulas.path import Path
+from fourbar.formulas.pin_forces import dot
+from fourbar.formulas.position import HalfAngle, Loop, close_loop
+from fourbar.quantities import PIN_FORCES
+from fourbar.scene import Scene, command
+from fourbar.scene.case import Case
+from fourbar.studies.derivatives import differentiable
+from fourbar.studies.keys import at_place, entries, left_out, placed
+from fourbar.studies.sloped import Sloped
+
+BITS = 128
+"""Working precision: rounding is far below what is promised."""
+PROVEN = 1e-9
+"""Width of the enclosure, relative to the largest magnitude."""
+OUTWARDS = 1e-15
+"""Relative; the roots and arcs of the ends are rounded by less."""
+DISTANCE = math.radians(1.0)
+"""rad; how near to a limit, where forces grow without end, the bounds reach."""
+FIRST = 64
+"""Boxes to begin with."""
+FINEST, FINEST_OF_MANY = 1e-10, 1e-4
+"""rad; narrower boxes are not halved: without tolerances, and with them, where the rest is theirs."""
+NAMES = ("torque", *(f"|{name}|" for name in PIN_FORCES), "transmission")
+KNOWN = ("gravity", "viscous", "springs", "flywheel", "load")
+Balls = NDArray[Any]
+
+
+class Extreme(NamedTuple):
+    """One end of a quantity over the interval."""
+
+    low: float
+    """The extreme lies between these two, rounded outwards."""
+    high: float
+    theta_2: float
+    """Where it is, or with tolerances where it was found, rad."""
+
+
+class Extremes(NamedTuple):
+    """What `extremes` returns."""
+
+    parts: tuple[tuple[float, float], ...]
+    """The intervals of theta_2 (rad) that the bounds hold over."""
+    distance: float
+    """How near to a limit of the input or a pole of the torque they reach, rad; 0 where there is none."""
+    least: dict[str, Extreme]
+    """By quantity: torque (N m), |F12| .. |F14| (N), transmission (rad)."""
+    greatest: dict[str, Extreme]
+    boxes: int
+    """That were evaluated."""
+    nominal: "Extremes | None" = None
+    """Of the linkage without its tolerances, where it has any."""
+
+    def over_estimate(self, name: str, sign: int) -> float | None:
+        """With tolerances: how far the proven greatest (+1) or least (-1) lies from the nominal one, over how far a
+        linkage was found to go, >= 1; None without tolerances, or where none was found to go further."""
+        if self.nominal is None:
+            return None
+        own, before = ((x.greatest if sign > 0 else x.least)[name] for x in (self, self.nominal))
+        proven, found = (own.high, own.low) if sign > 0 else (own.low, own.high)
+        middle = 0.5 * (before.low + before.high)
+        return (proven - middle) / (found - middle) if sign * (found - middle) > PROVEN * abs(middle) else None
+
+
+def extremes(scene: Scene) -> Extremes:
+    """Largest and smallest torque, pin forces and transmission angle over the input's whole interval, proven.
+
+    At the scene's omega_2, alpha_2 and branch. Where the scene has tolerances the bounds hold for every linkage within
+    them (three sigma of a normal one): `high` of the greatest and `low` of the least are then proven, and the other end
+    is what the worst corner found reaches.
+
+    Raises
+    ------
+    InputError : no omega_2, a free motion or a motion law, a change point, an effect that has no derivative somewhere.
+    LimitError : the linkages within the tolerances do not all assemble over the interval.
+    DependencyError : python-flint is not installed.
+    """
+    try:
+        import flint
+    except ImportError:
+        raise DependencyError('Guaranteed extremes need python-flint: pip install "fourbar[exact]"') from None
+    _require(scene)
+    before, flint.ctx.prec = flint.ctx.prec, BITS
+    try:
+        with np.errstate(all="ignore"):
+            search = _Search(scene)
+            least, greatest = ({name: search.extreme(name, sign) for name in search.names} for sign in (-1, 1))
+            nominal = extremes(replace(scene, tolerances=())) if scene.tolerances else None
+            return Extremes(search.parts, search.distance, least, greatest, search.boxes, nominal)
+    finally:
+        flint.ctx.prec = before
+
+
+def _require(scene: Scene) -> None:
+    motion = scene.motion
+    if motion.free is not None or motion.law is not None:
+        raise InputError("motion", "a free motion or a motion law", "has no interval of theta_2 at one speed")
+    if motion.omega_2 is None:
+        raise InputError("motion.omega_2", None, "is needed for extremes of torque and pin forces")
+    if change_points(scene.linkage):
+        raise InputError("lengths", scene.linkage.lengths, "has a change point, towards which forces have no bound")
+    for term in (*scene.loads, *scene.effects):
+        if term.key not in KNOWN or getattr(term, "table", None) is not None:
+            raise InputError(f"effects.{term.key}", term.key, "is not evaluated in balls; allowed: " + ", ".join(KNOWN))
+
+
+class _Search:
+    """The quantities over boxes, and the halving of boxes."""
+
+    def __init__(self, scene: Scene) -> None:
+        from flint import arb
+
+        self.arb, self.scene, self.boxes = arb, scene, 0
+        self.names = NAMES
+        known = entries(scene)
+        self.reach = {tolerance.key: tolerance.reach for tolerance in scene.tolerances}
+        for key in self.reach:
+            if key not in known or left_out(scene, known[key]):
+                raise InputError(f"tolerances.{key}", self.reach[key], "is no number that the scene states")
+        self.keys = [key for key in known if key in self.reach]
+        self.parts, self.distance = _interval(scene)
+        self.branch = float(command(scene).branch[0])
+        start = [(a, b) for low, high in self.parts for a, b in _halves(np.linspace(low, high, FIRST + 1))]
+        self.start = np.array(start)
+
+    def number(self, key: str, value: float, moved: Any) -> Sloped:
+        """A number of the scene at all boxes: as a ball over its tolerance, or moved by a part of that."""
+        slopes, own = np.zeros((1 + len(self.keys), 1), dtype=object), self.arb(value)
+        if key not in self.reach:
+            return Sloped(np.array([own], dtype=object), slopes)
+        row = 1 + self.keys.index(key)
+        slopes[row] = 1
+        if moved is None:
+            return Sloped(np.array([self.arb(value, self.reach[key])], dtype=object), slopes)
+        return Sloped(np.array([own + float(part) * self.reach[key] for part in moved[row - 1]], dtype=object), slopes)
+
+    def evaluate(self, theta_2: Balls, moved: Any) -> dict[str, Sloped]:
+        """The quantities, the pin forces and the sine of the transmission angle squared, with their slopes.
+
+        Parameters
+        ----------
+        moved : None: over the tolerances; else what each number is off by, in parts of its tolerance, (k, n).
+        """
+        self.boxes += len(theta_2)
+        scene, known = differentiable(self.scene), entries(self.scene)
+        numbers = {
+            key: self.number(key, at_place(self.scene, entry.place), moved)
+            for key, entry in known.items()
+            if not left_out(self.scene, entry)
+        }
+        for key, number in numbers.items():
+            if not key.startswith("motion."):
+                scene = placed(scene, known[key].place, number)
+        by_theta = np.zeros((1 + len(self.keys), 1), dtype=object)
+        by_theta[0] = 1
+        q, link = Sloped(theta_2, by_theta), scene.linkage
+        d, a, b, c = link.lengths
+        lengths = Loop(d, a, b, c, (b + c - a - d) * (a + b + c + d), (d - a - b + c) * (d - a + b - c))
+        angles: Any = (link.ground_angle, q)
+        theta_1 = angles[0]
+        h = 0.5 * (q - theta_1)
+        s, k = np.sin(h), np.cos(h)
+        ss, kk, four_ad = s * s, k * k, 4.0 * a * d
+        half = HalfAngle(ss, kk, s * k, lengths.E1 + four_ad * kk, lengths.E2 + four_ad * ss)
+        u1, u2 = (np.cos(angle) + 1j * np.sin(angle) for angle in angles)
+        at = close_loop(lengths, u1, u2, half, self.branch)
+        terms = (*scene.loads, *scene.effects)
+        path = Path(2, lengths, theta_1, u1)
+        case = Case(link, lengths, bodies(link, terms), terms, scene.drive_bar, path)
+        acceleration = numbers["motion.alpha_2"]
+        state = case.state(path, q, at, self.branch, numbers["motion.omega_2"], acceleration)
+        found = case.dynamics(state, acceleration)
+        forces = {f"|{name}|": dot(force, force) for name, force in found.pins._asdict().items()}
+        cosine = dot(at.u3, at.u4)
+        return {"torque": found.torque, **forces, "sine": at.sin_mu * at.sin_mu, "cosine": cosine * cosine}
+
+    def extreme(self, name: str, sign: int) -> Extreme:
+        """The greatest (+1) or least (-1) value, enclosed and rounded outwards."""
+        if name == "torque":
+            return Extreme(*self.enclosed(name, sign))
+        if name == "transmission" and sign > 0:  # near a right angle its cosine has the digits, near zero its sine
+            least, most, where = self.enclosed("cosine", -1)
+            low, high = (math.acos(min(math.sqrt(max(x, 0.0)), 1.0)) for x in (most, least))
+        else:
+            least, most, where = self.enclosed("sine" if name == "transmission" else name, sign)
+            low, high = (math.sqrt(max(x, 0.0)) for x in (least, most))
+            if name == "transmission":
+                low, high = (math.asin(min(x, 1.0)) for x in (low, high))
+        return Extreme(low * (1.0 - OUTWARDS), high * (1.0 + OUTWARDS), where)
+
+    def enclosed(self, name: str, sign: int) -> tuple[float, float, float]:
+        """The greatest (+1) or least (-1) value of what is evaluated between two numbers, and where."""
+        finest = FINEST_OF_MANY if self.keys else FINEST
+        boxes, size = self.start, 0.0
+        best, where, closed = -math.inf, math.nan, -math.inf
+        while len(boxes):
+            centre, radius = boxes.mean(axis=1), 0.5 * np.ptp(boxes, axis=1)
+            points = np.array([self.arb(x) for x in centre], dtype=object)
+            # half an interval more than rounding of its ends could lose
+            wide = np.array([self.arb(x, r * (1.0 + 1e-9)) for x, r in zip(centre, radius, strict=True)], dtype=object)
+            count, k = len(boxes), len(self.keys)
+            over, nominal = self.evaluate(wide, None)[name], self.evaluate(points, np.zeros((k, count)))[name]
+            found = [float((sign * value).lower()) for value in nominal.values]
+            if k:
+                slopes = np.broadcast_to(nominal.slopes, (1 + k, count))
+                corner = np.array([[sign * math.copysign(1.0, _mid(s)) for s in row] for row in slopes[1:]])
+                corners = self.evaluate(points, corner)[name]
+                found = [max(x, float((sign * value).lower())) for x, value in zip(found, corners.values, strict=True)]
+            top = np.array([self._bound(sign, over, nominal, i, r) for i, r in enumerate(radius)])
+            found_at = np.array([x if math.isfinite(x) else -math.inf for x in found])
+            size = max([size, *(abs(x) for x in found if math.isfinite(x))])
+            if found_at.max() > best:
+                best, where = float(found_at.max()), float(centre[int(found_at.argmax())])
+            allowed = PROVEN * (math.sqrt(abs(best) * size) + PROVEN * size if name != "torque" else size)
+            done = (top <= best + allowed) | ((radius < finest) & np.isfinite(top))
+            closed = max([closed, *top[done & (top > best)].tolist()])
+            if ((radius < finest) & ~np.isfinite(top)).any():
+                at = math.degrees(float(centre[~np.isfinite(top)][0]))
+                raise LimitError(f"{name} has no bound at theta_2 = {at:.6g} deg: not all linkages assemble there")
+            boxes = np.array([half for box in boxes[~done] for half in _halves(np.linspace(box[0], box[1], 3))])
+        closed = max(closed, best)
+        return (best, closed, where) if sign > 0 else (-closed, -best, where)
+
+    def _bound(self, sign: int, over: Sloped, nominal: Sloped, index: int, radius: float) -> float:
+        """Above everything that a box holds; inf where it has no bound."""
+        slopes = np.broadcast_to(over.slopes, (1 + len(self.keys), len(over.values)))[:, index]
+        reach = [radius * (1.0 + 1e-9), *(self.reach[key] for key in self.keys)]
+        mean = nominal.values[index] + sum(s * self.arb(0, r) for s, r in zip(slopes, reach, strict=True))
+        tops = [float((sign * value).upper()) for value in (mean, over.values[index])]
+        return math.nextafter(min([x for x in tops if math.isfinite(x)], default=math.inf), math.inf)
+
+
+def _mid(ball: Any) -> float:
+    return float(ball.mid()) if hasattr(ball, "mid") else float(ball)
+
+
+def _halves(ends: Any) -> list[tuple[float, float]]:
+    return list(zip(ends[:-1].tolist(), ends[1:].tolist(), strict=True))
+
+
+def _interval(scene: Scene) -> tuple[tuple[tuple[float, float], ...], float]:
+    """The input's whole interval without what lies within DISTANCE of its limits and of poles of the torque."""
+    linkage, first = scene.linkage, float(command(scene).theta_2[0])
+    if turns_fully(linkage):
+        start, stop, gaps = first, first + TURN, False
+    else:
+        every = [
+            (low + TURN * turn, high + TURN * turn)
+            for low, high in intervals(linkage)
+            for turn in (math.floor((first - low) / TURN),)
+        ]
+        start, stop = next(((low, high) for low, high in every if low <= first <= high), every[0])
+        start, stop, gaps = start + DISTANCE, stop - DISTANCE, True
+    parts = [(start, stop)]
+    if scene.drive_bar != 2:  # T3 has poles where bar 3 stands still against the ground, T4 where bar 4 does
+        for limit in limit_positions(linkage, scene.drive_bar):
+            for turn in range(-2, 3):
+                at = limit.theta_2 + TURN * turn
+                cut = [(low, min(high, at - DISTANCE)) for low, high in parts]
+                cut += [(max(low, at + DISTANCE), high) for low, high in parts]
+                kept = [(low, high) for low, high in cut if low < high]
+                if kept != parts:
+                    gaps = True
+                parts = sorted(set(kept))
+    return tuple(parts), DISTANCE if gaps else 0.0

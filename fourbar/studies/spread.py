@@ -1,0 +1,209 @@
+"""What the tolerances of a scene do to its quantities: from samples, and to first order from the sensitivities."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fourbar.errors import DependencyError, InputError
+from fourbar.quantities import ANGLES, NOT_ASSEMBLED, PIN_FORCES
+from fourbar.scene import Scene, command
+from fourbar.solution import Array
+from fourbar.solve import is_scalar, solve
+from fourbar.studies.derivatives import THETA_2, Sensitivity, quantity_of, sensitivity
+from fourbar.studies.keys import LEFT_OUT, at_place, entries, left_out, refusal
+from fourbar.studies.study import Study, vary
+
+SAMPLES = 8192
+MOST_SAMPLES = 10_000_000
+BAND = (1.0, 99.0)
+"""Percentiles of the band."""
+AT_ONCE = 200_000
+"""Members times positions: about 40 quantities of them are 70 MB."""
+PARTED = 0.1
+"""First order and samples part where their standard deviations differ by more than this share of the larger: the
+quantity is no longer straight over the tolerances, and a share of a variance is that of a straight one."""
+NEGLIGIBLE = 1e-9
+"""A deviation below this share of the quantity's largest value is rounding and decides nothing."""
+
+
+class Spread(NamedTuple):
+    """One quantity, or a component or magnitude of it, over n positions; SI, rad."""
+
+    nominal: Array
+    deviation: Array
+    """Standard deviation of the samples."""
+    low: Array
+    """Percentiles 1 and 99 of the samples."""
+    high: Array
+    least: Array
+    greatest: Array
+    worst: Array
+    """First-order worst case: sum of |s_i| t_i, to either side of the nominal."""
+    shares: Array
+    """(k, n), (s_i sigma_i)^2 of each tolerance."""
+
+    @property
+    def first_order(self) -> Array:
+        """Standard deviation to first order."""
+        return np.asarray(np.sqrt(self.shares.sum(axis=0)))
+
+    @property
+    def parted(self) -> NDArray[np.bool_]:
+        """Where first order and samples differ by more than `PARTED`, or only samples have a value."""
+        larger = np.fmax(self.deviation, self.first_order)
+        size = np.nanmax(np.abs(self.nominal), initial=0.0)
+        differ = ~(np.abs(self.deviation - self.first_order) <= PARTED * larger) & np.isfinite(self.deviation)
+        return np.asarray(differ & (larger > NEGLIGIBLE * size))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Tolerances:
+    """What `tolerances` returns."""
+
+    scene: Scene
+    samples: int
+    seed: int
+    theta_2: Array
+    """(n,), rad."""
+    spreads: dict[str, Spread]
+    """By quantity; vectors as components F12_x, F12_y, pin forces also as magnitude |F12|."""
+    without: NDArray[np.intp]
+    """Members without a value of everything at each position, (n,)."""
+    apart: int
+    """Members that do not assemble at one position or more at which the nominal linkage does."""
+    invalid: int
+    """Members with a number that no scene takes (a length below zero)."""
+
+
+def tolerances(
+    scene: Scene, samples: int = SAMPLES, seed: int = 0, *, progress: Callable[[float], None] | None = None
+) -> Tolerances:
+    """Spread of every quantity at each position, from quasi-random samples of the toleranced numbers.
+
+    With the samples come first-order figures, from s_i = d(quantity)/d(number i): the worst case sum |s_i| t_i and
+    the shares (s_i sigma_i)^2 of the variance.
+
+    Parameters
+    ----------
+    samples, seed : of a scrambled Sobol' sequence.
+    progress : is given the share that is done, from time to time.
+
+    Raises
+    ------
+    InputError : no tolerances, a key that the scene does not have, a number that it leaves out, a free motion.
+    DependencyError : SciPy is not installed.
+
+    Source: I. M. Sobol', USSR Comput. Math. Math. Phys. 7 (1967) 86; error propagation: JCGM 100:2008, 5.1.2.
+    """
+    if isinstance(samples, bool) or not isinstance(samples, int) or not 2 <= samples <= MOST_SAMPLES:
+        raise InputError("samples", samples, f"must be a whole number from 2 to {MOST_SAMPLES}")
+    if isinstance(seed, bool) or not isinstance(seed, int) or seed < 0:
+        raise InputError("seed", seed, "must be a whole number, 0 or more")
+    if not scene.tolerances:
+        raise InputError("tolerances", None, 'the scene states none; like [tolerances] "lengths.input" = "0.05 mm"')
+    found, study = sensitivity(scene), _members(scene, samples, seed)
+    n = len(found.solution)
+    names = list(found.by)
+    values = {name: _parts(name, found.value(name)) for name in names}
+    spreads = {part: _of_first_order(found, name, part) for name, own in values.items() for part in own}
+    without, gone = np.zeros(n, dtype=np.intp), np.zeros(len(study), dtype=bool)
+    nominal_closes = found.solution.status_code != NOT_ASSEMBLED
+    for columns, extra in _columns(study, scene, samples, nominal_closes):
+        own = replace(study, at=study.at._replace(**{name: _piece(x, extra) for name, x in study.at._asdict().items()}))
+        width = columns.stop - columns.start
+        solution = solve(own)
+        code = solution.status_code[:, -width:]
+        without[columns] = np.count_nonzero(code, axis=0)
+        gone |= ((code == NOT_ASSEMBLED) & nominal_closes[columns]).any(axis=1)
+        for name in names:
+            number = quantity_of(solution, name)[:, -width:]
+            if name in ANGLES:  # each member counts its turns from its own first position
+                turns = np.rint((number - values[name][name][columns]) / (2 * np.pi))
+                number = number - 2 * np.pi * turns
+            for part, sampled in _parts(name, number).items():
+                _fill(spreads[part], columns, sampled)
+        if progress is not None:
+            progress(columns.stop / n)
+    invalid = int(np.count_nonzero(study.invalid))
+    return Tolerances(scene, samples, seed, found.solution.theta_2, spreads, without, int(gone.sum()), invalid)
+
+
+def _members(scene: Scene, samples: int, seed: int) -> Study:
+    """The linkages of the samples."""
+    try:
+        from scipy.stats import norm, qmc
+    except ImportError:
+        raise DependencyError('SciPy is needed for tolerances: pip install "fourbar[dynamics]"') from None
+    known, numbers = entries(scene), dict[str, Any]()
+    drawn = qmc.Sobol(len(scene.tolerances), seed=seed).random_base2(max(1, (samples - 1).bit_length()))[:samples]
+    for tolerance, column in zip(scene.tolerances, drawn.T, strict=True):
+        if tolerance.key not in known:
+            raise refusal(tolerance.key, tolerance.width, list(known))
+        entry = known[tolerance.key]
+        if left_out(scene, entry):
+            raise InputError(tolerance.key, tolerance.width, LEFT_OUT)
+        inside = np.clip(column, 0.5 / samples, 1.0 - 0.5 / samples)
+        change = norm.ppf(inside) if tolerance.sigma else 2.0 * column - 1.0
+        numbers[tolerance.key] = at_place(scene, entry.place) + tolerance.width * change
+    if scene.motion.law is None:
+        numbers[THETA_2] = command(scene).theta_2
+    return vary(scene, numbers)
+
+
+def _columns(
+    study: Study, scene: Scene, samples: int, closes: NDArray[np.bool_]
+) -> Iterator[tuple[slice, NDArray[np.intp]]]:
+    """Blocks of positions, and their indices: after that at which the motion begins where an effect counts from it."""
+    n, first = study.at.theta_2.shape[1], int(np.argmax(closes))
+    begins = [first] if any(effect.counts_turns for effect in scene.effects) else []
+    size = max(1, AT_ONCE // samples)
+    for start in range(0, n, size):
+        columns = slice(start, min(start + size, n))
+        yield columns, np.array([*begins, *range(columns.start, columns.stop)])
+
+
+def _piece(value: Any, index: NDArray[np.intp]) -> Any:
+    return value[:, index] if np.ndim(value) == 2 and value.shape[1] > 1 else value
+
+
+def _parts(name: str, value: Any) -> dict[str, Array]:
+    """A quantity as scalars: components, and the magnitude of a pin force."""
+    if is_scalar(name):
+        return {name: value}
+    found = {f"{name}_x": value[..., 0], f"{name}_y": value[..., 1]}
+    return {f"|{name}|": np.hypot(value[..., 0], value[..., 1]), **found} if name in PIN_FORCES else found
+
+
+def _of_first_order(found: Sensitivity, name: str, part: str) -> Spread:
+    """The nominal and the first-order figures of a part of a quantity; the samples' are still to come."""
+    value, scene = found.value(name), found.scene
+    slopes = np.array([found.of(name, tolerance.key) for tolerance in scene.tolerances])
+    if part.startswith("|"):
+        with np.errstate(all="ignore"):
+            slopes = (slopes * value).sum(axis=-1) / np.hypot(*value.T)
+    elif slopes.ndim == 3:
+        slopes = slopes[..., "xy".index(part[-1])]
+    deviations, reaches = (
+        np.array([getattr(tolerance, of) for tolerance in scene.tolerances])[:, None] for of in ("deviation", "reach")
+    )
+    nominal = _parts(name, value)[part]
+    deviation, low, high, least, greatest = (np.full(nominal.shape, np.nan) for _ in range(5))
+    worst = np.asarray(np.abs(slopes * reaches).sum(axis=0))
+    return Spread(nominal, deviation, low, high, least, greatest, worst, (slopes * deviations) ** 2)
+
+
+def _fill(spread: Spread, columns: slice, sampled: Array) -> None:
+    """The samples' figures at some positions; where not all members have a value, those of the others."""
+    if np.isfinite(sampled).all():
+        # of the differences: the sum of many equal numbers is rounded, and so would be their mean
+        spread.deviation[columns] = (sampled - np.nan_to_num(spread.nominal[columns])).std(axis=0)
+        spread.low[columns], spread.high[columns] = np.percentile(sampled, BAND, axis=0)
+        spread.least[columns], spread.greatest[columns] = sampled.min(axis=0), sampled.max(axis=0)
+        return
+    for column, values in zip(range(columns.start, columns.stop), sampled.T, strict=True):
+        known = values[np.isfinite(values)]
+        if known.size > 1:
+            _fill(spread, slice(column, column + 1), known[:, None])

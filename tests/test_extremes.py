@@ -1,0 +1,135 @@
+"""Guaranteed extremes: no sample lies outside, the enclosures are as narrow as promised, and what has none says so."""
+
+import json
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import fourbar
+from fourbar import Friction, InputError, Motion, Scene, Sweep, Tolerance
+from fourbar.cli import status
+from fourbar.scene import Command
+from fourbar.studies import enclosure
+from fourbar.studies.enclosure import PROVEN, Extremes, extremes
+
+MODELS = Path(__file__).parents[1] / "models"
+LENGTHS = ("ground", "input", "coupler", "output")
+ROUNDING = 1e-12
+"""Relative; what doubles lose of a sample that lies on the extreme itself."""
+
+
+@pytest.fixture(scope="module")
+def rocker() -> tuple[Scene, Extremes]:
+    scene = fourbar.load(MODELS / "crank_rocker.toml")
+    return scene, extremes(scene)
+
+
+def sampled(solution: Any) -> dict[str, np.ndarray]:
+    found = {f"|{name}|": np.hypot(*np.moveaxis(getattr(solution, name), -1, 0)) for name in enclosure.PIN_FORCES}
+    mu = np.arctan2(np.abs(solution.sin_mu), np.abs(np.cos(solution.theta_4 - solution.theta_3)))
+    return {"torque": solution.torque, **found, "transmission": mu}
+
+
+def holds(found: Extremes, samples: dict[str, np.ndarray]) -> None:
+    for name in found.least:
+        values = samples[name]
+        size = ROUNDING * np.abs(values).max()
+        assert values.min() >= found.least[name].low - size, name
+        assert values.max() <= found.greatest[name].high + size, name
+
+
+def test_no_sample_lies_outside_and_the_enclosure_is_as_narrow_as_promised(rocker: tuple[Scene, Extremes]) -> None:
+    scene, found = rocker
+    theta_2 = np.linspace(0, 2 * math.pi, 20_001)
+    samples = sampled(fourbar.solve(scene, at=Command(theta_2, np.ones(20_001, np.int8), 10.0, 0.0)))
+    assert set(samples) == set(found.least) and found.distance == 0.0
+    holds(found, samples)
+    for name, values in samples.items():
+        size = np.abs(values).max()
+        for extreme, at in ((found.least[name], values.min()), (found.greatest[name], values.max())):
+            assert 0.0 <= extreme.high - extreme.low <= PROVEN * size
+            dense = 1e-3 if name == "transmission" else 1e-6  # it has a corner at a right angle
+            assert extreme.low <= at + dense * size and at - dense * size <= extreme.high
+
+
+def test_poles_are_kept_away_from_and_the_drive_may_be_on_any_bar(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(enclosure, "NAMES", ("torque",))
+    scene = fourbar.load(MODELS / "thesis.toml")
+    found = extremes(scene)
+    assert found.distance == enclosure.DISTANCE and len(found.parts) == 3
+    theta_2 = np.concatenate([np.linspace(*part, 500) for part in found.parts])
+    samples = sampled(fourbar.solve(scene, at=Command(theta_2, np.ones(1500, np.int8), 0.2244, 0.0)))
+    holds(found, samples)
+    assert found.greatest["torque"].high == pytest.approx(samples["torque"].max(), rel=1e-6)  # at an end
+
+
+def test_with_tolerances_no_linkage_lies_outside(
+    rocker: tuple[Scene, Extremes], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(enclosure, "NAMES", ("torque", "|F43|"))
+    scene, nominal = rocker
+    linkage = scene.linkage.lengths
+    widths = {f"lengths.{name}": 1e-4 * length for name, length in zip(LENGTHS, linkage, strict=True)}
+    loose = replace(scene, tolerances=tuple(Tolerance(key, width) for key, width in widths.items()))
+    found = extremes(loose)
+    random = np.random.default_rng(1)
+    corners = random.choice([-1.0, 1.0], (4, 200)) * np.maximum(random.uniform(0, 1.0, (4, 200)), 0.5).round()
+    values = {key: x + w * c for (key, w), x, c in zip(widths.items(), linkage, corners, strict=True)}
+    study = fourbar.vary(scene, values | {"motion.theta_2": np.linspace(0, 2 * math.pi, 721)})
+    holds(found, sampled(fourbar.solve(study)))
+    for name in found.greatest:
+        over = found.over_estimate(name, 1)
+        assert over is not None and 1.0 <= over <= 1.2, name
+        assert found.nominal is not None and found.nominal.greatest[name] == nominal.greatest[name]
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"motion": Motion(1.0)}, "is needed for extremes"),
+        ({"effects": (Friction.at(B=0.05),)}, "not evaluated in balls"),
+        ({"linkage": fourbar.uniform(0.3, 0.1, 0.3, 0.1)}, "change point"),
+        ({"tolerances": (Tolerance("bars.coupler.inertia", 1e-4),)}, "is no number that the scene states"),
+    ],
+)
+def test_what_has_no_enclosure_is_one_line(changes: dict[str, Any], words: str) -> None:
+    scene = fourbar.load(MODELS / "crank_rocker.toml")
+    with pytest.raises(InputError, match=words):
+        extremes(replace(scene, **changes))
+
+
+def test_linkages_that_come_apart_are_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(enclosure, "NAMES", ("torque",))
+    scene = Scene(fourbar.uniform(0.2, 0.48, 0.55, 0.2), Motion(Sweep(1.6, 1.7, 2), 1.0))
+    with pytest.raises(fourbar.FourBarError, match="not all linkages assemble there"):
+        extremes(replace(scene, tolerances=(Tolerance("lengths.output", 0.02),)))
+
+
+def test_the_command(rocker: tuple[Scene, Extremes], monkeypatch: pytest.MonkeyPatch, capsys: Any) -> None:
+    monkeypatch.setattr(enclosure, "extremes", lambda scene: rocker[1])
+    model = str(MODELS / "crank_rocker.toml")
+    assert status(["extremes", model]) == 0
+    text = capsys.readouterr().out
+    assert "proven over theta_2 = 0 to 360 deg" in text and "319.8767" in text
+    assert status(["extremes", model, "--json"]) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert document["extremes"]["torque"]["greatest"]["high"] == rocker[1].greatest["torque"].high
+
+
+def test_the_bound_of_a_box_holds_at_its_ends(rocker: tuple[Scene, Extremes]) -> None:
+    search, radius = enclosure._Search(rocker[0]), 1e-3
+    centre = np.array([0.4, 2.0, 4.5])
+    points, low, high = (np.array([search.arb(x) for x in centre + r]) for r in (0.0, -radius, radius))
+    wide = np.array([search.arb(x, radius) for x in centre])
+    none = np.zeros((0, 3))
+    over, nominal, *ends = (search.evaluate(*box) for box in ((wide, None), (points, none), (low, none), (high, none)))
+    for name in over:
+        for i in range(3):
+            top = search._bound(1, over[name], nominal[name], i, radius)
+            least = -search._bound(-1, over[name], nominal[name], i, radius)
+            for end in ends:
+                assert least <= float(end[name].values[i].mid()) <= top, name
