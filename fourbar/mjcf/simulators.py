@@ -52,9 +52,12 @@ SIMULATORS = {
     ),
     "newton": Simulator(
         SINGLE,
-        "For Newton, whose MuJoCo solver works in single precision: add_mjcf takes neither timestep, gravity nor "
-        "keyframe from this file. Give the timestep to step(), gravity to ModelBuilder(gravity=...), and set joint_qd. "
-        "It turns the closure into a ball joint of its own, and no torque or pin force is known to be read from it.",
+        "For Newton, whose MuJoCo solver works in single precision. add_mjcf takes neither timestep, gravity nor "
+        "keyframe from this file: give the timestep to step(), the gravity above to ModelBuilder(gravity=...) with its "
+        "up axis left at Z (another one turns the file), and the keyframe's speeds to joint_qd[:3]. Numbers: after "
+        "step call mujoco_warp.forward(solver.mjw_model, solver.mjw_data) twice; then in mjw_data T2 = "
+        "actuator_force[drive] - dof_armature[0] qacc[0], and efc.force[0], efc.force[1] of the world are the force of "
+        "bar 4 on bar 3 at pin B in world axes.",
     ),
 }
 
