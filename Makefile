@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: validate test long-test models setup clean
+.PHONY: validate test long-test models docs setup clean
 
 validate: setup
 	$(BIN)/python -m validation run
@@ -13,12 +13,14 @@ test: setup
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
-	$(BIN)/python -m pytest -n 2
+	$(BIN)/python -m pytest -n 2 --dist worksteal
 
 # hours: everything that `make test` samples, in full
 long-test: setup
 	KILLS=50 $(BIN)/python -m pytest tests/test_suite.py tests/test_dask.py
+	PACKAGE=all $(BIN)/python -m pytest tests/test_package.py
 	MACHINES=all $(BIN)/python -m pytest tests/test_machines.py
+	INSTRUCTIONS=all $(BIN)/python -m pytest tests/test_effects_cost.py
 	$(BIN)/python -m pytest tests/test_further_engines.py
 	$(BIN)/python -m pytest tests/test_model_files.py tests/test_subjects.py
 	$(BIN)/python -m validation standing
@@ -29,6 +31,11 @@ long-test: setup
 	$(BIN)/python -m validation published
 	$(BIN)/python -m validation run --suite hard --out results/hard
 	$(BIN)/python -m validation run --random 1000 --out results/random
+
+# the site of docs/, in site/
+docs: setup
+	$(BIN)/python -m pip install --quiet --editable ".[docs]"
+	$(BIN)/sphinx-build -W -q docs site
 
 models: setup
 	$(BIN)/python -m validation models
@@ -42,4 +49,4 @@ $(STAMP): pyproject.toml
 	touch $(STAMP)
 
 clean:
-	rm -rf $(VENV) results
+	rm -rf $(VENV) results site

@@ -1,10 +1,24 @@
 """Closed formulas of the planar four-bar linkage: from position to driving torque and pin forces."""
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from importlib import import_module as _import_module
+from types import ModuleType as _ModuleType
+from typing import TYPE_CHECKING as _TYPE_CHECKING
+from typing import Any as _Any
 
+from fourbar.errors import DependencyError as DependencyError
 from fourbar.errors import FourBarError as FourBarError
 from fourbar.errors import InputError as InputError
+from fourbar.errors import NotAssembledError as NotAssembledError
+from fourbar.formulas.circuits import circuits as circuits
+from fourbar.formulas.linkage_type import classify as classify
+from fourbar.formulas.mobility import change_points as change_points
+from fourbar.formulas.mobility import limit_positions as limit_positions
+from fourbar.formulas.mobility import swing as swing
+from fourbar.formulas.mobility import time_ratio as time_ratio
+from fourbar.formulas.points import coupler_curve as coupler_curve
+from fourbar.formulas.points import instant_centres as instant_centres
+from fourbar.formulas.points import point_coefficients as point_coefficients
+from fourbar.formulas.transmission import transmission_extremes as transmission_extremes
 from fourbar.linkage import Bar as Bar
 from fourbar.linkage import FourBar as FourBar
 from fourbar.linkage import uniform as uniform
@@ -14,42 +28,69 @@ from fourbar.scene.motion import Free as Free
 from fourbar.scene.motion import FromLimit as FromLimit
 from fourbar.scene.motion import Motion as Motion
 from fourbar.scene.motion import Sweep as Sweep
+from fourbar.scene.motion_law import Law as Law
 from fourbar.scene.point import Point as Point
 from fourbar.solution import Solution as Solution
 from fourbar.solve import solve as solve
 
 __version__ = "0.1.0"
 
-if TYPE_CHECKING:
+if _TYPE_CHECKING:
+    from fourbar.effects import Flywheel as Flywheel
     from fourbar.effects import Friction as Friction
     from fourbar.effects import Gravity as Gravity
     from fourbar.effects import Load as Load
+    from fourbar.effects import PinFriction as PinFriction
+    from fourbar.effects import Spring as Spring
+    from fourbar.effects import Springs as Springs
+    from fourbar.effects import Torsion as Torsion
     from fourbar.effects import Viscous as Viscous
     from fourbar.files import dump as dump
     from fourbar.files import load as load
+    from fourbar.files import save as save
+    from fourbar.show.bearing import bearing_load as bearing_load
+    from fourbar.show.bearing import shaking_force as shaking_force
+    from fourbar.show.bearing import shaking_moment as shaking_moment
+    from fourbar.show.motor import motor_duty as motor_duty
+    from fourbar.show.notebook import in_units as in_units
+    from fourbar.show.units import units as units
     from fourbar.studies import Study as Study
     from fourbar.studies import vary as vary
 
+_EFFECTS = (*("Flywheel", "Friction", "Gravity", "Load", "PinFriction", "Spring", "Springs", "Torsion", "Viscous"),)
+_ON_FIRST_USE = {
+    **{name: "fourbar.effects" for name in _EFFECTS},
+    **{name: "fourbar.files" for name in ("dump", "load", "save")},
+    **{name: "fourbar.show.bearing" for name in ("bearing_load", "shaking_force", "shaking_moment")},
+    **{name: "fourbar.studies" for name in ("Study", "vary")},
+    "motor_duty": "fourbar.show.motor",
+    "in_units": "fourbar.show.notebook",
+    "units": "fourbar.show.units",
+}
+"""The file edge needs a units library, most scenes few effects: `import fourbar` loads neither."""
 
-def _notebook(name: str) -> Any:
-    """How a notebook shows a scene or a solution; what draws it is loaded when it does."""
 
-    def show(self: Any) -> str:
-        return str(getattr(import_module("fourbar.show.notebook"), name)(self))
+def _method(module: str, function: str) -> _Any:
+    """A method that a folder above adds to a scene or a solution; loaded when it is called."""
 
-    return show
+    def call(self: _Any, *arguments: _Any, **options: _Any) -> _Any:
+        return getattr(_import_module(module), function)(self, *arguments, **options)
 
-
-setattr(Scene, "_repr_html_", _notebook("scene_html"))  # noqa: B010 - declared where it is drawn
-setattr(Solution, "_repr_html_", _notebook("solution_html"))  # noqa: B010
+    return call
 
 
-def __getattr__(name: str) -> Any:
-    # the file edge needs a units library, most scenes few effects, and few are varied: loaded on first use
-    if name in ("load", "dump"):
-        return getattr(import_module("fourbar.files"), name)
-    if name in ("Friction", "Gravity", "Load", "Viscous"):
-        return getattr(import_module("fourbar.effects"), name)
-    if name in ("Study", "vary"):
-        return getattr(import_module("fourbar.studies"), name)
+setattr(Scene, "_repr_html_", _method("fourbar.show.notebook", "scene_html"))  # noqa: B010 - declared where it is drawn
+setattr(Solution, "_repr_html_", _method("fourbar.show.notebook", "solution_html"))  # noqa: B010
+setattr(Scene, "plot", _method("fourbar.show.plot.figures", "drawn"))  # noqa: B010
+
+
+def __getattr__(name: str) -> _Any:
+    if name in _ON_FIRST_USE:
+        return getattr(_import_module(_ON_FIRST_USE[name]), name)
     raise AttributeError(f"module 'fourbar' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    """What a user reaches for; the modules behind it stay out of the list."""
+    own = [name for name, value in globals().items() if name[0] != "_" and not isinstance(value, _ModuleType)]
+    return sorted([*own, *_ON_FIRST_USE, "__version__"])

@@ -1,16 +1,15 @@
 """The command `fourbar`; what a command needs is imported when it is called."""
 
-import io
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
 from fourbar import __version__
-from fourbar.errors import InputError, NotAssembledError, printable, run
+from fourbar.errors import InputError, NotAssembledError, run
 
 if TYPE_CHECKING:
     from fourbar.scene import Scene
@@ -20,48 +19,59 @@ MOST_POSITIONS = 1_000_000
 
 scene_argument = click.argument("scene", type=click.Path(path_type=Path))
 out_option = click.option("-o", "--out", type=click.Path(path_type=Path), required=True, metavar="FILE")
+or_out_option = click.option(
+    "-o", "--out", type=click.Path(path_type=Path), metavar="FILE", help="Write there instead."
+)
 
 
-@click.group(context_settings={"help_option_names": ["-h", "--help"]})
-@click.version_option(__version__, prog_name="fourbar")
+units_option = click.option(
+    "--units", default="SI", metavar="UNITS", help='"imperial", or a list like "mm N.mm deg"; left out: SI.'
+)
+
+
+@click.group(
+    invoke_without_command=True,
+    context_settings={"help_option_names": ["-h", "--help"]},
+    epilog="Begin with: fourbar new first.toml --lengths 300mm 100mm 250mm 220mm",
+)
+@click.version_option(__version__, "-V", "--version", prog_name="fourbar")
 @click.option("--traceback", is_flag=True, help="Show where an internal error happened.")
-def group(traceback: bool) -> None:
+@click.pass_context
+def group(context: click.Context, traceback: bool) -> None:
     """Closed formulas of the planar four-bar linkage: from a scene file to driving torque and pin forces.
+
+    The checks against MuJoCo and Pinocchio are no part of the installed package: in a checkout, python -m validation.
 
     Exit status: 0 all well (also when some positions do not assemble), 2 the input is bad, 3 the
     environment or the program failed, 130 interrupted.
     """
-    del traceback  # looked at where errors are told
+    del traceback  # looked at where errors are reported
+    if context.invoked_subcommand is None:
+        click.echo(context.get_help())
 
 
 @group.command()
 @click.argument("lengths", nargs=4, metavar="D A B C")
-def classify(lengths: tuple[str, ...]) -> None:
+@click.option("--json", "as_json", is_flag=True, help="One object, SI and radians, every digit.")
+@or_out_option
+def classify(lengths: tuple[str, ...], as_json: bool, out: Path | None) -> None:
     """Name a linkage by its bar lengths (ground, input, coupler, output), and say what turns and how far.
 
     Bare numbers are metres; "30 cm" works too.
     """
-    from fourbar.formulas.linkage_type import classify as type_of
-    from fourbar.linkage import BAR_NAMES, Bar, FourBar
-    from fourbar.show.words import told
+    from fourbar.linkage import Bar, FourBar
+    from fourbar.show.words import type_json, type_lines
 
     d, a, b, c = _lengths(lengths)
     linkage = FourBar(d, Bar(a), Bar(b), Bar(c))
-    found = type_of(linkage)
-    relation = "<" if found.surplus > 0.0 else ">" if found.surplus < 0.0 else "="
-    outer = min(linkage.lengths) + max(linkage.lengths)
-    turning = ", ".join(BAR_NAMES[number] for number in found.turning) or "none"
-    click.echo(found.name)
-    click.echo(f"s + l = {outer:.6g} m {relation} p + q = {sum(linkage.lengths) - outer:.6g} m")
-    click.echo(f"bars that turn fully: {turning}")
-    for line in told(linkage) if found.barker is not None else ():  # a structure does not move
-        click.echo(line)
+    _print((type_json(linkage) if as_json else "\n".join(type_lines(linkage))) + "\n", out)
 
 
 @group.command()
-@click.argument("file", type=click.Path(path_type=Path))
+@click.argument("file", type=click.Path(path_type=Path), required=False)
+@click.option("-o", "--out", type=click.Path(path_type=Path), metavar="FILE", help="The same, as an option.")
 @click.option("--lengths", nargs=4, required=True, metavar="D A B C", help="Ground, input, coupler, output.")
-def new(file: Path, lengths: tuple[str, ...]) -> None:
+def new(file: Path | None, out: Path | None, lengths: tuple[str, ...]) -> None:
     """Write a new scene file with the four lengths, the rest explained in comments.
 
     Bare numbers are metres; "30 cm" works too.
@@ -69,6 +79,10 @@ def new(file: Path, lengths: tuple[str, ...]) -> None:
     from fourbar.files.new import new_scene
     from fourbar.writing import write_text
 
+    if (file is None) == (out is None):
+        raise click.UsageError("name the new file once: FILE, or -o FILE")
+    file = file or out
+    assert file is not None
     if file.exists():
         raise InputError("FILE", str(file), "is there already; a new scene needs a new name")
     write_text(file, new_scene(lengths))
@@ -77,30 +91,51 @@ def new(file: Path, lengths: tuple[str, ...]) -> None:
 
 @group.command()
 @scene_argument
-@click.option("--json", "form", flag_value="json", help="One object, SI, every digit.")
-@click.option("--csv", "form", flag_value="csv", help="One line per position, SI, every digit.")
+@click.option("--json", "as_json", is_flag=True, help="One object, SI, every digit.")
+@click.option("--csv", "as_csv", is_flag=True, help="One line per position, SI, every digit.")
 @click.option("--degrees/--radians", default=None, help="Angles theta; left out: degrees in the table, else radians.")
-@click.option("-o", "--out", type=click.Path(path_type=Path), metavar="FILE", help="Write there instead.")
-def analyze(scene: Path, form: str | None, degrees: bool | None, out: Path | None) -> None:
+@units_option
+@click.option("--every", type=click.IntRange(min=1), metavar="N", help="Show every N-th position in the table.")
+@click.option("--all", "every", flag_value=1, help="Show every position; a terminal gets some forty at most.")
+@or_out_option
+def analyze(
+    scene: Path,
+    as_json: bool,
+    as_csv: bool,
+    degrees: bool | None,
+    units: str,
+    every: int | None,
+    out: Path | None,
+) -> None:
     """Solve a scene: angles, speeds, accelerations, driving torque and pin forces."""
-    from fourbar.solution import csv_text, json_text
+    from fourbar.show.motor import motor_entry
+    from fourbar.show.tables import printed
+    from fourbar.show.units import units as units_of
+    from fourbar.solution import DEGREES, csv_text, json_text
     from fourbar.solve import last_stage, solve
-    from fourbar.writing import write_text
 
-    asked = _load(scene)
-    with _named(scene), _waiting(asked):
-        solution = solve(asked, last_stage(asked))
+    if as_json and as_csv:
+        raise click.UsageError("--json and --csv are two forms of the output; give one of them")
+    if every is not None and (as_json or as_csv):
+        raise click.UsageError("--every and --all are of the table; --json and --csv hold every position")
+    shown = dict(units_of(units))
+    if degrees or (degrees is None and "rad" not in shown and not (as_json or as_csv)):
+        shown |= DEGREES
+    elif degrees is False:
+        shown.pop("rad", None)
+    described = _load(scene)
+    with _named(scene), _waiting(described):
+        solution = solve(described, last_stage(described))
     if not solution.assembled.any():
-        raise NotAssembledError(f"{scene}: motion.theta_2: the linkage assembles at none of the positions asked for")
-    if form is None:
-        text = _table_text(asked, solution, None if out else _terminal_width(), degrees is not False)
+        raise NotAssembledError(f"{scene}: motion.theta_2: the linkage assembles at none of the positions requested")
+    if as_json:
+        text = json_text(solution, shown, motor=motor_entry(solution, shown))
+    elif as_csv:
+        text = csv_text(solution, shown)
     else:
-        write = json_text if form == "json" else csv_text
-        text = write(solution, degrees=bool(degrees))
-    if out is None:
-        click.echo(text, nl=False)
-    else:
-        write_text(out, text)
+        width = None if out else _terminal_width()
+        text = printed(described, solution, width, shown, every=every)
+    _print(text, out)
 
 
 @group.command()
@@ -160,18 +195,23 @@ def sdf(scene: Path, reader: str, out: Path) -> None:
     default="overview",
     show_default=True,
     metavar="NAME",
-    help="overview, linkage, coupler, kinematics, torque, forces, hodograph, energy, transmission or freebody.",
+    help="overview, linkage, coupler, kinematics, points, torque, forces, hodograph, energy, transmission or freebody.",
 )
 @click.option("--position", metavar="ANGLE", help='theta_2 of the linkage and free bodies, like "135 deg".')
 @click.option("--branches", default="one", show_default=True, metavar="WHICH", help="one or both.")
-def plot(scene: Path, out: Path, figure: str, position: str | None, branches: str) -> None:
+@click.option("--dimensions", is_flag=True, help="Write the lengths of the bars at them.")
+@units_option
+def plot(
+    scene: Path, out: Path, figure: str, position: str | None, branches: str, dimensions: bool, units: str
+) -> None:
     """Draw a scene as SVG, PNG or PDF (by the ending of FILE)."""
     from fourbar.show.plot import draw
+    from fourbar.show.units import units as units_of
 
-    at = None if position is None else _number("--position", position, "rad")
-    asked = _load(scene)
-    with _named(scene), _waiting(asked):
-        draw(asked, out, figure, position=at, branches=branches)
+    at = None if position is None else _angle("--position", position)
+    described = _load(scene)
+    with _named(scene), _waiting(described):
+        draw(described, out, figure, position=at, branches=branches, units=units_of(units), dimensions=dimensions)
 
 
 @group.command()
@@ -189,9 +229,11 @@ def plot(scene: Path, out: Path, figure: str, position: str | None, branches: st
     type=click.FloatRange(min=0.1, max=60.0),
     help="Length of a film; left out: 6, of a motion through time its own.",
 )
-def animate(scene: Path, out: Path, pictures: tuple[str, ...], seconds: float | None) -> None:
+@units_option
+def animate(scene: Path, out: Path, pictures: tuple[str, ...], seconds: float | None, units: str) -> None:
     """Show a scene moving: one web page (.html), or a film (.gif, .mp4)."""
     from fourbar.show.animate import write
+    from fourbar.show.units import units as units_of
 
     attached = {}
     for entry in pictures:
@@ -199,9 +241,9 @@ def animate(scene: Path, out: Path, pictures: tuple[str, ...], seconds: float | 
         if not equals:
             raise InputError("--picture", entry, "must be like coupler=FILE")
         attached[bar] = file
-    asked = _load(scene)
-    with _named(scene), _waiting(asked):
-        write(asked, out, pictures=attached, seconds=seconds)
+    described = _load(scene)
+    with _named(scene), _waiting(described):
+        write(described, out, pictures=attached, seconds=seconds, units=units_of(units))
 
 
 @contextmanager
@@ -217,14 +259,14 @@ def _named(path: Path) -> Iterator[None]:
 
 @contextmanager
 def _waiting(scene: "Scene") -> Iterator[None]:
-    """A long free motion takes minutes: a terminal shows that it is under way."""
+    """A long free motion takes minutes: a terminal shows that it is running."""
     if scene.motion.free is None:
         yield
         return
     from fourbar.free_motion import STEPS
-    from fourbar.show.under_way import under_way
+    from fourbar.show.progress import running
 
-    with under_way(f"the free motion is integrated, in {STEPS} steps at most"):
+    with running(f"the free motion is integrated, in {STEPS} steps at most"):
         yield
 
 
@@ -233,9 +275,9 @@ def _load(path: Path) -> "Scene":
     from fourbar.scene.motion import Free, Sweep
 
     scene = load(path)
-    for key, asked in (("motion.theta_2", scene.motion.theta_2), ("motion.free", scene.motion.free)):
-        if isinstance(asked, (Sweep, Free)) and asked.steps >= MOST_POSITIONS:
-            raise InputError(f"{key}.steps", asked.steps, f"must be below {MOST_POSITIONS} here", str(path))
+    for key, described in (("motion.theta_2", scene.motion.theta_2), ("motion.free", scene.motion.free)):
+        if isinstance(described, (Sweep, Free)) and described.steps >= MOST_POSITIONS:
+            raise InputError(f"{key}.steps", described.steps, f"must be below {MOST_POSITIONS} here", str(path))
     return scene
 
 
@@ -259,6 +301,15 @@ def _number(key: str, text: str, unit: str, *, positive: bool = False) -> float:
             raise InputError(key, text, f"{error}; must be a number in {unit}, or one with a unit") from None
 
 
+def _angle(key: str, text: str) -> float:
+    """An angle with its unit, rad: a bare number may have been meant in either."""
+    try:
+        float(text)
+    except ValueError:
+        return _number(key, text, "rad")
+    raise InputError(key, text, f'the unit is missing; did you mean "{text} deg"?')
+
+
 def _terminal_width() -> int | None:
     """Columns of the terminal; None where the output goes elsewhere."""
     if not sys.stdout.isatty():
@@ -268,23 +319,14 @@ def _terminal_width() -> int | None:
     return shutil.get_terminal_size().columns
 
 
-def _table_text(scene: "Scene", solution: Any, width: int | None, degrees: bool) -> str:
-    from rich.console import Console
-    from rich.text import Text
+def _print(text: str, out: Path | None) -> None:
+    """To standard output, or to a file, whole or not at all."""
+    from fourbar.writing import write_text
 
-    from fourbar.show import tables
-
-    shown, left_out = tables.table(solution, width, degrees=degrees)
-    text = io.StringIO()
-    console = Console(file=text, width=width or 10_000, color_system=None)
-    if scene.title:
-        console.print(Text(printable(scene.title)))
-    for line in tables.heading(scene, solution):
-        console.print(Text(line))
-    console.print(shown)
-    if left_out:
-        console.print(Text(f"not shown: {', '.join(left_out)} (a wider terminal, --csv or --json has them)"))
-    return "\n".join(line.rstrip() for line in text.getvalue().split("\n"))
+    if out is None:
+        click.echo(text, nl=False)
+    else:
+        write_text(out, text)
 
 
 def main(arguments: list[str] | None = None) -> None:

@@ -94,7 +94,7 @@ def error_bars(
         bodies=(rounded_body(case.bodies[0]), rounded_body(case.bodies[1]), rounded_body(case.bodies[2])),
         terms=tuple(rounded.of(term) for term in case.terms),
     )
-    near = near._replace(sin_mu=rounded(near.sin_mu), foot=rounded(near.foot))
+    near = near._replace(sin_mu=rounded(near.sin_mu), diagonal=rounded(near.diagonal))
     near = near._replace(u2=rounded(near.u2), u3=rounded(near.u3), u4=rounded(near.u4))
     k = _rounded_coefficients(path, near, k, rounded)
     moving = rates(k, state.speed, acceleration)

@@ -6,6 +6,7 @@ theta_4, and both at once happen at a change point alone, where the path itself 
 loop therefore closes to round-off at every instant, and nothing drifts off it.
 """
 
+import cmath
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
@@ -18,8 +19,8 @@ from fourbar.effects.actions import Actions, bodies
 from fourbar.errors import DependencyError, FourBarError, InputError, LimitError
 from fourbar.formulas.motion import Coefficients, State, rates
 from fourbar.formulas.path import Path, path, smooth_branch
-from fourbar.formulas.pin_forces import cross
-from fourbar.formulas.position import Loop, Position, loop
+from fourbar.formulas.pin_forces import Body, cross
+from fourbar.formulas.position import HalfAngle, Loop, Position, loop
 from fourbar.formulas.torque import half_slope, inertia
 from fourbar.linkage import FourBar
 from fourbar.scene import Command
@@ -80,22 +81,43 @@ def _meeting(lengths: Loop) -> Loop:
     )
 
 
+def _plain(numbers: Any) -> Any:
+    """The same numbers as Python's own, with which a formula of one position is several times quicker."""
+    return type(numbers)(*(x.item() if isinstance(x, np.generic | np.ndarray) else x for x in numbers))
+
+
 class _Reading:
     """The linkage read in the angle of bar 2 or of bar 4, with the sign of its path."""
 
     def __init__(self, linkage: FourBar, bar: int, sign: float = 1.0) -> None:
         found = path(loop(*linkage.lengths), linkage.ground_angle, bar)
-        self.path = found._replace(lengths=_meeting(found.lengths))
+        own = {"lengths": _plain(_meeting(found.lengths)), "u1": complex(found.u1), "unit": float(found.unit)}
+        self.path = found._replace(**own)
         self.bar, self.sign = bar, sign
+        self.changes = 0.0 in (self.path.lengths.E1, self.path.lengths.E2)
+        self.last: tuple[tuple[float, float], tuple[Position, Coefficients]] | None = None
 
     def branch(self, q: float) -> float:
         """Sign of the root at q."""
-        return float(smooth_branch(self.path.lengths, q - self.path.theta_1, self.sign))
+        return float(smooth_branch(self.path.lengths, q - self.path.theta_1, self.sign)) if self.changes else self.sign
 
     def at(self, q: float) -> tuple[Position, Coefficients]:
-        """The position and its coefficients by q."""
+        """The position and its coefficients by q; what is wanted again is kept."""
+        if self.last is None or self.last[0] != (q, self.sign):
+            self.last = (q, self.sign), self._at(q)
+        return self.last[1]
+
+    def _at(self, q: float) -> tuple[Position, Coefficients]:
         branch = self.branch(q)
-        return self.path.motion(self.path.position(q, self.path.half_angle(q), branch), branch)
+        half = self.path.half_angle(q)
+        try:
+            return self._by(q, _plain(half), branch)
+        except ZeroDivisionError:  # numpy's numbers have a value there, infinite or none
+            return self._by(q, half, branch)
+
+    def _by(self, q: float, half: HalfAngle, branch: float) -> tuple[Position, Coefficients]:
+        at, k = self.path.motion(self.path.position(q, half, branch), branch)
+        return (_plain(at), _plain(k)) if self.path.may_stay_parallel else (at, k)
 
 
 def _sines(at: Position) -> dict[int, float]:
@@ -145,7 +167,9 @@ class _Run:
         self, linkage: FourBar, terms: "tuple[Effect, ...]", theta_2: float, omega_2: float, branch: int, follow: bool
     ) -> None:
         self.linkage, self.terms, self.follow, self.branch = linkage, terms, follow, branch
-        self.lengths, self.bodies = loop(*linkage.lengths), bodies(linkage, terms)
+        self.lengths = _plain(loop(*linkage.lengths))
+        two, three, four = (_plain(body) for body in bodies(linkage, terms))
+        self.bodies: tuple[Body, Body, Body] = two, three, four
         self.readings = {bar: _Reading(linkage, bar) for bar in (2, 4)}
         self.reading = self.readings[2]
         # the sign of the path is that of the branch just after the start, should that be a change point
@@ -178,7 +202,7 @@ class _Run:
 
     def _generalised_force(self, q: float, at: Position, k: Coefficients, rate: float) -> float:
         """Q under everything that acts, at a speed that is not zero where friction has to have a sense."""
-        theta_2 = q if self.reading.bar == 2 else float(np.angle(at.u2))
+        theta_2 = q if self.reading.bar == 2 else cmath.phase(at.u2)
         state = State(self.lengths, self.linkage.ground_angle, theta_2, at, k, rate, rates(k, rate, 0.0))
         actions = Actions(state, self.bodies)
         for term in self.terms:
@@ -200,7 +224,8 @@ class _Run:
         moving = self.side * max(self.side * rate, VANISHING) if self.side else rate
         Q = self._generalised_force(q, at, k, moving)
         slope = half_slope(self.lengths.a, self.bodies, at, k)
-        return [rate, float((Q - slope * rate * rate) / self._inertia(at, k)), Q * rate]
+        # numpy's division: no error where the inertia vanishes
+        return [rate, float(np.float64(Q - slope * rate * rate) / self._inertia(at, k)), Q * rate]
 
     def _change_over(self) -> bool:
         """Take the other angle where it is further from its limit; keeps position, velocity and work."""
@@ -217,7 +242,7 @@ class _Run:
     def _turn(self, at: Position) -> None:
         """Bring theta_2 and theta_4 up to date, continuous from one step to the next."""
         for bar, u in ((2, at.u2), (4, at.u4)):
-            now = float(np.angle(u))
+            now = cmath.phase(u)
             self.theta[bar] = now + 2.0 * math.pi * round((self.theta[bar] - now) / (2.0 * math.pi))
 
     def _starts(self) -> bool:
@@ -260,7 +285,7 @@ class _Run:
                 if steps > STEPS:
                     allowed = f"this motion is followed for {STEPS} steps, here to {t:.6g} s; make it shorter"
                     raise InputError("motion.free.duration", end, allowed)
-                dense, t_new, new = solver.dense_output(), solver.t, solver.y
+                dense, t_new, new = _Within(solver), solver.t, solver.y
                 rested = bool(self.side and self.side * new[1] < 0.0)
                 if rested:
                     t_new = self._root(brentq, dense, self._rate, solver.t_old, t_new)
@@ -313,7 +338,7 @@ class _Run:
         """theta_2, omega_2, alpha_2, branch, and the independent angle with all that belongs to it, of one instant."""
         q, rate = float(y[0]), float(y[1])
         at, k = self.reading.at(q)
-        now = float(np.angle(at.u2))
+        now = cmath.phase(at.u2)
         theta_2 = now + 2.0 * math.pi * round((self.theta[2] - now) / (2.0 * math.pi))
         if self.reading.bar == 2:
             theta_2 = q
@@ -324,6 +349,19 @@ class _Run:
         branch = math.copysign(1.0, sine) if sine else float(self.branch)
         independent = (float(self.reading.bar), q, rate, growth, self.reading.branch(q))
         return theta_2, float(moving.omega_2), float(moving.alpha_2), branch, *independent
+
+
+class _Within:
+    """The motion within the last step of the solver, whose three more evaluations are made where one reads it."""
+
+    def __init__(self, solver: Any) -> None:
+        self.solver = solver
+        self.known: Callable[[float], Array] | None = None
+
+    def __call__(self, t: float) -> Array:
+        if self.known is None:
+            self.known = self.solver.dense_output()
+        return self.known(t)
 
 
 def _scipy() -> tuple[Any, Any]:

@@ -105,6 +105,9 @@ class FourBar:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "ground", require("lengths.ground", self.ground, positive=True))
+        for name, bar in zip(("input", "coupler", "output"), self.moving, strict=True):
+            if not isinstance(bar, Bar):
+                raise InputError(f"bars.{name}", bar, "must be a Bar, like fourbar.Bar(0.1) for a bar of 0.1 m")
         object.__setattr__(self, "ground_angle", require("lengths.ground_angle", self.ground_angle))
         longest = max(self.lengths)
         if not math.isfinite(4.0 * longest):

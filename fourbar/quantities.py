@@ -67,8 +67,7 @@ STAGE_OF = {q.name: q.stage for q in QUANTITIES if q.stage is not None}
 """Every evaluated quantity and the stage that computes it."""
 STAGES = tuple(dict.fromkeys(STAGE_OF.values()))
 VECTORS = tuple(q.name for q in QUANTITIES if q.kind == "vector")
-IN_DEGREES = tuple(q.name for q in QUANTITIES if q.unit == "rad")
-ANGLES = tuple(name for name in IN_DEGREES if name in STAGE_OF)
+ANGLES = tuple(q.name for q in QUANTITIES if q.unit == "rad" and q.stage is not None)
 PIN_FORCES = tuple(name for name in VECTORS if UNITS[name] == "N")
 """F_ij, of bar i on bar j, in the order of the pins O2, A, B, O4."""
 UNKNOWNS = tuple(q.name for q in QUANTITIES if q.group == "unknown")

@@ -4,6 +4,7 @@ import csv
 import io
 import json
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -11,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.errors import DependencyError
-from fourbar.quantities import IN_DEGREES, NOT_ASSEMBLED, STATUS_NAMES, UNITS, VECTORS
+from fourbar.quantities import NOT_ASSEMBLED, STATUS_NAMES, UNITS, VECTORS
 
 Array = NDArray[np.float64]
 
@@ -21,6 +22,10 @@ if TYPE_CHECKING:
     from pandas import DataFrame
 
 SCHEMA = "fourbar-analyze/1"
+Conversion = Mapping[str, tuple[str, float]]
+"""From an SI unit to another unit, and the factor from the one to the other; a unit that is left out stays."""
+SI: Conversion = {}
+DEGREES: Conversion = {"rad": ("deg", 180.0 / math.pi)}
 
 
 @dataclass(slots=True, eq=False)
@@ -120,18 +125,24 @@ class Solution:
         """Names of the quantities that were evaluated, theta_2 first; without the scene's own points."""
         return [name for name in UNITS if getattr(self, name) is not None]
 
-    def to_csv(self, path: "str | Path | None" = None, *, degrees: bool = False) -> str | None:
-        """One line per position, every digit; the text itself, or written to a file, whole or not at all."""
+    def to_csv(self, path: "str | Path | None" = None, *, degrees: bool = False, units: Conversion = SI) -> str | None:
+        """One line per position, every digit; the text itself, or written to a file, whole or not at all.
+
+        Parameters
+        ----------
+        degrees : theta in deg.
+        units : other units, as `fourbar.units("mm N.mm")` makes them; a heading names a unit that is not SI.
+        """
         from fourbar.writing import write_text
 
-        text = csv_text(self, degrees=degrees)
+        text = csv_text(self, {**units, **(DEGREES if degrees else SI)})
         if path is None:
             return text
         write_text(path, text)
         return None
 
-    def to_pandas(self) -> "DataFrame":
-        """One row per position, vectors as columns `A_x`, `A_y`; only what was evaluated, SI and radians.
+    def to_pandas(self, units: Conversion = SI) -> "DataFrame":
+        """One row per position, vectors as columns `A_x`, `A_y`; only what was evaluated, SI and radians by default.
 
         Raises DependencyError where pandas is not installed.
         """
@@ -139,33 +150,40 @@ class Solution:
             from pandas import DataFrame
         except ImportError:
             raise DependencyError('to_pandas needs pandas: pip install "fourbar[pandas]"') from None
-        known = {name: values for name, values in scalars(self).items() if values is not None}
+        known = {name: values for name, values in scalars(self, units).items() if values is not None}
         return DataFrame({**leading(self), **known})
 
 
-def json_text(solution: Solution, *, degrees: bool = False) -> str:
-    """One object, SI; arrays over the positions, vectors as [x, y], null where there is no value."""
+def json_text(solution: Solution, units: Conversion = SI, **more: Any) -> str:
+    """One object; arrays over the positions, vectors as [x, y], null where there is no value; `units` says in what.
+
+    Entries of other names follow as they are given.
+    """
+    names = _quantities(solution)
     document: dict[str, Any] = {
         "schema": SCHEMA,
         "title": solution.title,
-        "angle_unit": "deg" if degrees else "rad",
+        "angle_unit": unit_in("rad", units)[0],
+        "units": {name: unit_in(unit_of(name), units)[0] for name in names},
         "status": solution.status,
         "branch": solution.branch.tolist(),
     }
-    for name in _quantities(solution):
-        values = _values(solution, name, degrees)
+    for name in names:
+        values = _values(solution, name, units)
         document[name] = None if values is None else _nulled(values)
+    if solution.time is not None:
+        document["stopped_at"] = solution.stopped_at
     document["drive_bar"] = solution.drive_bar
     document["assembled"] = solution.assembled.tolist()
+    document |= more
     return json.dumps(document, allow_nan=False) + "\n"
 
 
-def csv_text(solution: Solution, *, degrees: bool = False) -> str:
+def csv_text(solution: Solution, units: Conversion = SI) -> str:
     """One line per position; vectors as columns `A_x`, `A_y`, empty where there is no value."""
     size, first = solution.theta_2.size, leading(solution)
     columns = {
-        name: [None] * size if values is None else _nulled(values)
-        for name, values in scalars(solution, degrees=degrees).items()
+        name: [None] * size if values is None else _nulled(values) for name, values in scalars(solution, units).items()
     }
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
@@ -188,18 +206,26 @@ def leading(solution: Solution) -> dict[str, list[Any]]:
     return {"member": np.repeat(np.arange(len(solution)), size // len(solution)).tolist(), **first}
 
 
-def scalars(solution: Solution, *, degrees: bool = False) -> dict[str, Array | None]:
-    """Every quantity as columns of numbers, vectors as `A_x`, `A_y`; None for what was not evaluated."""
+def scalars(solution: Solution, units: Conversion = SI) -> dict[str, Array | None]:
+    """Every quantity as columns of numbers, vectors as `A_x`, `A_y`; None for what was not evaluated.
+
+    A heading names a unit that is not SI: `F12_x [lbf]`.
+    """
     found: dict[str, Array | None] = {}
     for name in _quantities(solution):
-        values = _values(solution, name, degrees)
-        heading = f"{name} [deg]" if degrees and name in IN_DEGREES else name
+        values, unit = _values(solution, name, units), unit_of(name)
+        heading = f" [{units[unit][0]}]" if unit in units else ""
         if name in VECTORS or name not in UNITS:
             for axis, letter in enumerate("xy"):
-                found[f"{heading}_{letter}"] = None if values is None else values[..., axis].ravel()
+                found[f"{name}_{letter}{heading}"] = None if values is None else values[..., axis].ravel()
         else:
-            found[heading] = None if values is None else values.ravel()
+            found[name + heading] = None if values is None else values.ravel()
     return found
+
+
+def unit_in(unit: str, units: Conversion) -> tuple[str, float]:
+    """The unit in which a quantity of an SI unit is given, and the factor to it."""
+    return units.get(unit, (unit, 1.0))
 
 
 def _quantities(solution: "Solution") -> list[str]:
@@ -209,16 +235,20 @@ def _quantities(solution: "Solution") -> list[str]:
     return names + [f"{start}{name}" for name in points for start in ("", "v_", "a_")]
 
 
-def _values(solution: Solution, name: str, degrees: bool) -> Array | None:
+def unit_of(name: str) -> str:
+    """SI unit of a quantity, or of a point of the scene: its path, velocity or acceleration."""
+    return UNITS.get(name) or {"v_": "m/s", "a_": "m/s^2"}.get(name[:2], "m")
+
+
+def _values(solution: Solution, name: str, units: Conversion) -> Array | None:
     values: Array | None
     if name in UNITS:
         values = getattr(solution, name)
     else:
         table = {"v_": solution.velocity, "a_": solution.acceleration}.get(name[:2])
         values = solution.points.get(name) if table is None else table.get(name[2:])
-    if values is not None and degrees and name in IN_DEGREES:
-        return np.degrees(values)
-    return values
+    unit = unit_of(name)
+    return values if values is None or unit not in units else values * units[unit][1]
 
 
 def _nulled(values: Array) -> list[Any]:

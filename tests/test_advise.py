@@ -19,7 +19,7 @@ from validation.engines.witnesses import WITNESSES
 from validation.run import dial
 from validation.run.judge import judge
 from validation.scenes.suites import MODELS
-from validation.studies.cost import advise, measure
+from validation.studies.cost import advise, matters, measure
 from validation.studies.cost.errors import errors
 from validation.studies.cost.exhaustive import cheapest
 
@@ -151,3 +151,36 @@ def test_exact_witnesses_stay_exact() -> None:
     assert changed[0].tolerance.factor == 1e-3 and changed[0].expected == next(
         w.expected for w in WITNESSES if w.through_time
     )
+
+
+def test_what_matters_for_a_scene_is_measured_and_stated_with_its_reason() -> None:
+    """Each scene is made so that one setting carries it."""
+    bars = (fourbar.Bar(0.10, 0.01), fourbar.Bar(0.08, 14.5, 5.0, (1.0, 0.2)), fourbar.Bar(0.12, 0.01))
+    motion = fourbar.Motion(fourbar.Sweep(0.8, 1.8, 12), 0.5)
+    hood = fourbar.Scene(fourbar.FourBar(0.11, *bars), motion, effects=(fourbar.Gravity(),))
+    for scene, setting, why in ((hood, "the stiffness by pads", "lighter of coupler and output"),
+                                (turning(10.0, 36), "the timestep", "fourth power")):  # fmt: skip
+        rig = Rig(scene, advise.looked_at(scene))
+        first, *others = found = matters.influences(scene, rig, advise.dialled(40.0, 12.0))
+        assert first.setting == setting and first.times > 10.0 and why in matters.sentence(found)
+        assert all(first.times >= other.times for other in others)
+    quiet = [replace(each, times=1.5) for each in found]
+    assert matters.sentence(quiet).startswith("no setting matters by itself")
+
+
+def test_several_scenes_have_one_table(tmp_path: Path) -> None:
+    files = []
+    for name, scene in (
+        ("one", turning(10.0, 36)),
+        ("still", replace(turning(10.0, 36), motion=fourbar.Motion(1.0, 1.0))),
+    ):
+        files.append(str(tmp_path / f"{name}.toml"))
+        Path(files[-1]).write_text(fourbar.dump(scene))
+    result = CliRunner().invoke(advise.command, [*files, "--error", "1e-4"], standalone_mode=False)
+    assert result.return_value == 1  # one of them cannot be run through
+    lines = result.output.splitlines()
+    assert lines[1].startswith("the timestep matters most here: twice as long the error is")
+    assert lines[-2].split()[0] == "one.toml" and lines[-1].split()[:2] == ["still.toml", "-"]
+    with pytest.raises(fourbar.InputError, match="MJCF of one scene, not of 2"):
+        CliRunner().invoke(advise.command, [*files, "--error", "1e-4", "-o", "x.xml"], standalone_mode=False,
+                           catch_exceptions=False)  # fmt: skip

@@ -188,7 +188,11 @@ def test_what_is_not_text(data: bytes, tmp_path: Path, capsys: pytest.CaptureFix
 
 def test_not_toml(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "scene.toml").write_text("<mujoco/>")
-    refused(["analyze", str(tmp_path / "scene.toml")], ["TOML", "line 1"], tmp_path, capsys)
+    refused(["analyze", str(tmp_path / "scene.toml")], ["TOML", "line 1, column 1 = '<mujoco/>'"], tmp_path, capsys)
+    (tmp_path / "scene.toml").write_text('title = "a"\n\n[lengths\nground = "1 m"\n')
+    refused(["analyze", str(tmp_path / "scene.toml")], ["line 3, column 9 = '[lengths'"], tmp_path, capsys)
+    (tmp_path / "scene.toml").write_text('title = "a"\nsource = """b')
+    refused(["analyze", str(tmp_path / "scene.toml")], ["line 2, column 14", "Unterminated"], tmp_path, capsys)
 
 
 def rocker(theta_2: str) -> str:

@@ -1,7 +1,9 @@
 """Other people's numbers: judged row by row, and a known mistake is named as such."""
 
 import csv
+import json
 import math
+import xml.etree.ElementTree as ET
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -15,6 +17,7 @@ from fourbar.quantities import OK, UNITS, VECTORS
 from fourbar.scene import Command, Scene, command
 from fourbar.solve import solve
 from validation.check.check import Judgement, judge_table
+from validation.check.judge import Tolerance
 from validation.check.theirs import LARGEST_FILE, NOT_JUDGED, read_table
 from validation.cli import status
 from validation.compare.scales import TERMS, yardstick
@@ -148,6 +151,14 @@ def about_pin(scene: Scene) -> Scene:
     return bars(scene, output=replace(bar, inertia=bar.moment_of_inertia + bar.mass * bar.mass_centre[0] ** 2))
 
 
+def half_a_turn(bar: fourbar.Bar) -> tuple[float, float]:
+    return bar.mass_centre[0], bar.mass_centre[1] + math.pi
+
+
+def reversed_load(load: fourbar.Load) -> fourbar.Load:
+    return replace(load, force=load.force and (-load.force[0], load.force[1]), moment=-load.moment)
+
+
 def exchanged(scene: Scene) -> Numbers:
     numbers = right(scene)
     return numbers | {"F32": numbers["F32"][:, ::-1]}
@@ -156,9 +167,9 @@ def exchanged(scene: Scene) -> Numbers:
 OMEGA = {"thesis": 0.2244, "crank_rocker": 10.0}
 MISTAKES: list[tuple[str, str, tuple[str, ...], Callable[[Scene], Numbers], str]] = [
     # id, scene, columns, what was done, words of the explanation
-    ("torque in N cm", "thesis", ALL, units("torque", factor=1e2), "10^2 of ours"),
-    ("torque in N mm", "crank_rocker", ALL, units("torque", factor=1e3), "10^3 of ours"),
-    ("forces in kN", "crank_rocker", ALL, units("F12", "F32", "F43", "F14", factor=1e-3), "10^-3 of ours"),
+    ("torque in N cm", "thesis", ALL, units("torque", factor=1e2), "numbers in N cm where N m was announced"),
+    ("torque in N mm", "crank_rocker", ALL, units("torque", factor=1e3), "numbers in N mm where N m"),
+    ("forces in kN", "crank_rocker", ALL, units("F12", "F32", "F43", "F14", factor=1e-3), "numbers in kN where N was"),
     ("forces in kgf", "thesis", ALL, units("F12", "F32", "F43", "F14", factor=1 / 9.80665), "kgf"),
     ("torque of the bar on the ground", "thesis", ALL, units("torque", factor=-1.0), "sign reversed"),
     ("F23 for F32", "crank_rocker", ALL, units("F32", factor=-1.0), "F_ij given for F_ji"),
@@ -167,7 +178,7 @@ MISTAKES: list[tuple[str, str, tuple[str, ...], Callable[[Scene], Numbers], str]
     ("other branch", "thesis", ALL, solved(same, branch=np.full(12, -1, np.int8)), "other branch"),
     ("gravity missing", "crank_rocker", FORCES, solved(lambda s: replace(s, effects=())), "gravity is missing"),
     ("gravity upwards", "crank_rocker", FORCES,
-     solved(lambda s: replace(s, effects=(fourbar.Gravity(-9.81),))), "gravity points the other way"),
+     solved(lambda s: replace(s, effects=(fourbar.Gravity(-9.81),))), "gravity is reversed"),
     ("gravity added", "thesis", FORCES,
      solved(lambda s: replace(s, effects=(fourbar.Gravity(),))), "gravity along -y is included"),
     ("loads missing", "thesis", FORCES, solved(lambda s: replace(s, loads=())), "the loads are missing"),
@@ -190,6 +201,32 @@ MISTAKES: list[tuple[str, str, tuple[str, ...], Callable[[Scene], Numbers], str]
     ("both", "crank_rocker", FORCES, lambda s: inertial_times(s, 100.0, 100.0), "m a and I alpha in kg cm/s^2"),
     ("m a in kg mm/s^2", "crank_rocker", FORCES, lambda s: inertial_times(s, 1e3, 1.0), "m a in kg mm/s^2"),
     ("d'Alembert's sign", "crank_rocker", FORCES, lambda s: inertial_times(s, -1.0, -1.0), "d'Alembert"),
+    ("lbf ft", "crank_rocker", ALL, units("torque", factor=1 / 1.3558179483314004), "numbers in lbf ft where N m"),
+    ("an unknown ratio", "thesis", ALL, units("F12", "F14", factor=0.37), "every number is 0.37 times ours"),
+    ("inertia halved", "thesis", FORCES,
+     solved(lambda s: bars(s, coupler=replace(s.linkage.coupler, inertia=s.linkage.coupler.moment_of_inertia / 2))),
+     "coupler: moment of inertia halved"),
+    ("inertia times 0.83", "crank_rocker", FORCES,
+     solved(lambda s: bars(s, output=replace(s.linkage.output, inertia=s.linkage.output.moment_of_inertia * 0.83))),
+     "output: moment of inertia 0.83 times ours"),
+    ("mass times 1.2", "crank_rocker", FORCES,
+     solved(lambda s: bars(s, coupler=replace(s.linkage.coupler, mass=s.linkage.coupler.mass * 1.2))),
+     "coupler: mass 1.2 times ours"),
+    ("mass centre turned", "crank_rocker", FORCES,
+     solved(lambda s: bars(s, output=replace(s.linkage.output, centre=half_a_turn(s.linkage.output)))),
+     "output: mass centre turned by 180 deg"),
+    ("load reversed", "thesis", FORCES,
+     solved(lambda s: replace(s, loads=(reversed_load(s.loads[0]), *s.loads[1:]))), "load 1 (bar 2) is reversed"),
+    ("theta_4 from B", "thesis", ALL, lambda s: right(s) | {"theta_4": right(s)["theta_4"] + math.pi}, "theta_4 or"),
+    ("theta_4 from the coupler", "thesis", ALL,
+     lambda s: right(s) | {"theta_4": right(s)["theta_4"] - right(s)["theta_3"]}, "relative to bar 3"),
+    ("crank from another zero", "crank_rocker", ALL,
+     lambda s: right(s, theta_2=right(s)["theta_2"] + math.radians(37.0)) | {"theta_2": right(s)["theta_2"]},
+     "from another zero: theta_2 +37 deg"),
+    ("backwards", "thesis", ALL, lambda s: {name: x[::-1] for name, x in right(s).items()}
+     | {"theta_2": right(s)["theta_2"]}, "in reverse order"),
+    ("one row down", "crank_rocker", ALL, lambda s: {name: np.roll(x, 1, axis=0) for name, x in right(s).items()}
+     | {"theta_2": right(s)["theta_2"]}, "the rows are shifted by -1"),
     ("theta_2 as degrees", "crank_rocker", ALL,
      lambda s: right(s, theta_2=np.radians(right(s)["theta_2"])) | {"theta_2": right(s)["theta_2"]}, "read as degrees"),
 ]  # fmt: skip
@@ -217,7 +254,7 @@ def test_two_mistakes_in_two_columns_are_both_named(tmp_path: Path) -> None:
     numbers |= {"torque": numbers["torque"] * 100.0, "F43": -numbers["F43"]}
     found = judged(scene, write(tmp_path / "theirs.csv", numbers))
     found_causes = {explanation.text[:14]: explanation for explanation in found.explanations}
-    assert found_causes["units: every n"].quantities == ("torque",)
+    assert found_causes["units: numbers"].quantities == ("torque",)
     assert found_causes["sign reversed,"].quantities == ("F43",)
     assert not any(explanation.complete for explanation in found.explanations)
 
@@ -324,11 +361,13 @@ BAD_TABLES = [
     ("header alone", "theta_2,torque\n", "header and at least one row"),
     ("no angle", "torque\n1\n", "theta_2"),
     ("no result", "theta_2\n1\n", "needs a result"),
-    ("a time", "theta_2,time,torque\n1,0,2\n", "is not judged: a row is found by its theta_2"),
-    ("error bars", "theta_2,torque_error\n1,0\n", "is not judged: it is an error of the formulas"),
+    ("error bars alone", "theta_2,torque_error\n1,0\n", "needs a result"),
+    ("a row without its angle", "theta_2,torque\n,2\n", "line 2 = ['', '2']: needs a theta_2"),
+    ("blank column alone", "theta_2,torque\n1,\n", "needs a result"),
+    ("one cell more", "theta_2,torque\n1,2,3\n", "needs 2 cells"),
+    ("unit of another kind in a line of its own", "theta_2,torque\nrad,kg\n1,2\n", "kg"),
     ("of dry friction", "theta_2,torque_low\n1,2\n", "no dry friction"),
-    ("vector without component", "theta_2,F12\n1,2\n", "not a known column"),
-    ("unknown column", "theta_2,wheel\n1,2\n", "not a known column"),
+    ("unknown column", "theta_2,wheel\n1,2\n", "known are theta_2"),
     ("unit of another kind", "theta_2,torque [kg]\n1,2\n", "kg"),
     ("twice", "theta_2,torque,torque\n1,2,2\n", "twice"),
     ("word", "theta_2,torque\n1,much\n", "line 2"),
@@ -338,7 +377,7 @@ BAD_TABLES = [
     ("decimal comma", 'theta_2,torque\n1,"2,5"\n', "must be a number"),
     ("binary", b"\xff\xfe\x00\x01", "UTF-8"),
     ("null byte", "theta_2,torque\n1,2\x00\n", "table"),
-    ("escape", "theta_2,\x1b[31mtorque\n1,2\n", "not a known column"),
+    ("escape", "theta_2,\x1b[31mtorque\n1,2\n", "known are"),
     ("endless exponent", "theta_2,torque\n1,1e-99999999\n", "torque"),
 ]
 
@@ -385,3 +424,104 @@ def test_agreement_is_exit_0_in_every_unit(tmp_path: Path) -> None:
     heading = "theta_2 [deg],torque [N cm],F12_x [kgf],F12_y [kgf]"
     path.write_text("\n".join([heading, *lines]).replace("np.float64(", "").replace(")", ""))
     assert status(["check", str(MODELS / "thesis.toml"), str(path)]) == HOLDS
+
+
+def rows_of(name: str, *options: str) -> list[list[str]]:
+    """The file of `fourbar analyze --csv`, cell by cell."""
+    text = fourbar.solve(SCENES[name], "error").to_csv(degrees="--degrees" in options)
+    assert text is not None
+    return [line.split(",") for line in text.splitlines()]
+
+
+@pytest.mark.parametrize("options", [(), ("--degrees",)])
+@pytest.mark.parametrize("delimiter", [",", ";", "\t"])
+def test_the_file_of_analyze_is_read_as_it_is_and_as_a_spreadsheet_saves_it(
+    delimiter: str, options: tuple[str, ...], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rows = [row[:14] + row[-8:] for row in rows_of("thesis", *options)[:40]]
+    if delimiter == ";":  # decimal commas, and what is left of a deleted column
+        rows = [[cell.replace(".", ",") for cell in row] + [""] for row in rows]
+    path = tmp_path / "theirs.csv"
+    path.write_text("\ufeff" + "\r\n".join(delimiter.join(row) for row in rows))
+    assert status(["check", str(MODELS / "thesis.toml"), str(path)]) == HOLDS
+    out = capsys.readouterr().out
+    assert "left out (stated by the scene): status, branch, drive_bar" in out
+    assert "left out (blank): torque_low, torque_high" in out and "390 of 390 numbers agree" in out
+
+
+def test_blank_cells_state_nothing_and_the_rest_of_their_row_is_judged(tmp_path: Path) -> None:
+    numbers = right(SCENES["thesis"])
+    path = tmp_path / "theirs.csv"
+    (one, two), (first, second) = numbers["theta_2"][:2].tolist(), numbers["torque"][:2].tolist()
+    third = numbers["F12"][1, 0].item()
+    path.write_text(f"theta_2,torque,F12_x,F12_y,note\n{one},{first},,,a\n{two},{2 * second},{third},,b\n")
+    found = judged(SCENES["thesis"], path)
+    assert [(f.line, f.quantity, f.agrees) for f in found.findings] == [
+        (2, "torque", True), (3, "torque", False), (3, "F12_x", True)
+    ]  # fmt: skip
+    (wrong,) = found.differing
+    assert wrong.theirs == (2 * second,) and wrong.ours == pytest.approx((second,), rel=1e-12)
+
+
+def test_magnitudes_and_a_whole_imperial_table(tmp_path: Path) -> None:
+    numbers = right(SCENES["crank_rocker"])
+    inch, pound = 0.0254, 4.4482216152605
+    columns = {
+        "theta_2 [deg]": np.degrees(numbers["theta_2"]),
+        "omega_3 (rpm)": numbers["omega_3"] * 30.0 / math.pi,
+        "F12 [lbf]": np.hypot(*numbers["F12"].T) / pound,
+        "|F43| [kN]": np.hypot(*numbers["F43"].T) / 1e3,
+        "torque": numbers["torque"] / (pound * inch),
+    }
+    for wrong in (False, True):
+        columns["|F43| [kN]"] *= 1.0 + 1e-6 * wrong
+        rows = zip(*columns.values(), strict=True)
+        under = ",,,,lbf in"  # a line of units under the names
+        lines = [",".join(columns), under, *(",".join(f"{x:.12g}" for x in row) for row in rows)]
+        path = tmp_path / f"theirs{wrong}.csv"
+        path.write_text("\n".join(lines))
+        assert {f.quantity for f in judged(SCENES["crank_rocker"], path).differing} == ({"|F43|"} if wrong else set())
+
+
+def test_a_stated_tolerance_decides_and_the_exact_count_stands_next_to_it(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    numbers = right(SCENES["thesis"])
+    off = numbers | {"torque": numbers["torque"] * (1.0 + 1e-4)}
+    path, model = str(write(tmp_path / "theirs.csv", off)), str(MODELS / "thesis.toml")
+    reports = [f"--json={tmp_path / 'out.json'}", f"--junit={tmp_path / 'out.xml'}"]
+    rows, count = len(numbers["theta_2"]), len(ALL) * len(numbers["theta_2"])
+    assert status(["check", model, path, *reports]) == FAILED
+    report = json.loads((tmp_path / "out.json").read_text())
+    assert (report["compared"], report["agree"], report["holds"]) == (count, count - rows, False)
+    assert {finding["quantity"] for finding in report["differing"]} == {"torque"}
+    first = report["differing"][0]
+    assert first["theirs"] == pytest.approx([off["torque"][0]], rel=1e-15) and first["ours"] != first["theirs"]
+    suites = ET.parse(tmp_path / "out.xml").getroot()
+    assert [case.get("name") for case in suites.iter("testcase") if case.find("failure") is not None] == ["torque"]
+    capsys.readouterr()
+    assert status(["check", model, path, "--rtol", "1e-3", *reports]) == HOLDS
+    sentence = f"{count} of {count} numbers agree within rtol 0.001, atol 0; {count - rows} to round-off"
+    assert sentence in capsys.readouterr().out
+    assert json.loads((tmp_path / "out.json").read_text())["agree_to_round_off"] == count - rows
+    assert ET.parse(tmp_path / "out.xml").getroot().find(".//failure") is None
+    assert status(["check", model, path, "--atol", "1e-9"]) == FAILED
+    assert status(["check", model, path, "--rtol", "-1"]) == BAD_INPUT
+
+
+def test_a_mistake_is_recognised_in_numbers_that_are_right_only_to_the_stated_tolerance(tmp_path: Path) -> None:
+    """A simulation's torque, a ten-thousandth off, under the wrong unit."""
+    numbers = right(SCENES["crank_rocker"])
+    numbers["torque"] = numbers["torque"] * 1e3 * (1.0 + 1e-4 * np.sin(np.arange(len(numbers["torque"]))))
+    table = read_table(write(tmp_path / "theirs.csv", numbers))
+    found = judge_table(SCENES["crank_rocker"], table, Tolerance(rtol=1e-3))
+    assert "N mm where N m" in found.explanations[0].text and found.explanations[0].complete
+
+
+def test_a_law_and_a_changing_branch_are_judged_at_the_positions_of_the_scene(tmp_path: Path) -> None:
+    parallelogram = fourbar.FourBar(0.3, fourbar.Bar(0.1, 0.2), fourbar.Bar(0.3, 0.5), fourbar.Bar(0.1, 0.2))
+    scene = Scene(parallelogram, fourbar.Motion(fourbar.Sweep(0.5, 4.0, 21), 2.0, through="follow"))
+    (tmp_path / "theirs.csv").write_text(str(fourbar.solve(scene).to_csv()))
+    found = judged(scene, tmp_path / "theirs.csv")
+    assert {*solve(scene).branch.tolist()} == {1, -1}
+    assert found.differing == [] and found.not_assembled == [] and found.compared > 100

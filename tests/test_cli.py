@@ -5,6 +5,7 @@ import io
 import json
 import math
 import os
+import re
 import stat
 import subprocess
 import sys
@@ -163,6 +164,52 @@ def test_the_largest_pin_loads_stand_above_the_table(run: Fourbar) -> None:
         assert f" {pin} {size:.6g} N at {math.degrees(at):.6g} deg" in line
 
 
+def test_a_terminal_gets_some_forty_rows_and_the_summary_last() -> None:
+    lines = tables_text(load(MODELS / "crank_rocker.toml"), 80).splitlines()
+    rows = [line for line in lines if re.match(r" *\d+\.\d{4} ", line)]
+    assert len(rows) == 37 and rows[1].split()[0] == "10.0000" and rows[-1].split()[0] == "360.0000"
+    place = lines.index("shown: every 10th of the 361 positions; --all shows each")
+    assert lines.index(rows[-1]) < place < lines.index("361 positions: 361 ok")
+    assert max(map(len, lines)) <= 80
+
+
+def test_every_thins_the_table_and_keeps_its_last_position(run: Fourbar) -> None:
+    thinned = run("analyze", MODELS / "crank_rocker.toml", "--every", 100)[1].splitlines()
+    rows = [line.split()[0] for line in thinned if re.match(r" *\d+\.\d{4} ", line)]
+    assert rows == ["0.0000", "100.0000", "200.0000", "300.0000", "360.0000"]
+    assert run("analyze", MODELS / "crank_rocker.toml", "--all")[1] == run("analyze", MODELS / "crank_rocker.toml")[1]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("analyze", "x.toml", "--json", "--csv"), "give one of them"),
+        (("analyze", "x.toml", "--json", "--every", 2), "hold every position"),
+        (("plot", "x.toml", "-o", "a.svg", "--position", "12"), 'did you mean "12 deg"?'),
+        (("new", "--lengths", 3, 1, 2, 2), "name the new file once"),
+    ],
+)
+def test_what_contradicts_itself_or_lacks_a_unit_is_refused(
+    arguments: tuple[object, ...], words: str, run: Fourbar
+) -> None:
+    code, out, err = run(*arguments)
+    assert (code, out) == (2, "") and words in err and err.count("\n") == 1
+
+
+def test_no_command_is_a_question_for_help(run: Fourbar, capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, err = run()
+    assert (code, err) == (HOLDS, "") and out == run("-h")[1] and "analyze" in out
+    assert run("-V")[1] == f"fourbar, version {fourbar.__version__}\n"
+    harness = import_module("validation.cli").status([])
+    assert harness == HOLDS and "advise" in capsys.readouterr().out
+
+
+def test_the_shell_completes(run: Fourbar, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("_FOURBAR_COMPLETE", "zsh_source")
+    code, out, _ = run()
+    assert code == HOLDS and "compdef" in out
+
+
 def test_a_narrow_terminal_gets_whole_columns_and_the_names_of_what_is_missing() -> None:
     scene = crank_rocker()
     for width in (40, 80, 120):
@@ -173,9 +220,7 @@ def test_a_narrow_terminal_gets_whole_columns_and_the_names_of_what_is_missing()
 
 
 def tables_text(scene: fourbar.Scene, width: int) -> str:
-    from fourbar.cli import _table_text
-
-    return _table_text(scene, fourbar.solve(scene), width, True)
+    return tables.printed(scene, fourbar.solve(scene), width)
 
 
 def test_the_digits_of_the_torque() -> None:
@@ -211,6 +256,13 @@ CLASSES = [
 def test_classify(lengths: str, name: str, run: Fourbar) -> None:
     code, out, err = run("classify", *lengths.split())
     assert (code, err) == (HOLDS, "") and out.startswith(name)
+
+
+def test_what_is_printed_can_be_written(tmp_path: Path, run: Fourbar) -> None:
+    assert run("classify", 3, 1, 2.5, 2.2, "-o", tmp_path / "type.txt") == (HOLDS, "", "")
+    assert (tmp_path / "type.txt").read_text() == run("classify", 3, 1, 2.5, 2.2)[1]
+    assert run("new", "-o", tmp_path / "a.toml", "--lengths", 3, 1, 2.5, 2.2)[0] == HOLDS
+    assert load(tmp_path / "a.toml").linkage.lengths == (3.0, 1.0, 2.5, 2.2)
 
 
 def test_classify_says_what_turns_and_how_far(run: Fourbar) -> None:

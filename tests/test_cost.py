@@ -266,6 +266,7 @@ def test_the_command_writes_table_report_and_pictures(tmp_path: Path, monkeypatc
     monkeypatch.setattr(study, "ROUNDS", 1)
     result = CliRunner().invoke(cost, [str(scene), "--out", str(tmp_path / "out")], standalone_mode=False)
     assert result.exception is None and result.return_value == 0, result.output
+    assert "matters most here: " in result.output and ", because " in result.output
     folder = tmp_path / "out" / "small"
     rows = (folder / "cost.csv").read_text().splitlines()
     assert rows[0] == ",".join(study.COLUMNS) and len(rows) > 40

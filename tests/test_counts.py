@@ -280,7 +280,7 @@ def test_numbers_without_a_digit_do_not_agree(tmp_path: Path, capsys: pytest.Cap
     (tmp_path / "scene.toml").write_text(fourbar.dump(scene))
     (tmp_path / "theirs.csv").write_text(f"theta_2, torque\n{scene.motion.theta_2!r}, 17.0\n")
     assert status(["check", str(tmp_path / "scene.toml"), str(tmp_path / "theirs.csv")]) == FAILED
-    assert "Nothing was compared; nothing can be told of 1 more" in capsys.readouterr().out
+    assert "Nothing was compared; no digit left to judge 1 more by" in capsys.readouterr().out
 
 
 def test_a_study_in_which_no_law_is_fitted_is_no_success(

@@ -14,8 +14,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import validation.run.run
 from fourbar.errors import InputError
-from tests.test_suite import COUNT, EXACT, KILLS, SEED, TYPES, judge_all
+from tests.test_suite import COUNT, EXACT, IN_A_CHUNK, KILLS, SEED, TYPES, judge_all
 from validation.report.summary import Summary
 from validation.run import pool
 from validation.run.run import run
@@ -48,7 +49,9 @@ def running(nanny: object) -> int | None:
 
 
 @pytest.mark.timeout(120 + 20 * KILLS)
-def test_killed_workers_change_no_byte(cluster: object, tmp_path: Path) -> None:
+def test_killed_workers_change_no_byte(cluster: object, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(validation.run.run, "SCENES_SHOWN", 0)
+    monkeypatch.setattr(validation.run.run, "CHUNK", {False: IN_A_CHUNK})
     suite = Random(COUNT, SEED, TYPES)
     judge_all(suite, tmp_path / "here")
     rng = np.random.default_rng(SEED)
@@ -68,9 +71,9 @@ def test_killed_workers_change_no_byte(cluster: object, tmp_path: Path) -> None:
 
 def test_a_worker_in_which_an_engine_hangs_ends_itself() -> None:
     code = (
-        "from tests.test_suite import Few; from validation.run.pool import judge_watched; "
+        "from tests.unlucky import Few; from validation.run.pool import judge_watched; "
         "from validation.compare.tolerance import EQUIVALENCE; from validation.engines.witnesses import Witness; "
-        "judge_watched(5.0, Few(), [2], [Witness('moody', 'tests.test_suite:Moody', EQUIVALENCE)], False)"
+        "judge_watched(2.0, Few(), [2], [Witness('moody', 'tests.unlucky:Moody', EQUIVALENCE)], False)"
     )
     began = time.monotonic()
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, timeout=100, check=False, cwd=ROOT)

@@ -1,6 +1,7 @@
 """Scene files: read exactly, written back bit for bit; the models say what their sources say."""
 
 import math
+import re
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
@@ -75,6 +76,10 @@ def test_the_thesis_scenes_reach_the_figures(name: str, torque: float) -> None:
         ("9.81 m s^-2", "m/s^2", Fraction("9.81")),
         ("1 g_0", "m/s^2", Fraction("9.80665")),
         ("3 N m/(rad/s)", "N m s/rad", Fraction(3)),
+        ("2 kNm", "N m", Fraction(2000)),
+        ("3 N.mm", "N m", Fraction(3, 1000)),
+        ("2 inches", "m", Fraction(508, 10000)),
+        ("16 ozf in", "N m", Fraction("0.45359237") * Fraction("9.80665") * Fraction("0.0254")),
         ("1 lbf", "N", Fraction("0.45359237") * Fraction("9.80665")),
         ("2 tonne", "kg", Fraction(2000)),
         ("5e-324 rad", "rad", Fraction(5e-324)),
@@ -106,6 +111,20 @@ def test_what_is_no_length_is_refused(text: str) -> None:
 def test_an_angle_is_a_dimension(text: str) -> None:
     with pytest.raises(UnitError):
         to_si(text, "rad/s")
+
+
+@pytest.mark.parametrize(
+    ("text", "unit", "meant"),
+    [
+        ("5 lb", "N", "5 lbf"), ("5 lbf", "kg", "5 lb"), ("3 oz in", "N m", "3 ozf in"), ("5 Hz", "rad/s", "5 rev/s"),
+        ("5 RPM", "rad/s", "5 rpm"), ("5 Newton", "N", "5 newton"), ("2 N m", "N m/rad", "2 N m/rad"),
+        ("5 1/s", "rad/s", "5 rad /s"),
+    ],
+)  # fmt: skip
+def test_what_may_have_been_meant_is_one(text: str, unit: str, meant: str) -> None:
+    with pytest.raises(UnitError, match=re.escape(f'did you mean "{meant}"?')):
+        to_si(text, unit)
+    assert to_si(meant, unit) > 0.0
 
 
 def test_defaults_are_those_of_the_contract() -> None:

@@ -14,7 +14,7 @@ import pytest
 import fourbar.formulas
 from fourbar.formulas.mobility import limit_positions
 from fourbar.formulas.motion import Coefficients, Rates, State, rates
-from fourbar.formulas.path import path
+from fourbar.formulas.path import path, state
 from fourbar.formulas.pin_forces import Body, cross, inertia_wrenches, pin_forces
 from fourbar.formulas.position import (
     HalfAngle,
@@ -236,7 +236,7 @@ def everything(d: Any, a: Any, b: Any, c: Any, theta_1: Any, q: Any, branch: Any
     moving = rates(k, 2.0, -3.0)
     here = State(lengths, theta_1, q, at, k, 2.0, moving)
     bodies = Body(0.2, 0.01, 0.3 * a + 0.01j), Body(0.5, 0.02, 0.6 * b - 0.02j), Body(0.4, 0.03, 0.5 * c + 0j)
-    w, at_A = inertia_wrenches(a, bodies, at, moving)
+    w, mass_at_A = inertia_wrenches(a, bodies, at, moving)
     inertial = sum(inertia(a, bodies, at, k)) * -3.0 + half_slope(a, bodies, at, k) * 4.0
     values = {**half._asdict(), **k._asdict(), **moving._asdict(), "u3": at.u3, "u4": at.u4, "sin_mu": at.sin_mu}
     values |= {"sine_A": cross(at.u2, at.u3), "sine_24": cross(at.u2, at.u4)}
@@ -244,7 +244,7 @@ def everything(d: Any, a: Any, b: Any, c: Any, theta_1: Any, q: Any, branch: Any
         values[f"G{k_th}"] = here.point(k_th, bodies[k_th - 2].z)
         values[f"a_G{k_th}"] = here.acceleration(k_th, bodies[k_th - 2].z)
         values[f"T{k_th}"] = driving_torque(k, k_th, inertial, 0.5)
-        pins = pin_forces(lengths, at, k_th, drive_sine(at, k_th), w, at_A, 0.25)
+        pins = pin_forces(lengths, at, k_th, drive_sine(at, k_th), w, mass_at_A, 0.25)
         values |= {f"{name} of drive {k_th}": value for name, value in pins._asdict().items()}
     return values
 
@@ -421,3 +421,26 @@ def test_the_sine_of_the_drive_by_the_triangle_is_that_of_the_directions(bar: in
     short = loop(2.0**-14, 1.5, 0.75, 1.25)
     at = close_loop(short, 1.0, direction(0.7), half_angle(short, 0.7), branch)
     assert drive_sine_of_triangle(short, at, bar) == pytest.approx(exact, rel=16.0 * U)
+
+
+def test_a_state_holds_what_it_was_made_from() -> None:
+    bars, theta_2 = FourBar(0.3, Bar(0.1), Bar(0.25), Bar(0.22), 0.4), np.array([0.5, 1.0])
+    unit, moving = state(bars, theta_2, 1), state(bars, theta_2, 1, 3.0, -2.0)
+    assert unit.theta_1 == 0.4 and np.array_equal(unit.theta_2, theta_2)
+    assert (unit.speed, unit.moving.omega_2, unit.moving.alpha_2) == (1.0, 1.0, 0.0)
+    assert (moving.speed, moving.moving.omega_2, moving.moving.alpha_2) == (3.0, 3.0, -2.0)
+    assert np.array_equal(unit.moving.omega_4, unit.k.h4) and np.array_equal(unit.moving.alpha_4, unit.k.dh4)
+    assert [path(unit.lengths, 0.4, bar).bar for bar in (2, 4)] == [2, 4]
+
+
+def test_the_factor_that_changes_less_gives_the_other_its_digits() -> None:
+    """outer + inner = 4 b c: with a short coupler or output both are small against 4 a d."""
+    for psi, lengths in ((3.141, (0.75, 0.75, 1.5, 1e-6)), (1e-3, (0.75, 0.75 + 1.4e-3, 2e-6, 1.4e-3))):
+        d, a, b, c = map(mp.mpf, lengths)
+        half = half_angle(loop(*lengths), psi)
+        with mp.workdps(50):
+            e2 = (d - a) ** 2 + 4 * a * d * mp.sin(mp.mpf(psi) / 2) ** 2
+            exact = ((b + c) ** 2 - e2, e2 - (b - c) ** 2)
+        changes = float(4 * a * d * abs(mp.sin(psi)) * psi)  # with the last digit of psi
+        for found, factor in zip((half.outer, half.inner), exact, strict=True):
+            assert abs(factor - float(found)) <= PRODUCTS * (float(4 * b * c) + changes)

@@ -72,7 +72,8 @@ def test_power_in_equals_power_out(drive_bar: int) -> None:
     terms = [s.torque * omega[drive_bar]]
     for number in (2, 3, 4):
         bar = case.linkage.bar(number)
-        terms += [dot(acting[number - 2], of_foot[number]), acting[number + 1] * omega[number]]
+        force, moment = acting.on(number)
+        terms += [dot(force, of_foot[number]), moment * omega[number]]
         v = of_foot[number] + 1j * omega[number] * (G[number] - foot[number])
         terms.append(-bar.mass * dot(getattr(s, f"a_G{number}") @ [1, 1j], v))
         terms.append(-bar.moment_of_inertia * getattr(s, f"alpha_{number}") * omega[number])

@@ -1,6 +1,7 @@
 """MuJoCo's simulation against the formulas at the motion it really made."""
 
 import math
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -12,8 +13,11 @@ from fourbar.mjcf.settings import Run
 from tests.scenes import crank_rocker, thesis
 from validation.compare.answer import Answer
 from validation.compare.compare import COMPARED, compare
+from validation.compare.rows import AGREES, FAILS, REFUSES
 from validation.compare.tolerance import SIMULATED
 from validation.engines.mujoco.simulate import MujocoSimulated, observed_order
+from validation.engines.witnesses import WITNESSES
+from validation.run.judge import judge
 from validation.scenes.random import LinkageType, random_scene
 
 TURN = fourbar.Sweep(0.1, 0.1 + 2 * math.pi, 90)
@@ -144,3 +148,41 @@ def test_error_falls_with_the_fourth_power_of_the_timestep() -> None:
 
     coarse, fine, order = observed_order(posed, fourbar.command(posed), error)
     assert fine < coarse and 3.0 < order < 6.0, (coarse, fine, order)
+
+
+def hood(links: float, output: float | None = None) -> fourbar.Scene:
+    """14.5 kg that reach far out on light links, slowly."""
+    coupler = fourbar.Bar(0.08, 14.5, 5.0, (1.0, 0.2))
+    bars = (fourbar.Bar(0.10, links), coupler, fourbar.Bar(0.12, links if output is None else output))
+    motion = fourbar.Motion(fourbar.Sweep(0.8, 1.8, 12), 0.5)
+    return fourbar.Scene(fourbar.FourBar(0.11, *bars), motion, effects=(fourbar.Gravity(),), title="hood")
+
+
+SIMULATION = [replace(witness, order="") for witness in WITNESSES if witness.name == "mujoco-simulated"]
+
+
+@pytest.mark.parametrize("links", [1e-2, 1e-8])
+def test_the_closure_is_as_stiff_as_the_lightest_bar_that_it_joins_needs(links: float) -> None:
+    """With pads for bars of one size the inertial torque was 3e-5 wrong at 10 g, 3e-3 at 1 g."""
+    record = judge("hood", hood(links), SIMULATION)
+    assert {row.verdict for row in record.rows} == {AGREES}
+    assert record.answers[0].evidence["mass_ratio"] > 1e5
+    (inertia,) = (row for row in record.rows if row.quantity == "torque_inertia")
+    assert inertia.error < 1e-6
+
+
+def test_a_simulation_that_fails_names_the_ratio_of_masses(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("fourbar.mjcf.document.mass_ratio", lambda linkage: 1.0)  # pads for bars of one size
+    (failed,) = (row for row in judge("hood", hood(1e-3), SIMULATION).rows if row.verdict == FAILS)
+    assert failed.quantity == "torque_inertia"
+    assert failed.reason == "modelling + integration; of coupler and output one is 9.1e+06 times lighter"
+
+
+@pytest.mark.parametrize(("links", "output"), [(0.0, None), (0.01, 0.0)])
+def test_the_mass_that_a_massless_bar_is_advised_to_have_leads_to_a_pass(links: float, output: float | None) -> None:
+    (refused,) = (row for row in judge("hood", hood(links, output), SIMULATION).rows if row.quantity == "all")
+    advised = re.search('with mass = "(.*) kg"', refused.reason)
+    assert refused.verdict == REFUSES and advised is not None
+    mass = float(advised[1])
+    scene = hood(links or mass, None if output is None else mass)
+    assert {row.verdict for row in judge("hood", scene, SIMULATION).rows} == {AGREES}

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
+import fourbar
 from fourbar.errors import InputError
 from validation.cli import status
 from validation.compare.columns import write_columns
@@ -17,8 +18,12 @@ from validation.compare.tolerance import EPS
 from validation.regression import record, render
 from validation.regression.accept import accept_command, compare
 from validation.regression.changes import Kind, differences
-from validation.regression.record import About, about, read_run, write_about
+from validation.regression.history import HISTORY, append, read_history
+from validation.regression.record import About, about, baseline, read_run, read_times, write_about
+from validation.regression.scenes import description
+from validation.regression.times import TimeChange
 
+Recorded = tuple[About, list[Row]]
 ROW = Row("scene", "engine", "exact", "torque", 1e-15, 1e-14, AGREES, "equivalence", 1.0, 1.0)
 HERE = about({"engine": 1.0}, "suite")
 
@@ -90,17 +95,18 @@ def test_command_writes_every_form_and_leaves_with_the_status(tmp_path: Path) ->
     assert "No regression" in same.output
 
 
-def test_accept_records_the_run_under_a_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(record, "BASELINES", tmp_path / "baselines")
+def test_accept_keeps_the_run_next_to_the_results_or_in_a_stated_folder(tmp_path: Path) -> None:
     run = save(tmp_path / "run", [ROW])
+    (run / "timings.csv").write_text("scene,engine,setting,positions,seconds,times_formulas\nscene,engine,-,1,1,3.0\n")
     runner = CliRunner()
-    assert runner.invoke(accept_command, [str(run), "--as", "mine"]).exit_code == 0
-    kept = tmp_path / "baselines" / "mine"
-    assert read_run(kept) == read_run(run)
-    assert json.loads((kept / "record.json").read_text())["machine"] == HERE.machine
-    result = runner.invoke(compare, ["mine", str(run)], standalone_mode=False)
-    assert result.return_value == 0
-    assert runner.invoke(accept_command, [str(run), "--as", "../out"]).exit_code != 0
+    for options, kept in (([], tmp_path / "accepted"), (["--to", str(tmp_path / "mine")], tmp_path / "mine")):
+        assert runner.invoke(accept_command, [str(run), *options]).exit_code == 0
+        assert read_run(kept) == read_run(run)
+        assert read_times(kept) == {("scene", "engine"): 3.0}
+        assert json.loads((kept / "record.json").read_text())["machine"] == HERE.machine
+        assert runner.invoke(compare, [str(kept), str(run)], standalone_mode=False).return_value == 0
+    assert runner.invoke(accept_command, [str(run), "--to", str(run)]).exit_code != 0
+    assert baseline("accepted").parent == Path(record.__file__).parent  # of this project, where no such folder is
 
 
 @pytest.mark.parametrize(
@@ -161,3 +167,144 @@ def test_a_run_with_too_many_rows_for_a_text_is_read_from_its_columns(tmp_path: 
     (tmp_path / "results.parquet").write_bytes(b"no columns")
     with pytest.raises(InputError, match="is not a table written by"):
         read_run(tmp_path)
+
+
+SCENE = fourbar.load(Path(__file__).parent.parent / "models" / "crank_rocker.toml")
+
+
+def made(rows: list[Row], scenes: dict[str, fourbar.Scene], engines: tuple[str, ...] = ("engine",)) -> Recorded:
+    return about(dict.fromkeys(engines, 1.0), "suite", {name: description(s) for name, s in scenes.items()}), rows
+
+
+def test_a_scene_that_changed_comes_first_and_its_rows_are_not_compared() -> None:
+    output = replace(SCENE.linkage.output, inertia=0.05)
+    heavier = replace(SCENE, linkage=replace(SCENE.linkage, output=output), title="another title")
+    before = replace(SCENE, linkage=replace(SCENE.linkage, output=replace(output, inertia=0.048)))
+    other, wrong = replace(ROW, scene="other"), replace(ROW, error=1e-9, allowed=1e-8)
+    old = made([ROW, other], {"scene": before, "other": SCENE})
+    found = differences(old, made([wrong, other], {"scene": heavier, "other": SCENE}))
+    assert render.text(found).splitlines()[0] == "scene scene: bars.output.inertia 0.048 -> 0.05 kg m^2"
+    assert found.status == 0 and found.not_compared == ["scene scene changed (1 rows)"]
+    assert differences(old, made([replace(wrong, verdict=FAILS), other], {"scene": heavier})).regressions
+    assert differences(made([ROW], {"scene": before}), made([wrong], {"scene": heavier})).nothing
+    for form in (render.markdown, render.html):
+        assert "bars.output.inertia 0.048" in form(found)
+
+
+def test_more_positions_and_other_settings_are_named_so() -> None:
+    finer = replace(SCENE, motion=replace(SCENE.motion, theta_2=fourbar.Sweep(0.0, 2.0 * math.pi, 720)))
+    worse = replace(ROW, error=1e-9, allowed=1e-8)
+    found = differences(made([ROW], {"scene": SCENE}), made([worse], {"scene": finer}))
+    assert found.not_compared == ["scene scene has other positions (1 rows)"] and not found.regressions
+    assert "360} -> " in str(found.scenes[0]) or "steps" in str(found.scenes[0])
+    old, new = replace(ROW, setting="RK4 628/rev"), replace(worse, setting="RK4 1256/rev")
+    found = differences(made([old], {"scene": SCENE}), made([new], {"scene": SCENE}))
+    assert found.not_compared == ["scene / engine: RK4 628/rev -> RK4 1256/rev (1 rows)"] and not found.regressions
+
+
+def test_of_an_older_record_only_the_hash_can_say_that_scenes_changed() -> None:
+    old = About(HERE.versions, HERE.machine, {**HERE.settings, "suite": "0123456789abcdef"})
+    found = differences((old, [ROW]), made([ROW], {"scene": SCENE}))
+    assert not found.scenes and not found.regressions
+    (note,) = found.notes
+    assert "0123456789ab -> suite" in note and "the older record does not say what they ask" in note
+
+
+def test_what_was_not_wanted_is_not_run_and_what_was_wanted_is_gone() -> None:
+    rows = [replace(ROW, scene=scene, engine=engine) for scene in ("a", "b") for engine in ("engine", "formulas")]
+    rows.append(replace(ROW, scene="a", engine="other"))
+    old = made(rows, dict.fromkeys("ab", SCENE), ("engine", "other"))
+    found = differences(old, made(rows[:2], {"a": SCENE}))
+    assert found.not_run == ["scene b (2 rows)", "other (1 rows)"] and found.status == 0
+    gone = differences(old, made(rows[1:2], {"a": SCENE}))
+    assert [change.key[1] for change in gone.regressions] == ["engine"]
+    assert differences(old, (HERE, rows[:2])).not_run[0] == "scene b (2 rows)"  # without a record its rows say so
+
+
+def test_what_is_compared_can_be_chosen(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    bad = replace(ROW, quantity="F12")
+    old = save(tmp_path / "old", [ROW, bad])
+    new = save(tmp_path / "new", [ROW, replace(bad, error=1e-9)])
+    arguments = ["compare", str(old), str(new)]
+    assert [status([*arguments, *more]) for more in ([], ["--quantity", "torque"], ["--only", "scene"])] == [1, 0, 1]
+    capsys.readouterr()
+    assert status([*arguments, "--engines", "motor"]) == 2
+    assert capsys.readouterr().err == "error: --engines = 'motor': must be among engine\n"
+
+
+def test_an_engine_is_slower_only_beyond_the_scatter_of_its_times() -> None:
+    scenes = [f"scene {k}" for k in range(6)]
+    old = {(scene, "engine"): 100.0 for scene in scenes}
+
+    def ratios(*factors: float) -> list[TimeChange]:
+        new = {key: 100.0 * factor for key, factor in zip(old, factors, strict=False)}
+        return differences((HERE, [ROW]), (HERE, [ROW]), (old, new)).slower
+
+    (slower,) = ratios(1.9, 2.1, 2.0, 2.0, 1.9, 2.1)
+    assert str(slower).startswith("engine is 2.00 times slower") and slower.ratio > 1.0
+    assert not ratios(1.1, 1.15, 1.1, 1.2, 1.1, 1.1)  # of one mind, and less than nights differ
+    assert not ratios(9.0, 1.0, 1.0, 4.0, 1.0, 1.0)  # twice as slow on the mean, by two scenes
+    assert not ratios(2.0, 2.0)
+    (faster,) = ratios(0.5, 0.5, 0.5)
+    assert "2.00 times faster" in str(faster)
+
+
+@pytest.fixture(scope="module")
+def nights(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Eight runs of three scenes: a drift of 10 % a night in one row, a new version and a failure in the sixth."""
+    folder = tmp_path_factory.mktemp("nights")
+    for night in range(8):
+        scenes = [f"scene {k}" for k in range(3)]
+        error = 1e-9 * 1.1**night
+        rows = [replace(ROW, scene=scene, error=1e-9, allowed=1e-8, condition=1e-5) for scene in scenes]
+        rows[0] = replace(rows[0], error=error, condition=1.0)
+        if night >= 5:
+            rows[1] = replace(rows[1], error=1e-3, verdict=FAILS)
+        if night == 3:
+            rows = rows[:1]  # a part of the suite
+        record, _ = made(rows, {row.scene: SCENE for row in rows})
+        versions = {**record.versions, "mujoco": "4.0.0" if night < 5 else "4.1.0"}
+        date, commit = f"2026-01-0{night + 1}T02:00:00+00:00", f"{night}abcdef"
+        record = replace(record, versions=versions, date=date, commit=commit)
+        times = {(scene, "engine"): 50.0 * (3.0 if night >= 6 else 1.0) for scene in scenes}
+        append(folder / HISTORY, (record, rows), times)
+    return folder
+
+
+def test_a_history_names_the_step_at_which_a_row_changed(nights: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert status(["history", str(nights)]) == 0
+    out = capsys.readouterr().out.splitlines()
+    assert [line.split()[2] for line in out[:-1]] == ["(3abcdef):", "(5abcdef):", "(6abcdef):"]
+    assert "1 worse" in out[0]  # 1.1^3: no night by itself was beyond 1.25
+    assert "1 verdict got worse" in out[1] and "mujoco 4.0.0 -> 4.1.0" in out[1]
+    assert "engine is 3.00 times slower" in out[2] and out[-1].startswith("8 runs, 3 steps")
+    page = (nights / "history.html").read_text()
+    assert page.count("<svg") == 3 + 2 and "scene 1 / engine / exact / torque" in page and "mujoco 4.1.0" in page
+    assert status(["history", str(nights), "--only", "scene 2", "-o", str(nights / "two.html")]) == 0
+    assert "1 step changed" in capsys.readouterr().out
+
+
+def test_a_history_is_read_by_pandas_and_keeps_what_each_scene_states(nights: Path) -> None:
+    import pandas as pd
+
+    table = pd.read_parquet(nights / HISTORY)
+    assert table.groupby("commit", observed=True).size().tolist() == [6, 6, 6, 4, 6, 6, 6, 6]
+    errors = table[(table.quantity == "torque") & (table.scene == "scene 0")].error
+    assert errors.tolist() == pytest.approx([1e-9 * 1.1**night for night in range(8)], rel=1e-15)
+    assert set(table.version_mujoco) == {"4.0.0", "4.1.0"}
+    runs = read_history(nights / HISTORY)
+    assert runs[0].about.scenes["scene 2"] == description(SCENE) and len(runs[3].rows) == 1
+    before = (nights / HISTORY).read_bytes()
+    append(nights / HISTORY, (runs[4].about, runs[4].rows), runs[4].times)  # it is in it
+    assert (nights / HISTORY).read_bytes() == before
+
+
+def test_what_is_no_history_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    run = save(tmp_path / "run", [ROW])
+    write_columns(iter([[ROW]]), run)
+    (tmp_path / "text.parquet").write_text("no columns")
+    for file, words in ((tmp_path, "there is no such file"), (run / "results.parquet", "it lacks commit, date"),
+                        (tmp_path / "text.parquet", "is no history")):  # fmt: skip
+        assert status(["history", str(file)]) == 2
+        message = capsys.readouterr().err.strip()
+        assert words in message and "\n" not in message

@@ -1,5 +1,6 @@
 """A released linkage that reaches a limit position: judged to its end, whatever an engine does there."""
 
+import json
 from dataclasses import replace
 from typing import Any
 
@@ -112,6 +113,21 @@ def test_a_limit_is_seen_once_and_between_two_steps() -> None:
 
 def test_the_table_says_that_the_motion_ended() -> None:
     from fourbar.show.tables import heading
+    from fourbar.solution import json_text
 
     scene = falling()
-    assert any("ends at 0.43991 s" in line for line in heading(scene, solve(scene)))
+    solution, free = solve(scene), scene.motion.free
+    assert free is not None and len(solution) <= free.steps
+    wanted = f"{free.steps + 1} instants were wanted: the motion stops at a limit position at t = 0.43991 s"
+    assert any(line.startswith(wanted) for line in heading(scene, solution))
+    assert json.loads(json_text(solution))["stopped_at"] == solution.stopped_at
+
+
+def test_a_released_scene_is_reported_without_a_torque_that_is_rounding(monkeypatch: pytest.MonkeyPatch) -> None:
+    from validation.report import figures
+
+    scene = falling()
+    shown: list[str] = []
+    monkeypatch.setattr(figures, "_picture", lambda quantity, *_: shown.append(quantity) or "")
+    figures.scene_figure(Record("falling", scene, solution=solve(scene)))
+    assert shown == ["theta_4", "F32"]

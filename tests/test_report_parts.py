@@ -15,6 +15,7 @@ from validation.report.costs import cost_figure
 from validation.report.hard_section import found_in, section
 from validation.report.html import html
 from validation.report.summary import summarise
+from validation.report.templating import count_or_size
 from validation.run.run import sections
 from validation.scenes.hard_families import FAMILIES
 
@@ -92,3 +93,10 @@ def test_a_study_of_cost_next_to_the_report_is_part_of_it(tmp_path: Path) -> Non
     # an image runs no script; what is too large stays outside
     assert text.count('<figure class="part">') == 1 and f'src="data:image/svg+xml;base64,{data}"' in text
     assert text.index('id="cost"') < text.index("The study of demo")
+
+
+@pytest.mark.parametrize(
+    ("value", "text"), [(628.0, "628"), (0.0, "0"), (0.125, "0.125"), (3.1e-9, "3.10e-09"), (1.5e7, "1.50e+07")]
+)
+def test_what_is_counted_is_written_for_people(value: float, text: str) -> None:
+    assert count_or_size(value) == text

@@ -15,7 +15,7 @@ from click.testing import CliRunner
 
 import fourbar
 from fourbar.quantities import PIN_FORCES
-from validation.subjects import examine, mujoco_c
+from validation.subjects import examine
 from validation.subjects.standing import FINDINGS, PROBLEM, command, findings
 
 EXACT = 1e-10
@@ -25,6 +25,7 @@ THROUGH = 1e-5
 
 
 def test_mujoco_answers_at_states_and_through_a_turn() -> None:
+    mujoco_c = pytest.importorskip("validation.subjects.mujoco_c", exc_type=ImportError)
     scene = fourbar.load(PROBLEM)
     setting = "generated file"
     readings = [mujoco_c.states(scene, setting), mujoco_c.through(scene, 157, setting)]
@@ -36,6 +37,7 @@ def test_mujoco_answers_at_states_and_through_a_turn() -> None:
 
 
 def test_a_wrong_a_missing_and_a_nan_reading_show() -> None:
+    mujoco_c = pytest.importorskip("validation.subjects.mujoco_c", exc_type=ImportError)
     scene = fourbar.load(PROBLEM)
     reading = json.loads(json.dumps(mujoco_c.states(scene, "generated file").plain()))
     reading["forces"]["F43"] = [[-x, -y] for x, y in reading["forces"]["F43"]]

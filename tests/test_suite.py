@@ -6,7 +6,6 @@ import subprocess
 import sys
 import time
 from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -14,9 +13,7 @@ import pytest
 
 import validation.run.run
 from fourbar.errors import FourBarError, InputError
-from fourbar.scene import Command, Scene
-from tests.scenes import crank_rocker
-from validation.compare.answer import Answer
+from tests.unlucky import Few, dies_at_first
 from validation.compare.rows import FAILS, from_csv
 from validation.compare.tolerance import EQUIVALENCE
 from validation.engines import added
@@ -30,58 +27,16 @@ from validation.scenes.random import LinkageType
 from validation.scenes.suites import AS_LONG_AS, MOST_POSITIONS, Files, Random, scene_files
 
 SEED = 7
-COUNT = SCENES_SHOWN + 20
-"""More than are drawn, so that the work is the judging alone."""
 KILLS = int(os.environ.get("KILLS", "3"))
-"""Kills in each of the tests that kill; `make long-test` asks for 50."""
+"""Kills in each of the tests that kill; `make long-test` takes 50, and runs of full size."""
+FULL = "KILLS" in os.environ
+COUNT, IN_A_CHUNK = (SCENES_SHOWN + 20, 20) if FULL else (50, 5)
+"""Scenes of a run, more than are drawn, so that the work is the judging alone; and as many chunks in a small run."""
+SMALL = f"import validation.run.run as run; run.SCENES_SHOWN, run.CHUNK = 0, {{False: {IN_A_CHUNK}}}; "
+HARNESS = "import runpy; runpy.run_module('validation', run_name='__main__', alter_sys=True)"
+PROGRAM = ("-m", "validation") if FULL else ("-c", SMALL + HARNESS)
 TYPES = tuple(LinkageType)
 EXACT = chosen("free-body")
-
-
-@dataclass(frozen=True)
-class Few:
-    """Scenes made in code; the names say which engine misbehaves where."""
-
-    names: tuple[str, ...] = ("a", "b", "c", "d")
-
-    def __len__(self) -> int:
-        return len(self.names)
-
-    def name(self, index: int) -> str:
-        return self.names[index]
-
-    def scene(self, index: int) -> Scene:
-        return crank_rocker(title=self.names[index])
-
-    def fingerprint(self) -> str:
-        return repr(self.names)
-
-
-class Unlucky:
-    """Agrees, once its process was killed, or waited in vain for a lock, as often as the folder LIVES has files."""
-
-    name = "unlucky"
-
-    def answer(self, scene: Scene, command: Command) -> Answer:
-        for life in sorted(Path(os.environ["LIVES"]).iterdir()):
-            life.unlink()
-            if life.name.startswith("killed"):
-                os.kill(os.getpid(), signal.SIGKILL)
-            os._exit(1)
-        return Answer("unlucky", "exact", refusal="declined")
-
-
-class Moody:
-    """Agrees, except that it kills its process on scene b and hangs on scene c."""
-
-    name = "moody"
-
-    def answer(self, scene: Scene, command: Command) -> Answer:
-        if scene.title == "b":
-            os.kill(os.getpid(), signal.SIGSEGV)
-        if scene.title == "c":
-            time.sleep(3600.0)
-        return Answer("moody", "exact", refusal="declined")
 
 
 def judge_all(
@@ -95,8 +50,9 @@ def judge_all(
 @pytest.mark.timeout(300)  # its hangs alone take half a minute, and every new worker imports the harness again
 def test_an_engine_that_crashes_or_hangs_costs_its_own_rows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(validation.run.run, "CHUNK", {True: 2, False: 2})
-    moody = added.named([f"{__name__}:Moody"], ())
-    judge_all(Few(), tmp_path / "run", (*EXACT, *moody), seconds=8.0)
+    hangs = 3.0 * max(1.0, os.getloadavg()[0] / (os.cpu_count() or 1))  # s; a busy machine is given longer
+    moody = added.named(["tests.unlucky:Moody"], ())
+    judge_all(Few(), tmp_path / "run", (*EXACT, *moody), seconds=hangs)
     rows = from_csv(tmp_path / "run" / "results.csv")
     failing = {(row.scene, row.engine): row.reason for row in rows if row.verdict == FAILS}
     assert set(failing) == {("b", "moody"), ("c", "moody")}
@@ -115,17 +71,9 @@ def test_what_comes_from_outside_is_not_held_against_the_engine(
     for life in range(3):
         (tmp_path / "lives" / f"{how} {life}").touch()
     monkeypatch.setenv("LIVES", str(tmp_path / "lives"))
-    unlucky = Witness("unlucky", f"{__name__}:Unlucky", EQUIVALENCE)
+    unlucky = Witness("unlucky", "tests.unlucky:Unlucky", EQUIVALENCE)
     assert judge_all(Few(("a",)), tmp_path / "run", (*EXACT, unlucky), workers=1).counts[FAILS] == 0
     assert not list((tmp_path / "lives").iterdir())
-
-
-def dies_at_first() -> None:
-    """Starts no worker as long as some of its lives are left in the folder that the run was given."""
-    lives = sorted(Path(os.environ["LIVES"]).iterdir())
-    if lives:
-        lives[0].unlink(missing_ok=True)
-        os._exit(1)
 
 
 @pytest.mark.parametrize(("lives", "pools"), [(3, pool.POOLS), (9, 2)])
@@ -147,7 +95,11 @@ def test_workers_that_die_with_nothing_to_do_are_on_nobodys_account(
         assert not list((tmp_path / "lives").iterdir())
 
 
-def test_the_bytes_depend_neither_on_the_workers_nor_on_the_order(tmp_path: Path) -> None:
+def test_the_bytes_depend_neither_on_the_workers_nor_on_the_order(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(validation.run.run, "SCENES_SHOWN", 0)
+    monkeypatch.setattr(validation.run.run, "CHUNK", {False: IN_A_CHUNK})
     suite = Random(COUNT, SEED, TYPES)
     for workers in (1, 2):
         judge_all(suite, tmp_path / str(workers), workers=workers)
@@ -177,15 +129,13 @@ def test_another_suite_does_not_resume_the_parts_of_this_one(tmp_path: Path) -> 
             store.put(0, [])
 
 
-LIMITED = (
-    "import resource, runpy, sys; resource.setrlimit(resource.RLIMIT_FSIZE, (60_000, resource.RLIM_INFINITY)); "
-    "runpy.run_module('validation', run_name='__main__', alter_sys=True)"
-)
+LIMIT = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (60_000, resource.RLIM_INFINITY)); "
+LIMITED = LIMIT + ("" if FULL else SMALL) + HARNESS
 """The harness on a disk that takes no file of more than 60 kB: the parts fit, the results do not."""
 
 
 def start(out: Path, count: int, *program: str, stderr: int = subprocess.DEVNULL) -> subprocess.Popen[bytes]:
-    command = [sys.executable, *(program or ("-m", "validation")), "run", "--random", str(count)]
+    command = [sys.executable, *(program or PROGRAM), "run", "--random", str(count)]
     return subprocess.Popen(
         [*command, "--engines", "free-body", "--out", str(out)],
         cwd=Path(__file__).parent.parent,
@@ -222,7 +172,7 @@ def assert_resumes(disturbed: Path, undisturbed: Path) -> None:
 @pytest.mark.timeout(60 + 20 * KILLS)
 def test_killed_at_random_moments_a_rerun_ends_with_the_same_bytes(tmp_path: Path, undisturbed: Path) -> None:
     rng = np.random.default_rng(SEED)
-    chunks = len(range(0, COUNT, 20))
+    chunks = len(range(0, COUNT, IN_A_CHUNK))
     for _ in range(KILLS):
         process = start(tmp_path, COUNT)
         wait_for_parts(tmp_path, process, at_least=int(rng.integers(chunks)))

@@ -23,13 +23,14 @@ from fourbar.mjcf import mjcf
 from fourbar.scene import Scene
 from fourbar.solve import solve
 from validation.check import model
+from validation.check.causes import causes
 from validation.check.differences import differences
 from validation.check.screen import DEEPEST, LARGEST_MJCF, read_mjcf
 from validation.compare.compare import COMPARED, compare
 from validation.compare.rows import FAILS, from_csv
 from validation.compare.tolerance import SIMULATED
 from validation.engines.memory import WORKER_MEMORY
-from validation.engines.mujoco.theirs import ONE_STATE, THROUGH_TIME, Examined, examine
+from validation.engines.mujoco.theirs import ONE_STATE, THROUGH_TIME, Examined, examine, examine_mended
 
 CRANK_ROCKER = fourbar.load(Path(__file__).parents[1] / "models" / "crank_rocker.toml")
 GENERATED = mjcf(CRANK_ROCKER)
@@ -192,6 +193,49 @@ def other_plane(closure: str = 'site1="r" site2="q"', axis: str = "0 -1 0", opti
     <equality>{f"<connect {closure}/>" if closure else ""}</equality></mujoco>"""
 
 
+@pytest.mark.parametrize("closure", ['site1="r" site2="q"', ""])
+def test_bodies_and_sites_are_guessed_from_what_hangs_together_and_from_the_lengths(closure: str) -> None:
+    """The rocker is as good a crank by its hinges alone; without a connect the sites of pin B are looked for too."""
+    text = other_plane(closure)
+    rocker = re.search(' *<body name="rocker".*?</body>', text)
+    assert rocker is not None  # it comes first in the file
+    text = text.replace(rocker[0], "").replace("<worldbody>", "<worldbody>" + rocker[0])
+    found = examine(BARE, text, {})
+    assert found.names.items() >= MINE.items()
+    assert ({"B3": "r", "B4": "q"}.items() <= found.names.items()) == (not closure)
+    assert "guessed" in found.notes[0] and "input=crank, coupler=rod, output=rocker" in found.notes[0]
+    assert errors(BARE, found, ONE_STATE)["theta_4"] < STIFF_ENOUGH
+
+
+MENDED = [
+    ("bars.coupler.mass", 'mass="0.5"', 'mass="0.6"'),
+    ("bars.output.centre.angle", "0.11883216824898844 0 -0.0167", "0.11883216824898844 0 0.0167"),
+    ("lengths.coupler", 'name="r" pos="0.25', 'name="r" pos="0.26'),
+    ("lengths.input", 'name="rod" pos="0.1', 'name="rod" pos="0.11'),
+    ("gravity.y", "0 0 -9.81", "0 0 9.81"),
+    ("pins.A.damping", 'name="rod" pos="0.1 0 0"><joint', 'name="rod" pos="0.1 0 0"><joint damping="0.1"'),
+    ("closure.softness", STIFF, ""),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("key", "old", "new"), MENDED, ids=[each[0] for each in MENDED])
+def test_the_one_thing_that_is_wrong_has_all_of_the_error(key: str, old: str, new: str) -> None:
+    """Mended alone, the file is as good as it was before it was spoilt: by far the greatest share."""
+    text = other_plane(f'site1="r" site2="q" {STIFF}')
+    assert old in text
+    found = examine(BARE, spoilt := text.replace(old, new), {})
+    wanted = {d.key: d.generated for d in differences(generated(BARE).described, found.described)}
+    entries = [(key, wanted[key]), ("option.tolerance", wanted["option.tolerance"])]
+    before, *after = (
+        [row for row in compare("", BARE, answers[0], solve(BARE, at=answers[0].at), SIMULATED, COMPARED)]
+        for answers in (found.answers, *(each or [] for each in examine_mended(BARE, spoilt, found.names, entries)))
+    )
+    chosen = [d for d in differences(generated(BARE).described, found.described) if d.key in dict(entries)]
+    first, second = causes(sorted(chosen, key=lambda d: d.key != key), before, after)
+    assert first.difference.key == key and first.share is not None and first.share > 0.8
+    assert second.share is not None and second.share < 0.01
+
+
 @pytest.mark.parametrize("axis", ["0 -1 0", "0 1 0"])
 def test_another_plane_and_a_reversed_axis_change_no_number(axis: str) -> None:
     found = examine(BARE, other_plane(f'site1="r" site2="q" {STIFF}', axis), MINE)
@@ -298,10 +342,13 @@ def test_an_absurd_timestep_is_reported_and_not_run_through(timestep: str) -> No
         assert through.refusal is not None and "steps of the motion; must be 1 to 400000" in through.refusal
 
 
+FIFTH = '<body name="fan"><joint/><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/></body>'
 REFUSED = [
-    ("no such body", other_plane(), {}, "the file has: crank, rod, rocker"),
+    ("no such body", other_plane(), {"input": "wheel"}, "the file has: crank, rod, rocker"),
+    ("no guess", other_plane().replace("</worldbody>", FIFTH + "</worldbody>"), {},
+     "no guess makes a four-bar (every joint must be a hinge of the input"),
     ("a slide", other_plane().replace("<joint/>", '<joint type="slide"/>', 1), MINE, "hinge"),
-    ("nothing closes", other_plane(""), MINE, "--name B3=SITE"),
+    ("nothing closes", re.sub("<site [^>]*>", "", other_plane("")), MINE, "no body is named B3, B4"),
     ("does not compile", other_plane().replace("mass=", "weight="), MINE, "does not compile"),
     ("two names, one body", other_plane(), {**MINE, "coupler": "crank"}, "three bodies"),
 ]  # fmt: skip

@@ -11,6 +11,7 @@ COMMANDS = {
     "run": "validation.run.run:command",
     "accept": "validation.regression.accept:accept_command",
     "compare": "validation.regression.accept:compare",
+    "history": "validation.regression.accept:history",
     "check": "validation.check:check",
     "fuzz-files": "validation.stress.mutants:fuzz_files",
     "models": "validation.studies.models:models",
@@ -43,13 +44,16 @@ class LazyGroup(click.Group):
         return command
 
 
-@click.group(cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"]})
-def group() -> None:
+@click.group(cls=LazyGroup, invoke_without_command=True, context_settings={"help_option_names": ["-h", "--help"]})
+@click.pass_context
+def group(context: click.Context) -> None:
     """Check the closed formulas of the planar four-bar linkage against independent engines.
 
     Exit status: 0 all holds, 1 a comparison fails or nothing was compared, 2 the input is bad,
     3 the environment or the program failed, 130 interrupted.
     """
+    if context.invoked_subcommand is None:
+        click.echo(context.get_help())
 
 
 def main(arguments: list[str] | None = None) -> None:

@@ -105,17 +105,18 @@ class Actions:
 
     def wrenches(self, inertia: Wrenches) -> Wrenches:
         """Everything that acts on each bar, with d'Alembert's forces and moments."""
-        R, M = dict(zip((2, 3, 4), inertia[:3], strict=True)), dict(zip((2, 3, 4), inertia[3:], strict=True))
+        R, M = dict(zip((2, 3, 4), inertia[:3], strict=True)), dict(zip((2, 3, 4), inertia[3:6], strict=True))
         for bar, force in self.forces.items():
             R[bar] = R[bar] + force
         for bar, moment in self.moments.items():
             M[bar] = M[bar] + moment
         for pin, couple in self.couples.items():
             i, j = PINS[pin]
-            M[j] = M[j] + couple
-            if i != 1:
-                M[i] = M[i] - couple
-        return Wrenches(R[2], R[3], R[4], M[2], M[3], M[4])
+            if pin != "B":  # which has a place of its own
+                M[j] = M[j] + couple
+                if i != 1:
+                    M[i] = M[i] - couple
+        return Wrenches(R[2], R[3], R[4], M[2], M[3], M[4], self.couples.get("B", 0.0))
 
     def _rounded(self, term: Number) -> Number:
         return term if self.rounded is None else self.rounded(term)

@@ -32,7 +32,7 @@ class Gravity(Effect):
     def field(self) -> Any:
         """g_x + i g_y, m/s^2; a component that the angle as a double cannot tell from zero is zero."""
         u = np.exp(1j * self.angle)
-        cosine, sine = (x * (np.abs(x) > U) for x in (u.real, u.imag))
+        cosine, sine = (x * (abs(x) > U) for x in (u.real, u.imag))
         return self.magnitude * (cosine + 1j * sine)
 
     @property

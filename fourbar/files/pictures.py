@@ -18,7 +18,7 @@ LARGEST = 2_000_000
 LONGEST_NAME = 200
 RASTER = {b"\x89PNG\r\n\x1a\n": "image/png", b"\xff\xd8\xff": "image/jpeg"}
 """First bytes of the formats that may be attached; SVG may not, because it can carry scripts."""
-ALLOWED = 'must be the name of a PNG or JPEG file beside the scene file or below its folder, like "coupler.png"'
+ALLOWED = 'must be the name of a PNG or JPEG file next to the scene file or below its folder, like "coupler.png"'
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,6 +4,7 @@ Numbers are rounded once when they are read; what is written reads back bit for 
 """
 
 import math
+import re
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -32,6 +33,8 @@ MOST_STEPS = 100_000_000
 """The bound that Sweep and Free hold."""
 MOST_DOTS = 100
 """In one line: the time that the TOML reader takes grows with the square of a dotted key's parts."""
+LONGEST_LINE = 60
+"""Characters shown of a line that cannot be read."""
 MOST_LOADS = 1000
 """Each load is a term at every position."""
 THROUGH = ("sign", "follow")
@@ -65,11 +68,27 @@ def loads(text: str, name: str = "scene") -> Scene:
     except RecursionError:
         raise InputError("TOML", "...", "is nested too deeply", shown) from None
     except ValueError as error:  # TOMLDecodeError, and numbers that Python refuses
-        raise InputError("TOML", text[:40], f"cannot be read: {' '.join(str(error).split())[:120]}", shown) from None
+        raise _unreadable(text, str(error), shown) from None
     try:
         return _scene(Reader(shown), document, str(Path(name).parent))
     except InputError as error:
         raise (error if error.file else error.in_file(shown)) from None
+
+
+PLACE = re.compile(r" \(at (?:line (\d+), column (\d+)|end of document)\)$")
+
+
+def _unreadable(text: str, reason: str, shown: str) -> InputError:
+    """What the TOML reader stumbles over, with its line."""
+    found = PLACE.search(reason)
+    lines = text.split("\n")
+    if found is None:
+        return InputError("TOML", text[:LONGEST_LINE], f"cannot be read: {' '.join(reason.split())[:120]}", shown)
+    line, column = int(found[1] or len(lines)), int(found[2] or len(lines[-1]) + 1)
+    start = max(0, column - 1 - LONGEST_LINE // 2)
+    value = lines[line - 1][start : start + LONGEST_LINE].strip()
+    why = " ".join(reason[: found.start()].split())[:120]
+    return InputError(f"line {line}, column {column}", value, f"no TOML: {why}", shown)
 
 
 def _scene(read: Reader, document: dict[str, Any], folder: str) -> Scene:

@@ -72,16 +72,16 @@ def dump(scene: Scene) -> str:
 
 def _motion_entry(write: Writer, motion: Motion) -> dict[str, Any]:
     entry: dict[str, Any] = {}
-    asked = motion.theta_2
-    if isinstance(asked, Sweep):
-        ends = {"from": write.quantity(asked.start, "rad"), "to": write.quantity(asked.stop, "rad")}
-        entry["theta_2"] = {**ends, "steps": asked.steps}
-    elif isinstance(asked, FromLimit):
-        entry["theta_2"] = {"limit": asked.limit, "offset": write.quantity(asked.offset, "rad")}
-    elif isinstance(asked, np.ndarray):
-        entry["theta_2"] = [write.quantity(angle, "rad") for angle in asked.tolist()]
-    elif asked is not None:
-        entry["theta_2"] = write.quantity(asked, "rad")
+    wanted = motion.theta_2
+    if isinstance(wanted, Sweep):
+        ends = {"from": write.quantity(wanted.start, "rad"), "to": write.quantity(wanted.stop, "rad")}
+        entry["theta_2"] = {**ends, "steps": wanted.steps}
+    elif isinstance(wanted, FromLimit):
+        entry["theta_2"] = {"limit": wanted.limit, "offset": write.quantity(wanted.offset, "rad")}
+    elif isinstance(wanted, np.ndarray):
+        entry["theta_2"] = [write.quantity(angle, "rad") for angle in wanted.tolist()]
+    elif wanted is not None:
+        entry["theta_2"] = write.quantity(wanted, "rad")
     if motion.omega_2 is not None:
         entry["omega_2"] = write.quantity(motion.omega_2, "rad/s")
     if motion.law is None:

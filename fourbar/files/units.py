@@ -4,6 +4,7 @@ The units are a short list rather than all that the units library knows, because
 dimension here: rad/s is not 1/s, so neither Hz nor a forgotten "deg" slips through.
 """
 
+import difflib
 import math
 import re
 from fractions import Fraction
@@ -22,8 +23,8 @@ kilo- = 1e3 = k-
 mega- = 1e6 = M-
 giga- = 1e9 = G-
 meter = [length] = m = metre
-inch = 0.0254 * meter = in
-foot = 0.3048 * meter = ft
+inch = 0.0254 * meter = in = inches
+foot = 0.3048 * meter = ft = feet
 second = [time] = s = sec
 minute = 60 * second = min
 hour = 3600 * second = h
@@ -40,9 +41,23 @@ newton = kilogram * meter / second ** 2 = N
 standard_gravity = 9.80665 * meter / second ** 2 = g_0 = g0
 kilogram_force = kilogram * standard_gravity = kgf
 pound_force = pound * standard_gravity = lbf
+ounce_force = ounce * standard_gravity = ozf
 slug = pound_force * second ** 2 / foot
+newton_meter = newton * meter = Nm
+newton_centimeter = newton * meter / 100 = Ncm
+newton_millimeter = newton * meter / 1000 = Nmm
+joule = newton * meter = J
+watt = joule / second = W
+horsepower = 550 * foot * pound_force / second = hp
 """
 """pi to 60 digits, so that an angle given in degrees is rounded once."""
+JOINED = re.compile(r"(?<=[A-Za-z])[.-](?=[A-Za-z])")
+"""N.mm, lbf-in: a product."""
+SWAPS = (
+    {"lb": "lbf", "lbs": "lbf", "pound": "lbf", "oz": "ozf", "kg": "kgf", "Hz": "rev/s", "hz": "rev/s"},
+    {"lbf": "lb", "ozf": "oz", "kgf": "kg"},
+)
+"""Names that stand for each other in ordinary speech; here a pound is a mass, and the angle is a dimension."""
 
 NUMBER = re.compile(r"[+-]?(?:[0-9]{1,100}(?:\.[0-9]{0,100})?|\.[0-9]{1,100})(?:[eE][+-]?[0-9]{1,3})?(?![0-9.])")
 UNIT = re.compile(r"(?:[A-Za-zµμ°_]+(?:_?0(?![0-9]))?(?:(?:\^|\*\*)-?[1-9](?![0-9])|[²³])?|[·*/()]|\s)+")
@@ -51,7 +66,7 @@ LONGEST_UNIT = 60
 
 
 class UnitError(ValueError):
-    """A text that is not a quantity of the asked dimension; says why in one phrase."""
+    """A text that is not a quantity of another dimension than wanted; says why in one phrase."""
 
 
 def to_si(text: str, unit: str) -> float:
@@ -67,12 +82,15 @@ def to_si(text: str, unit: str) -> float:
     name = text[found.end() :].strip()
     if not name:
         raise UnitError("the unit is missing")
-    factor, dimension = _factor(name)
-    asked, asked_dimension = _factor(unit)
-    if dimension != asked_dimension:
-        raise UnitError(f'"{name}" does not convert to {unit}')
+    wanted, wanted_dimension = _factor(unit)
     try:
-        value = float(Fraction(found[0]) * factor / asked)
+        factor, dimension = _factor(name)
+    except UnitError as error:
+        raise UnitError(f"{error}{_hint(found[0], name, unit)}") from None
+    if dimension != wanted_dimension:
+        raise UnitError(f'"{name}" does not convert to {unit}{_hint(found[0], name, unit)}')
+    try:
+        value = float(Fraction(found[0]) * factor / wanted)
     except OverflowError:
         value = math.inf
     if not math.isfinite(value):
@@ -92,6 +110,30 @@ def factor_to(unit: str, given: str) -> float:
         raise InputError("unit", given, f"{error}; must convert to {unit}") from None
 
 
+def _hint(number: str, name: str, unit: str) -> str:
+    """What may have been meant by a unit that is unknown or of another dimension than `unit`."""
+    if len(name) > LONGEST_UNIT:
+        return ""
+    known = {word.casefold(): word for line in DEFINITIONS.split("\n") for word in re.split(r" = |-? = ", line) if word}
+
+    def nearest(word: str) -> str:
+        close = difflib.get_close_matches(word.casefold(), known, 1, 0.7)
+        return known[close[0]] if close else word
+
+    words = re.compile(r"[A-Za-zµμ°_]+")
+    swapped = [{word: swap.get(word, word) for word in words.findall(name)} for swap in SWAPS]
+    swapped.append({word: nearest(word) for word in words.findall(name)})
+    candidates = [words.sub(lambda match, by=by: by[match[0]], name) for by in swapped]  # type: ignore[misc]
+    candidates += [f"{name}/rad", f"rad {name.removeprefix('1')}"]
+    for candidate in candidates:
+        try:
+            if candidate != name and _factor(candidate)[1] == _factor(unit)[1]:
+                return f'; did you mean "{number} {candidate}"?'
+        except UnitError:
+            continue
+    return ""
+
+
 @cache
 def _registry() -> Any:
     import pint
@@ -106,6 +148,7 @@ def _registry() -> Any:
 @cache
 def _factor(name: str) -> tuple[Fraction, dict[str, Fraction]]:
     """What one of the unit is in base units, and its dimension."""
+    name = JOINED.sub(" ", name)
     if len(name) > LONGEST_UNIT or not UNIT.fullmatch(name):
         raise UnitError("the unit cannot be read")
     registry = _registry()

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fourbar.formulas.position import Loop, Number, Position, vector
+from fourbar.formulas.position import Loop, Number, Position, anywhere, select, vector
 
 FAST = 4.0
 """|d^2 - a^2|/e^2, of twice 1/2 - t: from there on the triangle's side turns fast against the bars."""
@@ -60,11 +60,11 @@ def coefficients(lengths: Loop, at: Position) -> Coefficients:
     qg = xg * per_e2
     m, rest = (grown + a * (a - d)) * per_e2 + qg, (grown + d * (d - a)) * per_e2 - qg
     w = (xg - 0.5 * y) * per_e2
-    if np.any(abs(y) > FAST * (d - a) * (d - a)):
+    if anywhere(abs(y) > FAST * (d - a) * (d - a)):
         fast = side_turns_fast(lengths, at)
         heron = E2 * (d + a) * (d + a) * outer + E1 * (b - c) * (b - c) * (2.0 * grown)
-        w = np.where(fast, -heron * per_root / (x * S + y * at.root), w)
-        m, rest = np.where(fast, 0.5 + w, m), np.where(fast, 0.5 - w, rest)
+        w = select(fast, -heron * per_root / (x * S + y * at.root), w)
+        m, rest = select(fast, 0.5 + w, m), select(fast, 0.5 - w, rest)
     dg = ((2.0 * ad * E2) * kk / inner - (2.0 * ad * E1) * ss / outer) * per_root
     dm = (x * dg - S * w) * per_e2
     return Coefficients(1.0, m - g, m + g, rest + g, 2.0 * g, 0.0, dm - dg, dm + dg)
@@ -105,10 +105,10 @@ def rates(k: Coefficients, speed: Number, acceleration: Number) -> Rates:
     """
     square = speed * speed
     alpha_2, alpha_3, alpha_4 = k.dh2 * square, k.dh3 * square, k.dh4 * square
-    if np.any(acceleration):
-        alpha_2, alpha_3, alpha_4 = (
-            alpha + h * acceleration for alpha, h in ((alpha_2, k.h2), (alpha_3, k.h3), (alpha_4, k.h4))
-        )
+    if anywhere(acceleration != 0.0):
+        alpha_2 = alpha_2 + k.h2 * acceleration
+        alpha_3 = alpha_3 + k.h3 * acceleration
+        alpha_4 = alpha_4 + k.h4 * acceleration
     return Rates(k.h2 * speed, k.h3 * speed, k.h4 * speed, alpha_2, alpha_3, alpha_4)
 
 

@@ -41,6 +41,8 @@ class Path(NamedTuple):
     """In the order of the reading: ground, the bar itself, coupler, the other one."""
     theta_1: Number
     """Direction of the ground in the order of the reading, rad."""
+    u1: Number
+    """e^{i theta_1}."""
     unit: Number = 1.0
     """Of the lengths, a power of two near the longest, m: no product of them leaves the range of doubles."""
     may_stay_parallel: bool = False
@@ -59,12 +61,14 @@ class Path(NamedTuple):
         half : of q.
         branch : sign of the root in that order: for bar 2 the branch, for bar 4 that of sin(theta_3 - theta_2).
         """
-        turned = self.theta_1 != 0.0
-        u1, u2 = polar(1.0, self.theta_1), direction(q) if np.all(turned) else vector(half.kk - half.ss, 2.0 * half.sk)
-        if np.ndim(turned):  # of linkages
+        turned, along = self.theta_1 != 0.0, anywhere(self.theta_1 == 0.0)
+        u2 = vector(half.kk - half.ss, 2.0 * half.sk) if along else direction(q)
+        if isinstance(turned, np.ndarray):  # of linkages
             u2 = np.where(turned, direction(q), u2)
-        at = close_loop(self.lengths, u1, u2, half, branch)
-        return parallel_position(at, *parallel_pairs(self.lengths, half, branch)) if self.may_stay_parallel else at
+        at = close_loop(self.lengths, self.u1, u2, half, branch)
+        if self.may_stay_parallel:
+            at = parallel_position(at, *parallel_pairs(self.lengths, half, branch))
+        return at._replace(diagonal=at.diagonal * self.unit)
 
     def angles(self, half: HalfAngle, branch: Number) -> tuple[Number, Number, Number]:
         """theta_3, theta_4 and the root alone, the arguments of what `close_loop` divides by lengths, in (-pi, pi].
@@ -101,7 +105,7 @@ def path(lengths: Loop, theta_1: Number, bar: int = 2) -> Path:
     if bar == 4:
         a, c, theta_1 = c, a, theta_1 + np.pi
     own = loop(d, a, b, c)
-    return Path(bar, own, theta_1, unit, anywhere((own.E1 == 0.0) & (own.E2 == 0.0)))
+    return Path(bar, own, theta_1, polar(1.0, theta_1), unit, anywhere((own.E1 == 0.0) & (own.E2 == 0.0)))
 
 
 def singular(at: Position, margin: float = NO_DIGIT_LEFT) -> Number:
@@ -145,8 +149,8 @@ def _turned_round(reading: Path, at: Position) -> Position:
     d, c, b, a, _, _ = reading.lengths
     u1, u2, u3, u4 = -at.u1, at.u4, -at.u3, at.u2
     diagonal = d * u1 - a * u2
-    sine, foot = cross(u3, u4), dot(diagonal, u3) / b
-    return Position(u1, u2, u3, u4, sine, diagonal, dot(diagonal, diagonal), foot, 2.0 * b * c * sine, at.half)
+    sine, e2 = cross(u3, u4), dot(diagonal, diagonal)
+    return Position(u1, u2, u3, u4, sine, diagonal * reading.unit, e2, 2.0 * b * c * sine, at.half)
 
 
 def read_backwards(k: Coefficients) -> Coefficients:

@@ -3,8 +3,8 @@
 F_ij is the force of bar i on bar j. The moments of the two bars that are not driven, about their outer
 pins, give the force between them; sums of forces give the rest:
     bar 2:  F12 + F32 + R2 = 0,            a u2 x F32 + M2 + T2 = 0   (about O2),
-    bar 3:  F43 - F32 + R3 = 0,            b u3 x F43 + M3 + T3 = 0   (about A),
-    bar 4:  F14 - F43 + R4 = 0,           -c u4 x F43 + M4 + T4 = 0   (about O4),
+    bar 3:  F43 - F32 + R3 = 0,            b u3 x F43 + M3 - C + T3 = 0   (about A),
+    bar 4:  F14 - F43 + R4 = 0,           -c u4 x F43 + M4 + C + T4 = 0   (about O4),
 with R, M the resultant and the moment of everything else on the bar: loads, effects and -m a_G, -I alpha.
 
 Source: Linares Mendoza, section 5.7 (the thirteen equations); R. L. Norton, Design of Machinery, ch. 11.
@@ -17,14 +17,11 @@ from fourbar.formulas.position import Loop, Number, Position, anywhere, vector
 
 
 class Body(NamedTuple):
-    """What inertia needs of a bar."""
+    """Mass, kg; moment of inertia about G, kg m^2; G from the first pin in the bar's frame, along + i across, m."""
 
     m: Number
-    """kg."""
     I: Number  # noqa: E741 - the literature's letter
-    """About the mass centre, kg m^2."""
     z: Number
-    """From the bar's first pin to G in the bar's frame, as a complex number, m."""
 
 
 Bodies = tuple[Body, Body, Body]
@@ -40,6 +37,13 @@ class Wrenches(NamedTuple):
     M2: Number = 0.0
     M3: Number = 0.0
     M4: Number = 0.0
+    C: Number = 0.0
+    """Couple at pin B on bar 4, its opposite on bar 3, in neither M3 nor M4: the small sum M3 + M4 keeps its digits."""
+
+    def on(self, bar: int) -> tuple[Number, Number]:
+        """The force and the moment on bar 2, 3 or 4."""
+        moment = self.M2 if bar == 2 else self.M3 - self.C if bar == 3 else self.M4 + self.C
+        return self[bar - 2], moment
 
 
 class PinForces(NamedTuple):
@@ -69,8 +73,8 @@ def about_first_pin(body: Body) -> Number:
 def inertia_wrenches(a: Number, bodies: Bodies, at: Position, moving: Rates) -> tuple[Wrenches, Number]:
     """d'Alembert: -m a_G on each bar, and -(I + m r^2) alpha - m r_G x a_pin about its first pin.
 
-    The force -m a_A of the coupler's mass at pin A is returned apart and is no part of R3: bar 2
-    carries it, with the moment -m a^2 alpha_2 about O2.
+    The force -m a_A of the coupler's mass at pin A is no part of R3; it is returned apart, in the frame of bar 2:
+    m_3 a (omega_2^2 - i alpha_2).
 
     Parameters
     ----------
@@ -79,16 +83,16 @@ def inertia_wrenches(a: Number, bodies: Bodies, at: Position, moving: Rates) -> 
     """
     two, three, four = bodies
     w2, w3, w4, alpha_2, alpha_3, alpha_4 = moving
-    G3, of_2 = three.z * at.u3, vector(w2 * w2, -alpha_2) * at.u2
-    at_A = (three.m * a) * of_2
+    of_2 = vector(w2 * w2, -alpha_2)
+    G3, mass_at_A = three.z * at.u3, (three.m * a) * of_2
     return Wrenches(
-        (two.m * two.z) * of_2,
+        (two.m * two.z) * of_2 * at.u2,
         three.m * vector(w3 * w3, -alpha_3) * G3,
         (four.m * four.z) * vector(w4 * w4, -alpha_4) * at.u4,
-        -(about_first_pin(two) + three.m * a * a) * alpha_2,
-        cross(G3, at_A) - about_first_pin(three) * alpha_3,
+        -about_first_pin(two) * alpha_2,
+        cross(G3, mass_at_A * at.u2) - about_first_pin(three) * alpha_3,
         -about_first_pin(four) * alpha_4,
-    ), at_A
+    ), mass_at_A
 
 
 def between(M_u: Number, M_v: Number, u: Number, v: Number, sine: Number) -> Number:
@@ -97,19 +101,19 @@ def between(M_u: Number, M_v: Number, u: Number, v: Number, sine: Number) -> Num
 
 
 def pin_forces(
-    lengths: Loop, at: Position, drive_bar: int, sine: Number, w: Wrenches, at_A: Number, moment_of_F32: Number
+    lengths: Loop, at: Position, drive_bar: int, sine: Number, w: Wrenches, mass_at_A: Number, moment_of_F32: Number
 ) -> PinForces:
     """The four pin forces; inf or NaN where the two bars that are not driven lie in one line.
 
-    With the drive on bar 2 the force at B along the coupler is written with f, the share of b at which the
-    perpendicular from O4 meets it, so that a couple between bars 3 and 4 keeps its digits:
-        F43 = ((M3 f - (M3 + M4))/(c sin(theta_4 - theta_3)) - i M3/b) u3,   f = (e^2 + b^2 - c^2)/(2 b^2).
+    With the drive on bar 2 the force at B is written with the diagonal D from A to O4, which closes the
+    triangle of bars 3 and 4, so that a couple between them keeps its digits:
+        F43 = ((M3 - C) D - (M3 + M4) b u3)/(b c sin(theta_4 - theta_3)).
 
     Parameters
     ----------
     drive_bar : 2, 3 or 4.
     sine : between the two bars that are not driven, of theta_4 - theta_3, theta_4 - theta_2, theta_3 - theta_2.
-    w, at_A : everything that acts, as from `inertia_wrenches`.
+    w, mass_at_A : everything that acts, as from `inertia_wrenches`.
     moment_of_F32 : a u2 x F32 (N m), which the virtual work of bars 3 and 4 knows; read for drive bar 2 alone.
 
     >>> from math import pi
@@ -119,25 +123,28 @@ def pin_forces(
     >>> s, deg = state(uniform(19, 5, 15, 10), pi / 3, 1, 25.0, -40.0), pi / 180
     >>> G3, P = polar(9, 45 * deg), polar(80, 330 * deg)  # a force on the coupler
     >>> bars = Body(0.004, 0.4, polar(3, 30 * deg)), Body(0.020, 1.5, G3), Body(0.015, 0.8, 5 + 0j)
-    >>> w, at_A = inertia_wrenches(5, bars, s.at, s.moving)
+    >>> w, mass_at_A = inertia_wrenches(5, bars, s.at, s.moving)
     >>> moment = cross((G3 + polar(3, 100 * deg)) * s.at.u3, P)
     >>> w = w._replace(R3=w.R3 + P, M3=w.M3 + moment, M4=w.M4 + 120)  # and a couple on the output
-    >>> f"{pin_forces(s.lengths, s.at, 2, s.at.sin_mu, w, at_A, 0.0).F12:.2f}"
+    >>> f"{pin_forces(s.lengths, s.at, 2, s.at.sin_mu, w, mass_at_A, 0.0).F12:.2f}"
     '-117.65-107.84j'
     """
     d, a, b, c, _, _ = lengths
-    R2, R3, R4, M2, M3, M4 = w
+    R2, R3, R4, M2, M3, M4, _ = w
+    of_3, of_4 = w.on(3)[1], w.on(4)[1]
+    along, across = mass_at_A.real, mass_at_A.imag  # bar 2: apart, for each would cancel in a sum that it is no part of
     if drive_bar == 4:
-        F32 = between(-M2 / a, cross(at.u3, R3) - M3 / b, at.u2, at.u3, sine) + at_A
-        # not F32 - R3: what the mass near A carries to O2 would cancel again
-        F43 = between(-M3 / b, -M2 / a - cross(at.u2, R3), at.u3, at.u2, -sine)
+        F32 = between(-M2 / a, cross(at.u3, R3) - of_3 / b + across * dot(at.u3, at.u2), at.u2, at.u3, sine)
+        F32 = F32 + along * at.u2
+        F43 = between(-of_3 / b, -M2 / a - cross(at.u2, R3) - across, at.u3, at.u2, -sine)
     elif drive_bar == 3:
-        F43 = between(-M2 / a - cross(at.u2, R3), M4 / c, at.u2, at.u4, sine)
-        F32 = between(-M2 / a, M4 / c + cross(at.u4, R3), at.u2, at.u4, sine)
-        F32 = (dot(at.u2, F32) - 1j * (M2 / a)) * at.u2 + at_A  # across bar 2 its own moment knows it best
+        F43 = between(-M2 / a - cross(at.u2, R3) - across, of_4 / c, at.u2, at.u4, sine)
+        F32 = between(-M2 / a - across, of_4 / c + cross(at.u4, R3), at.u2, at.u4, sine)
+        F32 = (dot(at.u2, F32) + along - 1j * (M2 / a)) * at.u2  # across bar 2 its own moment knows it best
     else:
-        F43 = vector((M3 * at.foot - (M3 + M4)) / (c * sine), M3 * (-1.0 / b)) * at.u3
-        F32 = R3 + F43 + at_A
+        k = 1.0 / (c * sine)
+        F43 = (of_3 * k / b) * at.diagonal - ((M3 + M4) * k) * at.u3
+        F32 = R3 + F43 + mass_at_A * at.u2
         short = d < a
         if anywhere(short):  # all bars turn as one, and the sum loses the small component across bar 2
             F32 = F32 + short * (moment_of_F32 / a - cross(at.u2, F32)) * 1j * at.u2

@@ -12,15 +12,15 @@ exactly and nothing cancels near it; nothing passes through zero at theta = 180 
 Source: R. L. Norton, Design of Machinery, ch. 4 (the loop and its two branches).
 """
 
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
 
 Number = Any
-"""A float, or an array that broadcasts with the others over positions and linkages."""
+"""A float, or an array that broadcasts over positions and linkages."""
 HAIR = 1e-100
-"""Added to the size of tan h, where zero alone feels it: with A on O4 bars 3, 4 get the directions to which they tend
-from theta_2 > theta_1, and so near to it that e^2 leaves the range of doubles those of their own side."""
+"""Added to the size of tan h: with A on O4 bars 3, 4 get the directions to which they tend from theta_2 > theta_1."""
 
 
 class Loop(NamedTuple):
@@ -47,22 +47,16 @@ class HalfAngle(NamedTuple):
 class Position(NamedTuple):
     """Directions of the bars as complex numbers, and the triangle A, B, O4."""
 
-    u1: Number
-    """e^{i theta_1}, from O2 to O4."""
-    u2: Number
-    """From O2 to A."""
-    u3: Number
-    """From A to B."""
-    u4: Number
-    """From O4 to B."""
+    u1: Number  # e^{i theta_1}, from O2 to O4
+    u2: Number  # from O2 to A
+    u3: Number  # from A to B
+    u4: Number  # from O4 to B
     sin_mu: Number
     """sin(theta_4 - theta_3), signed like the branch."""
     diagonal: Number
-    """From A to O4, complex, in the unit of the lengths that the loop was closed with."""
+    """From A to O4, complex, m."""
     e2: Number
-    """Its square e^2."""
-    foot: Number
-    """Of the perpendicular from O4 on the coupler: its distance from A over b."""
+    """Its square e^2, like the root in the unit of the lengths that the loop was closed with."""
     root: Number
     """sigma sqrt(outer inner); NaN where the loop does not close."""
     half: HalfAngle
@@ -71,6 +65,11 @@ class Position(NamedTuple):
 def anywhere(mask: Number) -> bool:
     """Whether a mask holds at any entry; `np.any` costs a plain number fifty times as much."""
     return bool(mask.any()) if isinstance(mask, np.ndarray) else bool(mask)
+
+
+def select(mask: Number, x: Number, y: Number) -> Number:
+    """x where a mask holds, y elsewhere; for a plain one the number itself."""
+    return np.where(mask, x, y) if isinstance(mask, np.ndarray) else (x if mask else y)
 
 
 def two_sum(x: Number, y: Number) -> tuple[Number, Number]:
@@ -106,7 +105,8 @@ def loop(d: Number, a: Number, b: Number, c: Number) -> Loop:
 def vector(x: Number, y: Number) -> Number:
     """x + i y, each part written once: over arrays the sum takes three times as long."""
     if not isinstance(x, np.ndarray) and not isinstance(y, np.ndarray):
-        return np.complex128(complex(x, y))
+        plain = complex(x, y)
+        return plain if type(x) is type(y) is float else np.complex128(plain)
     z = np.empty(np.broadcast(x, y).shape, dtype=complex)
     z.real, z.imag = x, y
     return z[()]
@@ -115,6 +115,8 @@ def vector(x: Number, y: Number) -> Number:
 def direction(theta: Number) -> Number:
     """e^{i theta} from one tangent: ((1 - t^2) + 2 i t)/(1 + t^2), t = tan(theta/2)."""
     t = np.tan(0.5 * theta)
+    if type(theta) is float:
+        t = t.item()
     kk = 1.0 / (1.0 + t * t)
     return vector((1.0 - t * t) * kk, 2.0 * t * kk)
 
@@ -124,12 +126,17 @@ def polar(r: Number, phi: Number) -> Number:
     return r * np.cos(phi) + 1j * (r * np.sin(phi))
 
 
+def square_root(x: Number) -> Number:
+    """sqrt(x), NaN where x < 0, of Python's own floats as such."""
+    return math.sqrt(x) if type(x) is float and x >= 0.0 else np.sqrt(x)
+
+
 def half_angle(lengths: Loop, psi: Number) -> HalfAngle:
     """The half angle h of psi = theta_2 - theta_1 (rad) by its tangent, and the factors of Heron's formula."""
     t = np.tan(0.5 * psi)
     meets = lengths.E2 == 0.0
     if anywhere(meets):
-        t = np.where(meets, t + np.copysign(HAIR, t), t)
+        t = select(meets, t + np.copysign(HAIR, t), t)
     kk = 1.0 / (1.0 + t * t)
     sk = t * kk
     ss = t * sk
@@ -138,8 +145,8 @@ def half_angle(lengths: Loop, psi: Number) -> HalfAngle:
     short = four_ad > four_bc
     if anywhere(short):  # outer + inner = 4 b c: of the two, the one that changes less over psi has the digits
         outer, inner = (
-            np.where(short & (ss < kk), four_bc - inner, outer),
-            np.where(short & (kk <= ss), four_bc - outer, inner),
+            select(short & (ss < kk), four_bc - inner, outer),
+            select(short & (kk <= ss), four_bc - outer, inner),
         )
     return HalfAngle(ss, kk, sk, outer, inner)
 
@@ -164,14 +171,14 @@ def close_loop(lengths: Loop, u1: Number, u2: Number, half: HalfAngle, branch: N
     """
     d, a, b, c, _, _ = lengths
     e2 = half.inner + (b - c) * (b - c)
-    root = branch * np.sqrt(half.outer * half.inner)
+    root = branch * square_root(half.outer * half.inner)
     diagonal = vector((d - a) + 2.0 * a * half.ss, -2.0 * a * half.sk) * u1
     # e^2 + b^2 - c^2 and b^2 - e^2 - c^2 from the factor that the root is made of, so that u3, u4 keep their length
     at_A, at_O4 = half.inner + 2.0 * b * (b - c), 2.0 * c * (b - c) - half.inner
     to_3, to_4 = 0.5 / (b * e2), 0.5 / (c * e2)
     u3 = diagonal * vector(at_A * to_3, root * to_3)
     u4 = diagonal * vector(at_O4 * to_4, root * to_4)
-    return Position(u1, u2, u3, u4, root * (0.5 / (b * c)), diagonal, e2, at_A * (0.5 / (b * b)), root, half)
+    return Position(u1, u2, u3, u4, root * (0.5 / (b * c)), diagonal, e2, root, half)
 
 
 def parallel_pairs(lengths: Loop, half: HalfAngle, branch: Number) -> tuple[Number, Number]:

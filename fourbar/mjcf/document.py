@@ -129,7 +129,17 @@ def _released(scene: Scene, settings: Settings) -> Settings:
 
 def _pad(scene: Scene) -> float:
     _, a, b, c = scene.linkage.lengths
-    return fitted_pad(_quickness(scene) * a / max(b, c), load_ratio(scene))
+    return fitted_pad(_quickness(scene) * a / max(b, c), load_ratio(scene), mass_ratio(scene.linkage))
+
+
+def mass_ratio(linkage: FourBar) -> float:
+    """Of coupler and output, the heavier by the lighter: (I + m r^2)/L^2 about the first pin, as the closure feels it.
+
+    1 where one of them has no mass.
+    """
+    felt = [(bar.moment_of_inertia + bar.mass * bar.mass_centre[0] ** 2) / bar.length**2
+            for bar in (linkage.coupler, linkage.output)]  # fmt: skip
+    return max(felt) / min(felt) if min(felt) > 0.0 else 1.0
 
 
 def _quickness(scene: Scene) -> float:

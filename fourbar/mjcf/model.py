@@ -44,17 +44,26 @@ def servo(gain: float, omega: float) -> tuple[float, float, float]:
     return (gain * omega, 0.0, -gain)
 
 
+A_MILLIONTH = 1e-6
+"""Of the heaviest bar's mass: simulations hold down to 1e-11 of it, and forces move by about this part."""
+ALONE = 1e-3
+"""kg, where no bar has a mass."""
+
+
 def carriable(linkage: FourBar) -> None:
-    """An InputError where a bar is lighter than MuJoCo carries."""
+    """An InputError where a bar is lighter than MuJoCo carries; it says which mass does instead."""
+    heaviest = max(linkage.bar(number).mass for number in MOVING_BARS)
+    enough = max(A_MILLIONTH * heaviest, 2.0 * FLOOR) if heaviest else ALONE
+    part = "a millionth of the heaviest bar's" if heaviest else "which all bars can have where loads alone act"
     for number in MOVING_BARS:
         bar = linkage.bar(number)
-        for key, value, unit in (("mass", bar.mass, "kg"), ("inertia", bar.moment_of_inertia, "kg m^2")):
-            if value is None or value < FLOOR:
-                raise InputError(
-                    f"bars.{BAR_NAMES[number]}.{key}",
-                    value,
-                    f"MuJoCo cannot carry a massless bar: must be at least {FLOOR:g} {unit}",
+        for key, value in (("mass", bar.mass), ("inertia", bar.moment_of_inertia)):
+            if value < FLOOR:
+                instead = f'mass = "{enough:.2g} kg" ({part}) and no inertia stated'
+                allowed = (
+                    f"MuJoCo cannot carry a massless bar; with {instead} the simulation holds, and hardly a force moves"
                 )
+                raise InputError(f"bars.{BAR_NAMES[number]}.{key}", value, allowed)
 
 
 class Model:

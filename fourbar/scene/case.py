@@ -10,7 +10,7 @@ from fourbar.effects.actions import Actions, bodies
 from fourbar.formulas.motion import Coefficients, State, rates
 from fourbar.formulas.path import Path, path
 from fourbar.formulas.pin_forces import Bodies, PinForces, Wrenches, inertia_wrenches, pin_forces
-from fourbar.formulas.position import HalfAngle, Loop, Position, anywhere, parallel_pairs, polar
+from fourbar.formulas.position import HalfAngle, Loop, Position, anywhere, parallel_pairs, polar, vector
 from fourbar.formulas.torque import driving_torque, half_slope, inertia
 from fourbar.formulas.transmission import drive_sine, drive_sine_of_triangle
 from fourbar.linkage import FourBar
@@ -108,7 +108,7 @@ class Case(NamedTuple):
         actions = Actions(state, self.bodies, side, rounded)
         for term in self.terms:
             term.act(actions, state)
-        own, at_A = inertia_wrenches(a, self.bodies, at, state.moving)
+        own, mass_at_A = inertia_wrenches(a, self.bodies, at, state.moving)
         # J q'' + J'/2 q'^2 of all bars, and of bars 3 and 4
         inertial = others = half_slope(a, self.bodies, at, k) * (state.speed * state.speed)
         if anywhere(acceleration != 0.0):
@@ -116,19 +116,19 @@ class Case(NamedTuple):
             others = others + of_others * acceleration
             inertial = others + of_input * acceleration
         if rounded is not None:
-            own, at_A = Wrenches(*map(rounded, own)), rounded(at_A)
+            own, mass_at_A = Wrenches(*map(rounded, own)), vector(rounded(mass_at_A.real), rounded(mass_at_A.imag))
             inertial, others = rounded(inertial), rounded(others)
 
         sine, short = self.drive_sine(at), np.any(self.lengths.d < self.lengths.a)
         if rounded is not None:
             sine = rounded(sine)
 
-        def solved(acting: Actions, own: Wrenches, at_A: Any, others: Any) -> PinForces:
+        def solved(acting: Actions, own: Wrenches, mass_at_A: Any, others: Any) -> PinForces:
             w, moment = acting.wrenches(own), acting.work()[1] - others if short else 0.0
-            return pin_forces(self.lengths, at, self.drive_bar, sine, w, at_A, moment)
+            return pin_forces(self.lengths, at, self.drive_bar, sine, w, mass_at_A, moment)
 
         def eliminate(acting: Actions) -> PinForces:
-            return solved(acting, own, at_A, others)
+            return solved(acting, own, mass_at_A, others)
 
         def by_couples(acting: Actions) -> PinForces:
             return solved(acting, Wrenches(), 0.0j, 0.0)

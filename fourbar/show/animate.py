@@ -20,14 +20,16 @@ from typing import Any
 import numpy as np
 
 from fourbar.errors import InputError, NotAssembledError
+from fourbar.files import dump
 from fourbar.files.pictures import data_uri
 from fourbar.linkage import BAR_NAMES, MOVING_BARS
 from fourbar.quantities import OK, PIN_FORCES
 from fourbar.scene import Command, Scene, command
+from fourbar.show.acting import Symbol, acting
 from fourbar.show.plot.energy import energies
 from fourbar.show.plot.style import length_unit, plain
 from fourbar.show.plot.view import on_branch, over_time, sweep_command
-from fourbar.solution import Array, Solution
+from fourbar.solution import SI, Array, Conversion, Solution
 from fourbar.solve import solve
 from fourbar.writing import write_text
 
@@ -48,7 +50,7 @@ SCALARS = (
     "alpha_4",
     "torque",
 )
-SCRIPTS = ("linkage.js", "numbers.js", "picture.js", "chart.js", "page.js")
+SCRIPTS = ("linkage.js", "numbers.js", "picture.js", "acting.js", "chart.js", "page.js")
 
 
 def write(
@@ -58,6 +60,7 @@ def write(
     pictures: Mapping[str, str | Path] | None = None,
     file_format: str | None = None,
     seconds: float | None = None,
+    units: Conversion = SI,
 ) -> None:
     """Write a moving scene to a file, whole or not at all.
 
@@ -68,6 +71,7 @@ def write(
         that is laid along the bar, its left edge at the bar's first pin (O2, A, O4) and its right
         edge at the second. Pages only.
     file_format : html, gif or mp4 where the path's ending does not say it.
+    units : in which numbers are shown; left out: SI. Angles are in degrees.
     seconds : duration of a film; left out: 6 s for a sweep, of a motion through time its own.
 
     Raises
@@ -81,16 +85,16 @@ def write(
     if kind not in FORMATS:
         raise InputError("output", str(path), "must end in one of " + ", ".join(f".{end}" for end in FORMATS))
     if kind == "html":
-        write_text(target, page(scene, pictures or {}))
+        write_text(target, page(scene, pictures or {}, units))
         return
     if pictures:
         raise InputError("picture", sorted(pictures), "pictures are shown in an .html page only")
     from fourbar.show.plot.film import write_film
 
-    write_film(scene, target, kind, seconds)
+    write_film(scene, target, kind, seconds, units)
 
 
-def page(scene: Scene, pictures: Mapping[str, str | Path] | None = None) -> str:
+def page(scene: Scene, pictures: Mapping[str, str | Path] | None = None, units: Conversion = SI) -> str:
     """The page as text."""
     from fourbar import __version__
 
@@ -105,7 +109,7 @@ def page(scene: Scene, pictures: Mapping[str, str | Path] | None = None) -> str:
         style_hash=_content_hash(style),
         script=script,
         script_hash=_content_hash(script),
-        data=embedded(page_data(scene, pictures or {})),
+        data=embedded(page_data(scene, pictures or {}, units)),
     )
 
 
@@ -120,7 +124,7 @@ def embedded(value: object) -> str:
     return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
 
 
-def page_data(scene: Scene, pictures: Mapping[str, str | Path]) -> dict[str, Any]:
+def page_data(scene: Scene, pictures: Mapping[str, str | Path], units: Conversion = SI) -> dict[str, Any]:
     """Everything the page's script needs: SI units, radians, null where there is no value."""
     linkage, motion = scene.linkage, scene.motion
     shown = _through_time(scene) if over_time(scene) else _sweep(scene)
@@ -128,28 +132,54 @@ def page_data(scene: Scene, pictures: Mapping[str, str | Path]) -> dict[str, Any
     if not any(closes):
         raise NotAssembledError("nothing to show: the linkage assembles at none of the scene's positions")
     shown["start"] = closes.index(True) if shown["start"] is None else shown["start"]
-    factor, unit = length_unit(max(linkage.lengths))
+    factor, unit = length_unit(max(linkage.lengths), units)
     return {
         "lengths": list(linkage.lengths),
         "theta_1": linkage.ground_angle,
         "unit": {"factor": factor, "name": unit},
+        "units": {unit: list(entry) for unit, entry in units.items()},
         "centres": {
             str(number): [(z := linkage.bar(number).to_centre).real, z.imag] if linkage.bar(number).mass > 0.0 else None
             for number in MOVING_BARS
         },
         "drive_bar": scene.drive_bar,
         "branch": motion.branch,
+        "points": [
+            {"name": p.name, "bar": p.bar, "at": [p.from_pin[0] * f(p.from_pin[1]) for f in (math.cos, math.sin)]}
+            for p in scene.points
+        ],
+        "acting": [_symbol(symbol, shown["theta_2"]) for symbol in acting(scene)],
+        "toml": _scene_file(scene),
         "followed": motion.through == "follow",
         "pictures": {str(number): picture for number, picture in _pictures(scene, pictures).items()},
         **shown,
     }
 
 
+def _symbol(symbol: Symbol, theta_2: list[float]) -> dict[str, Any]:
+    """One thing that acts, as the page's script draws it."""
+    entry: dict[str, Any] = symbol._asdict()
+    for name in ("at", "beyond", "vector"):
+        entry[name] = [entry[name].real, entry[name].imag]
+    entry["end"] = None if symbol.end is None else [symbol.end[0], [symbol.end[1].real, symbol.end[1].imag]]
+    table = entry.pop("table")
+    entry["factor"] = None if table is None else np.asarray(table.at(theta_2)).tolist()
+    return entry
+
+
+def _scene_file(scene: Scene) -> str | None:
+    """The scene as its file, to be downloaded; None where a file has no form of what acts."""
+    try:
+        return dump(scene)
+    except InputError:
+        return None
+
+
 def _sweep(scene: Scene) -> dict[str, Any]:
     """Both branches over theta_2."""
     motion = scene.motion
-    asked = sweep_command(scene)
-    where = thinned(asked)
+    swept = sweep_command(scene)
+    where = thinned(swept)
     own, start = command(scene).theta_2, None
     if len(own) == 1:
         start = int(np.argmin(np.abs(np.angle(np.exp(1j * (where.theta_2 - own[0]))))))
@@ -161,15 +191,16 @@ def _sweep(scene: Scene) -> dict[str, Any]:
         "rate": None,
         "start": start,
         "branches": {str(sign): _columns(on_branch(scene, sign), where.theta_2) for sign in (1, -1)},
-        "pace": _pace(motion.omega_2, where.theta_2, len(asked.theta_2)),
+        "pace": None,
+        "positions": len(swept.theta_2),
     }
 
 
 def _through_time(scene: Scene) -> dict[str, Any]:
     """The one motion that the scene makes: released, or by a law."""
-    asked = solve(scene)
-    assert asked.time is not None and asked.omega_2 is not None and asked.alpha_2 is not None
-    where = thinned(Command(asked.theta_2, asked.branch, asked.omega_2, asked.alpha_2, time=asked.time))
+    whole = solve(scene)
+    assert whole.time is not None and whole.omega_2 is not None and whole.alpha_2 is not None
+    where = thinned(Command(whole.theta_2, whole.branch, whole.omega_2, whole.alpha_2, time=whole.time))
     assert where.time is not None
     solution = solve(scene, at=where)
     solution.time = where.time
@@ -188,7 +219,8 @@ def _through_time(scene: Scene) -> dict[str, Any]:
         "rate": rate,
         "start": None,
         "branches": {str(scene.motion.branch): columns},
-        "pace": _pace_in_time(scene, asked, rate, len(where.time)),
+        "pace": _pace_in_time(scene, whole, rate, len(where.time)),
+        "positions": len(whole),
     }
 
 
@@ -202,17 +234,6 @@ def thinned(where: Command) -> Command:
     return where._replace(**rows)
 
 
-def _pace(omega_2: float | None, theta_2: Array, asked: int) -> str:
-    """What speed 1 means, and whether positions were left out."""
-    words = "At speed 1× one sweep takes 6 s"
-    if omega_2:
-        real = abs(float(theta_2[-1] - theta_2[0]) / omega_2)
-        words += f"; at ω₂ = {omega_2:.4g} rad/s the mechanism takes {real:.3g} s"
-    if asked > len(theta_2):
-        words += f". Shown are {len(theta_2)} of the {asked} positions"
-    return words + "."
-
-
 def _rate(duration: float) -> float:
     """Seconds of a motion shown in one second: 1, or the power of ten that makes it last neither too short nor long."""
     if duration <= 0.0:
@@ -223,19 +244,19 @@ def _rate(duration: float) -> float:
     return float(10.0 ** math.ceil(math.log10(duration / longest))) if duration > longest else 1.0
 
 
-def _pace_in_time(scene: Scene, asked: Solution, rate: float, shown: int) -> str:
+def _pace_in_time(scene: Scene, whole: Solution, rate: float, shown: int) -> str:
     """What speed 1 means, where the motion ends before its time, and whether instants were left out."""
-    assert asked.time is not None
+    assert whole.time is not None
     words = "At speed 1× it moves in real time"
     if rate < 1.0:
         words = f"At speed 1× it moves {1.0 / rate:.0f} times slower than it really does"
     elif rate > 1.0:
         words = f"At speed 1× it moves {rate:.0f} times faster than it really does"
     free = scene.motion.free
-    if free is not None and len(asked) <= free.steps:
-        words += f". It ends at {asked.time[-1]:.4g} s, where the linkage stops at a limit position"
-    if len(asked) > shown:
-        words += f". Shown are {shown} of the {len(asked)} instants"
+    if free is not None and len(whole) <= free.steps:
+        words += f". It ends at {whole.time[-1]:.4g} s, where the linkage stops at a limit position"
+    if len(whole) > shown:
+        words += f". Shown are {shown} of the {len(whole)} instants"
     return words + "."
 
 
@@ -254,6 +275,12 @@ def _solved(solution: Solution) -> dict[str, Any]:
         values = getattr(solution, name)
         if values is not None:
             columns[name] = [_or_null(value) for value in values.tolist()]
+    points = {**{name: getattr(solution, name) for name in ("v_A", "v_B", "a_A", "a_B")}}
+    points |= {f"v_{name}": values for name, values in solution.velocity.items()}
+    points |= {f"a_{name}": values for name, values in solution.acceleration.items()}
+    for name, values in points.items():
+        if values is not None:
+            columns[name] = [_or_null(size) for size in np.hypot(*values.T).tolist()]
     for name in PIN_FORCES:
         values = getattr(solution, name)
         if values is not None:

@@ -51,14 +51,19 @@ def drive_power(solution: Solution) -> Array:
     return np.asarray(_evaluated(solution, "torque") * _evaluated(solution, f"omega_{solution.drive_bar}"))
 
 
+def once_round(solution: Solution) -> slice:
+    """All positions, but of a sweep over whole turns not the last one, which repeats the first."""
+    turns = abs(solution.theta_2[-1] - solution.theta_2[0]) / (2.0 * np.pi)
+    closed = len(solution) > 1 and turns > 0.5 and np.isclose(turns, round(turns), rtol=1e-12, atol=0.0)
+    return slice(None, -1 if closed else None)
+
+
 def bearing_load(solution: Solution, pin: str) -> BearingLoad:
     """Largest and root mean square load of pin "O2", "A", "B" or "O4", and where; NaN positions are left out."""
     if pin not in PIN_FORCE:
         raise InputError("pin", pin, "the pins are " + ", ".join(PIN_FORCE))
-    load = np.hypot(*_evaluated(solution, PIN_FORCE[pin]).T)
-    theta_2 = solution.theta_2
-    if len(load) > 1 and np.isclose(abs(theta_2[-1] - theta_2[0]), 2.0 * np.pi, rtol=1e-12, atol=0.0):
-        load, theta_2 = load[:-1], theta_2[:-1]
+    one = once_round(solution)
+    load, theta_2 = np.hypot(*_evaluated(solution, PIN_FORCE[pin]).T)[one], solution.theta_2[one]
     known = np.isfinite(load)
     if not known.any():
         return BearingLoad(float("nan"), float("nan"), float("nan"))

@@ -12,6 +12,7 @@ from fourbar.solution import Array, Solution
 INK, SOFT, PAPER = "currentColor", "#6e7781", "#fefefe"
 WIDTH, HEIGHT, MARGIN = 300.0, 270.0, 30.0
 BARS = {2: "#0072b2", 3: "#c74f00", 4: "#00845f"}
+POINT = "#8a3b78"
 MOST_POINTS = 120
 """Points of a path: finer than can be seen at this size."""
 
@@ -28,6 +29,7 @@ def drawing(scene: Scene, solution: Solution) -> str:
     d, theta_1 = scene.linkage.ground, scene.linkage.ground_angle
     O2, O4 = np.zeros(2), d * np.array([math.cos(theta_1), math.sin(theta_1)])
     paths = [(solution.A, BARS[2]), (solution.B, BARS[4]), (solution.G3, BARS[3])]
+    paths += [(path, POINT) for path in solution.points.values()]
     shown = np.concatenate([np.array([O2, O4]), *(path[good] for path, _ in paths)])
     low, high = shown.min(axis=0), shown.max(axis=0)
     scale = float(np.min((np.array([WIDTH, HEIGHT]) - 2.0 * MARGIN) / np.maximum(high - low, 1e-300)))

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 from fourbar.errors import FourBarError
 from fourbar.linkage import BAR_NAMES, MOVING_BARS
-from fourbar.solution import Solution
+from fourbar.solution import DEGREES, SI, Conversion, Solution
 
 if TYPE_CHECKING:
     from fourbar.scene import Scene
@@ -14,8 +14,8 @@ SHOWN = 5
 """Positions shown at either end of a long sweep."""
 
 
-def scene_html(scene: "Scene") -> str:
-    """The linkage drawn, beside what the scene states."""
+def scene_html(scene: "Scene", units: Conversion = SI) -> str:
+    """The linkage drawn, next to what the scene states."""
     from fourbar.show.drawing import drawing
     from fourbar.solve import solve
 
@@ -25,7 +25,7 @@ def scene_html(scene: "Scene") -> str:
         picture = f"<p>{escape(str(error))}</p>"
     rows = "".join(
         f'<tr><th style="text-align:left">{escape(name)}</th><td style="text-align:left">{escape(text)}</td></tr>'
-        for name, text in _facts(scene)
+        for name, text in _facts(scene, units)
     )
     return (
         f"<div><b>{escape(scene.title or 'Four-bar linkage')}</b>"
@@ -34,18 +34,20 @@ def scene_html(scene: "Scene") -> str:
     )
 
 
-def _facts(scene: "Scene") -> list[tuple[str, str]]:
+def _facts(scene: "Scene", units: Conversion) -> list[tuple[str, str]]:
     from fourbar.formulas.linkage_type import classify
+    from fourbar.show.tables import value
 
     motion = scene.motion
     facts = [("type", classify(scene.linkage).name)]
     facts += [
-        (name, f"{scene.linkage.lengths[number - 1]:.6g} m{_mass(scene, number)}") for number, name in BAR_NAMES.items()
+        (name, f"{value(scene.linkage.lengths[number - 1], 'm', units)}{_mass(scene, number, units)}")
+        for number, name in BAR_NAMES.items()
     ]
     speed = (
         "positions only"
         if motion.omega_2 is None
-        else f"ω2 = {motion.omega_2:.6g} rad/s, α2 = {motion.alpha_2:.6g} rad/s²"
+        else f"ω2 = {value(motion.omega_2, 'rad/s', units)}, α2 = {value(motion.alpha_2, 'rad/s^2', units)}"
     )
     facts.append(("motion", f"{speed}; {'open' if motion.branch > 0 else 'crossed'} branch"))
     facts.append(
@@ -61,20 +63,22 @@ def _facts(scene: "Scene") -> list[tuple[str, str]]:
     return facts
 
 
-def _mass(scene: "Scene", number: int) -> str:
+def _mass(scene: "Scene", number: int, units: Conversion) -> str:
     if number not in MOVING_BARS or scene.linkage.bar(number).mass == 0.0:
         return ""
-    return f", {scene.linkage.bar(number).mass:.6g} kg"
+    from fourbar.show.tables import value
+
+    return f", {value(scene.linkage.bar(number).mass, 'kg', units)}"
 
 
-def solution_html(solution: Solution) -> str:
-    """The first and last positions as a table; angles in degrees."""
+def solution_html(solution: Solution, units: Conversion = DEGREES) -> str:
+    """The first and last positions as a table; angles in degrees by default."""
     from fourbar.show.tables import columns
 
     if solution.theta_2.ndim == 2:
         members, count = solution.theta_2.shape
         return f"<div><b>{escape(solution.title or 'Study')}</b>: {members} linkages, {count} positions each</div>"
-    cells = columns(solution)
+    cells = columns(solution, units)
     if (solution.status_code != 0).any():
         cells = {"status": [status.replace("_", " ") for status in solution.status], **cells}
     count = len(solution)
@@ -91,3 +95,25 @@ def solution_html(solution: Solution) -> str:
     positions = f"{count} position{'s' if count != 1 else ''}"
     table = f"<table><thead><tr>{head}</tr></thead><tbody>{''.join(lines)}</tbody></table>"
     return f"<div><b>{title}</b>: {positions}{table}</div>"
+
+
+class InUnits:
+    """A scene or a solution that a notebook shows in other units."""
+
+    def __init__(self, shown: "Scene | Solution", units: str) -> None:
+        from fourbar.show.units import units as units_of
+
+        self.shown, self.units = shown, units_of(units)
+
+    def _repr_html_(self) -> str:
+        if isinstance(self.shown, Solution):
+            return solution_html(self.shown, {**DEGREES, **self.units})
+        return scene_html(self.shown, self.units)
+
+
+def in_units(shown: "Scene | Solution", units: str) -> InUnits:
+    """A scene or a solution as a notebook shows it, in "imperial" or a list of units like "mm N.mm".
+
+    Raises InputError for what is no such list.
+    """
+    return InUnits(shown, units)

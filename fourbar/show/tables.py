@@ -1,5 +1,6 @@
 """What `fourbar analyze` prints: JSON, CSV, or a table for the reader; the quantities are those of `Solution`."""
 
+import io
 import math
 from typing import TYPE_CHECKING
 
@@ -10,7 +11,8 @@ from fourbar.quantities import ANGLES, PIN_FORCES, STATUS_NAMES, UNITS
 from fourbar.scene import Scene
 from fourbar.scene.motion import BRANCH_NAMES
 from fourbar.show.bearing import bearing_load
-from fourbar.solution import Array, Solution
+from fourbar.show.motor import motor_duty
+from fourbar.solution import DEGREES, Array, Conversion, Solution, unit_in
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -21,15 +23,70 @@ GAP = 2
 """Blanks between two columns of the table, the divider among them."""
 
 
-def heading(scene: Scene, solution: Solution) -> list[str]:
-    """The lines above the table: what was asked, and how many of the positions have an answer."""
-    d, a, b, c = scene.linkage.lengths
+MOST_ROWS = 40
+"""Rows of the table on a terminal where --every does not state them: they and the summary can be read at a glance."""
+STEPS = (1, 2, 5, 10, 15, 20, 30, 45, 60, 90)
+"""A terminal is shown every so many positions, of a longer sweep a multiple of the last."""
+
+
+def printed(
+    scene: Scene, solution: Solution, width: int | None, units: Conversion = DEGREES, *, every: int | None = None
+) -> str:
+    """The summary and the table as text.
+
+    Parameters
+    ----------
+    width : columns of a terminal, where the summary stands last and the positions are thinned out; None: a file or
+        a pipe, which gets the summary first and every position.
+    every : show every so many positions; left out: as `width` says.
+    """
+    from rich.console import Console
+    from rich.text import Text
+
+    from fourbar.errors import printable
+
+    step = every or (1 if width is None else _step(len(solution)))
+    shown, left_out = table(solution, width, units, every=step)
+    text = io.StringIO()
+    console = Console(file=text, width=width or 10_000, color_system=None)
+    title = [printable(scene.title)] if scene.title else []
+    summary = [*title, *heading(scene, solution, units)]
+    notes = []
+    if step > 1:
+        more = "; --all shows each" if every is None else ""
+        notes.append(f"shown: every {step}{_ordinal(step)} of the {len(solution)} positions{more}")
+    if left_out:
+        notes.append(f"not shown: {', '.join(left_out)} (a wider terminal, --csv or --json has them)")
+    before, after = (summary, notes) if width is None else ([], [*notes, *summary])
+    for line in before:
+        console.print(Text(line))
+    console.print(shown)
+    for line in after:
+        console.print(Text(line))
+    return "\n".join(line.rstrip() for line in text.getvalue().split("\n"))
+
+
+def _step(count: int) -> int:
+    """Show every so many of the positions, so that no more than MOST_ROWS are."""
+    wanted = math.ceil((count - 1) / (MOST_ROWS - 1))
+    return next((step for step in STEPS if step >= wanted), STEPS[-1] * math.ceil(wanted / STEPS[-1]))
+
+
+def _ordinal(number: int) -> str:
+    if number % 100 in (11, 12, 13):
+        return "th"
+    return {1: "st", 2: "nd", 3: "rd"}.get(number % 10, "th")
+
+
+def heading(scene: Scene, solution: Solution, units: Conversion = DEGREES) -> list[str]:
+    """The lines above the table: what was requested, and how many of the positions have an answer."""
+    lengths = zip(BAR_NAMES.values(), scene.linkage.lengths, strict=True)
     drive = f"drive on bar {scene.drive_bar} ({BAR_NAMES[scene.drive_bar]})"
     if scene.motion.free is not None:
         drive = "released, no drive"
     branch = BRANCH_NAMES[scene.motion.branch]
     lines = [
-        f"ground {d:.6g} m, input {a:.6g} m, coupler {b:.6g} m, output {c:.6g} m",
+        ", ".join(f"{name} {value(length, 'm', units)}" for name, length in lengths),
         f"{branch} branch; {drive}",
     ]
     counts = np.bincount(solution.status_code, minlength=len(STATUS_NAMES))
@@ -37,21 +94,61 @@ def heading(scene: Scene, solution: Solution) -> list[str]:
         f"{count} {name.replace('_', ' ')}" for name, count in zip(STATUS_NAMES, counts.tolist(), strict=True) if count
     ]
     lines.append(f"{len(solution)} position{'s' if len(solution) != 1 else ''}: " + ", ".join(parts))
-    if solution.stopped_at is not None:
-        lines.append(f"the motion ends at {solution.stopped_at:.6g} s: bars 3 and 4 lie in one line there")
+    if solution.stopped_at is not None and scene.motion.free is not None:
+        lines.append(
+            f"{scene.motion.free.steps + 1} instants were wanted: the motion stops at a limit position at "
+            f"t = {solution.stopped_at:.6g} s, where bars 3 and 4 are in line"
+        )
+    if scene.motion.omega_2 is None and solution.torque is None and _acting(scene):
+        lines.append(f"positions only, since omega_2 is left out; {STATIC}")
     if scene.motion.free is None and solution.torque is not None and np.isfinite(solution.torque).any():
         worst = int(np.nanargmax(np.abs(solution.torque)))
-        where = math.degrees(solution.theta_2[worst])
-        lines.append(f"largest torque {solution.torque[worst]:.6g} N m at theta_2 = {where:.6g} deg")
-        lines += _warning(scene, solution)
+        where = value(solution.theta_2[worst], "rad", units)
+        lines.append(f"largest torque {value(solution.torque[worst], 'N m', units)} at theta_2 = {where}")
+        lines += _warning(scene, solution, units)
+        lines += _motor(solution, units)
     if solution.F12 is not None and np.isfinite(solution.F12).any():
         loads = {pin: bearing_load(solution, pin) for pin in PIN_FORCE}
-        parts = [f"{pin} {load.largest:.6g} N at {math.degrees(load.where):.6g} deg" for pin, load in loads.items()]
-        lines.append("largest pin loads: " + ", ".join(parts))
+        parts = [
+            f"{pin} {value(load.largest, 'N', units)} at {value(load.where, 'rad', units)}"
+            for pin, load in loads.items()
+        ]
+        rms = [f"{pin} {value(load.rms, 'N', units)}" for pin, load in loads.items()]
+        lines += ["largest pin loads: " + ", ".join(parts), "RMS pin loads: " + ", ".join(rms)]
     return lines
 
 
-def _warning(scene: Scene, solution: Solution) -> list[str]:
+def _motor(solution: Solution, units: Conversion) -> list[str]:
+    """What the drive delivers, for the choice of a motor."""
+    duty = motor_duty(solution)
+    if duty is None or len(solution) == 1:
+        return []
+    lines = [
+        f"motor: RMS torque {value(duty.rms_torque, 'N m', units)}, peak speed {value(duty.peak_speed, 'rad/s', units)}"
+        f", power peak {value(duty.peak_power, 'W', units)}, RMS {value(duty.rms_power, 'W', units)}"
+    ]
+    if duty.energy_in is not None and duty.energy_out is not None:
+        over = "per turn" if duty.closed else "over the sweep"
+        energy_in, energy_out = value(duty.energy_in, "J", units), value(duty.energy_out, "J", units)
+        lines.append(f"the drive gives {energy_in} {over} and takes back {energy_out}")
+    return lines
+
+
+STATIC = 'omega_2 = "0 rad/s" gives the static torque and pin forces'
+
+
+def _acting(scene: Scene) -> bool:
+    """Whether anything in the scene would need a torque."""
+    return bool(scene.loads or scene.effects or any(bar.mass > 0.0 for bar in scene.linkage.moving))
+
+
+def value(number: float, unit: str, units: Conversion) -> str:
+    """A number of an SI unit with six digits and the unit it is shown in."""
+    name, factor = unit_in(unit, units)
+    return f"{number * factor:.6g} {name}"
+
+
+def _warning(scene: Scene, solution: Solution, units: Conversion) -> list[str]:
     """Where the torque has few digits left, and how far from in line the two bars are that cost them."""
     assert solution.torque is not None
     if solution.torque_error is None or solution.drive_condition is None:
@@ -63,7 +160,7 @@ def _warning(scene: Scene, solution: Solution) -> list[str]:
         return []
     worst = int(np.nanargmax(share))
     left = max(math.floor(-math.log10(share[worst])), 0)
-    where = f"at theta_2 = {math.degrees(solution.theta_2[worst]):.6g} deg"
+    where = f"at theta_2 = {value(solution.theta_2[worst], 'rad', units)}"
     sines = {"3 and 4": abs(solution.sin_mu[worst])}
     if scene.drive_bar != 2:
         sines[{3: "2 and 4", 4: "2 and 3"}[scene.drive_bar]] = solution.drive_condition[worst]
@@ -76,44 +173,53 @@ FEW_DIGITS = 1e-8
 """Relative error of the torque above which the heading says so: half of what a double carries is lost."""
 
 
-def columns(solution: Solution, *, degrees: bool = True) -> dict[str, list[str]]:
+def columns(solution: Solution, units: Conversion = DEGREES) -> dict[str, list[str]]:
     """The columns of the table, most wanted first: heading with unit -> cells."""
-    unit, factor = ("deg", 180.0 / math.pi) if degrees else ("rad", 1.0)
     shown: dict[str, list[str]] = {}
+
+    def add(name: str, unit: str, values: Array) -> None:
+        label, factor = unit_in(unit, units)
+        shown[f"{name}\n{label}"] = _cells(values * factor, "angle" if unit == "rad" else "")
+
     if solution.time is not None:
-        shown["time\ns"] = _cells(solution.time)
-    shown[f"theta_2\n{unit}"] = _cells(solution.theta_2 * factor, "angle")
+        add("time", "s", solution.time)
+    add("theta_2", "rad", solution.theta_2)
     if solution.torque is not None:
         if solution.time is None:  # released, it has no drive: its torque is rounding
-            shown[f"T{solution.drive_bar}\nN m"] = _cells(solution.torque)
+            add(f"T{solution.drive_bar}", "N m", solution.torque)
             if solution.torque_error is not None:
                 shown["digits\nof T"] = _digits(solution)
         for name in PIN_FORCES:
-            shown[f"|{name}|\nN"] = _cells(np.hypot(*getattr(solution, name).T))
-    for start, unit_of, arrays in (
+            add(f"|{name}|", "N", np.hypot(*getattr(solution, name).T))
+    for start, unit, arrays in (
         ("", "m", solution.points),
         ("v_", "m/s", solution.velocity),
         ("a_", "m/s^2", solution.acceleration),
     ):
         for name, values in arrays.items():
-            shown |= {f"{start}{name}_{letter}\n{unit_of}": _cells(values[:, i]) for i, letter in enumerate("xy")}
+            for axis, letter in enumerate("xy"):
+                add(f"{start}{name}_{letter}", unit, values[:, axis])
     for name in ANGLES:
-        shown[f"{name}\n{unit}"] = _cells(getattr(solution, name) * factor, "angle")
+        add(name, "rad", getattr(solution, name))
     for name in ("omega_3", "omega_4", "alpha_3", "alpha_4"):
-        values = getattr(solution, name)
-        if values is not None:
-            shown[f"{name}\n{UNITS[name]}"] = _cells(values)
+        if getattr(solution, name) is not None:
+            add(name, UNITS[name], getattr(solution, name))
     shown["sin mu\n"] = _cells(solution.sin_mu)
     return shown
 
 
-def table(solution: Solution, width: int | None, *, degrees: bool = True) -> "tuple[Table, list[str]]":
-    """The table for a terminal of the given width (None: as wide as it needs), and the columns left out of it."""
+def table(
+    solution: Solution, width: int | None, units: Conversion = DEGREES, *, every: int = 1
+) -> "tuple[Table, list[str]]":
+    """The table for a terminal of the given width (None: as wide as it needs), and the columns left out of it.
+
+    Every so many positions are shown, the last one always.
+    """
     from rich import box
     from rich.table import Table
     from rich.text import Text
 
-    cells = columns(solution, degrees=degrees)
+    cells = columns(solution, units)
     if (solution.status_code != 0).any():
         cells = {"status\n": [status.replace("_", " ") for status in solution.status], **cells}
     needed = -GAP
@@ -126,7 +232,9 @@ def table(solution: Solution, width: int | None, *, degrees: bool = True) -> "tu
     shown = Table(box=box.SIMPLE_HEAD, show_edge=False, pad_edge=False, padding=(0, GAP - 1, 0, 0))
     for name in kept:
         shown.add_column(Text(name), justify="right", no_wrap=True)
-    for row in zip(*(cells[name] for name in kept), strict=True):
+    rows = list(zip(*(cells[name] for name in kept), strict=True))
+    last = rows[-1:] if (len(rows) - 1) % every else []
+    for row in rows[::every] + last:
         shown.add_row(*(Text(cell) for cell in row))
     return shown, [name.split("\n")[0] for name in cells if name not in kept]
 

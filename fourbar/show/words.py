@@ -1,8 +1,11 @@
 """In words, what a linkage can do whatever drives it: swings, limit positions, change points, transmission."""
 
+import json
 import math
 from collections.abc import Iterator
 
+from fourbar.formulas.circuits import circuits
+from fourbar.formulas.linkage_type import classify
 from fourbar.formulas.mobility import change_points, limit_positions, swing, time_ratio, turns_fully
 from fourbar.formulas.transmission import transmission_extremes
 from fourbar.linkage import BAR_NAMES, MOVING_BARS, FourBar
@@ -11,7 +14,42 @@ from fourbar.scene.motion import BRANCH_NAMES
 BRANCHES = {**BRANCH_NAMES, 0: "both"}
 
 
-def told(linkage: FourBar) -> Iterator[str]:
+def type_lines(linkage: FourBar) -> Iterator[str]:
+    """The type of a linkage, the condition that decides it, what turns, and `mobility_lines`."""
+    found = classify(linkage)
+    relation = "<" if found.surplus > 0.0 else ">" if found.surplus < 0.0 else "="
+    outer = min(linkage.lengths) + max(linkage.lengths)
+    yield found.name
+    yield f"s + l = {outer:.6g} m {relation} p + q = {sum(linkage.lengths) - outer:.6g} m"
+    yield "bars that turn fully: " + (", ".join(BAR_NAMES[number] for number in found.turning) or "none")
+    if found.barker is not None:  # a structure does not move
+        yield from mobility_lines(linkage)
+
+
+def type_json(linkage: FourBar) -> str:
+    """The same as one object: SI and radians, null where there is nothing; positions as `LimitPosition` has them."""
+    found = classify(linkage)
+    document: dict[str, object] = {
+        "schema": "fourbar-classify/1",
+        "lengths": dict(zip(BAR_NAMES.values(), linkage.lengths, strict=True)),
+        **found._asdict(),
+    }
+    if found.barker is not None:
+        transmission = transmission_extremes(linkage)
+        document |= {
+            "swing": {BAR_NAMES[bar]: swing(linkage, bar) for bar in MOVING_BARS},
+            "limit_positions": {
+                BAR_NAMES[bar]: [limit._asdict() for limit in limit_positions(linkage, bar)] for bar in MOVING_BARS
+            },
+            "change_points": change_points(linkage),
+            "circuits": [circuit._asdict() for circuit in circuits(linkage)],
+            "transmission": {**transmission._asdict(), "worst": transmission.worst},
+            "time_ratio": time_ratio(linkage),
+        }
+    return json.dumps(document, allow_nan=False)
+
+
+def mobility_lines(linkage: FourBar) -> Iterator[str]:
     """Line by line; angles in deg, digits as far as a drawing needs them."""
     swings = [f"{BAR_NAMES[bar]} {_deg(swing(linkage, bar))}" for bar in MOVING_BARS if not turns_fully(linkage, bar)]
     if swings:

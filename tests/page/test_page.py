@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 
 import fourbar
+from fourbar.effects import Point
+from fourbar.files import loads
 from fourbar.show import animate
 from tests.scenes import crank_rocker, thesis
 from tests.test_animate import HOSTILE, PNG, RELEASED, embedded
@@ -52,6 +54,20 @@ def type_length(driver, bar: int, value: float | str) -> None:
         "const e = document.getElementById(arguments[0]); e.value = arguments[1]; e.dispatchEvent(new Event('input'))"
     )
     driver.execute_script(script, f"length-{bar}", str(value))
+
+
+def test_numbers_are_shown_in_the_units_of_the_page(browse) -> None:
+    scene = crank_rocker()
+    driver = browse(animate.page(scene, units=fourbar.units("mm kN N.mm rpm")))
+    s = fourbar.solve(scene)
+    expected = [s.torque[0] * 1e3, s.F43[0, 0] * 1e-3, s.omega_4[0] * 30.0 / math.pi]
+    assert shown(driver, "torque", "F43_x", "omega_4") == pytest.approx(expected, rel=PRINTED)
+    text = driver.find_element("tag name", "body").text
+    assert "N mm" in text and "kN" in text and "rpm" in text and "rad/s²" in text and "Lengths (mm)" in text
+    labels = [option.text for option in driver.find_elements("css selector", "#quantity option")]
+    assert "torque on bar 2, N mm" in labels and "|F₁₂|, kN" in labels
+    top = max(number(text.text) for text in driver.find_elements("css selector", "#chart text")[-3:] if text.text)
+    assert top == pytest.approx(1e3 * s.torque.max(), rel=0.01)
 
 
 def test_it_loads_and_shows_the_first_position(browse) -> None:
@@ -197,6 +213,64 @@ def test_a_changed_length_redraws_by_the_formulas_and_hides_the_forces(browse) -
     assert shown(driver, "theta_2")[0] == pytest.approx(math.degrees(fourbar.solve(scene).theta_2[7]), abs=PRINTED_DEG)
 
 
+def test_type_time_and_scene_file_follow_the_lengths(browse, tmp_path: Path) -> None:
+    scene = crank_rocker(title="a\\nb", motion=fourbar.Motion(np.array([0.1, 0.2, 0.3, 0.4]), 10.0, 5.0))
+    driver = browse(animate.page(scene))
+    assert driver.find_element("id", "type").text == "crank-rocker"
+    assert loads(state_of(driver, "sceneFile()")).linkage == scene.linkage
+    type_length(driver, 2, 200.0)
+    driver.execute_script("chooseBranch(-1)")
+    assert driver.find_element("id", "type").text.startswith("triple rocker (longest: ground); with the original")
+    swept = state_of(driver, "grid[grid.length - 1] - grid[0]")
+    assert f"at ω₂ = 10 rad/s the mechanism takes {swept / 10.0:.3g} s." in driver.find_element("id", "pace").text
+    saved = loads(state_of(driver, "sceneFile()"))
+    assert saved.linkage.lengths == (0.3, 0.2, 0.25, 0.22) and saved.linkage.coupler.mass == scene.linkage.coupler.mass
+    assert saved.motion.branch == -1 and saved.title == "a\\nb" and len(saved.loads) == len(scene.loads)
+    assert fourbar.solve(saved).theta_2[-1] == state_of(driver, "grid[grid.length - 1]")
+    driver.execute_cdp_cmd("Browser.setDownloadBehavior", {"behavior": "allow", "downloadPath": str(tmp_path)})
+    driver.find_element("id", "download").click()
+    until = time.monotonic() + 10.0
+    while not (tmp_path / "linkage.toml").exists() and time.monotonic() < until:
+        time.sleep(0.02)
+    assert (tmp_path / "linkage.toml").read_text() == state_of(driver, "sceneFile()")
+
+
+def test_the_page_names_a_linkage_as_fourbar_does(browse) -> None:
+    driver = browse(animate.page(crank_rocker()))
+    rng = np.random.default_rng(19)
+    cases = [[*map(float, rng.integers(1, 6, 4) / 10.0)] for _ in range(300)]
+    cases = [lengths for lengths in cases if 2 * max(lengths) <= sum(lengths)]
+    names = [fourbar.classify(fourbar.uniform(*lengths)).name for lengths in cases]
+    assert len(set(names)) > 12
+    assert driver.execute_script("return arguments[0].map(typeName)", cases) == names
+
+
+def test_what_acts_is_drawn_at_its_place_and_dimensions_on_request(browse) -> None:
+    spring = fourbar.Spring(Point(1, 0.1, -0.5), Point(4, 0.08, 0.0), 20.0, 0.1)
+    load = fourbar.Load(3, (2.0, 0.5), (0.03, 1.0), frame="bar")
+    scene = crank_rocker(loads=(load,), effects=(fourbar.Springs((spring,)), fourbar.Gravity()))
+    driver = browse(animate.page(scene))
+    driver.execute_script("go(20)")
+    s = fourbar.solve(scene)
+    script = """return [...document.querySelectorAll("#acting path.act")].map(e => [e.getAttribute("class"),
+        [...e.getAttribute("d").matchAll(/[ML]([^ ]+) ([^ML]+)/g)].map(
+            m => [(m[1] - view.x) / view.k, (view.y - m[2]) / view.k])])"""
+    found = dict(driver.execute_script(script))
+    zigzag, arrow = found["act act-spring"], found["act act-force"]
+    end = s.B[20] + (0.08 - 0.22) * np.array([math.cos(s.theta_4[20]), math.sin(s.theta_4[20])])
+    np.testing.assert_allclose(zigzag[-1], end, atol=1e-4)
+    angle = s.theta_3[20] + 1.0
+    np.testing.assert_allclose(arrow[0], s.G3[20] + 0.03 * np.array([math.cos(angle), math.sin(angle)]), atol=1e-4)
+    towards = np.subtract(arrow[1], arrow[0])
+    assert math.atan2(towards[1], towards[0]) == pytest.approx(s.theta_3[20] + 0.5, abs=0.01)
+    assert found.keys() >= {"act act-drive", "act act-gravity"}
+    names = 'return ["1", "3"].map(k => [parts.label[k].textContent, parts.label[k].style.display])'
+    assert driver.execute_script(names) == [["1", "none"], ["3", ""]]
+    driver.execute_script("toggle('show-dimensions'); toggle('show-acting')")
+    assert [text for text, _ in driver.execute_script(names)] == ["1: 300 mm", "3: 250 mm"]
+    assert not driver.find_elements("css selector", "#acting *")
+
+
 @pytest.mark.parametrize("value", ("-1", "0", "5000", ""))
 def test_lengths_that_cannot_be_are_refused_and_the_picture_stays(browse, value: str) -> None:
     driver = browse(animate.page(crank_rocker()))
@@ -287,18 +361,18 @@ def test_arrows_point_along_the_forces_to_the_scale_of_the_legend(browse, scalin
         np.testing.assert_allclose(drawn, getattr(s, name)[50] * bar / newtons, atol=PIXEL)
 
 
-@pytest.mark.parametrize("width", (360, 1100))
-def test_no_arrow_that_fits_the_position_leaves_the_picture(browse, width: int) -> None:
-    driver = browse(animate.page(thesis()), width)
-    script = """const choice = document.getElementById("arrow-scale"); choice.value = "position";
+@pytest.mark.parametrize(("width", "scaling"), [(360, "position"), (1100, "position"), (360, "sweep"), (1100, "sweep")])
+def test_no_arrow_and_no_name_of_one_leaves_the_picture(browse, width: int, scaling: str) -> None:
+    driver = browse(animate.page(thesis() if scaling == "position" else crank_rocker()), width)
+    script = """const choice = document.getElementById("arrow-scale"); choice.value = arguments[0];
         choice.dispatchEvent(new Event("change"));
         const least = []; for (let i = 0; i < grid.length; i += 7) { go(i);
           for (const e of document.querySelectorAll("#arrows .head")) { if (e.style.display === "none") continue;
             const [x, y] = e.getAttribute("d").slice(1).split("L")[0].split(" ").map(Number);
             least.push(Math.min(x, y, view.width - x, view.height - y)); } }
         return least;"""
-    clearance = driver.execute_script(script)
-    assert len(clearance) > 100 and min(clearance) > 0.0
+    distances = driver.execute_script(script, scaling)
+    assert len(distances) > 30 and min(distances) > 15.0  # its name stands beyond the tip
 
 
 def test_keyboard_drives_it(browse) -> None:

@@ -1,47 +1,22 @@
 """`python -m validation check SCENE THEIRS.csv`: judge a user's own torques and forces."""
 
 import math
+from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 
 import click
-import numpy as np
 
 from fourbar.errors import FAILED, HOLDS, InputError
 from fourbar.files import load
-from fourbar.quantities import OK
-from fourbar.scene import Command, Scene, command
-from fourbar.solve import solve
+from fourbar.scene import Scene
+from fourbar.writing import write_text
+from validation.check.judge import Finding, Judge, Tolerance
 from validation.check.mistakes import NEARER, Explanation, explain
-from validation.check.theirs import Array, Table, read_table
-from validation.compare.error import difference, in_own_unit, magnitude, relative, relative_error
+from validation.check.theirs import Table, read_table
 from validation.compare.plain import plain
-from validation.compare.scales import yardstick
-from validation.compare.tolerance import EPS, EQUIVALENCE, NOTHING_TO_TELL, condition_of
 
-SHOWN = 20
-
-
-@dataclass(frozen=True, slots=True)
-class Finding:
-    """One quantity at one position of the user's table."""
-
-    line: int
-    """In the user's file."""
-    quantity: str
-    error: float
-    allowed: float
-    theta_2: float
-
-    @property
-    def told(self) -> bool:
-        """Whether any digit is left by which it can be judged."""
-        return self.allowed != math.inf
-
-    @property
-    def agrees(self) -> bool:
-        """Whether it is within what is allowed."""
-        return self.told and self.error <= self.allowed
+SHOWN = 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,11 +27,12 @@ class Judgement:
     not_assembled: list[int]
     """Lines at which this linkage does not assemble, or is singular: there is no right answer there."""
     explanations: list[Explanation]
+    tolerance: Tolerance | None = None
 
     @property
     def differing(self) -> list[Finding]:
-        """The findings that do not agree, though there are digits to tell by."""
-        return [finding for finding in self.findings if finding.told and not finding.agrees]
+        """The findings that do not agree, though there are digits to judge by."""
+        return [finding for finding in self.findings if finding.judged and not finding.agrees]
 
     @property
     def agreeing(self) -> int:
@@ -64,62 +40,56 @@ class Judgement:
         return sum(finding.agrees for finding in self.findings)
 
     @property
-    def untold(self) -> int:
-        """How many numbers nothing can be told of."""
-        return sum(not finding.told for finding in self.findings)
+    def exact(self) -> int:
+        """How many numbers agree to round-off and their printed digits."""
+        return sum(finding.exact for finding in self.findings)
+
+    @property
+    def not_judged(self) -> int:
+        """How many numbers have no digit left to judge by."""
+        return sum(not finding.judged for finding in self.findings)
+
+    @property
+    def compared(self) -> int:
+        """How many numbers were judged."""
+        return len(self.findings) - self.not_judged
+
+    @property
+    def status(self) -> int:
+        """Exit status; nothing compared is no success."""
+        return FAILED if self.differing or self.not_assembled or not self.compared else HOLDS
+
+    def sentence(self) -> str:
+        """How many numbers agree, exactly and within the stated tolerance."""
+        if not self.compared:
+            agreed = "Nothing was compared"
+        elif self.tolerance is None:
+            agreed = f"{self.agreeing} of {self.compared} numbers agree"
+        else:
+            within = f"rtol {self.tolerance.rtol:g}, atol {self.tolerance.atol:g}"
+            agreed = f"{self.agreeing} of {self.compared} numbers agree within {within}; {self.exact} to round-off"
+        return agreed + (f"; no digit left to judge {self.not_judged} more by" if self.not_judged else "")
+
+    def together(self) -> bool:
+        """Whether the explanations together account for every quantity that differs."""
+        explained = {quantity for explanation in self.explanations for quantity in explanation.quantities}
+        return explained >= {finding.quantity for finding in self.differing}
 
 
-def judge_table(scene: Scene, table: Table) -> Judgement:
-    """Judge every number by K eps/condition plus half a unit of its last printed digit, and of theta_2's."""
-    base = command(scene)
-    if np.ndim(base.omega_2 or 0.0) or np.ndim(base.alpha_2):
-        raise InputError("motion.law", scene.title, "a table is judged at one omega_2 and alpha_2, not along a law")
-    if scene.motion.free is not None:
-        raise InputError("motion.free", scene.title, "a table is judged at one omega_2 and alpha_2, not while released")
-    branch = np.full(len(table.theta_2), scene.motion.branch, dtype=np.int8)
-    at = Command(table.theta_2, branch, base.omega_2, base.alpha_2)
-    right = solve(scene, "position" if at.omega_2 is None else "force", at=at)
-    ok = right.status_code == OK
-    beside = []  # the same half a unit of a rounded theta_2 away
-    if table.theta_2_rounding.any():
-        for shift in (-table.theta_2_rounding, table.theta_2_rounding):
-            moved = at._replace(theta_2=at.theta_2 + shift)
-            beside.append(solve(scene, "position" if at.omega_2 is None else "force", at=moved))
+def judge_table(scene: Scene, table: Table, tolerance: Tolerance | None = None) -> Judgement:
+    """Judge every number by K eps/condition plus half a unit of its last printed digit, and of theta_2's.
 
-    def judged(quantity: str, ours: Array, theirs: Array) -> tuple[Array, Array]:
-        yard = yardstick(quantity, scene, right, getattr(right, quantity))
-        scale = in_own_unit(yard)  # what all its terms leave 0
-        theirs = np.where(np.isnan(theirs), ours, theirs)  # a component that their table does not have
-        error = relative_error(quantity, ours, theirs, scale)
-        condition = condition_of(quantity, scene.linkage, right)
-        # what a mistake would have printed is rounded at its own size, however much larger
-        size = np.nanmax(magnitude(ours)[ok], initial=0.0) if not quantity.startswith("theta") else 0.0
-        there = getattr(right, quantity)
-        larger = 1.0 if ours is there else np.maximum(size / scale, 1.0)
-        moves = [difference(quantity, there, getattr(other, quantity)) for other in beside]
-        spread = relative(np.fmax.reduce(moves), scale) if moves else 0.0
-        exact = np.where(yard == 0.0, 0.0, EQUIVALENCE.allowed(condition))
-        allowed = (exact + spread) * larger + relative(table.rounding[quantity], scale)
-        return error[ok], np.where(condition * NOTHING_TO_TELL > EPS, allowed, np.inf)[ok]
-
-    findings = []
-    for quantity, theirs in table.values.items():
-        ours = getattr(right, quantity)
-        if ours is None:
-            if at.omega_2 is None:
-                raise InputError("motion.omega_2", None, f"is needed in the scene to judge {quantity}")
-            raise InputError("header", quantity, "does not exist in this scene: it has no dry friction")
-        error, allowed = judged(quantity, ours, theirs)
-        label = table.label(quantity)
-        for index, e, most in zip(np.flatnonzero(ok).tolist(), error.tolist(), allowed.tolist(), strict=True):
-            findings.append(Finding(table.lines[index], label, e, most, float(table.theta_2[index])))
-    found = {finding.quantity for finding in findings if finding.told and not finding.agrees}
-    differing = sorted(quantity for quantity in table.values if table.label(quantity) in found)
-    known = explain(table, scene, at, right, differing, judged) if differing else []
-    return Judgement(findings, [table.lines[index] for index in np.flatnonzero(~ok)], known)
+    With a tolerance that decides, and what explains the rest is held to it too.
+    """
+    judge = Judge(scene, table, tolerance)
+    findings = judge.findings()
+    found = {finding.quantity for finding in findings if finding.judged and not finding.agrees}
+    differing = sorted(key for key in table.values if table.label(key) in found)
+    known = explain(judge, differing) if differing else []
+    return Judgement(findings, judge.without_answer(), known, tolerance)
 
 
-def said(explanation: Explanation) -> str:
+def extent(explanation: Explanation) -> str:
     """How far a mistake explains what differs."""
     if explanation.complete:
         return "explains everything that differs: " + ", ".join(explanation.quantities)
@@ -131,39 +101,102 @@ def said(explanation: Explanation) -> str:
     return "; ".join(parts)
 
 
+def tolerance_of(rtol: float | None, atol: float | None) -> Tolerance | None:
+    """What the options state; None where they state nothing."""
+    for option, value in (("--rtol", rtol), ("--atol", atol)):
+        if value is not None and not 0.0 <= value < math.inf:
+            raise InputError(option, value, "must be a finite number >= 0")
+    return None if rtol is None and atol is None else Tolerance(rtol or 0.0, atol or 0.0)
+
+
 @click.command()
 @click.argument("scene", type=click.Path(path_type=Path))
 @click.argument("theirs", type=click.Path(path_type=Path))
-def check(scene: Path, theirs: Path) -> int:
+@click.option("--rtol", type=float, metavar="R", help="Allow this part of each number too.")
+@click.option("--atol", type=float, metavar="A", help="Allow this too, in the SI unit of each quantity.")
+@click.option("--json", "as_json", type=click.Path(path_type=Path, dir_okay=False), help="Write it as JSON too.")
+@click.option("--junit", type=click.Path(path_type=Path, dir_okay=False), help="Write it as JUnit too.")
+def check(
+    scene: Path, theirs: Path, rtol: float | None, atol: float | None, as_json: Path | None, junit: Path | None
+) -> int:
     """Judge a table of torques and forces (THEIRS.csv) against the formulas, row by row.
 
-    Columns are named as by `fourbar analyze --csv`; a unit may follow in brackets:
-    theta_2 [deg], torque [N cm], F12_x, F12_y. Half a unit of the last printed digit is allowed.
+    Columns are named as by `fourbar analyze --csv`, whose file is read as it is; a unit may follow in
+    brackets: theta_2 [deg], torque [lbf ft], F12_x, F12_y, F43 [kN] (a magnitude). A spreadsheet's
+    semicolons and blank cells are understood. Half a unit of the last printed digit is allowed; with
+    --rtol or --atol these decide, and how many agree exactly is printed too.
     """
+    table = read_table(theirs)
+    judgement = judge_table(load(scene), table, tolerance_of(rtol, atol))
+    if as_json is not None or junit is not None:
+        from validation.check import forms
+
+        if as_json is not None:
+            write_text(as_json, forms.as_json(judgement, table))
+        if junit is not None:
+            write_text(junit, forms.junit(judgement, theirs.name))
+    show(judgement, table, theirs.name)
+    return judgement.status
+
+
+def show(judgement: Judgement, table: Table, name: str) -> None:
+    """Print what differs, what explains it, and the count."""
+    from rich.box import SIMPLE_HEAD
     from rich.console import Console
     from rich.markup import escape
     from rich.table import Table as Shown
 
-    judgement = judge_table(load(scene), read_table(theirs))
     console = Console(soft_wrap=True)
+    for why in dict.fromkeys(table.left_out.values()):
+        headings = ", ".join(heading for heading, reason in table.left_out.items() if reason == why)
+        console.print(f"left out ({why}): {escape(plain(headings))}")
     differing = judgement.differing
     if differing:
-        shown = Shown(title=f"{escape(plain(theirs.name))}: what differs, worst first")
-        for heading in ("line", "theta_2 [deg]", "quantity", "error", "allowed"):
+        title = f"{escape(plain(name))}: what differs, the {SHOWN} worst of each quantity"
+        shown = Shown(title=title, box=SIMPLE_HEAD, pad_edge=False, show_edge=False, padding=(0, 1, 0, 0))
+        for heading in ("line", "theta_2\ndeg", "quantity", "theirs", "ours", "error", "allowed"):
             shown.add_column(heading, justify="right")
-        for finding in sorted(differing, key=lambda f: -f.error)[:SHOWN]:
-            degrees = f"{math.degrees(finding.theta_2):.4f}"
-            numbers = (f"{finding.error:.2e}", f"{finding.allowed:.2e}")
-            shown.add_row(str(finding.line), degrees, finding.quantity, *numbers)
+        for finding in worst_of_each(differing):
+            theirs, ours = in_their_unit(finding, table)
+            numbers = (theirs, ours, f"{finding.error:.1e}", f"{finding.allowed:.1e}")
+            where = f"{math.degrees(finding.theta_2):.7g}"
+            shown.add_row(str(finding.line), where, escape(with_unit(finding, table)), *numbers)
         console.print(shown)
+        counted = Counter(finding.quantity for finding in differing)
+        console.print("in all: " + ", ".join(f"{count} of {quantity}" for quantity, count in counted.items()))
     for line in judgement.not_assembled:
         console.print(f"line {line}: the linkage has no motion there (it does not assemble, or is singular)")
     for explanation in judgement.explanations:
-        console.print(f"looks like: {escape(explanation.text)} ({said(explanation)})")
+        console.print(f"looks like: {escape(explanation.text)} ({extent(explanation)})")
     if differing and not any(explanation.complete for explanation in judgement.explanations):
-        console.print("no single known mistake explains all of it")
-    count = len(judgement.findings) - judgement.untold
-    apart = f"; nothing can be told of {judgement.untold} more" if judgement.untold else ""
-    told = f"{judgement.agreeing} of {count} numbers agree" if count else "Nothing was compared"
-    console.print(f"[bold]{told}{apart}[/]")
-    return FAILED if differing or judgement.not_assembled or not count else HOLDS
+        together = "these together explain all of it" if judgement.together() else "no single known mistake explains it"
+        console.print(together)
+    console.print(f"[bold]{judgement.sentence()}[/]")
+
+
+def worst_of_each(differing: list[Finding]) -> list[Finding]:
+    """The worst findings of each quantity, the worst quantity first."""
+    seen: Counter[str] = Counter()
+    shown: dict[str, list[Finding]] = {}
+    for finding in sorted(differing, key=lambda f: -f.error):
+        seen[finding.quantity] += 1
+        if seen[finding.quantity] <= SHOWN:
+            shown.setdefault(finding.quantity, []).append(finding)
+    return [finding for findings in shown.values() for finding in findings]
+
+
+def with_unit(finding: Finding, table: Table) -> str:
+    """The quantity and the unit of their column."""
+    return f"{finding.quantity} [{plain(table.units[_key(finding, table)].text)}]"
+
+
+def in_their_unit(finding: Finding, table: Table) -> tuple[str, str]:
+    """Both numbers in the unit of their column, with the digits that set them apart."""
+    factor = table.units[_key(finding, table)].factor
+    theirs, ours = ([x / factor for x in numbers] for numbers in (finding.theirs, finding.ours))
+    digits = next((d for d in (4, 6, 9, 12) if any(f"{a:.{d}g}" != f"{b:.{d}g}" for a, b in zip(theirs, ours))), 15)  # noqa: B905
+    return tuple(", ".join(f"{x:.{digits}g}" for x in numbers) for numbers in (theirs, ours))  # type: ignore[return-value]
+
+
+def _key(finding: Finding, table: Table) -> str:
+    return next(key for key in table.values if table.label(key) == finding.quantity)

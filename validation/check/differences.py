@@ -31,7 +31,7 @@ NEEDS = {
     r"option\.sleep_tolerance": ("option.switched on", "nothing that matters here"),
     r"option\.meaninertia": ("option.tolerance", 0.0),
 }
-"""A key, and what its effect hangs on: where their file has that switched off, the key is not told."""
+"""A key, and what its effect hangs on: where their file has that switched off, the key is left out."""
 NEUTRAL: dict[str, Value] = {"damping": 0.0, "friction": 0.0, "stiffness": 0.0, "armature": 0.0, "range": "free"}
 """What a pin without a hinge has of each: the pin at which the other file is cut. The rest of it is not compared."""
 WRITTEN = {
@@ -121,7 +121,7 @@ def differences(generated: Described, theirs: Described, called: Mapping[str, st
     generated = _numbered_like(theirs, generated)
     found = []
     for key in [*theirs, *(key for key in generated if key not in theirs)]:
-        ours, other = (told.get(key, _without(key)) for told in (generated, theirs))
+        ours, other = (file.get(key, _without(key)) for file in (generated, theirs))
         if ours is not None and other is not None and _acts(key, theirs) and not _same(key, ours, other, scale):
             name = _named(key, theirs if key in theirs else generated)
             found.append(Difference(name, ours, other, _remark(key, ours, other), _written(key, theirs, called or {})))
@@ -153,7 +153,7 @@ def _numbered_like(theirs: Described, generated: Described) -> Described:
 
 
 def _without(key: str) -> Value | None:
-    """What a file has that does not have the key; None: nothing is to be said of it."""
+    """What a file has that does not have the key; None: it is left out."""
     if attached := ATTACHED.fullmatch(key):
         return None if attached[2] else "none"
     if key.startswith("pins."):
@@ -171,9 +171,9 @@ def _acts(key: str, theirs: Described) -> bool:
     return True
 
 
-def _named(key: str, told: Described) -> str:
+def _named(key: str, described: Described) -> str:
     attached = ATTACHED.fullmatch(key)
-    if not attached or not (name := told[f"{attached[1]}.name"]):
+    if not attached or not (name := described[f"{attached[1]}.name"]):
         return key
     return f"{key.partition('.')[0]}.{name}{attached[2] or ''}"
 

@@ -2,56 +2,34 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from itertools import chain
 from typing import Any
 
 import numpy as np
 
-from fourbar.effects import Gravity
+from fourbar.effects import Gravity, Load
 from fourbar.errors import FourBarError
 from fourbar.linkage import Bar
 from fourbar.quantities import FORCES, VECTORS
 from fourbar.scene import Command, Scene
 from fourbar.solution import Solution
 from fourbar.solve import solve
-from validation.check.theirs import Array, Table
+from validation.check.fitted import fitted
+from validation.check.judge import Judge
+from validation.check.mistake import Mistake
+from validation.check.theirs import Array
 
-POWERS_OF_TEN = (-6, -5, -4, -3, -2, -1, 1, 2, 3, 4, 5, 6)
-GRAVITATIONAL = 9.80665
-"""kgf in N."""
 SHOWN = 5
-"""Explanations that are told."""
+"""Explanations that are printed."""
 NEARER = 10.0
-"""A mistake that brings every row of a quantity this much nearer is told, though it does not explain it wholly."""
-
-
-@dataclass(frozen=True, slots=True)
-class Mistake:
-    """A hypothesis: what was done, and what it turns the right numbers into."""
-
-    text: str
-    predict: Callable[[str, Solution], Array | None]
-    """quantity, right solution -> what would have been printed; None where it changes nothing of it."""
-    whole: bool = True
-    """Whether it was made in the calculation, and so shows in every quantity; a column's unit shows in its own."""
+"""A mistake that brings every row of a quantity this much nearer is named, though it does not explain it wholly."""
 
 
 def hypotheses(scene: Scene, at: Command) -> Iterator[Mistake]:
-    """Every mistake that this scene gives room for, the simplest first."""
+    """Every mistake that can be made on this scene, the simplest first."""
     yield Mistake(
         "sign reversed, or F_ij given for F_ji",
         lambda quantity, right: _where(quantity, right, lambda v: -v),
-        whole=False,
-    )
-    for power in POWERS_OF_TEN:
-        factor = 10.0**power
-        yield Mistake(
-            f"units: every number is 10^{power} of ours (N cm for N m is 10^2, mm for m 10^3)",
-            lambda quantity, right, factor=factor: _where(quantity, right, lambda v: factor * v),  # type: ignore[misc]
-            whole=False,
-        )
-    yield Mistake(
-        "forces in kgf where newtons were announced",
-        lambda quantity, right: _where(quantity, right, lambda v: v / GRAVITATIONAL) if _is_force(quantity) else None,
         whole=False,
     )
     yield Mistake(
@@ -65,19 +43,16 @@ def hypotheses(scene: Scene, at: Command) -> Iterator[Mistake]:
         whole=False,
     )
     yield Mistake(
-        "measured from the other end of the bar (half a turn off)",
+        "measured from the other end of the bar (half a turn off): theta_4 or theta_3 from B, theta_2 from A",
         lambda quantity, right: _where(quantity, right, lambda v: v + np.pi) if quantity.startswith("theta") else None,
         whole=False,
     )
-    yield Mistake(
-        "relative to bar 2 instead of the ground",
-        lambda quantity, right: (
-            getattr(right, quantity) - getattr(right, f"{quantity[:-1]}2")
-            if _is_angular(quantity) and _where(quantity, right, np.negative) is not None
-            else None
-        ),
-        whole=False,
-    )
+    for bar in (2, 3):
+        yield Mistake(
+            f"relative to bar {bar} instead of the ground",
+            lambda quantity, right, bar=bar: _relative(quantity, right, bar),  # type: ignore[misc]
+            whole=False,
+        )
     yield from _inertial(scene, at)
     for text, changed, where in _other_problems(scene, at):
         try:
@@ -134,7 +109,7 @@ def _other_problems(scene: Scene, at: Command) -> Iterator[tuple[str, Scene, Com
         others = tuple(effect for effect in scene.effects if not isinstance(effect, Gravity))
         yield "gravity is missing", replace(scene, effects=others), at
         flipped = tuple(replace(g, magnitude=-g.magnitude) for g in gravity)
-        yield "gravity points the other way", replace(scene, effects=(*others, *flipped)), at
+        yield "gravity is reversed", replace(scene, effects=(*others, *flipped)), at
     else:
         yield "gravity along -y is included though the scene has none", _with_gravity(scene), at
     if scene.loads:
@@ -142,6 +117,11 @@ def _other_problems(scene: Scene, at: Command) -> Iterator[tuple[str, Scene, Com
         for number, load in enumerate(scene.loads, 1):
             kept = tuple(other for other in scene.loads if other is not load)
             yield f"load {number} (bar {load.bar}) is missing", replace(scene, loads=kept), at
+        if len(scene.loads) > 1:
+            yield "the loads are reversed", replace(scene, loads=tuple(map(_reversed, scene.loads))), at
+        for number, load in enumerate(scene.loads, 1):
+            turned = tuple(_reversed(other) if other is load else other for other in scene.loads)
+            yield f"load {number} (bar {load.bar}) is reversed", replace(scene, loads=turned), at
     if at.omega_2 is not None:
         yield "no inertial forces (statics)", scene, at._replace(omega_2=0.0, alpha_2=0.0)
         if np.any(at.alpha_2):
@@ -162,6 +142,18 @@ def _with_gravity(scene: Scene) -> Scene:
     return replace(scene, effects=(*scene.effects, Gravity()))
 
 
+def _reversed(load: Load) -> Load:
+    force = None if load.force is None else (-load.force[0], load.force[1])
+    return replace(load, force=force, moment=-load.moment)
+
+
+def _relative(quantity: str, right: Solution, bar: int) -> Array | None:
+    if not _is_angular(quantity) or quantity.endswith(str(bar)):
+        return None
+    base = getattr(right, f"{quantity[:-1]}{bar}", None)
+    return None if base is None else _where(quantity, right, lambda values: values - base)
+
+
 def _from_other_pin(bar: Bar) -> Bar | None:
     r, phi = bar.mass_centre
     x, y = bar.length - r * np.cos(phi), r * np.sin(phi)
@@ -176,21 +168,27 @@ def _mid_bar(bar: Bar) -> Bar | None:
     return replace(bar, centre=(bar.length / 2.0, 0.0)) if bar.mass else None
 
 
+def _turned(bar: Bar) -> Bar | None:
+    r, phi = bar.mass_centre
+    return replace(bar, centre=(r, phi + np.pi)) if bar.mass and r else None
+
+
+def _mirrored(bar: Bar) -> Bar | None:
+    r, phi = bar.mass_centre
+    return replace(bar, centre=(r, -phi)) if bar.mass and r and np.sin(phi) else None
+
+
 def _no_inertia(bar: Bar) -> Bar | None:
     return replace(bar, inertia=0.0) if bar.moment_of_inertia else None
-
-
-def _inertia_times(factor: float) -> Callable[[Bar], Bar | None]:
-    return lambda bar: replace(bar, inertia=bar.moment_of_inertia * factor) if bar.moment_of_inertia else None
 
 
 BAR_MISTAKES: tuple[tuple[str, Callable[[Bar], Bar | None]], ...] = (
     ("mass centre measured from the wrong pin", _from_other_pin),
     ("mass centre taken at mid-bar", _mid_bar),
+    ("mass centre turned by 180 deg about the bar's first pin", _turned),
+    ("mass centre on the other side of the bar's line", _mirrored),
     ("inertia about the pin used as the inertia about G", _about_pin),
     ("moment of inertia left out", _no_inertia),
-    ("moment of inertia in kg cm^2 taken for kg m^2", _inertia_times(1e4)),
-    ("moment of inertia 10^4 too small", _inertia_times(1e-4)),
 )
 
 
@@ -220,36 +218,29 @@ class Explanation:
     """Quantities that it explains for the most part: what remains is NEARER times smaller."""
 
 
-def explain(
-    table: Table,
-    scene: Scene,
-    at: Command,
-    right: Solution,
-    differing: list[str],
-    judged: Callable[[str, Array, Array], tuple[Array, Array]],
-) -> list[Explanation]:
-    """The hypotheses under which quantities that differ agree, the most complete first; then those that come near.
+def explain(judge: Judge, differing: list[str]) -> list[Explanation]:
+    """The mistakes under which quantities that differ agree, the most complete first; then those that come near.
 
     A mistake that breaks a quantity which agreed as it was is none.
     """
-    found = []
-    theirs = table.values
-    for mistake in hypotheses(scene, at):
+    found: list[Explanation] = []
+    table = judge.table
+    for mistake in chain(hypotheses(judge.scene, judge.at), fitted(judge, differing)):
         explained, nearer, broken = [], [], False
-        for quantity, values in theirs.items():
-            predicted = mistake.predict(quantity, right)
-            if predicted is None or np.array_equal(predicted, getattr(right, quantity), equal_nan=True):
+        for key in table.values:
+            predicted = mistake.prediction(key, judge.right)
+            if predicted is None or np.array_equal(predicted, judge.ours(key), equal_nan=True):
                 continue
-            error, allowed = judged(quantity, predicted, values)
-            if np.all(error <= allowed):
-                if quantity in differing:
-                    explained.append(table.label(quantity))
-            elif quantity not in differing:
+            if judge.explained(key, predicted, mistake.times):
+                if key in differing:
+                    explained.append(table.label(key))
+            elif key not in differing:
                 broken = mistake.whole
             else:
-                before, _ = judged(quantity, getattr(right, quantity), values)
-                if np.all(NEARER * error <= before):
-                    nearer.append(table.label(quantity))
+                where = judge.where(key)
+                before, after = (judge.judged(key, values)[0][where] for values in (judge.ours(key), predicted))
+                if np.all(NEARER * after <= before):
+                    nearer.append(table.label(key))
         if (explained or nearer) and not broken:
             complete = len(explained) == len(differing)
             found.append(Explanation(mistake.text, tuple(explained), complete, tuple(nearer)))

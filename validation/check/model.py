@@ -13,10 +13,11 @@ from typing import Any
 
 from fourbar.errors import FourBarError, InputError
 from fourbar.scene import Scene
-from fourbar.show.under_way import under_way
+from fourbar.show.progress import running
 from fourbar.solve import solve
 from fourbar.writing import write_text
-from validation.check.differences import Difference, Value, differences
+from validation.check.causes import Cause, causes
+from validation.check.differences import differences
 from validation.check.screen import read_mjcf
 from validation.compare.answer import Answer
 from validation.compare.compare import COMPARED, compare
@@ -30,21 +31,25 @@ from validation.report.templating import number
 
 SECONDS = 120.0
 """A four-bar takes less than one."""
-DIFFERENCES = ("what differs", "generated", "theirs", "what it does")
+ABOUT_SHARES = (
+    "share: of the error of that quantity, what goes when this one entry alone is as generated; "
+    "a dash: it cannot be mended alone in the compiled file"
+)
 HEADINGS = ("quantity", "theirs", "generated", "allowed", "verdict")
 EXAMINE = "validation.engines.mujoco.theirs:examine"
+MENDED = "validation.engines.mujoco.theirs:examine_mended"
 
 
 @dataclass(frozen=True, slots=True)
 class Cost:
-    """One quantity, asked in one way: the error of their file, and of the generated one beside it."""
+    """One quantity by one method: the error of their file, and of the generated one."""
 
     row: Row
     generated: float
 
     @property
-    def asked(self) -> str:
-        """How."""
+    def method(self) -> str:
+        """Engine and setting."""
         return f"{self.row.engine} {self.row.setting}"
 
     def cells(self) -> tuple[str, ...]:
@@ -56,15 +61,16 @@ class Cost:
 
 @dataclass(frozen=True, slots=True)
 class ModelReport:
-    """All that is said about somebody's file."""
+    """All that is reported of somebody's file."""
 
-    differences: list[Difference]
+    causes: list[Cause]
+    """What differs, the worst first."""
     costs: list[Cost]
     notes: list[str]
 
-    def asked(self) -> list[str]:
-        """The ways in which their file was asked."""
-        return list(dict.fromkeys(cost.asked for cost in self.costs))
+    def methods(self) -> list[str]:
+        """The methods by which their file was evaluated."""
+        return list(dict.fromkeys(cost.method for cost in self.costs))
 
     @property
     def counts(self) -> Counts:
@@ -87,13 +93,17 @@ def named(pairs: tuple[str, ...]) -> dict[str, str]:
 def examine_model(
     name: str, scene: Scene, mjcf: Path, names: Mapping[str, str], tolerance: Tolerance = SIMULATED
 ) -> ModelReport:
-    """Examine a file in a guarded process, and the generated one in the same way; theirs is held to the tolerance."""
+    """Examine a file in a guarded process, and the generated one likewise; theirs is held to the tolerance."""
     text = read_mjcf(mjcf)
     generated, theirs = _guarded(scene, None, {}), _guarded(scene, text, names)
-    beside = {(row.engine, row.quantity): row.error for row in _rows(name, scene, generated.answers, SIMULATED)}
+    ours = {(row.engine, row.quantity): row.error for row in _rows(name, scene, generated.answers, SIMULATED)}
     rows = _rows(name, scene, theirs.answers, tolerance)
-    costs = [Cost(row, beside.get((row.engine, row.quantity), math.nan)) for row in rows]
-    return ModelReport(differences(generated.described, theirs.described, theirs.called), costs, theirs.notes)
+    costs = [Cost(row, ours.get((row.engine, row.quantity), math.nan)) for row in rows]
+    found = differences(generated.described, theirs.described, theirs.called)
+    entries = [(difference.key, difference.generated) for difference in found]
+    mended = _guarded(scene, text, theirs.names, entries, examine=MENDED) if any(row.failed for row in rows) else []
+    after = [[] if answers is None else _rows(name, scene, answers, tolerance) for answers in mended]
+    return ModelReport(causes(found, rows, after), costs, theirs.notes)
 
 
 def _rows(name: str, scene: Scene, answers: list[Answer], tolerance: Tolerance) -> list[Row]:
@@ -104,15 +114,17 @@ def _rows(name: str, scene: Scene, answers: list[Answer], tolerance: Tolerance) 
     return found
 
 
-def _guarded(scene: Scene, text: str | None, names: Mapping[str, str]) -> Any:
+def _guarded(
+    scene: Scene, text: str | None, names: Mapping[str, str], *more: object, examine: str | None = None
+) -> Any:
     """The examination, in a process that may crash, hang or run out of memory."""
     from multiprocessing import get_context
 
     from pebble import ProcessExpired, ProcessPool
 
-    waiting = under_way(f"MuJoCo examines the file, in {SECONDS:g} s at most")
+    waiting = running(f"MuJoCo examines the file, in {SECONDS:g} s at most")
     with waiting, ProcessPool(max_workers=1, context=get_context("spawn"), initializer=_confine) as pool:
-        future = pool.schedule(_examine, args=(EXAMINE, scene, text, dict(names)), timeout=SECONDS)
+        future = pool.schedule(_examine, args=(examine or EXAMINE, scene, text, dict(names), *more), timeout=SECONDS)
         try:
             return future.result()
         except FourBarError:
@@ -135,71 +147,59 @@ def _confine() -> None:
     bound_memory()
 
 
-def _examine(adapter: str, scene: Scene, text: str | None, names: dict[str, str]) -> Any:
+def _examine(adapter: str, *arguments: object) -> Any:
     from importlib import import_module
 
     module, _, function = adapter.partition(":")
-    return getattr(import_module(module), function)(scene, text, names)
+    return getattr(import_module(module), function)(*arguments)
 
 
-def tell(report: ModelReport, mjcf: Path, out: Path) -> None:
+def show(report: ModelReport, mjcf: Path, out: Path) -> None:
     """Print the report and write theirs.md and results.csv."""
     from rich.box import SIMPLE_HEAD
     from rich.console import Console
     from rich.markup import escape
+    from rich.padding import Padding
     from rich.table import Table
 
     console = Console()
-    shown = Table(title=f"{escape(plain(mjcf.name))} against the generated MJCF", box=SIMPLE_HEAD)
-    for heading in DIFFERENCES:
-        shown.add_column(heading, overflow="fold")
-    for d in report.differences:
-        shown.add_row(*(escape(plain(text)) for text in entries(d)))
-    console.print(shown if report.differences else "It differs in nothing from the generated MJCF.")
+    if not report.causes:
+        console.print("It differs in nothing from the generated MJCF.")
+    else:
+        console.print(f"{escape(plain(mjcf.name))} against the generated MJCF, the worst cause first")
+        console.print(f"[dim]{ABOUT_SHARES}[/]\n")
+    for cause in report.causes:
+        style = "bold" if cause.share is not None and cause.share >= 0.5 else ""
+        console.print(f"{cause.percent():>12}  {escape(plain(cause.line()))}", style=style)
+        for text in cause.texts():
+            console.print(Padding(escape(plain(text)), (0, 0, 0, 14)))
     for note in report.notes:
         console.print(f"note: {escape(plain(note))}")
-    for asked in report.asked():
-        costs = Table(title=f"what it costs, {escape(plain(asked))}: error", box=SIMPLE_HEAD, pad_edge=False)
+    for method in report.methods():
+        costs = Table(title=f"what it costs, {escape(plain(method))}: error", box=SIMPLE_HEAD, pad_edge=False)
         for heading in HEADINGS:
             costs.add_column(heading, overflow="fold")
         for cost in report.costs:
-            if cost.asked == asked:
+            if cost.method == method:
                 style = "bold red" if cost.row.failed else ""
                 costs.add_row(*(escape(plain(text)) for text in cost.cells()), style=style)
         console.print(costs)
     out.mkdir(parents=True, exist_ok=True)
     write_text(out / "theirs.md", markdown(report, mjcf))
     write_results([cost.row for cost in report.costs], out / "results.csv")
-    said = f"{report.counts.sentence()}. It differs in {len(report.differences)} entries"
-    console.print(f"[bold]{said}[/]; written to {escape(plain(str(out)))}")
+    sentence = f"{report.counts.sentence()}. It differs in {len(report.causes)} entries"
+    console.print(f"[bold]{sentence}[/]; written to {escape(plain(str(out)))}")
 
 
 def markdown(report: ModelReport, mjcf: Path) -> str:
     """The same as text for a page."""
-    lines = [
-        f"# {cell(plain(mjcf.name))} against the generated MJCF",
-        "",
-        f"| {' | '.join(DIFFERENCES)} |",
-        "|---|---|---|---|",
-    ]
-    for d in report.differences:
-        lines.append("| " + " | ".join(cell(plain(text)) for text in entries(d)) + " |")
+    lines = [f"# {cell(plain(mjcf.name))} against the generated MJCF", "", ABOUT_SHARES, ""]
+    lines += ["| share | what differs | generated | theirs | what it does |", "|---|---|---|---|---|"]
+    for cause in report.causes:
+        lines.append("| " + " | ".join(cell(plain(text)) for text in cause.cells()) + " |")
     lines += ["", *(f"- {cell(plain(note))}" for note in report.notes), "", "## What it costs", ""]
     lines += [f"{report.counts.sentence()}.", ""]
-    lines += [f"| asked | {' | '.join(HEADINGS)} |", "|---|---|---|---|---|---|"]
+    lines += [f"| method | {' | '.join(HEADINGS)} |", "|---|---|---|---|---|---|"]
     for cost in report.costs:
-        lines.append("| " + " | ".join(cell(plain(text)) for text in (cost.asked, *cost.cells())) + " |")
+        lines.append("| " + " | ".join(cell(plain(text)) for text in (cost.method, *cost.cells())) + " |")
     return "\n".join(lines) + "\n"
-
-
-def entries(difference: Difference) -> tuple[str, ...]:
-    """Under DIFFERENCES; the first says how it stands in their file."""
-    d = difference
-    return f"{d.key} ({d.written})" if d.written else d.key, value(d.generated), value(d.theirs), d.remark
-
-
-def value(entry: Value) -> str:
-    """Numbers with the digits that tell them apart, or the word itself."""
-    if isinstance(entry, str):
-        return entry
-    return " ".join(f"{x:.12g}" for x in (entry if isinstance(entry, tuple) else (entry,)))

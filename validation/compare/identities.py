@@ -77,8 +77,9 @@ def _sums(name: str, scene: Scene, at: Command, solution: Solution, ours: Answer
     first_pins = {2: np.zeros(2), 3: solution.A, 4: O4}
     for number in MOVING_BARS:
         bar = scene.linkage.bar(number)
-        resultant = np.broadcast_to(acting[number - 2], n)
-        load, couple = np.stack([resultant.real, resultant.imag], axis=1), acting[number + 1]
+        force_on, couple = acting.on(number)
+        resultant = np.broadcast_to(force_on, n)
+        load = np.stack([resultant.real, resultant.imag], axis=1)
         centre, acceleration = getattr(solution, f"G{number}"), getattr(solution, f"a_G{number}")
         alpha = getattr(solution, f"alpha_{number}")
         force = force + load - bar.mass * acceleration

@@ -1,4 +1,4 @@
-"""`python -m validation accept` and `compare`."""
+"""`python -m validation compare`, `accept` and `history`."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -8,9 +8,11 @@ import click
 
 from fourbar.errors import InputError
 from fourbar.writing import write_text
+from validation.compare.rows import Row
 from validation.regression import render
 from validation.regression.changes import Differences, differences
-from validation.regression.record import ACCEPTED, accept, baseline, read_run
+from validation.regression.history import HISTORY, append
+from validation.regression.record import ACCEPTED, accept, baseline, read_run, read_times
 
 FORMS: dict[str, Callable[[Differences], str]] = {
     "markdown": render.markdown,
@@ -18,6 +20,8 @@ FORMS: dict[str, Callable[[Differences], str]] = {
     "junit": render.junit,
 }
 """Forms in which the differences can be written, besides the text that is printed."""
+CHOICES = {"only": "scene", "engines": "engine", "quantity": "quantity"}
+"""Option, and the column that it chooses by."""
 
 
 def output_options(command: Callable[..., Any]) -> Callable[..., Any]:
@@ -28,9 +32,24 @@ def output_options(command: Callable[..., Any]) -> Callable[..., Any]:
     return command
 
 
-def told(old: Path, new: Path, forms: dict[str, Path | None]) -> int:
-    """Print the differences, write the forms asked for; 1 on a regression, or where nothing was compared."""
-    found = differences(read_run(old), read_run(new))
+def choosing_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """The options --only, --engines and --quantity."""
+    for option, column in reversed(CHOICES.items()):
+        text = f"Compare these alone, comma-separated: names of column {column}."
+        command = click.option(f"--{option}", metavar="NAMES", help=text)(command)
+    return command
+
+
+def report_differences(
+    old: Path, new: Path, forms: dict[str, Path | None], chosen: dict[str, str | None] | None = None
+) -> int:
+    """Print the differences, write the forms wanted; 1 on a regression, or where nothing was compared."""
+    (before, old_rows), (after, new_rows) = read_run(old), read_run(new)
+    times = read_times(old), read_times(new)
+    if chosen:
+        keep = _choice(chosen, [*old_rows, *new_rows])
+        old_rows, new_rows = ([row for row in rows if keep(row)] for rows in (old_rows, new_rows))
+    found = differences((before, old_rows), (after, new_rows), times)
     for form, path in forms.items():
         if path is not None:
             write_text(path, FORMS[form](found))
@@ -38,24 +57,84 @@ def told(old: Path, new: Path, forms: dict[str, Path | None]) -> int:
     return found.status
 
 
+def _choice(chosen: dict[str, str | None], rows: list[Row]) -> Callable[[Row], bool]:
+    """Whether a row is of what the options name; InputError for a name that neither run has."""
+    wanted: dict[str, set[str]] = {}
+    for option, text in chosen.items():
+        if text is None:
+            continue
+        names = {name.strip() for name in text.split(",") if name.strip()}
+        known = {getattr(row, CHOICES[option]) for row in rows}
+        for name in sorted(names - known) or ([] if names else [text]):
+            raise InputError(f"--{option}", name, "must be among " + ", ".join(sorted(known)))
+        wanted[CHOICES[option]] = names
+    return lambda row: all(getattr(row, column) in names for column, names in wanted.items())
+
+
 @click.command()
 @click.argument("old")
 @click.argument("new", type=click.Path(path_type=Path))
+@choosing_options
 @output_options
-def compare(old: str, new: Path, **forms: Path | None) -> int:
+def compare(
+    old: str, new: Path, only: str | None, engines: str | None, quantity: str | None, **forms: Path | None
+) -> int:
     """Say what changed from OLD (a run's folder, its results.csv, or an accepted name) to NEW.
 
+    Scenes that changed come first, entry by entry; their rows, and those with other settings or at other
+    positions, are named and not compared. What was not wanted of the new run is "not run", and no regression.
     Exit status 1 on a regression: a verdict that got worse, an error that grew beyond round-off,
-    a row that is gone, a new row that fails; and where nothing was compared.
+    a row that was run for and is gone, a new row that fails; and where nothing was compared.
     """
-    return told(baseline(old), new, forms)
+    return report_differences(baseline(old), new, forms, {"only": only, "engines": engines, "quantity": quantity})
 
 
 @click.command(name="accept")
 @click.argument("results", type=click.Path(path_type=Path))
-@click.option("--as", "name", default=ACCEPTED, show_default=True, help="Name of the accepted state.")
-def accept_command(results: Path, name: str) -> None:
-    """Record RESULTS (a run's folder) as the accepted state that later runs are compared with."""
-    if not name or name in (".", "..") or not all(c.isalnum() or c in "-_." for c in name):
-        raise InputError("--as", name, "must be letters, digits, '-', '_' or '.'")
-    click.echo(f"accepted as {name}: {accept(results, name)}")
+@click.option("--to", type=click.Path(path_type=Path, file_okay=False), metavar="DIR",
+              help=f"Keep it there; left out: {ACCEPTED}/ next to RESULTS.")  # fmt: skip
+def accept_command(results: Path, to: Path | None) -> None:
+    """Record RESULTS (a run's folder) as the accepted state that later runs are compared with.
+
+    It is kept in DIR, and appended to DIR/history.parquet, of which `history` makes a page.
+    """
+    folder = results if results.is_dir() else results.parent
+    target = folder.absolute().parent / ACCEPTED if to is None else to
+    if target.resolve() == folder.resolve():
+        raise InputError("--to", str(target), "must be another folder than that of the results")
+    run = read_run(results)
+    accept(results, run, target)
+    append(target / HISTORY, run, read_times(results))
+    click.echo(f"accepted: {target} ({len(run[1])} rows; appended to {target / HISTORY})")
+
+
+@click.command()
+@click.argument("history", type=click.Path(path_type=Path))
+@click.option("--add", type=click.Path(path_type=Path), metavar="RESULTS", help="Append this run first.")
+@click.option("-o", "--out", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE",
+              help="Page to write; left out: history.html next to HISTORY.")  # fmt: skip
+@choosing_options
+def history(
+    history: Path, add: Path | None, out: Path | None, only: str | None, engines: str | None, quantity: str | None
+) -> None:
+    """Show HISTORY (a file history.parquet, or the folder that holds it) over time, as a page with charts.
+
+    Error, verdict and time by date, commit and engine version, and the step at which each row changed.
+    """
+    from validation.regression.history import read_history
+    from validation.regression.history_page import page
+    from validation.regression.steps import steps
+
+    file = history / HISTORY if history.is_dir() or not history.suffix else history
+    if add is not None:
+        append(file, read_run(add), read_times(add))
+    runs = read_history(file)
+    keep = _choice({"only": only, "engines": engines, "quantity": quantity}, [row for run in runs for row in run.rows])
+    runs = [run.of(keep) for run in runs]
+    found = steps(runs)
+    target = file.with_name("history.html") if out is None else out
+    write_text(target, page(runs, found))
+    for step in found:
+        click.echo(step.sentence())
+    changed = f"{len(found)} step{'s' if len(found) > 1 else ''} changed something" if found else "nothing changed"
+    click.echo(f"{len(runs)} runs, {changed}: {target}")

@@ -1,9 +1,12 @@
-"""A recorded run: its table and the versions, machine and settings it was made with."""
+"""A recorded run: its table and the versions, machine, settings and scenes it was made with."""
 
 import csv
 import json
+import os
+import subprocess
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -15,9 +18,10 @@ from validation.compare.rows import Row, from_csv, to_csv
 from validation.compare.tolerance import SIMULATED, K
 from validation.report.machine import machine, versions
 
-BASELINES = Path(__file__).parent
+SHIPPED = Path(__file__).parent
+"""Where the accepted state of the models of this project is."""
 ACCEPTED = "accepted"
-TABLE, COLUMNS, ABOUT = "results.csv", "results.parquet", "record.json"
+TABLE, COLUMNS, ABOUT, TIMINGS = "results.csv", "results.parquet", "record.json", "timings.csv"
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,18 +31,44 @@ class About:
     versions: dict[str, str]
     machine: str
     settings: dict[str, str]
-    """Engines asked, suite, and the factors of the tolerances."""
+    """Engines, suite, and the factors of the tolerances."""
+    scenes: dict[str, dict[str, str]] = field(default_factory=dict)
+    """What each scene asks, by its name; empty in older records and in suites too long for it."""
+    date: str = ""
+    """UTC, ISO 8601; empty in older records."""
+    commit: str = ""
+    """Of the checkout that the run was made in; empty where it is none."""
+
+    @property
+    def engines(self) -> set[str] | None:
+        """Those that were run; None where nothing is known of it."""
+        names = self.settings.get("engines")
+        return None if names is None else set(filter(None, names.split(", ")))
 
 
-def about(factors: Mapping[str, float], suite: str) -> About:
+def about(factors: Mapping[str, float], suite: str, scenes: Mapping[str, Mapping[str, str]] | None = None) -> About:
     """The record of a run made here and now; `factors` are the errors allowed to each engine at condition 1."""
     simulated = factors.get("mujoco-simulated", SIMULATED.factor)
     settings = {"engines": ", ".join(factors), "suite": suite, "K": repr(K), "simulated": repr(simulated)}
-    return About(versions(), machine(), settings)
+    described = {name: dict(entries) for name, entries in (scenes or {}).items()}
+    now = datetime.now(UTC).isoformat(timespec="seconds")
+    return About(versions(), machine(), settings, described, now, _commit())
+
+
+def _commit() -> str:
+    """Of the folder of this harness, marked where it holds what is not committed; what CI says of itself first."""
+    if stated := os.environ.get("GITHUB_SHA") or os.environ.get("CI_COMMIT_SHA"):
+        return stated[:12]
+    command = ["git", "describe", "--always", "--dirty", "--abbrev=12", "--exclude=*"]
+    try:
+        done = subprocess.run(command, cwd=SHIPPED, capture_output=True, text=True, check=True, timeout=10)
+    except (OSError, subprocess.SubprocessError):
+        return ""
+    return done.stdout.strip()
 
 
 def write_about(record: About, folder: Path) -> None:
-    """Write record.json beside the results."""
+    """Write record.json next to the results."""
     write_text(folder / ABOUT, json.dumps(asdict(record), indent=1, sort_keys=True) + "\n")
 
 
@@ -57,34 +87,55 @@ def read_run(path: Path) -> tuple[About, list[Row]]:
         rows = list(read_columns(table)) if table.suffix == ".parquet" else from_csv(table)
     except (KeyError, TypeError, ValueError, csv.Error):  # a column, a cell or a number is missing, or it is no text
         raise InputError("RESULTS", str(table), "is not a table written by `run`") from None
-    beside = table.parent / ABOUT
-    if not beside.is_file():
+    record = table.parent / ABOUT
+    if not record.is_file():
         return About({}, "unknown machine", {}), rows
     try:
-        return _about(json.loads(beside.read_text(encoding="utf-8"))), rows
+        return about_of(json.loads(record.read_text(encoding="utf-8"))), rows
     except (AttributeError, KeyError, TypeError, ValueError, RecursionError):
-        raise InputError("RESULTS", str(beside), "is not a record written by `run`") from None
+        raise InputError("RESULTS", str(record), "is not a record written by `run`") from None
 
 
-def _about(kept: dict[str, Any]) -> About:
+def about_of(kept: dict[str, Any]) -> About:
     """What a file says of a run; its words are somebody's text."""
-    versions, settings = (
-        {plain(key): plain(value) for key, value in kept[name].items()} for name in ("versions", "settings")
-    )
-    return About(versions, plain(kept["machine"]), settings)
+    versions, settings = (_plain(kept[name]) for name in ("versions", "settings"))
+    scenes = {plain(name): _plain(entries) for name, entries in kept.get("scenes", {}).items()}
+    date, commit = (plain(kept.get(name, "")) for name in ("date", "commit"))
+    return About(versions, plain(kept["machine"]), settings, scenes, date, commit)
 
 
-def accept(run: Path, name: str = ACCEPTED) -> Path:
-    """Keep a run as the accepted state of that name; the folder it is kept in."""
-    record, rows = read_run(run)
-    target = BASELINES / name
-    target.mkdir(parents=True, exist_ok=True)
-    write_text(target / TABLE, to_csv(rows))
-    write_about(record, target)
-    return target
+def _plain(entries: dict[str, str]) -> dict[str, str]:
+    return {plain(key): plain(value) for key, value in entries.items()}
+
+
+def read_times(path: Path) -> dict[tuple[str, str], float]:
+    """Times of each engine on each scene over the formulas' there, by (scene, engine); empty where none were kept."""
+    table = (path if path.is_dir() else path.parent) / TIMINGS
+    if not table.is_file():
+        return {}
+    try:
+        with table.open(newline="", encoding="utf-8") as file:
+            return {
+                (plain(row["scene"]), plain(row["engine"])): float(row["times_formulas"])
+                for row in csv.DictReader(file)
+            }
+    except (KeyError, TypeError, ValueError, csv.Error):
+        raise InputError("RESULTS", str(table), "is not a table of times written by `run`") from None
 
 
 def baseline(name_or_path: str) -> Path:
-    """A baseline by its name, or any run by its path."""
-    named = BASELINES / name_or_path
-    return named if named.is_dir() else Path(name_or_path)
+    """A run by its path, or the accepted state of this project's models by its name."""
+    if not Path(name_or_path).exists() and (SHIPPED / name_or_path / TABLE).is_file():
+        return SHIPPED / name_or_path
+    return Path(name_or_path)
+
+
+def accept(results: Path, run: tuple[About, list[Row]], target: Path) -> None:
+    """Keep a run, with its times, as the accepted state in a folder."""
+    record, rows = run
+    target.mkdir(parents=True, exist_ok=True)
+    write_text(target / TABLE, to_csv(rows))
+    write_about(record, target)
+    times = (results if results.is_dir() else results.parent) / TIMINGS
+    if times.is_file():
+        write_text(target / TIMINGS, times.read_text(encoding="utf-8"))

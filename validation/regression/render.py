@@ -1,10 +1,14 @@
 """Differences as text, Markdown, HTML and JUnit XML."""
 
-from validation.regression.changes import Change, Differences, Kind
+from collections.abc import Iterator
+
+from validation.regression.changes import OTHER_QUESTION, Change, Differences, Kind
+from validation.report.junit import Case, document
 from validation.report.markdown import cell
 from validation.report.templating import environment, number
 
-TOLD = tuple(kind for kind in Kind if kind not in (Kind.SAME, Kind.ROUND_OFF))
+SHOWN = tuple(kind for kind in Kind if kind not in (Kind.SAME, Kind.ROUND_OFF, Kind.NOT_RUN, *OTHER_QUESTION))
+"""Listed row by row; what was not run, or is another question, is named as a whole."""
 AT_MOST = 50
 """Rows of one kind listed in text and Markdown."""
 
@@ -36,9 +40,13 @@ def line(change: Change) -> str:
 
 
 def text(found: Differences) -> str:
-    """For a terminal."""
-    lines = [f"{what}: {old} -> {new}" for what, old, new in found.surroundings]
-    for kind in TOLD:
+    """For a terminal: what is another question first, then what it was made with, then the rows."""
+    lines = [*map(str, found.scenes), *found.notes]
+    lines += [f"{what}: {old} -> {new}" for what, old, new in found.surroundings]
+    lines += [f"not compared: {name}" for name in found.not_compared]
+    lines += [f"not run: {name}" for name in found.not_run]
+    lines += [f"time: {change}" for change in found.slower]
+    for kind in SHOWN:
         changes = found.of(kind)
         lines += [f"{kind.value}: {line(change)}" for change in changes[:AT_MOST]]
         if len(changes) > AT_MOST:
@@ -46,14 +54,27 @@ def text(found: Differences) -> str:
     return "\n".join([*lines, verdict(found)]) + "\n"
 
 
+def other_questions(found: Differences) -> list[tuple[str, list[str]]]:
+    """What is another question, was not run, or took longer, under its headings."""
+    parts = {
+        "The scenes changed": [*map(str, found.scenes), *found.notes],
+        "Not compared": found.not_compared,
+        "Not run": found.not_run,
+        "Times": [*map(str, found.slower)],
+    }
+    return [(heading, texts) for heading, texts in parts.items() if texts]
+
+
 def markdown(found: Differences) -> str:
     """For a comment on a pull request."""
     lines = [f"# {verdict(found)}", ""]
+    for heading, texts in other_questions(found):
+        lines += [f"## {heading}", "", *(f"- {cell(text)}" for text in texts), ""]
     if found.surroundings:
         lines += ["| made with | old | new |", "|---|---|---|"]
         lines += [f"| {cell(what)} | {cell(old)} | {cell(new)} |" for what, old, new in found.surroundings]
         lines.append("")
-    for kind in TOLD:
+    for kind in SHOWN:
         if changes := found.of(kind):
             lines += [f"## {kind.value}: {len(changes)}", ""]
             lines += [f"- {cell(line(change))}" for change in changes[:AT_MOST]]
@@ -65,9 +86,9 @@ def markdown(found: Differences) -> str:
 
 def html(found: Differences) -> str:
     """A page of its own."""
-    kinds = [(kind, found.of(kind)) for kind in TOLD if found.of(kind)]
+    kinds = [(kind, found.of(kind)) for kind in SHOWN if found.of(kind)]
     template = environment("validation.regression", escape=True).get_template("changes.html.j2")
-    return template.render(found=found, verdict=verdict(found), kinds=kinds)
+    return template.render(found=found, verdict=verdict(found), kinds=kinds, questions=other_questions(found))
 
 
 def junit(found: Differences) -> str:
@@ -75,28 +96,20 @@ def junit(found: Differences) -> str:
 
     A regression is a failure, and so is a row that fails as it did before; what was not compared is skipped.
     """
-    from junitparser import Failure, JUnitXml, Skipped, TestCase, TestSuite
+    return document(verdict(found), _cases(found))
 
-    report = JUnitXml(verdict(found))
-    suites: dict[str, TestSuite] = {}
+
+def _cases(found: Differences) -> Iterator[Case]:
     for change in found.changes:
         scene, engine, setting, quantity = change.key
-        suite = suites.setdefault(scene, TestSuite(scene))
-        case = TestCase(quantity, classname=f"{scene}.{engine} {setting}", time=0.0)
+        name, kind = (scene, f"{scene}.{engine} {setting}", quantity), change.kind.value
         if change.regression or (change.new is not None and change.new.failed):
-            case.result = [Failure(line(change), change.kind.value)]
+            yield Case(*name, "failure", kind, line(change))
         elif change.new is None:
-            case.result = [Skipped(line(change), change.kind.value)]
+            yield Case(*name, "skipped", kind, line(change))
         elif not change.new.compared:
-            case.result = [Skipped(f"{change.new.verdict}: {change.new.reason}", change.kind.value)]
-        suite.add_testcase(case)
+            yield Case(*name, "skipped", kind, f"{change.new.verdict}: {change.new.reason}")
+        else:
+            yield Case(*name, "passed")
     if found.nothing:
-        suites[""] = TestSuite("all scenes")
-        case = TestCase("anything is compared", classname="all scenes", time=0.0)
-        case.result = [Failure(verdict(found), "nothing compared")]
-        suites[""].add_testcase(case)
-    for suite in suites.values():
-        report.add_testsuite(suite)
-    report.update_statistics()  # type: ignore[no-untyped-call]
-    xml: str | bytes = report.tostring()  # type: ignore[no-untyped-call]
-    return xml if isinstance(xml, str) else xml.decode("utf-8")
+        yield Case("all scenes", "all scenes", "anything is compared", "failure", "nothing compared", verdict(found))

@@ -29,6 +29,8 @@ STRETCHES = 24
 FLOOR = EPS / 16.0
 """Errors below this, zero among them, are drawn here."""
 TORQUE_AND_FORCE = ("torque", "F32")
+MOTION_AND_FORCE = ("theta_4", "F32")
+"""Of a released linkage: its torque is rounding."""
 SUBSCRIPT = str.maketrans("234", "₂₃₄")
 
 
@@ -47,6 +49,8 @@ def _answers(record: Record, solution: Solution) -> str:
     """One SVG per quantity: values above, errors of the simulation and of the exact engines on axes of their own."""
     answers = [answer for answer in record.answers if answer.refusal is None and answer.quantities]
     shown = TORQUE_AND_FORCE if solution.torque is not None else ANGLES
+    if record.scene is not None and record.scene.motion.free is not None:
+        shown = MOTION_AND_FORCE
     return "".join(_picture(quantity, record, solution, answers) for quantity in shown)
 
 

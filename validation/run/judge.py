@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from fourbar.errors import LimitError
+from fourbar.mjcf.settings import LIGHT
 from fourbar.quantities import FORCES
 from fourbar.scene import Command, Scene, command
 from fourbar.solution import Solution
@@ -105,6 +106,9 @@ def _judged(name: str, scene: Scene, at: Command, solution: Solution, answer: An
     formulas = solution if theirs is at else solve(scene, _stage(theirs), at=theirs)
     predicted = predicting_from(witness, scene, theirs, answer)
     rows = compare(name, scene, answer, formulas, witness.tolerance, witness.expected, predicted)
+    if (ratio := answer.evidence.get("mass_ratio", 1.0)) > LIGHT:
+        why = f"; of coupler and output one is {ratio:.1e} times lighter"
+        rows = [replace(row, reason=row.reason + why) if row.failed else row for row in rows]
     answers = answer.assembled is not None and len(answer.assembled) == len(formulas)  # otherwise a row has failed
     if answers and answer.at is not None and {"theta_3", "theta_4"} <= answer.quantities.keys():
         rows.append(closure(name, scene, answer, witness.tolerance))

@@ -19,8 +19,9 @@ from validation.engines.hard_suite import Hard
 from validation.engines.mujoco.picture import pictures
 from validation.engines.witnesses import Witness
 from validation.published import ladder_rows
-from validation.regression.accept import output_options, told
+from validation.regression.accept import output_options, report_differences
 from validation.regression.record import about, baseline, read_run, write_about
+from validation.regression.scenes import descriptions
 from validation.report import cost_section, hard_section
 from validation.report.html import Section, html
 from validation.report.machine import versions
@@ -84,7 +85,7 @@ def run(
         summary = summarise(store.records(len(chunks)), ladder, held_to, missing)
         first_lines = write_columns(store.rows(len(chunks)), out)
         factors = {witness.name: witness.tolerance.factor for witness in witnesses}
-        write_about(about(factors, suite.fingerprint()), out)
+        write_about(about(factors, suite.fingerprint(), descriptions(suite)), out)
         write_text(out / "timings.csv", timings_csv(store.records(len(chunks))))
         write_text(out / "report.md", markdown(summary))
         drawn, why_not = mjcf_pictures(suite) if draw and simulated else ({}, "")
@@ -137,7 +138,7 @@ def timings_csv(records: Iterator[Record]) -> str:
 
 def examine(scenes: tuple[Path, ...], mjcf: Path, names: tuple[str, ...], out: Path, wanted: float | None) -> int:
     """What a user's own MJCF of one scene differs in, and what it costs; 1 where it is wrong by more than wanted."""
-    from validation.check.model import examine_model, named, tell
+    from validation.check.model import examine_model, named, show
     from validation.run.dial import held_to
 
     if len(scenes) != 1:
@@ -145,13 +146,15 @@ def examine(scenes: tuple[Path, ...], mjcf: Path, names: tuple[str, ...], out: P
     suite = scene_files(scenes)
     tolerance = SIMULATED if wanted is None else held_to(wanted, "what this file may be wrong by")
     report = examine_model(suite.name(0), suite.scene(0), mjcf, named(names), tolerance)
-    tell(report, mjcf, out)
+    show(report, mjcf, out)
     return report.counts.status
 
 
 @click.command(name="run")
 @click.argument("scenes", nargs=-1, type=click.Path(path_type=Path))
-@click.option("--out", type=click.Path(path_type=Path, file_okay=False), default=Path("results"), show_default=True)
+@click.option(
+    "-o", "--out", type=click.Path(path_type=Path, file_okay=False), default=Path("results"), show_default=True
+)
 @click.option("--engines", metavar="NAMES", help="Comma-separated witnesses; left out: all.")
 @click.option(
     "--error",
@@ -186,7 +189,14 @@ def examine(scenes: tuple[Path, ...], mjcf: Path, names: tuple[str, ...], out: P
     help="End what takes longer on one scene; left out: a minute, and more for many positions.",
 )
 @click.option("--mjcf", type=click.Path(path_type=Path), help="Examine this MJCF of the one SCENE instead.")
-@click.option("--name", "names", metavar="ROLE=NAME", multiple=True, help="Body or site of --mjcf named otherwise.")
+@click.option(
+    "--name",
+    "names",
+    metavar="ROLE=NAME",
+    multiple=True,
+    help="Of --mjcf: the body that is the input, coupler or output; B3, B4: the sites of pin B on the coupler and the "
+    "output, where no connect or weld closes the loop. Left out: guessed from structure and lengths, and printed.",
+)
 @output_options
 def command(
     scenes: tuple[Path, ...],
@@ -257,7 +267,7 @@ def command(
     how: dict[str, Any] = {"workers": workers, "scheduler": scheduler, "seconds": time_limit}
     result = _in_sight(len(suite), run(suite, out, present, published=published, missing=missing, **how))
     table(result, out)
-    worse = told(baseline(against), out, forms) if against is not None else 0
+    worse = report_differences(baseline(against), out, forms) if against is not None else 0
     if result.counts[FAILS] or worse:
         return FAILED
     if missing:

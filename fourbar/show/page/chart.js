@@ -1,12 +1,14 @@
 // ---- chart ---------------------------------------------------------------------------------
-const INPUT = [["theta_2", "\u03b8\u2082, deg", DEG], ["omega_2", "\u03c9\u2082, rad/s", 1], ["alpha_2", "\u03b1\u2082, rad/s\u00b2", 1]];
+const angle = (name, label) => [name, `${label}, deg`, DEG], other = (name, label, si) => [name, `${label}, ${nameOf(si)}`, inUnit(si, 1)];
+const INPUT = [angle("theta_2", "\u03b8\u2082"), other("omega_2", "\u03c9\u2082", "rad/s"), other("alpha_2", "\u03b1\u2082", "rad/s^2")];
 const QUANTITIES = [
   ...throughTime ? INPUT : [],
-  ["theta_3", "\u03b8\u2083, deg", DEG], ["theta_4", "\u03b8\u2084, deg", DEG],
-  ["omega_3", "\u03c9\u2083, rad/s", 1], ["omega_4", "\u03c9\u2084, rad/s", 1],
-  ["alpha_3", "\u03b1\u2083, rad/s\u00b2", 1], ["alpha_4", "\u03b1\u2084, rad/s\u00b2", 1],
-  ["energy", "kinetic energy, J", 1], ["torque", `torque on bar ${data.drive_bar}, N m`, 1],
-  ...FORCES.map(name => [name, `|F${name.slice(1).replace(/./g, d => "\u2080\u2081\u2082\u2083\u2084"[d])}|, N`, 1]),
+  angle("theta_3", "\u03b8\u2083"), angle("theta_4", "\u03b8\u2084"),
+  other("omega_3", "\u03c9\u2083", "rad/s"), other("omega_4", "\u03c9\u2084", "rad/s"),
+  other("alpha_3", "\u03b1\u2083", "rad/s^2"), other("alpha_4", "\u03b1\u2084", "rad/s^2"),
+  ...["A", "B", ...data.points.map(point => point.name)].flatMap(name => [other(`v_${name}`, `speed of ${name}`, "m/s"), other(`a_${name}`, `acceleration of ${name}`, "m/s^2")]),
+  other("energy", "kinetic energy", "J"), other("torque", `torque on bar ${data.drive_bar}`, "N m"),
+  ...FORCES.map(name => other(name, `|F${name.slice(1).replace(/./g, d => "\u2080\u2081\u2082\u2083\u2084"[d])}|`, "N")),
 ];
 const chart = byId("chart");
 let plotted = { values: [], x: () => 0, y: () => 0 };
@@ -16,7 +18,7 @@ function column(name) {
   const values = grid.map((_, i) => {
     const v = edited ? valuesAt(i)[name] : table()[name][i];
     if (v === null || v === undefined) return NaN;
-    return Array.isArray(v) ? (v[0] === null ? NaN : Math.hypot(v[0], v[1])) : v * factor;
+    return Array.isArray(v) ? (v[0] === null ? NaN : Math.hypot(v[0], v[1]) * factor) : v * factor;
   });
   if (name.startsWith("theta")) for (let i = 1; i < values.length; i++) values[i] -= 360 * Math.round((values[i] - values[i - 1]) / 360) || 0;
   return values;

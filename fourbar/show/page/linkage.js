@@ -51,3 +51,35 @@ function closingIntervals(lengths) {
   if (outer === Math.PI) return [[inner, 2 * Math.PI - inner]];
   return [[inner, outer], [-outer, -inner]];
 }
+
+// What the linkage is called, as fourbar.classify names it: the sums are exact, equality within the rounding of the lengths.
+const BAR_NAMES = { 1: "ground", 2: "input", 3: "coupler", 4: "output" };
+const GRASHOF = { 1: "double crank (drag link)", 2: "crank-rocker", 3: "double rocker", 4: "rocker-crank" };
+function typeName(lengths) {
+  const sum = terms => {
+    let total = 0, rest = 0;
+    for (const term of terms) {
+      const next = total + term;
+      rest += Math.abs(total) >= Math.abs(term) ? (total - next) + term : (term - next) + total;
+      total = next;
+    }
+    return total + rest;
+  };
+  const whole = sum(lengths), least = 0.5 * Number.EPSILON * whole;
+  const balance = (bar, other) => {
+    const total = sum(lengths.map((length, k) => k + 1 === bar || k + 1 === other ? length : -length));
+    return Math.abs(total) <= least ? 0 : total;
+  };
+  const shortest = lengths.indexOf(Math.min(...lengths)) + 1, longest = lengths.indexOf(Math.max(...lengths)) + 1;
+  if (sum([...lengths, -2 * lengths[longest - 1]]) <= least) return `structure (the ${BAR_NAMES[longest]} is as long as the other three)`;
+  const surplus = -balance(shortest, longest !== shortest ? longest : 4);
+  if (surplus > 0) return GRASHOF[shortest];
+  if (surplus < 0) return `triple rocker (longest: ${BAR_NAMES[longest]})`;
+  const opposite = balance(1, 3) === 0, withInput = balance(1, 2) === 0, withOutput = balance(1, 4) === 0;
+  if (opposite && withInput && withOutput) return "rhombus (triple change point)";
+  if (opposite + withInput + withOutput === 2) {
+    if (!opposite) return "parallelogram (crossed: antiparallelogram)";
+    return `kite (equal: ${withOutput ? "ground and input; coupler and output" : "ground and output; input and coupler"})`;
+  }
+  return `change-point ${GRASHOF[shortest]}`;
+}

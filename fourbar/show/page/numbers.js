@@ -11,7 +11,7 @@ const REASONS = {   // why a position has no forces, or more than one set of the
 };
 const FORCE_PIN = { F12: "O2", F32: "A", F43: "B", F14: "O4" };
 const SWEEP_SECONDS = 6, ROWS = 360;   // one sweep at speed 1; positions of a sweep whose lengths were edited
-const ORDINARY = 0.95, OUTLIER = 3, ROOM = 1.6;   // a scale ends at ROOM times the 95th percentile where values diverge
+const ORDINARY = 0.95, OUTLIER = 3, CLIPPED = 1.6;   // a scale ends at CLIPPED times the 95th percentile where values diverge
 const unit = data.unit, still = window.matchMedia("(prefers-reduced-motion: reduce)").matches;
 
 let lengths = data.lengths.slice(), edited = false, branch = data.branch, grid = data.theta_2, row = data.start;
@@ -35,6 +35,10 @@ function text(value, digits = 5) {
 const rounded = (value, digits) => Math.abs(value) < 1e6 ? String(Number(value.toPrecision(digits))) : text(value, digits + 2);
 const degrees = value => value === null || !Number.isFinite(value) ? "\u2013" : (value * DEG).toFixed(3).replace("-", "\u2212");
 
+// A number of an SI unit in the unit it is shown in, and that unit's name.
+const inUnit = (si, value) => value === null || value === undefined ? value : value * (data.units[si]?.[1] ?? 1);
+const nameOf = si => (data.units[si]?.[0] ?? si).replace("^2", "\u00b2");
+
 function valuesAt(i) {
   const t = table(), out = {};
   if (!edited) {
@@ -57,17 +61,17 @@ function showNumbers(i) {
   const v = valuesAt(i);
   for (const k of [2, 3, 4]) {
     byId(`theta_${k}`).textContent = degrees(v[`theta_${k}`] ?? null);
-    byId(`omega_${k}`).textContent = text(v[`omega_${k}`]);
-    byId(`alpha_${k}`).textContent = text(v[`alpha_${k}`]);
+    byId(`omega_${k}`).textContent = text(inUnit("rad/s", v[`omega_${k}`]));
+    byId(`alpha_${k}`).textContent = text(inUnit("rad/s^2", v[`alpha_${k}`]));
   }
   byId("condition").textContent = text(v.condition);
   const across = v.theta_3 === undefined || v.theta_3 === null ? null : Math.atan2(Math.abs(Math.sin(v.theta_4 - v.theta_3)), Math.abs(Math.cos(v.theta_4 - v.theta_3)));
   byId("mu").textContent = degrees(across);
-  byId("torque").textContent = text(v.torque);
-  byId("energy").textContent = text(v.energy);
+  byId("torque").textContent = text(inUnit("N m", v.torque));
+  byId("energy").textContent = text(inUnit("J", v.energy));
   if (dynamic()) {
     for (const name of FORCES) {
-      const f = v[name], known = f[0] !== null;
+      const f = v[name].map(component => inUnit("N", component)), known = f[0] !== null;
       byId(`${name}_x`).textContent = text(f[0]);
       byId(`${name}_y`).textContent = text(f[1]);
       byId(`${name}_size`).textContent = text(known ? Math.hypot(f[0], f[1]) : null);
@@ -85,7 +89,7 @@ function showNumbers(i) {
   if (!playing) {
     let words = assembled ? `Theta 2 ${here}, theta 3 ${degrees(v.theta_3)}, theta 4 ${degrees(v.theta_4)} degrees` : `Theta 2 ${here}: does not assemble`;
     if (timed()) words = `At ${instant} seconds: ` + words;
-    if (v.torque !== undefined && v.torque !== null) words += `, torque ${text(v.torque, 4)} newton metres`;
+    if (v.torque !== undefined && v.torque !== null) words += `, torque ${text(inUnit("N m", v.torque), 4)} ${nameOf("N m")}`;
     byId("live").textContent = words;
     byId("picture-text").textContent = `Four-bar linkage, ${branch === 1 ? "open" : "crossed"} branch. ${words}`;
   }

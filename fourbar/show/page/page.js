@@ -93,7 +93,32 @@ function nearest(theta) {
   return best;
 }
 
+// What speed 1 means, and whether positions were left out.
+function pace() {
+  if (timed()) return data.pace;
+  const turned = Math.abs(grid[grid.length - 1] - grid[0]), words = [`At speed 1\u00d7 one sweep takes ${SWEEP_SECONDS} s`];
+  if (data.omega_2) words[0] += `; at \u03c9\u2082 = ${rounded(inUnit("rad/s", data.omega_2), 4)} ${nameOf("rad/s")} the mechanism takes ${rounded(turned / Math.abs(data.omega_2), 3)} s`;
+  if (!edited && data.positions > grid.length) words.push(`Shown are ${grid.length} of the ${data.positions} positions`);
+  return words.join(". ") + ".";
+}
+
+// The scene file of what is shown: other lengths, with the range swept here, and the branch.
+function sceneFile() {
+  if (!edited && branch === data.branch) return data.toml;
+  let file = data.toml;
+  Object.values(BAR_NAMES).forEach((name, k) => { file = file.replace(new RegExp(`^${name} = .*$`, "m"), () => `${name} = "${lengths[k]} m"`); });
+  if (edited && !throughTime) {
+    const range = `theta_2 = { from = "${grid[0]} rad", to = "${grid[grid.length - 1]} rad", steps = ${grid.length - 1} }`;
+    file = file.replace(/^theta_2 = (\[[^\]]*\]|.*)\n/m, "").replace(/^\[motion\]\n/m, () => `[motion]\n${range}\n`);
+  }
+  return file.replace(/^branch = .*$/m, `branch = "${branch === 1 ? "open" : "crossed"}"`);
+}
+
 function refresh() {
+  showDimensions();
+  const type = typeName(lengths), was = typeName(data.lengths);
+  byId("type").textContent = type === was ? type : `${type}; with the original lengths ${was}`;
+  byId("pace").textContent = pace();
   byId("theta").max = grid.length - 1;
   byId("theta").disabled = grid.length < 2;
   byId("edited").hidden = !edited || !("F12" in table());
@@ -171,7 +196,7 @@ byId("branch").addEventListener("change", event => chooseBranch(Number(event.tar
 byId("quantity").addEventListener("change", () => { drawChart(); moveCursor(row); });
 for (const k of [1, 2, 3, 4]) byId(`length-${k}`).addEventListener("input", readLengths);
 byId("arrow-scale").addEventListener("change", () => { scaleForces(); draw(playing ? phase : row); });
-for (const name of ["labels", "centres", "curve", "forces", "pictures"]) byId(`show-${name}`).addEventListener("change", () => { scaleForces(); draw(playing ? phase : row); });
+for (const name of ["labels", "acting", "dimensions", "centres", "curve", "forces", "pictures"]) byId(`show-${name}`).addEventListener("change", () => { showDimensions(); scaleForces(); draw(playing ? phase : row); });
 document.addEventListener("keydown", event => {
   if (event.ctrlKey || event.metaKey || event.altKey) return;
   const own = event.target.closest("button, select, input, a");   // controls keep their own keys
@@ -187,11 +212,13 @@ document.addEventListener("keydown", event => {
 new ResizeObserver(() => { if (Math.max(280, picture.parentElement.clientWidth) !== view.width) refresh(); }).observe(picture.parentElement);
 
 byId("drive").textContent = data.drive_bar;
+for (const element of document.querySelectorAll("[data-unit]")) element.textContent = nameOf(element.dataset.unit);
 byId("branch").value = branch;
 for (const element of document.querySelectorAll(".unit")) element.textContent = unit.name;
 if (data.followed) byId("branch").options[branch === 1 ? 0 : 1].textContent += " (followed)";
 if (!Object.keys(data.pictures).length) byId("show-pictures").parentElement.hidden = true;
 if (!Object.values(data.centres).some(Boolean)) byId("show-centres").parentElement.hidden = true;
+if (!data.acting.length) byId("show-acting").parentElement.hidden = true;
 if (!dynamic()) byId("show-forces").parentElement.hidden = true;
 if (!dynamic()) byId("arrow-scale").parentElement.hidden = true;
 else {   // one scale for all positions, unless most arrows would then be too short to see
@@ -199,7 +226,10 @@ else {   // one scale for all positions, unless most arrows would then be too sh
   const most = ceiling(sizes);
   if (most.cut || sizes[Math.floor(0.5 * sizes.length)] < 0.1 * most.top) byId("arrow-scale").value = "position";
 }
-byId("pace").textContent = data.pace;
+byId("download").hidden = data.toml === null;
+byId("download").addEventListener("click", event => {
+  event.target.href = URL.createObjectURL(new Blob([sceneFile()], { type: "application/toml" }));
+});
 for (const [k, source] of Object.entries(data.pictures)) {
   const probe = new Image();
   probe.onload = () => { parts.image[k].ratio = probe.naturalHeight / probe.naturalWidth; draw(playing ? phase : row); };

@@ -9,6 +9,7 @@ function make(parent, name, attributes) {
 const set = (element, attributes) => { for (const key in attributes) element.setAttribute(key, attributes[key]); };
 const picture = byId("picture");
 const parts = { ground: make(picture, "g", {}), images: make(picture, "g", { id: "images" }), curve: make(picture, "path", { class: "path", id: "curve" }) };
+parts.traces = make(picture, "g", { id: "traces" });
 parts.bars = {}; parts.image = {};
 for (const k of [2, 3, 4]) {
   if (data.pictures[k]) parts.image[k] = make(parts.images, "image", { href: data.pictures[k], preserveAspectRatio: "none", id: `picture-${k}` });
@@ -30,7 +31,7 @@ for (const k of [2, 3, 4]) if (data.centres[k]) {
 }
 parts.labels = make(picture, "g", { id: "labels" });
 parts.label = {};
-for (const name of ["O2", "A", "B", "O4", "2", "3", "4", "G2", "G3", "G4", ...FORCES]) {
+for (const name of ["O2", "A", "B", "O4", "1", "2", "3", "4", "G2", "G3", "G4", ...FORCES]) {
   const element = make(parts.labels, "text", { class: "label" + (FORCES.includes(name) ? ` f-${name}` : "") });
   element.append(name[0]);
   if (name.length > 1) {
@@ -40,6 +41,11 @@ for (const name of ["O2", "A", "B", "O4", "2", "3", "4", "G2", "G3", "G4", ...FO
   parts.label[name] = element;
 }
 parts.legend = make(picture, "g", { id: "force-scale" });
+
+// A bar is named by its number, and by its length where dimensions are wanted; the ground has a name only then.
+function showDimensions() {
+  for (const k of [1, 2, 3, 4]) parts.label[k].textContent = byId("show-dimensions").checked ? `${k}: ${shown(lengths[k - 1])} ${unit.name}` : String(k);
+}
 
 const toScreen = p => [view.x + view.k * p[0], view.y - view.k * p[1]];
 const FIRST_PIN = { 2: "O2", 3: "A", 4: "O4" }, LAST_PIN = { 2: "A", 3: "B", 4: "B" };
@@ -59,25 +65,59 @@ function fit() {
   view.height = Math.round(small ? view.width : Math.min(560, 0.68 * view.width));
   picture.classList.toggle("small", small);
   set(picture, { viewBox: `0 0 ${view.width} ${view.height}` });
-  let low = [0, 0], high = [0, 0];
-  const curve = [];
+  const points = [[0, 0]], tips = [], curve = [], traces = [];
   let broken = true;
   for (let i = 0; i < grid.length; i++) {
     const p = at(i);
     if (!p) { broken = true; continue; }
     const g = coupler(p), reached = [p.A, p.B, p.O4, g];
     for (const k of [2, 4]) if (data.centres[k]) reached.push(barPoint(p, k, data.centres[k]));
-    for (const q of reached) for (const j of [0, 1]) { low[j] = Math.min(low[j], q[j]); high[j] = Math.max(high[j], q[j]); }
+    const own = data.points.map(point => framed(p, point.bar, point.at));
+    own.forEach((place, n) => { traces[n] = (traces[n] ?? "") + `${broken ? "M" : "L"}${place[0]} ${place[1]} `; });
+    points.push(...reached, ...actingPoints(p), ...own);
+    if (dynamic()) for (const name of FORCES) tips.push([p[FORCE_PIN[name]], ...arrowShares(name, i)]);
     curve.push([broken ? "M" : "L", g]);
     broken = false;
   }
-  const margin = small ? 30 : 58;
-  view.k = Math.min((view.width - 2 * margin) / (high[0] - low[0]), (view.height - 2 * margin) / (high[1] - low[1]));
-  view.x = 0.5 * view.width - 0.5 * view.k * (low[0] + high[0]);
-  view.y = 0.5 * view.height + 0.5 * view.k * (low[1] + high[1]);
+  const frame = fitted(points, tips, small ? 30 : 58);
+  Object.assign(view, frame);
   parts.curve.setAttribute("d", curve.map(([step, g]) => step + toScreen(g).map(v => v.toFixed(2)).join(" ")).join(""));
+  parts.traces.replaceChildren();   // in metres: the group carries the scale
+  parts.traces.setAttribute("transform", `translate(${view.x} ${view.y}) scale(${view.k} ${-view.k})`);
+  for (const d of traces) make(parts.traces, "path", { class: "trace", d, "vector-effect": "non-scaling-stroke" });
   drawGround();
   scaleForces();
+}
+
+// Both components of a force as shares of the longest arrow of the sweep, and of half the longest of its position.
+function arrowShares(name, i) {
+  const force = table()[name][i], sizes = FORCES.map(other => Math.hypot(...table()[other][i]));
+  const size = Math.hypot(...force), top = sweepCeiling().top, here = Math.max(...sizes);
+  if (!(size > 0) || force[0] === null) return [[0, 0]];
+  return [Math.min(size, top) / top, 0.5 * size / here].map(share => [share * force[0] / size, share * force[1] / size]);
+}
+
+// The greatest scale at which pins keep a margin and arrows with their names stay inside, and the length of an arrow.
+function fitted(points, tips, margin) {
+  const edge = 30, side = Math.min(view.width, view.height);
+  const reach = (j, k, arrow) => {
+    let low = Infinity, high = -Infinity;
+    const take = (value, around) => { low = Math.min(low, value - around); high = Math.max(high, value + around); };
+    for (const point of points) take(k * point[j], margin);
+    for (const [foot, ...shares] of tips) for (const share of shares) take(k * foot[j] + arrow * share[j], edge);
+    return [low, high];
+  };
+  const fits = (k, arrow) => [view.width, view.height].every((size, j) => { const [low, high] = reach(j, k, arrow); return high - low <= size; });
+  const largest = arrow => {
+    let low = 0, high = side / Math.max(...lengths);
+    for (let n = 0; n < 24; n++) { const k = 0.5 * (low + high); if (fits(k, arrow)) low = k; else high = k; }
+    return low;
+  };
+  const bare = largest(0);
+  let arrow = 0.3 * side, k = largest(arrow);
+  while (k < 0.6 * bare && arrow > 0.1 * side) { arrow *= 0.85; k = largest(arrow); }   // a linkage too small to see is worse than short arrows
+  const [left, right] = reach(0, k, arrow), [bottom, top] = reach(1, k, arrow);
+  return { k, arrow, x: 0.5 * (view.width - left - right), y: 0.5 * (view.height + bottom + top) };
 }
 
 function drawGround() {
@@ -95,7 +135,12 @@ function ceiling(values) {
   const sizes = values.filter(Number.isFinite).map(Math.abs).sort((x, y) => x - y);
   if (!sizes.length) return { top: 0, cut: false };
   const ordinary = sizes[Math.floor(ORDINARY * (sizes.length - 1))], largest = sizes[sizes.length - 1];
-  return ordinary > 0 && largest > OUTLIER * ordinary ? { top: ROOM * ordinary, cut: true } : { top: largest, cut: false };
+  return ordinary > 0 && largest > OUTLIER * ordinary ? { top: CLIPPED * ordinary, cut: true } : { top: largest, cut: false };
+}
+
+let ceilings = {};   // by branch
+function sweepCeiling() {
+  return ceilings[branch] ??= ceiling(FORCES.flatMap(name => table()[name].map(f => f[0] === null ? NaN : Math.hypot(f[0], f[1]))));
 }
 
 function scaleForces() {
@@ -103,8 +148,8 @@ function scaleForces() {
   const shown = dynamic() && byId("show-forces").checked;
   parts.forces.style.display = shown ? "" : "none";
   if (!dynamic()) return;
-  forceScale = ceiling(FORCES.flatMap(name => table()[name].map(f => f[0] === null ? NaN : Math.hypot(f[0], f[1]))));
-  forceScale.pixels = forceScale.top > 0 ? 0.3 * Math.min(view.width, view.height) / forceScale.top : 0;
+  forceScale = { ...sweepCeiling() };
+  forceScale.pixels = forceScale.top > 0 ? view.arrow / forceScale.top : 0;
   if (!shown || forceScale.pixels === 0) return;
   forceLegend();
 }
@@ -113,19 +158,19 @@ function scaleForces() {
 // position, small forces stay visible where others diverge.
 function forceLegend() {
   parts.legend.replaceChildren();
-  const step = 10 ** Math.floor(Math.log10(forceScale.top));
-  const round = [5, 2, 1].map(m => m * step).find(v => v <= 0.75 * forceScale.top) ?? 0.5 * step;
-  const y = view.height - 12, long = round * forceScale.pixels;
+  const top = inUnit("N", forceScale.top), step = 10 ** Math.floor(Math.log10(top));
+  const round = [5, 2, 1].map(m => m * step).find(v => v <= 0.75 * top) ?? 0.5 * step;
+  const y = view.height - 12, long = round * forceScale.pixels * forceScale.top / top;
   make(parts.legend, "line", { class: "scale", x1: 14, x2: 14 + long, y1: y, y2: y });
   make(parts.legend, "text", { class: "small", x: 14, y: y - 7 }).textContent =
-    `${rounded(round, 1)} N` + (forceScale.cut ? `, arrows over ${rounded(forceScale.top, 2)} N cut (dashed)` : "");
+    `${rounded(round, 1)} ${nameOf("N")}` + (forceScale.cut ? `, arrows over ${rounded(top, 2)} ${nameOf("N")} cut (dashed)` : "");
 }
 
 // The length, in pixels, of the greatest force with which no arrow of a position leaves the picture.
 function insideTip(i, s, top) {
   let length = Infinity;
   for (const name of FORCES) {
-    const [fx, fy] = table()[name][i], [x, y] = s[FORCE_PIN[name]], edge = 24;   // room for its name
+    const [fx, fy] = table()[name][i], [x, y] = s[FORCE_PIN[name]], edge = 30;   // space for its name
     if (fx) length = Math.min(length, (fx > 0 ? view.width - edge - x : x - edge) * top / Math.abs(fx));
     if (fy) length = Math.min(length, (fy > 0 ? y - edge : view.height - edge - y) * top / Math.abs(fy));
   }
@@ -139,7 +184,7 @@ function place(name, point, from, distance) {
 
 function drawLinkage(p, i) {
   const show = id => byId(id).checked;
-  parts.curve.style.display = show("show-curve") ? "" : "none";
+  parts.curve.style.display = parts.traces.style.display = show("show-curve") ? "" : "none";
   parts.labels.style.display = show("show-labels") ? "" : "none";
   for (const element of Object.values(parts.label)) element.style.display = "none";
   const visible = (name, on) => { parts.label[name].style.display = on ? "" : "none"; };
@@ -154,6 +199,10 @@ function drawLinkage(p, i) {
     if (name[0] === "O") set(parts.label[name], { x: s[name][0] + (s[name][0] < middle[0] ? -24 : 24), y: s[name][1] + 8 });
     else place(name, s[name], middle, 18);
   }
+  if (show("show-dimensions")) {
+    visible("1", true);
+    set(parts.label["1"], { x: 0.5 * (s.O2[0] + s.O4[0]), y: 0.5 * (s.O2[1] + s.O4[1]) + 14 });
+  }
   for (const k of [2, 3, 4]) {
     const p1 = s[FIRST_PIN[k]], p2 = s[LAST_PIN[k]], drawn = Boolean(p1 && p2);
     parts.bars[k].style.display = drawn ? "" : "none";
@@ -162,11 +211,11 @@ function drawLinkage(p, i) {
     if (!drawn) continue;
     set(parts.bars[k], { x1: p1[0], y1: p1[1], x2: p2[0], y2: p2[1] });
     visible(String(k), true);
-    const half = [0.5 * (p1[0] + p2[0]), 0.5 * (p1[1] + p2[1])], long = Math.hypot(p2[0] - p1[0], p2[1] - p1[1]) || 1;
+    const mid = [0.5 * (p1[0] + p2[0]), 0.5 * (p1[1] + p2[1])], long = Math.hypot(p2[0] - p1[0], p2[1] - p1[1]) || 1;
     const normal = [-(p2[1] - p1[1]) / long, (p2[0] - p1[0]) / long];
-    let side = (half[0] - middle[0]) * normal[0] + (half[1] - middle[1]) * normal[1] >= 0 ? 15 : -15;
-    if (data.centres[k] && Math.abs(data.centres[k][1]) * view.k > 10) side = data.centres[k][1] > 0 ? 15 : -15;   // beside the bar, G has the other side
-    set(parts.label[k], { x: half[0] + side * normal[0], y: half[1] + side * normal[1] });
+    let side = (mid[0] - middle[0]) * normal[0] + (mid[1] - middle[1]) * normal[1] >= 0 ? 15 : -15;
+    if (data.centres[k] && Math.abs(data.centres[k][1]) * view.k > 10) side = data.centres[k][1] > 0 ? 15 : -15;   // off the bar, G has the other side
+    set(parts.label[k], { x: mid[0] + side * normal[0], y: mid[1] + side * normal[1] });
     if (parts.image[k]) {
       const height = long * (parts.image[k].ratio ?? 0.3), angle = Math.atan2(p2[1] - p1[1], p2[0] - p1[0]) * DEG;
       set(parts.image[k], { x: 0, y: -0.5 * height, width: long, height, transform: `translate(${p1[0]} ${p1[1]}) rotate(${angle})` });
@@ -182,8 +231,8 @@ function drawLinkage(p, i) {
   }
   const forces = dynamic() && show("show-forces");
   if (forces && p && byId("arrow-scale").value === "position") {
-    const top = Math.max(...FORCES.map(name => Math.hypot(...table()[name][i]))), room = Math.min(view.width, view.height);
-    forceScale = { top, cut: false, pixels: top > 0 ? Math.max(0.15 * room, Math.min(0.3 * room, insideTip(i, s, top))) / top : 0 };
+    const top = Math.max(...FORCES.map(name => Math.hypot(...table()[name][i])));
+    forceScale = { top, cut: false, pixels: top > 0 ? Math.max(0.5 * view.arrow, Math.min(view.arrow, insideTip(i, s, top))) / top : 0 };
     if (top > 0) forceLegend(); else parts.legend.replaceChildren();
   }
   for (const name of FORCES) {
@@ -191,7 +240,7 @@ function drawLinkage(p, i) {
     const size = f[0] === null ? 0 : Math.hypot(f[0], f[1]), cut = size > forceScale.top;
     const long = Math.min(size, forceScale.top) * forceScale.pixels, drawn = long > 2;
     for (const element of Object.values(arrow)) element.style.display = drawn ? "" : "none";
-    visible(name, long > 10);   // beside a shorter arrow its name would stand on the pin's
+    visible(name, long > 10);   // next to a shorter arrow its name would stand on the pin's
     if (!drawn) continue;
     const [x, y] = s[FORCE_PIN[name]], ux = f[0] / size, uy = -f[1] / size, head = Math.min(11, long);
     const tip = [x + long * ux, y + long * uy], neck = [tip[0] - head * ux, tip[1] - head * uy];
@@ -201,15 +250,17 @@ function drawLinkage(p, i) {
     set(parts.label[name], { x: tip[0] + 15 * ux, y: tip[1] + 13 * uy });
   }
   separateLabels();
+  drawActing(p, i);
+  drawPoints(p);
 }
 
-// Labels that would cover each other give way, the less important one first; one without room is left out.
+// Labels that would cover each other move aside, the less important one first; one without a free spot is left out.
 function separateLabels() {
   const kept = [];
-  for (const name of ["O2", "A", "B", "O4", ...FORCES, "2", "3", "4", "G2", "G3", "G4"]) {
+  for (const name of ["O2", "A", "B", "O4", ...FORCES, "1", "2", "3", "4", "G2", "G3", "G4"]) {
     const label = parts.label[name];
     if (label.style.display === "none") continue;
-    const x = Number(label.getAttribute("x")), y = Number(label.getAttribute("y")), wide = 6 + 6 * name.length;
+    const x = Number(label.getAttribute("x")), y = Number(label.getAttribute("y")), wide = 6 + 6 * (label.childElementCount ? name.length : label.textContent.length);
     const free = SHIFTS.map(([dx, dy]) => [x + dx, y + dy]).find(([u, v]) =>
       u > 10 && v > 10 && u < view.width - 10 && v < view.height - 10
       && kept.every(([s, t, w]) => Math.abs(u - s) > 0.5 * (wide + w) || Math.abs(v - t) > 15));

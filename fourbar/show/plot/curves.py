@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import PIN_FORCES
 from fourbar.show.plot.energy import energies
 from fourbar.show.plot.style import (
@@ -23,6 +24,7 @@ from fourbar.show.plot.style import (
     largest,
     legend_above,
     number,
+    quantity,
     unit_for,
 )
 from fourbar.show.plot.view import View
@@ -35,12 +37,12 @@ ORDINARY = 95.0
 """Percentile of the magnitudes that counts as the ordinary size of a curve ..."""
 OUTLIER = 3.0
 """... and the multiple of it that a curve must exceed to be clipped."""
-ROOM = 1.6
+CLIPPED = 1.6
 """A clipped axis ends at this multiple of the ordinary size."""
 RECOMMENDED = 40.0
 """Smallest transmission angle that is usually recommended, deg (R. L. Norton, Design of Machinery)."""
 REMARK = 0.34
-"""Room that a remark takes along an axis, as a part of its length."""
+"""Part that a remark takes along an axis, as a part of its length."""
 Indices = NDArray[np.intp]
 WORKS: tuple[tuple[str, Any], ...] = tuple((FORCE_COLOURS[name], FORCE_DASHES[name]) for name in PIN_FORCES)
 BINDING = re.compile(r" (?==)|(?<==) |(?<=[\d]) (?=[A-Za-zµ])|(?<=N) (?=m\b)")
@@ -97,7 +99,7 @@ def poles(view: View) -> Indices:
 
 
 def broken(values: Array, where: Indices) -> Array:
-    """Copies of a curve's values with NaN at the positions beside a pole, so that no line crosses it."""
+    """Copies of a curve's values with NaN at the positions next to a pole, so that no line crosses it."""
     out = np.array(values, dtype=float)
     out[~np.isfinite(out)] = np.nan
     return np.insert(out, where + 1, np.nan)
@@ -109,15 +111,14 @@ def limit_of(values: list[Array]) -> float | None:
     if size.size == 0:
         return None
     ordinary = float(np.percentile(size, ORDINARY))
-    return ROOM * ordinary if ordinary > 0.0 and size.max() > OUTLIER * ordinary else None
+    return CLIPPED * ordinary if ordinary > 0.0 and size.max() > OUTLIER * ordinary else None
 
 
-def clip(
-    axes: "Axes", view: View, curves: dict[str, Array], limit: float | None, what: str, factor: float, unit: str
-) -> None:
-    """End the axis short of what diverges, and say so."""
+def clip(axes: "Axes", view: View, curves: dict[str, Array], limit: float | None, what: str, unit: str) -> None:
+    """End the axis short of what diverges, and say so; `unit` is that of SI."""
     if limit is None:
         return
+    factor, name_of_unit = unit_for(limit, unit, view.units)
     lowest = min(float(np.nanmin(value)) for value in curves.values())
     axes.set_ylim(0.0 if lowest >= 0.0 else -limit * factor, limit * factor)
     name, worst = max(curves.items(), key=lambda item: largest(item[1]))
@@ -125,11 +126,10 @@ def clip(
     if abs(worst[index]) <= limit:
         return
     where = f"θ₂ = {view.degrees[index]:.5g}°" if view.time is None else f"t = {view.time[index]:.4g} s"
-    own_factor, own_unit = (1.0, unit) if "/" in unit else unit_for(abs(worst[index]), unit.lstrip("GMkmµn ") or unit)
     note(
         view,
-        f"{what} clipped at {number(limit * factor)} {unit}; the largest evaluated, {name} = "
-        f"{number(worst[index] * own_factor)} {own_unit}, is at {where}.",
+        f"{what} clipped at {number(limit * factor)} {name_of_unit}; the largest evaluated, {name} = "
+        f"{quantity(worst[index], unit, view.units)}, is at {where}.",
     )
 
 
@@ -152,16 +152,17 @@ def _rates(axes: "Axes", view: View, letter: str, unit: str, title: str, what: s
     name = {"omega": "ω", "alpha": "α"}[letter]
     digits = {2: "₂", 3: "₃", 4: "₄"}
     curves = {name + digits[bar]: getattr(view.sweep, f"{letter}_{bar}") for bar in (3, 4)}
+    factor, shown_unit = unit_for(0.0, unit, view.units)
     command = getattr(view.sweep, f"{letter}_2")
     if np.any(command):
-        axes.plot(over, command, color=BAR_COLOURS[2], lw=1.0, label=rf"$\{letter}_2$")
+        axes.plot(over, factor * command, color=BAR_COLOURS[2], lw=1.0, label=rf"$\{letter}_2$")
     for bar, values in zip((3, 4), curves.values(), strict=True):
-        axes.plot(over, values, color=BAR_COLOURS[bar], ls=BAR_DASHES[bar], label=rf"$\{letter}_{bar}$")
+        axes.plot(over, factor * values, color=BAR_COLOURS[bar], ls=BAR_DASHES[bar], label=rf"$\{letter}_{bar}$")
     axes.axhline(0.0, color=INK, lw=0.6, zorder=1)
-    axes.set_ylabel(rf"$\{letter}$ ({unit})")
+    axes.set_ylabel(rf"$\{letter}$ ({shown_unit})")
     axes.set_title(title)
     limit = limit_of([getattr(other.sweep, f"{letter}_{bar}") for other in view.alike for bar in (3, 4)])
-    clip(axes, view, curves, limit, what, 1.0, unit)
+    clip(axes, view, curves, limit, what, unit)
     legend_above(axes)
 
 
@@ -172,7 +173,35 @@ def draw_velocities(axes: "Axes", view: View) -> None:
 
 def draw_accelerations(axes: "Axes", view: View) -> None:
     """alpha_2 (where it is not zero), alpha_3, alpha_4."""
-    _rates(axes, view, "alpha", "rad/s²", "Angular accelerations", "Angular acceleration")
+    _rates(axes, view, "alpha", "rad/s^2", "Angular accelerations", "Angular acceleration")
+
+
+def draw_speeds(axes: "Axes", view: View) -> None:
+    """Speeds of A, B, the mass centres and the scene's own points."""
+    _of_points(axes, view, "v", "m/s", view.sweep.velocity, "Speeds of points")
+
+
+def draw_point_accelerations(axes: "Axes", view: View) -> None:
+    """Sizes of the accelerations of the same points."""
+    _of_points(axes, view, "a", "m/s^2", view.sweep.acceleration, "Accelerations of points")
+
+
+def _of_points(axes: "Axes", view: View, letter: str, unit: str, own: dict[str, Array], title: str) -> None:
+    over = _bases(axes, view)
+    masses = [f"G{bar}" for bar in MOVING_BARS if view.scene.linkage.bar(bar).mass > 0.0]
+    vectors = {name: getattr(view.sweep, f"{letter}_{name}") for name in ("A", "B", *masses)} | own
+    curves = {name: np.hypot(*vector.T) for name, vector in vectors.items()}
+    limit = limit_of(list(curves.values()))
+    factor, shown_unit = unit_for(limit or largest(*curves.values()), unit, view.units)
+    looks = {"A": BAR_COLOURS[2], "B": BAR_COLOURS[4], **{f"G{bar}": BAR_COLOURS[bar] for bar in MOVING_BARS}}
+    for (name, values), dashes in zip(curves.items(), cycle(("-", "--", "-.", ":")), strict=False):
+        colour, width = looks.get(name, FORCE_COLOURS["F43"]), 2.0 if name in own else 1.2
+        axes.plot(over, factor * values, color=colour, ls=":" if name[0] == "G" else dashes, label=name, lw=width)
+    axes.set_ylim(bottom=0.0)
+    axes.set_ylabel(f"$|{letter}|$ ({shown_unit})")
+    axes.set_title(title)
+    clip(axes, view, curves, limit, title, unit)
+    legend_above(axes, 6)
 
 
 def draw_torque(axes: "Axes", view: View) -> None:
@@ -182,7 +211,7 @@ def draw_torque(axes: "Axes", view: View) -> None:
     assert torque is not None
     torques = [other.sweep.torque for other in view.alike if other.sweep.torque is not None]
     limit = limit_of(torques)
-    factor, unit = unit_for(limit or largest(*torques), "N m")
+    factor, unit = unit_for(limit or largest(*torques), "N m", view.units)
     where = poles(view)
     axes.plot(broken(over, where), factor * broken(torque, where), color=INK, label=f"$T_{bar}$")
     for index in where:
@@ -192,7 +221,7 @@ def draw_torque(axes: "Axes", view: View) -> None:
     axes.axhline(0.0, color=INK, lw=0.6, zorder=1)
     axes.set_ylabel(f"$T_{bar}$ ({unit})")
     axes.set_title(f"Driving torque on bar {bar}")
-    clip(axes, view, {f"T{'₂₃₄'[bar - 2]}": torque}, limit, "Torque", factor, unit)
+    clip(axes, view, {f"T{'₂₃₄'[bar - 2]}": torque}, limit, "Torque", "N m")
 
 
 def draw_forces(axes: "Axes", view: View) -> None:
@@ -201,7 +230,7 @@ def draw_forces(axes: "Axes", view: View) -> None:
     sizes = {name: np.hypot(*getattr(view.sweep, name).T) for name in FORCE_COLOURS}
     everywhere = [np.hypot(*getattr(other.sweep, name).T) for other in view.alike for name in FORCE_COLOURS]
     limit = limit_of(everywhere)
-    factor, unit = unit_for(limit or largest(*everywhere), "N")
+    factor, unit = unit_for(limit or largest(*everywhere), "N", view.units)
     where = poles(view)
     for name, values in sizes.items():
         axes.plot(
@@ -215,7 +244,7 @@ def draw_forces(axes: "Axes", view: View) -> None:
     axes.set_ylim(bottom=0.0)
     axes.set_ylabel(f"$|F|$ ({unit})")
     axes.set_title("Pin forces")
-    clip(axes, view, sizes, limit, "Pin forces", factor, unit)
+    clip(axes, view, sizes, limit, "Pin forces", "N")
     legend_above(axes)
 
 
@@ -256,12 +285,12 @@ def draw_transmission(axes: "Axes", view: View) -> None:
 def free_place(mu: Array) -> float:
     """Where along the axis the curve keeps furthest from a remark at 40 deg, as a part of its length."""
     half = REMARK / 2.0
-    best, room = 1.0 - half, -1.0
+    best, clearance = 1.0 - half, -1.0
     for place in np.linspace(1.0 - half, half, 25):
         part = mu[int((place - half) * len(mu)) : max(1, math.ceil((place + half) * len(mu)))]
         away = np.abs(part[np.isfinite(part)] - RECOMMENDED - 3.0)  # the remark stands on the line
-        if away.size and away.min() > room:
-            best, room = float(place), float(away.min())
+        if away.size and away.min() > clearance:
+            best, clearance = float(place), float(away.min())
     return best
 
 
@@ -269,9 +298,9 @@ def draw_energy(axes: "Axes", view: View) -> None:
     """Kinetic energy of a free motion, and the work that made it."""
     over = _bases(axes, view)
     own = energies(view.scene, view.sweep)
-    shared = [energies(other.scene, other.sweep) for other in view.beside] + [own]
+    shared = [energies(other.scene, other.sweep) for other in view.others] + [own]
     factor, unit = unit_for(
-        largest(*(values for each in shared for values in (each.kinetic, *each.work.values()))), "J"
+        largest(*(values for each in shared for values in (each.kinetic, *each.work.values()))), "J", view.units
     )
     axes.plot(over, factor * own.kinetic, color=INK, lw=2.2, label="kinetic energy")
     for (name, values), (colour, dashes) in zip(own.work.items(), cycle(WORKS), strict=False):

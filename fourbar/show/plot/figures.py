@@ -1,4 +1,4 @@
-"""The figures by name, and the way from a scene to a file."""
+"""The figures by name, and how a scene becomes a file."""
 
 import math
 import textwrap
@@ -12,8 +12,10 @@ from fourbar.errors import InputError
 from fourbar.scene import Scene
 from fourbar.show.plot import curves, freebody, hodograph, linkage
 from fourbar.show.plot.labels import Labels
-from fourbar.show.plot.style import FORCE_COLOURS, MUTED, matplotlib_style, plain, save
+from fourbar.show.plot.style import FORCE_COLOURS, MUTED, matplotlib_style, plain, rendered, save
 from fourbar.show.plot.view import View, common_position, on_branch, over_time, view
+from fourbar.show.tables import STATIC
+from fourbar.solution import SI, Conversion
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -55,8 +57,8 @@ def _drive(axes: Any, shown: View) -> None:
 
 
 def _path_legend(axes: Any) -> None:
-    axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.005), ncols=3)
-    axes.set_title(axes.get_title(loc="left"), pad=18.0)
+    legend = axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.005), ncols=3)
+    axes.set_title(axes.get_title(loc="left"), pad=6.0 + 12.0 * math.ceil(len(legend.get_texts()) / 3))
 
 
 def _linkage(figure: "SubFigure", shown: View, labels: Labels) -> None:
@@ -75,6 +77,15 @@ def _kinematics(figure: "SubFigure", shown: View, labels: Labels) -> None:
     painters = (curves.draw_angles, curves.draw_velocities, curves.draw_accelerations)
     for axes, paint in zip(panels, painters, strict=False):
         paint(axes, shown)
+
+
+def _points(figure: "SubFigure", shown: View, labels: Labels) -> None:
+    """Paths, speeds and accelerations of points."""
+    panels = figure.subplot_mosaic([["linkage", "speeds"], ["linkage", "accelerations"]], width_ratios=[1.15, 1.0])
+    linkage.draw_linkage(panels["linkage"], shown, labels)
+    _path_legend(panels["linkage"])
+    curves.draw_speeds(panels["speeds"], shown)
+    curves.draw_point_accelerations(panels["accelerations"], shown)
 
 
 def _single(paint: Callable[[Any, View], None]) -> Painter:
@@ -105,6 +116,7 @@ FIGURES: dict[str, tuple[Painter, tuple[float, float], bool]] = {
     "linkage": (_linkage, (5.6, 5.2), False),
     "coupler": (_coupler, (5.6, 5.4), False),
     "kinematics": (_kinematics, (5.6, 6.8), False),
+    "points": (_points, (11.0, 5.6), True),
     "torque": (_single(curves.draw_torque), (5.6, 3.2), True),
     "forces": (_single(curves.draw_forces), (5.6, 3.2), True),
     "hodograph": (_hodographs, (6.4, 6.6), True),
@@ -122,6 +134,8 @@ def draw(
     *,
     position: float | None = None,
     branches: str = "one",
+    units: Conversion = SI,
+    dimensions: bool = False,
     file_format: str | None = None,
 ) -> None:
     """Draw a figure of a scene into a file, whole or not at all; the same scene gives the same bytes.
@@ -129,10 +143,12 @@ def draw(
     Parameters
     ----------
     path : the file; its ending says which of svg, png and pdf is meant.
-    figure : one of `FIGURES`: "overview", "linkage", "coupler", "kinematics", "torque",
+    figure : one of `FIGURES`: "overview", "linkage", "coupler", "kinematics", "points", "torque",
         "forces", "hodograph", "energy", "transmission", "freebody".
     position : theta_2 of the linkage and the free bodies, rad; left out: the scene's own.
     branches : "one" (the scene's) or "both" (open and crossed, to the same scales).
+    units : in which numbers are drawn; left out: SI with the prefix that suits. Angles are in degrees.
+    dimensions : write the lengths of the bars at them.
     file_format : svg, png or pdf where the path's ending does not say it.
 
     Raises
@@ -141,26 +157,73 @@ def draw(
     NotAssembledError : there is no position to draw.
     DependencyError : matplotlib is missing.
     """
-    target = Path(path)
-    kind = (file_format or target.suffix.removeprefix(".")).lower()
+    kind = _format_of(path, file_format)
+    painter, size = _painter(scene, figure, branches)
+    with matplotlib_style():
+        save(compose(scene, painter, size, position, branches, units, dimensions), Path(path), kind)
+
+
+def _format_of(path: str | Path, file_format: str | None = None) -> str:
+    kind = (file_format or Path(path).suffix.removeprefix(".")).lower()
+    if kind not in FORMATS:
+        raise InputError("output", str(path), "must end in one of " + ", ".join(f".{end}" for end in FORMATS))
+    return kind
+
+
+def _painter(scene: Scene, figure: str, branches: str) -> tuple[Painter, tuple[float, float]]:
+    """The painter and the size of a figure, where the scene has what it shows."""
     for key, value, allowed in (("figure", figure, tuple(FIGURES)), ("branches", branches, BRANCHES)):
         if value not in allowed:
             raise InputError(key, value, "must be one of " + ", ".join(allowed))
-    if kind not in FORMATS:
-        raise InputError("output", str(path), "must end in one of " + ", ".join(f".{end}" for end in FORMATS))
     painter, size, dynamic = FIGURES[figure]
     if dynamic and scene.motion.omega_2 is None and not over_time(scene):
-        raise InputError("motion.omega_2", None, f"is needed for the figure {figure!r}")
+        raise InputError("motion.omega_2", None, f"is needed for the figure {figure!r}; {STATIC}")
     if figure == "energy" and scene.motion.free is None:
         raise InputError("figure", figure, "needs a free motion: motion.free")
     if figure == "torque" and scene.motion.free is not None:
         raise InputError("figure", figure, "a free motion has no driving torque; energy shows what moves it")
+    return painter, size
+
+
+class Drawing:
+    """A figure that a notebook shows, and that `save` writes."""
+
+    def __init__(self, figure: "Figure") -> None:
+        self.figure = figure
+
+    def _repr_svg_(self) -> str:
+        with matplotlib_style():
+            return rendered(self.figure, "svg").decode("utf-8")
+
+    def save(self, path: str | Path) -> None:
+        """Write it as SVG, PNG or PDF by the ending of the path, whole or not at all."""
+        with matplotlib_style():
+            save(self.figure, Path(path), _format_of(path))
+
+
+def drawn(
+    scene: Scene,
+    figure: str = "overview",
+    *,
+    position: float | None = None,
+    branches: str = "one",
+    units: Conversion = SI,
+    dimensions: bool = False,
+) -> Drawing:
+    """A figure of a scene for a notebook (`scene.plot()`); parameters and errors are those of `draw`."""
+    painter, size = _painter(scene, figure, branches)
     with matplotlib_style():
-        save(compose(scene, painter, size, position, branches), target, kind)
+        return Drawing(compose(scene, painter, size, position, branches, units, dimensions))
 
 
 def compose(
-    scene: Scene, painter: Painter, size: tuple[float, float], position: float | None, branches: str
+    scene: Scene,
+    painter: Painter,
+    size: tuple[float, float],
+    position: float | None,
+    branches: str,
+    units: Conversion = SI,
+    dimensions: bool = False,
 ) -> "Figure":
     """The figure itself, laid out and labelled."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -171,7 +234,8 @@ def compose(
         position = common_position(scenes)
     views = [view(each, position) for each in scenes]
     for shown in views:
-        shown.beside = [other for other in views if other is not shown]
+        shown.units, shown.dimensions = units, dimensions
+        shown.others = [other for other in views if other is not shown]
     stacked = size[0] > 9.0
     figure = Figure(
         figsize=(size[0], size[1] * len(views)) if stacked else (size[0] * len(views), size[1]), layout="constrained"

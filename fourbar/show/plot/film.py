@@ -10,9 +10,13 @@ import numpy as np
 
 from fourbar.errors import DependencyError, InputError
 from fourbar.scene import Scene
-from fourbar.show.plot.linkage import ENDS, mass_centre, paths, supports
+from fourbar.show.acting import acting
+from fourbar.show.plot import symbols
+from fourbar.show.plot.linkage import ENDS, POINT, mass_centre, paths, pin_name, supports
 from fourbar.show.plot.style import BAR_COLOURS, INK, largest, length_unit, matplotlib_style, plain
 from fourbar.show.plot.view import View, view
+from fourbar.show.progress import counted
+from fourbar.solution import SI, Conversion
 from fourbar.writing import write_bytes
 
 if TYPE_CHECKING:
@@ -25,12 +29,18 @@ DPI = 100
 
 
 SWEEP_SECONDS = 6.0
-"""Of a film of a sweep, where nothing else is asked for."""
+"""Of a film of a sweep, where nothing else is stated."""
+NAME: dict[str, Any] = {
+    **{"textcoords": "offset points", "xytext": (0.0, 0.0), "ha": "center", "va": "center", "size": 9.0},
+    **{"zorder": 9, "annotation_clip": False},
+}
+WINDOW = 24
+"""Positions whose symbols the window is made to hold."""
 SHORTEST = 1.0
 """A motion through time shorter than this, s, is slowed down to be seen."""
 
 
-def write_film(scene: Scene, path: Path, kind: str, seconds: float | None) -> None:
+def write_film(scene: Scene, path: Path, kind: str, seconds: float | None, units: Conversion = SI) -> None:
     """One sweep; where the input does not turn fully, there and back. A motion through time is shown as it is.
 
     Parameters
@@ -49,6 +59,7 @@ def write_film(scene: Scene, path: Path, kind: str, seconds: float | None) -> No
         if kind == "mp4" and not FFMpegWriter.isAvailable():
             raise DependencyError("an .mp4 film needs the program ffmpeg; .gif and .html do not")
         shown = view(scene)
+        shown.units = units
         if seconds is None:
             seconds = SWEEP_SECONDS
             if shown.time is not None:
@@ -64,7 +75,7 @@ def write_film(scene: Scene, path: Path, kind: str, seconds: float | None) -> No
             draft = Path(folder) / f"film.{kind}"
             try:
                 with writer.saving(figure, str(draft), DPI):
-                    for index in order:
+                    for index in counted(order, f"{len(order)} frames"):
                         move(index)
                         writer.grab_frame()
             except (subprocess.CalledProcessError, BrokenPipeError):
@@ -92,6 +103,36 @@ def frames(shown: View, count: int) -> list[int]:
     return there + there[-2:0:-1]
 
 
+class _Acting:
+    """The symbols of what acts, which change from frame to frame."""
+
+    def __init__(self, axes: Any, shown: View, factor: float, size: float) -> None:
+        self.axes, self.shown, self.factor, self.size = axes, shown, factor, size
+        self.symbols = acting(shown.scene)
+        self.passing: list[Any] = []
+
+    def draw(self, index: int) -> list[symbols.Drawn]:
+        """At a position, in place of what stood there."""
+        while self.passing:
+            self.passing.pop().remove()
+        place = symbols.place_of(self.shown.scene.linkage, self.shown.sweep, index, self.factor)
+        drawn = [symbols.draw(self.axes, symbol, place, self.size) for symbol in self.symbols]
+        for each, symbol in zip(drawn, self.symbols, strict=True):
+            self.passing += each.artists
+            if each.label is not None and symbol.kind in ("force", "moment", "drive"):
+                at = {**NAME, "xytext": (12.0 * each.away.real, 12.0 * each.away.imag)}
+                self.passing.append(self.axes.annotate(each.text, each.label, color=symbols.COLOURS[symbol.kind], **at))
+        return drawn
+
+    def hold_all(self) -> None:
+        """Make the window large enough for the symbols of every position."""
+        closes = np.flatnonzero(self.shown.sweep.assembled)
+        for index in closes[:: max(1, len(closes) // WINDOW)]:
+            for each in self.draw(int(index)):
+                for line in each.lines:
+                    self.axes.update_datalim(line)
+
+
 def _stage(shown: View) -> tuple["Figure", Any]:
     """The figure, and the function that moves it to a position of the sweep."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -99,20 +140,16 @@ def _stage(shown: View) -> tuple["Figure", Any]:
 
     sweep, linkage = shown.sweep, shown.scene.linkage
     O4 = (linkage.ground * math.cos(linkage.ground_angle), linkage.ground * math.sin(linkage.ground_angle))
-    factor, unit = length_unit(largest(sweep.A, sweep.B, sweep.G3, np.array(O4)))
+    factor, unit = length_unit(largest(sweep.A, sweep.B, sweep.G3, np.array(O4)), shown.units)
     figure = Figure(figsize=SIZE, dpi=DPI, layout="constrained")
     FigureCanvasAgg(figure)
     axes = figure.subplots()
     figure.suptitle(plain(shown.scene.title, 70), parse_math=False, size=10.5, weight="bold", x=0.02, ha="left")
     for path, colour, dashes, name in paths(shown):
         axes.plot(*(factor * path).T, color=colour, lw=1.0, ls=dashes, label=name, zorder=2)
-    reached = np.concatenate([sweep.A, sweep.B, sweep.G3, [(0.0, 0.0), O4]])
-    supports(
-        axes,
-        (0.0, 0.0),
-        (factor * O4[0], factor * O4[1]),
-        0.03 * factor * float(np.nanmax(np.nanmax(reached, 0) - np.nanmin(reached, 0))),
-    )
+    reached = np.concatenate([sweep.A, sweep.B, sweep.G3, *sweep.points.values(), [(0.0, 0.0), O4]])
+    size = 0.03 * factor * float(np.nanmax(np.nanmax(reached, 0) - np.nanmin(reached, 0)))
+    supports(axes, (0.0, 0.0), (factor * O4[0], factor * O4[1]), size)
     bars = {
         number: axes.plot(
             [], [], "o-", color=BAR_COLOURS[number], lw=4.5, ms=6.5, mfc="white", mec=INK, mew=1.2, zorder=4
@@ -120,10 +157,17 @@ def _stage(shown: View) -> tuple["Figure", Any]:
         for number in ENDS
     }
     centres = {number: mass_centre(axes, (0.0, 0.0)) for number in ENDS if linkage.bar(number).mass > 0.0}
+    own = {name: axes.plot([], [], "D", ms=4.5, mfc="white", mec=POINT, mew=1.2, zorder=8)[0] for name in sweep.points}
+    arms = {number: axes.plot([], [], color=BAR_COLOURS[number], lw=0.8, ls=":", zorder=3)[0] for number in centres}
+    names = {pin: axes.annotate(pin_name(pin), (0.0, 0.0), **NAME) for pin in ("O2", "A", "B", "O4")}
+    acts = _Acting(axes, shown, factor, size)
+    acts.hold_all()
+    axes.autoscale_view()
     axes.set_aspect("equal", adjustable="datalim")
     axes.set_xlabel(f"$x$ ({unit})")
     axes.set_ylabel(f"$y$ ({unit})")
-    axes.set_title("θ", pad=18.0)
+    pad = 6.0 + 12.0 * math.ceil((3 + len(sweep.points)) / 3)
+    axes.set_title("θ", pad=pad)
     axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.005), ncols=3)
     figure.draw_without_rendering()
     figure.set_layout_engine("none")  # nothing jumps from frame to frame
@@ -136,8 +180,18 @@ def _stage(shown: View) -> tuple["Figure", Any]:
             point = factor * getattr(sweep, f"G{number}")[index]
             for mark in marks:
                 mark.set_data([point[0]], [point[1]])
+            foot = factor * np.array(pins[ENDS[number][0]])
+            arms[number].set_data([foot[0], point[0]], [foot[1], point[1]])
+        middle = np.mean([pins[pin] for pin in names], axis=0)
+        for pin, text in names.items():
+            away = np.array(pins[pin]) - middle
+            text.xy = tuple(factor * np.array(pins[pin]))
+            text.set_position(tuple(13.0 * away / max(float(np.hypot(*away)), 1e-300)))
+        for name, mark in own.items():
+            mark.set_data(*(factor * sweep.points[name][index][:, None]))
+        acts.draw(index)
         theta = f"{math.degrees(sweep.theta_2[index]):.1f}".replace("-", "−")
         when = "" if shown.time is None else f"$t$ = {shown.time[index]:.2f} s, "
-        axes.set_title(rf"{when}$\theta_2$ = {theta}°, {shown.branch_name} branch", pad=18.0)
+        axes.set_title(rf"{when}$\theta_2$ = {theta}°, {shown.branch_name} branch", pad=pad)
 
     return figure, move

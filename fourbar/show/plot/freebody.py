@@ -13,8 +13,9 @@ from fourbar.linkage import BAR_NAMES, FIRST_PIN, MOVING_BARS, PIN_FORCE
 from fourbar.show.plot.curves import force_name, note
 from fourbar.show.plot.labels import Label, Labels
 from fourbar.show.plot.linkage import ENDS, components, mass_centre, pins
-from fourbar.show.plot.style import BAR_COLOURS, FORCE_COLOURS, INK, MUTED, number, unit_for
+from fourbar.show.plot.style import BAR_COLOURS, FORCE_COLOURS, INK, MUTED, quantity, unit_for
 from fourbar.show.plot.view import Recorder, View
+from fourbar.solution import Conversion
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -25,8 +26,8 @@ PIN_FORCES = {
     4: (("B", "F43", -1.0), ("O4", "F14", 1.0)),
 }
 """The pins of a bar, the force there among the independent ones, and its sign on this bar."""
-ROOM = 1.3
-"""The window is this much wider than what it shows: room for the labels."""
+WINDOW = 1.3
+"""The window is this much wider than what it shows: space for the labels."""
 Points = NDArray[np.float64]
 SHOWN = 0.02
 """Forces below this share of the largest would be shorter than their head: named in the caption only."""
@@ -103,10 +104,10 @@ def draw_free_bodies(panels: "list[Axes]", view: View, labels: Labels) -> None:
     scale = 0.75 * longest / biggest if biggest > 0.0 else 0.0
     reach = {bar: _reach(view, bar, freed[bar][0], scale) for bar in MOVING_BARS}
     # one window size: the bars, too, are to one scale
-    span = ROOM * max(float(np.ptp(_reach(v, bar, arrows, scale), axis=0).max()) for v, arrows, bar in drawn)
+    span = WINDOW * max(float(np.ptp(_reach(v, bar, arrows, scale), axis=0).max()) for v, arrows, bar in drawn)
     for axes, bar in zip(panels, MOVING_BARS, strict=True):
         _draw_one(axes, view, bar, freed[bar], scale, biggest, labels, reach[bar], span)
-    _scale_bar(panels[0], scale, biggest)
+    _scale_bar(panels[0], scale, biggest, view.units)
     note(
         view,
         "Bars and forces each to one scale, in world axes; dashed: inertia forces −m a at G (d'Alembert), with which "
@@ -154,7 +155,7 @@ def _draw_one(
     for arrow in arrows:
         size = math.hypot(*arrow.force)
         if size < SHOWN * biggest:
-            short.append(f"{_words(arrow.text)} = {number(size)} N")
+            short.append(f"{_words(arrow.text)} = {quantity(size, 'N', view.units)}")
             continue
         tip = (arrow.at[0] + scale * arrow.force[0], arrow.at[1] + scale * arrow.force[1])
         axes.annotate(
@@ -173,9 +174,8 @@ def _draw_one(
             zorder=5,
             annotation_clip=False,
         )
-        factor, unit = unit_for(size, "N")
         labels.keep_off(axes, arrow.at, tip)
-        labels.add(Label(axes, f"{arrow.text} = {number(factor * size)} {unit}", tip, arrow.at, arrow.colour, 7.5))
+        labels.add(Label(axes, f"{arrow.text} = {quantity(size, 'N', view.units)}", tip, arrow.at, arrow.colour, 7.5))
     if short:
         note(view, f"Too short to draw on bar {bar}: {', '.join(short)}.")
     centre = view.scene.linkage.bar(bar)
@@ -193,9 +193,8 @@ def _draw_one(
     axes.set_title(f"Bar {bar} ({BAR_NAMES[bar]})")
     lines = []
     for couple in couples:
-        factor, unit = unit_for(abs(couple.moment), "N m")
         turn = "↺" if couple.moment > 0.0 else "↻"
-        lines.append(f"{turn} {couple.text} = {number(factor * couple.moment)} {unit}")
+        lines.append(f"{turn} {couple.text} = {quantity(couple.moment, 'N m', view.units)}")
     axes.text(
         0.0,
         -0.02,
@@ -226,13 +225,13 @@ def _words(text: str) -> str:
     )
 
 
-def _scale_bar(axes: "Axes", scale: float, biggest: float) -> None:
+def _scale_bar(axes: "Axes", scale: float, biggest: float, units: Conversion) -> None:
     """A round force as a length, under the first panel."""
     if scale == 0.0:
         return
-    step = 10.0 ** math.floor(math.log10(biggest))
-    round_force = next(m * step for m in (5.0, 2.0, 1.0) if 2.0 * m * step <= biggest or m == 1.0)
-    factor, unit = unit_for(round_force, "N")
+    factor, unit = unit_for(biggest, "N", units)
+    step = 10.0 ** math.floor(math.log10(factor * biggest))
+    round_force = next(m * step for m in (5.0, 2.0, 1.0) if 2.0 * m * step <= factor * biggest or m == 1.0) / factor
     x, y = axes.get_xlim()[0], axes.get_ylim()[0]
     axes.plot([x, x + scale * round_force], [y, y], color=INK, lw=2.0, solid_capstyle="butt", clip_on=False)
     text = f"{factor * round_force:g} {unit}"

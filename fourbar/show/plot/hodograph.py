@@ -28,14 +28,14 @@ def draw_hodograph(axes: "PolarAxes", view: View, names: tuple[str, ...] = tuple
     everywhere = [np.hypot(*getattr(other.sweep, name).T) for other in view.alike for name in names]
     limit = limit_of(everywhere)
     top = limit or 1.08 * largest(*everywhere) or 1.0
-    factor, unit = unit_for(top, "N")
+    factor, unit = unit_for(top, "N", view.units)
     where = poles(view)
     over, every, apart = _spacing(view)
     marks = np.unique(np.round((over - over[0]) / every).astype(int))
     dots = [int(np.argmin(np.abs(over - over[0] - every * k))) for k in marks]
     for name, force in forces.items():
         direction = np.arctan2(force[:, 1], force[:, 0])
-        # drawn as a polyline in x, y: unwrapped angles keep matplotlib from going round the long way
+        # drawn as a polyline in x, y: unwrapped angles keep matplotlib from going round by the longer arc
         known = np.isfinite(direction)
         direction[known] = np.unwrap(direction[known])
         size = np.where(sizes[name] <= top, sizes[name], np.nan) if limit else sizes[name]

@@ -1,4 +1,4 @@
-"""Labels beside points, where they cover neither each other nor a line of the drawing."""
+"""Labels next to points, where they cover neither each other nor a line of the drawing."""
 
 import math
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ DIRECTIONS = 16
 
 @dataclass(slots=True)
 class Label:
-    """A text that wants to stand beside `at` (data coordinates), away from `shun`."""
+    """A text that wants to stand next to `at` (data coordinates), away from `shun`."""
 
     axes: "Axes"
     text: str
@@ -42,7 +42,7 @@ class Labels:
     lines: list[tuple["Axes", list[Point]]]
 
     def add(self, label: Label) -> None:
-        """Ask for a label; it is placed by `settle`."""
+        """Request a label; it is placed by `settle`."""
         self.wanted.append(label)
 
     def keep_off(self, axes: "Axes", *points: Point) -> None:

@@ -5,8 +5,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fourbar.linkage import MOVING_BARS
+from fourbar.show.acting import acting
+from fourbar.show.plot import symbols
 from fourbar.show.plot.labels import Label, Labels
-from fourbar.show.plot.style import BAR_COLOURS, INK, MUTED, largest, length_unit
+from fourbar.show.plot.style import BAR_COLOURS, INK, MUTED, largest, length_unit, quantity
+from fourbar.show.plot.symbols import place_of
 from fourbar.show.plot.view import View
 from fourbar.solution import Array
 
@@ -15,6 +18,8 @@ if TYPE_CHECKING:
     from matplotlib.lines import Line2D
 
 Point = tuple[float, float]
+POINT = "#8A3B78"
+"""Of the scene's own points."""
 ENDS = {2: ("O2", "A"), 3: ("A", "B"), 4: ("O4", "B")}
 
 
@@ -41,21 +46,34 @@ def draw_linkage(axes: "Axes", view: View, labels: Labels) -> None:
     """The linkage at the position drawn, over the paths of A, B and the coupler's centre."""
     sweep = view.sweep
     where, masses = pins(view), centres(view)
-    reached = np.concatenate([sweep.A, sweep.B, sweep.G3, list(where.values())])
+    reached = np.concatenate([sweep.A, sweep.B, sweep.G3, *sweep.points.values(), list(where.values())])
     factor, unit = _unit(view)
     where = {name: (factor * x, factor * y) for name, (x, y) in where.items()}
     _paths(axes, view, labels, factor)
     size = 0.03 * factor * float(np.max(np.nanmax(reached, axis=0) - np.nanmin(reached, axis=0)))
     _ground(axes, labels, where["O2"], where["O4"], size)
+    if view.dimensions:
+        at = tuple(0.5 * (a + b) for a, b in zip(where["O2"], where["O4"], strict=True))
+        labels.add(Label(axes, _bar_name(view, 1), (at[0], at[1]), where["B"], MUTED, 9.0, 2.0))
     middle = (float(np.mean([p[0] for p in where.values()])), float(np.mean([p[1] for p in where.values()])))
     for number, (start, stop) in ENDS.items():
         (x, y), colour = zip(where[start], where[stop], strict=True), BAR_COLOURS[number]
         axes.plot(x, y, color=colour, lw=4.5, solid_capstyle="round", zorder=4)
         labels.keep_off(axes, where[start], where[stop])
-        labels.add(Label(axes, str(number), (0.5 * sum(x), 0.5 * sum(y)), middle, colour, 9.0, 2.0))
+        name = (
+            f"{number}: {quantity(view.scene.linkage.lengths[number - 1], 'm', view.units)}"
+            if view.dimensions
+            else str(number)
+        )
+        labels.add(Label(axes, name, (0.5 * sum(x), 0.5 * sum(y)), middle, colour, 9.0, 2.0))
     for name, point in where.items():
         axes.plot(*[[v] for v in point], "o", ms=6.0, mfc="white", mec=INK, mew=1.2, zorder=6)
         labels.add(Label(axes, pin_name(name), point, middle, INK, 9.0, 2.5))
+    for name, path in view.here.points.items():
+        x, y = factor * path[0]
+        axes.plot([x], [y], "D", ms=4.5, mfc="white", mec=POINT, mew=1.2, zorder=8)
+        labels.keep_off(axes, (float(x), float(y)), (float(x), float(y)))
+        labels.add(Label(axes, name, (float(x), float(y)), middle, POINT, 8.5, 2.5))
     for number, (x_centre, y_centre) in masses.items():
         here = (factor * x_centre, factor * y_centre)
         bar, colour = view.scene.linkage.bar(number), BAR_COLOURS[number]
@@ -66,6 +84,13 @@ def draw_linkage(axes: "Axes", view: View, labels: Labels) -> None:
         mass_centre(axes, here)
         labels.keep_off(axes, here, here)
         labels.add(Label(axes, f"$G_{number}$", here, middle, colour, 8.0, 3.0))
+    place = place_of(view.scene.linkage, view.here, 0, factor)
+    for symbol in acting(view.scene):
+        drawn = symbols.draw(axes, symbol, place, size)
+        for line in drawn.lines:
+            labels.keep_off(axes, *line)
+        if drawn.label is not None:
+            labels.add(Label(axes, drawn.text, drawn.label, middle, symbols.COLOURS[symbol.kind], 8.0))
     axes.set_aspect("equal", adjustable="datalim")
     axes.margins(0.08)
     axes.set_xlabel(f"$x$ ({unit})")
@@ -73,10 +98,17 @@ def draw_linkage(axes: "Axes", view: View, labels: Labels) -> None:
     axes.set_title(f"Linkage at {view.at}, {view.branch_name} branch")
 
 
+def _bar_name(view: View, number: int) -> str:
+    """The number of a bar, with its length where dimensions are wanted."""
+    length = quantity(view.scene.linkage.lengths[number - 1], "m", view.units)
+    return f"{number}: {length}" if view.dimensions else str(number)
+
+
 def _unit(view: View) -> tuple[float, str]:
     """The unit of length of a drawing, the same for both branches."""
     return length_unit(
-        max(largest(v.sweep.A, v.sweep.B, v.sweep.G3, *np.array(list(pins(v).values()))) for v in view.alike)
+        max(largest(v.sweep.A, v.sweep.B, v.sweep.G3, *np.array(list(pins(v).values()))) for v in view.alike),
+        view.units,
     )
 
 
@@ -90,12 +122,14 @@ def paths(view: View) -> list[tuple[Array, str, Any, str]]:
     sweep = view.sweep
     massive = view.scene.linkage.coupler.mass > 0.0
     middle = sweep.G3 if massive else 0.5 * (sweep.A + sweep.B)
-    found = (
+    found: list[tuple[Array, str, Any, str]] = [
         (sweep.A, BAR_COLOURS[2], (0, (1, 2)), "path of $A$"),
         (sweep.B, BAR_COLOURS[4], (0, (1, 2)), "path of $B$"),
         (middle, BAR_COLOURS[3], (0, (4, 1.5)), "coupler curve of " + ("$G_3$" if massive else "its mid-point")),
-    )
-    return [(np.where(sweep.assembled[:, None], path, np.nan), *look) for path, *look in found]
+    ]
+    found += [(path, POINT, (0, (3, 1, 1, 1)), f"path of {name}") for name, path in sweep.points.items()]
+    closes = sweep.assembled[:, None]
+    return [(np.where(closes, path, np.nan), colour, dashes, name) for path, colour, dashes, name in found]
 
 
 def _paths(axes: "Axes", view: View, labels: Labels, factor: float) -> None:
@@ -144,7 +178,7 @@ def _wedge(start: int, stop: int) -> Any:
 
 
 def draw_coupler_curves(axes: "Axes", view: View, labels: Labels) -> None:
-    """Paths of points along the coupler's line and beside it, from one full sweep."""
+    """Paths of points along the coupler's line and off it, from one full sweep."""
     sweep = view.sweep
     along = sweep.B - sweep.A
     across = np.stack([-along[:, 1], along[:, 0]], axis=1)
@@ -183,7 +217,7 @@ def draw_coupler_curves(axes: "Axes", view: View, labels: Labels) -> None:
         loc="upper center",
         bbox_to_anchor=(0.5, -0.14),
         ncols=4,
-        title="point along AB (and beside it), in lengths of the coupler",
+        title="point along AB (and off it), in lengths of the coupler",
         title_fontsize=7.5,
     )
     view.notes.append(f"The linkage is drawn at {view.at}.")

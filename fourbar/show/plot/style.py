@@ -12,7 +12,7 @@ import numpy as np
 
 from fourbar.errors import DependencyError
 from fourbar.quantities import PIN_FORCES
-from fourbar.solution import Array
+from fourbar.solution import SI, Array, Conversion, unit_in
 from fourbar.writing import write_bytes
 
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 INK, MUTED, FAINT = "#1a1a1a", "#6b6b6b", "#d9d9d9"
-# Okabe and Ito's palette: told apart by colour-blind readers, and by lightness and dashes in grey
+# Okabe and Ito's palette: distinguished by colour-blind readers, and by lightness and dashes in grey
 BAR_COLOURS = {2: "#0072B2", 3: "#D55E00", 4: "#007A5A"}
 BAR_DASHES: dict[int, Any] = {2: "-", 3: (0, (5, 1.6)), 4: (0, (7, 1.6, 1.4, 1.6))}
 FORCE_COLOURS = dict(zip(PIN_FORCES, ("#0072B2", "#D55E00", "#8A3B78", "#007A5A"), strict=True))
@@ -88,6 +88,11 @@ def matplotlib_style() -> Iterator[None]:
 
 def save(figure: "Figure", path: Path, file_format: str) -> None:
     """Write a figure whole or not at all, without a date in it."""
+    write_bytes(path, rendered(figure, file_format))
+
+
+def rendered(figure: "Figure", file_format: str) -> bytes:
+    """A figure as SVG, PNG or PDF."""
     metadata: dict[str, dict[str, Any]] = {
         "svg": {"Date": None, "Creator": "fourbar"},
         "pdf": {"CreationDate": None, "Producer": None, "Creator": "fourbar"},
@@ -95,7 +100,7 @@ def save(figure: "Figure", path: Path, file_format: str) -> None:
     }
     buffer = io.BytesIO()
     figure.savefig(buffer, format=file_format, dpi=DPI, metadata=metadata[file_format])
-    write_bytes(path, buffer.getvalue())
+    return buffer.getvalue()
 
 
 CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f\u2028\u2029]+")
@@ -110,8 +115,11 @@ def plain(text: str, width: int) -> str:
 PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
 
 
-def unit_for(largest: float, unit: str) -> tuple[float, str]:
-    """The factor from SI and the unit with the prefix that suits the largest magnitude."""
+def unit_for(largest: float, unit: str, units: Conversion = SI) -> tuple[float, str]:
+    """The factor from SI and the unit stated, or with the prefix that suits the largest magnitude; a rate has none."""
+    if unit in units or "/" in unit:
+        name, factor = unit_in(unit, units)
+        return factor, name.replace("^2", "²")
     if not math.isfinite(largest) or largest <= 0.0:
         return 1.0, unit
     for size, prefix in PREFIXES:
@@ -120,8 +128,10 @@ def unit_for(largest: float, unit: str) -> tuple[float, str]:
     return 1.0 / PREFIXES[-1][0], PREFIXES[-1][1] + unit
 
 
-def length_unit(largest: float) -> tuple[float, str]:
-    """Lengths in m, or in mm or µm where they are small."""
+def length_unit(largest: float, units: Conversion = SI) -> tuple[float, str]:
+    """Lengths in the unit stated, else in m, or in mm or µm where they are small."""
+    if "m" in units:
+        return unit_for(largest, "m", units)
     for size, unit in ((1e3, "km"), (1.0, "m"), (1e-3, "mm")):
         if largest >= size:
             return 1.0 / size, unit
@@ -148,6 +158,12 @@ def number(value: float) -> str:
         return text.replace("-", "−")
     mantissa, exponent = f"{value:.2e}".split("e")
     return f"{mantissa}·10".replace("-", "−") + str(int(exponent)).translate(RAISED)
+
+
+def quantity(value: float, unit: str, units: Conversion = SI) -> str:
+    """A number of an SI unit in the unit stated, or with the prefix that suits it."""
+    factor, name = unit_for(abs(value), unit, units)
+    return f"{number(factor * value)} {name}"
 
 
 def degree_ticks(axis: Any, span: float) -> None:

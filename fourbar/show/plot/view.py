@@ -12,11 +12,11 @@ from fourbar.formulas.position import Number
 from fourbar.linkage import PINS
 from fourbar.scene import Command, Scene, command
 from fourbar.scene.motion import FromLimit
-from fourbar.solution import Array, Solution
+from fourbar.solution import Array, Conversion, Solution
 from fourbar.solve import solve, state_at
 
 CLEAR = 0.3
-"""Motion and drive condition of the position drawn, where any has them: beside a pole forces dwarf all others."""
+"""Motion and drive condition of the position drawn, where any has them: next to a pole forces dwarf all others."""
 LEAD = math.radians(60.0)
 """The position drawn where none is named: so far into the longest stretch that assembles, or half of a shorter one."""
 
@@ -33,13 +33,17 @@ class View:
     sweep: Solution
     here: Solution
     notes: list[str] = field(default_factory=list)
-    beside: "list[View]" = field(default_factory=list)
-    """The other branch, where it is drawn beside this one: to the same scales."""
+    units: Conversion = field(default_factory=dict)
+    """Of the numbers drawn; what is left out has the SI unit with a prefix."""
+    dimensions: bool = False
+    """The lengths of the bars are written at them."""
+    others: "list[View]" = field(default_factory=list)
+    """The other branch, where it is drawn next to this one: to the same scales."""
 
     @property
     def alike(self) -> "list[View]":
         """This view and those that share its scales."""
-        return [self, *self.beside]
+        return [self, *self.others]
 
     @property
     def degrees(self) -> Array:

@@ -27,7 +27,7 @@ class Anatomy:
     """Bars, pins, hinges and closure of a compiled model; everything is measured in its rest state."""
 
     def __init__(self, model: mujoco.MjModel, names: Mapping[str, str]) -> None:
-        self.model, self.data = model, mujoco.MjData(model)
+        self.model, self.data, self.names = model, mujoco.MjData(model), dict(names)
         mujoco.mj_kinematics(model, self.data)
         mujoco.mj_comPos(model, self.data)
         self.root = {1: 0} | {bar: self._body(names, BAR_NAMES[bar]) for bar in MOVING_BARS}

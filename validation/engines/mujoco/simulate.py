@@ -10,6 +10,7 @@ import numpy as np
 
 from fourbar.errors import InputError, LimitError
 from fourbar.mjcf import RECIPE, Settings, mjcf
+from fourbar.mjcf.document import mass_ratio
 from fourbar.mjcf.effects import unwound
 from fourbar.quantities import PIN_FORCES, UNKNOWNS
 from fourbar.scene import Command, Scene
@@ -121,6 +122,7 @@ class _Simulation:
             "bad_states": 0.0,
             "solver_iterations": 0.0,
             "steps": 0.0,
+            "mass_ratio": mass_ratio(scene.linkage),
         }
         self.steps_per_revolution = 0.0
         self.predicted = {name: np.zeros(n) for name in (*FIELDS, *PIN_FORCES)}

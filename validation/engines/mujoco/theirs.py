@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from fourbar.errors import InputError, LimitError
+from fourbar.errors import FourBarError, InputError, LimitError
 from fourbar.linkage import PINS
 from fourbar.mjcf import flywheel, mjcf, run_through
 from fourbar.quantities import VECTORS
@@ -23,9 +23,11 @@ from validation.compare.answer import Answer, Array
 from validation.compare.compare import COMPARED
 from validation.engines.loop import Position
 from validation.engines.mujoco.anatomy import Anatomy
-from validation.engines.mujoco.attached import Described
+from validation.engines.mujoco.attached import Described, Value
 from validation.engines.mujoco.closed_loop import WARNINGS
 from validation.engines.mujoco.describe import called, described
+from validation.engines.mujoco.guess import anatomy_of
+from validation.engines.mujoco.mend import mended
 from validation.engines.mujoco.motions import order_in_time
 from validation.engines.mujoco.runner import Stepper, assembled, stretches
 
@@ -34,6 +36,8 @@ POSITIONS = 37
 """Positions taken of a sweep: a file is judged as a whole, not position by position."""
 MOST_STEPS = 400_000
 """A revolution at 628 steps per turn is a thousandth of this; more would be minutes."""
+MENDING = 60.0
+"""Seconds in which entries are mended one by one; each takes two evaluations."""
 REFINEMENTS = 3
 """Secant steps after the first: each gains the digits that the one before has."""
 SHARED = "theta_2, omega_2, alpha_2 and the branch; the rest is the file's"
@@ -49,6 +53,8 @@ class Examined:
     """Part of a key of the description: the element of the file that it is of."""
     answers: list[Answer]
     notes: list[str]
+    names: dict[str, str]
+    """Role: body or site, as stated or guessed."""
 
 
 def compile_text(text: str) -> mujoco.MjModel:
@@ -60,15 +66,40 @@ def compile_text(text: str) -> mujoco.MjModel:
 
 
 def examine(scene: Scene, text: str | None, names: Mapping[str, str]) -> Examined:
-    """Describe an MJCF, ask it at single states, and run it through time; None: the one generated from the scene."""
+    """Describe an MJCF, evaluate it at single states and through time; None: the one generated from the scene."""
     model = compile_text(mjcf(scene) if text is None else text)
-    anatomy = Anatomy(model, names)
-    at = _positions(command(scene))
+    anatomy, guessed = anatomy_of(model, names, scene.linkage.lengths)
     loop = Loop(anatomy, scene)
+    answers = _answers(loop, scene)
+    return Examined(described(anatomy), called(anatomy), answers, [*guessed, *loop.notes], anatomy.names)
+
+
+def examine_mended(
+    scene: Scene, text: str, names: Mapping[str, str], entries: Sequence[tuple[str, Value]]
+) -> list[list[Answer] | None]:
+    """The answers of a file with one entry of its description as stated, for each; None where it cannot be set alone.
+
+    After MENDING seconds the rest are not evaluated either.
+    """
+    anatomy = Anatomy(compile_text(text), names)
+    start, found = time.perf_counter(), list[list[Answer] | None]()
+    for key, value in entries:
+        answers = None
+        if time.perf_counter() - start < MENDING and (model := mended(anatomy, key, value)) is not None:
+            try:
+                answers = _answers(Loop(Anatomy(model, names), scene), scene)
+            except FourBarError:  # what the other differences make of it is no four-bar
+                answers = None
+        found.append(answers)
+    return found
+
+
+def _answers(loop: "Loop", scene: Scene) -> list[Answer]:
+    at = _positions(command(scene))
     answers = [_answered(ONE_STATE, scene, lambda: one_state(loop, at))]
     if at.omega_2 is not None and np.any(at.omega_2) and np.ptp(at.theta_2) > 0.0:
         answers.append(_answered(THROUGH_TIME, scene, lambda: through_time(loop, at)))
-    return Examined(described(anatomy), called(anatomy), answers, loop.notes)
+    return answers
 
 
 def _positions(at: Command) -> Command:

@@ -57,7 +57,7 @@ def run(count: int, seed: int, out: Path, workers: int) -> Iterator[dict[str, li
 @click.option("--seed", default=0, show_default=True, type=click.IntRange(0))
 @click.option("--workers", default=2, show_default=True, type=click.IntRange(1), help="Processes.")
 @click.option(
-    "--out", type=click.Path(path_type=Path, file_okay=False), default=Path("results/fuzz"), show_default=True
+    "-o", "--out", type=click.Path(path_type=Path, file_okay=False), default=Path("results/fuzz"), show_default=True
 )
 def fuzz(scenes: int, seed: int, workers: int, out: Path) -> int:
     """Random and adversarial scenes through files, formulas and exact engines; every failure is shrunk and kept."""

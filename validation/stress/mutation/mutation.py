@@ -33,7 +33,7 @@ UNTRIED = ("", "not checked", "check was interrupted by user")
 @click.option("--whole", is_flag=True, help="Try survivors without a reason on the whole suite (minutes each).")
 @click.option("--again", is_flag=True, help="Only what survived the last run into --out, after tests were added.")
 @click.option("--workers", default=2, show_default=True, type=click.IntRange(1))
-@click.option("--out", type=click.Path(path_type=Path, file_okay=False), default=Path("results/mutation"))
+@click.option("-o", "--out", type=click.Path(path_type=Path, file_okay=False), default=Path("results/mutation"))
 def mutation(harness: bool, module: str | None, most: int, whole: bool, again: bool, workers: int, out: Path) -> int:
     """Measure the checks: small faults in the formulas, one at a time, against `make test` or the harness alone.
 

@@ -20,8 +20,9 @@ from fourbar.scene import Command, Scene
 from fourbar.scene import command as command_of
 from fourbar.writing import write_text
 from validation.engines.mujoco.dialled import FEWEST_STEPS, LONGEST, ORDER, SHORTEST, dialled, guess
-from validation.engines.mujoco.trial import Rig, Trial
-from validation.studies.cost.errors import NO_ANSWER, Errors, errors
+from validation.engines.mujoco.trial import Rig
+from validation.studies.cost.errors import Errors
+from validation.studies.cost.matters import MATTERS, influences, judged, print_table, sentence
 
 MARGIN = 0.7
 """The run must stay within this part of the required error: between the positions it may be larger."""
@@ -55,6 +56,11 @@ class Advice:
     attempts: tuple[Attempt, ...]
     reached: bool
     steps_per_revolution: float
+
+    def cells(self) -> tuple[str, str, str]:
+        """Error, steps per revolution and time constant, for a table of several scenes."""
+        error = f"{self.best.errors.worst:.1e}" + ("" if self.reached else " (not reached)")
+        return error, f"{self.steps_per_revolution:.0f}", f"{self.best.settings.time_constant_steps:.3g}"
 
     @property
     def reason(self) -> str:
@@ -174,30 +180,44 @@ class _Search:
         return attempt
 
 
-def judged(scene: Scene, trial: Trial) -> Errors:
-    """Errors of a trial; none where MuJoCo lost the motion."""
-    return NO_ANSWER if trial.broken else errors(scene, trial.at, trial.quantities)
-
-
 @click.command(name="advise")
-@click.argument("scene", type=click.Path(path_type=Path, dir_okay=False))
-@click.option("--error", "error", type=float, required=True, help="Relative error of torque and pin forces.")
-@click.option("-o", "--output", type=click.Path(path_type=Path, dir_okay=False), help="Write the MJCF there.")
-def command(scene: Path, error: float, output: Path | None) -> int:
-    """The cheapest MuJoCo settings that keep SCENE within an error; exit 1 where none is found."""
+@click.argument("scenes", nargs=-1, required=True, type=click.Path(path_type=Path, dir_okay=False))
+@click.option("--error", "wanted", type=float, required=True, help="Relative error of torque and pin forces.")
+@click.option(
+    *("-o", "--out", "--output", "output"),
+    type=click.Path(path_type=Path, dir_okay=False),
+    help="Write the MJCF of one SCENE.",
+)
+def command(scenes: tuple[Path, ...], wanted: float, output: Path | None) -> int:
+    """The cheapest MuJoCo settings that keep SCENES within an error; exit 1 where none is found for one of them.
+
+    Of each scene it says which of the settings matters, and why; of several scenes a table is printed at the end.
+    """
     from fourbar.files import load
 
-    given = load(scene)
-    try:
-        advice = advise(given, error)
-    except LimitError as reason:
-        click.echo(f"{scene.name}: cannot be simulated: {reason}; inverse dynamics with loop multipliers can answer it")
-        return 1
-    click.echo(f"{scene.name}: {advice.reason}")
-    click.echo(f"{len(advice.attempts)} runs of the scene, {sum(a.steps for a in advice.attempts)} steps")
-    if not advice.reached:
-        return 1
-    if output is not None:
-        write_text(output, mjcf(given, advice.best.settings))
-        click.echo(f"written to {output}")
-    return 0
+    if output is not None and len(scenes) > 1:
+        raise InputError("-o", str(output), f"is the MJCF of one scene, not of {len(scenes)}")
+    loaded = [(scene, load(scene)) for scene in scenes]
+    rows, reached = [], True
+    for file, scene in loaded:
+        try:
+            rig = Rig(scene, looked_at(scene))
+            advice = advise(scene, wanted, rig)
+        except LimitError as error:
+            reason = f"cannot be simulated: {error}; inverse dynamics with loop multipliers can answer it"
+            click.echo(f"{file.name}: {reason}")
+            rows.append((file.name, "-", "-", "-", "cannot be simulated"))
+            reached = False
+            continue
+        found = influences(scene, rig, advice.best.settings)
+        click.echo(f"{file.name}: {advice.reason}")
+        click.echo(f"{sentence(found)}")
+        click.echo(f"{len(advice.attempts)} runs of the scene, {sum(a.steps for a in advice.attempts)} steps")
+        reached &= advice.reached
+        rows.append((file.name, *advice.cells(), found[0].setting if found[0].times >= MATTERS else "none by itself"))
+        if output is not None and advice.reached:
+            write_text(output, mjcf(scene, advice.best.settings))
+            click.echo(f"written to {output}")
+    if len(rows) > 1:
+        print_table(("scene", "error", "steps/turn", "tc, steps", "matters most"), rows)
+    return 0 if reached else 1

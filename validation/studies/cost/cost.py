@@ -10,21 +10,27 @@ import click
 
 from fourbar.errors import FAILED, HOLDS
 from fourbar.scene import Scene
+from fourbar.scene import command as command_of
 from fourbar.writing import write_text
+from validation.engines.mujoco.trial import Rig
 from validation.report.machine import machine, versions
 from validation.scenes.suites import MODELS, scene_files
+from validation.studies.cost.curves import BEST
 from validation.studies.cost.errors import QUANTITIES
 from validation.studies.cost.laws import Law, laws, lines, pareto, warnings
+from validation.studies.cost.matters import MATTERS, influences, print_table, sentence
 from validation.studies.cost.study import COLUMNS, STEPPED, Point, Study
 
 DEFAULT_SCENES = (MODELS / "crank_rocker.toml",)
+WANTED = (1e-3, 1e-6)
+"""Errors whose price the table of several scenes has."""
 ORDERS = "Errors are the worst over the scene's positions, each on its scale, against the formulas at the motion made."
 
 
 @click.command(name="cost")
 @click.argument("scenes", nargs=-1, type=click.Path(path_type=Path))
 @click.option(
-    "--out", type=click.Path(path_type=Path, file_okay=False), default=Path("results/cost"), show_default=True
+    "-o", "--out", type=click.Path(path_type=Path, file_okay=False), default=Path("results/cost"), show_default=True
 )
 @click.option("--effects", is_flag=True, help="Count instead what each effect costs in each engine (`effects-cost`).")
 def cost(scenes: tuple[Path, ...], out: Path, effects: bool) -> int:
@@ -42,6 +48,7 @@ def cost(scenes: tuple[Path, ...], out: Path, effects: bool) -> int:
 
     files = scene_files(scenes or DEFAULT_SCENES)
     fitted: list[Law] = []
+    rows: list[tuple[str, ...]] = []
     for index in range(len(files)):
         name, scene = files.name(index), files.scene(index)
         study = Study(name, scene, out / name)
@@ -59,10 +66,17 @@ def cost(scenes: tuple[Path, ...], out: Path, effects: bool) -> int:
                 curves[curve] = points
                 progress.update(task, advance=1, description=curve)
         found = laws(curves)
+        dials = influences(scene, Rig(scene, command_of(scene)), BEST)
         fitted += [law for law in found if law.decided]
         written = write(study, curves, found, scene.title or name)
         click.echo(summary(name, curves, found, study.left_out))
+        click.echo(sentence(dials))
+        held = sum(law.holds for law in found if law.decided)
+        most = dials[0].setting if dials[0].times >= MATTERS else "none by itself"
+        rows.append((name, *cheapest(curves), f"{held} of {sum(law.decided for law in found)}", most))
         click.echo(f"written to {out / name}: {', '.join(sorted(path.name for path in written))}")
+    if len(rows) > 1:
+        print_table(("scene", *(f"RK4 steps for {error:g}" for error in WANTED), "laws hold", "matters most"), rows)
     if not fitted:
         click.echo("Nothing was compared: no law has points enough for a fit")
     return HOLDS if fitted and all(law.holds for law in fitted) else FAILED
@@ -104,6 +118,13 @@ def summary(name: str, curves: Mapping[str, Sequence[Point]], found: Sequence[La
     text = [f"{name}: what accuracy costs", "", *front_lines(curves), "", *lines(found), ""]
     text += [f"warning: {line}" for line in warnings(curves)]
     return "\n".join((*text, *(f"left out: {line}" for line in left_out)))
+
+
+def cheapest(curves: Mapping[str, Sequence[Point]]) -> list[str]:
+    """The least work of a revolution, in RK4 steps, that reaches each of WANTED; a dash where nothing does."""
+    points = [p for name, row in curves.items() if "slow" not in name for p in row if p.kind == STEPPED]
+    work = ([p.rk4_steps for p in points if p.worst <= error] for error in WANTED)
+    return [f"{min(steps):.0f}" if steps else "-" for steps in work]
 
 
 def front_lines(curves: Mapping[str, Sequence[Point]]) -> list[str]:

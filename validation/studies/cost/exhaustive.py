@@ -12,7 +12,8 @@ from typing import NamedTuple
 from fourbar.mjcf import Settings
 from validation.engines.mujoco.dialled import FEWEST_STEPS, dialled
 from validation.engines.mujoco.trial import Rig
-from validation.studies.cost.advise import MOST_STEPS, judged
+from validation.studies.cost.advise import MOST_STEPS
+from validation.studies.cost.matters import judged
 
 COARSE, FINE = 2.0, 2.0 ** (1.0 / 3.0)
 """Ratios of the ladder of steps: first by factors of two, then thirds of an octave below what serves."""

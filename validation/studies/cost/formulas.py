@@ -47,6 +47,7 @@ def double(scene: Scene, at: Command) -> Quantities:
 def single(scene: Scene, at: Command) -> Quantities:
     """The same formulas on float32 arrays."""
     case = Case.of(scene)
+    case = case._replace(lengths=type(case.lengths)(*map(float, case.lengths)))  # NumPy's doubles would prevail
     with np.errstate(all="ignore"):
         theta_2 = at.theta_2.astype(np.float32)
         half = half_angle(case.lengths, theta_2 - scene.linkage.ground_angle)
@@ -62,13 +63,13 @@ def single(scene: Scene, at: Command) -> Quantities:
         for term in case.terms:
             term.act(actions, state)
         a = case.lengths.a
-        own, at_A = inertia_wrenches(a, case.bodies, position, moving)
+        own, mass_at_A = inertia_wrenches(a, case.bodies, position, moving)
         of_input, of_others = inertia(a, case.bodies, position, k)
         others = of_others * growth + half_slope(a, case.bodies, position, k) * (speed * speed)
         work, beyond_A = (_single(value) for value in actions.work())
         wrenches = Wrenches(*map(_single, actions.wrenches(own)))
         sine = drive_sine(position, scene.drive_bar)
-        pins = pin_forces(case.lengths, position, scene.drive_bar, sine, wrenches, at_A, beyond_A - others)
+        pins = pin_forces(case.lengths, position, scene.drive_bar, sine, wrenches, mass_at_A, beyond_A - others)
         torque = driving_torque(k, scene.drive_bar, others + of_input * growth, work)
     assert torque.dtype == np.float32
     return {"torque": torque, **{name: _stack(getattr(pins, name), len(theta_2)) for name in PIN_FORCES}}
@@ -105,9 +106,9 @@ def _bodies(scene: Scene, state: State) -> thirteen.FreeBodies:
         first[k] = _stack(-centre, n)
         # the thesis's order: bar 4's second pin is B as well, and its first is O4
         second[k] = _stack(scene.linkage.bar(k).length * state.direction(k) - centre, n)
-        R = acting[k - 2]
+        R, M = acting.on(k)
         force[k] = _stack(body.m * state.acceleration(k, body.z) - R, n)
-        about_G = acting[k + 1] - cross(centre, R + 0.0j)
+        about_G = M - cross(centre, R + 0.0j)
         moment[k] = np.broadcast_to(body.I * np.asarray(state.alpha(k)), (n,)) - about_G
     return thirteen.FreeBodies(first, second, force, moment)
 

@@ -16,8 +16,9 @@ from fourbar.scene import Scene, command
 from fourbar.scene.motion import Motion, Sweep
 from validation.engines.mujoco.trial import Rig
 from validation.scenes.random import LinkageType, random_scene
-from validation.studies.cost.advise import advise, judged
+from validation.studies.cost.advise import advise
 from validation.studies.cost.exhaustive import cheapest, relative_costs
+from validation.studies.cost.matters import judged
 
 TYPES = (
     *(LinkageType.CRANK_ROCKER, LinkageType.DRAG_LINK),
@@ -169,7 +170,7 @@ def _read(row: dict[str, Any]) -> Case:
 @click.command(name="advise-study")
 @click.option("--count", type=click.IntRange(min=1), default=400, show_default=True, help="Random linkages.")
 @click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True)
-@click.option("--out", type=click.Path(path_type=Path, dir_okay=False), default=Path("results/advise-study.csv"))
+@click.option("-o", "--out", type=click.Path(path_type=Path, dir_okay=False), default=Path("results/advise-study.csv"))
 def study(count: int, seed: int, out: Path) -> int:
     """Measure the advice on random linkages; exit 1 where it is not met or not cheap often enough."""
     from rich.console import Console

@@ -32,6 +32,8 @@ LEFT = frozenset(("formulas, double", "pinocchio-inverse", "MuJoCo at one state,
 """Names that stand left of their mark, where the right is taken."""
 NAMES = {"torque": "driving torque", "force": "worst pin force"}
 INK = "#333333"
+NEAR_TOP = 3e-2
+"""A label above a point with a larger error would reach the legend."""
 PALE = "#d9d9d9"
 
 
@@ -143,7 +145,7 @@ def _mark_default(axes: Any, points: Sequence[Point], quantity: str) -> None:
             axes.annotate(
                 f"MuJoCo's defaults (Euler, 2 ms): {short(at[1])}",
                 at,
-                xytext=(14, 16),
+                xytext=(14, 16 if at[1] < NEAR_TOP else -22),  # the legend stands above the axes
                 textcoords="offset points",
                 fontsize=10,
                 weight="bold",

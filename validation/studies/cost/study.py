@@ -19,9 +19,10 @@ from validation.compare.answer import Engine
 from validation.engines.mujoco.trial import Rig, Trial
 from validation.report.machine import versions
 from validation.studies.cost import formulas
-from validation.studies.cost.advise import advise, judged
+from validation.studies.cost.advise import advise
 from validation.studies.cost.curves import BEST, SLOW, Curve, Spot, curves
 from validation.studies.cost.errors import Errors, errors
+from validation.studies.cost.matters import judged
 
 ROUNDS = 7
 TIMED_STEPS = 200

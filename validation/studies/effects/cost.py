@@ -38,7 +38,7 @@ def costs(work: list[tuple[str, str]], workers: int) -> dict[tuple[str, str], fl
 @click.option("--engines", metavar="NAMES", default=",".join(AMOUNTS), show_default=True, help="Comma-separated.")
 @click.option("--effects", metavar="NAMES", help="Comma-separated; left out: all.")
 @click.option("--workers", type=click.IntRange(min=1), default=2, show_default=True, help="Counts at the same time.")
-@click.option("--out", type=click.Path(path_type=Path, dir_okay=False), help="Write the table as Markdown too.")
+@click.option("-o", "--out", type=click.Path(path_type=Path, dir_okay=False), help="Write the table as Markdown too.")
 @click.option("--absent", is_flag=True, help="Look instead for any trace of an effect in a build without it: none.")
 def command(engines: str, effects: str | None, workers: int, out: Path | None, absent: bool) -> int:
     """Count the instructions that each effect costs in each engine (valgrind; some minutes)."""

@@ -1,0 +1,85 @@
+"""What acts in a scene, as symbols: springs, loads, gravity, drive, flywheel, and what sits in the pins.
+
+Each symbol knows its bar and its points in that bar's frame, so that whoever draws it (plot, film, page) places it at
+any position.
+"""
+
+import cmath
+from typing import Any, NamedTuple
+
+from fourbar.linkage import FIRST_PIN
+from fourbar.scene import Scene
+
+IN_PINS = {"torsion": "springs", "viscous": "coefficients", "friction": "torques", "pin_friction": "pins"}
+"""Effects that act in a pin, each with the field that lists them, the pin first."""
+
+
+class Symbol(NamedTuple):
+    """One thing that acts."""
+
+    kind: str
+    """spring, force, moment, drive, flywheel, gravity, or an effect in a pin: torsion, viscous, friction, ..."""
+    name: str
+    """As it is labelled."""
+    bar: int = 1
+    """1 to 4."""
+    at: complex = 0.0j
+    """Where it acts, from the bar's first pin in the bar's frame, m."""
+    beyond: complex = 0.0j
+    """From there on to the point itself, m: in world axes, or in the bar's frame where `turns`."""
+    vector: complex = 0.0j
+    """Force (N) or field (m/s^2); in world axes, or in the bar's frame where `turns`."""
+    turns: bool = False
+    moment: float = 0.0
+    """N m; of a drive and of what acts in a pin 0."""
+    end: "tuple[int, complex] | None" = None
+    """Of a spring the bar and the point at its other end."""
+    pin: str = ""
+    """Of what acts in a pin."""
+    table: Any = None
+    """Of a load its factor over theta_2."""
+
+    def sign(self, theta_2: float) -> float:
+        """+1 or -1, 0 where the load's factor is zero."""
+        if self.table is None:
+            return 1.0
+        factor = float(self.table.at(theta_2))
+        return (factor > 0.0) - (factor < 0.0)
+
+
+def acting(scene: Scene) -> list[Symbol]:
+    """Everything that acts, the drive first; nothing that has no size."""
+    found = []
+    if scene.motion.free is None:
+        found.append(Symbol("drive", f"T{scene.drive_bar}", scene.drive_bar, pin=FIRST_PIN[scene.drive_bar]))
+    for number, load in enumerate(scene.loads, 1):
+        at, turns = scene.linkage.bar(load.bar).to_centre, load.frame == "bar"
+        if load.force is not None and load.force[0] != 0.0:
+            beyond, force = _polar(*load.at), _polar(*load.force)
+            found.append(Symbol("force", f"load {number}", load.bar, at, beyond, force, turns, table=load.table))
+        if load.moment != 0.0:
+            found.append(Symbol("moment", f"load {number}", load.bar, at, moment=load.moment, table=load.table))
+    for effect in scene.effects:
+        found += _effect(effect)
+    return found
+
+
+def _effect(effect: Any) -> list[Symbol]:
+    """The symbols of one effect; of a kind that is not known here none."""
+    if effect.key in IN_PINS:
+        entries = getattr(effect, IN_PINS[effect.key])
+        return [Symbol(effect.key, effect.key.replace("_", " "), pin=entry[0]) for entry in entries]
+    if effect.key == "gravity":
+        return [Symbol("gravity", "g", vector=complex(*effect.vector))]
+    if effect.key == "flywheel":
+        return [Symbol("flywheel", "flywheel", effect.bar, pin=FIRST_PIN[effect.bar])]
+    if effect.key == "springs":
+        return [
+            Symbol("spring", "spring", s.start.bar, _polar(*s.start[1:]), end=(s.end.bar, _polar(*s.end[1:])))
+            for s in effect.springs
+        ]
+    return []
+
+
+def _polar(size: float, angle: float) -> complex:
+    return cmath.rect(size, angle)

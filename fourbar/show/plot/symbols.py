@@ -1,0 +1,180 @@
+"""Symbols of what acts, drawn with matplotlib: springs, loads, drive, flywheel, gravity, and rings around pins."""
+
+import cmath
+import math
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from fourbar.linkage import FourBar
+from fourbar.show.acting import Symbol
+from fourbar.show.plot.style import INK, MUTED
+from fourbar.solution import Solution
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+Point = tuple[float, float]
+LOAD, SPRING, PIN = "#8A3B78", "#6b5b00", "#4d5b70"
+COLOURS = {
+    **{"force": LOAD, "moment": LOAD, "drive": INK, "gravity": MUTED, "spring": SPRING, "torsion": SPRING},
+    **{"flywheel": MUTED, "viscous": PIN, "friction": PIN, "pin_friction": PIN},
+}
+LENGTHS = {"force": 7.0, "moment": 2.6, "drive": 3.2, "flywheel": 4.0, "torsion": 2.2}
+"""Length of an arrow and radii, in sizes of a support; other rings around pins have RING."""
+RING = {"viscous": 1.5, "friction": 1.8, "pin_friction": 1.8}
+COILS = 7
+OPENING = math.radians(250.0)
+"""Of an arc with an arrow head."""
+
+
+class Place(NamedTuple):
+    """One position of the linkage in the units of a drawing."""
+
+    foot: dict[int, complex]
+    """First pin of each bar, 1 to 4."""
+    u: dict[int, complex]
+    """Direction of each bar."""
+    pins: dict[str, complex]
+    factor: float
+    """From m."""
+    theta_2: float
+    torque: float
+    """N m; NaN where there is none."""
+
+    def point(self, bar: int, z: complex) -> complex:
+        """A point given in the frame of a bar."""
+        return self.foot[bar] + self.factor * z * self.u[bar]
+
+
+@dataclass(slots=True)
+class Drawn:
+    """What one symbol has put into a drawing."""
+
+    artists: list[Any] = field(default_factory=list)
+    lines: list[list[Point]] = field(default_factory=list)
+    """That labels keep off, and that a window has to show."""
+    text: str = ""
+    label: Point | None = None
+    """Where the text belongs; None: it stands already."""
+    away: complex = 0.0j
+    """From there outwards, of length 1."""
+
+
+def place_of(linkage: FourBar, solution: Solution, index: int, factor: float) -> Place:
+    """The place of one position of a solution."""
+    A, B = (factor * complex(*point[index]) for point in (solution.A, solution.B))
+    O4 = factor * cmath.rect(linkage.ground, linkage.ground_angle)
+    angles = {k: float(getattr(solution, f"theta_{k}")[index]) for k in (2, 3, 4)}
+    u = {1: cmath.rect(1.0, linkage.ground_angle), **{k: cmath.rect(1.0, angle) for k, angle in angles.items()}}
+    torque = float("nan") if solution.torque is None else float(solution.torque[index])
+    pins = {"O2": 0.0j, "A": A, "B": B, "O4": O4}
+    return Place({1: 0.0j, 2: 0.0j, 3: A, 4: O4}, u, pins, factor, angles[2], torque)
+
+
+def draw(axes: "Axes", symbol: Symbol, place: Place, size: float) -> Drawn:
+    """One symbol at one position; `size` is that of a support."""
+    drawn, colour = Drawn(text=symbol.name), COLOURS[symbol.kind]
+    if symbol.kind == "gravity":
+        _gravity(axes, symbol, drawn)
+    elif symbol.kind == "spring":
+        assert symbol.end is not None
+        start, end = place.point(symbol.bar, symbol.at), place.point(*symbol.end)
+        _line(axes, drawn, _zigzag(start, end, 0.8 * size), colour, 1.1)
+        drawn.artists += axes.plot([start.real, end.real], [start.imag, end.imag], "o", ms=3.5, color=colour, zorder=8)
+    elif symbol.kind == "force":
+        _force(axes, symbol, place, size, drawn)
+    elif symbol.kind in ("moment", "drive"):
+        centre = place.point(symbol.bar, symbol.at)
+        turn = math.copysign(1.0, symbol.moment) * symbol.sign(place.theta_2)
+        if symbol.kind == "drive":
+            centre = 0.5 * (place.pins["A"] + place.pins["B"]) if symbol.bar == 3 else place.pins[symbol.pin]
+            turn = 1.0 if math.isnan(place.torque) else float(np.sign(place.torque))
+            drawn.text = f"$T_{symbol.bar}$"
+        _turn(axes, centre, LENGTHS[symbol.kind] * size, turn, colour, drawn)
+    else:
+        centre = place.pins[symbol.pin]
+        if symbol.kind == "torsion":
+            radii = size * np.linspace(0.6, LENGTHS["torsion"], 90)
+            points = centre + radii * np.exp(1j * np.linspace(0.0, 2.5 * math.tau, 90))
+        else:
+            points = centre + size * (RING.get(symbol.kind) or LENGTHS["flywheel"]) * np.exp(
+                1j * np.linspace(0.0, math.tau, 60)
+            )
+        _line(axes, drawn, points, colour, 2.2 if symbol.kind == "flywheel" else 1.2)
+        drawn.label = _point(points[-1])
+    return drawn
+
+
+def _point(z: complex) -> Point:
+    return (z.real, z.imag)
+
+
+def _line(axes: "Axes", drawn: Drawn, points: Any, colour: str, width: float) -> None:
+    x, y = np.real(points), np.imag(points)
+    drawn.artists += axes.plot(x, y, color=colour, lw=width, zorder=5)
+    drawn.lines.append([(float(a), float(b)) for a, b in zip(x, y, strict=True)])
+
+
+def _arrow(axes: "Axes", tail: complex, tip: complex, colour: str, drawn: Drawn) -> None:
+    from matplotlib.patches import FancyArrowPatch
+
+    style: dict[str, Any] = {
+        "arrowstyle": "-|>",
+        "color": colour,
+        "lw": 1.5,
+        "shrinkA": 0.0,
+        "shrinkB": 0.0,
+        "mutation_scale": 10.0,
+    }
+    arrow = FancyArrowPatch(_point(tail), _point(tip), zorder=8, **style)
+    drawn.artists.append(axes.add_patch(arrow))
+    axes.update_datalim([_point(tail), _point(tip)])
+    drawn.lines.append([_point(tail), _point(tip)])
+
+
+def _force(axes: "Axes", symbol: Symbol, place: Place, size: float, drawn: Drawn) -> None:
+    u = place.u[symbol.bar] if symbol.turns else 1.0
+    tail = place.point(symbol.bar, symbol.at) + place.factor * symbol.beyond * u
+    sign = symbol.sign(place.theta_2)
+    if sign == 0.0:
+        return
+    tip = tail + sign * LENGTHS["force"] * size * u * symbol.vector / abs(symbol.vector)
+    _arrow(axes, tail, tip, COLOURS["force"], drawn)
+    drawn.label, drawn.away = _point(tip), (tip - tail) / abs(tip - tail)
+
+
+def _turn(axes: "Axes", centre: complex, radius: float, turn: float, colour: str, drawn: Drawn) -> None:
+    """An arc with a head, counter-clockwise where turn > 0; none where nothing turns."""
+    if turn == 0.0:
+        return
+    angles = math.radians(-35.0) * turn + turn * np.linspace(0.0, OPENING, 40)
+    points = centre + radius * np.exp(1j * angles)
+    _line(axes, drawn, points, colour, 1.5)
+    _arrow(axes, complex(points[-2]), complex(points[-1] + 2.0 * (points[-1] - points[-2])), colour, drawn)
+    drawn.label, drawn.away = _point(complex(points[20])), complex(points[20] - centre) / radius
+
+
+def _zigzag(start: complex, end: complex, width: float) -> Any:
+    """A coil spring seen from the side: straight ends, teeth between."""
+    along = end - start
+    across = 1j * along / abs(along) * width if along else 0.0
+    teeth = [start, start + 0.15 * along]
+    teeth += [start + (0.15 + 0.7 * (k + 0.5) / COILS) * along + (-1) ** k * across for k in range(COILS)]
+    return np.array([*teeth, start + 0.85 * along, end])
+
+
+def _gravity(axes: "Axes", symbol: Symbol, drawn: Drawn) -> None:
+    """An arrow in the corner, of no length in the plane."""
+    size = abs(symbol.vector)
+    if size == 0.0:
+        return
+    x, y = (24.0 * part / size for part in (symbol.vector.real, symbol.vector.imag))
+    style = {"arrowstyle": "-|>", "color": COLOURS["gravity"], "lw": 1.3, "shrinkA": 0.0, "shrinkB": 0.0}
+    corner: dict[str, Any] = {"xycoords": "axes fraction", "textcoords": "offset points", "annotation_clip": False}
+    middle = (0.95, 0.9)
+    drawn.artists += [
+        axes.annotate("", xy=middle, xytext=(-x, -y), arrowprops=style, **corner),
+        axes.annotate("$g$", xy=middle, xytext=(-x - 8.0, -y), color=COLOURS["gravity"], size=9.0, **corner),
+    ]

@@ -1,0 +1,46 @@
+"""The units in which results are shown: a list such as "mm N N.mm deg", or "imperial"."""
+
+from fourbar.errors import InputError
+from fourbar.files.units import UnitError, to_si
+from fourbar.solution import SI, Conversion
+
+PRESETS = {"SI": "", "imperial": "in lbf lbf.in lb deg rpm"}
+STATED = ("m", "N", "N m", "kg", "rad", "rad/s", "rad/s^2", "m/s", "m/s^2", "W")
+"""The SI units for which another one can be stated, each of a dimension of its own."""
+DERIVED = {
+    "m/s": ("m", "{}/s"),
+    "m/s^2": ("m", "{}/s^2"),
+    "J": ("N m", "{}"),
+    "W": ("N m", "{}/s"),
+}
+"""Not stated, these follow another one: energy and power the unit of torque, speeds that of length."""
+
+
+def units(text: str) -> Conversion:
+    """The units of a list, or of "SI" or "imperial" (in, lbf, lbf in, lb, deg, rpm).
+
+    A product is joined by dots ("N.mm"). What the list leaves out stays SI, but for speeds and accelerations of
+    points, which follow the length, and energy and power, which follow the torque.
+
+    Raises InputError for what is no unit of a result, and for two of one dimension.
+    """
+    names = PRESETS.get(text, text).split()
+    stated: dict[str, str] = {}
+    for name in names:
+        unit = next((unit for unit in STATED if _converts(name, unit)), None)
+        if unit is None or unit in stated:
+            why = "is no unit of a result" if unit is None else f"is the second unit for {unit}"
+            raise InputError("units", name, f'{why}; must be "SI", "imperial" or a list like "mm N N.mm deg rpm"')
+        stated[unit] = name.replace(".", " ")
+    for unit, (base, form) in DERIVED.items():
+        if base in stated and unit not in stated:
+            stated[unit] = form.format(stated[base])
+    return {unit: (name, to_si(f"1 {unit}", name)) for unit, name in stated.items()} or SI
+
+
+def _converts(name: str, unit: str) -> bool:
+    try:
+        to_si(f"1 {name}", unit)
+    except UnitError:
+        return False
+    return True

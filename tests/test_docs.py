@@ -1,0 +1,118 @@
+"""README and docs are run: commands, program, scene file; every link leads somewhere, every page is listed.
+
+The tutorial has a test of its own, which runs it from top to bottom.
+"""
+
+import contextlib
+import io
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+
+import fourbar
+from fourbar.cli import status
+from fourbar.errors import HOLDS
+from fourbar.files import load
+from fourbar.files.effects import REGISTRY
+from validation.cli import COMMANDS
+from validation.scenes.suites import suite_file
+
+ROOT = Path(__file__).parent.parent
+DOCS = ROOT / "docs"
+GALLERY = ROOT / "models" / "gallery"
+PAGES = [ROOT / "README.md", *sorted(DOCS.rglob("*.md"))]
+
+
+def read(name: str) -> str:
+    return (ROOT / name).read_text(encoding="utf-8")
+
+
+def blocks(language: str, text: str) -> list[str]:
+    return re.findall(rf"^```{language}\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
+
+
+@pytest.fixture
+def checkout(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder that looks like a checkout and may be written to."""
+    (tmp_path / "models").symlink_to(ROOT / "models")
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    ("name", "count"),
+    [("README.md", 2), ("docs/commands.md", 9), ("docs/gallery.md", 6)],
+    ids=["readme", "commands", "gallery"],
+)
+def test_every_command_prints_what_is_shown(
+    name: str, count: int, checkout: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    sessions = re.findall(r"^\$ (.*)\n((?:(?!\$ ).*\n)*)", "".join(blocks("console", read(name))), re.MULTILINE)
+    assert len(sessions) == count
+    for command, shown in sessions:
+        program, *arguments = shlex.split(command)
+        assert program == "fourbar" and status(arguments) == HOLDS, command
+        captured = capsys.readouterr()
+        beginning = shown.removesuffix("...\n")
+        assert captured.out.startswith(beginning), command
+        assert (len(captured.out) > len(beginning)) == (shown != beginning), command
+        assert captured.err == ""
+        for file in re.findall(r"-o (\S+)", command):
+            assert (checkout / file).stat().st_size > 0, command
+
+
+@pytest.mark.usefixtures("checkout")
+def test_the_program_prints_what_is_shown() -> None:
+    (program,), (shown,) = blocks("python", read("README.md")), blocks("text", read("README.md"))
+    printed = io.StringIO()
+    with contextlib.redirect_stdout(printed):
+        exec(compile(program, "README.md", "exec"), {})
+    # the error bar is itself rounding: its digits may differ from one machine to the next
+    assert re.sub(r"take .*", "take", printed.getvalue()) == re.sub(r"take .*", "take", shown)
+
+
+def test_the_scene_file_is_one(checkout: Path) -> None:
+    (text,) = blocks("toml", read("docs/scene-file.md"))
+    (checkout / "example.toml").write_text(text)
+    scene = fourbar.load(checkout / "example.toml")
+    assert set(fourbar.solve(scene).status) == {"ok"}
+    assert {effect.key for effect in scene.effects} <= set(REGISTRY)
+
+
+def test_every_command_of_the_harness_is_listed() -> None:
+    text = read("docs/checks.md")
+    table = text[text.index("| `python -m validation` |") : text.index("The columns of the results:")]
+    listed = re.findall(r"`([a-z-]+)[^`]*`", "".join(line.split("|")[1] for line in table.splitlines()[2:] if line))
+    assert sorted(listed) == sorted(COMMANDS)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_every_link_leads_somewhere(page: Path) -> None:
+    for target in re.findall(r"\]\(([^)#\s]+)\)", page.read_text(encoding="utf-8")):
+        assert target.startswith("http") or (page.parent / target).is_file(), target
+
+
+def test_the_index_lists_every_page_for_readers_and_for_the_site() -> None:
+    text = read("docs/index.md")
+    pages = {page.relative_to(DOCS).as_posix() for page in PAGES[1:]} - {"index.md"}
+    assert pages == set(re.findall(r"\]\(([^)]+\.md)\)", text))
+    (tree,) = blocks(r"\{toctree\}", text)
+    assert pages == {f"{line}.md" for line in tree.splitlines() if not line.startswith(":")}
+
+
+def test_the_gallery_is_a_suite_with_pictures_and_sources() -> None:
+    suite = suite_file(GALLERY / "suite.txt")
+    names = [suite.name(index) for index in range(len(suite))]
+    assert names == sorted(path.stem for path in GALLERY.glob("*.toml")) and len(names) == 6
+    for name in names:
+        scene = load(GALLERY / f"{name}.toml")
+        assert set(fourbar.solve(scene, "force").status) == {"ok"} and len(scene.source) > 100
+        assert (DOCS / "gallery" / f"{name}.svg").is_file() and f"gallery/{name}.svg" in read("docs/gallery.md")
+    # what the sources state of them, by the formulas: a stroke of 54 in, a line straight to 1.5 of 450 mm
+    pump = load(GALLERY / "pump_jack.toml").linkage
+    assert fourbar.swing(pump) * 72.0 == pytest.approx(54.0, rel=0.03)
+    curve = fourbar.coupler_curve(load(GALLERY / "hoecken.toml").linkage, 0.5, 0.0, steps=720)
+    straight = curve.y < 0.4015
+    assert straight.mean() > 0.5 and curve.y.min() > 0.3999 and curve.x[straight].max() - curve.x[straight].min() > 0.44

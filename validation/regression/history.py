@@ -1,0 +1,176 @@
+"""Every accepted or added run in one small columnar file, history.parquet, which pandas and DuckDB read as it is.
+
+One line per row of a run, and one per time (quantity "time": `times_formulas` is the engine's time over the
+formulas' on that scene), with the run's date, commit, machine and versions in columns of their own
+(`version_mujoco`). What each scene states stands once in the file's own notes, by its `scene_hash`.
+"""
+
+import hashlib
+import json
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+from typing import Any
+
+from fourbar.errors import InputError
+from fourbar.writing import write_bytes
+from validation.compare.plain import plain
+from validation.compare.rows import Row, sorted_rows
+from validation.regression.record import About
+from validation.regression.times import Times
+
+HISTORY = "history.parquet"
+SCENES = b"fourbar.scenes"
+"""Of the file's notes: JSON, what each scene states by its hash."""
+TIME = "time"
+OF_A_ROW = tuple(column.name for column in fields(Row) if column.name != "passed")
+OF_A_RUN = ("run", "date", "commit", "machine", "settings")
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """One run of a history."""
+
+    about: About
+    rows: list[Row]
+    times: Times
+
+    @property
+    def name(self) -> str:
+        """Date and commit, for a reader."""
+        date = self.about.date[:16].replace("T", " ") or "no date"
+        return f"{date} ({self.about.commit or 'no commit'})"
+
+    def of(self, keep: Callable[[Row], bool]) -> "Run":
+        """The rows that are wanted."""
+        return replace(self, rows=[row for row in self.rows if keep(row)])
+
+
+def append(file: Path, run: tuple[About, list[Row]], times: Times) -> None:
+    """Add a run at the end of a history, which is made where there is none; InputError where it is no history.
+
+    A run that is in it already, by date and rows, is not added again.
+    """
+    import pyarrow as pa
+
+    about, rows = run
+    new = _table(about, rows, times)
+    if file.exists():
+        old = _read(file)
+        if new["run"][0].as_py() in set(old["run"].to_pylist()):
+            return
+        scenes = {**_scenes(old), **_scenes(new)}
+        new = pa.concat_tables([old, new], promote_options="default")
+        new = new.replace_schema_metadata({SCENES: json.dumps(scenes, sort_keys=True).encode()})
+    _write(file, new)
+
+
+def read_history(file: Path) -> list[Run]:
+    """The runs of a history by date; InputError where it is none."""
+    if not file.is_file():
+        raise InputError("HISTORY", str(file), "there is no such file; `accept` and `history --add` make it")
+    table = _read(file)
+    scenes = _scenes(table)
+    runs: dict[str, Run] = {}
+    hashes: dict[str, dict[str, str]] = {}
+    try:
+        for cells in table.to_pylist():
+            name = cells["run"]
+            if name not in runs:
+                runs[name] = Run(_about(cells), [], {})
+            _put(runs[name], hashes.setdefault(name, {}), cells)
+        for name, run in runs.items():
+            stated = {scene: scenes[each] for scene, each in hashes[name].items() if each in scenes}
+            runs[name] = replace(run, about=replace(run.about, scenes=stated))
+    except (AttributeError, KeyError, TypeError, ValueError):
+        raise InputError("HISTORY", str(file), "is no history written by `accept`") from None
+    return sorted(runs.values(), key=lambda run: run.about.date)
+
+
+def _put(run: Run, hashes: dict[str, str], cells: Mapping[str, Any]) -> None:
+    scene, engine = plain(cells["scene"]), plain(cells["engine"])
+    if cells["scene_hash"]:
+        hashes[scene] = cells["scene_hash"]
+    if cells["quantity"] == TIME:
+        run.times[scene, engine] = float(cells["times_formulas"])  # type: ignore[index]
+        return
+    values: dict[str, Any] = {}
+    for name in OF_A_ROW:
+        cell = cells[name]
+        values[name] = plain(cell) if isinstance(cell, str) else math.nan if cell is None else cell
+    run.rows.append(Row(**values))
+
+
+def _about(cells: Mapping[str, Any]) -> About:
+    versions = {name.removeprefix("version_"): plain(value) for name, value in cells.items()
+                if name.startswith("version_") and value}  # fmt: skip
+    settings = {plain(key): plain(value) for key, value in json.loads(cells["settings"]).items()}
+    return About(versions, plain(cells["machine"]), settings, {}, plain(cells["date"]), plain(cells["commit"]))
+
+
+def _table(about: About, rows: list[Row], times: Times) -> Any:
+    """A run as columns; words that recur are kept once."""
+    import pyarrow as pa
+
+    hashes = {name: _hash(entries) for name, entries in about.scenes.items()}
+    lines: list[dict[str, Any]] = [
+        {name: _or_none(getattr(row, name)) for name in OF_A_ROW} | {"times_formulas": None}
+        for row in sorted_rows(rows)
+    ]
+    nothing = dict.fromkeys(OF_A_ROW)
+    for (scene, engine), ratio in sorted(times.items()):
+        lines.append({**nothing, "scene": scene, "engine": engine, "quantity": TIME, "times_formulas": ratio})
+    name = hashlib.sha256(repr((about.date, [tuple(line.values()) for line in lines])).encode()).hexdigest()[:16]
+    of_run = {"run": name, "date": about.date, "commit": about.commit, "machine": about.machine}
+    of_run |= {"settings": json.dumps(about.settings, sort_keys=True)}
+    of_run |= {f"version_{name}": version for name, version in about.versions.items()}
+    word, number = pa.dictionary(pa.int32(), pa.string()), pa.float64()
+    kinds = {column.name: number if column.type is float else word for column in fields(Row)}
+    names = [*of_run, *OF_A_ROW, "scene_hash", "times_formulas"]
+    columns = {name: [of_run.get(name, line.get(name)) for line in lines] for name in names}
+    columns["scene_hash"] = [hashes.get(line["scene"], "") for line in lines]
+    schema = pa.schema([(name, number if name == "times_formulas" else kinds.get(name, word)) for name in names])
+    kept = {hashes[name]: dict(entries) for name, entries in about.scenes.items()}
+    return pa.table(columns, schema=schema.with_metadata({SCENES: json.dumps(kept, sort_keys=True).encode()}))
+
+
+def _or_none(value: object) -> object:
+    """A missing number as null: no maximum of a column is NaN by it."""
+    return None if isinstance(value, float) and math.isnan(value) else value
+
+
+def _hash(entries: Mapping[str, str]) -> str:
+    return hashlib.sha256(json.dumps(dict(entries), sort_keys=True).encode()).hexdigest()[:16]
+
+
+def _scenes(table: Any) -> dict[str, dict[str, str]]:
+    kept = json.loads((table.schema.metadata or {}).get(SCENES, b"{}"))
+    return {plain(key): {plain(k): plain(v) for k, v in entries.items()} for key, entries in kept.items()}
+
+
+def _read(file: Path) -> Any:
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    try:
+        table = pq.read_table(file)
+    except (OSError, pa.ArrowException):
+        raise InputError("HISTORY", str(file), "is no history written by `accept`") from None
+    missing = {*OF_A_RUN, *OF_A_ROW} - set(table.column_names)
+    if missing:
+        raise InputError(
+            "HISTORY", str(file), f"is no history written by `accept`: it lacks {', '.join(sorted(missing))}"
+        )
+    return table
+
+
+def _write(file: Path, table: Any) -> None:
+    """All of it or nothing."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    sink = pa.BufferOutputStream()
+    pq.write_table(table, sink, compression="zstd")
+    file.parent.mkdir(parents=True, exist_ok=True)
+    write_bytes(file, sink.getvalue().to_pybytes())

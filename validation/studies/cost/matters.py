@@ -1,0 +1,133 @@
+"""Which of MuJoCo's settings matters for a scene, and why: each is changed alone, and the error that comes of it."""
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fourbar.mjcf import Settings
+from fourbar.mjcf.document import load_ratio, mass_ratio
+from fourbar.mjcf.settings import LIGHT
+from fourbar.scene import Scene
+from fourbar.solve import solve
+from validation.compare.plain import plain
+from validation.engines.mujoco.dialled import LONGEST, SHORTEST
+from validation.engines.mujoco.trial import Rig, Trial
+from validation.studies.cost.errors import NO_ANSWER, Errors, errors
+
+MATTERS = 2.0
+"""A setting that a change of a factor of two, or its loss, makes the error grow by less does not matter."""
+IN_LINE = 0.3
+"""|sin(theta_4 - theta_3)| below which bars 3 and 4 speed up so much that the timestep feels it."""
+MUJOCO_TOLERANCE = 1e-8
+"""MuJoCo's own default."""
+
+
+@dataclass(frozen=True, slots=True)
+class Influence:
+    """One setting changed alone."""
+
+    setting: str
+    changed: str
+    error: float
+    times: float
+    """The error over that of the settings as they were."""
+    why: str
+
+    def __str__(self) -> str:
+        error = f"the error is {self.error:.1e}, {self.times:.2g} times as large"
+        lost = error if math.isfinite(self.error) else "MuJoCo loses the motion"
+        return f"{self.setting} matters most here: {self.changed} {lost}, because {self.why}"
+
+
+def judged(scene: Scene, trial: Trial) -> Errors:
+    """Errors of a trial; none where MuJoCo lost the motion."""
+    return NO_ANSWER if trial.broken else errors(scene, trial.at, trial.quantities)
+
+
+def influences(scene: Scene, rig: Rig, settings: Settings) -> list[Influence]:
+    """Every setting changed alone, the one that matters most first."""
+    before = judged(scene, rig.try_out(settings)).worst
+    found = []
+    for name, changed, other, why in _changes(scene, settings):
+        worst = judged(scene, rig.try_out(other)).worst
+        times = worst / before if before > 0.0 and math.isfinite(before) else math.nan
+        found.append(Influence(name, changed, worst, times, why(rig)))
+    return sorted(found, key=lambda each: -each.times if each.times == each.times else math.inf)
+
+
+def sentence(found: list[Influence]) -> str:
+    """The one that matters most, and why."""
+    if found and found[0].times >= MATTERS:
+        return str(found[0])
+    return f"no setting matters by itself here: changed alone none makes the error {MATTERS:g} times as large"
+
+
+def _changes(scene: Scene, settings: Settings) -> Iterator[tuple[str, str, Settings, Callable[[Rig], str]]]:
+    """What is changed, in words, to what, and what a growth of the error would come from."""
+    steps, tc = settings.steps_per_revolution, settings.time_constant_steps
+    window = max(settings.steps_per_window // 2, 1)
+    coarse = replace(settings, steps_per_revolution=steps / 2.0, steps_per_window=window)
+    yield "the timestep", "twice as long", coarse, _why_timestep
+    if tc / 2.0 >= SHORTEST / 2.0:
+        stiff = replace(settings, time_constant_steps=tc / 2.0)
+        yield (
+            "the closure's time constant",
+            "half as long",
+            stiff,
+            lambda _: "a closure of few steps is a spring that RK4 follows badly, in proportion to (h/tc)^4",
+        )
+    if 2.0 * tc <= LONGEST:
+        slow = replace(settings, time_constant_steps=2.0 * tc)
+        yield "the closure's time constant", "twice as long", slow, lambda _: _yields(scene, "a slow closure")
+    if settings.pad is not None:
+        yield (
+            "the stiffness by pads",
+            "without it",
+            replace(settings, pad=None),
+            lambda _: _yields(scene, "without pads the closure"),
+        )
+    if settings.tolerance == 0.0:
+        loose = replace(settings, tolerance=MUJOCO_TOLERANCE)
+        yield (
+            "the solver's tolerance",
+            f"at MuJoCo's own {MUJOCO_TOLERANCE:g}",
+            loose,
+            lambda _: "MuJoCo divides it by the inertia of the flywheel, next to which the linkage is small",
+        )
+
+
+def _why_timestep(rig: Rig) -> str:
+    motion = solve(rig.scene, "position", at=rig.command)
+    sines = np.abs(motion.sin_mu)
+    nearest = int(np.nanargmin(sines))
+    if sines[nearest] < IN_LINE:
+        near, where = (math.degrees(x) for x in (math.asin(sines[nearest]), float(rig.command.theta_2[nearest])))
+        return f"bars 3 and 4 come within {near:.2g} deg of one line at theta_2 = {where:.4g} deg and speed up there"
+    return "the error of RK4 goes as the fourth power of it"
+
+
+def _yields(scene: Scene, what: str) -> str:
+    """To what a soft closure yields, of this scene."""
+    loads, masses = load_ratio(scene), mass_ratio(scene.linkage)
+    if masses > LIGHT:
+        return f"{what} is soft at the lighter of coupler and output, whose inertia is {masses:.1e} times smaller"
+    if loads > 1.0:
+        return f"{what} sags under loads and weights, which are {loads:.2g} times the inertial forces"
+    return f"{what} yields to the inertial forces"
+
+
+def print_table(headings: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> None:
+    """Several scenes, one a line."""
+    from rich.box import SIMPLE_HEAD
+    from rich.console import Console
+    from rich.markup import escape
+    from rich.table import Table
+
+    shown = Table(box=SIMPLE_HEAD, pad_edge=False, show_edge=False)
+    for heading in headings:
+        shown.add_column(heading, overflow="fold")
+    for row in rows:
+        shown.add_row(*(escape(plain(cell)) for cell in row))
+    Console().print(shown)
