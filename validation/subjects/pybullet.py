@@ -15,7 +15,7 @@ from validation.subjects.motion import Readings, gap, turn
 
 VERSION = version("pybullet")
 STEPS = (628, 2512, 10048)
-CHANGED = "built in its own way: URDF holds no loop"
+CHANGED = "built from URDF, which holds no loop, and a point constraint"
 SETTINGS: dict[str, dict[str, float]] = {
     "its defaults": {},
     "500 iterations, no residual": {"numSolverIterations": 500, "solverResidualThreshold": 0.0},
