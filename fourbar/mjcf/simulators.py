@@ -48,7 +48,10 @@ SIMULATORS = {
     "genesis": Simulator(
         RECIPE,
         "For Genesis: gs.init(precision='64') and gs.morphs.MJCF(file=..., default_armature=None); left out, it adds "
-        "0.1 kg m^2 to every joint that states no armature, and the forces are another linkage's.",
+        "0.1 kg m^2 to every joint that states no armature, and the forces are another linkage's. Give timestep and "
+        "gravity to the options of the scene, and the keyframe's speeds to set_dofs_velocity. Numbers: after step, all "
+        "of the instant before it, efc_force[0], efc_force[1] of the rigid solver's constraint_solver are the force of "
+        "bar 4 on bar 3 at pin B in world axes, and T2 = - armature of O2 times its get_dofs_acc.",
     ),
     "newton": Simulator(
         SINGLE,

@@ -21,6 +21,7 @@ SUBJECTS = {
     "mujoco_warp": ("MuJoCo Warp", "mujoco_warp"),
     "mujoco_mjx": ("MJX", "mujoco.mjx"),
     "newton_mujoco": ("Newton, MuJoCo solver", "newton"),
+    "genesis_rigid": ("Genesis", "genesis"),
     "pybullet": ("PyBullet", "pybullet"),
     "drake_sap": ("Drake, SAP", "pydrake"),
 }
