@@ -1,17 +1,20 @@
 """From a scene to its solution: block by block over the positions, stage by stage, no further than wanted."""
 
 import cmath
+import os
 from collections.abc import Callable, Collection, Iterable, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.errors import InputError, LimitError
-from fourbar.formulas.motion import State
+from fourbar.errors import DependencyError, InputError, LimitError
+from fourbar.formulas.motion import Rates, State
 from fourbar.formulas.path import NO_DIGIT_LEFT
-from fourbar.formulas.position import HalfAngle, Position, anywhere
+from fourbar.formulas.position import HalfAngle, Position, anywhere, polar
 from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import (
     ANGLES,
@@ -23,15 +26,17 @@ from fourbar.quantities import (
     OF_PIN_LOADS,
     OK,
     OVERFLOW,
+    PIN_FORCES,
     QUANTITIES,
     SEVERAL,
     SINGULAR,
     STAGE_OF,
     STAGES,
+    UNKNOWNS,
     WOUND,
 )
 from fourbar.scene import Command, Scene, command
-from fourbar.scene.case import NOWHERE, Case
+from fourbar.scene.case import NO_MOTION, NOWHERE, Case, changed
 from fourbar.scene.point import OF_POINTS
 from fourbar.solution import Array, Solution, unwrap
 
@@ -41,7 +46,12 @@ if TYPE_CHECKING:
 
 BLOCK = 8192
 """Positions evaluated at a time, measured: fewer pay for calls, more leave the cache."""
+WORTH_COMPILING = 2_000_000
+"""Evaluations of the forces, one a position, with error bars 17: loading numba and the compiled loop costs as much."""
+PARTS_FOR_THREADS = 4
 FORCE, ERROR = STAGES.index("force"), STAGES.index("error")
+NO_HALF_ANGLE = HalfAngle(*[np.nan] * 5)
+"""Of positions whose motion and forces are known."""
 Part = tuple[Any, ...]
 """Index of some positions in the arrays of all."""
 Evaluated = tuple[NDArray[np.uint8], dict[str, Any], Position | None]
@@ -55,6 +65,7 @@ def solve(
     at: Command | None = None,
     out: Mapping[str, Array] | None = None,
     side: int = 0,
+    compiled: bool | None = None,
 ) -> Solution:
     """Evaluate a scene, or a study of m linkages, with the closed formulas as far as a stage.
 
@@ -68,47 +79,101 @@ def solve(
     side : in which sense pins at rest are about to turn where dry friction acts: +1 as theta_2 grows, -1 as it falls, 0
         neither.
 
+    compiled : False: by NumPy. True: by the compiled formulas (numba, extra "fast"), as far as they carry the scene;
+        left out: likewise, where numba is installed and the work is at least WORTH_COMPILING.
+
     Raises
     ------
+    DependencyError : compiled is True and numba is not installed.
     InputError : the stage or a name in `out` is unknown, its array has the wrong shape, the scene does not state
         the omega_2 that is needed, or a study, which states its own positions, is given others.
     """
     if not isinstance(scene, Scene):
         if at is not None:
             raise InputError("at", "a command", "a study states its own positions: vary motion.theta_2")
-        return scene.solved(stage, out=out, side=side)
+        return scene.solved(stage, out=out, side=side, compiled=compiled)
     moved = _released(scene) if scene.motion.free is not None and at is None else None
     where = moved.command if moved is not None else command(scene) if at is None else at
     n = len(where.theta_2)
     wanted, names = requested(scene, (n,), where.omega_2, stage, out)
     alone = n == 1 and moved is None and out is None
-    result = {} if alone else arrays(names, (n,), out)
+    result = arrays(names, (n,), out) if not alone or compiled else {}
     code = np.zeros(n, dtype=np.uint8)
     with np.errstate(all="ignore"):
         case = Case.of(_started(scene) if wanted >= FORCE else scene)._replace(side=side)
+        quick = moved is None and where.remainder is None and is_compiled(case, wanted, n, compiled)
         parts: Iterable[Part]
         if moved is not None:
             parts = ((np.flatnonzero(moved.bar == bar),) for bar in (2, 4))
-        elif n == 1:  # in plain numbers: arrays of one entry cost several times as much
+        elif n == 1 and not quick:  # in plain numbers: arrays of one entry cost several times as much
             parts = ((0,),)
         else:
-            size = positions_at_once(wanted)
-            parts = ((slice(start, start + size),) for start in range(0, n, size))
-        for part in parts:
-            if moved is None:
-                found = commanded(case, where, part, wanted, names)
-            else:
-                found = _freely(case, moved, part, wanted, names)
-            if alone:
-                code[0], result = _of_one(case, found)
-            else:
-                keep(case, found, result, code, part)
+            size = BLOCK if quick else positions_at_once(wanted)
+            parts = [(slice(start, start + size),) for start in range(0, n, size)]
+
+    def evaluate(part: Part) -> None:
+        nonlocal result
+        if quick:
+            found = evaluated(case, where, part, wanted, names)
+        elif moved is None:
+            found = commanded(case, where, part, wanted, names)
+        else:
+            found = _freely(case, moved, part, wanted, names)
+        if alone and not quick:
+            code[0], result = _of_one(case, found)
+        else:
+            keep(case, found, result, code, part, seen=quick)
+
+    each(evaluate, parts, at_once=quick)
     for name in ANGLES:
         if name in result:
             unwrap(result[name])
     solution = solved(scene, where, code, result)
     solution.time, solution.stopped_at = where.time, None if moved is None else moved.stopped_at
     return solution
+
+
+def is_compiled(case: Case, wanted: int, count: int, compiled: bool | None) -> bool:
+    """Whether some positions go through the compiled loop; for the parameters see `solve` and `commanded`."""
+    if compiled is False or wanted < FORCE:
+        return False
+    size = count * (BLOCK // positions_at_once(wanted))
+    if compiled is None and (size < WORTH_COMPILING or not find_spec("numba")):
+        return False
+    from fourbar.scene.compiled import carries
+
+    if not find_spec("numba"):
+        raise DependencyError('compiled=True needs numba, which is not installed: pip install "fourbar[fast]"')
+    return carries(case)
+
+
+def threads() -> int:
+    """As many as this process may use cores, or as OMP_NUM_THREADS states."""
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    stated = os.environ.get("OMP_NUM_THREADS", "")
+    return min(cores, int(stated)) if stated.isdecimal() and int(stated) else cores
+
+
+def each(evaluate: Callable[[Any], None], parts: Iterable[Any], *, at_once: bool) -> None:
+    """Evaluate the parts, one after the other or on all cores: compiled code holds no lock of the interpreter."""
+
+    def quietly(part: Any) -> None:
+        with np.errstate(all="ignore"):  # which each thread has of its own
+            evaluate(part)
+
+    parts = iter(parts)
+    for part in parts:  # compiled by the first
+        quietly(part)
+        if at_once:
+            break
+    rest, cores = list(parts) if at_once else [], threads()
+    if cores == 1 or len(rest) < PARTS_FOR_THREADS:
+        for part in rest:
+            quietly(part)
+        return
+    with ThreadPoolExecutor(cores) as pool:
+        for _ in pool.map(quietly, rest):
+            pass
 
 
 def last_stage(scene: Scene) -> str:
@@ -184,7 +249,7 @@ def positions_at_once(wanted: int) -> int:
     """Of a stage: for the error bars each position is evaluated many times."""
     if wanted < ERROR:
         return BLOCK
-    from fourbar.error_bars import EVALUATIONS
+    from fourbar.scene.error_bars import EVALUATIONS
 
     return BLOCK // EVALUATIONS
 
@@ -196,17 +261,19 @@ def keep(
     code: NDArray[np.uint8],
     part: Part,
     shape: tuple[int, ...] | None = None,
+    *,
+    seen: bool = False,
 ) -> None:
     """Write what was evaluated into the arrays of all positions, where it is no number with the status that says so.
 
     Parameters
     ----------
+    seen : whether what is no number has its status already.
     shape : of the part of the arrays; None: that of what was evaluated.
     """
-    codes, values, driven = found
-    if not all_finite(values):
-        in_line = driven is not None and np.abs(case.drive_sine(driven)) <= NO_DIGIT_LEFT
-        withhold(values, codes, np.broadcast_to(in_line, codes.shape))
+    codes, values, _ = found
+    if not seen:
+        withheld(case, found)
     code[part] = codes if shape is None else codes.reshape(shape)
     for name, value in values.items():
         if shape is not None and np.ndim(value):
@@ -233,6 +300,14 @@ def all_finite(values: Mapping[str, Any]) -> bool:
     """Whether every entry is a number, from their squares; False also where a square leaves the range of doubles."""
     squares = (np.vdot(value, value) if isinstance(value, np.ndarray) else value for value in values.values())
     return all(cmath.isfinite(square) for square in squares)
+
+
+def withheld(case: Case, found: Evaluated) -> None:
+    """What was evaluated with `withhold` where anything is no number, changed in place."""
+    codes, values, driven = found
+    if not all_finite(values):
+        in_line = driven is not None and np.abs(case.drive_sine(driven)) <= NO_DIGIT_LEFT
+        withhold(values, codes, np.broadcast_to(in_line, codes.shape))
 
 
 def withhold(values: dict[str, Any], code: NDArray[np.uint8], in_line: NDArray[np.bool_]) -> None:
@@ -290,6 +365,44 @@ def commanded(case: Case, where: Command, part: Part, wanted: int, names: Collec
         known = exact if wanted == ERROR else None
         values |= _forces(case, state, alpha_2, branch, branch, codes, names, known)
     return codes, values, at
+
+
+def evaluated(case: Case, where: Command, part: Part, wanted: int, names: Collection[str]) -> Evaluated:
+    """The same through the compiled loop; what it leaves open as of `commanded`."""
+    from fourbar.scene import compiled
+
+    theta_2, branch = where.theta_2[part], _sign(where.branch[part])
+    omega_2, alpha_2 = _piece(where.omega_2, part), _piece(where.alpha_2, part)
+    found = compiled.evaluate(case, theta_2, branch, omega_2, alpha_2, error_bars=wanted == ERROR)
+    u2, u3, u4, *pins = found.vectors
+    sin_mu, omega_3, omega_4, alpha_3, alpha_4, torque, sine, *errors = found.scalars
+    at = Position(polar(1.0, case.path.theta_1), u2, u3, u4, sin_mu, np.nan, np.nan, np.nan, NO_HALF_ANGLE)
+    moving = Rates(omega_2, omega_3, omega_4, alpha_2, alpha_3, alpha_4)
+    state = State(case.lengths, case.path.theta_1, theta_2, at, NO_MOTION, omega_2, moving)
+    values = kinematics(case, state, names)
+    others = dict(zip((*PIN_FORCES, "torque", "torque_error", "force_error"), (*pins, torque, *errors), strict=True))
+    others["drive_condition"] = np.abs(sine)
+    values |= {name: value for name, value in others.items() if name in names}
+    codes = np.zeros(theta_2.shape, dtype=np.uint8)
+    if found.left.any():
+        index = np.flatnonzero(found.left)
+
+        def own(number: Any) -> Any:
+            return number[index] if np.ndim(number) else number
+
+        left = changed(case, own)
+        where = Command(theta_2[index], own(where.branch[part]), own(omega_2), own(alpha_2))
+        rest = commanded(left, where, (...,), wanted, names)
+        withheld(left, rest)
+        codes[index] = rest[0]
+        for name, value in rest[1].items():
+            whole = np.array(np.broadcast_to(values[name], theta_2.shape))
+            whole[index] = value
+            values[name] = whole
+    elif all_finite({name: value for name, value in values.items() if name not in UNKNOWNS}):  # the loop saw to these
+        return codes, values, None
+    withheld(case, (codes, values, None))
+    return codes, values, None
 
 
 def _codes(sine: Any, half: HalfAngle, margin: float) -> NDArray[np.uint8]:
@@ -368,7 +481,7 @@ def _forces(
         if held is not None and found.status is not None:
             found = found._replace(status=np.where(held & (found.status == OK), JAMMED, found.status))
     if exact is not None:
-        from fourbar.error_bars import error_bars
+        from fourbar.scene.error_bars import error_bars
 
         values |= error_bars(case, state, alpha_2, sign, found, exact)
     without = [status for term in case.terms if (status := term.status(state, branch)) is not None]

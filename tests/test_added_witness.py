@@ -168,9 +168,8 @@ def test_from_the_command_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
         return ((number, pool.judge_chunk(suite, scenes, witnesses, draw)) for number, scenes in chunks)
 
     monkeypatch.setattr(pool, "over_processes", here)
-    monkeypatch.setattr("validation.run.run.SCENES_SHOWN", 0)  # nothing is drawn
     monkeypatch.setattr("validation.run.run.html", lambda *_, **__: "")
-    out = ["--out", str(tmp_path / "out"), "--engines", "right,raises", "--time-limit", "2.5"]
+    out = ["--out", str(tmp_path / "out"), "--engines", "right,raises", "--time-limit", "2.5", "--no-pictures"]
     assert (
         status(["run", str(tmp_path / "scene.toml"), "--witness", HERE + "Right", "--witness", HERE + "Raises", *out])
         == 1

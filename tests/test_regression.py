@@ -13,7 +13,7 @@ import fourbar
 from fourbar.errors import InputError
 from validation.cli import status
 from validation.compare.columns import write_columns
-from validation.compare.rows import AGREES, FAILS, Row, write_results
+from validation.compare.rows import AGREES, FAILS, REFUSES, Row, write_results
 from validation.compare.tolerance import EPS
 from validation.regression import record, render
 from validation.regression.accept import accept_command, compare
@@ -107,6 +107,28 @@ def test_accept_keeps_the_run_next_to_the_results_or_in_a_stated_folder(tmp_path
         assert runner.invoke(compare, [str(kept), str(run)], standalone_mode=False).return_value == 0
     assert runner.invoke(accept_command, [str(run), "--to", str(run)]).exit_code != 0
     assert baseline("accepted").parent == Path(record.__file__).parent  # of this project, where no such folder is
+
+
+def test_what_is_empty_unfinished_or_fails_is_not_accepted(tmp_path: Path) -> None:
+    fails, refuses = replace(ROW, verdict=FAILS, error=1.0), replace(ROW, verdict=REFUSES)
+    folders = {name: save(tmp_path / name, rows) for name, rows in (("empty", []), ("good", [ROW]), ("bad", [fails]))}
+    folders |= {name: save(tmp_path / name, [row]) for name, row in (("unfinished", ROW), ("nothing", refuses))}
+    (folders["unfinished"] / "run.json").write_text("{}")
+    reasons = {
+        "empty": "at least one comparison",
+        "unfinished": "a run that was finished",
+        "bad": "--even-failing: 1 comparisons fail",
+        "nothing": "--even-failing: nothing was compared",
+    }
+    for name, reason in reasons.items():
+        with pytest.raises(InputError, match=reason):
+            CliRunner().invoke(accept_command, [str(folders[name])], standalone_mode=False, catch_exceptions=False)
+        assert not (tmp_path / "accepted").exists()
+    for name in ("empty", "unfinished"):
+        with pytest.raises(InputError, match=reasons[name]):
+            read_run(folders[name])
+    for name in ("bad", "nothing"):
+        assert status(["accept", str(folders[name]), "--even-failing"]) == 0
 
 
 @pytest.mark.parametrize(

@@ -1,38 +1,46 @@
 """Nothing is lost: whatever dies, finished scenes stay, and a rerun ends with the same bytes."""
 
+import math
 import os
+import shutil
 import signal
 import subprocess
 import sys
 import time
+from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 import pytest
 
 import validation.run.run
-from fourbar.errors import FourBarError, InputError
+from fourbar.errors import DependencyError, FourBarError, InputError
+from fourbar.scene import Command, Scene
 from tests.unlucky import Few, dies_at_first
-from validation.compare.rows import FAILS, from_csv
+from validation.compare.answer import Answer
+from validation.compare.rows import FAILS, REFUSES, Row, from_csv
 from validation.compare.tolerance import EQUIVALENCE
 from validation.engines import added
 from validation.engines.witnesses import Witness
-from validation.report.summary import SCENES_SHOWN, Summary
+from validation.report.record import Record
+from validation.report.summary import Summary
 from validation.run import pool
-from validation.run.run import run
+from validation.run.code import build, checkout, code
+from validation.run.run import Collected, run
 from validation.run.selection import chosen
 from validation.run.store import RunningError, Store
 from validation.scenes.random import LinkageType
-from validation.scenes.suites import AS_LONG_AS, MOST_POSITIONS, Files, Random, scene_files
+from validation.scenes.suites import AS_LONG_AS, MOST_POSITIONS, Files, Random, Suite, scene_files
 
 SEED = 7
 KILLS = int(os.environ.get("KILLS", "3"))
 """Kills in each of the tests that kill; `make long-test` takes 50, and runs of full size."""
 FULL = "KILLS" in os.environ
-COUNT, IN_A_CHUNK = (SCENES_SHOWN + 20, 20) if FULL else (50, 5)
-"""Scenes of a run, more than are drawn, so that the work is the judging alone; and as many chunks in a small run."""
-SMALL = f"import validation.run.run as run; run.SCENES_SHOWN, run.CHUNK = 0, {{False: {IN_A_CHUNK}}}; "
+COUNT, IN_A_CHUNK = (220, 20) if FULL else (50, 5)
+"""Scenes of a run, none of them drawn, so that the work is the judging alone; and as many chunks in a small run."""
+SMALL = f"import validation.run.run as run; run.CHUNK = {{False: {IN_A_CHUNK}}}; "
 HARNESS = "import runpy; runpy.run_module('validation', run_name='__main__', alter_sys=True)"
 PROGRAM = ("-m", "validation") if FULL else ("-c", SMALL + HARNESS)
 TYPES = tuple(LinkageType)
@@ -42,8 +50,9 @@ EXACT = chosen("free-body")
 def judge_all(
     suite: object, out: Path, witnesses: tuple[Witness, ...] = EXACT, workers: int = 2, seconds: float | None = None
 ) -> Summary:
-    *_, last = run(suite, out, witnesses, workers=workers, seconds=seconds)  # type: ignore[arg-type]
+    *steps, last = run(suite, out, witnesses, workers=workers, seconds=seconds, drawn=False)  # type: ignore[arg-type]
     assert isinstance(last, Summary)
+    assert sum(step for step in steps if isinstance(step, Collected)) == len(suite)  # type: ignore[arg-type]
     return last
 
 
@@ -60,6 +69,21 @@ def test_an_engine_that_crashes_or_hangs_costs_its_own_rows(tmp_path: Path, monk
     assert "hung" in failing["c", "moody"]
     for scene in "abcd":
         assert any(row.scene == scene and row.engine == "free-body" for row in rows)
+
+
+def test_a_worker_ends_itself_in_the_scene_that_hangs_and_with_its_parent() -> None:
+    """The limit is that of a scene, whatever the others of its chunk took."""
+    judge = (
+        "from tests.unlucky import Few; from validation.run import pool; "
+        "from validation.compare.tolerance import EQUIVALENCE; from validation.engines.witnesses import Witness; "
+        "moody = [Witness('moody', 'tests.unlucky:Moody', EQUIVALENCE)]; pool.ready(%s); print('ready', flush=True); "
+        "pool.judge_watched(%s, Few(), [0, 2], moody, False)"
+    )
+    for parent, limit in (("0", 1.0), ("1", 100.0)):  # the parent of the second is another
+        line = [sys.executable, "-c", judge % (parent, limit)]
+        began = time.monotonic()
+        done = subprocess.run(line, cwd=Path(__file__).parent.parent, capture_output=True, check=False, timeout=60)
+        assert done.returncode == 1 and time.monotonic() - began < 60.0, done.stderr
 
 
 @pytest.mark.parametrize("how", ["killed", "locked out"])
@@ -98,7 +122,6 @@ def test_workers_that_die_with_nothing_to_do_are_on_nobodys_account(
 def test_the_bytes_depend_neither_on_the_workers_nor_on_the_order(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(validation.run.run, "SCENES_SHOWN", 0)
     monkeypatch.setattr(validation.run.run, "CHUNK", {False: IN_A_CHUNK})
     suite = Random(COUNT, SEED, TYPES)
     for workers in (1, 2):
@@ -122,11 +145,57 @@ def test_two_runs_into_one_folder_refuse_each_other(tmp_path: Path) -> None:
         pass
 
 
-def test_another_suite_does_not_resume_the_parts_of_this_one(tmp_path: Path) -> None:
-    for identity, kept in (({"scenes": "one"}, 0), ({"scenes": "one"}, 1), ({"scenes": "two"}, 0)):
+def test_another_suite_or_code_does_not_resume_the_parts_of_this_one(tmp_path: Path) -> None:
+    one = {"scenes": "one", **code()}
+    for identity, kept, note in (
+        (one, 0, []),
+        (one, 1, []),
+        (one | {"scenes": "two"}, 0, ["made again: the parts of another run (scenes)"]),
+        (one | {"code": "changed"}, 0, ["made again: the parts of another run (code, scenes)"]),
+    ):
         with Store(tmp_path, identity).held() as store:
-            assert len(store.done()) == kept
+            assert (len(store.done()), store.notes) == (kept, note)
             store.put(0, [])
+
+
+def test_the_hash_of_the_code_is_that_of_its_modules(tmp_path: Path) -> None:
+    hashes = []
+    for name, text in (
+        ("fourbar/a.py", "1"),
+        ("validation/b.py", "2"),
+        ("validation/b.py", "3"),
+        ("fourbar/a.txt", ""),
+    ):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text(text)
+        hashes.append(checkout(tmp_path))
+    assert len(set(hashes)) == 3 and hashes[2] == hashes[3]
+    assert build("numpy") and build("no-such-package") == ""
+
+
+def test_damaged_swapped_and_foreign_parts_are_made_again_and_named(tmp_path: Path) -> None:
+    row = Row("a", "engine", "exact", "torque", math.nan, math.inf, REFUSES, "a limit", -0.0, 1e-300)
+    record = Record("a", title="A", rows=[row])
+    with Store(tmp_path / "foreign", {"scenes": "two"}).held() as other:
+        other.put(4, [record])
+    with Store(tmp_path / "run", {"scenes": "one"}).held() as store:
+        for chunk in range(6):
+            store.put(chunk, [record])
+        assert store.done() == set(range(6)) and repr(store.read(5)) == repr([record])
+        first = store.parts / "000000"
+        first.write_bytes(first.read_bytes()[:-1])
+        (store.parts / "000001").write_bytes(b"")
+        (store.parts / "000002").rename(store.parts / "swap")
+        (store.parts / "000003").rename(store.parts / "000002")
+        (store.parts / "swap").rename(store.parts / "000003")
+        shutil.copy(tmp_path / "foreign" / "parts" / "000004", store.parts / "000004")
+        assert store.done() == {5}
+        assert [note.rpartition(": ")[2] for note in store.notes] == [
+            *("is damaged", "is damaged", "is another part", "is another part", "is of another run")
+        ]
+        (store.parts / "000005").write_bytes(b"{}")
+        with pytest.raises(DependencyError, match="is damaged; run it again"):
+            store.read(5)
 
 
 LIMIT = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (60_000, resource.RLIM_INFINITY)); "
@@ -137,7 +206,7 @@ LIMITED = LIMIT + ("" if FULL else SMALL) + HARNESS
 def start(out: Path, count: int, *program: str, stderr: int = subprocess.DEVNULL) -> subprocess.Popen[bytes]:
     command = [sys.executable, *(program or PROGRAM), "run", "--random", str(count)]
     return subprocess.Popen(
-        [*command, "--engines", "free-body", "--out", str(out)],
+        [*command, "--engines", "free-body", "--no-pictures", "--out", str(out)],
         cwd=Path(__file__).parent.parent,
         stdout=subprocess.DEVNULL,
         stderr=stderr,
@@ -149,7 +218,7 @@ def start(out: Path, count: int, *program: str, stderr: int = subprocess.DEVNULL
 
 def wait_for_parts(out: Path, process: subprocess.Popen[bytes], at_least: int) -> None:
     deadline = time.monotonic() + 60.0
-    while len(list(out.glob("parts/*.csv"))) < at_least and process.poll() is None and time.monotonic() < deadline:
+    while len(list(out.glob("parts/0*"))) < at_least and process.poll() is None and time.monotonic() < deadline:
         time.sleep(0.01)
 
 
@@ -257,3 +326,44 @@ def test_a_scene_of_too_many_positions_is_refused_before_anything_runs(motion: s
 
 def test_a_scene_of_many_positions_has_longer_before_it_counts_as_hanging() -> None:
     assert pool.longest(Files((), 50_000)) > 20 * pool.longest(Random(1, 0, TYPES))
+
+
+class Blunders:
+    """Breaks down in scene b, answers nothing in scene c, and declines elsewhere."""
+
+    name = "blunders"
+    titles: ClassVar[list[str]] = []
+
+    def answer(self, scene: Scene, command: Command) -> Answer:
+        self.titles.append(scene.title)
+        if scene.title == "b":
+            raise RuntimeError("no licence")
+        return Answer("blunders", "exact", refusal=None if scene.title == "c" else "declined")
+
+
+def test_of_a_long_suite_what_fails_has_pictures_and_what_is_nearest_to_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Drawn at the end, without the engine that broke down; with --no-pictures not at all."""
+    drawn: list[str] = []
+
+    def here(
+        suite: Suite, chunks: Iterable[pool.Chunk], who: tuple[Witness, ...], draw: bool, *_: object
+    ) -> Iterator[tuple[int, list[Record]]]:
+        for number, scenes in chunks:
+            drawn.extend(suite.name(scene) for scene in scenes if draw)
+            yield number, pool.judge_chunk(suite, scenes, who, draw)
+
+    monkeypatch.setattr(pool, "over_processes", here)
+    monkeypatch.setattr("validation.report.summary.PICTURED", 3)
+    monkeypatch.setattr(validation.run.run, "PICTURED", 3)
+    monkeypatch.setattr(validation.run.run, "html", lambda *_, **__: "")
+    blunders = Witness("blunders", f"{__name__}:Blunders", EQUIVALENCE)
+    *_, without = run(Few(), tmp_path / "without", (*EXACT, blunders), drawn=False)
+    assert not drawn and not any(record.figure for record in without.shown)  # type: ignore[union-attr]
+    once = Blunders.titles.count("b")
+    *_, last = run(Few(), tmp_path / "with", (*EXACT, blunders))
+    assert isinstance(last, Summary) and len(drawn) == 3 and {"b", "c"} < set(drawn)
+    assert {record.name for record in last.shown if record.figure} == set(drawn)
+    assert Blunders.titles.count("b") == 2 * once
+    assert (tmp_path / "with" / "results.csv").read_bytes() == (tmp_path / "without" / "results.csv").read_bytes()

@@ -57,8 +57,8 @@ class Moody:
         return Answer("moody", "exact", refusal="declined")
 
 
-def dies_at_first() -> None:
-    """Starts no worker as long as some of its lives are left in the folder that the run was given."""
+def dies_at_first(parent: int) -> None:
+    """Starts no worker of a process as long as some of its lives are left in the folder that the run was given."""
     lives = sorted(Path(os.environ["LIVES"]).iterdir())
     if lives:
         lives[0].unlink(missing_ok=True)

@@ -84,15 +84,15 @@ def inertia_wrenches(a: Number, bodies: Bodies, at: Position, moving: Rates) -> 
     two, three, four = bodies
     w2, w3, w4, alpha_2, alpha_3, alpha_4 = moving
     of_2 = vector(w2 * w2, -alpha_2)
-    G3, mass_at_A = three.z * at.u3, (three.m * a) * of_2
+    G3, turned = three.z * at.u3, of_2 * at.u2
     return Wrenches(
-        (two.m * two.z) * of_2 * at.u2,
+        (two.m * two.z) * turned,
         three.m * vector(w3 * w3, -alpha_3) * G3,
         (four.m * four.z) * vector(w4 * w4, -alpha_4) * at.u4,
         -about_first_pin(two) * alpha_2,
-        cross(G3, mass_at_A * at.u2) - about_first_pin(three) * alpha_3,
+        cross(G3, (three.m * a) * turned) - about_first_pin(three) * alpha_3,
         -about_first_pin(four) * alpha_4,
-    ), mass_at_A
+    ), (three.m * a) * of_2
 
 
 def between(M_u: Number, M_v: Number, u: Number, v: Number, sine: Number) -> Number:
@@ -130,8 +130,8 @@ def pin_forces(
     '-117.65-107.84j'
     """
     d, a, b, c, _, _ = lengths
-    R2, R3, R4, M2, M3, M4, _ = w
-    of_3, of_4 = w.on(3)[1], w.on(4)[1]
+    R2, R3, R4, M2, M3, M4, C = w
+    of_3, of_4 = M3 - C, M4 + C
     along, across = mass_at_A.real, mass_at_A.imag  # bar 2: apart, for each would cancel in a sum that it is no part of
     if drive_bar == 4:
         F32 = between(-M2 / a, cross(at.u3, R3) - of_3 / b + across * dot(at.u3, at.u2), at.u2, at.u3, sine)

@@ -113,10 +113,13 @@ def vector(x: Number, y: Number) -> Number:
 
 
 def direction(theta: Number) -> Number:
-    """e^{i theta} from one tangent: ((1 - t^2) + 2 i t)/(1 + t^2), t = tan(theta/2)."""
+    """e^{i theta} from one tangent."""
     t = np.tan(0.5 * theta)
-    if type(theta) is float:
-        t = t.item()
+    return direction_of_tangent(t.item() if type(theta) is float else t)
+
+
+def direction_of_tangent(t: Number) -> Number:
+    """e^{i theta} = ((1 - t^2) + 2 i t)/(1 + t^2), t = tan(theta/2)."""
     kk = 1.0 / (1.0 + t * t)
     return vector((1.0 - t * t) * kk, 2.0 * t * kk)
 
@@ -132,8 +135,12 @@ def square_root(x: Number) -> Number:
 
 
 def half_angle(lengths: Loop, psi: Number) -> HalfAngle:
-    """The half angle h of psi = theta_2 - theta_1 (rad) by its tangent, and the factors of Heron's formula."""
-    t = np.tan(0.5 * psi)
+    """The half angle h of psi = theta_2 - theta_1 (rad), and the factors of Heron's formula."""
+    return half_angle_of_tangent(lengths, np.tan(0.5 * psi))
+
+
+def half_angle_of_tangent(lengths: Loop, t: Number) -> HalfAngle:
+    """The same of t = tan h."""
     meets = lengths.E2 == 0.0
     if anywhere(meets):
         t = select(meets, t + np.copysign(HAIR, t), t)

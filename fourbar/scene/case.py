@@ -1,6 +1,7 @@
 """A scene in the numbers of the formulas: positions, motion, and the forces under everything that acts."""
 
 from collections.abc import Callable
+from dataclasses import fields, is_dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -32,6 +33,26 @@ NOWHERE = np.empty(0, dtype=np.intp)
 
 NO_MOTION = Coefficients(*[np.nan] * 8)
 """Where positions alone are wanted."""
+
+
+def changed(value: Any, change: Callable[[Any], Any]) -> Any:
+    """The same with each of its floats and arrays changed, in tuples and dataclasses too; all else stays."""
+    if isinstance(value, (float, np.ndarray)):
+        return change(value)
+    if isinstance(value, tuple):
+        parts = [changed(part, change) for part in value]
+        return type(value)(*parts) if hasattr(value, "_fields") else tuple(parts)
+    if not is_dataclass(value) or getattr(value, "as_given", False):
+        return value
+    other = object.__new__(type(value))  # a constructor checks what a user gives, one number at a time
+    for field in fields(value):
+        object.__setattr__(other, field.name, changed(getattr(value, field.name), change))
+    return other
+
+
+def undecided(factor: Any, constant: Any, size: Any) -> Any:
+    """Where doubles cannot decide the sign of a factor of Heron's formula, the constant and 4 a d times a square."""
+    return (constant < 0.0) & (np.abs(factor) < UNDECIDED * (np.abs(constant) + size))
 
 
 class Dynamics(NamedTuple):
@@ -88,10 +109,9 @@ class Case(NamedTuple):
         lengths, half = self.path.lengths, self.path.half_angle(theta_2)
         close: Any = remainder is not None
         if remainder is None:
-            size = 4.0 * lengths.a * lengths.d
             for factor, constant in ((half.outer, lengths.E1), (half.inner, lengths.E2)):
                 if anywhere(constant < 0.0):  # else it is a sum of two positive terms
-                    close = close | ((constant < 0.0) & (np.abs(factor) < UNDECIDED * (np.abs(constant) + size)))
+                    close = close | undecided(factor, constant, 4.0 * lengths.a * lengths.d)
         if not anywhere(close):
             return half, NOWHERE
         from fourbar.many_digits import decided

@@ -15,7 +15,20 @@ from fourbar.scene import Command, Scene, command
 from fourbar.scene.case import Case
 from fourbar.scene.motion import FromLimit
 from fourbar.solution import Array, Solution, unwrap
-from fourbar.solve import BLOCK, FORCE, arrays, commanded, keep, positions_at_once, requested, solved, started
+from fourbar.solve import (
+    BLOCK,
+    FORCE,
+    arrays,
+    commanded,
+    each,
+    evaluated,
+    is_compiled,
+    keep,
+    positions_at_once,
+    requested,
+    solved,
+    started,
+)
 from fourbar.studies.keys import entries, placed, refusal
 
 THETA_2 = "motion.theta_2"
@@ -40,24 +53,33 @@ class Study:
     def __len__(self) -> int:
         return len(self.invalid)
 
-    def solved(self, stage: str | None, *, out: Mapping[str, Array] | None = None, side: int = 0) -> Solution:
+    def solved(
+        self, stage: str | None, *, out: Mapping[str, Array] | None = None, side: int = 0, compiled: bool | None = None
+    ) -> Solution:
         """What `fourbar.solve` returns for a study: every quantity as (m, n) or (m, n, 2)."""
         at, shape = self.at, self.at.theta_2.shape
         wanted, names = requested(self.scene, shape, at.omega_2, stage, out)
         result = arrays(names, shape, out)
         code = np.zeros(shape, dtype=np.uint8)
         with np.errstate(all="ignore"):
-            for rows in _parts(len(self), max(1, positions_at_once(wanted) // shape[1])):
-                begins = self._started(rows) if wanted >= FORCE else self.scene
-                for columns in _parts(shape[1], positions_at_once(wanted)):
-                    block = (rows.stop - rows.start, columns.stop - columns.start)
-                    case = Case.of(self._members(rows, block[1], begins))._replace(side=side)
-                    where = self._command(rows, columns)
-                    found = commanded(case, where, (), wanted, names)
-                    keep(case, found, result, code, (rows, columns), block)
-                for name in ANGLES:
-                    if name in result:
-                        unwrap(result[name][rows])
+            whole = Case.of(self._members(slice(0, 1), 1, self.scene))
+        quick = is_compiled(whole, wanted, code.size, compiled)
+        size = BLOCK if quick else positions_at_once(wanted)
+
+        def evaluate(rows: slice) -> None:
+            begins = self._started(rows) if wanted >= FORCE else self.scene
+            for columns in _parts(shape[1], size):
+                block = (rows.stop - rows.start, columns.stop - columns.start)
+                case = Case.of(self._members(rows, block[1], begins))._replace(side=side)
+                where = self._command(rows, columns)
+                run = evaluated if quick and not case.path.may_stay_parallel else commanded
+                found = run(case, where, (...,), wanted, names)
+                keep(case, found, result, code, (rows, columns), block)
+            for name in ANGLES:
+                if name in result:
+                    unwrap(result[name][rows])
+
+        each(evaluate, list(_parts(len(self), max(1, size // shape[1]))), at_once=quick)
         code[self.invalid] = INVALID
         for array in result.values():
             array[self.invalid] = np.nan

@@ -1,12 +1,13 @@
 """The results of a run as results.csv and, for pandas and DuckDB, results.parquet.
 
 Both hold the columns of `validation.compare.rows.Row`, sorted by scene, engine, setting and quantity;
-the Parquet file has one row group per chunk of scenes and is written as the chunks are read.
+both are written as the chunks are read.
 """
 
 import os
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import ExitStack
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
@@ -14,36 +15,76 @@ from typing import Any
 from validation.compare.plain import plain
 from validation.compare.rows import COLUMNS, Row, to_csv
 
+GROUP_ROWS = 100_000
+"""Rows of a row group of the Parquet file: each costs some kilobytes of footer, whatever it holds."""
 CSV_ROWS = 1_000_000
 """Rows beyond this are in results.parquet alone: a text table of that size serves nobody."""
 
 
-def write_columns(chunks: Iterator[list[Row]], out: Path) -> dict[str, int]:
-    """Stream the rows into both files; the line of results.csv at which each scene starts."""
-    import pyarrow as pa
-    import pyarrow.parquet as pq
+class Columns:
+    """Both files while they are written: whole at the end of a `with`, not there where it fails."""
 
-    kinds = {str: pa.string(), float: pa.float64(), bool: pa.bool_()}
-    schema = pa.schema([(field.name, kinds[field.type]) for field in fields(Row)])  # type: ignore[index]
-    text, columns = out / ".results.csv.part", out / ".results.parquet.part"
-    first_lines: dict[str, int] = {}
-    line = 2
-    with text.open("w", encoding="utf-8", newline="") as csv, pq.ParquetWriter(columns, schema) as parquet:
-        csv.write(to_csv([]))
+    def __init__(self, out: Path) -> None:
+        self.out = out
+        self.first_lines: dict[str, int] = {}
+        """The line of results.csv at which each scene starts."""
+        self._line = 2
+        self._waiting: list[Row] = []
+        self._files = ExitStack()
+
+    def __enter__(self) -> "Columns":
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+
+        kinds = {str: pa.string(), float: pa.float64(), bool: pa.bool_()}
+        self._schema = pa.schema([(field.name, kinds[field.type]) for field in fields(Row)])  # type: ignore[index]
+        self._text, self._columns = (self.out / f".results.{kind}.part" for kind in ("csv", "parquet"))
+        with self._files:
+            self._csv = self._files.enter_context(self._text.open("w", encoding="utf-8", newline=""))
+            self._parquet = self._files.enter_context(pq.ParquetWriter(self._columns, self._schema))
+            self._csv.write(to_csv([]))
+            self._files = self._files.pop_all()
+        return self
+
+    def add(self, rows: Sequence[Row]) -> None:
+        """The rows that come next."""
+        for row in rows:
+            self.first_lines.setdefault(row.scene, self._line)
+            self._line += 1
+        self._waiting += rows
+        if self._line <= CSV_ROWS:
+            self._csv.write(to_csv(rows).partition("\n")[2])
+        if len(self._waiting) >= GROUP_ROWS:
+            self._write_group()
+
+    def _write_group(self) -> None:
+        import pyarrow as pa
+
+        by_column = {name: [getattr(row, name) for row in self._waiting] for name in COLUMNS}
+        self._parquet.write_table(pa.table(by_column, schema=self._schema))
+        self._waiting.clear()
+
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        """Put both in place, the text only where it is not too long."""
+        with self._files:
+            if kind is None and self._waiting:
+                self._write_group()
+        if kind is not None:
+            return
+        os.replace(self._columns, self.out / "results.parquet")
+        if self._line <= CSV_ROWS:
+            os.replace(self._text, self.out / "results.csv")
+        else:
+            self._text.unlink()
+            (self.out / "results.csv").unlink(missing_ok=True)
+
+
+def write_columns(chunks: Iterable[Sequence[Row]], out: Path) -> dict[str, int]:
+    """Both files of rows that are at hand; the line of results.csv at which each scene starts."""
+    with Columns(out) as columns:
         for rows in chunks:
-            for row in rows:
-                first_lines.setdefault(row.scene, line)
-                line += 1
-            parquet.write_table(pa.table(_by_column(rows), schema=schema))
-            if line <= CSV_ROWS:
-                csv.write(to_csv(rows).partition("\n")[2])
-    os.replace(columns, out / "results.parquet")
-    if line <= CSV_ROWS:
-        os.replace(text, out / "results.csv")
-    else:
-        text.unlink()
-        (out / "results.csv").unlink(missing_ok=True)
-    return first_lines
+            columns.add(rows)
+    return columns.first_lines
 
 
 def read_columns(path: Path) -> Iterator[Row]:
@@ -59,7 +100,3 @@ def read_columns(path: Path) -> Iterator[Row]:
 
 def _kept_once(cell: Any) -> Any:
     return sys.intern(plain(cell)) if isinstance(cell, str) else cell
-
-
-def _by_column(rows: list[Row]) -> dict[str, list[Any]]:
-    return {name: [getattr(row, name) for row in rows] for name in COLUMNS}

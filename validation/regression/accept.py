@@ -6,9 +6,10 @@ from typing import Any
 
 import click
 
-from fourbar.errors import InputError
+from fourbar.errors import HOLDS, InputError
 from fourbar.writing import write_text
-from validation.compare.rows import Row
+from validation.compare.counts import Counts
+from validation.compare.rows import FAILS, Row
 from validation.regression import render
 from validation.regression.changes import Differences, differences
 from validation.regression.history import HISTORY, append
@@ -93,7 +94,8 @@ def compare(
 @click.argument("results", type=click.Path(path_type=Path))
 @click.option("--to", type=click.Path(path_type=Path, file_okay=False), metavar="DIR",
               help=f"Keep it there; left out: {ACCEPTED}/ next to RESULTS.")  # fmt: skip
-def accept_command(results: Path, to: Path | None) -> None:
+@click.option("--even-failing", is_flag=True, help="Accept a run in which a comparison fails, or none was made.")
+def accept_command(results: Path, to: Path | None, even_failing: bool) -> None:
     """Record RESULTS (a run's folder) as the accepted state that later runs are compared with.
 
     It is kept in DIR, and appended to DIR/history.parquet, of which `history` makes a page.
@@ -103,6 +105,10 @@ def accept_command(results: Path, to: Path | None) -> None:
     if target.resolve() == folder.resolve():
         raise InputError("--to", str(target), "must be another folder than that of the results")
     run = read_run(results)
+    counts = Counts(run[1])
+    if counts.status != HOLDS and not even_failing:
+        why = f"{counts[FAILS]} comparisons fail" if counts[FAILS] else "nothing was compared"
+        raise InputError("RESULTS", str(results), f"must hold, or say --even-failing: {why}")
     accept(results, run, target)
     append(target / HISTORY, run, read_times(results))
     click.echo(f"accepted: {target} ({len(run[1])} rows; appended to {target / HISTORY})")

@@ -22,6 +22,8 @@ SHIPPED = Path(__file__).parent
 """Where the accepted state of the models of this project is."""
 ACCEPTED = "accepted"
 TABLE, COLUMNS, ABOUT, TIMINGS = "results.csv", "results.parquet", "record.json", "timings.csv"
+UNFINISHED = "run.json"
+"""What a run keeps in its folder until it is finished."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,7 +77,7 @@ def write_about(record: About, folder: Path) -> None:
 def read_run(path: Path) -> tuple[About, list[Row]]:
     """A run from its folder, or from a results.csv alone (then nothing is known of how it was made).
 
-    Raises InputError where there is no readable table.
+    Raises InputError where there is no readable table, or an empty one, or that of a run that is unfinished.
     """
     table = path / TABLE if path.is_dir() else path
     long = path / COLUMNS
@@ -87,6 +89,10 @@ def read_run(path: Path) -> tuple[About, list[Row]]:
         rows = list(read_columns(table)) if table.suffix == ".parquet" else from_csv(table)
     except (KeyError, TypeError, ValueError, csv.Error):  # a column, a cell or a number is missing, or it is no text
         raise InputError("RESULTS", str(table), "is not a table written by `run`") from None
+    if not rows:
+        raise InputError("RESULTS", str(table), "must hold at least one comparison: it has none")
+    if (table.parent / UNFINISHED).is_file():
+        raise InputError("RESULTS", str(table), "must be of a run that was finished: run it again, and it is resumed")
     record = table.parent / ABOUT
     if not record.is_file():
         return About({}, "unknown machine", {}), rows

@@ -8,7 +8,10 @@ from fourbar.solution import Solution
 from validation.compare.answer import Answer
 from validation.compare.identities import FORMULAS
 from validation.compare.reversals import Reversal
-from validation.compare.rows import Row
+from validation.compare.rows import COLUMNS, Row, sorted_rows
+
+STORED = tuple(name for name in COLUMNS if name != "passed")
+"""Columns that make a row: whether it passed follows from them."""
 
 
 @dataclass(slots=True)
@@ -58,19 +61,20 @@ class Record:
             jumps=[],
         )
 
-    def without_rows(self) -> dict[str, Any]:
-        """Everything that is kept but the rows, which have their own table."""
+    def kept_all(self) -> dict[str, Any]:
+        """Everything that is kept, in lists and dictionaries, the rows sorted."""
         kept = asdict(replace(self, rows=[]))
-        for name in ("rows", "scene", "solution", "answers", "jumps"):
+        for name in ("scene", "solution", "answers", "jumps"):
             del kept[name]
-        return kept
+        return kept | {"rows": [[getattr(row, name) for name in STORED] for row in sorted_rows(self.rows)]}
 
     @classmethod
-    def restore(cls, kept: dict[str, Any], rows: list[Row]) -> "Record":
-        """From what `without_rows` gave."""
+    def restore(cls, kept: dict[str, Any]) -> "Record":
+        """From what `kept_all` gave."""
+        rows = [Row(*row) for row in kept["rows"]]
         timings = [Timing(**timing) for timing in kept["timings"]]
         independence = {engine: (shared, own) for engine, (shared, own) in kept["independence"].items()}
-        return cls(**{**kept, "timings": timings, "independence": independence}, rows=rows)
+        return cls(**{**kept, "timings": timings, "independence": independence, "rows": rows})
 
     def joined(self, other: "Record") -> "Record":
         """The same scene with the answers of another set of engines; the rows of the formulas stand once."""

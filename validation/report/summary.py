@@ -91,6 +91,8 @@ class Summary:
 
 
 SCENES_SHOWN = 200
+PICTURED = 24
+"""Scenes with pictures, where fewer fail: to draw one takes ten times as long as to judge it by an exact engine."""
 WORST_SHOWN = 60
 ORDERS_SHOWN = 20
 FAILURES_KEPT = 1000
@@ -106,79 +108,123 @@ STATEMENT = (
 )
 
 
+class Summing:
+    """Condense a run, scene by scene; what is kept does not grow with their number."""
+
+    def __init__(self) -> None:
+        self.counts = Counts()
+        self.failures: list[Row] = []
+        self.refusals: Counter[tuple[str, str]] = Counter()
+        self.first_reason: dict[tuple[str, str], str] = {}
+        self.worst: list[Worst] = []
+        self.judged = 0
+        self.measured_k: dict[str, float] = {}
+        self.independence: dict[str, tuple[str, str]] = {}
+        self.costs: dict[tuple[str, str], list[Timed]] = {}
+        self.orders: list[tuple[str, dict[str, float]]] = []
+        self.failing: list[Record] = []
+        self.holding: list[tuple[float, Record]] = []
+
+    def add(self, scene: Record) -> None:
+        """One scene more."""
+        self.counts.add_scene(scene.rows)
+        bad = [row for row in scene.rows if row.failed]
+        self.failures += bad[: FAILURES_KEPT - len(self.failures)]
+        for engine, reason in sorted(_left_out(scene)):
+            kind = (engine, NUMBER.sub("#", reason))
+            self.refusals[kind] += 1
+            self.first_reason.setdefault(kind, reason)
+        found = _worst(scene.rows)
+        self.judged += len(found)
+        self.worst = _top(WORST_SHOWN, [*self.worst, *found], lambda w: w.used)
+        _measure_k(scene.rows, self.measured_k)
+        self.independence.update(scene.independence)
+        _add_costs(scene, self.costs)
+        self._add_orders(scene)
+        if bad:
+            self.failing += [scene][: SCENES_SHOWN - len(self.failing)]
+        else:
+            most = max((w.used for w in found), default=0.0)
+            self.holding = _top(SCENES_SHOWN, [*self.holding, (most, scene)], lambda each: each[0])
+
+    @property
+    def shown(self) -> list[Record]:
+        """The scenes shown one by one, by name."""
+        holding = nlargest(SCENES_SHOWN - len(self.failing), self.holding, key=lambda each: each[0])
+        return sorted([*self.failing, *(scene for _, scene in holding)], key=lambda scene: scene.name)
+
+    @property
+    def pictured(self) -> list[Record]:
+        """Those of them that have pictures: all that fail, and of the others those that used most."""
+        holding = nlargest(PICTURED - len(self.failing), self.holding, key=lambda each: each[0])
+        return [*self.failing, *(scene for _, scene in holding)]
+
+    def picture(self, drawn: Record) -> None:
+        """Add what was drawn and measured of a scene that is shown."""
+        for scene in self.shown:
+            if scene.name == drawn.name:
+                scene.figure = drawn.figure
+        self._add_orders(drawn)
+
+    def _add_orders(self, scene: Record) -> None:
+        known = [(scene.name, each) for each in scene.evidence.values() if "observed_order" in each]
+        self.orders = _top(ORDERS_SHOWN, [*self.orders, *known], _lowest)
+
+    def summary(
+        self,
+        ladder: Sequence[LadderRow] = (),
+        tolerances: Sequence[Tolerance] = TOLERANCES,
+        missing: Sequence[tuple[str, str]] = (),
+    ) -> Summary:
+        """What the scenes so far came to."""
+        verdict = self.counts.sentence()
+        if missing:
+            verdict += f"; not run: {', '.join(engine for engine, _ in missing)}"
+        few = self.judged <= WORST_SHOWN
+        orders = self.orders
+        if len(orders) > ORDERS_SHOWN:
+            orders = nlargest(ORDERS_SHOWN, orders, key=_lowest)
+        return Summary(
+            verdict=verdict,
+            scenes=self.counts.scenes,
+            counts=self.counts,
+            versions=versions(),
+            machine=machine(),
+            worst=_sorted(self.worst) if few else nlargest(WORST_SHOWN, self.worst, key=lambda w: w.used),
+            judged=self.judged,
+            failures=self.failures,
+            refusals=[(kind[0], self.first_reason[kind], count) for kind, count in sorted(self.refusals.items())],
+            measured_k=self.measured_k,
+            independence=[(engine, *self.independence[engine]) for engine in sorted(self.independence)],
+            costs=[
+                Cost(
+                    engine,
+                    _settings(values),
+                    median(t.times for t in values),
+                    median(t.microseconds for t in values),
+                    WORK[engine].full if engine in WORK else "",
+                )
+                for (engine, _), values in sorted(self.costs.items())
+            ],
+            orders=orders,
+            ladder=list(ladder),
+            tolerances=list(tolerances),
+            missing=list(missing),
+            shown=self.shown,
+        )
+
+
 def summarise(
     scenes: Iterable[Record],
     ladder: Sequence[LadderRow] = (),
     tolerances: Sequence[Tolerance] = TOLERANCES,
     missing: Sequence[tuple[str, str]] = (),
 ) -> Summary:
-    """Condense a run in one pass; what is kept does not grow with the number of scenes."""
-    counts = Counts()
-    failures: list[Row] = []
-    refusals: Counter[tuple[str, str]] = Counter()
-    first_reason: dict[tuple[str, str], str] = {}
-    worst: list[Worst] = []
-    judged = 0
-    measured_k: dict[str, float] = {}
-    independence: dict[str, tuple[str, str]] = {}
-    costs: dict[tuple[str, str], list[Timed]] = {}
-    orders: list[tuple[str, dict[str, float]]] = []
-    failing: list[Record] = []
-    holding: list[tuple[float, Record]] = []
+    """Condense a run in one pass."""
+    summing = Summing()
     for scene in scenes:
-        counts.add_scene(scene.rows)
-        bad = [row for row in scene.rows if row.failed]
-        failures += bad[: FAILURES_KEPT - len(failures)]
-        for engine, reason in sorted(_left_out(scene)):
-            kind = (engine, NUMBER.sub("#", reason))
-            refusals[kind] += 1
-            first_reason.setdefault(kind, reason)
-        found = _worst(scene.rows)
-        judged += len(found)
-        worst = _top(WORST_SHOWN, [*worst, *found], lambda w: w.used)
-        _measure_k(scene.rows, measured_k)
-        independence.update(scene.independence)
-        _add_costs(scene, costs)
-        known = [(scene.name, each) for each in scene.evidence.values() if "observed_order" in each]
-        orders = _top(ORDERS_SHOWN, [*orders, *known], _lowest)
-        if bad:
-            failing += [scene][: SCENES_SHOWN - len(failing)]
-        else:
-            most = max((w.used for w in found), default=0.0)
-            holding = _top(SCENES_SHOWN, [*holding, (most, scene)], lambda each: each[0])
-    verdict = counts.sentence()
-    if missing:
-        verdict += f"; not run: {', '.join(engine for engine, _ in missing)}"
-    holding = nlargest(SCENES_SHOWN - len(failing), holding, key=lambda each: each[0])
-    shown = sorted([*failing, *(scene for _, scene in holding)], key=lambda scene: scene.name)
-    return Summary(
-        verdict=verdict,
-        scenes=counts.scenes,
-        counts=counts,
-        versions=versions(),
-        machine=machine(),
-        worst=_sorted(worst) if judged <= WORST_SHOWN else nlargest(WORST_SHOWN, worst, key=lambda w: w.used),
-        judged=judged,
-        failures=failures,
-        refusals=[(kind[0], first_reason[kind], count) for kind, count in sorted(refusals.items())],
-        measured_k=measured_k,
-        independence=[(engine, *independence[engine]) for engine in sorted(independence)],
-        costs=[
-            Cost(
-                engine,
-                _settings(values),
-                median(t.times for t in values),
-                median(t.microseconds for t in values),
-                WORK[engine].full if engine in WORK else "",
-            )
-            for (engine, _), values in sorted(costs.items())
-        ],
-        orders=orders if len(orders) <= ORDERS_SHOWN else nlargest(ORDERS_SHOWN, orders, key=_lowest),
-        ladder=list(ladder),
-        tolerances=list(tolerances),
-        missing=list(missing),
-        shown=shown,
-    )
+        summing.add(scene)
+    return summing.summary(ladder, tolerances, missing)
 
 
 def _left_out(scene: Record) -> set[tuple[str, str]]:

@@ -29,8 +29,8 @@ from validation.run.breakdown import breakdown
 
 
 def judged(name: str, scene: Scene, witnesses: Sequence[Witness] = WITNESSES, *, draw: bool = True) -> Record:
-    """Judge a scene and keep what the report needs of it."""
-    record = judge(name, scene, witnesses)
+    """Judge a scene and keep what the report needs of it; `draw`: with its pictures and observed orders."""
+    record = judge(name, scene, witnesses, order=draw)
     figure = None
     if draw:
         from validation.report.figures import scene_figure
@@ -39,8 +39,11 @@ def judged(name: str, scene: Scene, witnesses: Sequence[Witness] = WITNESSES, *,
     return record.kept(figure)
 
 
-def judge(name: str, scene: Scene, witnesses: Sequence[Witness] = WITNESSES) -> Record:
-    """Let every witness answer one scene and compare; an engine that breaks down costs its own rows."""
+def judge(name: str, scene: Scene, witnesses: Sequence[Witness] = WITNESSES, *, order: bool = True) -> Record:
+    """Let every witness answer one scene and compare; an engine that breaks down costs its own rows.
+
+    `order`: measure the observed order of what is simulated, which takes two more simulations and changes no row.
+    """
     record = Record(name, scene, plain(scene.title), plain(scene.source))
     if scene.motion.free is not None:
         from validation.run.released import judge_released
@@ -63,7 +66,7 @@ def judge(name: str, scene: Scene, witnesses: Sequence[Witness] = WITNESSES) -> 
         exact = witness.tolerance == EQUIVALENCE and answer.refusal is None and "theta_3" in witness.expected
         if exact and witness.stated:
             record.rows += _stated(name, scene, witness, answer)
-        if witness.order and answer.refusal is None:
+        if order and witness.order and answer.refusal is None:
             answer.evidence |= _observed_order(name, scene, at, record.solution, witness)
     _judge_inertia(record, scene, at, witnesses)
     return record

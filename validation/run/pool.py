@@ -5,13 +5,19 @@ done again scene by scene, and the scene at fault engine by engine.
 """
 
 import faulthandler
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+import os
+import threading
+import time
+from collections.abc import Collection, Iterable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, wait
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import replace
 from importlib import import_module
+from itertools import islice
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol
 
-from fourbar.errors import DependencyError, InputError
+from fourbar.errors import DependencyError
 from validation.compare.plain import plain
 from validation.engines.memory import bound_memory
 from validation.engines.witnesses import Witness
@@ -20,10 +26,15 @@ from validation.run.breakdown import breakdown
 from validation.run.judge import judged
 from validation.scenes.suites import Files, Suite
 
+if TYPE_CHECKING:
+    from pebble import ProcessPool
+
 SECONDS_PER_SCENE = 60.0
 """A scene takes 0.05 to 3 s; one that takes longer than this hangs."""
 SECONDS_PER_POSITION = 0.03
 """Ten times what a position takes with all engines: scenes of many positions have that much longer."""
+LATER = 10.0
+"""Seconds after which a worker whose parent should have stopped it ends itself."""
 IN_FLIGHT = 4
 """Chunks submitted per worker: enough to keep it busy, few enough to keep the memory bounded."""
 STALL = 20.0
@@ -45,7 +56,7 @@ class StalledError(Exception):
 
 
 class NoWorkersError(DependencyError):
-    """The scheduler has no workers, or those of this machine all die."""
+    """The cluster has no workers, or those of this machine all die."""
 
 
 def part(suite: Suite, scenes: Sequence[int]) -> tuple[Suite, Sequence[int]]:
@@ -68,19 +79,90 @@ def judge_chunk(suite: Suite, scenes: Sequence[int], witnesses: Sequence[Witness
 def judge_watched(
     seconds: float, suite: Suite, scenes: Sequence[int], witnesses: Sequence[Witness], draw: bool
 ) -> list[Record]:
-    """The same in a worker that nobody stops from outside: it ends its own process where it takes longer."""
-    faulthandler.dump_traceback_later(seconds, exit=True)
-    try:
-        return judge_chunk(suite, scenes, witnesses, draw)
-    finally:
-        faulthandler.cancel_dump_traceback_later()
+    """The same in a worker that ends its own process where one scene takes longer, whatever the engine holds."""
+    records = []
+    with Path(os.devnull).open("w", encoding="utf-8") as silent:
+        for scene in scenes:
+            faulthandler.dump_traceback_later(seconds, exit=True, file=silent)
+            try:
+                records += judge_chunk(suite, [scene], witnesses, draw)
+            finally:
+                faulthandler.cancel_dump_traceback_later()
+    return records
 
 
-def ready() -> None:
-    """Bound the memory, and import what every scene needs."""
+def ready(parent: int = 0) -> None:
+    """Bound the memory, import what every scene needs, and end with the parent, whose id is given."""
     bound_memory()
+    if parent:
+        threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
     import_module("validation.run.judge")
     import_module("validation.engines.free_body")
+
+
+def _end_with(parent: int) -> None:
+    """End this process when another has become its parent: the first one was killed and cannot stop it."""
+    while os.getppid() == parent:
+        time.sleep(1.0)
+    os._exit(1)
+
+
+class Workers(Protocol):
+    """What carries out tasks: processes of this machine, or the workers of a cluster."""
+
+    @property
+    def in_flight(self) -> int:
+        """Chunks submitted at a time."""
+
+    def submit(self, scenes: Sequence[int], who: Sequence[Witness]) -> Any:
+        """Hand in some scenes; the task."""
+
+    def done(self, tasks: Collection[Any], seconds: float) -> set[Any]:
+        """Those that are finished, as soon as there is one; none after some seconds."""
+
+    def result(self, task: Any) -> list[Record]:
+        """What a finished task returned or raised; StalledError where it is on nobody's account."""
+
+    def lost(self, tasks: Collection[Any]) -> bool:
+        """Whether nobody takes up the tasks any more."""
+
+
+class Processes:
+    """The processes of a Pebble pool."""
+
+    def __init__(
+        self, pool: "ProcessPool", suite: Suite, witnesses: Sequence[Witness], draw: bool, workers: int, seconds: float
+    ) -> None:
+        self._pool, self._suite, self._draw, self._seconds = pool, suite, draw, seconds
+        self.in_flight = IN_FLIGHT * workers
+
+    def submit(self, scenes: Sequence[int], who: Sequence[Witness]) -> "Future[list[Record]]":
+        """Hand in some scenes: one by itself is stopped from outside, among several the worker ends itself."""
+        alone = len(scenes) == 1
+        own = self._seconds + LATER if alone else self._seconds
+        task = (own, *part(self._suite, scenes), who, self._draw)
+        try:
+            future: Future[list[Record]] = self._pool.schedule(
+                judge_watched, args=task, timeout=self._seconds if alone else None
+            )
+        except RuntimeError:  # a broken pool takes no more
+            raise StalledError from None
+        return future
+
+    def done(self, tasks: "Collection[Future[Any]]", seconds: float) -> "set[Future[Any]]":
+        """Those that are finished, as soon as there is one; none after some seconds."""
+        return wait(tasks, seconds, FIRST_COMPLETED).done
+
+    def result(self, task: "Future[list[Record]]") -> list[Record]:
+        """What a task returned or raised."""
+        try:
+            return task.result()
+        except BrokenProcessPool:  # workers died while they had nothing to do
+            raise StalledError from None
+
+    def lost(self, tasks: "Collection[Future[Any]]") -> bool:
+        """Whether the pool broke, or none of its workers takes up a task."""
+        return not self._pool.active or not any(task.running() for task in tasks)
 
 
 def over_processes(
@@ -92,143 +174,73 @@ def over_processes(
     seconds: float | None = None,
 ) -> Iterator[tuple[int, list[Record]]]:
     """Over processes of this machine; `seconds`: after which a scene is taken to hang."""
-    seconds = longest(suite) if seconds is None else seconds
-    left = dict(chunks)
-    in_vain = 0
-    while left:
-        try:
-            for number, records in _over_one_pool(suite, list(left.items()), witnesses, draw, workers, seconds):
-                yield number, records
-                del left[number]
-                in_vain = 0
-        except StalledError:
-            in_vain += 1
-            if in_vain == POOLS:
-                raise NoWorkersError("the workers die before they finish a scene; what is finished is kept") from None
-
-
-def _over_one_pool(
-    suite: Suite, chunks: Iterable[Chunk], witnesses: Sequence[Witness], draw: bool, workers: int, seconds: float
-) -> Iterator[tuple[int, list[Record]]]:
     from multiprocessing import get_context
 
     from pebble import ProcessPool
 
-    # a worker imports before its first task, so that the time for it is not taken from a scene
-    with ProcessPool(max_workers=workers, context=get_context("spawn"), initializer=ready) as pool:
-        try:
-
-            def submit(scenes: Sequence[int], who: Sequence[Witness]) -> Future[list[Record]]:
-                task = (*part(suite, scenes), who, draw)
-                allowed = seconds * len(scenes)
-                try:
-                    future: Future[list[Record]] = pool.schedule(judge_chunk, args=task, timeout=allowed)
-                except RuntimeError:  # a broken pool takes no more
-                    raise StalledError from None
-                return future
-
-            def lost(running: Iterable[Future[list[Record]]]) -> bool:
-                return not pool.active or not any(future.running() for future in running)
-
-            yield from _as_done(suite, chunks, witnesses, submit, IN_FLIGHT * workers, lost)
-        except BaseException:
-            pool.stop()  # type: ignore[no-untyped-call]
-            raise
-
-
-def over_machines(
-    suite: Suite,
-    chunks: Iterable[Chunk],
-    witnesses: Sequence[Witness],
-    draw: bool,
-    scheduler: str,
-    seconds: float | None = None,
-) -> Iterator[tuple[int, list[Record]]]:
-    """Over the workers of a Dask scheduler; each needs this checkout importable, and what witnesses are added."""
     seconds = longest(suite) if seconds is None else seconds
-    from distributed import Client
-
-    try:
-        connected = Client(scheduler)  # type: ignore[no-untyped-call]
-    except (OSError, ValueError) as error:  # no answer, or no address
-        why = str(error) or "no answer"
-        raise InputError("--scheduler", scheduler, f"must be the address of a Dask scheduler: {why}") from None
-    workers = max(1, len(connected.nthreads()))  # type: ignore[no-untyped-call]
-    # threads that wait for Dask's futures: those of its executor never end where a result was lost in transit;
-    # the client is left first, which ends what is still waited for
-    with ThreadPoolExecutor(IN_FLIGHT * workers) as waiting, connected as client:
-
-        def submit(scenes: Sequence[int], who: Sequence[Witness]) -> Future[list[Record]]:
-            task = (seconds * len(scenes), *part(suite, scenes), who, draw)
-            return waiting.submit(client.submit(judge_watched, *task, retries=0, pure=False).result)
-
-        def deserted(_: Iterable[Future[list[Record]]]) -> bool:
-            return not client.nthreads()
-
-        try:
-            yield from _as_done(suite, chunks, witnesses, submit, IN_FLIGHT * workers, deserted)
-        except StalledError:
-            raise NoWorkersError(f"{scheduler}: no workers; start some, what is finished is kept") from None
+    left = dict(chunks)
+    in_vain = 0
+    while left:
+        # a worker imports before its first task, so that the time for it is not taken from a scene
+        context, me = get_context("spawn"), os.getpid()
+        with ProcessPool(max_workers=workers, context=context, initializer=ready, initargs=[me]) as pool:
+            try:
+                crew = Processes(pool, suite, witnesses, draw, workers, seconds)
+                for number, records in as_done(suite, list(left.items()), witnesses, crew):
+                    yield number, records
+                    del left[number]
+                    in_vain = 0
+            except StalledError:
+                pool.stop()  # type: ignore[no-untyped-call]
+                in_vain += 1
+                if in_vain == POOLS:
+                    lost = "the workers die before they finish a scene; what is finished is kept"
+                    raise NoWorkersError(lost) from None
+            except BaseException:
+                pool.stop()  # type: ignore[no-untyped-call]
+                raise
 
 
-def _as_done(
-    suite: Suite,
-    chunks: Iterable[Chunk],
-    witnesses: Sequence[Witness],
-    submit: Callable[[Sequence[int], Sequence[Witness]], "Future[list[Record]]"],
-    in_flight: int,
-    lost: "Callable[[Iterable[Future[list[Record]]]], bool]",
+def as_done(
+    suite: Suite, chunks: Iterable[Chunk], witnesses: Sequence[Witness], workers: Workers
 ) -> Iterator[tuple[int, list[Record]]]:
     """Keep a bounded number of chunks running; yield each as it is done."""
     waiting = iter(chunks)
-    running: dict[Future[list[Record]], Chunk] = {}
-    exhausted = False
+    running: dict[Any, Chunk] = {}
+    most = workers.in_flight
     while True:
-        while not exhausted and len(running) < in_flight:
-            chunk = next(waiting, None)
-            if chunk is None:
-                exhausted = True
-            else:
-                running[submit(chunk[1], witnesses)] = chunk
+        for chunk in islice(waiting, most - len(running)):
+            running[workers.submit(chunk[1], witnesses)] = chunk
         if not running:
             return
-        done, _ = wait(running, STALL, FIRST_COMPLETED)
-        if not done and lost(running):
+        done = workers.done(running, STALL)
+        if not done and workers.lost(running):
             raise StalledError
-        for future in done:
-            number, scenes = running.pop(future)
+        for task in done:
+            number, scenes = running.pop(task)
             try:
-                yield number, _outcome(future, lost)
-            except StalledError:
+                yield number, workers.result(task)
+            except (StalledError, DependencyError):
                 raise
             except Exception:  # the worker died or hung; find out on whose account
-                yield number, [_alone(suite, scene, witnesses, submit, lost) for scene in scenes]
+                yield number, [_alone(suite, scene, witnesses, workers) for scene in scenes]
 
 
-def _outcome(future: "Future[list[Record]]", lost: "Callable[[Iterable[Future[list[Record]]]], bool]") -> list[Record]:
-    """The result of a task, or StalledError where no worker takes it up or the pool breaks."""
-    while True:
-        wait([future], STALL)
-        if future.done():
-            try:
-                return future.result()
-            except BrokenProcessPool:  # workers died while they had nothing to do: on nobody's account
-                raise StalledError from None
-        if lost([future]):
+def _outcome(scene: int, who: Sequence[Witness], workers: Workers) -> Record:
+    """One scene by some engines, or StalledError where no worker takes it up."""
+    task = workers.submit([scene], who)
+    while not workers.done([task], STALL):
+        if workers.lost([task]):
             raise StalledError
+    return workers.result(task)[0]
 
 
-def _alone(
-    suite: Suite,
-    scene: int,
-    witnesses: Sequence[Witness],
-    submit: Callable[[Sequence[int], Sequence[Witness]], "Future[list[Record]]"],
-    lost: "Callable[[Iterable[Future[list[Record]]]], bool]",
-) -> Record:
+def _alone(suite: Suite, scene: int, witnesses: Sequence[Witness], workers: Workers) -> Record:
     """One scene by itself, and if that breaks down too, one engine at a time."""
     try:
-        return _outcome(submit([scene], witnesses), lost)[0]
-    except StalledError:
+        return _outcome(scene, witnesses, workers)
+    except (StalledError, DependencyError):
         raise
     except Exception:
         pass
@@ -238,8 +250,8 @@ def _alone(
     for who in ([], *([witness] for witness in witnesses)):
         for attempt in range(ATTEMPTS):
             try:
-                part = _outcome(submit([scene], who), lost)[0]
-            except StalledError:
+                part = _outcome(scene, who, workers)
+            except (StalledError, DependencyError):
                 raise
             except Exception as error:
                 if getattr(error, "exitcode", None) in FROM_OUTSIDE and attempt + 1 < ATTEMPTS:

@@ -1,7 +1,7 @@
 """The run: every scene judged, the results streamed to disk, the report written."""
 
 import csv
-import io
+import math
 import os
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
@@ -12,7 +12,8 @@ import click
 from fourbar.errors import FAILED, DependencyError, FourBarError, InputError
 from fourbar.mjcf import mjcf
 from fourbar.writing import write_text
-from validation.compare.columns import write_columns
+from validation.compare.columns import Columns
+from validation.compare.plain import plain
 from validation.compare.rows import FAILS, Row
 from validation.compare.tolerance import IDENTITY, SIMULATED
 from validation.engines.hard_suite import Hard
@@ -24,12 +25,13 @@ from validation.regression.record import about, baseline, read_run, write_about
 from validation.regression.scenes import descriptions
 from validation.report import cost_section, hard_section
 from validation.report.html import Section, html
-from validation.report.machine import versions
 from validation.report.markdown import markdown
 from validation.report.record import Record
-from validation.report.summary import SCENES_SHOWN, Summary, summarise
+from validation.report.summary import PICTURED, Summary, Summing
 from validation.run import pool
+from validation.run.code import code
 from validation.run.elsewhere import run_elsewhere
+from validation.run.machines import Cluster
 from validation.run.selection import askable, chosen, selected
 from validation.run.store import Store
 from validation.scenes.random import LinkageType
@@ -39,6 +41,21 @@ WORKERS = 2
 ALL_TYPES = ",".join(kind.value for kind in LinkageType)
 CHUNK = {True: 1, False: 20}
 """Scenes per task: one where something is simulated or drawn (a second each), else twenty (a second together)."""
+MOST_PARTS = 10_000
+"""Files that a run keeps while it goes on: of a million scenes a hundred stand in each."""
+TIMINGS = ("scene", "engine", "setting", "positions", "seconds", "times_formulas")
+
+
+class Collected(int):
+    """Scenes that were read back for the report."""
+
+
+class Drawn(int):
+    """Scenes of a long suite that were drawn."""
+
+
+STAGES = {int: "judging", Collected: "collecting", Drawn: "drawing"}
+"""What the progress says."""
 
 
 def run(
@@ -51,30 +68,36 @@ def run(
     published: bool = False,
     missing: Sequence[tuple[str, str]] = (),
     seconds: float | None = None,
-) -> Iterator[int | Summary]:
-    """Judge a suite into a folder; yields the number of scenes done as they come, at last the summary.
+    drawn: bool = True,
+) -> Iterator[int | str | Summary]:
+    """Judge a suite into a folder; yields the number of scenes done as they come, then collected, at last the summary.
+
+    What of an earlier run is not kept is yielded as a line of text.
 
     With `published` the report sets what the thesis printed against what is right, error by error.
-    `missing` are the witnesses that cannot answer here, each with the reason; `seconds`: after which a scene hangs.
+    `missing` are the witnesses that cannot answer here, each with the reason; `seconds`: after which a scene hangs;
+    `drawn`: with pictures, of a long suite at the end, of the scenes that fail and those nearest to it.
 
     What an interrupted run of the same suite with the same engines and versions left is kept.
     """
     simulated = any(witness.name == "mujoco-simulated" for witness in witnesses)
-    draw = len(suite) <= SCENES_SHOWN
-    size = CHUNK[simulated or draw or seconds is not None]
+    draw = drawn and len(suite) <= PICTURED
+    size = max(CHUNK[simulated or draw], math.ceil(len(suite) / MOST_PARTS))
     chunks = [range(start, min(start + size, len(suite))) for start in range(0, len(suite), size)]
     identity = {
         "scenes": suite.fingerprint(),
         "witnesses": [f"{witness.name} {witness.tolerance.factor!r}" for witness in witnesses],
-        "versions": versions(),
+        **code(),
         "draw": draw,
     }
     with Store(out, identity).held() as store:
         done = store.done()
+        yield from store.notes
         yield sum(len(chunks[number]) for number in done)
         todo = [(number, scenes) for number, scenes in enumerate(chunks) if number not in done]
-        if scheduler is not None:
-            answers = pool.over_machines(suite, todo, witnesses, draw, scheduler, seconds)
+        cluster = None if scheduler is None else Cluster(scheduler)
+        if cluster is not None:
+            answers = cluster.over(suite, todo, witnesses, draw, seconds)
         else:
             answers = pool.over_processes(suite, todo, witnesses, draw, workers, seconds)
         for number, records in answers:
@@ -82,16 +105,35 @@ def run(
             yield len(records)
         held_to = list(dict.fromkeys((IDENTITY, *(witness.tolerance for witness in witnesses))))
         ladder = ladder_rows() if published else []
-        summary = summarise(store.records(len(chunks)), ladder, held_to, missing)
-        first_lines = write_columns(store.rows(len(chunks)), out)
+        summing = Summing()
+        times = out / ".timings.csv.part"
+        with Columns(out) as columns, times.open("w", encoding="utf-8", newline="") as file:
+            csv.writer(file, lineterminator="\n").writerow(TIMINGS)
+            for number, scenes in enumerate(chunks):
+                records = store.read(number)
+                for each in records:
+                    summing.add(each)
+                    csv.writer(file, lineterminator="\n").writerows(timings(each))
+                columns.add([row for each in records for row in each.rows])
+                yield Collected(len(scenes))
+        os.replace(times, out / "timings.csv")
+        pictured = {record.name for record in summing.pictured} if drawn else set()
+        places = [index for index in range(len(suite)) if plain(suite.name(index)) in pictured]
+        if drawn and not draw:
+            for shown in pictures_of(suite, places, summing.pictured, witnesses, workers, seconds):
+                summing.picture(shown)
+                yield Drawn(1)
+        summary = summing.summary(ladder, held_to, missing)
         factors = {witness.name: witness.tolerance.factor for witness in witnesses}
-        write_about(about(factors, suite.fingerprint(), descriptions(suite)), out)
-        write_text(out / "timings.csv", timings_csv(store.records(len(chunks))))
+        record = about(factors, suite.fingerprint(), descriptions(suite))
+        if cluster is not None:
+            record.settings["machines"] = cluster.machines
+        write_about(record, out)
         write_text(out / "report.md", markdown(summary))
-        drawn, why_not = mjcf_pictures(suite) if draw and simulated else ({}, "")
-        rows = (row for chunk in store.rows(len(chunks)) for row in chunk)
+        models, why_not = mjcf_pictures(suite, places) if places and simulated else ({}, "")
+        rows = (row for number in range(len(chunks)) for each in store.read(number) for row in each.rows)
         more = sections(rows if isinstance(suite, Hard) else None, out)
-        page = html(summary, first_lines, pictures=drawn, no_pictures=why_not, sections=more)
+        page = html(summary, columns.first_lines, pictures=models, no_pictures=why_not, sections=more)
         write_text(out / "report.html", page)
         store.finish()
     yield summary
@@ -113,10 +155,34 @@ def sections(hard: Iterable[Row] | None, out: Path) -> list[Section]:
     return [hard_section.section(hard, inline(svg)), *cost_section.found_in(out)]
 
 
-def mjcf_pictures(suite: Suite) -> tuple[dict[str, str], str]:
-    """MuJoCo's own pictures of the scenes' MJCF, base64 PNGs by name, and the reason where there are none."""
+def pictures_of(
+    suite: Suite,
+    places: Sequence[int],
+    records: Iterable[Record],
+    witnesses: Sequence[Witness],
+    workers: int,
+    seconds: float | None,
+) -> Iterator[Record]:
+    """Some scenes judged once more, now with their pictures: their answers were not kept.
+
+    An engine that broke down, or hung, in a scene is not started in it again.
+    """
+    broken = {record.name: {row.engine for row in record.rows if row.failed and row.quantity == "all"}
+              for record in records}  # fmt: skip
+    groups: dict[tuple[Witness, ...], list[int]] = {}
+    for index in places:
+        without = broken[plain(suite.name(index))]
+        groups.setdefault(tuple(each for each in witnesses if each.name not in without), []).append(index)
+    for who, indices in groups.items():
+        chunks = [(index, range(index, index + 1)) for index in indices]
+        for _, judged in pool.over_processes(suite, chunks, who, True, workers, seconds):
+            yield from judged
+
+
+def mjcf_pictures(suite: Suite, places: Iterable[int]) -> tuple[dict[str, str], str]:
+    """MuJoCo's own pictures of some scenes' MJCF, base64 PNGs by name, and the reason where there are none."""
     texts = {}
-    for index in range(len(suite)):
+    for index in places:
         try:
             texts[suite.name(index)] = mjcf(suite.scene(index))
         except FourBarError:  # bars without mass, a motion law: the engines' own rows say so
@@ -124,16 +190,11 @@ def mjcf_pictures(suite: Suite) -> tuple[dict[str, str], str]:
     return pictures(texts)
 
 
-def timings_csv(records: Iterator[Record]) -> str:
+def timings(record: Record) -> Iterator[list[str]]:
     """Seconds per answer, and their ratio to the formulas' on the same scene in the same process."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(["scene", "engine", "setting", "positions", "seconds", "times_formulas"])
-    for record in records:
-        for t in record.timings:
-            ratio = t.seconds / record.timings[0].seconds
-            writer.writerow([t.scene, t.engine, t.setting, t.positions, f"{t.seconds:.6f}", f"{ratio:.1f}"])
-    return text.getvalue()
+    for t in record.timings:
+        ratio = t.seconds / record.timings[0].seconds
+        yield [t.scene, t.engine, t.setting, str(t.positions), f"{t.seconds:.6f}", f"{ratio:.1f}"]
 
 
 def examine(scenes: tuple[Path, ...], mjcf: Path, names: tuple[str, ...], out: Path, wanted: float | None) -> int:
@@ -188,6 +249,7 @@ def examine(scenes: tuple[Path, ...], mjcf: Path, names: tuple[str, ...], out: P
     metavar="SECONDS",
     help="End what takes longer on one scene; left out: a minute, and more for many positions.",
 )
+@click.option("--no-pictures", is_flag=True, help="Draw nothing, and measure no observed order of a simulation.")
 @click.option("--mjcf", type=click.Path(path_type=Path), help="Examine this MJCF of the one SCENE instead.")
 @click.option(
     "--name",
@@ -213,6 +275,7 @@ def command(
     python: Path | None,
     adapters: tuple[str, ...],
     time_limit: float | None,
+    no_pictures: bool,
     mjcf: Path | None,
     names: tuple[str, ...],
     **forms: Path | None,
@@ -223,6 +286,7 @@ def command(
     if mjcf is not None:
         others = {"engines": engines, "suite": named, "random": count, "seed": seed, "type": types, "against": against}
         more = {"scheduler": scheduler, "python": python, "witness": adapters or None, "time-limit": time_limit}
+        more["no-pictures"] = no_pictures or None
         for option, value in {**others, **more, **forms}.items():
             if value is not None:
                 raise InputError(
@@ -256,6 +320,7 @@ def command(
     if python is not None:
         passed_on = [*map(os.path.abspath, scenes), f"--workers={workers}"]
         passed_on += [f"--engines={engines}"] if engines else []
+        passed_on += ["--no-pictures"]
         passed_on += [f"--random={count}", f"--seed={seed}", f"--type={types}"] if count else []
         passed_on += [f"--error={wanted!r}"] if wanted is not None else []
         passed_on += [f"--witness={adapter}" for adapter in adapters]
@@ -264,7 +329,7 @@ def command(
         against = str(run_elsewhere(python, passed_on, out / "elsewhere"))
     present, missing = askable(chosen(engines, witnesses), by_name=engines is not None)
     published = not scenes and named is None and count is None  # the models, the thesis's among them
-    how: dict[str, Any] = {"workers": workers, "scheduler": scheduler, "seconds": time_limit}
+    how: dict[str, Any] = {"workers": workers, "scheduler": scheduler, "seconds": time_limit, "drawn": not no_pictures}
     result = _in_sight(len(suite), run(suite, out, present, published=published, missing=missing, **how))
     table(result, out)
     worse = report_differences(baseline(against), out, forms) if against is not None else 0
@@ -276,17 +341,22 @@ def command(
     return result.counts.status
 
 
-def _in_sight(scenes: int, steps: Iterable[int | Summary]) -> Summary:
+def _in_sight(scenes: int, steps: Iterable[int | str | Summary]) -> Summary:
     """The summary at the end of a run, its progress shown meanwhile."""
     from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
 
-    columns = (TextColumn("judging"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    step: int | Summary = 0
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    step: int | str | Summary = 0
     with Progress(*columns, console=Console(stderr=True)) as progress:
-        task = progress.add_task("judging", total=scenes)
+        tasks: dict[type, TaskID] = {}
         for step in steps:
-            if isinstance(step, int):
-                progress.advance(task, step)
+            if isinstance(step, str):
+                progress.console.print(step, markup=False, highlight=False)
+            elif isinstance(step, int):
+                kind = type(step)
+                if kind not in tasks:
+                    tasks[kind] = progress.add_task(STAGES[kind], total=None if kind is Drawn else scenes)
+                progress.advance(tasks[kind], step)
     assert isinstance(step, Summary)
     return step

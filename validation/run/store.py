@@ -2,20 +2,22 @@
 
 lock               held while a run goes on; the system frees it when the process dies
 run.json           what is being run; a rerun of the same thing resumes, of another starts over
-parts/000012.csv   the rows of chunk 12, written whole; its presence says the chunk is done
-parts/000012.json  what the report needs of it: timings, evidence, pictures
+parts/000012       what chunk 12 came to, written whole: a line of JSON that says of which run it is, how many
+                   records and rows follow, and their SHA-256; then a line of JSON for each record, packed by gzip
 """
 
+import gzip
+import hashlib
 import json
 import shutil
-from collections.abc import Iterator
+import zlib
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from fourbar.errors import FourBarError
-from fourbar.writing import write_text
-from validation.compare.rows import Row, from_csv, to_csv
+from fourbar.errors import DependencyError, FourBarError
+from fourbar.writing import write_bytes, write_text
 from validation.report.record import Record
 
 
@@ -24,11 +26,14 @@ class RunningError(FourBarError):
 
 
 class Store:
-    """The parts of one run in its folder."""
+    """The parts of one run in its folder: `identity` is what they depend on."""
 
     def __init__(self, folder: Path, identity: dict[str, Any]) -> None:
         self.folder, self.parts = folder, folder / "parts"
         self._identity = json.dumps(identity, indent=1, sort_keys=True) + "\n"
+        self._run = hashlib.sha256(self._identity.encode()).hexdigest()
+        self.notes: list[str] = []
+        """What of an earlier run is made again, and why."""
 
     @contextmanager
     def held(self) -> Iterator["Store"]:
@@ -51,6 +56,8 @@ class Store:
         marker = self.folder / "run.json"
         same = marker.is_file() and marker.read_text(encoding="utf-8") == self._identity
         if not same:
+            if marker.is_file() and self.parts.is_dir() and any(self.parts.iterdir()):
+                self.notes.append(f"made again: the parts of another run ({self._other(marker)})")
             marker.unlink(missing_ok=True)
             shutil.rmtree(self.parts, ignore_errors=True)
         self.parts.mkdir(exist_ok=True)
@@ -59,30 +66,64 @@ class Store:
         if not same:
             write_text(marker, self._identity)
 
+    def _other(self, marker: Path) -> str:
+        """In what the earlier run differs from this one."""
+        try:
+            before, now = json.loads(marker.read_text(encoding="utf-8")), json.loads(self._identity)
+            return ", ".join(name for name in sorted({*before, *now}) if before.get(name) != now.get(name))
+        except (AttributeError, TypeError, ValueError):
+            return "its run.json is damaged"
+
     def done(self) -> set[int]:
-        """The chunks whose parts are complete."""
-        return {int(path.stem) for path in self.parts.glob("*.csv")}
+        """The chunks whose parts are whole and of this run; others are removed, and noted."""
+        found = set()
+        for path in sorted(self.parts.iterdir()):
+            try:
+                self._packed(path)
+                found.add(int(path.name))
+            except ValueError as error:
+                self.notes.append(f"made again: {path.parent.name}/{path.name}: {error}")
+                path.unlink()
+        return found
 
-    def put(self, chunk: int, records: list[Record]) -> None:
-        """Write a finished chunk; the rows come last, since they say that it is done."""
-        rows = [row for record in records for row in record.rows]
-        text = json.dumps([record.without_rows() for record in records])
-        write_text(self.parts / f"{chunk:06d}.json", text)
-        write_text(self.parts / f"{chunk:06d}.csv", to_csv(rows))
+    def put(self, chunk: int, records: Sequence[Record]) -> None:
+        """Write a finished chunk."""
+        packed = gzip.compress("\n".join(json.dumps(record.kept_all()) for record in records).encode(), 1, mtime=0)
+        rows = sum(len(record.rows) for record in records)
+        head = {"chunk": chunk, "run": self._run, "records": len(records), "rows": rows}
+        head["sha256"] = hashlib.sha256(packed).hexdigest()
+        write_bytes(self._path(chunk), json.dumps(head).encode() + b"\n" + packed)
 
-    def rows(self, chunks: int) -> Iterator[list[Row]]:
-        """The rows of each chunk, in order; sorted within and across chunks."""
-        for chunk in range(chunks):
-            yield from_csv(self.parts / f"{chunk:06d}.csv")
+    def _path(self, chunk: int) -> Path:
+        return self.parts / f"{chunk:06d}"
 
-    def records(self, chunks: int) -> Iterator[Record]:
-        """The records, in order, with their rows."""
-        for chunk, rows in enumerate(self.rows(chunks)):
-            by_scene: dict[str, list[Row]] = {}
-            for row in rows:
-                by_scene.setdefault(row.scene, []).append(row)
-            for record in json.loads((self.parts / f"{chunk:06d}.json").read_text(encoding="utf-8")):
-                yield Record.restore(record, by_scene.get(record["name"], []))
+    def _packed(self, path: Path) -> tuple[dict[str, Any], bytes]:
+        """The first line of a part and the rest; ValueError that says what is wrong with it."""
+        first, _, packed = path.read_bytes().partition(b"\n")
+        try:
+            head = dict(json.loads(first))
+        except (TypeError, ValueError):
+            raise ValueError("is damaged") from None
+        if head.get("sha256") != hashlib.sha256(packed).hexdigest():
+            raise ValueError("is damaged")
+        if head.get("run") != self._run:
+            raise ValueError("is of another run")
+        if path.name != str(head.get("chunk")).zfill(6):
+            raise ValueError("is another part")
+        return head, packed
+
+    def read(self, chunk: int) -> list[Record]:
+        """The records of a chunk, in order; DependencyError where the part was damaged meanwhile."""
+        path = self._path(chunk)
+        try:
+            head, packed = self._packed(path)
+            lines = gzip.decompress(packed).decode().splitlines()
+            records = [Record.restore(json.loads(line)) for line in lines]
+        except (ValueError, EOFError, zlib.error, FileNotFoundError) as error:
+            raise DependencyError(f"{path}: {error}; run it again, and this part is made again") from None
+        if (len(records), sum(len(record.rows) for record in records)) != (head["records"], head["rows"]):
+            raise DependencyError(f"{path}: is damaged; run it again, and this part is made again")
+        return records
 
     def finish(self) -> None:
         """The results are written: the parts have served."""

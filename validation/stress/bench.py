@@ -59,6 +59,9 @@ LIMITS = {
     "solve with error bars / to forces": Limit(
         "<=", 35.0, "the forces are evaluated 17 times, and every number is rounded anew"
     ),
+    "numpy / compiled": Limit(">=", 1.2, "who installs numba gains by it on one core"),
+    "compiled / C": Limit("<=", 1.5, "the blocks, statuses and copies around the compiled loop stay small"),
+    "compiled error bars / forces": Limit("<=", 17.0, "16 more evaluations, which share the tangent"),
     "growth from 1000 positions on": Limit("<=", 1.3, "the work is linear in the positions: blocks fit the cache"),
     "memory beyond the result, MB": Limit("<=", 50.0, "work space is that of a block, not of the sweep"),
     "import fourbar / import numpy": Limit("<=", 1.0, "it loads numpy alone, and less than that of its own"),
@@ -103,7 +106,7 @@ def memory(n: int) -> float:
     """MB allocated at the peak beyond arguments and results."""
     at, out = command(n), preallocated(UNKNOWNS, VECTORS, n)
     tracemalloc.start()
-    solve(example(), at=at, out=out)
+    solve(example(), at=at, out=out, compiled=False)
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     return peak / 1e6
@@ -215,26 +218,35 @@ def measure(positions: int, rounds: int, largest: int) -> dict[str, float]:
     batch, solved = min(positions, THIRTEEN_BATCH), command(min(positions, SOLVED))
     bodies = bodies_of(scene, command(batch))
     actions: dict[str, Callable[[], object]] = {
-        "formulas, all 11 unknowns": lambda: solve(scene, at=at, out=everything),
+        "formulas, all 11 unknowns": lambda: solve(scene, at=at, out=everything, compiled=False),
+        "the same compiled": lambda: solve(scene, at=at, out=everything, compiled=True),
         "positions only": lambda: solve(scene, at=at, out=angles),
         "13x13 assembled and solved": lambda: solve_thirteen(bodies, 2),
         "floor: tangent, root, two arctan": floor(at.theta_2, angles),
-        "input between limits: all": lambda: solve(limits, at=swing, out=everything),
+        "input between limits: all": lambda: solve(limits, at=swing, out=everything, compiled=False),
         "input between limits: positions only": lambda: solve(limits, at=swing, out=angles),
-        "solve to forces, points too": lambda: solve(scene, "force", at=solved),
-        "solve with error bars": lambda: solve(scene, "error", at=solved),
+        "solve to forces, points too": lambda: solve(scene, "force", at=solved, compiled=False),
+        "solve with error bars": lambda: solve(scene, "error", at=solved, compiled=False),
+        "compiled to forces, points too": lambda: solve(scene, "force", at=solved, compiled=True),
+        "compiled with error bars": lambda: solve(scene, "error", at=solved, compiled=True),
     }
     in_c = c_loop(positions)
     if in_c is not None:
         actions["plain C loop, all"] = in_c
     times = interleaved(actions, rounds)
     counts = {"13x13 assembled and solved": batch}
-    counts |= dict.fromkeys(("solve to forces, points too", "solve with error bars"), len(solved.theta_2))
+    to_stages = ["solve to forces, points too", "solve with error bars"]
+    to_stages += ["compiled to forces, points too", "compiled with error bars"]
+    counts |= dict.fromkeys(to_stages, len(solved.theta_2))
     rows = {name: 1e9 * value / counts.get(name, positions) for name, value in times.items()}
     cost = growth(largest, rounds)
     rows |= {f"all, {n} positions": value for n, value in cost.items()}
     everything_ns, forces = rows["formulas, all 11 unknowns"], rows["solve to forces, points too"]
+    if in_c is not None:
+        rows["compiled / C"] = rows["the same compiled"] / rows["plain C loop, all"]
     return rows | {
+        "numpy / compiled": everything_ns / rows["the same compiled"],
+        "compiled error bars / forces": rows["compiled with error bars"] / rows["compiled to forces, points too"],
         "13x13 / formulas": rows["13x13 assembled and solved"] / everything_ns,
         "formulas / positions only": everything_ns / rows["positions only"],
         "positions only / floor": rows["positions only"] / rows["floor: tangent, root, two arctan"],
@@ -252,7 +264,7 @@ def repeated(scene: Scene, n: int) -> Callable[[], object]:
 
     def action() -> None:
         for _ in range(max(1, 200_000 // n)):
-            solve(scene, at=at, out=out)
+            solve(scene, at=at, out=out, compiled=False)
 
     return action
 

@@ -1,0 +1,419 @@
+"""The functions of formulas/ compiled by numba as they stand, and the loop over the positions that calls them.
+
+The loop carries loads (in both frames, over a table too), gravity, viscous pins and flywheels, with the drive on any
+bar. Positions that it leaves open (those that need many digits, singular, not assembled, beyond the range of doubles)
+are evaluated by NumPy, as is every scene with other effects or with two pairs of equal bars.
+"""
+
+import threading
+import zlib
+from functools import cache
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fourbar.effects import Flywheel, Gravity, Load, Viscous
+from fourbar.formulas import motion, pin_forces, position, torque, transmission
+from fourbar.formulas.motion import Coefficients, Rates, coefficients, rates
+from fourbar.formulas.path import NO_DIGIT_LEFT
+from fourbar.formulas.pin_forces import Body, PinForces, Wrenches, cross, inertia_wrenches
+from fourbar.formulas.pin_forces import pin_forces as pin_forces_of
+from fourbar.formulas.position import (
+    Loop,
+    Position,
+    anywhere,
+    close_loop,
+    direction_of_tangent,
+    half_angle_of_tangent,
+    polar,
+    select,
+    square_root,
+    two_sum,
+    vector,
+)
+from fourbar.formulas.torque import driving_torque, half_slope, inertia
+from fourbar.formulas.transmission import drive_sine_of_triangle
+from fourbar.linkage import MOVING_BARS, PINS
+from fourbar.scene import case as cases
+from fourbar.scene import error_bars as bars
+from fourbar.scene.case import Case, undecided
+from fourbar.scene.error_bars import (
+    EVALUATIONS,
+    bar,
+    rounded_coefficients,
+    rounded_complex,
+    rounded_half_angle,
+    rounded_real,
+    signs,
+)
+from fourbar.solution import Array
+
+CARRIED = (Load, Gravity, Viscous, Flywheel)
+"""Effects that the loop knows; a flywheel is in the inertia of its bar."""
+BODIES, VISCOUS, LOADS = 16, 28, 32
+"""Where the bodies, viscous pins and loads begin among the numbers of a position."""
+OF_BODY, OF_LOADS = 4, 8
+ROWS = LOADS + 3 * OF_LOADS
+
+
+class Loads(NamedTuple):
+    """Everything that pushes on one bar, summed: at its mass centre, and as couples."""
+
+    world: Any = 0j
+    """Forces with constant directions, N."""
+    turning: Any = 0j
+    """Forces that turn with the bar, in its frame, N."""
+    couple: Any = 0.0
+    """Couples, and moments of both kinds of forces about the mass centre, N m."""
+    of_world: Any = 0.0
+    """Sums of the sizes of the terms, for the error bars."""
+    of_turning: Any = 0.0
+    of_couple: Any = 0.0
+
+    def with_force(self, force: Any, at: Any, turns: bool) -> "Loads":
+        """One force more, with its arm from the mass centre, both complex and in the same frame."""
+        moment, size = cross(at, force), np.abs(force)
+        more = self._replace(
+            couple=self.couple + moment, of_couple=self.of_couple + size * (np.abs(at.real) + np.abs(at.imag))
+        )
+        if turns:
+            return more._replace(turning=more.turning + force, of_turning=more.of_turning + size)
+        return more._replace(world=more.world + force, of_world=more.of_world + size)
+
+    def with_couple(self, couple: Any) -> "Loads":
+        """One couple more."""
+        return self._replace(couple=self.couple + couple, of_couple=self.of_couple + np.abs(couple))
+
+
+def carries(case: Case) -> bool:
+    """Whether the loop can evaluate a case."""
+    plain = case.path.bar == 2 and not case.path.may_stay_parallel
+    return plain and all(type(term) in CARRIED for term in case.terms)
+
+
+def numbers(case: Case, theta_2: Array, branch: Any, omega_2: Any, alpha_2: Any) -> Any:
+    """What `run` reads of a case and the motion of some positions: (ROWS,) numbers, or an array (ROWS, n).
+
+    Lengths in their unit with E1 and E2; lengths, m; u1; omega_2, alpha_2, branch, what theta_2 - theta_1 loses;
+    bodies; viscous pins; loads.
+    """
+    of_bodies = [number for body in case.bodies for number in (body.m, body.I, body.z.real, body.z.imag)]
+    of_pins: dict[str, Any] = dict.fromkeys(PINS, 0.0)
+    loads = dict.fromkeys(MOVING_BARS, Loads())
+    for term in case.terms:
+        if isinstance(term, Viscous):
+            of_pins |= dict(term.coefficients)
+        elif isinstance(term, Gravity):
+            for bar, body in zip(MOVING_BARS, case.bodies, strict=True):
+                loads[bar] = loads[bar].with_force(body.m * term.field, 0j, False)
+        elif isinstance(term, Load):
+            factor = 1.0 if term.table is None else term.table.at(theta_2)
+            if term.force is not None:
+                force, at = factor * polar(*term.force), polar(*term.at)
+                loads[term.bar] = loads[term.bar].with_force(force, at, term.frame == "bar")
+            loads[term.bar] = loads[term.bar].with_couple(factor * term.moment)
+    of_loads = [
+        number
+        for load in loads.values()
+        for number in (load.world.real, load.world.imag, load.turning.real, load.turning.imag, *load[2:])
+    ]
+    theta_1 = case.path.theta_1
+    u1 = polar(1.0, theta_1)
+    lost = two_sum(theta_2, -theta_1)[1] if anywhere(theta_1 != 0.0) else 0.0
+    found = [*case.path.lengths, *case.lengths[:4], u1.real, u1.imag, omega_2, alpha_2, branch, lost]
+    found += [*of_bodies, *of_pins.values(), *of_loads]
+    if not any(isinstance(number, np.ndarray) and number.size > 1 for number in found):
+        return tuple(float(np.ravel(number)[0]) for number in found)
+    rows = np.empty((ROWS, np.size(theta_2)))
+    for row, number in zip(rows, found, strict=True):
+        row[:] = number
+    return rows
+
+
+def number(rows: Any, row: int, i: int) -> Any:
+    """Of position i."""
+    return rows[row, i] if isinstance(rows, np.ndarray) else rows[row]
+
+
+def complex_rounded(z: Any, turned: Any, signs: Any, first: int) -> Any:
+    """A complex number, its parts changed by two of the signs; without signs itself."""
+    return z if signs is None else rounded_complex(z, turned, signs[first], signs[first + 1])
+
+
+def real_rounded(x: Any, signs: Any, first: int) -> Any:
+    """A real number likewise."""
+    return x if signs is None else rounded_real(x, signs[first])
+
+
+def by_terms(x: Any, size: Any, signs: Any, first: int) -> Any:
+    """A sum changed by the last digit of its terms."""
+    return x if signs is None else x + size * signs[first]
+
+
+def body_of(rows: Any, i: int, bar: int, turned: Any, signs: Any) -> Body:
+    """Bar 2, 3 or 4."""
+    row, sign = BODIES + OF_BODY * (bar - 2), 8 + 3 * (bar - 2)
+    z = vector(number(rows, row + 2, i), number(rows, row + 3, i))
+    inertia = real_rounded(number(rows, row + 1, i), signs, sign)
+    return Body(number(rows, row, i), inertia, complex_rounded(z, turned, signs, sign + 1))
+
+
+def push_of(rows: Any, i: int, bar: int, z: Any, u: Any, turned: Any, signs: Any) -> tuple[Any, Any]:
+    """Force of the loads on a bar (complex, N) and their moment about its first pin (N m)."""
+    row, sign = LOADS + OF_LOADS * (bar - 2), 64 + 7 * (bar - 2)
+    of_world, of_turning = number(rows, row + 5, i), number(rows, row + 6, i)
+    x = by_terms(number(rows, row, i), of_world, signs, sign)
+    y = by_terms(number(rows, row + 1, i), of_world, signs, sign + 1)
+    along = by_terms(number(rows, row + 2, i), of_turning, signs, sign + 2)
+    across = by_terms(number(rows, row + 3, i), of_turning, signs, sign + 3)
+    couple = by_terms(number(rows, row + 4, i), number(rows, row + 7, i), signs, sign + 4)
+    force = vector(x, y) + vector(along, across) * u
+    return force, real_rounded(cross(z * u, force), signs, sign + 5) + couple
+
+
+def viscous_of(rows: Any, i: int, pin: int, slip: Any, signs: Any) -> Any:
+    """Couple of a viscous pin."""
+    coefficient = real_rounded(number(rows, VISCOUS + pin, i), signs, 56 + pin)
+    return real_rounded(-coefficient * (slip * number(rows, 12, i)), signs, 60 + pin)
+
+
+def forces(
+    lengths: Loop,
+    in_unit: Loop,
+    at: Position,
+    k: Coefficients,
+    moving: Rates,
+    rows: Any,
+    i: int,
+    drive_bar: int,
+    turned: Any,
+    signs: Any,
+) -> tuple[PinForces, Any, Any]:
+    """Pin forces, torque, and the sine of the drive, as `Case.dynamics` has them."""
+    a, speed, acceleration = lengths.a, number(rows, 12, i), number(rows, 13, i)
+    two, three, four = (
+        body_of(rows, i, 2, turned, signs),
+        body_of(rows, i, 3, turned, signs),
+        body_of(rows, i, 4, turned, signs),
+    )
+    bodies = (two, three, four)
+    w, mass_at_A = inertia_wrenches(a, bodies, at, moving)
+    of_input, of_others = inertia(a, bodies, at, k)
+    slope = half_slope(a, bodies, at, k) * (speed * speed)
+    others = slope + of_others * acceleration
+    inertial = real_rounded(others + of_input * acceleration, signs, 53)
+    others = real_rounded(others, signs, 54)
+    sine = real_rounded(drive_sine_of_triangle(in_unit, at, drive_bar), signs, 55)
+    P2, N2 = push_of(rows, i, 2, two.z, at.u2, turned, signs)
+    P3, N3 = push_of(rows, i, 3, three.z, at.u3, turned, signs)
+    P4, N4 = push_of(rows, i, 4, four.z, at.u4, turned, signs)
+    slip_A = -k.h23
+    of_O2, of_A = viscous_of(rows, i, 0, k.h2, signs), viscous_of(rows, i, 1, slip_A, signs)
+    of_B, of_O4 = viscous_of(rows, i, 2, k.h43, signs), viscous_of(rows, i, 3, k.h4, signs)
+    Q = N3 * k.h3 + N4 * k.h4 + k.h2 * cross(a * at.u2, P3) + of_B * k.h43 + of_O4 * k.h4
+    w = Wrenches(
+        complex_rounded(w.R2, turned, signs, 42) + P2,
+        complex_rounded(w.R3, turned, signs, 44) + P3,
+        complex_rounded(w.R4, turned, signs, 46) + P4,
+        real_rounded(w.M2, signs, 48) + N2 + of_O2 - of_A,
+        real_rounded(w.M3, signs, 49) + N3 + of_A,
+        real_rounded(w.M4, signs, 50) + N4 + of_O4,
+        of_B,
+    )
+    mass_at_A = vector(real_rounded(mass_at_A.real, signs, 51), real_rounded(mass_at_A.imag, signs, 52))
+    pins = pin_forces_of(lengths, at, drive_bar, sine, w, mass_at_A, Q + of_A * k.h3 - others)
+    return pins, driving_torque(k, drive_bar, inertial, Q + of_A * slip_A + (N2 + of_O2) * k.h2), sine
+
+
+def thirteen(signs: Any, first: int) -> Any:
+    """Thirteen of the signs."""
+    s, k = signs, first
+    return (
+        *(s[k], s[k + 1], s[k + 2], s[k + 3], s[k + 4], s[k + 5], s[k + 6]),
+        *(s[k + 7], s[k + 8], s[k + 9], s[k + 10], s[k + 11], s[k + 12]),
+    )
+
+
+def nearby(
+    lengths: Loop, in_unit: Loop, at: Position, rows: Any, i: int, drive_bar: int, turned: Any, signs: Any
+) -> tuple[PinForces, Any]:
+    """Pin forces and torque of position i with every number changed in its last digit, as `error_bars` has them."""
+    d, a, b, c, E1, E2 = in_unit
+    half = rounded_half_angle(in_unit, at.half, number(rows, 15, i), False, thirteen(signs, 2))
+    in_unit = Loop(d, a, b, c, rounded_real(E1, signs[0]), rounded_real(E2, signs[1]))
+    u2 = select(turned, at.u2, vector(half.kk - half.ss, 2.0 * half.sk))
+    near = close_loop(in_unit, at.u1, u2, half, number(rows, 14, i))
+    near = Position(
+        at.u1,
+        rounded_complex(u2, turned, signs[19], signs[20]),
+        rounded_complex(near.u3, turned, signs[21], signs[22]),
+        rounded_complex(near.u4, turned, signs[23], signs[24]),
+        rounded_real(near.sin_mu, signs[17]),
+        rounded_complex(near.diagonal * (lengths.d / d), turned, signs[18], signs[250]),
+        near.e2,
+        near.root,
+        half,
+    )
+    k = rounded_coefficients(in_unit, near, coefficients(in_unit, near), thirteen(signs, 25))
+    v = rates(k, number(rows, 12, i), number(rows, 13, i))
+    omega_3, omega_4 = rounded_real(v.omega_3, signs[38]), rounded_real(v.omega_4, signs[39])
+    alpha_3, alpha_4 = rounded_real(v.alpha_3, signs[40]), rounded_real(v.alpha_4, signs[41])
+    moving = Rates(v.omega_2, omega_3, omega_4, v.alpha_2, alpha_3, alpha_4)
+    pins, torque, _ = forces(lengths, in_unit, near, k, moving, rows, i, drive_bar, turned, signs)
+    return pins, torque
+
+
+def square(z: Any) -> Any:
+    """|z|^2."""
+    return z.real * z.real + z.imag * z.imag
+
+
+def run(
+    tangents: Array,
+    of_theta_2: Array,
+    rows: Any,
+    drive_bar: int,
+    signs: Any,
+    vectors: Any,
+    scalars: Array,
+    left: Any,
+) -> None:
+    """The positions one after the other.
+
+    Parameters
+    ----------
+    tangents : tan of half theta_2 - theta_1, (n,).
+    of_theta_2 : tan of half theta_2, (n,); empty where no ground is turned.
+    rows : as of `numbers`.
+    signs : (evaluations, numbers); None where no error bars are wanted.
+    vectors : u2, u3, u4 and the pin forces, complex, (7, n), written.
+    scalars : sin mu, omega_3, omega_4, alpha_3, alpha_4, torque, sine of the drive, error bars, (9, n), written.
+    left : whether a position is left to NumPy, (n,), written.
+    """
+    turns = len(of_theta_2) > 0
+    changes = np.empty((5, EVALUATIONS))
+    for i in range(len(tangents)):
+        in_unit = Loop(
+            *(number(rows, 0, i), number(rows, 1, i), number(rows, 2, i), number(rows, 3, i)),
+            *(number(rows, 4, i), number(rows, 5, i)),
+        )
+        lengths = Loop(number(rows, 6, i), number(rows, 7, i), number(rows, 8, i), number(rows, 9, i), 0.0, 0.0)
+        u1 = vector(number(rows, 10, i), number(rows, 11, i))
+        half = half_angle_of_tangent(in_unit, tangents[i])
+        turned = u1.imag != 0.0
+        u2 = vector(half.kk - half.ss, 2.0 * half.sk)
+        if turns and (turned or u1.real != 1.0):
+            u2 = direction_of_tangent(of_theta_2[i])
+        size = 4.0 * in_unit.a * in_unit.d
+        close = undecided(half.outer, in_unit.E1, size) or undecided(half.inner, in_unit.E2, size)
+        at = close_loop(in_unit, u1, u2, half, number(rows, 14, i))
+        diagonal = at.diagonal * (lengths.d / in_unit.d)
+        at = Position(at.u1, at.u2, at.u3, at.u4, at.sin_mu, diagonal, at.e2, at.root, half)
+        k = coefficients(in_unit, at)
+        v = rates(k, number(rows, 12, i), number(rows, 13, i))
+        pins, torque, sine = forces(lengths, in_unit, at, k, v, rows, i, drive_bar, turned, None)
+        vectors[0, i], vectors[1, i], vectors[2, i] = at.u2, at.u3, at.u4
+        vectors[3, i], vectors[4, i], vectors[5, i], vectors[6, i] = pins.F12, pins.F32, pins.F43, pins.F14
+        scalars[0, i], scalars[1, i], scalars[2, i] = at.sin_mu, v.omega_3, v.omega_4
+        scalars[3, i], scalars[4, i], scalars[5, i], scalars[6, i] = v.alpha_3, v.alpha_4, torque, sine
+        whole = at.sin_mu + v.omega_3 + v.omega_4 + v.alpha_3 + v.alpha_4 + torque + sine
+        total = pins.F12 + pins.F32 + pins.F43 + pins.F14
+        left[i] = close or not np.abs(at.sin_mu) > NO_DIGIT_LEFT or not np.isfinite(whole + total.real + total.imag)
+        if signs is not None:
+            for each in range(EVALUATIONS):
+                other, T = nearby(lengths, in_unit, at, rows, i, drive_bar, turned, signs[each])
+                changes[0, each] = square(T - torque)
+                changes[1, each], changes[2, each] = square(other.F12 - pins.F12), square(other.F32 - pins.F32)
+                changes[3, each], changes[4, each] = square(other.F43 - pins.F43), square(other.F14 - pins.F14)
+            of_forces, largest = 0.0, 0.0
+            for row in range(1, 5):
+                of_forces = max(of_forces, np.mean(changes[row]))
+            for force in (pins.F12, pins.F32, pins.F43, pins.F14):
+                largest = max(largest, np.abs(force))
+            scalars[7, i] = bar(np.mean(changes[0]), torque)
+            scalars[8, i] = bar(of_forces, largest)
+
+
+LEAVES: tuple[tuple[Any, str], ...] = (
+    (position, "two_sum direction_of_tangent half_angle_of_tangent close_loop"),
+    (motion, "side_turns_fast coefficients rates"),
+    (pin_forces, "cross dot about_first_pin inertia_wrenches between pin_forces"),
+    (torque, "inertia half_slope driving_torque"),
+    (transmission, "drive_sine_of_triangle"),
+    (cases, "undecided"),
+    (bars, "rounded_real rounded_complex rounded_half_angle rounded_coefficients bar"),
+)
+"""What is compiled as it stands."""
+OWN = (complex_rounded, real_rounded, by_terms, body_of, push_of, viscous_of, forces, thirteen, nearby, square)
+
+
+def installed() -> bool:
+    """Whether there is numba."""
+    return find_spec("numba") is not None
+
+
+@cache
+def loop(on_disk: bool = True) -> Any:
+    """`run` compiled; on the disk, where a place can be written, for later processes until a source changes."""
+    from numba import njit, types
+    from numba.extending import overload, register_jitable
+
+    overload(anywhere)(lambda mask: lambda mask: bool(mask))  # noqa: PLW0108 - numba reads the names
+    overload(select)(lambda mask, x, y: lambda mask, x, y: x if mask else y)
+    overload(square_root)(lambda x: lambda x: np.sqrt(x))  # noqa: PLW0108
+    overload(vector)(lambda x, y: lambda x, y: complex(x, y))  # noqa: PLW0108
+    of_one, of_each = (lambda rows, row, i: rows[row]), (lambda rows, row, i: rows[row, i])
+    overload(number)(lambda rows, row, i: of_each if isinstance(rows, types.Array) else of_one)
+    leaves = [getattr(module, name) for module, names in LEAVES for name in names.split()]
+    for leaf in (*leaves, *OWN):
+        register_jitable(error_model="numpy", forceinline=True)(leaf)
+    register_jitable(error_model="numpy")(run)
+    files = sorted({str(module.__file__) for module, _ in LEAVES})
+    sources = zlib.crc32(b"".join(Path(file).read_bytes() for file in files))
+
+    def compiled(tangents, of_theta_2, rows, drive_bar, signs, vectors, scalars, left):  # type: ignore[no-untyped-def]
+        if sources >= 0:  # a part of the key on the disk, where numba looks at this file alone
+            run(tangents, of_theta_2, rows, drive_bar, signs, vectors, scalars, left)
+
+    try:
+        return njit(compiled, nogil=True, error_model="numpy", cache=on_disk)
+    except RuntimeError:  # no place to write to
+        return loop(False)
+
+
+SPACE = threading.local()
+"""Of each thread, what the loop writes of a block: fresh pages for each would cost a tenth of the time."""
+
+
+def space(numbers: int) -> Array:
+    """So many numbers to write into, the same memory each time."""
+    if getattr(SPACE, "numbers", np.empty(0)).size < numbers:
+        SPACE.numbers = np.empty(numbers)
+    return SPACE.numbers[:numbers]  # type: ignore[no-any-return]
+
+
+class Found(NamedTuple):
+    """What the loop writes, for n positions; the next call of the same thread writes over it."""
+
+    vectors: NDArray[np.complex128]
+    scalars: Array
+    left: NDArray[np.bool_]
+
+
+def evaluate(case: Case, theta_2: Array, branch: Any, omega_2: Any, alpha_2: Any, *, error_bars: bool) -> Found:
+    """Some positions of a case that the loop carries; for the parameters see `run`."""
+    n, theta_1 = len(theta_2), case.path.theta_1
+    of_theta_2 = np.tan(0.5 * theta_2) if anywhere(theta_1 != 0.0) else np.empty(0)
+    rows = numbers(case, theta_2, branch, omega_2, alpha_2)
+    written = space(23 * n)
+    vectors, scalars = written[: 14 * n].view(complex).reshape(7, n), written[14 * n :].reshape(9, n)
+    found = Found(vectors, scalars, np.empty(n, dtype=bool))
+    given = np.tan(0.5 * (theta_2 - theta_1)), of_theta_2, rows, case.drive_bar, signs() if error_bars else None
+    try:
+        loop()(*given, *found)
+    except OSError:  # the disk is full
+        loop(False)(*given, *found)
+    return found

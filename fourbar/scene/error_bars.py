@@ -1,0 +1,184 @@
+"""Error bars of torque and pin forces: how far rounding makes them scatter.
+
+The forces are evaluated again with every number of the position, coefficient, arm and term changed in its last
+digit. All roundings then fall differently, so the root mean square of the changes is of the size of the error
+itself, whatever the formulas lose at this position. As many changes go up as down, in an order drawn at random
+for each number, so that those of different numbers do not cancel over the evaluations, which run as one batch.
+"""
+
+from functools import cache
+from itertools import cycle
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fourbar.formulas.motion import Coefficients, State, rates, side_turns_fast
+from fourbar.formulas.path import read_backwards
+from fourbar.formulas.pin_forces import Body
+from fourbar.formulas.position import HalfAngle, Loop, Position, select, two_sum, vector
+from fourbar.scene.case import Case, Dynamics, changed
+
+EVALUATIONS = 16
+"""With fewer, all of them may by chance come out as far off as the answer itself."""
+NUMBERS = 256
+"""Whose signs are independent; a scene has about sixty, and a few for each load and effect."""
+LAST_DIGIT = 1.01 * 2.0**-53
+"""Relative: x + x LAST_DIGIT is the next double, whatever x."""
+LAST_ROUNDING = 2.0**-56
+"""An error of rounding to nearest, whose largest is 2^-53, is above this in 7 cases of 8."""
+TYPICAL = 0.4
+"""The error bar as a share of the root mean square. That holds the error of the answer besides the scatter, sqrt 2
+times either, so the bar is 0.57 standard deviations: 2 in 100 million normal errors exceed ten bars, and 5 in 1000
+are below a hundredth of one."""
+
+
+class Roundings:
+    """Changes of numbers in their last digit, up or down, EVALUATIONS times at once."""
+
+    def __init__(self, u1: Any) -> None:
+        self.signs = cycle(signs().T[:, :, None])
+        self.turned = (np.real(u1) != 0.0) & (np.imag(u1) != 0.0)
+
+    def __call__(self, number: Any) -> Any:
+        """Real numbers: the next double up or down, (EVALUATIONS, ...); each part of a complex one by itself."""
+        if np.iscomplexobj(number):
+            return rounded_complex(number, self.turned, *self.next(2))
+        return rounded_real(number, next(self.signs))
+
+    def next(self, count: int) -> list[Any]:
+        """The signs of some more numbers."""
+        return [next(self.signs) for _ in range(count)]
+
+
+def error_bars(
+    case: Case, state: State, acceleration: Any, sign: Any, found: Dynamics, exact: NDArray[np.intp]
+) -> dict[str, Any]:
+    """`torque_error` (N m) and `force_error` (N, worst of the four pin forces), each (n,).
+
+    Parameters
+    ----------
+    state, acceleration, sign, found : the evaluation that the error bars are for; the sign is that of the path's root.
+    exact : indices of the positions whose half angle is known in many digits.
+    """
+    rounded = Roundings(state.at.u1)
+
+    def rounded_body(body: Body) -> Body:
+        return Body(body.m, rounded(body.I), rounded(body.z))
+
+    path = case.path
+    q = state.theta_2 if path.bar == 2 else np.angle(state.at.u4)
+    lost, known = two_sum(q, -path.theta_1)[1], np.isin(np.arange(np.size(state.at.half.ss)), exact)
+    half = rounded_half_angle(path.lengths, state.at.half, lost, known, rounded.next(6))
+    path = path._replace(lengths=Loop(*path.lengths[:4], *map(rounded, path.lengths[4:])))
+    near, k = path.motion(path.position(q, half, sign), sign)
+    moved = case._replace(
+        path=path,
+        bodies=(rounded_body(case.bodies[0]), rounded_body(case.bodies[1]), rounded_body(case.bodies[2])),
+        terms=changed(case.terms, rounded),
+    )
+    near = near._replace(sin_mu=rounded(near.sin_mu), diagonal=rounded(near.diagonal))
+    near = near._replace(u2=rounded(near.u2), u3=rounded(near.u3), u4=rounded(near.u4))
+    k = k if path.bar == 2 else read_backwards(k)
+    k = rounded_coefficients(path.lengths, near, k, rounded.next(13))
+    k = k if path.bar == 2 else read_backwards(k)
+    moving = rates(k, state.speed, acceleration)
+    stated = ("omega_2", "alpha_2") if path.bar == 2 else ()
+    moving = moving._replace(**{name: rounded(rate) for name, rate in moving._asdict().items() if name not in stated})
+    nearby = state._replace(at=near, k=k, moving=moving)
+    other = moved.dynamics(nearby, acceleration, rounded=rounded)
+    torque = np.mean((other.torque - found.torque) ** 2, axis=0)
+    forces = [
+        np.mean(np.abs(after - before) ** 2, axis=0) for before, after in zip(found.pins, other.pins, strict=True)
+    ]
+    largest = np.max([np.abs(force) for force in found.pins], axis=0)
+    shape = np.shape(found.torque)
+    return {
+        "torque_error": np.reshape(bar(torque, found.torque), shape),
+        "force_error": np.reshape(bar(np.max(forces, axis=0), largest), shape),
+    }
+
+
+def rounded_real(x: Any, sign: Any) -> Any:
+    """The next double up or down."""
+    return x + x * sign
+
+
+def rounded_complex(z: Any, turned: Any, of_x: Any, of_y: Any) -> Any:
+    """Each part by itself; a ground at an angle mixes those of every direction, and each carries the larger's."""
+    size = np.maximum(np.abs(z.real), np.abs(z.imag))
+    return z + vector(select(turned, size, z.real) * of_x, select(turned, size, z.imag) * of_y)
+
+
+def rounded_half_angle(lengths: Loop, half: HalfAngle, lost: Any, known: Any, signs: Any) -> HalfAngle:
+    """The five numbers with their own roundings, that of theta_2 - theta_1, and those of the two sums.
+
+    Parameters
+    ----------
+    lost : what the difference theta_2 - theta_1 lost, rad.
+    known : where the five are known in many digits and carry one rounding each.
+    signs : six of them.
+    """
+    d, a, b, c, E1, E2 = lengths
+    ss, kk, sk, outer, inner = half
+    four_ad, four_bc = 4.0 * a * d, 4.0 * b * c
+    of_outer, of_inner = np.abs(E1) + four_ad * kk, np.abs(E2) + four_ad * ss
+    of_outer, of_inner = np.minimum(of_outer, four_bc + of_inner), np.minimum(of_inner, four_bc + of_outer)
+    of_outer, of_inner = select(known, outer, of_outer), select(known, inner, of_inner)
+    turned = select(known, 0.0, lost) * np.sign(signs[0])
+    return HalfAngle(
+        rounded_real(ss, signs[1]) + sk * turned,
+        rounded_real(kk, signs[2]) - sk * turned,
+        rounded_real(sk, signs[3]) + (0.5 * (kk - ss)) * turned,
+        outer - (four_ad * sk) * turned + of_outer * signs[4],
+        inner + (four_ad * sk) * turned + of_inner * signs[5],
+    )
+
+
+def rounded_coefficients(lengths: Loop, at: Position, k: Coefficients, signs: Any) -> Coefficients:
+    """The coefficients from parts rounded each: h3 = m - g, h4 = m + g with m = t + q g, and so their slopes.
+
+    Parameters
+    ----------
+    at, k : in the order in which the loop is read.
+    signs : thirteen of them.
+    """
+    d, a, b, c, _, _ = lengths
+    g, dg = 0.5 * k.h43, 0.5 * (k.dh4 - k.dh3)
+    m, x = k.h3 + g, ((b - c) * (b + c)) / at.e2
+    fast = side_turns_fast(lengths, at)
+    of_t, of_qg = select(fast, m, m - x * g), select(fast, 0.5, x * g)
+    of_rest = select(fast, 1.0 - m, 1.0 - of_t)
+    w = select(fast, m - 0.5, x * g - 0.5 * ((d - a) * (d + a)) / at.e2)
+    of_slope, of_side = x * dg, (4.0 * a * d * at.half.sk) * w / at.e2
+    g_moved, dg_moved, qg_moved = g * signs[0], dg * signs[1], of_qg * signs[2]
+    m_moved = of_t * signs[3] + qg_moved
+    slope_moved = of_slope * signs[4] + of_side * signs[5]
+    return Coefficients(
+        k.h2,
+        rounded_real(k.h3, signs[6]) + m_moved - g_moved,
+        rounded_real(k.h4, signs[7]) + m_moved + g_moved,
+        rounded_real(k.h23, signs[8]) + of_rest * signs[9] - qg_moved + g_moved,
+        rounded_real(k.h43, signs[10]) + 2.0 * g_moved,
+        k.dh2,
+        rounded_real(k.dh3, signs[11]) + slope_moved - dg_moved,
+        rounded_real(k.dh4, signs[12]) + slope_moved + dg_moved,
+    )
+
+
+def bar(mean_square: Any, value: Any) -> Any:
+    """The error bar from the mean square of the changes and the size of the value.
+
+    A change that leaves no value, or none in the range of a double: of the value itself no digit is left.
+    """
+    size = np.abs(value)
+    width = TYPICAL * np.sqrt(mean_square) + LAST_ROUNDING * size
+    return select(np.isfinite(width), width, size)
+
+
+@cache
+def signs() -> NDArray[np.float64]:
+    """+- one last digit, (EVALUATIONS, NUMBERS): of number 1, 2, ... in each evaluation, from a fixed seed."""
+    rng = np.random.default_rng(0)
+    ends = np.repeat([LAST_DIGIT, -LAST_DIGIT], EVALUATIONS // 2)
+    return np.stack([rng.permutation(ends) for _ in range(NUMBERS)], axis=1)
