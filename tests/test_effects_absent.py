@@ -89,7 +89,7 @@ def disabled(model: mujoco.MjModel) -> set[str]:
     }
 
 
-BARE = {"contact", "limit", "island", "sensor", "midphase", "spring", "damper", "frictionloss"}
+BARE = {"contact", "limit", "island", "sensor", "spring", "damper", "frictionloss"}
 
 
 def test_the_bare_model_has_the_closed_loop_and_nothing_else() -> None:

@@ -31,7 +31,7 @@ LAYERS = {
         "regression",
         "check run",
         "stress",
-        "studies",
+        "studies subjects",
         "cli",
     ),
 }
@@ -85,7 +85,7 @@ def test_each_engine_is_imported_under_its_own_name_alone(path: Path) -> None:
     assert not {name for name in names if name.partition(".")[0] == "tests"}
     for engine, its_name in ENGINES.items():
         if any(name.partition(".")[0] == engine for name in names):
-            assert path.parent.name == "engines" or path.parent.parent.name == "engines"
+            assert {"engines", "subjects"} & {path.parent.name, path.parent.parent.name}
             assert its_name in path.relative_to(ROOT).as_posix()
 
 

@@ -23,6 +23,7 @@ COMMANDS = {
     "cost": "validation.studies.cost.cost:cost",
     "advise": "validation.studies.cost.advise:command",
     "advise-study": "validation.studies.cost.measure:study",
+    "standing": "validation.subjects.standing:command",
     "effects-cost": "validation.studies.effects.cost:command",
 }
 

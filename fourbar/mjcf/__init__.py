@@ -1,4 +1,4 @@
-"""MJCF of a scene, without any engine."""
+"""Model files of a scene for simulators (MJCF, SDF), without any of them."""
 
 from fourbar.mjcf.defaults import defaults_used as defaults_used
 from fourbar.mjcf.defaults import scene_from_lengths as scene_from_lengths
@@ -8,3 +8,5 @@ from fourbar.mjcf.document import run_through as run_through
 from fourbar.mjcf.settings import RECIPE as RECIPE
 from fourbar.mjcf.settings import Run as Run
 from fourbar.mjcf.settings import Settings as Settings
+from fourbar.mjcf.simulators import SIMULATORS as SIMULATORS
+from fourbar.mjcf.simulators import mjcf_for as mjcf_for

@@ -38,14 +38,21 @@ COMMENT = (
     "theta_3, O4 is theta_4. Beyond its limit positions the linkage cannot be carried, nor everywhere through a "
     "change point: MuJoCo then starts anew. "
 )
+READING = (
+    "Numbers: after mj_step qpos and qvel are new, but qacc, actuator_force and efc_force are of the last evaluation "
+    "within the step. Call mj_forward; then, all of this instant, T2 = actuator_force[drive] - dof_armature[O2] "
+    "qacc[O2], and efc_force[0], efc_force[1] are the force of bar 4 on bar 3 at pin B in world axes. cfrc_int (the "
+    "other pins) needs mj_rnePostConstraint after that."
+)
 
 
-def mjcf(scene: Scene, settings: Settings = RECIPE, *, keyframe: bool = True) -> str:
+def mjcf(scene: Scene, settings: Settings = RECIPE, reading: str = READING, *, keyframe: bool = True) -> str:
     """The MJCF text of a scene: it runs on its own in MuJoCo.
 
     Parameters
     ----------
     settings : of MuJoCo; the default ones carry every linkage above MuJoCo's floor of mass.
+    reading : the comment that says where torque and pin force are read.
     keyframe : False leaves it out, and with it the assembled pose and the servo that starts it from rest; then
         `settings.timestep` must be given and no position is computed.
 
@@ -61,7 +68,7 @@ def mjcf(scene: Scene, settings: Settings = RECIPE, *, keyframe: bool = True) ->
     free = scene.motion.free is not None
     if free:
         settings = _released(scene, settings)
-    start = _start(scene) if keyframe else None
+    start = at_start(scene) if keyframe else None
     if start is not None:
         timestep = start.run.timestep(settings)
     elif settings.timestep is not None:
@@ -74,8 +81,9 @@ def mjcf(scene: Scene, settings: Settings = RECIPE, *, keyframe: bool = True) ->
     for term in (*scene.effects, *scene.loads):
         row(term).add(term, model)
     armature = flywheel(scene, settings)
-    root = ET.Element("mujoco", model=_plain(scene.title) or "four-bar")
+    root = ET.Element("mujoco", model=plain(scene.title) or "four-bar")
     root.append(ET.Comment(RELEASED if free else COMMENT))
+    root.append(ET.Comment(f" {reading} "))
     ET.SubElement(root, "compiler", angle="radian", autolimits="true")
     model.add_option(root, timestep)
     add_appearance(root, scene.linkage)
@@ -172,7 +180,7 @@ def run_through(theta_2: Array, omega: float, alpha: float) -> Run:
     return Run(least, most, omega, alpha) if omega > 0.0 else Run(most, least, omega, alpha)
 
 
-def _start(scene: Scene) -> Start:
+def at_start(scene: Scene) -> Start:
     """Where the motion begins: the first position, in the direction of motion, that assembles."""
     at = command(scene)
     alpha = scene.motion.alpha_2
@@ -202,6 +210,6 @@ def _span(linkage: FourBar) -> float:
     return min(abs(most - least), 2.0 * math.pi)
 
 
-def _plain(title: str) -> str:
+def plain(title: str) -> str:
     """A title that XML can hold: every character that does not print becomes a blank."""
     return "".join(character if character.isprintable() else " " for character in title).strip()

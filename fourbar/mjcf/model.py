@@ -22,8 +22,9 @@ COLOURS = {1: "0.45 0.45 0.48 1", 2: "0.12 0.47 0.71 1", 3: "1 0.5 0.05 1", 4: "
 SLIP_DAMPING = 1e6
 """Of dry friction, per timestep: the slower the slip that it still softens. The drive prescribes the slip itself, so
 it makes nothing stiff; measured, a reversal is then as exact as any other position."""
-NEVER_NEEDED = ("contact", "limit", "island", "sensor", "midphase")
-"""Features that a closed loop of bars never uses."""
+NEVER_NEEDED = ("contact", "limit", "island", "sensor")
+"""Features that a closed loop of bars never uses; without contacts there is no midphase, and MuJoCo Warp does not load
+a file that switches it off."""
 THICKNESS = 0.02
 """Radius of a bar's capsule, as a part of the longest bar."""
 

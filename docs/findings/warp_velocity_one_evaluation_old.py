@@ -1,0 +1,35 @@
+"""MuJoCo Warp builds (dJ/dt) v of an equality constraint `connect` from the velocities of the evaluation before.
+
+The same state evaluated once and twice has two closing forces, and the second is MuJoCo's. Exit 0: they differ, as
+found with MuJoCo Warp 4.0.0.
+"""
+
+import sys
+
+import mujoco
+import mujoco_warp as mjw
+import numpy as np
+
+XML = """<mujoco><option gravity="0 0 0"/><worldbody>
+<body><joint type="hinge" axis="0 0 1"/><inertial pos=".5 0 0" mass="1" diaginertia=".1 .1 .1"/>
+  <body pos="1 0 0"><joint type="hinge" axis="0 0 1"/><inertial pos=".5 0 0" mass="1" diaginertia=".1 .1 .1"/>
+  <site name="one" pos="2 0 0"/></body></body>
+<body pos="2 -1 0"><joint type="hinge" axis="0 0 1"/><inertial pos="0 .5 0" mass="1" diaginertia=".1 .1 .1"/>
+  <site name="other" pos="0 2 0"/></body>
+</worldbody><equality><connect site1="one" site2="other"/></equality></mujoco>"""
+
+model = mujoco.MjModel.from_xml_string(XML)
+data = mujoco.MjData(model)
+data.qpos[:] = np.pi / 2, -np.pi / 2, 0.0
+theirs, state = mjw.put_model(model), mjw.put_data(model, data)
+data.qvel[:] = 1.0, -1.0, 0.5
+state.qpos.assign(data.qpos[None].astype(np.float32))
+state.qvel.assign(data.qvel[None].astype(np.float32))
+mujoco.mj_forward(model, data)
+found = []
+for _ in range(2):
+    mjw.forward(theirs, state)
+    found.append(state.efc.force.numpy()[0, :2].copy())
+print("MuJoCo", data.efc_force[:2], " Warp, once", found[0], " twice", found[1])
+twice_right = np.abs(found[1] - data.efc_force[:2]).max() < 1e-3
+sys.exit(0 if twice_right and np.abs(found[0] - found[1]).max() > 1e-3 else 1)

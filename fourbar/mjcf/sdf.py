@@ -1,0 +1,138 @@
+"""Scene -> SDF text: the closed loop as links and joints, for Gazebo and Drake."""
+
+import cmath
+from xml.etree import ElementTree as ET
+
+from fourbar.errors import LimitError
+from fourbar.linkage import BAR_NAMES, FIRST_PIN, MOVING_BARS
+from fourbar.mjcf.document import at_start, plain
+from fourbar.mjcf.model import carriable, text
+from fourbar.scene import Scene
+
+PARENT = {2: 1, 3: 2, 4: 1}
+"""The bar that carries each bar's first pin."""
+DRAKE = "http://drake.mit.edu"
+"""Namespace of the elements that only Drake reads."""
+COMMENT = (
+    " Written by fourbar. The links stand assembled; every joint reads 0 there. SDF holds neither speeds nor a drive: "
+    "theta_2 = {} rad, theta_3 = {} rad, theta_4 = {} rad; to start at omega_2 = {} rad/s give joint A {} rad/s and "
+    "joint O4 {} rad/s{}. Pin B: {}. "
+)
+CLOSURE = {
+    "gazebo": "a revolute joint, the fourth of the loop",
+    "drake": "a ball constraint, since Drake takes no loop of joints: it needs a discrete plant with the SAP "
+    "approximation. Drake reads no gravity from a file: set the plant's gravity field",
+}
+
+
+def sdf(scene: Scene, reader: str = "gazebo") -> str:
+    """The SDF 1.9 text of a scene: a world with gravity, four links, and the pins as joints.
+
+    Parameters
+    ----------
+    reader : who closes the loop how: "gazebo" by a fourth joint, "drake" by its own ball constraint.
+
+    Raises
+    ------
+    LimitError : a load, an effect or a motion law has no counterpart there.
+    InputError : a bar without mass or inertia, which neither carries.
+    NotAssembledError : the linkage closes at none of the scene's positions.
+
+    Source: sdformat.org/spec, and Drake's documentation of its parser.
+    """
+    linkage = scene.linkage
+    if scene.motion.law is not None:
+        raise LimitError("a motion law has no counterpart in SDF")
+    carriable(linkage)
+    inertia = {number: linkage.bar(number).moment_of_inertia for number in MOVING_BARS}
+    gravity, dynamics = _acting(scene, reader, inertia)
+    begin = at_start(scene)
+    (theta_2, of_3_to_2, theta_4), (omega_2, at_A, omega_4) = begin.qpos, begin.qvel
+    turn = {2: theta_2, 3: theta_2 + of_3_to_2, 4: theta_4}
+    foot = {
+        2: 0j,
+        3: cmath.rect(linkage.input.length, theta_2),
+        4: cmath.rect(linkage.ground, linkage.ground_angle),
+    }
+    root = ET.Element("sdf", {"version": "1.9", **({"xmlns:drake": DRAKE} if reader == "drake" else {})})
+    numbers = (repr(x) for x in (theta_2, turn[3], theta_4, omega_2, at_A, omega_4))
+    at_B = f", joint B {omega_2 + at_A - omega_4!r} rad/s" if reader == "gazebo" else ""
+    root.append(ET.Comment(COMMENT.format(*numbers, at_B, CLOSURE[reader])))
+    world = ET.SubElement(root, "world", name="four_bar")
+    ET.SubElement(world, "gravity").text = text(*gravity, 0.0)
+    model = ET.SubElement(world, "model", name=plain(scene.title) or "four-bar")
+    _link(model, BAR_NAMES[1], 0j, 0.0, 1.0, 1.0, 0j)
+    _joint(model, "ground_on_world", "fixed", "world", BAR_NAMES[1])
+    for number in MOVING_BARS:
+        bar = linkage.bar(number)
+        _link(model, BAR_NAMES[number], foot[number], turn[number], bar.mass, inertia[number], bar.to_centre)
+        pin = FIRST_PIN[number]
+        _joint(model, pin, "revolute", BAR_NAMES[PARENT[number]], BAR_NAMES[number], dynamics.get(pin, {}))
+    length_3, length_4 = linkage.coupler.length, linkage.output.length
+    if reader == "gazebo":
+        joint = _joint(model, "B", "revolute", BAR_NAMES[4], BAR_NAMES[3], dynamics.get("B", {}))
+        ET.SubElement(joint, "pose").text = text(length_3, 0, 0, 0, 0, 0)  # in the frame of its child
+    else:
+        ball = ET.SubElement(model, "drake:ball_constraint")
+        for key, value in (("body_A", BAR_NAMES[3]), ("body_B", BAR_NAMES[4])):
+            ET.SubElement(ball, f"drake:ball_constraint_{key}").text = value
+        for key, length in (("p_AP", length_3), ("p_BQ", length_4)):
+            ET.SubElement(ball, f"drake:ball_constraint_{key}").text = text(length, 0.0, 0.0)
+    ET.indent(root)
+    return ET.tostring(root, encoding="unicode") + "\n"
+
+
+def _acting(
+    scene: Scene, reader: str, inertia: dict[int, float]
+) -> tuple[tuple[float, float], dict[str, dict[str, float]]]:
+    """Gravity, and damping and friction of each joint; what a flywheel adds goes into `inertia`."""
+    gravity, dynamics = (0.0, 0.0), dict[str, dict[str, float]]()
+    if scene.loads:
+        raise LimitError("a load has no counterpart in SDF; apply it in the simulator and leave it out of the scene")
+    at_joints = {"viscous": ("damping", "coefficients"), "friction": ("friction", "torques")}
+    for effect in scene.effects:
+        if effect.key == "gravity":
+            x, y = effect.vector  # type: ignore[attr-defined]
+            gravity = (float(x), float(y))
+        elif effect.key == "flywheel":
+            inertia[effect.bar] += effect.inertia  # type: ignore[attr-defined]
+        elif effect.key in at_joints and (effect.key == "viscous" or reader == "gazebo"):
+            key, numbers = at_joints[effect.key]
+            for pin, value in getattr(effect, numbers):
+                if pin == "B" and reader == "drake":
+                    raise LimitError("Drake's ball constraint at pin B has no damping")
+                dynamics.setdefault(pin, {})[key] = value
+        else:
+            raise LimitError(f"the effect {effect.key!r} has no counterpart in SDF for {reader}")
+    return gravity, dynamics
+
+
+def _link(
+    model: ET.Element, name: str, foot: complex, turn: float, mass: float, inertia: float, centre: complex
+) -> None:
+    link = ET.SubElement(model, "link", name=name)
+    ET.SubElement(link, "pose").text = text(foot.real, foot.imag, 0, 0, 0, turn)
+    inertial = ET.SubElement(link, "inertial")
+    ET.SubElement(inertial, "pose").text = text(centre.real, centre.imag, 0, 0, 0, 0)
+    ET.SubElement(inertial, "mass").text = text(mass)
+    tensor = ET.SubElement(inertial, "inertia")
+    for axes in ("ixx", "iyy", "izz"):  # izz alone acts in the plane; three equal ones are a possible body
+        ET.SubElement(tensor, axes).text = text(inertia)
+    for axes in ("ixy", "ixz", "iyz"):
+        ET.SubElement(tensor, axes).text = "0"
+
+
+def _joint(
+    model: ET.Element, name: str, kind: str, parent: str, child: str, dynamics: dict[str, float] | None = None
+) -> ET.Element:
+    joint = ET.SubElement(model, "joint", name=name, type=kind)
+    ET.SubElement(joint, "parent").text = parent
+    ET.SubElement(joint, "child").text = child
+    if dynamics is not None:
+        axis = ET.SubElement(joint, "axis")
+        ET.SubElement(axis, "xyz").text = "0 0 1"
+        if dynamics:
+            values = ET.SubElement(axis, "dynamics")
+            for key, value in dynamics.items():
+                ET.SubElement(values, key).text = text(value)
+    return joint

@@ -1,0 +1,187 @@
+"""The model files of `fourbar mjcf --for` and `fourbar sdf`, loaded, stepped and read as their comments say."""
+
+import cmath
+import importlib
+import re
+from typing import Any
+from xml.etree import ElementTree as ET
+
+import numpy as np
+import pytest
+
+import fourbar
+from fourbar.effects import Torsion
+from fourbar.errors import LimitError
+from fourbar.mjcf import SIMULATORS, mjcf_for
+from fourbar.mjcf.sdf import sdf
+from fourbar.scene import Command, Scene
+from tests.scenes import crank_rocker
+from validation.compare.answer import Array
+
+STEPS = 20
+
+
+def ours(scene: Scene, q: Array, v: Array, a: Array) -> Any:
+    """The formulas at the simulator's own angle, speed and acceleration."""
+    at = Command(np.array([q[0]]), np.array([1]), np.array([v[0]]), np.array([a[0]]))
+    return fourbar.solve(scene, "force", at=at)
+
+
+def errors(scene: Scene, q: Array, v: Array, a: Array, torque: float, force: Array) -> tuple[float, float]:
+    """Of T2 and of the pin force at B, by their greatest value in a turn."""
+    expected, turn = ours(scene, q, v, a), fourbar.solve(scene, "force")
+    assert turn.torque is not None and turn.F43 is not None
+    return (
+        abs(torque - expected.torque[0]) / np.abs(turn.torque).max(),
+        float(np.hypot(*(force - expected.F43[0])) / np.hypot(*turn.F43.T).max()),
+    )
+
+
+def read_mujoco(text: str, forward: int) -> tuple[Array, Array, Array, float, Array]:
+    """As the comment of the file says."""
+    mujoco = pytest.importorskip("mujoco")
+    model = mujoco.MjModel.from_xml_string(text)
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, 0)
+    mujoco.mj_step(model, data, STEPS)
+    for _ in range(forward):
+        mujoco.mj_forward(model, data)
+    torque = data.actuator_force[model.actuator("drive").id] - model.dof_armature[0] * data.qacc[0]
+    return data.qpos, data.qvel, data.qacc, float(torque), data.efc_force[:2]
+
+
+def read_warp(text: str, forward: int) -> tuple[Array, Array, Array, float, Array]:
+    """As the comment of the file says; the kernels compile for minutes the first time."""
+    mjw = pytest.importorskip("mujoco_warp")
+    mujoco = importlib.import_module("mujoco")
+    model = mujoco.MjModel.from_xml_string(text)
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, 0)
+    mujoco.mj_forward(model, data)
+    theirs, state = mjw.put_model(model), mjw.put_data(model, data)
+    for _ in range(STEPS):
+        mjw.step(theirs, state)
+    for _ in range(forward):
+        mjw.forward(theirs, state)
+    q, v, a, drive = (x.numpy()[0].astype(float) for x in (state.qpos, state.qvel, state.qacc, state.actuator_force))
+    torque = drive[model.actuator("drive").id] - model.dof_armature[0] * a[0]
+    return q, v, a, float(torque), state.efc.force.numpy()[0, :2].astype(float)
+
+
+def read_mjx(text: str, steps: int) -> tuple[Array, Array, Array, float, Array]:
+    """As the comment of the file says."""
+    mjx = pytest.importorskip("mujoco.mjx")
+    mujoco, jax = importlib.import_module("mujoco"), importlib.import_module("jax")
+    jax.config.update("jax_enable_x64", True)
+    model = mujoco.MjModel.from_xml_string(text)
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, 0)
+    theirs, state, step = mjx.put_model(model), mjx.put_data(model, data), jax.jit(mjx.step)
+    for _ in range(steps):
+        state = step(theirs, state)
+    state = jax.jit(mjx.forward)(theirs, state)
+    q, v, a, drive = (np.array(x, dtype=float) for x in (state.qpos, state.qvel, state.qacc, state.actuator_force))
+    torque = drive[model.actuator("drive").id] - model.dof_armature[0] * a[0]
+    closing = getattr(state, "_impl", state).efc_force
+    return q, v, a, float(torque), np.array(closing, dtype=float)[:2]
+
+
+EXACT = 1e-6
+"""Of MuJoCo's closing force and torque at its own state, 20 steps from the start; measured 1e-7."""
+
+
+def test_mujoco_reads_as_the_comment_says() -> None:
+    scene = crank_rocker()
+    text = mjcf_for(scene)
+    assert max(errors(scene, *read_mujoco(text, forward=1))) < EXACT
+    assert max(errors(scene, *read_mujoco(text, forward=0))) > 1e3 * EXACT, "the step alone leaves them of the old time"
+    names = (r"mj_forward", r"actuator_force\[drive\]", r"dof_armature\[O2\]", r"efc_force\[0\]")
+    assert all(re.search(name, text) for name in names)
+
+
+SINGLE = 1e-2
+"""Of MuJoCo Warp: single precision in a closure of impedance 0.9999 keeps 1e4 roundings; measured 2.5e-3 in a turn."""
+YIELDING = 1e-2
+"""Of MJX, whose closure makes up for the missing term by yielding; measured 8.5e-4 in a turn."""
+
+
+def test_warp_reads_as_the_comment_says() -> None:
+    scene = crank_rocker()
+    text = mjcf_for(scene, "warp")
+    assert max(errors(scene, *read_warp(text, forward=2))) < SINGLE
+    assert "forward twice" in text
+
+
+def test_mjx_reads_as_the_comment_says() -> None:
+    scene = crank_rocker()
+    assert max(errors(scene, *read_mjx(mjcf_for(scene, "mjx"), STEPS))) < YIELDING
+    assert max(errors(scene, *read_mjx(mjcf_for(scene, "mjx"), 0))) > 0.1, "a state that was only set"
+
+
+@pytest.mark.parametrize("simulator", SIMULATORS)
+def test_each_file_loads_in_mujoco_and_runs(simulator: str) -> None:
+    """Single precision, pads or none: MuJoCo itself carries all of them."""
+    scene = crank_rocker()
+    assert max(errors(scene, *read_mujoco(mjcf_for(scene, simulator), forward=1))) < CARRIED
+
+
+CARRIED = 2e-3
+"""Of a closure with a time constant of two timesteps; measured 1.4e-3, the others 1e-5 and less."""
+
+
+def released(**changes: Any) -> Scene:
+    """A linkage let go under its weight, with a damper."""
+    motion = fourbar.Motion(1.0, 3.0, free=fourbar.Free(0.2, 2))
+    effects = (fourbar.Gravity(), fourbar.Viscous.at(O2=0.05))
+    return crank_rocker(**({"motion": motion, "effects": effects, "loads": ()} | changes))
+
+
+FIRST_ORDER = 0.5
+"""Drake's discrete plant errs as its step: half the step leaves half the error, within this factor of two."""
+
+
+def test_drake_loads_the_sdf_and_moves_as_released() -> None:
+    pytest.importorskip("pydrake")
+    plants, parsing = (importlib.import_module(f"pydrake.multibody.{name}") for name in ("plant", "parsing"))
+    simulator = importlib.import_module("pydrake.systems.analysis").Simulator
+    scene = released()
+    text = sdf(scene, "drake")
+    theta_2, _, _, *speeds = (float(x) for x in re.findall(r"(-?[\d.]+(?:e-?\d+)?) rad", text))
+    expected, missed = fourbar.solve(scene).theta_2[-1], []
+    for step in (1e-3, 5e-4):
+        plant = plants.MultibodyPlant(step)
+        plant.set_discrete_contact_approximation(plants.DiscreteContactApproximation.kSap)
+        parsing.Parser(plant).AddModelsFromString(text, "sdf")
+        plant.mutable_gravity_field().set_gravity_vector([0.0, -9.81, 0.0])
+        plant.Finalize()
+        context = plant.CreateDefaultContext()
+        for name, speed in zip(("O2", "A", "O4"), speeds, strict=True):
+            plant.GetJointByName(name).set_angular_rate(context, speed)
+        simulator(plant, context).AdvanceTo(0.2)
+        missed.append(theta_2 + plant.GetJointByName("O2").get_angle(context) - expected)
+    assert abs(missed[1]) < 1e-2 and missed[1] / missed[0] == pytest.approx(0.5, rel=FIRST_ORDER)
+
+
+def test_sdf_closes_its_loop_and_keeps_masses() -> None:
+    scene = released()
+    root = ET.fromstring(sdf(scene))
+    pose = {link.get("name"): [float(x) for x in str(link.findtext("pose")).split()] for link in root.iter("link")}
+    joints = {joint.get("name"): joint for joint in root.iter("joint")}
+    assert set(joints) == {"ground_on_world", "O2", "A", "O4", "B"}
+    ends = []
+    for name, bar in (("coupler", scene.linkage.coupler), ("output", scene.linkage.output)):
+        x, y, *_, turn = pose[name]
+        ends.append(complex(x, y) + cmath.rect(bar.length, turn))
+    assert abs(ends[0] - ends[1]) < 1e-15 * 8
+    assert float(str(joints["B"].findtext("pose")).split()[0]) == scene.linkage.coupler.length
+    assert float(str(joints["O2"].findtext("axis/dynamics/damping"))) == 0.05
+    assert [float(str(x.text)) for x in root.iter("mass")][1:] == [scene.linkage.bar(bar).mass for bar in (2, 3, 4)]
+
+
+def test_sdf_refuses_what_it_cannot_hold() -> None:
+    with pytest.raises(LimitError, match="load"):
+        sdf(crank_rocker(loads=(fourbar.Load(4, moment=1.0),)))
+    with pytest.raises(LimitError, match="torsion"):
+        sdf(released(effects=(Torsion.at(O2=(1.0, 0.0, 0.0)),)), "drake")
+    with pytest.raises(LimitError, match="pin B"):
+        sdf(released(effects=(fourbar.Viscous.at(B=1.0),)), "drake")

@@ -1,0 +1,54 @@
+"""Drake's own simulation of the SDF file: a discrete plant, its SAP solver, a ball constraint at B."""
+
+import time
+from importlib.metadata import version
+
+import numpy as np
+from pydrake.multibody.parsing import Parser
+from pydrake.multibody.plant import DiscreteContactApproximation, MultibodyPlant
+from pydrake.systems.analysis import Simulator
+
+from fourbar.mjcf import flywheel
+from fourbar.mjcf.document import at_start
+from fourbar.mjcf.sdf import sdf
+from fourbar.scene import Scene
+from validation.subjects.motion import Readings, gap, turn
+
+VERSION = version("drake")
+STEPS = (628, 2512)
+CHANGED = "SDF with Drake's ball constraint in place of a fourth joint; the force of that constraint cannot be read"
+SETTINGS = {"SAP": None}
+
+
+def through(scene: Scene, steps: int, setting: str) -> Readings:
+    """A turn in so many steps, carried by a flywheel, the rotor of an actuator on O2."""
+    timestep, stops = turn(scene, steps)
+    begin, inertia = at_start(scene), flywheel(scene)
+    plant = MultibodyPlant(timestep)
+    plant.set_discrete_contact_approximation(DiscreteContactApproximation.kSap)
+    Parser(plant).AddModelsFromString(sdf(scene, "drake"), "sdf")
+    gravity = next((effect.vector for effect in scene.effects if effect.key == "gravity"), (0.0, 0.0))  # type: ignore[attr-defined]
+    plant.mutable_gravity_field().set_gravity_vector([float(gravity[0]), float(gravity[1]), 0.0])
+    joints = [plant.GetJointByName(name) for name in ("O2", "A", "O4")]
+    actuator = plant.AddJointActuator("drive", joints[0])
+    actuator.set_default_rotor_inertia(inertia)
+    actuator.set_default_gear_ratio(1.0)
+    plant.Finalize()
+    context = plant.CreateDefaultContext()
+    plant.get_actuation_input_port().FixValue(context, np.zeros(plant.num_actuators()))  # also one of every other joint
+    for joint, speed in zip(joints, begin.qvel, strict=True):
+        joint.set_angular_rate(context, speed)
+    simulator = Simulator(plant, context)
+    found = Readings(setting, steps)
+    for stop in stops:
+        began = time.process_time()
+        simulator.AdvanceTo((stop - 1) * timestep)
+        angles = [joint.get_angle(context) + q for joint, q in zip(joints, begin.qpos, strict=True)]
+        speed = joints[0].get_angular_rate(context)
+        simulator.AdvanceTo(stop * timestep)
+        found.seconds += time.process_time() - began
+        alpha = (joints[0].get_angular_rate(context) - speed) / timestep
+        theta = (angles[0], angles[0] + angles[1], angles[2])
+        found.read(theta, speed, alpha, -inertia * alpha, {})
+        found.gap = max(found.gap, gap(scene, theta))
+    return found

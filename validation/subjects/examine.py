@@ -1,0 +1,136 @@
+"""Each subject in its own environment, held against the formulas at the states that it reached by itself."""
+
+import json
+import math
+import subprocess
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import fourbar
+from fourbar.quantities import PIN_FORCES
+from fourbar.scene import Command, Scene
+from validation.compare.answer import Array
+from validation.compare.error import relative
+
+CHECKOUT = Path(__file__).parents[2]
+SUBJECTS = {
+    "mujoco_c": ("MuJoCo", "mujoco"),
+    "mujoco_warp": ("MuJoCo Warp", "mujoco_warp"),
+    "mujoco_mjx": ("MJX", "mujoco.mjx"),
+    "newton_mujoco": ("Newton, MuJoCo solver", "newton"),
+    "genesis_rigid": ("Genesis", "genesis"),
+    "pybullet": ("PyBullet", "pybullet"),
+    "drake_sap": ("Drake, SAP", "pydrake"),
+}
+"""By module: name, and what must be importable."""
+TORQUE_AND_FORCES = ("torque", *PIN_FORCES)
+MISSING = 3
+"""Exit status of the look for a module."""
+
+
+@dataclass(slots=True)
+class Line:
+    """One setting of a subject, over single states or over a turn in so many steps."""
+
+    subject: str
+    version: str
+    setting: str
+    steps: int | None
+    errors: dict[str, float]
+    """Greatest of the readings, by the greatest value in a turn; a quantity that cannot be read is left out."""
+    gap: float
+    """By the longest bar."""
+    cost: float | None
+    """Seconds of the processor for one simulated second."""
+    order: float | None = None
+    """Of the torque's error, from the number of steps before to this one."""
+
+
+@dataclass(slots=True)
+class Standing:
+    """All that the page shows."""
+
+    lines: list[Line] = field(default_factory=list)
+    changed: dict[str, str] = field(default_factory=dict)
+    left_out: dict[str, str] = field(default_factory=dict)
+
+
+def examine(scene: Scene, file: Path, pythons: list[Path], seconds: float) -> Standing:
+    """Every subject under the first of the interpreters that has it."""
+    found = Standing()
+    for module, (name, library) in SUBJECTS.items():
+        python = next((python for python in pythons if _has(python, library)), None)
+        if python is None:
+            found.left_out[name] = "not installed under any --python"
+            continue
+        command = [str(python), "-m", "validation.subjects.work", module, str(file.absolute())]
+        try:
+            done = subprocess.run(command, cwd=CHECKOUT, capture_output=True, text=True, timeout=seconds, check=False)
+        except subprocess.TimeoutExpired:
+            found.left_out[name] = f"no answer within {seconds:g} s"
+            continue
+        if done.returncode:
+            found.left_out[name] = (done.stderr.strip().splitlines() or ["no word"])[-1]
+            continue
+        answer = json.loads(done.stdout.strip().splitlines()[-1])
+        found.changed[name] = answer["changed"]
+        found.lines += lines(scene, name, answer)
+    return found
+
+
+def lines(scene: Scene, name: str, answer: dict[str, Any]) -> list[Line]:
+    """The judged lines of one subject's answer."""
+    made: list[Line] = []
+    turn = abs(math.tau / scene.motion.omega_2) if scene.motion.omega_2 else math.nan
+    for reading in answer["readings"]:
+        found = errors(scene, reading)
+        steps = reading["steps"]
+        line = Line(
+            name,
+            answer["version"],
+            reading["setting"],
+            steps,
+            found,
+            reading["gap"] / max(scene.linkage.lengths),
+            None if steps is None else reading["seconds"] / turn,
+        )
+        before = made[-1] if made else None
+        if before is not None and steps and before.steps and before.setting == line.setting:
+            line.order = math.log(before.errors["torque"] / found["torque"]) / math.log(steps / before.steps)
+        made.append(line)
+    return made
+
+
+def errors(scene: Scene, reading: dict[str, Any]) -> dict[str, float]:
+    """Of torque and pin forces, at the subject's own theta_2, omega_2 and alpha_2; NaN where it answers NaN."""
+    theta = np.array(reading["theta"])
+    n = len(theta)
+    at = Command(theta[:, 0], np.ones(n, dtype=int), np.array(reading["omega_2"]), np.array(reading["alpha_2"]))
+    ours, whole = fourbar.solve(scene, "force", at=at), fourbar.solve(scene, "force")
+    answered: dict[str, Array] = {name: np.array(values) for name, values in reading["forces"].items()}
+    answered["torque"] = np.array(reading["torque"])
+    found = {}
+    for name in TORQUE_AND_FORCES:
+        if name not in answered:
+            continue
+        size, expected = _size(getattr(whole, name)).max(), getattr(ours, name)
+        missed = _size(answered[name] - expected) if len(answered[name]) == n else np.full(n, np.nan)
+        found[name] = float(np.max(relative(missed, np.full(n, size))))  # NaN stays NaN
+    return found
+
+
+def _size(values: Array) -> Array:
+    return np.abs(values) if values.ndim == 1 else np.hypot(values[:, 0], values[:, 1])
+
+
+def _has(python: Path, library: str) -> bool:
+    look = (
+        "import importlib.util, sys\n"
+        f"try: found = importlib.util.find_spec({library!r})\n"
+        "except ModuleNotFoundError: found = None\n"
+        f"sys.exit(0 if found else {MISSING})"
+    )
+    return subprocess.run([str(python), "-c", look], capture_output=True, check=False).returncode == 0

@@ -1,0 +1,67 @@
+"""What a subject answers: numbers of a turn that it ran through, or of states that it was given."""
+
+import math
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+import numpy as np
+
+from fourbar.errors import LimitError
+from fourbar.scene import Scene
+
+SAMPLES = 12
+"""Readings in a turn; the first quarter, in which a closure settles, is not read."""
+
+
+@dataclass(slots=True)
+class Readings:
+    """One subject under one setting; each list has one entry a reading, SI units."""
+
+    setting: str
+    steps: int | None = None
+    """In a turn; None: of single states."""
+    theta: list[tuple[float, float, float]] = field(default_factory=list)
+    """theta_2, theta_3, theta_4, of the subject itself, rad."""
+    omega_2: list[float] = field(default_factory=list)
+    alpha_2: list[float] = field(default_factory=list)
+    torque: list[float] = field(default_factory=list)
+    forces: dict[str, list[tuple[float, float]]] = field(default_factory=dict)
+    """Of the pins that it lets read, N."""
+    gap: float = 0.0
+    """The greatest distance of B on bar 3 from B on bar 4, m."""
+    seconds: float = 0.0
+    """Of the processor's clock, for the steps alone."""
+
+    def read(self, theta: Any, omega_2: float, alpha_2: float, torque: float | None, forces: dict[str, Any]) -> None:
+        """One more reading."""
+        self.theta.append((float(theta[0]), float(theta[1]), float(theta[2])))
+        self.omega_2.append(float(omega_2))
+        self.alpha_2.append(float(alpha_2))
+        if torque is not None:
+            self.torque.append(float(torque))
+        for name, force in forces.items():
+            self.forces.setdefault(name, []).append((float(force[0]), float(force[1])))
+
+    def plain(self) -> dict[str, Any]:
+        """For JSON."""
+        return asdict(self)
+
+
+def turn(scene: Scene, steps: int) -> tuple[float, list[int]]:
+    """The timestep (s) with which the input turns once in so many steps, and the steps after which to read."""
+    if not scene.motion.omega_2 or scene.motion.alpha_2 or scene.loads:
+        raise LimitError("subjects run through a turn at constant omega_2 without loads")
+    first = steps // 4
+    return math.tau / abs(scene.motion.omega_2) / steps, [
+        first + round(k * (steps - first) / (SAMPLES - 1)) for k in range(SAMPLES)
+    ]
+
+
+def gap(scene: Scene, theta: tuple[float, float, float]) -> float:
+    """Distance of B on bar 3 from B on bar 4 at the bars' directions, m."""
+    linkage = scene.linkage
+    a, b, c = (
+        bar.length * np.exp(1j * angle)
+        for bar, angle in zip((linkage.input, linkage.coupler, linkage.output), theta, strict=True)
+    )
+    return float(abs(a + b - c - linkage.ground * np.exp(1j * linkage.ground_angle)))

@@ -1,0 +1,27 @@
+"""`python -m validation.subjects.work MODULE SCENE`: one subject in its own environment; JSON on standard output.
+
+It needs numpy, mpmath, pint and the simulator.
+"""
+
+import json
+import sys
+from importlib import import_module
+from pathlib import Path
+
+import fourbar
+
+
+def main(module: str, file: str) -> None:
+    """Every setting: a turn at each number of steps, and single states where the subject takes them."""
+    subject, scene = import_module(f"validation.subjects.{module}"), fourbar.load(Path(file))
+    found = []
+    for setting in subject.SETTINGS:
+        if hasattr(subject, "states"):
+            found.append(subject.states(scene, setting))
+        found += [subject.through(scene, steps, setting) for steps in subject.STEPS]
+    answer = {"version": subject.VERSION, "changed": subject.CHANGED, "readings": [each.plain() for each in found]}
+    sys.stdout.write("\n" + json.dumps(answer) + "\n")
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])
