@@ -151,7 +151,7 @@ def test_wrong_answers_fail_in_their_own_rows_alone() -> None:
     found = verdicts(SCENE, "Raises", "Empty", "Lacks", "Text", "Shapes")
     assert set(found.pop("free-body").values()) == set(found.pop("formulas").values()) == {"agrees"}
     assert found.pop("lacks") == {
-        **{"assembled": "agrees", "theta_3": "agrees", "theta_4": FAILS, "torque": FAILS},
+        **{"assembled": "agrees", "undecided": "agrees", "theta_3": "agrees", "theta_4": FAILS, "torque": FAILS},
         **{"closure": FAILS, "torque_inertia": FAILS},
     }
     assert {(quantity, verdict) for rows in found.values() for quantity, verdict in rows.items()} == {("all", FAILS)}

@@ -298,16 +298,17 @@ def test_classify_says_what_turns_and_how_far(run: Fourbar) -> None:
 
 
 def test_mjcf_of_a_scene_and_of_bare_lengths(tmp_path: Path, run: Fourbar) -> None:
-    from fourbar.mjcf import defaults_used, mjcf, scene_from_lengths
+    from fourbar.mjcf import defaults_used, scene_from_lengths
+    from fourbar.mjcf.simulators import mjcf_for
 
     code, out, err = run("mjcf", MODELS / "crank_rocker.toml", "-o", tmp_path / "a.xml")
     assert (code, out, err) == (HOLDS, "", "")
-    assert (tmp_path / "a.xml").read_text() == mjcf(load(MODELS / "crank_rocker.toml"))
+    assert (tmp_path / "a.xml").read_text() == mjcf_for(load(MODELS / "crank_rocker.toml"))
     lengths = ["--lengths", 0.3, "10 cm", "250 mm", 0.22]
     code, out, err = run("mjcf", *lengths, "--omega", "60 rpm", "-o", tmp_path / "b.xml")
     scene = scene_from_lengths(0.3, 0.1, 0.25, 0.22, omega=2.0 * math.pi)
     assert (code, err) == (HOLDS, "") and out.splitlines() == defaults_used(scene)
-    assert (tmp_path / "b.xml").read_text() == mjcf(scene)
+    assert (tmp_path / "b.xml").read_text() == mjcf_for(scene)
 
 
 def test_plot_and_animate_write_what_their_ending_says(tmp_path: Path, run: Fourbar) -> None:

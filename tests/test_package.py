@@ -38,7 +38,7 @@ def libraries(requirements: list[str]) -> set[str]:
 def test_every_file_of_the_package_is_shipped() -> None:
     patterns = PROJECT["tool"]["setuptools"]["package-data"]["fourbar"]
     for path in (ROOT / "fourbar").rglob("*"):
-        if path.is_file() and path.suffix not in (".py", ".pyc"):
+        if path.is_file() and path.suffix != ".py" and path.parent.name != "__pycache__":
             name = path.relative_to(ROOT / "fourbar").as_posix()
             assert any(fnmatch.fnmatch(name, pattern) for pattern in patterns), name
         if path.suffix == ".py":

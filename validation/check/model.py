@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from fourbar.errors import FourBarError, InputError
+from fourbar.quantities import UNKNOWNS
 from fourbar.scene import Scene
 from fourbar.show.progress import running
 from fourbar.solve import solve
@@ -20,7 +21,7 @@ from validation.check.causes import Cause, causes
 from validation.check.differences import differences
 from validation.check.screen import read_mjcf
 from validation.compare.answer import Answer
-from validation.compare.compare import COMPARED, compare
+from validation.compare.compare import compare
 from validation.compare.counts import Counts
 from validation.compare.plain import plain
 from validation.compare.rows import Row, write_results
@@ -110,7 +111,7 @@ def _rows(name: str, scene: Scene, answers: list[Answer], tolerance: Tolerance) 
     found = []
     for answer in answers:
         formulas = solve(scene, "force", at=answer.at)
-        found += compare(name, scene, answer, formulas, tolerance, COMPARED)
+        found += compare(name, scene, answer, formulas, tolerance, UNKNOWNS)
     return found
 
 

@@ -16,7 +16,6 @@ from fourbar.quantities import (
     OF_PIN_LOADS,
     OK,
     OVERFLOW,
-    SEVERAL,
     SINGULAR,
     STAGE_OF,
     STATUS_NAMES,
@@ -265,7 +264,8 @@ def _stated(quantity: str, formulas: Solution, ours: Array) -> Mask:
     """Where the formulas state one value: beyond the range of doubles the motion is, up to the stage that met it."""
     if quantity in OF_FORCES:
         # at rest a jam is of the motion that would begin
-        stated = np.isin(formulas.status_code, (SEVERAL, JAMMED)) & np.isfinite(magnitude(ours))
+        # where there are several solutions an engine may find another, or none by its own iteration
+        stated = (formulas.status_code == JAMMED) & np.isfinite(magnitude(ours))
         return np.asarray(stated | (formulas.status_code == OK))
     beyond = (formulas.status_code == OVERFLOW) & np.isnan(magnitude(ours))
     jammed = (formulas.status_code == JAMMED) & (quantity == "drive_condition")  # which holds how near that is

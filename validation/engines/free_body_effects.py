@@ -17,6 +17,9 @@ from validation.compare.answer import Array
 from validation.engines.description import PINS, centre
 from validation.engines.free_body_closure import Complex, close, cross
 
+HALF_TURN = math.pi * (1.0 - 1e-12)
+"""From rest a spring is wound; angles of some turns are known so far."""
+
 
 class Motion(NamedTuple):
     """The bars at n positions, by number, each (n,); the ground is bar 1."""
@@ -221,7 +224,7 @@ def wound(scene: Scene, motion: Motion) -> NDArray[np.bool_] | None:
     for pin, _, rest, _ in springs:
         i, j = PINS[pin]
         away = theta[j] - theta[i] - rest
-        gone |= np.abs(away[here] - 2.0 * np.pi * np.floor(away[first] / (2.0 * np.pi) + 0.5)) > np.pi
+        gone |= np.abs(away[here] - 2.0 * np.pi * np.floor(away[first] / (2.0 * np.pi) + 0.5)) > HALF_TURN
     return gone
 
 

@@ -17,10 +17,9 @@ import numpy as np
 from fourbar.errors import FourBarError, InputError, LimitError
 from fourbar.linkage import PINS
 from fourbar.mjcf import flywheel, mjcf, run_through
-from fourbar.quantities import VECTORS
+from fourbar.quantities import UNKNOWNS, VECTORS
 from fourbar.scene import Command, Scene, command
 from validation.compare.answer import Answer, Array
-from validation.compare.compare import COMPARED
 from validation.engines.loop import Position
 from validation.engines.mujoco.anatomy import Anatomy
 from validation.engines.mujoco.attached import Described, Value
@@ -334,5 +333,5 @@ def through_time(loop: Loop, at: Command) -> Answer:
 
 
 def _empty(n: int) -> dict[str, Array]:
-    names = (*COMPARED, "theta_2", "omega_2", "alpha_2")
+    names = (*UNKNOWNS, "theta_2", "omega_2", "alpha_2")
     return {name: np.full((n, 2) if name in VECTORS else n, np.nan) for name in names}

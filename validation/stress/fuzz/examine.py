@@ -72,4 +72,6 @@ def _engines(scene: Scene, at: Command, solution: Solution, witnesses: tuple[Wit
         )
         if witness.name == "pinocchio-inverse" and answer.refusal is None:  # of two exact engines the quicker one
             rows += statements("", scene, witness.engine(), answer)
-    return [f"{row.engine} {row.quantity}: {row.reason}" for row in rows if row.verdict == FAILS]
+    # half of the scenes are drawn where doubles have few digits: that they are undecided is no fault
+    failed = [row for row in rows if row.verdict == FAILS and row.quantity != "undecided"]
+    return [f"{row.engine} {row.quantity}: {row.reason}" for row in failed]
