@@ -6,7 +6,7 @@ from collections.abc import Callable, Collection, Iterable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from importlib.util import find_spec
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,7 +42,6 @@ from fourbar.solution import Array, Solution, unwrap
 
 if TYPE_CHECKING:
     from fourbar.free_motion import FreeMotion
-    from fourbar.studies import Study
 
 BLOCK = 8192
 """Positions evaluated at a time, measured: fewer pay for calls, more leave the cache."""
@@ -58,8 +57,17 @@ Evaluated = tuple[NDArray[np.uint8], dict[str, Any], Position | None]
 """Status codes and quantities of some positions, vectors as x + i y, and where the drive must balance."""
 
 
+class Members(Protocol):
+    """What else can be solved: many linkages, which evaluate themselves block by block (`fourbar.vary`)."""
+
+    def solved(
+        self, stage: str | None, *, out: Mapping[str, Array] | None, side: int, compiled: bool | None
+    ) -> Solution:
+        """Every quantity as (m, n) or (m, n, 2)."""
+
+
 def solve(
-    scene: "Scene | Study",
+    scene: Scene | Members,
     stage: str | None = None,
     *,
     at: Command | None = None,
