@@ -76,7 +76,7 @@ def judge(name: str, scene: Scene, witnesses: Sequence[Witness] = WITNESSES, *, 
         record.rows += _judged(name, scene, at, record.solution, answer, witness, basis)
         exact = witness.tolerance == EQUIVALENCE and answer.refusal is None and "theta_3" in witness.expected
         if exact and witness.stated:
-            record.rows += _stated(name, scene, witness, answer)
+            record.rows += _stated(name, scene, at, witness, answer)
         if order and witness.order and answer.refusal is None:
             answer.evidence |= _observed_order(name, scene, at, record.solution, witness)
     if any(witness.name == SIMULATION for witness in witnesses):
@@ -153,10 +153,10 @@ def _judged(
     return rows
 
 
-def _stated(name: str, scene: Scene, witness: Witness, answer: Answer) -> list[Row]:
+def _stated(name: str, scene: Scene, at: Command, witness: Witness, answer: Answer) -> list[Row]:
     """What the formulas state of the linkage whatever its motion, held against an exact engine."""
     try:
-        return statements(name, scene, witness.engine(), answer)
+        return statements(name, scene, witness.engine(), answer, predicting_from(witness, scene, at, answer))
     except LimitError as limit:
         return [Row.unmeasured(name, witness.name, "statements of the linkage", "all", REFUSES, str(limit))]
     except Exception as error:  # whatever an engine raises is its own failure, in its own row

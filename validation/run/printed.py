@@ -11,6 +11,7 @@ from fourbar.scene import Command, Scene
 from fourbar.solution import Solution
 from fourbar.solve import BLOCK, solve
 from validation.compare.basis import basis_of, smallest_yardstick, strictest_condition
+from validation.compare.compare import turned
 from validation.compare.error import magnitude, relative, relative_error, worst
 from validation.compare.law import law_row
 from validation.compare.reversals import reversing
@@ -71,10 +72,10 @@ def _points(name: str, scene: Scene, solution: Solution, basis: Solution) -> Row
                     size = np.abs(arm) + np.abs(at_foot) + term_sizes(kind, scene, basis)
                 apart = relative_error(kind, ours[point.name], theirs, size) * condition_of(kind, link, basis)
                 error = np.where(usable, np.maximum(error, np.where(np.isnan(apart), np.inf, apart)), error)
-    index = worst(error)
-    verdict = UNDECIDED if not usable.any() else AGREES if error[index] <= EQUIVALENCE.factor else FAILS
+    index, allowed = worst(error), EQUIVALENCE.factor * turned(link.ground_angle, solution.theta_2)
+    verdict = UNDECIDED if not usable.any() else AGREES if error[index] <= allowed else FAILS
     what, place = f"the {len(scene.points)} points of the scene", float(solution.theta_2[index])
-    return Row(name, FORMULAS, "exact", "points", float(error[index]), EQUIVALENCE.factor, verdict, what, place, 1.0)
+    return Row(name, FORMULAS, "exact", "points", float(error[index]), allowed, verdict, what, place, 1.0)
 
 
 def _known(basis: Solution, quantity: str, n: int) -> Array:
@@ -133,8 +134,8 @@ def _error_bars(name: str, scene: Scene, at: Command, solution: Solution) -> Ite
         size = np.max([smallest_yardstick(q, scene, ours, other) for q in quantities], axis=0)
         condition = strictest_condition(quantities[0], scene.linkage, ours, other)
         tells = condition * NOTHING_TO_TELL > EPS
-        wide = relative(width, size) * condition / (K * EPS)
-        share = np.where(tells, np.fmax(relative(true, BARS * width), wide), 0.0)
+        wide = relative(width, size) * condition / (K * EPS * turned(scene.linkage.ground_angle, sampled.theta_2))
+        share = np.where(tells, np.maximum(relative(true, BARS * width), wide), 0.0)
         share[tells & ~np.isfinite(width)] = np.inf
         index = worst(share)
         verdict = UNDECIDED if not tells.any() else AGREES if share[index] <= 1.0 else FAILS

@@ -10,9 +10,9 @@ from fourbar.linkage import MOVING_BARS, FourBar
 from fourbar.scene import Scene
 from validation.compare.answer import Engine
 from validation.compare.compare import TOUCHING_MARGIN, closing_margin
-from validation.compare.statements.finding import Finding, answered, wrapped
+from validation.compare.statements.finding import Finding, answered, roundoff, wrapped
 from validation.compare.statements.ranges import step_beyond
-from validation.compare.tolerance import EPS, EQUIVALENCE, NOTHING_TO_TELL, lever
+from validation.compare.tolerance import EPS, NOTHING_TO_TELL, lever
 
 
 def limit_positions(linkage: FourBar, engine: Engine) -> Iterator[Finding]:
@@ -39,7 +39,7 @@ def _of_input(linkage: FourBar, engine: Engine) -> Iterator[Finding]:
         if digits * NOTHING_TO_TELL <= EPS:
             continue
         e = abs(d - a * np.exp(1j * (limit.theta_2 - linkage.ground_angle)))
-        allowed = EQUIVALENCE.factor / digits + a / e * (abs(step) + _moved(linkage, 2, limit))
+        allowed = roundoff(linkage) / digits + a / e * (abs(step) + _moved(linkage, 2, limit))
         middle = {}
         for name, stated in (("theta_3", limit.theta_3), ("theta_4", limit.theta_4)):
             middle[name] = open_[name][i] + 0.5 * wrapped(crossed[name][i] - open_[name][i])
@@ -61,7 +61,7 @@ def _moved(linkage: FourBar, bar: int, limit: mobility.LimitPosition) -> float:
     upright = abs(math.sin(limit[MOVING_BARS.index(bar)] - linkage.ground_angle))
     d, *moving = linkage.lengths
     spread = sum(linkage.lengths) / d * (1.0 + sum(moving) / linkage.bar(bar).length)
-    return EQUIVALENCE.factor * spread / max(upright, EPS)
+    return roundoff(linkage) * spread / max(upright, EPS)
 
 
 def _dead_centres(linkage: FourBar, bar: int, engine: Engine) -> Iterator[Finding]:
@@ -85,10 +85,10 @@ def _dead_centres(linkage: FourBar, bar: int, engine: Engine) -> Iterator[Findin
         moved = _moved(linkage, bar, limit)
         for angle, stated in ((theta_3, limit.theta_3), (theta_4, limit.theta_4)):
             error = abs(float(wrapped(np.array(angle - stated))))
-            yield Finding(error, EQUIVALENCE.factor / digits + moved * speed, limit.theta_2, what)
+            yield Finding(error, roundoff(linkage) / digits + moved * speed, limit.theta_2, what)
         # the loop runs along bar 4 from B to O4
         aligned = math.cos({3: theta_4 + math.pi, 4: theta_3}[bar] - limit.theta_2) > 0.0
         yield Finding(float(aligned != limit.stretched), 0.0, limit.theta_2, "stretched or folded")
         slowing = abs(float(seen[f"alpha_{bar}"][i]))
-        at_rest = EQUIVALENCE.factor * speed / (digits * sine) + slowing * moved
+        at_rest = roundoff(linkage) * speed / (digits * sine) + slowing * moved
         yield Finding(abs({3: omega_3, 4: omega_4}[bar]), at_rest, limit.theta_2, f"{what}: at rest")

@@ -83,6 +83,6 @@ def _of_bar(linkage: FourBar, bar: int, engine: Engine) -> Iterator[Finding]:
     what = f"bar {bar} at {where!r} rad: the engine finds the opposite" if wrong.any() else "closes where stated"
     yield Finding(float(np.count_nonzero(wrong)), 0.0, where, what)
     limits = [limit[MOVING_BARS.index(bar)] for limit in mobility.limit_positions(linkage, bar)]
-    yield same(f"limits of bar {bar}", limits, [] if full else [end for span in spans for end in span])
-    yield same(f"swing of bar {bar}", [mobility.swing(linkage, bar)], [spans[0][1] - spans[0][0]])
+    yield same(f"limits of bar {bar}", limits, [] if full else [end for span in spans for end in span], linkage)
+    yield same(f"swing of bar {bar}", [mobility.swing(linkage, bar)], [spans[0][1] - spans[0][0]], linkage)
     yield Finding(float(full != all(within)), 0.0, where, f"whether bar {bar} turns fully")
