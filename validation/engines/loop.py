@@ -23,11 +23,15 @@ from validation.compare.answer import Answer, Array
 from validation.engines import effects
 from validation.engines.description import FORCE_AT
 
-START_ANGLES = (
-    *((30, 30), (15, 15), (45, 45), (5, 5), (5, 120)),
-    *((120, 5), (60, 60), (2, 150), (150, 2), (1, 1)),
+STARTS = tuple(
+    (math.radians(alpha), math.radians(beta))
+    for alpha, beta in (
+        *((30, 30), (15, 15), (45, 45), (5, 5), (5, 120)),
+        *((120, 5), (60, 60), (2, 150), (150, 2), (1, 1)),
+    )
 )
-"""Degrees that bars 3 and 4 first make with the diagonal A to O4, tried in turn; they served 8000 of 8000 linkages."""
+"""Angles, rad, that bars 3 and 4 first make with the diagonal A to O4, tried in turn where the triangle of the lengths,
+as the engine measures them, is none in doubles."""
 LONGEST_STEP = 0.5
 """rad; a longer Newton step leaves the region in which the gap is nearly linear."""
 SHORTEST_STEP = 2.0**-40
@@ -116,25 +120,24 @@ class Position:
         if max(e - (b + c), abs(b - c) - e) > closed:
             return None
         phi = math.atan2(diagonal[1], diagonal[0])
-        for q3, q4 in self._starts(theta_2, branch, phi):
+        triangle = _triangle_angle(e, b, c), _triangle_angle(e, c, b)
+        for q3, q4 in self._starts(theta_2, branch, phi, triangle):
             found = newton(tree, (theta_2, q3, q4), branch, closed)
             if found is not None:
                 self.last[branch] = found[1:]
                 return found
-        # the starts miss where a bar is a millionth of the others; the triangle of the lengths as measured does not
-        alpha, beta = (_triangle_angle(e, near, far) for near, far in ((b, c), (c, b)))
-        theta_3, theta_4 = phi + branch * alpha, phi + math.pi - branch * beta
-        found = newton(tree, (theta_2, theta_3 - theta_2, theta_4), branch, closed)
-        if found is None and max(e - (b + c), abs(b - c) - e) < -closed:
+        if max(e - (b + c), abs(b - c) - e) < -closed:
             raise ArithmeticError(f"the loop closes at theta_2 = {theta_2!r}, but Newton's method does not find it")
-        return found
+        return None
 
-    def _starts(self, theta_2: float, branch: int, phi: float) -> Iterator[tuple[float, float]]:
+    def _starts(
+        self, theta_2: float, branch: int, phi: float, triangle: tuple[float, float]
+    ) -> Iterator[tuple[float, float]]:
         if branch in self.last:
             yield self.last[branch]
-        for alpha, beta in START_ANGLES:
-            theta_3 = phi + branch * math.radians(alpha)
-            theta_4 = phi + math.pi - branch * math.radians(beta)
+        for alpha, beta in (triangle, *STARTS):
+            theta_3 = phi + branch * alpha
+            theta_4 = phi + math.pi - branch * beta
             yield math.remainder(theta_3 - theta_2, math.tau), math.remainder(theta_4, math.tau)
 
 

@@ -134,7 +134,8 @@ def _error_bars(name: str, scene: Scene, at: Command, solution: Solution) -> Ite
         size = np.max([smallest_yardstick(q, scene, ours, other) for q in quantities], axis=0)
         condition = strictest_condition(quantities[0], scene.linkage, ours, other)
         tells = condition * NOTHING_TO_TELL > EPS
-        wide = relative(width, size) * condition / (K * EPS * turned(scene.linkage.ground_angle, sampled.theta_2))
+        turns = np.array([turned(scene.linkage.ground_angle, theta_2) for theta_2 in sampled.theta_2])
+        wide = relative(width, size) * condition / (K * EPS * turns)
         share = np.where(tells, np.maximum(relative(true, BARS * width), wide), 0.0)
         share[tells & ~np.isfinite(width)] = np.inf
         index = worst(share)
