@@ -12,9 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.errors import DependencyError, InputError, LimitError
+from fourbar.formulas.arithmetic import anywhere, polar
 from fourbar.formulas.motion import Rates, State
 from fourbar.formulas.path import NO_DIGIT_LEFT
-from fourbar.formulas.position import HalfAngle, Position, anywhere, polar
+from fourbar.formulas.position import HalfAngle, Position
 from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import (
     ANGLES,

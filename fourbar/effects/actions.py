@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 
+from fourbar.formulas.arithmetic import Number, cross
 from fourbar.formulas.motion import State
-from fourbar.formulas.pin_forces import Bodies, Body, Wrenches, cross
-from fourbar.formulas.position import Number
+from fourbar.formulas.pin_forces import Bodies, Body, Wrenches
 from fourbar.linkage import PINS, FourBar
 
 AT_REST = 50.0 * 2.0**-52

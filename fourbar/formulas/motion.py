@@ -11,7 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fourbar.formulas.position import Loop, Number, Position, anywhere, select, vector
+from fourbar.formulas.arithmetic import Number, anywhere, select, vector
+from fourbar.formulas.position import Loop, Position
 
 FAST = 4.0
 """|d^2 - a^2|/e^2, of twice 1/2 - t: from there on the triangle's side turns fast against the bars."""

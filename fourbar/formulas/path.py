@@ -8,23 +8,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from fourbar.formulas.arithmetic import Number, anywhere, cross, dot, polar, vector
 from fourbar.formulas.motion import Coefficients, State, coefficients, rates
 from fourbar.formulas.motion import with_parallel_pairs as parallel_motion
-from fourbar.formulas.pin_forces import cross, dot
-from fourbar.formulas.position import (
-    HalfAngle,
-    Loop,
-    Number,
-    Position,
-    anywhere,
-    close_loop,
-    direction,
-    half_angle,
-    loop,
-    parallel_pairs,
-    polar,
-    vector,
-)
+from fourbar.formulas.position import HalfAngle, Loop, Position, close_loop, direction, half_angle, loop, parallel_pairs
 from fourbar.formulas.position import with_parallel_pairs as parallel_position
 from fourbar.linkage import FourBar
 

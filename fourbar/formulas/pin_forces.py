@@ -12,8 +12,9 @@ Source: Linares Mendoza, section 5.7 (the thirteen equations); R. L. Norton, Des
 
 from typing import NamedTuple
 
+from fourbar.formulas.arithmetic import Number, anywhere, cross, dot, vector
 from fourbar.formulas.motion import Rates
-from fourbar.formulas.position import Loop, Number, Position, anywhere, vector
+from fourbar.formulas.position import Loop, Position
 
 
 class Body(NamedTuple):
@@ -53,16 +54,6 @@ class PinForces(NamedTuple):
     F32: Number
     F43: Number
     F14: Number
-
-
-def cross(u: Number, v: Number) -> Number:
-    """z-component of u x v."""
-    return u.real * v.imag - u.imag * v.real
-
-
-def dot(u: Number, v: Number) -> Number:
-    """Scalar product u . v."""
-    return u.real * v.real + u.imag * v.imag
 
 
 def about_first_pin(body: Body) -> Number:
@@ -118,7 +109,7 @@ def pin_forces(
 
     >>> from math import pi
     >>> from fourbar.formulas.path import state
-    >>> from fourbar.formulas.position import polar
+    >>> from fourbar.formulas.arithmetic import polar
     >>> from fourbar.linkage import uniform  # below, Norton, example 11-3: in, lbf, s
     >>> s, deg = state(uniform(19, 5, 15, 10), pi / 3, 1, 25.0, -40.0), pi / 180
     >>> G3, P = polar(9, 45 * deg), polar(80, 330 * deg)  # a force on the coupler

@@ -8,10 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.effects.actions import Actions, bodies
+from fourbar.formulas.arithmetic import anywhere, polar, vector
 from fourbar.formulas.motion import Coefficients, State, rates
 from fourbar.formulas.path import Path, path
 from fourbar.formulas.pin_forces import Bodies, PinForces, Wrenches, inertia_wrenches, pin_forces
-from fourbar.formulas.position import HalfAngle, Loop, Position, anywhere, parallel_pairs, polar, vector
+from fourbar.formulas.position import HalfAngle, Loop, Position, parallel_pairs
 from fourbar.formulas.torque import driving_torque, half_slope, inertia
 from fourbar.formulas.transmission import drive_sine, drive_sine_of_triangle
 from fourbar.linkage import FourBar

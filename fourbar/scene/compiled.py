@@ -8,7 +8,6 @@ are evaluated by NumPy, as is every scene with other effects or with two pairs o
 import threading
 import zlib
 from functools import cache
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -16,24 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.effects import Flywheel, Gravity, Load, Viscous
-from fourbar.formulas import motion, pin_forces, position, torque, transmission
+from fourbar.formulas import arithmetic, motion, pin_forces, position, torque, transmission
+from fourbar.formulas.arithmetic import anywhere, cross, polar, select, square_root, two_sum, vector
 from fourbar.formulas.motion import Coefficients, Rates, coefficients, rates
 from fourbar.formulas.path import NO_DIGIT_LEFT
-from fourbar.formulas.pin_forces import Body, PinForces, Wrenches, cross, inertia_wrenches
+from fourbar.formulas.pin_forces import Body, PinForces, Wrenches, inertia_wrenches
 from fourbar.formulas.pin_forces import pin_forces as pin_forces_of
-from fourbar.formulas.position import (
-    Loop,
-    Position,
-    anywhere,
-    close_loop,
-    direction_of_tangent,
-    half_angle_of_tangent,
-    polar,
-    select,
-    square_root,
-    two_sum,
-    vector,
-)
+from fourbar.formulas.position import Loop, Position, close_loop, direction_of_tangent, half_angle_of_tangent
 from fourbar.formulas.torque import driving_torque, half_slope, inertia
 from fourbar.formulas.transmission import drive_sine_of_triangle
 from fourbar.linkage import MOVING_BARS, PINS
@@ -338,9 +326,10 @@ def run(
 
 
 LEAVES: tuple[tuple[Any, str], ...] = (
-    (position, "two_sum direction_of_tangent half_angle_of_tangent close_loop"),
+    (arithmetic, "two_sum cross dot"),
+    (position, "direction_of_tangent half_angle_of_tangent close_loop"),
     (motion, "side_turns_fast coefficients rates"),
-    (pin_forces, "cross dot about_first_pin inertia_wrenches between pin_forces"),
+    (pin_forces, "about_first_pin inertia_wrenches between pin_forces"),
     (torque, "inertia half_slope driving_torque"),
     (transmission, "drive_sine_of_triangle"),
     (cases, "undecided"),
@@ -348,11 +337,6 @@ LEAVES: tuple[tuple[Any, str], ...] = (
 )
 """What is compiled as it stands."""
 OWN = (complex_rounded, real_rounded, by_terms, body_of, push_of, viscous_of, forces, thirteen, nearby, square)
-
-
-def installed() -> bool:
-    """Whether there is numba."""
-    return find_spec("numba") is not None
 
 
 @cache

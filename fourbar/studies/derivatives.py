@@ -11,7 +11,7 @@ from fourbar.effects.actions import Actions
 from fourbar.effects.cones import settle
 from fourbar.effects.pin_friction import Settled
 from fourbar.errors import InputError
-from fourbar.formulas.position import polar
+from fourbar.formulas.arithmetic import polar
 from fourbar.linkage import PIN_FORCE
 from fourbar.quantities import FORCES, NOT_ASSEMBLED, OK, SINGULAR, STATUS_NAMES
 from fourbar.scene import Command, Scene, command

@@ -6,8 +6,8 @@ import numpy as np
 
 from fourbar.effects.actions import Actions, bodies
 from fourbar.errors import DependencyError
+from fourbar.formulas.arithmetic import dot
 from fourbar.formulas.motion import State
-from fourbar.formulas.pin_forces import dot
 from fourbar.linkage import MOVING_BARS
 from fourbar.scene import Command, Scene
 from fourbar.solution import Array, Solution

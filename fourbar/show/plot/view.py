@@ -7,8 +7,8 @@ import numpy as np
 
 from fourbar.effects.actions import Actions, bodies
 from fourbar.errors import NotAssembledError
+from fourbar.formulas.arithmetic import Number
 from fourbar.formulas.motion import State
-from fourbar.formulas.position import Number
 from fourbar.linkage import PINS
 from fourbar.scene import Command, Scene, command
 from fourbar.scene.motion import FromLimit
