@@ -16,10 +16,11 @@ from fourbar.linkage import PIN_FORCE
 from fourbar.quantities import FORCES, NOT_ASSEMBLED, OK, SINGULAR, STATUS_NAMES
 from fourbar.scene import Command, Scene, command
 from fourbar.scene.case import Case
+from fourbar.scene.kinematics import KINEMATIC, kinematics
 from fourbar.scene.motion import FromLimit
 from fourbar.scene.point import OF_POINTS
 from fourbar.solution import Array, Solution
-from fourbar.solve import KINEMATIC, kinematics, solve
+from fourbar.solve import solve
 from fourbar.studies.keys import Entry, at_place, entries, placed
 from fourbar.studies.sloped import Sloped, slopes, values
 

@@ -10,8 +10,8 @@ from fourbar.formulas.arithmetic import dot
 from fourbar.formulas.motion import State
 from fourbar.linkage import MOVING_BARS
 from fourbar.scene import Command, Scene
+from fourbar.scene.start import state_at
 from fourbar.solution import Array, Solution
-from fourbar.solve import state_at
 
 
 class Energies(NamedTuple):
