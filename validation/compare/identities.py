@@ -21,7 +21,7 @@ from validation.compare.error import magnitude, relative, worst
 from validation.compare.reversals import reversing
 from validation.compare.rows import AGREES, FAILS, UNDECIDED, Row
 from validation.compare.scales import of_length
-from validation.compare.tolerance import IDENTITY, SIMULATED, Array, Tolerance, condition_of
+from validation.compare.tolerance import IDENTITY, SIMULATED, Array, Tolerance, condition_of, lever
 
 FORMULAS = "formulas"
 IDENTITIES = (
@@ -104,6 +104,8 @@ def _sums(name: str, scene: Scene, at: Command, solution: Solution, ours: Answer
     # the torque is that of virtual work, the forces are those of the free bodies: both err as the two conditions say
     with np.errstate(divide="ignore", invalid="ignore"):
         moment_terms = moment_terms / condition_of("torque", scene.linkage, solution)
+    # the accelerations are printed by one evaluation and balanced by another, which a short bar sets apart
+    force_terms = force_terms / lever(scene.linkage)
     where = solution.status_code == OK
     # the sense of dry friction at a pin at rest is decided by rounding: not the same here as in the answer
     where &= ~reversing(scene, solution, IDENTITY.factor)
