@@ -98,9 +98,12 @@ def _blocks(name: str, scene: Scene, at: Command, solution: Solution) -> Row:
     n = len(at.theta_2)
     long = np.arange(max(n, BLOCK + n)) % n
     ends = np.unique([0, BLOCK - 1, BLOCK, len(long) - 1])
-    whole = solve(scene, "force", at=piece(at, long))
-    error = (whole.status_code[ends] != solution.status_code[long[ends]]).astype(float)
-    for quantity in ("sin_mu", "B", "alpha_3", *FORCES):
+    loaded = any(effect.loaded_pins for effect in scene.effects)  # whose couples may take a search at each position
+    whole = solve(scene, "acceleration" if loaded else "force", at=piece(at, long))
+    error = np.zeros(len(ends))
+    if not loaded:
+        error += whole.status_code[ends] != solution.status_code[long[ends]]
+    for quantity in ("sin_mu", "B", "alpha_3", *(() if loaded else FORCES)):
         ours = getattr(solution, quantity)
         one, other = getattr(whole, quantity)[ends], ours[long[ends]]
         known = np.isfinite(magnitude(other))
