@@ -22,6 +22,7 @@ from validation.compare.identities import FORMULAS, closure, identities
 from validation.compare.plain import plain
 from validation.compare.reversals import reversals
 from validation.compare.rows import FAILS, REFUSES, VERDICTS, Row
+from validation.compare.statements.finding import Stated
 from validation.compare.statements.statements import statements
 from validation.compare.tolerance import EQUIVALENCE
 from validation.compare.withheld import withheld
@@ -68,6 +69,7 @@ def judge(name: str, scene: Scene, witnesses: Sequence[Witness] = WITNESSES, *, 
         record.rows.append(withheld(name, scene, record.solution, basis))
     record.rows += printed(name, scene, at, record.solution, basis)
     record.jumps = reversals(scene, at, record.solution)
+    stated = Stated(scene.linkage)
     for witness in witnesses:
         answer = _ask(witness, scene, at, record)
         if answer is None:
@@ -76,7 +78,7 @@ def judge(name: str, scene: Scene, witnesses: Sequence[Witness] = WITNESSES, *, 
         record.rows += _judged(name, scene, at, record.solution, answer, witness, basis)
         exact = witness.tolerance == EQUIVALENCE and answer.refusal is None and "theta_3" in witness.expected
         if exact and witness.stated:
-            record.rows += _stated(name, scene, witness, answer)
+            record.rows += _stated(name, scene, witness, answer, stated)
         if order and witness.order and answer.refusal is None:
             answer.evidence |= _observed_order(name, scene, at, record.solution, witness)
     if any(witness.name == SIMULATION for witness in witnesses):
@@ -153,10 +155,10 @@ def _judged(
     return rows
 
 
-def _stated(name: str, scene: Scene, witness: Witness, answer: Answer) -> list[Row]:
+def _stated(name: str, scene: Scene, witness: Witness, answer: Answer, stated: Stated) -> list[Row]:
     """What the formulas state of the linkage whatever its motion, held against an exact engine."""
     try:
-        return statements(name, scene, witness.engine(), answer)
+        return statements(name, scene, witness.engine(), answer, stated)
     except LimitError as limit:
         return [Row.unmeasured(name, witness.name, "statements of the linkage", "all", REFUSES, str(limit))]
     except Exception as error:  # whatever an engine raises is its own failure, in its own row
