@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.errors import DependencyError, InputError, LimitError
+from fourbar.errors import DependencyError, InputError, LimitError, installing
 from fourbar.formulas.motion import Rates, State
 from fourbar.formulas.path import NO_DIGIT_LEFT
 from fourbar.formulas.position import HalfAngle, Position, anywhere, polar
@@ -151,7 +151,7 @@ def is_compiled(case: Case, wanted: int, count: int, compiled: bool | None) -> b
     from fourbar.scene.compiled import carries
 
     if not find_spec("numba"):
-        raise DependencyError('compiled=True needs numba, which is not installed: pip install "fourbar[fast]"')
+        raise DependencyError(f"compiled=True needs numba, which is not installed: {installing('fast')}")
     return carries(case)
 
 

@@ -13,6 +13,7 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
+from fourbar.writing import naming
 from validation.compare.plain import plain
 from validation.compare.rows import COLUMNS, MADE_OF, Row, to_csv
 
@@ -57,7 +58,8 @@ class Columns:
             self._line += 1
         self._waiting += rows
         if self._line <= CSV_ROWS:
-            self._csv.write(to_csv(rows).partition("\n")[2])
+            with naming(self.out / "results.csv"):
+                self._csv.write(to_csv(rows).partition("\n")[2])
         if len(self._waiting) >= GROUP_ROWS:
             self._write_group()
 
@@ -65,12 +67,13 @@ class Columns:
         import pyarrow as pa
 
         by_column = {name: [or_null(getattr(row, name)) for row in self._waiting] for name in COLUMNS}
-        self._parquet.write_table(pa.table(by_column, schema=self._schema))
+        with naming(self.out / "results.parquet"):
+            self._parquet.write_table(pa.table(by_column, schema=self._schema))
         self._waiting.clear()
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         """Put both in place, the text only where it is not too long."""
-        with self._files:
+        with naming(self.out), self._files:
             if kind is None and self._waiting:
                 self._write_group()
         if kind is not None:

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from fourbar.errors import InputError
-from fourbar.writing import write_text
+from fourbar.writing import naming, write_text
 from validation.compare.columns import column_of, read_columns
 from validation.compare.plain import plain
 from validation.compare.rows import Row, column_of_csv, rows_of_csv
@@ -181,10 +181,10 @@ def accept(run: Recorded, target: Path) -> None:
 def _copy(source: Path, target: Path) -> None:
     """A file however long, all of it or nothing."""
     draft = target.with_name(f".{target.name}.part")
-    try:
-        shutil.copyfile(source, draft)
-        os.replace(draft, target)
-    except OSError as error:
-        draft.unlink(missing_ok=True)
-        error.filename = str(target)
-        raise
+    with naming(target):
+        try:
+            shutil.copyfile(source, draft)
+            os.replace(draft, target)
+        except BaseException:
+            draft.unlink(missing_ok=True)
+            raise

@@ -11,7 +11,7 @@ import click
 
 from fourbar.errors import FAILED, HOLDS, DependencyError, FourBarError, InputError
 from fourbar.mjcf import mjcf
-from fourbar.writing import write_text
+from fourbar.writing import naming, write_text
 from validation.compare.columns import Columns, read_columns
 from validation.compare.plain import plain
 from validation.compare.rows import FAILS, Row
@@ -108,7 +108,11 @@ def run(
         ladder = ladder_rows() if published else []
         summing = Summing()
         times = out / ".timings.csv.part"
-        with Columns(out) as columns, times.open("w", encoding="utf-8", newline="") as file:
+        with (
+            Columns(out) as columns,
+            naming(out / "timings.csv"),
+            times.open("w", encoding="utf-8", newline="") as file,
+        ):
             csv.writer(file, lineterminator="\n").writerow(TIMINGS)
             for number, scenes in enumerate(chunks):
                 records = store.read(number)
