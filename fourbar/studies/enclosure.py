@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.effects.actions import bodies
-from fourbar.errors import DependencyError, InputError, LimitError
+from fourbar.errors import DependencyError, InputError, LimitError, installing
 from fourbar.formulas.arithmetic import dot
 from fourbar.formulas.mobility import TURN, change_points, intervals, limit_positions, turns_fully
 from fourbar.formulas.path import Path
@@ -97,7 +97,7 @@ def extremes(scene: Scene) -> Extremes:
     try:
         import flint
     except ImportError:
-        raise DependencyError('Guaranteed extremes need python-flint: pip install "fourbar[exact]"') from None
+        raise DependencyError(f"Guaranteed extremes need python-flint: {installing('exact')}") from None
     _require(scene)
     before, flint.ctx.prec = flint.ctx.prec, BITS
     try:
