@@ -9,9 +9,8 @@ from typing import Any
 import genesis
 import numpy as np
 
-from fourbar.mjcf.document import at_start
 from fourbar.scene import Scene
-from validation.subjects.motion import Readings, gap, turn
+from validation.subjects.motion import Readings, gap, start, turn, weight
 from validation.subjects.mujoco_c import text
 
 VERSION = version("genesis-world")
@@ -23,9 +22,8 @@ SETTINGS = {"no armature added": None}
 def through(scene: Scene, steps: int, setting: str) -> Readings:
     """A turn in so many steps; torque and force are those with which the step began."""
     timestep, stops = turn(scene, steps)
-    pull = next((effect.vector for effect in scene.effects if effect.key == "gravity"), (0.0, 0.0))  # type: ignore[attr-defined]
     genesis.init(backend=genesis.cpu, precision="64", logging_level="error")
-    common: dict[str, Any] = {"dt": timestep, "gravity": (float(pull[0]), float(pull[1]), 0.0)}
+    common: dict[str, Any] = {"dt": timestep, "gravity": weight(scene)}
     world = genesis.Scene(
         sim_options=genesis.options.SimOptions(**common),
         rigid_options=genesis.options.RigidOptions(**common, enable_collision=False, enable_joint_limit=False),
@@ -36,7 +34,7 @@ def through(scene: Scene, steps: int, setting: str) -> Readings:
         file.write_text(text(scene, steps, "genesis"))
         bars = world.add_entity(genesis.morphs.MJCF(file=str(file), default_armature=SETTINGS[setting]))
         world.build()
-    bars.set_dofs_velocity(np.array(at_start(scene).qvel))
+    bars.set_dofs_velocity(np.array(start(scene).qvel))
     armature, solver = float(bars.get_dofs_armature()[0]), world.sim.rigid_solver
     found, done = Readings(setting, steps), 0
     for stop in stops:

@@ -8,9 +8,8 @@ from pathlib import Path
 import mujoco_warp as mjw
 import newton
 
-from fourbar.mjcf.document import at_start
 from fourbar.scene import Scene
-from validation.subjects.motion import Readings, gap, turn
+from validation.subjects.motion import Readings, gap, start, turn, weight
 from validation.subjects.mujoco_c import text
 
 VERSION = version("newton")
@@ -22,8 +21,7 @@ SETTINGS = {"SolverMuJoCo": None}
 def through(scene: Scene, steps: int, setting: str) -> Readings:
     """A turn in so many steps."""
     timestep, stops = turn(scene, steps)
-    gravity = next((effect.vector for effect in scene.effects if effect.key == "gravity"), (0.0, 0.0))  # type: ignore[attr-defined]
-    builder = newton.ModelBuilder(gravity=(float(gravity[0]), float(gravity[1]), 0.0))
+    builder = newton.ModelBuilder(gravity=weight(scene))
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "four_bar.xml"
         file.write_text(text(scene, steps, "newton"))
@@ -32,7 +30,7 @@ def through(scene: Scene, steps: int, setting: str) -> Readings:
     solver, control = newton.solvers.SolverMuJoCo(model), model.control()
     now, then = model.state(), model.state()
     speeds = now.joint_qd.numpy()
-    speeds[:3] = at_start(scene).qvel
+    speeds[:3] = start(scene).qvel
     now.joint_qd.assign(speeds)
     found, done = Readings(setting, steps), 0
     names = [solver.mj_model.body(number).name for number in range(solver.mj_model.nbody)]
