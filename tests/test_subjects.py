@@ -31,8 +31,8 @@ THROUGH = 1e-5
 """Of a turn in 157 steps with the generated file; measured 4e-7."""
 
 
-JUDGES = {"examine.py"}
-"""The modules of subjects that hold answers against the formulas; every other hands things to a simulator."""
+JUDGES = {"examine.py", "problems.py"}
+"""The modules of subjects that state or judge by the formulas; every other hands things to a simulator."""
 
 
 @pytest.fixture
@@ -122,16 +122,6 @@ def test_each_finding_is_reproduced_where_its_simulator_is(script: Path) -> None
         if find_spec(name) is None:
             pytest.skip(f"not run: {name} is not installed")
     subprocess.run([sys.executable, str(script)], check=True, capture_output=True)
-
-
-def test_the_kept_answers_of_the_problem_are_those_of_today() -> None:
-    kept = json.loads(PROBLEM.with_suffix(".json").read_text())
-    today = fourbar.solve(fourbar.load(PROBLEM), "error")
-    assert kept["schema"] and len(kept["theta_2"]) == 25
-    for name in ("torque", *PIN_FORCES):
-        bar = np.asarray(kept["torque_error" if name == "torque" else "force_error"])
-        apart = np.abs(np.asarray(kept[name]) - getattr(today, name))
-        assert (apart <= 2.0 * (bar if name == "torque" else bar[:, None])).all() and (bar > 0.0).all()
 
 
 COARSE = 0.05
