@@ -5,29 +5,32 @@ import io
 import json
 import math
 import os
-from collections.abc import Callable, Sequence
+import subprocess
+import time
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
-from statistics import fmean
 from typing import Any
 
 import click
 
+import fourbar
 from fourbar.errors import DependencyError
+from fourbar.scene import command as on_path
 from fourbar.writing import write_text
 from validation.compare.rows import FAILS, REFUSES
 from validation.engines.witnesses import FURTHER, WITNESSES
 from validation.regression.changes import Change, Kind, differences
 from validation.regression.history import Run
-from validation.regression.record import read_run, read_times
+from validation.regression.record import read_run
 from validation.regression.render import line
 from validation.regression.steps import NO_CHANGE, Step, steps
 from validation.report.colours import style_of
 from validation.report.machine import machine
 from validation.report.svg import drawn
 from validation.report.templating import environment, number
-from validation.run.elsewhere import ElsewhereError, run_elsewhere
+from validation.run.elsewhere import CHECKOUT, ElsewhereError, run_elsewhere
 from validation.subjects.examine import TORQUE_AND_FORCES
 from validation.subjects.releases import installed, known, released
 
@@ -35,6 +38,10 @@ CACHE = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "four
 OF_VERDICTS = (Kind.VERDICT_WORSE, Kind.VERDICT_BETTER, Kind.NEW_FAILURE, Kind.GONE_FAILURE, Kind.GONE)
 """What a bisection looks for, where its two ends differ in any of them; else for any change."""
 SCHEMA = "fourbar-versions/1"
+CLOCK = "cpu_s_a_position"
+REPEATED = 3
+"""Of so many times the least counts."""
+TIMED = Path(__file__).parents[2] / "models" / "crank_rocker.toml"
 SECONDS = 120.0
 """For each scene of a version."""
 
@@ -46,6 +53,8 @@ class Release:
     version: str
     run: Run | None
     why: str = ""
+    seconds: Mapping[str, float] = field(default_factory=dict)
+    """By witness: of the processor's clock for one position."""
 
 
 Try = Callable[[str], Release]
@@ -83,6 +92,7 @@ def command(
     witnesses = [witness.name for witness in (*WITNESSES, *FURTHER) if witness.library == module]
     arguments = [*map(os.path.abspath, scenes), f"--engines={','.join(witnesses)}", "--no-pictures", "--workers=1"]
     arguments.append(f"--time-limit={SECONDS!r}")
+    timing = next(iter(scenes), TIMED).absolute()
 
     def attempt(version: str) -> Release:
         python, why = installed(engine, version, cache, more)
@@ -94,8 +104,8 @@ def command(
             run_elsewhere(python, arguments, folder)
         except ElsewhereError as error:
             return Release(version, None, str(error).partition(": ")[2])
-        run = Run(*read_run(folder), read_times(folder))
-        return Release(version, run.of(lambda row: row.engine in witnesses))
+        run = Run(*read_run(folder), {})  # its times are of the wall clock, with other jobs
+        return Release(version, run.of(lambda row: row.engine in witnesses), seconds=timed(python, timing, witnesses))
 
     found = bisected(chosen, attempt) if bisect else scanned(chosen, attempt, jobs)
     if sum(release.run is not None for release in found) < 2:
@@ -110,6 +120,29 @@ def command(
     for sentence in changed(found):
         click.echo(sentence)
     click.echo(f"{len(found)} versions of {engine}, {left} not needed: {out}/versions.md, .svg, .csv, .json")
+
+
+def timed(python: Path, scene: Path, witnesses: Sequence[str]) -> dict[str, float]:
+    """What one position of a scene costs each witness under another Python, s of the processor's clock."""
+    code = "import sys; from validation.subjects.versions import clock; clock(*sys.argv[1:])"
+    command = [str(python), "-c", code, str(scene), *witnesses]
+    done = subprocess.run(command, cwd=CHECKOUT, capture_output=True, text=True, check=False)
+    return json.loads(done.stdout.splitlines()[-1]) if done.returncode == 0 else {}
+
+
+def clock(file: str, *names: str) -> None:
+    """Print the least time of each witness for a position of a scene, as JSON."""
+    scene = fourbar.load(file)
+    at, least = on_path(scene), {}
+    for witness in (*WITNESSES, *FURTHER):
+        if witness.name in names:
+            taken = []
+            for _ in range(REPEATED):
+                began = time.process_time()
+                witness.engine().answer(scene, at)
+                taken.append(time.process_time() - began)
+            least[witness.name] = min(taken) / len(at.theta_2)
+    click.echo(json.dumps(least))
 
 
 def scanned(versions: Sequence[str], attempt: Try, jobs: int) -> list[Release]:
@@ -186,7 +219,7 @@ def _with(step: Step) -> str:
 
 
 def lines(found: Sequence[Release]) -> list[dict[str, Any]]:
-    """A line for each version and witness: greatest errors, verdicts, times over the formulas'; or why it has none."""
+    """A line for each version and witness: greatest errors, verdicts, time; or why it has none."""
     made: list[dict[str, Any]] = []
     for release in found:
         if release.run is None:
@@ -195,14 +228,13 @@ def lines(found: Sequence[Release]) -> list[dict[str, Any]]:
         run = release.run
         for engine in dict.fromkeys(row.engine for row in run.rows):
             rows = [row for row in run.rows if row.engine == engine]
-            ratios = [math.log(ratio) for (_, name), ratio in run.times.items() if name == engine and ratio > 0.0]
             errors = {
                 name: max((row.error for row in rows if row.quantity == name and row.compared), default=None, key=_last)
                 for name in TORQUE_AND_FORCES
             }
             counted = {"compared": sum(row.compared for row in rows)}
             counted |= {verdict: sum(row.verdict == verdict for row in rows) for verdict in (FAILS, REFUSES)}
-            times = {"times_formulas": math.exp(fmean(ratios)) if ratios else None}
+            times = {CLOCK: release.seconds.get(engine)}
             made.append({"version": release.version, "engine": engine, "why": "", **errors, **counted, **times})
     return made
 
@@ -212,7 +244,7 @@ def _last(error: float) -> float:
     return math.inf if math.isnan(error) else error
 
 
-COLUMNS = ("version", "engine", *TORQUE_AND_FORCES, "compared", FAILS, REFUSES, "times_formulas", "why")
+COLUMNS = ("version", "engine", *TORQUE_AND_FORCES, "compared", FAILS, REFUSES, CLOCK, "why")
 
 
 def written(engine: str, found: Sequence[Release], left: int) -> dict[str, str]:
@@ -236,8 +268,8 @@ def written(engine: str, found: Sequence[Release], left: int) -> dict[str, str]:
 def _cell(name: str, value: Any) -> str:
     if value is None:
         return ""
-    if name == "times_formulas":
-        return f"{value:.0f}"
+    if name == CLOCK:
+        return f"{value:.2e}"
     return number(value) if isinstance(value, float) else str(value)
 
 
@@ -255,14 +287,14 @@ def chart(rows: Sequence[dict[str, Any]]) -> str:
         drawn_with: dict[str, Any] = {"color": style.colour, "marker": style.marker, "markersize": 4, "linewidth": 1}
         errors.plot(at, [row["torque"] or math.nan for row in own], label=f"{engine}: torque", **drawn_with)
         errors.plot(at, forces, linestyle="--", label=f"{engine}: pin forces", fillstyle="none", **drawn_with)
-        times.plot(at, [row["times_formulas"] or math.nan for row in own], label=engine, **drawn_with)
+        times.plot(at, [row[CLOCK] or math.nan for row in own], label=engine, **drawn_with)
     for row in rows:
         if row["engine"] is None:
             errors.axvline(versions.index(row["version"]), color="#c74f00", linestyle=":", linewidth=1)
     errors.set_yscale("log")
     errors.set_ylabel("greatest error")
     times.set_ylim(bottom=0.0)
-    times.set_ylabel("time over the formulas'")
+    times.set_ylabel("processor s a position")
     times.set_xticks(range(len(versions)), versions, rotation=45, ha="right", fontsize=7)
     for axes in (errors, times):
         axes.grid(alpha=0.3)
