@@ -43,11 +43,11 @@ def unpacking(folder: Path) -> Callable[..., CompletedProcess[str]]:
     def pip(python: Path, *arguments: str) -> CompletedProcess[str]:
         if arguments[0] == "index":
             return CompletedProcess([], 0, "toy (1.1)\nAvailable versions: 1.1, 1.0\n", "")
-        name = arguments[3].replace("==", "-")
-        if len(arguments) > 4:
-            missing = f"Could not find a version that satisfies the requirement {arguments[4]}"
+        file = folder / f"{arguments[3].replace('==', '-')}-py3-none-any.whl"
+        if len(arguments) > 4 or not file.is_file():
+            missing = f"Could not find a version that satisfies the requirement {arguments[-1]}"
             return CompletedProcess([], 1, "", f"ERROR: {missing} (from versions: none)\nERROR: No match\n")
-        with zipfile.ZipFile(folder / f"{name}-py3-none-any.whl") as archive:
+        with zipfile.ZipFile(file) as archive:
             archive.extractall(next(python.parents[1].rglob("site-packages")))
         return CompletedProcess([], 0, "", "")
 
@@ -69,9 +69,9 @@ def test_each_release_loads_by_itself_or_says_why(tmp_path: Path, monkeypatch: p
     assert python is not None and python.is_file() and python != Path(sys.executable) and not why
     python, why = releases.installed("toy", "1.1", tmp_path / "cache")
     assert python is None and why == "does not load: ImportError: libtoy.so.7 is not there"
-    missing = "Could not find a version that satisfies the requirement nothing-such"
-    again = releases.installed("toy", "1.0", tmp_path / "cache", ["nothing-such"])
-    assert again == (None, f"does not install: {missing}")
+    assert releases.installed("toy", "1.0", tmp_path / "cache", ["nothing-such"])[1] == "", "it is installed alone"
+    missing = "Could not find a version that satisfies the requirement toy==0.9"
+    assert releases.installed("toy", "0.9", tmp_path / "cache") == (None, f"does not install: {missing}")
     monkeypatch.setitem(releases.MODULES, "toy", "numpy")  # which the harness has
     stead = releases.installed("toy", "1.0", tmp_path / "cache")
     assert stead == (None, "does not load: another toy is found in its stead") and "toy" not in sys.modules

@@ -21,9 +21,11 @@ SUBJECTS = {
     "mujoco_warp": ("MuJoCo Warp", "mujoco_warp"),
     "mujoco_mjx": ("MJX", "mujoco.mjx"),
     "newton_mujoco": ("Newton, MuJoCo solver", "newton"),
+    "newton_kamino": ("Newton, Kamino", "newton"),
     "genesis_rigid": ("Genesis", "genesis"),
     "pybullet": ("PyBullet", "pybullet"),
     "drake_sap": ("Drake, SAP", "pydrake"),
+    "exudyn_simulated": ("Exudyn", "exudyn"),
 }
 """By module: name, and what must be importable."""
 TORQUE_AND_FORCES = ("torque", *PIN_FORCES)
@@ -55,6 +57,8 @@ class Standing:
 
     lines: list[Line] = field(default_factory=list)
     changed: dict[str, str] = field(default_factory=dict)
+    devices: dict[str, str] = field(default_factory=dict)
+    """What each ran on."""
     left_out: dict[str, str] = field(default_factory=dict)
 
 
@@ -76,7 +80,7 @@ def examine(scene: Scene, file: Path, pythons: list[Path], seconds: float) -> St
             found.left_out[name] = (done.stderr.strip().splitlines() or ["no word"])[-1]
             continue
         answer = json.loads(done.stdout.strip().splitlines()[-1])
-        found.changed[name] = answer["changed"]
+        found.changed[name], found.devices[name] = answer["changed"], answer["device"]
         found.lines += lines(scene, name, answer)
     return found
 

@@ -8,12 +8,14 @@ from typing import Any
 
 import genesis
 import numpy as np
+import torch
 
 from fourbar.scene import Scene
 from validation.subjects.motion import Readings, gap, start, turn, weight
 from validation.subjects.mujoco_c import text
 
 VERSION = version("genesis-world")
+DEVICE = torch.cuda.get_device_name() if torch.cuda.is_available() else "CPU"
 STEPS = (628,)
 CHANGED = "precision 64 and default_armature=None; timestep, gravity and the keyframe's speeds given by hand"
 SETTINGS = {"no armature added": None}
@@ -22,7 +24,9 @@ SETTINGS = {"no armature added": None}
 def through(scene: Scene, steps: int, setting: str) -> Readings:
     """A turn in so many steps; torque and force are those with which the step began."""
     timestep, stops = turn(scene, steps)
-    genesis.init(backend=genesis.cpu, precision="64", logging_level="error")
+    genesis.init(
+        backend=genesis.gpu if torch.cuda.is_available() else genesis.cpu, precision="64", logging_level="error"
+    )
     common: dict[str, Any] = {"dt": timestep, "gravity": weight(scene)}
     world = genesis.Scene(
         sim_options=genesis.options.SimOptions(**common),
@@ -41,11 +45,11 @@ def through(scene: Scene, steps: int, setting: str) -> Readings:
         began = time.process_time()
         for _ in range(stop - done - 1):
             world.step()
-        q, speed = bars.get_qpos().numpy().copy(), float(bars.get_dofs_velocity()[0])
+        q, speed = bars.get_qpos().cpu().numpy().copy(), float(bars.get_dofs_velocity()[0])
         world.step()
         found.seconds += time.process_time() - began
         done = stop
-        alpha = float(solver.get_dofs_acc().numpy().ravel()[0])
+        alpha = float(solver.get_dofs_acc().cpu().numpy().ravel()[0])
         theta = (float(q[0]), float(q[0] + q[1]), float(q[2]))
         closing = solver.constraint_solver.efc_force.to_numpy()[:2].ravel()
         found.read(theta, speed, alpha, -armature * alpha, {"F43": closing})

@@ -7,12 +7,14 @@ from pathlib import Path
 
 import mujoco_warp as mjw
 import newton
+import warp
 
 from fourbar.scene import Scene
 from validation.subjects.motion import Readings, gap, start, turn, weight
 from validation.subjects.mujoco_c import text
 
 VERSION = version("newton")
+DEVICE = str(warp.get_preferred_device().name)
 STEPS = (78, 157)
 CHANGED = "add_mjcf takes neither timestep, gravity nor keyframe: all three given by hand; --for newton"
 SETTINGS = {"SolverMuJoCo": None}
@@ -26,7 +28,7 @@ def through(scene: Scene, steps: int, setting: str) -> Readings:
         file = Path(folder) / "four_bar.xml"
         file.write_text(text(scene, steps, "newton"))
         builder.add_mjcf(str(file))
-    model = builder.finalize(device="cpu")
+    model = builder.finalize(device=warp.get_preferred_device())
     solver, control = newton.solvers.SolverMuJoCo(model), model.control()
     now, then = model.state(), model.state()
     speeds = now.joint_qd.numpy()

@@ -63,15 +63,18 @@ def released(engine: str, first: str | None, last: str | None) -> list[str]:
 def installed(engine: str, version: str, cache: Path, more: Sequence[str] = ()) -> tuple[Path | None, str]:
     """The interpreter that loads this version and no other; None, and why, where it does not install or load.
 
-    The environment has the engine and what it requires, and what `more` requires; all else it takes from the one that
-    runs here.
+    The environment has the engine and what it requires, and `more` where that does not contradict it; all else it takes
+    from the one that runs here.
     """
     folder = (cache / re.sub(r"[^\w.+-]", "_", "-".join([engine, version, *more]))).absolute()
     python = folder / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
     if not (folder / DONE).is_file():
         venv.EnvBuilder(symlinks=os.name != "nt", clear=True).create(folder)
         wanted = f"{distribution(engine)}=={version}"
-        done = pip(python, "install", "--only-binary=:all:", "--no-compile", wanted, *more)
+        options = ("install", "--only-binary=:all:", "--no-compile", wanted)
+        done = pip(python, *options, *more)
+        if done.returncode and more:
+            done = pip(python, *options)
         if done.returncode:
             return None, f"does not install: {_reason(done.stderr)}"
         site = Path(_answered(python, "import sysconfig; print(sysconfig.get_path('purelib'))")[0])

@@ -67,7 +67,7 @@ Try = Callable[[str], Release]
 @click.option("--to", "last", metavar="VERSION", help="The newest; left out: the newest that pip lists.")
 @click.option("--bisect", is_flag=True, help="Only the versions between which something changed, by halves.")
 @click.option("--jobs", type=click.IntRange(min=1), default=1, show_default=True, help="Versions at a time.")
-@click.option("--with", "more", multiple=True, metavar="REQUIREMENT", help="Install this into each one too (repeat).")
+@click.option("--with", "more", multiple=True, metavar="REQUIREMENT", help="For each that can take it (repeat).")
 @click.option("--cache", type=click.Path(path_type=Path), default=CACHE, help="Where the versions are installed.")
 @click.option("--out", type=click.Path(path_type=Path), help="Left out: results/versions-ENGINE.")
 def command(
@@ -112,7 +112,7 @@ def command(
         reasons = "; ".join(f"{release.version}: {release.why}" for release in found if release.run is None)
         raise DependencyError(f"fewer than two versions of {engine} can be judged: {reasons}")
     left = len(chosen) - len(found)
-    for name, text in written(engine, found, left).items():
+    for name, text in written(engine, found, left, more).items():
         write_text(out / name, text)
     for release in found:
         if release.run is None:
@@ -247,7 +247,7 @@ def _last(error: float) -> float:
 COLUMNS = ("version", "engine", *TORQUE_AND_FORCES, "compared", FAILS, REFUSES, CLOCK, "why")
 
 
-def written(engine: str, found: Sequence[Release], left: int) -> dict[str, str]:
+def written(engine: str, found: Sequence[Release], left: int, more: Sequence[str] = ()) -> dict[str, str]:
     """The text of each file by its name."""
     rows, sentences = lines(found), changed(found)
     table = io.StringIO()
@@ -259,7 +259,7 @@ def written(engine: str, found: Sequence[Release], left: int) -> dict[str, str]:
     kept = {"schema": SCHEMA, "engine": engine, "machine": machine(), "changed": sentences, "versions": plain}
     template = environment("validation.subjects", escape=False).get_template("versions.md.j2")
     shown = [[_cell(name, row.get(name)) for name in COLUMNS] for row in rows]
-    made = {"machine": machine(), "python": about.versions.get("python", ""), "left": left}
+    made = {"machine": machine(), "python": about.versions.get("python", ""), "left": left, "more": more}
     page = template.render(engine=engine, rows=shown, columns=COLUMNS, changed=sentences, **made)
     texts = {"csv": table.getvalue(), "json": json.dumps(kept, indent=1) + "\n", "md": page, "svg": chart(rows)}
     return {f"versions.{ending}": text for ending, text in texts.items()}
