@@ -35,12 +35,15 @@ def unit_of(part: str) -> str:
 
 def heading(found: Tolerances) -> list[str]:
     """The lines above the table."""
-    first, *others = counted(found)
-    return [
-        first,
-        "each quantity where its first-order worst case is largest; the share is that of the variance",
-        *others,
+    lines = [
+        *counted(found),
+        "each quantity where its first-order worst case is largest; sigma is the standard",
+        "deviation of the samples; the variance there comes from",
     ]
+    for part in shown_parts(found):
+        if (at := worst_position(found.spreads[part])) is not None and (most := _most(found, found.spreads[part], at)):
+            lines.append(f"  {part}: {most}")
+    return lines
 
 
 def counted(found: Tolerances) -> list[str]:
@@ -84,11 +87,10 @@ def table(found: Tolerances) -> "Table":
     from rich.table import Table
     from rich.text import Text
 
-    shown = Table(box=box.SIMPLE_HEAD, show_edge=False, pad_edge=False, padding=(0, 1, 0, 0))
-    heads = ("", "\nunit", "theta_2\ndeg", "\nnominal", "standard\ndeviation", f"{BAND[0]:g} %\nof samples")
-    for head in (*heads, f"{BAND[1]:g} %\nof samples", "least\nsampled", "greatest\nsampled", "worst case\n+-"):
+    shown = Table(box=box.SIMPLE_HEAD, show_edge=False, pad_edge=False, padding=0)
+    first = ("", "\nunit", "theta_2\ndeg", "\nnominal", "\nsigma")
+    for head in (*first, f"\n{BAND[0]:g} %", f"\n{BAND[1]:g} %", "\nleast", "\ngreatest", "worst\n+-"):
         shown.add_column(Text(head), justify="right" if head else "left", no_wrap=True)
-    shown.add_column(Text("most of it from\n"), no_wrap=True)
     for part in shown_parts(found):
         spread = found.spreads[part]
         at = worst_position(spread)
@@ -98,17 +100,17 @@ def table(found: Tolerances) -> "Table":
         numbers = [f"{column[at]:.6g}" for column in columns]
         numbers[1] = f"{spread.deviation[at]:.3g}"
         row = [part, unit_of(part), f"{math.degrees(found.theta_2[at]):.6g}", *numbers, f"{spread.worst[at]:.3g}"]
-        shown.add_row(*map(Text, row), Text(_most(found, spread, at)))
+        shown.add_row(*map(Text, row))
     return shown
 
 
 def _most(found: Tolerances, spread: Spread, at: int) -> str:
-    """The two tolerances with the largest shares."""
+    """The two tolerances with the largest shares of the variance."""
     shares, total = spread.shares[:, at], float(spread.shares[:, at].sum())
     if not total > 0.0:
-        return "-"
-    order = np.argsort(-shares)[:2]
-    return ", ".join(f"{found.scene.tolerances[i].key} {100.0 * shares[i] / total:.0f} %" for i in order)
+        return ""
+    order = [i for i in np.argsort(-shares)[:2] if shares[i] > 0.0]
+    return ", ".join(f"{100.0 * shares[i] / total:.0f} % {found.scene.tolerances[i].key}" for i in order)
 
 
 def embedded_tolerances(scene: Scene, theta_2: list[float]) -> dict[str, Any]:
