@@ -5,9 +5,10 @@ import numpy as np
 import pytest
 from mpmath import mpf
 
+from fourbar.formulas.arithmetic import cross, dot
 from fourbar.formulas.motion import State, coefficients, rates, with_parallel_pairs
 from fourbar.formulas.path import path, state
-from fourbar.formulas.pin_forces import Wrenches, cross, dot, pin_forces
+from fourbar.formulas.pin_forces import Wrenches, pin_forces
 from fourbar.formulas.position import close_loop, direction, half_angle, loop, parallel_pairs
 from fourbar.formulas.transmission import drive_sine
 from fourbar.linkage import uniform

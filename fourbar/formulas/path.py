@@ -8,23 +8,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fourbar.formulas.motion import Coefficients, State, coefficients, rates
+from fourbar.formulas.arithmetic import Number, anywhere, cross, dot, polar, vector
+from fourbar.formulas.motion import Coefficients, State, coefficients, rates, with_sines_of_rates
 from fourbar.formulas.motion import with_parallel_pairs as parallel_motion
-from fourbar.formulas.pin_forces import cross, dot
-from fourbar.formulas.position import (
-    HalfAngle,
-    Loop,
-    Number,
-    Position,
-    anywhere,
-    close_loop,
-    direction,
-    half_angle,
-    loop,
-    parallel_pairs,
-    polar,
-    vector,
-)
+from fourbar.formulas.position import HalfAngle, Loop, Position, close_loop, direction, half_angle, loop, parallel_pairs
 from fourbar.formulas.position import with_parallel_pairs as parallel_position
 from fourbar.linkage import FourBar
 
@@ -90,6 +77,7 @@ class Path(NamedTuple):
     def motion(self, at: Position, branch: Number) -> tuple[Position, Coefficients]:
         """Positions and kinematic coefficients by q with the bars in their usual order, from `position`."""
         k = coefficients(self.lengths, at)
+        at = with_sines_of_rates(self.lengths, at, k)
         if self.may_stay_parallel:
             first, second = parallel_pairs(self.lengths, at.half, branch)
             known = ~np.isnan(at.root)

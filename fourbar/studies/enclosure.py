@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 
 from fourbar.effects.actions import bodies
 from fourbar.errors import DependencyError, InputError, LimitError
+from fourbar.formulas.arithmetic import dot
 from fourbar.formulas.path import Path
-from fourbar.formulas.pin_forces import dot
 from fourbar.formulas.position import HalfAngle, Loop, close_loop
 from fourbar.quantities import PIN_FORCES
 from fourbar.scene import Scene, command
