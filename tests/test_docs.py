@@ -64,13 +64,15 @@ def test_every_command_prints_what_is_shown(
 
 
 @pytest.mark.usefixtures("checkout")
-def test_the_program_prints_what_is_shown() -> None:
-    (program,), (shown,) = blocks("python", read("README.md")), blocks("text", read("README.md"))
-    printed = io.StringIO()
-    with contextlib.redirect_stdout(printed):
-        exec(compile(program, "README.md", "exec"), {})
-    # the error bar is itself rounding: its digits may differ from one machine to the next
-    assert re.sub(r"take .*", "take", printed.getvalue()) == re.sub(r"take .*", "take", shown)
+def test_the_programs_print_what_is_shown() -> None:
+    programs, texts = blocks("python", read("README.md")), blocks("text", read("README.md"))
+    assert len(programs) == 2
+    for program, shown in zip(programs, texts, strict=True):
+        printed = io.StringIO()
+        with contextlib.redirect_stdout(printed):
+            exec(compile(program, "README.md", "exec"), {})
+        # the error bar is itself rounding: its digits may differ from one machine to the next
+        assert re.sub(r"take .*", "take", printed.getvalue()) == re.sub(r"take .*", "take", shown)
 
 
 def test_the_scene_file_is_one(checkout: Path) -> None:

@@ -12,7 +12,7 @@ from fourbar.effects import PinFriction
 from fourbar.formulas.pin_forces import PinForces
 from fourbar.quantities import FORCES, PIN_FORCES, QUANTITIES, STAGES, UNKNOWNS
 from fourbar.solution import Solution
-from tests.scenes import crank_rocker
+from tests.scenes import crank_rocker, judge_here
 from validation.compare.columns import read_columns
 from validation.compare.rows import COLUMNS, Row, from_csv
 from validation.run.run import run
@@ -37,7 +37,9 @@ def block(language: str) -> str:
 @pytest.fixture(scope="module")
 def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("run")
-    list(run(Random(30, 1, tuple(LinkageType)), folder / "results", chosen("free-body"), workers=1, drawn=False))
+    with pytest.MonkeyPatch.context() as monkeypatch:
+        judge_here(monkeypatch)
+        list(run(Random(8, 1, tuple(LinkageType)), folder / "results", chosen("free-body"), workers=1, drawn=False))
     return folder
 
 

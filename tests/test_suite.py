@@ -293,7 +293,8 @@ def test_a_full_disk_is_one_line_and_status_3_and_resumes(tmp_path: Path, undist
     _, printed = process.communicate(timeout=100)
     assert process.returncode == 3
     assert b"Traceback" not in printed
-    assert printed.strip().splitlines()[-1].startswith(b"error: ")
+    last = printed.decode().strip().splitlines()[-1]
+    assert last.startswith("error: ") and str(tmp_path / "results.") in last
     assert not (tmp_path / "results.csv").exists()
     assert_resumes(tmp_path, undisturbed)
 

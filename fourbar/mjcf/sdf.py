@@ -5,7 +5,7 @@ from xml.etree import ElementTree as ET
 
 from fourbar.errors import LimitError
 from fourbar.linkage import BAR_NAMES, FIRST_PIN, MOVING_BARS
-from fourbar.mjcf.document import at_start, plain
+from fourbar.mjcf.document import Start, at_start, plain
 from fourbar.mjcf.model import carriable, text
 from fourbar.scene import Scene
 
@@ -25,12 +25,13 @@ CLOSURE = {
 }
 
 
-def sdf(scene: Scene, reader: str = "gazebo") -> str:
+def sdf(scene: Scene, reader: str = "gazebo", start: Start | None = None) -> str:
     """The SDF 1.9 text of a scene: a world with gravity, four links, and the pins as joints.
 
     Parameters
     ----------
     reader : who closes the loop how: "gazebo" by a fourth joint, "drake" by its own ball constraint.
+    start : the assembled state to stand in; None: that of `at_start`.
 
     Raises
     ------
@@ -46,7 +47,7 @@ def sdf(scene: Scene, reader: str = "gazebo") -> str:
     carriable(linkage)
     inertia = {number: linkage.bar(number).moment_of_inertia for number in MOVING_BARS}
     gravity, dynamics = _acting(scene, reader, inertia)
-    begin = at_start(scene)
+    begin = start or at_start(scene)
     (theta_2, of_3_to_2, theta_4), (omega_2, at_A, omega_4) = begin.qpos, begin.qvel
     turn = {2: theta_2, 3: theta_2 + of_3_to_2, 4: theta_4}
     foot = {

@@ -25,7 +25,7 @@ OfSome = Callable[[NDArray[np.intp]], Array]
 IN_ONE_LINE = 32.0 * 2.0**-53
 """|sin(theta_4 - theta_3)| at which bars 3 and 4 may be called in line: their directions are rounded by that."""
 SAMPLE = 5
-"""Positions of a scene at which friction is said to have several solutions that are tried: each takes a search."""
+"""Positions of a scene with several solutions of friction that are tried: each takes a search."""
 NEAR = 1e-6
 """|sin(theta_4 - theta_3)| below which doubles have no word in it."""
 

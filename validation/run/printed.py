@@ -96,7 +96,7 @@ def piece(at: Command, where: NDArray[np.intp]) -> Command:
 def _blocks(name: str, scene: Scene, at: Command, solution: Solution) -> Row:
     """A sweep of more than one block of positions, at the ends of its blocks, against the scene's own sweep."""
     n = len(at.theta_2)
-    long = np.arange(max(n, BLOCK + n)) % n
+    long = np.arange(BLOCK + n) % n
     ends = np.unique([0, BLOCK - 1, BLOCK, len(long) - 1])
     loaded = any(effect.loaded_pins for effect in scene.effects)  # whose couples may take a search at each position
     whole = solve(scene, "acceleration" if loaded else "force", at=piece(at, long))

@@ -1,4 +1,4 @@
-"""Speed of the formulas, side by side in one process: against the 13x13 system, over sizes, over stages."""
+"""Speed of the formulas, side by side in one process: against the 13x13 system, over sizes, stages; and of a run."""
 
 import ctypes
 import os
@@ -8,6 +8,7 @@ import sys
 import tempfile
 import tracemalloc
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from statistics import median
 from typing import NamedTuple
@@ -23,8 +24,12 @@ from fourbar.linkage import MOVING_BARS, Bar, FourBar
 from fourbar.quantities import ANGLES, UNKNOWNS, VECTORS
 from fourbar.scene import Command, Scene
 from fourbar.solve import BLOCK, solve
+from validation.engines.witnesses import WITNESSES, Witness
 from validation.published.thirteen import FreeBodies, solve_thirteen
 from validation.report.machine import machine
+from validation.run.judge import judged
+from validation.scenes.random import LinkageType
+from validation.scenes.suites import Random
 from validation.stress.against import ONE_THREAD
 from validation.stress.against import against as against_revision
 from validation.stress.timed import LINKAGE, command, example, preallocated, seconds
@@ -37,10 +42,13 @@ THIRTEEN_BATCH = 20_000
 """Positions per batch of the 13x13 system: larger batches are slower per position (27 MB of matrices each)."""
 SOLVED = 100_000
 """Positions where every array is allocated, and for the error bars, which evaluate the forces 17 times."""
+PER_SCENE = 50_000
+"""Positions in whose stead one random scene is judged: twenty of them by default."""
+JUDGED = "a scene judged by the exact engines, ms"
 
 
 class Limit(NamedTuple):
-    """What a row of the table is held to, and why; a ratio, which holds with and without AVX-512."""
+    """What a row of the table is held to, and why: ratios hold with and without AVX-512."""
 
     sign: str
     bound: float
@@ -64,6 +72,7 @@ LIMITS = {
     "compiled error bars / forces": Limit("<=", 17.0, "16 more evaluations, which share the tangent"),
     "growth from 1000 positions on": Limit("<=", 1.3, "the work is linear in the positions: blocks fit the cache"),
     "memory beyond the result, MB": Limit("<=", 50.0, "work space is that of a block, not of the sweep"),
+    JUDGED: Limit("<=", 65.0, "a night of ten hours judges a million scenes on twenty cores, statements and all"),
     "import fourbar / import numpy": Limit("<=", 1.0, "it loads numpy alone, and less than that of its own"),
 }
 """By the name of the row."""
@@ -244,6 +253,9 @@ def measure(positions: int, rounds: int, largest: int) -> dict[str, float]:
     everything_ns, forces = rows["formulas, all 11 unknowns"], rows["solve to forces, points too"]
     if in_c is not None:
         rows["compiled / C"] = rows["the same compiled"] / rows["plain C loop, all"]
+    exact = [witness for witness in WITNESSES if not witness.through_time]
+    if not any(witness.missing() for witness in exact):
+        rows[JUDGED] = judging(exact, max(1, positions // PER_SCENE))
     return rows | {
         "numpy / compiled": everything_ns / rows["the same compiled"],
         "compiled error bars / forces": rows["compiled with error bars"] / rows["compiled to forces, points too"],
@@ -256,6 +268,14 @@ def measure(positions: int, rounds: int, largest: int) -> dict[str, float]:
         "memory beyond the result, MB": memory(min(positions, 1_000_000)),
         "import fourbar / import numpy": import_cost(),
     }
+
+
+def judging(witnesses: list[Witness], scenes: int) -> float:
+    """Milliseconds of CPU in which a random scene is judged as `run` does, nothing drawn; the median."""
+    suite = Random(scenes + 1, 0, tuple(LinkageType))
+    each = (partial(judged, suite.name(i), suite.scene(i), witnesses, draw=False) for i in range(scenes + 1))
+    times = [seconds(action) for action in each]
+    return 1e3 * median(times[1:])  # the first one imports the engines
 
 
 def repeated(scene: Scene, n: int) -> Callable[[], object]:

@@ -9,10 +9,9 @@ from pydrake.multibody.plant import DiscreteContactApproximation, MultibodyPlant
 from pydrake.systems.analysis import Simulator
 
 from fourbar.mjcf import flywheel
-from fourbar.mjcf.document import at_start
 from fourbar.mjcf.sdf import sdf
 from fourbar.scene import Scene
-from validation.subjects.motion import Readings, gap, turn
+from validation.subjects.motion import Readings, gap, start, turn, weight
 
 VERSION = version("drake")
 STEPS = (628, 2512)
@@ -23,12 +22,11 @@ SETTINGS = {"SAP": None}
 def through(scene: Scene, steps: int, setting: str) -> Readings:
     """A turn in so many steps, carried by a flywheel, the rotor of an actuator on O2."""
     timestep, stops = turn(scene, steps)
-    begin, inertia = at_start(scene), flywheel(scene)
+    begin, inertia = start(scene), flywheel(scene)
     plant = MultibodyPlant(timestep)
     plant.set_discrete_contact_approximation(DiscreteContactApproximation.kSap)
-    Parser(plant).AddModelsFromString(sdf(scene, "drake"), "sdf")
-    gravity = next((effect.vector for effect in scene.effects if effect.key == "gravity"), (0.0, 0.0))  # type: ignore[attr-defined]
-    plant.mutable_gravity_field().set_gravity_vector([float(gravity[0]), float(gravity[1]), 0.0])
+    Parser(plant).AddModelsFromString(sdf(scene, "drake", begin), "sdf")
+    plant.mutable_gravity_field().set_gravity_vector(weight(scene))
     joints = [plant.GetJointByName(name) for name in ("O2", "A", "O4")]
     actuator = plant.AddJointActuator("drive", joints[0])
     actuator.set_default_rotor_inertia(inertia)

@@ -45,13 +45,15 @@ def command(scene: Path, pythons: tuple[Path, ...], out: Path, time_limit: float
     if not found.lines:
         raise InputError("--python", ", ".join(map(str, pythons)) or None, "no subject answered there")
     chart = work_precision(found)
+    versions = dict.fromkeys(f"{line.subject} {line.version}" for line in found.lines)
     page = {
         "title": given.title,
-        "made": machine(),
+        "made": f"{machine()}; {', '.join(versions)}",
         "explained": EXPLAINED,
         "head": HEAD,
         "rows": [cells(line) for line in found.lines],
         "changed": found.changed,
+        "devices": found.devices,
         "left_out": found.left_out,
         "findings": findings(),
         "chart": chart,

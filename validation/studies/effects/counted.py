@@ -22,7 +22,7 @@ AMOUNTS = {"formulas": (1, 5), "mujoco-simulated": (10, 210), "mujoco-inverse": 
 BRACKET = "ffi_call"
 """The function of libffi within which a workload runs."""
 REPEATS = 1e-3
-"""Counts of the same work differ by less than this part."""
+"""Counts of the same work differ by this part at least, whatever the machine."""
 
 
 def available() -> bool:
