@@ -87,11 +87,6 @@ def _sums(name: str, scene: Scene, at: Command, solution: Solution, ours: Answer
         alpha = getattr(solution, f"alpha_{number}")
         force = force + load - bar.mass * acceleration
         force_terms = force_terms + magnitude(load) + bar.mass * magnitude(acceleration)
-        if scene.drive_bar == 4 and number != 4:  # F32 and F43 are solved apart, from the moments of bars 2 and 3
-            swung = np.abs(couple) + bar.mass * magnitude(centre - first_pins[number]) * magnitude(acceleration)
-            sine = np.abs(np.sin(solution.theta_3 - solution.theta_2))
-            with np.errstate(divide="ignore", invalid="ignore"):  # 0/0 where nothing is judged: at a change point
-                force_terms = force_terms + (swung + actions.bodies[number - 2].I * np.abs(alpha)) / (bar.length * sine)
         turned = couple + _cross(first_pins[number], load)
         swept = bar.mass * _cross(centre, acceleration) + actions.bodies[number - 2].I * alpha
         moment = moment + turned - swept
@@ -101,11 +96,11 @@ def _sums(name: str, scene: Scene, at: Command, solution: Solution, ours: Answer
             + bar.mass * _reach(centre) * magnitude(acceleration)
             + actions.bodies[number - 2].I * np.abs(alpha)
         )
-    # the torque is that of virtual work, the forces are those of the free bodies: both err as the two conditions say
+    # the forces of the bars that are not driven are solved apart, and the torque is that of virtual work
+    assert solution.drive_condition is not None
     with np.errstate(divide="ignore", invalid="ignore"):
+        force_terms = force_terms / (lever(scene.linkage) * solution.drive_condition)
         moment_terms = moment_terms / condition_of("torque", scene.linkage, solution)
-    # the accelerations are printed by one evaluation and balanced by another, which a short bar sets apart
-    force_terms = force_terms / lever(scene.linkage)
     where = solution.status_code == OK
     # the sense of dry friction at a pin at rest is decided by rounding: not the same here as in the answer
     where &= ~reversing(scene, solution, IDENTITY.factor)
