@@ -136,8 +136,8 @@ def test_a_count_that_cannot_decide_says_which_one_can(
     monkeypatch.setattr(measure, "relative_costs", lambda rig: {})
     for count, status in ((40, 1), (73, 0)):
         assert ended(["advise-study", "--count", str(count), "--out", str(tmp_path / f"{count}.csv")]) == status
-        said = "undecided: with 0 not met the bound is reached from --count 73 on" in capsys.readouterr().out
-        assert said == (status == 1)
+        stated = "undecided: with 0 not met the bound is reached from --count 73 on" in capsys.readouterr().out
+        assert stated == (status == 1)
 
 
 def test_a_measure_is_resumed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

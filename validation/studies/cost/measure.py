@@ -183,7 +183,7 @@ def study(count: int, seed: int, out: Path) -> int:
     """Measure the advice on random linkages; exit 1 where it is not met or not cheap often enough.
 
     That it is met often enough is a statement on all linkages, which few of them cannot prove: the count that it
-    needs is said.
+    needs is stated.
     """
     from rich.console import Console
     from rich.progress import track
