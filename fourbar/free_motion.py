@@ -17,9 +17,10 @@ from numpy.typing import NDArray
 
 from fourbar.effects.actions import Actions, bodies
 from fourbar.errors import DependencyError, FourBarError, InputError, LimitError, installing
+from fourbar.formulas.arithmetic import cross
 from fourbar.formulas.motion import Coefficients, State, rates
 from fourbar.formulas.path import Path, path, smooth_branch
-from fourbar.formulas.pin_forces import Body, cross
+from fourbar.formulas.pin_forces import Body
 from fourbar.formulas.position import HalfAngle, Loop, Position, loop
 from fourbar.formulas.torque import half_slope, inertia
 from fourbar.linkage import FourBar

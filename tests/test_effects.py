@@ -26,8 +26,9 @@ from fourbar.effects import (
 )
 from fourbar.effects.actions import Actions, bodies
 from fourbar.files.effects import REGISTRY
+from fourbar.formulas.arithmetic import dot
 from fourbar.formulas.path import state
-from fourbar.formulas.pin_forces import Bodies, dot
+from fourbar.formulas.pin_forces import Bodies
 from fourbar.linkage import MOVING_BARS
 from fourbar.scene import Scene, command
 from tests.scenes import crank_rocker

@@ -12,20 +12,12 @@ import numpy as np
 import pytest
 
 import fourbar.formulas
+from fourbar.formulas.arithmetic import cross, exact_difference, two_sum
 from fourbar.formulas.mobility import limit_positions
 from fourbar.formulas.motion import Coefficients, Rates, State, rates
 from fourbar.formulas.path import path, state
-from fourbar.formulas.pin_forces import Body, cross, inertia_wrenches, pin_forces
-from fourbar.formulas.position import (
-    HalfAngle,
-    close_loop,
-    direction,
-    exact_difference,
-    half_angle,
-    loop,
-    parallel_pairs,
-    two_sum,
-)
+from fourbar.formulas.pin_forces import Body, inertia_wrenches, pin_forces
+from fourbar.formulas.position import HalfAngle, close_loop, direction, half_angle, loop, parallel_pairs
 from fourbar.formulas.torque import driving_torque, half_slope, inertia
 from fourbar.formulas.transmission import drive_sine, drive_sine_of_triangle
 from fourbar.linkage import MOVING_BARS, Bar, FourBar, uniform

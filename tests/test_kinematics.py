@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import fourbar
+from fourbar.formulas.arithmetic import dot
 from fourbar.formulas.motion import State
 from fourbar.formulas.path import singular, state
-from fourbar.formulas.pin_forces import dot
 from fourbar.many_digits import limit_remainder
 
 EPS = 2.0**-52

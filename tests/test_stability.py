@@ -23,7 +23,12 @@ ONCE_BAD = {
         (3, 78),  # sin mu: Heron's factor of a short coupler and output by the longer route
         (3, 1063),  # bars: rounding of theta_2 - theta_1 near a whole turn
     ],
-    "scales": [(0, 347), (0, 952), (0, 1091)],  # bars, likewise
+    "scales": [
+        (0, 347),  # bars, likewise
+        (0, 952),
+        (0, 1091),
+        (0, 5133),  # F32, driven on bar 4: the moment about B of a coupler whose mass centre lies there
+    ],
     "speeds": [(0, 246), (0, 784)],  # bars, likewise
     "ratios": [
         (0, 36),  # torque: products of constants rounded to doubles in the pass with 32 digits
@@ -35,6 +40,7 @@ ONCE_BAD = {
         (0, 656),  # likewise, where bars stay parallel
         (0, 164),  # bar of the forces: directions of bars that stay parallel
         (0, 580),  # bars: products of constants
+        (0, 464),  # v_B: the small sine of theta_4 as a difference of large angles
         (0, 6915),  # bar of the forces: half a last digit lost in theta_2 - theta_1, added to it, was rounded away
     ],
 }

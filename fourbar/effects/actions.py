@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 
+from fourbar.formulas.arithmetic import Number, cross
 from fourbar.formulas.motion import State
-from fourbar.formulas.pin_forces import Bodies, Body, Wrenches, cross
-from fourbar.formulas.position import Number
+from fourbar.formulas.pin_forces import Bodies, Body, Wrenches
 from fourbar.linkage import PINS, FourBar
 
 AT_REST = 50.0 * 2.0**-52
@@ -84,6 +84,13 @@ class Actions:
             if pin != "O2":
                 others = others + couple * (k.h3 if pin == "A" else self.state.slip(pin)[0])
         return total, others
+
+    def about_B(self) -> Number:
+        """Moment on the coupler about pin B, N m."""
+        lengths, moment = self.state.lengths, self.moments.get(3, 0.0)
+        if 3 in self.forces:
+            moment = moment - lengths.b * cross(self.state.at.u3, self.forces[3])
+        return moment + self.couples.get("A", 0.0) - self.couples.get("B", 0.0)
 
     def sense(self, pin: str) -> Number:
         """Sign of omega_j - omega_i at a pin; at rest the one that a motion beginning to `side` would have.

@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.effects.actions import Actions
+from fourbar.formulas.arithmetic import Number
 from fourbar.formulas.motion import State
 from fourbar.formulas.pin_forces import Bodies
-from fourbar.formulas.position import Number
 from fourbar.solution import Array
 
 

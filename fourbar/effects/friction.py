@@ -6,8 +6,8 @@ from typing import ClassVar
 from fourbar.effects.actions import Actions
 from fourbar.effects.effect import Effect
 from fourbar.effects.pins import pin_values
+from fourbar.formulas.arithmetic import anywhere
 from fourbar.formulas.motion import State
-from fourbar.formulas.position import anywhere
 
 
 @dataclass(frozen=True, slots=True)

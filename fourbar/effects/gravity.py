@@ -8,8 +8,8 @@ import numpy as np
 
 from fourbar.effects.actions import Actions
 from fourbar.effects.effect import Effect
+from fourbar.formulas.arithmetic import anywhere
 from fourbar.formulas.motion import State
-from fourbar.formulas.position import anywhere
 from fourbar.linkage import MOVING_BARS, require
 
 U = 2.0**-53

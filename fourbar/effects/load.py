@@ -10,8 +10,8 @@ import numpy as np
 from fourbar.effects.actions import Actions
 from fourbar.effects.effect import Effect
 from fourbar.errors import InputError
+from fourbar.formulas.arithmetic import anywhere, polar
 from fourbar.formulas.motion import State
-from fourbar.formulas.position import anywhere, polar
 from fourbar.linkage import MOVING_BARS, FourBar, require
 from fourbar.solution import Array
 

@@ -12,8 +12,8 @@ from fourbar.effects.cones import NONE, ONE, settle
 from fourbar.effects.effect import Effect
 from fourbar.effects.pins import known
 from fourbar.errors import InputError
+from fourbar.formulas.arithmetic import anywhere
 from fourbar.formulas.pin_forces import PinForces
-from fourbar.formulas.position import anywhere
 from fourbar.linkage import PIN_FORCE, PINS, require
 from fourbar.quantities import JAMMED, OK, SEVERAL
 from fourbar.solution import Array

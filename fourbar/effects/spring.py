@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from fourbar.effects.actions import Actions
 from fourbar.effects.effect import Effect
 from fourbar.errors import InputError
+from fourbar.formulas.arithmetic import anywhere, polar
 from fourbar.formulas.motion import State
-from fourbar.formulas.position import anywhere, polar
 from fourbar.linkage import BAR_NAMES, FourBar, require
 from fourbar.quantities import NO_DIRECTION, OK
 

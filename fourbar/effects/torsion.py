@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from fourbar.effects.actions import Actions
 from fourbar.effects.effect import Effect
 from fourbar.effects.pins import known
+from fourbar.formulas.arithmetic import Number
 from fourbar.formulas.motion import State
-from fourbar.formulas.position import Number
 from fourbar.linkage import PINS, require
 from fourbar.quantities import OK, WOUND
 from fourbar.solution import Array

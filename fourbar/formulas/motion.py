@@ -11,7 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fourbar.formulas.position import Loop, Number, Position, anywhere, select, vector
+from fourbar.formulas.arithmetic import Number, anywhere, select, vector
+from fourbar.formulas.position import Loop, Position
 
 FAST = 4.0
 """|d^2 - a^2|/e^2, of twice 1/2 - t: from there on the triangle's side turns fast against the bars."""
@@ -60,7 +61,7 @@ def coefficients(lengths: Loop, at: Position) -> Coefficients:
     qg = xg * per_e2
     m, rest = (grown + a * (a - d)) * per_e2 + qg, (grown + d * (d - a)) * per_e2 - qg
     w = (xg - 0.5 * y) * per_e2
-    if anywhere(abs(y) > FAST * (d - a) * (d - a)):
+    if anywhere(side_may_turn_fast(lengths)):
         fast = side_turns_fast(lengths, at)
         heron = E2 * (d + a) * (d + a) * outer + E1 * (b - c) * (b - c) * (2.0 * grown)
         w = select(fast, -heron * per_root / (x * S + y * at.root), w)
@@ -70,11 +71,32 @@ def coefficients(lengths: Loop, at: Position) -> Coefficients:
     return Coefficients(1.0, m - g, m + g, rest + g, 2.0 * g, 0.0, dm - dg, dm + dg)
 
 
+def side_may_turn_fast(lengths: Loop) -> Number:
+    """Whether |d^2 - a^2| > FAST e^2 where e is shortest."""
+    return lengths.d + lengths.a > FAST * abs(lengths.d - lengths.a)
+
+
 def side_turns_fast(lengths: Loop, at: Position) -> Number:
     """Where t and q g are large and cancel: |d^2 - a^2| > FAST e^2, and x S, y root of one sign."""
     d, a, b, c, _, _ = lengths
     y = (d - a) * (d + a)
     return (abs(y) > FAST * at.e2) & ((y * at.root) * ((b - c) * at.half.sk) > 0.0)
+
+
+def with_sines_of_rates(lengths: Loop, at: Position, k: Coefficients) -> Position:
+    """Where the side turns fast, u3 and u4 with small sines that keep their digits, by the instant centres:
+
+    d sin(theta_4 - theta_1) = b sin(theta_4 - theta_3) (1 - h3),
+    d sin(theta_3 - theta_1) = c sin(theta_4 - theta_3) (1 - h4).
+    """
+    d, _, b, c, _, _ = lengths
+    if not anywhere(side_may_turn_fast(lengths)):
+        return at
+    fast, scale = side_turns_fast(lengths, at), at.sin_mu / d
+    u3, u4 = at.u3 * at.u1.conjugate(), at.u4 * at.u1.conjugate()
+    u3 = select(fast, vector(u3.real, c * scale * (k.h23 - k.h43)) * at.u1, at.u3)
+    u4 = select(fast, vector(u4.real, b * scale * k.h23) * at.u1, at.u4)
+    return Position(at.u1, at.u2, u3, u4, at.sin_mu, at.diagonal, at.e2, at.root, at.half)
 
 
 def with_parallel_pairs(k: Coefficients, first: Number, second: Number) -> Coefficients:

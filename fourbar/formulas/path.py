@@ -8,23 +8,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fourbar.formulas.motion import Coefficients, State, coefficients, rates
+from fourbar.formulas.arithmetic import Number, anywhere, cross, dot, polar, power_of_two, vector
+from fourbar.formulas.motion import Coefficients, State, coefficients, rates, with_sines_of_rates
 from fourbar.formulas.motion import with_parallel_pairs as parallel_motion
-from fourbar.formulas.pin_forces import cross, dot
-from fourbar.formulas.position import (
-    HalfAngle,
-    Loop,
-    Number,
-    Position,
-    anywhere,
-    close_loop,
-    direction,
-    half_angle,
-    loop,
-    parallel_pairs,
-    polar,
-    vector,
-)
+from fourbar.formulas.position import HalfAngle, Loop, Position, close_loop, direction, half_angle, loop, parallel_pairs
 from fourbar.formulas.position import with_parallel_pairs as parallel_position
 from fourbar.linkage import FourBar
 
@@ -90,6 +77,7 @@ class Path(NamedTuple):
     def motion(self, at: Position, branch: Number) -> tuple[Position, Coefficients]:
         """Positions and kinematic coefficients by q with the bars in their usual order, from `position`."""
         k = coefficients(self.lengths, at)
+        at = with_sines_of_rates(self.lengths, at, k)
         if self.may_stay_parallel:
             first, second = parallel_pairs(self.lengths, at.half, branch)
             known = ~np.isnan(at.root)
@@ -100,7 +88,7 @@ class Path(NamedTuple):
 def path(lengths: Loop, theta_1: Number, bar: int = 2) -> Path:
     """The path in the angle of bar 2 or 4."""
     d, a, b, c, _, _ = lengths
-    unit = np.ldexp(1.0, np.frexp(0.25 * (d + a + b + c))[1])
+    unit = power_of_two(0.25 * (d + a + b + c))
     d, a, b, c = d / unit, a / unit, b / unit, c / unit
     if bar == 4:
         a, c, theta_1 = c, a, theta_1 + np.pi

@@ -12,8 +12,9 @@ Source: Linares Mendoza, section 5.7 (the thirteen equations); R. L. Norton, Des
 
 from typing import NamedTuple
 
+from fourbar.formulas.arithmetic import Number, anywhere, cross, dot, vector
 from fourbar.formulas.motion import Rates
-from fourbar.formulas.position import Loop, Number, Position, anywhere, vector
+from fourbar.formulas.position import Loop, Position
 
 
 class Body(NamedTuple):
@@ -55,16 +56,6 @@ class PinForces(NamedTuple):
     F14: Number
 
 
-def cross(u: Number, v: Number) -> Number:
-    """z-component of u x v."""
-    return u.real * v.imag - u.imag * v.real
-
-
-def dot(u: Number, v: Number) -> Number:
-    """Scalar product u . v."""
-    return u.real * v.real + u.imag * v.imag
-
-
 def about_first_pin(body: Body) -> Number:
     """I + m r^2, kg m^2."""
     return body.I + body.m * body.z.real * body.z.real + body.m * body.z.imag * body.z.imag
@@ -95,6 +86,20 @@ def inertia_wrenches(a: Number, bodies: Bodies, at: Position, moving: Rates) -> 
     ), (three.m * a) * of_2
 
 
+def coupler_about_B(lengths: Loop, three: Body, at: Position, moving: Rates, sine: Number) -> Number:
+    """d'Alembert: -I alpha_3 - m (G - B) x a_G, the coupler's moment about pin B, which is small where G lies near B.
+
+    Parameters
+    ----------
+    sine : of theta_3 - theta_2.
+    """
+    w2, w3, _, alpha_2, alpha_3, _ = moving
+    x, y, cosine = three.z.real - lengths.b, three.z.imag, dot(at.u2, at.u3)
+    of_A = lengths.a * (w2 * w2 * (x * sine + y * cosine) + alpha_2 * (x * cosine - y * sine))
+    of_G = w3 * w3 * (lengths.b * y) + alpha_3 * (x * three.z.real + y * y)
+    return -three.m * (of_A + of_G) - three.I * alpha_3
+
+
 def between(M_u: Number, M_v: Number, u: Number, v: Number, sine: Number) -> Number:
     """The force F with u x F = M_u and v x F = M_v, for unit vectors with u x v = sine: F = (M_u v - M_v u)/sine."""
     return (M_u * v - M_v * u) * (1.0 / sine)
@@ -114,11 +119,12 @@ def pin_forces(
     drive_bar : 2, 3 or 4.
     sine : between the two bars that are not driven, of theta_4 - theta_3, theta_4 - theta_2, theta_3 - theta_2.
     w, mass_at_A : everything that acts, as from `inertia_wrenches`.
-    moment_of_F32 : a u2 x F32 (N m), which the virtual work of bars 3 and 4 knows; read for drive bar 2 alone.
+    moment_of_F32 : with the drive on bar 2: a u2 x F32 (N m), which the virtual work of bars 3 and 4 knows; on bar 4:
+        b u3 x F32, the opposite of the coupler's moment about B.
 
     >>> from math import pi
     >>> from fourbar.formulas.path import state
-    >>> from fourbar.formulas.position import polar
+    >>> from fourbar.formulas.arithmetic import polar
     >>> from fourbar.linkage import uniform  # below, Norton, example 11-3: in, lbf, s
     >>> s, deg = state(uniform(19, 5, 15, 10), pi / 3, 1, 25.0, -40.0), pi / 180
     >>> G3, P = polar(9, 45 * deg), polar(80, 330 * deg)  # a force on the coupler
@@ -134,8 +140,7 @@ def pin_forces(
     of_3, of_4 = M3 - C, M4 + C
     along, across = mass_at_A.real, mass_at_A.imag  # bar 2: apart, for each would cancel in a sum that it is no part of
     if drive_bar == 4:
-        F32 = between(-M2 / a, cross(at.u3, R3) - of_3 / b + across * dot(at.u3, at.u2), at.u2, at.u3, sine)
-        F32 = F32 + along * at.u2
+        F32 = between(-M2 / a, moment_of_F32 / b, at.u2, at.u3, sine)
         F43 = between(-of_3 / b, -M2 / a - cross(at.u2, R3) - across, at.u3, at.u2, -sine)
     elif drive_bar == 3:
         F43 = between(-M2 / a - cross(at.u2, R3) - across, of_4 / c, at.u2, at.u4, sine)

@@ -10,11 +10,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from fourbar.formulas.arithmetic import Number, cross
 from fourbar.formulas.circuits import circuits
 from fourbar.formulas.mobility import TURN, Array, change_points, on_smooth_path, turns_fully
 from fourbar.formulas.path import state
-from fourbar.formulas.pin_forces import cross
-from fourbar.formulas.position import Number
 from fourbar.linkage import FourBar
 
 

@@ -12,13 +12,12 @@ exactly and nothing cancels near it; nothing passes through zero at theta = 180 
 Source: R. L. Norton, Design of Machinery, ch. 4 (the loop and its two branches).
 """
 
-import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-Number = Any
-"""A float, or an array that broadcasts over positions and linkages."""
+from fourbar.formulas.arithmetic import Number, anywhere, exact_difference, select, square_root, tangent, vector
+
 HAIR = 1e-100
 """Added to the size of tan h: with A on O4 bars 3, 4 get the directions to which they tend from theta_2 > theta_1."""
 
@@ -62,35 +61,6 @@ class Position(NamedTuple):
     half: HalfAngle
 
 
-def anywhere(mask: Number) -> bool:
-    """Whether a mask holds at any entry; `np.any` costs a plain number fifty times as much."""
-    return bool(mask.any()) if isinstance(mask, np.ndarray) else bool(mask)
-
-
-def select(mask: Number, x: Number, y: Number) -> Number:
-    """x where a mask holds, y elsewhere; for a plain one the number itself."""
-    return np.where(mask, x, y) if isinstance(mask, np.ndarray) else (x if mask else y)
-
-
-def two_sum(x: Number, y: Number) -> tuple[Number, Number]:
-    """x + y = s + r exactly, s the rounded sum.
-
-    Source: D. E. Knuth, The Art of Computer Programming, vol. 2, 4.2.2, theorem B.
-    """
-    s = x + y
-    z = s - x
-    return s, (x - (s - z)) + (y - z)
-
-
-def exact_difference(p: Number, q: Number, r: Number, s: Number) -> Number:
-    """(p + q) - (r + s), zero only where it is zero."""
-    one, lost_1 = two_sum(p, q)
-    other, lost_2 = two_sum(r, s)
-    gap, lost = two_sum(one, -other)
-    both, rest = two_sum(lost_1, -lost_2)
-    return (gap + (lost + both)) + rest
-
-
 def loop(d: Number, a: Number, b: Number, c: Number) -> Loop:
     """The lengths with E1 = (b + c - a - d)(a + b + c + d) and E2 = (d - a - b + c)(d - a + b - c).
 
@@ -102,22 +72,9 @@ def loop(d: Number, a: Number, b: Number, c: Number) -> Loop:
     return Loop(d, a, b, c, E1, E2)
 
 
-def vector(x: Number, y: Number) -> Number:
-    """x + i y, each part written once: over arrays the sum takes three times as long."""
-    if hasattr(x, "slopes") or hasattr(y, "slopes"):  # numbers that carry their derivatives
-        return x + 1j * y
-    if not isinstance(x, np.ndarray) and not isinstance(y, np.ndarray):
-        plain = complex(x, y)
-        return plain if type(x) is type(y) is float else np.complex128(plain)
-    z = np.empty(np.broadcast(x, y).shape, dtype=complex)
-    z.real, z.imag = x, y
-    return z[()]
-
-
 def direction(theta: Number) -> Number:
     """e^{i theta} from one tangent."""
-    t = np.tan(0.5 * theta)
-    return direction_of_tangent(t.item() if type(theta) is float else t)
+    return direction_of_tangent(tangent(0.5 * theta))
 
 
 def direction_of_tangent(t: Number) -> Number:
@@ -126,19 +83,9 @@ def direction_of_tangent(t: Number) -> Number:
     return vector((1.0 - t * t) * kk, 2.0 * t * kk)
 
 
-def polar(r: Number, phi: Number) -> Number:
-    """r e^{i phi} with the cosine and the sine of the library, exact where phi = 0."""
-    return r * np.cos(phi) + 1j * (r * np.sin(phi))
-
-
-def square_root(x: Number) -> Number:
-    """sqrt(x), NaN where x < 0, of Python's own floats as such."""
-    return math.sqrt(x) if type(x) is float and x >= 0.0 else np.sqrt(x)
-
-
 def half_angle(lengths: Loop, psi: Number) -> HalfAngle:
     """The half angle h of psi = theta_2 - theta_1 (rad), and the factors of Heron's formula."""
-    return half_angle_of_tangent(lengths, np.tan(0.5 * psi))
+    return half_angle_of_tangent(lengths, tangent(0.5 * psi))
 
 
 def half_angle_of_tangent(lengths: Loop, t: Number) -> HalfAngle:

@@ -10,9 +10,10 @@ h3 = 0, T4 where h4 = 0.
 Source: R. L. Norton, Design of Machinery, ch. 11 (virtual work); M. Eksergian, Dynamical analysis of machines (1930).
 """
 
+from fourbar.formulas.arithmetic import Number, dot
 from fourbar.formulas.motion import Coefficients
-from fourbar.formulas.pin_forces import Bodies, about_first_pin, dot
-from fourbar.formulas.position import Number, Position
+from fourbar.formulas.pin_forces import Bodies, about_first_pin
+from fourbar.formulas.position import Position
 
 
 def inertia(a: Number, bodies: Bodies, at: Position, k: Coefficients) -> tuple[Number, Number]:
@@ -53,7 +54,7 @@ def driving_torque(k: Coefficients, drive_bar: int, inertial: Number, Q: Number)
     >>> from math import pi
     >>> from fourbar.formulas.path import state
     >>> from fourbar.formulas.pin_forces import Body
-    >>> from fourbar.formulas.position import polar
+    >>> from fourbar.formulas.arithmetic import polar
     >>> from fourbar.linkage import uniform  # below, Norton, example 11-3: in, lbf, s
     >>> s, deg = state(uniform(19, 5, 15, 10), pi / 3, 1, 25.0, -40.0), pi / 180
     >>> G3, P = polar(9, 45 * deg), polar(80, 330 * deg)

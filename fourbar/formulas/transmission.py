@@ -5,10 +5,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from fourbar.formulas.arithmetic import Number, cross, dot
 from fourbar.formulas.mobility import TURN, Array, Reach, change_points, limit_positions, reach_of
 from fourbar.formulas.motion import State
-from fourbar.formulas.pin_forces import cross, dot
-from fourbar.formulas.position import Loop, Number, Position
+from fourbar.formulas.position import Loop, Position
 from fourbar.linkage import FourBar
 
 

@@ -8,10 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.effects.actions import Actions, bodies
+from fourbar.formulas.arithmetic import anywhere, polar, vector
 from fourbar.formulas.motion import Coefficients, State, rates
 from fourbar.formulas.path import Path, path
-from fourbar.formulas.pin_forces import Bodies, PinForces, Wrenches, inertia_wrenches, pin_forces
-from fourbar.formulas.position import HalfAngle, Loop, Position, anywhere, parallel_pairs, polar, vector
+from fourbar.formulas.pin_forces import Bodies, PinForces, Wrenches, coupler_about_B, inertia_wrenches, pin_forces
+from fourbar.formulas.position import HalfAngle, Loop, Position, parallel_pairs
 from fourbar.formulas.torque import driving_torque, half_slope, inertia
 from fourbar.formulas.transmission import drive_sine, drive_sine_of_triangle
 from fourbar.linkage import FourBar
@@ -33,6 +34,8 @@ NOWHERE = np.empty(0, dtype=np.intp)
 
 NO_MOTION = Coefficients(*[np.nan] * 8)
 """Where positions alone are wanted."""
+Evaluated = tuple[NDArray[np.uint8], dict[str, Any], Position | None]
+"""Status codes and quantities of some positions, vectors as x + i y, and where the drive must balance."""
 
 
 def changed(value: Any, change: Callable[[Any], Any]) -> Any:
@@ -139,12 +142,19 @@ class Case(NamedTuple):
             own, mass_at_A = Wrenches(*map(rounded, own)), vector(rounded(mass_at_A.real), rounded(mass_at_A.imag))
             inertial, others = rounded(inertial), rounded(others)
 
-        sine, short = self.drive_sine(at), np.any(self.lengths.d < self.lengths.a)
+        sine, short = self.drive_sine(at), anywhere(self.lengths.d < self.lengths.a)
         if rounded is not None:
             sine = rounded(sine)
+        if self.drive_bar == 4:
+            about_B = coupler_about_B(self.lengths, self.bodies[1], at, state.moving, sine)
+            others = about_B if rounded is None else rounded(about_B)
 
         def solved(acting: Actions, own: Wrenches, mass_at_A: Any, others: Any) -> PinForces:
-            w, moment = acting.wrenches(own), acting.work()[1] - others if short else 0.0
+            w, moment = acting.wrenches(own), 0.0
+            if self.drive_bar == 4:
+                moment = -(acting.about_B() + others)
+            elif self.drive_bar == 2 and short:
+                moment = acting.work()[1] - others
             return pin_forces(self.lengths, at, self.drive_bar, sine, w, mass_at_A, moment)
 
         def eliminate(acting: Actions) -> PinForces:

@@ -8,7 +8,6 @@ are evaluated by NumPy, as is every scene with other effects or with two pairs o
 import threading
 import zlib
 from functools import cache
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -16,24 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.effects import Flywheel, Gravity, Load, Viscous
-from fourbar.formulas import motion, pin_forces, position, torque, transmission
-from fourbar.formulas.motion import Coefficients, Rates, coefficients, rates
+from fourbar.formulas import arithmetic, motion, pin_forces, position, torque, transmission
+from fourbar.formulas.arithmetic import anywhere, cross, polar, select, square_root, two_sum, vector
+from fourbar.formulas.motion import Coefficients, Rates, coefficients, rates, with_sines_of_rates
 from fourbar.formulas.path import NO_DIGIT_LEFT
-from fourbar.formulas.pin_forces import Body, PinForces, Wrenches, cross, inertia_wrenches
+from fourbar.formulas.pin_forces import Body, PinForces, Wrenches, coupler_about_B, inertia_wrenches
 from fourbar.formulas.pin_forces import pin_forces as pin_forces_of
-from fourbar.formulas.position import (
-    Loop,
-    Position,
-    anywhere,
-    close_loop,
-    direction_of_tangent,
-    half_angle_of_tangent,
-    polar,
-    select,
-    square_root,
-    two_sum,
-    vector,
-)
+from fourbar.formulas.position import Loop, Position, close_loop, direction_of_tangent, half_angle_of_tangent
 from fourbar.formulas.torque import driving_torque, half_slope, inertia
 from fourbar.formulas.transmission import drive_sine_of_triangle
 from fourbar.linkage import MOVING_BARS, PINS
@@ -224,7 +212,12 @@ def forces(
         of_B,
     )
     mass_at_A = vector(real_rounded(mass_at_A.real, signs, 51), real_rounded(mass_at_A.imag, signs, 52))
-    pins = pin_forces_of(lengths, at, drive_bar, sine, w, mass_at_A, Q + of_A * k.h3 - others)
+    if drive_bar == 4:
+        about_B = real_rounded(coupler_about_B(lengths, three, at, moving, sine), signs, 251)
+        moment = -(about_B + N3 - lengths.b * cross(at.u3, P3) + of_A - of_B)
+    else:
+        moment = Q + of_A * k.h3 - others
+    pins = pin_forces_of(lengths, at, drive_bar, sine, w, mass_at_A, moment)
     return pins, driving_torque(k, drive_bar, inertial, Q + of_A * slip_A + (N2 + of_O2) * k.h2), sine
 
 
@@ -246,6 +239,8 @@ def nearby(
     in_unit = Loop(d, a, b, c, rounded_real(E1, signs[0]), rounded_real(E2, signs[1]))
     u2 = select(turned, at.u2, vector(half.kk - half.ss, 2.0 * half.sk))
     near = close_loop(in_unit, at.u1, u2, half, number(rows, 14, i))
+    k = coefficients(in_unit, near)
+    near = with_sines_of_rates(in_unit, near, k)
     near = Position(
         at.u1,
         rounded_complex(u2, turned, signs[19], signs[20]),
@@ -257,7 +252,7 @@ def nearby(
         near.root,
         half,
     )
-    k = rounded_coefficients(in_unit, near, coefficients(in_unit, near), thirteen(signs, 25))
+    k = rounded_coefficients(in_unit, near, k, thirteen(signs, 25))
     v = rates(k, number(rows, 12, i), number(rows, 13, i))
     omega_3, omega_4 = rounded_real(v.omega_3, signs[38]), rounded_real(v.omega_4, signs[39])
     alpha_3, alpha_4 = rounded_real(v.alpha_3, signs[40]), rounded_real(v.alpha_4, signs[41])
@@ -313,6 +308,7 @@ def run(
         diagonal = at.diagonal * (lengths.d / in_unit.d)
         at = Position(at.u1, at.u2, at.u3, at.u4, at.sin_mu, diagonal, at.e2, at.root, half)
         k = coefficients(in_unit, at)
+        at = with_sines_of_rates(in_unit, at, k)
         v = rates(k, number(rows, 12, i), number(rows, 13, i))
         pins, torque, sine = forces(lengths, in_unit, at, k, v, rows, i, drive_bar, turned, None)
         vectors[0, i], vectors[1, i], vectors[2, i] = at.u2, at.u3, at.u4
@@ -338,9 +334,10 @@ def run(
 
 
 LEAVES: tuple[tuple[Any, str], ...] = (
-    (position, "two_sum direction_of_tangent half_angle_of_tangent close_loop"),
-    (motion, "side_turns_fast coefficients rates"),
-    (pin_forces, "cross dot about_first_pin inertia_wrenches between pin_forces"),
+    (arithmetic, "two_sum cross dot"),
+    (position, "direction_of_tangent half_angle_of_tangent close_loop"),
+    (motion, "side_may_turn_fast side_turns_fast coefficients with_sines_of_rates rates"),
+    (pin_forces, "about_first_pin inertia_wrenches coupler_about_B between pin_forces"),
     (torque, "inertia half_slope driving_torque"),
     (transmission, "drive_sine_of_triangle"),
     (cases, "undecided"),
@@ -348,11 +345,6 @@ LEAVES: tuple[tuple[Any, str], ...] = (
 )
 """What is compiled as it stands."""
 OWN = (complex_rounded, real_rounded, by_terms, body_of, push_of, viscous_of, forces, thirteen, nearby, square)
-
-
-def installed() -> bool:
-    """Whether there is numba."""
-    return find_spec("numba") is not None
 
 
 @cache

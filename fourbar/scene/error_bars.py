@@ -13,10 +13,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fourbar.formulas.arithmetic import select, two_sum, vector
 from fourbar.formulas.motion import Coefficients, State, rates, side_turns_fast
 from fourbar.formulas.path import read_backwards
 from fourbar.formulas.pin_forces import Body
-from fourbar.formulas.position import HalfAngle, Loop, Position, select, two_sum, vector
+from fourbar.formulas.position import HalfAngle, Loop, Position
 from fourbar.scene.case import Case, Dynamics, changed
 
 EVALUATIONS = 16

@@ -11,15 +11,16 @@ from fourbar.effects.actions import Actions
 from fourbar.effects.cones import settle
 from fourbar.effects.pin_friction import Settled
 from fourbar.errors import InputError
-from fourbar.formulas.position import polar
+from fourbar.formulas.arithmetic import polar
 from fourbar.linkage import PIN_FORCE
 from fourbar.quantities import FORCES, NOT_ASSEMBLED, OK, SINGULAR, STATUS_NAMES
 from fourbar.scene import Command, Scene, command
 from fourbar.scene.case import Case
+from fourbar.scene.kinematics import KINEMATIC, kinematics
 from fourbar.scene.motion import FromLimit
 from fourbar.scene.point import OF_POINTS
 from fourbar.solution import Array, Solution
-from fourbar.solve import KINEMATIC, kinematics, solve
+from fourbar.solve import solve
 from fourbar.studies.keys import Entry, at_place, entries, placed
 from fourbar.studies.sloped import Sloped, slopes, values
 

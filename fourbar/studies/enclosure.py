@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 
 from fourbar.effects.actions import bodies
 from fourbar.errors import DependencyError, InputError, LimitError, installing
+from fourbar.formulas.arithmetic import dot
 from fourbar.formulas.mobility import TURN, change_points, intervals, limit_positions, turns_fully
 from fourbar.formulas.path import Path
-from fourbar.formulas.pin_forces import dot
 from fourbar.formulas.position import HalfAngle, Loop, close_loop
 from fourbar.quantities import PIN_FORCES
 from fourbar.scene import Scene, command

@@ -13,22 +13,11 @@ from fourbar.formulas.position import loop
 from fourbar.quantities import ANGLES, INVALID
 from fourbar.scene import Command, Scene, command
 from fourbar.scene.case import Case
+from fourbar.scene.evaluation import FORCE, commanded, evaluated
 from fourbar.scene.motion import FromLimit
+from fourbar.scene.start import started
 from fourbar.solution import Array, Solution, unwrap
-from fourbar.solve import (
-    BLOCK,
-    FORCE,
-    arrays,
-    commanded,
-    each,
-    evaluated,
-    is_compiled,
-    keep,
-    positions_at_once,
-    requested,
-    solved,
-    started,
-)
+from fourbar.solve import BLOCK, arrays, each, is_compiled, keep, positions_at_once, requested, solved
 from fourbar.studies.keys import entries, placed, refusal
 
 THETA_2 = "motion.theta_2"

@@ -13,8 +13,8 @@ from fourbar.formulas.pin_forces import Wrenches
 from fourbar.linkage import MOVING_BARS, PIN_FORCE
 from fourbar.quantities import OK, OVERFLOW
 from fourbar.scene import Command, Scene
+from fourbar.scene.start import state_at
 from fourbar.solution import Solution
-from fourbar.solve import state_at
 from validation.compare.answer import Answer
 from validation.compare.compare import turned
 from validation.compare.error import magnitude, relative, worst

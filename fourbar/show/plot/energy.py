@@ -6,12 +6,12 @@ import numpy as np
 
 from fourbar.effects.actions import Actions, bodies
 from fourbar.errors import DependencyError, installing
+from fourbar.formulas.arithmetic import dot
 from fourbar.formulas.motion import State
-from fourbar.formulas.pin_forces import dot
 from fourbar.linkage import MOVING_BARS
 from fourbar.scene import Command, Scene
+from fourbar.scene.start import state_at
 from fourbar.solution import Array, Solution
-from fourbar.solve import state_at
 
 
 class Energies(NamedTuple):

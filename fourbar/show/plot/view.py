@@ -7,13 +7,14 @@ import numpy as np
 
 from fourbar.effects.actions import Actions, bodies
 from fourbar.errors import NotAssembledError
+from fourbar.formulas.arithmetic import Number
 from fourbar.formulas.motion import State
-from fourbar.formulas.position import Number
 from fourbar.linkage import PINS
 from fourbar.scene import Command, Scene, command
 from fourbar.scene.motion import FromLimit
+from fourbar.scene.start import state_at
 from fourbar.solution import Array, Conversion, Solution
-from fourbar.solve import solve, state_at
+from fourbar.solve import solve
 
 CLEAR = 0.3
 """Motion and drive condition of the position drawn, where any has them: next to a pole forces dwarf all others."""

@@ -9,16 +9,18 @@ import numpy as np
 
 from fourbar.effects import Actions
 from fourbar.effects.actions import bodies
+from fourbar.formulas.arithmetic import cross, polar
 from fourbar.formulas.motion import State, coefficients, rates
-from fourbar.formulas.pin_forces import Wrenches, cross, inertia_wrenches, pin_forces
-from fourbar.formulas.position import close_loop, direction, half_angle, polar
+from fourbar.formulas.pin_forces import Wrenches, coupler_about_B, inertia_wrenches, pin_forces
+from fourbar.formulas.position import close_loop, direction, half_angle
 from fourbar.formulas.torque import driving_torque, half_slope, inertia
 from fourbar.formulas.transmission import drive_sine
 from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import PIN_FORCES
 from fourbar.scene import Command, Scene
 from fourbar.scene.case import Case
-from fourbar.solve import solve, state_at
+from fourbar.scene.start import state_at
+from fourbar.solve import solve
 from validation.compare.answer import Array
 from validation.compare.error import relative
 from validation.compare.scales import yardstick
@@ -66,10 +68,13 @@ def single(scene: Scene, at: Command) -> Quantities:
         own, mass_at_A = inertia_wrenches(a, case.bodies, position, moving)
         of_input, of_others = inertia(a, case.bodies, position, k)
         others = of_others * growth + half_slope(a, case.bodies, position, k) * (speed * speed)
+        sine = _single(drive_sine(position, scene.drive_bar))
         work, beyond_A = (_single(value) for value in actions.work())
+        moment = beyond_A - others
+        if scene.drive_bar == 4:
+            moment = -_single(actions.about_B() + coupler_about_B(case.lengths, case.bodies[1], position, moving, sine))
         wrenches = Wrenches(*map(_single, actions.wrenches(own)))
-        sine = drive_sine(position, scene.drive_bar)
-        pins = pin_forces(case.lengths, position, scene.drive_bar, sine, wrenches, mass_at_A, beyond_A - others)
+        pins = pin_forces(case.lengths, position, scene.drive_bar, sine, wrenches, mass_at_A, moment)
         torque = driving_torque(k, scene.drive_bar, others + of_input * growth, work)
     assert torque.dtype == np.float32
     return {"torque": torque, **{name: _stack(getattr(pins, name), len(theta_2)) for name in PIN_FORCES}}

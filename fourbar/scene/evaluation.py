@@ -1,0 +1,213 @@
+"""Positions of a case evaluated stage by stage: by NumPy, by the compiled loop, along a free motion."""
+
+from collections.abc import Collection, Iterable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fourbar.formulas.arithmetic import anywhere, polar
+from fourbar.formulas.motion import Rates, State
+from fourbar.formulas.path import NO_DIGIT_LEFT
+from fourbar.formulas.position import HalfAngle, Position
+from fourbar.quantities import (
+    ANGLES,
+    JAMMED,
+    NO_DIRECTION,
+    NOT_ASSEMBLED,
+    OF_DRY_FRICTION,
+    OK,
+    OVERFLOW,
+    PIN_FORCES,
+    SINGULAR,
+    STAGES,
+    UNKNOWNS,
+    WOUND,
+)
+from fourbar.scene import Command
+from fourbar.scene.case import NO_MOTION, NOWHERE, Case, Evaluated, changed
+from fourbar.scene.kinematics import kinematics
+from fourbar.scene.withheld import all_finite, no_value, withheld
+from fourbar.solution import Array
+
+if TYPE_CHECKING:
+    from fourbar.free_motion import FreeMotion
+
+
+FORCE, ERROR = STAGES.index("force"), STAGES.index("error")
+
+NO_HALF_ANGLE = HalfAngle(*[np.nan] * 5)
+"""Of positions whose motion and forces are known."""
+
+Part = tuple[Any, ...]
+"""Index of some positions in the arrays of all."""
+
+
+WITHOUT_FORCES = (NO_DIRECTION, WOUND)
+"""Statuses of positions at which an effect has no value, and so the forces have none."""
+
+
+def commanded(case: Case, where: Command, part: Part, wanted: int, names: Collection[str]) -> Evaluated:
+    """Some positions of a command to the input, evaluated.
+
+    Parameters
+    ----------
+    wanted : number of the last stage that the quantities named need.
+    """
+    theta_2: Any = where.theta_2[part]
+    if theta_2.ndim == 0:
+        theta_2 = theta_2.item()  # with Python's own numbers a formula takes half the time
+    branch = _sign(where.branch[part])
+    half, exact = case.half_angle(theta_2, where.remainder)
+    of_angles = len(names) <= len(ANGLES) and set(names) <= set(ANGLES)
+    if of_angles and where.remainder is None and not case.path.may_stay_parallel:
+        return _angles(case, half, branch, names)
+    at = case.path.position(theta_2, half, branch)
+    codes = _codes(at.sin_mu, half, NO_DIGIT_LEFT if where.remainder is None else 0.0)
+    if anywhere(codes):  # velocities are 0/0
+        at = at._replace(root=np.where(codes == SINGULAR, np.nan, at.root))
+    omega_2, alpha_2 = _piece(where.omega_2, part), _piece(where.alpha_2, part)
+    state = case.state(case.path, theta_2, at, branch, omega_2, alpha_2, moving=wanted > 0)
+    values = kinematics(case, state, names)
+    if wanted >= FORCE:
+        known = exact if wanted == ERROR else None
+        values |= _forces(case, state, alpha_2, branch, branch, codes, names, known)
+    return codes, values, at
+
+
+def evaluated(case: Case, where: Command, part: Part, wanted: int, names: Collection[str]) -> Evaluated:
+    """The same through the compiled loop; what it leaves open as of `commanded`."""
+    from fourbar.scene import compiled
+
+    theta_2, branch = where.theta_2[part], _sign(where.branch[part])
+    omega_2, alpha_2 = _piece(where.omega_2, part), _piece(where.alpha_2, part)
+    found = compiled.evaluate(case, theta_2, branch, omega_2, alpha_2, error_bars=wanted == ERROR)
+    u2, u3, u4, *pins = found.vectors
+    sin_mu, omega_3, omega_4, alpha_3, alpha_4, torque, sine, *errors = found.scalars
+    at = Position(polar(1.0, case.path.theta_1), u2, u3, u4, sin_mu, np.nan, np.nan, np.nan, NO_HALF_ANGLE)
+    moving = Rates(omega_2, omega_3, omega_4, alpha_2, alpha_3, alpha_4)
+    state = State(case.lengths, case.path.theta_1, theta_2, at, NO_MOTION, omega_2, moving)
+    values = kinematics(case, state, names)
+    others = dict(zip((*PIN_FORCES, "torque", "torque_error", "force_error"), (*pins, torque, *errors), strict=True))
+    others["drive_condition"] = np.abs(sine)
+    values |= {name: value for name, value in others.items() if name in names}
+    codes = np.zeros(theta_2.shape, dtype=np.uint8)
+    if found.left.any():
+        index = np.flatnonzero(found.left)
+
+        def own(number: Any) -> Any:
+            return number[index] if np.ndim(number) else number
+
+        left = changed(case, own)
+        where = Command(theta_2[index], own(where.branch[part]), own(omega_2), own(alpha_2))
+        rest = commanded(left, where, (...,), wanted, names)
+        withheld(left, rest)
+        codes[index] = rest[0]
+        for name, value in rest[1].items():
+            whole = np.array(np.broadcast_to(values[name], theta_2.shape))
+            whole[index] = value
+            values[name] = whole
+    elif all_finite({name: value for name, value in values.items() if name not in UNKNOWNS}):  # the loop saw to these
+        return codes, values, None
+    withheld(case, (codes, values, None))
+    return codes, values, None
+
+
+def _codes(sine: Any, half: HalfAngle, margin: float) -> NDArray[np.uint8]:
+    """Statuses of positions from the sine of the transmission angle, or a multiple of it."""
+    codes, size = np.zeros(np.shape(sine), dtype=np.uint8), np.abs(sine)
+    if not (size.min(initial=np.inf) if codes.ndim else size) > margin:  # NaN where the loop does not close
+        codes[size <= margin] = SINGULAR
+        codes[np.isnan(sine)] = NOT_ASSEMBLED
+        codes[np.isnan(half.kk)] = OVERFLOW  # of theta_2 - theta_1: not even where it closes is known
+    return codes
+
+
+def _sign(branch: NDArray[np.int8]) -> Any:
+    """The branch of each position, or one number where all have the same."""
+    if branch.ndim == 0 or (branch.size and branch.min() == branch.max()):
+        return float(branch.flat[0]) if branch.ndim else float(branch)
+    return branch
+
+
+def _angles(case: Case, half: HalfAngle, branch: Any, names: Iterable[str]) -> Evaluated:
+    """The same where two angles alone are wanted: without vectors and the rest of the triangle."""
+    theta_3, theta_4, root = case.path.angles(half, branch)
+    codes = _codes(root, half, NO_DIGIT_LEFT * 2.0 * case.path.lengths.b * case.path.lengths.c)
+    found = {"theta_3": theta_3, "theta_4": theta_4}
+    return codes, {name: found[name] for name in names}, None
+
+
+def freely(case: Case, moved: "FreeMotion", part: Part, wanted: int, names: Collection[str]) -> Evaluated:
+    """The same at instants of a free motion that have one independent angle; there is no driving torque."""
+    codes = np.zeros(len(part[0]), dtype=np.uint8)
+    if not codes.size:
+        return codes, {}, None
+    bar = int(moved.bar[part][0])
+    free = case._replace(drive_bar=bar, path=moved.paths[bar])
+    q, speed, growth, branch = (x[part] for x in (moved.q, moved.speed, moved.acceleration, moved.sign))
+    at = free.path.position(q, free.path.half_angle(q), branch)
+    state = free.state(free.path, q, at, branch, speed, growth)._replace(theta_2=moved.command.theta_2[part])
+    values = kinematics(case, state, names)
+    if wanted >= FORCE:
+        exact = NOWHERE if wanted == ERROR else None
+        values |= _forces(free, state, growth, None, branch, codes, names, exact)
+        values |= {
+            name: np.zeros(codes.shape) for name in values if name in ("torque", "torque_error", *OF_DRY_FRICTION)
+        }
+    return codes, values, None
+
+
+def _forces(
+    case: Case,
+    state: State,
+    alpha_2: Any,
+    branch: NDArray[np.int8] | None,
+    sign: Any,
+    codes: NDArray[np.uint8],
+    names: Collection[str],
+    exact: NDArray[np.intp] | None,
+) -> dict[str, Any]:
+    """The quantities of the force stage; statuses of effects go into the codes.
+
+    Parameters
+    ----------
+    branch : of each position; None where no effect counts turns by it.
+    sign : of the path's root.
+    exact : indices of the positions known in many digits; None: no error bars.
+    """
+    found = case.dynamics(state, alpha_2, case.side)
+    values: dict[str, Any] = {**found.pins._asdict(), "torque": found.torque}
+    if "drive_condition" in names:
+        condition = np.abs(case.drive_sine(state.at))
+        values["drive_condition"] = condition if found.from_jamming is None else condition * found.from_jamming
+    if "friction_residual" in names:
+        values["friction_residual"] = 0.0 if found.residual is None else found.residual
+    if "torque_low" in names or "torque_high" in names:
+        *ends, held = case.torque_interval(state, alpha_2, found.torque)
+        values |= zip(OF_DRY_FRICTION, ends, strict=True)
+        if held is not None and found.status is not None:
+            found = found._replace(status=np.where(held & (found.status == OK), JAMMED, found.status))
+    if exact is not None:
+        from fourbar.scene.error_bars import error_bars
+
+        values |= error_bars(case, state, alpha_2, sign, found, exact)
+    without = [status for term in case.terms if (status := term.status(state, branch)) is not None]
+    if found.status is not None:
+        without.append(found.status)
+    if without:
+        status = np.max(without, axis=0)
+        codes[...] = np.where(codes == OK, status, codes)
+    if anywhere(codes > SINGULAR):
+        gone = np.isin(codes, WITHOUT_FORCES)
+        values |= {
+            name: np.where(gone, no_value(value), value) for name, value in values.items() if name != "drive_condition"
+        }
+    return {name: value for name, value in values.items() if name in names}
+
+
+def _piece(value: float | Array | None, part: Part) -> float | Array:
+    """A number for all positions, or the part of an array that belongs to a block."""
+    if value is None or np.ndim(value) == 0:
+        return value or 0.0
+    return value[part]  # type: ignore[index]
