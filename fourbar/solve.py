@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.errors import DependencyError, InputError
+from fourbar.errors import DependencyError, InputError, installing
 from fourbar.quantities import ANGLES, OF_DRY_FRICTION, OF_PIN_LOADS, QUANTITIES, STAGE_OF, STAGES
 from fourbar.scene import Command, Scene, command
 from fourbar.scene.case import Case, Evaluated
