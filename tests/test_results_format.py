@@ -12,7 +12,8 @@ from fourbar.effects import PinFriction
 from fourbar.formulas.pin_forces import PinForces
 from fourbar.quantities import FORCES, PIN_FORCES, QUANTITIES, STAGES, UNKNOWNS
 from fourbar.solution import Solution
-from tests.scenes import crank_rocker, judge_here
+from tests.here import judge_here
+from tests.scenes import crank_rocker
 from validation.compare.columns import read_columns
 from validation.compare.identities import FORMULAS, IDENTITIES
 from validation.compare.rows import COLUMNS, Row, from_csv
