@@ -213,6 +213,10 @@ def test_usd_closes_its_loop_keeps_masses_and_refuses_what_it_cannot_hold() -> N
     places = points(text, "xformOp:translate")
     ends = [places[bar - 2] + cmath.rect(linkage.bar(bar).length, turns[bar - 2]) for bar in (2, 3, 4)]
     assert abs(ends[0] - places[1]) < 8e-15 and abs(ends[1] - ends[2]) < 8e-15
+    fixed = [2.0 * cmath.phase(complex(float(w), float(z)))
+             for w, z in re.findall(r"localRot0 = \((\S+), 0, 0, (\S+)\)", text)]  # fmt: skip
+    between = [turns[0], turns[1] - turns[0], turns[2], turns[1] - turns[2]]
+    assert all(abs(one - other) < 8e-15 for one, other in zip(fixed, between, strict=True))
     assert points(text, "localPos0")[1::2] == [linkage.input.length, linkage.output.length]
     assert points(text, "localPos1") == [0.0, 0.0, 0.0, linkage.coupler.length]
     assert re.findall(r'Joint "(\w+)"', text) == ["O2", "A", "O4", "B"] and text.count("Articulation = true") == 1

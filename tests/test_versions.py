@@ -8,15 +8,17 @@ import os
 import sys
 import zipfile
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from subprocess import CompletedProcess
 
 import pytest
 
 from validation.cli import status
-from validation.compare.rows import AGREES, FAILS, Row
+from validation.compare.rows import AGREES, FAILS, Row, to_csv
 from validation.regression.history import Run
-from validation.regression.record import About
+from validation.regression.record import About, write_about
+from validation.run.elsewhere import ElsewhereError
 from validation.subjects import releases, versions
 from validation.subjects.versions import Release
 
@@ -140,6 +142,38 @@ def test_a_scan_runs_every_version() -> None:
     found = versions.scanned(FROM_0_TO_31[:6], made_up(changes, set(), tried), 2)
     assert sorted(tried) == list(range(6)) == [int(release.version) for release in found]
     assert [sentence.partition(":")[0] for sentence in versions.changed(found)] == ["2 -> 3", "3 -> 4"]
+
+
+def test_the_command_runs_each_version_and_says_why_one_has_no_answer(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    given = {"3.0": judged("3.0", 1e-3, FAILS), "3.2": judged("3.2", 1e-7)}
+
+    def elsewhere(python: Path, arguments: list[str], out: Path) -> None:
+        assert python == Path("its") and "--engines=pinocchio-inverse" in arguments
+        if (release := given.get(out.name)) is None:
+            raise ElsewhereError("its: the suite did not run there: no reason")
+        assert release.run is not None
+        (out / "results.csv").write_text(to_csv(replace(row, engine="pinocchio-inverse") for row in release.run.rows))
+        write_about(release.run.about, out)
+
+    monkeypatch.setattr(releases, "pip", lambda *_: CompletedProcess([], 0, LISTED, ""))
+    loads = {"2.7": (None, "does not load: libtoy.so.7")}
+    monkeypatch.setattr(versions, "installed", lambda _, version, *__: loads.get(version, (Path("its"), "")))
+    monkeypatch.setattr(versions, "run_elsewhere", elsewhere)
+    monkeypatch.setattr(versions, "timed", lambda *_: {"pinocchio-inverse": 1e-3})
+    assert status(["versions", "pinocchio", "--out", str(tmp_path)]) == 0
+    printed = capsys.readouterr().out
+    for line in (
+        "2.7 does not load: libtoy.so.7",
+        "3.1 the suite did not run there: no reason",
+        "3.0 -> 3.2: 1 verdict",
+    ):
+        assert line in printed
+    assert {file.name for file in tmp_path.glob("versions.*")} == {
+        f"versions.{x}" for x in ("md", "svg", "csv", "json")
+    }
+    assert status(["versions", "pinocchio", "--to", "3.1", "--out", str(tmp_path)]) == 3, "one version is no history"
 
 
 def test_page_table_and_chart_show_each_version_or_why_not() -> None:

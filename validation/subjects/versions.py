@@ -66,7 +66,9 @@ Try = Callable[[str], Release]
 @click.option("--from", "first", metavar="VERSION", help="The oldest; left out: the oldest that pip lists.")
 @click.option("--to", "last", metavar="VERSION", help="The newest; left out: the newest that pip lists.")
 @click.option("--bisect", is_flag=True, help="Only the versions between which something changed, by halves.")
-@click.option("--jobs", type=click.IntRange(min=1), default=1, show_default=True, help="Versions at a time.")
+@click.option(
+    "--jobs", type=click.IntRange(min=1), default=1, show_default=True, help="Versions at a time, not in a bisection."
+)
 @click.option("--with", "more", multiple=True, metavar="REQUIREMENT", help="For each that can take it (repeat).")
 @click.option("--cache", type=click.Path(path_type=Path), default=CACHE, help="Where the versions are installed.")
 @click.option("--out", type=click.Path(path_type=Path), help="Left out: results/versions-ENGINE.")
