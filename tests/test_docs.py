@@ -9,9 +9,12 @@ import re
 import shlex
 from pathlib import Path
 
+import click
 import pytest
 
 import fourbar
+import fourbar.cli
+import validation.cli
 from fourbar.cli import status
 from fourbar.errors import HOLDS
 from fourbar.files import load
@@ -22,6 +25,7 @@ from validation.scenes.suites import suite_file
 ROOT = Path(__file__).parent.parent
 DOCS = ROOT / "docs"
 GALLERY = ROOT / "models" / "gallery"
+GROUPS = {"fourbar": fourbar.cli.group, "validation": validation.cli.group}
 PAGES = [ROOT / "README.md", *sorted(DOCS.rglob("*.md"))]
 
 
@@ -81,6 +85,31 @@ def test_the_scene_file_is_one(checkout: Path) -> None:
     scene = fourbar.load(checkout / "example.toml")
     assert set(fourbar.solve(scene).status) == {"ok"}
     assert {effect.key for effect in scene.effects} <= set(REGISTRY)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_every_other_command_line_is_one_that_its_program_takes(page: Path) -> None:
+    """Those in running text and shell blocks run for minutes or name a SCENE: they are parsed as they stand."""
+    text = page.read_text(encoding="utf-8")
+    lines = re.findall(r"`((?:fourbar|python -m validation) [^`]+)`", text)
+    lines += re.findall(r"^(python -m validation .*)$", "".join(blocks("sh", text)), re.MULTILINE)
+    for line in lines:
+        words = shlex.split(line.removeprefix("python -m "), comments=True)
+        command = GROUPS[words[0]].get_command(click.Context(GROUPS[words[0]]), words[1])
+        assert command is not None, line
+        if words[2:]:
+            command.make_context(words[1], words[2:])
+
+
+@pytest.mark.parametrize("name", ["commands.md", "checks.md", "results-format.md"])
+def test_every_option_that_a_page_names_is_one(name: str) -> None:
+    known = set()
+    for group in GROUPS.values():
+        context = click.Context(group)
+        for command in (group, *(group.get_command(context, each) for each in group.list_commands(context))):
+            assert command is not None
+            known |= {option for param in command.params for option in (*param.opts, *param.secondary_opts)}
+    assert set(re.findall(r"(?<![\w-])--[a-z][a-z-]*", read(f"docs/{name}"))) <= known
 
 
 def test_every_command_of_the_harness_is_listed() -> None:
