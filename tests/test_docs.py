@@ -5,6 +5,7 @@ The tutorial has a test of its own, which runs it from top to bottom.
 
 import contextlib
 import io
+import math
 import re
 import shlex
 from pathlib import Path
@@ -141,9 +142,12 @@ def test_the_gallery_is_a_suite_with_pictures_and_sources() -> None:
         scene = load(GALLERY / f"{name}.toml")
         assert set(fourbar.solve(scene, "force").status) == {"ok"} and len(scene.source) > 100
         assert (DOCS / "gallery" / f"{name}.svg").is_file() and f"gallery/{name}.svg" in read("docs/gallery.md")
-    # what the sources state of them, by the formulas: a stroke of 54 in, a line straight to 1.5 of 450 mm
+    # what the sources state of them, by the formulas: a stroke of 54 in, 60 degrees to and fro in the same time, a line straight to 1.5 of 450 mm
     pump = load(GALLERY / "pump_jack.toml").linkage
     assert fourbar.swing(pump) * 72.0 == pytest.approx(54.0, rel=0.03)
+    wiper = load(GALLERY / "wiper.toml").linkage
+    assert math.degrees(fourbar.swing(wiper)) == pytest.approx(60.0, rel=1e-8)
+    assert fourbar.time_ratio(wiper) == pytest.approx(1.0, rel=1e-8)
     curve = fourbar.coupler_curve(load(GALLERY / "hoecken.toml").linkage, 0.5, 0.0, steps=720)
     straight = curve.y < 0.4015
     assert straight.mean() > 0.5 and curve.y.min() > 0.3999 and curve.x[straight].max() - curve.x[straight].min() > 0.44
