@@ -142,7 +142,7 @@ def test_the_gallery_is_a_suite_with_pictures_and_sources() -> None:
         scene = load(GALLERY / f"{name}.toml")
         assert set(fourbar.solve(scene, "force").status) == {"ok"} and len(scene.source) > 100
         assert (DOCS / "gallery" / f"{name}.svg").is_file() and f"gallery/{name}.svg" in read("docs/gallery.md")
-    # what the sources state of them, by the formulas: a stroke of 54 in, 60 degrees to and fro in the same time, a line straight to 1.5 of 450 mm
+    # what the sources state of them: a stroke of 54 in, 60 deg to and fro in the same time, 450 mm straight to 1.5 mm
     pump = load(GALLERY / "pump_jack.toml").linkage
     assert fourbar.swing(pump) * 72.0 == pytest.approx(54.0, rel=0.03)
     wiper = load(GALLERY / "wiper.toml").linkage
