@@ -172,13 +172,13 @@ def _sensitivity(scene: Path, as_json: bool, out: Path | None) -> None:
 def tolerance(scene: Path, samples: int | None, seed: int, as_json: bool, out: Path | None) -> None:
     """What the [tolerances] of a scene do to torque, pin forces and points, and which dimension does it."""
     from fourbar.show import tolerances as shown
-    from fourbar.show.plot import draw_tolerances, drawable
+    from fourbar.show.plot import draw_tolerances, format_of
     from fourbar.show.progress import share_done
     from fourbar.show.tables import under_heading
     from fourbar.studies.spread import SAMPLES, tolerances
 
     if out is not None:
-        drawable(out)
+        format_of(out)
     stated = _load(scene)
     with _named(scene), share_done("samples are solved") as progress:
         found = tolerances(stated, SAMPLES if samples is None else samples, seed, progress=progress)

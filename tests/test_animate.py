@@ -5,8 +5,10 @@ import json
 import math
 import re
 import shutil
+import sys
 from dataclasses import replace
 from html.parser import HTMLParser
+from importlib.util import find_spec
 from itertools import pairwise
 from pathlib import Path
 
@@ -188,7 +190,9 @@ def test_a_gif_moves_the_linkage(tmp_path: Path) -> None:
     assert all(np.any(p != q) for p, q in pairwise(pictures))
 
 
-@pytest.mark.skipif(shutil.which("ffmpeg") is None, reason="ffmpeg is not installed")
+@pytest.mark.skipif(
+    shutil.which("ffmpeg") is None and find_spec("imageio_ffmpeg") is None, reason="neither ffmpeg nor imageio-ffmpeg"
+)
 def test_an_mp4_is_written(tmp_path: Path) -> None:
     animate.write(thesis(), tmp_path / "a.mp4", seconds=0.2)
     assert (tmp_path / "a.mp4").read_bytes()[4:8] == b"ftyp"
@@ -196,6 +200,7 @@ def test_an_mp4_is_written(tmp_path: Path) -> None:
 
 def test_without_ffmpeg_an_mp4_is_refused_in_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PATH", str(tmp_path))
+    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
     with pytest.raises(DependencyError, match=r"^an \.mp4 film needs the program ffmpeg[^\n]*$"):
         animate.write(crank_rocker(), tmp_path / "a.mp4")
     assert not list(tmp_path.iterdir())

@@ -15,7 +15,8 @@ import fourbar
 from fourbar.errors import FAILED, HOLDS
 from fourbar.formulas.mobility import limit_positions
 from fourbar.scene import Command, Scene, command
-from tests.scenes import crank_rocker, judge_here, summary_of
+from tests.here import judge_here, summary_of
+from tests.scenes import crank_rocker
 from tests.test_harness import Echo
 from tests.test_regression import HERE, ROW, save
 from validation.check.model import ModelReport

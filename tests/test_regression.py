@@ -14,7 +14,7 @@ from click.testing import CliRunner
 
 import fourbar
 from fourbar.errors import InputError
-from tests.scenes import judge_here
+from tests.here import judge_here
 from validation.cli import status
 from validation.compare.columns import Columns
 from validation.compare.rows import AGREES, FAILS, REFUSES, Row, write_results

@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 import fourbar
-from tests.scenes import crank_rocker, summary_of
+from tests.here import summary_of
+from tests.scenes import crank_rocker
 from validation.compare.rows import FAILS, to_csv
 from validation.engines.witnesses import WITNESSES
 from validation.report.costs import cost_points

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.scenes import summary_of
+from tests.here import summary_of
 from tests.test_report import demo, report
 from validation.compare.rows import AGREES, FAILS, REFUSES, UNDECIDED, Row, write_results
 from validation.engines.hard_suite import HARD_WITNESSES, Hard

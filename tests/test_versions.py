@@ -8,17 +8,19 @@ import os
 import sys
 import zipfile
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from subprocess import CompletedProcess
 
 import pytest
 
 from validation.cli import status
-from validation.compare.rows import AGREES, FAILS, Row
+from validation.compare.rows import AGREES, FAILS, Row, to_csv
 from validation.regression.history import Run
-from validation.regression.record import About
-from validation.subjects import releases, versions
-from validation.subjects.versions import Release
+from validation.regression.record import About, write_about
+from validation.run.elsewhere import ElsewhereError
+from validation.subjects import releases, versions, versions_page
+from validation.subjects.releases import Release
 
 LISTED = "pin (3.2)\nAvailable versions: 3.2, 3.1, 3.0, 2.7\n"
 
@@ -82,6 +84,7 @@ def test_each_release_loads_by_itself_or_says_why(tmp_path: Path, monkeypatch: p
     [
         (["mujco"], 'must be one of mujoco, pinocchio, exudyn, opensim, drake; did you mean "mujoco"?'),
         (["pin"], 'did you mean "pinocchio"?'),
+        (["pinocchio", "no_such_scene.toml"], "no_such_scene.toml"),
         (["pinocchio", "--from", "3.4"], "is no released version; there are 2.7 to 3.2"),
         (["pinocchio", "--from", "3.1", "--to", "3.0"], "must come before --to (3.0): two versions make a history"),
     ],
@@ -126,11 +129,11 @@ def test_a_bisection_runs_what_it_needs_and_names_every_change() -> None:
     changes = {0: (0.5, FAILS), 7: (1e-7, AGREES), 21: (1e-3, FAILS)}
     found = versions.bisected(FROM_0_TO_31, made_up(changes, {0, 15, 20}, tried))
     assert len(tried) == len(set(tried)) == len(found) <= 17
-    sentences = versions.changed(found)
+    sentences = versions_page.changed(found)
     assert [sentence.partition(":")[0] for sentence in sentences] == ["6 -> 7", "19 -> 21"]
     assert "verdict got better" in sentences[0] and "F43: error 5.00e-01 -> 1.00e-07" in sentences[0]
     alike: list[int] = []
-    assert not versions.changed(versions.bisected(FROM_0_TO_31, made_up({0: (1e-7, AGREES)}, set(), alike)))
+    assert not versions_page.changed(versions.bisected(FROM_0_TO_31, made_up({0: (1e-7, AGREES)}, set(), alike)))
     assert alike == [0, 31]
 
 
@@ -139,13 +142,45 @@ def test_a_scan_runs_every_version() -> None:
     changes = {0: (1e-7, AGREES), 3: (1e-3, FAILS), 4: (1e-7, AGREES)}
     found = versions.scanned(FROM_0_TO_31[:6], made_up(changes, set(), tried), 2)
     assert sorted(tried) == list(range(6)) == [int(release.version) for release in found]
-    assert [sentence.partition(":")[0] for sentence in versions.changed(found)] == ["2 -> 3", "3 -> 4"]
+    assert [sentence.partition(":")[0] for sentence in versions_page.changed(found)] == ["2 -> 3", "3 -> 4"]
+
+
+def test_the_command_runs_each_version_and_says_why_one_has_no_answer(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    given = {"3.0": judged("3.0", 1e-3, FAILS), "3.2": judged("3.2", 1e-7)}
+
+    def elsewhere(python: Path, arguments: list[str], out: Path) -> None:
+        assert python == Path("its") and "--engines=pinocchio-inverse" in arguments
+        if (release := given.get(out.name)) is None:
+            raise ElsewhereError("its: the suite did not run there: no reason")
+        assert release.run is not None
+        (out / "results.csv").write_text(to_csv(replace(row, engine="pinocchio-inverse") for row in release.run.rows))
+        write_about(release.run.about, out)
+
+    monkeypatch.setattr(releases, "pip", lambda *_: CompletedProcess([], 0, LISTED, ""))
+    loads = {"2.7": (None, "does not load: libtoy.so.7")}
+    monkeypatch.setattr(versions, "installed", lambda _, version, *__: loads.get(version, (Path("its"), "")))
+    monkeypatch.setattr(versions, "run_elsewhere", elsewhere)
+    monkeypatch.setattr(versions, "timed", lambda *_: {"pinocchio-inverse": 1e-3})
+    assert status(["versions", "pinocchio", "--out", str(tmp_path)]) == 0
+    printed = capsys.readouterr().out
+    for line in (
+        "2.7 does not load: libtoy.so.7",
+        "3.1 the suite did not run there: no reason",
+        "3.0 -> 3.2: 1 verdict",
+    ):
+        assert line in printed
+    assert {file.name for file in tmp_path.glob("versions.*")} == {
+        f"versions.{x}" for x in ("md", "svg", "csv", "json")
+    }
+    assert status(["versions", "pinocchio", "--to", "3.1", "--out", str(tmp_path)]) == 3, "one version is no history"
 
 
 def test_page_table_and_chart_show_each_version_or_why_not() -> None:
     nan = judged("1.2", math.nan, FAILS)
     found = [judged("1.0", 1e-3, FAILS), Release("1.1", None, "does not load: libtoy.so.7"), nan, judged("2.0", 1e-7)]
-    texts = versions.written("mujoco", found, 5)
+    texts = versions_page.written("mujoco", found, 5)
     page = texts["versions.md"]
     assert "4 released versions of mujoco" in page and "| 1.1 |" in page and "libtoy.so.7" in page
     assert "5 more versions were not needed" in page and "- 1.2 -> 2.0: 1 verdict got better" in page

@@ -15,8 +15,9 @@ from validation.subjects.motion import Readings, gap, start, turn, weight
 
 VERSION = version("drake")
 STEPS = (628, 2512)
-CHANGED = "SDF with Drake's ball constraint in place of a fourth joint; the force of that constraint cannot be read"
+CHANGED = "SDF with Drake's ball constraint in place of a fourth joint; its force cannot be read"
 SETTINGS = {"SAP": None}
+PINS = ("O2", "A", "O4")
 
 
 def through(scene: Scene, steps: int, setting: str) -> Readings:
@@ -27,7 +28,7 @@ def through(scene: Scene, steps: int, setting: str) -> Readings:
     plant.set_discrete_contact_approximation(DiscreteContactApproximation.kSap)
     Parser(plant).AddModelsFromString(sdf(scene, "drake", begin), "sdf")
     plant.mutable_gravity_field().set_gravity_vector(weight(scene))
-    joints = [plant.GetJointByName(name) for name in ("O2", "A", "O4")]
+    joints = [plant.GetJointByName(name) for name in PINS]
     actuator = plant.AddJointActuator("drive", joints[0])
     actuator.set_default_rotor_inertia(inertia)
     actuator.set_default_gear_ratio(1.0)
@@ -43,10 +44,17 @@ def through(scene: Scene, steps: int, setting: str) -> Readings:
         simulator.AdvanceTo((stop - 1) * timestep)
         angles = [joint.get_angle(context) + q for joint, q in zip(joints, begin.qpos, strict=True)]
         speed = joints[0].get_angular_rate(context)
+        theta = (angles[0], angles[0] + angles[1], angles[2])
+        reactions = plant.get_reaction_forces_output_port().Eval(context)
+        on_child = {
+            pin: reactions[int(joint.index())].translational()[:2] for pin, joint in zip(PINS, joints, strict=True)
+        }
+        world = {pin: complex(*on_child[pin]) * np.exp(1j * turned) for pin, turned in zip(PINS, theta, strict=True)}
+        forces = {"F12": world["O2"], "F32": -world["A"], "F14": world["O4"]}
+        pairs = {name: (force.real, force.imag) for name, force in forces.items()}
         simulator.AdvanceTo(stop * timestep)
         found.seconds += time.process_time() - began
         alpha = (joints[0].get_angular_rate(context) - speed) / timestep
-        theta = (angles[0], angles[0] + angles[1], angles[2])
-        found.read(theta, speed, alpha, -inertia * alpha, {})
+        found.read(theta, speed, alpha, -inertia * alpha, pairs)
         found.gap = max(found.gap, gap(scene, theta))
     return found

@@ -1,6 +1,7 @@
 """Exudyn's own simulation: nine absolute coordinates, its implicit solvers, all four pins and the drive multipliers."""
 
 import time
+from importlib.metadata import version
 from typing import Any
 
 import exudyn as exu
@@ -11,7 +12,7 @@ from fourbar.scene import Scene
 from validation.engines.exudyn import JOINTS, SIZE, ExudynBars
 from validation.subjects.motion import Readings, gap, start, turn
 
-VERSION = exu.GetVersionString()
+VERSION = version("exudyn")
 STEPS = (314, 1256, 5024)
 CHANGED = "built with its Python interface; the drive is a coordinate constraint whose offset follows the time"
 SETTINGS: dict[str, Any] = {

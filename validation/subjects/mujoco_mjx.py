@@ -13,7 +13,7 @@ from validation.subjects.motion import Readings, turn
 from validation.subjects.mujoco_c import at_rest_of, opened, read, text
 
 VERSION = version("mujoco-mjx")
-DEVICE = str(jax.devices()[0].device_kind)
+DEVICE = "CPU" if jax.default_backend() == "cpu" else str(jax.devices()[0].device_kind)
 """JAX takes a GPU where it has one."""
 STEPS = (157, 314, 628)
 CHANGED = "a closure of two timesteps (--for mjx), and jax_enable_x64"

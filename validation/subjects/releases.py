@@ -6,11 +6,13 @@ import subprocess
 import sys
 import sysconfig
 import venv
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from difflib import get_close_matches
 from pathlib import Path
 
 from fourbar.errors import DependencyError, InputError
+from validation.regression.history import Run
 from validation.report.machine import PACKAGES
 from validation.run.elsewhere import CHECKOUT
 
@@ -20,6 +22,17 @@ LISTED = "Available versions:"
 """What pip's list begins with; the newest comes first."""
 DONE = "installed"
 """In the folder of a version that was installed wholly."""
+
+
+@dataclass(frozen=True, slots=True)
+class Release:
+    """What the suite found under one version, or why it found nothing."""
+
+    version: str
+    run: Run | None
+    why: str = ""
+    seconds: Mapping[str, float] = field(default_factory=dict)
+    """By witness: of the processor's clock for one position."""
 
 
 def distribution(engine: str) -> str:

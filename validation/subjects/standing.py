@@ -23,9 +23,10 @@ HEAD = ("subject", "version", "setting", "of", *TORQUE_AND_FORCES, "gap at B", "
 EXPLAINED = (
     "Errors of the torque and of each pin force: the greatest of the readings by the greatest value in a turn, at the "
     "subject's own angle, speed and acceleration. 'states': states set one by one; 'N steps': a turn at constant "
-    "speed, its first quarter not read. Empty: its adapter does not read it. The gap is by the longest bar, the order "
-    "that of the torque's error from the line above; readings and compilation are not in the time. No line is a "
-    "ranking: double and single precision, compiled and interpreted loops stand side by side."
+    "speed, its first quarter not read. Empty: its adapter does not read it. The gap, the drift of the closure, "
+    "is the greatest of the readings by the longest bar, the order that of the torque's error from the line "
+    "above; readings and compilation are not in the time. No line is a ranking: double and single precision, compiled "
+    "and interpreted loops stand side by side."
 )
 
 
