@@ -266,9 +266,8 @@ def _motion_and_forces(
     """
     jacobian = tree.jacobian()
     try:
-        v = np.array([omega_2, *np.linalg.solve(jacobian[:, 1:], -jacobian[:, 0] * omega_2)])
-        drift = tree.drift(v)
-        a = np.array([alpha_2, *np.linalg.solve(jacobian[:, 1:], -jacobian[:, 0] * alpha_2 - drift)])
+        v = _closed(jacobian, omega_2, 0.0, 0.0)
+        a = _closed(jacobian, alpha_2, *tree.drift(v).tolist())
         tree.pin_loads = {}
         needed = tree.torques(v, a)
         values: dict[str, Array | float] = {}
@@ -292,6 +291,15 @@ def _motion_and_forces(
         return values
     values.update(forces)
     return values
+
+
+def _closed(jacobian: Array, of_2: float, x: float, y: float) -> Array:
+    """Rates of the three coordinates where J rates + (x, y) = 0 and bar 2 has its own; LinAlgError at a toggle."""
+    (e, a, b), (f, c, d) = jacobian.tolist()
+    x, y, det = x + e * of_2, y + f * of_2, a * d - b * c
+    if det == 0.0:
+        raise np.linalg.LinAlgError
+    return np.array([of_2, (b * y - d * x) / det, (c * x - a * y) / det])
 
 
 def _settle(
