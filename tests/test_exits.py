@@ -18,6 +18,7 @@ from fourbar.writing import write_text
 from tests.scenes import crank_rocker
 from validation.compare.rows import AGREES, FAILS, Row, write_results
 from validation.published.figures import Figure
+from validation.stress.bench import Measured
 from validation.stress.forward_error.judge import Tally
 
 ROOT = Path(__file__).parent.parent
@@ -215,7 +216,7 @@ def test_a_ratio_that_is_not_reached_is_status_1(monkeypatch: pytest.MonkeyPatch
     for name in ONE_THREAD:
         monkeypatch.setenv(name, "1")
     rows = {"growth from 1000 positions on": 1.1, "floor": 1.0}
-    monkeypatch.setattr("validation.stress.bench.measure", lambda *_: rows)
+    monkeypatch.setattr("validation.stress.bench.measure", lambda *_: Measured(rows, {}, {}, {}))
     assert VALIDATION(["bench"]) == HOLDS
     rows["growth from 1000 positions on"] = 2.0
     assert VALIDATION(["bench"]) == FAILED
