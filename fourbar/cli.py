@@ -172,13 +172,13 @@ def _sensitivity(scene: Path, as_json: bool, out: Path | None) -> None:
 def tolerance(scene: Path, samples: int | None, seed: int, as_json: bool, out: Path | None) -> None:
     """What the [tolerances] of a scene do to torque, pin forces and points, and which dimension does it."""
     from fourbar.show import tolerances as shown
-    from fourbar.show.plot import draw_tolerances, drawable
+    from fourbar.show.plot import draw_tolerances, format_of
     from fourbar.show.progress import share_done
     from fourbar.show.tables import under_heading
     from fourbar.studies.spread import SAMPLES, tolerances
 
     if out is not None:
-        drawable(out)
+        format_of(out)
     stated = _load(scene)
     with _named(scene), share_done("samples are solved") as progress:
         found = tolerances(stated, SAMPLES if samples is None else samples, seed, progress=progress)
@@ -194,17 +194,19 @@ def tolerance(scene: Path, samples: int | None, seed: int, as_json: bool, out: P
 
 @group.command()
 @scene_argument
+@click.option("--quantity", "quantities", multiple=True, metavar="NAME", help="torque, F12 .. F14, transmission.")
 @click.option("--json", "as_json", is_flag=True, help="One object, SI and rad, every digit.")
-def extremes(scene: Path, as_json: bool) -> None:
+def extremes(scene: Path, quantities: tuple[str, ...], as_json: bool) -> None:
     """Prove the largest and smallest torque, pin forces and transmission angle over the input's whole interval."""
     from fourbar.show import extremes as shown
     from fourbar.show.progress import running
     from fourbar.show.tables import under_heading
+    from fourbar.studies.enclosure import NAMES
     from fourbar.studies.enclosure import extremes as proven
 
     stated = _load(scene)
     with _named(scene), running("the boxes are halved"):
-        found = proven(stated)
+        found = proven(stated, quantities or NAMES)
     if as_json:
         _print(shown.json_text(stated, found), None)
     else:

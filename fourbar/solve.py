@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.errors import DependencyError, InputError
+from fourbar.errors import DependencyError, InputError, installing
 from fourbar.quantities import ANGLES, OF_DRY_FRICTION, OF_PIN_LOADS, QUANTITIES, STAGE_OF, STAGES
 from fourbar.scene import Command, Scene, command
 from fourbar.scene.case import Case, Evaluated
@@ -108,7 +108,7 @@ def is_compiled(case: Case, wanted: int, count: int, compiled: bool | None) -> b
     if not find_spec("numba"):
         if compiled is None:
             return False
-        raise DependencyError('compiled=True needs numba, which is not installed: pip install "fourbar[fast]"')
+        raise DependencyError(f"compiled=True needs numba, which is not installed: {installing('fast')}")
     from fourbar.scene.compiled import carries
 
     return carries(case)

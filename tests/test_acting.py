@@ -16,6 +16,7 @@ from fourbar.files.effects import REGISTRY
 from fourbar.scene import Scene
 from fourbar.show import animate
 from fourbar.show.acting import acting
+from fourbar.show.page_data import page_data
 from tests.scenes import crank_rocker
 
 TURNING = Load(3, (2.0, 0.5), (0.03, 1.0), frame="bar")
@@ -96,7 +97,7 @@ def test_the_points_of_a_scene_are_drawn_where_they_are() -> None:
         line = next(line for line in panel.lines if line.get_label() == "P")
         assert np.allclose(line.get_ydata(), np.hypot(*own["P"].T), rtol=1e-15)
     assert drawing(scene, solution).count(f'stroke="{POINT}"') == 1
-    data = animate.page_data(scene, {})
+    data = page_data(scene, {})
     assert data["points"][0]["name"] == "P" and abs(complex(*data["points"][0]["at"]) - cmath.rect(0.15, 0.7)) < 1e-15
     here = data["theta_2"].index(float(solution.theta_2[7]))
     assert data["branches"]["1"]["v_P"][here] == pytest.approx(float(np.hypot(*solution.velocity["P"][7])), rel=1e-12)

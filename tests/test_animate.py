@@ -5,8 +5,10 @@ import json
 import math
 import re
 import shutil
+import sys
 from dataclasses import replace
 from html.parser import HTMLParser
+from importlib.util import find_spec
 from itertools import pairwise
 from pathlib import Path
 
@@ -17,7 +19,7 @@ import fourbar
 from fourbar.errors import DependencyError, InputError, NotAssembledError
 from fourbar.files.pictures import LARGEST
 from fourbar.scene.motion_law import Law
-from fourbar.show import animate
+from fourbar.show import animate, page_data
 from tests.scenes import crank_rocker, thesis
 
 HOSTILE = "</script><script>alert(1)</script> \"'><img src=x onerror=alert(2)> $style ${data} {{x}} \u2028 \x00 é"
@@ -100,8 +102,8 @@ def test_positions_that_do_not_assemble_are_null() -> None:
 def test_a_fine_sweep_is_thinned_evenly_and_says_so() -> None:
     scene = crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.0, 2 * math.pi, 36_000), 1.0))
     data = embedded(animate.page(scene))
-    assert len(data["theta_2"]) == animate.MAX_ROWS
-    assert np.diff(data["theta_2"]) == pytest.approx(2 * math.pi / (animate.MAX_ROWS - 1))
+    assert len(data["theta_2"]) == page_data.MAX_ROWS
+    assert np.diff(data["theta_2"]) == pytest.approx(2 * math.pi / (page_data.MAX_ROWS - 1))
     assert data["positions"] == 36_001
 
 
@@ -188,7 +190,9 @@ def test_a_gif_moves_the_linkage(tmp_path: Path) -> None:
     assert all(np.any(p != q) for p, q in pairwise(pictures))
 
 
-@pytest.mark.skipif(shutil.which("ffmpeg") is None, reason="ffmpeg is not installed")
+@pytest.mark.skipif(
+    shutil.which("ffmpeg") is None and find_spec("imageio_ffmpeg") is None, reason="neither ffmpeg nor imageio-ffmpeg"
+)
 def test_an_mp4_is_written(tmp_path: Path) -> None:
     animate.write(thesis(), tmp_path / "a.mp4", seconds=0.2)
     assert (tmp_path / "a.mp4").read_bytes()[4:8] == b"ftyp"
@@ -196,6 +200,7 @@ def test_an_mp4_is_written(tmp_path: Path) -> None:
 
 def test_without_ffmpeg_an_mp4_is_refused_in_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PATH", str(tmp_path))
+    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
     with pytest.raises(DependencyError, match=r"^an \.mp4 film needs the program ffmpeg[^\n]*$"):
         animate.write(crank_rocker(), tmp_path / "a.mp4")
     assert not list(tmp_path.iterdir())

@@ -5,23 +5,28 @@ The tutorial has a test of its own, which runs it from top to bottom.
 
 import contextlib
 import io
+import math
 import re
 import shlex
 from pathlib import Path
 
+import click
 import pytest
 
 import fourbar
+import fourbar.cli
+import validation.cli
 from fourbar.cli import status
 from fourbar.errors import HOLDS
 from fourbar.files import load
 from fourbar.files.effects import REGISTRY
-from validation.cli import COMMANDS
+from validation.cli import COMMANDS, group
 from validation.scenes.suites import suite_file
 
 ROOT = Path(__file__).parent.parent
 DOCS = ROOT / "docs"
 GALLERY = ROOT / "models" / "gallery"
+GROUPS = {"fourbar": fourbar.cli.group, "validation": validation.cli.group}
 PAGES = [ROOT / "README.md", *sorted(DOCS.rglob("*.md"))]
 
 
@@ -31,6 +36,17 @@ def read(name: str) -> str:
 
 def blocks(language: str, text: str) -> list[str]:
     return re.findall(rf"^```{language}\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
+
+
+def test_the_examples_of_continuous_integration_use_commands_and_options_that_exist() -> None:
+    for file in sorted((DOCS / "ci").glob("*.yml")):
+        text = re.sub(r"\\\n\s*|>\n\s*|(?<=\S)\n\s+(?=--)", " ", file.read_text())
+        lines = re.findall(r"-m validation (\w+)(.*)", text)
+        assert {name for name, _ in lines} >= {"run", "accept"}
+        for name, options in lines:
+            known = {option for each in group.get_command(None, name).params for option in each.opts}  # type: ignore[arg-type,union-attr]
+            wanted = set(re.findall(r"(?<=\s)--[a-z-]+", options))
+            assert wanted <= known and wanted, (file.name, name, wanted - known)
 
 
 @pytest.fixture
@@ -64,13 +80,15 @@ def test_every_command_prints_what_is_shown(
 
 
 @pytest.mark.usefixtures("checkout")
-def test_the_program_prints_what_is_shown() -> None:
-    (program,), (shown,) = blocks("python", read("README.md")), blocks("text", read("README.md"))
-    printed = io.StringIO()
-    with contextlib.redirect_stdout(printed):
-        exec(compile(program, "README.md", "exec"), {})
-    # the error bar is itself rounding: its digits may differ from one machine to the next
-    assert re.sub(r"take .*", "take", printed.getvalue()) == re.sub(r"take .*", "take", shown)
+def test_the_programs_print_what_is_shown() -> None:
+    programs, texts = blocks("python", read("README.md")), blocks("text", read("README.md"))
+    assert len(programs) == 2
+    for program, shown in zip(programs, texts, strict=True):
+        printed = io.StringIO()
+        with contextlib.redirect_stdout(printed):
+            exec(compile(program, "README.md", "exec"), {})
+        # the error bar is itself rounding: its digits may differ from one machine to the next
+        assert re.sub(r"take .*", "take", printed.getvalue()) == re.sub(r"take .*", "take", shown)
 
 
 def test_the_scene_file_is_one(checkout: Path) -> None:
@@ -79,6 +97,31 @@ def test_the_scene_file_is_one(checkout: Path) -> None:
     scene = fourbar.load(checkout / "example.toml")
     assert set(fourbar.solve(scene).status) == {"ok"}
     assert {effect.key for effect in scene.effects} <= set(REGISTRY)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_every_other_command_line_is_one_that_its_program_takes(page: Path) -> None:
+    """Those in running text and shell blocks run for minutes or name a SCENE: they are parsed as they stand."""
+    text = page.read_text(encoding="utf-8")
+    lines = re.findall(r"`((?:fourbar|python -m validation) [^`]+)`", text)
+    lines += re.findall(r"^(python -m validation .*)$", "".join(blocks("sh", text)), re.MULTILINE)
+    for line in lines:
+        words = shlex.split(line.removeprefix("python -m "), comments=True)
+        command = GROUPS[words[0]].get_command(click.Context(GROUPS[words[0]]), words[1])
+        assert command is not None, line
+        if words[2:]:
+            command.make_context(words[1], words[2:])
+
+
+@pytest.mark.parametrize("name", ["commands.md", "checks.md", "results-format.md"])
+def test_every_option_that_a_page_names_is_one(name: str) -> None:
+    known = set()
+    for program in GROUPS.values():
+        context = click.Context(program)
+        for command in (program, *(program.get_command(context, each) for each in program.list_commands(context))):
+            assert command is not None
+            known |= {option for param in command.params for option in (*param.opts, *param.secondary_opts)}
+    assert set(re.findall(r"(?<![\w-])--[a-z][a-z-]*", read(f"docs/{name}"))) <= known
 
 
 def test_every_command_of_the_harness_is_listed() -> None:
@@ -110,9 +153,12 @@ def test_the_gallery_is_a_suite_with_pictures_and_sources() -> None:
         scene = load(GALLERY / f"{name}.toml")
         assert set(fourbar.solve(scene, "force").status) == {"ok"} and len(scene.source) > 100
         assert (DOCS / "gallery" / f"{name}.svg").is_file() and f"gallery/{name}.svg" in read("docs/gallery.md")
-    # what the sources state of them, by the formulas: a stroke of 54 in, a line straight to 1.5 of 450 mm
+    # what the sources state of them: a stroke of 54 in, 60 deg to and fro in the same time, 450 mm straight to 1.5 mm
     pump = load(GALLERY / "pump_jack.toml").linkage
     assert fourbar.swing(pump) * 72.0 == pytest.approx(54.0, rel=0.03)
+    wiper = load(GALLERY / "wiper.toml").linkage
+    assert math.degrees(fourbar.swing(wiper)) == pytest.approx(60.0, rel=1e-8)
+    assert fourbar.time_ratio(wiper) == pytest.approx(1.0, rel=1e-8)
     curve = fourbar.coupler_curve(load(GALLERY / "hoecken.toml").linkage, 0.5, 0.0, steps=720)
     straight = curve.y < 0.4015
     assert straight.mean() > 0.5 and curve.y.min() > 0.3999 and curve.x[straight].max() - curve.x[straight].min() > 0.44

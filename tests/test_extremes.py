@@ -13,7 +13,7 @@ import fourbar
 from fourbar import Friction, InputError, Motion, Scene, Sweep, Tolerance
 from fourbar.cli import status
 from fourbar.scene import Command
-from fourbar.studies import enclosure
+from fourbar.studies import enclosure, interval
 from fourbar.studies.enclosure import PROVEN, Extremes, extremes
 
 MODELS = Path(__file__).parents[1] / "models"
@@ -25,7 +25,7 @@ ROUNDING = 1e-12
 @pytest.fixture(scope="module")
 def rocker() -> tuple[Scene, Extremes]:
     scene = fourbar.load(MODELS / "crank_rocker.toml")
-    return scene, extremes(scene)
+    return scene, extremes(scene, ["torque", "F43", "transmission"])
 
 
 def sampled(solution: Any) -> dict[str, np.ndarray]:
@@ -46,9 +46,10 @@ def test_no_sample_lies_outside_and_the_enclosure_is_as_narrow_as_promised(rocke
     scene, found = rocker
     theta_2 = np.linspace(0, 2 * math.pi, 20_001)
     samples = sampled(fourbar.solve(scene, at=Command(theta_2, np.ones(20_001, np.int8), 10.0, 0.0)))
-    assert set(samples) == set(found.least) and found.distance == 0.0
+    assert set(samples) == set(enclosure.NAMES) and found.distance == 0.0
     holds(found, samples)
-    for name, values in samples.items():
+    for name in found.least:
+        values = samples[name]
         size = np.abs(values).max()
         for extreme, at in ((found.least[name], values.min()), (found.greatest[name], values.max())):
             assert 0.0 <= extreme.high - extreme.low <= PROVEN * size
@@ -56,26 +57,23 @@ def test_no_sample_lies_outside_and_the_enclosure_is_as_narrow_as_promised(rocke
             assert extreme.low <= at + dense * size and at - dense * size <= extreme.high
 
 
-def test_poles_are_kept_away_from_and_the_drive_may_be_on_any_bar(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(enclosure, "NAMES", ("torque",))
+def test_poles_are_kept_away_from_and_the_drive_may_be_on_any_bar() -> None:
     scene = fourbar.load(MODELS / "thesis.toml")
-    found = extremes(scene)
-    assert found.distance == enclosure.DISTANCE and len(found.parts) == 3
+    found = extremes(scene, ["torque"])
+    assert found.distance == interval.DISTANCE and len(found.parts) == 3 and set(found.least) == {"torque"}
     theta_2 = np.concatenate([np.linspace(*part, 500) for part in found.parts])
     samples = sampled(fourbar.solve(scene, at=Command(theta_2, np.ones(1500, np.int8), 0.2244, 0.0)))
     holds(found, samples)
     assert found.greatest["torque"].high == pytest.approx(samples["torque"].max(), rel=1e-6)  # at an end
 
 
-def test_with_tolerances_no_linkage_lies_outside(
-    rocker: tuple[Scene, Extremes], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(enclosure, "NAMES", ("torque", "|F43|"))
+def test_with_tolerances_no_linkage_lies_outside(rocker: tuple[Scene, Extremes]) -> None:
     scene, nominal = rocker
     linkage = scene.linkage.lengths
     widths = {f"lengths.{name}": 1e-4 * length for name, length in zip(LENGTHS, linkage, strict=True)}
     loose = replace(scene, tolerances=tuple(Tolerance(key, width) for key, width in widths.items()))
-    found = extremes(loose)
+    found = extremes(loose, ["F43"])
+    assert list(found.greatest) == ["|F43|"]
     random = np.random.default_rng(1)
     corners = random.choice([-1.0, 1.0], (4, 200)) * np.maximum(random.uniform(0, 1.0, (4, 200)), 0.5).round()
     values = {key: x + w * c for (key, w), x, c in zip(widths.items(), linkage, corners, strict=True)}
@@ -102,15 +100,31 @@ def test_what_has_no_enclosure_is_one_line(changes: dict[str, Any], words: str) 
         extremes(replace(scene, **changes))
 
 
-def test_linkages_that_come_apart_are_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(enclosure, "NAMES", ("torque",))
-    scene = Scene(fourbar.uniform(0.2, 0.48, 0.55, 0.2), Motion(Sweep(1.6, 1.7, 2), 1.0))
-    with pytest.raises(fourbar.FourBarError, match="not all linkages assemble there"):
-        extremes(replace(scene, tolerances=(Tolerance("lengths.output", 0.02),)))
+def test_the_share_of_the_linkages_that_come_apart_is_stated() -> None:
+    scene = Scene(fourbar.uniform(0.3, 0.1, 0.25, 0.22), Motion(Sweep(0.0, 1.0, 2), 1.0))  # turns fully where c >= 0.15
+    loose = replace(scene, tolerances=(Tolerance("lengths.output", 0.1),))
+    with pytest.raises(fourbar.FourBarError, match=r"tolerances: \S+ % of the linkages .* do not assemble") as error:
+        extremes(loose)
+    assert float(str(error.value).split(":")[1].split("%")[0]) == pytest.approx(100 * (0.15 - 0.12) / 0.2, abs=1.0)
+
+
+def test_a_pole_within_the_tolerances_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(enclosure, "FINEST_OF_MANY", 1e-2)
+    scene = replace(fourbar.load(MODELS / "crank_rocker.toml"), drive_bar=4)
+    with pytest.raises(fourbar.FourBarError, match=r"torque has no bound at theta_2 = .* a pole there"):
+        extremes(replace(scene, tolerances=(Tolerance("lengths.coupler", 0.01),)), ["torque"])
+
+
+def test_what_only_tolerances_widen_is_not_halved_further(rocker: tuple[Scene, Extremes]) -> None:
+    loose = replace(rocker[0], tolerances=(Tolerance("lengths.input", 3e-3),))
+    found = extremes(loose, ["torque"])
+    assert found.boxes < 2000  # many times that where each is halved to the end
+    over = found.over_estimate("torque", 1)
+    assert over is not None and over > 1.5
 
 
 def test_the_command(rocker: tuple[Scene, Extremes], monkeypatch: pytest.MonkeyPatch, capsys: Any) -> None:
-    monkeypatch.setattr(enclosure, "extremes", lambda scene: rocker[1])
+    monkeypatch.setattr(enclosure, "extremes", lambda scene, names: rocker[1])
     model = str(MODELS / "crank_rocker.toml")
     assert status(["extremes", model]) == 0
     text = capsys.readouterr().out
@@ -118,6 +132,9 @@ def test_the_command(rocker: tuple[Scene, Extremes], monkeypatch: pytest.MonkeyP
     assert status(["extremes", model, "--json"]) == 0
     document = json.loads(capsys.readouterr().out)
     assert document["extremes"]["torque"]["greatest"]["high"] == rocker[1].greatest["torque"].high
+    monkeypatch.undo()
+    assert status(["extremes", model, "--quantity", "F99"]) == 2
+    assert "quantity = 'F99': must be one of torque, F12" in capsys.readouterr().err
 
 
 def test_the_bound_of_a_box_holds_at_its_ends(rocker: tuple[Scene, Extremes]) -> None:
@@ -129,7 +146,7 @@ def test_the_bound_of_a_box_holds_at_its_ends(rocker: tuple[Scene, Extremes]) ->
     over, nominal, *ends = (search.evaluate(*box) for box in ((wide, None), (points, none), (low, none), (high, none)))
     for name in over:
         for i in range(3):
-            top = search._bound(1, over[name], nominal[name], i, radius)
-            least = -search._bound(-1, over[name], nominal[name], i, radius)
+            top = search._bound(1, over[name], nominal[name], i, radius)[0]
+            least = -search._bound(-1, over[name], nominal[name], i, radius)[0]
             for end in ends:
                 assert least <= float(end[name].values[i].mid()) <= top, name

@@ -23,6 +23,8 @@ WRITTEN = (
     "pictured.html",
     "energy.svg",
     "released.html",
+    "play.svg",
+    "play.html",
     "thesis.xml",
 )
 

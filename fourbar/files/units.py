@@ -124,7 +124,11 @@ def _hint(number: str, name: str, unit: str) -> str:
     swapped = [{word: swap.get(word, word) for word in words.findall(name)} for swap in SWAPS]
     swapped.append({word: nearest(word) for word in words.findall(name)})
     candidates = [words.sub(lambda match, by=by: by[match[0]], name) for by in swapped]  # type: ignore[misc]
-    candidates += [f"{name}/rad", f"rad {name.removeprefix('1')}"]
+    candidates += [
+        f"{name}/rad",
+        f"rad {name.removeprefix('1')}",
+        re.sub(r"(?<=[A-Za-z])([23])(?![0-9])", r"^\1", name),
+    ]
     for candidate in candidates:
         try:
             if candidate != name and _factor(candidate)[1] == _factor(unit)[1]:

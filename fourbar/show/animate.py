@@ -1,7 +1,6 @@
 """A scene that moves: one self-contained web page, or a film (GIF, MP4).
 
-The page needs nothing but a browser: no network, no library. Its numbers are those of
-`fourbar.solve`, embedded for both branches (of a motion through time: for its own); the position
+The page needs nothing but a browser: no network, no library. Its numbers are those of `page_data`; the position
 formula runs in the page as well, so that the picture follows when a length is changed.
 """
 
@@ -9,48 +8,20 @@ import base64
 import hashlib
 import html
 import json
-import math
 from collections.abc import Mapping
-from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
 from string import Template
-from typing import Any
 
-import numpy as np
-
-from fourbar.errors import InputError, NotAssembledError
-from fourbar.files import dump
-from fourbar.files.pictures import data_uri
-from fourbar.linkage import BAR_NAMES, MOVING_BARS
-from fourbar.quantities import OK, PIN_FORCES
-from fourbar.scene import Command, Scene, command
-from fourbar.show.acting import Symbol, acting
-from fourbar.show.plot.energy import energies
-from fourbar.show.plot.style import length_unit, plain
-from fourbar.show.plot.view import on_branch, over_time, sweep_command
-from fourbar.solution import SI, Array, Conversion, Solution
-from fourbar.solve import solve
+from fourbar.errors import InputError
+from fourbar.scene import Scene
+from fourbar.show.page_data import page_data
+from fourbar.show.plot.style import plain
+from fourbar.solution import SI, Conversion
 from fourbar.writing import write_text
 
 FORMATS = ("html", "gif", "mp4")
-MAX_ROWS = 1441
-"""Positions embedded in a page: a quarter of a degree over a full turn; a finer sweep is thinned out evenly."""
-WATCHED = (1.5, 60.0)
-"""A motion through time that lasts between these, s, is shown in real time."""
-SCALARS = (
-    "theta_3",
-    "theta_4",
-    "condition",
-    "omega_2",
-    "omega_3",
-    "omega_4",
-    "alpha_2",
-    "alpha_3",
-    "alpha_4",
-    "torque",
-)
-SCRIPTS = ("linkage.js", "numbers.js", "picture.js", "acting.js", "chart.js", "page.js")
+SCRIPTS = ("linkage.js", "numbers.js", "picture.js", "acting.js", "chart.js", "tolerances.js", "page.js")
 
 
 def write(
@@ -122,183 +93,3 @@ def embedded(value: object) -> str:
     """JSON that can stand inside a script element, whatever strings it holds."""
     text = json.dumps(value, ensure_ascii=True, allow_nan=False, separators=(",", ":"))
     return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
-
-
-def page_data(scene: Scene, pictures: Mapping[str, str | Path], units: Conversion = SI) -> dict[str, Any]:
-    """Everything the page's script needs: SI units, radians, null where there is no value."""
-    linkage, motion = scene.linkage, scene.motion
-    shown = _through_time(scene) if over_time(scene) else _sweep(scene)
-    closes = [theta_3 is not None for theta_3 in shown["branches"][str(motion.branch)]["theta_3"]]
-    if not any(closes):
-        raise NotAssembledError("nothing to show: the linkage assembles at none of the scene's positions")
-    shown["start"] = closes.index(True) if shown["start"] is None else shown["start"]
-    factor, unit = length_unit(max(linkage.lengths), units)
-    return {
-        "lengths": list(linkage.lengths),
-        "theta_1": linkage.ground_angle,
-        "unit": {"factor": factor, "name": unit},
-        "units": {unit: list(entry) for unit, entry in units.items()},
-        "centres": {
-            str(number): [(z := linkage.bar(number).to_centre).real, z.imag] if linkage.bar(number).mass > 0.0 else None
-            for number in MOVING_BARS
-        },
-        "drive_bar": scene.drive_bar,
-        "branch": motion.branch,
-        "points": [
-            {"name": p.name, "bar": p.bar, "at": [p.from_pin[0] * f(p.from_pin[1]) for f in (math.cos, math.sin)]}
-            for p in scene.points
-        ],
-        "acting": [_symbol(symbol, shown["theta_2"]) for symbol in acting(scene)],
-        "toml": _scene_file(scene),
-        "followed": motion.through == "follow",
-        "pictures": {str(number): picture for number, picture in _pictures(scene, pictures).items()},
-        **shown,
-    }
-
-
-def _symbol(symbol: Symbol, theta_2: list[float]) -> dict[str, Any]:
-    """One thing that acts, as the page's script draws it."""
-    entry: dict[str, Any] = symbol._asdict()
-    for name in ("at", "beyond", "vector"):
-        entry[name] = [entry[name].real, entry[name].imag]
-    entry["end"] = None if symbol.end is None else [symbol.end[0], [symbol.end[1].real, symbol.end[1].imag]]
-    table = entry.pop("table")
-    entry["factor"] = None if table is None else np.asarray(table.at(theta_2)).tolist()
-    return entry
-
-
-def _scene_file(scene: Scene) -> str | None:
-    """The scene as its file, to be downloaded; None where a file has no form of what acts."""
-    try:
-        return dump(scene)
-    except InputError:
-        return None
-
-
-def _sweep(scene: Scene) -> dict[str, Any]:
-    """Both branches over theta_2."""
-    motion = scene.motion
-    swept = sweep_command(scene)
-    where = thinned(swept)
-    own, start = command(scene).theta_2, None
-    if len(own) == 1:
-        start = int(np.argmin(np.abs(np.angle(np.exp(1j * (where.theta_2 - own[0]))))))
-    return {
-        "omega_2": motion.omega_2,
-        "alpha_2": motion.alpha_2,
-        "theta_2": where.theta_2.tolist(),
-        "time": None,
-        "rate": None,
-        "start": start,
-        "branches": {str(sign): _columns(on_branch(scene, sign), where.theta_2) for sign in (1, -1)},
-        "pace": None,
-        "positions": len(swept.theta_2),
-    }
-
-
-def _through_time(scene: Scene) -> dict[str, Any]:
-    """The one motion that the scene makes: released, or by a law."""
-    whole = solve(scene)
-    assert whole.time is not None and whole.omega_2 is not None and whole.alpha_2 is not None
-    where = thinned(Command(whole.theta_2, whole.branch, whole.omega_2, whole.alpha_2, time=whole.time))
-    assert where.time is not None
-    solution = solve(scene, at=where)
-    solution.time = where.time
-    columns = _solved(solution)
-    columns["theta_2"] = where.theta_2.tolist()
-    if scene.motion.free is not None:
-        del columns["torque"]
-        columns["energy"] = [_or_null(value) for value in energies(scene, solution).kinetic.tolist()]
-    duration = float(where.time[-1] - where.time[0])
-    rate = _rate(duration)
-    return {
-        "omega_2": None,
-        "alpha_2": 0.0,
-        "theta_2": where.theta_2.tolist(),
-        "time": where.time.tolist(),
-        "rate": rate,
-        "start": None,
-        "branches": {str(scene.motion.branch): columns},
-        "pace": _pace_in_time(scene, whole, rate, len(where.time)),
-        "positions": len(whole),
-    }
-
-
-def thinned(where: Command) -> Command:
-    """At most `MAX_ROWS` of the positions, evenly, both ends included."""
-    n = len(where.theta_2)
-    if n <= MAX_ROWS:
-        return where
-    keep = np.round(np.linspace(0, n - 1, MAX_ROWS)).astype(int)
-    rows = {name: value[keep] for name, value in where._asdict().items() if isinstance(value, np.ndarray)}
-    return where._replace(**rows)
-
-
-def _rate(duration: float) -> float:
-    """Seconds of a motion shown in one second: 1, or the power of ten that makes it last neither too short nor long."""
-    if duration <= 0.0:
-        return 1.0
-    shortest, longest = WATCHED
-    if duration < shortest:
-        return float(10.0 ** math.floor(math.log10(duration / shortest)))
-    return float(10.0 ** math.ceil(math.log10(duration / longest))) if duration > longest else 1.0
-
-
-def _pace_in_time(scene: Scene, whole: Solution, rate: float, shown: int) -> str:
-    """What speed 1 means, where the motion ends before its time, and whether instants were left out."""
-    assert whole.time is not None
-    words = "At speed 1× it moves in real time"
-    if rate < 1.0:
-        words = f"At speed 1× it moves {1.0 / rate:.0f} times slower than it really does"
-    elif rate > 1.0:
-        words = f"At speed 1× it moves {rate:.0f} times faster than it really does"
-    free = scene.motion.free
-    if free is not None and len(whole) <= free.steps:
-        words += f". It ends at {whole.time[-1]:.4g} s, where the linkage stops at a limit position"
-    if len(whole) > shown:
-        words += f". Shown are {shown} of the {len(whole)} instants"
-    return words + "."
-
-
-def _columns(scene: Scene, theta_2: Array) -> dict[str, Any]:
-    """The solution on one branch, quantity by quantity."""
-    own = command(replace(scene, motion=replace(scene.motion, theta_2=theta_2)))
-    return _solved(solve(scene, at=own))
-
-
-def _solved(solution: Solution) -> dict[str, Any]:
-    """Quantity by quantity, as lists."""
-    columns: dict[str, Any] = {"sign": solution.branch.tolist()}
-    if (solution.status_code != OK).any():
-        columns["status"] = solution.status
-    for name in SCALARS:
-        values = getattr(solution, name)
-        if values is not None:
-            columns[name] = [_or_null(value) for value in values.tolist()]
-    points = {**{name: getattr(solution, name) for name in ("v_A", "v_B", "a_A", "a_B")}}
-    points |= {f"v_{name}": values for name, values in solution.velocity.items()}
-    points |= {f"a_{name}": values for name, values in solution.acceleration.items()}
-    for name, values in points.items():
-        if values is not None:
-            columns[name] = [_or_null(size) for size in np.hypot(*values.T).tolist()]
-    for name in PIN_FORCES:
-        values = getattr(solution, name)
-        if values is not None:
-            columns[name] = [[_or_null(x), _or_null(y)] for x, y in values.tolist()]
-    return columns
-
-
-def _or_null(value: float) -> float | None:
-    return value if math.isfinite(value) else None
-
-
-def _pictures(scene: Scene, pictures: Mapping[str, str | Path]) -> dict[int, str]:
-    """The pictures of the bars as data URIs: those of the scene, and those given in their place."""
-    numbers = {name: number for number, name in BAR_NAMES.items() if number in MOVING_BARS}
-    found = {}
-    for name, path in pictures.items():
-        if name not in numbers:
-            raise InputError("picture", name, "must name one of " + ", ".join(numbers))
-        found[numbers[name]] = data_uri(f"picture.{name}", path)
-    own = {picture.bar: picture for picture in scene.pictures if picture.bar not in found}
-    return found | {bar: picture.data_uri() for bar, picture in own.items()}

@@ -2,17 +2,22 @@
 
 import json
 import math
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from fourbar.errors import DependencyError, InputError
 from fourbar.quantities import PIN_FORCES, UNITS
-from fourbar.solution import nulled
-from fourbar.studies.spread import BAND, Spread, Tolerances
+from fourbar.scene import Scene
+from fourbar.solution import Array, nulled
+from fourbar.studies.spread import BAND, Spread, Tolerances, tolerances
 
 if TYPE_CHECKING:
     from rich.table import Table
 
+PAGE_SAMPLES = 2048
+"""Samples behind the bands of a page: seconds, and a percentile to a fiftieth of the deviation."""
 SCHEMA = "fourbar-tolerance/1"
 
 
@@ -30,11 +35,22 @@ def unit_of(part: str) -> str:
 
 def heading(found: Tolerances) -> list[str]:
     """The lines above the table."""
-    n = len(found.theta_2)
     lines = [
-        f"{len(found.scene.tolerances)} tolerances, {found.samples} samples (seed {found.seed}), {n} positions",
-        "each quantity where its first-order worst case is largest; the share is that of the variance",
+        *counted(found),
+        "each quantity where its first-order worst case is largest; sigma is the standard",
+        "deviation of the samples; the variance there comes from",
     ]
+    for part in shown_parts(found):
+        if (at := worst_position(found.spreads[part])) is not None and (most := _most(found, found.spreads[part], at)):
+            lines.append(f"  {part}: {most}")
+    return lines
+
+
+def counted(found: Tolerances) -> list[str]:
+    """What was tried, what of it has no answer, and where first order and samples part."""
+    n = len(found.theta_2)
+    count = f"{len(found.scene.tolerances)} tolerance" + ("s" if len(found.scene.tolerances) > 1 else "")
+    lines = [f"{count}, {found.samples} samples (seed {found.seed}), {n} positions"]
     if found.invalid:
         lines.append(f"{_share(found.invalid, found)} have a number that no scene takes")
     if found.apart:
@@ -71,11 +87,10 @@ def table(found: Tolerances) -> "Table":
     from rich.table import Table
     from rich.text import Text
 
-    shown = Table(box=box.SIMPLE_HEAD, show_edge=False, pad_edge=False, padding=(0, 1, 0, 0))
-    heads = ("", "\nunit", "theta_2\ndeg", "\nnominal", "standard\ndeviation", f"{BAND[0]:g} %\nof samples")
-    for head in (*heads, f"{BAND[1]:g} %\nof samples", "least\nsampled", "greatest\nsampled", "worst case\n+-"):
+    shown = Table(box=box.SIMPLE_HEAD, show_edge=False, pad_edge=False, padding=0)
+    first = ("", "\nunit", "theta_2\ndeg", "\nnominal", "\nsigma")
+    for head in (*first, f"\n{BAND[0]:g} %", f"\n{BAND[1]:g} %", "\nleast", "\ngreatest", "worst\n+-"):
         shown.add_column(Text(head), justify="right" if head else "left", no_wrap=True)
-    shown.add_column(Text("most of it from\n"), no_wrap=True)
     for part in shown_parts(found):
         spread = found.spreads[part]
         at = worst_position(spread)
@@ -85,17 +100,48 @@ def table(found: Tolerances) -> "Table":
         numbers = [f"{column[at]:.6g}" for column in columns]
         numbers[1] = f"{spread.deviation[at]:.3g}"
         row = [part, unit_of(part), f"{math.degrees(found.theta_2[at]):.6g}", *numbers, f"{spread.worst[at]:.3g}"]
-        shown.add_row(*map(Text, row), Text(_most(found, spread, at)))
+        shown.add_row(*map(Text, row))
     return shown
 
 
 def _most(found: Tolerances, spread: Spread, at: int) -> str:
-    """The two tolerances with the largest shares."""
+    """The two tolerances with the largest shares of the variance."""
     shares, total = spread.shares[:, at], float(spread.shares[:, at].sum())
     if not total > 0.0:
-        return "-"
-    order = np.argsort(-shares)[:2]
-    return ", ".join(f"{found.scene.tolerances[i].key} {100.0 * shares[i] / total:.0f} %" for i in order)
+        return ""
+    order = [i for i in np.argsort(-shares)[:2] if shares[i] > 0.0]
+    return ", ".join(f"{100.0 * shares[i] / total:.0f} % {found.scene.tolerances[i].key}" for i in order)
+
+
+def embedded_tolerances(scene: Scene, theta_2: list[float]) -> dict[str, Any]:
+    """What a page shows of them at its positions: deviations from the nominal, and shares of the variance.
+
+    A scene that has none of this (a free motion, SciPy not installed) gives the sentence that says so.
+    """
+    positions = scene if scene.motion.law else replace(scene, motion=replace(scene.motion, theta_2=np.array(theta_2)))
+    try:
+        found = tolerances(positions, PAGE_SAMPLES)
+    except (InputError, DependencyError) as error:
+        return {"lines": [str(error)], "parts": {}}
+    at = np.linspace(0, len(found.theta_2) - 1, len(theta_2)).round().astype(int)  # a law is thinned as in `page_data`
+
+    def short(values: Array, digits: int) -> list[float | None]:
+        return [float(f"{x:.{digits}g}") if math.isfinite(x) else None for x in values[at].tolist()]
+
+    parts: dict[str, Any] = {}
+    for part in shown_parts(found):
+        spread = found.spreads[part]
+        ends = {name: getattr(spread, name) - spread.nominal for name in ("low", "high", "least", "greatest")}
+        away = {**ends, "worst": spread.worst, "deviation": spread.deviation}
+        with np.errstate(all="ignore"):
+            shares = spread.shares / spread.shares.sum(axis=0)
+        parts[part] = {
+            "unit": unit_of(part),
+            "nominal": short(spread.nominal, 9),
+            **{name: short(values, 4) for name, values in away.items()},
+            "shares": [short(share, 3) for share in shares],
+        }
+    return {"lines": counted(found), "keys": [each.key for each in scene.tolerances], "parts": parts}
 
 
 def json_text(found: Tolerances) -> str:

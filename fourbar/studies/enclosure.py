@@ -9,6 +9,7 @@ Comput. 66 (2017) 1281 (Arb).
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -16,15 +17,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.effects.actions import bodies
-from fourbar.errors import DependencyError, InputError, LimitError
+from fourbar.errors import DependencyError, InputError, LimitError, installing
 from fourbar.formulas.arithmetic import dot
-from fourbar.formulas.mobility import TURN, change_points, intervals, limit_positions, turns_fully
 from fourbar.formulas.path import Path
 from fourbar.formulas.position import HalfAngle, Loop, close_loop
 from fourbar.quantities import PIN_FORCES
 from fourbar.scene import Scene, command
 from fourbar.scene.case import Case
 from fourbar.studies.derivatives import differentiable
+from fourbar.studies.interval import interval, require, require_all
 from fourbar.studies.keys import at_place, entries, left_out, placed
 from fourbar.studies.sloped import Sloped
 
@@ -34,14 +35,13 @@ PROVEN = 1e-9
 """Width of the enclosure, relative to the largest magnitude."""
 OUTWARDS = 1e-15
 """Relative; the roots and arcs of the ends are rounded by less."""
-DISTANCE = math.radians(1.0)
-"""rad; how near to a limit, where forces grow without end, the bounds reach."""
 FIRST = 64
 """Boxes to begin with."""
 FINEST, FINEST_OF_MANY = 1e-10, 1e-4
-"""rad; narrower boxes are not halved: without tolerances, and with them, where the rest is theirs."""
+"""rad; narrower boxes are not halved: without tolerances, and with them."""
+NEGLIGIBLE = 0.02
+"""A box over which theta_2 adds less than this share of what the tolerances add is not halved: the rest is theirs."""
 NAMES = ("torque", *(f"|{name}|" for name in PIN_FORCES), "transmission")
-KNOWN = ("gravity", "viscous", "springs", "flywheel", "load")
 Balls = NDArray[Any]
 
 
@@ -81,46 +81,42 @@ class Extremes(NamedTuple):
         return (proven - middle) / (found - middle) if sign * (found - middle) > PROVEN * abs(middle) else None
 
 
-def extremes(scene: Scene) -> Extremes:
+def extremes(scene: Scene, quantities: Sequence[str] = NAMES) -> Extremes:
     """Largest and smallest torque, pin forces and transmission angle over the input's whole interval, proven.
 
     At the scene's omega_2, alpha_2 and branch. Where the scene has tolerances the bounds hold for every linkage within
     them (three sigma of a normal one): `high` of the greatest and `low` of the least are then proven, and the other end
     is what the worst corner found reaches.
 
+    Parameters
+    ----------
+    quantities : of torque, |F12|, |F32|, |F43|, |F14|, transmission; left out: all. F12 means |F12|.
+
     Raises
     ------
-    InputError : no omega_2, a free motion or a motion law, a change point, an effect that has no derivative somewhere.
+    InputError : an unknown quantity, no omega_2, a free motion or a motion law, a change point, an effect that has no
+        derivative somewhere.
     LimitError : the linkages within the tolerances do not all assemble over the interval.
     DependencyError : python-flint is not installed.
     """
     try:
         import flint
     except ImportError:
-        raise DependencyError('Guaranteed extremes need python-flint: pip install "fourbar[exact]"') from None
-    _require(scene)
+        raise DependencyError(f"Guaranteed extremes need python-flint: {installing('exact')}") from None
+    names = [name for name in NAMES if name in quantities or name.strip("|") in quantities]
+    for name in quantities:
+        if name not in NAMES and f"|{name}|" not in NAMES:
+            raise InputError("quantity", name, "must be one of " + ", ".join(NAMES).replace("|", ""))
+    require(scene)
     before, flint.ctx.prec = flint.ctx.prec, BITS
     try:
         with np.errstate(all="ignore"):
             search = _Search(scene)
-            least, greatest = ({name: search.extreme(name, sign) for name in search.names} for sign in (-1, 1))
-            nominal = extremes(replace(scene, tolerances=())) if scene.tolerances else None
+            least, greatest = ({name: search.extreme(name, sign) for name in names} for sign in (-1, 1))
+            nominal = extremes(replace(scene, tolerances=()), names) if scene.tolerances else None
             return Extremes(search.parts, search.distance, least, greatest, search.boxes, nominal)
     finally:
         flint.ctx.prec = before
-
-
-def _require(scene: Scene) -> None:
-    motion = scene.motion
-    if motion.free is not None or motion.law is not None:
-        raise InputError("motion", "a free motion or a motion law", "has no interval of theta_2 at one speed")
-    if motion.omega_2 is None:
-        raise InputError("motion.omega_2", None, "is needed for extremes of torque and pin forces")
-    if change_points(scene.linkage):
-        raise InputError("lengths", scene.linkage.lengths, "has a change point, towards which forces have no bound")
-    for term in (*scene.loads, *scene.effects):
-        if term.key not in KNOWN or getattr(term, "table", None) is not None:
-            raise InputError(f"effects.{term.key}", term.key, "is not evaluated in balls; allowed: " + ", ".join(KNOWN))
 
 
 class _Search:
@@ -130,17 +126,18 @@ class _Search:
         from flint import arb
 
         self.arb, self.scene, self.boxes = arb, scene, 0
-        self.names = NAMES
         known = entries(scene)
         self.reach = {tolerance.key: tolerance.reach for tolerance in scene.tolerances}
         for key in self.reach:
             if key not in known or left_out(scene, known[key]):
                 raise InputError(f"tolerances.{key}", self.reach[key], "is no number that the scene states")
         self.keys = [key for key in known if key in self.reach]
-        self.parts, self.distance = _interval(scene)
+        self.parts, self.distance = interval(scene)
         self.branch = float(command(scene).branch[0])
+        require_all(scene, self.parts)
         start = [(a, b) for low, high in self.parts for a, b in _halves(np.linspace(low, high, FIRST + 1))]
         self.start = np.array(start)
+        self.at_start: tuple[dict[str, Sloped], dict[str, Sloped]] | None = None
 
     def number(self, key: str, value: float, moved: Any) -> Sloped:
         """A number of the scene at all boxes: as a ball over its tolerance, or moved by a part of that."""
@@ -193,6 +190,19 @@ class _Search:
         cosine = dot(at.u3, at.u4)
         return {"torque": found.torque, **forces, "sine": at.sin_mu * at.sin_mu, "cosine": cosine * cosine}
 
+    def over(self, boxes: NDArray[np.float64]) -> tuple[dict[str, Sloped], dict[str, Sloped]]:
+        """The quantities over the boxes and all tolerances, and at the centres without any."""
+        if boxes is self.start and self.at_start is not None:  # every search begins with them
+            return self.at_start
+        centre, radius = boxes.mean(axis=1), 0.5 * np.ptp(boxes, axis=1)
+        # half an interval more than rounding of its ends could lose
+        wide = np.array([self.arb(x, r * (1.0 + 1e-9)) for x, r in zip(centre, radius, strict=True)], dtype=object)
+        points, off = np.array([self.arb(x) for x in centre], dtype=object), np.zeros((len(self.keys), len(boxes)))
+        found = self.evaluate(wide, None), self.evaluate(points, off)
+        if boxes is self.start:
+            self.at_start = found
+        return found
+
     def extreme(self, name: str, sign: int) -> Extreme:
         """The greatest (+1) or least (-1) value, enclosed and rounded outwards."""
         if name == "torque":
@@ -214,39 +224,46 @@ class _Search:
         best, where, closed = -math.inf, math.nan, -math.inf
         while len(boxes):
             centre, radius = boxes.mean(axis=1), 0.5 * np.ptp(boxes, axis=1)
-            points = np.array([self.arb(x) for x in centre], dtype=object)
-            # half an interval more than rounding of its ends could lose
-            wide = np.array([self.arb(x, r * (1.0 + 1e-9)) for x, r in zip(centre, radius, strict=True)], dtype=object)
-            count, k = len(boxes), len(self.keys)
-            over, nominal = self.evaluate(wide, None)[name], self.evaluate(points, np.zeros((k, count)))[name]
-            found = [float((sign * value).lower()) for value in nominal.values]
-            if k:
-                slopes = np.broadcast_to(nominal.slopes, (1 + k, count))
-                corner = np.array([[sign * math.copysign(1.0, _mid(s)) for s in row] for row in slopes[1:]])
-                corners = self.evaluate(points, corner)[name]
-                found = [max(x, float((sign * value).lower())) for x, value in zip(found, corners.values, strict=True)]
-            top = np.array([self._bound(sign, over, nominal, i, r) for i, r in enumerate(radius)])
-            found_at = np.array([x if math.isfinite(x) else -math.inf for x in found])
-            size = max([size, *(abs(x) for x in found if math.isfinite(x))])
-            if found_at.max() > best:
-                best, where = float(found_at.max()), float(centre[int(found_at.argmax())])
+            over, nominal = (found[name] for found in self.over(boxes))
+            found = _lowest(sign, nominal)
+            size = max([size, *np.abs(found[np.isfinite(found)])])
+            bounds = [self._bound(sign, over, nominal, i, r) for i, r in enumerate(radius)]
+            top, settled = np.array([bound[0] for bound in bounds]), np.array([bound[1] for bound in bounds])
+            if self.keys and (tried := np.flatnonzero(top > max(best, found.max()))).size:
+                slopes = np.broadcast_to(nominal.slopes, (1 + len(self.keys), len(boxes)))[1:, tried]
+                corner = np.array([[sign * math.copysign(1.0, _mid(s)) for s in row] for row in slopes])
+                points = np.array([self.arb(x) for x in centre[tried]], dtype=object)
+                found[tried] = np.fmax(found[tried], _lowest(sign, self.evaluate(points, corner)[name]))
+            if found.max() > best:
+                best, where = float(found.max()), float(centre[int(found.argmax())])
+                size = max(size, abs(best))
             allowed = PROVEN * (math.sqrt(abs(best) * size) + PROVEN * size if name != "torque" else size)
-            done = (top <= best + allowed) | ((radius < finest) & np.isfinite(top))
+            done = (top <= best + allowed) | ((settled | (radius < finest)) & np.isfinite(top))
             closed = max([closed, *top[done & (top > best)].tolist()])
+            done |= top <= closed
             if ((radius < finest) & ~np.isfinite(top)).any():
                 at = math.degrees(float(centre[~np.isfinite(top)][0]))
-                raise LimitError(f"{name} has no bound at theta_2 = {at:.6g} deg: not all linkages assemble there")
+                why = "within the tolerances it has a pole there, or linkages that do not assemble"
+                raise LimitError(f"{name} has no bound at theta_2 = {at:.6g} deg: {why}")
             boxes = np.array([half for box in boxes[~done] for half in _halves(np.linspace(box[0], box[1], 3))])
         closed = max(closed, best)
         return (best, closed, where) if sign > 0 else (-closed, -best, where)
 
-    def _bound(self, sign: int, over: Sloped, nominal: Sloped, index: int, radius: float) -> float:
-        """Above everything that a box holds; inf where it has no bound."""
+    def _bound(self, sign: int, over: Sloped, nominal: Sloped, index: int, radius: float) -> tuple[float, bool]:
+        """Above everything that a box holds, inf where it has no bound; and whether halving it would gain nothing."""
         slopes = np.broadcast_to(over.slopes, (1 + len(self.keys), len(over.values)))[:, index]
         reach = [radius * (1.0 + 1e-9), *(self.reach[key] for key in self.keys)]
-        mean = nominal.values[index] + sum(s * self.arb(0, r) for s, r in zip(slopes, reach, strict=True))
-        tops = [float((sign * value).upper()) for value in (mean, over.values[index])]
-        return math.nextafter(min([x for x in tops if math.isfinite(x)], default=math.inf), math.inf)
+        added = [s * self.arb(0, r) for s, r in zip(slopes, reach, strict=True)]
+        tops = [float((sign * value).upper()) for value in (nominal.values[index] + sum(added), over.values[index])]
+        by_angle, *by_tolerance = (float(part.rad()) for part in added)
+        top = math.nextafter(min([x for x in tops if math.isfinite(x)], default=math.inf), math.inf)
+        return top, by_angle < NEGLIGIBLE * sum(by_tolerance)
+
+
+def _lowest(sign: int, of: Sloped) -> NDArray[np.float64]:
+    """What the values, or their negatives, certainly reach; -inf where that is not known."""
+    found = np.array([float((sign * value).lower()) for value in of.values])
+    return np.where(np.isfinite(found), found, -math.inf)
 
 
 def _mid(ball: Any) -> float:
@@ -255,30 +272,3 @@ def _mid(ball: Any) -> float:
 
 def _halves(ends: Any) -> list[tuple[float, float]]:
     return list(zip(ends[:-1].tolist(), ends[1:].tolist(), strict=True))
-
-
-def _interval(scene: Scene) -> tuple[tuple[tuple[float, float], ...], float]:
-    """The input's whole interval without what lies within DISTANCE of its limits and of poles of the torque."""
-    linkage, first = scene.linkage, float(command(scene).theta_2[0])
-    if turns_fully(linkage):
-        start, stop, gaps = first, first + TURN, False
-    else:
-        every = [
-            (low + TURN * turn, high + TURN * turn)
-            for low, high in intervals(linkage)
-            for turn in (math.floor((first - low) / TURN),)
-        ]
-        start, stop = next(((low, high) for low, high in every if low <= first <= high), every[0])
-        start, stop, gaps = start + DISTANCE, stop - DISTANCE, True
-    parts = [(start, stop)]
-    if scene.drive_bar != 2:  # T3 has poles where bar 3 stands still against the ground, T4 where bar 4 does
-        for limit in limit_positions(linkage, scene.drive_bar):
-            for turn in range(-2, 3):
-                at = limit.theta_2 + TURN * turn
-                cut = [(low, min(high, at - DISTANCE)) for low, high in parts]
-                cut += [(max(low, at + DISTANCE), high) for low, high in parts]
-                kept = [(low, high) for low, high in cut if low < high]
-                if kept != parts:
-                    gaps = True
-                parts = sorted(set(kept))
-    return tuple(parts), DISTANCE if gaps else 0.0

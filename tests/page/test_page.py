@@ -12,6 +12,7 @@ import fourbar
 from fourbar.effects import Point
 from fourbar.files import loads
 from fourbar.show import animate
+from fourbar.show.tolerances import PAGE_SAMPLES
 from tests.scenes import crank_rocker, thesis
 from tests.test_animate import HOSTILE, PNG, RELEASED, embedded
 
@@ -21,6 +22,8 @@ PRINTED = 6e-5
 """Numbers are shown with five significant digits."""
 PRINTED_DEG = 6e-4
 """Angles are shown with three decimals of a degree."""
+SPREAD_PRINTED = 6e-3
+"""Of the worst case: numbers next to it are shown with the digits that it has, three significant ones."""
 PIXEL = 0.01
 """Coordinates in the picture are exact but for rounding; a hundredth of a pixel is far below what is seen."""
 RADIANS = 1e-9
@@ -509,3 +512,36 @@ def test_it_says_why_a_position_has_no_forces(browse) -> None:
         scene = fourbar.Scene(fourbar.uniform(1.0, 0.5, 1.0, 0.5), motion, drive_bar)
         status = browse(animate.page(scene)).find_element("id", "status")
         assert (remark in status.text) and status.is_displayed() == bool(remark)
+
+
+def test_tolerances_have_bands_and_shares_in_the_units_of_the_page(browse) -> None:
+    loose = (fourbar.Tolerance("lengths.input", 5e-5), fourbar.Tolerance("bars.coupler.mass", 0.001, True))
+    scene = crank_rocker(tolerances=loose, points=(fourbar.Point("P", 3, (0.1, 0.2)),))
+    driver = browse(animate.page(scene, units=fourbar.units("N.mm")), 360)
+    found = fourbar.tolerances(scene, PAGE_SAMPLES)
+    driver.execute_script("go(20)")
+    rows = {
+        row.find_element("tag name", "th").text: [number(cell.text.replace("±", "")) for cell in cells]
+        for row in driver.find_elements("css selector", "#spreads tbody tr, #shares tbody tr")
+        for cells in [row.find_elements("tag name", "td")]
+    }
+    for label, part, factor in (("torque, N mm", "torque", 1e3), ("|F₄₃|, N", "|F43|", 1.0), ("P_x, mm", "P_x", 1e3)):
+        spread = found.spreads[part]
+        names = ("nominal", "deviation", "low", "high", "worst", "least", "greatest")
+        expected = np.array([getattr(spread, name)[20] * factor for name in names])
+        np.testing.assert_allclose(rows[label], expected, rtol=0, atol=SPREAD_PRINTED * spread.worst[20] * factor)
+    shares = found.spreads["torque"].shares[:, 20]
+    assert [rows[each.key][0] for each in loose] == pytest.approx(100 * shares / shares.sum(), abs=0.51)
+    assert state_of(driver, "document.documentElement.scrollWidth") <= 360
+    box = driver.find_element("css selector", "#bands .band").rect
+    assert box["height"] > 40 and box["width"] > 200
+    type_length(driver, 2, 90.0)
+    assert not driver.find_element("id", "spreads").is_displayed()
+    assert "original lengths and branch" in driver.find_element("id", "tolerance-note").text
+
+
+def test_a_scene_without_bands_says_why_or_shows_nothing(browse) -> None:
+    driver = browse(animate.page(replace(RELEASED, tolerances=(fourbar.Tolerance("lengths.input", 5e-5),))))
+    assert "free motion" in driver.find_element("id", "tolerance-note").text
+    assert not driver.find_element("id", "bands").is_displayed()
+    assert not browse(animate.page(crank_rocker())).find_element("id", "tolerances").is_displayed()

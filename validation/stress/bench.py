@@ -1,16 +1,14 @@
-"""Speed of the formulas, side by side in one process: against the 13x13 system, over sizes, over stages."""
+"""Speed side by side in one process: stages, the 13x13 system, C, SymPy, engines, a judged scene; ratios that hold."""
 
-import ctypes
 import os
-import shutil
 import subprocess
 import sys
-import tempfile
 import tracemalloc
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from statistics import median
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import click
 import numpy as np
@@ -22,12 +20,32 @@ from fourbar.formulas.mobility import default_range
 from fourbar.linkage import MOVING_BARS, Bar, FourBar
 from fourbar.quantities import ANGLES, UNKNOWNS, VECTORS
 from fourbar.scene import Command, Scene
+from fourbar.show.plot.style import format_of
 from fourbar.solve import BLOCK, solve
+from validation.engines.witnesses import WITNESSES, Witness
 from validation.published.thirteen import FreeBodies, solve_thirteen
 from validation.report.machine import machine
+from validation.run.judge import judged
+from validation.scenes.random import LinkageType
+from validation.scenes.suites import Random
 from validation.stress.against import ONE_THREAD
 from validation.stress.against import against as against_revision
+from validation.stress.bench_picture import Times, draw_bench
+from validation.stress.contenders import (
+    ONE_BY_ONE,
+    POSITIONS,
+    STUDY,
+    engines,
+    interleaved,
+    loops,
+    over_linkages,
+    over_positions,
+)
+from validation.stress.limits import JUDGED_BY_SYSTEMS, LIMITS
 from validation.stress.timed import LINKAGE, command, example, preallocated, seconds
+
+if TYPE_CHECKING:
+    from rich.table import Table
 
 Array = NDArray[np.float64]
 
@@ -35,47 +53,23 @@ WITH_LIMITS = FourBar(0.3, Bar(0.25, 0.2), Bar(0.1, 0.5), Bar(0.22, 0.4))
 """Its input swings between limit positions: each of its positions has to be looked at."""
 THIRTEEN_BATCH = 20_000
 """Positions per batch of the 13x13 system: larger batches are slower per position (27 MB of matrices each)."""
+IN_C = ("C", "C, vector math")
+OVER_POSITIONS = "all unknowns of a position, over the number of positions (1e6 at once at most)"
+OVER_LINKAGES = "all forces of a linkage at one position, over the number of linkages"
 SOLVED = 100_000
 """Positions where every array is allocated, and for the error bars, which evaluate the forces 17 times."""
+PER_SCENE = 50_000
+"""Positions in whose stead one random scene is judged: twenty of them by default."""
+JUDGED = "a scene judged by the exact engines, ms"
 
 
-class Limit(NamedTuple):
-    """What a row of the table is held to, and why; a ratio, which holds with and without AVX-512."""
+class Measured(NamedTuple):
+    """What one run found."""
 
-    sign: str
-    bound: float
-    reason: str
-
-    def holds(self, measured: float) -> bool:
-        """Whether the measured number keeps it; NaN does not."""
-        return measured >= self.bound if self.sign == ">=" else measured <= self.bound
-
-
-LIMITS = {
-    "13x13 / formulas": Limit(">=", 5.0, "closed formulas are worth several times the system that they eliminate"),
-    "formulas / positions only": Limit(">=", 3.0, "who asks for two angles does not pay for nine more unknowns"),
-    "positions only / floor": Limit("<=", 6.0, "the rest of two angles is arithmetic on arrays of a block"),
-    "solve to forces / formulas": Limit("<=", 2.0, "new arrays and the points come on top, no second evaluation"),
-    "solve with error bars / to forces": Limit(
-        "<=", 35.0, "the forces are evaluated 17 times, and every number is rounded anew"
-    ),
-    "numpy / compiled": Limit(">=", 1.2, "who installs numba gains by it on one core"),
-    "compiled / C": Limit("<=", 1.5, "the blocks, statuses and copies around the compiled loop stay small"),
-    "compiled error bars / forces": Limit("<=", 17.0, "16 more evaluations, which share the tangent"),
-    "growth from 1000 positions on": Limit("<=", 1.3, "the work is linear in the positions: blocks fit the cache"),
-    "memory beyond the result, MB": Limit("<=", 50.0, "work space is that of a block, not of the sweep"),
-    "import fourbar / import numpy": Limit("<=", 1.0, "it loads numpy alone, and less than that of its own"),
-}
-"""By the name of the row."""
-
-
-def interleaved(actions: dict[str, Callable[[], object]], rounds: int) -> dict[str, float]:
-    """Median time of each action, the actions taking turns so that a slow spell hits all of them."""
-    times: dict[str, list[float]] = {name: [] for name in actions}
-    for _ in range(rounds + 1):
-        for name, action in actions.items():
-            times[name].append(seconds(action))
-    return {name: median(values[1:]) for name, values in times.items()}
+    rows: dict[str, float]
+    over_positions: Times
+    over_linkages: Times
+    not_run: dict[str, str]
 
 
 def bodies_of(scene: Scene, at: Command) -> FreeBodies:
@@ -112,33 +106,6 @@ def memory(n: int) -> float:
     return peak / 1e6
 
 
-def c_loop(n: int) -> Callable[[], object] | None:
-    """The same equations as a plain C loop, compiled on the spot; None where there is no compiler."""
-    compiler = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
-    if compiler is None:
-        return None
-    with tempfile.TemporaryDirectory() as folder:
-        library = Path(folder) / "loop.so"
-        source = Path(__file__).with_name("bench_loop.c")
-        made = subprocess.run(
-            [compiler, "-O3", "-march=native", "-shared", "-fPIC", str(source), "-o", str(library), "-lm"],
-            capture_output=True,
-            check=False,
-        )
-        if made.returncode != 0:
-            return None
-        loop = ctypes.CDLL(str(library)).loop
-    theta_2, out = command(n).theta_2, np.zeros((15, n))
-    pointer = ctypes.POINTER(ctypes.c_double)
-    arguments = (ctypes.c_long(n), theta_2.ctypes.data_as(pointer), out.ctypes.data_as(pointer))
-
-    def call() -> Array:
-        loop(*arguments)
-        return out
-
-    return call
-
-
 def floor(theta_2: Array, out: dict[str, Array]) -> Callable[[], object]:
     """What no formula for two angles does without: a tangent, a square root and two arctangents, block by block."""
 
@@ -156,10 +123,15 @@ def floor(theta_2: Array, out: dict[str, Array]) -> Callable[[], object]:
 @click.command()
 @click.option("--positions", default=1_000_000, show_default=True, type=click.IntRange(1000))
 @click.option("--rounds", default=5, show_default=True, type=click.IntRange(1))
-@click.option("--largest", default=10_000_000, show_default=True, type=click.IntRange(1000), help="For the growth.")
+@click.option(
+    "--largest", default=1_000_000, show_default=True, type=click.IntRange(1000, 10**8), help="For the growth, to 1e8."
+)
+@click.option("--picture", type=click.Path(path_type=Path), metavar="FILE", help="Draw the growth: svg, png or pdf.")
 @click.option("--against", metavar="REVISION", help="This tree's times over those of a git revision, instead.")
-def bench(positions: int, rounds: int, largest: int, against: str | None) -> int:
-    """Ratios of speed: formulas, the 13x13 system, a C loop; sizes, stages, import, memory."""
+def bench(positions: int, rounds: int, largest: int, picture: Path | None, against: str | None) -> int:
+    """Speed side by side: NumPy, compiled, C, SymPy, engines; over positions and linkages; ratios that must hold."""
+    if picture is not None:
+        format_of(picture)
     if against is not None:
         return compared_with(against, positions, rounds)
     from rich.console import Console
@@ -168,15 +140,16 @@ def bench(positions: int, rounds: int, largest: int, against: str | None) -> int
     if any(os.environ.get(name) != "1" for name in ONE_THREAD):
         # read when numpy is loaded: too late in this process
         arguments = ["--positions", positions, "--rounds", rounds, "--largest", largest]
+        arguments += ["--picture", picture] if picture is not None else []
         line = [sys.executable, "-m", "validation", "bench", *map(str, arguments)]
         status = subprocess.run(line, env=os.environ | dict.fromkeys(ONE_THREAD, "1"), check=False).returncode
         return status if status >= 0 else BROKEN  # below 0: a signal ended it
-    rows = measure(positions, rounds, largest)
+    found = measure(positions, rounds, largest)
     table = Table(title=f"{positions} positions, one core, medians of {rounds} interleaved rounds; {machine()}")
     for column in ("what", "measured", "needed", ""):
         table.add_column(column, justify="left" if column == "what" else "right")
     broken = []
-    for what, measured in rows.items():
+    for what, measured in found.rows.items():
         limit = LIMITS.get(what)
         if limit is None:
             table.add_row(what, f"{measured:.1f} ns/position")
@@ -184,10 +157,30 @@ def bench(positions: int, rounds: int, largest: int, against: str | None) -> int
         holds = limit.holds(measured)
         table.add_row(what, f"{measured:.2f}", f"{limit.sign} {limit.bound:g}", "holds" if holds else "fails")
         broken += [] if holds else [f"{what}: {limit.reason}"]
-    Console().print(table)
+    console = Console()
+    console.print(table)
+    for title, times in ((OVER_POSITIONS, found.over_positions), (OVER_LINKAGES, found.over_linkages)):
+        console.print(_by_count(title, times))
+    for who, reason in found.not_run.items():
+        click.echo(f"not run: {who}: {reason}")
+    if picture is not None:
+        draw_bench(found.over_positions, found.over_linkages, picture)
     for what in broken:
         click.echo(f"fails: {what}")
     return FAILED if broken else HOLDS
+
+
+def _by_count(title: str, times: Times) -> "Table":
+    """One row for each who, one column for each count."""
+    from rich.table import Table
+
+    counts = sorted({n for own in times.values() for n in own})
+    table = Table("ns each", title=title)
+    for n in counts:
+        table.add_column(f"{n:.0e}".replace("e+0", "e"), justify="right")
+    for who, own in times.items():
+        table.add_row(who, *(f"{own[n]:.4g}" if n in own else "" for n in counts))
+    return table
 
 
 def compared_with(revision: str, positions: int, rounds: int) -> int:
@@ -210,13 +203,14 @@ def compared_with(revision: str, positions: int, rounds: int) -> int:
     return HOLDS
 
 
-def measure(positions: int, rounds: int, largest: int) -> dict[str, float]:
-    """Rows of the table: the ratios of LIMITS, and ns per position."""
+def measure(positions: int, rounds: int, largest: int) -> Measured:
+    """Rows of the table: the ratios of LIMITS, and ns per position; and the times by how many."""
     scene, at = example(), command(positions)
     limits, swing = example(WITH_LIMITS), command(positions, *default_range(WITH_LIMITS))
     everything, angles = preallocated(UNKNOWNS, VECTORS, positions), preallocated(ANGLES, VECTORS, positions)
     batch, solved = min(positions, THIRTEEN_BATCH), command(min(positions, SOLVED))
     bodies = bodies_of(scene, command(batch))
+    peers, others = loops(), engines()
     actions: dict[str, Callable[[], object]] = {
         "formulas, all 11 unknowns": lambda: solve(scene, at=at, out=everything, compiled=False),
         "the same compiled": lambda: solve(scene, at=at, out=everything, compiled=True),
@@ -230,51 +224,48 @@ def measure(positions: int, rounds: int, largest: int) -> dict[str, float]:
         "compiled to forces, points too": lambda: solve(scene, "force", at=solved, compiled=True),
         "compiled with error bars": lambda: solve(scene, "error", at=solved, compiled=True),
     }
-    in_c = c_loop(positions)
-    if in_c is not None:
-        actions["plain C loop, all"] = in_c
+    out = np.zeros((15, positions))
+    actions |= {f"{name}, all": partial(loop, at.theta_2, out) for name, loop in peers.here.items() if name in IN_C}
+    if "compiled" in peers.not_run:
+        actions = {name: action for name, action in actions.items() if "compiled" not in name}
+    actions |= others.here
     times = interleaved(actions, rounds)
     counts = {"13x13 assembled and solved": batch}
     to_stages = ["solve to forces, points too", "solve with error bars"]
     to_stages += ["compiled to forces, points too", "compiled with error bars"]
     counts |= dict.fromkeys(to_stages, len(solved.theta_2))
+    counts |= dict.fromkeys(others.here, ONE_BY_ONE)
     rows = {name: 1e9 * value / counts.get(name, positions) for name, value in times.items()}
-    cost = growth(largest, rounds)
-    rows |= {f"all, {n} positions": value for n, value in cost.items()}
+    by_positions = over_positions(peers.here, largest, rounds)
+    by_linkages = over_linkages(positions, rounds, compiled="compiled" in peers.here)
+    cost, most = by_positions["NumPy"], max(by_linkages[STUDY])
     everything_ns, forces = rows["formulas, all 11 unknowns"], rows["solve to forces, points too"]
-    if in_c is not None:
-        rows["compiled / C"] = rows["the same compiled"] / rows["plain C loop, all"]
-    return rows | {
-        "numpy / compiled": everything_ns / rows["the same compiled"],
-        "compiled error bars / forces": rows["compiled with error bars"] / rows["compiled to forces, points too"],
+    if "compiled" in peers.here:
+        rows["numpy / compiled"] = everything_ns / rows["the same compiled"]
+        rows["compiled error bars / forces"] = rows["compiled with error bars"] / rows["compiled to forces, points too"]
+        if "C" in peers.here:
+            rows["compiled / C"] = rows["the same compiled"] / rows["C, all"]
+    exact = [witness for witness in WITNESSES if not witness.through_time]
+    if not any(witness.missing() for witness in exact):
+        rows[JUDGED] = judging(exact, max(1, positions // PER_SCENE))
+        rows[JUDGED_BY_SYSTEMS] = rows[JUDGED] * 1e6 / rows["13x13 assembled and solved"]
+    rows |= {
         "13x13 / formulas": rows["13x13 assembled and solved"] / everything_ns,
         "formulas / positions only": everything_ns / rows["positions only"],
         "positions only / floor": rows["positions only"] / rows["floor: tangent, root, two arctan"],
         "solve to forces / formulas": forces / everything_ns,
         "solve with error bars / to forces": rows["solve with error bars"] / forces,
+        "study of linkages / positions": by_linkages[STUDY][most] / by_linkages[POSITIONS][most],
         "growth from 1000 positions on": max(cost.values()) / cost[min(cost)],
         "memory beyond the result, MB": memory(min(positions, 1_000_000)),
         "import fourbar / import numpy": import_cost(),
     }
+    return Measured(rows, by_positions, by_linkages, peers.not_run | others.not_run)
 
 
-def repeated(scene: Scene, n: int) -> Callable[[], object]:
-    """n positions, as often as makes 200 000."""
-    at, out = command(n), preallocated(UNKNOWNS, VECTORS, n)
-
-    def action() -> None:
-        for _ in range(max(1, 200_000 // n)):
-            solve(scene, at=at, out=out, compiled=False)
-
-    return action
-
-
-def growth(largest: int, rounds: int) -> dict[int, float]:
-    """ns per position for 1000, 10 000, ... positions, into preallocated arrays."""
-    sizes = [10**k for k in range(3, 9) if 10**k <= largest]
-    scene = example()
-    actions: dict[str, Callable[[], object]] = {}
-    for n in sizes:
-        actions[str(n)] = repeated(scene, n)
-    times = interleaved(actions, rounds)
-    return {n: 1e9 * times[str(n)] / (n * max(1, 200_000 // n)) for n in sizes}
+def judging(witnesses: list[Witness], scenes: int) -> float:
+    """Milliseconds of CPU in which a random scene is judged as `run` does, nothing drawn; the median."""
+    suite = Random(scenes + 1, 0, tuple(LinkageType))
+    each = (partial(judged, suite.name(i), suite.scene(i), witnesses, draw=False) for i in range(scenes + 1))
+    times = [seconds(action) for action in each]
+    return 1e3 * median(times[1:])  # the first one imports the engines

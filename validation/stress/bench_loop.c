@@ -1,10 +1,11 @@
-/* The crank-rocker of bench.py, position to pin forces, as a plain loop: the physical yardstick. */
+/* The crank-rocker of timed.py, position to pin forces, as a plain loop: the physical yardstick. */
 #include <math.h>
 
-void loop(long n, const double *theta_2, double *out) {
+void loop(long n, const double *restrict theta_2, double *restrict out) {
   const double d = 0.3, a = 0.1, b = 0.25, c = 0.22, w2 = 10.0, g = -9.81;
   const double m2 = 0.2, m3 = 0.5, m4 = 0.4, r2 = a / 2, r3 = b / 2, r4 = c / 2;
   const double J3 = m3 * b * b / 3, J4 = m4 * c * c / 3;
+#pragma GCC ivdep
   for (long i = 0; i < n; i++) {
     const double c2 = cos(theta_2[i]), s2 = sin(theta_2[i]);
     const double x = d - a * c2, y = -a * s2, e2 = x * x + y * y;
@@ -27,8 +28,20 @@ void loop(long n, const double *theta_2, double *out) {
     const double M4 = -J4 * al4 + m4 * g * r4 * c4;
     const double u = -M3 / (b * s), v = M4 / (c * s);
     const double F43x = u * c4 - v * c3, F43y = u * s4 - v * s3, F32x = R3x + F43x, F32y = R3y + F43y;
-    const double values[15] = {atan2(s3, c3), atan2(s4, c4), w3, w4, al3, al4, -R2x - F32x, -R2y - F32y,
-                               F32x, F32y, F43x, F43y, F43x - R4x, F43y - R4y, -(M2 + a * (c2 * F32y - s2 * F32x))};
-    for (int k = 0; k < 15; k++) out[k * n + i] = values[k];
+    out[i] = atan2(s3, c3);
+    out[n + i] = atan2(s4, c4);
+    out[2 * n + i] = w3;
+    out[3 * n + i] = w4;
+    out[4 * n + i] = al3;
+    out[5 * n + i] = al4;
+    out[6 * n + i] = -R2x - F32x;
+    out[7 * n + i] = -R2y - F32y;
+    out[8 * n + i] = F32x;
+    out[9 * n + i] = F32y;
+    out[10 * n + i] = F43x;
+    out[11 * n + i] = F43y;
+    out[12 * n + i] = F43x - R4x;
+    out[13 * n + i] = F43y - R4y;
+    out[14 * n + i] = -(M2 + a * (c2 * F32y - s2 * F32x));
   }
 }

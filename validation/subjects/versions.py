@@ -15,7 +15,8 @@ from fourbar.errors import DependencyError
 from fourbar.scene import command as on_path
 from fourbar.writing import write_text
 from validation.engines.witnesses import FURTHER, WITNESSES
-from validation.regression.changes import Change, Kind, differences
+from validation.regression.change import Change, Kind
+from validation.regression.changes import differences
 from validation.regression.history import Run
 from validation.regression.record import read_run
 from validation.regression.steps import NO_CHANGE

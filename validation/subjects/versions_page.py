@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from validation.compare.rows import FAILS, REFUSES
-from validation.regression.changes import Change, Kind
+from validation.regression.change import Change, Kind
 from validation.regression.render import line
 from validation.regression.steps import NO_CHANGE, Step, steps
 from validation.report.colours import style_of

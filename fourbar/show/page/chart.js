@@ -24,23 +24,13 @@ function column(name) {
   return values;
 }
 
-function drawChart() {
-  const kinematic = name => /^(theta|omega|alpha)_[34]$/.test(name);
-  const available = QUANTITIES.filter(([name]) => edited ? kinematic(name) && (data.omega_2 !== null || name.startsWith("theta")) : name in table());
-  const select = byId("quantity"), wanted = available.some(q => q[0] === select.value) ? select.value : (available.find(q => q[0] === "torque") ?? available[0])[0];
-  select.replaceChildren(...available.map(([name, label]) => new Option(label, name, false, name === wanted)));
-  const width = Math.max(280, picture.parentElement.clientWidth), height = 170, left = 62, bottom = 26, values = column(wanted);
+// Axes of a chart over the motion, from low to high; where its points lie.
+function chartFrame(chart, low, high) {
+  const width = Math.max(280, chart.parentElement.clientWidth || picture.parentElement.clientWidth), height = 170, left = 62, bottom = 26;
   chart.replaceChildren();
   set(chart, { viewBox: `0 0 ${width} ${height}` });
-  const limit = wanted.startsWith("theta") ? { cut: false } : ceiling(values), finite = values.filter(Number.isFinite);
-  let low = Math.min(...finite), high = Math.max(...finite);
-  if (limit.cut) { low = Math.max(low, -limit.top); high = Math.min(high, limit.top); }
-  if (!wanted.startsWith("theta")) { low = Math.min(low, 0); high = Math.max(high, 0); }
-  if (high - low < 1e-300) { high += 1; low -= 1; }
-  byId("chart-note").textContent = limit.cut ? `cut at ${text(limit.top, 3)}; it reaches ${text(finite.reduce((m, v) => Math.abs(v) > Math.abs(m) ? v : m, 0), 4)}` : "";
   const over = timed() ? data.time : grid, first = over[0], span = over[over.length - 1] - first || 1;
   const x = t => left + (width - left - 12) * (t - first) / span, y = v => 10 + (height - 10 - bottom) * (high - v) / (high - low);
-  plotted = { over, values, x, y, low, high, height, bottom };
   const most = Math.max(3, width / 75), decade = 10 ** Math.floor(Math.log10(span / most));
   const [factor, sign] = timed() ? [1, " s"] : [DEG, "\u00b0"];
   const step = timed() ? [1, 2, 5, 10].map(m => m * decade).find(d => span / d <= most) : [15, 30, 45, 60, 90, 180].find(d => span * DEG / d <= most) ?? 360;
@@ -55,6 +45,23 @@ function drawChart() {
     if (v === 0 && Math.min(y(low) - y(0), y(0) - y(high)) < 14 && low !== 0 && high !== 0) continue;
     if (v !== 0 || kind === "zero") make(chart, "text", { class: "small", x: left - 6, y: y(v) + 4, "text-anchor": "end" }).textContent = text(v, 3);
   }
+  return { over, x, y, height, bottom };
+}
+
+function drawChart() {
+  const kinematic = name => /^(theta|omega|alpha)_[34]$/.test(name);
+  const available = QUANTITIES.filter(([name]) => edited ? kinematic(name) && (data.omega_2 !== null || name.startsWith("theta")) : name in table());
+  const select = byId("quantity"), wanted = available.some(q => q[0] === select.value) ? select.value : (available.find(q => q[0] === "torque") ?? available[0])[0];
+  select.replaceChildren(...available.map(([name, label]) => new Option(label, name, false, name === wanted)));
+  const values = column(wanted);
+  const limit = wanted.startsWith("theta") ? { cut: false } : ceiling(values), finite = values.filter(Number.isFinite);
+  let low = Math.min(...finite), high = Math.max(...finite);
+  if (limit.cut) { low = Math.max(low, -limit.top); high = Math.min(high, limit.top); }
+  if (!wanted.startsWith("theta")) { low = Math.min(low, 0); high = Math.max(high, 0); }
+  if (high - low < 1e-300) { high += 1; low -= 1; }
+  byId("chart-note").textContent = limit.cut ? `cut at ${text(limit.top, 3)}; it reaches ${text(finite.reduce((m, v) => Math.abs(v) > Math.abs(m) ? v : m, 0), 4)}` : "";
+  plotted = { ...chartFrame(chart, low, high), values, low, high };
+  const { over, x, y, height, bottom } = plotted;
   let d = "", open = false;
   values.forEach((v, i) => {
     const jump = i > 0 && limit.cut && v * values[i - 1] < 0 && Math.abs(v - values[i - 1]) > limit.top;   // across a pole no line

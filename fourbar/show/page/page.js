@@ -7,6 +7,7 @@ function draw(position = row) {
   }
   drawLinkage(p, i);
   showNumbers(i);
+  showSpreads(i);
   moveCursor(i);
 }
 
@@ -132,6 +133,7 @@ function refresh() {
   byId("show-forces").disabled = byId("arrow-scale").disabled = !dynamic();
   fit();
   drawChart();
+  drawBands();
   draw();
 }
 

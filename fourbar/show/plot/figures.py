@@ -12,7 +12,7 @@ from fourbar.errors import InputError
 from fourbar.scene import Scene
 from fourbar.show.plot import curves, freebody, hodograph, influence, linkage
 from fourbar.show.plot.labels import Labels
-from fourbar.show.plot.style import FORCE_COLOURS, MUTED, matplotlib_style, plain, rendered, save
+from fourbar.show.plot.style import FORCE_COLOURS, MUTED, format_of, matplotlib_style, plain, rendered, save
 from fourbar.show.plot.view import View, common_position, on_branch, over_time, view
 from fourbar.show.tables import STATIC
 from fourbar.solution import SI, Conversion
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure, SubFigure
     from matplotlib.projections.polar import PolarAxes
 
-FORMATS = ("svg", "png", "pdf")
 BRANCHES = ("one", "both")
 Painter = Callable[["SubFigure", View, Labels], None]
 
@@ -158,17 +157,10 @@ def draw(
     NotAssembledError : there is no position to draw.
     DependencyError : matplotlib is missing.
     """
-    kind = _format_of(path, file_format)
+    kind = format_of(path, file_format)
     painter, size = _painter(scene, figure, branches)
     with matplotlib_style():
         save(compose(scene, painter, size, position, branches, units, dimensions), Path(path), kind)
-
-
-def _format_of(path: str | Path, file_format: str | None = None) -> str:
-    kind = (file_format or Path(path).suffix.removeprefix(".")).lower()
-    if kind not in FORMATS:
-        raise InputError("output", str(path), "must end in one of " + ", ".join(f".{end}" for end in FORMATS))
-    return kind
 
 
 def _painter(scene: Scene, figure: str, branches: str) -> tuple[Painter, tuple[float, float]]:
@@ -199,7 +191,7 @@ class Drawing:
     def save(self, path: str | Path) -> None:
         """Write it as SVG, PNG or PDF by the ending of the path, whole or not at all."""
         with matplotlib_style():
-            save(self.figure, Path(path), _format_of(path))
+            save(self.figure, Path(path), format_of(path))
 
 
 def drawn(

@@ -1,6 +1,7 @@
 """The moving linkage as a film: GIF through pillow, MP4 through ffmpeg."""
 
 import math
+import shutil
 import subprocess
 import tempfile
 from pathlib import Path
@@ -40,6 +41,19 @@ SHORTEST = 1.0
 """A motion through time shorter than this, s, is slowed down to be seen."""
 
 
+def _ffmpeg() -> str:
+    """The program: the machine's own, else the one that imageio-ffmpeg brings."""
+    if (own := shutil.which("ffmpeg")) is not None:
+        return own
+    try:
+        from imageio_ffmpeg import get_ffmpeg_exe
+
+        return str(get_ffmpeg_exe())
+    except (ImportError, RuntimeError):
+        wanted = 'the program ffmpeg (or pip install "fourbar[film]")'
+        raise DependencyError(f"an .mp4 film needs {wanted}; .gif and .html do not") from None
+
+
 def write_film(scene: Scene, path: Path, kind: str, seconds: float | None, units: Conversion = SI) -> None:
     """One sweep; where the input does not turn fully, there and back. A motion through time is shown as it is.
 
@@ -54,10 +68,11 @@ def write_film(scene: Scene, path: Path, kind: str, seconds: float | None, units
     if seconds is not None and not (math.isfinite(seconds) and 0.0 < seconds * FRAMES_PER_SECOND <= MAX_FRAMES):
         raise InputError("seconds", seconds, f"must be more than 0 and at most {MAX_FRAMES // FRAMES_PER_SECOND}")
     with matplotlib_style():
+        import matplotlib as mpl
         from matplotlib.animation import FFMpegWriter, PillowWriter
 
-        if kind == "mp4" and not FFMpegWriter.isAvailable():
-            raise DependencyError("an .mp4 film needs the program ffmpeg; .gif and .html do not")
+        if kind == "mp4":
+            mpl.rcParams["animation.ffmpeg_path"] = _ffmpeg()
         shown = view(scene)
         shown.units = units
         if seconds is None:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fourbar.errors import DependencyError
+from fourbar.errors import DependencyError, InputError, installing
 from fourbar.quantities import PIN_FORCES
 from fourbar.solution import SI, Array, Conversion, unit_in
 from fourbar.writing import write_bytes
@@ -68,6 +68,7 @@ SETTINGS: dict[Any, Any] = {
     "pdf.fonttype": 42,
 }
 DPI = 200
+FORMATS = ("svg", "png", "pdf")
 
 
 @contextmanager
@@ -79,11 +80,19 @@ def matplotlib_style() -> Iterator[None]:
     try:
         import matplotlib as mpl
     except ImportError:
-        raise DependencyError('drawing needs matplotlib: pip install "fourbar[plot]"') from None
+        raise DependencyError(f"drawing needs matplotlib: {installing('plot')}") from None
     with mpl.rc_context():
         mpl.rcdefaults()  # a user's matplotlibrc does not change a published figure
         mpl.rcParams.update(SETTINGS)
         yield
+
+
+def format_of(path: str | Path, file_format: str | None = None) -> str:
+    """The format stated, or that a file's ending names; InputError where it is none of svg, png, pdf."""
+    kind = (file_format or Path(path).suffix.removeprefix(".")).lower()
+    if kind not in FORMATS:
+        raise InputError("output", str(path), "must end in one of " + ", ".join(f".{end}" for end in FORMATS))
+    return kind
 
 
 def save(figure: "Figure", path: Path, file_format: str) -> None:

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fourbar.errors import InputError
-from fourbar.show.plot.figures import FORMATS
 from fourbar.show.plot.style import (
     FAINT,
     FORCE_COLOURS,
     INK,
     MUTED,
     degree_ticks,
+    format_of,
     largest,
     matplotlib_style,
     plain,
@@ -35,14 +35,6 @@ OFF_SCALE = 98.0
 """Percentile of the half widths beyond which an axis is not stretched: towards a limit they grow without end."""
 
 
-def drawable(path: str | Path) -> str:
-    """The format that a file's ending names; InputError where it is none of svg, png, pdf."""
-    kind = Path(path).suffix.removeprefix(".").lower()
-    if kind not in FORMATS:
-        raise InputError("output", str(path), "must end in one of " + ", ".join(f".{end}" for end in FORMATS))
-    return kind
-
-
 def draw_tolerances(found: Tolerances, path: str | Path) -> None:
     """Draw the deviations from the nominal with their bands into a file, whole or not at all.
 
@@ -50,7 +42,7 @@ def draw_tolerances(found: Tolerances, path: str | Path) -> None:
     matplotlib.
     """
     target = Path(path)
-    kind = drawable(target)
+    kind = format_of(target)
     if len(found.theta_2) < 2:
         raise InputError("motion.theta_2", "one position", "a picture of bands needs a sweep")
     with matplotlib_style():
