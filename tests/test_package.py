@@ -26,7 +26,7 @@ from tests.scenes import crank_rocker
 ROOT = Path(__file__).parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
 PYTHONS = ("3.11", "3.12", "3.13")
-MODULE_OF = {"python-flint": "flint", "pin": "pinocchio"}
+MODULE_OF = {"python-flint": "flint", "pin": "pinocchio", "imageio-ffmpeg": "imageio_ffmpeg"}
 """Libraries that are imported under another name than they are installed by."""
 
 
