@@ -23,6 +23,8 @@ long-test: setup
 	INSTRUCTIONS=all $(BIN)/python -m pytest tests/test_effects_cost.py
 	$(BIN)/python -m pytest tests/test_further_engines.py
 	$(BIN)/python -m pytest tests/test_model_files.py tests/test_subjects.py
+	PROBLEMS=all $(BIN)/python -m pytest tests/test_problems.py
+	RELEASES=pip $(BIN)/python -m pytest tests/test_versions.py
 	$(BIN)/python -m validation standing
 	FREE_MOTIONS=30 $(BIN)/python -m pytest -n 2 tests/test_free_motion_reference.py
 	$(BIN)/python -m validation fuzz-files --count 100000

@@ -265,6 +265,19 @@ def sdf(scene: Path, reader: str, out: Path) -> None:
 @group.command()
 @scene_argument
 @out_option
+def usd(scene: Path, out: Path) -> None:
+    """Write a scene as USD text (.usda) for Newton, the loop closed by a fourth revolute joint."""
+    from fourbar.mjcf.usd import usd as written
+    from fourbar.writing import write_text
+
+    with _named(scene):
+        text = written(_load(scene))
+    write_text(out, text)
+
+
+@group.command()
+@scene_argument
+@out_option
 @click.option(
     "--figure",
     default="overview",

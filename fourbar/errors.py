@@ -2,8 +2,11 @@
 
 import io
 import os
+import re
 import select
 import sys
+from pathlib import Path
+from types import TracebackType
 from typing import TYPE_CHECKING, TextIO
 
 if TYPE_CHECKING:
@@ -57,6 +60,17 @@ class DependencyError(FourBarError):
     """A library that the request needs is not installed."""
 
 
+def installing(extra: str) -> str:
+    """How to install what an extra of this package needs: no index of packages has the package itself."""
+    if (Path(__file__).parents[1] / "pyproject.toml").is_file():
+        return f'pip install ".[{extra}]" in the checkout'
+    from importlib.metadata import requires
+
+    wanted = f"extra == [\"']{extra}[\"']"
+    found = [each.partition(";")[0].strip() for each in requires("fourbar") or () if re.search(wanted, each)]
+    return "pip install " + " ".join(f'"{each}"' for each in found)
+
+
 HOLDS, FAILED, BAD_INPUT, BROKEN, INTERRUPTED = 0, 1, 2, 3, 130
 """All holds; a comparison fails or none was made; bad input; the environment or the program failed; interrupted."""
 
@@ -85,7 +99,7 @@ def run(group: "click.Group", program: str, arguments: list[str] | None = None) 
     except FourBarError as error:
         return _say(str(error), BAD_INPUT)
     except ModuleNotFoundError as error:
-        return _say(f'{error.name} is not installed: pip install "fourbar[all]"', BROKEN)
+        return _say(f"{error.name} is not installed: {installing('all')}", BROKEN)
     except OSError as error:
         return _say(f"{error.filename or 'output'}: {error.strerror}", BROKEN)
     except Exception as error:
@@ -140,3 +154,20 @@ def _say(message: str, status: int) -> int:
 def printable(text: str) -> str:
     """One line without control characters: a title or file name does not steer the terminal."""
     return " ".join("".join(letter if letter.isprintable() else " " for letter in text).split())
+
+
+def _report_interruption(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
+    """One line also where the libraries are still being imported, and nothing can catch it yet."""
+    if not issubclass(kind, KeyboardInterrupt):
+        sys.__excepthook__(kind, error, trace)
+        return
+    print("error: interrupted", file=sys.stderr, flush=True)
+    os._exit(INTERRUPTED)
+
+
+STARTED_AS = [("-m", "fourbar"), ("-m", "validation")]
+"""The commands of this project: another program that imports it reports its own interruptions."""
+if Path(sys.argv[0] if sys.argv else "").stem == "fourbar" or any(
+    pair in STARTED_AS for pair in zip(sys.orig_argv, sys.orig_argv[1:], strict=False)
+):
+    sys.excepthook = _report_interruption

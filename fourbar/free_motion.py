@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.effects.actions import Actions, bodies
-from fourbar.errors import DependencyError, FourBarError, InputError, LimitError
+from fourbar.errors import DependencyError, FourBarError, InputError, LimitError, installing
 from fourbar.formulas.arithmetic import cross
 from fourbar.formulas.motion import Coefficients, State, rates
 from fourbar.formulas.path import Path, path, smooth_branch
@@ -370,5 +370,5 @@ def _scipy() -> tuple[Any, Any]:
         from scipy.integrate import DOP853
         from scipy.optimize import brentq
     except ModuleNotFoundError:
-        raise DependencyError('SciPy is needed for free motion: pip install "fourbar[dynamics]"') from None
+        raise DependencyError(f"SciPy is needed for free motion: {installing('dynamics')}") from None
     return DOP853, brentq

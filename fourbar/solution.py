@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.errors import DependencyError
+from fourbar.errors import DependencyError, installing
 from fourbar.quantities import NOT_ASSEMBLED, STATUS_NAMES, UNITS, VECTORS
 
 Array = NDArray[np.float64]
@@ -149,7 +149,7 @@ class Solution:
         try:
             from pandas import DataFrame
         except ImportError:
-            raise DependencyError('to_pandas needs pandas: pip install "fourbar[pandas]"') from None
+            raise DependencyError(f"to_pandas needs pandas: {installing('pandas')}") from None
         known = {name: values for name, values in scalars(self, units).items() if values is not None}
         return DataFrame({**leading(self), **known})
 

@@ -3,13 +3,14 @@
 import os
 from collections.abc import Callable, Collection, Iterable, Mapping
 from concurrent.futures import ThreadPoolExecutor
+from functools import cache
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.errors import DependencyError, InputError
+from fourbar.errors import DependencyError, InputError, installing
 from fourbar.quantities import ANGLES, OF_DRY_FRICTION, OF_PIN_LOADS, QUANTITIES, STAGE_OF, STAGES
 from fourbar.scene import Command, Scene, command
 from fourbar.scene.case import Case, Evaluated
@@ -23,8 +24,9 @@ if TYPE_CHECKING:
     from fourbar.free_motion import FreeMotion
 
 
-BLOCK = 8192
-"""Positions evaluated at a time, measured: fewer pay for calls, more leave the cache."""
+BLOCK = 8000
+"""Positions evaluated at a time, measured: fewer pay for calls, more leave the cache; and of 8192 an array of complex
+numbers is a little more than the C library hands out again without asking the system for fresh pages."""
 
 WORTH_COMPILING = 2_000_000
 """Evaluations of the forces, one a position, with error bars 17: loading numba and the compiled loop costs as much."""
@@ -78,36 +80,17 @@ def solve(
     where = moved.command if moved is not None else command(scene) if at is None else at
     n = len(where.theta_2)
     wanted, names = requested(scene, (n,), where.omega_2, stage, out)
-    alone = n == 1 and moved is None and out is None
-    result = arrays(names, (n,), out) if not alone or compiled else {}
     code = np.zeros(n, dtype=np.uint8)
     with np.errstate(all="ignore"):
         case = Case.of(with_start(scene) if wanted >= FORCE else scene)._replace(side=side)
         quick = moved is None and where.remainder is None and is_compiled(case, wanted, n, compiled)
-        parts: Iterable[Part]
-        if moved is not None:
-            parts = ((np.flatnonzero(moved.bar == bar),) for bar in (2, 4))
-        elif n == 1 and not quick:  # in plain numbers: arrays of one entry cost several times as much
-            parts = ((0,),)
-        else:
-            size = BLOCK if quick else positions_at_once(wanted)
-            parts = [(slice(start, start + size),) for start in range(0, n, size)]
+        result = None
+        if n == 1 and moved is None and out is None and not quick:
+            result = _alone(case, where, wanted, names, code)
+    if result is None:
+        result = arrays(names, (n,), out)
+        _by_parts(case, where, moved, wanted, names, result, code, quick)
 
-    def evaluate(part: Part) -> Evaluated:
-        nonlocal result
-        if quick:
-            found = evaluated(case, where, part, wanted, names)
-        elif moved is None:
-            found = commanded(case, where, part, wanted, names)
-        else:
-            found = freely(case, moved, part, wanted, names)
-        if alone and not quick:
-            code[0], result = _of_one(case, found)
-        else:
-            keep(case, found, result, code, part, seen=quick)
-        return found
-
-    each(evaluate, parts, at_once=quick)
     for name in ANGLES:
         if name in result:
             unwrap(result[name])
@@ -125,7 +108,7 @@ def is_compiled(case: Case, wanted: int, count: int, compiled: bool | None) -> b
     if not find_spec("numba"):
         if compiled is None:
             return False
-        raise DependencyError('compiled=True needs numba, which is not installed: pip install "fourbar[fast]"')
+        raise DependencyError(f"compiled=True needs numba, which is not installed: {installing('fast')}")
     from fourbar.scene.compiled import carries
 
     return carries(case)
@@ -152,8 +135,8 @@ def each(evaluate: Callable[[Any], Any], parts: Iterable[Any], *, at_once: bool)
         if at_once:
             break
     del found
-    rest, cores = list(parts) if at_once else [], threads()
-    if cores == 1 or len(rest) < PARTS_FOR_THREADS:
+    rest = list(parts)
+    if len(rest) < PARTS_FOR_THREADS or (cores := threads()) == 1:
         for part in rest:
             quietly(part)
         return
@@ -183,14 +166,11 @@ def requested(
             stage = "position" if omega_2 is None else "force"
         if stage not in STAGES:
             raise InputError("stage", stage, "must be one of " + ", ".join(STAGES))
-        wanted, absent = STAGES.index(stage), _absent(scene)
-        before = STAGES[: wanted + 1]
-        names: Collection[str] = {
-            name: None for name, of in _stages(scene).items() if of in before and name not in absent
-        }.keys()
+        wanted = STAGES.index(stage)
+        names: Collection[str] = _names(wanted, _absent(scene), tuple(point.name for point in scene.points))
     else:
         names = out.keys()
-        wanted = _highest_stage(out, shape, _stages(scene))
+        wanted = _highest_stage(out, shape, _stages(tuple(point.name for point in scene.points)))
     if wanted > 0 and omega_2 is None:
         raise InputError("motion.omega_2", None, f"is needed for the stage {STAGES[wanted]!r}")
     return wanted, names
@@ -211,11 +191,16 @@ def is_scalar(name: str) -> bool:
 KIND = {q.name: q.kind for q in QUANTITIES}
 
 
-def _stages(scene: Scene) -> dict[str, str]:
+def _stages(points: tuple[str, ...]) -> dict[str, str]:
     """Every quantity of a scene, those of its own points too, and its stage."""
-    if not scene.points:
-        return STAGE_OF
-    return STAGE_OF | {f"{start}{p.name}": stage for p in scene.points for start, stage in OF_POINTS.items()}
+    return STAGE_OF | {start + name: stage for name in points for start, stage in OF_POINTS.items()}
+
+
+@cache
+def _names(wanted: int, absent: tuple[str, ...], points: tuple[str, ...]) -> tuple[str, ...]:
+    """The quantities of the stages up to the last one wanted."""
+    before = STAGES[: wanted + 1]
+    return tuple(name for name, of in _stages(points).items() if of in before and name not in absent)
 
 
 def solved(scene: Scene, at: Command, code: NDArray[np.uint8], result: Mapping[str, Array]) -> Solution:
@@ -267,18 +252,55 @@ def keep(
         if is_scalar(name):
             result[name][part] = value
         else:
-            result[name][*part, 0], result[name][*part, 1] = value.real, value.imag
+            array = result[name]
+            if array.strides[-1] == array.itemsize:  # x and y next to each other: one copy
+                array.view(complex)[*part, 0] = value
+            else:
+                array[*part, 0], array[*part, 1] = value.real, value.imag
 
 
-def _of_one(case: Case, found: Evaluated) -> tuple[Any, dict[str, Array]]:
-    """The same of a single position: its status code, and all of its arrays at once."""
-    withheld(case, found)
-    codes, values, _ = found
-    numbers = [name for name in values if KIND.get(name) == "scalar"]
-    vectors = [name for name in values if KIND.get(name) != "scalar"]
-    rows = np.array([values[name] for name in numbers], dtype=float)[:, None]
-    pairs = np.array([values[name] for name in vectors], dtype=complex)[:, None].view(float).reshape(-1, 1, 2)
-    return codes, dict(zip((*numbers, *vectors), (*rows, *pairs), strict=True))
+def _by_parts(
+    case: Case,
+    where: Command,
+    moved: "FreeMotion | None",
+    wanted: int,
+    names: Collection[str],
+    result: Mapping[str, Array],
+    code: NDArray[np.uint8],
+    quick: bool,
+) -> None:
+    """Evaluate all positions block by block, those of a free motion by their independent angle."""
+    size = BLOCK if quick else positions_at_once(wanted)
+    parts: list[Part] = [(slice(start, start + size),) for start in range(0, len(code), size)]
+    if moved is not None:
+        parts = [(np.flatnonzero(moved.bar == bar),) for bar in (2, 4)]
+
+    def evaluate(part: Part) -> Evaluated:
+        if moved is not None:
+            found = freely(case, moved, part, wanted, names)
+        else:
+            found = (evaluated if quick else commanded)(case, where, part, wanted, names)
+        keep(case, found, result, code, part, seen=quick)
+        return found
+
+    each(evaluate, parts, at_once=quick)
+
+
+def _alone(
+    case: Case, where: Command, wanted: int, names: Collection[str], code: NDArray[np.uint8]
+) -> dict[str, Array] | None:
+    """A single position in plain numbers, for arrays of one entry cost several times as much; None where any is no
+    number: there NumPy goes on with inf and NaN, and statuses follow."""
+    try:
+        codes, values, _ = commanded(case, where, (0,), wanted, names)
+    except ArithmeticError:
+        return None
+    code[0] = codes
+    table = np.array([*values.values()], dtype=complex)
+    if not np.isfinite(table).all():
+        return None
+    pairs = table.view(float).reshape(-1, 1, 2)
+    return {name: pairs[i, :, 0] if is_scalar(name) else pairs[i] for i, name in enumerate(values)}
 
 
 def _released(scene: Scene) -> "FreeMotion":

@@ -2,7 +2,23 @@
 
 import os
 import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+
+TEMPORARY = ".part"
+"""What the name of an unfinished file ends with."""
+
+
+@contextmanager
+def naming(path: Path) -> Iterator[None]:
+    """What goes wrong with an open file (a full disk) names it, and no temporary one, which no reader knows."""
+    try:
+        yield
+    except OSError as error:
+        if error.filename is None or str(error.filename).endswith(TEMPORARY):
+            error.filename = str(path)
+        raise
 
 
 def write_bytes(path: str | Path, data: bytes) -> None:
@@ -13,26 +29,23 @@ def write_bytes(path: str | Path, data: bytes) -> None:
     target = Path(path)
     if target.exists() and not target.is_file():
         # a device or pipe is written to; renaming onto it would replace /dev/null itself
-        with target.open("wb") as file:
+        with naming(target), target.open("wb") as file:
             file.write(data)
         return
-    try:
-        handle, temporary = tempfile.mkstemp(prefix=f".{target.name[:100]}.", suffix=".part", dir=target.parent)
-    except OSError as error:
-        error.filename = str(target)  # the reader knows this name, not the temporary one
-        raise
-    try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(data)
-            file.flush()
-            os.fsync(file.fileno())
-        umask = os.umask(0)
-        os.umask(umask)
-        os.chmod(temporary, 0o666 & ~umask)  # mkstemp makes it private; a result is an ordinary file
-        os.replace(temporary, target)
-    except BaseException:
-        Path(temporary).unlink(missing_ok=True)
-        raise
+    with naming(target):
+        handle, temporary = tempfile.mkstemp(prefix=f".{target.name[:100]}.", suffix=TEMPORARY, dir=target.parent)
+        try:
+            with os.fdopen(handle, "wb") as file:
+                file.write(data)
+                file.flush()
+                os.fsync(file.fileno())
+            umask = os.umask(0)
+            os.umask(umask)
+            os.chmod(temporary, 0o666 & ~umask)  # mkstemp makes it private; a result is an ordinary file
+            os.replace(temporary, target)
+        except BaseException:
+            Path(temporary).unlink(missing_ok=True)
+            raise
 
 
 def write_text(path: str | Path, text: str) -> None:

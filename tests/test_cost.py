@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -20,7 +21,7 @@ from validation.engines.mujoco.trial import Build, Rig
 from validation.engines.pinocchio_forward import PinocchioForward
 from validation.stress.bench import LINKAGE
 from validation.studies.cost import formulas, laws, orders, pictures, study
-from validation.studies.cost.cost import cost
+from validation.studies.cost.cost import cost, front_lines
 from validation.studies.cost.curves import BEST
 from validation.studies.cost.errors import NO_ANSWER, QUANTITIES, Errors, errors
 
@@ -161,7 +162,9 @@ def test_formulas_in_four_precisions() -> None:
 
 def point(steps: float, worst: float, curve: str = "c", kind: str = study.STEPPED) -> study.Point:
     errors = [worst] * len(QUANTITIES)
-    return study.Point(curve, kind, f"{steps:g}/rev", steps, int(steps), steps, *errors, steps * 1e-6, 1e-6, steps)
+    return study.Point(
+        curve, kind, f"{steps:g}/rev", steps, int(steps), steps, *errors, steps * 1e-6, 1e-6, steps, 0.03
+    )
 
 
 def test_fit_floor_and_warning() -> None:
@@ -267,6 +270,7 @@ def test_the_command_writes_table_report_and_pictures(tmp_path: Path, monkeypatc
     result = CliRunner().invoke(cost, [str(scene), "--out", str(tmp_path / "out")], standalone_mode=False)
     assert result.exception is None and result.return_value == 0, result.output
     assert "matters most here: " in result.output and ", because " in result.output
+    assert re.search(r"RK4 steps  ms/turn    \+-  setting\n +\S+ +\d+ +\S+ +\d+ %  ", result.output)
     folder = tmp_path / "out" / "small"
     rows = (folder / "cost.csv").read_text().splitlines()
     assert rows[0] == ",".join(study.COLUMNS) and len(rows) > 40
@@ -278,6 +282,13 @@ def test_the_command_writes_table_report_and_pictures(tmp_path: Path, monkeypatc
         assert (folder / f"{stem}.svg").read_text().startswith("<?xml") and (
             folder / f"{stem}.png"
         ).stat().st_size > 20_000
+
+
+def test_the_scatter_of_timings_is_that_of_their_middle_half() -> None:
+    middle, scatter = study.clocked([1.0, 9.0, 2.0, 2.2, 1.8])
+    assert middle == 2.0 and scatter == pytest.approx(0.5 * (2.2 - 1.8) / 2.0)
+    lines = front_lines({"c": [point(10, 1e-2), replace(point(20, 1e-3), scatter=math.nan)]})
+    assert lines[1].endswith("3 %  c: 10/rev") and lines[2].endswith("0.02     -  c: 20/rev")
 
 
 def test_statement_of_a_picture() -> None:

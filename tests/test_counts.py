@@ -15,6 +15,7 @@ import fourbar
 from fourbar.errors import FAILED, HOLDS
 from fourbar.formulas.mobility import limit_positions
 from fourbar.scene import Command, Scene, command
+from tests.here import judge_here, summary_of
 from tests.scenes import crank_rocker
 from tests.test_harness import Echo
 from tests.test_regression import HERE, ROW, save
@@ -30,7 +31,6 @@ from validation.regression import render
 from validation.regression.changes import differences
 from validation.report.html import html as page_of
 from validation.report.markdown import markdown
-from validation.report.summary import summarise
 from validation.run import released as free
 from validation.run.judge import judge, judged
 from validation.stress.mutation import mutation
@@ -180,8 +180,9 @@ omega_2 = "1 rad/s"
 
 
 def test_a_run_in_which_nothing_was_compared_says_so_everywhere_and_ends_with_1(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    judge_here(monkeypatch)
     (tmp_path / "scene.toml").write_text(ONE_POSITION)
     out = tmp_path / "out"
     arguments = ["run", str(tmp_path / "scene.toml"), "--workers", "1", "--out", str(out)]
@@ -201,7 +202,7 @@ def test_every_form_of_a_report_says_the_same_counts() -> None:
         judged(name, crank_rocker(title=name), witnesses, draw=False)
         for name, witnesses in (("good", (exact, refused)), ("refused", (refused,)))
     )
-    summary = summarise([good, bad])
+    summary = summary_of([good, bad])
     # the rows of the formulas themselves stand on both scenes; the others are of the free bodies
     sentence = "All 52 comparisons on 1 of 2 scenes hold: 52 agree; not compared: 2 refuse"
     assert summary.verdict == sentence == summary.counts.sentence() and summary.good
@@ -223,9 +224,8 @@ def test_a_free_motion_that_every_engine_refuses_is_not_held(monkeypatch: pytest
     monkeypatch.setattr(free, "_adapter", lambda _: Refusing)
     scene = crank_rocker(motion=fourbar.Motion(1.0, 0.0, free=fourbar.Free(0.2, 20)))
     page = judged("free", scene, (), draw=False)
-    assert (
-        summarise([page]).verdict == "Nothing was compared on 1 scene: 1 of the formulas' own identities hold; 2 refuse"
-    )
+    sentence = "Nothing was compared on 1 scene: 1 of the formulas' own identities hold; 2 refuse"
+    assert summary_of([page]).verdict == sentence
 
 
 def junit(old: list[Row], new: list[Row]) -> ET.Element:

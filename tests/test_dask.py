@@ -17,7 +17,8 @@ import pytest
 
 import validation.run.run
 from fourbar.errors import InputError
-from tests.test_suite import COUNT, EXACT, IN_A_CHUNK, KILLS, SEED, TYPES, judge_all
+from tests.here import judge_here
+from tests.test_suite import COUNT, EXACT, FULL, IN_A_CHUNK, KILLS, SEED, TYPES, judge_all
 from validation.compare.rows import FAILS
 from validation.report.summary import Summary
 from validation.run import machines, pool
@@ -56,7 +57,9 @@ def running(nanny: object) -> int | None:
 def test_killed_workers_change_no_byte(cluster: object, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(validation.run.run, "CHUNK", {False: IN_A_CHUNK})
     suite = Random(COUNT, SEED, TYPES)
-    judge_all(suite, tmp_path / "here")
+    with monkeypatch.context() as alone:
+        judge_here(alone)
+        judge_all(suite, tmp_path / "here")
     rng = np.random.default_rng(SEED)
     kills = 0
     while kills < KILLS:
@@ -133,13 +136,13 @@ def test_a_cluster_without_workers_or_without_the_checkout_is_one_line(
     assert "\n" not in str(caught.value) and "no such module" in str(caught.value)
 
 
-@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGTERM])
+@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGTERM] if FULL else [signal.SIGKILL])
 def test_a_lost_scheduler_ends_the_run_and_writes_nothing(
     how: signal.Signals, started: Callable[..., tuple[subprocess.Popen[bytes], str]], tmp_path: Path
 ) -> None:
     scheduler, address = started("scheduler", "--host", "127.0.0.1", "--port", "0")
     started("worker", *WORKER)
-    suite, steps = Random(200, SEED, TYPES), 0
+    suite, steps = Random(100, SEED, TYPES), 0
     with pytest.raises(ClusterError, match="the scheduler is gone; what is finished is kept"):
         for step in run(suite, tmp_path / "out", EXACT, drawn=False, scheduler=address):
             steps += bool(step)

@@ -20,7 +20,7 @@ from fourbar.cli import status
 from fourbar.errors import HOLDS
 from fourbar.files import load
 from fourbar.files.effects import REGISTRY
-from validation.cli import COMMANDS
+from validation.cli import COMMANDS, group
 from validation.scenes.suites import suite_file
 
 ROOT = Path(__file__).parent.parent
@@ -36,6 +36,17 @@ def read(name: str) -> str:
 
 def blocks(language: str, text: str) -> list[str]:
     return re.findall(rf"^```{language}\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
+
+
+def test_the_examples_of_continuous_integration_use_commands_and_options_that_exist() -> None:
+    for file in sorted((DOCS / "ci").glob("*.yml")):
+        text = re.sub(r"\\\n\s*|>\n\s*|(?<=\S)\n\s+(?=--)", " ", file.read_text())
+        lines = re.findall(r"-m validation (\w+)(.*)", text)
+        assert {name for name, _ in lines} >= {"run", "accept"}
+        for name, options in lines:
+            known = {option for each in group.get_command(None, name).params for option in each.opts}  # type: ignore[arg-type,union-attr]
+            wanted = set(re.findall(r"(?<=\s)--[a-z-]+", options))
+            assert wanted <= known and wanted, (file.name, name, wanted - known)
 
 
 @pytest.fixture
@@ -105,9 +116,9 @@ def test_every_other_command_line_is_one_that_its_program_takes(page: Path) -> N
 @pytest.mark.parametrize("name", ["commands.md", "checks.md", "results-format.md"])
 def test_every_option_that_a_page_names_is_one(name: str) -> None:
     known = set()
-    for group in GROUPS.values():
-        context = click.Context(group)
-        for command in (group, *(group.get_command(context, each) for each in group.list_commands(context))):
+    for program in GROUPS.values():
+        context = click.Context(program)
+        for command in (program, *(program.get_command(context, each) for each in program.list_commands(context))):
             assert command is not None
             known |= {option for param in command.params for option in (*param.opts, *param.secondary_opts)}
     assert set(re.findall(r"(?<![\w-])--[a-z][a-z-]*", read(f"docs/{name}"))) <= known

@@ -1,5 +1,7 @@
 """What a scene does not name does not exist: nothing of it in the formulas, in the MJCF or in the compiled model."""
 
+import math
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -9,9 +11,12 @@ import pytest
 
 import fourbar
 from fourbar.effects import FILE_OF, Friction, Viscous
+from fourbar.errors import BROKEN, FAILED
 from fourbar.mjcf import mjcf
 from tests.scenes import crank_rocker
 from tests.test_effects import ACTING
+from validation.cli import status
+from validation.studies.effects import absent, cost
 from validation.studies.effects.absent import ABSENT, TABLES, build, differences, made
 
 ROOT = Path(fourbar.__file__).parent.parent
@@ -45,6 +50,30 @@ def test_a_build_that_pays_for_an_absent_effect_is_noticed(whole: dict[str, obje
     found = differences(whole, made(other))
     assert "list of the terms that run" in found and "bytes of the MJCF" in found
     assert "disabled of the compiled model" in found
+    line = [sys.executable, "-m", "validation.studies.effects.work", "formulas", "1", "2", "none"]
+    subprocess.run(line, env={**os.environ, "PYTHONPATH": str(other)}, cwd=tmp_path, check=True)  # its work is counted
+
+
+def test_instructions_are_judged_by_the_noise_of_the_whole_build(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    counted = iter([100.0, 100.1, 99.9, 100.12, 100.0, 100.35, 100.37])
+    same = {"numbers": {}, "calls": [], "mjcf": ""}
+    monkeypatch.setattr(absent, "build", lambda root, _: root)
+    monkeypatch.setattr(absent, "made", lambda _: same)
+    monkeypatch.setattr(absent, "counts", lambda *_: {"none": next(counted)})
+    for module in (absent, cost):
+        monkeypatch.setattr(module, "available", lambda: True)
+        monkeypatch.setattr(module, "not_installed", lambda _: "mujoco is not installed")
+    monkeypatch.setattr(absent, "ABSENT", ("gravity", "viscous"))
+    assert status(["effects-cost", "--absent"]) == FAILED
+    first, gravity, viscous, last = capsys.readouterr().out.splitlines()
+    assert first == "compiled models are not compared: mujoco is not installed"
+    assert gravity.endswith("bits, MJCF and terms are equal; instructions +0.350 %") and "+0.370 %" in viscous
+    assert last == "FAILS: at most 0.36 %, by the noise of the whole build, and no difference are required"
+    assert [absent.Trace("", [], more, 0.0036).holds for more in (0.0035, -0.0037, math.nan)] == [True, False, False]
+    assert status(["effects-cost", "--engines", "formulas,mujoco-inverse"]) == BROKEN
+    assert capsys.readouterr().err == "error: mujoco-inverse: mujoco is not installed\n"
 
 
 def test_no_term_of_an_effect_runs_in_a_scene_without_effects(whole: dict[str, object]) -> None:

@@ -14,6 +14,7 @@ import fourbar
 import fourbar.cli
 import validation.cli
 from fourbar.errors import BAD_INPUT, BROKEN, FAILED, HOLDS, INTERRUPTED, DependencyError, InputError, run
+from fourbar.writing import write_text
 from tests.scenes import crank_rocker
 from validation.compare.rows import AGREES, FAILS, Row, write_results
 from validation.published.figures import Figure
@@ -91,6 +92,25 @@ def test_every_end_has_its_status(
     assert "\n" not in printed and bool(printed) == (
         status in (BROKEN, INTERRUPTED) or "must be" in printed or "such" in printed
     )
+
+
+@pytest.mark.parametrize("module", ["fourbar", "validation"])
+def test_an_interruption_while_the_libraries_are_imported_is_one_line(module: str, tmp_path: Path) -> None:
+    (tmp_path / "numpy.py").write_text("raise KeyboardInterrupt")
+    paths = os.pathsep.join((str(tmp_path), str(ROOT)))
+    line = [sys.executable, "-m", module, "--help"]
+    done = subprocess.run(line, env={**os.environ, "PYTHONPATH": paths}, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (INTERRUPTED, "error: interrupted\n")
+
+
+def test_a_full_disk_names_the_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(_: int) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("os.fsync", full)
+    with pytest.raises(OSError, match="No space left on device") as caught:
+        write_text(tmp_path / "report.md", "text")
+    assert caught.value.filename == str(tmp_path / "report.md") and not list(tmp_path.iterdir())
 
 
 ROW = Row("scene", "engine", "exact", "torque", 1e-15, 1e-14, AGREES, "equivalence", 1.0, 1.0)

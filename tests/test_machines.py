@@ -12,9 +12,9 @@ import pytest
 
 from tests.another_machine import BEFORE, CORES, ROOT, environment, machine, why_not
 
-NUMERICAL = ("test_published.py", "test_kinetostatics.py", "test_engines_inverse.py", "test_accepted.py")
-"""Printed figures, identities, the exact engines, the accepted state."""
 ALL = os.environ.get("MACHINES") == "all"
+NUMERICAL = ("test_kinetostatics.py", "test_accepted.py", *(["test_published.py", "test_engines_inverse.py"] * ALL))
+"""Identities, the accepted state of the exact engines; with all kernels printed figures and each engine by itself."""
 
 
 @pytest.mark.timeout(600)

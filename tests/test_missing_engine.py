@@ -17,6 +17,8 @@ import sys
 class Blocker:
     def find_spec(self, name, path=None, target=None):
         if name.partition(".")[0] == os.environ["BLOCKED"]:
+            if "BROKEN" in os.environ:
+                raise ImportError("libboost.so: cannot open shared object file", name=name)
             raise ModuleNotFoundError(f"No module named {name!r}", name=name)
 
 
@@ -42,7 +44,7 @@ omega_2 = "1 rad/s"
 """
 
 
-def without(library: str, folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+def without(library: str, folder: Path, *arguments: str, **settings: str) -> subprocess.CompletedProcess[str]:
     """`python -m validation run` where a library cannot be imported."""
     (folder / "sitecustomize.py").write_text(BLOCKER)
     (folder / "scene.toml").write_text(SCENE)
@@ -50,7 +52,7 @@ def without(library: str, folder: Path, *arguments: str) -> subprocess.Completed
     return subprocess.run(
         [sys.executable, "-m", "validation", "run", "scene.toml", "--workers", "1", "--out", "out", *arguments],
         cwd=folder,
-        env={**os.environ, "PYTHONPATH": paths, "BLOCKED": library, "COLUMNS": "200"},
+        env={**os.environ, "PYTHONPATH": paths, "BLOCKED": library, "COLUMNS": "200", **settings},
         capture_output=True,
         text=True,
         check=False,
@@ -60,7 +62,7 @@ def without(library: str, folder: Path, *arguments: str) -> subprocess.Completed
 @pytest.mark.parametrize("library", WITNESSES)
 def test_the_others_run_and_the_missing_named_with_the_reason(library: str, tmp_path: Path) -> None:
     done = without(library, tmp_path)
-    reason = f'{library} is not installed: pip install "fourbar[{library}]"'
+    reason = f'{library} is not installed: pip install ".[{library}]" in the checkout'
     with (tmp_path / "out" / "results.csv").open() as table:
         rows = list(csv.DictReader(table))
     assert {row["engine"] for row in rows} == {"formulas", *(ALL - WITNESSES[library])}
@@ -76,6 +78,14 @@ def test_the_others_run_and_the_missing_named_with_the_reason(library: str, tmp_
 
 def test_requested_by_name_nothing_is_run(tmp_path: Path) -> None:
     done = without("mujoco", tmp_path, "--engines", "free-body,mujoco-inverse")
-    assert done.stderr.strip() == 'error: mujoco-inverse: mujoco is not installed: pip install "fourbar[mujoco]"'
+    reason = 'mujoco is not installed: pip install ".[mujoco]" in the checkout'
+    assert done.stderr.strip() == f"error: mujoco-inverse: {reason}"
     assert done.returncode == 3
     assert not (tmp_path / "out").exists()
+
+
+def test_an_engine_that_is_there_and_does_not_load_is_one_line(tmp_path: Path) -> None:
+    done = without("pinocchio", tmp_path, "--engines", "pinocchio-inverse", BROKEN="1")
+    what = "ImportError: libboost.so: cannot open shared object file"
+    assert done.stderr.strip() == f"error: pinocchio-inverse: pinocchio is installed, but does not load: {what}"
+    assert done.returncode == 3 and not (tmp_path / "out").exists()

@@ -3,6 +3,8 @@
 import cmath
 import importlib
 import re
+import tempfile
+from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree as ET
 
@@ -14,6 +16,7 @@ from fourbar.effects import Torsion
 from fourbar.errors import LimitError
 from fourbar.mjcf import SIMULATORS, mjcf_for
 from fourbar.mjcf.sdf import sdf
+from fourbar.mjcf.usd import usd
 from fourbar.scene import Command, Scene
 from tests.scenes import crank_rocker
 from validation.compare.answer import Array
@@ -140,14 +143,18 @@ FIRST_ORDER = 0.5
 """Drake's discrete plant errs as its step: half the step leaves half the error, within this factor of two."""
 
 
+FORCE = 0.01
+"""Of Drake's reaction at A after 200 steps of 1 ms, of first order; measured 1.1e-3."""
+
+
 def test_drake_loads_the_sdf_and_moves_as_released() -> None:
     pytest.importorskip("pydrake")
     plants, parsing = (importlib.import_module(f"pydrake.multibody.{name}") for name in ("plant", "parsing"))
     simulator = importlib.import_module("pydrake.systems.analysis").Simulator
     scene = released()
     text = sdf(scene, "drake")
-    theta_2, _, _, *speeds = (float(x) for x in re.findall(r"(-?[\d.]+(?:e-?\d+)?) rad", text))
-    expected, missed = fourbar.solve(scene).theta_2[-1], []
+    theta_2, theta_3, _, *speeds = (float(x) for x in re.findall(r"(-?[\d.]+(?:e-?\d+)?) rad", text))
+    ours, missed, pulls = fourbar.solve(scene), [], []
     for step in (1e-3, 5e-4):
         plant = plants.MultibodyPlant(step)
         plant.set_discrete_contact_approximation(plants.DiscreteContactApproximation.kSap)
@@ -158,7 +165,12 @@ def test_drake_loads_the_sdf_and_moves_as_released() -> None:
         for name, speed in zip(("O2", "A", "O4"), speeds, strict=True):
             plant.GetJointByName(name).set_angular_rate(context, speed)
         simulator(plant, context).AdvanceTo(0.2)
-        missed.append(theta_2 + plant.GetJointByName("O2").get_angle(context) - expected)
+        missed.append(theta_2 + plant.GetJointByName("O2").get_angle(context) - ours.theta_2[-1])
+        joint = plant.GetJointByName("A")
+        on_3 = plant.get_reaction_forces_output_port().Eval(context)[int(joint.index())].translational()[:2]
+        turned = theta_3 + plant.GetJointByName("O2").get_angle(context) + joint.get_angle(context)
+        pulls.append(abs(complex(*on_3) * cmath.exp(1j * turned) + complex(*ours.F32[-1])))
+    assert pulls[0] < FORCE * abs(complex(*ours.F32[-1])), "the force at A as the comment says"
     assert abs(missed[1]) < 1e-2 and missed[1] / missed[0] == pytest.approx(0.5, rel=FIRST_ORDER)
 
 
@@ -185,3 +197,65 @@ def test_sdf_refuses_what_it_cannot_hold() -> None:
         sdf(released(effects=(Torsion.at(O2=(1.0, 0.0, 0.0)),)), "drake")
     with pytest.raises(LimitError, match="pin B"):
         sdf(released(effects=(fourbar.Viscous.at(B=1.0),)), "drake")
+
+
+def points(text: str, name: str) -> list[complex]:
+    """The points of that name in a USD file, in the order in which they stand there."""
+    found = re.findall(rf"{name} = \((\S+), (\S+), 0\)", text)
+    return [complex(float(x), float(y)) for x, y in found]
+
+
+def test_usd_closes_its_loop_keeps_masses_and_refuses_what_it_cannot_hold() -> None:
+    scene = released(effects=(fourbar.Gravity(),))
+    text, linkage = usd(scene), scene.linkage
+    turns = [2.0 * cmath.phase(complex(float(w), float(z)))
+             for w, z in re.findall(r"xformOp:orient = \((\S+), 0, 0, (\S+)\)", text)]  # fmt: skip
+    places = points(text, "xformOp:translate")
+    ends = [places[bar - 2] + cmath.rect(linkage.bar(bar).length, turns[bar - 2]) for bar in (2, 3, 4)]
+    assert abs(ends[0] - places[1]) < 8e-15 and abs(ends[1] - ends[2]) < 8e-15
+    fixed = [2.0 * cmath.phase(complex(float(w), float(z)))
+             for w, z in re.findall(r"localRot0 = \((\S+), 0, 0, (\S+)\)", text)]  # fmt: skip
+    between = [turns[0], turns[1] - turns[0], turns[2], turns[1] - turns[2]]
+    assert all(abs(one - other) < 8e-15 for one, other in zip(fixed, between, strict=True))
+    assert points(text, "localPos0")[1::2] == [linkage.input.length, linkage.output.length]
+    assert points(text, "localPos1") == [0.0, 0.0, 0.0, linkage.coupler.length]
+    assert re.findall(r'Joint "(\w+)"', text) == ["O2", "A", "O4", "B"] and text.count("Articulation = true") == 1
+    assert [float(x) for x in re.findall(r"physics:mass = (\S+)", text)] == [linkage.bar(n).mass for n in (2, 3, 4)]
+    for wrong in (crank_rocker(loads=(fourbar.Load(4, moment=1.0),)), released()):
+        with pytest.raises(LimitError, match="no counterpart in USD"):
+            usd(wrong)
+
+
+KAMINO = 0.01
+"""Of Kamino's force at B in its third step of 1 ms: single precision, and a first-order step; measured 1.5e-3."""
+
+
+def test_newton_loads_the_usd_and_reads_as_the_comment_says() -> None:
+    newton = pytest.importorskip("newton")
+    pytest.importorskip("newton_usd_schemas")
+    wheel = fourbar.Flywheel(100.0, 2)
+    scene = crank_rocker(effects=(fourbar.Gravity(), wheel), loads=(), motion=fourbar.Motion(1.0, 3.0))
+    text = usd(scene)
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "four_bar.usda"
+        file.write_text(text)
+        builder = newton.ModelBuilder()
+        builder.add_usd(str(file))
+    model = builder.finalize(device="cpu")
+    solver, now, then = newton.solvers.SolverKamino(model), model.state(), model.state()
+    *angles, omega_2, at_A, omega_4 = (float(x) for x in re.findall(r"= (-?[\d.]+(?:e-?\d+)?) rad", text)[:4] +
+                                       re.findall(r"joint (?:A|O4) (\S+) rad/s", text))  # fmt: skip
+    speeds = now.joint_qd.numpy()
+    speeds[:3] = omega_2, at_A, omega_4
+    now.joint_qd.assign(speeds)
+    newton.eval_fk(model, now.joint_q, now.joint_qd, now)
+    for _ in range(3):
+        turned = now.body_q.numpy().astype(float)
+        solver.step(now, then, model.control(), None, 1e-3)
+        now, then = then, now
+    row = solver._solver_kamino.data.joints.lambda_kin_j.numpy().astype(float)[15 + 1 : 15 + 3]
+    theta = 2.0 * np.arctan2(turned[:, 5], turned[:, 6])
+    force = complex(*row) * cmath.exp(1j * (theta[2] + angles[1] - angles[2]))
+    at = Command(theta[:1], np.array([1]), np.array([omega_2]), np.zeros(1))
+    expected = complex(*fourbar.solve(scene, "force", at=at).F43[0])
+    assert abs(force - expected) < KAMINO * abs(expected)

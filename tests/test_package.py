@@ -86,14 +86,15 @@ def test_an_extra_that_is_missing_is_one_line(
     before = sorted(tmp_path.iterdir())
     assert status(command) == BROKEN
     err = capsys.readouterr().err
-    assert err.count("\n") == 1 and f'pip install "fourbar[{extra}]"' in err and sorted(tmp_path.iterdir()) == before
+    assert err.count("\n") == 1 and f'pip install ".[{extra}]" in the checkout' in err
+    assert sorted(tmp_path.iterdir()) == before
 
 
 def test_pandas_missing_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
     import fourbar
 
     monkeypatch.setitem(sys.modules, "pandas", None)
-    with pytest.raises(DependencyError, match=r'pip install "fourbar\[pandas\]"'):
+    with pytest.raises(DependencyError, match=r'pip install "\.\[pandas\]"'):
         fourbar.solve(crank_rocker(), "position").to_pandas()
 
 
@@ -134,7 +135,8 @@ def installed_works(python: str, package: Path, folder: Path, constraints: list[
     page = run("animate", "a.toml", "-o", "a.html")
     assert page.returncode == 0 and (folder / "a.html").stat().st_size > 50_000, page.stderr
     missing = run("plot", "a.toml", "-o", "a.svg")
-    assert missing.returncode == BROKEN and missing.stderr.count("\n") == 1 and "fourbar[plot]" in missing.stderr
+    assert missing.returncode == BROKEN and missing.stderr.count("\n") == 1
+    assert 'pip install "matplotlib>=' in missing.stderr
 
 
 @pytest.mark.skipif(os.environ.get("PACKAGE") != "all", reason="PACKAGE=all builds and installs wheel and archive")

@@ -375,7 +375,7 @@ def test_matplotlib_is_loaded_only_to_draw_and_its_absence_is_one_line(tmp_path:
     done = subprocess.run(
         [sys.executable, "-c", code, str(tmp_path / "a.png")], capture_output=True, text=True, check=True
     )
-    assert done.stdout.strip() == 'drawing needs matplotlib: pip install "fourbar[plot]"'
+    assert done.stdout.strip() == 'drawing needs matplotlib: pip install ".[plot]" in the checkout'
     assert issubclass(DependencyError, fourbar.FourBarError)
 
 

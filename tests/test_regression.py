@@ -1,29 +1,35 @@
 """What changed since the accepted state: real changes distinguished from round-off, the surroundings first."""
 
+import html
 import json
 import math
 import xml.etree.ElementTree as ET
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
+import pyarrow.parquet as pq
 import pytest
 from click.testing import CliRunner
 
 import fourbar
 from fourbar.errors import InputError
+from tests.here import judge_here
 from validation.cli import status
-from validation.compare.columns import write_columns
+from validation.compare.columns import Columns
 from validation.compare.rows import AGREES, FAILS, REFUSES, Row, write_results
 from validation.compare.tolerance import EPS
 from validation.regression import record, render
 from validation.regression.accept import accept_command, compare
-from validation.regression.changes import Kind, differences
+from validation.regression.change import Kind
+from validation.regression.changes import compared, differences
 from validation.regression.history import HISTORY, append, read_history
-from validation.regression.record import About, about, baseline, read_run, read_times, write_about
+from validation.regression.record import About, Recorded, about, baseline, read_run, recorded, write_about
 from validation.regression.scenes import description
 from validation.regression.times import TimeChange
+from validation.report.junit import cases
 
-Recorded = tuple[About, list[Row]]
+WithRows = tuple[About, list[Row]]
 ROW = Row("scene", "engine", "exact", "torque", 1e-15, 1e-14, AGREES, "equivalence", 1.0, 1.0)
 HERE = about({"engine": 1.0}, "suite")
 
@@ -102,7 +108,7 @@ def test_accept_keeps_the_run_next_to_the_results_or_in_a_stated_folder(tmp_path
     for options, kept in (([], tmp_path / "accepted"), (["--to", str(tmp_path / "mine")], tmp_path / "mine")):
         assert runner.invoke(accept_command, [str(run), *options]).exit_code == 0
         assert read_run(kept) == read_run(run)
-        assert read_times(kept) == {("scene", "engine"): 3.0}
+        assert dict(recorded(kept).times()) == {"scene": [("engine", 3.0)]}
         assert json.loads((kept / "record.json").read_text())["machine"] == HERE.machine
         assert runner.invoke(compare, [str(kept), str(run)], standalone_mode=False).return_value == 0
     assert runner.invoke(accept_command, [str(run), "--to", str(run)]).exit_code != 0
@@ -140,7 +146,7 @@ def test_what_is_empty_unfinished_or_fails_is_not_accepted(tmp_path: Path) -> No
         (["--engines", ","], "must be among pinocchio-inverse"),
         (["--against", "no-such-run"], "must be a folder with results.csv"),
         (["--against", "accepted", "--python", "python"], "cannot be combined with --python"),
-        (["--junit", "changes.xml"], "say --against BASELINE or --python PATH too"),
+        (["--html", "changes.html"], "say --against BASELINE or --python PATH too"),
         (["--name", "coupler=link"], "names a body or site of --mjcf"),
     ],
 )
@@ -179,9 +185,11 @@ def test_another_python_without_the_libraries_is_one_line_and_status_3(
 
 def test_a_run_with_too_many_rows_for_a_text_is_read_from_its_columns(tmp_path: Path) -> None:
     rows = [ROW, replace(ROW, quantity="watch", error=math.nan, verdict=FAILS)]
-    write_columns(iter([rows]), tmp_path)
+    with Columns(tmp_path) as columns:
+        columns.add(rows)
     write_about(HERE, tmp_path)
     from_text = read_run(tmp_path)
+    assert pq.read_table(tmp_path / "results.parquet")["error"].null_count == 1  # no greatest error is NaN by it
     (tmp_path / "results.csv").unlink()
     from_columns = read_run(tmp_path)
     assert from_columns[0] == from_text[0] and repr(from_columns[1]) == repr(from_text[1])
@@ -191,10 +199,122 @@ def test_a_run_with_too_many_rows_for_a_text_is_read_from_its_columns(tmp_path: 
         read_run(tmp_path)
 
 
+def test_two_long_runs_are_read_scene_by_scene_and_little_of_them_is_kept(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One row group after the other, both in step; every row is counted, of each kind the worst are listed."""
+    monkeypatch.setattr("validation.compare.columns.GROUP_ROWS", 60)
+    for where in ("validation.compare.columns", "validation.regression.accept"):
+        monkeypatch.setattr(f"{where}.CSV_ROWS", 100)
+    monkeypatch.setattr("validation.compare.columns.BATCH_ROWS", 60)
+    scenes, kept = 1000, 5
+    for name, grown in (("old", 1.0), ("new", 1e3)):
+        (tmp_path / name).mkdir()
+        with Columns(tmp_path / name) as columns:
+            for k in range(scenes):
+                row = replace(ROW, scene=f"random-0-{k:09d}", condition=1e-3, error=1e-9 * (1.0 + k * (grown - 1.0)))
+                columns.add([replace(row, quantity="F12", error=1e-15), row])
+        assert not (tmp_path / name / "results.csv").exists() and len(columns.first_lines) < 60
+    alive = most = 0
+    before, after = (recorded(tmp_path / name) for name in ("old", "new"))
+
+    def watched(run: Recorded) -> Iterator[tuple[str, list[Row]]]:
+        nonlocal alive, most
+        for scene, rows in run.scenes():
+            alive += 1
+            most = max(most, alive)
+            yield scene, rows
+            alive -= 1
+
+    found = compared((HERE, watched(before)), (HERE, watched(after)), {"engine"}, [], kept)
+    assert most == 2 and found.rows == 2 * scenes and found.regressed == found.kinds[Kind.WORSE] == scenes - 1
+    assert [change.key[0][-3:] for change in found.of(Kind.WORSE)] == ["999", "998", "997", "996", "995"]
+    assert len(found.changes) == 2 * kept
+    cases = ET.fromstring(render.junit(found))
+    assert cases.findall(".//testcase")[-1].get("name") == f"{2 * (scenes - kept)} rows more: see results.parquet"
+    arguments = ["compare", str(tmp_path / "old"), str(tmp_path / "new")]
+    assert [status(arguments), status([*arguments, "--only", "random-0-000000000"])] == [1, 0]
+    kept_as = tmp_path / "kept"
+    assert status(["accept", str(tmp_path / "new"), "--to", str(kept_as)]) == 0
+    assert {path.name for path in kept_as.iterdir()} == {"record.json", "results.parquet"}  # too long for a history
+    assert status(["compare", str(kept_as), str(tmp_path / "new")]) == 0
+
+
+def test_a_part_of_a_long_run_compares_with_its_part_and_a_table_out_of_order_with_nothing(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rows = [replace(ROW, scene=f"scene {k:03d}") for k in range(80)]
+    whole, some = save(tmp_path / "whole", rows), save(tmp_path / "some", [rows[7], rows[70]])
+    assert status(["compare", str(whole), str(some)]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0] == "not run: scene scene 000 (1 rows)" and lines[50] == "not run: and 28 more (28 rows)"
+    assert lines[-1].startswith("No regression in 80 rows: 78 not run, 2 same")
+    table = some / "results.csv"
+    first, *others = table.read_text().splitlines(keepends=True)
+    table.write_text(first + "".join(reversed(others)))
+    assert status(["compare", str(whole), str(some)]) == 2
+    assert "is sorted by scene" in capsys.readouterr().err
+
+
+def disagreeing(worse: set[tuple[str, str]]) -> tuple[list[Row], list[Row]]:
+    """Two runs of three scenes by three exact engines, a simulation and an identity; `worse`: engine and quantity."""
+    names = [(engine, quantity) for engine in ("one", "two", "three", "sim") for quantity in ("F12", "torque")]
+    rows = [replace(ROW, engine=engine, quantity=quantity) for engine, quantity in (*names, ("formulas", "power"))]
+    rows = [replace(row, setting="RK4 628/rev") if row.engine == "sim" else row for row in rows]
+    old = [replace(row, scene=scene) for scene in "abc" for row in rows]
+    fails = {"verdict": FAILS, "error": 1e-6}
+    return old, [
+        replace(row, **fails, reason=f"{ord(row.scene)}e-6 where 1e-9 was predicted")  # type: ignore[arg-type]
+        if (row.engine, row.quantity) in worse
+        else row
+        for row in old
+    ]
+
+
+@pytest.mark.parametrize(
+    ("worse", "sentence"),
+    [
+        ({("sim", "F12"), ("sim", "torque")}, "only sim, 3 of 3 scenes"),
+        ({("one", "torque"), ("sim", "torque")}, "only one, sim, 3 of 3 scenes"),
+        (
+            {(engine, "torque") for engine in ("one", "two", "three")} | {("formulas", "power")},
+            "all engines and the identity disagree: the formulas, 3 of 3 scenes",
+        ),
+        (
+            {(engine, "F12") for engine in ("one", "two", "three")},
+            "all engines disagree, and the identities hold: the formulas, or what all engines are given, 3 of 3 scenes",
+        ),
+        ({("formulas", "power")}, "only the identities: the formulas, or what is stated of them, 3 of 3 scenes"),
+    ],
+)
+def test_the_report_says_who_is_at_fault(worse: set[tuple[str, str]], sentence: str) -> None:
+    old, new = disagreeing(worse)
+    found = differences((HERE, old), (HERE, new))
+    assert found.fault.sentences == [sentence]
+    for form in (render.text, render.markdown, render.html):
+        assert sentence in html.unescape(form(found))
+
+
+def test_rows_that_changed_are_grouped_by_engine_and_cause_the_worst_first() -> None:
+    old, new = disagreeing({("sim", "F12"), ("sim", "torque"), ("one", "torque")})
+    better = [replace(row, error=1e-9) if row.engine == "two" else row for row in old]
+    new = [replace(row, error=1.0) if row.failed and row.engine == "one" and row.scene == "b" else row for row in new]
+    found = differences((HERE, better), (HERE, new))
+    groups = [line for line in render.text(found).splitlines() if "scenes, " in line and "rows (" in line]
+    cause = "agrees -> fails: # where # was predicted"
+    assert groups == [
+        f"verdict got worse: one, 3 of 3 scenes, 3 rows (torque 3), {cause}",
+        f"verdict got worse: sim, 3 of 3 scenes, 6 rows (F12 3, torque 3), {cause}",
+        "better: two, 3 of 3 scenes, 6 rows (F12 3, torque 3)",
+    ]
+    assert found.of(Kind.VERDICT_WORSE)[0].key[:2] == ("b", "one")
+    assert groups[0].partition(": ")[2] in html.unescape(render.html(found))
+
+
 SCENE = fourbar.load(Path(__file__).parent.parent / "models" / "crank_rocker.toml")
 
 
-def made(rows: list[Row], scenes: dict[str, fourbar.Scene], engines: tuple[str, ...] = ("engine",)) -> Recorded:
+def made(rows: list[Row], scenes: dict[str, fourbar.Scene], engines: tuple[str, ...] = ("engine",)) -> WithRows:
     return about(dict.fromkeys(engines, 1.0), "suite", {name: description(s) for name, s in scenes.items()}), rows
 
 
@@ -260,7 +380,7 @@ def test_an_engine_is_slower_only_beyond_the_scatter_of_its_times() -> None:
 
     def ratios(*factors: float) -> list[TimeChange]:
         new = {key: 100.0 * factor for key, factor in zip(old, factors, strict=False)}
-        return differences((HERE, [ROW]), (HERE, [ROW]), (old, new)).slower
+        return differences((HERE, [ROW]), (HERE, [ROW]), (old, new)).other_times
 
     (slower,) = ratios(1.9, 2.1, 2.0, 2.0, 1.9, 2.1)
     assert str(slower).startswith("engine is 2.00 times slower") and slower.ratio > 1.0
@@ -269,6 +389,44 @@ def test_an_engine_is_slower_only_beyond_the_scatter_of_its_times() -> None:
     assert not ratios(2.0, 2.0)
     (faster,) = ratios(0.5, 0.5, 0.5)
     assert "2.00 times faster" in str(faster)
+
+
+def test_a_slower_engine_is_a_regression_on_the_same_machine_and_slower_formulas_are_theirs(tmp_path: Path) -> None:
+    def timed(name: str, **ratios: float) -> Path:
+        folder = save(tmp_path / name, [ROW])
+        lines = [f"{scene},{engine},-,1,1,{ratio}" for scene in "abcd" for engine, ratio in ratios.items()]
+        head = "scene,engine,setting,positions,seconds,times_formulas"
+        (folder / "timings.csv").write_text("\n".join([head, *lines]))
+        return folder
+
+    old, slower = timed("old", engine=100.0, other=50.0), timed("slower", engine=180.0, other=50.0)
+    xml = tmp_path / "changes.xml"
+    assert status(["compare", str(old), str(slower), "--junit", str(xml)]) == 1
+    (failure,) = ET.parse(xml).getroot().findall(".//failure")
+    assert failure.get("message") == "engine is 1.80 times slower (factor of scatter 1.00, 4 scenes)"
+    assert status(["compare", str(slower), str(old)]) == 0
+    write_about(replace(HERE, machine="another"), slower)
+    assert status(["compare", str(old), str(slower)]) == 0
+    both = {("a", "b"): 100.0}
+    halved, doubled = ({(s, e): t for s in "abcd" for e in ("engine", "other")} for t in (50.0, 200.0))
+    for one, other, word in ((doubled, halved, "slower"), (halved, doubled, "faster")):
+        (change,) = differences((HERE, [ROW]), (HERE, [ROW]), ({**both, **one}, {**both, **other})).times
+        assert str(change).startswith(f"formulas is 4.00 times {word}")
+
+
+def test_the_run_itself_is_written_as_junit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("validation.report.junit.LISTED", 10)
+    judge_here(monkeypatch)
+    xml, scene = tmp_path / "run.xml", Path(__file__).parent.parent / "models" / "crank_rocker.toml"
+    arguments = ["run", str(scene), "--engines", "free-body", "--no-pictures", "--out", str(tmp_path / "out")]
+    assert status([*arguments, "--junit", str(xml)]) == 0
+    found, rows = ET.parse(xml).getroot(), read_run(tmp_path / "out")[1]
+    names = [case.get("name") for case in found.iter("testcase")]
+    assert names == [row.quantity for row in rows[:10]] + [f"{len(rows) - 10} rows more: see results.parquet"]
+    assert found.get("failures") == "0" and found.get("name", "").startswith("All ")
+    failing = [replace(row, verdict=FAILS, reason="not held") for row in rows[20:22]]
+    kinds = [(case.outcome, case.message.partition(": ")[2]) for case in cases([*rows, *failing])][10:]
+    assert kinds == [("failure", "not held")] * 2 + [("skipped", "")]
 
 
 @pytest.fixture(scope="module")
@@ -323,7 +481,8 @@ def test_a_history_is_read_by_pandas_and_keeps_what_each_scene_states(nights: Pa
 
 def test_what_is_no_history_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     run = save(tmp_path / "run", [ROW])
-    write_columns(iter([[ROW]]), run)
+    with Columns(run) as columns:
+        columns.add([ROW])
     (tmp_path / "text.parquet").write_text("no columns")
     for file, words in ((tmp_path, "there is no such file"), (run / "results.parquet", "it lacks commit, date"),
                         (tmp_path / "text.parquet", "is no history")):  # fmt: skip

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import fourbar
+from tests.here import summary_of
 from tests.scenes import crank_rocker
 from validation.compare.rows import FAILS, to_csv
 from validation.engines.witnesses import WITNESSES
@@ -20,7 +21,7 @@ from validation.report.figures import FLOOR, STRETCHES, worst_of_stretches
 from validation.report.html import ALL_OPEN, Section, html
 from validation.report.markdown import markdown
 from validation.report.record import Record
-from validation.report.summary import Summary, summarise
+from validation.report.summary import Summary
 from validation.run.judge import judged
 
 COMMENT_LIMIT = 65_536
@@ -49,12 +50,12 @@ def copies(count: int, *, failing: int = 0) -> list[Record]:
 
 
 def report(pages: list[Record], **more) -> tuple[Summary, str]:
-    """Summary and page, the lines of results.csv counted as `write_columns` does."""
+    """Summary and page, the lines of results.csv counted as `run` does."""
     lines, line = {}, 2
     for each in pages:
         lines[each.name] = line
         line += len(each.rows)
-    summary = summarise(pages)
+    summary = summary_of(pages)
     return summary, html(summary, lines, **more)
 
 
@@ -117,7 +118,7 @@ def test_nothing_is_fetched() -> None:
 
 
 def test_the_comment_of_a_pull_request_holds_200_scenes_that_all_fail() -> None:
-    assert len(markdown(summarise(copies(200, failing=200)))) < COMMENT_LIMIT
+    assert len(markdown(summary_of(copies(200, failing=200)))) < COMMENT_LIMIT
 
 
 def test_a_section_of_another_module_is_shown_and_linked() -> None:

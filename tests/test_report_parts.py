@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.here import summary_of
 from tests.test_report import demo, report
 from validation.compare.rows import AGREES, FAILS, REFUSES, UNDECIDED, Row, write_results
 from validation.engines.hard_suite import HARD_WITNESSES, Hard
@@ -14,7 +15,6 @@ from validation.report import cost_section as cost
 from validation.report.costs import cost_figure
 from validation.report.hard_section import found_in, section
 from validation.report.html import html
-from validation.report.summary import summarise
 from validation.report.templating import count_or_size
 from validation.run.run import sections
 from validation.scenes.hard_families import FAMILIES
@@ -60,7 +60,7 @@ def test_a_run_of_the_hard_suite_writes_its_page_and_its_part_of_the_report(
     assert (
         "the picture" in (tmp_path / "hard.html").read_text(encoding="utf-8") and "the picture" in part.figures[0].svg
     )
-    text = html(summarise([]), {}, sections=[part])
+    text = html(summary_of([]), {}, sections=[part])
     assert 'href="#hard"' in text and 'href="hard.html"' in text and "<text>the picture</text>" in text
 
 

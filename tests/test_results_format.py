@@ -7,14 +7,24 @@ from pathlib import Path
 
 import pytest
 
-from fourbar import solve
+from fourbar import Motion, Scene, Sweep, command, solve, uniform
 from fourbar.effects import PinFriction
 from fourbar.formulas.pin_forces import PinForces
 from fourbar.quantities import FORCES, PIN_FORCES, QUANTITIES, STAGES, UNKNOWNS
 from fourbar.solution import Solution
+from tests.here import judge_here
 from tests.scenes import crank_rocker
 from validation.compare.columns import read_columns
+from validation.compare.identities import FORMULAS, IDENTITIES
 from validation.compare.rows import COLUMNS, Row, from_csv
+from validation.compare.statements.statements import statements
+from validation.engines.free_body import FreeBody
+from validation.engines.hard_suite import HARD_WITNESSES
+from validation.engines.mujoco.shipped import QUANTITY as SHIPPED
+from validation.engines.witnesses import FURTHER, WITNESSES, WORK
+from validation.regression.change import WHOLE
+from validation.regression.record import ACCEPTED, baseline
+from validation.run.released import ENGINES, FULL
 from validation.run.run import run
 from validation.run.selection import chosen
 from validation.scenes.random import LinkageType
@@ -25,6 +35,9 @@ NOT_QUANTITIES = (
     *("title", "drive_bar", "status_code", "branch", "stopped_at"),
     *("points", "velocity", "acceleration"),
 )
+OF_A_SCENE = ("assembled", "undecided", "torque_inertia")
+"""Of every engine, besides what it says of positions and of the linkage."""
+SHIPPED_RUN = baseline(ACCEPTED)
 TYPES = {"string": str, "double": float, "boolean": bool}
 
 
@@ -37,7 +50,9 @@ def block(language: str) -> str:
 @pytest.fixture(scope="module")
 def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("run")
-    list(run(Random(30, 1, tuple(LinkageType)), folder / "results", chosen("free-body"), workers=1, drawn=False))
+    with pytest.MonkeyPatch.context() as monkeypatch:
+        judge_here(monkeypatch)
+        list(run(Random(8, 1, tuple(LinkageType)), folder / "results", chosen("free-body"), workers=1, drawn=False))
     return folder
 
 
@@ -51,6 +66,26 @@ def test_every_quantity_is_described_as_the_table_has_it() -> None:
     described = re.findall(r"^\| `(\w+)` \| (.+?) \| (\w+) \| (scalar|vector) \| (.+) \|$", PAGE, re.MULTILINE)
     table = [(q.name, q.unit, q.stage or "commanded", q.kind, q.meaning.replace("|", r"\|")) for q in QUANTITIES]
     assert described == table
+
+
+def test_every_engine_is_described() -> None:
+    table = PAGE.partition("## The engines")[2].partition("## The quantities")[0]
+    described = re.findall(r"^\| `([\w-]+)` \| [^|]+ \| .+ \|$", table, re.MULTILINE)
+    assert described == ["engine", *WORK, *ENGINES]
+    names = {each.name for each in (*WITNESSES, *FURTHER, *HARD_WITNESSES)}
+    assert names | {FORMULAS} == set(WORK)
+
+
+def test_every_quantity_of_a_scene_is_described(results: Path) -> None:
+    table = PAGE.partition("## Quantities of a scene")[2].partition("## pandas")[0]
+    described = re.findall(r"^\| `([\w ]+)` \| [^|]+ \| .+ \|$", table, re.MULTILINE)
+    linkage = uniform(2.0, 1.0, 2.0, 1.0)  # with change points
+    scene, engine = Scene(linkage, Motion(Sweep(0.3, 1.0, 3), 1.0)), FreeBody()
+    stated = {row.quantity for row in statements("", scene, engine, engine.answer(scene, command(scene)))}
+    of_positions = {q.name for q in QUANTITIES}
+    assert set(described) == ({*IDENTITIES, *WHOLE, *FULL, *stated, SHIPPED, *OF_A_SCENE}) - of_positions
+    seen = {row.quantity for file in (results / "results", SHIPPED_RUN) for row in from_csv(file / "results.csv")}
+    assert stated - {"through"} <= seen <= {*described, *of_positions}
 
 
 def test_the_fields_of_a_solution_are_the_rows_of_the_table() -> None:

@@ -6,9 +6,9 @@ import pytest
 from mpmath import mpf
 
 from fourbar.formulas.arithmetic import cross, dot
-from fourbar.formulas.motion import State, coefficients, rates, with_parallel_pairs
+from fourbar.formulas.motion import State, coefficients, rates, with_parallel_pairs, with_sines_of_rates
 from fourbar.formulas.path import path, state
-from fourbar.formulas.pin_forces import Wrenches, pin_forces
+from fourbar.formulas.pin_forces import Body, Wrenches, coupler_about_B, pin_forces
 from fourbar.formulas.position import close_loop, direction, half_angle, loop, parallel_pairs
 from fourbar.formulas.transmission import drive_sine
 from fourbar.linkage import uniform
@@ -59,6 +59,43 @@ def test_coefficients_keep_their_digits_where_the_diagonal_is_short(
         assert abs(exact - float(found)) < size
     for found, exact in ((k.dh3, dh3), (k.dh4, dh4)):
         assert abs(exact - float(found)) < size / abs(psi)
+
+
+@pytest.mark.parametrize("theta_1", [0.0, 0.4])
+@pytest.mark.parametrize(("lengths", "psi", "branch"), SHORT)
+def test_small_sines_of_coupler_and_output_keep_their_digits(
+    lengths: tuple[float, ...], psi: float, branch: int, theta_1: float
+) -> None:
+    bars, half = loop(*lengths), half_angle(loop(*lengths), psi)
+    u1 = complex(np.exp(1j * theta_1))
+    plain = close_loop(bars, u1, direction(psi) * u1, half, branch)
+    found = with_sines_of_rates(bars, plain, coefficients(bars, plain))
+    with mp.workdps(50):
+        d, a, b, c = map(mpf, lengths)
+        A = a * mp.expj(mpf(psi))
+        e = abs(d - A)
+        B = A + b * ((d - A) / e) * mp.expj(branch * mp.acos((b * b + e * e - c * c) / (2 * b * e)))
+        exact = (B - A) / b, (B - d) / c
+    for ours, theirs, before in zip((found.u3, found.u4), exact, (plain.u3, plain.u4), strict=True):
+        apart = abs(mp.mpc(ours) - theirs * mp.mpc(u1))
+        assert apart < FEW_ROUNDINGS / abs(psi) and abs(ours - before) < FEW_ROUNDINGS / abs(psi)
+        if theta_1 == 0.0:
+            assert abs(ours.imag - theirs.imag) < 4.0 * FEW_ROUNDINGS * abs(theirs.imag)
+
+
+def test_small_sines_are_those_of_the_triangle_elsewhere() -> None:
+    bars, half = loop(0.3, 0.1, 0.25, 0.22), half_angle(loop(0.3, 0.1, 0.25, 0.22), 1.0)
+    at = close_loop(bars, 1.0 + 0.0j, direction(1.0), half, 1)
+    assert with_sines_of_rates(bars, at, coefficients(bars, at)) is at
+
+
+def test_moment_of_the_coupler_about_B_is_that_of_its_inertia_at_the_mass_centre() -> None:
+    s = state(uniform(0.3, 0.1, 0.25, 0.22), np.array([0.4, 1.0, 4.0]), 1, 3.0, -5.0)
+    three = Body(0.7, 0.02, 0.11 + 0.07j)
+    arm = s.point(3, three.z) - s.point(4, s.lengths.c)
+    expected = -three.I * s.alpha(3) - three.m * cross(arm, s.acceleration(3, three.z))
+    found = coupler_about_B(s.lengths, three, s.at, s.moving, drive_sine(s.at, 4))
+    assert np.allclose(found, expected, rtol=0.0, atol=64 * FEW_ROUNDINGS)
 
 
 @pytest.mark.parametrize(("lengths", "branch"), [((3.0, 1.0, 3.0, 1.0), 1), ((3.0, 1.0, 1.0, 3.0), -1)])

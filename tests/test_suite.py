@@ -7,7 +7,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import ClassVar
@@ -18,6 +18,7 @@ import pytest
 import validation.run.run
 from fourbar.errors import DependencyError, FourBarError, InputError
 from fourbar.scene import Command, Scene
+from tests.here import judge_here
 from tests.unlucky import Few, dies_at_first
 from validation.compare.answer import Answer
 from validation.compare.rows import FAILS, REFUSES, Row, from_csv
@@ -35,10 +36,10 @@ from validation.scenes.random import LinkageType
 from validation.scenes.suites import AS_LONG_AS, MOST_POSITIONS, Files, Random, Suite, scene_files
 
 SEED = 7
-KILLS = int(os.environ.get("KILLS", "3"))
+KILLS = int(os.environ.get("KILLS", "2"))
 """Kills in each of the tests that kill; `make long-test` takes 50, and runs of full size."""
 FULL = "KILLS" in os.environ
-COUNT, IN_A_CHUNK = (220, 20) if FULL else (50, 5)
+COUNT, IN_A_CHUNK = (220, 20) if FULL else (30, 3)
 """Scenes of a run, none of them drawn, so that the work is the judging alone; and as many chunks in a small run."""
 SMALL = f"import validation.run.run as run; run.CHUNK = {{False: {IN_A_CHUNK}}}; "
 HARNESS = "import runpy; runpy.run_module('validation', run_name='__main__', alter_sys=True)"
@@ -119,15 +120,14 @@ def test_workers_that_die_with_nothing_to_do_are_on_nobodys_account(
         assert not list((tmp_path / "lives").iterdir())
 
 
-def test_the_bytes_depend_neither_on_the_workers_nor_on_the_order(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def test_the_bytes_do_not_depend_on_the_workers(
+    tmp_path: Path, undisturbed: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    """None, in order, or two."""
     monkeypatch.setattr(validation.run.run, "CHUNK", {False: IN_A_CHUNK})
-    suite = Random(COUNT, SEED, TYPES)
-    for workers in (1, 2):
-        judge_all(suite, tmp_path / str(workers), workers=workers)
+    judge_all(Random(COUNT, 0, TYPES), tmp_path, workers=2)
     for name in ("results.csv", "results.parquet"):
-        assert (tmp_path / "1" / name).read_bytes() == (tmp_path / "2" / name).read_bytes()
+        assert (tmp_path / name).read_bytes() == (undisturbed / name).read_bytes()
 
 
 def test_random_scenes_depend_on_seed_and_index_alone() -> None:
@@ -224,31 +224,44 @@ def wait_for_parts(out: Path, process: subprocess.Popen[bytes], at_least: int) -
 
 @pytest.fixture(scope="module")
 def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The folder of a run that nothing disturbed."""
+    """The folder of a run that nothing disturbed, judged in this process."""
     out = tmp_path_factory.mktemp("undisturbed")
-    assert start(out, COUNT).wait(timeout=100) == 0
+    with pytest.MonkeyPatch.context() as monkeypatch:
+        judge_here(monkeypatch)
+        judge_all(Random(COUNT, 0, TYPES), out)
     return out
 
 
-def assert_resumes(disturbed: Path, undisturbed: Path) -> None:
-    """A rerun ends with the bytes of the undisturbed run, and nothing is left over."""
-    assert start(disturbed, COUNT).wait(timeout=100) == 0
-    for name in ("results.csv", "results.parquet"):
-        assert (disturbed / name).read_bytes() == (undisturbed / name).read_bytes()
-    assert {path.name for path in disturbed.iterdir()} == {path.name for path in undisturbed.iterdir()}
+@pytest.mark.timeout(120 + 20 * KILLS)
+def test_whatever_ended_it_a_rerun_goes_on_and_ends_with_the_same_bytes(tmp_path: Path, undisturbed: Path) -> None:
+    """Interrupted, killed at random moments and met with a full disk, one after the other in one folder."""
+    process = start(tmp_path, COUNT)
+    wait_for_parts(tmp_path, process, at_least=1)
+    os.kill(process.pid, signal.SIGINT)
+    assert process.wait(timeout=60) == 130
+    assert not list(tmp_path.glob("**/*.part"))
 
-
-@pytest.mark.timeout(60 + 20 * KILLS)
-def test_killed_at_random_moments_a_rerun_ends_with_the_same_bytes(tmp_path: Path, undisturbed: Path) -> None:
     rng = np.random.default_rng(SEED)
     chunks = len(range(0, COUNT, IN_A_CHUNK))
     for _ in range(KILLS):
         process = start(tmp_path, COUNT)
-        wait_for_parts(tmp_path, process, at_least=int(rng.integers(chunks)))
+        wait_for_parts(tmp_path, process, at_least=int(rng.integers(1, chunks)))
         time.sleep(float(rng.uniform(0.0, 0.3)))
         os.killpg(process.pid, signal.SIGKILL)
         process.communicate()
-    assert_resumes(tmp_path, undisturbed)
+
+    process = start(tmp_path, COUNT, "-c", LIMITED, stderr=subprocess.PIPE)
+    _, printed = process.communicate(timeout=100)
+    assert process.returncode == 3
+    assert b"Traceback" not in printed
+    last = printed.decode().strip().splitlines()[-1]
+    assert last.startswith("error: ") and str(tmp_path / "results.") in last
+    assert not (tmp_path / "results.csv").exists()
+
+    assert start(tmp_path, COUNT).wait(timeout=100) == 0
+    for name in ("results.csv", "results.parquet"):
+        assert (tmp_path / name).read_bytes() == (undisturbed / name).read_bytes()
+    assert {path.name for path in tmp_path.iterdir()} == {path.name for path in undisturbed.iterdir()}
 
 
 def workers_of(process: subprocess.Popen[bytes]) -> list[int]:
@@ -277,25 +290,6 @@ def test_a_worker_killed_at_random_moments_changes_no_byte(tmp_path: Path, undis
                     kills += 1
         assert process.wait(timeout=100) == 0
         assert (out / "results.csv").read_bytes() == (undisturbed / "results.csv").read_bytes()
-
-
-def test_interrupted_it_says_130_and_resumes(tmp_path: Path, undisturbed: Path) -> None:
-    process = start(tmp_path, COUNT)
-    wait_for_parts(tmp_path, process, at_least=1)
-    os.kill(process.pid, signal.SIGINT)
-    assert process.wait(timeout=60) == 130
-    assert not list(tmp_path.glob("**/*.part"))
-    assert_resumes(tmp_path, undisturbed)
-
-
-def test_a_full_disk_is_one_line_and_status_3_and_resumes(tmp_path: Path, undisturbed: Path) -> None:
-    process = start(tmp_path, COUNT, "-c", LIMITED, stderr=subprocess.PIPE)
-    _, printed = process.communicate(timeout=100)
-    assert process.returncode == 3
-    assert b"Traceback" not in printed
-    assert printed.strip().splitlines()[-1].startswith(b"error: ")
-    assert not (tmp_path / "results.csv").exists()
-    assert_resumes(tmp_path, undisturbed)
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")
@@ -345,16 +339,15 @@ def test_of_a_long_suite_what_fails_has_pictures_and_what_is_nearest_to_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Drawn at the end, without the engine that broke down; with --no-pictures not at all."""
+    judge_here(monkeypatch)
     drawn: list[str] = []
+    judge = pool.judge_chunk
 
-    def here(
-        suite: Suite, chunks: Iterable[pool.Chunk], who: tuple[Witness, ...], draw: bool, *_: object
-    ) -> Iterator[tuple[int, list[Record]]]:
-        for number, scenes in chunks:
-            drawn.extend(suite.name(scene) for scene in scenes if draw)
-            yield number, pool.judge_chunk(suite, scenes, who, draw)
+    def noting(suite: Suite, scenes: Sequence[int], who: Sequence[Witness], draw: bool) -> list[Record]:
+        drawn.extend(suite.name(scene) for scene in scenes if draw)
+        return judge(suite, scenes, who, draw)
 
-    monkeypatch.setattr(pool, "over_processes", here)
+    monkeypatch.setattr(pool, "judge_chunk", noting)
     monkeypatch.setattr("validation.report.summary.PICTURED", 3)
     monkeypatch.setattr(validation.run.run, "PICTURED", 3)
     monkeypatch.setattr(validation.run.run, "html", lambda *_, **__: "")

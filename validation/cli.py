@@ -24,6 +24,8 @@ COMMANDS = {
     "advise": "validation.studies.cost.advise:command",
     "advise-study": "validation.studies.cost.measure:study",
     "standing": "validation.subjects.standing:command",
+    "versions": "validation.subjects.versions:command",
+    "problems": "validation.subjects.problems:command",
     "effects-cost": "validation.studies.effects.cost:command",
 }
 

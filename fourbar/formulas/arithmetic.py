@@ -1,5 +1,6 @@
 """Arithmetic over plain floats, arrays and numbers that carry derivatives alike; sums that lose nothing."""
 
+import cmath
 import math
 from typing import Any
 
@@ -40,11 +41,12 @@ def exact_difference(p: Number, q: Number, r: Number, s: Number) -> Number:
 
 def vector(x: Number, y: Number) -> Number:
     """x + i y, each part written once: over arrays the sum takes three times as long."""
+    if type(x) is type(y) is float:
+        return complex(x, y)
     if hasattr(x, "slopes") or hasattr(y, "slopes"):  # numbers that carry their derivatives
         return x + 1j * y
     if not isinstance(x, np.ndarray) and not isinstance(y, np.ndarray):
-        plain = complex(x, y)
-        return plain if type(x) is type(y) is float else np.complex128(plain)
+        return np.complex128(complex(x, y))
     z = np.empty(np.broadcast(x, y).shape, dtype=complex)
     z.real, z.imag = x, y
     return z[()]
@@ -52,12 +54,25 @@ def vector(x: Number, y: Number) -> Number:
 
 def polar(r: Number, phi: Number) -> Number:
     """r e^{i phi} with the cosine and the sine of the library, exact where phi = 0."""
+    if type(r) is type(phi) is float:
+        return cmath.rect(r, phi)
     return r * np.cos(phi) + 1j * (r * np.sin(phi))
+
+
+def tangent(x: Number) -> Number:
+    """tan x, of Python's own floats as such."""
+    t = np.tan(x)
+    return t.item() if type(x) is float else t
 
 
 def square_root(x: Number) -> Number:
     """sqrt(x), NaN where x < 0, of Python's own floats as such."""
     return math.sqrt(x) if type(x) is float and x >= 0.0 else np.sqrt(x)
+
+
+def power_of_two(x: Number) -> Number:
+    """The power of two just above a positive number."""
+    return math.ldexp(1.0, math.frexp(x)[1]) if type(x) is float else np.ldexp(1.0, np.frexp(x)[1])
 
 
 def cross(u: Number, v: Number) -> Number:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fourbar.formulas.arithmetic import Number, anywhere, cross, dot, polar, vector
+from fourbar.formulas.arithmetic import Number, anywhere, cross, dot, polar, power_of_two, vector
 from fourbar.formulas.motion import Coefficients, State, coefficients, rates, with_sines_of_rates
 from fourbar.formulas.motion import with_parallel_pairs as parallel_motion
 from fourbar.formulas.position import HalfAngle, Loop, Position, close_loop, direction, half_angle, loop, parallel_pairs
@@ -88,7 +88,7 @@ class Path(NamedTuple):
 def path(lengths: Loop, theta_1: Number, bar: int = 2) -> Path:
     """The path in the angle of bar 2 or 4."""
     d, a, b, c, _, _ = lengths
-    unit = np.ldexp(1.0, np.frexp(0.25 * (d + a + b + c))[1])
+    unit = power_of_two(0.25 * (d + a + b + c))
     d, a, b, c = d / unit, a / unit, b / unit, c / unit
     if bar == 4:
         a, c, theta_1 = c, a, theta_1 + np.pi

@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fourbar.formulas.arithmetic import Number, anywhere, exact_difference, select, square_root, vector
+from fourbar.formulas.arithmetic import Number, anywhere, exact_difference, select, square_root, tangent, vector
 
 HAIR = 1e-100
 """Added to the size of tan h: with A on O4 bars 3, 4 get the directions to which they tend from theta_2 > theta_1."""
@@ -74,8 +74,7 @@ def loop(d: Number, a: Number, b: Number, c: Number) -> Loop:
 
 def direction(theta: Number) -> Number:
     """e^{i theta} from one tangent."""
-    t = np.tan(0.5 * theta)
-    return direction_of_tangent(t.item() if type(theta) is float else t)
+    return direction_of_tangent(tangent(0.5 * theta))
 
 
 def direction_of_tangent(t: Number) -> Number:
@@ -86,7 +85,7 @@ def direction_of_tangent(t: Number) -> Number:
 
 def half_angle(lengths: Loop, psi: Number) -> HalfAngle:
     """The half angle h of psi = theta_2 - theta_1 (rad), and the factors of Heron's formula."""
-    return half_angle_of_tangent(lengths, np.tan(0.5 * psi))
+    return half_angle_of_tangent(lengths, tangent(0.5 * psi))
 
 
 def half_angle_of_tangent(lengths: Loop, t: Number) -> HalfAngle:

@@ -1,4 +1,4 @@
-"""Model files of a scene for simulators (MJCF, SDF), without any of them."""
+"""Model files of a scene for simulators (MJCF, SDF, USD), without any of them."""
 
 from fourbar.mjcf.defaults import defaults_used as defaults_used
 from fourbar.mjcf.defaults import scene_from_lengths as scene_from_lengths

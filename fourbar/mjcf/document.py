@@ -46,7 +46,14 @@ READING = (
 )
 
 
-def mjcf(scene: Scene, settings: Settings = RECIPE, reading: str = READING, *, keyframe: bool = True) -> str:
+def mjcf(
+    scene: Scene,
+    settings: Settings = RECIPE,
+    reading: str = READING,
+    *,
+    keyframe: bool = True,
+    start: "Start | None" = None,
+) -> str:
     """The MJCF text of a scene: it runs on its own in MuJoCo.
 
     Parameters
@@ -55,6 +62,7 @@ def mjcf(scene: Scene, settings: Settings = RECIPE, reading: str = READING, *, k
     reading : the comment that says where torque and pin force are read.
     keyframe : False leaves it out, and with it the assembled pose and the servo that starts it from rest; then
         `settings.timestep` must be given and no position is computed.
+    start : the assembled state to open with; None: that of `at_start`.
 
     Raises
     ------
@@ -68,7 +76,7 @@ def mjcf(scene: Scene, settings: Settings = RECIPE, reading: str = READING, *, k
     free = scene.motion.free is not None
     if free:
         settings = _released(scene, settings)
-    start = at_start(scene) if keyframe else None
+    start = (start or at_start(scene)) if keyframe else None
     if start is not None:
         timestep = start.run.timestep(settings)
     elif settings.timestep is not None:

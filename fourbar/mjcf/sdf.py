@@ -5,7 +5,7 @@ from xml.etree import ElementTree as ET
 
 from fourbar.errors import LimitError
 from fourbar.linkage import BAR_NAMES, FIRST_PIN, MOVING_BARS
-from fourbar.mjcf.document import at_start, plain
+from fourbar.mjcf.document import Start, at_start, plain
 from fourbar.mjcf.model import carriable, text
 from fourbar.scene import Scene
 
@@ -16,7 +16,7 @@ DRAKE = "http://drake.mit.edu"
 COMMENT = (
     " Written by fourbar. The links stand assembled; every joint reads 0 there. SDF holds neither speeds nor a drive: "
     "theta_2 = {} rad, theta_3 = {} rad, theta_4 = {} rad; to start at omega_2 = {} rad/s give joint A {} rad/s and "
-    "joint O4 {} rad/s{}. Pin B: {}. "
+    "joint O4 {} rad/s{}. Pin B: {}. Numbers: {}. "
 )
 CLOSURE = {
     "gazebo": "a revolute joint, the fourth of the loop",
@@ -25,12 +25,22 @@ CLOSURE = {
 }
 
 
-def sdf(scene: Scene, reader: str = "gazebo") -> str:
+NUMBERS = {
+    "gazebo": "T2 is what the program puts on joint O2; a force_torque sensor on joint B, with frame child and measure "
+    "direction parent_to_child, reads the force of bar 4 on bar 3 in the axes of bar 3, of the step that was made",
+    "drake": "T2 is what the program puts on joint O2; get_reaction_forces_output_port, at int(joint.index()), holds "
+    "the force of pins O2, A and O4 on bars 2, 3 and 4 in that bar's axes, all of the instant of the context; the ball "
+    "constraint's own force at B cannot be read",
+}
+
+
+def sdf(scene: Scene, reader: str = "gazebo", start: Start | None = None) -> str:
     """The SDF 1.9 text of a scene: a world with gravity, four links, and the pins as joints.
 
     Parameters
     ----------
     reader : who closes the loop how: "gazebo" by a fourth joint, "drake" by its own ball constraint.
+    start : the assembled state to stand in; None: that of `at_start`.
 
     Raises
     ------
@@ -46,7 +56,7 @@ def sdf(scene: Scene, reader: str = "gazebo") -> str:
     carriable(linkage)
     inertia = {number: linkage.bar(number).moment_of_inertia for number in MOVING_BARS}
     gravity, dynamics = _acting(scene, reader, inertia)
-    begin = at_start(scene)
+    begin = start or at_start(scene)
     (theta_2, of_3_to_2, theta_4), (omega_2, at_A, omega_4) = begin.qpos, begin.qvel
     turn = {2: theta_2, 3: theta_2 + of_3_to_2, 4: theta_4}
     foot = {
@@ -57,7 +67,7 @@ def sdf(scene: Scene, reader: str = "gazebo") -> str:
     root = ET.Element("sdf", {"version": "1.9", **({"xmlns:drake": DRAKE} if reader == "drake" else {})})
     numbers = (repr(x) for x in (theta_2, turn[3], theta_4, omega_2, at_A, omega_4))
     at_B = f", joint B {omega_2 + at_A - omega_4!r} rad/s" if reader == "gazebo" else ""
-    root.append(ET.Comment(COMMENT.format(*numbers, at_B, CLOSURE[reader])))
+    root.append(ET.Comment(COMMENT.format(*numbers, at_B, CLOSURE[reader], NUMBERS[reader])))
     world = ET.SubElement(root, "world", name="four_bar")
     ET.SubElement(world, "gravity").text = text(*gravity, 0.0)
     model = ET.SubElement(world, "model", name=plain(scene.title) or "four-bar")

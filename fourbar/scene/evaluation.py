@@ -54,7 +54,10 @@ def commanded(case: Case, where: Command, part: Part, wanted: int, names: Collec
     ----------
     wanted : number of the last stage that the quantities named need.
     """
-    theta_2, branch = where.theta_2[part], _sign(where.branch[part])
+    theta_2: Any = where.theta_2[part]
+    if theta_2.ndim == 0:
+        theta_2 = theta_2.item()  # with Python's own numbers a formula takes half the time
+    branch = _sign(where.branch[part])
     half, exact = case.half_angle(theta_2, where.remainder)
     of_angles = len(names) <= len(ANGLES) and set(names) <= set(ANGLES)
     if of_angles and where.remainder is None and not case.path.may_stay_parallel:

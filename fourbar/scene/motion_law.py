@@ -5,7 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from fourbar.errors import DependencyError, InputError
+from fourbar.errors import DependencyError, InputError, installing
 from fourbar.linkage import require
 from fourbar.solution import Array
 
@@ -61,7 +61,7 @@ class Law:
         try:
             from scipy.interpolate import CubicSpline
         except ModuleNotFoundError:
-            raise DependencyError('SciPy is needed for a motion law: pip install "fourbar[dynamics]"') from None
+            raise DependencyError(f"SciPy is needed for a motion law: {installing('dynamics')}") from None
         t, angle = np.array(self.time), np.array(self.theta_2)
         mean = 0.0
         if self.ends == "periodic":

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.effects.actions import bodies
-from fourbar.errors import DependencyError, InputError, LimitError
+from fourbar.errors import DependencyError, InputError, LimitError, installing
 from fourbar.formulas.arithmetic import dot
 from fourbar.formulas.path import Path
 from fourbar.formulas.position import HalfAngle, Loop, close_loop
@@ -102,7 +102,7 @@ def extremes(scene: Scene, quantities: Sequence[str] = NAMES) -> Extremes:
     try:
         import flint
     except ImportError:
-        raise DependencyError('Guaranteed extremes need python-flint: pip install "fourbar[exact]"') from None
+        raise DependencyError(f"Guaranteed extremes need python-flint: {installing('exact')}") from None
     names = [name for name in NAMES if name in quantities or name.strip("|") in quantities]
     for name in quantities:
         if name not in NAMES and f"|{name}|" not in NAMES:

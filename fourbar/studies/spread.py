@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.errors import DependencyError, InputError
+from fourbar.errors import DependencyError, InputError, installing
 from fourbar.quantities import ANGLES, NOT_ASSEMBLED, PIN_FORCES
 from fourbar.scene import Scene, command
 from fourbar.solution import Array
@@ -136,7 +136,7 @@ def _members(scene: Scene, samples: int, seed: int) -> Study:
     try:
         from scipy.stats import norm, qmc
     except ImportError:
-        raise DependencyError('SciPy is needed for tolerances: pip install "fourbar[dynamics]"') from None
+        raise DependencyError(f"SciPy is needed for tolerances: {installing('dynamics')}") from None
     known, numbers = entries(scene), dict[str, Any]()
     drawn = qmc.Sobol(len(scene.tolerances), seed=seed).random_base2(max(1, (samples - 1).bit_length()))[:samples]
     for tolerance, column in zip(scene.tolerances, drawn.T, strict=True):

@@ -4,19 +4,23 @@ Both hold the columns of `validation.compare.rows.Row`, sorted by scene, engine,
 both are written as the chunks are read.
 """
 
+import math
 import os
 import sys
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
+from fourbar.writing import naming
 from validation.compare.plain import plain
-from validation.compare.rows import COLUMNS, Row, to_csv
+from validation.compare.rows import COLUMNS, MADE_OF, Row, to_csv
 
 GROUP_ROWS = 100_000
 """Rows of a row group of the Parquet file: each costs some kilobytes of footer, whatever it holds."""
+BATCH_ROWS = 20_000
+"""Rows in memory while the file is read."""
 CSV_ROWS = 1_000_000
 """Rows beyond this are in results.parquet alone: a text table of that size serves nobody."""
 
@@ -49,24 +53,27 @@ class Columns:
     def add(self, rows: Sequence[Row]) -> None:
         """The rows that come next."""
         for row in rows:
-            self.first_lines.setdefault(row.scene, self._line)
+            if self._line <= CSV_ROWS:
+                self.first_lines.setdefault(row.scene, self._line)
             self._line += 1
         self._waiting += rows
         if self._line <= CSV_ROWS:
-            self._csv.write(to_csv(rows).partition("\n")[2])
+            with naming(self.out / "results.csv"):
+                self._csv.write(to_csv(rows).partition("\n")[2])
         if len(self._waiting) >= GROUP_ROWS:
             self._write_group()
 
     def _write_group(self) -> None:
         import pyarrow as pa
 
-        by_column = {name: [getattr(row, name) for row in self._waiting] for name in COLUMNS}
-        self._parquet.write_table(pa.table(by_column, schema=self._schema))
+        by_column = {name: [or_null(getattr(row, name)) for row in self._waiting] for name in COLUMNS}
+        with naming(self.out / "results.parquet"):
+            self._parquet.write_table(pa.table(by_column, schema=self._schema))
         self._waiting.clear()
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         """Put both in place, the text only where it is not too long."""
-        with self._files:
+        with naming(self.out), self._files:
             if kind is None and self._waiting:
                 self._write_group()
         if kind is not None:
@@ -79,24 +86,38 @@ class Columns:
             (self.out / "results.csv").unlink(missing_ok=True)
 
 
-def write_columns(chunks: Iterable[Sequence[Row]], out: Path) -> dict[str, int]:
-    """Both files of rows that are at hand; the line of results.csv at which each scene starts."""
-    with Columns(out) as columns:
-        for rows in chunks:
-            columns.add(rows)
-    return columns.first_lines
+def or_null(value: object) -> object:
+    """A missing number as null: no greatest error is NaN by it, and every reader takes it for none."""
+    return None if isinstance(value, float) and math.isnan(value) else value
 
 
 def read_columns(path: Path) -> Iterator[Row]:
-    """The rows of a results.parquet, a row group at a time; words that recur are kept once."""
+    """The rows of a results.parquet, some thousands at a time; words that recur are kept once."""
+    for cells in _batches(path, list(MADE_OF)):
+        words: dict[str, str] = {}
+        columns = [
+            [math.nan if cell is None else cell for cell in column] if kind is float else _words(column, words)
+            for column, kind in zip(cells, MADE_OF.values(), strict=True)
+        ]
+        yield from map(Row, *columns)
+
+
+def column_of(path: Path, column: str) -> Iterator[str]:
+    """The words in a column, each once in every batch."""
+    for (cells,) in _batches(path, [column]):
+        yield from dict.fromkeys(_words(cells, {}))
+
+
+def _batches(path: Path, columns: list[str]) -> Iterator[list[list[Any]]]:
     import pyarrow.parquet as pq
 
     with pq.ParquetFile(path) as file:
-        for batch in file.iter_batches():
-            for cells in batch.to_pylist():
-                kept: dict[str, Any] = {name: _kept_once(cell) for name, cell in cells.items() if name != "passed"}
-                yield Row(**kept)
+        for batch in file.iter_batches(BATCH_ROWS, columns=columns):
+            yield [batch.column(name).to_pylist() for name in columns]
 
 
-def _kept_once(cell: Any) -> Any:
-    return sys.intern(plain(cell)) if isinstance(cell, str) else cell
+def _words(cells: list[str], known: dict[str, str]) -> list[str]:
+    for cell in dict.fromkeys(cells):
+        if cell not in known:
+            known[cell] = sys.intern(plain(cell))
+    return [known[cell] for cell in cells]

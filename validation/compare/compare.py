@@ -39,6 +39,8 @@ from validation.compare.tolerance import (
 )
 
 Mask = NDArray[np.bool_]
+Yardsticks = dict[str, tuple[Array, Array]]
+"""Size and condition of each quantity at each position."""
 
 OF_THE_FORMULAS = (*OF_DRY_FRICTION, *OF_PIN_LOADS, "torque_error", "force_error")
 """What has judges of its own: the range in which dry friction holds, what it leaves, and the error bars."""
@@ -66,11 +68,14 @@ def compare(
     expected: Iterable[str],
     predicted: Callable[[], Mapping[str, Array]] | None = None,
     basis: Solution | None = None,
+    yardsticks: Yardsticks | None = None,
 ) -> list[Row]:
     """Judge an answer; `formulas` is the solution at `answer.at`, `expected` what the engine must answer.
 
     What the formulas may be wrong by is decided by the stricter of their own conditions and sizes and those of
     `basis`, another derivation at the same positions; left out: the answer itself.
+
+    `yardsticks` are those of `formulas` and `basis` where another answer was held to them before.
 
     With `predicted`, which gives the error to be expected of each quantity at each position in its own unit,
     an error beyond full accuracy must be within DEGRADED times that, and the law in the condition plays no part.
@@ -82,7 +87,9 @@ def compare(
         what = "the engine did not say where the loop closes"
         return [Row.unmeasured(name, answer.engine, answer.setting, "assembled", FAILS, what)]
     own = basis_of(scene, answer)
-    each = _Comparison(name, scene, answer, formulas, tolerance, predicted, own, own if basis is None else basis)
+    held_to = own if basis is None else basis
+    known = {} if yardsticks is None or basis is None else yardsticks
+    each = _Comparison(name, scene, answer, formulas, tolerance, predicted, own, held_to, known)
     rows = [each.assembled()]
     rows += [row for quantity in STAGE_OF if quantity in expected for row in each.judged(quantity)]
     rows += [each.row("watch", FAILS, alarm) for alarm in answer.alarms]
@@ -101,6 +108,7 @@ class _Comparison:
     predicted: Callable[[], Mapping[str, Array]] | None
     own: Solution | None
     basis: Solution | None
+    yardsticks: Yardsticks
     numbers: int = 0
     decided: int = 0
 
@@ -166,12 +174,16 @@ class _Comparison:
 
     def _measured(self, quantity: str, ours: Array, theirs: Array, where: Mask) -> "tuple[_Finding, Array, Array]":
         """What is found over the positions `where`, with the errors and the conditions, (n,)."""
-        size = smallest_yardstick(quantity, self.scene, self.formulas, self.basis)
+        if quantity not in self.yardsticks:
+            self.yardsticks[quantity] = (
+                smallest_yardstick(quantity, self.scene, self.formulas, self.basis),
+                strictest_condition(quantity, self.scene.linkage, self.formulas, self.basis),
+            )
+        size, condition = self.yardsticks[quantity]
         vanishing = size == 0.0
         if self.predicted is not None:
             size = in_own_unit(size)
         error = relative_error(quantity, ours, theirs, size)
-        condition = strictest_condition(quantity, self.scene.linkage, self.formulas, self.basis)
         if self.predicted is None:
             return _by_condition(error, condition, where, self.tolerance), error, condition
         full = np.where(vanishing, 0.0, self.tolerance.factor)

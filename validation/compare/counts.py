@@ -42,6 +42,11 @@ class Counts:
         self.scenes_compared += self._answered > before
 
     @property
+    def total(self) -> int:
+        """All rows."""
+        return self._of.total()
+
+    @property
     def compared(self) -> int:
         """Comparisons that were made."""
         return sum(self[verdict] for verdict in COMPARED)

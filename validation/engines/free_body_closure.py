@@ -19,7 +19,7 @@ STARTS = (
     *((30, 30), (15, 15), (45, 45), (5, 5), (5, 120)),
     *((120, 5), (60, 60), (2, 150), (150, 2), (1, 1)),
 )
-"""Degrees that bars 3 and 4 first make with the diagonal from A to O4, tried in turn."""
+"""Degrees that bars 3 and 4 first make with the diagonal from A to O4, tried in turn where the triangle fails."""
 LONGEST_STEP = 0.5
 """rad; a longer Newton step leaves the region in which the gap is nearly linear."""
 HALVINGS = 40
@@ -48,7 +48,7 @@ def close(linkage: FourBar, theta_2: Array, branch: NDArray[np.int8]) -> Closed:
     # the gap is least where bars 3 and 4 lie along the diagonal
     possible = np.maximum(e - (b + c), abs(b - c) - e) <= closed
     theta, gap = np.full((2, len(e)), np.nan), np.full(len(e), np.nan)
-    for alpha, beta in [*np.radians(STARTS), _triangle(e, b, c)]:
+    for alpha, beta in [_triangle(e, b, c), *np.radians(STARTS)]:
         left = np.flatnonzero(possible & np.isnan(gap))
         if not len(left):
             break
@@ -64,7 +64,7 @@ def close(linkage: FourBar, theta_2: Array, branch: NDArray[np.int8]) -> Closed:
 
 
 def _triangle(e: Array, b: float, c: float) -> tuple[Array, Array]:
-    """Angles of the triangle of the lengths: the start where a bar is a millionth of the others."""
+    """Angles of the triangle of the lengths: the nearest start, also where a bar is a millionth of the others."""
     with np.errstate(divide="ignore", invalid="ignore"):
         at_A, at_O4 = (e * e + b * b - c * c) / (2.0 * e * b), (e * e + c * c - b * b) / (2.0 * e * c)
     return np.arccos(np.clip(np.nan_to_num(at_A), -1.0, 1.0)), np.arccos(np.clip(np.nan_to_num(at_O4), -1.0, 1.0))

@@ -10,7 +10,7 @@ lambda = F43 and e_drive = the derivative of the driven bar's rotation. Every nu
 
 import math
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any, Protocol
 
@@ -27,7 +27,8 @@ START_ANGLES = (
     *((30, 30), (15, 15), (45, 45), (5, 5), (5, 120)),
     *((120, 5), (60, 60), (2, 150), (150, 2), (1, 1)),
 )
-"""Degrees that bars 3 and 4 first make with the diagonal A to O4, tried in turn; they served 8000 of 8000 linkages."""
+"""Degrees that bars 3 and 4 first make with the diagonal A to O4, tried in turn where the triangle of the lengths as
+measured is none to start from; they alone served 8000 of 8000 linkages, in four times as many steps."""
 LONGEST_STEP = 0.5
 """rad; a longer Newton step leaves the region in which the gap is nearly linear."""
 SHORTEST_STEP = 2.0**-40
@@ -100,7 +101,6 @@ class Position:
 
     def __init__(self, tree: Bars) -> None:
         self.tree = tree
-        self.last: dict[int, tuple[float, float]] = {}
 
     def find(self, theta_2: float, branch: int) -> tuple[float, float, float] | None:
         """The configuration on the branch, with the tree placed there, or None where the loop does not close."""
@@ -116,26 +116,17 @@ class Position:
         if max(e - (b + c), abs(b - c) - e) > closed:
             return None
         phi = math.atan2(diagonal[1], diagonal[0])
-        for q3, q4 in self._starts(theta_2, branch, phi):
-            found = newton(tree, (theta_2, q3, q4), branch, closed)
+        # the triangle as measured is the nearest start, also where a bar is a millionth of the others
+        triangle = (_triangle_angle(e, near, far) for near, far in ((b, c), (c, b)))
+        for alpha, beta in (tuple(triangle), *(map(math.radians, pair) for pair in START_ANGLES)):
+            theta_3, theta_4 = phi + branch * alpha, phi + math.pi - branch * beta
+            q = theta_2, math.remainder(theta_3 - theta_2, math.tau), math.remainder(theta_4, math.tau)
+            found = newton(tree, q, branch, closed)
             if found is not None:
-                self.last[branch] = found[1:]
                 return found
-        # the starts miss where a bar is a millionth of the others; the triangle of the lengths as measured does not
-        alpha, beta = (_triangle_angle(e, near, far) for near, far in ((b, c), (c, b)))
-        theta_3, theta_4 = phi + branch * alpha, phi + math.pi - branch * beta
-        found = newton(tree, (theta_2, theta_3 - theta_2, theta_4), branch, closed)
-        if found is None and max(e - (b + c), abs(b - c) - e) < -closed:
+        if max(e - (b + c), abs(b - c) - e) < -closed:
             raise ArithmeticError(f"the loop closes at theta_2 = {theta_2!r}, but Newton's method does not find it")
-        return found
-
-    def _starts(self, theta_2: float, branch: int, phi: float) -> Iterator[tuple[float, float]]:
-        if branch in self.last:
-            yield self.last[branch]
-        for alpha, beta in START_ANGLES:
-            theta_3 = phi + branch * math.radians(alpha)
-            theta_4 = phi + math.pi - branch * math.radians(beta)
-            yield math.remainder(theta_3 - theta_2, math.tau), math.remainder(theta_4, math.tau)
+        return None
 
 
 def _triangle_angle(e: float, near: float, far: float) -> float:
@@ -179,8 +170,9 @@ def newton(tree: Bars, q: tuple[float, float, float], branch: int, closed: float
     return q if math.hypot(here[0], here[1]) <= closed else None
 
 
-Act = Callable[[float, float], dict[str, Array | float]]
-"""omega_2, alpha_2: motion and forces where the bars are placed, by name; empty where a toggle leaves them 0/0."""
+Act = Callable[[Sequence[float], float, float], dict[str, Array | float]]
+"""Joint angles, omega_2, alpha_2: motion and forces where the bars are placed, by name; empty where a toggle leaves
+them 0/0."""
 
 
 def answer_exactly(engine: str, build: Callable[[Scene], Tree], scene: Scene, command: Command) -> Answer:
@@ -190,22 +182,16 @@ def answer_exactly(engine: str, build: Callable[[Scene], Tree], scene: Scene, co
     tree.place((0.0, 0.0, 0.0))
     e_drive = tree.turn(scene.drive_bar)
 
-    def act(omega_2: float, alpha_2: float) -> dict[str, Array | float]:
-        return _motion_and_forces(tree, e_drive, omega_2, alpha_2, loaded)
+    bare = build(replace(scene, loads=(), effects=())) if scene.loads or scene.effects else None
+
+    def act(q: Sequence[float], omega_2: float, alpha_2: float) -> dict[str, Array | float]:
+        return _motion_and_forces(tree, e_drive, omega_2, alpha_2, loaded, bare, q)
 
     own = (
         "assembly (Newton on its own gap), velocities (own Jacobian), accelerations (own dJ/dt v), "
         "inverse dynamics, effects from its own state, loop multipliers, pin forces"
     )
-    if not (scene.loads or scene.effects) or command.omega_2 is None:
-        return answer_each(engine, tree, act, command, own)
-    bare = build(replace(scene, loads=(), effects=()))
-
-    def alone(q: Sequence[float], omega_2: float, alpha_2: float) -> float:
-        bare.place(q)
-        return float(_motion_and_forces(bare, e_drive, omega_2, alpha_2, ()).get("torque", math.nan))
-
-    return answer_each(engine, tree, act, command, own, alone)
+    return answer_each(engine, tree, act, command, own, alone=bare is not None)
 
 
 def answer_each(
@@ -214,20 +200,21 @@ def answer_each(
     act: Act,
     command: Command,
     own: str,
-    alone: Callable[[Sequence[float], float, float], float] | None = None,
+    *,
+    alone: bool = False,
 ) -> Answer:
     """Each position assembled, and then moved and loaded by an engine.
 
     Parameters
     ----------
     own : what the engine finds alone, for the report.
-    alone : the torque that the bars without loads and effects take, at joint angles, omega_2 and alpha_2.
+    alone : `act` gives the torque that the bars without loads and effects take, too: `torque_inertia`.
     """
     start = time.perf_counter()
     n = len(command.theta_2)
     wanted = ("position",) if command.omega_2 is None else STAGES
     names = [name for name, stage in STAGE_OF.items() if stage in wanted and name not in NOT_ANSWERED]
-    names += ["torque_inertia"] if alone is not None else []
+    names += ["torque_inertia"] if alone and command.omega_2 is not None else []
     out = {name: np.full((n, 2) if name in VECTORS else n, np.nan) for name in names}
     assembled = np.zeros(n, dtype=bool)
     gap = 0.0
@@ -245,9 +232,7 @@ def answer_each(
         values.update({name: points[name] for name in ("A", "B", "G2", "G3", "G4")})
         gap = max(gap, math.hypot(*bars.gap()))
         if command.omega_2 is not None:
-            values.update(act(float(omega_2[i]), float(alpha_2[i])))
-            if alone is not None:
-                values["torque_inertia"] = alone(q, float(omega_2[i]), float(alpha_2[i]))
+            values.update(act(q, float(omega_2[i]), float(alpha_2[i])))
         for name, value in values.items():
             out[name][i] = value
     for name in ANGLES:
@@ -266,11 +251,18 @@ def answer_each(
 
 
 def _motion_and_forces(
-    tree: Tree, e_drive: Array, omega_2: float, alpha_2: float, loaded: Sequence[str]
+    tree: Tree,
+    e_drive: Array,
+    omega_2: float,
+    alpha_2: float,
+    loaded: Sequence[str],
+    bare: Tree | None,
+    q: Sequence[float],
 ) -> dict[str, Array | float]:
     """Velocities, accelerations and forces where the tree is placed; nothing where a toggle leaves them 0/0.
 
     Effects that depend on the load of a pin (`loaded`) are given the loads of the pass before, until they repeat.
+    `bare` is the same tree without loads and effects, which makes the same motion at the joint angles `q`.
     """
     jacobian = tree.jacobian()
     try:
@@ -287,6 +279,9 @@ def _motion_and_forces(
         return {}
     try:
         matrix = np.column_stack((jacobian.T, e_drive))
+        if bare is not None:
+            bare.place(q)
+            values["torque_inertia"] = float(np.linalg.solve(matrix, bare.torques(v, a))[2])
         forces = _forces(tree, matrix, needed)
         if loaded:
             settled = _settle(tree, loaded, forces, lambda: _forces(tree, matrix, tree.torques(v, a)))

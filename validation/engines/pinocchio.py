@@ -57,6 +57,7 @@ class PinocchioTree:
         self.v = np.zeros(3)
         self.a = np.zeros(3)
         self.wrenches: dict[int, Array] = {}
+        self.external = pin.StdVec_Force([pin.Force.Zero()] * model.njoints)
         self.ground_angle = theta_1
         self.pin_loads: dict[str, float] = {}
         self.acting = acting(scene, self)
@@ -152,13 +153,11 @@ class PinocchioTree:
         return np.array(self._newton_euler(self.wrenches))
 
     def _newton_euler(self, wrenches: dict[int, Array]) -> Any:
-        external = pin.StdVec_Force()
-        external.extend([pin.Force.Zero()] * self.model.njoints)
         for bar, (x, y, moment) in wrenches.items():
             rotation = self.data.oMi[self.joint[bar]].rotation
             local = rotation.T @ np.array([x, y, 0.0])
-            external[self.joint[bar]] = pin.Force(local, np.array([0.0, 0.0, moment]))
-        return pin.rnea(self.model, self.data, self.q, self.v, self.a, external)
+            self.external[self.joint[bar]] = pin.Force(local, np.array([0.0, 0.0, moment]))
+        return pin.rnea(self.model, self.data, self.q, self.v, self.a, self.external)
 
     def push(self, bar: int, force: Array, point: Array) -> None:
         """Add a force at a point, world axes; on the ground it does nothing."""

@@ -4,11 +4,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
-from importlib.util import find_spec
 from typing import NamedTuple
 
 import numpy as np
 
+from fourbar.errors import installing
 from fourbar.quantities import OF_DRY_FRICTION, STAGE_OF, UNKNOWNS
 from fourbar.scene import Command, Scene
 from validation.compare.answer import Answer, Engine
@@ -36,7 +36,7 @@ class Witness:
     stated: bool = True
     """Whether an exact engine is held to what the formulas state of the linkage too, whatever its motion."""
     library: str = ""
-    """The module that its adapter imports, a key of `REQUIREMENT`; nothing: it needs no more than the formulas."""
+    """The module that its adapter imports, a key of `EXTRA`; nothing: it needs no more than the formulas."""
 
     def engine(self) -> Engine:
         """The adapter."""
@@ -48,21 +48,25 @@ class Witness:
         return not_installed(self.library) if self.library else None
 
 
-REQUIREMENT = {
-    **{name: f"fourbar[{name}]" for name in ("mujoco", "pinocchio", "exudyn", "opensim")},
-    "pydrake": "fourbar[drake]",
-    "flint": "python-flint",
-}
-"""Module of an engine: what pip installs it by."""
+EXTRA = {name: name for name in ("mujoco", "pinocchio", "exudyn", "opensim")} | {"pydrake": "drake", "flint": "exact"}
+"""Module of an engine: the extra that brings it."""
 
 
 def not_installed(library: str) -> str | None:
-    """The reason to give where a module cannot be found, or None; one that is found but broken fails in its rows."""
+    """The reason to give where a module cannot be found, or does not load; None where it does."""
     try:
-        found = find_spec(library) is not None
-    except ModuleNotFoundError:
-        found = False
-    return None if found else f'{library} is not installed: pip install "{REQUIREMENT[library]}"'
+        import_module(library)
+    except ModuleNotFoundError as error:
+        if error.name == library:
+            return f"{library} is not installed: {installing(EXTRA[library])}"
+        return _broken(library, error)
+    except Exception as error:  # whatever a library raises that was built for another machine
+        return _broken(library, error)
+    return None
+
+
+def _broken(library: str, error: Exception) -> str:
+    return f"{library} is installed, but does not load: {' '.join(f'{type(error).__name__}: {error}'.split())}"
 
 
 class Work(NamedTuple):

@@ -1,19 +1,22 @@
 """`python -m validation compare`, `accept` and `history`."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
+from itertools import chain, islice
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import click
 
 from fourbar.errors import HOLDS, InputError
 from fourbar.writing import write_text
+from validation.compare.columns import CSV_ROWS
 from validation.compare.counts import Counts
 from validation.compare.rows import FAILS, Row
 from validation.regression import render
-from validation.regression.changes import Differences, differences
+from validation.regression.changes import Differences, compared, merged
 from validation.regression.history import HISTORY, append
-from validation.regression.record import ACCEPTED, accept, baseline, read_run, read_times
+from validation.regression.record import ACCEPTED, About, Recorded, accept, baseline, recorded
+from validation.regression.times import time_changes
 
 FORMS: dict[str, Callable[[Differences], str]] = {
     "markdown": render.markdown,
@@ -21,6 +24,9 @@ FORMS: dict[str, Callable[[Differences], str]] = {
     "junit": render.junit,
 }
 """Forms in which the differences can be written, besides the text that is printed."""
+T = TypeVar("T")
+NAMED = 50
+"""Names of a column that a message lists."""
 CHOICES = {"only": "scene", "engines": "engine", "quantity": "quantity"}
 """Option, and the column that it chooses by."""
 
@@ -29,7 +35,9 @@ def output_options(command: Callable[..., Any]) -> Callable[..., Any]:
     """The options --markdown, --html and --junit."""
     for form in reversed(FORMS):
         path = click.Path(path_type=Path, dir_okay=False)
-        command = click.option(f"--{form}", type=path, help=f"Write the differences as {form} too.")(command)
+        text = f"Write the differences as {form} too"
+        text += "; of a run held against nothing its own comparisons." if form == "junit" else "."
+        command = click.option(f"--{form}", type=path, help=text)(command)
     return command
 
 
@@ -45,12 +53,12 @@ def report_differences(
     old: Path, new: Path, forms: dict[str, Path | None], chosen: dict[str, str | None] | None = None
 ) -> int:
     """Print the differences, write the forms wanted; 1 on a regression, or where nothing was compared."""
-    (before, old_rows), (after, new_rows) = read_run(old), read_run(new)
-    times = read_times(old), read_times(new)
-    if chosen:
-        keep = _choice(chosen, [*old_rows, *new_rows])
-        old_rows, new_rows = ([row for row in rows if keep(row)] for rows in (old_rows, new_rows))
-    found = differences((before, old_rows), (after, new_rows), times)
+    before, after = recorded(old), recorded(new)
+    keep = _choice(chosen or {}, lambda column: chain(before.words(column), after.words(column)))
+    engines = set(after.words("engine"))
+    times = time_changes(merged(before.times(), after.times()))
+    scenes = in_sight(after.scenes(keep))
+    found = compared((before.about, before.scenes(keep)), (after.about, scenes), engines, times)
     for form, path in forms.items():
         if path is not None:
             write_text(path, FORMS[form](found))
@@ -58,15 +66,29 @@ def report_differences(
     return found.status
 
 
-def _choice(chosen: dict[str, str | None], rows: list[Row]) -> Callable[[Row], bool]:
-    """Whether a row is of what the options name; InputError for a name that neither run has."""
+def in_sight(scenes: Iterable[T]) -> Iterator[T]:
+    """The same, their number shown meanwhile where somebody looks."""
+    from rich.console import Console
+    from rich.progress import MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+    columns = (TextColumn("comparing"), MofNCompleteColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+        yield from progress.track(scenes)
+
+
+def _choice(chosen: dict[str, str | None], words: Callable[[str], Iterable[str]]) -> Callable[[Row], bool]:
+    """Whether a row is of what the options name; InputError for a name that does not stand in its column."""
     wanted: dict[str, set[str]] = {}
     for option, text in chosen.items():
         if text is None:
             continue
         names = {name.strip() for name in text.split(",") if name.strip()}
-        known = {getattr(row, CHOICES[option]) for row in rows}
-        for name in sorted(names - known) or ([] if names else [text]):
+        missing, known = set(names), set[str]()
+        for word in words(CHOICES[option]):
+            missing.discard(word)
+            if len(known) < NAMED:
+                known.add(word)
+        for name in sorted(missing) or ([] if names else [text]):
             raise InputError(f"--{option}", name, "must be among " + ", ".join(sorted(known)))
         wanted[CHOICES[option]] = names
     return lambda row: all(getattr(row, column) in names for column, names in wanted.items())
@@ -104,14 +126,25 @@ def accept_command(results: Path, to: Path | None, even_failing: bool) -> None:
     target = folder.absolute().parent / ACCEPTED if to is None else to
     if target.resolve() == folder.resolve():
         raise InputError("--to", str(target), "must be another folder than that of the results")
-    run = read_run(results)
-    counts = Counts(run[1])
+    run = recorded(results)
+    counts = Counts(run.rows())
     if counts.status != HOLDS and not even_failing:
         why = f"{counts[FAILS]} comparisons fail" if counts[FAILS] else "nothing was compared"
         raise InputError("RESULTS", str(results), f"must hold, or say --even-failing: {why}")
-    accept(results, run, target)
-    append(target / HISTORY, run, read_times(results))
-    click.echo(f"accepted: {target} ({len(run[1])} rows; appended to {target / HISTORY})")
+    accept(run, target)
+    too_long = counts.total > CSV_ROWS
+    if not too_long:
+        append(target / HISTORY, *_whole(run))
+    history = "too many for a history" if too_long else f"appended to {target / HISTORY}"
+    click.echo(f"accepted: {target} ({counts.total} rows; {history})")
+
+
+def _whole(run: Recorded) -> tuple[tuple[About, list[Row]], dict[tuple[str, str], float]]:
+    """All rows and times of a run, as a history takes them; InputError where there are too many."""
+    rows = list(islice(run.rows(), CSV_ROWS + 1))
+    if len(rows) > CSV_ROWS:
+        raise InputError("--add", str(run.table), f"must have at most {CSV_ROWS} rows: a history is read as a whole")
+    return (run.about, rows), {(scene, engine): time for scene, some in run.times() for engine, time in some}
 
 
 @click.command()
@@ -133,9 +166,12 @@ def history(
 
     file = history / HISTORY if history.is_dir() or not history.suffix else history
     if add is not None:
-        append(file, read_run(add), read_times(add))
+        append(file, *_whole(recorded(add)))
     runs = read_history(file)
-    keep = _choice({"only": only, "engines": engines, "quantity": quantity}, [row for run in runs for row in run.rows])
+    keep = _choice(
+        {"only": only, "engines": engines, "quantity": quantity},
+        lambda column: (getattr(row, column) for run in runs for row in run.rows),
+    )
     runs = [run.of(keep) for run in runs]
     found = steps(runs)
     target = file.with_name("history.html") if out is None else out

@@ -1,166 +1,256 @@
-"""Two runs held against each other, row by row."""
+"""Two runs held against each other, scene by scene: both tables are sorted, and neither is ever whole in memory."""
 
 import math
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from enum import Enum
+from heapq import nlargest
+from itertools import groupby
+from typing import TypeVar
 
-from fourbar.errors import FAILED, HOLDS
+from fourbar.errors import FAILED, HOLDS, InputError
 from validation.compare.counts import Counts
 from validation.compare.identities import FORMULAS
-from validation.compare.rows import FAILS, VERDICTS, Row
-from validation.compare.tolerance import EPS, K
+from validation.compare.rows import FAILS, VERDICTS, Row, sorted_rows
+from validation.regression.change import OTHER_QUESTION, REGRESSIONS, Change, Key, Kind, change
+from validation.regression.fault import Fault
 from validation.regression.record import About
 from validation.regression.scenes import SceneChange, scene_changes
-from validation.regression.times import TimeChange, Times, time_changes
+from validation.regression.times import Time, TimeChange, time_changes
 
-ROUND_OFF = K
-"""Errors of an exact comparison move freely by this many eps/condition: another compiler, another
-order of summation. A move beyond it is a change of the numbers themselves."""
-NOTICEABLE = 1.25
-"""An error that is not round-off has changed where it grew or shrank by this factor."""
-
-
-class Kind(Enum):
-    """What happened to a row; the value is the heading of the report."""
-
-    VERDICT_WORSE = "verdict got worse"
-    WORSE = "worse"
-    GONE = "gone"
-    VERDICT_BETTER = "verdict got better"
-    BETTER = "better"
-    GONE_FAILURE = "gone, and had failed"
-    NEW = "new"
-    NEW_FAILURE = "new, and fails"
-    OTHER_SCENE = "of a changed scene"
-    OTHER_POSITIONS = "at other positions"
-    OTHER_SETTING = "with another setting"
-    NOT_RUN = "not run"
-    ROUND_OFF = "moved within round-off"
-    SAME = "same"
+KEPT = 10_000
+"""Rows of one kind that are listed, the worst of them; all are counted."""
+NAMED = 50
+"""Scenes and engines listed by name that were not run or not compared; the others are counted."""
+T = TypeVar("T")
+ByScene = Iterable[tuple[str, Sequence[T]]]
+"""What is of one scene after the other, in ascending order of their names."""
 
 
-WHOLE = ("all", "watch")
-"""Rows that stand for what went wrong with an engine as a whole: once it is mended they are gone."""
-REGRESSIONS = frozenset((Kind.VERDICT_WORSE, Kind.WORSE, Kind.GONE, Kind.NEW_FAILURE))
-OTHER_QUESTION = (Kind.OTHER_SCENE, Kind.OTHER_POSITIONS, Kind.OTHER_SETTING)
-"""Rows that are not compared: each run answers a question of its own."""
-Key = tuple[str, str, str, str]
+class Named:
+    """Rows by a name; of more than NAMED names the others are one."""
+
+    def __init__(self) -> None:
+        self._rows: Counter[str] = Counter()
+        self._others = 0
+        """Names beyond, each in turn: those of one scene come together."""
+        self._rows_of_others = 0
+        self._last = ""
+
+    def add(self, name: str) -> None:
+        """One row more of a name."""
+        if name in self._rows or len(self._rows) < NAMED:
+            self._rows[name] += 1
+        else:
+            self._others += name != self._last
+            self._rows_of_others += 1
+        self._last = name
+
+    def __iter__(self) -> Iterator[str]:
+        yield from (f"{name} ({count} rows)" for name, count in self._rows.items())
+        if self._others:
+            yield f"and {self._others} more ({self._rows_of_others} rows)"
 
 
-@dataclass(frozen=True, slots=True)
-class Change:
-    """One row in the old and the new run."""
-
-    kind: Kind
-    key: Key
-    old: Row | None
-    new: Row | None
-    round_off: float
-    """By how much the error may move without meaning, K eps/condition."""
-
-    @property
-    def regression(self) -> bool:
-        """Whether the run should fail for it."""
-        return self.kind in REGRESSIONS
-
-
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class Differences:
     """Everything that differs between two runs."""
 
     surroundings: list[tuple[str, str, str]]
     """(what, old, new) of versions, machine and settings."""
-    changes: list[Change]
     scenes: list[SceneChange] = field(default_factory=list)
     """Scenes that ask something else; reported first."""
     notes: list[str] = field(default_factory=list)
     """What an older record cannot say."""
     times: list[TimeChange] = field(default_factory=list)
+    kept: int = KEPT
+    kinds: Counter[Kind] = field(default_factory=Counter)
+    """Rows by what happened to them."""
+    counts: Counts = field(default_factory=Counts)
+    """The rows of the new run by verdict."""
+    fault: Fault = field(default_factory=Fault)
+    _changes: dict[Kind, list[Change]] = field(default_factory=dict)
+    _compared: Counts = field(default_factory=Counts)
+    """The rows of the new run that have their counterpart in the old one."""
+    _scenes_not_run: Named = field(default_factory=Named)
+    _engines_not_run: Named = field(default_factory=Named)
+    _not_compared: Named = field(default_factory=Named)
+
+    def add(self, changes: Sequence[Change]) -> None:
+        """The rows of one scene more."""
+        self.kinds.update(each.kind for each in changes)
+        self.counts.add(each.new for each in changes if each.new is not None)
+        alike = (each for each in changes if each.kind not in OTHER_QUESTION)
+        self._compared.add(each.new for each in alike if each.new is not None and each.old is not None)
+        self.fault.add(changes)
+        there = any(each.new is not None for each in changes)
+        for each in changes:
+            if each.kind is Kind.NOT_RUN and there:
+                self._engines_not_run.add(each.key[1])
+            elif each.kind is Kind.NOT_RUN:
+                self._scenes_not_run.add(f"scene {each.key[0]}")
+            elif each.kind in OTHER_QUESTION and each.old is not None and each.new is not None:
+                self._not_compared.add(_why_not(each, each.old, each.new))
+            some = self._changes.setdefault(each.kind, [])
+            some.append(each)
+            if len(some) > 2 * self.kept:
+                self._changes[each.kind] = nlargest(self.kept, some, key=lambda one: one.severity)
 
     def of(self, kind: Kind) -> list[Change]:
-        """The changes of one kind."""
-        return [change for change in self.changes if change.kind is kind]
+        """The changes of one kind, the worst first; at most `kept` of them."""
+        return nlargest(self.kept, self._changes.get(kind, ()), key=lambda one: one.severity)
+
+    @property
+    def changes(self) -> list[Change]:
+        """Those that are kept, by scene, engine, setting and quantity."""
+        return sorted((each for kind in Kind for each in self.of(kind)), key=lambda each: each.key)
+
+    @property
+    def rows(self) -> int:
+        """How many there are."""
+        return self.kinds.total()
 
     @property
     def regressions(self) -> list[Change]:
         """The changes for which a run fails."""
-        return [change for change in self.changes if change.regression]
+        return [each for each in self.changes if each.regression]
+
+    @property
+    def regressed(self) -> int:
+        """How many rows, and times, a run fails for."""
+        return sum(self.kinds[kind] for kind in REGRESSIONS) + len(self.slower)
+
+    @property
+    def other_times(self) -> list[TimeChange]:
+        """Engines whose times changed by more than their scatter."""
+        return [each for each in self.times if each.beyond]
 
     @property
     def slower(self) -> list[TimeChange]:
-        """Engines whose times changed by more than their scatter."""
-        return [change for change in self.times if change.beyond]
+        """Those that are slower than on the same machine before."""
+        same = all(what != "machine" for what, _, _ in self.surroundings)
+        return [each for each in self.other_times if same and each.slower]
 
     @property
     def not_run(self) -> list[str]:
         """Scenes and engines of the old run that the new one was not run for, each with its number of rows."""
-        found = self.of(Kind.NOT_RUN)
-        there = {change.key[0] for change in self.changes if change.new is not None}
-        lines = []
-        for name in dict.fromkeys(change.key[0] for change in found if change.key[0] not in there):
-            lines.append(f"scene {name} ({sum(change.key[0] == name for change in found)} rows)")
-        engines = [change.key[1] for change in found if change.key[0] in there]
-        return lines + [f"{name} ({engines.count(name)} rows)" for name in dict.fromkeys(engines)]
+        return [*self._scenes_not_run, *self._engines_not_run]
 
     @property
     def not_compared(self) -> list[str]:
         """Rows that both runs have, each as the answer to another question: by scene, engine and setting."""
-        found: Counter[str] = Counter()
-        for change in self.changes:
-            if change.kind in OTHER_QUESTION and change.old is not None and change.new is not None:
-                what = "changed" if change.kind is Kind.OTHER_SCENE else "has other positions"
-                name = f"scene {change.key[0]} {what}"
-                if change.kind is Kind.OTHER_SETTING:
-                    name = f"{change.key[0]} / {change.key[1]}: {change.old.setting} -> {change.new.setting}"
-                found[name] += 1
-        return [f"{name} ({count} rows)" for name, count in found.items()]
-
-    @property
-    def counts(self) -> Counts:
-        """The rows of the new run by verdict."""
-        return Counts(change.new for change in self.changes if change.new is not None)
+        return [*self._not_compared]
 
     @property
     def nothing(self) -> bool:
         """Whether no comparison of the new run has its counterpart in the old one."""
-        alike = (change for change in self.changes if change.kind not in OTHER_QUESTION)
-        both = (change.new for change in alike if change.new and change.old)
-        return Counts(both).nothing
+        return self._compared.nothing
 
     @property
     def status(self) -> int:
         """Exit status: 1 on a regression, and where nothing was compared."""
-        return FAILED if self.regressions or self.nothing else HOLDS
+        return FAILED if self.regressed or self.nothing else HOLDS
+
+
+def _why_not(of: Change, old: Row, new: Row) -> str:
+    if of.kind is Kind.OTHER_SETTING:
+        return f"{of.key[0]} / {of.key[1]}: {old.setting} -> {new.setting}"
+    return f"scene {of.key[0]} {'changed' if of.kind is Kind.OTHER_SCENE else 'has other positions'}"
 
 
 def differences(
-    old: tuple[About, Iterable[Row]], new: tuple[About, Iterable[Row]], times: tuple[Times, Times] = ({}, {})
+    old: tuple[About, Iterable[Row]],
+    new: tuple[About, Iterable[Row]],
+    times: tuple[Mapping[tuple[str, str], float], Mapping[tuple[str, str], float]] = ({}, {}),
+    kept: int = KEPT,
 ) -> Differences:
-    """Compare two runs: only where both answer the same question."""
-    before, after = _by_key(old[1]), _by_key(new[1])
-    scenes = {change.scene: change for change in scene_changes(old[0].scenes, new[0].scenes)}
-    settings = _other_settings(before, after)
-    changes = []
-    for key in sorted(before.keys() | after.keys()):
-        if key in settings.values():
-            continue  # it stands with its counterpart
-        one, other = before.get(key), after.get(settings.get(key, key))
-        change = _change(key, one, other)
-        if other is None and not _was_run(key, new[0], after):
-            change = Change(Kind.NOT_RUN, key, one, None, math.nan)
-        elif one is not None and other is not None and (kind := _other_question(key, scenes, settings)):
-            fails = other.verdict == FAILS and one.verdict != FAILS
-            change = Change(Kind.NEW_FAILURE if fails else kind, key, one, other, change.round_off)
-        changes.append(change)
-    changed, notes = _surroundings(old[0], new[0])
-    return Differences(changed, changes, list(scenes.values()), notes, time_changes(*times))
+    """Compare two runs whose rows are at hand, in any order."""
+    before, after = (sorted_rows(run[1]) for run in (old, new))
+    engines = {row.engine for row in after}
+    changed = time_changes(merged(*(_times_by_scene(each) for each in times)))
+    return compared((old[0], by_scene(before)), (new[0], by_scene(after)), engines, changed, kept)
+
+
+def _times_by_scene(times: Mapping[tuple[str, str], float]) -> Iterator[tuple[str, list[Time]]]:
+    for scene, some in groupby(sorted(times.items()), key=lambda item: item[0][0]):
+        yield scene, [(engine, time) for (_, engine), time in some]
+
+
+def compared(
+    old: tuple[About, ByScene[Row]],
+    new: tuple[About, ByScene[Row]],
+    engines: set[str],
+    times: list[TimeChange],
+    kept: int = KEPT,
+) -> Differences:
+    """Compare two runs by their scenes, in ascending order: only where both answer the same question.
+
+    Parameters
+    ----------
+    engines : those that have rows in the new run.
+    """
+    scenes = {each.scene: each for each in scene_changes(old[0].scenes, new[0].scenes)}
+    surroundings, notes = _surroundings(old[0], new[0])
+    found = Differences(surroundings, list(scenes.values()), notes, times, kept)
+    known = engines | (new[0].engines or set())
+    for scene, before, after in merged(old[1], new[1]):
+        wanted = scene in new[0].scenes if new[0].scenes else bool(after) or not engines
+        found.add(_of_scene(_by_key(before), _by_key(after), known if wanted else set(), wanted, scenes.get(scene)))
+    return found
+
+
+def by_scene(rows: Iterable[Row]) -> Iterator[tuple[str, list[Row]]]:
+    """The rows of one scene after the other."""
+    for scene, some in groupby(rows, key=lambda row: row.scene):
+        yield scene, list(some)
+
+
+def merged(old: ByScene[T], new: ByScene[T]) -> Iterator[tuple[str, Sequence[T], Sequence[T]]]:
+    """Each scene that either run has, with what both have of it; InputError where the scenes are not in order."""
+    before, after = _in_order("OLD", old), _in_order("NEW", new)
+    one, other = next(before, None), next(after, None)
+    while one is not None or other is not None:
+        scene = min(each[0] for each in (one, other) if each is not None)
+        mine, theirs = ([] if each is None or each[0] != scene else each[1] for each in (one, other))
+        yield scene, mine, theirs
+        one = next(before, None) if mine else one
+        other = next(after, None) if theirs else other
+
+
+def _in_order(run: str, scenes: ByScene[T]) -> Iterator[tuple[str, Sequence[T]]]:
+    last = None
+    for scene, rows in scenes:
+        if last is not None and scene <= last:
+            raise InputError(run, scene, f"must stand before scene {last}: a table of `run` is sorted by scene")
+        last = scene
+        yield scene, rows
 
 
 def _by_key(rows: Iterable[Row]) -> dict[Key, Row]:
     worst_last = sorted(rows, key=lambda row: VERDICTS.index(row.verdict))  # of two of one name the worse one counts
     return {(row.scene, row.engine, row.setting, row.quantity): row for row in worst_last}
+
+
+def _of_scene(
+    before: Mapping[Key, Row], after: Mapping[Key, Row], engines: set[str], wanted: bool, other: SceneChange | None
+) -> list[Change]:
+    """What happened to each row of a scene; `engines`: those it was run for, where it was `wanted` at all."""
+    settings = _other_settings(before, after)
+    changes = []
+    for key in sorted(before.keys() | after.keys()):
+        if key in settings.values():
+            continue  # it stands with its counterpart
+        old, new = before.get(key), after.get(settings.get(key, key))
+        found = change(key, old, new)
+        if new is None and not (wanted and (key[1] in engines or key[1] == FORMULAS)):
+            found = Change(Kind.NOT_RUN, key, old, None, math.nan)
+        elif old is not None and new is not None and (other is not None or key in settings):
+            kind = Kind.OTHER_SETTING if other is None else Kind.OTHER_SCENE
+            kind = Kind.OTHER_POSITIONS if other is not None and other.positions_alone else kind
+            fails = new.verdict == FAILS and old.verdict != FAILS
+            found = Change(Kind.NEW_FAILURE if fails else kind, key, old, new, found.round_off)
+        changes.append(found)
+    return changes
 
 
 def _other_settings(before: Mapping[Key, Row], after: Mapping[Key, Row]) -> dict[Key, Key]:
@@ -174,47 +264,6 @@ def _other_settings(before: Mapping[Key, Row], after: Mapping[Key, Row]) -> dict
 
     old, new = alone(before.keys() - after.keys()), alone(after.keys() - before.keys())
     return {old[name]: new[name] for name in old.keys() & new.keys() if "-" not in (old[name][2], new[name][2])}
-
-
-def _was_run(key: Key, new: About, rows: Mapping[Key, Row]) -> bool:
-    """Whether the new run was made for the scene and the engine of a row; without a record its rows say so."""
-    scenes = new.scenes.keys() or {each[0] for each in rows} or {key[0]}
-    engines = new.engines or {each[1] for each in rows}
-    known = {each[1] for each in rows} | engines
-    return key[0] in scenes and (key[1] in known or key[1] == FORMULAS)
-
-
-def _other_question(key: Key, scenes: Mapping[str, SceneChange], settings: Mapping[Key, Key]) -> Kind | None:
-    if key[0] in scenes:
-        return Kind.OTHER_POSITIONS if scenes[key[0]].positions_alone else Kind.OTHER_SCENE
-    return Kind.OTHER_SETTING if key in settings else None
-
-
-def _change(key: Key, old: Row | None, new: Row | None) -> Change:
-    if old is None or new is None:
-        fails = new is not None and new.verdict == FAILS
-        kind = Kind.NEW_FAILURE if fails else Kind.NEW
-        if old is not None:
-            kind = Kind.GONE_FAILURE if old.verdict == FAILS and old.quantity in WHOLE else Kind.GONE
-        return Change(kind, key, old, new, math.nan)
-    condition = min((c for c in (old.condition, new.condition) if c > 0.0), default=1.0)
-    round_off = ROUND_OFF * EPS / condition
-    return Change(_kind(old, new, round_off), key, old, new, round_off)
-
-
-def _kind(old: Row, new: Row, round_off: float) -> Kind:
-    if old.verdict != new.verdict:
-        worse = VERDICTS.index(new.verdict) > VERDICTS.index(old.verdict)
-        return Kind.VERDICT_WORSE if worse else Kind.VERDICT_BETTER
-    if not new.compared or old.error == new.error or (math.isnan(old.error) and math.isnan(new.error)):
-        return Kind.SAME
-    if abs(new.error - old.error) <= round_off:
-        return Kind.ROUND_OFF
-    if new.error > NOTICEABLE * old.error or math.isnan(new.error):
-        return Kind.WORSE
-    if old.error > NOTICEABLE * new.error:
-        return Kind.BETTER
-    return Kind.SAME
 
 
 def _surroundings(old: About, new: About) -> tuple[list[tuple[str, str, str]], list[str]]:

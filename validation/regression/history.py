@@ -9,22 +9,22 @@ import hashlib
 import json
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from fourbar.errors import InputError
 from fourbar.writing import write_bytes
+from validation.compare.columns import or_null
 from validation.compare.plain import plain
-from validation.compare.rows import Row, sorted_rows
+from validation.compare.rows import MADE_OF, Row, sorted_rows
 from validation.regression.record import About
-from validation.regression.times import Times
 
 HISTORY = "history.parquet"
 SCENES = b"fourbar.scenes"
 """Of the file's notes: JSON, what each scene states by its hash."""
 TIME = "time"
-OF_A_ROW = tuple(column.name for column in fields(Row) if column.name != "passed")
+OF_A_ROW = tuple(MADE_OF)
 OF_A_RUN = ("run", "date", "commit", "machine", "settings")
 
 
@@ -34,7 +34,7 @@ class Run:
 
     about: About
     rows: list[Row]
-    times: Times
+    times: Mapping[tuple[str, str], float]
 
     @property
     def name(self) -> str:
@@ -47,7 +47,7 @@ class Run:
         return replace(self, rows=[row for row in self.rows if keep(row)])
 
 
-def append(file: Path, run: tuple[About, list[Row]], times: Times) -> None:
+def append(file: Path, run: tuple[About, list[Row]], times: Mapping[tuple[str, str], float]) -> None:
     """Add a run at the end of a history, which is made where there is none; InputError where it is no history.
 
     A run that is in it already, by date and rows, is not added again.
@@ -109,14 +109,13 @@ def _about(cells: Mapping[str, Any]) -> About:
     return About(versions, plain(cells["machine"]), settings, {}, plain(cells["date"]), plain(cells["commit"]))
 
 
-def _table(about: About, rows: list[Row], times: Times) -> Any:
+def _table(about: About, rows: list[Row], times: Mapping[tuple[str, str], float]) -> Any:
     """A run as columns; words that recur are kept once."""
     import pyarrow as pa
 
     hashes = {name: _hash(entries) for name, entries in about.scenes.items()}
     lines: list[dict[str, Any]] = [
-        {name: _or_none(getattr(row, name)) for name in OF_A_ROW} | {"times_formulas": None}
-        for row in sorted_rows(rows)
+        {name: or_null(getattr(row, name)) for name in OF_A_ROW} | {"times_formulas": None} for row in sorted_rows(rows)
     ]
     nothing = dict.fromkeys(OF_A_ROW)
     for (scene, engine), ratio in sorted(times.items()):
@@ -126,18 +125,13 @@ def _table(about: About, rows: list[Row], times: Times) -> Any:
     of_run |= {"settings": json.dumps(about.settings, sort_keys=True)}
     of_run |= {f"version_{name}": version for name, version in about.versions.items()}
     word, number = pa.dictionary(pa.int32(), pa.string()), pa.float64()
-    kinds = {column.name: number if column.type is float else word for column in fields(Row)}
+    kinds = {name: number if kind is float else word for name, kind in MADE_OF.items()}
     names = [*of_run, *OF_A_ROW, "scene_hash", "times_formulas"]
     columns = {name: [of_run.get(name, line.get(name)) for line in lines] for name in names}
     columns["scene_hash"] = [hashes.get(line["scene"], "") for line in lines]
     schema = pa.schema([(name, number if name == "times_formulas" else kinds.get(name, word)) for name in names])
     kept = {hashes[name]: dict(entries) for name, entries in about.scenes.items()}
     return pa.table(columns, schema=schema.with_metadata({SCENES: json.dumps(kept, sort_keys=True).encode()}))
-
-
-def _or_none(value: object) -> object:
-    """A missing number as null: no maximum of a column is NaN by it."""
-    return None if isinstance(value, float) and math.isnan(value) else value
 
 
 def _hash(entries: Mapping[str, str]) -> str:

@@ -11,7 +11,7 @@ from validation.compare.error import used
 from validation.compare.identities import FORMULAS
 from validation.compare.rows import AGREES, DEGRADED, FAILS, REFUSES, VERDICTS
 from validation.compare.tolerance import EPS
-from validation.regression.changes import Key
+from validation.regression.change import Key
 from validation.regression.history import Run
 from validation.regression.render import line
 from validation.regression.steps import Step

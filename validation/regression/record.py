@@ -3,18 +3,20 @@
 import csv
 import json
 import os
+import shutil
 import subprocess
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, dataclass, field
 from datetime import UTC, datetime
+from itertools import groupby
 from pathlib import Path
 from typing import Any
 
 from fourbar.errors import InputError
-from fourbar.writing import write_text
-from validation.compare.columns import read_columns
+from fourbar.writing import naming, write_text
+from validation.compare.columns import column_of, read_columns
 from validation.compare.plain import plain
-from validation.compare.rows import Row, from_csv, to_csv
+from validation.compare.rows import Row, column_of_csv, rows_of_csv
 from validation.compare.tolerance import SIMULATED, K
 from validation.report.machine import machine, versions
 
@@ -74,8 +76,50 @@ def write_about(record: About, folder: Path) -> None:
     write_text(folder / ABOUT, json.dumps(asdict(record), indent=1, sort_keys=True) + "\n")
 
 
-def read_run(path: Path) -> tuple[About, list[Row]]:
-    """A run from its folder, or from a results.csv alone (then nothing is known of how it was made).
+NOTHING_KNOWN = About({}, "unknown machine", {})
+
+
+@dataclass(frozen=True, slots=True)
+class Recorded:
+    """A run as it is kept in a folder: its table is read as it is needed, and never whole."""
+
+    about: About
+    table: Path
+
+    def rows(self) -> Iterator[Row]:
+        """Its rows in their order; InputError where the table is damaged."""
+        yield from self._read(read_columns, rows_of_csv)
+
+    def scenes(self, keep: Callable[[Row], bool] = lambda _: True) -> Iterator[tuple[str, list[Row]]]:
+        """The rows that are wanted, scene by scene."""
+        for scene, some in groupby(filter(keep, self.rows()), key=lambda row: row.scene):
+            yield scene, list(some)
+
+    def words(self, column: str) -> Iterator[str]:
+        """What stands in a column of text, some of it more than once."""
+        yield from self._read(lambda table: column_of(table, column), lambda table: column_of_csv(table, column))
+
+    def times(self) -> Iterator[tuple[str, list[tuple[str, float]]]]:
+        """Scene by scene, each engine's time over the formulas' there; none where they were not kept."""
+        table = self.table.parent / TIMINGS
+        if not table.is_file():
+            return
+        try:
+            with table.open(newline="", encoding="utf-8") as file:
+                for scene, some in groupby(csv.DictReader(file), key=lambda row: row["scene"]):
+                    yield plain(scene), [(plain(row["engine"]), float(row["times_formulas"])) for row in some]
+        except (KeyError, TypeError, ValueError, csv.Error):
+            raise InputError("RESULTS", str(table), "is not a table of times written by `run`") from None
+
+    def _read(self, of_columns: Callable[[Path], Iterator[Any]], of_text: Callable[[Path], Iterator[Any]]) -> Any:
+        try:
+            yield from (of_columns if self.table.suffix == ".parquet" else of_text)(self.table)
+        except (KeyError, TypeError, ValueError, csv.Error):  # a column, a cell or a number is missing, or is no text
+            raise InputError("RESULTS", str(self.table), "is not a table written by `run`") from None
+
+
+def recorded(path: Path) -> Recorded:
+    """A run by its folder, or by a results.csv alone (then nothing is known of how it was made).
 
     Raises InputError where there is no readable table, or an empty one, or that of a run that is unfinished.
     """
@@ -84,22 +128,24 @@ def read_run(path: Path) -> tuple[About, list[Row]]:
     if not table.is_file() and long.is_file():  # too many rows for a text
         table = long
     if not table.is_file():
-        raise InputError("RESULTS", str(path), f"must be a folder with {TABLE}, or such a file")
-    try:
-        rows = list(read_columns(table)) if table.suffix == ".parquet" else from_csv(table)
-    except (KeyError, TypeError, ValueError, csv.Error):  # a column, a cell or a number is missing, or it is no text
-        raise InputError("RESULTS", str(table), "is not a table written by `run`") from None
-    if not rows:
+        raise InputError("RESULTS", str(path), f"must be a folder with {TABLE} or {COLUMNS}, or such a file")
+    if next(Recorded(NOTHING_KNOWN, table).rows(), None) is None:
         raise InputError("RESULTS", str(table), "must hold at least one comparison: it has none")
     if (table.parent / UNFINISHED).is_file():
         raise InputError("RESULTS", str(table), "must be of a run that was finished: run it again, and it is resumed")
     record = table.parent / ABOUT
     if not record.is_file():
-        return About({}, "unknown machine", {}), rows
+        return Recorded(NOTHING_KNOWN, table)
     try:
-        return about_of(json.loads(record.read_text(encoding="utf-8"))), rows
+        return Recorded(about_of(json.loads(record.read_text(encoding="utf-8"))), table)
     except (AttributeError, KeyError, TypeError, ValueError, RecursionError):
         raise InputError("RESULTS", str(record), "is not a record written by `run`") from None
+
+
+def read_run(path: Path) -> tuple[About, list[Row]]:
+    """What is known of a run, and all its rows."""
+    run = recorded(path)
+    return run.about, list(run.rows())
 
 
 def about_of(kept: dict[str, Any]) -> About:
@@ -114,21 +160,6 @@ def _plain(entries: dict[str, str]) -> dict[str, str]:
     return {plain(key): plain(value) for key, value in entries.items()}
 
 
-def read_times(path: Path) -> dict[tuple[str, str], float]:
-    """Times of each engine on each scene over the formulas' there, by (scene, engine); empty where none were kept."""
-    table = (path if path.is_dir() else path.parent) / TIMINGS
-    if not table.is_file():
-        return {}
-    try:
-        with table.open(newline="", encoding="utf-8") as file:
-            return {
-                (plain(row["scene"]), plain(row["engine"])): float(row["times_formulas"])
-                for row in csv.DictReader(file)
-            }
-    except (KeyError, TypeError, ValueError, csv.Error):
-        raise InputError("RESULTS", str(table), "is not a table of times written by `run`") from None
-
-
 def baseline(name_or_path: str) -> Path:
     """A run by its path, or the accepted state of this project's models by its name."""
     if not Path(name_or_path).exists() and (SHIPPED / name_or_path / TABLE).is_file():
@@ -136,12 +167,24 @@ def baseline(name_or_path: str) -> Path:
     return Path(name_or_path)
 
 
-def accept(results: Path, run: tuple[About, list[Row]], target: Path) -> None:
+def accept(run: Recorded, target: Path) -> None:
     """Keep a run, with its times, as the accepted state in a folder."""
-    record, rows = run
     target.mkdir(parents=True, exist_ok=True)
-    write_text(target / TABLE, to_csv(rows))
-    write_about(record, target)
-    times = (results if results.is_dir() else results.parent) / TIMINGS
-    if times.is_file():
-        write_text(target / TIMINGS, times.read_text(encoding="utf-8"))
+    name, other = (COLUMNS, TABLE) if run.table.suffix == ".parquet" else (TABLE, COLUMNS)
+    _copy(run.table, target / name)
+    (target / other).unlink(missing_ok=True)  # of the state before
+    write_about(run.about, target)
+    if (times := run.table.parent / TIMINGS).is_file():
+        _copy(times, target / TIMINGS)
+
+
+def _copy(source: Path, target: Path) -> None:
+    """A file however long, all of it or nothing."""
+    draft = target.with_name(f".{target.name}.part")
+    with naming(target):
+        try:
+            shutil.copyfile(source, draft)
+            os.replace(draft, target)
+        except BaseException:
+            draft.unlink(missing_ok=True)
+            raise

@@ -2,25 +2,30 @@
 
 from collections.abc import Iterator
 
-from validation.regression.changes import OTHER_QUESTION, Change, Differences, Kind
-from validation.report.junit import Case, document
+from validation.regression.change import OTHER_QUESTION, Change, Kind
+from validation.regression.changes import Differences
+from validation.regression.fault import Group
+from validation.report.junit import Case, beyond, document
 from validation.report.markdown import cell
 from validation.report.templating import environment, number
 
 SHOWN = tuple(kind for kind in Kind if kind not in (Kind.SAME, Kind.ROUND_OFF, Kind.NOT_RUN, *OTHER_QUESTION))
-"""Listed row by row; what was not run, or is another question, is named as a whole."""
+"""By engine and cause; what was not run, or is another question, is named as a whole."""
 AT_MOST = 50
-"""Rows of one kind listed in text and Markdown."""
+"""Engines and causes listed in text and Markdown."""
+ROWS = 5
+"""Rows of one kind listed there, the worst of them."""
 
 
 def verdict(found: Differences) -> str:
     """One line: how many regressions among how many rows, what else moved, and the counts of the new run."""
-    counts = [f"{len(found.of(kind))} {kind.value}" for kind in Kind if found.of(kind)]
-    many = len(found.regressions)
+    counts = [f"{found.kinds[kind]} {kind.value}" for kind in Kind if found.kinds[kind]]
+    counts += [f"{len(found.slower)} slower"] if found.slower else []
+    many = found.regressed
     head = f"{many} regression{'s' if many > 1 else ''}" if many else "No regression"
     if found.nothing and not many:
         head = "Nothing was compared with the old run"
-    moved = f" in {len(found.changes)} rows: {', '.join(counts)}" if counts else ""
+    moved = f" in {found.rows} rows: {', '.join(counts)}" if counts else ""
     return f"{head}{moved}. New run: {found.counts.sentence()}"
 
 
@@ -45,13 +50,26 @@ def text(found: Differences) -> str:
     lines += [f"{what}: {old} -> {new}" for what, old, new in found.surroundings]
     lines += [f"not compared: {name}" for name in found.not_compared]
     lines += [f"not run: {name}" for name in found.not_run]
-    lines += [f"time: {change}" for change in found.slower]
+    lines += [f"time: {change}" for change in found.other_times]
+    lines += [f"disagree: {sentence}" for sentence in found.fault.sentences]
+    groups, more = _groups(found)
+    lines += [f"{group.kind.value}: {group}" for group in groups] + more
     for kind in SHOWN:
-        changes = found.of(kind)
-        lines += [f"{kind.value}: {line(change)}" for change in changes[:AT_MOST]]
-        if len(changes) > AT_MOST:
-            lines.append(f"{kind.value}: and {len(changes) - AT_MOST} more")
+        lines += [f"{kind.value}: {each}" for each in _worst(found, kind)]
     return "\n".join([*lines, verdict(found)]) + "\n"
+
+
+def _groups(found: Differences) -> tuple[list[Group], list[str]]:
+    """The rows that changed by engine and cause, the worst first, and how many more there are."""
+    groups = found.fault.groups(SHOWN)
+    more = len(groups) - AT_MOST
+    return groups[:AT_MOST], [f"and {more} more engines and causes"] if more > 0 else []
+
+
+def _worst(found: Differences, kind: Kind) -> list[str]:
+    """The worst rows of a kind, and how many more there are."""
+    more = found.kinds[kind] - ROWS
+    return [line(each) for each in found.of(kind)[:ROWS]] + ([f"and {more} more"] if more > 0 else [])
 
 
 def other_questions(found: Differences) -> list[tuple[str, list[str]]]:
@@ -60,7 +78,8 @@ def other_questions(found: Differences) -> list[tuple[str, list[str]]]:
         "The scenes changed": [*map(str, found.scenes), *found.notes],
         "Not compared": found.not_compared,
         "Not run": found.not_run,
-        "Times": [*map(str, found.slower)],
+        "Times": [*map(str, found.other_times)],
+        "Who disagrees": found.fault.sentences,
     }
     return [(heading, texts) for heading, texts in parts.items() if texts]
 
@@ -74,19 +93,22 @@ def markdown(found: Differences) -> str:
         lines += ["| made with | old | new |", "|---|---|---|"]
         lines += [f"| {cell(what)} | {cell(old)} | {cell(new)} |" for what, old, new in found.surroundings]
         lines.append("")
+    groups, more = _groups(found)
     for kind in SHOWN:
-        if changes := found.of(kind):
-            lines += [f"## {kind.value}: {len(changes)}", ""]
-            lines += [f"- {cell(line(change))}" for change in changes[:AT_MOST]]
-            if len(changes) > AT_MOST:
-                lines.append(f"- and {len(changes) - AT_MOST} more")
-            lines.append("")
+        if found.kinds[kind]:
+            lines += [f"## {kind.value}: {found.kinds[kind]}", ""]
+            lines += [f"- **{cell(group)}**" for group in groups if group.kind is kind]
+            lines += [*(f"- {cell(each)}" for each in _worst(found, kind)), ""]
+    lines += more
     return "\n".join(lines)
 
 
 def html(found: Differences) -> str:
     """A page of its own."""
-    kinds = [(kind, found.of(kind)) for kind in SHOWN if found.of(kind)]
+    groups = found.fault.groups(SHOWN)
+    kinds = [
+        (kind, [each for each in groups if each.kind is kind], found.of(kind)) for kind in SHOWN if found.kinds[kind]
+    ]
     template = environment("validation.regression", escape=True).get_template("changes.html.j2")
     return template.render(found=found, verdict=verdict(found), kinds=kinds, questions=other_questions(found))
 
@@ -111,5 +133,7 @@ def _cases(found: Differences) -> Iterator[Case]:
             yield Case(*name, "skipped", kind, f"{change.new.verdict}: {change.new.reason}")
         else:
             yield Case(*name, "passed")
+    yield from (Case("times", "times", each.engine, "failure", "slower", str(each)) for each in found.slower)
+    yield from beyond(found.rows - len(found.changes))
     if found.nothing:
         yield Case("all scenes", "all scenes", "anything is compared", "failure", "nothing compared", verdict(found))

@@ -1,10 +1,13 @@
 """The steps of a history: the runs at which a row, a scene or an engine's time changed, and what changed with them."""
 
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from validation.compare.identities import FORMULAS
 from validation.compare.rows import Row
-from validation.regression.changes import Change, Differences, Key, Kind, differences
+from validation.regression.change import Change, Key, Kind
+from validation.regression.changes import Differences, differences
 from validation.regression.history import Run
 from validation.regression.record import About
 
@@ -33,9 +36,9 @@ class Step:
 
     def sentence(self) -> str:
         """The step in one line: when, with what, and how many rows."""
-        counts = [f"{len(self.found.of(kind))} {kind.value}" for kind in Kind
-                  if kind not in NO_CHANGE and self.found.of(kind)]  # fmt: skip
-        parts = [*map(str, self.found.scenes), ", ".join(counts), *map(str, self.found.slower)]
+        counts = [f"{self.found.kinds[kind]} {kind.value}" for kind in Kind
+                  if kind not in NO_CHANGE and self.found.kinds[kind]]  # fmt: skip
+        parts = [*map(str, self.found.scenes), ", ".join(counts), *map(str, self.found.other_times)]
         return f"{self.run.name}: {'; '.join(filter(None, parts))} [{self.made_with}]"
 
 
@@ -47,16 +50,15 @@ def steps(runs: Sequence[Run]) -> list[Step]:
     times: dict[tuple[str, str], float] = {}
     for number, run in enumerate(runs):
         if about is not None:
-            here = differences((about, known.values()), (run.about, run.rows), (times, run.times))
+            here = differences((about, known.values()), (run.about, run.rows), (times, run.times), kept=sys.maxsize)
             step = Step(number, run, here)
-            if step.changes or here.scenes or here.slower:
+            if step.changes or here.scenes or here.other_times:
                 found.append(step)
             for change in here.changes:
                 if change.kind not in NO_CHANGE:
                     known.pop(change.key, None)
-            if here.slower:  # the new times are what later ones are held against
-                slower = {change.engine for change in here.slower}
-                times |= {key: value for key, value in run.times.items() if key[1] in slower}
+            others = {change.engine for change in here.other_times}  # what later ones are held against
+            times |= {key: value for key, value in run.times.items() if others & {key[1], FORMULAS}}
         for row in run.rows:
             known.setdefault((row.scene, row.engine, row.setting, row.quantity), row)
         times = {**run.times, **times}

@@ -1,9 +1,8 @@
 """Are an engine's times, each over the formulas' on the same scene in the same process, longer than before?"""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from statistics import fmean, stdev
 
 from validation.compare.identities import FORMULAS
 
@@ -14,7 +13,8 @@ NOTICEABLE = 1.25
 ENOUGH = 3
 """Scenes: of two the scatter says nothing."""
 
-Times = Mapping[tuple[str, str], float]
+Time = tuple[str, float]
+"""An engine, and its time over that of the formulas on a scene."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,20 +34,36 @@ class TimeChange:
         change = abs(math.log(self.ratio))
         return change > max(math.log(NOTICEABLE), SCATTERS * math.log(self.scatter))
 
+    @property
+    def slower(self) -> bool:
+        """Whether that is to the worse."""
+        return self.beyond and self.ratio > 1.0
+
     def __str__(self) -> str:
         word = "slower" if self.ratio > 1.0 else "faster"
         times = max(self.ratio, 1.0 / self.ratio)
         return f"{self.engine} is {times:.2f} times {word} (factor of scatter {self.scatter:.2f}, {self.scenes} scenes)"
 
 
-def time_changes(old: Times, new: Times) -> list[TimeChange]:
-    """Every engine with times of at least ENOUGH scenes in both runs, over the formulas' own."""
-    by_engine: dict[str, list[float]] = {}
-    for key in sorted(old.keys() & new.keys()):
-        if old[key] > 0.0 and new[key] > 0.0 and key[1] != FORMULAS:
-            by_engine.setdefault(key[1], []).append(math.log(new[key] / old[key]))
-    return [
-        TimeChange(engine, math.exp(fmean(logs)), math.exp(stdev(logs) / math.sqrt(len(logs))), len(logs))
-        for engine, logs in by_engine.items()
-        if len(logs) >= ENOUGH
-    ]
+def time_changes(scenes: Iterable[tuple[str, Sequence[Time], Sequence[Time]]]) -> list[TimeChange]:
+    """Every engine with times of at least ENOUGH scenes in both runs, over the formulas' own.
+
+    Where several engines all changed in one sense it is the time of the formulas that changed in the other.
+    """
+    sums: dict[str, list[float]] = {}
+    for _, old, new in scenes:
+        before = dict(old)
+        for engine, time in new:
+            if engine != FORMULAS and time > 0.0 and before.get(engine, 0.0) > 0.0:
+                log = math.log(time / before[engine])
+                kept = sums.setdefault(engine, [0.0, 0.0, 0.0])
+                kept[:] = kept[0] + 1.0, kept[1] + log, kept[2] + log * log
+    found = []
+    for engine, (n, total, squares) in sorted(sums.items()):
+        if n >= ENOUGH:
+            spread = math.sqrt(max(squares - total * total / n, 0.0) / (n - 1.0))
+            found.append(TimeChange(engine, math.exp(total / n), math.exp(spread / math.sqrt(n)), int(n)))
+    if len(found) > 1 and all(each.beyond for each in found) and len({each.ratio > 1.0 for each in found}) == 1:
+        ratio = math.exp(-sum(math.log(each.ratio) for each in found) / len(found))
+        return [TimeChange(FORMULAS, ratio, max(each.scatter for each in found), found[0].scenes)]
+    return found

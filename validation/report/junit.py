@@ -1,7 +1,12 @@
 """JUnit XML, for the test page of a continuous-integration system."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from typing import NamedTuple
+
+from validation.compare.rows import Row
+
+LISTED = 10_000
+"""Comparisons with a case of their own, besides as many that fail; the others are counted."""
 
 
 class Case(NamedTuple):
@@ -14,6 +19,28 @@ class Case(NamedTuple):
     """passed, failure or skipped."""
     kind: str = ""
     message: str = ""
+
+
+def cases(rows: Iterable[Row]) -> Iterator[Case]:
+    """The rows of a run: what fails is a failure, and what was not compared is skipped."""
+    listed = failures = others = 0
+    for row in rows:
+        name = (row.scene, f"{row.scene}.{row.engine} {row.setting}", row.quantity)
+        if row.failed and failures < LISTED:
+            failures += 1
+            yield Case(*name, "failure", row.verdict, f"error {row.error!r}, allowed {row.allowed!r}: {row.reason}")
+        elif not row.failed and listed < LISTED:
+            listed += 1
+            yield Case(*name, "passed") if row.compared else Case(*name, "skipped", row.verdict, row.reason)
+        else:
+            others += 1
+    yield from beyond(others)
+
+
+def beyond(rows: int) -> Iterator[Case]:
+    """What is not listed, as one case."""
+    if rows > 0:
+        yield Case("all scenes", "all scenes", f"{rows} rows more: see results.parquet", "skipped", "not listed")
 
 
 def document(title: str, cases: Iterable[Case]) -> str:

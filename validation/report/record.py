@@ -8,10 +8,7 @@ from fourbar.solution import Solution
 from validation.compare.answer import Answer
 from validation.compare.identities import FORMULAS
 from validation.compare.reversals import Reversal
-from validation.compare.rows import COLUMNS, Row, sorted_rows
-
-STORED = tuple(name for name in COLUMNS if name != "passed")
-"""Columns that make a row: whether it passed follows from them."""
+from validation.compare.rows import MADE_OF, Row, sorted_rows
 
 
 @dataclass(slots=True)
@@ -66,7 +63,7 @@ class Record:
         kept = asdict(replace(self, rows=[]))
         for name in ("scene", "solution", "answers", "jumps"):
             del kept[name]
-        return kept | {"rows": [[getattr(row, name) for name in STORED] for row in sorted_rows(self.rows)]}
+        return kept | {"rows": [[getattr(row, name) for name in MADE_OF] for row in sorted_rows(self.rows)]}
 
     @classmethod
     def restore(cls, kept: dict[str, Any]) -> "Record":

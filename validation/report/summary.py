@@ -99,6 +99,7 @@ FAILURES_KEPT = 1000
 """Lines of a table at the most; everything is in results.csv."""
 TIMED = 1000
 NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
+"""In a reason: what differs by it alone is one reason."""
 TOLERANCES = (IDENTITY, EQUIVALENCE, SIMULATED)
 """Of a run with the standing witnesses."""
 STATEMENT = (
@@ -212,19 +213,6 @@ class Summing:
             missing=list(missing),
             shown=self.shown,
         )
-
-
-def summarise(
-    scenes: Iterable[Record],
-    ladder: Sequence[LadderRow] = (),
-    tolerances: Sequence[Tolerance] = TOLERANCES,
-    missing: Sequence[tuple[str, str]] = (),
-) -> Summary:
-    """Condense a run in one pass."""
-    summing = Summing()
-    for scene in scenes:
-        summing.add(scene)
-    return summing.summary(ladder, tolerances, missing)
 
 
 def _left_out(scene: Record) -> set[tuple[str, str]]:

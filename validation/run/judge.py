@@ -17,11 +17,12 @@ from fourbar.solution import Solution
 from fourbar.solve import solve
 from validation.compare.answer import Answer
 from validation.compare.basis import basis_of
-from validation.compare.compare import compare
+from validation.compare.compare import Yardsticks, compare
 from validation.compare.identities import FORMULAS, closure, identities
 from validation.compare.plain import plain
 from validation.compare.reversals import reversals
 from validation.compare.rows import FAILS, REFUSES, VERDICTS, Row
+from validation.compare.statements.finding import Stated
 from validation.compare.statements.statements import statements
 from validation.compare.tolerance import EQUIVALENCE
 from validation.compare.withheld import withheld
@@ -68,15 +69,16 @@ def judge(name: str, scene: Scene, witnesses: Sequence[Witness] = WITNESSES, *, 
         record.rows.append(withheld(name, scene, record.solution, basis))
     record.rows += printed(name, scene, at, record.solution, basis)
     record.jumps = reversals(scene, at, record.solution)
+    stated, yardsticks = Stated(scene.linkage), Yardsticks()
     for witness in witnesses:
         answer = _ask(witness, scene, at, record)
         if answer is None:
             continue
         record.answers.append(answer)
-        record.rows += _judged(name, scene, at, record.solution, answer, witness, basis)
+        record.rows += _judged(name, scene, at, record.solution, answer, witness, basis, yardsticks)
         exact = witness.tolerance == EQUIVALENCE and answer.refusal is None and "theta_3" in witness.expected
         if exact and witness.stated:
-            record.rows += _stated(name, scene, witness, answer)
+            record.rows += _stated(name, scene, witness, answer, stated)
         if order and witness.order and answer.refusal is None:
             answer.evidence |= _observed_order(name, scene, at, record.solution, witness)
     if any(witness.name == SIMULATION for witness in witnesses):
@@ -135,15 +137,22 @@ def _basis(scene: Scene, at: Command) -> Solution | None:
 
 
 def _judged(
-    name: str, scene: Scene, at: Command, solution: Solution, answer: Answer, witness: Witness, basis: Solution | None
+    name: str,
+    scene: Scene,
+    at: Command,
+    solution: Solution,
+    answer: Answer,
+    witness: Witness,
+    basis: Solution | None,
+    yardsticks: Yardsticks,
 ) -> list[Row]:
     """The rows of one answer, against the formulas at the motion that the engine really made."""
     theirs = answer.at if answer.at is not None else at
     formulas = solution
     if theirs is not at:
-        formulas, basis = solve(scene, _stage(theirs), at=theirs), _basis(scene, theirs)
+        formulas, basis, yardsticks = solve(scene, _stage(theirs), at=theirs), _basis(scene, theirs), {}
     predicted = predicting_from(witness, scene, theirs, answer)
-    rows = compare(name, scene, answer, formulas, witness.tolerance, witness.expected, predicted, basis)
+    rows = compare(name, scene, answer, formulas, witness.tolerance, witness.expected, predicted, basis, yardsticks)
     if (ratio := answer.evidence.get("mass_ratio", 1.0)) > LIGHT:
         why = f"; of coupler and output one is {ratio:.1e} times lighter"
         rows = [replace(row, reason=row.reason + why) if row.failed else row for row in rows]
@@ -153,10 +162,10 @@ def _judged(
     return rows
 
 
-def _stated(name: str, scene: Scene, witness: Witness, answer: Answer) -> list[Row]:
+def _stated(name: str, scene: Scene, witness: Witness, answer: Answer, stated: Stated) -> list[Row]:
     """What the formulas state of the linkage whatever its motion, held against an exact engine."""
     try:
-        return statements(name, scene, witness.engine(), answer)
+        return statements(name, scene, witness.engine(), answer, stated)
     except LimitError as limit:
         return [Row.unmeasured(name, witness.name, "statements of the linkage", "all", REFUSES, str(limit))]
     except Exception as error:  # whatever an engine raises is its own failure, in its own row
@@ -168,7 +177,7 @@ def _observed_order(name: str, scene: Scene, at: Command, solution: Solution, wi
     module, _, function = witness.order.partition(":")
 
     def error(answer: Answer) -> float:
-        rows = _judged(name, scene, at, solution, answer, replace(witness, expected=FORCES), None)
+        rows = _judged(name, scene, at, solution, answer, replace(witness, expected=FORCES), None, {})
         return max((row.error for row in rows if row.quantity in FORCES), default=math.nan)  # a refusal has none
 
     coarse, fine, order = getattr(import_module(module), function)(scene, at, error)
@@ -186,14 +195,14 @@ def _judge_inertia(record: Record, scene: Scene, at: Command, witnesses: Iterabl
     bare = replace(scene, loads=(), effects=())
     ours = solve(bare, _stage(at), at=at)
     refused = {answer.engine for answer in record.answers if answer.refusal is not None}  # and has its row
-    of_bare = _basis(bare, at)
+    of_bare, yardsticks = _basis(bare, at), Yardsticks()
     for witness in witnesses:
         answer = _of_inertia(next((each for each in record.answers if each.engine == witness.name), None))
         if answer is None:
             answer = _ask(replace(witness, expected=("torque",)), bare, at, record, part="inertia alone")
         if answer is None or (answer.refusal is not None and answer.engine in refused):
             continue
-        rows = _judged(record.name, bare, at, ours, answer, replace(witness, expected=("torque",)), of_bare)
+        rows = _judged(record.name, bare, at, ours, answer, replace(witness, expected=("torque",)), of_bare, yardsticks)
         rows = [row for row in rows if row.quantity == "torque" or row.verdict in (REFUSES, FAILS)]
         rows = [row for row in rows if row.quantity != "undecided"]
         if rows:  # what fails besides the torque, or stands in place of it, is not left out

@@ -95,7 +95,9 @@ def piece(at: Command, where: NDArray[np.intp]) -> Command:
 def _blocks(name: str, scene: Scene, at: Command, solution: Solution) -> Row:
     """A sweep of more than one block of positions, at the ends of its blocks, against the scene's own sweep."""
     n = len(at.theta_2)
-    long = np.arange(max(n, BLOCK + n)) % n
+    ok = np.flatnonzero(solution.status_code == OK)  # elsewhere pin friction searches for long, at each repetition
+    between = np.resize(ok if len(ok) else np.arange(n), BLOCK)
+    long = np.concatenate((between, np.arange(n)))
     ends = np.unique([0, BLOCK - 1, BLOCK, len(long) - 1])
     whole = solve(scene, "force", at=piece(at, long))
     error = (whole.status_code[ends] != solution.status_code[long[ends]]).astype(float)

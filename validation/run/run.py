@@ -9,10 +9,10 @@ from typing import Any
 
 import click
 
-from fourbar.errors import FAILED, DependencyError, FourBarError, InputError
+from fourbar.errors import FAILED, HOLDS, DependencyError, FourBarError, InputError
 from fourbar.mjcf import mjcf
-from fourbar.writing import write_text
-from validation.compare.columns import Columns
+from fourbar.writing import naming, write_text
+from validation.compare.columns import Columns, read_columns
 from validation.compare.plain import plain
 from validation.compare.rows import FAILS, Row
 from validation.compare.tolerance import IDENTITY, SIMULATED
@@ -21,10 +21,11 @@ from validation.engines.mujoco.picture import pictures
 from validation.engines.witnesses import Witness
 from validation.published import ladder_rows
 from validation.regression.accept import output_options, report_differences
-from validation.regression.record import about, baseline, read_run, write_about
+from validation.regression.record import about, baseline, recorded, write_about
 from validation.regression.scenes import descriptions
 from validation.report import cost_section, hard_section
 from validation.report.html import Section, html
+from validation.report.junit import cases, document
 from validation.report.markdown import markdown
 from validation.report.record import Record
 from validation.report.summary import PICTURED, Summary, Summing
@@ -107,7 +108,11 @@ def run(
         ladder = ladder_rows() if published else []
         summing = Summing()
         times = out / ".timings.csv.part"
-        with Columns(out) as columns, times.open("w", encoding="utf-8", newline="") as file:
+        with (
+            Columns(out) as columns,
+            naming(out / "timings.csv"),
+            times.open("w", encoding="utf-8", newline="") as file,
+        ):
             csv.writer(file, lineterminator="\n").writerow(TIMINGS)
             for number, scenes in enumerate(chunks):
                 records = store.read(number)
@@ -131,8 +136,7 @@ def run(
         write_about(record, out)
         write_text(out / "report.md", markdown(summary))
         models, why_not = mjcf_pictures(suite, places) if places and simulated else ({}, "")
-        rows = (row for number in range(len(chunks)) for each in store.read(number) for row in each.rows)
-        more = sections(rows if isinstance(suite, Hard) else None, out)
+        more = sections(read_columns(out / "results.parquet") if isinstance(suite, Hard) else None, out)
         page = html(summary, columns.first_lines, pictures=models, no_pictures=why_not, sections=more)
         write_text(out / "report.html", page)
         store.finish()
@@ -307,10 +311,10 @@ def command(
             "--against", against, "cannot be combined with --python, which compares with the run made there"
         )
     for form, path in forms.items():
-        if path is not None and python is None and against is None:
+        if path is not None and python is None and against is None and form != "junit":
             raise InputError(f"--{form}", str(path), "tells differences; say --against BASELINE or --python PATH too")
     if against is not None:
-        read_run(baseline(against))  # before anything runs
+        recorded(baseline(against))  # before anything runs
     seed, types = seed or 0, types or ALL_TYPES
     suite, witnesses = selected(scenes, named, count, seed, types, adapters)
     if wanted is not None:
@@ -332,13 +336,22 @@ def command(
     how: dict[str, Any] = {"workers": workers, "scheduler": scheduler, "seconds": time_limit, "drawn": not no_pictures}
     result = _in_sight(len(suite), run(suite, out, present, published=published, missing=missing, **how))
     table(result, out)
-    worse = report_differences(baseline(against), out, forms) if against is not None else 0
+    worse = _held_against(against, out, forms, result.verdict)
     if result.counts[FAILS] or worse:
         return FAILED
     if missing:
         there = ",".join(witness.name for witness in present)
         raise DependencyError(f"{missing[0][1]}, or say --engines {there} where those are all that is wanted")
     return result.counts.status
+
+
+def _held_against(against: str | None, out: Path, forms: dict[str, Path | None], verdict: str) -> int:
+    """The differences from an earlier run; where there is none the run's own comparisons as JUnit, if wanted."""
+    if against is not None:
+        return report_differences(baseline(against), out, forms)
+    if (xml := forms["junit"]) is not None:
+        write_text(xml, document(verdict, cases(read_columns(out / "results.parquet"))))
+    return HOLDS
 
 
 def _in_sight(scenes: int, steps: Iterable[int | str | Summary]) -> Summary:

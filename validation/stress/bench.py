@@ -1,4 +1,4 @@
-"""Speed of the formulas, side by side in one process: stages, the 13x13 system, C, SymPy, engines; ratios that hold."""
+"""Speed side by side in one process: stages, the 13x13 system, C, SymPy, engines, a judged scene; ratios that hold."""
 
 import os
 import subprocess
@@ -22,8 +22,12 @@ from fourbar.quantities import ANGLES, UNKNOWNS, VECTORS
 from fourbar.scene import Command, Scene
 from fourbar.show.plot.style import format_of
 from fourbar.solve import BLOCK, solve
+from validation.engines.witnesses import WITNESSES, Witness
 from validation.published.thirteen import FreeBodies, solve_thirteen
 from validation.report.machine import machine
+from validation.run.judge import judged
+from validation.scenes.random import LinkageType
+from validation.scenes.suites import Random
 from validation.stress.against import ONE_THREAD
 from validation.stress.against import against as against_revision
 from validation.stress.bench_picture import Times, draw_bench
@@ -37,8 +41,8 @@ from validation.stress.contenders import (
     over_linkages,
     over_positions,
 )
-from validation.stress.limits import LIMITS
-from validation.stress.timed import LINKAGE, command, example, preallocated
+from validation.stress.limits import JUDGED_BY_SYSTEMS, LIMITS
+from validation.stress.timed import LINKAGE, command, example, preallocated, seconds
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -54,6 +58,9 @@ OVER_POSITIONS = "all unknowns of a position, over the number of positions (1e6 
 OVER_LINKAGES = "all forces of a linkage at one position, over the number of linkages"
 SOLVED = 100_000
 """Positions where every array is allocated, and for the error bars, which evaluate the forces 17 times."""
+PER_SCENE = 50_000
+"""Positions in whose stead one random scene is judged: twenty of them by default."""
+JUDGED = "a scene judged by the exact engines, ms"
 
 
 class Measured(NamedTuple):
@@ -238,6 +245,10 @@ def measure(positions: int, rounds: int, largest: int) -> Measured:
         rows["compiled error bars / forces"] = rows["compiled with error bars"] / rows["compiled to forces, points too"]
         if "C" in peers.here:
             rows["compiled / C"] = rows["the same compiled"] / rows["C, all"]
+    exact = [witness for witness in WITNESSES if not witness.through_time]
+    if not any(witness.missing() for witness in exact):
+        rows[JUDGED] = judging(exact, max(1, positions // PER_SCENE))
+        rows[JUDGED_BY_SYSTEMS] = rows[JUDGED] * 1e6 / rows["13x13 assembled and solved"]
     rows |= {
         "13x13 / formulas": rows["13x13 assembled and solved"] / everything_ns,
         "formulas / positions only": everything_ns / rows["positions only"],
@@ -250,3 +261,11 @@ def measure(positions: int, rounds: int, largest: int) -> Measured:
         "import fourbar / import numpy": import_cost(),
     }
     return Measured(rows, by_positions, by_linkages, peers.not_run | others.not_run)
+
+
+def judging(witnesses: list[Witness], scenes: int) -> float:
+    """Milliseconds of CPU in which a random scene is judged as `run` does, nothing drawn; the median."""
+    suite = Random(scenes + 1, 0, tuple(LinkageType))
+    each = (partial(judged, suite.name(i), suite.scene(i), witnesses, draw=False) for i in range(scenes + 1))
+    times = [seconds(action) for action in each]
+    return 1e3 * median(times[1:])  # the first one imports the engines

@@ -9,27 +9,26 @@ from pydrake.multibody.plant import DiscreteContactApproximation, MultibodyPlant
 from pydrake.systems.analysis import Simulator
 
 from fourbar.mjcf import flywheel
-from fourbar.mjcf.document import at_start
 from fourbar.mjcf.sdf import sdf
 from fourbar.scene import Scene
-from validation.subjects.motion import Readings, gap, turn
+from validation.subjects.motion import Readings, gap, start, turn, weight
 
 VERSION = version("drake")
 STEPS = (628, 2512)
-CHANGED = "SDF with Drake's ball constraint in place of a fourth joint; the force of that constraint cannot be read"
+CHANGED = "SDF with Drake's ball constraint in place of a fourth joint; its force cannot be read"
 SETTINGS = {"SAP": None}
+PINS = ("O2", "A", "O4")
 
 
 def through(scene: Scene, steps: int, setting: str) -> Readings:
     """A turn in so many steps, carried by a flywheel, the rotor of an actuator on O2."""
     timestep, stops = turn(scene, steps)
-    begin, inertia = at_start(scene), flywheel(scene)
+    begin, inertia = start(scene), flywheel(scene)
     plant = MultibodyPlant(timestep)
     plant.set_discrete_contact_approximation(DiscreteContactApproximation.kSap)
-    Parser(plant).AddModelsFromString(sdf(scene, "drake"), "sdf")
-    gravity = next((effect.vector for effect in scene.effects if effect.key == "gravity"), (0.0, 0.0))  # type: ignore[attr-defined]
-    plant.mutable_gravity_field().set_gravity_vector([float(gravity[0]), float(gravity[1]), 0.0])
-    joints = [plant.GetJointByName(name) for name in ("O2", "A", "O4")]
+    Parser(plant).AddModelsFromString(sdf(scene, "drake", begin), "sdf")
+    plant.mutable_gravity_field().set_gravity_vector(weight(scene))
+    joints = [plant.GetJointByName(name) for name in PINS]
     actuator = plant.AddJointActuator("drive", joints[0])
     actuator.set_default_rotor_inertia(inertia)
     actuator.set_default_gear_ratio(1.0)
@@ -45,10 +44,17 @@ def through(scene: Scene, steps: int, setting: str) -> Readings:
         simulator.AdvanceTo((stop - 1) * timestep)
         angles = [joint.get_angle(context) + q for joint, q in zip(joints, begin.qpos, strict=True)]
         speed = joints[0].get_angular_rate(context)
+        theta = (angles[0], angles[0] + angles[1], angles[2])
+        reactions = plant.get_reaction_forces_output_port().Eval(context)
+        on_child = {
+            pin: reactions[int(joint.index())].translational()[:2] for pin, joint in zip(PINS, joints, strict=True)
+        }
+        world = {pin: complex(*on_child[pin]) * np.exp(1j * turned) for pin, turned in zip(PINS, theta, strict=True)}
+        forces = {"F12": world["O2"], "F32": -world["A"], "F14": world["O4"]}
+        pairs = {name: (force.real, force.imag) for name, force in forces.items()}
         simulator.AdvanceTo(stop * timestep)
         found.seconds += time.process_time() - began
         alpha = (joints[0].get_angular_rate(context) - speed) / timestep
-        theta = (angles[0], angles[0] + angles[1], angles[2])
-        found.read(theta, speed, alpha, -inertia * alpha, {})
+        found.read(theta, speed, alpha, -inertia * alpha, pairs)
         found.gap = max(found.gap, gap(scene, theta))
     return found

@@ -13,7 +13,7 @@ import fourbar
 from fourbar.quantities import PIN_FORCES
 from fourbar.scene import Command, Scene
 from validation.compare.answer import Array
-from validation.compare.error import relative
+from validation.compare.error import magnitude, relative_error
 
 CHECKOUT = Path(__file__).parents[2]
 SUBJECTS = {
@@ -21,9 +21,11 @@ SUBJECTS = {
     "mujoco_warp": ("MuJoCo Warp", "mujoco_warp"),
     "mujoco_mjx": ("MJX", "mujoco.mjx"),
     "newton_mujoco": ("Newton, MuJoCo solver", "newton"),
+    "newton_kamino": ("Newton, Kamino", "newton"),
     "genesis_rigid": ("Genesis", "genesis"),
     "pybullet": ("PyBullet", "pybullet"),
     "drake_sap": ("Drake, SAP", "pydrake"),
+    "exudyn_simulated": ("Exudyn", "exudyn"),
 }
 """By module: name, and what must be importable."""
 TORQUE_AND_FORCES = ("torque", *PIN_FORCES)
@@ -55,6 +57,8 @@ class Standing:
 
     lines: list[Line] = field(default_factory=list)
     changed: dict[str, str] = field(default_factory=dict)
+    devices: dict[str, str] = field(default_factory=dict)
+    """What each ran on."""
     left_out: dict[str, str] = field(default_factory=dict)
 
 
@@ -76,7 +80,7 @@ def examine(scene: Scene, file: Path, pythons: list[Path], seconds: float) -> St
             found.left_out[name] = (done.stderr.strip().splitlines() or ["no word"])[-1]
             continue
         answer = json.loads(done.stdout.strip().splitlines()[-1])
-        found.changed[name] = answer["changed"]
+        found.changed[name], found.devices[name] = answer["changed"], answer["device"]
         found.lines += lines(scene, name, answer)
     return found
 
@@ -108,7 +112,12 @@ def errors(scene: Scene, reading: dict[str, Any]) -> dict[str, float]:
     """Of torque and pin forces, at the subject's own theta_2, omega_2 and alpha_2; NaN where it answers NaN."""
     theta = np.array(reading["theta"])
     n = len(theta)
-    at = Command(theta[:, 0], np.ones(n, dtype=int), np.array(reading["omega_2"]), np.array(reading["alpha_2"]))
+    at = Command(
+        theta[:, 0],
+        np.full(n, scene.motion.branch, dtype=np.int8),
+        np.array(reading["omega_2"]),
+        np.array(reading["alpha_2"]),
+    )
     ours, whole = fourbar.solve(scene, "force", at=at), fourbar.solve(scene, "force")
     answered: dict[str, Array] = {name: np.array(values) for name, values in reading["forces"].items()}
     answered["torque"] = np.array(reading["torque"])
@@ -116,14 +125,9 @@ def errors(scene: Scene, reading: dict[str, Any]) -> dict[str, float]:
     for name in TORQUE_AND_FORCES:
         if name not in answered:
             continue
-        size, expected = _size(getattr(whole, name)).max(), getattr(ours, name)
-        missed = _size(answered[name] - expected) if len(answered[name]) == n else np.full(n, np.nan)
-        found[name] = float(np.max(relative(missed, np.full(n, size))))  # NaN stays NaN
+        size = np.full(n, magnitude(getattr(whole, name)).max())
+        found[name] = float(np.max(relative_error(name, getattr(ours, name), answered[name], size)))  # NaN stays NaN
     return found
-
-
-def _size(values: Array) -> Array:
-    return np.abs(values) if values.ndim == 1 else np.hypot(values[:, 0], values[:, 1])
 
 
 def _has(python: Path, library: str) -> bool:

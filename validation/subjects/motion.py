@@ -6,8 +6,13 @@ from typing import Any
 
 import numpy as np
 
-from fourbar.errors import LimitError
-from fourbar.scene import Scene
+from fourbar.effects import Gravity
+from fourbar.errors import LimitError, NotAssembledError
+from fourbar.mjcf.document import Start, run_through
+from fourbar.scene import Scene, command
+from validation.engines.description import field as field_of
+from validation.engines.free_body import move
+from validation.engines.free_body_closure import close
 
 SAMPLES = 12
 """Readings in a turn; the first quarter, in which a closure settles, is not read."""
@@ -55,6 +60,31 @@ def turn(scene: Scene, steps: int) -> tuple[float, list[int]]:
     return math.tau / abs(scene.motion.omega_2) / steps, [
         first + round(k * (steps - first) / (SAMPLES - 1)) for k in range(SAMPLES)
     ]
+
+
+def start(scene: Scene) -> Start:
+    """The first position that closes, in the direction of motion, and the speeds there: the free body's own assembly.
+
+    No subject starts from what the formulas computed.
+    """
+    at, omega_2 = command(scene), scene.motion.omega_2 or 0.0
+    closed = close(scene.linkage, at.theta_2, at.branch)
+    usable = np.flatnonzero(closed.assembled)
+    if not len(usable):
+        raise NotAssembledError("the linkage closes at none of the scene's positions: there is nothing to start from")
+    theta_2 = at.theta_2[usable]
+    first = usable[[np.argmin(theta_2) if omega_2 >= 0.0 else np.argmax(theta_2)]]
+    theta = (at.theta_2[first], *closed.theta[:, first])
+    omega = move(scene.linkage, theta[0], np.array([omega_2]), np.zeros(1), *theta[1:]).omega
+    q, v = [float(x[0]) for x in theta], [float(omega[bar][0]) for bar in (2, 3, 4)]
+    run = run_through(theta_2, omega_2, 0.0)
+    return Start((q[0], q[1] - q[0], q[2]), (v[0], v[1] - v[0], v[2]), run)
+
+
+def weight(scene: Scene) -> tuple[float, float, float]:
+    """The field of gravity, m/s^2."""
+    fields = [field_of(effect) for effect in scene.effects if isinstance(effect, Gravity)]
+    return (*fields[0], 0.0) if fields else (0.0, 0.0, 0.0)
 
 
 def gap(scene: Scene, theta: tuple[float, float, float]) -> float:

@@ -10,7 +10,7 @@ import numpy as np
 
 from fourbar.mjcf import SIMULATORS, mjcf
 from fourbar.scene import Scene
-from validation.subjects.motion import Readings, turn
+from validation.subjects.motion import Readings, start, turn
 
 VERSION = mujoco.__version__
 STEPS = (157, 314, 628, 1256)
@@ -19,10 +19,13 @@ SETTINGS = {"generated file": "mujoco", "its defaults": None}
 
 
 def text(scene: Scene, steps: int, simulator: str | None) -> str:
-    """The generated MJCF with so many steps a turn; without a simulator's name all that the solver is set to goes."""
+    """The generated MJCF, opening in the subjects' start, with so many steps a turn.
+
+    Without a simulator's name all that the solver is set to goes.
+    """
     timestep, _ = turn(scene, steps)
     settings, note = SIMULATORS[simulator or "warp"]  # without pads
-    written = mjcf(scene, replace(settings, timestep=timestep), note)
+    written = mjcf(scene, replace(settings, timestep=timestep), note, start=start(scene))
     if simulator is not None:
         return written
     root = ET.fromstring(written)

@@ -13,6 +13,8 @@ from validation.subjects.motion import Readings, turn
 from validation.subjects.mujoco_c import at_rest_of, opened, read, text
 
 VERSION = version("mujoco-mjx")
+DEVICE = "CPU" if jax.default_backend() == "cpu" else str(jax.devices()[0].device_kind)
+"""JAX takes a GPU where it has one."""
 STEPS = (157, 314, 628)
 CHANGED = "a closure of two timesteps (--for mjx), and jax_enable_x64"
 SETTINGS = {"written for MJX": "mjx", "as for MuJoCo": "mujoco"}

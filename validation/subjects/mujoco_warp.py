@@ -5,12 +5,15 @@ from typing import Any
 
 import mujoco_warp as mjw
 import numpy as np
+import warp
 
 from fourbar.scene import Scene
 from validation.subjects.motion import Readings, turn
 from validation.subjects.mujoco_c import at_rest_of, opened, read, text
 
 VERSION = mjw.__version__ if hasattr(mjw, "__version__") else ""
+DEVICE = str(warp.get_preferred_device().name)
+"""Its arrays lie on a GPU where there is one."""
 STEPS = (78, 157)
 CHANGED = "a light flywheel and no pads (--for warp): single precision; midphase may not be switched off"
 SETTINGS = {"forward twice": 2, "forward once": 1}

@@ -7,13 +7,14 @@ from pathlib import Path
 
 import mujoco_warp as mjw
 import newton
+import warp
 
-from fourbar.mjcf.document import at_start
 from fourbar.scene import Scene
-from validation.subjects.motion import Readings, gap, turn
+from validation.subjects.motion import Readings, gap, start, turn, weight
 from validation.subjects.mujoco_c import text
 
 VERSION = version("newton")
+DEVICE = str(warp.get_preferred_device().name)
 STEPS = (78, 157)
 CHANGED = "add_mjcf takes neither timestep, gravity nor keyframe: all three given by hand; --for newton"
 SETTINGS = {"SolverMuJoCo": None}
@@ -22,17 +23,16 @@ SETTINGS = {"SolverMuJoCo": None}
 def through(scene: Scene, steps: int, setting: str) -> Readings:
     """A turn in so many steps."""
     timestep, stops = turn(scene, steps)
-    gravity = next((effect.vector for effect in scene.effects if effect.key == "gravity"), (0.0, 0.0))  # type: ignore[attr-defined]
-    builder = newton.ModelBuilder(gravity=(float(gravity[0]), float(gravity[1]), 0.0))
+    builder = newton.ModelBuilder(gravity=weight(scene))
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "four_bar.xml"
         file.write_text(text(scene, steps, "newton"))
         builder.add_mjcf(str(file))
-    model = builder.finalize(device="cpu")
+    model = builder.finalize(device=warp.get_preferred_device())
     solver, control = newton.solvers.SolverMuJoCo(model), model.control()
     now, then = model.state(), model.state()
     speeds = now.joint_qd.numpy()
-    speeds[:3] = at_start(scene).qvel
+    speeds[:3] = start(scene).qvel
     now.joint_qd.assign(speeds)
     found, done = Readings(setting, steps), 0
     names = [solver.mj_model.body(number).name for number in range(solver.mj_model.nbody)]

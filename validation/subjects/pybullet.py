@@ -9,9 +9,8 @@ import numpy as np
 import pybullet as bullet
 
 from fourbar.linkage import BAR_NAMES, FIRST_PIN
-from fourbar.mjcf.document import at_start
 from fourbar.scene import Scene
-from validation.subjects.motion import Readings, gap, turn
+from validation.subjects.motion import Readings, gap, start, turn, weight
 
 VERSION = version("pybullet")
 STEPS = (628, 2512, 10048)
@@ -47,7 +46,7 @@ def urdf(scene: Scene) -> str:
 def through(scene: Scene, steps: int, setting: str) -> Readings:
     """A turn in so many steps; torque and force are those with which the step began."""
     timestep, stops = turn(scene, steps)
-    begin, linkage = at_start(scene), scene.linkage
+    begin, linkage = start(scene), scene.linkage
     client = bullet.connect(bullet.DIRECT)
     try:
         with tempfile.TemporaryDirectory() as folder:
@@ -56,8 +55,7 @@ def through(scene: Scene, steps: int, setting: str) -> Readings:
             flags = bullet.URDF_USE_INERTIA_FROM_FILE
             body = bullet.loadURDF(str(file), useFixedBase=True, flags=flags, physicsClientId=client)
         bullet.setPhysicsEngineParameter(fixedTimeStep=timestep, **SETTINGS[setting])
-        gravity = next((effect.vector for effect in scene.effects if effect.key == "gravity"), (0.0, 0.0))  # type: ignore[attr-defined]
-        bullet.setGravity(float(gravity[0]), float(gravity[1]), 0.0)
+        bullet.setGravity(*weight(scene))
         for joint, (angle, speed) in enumerate(zip(begin.qpos, begin.qvel, strict=True)):
             bullet.changeDynamics(body, joint, linearDamping=0.0, angularDamping=0.0, jointDamping=0.0)
             bullet.resetJointState(body, joint, angle, speed)

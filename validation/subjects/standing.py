@@ -23,9 +23,10 @@ HEAD = ("subject", "version", "setting", "of", *TORQUE_AND_FORCES, "gap at B", "
 EXPLAINED = (
     "Errors of the torque and of each pin force: the greatest of the readings by the greatest value in a turn, at the "
     "subject's own angle, speed and acceleration. 'states': states set one by one; 'N steps': a turn at constant "
-    "speed, its first quarter not read. Empty: its adapter does not read it. The gap is by the longest bar, the order "
-    "that of the torque's error from the line above; readings and compilation are not in the time. No line is a "
-    "ranking: double and single precision, compiled and interpreted loops stand side by side."
+    "speed, its first quarter not read. Empty: its adapter does not read it. The gap, the drift of the closure, "
+    "is the greatest of the readings by the longest bar, the order that of the torque's error from the line "
+    "above; readings and compilation are not in the time. No line is a ranking: double and single precision, compiled "
+    "and interpreted loops stand side by side."
 )
 
 
@@ -45,13 +46,15 @@ def command(scene: Path, pythons: tuple[Path, ...], out: Path, time_limit: float
     if not found.lines:
         raise InputError("--python", ", ".join(map(str, pythons)) or None, "no subject answered there")
     chart = work_precision(found)
+    versions = dict.fromkeys(f"{line.subject} {line.version}" for line in found.lines)
     page = {
         "title": given.title,
-        "made": machine(),
+        "made": f"{machine()}; {', '.join(versions)}",
         "explained": EXPLAINED,
         "head": HEAD,
         "rows": [cells(line) for line in found.lines],
         "changed": found.changed,
+        "devices": found.devices,
         "left_out": found.left_out,
         "findings": findings(),
         "chart": chart,

@@ -20,6 +20,7 @@ def main(module: str, file: str) -> None:
             found.append(subject.states(scene, setting))
         found += [subject.through(scene, steps, setting) for steps in subject.STEPS]
     answer = {"version": subject.VERSION, "changed": subject.CHANGED, "readings": [each.plain() for each in found]}
+    answer["device"] = getattr(subject, "DEVICE", "CPU")
     sys.stdout.write("\n" + json.dumps(answer) + "\n")
 
 

@@ -1,6 +1,6 @@
 """Drawings of a scene in publication quality: linkage, curves over theta_2, forces, free bodies.
 
-Needs matplotlib (``pip install "fourbar[plot]"``), which is loaded when something is drawn.
+Needs matplotlib (the extra ``plot``), which is loaded when something is drawn.
 """
 
 from fourbar.show.plot.figures import BRANCHES as BRANCHES

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fourbar.effects.actions import Actions, bodies
-from fourbar.errors import DependencyError
+from fourbar.errors import DependencyError, installing
 from fourbar.formulas.arithmetic import dot
 from fourbar.formulas.motion import State
 from fourbar.linkage import MOVING_BARS
@@ -33,7 +33,7 @@ def energies(scene: Scene, motion: Solution) -> Energies:
     try:
         from scipy.interpolate import CubicSpline
     except ModuleNotFoundError:
-        raise DependencyError('SciPy is needed for free motion: pip install "fourbar[dynamics]"') from None
+        raise DependencyError(f"SciPy is needed for free motion: {installing('dynamics')}") from None
     assert motion.time is not None and motion.omega_2 is not None
     state = state_at(scene, Command(motion.theta_2, motion.branch, motion.omega_2, 0.0))
     groups = {"loads": scene.loads, **{effect.key: (effect,) for effect in scene.effects}}

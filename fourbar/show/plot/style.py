@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fourbar.errors import DependencyError, InputError
+from fourbar.errors import DependencyError, InputError, installing
 from fourbar.quantities import PIN_FORCES
 from fourbar.solution import SI, Array, Conversion, unit_in
 from fourbar.writing import write_bytes
@@ -80,7 +80,7 @@ def matplotlib_style() -> Iterator[None]:
     try:
         import matplotlib as mpl
     except ImportError:
-        raise DependencyError('drawing needs matplotlib: pip install "fourbar[plot]"') from None
+        raise DependencyError(f"drawing needs matplotlib: {installing('plot')}") from None
     with mpl.rc_context():
         mpl.rcdefaults()  # a user's matplotlibrc does not change a published figure
         mpl.rcParams.update(SETTINGS)

@@ -1,8 +1,8 @@
-"""What one statement comes to, and the angles and questions that all of them share."""
+"""What one statement comes to, and what all of them share: the formulas' words, and the answers to one question."""
 
 import math
-from collections.abc import Iterable, Sequence
-from typing import NamedTuple
+from collections.abc import Callable, Iterable, Sequence
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
@@ -17,6 +17,10 @@ from validation.compare.rows import AGREES, FAILS, Row
 from validation.compare.tolerance import EQUIVALENCE, Array
 
 TURN = 2.0 * math.pi
+T = TypeVar("T")
+A = TypeVar("A", float, Array)
+Place = tuple[float, int]
+"""theta_2 (rad) and branch."""
 
 
 class Finding(NamedTuple):
@@ -30,7 +34,8 @@ class Finding(NamedTuple):
 
 def worst(name: str, answer: Answer, quantity: str, findings: Iterable[Finding]) -> Row:
     """The row of a quantity: the finding that exceeds what it is allowed by most."""
-    found = max(findings, key=lambda each: float(used(each.error, each.allowed)))
+    each = list(findings)
+    found = each[int(np.argmax(used(np.array([one.error for one in each]), np.array([one.allowed for one in each]))))]
     holds = found.error <= found.allowed
     return Row(
         scene=name,
@@ -46,12 +51,39 @@ def worst(name: str, answer: Answer, quantity: str, findings: Iterable[Finding])
     )
 
 
-def answered(engine: Engine, linkage: FourBar, theta_2: Sequence[float], branch: Sequence[int]) -> dict[str, Array]:
-    """What the engine finds where bar 2 turns at 1 rad/s; the bars are uniform: their masses play no part."""
-    bars = uniform(*linkage.lengths)
-    scene = Scene(FourBar(bars.ground, bars.input, bars.coupler, bars.output, linkage.ground_angle), Motion(0.0, 1.0))
-    at = Command(np.array(theta_2, dtype=float), np.array(branch, dtype=np.int8), 1.0, 0.0)
-    return given(engine, scene, at).quantities
+class Stated:
+    """What the formulas state of a linkage: each of them is evaluated once, for all engines."""
+
+    def __init__(self, linkage: FourBar) -> None:
+        self.linkage = linkage
+        self._known: dict[tuple[Callable[..., object], tuple[int, ...]], object] = {}
+
+    def __call__(self, formula: Callable[..., T], *of: int) -> T:
+        """The value of a formula of the linkage, and of a bar where it is of one."""
+        if (formula, of) not in self._known:
+            self._known[formula, of] = formula(self.linkage, *of)
+        value: T = self._known[formula, of]  # type: ignore[assignment]
+        return value
+
+
+class Seen:
+    """What an engine finds at some places where bar 2 turns at 1 rad/s; the bars are uniform: masses play no part."""
+
+    def __init__(self, engine: Engine, linkage: FourBar, places: Iterable[Place]) -> None:
+        # neighbours in turn: an engine starts from the position before
+        self._index = {place: i for i, place in enumerate(sorted(set(places), key=lambda each: each[::-1]))}
+        if not self._index:
+            return
+        bars = uniform(*linkage.lengths)
+        scene = Scene(
+            FourBar(bars.ground, bars.input, bars.coupler, bars.output, linkage.ground_angle), Motion(0.0, 1.0)
+        )
+        theta_2, branch = (np.array(column) for column in zip(*self._index, strict=True))
+        self._found = given(engine, scene, Command(theta_2, branch.astype(np.int8), 1.0, 0.0)).quantities
+
+    def at(self, place: Place, quantity: str) -> float:
+        """A quantity at one of the places."""
+        return float(self._found[quantity][self._index[place]])
 
 
 def given(engine: Engine, scene: Scene, at: Command) -> Answer:
@@ -62,9 +94,9 @@ def given(engine: Engine, scene: Scene, at: Command) -> Answer:
     return answer
 
 
-def wrapped(angle: Array) -> Array:
+def wrapped(angle: A) -> A:
     """Into [-pi, pi)."""
-    return np.asarray((angle + math.pi) % TURN - math.pi)
+    return (angle + math.pi) % TURN - math.pi
 
 
 def same(what: str, stated: Sequence[float], found: Sequence[float]) -> Finding:

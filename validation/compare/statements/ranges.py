@@ -9,6 +9,7 @@ the limits and along the ground settle every angle.
 import math
 from collections.abc import Iterator
 from fractions import Fraction
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,9 +17,9 @@ from fourbar.formulas import mobility
 from fourbar.linkage import MOVING_BARS, FourBar
 from fourbar.scene import Command, Scene
 from validation.compare.answer import Engine
-from validation.compare.compare import TOUCHING_MARGIN, closing_margin
-from validation.compare.statements.finding import TURN, Finding, given, same
-from validation.compare.tolerance import EPS, EQUIVALENCE
+from validation.compare.compare import TOUCHING_MARGIN, Mask, closing_margin
+from validation.compare.statements.finding import TURN, Finding, Stated, given, same
+from validation.compare.tolerance import EPS, EQUIVALENCE, Array
 
 BEYOND = 4.0 * TOUCHING_MARGIN
 """Of the sum of the lengths: by this much the loop closes, or misses, past a limit where the engine is tried."""
@@ -27,11 +28,11 @@ LENGTHS_ROUNDED = (EPS / 4.0, EPS)
 """Of the perimeter: the lengths were rounded themselves, and between these two a change point may be stated or not."""
 
 
-def ranges(linkage: FourBar, engine: Engine) -> Iterator[Finding]:
+def ranges(stated: Stated, engine: Engine) -> Iterator[Finding]:
     """Ranges, limits and full turns of every moving bar, the range of a sweep, and the change points."""
     for bar in MOVING_BARS:
-        yield from _of_bar(linkage, bar, engine)
-    yield _change_points(linkage)
+        yield from _of_bar(stated, bar, engine)
+    yield stated(_change_points)
 
 
 def _change_points(linkage: FourBar) -> Finding:
@@ -58,7 +59,23 @@ def step_beyond(linkage: FourBar, theta_2: float) -> float:
     return float(little / slope) + 4.0 * EPS * (abs(theta_2) + TURN)
 
 
-def _of_bar(linkage: FourBar, bar: int, engine: Engine) -> Iterator[Finding]:
+class _Question(NamedTuple):
+    """What an engine is tried with for one bar, and what the formulas state of it."""
+
+    scene: Scene
+    """The linkage with the bar in the place of bar 2."""
+    command: Command
+    angles: Array
+    """Of the bar, rad."""
+    inside: Mask
+    """Whether the loop closes there."""
+    decidable: Mask
+    """And it is not rounding that decides."""
+    findings: tuple[Finding, ...]
+    """Of the statements among themselves."""
+
+
+def _question(linkage: FourBar, bar: int) -> _Question:
     second, third = (linkage.bar(k) for k in MOVING_BARS if k != bar)
     first = FourBar(linkage.ground, linkage.bar(bar), second, third, linkage.ground_angle)
     shift = math.pi if bar == 4 else 0.0  # the loop runs along bar 4 from B to O4
@@ -74,15 +91,24 @@ def _of_bar(linkage: FourBar, bar: int, engine: Engine) -> Iterator[Finding]:
     expected += zip(along, within, strict=True)
     if bar == 2:
         expected += [(angle, True) for angle in mobility.default_range(linkage)]
-    angles = np.array([angle for angle, _ in expected])
+    angles, inside = (np.array(column) for column in zip(*expected, strict=True))
+    limits = [limit[MOVING_BARS.index(bar)] for limit in mobility.limit_positions(linkage, bar)]
+    findings = (
+        same(f"limits of bar {bar}", limits, [] if full else [end for span in spans for end in span]),
+        same(f"swing of bar {bar}", [mobility.swing(linkage, bar)], [spans[0][1] - spans[0][0]]),
+        Finding(float(full != all(within)), 0.0, along[0], f"whether bar {bar} turns fully"),
+    )
     decidable = np.abs(closing_margin(Scene(first), angles + shift)) > TOUCHING_MARGIN
-    closes = given(engine, Scene(first), Command(angles + shift, np.ones(len(angles), np.int8), None, 0.0)).assembled
+    command = Command(angles + shift, np.ones(len(angles), np.int8), None, 0.0)
+    return _Question(Scene(first), command, angles, inside, decidable, findings)
+
+
+def _of_bar(stated: Stated, bar: int, engine: Engine) -> Iterator[Finding]:
+    tried = stated(_question, bar)
+    closes = given(engine, tried.scene, tried.command).assembled
     assert closes is not None
-    wrong = decidable & (closes != [inside for _, inside in expected])
-    where = float(angles[int(np.argmax(wrong))])
+    wrong = tried.decidable & (closes != tried.inside)
+    where = float(tried.angles[int(np.argmax(wrong))])
     what = f"bar {bar} at {where!r} rad: the engine finds the opposite" if wrong.any() else "closes where stated"
     yield Finding(float(np.count_nonzero(wrong)), 0.0, where, what)
-    limits = [limit[MOVING_BARS.index(bar)] for limit in mobility.limit_positions(linkage, bar)]
-    yield same(f"limits of bar {bar}", limits, [] if full else [end for span in spans for end in span])
-    yield same(f"swing of bar {bar}", [mobility.swing(linkage, bar)], [spans[0][1] - spans[0][0]])
-    yield Finding(float(full != all(within)), 0.0, where, f"whether bar {bar} turns fully")
+    yield from tried.findings

@@ -7,7 +7,7 @@ import numpy as np
 from fourbar.formulas import mobility
 from fourbar.linkage import FourBar
 from validation.compare.answer import Engine
-from validation.compare.statements.finding import Finding, answered
+from validation.compare.statements.finding import Finding, Seen
 
 PAST = 1e-3
 """rad. This far on either side of a change point the speeds of the two motions differ visibly."""
@@ -21,8 +21,9 @@ def through(linkage: FourBar, engine: Engine) -> Iterator[Finding]:
         for sense in (1.0, -1.0):
             for start in (1, -1):
                 angles = point + sense * np.array([-FAR, -PAST, PAST, FAR])
-                seen = answered(engine, linkage, [angles[1], angles[2], angles[2]], [start, 1, -1])
-                rates = np.stack((seen["omega_3"], seen["omega_4"]))
+                places = [(float(angles[1]), start), (float(angles[2]), 1), (float(angles[2]), -1)]
+                seen = Seen(engine, linkage, places)
+                rates = np.array([[seen.at(place, name) for place in places] for name in ("omega_3", "omega_4")])
                 goes_on = (1, -1)[int(np.argmin(np.abs(rates[:, 1:] - rates[:, :1]).max(axis=0)))]
                 expected = [start, start, goes_on, goes_on]
                 stated = mobility.on_smooth_path(linkage, angles, start)

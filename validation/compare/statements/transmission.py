@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterator
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,27 +12,33 @@ from fourbar.formulas.path import state as state_of
 from fourbar.formulas.transmission import drive_sine
 from fourbar.linkage import MOVING_BARS, FourBar
 from fourbar.scene import Scene
-from validation.compare.answer import Answer, Engine
+from validation.compare.answer import Answer
 from validation.compare.compare import turned
-from validation.compare.statements.finding import TURN, Finding, answered, wrapped
+from validation.compare.error import used, worst
+from validation.compare.statements.finding import TURN, Finding, Place, Seen, Stated, wrapped
 from validation.compare.tolerance import EPS, EQUIVALENCE, NOTHING_TO_TELL, Array, lever
 
 RADII = (0.2, 0.3)
 """m; where the forces of the mechanical advantage act. Any two that differ."""
 
 
-def transmitted(scene: Scene, engine: Engine, answer: Answer) -> Iterator[Finding]:
+def places(stated: Stated) -> list[Place]:
+    """Where an engine is looked at for it: at the extremes that are no limits, and in both strokes of bar 4."""
+    strokes = stated(_strokes)
+    inner = [(theta_2, 1) for value, theta_2, collinear in _ends(stated) if value != collinear]
+    return inner + ([] if strokes is None else [(theta_2, -1) for theta_2 in strokes.middles])
+
+
+def transmitted(scene: Scene, stated: Stated, seen: Seen, answer: Answer) -> Iterator[Finding]:
     """Over the scene's own motion, if it is one, at the stated extremes, and between the stated limits of bar 4."""
-    linkage = scene.linkage
-    extremes = transmission.transmission_extremes(linkage)
     if answer.at is not None and answer.at.omega_2 is not None:
-        yield from _over(scene, answer, extremes)
-    yield from _extremes(linkage, engine, extremes)
-    yield from _strokes(linkage, engine)
+        yield from _over(scene, answer, stated)
+    yield from _extremes(stated, seen)
+    yield from _time_ratio(stated, seen)
 
 
-def _over(scene: Scene, answer: Answer, extremes: transmission.TransmissionExtremes) -> Iterator[Finding]:
-    at, linkage = answer.at, scene.linkage
+def _over(scene: Scene, answer: Answer, stated: Stated) -> Iterator[Finding]:
+    at, linkage, extremes = answer.at, scene.linkage, stated(transmission.transmission_extremes)
     assert at is not None and at.omega_2 is not None and answer.assembled is not None
     state = state_of(linkage, at.theta_2, at.branch)
     half = state.at.half
@@ -61,23 +68,30 @@ def _over(scene: Scene, answer: Answer, extremes: transmission.TransmissionExtre
         ("beyond the extremes", outside, allowed, where),
         ("mechanical advantage", np.abs(gained), allowed_gain, moving & ~(allowed_gain >= NOTHING_TO_TELL)),
     ):
-        yield from (Finding(*each, what) for each in zip(error[counts], bound[counts], at.theta_2[counts], strict=True))
+        if counts.any():
+            most = np.flatnonzero(counts)[worst(used(error[counts], bound[counts]))]
+            yield Finding(float(error[most]), float(bound[most]), float(at.theta_2[most]), what)
     branch = at.branch.astype(float)
     nearest = transmission.distance_to_singular(linkage, at.theta_2, scene.drive_bar, branch)
-    found = _to_singular(scene, at.theta_2, branch)
+    found = _to_singular(scene, at.theta_2, branch, stated)
     error = np.where(np.isinf(nearest) == np.isinf(found), 0.0, math.inf)
     finite = np.isfinite(nearest) & np.isfinite(found)
     error[finite] = np.abs(nearest[finite] - found[finite])
-    worst = int(np.argmax(error))
+    most = int(np.argmax(error))
     bound = EPS * 8.0 * (np.abs(at.theta_2) + abs(linkage.ground_angle) + TURN)
-    yield Finding(float(error[worst]), float(bound[worst]), float(at.theta_2[worst]), "distance to a singular position")
+    yield Finding(float(error[most]), float(bound[most]), float(at.theta_2[most]), "distance to a singular position")
 
 
-def _to_singular(scene: Scene, theta_2: Array, branch: Array) -> Array:
+def _always(stated: Stated) -> list[float]:
+    """theta_2 where bars 3 and 4 are collinear on either branch."""
+    limits = stated(mobility.limit_positions, 2)
+    return [*(limit.theta_2 for limit in limits), *stated(mobility.change_points)]
+
+
+def _to_singular(scene: Scene, theta_2: Array, branch: Array, stated: Stated) -> Array:
     """The angle to the nearest position at which bars are collinear that must not be, inf where there is none."""
-    linkage, drive = scene.linkage, scene.drive_bar
-    always = [limit.theta_2 for limit in mobility.limit_positions(linkage)] + [*mobility.change_points(linkage)]
-    dead = mobility.limit_positions(linkage, drive) if drive != 2 else ()
+    drive, always = scene.drive_bar, _always(stated)
+    dead = stated(mobility.limit_positions, drive) if drive != 2 else ()
     nearest = np.full(theta_2.shape, math.inf)
     for point, side in [*((point, 0) for point in always), *((limit.theta_2, limit.branch) for limit in dead)]:
         apart = np.abs(np.angle(np.exp(1j * (theta_2 - point))))
@@ -85,36 +99,52 @@ def _to_singular(scene: Scene, theta_2: Array, branch: Array) -> Array:
     return nearest
 
 
-def _extremes(linkage: FourBar, engine: Engine, stated: transmission.TransmissionExtremes) -> Iterator[Finding]:
-    singular = [limit.theta_2 for limit in mobility.limit_positions(linkage)] + [*mobility.change_points(linkage)]
-    for value, theta_2, collinear in (
-        (stated.least, stated.theta_2_least, 0.0),
-        (stated.greatest, stated.theta_2_greatest, math.pi),
-    ):
+def _ends(stated: Stated) -> tuple[tuple[float, float, float], ...]:
+    """Least and greatest angle between bars 3 and 4, theta_2 there, and what the angle is where they are collinear."""
+    of = stated(transmission.transmission_extremes)
+    return (of.least, of.theta_2_least, 0.0), (of.greatest, of.theta_2_greatest, math.pi)
+
+
+def _extremes(stated: Stated, seen: Seen) -> Iterator[Finding]:
+    for value, theta_2, collinear in _ends(stated):
         if value == collinear:
-            error = min((float(np.abs(wrapped(np.array(theta_2 - point)))) for point in singular), default=math.inf)
+            error = min((abs(wrapped(theta_2 - point)) for point in _always(stated)), default=math.inf)
             yield Finding(error, EQUIVALENCE.factor * turned(np.array([theta_2])), theta_2, "extreme at a limit")
             continue
-        seen = answered(engine, linkage, [theta_2], [1])
-        angle = abs(float(wrapped(seen["theta_4"] - seen["theta_3"])[0]))
-        digits = lever(linkage) * math.sin(angle)
+        angle = abs(wrapped(seen.at((theta_2, 1), "theta_4") - seen.at((theta_2, 1), "theta_3")))
+        digits = lever(stated.linkage) * math.sin(angle)
         if not digits * NOTHING_TO_TELL <= EPS:
             yield Finding(abs(angle - value), EQUIVALENCE.factor / digits, theta_2, "extreme of the angle at B")
-    worst = min(stated.least, math.pi - stated.greatest)
-    yield Finding(abs(stated.worst - worst), EPS, stated.theta_2_least, "smallest transmission angle")
+    of = stated(transmission.transmission_extremes)
+    smallest = min(of.least, math.pi - of.greatest)
+    yield Finding(abs(of.worst - smallest), EPS, of.theta_2_least, "smallest transmission angle")
 
 
-def _strokes(linkage: FourBar, engine: Engine) -> Iterator[Finding]:
+class _Strokes(NamedTuple):
     """Bar 4 turns in one sense between its two limits on a branch, and in the other for the rest of the turn."""
-    stated = mobility.time_ratio(linkage)
+
+    there: float
+    """rad of bar 2 in the first."""
+    middles: tuple[float, float]
+    """theta_2 amid each."""
+
+
+def _strokes(linkage: FourBar) -> _Strokes | None:
     dead = [limit.theta_2 for limit in mobility.limit_positions(linkage, 4) if limit.branch == -1]
-    strokes = len(dead) == 2 and mobility.turns_fully(linkage) and not mobility.change_points(linkage)
-    yield Finding(float(strokes != (stated is not None)), 0.0, linkage.ground_angle, "whether there is a time ratio")
-    if strokes and stated is not None:
-        there = (dead[1] - dead[0]) % TURN
-        rates = answered(engine, linkage, [dead[0] + there / 2.0, dead[1] + (TURN - there) / 2.0], [-1, -1])["omega_4"]
-        yield Finding(float(not rates[0] * rates[1] < 0.0), 0.0, dead[0], "bar 4 turns in both senses")
-        ratio = max(there, TURN - there) / min(there, TURN - there)
+    if len(dead) != 2 or not mobility.turns_fully(linkage) or mobility.change_points(linkage):
+        return None
+    there = (dead[1] - dead[0]) % TURN
+    return _Strokes(there, (dead[0] + there / 2.0, dead[1] + (TURN - there) / 2.0))
+
+
+def _time_ratio(stated: Stated, seen: Seen) -> Iterator[Finding]:
+    ratio, strokes, theta_1 = stated(mobility.time_ratio), stated(_strokes), stated.linkage.ground_angle
+    known = (strokes is None) == (ratio is None)
+    yield Finding(float(not known), 0.0, theta_1, "whether there is a time ratio")
+    if strokes is not None and ratio is not None:
+        one, other = (seen.at((theta_2, -1), "omega_4") for theta_2 in strokes.middles)
+        place = strokes.middles[0]
+        yield Finding(float(not one * other < 0.0), 0.0, place, "bar 4 turns in both senses")
+        shorter, longer = sorted((strokes.there, TURN - strokes.there))
         # both angles are differences of two that were rounded
-        allowed = EQUIVALENCE.factor * TURN / min(there, TURN - there)
-        yield Finding(abs(stated / ratio - 1.0), allowed, dead[0], "time ratio")
+        yield Finding(abs(ratio / (longer / shorter) - 1.0), EQUIVALENCE.factor * TURN / shorter, place, "time ratio")

@@ -80,7 +80,7 @@ class MujocoTree:
         model.body_simple[:] = model.dof_simplenum[:] = 0
         self.data = mujoco.MjData(model)
         self.body = {n: model.body(f"bar{n}").id for n in MOVING_BARS}
-        self.dof = [int(model.joint(description.FIRST_PIN[n]).dofadr[0]) for n in MOVING_BARS]
+        assert [int(model.joint(description.FIRST_PIN[n]).dofadr[0]) for n in MOVING_BARS] == [0, 1, 2]  # depth first
         self.site = {name: model.site(name).id for n in MOVING_BARS for name in (f"G{n}", f"end{n}")}
         self.on_bar = {name: self.body[int(name[-1])] for name in self.site}
         self.linear, self.linear_dot, self.angular = (np.zeros((3, 3)) for _ in range(3))
@@ -90,7 +90,7 @@ class MujocoTree:
 
     def place(self, q: Sequence[float]) -> None:
         """Bodies, sites and the axes of the Jacobians at q."""
-        self.data.qpos[self.dof] = q
+        self.data.qpos[:] = q
         mujoco.mj_kinematics(self.model, self.data)
         mujoco.mj_comPos(self.model, self.data)
 
@@ -109,17 +109,17 @@ class MujocoTree:
 
     def _site_jacobian(self, name: str) -> Array:
         mujoco.mj_jacSite(self.model, self.data, self.linear, None, self.site[name])
-        return np.asarray(self.linear[:2, self.dof])
+        return self.linear[:2].copy()
 
     def _site_jacobian_rate(self, name: str) -> Array:
         at = self.data.site_xpos[self.site[name]]
         mujoco.mj_jacDot(self.model, self.data, self.linear_dot, None, at, self.on_bar[name])
-        return np.asarray(self.linear_dot[:2, self.dof])
+        return self.linear_dot[:2].copy()
 
     def turn(self, bar: int) -> Array:
         """Last row of the body's rotational Jacobian."""
         mujoco.mj_jacBody(self.model, self.data, None, self.angular, self.body[bar])
-        return np.array(self.angular[2, self.dof])
+        return np.array(self.angular[2])
 
     def positions(self) -> dict[str, Array]:
         """Points of the bars."""
@@ -159,7 +159,7 @@ class MujocoTree:
 
     def drift(self, v: Array) -> Array:
         """(dJ/dt) v from mj_jacDot."""
-        self.data.qvel[self.dof] = v
+        self.data.qvel[:] = v
         mujoco.mj_comVel(self.model, self.data)
         return np.asarray((self._site_jacobian_rate("end3") - self._site_jacobian_rate("end4")) @ v)
 
@@ -169,11 +169,11 @@ class MujocoTree:
 
     def alpha(self, bar: int) -> float:
         """From the body's rotational Jacobian, which is constant in the plane."""
-        return float(self.turn(bar) @ self.data.qacc[self.dof]) if bar != 1 else 0.0
+        return float(self.turn(bar) @ self.data.qacc) if bar != 1 else 0.0
 
     def torques(self, v: Array, a: Array) -> Array:
         """mj_inverse, less what loads and effects do on the coordinates."""
-        self.data.qvel[self.dof], self.data.qacc[self.dof] = v, a
+        self.data.qvel[:], self.data.qacc[:] = v, a
         self.data.xfrc_applied[:] = 0.0
         mujoco.mj_inverse(self.model, self.data)
         for act in self.acting:
@@ -182,7 +182,7 @@ class MujocoTree:
         for body in self.body.values():
             force, couple = self.data.xfrc_applied[body, :3], self.data.xfrc_applied[body, 3:]
             mujoco.mj_applyFT(self.model, self.data, force, couple, self.data.xipos[body], body, applied)
-        return np.asarray((self.data.qfrc_inverse - applied)[self.dof])
+        return np.asarray(self.data.qfrc_inverse - applied)
 
     def push(self, bar: int, force: Array, point: Array) -> None:
         """Add a force at a point, world axes, as force and couple at the mass centre; on the ground it does nothing."""
@@ -200,7 +200,7 @@ class MujocoTree:
 
     def accelerations(self) -> dict[str, Array]:
         """J a + (dJ/dt) v of each point."""
-        v, a = self.data.qvel[self.dof], self.data.qacc[self.dof]
+        v, a = self.data.qvel, self.data.qacc
         sites = {"A": "end2", "B": "end4", "G2": "G2", "G3": "G3", "G4": "G4"}
         return {n: self._site_jacobian(site) @ a + self._site_jacobian_rate(site) @ v for n, site in sites.items()}
 

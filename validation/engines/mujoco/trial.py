@@ -51,6 +51,8 @@ class Trial:
     """CPU seconds in steps."""
     reading: float
     """CPU seconds in reading the samples."""
+    stretches: tuple[tuple[slice, int], ...] = ()
+    """The samples of each stretch, and its steps: several samples are of one step where these are fewer."""
     broken: str = ""
     """What MuJoCo reported of itself, where it lost the motion."""
 
@@ -101,7 +103,9 @@ class Rig:
         first = 0
         with silence():
             for stretch in self.stretches:
+                before = trial.steps
                 self._run(stretch, settings, build or (lambda text, _: ClosedLoop(text)), first, motion, forces, trial)
+                trial.stretches += ((slice(first, first + len(stretch)), trial.steps - before),)
                 first += len(stretch)
                 if trial.broken:
                     break

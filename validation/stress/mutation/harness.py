@@ -30,7 +30,7 @@ from validation.engines.witnesses import WITNESSES, Witness
 CHANGES = 1e-9
 SECONDS = 20
 """A mutant that computes longer than this hangs: the run would be stopped, which is a failure too."""
-MODULES = ("position", "motion", "pin_forces", "torque", "path", "mobility", "transmission")
+MODULES = ("arithmetic", "position", "motion", "pin_forces", "torque", "path", "mobility", "transmission")
 SCENES = 10
 EXACT = ("pinocchio-inverse", "mujoco-inverse", "free-body")
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import click
 
-from fourbar.errors import DependencyError, InputError
+from fourbar.errors import DependencyError, InputError, installing
 from fourbar.writing import write_text
 from validation.stress.mutation.harness import MODULES
 from validation.stress.mutation.planted import planted as every_fault
@@ -56,7 +56,7 @@ def mutation(
         raise InputError("--again", again, f"no run into {out} came before")
     mutmut = Path(sys.executable).parent / "mutmut"
     if not mutmut.is_file():
-        raise DependencyError('mutmut is not installed: pip install "fourbar[mutation]"')
+        raise DependencyError(f"mutmut is not installed: {installing('mutation')}")
     _copy(tree)
     if harness:
         return _harness(mutmut, tree, module, most, out)

@@ -25,7 +25,7 @@ from validation.studies.cost.errors import Errors
 from validation.studies.cost.matters import MATTERS, influences, judged, print_table, sentence
 
 MARGIN = 0.7
-"""The run must stay within this part of the required error: between the positions it may be larger."""
+"""The run must stay within this part of the required error: elsewhere it may be larger."""
 CLOSE_ENOUGH = 1.15
 """The search stops where the least steps that serve and the most that do not are this close."""
 BETWEEN = 180

@@ -2,6 +2,7 @@
 
 import csv
 import io
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -130,13 +131,19 @@ def cheapest(curves: Mapping[str, Sequence[Point]]) -> list[str]:
 def front_lines(curves: Mapping[str, Sequence[Point]]) -> list[str]:
     """The Pareto front of everything stepped, by the worse of torque and force."""
     points = [p for name, row in curves.items() if "slow" not in name for p in row if p.kind == STEPPED]
-    head = f"{'error':>8} {'RK4 steps':>10} {'ms/turn':>8}  setting"
+    head = f"{'error':>8} {'RK4 steps':>10} {'ms/turn':>8} {'+-':>5}  setting"
     front = pareto(points, "worst")
     rows = [
-        f"{p.worst:8.0e} {p.rk4_steps:10.0f} {1e3 * p.seconds_per_revolution:8.2f}  {p.curve}: {p.setting}"
+        f"{p.worst:8.0e} {p.rk4_steps:10.0f} {1e3 * p.seconds_per_revolution:8.2f} {percent(p.scatter):>5}  "
+        f"{p.curve}: {p.setting}"
         for p in front
     ]
     return [head, *rows]
+
+
+def percent(scatter: float) -> str:
+    """The scatter of some timings; a dash where there was one."""
+    return "-" if math.isnan(scatter) else f"{100.0 * scatter:.0f} %"
 
 
 def report(
@@ -158,15 +165,16 @@ def report(
         "",
         "## All points",
         "",
-        f"| setting | {' | '.join(QUANTITIES)} | steps/turn | ms/turn | us/sample | RK4 steps |",
-        "|---|---|---|---|---|---|---|---|---|---|",
+        f"| setting | {' | '.join(QUANTITIES)} | steps/turn | ms/turn | +- | us/sample | RK4 steps |",
+        "|---|---|---|---|---|---|---|---|---|---|---|",
     ]
     for name, points in curves.items():
         for p in points:
             text.append(
                 f"| {name}: {p.setting} | {' | '.join(f'{getattr(p, q):.1e}' for q in QUANTITIES)} "
                 f"| {p.steps_per_revolution:.0f} "
-                f"| {1e3 * p.seconds_per_revolution:.3g} | {1e6 * p.seconds_per_sample:.3g} | {p.rk4_steps:.0f} |"
+                f"| {1e3 * p.seconds_per_revolution:.3g} | {percent(p.scatter)} "
+                f"| {1e6 * p.seconds_per_sample:.3g} | {p.rk4_steps:.0f} |"
             )
     if left_out:
         text += ["", "## Left out", "", *(f"- {line}" for line in left_out)]

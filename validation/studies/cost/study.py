@@ -2,11 +2,10 @@
 
 import json
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from statistics import median
-from typing import Any
 
 import numpy as np
 
@@ -21,10 +20,10 @@ from validation.report.machine import versions
 from validation.studies.cost import formulas
 from validation.studies.cost.advise import advise
 from validation.studies.cost.curves import BEST, SLOW, Curve, Spot, curves
-from validation.studies.cost.errors import Errors, errors
-from validation.studies.cost.matters import judged
+from validation.studies.cost.errors import NO_ANSWER, Errors, errors
 
-ROUNDS = 7
+ROUNDS, ANSWERS = 7, 3
+"""Timings of each setting, and of an engine that answers position by position."""
 TIMED_STEPS = 200
 """Steps per timing: some 3 ms of RK4, so that a round of a curve passes within one spell of the machine."""
 FORWARD_STEPS = (20, 40, 80, 160, 320, 640)
@@ -32,7 +31,7 @@ FORWARD_TIME_CONSTANT = 0.25
 REQUIRED = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 2e-9)
 """Errors for which the advice is drawn."""
 ONE_STATE = (0.9, 0.99, 0.999, 0.9999)
-VERSION = 5
+VERSION = 6
 """Of what is tried; parts of another one are done again."""
 EXACT, STEPPED, FORMULAS = "exact", "stepped", "formulas"
 
@@ -61,6 +60,8 @@ class Point:
     """CPU, of reading a sample; of an exact method: of a position."""
     rk4_steps: float
     """seconds_per_revolution in steps of the recommended RK4 model."""
+    scatter: float
+    """Of seconds_per_revolution: half of what the middle half of its timings spans, over their median."""
     broken: str = ""
 
     @property
@@ -153,14 +154,15 @@ class Study:
             clocks, rig.seconds_per_step(BEST), [min(t.steps, TIMED_STEPS) or 1 for t in trials]
         )
         points = []
-        for spot, trial, seconds in zip(spots, trials, per_step, strict=True):
-            found = judged(rig.scene, trial)
+        for spot, trial, (seconds, scatter) in zip(spots, trials, per_step, strict=True):
+            # the laws are those of the steps themselves: between them the advice judges
+            found = NO_ANSWER if trial.broken else errors(rig.scene, trial.at, trial.quantities)
             n = trial.steps_per_revolution or spot.settings.steps_per_revolution
             samples = max(len(trial.at.theta_2), 1)
             points.append(
                 Point(
                     *(name, STEPPED, spot.label, spot.x, trial.steps, n, *found),
-                    *(seconds * n, trial.reading / samples, seconds * n / reference, trial.broken),
+                    *(seconds * n, trial.reading / samples, seconds * n / reference, scatter, trial.broken),
                 )
             )
         return points
@@ -184,13 +186,13 @@ class Study:
         return self._stepped("recommended", tuple(spots), rig)
 
     def _at_positions(
-        self, name: str, kind: str, label: str, found: Errors, seconds: float, n: int, dial: float = math.nan
+        self, name: str, kind: str, label: str, found: Errors, times: Sequence[float], n: int, dial: float = math.nan
     ) -> Point:
         """A point of a method that answers each position by itself."""
         per_revolution = self._positions_per_revolution()
-        reference = self._rk4_step()
+        reference, (seconds, scatter) = self._rk4_step(), clocked(times)
         cost = seconds / n * per_revolution
-        return Point(name, kind, label, dial, n, per_revolution, *found, cost, seconds / n, cost / reference)
+        return Point(name, kind, label, dial, n, per_revolution, *found, cost, seconds / n, cost / reference, scatter)
 
     def _positions_per_revolution(self) -> float:
         span = float(np.ptp(self.command.theta_2)) or 2.0 * math.pi
@@ -214,8 +216,8 @@ class Study:
                 self.left_out.append(f"{label}: {error}")
                 continue
             at = few if label == "50 digits" else self.command
-            seconds = median(formulas.seconds(method, self.scene, at) for _ in range(ROUNDS))
-            points.append(self._at_positions("formulas", FORMULAS, label, found, seconds, len(at.theta_2)))
+            times = [formulas.seconds(method, self.scene, at) for _ in range(ROUNDS)]
+            points.append(self._at_positions("formulas", FORMULAS, label, found, times, len(at.theta_2)))
         return points
 
     def _inverse(self) -> list[Point]:
@@ -228,16 +230,18 @@ class Study:
         """An engine that answers each position."""
         import time
 
-        began = time.process_time()
-        answer = engine.answer(self.scene, self.command)
-        seconds = time.process_time() - began
+        times = []
+        for _ in range(ANSWERS):
+            began = time.process_time()
+            answer = engine.answer(self.scene, self.command)
+            times.append(time.process_time() - began)
         if answer.refusal is not None:
             raise LimitError(f"{engine.name}: {answer.refusal}")
         assert answer.assembled is not None
         rows = np.flatnonzero(answer.assembled)
         at = self.command._replace(theta_2=self.command.theta_2[rows], branch=self.command.branch[rows])
         found = errors(self.scene, at, {name: value[rows] for name, value in answer.quantities.items()})
-        return self._at_positions(curve, EXACT, label or engine.name, found, seconds, len(self.command.theta_2), dial)
+        return self._at_positions(curve, EXACT, label or engine.name, found, times, len(self.command.theta_2), dial)
 
     def _one_state(self) -> list[Point]:
         from validation.engines.mujoco.one_state import MujocoOneState
@@ -260,7 +264,7 @@ class Study:
             points.append(
                 Point(
                     *("Pinocchio forward", STEPPED, f"Pinocchio RK4, {n}/rev", n, ran.steps, ran.steps_per_revolution),
-                    *(*found, cost, math.nan, cost / reference),
+                    *(*found, cost, math.nan, cost / reference, math.nan),
                 )
             )
         return points
@@ -273,19 +277,20 @@ def _leave_out_first(trial: Trial) -> None:
     trial.quantities = {name: values[1:] for name, values in trial.quantities.items()}
 
 
+def clocked(times: Sequence[float]) -> tuple[float, float]:
+    """The median of some timings, and half of what their middle half spans, over it."""
+    low, middle, high = np.percentile(times, (25, 50, 75)).tolist()
+    return middle, 0.5 * (high - low) / middle
+
+
 def _interleaved(
     clocks: list[Callable[[int], float]], reference: Callable[[int], float], steps: list[int]
-) -> tuple[list[float], float]:
-    """Medians over rounds of CPU seconds per step; all take turns, so that a slow spell hits all of them."""
+) -> tuple[list[tuple[float, float]], float]:
+    """CPU seconds per step, and their scatter over rounds; all take turns, so that a slow spell hits all of them."""
     times: list[list[float]] = [[] for _ in clocks]
     base = []
     for _ in range(ROUNDS):
         base.append(reference(TIMED_STEPS) / TIMED_STEPS)
         for clock, n, kept in zip(clocks, steps, times, strict=True):
             kept.append(clock(n) / n)
-    return [median(kept) for kept in times], median(base)
-
-
-def table(points: list[Point]) -> list[dict[str, Any]]:
-    """The rows of the CSV."""
-    return [asdict(point) for point in points]
+    return [clocked(kept) for kept in times], median(base)

@@ -10,6 +10,8 @@ import tempfile
 from collections.abc import Iterator
 from importlib import import_module
 from pathlib import Path
+from statistics import median
+from typing import NamedTuple
 
 from fourbar import effects
 from fourbar.errors import FourBarError
@@ -17,13 +19,18 @@ from validation.engines.witnesses import not_installed
 from validation.studies.effects.counted import REPEATS, available, counts
 
 WORKLOADS = (
-    *("__init__.py", "studies/__init__.py", "studies/effects/__init__.py", "studies/effects/work.py"),
+    *("studies/__init__.py", "studies/effects/__init__.py", "studies/effects/work.py"),
     *("engines/__init__.py", "engines/mujoco/__init__.py", "engines/mujoco/stepping.py"),
 )
 """Of the harness, what runs a workload; it names no effect but those that are requested."""
 KINDS = {getattr(effects, name).key: getattr(effects, name) for name in (*effects.FILE_OF, "Load")}
 """Everything that can act, by key."""
 ABSENT = tuple(KINDS)
+WHOLE = 5
+"""Counts of the whole build, each with other hashes of its words: what they differ by is noise, as what a build with
+fewer words differs by; addresses and allocations are in it too."""
+BEYOND_NOISE = 3.0
+"""An effect's count is another one beyond so many times the largest deviation among those."""
 TABLES = ("files/effects.py", "mjcf/effects.py")
 """Of the package, where an effect has a row."""
 PROBE = """
@@ -59,6 +66,7 @@ def build(folder: Path, without: str | None = None) -> Path:
         target = folder / "validation" / file
         target.parent.mkdir(parents=True, exist_ok=True)
         shutil.copy(root / "validation" / file, target)
+    (folder / "validation" / "__init__.py").touch()  # that of the harness imports what a workload has no use for
     if without is None:
         return folder
     effect = KINDS[without]
@@ -110,28 +118,45 @@ def differences(whole: dict[str, object], other: dict[str, object]) -> list[str]
     return found + [f"{key} of the compiled model" for key in one if one[key] != two[key]]
 
 
-def compared(effects: tuple[str, ...]) -> Iterator[tuple[str, list[str], float | None]]:
-    """For each effect what a build without it makes otherwise of a bare scene, and its instructions.
+class Trace(NamedTuple):
+    """What a build without an effect makes otherwise of a bare scene."""
 
-    These relative to the whole build's, less 1; None where instructions cannot be counted.
-    """
+    effect: str
+    differs: list[str]
+    more: float | None
+    """Its instructions relative to those of the whole build, less 1; None where they cannot be counted."""
+    bound: float
+    """What noise explains of that."""
+
+    @property
+    def holds(self) -> bool:
+        """Whether the build is the same in everything that was looked at."""
+        return not self.differs and (self.more is None or abs(self.more) <= self.bound)
+
+
+def compared(effects: tuple[str, ...]) -> Iterator[Trace]:
+    """Each effect in turn."""
     with tempfile.TemporaryDirectory() as folder:
-        roots = {}
+        roots = []
         for number, effect in enumerate((None, *effects)):
             # names of one length: paths are part of what is counted
-            roots[effect] = Path(folder).resolve() / f"{number:03d}"
-            roots[effect].mkdir()
-            build(roots[effect], effect)
-        whole = made(roots[None])
-        counted = counts("formulas", ["none"], roots[None])["none"] if available() else None
-        for effect in effects:
-            differs = differences(whole, made(roots[effect]))
-            more = None
-            if counted is not None:
-                more = counts("formulas", ["none"], roots[effect])["none"] / counted - 1.0
-            yield effect, differs, more
+            roots.append(Path(folder).resolve() / f"{number:03d}")
+            roots[-1].mkdir()
+            build(roots[-1], effect)
+        whole = made(roots[0])
+        usual, bound = _noise([_counted(roots[0], seed) for seed in range(WHOLE)] if available() else [])
+        for effect, root in zip(effects, roots[1:], strict=True):
+            more = _counted(root) / usual - 1.0 if available() else None
+            yield Trace(effect, differences(whole, made(root)), more, bound)
 
 
-def holds(differs: list[str], more: float | None) -> bool:
-    """Whether a build without the effect is the same in everything that was looked at."""
-    return not differs and (more is None or abs(more) < REPEATS)
+def _counted(root: Path, seed: int = 0) -> float:
+    return counts("formulas", ["none"], root, seed)["none"]
+
+
+def _noise(counted: list[float]) -> tuple[float, float]:
+    """The usual count of the same work, and the part of it by which another count is beyond noise."""
+    if not counted:
+        return 1.0, REPEATS
+    usual = median(counted)
+    return usual, max(REPEATS, BEYOND_NOISE * max(abs(each / usual - 1.0) for each in counted))

@@ -22,7 +22,7 @@ AMOUNTS = {"formulas": (1, 5), "mujoco-simulated": (10, 210), "mujoco-inverse": 
 BRACKET = "ffi_call"
 """The function of libffi within which a workload runs."""
 REPEATS = 1e-3
-"""Counts of the same work differ by less than this part."""
+"""Counts of the same work differ by this part at least, whatever the machine."""
 
 
 def available() -> bool:
@@ -30,8 +30,11 @@ def available() -> bool:
     return shutil.which("valgrind") is not None and shutil.which("setarch") is not None
 
 
-def counts(engine: str, effects: Sequence[str], root: Path | None = None) -> dict[str, float]:
-    """Instructions of each effect per step or position, from another checkout where one is given."""
+def counts(engine: str, effects: Sequence[str], root: Path | None = None, seed: int = 0) -> dict[str, float]:
+    """Instructions of each effect per step or position, from another checkout where one is given.
+
+    `seed` fixes the hashes of Python's words: what depends on it is noise.
+    """
     if not available():
         raise DependencyError("valgrind and setarch are needed to count instructions")
     here = Path(__file__).parents[3] if root is None else root
@@ -41,7 +44,7 @@ def counts(engine: str, effects: Sequence[str], root: Path | None = None) -> dic
         settings = {
             **os.environ,
             **threads,
-            "PYTHONHASHSEED": "0",
+            "PYTHONHASHSEED": str(seed),
             "PYTHONPATH": str(here),
             "PYTHONDONTWRITEBYTECODE": "1",
         }

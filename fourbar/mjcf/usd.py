@@ -1,0 +1,127 @@
+"""Scene -> USD text (UsdPhysics): the closed loop as rigid bodies and joints, for Newton."""
+
+import cmath
+import json
+import math
+
+from fourbar.errors import LimitError
+from fourbar.linkage import BAR_NAMES, FIRST_PIN, MOVING_BARS
+from fourbar.mjcf.document import Start, at_start, plain
+from fourbar.mjcf.model import carriable
+from fourbar.mjcf.sdf import PARENT
+from fourbar.scene import Scene
+
+COMMENT = (
+    "Written by fourbar. The bodies stand assembled, every joint reads 0 there; a body's frame lies in the first pin "
+    "of its bar, x along it. theta_2 = {} rad, theta_3 = {} rad, theta_4 = {} rad; to start at omega_2 = {} rad/s give "
+    "joint A {} rad/s and joint O4 {} rad/s. USD holds no drive at a speed. Pin B closes the loop and stands outside "
+    "the articulation. Newton: ModelBuilder().add_usd(file), which takes gravity too; put the speeds into joint_qd[:3] "
+    "and call eval_fk before the first step. Numbers: with SolverKamino, after a step, of that step, rows 15 + 1 and "
+    "15 + 2 of solver._solver_kamino.data.joints.lambda_kin_j are the force of bar 4 on bar 3 at pin B along and "
+    "across axes turned by theta_3 - theta_4 of this file from bar 4. T2 is what the program puts on joint O2."
+)
+
+
+def usd(scene: Scene, start: Start | None = None) -> str:
+    """The USD text (.usda) of a scene: three rigid bodies, four revolute joints, the fourth closing the loop.
+
+    Parameters
+    ----------
+    start : the assembled state to stand in; None: that of `at_start`.
+
+    Raises
+    ------
+    LimitError : a load, a motion law, or an effect but gravity and flywheel has no counterpart there.
+    InputError : a bar without mass or inertia, which simulators do not carry.
+    NotAssembledError : the linkage closes at none of the scene's positions.
+
+    Source: openusd.org, UsdPhysics.
+    """
+    linkage = scene.linkage
+    if scene.motion.law is not None or scene.loads:
+        raise LimitError("a motion law and a load have no counterpart in USD; apply them in the simulator")
+    carriable(linkage)
+    inertia = {number: linkage.bar(number).moment_of_inertia for number in MOVING_BARS}
+    x = y = 0.0
+    for effect in scene.effects:
+        if effect.key == "gravity":
+            x, y = map(float, effect.vector)  # type: ignore[attr-defined]
+        elif effect.key == "flywheel":
+            inertia[effect.bar] += effect.inertia  # type: ignore[attr-defined]
+        else:
+            raise LimitError(f"the effect {effect.key!r} has no counterpart in USD")
+    begin = start or at_start(scene)
+    (theta_2, of_3_to_2, theta_4), (omega_2, at_A, omega_4) = begin.qpos, begin.qvel
+    turn = {1: 0.0, 2: theta_2, 3: theta_2 + of_3_to_2, 4: theta_4}
+    O4 = cmath.rect(linkage.ground, linkage.ground_angle)
+    foot = {1: 0j, 2: 0j, 3: cmath.rect(linkage.input.length, theta_2), 4: O4}
+    numbers = (repr(number) for number in (theta_2, turn[3], theta_4, omega_2, at_A, omega_4))
+    pull = math.hypot(x, y)
+    bodies = []
+    for number in MOVING_BARS:
+        bar = linkage.bar(number)
+        bodies.append(
+            f"""    def Xform "{BAR_NAMES[number]}" (
+        prepend apiSchemas = ["PhysicsRigidBodyAPI", "PhysicsMassAPI"]
+    )
+    {{
+        float physics:mass = {bar.mass!r}
+        point3f physics:centerOfMass = {_place(bar.to_centre)}
+        float3 physics:diagonalInertia = ({", ".join([repr(inertia[number])] * 3)})
+        quatf physics:principalAxes = (1, 0, 0, 0)
+        double3 xformOp:translate = {_place(foot[number])}
+        quatd xformOp:orient = {_turned(turn[number])}
+        uniform token[] xformOpOrder = ["xformOp:translate", "xformOp:orient"]
+    }}
+"""
+        )
+    joints = []
+    length = {number: linkage.bar(number).length for number in MOVING_BARS}
+    places = {FIRST_PIN[number]: (PARENT[number], number, 0.0) for number in MOVING_BARS} | {"B": (4, 3, length[3])}
+    for pin, (one, other, along) in places.items():
+        on_one = {"O2": 0j, "A": complex(length[2]), "B": complex(length[4]), "O4": O4}[pin]
+        joints.append(
+            f"""    def PhysicsRevoluteJoint "{pin}"
+    {{
+        uniform token physics:axis = "Z"
+        {"" if one == 1 else f"rel physics:body0 = </four_bar/{BAR_NAMES[one]}>"}
+        rel physics:body1 = </four_bar/{BAR_NAMES[other]}>
+        point3f physics:localPos0 = {_place(on_one)}
+        quatf physics:localRot0 = {_turned(turn[other] - turn[one])}
+        point3f physics:localPos1 = {_place(complex(along))}
+        quatf physics:localRot1 = (1, 0, 0, 0)
+        bool physics:excludeFromArticulation = {"true" if pin == "B" else "false"}
+    }}
+"""
+        )
+    return f"""#usda 1.0
+(
+    doc = {json.dumps(COMMENT.format(*numbers), ensure_ascii=False)}
+    defaultPrim = "four_bar"
+    metersPerUnit = 1
+    kilogramsPerUnit = 1
+    upAxis = "Z"
+)
+
+def PhysicsScene "physics"
+{{
+    vector3f physics:gravityDirection = ({x / pull if pull else 0.0!r}, {y / pull if pull else -1.0!r}, 0)
+    float physics:gravityMagnitude = {pull!r}
+}}
+
+def Xform "four_bar" (
+    doc = {json.dumps(plain(scene.title) or "four-bar", ensure_ascii=False)}
+    prepend apiSchemas = ["PhysicsArticulationRootAPI"]
+)
+{{
+{"".join([*bodies, *joints])}}}
+"""
+
+
+def _place(point: complex) -> str:
+    return f"({point.real!r}, {point.imag!r}, 0)"
+
+
+def _turned(angle: float) -> str:
+    """Quaternion (w, x, y, z) of a turn about z."""
+    return f"({math.cos(0.5 * angle)!r}, 0, 0, {math.sin(0.5 * angle)!r})"

@@ -1,0 +1,75 @@
+"""Newton's Kamino solver (beta, single precision, maximal coordinates), from the USD file."""
+
+import tempfile
+import time
+from dataclasses import replace
+from importlib.metadata import version
+from pathlib import Path
+
+import newton
+import numpy as np
+import warp
+
+from fourbar.effects import Flywheel
+from fourbar.mjcf import flywheel
+from fourbar.mjcf.simulators import SINGLE
+from fourbar.mjcf.usd import usd
+from fourbar.scene import Scene
+from validation.compare.answer import Array
+from validation.subjects.motion import Readings, gap, start, turn
+
+VERSION = version("newton")
+DEVICE = str(warp.get_preferred_device().name)
+STEPS = (157, 314)
+CHANGED = "USD with a fourth revolute joint; a light flywheel on the input; multipliers from the solver's own data"
+SETTINGS = {"SolverKamino": None}
+PARENTS = {"O2": None, "A": 0, "O4": None, "B": 2}
+"""The body on which each joint's axes are fixed, in the order of the joints; None: the ground."""
+
+
+def through(scene: Scene, steps: int, setting: str) -> Readings:
+    """A turn in so many steps; forces are those of a step, with the state in which it began."""
+    timestep, stops = turn(scene, steps)
+    begin, inertia = start(scene), flywheel(scene, SINGLE)
+    carried = replace(scene, effects=(*scene.effects, Flywheel(inertia, 2)))
+    builder = newton.ModelBuilder()
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "four_bar.usda"
+        file.write_text(usd(carried, begin))
+        builder.add_usd(str(file))
+    model = builder.finalize(device=warp.get_preferred_device())
+    solver, control = newton.solvers.SolverKamino(model), model.control()
+    now, then = model.state(), model.state()
+    speeds = now.joint_qd.numpy()
+    speeds[:3] = begin.qvel
+    now.joint_qd.assign(speeds)
+    newton.eval_fk(model, now.joint_q, now.joint_qd, now)
+    (t_2, t_32, t_4), found, done = begin.qpos, Readings(setting, steps), 0
+    laid = {"O2": t_2, "A": t_32, "O4": t_4, "B": t_2 + t_32 - t_4}
+    for stop in stops:
+        began = time.process_time()
+        for _ in range(stop - done - 1):
+            solver.step(now, then, control, None, timestep)
+            now, then = then, now
+        theta, speed = directions(now), float(now.joint_qd.numpy()[0])
+        solver.step(now, then, control, None, timestep)
+        now, then = then, now
+        found.seconds += time.process_time() - began
+        done = stop
+        alpha = (float(now.joint_qd.numpy()[0]) - speed) / timestep
+        rows = solver._solver_kamino.data.joints.lambda_kin_j.numpy().astype(float).reshape(4, 5)[:, 1:3]
+        forces = {}
+        for row, (pin, parent) in zip(rows, PARENTS.items(), strict=True):
+            axes = laid[pin] + (0.0 if parent is None else theta[parent])
+            forces[pin] = complex(*row) * np.exp(1j * axes)
+        on_pins = {"F12": forces["O2"], "F32": -forces["A"], "F43": forces["B"], "F14": forces["O4"]}
+        pairs = {name: (force.real, force.imag) for name, force in on_pins.items()}
+        found.read(theta, speed, alpha, -inertia * alpha, pairs)
+        found.gap = max(found.gap, gap(scene, (theta[0], theta[1], theta[2])))
+    return found
+
+
+def directions(state: newton.State) -> Array:
+    """Of bars 2, 3, 4, rad."""
+    turned = state.body_q.numpy().astype(float)
+    return np.asarray(2.0 * np.arctan2(turned[:, 5], turned[:, 6]))
