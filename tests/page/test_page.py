@@ -234,9 +234,10 @@ def test_type_time_and_scene_file_follow_the_lengths(browse, tmp_path: Path) -> 
     driver.execute_cdp_cmd("Browser.setDownloadBehavior", {"behavior": "allow", "downloadPath": str(tmp_path)})
     driver.find_element("id", "download").click()
     until = time.monotonic() + 10.0
-    while not (tmp_path / "linkage.toml").exists() and time.monotonic() < until:
+    saved_file = tmp_path / "linkage.toml"
+    while not (saved_file.exists() and saved_file.stat().st_size) and time.monotonic() < until:  # made empty at first
         time.sleep(0.02)
-    assert (tmp_path / "linkage.toml").read_text() == state_of(driver, "sceneFile()")
+    assert saved_file.read_text() == state_of(driver, "sceneFile()")
 
 
 def test_the_page_names_a_linkage_as_fourbar_does(browse) -> None:
