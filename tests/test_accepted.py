@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import fourbar
+from validation.compare.rows import DEGRADED
 from validation.compare.tolerance import EPS, K
 from validation.engines.witnesses import WITNESSES
 from validation.regression import render
@@ -39,5 +40,8 @@ def test_a_row_states_the_condition_that_its_allowance_comes_from(turns: int) ->
     apart = {"torque_error", "force_error", "undecided", "status"}  # bars against their errors, and counts
     rows = [row for row in judge(name, scene, EXACT).rows if row.allowed > 0.0 and row.quantity not in apart]
     assert {"closure", "moment_sum", "F12", "limit_positions", "transmission"} <= {row.quantity for row in rows}
+    assert all(row.passed for row in rows)
     for row in rows:
+        if row.verdict == DEGRADED:  # held to what is computed for the position: no law in the condition
+            continue
         assert row.condition == pytest.approx(min(1.0, K * EPS / row.allowed), rel=1e-9), row

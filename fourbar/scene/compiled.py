@@ -45,6 +45,8 @@ BODIES, VISCOUS, LOADS = 16, 28, 32
 """Where the bodies, viscous pins and loads begin among the numbers of a position."""
 OF_BODY, OF_LOADS = 4, 8
 ROWS = LOADS + 3 * OF_LOADS
+SMALL, LARGE = 1e-130, 1e130
+"""N, N m. Of what is beyond, the squares of the changes for an error bar may leave the range of doubles."""
 
 
 class Loads(NamedTuple):
@@ -329,8 +331,9 @@ def run(
                 of_forces = max(of_forces, np.mean(changes[row]))
             for force in (pins.F12, pins.F32, pins.F43, pins.F14):
                 largest = max(largest, np.abs(force))
-            scalars[7, i] = bar(np.mean(changes[0]), torque)
-            scalars[8, i] = bar(of_forces, largest)
+            scalars[7, i] = bar(np.sqrt(np.mean(changes[0])), torque)
+            scalars[8, i] = bar(np.sqrt(of_forces), largest)
+            left[i] = left[i] or not min(np.abs(torque), largest) > SMALL or not max(np.abs(torque), largest) < LARGE
 
 
 LEAVES: tuple[tuple[Any, str], ...] = (

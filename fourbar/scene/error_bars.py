@@ -26,8 +26,8 @@ NUMBERS = 256
 """Whose signs are independent; a scene has about sixty, and a few for each load and effect."""
 LAST_DIGIT = 1.01 * 2.0**-53
 """Relative: x + x LAST_DIGIT is the next double, whatever x."""
-LAST_ROUNDING = 2.0**-56
-"""An error of rounding to nearest, whose largest is 2^-53, is above this in 7 cases of 8."""
+LAST_ROUNDING = 2.0**-53
+"""Relative: half the distance to the next double, or more; the result itself was rounded by as much."""
 TYPICAL = 0.4
 """The error bar as a share of the root mean square. That holds the error of the answer besides the scatter, sqrt 2
 times either, so the bar is 0.57 standard deviations: 2 in 100 million normal errors exceed ten bars, and 5 in 1000
@@ -88,10 +88,8 @@ def error_bars(
     moving = moving._replace(**{name: rounded(rate) for name, rate in moving._asdict().items() if name not in stated})
     nearby = state._replace(at=near, k=k, moving=moving)
     other = moved.dynamics(nearby, acceleration, rounded=rounded)
-    torque = np.mean((other.torque - found.torque) ** 2, axis=0)
-    forces = [
-        np.mean(np.abs(after - before) ** 2, axis=0) for before, after in zip(found.pins, other.pins, strict=True)
-    ]
+    torque = root_mean_square(np.abs(other.torque - found.torque))
+    forces = [root_mean_square(np.abs(after - before)) for before, after in zip(found.pins, other.pins, strict=True)]
     largest = np.max([np.abs(force) for force in found.pins], axis=0)
     shape = np.shape(found.torque)
     return {
@@ -167,13 +165,20 @@ def rounded_coefficients(lengths: Loop, at: Position, k: Coefficients, signs: An
     )
 
 
-def bar(mean_square: Any, value: Any) -> Any:
-    """The error bar from the mean square of the changes and the size of the value.
+def root_mean_square(changes: Any) -> Any:
+    """Of the sizes of the changes, (EVALUATIONS, ...), whose squares may be beyond the range of a double."""
+    largest = np.max(changes, axis=0)
+    unit = np.where(largest == 0.0, 1.0, largest)
+    return unit * np.sqrt(np.mean((changes / unit) ** 2, axis=0))
+
+
+def bar(spread: Any, value: Any) -> Any:
+    """The error bar from the root mean square of the changes and the size of the value.
 
     A change that leaves no value, or none in the range of a double: of the value itself no digit is left.
     """
     size = np.abs(value)
-    width = TYPICAL * np.sqrt(mean_square) + LAST_ROUNDING * size
+    width = np.maximum(TYPICAL * spread, LAST_ROUNDING * size)
     return select(np.isfinite(width), width, size)
 
 

@@ -39,7 +39,8 @@ def basis_of(scene: Scene, answer: Answer) -> Solution | None:
     basis.sin_mu = np.sin(theta[4] - theta[3])
     basis.condition = np.abs(basis.sin_mu)
     if basis.drive_condition is None:  # one that knows how near friction is to jamming answers it
-        basis.drive_condition = np.abs(np.sin(other - one))
+        # not of their difference: of an angle many turns away that has fewer digits than its sine
+        basis.drive_condition = np.abs(np.sin(other) * np.cos(one) - np.cos(other) * np.sin(one))
     return basis
 
 

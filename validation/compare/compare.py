@@ -3,7 +3,6 @@
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -39,6 +38,8 @@ from validation.compare.tolerance import (
 )
 
 Mask = NDArray[np.bool_]
+Predicted = Callable[[Mask], Mapping[str, Array]]
+"""The error to be expected of each quantity, in its own unit, (n,); it matters at the positions of the mask alone."""
 Yardsticks = dict[str, tuple[Array, Array]]
 """Size and condition of each quantity at each position."""
 
@@ -66,7 +67,7 @@ def compare(
     formulas: Solution,
     tolerance: Tolerance,
     expected: Iterable[str],
-    predicted: Callable[[], Mapping[str, Array]] | None = None,
+    predicted: Predicted | None = None,
     basis: Solution | None = None,
     yardsticks: Yardsticks | None = None,
 ) -> list[Row]:
@@ -77,8 +78,7 @@ def compare(
 
     `yardsticks` are those of `formulas` and `basis` where another answer was held to them before.
 
-    With `predicted`, which gives the error to be expected of each quantity at each position in its own unit,
-    an error beyond full accuracy must be within DEGRADED times that, and the law in the condition plays no part.
+    With `predicted` an error beyond the tolerance must be within DEGRADED times the error to be expected there.
     """
 
     if answer.refusal is not None:
@@ -105,7 +105,7 @@ class _Comparison:
     answer: Answer
     formulas: Solution
     tolerance: Tolerance
-    predicted: Callable[[], Mapping[str, Array]] | None
+    predicted: Predicted | None
     own: Solution | None
     basis: Solution | None
     yardsticks: Yardsticks
@@ -180,15 +180,15 @@ class _Comparison:
                 strictest_condition(quantity, self.scene.linkage, self.formulas, self.basis),
             )
         size, condition = self.yardsticks[quantity]
-        vanishing = size == 0.0
-        if self.predicted is not None:
-            size = in_own_unit(size)
+        full, predicted, expected = self.tolerance.allowed(condition), self.predicted, None
+        if predicted is not None:
+            full, size = np.where(size == 0.0, 0.0, full), in_own_unit(size)
+
+            def expected(where: Mask) -> Array:
+                return relative(predicted(where)[quantity], size)
+
         error = relative_error(quantity, ours, theirs, size)
-        if self.predicted is None:
-            return _by_condition(error, condition, where, self.tolerance), error, condition
-        full = np.where(vanishing, 0.0, self.tolerance.factor)
-        expected = partial(_relative, self.predicted, quantity, size)
-        return _by_prediction(error, where, full, self.tolerance, expected), error, condition
+        return _found(error, condition, where, full, self.tolerance, expected), error, condition
 
     def undecided(self) -> Iterator[Row]:
         """A scene of which most numbers are undecided does not hold."""
@@ -199,11 +199,6 @@ class _Comparison:
         reason = f"{missing} of {self.numbers} numbers are undecided"
         verdict = AGREES if share <= MOST_UNDECIDED else FAILS
         yield self.row("undecided", verdict, reason, error=share, allowed=MOST_UNDECIDED, condition=1.0)
-
-
-def _relative(predicted: Callable[[], Mapping[str, Array]], quantity: str, size: Array) -> Array:
-    """The predicted error of a quantity in parts of its size; computed when it is called for."""
-    return relative(predicted()[quantity], size)
 
 
 class _Finding(NamedTuple):
@@ -217,59 +212,52 @@ class _Finding(NamedTuple):
     """Positions of which a verdict is drawn."""
 
 
-def _by_condition(error: Array, condition: Array, where: Mask, tolerance: Tolerance) -> _Finding:
-    """Errors over the positions `where` against the law in the condition; NaN at any of them fails."""
-    allowed = tolerance.allowed(condition)
-    decidable = where & (condition * NOTHING_TO_TELL > EPS)
+def _found(
+    error: Array,
+    condition: Array,
+    where: Mask,
+    full: Array,
+    tolerance: Tolerance,
+    predicted: Callable[[Mask], Array] | None,
+) -> _Finding:
+    """Errors over the positions `where` against the tolerance, `full`, and beyond it against what was predicted there.
+
+    NaN at any of them fails. `full` is 0 where the quantity vanishes; the error is in its own unit there.
+    """
+    decidable = where & (condition * NOTHING_TO_TELL > EPS) if tolerance.conditioned else where
     undecided = int(np.count_nonzero(where & ~decidable))
     note = f"; {undecided} positions with eps/condition > {NOTHING_TO_TELL:g} not judged" if undecided else ""
-    if not decidable.any():
+    beyond = (decidable & ~(error <= full)) | (where & ~np.isfinite(error))
+    if not (decidable | beyond).any():
         index = int(np.flatnonzero(where)[0])
-        verdict, reason = UNDECIDED, f"eps/condition = {EPS / condition[index]:.1e}"
-        if not np.isfinite(error[where]).all():
-            verdict, reason = FAILS, "NaN"
-        return _Finding(index, verdict, reason, allowed[index], 0)
-    ratio = np.where(decidable, used(error, allowed), -1.0)
-    ratio[where & ~np.isfinite(error)] = np.inf
-    index = int(np.argmax(ratio))
-    reason = ("NaN" if math.isnan(error[index]) else tolerance.name) + note
-    verdict = AGREES if ratio[index] <= 1.0 else FAILS
-    return _Finding(index, verdict, reason, allowed[index], int(np.count_nonzero(decidable)))
-
-
-def _by_prediction(
-    error: Array, where: Mask, full: Array, tolerance: Tolerance, predicted: Callable[[], Array]
-) -> _Finding:
-    """Errors against full accuracy, or else against what was predicted for each position; NaN always fails.
-
-    Full accuracy is 0 where the quantity vanishes; the error is in its own unit there.
-    """
-    beyond = where & ~(error <= full)
+        return _Finding(index, UNDECIDED, f"eps/condition = {EPS / condition[index]:.1e}", full[index], 0)
     expected = np.zeros_like(error)
-    if beyond.any():
-        expected = np.nan_to_num(predicted(), nan=0.0, posinf=np.inf)
+    if predicted is not None and beyond.any():
+        expected = np.nan_to_num(predicted(beyond), nan=0.0, posinf=np.inf)
     allowed = np.maximum(full, TIMES_PREDICTED * expected)
-    ratio = np.where(where, used(error, allowed), -1.0)
-    lost = np.where(full > 0.0, expected >= 1.0, expected == np.inf)  # first order says that no digit is left, no more
+    ratio = used(error, allowed)
+    # first order says that no digit is left, no more
+    lost = beyond & np.isfinite(error) & np.where(full > 0.0, expected >= 1.0, expected == np.inf)
     ratio[lost] = np.minimum(ratio[lost], 1.0)
-    ratio[where & ~np.isfinite(error)] = np.inf
-    index = int(np.argmax(np.where(beyond, ratio, -1.0) if beyond.any() else np.where(where, ratio, -2.0)))
+    index = int(np.argmax(np.where(beyond if beyond.any() else decidable, ratio, -1.0)))
     if not beyond.any():
         verdict, reason = AGREES, tolerance.name
-    elif lost[index] and math.isfinite(error[index]):
-        verdict, reason = UNDECIDED, f"an error of {expected[index]:.1e} of the value is predicted"
-    elif ratio[index] <= 1.0:
-        verdict, reason = DEGRADED, f"{error[index]:.1e} of {expected[index]:.1e} predicted for this position"
     elif math.isnan(error[index]):
         verdict, reason = FAILS, "NaN"
+    elif lost[index]:
+        verdict, reason = UNDECIDED, f"an error of {expected[index]:.1e} of the value is predicted"
+    elif predicted is None:
+        verdict, reason = FAILS, tolerance.name
+    elif ratio[index] <= 1.0:
+        verdict, reason = DEGRADED, f"{error[index]:.1e} of {expected[index]:.1e} predicted for this position"
     else:
         verdict, reason = FAILS, f"{error[index]:.1e} where {expected[index]:.1e} was predicted"
-    return _Finding(index, verdict, reason, allowed[index], int(np.count_nonzero(where & ~(beyond & lost))))
+    return _Finding(index, verdict, reason + note, allowed[index], int(np.count_nonzero(decidable & ~lost)))
 
 
-def turned(theta_2: Array) -> float:
-    """Angles many turns away carry fewer digits of their direction: the largest of them, at least 1 rad."""
-    return max(1.0, float(np.abs(theta_2).max(initial=0.0)) / np.pi)
+def turned(ground_angle: float, theta_2: Array | float = 0.0) -> float:
+    """Angles many turns away carry fewer digits of their direction: the largest of them in half turns, at least 1."""
+    return max(1.0, abs(ground_angle) / np.pi, float(np.abs(theta_2).max(initial=0.0)) / np.pi)
 
 
 def _stated(quantity: str, formulas: Solution, ours: Array) -> Mask:

@@ -21,7 +21,7 @@ from validation.compare.error import magnitude, relative, worst
 from validation.compare.reversals import reversing
 from validation.compare.rows import AGREES, FAILS, UNDECIDED, Row
 from validation.compare.scales import of_length
-from validation.compare.tolerance import IDENTITY, SIMULATED, Array, Tolerance
+from validation.compare.tolerance import IDENTITY, SIMULATED, Array, Tolerance, condition_of, lever
 
 FORMULAS = "formulas"
 IDENTITIES = (
@@ -51,7 +51,7 @@ def closure(name: str, scene: Scene, answer: Answer, simulated: Tolerance = SIMU
     gap = np.abs(a * np.exp(1j * answer.at.theta_2) + b * np.exp(1j * theta_3) - ground - c * np.exp(1j * theta_4))
     tolerance = IDENTITY if answer.setting == "exact" else simulated
     equation = "a e^{i theta_2} + b e^{i theta_3} = d e^{i theta_1} + c e^{i theta_4}"
-    return _row(name, answer, "closure", equation, gap, of_length(scene), answer.assembled, tolerance.factor)
+    return _row(name, scene, answer, "closure", equation, gap, of_length(scene), answer.assembled, tolerance.factor)
 
 
 def _sums(name: str, scene: Scene, at: Command, solution: Solution, ours: Answer) -> list[Row]:
@@ -87,11 +87,6 @@ def _sums(name: str, scene: Scene, at: Command, solution: Solution, ours: Answer
         alpha = getattr(solution, f"alpha_{number}")
         force = force + load - bar.mass * acceleration
         force_terms = force_terms + magnitude(load) + bar.mass * magnitude(acceleration)
-        if scene.drive_bar == 4 and number != 4:  # F32 and F43 are solved apart, from the moments of bars 2 and 3
-            swung = np.abs(couple) + bar.mass * magnitude(centre - first_pins[number]) * magnitude(acceleration)
-            sine = np.abs(np.sin(solution.theta_3 - solution.theta_2))
-            with np.errstate(divide="ignore", invalid="ignore"):  # 0/0 where nothing is judged: at a change point
-                force_terms = force_terms + (swung + actions.bodies[number - 2].I * np.abs(alpha)) / (bar.length * sine)
         turned = couple + _cross(first_pins[number], load)
         swept = bar.mass * _cross(centre, acceleration) + actions.bodies[number - 2].I * alpha
         moment = moment + turned - swept
@@ -101,21 +96,23 @@ def _sums(name: str, scene: Scene, at: Command, solution: Solution, ours: Answer
             + bar.mass * _reach(centre) * magnitude(acceleration)
             + actions.bodies[number - 2].I * np.abs(alpha)
         )
-    # the torque is that of virtual work, the forces are those of the free bodies: both err as the two conditions say
+    # the forces of the bars that are not driven are solved apart, and the torque is that of virtual work
     assert solution.drive_condition is not None
     with np.errstate(divide="ignore", invalid="ignore"):
-        moment_terms = moment_terms / (solution.condition**2 * solution.drive_condition)
+        force_terms = force_terms / (lever(scene.linkage) * solution.drive_condition)
+        moment_terms = moment_terms / condition_of("torque", scene.linkage, solution)
     where = solution.status_code == OK
     # the sense of dry friction at a pin at rest is decided by rounding: not the same here as in the answer
     where &= ~reversing(scene, solution, IDENTITY.factor)
     return [
-        _row(name, ours, "force_sum", "F12 + F14 + loads = sum of m a_G", magnitude(force), force_terms, where),
-        _row(name, ours, "moment_sum", "moments about O2, with the torque", np.abs(moment), moment_terms, where),
+        _row(name, scene, ours, "force_sum", "F12 + F14 + loads = sum of m a_G", magnitude(force), force_terms, where),
+        _row(name, scene, ours, "moment_sum", "moments about O2, with the torque", np.abs(moment), moment_terms, where),
     ]
 
 
 def _row(
     name: str,
+    scene: Scene,
     answer: Answer,
     quantity: str,
     equation: str,
@@ -129,7 +126,7 @@ def _row(
     theta_2 = answer.at.theta_2
     error = np.where(where, relative(gap, terms), 0.0)
     index = worst(error)
-    condition = 1.0 / turned(theta_2)
+    condition = 1.0 / turned(scene.linkage.ground_angle, theta_2)
     allowed = factor / condition
     verdict = UNDECIDED if not where.any() else AGREES if error[index] <= allowed else FAILS
     return Row(

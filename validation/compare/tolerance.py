@@ -55,7 +55,8 @@ IDENTITY = Tolerance(
 )
 EQUIVALENCE = Tolerance(
     "equivalence",
-    "K eps/condition: two exact derivations of one number differ by round-off alone",
+    "K eps/condition: two exact derivations of one number differ by round-off alone; beyond that ten times the error "
+    "computed for the position, from moving every stored number and the closure by one rounding in 320-bit arithmetic",
     K * EPS,
     conditioned=True,
 )

@@ -1,14 +1,17 @@
 """A withheld answer is an answer: where the formulas state no value, another derivation must have none."""
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.quantities import NOT_ASSEMBLED, OK, STATUS_NAMES
+from fourbar.quantities import NOT_ASSEMBLED, OK, SEVERAL, SINGULAR, STATUS_NAMES
 from fourbar.scene import Scene
 from fourbar.solution import Solution
+from validation.compare.compare import TOUCHING_MARGIN, Mask, closing_margin
 from validation.compare.error import magnitude, worst
 from validation.compare.rows import AGREES, FAILS, Row
-from validation.compare.tolerance import EPS, NOTHING_TO_TELL, condition_of
+from validation.compare.tolerance import EPS, NOTHING_TO_TELL, Array, condition_of
 
 FORMULAS = "formulas"
 STAGES = ("omega_3", "alpha_3", "torque")
@@ -17,10 +20,33 @@ LARGE = 1e75
 """Numbers beyond this, or their squares, may leave the range of doubles in between: 1e300 in a product of four."""
 
 
-def withheld(name: str, scene: Scene, formulas: Solution, basis: Solution) -> Row:
+OfSome = Callable[[NDArray[np.intp]], Array]
+"""A number of each of some positions."""
+IN_ONE_LINE = 32.0 * 2.0**-53
+"""|sin(theta_4 - theta_3)| at which bars 3 and 4 may be called in line: their directions are rounded by that."""
+SAMPLE = 5
+"""Positions of a scene with several solutions of friction that are tried: each takes a search."""
+NEAR = 1e-6
+"""|sin(theta_4 - theta_3)| below which doubles have no word in it."""
+
+
+def withheld(
+    name: str,
+    scene: Scene,
+    formulas: Solution,
+    basis: Solution,
+    sines: OfSome | None = None,
+    solutions: OfSome | None = None,
+) -> Row:
     """The positions at which the formulas have a value and `basis` has none, or the reverse, where it has digits left.
 
-    That a loop does not close is compared by itself.
+    That a loop does not close is compared by itself where doubles can decide it.
+
+    Parameters
+    ----------
+    sines : sin(theta_4 - theta_3) in many digits at some positions, NaN where the loop does not close; near 0 it
+        decides whether they are singular. None: nothing is.
+    solutions : how many solutions loaded friction has at some positions.
     """
     differ = np.zeros(len(formulas), dtype=bool)
     large = _large(scene, basis)
@@ -31,6 +57,13 @@ def withheld(name: str, scene: Scene, formulas: Solution, basis: Solution) -> Ro
         sound = condition_of(quantity, scene.linkage, basis) * NOTHING_TO_TELL > EPS
         differ |= sound & ~large & (np.isfinite(ours) != np.isfinite(theirs))
     differ &= formulas.status_code != NOT_ASSEMBLED
+    if sines is not None and len(near := np.flatnonzero(_near(scene, formulas, basis))):
+        sine = np.abs(sines(near))
+        closes, in_line = np.isfinite(sine), formulas.status_code[near] == SINGULAR
+        differ[near] |= (formulas.status_code[near] == NOT_ASSEMBLED) == closes
+        differ[near] |= closes & np.where(in_line, sine > IN_ONE_LINE, sine < 1.0 / 16.0 * IN_ONE_LINE)
+    if solutions is not None and len(many := np.flatnonzero(formulas.status_code == SEVERAL)[:SAMPLE]):
+        differ[many] |= solutions(many) < 2
     index = worst(differ.astype(float))
     counts = np.bincount(formulas.status_code, minlength=len(STATUS_NAMES)).tolist()
     stated = ", ".join(f"{count} {STATUS_NAMES[code]}" for code, count in enumerate(counts) if count and code != OK)
@@ -42,7 +75,13 @@ def withheld(name: str, scene: Scene, formulas: Solution, basis: Solution) -> Ro
     return Row(name, FORMULAS, "exact", "status", float(np.count_nonzero(differ)), 0.0, verdict, reason, theta_2, 1.0)
 
 
-def _large(scene: Scene, basis: Solution) -> NDArray[np.bool_]:
+def _near(scene: Scene, formulas: Solution, basis: Solution) -> Mask:
+    """Where bars 3 and 4 are so nearly in line that exact arithmetic has to decide, (n,)."""
+    touching = np.abs(closing_margin(scene, formulas.theta_2)) < TOUCHING_MARGIN
+    return np.asarray(touching | (basis.condition < NEAR) | (formulas.condition < NEAR))
+
+
+def _large(scene: Scene, basis: Solution) -> Mask:
     """Where numbers are so large that the formulas may have to give up, (n,)."""
     large = np.full(len(basis), max(scene.linkage.lengths) > LARGE or min(scene.linkage.lengths) < 1.0 / LARGE)
     for name in ("omega_2", "alpha_2", *STAGES, "F12", "F43"):

@@ -5,12 +5,14 @@ velocities and accelerations come from the linear systems of the differentiated 
 and the torque from the full thirteen Newton-Euler equations about the mass centres.
 """
 
+import math
+from bisect import bisect
 from collections.abc import Callable
 from typing import Any, TypeAlias
 
 from flint import arb, arb_mat, ctx
 
-from fourbar.effects import Friction, Gravity, Load, Viscous
+from fourbar.effects import Flywheel, Friction, Gravity, Load, Spring, Springs, Table, Torsion, Viscous
 from fourbar.linkage import MOVING_BARS
 from fourbar.scene import Scene
 from validation.engines.description import PINS, centre, inertia
@@ -51,6 +53,20 @@ def inputs(scene: Scene, theta_2: float) -> dict[str, float]:
             values |= {f"viscous_{pin}": value for pin, value in effect.coefficients}
         elif isinstance(effect, Friction):
             values |= {f"friction_{pin}": value for pin, value in effect.torques}
+        elif isinstance(effect, Flywheel):
+            values["J"] = effect.inertia
+        elif isinstance(effect, Torsion):
+            for pin, stiffness, rest, preload in effect.springs:
+                values |= {f"torsion_{pin}": stiffness, f"rest_{pin}": rest, f"wound_{pin}": preload}
+        elif isinstance(effect, Springs):
+            for k, spring in enumerate(effect.springs):
+                values |= {
+                    f"stiffness_{k}": spring.stiffness,
+                    f"length_{k}": spring.length,
+                    f"pull_{k}": spring.preload,
+                }
+                for end, point in (("start", spring.start), ("end", spring.end)):
+                    values |= {f"{end}_{k}": point.distance, f"{end}_angle_{k}": point.angle}
         else:
             raise NotImplementedError(f"the reference knows no effect {type(effect).__name__}")
     return values
@@ -102,7 +118,9 @@ def linear(rows: list[list[Ball]], right: list[Ball]) -> list[Ball]:
     return [solution[k, 0] for k in range(len(right))]
 
 
-def outputs(scene: Scene, branch: int, x: Values, drive_bar: int) -> Values | None:  # noqa: PLR0915 - one system
+def outputs(  # noqa: PLR0915 - one system
+    scene: Scene, branch: int, x: Values, drive_bar: int
+) -> Values | None:
     """Every output at one position as balls; vectors as name_x, name_y; None where the loop does not close."""
     closed = closure(x, branch)
     if closed is None:
@@ -151,6 +169,22 @@ def outputs(scene: Scene, branch: int, x: Values, drive_bar: int) -> Values | No
     moment = {k: x.get(f"couple_{k}", arb(0)) for k in MOVING_BARS}  # about G; a probe may add one
     for k, load in enumerate(scene.loads):
         _add_load(load, x, k, w, force, moment)
+    axes = {1: polar(arb(1), x["theta_1"]), **w}
+    for effect in scene.effects:
+        if isinstance(effect, Springs):
+            for k, spring in enumerate(effect.springs):
+                _add_spring(spring, x, k, axes, {1: zero, **foot}, centre, force, moment)
+        elif isinstance(effect, Torsion):
+            for pin, *_ in effect.springs:
+                i, j = PINS[pin]
+                back = turn((axes[i][0], -axes[i][1]), polar(arb(1), -x[f"rest_{pin}"]))
+                cos, sin = turn(axes[j], back)
+                couple = -x[f"wound_{pin}"] - x[f"torsion_{pin}"] * arb.atan2(sin, cos)
+                for bar, value in ((j, couple), (i, -couple)):
+                    if bar in moment:
+                        moment[bar] += value
+        elif isinstance(effect, Flywheel):
+            moment[effect.bar] -= x["J"] * alpha[effect.bar]
     for k in MOVING_BARS:
         if "g" in x:
             force[k] = plus(force[k], times(x[f"m{k}"], polar(x["g"], x["g_angle"])))
@@ -194,11 +228,48 @@ def outputs(scene: Scene, branch: int, x: Values, drive_bar: int) -> Values | No
 def _add_load(
     load: Load, x: Values, k: int, w: dict[int, Pair], force: dict[int, Pair], moment: dict[int, Ball]
 ) -> None:
-    f, arm = polar(x[f"F_{k}"], x[f"F_angle_{k}"]), polar(x[f"at_{k}"], x[f"at_angle_{k}"])
+    factor = _factor(load.table, x["theta_2"]) if load.table else arb(1)
+    f, arm = polar(factor * x[f"F_{k}"], x[f"F_angle_{k}"]), polar(x[f"at_{k}"], x[f"at_angle_{k}"])
     if load.frame == "bar":
         f, arm = turn(f, w[load.bar]), turn(arm, w[load.bar])
     force[load.bar] = plus(force[load.bar], f)
-    moment[load.bar] = moment[load.bar] + wedge(arm, f) + x[f"M_{k}"]
+    moment[load.bar] = moment[load.bar] + wedge(arm, f) + factor * x[f"M_{k}"]
+
+
+def _factor(table: Table, theta_2: Ball) -> Ball:
+    """On the straight line between the two points of a table that enclose an angle, taken modulo a turn."""
+    turns = math.floor((float(theta_2.mid()) - table.theta_2[0]) / math.tau + 1e-12)
+    angle = theta_2 - 2 * turns * arb.pi()
+    after = min(max(bisect(table.theta_2, float(angle.mid())), 1), len(table.theta_2) - 1)
+    start, stop = (arb(table.theta_2[k]) for k in (after - 1, after))
+    first, last = (arb(table.factor[k]) for k in (after - 1, after))
+    return first + (last - first) * (angle - start) / (stop - start)
+
+
+def _add_spring(
+    spring: Spring,
+    x: Values,
+    k: int,
+    axes: dict[int, Pair],
+    foot: dict[int, Pair],
+    centre: dict[int, Pair],
+    force: dict[int, Pair],
+    moment: dict[int, Ball],
+) -> None:
+    """Pull preload + stiffness (distance - length) along the line of the two points, and nothing where they meet."""
+    ends = (("start", spring.start.bar), ("end", spring.end.bar))
+    arms = [turn(axes[bar], polar(x[f"{end}_{k}"], x[f"{end}_angle_{k}"])) for end, bar in ends]
+    places = [plus(foot[bar], arm) for (_, bar), arm in zip(ends, arms, strict=True)]
+    across = plus(places[1], times(arb(-1), places[0]))
+    distance = (across[0] * across[0] + across[1] * across[1]).sqrt()
+    if spring.preload == spring.stiffness * spring.length:  # the pull is k times the distance, wherever that ends
+        pull = times(x[f"stiffness_{k}"], across)
+    else:
+        pull = times((x[f"pull_{k}"] + x[f"stiffness_{k}"] * (distance - x[f"length_{k}"])) / distance, across)
+    for (_, bar), arm, f in zip(ends, arms, (pull, times(arb(-1), pull)), strict=True):
+        if bar in force:
+            force[bar] = plus(force[bar], f)
+            moment[bar] += wedge(plus(arm, times(arb(-1), centre[bar])), f)
 
 
 def reference(

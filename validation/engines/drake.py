@@ -198,6 +198,11 @@ class DrakeTree:
         self.needed = np.array(self.plant.CalcInverseDynamics(self.context, a, forces))
         return self.needed
 
+    def inertial(self, v: Array, a: Array) -> Array:
+        """Inverse dynamics with no force element."""
+        self.plant.SetVelocities(self.context, v)
+        return np.array(self.plant.CalcInverseDynamics(self.context, a, MultibodyForces(self.plant)))
+
     def push(self, bar: int, force: Array, point: Array) -> None:
         """Add a force at a point, world axes, as one at the first pin and a couple; on the ground it does nothing."""
         if bar == 1:

@@ -5,14 +5,15 @@ from typing import Any
 
 import numpy as np
 
-from fourbar.effects import Friction, Gravity, Viscous
+from fourbar.effects import Flywheel, Friction, Gravity, Springs, Torsion, Viscous
+from fourbar.linkage import FourBar
 from fourbar.quantities import VECTORS
 from fourbar.scene import Command, Scene
-from validation.compare.answer import Answer
+from validation.compare.answer import Answer, Array
 from validation.compare.compare import COMPARED
 
 NAME = "ball-arithmetic"
-KNOWN = (Gravity, Viscous, Friction)
+KNOWN = (Gravity, Viscous, Friction, Springs, Torsion, Flywheel)
 
 
 def unknown(scene: Scene) -> str | None:
@@ -20,7 +21,7 @@ def unknown(scene: Scene) -> str | None:
     for effect in scene.effects:
         if not isinstance(effect, KNOWN):
             return f"the effect {effect.key!r} has no model here"
-    return "a load that is a table has no model here" if any(load.table for load in scene.loads) else None
+    return None
 
 
 class BallArithmetic:
@@ -64,6 +65,23 @@ class BallArithmetic:
             shared="the description, theta_2, omega_2, alpha_2 and the branch",
             own="closure as a complex quadratic, linear speeds and accelerations, thirteen Newton-Euler equations",
         )
+
+
+def sines(linkage: FourBar, command: Command) -> Array:
+    """sin(theta_4 - theta_3) of each position in many digits, (n,); NaN where the loop does not close."""
+    from flint import arb, ctx
+
+    from validation.engines.balls import BITS, closure, wedge
+
+    ctx.prec = BITS
+    x = {name: arb(length) for name, length in zip("dabc", linkage.lengths, strict=True)}
+    x["theta_1"] = arb(linkage.ground_angle)
+    found = np.full(len(command.theta_2), np.nan)
+    for i, (theta_2, branch) in enumerate(zip(command.theta_2.tolist(), command.branch.tolist(), strict=True)):
+        closed = closure(x | {"theta_2": arb(theta_2)}, branch)
+        # with A on O4 bars 3 and 4 have no direction
+        found[i] = math.nan if closed is None else np.nan_to_num(_number(wedge(*closed[1:])))
+    return found
 
 
 def _number(ball: Any) -> float:

@@ -32,6 +32,10 @@ FRICTION_STEPS = 60
 """Newton's steps in a stage; where it converges it needs a tenth of them."""
 FRICTION_SETTLED = 8.0 * 2.0**-52
 """Of the sum of the terms of a friction couple's equation: what is left of it is rounding."""
+FRICTION_STARTS = 100
+"""From which other solutions are looked for, over six decades of couples."""
+APART = 1e-6
+"""Relative; two solutions that differ by less are one."""
 
 
 class FreeBody:
@@ -129,6 +133,19 @@ def balance(scene: Scene, motion: Motion) -> tuple[Array, float, Array | float]:
     sliding friction is from jamming, in (0, 1]."""
     wrenches = acting(scene, motion)
     _add_inertia(motion, wrenches)
+    unknowns, loads, arms, residual = _with_unit_couples(scene, motion, wrenches)
+    total: Array = unknowns[..., 0]
+    from_jamming: Array | float = 1.0
+    if len(arms):
+        couples = slide(loads[..., 0], loads[..., 1:], arms)
+        from_jamming = distance_from_jamming(loads[..., 0], loads[..., 1:], arms, couples)
+        total = total + (unknowns[..., 1:] * couples[:, None, :]).sum(axis=-1)
+    return total, residual, from_jamming
+
+
+def _with_unit_couples(scene: Scene, motion: Motion, wrenches: Wrenches) -> tuple[Array, Complex, Array, float]:
+    """The unknowns (n, 13, 1 + p) without sliding friction and per N m of it at each pin; the loads of these pins as
+    complex numbers (n, p, 1 + p), mu r of each (m), and the residual."""
     pins = sliding_pins(scene)
     columns = [_right(motion.linkage, wrenches)]
     for pin in pins:
@@ -137,16 +154,38 @@ def balance(scene: Scene, motion: Motion) -> tuple[Array, float, Array | float]:
         columns.append(_right(motion.linkage, unit))
     unknowns, residual = solved(_matrix(motion, scene.drive_bar), np.stack(columns, axis=-1))
     unknowns[:, TORQUE] *= motion.linkage.bar(scene.drive_bar).length
-    total: Array = unknowns[..., 0]
-    from_jamming: Array | float = 1.0
-    if pins:
-        of_pin = [unknowns[:, COLUMN[FORCE_AT[pin]] : COLUMN[FORCE_AT[pin]] + 2] for pin in pins]
-        loads = np.stack([force[:, 0] + 1j * force[:, 1] for force in of_pin], axis=1)
-        arms = np.array(list(pins.values()))
-        couples = slide(loads[..., 0], loads[..., 1:], arms)
-        from_jamming = distance_from_jamming(loads[..., 0], loads[..., 1:], arms, couples)
-        total = total + (unknowns[..., 1:] * couples[:, None, :]).sum(axis=-1)
-    return total, residual, from_jamming
+    first = [COLUMN[FORCE_AT[pin]] for pin in pins]
+    loads = unknowns[:, first] + 1j * unknowns[:, [column + 1 for column in first]]
+    return unknowns, loads, np.array(list(pins.values())), residual
+
+
+def solutions(scene: Scene, command: Command) -> Array:
+    """How many pin forces and friction couples balance the linkage at each position, where it moves, (n,)."""
+    closed = close(scene.linkage, command.theta_2, command.branch)
+    speeds = (np.broadcast_to(np.asarray(x, float), command.theta_2.shape) for x in (command.omega_2, command.alpha_2))
+    motion = move(scene.linkage, command.theta_2, *speeds, *closed.theta)
+    wrenches = acting(scene, motion)
+    _add_inertia(motion, wrenches)
+    _, loads, arms, _ = _with_unit_couples(scene, motion, wrenches)
+    return np.array([_number(F, C, arms) for F, C in zip(loads[..., 0], loads[..., 1:], strict=True)], dtype=float)
+
+
+def _number(F: Complex, C: Complex, k: Array) -> int:
+    """Of one position: one where the couples are a contraction, else those found from many starts."""
+    if not (np.isfinite(F).all() and np.isfinite(C).all()):
+        return 0
+    if np.abs(np.linalg.eigvals(k[:, None] * np.abs(C))).max() < 1.0:
+        return 1
+    rng, n = np.random.default_rng(0), FRICTION_STARTS
+    size = float((k * np.abs(F)).max()) or 1.0
+    x = size * 10.0 ** rng.uniform(-3.0, 3.0, (n, 1)) * rng.uniform(0.0, 1.0, (n, len(k)))
+    many = (np.broadcast_to(F, (n, *F.shape)), np.broadcast_to(C, (n, *C.shape)))
+    x, settled, _ = _newton(*many, k, x)
+    found: list[Array] = []
+    for each in x[settled & (x >= 0.0).all(axis=1)]:
+        if all(np.abs(each - other).max() > APART * max(each.max(), other.max()) for other in found):
+            found.append(each)
+    return len(found)
 
 
 def _add_inertia(motion: Motion, wrenches: Wrenches) -> None:
@@ -239,7 +278,12 @@ def _grow(F: Complex, C: Complex, k: Array, x: Array) -> tuple[Array, NDArray[np
     The growth has turned back, into a jam, where the determinant of the equations, 1 without friction, changes its
     sign.
     """
-    grown = np.zeros(len(x), dtype=bool)
+    x, settled, det = _newton(F, C, k, x)
+    return x, settled & (det > 0.0) & (x >= 0.0).all(axis=1)
+
+
+def _newton(F: Complex, C: Complex, k: Array, x: Array) -> tuple[Array, NDArray[np.bool_], Array]:
+    """The couples, where their equations hold, and the determinant of these equations' slope."""
     for _ in range(FRICTION_STEPS):
         force = F + (C * x[:, None, :]).sum(axis=-1)
         size = np.abs(force)
@@ -247,13 +291,12 @@ def _grow(F: Complex, C: Complex, k: Array, x: Array) -> tuple[Array, NDArray[np
         matrix = np.eye(len(k)) - k[:, None] * (np.conj(direction)[..., None] * C).real
         gap, terms = k * size - x, k * (np.abs(F) + (np.abs(C) * x[:, None, :]).sum(axis=-1))
         settled = (np.abs(gap) <= FRICTION_SETTLED * terms).all(axis=1)
-        grown = settled & (np.linalg.det(matrix) > 0.0) & (x >= 0.0).all(axis=1)
         step = solved(matrix, gap[..., None])[0][..., 0]
         moving = ~settled & np.isfinite(step).all(axis=1)
         if not moving.any():
             break
         x = np.where(moving[:, None], x + step, x)
-    return x, grown
+    return x, settled, np.linalg.det(matrix)
 
 
 def _plane(vectors: Complex) -> Array:

@@ -26,6 +26,8 @@ HALVINGS = 40
 """A step halved this often moves nothing that a gap above the rounding could tell."""
 NEWTON_STEPS = 100
 """Near a toggle Newton halves its distance: fifty steps reach the last digit from any start."""
+IN_LINE = 2.0**-26
+"""rad; so far from a line the gap is as small as rounding."""
 ROUNDING = 16.0 * 2.0**-52
 """Gap, relative to the sum of the lengths, that the roundings of a sum of four bars can leave."""
 
@@ -48,7 +50,7 @@ def close(linkage: FourBar, theta_2: Array, branch: NDArray[np.int8]) -> Closed:
     # the gap is least where bars 3 and 4 lie along the diagonal
     possible = np.maximum(e - (b + c), abs(b - c) - e) <= closed
     theta, gap = np.full((2, len(e)), np.nan), np.full(len(e), np.nan)
-    for alpha, beta in [_triangle(e, b, c), *np.radians(STARTS)]:
+    for alpha, beta in [(_between(e, b, c), _between(e, c, b)), *np.radians(STARTS)]:
         left = np.flatnonzero(possible & np.isnan(gap))
         if not len(left):
             break
@@ -63,11 +65,11 @@ def close(linkage: FourBar, theta_2: Array, branch: NDArray[np.int8]) -> Closed:
     return Closed(assembled, np.angle(np.exp(1j * theta)), gap)
 
 
-def _triangle(e: Array, b: float, c: float) -> tuple[Array, Array]:
-    """Angles of the triangle of the lengths: the nearest start, also where a bar is a millionth of the others."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        at_A, at_O4 = (e * e + b * b - c * c) / (2.0 * e * b), (e * e + c * c - b * b) / (2.0 * e * c)
-    return np.arccos(np.clip(np.nan_to_num(at_A), -1.0, 1.0)), np.arccos(np.clip(np.nan_to_num(at_O4), -1.0, 1.0))
+def _between(e: Array, near: float, far: float) -> Array:
+    """The angle between the sides e and near, by half-angle tangents; never such that bars 3 and 4 are in line."""
+    above, below = (e - near + far) * (far + near - e), (e + near - far) * (e + near + far)
+    angle = 2.0 * np.arctan2(np.sqrt(np.maximum(above, 0.0)), np.sqrt(np.maximum(below, 0.0)))
+    return np.clip(angle, IN_LINE, np.pi - 2.0 * IN_LINE)
 
 
 def _newton(

@@ -4,13 +4,9 @@ from dataclasses import dataclass, field, replace
 
 from fourbar.scene import Scene
 from validation.compare.tolerance import EQUIVALENCE, FULL_ACCURACY
-from validation.engines.witnesses import WITNESSES, Witness
+from validation.engines.witnesses import FROM_DATA, WITNESSES, Witness
 from validation.scenes.hard_families import FAMILIES
 
-PREDICTION = "validation.engines.prediction:"
-WORLD_AXES = ("pinocchio-inverse", "drake-inverse", "exudyn-constraints", "opensim-constraints")
-PREDICTORS = {**dict.fromkeys(WORLD_AXES, "in_world_axes"), "mujoco-inverse": "about_mass_centre"}
-"""How each exact engine measures lever arms; others work with the data as they are."""
 BALLS = Witness("ball-arithmetic", "validation.engines.exact:BallArithmetic", FULL_ACCURACY, library="flint")
 
 
@@ -18,8 +14,7 @@ def predicting(witness: Witness) -> Witness:
     """The witness held to full accuracy, or else to the error predicted for each position."""
     if witness.tolerance not in (EQUIVALENCE, FULL_ACCURACY):
         return witness
-    predictor = PREDICTION + PREDICTORS.get(witness.name, "from_data")
-    return replace(witness, tolerance=FULL_ACCURACY, predictor=predictor)
+    return replace(witness, tolerance=FULL_ACCURACY, predictor=witness.predictor or FROM_DATA)
 
 
 HARD_WITNESSES = tuple(predicting(witness) for witness in (BALLS, *WITNESSES))

@@ -23,6 +23,7 @@ import numpy as np
 from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import PIN_FORCES, VECTORS
 from fourbar.scene import Command, Scene
+from validation.compare.compare import Mask
 from validation.compare.tolerance import EPS, Array
 from validation.engines.description import centre
 
@@ -34,23 +35,25 @@ FIRST_ORDER = 0.1
 speeds and forces may come out as anything, the torque too, whose own first order can cancel."""
 
 
-def from_data(scene: Scene, at: Command, quantities: Iterable[str]) -> dict[str, Array]:
+def from_data(scene: Scene, at: Command, quantities: Iterable[str], where: Mask | None = None) -> dict[str, Array]:
     """For a derivation that works in angles and lengths themselves."""
-    return predicted_error(scene, at, quantities, 0.0)
+    return predicted_error(scene, at, quantities, 0.0, where)
 
 
-def in_world_axes(scene: Scene, at: Command, quantities: Iterable[str]) -> dict[str, Array]:
+def in_world_axes(scene: Scene, at: Command, quantities: Iterable[str], where: Mask | None = None) -> dict[str, Array]:
     """For an engine that differences points of the linkage in world axes, as Pinocchio's frame Jacobians do."""
-    return predicted_error(scene, at, quantities, _extent(scene))
+    return predicted_error(scene, at, quantities, _extent(scene), where)
 
 
-def about_mass_centre(scene: Scene, at: Command, quantities: Iterable[str]) -> dict[str, Array]:
+def about_mass_centre(
+    scene: Scene, at: Command, quantities: Iterable[str], where: Mask | None = None
+) -> dict[str, Array]:
     """For an engine that moves a tree of bodies about the mass centre of all of them, as MuJoCo does.
 
     Every bar is accelerated with the first of its tree and back again by its own joint.
     """
     furthest = max(abs(centre(scene.linkage.bar(number))[0]) for number in MOVING_BARS)
-    return predicted_error(scene, at, quantities, _extent(scene) + furthest, carried=True)
+    return predicted_error(scene, at, quantities, _extent(scene) + furthest, where, carried=True)
 
 
 def _extent(scene: Scene) -> float:
@@ -58,9 +61,15 @@ def _extent(scene: Scene) -> float:
 
 
 def predicted_error(
-    scene: Scene, at: Command, quantities: Iterable[str], reach: float, *, carried: bool = False
+    scene: Scene,
+    at: Command,
+    quantities: Iterable[str],
+    reach: float,
+    where: Mask | None = None,
+    *,
+    carried: bool = False,
 ) -> dict[str, Array]:
-    """Absolute error predicted for each quantity at each position, (n,).
+    """Absolute error predicted for each quantity at each position, or at those of a mask, (n,).
 
     With `carried` the accelerations of the bars are differences of others as large as the fastest bar's at `reach`.
     NaN where the loop does not close; infinite at a singular position, where the equations have no answer.
@@ -69,7 +78,7 @@ def predicted_error(
     omega = np.broadcast_to(0.0 if at.omega_2 is None else np.asarray(at.omega_2, float), (n,))
     alpha = np.broadcast_to(np.asarray(at.alpha_2, float), (n,))
     result = {name: np.full(n, np.nan) for name in quantities}
-    for i in range(n):
+    for i in range(n) if where is None else np.flatnonzero(where).tolist():
         moved = _sensitivity(scene, float(at.theta_2[i]), int(at.branch[i]), float(omega[i]), float(alpha[i]))
         if moved is None:
             continue

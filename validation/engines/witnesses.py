@@ -1,8 +1,6 @@
 """The witnesses: each one, where its adapter lives, what it needs, and what it is held to."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
 from importlib import import_module
 from typing import NamedTuple
 
@@ -12,8 +10,9 @@ from fourbar.errors import installing
 from fourbar.quantities import OF_DRY_FRICTION, STAGE_OF, UNKNOWNS
 from fourbar.scene import Command, Scene
 from validation.compare.answer import Answer, Engine
-from validation.compare.compare import COMPARED
-from validation.compare.tolerance import EQUIVALENCE, SIMULATED, Array, Tolerance
+from validation.compare.compare import COMPARED, Predicted
+from validation.compare.tolerance import EQUIVALENCE, SIMULATED, Tolerance
+from validation.engines.exact import unknown
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,7 +31,8 @@ class Witness:
     through_time: bool = False
     """Whether it runs through the motion in time."""
     predictor: str = ""
-    """ "module:function" that predicts errors from the description; "own": the engine's own residuals do."""
+    """ "module:function" that predicts, from the description, the errors to be expected beyond the tolerance; "own":
+    the engine's own residuals do; nothing: the tolerance is all."""
     stated: bool = True
     """Whether an exact engine is held to what the formulas state of the linkage too, whatever its motion."""
     library: str = ""
@@ -109,9 +109,20 @@ WORK = {
 }
 """By witness: what is compared is not the same work."""
 OF_A_POSITION = tuple(name for name in COMPARED if STAGE_OF[name] == "position")
+FROM_DATA, IN_WORLD_AXES, ABOUT_MASS_CENTRE = (
+    f"validation.engines.prediction:{name}" for name in ("from_data", "in_world_axes", "about_mass_centre")
+)
+"""How an exact engine measures lever arms; with the data as they are, in world axes, or about all bars' mass centre."""
+
+
+def _exact(name: str, adapter: str, library: str, predictor: str = IN_WORLD_AXES) -> Witness:
+    """An engine that answers every position by itself."""
+    return Witness(name, f"validation.engines.{adapter}", EQUIVALENCE, predictor=predictor, library=library)
+
+
 WITNESSES = (
-    Witness("pinocchio-inverse", "validation.engines.pinocchio:PinocchioInverse", EQUIVALENCE, library="pinocchio"),
-    Witness("mujoco-inverse", "validation.engines.mujoco.inverse:MujocoInverse", EQUIVALENCE, library="mujoco"),
+    _exact("pinocchio-inverse", "pinocchio:PinocchioInverse", "pinocchio"),
+    _exact("mujoco-inverse", "mujoco.inverse:MujocoInverse", "mujoco", ABOUT_MASS_CENTRE),
     Witness(
         "mujoco-simulated",
         "validation.engines.mujoco.simulate:MujocoSimulated",
@@ -128,19 +139,18 @@ WITNESSES = (
         EQUIVALENCE,
         (*COMPARED, *OF_DRY_FRICTION),
         positions=OF_A_POSITION,
+        predictor=FROM_DATA,
     ),
 )
 FURTHER = (
-    Witness("exudyn-constraints", "validation.engines.exudyn:ExudynConstraints", EQUIVALENCE, library="exudyn"),
-    Witness("opensim-constraints", "validation.engines.opensim:OpenSimConstraints", EQUIVALENCE, library="opensim"),
-    Witness("drake-inverse", "validation.engines.drake:DrakeInverse", EQUIVALENCE, library="pydrake"),
+    _exact("exudyn-constraints", "exudyn:ExudynConstraints", "exudyn"),
+    _exact("opensim-constraints", "opensim:OpenSimConstraints", "opensim"),
+    _exact("drake-inverse", "drake:DrakeInverse", "pydrake"),
 )
 """Engines with extras of their own: they join a run where they are installed, and where they are named."""
 
 
-def predicting_from(
-    witness: Witness, scene: Scene, at: Command, answer: Answer
-) -> Callable[[], dict[str, Array]] | None:
+def predicting_from(witness: Witness, scene: Scene, at: Command, answer: Answer) -> Predicted | None:
     """What computes the errors to be expected, should any be called for; an alarm leaves an engine no own excuse."""
     if not witness.predictor or answer.refusal is not None:
         return None
@@ -148,7 +158,9 @@ def predicting_from(
         if answer.alarms:
             return None
         zero = np.zeros(len(at.theta_2))
-        return lambda: {quantity: answer.predicted.get(quantity, zero) for quantity in witness.expected}
+        return lambda where: {quantity: answer.predicted.get(quantity, zero) for quantity in witness.expected}
+    if witness.tolerance.conditioned and (not_installed("flint") or unknown(scene)):
+        return None  # the law in the condition stands alone
     module, _, name = witness.predictor.partition(":")
     predict = getattr(import_module(module), name)
-    return cache(lambda: predict(scene, at, witness.expected))
+    return lambda where: predict(scene, at, witness.expected, where)

@@ -8,6 +8,7 @@ from importlib import import_module
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fourbar.errors import LimitError
 from fourbar.mjcf.settings import LIGHT
@@ -15,7 +16,7 @@ from fourbar.quantities import FORCES
 from fourbar.scene import Command, Scene, command
 from fourbar.solution import Solution
 from fourbar.solve import solve
-from validation.compare.answer import Answer
+from validation.compare.answer import Answer, Array
 from validation.compare.basis import basis_of
 from validation.compare.compare import Yardsticks, compare
 from validation.compare.identities import FORMULAS, closure, identities
@@ -25,12 +26,13 @@ from validation.compare.rows import FAILS, REFUSES, VERDICTS, Row
 from validation.compare.statements.finding import Stated
 from validation.compare.statements.statements import statements
 from validation.compare.tolerance import EQUIVALENCE
-from validation.compare.withheld import withheld
-from validation.engines.free_body import FreeBody
-from validation.engines.witnesses import WITNESSES, Witness, predicting_from
+from validation.compare.withheld import OfSome, withheld
+from validation.engines.exact import sines
+from validation.engines.free_body import FreeBody, solutions
+from validation.engines.witnesses import WITNESSES, Witness, not_installed, predicting_from
 from validation.report.record import Record, Timing
 from validation.run.breakdown import breakdown
-from validation.run.printed import printed
+from validation.run.printed import piece, printed
 
 SIMULATION = "mujoco-simulated"
 """The witness that runs the generated MJCF."""
@@ -66,7 +68,7 @@ def judge(name: str, scene: Scene, witnesses: Sequence[Witness] = WITNESSES, *, 
     record.rows += identities(name, scene, at, record.solution)
     basis = _basis(scene, at)
     if basis is not None and at.omega_2 is not None:
-        record.rows.append(withheld(name, scene, record.solution, basis))
+        record.rows.append(withheld(name, scene, record.solution, basis, *_by_exact_means(scene, at)))
     record.rows += printed(name, scene, at, record.solution, basis)
     record.jumps = reversals(scene, at, record.solution)
     stated, yardsticks = Stated(scene.linkage), Yardsticks()
@@ -78,7 +80,7 @@ def judge(name: str, scene: Scene, witnesses: Sequence[Witness] = WITNESSES, *, 
         record.rows += _judged(name, scene, at, record.solution, answer, witness, basis, yardsticks)
         exact = witness.tolerance == EQUIVALENCE and answer.refusal is None and "theta_3" in witness.expected
         if exact and witness.stated:
-            record.rows += _stated(name, scene, witness, answer, stated)
+            record.rows += _stated(name, scene, at, witness, answer, stated)
         if order and witness.order and answer.refusal is None:
             answer.evidence |= _observed_order(name, scene, at, record.solution, witness)
     if any(witness.name == SIMULATION for witness in witnesses):
@@ -136,6 +138,18 @@ def _basis(scene: Scene, at: Command) -> Solution | None:
         return None
 
 
+def _by_exact_means(scene: Scene, at: Command) -> tuple[OfSome | None, OfSome]:
+    """The sine between bars 3 and 4 in many digits, and how many solutions friction has, at some positions."""
+
+    def sines_at(where: NDArray[np.intp]) -> Array:
+        return sines(scene.linkage, piece(at, where))
+
+    def solutions_at(where: NDArray[np.intp]) -> Array:
+        return solutions(scene, piece(at, where))
+
+    return (None if at.remainder is not None or not_installed("flint") else sines_at), solutions_at
+
+
 def _judged(
     name: str,
     scene: Scene,
@@ -162,10 +176,11 @@ def _judged(
     return rows
 
 
-def _stated(name: str, scene: Scene, witness: Witness, answer: Answer, stated: Stated) -> list[Row]:
+def _stated(name: str, scene: Scene, at: Command, witness: Witness, answer: Answer, stated: Stated) -> list[Row]:
     """What the formulas state of the linkage whatever its motion, held against an exact engine."""
     try:
-        return statements(name, scene, witness.engine(), answer, stated)
+        predicted = predicting_from(witness, scene, at, answer)
+        return statements(name, scene, witness.engine(), answer, stated, predicted)
     except LimitError as limit:
         return [Row.unmeasured(name, witness.name, "statements of the linkage", "all", REFUSES, str(limit))]
     except Exception as error:  # whatever an engine raises is its own failure, in its own row

@@ -11,6 +11,7 @@ from fourbar.scene import Command, Scene
 from fourbar.solution import Solution
 from fourbar.solve import BLOCK, solve
 from validation.compare.basis import basis_of, smallest_yardstick, strictest_condition
+from validation.compare.compare import turned
 from validation.compare.error import magnitude, relative, relative_error, worst
 from validation.compare.law import law_row
 from validation.compare.reversals import reversing
@@ -71,10 +72,10 @@ def _points(name: str, scene: Scene, solution: Solution, basis: Solution) -> Row
                     size = np.abs(arm) + np.abs(at_foot) + term_sizes(kind, scene, basis)
                 apart = relative_error(kind, ours[point.name], theirs, size) * condition_of(kind, link, basis)
                 error = np.where(usable, np.maximum(error, np.where(np.isnan(apart), np.inf, apart)), error)
-    index = worst(error)
-    verdict = UNDECIDED if not usable.any() else AGREES if error[index] <= EQUIVALENCE.factor else FAILS
+    index, allowed = worst(error), EQUIVALENCE.factor * turned(link.ground_angle, solution.theta_2)
+    verdict = UNDECIDED if not usable.any() else AGREES if error[index] <= allowed else FAILS
     what, place = f"the {len(scene.points)} points of the scene", float(solution.theta_2[index])
-    return Row(name, FORMULAS, "exact", "points", float(error[index]), EQUIVALENCE.factor, verdict, what, place, 1.0)
+    return Row(name, FORMULAS, "exact", "points", float(error[index]), allowed, verdict, what, place, 1.0)
 
 
 def _known(basis: Solution, quantity: str, n: int) -> Array:
@@ -95,13 +96,14 @@ def piece(at: Command, where: NDArray[np.intp]) -> Command:
 def _blocks(name: str, scene: Scene, at: Command, solution: Solution) -> Row:
     """A sweep of more than one block of positions, at the ends of its blocks, against the scene's own sweep."""
     n = len(at.theta_2)
-    ok = np.flatnonzero(solution.status_code == OK)  # elsewhere pin friction searches for long, at each repetition
-    between = np.resize(ok if len(ok) else np.arange(n), BLOCK)
-    long = np.concatenate((between, np.arange(n)))
+    long = np.arange(BLOCK + n) % n
     ends = np.unique([0, BLOCK - 1, BLOCK, len(long) - 1])
-    whole = solve(scene, "force", at=piece(at, long))
-    error = (whole.status_code[ends] != solution.status_code[long[ends]]).astype(float)
-    for quantity in ("sin_mu", "B", "alpha_3", *FORCES):
+    loaded = any(effect.loaded_pins for effect in scene.effects)  # whose couples may take a search at each position
+    whole = solve(scene, "acceleration" if loaded else "force", at=piece(at, long))
+    error = np.zeros(len(ends))
+    if not loaded:
+        error += whole.status_code[ends] != solution.status_code[long[ends]]
+    for quantity in ("sin_mu", "B", "alpha_3", *(() if loaded else FORCES)):
         ours = getattr(solution, quantity)
         one, other = getattr(whole, quantity)[ends], ours[long[ends]]
         known = np.isfinite(magnitude(other))
@@ -135,8 +137,9 @@ def _error_bars(name: str, scene: Scene, at: Command, solution: Solution) -> Ite
         size = np.max([smallest_yardstick(q, scene, ours, other) for q in quantities], axis=0)
         condition = strictest_condition(quantities[0], scene.linkage, ours, other)
         tells = condition * NOTHING_TO_TELL > EPS
-        wide = relative(width, size) * condition / (K * EPS)
-        share = np.where(tells, np.fmax(relative(true, BARS * width), wide), 0.0)
+        turns = np.array([turned(scene.linkage.ground_angle, theta_2) for theta_2 in sampled.theta_2])
+        wide = relative(width, size) * condition / (K * EPS * turns)
+        share = np.where(tells, np.maximum(relative(true, BARS * width), wide), 0.0)
         share[tells & ~np.isfinite(width)] = np.inf
         index = worst(share)
         verdict = UNDECIDED if not tells.any() else AGREES if share[index] <= 1.0 else FAILS

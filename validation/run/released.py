@@ -27,7 +27,7 @@ from validation.compare.rows import AGREES, DEGRADED, FAILS, REFUSES, Row
 from validation.compare.tolerance import DEGRADED as TIMES_PREDICTED
 from validation.compare.tolerance import EQUIVALENCE
 from validation.compare.withheld import FORMULAS
-from validation.engines.witnesses import WITNESSES, Witness, not_installed
+from validation.engines.witnesses import WITNESSES, Witness, not_installed, predicting_from
 from validation.report.record import Record, Timing
 from validation.run.breakdown import breakdown
 
@@ -160,7 +160,9 @@ def _forces(name: str, scene: Scene, solution: Solution, witnesses: Sequence[Wit
         conditioned = replace(solution, condition=basis.condition, drive_condition=basis.drive_condition)
         conditioned.drive_bar = 2
         names = [q for q in UNKNOWNS if q in witness.expected]
-        rows = compare(name, held, answer, conditioned, witness.tolerance, names, None, basis)
+        # nor are theta_2, omega_2 and alpha_2 more than that angle's, rounded: what that costs there is computed
+        predicted = predicting_from(witness, held, at, answer)
+        rows = compare(name, held, answer, conditioned, witness.tolerance, names, predicted, basis)
         yield from (row for row in rows if row.quantity != "undecided")
 
 

@@ -231,7 +231,13 @@ def examine(scenes: tuple[Path, ...], mjcf: Path, names: tuple[str, ...], out: P
 @click.option("--suite", "named", metavar="hard|FILE", help="Judge the hard cases, or the scenes that FILE lists.")
 @click.option("--random", "count", type=click.IntRange(min=1), help="Judge this many random linkages instead.")
 @click.option("--seed", type=click.IntRange(min=0), metavar="S", help="Of the random linkages; left out: 0.")
-@click.option("--type", "types", metavar="TYPES", help=f"Of the random linkages, comma-separated: {ALL_TYPES} (all).")
+@click.option(
+    "--type",
+    "types",
+    metavar="TYPES",
+    help=f"Of the random linkages, comma-separated: {ALL_TYPES} (all); or uneven: with every ratio over ten decades "
+    "and every effect but loaded friction, for exact engines.",
+)
 @click.option("--workers", type=click.IntRange(min=1), default=WORKERS, show_default=True, help="Processes.")
 @click.option("--scheduler", metavar="ADDRESS", help="Spread over the workers of this Dask scheduler.")
 @click.option("--against", metavar="BASELINE", help="Compare with an accepted name or an earlier run's folder.")

@@ -7,7 +7,7 @@ from fourbar.errors import DependencyError, InputError
 from validation.engines import added
 from validation.engines.hard_suite import HARD_WITNESSES, Hard, predicting
 from validation.engines.witnesses import FURTHER, WITNESSES, Witness
-from validation.scenes.random import LinkageType
+from validation.scenes.random import UNEVEN_TYPE, LinkageType
 from validation.scenes.suites import Random, Suite, model_files, scene_files, suite_file
 
 
@@ -56,9 +56,11 @@ def askable(witnesses: tuple[Witness, ...], *, by_name: bool) -> tuple[tuple[Wit
 
 
 def linkage_types(text: str) -> tuple[LinkageType, ...]:
-    """The types named in a comma-separated list."""
+    """The types named in a comma-separated list; none for uneven linkages."""
+    if text == UNEVEN_TYPE:
+        return ()
     try:
         return tuple(LinkageType(name.strip()) for name in text.split(","))
     except ValueError:
         allowed = ", ".join(kind.value for kind in LinkageType)
-        raise InputError("--type", text, f"must be a comma-separated list of {allowed}") from None
+        raise InputError("--type", text, f"must be {UNEVEN_TYPE} or a comma-separated list of {allowed}") from None

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from fourbar.effects import Friction, Gravity, Load, Viscous
+from fourbar.effects import Flywheel, Friction, Gravity, Load, Point, Spring, Springs, Torsion, Viscous
 from fourbar.formulas.mobility import default_range
 from fourbar.linkage import MOVING_BARS, PINS, Bar, FourBar
 from fourbar.scene import Scene
@@ -68,6 +68,8 @@ class Ranges:
     viscous: float = 0.0
     friction: float = 0.0
     """Shares of the scenes that have such an effect."""
+    sprung: float = 0.0
+    """Share of the scenes that have a spring; likewise of a torsion spring, and of a flywheel."""
     by_length: bool = True
     """Whether the mass is per metre."""
 
@@ -89,6 +91,8 @@ SHORTEST = {
     LinkageType.ROCKER_CRANK: 3,
 }
 """Which of (ground, input, coupler, output) is the shortest bar of a Grashof linkage of that type."""
+UNEVEN_TYPE = "uneven"
+"""Named in place of types: see `uneven_scene`."""
 POSITIONS = 37
 CLEARANCE = 0.02
 """A random linkage keeps this part of its longest bar away from the change-point equality s + l = p + q."""
@@ -134,6 +138,7 @@ def drawn(rng: np.random.Generator, lengths: Sequence[float], ranges: Ranges) ->
     for kind, share in ((Viscous, ranges.viscous), (Friction, ranges.friction)):
         if rng.random() < share:
             effects.append(kind.at(**{pin: couple * float(rng.random()) for pin in PINS if rng.random() < 0.5}))
+    effects += _sprung(rng, linkage, weight, ranges) if ranges.sprung else []
     omega = float(rng.choice([-1.0, 1.0])) * ranges.speed(rng)
     alpha = float(rng.choice([0.0, omega**2 * ranges.acceleration(rng)]))
     motion = Motion(0.0, omega, alpha, OPEN if rng.random() < 0.5 else CROSSED)
@@ -150,6 +155,73 @@ def _load(rng: np.random.Generator, linkage: FourBar, weight: float, ranges: Ran
     return Load(bar, force, at, moment, "bar" if rng.random() < 0.5 else "world")
 
 
+def _sprung(rng: np.random.Generator, linkage: FourBar, weight: float, ranges: Ranges) -> list[Any]:
+    """Springs, torsion springs and flywheels that carry the weights about as they are loaded."""
+    found: list[Any] = []
+    size = weight * abs(ranges.load(rng))
+    if rng.random() < ranges.sprung:
+        one, other = (int(bar) for bar in rng.choice([1, *MOVING_BARS], 2, replace=False))
+        start, end = (Point(bar, linkage.lengths[bar - 1] * ranges.arm(rng), ANY_ANGLE(rng)) for bar in (one, other))
+        length = max(linkage.lengths)
+        found.append(
+            Springs((Spring(start, end, (size or 1.0) / length, length * ANY_PART(rng), size * EITHER_SIGN(rng)),))
+        )
+    if rng.random() < ranges.sprung:
+        couple = size * max(linkage.lengths[1:])
+        found.append(
+            Torsion.at(**{str(rng.choice(list(PINS))): (couple or 1.0, ANY_ANGLE(rng), couple * EITHER_SIGN(rng))})
+        )
+    if rng.random() < ranges.sprung:
+        bar = int(rng.choice([2, 4]))
+        inertia = (linkage.bar(bar).mass or 1.0) * linkage.bar(bar).length ** 2
+        found.append(Flywheel(inertia * ranges.inertia(rng), bar))
+    return found
+
+
+def uneven_lengths(rng: np.random.Generator, crank: Draw, coupler: Draw) -> tuple[Sequence[float], float]:
+    """(ground, input, coupler, output), m, and an angle theta_2 - theta_1 at which they close, rad.
+
+    Parameters
+    ----------
+    crank, coupler : of the ground, and of the diagonal from A to O4 at that angle.
+    """
+    d = float(rng.uniform(0.1, 1.0))
+    a = d * crank(rng)
+    angle = float(rng.uniform(-7.0, 7.0))
+    diagonal = abs(d - a * complex(math.cos(angle), math.sin(angle)))
+    b = diagonal * coupler(rng)
+    c = abs(diagonal - b) + 2.0 * min(diagonal, b) * rng.uniform(0.02, 0.98)
+    return (d, a, b, c), angle
+
+
+TEN_DECADES = decades(-5.0, 5.0)
+UNEVEN = Ranges(
+    mass=sometimes(0.9, TEN_DECADES),
+    inertia=product(uniform(0.02, 0.4), sometimes(0.5, TEN_DECADES, 1.0)),
+    centre=product(uniform(-1.0, 2.0), sometimes(0.3, TEN_DECADES, 1.0)),
+    centre_angle=sometimes(0.5, uniform(-3.0, 3.0)),
+    load=product(EITHER_SIGN, TEN_DECADES),
+    arm=product(ANY_PART, sometimes(0.3, TEN_DECADES, 1.0)),
+    without_force=0.2,
+    speed=TEN_DECADES,
+    viscous=0.3,
+    friction=0.2,
+    sprung=0.3,
+    by_length=False,
+)
+"""Masses, inertias, arms, loads and speeds each over ten decades."""
+
+
+def uneven_scene(seed: int, index: int) -> Scene:
+    """A linkage whose lengths, masses, arms and loads are in ratios of 1e-5 to 1e5, with every kind of effect."""
+    rng = np.random.default_rng([seed, index])
+    lengths, psi = uneven_lengths(rng, TEN_DECADES, TEN_DECADES)
+    size = 10.0 ** rng.uniform(-3.0, 3.0)
+    scene = drawn(rng, [size * x for x in lengths], UNEVEN)
+    theta_2 = scene.linkage.ground_angle + psi + np.array([0.0, 1e-3, rng.uniform(-3.0, 3.0)])
+    return replace(scene, motion=replace(scene.motion, theta_2=theta_2), title=f"uneven {index}")
+
+
 MACHINES = Ranges(
     mass=decades(-1.0, 1.0),
     inertia=uniform(1.0 / 24.0, 1.0 / 6.0),
@@ -163,7 +235,14 @@ MACHINES = Ranges(
 
 
 def random_scene(seed: int, index: int, types: tuple[LinkageType, ...]) -> Scene:
-    """A linkage with random bars, loads, gravity and drive, at POSITIONS positions over the range it can move."""
+    """A linkage with random bars, loads, gravity and drive, at POSITIONS positions over the range it can move.
+
+    Parameters
+    ----------
+    types : taken in turn; none of them: an uneven one.
+    """
+    if not types:
+        return uneven_scene(seed, index)
     rng = np.random.default_rng([seed, index])
     kind = types[index % len(types)]
     size = 10.0 ** rng.uniform(-1.5, 1.0)

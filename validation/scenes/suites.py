@@ -64,7 +64,7 @@ class Files:
 
 @dataclass(frozen=True, slots=True)
 class Random:
-    """`count` random linkages of the given types; scene i depends on (seed, i) alone."""
+    """`count` random linkages of the given types, or uneven ones; scene i depends on (seed, i) alone."""
 
     count: int
     seed: int

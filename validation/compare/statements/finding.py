@@ -99,10 +99,15 @@ def wrapped(angle: A) -> A:
     return (angle + math.pi) % TURN - math.pi
 
 
-def same(what: str, stated: Sequence[float], found: Sequence[float]) -> Finding:
+def same(what: str, stated: Sequence[float], found: Sequence[float], linkage: FourBar) -> Finding:
     """Two lists of angles, modulo 2 pi and in any order: the largest distance of one from the nearest of the other."""
     if not stated or not found:
         return Finding(0.0 if len(stated) == len(found) else math.inf, 0.0, 0.0, what)
     apart = np.abs(wrapped(np.subtract.outer(np.array(stated), np.array(found))))
     error = float(max(apart.min(axis=0).max(), apart.min(axis=1).max()))
-    return Finding(error, EQUIVALENCE.factor * turned(np.array(stated)), stated[0], what)
+    return Finding(error, EQUIVALENCE.factor * turned(linkage.ground_angle, np.array(stated)), stated[0], what)
+
+
+def roundoff(linkage: FourBar) -> float:
+    """What two derivations of an angle may differ by, rad: it is one against the ground's."""
+    return EQUIVALENCE.factor * turned(linkage.ground_angle)

@@ -9,9 +9,9 @@ from fourbar.formulas import mobility
 from fourbar.linkage import MOVING_BARS, FourBar
 from fourbar.scene import Scene
 from validation.compare.compare import TOUCHING_MARGIN, closing_margin
-from validation.compare.statements.finding import Finding, Place, Seen, Stated, wrapped
+from validation.compare.statements.finding import Finding, Place, Seen, Stated, roundoff, wrapped
 from validation.compare.statements.ranges import step_beyond
-from validation.compare.tolerance import EPS, EQUIVALENCE, NOTHING_TO_TELL, lever
+from validation.compare.tolerance import EPS, NOTHING_TO_TELL, lever
 
 
 def places(stated: Stated) -> list[Place]:
@@ -47,7 +47,7 @@ def _of_input(stated: Stated, seen: Seen) -> Iterator[Finding]:
         if digits * NOTHING_TO_TELL <= EPS:
             continue
         e = abs(d - a * np.exp(1j * (limit.theta_2 - linkage.ground_angle)))
-        allowed = EQUIVALENCE.factor / digits + a / e * (abs(step) + _moved(linkage, 2, limit))
+        allowed = roundoff(linkage) / digits + a / e * (abs(step) + _moved(linkage, 2, limit))
         middle = {}
         for name, angle in (("theta_3", limit.theta_3), ("theta_4", limit.theta_4)):
             middle[name] = open_[name] + 0.5 * wrapped(crossed[name] - open_[name])
@@ -69,7 +69,7 @@ def _moved(linkage: FourBar, bar: int, limit: mobility.LimitPosition) -> float:
     upright = abs(math.sin(limit[MOVING_BARS.index(bar)] - linkage.ground_angle))
     d, *moving = linkage.lengths
     spread = sum(linkage.lengths) / d * (1.0 + sum(moving) / linkage.bar(bar).length)
-    return EQUIVALENCE.factor * spread / max(upright, EPS)
+    return roundoff(linkage) * spread / max(upright, EPS)
 
 
 def _collinear(linkage: FourBar, bar: int) -> list[bool]:
@@ -100,10 +100,10 @@ def _dead_centres(stated: Stated, bar: int, seen: Seen) -> Iterator[Finding]:
         moved = _moved(linkage, bar, limit)
         for angle, of_formula in ((theta_3, limit.theta_3), (theta_4, limit.theta_4)):
             error = abs(wrapped(angle - of_formula))
-            yield Finding(error, EQUIVALENCE.factor / digits + moved * speed, limit.theta_2, what)
+            yield Finding(error, roundoff(linkage) / digits + moved * speed, limit.theta_2, what)
         # the loop runs along bar 4 from B to O4
         aligned = math.cos({3: theta_4 + math.pi, 4: theta_3}[bar] - limit.theta_2) > 0.0
         yield Finding(float(aligned != limit.stretched), 0.0, limit.theta_2, "stretched or folded")
         slowing = abs(seen.at(place, f"alpha_{bar}"))
-        at_rest = EQUIVALENCE.factor * speed / (digits * sine) + slowing * moved
+        at_rest = roundoff(linkage) * speed / (digits * sine) + slowing * moved
         yield Finding(abs({3: omega_3, 4: omega_4}[bar]), at_rest, limit.theta_2, f"{what}: at rest")

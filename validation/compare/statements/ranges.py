@@ -94,8 +94,8 @@ def _question(linkage: FourBar, bar: int) -> _Question:
     angles, inside = (np.array(column) for column in zip(*expected, strict=True))
     limits = [limit[MOVING_BARS.index(bar)] for limit in mobility.limit_positions(linkage, bar)]
     findings = (
-        same(f"limits of bar {bar}", limits, [] if full else [end for span in spans for end in span]),
-        same(f"swing of bar {bar}", [mobility.swing(linkage, bar)], [spans[0][1] - spans[0][0]]),
+        same(f"limits of bar {bar}", limits, [] if full else [end for span in spans for end in span], linkage),
+        same(f"swing of bar {bar}", [mobility.swing(linkage, bar)], [spans[0][1] - spans[0][0]], linkage),
         Finding(float(full != all(within)), 0.0, along[0], f"whether bar {bar} turns fully"),
     )
     decidable = np.abs(closing_margin(Scene(first), angles + shift)) > TOUCHING_MARGIN

@@ -8,14 +8,7 @@ import numpy as np
 
 from fourbar.linkage import MOVING_BARS, Bar, FourBar
 from fourbar.scene import Scene
-from validation.scenes.random import Ranges, decades, drawn, product, sometimes, uniform
-
-
-def triangle(rng: np.random.Generator, diagonal: float, low: float, high: float) -> tuple[float, float]:
-    """Lengths b, c that close over a diagonal, b/e log-uniform."""
-    b = diagonal * 10.0 ** rng.uniform(low, high)
-    c = abs(diagonal - b) + 2.0 * min(diagonal, b) * rng.uniform(0.02, 0.98)
-    return float(b), float(c)
+from validation.scenes.random import Ranges, decades, drawn, product, sometimes, uneven_lengths, uniform
 
 
 def ranges_of(spread: float) -> Ranges:
@@ -90,12 +83,8 @@ def change_point(rng: np.random.Generator) -> Scene:
 
 def ratios(rng: np.random.Generator) -> Scene:
     """Crank to ground, coupler to diagonal, and masses, each in ratios from 1e-6 to 1e6."""
-    d = float(rng.uniform(0.1, 1.0))
-    a = d * float(10.0 ** rng.uniform(-6, 6))
-    angle = float(rng.uniform(-7.0, 7.0))
-    diagonal = abs(d - a * complex(math.cos(angle), math.sin(angle)))
-    b, c = triangle(rng, diagonal, -1, 1)
-    return at_angle(drawn(rng, (d, a, b, c), UNEVEN), angle)
+    lengths, angle = uneven_lengths(rng, decades(-6.0, 6.0), decades(-1.0, 1.0))
+    return at_angle(drawn(rng, lengths, UNEVEN), angle)
 
 
 def scales(rng: np.random.Generator) -> Scene:

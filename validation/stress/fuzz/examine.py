@@ -61,17 +61,10 @@ def _engines(scene: Scene, at: Command, solution: Solution, witnesses: tuple[Wit
     rows = identities("", scene, at, solution)
     for witness in witnesses:
         answer = witness.engine().answer(scene, at)
-        rows += compare(
-            "",
-            scene,
-            answer,
-            solution,
-            witness.tolerance,
-            witness.expected,
-            predicting_from(witness, scene, at, answer),
-        )
+        predicted = predicting_from(witness, scene, at, answer)
+        rows += compare("", scene, answer, solution, witness.tolerance, witness.expected, predicted)
         if witness.name == "pinocchio-inverse" and answer.refusal is None:  # of two exact engines the quicker one
-            rows += statements("", scene, witness.engine(), answer)
+            rows += statements("", scene, witness.engine(), answer, predicted=predicted)
     # half of the scenes are drawn where doubles have few digits: that they are undecided is no fault
     failed = [row for row in rows if row.verdict == FAILS and row.quantity != "undecided"]
     return [f"{row.engine} {row.quantity}: {row.reason}" for row in failed]

@@ -58,6 +58,9 @@ SPECIMENS: dict[str, Scene] = {
     "near a limit": Scene(
         ROCKER, Motion(limit_positions(ROCKER)[0].theta_2 + np.array([1e-2, 1e-3]), 1.0), effects=(WEIGHT,)
     ),
+    "nearest to a limit": Scene(
+        ROCKER, Motion(limit_positions(ROCKER)[0].theta_2 + np.array([1e-3, 1e-13]), 1.0), effects=(WEIGHT,)
+    ),
     "a hair from a limit": Scene(ROCKER, Motion(FromLimit(1, 1e-9), 1.0), effects=(WEIGHT,)),
     "positions": Scene(CRANK, Motion(Sweep(0.0, 6.0, 12))),
     "damped": replace(
