@@ -53,6 +53,7 @@ def test_every_contender_finds_the_same_unknowns(monkeypatch: pytest.MonkeyPatch
     expected = np.concatenate([np.atleast_2d(getattr(own, name).T) for name in UNKNOWNS])
     peers = contenders.loops()
     assert {"NumPy", "C"} <= set(peers.here) or "C" in peers.not_run
+    assert float(np.float64(5e-324) * 1.0) > 0.0  # no library has taken subnormal numbers from this process
     for name, loop in peers.here.items():
         out = np.full((15, 500), np.nan)
         loop(at.theta_2, out)

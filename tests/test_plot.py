@@ -18,11 +18,12 @@ from fourbar.formulas.path import state
 from fourbar.formulas.torque import inertia
 from fourbar.scene.motion_law import Law
 from fourbar.show import plot
-from fourbar.show.plot.curves import broken, free_place, limit_of, poles
+from fourbar.show.plot.curves import broken, limit_of, poles
 from fourbar.show.plot.energy import energies
 from fourbar.show.plot.figures import FIGURES, compose
 from fourbar.show.plot.freebody import free_body
 from fourbar.show.plot.style import matplotlib_style, number, plain, unit_for
+from fourbar.show.plot.transmission import free_place
 from fourbar.show.plot.view import CLEAR, common_position, on_branch, view
 from tests.scenes import crank_rocker, thesis
 

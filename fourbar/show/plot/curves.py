@@ -1,4 +1,4 @@
-"""Curves over theta_2 or time: angles and their rates, torque, pin forces, energy, transmission angle."""
+"""Curves over theta_2 or time: angles and their rates, points, torque, pin forces, energy."""
 
 import math
 import re
@@ -17,10 +17,10 @@ from fourbar.show.plot.style import (
     FAINT,
     FORCE_COLOURS,
     FORCE_DASHES,
-    FORCE_WIDTHS,
     INK,
     MUTED,
     degree_ticks,
+    force_line,
     largest,
     legend_above,
     number,
@@ -39,17 +39,13 @@ OUTLIER = 3.0
 """... and the multiple of it that a curve must exceed to be clipped."""
 CLIPPED = 1.6
 """A clipped axis ends at this multiple of the ordinary size."""
-RECOMMENDED = 40.0
-"""Smallest transmission angle that is usually recommended, deg (R. L. Norton, Design of Machinery)."""
-REMARK = 0.34
-"""Part that a remark takes along an axis, as a part of its length."""
 Indices = NDArray[np.intp]
 WORKS: tuple[tuple[str, Any], ...] = tuple((FORCE_COLOURS[name], FORCE_DASHES[name]) for name in PIN_FORCES)
 BINDING = re.compile(r" (?==)|(?<==) |(?<=[\d]) (?=[A-Za-zµ])|(?<=N) (?=m\b)")
 POLE_REASON = {2: "bars 3 and 4 collinear", 3: "ω₃ = 0", 4: "ω₄ = 0"}
 
 
-def _bases(axes: "Axes", view: View) -> Array:
+def bases(axes: "Axes", view: View) -> Array:
     """The axis of theta_2 (or time), with the positions that do not assemble shaded and the position drawn marked.
 
     Returns what the curves are drawn over.
@@ -135,7 +131,7 @@ def clip(axes: "Axes", view: View, curves: dict[str, Array], limit: float | None
 
 def draw_angles(axes: "Axes", view: View) -> None:
     """theta_3 and theta_4; over time theta_2 too."""
-    over = _bases(axes, view)
+    over = bases(axes, view)
     bars = (3, 4) if view.time is None else (2, 3, 4)
     for bar in bars:
         values = np.degrees(getattr(view.sweep, f"theta_{bar}"))
@@ -148,7 +144,7 @@ def draw_angles(axes: "Axes", view: View) -> None:
 
 
 def _rates(axes: "Axes", view: View, letter: str, unit: str, title: str, what: str) -> None:
-    over = _bases(axes, view)
+    over = bases(axes, view)
     name = {"omega": "ω", "alpha": "α"}[letter]
     digits = {2: "₂", 3: "₃", 4: "₄"}
     curves = {name + digits[bar]: getattr(view.sweep, f"{letter}_{bar}") for bar in (3, 4)}
@@ -187,7 +183,7 @@ def draw_point_accelerations(axes: "Axes", view: View) -> None:
 
 
 def _of_points(axes: "Axes", view: View, letter: str, unit: str, own: dict[str, Array], title: str) -> None:
-    over = _bases(axes, view)
+    over = bases(axes, view)
     masses = [f"G{bar}" for bar in MOVING_BARS if view.scene.linkage.bar(bar).mass > 0.0]
     vectors = {name: getattr(view.sweep, f"{letter}_{name}") for name in ("A", "B", *masses)} | own
     curves = {name: np.hypot(*vector.T) for name, vector in vectors.items()}
@@ -206,7 +202,7 @@ def _of_points(axes: "Axes", view: View, letter: str, unit: str, own: dict[str, 
 
 def draw_torque(axes: "Axes", view: View) -> None:
     """The driving torque, with its poles."""
-    over = _bases(axes, view)
+    over = bases(axes, view)
     torque, bar = view.sweep.torque, view.scene.drive_bar
     assert torque is not None
     torques = [other.sweep.torque for other in view.alike if other.sweep.torque is not None]
@@ -226,21 +222,14 @@ def draw_torque(axes: "Axes", view: View) -> None:
 
 def draw_forces(axes: "Axes", view: View) -> None:
     """Magnitudes of the four pin forces."""
-    over = _bases(axes, view)
+    over = bases(axes, view)
     sizes = {name: np.hypot(*getattr(view.sweep, name).T) for name in FORCE_COLOURS}
     everywhere = [np.hypot(*getattr(other.sweep, name).T) for other in view.alike for name in FORCE_COLOURS]
     limit = limit_of(everywhere)
     factor, unit = unit_for(limit or largest(*everywhere), "N", view.units)
     where = poles(view)
     for name, values in sizes.items():
-        axes.plot(
-            broken(over, where),
-            factor * broken(values, where),
-            color=FORCE_COLOURS[name],
-            ls=FORCE_DASHES[name],
-            lw=FORCE_WIDTHS[name],
-            label=force_name(name),
-        )
+        axes.plot(broken(over, where), factor * broken(values, where), **force_line(name))
     axes.set_ylim(bottom=0.0)
     axes.set_ylabel(f"$|F|$ ({unit})")
     axes.set_title("Pin forces")
@@ -248,55 +237,9 @@ def draw_forces(axes: "Axes", view: View) -> None:
     legend_above(axes)
 
 
-def force_name(name: str) -> str:
-    """F12 as it is typeset."""
-    return f"$F_{{{name[1:]}}}$"
-
-
-def draw_transmission(axes: "Axes", view: View) -> None:
-    """Acute angle between coupler and output, with limit and dead-centre positions."""
-    over = _bases(axes, view)
-    sweep = view.sweep
-    mu = np.degrees(np.arctan2(np.abs(sweep.sin_mu), np.abs(np.cos(sweep.theta_4 - sweep.theta_3))))
-    axes.plot(over, mu, color=INK)
-    axes.axhline(RECOMMENDED, color=MUTED, lw=0.9, ls=(0, (4, 2)))
-    place = free_place(mu)
-    axes.annotate(
-        f"{RECOMMENDED:g}° recommended",
-        (over[0] + place * (over[-1] - over[0]), RECOMMENDED),
-        xytext=(0, 2),
-        textcoords="offset points",
-        ha="center",
-        size=7.0,
-        color=MUTED,
-    )
-    axes.set_ylim(0.0, 96.0)
-    axes.yaxis.set_ticks(range(0, 91, 15))
-    for theta, height, marker, name in _marked(view):
-        axes.plot(
-            theta, height, marker, ms=6.0, mfc="white", mec=INK, mew=1.1, ls="none", label=name, clip_on=False, zorder=5
-        )
-    axes.set_ylabel(r"transmission angle $\mu$ (°)")
-    axes.set_title("Transmission angle")
-    if view.time is None:
-        legend_above(axes, 2)
-
-
-def free_place(mu: Array) -> float:
-    """Where along the axis the curve keeps furthest from a remark at 40 deg, as a part of its length."""
-    half = REMARK / 2.0
-    best, clearance = 1.0 - half, -1.0
-    for place in np.linspace(1.0 - half, half, 25):
-        part = mu[int((place - half) * len(mu)) : max(1, math.ceil((place + half) * len(mu)))]
-        away = np.abs(part[np.isfinite(part)] - RECOMMENDED - 3.0)  # the remark stands on the line
-        if away.size and away.min() > clearance:
-            best, clearance = float(place), float(away.min())
-    return best
-
-
 def draw_energy(axes: "Axes", view: View) -> None:
     """Kinetic energy of a free motion, and the work that made it."""
-    over = _bases(axes, view)
+    over = bases(axes, view)
     own = energies(view.scene, view.sweep)
     shared = [energies(other.scene, other.sweep) for other in view.others] + [own]
     factor, unit = unit_for(
@@ -310,38 +253,3 @@ def draw_energy(axes: "Axes", view: View) -> None:
     axes.set_title("Kinetic energy, and the work done")
     legend_above(axes, 3)
     note(view, "The kinetic energy has grown by the work that loads and effects have done since the release.")
-
-
-def _marked(view: View) -> list[tuple[list[float], list[float], str, str]]:
-    """Limits (bars 3, 4 collinear) and dead centres (bars 2, 3 collinear): theta_2, mu (degrees), mark, name."""
-    from fourbar.formulas.mobility import limit_positions
-
-    if view.time is not None:
-        return []
-    degrees = view.degrees
-    margin = 1.5 * float(np.median(np.diff(degrees))) if len(degrees) > 1 else 0.0
-    limits = [t for angle in limit_angles(view) for t in _inside(view, angle, margin)]
-    centres, heights = [], []
-    for found in limit_positions(view.scene.linkage, 4):
-        difference = found.theta_4 - found.theta_3
-        for t in _inside(view, found.theta_2, 0.0):
-            if view.sweep.branch[np.argmin(np.abs(degrees - t))] == found.branch:
-                centres.append(t)
-                heights.append(math.degrees(math.atan2(abs(math.sin(difference)), abs(math.cos(difference)))))
-    marked = [(limits, [0.0] * len(limits), "s", "limit"), (centres, heights, "D", "dead centre")]
-    return [entry for entry in marked if entry[0]]
-
-
-def _inside(view: View, angle: float, margin: float) -> list[float]:
-    """An angle (rad) and its whole turns that lie in the sweep, degrees."""
-    low, high = float(view.degrees[0]) - margin, float(view.degrees[-1]) + margin
-    start = math.degrees(angle)
-    first = math.ceil((low - start) / 360.0)
-    return [start + 360.0 * k for k in range(first, math.floor((high - start) / 360.0) + 1)]
-
-
-def limit_angles(view: View) -> list[float]:
-    """theta_2 of the input's limit positions, rad, from e = b + c and e = |b - c|."""
-    from fourbar.formulas.mobility import limit_positions
-
-    return [float(limit.theta_2) for limit in limit_positions(view.scene.linkage)]

@@ -13,6 +13,7 @@ from fourbar.scene import Scene
 from fourbar.show.plot import curves, freebody, hodograph, influence, linkage
 from fourbar.show.plot.labels import Labels
 from fourbar.show.plot.style import FORCE_COLOURS, MUTED, format_of, matplotlib_style, plain, rendered, save
+from fourbar.show.plot.transmission import draw_transmission
 from fourbar.show.plot.view import View, common_position, on_branch, over_time, view
 from fourbar.show.tables import STATIC
 from fourbar.solution import SI, Conversion
@@ -32,7 +33,7 @@ def _overview(figure: "SubFigure", shown: View, labels: Labels) -> None:
         linkage.draw_linkage(panels["linkage"], shown, labels)
         _path_legend(panels["linkage"])
         curves.draw_angles(panels["angles"], shown)
-        curves.draw_transmission(panels["mu"], shown)
+        draw_transmission(panels["mu"], shown)
         return
     panels = figure.subplot_mosaic(
         [["linkage", "angles", "torque"], ["linkage", "omega", "forces"], ["polar", "alpha", "mu"]],
@@ -46,7 +47,7 @@ def _overview(figure: "SubFigure", shown: View, labels: Labels) -> None:
     curves.draw_accelerations(panels["alpha"], shown)
     _drive(panels["torque"], shown)
     curves.draw_forces(panels["forces"], shown)
-    curves.draw_transmission(panels["mu"], shown)
+    draw_transmission(panels["mu"], shown)
     hodograph.draw_hodograph(cast("PolarAxes", panels["polar"]), shown)
 
 
@@ -120,7 +121,7 @@ FIGURES: dict[str, tuple[Painter, tuple[float, float], bool]] = {
     "forces": (_single(curves.draw_forces), (5.6, 3.2), True),
     "hodograph": (_hodographs, (6.4, 6.6), True),
     "energy": (_single(curves.draw_energy), (5.6, 3.2), True),
-    "transmission": (_single(curves.draw_transmission), (5.6, 3.2), False),
+    "transmission": (_single(draw_transmission), (5.6, 3.2), False),
     "freebody": (_free_bodies, (9.6, 4.6), True),
     "sensitivity": (influence.draw_influences, (9.6, 3.6), True),
 }

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from fourbar.effects.actions import bodies
 from fourbar.linkage import BAR_NAMES, FIRST_PIN, MOVING_BARS, PIN_FORCE
-from fourbar.show.plot.curves import force_name, note
+from fourbar.show.plot.curves import note
 from fourbar.show.plot.labels import Label, Labels
 from fourbar.show.plot.linkage import ENDS, components, mass_centre, pins
-from fourbar.show.plot.style import BAR_COLOURS, FORCE_COLOURS, INK, MUTED, quantity, unit_for
+from fourbar.show.plot.style import BAR_COLOURS, FORCE_COLOURS, INK, MUTED, force_name, quantity, unit_for
 from fourbar.show.plot.view import Recorder, View
 from fourbar.solution import Conversion
 

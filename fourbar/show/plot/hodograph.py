@@ -5,8 +5,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fourbar.show.plot.curves import broken, force_name, limit_of, note, poles
-from fourbar.show.plot.style import FORCE_COLOURS, FORCE_DASHES, FORCE_WIDTHS, MUTED, largest, number, unit_for
+from fourbar.show.plot.curves import broken, limit_of, note, poles
+from fourbar.show.plot.style import FORCE_COLOURS, MUTED, force_line, force_name, largest, number, unit_for
 from fourbar.show.plot.view import View
 from fourbar.solution import Array
 
@@ -39,14 +39,7 @@ def draw_hodograph(axes: "PolarAxes", view: View, names: tuple[str, ...] = tuple
         known = np.isfinite(direction)
         direction[known] = np.unwrap(direction[known])
         size = np.where(sizes[name] <= top, sizes[name], np.nan) if limit else sizes[name]
-        axes.plot(
-            broken(direction, where),
-            factor * broken(size, where),
-            color=FORCE_COLOURS[name],
-            ls=FORCE_DASHES[name],
-            lw=FORCE_WIDTHS[name],
-            label=force_name(name),
-        )
+        axes.plot(broken(direction, where), factor * broken(size, where), **force_line(name))
         axes.plot(direction[dots], factor * size[dots], "o", ms=2.8, color=FORCE_COLOURS[name], ls="none")
         first = int(np.argmax(np.isfinite(size)))
         axes.plot(

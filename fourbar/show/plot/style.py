@@ -29,6 +29,19 @@ FORCE_DASHES: dict[str, Any] = dict(
 )
 FORCE_WIDTHS = dict(zip(PIN_FORCES, (2.6, 2.0, 1.6, 1.1), strict=True))
 """Thick beneath thin: forces that are equal still show all four lines."""
+
+
+def force_line(name: str) -> dict[str, Any]:
+    """How the curve of a pin force is drawn and named."""
+    look = {"color": FORCE_COLOURS[name], "ls": FORCE_DASHES[name], "lw": FORCE_WIDTHS[name]}
+    return {**look, "label": force_name(name)}
+
+
+def force_name(name: str) -> str:
+    """F12 as it is typeset."""
+    return f"$F_{{{name[1:]}}}$"
+
+
 SETTINGS: dict[Any, Any] = {
     "font.family": "DejaVu Sans",  # ships with matplotlib: the same picture on every machine
     "font.size": 8.0,

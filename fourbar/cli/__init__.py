@@ -1,0 +1,47 @@
+"""The command `fourbar`; what a command needs is imported when it is called."""
+
+import sys
+
+import click
+
+from fourbar import __version__
+from fourbar.cli.draw import animate, plot
+from fourbar.cli.evaluate import analyze, classify, new
+from fourbar.cli.export import mjcf, sdf, usd
+from fourbar.cli.studies import extremes, tolerance
+from fourbar.errors import run
+
+
+@click.group(
+    invoke_without_command=True,
+    context_settings={"help_option_names": ["-h", "--help"]},
+    epilog="Begin with: fourbar new first.toml --lengths 300mm 100mm 250mm 220mm",
+)
+@click.version_option(__version__, "-V", "--version", prog_name="fourbar")
+@click.option("--traceback", is_flag=True, help="Show where an internal error happened.")
+@click.pass_context
+def group(context: click.Context, traceback: bool) -> None:
+    """Closed formulas of the planar four-bar linkage: from a scene file to driving torque and pin forces.
+
+    The checks against MuJoCo and Pinocchio are no part of the installed package: in a checkout, python -m validation.
+
+    Exit status: 0 all well (also when some positions do not assemble), 2 the input is bad, 3 the
+    environment or the program failed, 130 interrupted.
+    """
+    del traceback  # looked at where errors are reported
+    if context.invoked_subcommand is None:
+        click.echo(context.get_help())
+
+
+for command in (classify, new, analyze, tolerance, extremes, mjcf, sdf, usd, plot, animate):
+    group.add_command(command)
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Run a command and leave with its exit status."""
+    sys.exit(status(arguments))
+
+
+def status(arguments: list[str] | None = None) -> int:
+    """Run a command; what goes wrong becomes one line on standard error and an exit status."""
+    return run(group, "fourbar", arguments)

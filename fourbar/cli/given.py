@@ -1,0 +1,114 @@
+"""What the commands are given: scenes, numbers with units, places to write to."""
+
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from fourbar.errors import InputError
+
+if TYPE_CHECKING:
+    from fourbar.scene import Scene
+
+
+MOST_POSITIONS = 1_000_000
+"""Positions that `analyze` prints: about a gigabyte of text."""
+
+scene_argument = click.argument("scene", type=click.Path(path_type=Path))
+out_option = click.option("-o", "--out", type=click.Path(path_type=Path), required=True, metavar="FILE")
+or_out_option = click.option(
+    "-o", "--out", type=click.Path(path_type=Path), metavar="FILE", help="Write there instead."
+)
+units_option = click.option(
+    "--units", default="SI", metavar="UNITS", help='"imperial", or a list like "mm N.mm deg"; left out: SI.'
+)
+
+
+@contextmanager
+def named(path: Path) -> Iterator[None]:
+    """Mistakes of a scene that show only when it is solved name its file too."""
+    try:
+        yield
+    except InputError as error:
+        if error.file is None and error.key.startswith(
+            ("motion", "lengths", "bars", "drive", "loads", "effects", "tolerances")
+        ):
+            raise error.in_file(str(path)) from None
+        raise
+
+
+@contextmanager
+def waiting(scene: "Scene") -> Iterator[None]:
+    """A long free motion takes minutes: a terminal shows that it is running."""
+    if scene.motion.free is None:
+        yield
+        return
+    from fourbar.free_motion import STEPS
+    from fourbar.show.progress import running
+
+    with running(f"the free motion is integrated, in {STEPS} steps at most"):
+        yield
+
+
+def loaded(path: Path) -> "Scene":
+    """The scene of a file; InputError where it has more positions than can be printed."""
+    from fourbar.files import load
+    from fourbar.scene.motion import Free, Sweep
+
+    scene = load(path)
+    for key, described in (("motion.theta_2", scene.motion.theta_2), ("motion.free", scene.motion.free)):
+        if isinstance(described, (Sweep, Free)) and described.steps >= MOST_POSITIONS:
+            raise InputError(f"{key}.steps", described.steps, f"must be below {MOST_POSITIONS} here", str(path))
+    return scene
+
+
+def lengths_of(texts: tuple[str, ...]) -> list[float]:
+    """Ground, input, coupler and output, m."""
+    names = ("ground", "input", "coupler", "output")
+    return [number_of(f"length of {name}", text, "m", positive=True) for name, text in zip(names, texts, strict=True)]
+
+
+def number_of(key: str, text: str, unit: str, *, positive: bool = False) -> float:
+    """A number of the command line: bare in SI, or with a unit."""
+    from fourbar.linkage import require
+
+    try:
+        return require(key, float(text), positive=positive)
+    except ValueError:
+        from fourbar.files.units import UnitError, to_si
+
+        try:
+            return require(key, to_si(text, unit), positive=positive)
+        except UnitError as error:
+            raise InputError(key, text, f"{error}; must be a number in {unit}, or one with a unit") from None
+
+
+def angle_of(key: str, text: str) -> float:
+    """An angle with its unit, rad: a bare number may have been meant in either."""
+    try:
+        float(text)
+    except ValueError:
+        return number_of(key, text, "rad")
+    raise InputError(key, text, f'the unit is missing; did you mean "{text} deg"?')
+
+
+def terminal_width() -> int | None:
+    """Columns of the terminal; None where the output goes elsewhere."""
+    if not sys.stdout.isatty():
+        return None
+    import shutil
+
+    return shutil.get_terminal_size().columns
+
+
+def printed_to(text: str, out: Path | None) -> None:
+    """To standard output, or to a file, whole or not at all."""
+    from fourbar.writing import write_text
+
+    if out is None:
+        click.echo(text, nl=False)
+    else:
+        write_text(out, text)
