@@ -27,7 +27,7 @@ KINDS = {getattr(effects, name).key: getattr(effects, name) for name in (*effect
 """Everything that can act, by key."""
 ABSENT = tuple(KINDS)
 WHOLE = 5
-"""Copies of the whole build, each counted with other idle functions beside the effects: what they differ by is noise
+"""Copies of the whole build, each counted with other idle functions next to the effects: what they differ by is noise
 of where things lie in memory, as a build without the file of an effect has it too."""
 IDLE = 40
 """Functions by which one copy has more than the one before: an effect has some ten, with their classes and words."""
