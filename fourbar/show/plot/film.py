@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fourbar.errors import DependencyError, InputError
+from fourbar.errors import DependencyError, InputError, installing
 from fourbar.scene import Scene
 from fourbar.show.acting import acting
 from fourbar.show.plot import symbols
@@ -50,7 +50,7 @@ def _ffmpeg() -> str:
 
         return str(get_ffmpeg_exe())
     except (ImportError, RuntimeError):
-        wanted = 'the program ffmpeg (or pip install "fourbar[film]")'
+        wanted = f"the program ffmpeg (or {installing('film')})"
         raise DependencyError(f"an .mp4 film needs {wanted}; .gif and .html do not") from None
 
 
