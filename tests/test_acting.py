@@ -92,12 +92,17 @@ def test_the_points_of_a_scene_are_drawn_where_they_are() -> None:
     with matplotlib_style():
         panels = compose(scene, painter, size, None, "one", fourbar.units("m m/s m/s^2")).subfigs[0].axes
     path = next(line for line in panels[0].lines if line.get_label() == "path of P")
+    assert {f"path of $G_{bar}$" for bar in (2, 4)} <= {line.get_label() for line in panels[0].lines}
     assert np.allclose(path.get_xydata(), solution.points["P"], rtol=0.0, atol=1e-15)
     for panel, own in zip(panels[1:], (solution.velocity, solution.acceleration), strict=True):
         line = next(line for line in panel.lines if line.get_label() == "P")
         assert np.allclose(line.get_ydata(), np.hypot(*own["P"].T), rtol=1e-15)
     assert drawing(scene, solution).count(f'stroke="{POINT}"') == 1
     data = page_data(scene, {})
+    speeds = data["branches"]["1"]["v_G4"]
+    assert speeds[data["theta_2"].index(float(solution.theta_2[7]))] == pytest.approx(
+        np.hypot(*solution.v_G4[7]), rel=1e-12
+    )
     assert data["points"][0]["name"] == "P" and abs(complex(*data["points"][0]["at"]) - cmath.rect(0.15, 0.7)) < 1e-15
     here = data["theta_2"].index(float(solution.theta_2[7]))
     assert data["branches"]["1"]["v_P"][here] == pytest.approx(float(np.hypot(*solution.velocity["P"][7])), rel=1e-12)

@@ -59,7 +59,7 @@ def test_instructions_are_judged_by_the_noise_of_the_whole_build(
 ) -> None:
     counted = iter([100.0, 100.1, 99.9, 100.12, 100.0, 100.35, 100.37])
     same = {"numbers": {}, "calls": [], "mjcf": ""}
-    monkeypatch.setattr(absent, "build", lambda root, _: root)
+    monkeypatch.setattr(absent, "build", lambda root, _: (root / "fourbar" / "effects").mkdir(parents=True))
     monkeypatch.setattr(absent, "made", lambda _: same)
     monkeypatch.setattr(absent, "counts", lambda *_: {"none": next(counted)})
     for module in (absent, cost):

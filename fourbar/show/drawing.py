@@ -29,6 +29,7 @@ def drawing(scene: Scene, solution: Solution) -> str:
     d, theta_1 = scene.linkage.ground, scene.linkage.ground_angle
     O2, O4 = np.zeros(2), d * np.array([math.cos(theta_1), math.sin(theta_1)])
     paths = [(solution.A, BARS[2]), (solution.B, BARS[4]), (solution.G3, BARS[3])]
+    paths += [(getattr(solution, f"G{n}"), BARS[n]) for n in (2, 4) if scene.linkage.bar(n).mass > 0.0]
     paths += [(path, POINT) for path in solution.points.values()]
     shown = np.concatenate([np.array([O2, O4]), *(path[good] for path, _ in paths)])
     low, high = shown.min(axis=0), shown.max(axis=0)

@@ -121,7 +121,7 @@ def _through_time(scene: Scene) -> dict[str, Any]:
     assert where.time is not None
     solution = solve(scene, at=where)
     solution.time = where.time
-    columns = _solved(solution)
+    columns = _solved(scene, solution)
     columns["theta_2"] = where.theta_2.tolist()
     if scene.motion.free is not None:
         del columns["torque"]
@@ -180,10 +180,10 @@ def _pace_in_time(scene: Scene, whole: Solution, rate: float, shown: int) -> str
 def _columns(scene: Scene, theta_2: Array) -> dict[str, Any]:
     """The solution on one branch, quantity by quantity."""
     own = command(replace(scene, motion=replace(scene.motion, theta_2=theta_2)))
-    return _solved(solve(scene, at=own))
+    return _solved(scene, solve(scene, at=own))
 
 
-def _solved(solution: Solution) -> dict[str, Any]:
+def _solved(scene: Scene, solution: Solution) -> dict[str, Any]:
     """Quantity by quantity, as lists."""
     columns: dict[str, Any] = {"sign": solution.branch.tolist()}
     if (solution.status_code != OK).any():
@@ -192,7 +192,8 @@ def _solved(solution: Solution) -> dict[str, Any]:
         values = getattr(solution, name)
         if values is not None:
             columns[name] = [_or_null(value) for value in values.tolist()]
-    points = {**{name: getattr(solution, name) for name in ("v_A", "v_B", "a_A", "a_B")}}
+    drawn = ("A", "B", *(f"G{bar}" for bar in MOVING_BARS if scene.linkage.bar(bar).mass > 0.0))
+    points = {f"{letter}_{name}": getattr(solution, f"{letter}_{name}") for letter in "va" for name in drawn}
     points |= {f"v_{name}": values for name, values in solution.velocity.items()}
     points |= {f"a_{name}": values for name, values in solution.acceleration.items()}
     for name, values in points.items():

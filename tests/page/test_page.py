@@ -68,7 +68,8 @@ def test_numbers_are_shown_in_the_units_of_the_page(browse) -> None:
     text = driver.find_element("tag name", "body").text
     assert "N mm" in text and "kN" in text and "rpm" in text and "rad/s²" in text and "Lengths (mm)" in text
     labels = [option.text for option in driver.find_elements("css selector", "#quantity option")]
-    assert "torque on bar 2, N mm" in labels and "|F₁₂|, kN" in labels
+    assert {"torque on bar 2, N mm", "|F₁₂|, kN", "acceleration of G₄, mm/s²"} <= set(labels)
+    assert len(driver.find_elements("css selector", "#traces .b2, #traces .b4")) == 2
     top = max(number(text.text) for text in driver.find_elements("css selector", "#chart text")[-3:] if text.text)
     assert top == pytest.approx(1e3 * s.torque.max(), rel=0.01)
 
@@ -233,9 +234,10 @@ def test_type_time_and_scene_file_follow_the_lengths(browse, tmp_path: Path) -> 
     driver.execute_cdp_cmd("Browser.setDownloadBehavior", {"behavior": "allow", "downloadPath": str(tmp_path)})
     driver.find_element("id", "download").click()
     until = time.monotonic() + 10.0
-    while not (tmp_path / "linkage.toml").exists() and time.monotonic() < until:
+    saved_file = tmp_path / "linkage.toml"
+    while not (saved_file.exists() and saved_file.stat().st_size) and time.monotonic() < until:  # made empty at first
         time.sleep(0.02)
-    assert (tmp_path / "linkage.toml").read_text() == state_of(driver, "sceneFile()")
+    assert saved_file.read_text() == state_of(driver, "sceneFile()")
 
 
 def test_the_page_names_a_linkage_as_fourbar_does(browse) -> None:

@@ -196,6 +196,11 @@ class DrakeTree(Pushed):
         self.needed = np.array(self.plant.CalcInverseDynamics(self.context, a, forces))
         return self.needed
 
+    def inertial(self, v: Array, a: Array) -> Array:
+        """Inverse dynamics with no force element."""
+        self.plant.SetVelocities(self.context, v)
+        return np.array(self.plant.CalcInverseDynamics(self.context, a, MultibodyForces(self.plant)))
+
     def accelerations(self) -> dict[str, Array]:
         """J a + (dJ/dt) v of each point."""
         points = {"A": "end2", "B": "end4", "G2": "G2", "G3": "G3", "G4": "G4"}

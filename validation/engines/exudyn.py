@@ -59,7 +59,7 @@ class ExudynConstraints:
             if effect.key not in ELEMENT_OF:
                 return Answer(NAME, "exact", refusal=f"Exudyn has no element for the effect {effect.key!r}")
         bars = ExudynBars(scene)
-        return answer_each(NAME, bars, lambda _, *speeds: bars.move(*speeds), command, OWN)
+        return answer_each(NAME, bars, bars.move, command, OWN)
 
 
 class ExudynBars:

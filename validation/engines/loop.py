@@ -11,7 +11,6 @@ lambda = F43 and e_drive = the derivative of the driven bar's rotation. Every nu
 import math
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from typing import Any, Protocol
 
 import numpy as np
@@ -88,6 +87,9 @@ class Tree(Bars, effects.Tree, Protocol):
 
     def torques(self, v: Array, a: Array) -> Array:
         """Generalised forces that the motion asks for beyond loads and effects, (3,), N m."""
+
+    def inertial(self, v: Array, a: Array) -> Array:
+        """The same of the bars alone: without loads, effects and gravity, (3,), N m."""
 
     def accelerations(self) -> dict[str, Array]:
         """Accelerations of A, B, G2, G3, G4 at the motion last given, (2,) each, m/s^2."""
@@ -170,9 +172,8 @@ def newton(tree: Bars, q: tuple[float, float, float], branch: int, closed: float
     return q if math.hypot(here[0], here[1]) <= closed else None
 
 
-Act = Callable[[Sequence[float], float, float], dict[str, Array | float]]
-"""Joint angles, omega_2, alpha_2: motion and forces where the bars are placed, by name; empty where a toggle leaves
-them 0/0."""
+Act = Callable[[float, float], dict[str, Array | float]]
+"""omega_2, alpha_2: motion and forces where the bars are placed, by name; empty where a toggle leaves them 0/0."""
 
 
 def answer_exactly(engine: str, build: Callable[[Scene], Tree], scene: Scene, command: Command) -> Answer:
@@ -182,16 +183,16 @@ def answer_exactly(engine: str, build: Callable[[Scene], Tree], scene: Scene, co
     tree.place((0.0, 0.0, 0.0))
     e_drive = tree.turn(scene.drive_bar)
 
-    bare = build(replace(scene, loads=(), effects=())) if scene.loads or scene.effects else None
+    alone = bool(scene.loads or scene.effects)
 
-    def act(q: Sequence[float], omega_2: float, alpha_2: float) -> dict[str, Array | float]:
-        return _motion_and_forces(tree, e_drive, omega_2, alpha_2, loaded, bare, q)
+    def act(omega_2: float, alpha_2: float) -> dict[str, Array | float]:
+        return _motion_and_forces(tree, e_drive, omega_2, alpha_2, loaded, alone=alone)
 
     own = (
         "assembly (Newton on its own gap), velocities (own Jacobian), accelerations (own dJ/dt v), "
         "inverse dynamics, effects from its own state, loop multipliers, pin forces"
     )
-    return answer_each(engine, tree, act, command, own, alone=bare is not None)
+    return answer_each(engine, tree, act, command, own, alone=alone)
 
 
 def answer_each(
@@ -232,7 +233,7 @@ def answer_each(
         values.update({name: points[name] for name in ("A", "B", "G2", "G3", "G4")})
         gap = max(gap, math.hypot(*bars.gap()))
         if command.omega_2 is not None:
-            values.update(act(q, float(omega_2[i]), float(alpha_2[i])))
+            values.update(act(float(omega_2[i]), float(alpha_2[i])))
         for name, value in values.items():
             out[name][i] = value
     for name in ANGLES:
@@ -256,20 +257,20 @@ def _motion_and_forces(
     omega_2: float,
     alpha_2: float,
     loaded: Sequence[str],
-    bare: Tree | None,
-    q: Sequence[float],
+    *,
+    alone: bool,
 ) -> dict[str, Array | float]:
     """Velocities, accelerations and forces where the tree is placed; nothing where a toggle leaves them 0/0.
 
     Effects that depend on the load of a pin (`loaded`) are given the loads of the pass before, until they repeat.
-    `bare` is the same tree without loads and effects, which makes the same motion at the joint angles `q`.
+    `alone`: with the torque of the bars without loads and effects, of the same motion.
     """
     jacobian = tree.jacobian()
     try:
-        v = np.array([omega_2, *np.linalg.solve(jacobian[:, 1:], -jacobian[:, 0] * omega_2)])
-        drift = tree.drift(v)
-        a = np.array([alpha_2, *np.linalg.solve(jacobian[:, 1:], -jacobian[:, 0] * alpha_2 - drift)])
+        v = _closed(jacobian, omega_2, 0.0, 0.0)
+        a = _closed(jacobian, alpha_2, *tree.drift(v).tolist())
         tree.pin_loads = {}
+        inertial = tree.inertial(v, a) if alone else None
         needed = tree.torques(v, a)
         values: dict[str, Array | float] = {}
         for bar in MOVING_BARS[1:]:
@@ -279,9 +280,8 @@ def _motion_and_forces(
         return {}
     try:
         matrix = np.column_stack((jacobian.T, e_drive))
-        if bare is not None:
-            bare.place(q)
-            values["torque_inertia"] = float(np.linalg.solve(matrix, bare.torques(v, a))[2])
+        if inertial is not None:
+            values["torque_inertia"] = float(np.linalg.solve(matrix, inertial)[2])
         forces = _forces(tree, matrix, needed)
         if loaded:
             settled = _settle(tree, loaded, forces, lambda: _forces(tree, matrix, tree.torques(v, a)))
@@ -292,6 +292,15 @@ def _motion_and_forces(
         return values
     values.update(forces)
     return values
+
+
+def _closed(jacobian: Array, of_2: float, x: float, y: float) -> Array:
+    """Rates of the three coordinates where J rates + (x, y) = 0 and bar 2 has its own; LinAlgError at a toggle."""
+    (e, a, b), (f, c, d) = jacobian.tolist()
+    x, y, det = x + e * of_2, y + f * of_2, a * d - b * c
+    if det == 0.0:
+        raise np.linalg.LinAlgError
+    return np.array([of_2, (b * y - d * x) / det, (c * x - a * y) / det])
 
 
 def _settle(

@@ -45,7 +45,7 @@ class OpenSimConstraints:
         if (reason := refusal(scene)) is not None:
             return Answer(NAME, "exact", refusal=reason)
         bars = OpenSimBars(scene)
-        answer = answer_each(NAME, bars, lambda _, *speeds: bars.move(*speeds), command, OWN)
+        answer = answer_each(NAME, bars, bars.move, command, OWN)
         if bars.least_conditioned < LEAST_CONDITIONED:
             reason = (
                 f"the matrix of Simbody's multipliers is conditioned by {bars.least_conditioned:.1e} at the worst; "

@@ -149,6 +149,14 @@ class PinocchioTree(Pushed):
         self.act(self.acting)
         return np.array(self._newton_euler(self.wrenches))
 
+    def inertial(self, v: Array, a: Array) -> Array:
+        """Recursive Newton-Euler without gravity."""
+        gravity = pin.Motion(self.model.gravity)
+        self.model.gravity = pin.Motion.Zero()
+        needed = np.array(pin.rnea(self.model, self.data, self.q, v, a))
+        self.model.gravity = gravity
+        return needed
+
     def _newton_euler(self, wrenches: dict[int, Array]) -> Any:
         for bar, (x, y, moment) in wrenches.items():
             rotation = self.data.oMi[self.joint[bar]].rotation

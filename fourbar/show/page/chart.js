@@ -6,9 +6,9 @@ const QUANTITIES = [
   angle("theta_3", "\u03b8\u2083"), angle("theta_4", "\u03b8\u2084"),
   other("omega_3", "\u03c9\u2083", "rad/s"), other("omega_4", "\u03c9\u2084", "rad/s"),
   other("alpha_3", "\u03b1\u2083", "rad/s^2"), other("alpha_4", "\u03b1\u2084", "rad/s^2"),
-  ...["A", "B", ...data.points.map(point => point.name)].flatMap(name => [other(`v_${name}`, `speed of ${name}`, "m/s"), other(`a_${name}`, `acceleration of ${name}`, "m/s^2")]),
+  ...["A", "B", ...[2, 3, 4].filter(k => data.centres[k]).map(k => `G${k}`), ...data.points.map(point => point.name)].flatMap(name => [other(`v_${name}`, `speed of ${typeset(name)}`, "m/s"), other(`a_${name}`, `acceleration of ${typeset(name)}`, "m/s^2")]),
   other("energy", "kinetic energy", "J"), other("torque", `torque on bar ${data.drive_bar}`, "N m"),
-  ...FORCES.map(name => other(name, `|F${name.slice(1).replace(/./g, d => "\u2080\u2081\u2082\u2083\u2084"[d])}|`, "N")),
+  ...FORCES.map(name => other(name, `|${typeset(name)}|`, "N")),
 ];
 const chart = byId("chart");
 let plotted = { values: [], x: () => 0, y: () => 0 };

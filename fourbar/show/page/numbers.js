@@ -37,6 +37,7 @@ const degrees = value => value === null || !Number.isFinite(value) ? "\u2013" : 
 
 // A number of an SI unit in the unit it is shown in, and that unit's name.
 const inUnit = (si, value) => value === null || value === undefined ? value : value * (data.units[si]?.[1] ?? 1);
+const typeset = name => /^(\|F\d\d\||F\d\d|G\d|theta_\d)$/.test(name) ? name.replace("theta_", "\u03b8").replace(/\d/g, d => "\u2080\u2081\u2082\u2083\u2084"[d]) : name;
 const nameOf = si => (data.units[si]?.[0] ?? si).replace("^2", "\u00b2");
 
 function valuesAt(i) {

@@ -71,8 +71,7 @@ function fit() {
     const p = at(i);
     if (!p) { broken = true; continue; }
     const g = coupler(p), reached = [p.A, p.B, p.O4, g];
-    for (const k of [2, 4]) if (data.centres[k]) reached.push(barPoint(p, k, data.centres[k]));
-    const own = data.points.map(point => framed(p, point.bar, point.at));
+    const own = [...[2, 4].filter(k => data.centres[k]).map(k => barPoint(p, k, data.centres[k])), ...data.points.map(point => framed(p, point.bar, point.at))];
     own.forEach((place, n) => { traces[n] = (traces[n] ?? "") + `${broken ? "M" : "L"}${place[0]} ${place[1]} `; });
     points.push(...reached, ...actingPoints(p), ...own);
     if (dynamic()) for (const name of FORCES) tips.push([p[FORCE_PIN[name]], ...arrowShares(name, i)]);
@@ -84,7 +83,8 @@ function fit() {
   parts.curve.setAttribute("d", curve.map(([step, g]) => step + toScreen(g).map(v => v.toFixed(2)).join(" ")).join(""));
   parts.traces.replaceChildren();   // in metres: the group carries the scale
   parts.traces.setAttribute("transform", `translate(${view.x} ${view.y}) scale(${view.k} ${-view.k})`);
-  for (const d of traces) make(parts.traces, "path", { class: "trace", d, "vector-effect": "non-scaling-stroke" });
+  const of = [...[2, 4].filter(k => data.centres[k]).map(k => `trace b${k}`), ...data.points.map(() => "trace")];
+  traces.forEach((d, n) => make(parts.traces, "path", { class: of[n], d, "vector-effect": "non-scaling-stroke" }));
   drawGround();
   scaleForces();
 }

@@ -2,7 +2,6 @@
 // Of the original lengths on the scene's branch: spreads at this position, their shares, and bands over the motion.
 const loose = data.tolerances, bands = byId("bands");
 let banded = null;
-const partName = part => part.replace(/^\|F(\d)(\d)\|$/, (_, i, j) => `|F${"₀₁₂₃₄"[i]}${"₀₁₂₃₄"[j]}|`).replace(/^theta_(\d)$/, (_, i) => `θ${"₀₁₂₃₄"[i]}`);
 const factorOf = spread => ({ rad: DEG, m: unit.factor }[spread.unit] ?? inUnit(spread.unit, 1));   // lengths as everywhere on the page
 const spreadUnit = spread => ({ rad: "deg", m: unit.name }[spread.unit] ?? nameOf(spread.unit));
 const spreadsShown = () => loose !== null && !edited && branch === data.branch && Object.keys(loose.parts).length > 0;
@@ -26,7 +25,7 @@ function showSpreads(i) {
   for (const [part, s] of Object.entries(loose.parts)) {
     const f = factorOf(s), scaled = name => s[name][i] === null ? null : s[name][i] * f, n = scaled("nominal"), worst = scaled("worst");
     const ends = ["low", "high", "least", "greatest"].map(name => within(n === null || scaled(name) === null ? null : n + scaled(name), worst));
-    cells(byId("spreads").tBodies[0], [`${partName(part)}, ${spreadUnit(s)}`, within(n, worst), text(scaled("deviation"), 3), ends[0], ends[1], `\u00b1${text(worst, 3)}`, ends[2], ends[3]]);
+    cells(byId("spreads").tBodies[0], [`${typeset(part)}, ${spreadUnit(s)}`, within(n, worst), text(scaled("deviation"), 3), ends[0], ends[1], `\u00b1${text(worst, 3)}`, ends[2], ends[3]]);
   }
   byId("shares").tBodies[0].replaceChildren();
   loose.keys.forEach((key, k) => {
@@ -58,8 +57,8 @@ function drawBands() {
 }
 
 if (loose !== null) {
-  byId("tolerance-quantity").replaceChildren(...Object.keys(loose.parts).map(part => new Option(partName(part), part)));
-  byId("shares").tHead.rows[0].append(...Object.keys(loose.parts).map(part => Object.assign(document.createElement("th"), { scope: "col", textContent: partName(part) })));
+  byId("tolerance-quantity").replaceChildren(...Object.keys(loose.parts).map(part => new Option(typeset(part), part)));
+  byId("shares").tHead.rows[0].append(...Object.keys(loose.parts).map(part => Object.assign(document.createElement("th"), { scope: "col", textContent: typeset(part) })));
   byId("tolerance-quantity").addEventListener("change", () => { drawBands(); showSpreads(row); });
 }
 

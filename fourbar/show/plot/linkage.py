@@ -118,7 +118,7 @@ def pin_name(name: str) -> str:
 
 
 def paths(view: View) -> list[tuple[Array, str, Any, str]]:
-    """Paths of A, B and the coupler's mass centre (or its mid-point): points (n, 2) in m, colour, dashes, name."""
+    """Paths of A, B, mass centres (or the coupler's mid-point) and own points: (n, 2) in m, colour, dashes, name."""
     sweep = view.sweep
     massive = view.scene.linkage.coupler.mass > 0.0
     middle = sweep.G3 if massive else 0.5 * (sweep.A + sweep.B)
@@ -127,6 +127,9 @@ def paths(view: View) -> list[tuple[Array, str, Any, str]]:
         (sweep.B, BAR_COLOURS[4], (0, (1, 2)), "path of $B$"),
         (middle, BAR_COLOURS[3], (0, (4, 1.5)), "coupler curve of " + ("$G_3$" if massive else "its mid-point")),
     ]
+    for bar, centre in ((2, sweep.G2), (4, sweep.G4)):
+        if view.scene.linkage.bar(bar).mass > 0.0:
+            found.append((centre, BAR_COLOURS[bar], (0, (6, 2, 1, 2)), f"path of $G_{bar}$"))
     found += [(path, POINT, (0, (3, 1, 1, 1)), f"path of {name}") for name, path in sweep.points.items()]
     closes = sweep.assembled[:, None]
     return [(np.where(closes, path, np.nan), colour, dashes, name) for path, colour, dashes, name in found]

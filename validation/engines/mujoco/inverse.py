@@ -184,6 +184,16 @@ class MujocoTree:
             mujoco.mj_applyFT(self.model, self.data, force, couple, self.data.xipos[body], body, applied)
         return np.asarray(self.data.qfrc_inverse - applied)
 
+    def inertial(self, v: Array, a: Array) -> Array:
+        """mj_inverse without gravity."""
+        gravity = self.model.opt.gravity.copy()
+        self.model.opt.gravity[:] = 0.0
+        self.data.qvel[:], self.data.qacc[:] = v, a
+        self.data.xfrc_applied[:] = 0.0
+        mujoco.mj_inverse(self.model, self.data)
+        self.model.opt.gravity[:] = gravity
+        return np.array(self.data.qfrc_inverse)
+
     def push(self, bar: int, force: Array, point: Array) -> None:
         """Add a force at a point, world axes, as force and couple at the mass centre; on the ground it does nothing."""
         if bar == 1:

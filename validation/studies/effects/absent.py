@@ -27,10 +27,12 @@ KINDS = {getattr(effects, name).key: getattr(effects, name) for name in (*effect
 """Everything that can act, by key."""
 ABSENT = tuple(KINDS)
 WHOLE = 5
-"""Counts of the whole build, each with other hashes of its words: what they differ by is noise, as what a build with
-fewer words differs by; addresses and allocations are in it too."""
+"""Copies of the whole build, each counted with other idle functions beside the effects: what they differ by is noise
+of where things lie in memory, as a build without the file of an effect has it too."""
+IDLE = 40
+"""Functions by which one copy has more than the one before: an effect has some ten, with their classes and words."""
 BEYOND_NOISE = 3.0
-"""An effect's count is another one beyond so many times the largest deviation among those."""
+"""An effect's count is another one beyond so many times the largest deviation among those copies."""
 TABLES = ("files/effects.py", "mjcf/effects.py")
 """Of the package, where an effect has a row."""
 PROBE = """
@@ -138,20 +140,23 @@ def compared(effects: tuple[str, ...]) -> Iterator[Trace]:
     """Each effect in turn."""
     with tempfile.TemporaryDirectory() as folder:
         roots = []
-        for number, effect in enumerate((None, *effects)):
+        for number, effect in enumerate((*[None] * WHOLE, *effects)):
             # names of one length: paths are part of what is counted
             roots.append(Path(folder).resolve() / f"{number:03d}")
             roots[-1].mkdir()
             build(roots[-1], effect)
+            if number < WHOLE:
+                with (roots[-1] / "fourbar" / "effects" / "__init__.py").open("a") as file:
+                    file.writelines(f"\n\ndef _idle_{k}() -> int:\n    return {k}\n" for k in range(IDLE * number))
         whole = made(roots[0])
-        usual, bound = _noise([_counted(roots[0], seed) for seed in range(WHOLE)] if available() else [])
-        for effect, root in zip(effects, roots[1:], strict=True):
+        usual, bound = _noise([_counted(root) for root in roots[:WHOLE]] if available() else [])
+        for effect, root in zip(effects, roots[WHOLE:], strict=True):
             more = _counted(root) / usual - 1.0 if available() else None
             yield Trace(effect, differences(whole, made(root)), more, bound)
 
 
-def _counted(root: Path, seed: int = 0) -> float:
-    return counts("formulas", ["none"], root, seed)["none"]
+def _counted(root: Path) -> float:
+    return counts("formulas", ["none"], root)["none"]
 
 
 def _noise(counted: list[float]) -> tuple[float, float]:

@@ -30,11 +30,8 @@ def available() -> bool:
     return shutil.which("valgrind") is not None and shutil.which("setarch") is not None
 
 
-def counts(engine: str, effects: Sequence[str], root: Path | None = None, seed: int = 0) -> dict[str, float]:
-    """Instructions of each effect per step or position, from another checkout where one is given.
-
-    `seed` fixes the hashes of Python's words: what depends on it is noise.
-    """
+def counts(engine: str, effects: Sequence[str], root: Path | None = None) -> dict[str, float]:
+    """Instructions of each effect per step or position, from another checkout where one is given."""
     if not available():
         raise DependencyError("valgrind and setarch are needed to count instructions")
     here = Path(__file__).parents[3] if root is None else root
@@ -44,7 +41,7 @@ def counts(engine: str, effects: Sequence[str], root: Path | None = None, seed: 
         settings = {
             **os.environ,
             **threads,
-            "PYTHONHASHSEED": str(seed),
+            "PYTHONHASHSEED": "0",
             "PYTHONPATH": str(here),
             "PYTHONDONTWRITEBYTECODE": "1",
         }
