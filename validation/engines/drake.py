@@ -18,10 +18,11 @@ from pydrake.multibody.tree import (
     SpatialInertia,
 )
 
-from fourbar.linkage import FIRST_PIN, MOVING_BARS
+from fourbar.linkage import MOVING_BARS
 from fourbar.scene import Command, Scene
 from validation.compare.answer import Answer, Array
-from validation.engines.effects import acting, unknown_effect
+from validation.engines import description
+from validation.engines.effects import Pushed, acting, unknown_effect
 from validation.engines.loop import answer_exactly, turned_ground
 
 NAME = "drake-inverse"
@@ -49,12 +50,12 @@ def refusal(scene: Scene) -> str | None:
         bar = scene.linkage.bar(number)
         if bar.mass == 0.0:
             return f"bar {number} has no mass; the reaction port of Drake divides by it"
-        if number != 2 and bar.moment_of_inertia + bar.mass * bar.mass_centre[0] ** 2 == 0.0:
+        if number != 2 and description.inertia(bar) + bar.mass * description.centre(bar)[0] ** 2 == 0.0:
             return f"bar {number} has no inertia about its pin; the reaction port of Drake divides by it"
     return None
 
 
-class DrakeTree:
+class DrakeTree(Pushed):
     """The open tree, built from the description."""
 
     def __init__(self, scene: Scene) -> None:
@@ -68,15 +69,15 @@ class DrakeTree:
         self.local: dict[str, tuple[int, Array]] = {}
         for number in MOVING_BARS:
             part = linkage.bar(number)
-            r, phi = part.mass_centre
+            r, phi = description.centre(part)
             centre = np.array([r * math.cos(phi), r * math.sin(phi), 0.0])
-            about_g = RotationalInertia(*[part.moment_of_inertia] * 3)
+            about_g = RotationalInertia(*[description.inertia(part)] * 3)
             inertia = SpatialInertia.MakeFromCentralInertia(part.mass, centre, about_g)
             body = plant.AddRigidBody(f"bar{number}", inertia)
             parent = self.body[2] if number == 3 else plant.world_body()
             at = RigidTransform(np.array([*foot[number], 0.0]))
             frame = plant.AddFrame(FixedOffsetFrame(f"foot{number}", parent.body_frame(), at))
-            joint = RevoluteJoint(FIRST_PIN[number], frame, body.body_frame(), UP)
+            joint = RevoluteJoint(description.FIRST_PIN[number], frame, body.body_frame(), UP)
             self.joint[number] = plant.AddJoint(joint)
             self.body[number] = body
             self.local |= {f"G{number}": (number, centre), f"end{number}": (number, np.array([part.length, 0.0, 0.0]))}
@@ -90,7 +91,6 @@ class DrakeTree:
         self.world = plant.world_frame()
         self.drive = scene.drive_bar
         self.v, self.a, self.needed = np.zeros(3), np.zeros(3), np.zeros(3)
-        self.wrenches: dict[int, Array] = {}
 
     def place(self, q: Sequence[float]) -> None:
         """Set the coordinates."""
@@ -188,9 +188,7 @@ class DrakeTree:
         """Inverse dynamics with gravity and what acts on the bars as external forces."""
         self.v, self.a = v, a
         self.plant.SetVelocities(self.context, v)
-        self.wrenches = {bar: np.zeros(3) for bar in MOVING_BARS}
-        for act in self.acting:
-            act()
+        self.act(self.acting)
         forces = MultibodyForces(self.plant)
         self.plant.CalcForceElementsContribution(self.context, forces)
         for bar, wrench in self.wrenches.items():
@@ -202,18 +200,6 @@ class DrakeTree:
         """Inverse dynamics with no force element."""
         self.plant.SetVelocities(self.context, v)
         return np.array(self.plant.CalcInverseDynamics(self.context, a, MultibodyForces(self.plant)))
-
-    def push(self, bar: int, force: Array, point: Array) -> None:
-        """Add a force at a point, world axes, as one at the first pin and a couple; on the ground it does nothing."""
-        if bar == 1:
-            return
-        x, y = point - self.foot(bar)
-        self.wrenches[bar] += (force[0], force[1], x * force[1] - y * force[0])
-
-    def twist(self, bar: int, couple: float) -> None:
-        """Add a couple; on the ground it does nothing."""
-        if bar != 1:
-            self.wrenches[bar][2] += couple
 
     def accelerations(self) -> dict[str, Array]:
         """J a + (dJ/dt) v of each point."""

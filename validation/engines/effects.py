@@ -5,11 +5,12 @@ No engine is named here, and nothing of the formulas' `act` is used: this is the
 
 import bisect
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
+from fourbar.linkage import MOVING_BARS
 from fourbar.scene import Scene
 from validation.compare.answer import Array
 from validation.engines.description import PINS, along_and_across, field
@@ -18,6 +19,33 @@ if TYPE_CHECKING:
     from fourbar.effects import Flywheel, Friction, Gravity, Load, PinFriction, Springs, Table, Torsion, Viscous
 
 Act = Callable[[], None]
+
+
+class Pushed:
+    """What acts on each moving bar, summed: a force at its first pin and a couple, (x, y, moment), N and N m."""
+
+    wrenches: dict[int, Array]
+
+    def foot(self, bar: int) -> Array:
+        """First pin of a bar, m, world axes."""
+        raise NotImplementedError
+
+    def act(self, acting: Sequence[Callable[[], None]]) -> None:
+        """Sum anew what these add."""
+        self.wrenches = {bar: np.zeros(3) for bar in MOVING_BARS}
+        for each in acting:
+            each()
+
+    def push(self, bar: int, force: Array, point: Array) -> None:
+        """Add a force at a point, world axes; on the ground it does nothing."""
+        if bar != 1:
+            x, y = point - self.foot(bar)
+            self.wrenches[bar] += (force[0], force[1], x * force[1] - y * force[0])
+
+    def twist(self, bar: int, couple: float) -> None:
+        """Add a couple; on the ground it does nothing."""
+        if bar != 1:
+            self.wrenches[bar][2] += couple
 
 
 class Tree(Protocol):

@@ -29,6 +29,7 @@ from exudyn.itemInterface import (
 from fourbar.linkage import MOVING_BARS, PIN_FORCE
 from fourbar.scene import Command, Scene
 from validation.compare.answer import Answer, Array
+from validation.engines import description
 from validation.engines.exudyn_elements import ELEMENT_OF, add_load
 from validation.engines.loop import answer_each, turned_ground
 
@@ -76,10 +77,10 @@ class ExudynBars:
         self.local: dict[str, tuple[int, tuple[float, float]]] = {}
         for bar in MOVING_BARS:
             part = linkage.bar(bar)
-            r, phi = part.mass_centre
+            r, phi = description.centre(part)
             centre = (r * math.cos(phi), r * math.sin(phi))
             self.node[bar] = mbs.AddNode(NodeRigidBody2D())
-            about_pin = part.moment_of_inertia + part.mass * r * r
+            about_pin = description.inertia(part) + part.mass * r * r
             self.body[bar] = mbs.AddObject(
                 ObjectRigidBody2D(mass=part.mass, inertia=about_pin, centerOfMass=centre, nodeNumber=self.node[bar])
             )

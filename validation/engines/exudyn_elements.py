@@ -18,7 +18,8 @@ from exudyn.itemInterface import (
     ObjectGenericODE2,
 )
 
-from fourbar.linkage import MOVING_BARS, PINS
+from fourbar.linkage import MOVING_BARS
+from validation.engines.description import PINS, along_and_across, field
 from validation.engines.effects import look_up
 from validation.engines.loop import turned_ground
 
@@ -60,7 +61,7 @@ def _gravity(effect: Any, bars: "ExudynBars") -> None:
     """`LoadMassProportional` on each body."""
     for bar in MOVING_BARS:
         marker = bars.mbs.AddMarker(MarkerBodyMass(bodyNumber=bars.body[bar]))
-        bars.mbs.AddLoad(LoadMassProportional(markerNumber=marker, loadVector=[*effect.vector, 0.0]))
+        bars.mbs.AddLoad(LoadMassProportional(markerNumber=marker, loadVector=[*field(effect), 0.0]))
 
 
 def _between(pin: str, bars: "ExudynBars") -> list[Any]:
@@ -101,7 +102,7 @@ def _springs(effect: Any, bars: "ExudynBars") -> None:
     for spring in effect.springs:
         markers = []
         for point in (spring.start, spring.end):
-            x, y = point.in_bar.real, point.in_bar.imag
+            x, y = along_and_across(point.distance, point.angle)
             markers.append(bars.point_marker(point.bar, *(turned_ground(line, x, y) if point.bar == 1 else (x, y))))
         bars.mbs.AddObject(
             ObjectConnectorSpringDamper(

@@ -15,6 +15,7 @@ import opensim as osim
 from fourbar.linkage import MOVING_BARS
 from fourbar.scene import Command, Scene
 from validation.compare.answer import Answer, Array
+from validation.engines import description
 from validation.engines.loop import answer_each, turned_ground
 from validation.engines.opensim_elements import ELEMENT_OF, ZERO, add_load, constants, vec, vector
 
@@ -63,7 +64,7 @@ def refusal(scene: Scene) -> str | None:
         if scene.linkage.bar(number).mass == 0.0:
             return f"bar {number} has no mass; OpenSim takes no such body at the end of a chain, and drops its inertia"
     crank = scene.linkage.input
-    if crank.moment_of_inertia + crank.mass * crank.mass_centre[0] ** 2 == 0.0:
+    if description.inertia(crank) + crank.mass * description.centre(crank)[0] ** 2 == 0.0:
         return "bar 2 has no inertia about O2; Simbody divides by it"
     return None
 
@@ -82,9 +83,9 @@ class OpenSimBars:
         self.centre: dict[int, tuple[float, float]] = {}
         for bar in MOVING_BARS:
             part = linkage.bar(bar)
-            r, phi = part.mass_centre
+            r, phi = description.centre(part)
             self.centre[bar] = r * math.cos(phi), r * math.sin(phi)
-            about_z = osim.Inertia(part.moment_of_inertia, part.moment_of_inertia, part.moment_of_inertia, *ZERO)
+            about_z = osim.Inertia(*[description.inertia(part)] * 3, *ZERO)
             self.body[bar] = osim.Body(f"bar{bar}", part.mass, vec(*self.centre[bar]), about_z)
             model.addBody(self.body[bar])
         foot_4 = (*turned_ground(self.ground_angle, linkage.ground, 0.0).tolist(), 0.0)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import opensim as osim
 
-from fourbar.linkage import PINS
+from validation.engines.description import PINS, along_and_across, field
 from validation.engines.effects import look_up
 from validation.engines.loop import turned_ground
 
@@ -71,7 +71,7 @@ def add_load(load: Any, bars: "OpenSimBars") -> None:
 
 def _gravity(effect: Any, bars: "OpenSimBars") -> None:
     """The model's own gravity."""
-    bars.model.setGravity(vec(*effect.vector))
+    bars.model.setGravity(vec(*field(effect)))
 
 
 def _pin_frames(pin: str, bars: "OpenSimBars", turn: float = 0.0) -> list[Any]:
@@ -116,7 +116,7 @@ def _springs(effect: Any, bars: "OpenSimBars") -> None:
     for number, spring in enumerate(effect.springs):
         ends: list[Any] = []
         for point in (spring.start, spring.end):
-            x, y = point.in_bar.real, point.in_bar.imag
+            x, y = along_and_across(point.distance, point.angle)
             ends += [bars.body[point.bar], vec(*(turned_ground(line, x, y) if point.bar == 1 else (x, y)))]
         rest = spring.length - spring.preload / spring.stiffness
         element = osim.PointToPointSpring(*ends, spring.stiffness, rest)

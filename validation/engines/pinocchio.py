@@ -11,7 +11,7 @@ from fourbar.linkage import MOVING_BARS
 from fourbar.scene import Command, Scene
 from validation.compare.answer import Answer, Array
 from validation.engines import description
-from validation.engines.effects import acting, unknown_effect
+from validation.engines.effects import Pushed, acting, unknown_effect
 from validation.engines.loop import answer_exactly, turned_ground
 
 NAME = "pinocchio-inverse"
@@ -30,7 +30,7 @@ class PinocchioInverse:
         return answer_exactly(NAME, PinocchioTree, scene, command)
 
 
-class PinocchioTree:
+class PinocchioTree(Pushed):
     """The open tree, built from the description."""
 
     def __init__(self, scene: Scene) -> None:
@@ -56,7 +56,6 @@ class PinocchioTree:
         self.q = np.zeros(3)
         self.v = np.zeros(3)
         self.a = np.zeros(3)
-        self.wrenches: dict[int, Array] = {}
         self.external = pin.StdVec_Force([pin.Force.Zero()] * model.njoints)
         self.ground_angle = theta_1
         self.pin_loads: dict[str, float] = {}
@@ -147,9 +146,7 @@ class PinocchioTree:
         """Recursive Newton-Euler with what acts on the bars as external forces."""
         self.v, self.a = v, a
         pin.forwardKinematics(self.model, self.data, self.q, v, a)
-        self.wrenches = {bar: np.zeros(3) for bar in MOVING_BARS}
-        for act in self.acting:
-            act()
+        self.act(self.acting)
         return np.array(self._newton_euler(self.wrenches))
 
     def inertial(self, v: Array, a: Array) -> Array:
@@ -166,18 +163,6 @@ class PinocchioTree:
             local = rotation.T @ np.array([x, y, 0.0])
             self.external[self.joint[bar]] = pin.Force(local, np.array([0.0, 0.0, moment]))
         return pin.rnea(self.model, self.data, self.q, self.v, self.a, self.external)
-
-    def push(self, bar: int, force: Array, point: Array) -> None:
-        """Add a force at a point, world axes; on the ground it does nothing."""
-        if bar == 1:
-            return
-        x, y = point - self.foot(bar)
-        self.wrenches[bar] += (force[0], force[1], x * force[1] - y * force[0])
-
-    def twist(self, bar: int, couple: float) -> None:
-        """Add a couple; on the ground it does nothing."""
-        if bar != 1:
-            self.wrenches[bar][2] += couple
 
     def accelerations(self) -> dict[str, Array]:
         """Accelerations of the points, from the frames."""
