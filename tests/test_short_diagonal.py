@@ -9,7 +9,7 @@ from fourbar.formulas.arithmetic import cross, dot
 from fourbar.formulas.motion import State, coefficients, rates, with_parallel_pairs, with_sines_of_rates
 from fourbar.formulas.path import path, state
 from fourbar.formulas.pin_forces import Body, Wrenches, coupler_about_B, pin_forces
-from fourbar.formulas.position import close_loop, direction, half_angle, loop, parallel_pairs
+from fourbar.formulas.position import Loop, close_loop, direction, half_angle, loop, parallel_pairs
 from fourbar.formulas.transmission import drive_sine
 from fourbar.linkage import uniform
 
@@ -108,6 +108,7 @@ def test_bars_that_stay_parallel_turn_as_one(lengths: tuple[float, ...], branch:
     k = coefficients(bars, at)
     exact = with_parallel_pairs(k, first, second)
     assert set(exact.h23[first]) <= {1.0} and set(exact.h23[second]) <= {0.0}  # however near the change point
+    assert set(exact.h43[first]) <= {1.0} and set(exact.h43[second]) <= {-1.0}
     for name in ("h3", "h4", "h23", "h43"):  # the formulas themselves, away from the change point, up to rounding
         assert np.allclose(getattr(k, name)[1:], getattr(exact, name)[1:], rtol=0.0, atol=64 * FEW_ROUNDINGS)
 
@@ -121,6 +122,23 @@ def two_readings() -> tuple[State, State]:
     sign = np.sign(drive_sine(by_2.at, 4))
     at, k = reading.motion(reading.position(theta_4, reading.half_angle(theta_4), sign), sign)
     return by_2, State(lengths, 0.0, by_2.theta_2, at, k, 1.0, rates(k, 1.0, 0.0))
+
+
+def test_a_loop_read_backwards_keeps_the_half_angle_that_it_was_closed_with() -> None:
+    _, by_4 = two_readings()
+    assert np.allclose(by_4.at.half.ss + by_4.at.half.kk, 1.0, rtol=0.0, atol=FEW_ROUNDINGS)
+
+
+def test_grounds_at_several_angles_are_those_of_each() -> None:
+    bars, theta_2 = uniform(0.3, 0.1, 0.25, 0.22), np.array([0.4, 1.0, 4.0])
+    lengths, theta_1 = loop(*bars.lengths), np.array([[0.0], [0.4], [1.0]])
+    many = path(Loop(*(length + 0.0 * theta_1 for length in lengths)), theta_1)
+    found = many.position(theta_2, many.half_angle(theta_2), 1)
+    for row, angle in enumerate(theta_1[:, 0]):
+        one = path(lengths, float(angle))
+        alone = one.position(theta_2, one.half_angle(theta_2), 1)
+        assert np.allclose(found.u2[row], alone.u2, rtol=0.0, atol=FEW_ROUNDINGS)
+        assert np.allclose(found.u2[row], np.exp(1j * theta_2), rtol=0.0, atol=FEW_ROUNDINGS)
 
 
 @pytest.mark.parametrize("pin", ["O2", "A", "B", "O4"])
