@@ -60,7 +60,7 @@ SOLVED = 100_000
 """Positions where every array is allocated, and for the error bars, which evaluate the forces 17 times."""
 PER_SCENE = 50_000
 """Positions in whose stead one random scene is judged: twenty of them by default."""
-JUDGED = "a scene judged by the exact engines, ms"
+JUDGED = "a scene judged by the exact engines"
 
 
 class Measured(NamedTuple):
@@ -152,7 +152,7 @@ def bench(positions: int, rounds: int, largest: int, picture: Path | None, again
     for what, measured in found.rows.items():
         limit = LIMITS.get(what)
         if limit is None:
-            table.add_row(what, f"{measured:.1f} ns/position")
+            table.add_row(what, f"{measured:.1f} {'ms' if what == JUDGED else 'ns/position'}")
             continue
         holds = limit.holds(measured)
         table.add_row(what, f"{measured:.2f}", f"{limit.sign} {limit.bound:g}", "holds" if holds else "fails")
