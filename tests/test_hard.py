@@ -15,12 +15,13 @@ from fourbar.scene import Command, Scene
 from tests.scenes import crank_rocker
 from validation.compare.answer import Answer
 from validation.compare.compare import COMPARED
-from validation.compare.rows import AGREES, DEGRADED, FAILS, VERDICTS
+from validation.compare.rows import AGREES, DEGRADED, FAILS, UNDECIDED, VERDICTS
 from validation.compare.tolerance import FULL_ACCURACY
 from validation.engines.hard_suite import HARD_WITNESSES, Hard
 from validation.engines.limits import LIMITS, Limit
 from validation.engines.mujoco import simulate
 from validation.engines.mujoco.closed_loop import ClosedLoop
+from validation.engines.mujoco.shipped import shipped
 from validation.engines.prediction import from_data, in_world_axes
 from validation.engines.witnesses import Witness
 from validation.report.hard_page import limit_rows, page
@@ -254,3 +255,15 @@ def test_a_golden_file_of_others_swept_through_its_change_point() -> None:
     assert s.status == ["ok", "singular", "ok"]
     assert s.torque is not None and np.isnan(s.torque[1]) and np.isfinite(s.torque[[0, 2]]).all()
     assert (np.sign(s.sin_mu[[0, 2]]) == 1.0).all()
+
+
+@pytest.mark.parametrize(
+    ("name", "why"),
+    [("speeds-+1e+6", "mjMAXVAL"), ("toggle-double-rocker-0-folded-open", "below 0.05"), ("speeds-+1e+3", None)],
+)
+def test_the_file_as_shipped_is_driven_within_the_declared_limits_of_mujoco(name: str, why: str | None) -> None:
+    suite = Hard()
+    scene = next(suite.scene(index) for index in range(len(suite)) if suite.name(index) == name)
+    row = shipped(name, scene, fourbar.command(scene))
+    assert row is not None
+    assert (row.verdict, why is None or why in row.reason) == (AGREES if why is None else UNDECIDED, True)

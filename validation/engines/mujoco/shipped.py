@@ -9,9 +9,10 @@ from fourbar.errors import InputError, LimitError, NotAssembledError
 from fourbar.mjcf import mjcf
 from fourbar.scene import Command, Scene
 from fourbar.scene.motion import BRANCH_NAMES
-from validation.compare.rows import AGREES, FAILS, Row
+from validation.compare.rows import AGREES, FAILS, UNDECIDED, Row
 from validation.compare.tolerance import EPS, SIMULATED, K
 from validation.engines.mujoco.closed_loop import O2, ClosedLoop
+from validation.engines.mujoco.limits import FASTEST, NEAREST_TOGGLE, least_sine
 
 NAME = "mujoco-simulated"
 QUANTITY = "as shipped"
@@ -58,10 +59,29 @@ def shipped(name: str, scene: Scene, at: Command) -> Row | None:
         moving = omega
     else:  # a motor: on from the keyframe
         moving = omega + scene.motion.alpha_2 * STEPS * loop.model.opt.timestep
+    if (beyond := _not_driven(scene, float(d.qpos[O2]), STEPS * loop.model.opt.timestep)) is not None:
+        error, reason = _worst(found)
+        verdict, reason = (FAILS, reason) if error > 1.0 else (UNDECIDED, f"the drive is not run: {beyond}")
+        return Row(name, NAME, "shipped", QUANTITY, error, 1.0, verdict, reason, float(d.qpos[O2]), 1.0)
     mujoco.mj_step(loop.model, d, STEPS)
     lost = d.time < 0.5 * STEPS * loop.model.opt.timestep
     speed = math.inf if lost else abs(float(d.qvel[O2]) - moving) / (SPEED * abs(omega))
     found.append((speed, f"after {STEPS} steps the input turns at {d.qvel[O2]:.6g} of {moving:.6g} rad/s"))
-    error, reason = max(found, key=lambda each: math.inf if math.isnan(each[0]) else each[0])
+    error, reason = _worst(found)
     verdict = AGREES if error <= 1.0 else FAILS
     return Row(name, NAME, "shipped", QUANTITY, error, 1.0, verdict, reason, float(d.qpos[O2]), 1.0)
+
+
+def _worst(found: list[tuple[float, str]]) -> tuple[float, str]:
+    return max(found, key=lambda each: math.inf if math.isnan(each[0]) else each[0])
+
+
+def _not_driven(scene: Scene, theta_2: float, seconds: float) -> str | None:
+    """The declared limit of the simulation that the first steps meet, or None."""
+    omega = abs(scene.motion.omega_2 or 0.0)
+    if omega > FASTEST.boundary:
+        return FASTEST.reason
+    ahead = np.array([theta_2, theta_2 + (scene.motion.omega_2 or 0.0) * seconds])
+    if not least_sine(scene.linkage, ahead, np.array([True, True])) >= NEAREST_TOGGLE.boundary:
+        return NEAREST_TOGGLE.reason
+    return None
