@@ -96,14 +96,12 @@ def piece(at: Command, where: NDArray[np.intp]) -> Command:
 def _blocks(name: str, scene: Scene, at: Command, solution: Solution) -> Row:
     """A sweep of more than one block of positions, at the ends of its blocks, against the scene's own sweep."""
     n = len(at.theta_2)
-    long = np.arange(BLOCK + n) % n
+    ok = np.flatnonzero(solution.status_code == OK)  # elsewhere loaded friction takes a search, at each repetition
+    long = np.concatenate((np.resize(ok if len(ok) else np.arange(n), BLOCK), np.arange(n)))
     ends = np.unique([0, BLOCK - 1, BLOCK, len(long) - 1])
-    loaded = any(effect.loaded_pins for effect in scene.effects)  # whose couples may take a search at each position
-    whole = solve(scene, "acceleration" if loaded else "force", at=piece(at, long))
-    error = np.zeros(len(ends))
-    if not loaded:
-        error += whole.status_code[ends] != solution.status_code[long[ends]]
-    for quantity in ("sin_mu", "B", "alpha_3", *(() if loaded else FORCES)):
+    whole = solve(scene, "force", at=piece(at, long))
+    error = (whole.status_code[ends] != solution.status_code[long[ends]]).astype(float)
+    for quantity in ("sin_mu", "B", "alpha_3", *FORCES):
         ours = getattr(solution, quantity)
         one, other = getattr(whole, quantity)[ends], ours[long[ends]]
         known = np.isfinite(magnitude(other))
