@@ -77,6 +77,7 @@ def _over(scene: Scene, answer: Answer, stated: Stated, predicted: Predicted | N
             if what == "mechanical advantage":
                 lost = expected["omega_4"] / np.abs(answer.quantities["omega_4"])
             bound = np.where(beyond, np.fmax(bound, DEGRADED * lost), bound)  # noqa: PLW2901
+            counts = counts & ~(bound >= NOTHING_TO_TELL)  # noqa: PLW2901
         if counts.any():
             most = np.flatnonzero(counts)[worst(used(error[counts], bound[counts]))]
             yield Finding(float(error[most]), float(bound[most]), float(at.theta_2[most]), what)
