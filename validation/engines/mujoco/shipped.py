@@ -59,7 +59,7 @@ def shipped(name: str, scene: Scene, at: Command) -> Row | None:
         moving = omega
     else:  # a motor: on from the keyframe
         moving = omega + scene.motion.alpha_2 * STEPS * loop.model.opt.timestep
-    if (beyond := _not_driven(scene, float(d.qpos[O2]), STEPS * loop.model.opt.timestep)) is not None:
+    if (beyond := _not_driven(scene, omega, float(d.qpos[O2]), STEPS * loop.model.opt.timestep)) is not None:
         error, reason = _worst(found)
         verdict, reason = (FAILS, reason) if error > 1.0 else (UNDECIDED, f"the drive is not run: {beyond}")
         return Row(name, NAME, "shipped", QUANTITY, error, 1.0, verdict, reason, float(d.qpos[O2]), 1.0)
@@ -76,12 +76,10 @@ def _worst(found: list[tuple[float, str]]) -> tuple[float, str]:
     return max(found, key=lambda each: math.inf if math.isnan(each[0]) else each[0])
 
 
-def _not_driven(scene: Scene, theta_2: float, seconds: float) -> str | None:
+def _not_driven(scene: Scene, omega_2: float, theta_2: float, seconds: float) -> str | None:
     """The declared limit of the simulation that the first steps meet, or None."""
-    omega = abs(scene.motion.omega_2 or 0.0)
-    if omega > FASTEST.boundary:
+    if abs(omega_2) > FASTEST.boundary:
         return FASTEST.reason
-    ahead = np.array([theta_2, theta_2 + (scene.motion.omega_2 or 0.0) * seconds])
-    if not least_sine(scene.linkage, ahead, np.array([True, True])) >= NEAREST_TOGGLE.boundary:
-        return NEAREST_TOGGLE.reason
-    return None
+    ahead = np.array([theta_2, theta_2 + omega_2 * seconds])
+    least = least_sine(scene.linkage, ahead, np.array([True, True]))
+    return None if least >= NEAREST_TOGGLE.boundary else NEAREST_TOGGLE.reason
