@@ -36,8 +36,8 @@ class Step:
 
     def sentence(self) -> str:
         """The step in one line: when, with what, and how many rows."""
-        counts = [f"{self.found.kinds[kind]} {kind.value}" for kind in Kind
-                  if kind not in NO_CHANGE and self.found.kinds[kind]]  # fmt: skip
+        kinds = [kind for kind in Kind if kind not in NO_CHANGE and self.found.kinds[kind]]
+        counts = [f"{self.found.kinds[kind]} {kind.value}" for kind in kinds]
         parts = [*map(str, self.found.scenes), ", ".join(counts), *map(str, self.found.other_times)]
         return f"{self.run.name}: {'; '.join(filter(None, parts))} [{self.made_with}]"
 
