@@ -186,7 +186,7 @@ def test_an_engine_that_raised_an_alarm_is_excused_by_no_prediction_of_its_own()
     witness = next(witness for witness in WITNESSES if witness.predictor == "own")
     answer = Answer(witness.name, "RK4", at, predicted={"torque": np.ones(len(at.theta_2))})
     predicted = predicting_from(witness, scene, at, answer)
-    assert predicted is not None and predicted(np.ones(len(at.theta_2), bool))["torque"][0] == 1.0
+    assert predicted is not None and predicted("torque", np.ones(len(at.theta_2), bool))[0] == 1.0
     answer.alarms.append("the loop is open")
     assert predicting_from(witness, scene, at, answer) is None
 

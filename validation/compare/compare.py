@@ -1,7 +1,7 @@
 """An engine's answer against the formulas: one row per quantity, at the position where it is worst."""
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -38,8 +38,8 @@ from validation.compare.tolerance import (
 )
 
 Mask = NDArray[np.bool_]
-Predicted = Callable[[Mask], Mapping[str, Array]]
-"""The error to be expected of each quantity, in its own unit, (n,); it matters at the positions of the mask alone."""
+Predicted = Callable[[str, Mask], Array]
+"""The error to be expected of a quantity, in its own unit, (n,); it matters at the positions of the mask alone."""
 Yardsticks = dict[str, tuple[Array, Array]]
 """Size and condition of each quantity at each position."""
 
@@ -185,7 +185,7 @@ class _Comparison:
             full, size = np.where(size == 0.0, 0.0, full), in_own_unit(size)
 
             def expected(where: Mask) -> Array:
-                return relative(predicted(where)[quantity], size)
+                return relative(predicted(quantity, where), size)
 
         error = relative_error(quantity, ours, theirs, size)
         return _found(error, condition, where, full, self.tolerance, expected), error, condition
