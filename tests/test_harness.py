@@ -231,7 +231,7 @@ def test_beyond_the_range_of_doubles_what_was_before_is_judged() -> None:
 
 
 class Counting(FreeBody):
-    """The free bodies, with who was started and what was asked."""
+    """The free bodies, with who was started and what it was given."""
 
     started = 0
 
@@ -240,18 +240,18 @@ class Counting(FreeBody):
 
 
 def test_an_engine_is_started_once_a_scene_and_no_question_is_put_twice(monkeypatch: pytest.MonkeyPatch) -> None:
-    asked: list[tuple[Scene, Command]] = []
+    put: list[tuple[Scene, Command]] = []
     true = FreeBody.answer
 
     def noting(self: FreeBody, scene: Scene, command: Command) -> Answer:
-        asked.append((scene, command))
+        put.append((scene, command))
         return true(self, scene, command)
 
     monkeypatch.setattr(FreeBody, "answer", noting)
     scene = crank_rocker()
     judge("scene", scene, [witness for witness in WITNESSES if witness.name == "free-body"])
-    assert len({(id(of), id(command)) for of, command in asked}) == len(asked)
+    assert len({(id(of), id(command)) for of, command in put}) == len(put)
     # nor of the bars without loads, which the answer holds too
-    assert [of for of, _ in asked if of.linkage is scene.linkage] == [scene]
+    assert [of for of, _ in put if of.linkage is scene.linkage] == [scene]
     judge("scene", scene, [Witness("free-body", f"{__name__}:Counting", EQUIVALENCE)])
     assert Counting.started == 1
