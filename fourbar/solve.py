@@ -1,7 +1,8 @@
 """From a scene to its solution: block by block over the positions, stage by stage, no further than wanted."""
 
+import cmath
 import os
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Iterable, KeysView, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 from importlib.util import find_spec
@@ -153,7 +154,7 @@ def last_stage(scene: Scene) -> str:
 
 def requested(
     scene: Scene, shape: tuple[int, ...], omega_2: Any, stage: str | None, out: Mapping[str, Array] | None
-) -> tuple[int, Collection[str]]:
+) -> tuple[int, KeysView[str]]:
     """The number of the last stage that is evaluated, and the names of the quantities; an InputError as of `solve`.
 
     Parameters
@@ -167,7 +168,7 @@ def requested(
         if stage not in STAGES:
             raise InputError("stage", stage, "must be one of " + ", ".join(STAGES))
         wanted = STAGES.index(stage)
-        names: Collection[str] = _names(wanted, _absent(scene), tuple(point.name for point in scene.points))
+        names = _names(wanted, _absent(scene), tuple(point.name for point in scene.points))
     else:
         names = out.keys()
         wanted = _highest_stage(out, shape, _stages(tuple(point.name for point in scene.points)))
@@ -197,10 +198,10 @@ def _stages(points: tuple[str, ...]) -> dict[str, str]:
 
 
 @cache
-def _names(wanted: int, absent: tuple[str, ...], points: tuple[str, ...]) -> tuple[str, ...]:
+def _names(wanted: int, absent: tuple[str, ...], points: tuple[str, ...]) -> KeysView[str]:
     """The quantities of the stages up to the last one wanted."""
     before = STAGES[: wanted + 1]
-    return tuple(name for name, of in _stages(points).items() if of in before and name not in absent)
+    return {name: of for name, of in _stages(points).items() if of in before and name not in absent}.keys()
 
 
 def solved(scene: Scene, at: Command, code: NDArray[np.uint8], result: Mapping[str, Array]) -> Solution:
@@ -210,7 +211,7 @@ def solved(scene: Scene, at: Command, code: NDArray[np.uint8], result: Mapping[s
         for start, arrays in own.items():
             if (array := result.get(start + point.name)) is not None:
                 arrays[point.name] = array
-    known = {name: array for name, array in result.items() if name in STAGE_OF}
+    known = {name: array for name, array in result.items() if name in STAGE_OF} if scene.points else result
     solution = Solution(scene.title, scene.drive_bar, code, np.asarray(at.branch), at.theta_2, **known)
     solution.points, solution.velocity, solution.acceleration = own[""], own["v_"], own["a_"]
     return solution
@@ -264,7 +265,7 @@ def _by_parts(
     where: Command,
     moved: "FreeMotion | None",
     wanted: int,
-    names: Collection[str],
+    names: KeysView[str],
     result: Mapping[str, Array],
     code: NDArray[np.uint8],
     quick: bool,
@@ -287,7 +288,7 @@ def _by_parts(
 
 
 def _alone(
-    case: Case, where: Command, wanted: int, names: Collection[str], code: NDArray[np.uint8]
+    case: Case, where: Command, wanted: int, names: KeysView[str], code: NDArray[np.uint8]
 ) -> dict[str, Array] | None:
     """A single position in plain numbers, for arrays of one entry cost several times as much; None where any is no
     number: there NumPy goes on with inf and NaN, and statuses follow."""
@@ -297,10 +298,11 @@ def _alone(
         return None
     code[0] = codes
     table = np.array([*values.values()], dtype=complex)
-    if not np.isfinite(table).all():
+    if not cmath.isfinite(np.vdot(table, table)):
         return None
-    pairs = table.view(float).reshape(-1, 1, 2)
-    return {name: pairs[i, :, 0] if is_scalar(name) else pairs[i] for i, name in enumerate(values)}
+    vectors = table.view(float).reshape(-1, 1, 2)
+    scalars = vectors[:, :, 0]
+    return {name: (scalars if KIND.get(name) == "scalar" else vectors)[i] for i, name in enumerate(values)}
 
 
 def _released(scene: Scene) -> "FreeMotion":

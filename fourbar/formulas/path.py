@@ -52,10 +52,10 @@ class Path(NamedTuple):
         u2 = vector(half.kk - half.ss, 2.0 * half.sk) if along else direction(q)
         if isinstance(turned, np.ndarray):  # of linkages
             u2 = np.where(turned, direction(q), u2)
-        at = close_loop(self.lengths, self.u1, u2, half, branch)
+        at = close_loop(self.lengths, self.u1, u2, half, branch, self.unit)
         if self.may_stay_parallel:
             at = parallel_position(at, *parallel_pairs(self.lengths, half, branch))
-        return at._replace(diagonal=at.diagonal * self.unit)
+        return at
 
     def angles(self, half: HalfAngle, branch: Number) -> tuple[Number, Number, Number]:
         """theta_3, theta_4 and the root alone, the arguments of what `close_loop` divides by lengths, in (-pi, pi].

@@ -149,7 +149,9 @@ class Case(NamedTuple):
             about_B = coupler_about_B(self.lengths, self.bodies[1], at, state.moving, sine)
             others = about_B if rounded is None else rounded(about_B)
 
-        def solved(acting: Actions, own: Wrenches, mass_at_A: Any, others: Any) -> PinForces:
+        def eliminate(
+            acting: Actions, own: Wrenches = own, mass_at_A: Any = mass_at_A, others: Any = others
+        ) -> PinForces:
             w, moment = acting.wrenches(own), 0.0
             if self.drive_bar == 4:
                 moment = -(acting.about_B() + others)
@@ -157,19 +159,15 @@ class Case(NamedTuple):
                 moment = acting.work()[1] - others
             return pin_forces(self.lengths, at, self.drive_bar, sine, w, mass_at_A, moment)
 
-        def eliminate(acting: Actions) -> PinForces:
-            return solved(acting, own, mass_at_A, others)
-
         def by_couples(acting: Actions) -> PinForces:
-            return solved(acting, Wrenches(), 0.0j, 0.0)
+            return eliminate(acting, Wrenches(), 0.0j, 0.0)
 
         pins = eliminate(actions)
-        found = Dynamics(pins, None)
+        settled: list[Any] = []
         for term in self.terms:  # a scene holds one effect of a kind, and one kind depends on the forces
             if term.loaded_pins:
-                settled = term.settle(actions, pins, eliminate, by_couples)  # type: ignore[attr-defined]
-                found = Dynamics(settled.pins, None, settled.from_jamming, settled.residual, settled.status)
-        return found._replace(torque=driving_torque(k, self.drive_bar, inertial, actions.work()[0]))
+                pins, *settled = term.settle(actions, pins, eliminate, by_couples)  # type: ignore[attr-defined]
+        return Dynamics(pins, driving_torque(k, self.drive_bar, inertial, actions.work()[0]), *settled)
 
     def drive_sine(self, at: Position) -> Any:
         """Sine between the two bars that are not driven."""

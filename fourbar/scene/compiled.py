@@ -240,7 +240,7 @@ def nearby(
     half = rounded_half_angle(in_unit, at.half, number(rows, 15, i), False, thirteen(signs, 2))
     in_unit = Loop(d, a, b, c, rounded_real(E1, signs[0]), rounded_real(E2, signs[1]))
     u2 = select(turned, at.u2, vector(half.kk - half.ss, 2.0 * half.sk))
-    near = close_loop(in_unit, at.u1, u2, half, number(rows, 14, i))
+    near = close_loop(in_unit, at.u1, u2, half, number(rows, 14, i), lengths.d / d)
     k = coefficients(in_unit, near)
     near = with_sines_of_rates(in_unit, near, k)
     near = Position(
@@ -249,7 +249,7 @@ def nearby(
         rounded_complex(near.u3, turned, signs[21], signs[22]),
         rounded_complex(near.u4, turned, signs[23], signs[24]),
         rounded_real(near.sin_mu, signs[17]),
-        rounded_complex(near.diagonal * (lengths.d / d), turned, signs[18], signs[250]),
+        rounded_complex(near.diagonal, turned, signs[18], signs[250]),
         near.e2,
         near.root,
         half,
@@ -306,9 +306,7 @@ def run(
             u2 = direction_of_tangent(of_theta_2[i])
         size = 4.0 * in_unit.a * in_unit.d
         close = undecided(half.outer, in_unit.E1, size) or undecided(half.inner, in_unit.E2, size)
-        at = close_loop(in_unit, u1, u2, half, number(rows, 14, i))
-        diagonal = at.diagonal * (lengths.d / in_unit.d)
-        at = Position(at.u1, at.u2, at.u3, at.u4, at.sin_mu, diagonal, at.e2, at.root, half)
+        at = close_loop(in_unit, u1, u2, half, number(rows, 14, i), lengths.d / in_unit.d)
         k = coefficients(in_unit, at)
         at = with_sines_of_rates(in_unit, at, k)
         v = rates(k, number(rows, 12, i), number(rows, 13, i))

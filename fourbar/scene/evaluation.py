@@ -1,6 +1,6 @@
 """Positions of a case evaluated stage by stage: by NumPy, by the compiled loop, along a free motion."""
 
-from collections.abc import Collection, Iterable
+from collections.abc import Iterable, KeysView
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -47,7 +47,7 @@ WITHOUT_FORCES = (NO_DIRECTION, WOUND)
 """Statuses of positions at which an effect has no value, and so the forces have none."""
 
 
-def commanded(case: Case, where: Command, part: Part, wanted: int, names: Collection[str]) -> Evaluated:
+def commanded(case: Case, where: Command, part: Part, wanted: int, names: KeysView[str]) -> Evaluated:
     """Some positions of a command to the input, evaluated.
 
     Parameters
@@ -71,11 +71,12 @@ def commanded(case: Case, where: Command, part: Part, wanted: int, names: Collec
     values = kinematics(case, state, names)
     if wanted >= FORCE:
         known = exact if wanted == ERROR else None
-        values |= _forces(case, state, alpha_2, branch, branch, codes, names, known)
+        codes, forces = _forces(case, state, alpha_2, branch, branch, codes, names, known)
+        values |= forces
     return codes, values, at
 
 
-def evaluated(case: Case, where: Command, part: Part, wanted: int, names: Collection[str]) -> Evaluated:
+def evaluated(case: Case, where: Command, part: Part, wanted: int, names: KeysView[str]) -> Evaluated:
     """The same through the compiled loop; what it leaves open as of `commanded`."""
     from fourbar.scene import compiled
 
@@ -113,10 +114,13 @@ def evaluated(case: Case, where: Command, part: Part, wanted: int, names: Collec
     return codes, values, None
 
 
-def _codes(sine: Any, half: HalfAngle, margin: float) -> NDArray[np.uint8]:
+def _codes(sine: Any, half: HalfAngle, margin: float) -> Any:
     """Statuses of positions from the sine of the transmission angle, or a multiple of it."""
-    codes, size = np.zeros(np.shape(sine), dtype=np.uint8), np.abs(sine)
-    if not (size.min(initial=np.inf) if codes.ndim else size) > margin:  # NaN where the loop does not close
+    size = abs(sine)
+    if type(size) is float and size > margin:
+        return OK
+    codes = np.zeros(np.shape(sine), dtype=np.uint8)
+    if not np.min(size, initial=np.inf) > margin:  # NaN where the loop does not close
         codes[size <= margin] = SINGULAR
         codes[np.isnan(sine)] = NOT_ASSEMBLED
         codes[np.isnan(half.kk)] = OVERFLOW  # of theta_2 - theta_1: not even where it closes is known
@@ -138,7 +142,7 @@ def _angles(case: Case, half: HalfAngle, branch: Any, names: Iterable[str]) -> E
     return codes, {name: found[name] for name in names}, None
 
 
-def freely(case: Case, moved: "FreeMotion", part: Part, wanted: int, names: Collection[str]) -> Evaluated:
+def freely(case: Case, moved: "FreeMotion", part: Part, wanted: int, names: KeysView[str]) -> Evaluated:
     """The same at instants of a free motion that have one independent angle; there is no driving torque."""
     codes = np.zeros(len(part[0]), dtype=np.uint8)
     if not codes.size:
@@ -151,7 +155,8 @@ def freely(case: Case, moved: "FreeMotion", part: Part, wanted: int, names: Coll
     values = kinematics(case, state, names)
     if wanted >= FORCE:
         exact = NOWHERE if wanted == ERROR else None
-        values |= _forces(free, state, growth, None, branch, codes, names, exact)
+        codes, forces = _forces(free, state, growth, None, branch, codes, names, exact)
+        values |= forces
         values |= {
             name: np.zeros(codes.shape) for name in values if name in ("torque", "torque_error", *OF_DRY_FRICTION)
         }
@@ -164,11 +169,11 @@ def _forces(
     alpha_2: Any,
     branch: NDArray[np.int8] | None,
     sign: Any,
-    codes: NDArray[np.uint8],
-    names: Collection[str],
+    codes: Any,
+    names: KeysView[str],
     exact: NDArray[np.intp] | None,
-) -> dict[str, Any]:
-    """The quantities of the force stage; statuses of effects go into the codes.
+) -> tuple[Any, dict[str, Any]]:
+    """The statuses with those of the effects, and the quantities of the force stage.
 
     Parameters
     ----------
@@ -179,7 +184,7 @@ def _forces(
     found = case.dynamics(state, alpha_2, case.side)
     values: dict[str, Any] = {**found.pins._asdict(), "torque": found.torque}
     if "drive_condition" in names:
-        condition = np.abs(case.drive_sine(state.at))
+        condition = abs(case.drive_sine(state.at))
         values["drive_condition"] = condition if found.from_jamming is None else condition * found.from_jamming
     if "friction_residual" in names:
         values["friction_residual"] = 0.0 if found.residual is None else found.residual
@@ -196,18 +201,15 @@ def _forces(
     if found.status is not None:
         without.append(found.status)
     if without:
-        status = np.max(without, axis=0)
-        codes[...] = np.where(codes == OK, status, codes)
+        codes = np.where(codes == OK, np.max(without, axis=0), codes).astype(np.uint8)
     if anywhere(codes > SINGULAR):
         gone = np.isin(codes, WITHOUT_FORCES)
         values |= {
             name: np.where(gone, no_value(value), value) for name, value in values.items() if name != "drive_condition"
         }
-    return {name: value for name, value in values.items() if name in names}
+    return codes, {name: value for name, value in values.items() if name in names}
 
 
 def _piece(value: float | Array | None, part: Part) -> float | Array:
     """A number for all positions, or the part of an array that belongs to a block."""
-    if value is None or np.ndim(value) == 0:
-        return value or 0.0
-    return value[part]  # type: ignore[index]
+    return value[part] if isinstance(value, np.ndarray) and value.ndim else value or 0.0

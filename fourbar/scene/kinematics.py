@@ -1,50 +1,54 @@
 """The quantities before the forces, from the positions of a case and their motion."""
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, KeysView
 from typing import Any
 
-import numpy as np
-
+from fourbar.formulas.arithmetic import angle
 from fourbar.formulas.motion import State
-from fourbar.linkage import MOVING_BARS
 from fourbar.scene.case import Case
+from fourbar.scene.point import OF_POINTS
 
-Quantity = Callable[[Case, State], Any]
-
-
-def _of_bar(evaluate: Callable[[Case, State, int], Any], bar: int) -> Quantity:
-    return lambda case, state: evaluate(case, state, bar)
-
-
-def _of_bars(name: str, evaluate: Callable[[Case, State, int], Any]) -> dict[str, Quantity]:
-    return {name.format(bar): _of_bar(evaluate, bar) for bar in MOVING_BARS}
-
-
-KINEMATIC: dict[str, Quantity] = {
-    "theta_3": lambda case, state: np.arctan2(state.at.u3.imag, state.at.u3.real),
-    "theta_4": lambda case, state: np.arctan2(state.at.u4.imag, state.at.u4.real),
-    "sin_mu": lambda case, state: state.at.sin_mu,
-    "condition": lambda case, state: np.abs(state.at.sin_mu),
-    "A": lambda case, state: state.point(2, case.lengths.a),
-    "B": lambda case, state: state.point(4, case.lengths.c),
-    **_of_bars("G{}", lambda case, state, bar: state.point(bar, case.bodies[bar - 2].z)),
-    **_of_bars("omega_{}", lambda case, state, bar: state.omega(bar)),
-    **_of_bars("alpha_{}", lambda case, state, bar: state.alpha(bar)),
-    "v_A": lambda case, state: state.velocity(2, case.lengths.a),
-    "v_B": lambda case, state: state.velocity(4, case.lengths.c),
-    **_of_bars("v_G{}", lambda case, state, bar: state.velocity(bar, case.bodies[bar - 2].z)),
-    "a_A": lambda case, state: state.acceleration(2, case.lengths.a),
-    "a_B": lambda case, state: state.acceleration(4, case.lengths.c),
-    **_of_bars("a_G{}", lambda case, state, bar: state.acceleration(bar, case.bodies[bar - 2].z)),
+OF_BARS: dict[str, Callable[[State], Any]] = {
+    "theta_3": lambda state: angle(state.at.u3),
+    "theta_4": lambda state: angle(state.at.u4),
+    "sin_mu": lambda state: state.at.sin_mu,
+    "condition": lambda state: abs(state.at.sin_mu),
+    "omega_2": lambda state: state.moving.omega_2,
+    "omega_3": lambda state: state.moving.omega_3,
+    "omega_4": lambda state: state.moving.omega_4,
+    "alpha_2": lambda state: state.moving.alpha_2,
+    "alpha_3": lambda state: state.moving.alpha_3,
+    "alpha_4": lambda state: state.moving.alpha_4,
 }
-"""The quantities before the forces."""
 
 
-def kinematics(case: Case, state: State, names: Collection[str]) -> dict[str, Any]:
+PLACES = frozenset(start + name for start in OF_POINTS for name in ("A", "B", "G2", "G3", "G4"))
+
+
+def kinematics(case: Case, state: State, wanted: KeysView[str]) -> dict[str, Any]:
     """Those of the quantities that come before the forces, a scene's own points among them."""
-    values = {name: KINEMATIC[name](case, state) for name in names if name in KINEMATIC}
+    values = {name: evaluate(state) for name, evaluate in OF_BARS.items() if name in wanted}
+    if not case.points and wanted.isdisjoint(PLACES):
+        return values
+    lengths, (two, three, four) = case.lengths, case.bodies
+    places: dict[int, list[tuple[str, Any]]] = {
+        2: [("A", lengths.a), ("G2", two.z)],
+        3: [("G3", three.z)],
+        4: [("B", lengths.c), ("G4", four.z)],
+    }
     for name, bar, z in case.points:
-        for start, evaluate in (("", state.point), ("v_", state.velocity), ("a_", state.acceleration)):
-            if start + name in names:
-                values[start + name] = evaluate(bar, z)
+        places.setdefault(bar, []).append((name, z))
+    for bar, of_bar in places.items():
+        u, foot, i_omega, turn = state.direction(bar), state.foot(bar), 1j * state.omega(bar), state.turn(bar)
+        v_foot = a_foot = 0.0
+        if bar == 3:
+            v_foot, a_foot = 1j * state.omega(2) * foot, state.turn(2) * foot
+        for name, z in of_bar:
+            r = z * u
+            if name in wanted:
+                values[name] = foot + r
+            if (velocity := f"v_{name}") in wanted:
+                values[velocity] = v_foot + i_omega * r
+            if (acceleration := f"a_{name}") in wanted:
+                values[acceleration] = a_foot + turn * r
     return values
