@@ -15,15 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.effects import Flywheel, Gravity, Load, Viscous
-from fourbar.formulas import arithmetic, motion, pin_forces, position, torque, transmission
+from fourbar.formulas import arithmetic, motion, path, pin_forces, position, torque
 from fourbar.formulas.arithmetic import anywhere, cross, polar, select, square_root, two_sum, vector
 from fourbar.formulas.motion import Coefficients, Rates, coefficients, rates, with_sines_of_rates
-from fourbar.formulas.path import NO_DIGIT_LEFT
+from fourbar.formulas.path import NO_DIGIT_LEFT, drive_sine_of_triangle
 from fourbar.formulas.pin_forces import Body, PinForces, Wrenches, coupler_about_B, inertia_wrenches
 from fourbar.formulas.pin_forces import pin_forces as pin_forces_of
 from fourbar.formulas.position import Loop, Position, close_loop, direction_of_tangent, half_angle_of_tangent
 from fourbar.formulas.torque import driving_torque, half_slope, inertia
-from fourbar.formulas.transmission import drive_sine_of_triangle
 from fourbar.linkage import MOVING_BARS, PINS
 from fourbar.scene import case as cases
 from fourbar.scene import error_bars as bars
@@ -340,7 +339,7 @@ LEAVES: tuple[tuple[Any, str], ...] = (
     (motion, "side_may_turn_fast side_turns_fast coefficients with_sines_of_rates rates"),
     (pin_forces, "about_first_pin inertia_wrenches coupler_about_B between pin_forces"),
     (torque, "inertia half_slope driving_torque"),
-    (transmission, "drive_sine_of_triangle"),
+    (path, "drive_sine_of_triangle"),
     (cases, "undecided"),
     (bars, "rounded_real rounded_complex rounded_half_angle rounded_coefficients bar"),
 )

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.formulas.arithmetic import select, two_sum, vector
+from fourbar.formulas.arithmetic import anywhere, select, two_sum, vector
 from fourbar.formulas.motion import Coefficients, State, rates, side_turns_fast
 from fourbar.formulas.path import read_backwards
 from fourbar.formulas.pin_forces import Body
@@ -43,7 +43,7 @@ class Roundings:
 
     def __call__(self, number: Any) -> Any:
         """Real numbers: the next double up or down, (EVALUATIONS, ...); each part of a complex one by itself."""
-        if np.iscomplexobj(number):
+        if isinstance(number, complex) or (isinstance(number, np.ndarray) and number.dtype.kind == "c"):
             return rounded_complex(number, self.turned, *self.next(2))
         return rounded_real(number, next(self.signs))
 
@@ -88,14 +88,13 @@ def error_bars(
     moving = moving._replace(**{name: rounded(rate) for name, rate in moving._asdict().items() if name not in stated})
     nearby = state._replace(at=near, k=k, moving=moving)
     other = moved.dynamics(nearby, acceleration, rounded=rounded)
-    torque = root_mean_square(np.abs(other.torque - found.torque))
-    forces = [root_mean_square(np.abs(after - before)) for before, after in zip(found.pins, other.pins, strict=True)]
-    largest = np.max([np.abs(force) for force in found.pins], axis=0)
-    shape = np.shape(found.torque)
-    return {
-        "torque_error": np.reshape(bar(torque, found.torque), shape),
-        "force_error": np.reshape(bar(np.max(forces, axis=0), largest), shape),
-    }
+    values, others = (*found.pins, found.torque), (*other.pins, other.torque)
+    spread = root_mean_square(np.array([after - before for before, after in zip(values, others, strict=True)]))
+    size = np.array([np.abs(value) for value in values]).reshape(spread.shape)
+    force_error, torque_error = bar(
+        np.array([spread[:4].max(axis=0), spread[4]]), np.array([size[:4].max(axis=0), size[4]])
+    ).reshape(2, *np.shape(found.torque))
+    return {"torque_error": torque_error, "force_error": force_error}
 
 
 def rounded_real(x: Any, sign: Any) -> Any:
@@ -105,8 +104,11 @@ def rounded_real(x: Any, sign: Any) -> Any:
 
 def rounded_complex(z: Any, turned: Any, of_x: Any, of_y: Any) -> Any:
     """Each part by itself; a ground at an angle mixes those of every direction, and each carries the larger's."""
-    size = np.maximum(np.abs(z.real), np.abs(z.imag))
-    return z + vector(select(turned, size, z.real) * of_x, select(turned, size, z.imag) * of_y)
+    x, y = z.real, z.imag
+    if anywhere(turned):
+        size = np.maximum(np.abs(x), np.abs(y))
+        return z + vector(select(turned, size, x) * of_x, select(turned, size, y) * of_y)
+    return vector(rounded_real(x, of_x), rounded_real(y, of_y))
 
 
 def rounded_half_angle(lengths: Loop, half: HalfAngle, lost: Any, known: Any, signs: Any) -> HalfAngle:
@@ -166,10 +168,11 @@ def rounded_coefficients(lengths: Loop, at: Position, k: Coefficients, signs: An
 
 
 def root_mean_square(changes: Any) -> Any:
-    """Of the sizes of the changes, (EVALUATIONS, ...), whose squares may be beyond the range of a double."""
-    largest = np.max(changes, axis=0)
-    unit = np.where(largest == 0.0, 1.0, largest)
-    return unit * np.sqrt(np.mean((changes / unit) ** 2, axis=0))
+    """Of the sizes of the changes, (..., EVALUATIONS, n), whose squares may be beyond the range of a double."""
+    size = np.abs(changes)
+    largest = size.max(axis=-2, keepdims=True)
+    size /= np.where(largest == 0.0, 1.0, largest)
+    return largest[..., 0, :] * np.sqrt(np.square(size).mean(axis=-2))
 
 
 def bar(spread: Any, value: Any) -> Any:

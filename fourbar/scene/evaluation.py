@@ -184,7 +184,7 @@ def _forces(
     found = case.dynamics(state, alpha_2, case.side)
     values: dict[str, Any] = {**found.pins._asdict(), "torque": found.torque}
     if "drive_condition" in names:
-        condition = abs(case.drive_sine(state.at))
+        condition = abs(case.path.drive_sine(state.at, case.drive_bar))
         values["drive_condition"] = condition if found.from_jamming is None else condition * found.from_jamming
     if "friction_residual" in names:
         values["friction_residual"] = 0.0 if found.residual is None else found.residual

@@ -237,5 +237,5 @@ def _derivatives(
             held |= ~np.broadcast_to(actions.turning(pin), held.shape) | (values(omega_2) == 0.0)
         dynamics = case.dynamics(state, alpha_2)
         found |= {**dynamics.pins._asdict(), "torque": dynamics.torque}
-        found["drive_condition"] = np.abs(case.drive_sine(position))
+        found["drive_condition"] = np.abs(case.path.drive_sine(position, case.drive_bar))
     return {name: found[name] for name in names}, held
