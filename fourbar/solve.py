@@ -15,7 +15,7 @@ from fourbar.errors import DependencyError, InputError, installing
 from fourbar.quantities import ANGLES, OF_DRY_FRICTION, OF_PIN_LOADS, QUANTITIES, STAGE_OF, STAGES
 from fourbar.scene import Command, Scene, command
 from fourbar.scene.case import Case, Evaluated
-from fourbar.scene.evaluation import ERROR, FORCE, Part, commanded, evaluated, freely
+from fourbar.scene.evaluation import ERROR, FORCE, Part, commanded, freely
 from fourbar.scene.point import OF_POINTS
 from fourbar.scene.start import refuse_wound, with_start
 from fourbar.scene.withheld import withheld
@@ -110,9 +110,18 @@ def is_compiled(case: Case, wanted: int, count: int, compiled: bool | None) -> b
         if compiled is None:
             return False
         raise DependencyError(f"compiled=True needs numba, which is not installed: {installing('fast')}")
-    from fourbar.scene.compiled import carries
+    from fourbar.scene.compiled_case import carries
 
     return carries(case)
+
+
+def evaluation(quick: bool) -> Callable[..., Evaluated]:
+    """Of some positions, by the compiled loop or by NumPy."""
+    if not quick:
+        return commanded
+    from fourbar.scene.compiled_case import evaluated
+
+    return evaluated
 
 
 def threads() -> int:
@@ -280,7 +289,7 @@ def _by_parts(
         if moved is not None:
             found = freely(case, moved, part, wanted, names)
         else:
-            found = (evaluated if quick else commanded)(case, where, part, wanted, names)
+            found = evaluation(quick)(case, where, part, wanted, names)
         keep(case, found, result, code, part, seen=quick)
         return found
 

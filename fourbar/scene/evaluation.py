@@ -1,15 +1,15 @@
 """Positions of a case evaluated stage by stage: by NumPy, by the compiled loop, along a free motion."""
 
-from collections.abc import Iterable, KeysView
+from collections.abc import Callable, Iterable, KeysView
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.formulas.arithmetic import anywhere, polar
-from fourbar.formulas.motion import Rates, State
+from fourbar.formulas.arithmetic import angle, anywhere
+from fourbar.formulas.motion import State
 from fourbar.formulas.path import NO_DIGIT_LEFT
-from fourbar.formulas.position import HalfAngle, Position
+from fourbar.formulas.position import HalfAngle
 from fourbar.quantities import (
     ANGLES,
     JAMMED,
@@ -18,16 +18,14 @@ from fourbar.quantities import (
     OF_DRY_FRICTION,
     OK,
     OVERFLOW,
-    PIN_FORCES,
     SINGULAR,
     STAGES,
-    UNKNOWNS,
     WOUND,
 )
 from fourbar.scene import Command
-from fourbar.scene.case import NO_MOTION, NOWHERE, Case, Evaluated, changed
-from fourbar.scene.kinematics import kinematics
-from fourbar.scene.withheld import all_finite, no_value, withheld
+from fourbar.scene.case import NOWHERE, Case, Evaluated
+from fourbar.scene.point import OF_POINTS
+from fourbar.scene.withheld import no_value
 from fourbar.solution import Array
 
 if TYPE_CHECKING:
@@ -57,7 +55,7 @@ def commanded(case: Case, where: Command, part: Part, wanted: int, names: KeysVi
     theta_2: Any = where.theta_2[part]
     if theta_2.ndim == 0:
         theta_2 = theta_2.item()  # with Python's own numbers a formula takes half the time
-    branch = _sign(where.branch[part])
+    branch = sign_of(where.branch[part])
     half, exact = case.half_angle(theta_2, where.remainder)
     of_angles = len(names) <= len(ANGLES) and set(names) <= set(ANGLES)
     if of_angles and where.remainder is None and not case.path.may_stay_parallel:
@@ -66,7 +64,7 @@ def commanded(case: Case, where: Command, part: Part, wanted: int, names: KeysVi
     codes = _codes(at.sin_mu, half, NO_DIGIT_LEFT if where.remainder is None else 0.0)
     if anywhere(codes):  # velocities are 0/0
         at = at._replace(root=np.where(codes == SINGULAR, np.nan, at.root))
-    omega_2, alpha_2 = _piece(where.omega_2, part), _piece(where.alpha_2, part)
+    omega_2, alpha_2 = piece(where.omega_2, part), piece(where.alpha_2, part)
     state = case.state(case.path, theta_2, at, branch, omega_2, alpha_2, moving=wanted > 0)
     values = kinematics(case, state, names)
     if wanted >= FORCE:
@@ -74,44 +72,6 @@ def commanded(case: Case, where: Command, part: Part, wanted: int, names: KeysVi
         codes, forces = _forces(case, state, alpha_2, branch, branch, codes, names, known)
         values |= forces
     return codes, values, at
-
-
-def evaluated(case: Case, where: Command, part: Part, wanted: int, names: KeysView[str]) -> Evaluated:
-    """The same through the compiled loop; what it leaves open as of `commanded`."""
-    from fourbar.scene import compiled
-
-    theta_2, branch = where.theta_2[part], _sign(where.branch[part])
-    omega_2, alpha_2 = _piece(where.omega_2, part), _piece(where.alpha_2, part)
-    found = compiled.evaluate(case, theta_2, branch, omega_2, alpha_2, error_bars=wanted == ERROR)
-    u2, u3, u4, *pins = found.vectors
-    sin_mu, omega_3, omega_4, alpha_3, alpha_4, torque, sine, *errors = found.scalars
-    at = Position(polar(1.0, case.path.theta_1), u2, u3, u4, sin_mu, np.nan, np.nan, np.nan, NO_HALF_ANGLE)
-    moving = Rates(omega_2, omega_3, omega_4, alpha_2, alpha_3, alpha_4)
-    state = State(case.lengths, case.path.theta_1, theta_2, at, NO_MOTION, omega_2, moving)
-    values = kinematics(case, state, names)
-    others = dict(zip((*PIN_FORCES, "torque", "torque_error", "force_error"), (*pins, torque, *errors), strict=True))
-    others["drive_condition"] = np.abs(sine)
-    values |= {name: value for name, value in others.items() if name in names}
-    codes = np.zeros(theta_2.shape, dtype=np.uint8)
-    if found.left.any():
-        index = np.flatnonzero(found.left)
-
-        def own(number: Any) -> Any:
-            return number[index] if np.ndim(number) else number
-
-        left = changed(case, own)
-        where = Command(theta_2[index], own(where.branch[part]), own(omega_2), own(alpha_2))
-        rest = commanded(left, where, (...,), wanted, names)
-        withheld(left, rest)
-        codes[index] = rest[0]
-        for name, value in rest[1].items():
-            whole = np.array(np.broadcast_to(values[name], theta_2.shape))
-            whole[index] = value
-            values[name] = whole
-    elif all_finite({name: value for name, value in values.items() if name not in UNKNOWNS}):  # the loop saw to these
-        return codes, values, None
-    withheld(case, (codes, values, None))
-    return codes, values, None
 
 
 def _codes(sine: Any, half: HalfAngle, margin: float) -> Any:
@@ -127,7 +87,7 @@ def _codes(sine: Any, half: HalfAngle, margin: float) -> Any:
     return codes
 
 
-def _sign(branch: NDArray[np.int8]) -> Any:
+def sign_of(branch: NDArray[np.int8]) -> Any:
     """The branch of each position, or one number where all have the same."""
     if branch.ndim == 0 or (branch.size and branch.min() == branch.max()):
         return float(branch.flat[0]) if branch.ndim else float(branch)
@@ -210,6 +170,52 @@ def _forces(
     return codes, {name: value for name, value in values.items() if name in names}
 
 
-def _piece(value: float | Array | None, part: Part) -> float | Array:
+def piece(value: float | Array | None, part: Part) -> float | Array:
     """A number for all positions, or the part of an array that belongs to a block."""
     return value[part] if isinstance(value, np.ndarray) and value.ndim else value or 0.0
+
+
+OF_BARS: dict[str, Callable[[State], Any]] = {
+    "theta_3": lambda state: angle(state.at.u3),
+    "theta_4": lambda state: angle(state.at.u4),
+    "sin_mu": lambda state: state.at.sin_mu,
+    "condition": lambda state: abs(state.at.sin_mu),
+    "omega_2": lambda state: state.moving.omega_2,
+    "omega_3": lambda state: state.moving.omega_3,
+    "omega_4": lambda state: state.moving.omega_4,
+    "alpha_2": lambda state: state.moving.alpha_2,
+    "alpha_3": lambda state: state.moving.alpha_3,
+    "alpha_4": lambda state: state.moving.alpha_4,
+}
+
+
+PLACES = frozenset(start + name for start in OF_POINTS for name in ("A", "B", "G2", "G3", "G4"))
+
+
+def kinematics(case: Case, state: State, wanted: KeysView[str]) -> dict[str, Any]:
+    """Those of the quantities that come before the forces, a scene's own points among them."""
+    values = {name: evaluate(state) for name, evaluate in OF_BARS.items() if name in wanted}
+    if not case.points and wanted.isdisjoint(PLACES):
+        return values
+    lengths, (two, three, four) = case.lengths, case.bodies
+    places: dict[int, list[tuple[str, Any]]] = {
+        2: [("A", lengths.a), ("G2", two.z)],
+        3: [("G3", three.z)],
+        4: [("B", lengths.c), ("G4", four.z)],
+    }
+    for name, bar, z in case.points:
+        places.setdefault(bar, []).append((name, z))
+    for bar, of_bar in places.items():
+        u, foot, i_omega, turn = state.direction(bar), state.foot(bar), 1j * state.omega(bar), state.turn(bar)
+        v_foot = a_foot = 0.0
+        if bar == 3:
+            v_foot, a_foot = 1j * state.omega(2) * foot, state.turn(2) * foot
+        for name, z in of_bar:
+            r = z * u
+            if name in wanted:
+                values[name] = foot + r
+            if (velocity := f"v_{name}") in wanted:
+                values[velocity] = v_foot + i_omega * r
+            if (acceleration := f"a_{name}") in wanted:
+                values[acceleration] = a_foot + turn * r
+    return values

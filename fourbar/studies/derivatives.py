@@ -17,7 +17,7 @@ from fourbar.linkage import PIN_FORCE
 from fourbar.quantities import FORCES, NOT_ASSEMBLED, OK, SINGULAR, STAGE_OF, STAGES, STATUS_NAMES
 from fourbar.scene import Command, Scene, command
 from fourbar.scene.case import Case
-from fourbar.scene.kinematics import kinematics
+from fourbar.scene.evaluation import kinematics
 from fourbar.scene.motion import FromLimit
 from fourbar.scene.point import OF_POINTS
 from fourbar.solution import Array, Solution
