@@ -129,13 +129,14 @@ def close_loop(lengths: Loop, u1: Number, u2: Number, half: HalfAngle, branch: N
     d, a, b, c, _, _ = lengths
     e2 = half.inner + (b - c) * (b - c)
     root = branch * square_root(half.outer * half.inner)
-    diagonal = vector((d - a) + 2.0 * a * half.ss, -2.0 * a * half.sk) * u1
+    twice_a = 2.0 * a * unit
+    diagonal = vector((d - a) * unit + twice_a * half.ss, -twice_a * half.sk) * u1
     # e^2 + b^2 - c^2 and b^2 - e^2 - c^2 from the factor that the root is made of, so that u3, u4 keep their length
     at_A, at_O4 = half.inner + 2.0 * b * (b - c), 2.0 * c * (b - c) - half.inner
-    to_3, to_4 = 0.5 / (b * e2), 0.5 / (c * e2)
+    to_3, to_4 = (0.5 / unit) / (b * e2), (0.5 / unit) / (c * e2)
     u3 = diagonal * vector(at_A * to_3, root * to_3)
     u4 = diagonal * vector(at_O4 * to_4, root * to_4)
-    return Position(u1, u2, u3, u4, root * (0.5 / (b * c)), diagonal * unit, e2, root, half)
+    return Position(u1, u2, u3, u4, root * (0.5 / (b * c)), diagonal, e2, root, half)
 
 
 def parallel_pairs(lengths: Loop, half: HalfAngle, branch: Number) -> tuple[Number, Number]:
