@@ -83,7 +83,8 @@ def solve(
     wanted, names = requested(scene, (n,), where.omega_2, stage, out)
     code = np.zeros(n, dtype=np.uint8)
     with np.errstate(all="ignore"):
-        case = Case.of(with_start(scene) if wanted >= FORCE else scene)._replace(side=side)
+        turns = wanted >= FORCE and any(effect.counts_turns for effect in scene.effects)
+        case = Case.of(with_start(scene) if turns else scene)._replace(side=side)
         quick = moved is None and where.remainder is None and is_compiled(case, wanted, n, compiled)
         result = None
         if n == 1 and moved is None and out is None and not quick:

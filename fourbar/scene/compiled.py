@@ -133,7 +133,7 @@ def forces(
     )
     mass_at_A = vector(real_rounded(mass_at_A.real, signs, 51), real_rounded(mass_at_A.imag, signs, 52))
     if drive_bar == 4:
-        about_B = real_rounded(coupler_about_B(lengths, three, at, moving, sine), signs, 251)
+        about_B = real_rounded(coupler_about_B(lengths, three, at, moving, sine), signs, 86)
         moment = -(about_B + N3 - lengths.b * cross(at.u3, P3) + of_A - of_B)
     else:
         moment = Q + of_A * k.h3 - others
@@ -167,7 +167,7 @@ def nearby(
         rounded_complex(near.u3, turned, signs[21], signs[22]),
         rounded_complex(near.u4, turned, signs[23], signs[24]),
         rounded_real(near.sin_mu, signs[17]),
-        rounded_complex(near.diagonal, turned, signs[18], signs[250]),
+        rounded_complex(near.diagonal, turned, signs[18], signs[85]),
         near.e2,
         near.root,
         half,
