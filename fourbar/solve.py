@@ -30,7 +30,7 @@ BLOCK = 8000
 numbers is a little more than the C library hands out again without asking the system for fresh pages."""
 
 WORTH_COMPILING = 2_000_000
-"""Evaluations of the forces, one a position, with error bars 17: loading numba and the compiled loop costs as much."""
+"""Evaluations of the forces, one a position, with error bars ten: loading numba and the compiled loop costs as much."""
 
 PARTS_FOR_THREADS = 4
 
@@ -178,7 +178,7 @@ def requested(
         if stage not in STAGES:
             raise InputError("stage", stage, "must be one of " + ", ".join(STAGES))
         wanted = STAGES.index(stage)
-        names = _names(wanted, _absent(scene), tuple(point.name for point in scene.points))
+        names = _names(wanted, _absent(scene), tuple([point.name for point in scene.points]))
     else:
         names = out.keys()
         wanted = _highest_stage(out, shape, _stages(tuple(point.name for point in scene.points)))

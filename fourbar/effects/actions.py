@@ -57,19 +57,19 @@ class Actions:
         arm : from the bar's first pin to where it acts, complex, m, world axes.
         """
         if bar != 1:
-            force = self._rounded(force)
+            force = force if self.rounded is None else self.rounded(force)
             self.forces[bar] = self.forces[bar] + force if bar in self.forces else force
             self.moment(bar, cross(arm, force))
 
     def moment(self, bar: int, moment: Number) -> None:
         """A pure couple on a bar, N m; on the ground it does nothing."""
         if bar != 1:
-            moment = self._rounded(moment)
+            moment = moment if self.rounded is None else self.rounded(moment)
             self.moments[bar] = self.moments[bar] + moment if bar in self.moments else moment
 
     def couple(self, pin: str, couple: Number) -> None:
         """A couple on the second of the two bars that meet at a pin, and its opposite on the first, N m."""
-        couple = self._rounded(couple)
+        couple = couple if self.rounded is None else self.rounded(couple)
         self.couples[pin] = self.couples[pin] + couple if pin in self.couples else couple
 
     def work(self) -> tuple[Number, Number]:
@@ -128,6 +128,3 @@ class Actions:
                 if i != 1:
                     M[i - 2] = M[i - 2] - couple
         return Wrenches(R[0], R[1], R[2], M[0], M[1], M[2], self.couples.get("B", 0.0))
-
-    def _rounded(self, term: Number) -> Number:
-        return term if self.rounded is None else self.rounded(term)
