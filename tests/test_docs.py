@@ -159,6 +159,11 @@ def test_the_gallery_is_a_suite_with_pictures_and_sources() -> None:
     wiper = load(GALLERY / "wiper.toml").linkage
     assert math.degrees(fourbar.swing(wiper)) == pytest.approx(60.0, rel=1e-8)
     assert fourbar.time_ratio(wiper) == pytest.approx(1.0, rel=1e-8)
+    gear = fourbar.solve(load(GALLERY / "landing_gear.toml")).points["foot"]
+    assert gear[0] == pytest.approx([-0.250962, -0.162331], abs=2e-5)  # retracted: D of the source
+    assert gear[-1] == pytest.approx([0.654038, -1.067331], abs=3e-4)  # plumb under O4
+    pump_cranks = fourbar.solve(load(GALLERY / "double_crank_pump.toml")).omega_4 / math.tau * 60.0
+    assert (pump_cranks.min(), pump_cranks.max()) == pytest.approx((240.0, 375.0), rel=1e-3)
     curve = fourbar.coupler_curve(load(GALLERY / "hoecken.toml").linkage, 0.5, 0.0, steps=720)
     straight = curve.y < 0.4015
     assert straight.mean() > 0.5 and curve.y.min() > 0.3999 and curve.x[straight].max() - curve.x[straight].min() > 0.44
