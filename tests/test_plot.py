@@ -25,6 +25,7 @@ from fourbar.show.plot.freebody import free_body
 from fourbar.show.plot.style import matplotlib_style, number, plain, unit_for
 from fourbar.show.plot.transmission import free_place
 from fourbar.show.plot.view import CLEAR, common_position, on_branch, view
+from fourbar.solution import SI
 from tests.scenes import crank_rocker, thesis
 
 SIGNATURES = {"svg": b"<?xml", "png": b"\x89PNG", "pdf": b"%PDF"}
@@ -39,10 +40,10 @@ TOUCH = 1.0
 FULL_TURN = fourbar.Sweep(0.0, 2 * math.pi, 360)
 
 
-def composed(scene, name, branches="one", position=None):
+def composed(scene, name, branches="one", position=None, units=SI):
     painter, size, _ = FIGURES[name]
     with matplotlib_style():
-        return compose(scene, painter, size, position, branches)
+        return compose(scene, painter, size, position, branches, units)
 
 
 @pytest.mark.parametrize("file_format", plot.FORMATS)

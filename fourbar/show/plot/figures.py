@@ -2,13 +2,14 @@
 
 import math
 import textwrap
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from fourbar.errors import InputError
+from fourbar.errors import InputError, expect
+from fourbar.linkage import require
 from fourbar.scene import Scene
 from fourbar.show.plot import curves, freebody, hodograph, influence, linkage
 from fourbar.show.plot.labels import Labels
@@ -31,7 +32,6 @@ def _overview(figure: "SubFigure", shown: View, labels: Labels) -> None:
     if not shown.moves:
         panels = figure.subplot_mosaic([["linkage", "angles"], ["linkage", "mu"]], width_ratios=[1.15, 1.0])
         linkage.draw_linkage(panels["linkage"], shown, labels)
-        _path_legend(panels["linkage"])
         curves.draw_angles(panels["angles"], shown)
         draw_transmission(panels["mu"], shown)
         return
@@ -41,7 +41,6 @@ def _overview(figure: "SubFigure", shown: View, labels: Labels) -> None:
         per_subplot_kw={"polar": {"projection": "polar"}},
     )
     linkage.draw_linkage(panels["linkage"], shown, labels)
-    _path_legend(panels["linkage"])
     curves.draw_angles(panels["angles"], shown)
     curves.draw_velocities(panels["omega"], shown)
     curves.draw_accelerations(panels["alpha"], shown)
@@ -56,15 +55,8 @@ def _drive(axes: Any, shown: View) -> None:
     (curves.draw_torque if shown.scene.motion.free is None else curves.draw_energy)(axes, shown)
 
 
-def _path_legend(axes: Any) -> None:
-    legend = axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.005), ncols=3)
-    axes.set_title(axes.get_title(loc="left"), pad=6.0 + 12.0 * math.ceil(len(legend.get_texts()) / 3))
-
-
 def _linkage(figure: "SubFigure", shown: View, labels: Labels) -> None:
-    axes = figure.subplots()
-    linkage.draw_linkage(axes, shown, labels)
-    _path_legend(axes)
+    linkage.draw_linkage(figure.subplots(), shown, labels)
 
 
 def _coupler(figure: "SubFigure", shown: View, labels: Labels) -> None:
@@ -82,8 +74,7 @@ def _kinematics(figure: "SubFigure", shown: View, labels: Labels) -> None:
 def _points(figure: "SubFigure", shown: View, labels: Labels) -> None:
     """Paths, speeds and accelerations of points."""
     panels = figure.subplot_mosaic([["linkage", "speeds"], ["linkage", "accelerations"]], width_ratios=[1.15, 1.0])
-    linkage.draw_linkage(panels["linkage"], shown, labels)
-    _path_legend(panels["linkage"])
+    linkage.draw_linkage(panels["linkage"], shown, labels, moving=True)
     curves.draw_speeds(panels["speeds"], shown)
     curves.draw_point_accelerations(panels["accelerations"], shown)
 
@@ -108,7 +99,7 @@ def _free_bodies(figure: "SubFigure", shown: View, labels: Labels) -> None:
     if not np.isfinite(here.F12).all():  # type: ignore[arg-type]
         where = f"theta_2 = {math.degrees(here.theta_2[0]):.6g} deg"
         raise InputError("figure", "freebody", f"needs forces, which have no value at {where}: {here.status[0]}")
-    freebody.draw_free_bodies(list(figure.subplots(1, 3)), shown, labels)
+    freebody.draw_free_bodies(figure, shown, labels)
 
 
 FIGURES: dict[str, tuple[Painter, tuple[float, float], bool]] = {
@@ -167,7 +158,7 @@ def draw(
 def _painter(scene: Scene, figure: str, branches: str) -> tuple[Painter, tuple[float, float]]:
     """The painter and the size of a figure, where the scene has what it shows."""
     for key, value, allowed in (("figure", figure, tuple(FIGURES)), ("branches", branches, BRANCHES)):
-        if value not in allowed:
+        if not isinstance(value, str) or value not in allowed:
             raise InputError(key, value, "must be one of " + ", ".join(allowed))
     painter, size, dynamic = FIGURES[figure]
     if dynamic and scene.motion.omega_2 is None and not over_time(scene):
@@ -223,6 +214,9 @@ def compose(
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
+    expect("units", units, Mapping)
+    if position is not None:
+        position = require("position", position)
     scenes = [on_branch(scene, sign) for sign in (1, -1)] if branches == "both" else [scene]
     if position is None and len(scenes) > 1:
         position = common_position(scenes)
