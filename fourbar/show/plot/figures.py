@@ -119,42 +119,6 @@ FIGURES: dict[str, tuple[Painter, tuple[float, float], bool]] = {
 """Each figure: its painter, the size of one branch in inches, and whether it needs omega_2."""
 
 
-def draw(
-    scene: Scene,
-    path: str | Path,
-    figure: str = "overview",
-    *,
-    position: float | None = None,
-    branches: str = "one",
-    units: Conversion = SI,
-    dimensions: bool = False,
-    file_format: str | None = None,
-) -> None:
-    """Draw a figure of a scene into a file, whole or not at all; the same scene gives the same bytes.
-
-    Parameters
-    ----------
-    path : the file; its ending says which of svg, png and pdf is meant.
-    figure : one of `FIGURES`: "overview", "linkage", "coupler", "kinematics", "points", "torque",
-        "forces", "hodograph", "energy", "transmission", "freebody", "sensitivity".
-    position : theta_2 of the linkage and the free bodies, rad; left out: the scene's own.
-    branches : "one" (the scene's) or "both" (open and crossed, to the same scales).
-    units : in which numbers are drawn; left out: SI with the prefix that suits. Angles are in degrees.
-    dimensions : write the lengths of the bars at them.
-    file_format : svg, png or pdf where the path's ending does not say it.
-
-    Raises
-    ------
-    InputError : unknown figure, format or choice of branches; a figure of forces without omega_2.
-    NotAssembledError : there is no position to draw.
-    DependencyError : matplotlib is missing.
-    """
-    kind = format_of(path, file_format)
-    painter, size = _painter(scene, figure, branches)
-    with matplotlib_style():
-        save(compose(scene, painter, size, position, branches, units, dimensions), Path(path), kind)
-
-
 def _painter(scene: Scene, figure: str, branches: str) -> tuple[Painter, tuple[float, float]]:
     """The painter and the size of a figure, where the scene has what it shows."""
     for key, value, allowed in (("figure", figure, tuple(FIGURES)), ("branches", branches, BRANCHES)):
@@ -180,10 +144,10 @@ class Drawing:
         with matplotlib_style():
             return rendered(self.figure, "svg").decode("utf-8")
 
-    def save(self, path: str | Path) -> None:
-        """Write it as SVG, PNG or PDF by the ending of the path, whole or not at all."""
+    def save(self, path: str | Path, file_format: str | None = None) -> None:
+        """Write it as SVG, PNG or PDF, by the ending of the path, whole or not at all."""
         with matplotlib_style():
-            save(self.figure, Path(path), format_of(path))
+            save(self.figure, Path(path), format_of(path, file_format))
 
 
 def drawn(
@@ -195,10 +159,43 @@ def drawn(
     units: Conversion = SI,
     dimensions: bool = False,
 ) -> Drawing:
-    """A figure of a scene for a notebook (`scene.plot()`); parameters and errors are those of `draw`."""
+    """A figure of a scene for a notebook (`scene.plot()`).
+
+    Parameters
+    ----------
+    figure : one of `FIGURES`: "overview", "linkage", "coupler", "kinematics", "points", "torque",
+        "forces", "hodograph", "energy", "transmission", "freebody", "sensitivity".
+    position : theta_2 of the linkage and the free bodies, rad; left out: the scene's own.
+    branches : "one" (the scene's) or "both" (open and crossed, to the same scales).
+    units : in which numbers are drawn; left out: SI with the prefix that suits. Angles are in degrees.
+    dimensions : write the lengths of the bars at them.
+
+    Raises
+    ------
+    InputError : unknown figure or choice of branches; a figure of forces without omega_2.
+    NotAssembledError : there is no position to draw.
+    DependencyError : matplotlib is missing.
+    """
     painter, size = _painter(scene, figure, branches)
     with matplotlib_style():
         return Drawing(compose(scene, painter, size, position, branches, units, dimensions))
+
+
+def draw(
+    scene: Scene, path: str | Path, figure: str = "overview", *, file_format: str | None = None, **options: Any
+) -> None:
+    """Draw a figure of a scene into a file, whole or not at all; the same scene gives the same bytes.
+
+    Parameters
+    ----------
+    path : the file; its ending says which of svg, png and pdf is meant.
+    file_format : svg, png or pdf where the path's ending does not say it.
+    figure, options : those of `drawn`.
+
+    Raises as `drawn` does, and InputError for another format.
+    """
+    format_of(path, file_format)
+    drawn(scene, figure, **options).save(path, file_format)
 
 
 def compose(

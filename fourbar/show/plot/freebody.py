@@ -1,6 +1,7 @@
 """Free-body diagrams of the three moving bars, all forces to one scale."""
 
 import math
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -13,7 +14,7 @@ from fourbar.linkage import BAR_NAMES, FIRST_PIN, MOVING_BARS, PIN_FORCE
 from fourbar.show.plot.curves import note
 from fourbar.show.plot.labels import Label, Labels
 from fourbar.show.plot.linkage import ENDS, components, mass_centre, pins
-from fourbar.show.plot.style import BAR_COLOURS, FORCE_COLOURS, INK, MUTED, force_name, quantity, unit_for
+from fourbar.show.plot.style import BAR_COLOURS, FORCE_COLOURS, HEADED, INK, MUTED, force_name, quantity, unit_for
 from fourbar.show.plot.view import Recorder, View
 from fourbar.solution import Conversion
 
@@ -163,22 +164,8 @@ def _draw_one(
             short.append(f"{_words(arrow.text)} = {quantity(size, 'N', view.units)}")
             continue
         tip = (arrow.at[0] + scale * arrow.force[0], arrow.at[1] + scale * arrow.force[1])
-        axes.annotate(
-            "",
-            xy=tip,
-            xytext=arrow.at,
-            arrowprops={
-                "arrowstyle": "-|>",
-                "color": arrow.colour,
-                "lw": 1.5,
-                "shrinkA": 0,
-                "shrinkB": 0,
-                "mutation_scale": 9,
-                "ls": "--" if arrow.dashed else "-",
-            },
-            zorder=5,
-            annotation_clip=False,
-        )
+        look = {**HEADED, "color": arrow.colour, "mutation_scale": 9, "ls": "--" if arrow.dashed else "-"}
+        axes.annotate("", xy=tip, xytext=arrow.at, arrowprops=look, zorder=5, annotation_clip=False)
         labels.keep_off(axes, arrow.at, tip)
         labels.add(Label(axes, f"{arrow.text} = {quantity(size, 'N', view.units)}", tip, arrow.at, arrow.colour, 7.5))
     if short:
@@ -216,15 +203,7 @@ def _second_pin(bar: int) -> str:
 
 def _words(text: str) -> str:
     """A typeset name in plain letters, for the caption."""
-    return (
-        text.replace("$", "")
-        .replace("\\,", " ")
-        .replace("_{", "")
-        .replace("_", "")
-        .replace("{", "")
-        .replace("}", "")
-        .replace("-", "−")
-    )
+    return re.sub(r"[$_{}]", "", text.replace("\\,", " ")).replace("-", "−")
 
 
 def _scale_bar(axes: "Axes", scale: float, biggest: float, units: Conversion) -> None:
