@@ -26,6 +26,7 @@ from fourbar.show.plot.freebody import free_body
 from fourbar.show.plot.style import matplotlib_style, number, plain, unit_for
 from fourbar.show.plot.transmission import free_place
 from fourbar.show.plot.view import CLEAR, common_position, on_branch, view
+from fourbar.solution import SI
 from tests.scenes import crank_rocker, thesis
 
 SIGNATURES = {"svg": b"<?xml", "png": b"\x89PNG", "pdf": b"%PDF"}
@@ -48,7 +49,7 @@ def composed(scene, name, branches="one", position=None):
     """A figure of a scene, composed once for all that look at it."""
     painter, size, _ = FIGURES[name]
     with matplotlib_style():
-        return compose(scene, painter, size, position, branches)
+        return compose(scene, painter, size, position, branches, SI)
 
 
 @pytest.mark.parametrize("file_format", plot.FORMATS)
