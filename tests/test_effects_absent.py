@@ -5,6 +5,7 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import mujoco
 import pytest
@@ -16,6 +17,8 @@ from fourbar.mjcf import mjcf
 from tests.scenes import crank_rocker
 from tests.test_effects import ACTING
 from validation.cli import status
+from validation.report.record import Record
+from validation.run.judge import judge
 from validation.studies.effects import absent, cost
 from validation.studies.effects.absent import ABSENT, TABLES, build, differences, made
 
@@ -160,40 +163,37 @@ import sys
 import fourbar
 from validation.run.judge import judge
 link = fourbar.uniform(0.3, 0.1, 0.25, 0.22)
-motion = {motion}
-record = judge("scene", fourbar.Scene(link, motion))
+record = judge("scene", fourbar.Scene(link, fourbar.Motion(fourbar.Sweep(0.0, 6.0, 20))))
 print(sorted(name for name in ("mujoco", "pinocchio") if name in sys.modules))
 print(*record.left_out, sep="\\n")
-print(*sorted({{row.engine for row in record.rows}}))
+print(*sorted({row.engine for row in record.rows}))
 """
 
 
-def answers_of(motion: str) -> list[str]:
-    code = POSITIONS_ONLY.format(motion=motion)
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT)
-    return done.stdout.splitlines()
-
-
 def test_positions_alone_start_no_force_engine() -> None:
-    engines, *left_out, answered = answers_of("fourbar.Motion(fourbar.Sweep(0.0, 6.0, 20))")
+    done = subprocess.run([sys.executable, "-c", POSITIONS_ONLY], capture_output=True, text=True, check=True, cwd=ROOT)
+    engines, *left_out, answered = done.stdout.splitlines()
     assert engines == "[]" and answered == "formulas free-body"
     assert {line.split(":")[0] for line in left_out} == {"pinocchio-inverse", "mujoco-inverse", "mujoco-simulated"}
     assert all("the scene states positions only" in line for line in left_out)
 
 
+def moved(*motion: Any) -> Record:
+    return judge("scene", fourbar.Scene(fourbar.uniform(0.3, 0.1, 0.25, 0.22), fourbar.Motion(*motion)))
+
+
 @pytest.mark.parametrize(
     ("motion", "reason"),
     [
-        ("fourbar.Motion(fourbar.Sweep(0.0, 6.0, 20), 0.0)", "omega_2 is 0: nothing moves through time"),
-        ("fourbar.Motion(1.0, 2.0)", "one position is no motion through time"),
+        ((fourbar.Sweep(0.0, 6.0, 20), 0.0), "omega_2 is 0: nothing moves through time"),
+        ((1.0, 2.0), "one position is no motion through time"),
     ],
 )
-def test_what_does_not_move_through_time_is_not_simulated(motion: str, reason: str) -> None:
-    _, *left_out, answered = answers_of(motion)
-    assert left_out == [f"mujoco-simulated: {reason}"]
-    assert answered == "formulas free-body mujoco-inverse pinocchio-inverse"
+def test_what_does_not_move_through_time_is_not_simulated(motion: tuple[Any, float], reason: str) -> None:
+    record = moved(*motion)
+    assert record.left_out == [f"mujoco-simulated: {reason}"]
+    assert {row.engine for row in record.rows} == {"formulas", "free-body", "mujoco-inverse", "pinocchio-inverse"}
 
 
 def test_equal_positions_are_evaluated_once() -> None:
-    _, *left_out, _ = answers_of("fourbar.Motion([1.0, 1.0, 1.0], 2.0)")
-    assert "positions: all are the same, one is evaluated" in left_out
+    assert "positions: all are the same, one is evaluated" in moved([1.0, 1.0, 1.0], 2.0).left_out

@@ -253,3 +253,14 @@ class TestPlantedFaults:
         right = tree.angle
         monkeypatch.setattr(tree, "angle", lambda self, bar: right(self, bar) + 1e-13)
         assert {"theta_3", "theta_4"} <= set(self.judged(tree))
+
+
+def test_a_scene_before_leaves_nothing_behind() -> None:
+    """MuJoCo keeps one memory for the trees of an engine."""
+    linkage, at = bars(MECHANISMS["crank-rocker"]), Motion(np.linspace(0.0, 6.0, 5), 10.0, 3.0)
+    plain, loaded = Scene(linkage, at), Scene(replace(linkage, ground=0.31), at, 4, LOADS, EFFECTS)
+    engine = MujocoInverse()
+    engine.answer(loaded, command(loaded))
+    kept, fresh = (each.answer(plain, command(plain)).quantities for each in (engine, MujocoInverse()))
+    for name, values in fresh.items():
+        np.testing.assert_array_equal(kept[name], values, err_msg=name)

@@ -4,6 +4,7 @@ import math
 import subprocess
 import sys
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -40,10 +41,15 @@ TOUCH = 1.0
 FULL_TURN = fourbar.Sweep(0.0, 2 * math.pi, 360)
 
 
-def composed(scene, name, branches="one", position=None, units=SI):
+CRANK_ROCKER = crank_rocker()
+
+
+@cache
+def composed(scene, name, branches="one", position=None):
+    """A figure of a scene, composed once for all that look at it."""
     painter, size, _ = FIGURES[name]
     with matplotlib_style():
-        return compose(scene, painter, size, position, branches, units)
+        return compose(scene, painter, size, position, branches, SI)
 
 
 @pytest.mark.parametrize("file_format", plot.FORMATS)
@@ -87,7 +93,7 @@ def clashes(figure) -> list[tuple[str, str]]:
 
 @pytest.mark.parametrize("name", sorted(set(FIGURES) - {"energy"}))
 def test_every_figure_draws_both_branches_and_no_texts_overlap(name: str) -> None:
-    for scene, branches in ((crank_rocker(), "both"), (thesis(), "one")):
+    for scene, branches in ((CRANK_ROCKER, "both"), (thesis(), "one")):
         figure = composed(scene, name, branches)
         texts, page = texts_shown(figure), figure.bbox
         assert len(texts) > 5
@@ -97,7 +103,7 @@ def test_every_figure_draws_both_branches_and_no_texts_overlap(name: str) -> Non
 
 
 def test_every_axis_of_theta_2_is_in_degrees_and_every_axis_has_a_unit() -> None:
-    figure = composed(crank_rocker(), "overview")
+    figure = composed(CRANK_ROCKER, "overview")
     flat = [axes for axes in figure.axes if axes.name == "rectilinear"]
     assert len(flat) == 7
     for axes in flat:
@@ -342,7 +348,7 @@ def test_figures_that_a_motion_does_not_have_are_refused_in_one_line(tmp_path: P
 
 @pytest.mark.parametrize("name", ("overview", "coupler", "hodograph", "freebody"))
 def test_both_branches_are_drawn_to_one_scale(name: str) -> None:
-    figure = composed(crank_rocker(), name, "both")
+    figure = composed(CRANK_ROCKER, name, "both")
     half = len(figure.axes) // 2
     assert half and len(figure.axes) == 2 * half
     figure.draw_without_rendering()

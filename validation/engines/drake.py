@@ -225,6 +225,6 @@ class DrakeTree(Pushed):
         return {"F12": on[2], "F32": -on[3], "F14": on[4]}
 
 
-def _spatial(wrench: Array) -> Any:
+def _spatial(wrench: Sequence[float]) -> Any:
     x, y, couple = wrench
     return SpatialForce(np.array([0.0, 0.0, couple]), np.array([x, y, 0.0]))

@@ -24,7 +24,7 @@ Act = Callable[[], None]
 class Pushed:
     """What acts on each moving bar, summed: a force at its first pin and a couple, (x, y, moment), N and N m."""
 
-    wrenches: dict[int, Array]
+    wrenches: dict[int, list[float]]
 
     def foot(self, bar: int) -> Array:
         """First pin of a bar, m, world axes."""
@@ -32,15 +32,17 @@ class Pushed:
 
     def act(self, acting: Sequence[Callable[[], None]]) -> None:
         """Sum anew what these add."""
-        self.wrenches = {bar: np.zeros(3) for bar in MOVING_BARS}
+        self.wrenches = {bar: [0.0, 0.0, 0.0] for bar in MOVING_BARS}
         for each in acting:
             each()
 
     def push(self, bar: int, force: Array, point: Array) -> None:
         """Add a force at a point, world axes; on the ground it does nothing."""
         if bar != 1:
-            x, y = point - self.foot(bar)
-            self.wrenches[bar] += (force[0], force[1], x * force[1] - y * force[0])
+            (x, y), (f_x, f_y), wrench = (point - self.foot(bar)).tolist(), force.tolist(), self.wrenches[bar]
+            wrench[0] += f_x
+            wrench[1] += f_y
+            wrench[2] += x * f_y - y * f_x
 
     def twist(self, bar: int, couple: float) -> None:
         """Add a couple; on the ground it does nothing."""
@@ -178,20 +180,17 @@ def _flywheel(effect: "Flywheel", tree: Tree) -> Act:
 
 def _load(load: "Load", tree: Tree) -> Act:
     """A force at its point and a couple; in the bar's frame both vectors turn with the engine's bar."""
+    of_force, of_arm = (
+        np.array([size * math.cos(angle), size * math.sin(angle)])
+        for size, angle in (load.force or (0.0, 0.0), load.at)
+    )
 
     def act() -> None:
         factor = 1.0 if load.table is None else look_up(load.table, tree.angle(2))
         if load.force is not None:
-            f, f_angle = load.force
-            r, r_angle = load.at
-            x, y, at_x, at_y = (
-                *(f * math.cos(f_angle), f * math.sin(f_angle)),
-                *(r * math.cos(r_angle), r * math.sin(r_angle)),
-            )
+            force, arm = of_force, of_arm
             if load.frame == "bar":
-                force, arm = tree.turned(load.bar, x, y), tree.turned(load.bar, at_x, at_y)
-            else:
-                force, arm = np.array([x, y]), np.array([at_x, at_y])
+                force, arm = tree.turned(load.bar, *of_force), tree.turned(load.bar, *of_arm)
             tree.push(load.bar, factor * force, tree.centre(load.bar) + arm)
         tree.twist(load.bar, factor * load.moment)
 

@@ -22,11 +22,13 @@ from validation.compare.answer import Answer, Array
 from validation.engines import effects
 from validation.engines.description import FORCE_AT
 
-START_ANGLES = (
-    *((30, 30), (15, 15), (45, 45), (5, 5), (5, 120)),
-    *((120, 5), (60, 60), (2, 150), (150, 2), (1, 1)),
-)
-"""Degrees that bars 3 and 4 first make with the diagonal A to O4, tried in turn where the triangle of the lengths as
+START_ANGLES = np.radians(
+    (
+        *((30, 30), (15, 15), (45, 45), (5, 5), (5, 120)),
+        *((120, 5), (60, 60), (2, 150), (150, 2), (1, 1)),
+    )
+).tolist()
+"""rad that bars 3 and 4 first make with the diagonal A to O4, tried in turn where the triangle of the lengths as
 measured is none to start from; they alone served 8000 of 8000 linkages, in four times as many steps."""
 LONGEST_STEP = 0.5
 """rad; a longer Newton step leaves the region in which the gap is nearly linear."""
@@ -111,16 +113,18 @@ class Position:
         at = tree.positions()
         pin_a = at.get("A2", at["A"])
         diagonal = at["O4"] - pin_a
-        e = math.hypot(*diagonal)
-        b, c = math.hypot(*(at["B"] - at["A"])), math.hypot(*(at["B4"] - at["O4"]))
-        closed = ROUNDING * (math.hypot(*pin_a) + math.hypot(*at["O4"]) + b + c)
+        e, a, d, b, c = (
+            math.hypot(*vector.tolist())
+            for vector in (diagonal, pin_a, at["O4"], at["B"] - at["A"], at["B4"] - at["O4"])
+        )
+        closed = ROUNDING * (a + d + b + c)
         # with bar 2 held, the gap is stationary only where bars 3 and 4 lie along the diagonal: this is its least value
         if max(e - (b + c), abs(b - c) - e) > closed:
             return None
         phi = math.atan2(diagonal[1], diagonal[0])
         # the triangle as measured is the nearest start, also where a bar is a millionth of the others
-        triangle = (_triangle_angle(e, near, far) for near, far in ((b, c), (c, b)))
-        for alpha, beta in (tuple(triangle), *(map(math.radians, pair) for pair in START_ANGLES)):
+        triangle = _triangle_angle(e, b, c), _triangle_angle(e, c, b)
+        for alpha, beta in (triangle, *START_ANGLES):
             theta_3, theta_4 = phi + branch * alpha, phi + math.pi - branch * beta
             q = theta_2, math.remainder(theta_3 - theta_2, math.tau), math.remainder(theta_4, math.tau)
             found = newton(tree, q, branch, closed)
@@ -216,7 +220,8 @@ def answer_each(
     wanted = ("position",) if command.omega_2 is None else STAGES
     names = [name for name, stage in STAGE_OF.items() if stage in wanted and name not in NOT_ANSWERED]
     names += ["torque_inertia"] if alone and command.omega_2 is not None else []
-    out = {name: np.full((n, 2) if name in VECTORS else n, np.nan) for name in names}
+    missing = {name: (math.nan, math.nan) if name in VECTORS else math.nan for name in names}
+    rows: list[dict[str, Any]] = []
     assembled = np.zeros(n, dtype=bool)
     gap = 0.0
     position = Position(bars)
@@ -224,18 +229,18 @@ def answer_each(
     alpha_2 = np.broadcast_to(np.asarray(command.alpha_2, dtype=float), (n,))
     for i, (theta_2, branch) in enumerate(zip(command.theta_2.tolist(), command.branch.tolist(), strict=True)):
         q = position.find(theta_2, branch)
+        rows.append(missing)
         if q is None:
             continue
         assembled[i] = True
-        values: dict[str, Array | float] = {f"theta_{bar}": bars.angle(bar) for bar in (3, 4)}
-        values["sin_mu"] = math.sin(bars.angle(4) - bars.angle(3))
+        theta_3, theta_4 = bars.angle(3), bars.angle(4)
+        rows[i] = missing | {"theta_3": theta_3, "theta_4": theta_4, "sin_mu": math.sin(theta_4 - theta_3)}
         points = bars.positions()
-        values.update({name: points[name] for name in ("A", "B", "G2", "G3", "G4")})
+        rows[i].update({name: points[name] for name in ("A", "B", "G2", "G3", "G4")})
         gap = max(gap, math.hypot(*bars.gap()))
         if command.omega_2 is not None:
-            values.update(act(float(omega_2[i]), float(alpha_2[i])))
-        for name, value in values.items():
-            out[name][i] = value
+            rows[i].update(act(float(omega_2[i]), float(alpha_2[i])))
+    out = {name: np.array([row[name] for row in rows]) for name in names}
     for name in ANGLES:
         out[name][assembled] = np.unwrap(out[name][assembled])
     return Answer(
@@ -265,12 +270,12 @@ def _motion_and_forces(
     Effects that depend on the load of a pin (`loaded`) are given the loads of the pass before, until they repeat.
     `alone`: with the torque of the bars without loads and effects, of the same motion.
     """
-    jacobian = tree.jacobian()
+    jacobian = tree.jacobian().tolist()
     try:
         v = _closed(jacobian, omega_2, 0.0, 0.0)
         a = _closed(jacobian, alpha_2, *tree.drift(v).tolist())
         tree.pin_loads = {}
-        inertial = tree.inertial(v, a) if alone else None
+        inertial = [tree.inertial(v, a)] if alone else []
         needed = tree.torques(v, a)
         values: dict[str, Array | float] = {}
         for bar in MOVING_BARS[1:]:
@@ -279,12 +284,13 @@ def _motion_and_forces(
     except np.linalg.LinAlgError:
         return {}
     try:
-        matrix = np.column_stack((jacobian.T, e_drive))
-        if inertial is not None:
-            values["torque_inertia"] = float(np.linalg.solve(matrix, inertial)[2])
-        forces = _forces(tree, matrix, needed)
+        matrix = np.array([*jacobian, e_drive]).T
+        unknowns, *without = np.linalg.solve(matrix, np.array([needed, *inertial]).T).T
+        if without:
+            values["torque_inertia"] = float(without[0][2])
+        forces = _forces(tree, unknowns)
         if loaded:
-            settled = _settle(tree, loaded, forces, lambda: _forces(tree, matrix, tree.torques(v, a)))
+            settled = _settle(tree, loaded, forces, lambda: _forces(tree, np.linalg.solve(matrix, tree.torques(v, a))))
             if settled is None:  # no answer, rather than that of some pass
                 return values
             forces = settled
@@ -294,9 +300,9 @@ def _motion_and_forces(
     return values
 
 
-def _closed(jacobian: Array, of_2: float, x: float, y: float) -> Array:
+def _closed(jacobian: Sequence[Sequence[float]], of_2: float, x: float, y: float) -> Array:
     """Rates of the three coordinates where J rates + (x, y) = 0 and bar 2 has its own; LinAlgError at a toggle."""
-    (e, a, b), (f, c, d) = jacobian.tolist()
+    (e, a, b), (f, c, d) = jacobian
     x, y, det = x + e * of_2, y + f * of_2, a * d - b * c
     if det == 0.0:
         raise np.linalg.LinAlgError
@@ -322,16 +328,21 @@ def _settle(
     return None
 
 
-def _forces(tree: Tree, matrix: Array, needed: Array) -> dict[str, Any]:
+def _forces(tree: Tree, unknowns: Array) -> dict[str, Any]:
     """Driving torque and the four pin forces."""
-    unknowns: Array = np.asarray(np.linalg.solve(matrix, needed), dtype=np.float64)
     return {**tree.forces(unknowns[:2]), "F43": unknowns[:2], "torque": unknowns[2]}
+
+
+def turned_by(rotation: Sequence[Sequence[float]], x: float, y: float) -> Array:
+    """A vector turned by a matrix of two rows."""
+    (a, b), (c, d) = rotation
+    return np.array([a * x + b * y, c * x + d * y])
 
 
 def turned_ground(theta_1: float, x: float, y: float) -> Array:
     """World axes of a vector along and across the ground's line, as described."""
     cos, sin = math.cos(theta_1), math.sin(theta_1)
-    return np.array([cos * x - sin * y, sin * x + cos * y])
+    return turned_by(((cos, -sin), (sin, cos)), x, y)
 
 
 class LimitWatch:

@@ -12,7 +12,7 @@ from fourbar.scene import Command, Scene
 from validation.compare.answer import Answer, Array
 from validation.engines import description
 from validation.engines.effects import Pushed, acting, unknown_effect
-from validation.engines.loop import answer_exactly, turned_ground
+from validation.engines.loop import answer_exactly, turned_by, turned_ground
 
 NAME = "pinocchio-inverse"
 WORLD = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
@@ -52,11 +52,20 @@ class PinocchioTree(Pushed):
             model.appendBodyToJoint(joint, inertia, pin.SE3.Identity())
             self._add_frame(f"G{bar}", joint, centre)
             self._add_frame(f"end{bar}", joint, _at(part.length, 0.0))
-        self.data = model.createData()
+        self.data = data = model.createData()
         self.q = np.zeros(3)
         self.v = np.zeros(3)
         self.a = np.zeros(3)
         self.external = pin.StdVec_Force([pin.Force.Zero()] * model.njoints)
+        # the engine's own memory, read and written in place: to look it up again costs more than a pass of the engine
+        self.at = {name: data.oMf[frame].translation[:2] for name, frame in self.frame.items()}
+        self.first_pin = {bar: data.oMi[joint].translation[:2] for bar, joint in self.joint.items()}
+        self.rotation = {bar: data.oMi[joint].rotation[:2, :2] for bar, joint in self.joint.items()}
+        self.spin = {bar: (data.v[joint].angular, data.a[joint].angular) for bar, joint in self.joint.items()}
+        self.joint_force = {bar: data.f[joint].linear[:2] for bar, joint in self.joint.items()}
+        self.external_force = {
+            bar: (self.external[j].linear, self.external[j].angular) for bar, j in self.joint.items()
+        }
         self.ground_angle = theta_1
         self.pin_loads: dict[str, float] = {}
         self.acting = acting(scene, self)
@@ -73,11 +82,11 @@ class PinocchioTree(Pushed):
 
     def point(self, name: str) -> Array:
         """A point fixed in a bar, world axes, (2,)."""
-        return np.array(self.data.oMf[self.frame[name]].translation[:2])
+        return np.array(self.at[name])
 
     def gap(self) -> tuple[float, float]:
         """B on bar 3 minus B on bar 4."""
-        x, y = (self.point("end3") - self.point("end4")).tolist()
+        x, y = (self.at["end3"] - self.at["end4"]).tolist()
         return x, y
 
     def jacobian(self) -> Array:
@@ -108,7 +117,7 @@ class PinocchioTree(Pushed):
         """A vector of a bar in world axes, by the joint's rotation."""
         if bar == 1:
             return turned_ground(self.ground_angle, x, y)
-        return np.asarray(self.data.oMi[self.joint[bar]].rotation[:2, :2] @ (x, y))
+        return turned_by(self.rotation[bar].tolist(), x, y)
 
     def pin_load(self, pin: str) -> float:
         """Pin force of the last pass; none before the first."""
@@ -116,13 +125,13 @@ class PinocchioTree(Pushed):
 
     def foot(self, bar: int) -> Array:
         """First pin of a bar, (2,)."""
-        return np.zeros(2) if bar == 1 else np.array(self.data.oMi[self.joint[bar]].translation[:2])
+        return np.array(self.first_pin[bar])
 
     def angle(self, bar: int) -> float:
         """From the rotation matrix; the ground's line as described."""
         if bar == 1:
             return self.ground_angle
-        rotation = self.data.oMi[self.joint[bar]].rotation
+        rotation = self.rotation[bar]
         return math.atan2(rotation[1, 0], rotation[0, 0])
 
     def drift(self, v: Array) -> Array:
@@ -136,18 +145,18 @@ class PinocchioTree(Pushed):
 
     def velocity(self, bar: int) -> float:
         """Spin of the joint frame; the ground has none."""
-        return float(self.data.v[self.joint[bar]].angular[2]) if bar != 1 else 0.0
+        return float(self.spin[bar][0][2])
 
     def alpha(self, bar: int) -> float:
         """Angular acceleration of the joint frame; the ground has none."""
-        return float(self.data.a[self.joint[bar]].angular[2]) if bar != 1 else 0.0
+        return float(self.spin[bar][1][2])
 
     def torques(self, v: Array, a: Array) -> Array:
         """Recursive Newton-Euler with what acts on the bars as external forces."""
         self.v, self.a = v, a
         pin.forwardKinematics(self.model, self.data, self.q, v, a)
         self.act(self.acting)
-        return np.array(self._newton_euler(self.wrenches))
+        return np.array(self._newton_euler())
 
     def inertial(self, v: Array, a: Array) -> Array:
         """Recursive Newton-Euler without gravity."""
@@ -157,11 +166,11 @@ class PinocchioTree(Pushed):
         self.model.gravity = gravity
         return needed
 
-    def _newton_euler(self, wrenches: dict[int, Array]) -> Any:
-        for bar, (x, y, moment) in wrenches.items():
-            rotation = self.data.oMi[self.joint[bar]].rotation
-            local = rotation.T @ np.array([x, y, 0.0])
-            self.external[self.joint[bar]] = pin.Force(local, np.array([0.0, 0.0, moment]))
+    def _newton_euler(self) -> Any:
+        for bar, (x, y, moment) in self.wrenches.items():
+            force, couple = self.external_force[bar]
+            force[:2] = turned_by(self.rotation[bar].T.tolist(), x, y)
+            couple[2] = moment
         return pin.rnea(self.model, self.data, self.q, self.v, self.a, self.external)
 
     def accelerations(self) -> dict[str, Array]:
@@ -173,11 +182,8 @@ class PinocchioTree(Pushed):
         """What each joint transmits in a second pass with the loop force put back."""
         self.push(3, loop_force, self.point("end3"))
         self.push(4, -loop_force, self.point("end4"))
-        self._newton_euler(self.wrenches)
-        on = {}
-        for bar, joint in self.joint.items():
-            if bar != 1:
-                on[bar] = np.array((self.data.oMi[joint].rotation @ self.data.f[joint].linear)[:2])
+        self._newton_euler()
+        on = {bar: self.rotation[bar] @ self.joint_force[bar] for bar in MOVING_BARS}
         return {"F12": on[2], "F32": -on[3], "F14": on[4]}
 
 

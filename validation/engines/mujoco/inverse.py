@@ -13,9 +13,11 @@ from fourbar.scene import Command, Scene
 from validation.compare.answer import Answer, Array
 from validation.engines import description
 from validation.engines.effects import acting, unknown_effect
-from validation.engines.loop import answer_exactly, turned_ground
+from validation.engines.loop import answer_exactly, turned_by, turned_ground
 
 NAME = "mujoco-inverse"
+ENDS = {"A": "end2", "B": "end4", "G2": "G2", "G3": "G3", "G4": "G4"}
+"""Points whose acceleration is compared, and the sites that they are."""
 LEAST = 1e-15
 """kg and kg m^2; the compiler raises ValueError for a moving body below it (mjMINVAL, measured with 4.0.0)."""
 
@@ -25,12 +27,21 @@ class MujocoInverse:
 
     name = NAME
 
+    def __init__(self) -> None:
+        self.data: mujoco.MjData | None = None
+
     def answer(self, scene: Scene, command: Command) -> Answer:
         """Its answer, or the refusal that names an effect it does not know or a bar it cannot hold."""
         reason = refusal(scene)
         if reason is not None:
             return Answer(NAME, "exact", refusal=reason)
-        return answer_exactly(NAME, MujocoTree, scene, command)
+        return answer_exactly(NAME, self._tree, scene, command)
+
+    def _tree(self, scene: Scene) -> "MujocoTree":
+        """The tree of a scene, in the memory of the one before: allocating it takes MuJoCo longer than all its work."""
+        tree = MujocoTree(scene, self.data)
+        self.data = tree.data
+        return tree
 
 
 def refusal(scene: Scene) -> str | None:
@@ -50,7 +61,7 @@ def refusal(scene: Scene) -> str | None:
 class MujocoTree:
     """The open tree, built from the description with MjSpec."""
 
-    def __init__(self, scene: Scene) -> None:
+    def __init__(self, scene: Scene, data: mujoco.MjData | None = None) -> None:
         linkage = scene.linkage
         spec = mujoco.MjSpec()
         spec.option.gravity = np.zeros(3)
@@ -78,12 +89,21 @@ class MujocoTree:
         model.body_sameframe[:] = mujoco.mjtSameFrame.mjSAMEFRAME_NONE
         model.site_sameframe[:] = mujoco.mjtSameFrame.mjSAMEFRAME_NONE
         model.body_simple[:] = model.dof_simplenum[:] = 0
-        self.data = mujoco.MjData(model)
+        self.data = mujoco.MjData(model) if data is None else data
+        mujoco.mj_resetData(model, self.data)
         self.body = {n: model.body(f"bar{n}").id for n in MOVING_BARS}
         assert [int(model.joint(description.FIRST_PIN[n]).dofadr[0]) for n in MOVING_BARS] == [0, 1, 2]  # depth first
         self.site = {name: model.site(name).id for n in MOVING_BARS for name in (f"G{n}", f"end{n}")}
         self.on_bar = {name: self.body[int(name[-1])] for name in self.site}
-        self.linear, self.linear_dot, self.angular = (np.zeros((3, 3)) for _ in range(3))
+        # the engine's own memory, read and written in place
+        data = self.data
+        self.at = {name: data.site_xpos[site, :2] for name, site in self.site.items()}
+        self.first_pin = {n: data.xpos[body, :2] for n, body in self.body.items()}
+        self.mass_centre = {n: data.xipos[body] for n, body in self.body.items()}
+        self.rotation = {n: data.xmat[body].reshape(3, 3)[:2, :2] for n, body in self.body.items()}
+        self.applied = {n: data.xfrc_applied[body] for n, body in self.body.items()}
+        self.linear, self.linear_dot = np.zeros((2, len(ENDS), 3, 3))
+        self.angular = np.zeros((3, 3))
         self.ground_angle = theta_1
         self.pin_loads: dict[str, float] = {}
         self.acting = acting(scene, self)
@@ -96,25 +116,30 @@ class MujocoTree:
 
     def point(self, name: str) -> Array:
         """A site, world axes, (2,)."""
-        return np.array(self.data.site_xpos[self.site[name], :2])
+        return np.array(self.at[name])
 
     def gap(self) -> tuple[float, float]:
         """B on bar 3 minus B on bar 4."""
-        x, y = (self.point("end3") - self.point("end4")).tolist()
+        x, y = (self.at["end3"] - self.at["end4"]).tolist()
         return x, y
 
     def jacobian(self) -> Array:
         """Difference of the two site Jacobians."""
-        return self._site_jacobian("end3") - self._site_jacobian("end4")
+        on_3, on_4 = self._site_jacobians("end3", "end4")
+        return np.asarray(on_3 - on_4)
 
-    def _site_jacobian(self, name: str) -> Array:
-        mujoco.mj_jacSite(self.model, self.data, self.linear, None, self.site[name])
-        return self.linear[:2].copy()
+    def _site_jacobians(self, *names: str) -> Array:
+        """Of each site, (n, 2, 3)."""
+        for name, out in zip(names, self.linear, strict=False):
+            mujoco.mj_jacSite(self.model, self.data, out, None, self.site[name])
+        return self.linear[: len(names), :2]
 
-    def _site_jacobian_rate(self, name: str) -> Array:
-        at = self.data.site_xpos[self.site[name]]
-        mujoco.mj_jacDot(self.model, self.data, self.linear_dot, None, at, self.on_bar[name])
-        return self.linear_dot[:2].copy()
+    def _site_jacobian_rates(self, *names: str) -> Array:
+        """Of each site, (n, 2, 3)."""
+        for name, out in zip(names, self.linear_dot, strict=False):
+            at = self.data.site_xpos[self.site[name]]
+            mujoco.mj_jacDot(self.model, self.data, out, None, at, self.on_bar[name])
+        return self.linear_dot[: len(names), :2]
 
     def turn(self, bar: int) -> Array:
         """Last row of the body's rotational Jacobian."""
@@ -124,8 +149,7 @@ class MujocoTree:
     def positions(self) -> dict[str, Array]:
         """Points of the bars."""
         where = {name: self.point(name) for name in ("G2", "G3", "G4")}
-        where["A"], where["O4"] = (np.array(self.data.xpos[self.body[bar], :2]) for bar in (3, 4))
-        where["B"], where["B4"] = self.point("end3"), self.point("end4")
+        where.update(A=self.foot(3), O4=self.foot(4), B=self.point("end3"), B4=self.point("end4"))
         return where
 
     def gravity(self, vector: tuple[float, float]) -> None:
@@ -134,7 +158,7 @@ class MujocoTree:
 
     def foot(self, bar: int) -> Array:
         """First pin of a bar, (2,)."""
-        return np.zeros(2) if bar == 1 else np.array(self.data.xpos[self.body[bar], :2])
+        return np.zeros(2) if bar == 1 else np.array(self.first_pin[bar])
 
     def centre(self, bar: int) -> Array:
         """Mass centre of a bar, from its site."""
@@ -144,7 +168,7 @@ class MujocoTree:
         """A vector of a bar in world axes, by the body's rotation."""
         if bar == 1:
             return turned_ground(self.ground_angle, x, y)
-        return np.asarray(self.data.xmat[self.body[bar]].reshape(3, 3)[:2, :2] @ (x, y))
+        return turned_by(self.rotation[bar].tolist(), x, y)
 
     def pin_load(self, pin: str) -> float:
         """Pin force of the last pass; none before the first."""
@@ -154,14 +178,15 @@ class MujocoTree:
         """From the body's rotation matrix; the ground's line as described."""
         if bar == 1:
             return self.ground_angle
-        rotation = self.data.xmat[self.body[bar]]
-        return math.atan2(rotation[3], rotation[0])
+        rotation = self.rotation[bar]
+        return math.atan2(rotation[1, 0], rotation[0, 0])
 
     def drift(self, v: Array) -> Array:
         """(dJ/dt) v from mj_jacDot."""
         self.data.qvel[:] = v
         mujoco.mj_comVel(self.model, self.data)
-        return np.asarray((self._site_jacobian_rate("end3") - self._site_jacobian_rate("end4")) @ v)
+        on_3, on_4 = self._site_jacobian_rates("end3", "end4")
+        return np.asarray((on_3 - on_4) @ v)
 
     def velocity(self, bar: int) -> float:
         """Spin of the body; the ground has none."""
@@ -179,9 +204,8 @@ class MujocoTree:
         for act in self.acting:
             act()
         applied = np.zeros(3)
-        for body in self.body.values():
-            force, couple = self.data.xfrc_applied[body, :3], self.data.xfrc_applied[body, 3:]
-            mujoco.mj_applyFT(self.model, self.data, force, couple, self.data.xipos[body], body, applied)
+        for bar, on in self.applied.items():
+            mujoco.mj_applyFT(self.model, self.data, on[:3], on[3:], self.mass_centre[bar], self.body[bar], applied)
         return np.asarray(self.data.qfrc_inverse - applied)
 
     def inertial(self, v: Array, a: Array) -> Array:
@@ -198,21 +222,21 @@ class MujocoTree:
         """Add a force at a point, world axes, as force and couple at the mass centre; on the ground it does nothing."""
         if bar == 1:
             return
-        body = self.body[bar]
-        x, y = point - self.data.xipos[body, :2]
-        self.data.xfrc_applied[body, :2] += force
-        self.data.xfrc_applied[body, 5] += x * force[1] - y * force[0]
+        (x, y), (f_x, f_y), on = (point - self.mass_centre[bar][:2]).tolist(), force.tolist(), self.applied[bar]
+        on[0] += f_x
+        on[1] += f_y
+        on[5] += x * f_y - y * f_x
 
     def twist(self, bar: int, couple: float) -> None:
         """Add a couple; on the ground it does nothing."""
         if bar != 1:
-            self.data.xfrc_applied[self.body[bar], 5] += couple
+            self.applied[bar][5] += couple
 
     def accelerations(self) -> dict[str, Array]:
         """J a + (dJ/dt) v of each point."""
-        v, a = self.data.qvel, self.data.qacc
-        sites = {"A": "end2", "B": "end4", "G2": "G2", "G3": "G3", "G4": "G4"}
-        return {n: self._site_jacobian(site) @ a + self._site_jacobian_rate(site) @ v for n, site in sites.items()}
+        moved = self._site_jacobians(*ENDS.values()) @ self.data.qacc
+        moved += self._site_jacobian_rates(*ENDS.values()) @ self.data.qvel
+        return dict(zip(ENDS, moved, strict=True))
 
     def forces(self, loop_force: Array) -> dict[str, Array]:
         """cfrc_int, the force of the parent on each body, with the loop force put back."""
