@@ -114,7 +114,7 @@ def test_no_text_covers_another_where_much_acts_and_numbers_are_long(everything:
     scene = replace(everything, loads=loads, effects=(*kept, *pins), drive_bar=2)
     assert not clashes(composed(scene, "freebody"))
     pump = fourbar.load(Path(__file__).parents[1] / "models" / "gallery" / "pump_jack.toml")
-    assert not clashes(composed(pump, "overview", units=fourbar.units("imperial")))
+    assert not clashes(composed(pump, "overview", units="imperial"))
 
 
 def test_a_film_names_and_moves_what_the_plot_does(everything: Scene) -> None:

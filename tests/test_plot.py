@@ -26,7 +26,6 @@ from fourbar.show.plot.freebody import free_body
 from fourbar.show.plot.style import matplotlib_style, number, plain, unit_for
 from fourbar.show.plot.transmission import free_place
 from fourbar.show.plot.view import CLEAR, common_position, on_branch, view
-from fourbar.solution import SI
 from tests.scenes import crank_rocker, thesis
 
 SIGNATURES = {"svg": b"<?xml", "png": b"\x89PNG", "pdf": b"%PDF"}
@@ -45,11 +44,11 @@ CRANK_ROCKER = crank_rocker()
 
 
 @cache
-def composed(scene, name, branches="one", position=None):
+def composed(scene, name, branches="one", position=None, units="SI"):
     """A figure of a scene, composed once for all that look at it."""
     painter, size, _ = FIGURES[name]
     with matplotlib_style():
-        return compose(scene, painter, size, position, branches, SI)
+        return compose(scene, painter, size, position, branches, fourbar.units(units))
 
 
 @pytest.mark.parametrize("file_format", plot.FORMATS)

@@ -12,19 +12,11 @@ from fourbar.files.fields import Reader, Writer
 from fourbar.linkage import PINS
 
 if TYPE_CHECKING:
-    from fourbar.effects import Effect, Flywheel, Gravity, PinFriction, Point, Springs, Torsion
+    from fourbar.effects import Effect, Flywheel, PinFriction, Point, Springs, Torsion
 
 TORSION = {"stiffness": "N m/rad", "rest": "rad", "preload": "N m"}
 SPRING = {"stiffness": "N/m", "length": "m", "preload": "N"}
 MOST_SPRINGS = 1000
-
-
-def _read_gravity(value: object, read: Reader) -> "Gravity":
-    return kinds.Gravity(*read.polar("effects.gravity", value, "m/s^2"))
-
-
-def _write_gravity(effect: "Gravity", write: Writer) -> Any:
-    return write.polar(effect.magnitude, effect.angle, "m/s^2")
 
 
 def _read_pin_friction(value: object, read: Reader) -> "PinFriction":
@@ -35,10 +27,6 @@ def _read_pin_friction(value: object, read: Reader) -> "PinFriction":
         mu = read.number(f"{key}.{pin}.coefficient", given.get("coefficient"))
         pins[pin] = (mu, read.quantity(f"{key}.{pin}.radius", given.get("radius"), "m", at_least_zero=True))
     return kinds.PinFriction.at(**pins)
-
-
-def _write_pin_friction(effect: "PinFriction", write: Writer) -> Any:
-    return {pin: {"coefficient": mu, "radius": write.quantity(r, "m")} for pin, mu, r in effect.pins}
 
 
 def _read_torsion(value: object, read: Reader) -> "Torsion":
@@ -104,10 +92,6 @@ def _read_flywheel(value: object, read: Reader) -> "Flywheel":
     return kinds.Flywheel(inertia, read.whole(f"{key}.bar", entry.get("bar", 2), 2, 4))
 
 
-def _write_flywheel(effect: "Flywheel", write: Writer) -> Any:
-    return {"bar": effect.bar, "inertia": write.quantity(effect.inertia, "kg m^2")}
-
-
 class Entry(NamedTuple):
     """What a scene file says of one effect."""
 
@@ -133,11 +117,19 @@ def _per_pin(key: str, kind: str, field: str, unit: str, example: str) -> Entry:
 
 
 REGISTRY: dict[str, Entry] = {
-    "gravity": Entry(_read_gravity, _write_gravity, 'gravity = ["9.81 m/s^2", "-90 deg"]'),
+    "gravity": Entry(
+        lambda value, read: kinds.Gravity(*read.polar("effects.gravity", value, "m/s^2")),
+        lambda effect, write: write.polar(effect.magnitude, effect.angle, "m/s^2"),
+        'gravity = ["9.81 m/s^2", "-90 deg"]',
+    ),
     "viscous": _per_pin("viscous", "Viscous", "coefficients", "N m s/rad", 'viscous = { O2 = "0.01 N m s/rad" }'),
     "friction": _per_pin("friction", "Friction", "torques", "N m", 'friction = { A = "0.05 N m" }'),
     "pin_friction": Entry(
-        _read_pin_friction, _write_pin_friction, 'pin_friction = { A = { coefficient = 0.1, radius = "8 mm" } }'
+        _read_pin_friction,
+        lambda effect, write: {
+            pin: {"coefficient": mu, "radius": write.quantity(r, "m")} for pin, mu, r in effect.pins
+        },
+        'pin_friction = { A = { coefficient = 0.1, radius = "8 mm" } }',
     ),
     "torsion": Entry(
         _read_torsion,
@@ -150,7 +142,11 @@ REGISTRY: dict[str, Entry] = {
         'springs = [{ from = { bar = 1, at = ["10 cm", "-90 deg"] }, to = { bar = 4, at = ["8 cm", "0 deg"] }, '
         'stiffness = "200 N/m", length = "12 cm", preload = "3 N" }]',
     ),
-    "flywheel": Entry(_read_flywheel, _write_flywheel, 'flywheel = { bar = 2, inertia = "0.02 kg m^2" }'),
+    "flywheel": Entry(
+        _read_flywheel,
+        lambda effect, write: {"bar": effect.bar, "inertia": write.quantity(effect.inertia, "kg m^2")},
+        'flywheel = { bar = 2, inertia = "0.02 kg m^2" }',
+    ),
 }
 """By the key under ``[effects]``, in the order in which they are listed; a new one is added here."""
 

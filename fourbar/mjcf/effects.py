@@ -35,18 +35,10 @@ def _viscous(effect: "Viscous", model: Model) -> None:
         model.pin[pin]["damping"] = k
 
 
-def _damping_couples(effect: "Viscous", linkage: FourBar, speed: float) -> float:
-    return sum((k for _, k in effect.coefficients), 0.0) * speed
-
-
 def _friction(effect: "Friction", model: Model) -> None:
     """The attribute ``frictionloss`` of the hinge (of a tendon at the cut pin B)."""
     for pin, f in effect.torques:
         model.add_dry_friction(pin, f)
-
-
-def _friction_couples(effect: "Friction", linkage: FourBar, speed: float) -> float:
-    return sum((f for _, f in effect.torques), 0.0)
 
 
 def _torsion(effect: "Torsion", model: Model) -> None:
@@ -56,10 +48,6 @@ def _torsion(effect: "Torsion", model: Model) -> None:
         model.pin[pin]["stiffness"] = k
         # a tendon's rest is a length
         model.pin[pin]["springlength" if pin == "B" else "springref"] = rest + turned - preload / k
-
-
-def _torsion_couples(effect: "Torsion", linkage: FourBar, speed: float) -> float:
-    return effect.greatest_couple
 
 
 def _unwind_torsion(effect: "Torsion", linkage: FourBar, q: Joints) -> Joints:
@@ -103,38 +91,25 @@ def _load(effect: "Load", model: Model) -> None:
     model.loads.append(effect)
 
 
-def _load_couples(effect: "Load", linkage: FourBar, speed: float) -> float:
-    """The load's size at the longest bar."""
-    return effect.greatest_force(linkage) * max(linkage.lengths)
-
-
-def _none(effect: Any, linkage: FourBar, speed: float) -> float:
-    return 0.0
-
-
-def _as_it_is(effect: Any, linkage: FourBar, q: Joints) -> Joints:
-    return q
-
-
 class Row(NamedTuple):
     """One effect in MJCF."""
 
     add: Callable[[Any, Model], None]
     """Puts it into the model."""
-    couple: Callable[[Any, FourBar, float], float] = _none
+    couple: Callable[[Any, FourBar, float], float] = lambda effect, linkage, speed: 0.0
     """The couple that it may ask of the drive at a speed (rad/s), N m: lays out the flywheel."""
-    unwind: Callable[[Any, FourBar, Joints], Joints] = _as_it_is
+    unwind: Callable[[Any, FourBar, Joints], Joints] = lambda effect, linkage, q: q
     """The angles of pins O2, A, O4, moved by the whole turns that the effect tells apart, rad."""
 
 
 MJCF_OF: dict[str, Row] = {
     "gravity": Row(_gravity, _weights),
-    "viscous": Row(_viscous, _damping_couples),
-    "friction": Row(_friction, _friction_couples),
-    "torsion": Row(_torsion, _torsion_couples, _unwind_torsion),
+    "viscous": Row(_viscous, lambda effect, linkage, speed: sum((k for _, k in effect.coefficients), 0.0) * speed),
+    "friction": Row(_friction, lambda effect, linkage, speed: sum((f for _, f in effect.torques), 0.0)),
+    "torsion": Row(_torsion, lambda effect, linkage, speed: effect.greatest_couple, _unwind_torsion),
     "springs": Row(_springs, _tensions),
     "flywheel": Row(_flywheel),
-    "load": Row(_load, _load_couples),
+    "load": Row(_load, lambda effect, linkage, speed: effect.greatest_force(linkage) * max(linkage.lengths)),
 }
 """By the key of an effect; MJCF has no counterpart of what is not here (friction that depends on the pin forces)."""
 

@@ -41,7 +41,8 @@ def drawing(scene: Scene, solution: Solution) -> str:
         return (WIDTH / 2.0 + float(x), HEIGHT / 2.0 - float(y))
 
     A, B = solution.A[index], solution.B[index]
-    parts = [_path([place(point) for point in _thinned(path[good])], colour) for path, colour in paths]
+    every = max(1, np.count_nonzero(good) // MOST_POINTS)
+    parts = [_path([place(point) for point in path[good][::every]], colour) for path, colour in paths]
     parts += [_bar(place(start), place(end), BARS[n]) for n, start, end in ((2, O2, A), (3, A, B), (4, O4, B))]
     parts += [_support(*place(O2)), _support(*place(O4))]
     centre = np.mean([place(point) for point in (O2, A, B, O4)], axis=0)
@@ -51,10 +52,6 @@ def drawing(scene: Scene, solution: Solution) -> str:
     parts.append(_text(f"θ₂ = {theta_2}°", WIDTH / 2.0, HEIGHT - 6.0, 11, SOFT))
     box = f'viewBox="0 0 {WIDTH:g} {HEIGHT:g}"'
     return f'<svg class="linkage" xmlns="http://www.w3.org/2000/svg" {box}>{"".join(parts)}</svg>'
-
-
-def _thinned(path: Array) -> Array:
-    return path[:: max(1, len(path) // MOST_POINTS)]
 
 
 def _path(points: Iterable[tuple[float, float]], colour: str) -> str:

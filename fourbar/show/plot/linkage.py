@@ -51,7 +51,10 @@ def draw_linkage(axes: "Axes", view: View, labels: Labels, *, moving: bool = Fal
     reached = np.concatenate([sweep.A, sweep.B, sweep.G3, *sweep.points.values(), list(where.values())])
     factor, unit = _unit(view)
     where = {name: (factor * x, factor * y) for name, (x, y) in where.items()}
-    _paths(axes, view, labels, factor)
+    for path, colour, dashes, name in paths(view):
+        scaled = factor * path
+        axes.plot(*scaled.T, color=colour, lw=1.0, ls=dashes, zorder=2, label=name)
+        labels.keep_off(axes, *[(float(x), float(y)) for x, y in scaled[:: max(1, len(scaled) // 120)]])
     size = 0.03 * factor * float(np.max(np.nanmax(reached, axis=0) - np.nanmin(reached, axis=0)))
     _ground(axes, labels, where["O2"], where["O4"], size)
     if view.dimensions:
@@ -143,13 +146,6 @@ def paths(view: View) -> list[tuple[Array, str, Any, str]]:
     return [(np.where(closes, path, np.nan), colour, dashes, name) for path, colour, dashes, name in found]
 
 
-def _paths(axes: "Axes", view: View, labels: Labels, factor: float) -> None:
-    for path, colour, dashes, name in paths(view):
-        scaled = factor * path
-        axes.plot(scaled[:, 0], scaled[:, 1], color=colour, lw=1.0, ls=dashes, zorder=2, label=name)
-        labels.keep_off(axes, *[(float(x), float(y)) for x, y in scaled[:: max(1, len(scaled) // 120)]])
-
-
 def _ground(axes: "Axes", labels: Labels, O2: Point, O4: Point, size: float) -> None:
     supports(axes, O2, O4, size)
     labels.keep_off(axes, O2, O4)
@@ -175,17 +171,13 @@ def supports(axes: "Axes", O2: Point, O4: Point, size: float) -> None:
 
 def mass_centre(axes: "Axes", point: Point, ms: float = 7.0) -> "list[Line2D]":
     """The quartered circle that marks a mass centre."""
+    from matplotlib.path import Path
+
     x, y = point
     marks = axes.plot([x], [y], "o", ms=ms, mfc="white", mec=INK, mew=0.8, zorder=7)
     for quarter in ((0, 90), (180, 270)):
-        marks += axes.plot([x], [y], marker=_wedge(*quarter), ms=ms, mfc=INK, mec="none", zorder=7)
+        marks += axes.plot([x], [y], marker=Path.wedge(*quarter), ms=ms, mfc=INK, mec="none", zorder=7)
     return marks
-
-
-def _wedge(start: int, stop: int) -> Any:
-    from matplotlib.path import Path
-
-    return Path.wedge(start, stop)
 
 
 def draw_coupler_curves(axes: "Axes", view: View, labels: Labels) -> None:

@@ -67,7 +67,7 @@ def _marked(view: View) -> list[tuple[list[float], list[float], str, str]]:
         return []
     degrees = view.degrees
     margin = 1.5 * float(np.median(np.diff(degrees))) if len(degrees) > 1 else 0.0
-    limits = [t for angle in limit_angles(view) for t in _inside(view, angle, margin)]
+    limits = [t for own in limit_positions(view.scene.linkage) for t in _inside(view, own.theta_2, margin)]
     centres, heights = [], []
     for found in limit_positions(view.scene.linkage, 4):
         difference = found.theta_4 - found.theta_3
@@ -85,8 +85,3 @@ def _inside(view: View, angle: float, margin: float) -> list[float]:
     start = math.degrees(angle)
     first = math.ceil((low - start) / 360.0)
     return [start + 360.0 * k for k in range(first, math.floor((high - start) / 360.0) + 1)]
-
-
-def limit_angles(view: View) -> list[float]:
-    """theta_2 of the input's limit positions, rad, from e = b + c and e = |b - c|."""
-    return [float(limit.theta_2) for limit in limit_positions(view.scene.linkage)]
