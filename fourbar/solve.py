@@ -74,6 +74,8 @@ def solve(
         the omega_2 that is needed, or a study, which states its own positions, is given others.
     """
     if not isinstance(scene, Scene):
+        if not hasattr(scene, "solved"):
+            raise InputError("scene", scene, "must be a Scene, or a Study of `vary`")
         if at is not None:
             raise InputError("at", "a command", "a study states its own positions: vary motion.theta_2")
         return scene.solved(stage, out=out, side=side, compiled=compiled)

@@ -9,7 +9,7 @@ import numpy as np
 
 from fourbar.effects.actions import Actions
 from fourbar.effects.effect import Effect
-from fourbar.errors import InputError
+from fourbar.errors import InputError, expect
 from fourbar.formulas.arithmetic import anywhere, polar
 from fourbar.formulas.motion import State
 from fourbar.linkage import MOVING_BARS, FourBar, require
@@ -93,8 +93,12 @@ class Load(Effect):
             raise InputError("loads.bar", self.bar, "must be 2, 3 or 4")
         if self.frame not in ("world", "bar"):
             raise InputError("loads.frame", self.frame, 'must be "world" or "bar"')
-        for key, pair in (("loads.force", self.force), ("loads.at", self.at)):
-            for number in pair or ():
+        expect("loads.table", self.table, Table, type(None))
+        for key, pair in (("loads.force", (0.0, 0.0) if self.force is None else self.force), ("loads.at", self.at)):
+            expect(key, pair, tuple, list)
+            if len(pair) != 2:
+                raise InputError(key, pair, "must be a pair (size, angle)")
+            for number in pair:
                 require(key, number)
         require("loads.moment", self.moment)
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from fourbar.effects.actions import Actions
 from fourbar.effects.effect import Effect
-from fourbar.errors import InputError
+from fourbar.errors import InputError, expect
 from fourbar.formulas.arithmetic import anywhere, polar
 from fourbar.formulas.motion import State
 from fourbar.linkage import BAR_NAMES, FourBar, require
@@ -51,6 +51,7 @@ class Spring:
 
     def __post_init__(self) -> None:
         for key, point in (("from", self.start), ("to", self.end)):
+            expect(f"effects.springs.{key}", point, Point)
             if point.bar not in BAR_NAMES or isinstance(point.bar, bool):
                 raise InputError(f"effects.springs.{key}.bar", point.bar, "must be 1, 2, 3 or 4")
             require(f"effects.springs.{key}.at", point.distance)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fourbar.errors import InputError
+from fourbar.errors import InputError, expect
 from fourbar.linkage import require
 from fourbar.solution import Array
 
@@ -90,7 +90,10 @@ class Motion:
 
     def __post_init__(self) -> None:
         if self.theta_2 is not None and not isinstance(self.theta_2, (Sweep, FromLimit)):
-            angles = np.array(self.theta_2, dtype=float)
+            try:
+                angles = np.array(self.theta_2, dtype=float)
+            except (TypeError, ValueError, OverflowError):
+                angles = np.array([])
             if not np.all(np.isfinite(angles)) or angles.ndim > 1 or angles.size == 0:
                 raise InputError("motion.theta_2", self.theta_2, "must be finite angles, shape () or (n,)")
             angles.flags.writeable = False
@@ -101,6 +104,8 @@ class Motion:
                 allowed = f"must be below {FASTEST:.4g} rad/s: every acceleration has its square"
                 raise InputError("motion.omega_2", self.omega_2, allowed)
         object.__setattr__(self, "alpha_2", require("motion.alpha_2", self.alpha_2))
+        for name, kinds in (("branch", (int, np.integer)), ("through", (str,)), ("free", (Free, type(None)))):
+            expect(f"motion.{name}", getattr(self, name), *kinds)
         if self.branch not in (OPEN, CROSSED):
             raise InputError("motion.branch", self.branch, "must be +1 (open) or -1 (crossed)")
         given = (self.free, self.theta_2, self.omega_2, self.alpha_2 or None)

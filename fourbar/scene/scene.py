@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.errors import InputError
+from fourbar.errors import InputError, expect
 from fourbar.formulas.mobility import default_range, limit_positions, on_smooth_path
 from fourbar.linkage import MOVING_BARS, FourBar
 from fourbar.scene.motion import DEFAULT_STEPS, FromLimit, Motion, Sweep
@@ -35,13 +35,19 @@ class Scene:
     tolerances: tuple[Tolerance, ...] = ()
 
     def __post_init__(self) -> None:
+        one = {"linkage": FourBar, "motion": Motion, "drive_bar": int, "title": str, "source": str}
+        for name, kind in one.items():
+            expect(name, getattr(self, name), kind)
         if self.drive_bar not in MOVING_BARS or isinstance(self.drive_bar, bool):
             raise InputError("drive.bar", self.drive_bar, "must be 2, 3 or 4")
-        object.__setattr__(self, "loads", tuple(self.loads))
-        object.__setattr__(self, "effects", tuple(self.effects))
-        object.__setattr__(self, "pictures", tuple(self.pictures))
-        object.__setattr__(self, "points", tuple(self.points))
-        object.__setattr__(self, "tolerances", tuple(self.tolerances))
+        from fourbar.effects.effect import Effect
+
+        many = {"loads": Effect, "effects": Effect, "pictures": object, "points": Point, "tolerances": Tolerance}
+        for name, each_kind in many.items():
+            expect(name, getattr(self, name), tuple, list)
+            object.__setattr__(self, name, tuple(getattr(self, name)))
+            for each in getattr(self, name):
+                expect(name, each, each_kind)
         names = [point.name for point in self.points]
         if len(set(names)) < len(names):
             raise InputError("points", names, "each point has a name of its own")
@@ -68,6 +74,7 @@ class Command(NamedTuple):
 
 def command(scene: Scene) -> Command:
     """The positions that the scene's motion names, each with its branch."""
+    expect("scene", scene, Scene)
     motion, linkage = scene.motion, scene.linkage
     stated, remainder, time = motion.theta_2, None, None
     omega_2: float | Array | None = motion.omega_2

@@ -3,6 +3,9 @@
 import math
 from dataclasses import dataclass
 
+from fourbar.errors import expect
+from fourbar.linkage import require
+
 THREE_SIGMA = 3.0
 """What counts as the width of a normal distribution in a worst case."""
 
@@ -21,6 +24,11 @@ class Tolerance:
     key: str
     width: float
     sigma: bool = False
+
+    def __post_init__(self) -> None:
+        expect("tolerances", self.key, str)
+        require(f"tolerances.{self.key}", self.width, positive=True)
+        expect(f"tolerances.{self.key}", self.sigma, bool)
 
     @property
     def deviation(self) -> float:
