@@ -231,12 +231,11 @@ class TestPlantedFaults:
     def test_torque_off_by_1e9(self, tree: Any, monkeypatch: pytest.MonkeyPatch) -> None:
         right = tree.turn
         monkeypatch.setattr(tree, "turn", lambda self, bar: right(self, bar) * (1.0 + 1e-9))
-        found = self.judged(tree)
-        assert "torque" in found and "F12" not in found
+        assert {"torque", "omega_3"} <= set(self.judged(tree))
 
     def test_loop_force_put_back_with_the_wrong_sign(self, tree: Any, monkeypatch: pytest.MonkeyPatch) -> None:
         right = tree.forces
-        monkeypatch.setattr(tree, "forces", lambda self, force: right(self, -force))
+        monkeypatch.setattr(tree, "forces", lambda self, force, torque: right(self, -force, torque))
         assert {"F12", "F32", "F14"} <= set(self.judged(tree))
 
     def test_an_effect_left_out(self, tree: Any, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -170,9 +170,9 @@ PLANTED = {
         "angle": (1.0 + 1e-12, {"theta_3", "theta_4"}),
     },
     "pydrake": {
-        "turn": (1.0 + 1e-9, {"torque"}),
+        "turn": (1.0 + 1e-9, {"omega_3", "torque"}),
         "drift": (0.0, {"alpha_3", "alpha_4", "torque", "F12"}),
-        "_rotation": (1.0 + 1e-9, {"F12", "F14"}),
+        "rotation": (1.0 + 1e-9, {"F12", "F14"}),
     },
 }
 

@@ -112,15 +112,16 @@ def _centre_kept(r: float) -> bool:
 
 def _proximal(mu: float) -> bool:
     """Whether Pinocchio's constrained acceleration is a number with this proximal parameter."""
-    from validation.engines import pinocchio_released as forward
+    from validation.engines import pinocchio_closed
+    from validation.engines.pinocchio_released import PinocchioReleased
 
     scene = replace(_base(), loads=(), motion=Motion(1.0, 3.0))
-    kept = forward.PROXIMAL
+    kept = pinocchio_closed.PROXIMAL
     try:
-        forward.PROXIMAL = (kept[0], mu, kept[2] if mu else 1)
-        released = forward.PinocchioReleased().release(scene, np.array([0.0, 0.01]))
+        pinocchio_closed.PROXIMAL = (kept[0], mu, kept[2] if mu else 1)
+        released = PinocchioReleased().release(scene, np.array([0.0, 0.01]))
     finally:
-        forward.PROXIMAL = kept
+        pinocchio_closed.PROXIMAL = kept
     return bool(np.isfinite(released.theta_2).all())
 
 

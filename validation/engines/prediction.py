@@ -25,7 +25,7 @@ from fourbar.quantities import PIN_FORCES, VECTORS
 from fourbar.scene import Command, Scene
 from validation.compare.compare import Mask
 from validation.compare.tolerance import EPS, Array
-from validation.engines.description import centre
+from validation.engines.description import centre, speeds
 
 ROUNDINGS = 8.0
 """R: a chain of some fifty roundings moves a result by sqrt(50) = 7 last digits, as a random walk."""
@@ -74,9 +74,7 @@ def predicted_error(
     With `carried` the accelerations of the bars are differences of others as large as the fastest bar's at `reach`.
     NaN where the loop does not close; infinite at a singular position, where the equations have no answer.
     """
-    n = len(at.theta_2)
-    omega = np.broadcast_to(0.0 if at.omega_2 is None else np.asarray(at.omega_2, float), (n,))
-    alpha = np.broadcast_to(np.asarray(at.alpha_2, float), (n,))
+    n, (omega, alpha) = len(at.theta_2), speeds(at)
     result = {name: np.full(n, np.nan) for name in quantities}
     for i in range(n) if where is None else np.flatnonzero(where).tolist():
         moved = _sensitivity(scene, float(at.theta_2[i]), int(at.branch[i]), float(omega[i]), float(alpha[i]))
