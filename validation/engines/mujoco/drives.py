@@ -7,9 +7,6 @@ drive takes its place, and the torque is read where that drive exerts it.
 from collections.abc import Sequence
 from xml.etree import ElementTree as ET
 
-import mujoco
-import numpy as np
-
 from fourbar.mjcf.model import text as numbers
 from validation.engines.mujoco.closed_loop import O2, ClosedLoop
 
@@ -126,12 +123,9 @@ class WheelEquality(Driven):
         super().place((*q, q[O2]))
 
     def set_state(self, q: Sequence[float], omega_2: float) -> None:
-        """Velocities that keep the gap closed, the wheel's the crank's."""
-        mujoco.mj_resetData(self.model, self.data)
-        self.place(q)
-        jacobian = self.jacobian()
-        v = np.linalg.solve(jacobian[:, [1, 2]], -jacobian[:, O2] * omega_2)
-        self.data.qvel[:] = (omega_2, v[0], v[1], omega_2)
+        """The wheel turns as the crank does."""
+        super().set_state(q, omega_2)
+        self.data.qvel[3] = omega_2
 
     def crank_torque(self) -> float:
         """The multiplier of the joint equality: its row of the Jacobian is 1 at the crank."""
