@@ -67,6 +67,7 @@ class Part(NamedTuple):
     mass: float
     inertia: float
     """About the mass centre, kg m^2."""
+    length: float
     points: dict[str, tuple[float, float]]
     """foot, G and end, each with the bar's number: its first pin, mass centre and second pin, m."""
 
@@ -85,7 +86,7 @@ def parts(linkage: FourBar) -> list[Part]:
         bar = linkage.bar(number)
         ends = {"foot": (0.0, 0.0), "G": components(*centre(bar)), "end": (bar.length, 0.0)}
         points = {f"{name}{number}": at for name, at in ends.items()}
-        found.append(Part(number, *feet[number], bar.mass, inertia(bar), points))
+        found.append(Part(number, *feet[number], bar.mass, inertia(bar), bar.length, points))
     return found
 
 

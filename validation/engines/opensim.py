@@ -66,7 +66,7 @@ class OpenSimBars(Bars):
             about_z = osim.Inertia(*[part.inertia] * 3, *ZERO)
             self.body[bar] = osim.Body(f"bar{bar}", part.mass, vec(*part.centre), about_z)
             model.addBody(self.body[bar])
-        self.length = {bar: linkage.bar(bar).length for bar in MOVING_BARS}
+        self.length = {bar: part.length for bar, part in self.part.items()}
         self.joint = {
             "O2": self._joint("O2", 1, ZERO, 2, ZERO),
             "O4": self._joint("O4", 1, self.part[4].foot, 4, ZERO),

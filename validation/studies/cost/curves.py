@@ -118,12 +118,12 @@ def _ladder(integrator: str) -> tuple[int, ...]:
 def _with_default_closure(integrator: str, speed: float) -> Curve:
     """MuJoCo's solref, solimp and solver; Euler at 2 ms is what a new user gets."""
     settings = replace(BEST, integrator=integrator, pad=None)
-    curve = over_steps(f"{integrator}, MuJoCo's defaults", settings, drives.AllDefaults, _ladder(integrator))
+    curve = over_steps(f"{integrator}, MuJoCo's defaults", settings, drives.all_defaults, _ladder(integrator))
     curve = replace(curve, settled=True)
     if integrator != "Euler":
         return curve
     n = 2.0 * math.pi / speed / DEFAULT_TIMESTEP
-    spot = Spot("MuJoCo's defaults", replace(settings, steps_per_revolution=n), drives.AllDefaults, n)
+    spot = Spot("MuJoCo's defaults", replace(settings, steps_per_revolution=n), drives.all_defaults, n)
     return replace(curve, spots=tuple(sorted((*curve.spots, spot), key=lambda each: each.x)))
 
 
