@@ -15,9 +15,13 @@ SECONDS = 300
 """A fault with which the harness takes longer than this ends the run as a failure would; it takes some ten."""
 
 
-def outcome(number: int | None) -> dict[str, list[str]] | str:
-    """The failing rows by specimen with the fault of a number, or why there are none; None: without a fault."""
-    line = [sys.executable, "-P", planting.__file__, *([] if number is None else [str(number)])]
+Failing = dict[str, list[str]]
+"""By specimen: the rows that fail."""
+
+
+def outcomes(*numbers: int) -> list[Failing] | str:
+    """What fails with the fault of each number, one after another, or why nothing was found; once without any fault."""
+    line = [sys.executable, "-P", planting.__file__, *map(str, numbers)]
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     try:
         done = subprocess.run(
@@ -27,11 +31,10 @@ def outcome(number: int | None) -> dict[str, list[str]] | str:
         return f"it took more than {SECONDS} s"
     if done.returncode:
         return (done.stderr.strip().splitlines() or ["no word"])[-1]
-    found: dict[str, list[str]] = json.loads(done.stdout.splitlines()[-1])
-    return found
+    return [json.loads(each) for each in done.stdout.splitlines()[-max(1, len(numbers)) :]]
 
 
-def survives(entry: dict[str, Any], found: dict[str, list[str]] | str) -> str | None:
+def survives(entry: dict[str, Any], found: Failing | str) -> str | None:
     """Why an entry does not count as caught on each of its specimens, or None."""
     if isinstance(found, str):
         return f"it raises, which is no physical fault: {found}"
@@ -48,10 +51,11 @@ def planted(workers: int) -> Iterator[tuple[str, str | None]]:
     """Every fault with the reason why it survives, or None; first the tree without a fault."""
     entries = faults()
     with ThreadPoolExecutor(workers) as pool:
-        found = pool.map(outcome, [None, *range(len(entries))])
-        without = next(found)
-        failing = without if isinstance(without, str) else [row for rows in without.values() for row in rows]
+        without, *found = (pool.submit(outcomes, *number) for number in [(), *((n,) for n in range(len(entries)))])
+        rows = without.result()
+        failing = rows if isinstance(rows, str) else [row for found in rows[0].values() for row in found]
         yield "no fault", f"the harness fails without one: {failing}" if failing else None
-        for entry, rows in zip(entries, found, strict=True):
-            why = survives(entry, rows)
+        for entry, one in zip(entries, found, strict=True):
+            rows = one.result()
+            why = survives(entry, rows if isinstance(rows, str) else rows[0])
             yield entry["fault"], None if why and "harmless" in entry else why
