@@ -120,14 +120,6 @@ def hopeless(scene: fourbar.Scene) -> object:
     return made
 
 
-def test_wilson() -> None:
-    # Brown, Cai, DasGupta, Statistical Science 16 (2001): bounds solve (p - x/n)^2 = z^2 p (1 - p)/n
-    for x, n in ((9, 10), (380, 400), (400, 400), (0, 5)):
-        p = measure.wilson(x, n)
-        assert (p - x / n) ** 2 == pytest.approx(1.959963984540054**2 * p * (1.0 - p) / n, abs=1e-15) and p <= x / n
-    assert measure.wilson(400, 400) >= measure.NEEDED_MET > measure.wilson(380, 400)
-
-
 def test_a_count_that_cannot_decide_says_which_one_can(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -18,6 +18,13 @@ TURNED_BY = {2: [O2], 3: [O2, A], 4: [O4]}
 WARNINGS = (mujoco.mjtWarning.mjWARN_BADQPOS, mujoco.mjtWarning.mjWARN_BADQVEL, mujoco.mjtWarning.mjWARN_BADQACC)
 
 
+def load_force(model: mujoco.MjModel, data: mujoco.MjData, actuator: int) -> Array:
+    """World force of an actuator on a site, (3,): MuJoCo counts it into the force of the parent."""
+    site, frame = model.actuator_trnid[actuator]
+    axes = data.site_xmat[frame if frame >= 0 else site].reshape(3, 3)
+    return np.asarray(axes @ model.actuator_gear[actuator, :3] * data.actuator_force[actuator])
+
+
 class ClosedLoop(Bars):
     """Model and data of one generated MJCF; nothing is edited after it is compiled."""
 
@@ -90,17 +97,10 @@ class ClosedLoop(Bars):
         d = self.data
         on = {name: d.cfrc_int[body][3:5].copy() for name, body in self.body.items()}
         for actuator, body in self.loads:
-            force = self._load_force(actuator)
+            force = load_force(self.model, self.data, actuator)[:2]
             for name in CARRIED_BY[self.model.body(body).name]:
                 on[name] -= force
         return on
-
-    def _load_force(self, actuator: int) -> Array:
-        """Force of a load actuator, in world axes, (2,)."""
-        site, frame = self.model.actuator_trnid[actuator]
-        axes = self.data.site_xmat[frame if frame >= 0 else site].reshape(3, 3)
-        gear = self.model.actuator_gear[actuator, :3]
-        return np.asarray((axes @ gear)[:2] * self.data.actuator_force[actuator])
 
     def crank_torque(self) -> float:
         """T2: what the flywheel gives the crank, and the motor next to it, N m."""

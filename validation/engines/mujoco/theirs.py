@@ -23,7 +23,7 @@ from validation.compare.answer import Answer, Array
 from validation.engines.loop import MADE, Angles, Position, as_made, at_each, blank
 from validation.engines.mujoco.anatomy import Anatomy
 from validation.engines.mujoco.attached import Described, Value
-from validation.engines.mujoco.closed_loop import WARNINGS, couple_for
+from validation.engines.mujoco.closed_loop import WARNINGS, couple_for, load_force
 from validation.engines.mujoco.describe import called, described
 from validation.engines.mujoco.guess import anatomy_of
 from validation.engines.mujoco.mend import mended
@@ -139,13 +139,10 @@ class Loop(Bars):
         self._jac = np.zeros((3, self.model.nv))
 
     def _take_off_the_drive(self) -> None:
-        model, joint = self.model, self.anatomy.hinge.get("O2")
-        for i in range(model.nu):
-            if model.actuator_trntype[i] == mujoco.mjtTrn.mjTRN_JOINT and model.actuator_trnid[i, 0] == joint:
-                model.actuator_gainprm[i], model.actuator_biasprm[i] = 0.0, 0.0
-                self.notes.append(
-                    f"its drive {model.actuator(i).name!r} on pin O2 is taken off: the torque is solved for"
-                )
+        model = self.model
+        for i in self.anatomy.drives():
+            model.actuator_gainprm[i], model.actuator_biasprm[i] = 0.0, 0.0
+            self.notes.append(f"its drive {model.actuator(i).name!r} on pin O2 is taken off: the torque is solved for")
         for i in range(model.neq):
             if i != self.anatomy.closure and model.eq_active0[i] and self.anatomy.closed_by != "tendon":
                 self.data.eq_active[i] = 0
@@ -218,9 +215,8 @@ class Loop(Bars):
             child, parent = anatomy.turning(pin)
             force = data.cfrc_int[anatomy.root[child], 3:].copy()
             for load in self._loads:
-                body, pushed = self._load(load)
-                if self._carries(anatomy.root[child], body):
-                    force -= pushed
+                if self._carries(anatomy.root[child], self.model.site_bodyid[self.model.actuator_trnid[load, 0]]):
+                    force -= load_force(self.model, data, load)
             on[parent, child] = anatomy.in_plane(force)
         bars = PINS[anatomy.cut]
         force = np.full(2, np.nan)
@@ -237,13 +233,6 @@ class Loop(Bars):
             on[bars] = force
         wanted = {"F12": (1, 2), "F32": (3, 2), "F43": (4, 3), "F14": (1, 4)}
         return {name: on[i, j] if (i, j) in on else -on[j, i] for name, (i, j) in wanted.items()}
-
-    def _load(self, actuator: int) -> tuple[int, Array]:
-        """Body and world force of an actuator on a site: MuJoCo counts it into the force of the parent."""
-        site, frame = self.model.actuator_trnid[actuator]
-        axes = self.data.site_xmat[frame if frame >= 0 else site].reshape(3, 3)
-        force = axes @ self.model.actuator_gear[actuator, :3] * self.data.actuator_force[actuator]
-        return int(self.model.site_bodyid[site]), np.asarray(force)
 
     def _carries(self, bearer: int, body: int) -> bool:
         """Whether a body hangs, however far down, on another."""
