@@ -1,13 +1,12 @@
 """Every planted fault against the harness, each in a process of its own; none may survive without a reason."""
 
 import json
-import os
-import subprocess
 import sys
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
+from validation.run.elsewhere import ended
 from validation.stress.mutation import planting
 from validation.stress.mutation.planting import ROOT, faults
 
@@ -21,17 +20,9 @@ Failing = dict[str, list[str]]
 
 def outcomes(*numbers: int) -> list[Failing] | str:
     """What fails with the fault of each number, one after another, or why nothing was found; once without any fault."""
-    line = [sys.executable, "-P", planting.__file__, *map(str, numbers)]
-    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-    try:
-        done = subprocess.run(
-            line, cwd=ROOT, check=False, capture_output=True, text=True, timeout=SECONDS, env=environment
-        )
-    except subprocess.TimeoutExpired:
-        return f"it took more than {SECONDS} s"
-    if done.returncode:
-        return (done.stderr.strip().splitlines() or ["no word"])[-1]
-    return [json.loads(each) for each in done.stdout.splitlines()[-max(1, len(numbers)) :]]
+    line = [sys.executable, "-P", planting.__file__, *numbers]
+    done = ended(line, folder=ROOT, seconds=SECONDS, variables={"PYTHONPATH": str(ROOT)})
+    return done.why or [json.loads(each) for each in done.out.splitlines()[-max(1, len(numbers)) :]]
 
 
 def survives(entry: dict[str, Any], found: Failing | str) -> str | None:
