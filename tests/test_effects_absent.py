@@ -16,6 +16,7 @@ from fourbar.mjcf import mjcf
 from tests.scenes import crank_rocker
 from tests.test_effects import ACTING
 from validation.cli import status
+from validation.run.judge import judge
 from validation.studies.effects import absent, cost
 from validation.studies.effects.absent import ABSENT, TABLES, build, differences, made
 
@@ -160,40 +161,34 @@ import sys
 import fourbar
 from validation.run.judge import judge
 link = fourbar.uniform(0.3, 0.1, 0.25, 0.22)
-motion = {motion}
-record = judge("scene", fourbar.Scene(link, motion))
+record = judge("scene", fourbar.Scene(link, fourbar.Motion(fourbar.Sweep(0.0, 6.0, 20))))
 print(sorted(name for name in ("mujoco", "pinocchio") if name in sys.modules))
 print(*record.left_out, sep="\\n")
-print(*sorted({{row.engine for row in record.rows}}))
+print(*sorted({row.engine for row in record.rows}))
 """
 
 
-def answers_of(motion: str) -> list[str]:
-    code = POSITIONS_ONLY.format(motion=motion)
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT)
-    return done.stdout.splitlines()
-
-
 def test_positions_alone_start_no_force_engine() -> None:
-    engines, *left_out, answered = answers_of("fourbar.Motion(fourbar.Sweep(0.0, 6.0, 20))")
+    line = [sys.executable, "-c", POSITIONS_ONLY]
+    done = subprocess.run(line, capture_output=True, text=True, check=True, cwd=ROOT)
+    engines, *left_out, answered = done.stdout.splitlines()
     assert engines == "[]" and answered == "formulas free-body"
     assert {line.split(":")[0] for line in left_out} == {"pinocchio-inverse", "mujoco-inverse", "mujoco-simulated"}
     assert all("the scene states positions only" in line for line in left_out)
 
 
 @pytest.mark.parametrize(
-    ("motion", "reason"),
+    ("motion", "left_out"),
     [
-        ("fourbar.Motion(fourbar.Sweep(0.0, 6.0, 20), 0.0)", "omega_2 is 0: nothing moves through time"),
-        ("fourbar.Motion(1.0, 2.0)", "one position is no motion through time"),
+        (
+            fourbar.Motion(fourbar.Sweep(0.0, 6.0, 20), 0.0),
+            "mujoco-simulated: omega_2 is 0: nothing moves through time",
+        ),
+        (fourbar.Motion(1.0, 2.0), "mujoco-simulated: one position is no motion through time"),
+        (fourbar.Motion([1.0, 1.0, 1.0], 2.0), "positions: all are the same, one is evaluated"),
     ],
 )
-def test_what_does_not_move_through_time_is_not_simulated(motion: str, reason: str) -> None:
-    _, *left_out, answered = answers_of(motion)
-    assert left_out == [f"mujoco-simulated: {reason}"]
-    assert answered == "formulas free-body mujoco-inverse pinocchio-inverse"
-
-
-def test_equal_positions_are_evaluated_once() -> None:
-    _, *left_out, _ = answers_of("fourbar.Motion([1.0, 1.0, 1.0], 2.0)")
-    assert "positions: all are the same, one is evaluated" in left_out
+def test_what_does_not_move_through_time_is_not_simulated(motion: fourbar.Motion, left_out: str) -> None:
+    record = judge("scene", fourbar.Scene(fourbar.uniform(0.3, 0.1, 0.25, 0.22), motion))
+    assert left_out in record.left_out and "mujoco-simulated" in {line.partition(":")[0] for line in record.left_out}
+    assert {row.engine for row in record.rows} == {"formulas", "free-body", "mujoco-inverse", "pinocchio-inverse"}

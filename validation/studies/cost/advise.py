@@ -21,8 +21,9 @@ from fourbar.scene import command as command_of
 from fourbar.writing import write_text
 from validation.engines.mujoco.dialled import FEWEST_STEPS, LONGEST, ORDER, SHORTEST, dialled, guess
 from validation.engines.mujoco.trial import Rig
+from validation.report.terminal import lined_up
 from validation.studies.cost.errors import Errors
-from validation.studies.cost.matters import MATTERS, influences, judged, print_table, sentence
+from validation.studies.cost.matters import MATTERS, influences, judged, sentence
 
 MARGIN = 0.7
 """The run must stay within this part of the required error: elsewhere it may be larger."""
@@ -219,5 +220,8 @@ def command(scenes: tuple[Path, ...], wanted: float, output: Path | None) -> int
             write_text(output, mjcf(scene, advice.best.settings))
             click.echo(f"written to {output}")
     if len(rows) > 1:
-        print_table(("scene", "error", "steps/turn", "tc, steps", "matters most"), rows)
+        from rich.console import Console
+
+        head = ("scene", "error", "steps/turn", "tc, steps", "matters most")
+        Console().print(lined_up(head, rows, show_edge=False))
     return 0 if reached else 1

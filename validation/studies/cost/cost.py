@@ -15,11 +15,12 @@ from fourbar.scene import command as command_of
 from fourbar.writing import write_text
 from validation.engines.mujoco.trial import Rig
 from validation.report.machine import machine, versions
+from validation.report.terminal import lined_up
 from validation.scenes.suites import MODELS, scene_files
 from validation.studies.cost.curves import BEST
 from validation.studies.cost.errors import QUANTITIES
 from validation.studies.cost.laws import Law, laws, lines, pareto, warnings
-from validation.studies.cost.matters import MATTERS, influences, print_table, sentence
+from validation.studies.cost.matters import MATTERS, influences, sentence
 from validation.studies.cost.study import COLUMNS, STEPPED, Point, Study
 
 DEFAULT_SCENES = (MODELS / "crank_rocker.toml",)
@@ -77,7 +78,8 @@ def cost(scenes: tuple[Path, ...], out: Path, effects: bool) -> int:
         rows.append((name, *cheapest(curves), f"{held} of {sum(law.decided for law in found)}", most))
         click.echo(f"written to {out / name}: {', '.join(sorted(path.name for path in written))}")
     if len(rows) > 1:
-        print_table(("scene", *(f"RK4 steps for {error:g}" for error in WANTED), "laws hold", "matters most"), rows)
+        head = ("scene", *(f"RK4 steps for {error:g}" for error in WANTED), "laws hold", "matters most")
+        Console().print(lined_up(head, rows, show_edge=False))
     if not fitted:
         click.echo("Nothing was compared: no law has points enough for a fit")
     return HOLDS if fitted and all(law.holds for law in fitted) else FAILED
