@@ -27,10 +27,7 @@ class Limit:
     """One limit of one engine."""
 
     engine: str
-    what: str
-    unit: str
-    boundary: float
-    reason: str
+    of: Boundary
     inside: float
     outside: float
     holds: Callable[[float], bool]
@@ -114,36 +111,24 @@ def _proximal(mu: float) -> bool:
     return bool(np.isfinite(released.theta_2).all())
 
 
-def _declared(boundary: Boundary, inside: float, outside: float, holds: Callable[[float], bool]) -> Limit:
-    return Limit(
-        "mujoco-simulated", boundary.name, boundary.unit, boundary.boundary, boundary.reason, inside, outside, holds
-    )
-
-
+LIGHTEST = Boundary(
+    "mass or inertia of a moving bar, least",
+    1e-15,
+    "kg or kg m^2",
+    "mjMINVAL: the compiler raises ValueError for a moving body below it",
+)
+PROXIMAL = Boundary(
+    "mu of the proximal iteration, least",
+    0.0,
+    "1",
+    "the third row of the planar loop is redundant: without proximal regularisation every number is NaN",
+)
 LIMITS = (
-    _declared(NEAREST_TOGGLE, 0.06, 0.01, _near_toggle),
-    _declared(FASTEST, 3e4, 3e5, lambda omega_2: not _simulated(_at_speed(omega_2)).alarms),
-    _declared(SLOWEST, 1e-10, 1e-11, _crank_acceleration),
-    _declared(HEAVIEST, 1e10, 1e11, _loaded),
-    _declared(NEAREST_CENTRE, 2e-6, 5e-7, _centre_kept),
-    Limit(
-        "mujoco-inverse and mujoco-simulated",
-        "mass or inertia of a moving bar, least",
-        "kg or kg m^2",
-        1e-15,
-        "mjMINVAL: the compiler raises ValueError for a moving body below it",
-        1.001e-15,
-        0.999e-15,
-        _compiles,
-    ),
-    Limit(
-        "pinocchio-forward",
-        "mu of the proximal iteration, least",
-        "1",
-        0.0,
-        "the third row of the planar loop is redundant: without proximal regularisation every number is NaN",
-        1e-8,
-        0.0,
-        _proximal,
-    ),
+    Limit("mujoco-simulated", NEAREST_TOGGLE, 0.06, 0.01, _near_toggle),
+    Limit("mujoco-simulated", FASTEST, 3e4, 3e5, lambda omega_2: not _simulated(_at_speed(omega_2)).alarms),
+    Limit("mujoco-simulated", SLOWEST, 1e-10, 1e-11, _crank_acceleration),
+    Limit("mujoco-simulated", HEAVIEST, 1e10, 1e11, _loaded),
+    Limit("mujoco-simulated", NEAREST_CENTRE, 2e-6, 5e-7, _centre_kept),
+    Limit("mujoco-inverse and mujoco-simulated", LIGHTEST, 1.001e-15, 0.999e-15, _compiles),
+    Limit("pinocchio-forward", PROXIMAL, 1e-8, 0.0, _proximal),
 )
