@@ -119,7 +119,7 @@ def _sensitivity(scene: Scene, theta_2: float, branch: int, omega_2: float, alph
     """Sensitivities at one position; None where the loop does not close."""
     from flint import arb, ctx
 
-    from validation.engines.balls import BITS, STEP_BITS, inputs, outputs
+    from validation.engines.balls import BITS, STEP_BITS, inputs, outputs, response
 
     ctx.prec = BITS
     stored = inputs(scene, theta_2) | {"omega_2": omega_2, "alpha_2": alpha_2}
@@ -127,23 +127,13 @@ def _sensitivity(scene: Scene, theta_2: float, branch: int, omega_2: float, alph
     base = outputs(scene, branch, exact, scene.drive_bar)
     if base is None:
         return None
-    step, two_pi = arb(2) ** -STEP_BITS, 2 * arb.pi()
+    step = arb(2) ** -STEP_BITS
 
     def add(total: dict[str, float], changes: list[dict[str, Any]]) -> None:
         """The change under the first of several changes of the inputs with which the loop still closes."""
-        for changed in changes:
-            moved = outputs(scene, branch, exact | changed, scene.drive_bar)
-            if moved is None:
-                continue
-            for output, y in base.items():
-                if output not in moved:  # singular there
-                    total[output] = math.inf
-                    continue
-                change = abs(moved[output] - y)
-                if output.startswith("theta") and change > 3:
-                    change = two_pi - change
-                total[output] = total.get(output, 0.0) + abs(float((change / step).mid()))
-            return
+        moved = (outputs(scene, branch, exact | changed, scene.drive_bar) for changed in changes)
+        for output, rate in response(base, moved).items():
+            total[output] = total.get(output, 0.0) + rate
 
     data = {name: 1.0 if name.startswith("theta") else abs(float(value.mid())) for name, value in base.items()}
     for name, weight in _weights(stored).items():
