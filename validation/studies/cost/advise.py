@@ -45,6 +45,7 @@ class Attempt:
     settings: Settings
     steps: int
     errors: Errors
+    steps_per_revolution: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,12 +57,11 @@ class Advice:
     """The cheapest that serves; where nothing does, the most accurate."""
     attempts: tuple[Attempt, ...]
     reached: bool
-    steps_per_revolution: float
 
     def cells(self) -> tuple[str, str, str]:
         """Error, steps per revolution and time constant, for a table of several scenes."""
         error = f"{self.best.errors.worst:.1e}" + ("" if self.reached else " (not reached)")
-        return error, f"{self.steps_per_revolution:.0f}", f"{self.best.settings.time_constant_steps:.3g}"
+        return error, f"{self.best.steps_per_revolution:.0f}", f"{self.best.settings.time_constant_steps:.3g}"
 
     @property
     def reason(self) -> str:
@@ -69,7 +69,7 @@ class Advice:
         s, e = self.best.settings, self.best.errors
         found = f"torque {e.torque:.1e}, worst pin force {e.force:.1e}"
         dial = (
-            f"RK4, {self.best.steps} steps ({self.steps_per_revolution:.0f} per revolution), "
+            f"RK4, {self.best.steps} steps ({self.best.steps_per_revolution:.0f} per revolution), "
             f"tc = {s.time_constant_steps:.3g} steps, pads {s.pad}, tolerance 0, flywheel {s.flywheel:g}"
         )
         if self.reached:
@@ -107,7 +107,6 @@ class _Search:
     def __init__(self, scene: Scene, error: float, rig: Rig) -> None:
         self.scene, self.error, self.rig = scene, error, rig
         self.attempts: list[Attempt] = []
-        self.per_revolution: dict[int, float] = {}
 
     def advice(self) -> Advice:
         """The cheapest that serves, by bisection in steps, then with shorter and longer time constants."""
@@ -119,9 +118,7 @@ class _Search:
                 self._polish(other)
         served = [a for a in self.attempts if a.errors.worst <= MARGIN * self.error]
         best = min(served, key=lambda a: a.steps) if served else min(self.attempts, key=lambda a: a.errors.worst)
-        return Advice(
-            self.error, best, tuple(self.attempts), bool(served), self.per_revolution[self.attempts.index(best)]
-        )
+        return Advice(self.error, best, tuple(self.attempts), bool(served))
 
     def _polish(self, tc: float) -> None:
         """Whether another time constant serves with fewer steps, or serves at all."""
@@ -175,8 +172,7 @@ class _Search:
         if steps > MOST_STEPS:
             settings = dialled(n * MOST_STEPS / steps, tc)
         trial = self.rig.try_out(settings)
-        attempt = Attempt(settings, max(trial.steps, 1), judged(self.scene, trial))
-        self.per_revolution[len(self.attempts)] = trial.steps_per_revolution
+        attempt = Attempt(settings, max(trial.steps, 1), judged(self.scene, trial), trial.steps_per_revolution)
         self.attempts.append(attempt)
         return attempt
 

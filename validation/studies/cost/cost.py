@@ -1,7 +1,5 @@
 """`python -m validation cost`: the study of scenes, its table, its laws and its pictures."""
 
-import csv
-import io
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
@@ -13,6 +11,7 @@ from fourbar.errors import FAILED, HOLDS
 from fourbar.scene import Scene
 from fourbar.scene import command as command_of
 from fourbar.writing import write_text
+from validation.compare.rows import csv_text
 from validation.engines.mujoco.trial import Rig
 from validation.report.machine import machine, versions
 from validation.report.terminal import lined_up
@@ -107,13 +106,7 @@ def subtitle(scene: Scene, title: str) -> str:
 
 def to_csv(curves: Mapping[str, Sequence[Point]]) -> str:
     """One row per point, floats as repr."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(COLUMNS)
-    for points in curves.values():
-        for point in points:
-            writer.writerow(asdict(point).values())
-    return text.getvalue()
+    return csv_text(COLUMNS, (asdict(point).values() for points in curves.values() for point in points))
 
 
 def summary(name: str, curves: Mapping[str, Sequence[Point]], found: Sequence[Law], left_out: Sequence[str]) -> str:
