@@ -3,7 +3,7 @@
 import math
 import time
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -186,6 +186,27 @@ def as_made(out: dict[str, Array], branch: NDArray[np.int8]) -> tuple[Command, d
     theta_2, omega_2, alpha_2 = (out[name] for name in MADE)
     rest = {name: values for name, values in out.items() if name not in MADE}
     return Command(theta_2, branch, omega_2, alpha_2), rest
+
+
+@dataclass(slots=True, eq=False)
+class Trial:
+    """What one run through a scene gave, with some settings."""
+
+    at: Command
+    """The motion that was really made."""
+    quantities: dict[str, Array] = field(default_factory=dict)
+    """Torque (n,) and pin forces (n, 2), under the names of `fourbar.Solution`."""
+    steps: int = 0
+    steps_per_revolution: float = 0.0
+    """At the fastest speed of the run."""
+    stepping: float = 0.0
+    """CPU seconds in steps."""
+    reading: float = 0.0
+    """CPU seconds in reading the samples."""
+    stretches: tuple[tuple[slice, int], ...] = ()
+    """The samples of each stretch, and its steps: several samples are of one step where these are fewer."""
+    broken: str = ""
+    """Where the engine lost the motion: what it reported of itself."""
 
 
 class LimitWatch:

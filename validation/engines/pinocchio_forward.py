@@ -1,7 +1,6 @@
 """Pinocchio's forward dynamics of a driven loop through time: a flywheel keeps the speed."""
 
 import time
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -9,21 +8,9 @@ from fourbar.errors import LimitError
 from fourbar.mjcf import Settings, flywheel, run_through
 from fourbar.scene import Command, Scene
 from validation.compare.answer import Array
-from validation.engines.loop import as_made, blank
+from validation.engines.loop import Trial, as_made, blank
 from validation.engines.pinocchio import PinocchioTree
 from validation.engines.pinocchio_closed import ClosedTree, step
-
-
-@dataclass(slots=True, eq=False)
-class Forward:
-    """What one run gave."""
-
-    at: Command
-    quantities: dict[str, Array]
-    steps: int
-    steps_per_revolution: float
-    stepping: float
-    """CPU seconds in steps."""
 
 
 class PinocchioForward:
@@ -54,7 +41,7 @@ class PinocchioForward:
             tau = tau + tree.needed(tree.field, dict.fromkeys(tree.wrenches, np.zeros(3))) - acted
         return np.array(self.loop.acceleration(q, v, tau))
 
-    def forward(self) -> Forward:
+    def forward(self) -> Trial:
         """Run through the positions; each is read at the step nearest to it."""
         order = np.argsort(self.command.theta_2 if self.omega > 0.0 else -self.command.theta_2, kind="stable")
         first = int(order[0])
@@ -75,7 +62,7 @@ class PinocchioForward:
             for name, value in self._read(q, v, self.acceleration(q, v)).items():
                 out[name][row] = value
         at, quantities = as_made(out, self.command.branch[order])
-        return Forward(at, quantities, done, 2.0 * np.pi / self.run.fastest / self.h, stepping)
+        return Trial(at, quantities, done, 2.0 * np.pi / self.run.fastest / self.h, stepping)
 
     def _read(self, q: Array, v: Array, a: Array) -> dict[str, Array | float]:
         """Torque and pin forces at a state, with the multiplier of the closure that the engine found."""

@@ -7,7 +7,7 @@ the drive to be tried, and reports its own motion, torque, pin forces and CPU se
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import mujoco
 import numpy as np
@@ -16,7 +16,7 @@ from fourbar.errors import LimitError
 from fourbar.mjcf import Settings, mjcf
 from fourbar.scene import Command, Scene
 from validation.compare.answer import Array
-from validation.engines.loop import as_made, blank
+from validation.engines.loop import Trial, as_made, blank
 from validation.engines.mujoco.closed_loop import O2, ClosedLoop
 from validation.engines.mujoco.motions import Steady, order_in_time
 from validation.engines.mujoco.runner import LIGHT_FLYWHEEL, Run, assembled, stretches
@@ -34,27 +34,6 @@ def silence() -> Iterator[None]:
         yield
     finally:
         mujoco.set_mju_user_warning(before)
-
-
-@dataclass(slots=True, eq=False)
-class Trial:
-    """What one run through the scene gave."""
-
-    at: Command
-    """The motion that was really made."""
-    quantities: dict[str, Array]
-    """Torque (n,) and pin forces (n, 2), under the names of `fourbar.Solution`."""
-    steps: int
-    steps_per_revolution: float
-    """At the fastest speed of the run."""
-    stepping: float
-    """CPU seconds in steps."""
-    reading: float
-    """CPU seconds in reading the samples."""
-    stretches: tuple[tuple[slice, int], ...] = ()
-    """The samples of each stretch, and its steps: several samples are of one step where these are fewer."""
-    broken: str = ""
-    """What MuJoCo reported of itself, where it lost the motion."""
 
 
 class Rig:
@@ -96,7 +75,7 @@ class Rig:
     def try_out(self, settings: Settings, build: Build | None = None) -> Trial:
         """Run through every stretch of positions that assembles and read at the step nearest to each."""
         samples = [index for stretch in self.stretches for index in stretch]
-        out, trial, first = blank(len(samples)), Trial(self.command, {}, 0, 0.0, 0.0, 0.0), 0
+        out, trial, first = blank(len(samples)), Trial(self.command), 0
         with silence():
             for stretch in self.stretches:
                 before, rows = trial.steps, slice(first, first + len(stretch))

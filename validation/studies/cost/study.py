@@ -16,7 +16,8 @@ from fourbar.formulas.mobility import turns_fully
 from fourbar.scene import Command, Scene, command
 from fourbar.writing import write_text
 from validation.compare.answer import Engine
-from validation.engines.mujoco.trial import Rig, Trial
+from validation.engines.loop import Trial
+from validation.engines.mujoco.trial import Rig
 from validation.report.machine import versions
 from validation.stress.timed import in_turns
 from validation.studies.cost import formulas
