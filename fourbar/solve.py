@@ -1,7 +1,8 @@
 """From a scene to its solution: block by block over the positions, stage by stage, no further than wanted."""
 
+import cmath
 import os
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Iterable, KeysView, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 from importlib.util import find_spec
@@ -14,7 +15,7 @@ from fourbar.errors import DependencyError, InputError, installing
 from fourbar.quantities import ANGLES, OF_DRY_FRICTION, OF_PIN_LOADS, QUANTITIES, STAGE_OF, STAGES
 from fourbar.scene import Command, Scene, command
 from fourbar.scene.case import Case, Evaluated
-from fourbar.scene.evaluation import ERROR, FORCE, Part, commanded, evaluated, freely
+from fourbar.scene.evaluation import ERROR, FORCE, Part, commanded, freely
 from fourbar.scene.point import OF_POINTS
 from fourbar.scene.start import refuse_wound, with_start
 from fourbar.scene.withheld import withheld
@@ -29,7 +30,7 @@ BLOCK = 8000
 numbers is a little more than the C library hands out again without asking the system for fresh pages."""
 
 WORTH_COMPILING = 2_000_000
-"""Evaluations of the forces, one a position, with error bars 17: loading numba and the compiled loop costs as much."""
+"""Evaluations of the forces, one a position, with error bars ten: loading numba and the compiled loop costs as much."""
 
 PARTS_FOR_THREADS = 4
 
@@ -82,7 +83,8 @@ def solve(
     wanted, names = requested(scene, (n,), where.omega_2, stage, out)
     code = np.zeros(n, dtype=np.uint8)
     with np.errstate(all="ignore"):
-        case = Case.of(with_start(scene) if wanted >= FORCE else scene)._replace(side=side)
+        turns = wanted >= FORCE and any(effect.counts_turns for effect in scene.effects)
+        case = Case.of(with_start(scene) if turns else scene)._replace(side=side)
         quick = moved is None and where.remainder is None and is_compiled(case, wanted, n, compiled)
         result = None
         if n == 1 and moved is None and out is None and not quick:
@@ -109,9 +111,18 @@ def is_compiled(case: Case, wanted: int, count: int, compiled: bool | None) -> b
         if compiled is None:
             return False
         raise DependencyError(f"compiled=True needs numba, which is not installed: {installing('fast')}")
-    from fourbar.scene.compiled import carries
+    from fourbar.scene.compiled_case import carries
 
     return carries(case)
+
+
+def evaluation(quick: bool) -> Callable[..., Evaluated]:
+    """Of some positions, by the compiled loop or by NumPy."""
+    if not quick:
+        return commanded
+    from fourbar.scene.compiled_case import evaluated
+
+    return evaluated
 
 
 def threads() -> int:
@@ -153,7 +164,7 @@ def last_stage(scene: Scene) -> str:
 
 def requested(
     scene: Scene, shape: tuple[int, ...], omega_2: Any, stage: str | None, out: Mapping[str, Array] | None
-) -> tuple[int, Collection[str]]:
+) -> tuple[int, KeysView[str]]:
     """The number of the last stage that is evaluated, and the names of the quantities; an InputError as of `solve`.
 
     Parameters
@@ -167,7 +178,7 @@ def requested(
         if stage not in STAGES:
             raise InputError("stage", stage, "must be one of " + ", ".join(STAGES))
         wanted = STAGES.index(stage)
-        names: Collection[str] = _names(wanted, _absent(scene), tuple(point.name for point in scene.points))
+        names = _names(wanted, _absent(scene), tuple([point.name for point in scene.points]))
     else:
         names = out.keys()
         wanted = _highest_stage(out, shape, _stages(tuple(point.name for point in scene.points)))
@@ -197,10 +208,10 @@ def _stages(points: tuple[str, ...]) -> dict[str, str]:
 
 
 @cache
-def _names(wanted: int, absent: tuple[str, ...], points: tuple[str, ...]) -> tuple[str, ...]:
+def _names(wanted: int, absent: tuple[str, ...], points: tuple[str, ...]) -> KeysView[str]:
     """The quantities of the stages up to the last one wanted."""
     before = STAGES[: wanted + 1]
-    return tuple(name for name, of in _stages(points).items() if of in before and name not in absent)
+    return {name: of for name, of in _stages(points).items() if of in before and name not in absent}.keys()
 
 
 def solved(scene: Scene, at: Command, code: NDArray[np.uint8], result: Mapping[str, Array]) -> Solution:
@@ -210,7 +221,7 @@ def solved(scene: Scene, at: Command, code: NDArray[np.uint8], result: Mapping[s
         for start, arrays in own.items():
             if (array := result.get(start + point.name)) is not None:
                 arrays[point.name] = array
-    known = {name: array for name, array in result.items() if name in STAGE_OF}
+    known = {name: array for name, array in result.items() if name in STAGE_OF} if scene.points else result
     solution = Solution(scene.title, scene.drive_bar, code, np.asarray(at.branch), at.theta_2, **known)
     solution.points, solution.velocity, solution.acceleration = own[""], own["v_"], own["a_"]
     return solution
@@ -264,7 +275,7 @@ def _by_parts(
     where: Command,
     moved: "FreeMotion | None",
     wanted: int,
-    names: Collection[str],
+    names: KeysView[str],
     result: Mapping[str, Array],
     code: NDArray[np.uint8],
     quick: bool,
@@ -279,7 +290,7 @@ def _by_parts(
         if moved is not None:
             found = freely(case, moved, part, wanted, names)
         else:
-            found = (evaluated if quick else commanded)(case, where, part, wanted, names)
+            found = evaluation(quick)(case, where, part, wanted, names)
         keep(case, found, result, code, part, seen=quick)
         return found
 
@@ -287,7 +298,7 @@ def _by_parts(
 
 
 def _alone(
-    case: Case, where: Command, wanted: int, names: Collection[str], code: NDArray[np.uint8]
+    case: Case, where: Command, wanted: int, names: KeysView[str], code: NDArray[np.uint8]
 ) -> dict[str, Array] | None:
     """A single position in plain numbers, for arrays of one entry cost several times as much; None where any is no
     number: there NumPy goes on with inf and NaN, and statuses follow."""
@@ -297,10 +308,11 @@ def _alone(
         return None
     code[0] = codes
     table = np.array([*values.values()], dtype=complex)
-    if not np.isfinite(table).all():
+    if not cmath.isfinite(np.vdot(table, table)):
         return None
-    pairs = table.view(float).reshape(-1, 1, 2)
-    return {name: pairs[i, :, 0] if is_scalar(name) else pairs[i] for i, name in enumerate(values)}
+    vectors = table.view(float).reshape(-1, 1, 2)
+    scalars = vectors[:, :, 0]
+    return {name: (scalars if KIND.get(name) == "scalar" else vectors)[i] for i, name in enumerate(values)}
 
 
 def _released(scene: Scene) -> "FreeMotion":

@@ -12,7 +12,7 @@ from fourbar import solve as solving
 from fourbar.effects import Flywheel, Friction, Gravity, Load, Viscous
 from fourbar.errors import DependencyError
 from fourbar.quantities import NOT_ASSEMBLED, OK
-from fourbar.scene import compiled
+from fourbar.scene import compiled, compiled_case
 from fourbar.scene.error_bars import EVALUATIONS
 from fourbar.studies import vary
 from validation.stress.forward_error.judge import TOO_SMALL
@@ -100,8 +100,8 @@ def test_what_it_does_not_carry_is_numpys_to_the_last_digit() -> None:
 
 def test_small_work_is_left_to_numpy(monkeypatch: pytest.MonkeyPatch) -> None:
     used: list[bool] = []
-    true = compiled.evaluate
-    monkeypatch.setattr(compiled, "evaluate", lambda *given, **named: used.append(True) or true(*given, **named))
+    true = compiled_case.looped
+    monkeypatch.setattr(compiled_case, "looped", lambda *given, **named: used.append(True) or true(*given, **named))
     solve(scene(), "error")
     assert not used
     module = __import__("sys").modules[solving.__module__]

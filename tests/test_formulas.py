@@ -15,11 +15,10 @@ import fourbar.formulas
 from fourbar.formulas.arithmetic import cross, exact_difference, two_sum
 from fourbar.formulas.mobility import limit_positions
 from fourbar.formulas.motion import Coefficients, Rates, State, rates
-from fourbar.formulas.path import path, state
+from fourbar.formulas.path import drive_sine, drive_sine_of_triangle, path, state
 from fourbar.formulas.pin_forces import Body, inertia_wrenches, pin_forces
 from fourbar.formulas.position import HalfAngle, close_loop, direction, half_angle, loop, parallel_pairs
 from fourbar.formulas.torque import driving_torque, half_slope, inertia
-from fourbar.formulas.transmission import drive_sine, drive_sine_of_triangle
 from fourbar.linkage import MOVING_BARS, Bar, FourBar, uniform
 from fourbar.many_digits import decided, limit_remainder
 from fourbar.many_digits import half_angle as exact_half_angle

@@ -7,10 +7,9 @@ from mpmath import mpf
 
 from fourbar.formulas.arithmetic import cross, dot
 from fourbar.formulas.motion import State, coefficients, rates, with_parallel_pairs, with_sines_of_rates
-from fourbar.formulas.path import path, state
+from fourbar.formulas.path import drive_sine, path, state
 from fourbar.formulas.pin_forces import Body, Wrenches, coupler_about_B, pin_forces
 from fourbar.formulas.position import Loop, close_loop, direction, half_angle, loop, parallel_pairs
-from fourbar.formulas.transmission import drive_sine
 from fourbar.linkage import uniform
 
 FEW_ROUNDINGS = 8.0 * 2.0**-52

@@ -4,11 +4,9 @@ import math
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-import numpy as np
-
 from fourbar.effects.actions import Actions
 from fourbar.effects.effect import Effect
-from fourbar.formulas.arithmetic import anywhere
+from fourbar.formulas.arithmetic import anywhere, polar, vector
 from fourbar.formulas.motion import State
 from fourbar.linkage import MOVING_BARS, require
 
@@ -31,9 +29,8 @@ class Gravity(Effect):
     @property
     def field(self) -> Any:
         """g_x + i g_y, m/s^2; a component that the angle as a double cannot tell from zero is zero."""
-        u = np.exp(1j * self.angle)
-        cosine, sine = (x * (abs(x) > U) for x in (u.real, u.imag))
-        return self.magnitude * (cosine + 1j * sine)
+        u = polar(1.0, self.angle)
+        return self.magnitude * vector(u.real * (abs(u.real) > U), u.imag * (abs(u.imag) > U))
 
     @property
     def vector(self) -> tuple[float, float]:

@@ -59,6 +59,11 @@ def polar(r: Number, phi: Number) -> Number:
     return r * np.cos(phi) + 1j * (r * np.sin(phi))
 
 
+def angle(u: Number) -> Number:
+    """Angle of a complex number, rad, in [-pi, pi]."""
+    return cmath.phase(u) if type(u) is complex else np.arctan2(u.imag, u.real)
+
+
 def tangent(x: Number) -> Number:
     """tan x, of Python's own floats as such."""
     t = np.tan(x)

@@ -134,11 +134,6 @@ def rates(k: Coefficients, speed: Number, acceleration: Number) -> Rates:
     return Rates(k.h2 * speed, k.h3 * speed, k.h4 * speed, alpha_2, alpha_3, alpha_4)
 
 
-def swing(arm: Number, omega: Number, alpha: Number) -> Number:
-    """Acceleration of the end of an arm (complex, m) about its foot: (i alpha - omega^2) r."""
-    return vector(-omega * omega, alpha) * arm
-
-
 class State(NamedTuple):
     """One position of a linkage, or many that broadcast, and how it moves: what loads and effects act on."""
 
@@ -167,6 +162,11 @@ class State(NamedTuple):
         """Angular acceleration of bar 1, 2, 3 or 4, rad/s^2."""
         return 0.0 if bar == 1 else self.moving[bar + 1]
 
+    def turn(self, bar: int) -> Number:
+        """i alpha - omega^2 of bar 1, 2, 3 or 4, 1/s^2: what an arm is multiplied by for its acceleration."""
+        omega = self.omega(bar)
+        return vector(-omega * omega, self.alpha(bar))
+
     def foot(self, bar: int) -> Number:
         """First pin of a bar, complex, m: O2 of bars 1 and 2, A of bar 3, O4 of bar 4."""
         if bar == 3:
@@ -189,8 +189,8 @@ class State(NamedTuple):
 
     def acceleration(self, bar: int, z: Number) -> Number:
         """Its acceleration, m/s^2: a_pin + (i alpha - omega^2) r."""
-        own = swing(z * self.direction(bar), self.omega(bar), self.alpha(bar))
-        return own + swing(self.foot(3), self.omega(2), self.alpha(2)) if bar == 3 else own
+        own = self.turn(bar) * (z * self.direction(bar))
+        return own + self.turn(2) * self.foot(3) if bar == 3 else own
 
     def slip(self, pin: str) -> tuple[Number, Number]:
         """Of the bars i, j that meet at a pin: h_j - h_i and its derivative by the independent angle."""

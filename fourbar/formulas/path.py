@@ -52,10 +52,10 @@ class Path(NamedTuple):
         u2 = vector(half.kk - half.ss, 2.0 * half.sk) if along else direction(q)
         if isinstance(turned, np.ndarray):  # of linkages
             u2 = np.where(turned, direction(q), u2)
-        at = close_loop(self.lengths, self.u1, u2, half, branch)
+        at = close_loop(self.lengths, self.u1, u2, half, branch, self.unit)
         if self.may_stay_parallel:
             at = parallel_position(at, *parallel_pairs(self.lengths, half, branch))
-        return at._replace(diagonal=at.diagonal * self.unit)
+        return at
 
     def angles(self, half: HalfAngle, branch: Number) -> tuple[Number, Number, Number]:
         """theta_3, theta_4 and the root alone, the arguments of what `close_loop` divides by lengths, in (-pi, pi].
@@ -83,6 +83,16 @@ class Path(NamedTuple):
             known = ~np.isnan(at.root)
             k = parallel_motion(k, first & known, second & known)
         return (at, k) if self.bar == 2 else (_turned_round(self, at), read_backwards(k))
+
+    def drive_sine(self, at: Position, drive_bar: int) -> Number:
+        """Sine between the two bars that are not driven; positions as `motion` returns them."""
+        if self.bar == 4:
+            return drive_sine(at, drive_bar)
+        sine = drive_sine_of_triangle(self.lengths, at, drive_bar)
+        if self.may_stay_parallel:  # whose directions are exact
+            first, second = parallel_pairs(self.lengths, at.half, np.sign(at.root))
+            sine = np.where(first | second, drive_sine(at, drive_bar), sine)
+        return sine
 
 
 def path(lengths: Loop, theta_1: Number, bar: int = 2) -> Path:
@@ -116,6 +126,33 @@ def state(linkage: FourBar, theta_2: Number, branch: Number, omega_2: Number = 1
         at = reading.position(theta_2, reading.half_angle(theta_2), branch)
         at, k = reading.motion(at._replace(root=np.where(singular(at), np.nan, at.root)), branch)
         return State(lengths, linkage.ground_angle, theta_2, at, k, omega_2, rates(k, omega_2, alpha_2))
+
+
+def drive_sine(at: Position, drive_bar: int) -> Number:
+    """sin(theta_4 - theta_3), sin(theta_4 - theta_2), sin(theta_3 - theta_2) for the drive on bar 2, 3, 4."""
+    if drive_bar == 2:
+        return at.sin_mu
+    return cross(at.u2, at.u4 if drive_bar == 3 else at.u3)
+
+
+def drive_sine_of_triangle(lengths: Loop, at: Position, drive_bar: int) -> Number:
+    """The same from the triangle A, B, O4, where a short ground leaves few digits to directions that differ little:
+
+        sin(theta_4 - theta_2) = ((d cos psi - a) root + d sin psi (e^2 - b^2 + c^2))/(2 c e^2),
+        sin(theta_3 - theta_2) = ((d cos psi - a) root - d sin psi (e^2 + b^2 - c^2))/(2 b e^2).
+
+    Parameters
+    ----------
+    lengths : of the loop that the position was closed with.
+    """
+    if drive_bar == 2:
+        return at.sin_mu
+    d, a, b, c, _, _ = lengths
+    ss, _, sk, _, inner = at.half
+    along = ((d - a) - 2.0 * d * ss) * at.root
+    if drive_bar == 3:
+        return (along + 2.0 * d * sk * (inner - 2.0 * c * (b - c))) / (2.0 * c * at.e2)
+    return (along - 2.0 * d * sk * (inner + 2.0 * b * (b - c))) / (2.0 * b * at.e2)
 
 
 def smooth_branch(lengths: Loop, psi: Number, sign: Number) -> Number:

@@ -78,10 +78,10 @@ def inertia_wrenches(a: Number, bodies: Bodies, at: Position, moving: Rates) -> 
     G3, turned = three.z * at.u3, of_2 * at.u2
     return Wrenches(
         (two.m * two.z) * turned,
-        three.m * vector(w3 * w3, -alpha_3) * G3,
+        vector(three.m * w3 * w3, -three.m * alpha_3) * G3,
         (four.m * four.z) * vector(w4 * w4, -alpha_4) * at.u4,
         -about_first_pin(two) * alpha_2,
-        cross(G3, (three.m * a) * turned) - about_first_pin(three) * alpha_3,
+        three.m * a * cross(G3, turned) - about_first_pin(three) * alpha_3,
         -about_first_pin(four) * alpha_4,
     ), (three.m * a) * of_2
 
@@ -137,12 +137,13 @@ def pin_forces(
     """
     d, a, b, c, _, _ = lengths
     R2, R3, R4, M2, M3, M4, C = w
-    of_3, of_4 = M3 - C, M4 + C
+    of_3 = M3 - C
     along, across = mass_at_A.real, mass_at_A.imag  # bar 2: apart, for each would cancel in a sum that it is no part of
     if drive_bar == 4:
         F32 = between(-M2 / a, moment_of_F32 / b, at.u2, at.u3, sine)
         F43 = between(-of_3 / b, -M2 / a - cross(at.u2, R3) - across, at.u3, at.u2, -sine)
     elif drive_bar == 3:
+        of_4 = M4 + C
         F43 = between(-M2 / a - cross(at.u2, R3) - across, of_4 / c, at.u2, at.u4, sine)
         F32 = between(-M2 / a - across, of_4 / c + cross(at.u4, R3), at.u2, at.u4, sine)
         F32 = (dot(at.u2, F32) + along - 1j * (M2 / a)) * at.u2  # across bar 2 its own moment knows it best
@@ -153,4 +154,4 @@ def pin_forces(
         short = d < a
         if anywhere(short):  # all bars turn as one, and the sum loses the small component across bar 2
             F32 = F32 + short * (moment_of_F32 / a - cross(at.u2, F32)) * 1j * at.u2
-    return PinForces(-1.0 * (R2 + F32), F32, F43, F43 - R4)
+    return PinForces(-(R2 + F32), F32, F43, F43 - R4)

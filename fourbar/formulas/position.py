@@ -107,7 +107,7 @@ def half_angle_of_tangent(lengths: Loop, t: Number) -> HalfAngle:
     return HalfAngle(ss, kk, sk, outer, inner)
 
 
-def close_loop(lengths: Loop, u1: Number, u2: Number, half: HalfAngle, branch: Number) -> Position:
+def close_loop(lengths: Loop, u1: Number, u2: Number, half: HalfAngle, branch: Number, unit: Number = 1.0) -> Position:
     """The directions of coupler and output:
 
         u3 = (O4 - A) ((e^2 + b^2 - c^2) + i root)/(2 b e^2),   e^2 = (d - a)^2 + 4 a d sin^2 h,
@@ -119,6 +119,7 @@ def close_loop(lengths: Loop, u1: Number, u2: Number, half: HalfAngle, branch: N
     u1, u2 : e^{i theta_1} and e^{i theta_2}.
     half : of theta_2 - theta_1.
     branch : +1 (B lies left of the diagonal from A to O4) or -1.
+    unit : of the lengths, m, where it is another than that of the diagonal found.
 
     >>> lengths, theta_2 = loop(100, 40, 120, 80), np.radians(40)  # mm; Norton, example 4-1
     >>> at = close_loop(lengths, 1.0, direction(theta_2), half_angle(lengths, theta_2), 1)
@@ -128,10 +129,11 @@ def close_loop(lengths: Loop, u1: Number, u2: Number, half: HalfAngle, branch: N
     d, a, b, c, _, _ = lengths
     e2 = half.inner + (b - c) * (b - c)
     root = branch * square_root(half.outer * half.inner)
-    diagonal = vector((d - a) + 2.0 * a * half.ss, -2.0 * a * half.sk) * u1
+    twice_a = 2.0 * a * unit
+    diagonal = vector((d - a) * unit + twice_a * half.ss, -twice_a * half.sk) * u1
     # e^2 + b^2 - c^2 and b^2 - e^2 - c^2 from the factor that the root is made of, so that u3, u4 keep their length
     at_A, at_O4 = half.inner + 2.0 * b * (b - c), 2.0 * c * (b - c) - half.inner
-    to_3, to_4 = 0.5 / (b * e2), 0.5 / (c * e2)
+    to_3, to_4 = (0.5 / unit) / (b * e2), (0.5 / unit) / (c * e2)
     u3 = diagonal * vector(at_A * to_3, root * to_3)
     u4 = diagonal * vector(at_O4 * to_4, root * to_4)
     return Position(u1, u2, u3, u4, root * (0.5 / (b * c)), diagonal, e2, root, half)

@@ -5,10 +5,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fourbar.formulas.arithmetic import Number, cross, dot
+from fourbar.formulas.arithmetic import dot
 from fourbar.formulas.mobility import TURN, Array, Reach, change_points, limit_positions, reach_of
 from fourbar.formulas.motion import State
-from fourbar.formulas.position import Loop, Position
 from fourbar.linkage import FourBar
 
 
@@ -61,33 +60,6 @@ def _angle_at_B(reach: Reach, d: int, own: int) -> float:
     """The angle between the sides b, c of the triangle b, c, e with e = d (ground) + own (input), signed."""
     opposite = max(reach.sum(d, own, 1, -1), 0.0) ** 0.5 * max(reach.sum(d, own, -1, 1), 0.0) ** 0.5
     return 2.0 * math.atan2(opposite, max(reach.sum(-d, -own, 1, 1), 0.0) ** 0.5 * reach.sum(d, own, 1, 1) ** 0.5)
-
-
-def drive_sine(at: Position, drive_bar: int) -> Number:
-    """sin(theta_4 - theta_3), sin(theta_4 - theta_2), sin(theta_3 - theta_2) for the drive on bar 2, 3, 4."""
-    if drive_bar == 2:
-        return at.sin_mu
-    return cross(at.u2, at.u4 if drive_bar == 3 else at.u3)
-
-
-def drive_sine_of_triangle(lengths: Loop, at: Position, drive_bar: int) -> Number:
-    """The same from the triangle A, B, O4, where a short ground leaves few digits to directions that differ little:
-
-        sin(theta_4 - theta_2) = ((d cos psi - a) root + d sin psi (e^2 - b^2 + c^2))/(2 c e^2),
-        sin(theta_3 - theta_2) = ((d cos psi - a) root - d sin psi (e^2 + b^2 - c^2))/(2 b e^2).
-
-    Parameters
-    ----------
-    lengths : of the loop that the position was closed with.
-    """
-    if drive_bar == 2:
-        return at.sin_mu
-    d, a, b, c, _, _ = lengths
-    ss, _, sk, _, inner = at.half
-    along = ((d - a) - 2.0 * d * ss) * at.root
-    if drive_bar == 3:
-        return (along + 2.0 * d * sk * (inner - 2.0 * c * (b - c))) / (2.0 * c * at.e2)
-    return (along - 2.0 * d * sk * (inner + 2.0 * b * (b - c))) / (2.0 * b * at.e2)
 
 
 def speed_ratio(state: State) -> Array:

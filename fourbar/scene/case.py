@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import fields, is_dataclass
+from functools import cache
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -12,9 +13,8 @@ from fourbar.formulas.arithmetic import anywhere, polar, vector
 from fourbar.formulas.motion import Coefficients, State, rates
 from fourbar.formulas.path import Path, path
 from fourbar.formulas.pin_forces import Bodies, PinForces, Wrenches, coupler_about_B, inertia_wrenches, pin_forces
-from fourbar.formulas.position import HalfAngle, Loop, Position, parallel_pairs
+from fourbar.formulas.position import HalfAngle, Loop, Position
 from fourbar.formulas.torque import driving_torque, half_slope, inertia
-from fourbar.formulas.transmission import drive_sine, drive_sine_of_triangle
 from fourbar.linkage import FourBar
 from fourbar.quantities import JAMMED
 from fourbar.scene import Scene
@@ -45,12 +45,18 @@ def changed(value: Any, change: Callable[[Any], Any]) -> Any:
     if isinstance(value, tuple):
         parts = [changed(part, change) for part in value]
         return type(value)(*parts) if hasattr(value, "_fields") else tuple(parts)
-    if not is_dataclass(value) or getattr(value, "as_given", False):
+    if not (names := _fields(value.__class__)):
         return value
     other = object.__new__(type(value))  # a constructor checks what a user gives, one number at a time
-    for field in fields(value):
-        object.__setattr__(other, field.name, changed(getattr(value, field.name), change))
+    for name in names:
+        object.__setattr__(other, name, changed(getattr(value, name), change))
     return other
+
+
+@cache
+def _fields(of: type) -> tuple[str, ...]:
+    """Of a dataclass whose numbers may be changed."""
+    return tuple(field.name for field in fields(of)) if is_dataclass(of) and not getattr(of, "as_given", False) else ()
 
 
 def undecided(factor: Any, constant: Any, size: Any) -> Any:
@@ -142,14 +148,16 @@ class Case(NamedTuple):
             own, mass_at_A = Wrenches(*map(rounded, own)), vector(rounded(mass_at_A.real), rounded(mass_at_A.imag))
             inertial, others = rounded(inertial), rounded(others)
 
-        sine, short = self.drive_sine(at), anywhere(self.lengths.d < self.lengths.a)
+        sine, short = self.path.drive_sine(at, self.drive_bar), anywhere(self.lengths.d < self.lengths.a)
         if rounded is not None:
             sine = rounded(sine)
         if self.drive_bar == 4:
             about_B = coupler_about_B(self.lengths, self.bodies[1], at, state.moving, sine)
             others = about_B if rounded is None else rounded(about_B)
 
-        def solved(acting: Actions, own: Wrenches, mass_at_A: Any, others: Any) -> PinForces:
+        def eliminate(
+            acting: Actions, own: Wrenches = own, mass_at_A: Any = mass_at_A, others: Any = others
+        ) -> PinForces:
             w, moment = acting.wrenches(own), 0.0
             if self.drive_bar == 4:
                 moment = -(acting.about_B() + others)
@@ -157,29 +165,15 @@ class Case(NamedTuple):
                 moment = acting.work()[1] - others
             return pin_forces(self.lengths, at, self.drive_bar, sine, w, mass_at_A, moment)
 
-        def eliminate(acting: Actions) -> PinForces:
-            return solved(acting, own, mass_at_A, others)
-
         def by_couples(acting: Actions) -> PinForces:
-            return solved(acting, Wrenches(), 0.0j, 0.0)
+            return eliminate(acting, Wrenches(), 0.0j, 0.0)
 
         pins = eliminate(actions)
-        found = Dynamics(pins, None)
+        settled: list[Any] = []
         for term in self.terms:  # a scene holds one effect of a kind, and one kind depends on the forces
             if term.loaded_pins:
-                settled = term.settle(actions, pins, eliminate, by_couples)  # type: ignore[attr-defined]
-                found = Dynamics(settled.pins, None, settled.from_jamming, settled.residual, settled.status)
-        return found._replace(torque=driving_torque(k, self.drive_bar, inertial, actions.work()[0]))
-
-    def drive_sine(self, at: Position) -> Any:
-        """Sine between the two bars that are not driven."""
-        if self.path.bar == 4:
-            return drive_sine(at, self.drive_bar)
-        sine = drive_sine_of_triangle(self.path.lengths, at, self.drive_bar)
-        if self.path.may_stay_parallel:  # whose directions are exact
-            first, second = parallel_pairs(self.path.lengths, at.half, np.sign(at.root))
-            sine = np.where(first | second, drive_sine(at, self.drive_bar), sine)
-        return sine
+                pins, *settled = term.settle(actions, pins, eliminate, by_couples)  # type: ignore[attr-defined]
+        return Dynamics(pins, driving_torque(k, self.drive_bar, inertial, actions.work()[0]), *settled)
 
     def torque_interval(self, state: State, alpha_2: Any, torque: Any) -> tuple[Any, Any, Any]:
         """Least and greatest driving torque where dry friction holds a pin at rest, elsewhere the torque twice, N m.

@@ -5,29 +5,24 @@ bar. Positions that it leaves open (those that need many digits, singular, not a
 are evaluated by NumPy, as is every scene with other effects or with two pairs of equal bars.
 """
 
-import threading
 import zlib
 from functools import cache
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fourbar.effects import Flywheel, Gravity, Load, Viscous
-from fourbar.formulas import arithmetic, motion, pin_forces, position, torque, transmission
-from fourbar.formulas.arithmetic import anywhere, cross, polar, select, square_root, two_sum, vector
+from fourbar.formulas import arithmetic, motion, path, pin_forces, position, torque
+from fourbar.formulas.arithmetic import anywhere, cross, select, square_root, vector
 from fourbar.formulas.motion import Coefficients, Rates, coefficients, rates, with_sines_of_rates
-from fourbar.formulas.path import NO_DIGIT_LEFT
+from fourbar.formulas.path import NO_DIGIT_LEFT, drive_sine_of_triangle
 from fourbar.formulas.pin_forces import Body, PinForces, Wrenches, coupler_about_B, inertia_wrenches
 from fourbar.formulas.pin_forces import pin_forces as pin_forces_of
 from fourbar.formulas.position import Loop, Position, close_loop, direction_of_tangent, half_angle_of_tangent
 from fourbar.formulas.torque import driving_torque, half_slope, inertia
-from fourbar.formulas.transmission import drive_sine_of_triangle
-from fourbar.linkage import MOVING_BARS, PINS
 from fourbar.scene import case as cases
 from fourbar.scene import error_bars as bars
-from fourbar.scene.case import Case, undecided
+from fourbar.scene.case import undecided
 from fourbar.scene.error_bars import (
     EVALUATIONS,
     bar,
@@ -35,92 +30,15 @@ from fourbar.scene.error_bars import (
     rounded_complex,
     rounded_half_angle,
     rounded_real,
-    signs,
 )
 from fourbar.solution import Array
 
-CARRIED = (Load, Gravity, Viscous, Flywheel)
-"""Effects that the loop knows; a flywheel is in the inertia of its bar."""
 BODIES, VISCOUS, LOADS = 16, 28, 32
 """Where the bodies, viscous pins and loads begin among the numbers of a position."""
 OF_BODY, OF_LOADS = 4, 8
 ROWS = LOADS + 3 * OF_LOADS
 SMALL, LARGE = 1e-130, 1e130
 """N, N m. Of what is beyond, the squares of the changes for an error bar may leave the range of doubles."""
-
-
-class Loads(NamedTuple):
-    """Everything that pushes on one bar, summed: at its mass centre, and as couples."""
-
-    world: Any = 0j
-    """Forces with constant directions, N."""
-    turning: Any = 0j
-    """Forces that turn with the bar, in its frame, N."""
-    couple: Any = 0.0
-    """Couples, and moments of both kinds of forces about the mass centre, N m."""
-    of_world: Any = 0.0
-    """Sums of the sizes of the terms, for the error bars."""
-    of_turning: Any = 0.0
-    of_couple: Any = 0.0
-
-    def with_force(self, force: Any, at: Any, turns: bool) -> "Loads":
-        """One force more, with its arm from the mass centre, both complex and in the same frame."""
-        moment, size = cross(at, force), np.abs(force)
-        more = self._replace(
-            couple=self.couple + moment, of_couple=self.of_couple + size * (np.abs(at.real) + np.abs(at.imag))
-        )
-        if turns:
-            return more._replace(turning=more.turning + force, of_turning=more.of_turning + size)
-        return more._replace(world=more.world + force, of_world=more.of_world + size)
-
-    def with_couple(self, couple: Any) -> "Loads":
-        """One couple more."""
-        return self._replace(couple=self.couple + couple, of_couple=self.of_couple + np.abs(couple))
-
-
-def carries(case: Case) -> bool:
-    """Whether the loop can evaluate a case."""
-    plain = case.path.bar == 2 and not case.path.may_stay_parallel
-    return plain and all(type(term) in CARRIED for term in case.terms)
-
-
-def numbers(case: Case, theta_2: Array, branch: Any, omega_2: Any, alpha_2: Any) -> Any:
-    """What `run` reads of a case and the motion of some positions: (ROWS,) numbers, or an array (ROWS, n).
-
-    Lengths in their unit with E1 and E2; lengths, m; u1; omega_2, alpha_2, branch, what theta_2 - theta_1 loses;
-    bodies; viscous pins; loads.
-    """
-    of_bodies = [number for body in case.bodies for number in (body.m, body.I, body.z.real, body.z.imag)]
-    of_pins: dict[str, Any] = dict.fromkeys(PINS, 0.0)
-    loads = dict.fromkeys(MOVING_BARS, Loads())
-    for term in case.terms:
-        if isinstance(term, Viscous):
-            of_pins |= dict(term.coefficients)
-        elif isinstance(term, Gravity):
-            for bar, body in zip(MOVING_BARS, case.bodies, strict=True):
-                loads[bar] = loads[bar].with_force(body.m * term.field, 0j, False)
-        elif isinstance(term, Load):
-            factor = 1.0 if term.table is None else term.table.at(theta_2)
-            if term.force is not None:
-                force, at = factor * polar(*term.force), polar(*term.at)
-                loads[term.bar] = loads[term.bar].with_force(force, at, term.frame == "bar")
-            loads[term.bar] = loads[term.bar].with_couple(factor * term.moment)
-    of_loads = [
-        number
-        for load in loads.values()
-        for number in (load.world.real, load.world.imag, load.turning.real, load.turning.imag, *load[2:])
-    ]
-    theta_1 = case.path.theta_1
-    u1 = polar(1.0, theta_1)
-    lost = two_sum(theta_2, -theta_1)[1] if anywhere(theta_1 != 0.0) else 0.0
-    found = [*case.path.lengths, *case.lengths[:4], u1.real, u1.imag, omega_2, alpha_2, branch, lost]
-    found += [*of_bodies, *of_pins.values(), *of_loads]
-    if not any(isinstance(number, np.ndarray) and number.size > 1 for number in found):
-        return tuple(float(np.ravel(number)[0]) for number in found)
-    rows = np.empty((ROWS, np.size(theta_2)))
-    for row, number in zip(rows, found, strict=True):
-        row[:] = number
-    return rows
 
 
 def number(rows: Any, row: int, i: int) -> Any:
@@ -215,7 +133,7 @@ def forces(
     )
     mass_at_A = vector(real_rounded(mass_at_A.real, signs, 51), real_rounded(mass_at_A.imag, signs, 52))
     if drive_bar == 4:
-        about_B = real_rounded(coupler_about_B(lengths, three, at, moving, sine), signs, 251)
+        about_B = real_rounded(coupler_about_B(lengths, three, at, moving, sine), signs, 86)
         moment = -(about_B + N3 - lengths.b * cross(at.u3, P3) + of_A - of_B)
     else:
         moment = Q + of_A * k.h3 - others
@@ -240,7 +158,7 @@ def nearby(
     half = rounded_half_angle(in_unit, at.half, number(rows, 15, i), False, thirteen(signs, 2))
     in_unit = Loop(d, a, b, c, rounded_real(E1, signs[0]), rounded_real(E2, signs[1]))
     u2 = select(turned, at.u2, vector(half.kk - half.ss, 2.0 * half.sk))
-    near = close_loop(in_unit, at.u1, u2, half, number(rows, 14, i))
+    near = close_loop(in_unit, at.u1, u2, half, number(rows, 14, i), lengths.d / d)
     k = coefficients(in_unit, near)
     near = with_sines_of_rates(in_unit, near, k)
     near = Position(
@@ -249,7 +167,7 @@ def nearby(
         rounded_complex(near.u3, turned, signs[21], signs[22]),
         rounded_complex(near.u4, turned, signs[23], signs[24]),
         rounded_real(near.sin_mu, signs[17]),
-        rounded_complex(near.diagonal * (lengths.d / d), turned, signs[18], signs[250]),
+        rounded_complex(near.diagonal, turned, signs[18], signs[85]),
         near.e2,
         near.root,
         half,
@@ -306,9 +224,7 @@ def run(
             u2 = direction_of_tangent(of_theta_2[i])
         size = 4.0 * in_unit.a * in_unit.d
         close = undecided(half.outer, in_unit.E1, size) or undecided(half.inner, in_unit.E2, size)
-        at = close_loop(in_unit, u1, u2, half, number(rows, 14, i))
-        diagonal = at.diagonal * (lengths.d / in_unit.d)
-        at = Position(at.u1, at.u2, at.u3, at.u4, at.sin_mu, diagonal, at.e2, at.root, half)
+        at = close_loop(in_unit, u1, u2, half, number(rows, 14, i), lengths.d / in_unit.d)
         k = coefficients(in_unit, at)
         at = with_sines_of_rates(in_unit, at, k)
         v = rates(k, number(rows, 12, i), number(rows, 13, i))
@@ -342,7 +258,7 @@ LEAVES: tuple[tuple[Any, str], ...] = (
     (motion, "side_may_turn_fast side_turns_fast coefficients with_sines_of_rates rates"),
     (pin_forces, "about_first_pin inertia_wrenches coupler_about_B between pin_forces"),
     (torque, "inertia half_slope driving_torque"),
-    (transmission, "drive_sine_of_triangle"),
+    (path, "drive_sine_of_triangle"),
     (cases, "undecided"),
     (bars, "rounded_real rounded_complex rounded_half_angle rounded_coefficients bar"),
 )
@@ -377,38 +293,3 @@ def loop(on_disk: bool = True) -> Any:
         return njit(compiled, nogil=True, error_model="numpy", cache=on_disk)
     except RuntimeError:  # no place to write to
         return loop(False)
-
-
-SPACE = threading.local()
-"""Of each thread, what the loop writes of a block: fresh pages for each would cost a tenth of the time."""
-
-
-def space(numbers: int) -> Array:
-    """So many numbers to write into, the same memory each time."""
-    if getattr(SPACE, "numbers", np.empty(0)).size < numbers:
-        SPACE.numbers = np.empty(numbers)
-    return SPACE.numbers[:numbers]  # type: ignore[no-any-return]
-
-
-class Found(NamedTuple):
-    """What the loop writes, for n positions; the next call of the same thread writes over it."""
-
-    vectors: NDArray[np.complex128]
-    scalars: Array
-    left: NDArray[np.bool_]
-
-
-def evaluate(case: Case, theta_2: Array, branch: Any, omega_2: Any, alpha_2: Any, *, error_bars: bool) -> Found:
-    """Some positions of a case that the loop carries; for the parameters see `run`."""
-    n, theta_1 = len(theta_2), case.path.theta_1
-    of_theta_2 = np.tan(0.5 * theta_2) if anywhere(theta_1 != 0.0) else np.empty(0)
-    rows = numbers(case, theta_2, branch, omega_2, alpha_2)
-    written = space(23 * n)
-    vectors, scalars = written[: 14 * n].view(complex).reshape(7, n), written[14 * n :].reshape(9, n)
-    found = Found(vectors, scalars, np.empty(n, dtype=bool))
-    given = np.tan(0.5 * (theta_2 - theta_1)), of_theta_2, rows, case.drive_bar, signs() if error_bars else None
-    try:
-        loop()(*given, *found)
-    except OSError:  # the disk is full
-        loop(False)(*given, *found)
-    return found

@@ -2,28 +2,29 @@
 
 The forces are evaluated again with every number of the position, coefficient, arm and term changed in its last
 digit. All roundings then fall differently, so the root mean square of the changes is of the size of the error
-itself, whatever the formulas lose at this position. As many changes go up as down, in an order drawn at random
-for each number, so that those of different numbers do not cancel over the evaluations, which run as one batch.
+itself, whatever the formulas lose at this position. As many changes go up as down, in an order of its own for each
+number, so that those of different numbers do not cancel over the evaluations, which run as one batch.
 """
 
 from functools import cache
-from itertools import cycle
+from itertools import combinations, cycle
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.formulas.arithmetic import select, two_sum, vector
+from fourbar.formulas.arithmetic import anywhere, select, two_sum, vector
 from fourbar.formulas.motion import Coefficients, State, rates, side_turns_fast
 from fourbar.formulas.path import read_backwards
 from fourbar.formulas.pin_forces import Body
 from fourbar.formulas.position import HalfAngle, Loop, Position
 from fourbar.scene.case import Case, Dynamics, changed
 
-EVALUATIONS = 16
-"""With fewer, all of them may by chance come out as far off as the answer itself."""
-NUMBERS = 256
-"""Whose signs are independent; a scene has about sixty, and a few for each load and effect."""
+EVALUATIONS = 10
+"""Of the orders of five changes up and five down half are the others reversed, which leaves NUMBERS of them: so many
+numbers of which no two change alike in all evaluations, or against each other, and so cancel."""
+NUMBERS = 126
+"""A scene has about sixty, and a few for each load and effect."""
 LAST_DIGIT = 1.01 * 2.0**-53
 """Relative: x + x LAST_DIGIT is the next double, whatever x."""
 LAST_ROUNDING = 2.0**-53
@@ -43,7 +44,7 @@ class Roundings:
 
     def __call__(self, number: Any) -> Any:
         """Real numbers: the next double up or down, (EVALUATIONS, ...); each part of a complex one by itself."""
-        if np.iscomplexobj(number):
+        if isinstance(number, complex) or (isinstance(number, np.ndarray) and number.dtype.kind == "c"):
             return rounded_complex(number, self.turned, *self.next(2))
         return rounded_real(number, next(self.signs))
 
@@ -88,14 +89,13 @@ def error_bars(
     moving = moving._replace(**{name: rounded(rate) for name, rate in moving._asdict().items() if name not in stated})
     nearby = state._replace(at=near, k=k, moving=moving)
     other = moved.dynamics(nearby, acceleration, rounded=rounded)
-    torque = root_mean_square(np.abs(other.torque - found.torque))
-    forces = [root_mean_square(np.abs(after - before)) for before, after in zip(found.pins, other.pins, strict=True)]
-    largest = np.max([np.abs(force) for force in found.pins], axis=0)
-    shape = np.shape(found.torque)
-    return {
-        "torque_error": np.reshape(bar(torque, found.torque), shape),
-        "force_error": np.reshape(bar(np.max(forces, axis=0), largest), shape),
-    }
+    values, others = (*found.pins, found.torque), (*other.pins, other.torque)
+    spread = root_mean_square(np.array([after - before for before, after in zip(values, others, strict=True)]))
+    size = np.array([np.abs(value) for value in values]).reshape(spread.shape)
+    force_error, torque_error = bar(
+        np.array([spread[:4].max(axis=0), spread[4]]), np.array([size[:4].max(axis=0), size[4]])
+    ).reshape(2, *np.shape(found.torque))
+    return {"torque_error": torque_error, "force_error": force_error}
 
 
 def rounded_real(x: Any, sign: Any) -> Any:
@@ -105,8 +105,11 @@ def rounded_real(x: Any, sign: Any) -> Any:
 
 def rounded_complex(z: Any, turned: Any, of_x: Any, of_y: Any) -> Any:
     """Each part by itself; a ground at an angle mixes those of every direction, and each carries the larger's."""
-    size = np.maximum(np.abs(z.real), np.abs(z.imag))
-    return z + vector(select(turned, size, z.real) * of_x, select(turned, size, z.imag) * of_y)
+    x, y = z.real, z.imag
+    if anywhere(turned):
+        size = np.maximum(np.abs(x), np.abs(y))
+        return z + vector(select(turned, size, x) * of_x, select(turned, size, y) * of_y)
+    return vector(rounded_real(x, of_x), rounded_real(y, of_y))
 
 
 def rounded_half_angle(lengths: Loop, half: HalfAngle, lost: Any, known: Any, signs: Any) -> HalfAngle:
@@ -166,10 +169,11 @@ def rounded_coefficients(lengths: Loop, at: Position, k: Coefficients, signs: An
 
 
 def root_mean_square(changes: Any) -> Any:
-    """Of the sizes of the changes, (EVALUATIONS, ...), whose squares may be beyond the range of a double."""
-    largest = np.max(changes, axis=0)
-    unit = np.where(largest == 0.0, 1.0, largest)
-    return unit * np.sqrt(np.mean((changes / unit) ** 2, axis=0))
+    """Of the sizes of the changes, (..., EVALUATIONS, n), whose squares may be beyond the range of a double."""
+    size = np.abs(changes)
+    largest = size.max(axis=-2, keepdims=True)
+    size /= np.where(largest == 0.0, 1.0, largest)
+    return largest[..., 0, :] * np.sqrt(np.square(size).mean(axis=-2))
 
 
 def bar(spread: Any, value: Any) -> Any:
@@ -184,7 +188,9 @@ def bar(spread: Any, value: Any) -> Any:
 
 @cache
 def signs() -> NDArray[np.float64]:
-    """+- one last digit, (EVALUATIONS, NUMBERS): of number 1, 2, ... in each evaluation, from a fixed seed."""
-    rng = np.random.default_rng(0)
-    ends = np.repeat([LAST_DIGIT, -LAST_DIGIT], EVALUATIONS // 2)
-    return np.stack([rng.permutation(ends) for _ in range(NUMBERS)], axis=1)
+    """+- one last digit, (EVALUATIONS, NUMBERS): of number 1, 2, ... in each evaluation, by a fixed seed."""
+    rng, others = np.random.default_rng(0), range(1, EVALUATIONS)
+    up = np.array([[0, *rest] for rest in combinations(others, EVALUATIONS // 2 - 1)])
+    changes = np.full((NUMBERS, EVALUATIONS), -LAST_DIGIT)
+    np.put_along_axis(changes, up, LAST_DIGIT, axis=1)
+    return np.asarray((rng.permutation(changes) * rng.choice([1.0, -1.0], (NUMBERS, 1))).T)

@@ -1,15 +1,15 @@
 """Positions of a case evaluated stage by stage: by NumPy, by the compiled loop, along a free motion."""
 
-from collections.abc import Collection, Iterable
+from collections.abc import Callable, Iterable, KeysView
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.formulas.arithmetic import anywhere, polar
-from fourbar.formulas.motion import Rates, State
+from fourbar.formulas.arithmetic import angle, anywhere
+from fourbar.formulas.motion import State
 from fourbar.formulas.path import NO_DIGIT_LEFT
-from fourbar.formulas.position import HalfAngle, Position
+from fourbar.formulas.position import HalfAngle
 from fourbar.quantities import (
     ANGLES,
     JAMMED,
@@ -18,16 +18,14 @@ from fourbar.quantities import (
     OF_DRY_FRICTION,
     OK,
     OVERFLOW,
-    PIN_FORCES,
     SINGULAR,
     STAGES,
-    UNKNOWNS,
     WOUND,
 )
 from fourbar.scene import Command
-from fourbar.scene.case import NO_MOTION, NOWHERE, Case, Evaluated, changed
-from fourbar.scene.kinematics import kinematics
-from fourbar.scene.withheld import all_finite, no_value, withheld
+from fourbar.scene.case import NOWHERE, Case, Evaluated
+from fourbar.scene.point import OF_POINTS
+from fourbar.scene.withheld import no_value
 from fourbar.solution import Array
 
 if TYPE_CHECKING:
@@ -47,7 +45,7 @@ WITHOUT_FORCES = (NO_DIRECTION, WOUND)
 """Statuses of positions at which an effect has no value, and so the forces have none."""
 
 
-def commanded(case: Case, where: Command, part: Part, wanted: int, names: Collection[str]) -> Evaluated:
+def commanded(case: Case, where: Command, part: Part, wanted: int, names: KeysView[str]) -> Evaluated:
     """Some positions of a command to the input, evaluated.
 
     Parameters
@@ -57,7 +55,7 @@ def commanded(case: Case, where: Command, part: Part, wanted: int, names: Collec
     theta_2: Any = where.theta_2[part]
     if theta_2.ndim == 0:
         theta_2 = theta_2.item()  # with Python's own numbers a formula takes half the time
-    branch = _sign(where.branch[part])
+    branch = sign_of(where.branch[part])
     half, exact = case.half_angle(theta_2, where.remainder)
     of_angles = len(names) <= len(ANGLES) and set(names) <= set(ANGLES)
     if of_angles and where.remainder is None and not case.path.may_stay_parallel:
@@ -66,64 +64,30 @@ def commanded(case: Case, where: Command, part: Part, wanted: int, names: Collec
     codes = _codes(at.sin_mu, half, NO_DIGIT_LEFT if where.remainder is None else 0.0)
     if anywhere(codes):  # velocities are 0/0
         at = at._replace(root=np.where(codes == SINGULAR, np.nan, at.root))
-    omega_2, alpha_2 = _piece(where.omega_2, part), _piece(where.alpha_2, part)
+    omega_2, alpha_2 = piece(where.omega_2, part), piece(where.alpha_2, part)
     state = case.state(case.path, theta_2, at, branch, omega_2, alpha_2, moving=wanted > 0)
     values = kinematics(case, state, names)
     if wanted >= FORCE:
         known = exact if wanted == ERROR else None
-        values |= _forces(case, state, alpha_2, branch, branch, codes, names, known)
+        codes, forces = _forces(case, state, alpha_2, branch, branch, codes, names, known)
+        values |= forces
     return codes, values, at
 
 
-def evaluated(case: Case, where: Command, part: Part, wanted: int, names: Collection[str]) -> Evaluated:
-    """The same through the compiled loop; what it leaves open as of `commanded`."""
-    from fourbar.scene import compiled
-
-    theta_2, branch = where.theta_2[part], _sign(where.branch[part])
-    omega_2, alpha_2 = _piece(where.omega_2, part), _piece(where.alpha_2, part)
-    found = compiled.evaluate(case, theta_2, branch, omega_2, alpha_2, error_bars=wanted == ERROR)
-    u2, u3, u4, *pins = found.vectors
-    sin_mu, omega_3, omega_4, alpha_3, alpha_4, torque, sine, *errors = found.scalars
-    at = Position(polar(1.0, case.path.theta_1), u2, u3, u4, sin_mu, np.nan, np.nan, np.nan, NO_HALF_ANGLE)
-    moving = Rates(omega_2, omega_3, omega_4, alpha_2, alpha_3, alpha_4)
-    state = State(case.lengths, case.path.theta_1, theta_2, at, NO_MOTION, omega_2, moving)
-    values = kinematics(case, state, names)
-    others = dict(zip((*PIN_FORCES, "torque", "torque_error", "force_error"), (*pins, torque, *errors), strict=True))
-    others["drive_condition"] = np.abs(sine)
-    values |= {name: value for name, value in others.items() if name in names}
-    codes = np.zeros(theta_2.shape, dtype=np.uint8)
-    if found.left.any():
-        index = np.flatnonzero(found.left)
-
-        def own(number: Any) -> Any:
-            return number[index] if np.ndim(number) else number
-
-        left = changed(case, own)
-        where = Command(theta_2[index], own(where.branch[part]), own(omega_2), own(alpha_2))
-        rest = commanded(left, where, (...,), wanted, names)
-        withheld(left, rest)
-        codes[index] = rest[0]
-        for name, value in rest[1].items():
-            whole = np.array(np.broadcast_to(values[name], theta_2.shape))
-            whole[index] = value
-            values[name] = whole
-    elif all_finite({name: value for name, value in values.items() if name not in UNKNOWNS}):  # the loop saw to these
-        return codes, values, None
-    withheld(case, (codes, values, None))
-    return codes, values, None
-
-
-def _codes(sine: Any, half: HalfAngle, margin: float) -> NDArray[np.uint8]:
+def _codes(sine: Any, half: HalfAngle, margin: float) -> Any:
     """Statuses of positions from the sine of the transmission angle, or a multiple of it."""
-    codes, size = np.zeros(np.shape(sine), dtype=np.uint8), np.abs(sine)
-    if not (size.min(initial=np.inf) if codes.ndim else size) > margin:  # NaN where the loop does not close
+    size = abs(sine)
+    if type(size) is float and size > margin:
+        return OK
+    codes = np.zeros(np.shape(sine), dtype=np.uint8)
+    if not np.min(size, initial=np.inf) > margin:  # NaN where the loop does not close
         codes[size <= margin] = SINGULAR
         codes[np.isnan(sine)] = NOT_ASSEMBLED
         codes[np.isnan(half.kk)] = OVERFLOW  # of theta_2 - theta_1: not even where it closes is known
     return codes
 
 
-def _sign(branch: NDArray[np.int8]) -> Any:
+def sign_of(branch: NDArray[np.int8]) -> Any:
     """The branch of each position, or one number where all have the same."""
     if branch.ndim == 0 or (branch.size and branch.min() == branch.max()):
         return float(branch.flat[0]) if branch.ndim else float(branch)
@@ -138,7 +102,7 @@ def _angles(case: Case, half: HalfAngle, branch: Any, names: Iterable[str]) -> E
     return codes, {name: found[name] for name in names}, None
 
 
-def freely(case: Case, moved: "FreeMotion", part: Part, wanted: int, names: Collection[str]) -> Evaluated:
+def freely(case: Case, moved: "FreeMotion", part: Part, wanted: int, names: KeysView[str]) -> Evaluated:
     """The same at instants of a free motion that have one independent angle; there is no driving torque."""
     codes = np.zeros(len(part[0]), dtype=np.uint8)
     if not codes.size:
@@ -151,7 +115,8 @@ def freely(case: Case, moved: "FreeMotion", part: Part, wanted: int, names: Coll
     values = kinematics(case, state, names)
     if wanted >= FORCE:
         exact = NOWHERE if wanted == ERROR else None
-        values |= _forces(free, state, growth, None, branch, codes, names, exact)
+        codes, forces = _forces(free, state, growth, None, branch, codes, names, exact)
+        values |= forces
         values |= {
             name: np.zeros(codes.shape) for name in values if name in ("torque", "torque_error", *OF_DRY_FRICTION)
         }
@@ -164,11 +129,11 @@ def _forces(
     alpha_2: Any,
     branch: NDArray[np.int8] | None,
     sign: Any,
-    codes: NDArray[np.uint8],
-    names: Collection[str],
+    codes: Any,
+    names: KeysView[str],
     exact: NDArray[np.intp] | None,
-) -> dict[str, Any]:
-    """The quantities of the force stage; statuses of effects go into the codes.
+) -> tuple[Any, dict[str, Any]]:
+    """The statuses with those of the effects, and the quantities of the force stage.
 
     Parameters
     ----------
@@ -179,7 +144,7 @@ def _forces(
     found = case.dynamics(state, alpha_2, case.side)
     values: dict[str, Any] = {**found.pins._asdict(), "torque": found.torque}
     if "drive_condition" in names:
-        condition = np.abs(case.drive_sine(state.at))
+        condition = abs(case.path.drive_sine(state.at, case.drive_bar))
         values["drive_condition"] = condition if found.from_jamming is None else condition * found.from_jamming
     if "friction_residual" in names:
         values["friction_residual"] = 0.0 if found.residual is None else found.residual
@@ -196,18 +161,61 @@ def _forces(
     if found.status is not None:
         without.append(found.status)
     if without:
-        status = np.max(without, axis=0)
-        codes[...] = np.where(codes == OK, status, codes)
+        codes = np.where(codes == OK, np.max(without, axis=0), codes).astype(np.uint8)
     if anywhere(codes > SINGULAR):
         gone = np.isin(codes, WITHOUT_FORCES)
         values |= {
             name: np.where(gone, no_value(value), value) for name, value in values.items() if name != "drive_condition"
         }
-    return {name: value for name, value in values.items() if name in names}
+    return codes, {name: value for name, value in values.items() if name in names}
 
 
-def _piece(value: float | Array | None, part: Part) -> float | Array:
+def piece(value: float | Array | None, part: Part) -> float | Array:
     """A number for all positions, or the part of an array that belongs to a block."""
-    if value is None or np.ndim(value) == 0:
-        return value or 0.0
-    return value[part]  # type: ignore[index]
+    return value[part] if isinstance(value, np.ndarray) and value.ndim else value or 0.0
+
+
+OF_BARS: dict[str, Callable[[State], Any]] = {
+    "theta_3": lambda state: angle(state.at.u3),
+    "theta_4": lambda state: angle(state.at.u4),
+    "sin_mu": lambda state: state.at.sin_mu,
+    "condition": lambda state: abs(state.at.sin_mu),
+    "omega_2": lambda state: state.moving.omega_2,
+    "omega_3": lambda state: state.moving.omega_3,
+    "omega_4": lambda state: state.moving.omega_4,
+    "alpha_2": lambda state: state.moving.alpha_2,
+    "alpha_3": lambda state: state.moving.alpha_3,
+    "alpha_4": lambda state: state.moving.alpha_4,
+}
+
+
+PLACES = frozenset(start + name for start in OF_POINTS for name in ("A", "B", "G2", "G3", "G4"))
+
+
+def kinematics(case: Case, state: State, wanted: KeysView[str]) -> dict[str, Any]:
+    """Those of the quantities that come before the forces, a scene's own points among them."""
+    values = {name: evaluate(state) for name, evaluate in OF_BARS.items() if name in wanted}
+    if not case.points and wanted.isdisjoint(PLACES):
+        return values
+    lengths, (two, three, four) = case.lengths, case.bodies
+    places: dict[int, list[tuple[str, Any]]] = {
+        2: [("A", lengths.a), ("G2", two.z)],
+        3: [("G3", three.z)],
+        4: [("B", lengths.c), ("G4", four.z)],
+    }
+    for name, bar, z in case.points:
+        places.setdefault(bar, []).append((name, z))
+    for bar, of_bar in places.items():
+        u, foot, i_omega, turn = state.direction(bar), state.foot(bar), 1j * state.omega(bar), state.turn(bar)
+        v_foot = a_foot = 0.0
+        if bar == 3:
+            v_foot, a_foot = 1j * state.omega(2) * foot, state.turn(2) * foot
+        for name, z in of_bar:
+            r = z * u
+            if name in wanted:
+                values[name] = foot + r
+            if (velocity := f"v_{name}") in wanted:
+                values[velocity] = v_foot + i_omega * r
+            if (acceleration := f"a_{name}") in wanted:
+                values[acceleration] = a_foot + turn * r
+    return values

@@ -91,7 +91,7 @@ def command(scene: Scene) -> Command:
         theta_2 = np.array([limit + stated.offset])
         remainder = limit_remainder(linkage, limit, float(theta_2[0]), stated.offset)
     else:
-        theta_2 = np.atleast_1d(np.asarray(stated, dtype=float))
+        theta_2 = np.array(stated, dtype=float, ndmin=1)
     branch = np.full(theta_2.shape, motion.branch, dtype=np.int8)
     if motion.through == "follow":
         branch = on_smooth_path(linkage, theta_2, motion.branch)

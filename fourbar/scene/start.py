@@ -21,9 +21,8 @@ def state_at(scene: Scene, at: Command) -> State:
 
 
 def with_start(scene: Scene) -> Scene:
-    """The scene with effects that know where its motion begins: where it first assembles, if it keeps its branch."""
-    if not any(effect.counts_turns for effect in scene.effects):
-        return scene
+    """A scene with effects that count turns, which know where its motion begins: where it first assembles, if it keeps
+    its branch."""
     at = command(scene)
     half, _ = Case.of(scene).half_angle(at.theta_2, at.remainder)
     assembled = (half.outer >= 0.0) & (half.inner >= 0.0)

@@ -23,7 +23,7 @@ def withheld(case: Case, found: Evaluated) -> None:
     """What was evaluated with `withhold` where anything is no number, changed in place."""
     codes, values, driven = found
     if not all_finite(values):
-        in_line = driven is not None and np.abs(case.drive_sine(driven)) <= NO_DIGIT_LEFT
+        in_line = driven is not None and np.abs(case.path.drive_sine(driven, case.drive_bar)) <= NO_DIGIT_LEFT
         withhold(values, codes, np.broadcast_to(in_line, codes.shape))
 
 

@@ -1,5 +1,6 @@
 """Sensitivities: the derivative of every quantity by every number of a scene, from the formulas as they stand."""
 
+from collections.abc import KeysView
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -13,10 +14,10 @@ from fourbar.effects.pin_friction import Settled
 from fourbar.errors import InputError
 from fourbar.formulas.arithmetic import polar
 from fourbar.linkage import PIN_FORCE
-from fourbar.quantities import FORCES, NOT_ASSEMBLED, OK, SINGULAR, STATUS_NAMES
+from fourbar.quantities import FORCES, NOT_ASSEMBLED, OK, SINGULAR, STAGE_OF, STAGES, STATUS_NAMES
 from fourbar.scene import Command, Scene, command
 from fourbar.scene.case import Case
-from fourbar.scene.kinematics import KINEMATIC, kinematics
+from fourbar.scene.evaluation import kinematics
 from fourbar.scene.motion import FromLimit
 from fourbar.scene.point import OF_POINTS
 from fourbar.solution import Array, Solution
@@ -97,7 +98,11 @@ def sensitivity(scene: Scene) -> Sensitivity:
     keys = {THETA_2: Entry((), "rad")} | (known if moving else {k: e for k, e in known.items() if _of_position(k)})
     numbers = [np.nan if key == THETA_2 else at_place(scene, entry.place) for key, entry in keys.items()]
     forces = FORCES if any(effect.loaded_pins for effect in scene.effects) else (*FORCES, "drive_condition")
-    names = [name for name in solution.evaluated() if name in KINEMATIC or (moving and name in forces)]
+    names = [
+        name
+        for name in solution.evaluated()
+        if STAGE_OF.get(name, "force") in STAGES[:3] or (moving and name in forces)
+    ]
     names += [f"{start}{p.name}" for p in scene.points for start in (OF_POINTS if moving else ("",))]
     p = len(keys)
     by = {name: np.full((p, *quantity_of(solution, name).shape), np.nan) for name in names}
@@ -109,7 +114,7 @@ def sensitivity(scene: Scene) -> Sensitivity:
         seeded = _seeded(scene, keys)
         for start in range(0, len(regular), AT_ONCE):
             index = regular[start : start + AT_ONCE]
-            found, held = _derivatives(seeded, keys, at, index, names, moving)
+            found, held = _derivatives(seeded, keys, at, index, by.keys(), moving)
             status[index[held & (solution.status_code[index] == OK)]] = AT_REST
             for name, number in found.items():
                 own = np.broadcast_to(slopes(number), (p, len(index)))
@@ -207,7 +212,7 @@ def unit_slope(index: int, count: int) -> Sloped:
 
 
 def _derivatives(
-    scene: Scene, keys: dict[str, Entry], at: Command, index: NDArray[np.intp], names: list[str], moving: bool
+    scene: Scene, keys: dict[str, Entry], at: Command, index: NDArray[np.intp], names: KeysView[str], moving: bool
 ) -> tuple[dict[str, Any], NDArray[np.bool_]]:
     """The quantities at some positions, with their slopes; and where dry friction holds a pin at rest."""
     place = {key: number for number, key in enumerate(keys)}
@@ -232,5 +237,5 @@ def _derivatives(
             held |= ~np.broadcast_to(actions.turning(pin), held.shape) | (values(omega_2) == 0.0)
         dynamics = case.dynamics(state, alpha_2)
         found |= {**dynamics.pins._asdict(), "torque": dynamics.torque}
-        found["drive_condition"] = np.abs(case.drive_sine(position))
+        found["drive_condition"] = np.abs(case.path.drive_sine(position, case.drive_bar))
     return {name: found[name] for name in names}, held

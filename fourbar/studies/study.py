@@ -13,11 +13,11 @@ from fourbar.formulas.position import loop
 from fourbar.quantities import ANGLES, INVALID
 from fourbar.scene import Command, Scene, command
 from fourbar.scene.case import Case
-from fourbar.scene.evaluation import FORCE, commanded, evaluated
+from fourbar.scene.evaluation import FORCE
 from fourbar.scene.motion import FromLimit
 from fourbar.scene.start import started
 from fourbar.solution import Array, Solution, unwrap
-from fourbar.solve import BLOCK, arrays, each, is_compiled, keep, positions_at_once, requested, solved
+from fourbar.solve import BLOCK, arrays, each, evaluation, is_compiled, keep, positions_at_once, requested, solved
 from fourbar.studies.keys import entries, placed, refusal
 
 THETA_2 = "motion.theta_2"
@@ -61,7 +61,7 @@ class Study:
                 block = (rows.stop - rows.start, columns.stop - columns.start)
                 case = Case.of(self._members(rows, block[1], begins))._replace(side=side)
                 where = self._command(rows, columns)
-                run = evaluated if quick and not case.path.may_stay_parallel else commanded
+                run = evaluation(quick and not case.path.may_stay_parallel)
                 found = run(case, where, (...,), wanted, names)
                 keep(case, found, result, code, (rows, columns), block)
             for name in ANGLES:

@@ -7,9 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from fourbar.formulas import mobility, transmission
-from fourbar.formulas.path import singular
+from fourbar.formulas.path import drive_sine, singular
 from fourbar.formulas.path import state as state_of
-from fourbar.formulas.transmission import drive_sine
 from fourbar.linkage import MOVING_BARS, FourBar
 from fourbar.scene import Scene
 from validation.compare.answer import Answer

@@ -11,10 +11,10 @@ from fourbar.effects import Actions
 from fourbar.effects.actions import bodies
 from fourbar.formulas.arithmetic import cross, polar
 from fourbar.formulas.motion import State, coefficients, rates
+from fourbar.formulas.path import drive_sine
 from fourbar.formulas.pin_forces import Wrenches, coupler_about_B, inertia_wrenches, pin_forces
 from fourbar.formulas.position import close_loop, direction, half_angle
 from fourbar.formulas.torque import driving_torque, half_slope, inertia
-from fourbar.formulas.transmission import drive_sine
 from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import PIN_FORCES
 from fourbar.scene import Command, Scene
