@@ -33,7 +33,7 @@ class InputError(FourBarError):
 
     def __init__(self, key: str, value: object, allowed: str, file: str | None = None) -> None:
         self.key, self.value, self.allowed, self.file = key, value, allowed, file
-        shown = repr(value)
+        shown = " ".join(repr(value).split())  # arrays take several lines
         if len(shown) > LONGEST_SHOWN:  # of a long path the end says which
             shown = f"{shown[: LONGEST_SHOWN // 2 - 3]}...{shown[-LONGEST_SHOWN // 2 :]}"
         where = f"{file}: " if file else ""
@@ -46,6 +46,13 @@ class InputError(FourBarError):
     def in_file(self, file: str) -> "InputError":
         """The same mistake, with the file it was found in."""
         return InputError(self.key, self.value, self.allowed, file)
+
+
+def expect(name: str, value: object, *kinds: type) -> None:
+    """Raise InputError where an argument is none of the kinds that a function takes."""
+    if not isinstance(value, kinds):
+        wanted = " or ".join(kind.__name__ for kind in kinds)
+        raise InputError(name, value, f"must be of type {wanted}, not {type(value).__name__}")
 
 
 class NotAssembledError(FourBarError):

@@ -2,7 +2,9 @@
 
 import json
 import runpy
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -34,6 +36,26 @@ def test_dir_shows_what_there_is_and_nothing_else() -> None:
 def test_a_number_where_a_bar_belongs_gets_a_sentence(number: float) -> None:
     with pytest.raises(fourbar.InputError, match=r"bars.coupler = .*0\.25.*must be a Bar, like fourbar\.Bar"):
         fourbar.FourBar(0.3, fourbar.Bar(0.1), number, fourbar.Bar(0.22))  # type: ignore[arg-type]
+
+
+def test_an_argument_of_another_type_gets_one_line() -> None:
+    scene = fourbar.Scene(fourbar.uniform(0.3, 0.1, 0.25, 0.22), fourbar.Motion(1.0, 10.0))
+    solution = fourbar.solve(scene)
+    calls: list[Callable[[Any], object]] = [
+        *(fourbar.sensitivity, fourbar.tolerances, fourbar.extremes, fourbar.dump, fourbar.load, fourbar.units),
+        *(fourbar.shaking_force, fourbar.motor_duty, lambda x: fourbar.bearing_load(x, "A")),
+        *(lambda x: fourbar.vary(x, {}), lambda x: fourbar.vary(scene, x), lambda x: fourbar.vary(scene, {5: x})),
+        *(lambda x: fourbar.vary(scene, {"nothing": x}), lambda x: fourbar.save(scene, x)),
+        *(lambda x: fourbar.save(x, "a.toml"), lambda x: fourbar.extremes(scene, x)),
+        *(lambda x: fourbar.bearing_load(solution, x), lambda x: fourbar.shaking_moment(x, solution)),
+        *(lambda x: fourbar.in_units(x, "SI"), lambda x: fourbar.in_units(scene, x)),
+        *(lambda x: scene.plot("torque", position=x), lambda x: scene.plot("torque", units=x), scene.plot),
+    ]
+    for call in calls:
+        for wrong in (5j, [[1, 2], [3]], np.zeros((3, 3)), object()):
+            with pytest.raises(fourbar.InputError) as caught:
+                call(wrong)
+            assert "\n" not in str(caught.value)
 
 
 def test_the_public_formulas_agree_with_a_solution() -> None:

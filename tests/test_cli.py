@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 import fourbar
-from fourbar.cli import status
+from fourbar.cli import group, status
 from fourbar.errors import BROKEN, HOLDS, INTERRUPTED, DependencyError
 from fourbar.files import load, save
 from fourbar.quantities import UNITS, VECTORS
@@ -263,6 +263,8 @@ def test_what_is_printed_can_be_written(tmp_path: Path, run: Fourbar) -> None:
     assert (tmp_path / "type.txt").read_text() == run("classify", 3, 1, 2.5, 2.2)[1]
     assert run("new", "-o", tmp_path / "a.toml", "--lengths", 3, 1, 2.5, 2.2)[0] == HOLDS
     assert load(tmp_path / "a.toml").linkage.lengths == (3.0, 1.0, 2.5, 2.2)
+    for name, command in group.commands.items():
+        assert any("--out" in option.opts for option in command.params), name
 
 
 def test_classify_says_what_turns_and_how_far(run: Fourbar) -> None:

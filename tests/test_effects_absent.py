@@ -5,6 +5,7 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import mujoco
 import pytest
@@ -16,6 +17,7 @@ from fourbar.mjcf import mjcf
 from tests.scenes import crank_rocker
 from tests.test_effects import ACTING
 from validation.cli import status
+from validation.report.record import Record
 from validation.run.judge import judge
 from validation.studies.effects import absent, cost
 from validation.studies.effects.absent import ABSENT, TABLES, build, differences, made
@@ -169,26 +171,29 @@ print(*sorted({row.engine for row in record.rows}))
 
 
 def test_positions_alone_start_no_force_engine() -> None:
-    line = [sys.executable, "-c", POSITIONS_ONLY]
-    done = subprocess.run(line, capture_output=True, text=True, check=True, cwd=ROOT)
+    done = subprocess.run([sys.executable, "-c", POSITIONS_ONLY], capture_output=True, text=True, check=True, cwd=ROOT)
     engines, *left_out, answered = done.stdout.splitlines()
     assert engines == "[]" and answered == "formulas free-body"
     assert {line.split(":")[0] for line in left_out} == {"pinocchio-inverse", "mujoco-inverse", "mujoco-simulated"}
     assert all("the scene states positions only" in line for line in left_out)
 
 
+def moved(*motion: Any) -> Record:
+    return judge("scene", fourbar.Scene(fourbar.uniform(0.3, 0.1, 0.25, 0.22), fourbar.Motion(*motion)))
+
+
 @pytest.mark.parametrize(
-    ("motion", "left_out"),
+    ("motion", "reason"),
     [
-        (
-            fourbar.Motion(fourbar.Sweep(0.0, 6.0, 20), 0.0),
-            "mujoco-simulated: omega_2 is 0: nothing moves through time",
-        ),
-        (fourbar.Motion(1.0, 2.0), "mujoco-simulated: one position is no motion through time"),
-        (fourbar.Motion([1.0, 1.0, 1.0], 2.0), "positions: all are the same, one is evaluated"),
+        ((fourbar.Sweep(0.0, 6.0, 20), 0.0), "omega_2 is 0: nothing moves through time"),
+        ((1.0, 2.0), "one position is no motion through time"),
     ],
 )
-def test_what_does_not_move_through_time_is_not_simulated(motion: fourbar.Motion, left_out: str) -> None:
-    record = judge("scene", fourbar.Scene(fourbar.uniform(0.3, 0.1, 0.25, 0.22), motion))
-    assert left_out in record.left_out and "mujoco-simulated" in {line.partition(":")[0] for line in record.left_out}
+def test_what_does_not_move_through_time_is_not_simulated(motion: tuple[Any, float], reason: str) -> None:
+    record = moved(*motion)
+    assert record.left_out == [f"mujoco-simulated: {reason}"]
     assert {row.engine for row in record.rows} == {"formulas", "free-body", "mujoco-inverse", "pinocchio-inverse"}
+
+
+def test_equal_positions_are_evaluated_once() -> None:
+    assert "positions: all are the same, one is evaluated" in moved([1.0, 1.0, 1.0], 2.0).left_out

@@ -341,3 +341,14 @@ def test_a_planted_fault_shows(name: str, monkeypatch: pytest.MonkeyPatch) -> No
     right = loop.Position.find
     monkeypatch.setattr(loop.Position, "find", lambda self, theta_2, branch: right(self, theta_2, -branch))
     assert {"theta_3", "theta_4", "torque"} <= judged(name)
+
+
+def test_a_scene_before_leaves_nothing_behind() -> None:
+    """MuJoCo keeps one memory for the trees of an engine."""
+    linkage, at = bars(MECHANISMS["crank-rocker"]), Motion(np.linspace(0.0, 6.0, 5), 10.0, 3.0)
+    plain, loaded = Scene(linkage, at), Scene(replace(linkage, ground=0.31), at, 4, LOADS, EFFECTS)
+    engine = MujocoInverse()
+    engine.answer(loaded, command(loaded))
+    kept, fresh = (each.answer(plain, command(plain)).quantities for each in (engine, MujocoInverse()))
+    for name, values in fresh.items():
+        np.testing.assert_array_equal(kept[name], values, err_msg=name)

@@ -15,6 +15,8 @@ import fourbar.cli
 import validation.cli
 from fourbar.errors import BAD_INPUT, BROKEN, FAILED, HOLDS, INTERRUPTED, DependencyError, InputError, run
 from fourbar.writing import write_text
+from tests.alone import alone
+from tests.here import judge_here
 from tests.scenes import crank_rocker
 from validation.compare.rows import AGREES, FAILS, Row, write_results
 from validation.published.figures import Figure
@@ -146,7 +148,7 @@ STATUSES: list[tuple[Callable[[list[str]], int], str, int]] = [
     (VALIDATION, "compare good.csv no-such-file", BAD_INPUT),
     (VALIDATION, "check scene.toml theirs.csv", FAILED),
     (VALIDATION, "check scene.toml no-such-file", BAD_INPUT),
-    (VALIDATION, "run scene.toml --engines free-body --workers 1 --out out", HOLDS),
+    (VALIDATION, "run scene.toml --engines free-body --no-pictures --out out", HOLDS),
     (VALIDATION, "run scene.toml --engines nobody --out out", BAD_INPUT),
     (VALIDATION, "fuzz-files --count 3", HOLDS),
     (VALIDATION, "stability --samples 2 --family random --jobs 1", HOLDS),
@@ -168,6 +170,7 @@ def test_every_command_ends_with_its_status(
 ) -> None:
     files = study(tmp_path)
     monkeypatch.chdir(tmp_path)
+    judge_here(monkeypatch)
     assert command([files.get(word, word) for word in line.split()]) == status
 
 
@@ -253,7 +256,7 @@ PROCESSES = [
     ("validation", f"check {NO_FILE} {NO_FILE}", BAD_INPUT),
     ("validation", "fuzz-files --count 1", HOLDS),
     ("validation", "models --no-such-option", BAD_INPUT),
-    ("validation", "published", HOLDS),
+    ("validation", "published --no-such-option", BAD_INPUT),
     ("validation", "mutation --most 3", BAD_INPUT),
     ("validation", "fuzz --scenes 0", BAD_INPUT),
     ("validation", "stability --samples 0", BAD_INPUT),
@@ -267,15 +270,8 @@ PROCESSES = [
 
 @pytest.mark.parametrize(("program", "line", "status"), PROCESSES, ids=[f"{p} {w.split()[0]}" for p, w, _ in PROCESSES])
 def test_each_command_in_a_process_of_its_own(program: str, line: str, status: int, tmp_path: Path) -> None:
-    done = subprocess.run(
-        [sys.executable, "-m", program, *line.split()],
-        cwd=tmp_path,
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert (done.returncode, bool(done.stderr.strip())) == (status, status == BAD_INPUT), done.stderr
+    ended, complained = alone(program, line.split(), tmp_path)
+    assert (ended, bool(complained.strip())) == (status, status == BAD_INPUT), complained
 
 
 def test_every_command_is_in_the_table_of_processes() -> None:

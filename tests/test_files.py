@@ -83,6 +83,10 @@ def test_the_thesis_scenes_reach_the_figures(name: str, torque: float) -> None:
         ("1 lbf", "N", Fraction("0.45359237") * Fraction("9.80665")),
         ("2 tonne", "kg", Fraction(2000)),
         ("5e-324 rad", "rad", Fraction(5e-324)),
+        *((text, "N m", Fraction(15)) for text in ("15 N⋅m", "15 N×m", "15 N•m", "15 kg·m²·s⁻²")),
+        *((text, "m", Fraction("0.3175")) for text in ("12 1/2 in", '12-1/2"', "12.5 in.", "25/2 inches", "12.5″")),
+        ("2/3 yd", "m", Fraction("0.6096")),
+        ("1 kp", "N", Fraction("9.80665")),
     ],
 )
 def test_units_are_converted_exactly_and_rounded_once(text: str, unit: str, value: Fraction) -> None:
@@ -119,6 +123,7 @@ def test_an_angle_is_a_dimension(text: str) -> None:
         ("5 lb", "N", "5 lbf"), ("5 lbf", "kg", "5 lb"), ("3 oz in", "N m", "3 ozf in"), ("5 Hz", "rad/s", "5 rev/s"),
         ("5 RPM", "rad/s", "5 rpm"), ("5 Newton", "N", "5 newton"), ("2 N m", "N m/rad", "2 N m/rad"),
         ("5 1/s", "rad/s", "5 rad /s"), ("5 kg cm2", "kg m^2", "5 kg cm^2"), ("1 m/s2", "m/s^2", "1 m/s^2"),
+        ("30 cms", "m", "30 cm"), ("300 MM", "m", "300 mm"), ("5 pounds", "N", "5 lbf"), ("0,3 m", "m", "0.3 m"),
     ],
 )  # fmt: skip
 def test_what_may_have_been_meant_is_one(text: str, unit: str, meant: str) -> None:

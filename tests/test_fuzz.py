@@ -84,7 +84,7 @@ def test_a_force_that_vanishes_is_held_to_its_prediction(
     answer = witness.engine().answer(scene, examine.command(scene))
     wrong = np.array([[times, 0.0]])
     answer.quantities["F12"] = wrong
-    rows = examine.compare("", scene, answer, solution, witness.tolerance, ("F12",), lambda where: {"F12": np.ones(1)})
+    rows = examine.compare("", scene, answer, solution, witness.tolerance, ("F12",), lambda quantity, where: np.ones(1))
     assert [row.verdict == "fails" for row in rows if row.quantity == "F12"] == [found]
 
 

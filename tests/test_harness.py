@@ -14,6 +14,7 @@ from validation.compare.answer import Answer
 from validation.compare.compare import COMPARED
 from validation.compare.rows import AGREES, FAILS, REFUSES, UNDECIDED, Row, from_csv, to_csv, write_results
 from validation.compare.tolerance import EPS, EQUIVALENCE, K
+from validation.engines.free_body import FreeBody
 from validation.engines.witnesses import WITNESSES, Witness, predicting_from
 from validation.run.judge import judge
 
@@ -186,7 +187,7 @@ def test_an_engine_that_raised_an_alarm_is_excused_by_no_prediction_of_its_own()
     witness = next(witness for witness in WITNESSES if witness.predictor == "own")
     answer = Answer(witness.name, "RK4", at, predicted={"torque": np.ones(len(at.theta_2))})
     predicted = predicting_from(witness, scene, at, answer)
-    assert predicted is not None and predicted(np.ones(len(at.theta_2), bool))["torque"][0] == 1.0
+    assert predicted is not None and predicted("torque", np.ones(len(at.theta_2), bool))[0] == 1.0
     answer.alarms.append("the loop is open")
     assert predicting_from(witness, scene, at, answer) is None
 
@@ -227,3 +228,30 @@ def test_beyond_the_range_of_doubles_what_was_before_is_judged() -> None:
     rows = rows_of(AnswersAnyway, Scene(heavy, fourbar.Motion(np.linspace(0.3, 2.0, 5), 10.0)))
     for quantity in COMPARED:
         assert rows[quantity].verdict == (REFUSES if quantity in FORCES else AGREES), quantity
+
+
+class Counting(FreeBody):
+    """The free bodies, with who was started and what it was given."""
+
+    started = 0
+
+    def __init__(self) -> None:
+        Counting.started += 1
+
+
+def test_an_engine_is_started_once_a_scene_and_no_question_is_put_twice(monkeypatch: pytest.MonkeyPatch) -> None:
+    put: list[tuple[Scene, Command]] = []
+    true = FreeBody.answer
+
+    def noting(self: FreeBody, scene: Scene, command: Command) -> Answer:
+        put.append((scene, command))
+        return true(self, scene, command)
+
+    monkeypatch.setattr(FreeBody, "answer", noting)
+    scene = crank_rocker()
+    judge("scene", scene, [witness for witness in WITNESSES if witness.name == "free-body"])
+    assert len({(id(of), id(command)) for of, command in put}) == len(put)
+    # nor of the bars without loads, which the answer holds too
+    assert [of for of, _ in put if of.linkage is scene.linkage] == [scene]
+    judge("scene", scene, [Witness("free-body", f"{__name__}:Counting", EQUIVALENCE)])
+    assert Counting.started == 1

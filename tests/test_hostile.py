@@ -14,6 +14,7 @@ import validation.run.run
 from fourbar.errors import BAD_INPUT, FAILED, HOLDS, InputError
 from fourbar.mjcf import mjcf
 from fourbar.scene import Command, Scene
+from tests.here import judge_here
 from tests.scenes import crank_rocker
 from validation.cli import status
 from validation.compare.answer import Answer
@@ -70,7 +71,10 @@ class Named:
         return repr(self.texts)
 
 
-def test_reports_hold_hostile_text_as_text(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_reports_hold_hostile_text_as_text(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    judge_here(monkeypatch)
     out = tmp_path / "deep" / "out"
     *_, summary = run(Named(), out, EXACT, workers=1)
     assert isinstance(summary, Summary)
@@ -160,14 +164,16 @@ def test_a_hostile_name_of_a_bad_file_is_shown_and_not_sent(
 
 
 def test_a_suite_file_of_hostile_names_runs_and_they_are_shown_and_not_sent(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    judge_here(monkeypatch)
     names = ("\x1b[31m<b>[red]x.toml", "a\nb.toml")
     for name in names:
         (tmp_path / name).write_text(scene_text("fine"))
     suite = tmp_path / "suite.toml"
     suite.write_text(f"scenes = {json.dumps(names)}")
-    assert status(["run", "--suite", str(suite), "--engines", "free-body", "--out", str(tmp_path / "out")]) == HOLDS
+    arguments = ["--suite", str(suite), "--engines", "free-body", "--no-pictures", "--out", str(tmp_path / "out")]
+    assert status(["run", *arguments]) == HOLDS
     assert {row.scene for row in from_csv(tmp_path / "out" / "results.csv")} == {"\\x1b[31m<b>[red]x", "a\nb"}
     # the progress bar steers the terminal itself; what is printed at the end does not
     assert not STEERING.search(capsys.readouterr().out)
@@ -248,7 +254,7 @@ def test_running_out_of_memory_costs_its_own_row(tmp_path: Path, monkeypatch: py
     suite = suite_file(listed(tmp_path, "a.toml\nb.toml\n"))
     monkeypatch.setattr(validation.run.run, "CHUNK", {True: 2, False: 2})
     greedy = Witness("greedy", f"{__name__}:Greedy", EQUIVALENCE)
-    list(run(suite, tmp_path / "run", (*EXACT, greedy), workers=1))
+    list(run(suite, tmp_path / "run", (*EXACT, greedy), workers=1, drawn=False))
     failing = [row for row in from_csv(tmp_path / "run" / "results.csv") if row.verdict == FAILS]
     assert {(row.scene, row.engine) for row in failing} == {("b", "greedy")}
     assert "MemoryError" in failing[0].reason

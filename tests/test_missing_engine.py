@@ -50,7 +50,19 @@ def without(library: str, folder: Path, *arguments: str, **settings: str) -> sub
     (folder / "scene.toml").write_text(SCENE)
     paths = os.pathsep.join((str(folder), str(ROOT)))
     return subprocess.run(
-        [sys.executable, "-m", "validation", "run", "scene.toml", "--workers", "1", "--out", "out", *arguments],
+        [
+            sys.executable,
+            "-m",
+            "validation",
+            "run",
+            "scene.toml",
+            "--workers",
+            "1",
+            "--no-pictures",
+            "--out",
+            "out",
+            *arguments,
+        ],
         cwd=folder,
         env={**os.environ, "PYTHONPATH": paths, "BLOCKED": library, "COLUMNS": "200", **settings},
         capture_output=True,

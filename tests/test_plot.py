@@ -4,6 +4,7 @@ import math
 import subprocess
 import sys
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -25,6 +26,7 @@ from fourbar.show.plot.freebody import free_body
 from fourbar.show.plot.style import matplotlib_style, number, plain, unit_for
 from fourbar.show.plot.transmission import free_place
 from fourbar.show.plot.view import CLEAR, common_position, on_branch, view
+from fourbar.solution import SI
 from tests.scenes import crank_rocker, thesis
 
 SIGNATURES = {"svg": b"<?xml", "png": b"\x89PNG", "pdf": b"%PDF"}
@@ -39,10 +41,15 @@ TOUCH = 1.0
 FULL_TURN = fourbar.Sweep(0.0, 2 * math.pi, 360)
 
 
+CRANK_ROCKER = crank_rocker()
+
+
+@cache
 def composed(scene, name, branches="one", position=None):
+    """A figure of a scene, composed once for all that look at it."""
     painter, size, _ = FIGURES[name]
     with matplotlib_style():
-        return compose(scene, painter, size, position, branches)
+        return compose(scene, painter, size, position, branches, SI)
 
 
 @pytest.mark.parametrize("file_format", plot.FORMATS)
@@ -86,7 +93,7 @@ def clashes(figure) -> list[tuple[str, str]]:
 
 @pytest.mark.parametrize("name", sorted(set(FIGURES) - {"energy"}))
 def test_every_figure_draws_both_branches_and_no_texts_overlap(name: str) -> None:
-    for scene, branches in ((crank_rocker(), "both"), (thesis(), "one")):
+    for scene, branches in ((CRANK_ROCKER, "both"), (thesis(), "one")):
         figure = composed(scene, name, branches)
         texts, page = texts_shown(figure), figure.bbox
         assert len(texts) > 5
@@ -96,7 +103,7 @@ def test_every_figure_draws_both_branches_and_no_texts_overlap(name: str) -> Non
 
 
 def test_every_axis_of_theta_2_is_in_degrees_and_every_axis_has_a_unit() -> None:
-    figure = composed(crank_rocker(), "overview")
+    figure = composed(CRANK_ROCKER, "overview")
     flat = [axes for axes in figure.axes if axes.name == "rectilinear"]
     assert len(flat) == 7
     for axes in flat:
@@ -341,7 +348,7 @@ def test_figures_that_a_motion_does_not_have_are_refused_in_one_line(tmp_path: P
 
 @pytest.mark.parametrize("name", ("overview", "coupler", "hodograph", "freebody"))
 def test_both_branches_are_drawn_to_one_scale(name: str) -> None:
-    figure = composed(crank_rocker(), name, "both")
+    figure = composed(CRANK_ROCKER, name, "both")
     half = len(figure.axes) // 2
     assert half and len(figure.axes) == 2 * half
     figure.draw_without_rendering()

@@ -30,10 +30,10 @@ HOSTILE = "</script><img src=x onerror=alert(1)>\"'&|`*"
 
 
 @cache
-def demo() -> Record:
+def demo(*, draw: bool = True) -> Record:
     """A small scene as two exact engines and the free bodies judge it."""
     scene = crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.0, 6.0, 36), 5.0))
-    return judged("demo", scene, tuple(w for w in WITNESSES if w.name != "mujoco-simulated"))
+    return judged("demo", scene, tuple(w for w in WITNESSES if w.name != "mujoco-simulated"), draw=draw)
 
 
 def copies(count: int, *, failing: int = 0) -> list[Record]:
@@ -168,7 +168,7 @@ def test_every_kind_of_scene_is_drawn(motion: fourbar.Motion, pictures: int) -> 
 
 def test_an_engine_that_is_missing_is_reported_as_failing() -> None:
     absent = replace(WITNESSES[0], adapter="validation.engines.absent:Absent")
-    summary, text = report([judged("demo", crank_rocker(), (absent,))])
+    summary, text = report([judged("demo", crank_rocker(), (absent,), draw=False)])
     assert summary.verdict.startswith("FAILS")
     assert "What fails</h2>" in text and "No module named" in text and "∞" in text
 

@@ -66,8 +66,8 @@ def test_a_run_of_the_hard_suite_writes_its_page_and_its_part_of_the_report(
 
 def test_the_picture_of_costs_says_what_each_did_for_a_position() -> None:
     assert set(WORK) == {"formulas", *(witness.name for witness in (*HARD_WITNESSES, *FURTHER))}
-    summary, text = report([demo()])
-    drawn = cost_figure([demo()])
+    summary, text = report([demo(draw=False)])
+    drawn = cost_figure([demo(draw=False)])
     assert drawn is not None
     for engine in ("formulas", "pinocchio-inverse", "mujoco-inverse", "free-body"):
         assert f"{engine}: {WORK[engine].short}" in drawn
@@ -87,7 +87,7 @@ def test_a_study_of_cost_next_to_the_report_is_part_of_it(tmp_path: Path) -> Non
     (folder / "cost.csv").touch()
     (folder / "sources.svg").write_text("<svg onload='alert(1)'/>")
     (folder / "work-precision-force.svg").write_bytes(bytes(cost.LARGEST + 1))
-    _, text = report([demo()], sections=cost.found_in(tmp_path))
+    _, text = report([demo(draw=False)], sections=cost.found_in(tmp_path))
     assert "The study of demo" in text and 'href="cost/demo/cost.md"' in text
     data = base64.b64encode(b"<svg onload='alert(1)'/>").decode()
     # an image runs no script; what is too large stays outside

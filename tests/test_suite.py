@@ -203,8 +203,10 @@ LIMITED = LIMIT + ("" if FULL else SMALL) + HARNESS
 """The harness on a disk that takes no file of more than 60 kB: the parts fit, the results do not."""
 
 
-def start(out: Path, count: int, *program: str, stderr: int = subprocess.DEVNULL) -> subprocess.Popen[bytes]:
-    command = [sys.executable, *(program or PROGRAM), "run", "--random", str(count)]
+def start(
+    out: Path, count: int, *program: str, workers: int = 2 if FULL else 1, stderr: int = subprocess.DEVNULL
+) -> subprocess.Popen[bytes]:
+    command = [sys.executable, *(program or PROGRAM), "run", "--random", str(count), "--workers", str(workers)]
     return subprocess.Popen(
         [*command, "--engines", "free-body", "--no-pictures", "--out", str(out)],
         cwd=Path(__file__).parent.parent,
@@ -279,7 +281,7 @@ def test_a_worker_killed_at_random_moments_changes_no_byte(tmp_path: Path, undis
     kills = runs = 0
     while kills < KILLS:  # a run is over after some ten of them, or before the first: another one takes the rest
         out, runs = tmp_path / str(runs), runs + 1
-        process = start(out, COUNT)
+        process = start(out, COUNT, workers=2)
         while kills < KILLS and process.poll() is None:
             wait_for_parts(out, process, at_least=1)
             time.sleep(float(rng.uniform(0.0, 0.5)))  # a worker needs a moment to start again

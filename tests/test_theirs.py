@@ -375,15 +375,14 @@ def devour(scene: Scene, text: str | None, names: dict[str, str]) -> None:
     bytearray(2 * WORKER_MEMORY)
 
 
-def test_ctrl_c_does_not_wait_for_the_file(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(model, "EXAMINE", f"{__name__}:hang")
+def test_ctrl_c_does_not_wait_for_the_file() -> None:
     # a test run in the background inherits SIGINT ignored
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     began = time.monotonic()
     threading.Timer(3.0, os.kill, (os.getpid(), signal.SIGINT)).start()
     try:
-        with pytest.raises(KeyboardInterrupt):
-            model._guarded(BARE, "<mujoco/>", {})
+        with pytest.raises(KeyboardInterrupt), model.guarded() as examined:
+            examined(f"{__name__}:hang", BARE, "<mujoco/>", {})
     finally:
         signal.signal(signal.SIGINT, before)
     assert time.monotonic() - began < model.SECONDS / 4
@@ -391,10 +390,9 @@ def test_ctrl_c_does_not_wait_for_the_file(monkeypatch: pytest.MonkeyPatch) -> N
 
 @pytest.mark.parametrize(("what", "word"), [(crash, "crashed"), (hang, "did not come back"), (devour, "memory")])
 def test_a_file_that_breaks_the_engine_is_one_line(what: object, word: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(model, "EXAMINE", f"{__name__}:{what.__name__}")  # type: ignore[attr-defined]
     monkeypatch.setattr(model, "SECONDS", 4.0 if what is hang else 60.0)  # a busy machine starts a process slowly
-    with pytest.raises(InputError, match=word):
-        model._guarded(BARE, "<mujoco/>", {})
+    with pytest.raises(InputError, match=word), model.guarded() as examined:
+        examined(f"{__name__}:{what.__name__}", BARE, "<mujoco/>", {})  # type: ignore[attr-defined]
 
 
 def test_the_command_writes_and_prints_what_it_found(tmp_path: Path) -> None:

@@ -69,6 +69,12 @@ def test_what_is_no_list_of_units_is_refused(text: str, capsys: pytest.CaptureFi
     assert "units" in capsys.readouterr().err
 
 
+def test_units_are_read_as_people_write_them() -> None:
+    assert units("mm, N,lbf-in") == units("mm N lbf-in") and units("Imperial") == units("imperial") and not units("si")
+    with pytest.raises(InputError, match=r'lb-in.*did you mean "lbf-in"'):
+        units("mm lb-in")
+
+
 def test_plots_and_notebooks_say_theirs() -> None:
     pytest.importorskip("matplotlib", reason="drawing needs matplotlib: pip install matplotlib")
     from fourbar.show.plot.figures import FIGURES, compose

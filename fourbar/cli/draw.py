@@ -51,8 +51,11 @@ def plot(
     type=click.FloatRange(min=0.1, max=60.0),
     help="Length of a film; left out: 6, of a motion through time its own.",
 )
+@click.option("--vectors", is_flag=True, help="With arrows of velocity and acceleration at the points.")
 @units_option
-def animate(scene: Path, out: Path, pictures: tuple[str, ...], seconds: float | None, units: str) -> None:
+def animate(
+    scene: Path, out: Path, pictures: tuple[str, ...], seconds: float | None, vectors: bool, units: str
+) -> None:
     """Show a scene moving: one web page (.html), or a film (.gif, .mp4)."""
     from fourbar.show.animate import write
     from fourbar.show.units import units as units_of
@@ -65,4 +68,4 @@ def animate(scene: Path, out: Path, pictures: tuple[str, ...], seconds: float | 
         attached[bar] = file
     described = loaded(scene)
     with named(scene), waiting(described):
-        write(described, out, pictures=attached, seconds=seconds, units=units_of(units))
+        write(described, out, pictures=attached, seconds=seconds, units=units_of(units), vectors=vectors)

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import click
 
-from fourbar.cli.given import loaded, named, printed_to, scene_argument
+from fourbar.cli.given import loaded, named, or_out_option, printed_to, scene_argument
 from fourbar.errors import NotAssembledError
 
 
@@ -41,7 +41,8 @@ def tolerance(scene: Path, samples: int | None, seed: int, as_json: bool, out: P
 @scene_argument
 @click.option("--quantity", "quantities", multiple=True, metavar="NAME", help="torque, F12 .. F14, transmission.")
 @click.option("--json", "as_json", is_flag=True, help="One object, SI and rad, every digit.")
-def extremes(scene: Path, quantities: tuple[str, ...], as_json: bool) -> None:
+@or_out_option
+def extremes(scene: Path, quantities: tuple[str, ...], as_json: bool, out: Path | None) -> None:
     """Prove the largest and smallest torque, pin forces and transmission angle over the input's whole interval."""
     from fourbar.show import extremes as shown
     from fourbar.show.progress import running
@@ -53,6 +54,7 @@ def extremes(scene: Path, quantities: tuple[str, ...], as_json: bool) -> None:
     with named(scene), running("the boxes are halved"):
         found = proven(stated, quantities or NAMES)
     if as_json:
-        printed_to(shown.json_text(stated, found), None)
+        text = shown.json_text(stated, found)
     else:
-        printed_to(under_heading(stated.title, shown.heading(stated, found), shown.table(found)), None)
+        text = under_heading(stated.title, shown.heading(stated, found), shown.table(found))
+    printed_to(text, out)

@@ -12,7 +12,7 @@ from fourbar.files.fields import Reader, Writer
 from fourbar.linkage import PINS
 
 if TYPE_CHECKING:
-    from fourbar.effects import Effect, Flywheel, Friction, Gravity, PinFriction, Point, Springs, Torsion, Viscous
+    from fourbar.effects import Effect, Flywheel, Gravity, PinFriction, Point, Springs, Torsion
 
 TORSION = {"stiffness": "N m/rad", "rest": "rad", "preload": "N m"}
 SPRING = {"stiffness": "N/m", "length": "m", "preload": "N"}
@@ -25,22 +25,6 @@ def _read_gravity(value: object, read: Reader) -> "Gravity":
 
 def _write_gravity(effect: "Gravity", write: Writer) -> Any:
     return write.polar(effect.magnitude, effect.angle, "m/s^2")
-
-
-def _read_viscous(value: object, read: Reader) -> "Viscous":
-    return kinds.Viscous.at(**read.per_pin("effects.viscous", value, "N m s/rad"))
-
-
-def _write_viscous(effect: "Viscous", write: Writer) -> Any:
-    return {pin: write.quantity(value, "N m s/rad") for pin, value in effect.coefficients}
-
-
-def _read_friction(value: object, read: Reader) -> "Friction":
-    return kinds.Friction.at(**read.per_pin("effects.friction", value, "N m"))
-
-
-def _write_friction(effect: "Friction", write: Writer) -> Any:
-    return {pin: write.quantity(value, "N m") for pin, value in effect.torques}
 
 
 def _read_pin_friction(value: object, read: Reader) -> "PinFriction":
@@ -135,10 +119,23 @@ class Entry(NamedTuple):
     """One line of a scene file."""
 
 
+def _per_pin(key: str, kind: str, field: str, unit: str, example: str) -> Entry:
+    """An effect that is one number for each pin."""
+
+    def read(value: object, given: Reader) -> "Effect":
+        effect: Effect = getattr(kinds, kind).at(**given.per_pin(f"effects.{key}", value, unit))
+        return effect
+
+    def write(effect: Any, write: Writer) -> Any:
+        return {pin: write.quantity(value, unit) for pin, value in getattr(effect, field)}
+
+    return Entry(read, write, example)
+
+
 REGISTRY: dict[str, Entry] = {
     "gravity": Entry(_read_gravity, _write_gravity, 'gravity = ["9.81 m/s^2", "-90 deg"]'),
-    "viscous": Entry(_read_viscous, _write_viscous, 'viscous = { O2 = "0.01 N m s/rad" }'),
-    "friction": Entry(_read_friction, _write_friction, 'friction = { A = "0.05 N m" }'),
+    "viscous": _per_pin("viscous", "Viscous", "coefficients", "N m s/rad", 'viscous = { O2 = "0.01 N m s/rad" }'),
+    "friction": _per_pin("friction", "Friction", "torques", "N m", 'friction = { A = "0.05 N m" }'),
     "pin_friction": Entry(
         _read_pin_friction, _write_pin_friction, 'pin_friction = { A = { coefficient = 0.1, radius = "8 mm" } }'
     ),

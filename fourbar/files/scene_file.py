@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from fourbar.effects import Load, Table
-from fourbar.errors import InputError
+from fourbar.errors import InputError, expect
 from fourbar.files import reading
 from fourbar.files.effects import REGISTRY
 from fourbar.files.fields import BARE_KEY, Reader
@@ -50,6 +50,7 @@ def load(path: str | Path) -> Scene:
     Raises InputError, in one line with file, key, value and what is allowed, for a file that is
     missing, not a file, too large, not text or not TOML, and for every entry that is wrong.
     """
+    expect("path", path, str, Path)
     return loads(read_text(path), str(path))
 
 

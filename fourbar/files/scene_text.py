@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from fourbar.effects import Load
-from fourbar.errors import InputError
+from fourbar.errors import InputError, expect
 from fourbar.files.effects import written
 from fourbar.files.fields import Writer
 from fourbar.linkage import BAR_NAMES, MOVING_BARS, Bar
@@ -25,6 +25,8 @@ def save(scene: Scene, path: str | Path) -> None:
 
     Raises InputError as `dump` does, and for a picture that lies outside the file's folder.
     """
+    expect("scene", scene, Scene)
+    expect("path", path, str, Path)
     pictures = tuple(picture.moved(Path(path).parent) for picture in scene.pictures)
     write_text(path, dump(replace(scene, pictures=pictures)))
 
@@ -35,6 +37,7 @@ def dump(scene: Scene) -> str:
     Raises InputError for a scene that a file cannot hold: two effects of one kind, a title that is
     no valid text.
     """
+    expect("scene", scene, Scene)
     write = Writer()
     linkage, motion = scene.linkage, scene.motion
     top = {"title": scene.title, "source": scene.source}

@@ -19,12 +19,14 @@ micro- = 1e-6 = µ- = μ- = u-
 milli- = 1e-3 = m-
 centi- = 1e-2 = c-
 deci- = 1e-1 = d-
+deca- = 10 = da-
 kilo- = 1e3 = k-
 mega- = 1e6 = M-
 giga- = 1e9 = G-
 meter = [length] = m = metre
 inch = 0.0254 * meter = in = inches
 foot = 0.3048 * meter = ft = feet
+yard = 3 * foot = yd
 second = [time] = s = sec
 minute = 60 * second = min
 hour = 3600 * second = h
@@ -35,11 +37,13 @@ ounce = pound / 16 = oz
 radian = [angle] = rad
 pi = 3.14159265358979323846264338327950288419716939937510582097494
 degree = pi / 180 * radian = deg = °
-revolution = 2 * pi * radian = rev = turn
+gradian = pi / 200 * radian = grad = gon
+revolution = 2 * pi * radian = rev = turn = r
 rpm = revolution / minute
+rps = revolution / second
 newton = kilogram * meter / second ** 2 = N
 standard_gravity = 9.80665 * meter / second ** 2 = g_0 = g0
-kilogram_force = kilogram * standard_gravity = kgf
+kilogram_force = kilogram * standard_gravity = kgf = kp
 pound_force = pound * standard_gravity = lbf
 ounce_force = ounce * standard_gravity = ozf
 slug = pound_force * second ** 2 / foot
@@ -54,11 +58,19 @@ horsepower = 550 * foot * pound_force / second = hp
 JOINED = re.compile(r"(?<=[A-Za-z])[.-](?=[A-Za-z])")
 """N.mm, lbf-in: a product."""
 SWAPS = (
-    {"lb": "lbf", "lbs": "lbf", "pound": "lbf", "oz": "ozf", "kg": "kgf", "Hz": "rev/s", "hz": "rev/s"},
+    {"lb": "lbf", "pound": "lbf", "oz": "ozf", "kg": "kgf", "Hz": "rev/s", "hz": "rev/s"},
     {"lbf": "lb", "ozf": "oz", "kgf": "kg"},
 )
 """Names that stand for each other in ordinary speech; here a pound is a mass, and the angle is a dimension."""
 
+SIGNS = str.maketrans(
+    {"⋅": "·", "×": "·", "•": "·", "″": " in", "”": " in", '"': " in", "′": " ft", "’": " ft", "'": " ft"}
+)
+"""Other signs of a product, and marks of inches and feet."""
+RAISED = re.compile("[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+")
+DIGITS = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
+FRACTION = re.compile(r"(?:([0-9]{1,6})[ -])?([0-9]{1,6})/([1-9][0-9]{0,5})(?=[ A-Za-z'\"′″])")
+"""1/2 or 12 1/2, as inches are written."""
 NUMBER = re.compile(r"[+-]?(?:[0-9]{1,100}(?:\.[0-9]{0,100})?|\.[0-9]{1,100})(?:[eE][+-]?[0-9]{1,3})?(?![0-9.])")
 UNIT = re.compile(r"(?:[A-Za-zµμ°_]+(?:_?0(?![0-9]))?(?:(?:\^|\*\*)-?[1-9](?![0-9])|[²³])?|[·*/()]|\s)+")
 """Names, each with at most one small exponent, and operators: nothing else reaches the parser, no tower of powers."""
@@ -76,10 +88,13 @@ def to_si(text: str, unit: str) -> float:
     dimension than `unit`, and where the number does not fit into a double.
     """
     text = text.strip()
-    found = NUMBER.match(text)
+    found = FRACTION.match(text) or NUMBER.match(text)
     if found is None:
         raise UnitError("there is no finite number")
-    name = text[found.end() :].strip()
+    name = RAISED.sub(lambda power: f"^{power[0].translate(DIGITS)}", text[found.end() :].translate(SIGNS)).strip()
+    if name.startswith(","):
+        hint = f'; did you mean "{found[0]}.{name[1:]}"?' if not re.match(r",[0-9]{3}(?![0-9])", name) else ""
+        raise UnitError(f"a comma is no part of a number{hint}")
     if not name:
         raise UnitError("the unit is missing")
     wanted, wanted_dimension = _factor(unit)
@@ -90,13 +105,20 @@ def to_si(text: str, unit: str) -> float:
     if dimension != wanted_dimension:
         raise UnitError(f'"{name}" does not convert to {unit}{_hint(found[0], name, unit)}')
     try:
-        value = float(Fraction(found[0]) * factor / wanted)
+        value = float(_number(found) * factor / wanted)
     except OverflowError:
         value = math.inf
     if not math.isfinite(value):
         raise UnitError("the number is too large")
     # Fraction has no -0.0
     return -0.0 if value == 0.0 and found[0].startswith("-") else value
+
+
+def _number(found: re.Match[str]) -> Fraction:
+    """The number of a match, exactly."""
+    if found.re is NUMBER:
+        return Fraction(found[0])
+    return int(found[1] or 0) + Fraction(int(found[2]), int(found[3]))
 
 
 def factor_to(unit: str, given: str) -> float:
@@ -121,7 +143,8 @@ def _hint(number: str, name: str, unit: str) -> str:
         return known[close[0]] if close else word
 
     words = re.compile(r"[A-Za-zµμ°_]+")
-    swapped = [{word: swap.get(word, word) for word in words.findall(name)} for swap in SWAPS]
+    swapped = [{word: swap.get(word.removesuffix("s"), word) for word in words.findall(name)} for swap in SWAPS]
+    swapped.append({word: word.removesuffix("s").casefold() for word in words.findall(name)})
     swapped.append({word: nearest(word) for word in words.findall(name)})
     candidates = [words.sub(lambda match, by=by: by[match[0]], name) for by in swapped]  # type: ignore[misc]
     candidates += [
@@ -152,7 +175,7 @@ def _registry() -> Any:
 @cache
 def _factor(name: str) -> tuple[Fraction, dict[str, Fraction]]:
     """What one of the unit is in base units, and its dimension."""
-    name = JOINED.sub(" ", name)
+    name = JOINED.sub(" ", name.rstrip("."))
     if len(name) > LONGEST_UNIT or not UNIT.fullmatch(name):
         raise UnitError("the unit cannot be read")
     registry = _registry()

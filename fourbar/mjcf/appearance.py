@@ -55,11 +55,7 @@ def add_camera(world: ET.Element, linkage: FourBar) -> None:
     """The camera `plane`, and a light at the same place."""
     seen = frame(linkage)
     place = f"{seen.x!r} {seen.y!r} {seen.distance!r}"
-    shining = {
-        "diffuse": ".2 .2 .2",
-        "specular": ".1 .1 .1",
-        "directional": "true",
-        "castshadow": "false",
-    }  # with the headlight 1
+    shining = {"diffuse": ".2 .2 .2", "specular": ".1 .1 .1"}  # with the headlight 1
+    shining |= {"directional": "true", "castshadow": "false"}
     ET.SubElement(world, "light", shining, name="light", pos=place, dir="0 0 -1")
     ET.SubElement(world, "camera", name="plane", pos=place, fovy=f"{FOVY:g}")

@@ -1,11 +1,10 @@
 """Scene -> SDF text: the closed loop as links and joints, for Gazebo and Drake."""
 
-import cmath
 from xml.etree import ElementTree as ET
 
 from fourbar.errors import LimitError
 from fourbar.linkage import BAR_NAMES, FIRST_PIN, MOVING_BARS
-from fourbar.mjcf.document import Start, at_start, plain
+from fourbar.mjcf.document import Start, plain, standing
 from fourbar.mjcf.model import carriable, text
 from fourbar.scene import Scene
 
@@ -56,18 +55,11 @@ def sdf(scene: Scene, reader: str = "gazebo", start: Start | None = None) -> str
     carriable(linkage)
     inertia = {number: linkage.bar(number).moment_of_inertia for number in MOVING_BARS}
     gravity, dynamics = _acting(scene, reader, inertia)
-    begin = start or at_start(scene)
-    (theta_2, of_3_to_2, theta_4), (omega_2, at_A, omega_4) = begin.qpos, begin.qvel
-    turn = {2: theta_2, 3: theta_2 + of_3_to_2, 4: theta_4}
-    foot = {
-        2: 0j,
-        3: cmath.rect(linkage.input.length, theta_2),
-        4: cmath.rect(linkage.ground, linkage.ground_angle),
-    }
+    turn, foot, numbers = standing(scene, start)
+    omega_2, at_A, omega_4 = numbers[3:]
     root = ET.Element("sdf", {"version": "1.9", **({"xmlns:drake": DRAKE} if reader == "drake" else {})})
-    numbers = (repr(x) for x in (theta_2, turn[3], theta_4, omega_2, at_A, omega_4))
     at_B = f", joint B {omega_2 + at_A - omega_4!r} rad/s" if reader == "gazebo" else ""
-    root.append(ET.Comment(COMMENT.format(*numbers, at_B, CLOSURE[reader], NUMBERS[reader])))
+    root.append(ET.Comment(COMMENT.format(*map(repr, numbers), at_B, CLOSURE[reader], NUMBERS[reader])))
     world = ET.SubElement(root, "world", name="four_bar")
     ET.SubElement(world, "gravity").text = text(*gravity, 0.0)
     model = ET.SubElement(world, "model", name=plain(scene.title) or "four-bar")

@@ -1,12 +1,11 @@
 """Scene -> USD text (UsdPhysics): the closed loop as rigid bodies and joints, for Newton."""
 
-import cmath
 import json
 import math
 
 from fourbar.errors import LimitError
 from fourbar.linkage import BAR_NAMES, FIRST_PIN, MOVING_BARS
-from fourbar.mjcf.document import Start, at_start, plain
+from fourbar.mjcf.document import Start, plain, standing
 from fourbar.mjcf.model import carriable
 from fourbar.mjcf.sdf import PARENT
 from fourbar.scene import Scene
@@ -50,12 +49,7 @@ def usd(scene: Scene, start: Start | None = None) -> str:
             inertia[effect.bar] += effect.inertia  # type: ignore[attr-defined]
         else:
             raise LimitError(f"the effect {effect.key!r} has no counterpart in USD")
-    begin = start or at_start(scene)
-    (theta_2, of_3_to_2, theta_4), (omega_2, at_A, omega_4) = begin.qpos, begin.qvel
-    turn = {1: 0.0, 2: theta_2, 3: theta_2 + of_3_to_2, 4: theta_4}
-    O4 = cmath.rect(linkage.ground, linkage.ground_angle)
-    foot = {1: 0j, 2: 0j, 3: cmath.rect(linkage.input.length, theta_2), 4: O4}
-    numbers = (repr(number) for number in (theta_2, turn[3], theta_4, omega_2, at_A, omega_4))
+    turn, foot, numbers = standing(scene, start)
     pull = math.hypot(x, y)
     bodies = []
     for number in MOVING_BARS:
@@ -79,7 +73,7 @@ def usd(scene: Scene, start: Start | None = None) -> str:
     length = {number: linkage.bar(number).length for number in MOVING_BARS}
     places = {FIRST_PIN[number]: (PARENT[number], number, 0.0) for number in MOVING_BARS} | {"B": (4, 3, length[3])}
     for pin, (one, other, along) in places.items():
-        on_one = {"O2": 0j, "A": complex(length[2]), "B": complex(length[4]), "O4": O4}[pin]
+        on_one = {"O2": 0j, "A": complex(length[2]), "B": complex(length[4]), "O4": foot[4]}[pin]
         joints.append(
             f"""    def PhysicsRevoluteJoint "{pin}"
     {{
@@ -96,7 +90,7 @@ def usd(scene: Scene, start: Start | None = None) -> str:
         )
     return f"""#usda 1.0
 (
-    doc = {json.dumps(COMMENT.format(*numbers), ensure_ascii=False)}
+    doc = {json.dumps(COMMENT.format(*map(repr, numbers)), ensure_ascii=False)}
     defaultPrim = "four_bar"
     metersPerUnit = 1
     kilogramsPerUnit = 1

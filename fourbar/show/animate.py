@@ -32,6 +32,7 @@ def write(
     file_format: str | None = None,
     seconds: float | None = None,
     units: Conversion = SI,
+    vectors: bool = False,
 ) -> None:
     """Write a moving scene to a file, whole or not at all.
 
@@ -43,6 +44,7 @@ def write(
         edge at the second. Pages only.
     file_format : html, gif or mp4 where the path's ending does not say it.
     units : in which numbers are shown; left out: SI. Angles are in degrees.
+    vectors : with arrows of velocity and acceleration at the points; a page can show and hide them.
     seconds : duration of a film; left out: 6 s for a sweep, of a motion through time its own.
 
     Raises
@@ -56,16 +58,18 @@ def write(
     if kind not in FORMATS:
         raise InputError("output", str(path), "must end in one of " + ", ".join(f".{end}" for end in FORMATS))
     if kind == "html":
-        write_text(target, page(scene, pictures or {}, units))
+        write_text(target, page(scene, pictures or {}, units, vectors))
         return
     if pictures:
         raise InputError("picture", sorted(pictures), "pictures are shown in an .html page only")
     from fourbar.show.plot.film import write_film
 
-    write_film(scene, target, kind, seconds, units)
+    write_film(scene, target, kind, seconds, units, moving=vectors)
 
 
-def page(scene: Scene, pictures: Mapping[str, str | Path] | None = None, units: Conversion = SI) -> str:
+def page(
+    scene: Scene, pictures: Mapping[str, str | Path] | None = None, units: Conversion = SI, vectors: bool = False
+) -> str:
     """The page as text."""
     from fourbar import __version__
 
@@ -80,7 +84,7 @@ def page(scene: Scene, pictures: Mapping[str, str | Path] | None = None, units: 
         style_hash=_content_hash(style),
         script=script,
         script_hash=_content_hash(script),
-        data=embedded(page_data(scene, pictures or {}, units)),
+        data=embedded(page_data(scene, pictures or {}, units) | {"vectors": vectors}),
     )
 
 

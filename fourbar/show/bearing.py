@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fourbar.errors import InputError
+from fourbar.errors import InputError, expect
 from fourbar.linkage import PIN_FORCE, FourBar
 from fourbar.solution import Array, Solution
 
@@ -21,6 +21,7 @@ class BearingLoad(NamedTuple):
 
 
 def _evaluated(solution: Solution, name: str) -> Array:
+    expect("solution", solution, Solution)
     force: Array | None = getattr(solution, name)
     if force is None:
         raise InputError("solution", name, "was not evaluated: solve up to the stage 'force'")
@@ -41,6 +42,7 @@ def shaking_moment(linkage: FourBar, solution: Solution) -> Array:
     Couples that effects exert between the bars and ground (pin damping or friction at O2, O4)
     are not part of it.
     """
+    expect("linkage", linkage, FourBar)
     F14, torque = _evaluated(solution, "F14"), _evaluated(solution, "torque")
     x, y = linkage.ground * np.cos(linkage.ground_angle), linkage.ground * np.sin(linkage.ground_angle)
     return np.asarray(-torque - (x * F14[:, 1] - y * F14[:, 0]))
@@ -60,10 +62,11 @@ def once_round(solution: Solution) -> slice:
 
 def bearing_load(solution: Solution, pin: str) -> BearingLoad:
     """Largest and root mean square load of pin "O2", "A", "B" or "O4", and where; NaN positions are left out."""
-    if pin not in PIN_FORCE:
+    if not isinstance(pin, str) or pin not in PIN_FORCE:
         raise InputError("pin", pin, "the pins are " + ", ".join(PIN_FORCE))
+    loads = np.hypot(*_evaluated(solution, PIN_FORCE[pin]).T)
     one = once_round(solution)
-    load, theta_2 = np.hypot(*_evaluated(solution, PIN_FORCE[pin]).T)[one], solution.theta_2[one]
+    load, theta_2 = loads[one], solution.theta_2[one]
     known = np.isfinite(load)
     if not known.any():
         return BearingLoad(float("nan"), float("nan"), float("nan"))

@@ -5,6 +5,7 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from fourbar.scene import Scene
+from fourbar.show.tables import plain_table
 from fourbar.studies.enclosure import PROVEN, Extremes
 
 if TYPE_CHECKING:
@@ -34,23 +35,17 @@ def heading(scene: Scene, found: Extremes) -> list[str]:
 
 def table(found: Extremes) -> "Table":
     """Two rows for each quantity."""
-    from rich import box
-    from rich.table import Table
-    from rich.text import Text
-
-    shown = Table(box=box.SIMPLE_HEAD, show_edge=False, pad_edge=False, padding=(0, 1, 0, 0))
-    for head in ("", "unit", "", "from", "to", "theta_2 (deg)", *(["over-estimate"] if found.nominal else [])):
-        shown.add_column(Text(head), justify="right" if head in ("from", "to", "theta_2 (deg)") else "left")
+    rows = []
     for name in found.least:
         unit, factor = _unit(name)
         for word, sign, extreme in (("least", -1, found.least[name]), ("greatest", 1, found.greatest[name])):
             ends = (f"{factor * extreme.low:.11g}", f"{factor * extreme.high:.11g}")
-            row = [name, unit, word, *ends, f"{math.degrees(extreme.theta_2):.6f}"]
+            rows.append([name, unit, word, *ends, f"{math.degrees(extreme.theta_2):.6f}"])
             if found.nominal is not None:
                 over = found.over_estimate(name, sign)
-                row.append("-" if over is None else f"{over:.3g} times")
-            shown.add_row(*map(Text, row))
-    return shown
+                rows[-1].append("-" if over is None else f"{over:.3g} times")
+    heads = ("", "unit", "", "from", "to", "theta_2 (deg)", *(["over-estimate"] if found.nominal else []))
+    return plain_table(heads, rows, left=("", "unit", "over-estimate"))
 
 
 def _unit(name: str) -> tuple[str, float]:

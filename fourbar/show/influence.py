@@ -3,6 +3,7 @@
 import math
 from typing import TYPE_CHECKING
 
+from fourbar.show.tables import plain_table
 from fourbar.studies.derivatives import Sensitivity
 from fourbar.studies.influence import influences, largest, shown_quantities, unit_of
 
@@ -31,20 +32,11 @@ def heading(found: Sensitivity) -> list[str]:
 
 def table(found: Sensitivity) -> "Table":
     """A row for each number that matters, those first that change any quantity most against its largest value."""
-    from rich import box
-    from rich.table import Table
-    from rich.text import Text
-
     names = shown_quantities(found)
     by = {name: {row.key: row.change for row in influences(found, name)} for name in names}
-    shown = Table(box=box.SIMPLE_HEAD, show_edge=False, pad_edge=False, padding=(0, 1, 0, 0))
-    shown.add_column("")
-    for name in names:
-        shown.add_column(Text(f"{name}\n{unit_of(name)}"), justify="right", no_wrap=True)
-    shown.add_row("largest value", *(f"{largest(found, name):.4g}" for name in names))
-    for key in ranked(found, names):
-        shown.add_row(Text(key), *(f"{by[name].get(key, 0.0):.3g}" for name in names))
-    return shown
+    rows = [["largest value", *(f"{largest(found, name):.4g}" for name in names)]]
+    rows += [[key, *(f"{by[name].get(key, 0.0):.3g}" for name in names)] for key in ranked(found, names)]
+    return plain_table(["", *(f"{name}\n{unit_of(name)}" for name in names)], rows, left=("",))
 
 
 def ranked(found: Sensitivity, names: list[str]) -> list[str]:

@@ -4,6 +4,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from fourbar.errors import expect
 from fourbar.linkage import PIN_FORCE
 from fourbar.show.bearing import bearing_load, drive_power, once_round
 from fourbar.solution import Array, Conversion, Solution, unit_in
@@ -48,6 +49,7 @@ def motor_duty(solution: Solution) -> MotorDuty | None:
     ----------
     solution : (n,) positions of a sweep or of a motion law, to the stage "force".
     """
+    expect("solution", solution, Solution)
     if solution.torque is None or not np.isfinite(solution.torque).any():
         return None
     power = drive_power(solution)

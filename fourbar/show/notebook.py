@@ -3,7 +3,7 @@
 from html import escape
 from typing import TYPE_CHECKING
 
-from fourbar.errors import FourBarError
+from fourbar.errors import FourBarError, expect
 from fourbar.linkage import BAR_NAMES, MOVING_BARS
 from fourbar.solution import DEGREES, SI, Conversion, Solution
 
@@ -101,7 +101,10 @@ class InUnits:
     """A scene or a solution that a notebook shows in other units."""
 
     def __init__(self, shown: "Scene | Solution", units: str) -> None:
+        from fourbar.scene import Scene
         from fourbar.show.units import units as units_of
+
+        expect("shown", shown, Scene, Solution)
 
         self.shown, self.units = shown, units_of(units)
 

@@ -136,7 +136,7 @@ def _through_time(scene: Scene) -> dict[str, Any]:
         "rate": rate,
         "start": None,
         "branches": {str(scene.motion.branch): columns},
-        "pace": _pace_in_time(scene, whole, rate, len(where.time)),
+        "pace": _pace_in_time(whole, rate, len(where.time)),
         "positions": len(whole),
     }
 
@@ -161,17 +161,15 @@ def _rate(duration: float) -> float:
     return float(10.0 ** math.ceil(math.log10(duration / longest))) if duration > longest else 1.0
 
 
-def _pace_in_time(scene: Scene, whole: Solution, rate: float, shown: int) -> str:
-    """What speed 1 means, where the motion ends before its time, and whether instants were left out."""
-    assert whole.time is not None
+def _pace_in_time(whole: Solution, rate: float, shown: int) -> str:
+    """What speed 1 means, when the linkage stops before its time, and whether instants were left out."""
     words = "At speed 1× it moves in real time"
     if rate < 1.0:
         words = f"At speed 1× it moves {1.0 / rate:.0f} times slower than it really does"
     elif rate > 1.0:
         words = f"At speed 1× it moves {rate:.0f} times faster than it really does"
-    free = scene.motion.free
-    if free is not None and len(whole) <= free.steps:
-        words += f". It ends at {whole.time[-1]:.4g} s, where the linkage stops at a limit position"
+    if whole.stopped_at is not None:
+        words += f". The linkage stops at a limit position at {whole.stopped_at:.4g} s"
     if len(whole) > shown:
         words += f". Shown are {shown} of the {len(whole)} instants"
     return words + "."
@@ -192,13 +190,6 @@ def _solved(scene: Scene, solution: Solution) -> dict[str, Any]:
         values = getattr(solution, name)
         if values is not None:
             columns[name] = [_or_null(value) for value in values.tolist()]
-    drawn = ("A", "B", *(f"G{bar}" for bar in MOVING_BARS if scene.linkage.bar(bar).mass > 0.0))
-    points = {f"{letter}_{name}": getattr(solution, f"{letter}_{name}") for letter in "va" for name in drawn}
-    points |= {f"v_{name}": values for name, values in solution.velocity.items()}
-    points |= {f"a_{name}": values for name, values in solution.acceleration.items()}
-    for name, values in points.items():
-        if values is not None:
-            columns[name] = [_or_null(size) for size in np.hypot(*values.T).tolist()]
     for name in PIN_FORCES:
         values = getattr(solution, name)
         if values is not None:

@@ -2,10 +2,12 @@
 
 import io
 import math
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from fourbar.errors import printable
 from fourbar.linkage import BAR_NAMES, PIN_FORCE
 from fourbar.quantities import ANGLES, PIN_FORCES, STATUS_NAMES, UNITS
 from fourbar.scene import Scene
@@ -29,19 +31,32 @@ STEPS = (1, 2, 5, 10, 15, 20, 30, 45, 60, 90)
 """A terminal is shown every so many positions, of a longer sweep a multiple of the last."""
 
 
-def under_heading(title: str, lines: list[str], shown: "Table") -> str:
-    """A table with its title and what stands above it, as text."""
+def under_heading(
+    title: str, lines: list[str], shown: "Table", after: Sequence[str] = (), width: int | None = None
+) -> str:
+    """A table with its title and what stands above it and below, as text; `width` is that of a terminal."""
     from rich.console import Console
     from rich.text import Text
 
-    from fourbar.errors import printable
-
     text = io.StringIO()
-    console = Console(file=text, width=10_000, color_system=None)
-    for line in ([printable(title)] if title else []) + lines:
-        console.print(Text(line))
-    console.print(shown)
+    console = Console(file=text, width=width or 10_000, color_system=None)
+    for part in (*([printable(title)] if title else []), *lines, shown, *after):
+        console.print(Text(part) if isinstance(part, str) else part)
     return "\n".join(line.rstrip() for line in text.getvalue().split("\n"))
+
+
+def plain_table(heads: Iterable[str], rows: Iterable[Iterable[str]], left: Iterable[str] = (), gap: int = 1) -> "Table":
+    """A table whose columns stand to the right, but for those headed by one of `left`."""
+    from rich import box
+    from rich.table import Table
+    from rich.text import Text
+
+    shown = Table(box=box.SIMPLE_HEAD, show_edge=False, pad_edge=False, padding=(0, gap, 0, 0))
+    for head in heads:
+        shown.add_column(Text(head), justify="left" if head in left else "right", no_wrap=True)
+    for row in rows:
+        shown.add_row(*map(Text, row))
+    return shown
 
 
 def printed(
@@ -55,30 +70,18 @@ def printed(
         a pipe, which gets the summary first and every position.
     every : show every so many positions; left out: as `width` says.
     """
-    from rich.console import Console
-    from rich.text import Text
-
-    from fourbar.errors import printable
-
     step = every or (1 if width is None else _step(len(solution)))
     shown, left_out = table(solution, width, units, every=step)
-    text = io.StringIO()
-    console = Console(file=text, width=width or 10_000, color_system=None)
-    title = [printable(scene.title)] if scene.title else []
-    summary = [*title, *heading(scene, solution, units)]
-    notes = []
+    summary, notes = heading(scene, solution, units), []
     if step > 1:
         more = "; --all shows each" if every is None else ""
         notes.append(f"shown: every {step}{_ordinal(step)} of the {len(solution)} positions{more}")
     if left_out:
         notes.append(f"not shown: {', '.join(left_out)} (a wider terminal, --csv or --json has them)")
-    before, after = (summary, notes) if width is None else ([], [*notes, *summary])
-    for line in before:
-        console.print(Text(line))
-    console.print(shown)
-    for line in after:
-        console.print(Text(line))
-    return "\n".join(line.rstrip() for line in text.getvalue().split("\n"))
+    if width is None:
+        return under_heading(scene.title, summary, shown, notes)
+    title = [printable(scene.title)] if scene.title else []
+    return under_heading("", [], shown, [*notes, *title, *summary], width)
 
 
 def _step(count: int) -> int:
@@ -230,10 +233,6 @@ def table(
 
     Every so many positions are shown, the last one always.
     """
-    from rich import box
-    from rich.table import Table
-    from rich.text import Text
-
     cells = columns(solution, units)
     if (solution.status_code != 0).any():
         cells = {"status\n": [status.replace("_", " ") for status in solution.status], **cells}
@@ -244,14 +243,11 @@ def table(
         if width is not None and needed > width:
             break
         kept.append(name)
-    shown = Table(box=box.SIMPLE_HEAD, show_edge=False, pad_edge=False, padding=(0, GAP - 1, 0, 0))
-    for name in kept:
-        shown.add_column(Text(name), justify="right", no_wrap=True)
     rows = list(zip(*(cells[name] for name in kept), strict=True))
     last = rows[-1:] if (len(rows) - 1) % every else []
-    for row in rows[::every] + last:
-        shown.add_row(*(Text(cell) for cell in row))
-    return shown, [name.split("\n")[0] for name in cells if name not in kept]
+    return plain_table(kept, rows[::every] + last, gap=GAP - 1), [
+        name.split("\n")[0] for name in cells if name not in kept
+    ]
 
 
 def _cells(values: Array, kind: str = "") -> list[str]:

@@ -10,6 +10,7 @@ import numpy as np
 from fourbar.errors import DependencyError, InputError
 from fourbar.quantities import PIN_FORCES, UNITS
 from fourbar.scene import Scene
+from fourbar.show.tables import plain_table
 from fourbar.solution import Array, nulled
 from fourbar.studies.spread import BAND, Spread, Tolerances, tolerances
 
@@ -83,25 +84,18 @@ def worst_position(spread: Spread) -> int | None:
 
 def table(found: Tolerances) -> "Table":
     """One row for each quantity."""
-    from rich import box
-    from rich.table import Table
-    from rich.text import Text
-
-    shown = Table(box=box.SIMPLE_HEAD, show_edge=False, pad_edge=False, padding=0)
-    first = ("", "\nunit", "theta_2\ndeg", "\nnominal", "\nsigma")
-    for head in (*first, f"\n{BAND[0]:g} %", f"\n{BAND[1]:g} %", "\nleast", "\ngreatest", "worst\n+-"):
-        shown.add_column(Text(head), justify="right" if head else "left", no_wrap=True)
+    heads = ("", "\nunit", "theta_2\ndeg", "\nnominal", "\nsigma", f"\n{BAND[0]:g} %", f"\n{BAND[1]:g} %")
+    rows = []
     for part in shown_parts(found):
         spread = found.spreads[part]
-        at = worst_position(spread)
-        if at is None:
+        if (at := worst_position(spread)) is None:
             continue
         columns = (spread.nominal, spread.deviation, spread.low, spread.high, spread.least, spread.greatest)
         numbers = [f"{column[at]:.6g}" for column in columns]
         numbers[1] = f"{spread.deviation[at]:.3g}"
-        row = [part, unit_of(part), f"{math.degrees(found.theta_2[at]):.6g}", *numbers, f"{spread.worst[at]:.3g}"]
-        shown.add_row(*map(Text, row))
-    return shown
+        angle = f"{math.degrees(found.theta_2[at]):.6g}"
+        rows.append([part, unit_of(part), angle, *numbers, f"{spread.worst[at]:.3g}"])
+    return plain_table((*heads, "\nleast", "\ngreatest", "worst\n+-"), rows, left=("",), gap=0)
 
 
 def _most(found: Tolerances, spread: Spread, at: int) -> str:

@@ -1,10 +1,11 @@
 """The units in which results are shown: a list such as "mm N N.mm deg", or "imperial"."""
 
 from fourbar.errors import InputError
-from fourbar.files.units import UnitError, to_si
+from fourbar.files.units import factor_to, to_si
 from fourbar.solution import SI, Conversion
 
-PRESETS = {"SI": "", "imperial": "in lbf lbf.in lb deg rpm"}
+ALLOWED = 'must be "SI", "imperial" or a list like "mm N N.mm deg rpm"'
+PRESETS = {"si": "", "imperial": "in lbf lbf.in lb deg rpm"}
 STATED = ("m", "N", "N m", "kg", "rad", "rad/s", "rad/s^2", "m/s", "m/s^2", "W")
 """The SI units for which another one can be stated, each of a dimension of its own."""
 DERIVED = {
@@ -24,13 +25,16 @@ def units(text: str) -> Conversion:
 
     Raises InputError for what is no unit of a result, and for two of one dimension.
     """
-    names = PRESETS.get(text, text).split()
+    if not isinstance(text, str):
+        raise InputError("units", text, ALLOWED)
     stated: dict[str, str] = {}
-    for name in names:
-        unit = next((unit for unit in STATED if _converts(name, unit)), None)
+    for name in PRESETS.get(text.casefold(), text).replace(",", " ").split():
+        why = {unit: _refusal(name, unit) for unit in STATED}
+        unit = next((unit for unit in STATED if not why[unit]), None)
         if unit is None or unit in stated:
-            why = "is no unit of a result" if unit is None else f"is the second unit for {unit}"
-            raise InputError("units", name, f'{why}; must be "SI", "imperial" or a list like "mm N N.mm deg rpm"')
+            hint = next((f"; {word}" for reason in why.values() if (word := reason.partition("; ")[2])), "")
+            reason = f"is no unit of a result{hint}" if unit is None else f"is the second unit for {unit}"
+            raise InputError("units", name, f"{reason}; {ALLOWED}")
         stated[unit] = name.replace(".", " ")
     for unit, (base, form) in DERIVED.items():
         if base in stated and unit not in stated:
@@ -38,9 +42,10 @@ def units(text: str) -> Conversion:
     return {unit: (name, to_si(f"1 {unit}", name)) for unit, name in stated.items()} or SI
 
 
-def _converts(name: str, unit: str) -> bool:
+def _refusal(name: str, unit: str) -> str:
+    """Why a name is no unit for another one; empty where it is."""
     try:
-        to_si(f"1 {name}", unit)
-    except UnitError:
-        return False
-    return True
+        factor_to(unit, name)
+    except InputError as error:
+        return error.allowed.rpartition("; must convert")[0].replace('"1 ', '"')
+    return ""

@@ -11,7 +11,7 @@ from fourbar.effects import Gravity, PinFriction
 from fourbar.effects.actions import Actions
 from fourbar.effects.cones import settle
 from fourbar.effects.pin_friction import Settled
-from fourbar.errors import InputError
+from fourbar.errors import InputError, expect
 from fourbar.formulas.arithmetic import polar
 from fourbar.linkage import PIN_FORCE
 from fourbar.quantities import FORCES, NOT_ASSEMBLED, OK, SINGULAR, STAGE_OF, STAGES, STATUS_NAMES
@@ -89,6 +89,7 @@ def sensitivity(scene: Scene) -> Sensitivity:
     >>> found.of("torque", "motion.omega_2") * 10.0 / found.value("torque")  # it grows with the square of the speed
     array([2.])
     """
+    expect("scene", scene, Scene)
     if scene.motion.free is not None:
         raise InputError("motion.free", "a free motion", "has no sensitivities: they are those of a prescribed theta_2")
     if isinstance(scene.motion.theta_2, FromLimit):

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.effects.actions import bodies
-from fourbar.errors import DependencyError, InputError, LimitError, installing
+from fourbar.errors import DependencyError, InputError, LimitError, expect, installing
 from fourbar.formulas.arithmetic import dot
 from fourbar.formulas.path import Path
 from fourbar.formulas.position import HalfAngle, Loop, close_loop
@@ -103,6 +103,8 @@ def extremes(scene: Scene, quantities: Sequence[str] = NAMES) -> Extremes:
         import flint
     except ImportError:
         raise DependencyError(f"Guaranteed extremes need python-flint: {installing('exact')}") from None
+    expect("scene", scene, Scene)
+    expect("quantities", quantities, list, tuple)
     names = [name for name in NAMES if name in quantities or name.strip("|") in quantities]
     for name in quantities:
         if name not in NAMES and f"|{name}|" not in NAMES:

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.lib.mixins import NDArrayOperatorsMixin
 
-from fourbar.errors import InputError
+from fourbar.errors import InputError, expect
 from fourbar.formulas.arithmetic import polar
 from fourbar.linkage import BAR_NAMES, MOVING_BARS, Bar
 from fourbar.scene import Scene
@@ -109,6 +109,7 @@ def entries(scene: Scene) -> dict[str, Entry]:
 
 def refusal(key: str, value: object, known: list[str]) -> InputError:
     """The error for a key that a study cannot vary."""
+    expect("key", key, str)
     inner = [name for name in known if name.startswith(f"{key}.")]
     if inner:
         return InputError(key, value, "is more than one number; vary " + ", ".join(inner))

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.errors import DependencyError, InputError, installing
+from fourbar.errors import DependencyError, InputError, expect, installing
 from fourbar.quantities import ANGLES, NOT_ASSEMBLED, PIN_FORCES
 from fourbar.scene import Scene, command
 from fourbar.solution import Array
@@ -98,6 +98,7 @@ def tolerances(
 
     Source: I. M. Sobol', USSR Comput. Math. Math. Phys. 7 (1967) 86; error propagation: JCGM 100:2008, 5.1.2.
     """
+    expect("scene", scene, Scene)
     if isinstance(samples, bool) or not isinstance(samples, int) or not 2 <= samples <= MOST_SAMPLES:
         raise InputError("samples", samples, f"must be a whole number from 2 to {MOST_SAMPLES}")
     if isinstance(seed, bool) or not isinstance(seed, int) or seed < 0:

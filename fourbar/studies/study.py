@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.errors import InputError
+from fourbar.errors import InputError, expect
 from fourbar.formulas.mobility import on_smooth_path
 from fourbar.formulas.position import loop
 from fourbar.quantities import ANGLES, INVALID
@@ -153,6 +153,8 @@ def vary(scene: Scene, values: Mapping[str, Any]) -> Study:
     >>> solve(vary(scene, {"lengths.input": [0.1, 0.11, 2.0]})).status
     [['ok'], ['ok'], ['not_assembled']]
     """
+    expect("scene", scene, Scene)
+    expect("values", values, Mapping)
     if scene.motion.free is not None:
         raise InputError("motion.free", "a free motion", "is integrated for one linkage; a study prescribes theta_2")
     known = entries(scene)
@@ -224,7 +226,7 @@ def _numbers(key: str, value: Any, known: list[str]) -> Array:
 
 def _shown(value: Any) -> object:
     """A value as far as one line shows it."""
-    return value if isinstance(value, (str, int, float)) else f"{type(value).__name__} of shape {np.shape(value)}"
+    return f"{type(value).__name__} of shape {value.shape}" if isinstance(value, np.ndarray) else value
 
 
 def _angles(scene: Scene, given: Mapping[str, Array]) -> Array:

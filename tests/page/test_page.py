@@ -226,6 +226,11 @@ def test_type_time_and_scene_file_follow_the_lengths(browse, tmp_path: Path) -> 
     driver.execute_script("chooseBranch(-1)")
     assert driver.find_element("id", "type").text.startswith("triple rocker (longest: ground); with the original")
     swept = state_of(driver, "grid[grid.length - 1] - grid[0]")
+    here = fourbar.solve(loads(state_of(driver, "sceneFile()")))
+    speeds, accelerations = zip(*state_of(driver, "grid.map((_, i) => pointMotion(i, POINTS[3]))"), strict=True)
+    np.testing.assert_allclose(speeds, here.v_G3, rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(accelerations, here.a_G3, rtol=1e-9, atol=1e-7)
+    assert "speed of G₃, m/s" in [option.text for option in driver.find_elements("css selector", "#quantity option")]
     assert f"at ω₂ = 10 rad/s the mechanism takes {swept / 10.0:.3g} s." in driver.find_element("id", "pace").text
     saved = loads(state_of(driver, "sceneFile()"))
     assert saved.linkage.lengths == (0.3, 0.2, 0.25, 0.22) and saved.linkage.coupler.mass == scene.linkage.coupler.mass
@@ -271,6 +276,13 @@ def test_what_acts_is_drawn_at_its_place_and_dimensions_on_request(browse) -> No
     assert found.keys() >= {"act act-drive", "act act-gravity"}
     names = 'return ["1", "3"].map(k => [parts.label[k].textContent, parts.label[k].style.display])'
     assert driver.execute_script(names) == [["1", "none"], ["3", ""]]
+    driver.execute_script("toggle('show-v'); toggle('show-a')")
+    arrows = driver.execute_script("""return [...document.querySelectorAll("#motion path.act")].map(e =>
+        [...e.getAttribute("d").matchAll(/[ML]([^ ]+) ([^ML]+)/g)].map(m => [Number(m[1]), -Number(m[2])]))""")
+    assert len(arrows) == 2 * 5
+    shafts = np.diff(arrows, axis=1)[:, 0]
+    for (x, y), expected in zip(shafts[[0, 5]], (s.v_A[20], s.a_A[20]), strict=True):
+        assert math.atan2(y, x) == pytest.approx(math.atan2(*expected[::-1]), abs=0.001)
     driver.execute_script("toggle('show-dimensions'); toggle('show-acting')")
     assert [text for text, _ in driver.execute_script(names)] == ["1: 300 mm", "3: 250 mm"]
     assert not driver.find_elements("css selector", "#acting *")

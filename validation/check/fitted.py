@@ -168,34 +168,34 @@ def _offset(judge: Judge) -> Iterator[Mistake]:
     keys = [key for key in judge.table.values if judge.yard(key).any()]
     rows = np.unique(np.linspace(0, len(judge.at.theta_2) - 1, TRIED).round().astype(int))
 
-    def residual(offset: float, rows: NDArray[np.int_]) -> Array:
-        at = judge.at
+    def residuals(offsets: Array, rows: NDArray[np.int_]) -> Array:
+        """One line for each offset."""
+        at, m = judge.at, len(offsets)
         many = {
-            name: values[rows]
+            name: np.tile(values[rows], m)
             for name in ("theta_2", "branch", "omega_2", "alpha_2")
             if np.ndim(values := getattr(at, name)) == 1
         }
-        many["theta_2"] = many["theta_2"] + offset
+        many["theta_2"] += np.repeat(offsets, len(rows))
         moved = solve(judge.scene, judge.stage, at=at._replace(**many, remainder=None, time=None))
         parts = []
         for key in keys:
-            ours, theirs = judge.ours(key, moved), judge.table.values[key][rows]
-            apart = ours - theirs
+            theirs = judge.table.values[key][rows].reshape(len(rows), -1)
+            apart = judge.ours(key, moved).reshape(m, *theirs.shape) - theirs
             if quantity_of(key).startswith("theta"):
                 apart = np.remainder(apart + np.pi, 2.0 * np.pi) - np.pi
-            yard = judge.yard(key)[rows]
-            scaled = apart / in_own_unit(yard).reshape(-1, *[1] * (apart.ndim - 1))
-            parts.append(np.where(np.isfinite(theirs), scaled, 0.0).ravel())
-        return np.concatenate(parts)
+            scaled = apart / in_own_unit(judge.yard(key)[rows])[:, None]
+            parts.append(np.where(np.isfinite(theirs), scaled, 0.0).reshape(m, -1))
+        return np.concatenate(parts, axis=1)
 
     if sum(np.count_nonzero(judge.where(key)) for key in keys) < ENOUGH:
         return
-    tried = [2.0 * np.pi * k / GRID for k in range(1, GRID)]
-    sizes = [float(np.mean(np.minimum(np.abs(np.nan_to_num(residual(x, rows), nan=1.0)), 1.0))) for x in tried]
-    offset = tried[int(np.argmin(sizes))]
+    tried = 2.0 * np.pi * np.arange(1, GRID) / GRID
+    sizes = np.mean(np.minimum(np.abs(np.nan_to_num(residuals(tried, rows), nan=1.0)), 1.0), axis=1)
+    offset = float(tried[np.argmin(sizes)])
     everything = np.arange(len(judge.at.theta_2))
     for _ in range(NEWTON):
-        here, more, less = (residual(offset + h, everything) for h in (0.0, STEP, -STEP))
+        here, more, less = residuals(offset + np.array([0.0, STEP, -STEP]), everything)
         slope = (more - less) / (2.0 * STEP)
         there = np.isfinite(here) & np.isfinite(slope)
         if not there.any() or not (size := float(slope[there] @ slope[there])):

@@ -6,7 +6,8 @@ The file is somebody's: it is compiled and run in a process of its own, with a l
 import math
 import os
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -94,15 +95,17 @@ def named(pairs: tuple[str, ...]) -> dict[str, str]:
 def examine_model(
     name: str, scene: Scene, mjcf: Path, names: Mapping[str, str], tolerance: Tolerance = SIMULATED
 ) -> ModelReport:
-    """Examine a file in a guarded process, and the generated one likewise; theirs is held to the tolerance."""
+    """Examine a file in a guarded process, and the generated one before; theirs is held to the tolerance."""
     text = read_mjcf(mjcf)
-    generated, theirs = _guarded(scene, None, {}), _guarded(scene, text, names)
-    ours = {(row.engine, row.quantity): row.error for row in _rows(name, scene, generated.answers, SIMULATED)}
-    rows = _rows(name, scene, theirs.answers, tolerance)
-    costs = [Cost(row, ours.get((row.engine, row.quantity), math.nan)) for row in rows]
-    found = differences(generated.described, theirs.described, theirs.called)
-    entries = [(difference.key, difference.generated) for difference in found]
-    mended = _guarded(scene, text, theirs.names, entries, examine=MENDED) if any(row.failed for row in rows) else []
+    with guarded() as examined:
+        generated, theirs = examined(EXAMINE, scene, None, {}), examined(EXAMINE, scene, text, dict(names))
+        ours = {(row.engine, row.quantity): row.error for row in _rows(name, scene, generated.answers, SIMULATED)}
+        rows = _rows(name, scene, theirs.answers, tolerance)
+        costs = [Cost(row, ours.get((row.engine, row.quantity), math.nan)) for row in rows]
+        found = differences(generated.described, theirs.described, theirs.called)
+        entries = [(difference.key, difference.generated) for difference in found]
+        failed = any(row.failed for row in rows)
+        mended = examined(MENDED, scene, text, dict(theirs.names), entries) if failed else []
     after = [[] if answers is None else _rows(name, scene, answers, tolerance) for answers in mended]
     return ModelReport(causes(found, rows, after), costs, theirs.notes)
 
@@ -115,31 +118,33 @@ def _rows(name: str, scene: Scene, answers: list[Answer], tolerance: Tolerance) 
     return found
 
 
-def _guarded(
-    scene: Scene, text: str | None, names: Mapping[str, str], *more: object, examine: str | None = None
-) -> Any:
-    """The examination, in a process that may crash, hang or run out of memory."""
+@contextmanager
+def guarded() -> Iterator[Callable[..., Any]]:
+    """What examines, an adapter and its arguments, in a process that may crash, hang or run out of memory."""
     from multiprocessing import get_context
 
     from pebble import ProcessExpired, ProcessPool
 
     waiting = running(f"MuJoCo examines the file, in {SECONDS:g} s at most")
     with waiting, ProcessPool(max_workers=1, context=get_context("spawn"), initializer=_confine) as pool:
-        future = pool.schedule(_examine, args=(examine or EXAMINE, scene, text, dict(names), *more), timeout=SECONDS)
-        try:
-            return future.result()
-        except FourBarError:
-            raise
-        except TimeoutError:
-            reason = f"MuJoCo did not come back in {SECONDS:g} s"
-        except MemoryError:
-            reason = f"asks for more than {WORKER_MEMORY // 2**30} GB of memory"
-        except ProcessExpired as error:
-            reason = f"MuJoCo crashed on it (exit code {error.exitcode})"
-        except KeyboardInterrupt:
-            pool.stop()  # type: ignore[no-untyped-call]  # or the pool would wait for the file to its time limit
-            raise
-    raise InputError("--mjcf", "the file", reason)
+
+        def examined(*arguments: object) -> Any:
+            try:
+                return pool.schedule(_examine, args=arguments, timeout=SECONDS).result()
+            except FourBarError:
+                raise
+            except TimeoutError:
+                reason = f"MuJoCo did not come back in {SECONDS:g} s"
+            except MemoryError:
+                reason = f"asks for more than {WORKER_MEMORY // 2**30} GB of memory"
+            except ProcessExpired as error:
+                reason = f"MuJoCo crashed on it (exit code {error.exitcode})"
+            except KeyboardInterrupt:
+                pool.stop()  # type: ignore[no-untyped-call]  # or the pool would wait for the file to its time limit
+                raise
+            raise InputError("--mjcf", "the file", reason)
+
+        yield examined
 
 
 def _confine() -> None:

@@ -1,7 +1,7 @@
 """An engine's answer against the formulas: one row per quantity, at the position where it is worst."""
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -38,8 +38,8 @@ from validation.compare.tolerance import (
 )
 
 Mask = NDArray[np.bool_]
-Predicted = Callable[[Mask], Mapping[str, Array]]
-"""The error to be expected of each quantity, in its own unit, (n,); it matters at the positions of the mask alone."""
+Predicted = Callable[[str, Mask], Array]
+"""The error to be expected of a quantity, in its own unit, (n,); it matters at the positions of the mask alone."""
 Yardsticks = dict[str, tuple[Array, Array]]
 """Size and condition of each quantity at each position."""
 
@@ -185,7 +185,7 @@ class _Comparison:
             full, size = np.where(size == 0.0, 0.0, full), in_own_unit(size)
 
             def expected(where: Mask) -> Array:
-                return relative(predicted(where)[quantity], size)
+                return relative(predicted(quantity, where), size)
 
         error = relative_error(quantity, ours, theirs, size)
         return _found(error, condition, where, full, self.tolerance, expected), error, condition
@@ -231,18 +231,19 @@ def _found(
     if not (decidable | beyond).any():
         index = int(np.flatnonzero(where)[0])
         return _Finding(index, UNDECIDED, f"eps/condition = {EPS / condition[index]:.1e}", full[index], 0)
+    if not beyond.any():
+        index = int(np.argmax(np.where(decidable, used(error, full), -1.0)))
+        return _Finding(index, AGREES, tolerance.name + note, full[index], int(np.count_nonzero(decidable)))
     expected = np.zeros_like(error)
-    if predicted is not None and beyond.any():
+    if predicted is not None:
         expected = np.nan_to_num(predicted(beyond), nan=0.0, posinf=np.inf)
     allowed = np.maximum(full, TIMES_PREDICTED * expected)
     ratio = used(error, allowed)
     # first order says that no digit is left, no more
     lost = beyond & np.isfinite(error) & np.where(full > 0.0, expected >= 1.0, expected == np.inf)
     ratio[lost] = np.minimum(ratio[lost], 1.0)
-    index = int(np.argmax(np.where(beyond if beyond.any() else decidable, ratio, -1.0)))
-    if not beyond.any():
-        verdict, reason = AGREES, tolerance.name
-    elif math.isnan(error[index]):
+    index = int(np.argmax(np.where(beyond, ratio, -1.0)))
+    if math.isnan(error[index]):
         verdict, reason = FAILS, "NaN"
     elif lost[index]:
         verdict, reason = UNDECIDED, f"an error of {expected[index]:.1e} of the value is predicted"

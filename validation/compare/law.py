@@ -8,9 +8,9 @@ import numpy as np
 
 from fourbar.scene import Command, Scene
 from validation.compare.error import worst
+from validation.compare.identities import FORMULAS
 from validation.compare.rows import AGREES, FAILS, Row
 from validation.compare.tolerance import IDENTITY, Array
-from validation.compare.withheld import FORMULAS
 
 
 def law_row(name: str, scene: Scene, at: Command) -> Row:

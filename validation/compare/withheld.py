@@ -10,10 +10,10 @@ from fourbar.scene import Scene
 from fourbar.solution import Solution
 from validation.compare.compare import TOUCHING_MARGIN, Mask, closing_margin
 from validation.compare.error import magnitude, worst
+from validation.compare.identities import FORMULAS
 from validation.compare.rows import AGREES, FAILS, Row
 from validation.compare.tolerance import EPS, NOTHING_TO_TELL, Array, condition_of
 
-FORMULAS = "formulas"
 STAGES = ("omega_3", "alpha_3", "torque")
 """One quantity of each stage that a position may lack."""
 LARGE = 1e75

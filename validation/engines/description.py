@@ -5,7 +5,7 @@ a point of a bar; the bars as a tree that is open at pin B.
 """
 
 import math
-from collections.abc import Container
+from collections.abc import Container, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -47,7 +47,13 @@ def components(size: float, angle: float) -> tuple[float, float]:
 def turned(angle: float, x: float, y: float) -> tuple[float, float]:
     """The vector that is (x, y) along and across a line at an angle (rad)."""
     cos, sin = math.cos(angle), math.sin(angle)
-    return cos * x - sin * y, sin * x + cos * y
+    return turned_by(((cos, -sin), (sin, cos)), x, y)
+
+
+def turned_by(rotation: Sequence[Sequence[float]], x: float, y: float) -> tuple[float, float]:
+    """A vector turned by a matrix of two rows."""
+    (a, b), (c, d) = rotation
+    return a * x + b * y, c * x + d * y
 
 
 def field(gravity: Gravity) -> tuple[float, float]:

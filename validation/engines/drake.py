@@ -100,7 +100,7 @@ class DrakeTree(Tree):
         bias = self.plant.CalcBiasTranslationalAcceleration(self.context, BY_SPEEDS, *at)
         return np.asarray(self.point_jacobian(name) @ self.a + bias[:2, 0])
 
-    def needed(self, field: tuple[float, float], wrenches: dict[int, Array]) -> Array:
+    def needed(self, field: tuple[float, float], wrenches: dict[int, list[float]]) -> Array:
         """Inverse dynamics with gravity as a force element and what acts on the bars as external forces."""
         forces = MultibodyForces(self.plant)
         if any(field):
@@ -125,6 +125,6 @@ class DrakeTree(Tree):
 DrakeInverse = partial(Exact, "drake-inverse", DrakeTree)
 
 
-def _spatial(wrench: Array) -> Any:
+def _spatial(wrench: Sequence[float]) -> Any:
     x, y, couple = wrench
     return SpatialForce(np.array([0.0, 0.0, couple]), np.array([x, y, 0.0]))

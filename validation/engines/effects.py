@@ -111,14 +111,14 @@ def _flywheel(effect: "Flywheel", tree: Tree) -> Act:
 
 def _load(load: "Load", tree: Tree) -> Act:
     """A force at its point and a couple; in the bar's frame both vectors turn with the engine's bar."""
-    force, arm = components(*(load.force or (0.0, 0.0))), components(*load.at)
+    force, arm = np.array(components(*(load.force or (0.0, 0.0)))), np.array(components(*load.at))
 
     def act() -> None:
         factor = 1.0 if load.table is None else look_up(load.table, tree.angle(2))
         if load.frame == "bar":
             f, at = tree.turned(load.bar, *force), tree.turned(load.bar, *arm)
         else:
-            f, at = np.array(force), np.array(arm)
+            f, at = force, arm
         tree.push(load.bar, factor * f, tree.centre(load.bar) + at)
         tree.twist(load.bar, factor * load.moment)
 

@@ -4,6 +4,7 @@ import math
 import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,11 +16,13 @@ from validation.compare.answer import Answer, Array
 from validation.engines.description import SHARED, speeds
 from validation.engines.tree import Bars, Values
 
-START_ANGLES = (
-    *((30, 30), (15, 15), (45, 45), (5, 5), (5, 120)),
-    *((120, 5), (60, 60), (2, 150), (150, 2), (1, 1)),
-)
-"""Degrees that bars 3 and 4 first make with the diagonal A to O4, tried in turn where the triangle of the lengths as
+START_ANGLES = np.radians(
+    (
+        *((30, 30), (15, 15), (45, 45), (5, 5), (5, 120)),
+        *((120, 5), (60, 60), (2, 150), (150, 2), (1, 1)),
+    )
+).tolist()
+"""rad that bars 3 and 4 first make with the diagonal A to O4, tried in turn where the triangle of the lengths as
 measured is none to start from; they alone served 8000 of 8000 linkages, in four times as many steps."""
 LONGEST_STEP = 0.5
 """rad; a longer Newton step leaves the region in which the gap is nearly linear."""
@@ -56,16 +59,18 @@ class Position:
         at = tree.positions()
         pin_a = at.get("A2", at["A"])
         diagonal = at["O4"] - pin_a
-        e = math.hypot(*diagonal)
-        b, c = math.hypot(*(at["B"] - at["A"])), math.hypot(*(at["B4"] - at["O4"]))
-        closed = ROUNDING * (math.hypot(*pin_a) + math.hypot(*at["O4"]) + b + c)
+        e, a, d, b, c = (
+            math.hypot(*vector.tolist())
+            for vector in (diagonal, pin_a, at["O4"], at["B"] - at["A"], at["B4"] - at["O4"])
+        )
+        closed = ROUNDING * (a + d + b + c)
         # with bar 2 held, the gap is stationary only where bars 3 and 4 lie along the diagonal: this is its least value
         if max(e - (b + c), abs(b - c) - e) > closed:
             return None
         phi = math.atan2(diagonal[1], diagonal[0])
         # the triangle as measured is the nearest start, also where a bar is a millionth of the others
-        triangle = (_triangle_angle(e, near, far) for near, far in ((b, c), (c, b)))
-        for alpha, beta in (tuple(triangle), *(map(math.radians, pair) for pair in START_ANGLES)):
+        triangle = _triangle_angle(e, b, c), _triangle_angle(e, c, b)
+        for alpha, beta in (triangle, *START_ANGLES):
             theta_3, theta_4 = phi + branch * alpha, phi + math.pi - branch * beta
             q = theta_2, math.remainder(theta_3 - theta_2, math.tau), math.remainder(theta_4, math.tau)
             found = newton(tree, q, branch, closed)
@@ -137,10 +142,9 @@ class Exact:
         names += ["torque_inertia"] if bars.alone and moves else []
 
         def read(q: Angles, omega_2: float, alpha_2: float) -> Values:
-            points = bars.positions()
-            values: Values = {f"theta_{bar}": bars.angle(bar) for bar in (3, 4)}
-            values |= {name: points[name] for name in ("A", "B", "G2", "G3", "G4")}
-            values["sin_mu"] = math.sin(bars.angle(4) - bars.angle(3))
+            points, theta_3, theta_4 = bars.positions(), bars.angle(3), bars.angle(4)
+            values: Values = {name: points[name] for name in ("A", "B", "G2", "G3", "G4")}
+            values |= {"theta_3": theta_3, "theta_4": theta_4, "sin_mu": math.sin(theta_4 - theta_3)}
             return values | (bars.move(omega_2, alpha_2) if moves else {})
 
         out, assembled, gap = at_each(bars, command, names, read)
@@ -162,14 +166,13 @@ def at_each(
 ) -> tuple[dict[str, Array], NDArray[np.bool_], float]:
     """What is read at each position that assembles, NaN elsewhere; where that is; the greatest gap left, m."""
     n, (omega, alpha) = len(command.theta_2), speeds(command)
-    out, assembled, gap = blank(n, names), np.zeros(n, dtype=bool), 0.0
-    position = Position(bars)
+    missing: dict[str, Any] = {name: (math.nan, math.nan) if name in VECTORS else math.nan for name in names}
+    rows, assembled, gap, position = [missing] * n, np.zeros(n, dtype=bool), 0.0, Position(bars)
     for i, (theta_2, branch) in enumerate(zip(command.theta_2.tolist(), command.branch.tolist(), strict=True)):
         if (q := position.find(theta_2, branch)) is not None:
             assembled[i], gap = True, max(gap, math.hypot(*bars.gap()))
-            for name, value in read(q, float(omega[i]), float(alpha[i])).items():
-                out[name][i] = value
-    return out, assembled, gap
+            rows[i] = missing | read(q, float(omega[i]), float(alpha[i]))
+    return {name: np.array([row[name] for row in rows], float) for name in missing}, assembled, gap
 
 
 MADE = ("theta_2", "omega_2", "alpha_2")

@@ -10,7 +10,7 @@ import pinocchio as pin
 from fourbar.errors import LimitError
 from fourbar.scene import Scene
 from validation.compare.answer import Array
-from validation.engines.description import FIRST_PIN, parts, unknown_effect
+from validation.engines.description import FIRST_PIN, parts, turned_by, unknown_effect
 from validation.engines.effects import TERM_OF, acting
 from validation.engines.loop import Exact
 from validation.engines.tree import Tree
@@ -33,9 +33,16 @@ class PinocchioTree(Tree):
             model.appendBodyToJoint(joint, inertia, pin.SE3.Identity())
             for name, at in part.points.items():
                 self.frame[name] = model.addFrame(pin.Frame(name, joint, 0, _at(*at), pin.FrameType.OP_FRAME))
-        self.data = model.createData()
+        self.data = data = model.createData()
         self.q = np.zeros(3)
         self.external = pin.StdVec_Force([pin.Force.Zero()] * model.njoints)
+        # the engine's own memory, read and written in place: to look it up again costs more than a pass of the engine
+        self.at = {name: data.oMf[frame].translation[:2] for name, frame in self.frame.items()}
+        self.turned_to = {bar: data.oMi[joint].rotation[:2, :2] for bar, joint in self.joint.items()}
+        self.joint_force = {bar: data.f[joint].linear[:2] for bar, joint in self.joint.items()}
+        self.external_force = {
+            bar: (self.external[joint].linear, self.external[joint].angular) for bar, joint in self.joint.items()
+        }
         self.ready(scene, acting(scene, self))
         self._weigh(self.field)
 
@@ -50,11 +57,11 @@ class PinocchioTree(Tree):
 
     def point(self, name: str) -> Array:
         """Place of a frame."""
-        return np.array(self.data.oMf[self.frame[name]].translation[:2])
+        return np.asarray(self.at[name])
 
     def rotation(self, bar: int) -> Array:
         """That of the joint."""
-        return np.asarray(self.data.oMi[self.joint[bar]].rotation[:2, :2])
+        return np.asarray(self.turned_to[bar])
 
     def point_jacobian(self, name: str) -> Array:
         """Of a frame."""
@@ -73,18 +80,19 @@ class PinocchioTree(Tree):
         motion = pin.getFrameClassicalAcceleration(self.model, self.data, self.frame[name], WORLD)
         return np.array(motion.linear[:2])
 
-    def needed(self, field: tuple[float, float], wrenches: dict[int, Array]) -> Array:
+    def needed(self, field: tuple[float, float], wrenches: dict[int, list[float]]) -> Array:
         """Recursive Newton-Euler with what acts on the bars as external forces."""
         self._weigh(field)
         for bar, (x, y, moment) in wrenches.items():
-            local = self.rotation(bar).T @ (x, y)
-            self.external[self.joint[bar]] = pin.Force(np.array([*local, 0.0]), np.array([0.0, 0.0, moment]))
+            force, couple = self.external_force[bar]
+            force[:2] = turned_by(self.rotation(bar).T.tolist(), x, y)
+            couple[2] = moment
         return np.array(pin.rnea(self.model, self.data, self.q, self.v, self.a, self.external))
 
     def carried(self) -> dict[int, Array]:
         """What each joint transmits in one more pass."""
         self.needed(self.field, self.wrenches)
-        return {bar: self.rotation(bar) @ self.data.f[self.joint[bar]].linear[:2] for bar in self.wrenches}
+        return {bar: self.rotation(bar) @ self.joint_force[bar] for bar in self.wrenches}
 
 
 PinocchioInverse = partial(Exact, "pinocchio-inverse", PinocchioTree)

@@ -38,7 +38,7 @@ class PinocchioForward:
             tree.place(q)  # type: ignore[arg-type]
             # what acts, as generalised forces: the difference it makes to inverse dynamics
             acted = tree.torques(v, np.zeros(3))
-            tau = tau + tree.needed(tree.field, dict.fromkeys(tree.wrenches, np.zeros(3))) - acted
+            tau = tau + tree.needed(tree.field, {bar: [0.0, 0.0, 0.0] for bar in tree.wrenches}) - acted
         return np.array(self.loop.acceleration(q, v, tau))
 
     def forward(self) -> Trial:

@@ -14,7 +14,6 @@ torque cancels, and for forces near a toggle, which a law in s^2 would excuse to
 """
 
 import math
-from collections.abc import Iterable
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -35,25 +34,23 @@ FIRST_ORDER = 0.1
 speeds and forces may come out as anything, the torque too, whose own first order can cancel."""
 
 
-def from_data(scene: Scene, at: Command, quantities: Iterable[str], where: Mask | None = None) -> dict[str, Array]:
+def from_data(scene: Scene, at: Command, quantity: str, where: Mask | None = None) -> Array:
     """For a derivation that works in angles and lengths themselves."""
-    return predicted_error(scene, at, quantities, 0.0, where)
+    return predicted_error(scene, at, quantity, 0.0, where)
 
 
-def in_world_axes(scene: Scene, at: Command, quantities: Iterable[str], where: Mask | None = None) -> dict[str, Array]:
+def in_world_axes(scene: Scene, at: Command, quantity: str, where: Mask | None = None) -> Array:
     """For an engine that differences points of the linkage in world axes, as Pinocchio's frame Jacobians do."""
-    return predicted_error(scene, at, quantities, _extent(scene), where)
+    return predicted_error(scene, at, quantity, _extent(scene), where)
 
 
-def about_mass_centre(
-    scene: Scene, at: Command, quantities: Iterable[str], where: Mask | None = None
-) -> dict[str, Array]:
+def about_mass_centre(scene: Scene, at: Command, quantity: str, where: Mask | None = None) -> Array:
     """For an engine that moves a tree of bodies about the mass centre of all of them, as MuJoCo does.
 
     Every bar is accelerated with the first of its tree and back again by its own joint.
     """
     furthest = max(abs(centre(scene.linkage.bar(number))[0]) for number in MOVING_BARS)
-    return predicted_error(scene, at, quantities, _extent(scene) + furthest, where, carried=True)
+    return predicted_error(scene, at, quantity, _extent(scene) + furthest, where, carried=True)
 
 
 def _extent(scene: Scene) -> float:
@@ -63,34 +60,33 @@ def _extent(scene: Scene) -> float:
 def predicted_error(
     scene: Scene,
     at: Command,
-    quantities: Iterable[str],
+    quantity: str,
     reach: float,
     where: Mask | None = None,
     *,
     carried: bool = False,
-) -> dict[str, Array]:
-    """Absolute error predicted for each quantity at each position, or at those of a mask, (n,).
+) -> Array:
+    """Absolute error predicted for a quantity at each position, or at those of a mask, (n,).
 
     With `carried` the accelerations of the bars are differences of others as large as the fastest bar's at `reach`.
     NaN where the loop does not close; infinite at a singular position, where the equations have no answer.
     """
     n, (omega, alpha) = len(at.theta_2), speeds(at)
-    result = {name: np.full(n, np.nan) for name in quantities}
+    errors = np.full(n, np.nan)
     for i in range(n) if where is None else np.flatnonzero(where).tolist():
         moved = _sensitivity(scene, float(at.theta_2[i]), int(at.branch[i]), float(omega[i]), float(alpha[i]))
         if moved is None:
             continue
         lost = ROUNDINGS * EPS * moved.data["theta_4"] >= FIRST_ORDER * float(moved.data["condition"])
-        for name, errors in result.items():
-            if lost and not name.startswith("theta"):
-                errors[i] = math.inf
-                continue
-            errors[i] = moved.first_order(name, reach, carried=carried)
-            if name == "torque":
-                turned = max(moved.first_order(f"theta_{bar}", reach) for bar in (3, 4))
-                pulled = max(moved.first_order(force, reach, carried=carried) for force in PIN_FORCES)
-                errors[i] += pulled * turned * _extent(scene)
-    return result
+        if lost and not quantity.startswith("theta"):
+            errors[i] = math.inf
+            continue
+        errors[i] = moved.first_order(quantity, reach, carried=carried)
+        if quantity == "torque":
+            turned = max(moved.first_order(f"theta_{bar}", reach) for bar in (3, 4))
+            pulled = max(moved.first_order(force, reach, carried=carried) for force in PIN_FORCES)
+            errors[i] += pulled * turned * _extent(scene)
+    return errors
 
 
 class Sensitivity(NamedTuple):

@@ -17,7 +17,7 @@ import numpy as np
 from fourbar.linkage import MOVING_BARS
 from fourbar.scene import Scene
 from validation.compare.answer import Array
-from validation.engines.description import FORCE_AT, turned
+from validation.engines.description import FORCE_AT, turned, turned_by
 
 PASSES = 1000
 """Passes over pin loads and the friction they make; each lessens the error where the friction is unique."""
@@ -84,7 +84,7 @@ class Tree(Bars):
     )
     field = (0.0, 0.0)
     """Of gravity, m/s^2."""
-    wrenches: dict[int, Array]
+    wrenches: dict[int, list[float]]
     """What acts on each moving bar, summed: a force at its first pin and a couple, (x, y, moment), N and N m."""
     v: Array
     a: Array
@@ -104,7 +104,7 @@ class Tree(Bars):
 
     # what the engine gives
     def point(self, name: str) -> Array:
-        """A point that `description.parts` names, world axes, (2,), m."""
+        """A point that `description.parts` names, world axes, (2,), m; perhaps the engine's own memory."""
         raise NotImplementedError
 
     def rotation(self, bar: int) -> Array:
@@ -127,7 +127,7 @@ class Tree(Bars):
         """Of a point at the motion last set, (2,), m/s^2."""
         raise NotImplementedError
 
-    def needed(self, field: tuple[float, float], wrenches: dict[int, Array]) -> Array:
+    def needed(self, field: tuple[float, float], wrenches: dict[int, list[float]]) -> Array:
         """Generalised forces that the motion last set asks for beyond gravity and what acts, (3,), N m."""
         raise NotImplementedError
 
@@ -148,7 +148,7 @@ class Tree(Bars):
     def positions(self) -> dict[str, Array]:
         """Points of the bars."""
         names = {"A": "foot3", "O4": "foot4", "B": "end3", "B4": "end4"}
-        return {name: self.point(names.get(name, name)) for name in (*names, "G2", "G3", "G4")}
+        return {name: np.array(self.point(names.get(name, name))) for name in (*names, "G2", "G3", "G4")}
 
     def angle(self, bar: int) -> float:
         """From the bar's axes; the ground's line as described."""
@@ -159,7 +159,8 @@ class Tree(Bars):
 
     def turned(self, bar: int, x: float, y: float) -> Array:
         """World axes of the vector that is (x, y) along and across a bar's line, (2,)."""
-        return np.array(turned(self.ground_angle, x, y)) if bar == 1 else self.rotation(bar) @ (x, y)
+        found = turned(self.ground_angle, x, y) if bar == 1 else turned_by(self.rotation(bar).tolist(), x, y)
+        return np.array(found)
 
     def foot(self, bar: int) -> Array:
         """First pin of a bar (O2, O2, A, O4 of bars 1, 2, 3, 4), m, (2,)."""
@@ -188,8 +189,10 @@ class Tree(Bars):
     def push(self, bar: int, force: Array, point: Array) -> None:
         """Add a force (N, world axes) at a point (m, world axes); on the ground it does nothing."""
         if bar != 1:
-            x, y = point - self.foot(bar)
-            self.wrenches[bar] += (force[0], force[1], x * force[1] - y * force[0])
+            (x, y), (f_x, f_y), wrench = (point - self.foot(bar)).tolist(), force.tolist(), self.wrenches[bar]
+            wrench[0] += f_x
+            wrench[1] += f_y
+            wrench[2] += x * f_y - y * f_x
 
     def twist(self, bar: int, couple: float) -> None:
         """Add a couple, N m; on the ground it does nothing."""
@@ -238,26 +241,26 @@ class Tree(Bars):
         except np.linalg.LinAlgError:
             return {}
         self.pin_loads = {}
-        inertial = self.inertial(v, a) if self.alone else None
+        inertial = [self.inertial(v, a)] if self.alone else []
         needed = self.torques(v, a)
         values: Values = {f"a_{name}": self.acceleration(point) for name, point in ON_BARS.items()}
         for bar in (3, 4):
             values[f"omega_{bar}"], values[f"alpha_{bar}"] = self.velocity(bar), self.alpha(bar)
-        matrix = np.column_stack((jacobian.T, self.turns[self.drive_bar]))
+        matrix = np.array([*jacobian, self.turns[self.drive_bar]]).T
         try:
-            if inertial is not None:
-                values["torque_inertia"] = float(np.linalg.solve(matrix, inertial)[2])
-            forces = self._multipliers(matrix, needed)
+            unknowns, *without = np.linalg.solve(matrix, np.array([needed, *inertial]).T).T
+            if without:
+                values["torque_inertia"] = float(without[0][2])
+            forces = self._multipliers(unknowns)
             if self.loaded:
-                forces = self._settled(forces, lambda: self._multipliers(matrix, self.torques(v, a)))
+                forces = self._settled(forces, lambda: self._multipliers(np.linalg.solve(matrix, self.torques(v, a))))
         except np.linalg.LinAlgError:  # no torque on that bar balances the linkage here
             return values
         return values | forces
 
-    def _multipliers(self, matrix: Array, needed: Array) -> dict[str, Any]:
+    def _multipliers(self, unknowns: Array) -> dict[str, Any]:
         """Driving torque and the four pin forces."""
-        unknowns: Array = np.asarray(np.linalg.solve(matrix, needed), dtype=np.float64)
-        return {**self.forces(unknowns[:2], unknowns[2]), "F43": unknowns[:2], "torque": unknowns[2]}
+        return {**self.forces(unknowns[:2], float(unknowns[2])), "F43": unknowns[:2], "torque": unknowns[2]}
 
     def _settled(self, forces: dict[str, Any], again: Callable[[], dict[str, Any]]) -> dict[str, Any]:
         """Passes over pin loads and the friction they make, until they repeat; nothing where they never do."""
@@ -276,8 +279,8 @@ class Tree(Bars):
         return {}  # rather than that of some pass
 
 
-def _no_wrenches() -> dict[int, Array]:
-    return {bar: np.zeros(3) for bar in MOVING_BARS}
+def _no_wrenches() -> dict[int, list[float]]:
+    return {bar: [0.0, 0.0, 0.0] for bar in MOVING_BARS}
 
 
 def closed(jacobian: Array, of_2: float, x: float = 0.0, y: float = 0.0) -> Array:

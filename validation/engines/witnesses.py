@@ -157,10 +157,9 @@ def predicting_from(witness: Witness, scene: Scene, at: Command, answer: Answer)
     if witness.predictor == "own":
         if answer.alarms:
             return None
-        zero = np.zeros(len(at.theta_2))
-        return lambda where: {quantity: answer.predicted.get(quantity, zero) for quantity in witness.expected}
+        return lambda quantity, where: answer.predicted.get(quantity, np.zeros(len(where)))
     if witness.tolerance.conditioned and (not_installed("flint") or unknown(scene)):
         return None  # the law in the condition stands alone
     module, _, name = witness.predictor.partition(":")
     predict = getattr(import_module(module), name)
-    return lambda where: predict(scene, at, witness.expected, where)
+    return lambda quantity, where: predict(scene, at, quantity, where)

@@ -4,7 +4,7 @@ import math
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from heapq import nlargest
+from heapq import merge, nlargest
 from itertools import groupby
 from typing import TypeVar
 
@@ -207,23 +207,19 @@ def by_scene(rows: Iterable[Row]) -> Iterator[tuple[str, list[Row]]]:
 
 def merged(old: ByScene[T], new: ByScene[T]) -> Iterator[tuple[str, Sequence[T], Sequence[T]]]:
     """Each scene that either run has, with what both have of it; InputError where the scenes are not in order."""
-    before, after = _in_order("OLD", old), _in_order("NEW", new)
-    one, other = next(before, None), next(after, None)
-    while one is not None or other is not None:
-        scene = min(each[0] for each in (one, other) if each is not None)
-        mine, theirs = ([] if each is None or each[0] != scene else each[1] for each in (one, other))
-        yield scene, mine, theirs
-        one = next(before, None) if mine else one
-        other = next(after, None) if theirs else other
+    both = merge(_in_order("OLD", old), _in_order("NEW", new), key=lambda each: each[0])
+    for scene, some in groupby(both, key=lambda each: each[0]):
+        rows = {run: each for _, run, each in some}
+        yield scene, rows.get("OLD", ()), rows.get("NEW", ())
 
 
-def _in_order(run: str, scenes: ByScene[T]) -> Iterator[tuple[str, Sequence[T]]]:
+def _in_order(run: str, scenes: ByScene[T]) -> Iterator[tuple[str, str, Sequence[T]]]:
     last = None
     for scene, rows in scenes:
         if last is not None and scene <= last:
             raise InputError(run, scene, f"must stand before scene {last}: a table of `run` is sorted by scene")
         last = scene
-        yield scene, rows
+        yield scene, run, rows
 
 
 def _by_key(rows: Iterable[Row]) -> dict[Key, Row]:

@@ -114,24 +114,21 @@ def _table(about: About, rows: list[Row], times: Mapping[tuple[str, str], float]
     import pyarrow as pa
 
     hashes = {name: _hash(entries) for name, entries in about.scenes.items()}
-    lines: list[dict[str, Any]] = [
-        {name: or_null(getattr(row, name)) for name in OF_A_ROW} | {"times_formulas": None} for row in sorted_rows(rows)
-    ]
-    nothing = dict.fromkeys(OF_A_ROW)
+    nothing: dict[str, Any] = dict.fromkeys((*OF_A_ROW, "times_formulas"))
+    lines = [nothing | {name: or_null(getattr(row, name)) for name in OF_A_ROW} for row in sorted_rows(rows)]
     for (scene, engine), ratio in sorted(times.items()):
-        lines.append({**nothing, "scene": scene, "engine": engine, "quantity": TIME, "times_formulas": ratio})
+        lines.append(nothing | {"scene": scene, "engine": engine, "quantity": TIME, "times_formulas": ratio})
     name = hashlib.sha256(repr((about.date, [tuple(line.values()) for line in lines])).encode()).hexdigest()[:16]
     of_run = {"run": name, "date": about.date, "commit": about.commit, "machine": about.machine}
     of_run |= {"settings": json.dumps(about.settings, sort_keys=True)}
     of_run |= {f"version_{name}": version for name, version in about.versions.items()}
+    kinds = MADE_OF | {"times_formulas": float}
     word, number = pa.dictionary(pa.int32(), pa.string()), pa.float64()
-    kinds = {name: number if kind is float else word for name, kind in MADE_OF.items()}
     names = [*of_run, *OF_A_ROW, "scene_hash", "times_formulas"]
-    columns = {name: [of_run.get(name, line.get(name)) for line in lines] for name in names}
-    columns["scene_hash"] = [hashes.get(line["scene"], "") for line in lines]
-    schema = pa.schema([(name, number if name == "times_formulas" else kinds.get(name, word)) for name in names])
+    schema = pa.schema([(name, number if kinds.get(name) is float else word) for name in names])
     kept = {hashes[name]: dict(entries) for name, entries in about.scenes.items()}
-    return pa.table(columns, schema=schema.with_metadata({SCENES: json.dumps(kept, sort_keys=True).encode()}))
+    lines = [of_run | line | {"scene_hash": hashes.get(line["scene"], "")} for line in lines]
+    return pa.Table.from_pylist(lines, schema.with_metadata({SCENES: json.dumps(kept, sort_keys=True).encode()}))
 
 
 def _hash(entries: Mapping[str, str]) -> str:

@@ -101,7 +101,7 @@ def _draw(axes: Any, approach: Approach, quantity: str) -> None:
     solution = solve(approach.scene, "force")
     size = magnitude(getattr(solution, quantity))
     singular = _singular(approach)
-    predicted = relative(in_world_axes(approach.scene, command(approach.scene), (quantity,))[quantity], size)
+    predicted = relative(in_world_axes(approach.scene, command(approach.scene), quantity), size)
     law = K * EPS / condition_of(quantity, approach.scene.linkage, solution)
     shown = np.isfinite(predicted)
     axes.loglog(approach.distances, law, color=INK, linestyle=(0, (1, 1)), linewidth=1, label="law K eps/condition")

@@ -14,7 +14,7 @@ from validation.compare.rows import FAILS, REFUSES, UNDECIDED, Row, sorted_rows,
 from validation.report.colours import by_variable, declarations, style_of
 from validation.report.costs import cost_figure
 from validation.report.record import Record
-from validation.report.summary import STATEMENT, Summary, used
+from validation.report.summary import STATEMENT, Summary, shares
 from validation.report.templating import environment
 
 ALL_OPEN = 8
@@ -28,11 +28,8 @@ class Cell(NamedTuple):
 
     line: int
     row: Row
-
-    @property
-    def used(self) -> float:
-        """error/allowed."""
-        return used(self.row)
+    used: float
+    """error/allowed."""
 
     @property
     def kind(self) -> str:
@@ -133,7 +130,6 @@ def html(
         no_pictures=no_pictures,
         sections=sections,
         statement=STATEMENT,
-        used=used,
         csv=csv.decode("ascii"),
         light=Markup(declarations(dark=False)),
         dark=Markup(declarations(dark=True)),
@@ -148,7 +144,8 @@ def share(value: float) -> str:
 
 
 def _view(scene: Record, first_line: int, pictures: Mapping[str, str]) -> SceneView:
-    cells = [Cell(line, row) for line, row in enumerate(sorted_rows(scene.rows), first_line)]
+    rows = sorted_rows(scene.rows)
+    cells = [Cell(line, *each) for line, each in enumerate(zip(rows, shares(rows), strict=True), first_line)]
     by_place: dict[tuple[str, str], Cell] = {}
     worst: dict[str, Cell] = {}
     for cell in cells:

@@ -1,6 +1,6 @@
 """report.md: short enough for a comment on a pull request."""
 
-from validation.report.summary import STATEMENT, Summary, used
+from validation.report.summary import STATEMENT, Summary
 from validation.report.templating import environment
 
 
@@ -9,7 +9,7 @@ def markdown(summary: Summary) -> str:
     templates = environment("validation.report", escape=False)  # Markdown: `cell` escapes what would break out
     templates.filters["cell"] = cell
     template = templates.get_template("report.md.j2")
-    return template.render(s=summary, statement=STATEMENT, used=used)
+    return template.render(s=summary, statement=STATEMENT)
 
 
 def cell(text: object) -> str:

@@ -9,9 +9,11 @@ from heapq import nlargest
 from statistics import median
 from typing import NamedTuple, TypeVar
 
+import numpy as np
+
 from fourbar.errors import HOLDS
 from validation.compare.counts import Counts
-from validation.compare.error import used as of_allowance
+from validation.compare.error import used
 from validation.compare.rows import REFUSES, Row
 from validation.compare.tolerance import EPS, EQUIVALENCE, IDENTITY, NOTHING_TO_TELL, SIMULATED, K, Tolerance
 from validation.engines.witnesses import WORK
@@ -27,13 +29,10 @@ class Worst:
     """The row of one scene and engine that comes nearest to, or goes furthest beyond, its allowance."""
 
     row: Row
+    used: float
+    """error/allowed of that row."""
     rows: int
     failed: int
-
-    @property
-    def used(self) -> float:
-        """error/allowed of the worst row."""
-        return used(self.row)
 
 
 @dataclass(frozen=True, slots=True)
@@ -224,17 +223,22 @@ def _left_out(scene: Record) -> set[tuple[str, str]]:
     return found
 
 
-def used(row: Row) -> float:
+def shares(rows: Sequence[Row]) -> list[float]:
     """error/allowed; infinite without an answer, 0 where nothing is allowed and errs, or nothing was compared."""
-    return float(of_allowance(row.error, row.allowed)) if row.compared else 0.0
+    of_all = used(np.array([row.error for row in rows]), np.array([row.allowed for row in rows]))
+    return [share if row.compared else 0.0 for row, share in zip(rows, of_all.tolist(), strict=True)]
 
 
 def _worst(rows: Sequence[Row]) -> list[Worst]:
-    groups: dict[tuple[str, str], list[Row]] = {}
-    for row in rows:
+    groups: dict[tuple[str, str], list[tuple[float, Row]]] = {}
+    for share, row in zip(shares(rows), rows, strict=True):
         if row.compared:
-            groups.setdefault((row.engine, row.setting), []).append(row)
-    return [Worst(max(group, key=used), len(group), sum(row.failed for row in group)) for group in groups.values()]
+            groups.setdefault((row.engine, row.setting), []).append((share, row))
+    found = []
+    for group in groups.values():
+        share, row = max(group, key=lambda each: each[0])
+        found.append(Worst(row, share, len(group), sum(each.failed for _, each in group)))
+    return found
 
 
 def _top(most: int, of: list[T], key: Callable[[T], float]) -> list[T]:

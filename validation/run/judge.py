@@ -16,7 +16,7 @@ from fourbar.quantities import FORCES
 from fourbar.scene import Command, Scene, command
 from fourbar.solution import Solution
 from fourbar.solve import solve
-from validation.compare.answer import Answer, Array
+from validation.compare.answer import Answer, Array, Engine
 from validation.compare.basis import basis_of
 from validation.compare.compare import Yardsticks, compare
 from validation.compare.identities import FORMULAS, closure, identities
@@ -66,26 +66,28 @@ def judge(name: str, scene: Scene, witnesses: Sequence[Witness] = WITNESSES, *, 
     record.solution, seconds = _timed(lambda: solve(scene, stage, at=at))
     record.timings.append(Timing(name, FORMULAS, "exact", len(at.theta_2), seconds))
     record.rows += identities(name, scene, at, record.solution)
-    basis = _basis(scene, at)
+    engines = _Engines(scene, at)
+    free_body = engines.free_body()
+    basis = _basis(scene, free_body)
     if basis is not None and at.omega_2 is not None:
         record.rows.append(withheld(name, scene, record.solution, basis, *_by_exact_means(scene, at)))
     record.rows += printed(name, scene, at, record.solution, basis)
     record.jumps = reversals(scene, at, record.solution)
     stated, yardsticks = Stated(scene.linkage), Yardsticks()
     for witness in witnesses:
-        answer = _ask(witness, scene, at, record)
+        answer = _ask(witness, engines, record)
         if answer is None:
             continue
         record.answers.append(answer)
         record.rows += _judged(name, scene, at, record.solution, answer, witness, basis, yardsticks)
         exact = witness.tolerance == EQUIVALENCE and answer.refusal is None and "theta_3" in witness.expected
         if exact and witness.stated:
-            record.rows += _stated(name, scene, at, witness, answer, stated)
+            record.rows += _stated(name, scene, at, witness, engines.started(witness), answer, stated)
         if order and witness.order and answer.refusal is None:
             answer.evidence |= _observed_order(name, scene, at, record.solution, witness)
     if any(witness.name == SIMULATION for witness in witnesses):
         record.rows += _shipped(name, scene, at)
-    _judge_inertia(record, scene, at, witnesses)
+    _judge_inertia(record, scene, at, witnesses, free_body)
     return record
 
 
@@ -129,13 +131,44 @@ def _called_for(witnesses: Iterable[Witness], at: Command, record: Record) -> It
             record.left_out.append(f"{witness.name}: {reason}")
 
 
-def _basis(scene: Scene, at: Command) -> Solution | None:
-    """Conditions and sizes of the positions by free bodies: nothing is allowed on the word of the formulas alone."""
-    try:
-        with np.errstate(all="ignore"):
-            return basis_of(scene, FreeBody().answer(scene, at))
-    except ArithmeticError:  # a row of its own fails; each answer is then measured by itself
-        return None
+class _Engines:
+    """What answers one scene: each engine is started once, and the free bodies, by which all is judged, answer once."""
+
+    def __init__(self, scene: Scene, at: Command) -> None:
+        self.scene, self.at = scene, at
+        self._started: dict[str, Engine] = {}
+        self._answered: dict[str, tuple[Answer, float]] = {}
+
+    def started(self, witness: Witness) -> Engine:
+        """The engine of a witness."""
+        if witness.adapter not in self._started:
+            self._started[witness.adapter] = witness.engine()
+        return self._started[witness.adapter]
+
+    def answer(self, witness: Witness) -> tuple[Answer, float]:
+        """The answer of a witness, and the seconds that it took."""
+        if witness.adapter in self._answered:
+            return self._answered[witness.adapter]
+        return _timed(lambda: self.started(witness).answer(self.scene, self.at))
+
+    def free_body(self) -> Answer | None:
+        """The answer of the free bodies, or None where they break down: a row of their own fails."""
+        adapter = f"{FreeBody.__module__}:{FreeBody.__name__}"
+        try:
+            with np.errstate(all="ignore"):
+                self._answered[adapter] = _timed(lambda: FreeBody().answer(self.scene, self.at))
+        except ArithmeticError:
+            return None
+        return self._answered[adapter][0]
+
+
+def _basis(scene: Scene, free_body: Answer | None) -> Solution | None:
+    """Conditions and sizes of the positions by free bodies: nothing is allowed on the word of the formulas alone.
+
+    Without them each answer is measured by itself.
+    """
+    with np.errstate(all="ignore"):
+        return None if free_body is None else basis_of(scene, free_body)
 
 
 def _by_exact_means(scene: Scene, at: Command) -> tuple[OfSome | None, OfSome]:
@@ -164,7 +197,8 @@ def _judged(
     theirs = answer.at if answer.at is not None else at
     formulas = solution
     if theirs is not at:
-        formulas, basis, yardsticks = solve(scene, _stage(theirs), at=theirs), _basis(scene, theirs), {}
+        basis = _basis(scene, _Engines(scene, theirs).free_body())
+        formulas, yardsticks = solve(scene, _stage(theirs), at=theirs), {}
     predicted = predicting_from(witness, scene, theirs, answer)
     rows = compare(name, scene, answer, formulas, witness.tolerance, witness.expected, predicted, basis, yardsticks)
     if (ratio := answer.evidence.get("mass_ratio", 1.0)) > LIGHT:
@@ -176,11 +210,13 @@ def _judged(
     return rows
 
 
-def _stated(name: str, scene: Scene, at: Command, witness: Witness, answer: Answer, stated: Stated) -> list[Row]:
+def _stated(
+    name: str, scene: Scene, at: Command, witness: Witness, engine: Engine, answer: Answer, stated: Stated
+) -> list[Row]:
     """What the formulas state of the linkage whatever its motion, held against an exact engine."""
     try:
         predicted = predicting_from(witness, scene, at, answer)
-        return statements(name, scene, witness.engine(), answer, stated, predicted)
+        return statements(name, scene, engine, answer, stated, predicted)
     except LimitError as limit:
         return [Row.unmeasured(name, witness.name, "statements of the linkage", "all", REFUSES, str(limit))]
     except Exception as error:  # whatever an engine raises is its own failure, in its own row
@@ -200,7 +236,9 @@ def _observed_order(name: str, scene: Scene, at: Command, solution: Solution, wi
     return seen if all(map(math.isfinite, seen.values())) else {}  # a coarse run may leave what the scene covers
 
 
-def _judge_inertia(record: Record, scene: Scene, at: Command, witnesses: Iterable[Witness]) -> None:
+def _judge_inertia(
+    record: Record, scene: Scene, at: Command, witnesses: Iterable[Witness], free_body: Answer | None
+) -> None:
     """The inertial part of the torque by itself: loads can hide an inertia that is 24 times wrong.
 
     An exact engine answers it in the same assembly; another one is started once more.
@@ -210,11 +248,12 @@ def _judge_inertia(record: Record, scene: Scene, at: Command, witnesses: Iterabl
     bare = replace(scene, loads=(), effects=())
     ours = solve(bare, _stage(at), at=at)
     refused = {answer.engine for answer in record.answers if answer.refusal is not None}  # and has its row
-    of_bare, yardsticks = _basis(bare, at), Yardsticks()
+    engines = _Engines(bare, at)
+    of_bare, yardsticks = _basis(bare, _of_inertia(free_body) or engines.free_body()), Yardsticks()
     for witness in witnesses:
         answer = _of_inertia(next((each for each in record.answers if each.engine == witness.name), None))
         if answer is None:
-            answer = _ask(replace(witness, expected=("torque",)), bare, at, record, part="inertia alone")
+            answer = _ask(witness, engines, record, part="inertia alone")
         if answer is None or (answer.refusal is not None and answer.engine in refused):
             continue
         rows = _judged(record.name, bare, at, ours, answer, replace(witness, expected=("torque",)), of_bare, yardsticks)
@@ -230,19 +269,19 @@ def _of_inertia(answer: Answer | None) -> Answer | None:
     """The part of an answer that is of the bars alone, or None."""
     if answer is None or "torque_inertia" not in answer.quantities:
         return None
-    torque = {"torque": answer.quantities["torque_inertia"]}
-    return replace(answer, quantities={**answer.quantities, **torque}, evidence={}, alarms=[])
+    alone = {**answer.quantities, "torque": answer.quantities["torque_inertia"]}
+    alone.pop("drive_condition", None)  # which holds how near loads and friction are to jamming
+    return replace(answer, quantities=alone, evidence={}, alarms=[])
 
 
-def _ask(witness: Witness, scene: Scene, at: Command, record: Record, part: str = "") -> Answer | None:
+def _ask(witness: Witness, engines: _Engines, record: Record, part: str = "") -> Answer | None:
     try:
-        answer: Answer
-        answer, seconds = _timed(lambda: witness.engine().answer(scene, at))
+        answer, seconds = engines.answer(witness)
     except Exception as error:  # whatever an engine raises is its own failure, in its own row
         record.rows.append(breakdown(record.name, witness.name, error, part))
         return None
     if not part:
-        record.timings.append(Timing(record.name, answer.engine, answer.setting, len(at.theta_2), seconds))
+        record.timings.append(Timing(record.name, answer.engine, answer.setting, len(engines.at.theta_2), seconds))
         if answer.refusal is not None:
             record.left_out.append(f"{answer.engine}: {answer.refusal}")
     return answer

@@ -13,12 +13,12 @@ from fourbar.solve import BLOCK, solve
 from validation.compare.basis import basis_of, smallest_yardstick, strictest_condition
 from validation.compare.compare import turned
 from validation.compare.error import magnitude, relative, relative_error, worst
+from validation.compare.identities import FORMULAS
 from validation.compare.law import law_row
 from validation.compare.reversals import reversing
 from validation.compare.rows import AGREES, FAILS, UNDECIDED, Row
 from validation.compare.scales import of_length, term_sizes, yardstick
 from validation.compare.tolerance import EPS, EQUIVALENCE, NOTHING_TO_TELL, Array, K, condition_of
-from validation.compare.withheld import FORMULAS
 from validation.engines.exact import BallArithmetic, unknown
 from validation.engines.witnesses import not_installed
 

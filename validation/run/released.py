@@ -23,10 +23,10 @@ from validation.compare.answer import Array, Released
 from validation.compare.basis import basis_of
 from validation.compare.compare import compare
 from validation.compare.error import in_own_unit, relative, worst
+from validation.compare.identities import FORMULAS
 from validation.compare.rows import AGREES, DEGRADED, FAILS, REFUSES, Row
 from validation.compare.tolerance import DEGRADED as TIMES_PREDICTED
 from validation.compare.tolerance import EQUIVALENCE
-from validation.compare.withheld import FORMULAS
 from validation.engines.witnesses import WITNESSES, Witness, not_installed, predicting_from
 from validation.report.record import Record, Timing
 from validation.run.breakdown import breakdown

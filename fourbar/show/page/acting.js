@@ -26,11 +26,11 @@ const ring = (at, radius, from, turn, count) => Array.from({ length: count }, (_
   return [at[0] + radius * Math.cos(angle), at[1] - radius * Math.sin(angle)];
 });
 
-function headed(points, kind) {   // a line with an arrow head at its end
-  make(parts.acting, "path", { class: `act act-${kind}`, d: pathOf(points) });
+function headed(points, kind, group = parts.acting) {   // a line with an arrow head at its end
+  make(group, "path", { class: `act act-${kind}`, d: pathOf(points) });
   const [x, y] = points[points.length - 1], [u, v] = points[points.length - 2], long = Math.hypot(x - u, y - v) || 1;
   const [a, b] = [(x - u) / long, (y - v) / long];
-  make(parts.acting, "path", { class: `act-head act-${kind}`, d: `M${x + 7 * a} ${y + 7 * b}L${x - 4 * b} ${y + 4 * a}L${x + 4 * b} ${y - 4 * a}Z` });
+  make(group, "path", { class: `act-head act-${kind}`, d: `M${x + 7 * a} ${y + 7 * b}L${x - 4 * b} ${y + 4 * a}L${x + 4 * b} ${y - 4 * a}Z` });
 }
 
 function named(text, x, y) {
@@ -74,6 +74,23 @@ function drawActing(p, i) {
       make(parts.acting, "circle", { class: `act act-${one.kind === "flywheel" ? "flywheel" : "pin"}`, cx: at[0], cy: at[1], r: RINGS[one.kind] * S });
     }
   }
+}
+
+// Velocities and accelerations of points as arrows, each kind to one scale: its longest of the sweep fits into the margin.
+parts.motion = make(picture, "g", { id: "motion" });
+let motionScales = null;   // of the sweep shown
+function drawMotion(p, i) {
+  parts.motion.replaceChildren();
+  ["v", "a"].forEach((letter, n) => {
+    if (!p || !byId(`show-${letter}`).checked) return;
+    motionScales ??= [0, 1].map(m => ceiling(POINTS.flatMap(point => grid.map((_, k) => Math.hypot(...pointMotion(k, point)[m])))).top);
+    for (const point of POINTS) {
+      const own = pointMotion(i, point)[n], size = Math.hypot(...own), long = (view.width < 480 ? 22 : 50) * Math.min(size / motionScales[n], 1);
+      if (!(long > 3)) continue;
+      const [x, y] = toScreen(framed(p, point[1], point[2]())), tip = [x + long * own[0] / size, y - long * own[1] / size];
+      headed([[x, y], tip], letter, parts.motion);
+    }
+  });
 }
 
 // The scene's own points, each with its name.

@@ -6,7 +6,7 @@ const QUANTITIES = [
   angle("theta_3", "\u03b8\u2083"), angle("theta_4", "\u03b8\u2084"),
   other("omega_3", "\u03c9\u2083", "rad/s"), other("omega_4", "\u03c9\u2084", "rad/s"),
   other("alpha_3", "\u03b1\u2083", "rad/s^2"), other("alpha_4", "\u03b1\u2084", "rad/s^2"),
-  ...["A", "B", ...[2, 3, 4].filter(k => data.centres[k]).map(k => `G${k}`), ...data.points.map(point => point.name)].flatMap(name => [other(`v_${name}`, `speed of ${typeset(name)}`, "m/s"), other(`a_${name}`, `acceleration of ${typeset(name)}`, "m/s^2")]),
+  ...POINTS.flatMap(([name]) => [other(`v_${name}`, `speed of ${typeset(name)}`, "m/s"), other(`a_${name}`, `acceleration of ${typeset(name)}`, "m/s^2")]),
   other("energy", "kinetic energy", "J"), other("torque", `torque on bar ${data.drive_bar}`, "N m"),
   ...FORCES.map(name => other(name, `|${typeset(name)}|`, "N")),
 ];
@@ -15,7 +15,9 @@ let plotted = { values: [], x: () => 0, y: () => 0 };
 
 function column(name) {
   const [, , factor] = QUANTITIES.find(q => q[0] === name);
+  const point = /^[va]_/.test(name) && POINTS.find(p => p[0] === name.slice(2));
   const values = grid.map((_, i) => {
+    if (point) return Math.hypot(...pointMotion(i, point)[name[0] === "v" ? 0 : 1]) * factor;
     const v = edited ? valuesAt(i)[name] : table()[name][i];
     if (v === null || v === undefined) return NaN;
     return Array.isArray(v) ? (v[0] === null ? NaN : Math.hypot(v[0], v[1]) * factor) : v * factor;
@@ -49,8 +51,8 @@ function chartFrame(chart, low, high) {
 }
 
 function drawChart() {
-  const kinematic = name => /^(theta|omega|alpha)_[34]$/.test(name);
-  const available = QUANTITIES.filter(([name]) => edited ? kinematic(name) && (data.omega_2 !== null || name.startsWith("theta")) : name in table());
+  const moves = edited ? data.omega_2 !== null : "omega_3" in table();
+  const available = QUANTITIES.filter(([name]) => /^[va]_/.test(name) ? moves : edited ? /^(theta|omega|alpha)_[34]$/.test(name) && (moves || name.startsWith("theta")) : name in table());
   const select = byId("quantity"), wanted = available.some(q => q[0] === select.value) ? select.value : (available.find(q => q[0] === "torque") ?? available[0])[0];
   select.replaceChildren(...available.map(([name, label]) => new Option(label, name, false, name === wanted)));
   const values = column(wanted);

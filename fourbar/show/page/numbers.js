@@ -57,6 +57,21 @@ function valuesAt(i) {
   return out;
 }
 
+// Velocity and acceleration of a point: [name, its bar, from the bar's first pin in the bar's frame].
+const POINTS = [["A", 2, () => [lengths[1], 0]], ["B", 4, () => [lengths[3], 0]],
+  ...[2, 3, 4].filter(k => data.centres[k]).map(k => [`G${k}`, k, () => data.centres[k]]),
+  ...data.points.map(point => [point.name, point.bar, () => point.at])];
+function pointMotion(i, [, bar, from]) {
+  const v = valuesAt(i), spin = (k, z) => {
+    const angle = v[`theta_${k}`] ?? NaN, w = v[`omega_${k}`] ?? NaN, e = v[`alpha_${k}`] ?? NaN, c = Math.cos(angle), s = Math.sin(angle);
+    const [x, y] = [z[0] * c - z[1] * s, z[0] * s + z[1] * c];
+    return [[-w * y, w * x], [-e * y - w * w * x, e * x - w * w * y]];
+  };
+  if (bar === 1) return [[0, 0], [0, 0]];
+  const own = spin(bar, from());
+  return bar === 3 ? spin(2, [lengths[1], 0]).map((foot, n) => [foot[0] + own[n][0], foot[1] + own[n][1]]) : own;
+}
+
 const clock = throughTime ? Math.max(2, 3 - Math.floor(Math.log10(data.time[data.time.length - 1] || 1))) : 0;   // decimals of a second
 function showNumbers(i) {
   const v = valuesAt(i);

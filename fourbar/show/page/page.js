@@ -198,7 +198,7 @@ byId("branch").addEventListener("change", event => chooseBranch(Number(event.tar
 byId("quantity").addEventListener("change", () => { drawChart(); moveCursor(row); });
 for (const k of [1, 2, 3, 4]) byId(`length-${k}`).addEventListener("input", readLengths);
 byId("arrow-scale").addEventListener("change", () => { scaleForces(); draw(playing ? phase : row); });
-for (const name of ["labels", "acting", "dimensions", "centres", "curve", "forces", "pictures"]) byId(`show-${name}`).addEventListener("change", () => { showDimensions(); scaleForces(); draw(playing ? phase : row); });
+for (const name of ["labels", "acting", "v", "a", "dimensions", "centres", "curve", "forces", "pictures"]) byId(`show-${name}`).addEventListener("change", () => { showDimensions(); scaleForces(); draw(playing ? phase : row); });
 document.addEventListener("keydown", event => {
   if (event.ctrlKey || event.metaKey || event.altKey) return;
   const own = event.target.closest("button, select, input, a");   // controls keep their own keys
@@ -220,6 +220,8 @@ for (const element of document.querySelectorAll(".unit")) element.textContent = 
 if (data.followed) byId("branch").options[branch === 1 ? 0 : 1].textContent += " (followed)";
 if (!Object.keys(data.pictures).length) byId("show-pictures").parentElement.hidden = true;
 if (!Object.values(data.centres).some(Boolean)) byId("show-centres").parentElement.hidden = true;
+for (const letter of "va") byId(`show-${letter}`).checked = data.vectors;
+for (const element of document.querySelectorAll(".moving")) element.hidden = !("omega_3" in table());
 if (!data.acting.length) byId("show-acting").parentElement.hidden = true;
 if (!dynamic()) byId("show-forces").parentElement.hidden = true;
 if (!dynamic()) byId("arrow-scale").parentElement.hidden = true;

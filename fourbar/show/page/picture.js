@@ -44,7 +44,7 @@ parts.legend = make(picture, "g", { id: "force-scale" });
 
 // A bar is named by its number, and by its length where dimensions are wanted; the ground has a name only then.
 function showDimensions() {
-  for (const k of [1, 2, 3, 4]) parts.label[k].textContent = byId("show-dimensions").checked ? `${k}: ${shown(lengths[k - 1])} ${unit.name}` : String(k);
+  for (const k of [1, 2, 3, 4]) parts.label[k].textContent = byId("show-dimensions").checked ? `${k}: ${rounded(shown(lengths[k - 1]), 5)} ${unit.name}` : String(k);
 }
 
 const toScreen = p => [view.x + view.k * p[0], view.y - view.k * p[1]];
@@ -87,6 +87,7 @@ function fit() {
   traces.forEach((d, n) => make(parts.traces, "path", { class: of[n], d, "vector-effect": "non-scaling-stroke" }));
   drawGround();
   scaleForces();
+  motionScales = null;
 }
 
 // Both components of a force as shares of the longest arrow of the sweep, and of half the longest of its position.
@@ -252,6 +253,7 @@ function drawLinkage(p, i) {
   separateLabels();
   drawActing(p, i);
   drawPoints(p);
+  drawMotion(p, i);
 }
 
 // Labels that would cover each other move aside, the less important one first; one without a free spot is left out.

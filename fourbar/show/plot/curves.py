@@ -27,7 +27,7 @@ from fourbar.show.plot.style import (
     quantity,
     unit_for,
 )
-from fourbar.show.plot.view import View
+from fourbar.show.plot.view import View, point_vectors
 from fourbar.solution import Array
 
 if TYPE_CHECKING:
@@ -174,24 +174,22 @@ def draw_accelerations(axes: "Axes", view: View) -> None:
 
 def draw_speeds(axes: "Axes", view: View) -> None:
     """Speeds of A, B, the mass centres and the scene's own points."""
-    _of_points(axes, view, "v", "m/s", view.sweep.velocity, "Speeds of points")
+    _of_points(axes, view, "v", "m/s", "Speeds of points")
 
 
 def draw_point_accelerations(axes: "Axes", view: View) -> None:
     """Sizes of the accelerations of the same points."""
-    _of_points(axes, view, "a", "m/s^2", view.sweep.acceleration, "Accelerations of points")
+    _of_points(axes, view, "a", "m/s^2", "Accelerations of points")
 
 
-def _of_points(axes: "Axes", view: View, letter: str, unit: str, own: dict[str, Array], title: str) -> None:
+def _of_points(axes: "Axes", view: View, letter: str, unit: str, title: str) -> None:
     over = bases(axes, view)
-    masses = [f"G{bar}" for bar in MOVING_BARS if view.scene.linkage.bar(bar).mass > 0.0]
-    vectors = {name: getattr(view.sweep, f"{letter}_{name}") for name in ("A", "B", *masses)} | own
-    curves = {name: np.hypot(*vector.T) for name, vector in vectors.items()}
+    curves = {name: np.hypot(*vector.T) for name, vector in point_vectors(view.scene, view.sweep, letter).items()}
     limit = limit_of(list(curves.values()))
     factor, shown_unit = unit_for(limit or largest(*curves.values()), unit, view.units)
     looks = {"A": BAR_COLOURS[2], "B": BAR_COLOURS[4], **{f"G{bar}": BAR_COLOURS[bar] for bar in MOVING_BARS}}
     for (name, values), dashes in zip(curves.items(), cycle(("-", "--", "-.", ":")), strict=False):
-        colour, width = looks.get(name, FORCE_COLOURS["F43"]), 2.0 if name in own else 1.2
+        colour, width = looks.get(name, FORCE_COLOURS["F43"]), 2.0 if name in view.sweep.points else 1.2
         axes.plot(over, factor * values, color=colour, ls=":" if name[0] == "G" else dashes, label=name, lw=width)
     axes.set_ylim(bottom=0.0)
     axes.set_ylabel(f"$|{letter}|$ ({shown_unit})")

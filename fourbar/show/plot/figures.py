@@ -2,13 +2,14 @@
 
 import math
 import textwrap
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from fourbar.errors import InputError
+from fourbar.errors import InputError, expect
+from fourbar.linkage import require
 from fourbar.scene import Scene
 from fourbar.show.plot import curves, freebody, hodograph, influence, linkage
 from fourbar.show.plot.labels import Labels
@@ -31,7 +32,6 @@ def _overview(figure: "SubFigure", shown: View, labels: Labels) -> None:
     if not shown.moves:
         panels = figure.subplot_mosaic([["linkage", "angles"], ["linkage", "mu"]], width_ratios=[1.15, 1.0])
         linkage.draw_linkage(panels["linkage"], shown, labels)
-        _path_legend(panels["linkage"])
         curves.draw_angles(panels["angles"], shown)
         draw_transmission(panels["mu"], shown)
         return
@@ -41,7 +41,6 @@ def _overview(figure: "SubFigure", shown: View, labels: Labels) -> None:
         per_subplot_kw={"polar": {"projection": "polar"}},
     )
     linkage.draw_linkage(panels["linkage"], shown, labels)
-    _path_legend(panels["linkage"])
     curves.draw_angles(panels["angles"], shown)
     curves.draw_velocities(panels["omega"], shown)
     curves.draw_accelerations(panels["alpha"], shown)
@@ -56,15 +55,8 @@ def _drive(axes: Any, shown: View) -> None:
     (curves.draw_torque if shown.scene.motion.free is None else curves.draw_energy)(axes, shown)
 
 
-def _path_legend(axes: Any) -> None:
-    legend = axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.005), ncols=3)
-    axes.set_title(axes.get_title(loc="left"), pad=6.0 + 12.0 * math.ceil(len(legend.get_texts()) / 3))
-
-
 def _linkage(figure: "SubFigure", shown: View, labels: Labels) -> None:
-    axes = figure.subplots()
-    linkage.draw_linkage(axes, shown, labels)
-    _path_legend(axes)
+    linkage.draw_linkage(figure.subplots(), shown, labels)
 
 
 def _coupler(figure: "SubFigure", shown: View, labels: Labels) -> None:
@@ -82,8 +74,7 @@ def _kinematics(figure: "SubFigure", shown: View, labels: Labels) -> None:
 def _points(figure: "SubFigure", shown: View, labels: Labels) -> None:
     """Paths, speeds and accelerations of points."""
     panels = figure.subplot_mosaic([["linkage", "speeds"], ["linkage", "accelerations"]], width_ratios=[1.15, 1.0])
-    linkage.draw_linkage(panels["linkage"], shown, labels)
-    _path_legend(panels["linkage"])
+    linkage.draw_linkage(panels["linkage"], shown, labels, moving=True)
     curves.draw_speeds(panels["speeds"], shown)
     curves.draw_point_accelerations(panels["accelerations"], shown)
 
@@ -108,7 +99,7 @@ def _free_bodies(figure: "SubFigure", shown: View, labels: Labels) -> None:
     if not np.isfinite(here.F12).all():  # type: ignore[arg-type]
         where = f"theta_2 = {math.degrees(here.theta_2[0]):.6g} deg"
         raise InputError("figure", "freebody", f"needs forces, which have no value at {where}: {here.status[0]}")
-    freebody.draw_free_bodies(list(figure.subplots(1, 3)), shown, labels)
+    freebody.draw_free_bodies(figure, shown, labels)
 
 
 FIGURES: dict[str, tuple[Painter, tuple[float, float], bool]] = {
@@ -128,46 +119,10 @@ FIGURES: dict[str, tuple[Painter, tuple[float, float], bool]] = {
 """Each figure: its painter, the size of one branch in inches, and whether it needs omega_2."""
 
 
-def draw(
-    scene: Scene,
-    path: str | Path,
-    figure: str = "overview",
-    *,
-    position: float | None = None,
-    branches: str = "one",
-    units: Conversion = SI,
-    dimensions: bool = False,
-    file_format: str | None = None,
-) -> None:
-    """Draw a figure of a scene into a file, whole or not at all; the same scene gives the same bytes.
-
-    Parameters
-    ----------
-    path : the file; its ending says which of svg, png and pdf is meant.
-    figure : one of `FIGURES`: "overview", "linkage", "coupler", "kinematics", "points", "torque",
-        "forces", "hodograph", "energy", "transmission", "freebody", "sensitivity".
-    position : theta_2 of the linkage and the free bodies, rad; left out: the scene's own.
-    branches : "one" (the scene's) or "both" (open and crossed, to the same scales).
-    units : in which numbers are drawn; left out: SI with the prefix that suits. Angles are in degrees.
-    dimensions : write the lengths of the bars at them.
-    file_format : svg, png or pdf where the path's ending does not say it.
-
-    Raises
-    ------
-    InputError : unknown figure, format or choice of branches; a figure of forces without omega_2.
-    NotAssembledError : there is no position to draw.
-    DependencyError : matplotlib is missing.
-    """
-    kind = format_of(path, file_format)
-    painter, size = _painter(scene, figure, branches)
-    with matplotlib_style():
-        save(compose(scene, painter, size, position, branches, units, dimensions), Path(path), kind)
-
-
 def _painter(scene: Scene, figure: str, branches: str) -> tuple[Painter, tuple[float, float]]:
     """The painter and the size of a figure, where the scene has what it shows."""
     for key, value, allowed in (("figure", figure, tuple(FIGURES)), ("branches", branches, BRANCHES)):
-        if value not in allowed:
+        if not isinstance(value, str) or value not in allowed:
             raise InputError(key, value, "must be one of " + ", ".join(allowed))
     painter, size, dynamic = FIGURES[figure]
     if dynamic and scene.motion.omega_2 is None and not over_time(scene):
@@ -189,10 +144,10 @@ class Drawing:
         with matplotlib_style():
             return rendered(self.figure, "svg").decode("utf-8")
 
-    def save(self, path: str | Path) -> None:
-        """Write it as SVG, PNG or PDF by the ending of the path, whole or not at all."""
+    def save(self, path: str | Path, file_format: str | None = None) -> None:
+        """Write it as SVG, PNG or PDF, by the ending of the path, whole or not at all."""
         with matplotlib_style():
-            save(self.figure, Path(path), format_of(path))
+            save(self.figure, Path(path), format_of(path, file_format))
 
 
 def drawn(
@@ -204,10 +159,43 @@ def drawn(
     units: Conversion = SI,
     dimensions: bool = False,
 ) -> Drawing:
-    """A figure of a scene for a notebook (`scene.plot()`); parameters and errors are those of `draw`."""
+    """A figure of a scene for a notebook (`scene.plot()`).
+
+    Parameters
+    ----------
+    figure : one of `FIGURES`: "overview", "linkage", "coupler", "kinematics", "points", "torque",
+        "forces", "hodograph", "energy", "transmission", "freebody", "sensitivity".
+    position : theta_2 of the linkage and the free bodies, rad; left out: the scene's own.
+    branches : "one" (the scene's) or "both" (open and crossed, to the same scales).
+    units : in which numbers are drawn; left out: SI with the prefix that suits. Angles are in degrees.
+    dimensions : write the lengths of the bars at them.
+
+    Raises
+    ------
+    InputError : unknown figure or choice of branches; a figure of forces without omega_2.
+    NotAssembledError : there is no position to draw.
+    DependencyError : matplotlib is missing.
+    """
     painter, size = _painter(scene, figure, branches)
     with matplotlib_style():
         return Drawing(compose(scene, painter, size, position, branches, units, dimensions))
+
+
+def draw(
+    scene: Scene, path: str | Path, figure: str = "overview", *, file_format: str | None = None, **options: Any
+) -> None:
+    """Draw a figure of a scene into a file, whole or not at all; the same scene gives the same bytes.
+
+    Parameters
+    ----------
+    path : the file; its ending says which of svg, png and pdf is meant.
+    file_format : svg, png or pdf where the path's ending does not say it.
+    figure, options : those of `drawn`.
+
+    Raises as `drawn` does, and InputError for another format.
+    """
+    format_of(path, file_format)
+    drawn(scene, figure, **options).save(path, file_format)
 
 
 def compose(
@@ -223,6 +211,9 @@ def compose(
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
+    expect("units", units, Mapping)
+    if position is not None:
+        position = require("position", position)
     scenes = [on_branch(scene, sign) for sign in (1, -1)] if branches == "both" else [scene]
     if position is None and len(scenes) > 1:
         position = common_position(scenes)

@@ -13,8 +13,9 @@ from fourbar.errors import DependencyError, InputError, installing
 from fourbar.scene import Scene
 from fourbar.show.acting import acting
 from fourbar.show.plot import symbols
-from fourbar.show.plot.linkage import ENDS, POINT, mass_centre, paths, pin_name, supports
+from fourbar.show.plot.linkage import ENDS, POINT, mass_centre, path_legend, paths, pin_name, supports
 from fourbar.show.plot.style import BAR_COLOURS, INK, largest, length_unit, matplotlib_style, plain
+from fourbar.show.plot.vectors import vectors
 from fourbar.show.plot.view import View, view
 from fourbar.show.progress import counted
 from fourbar.solution import SI, Conversion
@@ -54,12 +55,15 @@ def _ffmpeg() -> str:
         raise DependencyError(f"an .mp4 film needs {wanted}; .gif and .html do not") from None
 
 
-def write_film(scene: Scene, path: Path, kind: str, seconds: float | None, units: Conversion = SI) -> None:
+def write_film(
+    scene: Scene, path: Path, kind: str, seconds: float | None, units: Conversion = SI, *, moving: bool = False
+) -> None:
     """One sweep; where the input does not turn fully, there and back. A motion through time is shown as it is.
 
     Parameters
     ----------
     seconds : length of the film; None: 6 s for a sweep, of a motion through time its own duration.
+    moving : with arrows of velocity and acceleration at the points.
 
     Raises
     ------
@@ -80,7 +84,7 @@ def write_film(scene: Scene, path: Path, kind: str, seconds: float | None, units
             if shown.time is not None:
                 duration = float(shown.time[-1] - shown.time[0])
                 seconds = min(max(duration, SHORTEST), MAX_FRAMES / FRAMES_PER_SECOND)
-        figure, move = _stage(shown)
+        figure, move = _stage(shown, moving)
         order = frames(shown, max(2, round(seconds * FRAMES_PER_SECOND)))
         writer: Any = PillowWriter(fps=FRAMES_PER_SECOND)
         if kind == "mp4":
@@ -134,8 +138,10 @@ class _Acting:
         drawn = [symbols.draw(self.axes, symbol, place, self.size) for symbol in self.symbols]
         for each, symbol in zip(drawn, self.symbols, strict=True):
             self.passing += each.artists
-            if each.label is not None and symbol.kind in ("force", "moment", "drive"):
-                at = {**NAME, "xytext": (12.0 * each.away.real, 12.0 * each.away.imag)}
+            if each.label is not None:
+                away = each.away or 1.0  # of what surrounds a pin: to the right
+                side = {"ha": "left"} if each.away == 0.0 else {}
+                at = {**NAME, "xytext": (12.0 * away.real, 12.0 * away.imag), **side}
                 self.passing.append(self.axes.annotate(each.text, each.label, color=symbols.COLOURS[symbol.kind], **at))
         return drawn
 
@@ -148,7 +154,16 @@ class _Acting:
                     self.axes.update_datalim(line)
 
 
-def _stage(shown: View) -> tuple["Figure", Any]:
+def _names(axes: Any, shown: View, centres: list[int]) -> dict[str, Any]:
+    """The texts of pins, bars, mass centres and own points."""
+    texts = {pin: (pin_name(pin), INK) for pin in ("O2", "A", "B", "O4")}
+    texts |= {str(number): (str(number), BAR_COLOURS[number]) for number in ENDS}
+    texts |= {f"G{number}": (f"$G_{number}$", BAR_COLOURS[number]) for number in centres}
+    texts |= {name: (name, POINT) for name in shown.sweep.points}
+    return {key: axes.annotate(text, (0.0, 0.0), color=colour, **NAME) for key, (text, colour) in texts.items()}
+
+
+def _stage(shown: View, moving: bool) -> tuple["Figure", Any]:
     """The figure, and the function that moves it to a position of the sweep."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -165,46 +180,45 @@ def _stage(shown: View) -> tuple["Figure", Any]:
     reached = np.concatenate([sweep.A, sweep.B, sweep.G3, *sweep.points.values(), [(0.0, 0.0), O4]])
     size = 0.03 * factor * float(np.nanmax(np.nanmax(reached, 0) - np.nanmin(reached, 0)))
     supports(axes, (0.0, 0.0), (factor * O4[0], factor * O4[1]), size)
-    bars = {
-        number: axes.plot(
-            [], [], "o-", color=BAR_COLOURS[number], lw=4.5, ms=6.5, mfc="white", mec=INK, mew=1.2, zorder=4
-        )[0]
-        for number in ENDS
-    }
+    look: dict[str, Any] = {"lw": 4.5, "ms": 6.5, "mfc": "white", "mec": INK, "mew": 1.2, "zorder": 4}
+    bars = {number: axes.plot([], [], "o-", color=BAR_COLOURS[number], **look)[0] for number in ENDS}
     centres = {number: mass_centre(axes, (0.0, 0.0)) for number in ENDS if linkage.bar(number).mass > 0.0}
     own = {name: axes.plot([], [], "D", ms=4.5, mfc="white", mec=POINT, mew=1.2, zorder=8)[0] for name in sweep.points}
     arms = {number: axes.plot([], [], color=BAR_COLOURS[number], lw=0.8, ls=":", zorder=3)[0] for number in centres}
-    names = {pin: axes.annotate(pin_name(pin), (0.0, 0.0), **NAME) for pin in ("O2", "A", "B", "O4")}
+    names = _names(axes, shown, list(centres))
+    move_vectors = vectors(axes, shown, sweep, factor, size) if moving and shown.moves else None
     acts = _Acting(axes, shown, factor, size)
     acts.hold_all()
     axes.autoscale_view()
     axes.set_aspect("equal", adjustable="datalim")
     axes.set_xlabel(f"$x$ ({unit})")
     axes.set_ylabel(f"$y$ ({unit})")
-    pad = 6.0 + 12.0 * math.ceil((3 + len(sweep.points)) / 3)
-    axes.set_title("θ", pad=pad)
-    axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.005), ncols=3)
+    axes.set_title("θ")
+    pad = path_legend(axes)
     figure.draw_without_rendering()
     figure.set_layout_engine("none")  # nothing jumps from frame to frame
 
     def move(index: int) -> None:
-        pins = {"O2": (0.0, 0.0), "A": sweep.A[index], "B": sweep.B[index], "O4": O4}
+        pins = {"O2": np.zeros(2), "A": sweep.A[index], "B": sweep.B[index], "O4": np.array(O4)}
+        middle, at = np.mean(list(pins.values()), axis=0), dict(pins)
+        at |= {name: path[index] for name, path in sweep.points.items()}
         for number, (start, stop) in ENDS.items():
             bars[number].set_data(*(factor * np.array([pins[start], pins[stop]]).T))
+            at[str(number)] = 0.5 * (pins[start] + pins[stop])
         for number, marks in centres.items():
-            point = factor * getattr(sweep, f"G{number}")[index]
+            at[f"G{number}"] = point = getattr(sweep, f"G{number}")[index]
             for mark in marks:
-                mark.set_data([point[0]], [point[1]])
-            foot = factor * np.array(pins[ENDS[number][0]])
-            arms[number].set_data([foot[0], point[0]], [foot[1], point[1]])
-        middle = np.mean([pins[pin] for pin in names], axis=0)
-        for pin, text in names.items():
-            away = np.array(pins[pin]) - middle
-            text.xy = tuple(factor * np.array(pins[pin]))
-            text.set_position(tuple(13.0 * away / max(float(np.hypot(*away)), 1e-300)))
+                mark.set_data(*(factor * point[:, None]))
+            arms[number].set_data(*(factor * np.array([pins[ENDS[number][0]], point]).T))
         for name, mark in own.items():
-            mark.set_data(*(factor * sweep.points[name][index][:, None]))
+            mark.set_data(*(factor * at[name][:, None]))
+        for key, text in names.items():
+            away = at[key] - middle if key[0] != "G" else middle - at[key]  # across the bar from its number
+            text.xy = tuple(factor * at[key])
+            text.set_position(tuple(13.0 * away / max(float(np.hypot(*away)), 1e-300)))
         acts.draw(index)
+        if move_vectors is not None:
+            move_vectors(index)
         theta = f"{math.degrees(sweep.theta_2[index]):.1f}".replace("-", "−")
         when = "" if shown.time is None else f"$t$ = {shown.time[index]:.2f} s, "
         axes.set_title(rf"{when}$\theta_2$ = {theta}°, {shown.branch_name} branch", pad=pad)

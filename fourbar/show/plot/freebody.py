@@ -1,9 +1,10 @@
 """Free-body diagrams of the three moving bars, all forces to one scale."""
 
 import math
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,12 +14,13 @@ from fourbar.linkage import BAR_NAMES, FIRST_PIN, MOVING_BARS, PIN_FORCE
 from fourbar.show.plot.curves import note
 from fourbar.show.plot.labels import Label, Labels
 from fourbar.show.plot.linkage import ENDS, components, mass_centre, pins
-from fourbar.show.plot.style import BAR_COLOURS, FORCE_COLOURS, INK, MUTED, force_name, quantity, unit_for
+from fourbar.show.plot.style import BAR_COLOURS, FORCE_COLOURS, HEADED, INK, MUTED, force_name, quantity, unit_for
 from fourbar.show.plot.view import Recorder, View
 from fourbar.solution import Conversion
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import SubFigure
 
 PIN_FORCES = {
     2: (("O2", "F12", 1.0), ("A", "F32", 1.0)),
@@ -26,6 +28,8 @@ PIN_FORCES = {
     4: (("B", "F43", -1.0), ("O4", "F14", 1.0)),
 }
 """The pins of a bar, the force there among the independent ones, and its sign on this bar."""
+PANEL, LINE = 3.4, 0.16
+"""Heights of a bar's panel and of a line of its couples, inches."""
 WINDOW = 1.3
 """The window is this much wider than what it shows: space for the labels."""
 Points = NDArray[np.float64]
@@ -91,13 +95,15 @@ def _actions(view: View) -> Iterator[tuple[str, Recorder]]:
         recorder = Recorder(view.scene, state)
         effect.act(recorder, state)
         effect.act_known(recorder, {name: getattr(view.here, name) for name in PIN_FORCE.values()})
-        name = r"$m_#\,g$" if effect.key == "gravity" else effect.key
+        name = r"$m_#\,g$" if effect.key == "gravity" else effect.key.replace("_", " ")
         yield name, recorder
 
 
-def draw_free_bodies(panels: "list[Axes]", view: View, labels: Labels) -> None:
-    """The three bars, each freed from its pins, with arrows to one scale."""
+def draw_free_bodies(figure: "SubFigure", view: View, labels: Labels) -> None:
+    """The three bars, each freed from its pins, with arrows to one scale, over the couples."""
     freed = {bar: free_body(view, bar) for bar in MOVING_BARS}
+    lines = max(len(couples) for v in view.alike for bar in MOVING_BARS for couples in free_body(v, bar)[1:])
+    panels, below = figure.subplots(2, 3, height_ratios=[PANEL, LINE * lines])
     drawn = [(v, free_body(v, bar)[0], bar) for v in view.alike for bar in MOVING_BARS]
     biggest = max((math.hypot(*arrow.force) for *_, arrows, _ in drawn for arrow in arrows), default=0.0)
     longest = max(view.scene.linkage.bar(bar).length for bar in MOVING_BARS)
@@ -105,8 +111,9 @@ def draw_free_bodies(panels: "list[Axes]", view: View, labels: Labels) -> None:
     reach = {bar: _reach(view, bar, freed[bar][0], scale) for bar in MOVING_BARS}
     # one window size: the bars, too, are to one scale
     span = WINDOW * max(float(np.ptp(_reach(v, bar, arrows, scale), axis=0).max()) for v, arrows, bar in drawn)
-    for axes, bar in zip(panels, MOVING_BARS, strict=True):
-        _draw_one(axes, view, bar, freed[bar], scale, biggest, labels, reach[bar], span)
+    for axes, text, bar in zip(panels, below, MOVING_BARS, strict=True):
+        _draw_one(axes, view, bar, freed[bar][0], scale, biggest, labels, reach[bar], span)
+        _write_couples(text, view, freed[bar][1])
     _scale_bar(panels[0], scale, biggest, view.units)
     note(
         view,
@@ -129,7 +136,7 @@ def _draw_one(
     axes: "Axes",
     view: View,
     bar: int,
-    body: tuple[list[Arrow], list[Couple]],
+    arrows: list[Arrow],
     scale: float,
     biggest: float,
     labels: Labels,
@@ -150,7 +157,6 @@ def _draw_one(
         labels.add(
             Label(axes, f"${name[0]}_{name[1]}$" if len(name) == 2 else f"${name}$", (x, y), middle, MUTED, 8.0, 2.5)
         )
-    arrows, couples = body
     short: list[str] = []
     for arrow in arrows:
         size = math.hypot(*arrow.force)
@@ -158,22 +164,8 @@ def _draw_one(
             short.append(f"{_words(arrow.text)} = {quantity(size, 'N', view.units)}")
             continue
         tip = (arrow.at[0] + scale * arrow.force[0], arrow.at[1] + scale * arrow.force[1])
-        axes.annotate(
-            "",
-            xy=tip,
-            xytext=arrow.at,
-            arrowprops={
-                "arrowstyle": "-|>",
-                "color": arrow.colour,
-                "lw": 1.5,
-                "shrinkA": 0,
-                "shrinkB": 0,
-                "mutation_scale": 9,
-                "ls": "--" if arrow.dashed else "-",
-            },
-            zorder=5,
-            annotation_clip=False,
-        )
+        look = {**HEADED, "color": arrow.colour, "mutation_scale": 9, "ls": "--" if arrow.dashed else "-"}
+        axes.annotate("", xy=tip, xytext=arrow.at, arrowprops=look, zorder=5, annotation_clip=False)
         labels.keep_off(axes, arrow.at, tip)
         labels.add(Label(axes, f"{arrow.text} = {quantity(size, 'N', view.units)}", tip, arrow.at, arrow.colour, 7.5))
     if short:
@@ -191,20 +183,17 @@ def _draw_one(
     axes.set_aspect("equal", adjustable="box")
     axes.set_axis_off()
     axes.set_title(f"Bar {bar} ({BAR_NAMES[bar]})")
-    lines = []
-    for couple in couples:
-        turn = "↺" if couple.moment > 0.0 else "↻"
-        lines.append(f"{turn} {couple.text} = {quantity(couple.moment, 'N m', view.units)}")
-    axes.text(
-        0.0,
-        -0.02,
-        "\n".join(lines) if lines else "no couples",
-        transform=axes.transAxes,
-        va="top",
-        size=7.5,
-        color=INK if lines else MUTED,
-        linespacing=1.45,
-    )
+
+
+def _write_couples(axes: "Axes", view: View, couples: list[Couple]) -> None:
+    """One line each."""
+    lines = [
+        f"{'↺' if each.moment > 0.0 else '↻'} {each.text} = {quantity(each.moment, 'N m', view.units)}"
+        for each in couples
+    ]
+    axes.set_axis_off()
+    look: dict[str, Any] = {"va": "top", "size": 7.5, "linespacing": 1.45, "color": INK if lines else MUTED}
+    axes.text(0.0, 1.0, "\n".join(lines) or "no couples", transform=axes.transAxes, **look)
 
 
 def _second_pin(bar: int) -> str:
@@ -214,15 +203,7 @@ def _second_pin(bar: int) -> str:
 
 def _words(text: str) -> str:
     """A typeset name in plain letters, for the caption."""
-    return (
-        text.replace("$", "")
-        .replace("\\,", " ")
-        .replace("_{", "")
-        .replace("_", "")
-        .replace("{", "")
-        .replace("}", "")
-        .replace("-", "−")
-    )
+    return re.sub(r"[$_{}]", "", text.replace("\\,", " ")).replace("-", "−")
 
 
 def _scale_bar(axes: "Axes", scale: float, biggest: float, units: Conversion) -> None:

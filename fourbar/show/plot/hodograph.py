@@ -18,6 +18,9 @@ EVERY = 60.0
 MOST_DOTS = 12
 """... or, over time, a round number of seconds that gives no more than these."""
 
+LONG_NUMBERS = 2000.0
+"""From here on the numbers along a radius are too wide for four of them."""
+
 
 def draw_hodograph(axes: "PolarAxes", view: View, names: tuple[str, ...] = tuple(FORCE_COLOURS)) -> None:
     """The tips of the force vectors drawn from one origin; open dot: start of the sweep, dots every 60 deg."""
@@ -57,8 +60,9 @@ def draw_hodograph(axes: "PolarAxes", view: View, names: tuple[str, ...] = tuple
     axes.set_rlim(0.0, factor * top)
     axes.set_thetagrids(range(0, 360, 45))
     axes.tick_params(pad=0.5)
+    many = 4 if factor * top < LONG_NUMBERS else 2
     axes.set_rticks(
-        [tick for tick in MaxNLocator(4).tick_values(0.0, factor * top) if 0.0 < tick < 0.97 * factor * top]
+        [tick for tick in MaxNLocator(many).tick_values(0.0, factor * top) if 0.0 < tick < 0.97 * factor * top]
     )
     axes.set_rlabel_position(_free_direction([np.column_stack([forces[n], sizes[n]]) for n in names]))
     axes.tick_params(axis="y", labelsize=6.5, labelcolor=MUTED)

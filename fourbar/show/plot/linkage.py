@@ -1,5 +1,6 @@
 """The linkage drawn to scale: bars, pins, ground, mass centres and coupler curves."""
 
+import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,6 +11,7 @@ from fourbar.show.plot import symbols
 from fourbar.show.plot.labels import Label, Labels
 from fourbar.show.plot.style import BAR_COLOURS, INK, MUTED, largest, length_unit, quantity
 from fourbar.show.plot.symbols import place_of
+from fourbar.show.plot.vectors import vectors
 from fourbar.show.plot.view import View
 from fourbar.solution import Array
 
@@ -42,8 +44,8 @@ def centres(view: View) -> dict[int, Point]:
     return {number: components(state.point(number, bar.to_centre)) for number, bar in bars if bar.mass > 0.0}
 
 
-def draw_linkage(axes: "Axes", view: View, labels: Labels) -> None:
-    """The linkage at the position drawn, over the paths of A, B and the coupler's centre."""
+def draw_linkage(axes: "Axes", view: View, labels: Labels, *, moving: bool = False) -> None:
+    """The linkage at the position drawn, over the paths of its points; with their velocities where it is `moving`."""
     sweep = view.sweep
     where, masses = pins(view), centres(view)
     reached = np.concatenate([sweep.A, sweep.B, sweep.G3, *sweep.points.values(), list(where.values())])
@@ -60,12 +62,7 @@ def draw_linkage(axes: "Axes", view: View, labels: Labels) -> None:
         (x, y), colour = zip(where[start], where[stop], strict=True), BAR_COLOURS[number]
         axes.plot(x, y, color=colour, lw=4.5, solid_capstyle="round", zorder=4)
         labels.keep_off(axes, where[start], where[stop])
-        name = (
-            f"{number}: {quantity(view.scene.linkage.lengths[number - 1], 'm', view.units)}"
-            if view.dimensions
-            else str(number)
-        )
-        labels.add(Label(axes, name, (0.5 * sum(x), 0.5 * sum(y)), middle, colour, 9.0, 2.0))
+        labels.add(Label(axes, _bar_name(view, number), (0.5 * sum(x), 0.5 * sum(y)), middle, colour, 9.0, 2.0))
     for name, point in where.items():
         axes.plot(*[[v] for v in point], "o", ms=6.0, mfc="white", mec=INK, mew=1.2, zorder=6)
         labels.add(Label(axes, pin_name(name), point, middle, INK, 9.0, 2.5))
@@ -84,6 +81,8 @@ def draw_linkage(axes: "Axes", view: View, labels: Labels) -> None:
         mass_centre(axes, here)
         labels.keep_off(axes, here, here)
         labels.add(Label(axes, f"$G_{number}$", here, middle, colour, 8.0, 3.0))
+    if moving:
+        vectors(axes, view, view.here, factor, size)
     place = place_of(view.scene.linkage, view.here, 0, factor)
     for symbol in acting(view.scene):
         drawn = symbols.draw(axes, symbol, place, size)
@@ -96,6 +95,15 @@ def draw_linkage(axes: "Axes", view: View, labels: Labels) -> None:
     axes.set_xlabel(f"$x$ ({unit})")
     axes.set_ylabel(f"$y$ ({unit})")
     axes.set_title(f"Linkage at {view.at}, {view.branch_name} branch")
+    path_legend(axes)
+
+
+def path_legend(axes: "Axes") -> float:
+    """The legend of the paths above the drawing; the distance of the title over it, typographic points."""
+    legend = axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.005), ncols=3)
+    pad = 6.0 + 12.0 * math.ceil(len(legend.get_texts()) / 3)
+    axes.set_title(axes.get_title(loc="left"), pad=pad)
+    return pad
 
 
 def _bar_name(view: View, number: int) -> str:

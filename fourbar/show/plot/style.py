@@ -42,6 +42,8 @@ def force_name(name: str) -> str:
     return f"$F_{{{name[1:]}}}$"
 
 
+HEADED: dict[str, Any] = {"arrowstyle": "-|>", "lw": 1.5, "shrinkA": 0.0, "shrinkB": 0.0}
+"""An arrow from end to end."""
 SETTINGS: dict[Any, Any] = {
     "font.family": "DejaVu Sans",  # ships with matplotlib: the same picture on every machine
     "font.size": 8.0,
@@ -109,12 +111,12 @@ def format_of(path: str | Path, file_format: str | None = None) -> str:
 
 
 def save(figure: "Figure", path: Path, file_format: str) -> None:
-    """Write a figure whole or not at all, without a date in it."""
+    """Write a figure whole or not at all."""
     write_bytes(path, rendered(figure, file_format))
 
 
 def rendered(figure: "Figure", file_format: str) -> bytes:
-    """A figure as SVG, PNG or PDF."""
+    """A figure as SVG, PNG or PDF, without a date in it."""
     metadata: dict[str, dict[str, Any]] = {
         "svg": {"Date": None, "Creator": "fourbar"},
         "pdf": {"CreationDate": None, "Producer": None, "Creator": "fourbar"},

@@ -9,7 +9,7 @@ import numpy as np
 
 from fourbar.linkage import FourBar
 from fourbar.show.acting import Symbol
-from fourbar.show.plot.style import INK, MUTED
+from fourbar.show.plot.style import HEADED, INK, MUTED
 from fourbar.solution import Solution
 
 if TYPE_CHECKING:
@@ -120,15 +120,7 @@ def _line(axes: "Axes", drawn: Drawn, points: Any, colour: str, width: float) ->
 def _arrow(axes: "Axes", tail: complex, tip: complex, colour: str, drawn: Drawn) -> None:
     from matplotlib.patches import FancyArrowPatch
 
-    style: dict[str, Any] = {
-        "arrowstyle": "-|>",
-        "color": colour,
-        "lw": 1.5,
-        "shrinkA": 0.0,
-        "shrinkB": 0.0,
-        "mutation_scale": 10.0,
-    }
-    arrow = FancyArrowPatch(_point(tail), _point(tip), zorder=8, **style)
+    arrow = FancyArrowPatch(_point(tail), _point(tip), zorder=8, color=colour, mutation_scale=10.0, **HEADED)
     drawn.artists.append(axes.add_patch(arrow))
     axes.update_datalim([_point(tail), _point(tip)])
     drawn.lines.append([_point(tail), _point(tip)])
@@ -171,7 +163,7 @@ def _gravity(axes: "Axes", symbol: Symbol, drawn: Drawn) -> None:
     if size == 0.0:
         return
     x, y = (24.0 * part / size for part in (symbol.vector.real, symbol.vector.imag))
-    style = {"arrowstyle": "-|>", "color": COLOURS["gravity"], "lw": 1.3, "shrinkA": 0.0, "shrinkB": 0.0}
+    style = {**HEADED, "color": COLOURS["gravity"], "lw": 1.3}
     corner: dict[str, Any] = {"xycoords": "axes fraction", "textcoords": "offset points", "annotation_clip": False}
     middle = (0.95, 0.9)
     drawn.artists += [

@@ -9,7 +9,7 @@ from fourbar.effects.actions import Actions, bodies
 from fourbar.errors import NotAssembledError
 from fourbar.formulas.arithmetic import Number
 from fourbar.formulas.motion import State
-from fourbar.linkage import PINS
+from fourbar.linkage import MOVING_BARS, PINS
 from fourbar.scene import Command, Scene, command
 from fourbar.scene.motion import FromLimit
 from fourbar.scene.start import state_at
@@ -79,6 +79,14 @@ class View:
         here = self.here
         alpha_2 = 0.0 if here.alpha_2 is None else here.alpha_2
         return state_at(self.scene, Command(here.theta_2, here.branch, here.omega_2, alpha_2))
+
+
+def point_vectors(scene: Scene, solution: Solution, letter: str) -> dict[str, Array]:
+    """Velocities ("v") or accelerations ("a") of A, B, the mass centres of bars that have mass, and own points."""
+    drawn = ("A", "B", *(f"G{bar}" for bar in MOVING_BARS if scene.linkage.bar(bar).mass > 0.0))
+    found = {name: getattr(solution, f"{letter}_{name}") for name in drawn}
+    found |= solution.velocity if letter == "v" else solution.acceleration
+    return {name: values for name, values in found.items() if values is not None}
 
 
 def branch_name(branch: np.ndarray) -> str:
@@ -199,11 +207,8 @@ def _through_time(scene: Scene, position: float | None) -> View:
     here = solve(scene, at=Command(sweep.theta_2[one], sweep.branch[one], sweep.omega_2[one], sweep.alpha_2[one]))
     here.time = sweep.time[one]
     shown = View(scene, sweep, here)
-    free = scene.motion.free
-    if free is not None and len(sweep) <= free.steps:
-        shown.notes.append(
-            f"The motion ends at t = {sweep.time[-1]:.4g} s, where the linkage stops at a limit position."
-        )
+    if sweep.stopped_at is not None:
+        shown.notes.append(f"The linkage stops at a limit position at t = {sweep.stopped_at:.4g} s.")
     return shown
 
 

@@ -71,10 +71,10 @@ def _over(scene: Scene, answer: Answer, stated: Stated, predicted: Predicted | N
     ):
         beyond = counts & ~(error <= bound)
         if predicted is not None and beyond.any():
-            expected = predicted(beyond)
-            lost = expected["theta_3"] + expected["theta_4"]
             if what == "mechanical advantage":
-                lost = expected["omega_4"] / np.abs(answer.quantities["omega_4"])
+                lost = predicted("omega_4", beyond) / np.abs(answer.quantities["omega_4"])
+            else:
+                lost = predicted("theta_3", beyond) + predicted("theta_4", beyond)
             bound = np.where(beyond, np.fmax(bound, DEGRADED * lost), bound)  # noqa: PLW2901
             counts = counts & ~(bound >= NOTHING_TO_TELL)  # noqa: PLW2901
         if counts.any():

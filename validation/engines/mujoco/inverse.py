@@ -2,7 +2,6 @@
 
 import warnings
 from collections.abc import Sequence
-from functools import partial
 from typing import Any
 
 import mujoco
@@ -36,7 +35,7 @@ def refusal(scene: Scene) -> str:
 class MujocoTree(Tree):
     """The open tree, built from the description with MjSpec."""
 
-    def __init__(self, scene: Scene) -> None:
+    def __init__(self, scene: Scene, data: mujoco.MjData | None = None) -> None:
         spec = mujoco.MjSpec()
         spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT | mujoco.mjtDisableBit.mjDSBL_CONTACT
         bodies: dict[int, Any] = {1: spec.worldbody}
@@ -55,10 +54,14 @@ class MujocoTree(Tree):
         model.body_sameframe[:] = mujoco.mjtSameFrame.mjSAMEFRAME_NONE
         model.site_sameframe[:] = mujoco.mjtSameFrame.mjSAMEFRAME_NONE
         model.body_simple[:] = model.dof_simplenum[:] = 0
-        self.data = mujoco.MjData(model)
+        self.data = mujoco.MjData(model) if data is None else data
+        mujoco.mj_resetData(model, self.data)
         self.body = {bar: model.body(f"bar{bar}").id for bar in FIRST_PIN}
         self.site = {model.site(number).name: number for number in range(model.nsite)}
         assert [int(model.joint(pin).dofadr[0]) for pin in FIRST_PIN.values()] == [0, 1, 2]  # depth first
+        # the engine's own memory, read in place
+        self.at = {name: self.data.site_xpos[site, :2] for name, site in self.site.items()}
+        self.turned_to = {bar: self.data.xmat[body].reshape(3, 3)[:2, :2] for bar, body in self.body.items()}
         self._jac = np.zeros((3, 3))
         self.ready(scene, acting(scene, self))
 
@@ -70,11 +73,11 @@ class MujocoTree(Tree):
 
     def point(self, name: str) -> Array:
         """Place of a site."""
-        return np.array(self.data.site_xpos[self.site[name], :2])
+        return np.asarray(self.at[name])
 
     def rotation(self, bar: int) -> Array:
         """That of the body."""
-        return np.asarray(self.data.xmat[self.body[bar]].reshape(3, 3)[:2, :2])
+        return np.asarray(self.turned_to[bar])
 
     def point_jacobian(self, name: str) -> Array:
         """Of a site."""
@@ -98,13 +101,13 @@ class MujocoTree(Tree):
         mujoco.mj_jacDot(self.model, self.data, self._jac, None, at, body)
         return np.asarray(of_a + self._jac[:2] @ self.v)
 
-    def needed(self, field: tuple[float, float], wrenches: dict[int, Array]) -> Array:
+    def needed(self, field: tuple[float, float], wrenches: dict[int, list[float]]) -> Array:
         """mj_inverse, less what loads and effects do on the coordinates."""
         self.model.opt.gravity[:] = (*field, 0.0)
         self.data.xfrc_applied[:] = 0.0
         mujoco.mj_inverse(self.model, self.data)
         applied = np.zeros(3)
-        for bar, (x, y, moment) in wrenches.items():
+        for bar, (x, y, moment) in ((bar, wrench) for bar, wrench in wrenches.items() if any(wrench)):
             force, couple, body = np.array([x, y, 0.0]), np.array([0.0, 0.0, moment]), self.body[bar]
             mujoco.mj_applyFT(self.model, self.data, force, couple, self.data.xpos[body], body, applied)
         return np.asarray(self.data.qfrc_inverse - applied)
@@ -119,10 +122,16 @@ class MujocoTree(Tree):
         return {bar: np.array(self.data.cfrc_int[body, 3:5]) for bar, body in self.body.items()}
 
 
-def _built(scene: Scene) -> MujocoTree:
-    if reason := refusal(scene):
-        raise LimitError(reason)
-    return MujocoTree(scene)
+class MujocoInverse(Exact):
+    """Trees in the memory of the one before: allocating it takes MuJoCo longer than all its work."""
 
+    def __init__(self) -> None:
+        super().__init__("mujoco-inverse", self._tree)
+        self.data: mujoco.MjData | None = None
 
-MujocoInverse = partial(Exact, "mujoco-inverse", _built)
+    def _tree(self, scene: Scene) -> MujocoTree:
+        if reason := refusal(scene):
+            raise LimitError(reason)
+        tree = MujocoTree(scene, self.data)
+        self.data = tree.data
+        return tree
