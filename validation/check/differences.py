@@ -122,7 +122,7 @@ def differences(generated: Described, theirs: Described, called: Mapping[str, st
     found = []
     for key in [*theirs, *(key for key in generated if key not in theirs)]:
         ours, other = (file.get(key, _without(key)) for file in (generated, theirs))
-        if ours is not None and other is not None and _acts(key, theirs) and not _same(key, ours, other, scale):
+        if ours is not None and other is not None and not _same(key, ours, other, scale) and _acts(key, theirs):
             name = _named(key, theirs if key in theirs else generated)
             found.append(Difference(name, ours, other, _remark(key, ours, other), _written(key, theirs, called or {})))
     return found
@@ -191,7 +191,7 @@ def _is_length(key: str) -> bool:
 
 
 def _same(key: str, ours: Value, theirs: Value, length: float) -> bool:
-    if isinstance(ours, str) or isinstance(theirs, str):
+    if isinstance(ours, str) or isinstance(theirs, str) or ours == theirs:
         return ours == theirs
     one, other = np.atleast_1d(ours), np.atleast_1d(theirs)
     if one.shape != other.shape:

@@ -5,6 +5,7 @@ another MuJoCo that no list knows is compared as it stands.
 """
 
 from fnmatch import fnmatchcase
+from functools import cache
 from typing import Any
 
 PIN = {
@@ -174,6 +175,7 @@ def members(thing: Any) -> list[str]:
     return [name for name in dir(thing) if not name.startswith("_") and not callable(getattr(thing, name))]
 
 
+@cache
 def list_of(field: str) -> str | None:
     """The list that knows a field, the first that fits; None: no list does."""
     if field in COMPARED:
