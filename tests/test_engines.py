@@ -11,7 +11,7 @@ from typing import Any, ClassVar
 import numpy as np
 import pytest
 
-from fourbar.effects import Friction, Gravity, Load, Viscous
+from fourbar.effects import Effect, Friction, Gravity, Load, Viscous
 from fourbar.errors import InputError
 from fourbar.linkage import Bar, FourBar
 from fourbar.scene import Command, Scene, command
@@ -269,7 +269,7 @@ def test_simbody_loses_a_constraint_where_the_limit_says(name: str, monkeypatch:
 
 
 @dataclass(frozen=True)
-class Wind:
+class Wind(Effect):
     """An effect that no engine knows."""
 
     key: ClassVar[str] = "wind"
