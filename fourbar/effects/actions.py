@@ -76,12 +76,10 @@ class Actions:
         """Generalised force Q (power over the speed of the independent angle) of everything, and of what acts on
         bars 3 and 4 alone, N m."""
         k = self.state.k
-        others: Any = 0.0
-        for bar, h in ((3, k.h3), (4, k.h4)):
-            if bar in self.moments:
-                others = others + self.moments[bar] * h
+        parts = [self.moments[bar] * h for bar, h in ((3, k.h3), (4, k.h4)) if bar in self.moments]
         if 3 in self.forces:
-            others = others + k.h2 * cross(self.state.foot(3), self.forces[3])
+            parts.append(self.state.lengths.a * k.h2 * cross(self.state.at.u2, self.forces[3]))
+        others = sum(parts[1:], parts[0]) if parts else 0.0
         total = others + self.moments[2] * k.h2 if 2 in self.moments else others
         for pin, couple in self.couples.items():
             total = total + couple * self.state.slip(pin)[0]

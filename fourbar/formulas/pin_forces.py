@@ -149,9 +149,9 @@ def pin_forces(
         F32 = (dot(at.u2, F32) + along - 1j * (M2 / a)) * at.u2  # across bar 2 its own moment knows it best
     else:
         k = 1.0 / (c * sine)
-        F43 = (of_3 * k / b) * at.diagonal - ((M3 + M4) * k) * at.u3
+        F43 = (of_3 * k * (1.0 / b)) * at.diagonal - ((M3 + M4) * k) * at.u3
         F32 = R3 + F43 + mass_at_A * at.u2
         short = d < a
         if anywhere(short):  # all bars turn as one, and the sum loses the small component across bar 2
             F32 = F32 + short * (moment_of_F32 / a - cross(at.u2, F32)) * 1j * at.u2
-    return PinForces(-(R2 + F32), F32, F43, F43 - R4)
+    return PinForces(-1.0 * (R2 + F32), F32, F43, F43 - R4)  # NumPy negates complex numbers slowly

@@ -10,7 +10,7 @@ h3 = 0, T4 where h4 = 0.
 Source: R. L. Norton, Design of Machinery, ch. 11 (virtual work); M. Eksergian, Dynamical analysis of machines (1930).
 """
 
-from fourbar.formulas.arithmetic import Number, dot
+from fourbar.formulas.arithmetic import Number, anywhere, dot
 from fourbar.formulas.motion import Coefficients
 from fourbar.formulas.pin_forces import Bodies, about_first_pin
 from fourbar.formulas.position import Position
@@ -39,8 +39,10 @@ def half_slope(a: Number, bodies: Bodies, at: Position, k: Coefficients) -> Numb
     two, three, four = bodies
     AR = ((a * three.m * three.z) * at.u3) * at.u2.conjugate()
     half = about_first_pin(three) * (k.h3 * k.dh3) + about_first_pin(four) * (k.h4 * k.dh4)
-    half = half + (k.h2 * k.dh3 + k.h3 * k.dh2) * AR.real + (k.h2 * k.h3 * k.h23) * AR.imag
-    return half + (about_first_pin(two) + three.m * a * a) * (k.h2 * k.dh2)
+    half = half + (k.h2 * k.dh3) * AR.real + (k.h2 * k.h3 * k.h23) * AR.imag
+    if anywhere(k.dh2 != 0.0):  # q is not theta_2
+        half = half + (k.h3 * k.dh2) * AR.real + (about_first_pin(two) + three.m * a * a) * (k.h2 * k.dh2)
+    return half
 
 
 def driving_torque(k: Coefficients, drive_bar: int, inertial: Number, Q: Number) -> Number:
