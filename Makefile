@@ -21,7 +21,7 @@ long-test: setup
 	PACKAGE=all $(BIN)/python -m pytest tests/test_package.py
 	MACHINES=all $(BIN)/python -m pytest tests/test_machines.py
 	INSTRUCTIONS=all $(BIN)/python -m pytest tests/test_effects_cost.py
-	$(BIN)/python -m pytest tests/test_further_engines.py
+	$(BIN)/python -m pytest tests/test_engines.py
 	$(BIN)/python -m pytest tests/test_model_files.py tests/test_subjects.py
 	PROBLEMS=all $(BIN)/python -m pytest tests/test_problems.py
 	RELEASES=pip $(BIN)/python -m pytest tests/test_versions.py

@@ -149,15 +149,6 @@ def test_a_slower_tree_is_found_by_every_timing(repository: Path) -> None:
     assert sorted(path for path in repository.iterdir()) == before
 
 
-def test_the_quicker_of_two_is_the_one_without_the_delay(repository: Path) -> None:
-    module = repository / "fourbar" / "__init__.py"
-    quick = module.read_text()
-    module.write_text(quick + SLOWER)
-    git(repository, "commit", "-q", "-a", "-m", "slower")
-    module.write_text(quick)
-    assert all(row.most < 0.7 for row in against.against("HEAD", 1000, 1, repository).values())
-
-
 def reported(capsys: pytest.CaptureFixture[str], revision: str) -> tuple[int, str]:
     status = ended(["bench", "--against", revision, "--positions", "1000", "--rounds", "1"])
     return status, capsys.readouterr().err

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import fourbar
-from fourbar.effects import Effect, Flywheel, Friction, Gravity, Load, PinFriction, Point, Spring, Springs, Viscous
+from fourbar.effects import Flywheel, Friction, Gravity, Load, PinFriction, Point, Spring, Springs, Viscous
 from fourbar.linkage import PINS
 from fourbar.quantities import STAGE_OF
 from fourbar.scene import Scene, command
@@ -205,14 +205,6 @@ def test_friction_of_several_pins_fulfils_its_equations() -> None:
     load = np.abs(F + (C * x[:, None, :]).sum(axis=-1))
     assert (x > 0.0).all()
     assert np.abs(x - k * load).max() <= DIGITS * np.abs(x).max()
-
-
-def test_what_it_does_not_know_it_refuses() -> None:
-    class Wind(Effect):
-        key = "wind"
-
-    scene = crank_rocker(effects=(Wind(),))
-    assert "'wind'" in (FreeBody().answer(scene, command(scene)).refusal or "")
 
 
 def test_a_singular_position_costs_no_other() -> None:

@@ -131,7 +131,7 @@ def test_predictions_know_what_no_law_in_sines_knows() -> None:
             assert known.any() and (error[known] <= in_world_axes(scene, at_, quantity)[known]).all(), name
 
 
-@pytest.mark.parametrize("limit", LIMITS, ids=lambda limit: limit.what)
+@pytest.mark.parametrize("limit", LIMITS, ids=lambda limit: limit.of.name)
 def test_a_limit_is_where_it_was(limit: Limit, tmp_path: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     """Should this fail after an engine upgrade, the engine has lifted or worsened the limit: measure it again."""
     monkeypatch.chdir(tmp_path)  # MuJoCo writes its warnings into the working folder

@@ -13,7 +13,7 @@ import pytest
 from tests.another_machine import BEFORE, CORES, ROOT, environment, machine, why_not
 
 ALL = os.environ.get("MACHINES") == "all"
-NUMERICAL = ("test_kinetostatics.py", "test_accepted.py", *(["test_published.py", "test_engines_inverse.py"] * ALL))
+NUMERICAL = ("test_kinetostatics.py", "test_accepted.py", *(["test_published.py", "test_engines.py"] * ALL))
 """Identities, the accepted state of the exact engines; with all kernels printed figures and each engine by itself."""
 
 

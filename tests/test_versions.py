@@ -10,7 +10,6 @@ import zipfile
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from subprocess import CompletedProcess
 
 import pytest
 
@@ -18,7 +17,7 @@ from validation.cli import status
 from validation.compare.rows import AGREES, FAILS, Row, to_csv
 from validation.regression.history import Run
 from validation.regression.record import About, write_about
-from validation.run.elsewhere import ElsewhereError
+from validation.run.elsewhere import ElsewhereError, Ended
 from validation.subjects import releases, versions, versions_page
 from validation.subjects.releases import Release
 
@@ -39,19 +38,19 @@ def wheel(folder: Path, version: str, code: str) -> None:
             archive.writestr(name, text)
 
 
-def unpacking(folder: Path) -> Callable[..., CompletedProcess[str]]:
+def unpacking(folder: Path) -> Callable[..., Ended]:
     """What pip does with wheels that require nothing."""
 
-    def pip(python: Path, *arguments: str) -> CompletedProcess[str]:
+    def pip(python: Path, *arguments: str) -> Ended:
         if arguments[0] == "index":
-            return CompletedProcess([], 0, "toy (1.1)\nAvailable versions: 1.1, 1.0\n", "")
+            return Ended("toy (1.1)\nAvailable versions: 1.1, 1.0\n", "", False, "")
         file = folder / f"{arguments[3].replace('==', '-')}-py3-none-any.whl"
         if len(arguments) > 4 or not file.is_file():
             missing = f"Could not find a version that satisfies the requirement {arguments[-1]}"
-            return CompletedProcess([], 1, "", f"ERROR: {missing} (from versions: none)\nERROR: No match\n")
+            return Ended("", f"ERROR: {missing} (from versions: none)\nERROR: No match\n", True, "ERROR: No match")
         with zipfile.ZipFile(file) as archive:
             archive.extractall(next(python.parents[1].rglob("site-packages")))
-        return CompletedProcess([], 0, "", "")
+        return Ended("", "", False, "")
 
     return pip
 
@@ -92,7 +91,7 @@ def test_each_release_loads_by_itself_or_says_why(tmp_path: Path, monkeypatch: p
 def test_bad_input_is_one_line(
     arguments: list[str], stated: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(releases, "pip", lambda *_: CompletedProcess([], 0, LISTED, ""))
+    monkeypatch.setattr(releases, "pip", lambda *_: Ended(LISTED, "", False, ""))
     assert status(["versions", *arguments]) == 2
     error = capsys.readouterr().err
     assert stated in error and error.count("\n") == 1
@@ -158,7 +157,7 @@ def test_the_command_runs_each_version_and_says_why_one_has_no_answer(
         (out / "results.csv").write_text(to_csv(replace(row, engine="pinocchio-inverse") for row in release.run.rows))
         write_about(release.run.about, out)
 
-    monkeypatch.setattr(releases, "pip", lambda *_: CompletedProcess([], 0, LISTED, ""))
+    monkeypatch.setattr(releases, "pip", lambda *_: Ended(LISTED, "", False, ""))
     loads = {"2.7": (None, "does not load: libtoy.so.7")}
     monkeypatch.setattr(versions, "installed", lambda _, version, *__: loads.get(version, (Path("its"), "")))
     monkeypatch.setattr(versions, "run_elsewhere", elsewhere)

@@ -3,7 +3,7 @@
 import csv
 import io
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
@@ -73,11 +73,15 @@ def sorted_rows(rows: Iterable[Row]) -> list[Row]:
 
 def to_csv(rows: Iterable[Row]) -> str:
     """The table as text, sorted, floats as repr, a missing number left empty."""
+    return csv_text(COLUMNS, ([_cell(getattr(row, name)) for name in COLUMNS] for row in sorted_rows(rows)))
+
+
+def csv_text(columns: Sequence[str], rows: Iterable[Iterable[object]]) -> str:
+    """A table as CSV, floats as repr, nothing for None."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(COLUMNS)
-    for row in sorted_rows(rows):
-        writer.writerow([_cell(getattr(row, name)) for name in COLUMNS])
+    writer.writerow(columns)
+    writer.writerows(rows)
     return text.getvalue()
 
 

@@ -7,7 +7,7 @@ and the torque from the full thirteen Newton-Euler equations about the mass cent
 
 import math
 from bisect import bisect
-from collections.abc import Callable
+from collections.abc import Iterable
 from typing import Any, TypeAlias
 
 from flint import arb, arb_mat, ctx
@@ -272,47 +272,39 @@ def _add_spring(
             moment[bar] += wedge(plus(arm, times(arb(-1), centre[bar])), f)
 
 
-def reference(
-    scene: Scene,
-    branch: int,
-    theta_2: float,
-    angle_of: Callable[[Values], Ball] | None = None,
-    extra: dict[str, float] | None = None,
-) -> tuple[Values, dict[str, float]] | None:
-    """Values at one position as balls, and sum |x_i dy/dx_i| of each; None where the loop does not close.
+def response(base: Values, changed: Iterable[Values | None]) -> dict[str, float]:
+    """How far each output moves, by 2^-STEP_BITS, under the first of several changes with which the loop closes."""
+    for moved in changed:
+        if moved is None:
+            continue
+        found = {}
+        for output, y in base.items():
+            if output not in moved:  # singular there
+                found[output] = math.inf
+                continue
+            change = abs(moved[output] - y)
+            if output.startswith("theta") and change > 3:
+                change = 2 * arb.pi() - change
+            found[output] = abs(float((change * arb(2) ** STEP_BITS).mid()))
+        return found
+    return {}
 
-    Parameters
-    ----------
-    theta_2 : rad, one of the stored inputs, unless `angle_of` computes it.
-    angle_of : theta_2 from the other inputs, for a position that is described by its offset from a limit.
-    extra : inputs that only `angle_of` reads.
-    """
+
+def reference(scene: Scene, branch: int, theta_2: float) -> tuple[Values, dict[str, float]] | None:
+    """Values at one position as balls, and sum |x_i dy/dx_i| of each; None where the loop does not close."""
     ctx.prec = BITS
-    stored = inputs(scene, theta_2) | (extra or {})
-    if angle_of is not None:
-        del stored["theta_2"]
+    exact = {name: arb(value) for name, value in inputs(scene, theta_2).items()}
 
-    def evaluate(values: Values) -> Values | None:
-        if angle_of is not None:
-            values = values | {"theta_2": angle_of(values)}
-        return outputs(scene, branch, values, scene.drive_bar)
+    def evaluate(**changed: Ball) -> Values | None:
+        return outputs(scene, branch, exact | changed, scene.drive_bar)
 
-    exact = {name: arb(value) for name, value in stored.items()}
-    base = evaluate(exact)
+    base = evaluate()
     if base is None:
         return None
     sensitivity = dict.fromkeys(base, 0.0)
-    two_pi = 2 * arb.pi()
-    for name, value in stored.items():
-        if value == 0.0:
-            continue
-        step = abs(exact[name]) * arb(2) ** -STEP_BITS
-        moved = evaluate(exact | {name: exact[name] + step}) or evaluate(exact | {name: exact[name] - step})
-        if moved is None:
-            continue
-        for output, y in base.items():
-            change = moved[output] - y
-            if output.startswith("theta") and abs(change) > 3:
-                change = two_pi - abs(change)
-            sensitivity[output] += abs(float((change * arb(2) ** STEP_BITS).mid()))
+    for name, value in exact.items():
+        step = abs(value) * arb(2) ** -STEP_BITS
+        moved = response(base, (evaluate(**{name: value + side * step}) for side in (1, -1))) if value != 0 else {}
+        for output, rate in moved.items():
+            sensitivity[output] += rate
     return base, sensitivity

@@ -5,86 +5,17 @@ No engine is named here, and nothing of the formulas' `act` is used: this is the
 
 import bisect
 import math
-from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any, Protocol
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fourbar.linkage import MOVING_BARS
 from fourbar.scene import Scene
-from validation.compare.answer import Array
-from validation.engines.description import PINS, along_and_across, field
+from validation.engines.description import PINS, components, field
+from validation.engines.tree import Act, Tree
 
 if TYPE_CHECKING:
     from fourbar.effects import Flywheel, Friction, Gravity, Load, PinFriction, Springs, Table, Torsion, Viscous
-
-Act = Callable[[], None]
-
-
-class Pushed:
-    """What acts on each moving bar, summed: a force at its first pin and a couple, (x, y, moment), N and N m."""
-
-    wrenches: dict[int, list[float]]
-
-    def foot(self, bar: int) -> Array:
-        """First pin of a bar, m, world axes."""
-        raise NotImplementedError
-
-    def act(self, acting: Sequence[Callable[[], None]]) -> None:
-        """Sum anew what these add."""
-        self.wrenches = {bar: [0.0, 0.0, 0.0] for bar in MOVING_BARS}
-        for each in acting:
-            each()
-
-    def push(self, bar: int, force: Array, point: Array) -> None:
-        """Add a force at a point, world axes; on the ground it does nothing."""
-        if bar != 1:
-            (x, y), (f_x, f_y), wrench = (point - self.foot(bar)).tolist(), force.tolist(), self.wrenches[bar]
-            wrench[0] += f_x
-            wrench[1] += f_y
-            wrench[2] += x * f_y - y * f_x
-
-    def twist(self, bar: int, couple: float) -> None:
-        """Add a couple; on the ground it does nothing."""
-        if bar != 1:
-            self.wrenches[bar][2] += couple
-
-
-class Tree(Protocol):
-    """An engine holding the open tree of bars at its present motion; every number is the engine's own.
-
-    The ground (bar 1) does not move; its line points from O2 to O4.
-    """
-
-    def gravity(self, vector: tuple[float, float]) -> None:
-        """Give the engine's own gravity a field (g_x, g_y), m/s^2."""
-
-    def push(self, bar: int, force: Array, point: Array) -> None:
-        """Add a force (N, world axes) at a point (m, world axes); on the ground it does nothing."""
-
-    def twist(self, bar: int, couple: float) -> None:
-        """Add a couple, N m; on the ground it does nothing."""
-
-    def angle(self, bar: int) -> float:
-        """Direction of a bar's line, in (-pi, pi], rad."""
-
-    def velocity(self, bar: int) -> float:
-        """Angular velocity of a bar, rad/s."""
-
-    def alpha(self, bar: int) -> float:
-        """Angular acceleration of a bar, rad/s^2."""
-
-    def turned(self, bar: int, x: float, y: float) -> Array:
-        """World axes of the vector that is (x, y) along and across a bar's line, (2,)."""
-
-    def foot(self, bar: int) -> Array:
-        """First pin of a bar (O2, O2, A, O4 of bars 1, 2, 3, 4), m, (2,)."""
-
-    def centre(self, bar: int) -> Array:
-        """Mass centre of a moving bar, m, (2,)."""
-
-    def pin_load(self, pin: str) -> float:
-        """Magnitude of the pin force that the engine itself found in its last pass, N."""
 
 
 def _gravity(effect: "Gravity", tree: Tree) -> None:
@@ -92,44 +23,45 @@ def _gravity(effect: "Gravity", tree: Tree) -> None:
     tree.gravity(field(effect))
 
 
+def _slip(tree: Tree, pin: str) -> float:
+    """How much faster the first bar of a pin spins than the second, rad/s."""
+    one, other = PINS[pin]
+    return tree.velocity(one) - tree.velocity(other)
+
+
+def _twist_at(tree: Tree, pin: str, couple: float) -> None:
+    """A couple on the second bar of a pin, and its opposite on the first."""
+    one, other = PINS[pin]
+    tree.twist(other, couple)
+    tree.twist(one, -couple)
+
+
 def _viscous(effect: "Viscous", tree: Tree) -> Act:
-    """Couples against the relative spin of the two bars at each pin."""
+    """Couples in proportion to the spin."""
 
     def act() -> None:
         for pin, k in effect.coefficients:
-            one, other = PINS[pin]
-            slip = tree.velocity(one) - tree.velocity(other)
-            tree.twist(other, k * slip)
-            tree.twist(one, -k * slip)
+            _twist_at(tree, pin, k * _slip(tree, pin))
 
     return act
 
 
 def _friction(effect: "Friction", tree: Tree) -> Act:
-    """Couples of constant size against the relative spin; MuJoCo's own frictionloss is a soft constraint."""
+    """Couples of constant size; MuJoCo's own frictionloss is a soft constraint."""
 
     def act() -> None:
         for pin, f in effect.torques:
-            one, other = PINS[pin]
-            slip = tree.velocity(one) - tree.velocity(other)
-            couple = f if slip > 0.0 else -f if slip < 0.0 else 0.0
-            tree.twist(other, couple)
-            tree.twist(one, -couple)
+            _twist_at(tree, pin, f * float(np.sign(_slip(tree, pin))))
 
     return act
 
 
 def _pin_friction(effect: "PinFriction", tree: Tree) -> Act:
-    """Couples of mu r times the load that the engine found at the pin in its last pass, against the spin."""
+    """Couples of mu r times the load that the engine found at the pin in its last pass."""
 
     def act() -> None:
         for pin, mu, r in effect.pins:
-            one, other = PINS[pin]
-            slip = tree.velocity(one) - tree.velocity(other)
-            if slip != 0.0:
-                couple = math.copysign(mu * r * tree.pin_load(pin), slip)
-                tree.twist(other, couple)
-                tree.twist(one, -couple)
+            _twist_at(tree, pin, mu * r * tree.pin_load(pin) * float(np.sign(_slip(tree, pin))))
 
     return act
 
@@ -141,8 +73,7 @@ def _torsion(effect: "Torsion", tree: Tree) -> Act:
         for pin, k, rest, preload in effect.springs:
             one, other = PINS[pin]
             twist = math.remainder(tree.angle(one) - tree.angle(other) + rest, math.tau)
-            tree.twist(other, k * twist - preload)
-            tree.twist(one, preload - k * twist)
+            _twist_at(tree, pin, k * twist - preload)
 
     return act
 
@@ -153,7 +84,7 @@ def _springs(effect: "Springs", tree: Tree) -> Act:
     def act() -> None:
         for spring in effect.springs:
             one, other = (
-                tree.foot(point.bar) + tree.turned(point.bar, *along_and_across(point.distance, point.angle))
+                tree.foot(point.bar) + tree.turned(point.bar, *components(point.distance, point.angle))
                 for point in (spring.start, spring.end)
             )
             vector = np.asarray(other - one)
@@ -180,18 +111,15 @@ def _flywheel(effect: "Flywheel", tree: Tree) -> Act:
 
 def _load(load: "Load", tree: Tree) -> Act:
     """A force at its point and a couple; in the bar's frame both vectors turn with the engine's bar."""
-    of_force, of_arm = (
-        np.array([size * math.cos(angle), size * math.sin(angle)])
-        for size, angle in (load.force or (0.0, 0.0), load.at)
-    )
+    force, arm = np.array(components(*(load.force or (0.0, 0.0)))), np.array(components(*load.at))
 
     def act() -> None:
         factor = 1.0 if load.table is None else look_up(load.table, tree.angle(2))
-        if load.force is not None:
-            force, arm = of_force, of_arm
-            if load.frame == "bar":
-                force, arm = tree.turned(load.bar, *of_force), tree.turned(load.bar, *of_arm)
-            tree.push(load.bar, factor * force, tree.centre(load.bar) + arm)
+        if load.frame == "bar":
+            f, at = tree.turned(load.bar, *force), tree.turned(load.bar, *arm)
+        else:
+            f, at = force, arm
+        tree.push(load.bar, factor * f, tree.centre(load.bar) + at)
         tree.twist(load.bar, factor * load.moment)
 
     return act
@@ -222,11 +150,3 @@ def acting(scene: Scene, tree: Tree) -> list[Act]:
     """What loads and effects do at each state of a tree."""
     terms = [TERM_OF[effect.key](effect, tree) for effect in (*scene.effects, *scene.loads)]
     return [term for term in terms if term is not None]
-
-
-def unknown_effect(scene: Scene) -> str | None:
-    """The reason to refuse a scene: an effect that is not in the table."""
-    for effect in scene.effects:
-        if effect.key not in TERM_OF:
-            return f"the effect {effect.key!r} has no model here"
-    return None

@@ -11,17 +11,16 @@ from fourbar.quantities import VECTORS
 from fourbar.scene import Command, Scene
 from validation.compare.answer import Answer, Array
 from validation.compare.compare import COMPARED
+from validation.engines.description import SHARED, speeds, unknown_effect
+from validation.engines.loop import blank
 
 NAME = "ball-arithmetic"
-KNOWN = (Gravity, Viscous, Friction, Springs, Torsion, Flywheel)
+KNOWN = tuple(kind.key for kind in (Gravity, Viscous, Friction, Springs, Torsion, Flywheel))
 
 
-def unknown(scene: Scene) -> str | None:
-    """The reason to refuse a scene, or None."""
-    for effect in scene.effects:
-        if not isinstance(effect, KNOWN):
-            return f"the effect {effect.key!r} has no model here"
-    return None
+def unknown(scene: Scene) -> str:
+    """The reason to refuse a scene, or nothing."""
+    return unknown_effect(scene, KNOWN)
 
 
 class BallArithmetic:
@@ -35,15 +34,12 @@ class BallArithmetic:
 
         from validation.engines.balls import BITS, inputs, outputs
 
-        if (reason := unknown(scene)) is not None:
+        if reason := unknown(scene):
             return Answer(NAME, "exact", refusal=reason)
         ctx.prec = BITS
         n = len(command.theta_2)
         names = [q for q in COMPARED if command.omega_2 is not None or q.startswith("theta")]
-        out = {name: np.full((n, 2) if name in VECTORS else n, np.nan) for name in names}
-        assembled = np.zeros(n, dtype=bool)
-        omega = np.broadcast_to(np.asarray(0.0 if command.omega_2 is None else command.omega_2, float), (n,))
-        alpha = np.broadcast_to(np.asarray(command.alpha_2, float), (n,))
+        out, assembled, (omega, alpha) = blank(n, names), np.zeros(n, dtype=bool), speeds(command)
         for i in range(n):
             stored = inputs(scene, float(command.theta_2[i])) | {"omega_2": omega[i], "alpha_2": alpha[i]}
             exact = {name: arb(float(value)) for name, value in stored.items()}
@@ -62,7 +58,7 @@ class BallArithmetic:
             at=command,
             assembled=assembled,
             quantities=out,
-            shared="the description, theta_2, omega_2, alpha_2 and the branch",
+            shared=SHARED,
             own="closure as a complex quadratic, linear speeds and accelerations, thirteen Newton-Euler equations",
         )
 

@@ -10,6 +10,7 @@ g, J, (dJ/dt) v, M and f are Exudyn's; the three linear systems are solved here.
 
 import math
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 import exudyn as exu
@@ -26,18 +27,15 @@ from exudyn.itemInterface import (
     ObjectRigidBody2D,
 )
 
+from fourbar.errors import LimitError
 from fourbar.linkage import MOVING_BARS, PIN_FORCE
-from fourbar.scene import Command, Scene
-from validation.compare.answer import Answer, Array
-from validation.engines import description
-from validation.engines.exudyn_elements import ELEMENT_OF, add_load
-from validation.engines.loop import answer_each, turned_ground
+from fourbar.scene import Scene
+from validation.compare.answer import Array
+from validation.engines.description import about_first_pin, parts, unknown_effect
+from validation.engines.exudyn_elements import ELEMENT_OF
+from validation.engines.loop import Exact
+from validation.engines.tree import Bars, Values
 
-NAME = "exudyn-constraints"
-OWN = (
-    "nine absolute coordinates, constraint equations, their Jacobian and (dJ/dt) v, mass matrix, every load and effect "
-    "by an element of its own; Newton's method on its gap and the linear solves are the harness's"
-)
 SIZE = 9
 """Coordinates, and constraints."""
 B_ROWS, OTHER_ROWS = [4, 5], [0, 1, 2, 3, 6, 7]
@@ -48,50 +46,42 @@ JOINTS = {"O2": (1, 2), "A": (3, 2), "B": (4, 3), "O4": (1, 4)}
 """Of each pin the force is that on the second bar: F12, F32, F43, F14."""
 
 
-class ExudynConstraints:
-    """Positions, motion and multipliers of Exudyn's constraint equations."""
-
-    name = NAME
-
-    def answer(self, scene: Scene, command: Command) -> Answer:
-        """Its answer, or the refusal that names an effect it has no element for."""
-        for effect in scene.effects:
-            if effect.key not in ELEMENT_OF:
-                return Answer(NAME, "exact", refusal=f"Exudyn has no element for the effect {effect.key!r}")
-        bars = ExudynBars(scene)
-        return answer_each(NAME, bars, bars.move, command, OWN)
-
-
-class ExudynBars:
+class ExudynBars(Bars):
     """The bars, built from the description."""
 
+    own = (
+        "nine absolute coordinates, constraint equations, their Jacobian and (dJ/dt) v, mass matrix, every load and "
+        "effect by an element of its own; Newton's method on its gap and the linear solves are the harness's"
+    )
+
     def __init__(self, scene: Scene) -> None:
+        if reason := unknown_effect(scene, ELEMENT_OF, "Exudyn has no element for the effect {!r}"):
+            raise LimitError(reason)
         exu.config.printToConsole = False
-        self.scene, linkage = scene, scene.linkage
+        linkage = scene.linkage
         self.container = exu.SystemContainer()
         self.mbs = mbs = self.container.AddSystem()
         self.ground_angle = linkage.ground_angle
         self.ground_node = mbs.AddNode(NodePointGround())
         self.body = {1: mbs.AddObject(ObjectGround())}
         self.node: dict[int, Any] = {}
-        self.local: dict[str, tuple[int, tuple[float, float]]] = {}
-        for bar in MOVING_BARS:
-            part = linkage.bar(bar)
-            r, phi = description.centre(part)
-            centre = (r * math.cos(phi), r * math.sin(phi))
+        self.local = {"A": (3, (0.0, 0.0)), "O4": (4, (0.0, 0.0))}
+        """Points by name: their bar, and where they are in its axes, m."""
+        self.part = {part.bar: part for part in parts(linkage)}
+        for bar, part in self.part.items():
             self.node[bar] = mbs.AddNode(NodeRigidBody2D())
-            about_pin = description.inertia(part) + part.mass * r * r
+            about_pin = about_first_pin(linkage.bar(bar))
             self.body[bar] = mbs.AddObject(
-                ObjectRigidBody2D(mass=part.mass, inertia=about_pin, centerOfMass=centre, nodeNumber=self.node[bar])
+                ObjectRigidBody2D(
+                    mass=part.mass, inertia=about_pin, centerOfMass=part.centre, nodeNumber=self.node[bar]
+                )
             )
-            self.local |= {f"G{bar}": (bar, centre), END[bar]: (bar, (part.length, 0.0))}
-        self.local |= {"A": (3, (0.0, 0.0)), "O4": (4, (0.0, 0.0))}
-        foot_4 = tuple(turned_ground(self.ground_angle, linkage.ground, 0.0))
+            self.local |= {f"G{bar}": (bar, part.centre), END[bar]: (bar, part.points[f"end{bar}"])}
         at = {
             "O2": ((0.0, 0.0), (0.0, 0.0)),
             "A": ((0.0, 0.0), self.local["A2"][1]),
             "B": (self.local["B4"][1], self.local["B"][1]),
-            "O4": (foot_4, (0.0, 0.0)),
+            "O4": (self.part[4].foot, (0.0, 0.0)),
         }
         for pin, bars in JOINTS.items():
             markers = [self.point_marker(bar, *place) for bar, place in zip(bars, at[pin], strict=True)]
@@ -99,10 +89,8 @@ class ExudynBars:
         markers = [self.rotation_marker(bar) for bar in (1, 2)]
         self.drive = mbs.AddObject(ObjectConnectorCoordinate(markerNumbers=markers))
         self.tables: list[Callable[[float], None]] = []
-        for load in scene.loads:
-            add_load(load, self)
-        for effect in scene.effects:
-            ELEMENT_OF[effect.key](effect, self)
+        for term in (*scene.loads, *scene.effects):
+            ELEMENT_OF[term.key](term, self)
         mbs.Assemble()
         self.state = mbs.systemData
         settings = exu.SimulationSettings()
@@ -180,7 +168,7 @@ class ExudynBars:
         """Points of the bars."""
         return self._output(exu.OutputVariableType.Position)
 
-    def move(self, omega_2: float, alpha_2: float) -> dict[str, Array | float]:
+    def move(self, omega_2: float, alpha_2: float) -> Values:
         """Speeds, accelerations and multipliers; nothing where a toggle leaves them 0/0."""
         jacobian = self.jacobians
         drive = np.eye(SIZE)[-1]
@@ -195,7 +183,7 @@ class ExudynBars:
             return {}
         self.state.SetODE2Coordinates_tt(a)
         at = self._output(exu.OutputVariableType.Acceleration)
-        values: dict[str, Array | float] = {f"a_{name}": at[name] for name in ("A", "B", "G2", "G3", "G4")}
+        values: Values = {f"a_{name}": at[name] for name in ("A", "B", "G2", "G3", "G4")}
         for bar in MOVING_BARS[1:]:
             values[f"omega_{bar}"], values[f"alpha_{bar}"] = float(v[self.turn[bar]]), float(a[self.turn[bar]])
         try:
@@ -215,3 +203,6 @@ class ExudynBars:
         self.solver.ComputeODE2RHS(self.mbs)
         mass = np.array(self.solver.GetSystemMassMatrix())
         return np.asarray(mass @ a - np.array(self.solver.GetSystemResidual())[:SIZE])
+
+
+ExudynConstraints = partial(Exact, "exudyn-constraints", ExudynBars)

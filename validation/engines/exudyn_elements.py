@@ -1,6 +1,5 @@
 """Loads and effects of a scene as elements of Exudyn, one row of a table each."""
 
-import math
 import sys
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
@@ -19,9 +18,8 @@ from exudyn.itemInterface import (
 )
 
 from fourbar.linkage import MOVING_BARS
-from validation.engines.description import PINS, along_and_across, field
+from validation.engines.description import PINS, applied, field, place
 from validation.engines.effects import look_up
-from validation.engines.loop import turned_ground
 
 if TYPE_CHECKING:
     from validation.engines.exudyn import ExudynBars
@@ -30,29 +28,20 @@ SIGN_ZONE = sys.float_info.min
 """rad/s; the friction law of `CoordinateSpringDamperExt` is proportional to slower slips, and a sign beyond."""
 
 
-def add_load(load: Any, bars: "ExudynBars") -> None:
+def _load(load: Any, bars: "ExudynBars") -> None:
     """`LoadForceVector`, fixed in the bar or in world axes, and `LoadTorqueVector`."""
-    f, f_angle = load.force or (0.0, 0.0)
-    r, r_angle = load.at
-    x, y = bars.local[f"G{load.bar}"][1]
-    force = np.array([f * math.cos(f_angle), f * math.sin(f_angle), 0.0])
-    arm = (r * math.cos(r_angle), r * math.sin(r_angle))
-    couple = load.moment
-    in_bar = load.frame == "bar"
-    if in_bar:
-        x, y = x + arm[0], y + arm[1]
-    else:  # arm and force keep their directions, and with them their moment about the mass centre
-        couple += arm[0] * force[1] - arm[1] * force[0]
-    marker = bars.frame_marker(load.bar, 0.0, x, y)
-    moment = np.array([0.0, 0.0, couple])
-    push = bars.mbs.AddLoad(LoadForceVector(markerNumber=marker, loadVector=force, bodyFixed=in_bar))
-    twist = bars.mbs.AddLoad(LoadTorqueVector(markerNumber=marker, loadVector=moment))
+    point, force, couple = applied(load, bars.part[load.bar])
+    marker = bars.frame_marker(load.bar, 0.0, *point)
+    push, twist = np.array([*force, 0.0]), np.array([0.0, 0.0, couple])
+    acting = {
+        bars.mbs.AddLoad(LoadForceVector(markerNumber=marker, loadVector=push, bodyFixed=load.frame == "bar")): push,
+        bars.mbs.AddLoad(LoadTorqueVector(markerNumber=marker, loadVector=twist)): twist,
+    }
     if load.table is not None:
 
         def follow(theta_2: float) -> None:
-            factor = look_up(load.table, theta_2)
-            bars.mbs.SetLoadParameter(push, "loadVector", factor * force)
-            bars.mbs.SetLoadParameter(twist, "loadVector", factor * moment)
+            for number, vector in acting.items():
+                bars.mbs.SetLoadParameter(number, "loadVector", look_up(load.table, theta_2) * vector)
 
         bars.tables.append(follow)
 
@@ -98,12 +87,9 @@ def _torsion(effect: Any, bars: "ExudynBars") -> None:
 
 def _springs(effect: Any, bars: "ExudynBars") -> None:
     """`SpringDamper` between two points."""
-    line = bars.ground_angle
     for spring in effect.springs:
-        markers = []
-        for point in (spring.start, spring.end):
-            x, y = along_and_across(point.distance, point.angle)
-            markers.append(bars.point_marker(point.bar, *(turned_ground(line, x, y) if point.bar == 1 else (x, y))))
+        ends = (spring.start, spring.end)
+        markers = [bars.point_marker(point.bar, *place(point, bars.ground_angle)) for point in ends]
         bars.mbs.AddObject(
             ObjectConnectorSpringDamper(
                 markerNumbers=markers,
@@ -128,5 +114,6 @@ ELEMENT_OF: dict[str, Callable[[Any, "ExudynBars"], None]] = {
     "torsion": _torsion,
     "springs": _springs,
     "flywheel": _flywheel,
+    "load": _load,
 }
 """By the key of an effect; friction in proportion to a pin's load has no element in the plane."""

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from fourbar.linkage import MOVING_BARS, FourBar
 from fourbar.scene import Command, Scene
 from validation.compare.answer import Answer, Array
-from validation.engines.description import FORCE_AT, centre, inertia
+from validation.engines.description import FORCE_AT, SHARED, about_first_pin, centre, speeds, unknown_effect
 from validation.engines.free_body_closure import Complex, close, cross
-from validation.engines.free_body_effects import Motion, Wrenches, acting, polar, sliding_pins, unknown, wound
+from validation.engines.free_body_effects import WRENCH_OF, Motion, Wrenches, acting, polar, sliding_pins, wound
 
 NAME = "free-body"
 COLUMN = {"F12": 0, "F32": 2, "F23": 4, "F43": 6, "F34": 8, "F14": 10}
@@ -45,7 +45,7 @@ class FreeBody:
 
     def answer(self, scene: Scene, command: Command) -> Answer:
         """Its answer, or the refusal that names an effect it does not know."""
-        if (reason := unknown(scene)) is not None:
+        if reason := unknown_effect(scene, WRENCH_OF):
             return Answer(NAME, "exact", refusal=reason)
         closed = close(scene.linkage, command.theta_2, command.branch)
         answer = Answer(
@@ -55,15 +55,13 @@ class FreeBody:
             assembled=closed.assembled,
             quantities=_places(scene.linkage, command.theta_2, *closed.theta),
             evidence={"closure_gap": float(np.max(closed.gap, initial=0.0, where=closed.assembled))},
-            shared="the description, theta_2, omega_2, alpha_2 and the branch",
+            shared=SHARED,
             own="assembly (Newton on the two closure equations), speeds and accelerations (own 2x2 Jacobian), every "
             "effect from its definition, the thirteen equations of the free bodies as one system",
         )
         if command.omega_2 is not None:
-            n = len(command.theta_2)
-            omega_2, alpha_2 = (np.broadcast_to(np.asarray(x, float), (n,)) for x in (command.omega_2, command.alpha_2))
-            commanded = (command.theta_2, omega_2, alpha_2, *closed.theta)
-            blocks = [slice(start, start + BLOCK) for start in range(0, n, BLOCK)]
+            commanded = (command.theta_2, *speeds(command), *closed.theta)
+            blocks = [slice(start, start + BLOCK) for start in range(0, len(command.theta_2), BLOCK)]
             parts = [_answered(scene, *(array[block] for array in commanded)) for block in blocks]
             answer.evidence["residual"] = max((residual for _, residual in parts), default=0.0)
             for name in parts[0][0] if parts else ():
@@ -162,8 +160,7 @@ def _with_unit_couples(scene: Scene, motion: Motion, wrenches: Wrenches) -> tupl
 def solutions(scene: Scene, command: Command) -> Array:
     """How many pin forces and friction couples balance the linkage at each position, where it moves, (n,)."""
     closed = close(scene.linkage, command.theta_2, command.branch)
-    speeds = (np.broadcast_to(np.asarray(x, float), command.theta_2.shape) for x in (command.omega_2, command.alpha_2))
-    motion = move(scene.linkage, command.theta_2, *speeds, *closed.theta)
+    motion = move(scene.linkage, command.theta_2, *speeds(command), *closed.theta)
     wrenches = acting(scene, motion)
     _add_inertia(motion, wrenches)
     _, loads, arms, _ = _with_unit_couples(scene, motion, wrenches)
@@ -194,7 +191,7 @@ def _add_inertia(motion: Motion, wrenches: Wrenches) -> None:
         bar = motion.linkage.bar(number)
         arm, alpha = motion.to_centre(number), motion.alpha[number]
         wrenches.push(number, -bar.mass * motion.swing(number, arm), 0.0)
-        wrenches.twist(number, -(inertia(bar) + bar.mass * centre(bar)[0] ** 2) * alpha)
+        wrenches.twist(number, -about_first_pin(bar) * alpha)
     wrenches.push(3, -motion.linkage.coupler.mass * motion.swing(2, motion.foot[3]), motion.to_centre(3))
 
 

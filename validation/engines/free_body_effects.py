@@ -166,12 +166,6 @@ WRENCH_OF: dict[str, Callable[[Any, Motion, Wrenches], None]] = {
 """By the name under which a scene file knows an effect."""
 
 
-def unknown(scene: Scene) -> str | None:
-    """The reason to refuse a scene, or None."""
-    keys = [effect.key for effect in scene.effects if effect.key not in WRENCH_OF]
-    return f"the effect {keys[0]!r} has no model here" if keys else None
-
-
 def acting(scene: Scene, motion: Motion) -> Wrenches:
     """Everything that acts on the bars but pins, inertia, drive and what depends on the pin forces."""
     wrenches = Wrenches(len(motion.theta_2))

@@ -27,10 +27,7 @@ class Limit:
     """One limit of one engine."""
 
     engine: str
-    what: str
-    unit: str
-    boundary: float
-    reason: str
+    of: Boundary
     inside: float
     outside: float
     holds: Callable[[float], bool]
@@ -44,37 +41,26 @@ def _simulated(scene: Scene) -> Answer:
     return simulate._Simulation(RECIPE, scene, command(scene), bounded=False).answer()
 
 
-def _healthy(scene: Scene) -> bool:
-    return not _simulated(scene).alarms
-
-
 def _near_toggle(sine: float) -> bool:
     """Whether a sweep that ends where |sin mu| has this value is followed without an alarm."""
     d, a, b, c = linkage_of(LinkageType.TRIPLE_ROCKER, 1)
     cosine = -math.sqrt(1.0 - sine * sine)
     squared = b * b + c * c - 2.0 * b * c * cosine
     psi = math.acos((d * d + a * a - squared) / (2.0 * d * a))
-    return _healthy(at(dressed((d, a, b, c), 1), np.linspace(psi - 0.5, psi, 20)))
+    return not _simulated(at(dressed((d, a, b, c), 1), np.linspace(psi - 0.5, psi, 20))).alarms
 
 
 def _base() -> Scene:
     return sweep_of(dressed((0.3, 0.1, 0.25, 0.22)))
 
 
-def _at_speed(omega_2: float, *, bare: bool = False) -> bool:
-    base = _base()
-    scene = replace(base, motion=replace(base.motion, omega_2=omega_2))
-    return _healthy(replace(scene, loads=(), effects=()) if bare else scene)
+def _at_speed(omega_2: float) -> Scene:
+    return replace(_base(), motion=replace(_base().motion, omega_2=omega_2))
 
 
 def _crank_acceleration(value: float) -> bool:
-    answer = _simulated_bare(math.sqrt(value / 0.1))
+    answer = _simulated(replace(_at_speed(math.sqrt(value / 0.1)), loads=(), effects=()))
     return not answer.alarms and answer.evidence["force_gap"] < 1e-3
-
-
-def _simulated_bare(omega_2: float) -> Answer:
-    base = _base()
-    return _simulated(replace(base, motion=replace(base.motion, omega_2=omega_2), loads=(), effects=()))
 
 
 def _loaded(ratio: float) -> bool:
@@ -112,48 +98,37 @@ def _centre_kept(r: float) -> bool:
 
 def _proximal(mu: float) -> bool:
     """Whether Pinocchio's constrained acceleration is a number with this proximal parameter."""
-    from validation.engines import pinocchio_released as forward
+    from validation.engines import pinocchio_closed
+    from validation.engines.pinocchio_released import PinocchioReleased
 
     scene = replace(_base(), loads=(), motion=Motion(1.0, 3.0))
-    kept = forward.PROXIMAL
+    kept = pinocchio_closed.PROXIMAL
     try:
-        forward.PROXIMAL = (kept[0], mu, kept[2] if mu else 1)
-        released = forward.PinocchioReleased().release(scene, np.array([0.0, 0.01]))
+        pinocchio_closed.PROXIMAL = (kept[0], mu, kept[2] if mu else 1)
+        released = PinocchioReleased().release(scene, np.array([0.0, 0.01]))
     finally:
-        forward.PROXIMAL = kept
+        pinocchio_closed.PROXIMAL = kept
     return bool(np.isfinite(released.theta_2).all())
 
 
-def _declared(boundary: Boundary, inside: float, outside: float, holds: Callable[[float], bool]) -> Limit:
-    return Limit(
-        "mujoco-simulated", boundary.name, boundary.unit, boundary.boundary, boundary.reason, inside, outside, holds
-    )
-
-
+LIGHTEST = Boundary(
+    "mass or inertia of a moving bar, least",
+    1e-15,
+    "kg or kg m^2",
+    "mjMINVAL: the compiler raises ValueError for a moving body below it",
+)
+PROXIMAL = Boundary(
+    "mu of the proximal iteration, least",
+    0.0,
+    "1",
+    "the third row of the planar loop is redundant: without proximal regularisation every number is NaN",
+)
 LIMITS = (
-    _declared(NEAREST_TOGGLE, 0.06, 0.01, _near_toggle),
-    _declared(FASTEST, 3e4, 3e5, _at_speed),
-    _declared(SLOWEST, 1e-10, 1e-11, _crank_acceleration),
-    _declared(HEAVIEST, 1e10, 1e11, _loaded),
-    _declared(NEAREST_CENTRE, 2e-6, 5e-7, _centre_kept),
-    Limit(
-        "mujoco-inverse and mujoco-simulated",
-        "mass or inertia of a moving bar, least",
-        "kg or kg m^2",
-        1e-15,
-        "mjMINVAL: the compiler raises ValueError for a moving body below it",
-        1.001e-15,
-        0.999e-15,
-        _compiles,
-    ),
-    Limit(
-        "pinocchio-forward",
-        "mu of the proximal iteration, least",
-        "1",
-        0.0,
-        "the third row of the planar loop is redundant: without proximal regularisation every number is NaN",
-        1e-8,
-        0.0,
-        _proximal,
-    ),
+    Limit("mujoco-simulated", NEAREST_TOGGLE, 0.06, 0.01, _near_toggle),
+    Limit("mujoco-simulated", FASTEST, 3e4, 3e5, lambda omega_2: not _simulated(_at_speed(omega_2)).alarms),
+    Limit("mujoco-simulated", SLOWEST, 1e-10, 1e-11, _crank_acceleration),
+    Limit("mujoco-simulated", HEAVIEST, 1e10, 1e11, _loaded),
+    Limit("mujoco-simulated", NEAREST_CENTRE, 2e-6, 5e-7, _centre_kept),
+    Limit("mujoco-inverse and mujoco-simulated", LIGHTEST, 1.001e-15, 0.999e-15, _compiles),
+    Limit("pinocchio-forward", PROXIMAL, 1e-8, 0.0, _proximal),
 )

@@ -1,26 +1,20 @@
-"""Assembly, motion and loop multipliers of a four-bar opened at pin B, by whatever engine moves the open tree.
-
-Coordinates q = (turn of bar 2 at O2, of bar 3 against bar 2 at A, of bar 4 at O4). With g(q) = B on
-bar 3 minus B on bar 4 and J = dg/dq the loop holds where g = 0, J v = 0, J a + (dJ/dt) v = 0, and
-
-    [J^T e_drive] [lambda; T] = tau(q, v, a),
-
-lambda = F43 and e_drive = the derivative of the driven bar's rotation. Every number comes from the tree.
-"""
+"""A four-bar assembled position by position, by whatever engine moves its bars: what an exact engine answers."""
 
 import math
 import time
-from collections.abc import Callable, Sequence
-from typing import Any, Protocol
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from fourbar.linkage import MOVING_BARS
-from fourbar.quantities import ANGLES, STAGE_OF, STAGES, VECTORS
+from fourbar.errors import LimitError
+from fourbar.quantities import ANGLES, PIN_FORCES, STAGE_OF, STAGES, VECTORS
 from fourbar.scene import Command, Scene
 from validation.compare.answer import Answer, Array
-from validation.engines import effects
-from validation.engines.description import FORCE_AT
+from validation.engines.description import SHARED, speeds
+from validation.engines.tree import Bars, Values
 
 START_ANGLES = np.radians(
     (
@@ -36,14 +30,6 @@ SHORTEST_STEP = 2.0**-40
 """A step halved this often moves nothing that a gap above the rounding could tell."""
 NEWTON_STEPS = 100
 """Near a toggle Newton halves its distance: fifty steps reach the last digit from any start."""
-PASSES = 1000
-"""Passes over pin loads and the friction they make; each lessens the error where the friction is unique."""
-REPEATED = 2.0 * 2.0**-52
-"""Change of a pin load, relative, that is rounding."""
-ROUNDED = 1e-11
-"""Change, relative, at or below which one that no longer falls is rounding, near a pole of the torque too."""
-DIVERGED = 1e100
-"""Load, N, that only passes running away from each other reach."""
 NOT_ANSWERED = frozenset(
     (
         *("theta_2", "omega_2", "alpha_2", "condition", "drive_condition"),
@@ -56,48 +42,8 @@ ROUNDING = 16.0 * 2.0**-52
 """Gap, relative to the sum of the lengths, that the roundings of a chain of three bars alone can leave."""
 
 
-class Bars(Protocol):
-    """An engine holding the bars of a scene, opened at pin A or B; every number is the engine's own."""
-
-    def place(self, q: Sequence[float]) -> None:
-        """Move to a configuration."""
-
-    def gap(self) -> tuple[float, float]:
-        """B on bar 3 minus B on bar 4, or A on bar 2 minus A on bar 3, m."""
-
-    def jacobian(self) -> Array:
-        """Derivative of the gap, (2, 3), m."""
-
-    def angle(self, bar: int) -> float:
-        """Direction of a bar's line, in (-pi, pi], rad."""
-
-    def positions(self) -> dict[str, Array]:
-        """Points O4, A, B, G2, G3, G4, "B4", the end of bar 4, and where pin A is open "A2", that of bar 2; (2,), m."""
-
-
-class Tree(Bars, effects.Tree, Protocol):
-    """An engine holding the open tree of a scene; it computes everything from q, v, a by itself."""
-
-    pin_loads: dict[str, float]
-    """Magnitudes of its own pin forces in the last pass, by pin, N."""
-
-    def turn(self, bar: int) -> Array:
-        """Derivative of a bar's rotation, (3,)."""
-
-    def drift(self, v: Array) -> Array:
-        """Acceleration of the gap at speeds v where a = 0, (2,), m/s^2."""
-
-    def torques(self, v: Array, a: Array) -> Array:
-        """Generalised forces that the motion asks for beyond loads and effects, (3,), N m."""
-
-    def inertial(self, v: Array, a: Array) -> Array:
-        """The same of the bars alone: without loads, effects and gravity, (3,), N m."""
-
-    def accelerations(self) -> dict[str, Array]:
-        """Accelerations of A, B, G2, G3, G4 at the motion last given, (2,) each, m/s^2."""
-
-    def forces(self, loop_force: Array) -> dict[str, Array]:
-        """F12, F32, F14 with the loop force on bar 3 at B, and its opposite on bar 4, put back."""
+Angles = tuple[float, float, float]
+"""Turns of bar 2 at O2, of bar 3 against bar 2 at A, of bar 4 at O4, rad."""
 
 
 class Position:
@@ -106,7 +52,7 @@ class Position:
     def __init__(self, tree: Bars) -> None:
         self.tree = tree
 
-    def find(self, theta_2: float, branch: int) -> tuple[float, float, float] | None:
+    def find(self, theta_2: float, branch: int) -> Angles | None:
         """The configuration on the branch, with the tree placed there, or None where the loop does not close."""
         tree = self.tree
         tree.place((theta_2, 0.0, 0.0))
@@ -141,7 +87,7 @@ def _triangle_angle(e: float, near: float, far: float) -> float:
     return 2.0 * math.atan2(math.sqrt(max(above, 0.0)), math.sqrt(max(below, 0.0)))
 
 
-def newton(tree: Bars, q: tuple[float, float, float], branch: int, closed: float) -> tuple[float, float, float] | None:
+def newton(tree: Bars, q: Angles, branch: int, closed: float) -> Angles | None:
     """Close the gap with bar 2 held, never leaving the branch.
 
     The determinant of the gap's derivative by (q3, q4) is -b c sin(theta_4 - theta_3): its sign is the
@@ -149,7 +95,7 @@ def newton(tree: Bars, q: tuple[float, float, float], branch: int, closed: float
     nothing smaller than `closed` (m) falls any further.
     """
 
-    def look(q: tuple[float, float, float]) -> tuple[float, float, float, float, float, float, float]:
+    def look(q: Angles) -> tuple[float, float, float, float, float, float, float]:
         tree.place(q)
         x, y = tree.gap()
         (_, a, b), (_, c, d) = tree.jacobian().tolist()
@@ -176,173 +122,94 @@ def newton(tree: Bars, q: tuple[float, float, float], branch: int, closed: float
     return q if math.hypot(here[0], here[1]) <= closed else None
 
 
-Act = Callable[[float, float], dict[str, Array | float]]
-"""omega_2, alpha_2: motion and forces where the bars are placed, by name; empty where a toggle leaves them 0/0."""
+@dataclass(slots=True)
+class Exact:
+    """An engine that answers each position by itself."""
+
+    name: str
+    build: Callable[[Scene], Bars]
+    """Its bars from the description; LimitError says why it cannot hold them."""
+
+    def answer(self, scene: Scene, command: Command) -> Answer:
+        """Its answer, or the refusal that names what it does not know or cannot hold."""
+        try:
+            bars = self.build(scene)
+        except LimitError as error:
+            return Answer(self.name, "exact", refusal=str(error))
+        start, moves = time.perf_counter(), command.omega_2 is not None
+        wanted = STAGES if moves else ("position",)
+        names = [name for name, stage in STAGE_OF.items() if stage in wanted and name not in NOT_ANSWERED]
+        names += ["torque_inertia"] if bars.alone and moves else []
+
+        def read(q: Angles, omega_2: float, alpha_2: float) -> Values:
+            points, theta_3, theta_4 = bars.positions(), bars.angle(3), bars.angle(4)
+            values: Values = {name: points[name] for name in ("A", "B", "G2", "G3", "G4")}
+            values |= {"theta_3": theta_3, "theta_4": theta_4, "sin_mu": math.sin(theta_4 - theta_3)}
+            return values | (bars.move(omega_2, alpha_2) if moves else {})
+
+        out, assembled, gap = at_each(bars, command, names, read)
+        if reason := bars.refusal():
+            return Answer(self.name, "exact", refusal=reason)
+        for name in ANGLES:
+            out[name][assembled] = np.unwrap(out[name][assembled])
+        answer = Answer(self.name, "exact", command, assembled, out, evidence={"closure_gap": gap})
+        answer.shared, answer.own, answer.seconds = SHARED, bars.own, time.perf_counter() - start
+        return answer
 
 
-def answer_exactly(engine: str, build: Callable[[Scene], Tree], scene: Scene, command: Command) -> Answer:
-    """Every position by itself: assembly, velocities, accelerations, drive torque and pin forces of one engine."""
-    tree = build(scene)
-    loaded = [pin for effect in scene.effects for pin in effect.loaded_pins]
-    tree.place((0.0, 0.0, 0.0))
-    e_drive = tree.turn(scene.drive_bar)
-
-    alone = bool(scene.loads or scene.effects)
-
-    def act(omega_2: float, alpha_2: float) -> dict[str, Array | float]:
-        return _motion_and_forces(tree, e_drive, omega_2, alpha_2, loaded, alone=alone)
-
-    own = (
-        "assembly (Newton on its own gap), velocities (own Jacobian), accelerations (own dJ/dt v), "
-        "inverse dynamics, effects from its own state, loop multipliers, pin forces"
-    )
-    return answer_each(engine, tree, act, command, own, alone=alone)
+Read = Callable[[Angles, float, float], Values]
+"""Of the configuration in which the bars stand, omega_2 and alpha_2: values by name."""
 
 
-def answer_each(
-    engine: str,
-    bars: Bars,
-    act: Act,
-    command: Command,
-    own: str,
-    *,
-    alone: bool = False,
-) -> Answer:
-    """Each position assembled, and then moved and loaded by an engine.
-
-    Parameters
-    ----------
-    own : what the engine finds alone, for the report.
-    alone : `act` gives the torque that the bars without loads and effects take, too: `torque_inertia`.
-    """
-    start = time.perf_counter()
-    n = len(command.theta_2)
-    wanted = ("position",) if command.omega_2 is None else STAGES
-    names = [name for name, stage in STAGE_OF.items() if stage in wanted and name not in NOT_ANSWERED]
-    names += ["torque_inertia"] if alone and command.omega_2 is not None else []
-    missing = {name: (math.nan, math.nan) if name in VECTORS else math.nan for name in names}
-    rows: list[dict[str, Any]] = []
-    assembled = np.zeros(n, dtype=bool)
-    gap = 0.0
-    position = Position(bars)
-    omega_2 = np.broadcast_to(np.asarray(command.omega_2, dtype=float), (n,))
-    alpha_2 = np.broadcast_to(np.asarray(command.alpha_2, dtype=float), (n,))
+def at_each(
+    bars: Bars, command: Command, names: Iterable[str], read: Read
+) -> tuple[dict[str, Array], NDArray[np.bool_], float]:
+    """What is read at each position that assembles, NaN elsewhere; where that is; the greatest gap left, m."""
+    n, (omega, alpha) = len(command.theta_2), speeds(command)
+    missing: dict[str, Any] = {name: (math.nan, math.nan) if name in VECTORS else math.nan for name in names}
+    rows, assembled, gap, position = [missing] * n, np.zeros(n, dtype=bool), 0.0, Position(bars)
     for i, (theta_2, branch) in enumerate(zip(command.theta_2.tolist(), command.branch.tolist(), strict=True)):
-        q = position.find(theta_2, branch)
-        rows.append(missing)
-        if q is None:
-            continue
-        assembled[i] = True
-        theta_3, theta_4 = bars.angle(3), bars.angle(4)
-        rows[i] = missing | {"theta_3": theta_3, "theta_4": theta_4, "sin_mu": math.sin(theta_4 - theta_3)}
-        points = bars.positions()
-        rows[i].update({name: points[name] for name in ("A", "B", "G2", "G3", "G4")})
-        gap = max(gap, math.hypot(*bars.gap()))
-        if command.omega_2 is not None:
-            rows[i].update(act(float(omega_2[i]), float(alpha_2[i])))
-    out = {name: np.array([row[name] for row in rows]) for name in names}
-    for name in ANGLES:
-        out[name][assembled] = np.unwrap(out[name][assembled])
-    return Answer(
-        engine,
-        "exact",
-        at=command,
-        assembled=assembled,
-        quantities=out,
-        evidence={"closure_gap": gap},
-        shared="the description, theta_2, omega_2, alpha_2 and the branch",
-        own=own,
-        seconds=time.perf_counter() - start,
-    )
+        if (q := position.find(theta_2, branch)) is not None:
+            assembled[i], gap = True, max(gap, math.hypot(*bars.gap()))
+            rows[i] = missing | read(q, float(omega[i]), float(alpha[i]))
+    return {name: np.array([row[name] for row in rows], float) for name in missing}, assembled, gap
 
 
-def _motion_and_forces(
-    tree: Tree,
-    e_drive: Array,
-    omega_2: float,
-    alpha_2: float,
-    loaded: Sequence[str],
-    *,
-    alone: bool,
-) -> dict[str, Array | float]:
-    """Velocities, accelerations and forces where the tree is placed; nothing where a toggle leaves them 0/0.
-
-    Effects that depend on the load of a pin (`loaded`) are given the loads of the pass before, until they repeat.
-    `alone`: with the torque of the bars without loads and effects, of the same motion.
-    """
-    jacobian = tree.jacobian().tolist()
-    try:
-        v = _closed(jacobian, omega_2, 0.0, 0.0)
-        a = _closed(jacobian, alpha_2, *tree.drift(v).tolist())
-        tree.pin_loads = {}
-        inertial = [tree.inertial(v, a)] if alone else []
-        needed = tree.torques(v, a)
-        values: dict[str, Array | float] = {}
-        for bar in MOVING_BARS[1:]:
-            values[f"omega_{bar}"], values[f"alpha_{bar}"] = tree.velocity(bar), tree.alpha(bar)
-        values.update({f"a_{name}": value for name, value in tree.accelerations().items()})
-    except np.linalg.LinAlgError:
-        return {}
-    try:
-        matrix = np.array([*jacobian, e_drive]).T
-        unknowns, *without = np.linalg.solve(matrix, np.array([needed, *inertial]).T).T
-        if without:
-            values["torque_inertia"] = float(without[0][2])
-        forces = _forces(tree, unknowns)
-        if loaded:
-            settled = _settle(tree, loaded, forces, lambda: _forces(tree, np.linalg.solve(matrix, tree.torques(v, a))))
-            if settled is None:  # no answer, rather than that of some pass
-                return values
-            forces = settled
-    except np.linalg.LinAlgError:  # no torque on that bar balances the linkage here
-        return values
-    values.update(forces)
-    return values
+MADE = ("theta_2", "omega_2", "alpha_2")
+"""The motion that an engine really made."""
 
 
-def _closed(jacobian: Sequence[Sequence[float]], of_2: float, x: float, y: float) -> Array:
-    """Rates of the three coordinates where J rates + (x, y) = 0 and bar 2 has its own; LinAlgError at a toggle."""
-    (e, a, b), (f, c, d) = jacobian
-    x, y, det = x + e * of_2, y + f * of_2, a * d - b * c
-    if det == 0.0:
-        raise np.linalg.LinAlgError
-    return np.array([of_2, (b * y - d * x) / det, (c * x - a * y) / det])
+def blank(n: int, names: Iterable[str] = (*MADE, "torque", *PIN_FORCES)) -> dict[str, Array]:
+    """NaN for each of n positions, (n,) or (n, 2)."""
+    return {name: np.full((n, 2) if name in VECTORS else n, np.nan) for name in names}
 
 
-def _settle(
-    tree: Tree, loaded: Sequence[str], forces: dict[str, Any], again: Callable[[], dict[str, Any]]
-) -> dict[str, Any] | None:
-    """Passes over pin loads and the friction they make, until they repeat; None where they never do."""
-    before = math.inf
-    for _ in range(PASSES):
-        loads = {pin: math.hypot(*forces[FORCE_AT[pin]]) for pin in loaded}
-        most = max(loads.values())
-        change = max(abs(load - tree.pin_loads.get(pin, 0.0)) for pin, load in loads.items())
-        # once down to the rounding of a pass, the change falls no further
-        if change <= REPEATED * most or before <= change <= ROUNDED * most:
-            return forces
-        if not most < DIVERGED:
-            return None
-        before, tree.pin_loads = change, loads
-        forces = again()
-    return None
+def as_made(out: dict[str, Array], branch: NDArray[np.int8]) -> tuple[Command, dict[str, Array]]:
+    """The motion that was made, as a command, and the other quantities read on it."""
+    theta_2, omega_2, alpha_2 = (out[name] for name in MADE)
+    rest = {name: values for name, values in out.items() if name not in MADE}
+    return Command(theta_2, branch, omega_2, alpha_2), rest
 
 
-def _forces(tree: Tree, unknowns: Array) -> dict[str, Any]:
-    """Driving torque and the four pin forces."""
-    return {**tree.forces(unknowns[:2]), "F43": unknowns[:2], "torque": unknowns[2]}
+@dataclass(slots=True, eq=False)
+class Trial:
+    """What one run through a scene gave, with some settings."""
 
-
-def turned_by(rotation: Sequence[Sequence[float]], x: float, y: float) -> Array:
-    """A vector turned by a matrix of two rows."""
-    (a, b), (c, d) = rotation
-    return np.array([a * x + b * y, c * x + d * y])
-
-
-def turned_ground(theta_1: float, x: float, y: float) -> Array:
-    """World axes of a vector along and across the ground's line, as described."""
-    cos, sin = math.cos(theta_1), math.sin(theta_1)
-    return turned_by(((cos, -sin), (sin, cos)), x, y)
+    at: Command
+    """The motion that was really made."""
+    quantities: dict[str, Array] = field(default_factory=dict)
+    """Torque (n,) and pin forces (n, 2), under the names of `fourbar.Solution`."""
+    steps: int = 0
+    steps_per_revolution: float = 0.0
+    """At the fastest speed of the run."""
+    stepping: float = 0.0
+    """CPU seconds in steps."""
+    reading: float = 0.0
+    """CPU seconds in reading the samples."""
+    stretches: tuple[tuple[slice, int], ...] = ()
+    """The samples of each stretch, and its steps: several samples are of one step where these are fewer."""
+    broken: str = ""
+    """Where the engine lost the motion: what it reported of itself."""
 
 
 class LimitWatch:

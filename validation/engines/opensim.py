@@ -7,24 +7,21 @@ loads and effects are OpenSim's own elements.
 
 import math
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
 import opensim as osim
 
+from fourbar.errors import LimitError
 from fourbar.linkage import MOVING_BARS
-from fourbar.scene import Command, Scene
-from validation.compare.answer import Answer, Array
-from validation.engines import description
-from validation.engines.loop import answer_each, turned_ground
-from validation.engines.opensim_elements import ELEMENT_OF, ZERO, add_load, constants, vec, vector
+from fourbar.scene import Scene
+from validation.compare.answer import Array
+from validation.engines.description import about_first_pin, parts, unknown_effect
+from validation.engines.loop import Exact
+from validation.engines.opensim_elements import ELEMENT_OF, ZERO, constants, vec, vector
+from validation.engines.tree import Bars, Values
 
-NAME = "opensim-constraints"
-OWN = (
-    "constraint equations with the loop cut at A, joint reactions, closing force and torque by Simbody's constrained "
-    "dynamics, every load and effect by an element of its own (dry friction: its actuator against its own slip); "
-    "Newton's method on its gap, and the linear solve for speeds and accelerations, are the harness's"
-)
 PER_COORDINATE = {2: np.array([1.0, 0.0, 0.0]), 3: np.array([0.0, 1.0, 1.0]), 4: np.array([0.0, 1.0, 0.0])}
 """Derivative of each bar's direction by the coordinates."""
 PASSES = 50
@@ -35,44 +32,28 @@ TIME_IS_ALPHA = (1.0 / 6.0, 0.0, 0.0, 0.0)
 """t^3/6: the motion prescribed for bar 2, whose second derivative is the time, which is set to alpha_2."""
 
 
-class OpenSimConstraints:
-    """Accelerations, reactions and multipliers of Simbody's constrained dynamics."""
-
-    name = NAME
-
-    def answer(self, scene: Scene, command: Command) -> Answer:
-        """Its answer, or the refusal that names what it cannot hold."""
-        if (reason := refusal(scene)) is not None:
-            return Answer(NAME, "exact", refusal=reason)
-        bars = OpenSimBars(scene)
-        answer = answer_each(NAME, bars, bars.move, command, OWN)
-        if bars.least_conditioned < LEAST_CONDITIONED:
-            reason = (
-                f"the matrix of Simbody's multipliers is conditioned by {bars.least_conditioned:.1e} at the worst; "
-                f"below {LEAST_CONDITIONED:g} it takes constraints for dependent, and drops them"
-            )
-            return Answer(NAME, "exact", refusal=reason)
-        return answer
-
-
-def refusal(scene: Scene) -> str | None:
-    """The declared limit that a scene meets, or None."""
-    for effect in scene.effects:
-        if effect.key not in ELEMENT_OF:
-            return f"OpenSim has no element for the effect {effect.key!r}"
+def refusal(scene: Scene) -> str:
+    """The declared limit that a scene meets, or nothing."""
+    if reason := unknown_effect(scene, ELEMENT_OF, "OpenSim has no element for the effect {!r}"):
+        return reason
     for number in MOVING_BARS:
         if scene.linkage.bar(number).mass == 0.0:
             return f"bar {number} has no mass; OpenSim takes no such body at the end of a chain, and drops its inertia"
-    crank = scene.linkage.input
-    if description.inertia(crank) + crank.mass * description.centre(crank)[0] ** 2 == 0.0:
-        return "bar 2 has no inertia about O2; Simbody divides by it"
-    return None
+    return "" if about_first_pin(scene.linkage.input) else "bar 2 has no inertia about O2; Simbody divides by it"
 
 
-class OpenSimBars:
+class OpenSimBars(Bars):
     """The bars, built from the description."""
 
+    own = (
+        "constraint equations with the loop cut at A, joint reactions, closing force and torque by Simbody's "
+        "constrained dynamics, every load and effect by an element of its own (dry friction: its actuator against its "
+        "own slip); Newton's method on its gap, and the linear solve for speeds and accelerations, are the harness's"
+    )
+
     def __init__(self, scene: Scene) -> None:
+        if reason := refusal(scene):
+            raise LimitError(reason)
         osim.Logger.setLevelString("Off")
         osim.Logger.removeFileSink()
         linkage = scene.linkage
@@ -80,19 +61,15 @@ class OpenSimBars:
         self.model = model = osim.Model()
         model.setGravity(vec())
         self.body = {1: model.getGround()}
-        self.centre: dict[int, tuple[float, float]] = {}
-        for bar in MOVING_BARS:
-            part = linkage.bar(bar)
-            r, phi = description.centre(part)
-            self.centre[bar] = r * math.cos(phi), r * math.sin(phi)
-            about_z = osim.Inertia(*[description.inertia(part)] * 3, *ZERO)
-            self.body[bar] = osim.Body(f"bar{bar}", part.mass, vec(*self.centre[bar]), about_z)
+        self.part = {part.bar: part for part in parts(linkage)}
+        for bar, part in self.part.items():
+            about_z = osim.Inertia(*[part.inertia] * 3, *ZERO)
+            self.body[bar] = osim.Body(f"bar{bar}", part.mass, vec(*part.centre), about_z)
             model.addBody(self.body[bar])
-        foot_4 = (*turned_ground(self.ground_angle, linkage.ground, 0.0).tolist(), 0.0)
-        self.length = {bar: linkage.bar(bar).length for bar in MOVING_BARS}
+        self.length = {bar: part.length for bar, part in self.part.items()}
         self.joint = {
             "O2": self._joint("O2", 1, ZERO, 2, ZERO),
-            "O4": self._joint("O4", 1, foot_4, 4, ZERO),
+            "O4": self._joint("O4", 1, self.part[4].foot, 4, ZERO),
             "B": self._joint("B", 4, (self.length[4], 0.0, 0.0), 3, (self.length[3], 0.0, 0.0)),
         }
         self.pin_a = osim.PointConstraint(self.body[2], vec(self.length[2]), self.body[3], vec())
@@ -107,10 +84,8 @@ class OpenSimBars:
         self.drive_bar = scene.drive_bar
         self.motor = self.torque_between(1, scene.drive_bar)
         self.at_a = [function for bar in (2, 3) for function in self._force_at_a(bar)]
-        for load in scene.loads:
-            add_load(load, self)
-        for effect in scene.effects:
-            ELEMENT_OF[effect.key](effect, self)
+        for term in (*scene.loads, *scene.effects):
+            ELEMENT_OF[term.key](term, self)
         self.state = model.initSystem()
         for actuator in self.actuators:
             actuator.overrideActuation(self.state, True)
@@ -118,6 +93,15 @@ class OpenSimBars:
         self.matter = model.getMatterSubsystem()
         self.least_conditioned = 1.0
         """Of the matrix G M^-1 G^T of its multipliers, over the positions moved so far: least over greatest value."""
+
+    def refusal(self) -> str:
+        """Where constraints may have been dropped."""
+        if self.least_conditioned >= LEAST_CONDITIONED:
+            return ""
+        return (
+            f"the matrix of Simbody's multipliers is conditioned by {self.least_conditioned:.1e} at the worst; "
+            f"below {LEAST_CONDITIONED:g} it takes constraints for dependent, and drops them"
+        )
 
     def _joint(self, name: str, parent: int, at: Any, child: int, on: Any) -> Any:
         joint = osim.PinJoint(name, self.body[parent], vec(*at), vec(), self.body[child], vec(*on), vec())
@@ -174,11 +158,11 @@ class OpenSimBars:
 
     def positions(self) -> dict[str, Array]:
         """Points of the bars."""
-        where = {f"G{bar}": self._station(bar, *self.centre[bar]) for bar in MOVING_BARS}
+        where = {f"G{bar}": self._station(bar, *self.part[bar].centre) for bar in MOVING_BARS}
         where |= {"A": self._station(3), "A2": self._station(2, self.length[2]), "O4": self._station(4)}
         return where | {"B": self._station(3, self.length[3]), "B4": self._station(4, self.length[4])}
 
-    def move(self, omega_2: float, alpha_2: float) -> dict[str, Array | float]:
+    def move(self, omega_2: float, alpha_2: float) -> Values:
         """Speeds and accelerations, pin forces and torque; nothing where a toggle leaves them 0/0."""
         try:
             turns, accelerations = self._set_motion(omega_2, alpha_2)
@@ -204,20 +188,20 @@ class OpenSimBars:
         self.least_conditioned = min(self.least_conditioned, float(sizes[-1] / sizes[0]))
         return turns, np.linalg.solve(equations, -np.array(bias.to_numpy())[:3])
 
-    def _motion(self, accelerations: Array) -> dict[str, Array | float]:
-        values: dict[str, Array | float] = {}
+    def _motion(self, accelerations: Array) -> Values:
+        values: Values = {}
         for bar in (3, 4):
             values[f"omega_{bar}"] = self.velocity(bar)
             values[f"alpha_{bar}"] = float(PER_COORDINATE[bar] @ accelerations)
         points = {"a_A": (2, self.length[2], 0.0), "a_B": (4, self.length[4], 0.0)}
-        points |= {f"a_G{bar}": (bar, *self.centre[bar]) for bar in MOVING_BARS}
+        points |= {f"a_G{bar}": (bar, *self.part[bar].centre) for bar in MOVING_BARS}
         for name, (bar, x, y) in points.items():
             index, station = self.body[bar].getMobilizedBodyIndex(), vec(x, y)
             drift = self.matter.calcBiasForStationJacobian(self.state, index, station)
             values[name] = self._station_jacobian(bar, x, y) @ accelerations + np.array(drift.to_numpy()[:2])
         return values
 
-    def _forces(self, leverage: float) -> dict[str, Array | float]:
+    def _forces(self, leverage: float) -> Values:
         """Joint reactions, closing force and torque of its constrained dynamics.
 
         Simbody holds bar 2 to its motion by a couple: over the leverage it is a torque of the drive. What it finds is
@@ -262,3 +246,6 @@ class OpenSimBars:
         self.matter.calcConstraintForcesFromMultipliers(self.state, multipliers, on_bodies, on_mobilities)
         found = on_bodies.get(int(self.body[2].getMobilizedBodyIndex())).get(1)
         return np.array([-found.get(0), -found.get(1)])
+
+
+OpenSimConstraints = partial(Exact, "opensim-constraints", OpenSimBars)

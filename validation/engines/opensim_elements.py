@@ -1,15 +1,13 @@
 """Loads and effects of a scene as elements of OpenSim, one row of a table each; and its vectors."""
 
-import math
 from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import opensim as osim
 
-from validation.engines.description import PINS, along_and_across, field
+from validation.engines.description import PINS, applied, field, place
 from validation.engines.effects import look_up
-from validation.engines.loop import turned_ground
 
 if TYPE_CHECKING:
     from validation.engines.opensim import OpenSimBars
@@ -38,21 +36,12 @@ def constants(*values: float) -> list[Any]:
     return [osim.Constant(value) for value in values]
 
 
-def add_load(load: Any, bars: "OpenSimBars") -> None:
+def _load(load: Any, bars: "OpenSimBars") -> None:
     """`PrescribedForce`, fixed in the bar or in world axes."""
-    f, f_angle = load.force or (0.0, 0.0)
-    r, r_angle = load.at
-    force = (f * math.cos(f_angle), f * math.sin(f_angle))
-    arm = (r * math.cos(r_angle), r * math.sin(r_angle))
-    x, y = bars.centre[load.bar]
-    couple = load.moment
-    if load.frame == "bar":
-        x, y = x + arm[0], y + arm[1]
-    else:  # arm and force keep their directions, and with them their moment about the mass centre
-        couple += arm[0] * force[1] - arm[1] * force[0]
+    point, force, couple = applied(load, bars.part[load.bar])
     element = osim.PrescribedForce(f"load{bars.model.getForceSet().getSize()}", bars.body[load.bar])
     element.setForceIsInGlobalFrame(load.frame == "world")
-    element.setPointFunctions(*constants(x, y, 0.0))
+    element.setPointFunctions(*constants(*point, 0.0))
     element.setForceFunctions(*constants(*force, 0.0))
     element.setTorqueFunctions(*constants(0.0, 0.0, couple))
     bars.model.addForce(element)
@@ -112,12 +101,10 @@ def _torsion(effect: Any, bars: "OpenSimBars") -> None:
 
 def _springs(effect: Any, bars: "OpenSimBars") -> None:
     """`PointToPointSpring`, a preload as a shorter rest length."""
-    line = bars.ground_angle
     for number, spring in enumerate(effect.springs):
         ends: list[Any] = []
         for point in (spring.start, spring.end):
-            x, y = along_and_across(point.distance, point.angle)
-            ends += [bars.body[point.bar], vec(*(turned_ground(line, x, y) if point.bar == 1 else (x, y)))]
+            ends += [bars.body[point.bar], vec(*place(point, bars.ground_angle))]
         rest = spring.length - spring.preload / spring.stiffness
         element = osim.PointToPointSpring(*ends, spring.stiffness, rest)
         element.setName(f"spring{number}")
@@ -138,5 +125,6 @@ ELEMENT_OF: dict[str, Callable[[Any, "OpenSimBars"], None]] = {
     "torsion": _torsion,
     "springs": _springs,
     "flywheel": _flywheel,
+    "load": _load,
 }
 """By the key of an effect; friction in proportion to a pin's load has no element."""

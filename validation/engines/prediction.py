@@ -24,7 +24,7 @@ from fourbar.quantities import PIN_FORCES, VECTORS
 from fourbar.scene import Command, Scene
 from validation.compare.compare import Mask
 from validation.compare.tolerance import EPS, Array
-from validation.engines.description import centre
+from validation.engines.description import centre, speeds
 
 ROUNDINGS = 8.0
 """R: a chain of some fifty roundings moves a result by sqrt(50) = 7 last digits, as a random walk."""
@@ -71,9 +71,7 @@ def predicted_error(
     With `carried` the accelerations of the bars are differences of others as large as the fastest bar's at `reach`.
     NaN where the loop does not close; infinite at a singular position, where the equations have no answer.
     """
-    n = len(at.theta_2)
-    omega = np.broadcast_to(0.0 if at.omega_2 is None else np.asarray(at.omega_2, float), (n,))
-    alpha = np.broadcast_to(np.asarray(at.alpha_2, float), (n,))
+    n, (omega, alpha) = len(at.theta_2), speeds(at)
     errors = np.full(n, np.nan)
     for i in range(n) if where is None else np.flatnonzero(where).tolist():
         moved = _sensitivity(scene, float(at.theta_2[i]), int(at.branch[i]), float(omega[i]), float(alpha[i]))
@@ -117,7 +115,7 @@ def _sensitivity(scene: Scene, theta_2: float, branch: int, omega_2: float, alph
     """Sensitivities at one position; None where the loop does not close."""
     from flint import arb, ctx
 
-    from validation.engines.balls import BITS, STEP_BITS, inputs, outputs
+    from validation.engines.balls import BITS, STEP_BITS, inputs, outputs, response
 
     ctx.prec = BITS
     stored = inputs(scene, theta_2) | {"omega_2": omega_2, "alpha_2": alpha_2}
@@ -125,23 +123,13 @@ def _sensitivity(scene: Scene, theta_2: float, branch: int, omega_2: float, alph
     base = outputs(scene, branch, exact, scene.drive_bar)
     if base is None:
         return None
-    step, two_pi = arb(2) ** -STEP_BITS, 2 * arb.pi()
+    step = arb(2) ** -STEP_BITS
 
     def add(total: dict[str, float], changes: list[dict[str, Any]]) -> None:
         """The change under the first of several changes of the inputs with which the loop still closes."""
-        for changed in changes:
-            moved = outputs(scene, branch, exact | changed, scene.drive_bar)
-            if moved is None:
-                continue
-            for output, y in base.items():
-                if output not in moved:  # singular there
-                    total[output] = math.inf
-                    continue
-                change = abs(moved[output] - y)
-                if output.startswith("theta") and change > 3:
-                    change = two_pi - change
-                total[output] = total.get(output, 0.0) + abs(float((change / step).mid()))
-            return
+        moved = (outputs(scene, branch, exact | changed, scene.drive_bar) for changed in changes)
+        for output, rate in response(base, moved).items():
+            total[output] = total.get(output, 0.0) + rate
 
     data = {name: 1.0 if name.startswith("theta") else abs(float(value.mid())) for name, value in base.items()}
     for name, weight in _weights(stored).items():

@@ -142,7 +142,7 @@ def _singular(approach: Approach) -> float:
 def limit_rows(limits: Sequence[Limit] = LIMITS) -> list[tuple[str, str, str, str]]:
     """(engine, what, boundary, reason) of every declared limit."""
     return [
-        (limit.engine, limit.what, f"{limit.boundary:g} {limit.unit}".removesuffix(" 1"), limit.reason)
+        (limit.engine, limit.of.name, f"{limit.of.boundary:g} {limit.of.unit}".removesuffix(" 1"), limit.of.reason)
         for limit in limits
     ]
 

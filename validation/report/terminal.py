@@ -1,12 +1,17 @@
 """The table at the end of a run."""
 
 import math
+from collections.abc import Iterable, Sequence
 from itertools import groupby
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from fourbar.errors import printable
 from validation.report.summary import Summary
 from validation.report.templating import number
+
+if TYPE_CHECKING:
+    from rich.table import Table
 
 
 def table(summary: Summary, out: Path) -> None:
@@ -48,6 +53,21 @@ def table(summary: Summary, out: Path) -> None:
     for engine, reason in summary.missing:
         console.print(f"[bold red]not run[/] {escape(engine)}: {escape(reason)}")
     console.print(f"[bold]{escape(summary.verdict)}[/]; written to {escape(printable(str(out)))}")
+
+
+def lined_up(headings: Sequence[str], rows: Iterable[Sequence[str]], **options: Any) -> "Table":
+    """A table whose first column is words and whose others are numbers."""
+    from rich.box import SIMPLE_HEAD
+    from rich.markup import escape
+    from rich.table import Table
+
+    given: dict[str, Any] = {"box": SIMPLE_HEAD, "pad_edge": False}
+    shown = Table(**(given | options))
+    for index, heading in enumerate(headings):
+        shown.add_column(heading, justify="right" if index else "left", overflow="fold")
+    for row in rows:
+        shown.add_row(*(escape(printable(cell)) for cell in row))
+    return shown
 
 
 def short(value: float) -> str:

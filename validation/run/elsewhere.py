@@ -1,10 +1,12 @@
-"""The same suite under another Python: what does upgrading an engine change for my linkages?"""
+"""Other processes: the same suite under another Python (what does upgrading an engine change for my linkages?)."""
 
+import os
 import subprocess
-from collections.abc import Sequence
+from collections.abc import Container, Mapping, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
-from fourbar.errors import DependencyError, InputError
+from fourbar.errors import FAILED, HOLDS, DependencyError, InputError
 
 CHECKOUT = Path(__file__).parent.parent.parent
 NEEDS = "numpy, pint, click, rich, jinja2, pebble, filelock, pyarrow and the engines"
@@ -12,6 +14,48 @@ NEEDS = "numpy, pint, click, rich, jinja2, pebble, filelock, pyarrow and the eng
 
 class ElsewhereError(DependencyError):
     """The other environment could not run the suite."""
+
+
+class Ended(NamedTuple):
+    """How a process ended."""
+
+    out: str
+    errors: str
+    failed: bool
+    last: str
+    """Line of the errors, or the exit status."""
+
+    @property
+    def why(self) -> str:
+        """It failed, in one line; nothing where it did not."""
+        return self.last if self.failed else ""
+
+
+def ended(
+    command: Sequence[object],
+    *,
+    fine: Container[int] = (0,),
+    folder: Path = CHECKOUT,
+    seconds: float | None = None,
+    variables: Mapping[str, str] | None = None,
+) -> Ended:
+    """A command run to its end, with these variables added to the environment."""
+    line, environment = [str(part) for part in command], {**os.environ, **(variables or {})}
+    try:
+        done = subprocess.run(
+            line,
+            cwd=folder,
+            env=environment,
+            capture_output=True,
+            text=True,
+            errors="replace",
+            timeout=seconds,
+            check=False,
+        )
+    except subprocess.TimeoutExpired:
+        return Ended("", "", True, f"no answer within {seconds:g} s")
+    last = (done.stderr.strip().splitlines() or [f"exit status {done.returncode}"])[-1]
+    return Ended(done.stdout, done.stderr, done.returncode not in fine, last)
 
 
 def run_elsewhere(python: Path, arguments: Sequence[str], out: Path) -> Path:
@@ -24,13 +68,12 @@ def run_elsewhere(python: Path, arguments: Sequence[str], out: Path) -> Path:
         raise InputError("--python", str(python), "must be a Python interpreter, such as .venv-old/bin/python")
     results = out / "results.csv"
     results.unlink(missing_ok=True)  # of an earlier run; what is there afterwards is of this one
-    command = [str(python.absolute()), "-m", "validation", "run", *arguments, "--out", str(out.absolute())]
+    command = [python.absolute(), "-m", "validation", "run", *arguments, "--out", out.absolute()]
     try:
-        done = subprocess.run(command, cwd=CHECKOUT, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, check=False)
+        done = ended(command, fine=(HOLDS, FAILED))
     except OSError as error:
         raise InputError("--python", str(python), f"cannot be run: {error.strerror}") from None
-    if done.returncode not in (0, 1) or not results.is_file():
-        words = done.stderr.decode(errors="replace").strip().splitlines()
-        reason = words[-1].removeprefix("error: ") if words else f"exit status {done.returncode}"
+    if done.failed or not results.is_file():
+        reason = done.last.removeprefix("error: ")
         raise ElsewhereError(f"{python}: the suite did not run there: {reason} (it needs {NEEDS})")
     return out

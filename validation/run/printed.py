@@ -40,7 +40,7 @@ def printed(name: str, scene: Scene, at: Command, solution: Solution, basis: Sol
         return
     if at.remainder is None:
         yield _blocks(name, scene, at, solution)
-        if unknown(scene) is None and not_installed("flint") is None:
+        if not unknown(scene) and not_installed("flint") is None:
             yield from _error_bars(name, scene, at, solution)
     if solution.friction_residual is not None:
         yield _residual(name, scene, solution)

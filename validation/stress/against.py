@@ -15,6 +15,7 @@ from typing import NamedTuple
 import fourbar
 from fourbar.errors import DependencyError, FourBarError, InputError
 from fourbar.quantities import ANGLES, UNKNOWNS, VECTORS
+from validation.run.elsewhere import ended
 
 TREE = Path(fourbar.__file__).resolve().parents[1]
 ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
@@ -78,12 +79,10 @@ def timings(tree: Path, name: str, positions: int) -> dict[str, float]:
     script = str(Path(__file__).with_name("timed.py"))
     line = [sys.executable, "-P", script, str(positions), *(" ".join(names) for names in (UNKNOWNS, ANGLES, VECTORS))]
     path = os.pathsep.join(filter(None, (str(tree), os.environ.get("PYTHONPATH"))))
-    environment = os.environ | dict.fromkeys(ONE_THREAD, "1") | {"PYTHONPATH": path}
-    done = subprocess.run(line, env=environment, capture_output=True, text=True, check=False)
-    if done.returncode != 0:
-        reason = done.stderr.strip().rpartition("\n")[2] or f"ended with {done.returncode}"
-        raise FourBarError(f"{name} cannot be timed: {reason}")
-    found = json.loads(done.stdout)
+    done = ended(line, variables=dict.fromkeys(ONE_THREAD, "1") | {"PYTHONPATH": path})
+    if done.why:
+        raise FourBarError(f"{name} cannot be timed: {done.why}")
+    found = json.loads(done.out)
     if not Path(found["from"]).resolve().is_relative_to(tree.resolve()):
         raise FourBarError(f"{name} cannot be timed: {found['from']} was imported instead")
     times: dict[str, float] = found["times"]

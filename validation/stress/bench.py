@@ -25,6 +25,7 @@ from fourbar.solve import BLOCK, solve
 from validation.engines.witnesses import WITNESSES, Witness
 from validation.published.thirteen import FreeBodies, solve_thirteen
 from validation.report.machine import machine
+from validation.report.terminal import lined_up
 from validation.run.judge import judged
 from validation.scenes.random import LinkageType
 from validation.scenes.suites import Random
@@ -134,8 +135,8 @@ def bench(positions: int, rounds: int, largest: int, picture: Path | None, again
         format_of(picture)
     if against is not None:
         return compared_with(against, positions, rounds)
+    from rich.box import HEAVY_HEAD
     from rich.console import Console
-    from rich.table import Table
 
     if any(os.environ.get(name) != "1" for name in ONE_THREAD):
         # read when numpy is loaded: too late in this process
@@ -145,20 +146,19 @@ def bench(positions: int, rounds: int, largest: int, picture: Path | None, again
         status = subprocess.run(line, env=os.environ | dict.fromkeys(ONE_THREAD, "1"), check=False).returncode
         return status if status >= 0 else BROKEN  # below 0: a signal ended it
     found = measure(positions, rounds, largest)
-    table = Table(title=f"{positions} positions, one core, medians of {rounds} interleaved rounds; {machine()}")
-    for column in ("what", "measured", "needed", ""):
-        table.add_column(column, justify="left" if column == "what" else "right")
-    broken = []
+    rows: list[tuple[str, ...]] = []
+    broken: list[str] = []
     for what, measured in found.rows.items():
         limit = LIMITS.get(what)
         if limit is None:
-            table.add_row(what, f"{measured:.1f} {'ms' if what == JUDGED else 'ns/position'}")
+            rows.append((what, f"{measured:.1f} {'ms' if what == JUDGED else 'ns/position'}"))
             continue
         holds = limit.holds(measured)
-        table.add_row(what, f"{measured:.2f}", f"{limit.sign} {limit.bound:g}", "holds" if holds else "fails")
+        rows.append((what, f"{measured:.2f}", f"{limit.sign} {limit.bound:g}", "holds" if holds else "fails"))
         broken += [] if holds else [f"{what}: {limit.reason}"]
     console = Console()
-    console.print(table)
+    title = f"{positions} positions, one core, medians of {rounds} interleaved rounds; {machine()}"
+    console.print(lined_up(("what", "measured", "needed", ""), rows, title=title, box=HEAVY_HEAD))
     for title, times in ((OVER_POSITIONS, found.over_positions), (OVER_LINKAGES, found.over_linkages)):
         console.print(_by_count(title, times))
     for who, reason in found.not_run.items():
@@ -172,34 +172,27 @@ def bench(positions: int, rounds: int, largest: int, picture: Path | None, again
 
 def _by_count(title: str, times: Times) -> "Table":
     """One row for each who, one column for each count."""
-    from rich.table import Table
+    from rich.box import HEAVY_HEAD
 
     counts = sorted({n for own in times.values() for n in own})
-    table = Table("ns each", title=title)
-    for n in counts:
-        table.add_column(f"{n:.0e}".replace("e+0", "e"), justify="right")
-    for who, own in times.items():
-        table.add_row(who, *(f"{own[n]:.4g}" if n in own else "" for n in counts))
-    return table
+    rows = [[who, *(f"{own[n]:.4g}" if n in own else "" for n in counts)] for who, own in times.items()]
+    return lined_up(["ns each", *(f"{n:.0e}".replace("e+0", "e") for n in counts)], rows, title=title, box=HEAVY_HEAD)
 
 
 def compared_with(revision: str, positions: int, rounds: int) -> int:
     """The table of this tree's times over those of a revision; a measurement, held to nothing."""
+    from rich.box import HEAVY_HEAD
     from rich.console import Console
     from rich.markup import escape
-    from rich.table import Table
 
-    found = against_revision(revision, positions, rounds)
-    table = Table(
-        title=f"CPU ms of a call in this tree and at {escape(revision)}, and their ratio; "
-        f"{positions} positions, one core, medians of {rounds} pairs in turns; {machine()}"
-    )
-    for column in ("what", "ours", "theirs", "ratio", "least", "most"):
-        table.add_column(column, justify="left" if column == "what" else "right")
-    for what, row in found.items():
+    rows = []
+    for what, row in against_revision(revision, positions, rounds).items():
         times = (f"{1e3 * each:.4g}" for each in (row.ours, row.theirs))
-        table.add_row(what, *times, *(f"{each:.3f}" for each in (row.ratio, row.least, row.most)))
-    Console().print(table)
+        rows.append((what, *times, *(f"{each:.3f}" for each in (row.ratio, row.least, row.most))))
+    title = f"CPU ms of a call in this tree and at {escape(revision)}, and their ratio; "
+    title += f"{positions} positions, one core, medians of {rounds} pairs in turns; {machine()}"
+    head = ("what", "ours", "theirs", "ratio", "least", "most")
+    Console().print(lined_up(head, rows, title=title, box=HEAVY_HEAD))
     return HOLDS
 
 

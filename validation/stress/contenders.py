@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import partial
 from statistics import median
 from typing import Any, NamedTuple
 
@@ -15,7 +16,7 @@ from validation.engines.witnesses import FURTHER, WITNESSES
 from validation.stress.bench_picture import Times
 from validation.stress.in_c import VECTOR, Loop, c_loop
 from validation.stress.in_sympy import sympy_loop
-from validation.stress.timed import command, example, seconds
+from validation.stress.timed import command, example, in_turns, seconds
 
 AT_ONCE = 1_000_000
 """Positions of a call: more are evaluated in pieces of this many, so that their memory is bounded (150 MB)."""
@@ -41,12 +42,9 @@ class Peers(NamedTuple):
 
 
 def interleaved(actions: Mapping[str, Callable[[], object]], rounds: int) -> dict[str, float]:
-    """Median time of each action, the actions taking turns so that a slow spell hits all of them."""
-    times: dict[str, list[float]] = {name: [] for name in actions}
-    for _ in range(rounds + 1):
-        for name, action in actions.items():
-            times[name].append(seconds(action))
-    return {name: median(values[1:]) for name, values in times.items()}
+    """Median time of each action, the first of them apart."""
+    clocks = {name: partial(seconds, action) for name, action in actions.items()}
+    return {name: median(times[1:]) for name, times in in_turns(clocks, rounds + 1).items()}
 
 
 def loops() -> Peers:

@@ -12,10 +12,9 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 Loop = Callable[[Array, Array], None]
-"""Writes the unknowns at n angles into an array (15, n)."""
+"""Writes theta_3, theta_4, omega_3, omega_4, alpha_3, alpha_4, F12, F32, F43, F14 (two rows each) and the torque at n
+angles into an array (15, n)."""
 SOURCE = Path(__file__).with_name("bench_loop.c")
-NAMES = ("theta_3", "theta_4", "omega_3", "omega_4", "alpha_3", "alpha_4", "F12", "F32", "F43", "F14", "torque")
-"""What the rows are, in this order; a force has two."""
 PLAIN = ("-O3", "-march=native")
 VECTOR = (*PLAIN, "-ffast-math", "-fno-builtin-sin", "-fno-builtin-cos")
 """Sine and cosine as one call of sincos would keep GCC from taking several positions at once."""

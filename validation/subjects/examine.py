@@ -2,7 +2,6 @@
 
 import json
 import math
-import subprocess
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -14,8 +13,8 @@ from fourbar.quantities import PIN_FORCES
 from fourbar.scene import Command, Scene
 from validation.compare.answer import Array
 from validation.compare.error import magnitude, relative_error
+from validation.run.elsewhere import ended
 
-CHECKOUT = Path(__file__).parents[2]
 SUBJECTS = {
     "mujoco_c": ("MuJoCo", "mujoco"),
     "mujoco_warp": ("MuJoCo Warp", "mujoco_warp"),
@@ -29,8 +28,6 @@ SUBJECTS = {
 }
 """By module: name, and what must be importable."""
 TORQUE_AND_FORCES = ("torque", *PIN_FORCES)
-MISSING = 3
-"""Exit status of the look for a module."""
 
 
 @dataclass(slots=True)
@@ -70,16 +67,11 @@ def examine(scene: Scene, file: Path, pythons: list[Path], seconds: float) -> St
         if python is None:
             found.left_out[name] = "not installed under any --python"
             continue
-        command = [str(python), "-m", "validation.subjects.work", module, str(file.absolute())]
-        try:
-            done = subprocess.run(command, cwd=CHECKOUT, capture_output=True, text=True, timeout=seconds, check=False)
-        except subprocess.TimeoutExpired:
-            found.left_out[name] = f"no answer within {seconds:g} s"
+        done = ended([python, "-m", "validation.subjects.work", module, file.absolute()], seconds=seconds)
+        if done.why:
+            found.left_out[name] = done.why
             continue
-        if done.returncode:
-            found.left_out[name] = (done.stderr.strip().splitlines() or ["no word"])[-1]
-            continue
-        answer = json.loads(done.stdout.strip().splitlines()[-1])
+        answer = json.loads(done.out.strip().splitlines()[-1])
         found.changed[name], found.devices[name] = answer["changed"], answer["device"]
         found.lines += lines(scene, name, answer)
     return found
@@ -135,6 +127,6 @@ def _has(python: Path, library: str) -> bool:
         "import importlib.util, sys\n"
         f"try: found = importlib.util.find_spec({library!r})\n"
         "except ModuleNotFoundError: found = None\n"
-        f"sys.exit(0 if found else {MISSING})"
+        "sys.exit(found is None)"
     )
-    return subprocess.run([str(python), "-c", look], capture_output=True, check=False).returncode == 0
+    return not ended([python, "-c", look]).why

@@ -10,7 +10,7 @@ import numpy as np
 from fourbar.linkage import PIN_FORCE
 from fourbar.scene import Scene
 from validation.engines.exudyn import JOINTS, SIZE, ExudynBars
-from validation.subjects.motion import Readings, gap, start, turn
+from validation.subjects.motion import Readings, State, start, turn
 
 VERSION = version("exudyn")
 STEPS = (314, 1256, 5024)
@@ -44,9 +44,8 @@ def through(scene: Scene, steps: int, setting: str) -> Readings:
                                                    state.GetODE2Coordinates_tt))  # fmt: skip
             exerted = -np.array(state.GetAECoordinates())  # its multipliers stand on the other side of M a = f
             forces = {PIN_FORCE[pin]: exerted[2 * number : 2 * number + 2] for number, pin in enumerate(JOINTS)}
-            theta = (float(q[bars.turn[2]]), float(q[bars.turn[3]]), float(q[bars.turn[4]]))
-            found.read(theta, v[bars.turn[2]], a[bars.turn[2]], exerted[-1], forces)
-            found.gap = max(found.gap, gap(scene, theta))
+            theta = [q[turn] for turn in bars.turn.values()]
+            found.read(scene, State(theta, v[bars.turn[2]], a[bars.turn[2]], exerted[-1], forces))
         return True
 
     mbs.SetPostStepUserFunction(read)

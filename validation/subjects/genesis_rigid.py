@@ -1,7 +1,6 @@
 """Genesis' rigid solver in double precision, from the MJCF file."""
 
 import tempfile
-import time
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -11,7 +10,7 @@ import numpy as np
 import torch
 
 from fourbar.scene import Scene
-from validation.subjects.motion import Readings, gap, start, turn, weight
+from validation.subjects.motion import Readings, State, run_through, start, turn, weight
 from validation.subjects.mujoco_c import text
 
 VERSION = version("genesis-world")
@@ -25,7 +24,7 @@ genesis.init(backend=genesis.gpu if torch.cuda.is_available() else genesis.cpu, 
 
 def through(scene: Scene, steps: int, setting: str) -> Readings:
     """A turn in so many steps; torque and force are those with which the step began."""
-    timestep, stops = turn(scene, steps)
+    timestep, _ = turn(scene, steps)
     common: dict[str, Any] = {"dt": timestep, "gravity": weight(scene)}
     world = genesis.Scene(
         sim_options=genesis.options.SimOptions(**common),
@@ -41,18 +40,18 @@ def through(scene: Scene, steps: int, setting: str) -> Readings:
     world.reset()
     bars.set_dofs_velocity(np.array(start(scene).qvel))
     armature, solver = float(bars.get_dofs_armature()[0]), world.sim.rigid_solver
-    found, done = Readings(setting, steps), 0
-    for stop in stops:
-        began = time.process_time()
-        for _ in range(stop - done - 1):
+
+    def advance(n: int) -> tuple[Any, float]:
+        for _ in range(n - 1):
             world.step()
         q, speed = bars.get_qpos().cpu().numpy().copy(), float(bars.get_dofs_velocity()[0])
         world.step()
-        found.seconds += time.process_time() - began
-        done = stop
+        return q, speed
+
+    def read(before: tuple[Any, float]) -> State:
+        q, speed = before
         alpha = float(solver.get_dofs_acc().cpu().numpy().ravel()[0])
-        theta = (float(q[0]), float(q[0] + q[1]), float(q[2]))
         closing = solver.constraint_solver.efc_force.to_numpy()[:2].ravel()
-        found.read(theta, speed, alpha, -armature * alpha, {"F43": closing})
-        found.gap = max(found.gap, gap(scene, theta))
-    return found
+        return State((q[0], q[0] + q[1], q[2]), speed, alpha, -armature * alpha, {"F43": closing})
+
+    return run_through(scene, steps, setting, advance, read)

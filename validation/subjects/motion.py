@@ -1,14 +1,17 @@
 """What a subject answers: numbers of a turn that it ran through, or of states that it was given."""
 
 import math
+import time
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from fourbar.effects import Gravity
 from fourbar.errors import LimitError, NotAssembledError
-from fourbar.mjcf.document import Start, run_through
+from fourbar.mjcf.document import Start
+from fourbar.mjcf.document import run_through as window
 from fourbar.scene import Scene, command
 from validation.engines.description import field as field_of
 from validation.engines.free_body import move
@@ -16,6 +19,18 @@ from validation.engines.free_body_closure import close
 
 SAMPLES = 12
 """Readings in a turn; the first quarter, in which a closure settles, is not read."""
+
+
+class State(NamedTuple):
+    """What a subject lets read at one instant, SI units."""
+
+    theta: Sequence[Any]
+    """theta_2, theta_3, theta_4, of the subject itself, rad."""
+    omega_2: float
+    alpha_2: float
+    torque: float | None
+    forces: dict[str, Any]
+    """Of the pins that it lets read, N."""
 
 
 @dataclass(slots=True)
@@ -26,26 +41,26 @@ class Readings:
     steps: int | None = None
     """In a turn; None: of single states."""
     theta: list[tuple[float, float, float]] = field(default_factory=list)
-    """theta_2, theta_3, theta_4, of the subject itself, rad."""
     omega_2: list[float] = field(default_factory=list)
     alpha_2: list[float] = field(default_factory=list)
     torque: list[float] = field(default_factory=list)
     forces: dict[str, list[tuple[float, float]]] = field(default_factory=dict)
-    """Of the pins that it lets read, N."""
     gap: float = 0.0
     """The greatest distance of B on bar 3 from B on bar 4, m."""
     seconds: float = 0.0
     """Of the processor's clock, for the steps alone."""
 
-    def read(self, theta: Any, omega_2: float, alpha_2: float, torque: float | None, forces: dict[str, Any]) -> None:
+    def read(self, scene: Scene, now: State) -> None:
         """One more reading."""
-        self.theta.append((float(theta[0]), float(theta[1]), float(theta[2])))
-        self.omega_2.append(float(omega_2))
-        self.alpha_2.append(float(alpha_2))
-        if torque is not None:
-            self.torque.append(float(torque))
-        for name, force in forces.items():
+        theta = (float(now.theta[0]), float(now.theta[1]), float(now.theta[2]))
+        self.theta.append(theta)
+        self.omega_2.append(float(now.omega_2))
+        self.alpha_2.append(float(now.alpha_2))
+        if now.torque is not None:
+            self.torque.append(float(now.torque))
+        for name, force in now.forces.items():
             self.forces.setdefault(name, []).append((float(force[0]), float(force[1])))
+        self.gap = max(self.gap, gap(scene, theta))
 
     def plain(self) -> dict[str, Any]:
         """For JSON."""
@@ -60,6 +75,25 @@ def turn(scene: Scene, steps: int) -> tuple[float, list[int]]:
     return math.tau / abs(scene.motion.omega_2) / steps, [
         first + round(k * (steps - first) / (SAMPLES - 1)) for k in range(SAMPLES)
     ]
+
+
+def run_through(
+    scene: Scene, steps: int, setting: str, advance: Callable[[int], Any], read: Callable[[Any], State]
+) -> Readings:
+    """A turn in so many steps.
+
+    Parameters
+    ----------
+    advance : so many steps further, by the processor's clock; what it returns is read.
+    """
+    found, done = Readings(setting, steps), 0
+    for stop in turn(scene, steps)[1]:
+        began = time.process_time()
+        reached = advance(stop - done)
+        found.seconds += time.process_time() - began
+        done = stop
+        found.read(scene, read(reached))
+    return found
 
 
 def start(scene: Scene) -> Start:
@@ -77,8 +111,7 @@ def start(scene: Scene) -> Start:
     theta = (at.theta_2[first], *closed.theta[:, first])
     omega = move(scene.linkage, theta[0], np.array([omega_2]), np.zeros(1), *theta[1:]).omega
     q, v = [float(x[0]) for x in theta], [float(omega[bar][0]) for bar in (2, 3, 4)]
-    run = run_through(theta_2, omega_2, 0.0)
-    return Start((q[0], q[1] - q[0], q[2]), (v[0], v[1] - v[0], v[2]), run)
+    return Start((q[0], q[1] - q[0], q[2]), (v[0], v[1] - v[0], v[2]), window(theta_2, omega_2, 0.0))
 
 
 def weight(scene: Scene) -> tuple[float, float, float]:

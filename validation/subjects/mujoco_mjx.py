@@ -1,6 +1,5 @@
 """MuJoCo MJX (JAX), in double precision."""
 
-import time
 from importlib.metadata import version
 from typing import Any
 
@@ -9,8 +8,9 @@ import numpy as np
 from mujoco import mjx
 
 from fourbar.scene import Scene
-from validation.subjects.motion import Readings, turn
-from validation.subjects.mujoco_c import at_rest_of, opened, read, text
+from validation.engines.mujoco.stepping import opened
+from validation.subjects.motion import Readings, State, run_through
+from validation.subjects.mujoco_c import reading, states_of, text
 
 VERSION = version("mujoco-mjx")
 DEVICE = "CPU" if jax.default_backend() == "cpu" else str(jax.devices()[0].device_kind)
@@ -33,29 +33,27 @@ def through(scene: Scene, steps: int, setting: str) -> Readings:
     model, data = opened(text(scene, steps, SETTINGS[setting]))
     theirs, state = mjx.put_model(model), mjx.put_data(model, data)
     jax.block_until_ready(advance(theirs, state, 1))  # compiled before the clock runs
-    found, done = Readings(setting, steps), 0
-    for stop in turn(scene, steps)[1]:
-        began = time.process_time()
-        state = jax.block_until_ready(advance(theirs, state, stop - done))
-        found.seconds += time.process_time() - began
-        done = stop
-        _evaluate(found, model, forward(theirs, state))
-    return found
+
+    def further(n: int) -> Any:
+        nonlocal state
+        state = jax.block_until_ready(advance(theirs, state, n))
+        return state
+
+    return run_through(scene, steps, setting, further, lambda now: _evaluated(model, forward(theirs, now)))
 
 
 def states(scene: Scene, setting: str) -> Readings:
     """Single states, each set and evaluated by itself."""
-    model, data = opened(text(scene, 628, SETTINGS[setting]))
-    theirs, state = mjx.put_model(model), mjx.put_data(model, data)
-    found = Readings(setting)
-    for q, v in at_rest_of(model, data, scene):
-        _evaluate(found, model, forward(theirs, state.replace(qpos=jax.numpy.array(q), qvel=jax.numpy.array(v))))
+    written = text(scene, 628, SETTINGS[setting])
+    model, data = opened(written)
+    theirs, state, found = mjx.put_model(model), mjx.put_data(model, data), Readings(setting)
+    for q, v in states_of(written, scene):
+        given = state.replace(qpos=jax.numpy.array(q), qvel=jax.numpy.array(v))
+        found.read(scene, _evaluated(model, forward(theirs, given)))
     return found
 
 
-def _evaluate(found: Readings, model: Any, state: Any) -> None:
+def _evaluated(model: Any, state: Any) -> State:
     q, v, a, drive = (np.array(x) for x in (state.qpos, state.qvel, state.qacc, state.actuator_force))
     closing = np.array(getattr(state, "_impl", state).efc_force)[:2]
-    read(found, model, q, v, a, drive[model.actuator("drive").id], closing)
-    gap = np.linalg.norm(state.site_xpos[model.site("B3").id] - state.site_xpos[model.site("B4").id])
-    found.gap = max(found.gap, float(gap))
+    return reading(model, q, v, a, drive[model.actuator("drive").id], closing)

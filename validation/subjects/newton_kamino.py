@@ -1,7 +1,6 @@
 """Newton's Kamino solver (beta, single precision, maximal coordinates), from the USD file."""
 
 import tempfile
-import time
 from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
@@ -16,7 +15,8 @@ from fourbar.mjcf.simulators import SINGLE
 from fourbar.mjcf.usd import usd
 from fourbar.scene import Scene
 from validation.compare.answer import Array
-from validation.subjects.motion import Readings, gap, start, turn
+from validation.engines.description import turned
+from validation.subjects.motion import Readings, State, run_through, start, turn
 
 VERSION = version("newton")
 DEVICE = str(warp.get_preferred_device().name)
@@ -29,7 +29,7 @@ PARENTS = {"O2": None, "A": 0, "O4": None, "B": 2}
 
 def through(scene: Scene, steps: int, setting: str) -> Readings:
     """A turn in so many steps; forces are those of a step, with the state in which it began."""
-    timestep, stops = turn(scene, steps)
+    timestep, _ = turn(scene, steps)
     begin, inertia = start(scene), flywheel(scene, SINGLE)
     carried = replace(scene, effects=(*scene.effects, Flywheel(inertia, 2)))
     builder = newton.ModelBuilder()
@@ -45,32 +45,33 @@ def through(scene: Scene, steps: int, setting: str) -> Readings:
     now.joint_qd.assign(speeds)
     newton.eval_fk(model, now.joint_q, now.joint_qd, now)
     newton.solvers.SolverKamino(model).step(now, then, control, None, timestep)  # compiled before the clock runs
-    (t_2, t_32, t_4), found, done = begin.qpos, Readings(setting, steps), 0
+    t_2, t_32, t_4 = begin.qpos
     laid = {"O2": t_2, "A": t_32, "O4": t_4, "B": t_2 + t_32 - t_4}
-    for stop in stops:
-        began = time.process_time()
-        for _ in range(stop - done - 1):
+
+    def advance(n: int) -> tuple[Array, float]:
+        nonlocal now, then
+        for _ in range(n - 1):
             solver.step(now, then, control, None, timestep)
             now, then = then, now
         theta, speed = directions(now), float(now.joint_qd.numpy()[0])
         solver.step(now, then, control, None, timestep)
         now, then = then, now
-        found.seconds += time.process_time() - began
-        done = stop
+        return theta, speed
+
+    def read(before: tuple[Array, float]) -> State:
+        theta, speed = before
         alpha = (float(now.joint_qd.numpy()[0]) - speed) / timestep
         rows = solver._solver_kamino.data.joints.lambda_kin_j.numpy().astype(float).reshape(4, 5)[:, 1:3]
         forces = {}
         for row, (pin, parent) in zip(rows, PARENTS.items(), strict=True):
-            axes = laid[pin] + (0.0 if parent is None else theta[parent])
-            forces[pin] = complex(*row) * np.exp(1j * axes)
+            forces[pin] = np.array(turned(laid[pin] + (0.0 if parent is None else theta[parent]), *row))
         on_pins = {"F12": forces["O2"], "F32": -forces["A"], "F43": forces["B"], "F14": forces["O4"]}
-        pairs = {name: (force.real, force.imag) for name, force in on_pins.items()}
-        found.read(theta, speed, alpha, -inertia * alpha, pairs)
-        found.gap = max(found.gap, gap(scene, (theta[0], theta[1], theta[2])))
-    return found
+        return State(theta.tolist(), speed, alpha, -inertia * alpha, on_pins)
+
+    return run_through(scene, steps, setting, advance, read)
 
 
 def directions(state: newton.State) -> Array:
     """Of bars 2, 3, 4, rad."""
-    turned = state.body_q.numpy().astype(float)
-    return np.asarray(2.0 * np.arctan2(turned[:, 5], turned[:, 6]))
+    poses = state.body_q.numpy().astype(float)
+    return np.asarray(2.0 * np.arctan2(poses[:, 5], poses[:, 6]))

@@ -1,16 +1,16 @@
 """PyBullet: an articulated body, a point constraint at B, and a velocity motor on O2."""
 
 import tempfile
-import time
 from importlib.metadata import version
 from pathlib import Path
+from typing import Any
 
-import numpy as np
 import pybullet as bullet
 
 from fourbar.linkage import BAR_NAMES, FIRST_PIN
 from fourbar.scene import Scene
-from validation.subjects.motion import Readings, gap, start, turn, weight
+from validation.engines.description import parts
+from validation.subjects.motion import Readings, State, run_through, start, turn, weight
 
 VERSION = version("pybullet")
 STEPS = (628, 2512, 10048)
@@ -25,28 +25,22 @@ STRONG = 1e9
 
 def urdf(scene: Scene) -> str:
     """The tree: bars 2 and 3 one after the other, bar 4 on the ground; each link's frame lies in its mass centre."""
-    linkage = scene.linkage
-    theta_1, foot = linkage.ground_angle, {2: 0j, 3: complex(linkage.input.length)}
-    foot[4] = linkage.ground * complex(np.cos(theta_1), np.sin(theta_1))
-    parts = ['<robot name="four_bar"><link name="ground"/>']
-    for number, parent in ((2, 1), (3, 2), (4, 1)):
-        bar = linkage.bar(number)
-        turned = " ".join(f'{axes}="{bar.moment_of_inertia!r}"' for axes in ("ixx", "iyy", "izz"))
-        parts.append(
-            f'<link name="{BAR_NAMES[number]}"><inertial>'
-            f'<origin xyz="{bar.to_centre.real!r} {bar.to_centre.imag!r} 0"/>'
-            f'<mass value="{bar.mass!r}"/><inertia {turned} ixy="0" ixz="0" iyz="0"/></inertial></link>'
-            f'<joint name="{FIRST_PIN[number]}" type="continuous"><parent link="{BAR_NAMES[parent]}"/>'
-            f'<child link="{BAR_NAMES[number]}"/><origin xyz="{foot[number].real!r} {foot[number].imag!r} 0"/>'
+    links = ['<robot name="four_bar"><link name="ground"/>']
+    for part in parts(scene.linkage):
+        turned = " ".join(f'{axes}="{part.inertia!r}"' for axes in ("ixx", "iyy", "izz"))
+        links.append(
+            f'<link name="{BAR_NAMES[part.bar]}"><inertial><origin xyz="{part.centre[0]!r} {part.centre[1]!r} 0"/>'
+            f'<mass value="{part.mass!r}"/><inertia {turned} ixy="0" ixz="0" iyz="0"/></inertial></link>'
+            f'<joint name="{FIRST_PIN[part.bar]}" type="continuous"><parent link="{BAR_NAMES[part.bearer]}"/>'
+            f'<child link="{BAR_NAMES[part.bar]}"/><origin xyz="{part.foot[0]!r} {part.foot[1]!r} 0"/>'
             '<axis xyz="0 0 1"/></joint>'
         )
-    return "".join([*parts, "</robot>"])
+    return "".join([*links, "</robot>"])
 
 
 def through(scene: Scene, steps: int, setting: str) -> Readings:
     """A turn in so many steps; torque and force are those with which the step began."""
-    timestep, stops = turn(scene, steps)
-    begin, linkage = start(scene), scene.linkage
+    (timestep, _), begin = turn(scene, steps), start(scene)
     client = bullet.connect(bullet.DIRECT)
     try:
         with tempfile.TemporaryDirectory() as folder:
@@ -63,26 +57,25 @@ def through(scene: Scene, steps: int, setting: str) -> Readings:
         bullet.changeDynamics(body, -1, linearDamping=0.0, angularDamping=0.0)
         drive = {"targetVelocity": begin.qvel[0], "force": STRONG}
         bullet.setJointMotorControl2(body, 0, bullet.VELOCITY_CONTROL, **drive)
-        ends = [linkage.bar(n).length - linkage.bar(n).to_centre for n in (3, 4)]
-        frames = [[end.real, end.imag, 0.0] for end in ends]
+        _, three, four = parts(scene.linkage)
+        frames = [[part.length - part.centre[0], -part.centre[1], 0.0] for part in (three, four)]
         none = [0.0, 0.0, 0.0]
         ball = bullet.createConstraint(body, 1, body, 2, bullet.JOINT_POINT2POINT, none, *frames)
         bullet.changeConstraint(ball, maxForce=STRONG)
-        found, done = Readings(setting, steps), 0
-        for stop in stops:
-            began = time.process_time()
-            for _ in range(stop - done - 1):
+
+        def advance(n: int) -> list[Any]:
+            for _ in range(n - 1):
                 bullet.stepSimulation()
             before = [bullet.getJointState(body, joint)[:2] for joint in range(3)]
             bullet.stepSimulation()
-            found.seconds += time.process_time() - began
-            done = stop
-            after = bullet.getJointState(body, 0)
-            q, speed = [state[0] for state in before], before[0][1]
+            return before
+
+        def read(before: list[Any]) -> State:
+            after, q, speed = bullet.getJointState(body, 0), [state[0] for state in before], before[0][1]
             force = [-part for part in bullet.getConstraintState(ball)[:2]]  # it speaks of the force on the child
             theta = (q[0], q[0] + q[1], q[2])
-            found.read(theta, speed, (after[1] - speed) / timestep, after[3], {"F43": force})
-            found.gap = max(found.gap, gap(scene, theta))
-        return found
+            return State(theta, speed, (after[1] - speed) / timestep, after[3], {"F43": force})
+
+        return run_through(scene, steps, setting, advance, read)
     finally:
         bullet.disconnect(client)

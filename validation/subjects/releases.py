@@ -2,7 +2,6 @@
 
 import os
 import re
-import subprocess
 import sys
 import sysconfig
 import venv
@@ -14,7 +13,7 @@ from pathlib import Path
 from fourbar.errors import DependencyError, InputError
 from validation.regression.history import Run
 from validation.report.machine import PACKAGES
-from validation.run.elsewhere import CHECKOUT
+from validation.run.elsewhere import Ended, ended
 
 MODULES = {name: name for name in ("mujoco", "pinocchio", "exudyn", "opensim")} | {"drake": "pydrake"}
 """By engine: what must be importable, and which witnesses it is (`Witness.library`)."""
@@ -49,18 +48,17 @@ def known(engine: str) -> str:
     return MODULES[engine]
 
 
-def pip(python: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+def pip(python: Path, *arguments: str) -> Ended:
     """Pip's answer, with the index that the user has set up for it."""
-    command = [sys.executable, "-m", "pip", "--python", str(python), "--disable-pip-version-check", *arguments]
-    return subprocess.run(command, capture_output=True, text=True, check=False)
+    return ended([sys.executable, "-m", "pip", "--python", python, "--disable-pip-version-check", *arguments])
 
 
 def released(engine: str, first: str | None, last: str | None) -> list[str]:
     """The versions that pip's index has, from the oldest to the newest; of them those from `first` to `last`."""
     done = pip(Path(sys.executable), "index", "versions", distribution(engine))
-    listed = [line.removeprefix(LISTED) for line in done.stdout.splitlines() if line.startswith(LISTED)]
-    if done.returncode or not listed:
-        raise DependencyError(f"pip lists no versions of {distribution(engine)}: {_reason(done.stderr)}")
+    listed = [line.removeprefix(LISTED) for line in done.out.splitlines() if line.startswith(LISTED)]
+    if done.why or not listed:
+        raise DependencyError(f"pip lists no versions of {distribution(engine)}: {_reason(done)}")
     found = [version.strip() for version in listed[0].split(",")][::-1]
     for option, version in (("--from", first), ("--to", last)):
         if version is not None and version not in found:
@@ -86,30 +84,23 @@ def installed(engine: str, version: str, cache: Path, more: Sequence[str] = ()) 
         wanted = f"{distribution(engine)}=={version}"
         options = ("install", "--only-binary=:all:", "--no-compile", wanted)
         done = pip(python, *options, *more)
-        if done.returncode and more:
+        if done.why and more:
             done = pip(python, *options)
-        if done.returncode:
-            return None, f"does not install: {_reason(done.stderr)}"
-        site = Path(_answered(python, "import sysconfig; print(sysconfig.get_path('purelib'))")[0])
+        if done.why:
+            return None, f"does not install: {_reason(done)}"
+        site = Path(ended([python, "-c", "import sysconfig; print(sysconfig.get_path('purelib'))"]).out.strip())
         own = dict.fromkeys(sysconfig.get_path(name) for name in ("purelib", "platlib"))
         (site / "zz_of_the_harness.pth").write_text("\n".join(own) + "\n", encoding="utf-8")  # read after all others
         (folder / DONE).touch()
-    where, failed = _answered(python, f"import {MODULES[engine]} as engine; print(engine.__file__)")
-    if failed:
-        return None, f"does not load: {failed}"
-    if folder not in Path(where).parents:
+    done = ended([python, "-c", f"import {MODULES[engine]} as engine; print(engine.__file__)"])
+    if done.why:
+        return None, f"does not load: {done.why}"
+    if folder not in Path(done.out.strip().splitlines()[-1]).parents:
         return None, f"does not load: another {engine} is found in its stead"
     return python, ""
 
 
-def _answered(python: Path, code: str) -> tuple[str, str]:
-    """What a line of code prints last, and what went wrong."""
-    done = subprocess.run([str(python), "-c", code], cwd=CHECKOUT, capture_output=True, text=True, check=False)
-    return (done.stdout.strip().splitlines() or [""])[-1], _reason(done.stderr) if done.returncode else ""
-
-
-def _reason(errors: str) -> str:
-    """The one line of a page of errors that says why."""
-    lines = [line.strip() for line in errors.splitlines() if line.strip()]
-    stated = [line.removeprefix("ERROR:").strip() for line in lines if line.startswith("ERROR:")]
-    return stated[0].partition(" (from versions")[0] if stated else (lines or ["no word"])[-1]
+def _reason(done: Ended) -> str:
+    """The one line of pip's errors that says why."""
+    stated = [line.removeprefix("ERROR:").strip() for line in done.errors.splitlines() if line.startswith("ERROR:")]
+    return stated[0].partition(" (from versions")[0] if stated else done.why or "no word"

@@ -1,8 +1,6 @@
 """`python -m validation standing`: what simulators say of one closed loop, on one page."""
 
 import ast
-import csv
-import io
 import sys
 from pathlib import Path
 from typing import Any
@@ -12,6 +10,7 @@ import click
 import fourbar
 from fourbar.errors import InputError
 from fourbar.writing import write_text
+from validation.compare.rows import csv_text
 from validation.report.machine import machine
 from validation.report.svg import drawn
 from validation.report.templating import environment
@@ -80,14 +79,12 @@ def cells(line: Line) -> list[str]:
 
 def table(found: Standing) -> str:
     """CSV, every digit."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(["subject", "version", "setting", "steps", *TORQUE_AND_FORCES, "gap", "cpu_s_per_s", "order"])
+    columns = ["subject", "version", "setting", "steps", *TORQUE_AND_FORCES, "gap", "cpu_s_per_s", "order"]
+    rows: list[list[Any]] = []
     for line in found.lines:
-        values: list[Any] = [line.errors.get(name, "") for name in TORQUE_AND_FORCES]
-        optional = [line.gap, line.cost, line.order]
-        writer.writerow([line.subject, line.version, line.setting, line.steps, *values, *optional])
-    return text.getvalue()
+        values = [line.errors.get(name) for name in TORQUE_AND_FORCES]
+        rows.append([line.subject, line.version, line.setting, line.steps, *values, line.gap, line.cost, line.order])
+    return csv_text(columns, rows)
 
 
 def work_precision(found: Standing) -> str:

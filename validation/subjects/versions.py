@@ -2,7 +2,6 @@
 
 import json
 import os
-import subprocess
 import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -20,7 +19,7 @@ from validation.regression.changes import differences
 from validation.regression.history import Run
 from validation.regression.record import read_run
 from validation.regression.steps import NO_CHANGE
-from validation.run.elsewhere import CHECKOUT, ElsewhereError, run_elsewhere
+from validation.run.elsewhere import ElsewhereError, ended, run_elsewhere
 from validation.subjects.releases import Release, installed, known, released
 from validation.subjects.versions_page import changed, written
 
@@ -104,9 +103,8 @@ def command(
 def timed(python: Path, scene: Path, witnesses: Sequence[str]) -> dict[str, float]:
     """What one position of a scene costs each witness under another Python, s of the processor's clock."""
     code = "import sys; from validation.subjects.versions import clock; clock(*sys.argv[1:])"
-    command = [str(python), "-c", code, str(scene), *witnesses]
-    done = subprocess.run(command, cwd=CHECKOUT, capture_output=True, text=True, check=False)
-    return json.loads(done.stdout.splitlines()[-1]) if done.returncode == 0 else {}
+    done = ended([python, "-c", code, scene, *witnesses])
+    return {} if done.why else json.loads(done.out.splitlines()[-1])
 
 
 def clock(file: str, *names: str) -> None:

@@ -1,13 +1,11 @@
 """The pages of the versions of an engine: where something changed, a table, a chart; Markdown, CSV, JSON and SVG."""
 
-import csv
-import io
 import json
 import math
 from collections.abc import Sequence
 from typing import Any
 
-from validation.compare.rows import FAILS, REFUSES
+from validation.compare.rows import FAILS, REFUSES, csv_text
 from validation.regression.change import Change, Kind
 from validation.regression.render import line
 from validation.regression.steps import NO_CHANGE, Step, steps
@@ -82,10 +80,7 @@ COLUMNS = ("version", "engine", *TORQUE_AND_FORCES, "compared", FAILS, REFUSES, 
 def written(engine: str, found: Sequence[Release], left: int, more: Sequence[str] = ()) -> dict[str, str]:
     """The text of each file by its name."""
     rows, sentences = lines(found), changed(found)
-    table = io.StringIO()
-    writer = csv.writer(table, lineterminator="\n")
-    writer.writerow(COLUMNS)
-    writer.writerows([row.get(name) for name in COLUMNS] for row in rows)
+    table = csv_text(COLUMNS, ([row.get(name) for name in COLUMNS] for row in rows))
     about = next(release.run.about for release in found if release.run is not None)
     plain = [{key: None if isinstance(x, float) and math.isnan(x) else x for key, x in row.items()} for row in rows]
     kept = {"schema": SCHEMA, "engine": engine, "machine": machine(), "changed": sentences, "versions": plain}
@@ -93,7 +88,7 @@ def written(engine: str, found: Sequence[Release], left: int, more: Sequence[str
     shown = [[_cell(name, row.get(name)) for name in COLUMNS] for row in rows]
     made = {"machine": machine(), "python": about.versions.get("python", ""), "left": left, "more": more}
     page = template.render(engine=engine, rows=shown, columns=COLUMNS, changed=sentences, **made)
-    texts = {"csv": table.getvalue(), "json": json.dumps(kept, indent=1) + "\n", "md": page, "svg": chart(rows)}
+    texts = {"csv": table, "json": json.dumps(kept, indent=1) + "\n", "md": page, "svg": chart(rows)}
     return {f"versions.{ending}": text for ending, text in texts.items()}
 
 

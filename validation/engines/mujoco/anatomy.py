@@ -23,6 +23,17 @@ STRAIGHT = 1e-9
 """A hinge tilted by more than this (sine) leaves the plane."""
 
 
+def body_named(model: mujoco.MjModel, name: str) -> int | None:
+    """The body of a name, by what it is welded to; None where there is none."""
+    number = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, name)
+    return int(model.body_weldid[number]) if number >= 0 else None
+
+
+def bodies_of(model: mujoco.MjModel) -> str:
+    """The bodies of a file by name, for a message."""
+    return ", ".join(model.body(i).name or f"(unnamed {i})" for i in range(1, model.nbody))
+
+
 class Anatomy:
     """Bars, pins, hinges and closure of a compiled model; everything is measured in its rest state."""
 
@@ -54,11 +65,16 @@ class Anatomy:
 
     def _body(self, names: Mapping[str, str], role: str) -> int:
         name = names.get(role, role)
-        number = mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_BODY, name)
-        if number < 0:
-            known = ", ".join(self.model.body(i).name or f"(unnamed {i})" for i in range(1, self.model.nbody))
-            raise InputError("--name", f"{role}={name}", f"no such body; the file has: {known}")
-        return int(self.model.body_weldid[number])
+        body = body_named(self.model, name)
+        if body is None:
+            raise InputError("--name", f"{role}={name}", f"no such body; the file has: {bodies_of(self.model)}")
+        return body
+
+    def drives(self) -> list[int]:
+        """The actuators that turn pin O2."""
+        model, joint = self.model, self.hinge.get("O2")
+        on_joints = np.flatnonzero(model.actuator_trntype == mujoco.mjtTrn.mjTRN_JOINT).tolist()
+        return [i for i in on_joints if model.actuator_trnid[i, 0] == joint]
 
     def bar(self, body: int) -> int | None:
         """The bar that a body belongs to; None where it is no part of the four-bar."""

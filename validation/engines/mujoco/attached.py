@@ -37,30 +37,22 @@ def limits(model: mujoco.MjModel, field: str, row: int, key: str, *, switched_on
     return {f"{key}.{name}": "free" if free else _numbers(getattr(model, field)[row])}
 
 
-def on_the_drive(anatomy: Anatomy, pin: str, joint: int) -> Described:
+def on_the_drive(anatomy: Anatomy, pin: str) -> Described:
     """Damping that actuators on the crank's pin bring along."""
     model = anatomy.model
     if pin != "O2":
         return {}
-    drives = [i for i in range(len(model.actuator_trntype)) if _is_drive(model, i, joint)]
     return {
-        f"pins.O2.{name}": _numbers(getattr(model, field)[drives].sum(axis=0))
+        f"pins.O2.{name}": _numbers(getattr(model, field)[anatomy.drives()].sum(axis=0))
         for field, name in DRIVE.items()
         if hasattr(model, field)
     }
 
 
-def _is_drive(model: mujoco.MjModel, actuator: int, joint: int | None) -> bool:
-    on_a_joint = model.actuator_trntype[actuator] == mujoco.mjtTrn.mjTRN_JOINT
-    return bool(on_a_joint and model.actuator_trnid[actuator, 0] == joint)
-
-
 def actuators(anatomy: Anatomy) -> Described:
     """Every actuator but the drive, which is taken off: what it acts on, where, and with which wrench."""
     model, found = anatomy.model, Described()
-    for i in range(len(model.actuator_trntype)):
-        if _is_drive(model, i, anatomy.hinge.get("O2")):
-            continue
+    for i in sorted({*range(len(model.actuator_trntype))} - {*anatomy.drives()}):
         key = f"actuators.{i}"
         found[f"{key}.name"] = model.actuator(i).name
         out = int(model.actuator_outadr[i]) if hasattr(model, "actuator_outadr") else i

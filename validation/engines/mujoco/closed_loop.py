@@ -1,22 +1,31 @@
 """A compiled MJCF as a closed loop: MuJoCo's own kinematics, assembly, velocities and pin forces."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
+from validation.compare.answer import Array
 from validation.engines.loop import Position
+from validation.engines.tree import Bars, closed
 
-Array = NDArray[np.float64]
 CARRIED_BY = {"input": ("input",), "coupler": ("coupler", "input"), "output": ("output",)}
 """The bodies whose parent bears what acts on a body."""
 O2, A, O4 = 0, 1, 2
 """Degrees of freedom, in the order of the bodies."""
+TURNED_BY = {2: [O2], 3: [O2, A], 4: [O4]}
+"""Joints whose angles a bar's rotation is the sum of."""
 WARNINGS = (mujoco.mjtWarning.mjWARN_BADQPOS, mujoco.mjtWarning.mjWARN_BADQVEL, mujoco.mjtWarning.mjWARN_BADQACC)
 
 
-class ClosedLoop:
+def load_force(model: mujoco.MjModel, data: mujoco.MjData, actuator: int) -> Array:
+    """World force of an actuator on a site, (3,): MuJoCo counts it into the force of the parent."""
+    site, frame = model.actuator_trnid[actuator]
+    axes = data.site_xmat[frame if frame >= 0 else site].reshape(3, 3)
+    return np.asarray(axes @ model.actuator_gear[actuator, :3] * data.actuator_force[actuator])
+
+
+class ClosedLoop(Bars):
     """Model and data of one generated MJCF; nothing is edited after it is compiled."""
 
     def __init__(self, mjcf: str) -> None:
@@ -56,7 +65,7 @@ class ClosedLoop:
 
     def position(self) -> Position:
         """Own assembly, position after position."""
-        return Position(self)  # type: ignore[arg-type]  # it asks a tree for place, gap, jacobian, positions alone
+        return Position(self)
 
     def branch(self) -> int:
         """The branch of the state that was last forwarded: det = -b c sin(theta_4 - theta_3)."""
@@ -66,9 +75,7 @@ class ClosedLoop:
         """Start from own joint angles at omega_2, with the velocities that keep the gap closed."""
         mujoco.mj_resetData(self.model, self.data)
         self.place(q)
-        jacobian = self.jacobian()
-        v = np.linalg.solve(jacobian[:, [A, O4]], -jacobian[:, O2] * omega_2)
-        self.data.qvel[:] = (omega_2, v[0], v[1])
+        self.data.qvel[:3] = closed(self.jacobian()[:, :3], omega_2)
 
     def forward(self) -> None:
         """Everything at the present state: after a Runge-Kutta step some fields are still of the step before."""
@@ -90,17 +97,10 @@ class ClosedLoop:
         d = self.data
         on = {name: d.cfrc_int[body][3:5].copy() for name, body in self.body.items()}
         for actuator, body in self.loads:
-            force = self._load_force(actuator)
+            force = load_force(self.model, self.data, actuator)[:2]
             for name in CARRIED_BY[self.model.body(body).name]:
                 on[name] -= force
         return on
-
-    def _load_force(self, actuator: int) -> Array:
-        """Force of a load actuator, in world axes, (2,)."""
-        site, frame = self.model.actuator_trnid[actuator]
-        axes = self.data.site_xmat[frame if frame >= 0 else site].reshape(3, 3)
-        gear = self.model.actuator_gear[actuator, :3]
-        return np.asarray((axes @ gear)[:2] * self.data.actuator_force[actuator])
 
     def crank_torque(self) -> float:
         """T2: what the flywheel gives the crank, and the motor next to it, N m."""
@@ -137,8 +137,8 @@ def couple_elsewhere(
     happened = loop.data.qacc[O2]
     # the light flywheel's motor gives it alpha_2 as commanded; this gives it what the crank really had
     correction = light.model.dof_armature[O2] * (happened - alpha_2)
-    acts_on = [O2, A] if drive_bar == 3 else [O4]
-    speed = sum(d.qvel[dof] for dof in acts_on)
+    acts_on = TURNED_BY[drive_bar]
+    speed = d.qvel[acts_on].sum()
     guess = crank_torque * d.qvel[O2] / speed if speed else crank_torque
     trials = (0.5 * guess, 1.5 * guess) if guess else (-1.0, 1.0)
 
@@ -148,10 +148,25 @@ def couple_elsewhere(
         mujoco.mj_forward(light.model, d)
         return float(d.qacc[O2])
 
-    low, high = (crank_acceleration(couple) for couple in trials)
-    if high == low:
-        return None
-    couple = trials[0] + (trials[1] - trials[0]) * (happened - low) / (high - low)
-    crank_acceleration(couple)
+    couple = couple_for(crank_acceleration, happened, *trials)
     mujoco.mj_rnePostConstraint(light.model, d)
+    return couple
+
+
+def couple_for(
+    acceleration: Callable[[float], float], wanted: float, low: float, high: float, refinements: int = 0
+) -> float | None:
+    """The couple under which an acceleration, linear in it, is the wanted one, and which was evaluated last.
+
+    None where it does not depend on the couple. The difference of the two trials loses digits: each refinement, from
+    where the couple before leads, brings some of them back.
+    """
+    at_low, at_high = acceleration(low), acceleration(high)
+    slope = (at_high - at_low) / (high - low)
+    if slope == 0.0 or not np.isfinite(slope):
+        return None
+    couple = low + (wanted - at_low) / slope
+    for _ in range(refinements):
+        couple += (wanted - acceleration(couple)) / slope
+    acceleration(couple)
     return float(couple)

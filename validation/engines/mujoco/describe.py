@@ -114,7 +114,7 @@ def _pin(anatomy: Anatomy, pin: str, joint: int) -> Described:
         found |= direct(model, field, dof if field.startswith("dof") else joint, f"{key}.{name}")
     for field in ("jnt_range", "jnt_actfrcrange"):
         found |= limits(model, field, joint, key, switched_on=field != "jnt_range" or _on(model, "LIMIT"))
-    return found | on_the_drive(anatomy, pin, joint)
+    return found | on_the_drive(anatomy, pin)
 
 
 def _closure(anatomy: Anatomy) -> Described:

@@ -4,11 +4,9 @@ Each builds a loop from the generated text; the flywheel of the text is taken ou
 drive takes its place, and the torque is read where that drive exerts it.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from functools import partial
 from xml.etree import ElementTree as ET
-
-import mujoco
-import numpy as np
 
 from fourbar.mjcf.model import text as numbers
 from validation.engines.mujoco.closed_loop import O2, ClosedLoop
@@ -17,8 +15,8 @@ WHEEL = 1e8
 """Armature of the kinematic wheel that a joint equality follows, relative to the crank's dof inertia."""
 POSITION_GAIN, VELOCITY_GAIN = 1e6, 1e4
 """kp of the stiff servo, per (inertia omega^2), and kv of servo and velocity actuator, per (inertia omega)."""
-GENTLE_POSITION_GAIN, GENTLE_VELOCITY_GAIN = 1.0, 1.0
-"""Gains that an explicit integrator can follow: they droop, and the motion that happened is what is compared."""
+GENTLE_GAIN = 1.0
+"""Of position and of speed, that an explicit integrator can follow: the drive droops."""
 
 
 class Softened(ClosedLoop):
@@ -53,60 +51,50 @@ class Driven(ClosedLoop):
         return float(self.data.actuator_force[self.servo])
 
 
-class VelocityActuator(Driven):
-    """A velocity actuator: it droops, so the motion that happened is what is compared."""
+class Actuated(Driven):
+    """An actuator on O2: of speed alone, or a position servo whose target turns at omega, as `intvelocity`'s does.
 
-    gain = VELOCITY_GAIN
+    Parameters
+    ----------
+    position : kp per (inertia omega^2); none: kv (omega - omega_2), without a control input, by the affine bias.
+    velocity : kv per (inertia omega).
+    """
 
-    def add_drive(self, root: ET.Element) -> None:
-        """kv (omega - omega_2), without a control input: the affine bias holds the speed."""
-        kv = self.gain * self.flywheel * abs(self.omega)
-        actuators = root.find("actuator")
-        actuators = ET.SubElement(root, "actuator") if actuators is None else actuators
-        bias = {
-            "gaintype": "fixed",
-            "gainprm": "0",
-            "biastype": "affine",
-            "biasprm": numbers(kv * self.omega, 0.0, -kv),
-        }
-        ET.SubElement(actuators, "general", bias, name="servo", joint="O2")
-
-
-class Servo(Driven):
-    """A position servo whose target turns at omega: the integrated set-point of `intvelocity`."""
-
-    gains = (POSITION_GAIN, VELOCITY_GAIN)
+    def __init__(self, mjcf: str, omega: float, position: float, velocity: float) -> None:
+        self.kp, self.kv = position, velocity
+        super().__init__(mjcf, omega)
 
     def add_drive(self, root: ET.Element) -> None:
         """kp (act - theta_2) + kv (omega - omega_2), act integrating omega."""
-        kp, kv = self.gains[0] * self.flywheel * self.omega**2, self.gains[1] * self.flywheel * abs(self.omega)
+        kp, kv = self.kp * self.flywheel * self.omega**2, self.kv * self.flywheel * abs(self.omega)
         actuators = root.find("actuator")
         actuators = ET.SubElement(root, "actuator") if actuators is None else actuators
-        servo = {
-            "dyntype": "integrator",
-            "gaintype": "fixed",
-            "gainprm": numbers(kp),
-            "biastype": "affine",
-            "biasprm": numbers(kv * self.omega, -kp, -kv),
-        }
-        ET.SubElement(actuators, "general", servo, name="servo", joint="O2")
+        servo = {"dyntype": "integrator"} if kp else {}
+        servo |= {"gaintype": "fixed", "gainprm": numbers(kp), "biastype": "affine"}
+        ET.SubElement(actuators, "general", servo, biasprm=numbers(kv * self.omega, -kp, -kv), name="servo", joint="O2")
 
     def set_state(self, q: Sequence[float], omega_2: float) -> None:
         """The target starts where the crank is."""
         super().set_state(q, omega_2)
-        self.data.act[:] = q[O2]
-        self.data.ctrl[self.servo] = self.omega
+        if self.kp:
+            self.data.act[:] = q[O2]
+            self.data.ctrl[self.servo] = self.omega
+
+
+Servo = partial(Actuated, position=POSITION_GAIN, velocity=VELOCITY_GAIN)
+GentleServo = partial(Actuated, position=GENTLE_GAIN, velocity=GENTLE_GAIN)
+VelocityActuator = partial(Actuated, position=0.0, velocity=VELOCITY_GAIN)
+"""It droops, so the motion that happened is what is compared."""
+GentleVelocityActuator = partial(Actuated, position=0.0, velocity=GENTLE_GAIN)
 
 
 class WheelEquality(Driven):
     """A joint equality to a kinematic wheel: a second, heavy body that turns at omega next to the linkage."""
 
-    softness = 1.0
-    """Factor on dof_invweight0: how soft the equality is, edited after compile; 1: plain MJCF."""
-
-    def __init__(self, mjcf: str, omega: float) -> None:
+    def __init__(self, mjcf: str, omega: float, softness: float = 1.0) -> None:
+        """`softness`: factor on dof_invweight0, how soft the equality is, edited after compile; 1: plain MJCF."""
         super().__init__(mjcf, omega)
-        self.model.dof_invweight0[:] *= self.softness
+        self.model.dof_invweight0[:] *= softness
         self.row = 3  # the closure takes three rows, the joint equality the next
 
     def add_drive(self, root: ET.Element) -> None:
@@ -126,55 +114,32 @@ class WheelEquality(Driven):
         super().place((*q, q[O2]))
 
     def set_state(self, q: Sequence[float], omega_2: float) -> None:
-        """Velocities that keep the gap closed, the wheel's the crank's."""
-        mujoco.mj_resetData(self.model, self.data)
-        self.place(q)
-        jacobian = self.jacobian()
-        v = np.linalg.solve(jacobian[:, [1, 2]], -jacobian[:, O2] * omega_2)
-        self.data.qvel[:] = (omega_2, v[0], v[1], omega_2)
+        """The wheel turns as the crank does."""
+        super().set_state(q, omega_2)
+        self.data.qvel[3] = omega_2
 
     def crank_torque(self) -> float:
         """The multiplier of the joint equality: its row of the Jacobian is 1 at the crank."""
         return float(self.data.efc_force[self.row])
 
 
-class StiffWheelEquality(WheelEquality):
-    """The same with its softness edited down as far as the closure's is by the pads."""
-
-    softness = 1e-8
+StiffWheelEquality = partial(WheelEquality, softness=1e-8)
+"""Its softness edited down as far as the closure's is by the pads."""
 
 
-class GentleVelocityActuator(VelocityActuator):
-    """The same with a gain that an explicit integrator can follow."""
-
-    gain = GENTLE_VELOCITY_GAIN
-
-
-class GentleServo(Servo):
-    """The same with gains that an explicit integrator can follow."""
-
-    gains = (GENTLE_POSITION_GAIN, GENTLE_VELOCITY_GAIN)
-
-
-class DefaultClosure(ClosedLoop):
-    """solref and solimp left to MuJoCo: 0.02 s, impedance 0.9 to 0.95."""
-
-    def __init__(self, mjcf: str, _omega: float = 0.0) -> None:
-        root = ET.fromstring(mjcf)
-        closure = root.find("equality/connect")
-        assert closure is not None
-        for key in ("solref", "solimp"):
-            del closure.attrib[key]
-        super().__init__(ET.tostring(root, encoding="unicode"))
+def without(mjcf: str, attributes: Mapping[str, Sequence[str]]) -> str:
+    """A text without these attributes of the elements at these paths: what they say is left to MuJoCo."""
+    root = ET.fromstring(mjcf)
+    for path, names in attributes.items():
+        element = root.find(path)
+        assert element is not None
+        for name in names:
+            element.attrib.pop(name, None)
+    return ET.tostring(root, encoding="unicode")
 
 
-class AllDefaults(DefaultClosure):
-    """The solver left to MuJoCo too: Newton to 1e-8 in at most 100 iterations."""
-
-    def __init__(self, mjcf: str, omega: float = 0.0) -> None:
-        root = ET.fromstring(mjcf)
-        option = root.find("option")
-        assert option is not None
-        for key in ("solver", "tolerance", "iterations"):
-            del option.attrib[key]
-        super().__init__(ET.tostring(root, encoding="unicode"), omega)
+def all_defaults(mjcf: str, _: float = 0.0) -> ClosedLoop:
+    """solref, solimp and the solver left to MuJoCo: 0.02 s, impedance 0.9 to 0.95, Newton to 1e-8."""
+    return ClosedLoop(
+        without(mjcf, {"option": ("solver", "tolerance", "iterations"), "equality/connect": ("solref", "solimp")})
+    )

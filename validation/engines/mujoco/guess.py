@@ -8,7 +8,7 @@ import mujoco
 
 from fourbar.errors import InputError
 from fourbar.linkage import BAR_NAMES, MOVING_BARS
-from validation.engines.mujoco.anatomy import Anatomy
+from validation.engines.mujoco.anatomy import Anatomy, bodies_of, body_named
 
 ROLES = tuple(BAR_NAMES[bar] for bar in MOVING_BARS)
 SITES = ("B3", "B4")
@@ -28,10 +28,10 @@ def anatomy_of(model: mujoco.MjModel, names: Mapping[str, str], lengths: Sequenc
     Raises InputError in one line: why no three bodies fit.
     """
     known = {role: names.get(role, role) for role in (*ROLES, *SITES)}
-    bodies = [_body(model, known[role]) for role in ROLES]
+    bodies = [body_named(model, known[role]) for role in ROLES]
     for role, body in zip(ROLES, bodies, strict=True):
         if role in names and body is None:
-            raise InputError("--name", f"{role}={names[role]}", f"no such body; the file has: {_bodies(model)}")
+            raise InputError("--name", f"{role}={names[role]}", f"no such body; the file has: {bodies_of(model)}")
     if None not in bodies and (_site(model, known["B3"]) or names.keys() & {*SITES} or not _open_sites(model)):
         return Anatomy(model, names), []
     candidates = sorted({int(model.body_weldid[model.jnt_bodyid[joint]]) for joint in range(model.njnt)})
@@ -47,26 +47,17 @@ def anatomy_of(model: mujoco.MjModel, names: Mapping[str, str], lengths: Sequenc
         for sites in _sites(model, {**known, **guess}, names):
             try:
                 anatomy = Anatomy(model, {**names, **guess, **sites})
-                found.append((_misfit(anatomy, lengths), not _driven(anatomy), anatomy, {**guess, **sites}))
+                found.append((_misfit(anatomy, lengths), not anatomy.drives(), anatomy, {**guess, **sites}))
             except InputError as error:
                 refused.append(error.allowed)
     if not found:
         why = refused[0] if refused else "it has fewer bodies on hinges"
         nowhere = f"no body is named {', '.join(missing) or 'B3, B4'}, and no guess makes a four-bar ({why})"
-        raise InputError("--mjcf", _bodies(model), f"{nowhere}; say which is which: --name input=BODY, and so on")
+        raise InputError("--mjcf", bodies_of(model), f"{nowhere}; say which is which: --name input=BODY, and so on")
     best = min(each[0] for each in found)
     _, _, anatomy, guessed = min((each for each in found if each[0] <= best + ALIKE), key=lambda each: each[1])
     pairs = ", ".join(f"{role}={name}" for role, name in guessed.items())
     return anatomy, [f"guessed from what hangs together and from the lengths: {pairs} (--name states it otherwise)"]
-
-
-def _body(model: mujoco.MjModel, name: str) -> int | None:
-    number = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, name)
-    return int(model.body_weldid[number]) if number >= 0 else None
-
-
-def _bodies(model: mujoco.MjModel) -> str:
-    return ", ".join(model.body(i).name or f"(unnamed {i})" for i in range(1, model.nbody))
 
 
 def _site(model: mujoco.MjModel, name: str) -> bool:
@@ -84,7 +75,7 @@ def _sites(model: mujoco.MjModel, known: Mapping[str, str], names: Mapping[str, 
     if not _open_sites(model) or names.keys() & {*SITES} or _site(model, known["B3"]):
         return [{}]
     on = {role: [model.site(i).name for i in range(model.nsite) if model.site(i).name
-                 and int(model.body_weldid[model.site_bodyid[i]]) == _body(model, known[role])]
+                 and int(model.body_weldid[model.site_bodyid[i]]) == body_named(model, known[role])]
           for role in ("coupler", "output")}  # fmt: skip
     return [{"B3": three, "B4": four} for three in on["coupler"] for four in on["output"]]
 
@@ -95,11 +86,3 @@ def _misfit(anatomy: Anatomy, lengths: Sequence[float]) -> float:
     if min(theirs) <= 0.0:
         return math.inf
     return sum(abs(math.log(one / other)) for one, other in zip(theirs, lengths, strict=True))
-
-
-def _driven(anatomy: Anatomy) -> bool:
-    """Whether an actuator turns pin O2."""
-    model, joint = anatomy.model, anatomy.hinge.get("O2")
-    turns = mujoco.mjtTrn.mjTRN_JOINT
-    return any(model.actuator_trntype[i] == turns and model.actuator_trnid[i, 0] == joint
-               for i in range(len(model.actuator_trntype)))  # fmt: skip

@@ -3,7 +3,6 @@
 import bisect
 import math
 from collections.abc import Sequence
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,29 +16,11 @@ LOOKED_AT = 2000
 """Instants at which a law is searched for its greatest speed and acceleration; between them it hardly differs."""
 
 
-class Passage(Protocol):
-    """One stretch, from its first position on."""
-
-    omega: float
-    """At the start, rad/s."""
-    fastest: float
-    """The greatest |omega_2|, rad/s."""
-
-    def timestep(self, settings: Settings) -> float:
-        """The timestep of the settings for this stretch, s."""
-
-    def seconds(self, index: int) -> float:
-        """When it passes a position, from the start of the stretch."""
-
-    def speed(self, turned: float, seconds: float) -> float:
-        """|omega_2| that is due after a turn (rad) and a time."""
-
-    def alpha(self, seconds: float) -> float:
-        """What the drive is given, rad/s^2."""
-
-
 class Steady:
-    """At constant alpha_2, through positions in the order of their angles."""
+    """A stretch of positions in the order of their angles, at constant alpha_2.
+
+    As of `Lawful`, `omega` is the speed at the start and `fastest` the greatest |omega_2|, rad/s.
+    """
 
     def __init__(self, command: Command, stretch: Sequence[int], omega: float, alpha: float) -> None:
         self.theta_2 = command.theta_2
@@ -49,24 +30,24 @@ class Steady:
         self.omega, self.fastest = omega, self.run.fastest
 
     def timestep(self, settings: Settings) -> float:
-        """At least as many steps as positions; any where there is but one."""
+        """Of the settings for this stretch, s: at least as many steps as positions; any where there is but one."""
         return self.run.timestep(settings, at_least=self.width) if self.width else 1e-3
 
     def seconds(self, index: int) -> float:
-        """By the angle."""
+        """When it passes a position, from the start of the stretch: by the angle."""
         return self.run.time(float(self.theta_2[index]))
 
     def speed(self, turned: float, seconds: float) -> float:
-        """By the angle turned."""
+        """|omega_2| that is due after a turn (rad) and a time: by the angle turned."""
         return math.sqrt(max(self.run.omega**2 + 2.0 * self.run.alpha * turned, 0.0))
 
     def alpha(self, seconds: float) -> float:
-        """The same throughout."""
+        """What the drive is given, rad/s^2: the same throughout."""
         return self.run.alpha
 
 
 class Lawful:
-    """By a motion law, through positions in the order of their times."""
+    """A stretch of positions in the order of their times, by a motion law."""
 
     def __init__(self, law: Law, command: Command, stretch: Sequence[int]) -> None:
         assert command.time is not None
@@ -104,6 +85,9 @@ class Lawful:
         k = min(max(bisect.bisect_right(t, at), 1), len(t) - 1)
         part = (at - t[k - 1]) / (t[k] - t[k - 1])
         return float(f[k - 1] + part * (f[k] - f[k - 1]))
+
+
+Passage = Steady | Lawful
 
 
 def extremes(law: Law) -> tuple[float, float]:

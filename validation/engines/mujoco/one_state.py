@@ -4,6 +4,7 @@ At an exactly closed state the only error is the closure's softness, in proporti
 d the impedance: the values at several d, extrapolated to (1-d)/d = 0, are free of it.
 """
 
+import math
 import time
 from dataclasses import dataclass
 
@@ -17,13 +18,13 @@ from fourbar.mjcf.effects import unwound
 from fourbar.quantities import PIN_FORCES
 from fourbar.scene import Command, Scene
 from validation.compare.answer import Answer, Array
-from validation.engines.mujoco.closed_loop import O2, O4, A, ClosedLoop
+from validation.engines.loop import Angles, at_each
+from validation.engines.mujoco.closed_loop import O2, TURNED_BY, ClosedLoop, couple_for
+from validation.engines.tree import Values
 
 NAME = "mujoco-one-state"
 RUNGS = (0.9999, 0.9998, 0.9996, 0.9992)
 """Impedances to extrapolate from; MuJoCo clamps at the first."""
-ACTS_ON = {2: [O2], 3: [O2, A], 4: [O4]}
-"""Joints whose angle the driven bar's rotation is the sum of."""
 
 
 @dataclass(slots=True)
@@ -69,28 +70,17 @@ def _one_impedance(
     # no flywheel: the torque is on the driven bar itself
     settings = Settings(timestep=1e-3, impedance=d, pad=pad, flywheel=0.0)
     loop = ClosedLoop(mjcf(scene, settings, keyframe=False))
-    position, n = loop.position(), len(command.theta_2)
-    values = {"torque": np.full(n, np.nan), **{name: np.full((n, 2), np.nan) for name in PIN_FORCES}}
-    assembled = np.zeros(n, dtype=bool)
-    omega, alpha = (
-        np.broadcast_to(np.asarray(x or 0.0, dtype=float), (n,)) for x in (command.omega_2, command.alpha_2)
-    )
-    acts_on = ACTS_ON[scene.drive_bar]
-    for i, (theta_2, branch) in enumerate(zip(command.theta_2.tolist(), command.branch.tolist(), strict=True)):
-        found = position.find(theta_2, branch)
-        if found is None:
-            continue
-        assembled[i] = True
-        loop.set_state(unwound(scene, found), float(omega[i]))
-        torque = _torque(loop, acts_on, float(alpha[i]))
-        values["torque"][i] = torque
-        for name, force in loop.forces().items():
-            values[name][i] = force
-    return values, assembled
+
+    def read(q: Angles, omega_2: float, alpha_2: float) -> Values:
+        loop.set_state(unwound(scene, q), omega_2)
+        torque = _torque(loop, TURNED_BY[scene.drive_bar], alpha_2)
+        return {"torque": math.nan if torque is None else torque, **loop.forces()}
+
+    return at_each(loop, command, ("torque", *PIN_FORCES), read)[:2]
 
 
-def _torque(loop: ClosedLoop, acts_on: list[int], alpha: float) -> float:
-    """The couple that gives the crank its acceleration: linear in the couple, so two trials; the third is read."""
+def _torque(loop: ClosedLoop, acts_on: list[int], alpha: float) -> float | None:
+    """The couple that gives the crank its acceleration; None at a pole of the torque."""
     d = loop.data
 
     def crank_acceleration(couple: float) -> float:
@@ -99,13 +89,6 @@ def _torque(loop: ClosedLoop, acts_on: list[int], alpha: float) -> float:
         mujoco.mj_forward(loop.model, d)
         return float(d.qacc[O2])
 
-    at_rest = crank_acceleration(0.0)
-    slope = crank_acceleration(1.0) - at_rest
-    if slope == 0.0:
-        return float("nan")  # a pole of the torque
-    # once more from where the first guess leads: the difference of the two trials has lost digits
-    guess = (alpha - at_rest) / slope
-    couple = guess + (alpha - crank_acceleration(guess)) / slope
-    crank_acceleration(couple)
+    couple = couple_for(crank_acceleration, alpha, 0.0, 1.0, refinements=1)
     mujoco.mj_rnePostConstraint(loop.model, d)
     return couple

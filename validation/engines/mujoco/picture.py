@@ -50,12 +50,11 @@ def draw(texts: dict[str, str]) -> dict[str, str]:
     import matplotlib.image
     import mujoco
 
+    from validation.engines.mujoco.stepping import opened
+
     drawn = {}
     for name, text in texts.items():
-        model = mujoco.MjModel.from_xml_string(text)
-        data = mujoco.MjData(model)
-        mujoco.mj_resetDataKeyframe(model, data, 0)
-        mujoco.mj_forward(model, data)
+        model, data = opened(text)
         with mujoco.Renderer(model, HEIGHT, WIDTH) as renderer:
             renderer.update_scene(data, camera="plane")
             png = io.BytesIO()

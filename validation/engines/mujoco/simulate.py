@@ -12,17 +12,19 @@ from fourbar.errors import InputError, LimitError
 from fourbar.mjcf import RECIPE, Settings, mjcf
 from fourbar.mjcf.document import mass_ratio
 from fourbar.mjcf.effects import unwound
-from fourbar.quantities import PIN_FORCES, UNKNOWNS
+from fourbar.quantities import UNKNOWNS
 from fourbar.scene import Command, Scene
 from fourbar.scene.motion import Motion
 from validation.compare.answer import Answer
-from validation.engines.loop import Position
+from validation.engines.description import speeds
+from validation.engines.loop import MADE, Position, as_made, blank
 from validation.engines.mujoco.called_back import ActuatorForce, at_full_size, of_loads, receiving, supplying, within
 from validation.engines.mujoco.closed_loop import O2, O4, A, ClosedLoop
 from validation.engines.mujoco.limits import NEAREST_TOGGLE, least_sine, too_fast_or_loaded
 from validation.engines.mujoco.motions import Lawful, Passage, Steady, extremes, order_in_time
 from validation.engines.mujoco.runner import LIGHT_FLYWHEEL, Run, assembled, stretches
 from validation.engines.mujoco.watch import Watch, alarms
+from validation.engines.tree import Values
 
 SHARED = (
     "lengths, masses, inertias, centres, loads and effects as MJCF text; tables of loads; omega_2, alpha_2 or the "
@@ -33,7 +35,7 @@ FINE = np.radians(2.0)
 """Between positions further apart than this the loop is tried for closure."""
 COLLINEAR = 1e-9
 """Part of the sum of the lengths, and of half a turn: below what the time step itself can resolve."""
-FIELDS = tuple(name for name in UNKNOWNS if name not in PIN_FORCES)
+RESIDUALS = ("closure_gap_m", "speed_error", "time_went_back", "bad_states", "solver_iterations", "steps")
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,22 +112,12 @@ class _Simulation:
         self.supplied = of_loads(scene)
         n = len(command.theta_2)
         self.order = order_in_time(command, self.scene.motion.omega_2 or 0.0, self.law)
-        self.theta_2 = command.theta_2.copy()
-        self.omega_2, self.alpha_2 = (np.full(n, x, dtype=float) for x in (command.omega_2, command.alpha_2))
+        commanded = (command.theta_2, *speeds(command))
+        self.out = blank(n, UNKNOWNS) | {name: x.copy() for name, x in zip(MADE, commanded, strict=True)}
         self.branch = command.branch.copy()
-        self.values = {name: np.full(n, np.nan) for name in FIELDS}
-        self.values.update({name: np.full((n, 2), np.nan) for name in PIN_FORCES})
-        self.evidence = {
-            "closure_gap_m": 0.0,
-            "speed_error": 0.0,
-            "time_went_back": 0.0,
-            "bad_states": 0.0,
-            "solver_iterations": 0.0,
-            "steps": 0.0,
-            "mass_ratio": mass_ratio(scene.linkage),
-        }
+        self.evidence = dict.fromkeys(RESIDUALS, 0.0) | {"mass_ratio": mass_ratio(scene.linkage)}
         self.steps_per_revolution = 0.0
-        self.predicted = {name: np.zeros(n) for name in (*FIELDS, *PIN_FORCES)}
+        self.predicted = {name: np.zeros(n) for name in UNKNOWNS}
 
     def answer(self) -> Answer:
         """The answer over all positions."""
@@ -138,7 +130,8 @@ class _Simulation:
             start = found[stretch[0]]
             assert start is not None
             self._run(stretch, start)
-        at = Command(within(self.scene, self.theta_2), self.branch, self.omega_2, self.alpha_2)
+        self.out["theta_2"] = within(self.scene, self.out["theta_2"])
+        at, values = as_made(self.out, self.branch)
         setting = f"{self.settings.integrator} {self.steps_per_revolution:.0f}/rev"
         closes = np.array([angles is not None for angles in found])
         return Answer(
@@ -146,7 +139,7 @@ class _Simulation:
             setting,
             at,
             closes,
-            self.values,
+            values,
             predicted=self.predicted,
             alarms=alarms(self.evidence, sum(self.scene.linkage.lengths)),
             evidence=self.evidence,
@@ -209,20 +202,15 @@ class _Simulation:
         q = (float(d.qpos[O2]), float(d.qpos[A]), float(d.qpos[O4]))
         if unwound(self.scene, q) != q:
             raise LimitError("a torsion spring is wound by more than half a turn from its rest")
-        self.theta_2[index], self.omega_2[index] = d.qpos[O2] - turns, d.qvel[O2]
         self.branch[index] = loop.branch()
-        self.alpha_2[index] = d.qacc[O2]
         torque, pins = run.read()
         if torque is None:
             raise LimitError(f"the couple on bar {self.scene.drive_bar} does not move the input: a pole of the torque")
-        numbers = (
-            *(d.qpos[O2] + d.qpos[A] - turns, d.qpos[O4]),
-            *(d.qvel[O2] + d.qvel[A], d.qvel[O4]),
-            *(d.qacc[O2] + d.qacc[A], d.qacc[O4]),
-            torque,
-        )
-        for name, value in (*zip(FIELDS, numbers, strict=True), *pins.items()):
-            self.values[name][index] = value
+        values: Values = {"torque": torque, **pins}
+        for name, x, ahead in (("theta", d.qpos, turns), ("omega", d.qvel, 0.0), ("alpha", d.qacc, 0.0)):
+            values |= {f"{name}_2": x[O2] - ahead, f"{name}_3": x[O2] + x[A] - ahead, f"{name}_4": x[O4]}
+        for name, value in values.items():
+            self.out[name][index] = value
         for name, error in watch.look(loop, torque, pins["F43"]).items():
             self.predicted[name][index] = error
 

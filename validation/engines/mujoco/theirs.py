@@ -17,18 +17,19 @@ import numpy as np
 from fourbar.errors import FourBarError, InputError, LimitError
 from fourbar.linkage import PINS
 from fourbar.mjcf import flywheel, mjcf, run_through
-from fourbar.quantities import UNKNOWNS, VECTORS
+from fourbar.quantities import UNKNOWNS
 from fourbar.scene import Command, Scene, command
 from validation.compare.answer import Answer, Array
-from validation.engines.loop import Position
+from validation.engines.loop import MADE, Angles, Position, as_made, at_each, blank
 from validation.engines.mujoco.anatomy import Anatomy
 from validation.engines.mujoco.attached import Described, Value
-from validation.engines.mujoco.closed_loop import WARNINGS
+from validation.engines.mujoco.closed_loop import WARNINGS, couple_for, load_force
 from validation.engines.mujoco.describe import called, described
 from validation.engines.mujoco.guess import anatomy_of
 from validation.engines.mujoco.mend import mended
 from validation.engines.mujoco.motions import order_in_time
 from validation.engines.mujoco.runner import Stepper, assembled, stretches
+from validation.engines.tree import Bars, Values, closed
 
 ONE_STATE, THROUGH_TIME = "mjcf-one-state", "mjcf-simulated"
 POSITIONS = 37
@@ -39,6 +40,7 @@ MENDING = 60.0
 """Seconds in which entries are mended one by one; each takes two evaluations."""
 REFINEMENTS = 3
 """Secant steps after the first: each gains the digits that the one before has."""
+ANSWERED = (*UNKNOWNS, *MADE)
 SHARED = "theta_2, omega_2, alpha_2 and the branch; the rest is the file's"
 OWN = "assembly, speeds, accelerations, drive torque and pin forces, by MuJoCo from the file as compiled"
 
@@ -122,7 +124,7 @@ def _answered(name: str, scene: Scene, ask: Callable[[], Answer]) -> Answer:
     return answer
 
 
-class Loop:
+class Loop(Bars):
     """Somebody's model with its drive taken off; coordinates x = (theta_2, theta_3 - theta_2, theta_4)."""
 
     def __init__(self, anatomy: Anatomy, scene: Scene) -> None:
@@ -137,13 +139,10 @@ class Loop:
         self._jac = np.zeros((3, self.model.nv))
 
     def _take_off_the_drive(self) -> None:
-        model, joint = self.model, self.anatomy.hinge.get("O2")
-        for i in range(model.nu):
-            if model.actuator_trntype[i] == mujoco.mjtTrn.mjTRN_JOINT and model.actuator_trnid[i, 0] == joint:
-                model.actuator_gainprm[i], model.actuator_biasprm[i] = 0.0, 0.0
-                self.notes.append(
-                    f"its drive {model.actuator(i).name!r} on pin O2 is taken off: the torque is solved for"
-                )
+        model = self.model
+        for i in self.anatomy.drives():
+            model.actuator_gainprm[i], model.actuator_biasprm[i] = 0.0, 0.0
+            self.notes.append(f"its drive {model.actuator(i).name!r} on pin O2 is taken off: the torque is solved for")
         for i in range(model.neq):
             if i != self.anatomy.closure and model.eq_active0[i] and self.anatomy.closed_by != "tendon":
                 self.data.eq_active[i] = 0
@@ -178,11 +177,9 @@ class Loop:
 
     def speeds(self, omega_2: float) -> Array:
         """Joint speeds that keep the gap closed where the model is placed, (3,)."""
-        jacobian = self.jacobian()
-        others = np.linalg.solve(jacobian[:, 1:], -jacobian[:, 0] * omega_2)
-        return np.asarray(self.to_joints @ (omega_2, *others))
+        return np.asarray(self.to_joints @ closed(self.jacobian(), omega_2))
 
-    def ask(self, q: Array, v: Array, alpha_2: float) -> dict[str, Array | float]:
+    def ask(self, q: Array, v: Array, alpha_2: float) -> Values:
         """Everything at a state at which the crank accelerates at alpha_2, the driven bar's couple solved for."""
         data, drive = self.data, self.scene.drive_bar
         active = data.eq_active.copy()
@@ -198,18 +195,13 @@ class Loop:
             mujoco.mj_forward(self.model, data)
             return float((self.from_joints @ data.qacc)[0])
 
-        at_rest = acceleration(0.0)
         inertia = float(self.model.dof_M0.sum())
-        trial = inertia * max(abs(alpha_2 - at_rest), np.finfo(float).tiny / np.finfo(float).eps)
-        slope = (acceleration(trial) - at_rest) / trial
-        if slope == 0.0 or not np.isfinite(slope):
+        trial = inertia * max(abs(alpha_2 - acceleration(0.0)), np.finfo(float).tiny / np.finfo(float).eps)
+        couple = couple_for(acceleration, alpha_2, 0.0, trial, REFINEMENTS)
+        if couple is None:
             raise LimitError(f"a couple on bar {drive} does not move the crank of this model")
-        couple = (alpha_2 - at_rest) / slope
-        for _ in range(REFINEMENTS):
-            couple += (alpha_2 - acceleration(couple)) / slope
-        acceleration(couple)
         mujoco.mj_rnePostConstraint(self.model, data)
-        values: dict[str, Array | float] = {"torque": couple}
+        values: Values = {"torque": couple}
         turned = (self.anatomy.angles(data), self.from_joints @ data.qvel, self.from_joints @ data.qacc)
         for name, (two, three, four) in zip(("theta", "omega", "alpha"), turned, strict=True):
             values |= {f"{name}_2": two, f"{name}_3": two + three, f"{name}_4": four}
@@ -223,9 +215,8 @@ class Loop:
             child, parent = anatomy.turning(pin)
             force = data.cfrc_int[anatomy.root[child], 3:].copy()
             for load in self._loads:
-                body, pushed = self._load(load)
-                if self._carries(anatomy.root[child], body):
-                    force -= pushed
+                if self._carries(anatomy.root[child], self.model.site_bodyid[self.model.actuator_trnid[load, 0]]):
+                    force -= load_force(self.model, data, load)
             on[parent, child] = anatomy.in_plane(force)
         bars = PINS[anatomy.cut]
         force = np.full(2, np.nan)
@@ -243,13 +234,6 @@ class Loop:
         wanted = {"F12": (1, 2), "F32": (3, 2), "F43": (4, 3), "F14": (1, 4)}
         return {name: on[i, j] if (i, j) in on else -on[j, i] for name, (i, j) in wanted.items()}
 
-    def _load(self, actuator: int) -> tuple[int, Array]:
-        """Body and world force of an actuator on a site: MuJoCo counts it into the force of the parent."""
-        site, frame = self.model.actuator_trnid[actuator]
-        axes = self.data.site_xmat[frame if frame >= 0 else site].reshape(3, 3)
-        force = axes @ self.model.actuator_gear[actuator, :3] * self.data.actuator_force[actuator]
-        return int(self.model.site_bodyid[site]), np.asarray(force)
-
     def _carries(self, bearer: int, body: int) -> bool:
         """Whether a body hangs, however far down, on another."""
         while body not in (bearer, 0):
@@ -259,25 +243,19 @@ class Loop:
 
 def one_state(loop: Loop, at: Command) -> Answer:
     """Every position by itself."""
-    n = len(at.theta_2)
-    out = _empty(n)
-    assembled = np.zeros(n, dtype=bool)
-    position, gap, contacts = Position(loop), 0.0, 0  # type: ignore[arg-type]  # it asks for four methods alone
-    assert isinstance(at.omega_2, float) and isinstance(at.alpha_2, float)
-    for i, (theta_2, branch) in enumerate(zip(at.theta_2.tolist(), at.branch.tolist(), strict=True)):
-        x = position.find(theta_2, branch)
-        if x is None:
-            continue
-        assembled[i] = True
-        gap = max(gap, float(np.hypot(*loop.gap())))
+    contacts = 0
+
+    def read(_: Angles, omega_2: float, alpha_2: float) -> Values:
+        nonlocal contacts
         try:
-            v = loop.speeds(at.omega_2)
+            v = loop.speeds(omega_2)
         except np.linalg.LinAlgError:
-            continue
-        values = loop.ask(loop.data.qpos.copy(), v, at.alpha_2)
+            return {}
+        values = loop.ask(loop.data.qpos.copy(), v, alpha_2)
         contacts = max(contacts, int(loop.data.ncon))
-        for name, array in out.items():
-            array[i] = values[name]
+        return values
+
+    out, assembled, gap = at_each(loop, at, ANSWERED, read)
     if contacts:
         loop.notes.append(f"{contacts} contacts at a position where nothing but pins should touch")
     evidence = {"closure_gap_m": gap, "contacts": float(contacts)}
@@ -291,7 +269,7 @@ def through_time(loop: Loop, at: Command) -> Answer:
     if loop.crank is None:
         raise LimitError("pin O2 is not a hinge in this file: nothing can keep its crank at a speed")
     assert isinstance(at.omega_2, float) and isinstance(at.alpha_2, float)
-    position = Position(loop)  # type: ignore[arg-type]
+    position = Position(loop)
     order = order_in_time(at, at.omega_2, None)
     stretch = max(stretches(assembled(position, at, order), order), key=len, default=[])
     if len(stretch) < 2:
@@ -306,7 +284,7 @@ def through_time(loop: Loop, at: Command) -> Answer:
     position.find(float(at.theta_2[stretch[0]]), int(at.branch[stretch[0]]))
     data.qpos[:], data.qvel[:] = loop.data.qpos, loop.speeds(at.omega_2)
     heavy = max(loop.armature, flywheel(loop.scene))
-    out, seen = _empty(len(stretch)), {"closure_gap_m": 0.0, "speed_error": 0.0}
+    out, seen = blank(len(stretch), ANSWERED), {"closure_gap_m": 0.0, "speed_error": 0.0}
     alarms: list[str] = []
     stepper = Stepper(model, data, timestep)
     for i, index in enumerate(stretch):
@@ -327,11 +305,6 @@ def through_time(loop: Loop, at: Command) -> Answer:
     model.dof_armature[loop.crank] = loop.armature
     known = np.isfinite(out["theta_2"])
     out = {name: array[known] for name, array in out.items()}
-    where = Command(out["theta_2"], at.branch[stretch][known], out["omega_2"], out["alpha_2"])
+    where, _ = as_made(out, at.branch[stretch][known])
     setting = f"{mujoco.mjtIntegrator(model.opt.integrator).name.removeprefix('mjINT_')} {timestep:g} s"
     return Answer(THROUGH_TIME, setting, where, np.ones(known.sum(), dtype=bool), out, evidence=seen, alarms=alarms)
-
-
-def _empty(n: int) -> dict[str, Array]:
-    names = (*UNKNOWNS, "theta_2", "omega_2", "alpha_2")
-    return {name: np.full((n, 2) if name in VECTORS else n, np.nan) for name in names}

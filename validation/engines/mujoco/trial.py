@@ -7,16 +7,16 @@ the drive to be tried, and reports its own motion, torque, pin forces and CPU se
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import mujoco
 import numpy as np
 
 from fourbar.errors import LimitError
 from fourbar.mjcf import Settings, mjcf
-from fourbar.quantities import PIN_FORCES
 from fourbar.scene import Command, Scene
 from validation.compare.answer import Array
+from validation.engines.loop import Trial, as_made, blank
 from validation.engines.mujoco.closed_loop import O2, ClosedLoop
 from validation.engines.mujoco.motions import Steady, order_in_time
 from validation.engines.mujoco.runner import LIGHT_FLYWHEEL, Run, assembled, stretches
@@ -34,27 +34,6 @@ def silence() -> Iterator[None]:
         yield
     finally:
         mujoco.set_mju_user_warning(before)
-
-
-@dataclass(slots=True, eq=False)
-class Trial:
-    """What one run through the scene gave."""
-
-    at: Command
-    """The motion that was really made."""
-    quantities: dict[str, Array]
-    """Torque (n,) and pin forces (n, 2), under the names of `fourbar.Solution`."""
-    steps: int
-    steps_per_revolution: float
-    """At the fastest speed of the run."""
-    stepping: float
-    """CPU seconds in steps."""
-    reading: float
-    """CPU seconds in reading the samples."""
-    stretches: tuple[tuple[slice, int], ...] = ()
-    """The samples of each stretch, and its steps: several samples are of one step where these are fewer."""
-    broken: str = ""
-    """What MuJoCo reported of itself, where it lost the motion."""
 
 
 class Rig:
@@ -96,33 +75,19 @@ class Rig:
     def try_out(self, settings: Settings, build: Build | None = None) -> Trial:
         """Run through every stretch of positions that assembles and read at the step nearest to each."""
         samples = [index for stretch in self.stretches for index in stretch]
-        n = len(samples)
-        motion = {name: np.full(n, np.nan) for name in ("theta_2", "omega_2", "alpha_2", "torque")}
-        forces = {name: np.full((n, 2), np.nan) for name in PIN_FORCES}
-        trial = Trial(self.command, {}, 0, 0.0, 0.0, 0.0)
-        first = 0
+        out, trial, first = blank(len(samples)), Trial(self.command), 0
         with silence():
             for stretch in self.stretches:
-                before = trial.steps
-                self._run(stretch, settings, build or (lambda text, _: ClosedLoop(text)), first, motion, forces, trial)
-                trial.stretches += ((slice(first, first + len(stretch)), trial.steps - before),)
-                first += len(stretch)
+                before, rows = trial.steps, slice(first, first + len(stretch))
+                self._run(stretch, settings, build or _as_written, {name: x[rows] for name, x in out.items()}, trial)
+                trial.stretches += ((rows, trial.steps - before),)
+                first = rows.stop
                 if trial.broken:
                     break
-        trial.quantities = {"torque": motion.pop("torque"), **forces}
-        trial.at = Command(motion["theta_2"], self.command.branch[samples], motion["omega_2"], motion["alpha_2"])
+        trial.at, trial.quantities = as_made(out, self.command.branch[samples])
         return trial
 
-    def _run(
-        self,
-        stretch: list[int],
-        settings: Settings,
-        build: Build,
-        first: int,
-        motion: dict[str, Array],
-        forces: dict[str, Array],
-        trial: Trial,
-    ) -> None:
+    def _run(self, stretch: list[int], settings: Settings, build: Build, out: dict[str, Array], trial: Trial) -> None:
         passage = self.passage(stretch)
         timestep = passage.run.timestep(settings)
         loop = build(self.text(settings, timestep), self.omega)
@@ -130,7 +95,7 @@ class Rig:
         if self.scene.drive_bar != 2:
             light = ClosedLoop(self.text(replace(settings, flywheel=LIGHT_FLYWHEEL), timestep))
         run = Run(self.scene, loop, light, passage, self.start[stretch[0]], timestep)
-        for row, index in enumerate(stretch, first):
+        for row, index in enumerate(stretch):
             began = time.process_time()
             run.to(index)
             stepped = time.process_time()
@@ -139,12 +104,10 @@ class Rig:
             if run.stepper.lost() or loop.bad() or not np.isfinite(d.qacc).all():
                 trial.broken = "MuJoCo lost the motion: a value not finite, or too large"
                 break
-            motion["theta_2"][row] = d.qpos[O2] - run.turns
-            motion["omega_2"][row], motion["alpha_2"][row] = d.qvel[O2], d.qacc[O2]
             torque, pins = run.read()
-            motion["torque"][row] = np.nan if torque is None else torque
-            for name, force in pins.items():
-                forces[name][row] = force
+            made = {"theta_2": d.qpos[O2] - run.turns, "omega_2": d.qvel[O2], "alpha_2": d.qacc[O2]}
+            for name, value in (made | pins | {"torque": np.nan if torque is None else torque}).items():
+                out[name][row] = value
             trial.stepping += stepped - began
             trial.reading += time.process_time() - stepped
         trial.steps += run.stepper.done
@@ -154,8 +117,7 @@ class Rig:
         """CPU seconds of a number of steps from the start of the longest stretch; each call starts there again."""
         stretch = max(self.stretches, key=len)
         timestep = self.passage(stretch).run.timestep(settings)
-        make = build or (lambda text, _: ClosedLoop(text))
-        loop = make(self.text(settings, timestep), self.omega)
+        loop = (build or _as_written)(self.text(settings, timestep), self.omega)
 
         def clock(steps: int) -> float:
             loop.set_state(self.start[stretch[0]], self.omega)
@@ -165,3 +127,7 @@ class Rig:
                 return time.process_time() - began
 
         return clock
+
+
+def _as_written(text: str, _: float) -> ClosedLoop:
+    return ClosedLoop(text)

@@ -20,7 +20,7 @@ import numpy as np
 
 from fourbar.quantities import PIN_FORCES
 from validation.compare.answer import Array
-from validation.engines.mujoco.closed_loop import O2, O4, A, ClosedLoop
+from validation.engines.mujoco.closed_loop import O2, O4, TURNED_BY, A, ClosedLoop
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,7 +96,7 @@ class Watch:
         if self.bars.drive is not None:
             model.actuator_biastype[self.bars.drive] = mujoco.mjtBias.mjBIAS_NONE
         self.e_drive = np.zeros(3)
-        self.e_drive[{2: [O2], 3: [O2, A], 4: [O4]}[drive_bar]] = 1.0
+        self.e_drive[TURNED_BY[drive_bar]] = 1.0
         self._dot = np.zeros((3, 3))
         self.worst = dict.fromkeys(LIMITS, 0.0)
         self._most = dict.fromkeys(LIMITS, 0.0)

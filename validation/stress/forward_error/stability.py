@@ -7,6 +7,7 @@ import click
 import numpy as np
 
 from fourbar.errors import FAILED, HOLDS
+from validation.report.terminal import lined_up
 from validation.stress.forward_error.families import FAMILIES
 from validation.stress.forward_error.judge import TOO_LARGE, Tally, judge
 
@@ -39,9 +40,9 @@ def chunks(samples: int) -> Iterator[range]:
 def stability(samples: int, families: tuple[str, ...], seed: int, jobs: int) -> int:
     """Error of every output against 50-digit arithmetic, and whether the error bars hold."""
     from joblib import Parallel, delayed
+    from rich.box import HEAVY_HEAD
     from rich.console import Console
     from rich.progress import track
-    from rich.table import Table
 
     chosen = families or tuple(FAMILIES)
     tasks = [(family, part) for family in chosen for part in chunks(samples)]
@@ -49,21 +50,19 @@ def stability(samples: int, families: tuple[str, ...], seed: int, jobs: int) -> 
     tallies = {family: Tally() for family in chosen}
     for (family, _), tally in track(zip(tasks, results, strict=True), "samples", total=len(tasks)):
         tallies[family].add(tally)
-    table = Table(title=f"largest error / (8 eps (|y| + sum |x dy/dx|)), {samples} samples each, seed {seed}")
-    table.add_column("output")
-    for family in chosen:
-        table.add_column(family, justify="right")
+    rows = []
     for name in dict.fromkeys(name for tally in tallies.values() for name in tally.worst):
         cells = [tallies[family].worst.get(name, (math.nan, ""))[0] for family in chosen]
-        table.add_row(name, *("-" if math.isnan(cell) else f"{cell:.3f}" + " fails" * (cell > 1.0) for cell in cells))
+        rows.append((name, *("-" if math.isnan(cell) else f"{cell:.3f}" + " fails" * (cell > 1.0) for cell in cells)))
     for bar in ("torque_error", "force_error"):
-        table.add_row(f"error / {bar}", *(f"{tallies[family].too_small.get(bar, math.nan):.2f}" for family in chosen))
+        rows.append((f"error / {bar}", *(f"{tallies[family].too_small.get(bar, math.nan):.2f}" for family in chosen)))
         shares = (100.0 * tallies[family].too_large.get(bar, 0) / tallies[family].samples for family in chosen)
-        table.add_row(f"% {bar} > {TOO_LARGE:.0f} x error", *(f"{share:.2f}" for share in shares))
-    table.add_row("not assembled", *(str(tallies[family].not_assembled) for family in chosen))
-    table.add_row("no torque", *(str(tallies[family].no_torque) for family in chosen))
+        rows.append((f"% {bar} > {TOO_LARGE:.0f} x error", *(f"{share:.2f}" for share in shares)))
+    rows.append(("not assembled", *(str(tallies[family].not_assembled) for family in chosen)))
+    rows.append(("no torque", *(str(tallies[family].no_torque) for family in chosen)))
     console = Console()
-    console.print(table)
+    title = f"largest error / (8 eps (|y| + sum |x dy/dx|)), {samples} samples each, seed {seed}"
+    console.print(lined_up(("output", *chosen), rows, title=title, box=HEAVY_HEAD))
     for family, tally in tallies.items():
         for name, (ratio, sample) in tally.worst.items():
             if ratio > 1.0:

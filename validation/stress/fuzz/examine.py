@@ -13,20 +13,20 @@ from validation.compare.identities import identities
 from validation.compare.rows import FAILS
 from validation.compare.statements.statements import statements
 from validation.engines.hard_suite import predicting
-from validation.engines.witnesses import WITNESSES, Witness, predicting_from
+from validation.engines.witnesses import WITNESSES, predicting_from
 
 EXACT = tuple(predicting(w) for w in WITNESSES if w.name in ("pinocchio-inverse", "mujoco-inverse", "free-body"))
 """The exact engines, held to full accuracy or to what was predicted for the position."""
 
 
-def findings(scene: Scene, witnesses: tuple[Witness, ...] = EXACT) -> list[str]:
+def findings(scene: Scene) -> list[str]:
     """What is wrong with a scene, in one line each; an exception or a warning is a finding too."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error")
             at = command(scene)
             solution = solve(scene, "force", at=at)
-            return [*_file(scene), *_assembly(scene, at, solution), *_engines(scene, at, solution, witnesses)]
+            return [*_file(scene), *_assembly(scene, at, solution), *_engines(scene, at, solution)]
     except Exception as error:  # a traceback is what fuzzing looks for
         return [f"{type(error).__name__}: {error}".splitlines()[0]]
 
@@ -57,9 +57,9 @@ def _assembly(scene: Scene, at: Command, solution: Solution) -> list[str]:
     return found
 
 
-def _engines(scene: Scene, at: Command, solution: Solution, witnesses: tuple[Witness, ...]) -> list[str]:
+def _engines(scene: Scene, at: Command, solution: Solution) -> list[str]:
     rows = identities("", scene, at, solution)
-    for witness in witnesses:
+    for witness in EXACT:
         answer = witness.engine().answer(scene, at)
         predicted = predicting_from(witness, scene, at, answer)
         rows += compare("", scene, answer, solution, witness.tolerance, witness.expected, predicted)

@@ -13,29 +13,27 @@ from validation.scenes.random import Ranges, decades, drawn, product, sometimes,
 POSITIONS = 2
 SIZES = {False: decades(-0.7, 0.7), True: decades(-6.0, 6.0)}
 """Lengths, masses, speeds and loads: ordinary, adversarial."""
+ORDINARY = Ranges(
+    mass=SIZES[False],
+    inertia=uniform(0.02, 0.4),
+    centre=uniform(-1.0, 2.0),
+    centre_angle=sometimes(0.5, uniform(-3.0, 3.0)),
+    load=uniform(-1.0, 1.0),
+    without_force=0.2,
+    speed=sometimes(0.95, SIZES[False]),
+    viscous=0.2,
+    friction=0.1,
+)
 RANGES = {
-    False: Ranges(
-        mass=SIZES[False],
-        inertia=uniform(0.02, 0.4),
-        centre=uniform(-1.0, 2.0),
-        centre_angle=sometimes(0.5, uniform(-3.0, 3.0)),
-        load=uniform(-1.0, 1.0),
-        without_force=0.2,
-        speed=sometimes(0.95, SIZES[False]),
-        viscous=0.2,
-        friction=0.1,
-    ),
-    True: Ranges(
+    False: ORDINARY,
+    True: replace(
+        ORDINARY,
         mass=sometimes(0.85, SIZES[True]),
-        inertia=sometimes(0.85, uniform(0.02, 0.4)),
-        centre=product(uniform(-1.0, 2.0), sometimes(0.2, decades(0.0, 3.0), 1.0)),
-        centre_angle=sometimes(0.5, uniform(-3.0, 3.0)),
+        inertia=sometimes(0.85, ORDINARY.inertia),
+        centre=product(ORDINARY.centre, sometimes(0.2, decades(0.0, 3.0), 1.0)),
         ground_angle=lambda rng: float(rng.choice([0.0, math.pi, rng.uniform(-3.2, 3.2)])),
-        load=product(uniform(-1.0, 1.0), SIZES[True]),
-        without_force=0.2,
+        load=product(ORDINARY.load, SIZES[True]),
         speed=sometimes(0.95, SIZES[True]),
-        viscous=0.2,
-        friction=0.1,
     ),
 }
 """What the scenes are drawn from: ordinary, adversarial."""

@@ -10,9 +10,8 @@ import numpy as np
 
 from fourbar.errors import FourBarError
 from fourbar.files import save
-from fourbar.linkage import Bar, FourBar
+from fourbar.linkage import Bar
 from fourbar.scene import Scene
-from fourbar.scene.motion import Motion
 
 KEPT = Path(__file__).parents[3] / "tests" / "counterexamples"
 DIGITS = (1, 2, 3, 6, 10)
@@ -37,24 +36,20 @@ def shrunk(scene: Scene, fails: Callable[[Scene], bool]) -> Scene:
 
 
 def _changes(scene: Scene) -> Iterator[Callable[[Scene], Scene | None]]:
-    yield partial(_at, k=0)
-    yield partial(_at, k=1)
-    for k in range(len(scene.loads)):
-        yield partial(_without, part="loads", k=k)
-    for k in range(len(scene.effects)):
-        yield partial(_without, part="effects", k=k)
+    yield from (partial(_at, k=k) for k in (0, 1))
+    for part in ("loads", "effects"):
+        yield from (partial(_without, part=part, k=k) for k in range(len(getattr(scene, part))))
     for plain in ({"alpha_2": 0.0}, {"omega_2": 1.0}, {"branch": 1}):
         yield partial(_motion, plain=plain)
     yield lambda s: replace(s, drive_bar=2)
     yield _without_ground_angle
-    for name in BARS:
-        yield partial(_bar, name=name, change=_massless)
-        yield partial(_bar, name=name, change=_uniform)
+    simpler: list[Callable[[Bar], Bar]] = [lambda bar: Bar(bar.length), lambda bar: Bar(bar.length, 1.0)]
+    yield from (partial(_bar, name=name, change=change) for name in BARS for change in simpler)
     for digits in DIGITS:
-        for name in BARS:
-            yield partial(_bar, name=name, change=partial(_shorter, digits=digits))
-        yield partial(_ground, digits=digits)
-        yield partial(_angle, digits=digits)
+        short = partial(_rounded, digits=digits)
+        yield from (partial(_bar, name=name, change=partial(_shorter, short=short)) for name in BARS)
+        yield lambda s, short=short: replace(s, linkage=replace(s.linkage, ground=short(s.linkage.ground)))  # type: ignore[misc]
+        yield partial(_angle, short=short)
 
 
 def _without(scene: Scene, part: str, k: int) -> Scene | None:
@@ -67,46 +62,31 @@ def _motion(scene: Scene, plain: dict[str, Any]) -> Scene:
     return replace(scene, motion=replace(scene.motion, **plain))
 
 
-def _massless(bar: Bar) -> Bar:
-    return Bar(bar.length)
-
-
-def _uniform(bar: Bar) -> Bar:
-    return Bar(bar.length, 1.0)
-
-
-def _shorter(bar: Bar, digits: int) -> Bar:
-    return replace(bar, length=_rounded(bar.length, digits))
-
-
-def _ground(scene: Scene, digits: int) -> Scene:
-    return replace(scene, linkage=replace(scene.linkage, ground=_rounded(scene.linkage.ground, digits)))
+def _shorter(bar: Bar, short: Callable[[float], float]) -> Bar:
+    return replace(bar, length=short(bar.length))
 
 
 def _bar(scene: Scene, name: str, change: Callable[[Bar], Bar]) -> Scene:
     return replace(scene, linkage=replace(scene.linkage, **{name: change(getattr(scene.linkage, name))}))  # type: ignore[arg-type]
 
 
+def _angles(scene: Scene) -> Any:
+    return np.atleast_1d(np.asarray(scene.motion.theta_2))
+
+
 def _at(scene: Scene, k: int) -> Scene | None:
-    angles = np.atleast_1d(np.asarray(scene.motion.theta_2))
-    return _moved(scene, float(angles[k])) if len(angles) > k > -len(angles) and len(angles) > 1 else None
+    angles = _angles(scene)
+    return _motion(scene, {"theta_2": float(angles[k])}) if len(angles) > max(k, 1) else None
 
 
-def _moved(scene: Scene, theta_2: float) -> Scene:
-    motion: Motion = replace(scene.motion, theta_2=theta_2)
-    return replace(scene, motion=motion)
+def _angle(scene: Scene, short: Callable[[float], float]) -> Scene | None:
+    angles = _angles(scene)
+    return _motion(scene, {"theta_2": short(float(angles[0]))}) if len(angles) == 1 else None
 
 
 def _without_ground_angle(scene: Scene) -> Scene:
-    turn = scene.linkage.ground_angle
-    linkage: FourBar = replace(scene.linkage, ground_angle=0.0)
-    motion = replace(scene.motion, theta_2=np.atleast_1d(np.asarray(scene.motion.theta_2)) - turn)
-    return replace(scene, linkage=linkage, motion=motion)
-
-
-def _angle(scene: Scene, digits: int) -> Scene | None:
-    angles = np.atleast_1d(np.asarray(scene.motion.theta_2))
-    return _moved(scene, _rounded(float(angles[0]), digits)) if len(angles) == 1 else None
+    turned = _motion(scene, {"theta_2": _angles(scene) - scene.linkage.ground_angle})
+    return replace(turned, linkage=replace(scene.linkage, ground_angle=0.0))
 
 
 def _rounded(value: float, digits: int) -> float:

@@ -1,13 +1,12 @@
 """Every planted fault against the harness, each in a process of its own; none may survive without a reason."""
 
 import json
-import os
-import subprocess
 import sys
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
+from validation.run.elsewhere import ended
 from validation.stress.mutation import planting
 from validation.stress.mutation.planting import ROOT, faults
 
@@ -15,23 +14,18 @@ SECONDS = 300
 """A fault with which the harness takes longer than this ends the run as a failure would; it takes some ten."""
 
 
-def outcome(number: int | None) -> dict[str, list[str]] | str:
-    """The failing rows by specimen with the fault of a number, or why there are none; None: without a fault."""
-    line = [sys.executable, "-P", planting.__file__, *([] if number is None else [str(number)])]
-    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-    try:
-        done = subprocess.run(
-            line, cwd=ROOT, check=False, capture_output=True, text=True, timeout=SECONDS, env=environment
-        )
-    except subprocess.TimeoutExpired:
-        return f"it took more than {SECONDS} s"
-    if done.returncode:
-        return (done.stderr.strip().splitlines() or ["no word"])[-1]
-    found: dict[str, list[str]] = json.loads(done.stdout.splitlines()[-1])
-    return found
+Failing = dict[str, list[str]]
+"""By specimen: the rows that fail."""
 
 
-def survives(entry: dict[str, Any], found: dict[str, list[str]] | str) -> str | None:
+def outcomes(*numbers: int) -> list[Failing] | str:
+    """What fails with the fault of each number, one after another, or why nothing was found; once without any fault."""
+    line = [sys.executable, "-P", planting.__file__, *numbers]
+    done = ended(line, folder=ROOT, seconds=SECONDS, variables={"PYTHONPATH": str(ROOT)})
+    return done.why or [json.loads(each) for each in done.out.splitlines()[-max(1, len(numbers)) :]]
+
+
+def survives(entry: dict[str, Any], found: Failing | str) -> str | None:
     """Why an entry does not count as caught on each of its specimens, or None."""
     if isinstance(found, str):
         return f"it raises, which is no physical fault: {found}"
@@ -48,10 +42,11 @@ def planted(workers: int) -> Iterator[tuple[str, str | None]]:
     """Every fault with the reason why it survives, or None; first the tree without a fault."""
     entries = faults()
     with ThreadPoolExecutor(workers) as pool:
-        found = pool.map(outcome, [None, *range(len(entries))])
-        without = next(found)
-        failing = without if isinstance(without, str) else [row for rows in without.values() for row in rows]
+        without, *found = (pool.submit(outcomes, *number) for number in [(), *((n,) for n in range(len(entries)))])
+        rows = without.result()
+        failing = rows if isinstance(rows, str) else [row for found in rows[0].values() for row in found]
         yield "no fault", f"the harness fails without one: {failing}" if failing else None
-        for entry, rows in zip(entries, found, strict=True):
-            why = survives(entry, rows)
+        for entry, one in zip(entries, found, strict=True):
+            rows = one.result()
+            why = survives(entry, rows if isinstance(rows, str) else rows[0])
             yield entry["fault"], None if why and "harmless" in entry else why

@@ -1,7 +1,8 @@
-"""One planted fault in one process: its module is loaded with another text, then the harness judges the specimens.
+"""Planted faults, one after another: a module is loaded with another text, then the harness judges the specimens.
 
-Run by its path, with the checkout on PYTHONPATH: `python -P planting.py NUMBER` prints what failed as JSON; without a
-number nothing is planted and every specimen must hold. As a module it would import the project before the fault stands.
+Run by its path, with the checkout on PYTHONPATH: `python -P planting.py NUMBER...` prints what failed as JSON, a line
+for each fault; without a number nothing is planted and every specimen must hold. As a module it would import the
+project before the fault stands.
 """
 
 import importlib.abc
@@ -43,8 +44,6 @@ class Planter(importlib.abc.MetaPathFinder):
         self.texts = planted(entry)
         self.left = set(self.texts)
         """Modules that are not loaded yet."""
-        if early := [name for name in sys.modules if name.partition(".")[0] in ("fourbar", "validation")]:
-            raise RuntimeError(f"imported before the fault was planted: {early}")
 
     def find_spec(self, fullname: str, path: Any, target: Any = None) -> importlib.machinery.ModuleSpec | None:
         """The module with the fault, or None."""
@@ -86,17 +85,20 @@ def failing(names: list[str]) -> dict[str, list[str]]:
 
 
 def main() -> None:
-    """Plant the fault of a number, judge its specimens, print what fails."""
+    """Plant the fault of each number, judge its specimens, print what fails."""
     if len(sys.argv) == 1:
         print(json.dumps(failing([])))
-        return
-    entry = faults()[int(sys.argv[1])]
-    planter = Planter(entry)
-    sys.meta_path.insert(0, planter)
-    found = failing(entry["specimens"])
-    if planter.left:
-        raise RuntimeError(f"the specimens use no {', '.join(planter.left)}")
-    print(json.dumps(found))
+    for number in map(int, sys.argv[1:]):
+        for name in [name for name in sys.modules if name.partition(".")[0] in ("fourbar", "validation")]:
+            del sys.modules[name]  # of the fault before; the engines' libraries stay
+        entry = faults()[number]
+        planter = Planter(entry)
+        sys.meta_path.insert(0, planter)
+        found = failing(entry["specimens"])
+        sys.meta_path.remove(planter)
+        if planter.left:
+            raise RuntimeError(f"the specimens use no {', '.join(planter.left)}")
+        print(json.dumps(found))
 
 
 if __name__ == "__main__":

@@ -21,8 +21,9 @@ from fourbar.scene import command as command_of
 from fourbar.writing import write_text
 from validation.engines.mujoco.dialled import FEWEST_STEPS, LONGEST, ORDER, SHORTEST, dialled, guess
 from validation.engines.mujoco.trial import Rig
+from validation.report.terminal import lined_up
 from validation.studies.cost.errors import Errors
-from validation.studies.cost.matters import MATTERS, influences, judged, print_table, sentence
+from validation.studies.cost.matters import MATTERS, influences, judged, sentence
 
 MARGIN = 0.7
 """The run must stay within this part of the required error: elsewhere it may be larger."""
@@ -44,6 +45,7 @@ class Attempt:
     settings: Settings
     steps: int
     errors: Errors
+    steps_per_revolution: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,12 +57,11 @@ class Advice:
     """The cheapest that serves; where nothing does, the most accurate."""
     attempts: tuple[Attempt, ...]
     reached: bool
-    steps_per_revolution: float
 
     def cells(self) -> tuple[str, str, str]:
         """Error, steps per revolution and time constant, for a table of several scenes."""
         error = f"{self.best.errors.worst:.1e}" + ("" if self.reached else " (not reached)")
-        return error, f"{self.steps_per_revolution:.0f}", f"{self.best.settings.time_constant_steps:.3g}"
+        return error, f"{self.best.steps_per_revolution:.0f}", f"{self.best.settings.time_constant_steps:.3g}"
 
     @property
     def reason(self) -> str:
@@ -68,7 +69,7 @@ class Advice:
         s, e = self.best.settings, self.best.errors
         found = f"torque {e.torque:.1e}, worst pin force {e.force:.1e}"
         dial = (
-            f"RK4, {self.best.steps} steps ({self.steps_per_revolution:.0f} per revolution), "
+            f"RK4, {self.best.steps} steps ({self.best.steps_per_revolution:.0f} per revolution), "
             f"tc = {s.time_constant_steps:.3g} steps, pads {s.pad}, tolerance 0, flywheel {s.flywheel:g}"
         )
         if self.reached:
@@ -106,7 +107,6 @@ class _Search:
     def __init__(self, scene: Scene, error: float, rig: Rig) -> None:
         self.scene, self.error, self.rig = scene, error, rig
         self.attempts: list[Attempt] = []
-        self.per_revolution: dict[int, float] = {}
 
     def advice(self) -> Advice:
         """The cheapest that serves, by bisection in steps, then with shorter and longer time constants."""
@@ -118,9 +118,7 @@ class _Search:
                 self._polish(other)
         served = [a for a in self.attempts if a.errors.worst <= MARGIN * self.error]
         best = min(served, key=lambda a: a.steps) if served else min(self.attempts, key=lambda a: a.errors.worst)
-        return Advice(
-            self.error, best, tuple(self.attempts), bool(served), self.per_revolution[self.attempts.index(best)]
-        )
+        return Advice(self.error, best, tuple(self.attempts), bool(served))
 
     def _polish(self, tc: float) -> None:
         """Whether another time constant serves with fewer steps, or serves at all."""
@@ -174,8 +172,7 @@ class _Search:
         if steps > MOST_STEPS:
             settings = dialled(n * MOST_STEPS / steps, tc)
         trial = self.rig.try_out(settings)
-        attempt = Attempt(settings, max(trial.steps, 1), judged(self.scene, trial))
-        self.per_revolution[len(self.attempts)] = trial.steps_per_revolution
+        attempt = Attempt(settings, max(trial.steps, 1), judged(self.scene, trial), trial.steps_per_revolution)
         self.attempts.append(attempt)
         return attempt
 
@@ -219,5 +216,8 @@ def command(scenes: tuple[Path, ...], wanted: float, output: Path | None) -> int
             write_text(output, mjcf(scene, advice.best.settings))
             click.echo(f"written to {output}")
     if len(rows) > 1:
-        print_table(("scene", "error", "steps/turn", "tc, steps", "matters most"), rows)
+        from rich.console import Console
+
+        head = ("scene", "error", "steps/turn", "tc, steps", "matters most")
+        Console().print(lined_up(head, rows, show_edge=False))
     return 0 if reached else 1

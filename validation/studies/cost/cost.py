@@ -1,7 +1,5 @@
 """`python -m validation cost`: the study of scenes, its table, its laws and its pictures."""
 
-import csv
-import io
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
@@ -13,13 +11,15 @@ from fourbar.errors import FAILED, HOLDS
 from fourbar.scene import Scene
 from fourbar.scene import command as command_of
 from fourbar.writing import write_text
+from validation.compare.rows import csv_text
 from validation.engines.mujoco.trial import Rig
 from validation.report.machine import machine, versions
+from validation.report.terminal import lined_up
 from validation.scenes.suites import MODELS, scene_files
 from validation.studies.cost.curves import BEST
 from validation.studies.cost.errors import QUANTITIES
 from validation.studies.cost.laws import Law, laws, lines, pareto, warnings
-from validation.studies.cost.matters import MATTERS, influences, print_table, sentence
+from validation.studies.cost.matters import MATTERS, influences, sentence
 from validation.studies.cost.study import COLUMNS, STEPPED, Point, Study
 
 DEFAULT_SCENES = (MODELS / "crank_rocker.toml",)
@@ -77,7 +77,8 @@ def cost(scenes: tuple[Path, ...], out: Path, effects: bool) -> int:
         rows.append((name, *cheapest(curves), f"{held} of {sum(law.decided for law in found)}", most))
         click.echo(f"written to {out / name}: {', '.join(sorted(path.name for path in written))}")
     if len(rows) > 1:
-        print_table(("scene", *(f"RK4 steps for {error:g}" for error in WANTED), "laws hold", "matters most"), rows)
+        head = ("scene", *(f"RK4 steps for {error:g}" for error in WANTED), "laws hold", "matters most")
+        Console().print(lined_up(head, rows, show_edge=False))
     if not fitted:
         click.echo("Nothing was compared: no law has points enough for a fit")
     return HOLDS if fitted and all(law.holds for law in fitted) else FAILED
@@ -105,13 +106,7 @@ def subtitle(scene: Scene, title: str) -> str:
 
 def to_csv(curves: Mapping[str, Sequence[Point]]) -> str:
     """One row per point, floats as repr."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(COLUMNS)
-    for points in curves.values():
-        for point in points:
-            writer.writerow(asdict(point).values())
-    return text.getvalue()
+    return csv_text(COLUMNS, (asdict(point).values() for points in curves.values() for point in points))
 
 
 def summary(name: str, curves: Mapping[str, Sequence[Point]], found: Sequence[Law], left_out: Sequence[str]) -> str:

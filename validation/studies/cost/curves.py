@@ -1,8 +1,8 @@
 """What the study tries: one dial at a time around the recommended settings and around MuJoCo's defaults."""
 
 import math
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
-from functools import partial
 
 from fourbar.mjcf import Settings
 from fourbar.scene import Scene
@@ -46,8 +46,6 @@ class Curve:
     """A row of settings that differ in one dial."""
 
     name: str
-    dial: str
-    """ "steps", "1-d", "tc", "tolerance", "regularisation" or "pads"."""
     spots: tuple[Spot, ...]
     slow: bool = False
     """Run at SLOW instead of the scene's own speed."""
@@ -61,54 +59,50 @@ class Curve:
 BEST = Settings(steps_per_window=1, flywheel=FLYWHEEL, time_constant_steps=20.0, steps_per_revolution=MIDDLE)
 
 
-def over_steps(
-    name: str, settings: Settings, build: Build | None = None, steps: tuple[int, ...] = STEPS, label: str = ""
+def over(
+    name: str,
+    label: str,
+    values: Iterable[float],
+    settings: Callable[[float], Settings],
+    build: Callable[[float], Build | None] = lambda _: None,
 ) -> Curve:
-    """A curve over the timestep."""
-    return Curve(
-        name,
-        "steps",
-        tuple(Spot(f"{label or name}, {n}/rev", replace(settings, steps_per_revolution=n), build, n) for n in steps),
-    )
+    """A curve over the values of a dial, each with its label, settings and build."""
+    return Curve(name, tuple(Spot(label.format(x), settings(x), build(x), x) for x in values))
 
 
-def held(name: str, settings: Settings, steps: tuple[int, ...]) -> Curve:
-    """Over the timestep with the closure's time constant held in seconds, so that the timestep alone changes."""
-    return Curve(
-        name,
-        "steps",
-        tuple(
-            Spot(
-                f"{name}, {n}/rev",
-                replace(settings, steps_per_revolution=n, time_constant_steps=PART_OF_TURN * n),
-                None,
-                n,
-            )
-            for n in steps
-        ),
-    )
+def over_steps(
+    name: str, settings: Settings, build: Build | None = None, steps: Iterable[int] = STEPS, held: float | None = None
+) -> Curve:
+    """A curve over the timestep.
+
+    Parameters
+    ----------
+    held : a part of a revolution at which the closure's time constant is held in seconds, so that the timestep alone
+        changes; None: it is so many steps as in the settings.
+    """
+
+    def at(n: float) -> Settings:
+        tc = settings.time_constant_steps if held is None else held * n
+        return replace(settings, steps_per_revolution=n, time_constant_steps=tc)
+
+    return over(name, name + ", {:g}/rev", steps, at, lambda _: build)
 
 
 def curves(scene: Scene) -> list[Curve]:
     """The design for one scene."""
-    speed = abs(scene.motion.omega_2 or 1.0)
-    found = [_with_default_closure(name, speed) for name in INTEGRATORS]
-    found += [
-        over_steps(
-            f"{name}, pads, tc = 10 h", replace(BEST, integrator=name, time_constant_steps=10.0), None, _ladder(name)
-        )
-        for name in INTEGRATORS
-    ]
-    found += [held(f"{name}, tc held", replace(BEST, integrator=name), _ladder(name)) for name in INTEGRATORS]
-    found += [
-        over_steps(f"RK4, pads, tc = {tc:g} h", replace(BEST, time_constant_steps=tc)) for tc in (3.0, 30.0, 100.0)
-    ]
-    found.append(over_steps("RK4, no pads, tc = 10 h", replace(BEST, pad=None, time_constant_steps=10.0)))
-    found += _softness()
-    found += _tolerance()
-    if scene.motion.alpha_2 == 0.0:
-        found += _drives()
-    return found
+    found = [_with_default_closure(name, abs(scene.motion.omega_2 or 1.0)) for name in INTEGRATORS]
+    for suffix, tc, held in (("pads, tc = 10 h", 10.0, None), ("tc held", 20.0, PART_OF_TURN)):
+        for name in INTEGRATORS:
+            settings = replace(BEST, integrator=name, time_constant_steps=tc)
+            found.append(over_steps(f"{name}, {suffix}", settings, None, _ladder(name), held))
+    for tc in (3.0, 30.0, 100.0):
+        found.append(over_steps(f"RK4, pads, tc = {tc:g} h", replace(BEST, time_constant_steps=tc)))
+    found.append(over_steps("RK4, no pads, tc = 10 h", PLAIN))
+    found += [*_softness(), *_tolerance()]
+    return found + (_drives() if scene.motion.alpha_2 == 0.0 else [])
+
+
+PLAIN = replace(BEST, pad=None, time_constant_steps=10.0)
 
 
 def _ladder(integrator: str) -> tuple[int, ...]:
@@ -118,63 +112,50 @@ def _ladder(integrator: str) -> tuple[int, ...]:
 def _with_default_closure(integrator: str, speed: float) -> Curve:
     """MuJoCo's solref, solimp and solver; Euler at 2 ms is what a new user gets."""
     settings = replace(BEST, integrator=integrator, pad=None)
-    curve = over_steps(f"{integrator}, MuJoCo's defaults", settings, drives.AllDefaults, _ladder(integrator))
-    curve = replace(curve, settled=True)
-    if integrator != "Euler":
-        return curve
-    n = 2.0 * math.pi / speed / DEFAULT_TIMESTEP
-    spot = Spot("MuJoCo's defaults", replace(settings, steps_per_revolution=n), drives.AllDefaults, n)
-    return replace(curve, spots=tuple(sorted((*curve.spots, spot), key=lambda each: each.x)))
+    curve = over_steps(f"{integrator}, MuJoCo's defaults", settings, drives.all_defaults, _ladder(integrator))
+    spots = list(curve.spots)
+    if integrator == "Euler":
+        n = 2.0 * math.pi / speed / DEFAULT_TIMESTEP
+        spots.append(Spot("MuJoCo's defaults", replace(settings, steps_per_revolution=n), drives.all_defaults, n))
+    return replace(curve, spots=tuple(sorted(spots, key=lambda each: each.x)), settled=True)
 
 
 def _softness() -> list[Curve]:
-    plain = replace(BEST, pad=None, time_constant_steps=10.0)
-    by_d = tuple(Spot(f"d = {d:g}", replace(plain, impedance=d), None, 1.0 - d) for d in IMPEDANCES)
-    by_tc = tuple(Spot(f"tc = {tc:g} h", replace(plain, time_constant_steps=tc), None, tc) for tc in TIME_CONSTANTS)
-    soft = tuple(replace(spot, settings=replace(spot.settings, impedance=0.999)) for spot in by_tc)
+    by_d = tuple(Spot(f"d = {d:g}", replace(PLAIN, impedance=d), None, 1.0 - d) for d in IMPEDANCES)
+
+    def by_tc(name: str, impedance: float) -> Curve:
+        return over(
+            name,
+            "tc = {:g} h",
+            TIME_CONSTANTS,
+            lambda tc: replace(PLAIN, impedance=impedance, time_constant_steps=tc),
+        )
+
+    pads = (Spot("no pads" if f is None else f"pads {f:g}", replace(BEST, pad=f), None, f or 1.0) for f in PADS)
     return [
-        Curve("softness d", "1-d", by_d),
-        Curve("softness tc", "tc", by_tc),
-        Curve("sag d, slow", "1-d", by_d, slow=True),
-        Curve("sag tc, slow", "tc", soft, slow=True),
-        Curve("sag d, slow, nothing acts", "1-d", by_d, slow=True, bare=True),
-        Curve(
+        Curve("softness d", by_d),
+        by_tc("softness tc", PLAIN.impedance),
+        Curve("sag d, slow", by_d, slow=True),
+        replace(by_tc("sag tc, slow", 0.999), slow=True),
+        Curve("sag d, slow, nothing acts", by_d, slow=True, bare=True),
+        over(
             "regularisation edited",
-            "regularisation",
-            tuple(
-                Spot(f"body_invweight0 x {f:g}", replace(BEST, pad=None), partial(_softened, factor=f), f)
-                for f in REGULARISATIONS
-            ),
+            "body_invweight0 x {:g}",
+            REGULARISATIONS,
+            lambda _: replace(BEST, pad=None),
+            lambda factor: lambda text, _: drives.Softened(text, factor),
         ),
-        Curve(
-            "pads",
-            "pads",
-            tuple(Spot("no pads" if f is None else f"pads {f:g}", replace(BEST, pad=f), None, f or 1.0) for f in PADS),
-        ),
+        Curve("pads", tuple(pads)),
     ]
-
-
-def _softened(text: str, _omega: float, factor: float) -> drives.Softened:
-    return drives.Softened(text, factor)
 
 
 def _tolerance() -> list[Curve]:
-    return [
-        Curve(
-            f"tolerance, {solver}",
-            "tolerance",
-            tuple(
-                Spot(
-                    f"{solver}, tolerance {tol:g}",
-                    replace(BEST, solver=solver, tolerance=tol, iterations=10 if solver == "Newton" else 100),
-                    None,
-                    tol,
-                )
-                for tol in TOLERANCES
-            ),
-        )
-        for solver in ("Newton", "CG", "PGS")
-    ]
+    found = []
+    for solver, iterations in (("Newton", 10), ("CG", 100), ("PGS", 100)):
+        settings = replace(BEST, solver=solver, iterations=iterations)
+        label = solver + ", tolerance {:g}"
+        found.append(over(f"tolerance, {solver}", label, TOLERANCES, lambda x, s=settings: replace(s, tolerance=x)))  # type: ignore[misc]
+    return found
 
 
 def _drives() -> list[Curve]:
@@ -182,10 +163,15 @@ def _drives() -> list[Curve]:
     at = replace(BEST, flywheel=1.0)
     fast = replace(at, integrator="implicitfast", time_constant_steps=3.0)
     found = [over_steps(f"flywheel {f:g}, RK4", replace(BEST, flywheel=f)) for f in (1e2, 1e4, 1e6, 1e8)]
-    found.append(over_steps("joint equality, RK4", at, drives.WheelEquality))
-    found.append(over_steps("joint equality, softness edited, RK4", at, drives.StiffWheelEquality))
-    found.append(over_steps("servo, implicitfast", fast, drives.Servo, MORE_STEPS))
-    found.append(over_steps("gentle servo, RK4", at, drives.GentleServo))
-    found.append(over_steps("velocity actuator, implicitfast", fast, drives.VelocityActuator, MORE_STEPS))
-    found.append(over_steps("gentle velocity actuator, RK4", at, drives.GentleVelocityActuator))
+    tried: list[tuple[str, Build]] = [
+        ("joint equality, RK4", drives.WheelEquality),
+        ("joint equality, softness edited, RK4", drives.StiffWheelEquality),
+        ("servo, implicitfast", drives.Servo),
+        ("gentle servo, RK4", drives.GentleServo),
+        ("velocity actuator, implicitfast", drives.VelocityActuator),
+        ("gentle velocity actuator, RK4", drives.GentleVelocityActuator),
+    ]
+    for name, drive in tried:
+        carried = (at, drive) if name.endswith("RK4") else (fast, drive, MORE_STEPS)
+        found.append(over_steps(name, *carried))
     return found

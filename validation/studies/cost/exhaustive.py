@@ -4,14 +4,16 @@ Cost is counted in steps of the recommended RK4 model; a step of another integra
 CPU time relative to that, measured once, interleaved.
 """
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from functools import partial
 from statistics import median
 from typing import NamedTuple
 
 from fourbar.mjcf import Settings
 from validation.engines.mujoco.dialled import FEWEST_STEPS, dialled
 from validation.engines.mujoco.trial import Rig
+from validation.stress.timed import in_turns
 from validation.studies.cost.advise import MOST_STEPS
 from validation.studies.cost.matters import judged
 
@@ -35,13 +37,8 @@ class Found(NamedTuple):
 def relative_costs(rig: Rig) -> dict[tuple[str, bool], float]:
     """CPU time of a step, by integrator and pads, relative to RK4 with pads: medians of interleaved rounds."""
     kinds = [("RK4", True), ("RK4", False), *((name, False) for name in FIRST_ORDER)]
-    clocks: dict[tuple[str, bool], Callable[[int], float]] = {
-        kind: rig.seconds_per_step(of_kind(kind, dialled(628.0, 20.0))) for kind in kinds
-    }
-    times: dict[tuple[str, bool], list[float]] = {kind: [] for kind in kinds}
-    for _ in range(ROUNDS):
-        for kind, clock in clocks.items():
-            times[kind].append(clock(STEPS))
+    clocks = {kind: rig.seconds_per_step(of_kind(kind, dialled(628.0, 20.0))) for kind in kinds}
+    times = in_turns({kind: partial(clock, STEPS) for kind, clock in clocks.items()}, ROUNDS)
     reference = median(times["RK4", True])
     return {kind: median(values) / reference for kind, values in times.items()}
 

@@ -80,12 +80,10 @@ def _grouped(pairs: Sequence[tuple[str, str]]) -> list[str]:
 
 def fit(x: Sequence[float], y: Sequence[float]) -> tuple[float, float]:
     """Slope of log y over log x by least squares, and its standard error."""
-    u, v = np.log(np.asarray(x, dtype=float)), np.log(np.asarray(y, dtype=float))
-    u = u - u.mean()
-    slope = float(u @ v / (u @ u))
-    left = v - v.mean() - slope * u
-    free = len(u) - 2
-    return slope, math.sqrt(float(left @ left) / free / float(u @ u)) if free > 0 else math.inf
+    from scipy.stats import linregress
+
+    found = linregress(np.log(x), np.log(y))
+    return float(found.slope), float(found.stderr) if len(x) > 2 else math.inf
 
 
 def floor(points: Sequence[Point], quantity: str) -> float | None:

@@ -1,7 +1,7 @@
 """Which of MuJoCo's settings matters for a scene, and why: each is changed alone, and the error that comes of it."""
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,9 +11,9 @@ from fourbar.mjcf.document import load_ratio, mass_ratio
 from fourbar.mjcf.settings import LIGHT
 from fourbar.scene import Command, Scene
 from fourbar.solve import solve
-from validation.compare.plain import plain
+from validation.engines.loop import Trial
 from validation.engines.mujoco.dialled import LONGEST, SHORTEST
-from validation.engines.mujoco.trial import Rig, Trial
+from validation.engines.mujoco.trial import Rig
 from validation.studies.cost.errors import NO_ANSWER, Errors, errors
 
 MATTERS = 2.0
@@ -147,18 +147,3 @@ def _yields(scene: Scene, what: str) -> str:
     if loads > 1.0:
         return f"{what} sags under loads and weights, which are {loads:.2g} times the inertial forces"
     return f"{what} yields to the inertial forces"
-
-
-def print_table(headings: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> None:
-    """Several scenes, one a line."""
-    from rich.box import SIMPLE_HEAD
-    from rich.console import Console
-    from rich.markup import escape
-    from rich.table import Table
-
-    shown = Table(box=SIMPLE_HEAD, pad_edge=False, show_edge=False)
-    for heading in headings:
-        shown.add_column(heading, overflow="fold")
-    for row in rows:
-        shown.add_row(*(escape(plain(cell)) for cell in row))
-    Console().print(shown)

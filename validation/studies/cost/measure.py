@@ -35,8 +35,6 @@ GENTLE = 0.02
 POSITIONS, DENSER, SEARCHED = 36, 4, 2
 """Intervals of the scene; the answer is judged at so many times more, the search decides at so many times more."""
 NEEDED_MET, NEEDED_CHEAP, CHEAP = 0.95, 0.80, 3.0
-QUANTILE = 1.959963984540054
-"""Of the normal distribution, two-sided 95 %."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,11 +118,9 @@ def case(seed: int, index: int, costs: dict[tuple[str, bool], float]) -> Case:
 
 def wilson(successes: int, n: int) -> float:
     """Lower bound of the Wilson score interval of a proportion, at 95 %."""
-    if n == 0:
-        return 0.0
-    p, z2 = successes / n, QUANTILE**2
-    centre = p + z2 / (2.0 * n)
-    return (centre - QUANTILE * math.sqrt(p * (1.0 - p) / n + z2 / (4.0 * n * n))) / (1.0 + z2 / n)
+    from scipy.stats import binomtest
+
+    return float(binomtest(successes, n).proportion_ci(0.95, "wilson").low) if n else 0.0
 
 
 def enough(missed: int) -> int:

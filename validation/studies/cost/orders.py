@@ -7,25 +7,40 @@ from validation.studies.cost.errors import QUANTITIES
 from validation.studies.cost.laws import TOO_LARGE, jumps
 from validation.studies.cost.study import Point
 
-CURVES = {
+Look = tuple[str, str, str, Any]
+"""Curve, colour for all kinds of colour vision, marker and line that tell it apart in grey."""
+CURVES: dict[str, Look] = {
     "Euler": ("Euler, tc held", "#d55e00", "s", (0, (4, 2))),
     "implicitfast": ("implicitfast, tc held", "#cc79a7", "v", (0, (1, 1.5))),
     "discrete": ("discrete, tc held", "#e69f00", "D", (0, (6, 2, 1, 2))),
     "RK4": ("RK4, tc held", "#0072b2", "o", "solid"),
 }
-"""Name in the legend: curve, colour, marker and line."""
+"""By name in the legend."""
 LARGEST = 10.0
 """A larger error, and one without end, is drawn here: at the upper edge."""
 NAMES = {"torque": "driving torque"}
 
 
+def line_of(axes: Any, x: Sequence[float], y: Sequence[float], label: str, look: Look, **style: Any) -> None:
+    """A curve in its colour, with its marker and line."""
+    _, colour, marker, line = look
+    common = {"color": colour, "ls": line, "marker": marker, "mec": "white", "mew": 0.5}
+    axes.plot(x, y, label=label, **(common | style))
+
+
+def headed(figure: Any, statement: str, title: str, upper: float, lower: float) -> Any:
+    """With what a picture means, and below it what was run."""
+    figure.text(0.02, upper, statement, fontsize=12.5, weight="bold", va="center")
+    figure.text(0.02, lower, title, fontsize=9.5, color="#666666", va="center")
+    return figure
+
+
 def over_the_timestep(axes: Any, curves: Mapping[str, Sequence[Point]], quantity: str) -> None:
     """Draw one quantity's error over the timestep, by integrator."""
-    for label, (name, colour, marker, line) in CURVES.items():
-        row = sorted(curves.get(name, ()), key=lambda point: point.dial)
+    for label, look in CURVES.items():
+        row = sorted(curves.get(look[0], ()), key=lambda point: point.dial)
         errors = {point.dial: min(getattr(point, quantity), LARGEST) for point in row}
-        style = {"color": colour, "ls": line, "marker": marker, "ms": 4, "lw": 1.6, "mec": "white", "mew": 0.5}
-        axes.plot([1.0 / n for n in errors], list(errors.values()), label=label, **style)
+        line_of(axes, [1.0 / n for n in errors], list(errors.values()), label, look, ms=4, lw=1.6)
         leaps = [point.dial for point in jumps(row, quantity)]
         ring = {"ls": "none", "marker": "o", "ms": 12, "mfc": "none", "mec": "black", "mew": 1.4}
         axes.plot([1.0 / n for n in leaps], [errors[n] for n in leaps], gid=f"jump-{quantity}", **ring)
@@ -47,9 +62,7 @@ def picture(curves: Mapping[str, Sequence[Point]], title: str) -> Any:
     panels[0].set_ylabel("error, relative to its scale")
     handles, labels = panels[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="upper left", bbox_to_anchor=(0.012, 0.875), fontsize=9, ncols=len(CURVES))
-    figure.text(0.02, 0.955, statement(curves), fontsize=12.5, weight="bold", va="center")
-    figure.text(0.02, 0.905, title, fontsize=9.5, color="#666666", va="center")
-    return figure
+    return headed(figure, statement(curves), title, 0.955, 0.905)
 
 
 def statement(curves: Mapping[str, Sequence[Point]]) -> str:

@@ -8,18 +8,28 @@ from typing import Any
 from fourbar.show.plot.style import matplotlib_style, save
 from validation.studies.cost import orders
 from validation.studies.cost.laws import pareto
-from validation.studies.cost.orders import CURVES
+from validation.studies.cost.orders import CURVES, Look, headed, line_of
 from validation.studies.cost.study import EXACT, FORMULAS, STEPPED, Point
 
-SHOWN = {
+SHOWN: dict[str, Look] = {
     "Euler, MuJoCo's defaults": ("Euler, MuJoCo's defaults", "#d55e00", "s", (0, (4, 2))),
     "RK4, MuJoCo's defaults": ("RK4, MuJoCo's defaults", "#e69f00", "D", (0, (1, 1.5))),
-    "Euler, tc held": ("Euler, stiff closure", "#cc79a7", "v", (0, (6, 2, 1, 2))),
-    "RK4, no pads, tc = 10 h": ("RK4, d = 0.9999, tc = 10 h", "#56b4e9", "P", (0, (5, 1))),
-    "Pinocchio forward": ("Pinocchio forward, RK4", "#999999", "x", (0, (3, 2))),
-    "recommended": ("MuJoCo, recommended", "#0072b2", "o", "solid"),
+    "Euler, stiff closure": ("Euler, tc held", "#cc79a7", "v", (0, (6, 2, 1, 2))),
+    "RK4, d = 0.9999, tc = 10 h": ("RK4, no pads, tc = 10 h", "#56b4e9", "P", (0, (5, 1))),
+    "Pinocchio forward, RK4": ("Pinocchio forward", "#999999", "x", (0, (3, 2))),
+    "MuJoCo, recommended": ("recommended", "#0072b2", "o", "solid"),
 }
-"""Curve: name in the legend, colour for all kinds of colour vision, marker and line that tell it apart in grey."""
+SOFTNESS: dict[str, Look] = {
+    "at the scene's speed": ("softness d", "#0072b2", "o", "solid"),
+    "at 0.1 rad/s, sag under gravity and loads": ("sag d, slow", "#d55e00", "s", (0, (4, 2))),
+    "at 0.1 rad/s, nothing acts": ("sag d, slow, nothing acts", "#009e73", "^", (0, (1, 1.5))),
+}
+SOLVERS: dict[str, Look] = {
+    "Newton": ("tolerance, Newton", "#0072b2", "o", "solid"),
+    "PGS": ("tolerance, PGS", "#d55e00", "s", (0, (4, 2))),
+    "CG": ("tolerance, CG", "#009e73", "^", (0, (1, 1.5))),
+}
+"""By name in the legend."""
 DEFAULT = "MuJoCo's defaults"
 """Label of the point that a new user gets."""
 LOWEST = 1e-17
@@ -41,22 +51,16 @@ def draw(curves: Mapping[str, Sequence[Point]], title: str, folder: Path) -> lis
     """All pictures of a scene as SVG and PNG; the files written."""
     written = []
     with matplotlib_style():
-        for quantity in ("torque", "force"):
-            written += _both(_work_precision(curves, quantity, title), folder / f"work-precision-{quantity}")
+        made = {f"work-precision-{quantity}": _work_precision(curves, quantity, title) for quantity in NAMES}
         if any(name in curves for name, *_ in CURVES.values()):
-            written += _both(orders.picture(curves, title), folder / "orders")
+            made["orders"] = orders.picture(curves, title)
         if "tolerance, Newton" in curves:
-            written += _both(_sources(curves, title), folder / "sources")
+            made["sources"] = _sources(curves, title)
+        for name, figure in made.items():
+            for kind in ("svg", "png"):
+                written.append(folder / f"{name}.{kind}")
+                save(figure, written[-1], kind)
     return written
-
-
-def _both(figure: Any, stem: Path) -> list[Path]:
-    paths = []
-    for kind in ("svg", "png"):
-        path = stem.with_suffix(f".{kind}")
-        save(figure, path, kind)
-        paths.append(path)
-    return paths
 
 
 def _work_precision(curves: Mapping[str, Sequence[Point]], quantity: str, title: str) -> Any:
@@ -65,27 +69,29 @@ def _work_precision(curves: Mapping[str, Sequence[Point]], quantity: str, title:
     figure = Figure(figsize=(9.6, 6.4))
     axes = figure.add_axes((0.085, 0.1, 0.885, 0.735))
     points = [point for name, row in curves.items() for point in row if "slow" not in name]
-    stepped = [p for p in points if p.kind == STEPPED]
-    front = pareto(stepped, quantity)
+    front = pareto([p for p in points if p.kind == STEPPED], quantity)
     broad: dict[str, Any] = {"lw": 9.0, "solid_capstyle": "round", "solid_joinstyle": "round", "zorder": 1}
-    axes.plot(
-        *(_ms(front), [getattr(p, quantity) for p in front]),
-        **broad,
-        color=PALE,
-        label="Pareto front of everything stepped",
-    )
-    for name, (label, colour, marker, line) in SHOWN.items():
-        row = [p for p in curves.get(name, ()) if math.isfinite(getattr(p, quantity))]
+    axes.plot(*_places(front, quantity), **broad, color=PALE, label="Pareto front of everything stepped")
+    for label, look in SHOWN.items():
+        row = [p for p in curves.get(look[0], ()) if math.isfinite(getattr(p, quantity))]
         if row:
-            style: dict[str, Any] = {"color": colour, "ls": line, "marker": marker, "ms": 5.5, "lw": 1.8}
             # a cross has no face: with a white edge it would vanish
-            style |= {"mec": colour, "mew": 1.4} if marker == "x" else {"mec": "white", "mew": 0.6}
-            style["zorder"] = 3 if name == "recommended" else 2
-            axes.plot(_ms(row), [getattr(p, quantity) for p in row], label=label, **style)
-    _label_recommended(axes, curves.get("recommended", ()), quantity)
+            style: dict[str, Any] = {"mec": look[1], "mew": 1.4} if look[2] == "x" else {"mew": 0.6}
+            style["zorder"] = 3 if look[0] == "recommended" else 2
+            line_of(axes, *_places(row, quantity), label, look, ms=5.5, lw=1.8, **style)
+    for point in curves.get("recommended", ())[::2]:  # left of the curve above the plain settings' floor, then right
+        tc, left = point.setting.partition("tc = ")[2], getattr(point, quantity) > TURN
+        text = f"{point.steps_per_revolution:.0f} steps, tc = {tc}"
+        _note(axes, point, quantity, text, (-10, -5) if left else (12, 4), "right" if left else "left", color="#0072b2")
     if front and front[-1].curve != "recommended":
-        _label_end(axes, front[-1], quantity)
-    _mark_default(axes, points, quantity)
+        text = front[-1].setting.replace("tc held", "tc a quarter turn")
+        _note(axes, front[-1], quantity, text, (0, -16), "center", color="#666666")
+    for point in points:  # what a new user gets
+        if point.setting == DEFAULT and math.isfinite(error := getattr(point, quantity)):
+            axes.plot(*_places([point], quantity), marker="*", ms=19, color="#d55e00", mec="black", mew=0.9, zorder=5)
+            offset = (14, 16 if error < NEAR_TOP else -22)  # the legend stands above the axes
+            text = f"MuJoCo's defaults (Euler, 2 ms): {short(error)}"
+            _note(axes, point, quantity, text, offset, fontsize=10, weight="bold")
     _exact(axes, points, quantity)
     axes.set(xscale="log", yscale="log", xlabel="CPU time per revolution [ms]")
     axes.set_ylabel(f"error of the {NAMES[quantity]}, relative to its scale")
@@ -97,59 +103,22 @@ def _work_precision(curves: Mapping[str, Sequence[Point]], quantity: str, title:
     axes.xaxis.label.set_fontsize(11)
     axes.yaxis.label.set_fontsize(11)
     axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=4, fontsize=8.5)
-    figure.text(0.02, 0.965, statement(curves, quantity), fontsize=12, weight="bold", va="center")
-    figure.text(0.02, 0.928, title, fontsize=9.5, color="#666666", va="center")
-    return figure
+    return headed(figure, statement(curves, quantity), title, 0.965, 0.928)
 
 
-def _ms(points: Sequence[Point]) -> list[float]:
-    return [1e3 * p.seconds_per_revolution for p in points]
+def _places(points: Sequence[Point], quantity: str) -> tuple[list[float], list[float]]:
+    """Milliseconds a revolution, and errors; what lies below the picture at its edge."""
+    errors = [max(getattr(point, quantity), LOWEST) for point in points]
+    return [1e3 * point.seconds_per_revolution for point in points], errors
 
 
-def _label_recommended(axes: Any, row: Sequence[Point], quantity: str) -> None:
-    """Steps and time constant at every second point; left of the curve above the plain settings' floor, then right."""
-    for point in row[::2]:
-        tc, error = point.setting.partition("tc = ")[2], getattr(point, quantity)
-        left = error > TURN
-        axes.annotate(
-            f"{point.steps_per_revolution:.0f} steps, tc = {tc}",
-            (1e3 * point.seconds_per_revolution, error),
-            xytext=(-10, -5) if left else (12, 4),
-            textcoords="offset points",
-            ha="right" if left else "left",
-            fontsize=8.5,
-            color="#0072b2",
-        )
-
-
-def _label_end(axes: Any, point: Point, quantity: str) -> None:
-    """The most accurate of everything stepped."""
-    at = (1e3 * point.seconds_per_revolution, getattr(point, quantity))
-    axes.annotate(
-        point.setting.replace("tc held", "tc a quarter turn"),
-        at,
-        xytext=(0, -16),
-        textcoords="offset points",
-        ha="center",
-        fontsize=8.5,
-        color="#666666",
-    )
-
-
-def _mark_default(axes: Any, points: Sequence[Point], quantity: str) -> None:
-    """The point that a new user gets."""
-    for point in points:
-        if point.setting == DEFAULT and math.isfinite(getattr(point, quantity)):
-            at = (1e3 * point.seconds_per_revolution, getattr(point, quantity))
-            axes.plot(*at, marker="*", ms=19, color="#d55e00", mec="black", mew=0.9, ls="none", zorder=5)
-            axes.annotate(
-                f"MuJoCo's defaults (Euler, 2 ms): {short(at[1])}",
-                at,
-                xytext=(14, 16 if at[1] < NEAR_TOP else -22),  # the legend stands above the axes
-                textcoords="offset points",
-                fontsize=10,
-                weight="bold",
-            )
+def _note(
+    axes: Any, point: Point, quantity: str, text: str, offset: tuple[float, float], ha: str = "left", **style: Any
+) -> None:
+    """Words next to a point."""
+    (x,), (y,) = _places([point], quantity)
+    given = {"fontsize": 8.5} | style
+    axes.annotate(text, (x, y), xytext=offset, textcoords="offset points", ha=ha, **given)
 
 
 def _exact(axes: Any, points: Sequence[Point], quantity: str) -> None:
@@ -158,21 +127,11 @@ def _exact(axes: Any, points: Sequence[Point], quantity: str) -> None:
     for point in points:
         if point.kind == STEPPED or (point.curve == "one state" and point.dial > 0.0):
             continue
-        marker, colour = marks[point.kind]
-        value = getattr(point, quantity)
-        x, y = 1e3 * point.seconds_per_revolution, max(value, LOWEST)
-        axes.plot(x, y, marker=marker, ms=9, color=colour, mec="white", mew=0.6, ls="none", zorder=4)
+        (marker, colour), value = marks[point.kind], getattr(point, quantity)
+        axes.plot(*_places([point], quantity), marker=marker, ms=9, color=colour, mec="white", mew=0.6, zorder=4)
         name = point.setting if value >= LOWEST else f"{point.setting}: {short(value)}, far below"
-        right = point.setting not in LEFT
-        axes.annotate(
-            name,
-            (x, y),
-            xytext=(8 if right else -8, 0),
-            textcoords="offset points",
-            ha="left" if right else "right",
-            va="center",
-            fontsize=8.5,
-        )
+        left = point.setting in LEFT
+        _note(axes, point, quantity, name, (-8 if left else 8, 0), "right" if left else "left", va="center")
 
 
 def short(value: float) -> str:
@@ -206,30 +165,15 @@ def _sources(curves: Mapping[str, Sequence[Point]], title: str) -> Any:
     figure = Figure(figsize=(11.5, 5.6))
     left, right, both = 0.075, 0.985, 0.3
     panels = [figure.add_axes((left + i * (right - left + 0.012) / 3.0, 0.105, both - 0.008, 0.6)) for i in range(3)]
-    softness = {
-        "at the scene's speed": ("softness d", "#0072b2", "o", "solid"),
-        "at 0.1 rad/s, sag under gravity and loads": ("sag d, slow", "#d55e00", "s", (0, (4, 2))),
-        "at 0.1 rad/s, nothing acts": ("sag d, slow, nothing acts", "#009e73", "^", (0, (1, 1.5))),
-    }
-    solvers = {
-        name: (f"tolerance, {name}", colour, marker, line)
-        for name, colour, marker, line in (
-            ("Newton", "#0072b2", "o", "solid"),
-            ("PGS", "#d55e00", "s", (0, (4, 2))),
-            ("CG", "#009e73", "^", (0, (1, 1.5))),
-        )
-    }
     for axes, heading, label, rows in (
         (panels[0], "Time step", "time step, part of a revolution", CURVES),
-        (panels[1], "Softness of the closure", "1 - d", softness),
-        (panels[2], "Solver", "tolerance", solvers),
+        (panels[1], "Softness of the closure", "1 - d", SOFTNESS),
+        (panels[2], "Solver", "tolerance", SOLVERS),
     ):
-        for name, (curve, colour, marker, line) in rows.items():
-            row = [p for p in curves.get(curve, ()) if math.isfinite(p.worst) and p.worst < 10.0]
+        for name, look in rows.items():
+            row = [p for p in curves.get(look[0], ()) if math.isfinite(p.worst) and p.worst < 10.0]
             x = [1.0 / p.dial if axes is panels[0] else p.dial or NONE for p in row]
-            style: dict[str, Any] = {"color": colour, "ls": line, "marker": marker, "ms": 5, "lw": 1.8}
-            style |= {"mec": "white", "mew": 0.5}
-            axes.plot(x, [p.worst for p in row], label=name, **style)
+            line_of(axes, x, [p.worst for p in row], name, look, ms=5, lw=1.8)
         axes.set(xscale="log", yscale="log", ylim=(1e-12, 20.0), xlabel=label)
         axes.set_title(heading, loc="left", fontsize=11, weight="bold", pad=44.0)
         axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), fontsize=8.5, ncols=2 if axes is panels[0] else 1)
@@ -243,9 +187,7 @@ def _sources(curves: Mapping[str, Sequence[Point]], title: str) -> Any:
     _slope(panels[1], 1.0, 2e-3, 2e-5, "1")
     panels[0].set_ylabel("worst error of torque and pin forces")
     sentence = "Three sources, one at a time: time step by its order, softness in proportion, the solver unless at 0"
-    figure.text(0.02, 0.955, sentence, fontsize=12.5, weight="bold", va="center")
-    figure.text(0.02, 0.912, title, fontsize=9.5, color="#666666", va="center")
-    return figure
+    return headed(figure, sentence, title, 0.955, 0.912)
 
 
 def _slope(axes: Any, exponent: float, x: float, y: float, name: str) -> None:

@@ -4,6 +4,7 @@ import json
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, fields, replace
+from functools import partial
 from pathlib import Path
 from statistics import median
 
@@ -15,8 +16,10 @@ from fourbar.formulas.mobility import turns_fully
 from fourbar.scene import Command, Scene, command
 from fourbar.writing import write_text
 from validation.compare.answer import Engine
-from validation.engines.mujoco.trial import Rig, Trial
+from validation.engines.loop import Trial
+from validation.engines.mujoco.trial import Rig
 from validation.report.machine import versions
+from validation.stress.timed import in_turns
 from validation.studies.cost import formulas
 from validation.studies.cost.advise import advise
 from validation.studies.cost.curves import BEST, SLOW, Curve, Spot, curves
@@ -287,10 +290,10 @@ def _interleaved(
     clocks: list[Callable[[int], float]], reference: Callable[[int], float], steps: list[int]
 ) -> tuple[list[tuple[float, float]], float]:
     """CPU seconds per step, and their scatter over rounds; all take turns, so that a slow spell hits all of them."""
-    times: list[list[float]] = [[] for _ in clocks]
-    base = []
-    for _ in range(ROUNDS):
-        base.append(reference(TIMED_STEPS) / TIMED_STEPS)
-        for clock, n, kept in zip(clocks, steps, times, strict=True):
-            kept.append(clock(n) / n)
+
+    def per_step(clock: Callable[[int], float], n: int) -> float:
+        return clock(n) / n
+
+    every = zip((reference, *clocks), (TIMED_STEPS, *steps), strict=True)
+    base, *times = in_turns(dict(enumerate(partial(per_step, *each) for each in every)), ROUNDS).values()
     return [clocked(kept) for kept in times], median(base)

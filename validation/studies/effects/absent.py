@@ -4,7 +4,6 @@ import ast
 import json
 import re
 import shutil
-import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator
@@ -16,6 +15,7 @@ from typing import NamedTuple
 from fourbar import effects
 from fourbar.errors import FourBarError
 from validation.engines.witnesses import not_installed
+from validation.run.elsewhere import ended
 from validation.studies.effects.counted import REPEATS, available, counts
 
 WORKLOADS = (
@@ -98,12 +98,10 @@ def without_row(text: str, key: str) -> str:
 
 def made(root: Path) -> dict[str, object]:
     """What a checkout makes of the bare scene: bits, calls, MJCF."""
-    done = subprocess.run(
-        [sys.executable, "-c", PROBE, str(root)], capture_output=True, text=True, check=False, cwd=root
-    )
-    if done.returncode:
-        raise FourBarError(f"the build in {root} does not run: {done.stderr.strip()[-300:]}")
-    answer: dict[str, object] = json.loads(done.stdout)
+    done = ended([sys.executable, "-c", PROBE, root], folder=root)
+    if done.why:
+        raise FourBarError(f"the build in {root} does not run: {done.why}")
+    answer: dict[str, object] = json.loads(done.out)
     if not Path(str(answer.pop("file"))).is_relative_to(root):
         raise FourBarError(f"not the build in {root} was run, but another")
     return answer

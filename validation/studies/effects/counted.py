@@ -4,17 +4,17 @@ Wall clock on a busy machine scatters by a third; instructions repeat to some 0.
 and addresses are fixed (PYTHONHASHSEED, setarch -R) and one thread runs.
 """
 
-import os
 import platform
 import re
 import shutil
-import subprocess
 import sys
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
 from fourbar.errors import DependencyError, FourBarError
+from validation.run.elsewhere import ended
+from validation.stress.against import ONE_THREAD
 from validation.studies.effects.work import POSITIONS
 
 AMOUNTS = {"formulas": (1, 5), "mujoco-simulated": (10, 210), "mujoco-inverse": (5, 45), "pinocchio-inverse": (5, 45)}
@@ -36,25 +36,16 @@ def counts(engine: str, effects: Sequence[str], root: Path | None = None) -> dic
         raise DependencyError("valgrind and setarch are needed to count instructions")
     here = Path(__file__).parents[3] if root is None else root
     few, many = AMOUNTS[engine]
-    threads = {name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")}
+    settings = dict.fromkeys(ONE_THREAD, "1") | {"PYTHONHASHSEED": "0", "PYTHONDONTWRITEBYTECODE": "1"}
     with tempfile.TemporaryDirectory() as folder:  # MuJoCo writes its log where it runs
-        settings = {
-            **os.environ,
-            **threads,
-            "PYTHONHASHSEED": "0",
-            "PYTHONPATH": str(here),
-            "PYTHONDONTWRITEBYTECODE": "1",
-        }
         command = ["setarch", platform.machine(), "-R", "valgrind", "--tool=callgrind", "--callgrind-out-file=counted"]
         command += ["--collect-atstart=no", f"--toggle-collect={BRACKET}", f"--dump-after={BRACKET}"]
         command += [sys.executable, "-m", "validation.studies.effects.work", engine, str(few), str(many), *effects]
-        done = subprocess.run(command, env=settings, cwd=folder, capture_output=True, text=True, check=False)
+        done = ended(command, folder=Path(folder), variables=settings | {"PYTHONPATH": str(here)})
         dumps = sorted(Path(folder).glob("counted.*"), key=lambda path: int(path.suffix[1:]))
         totals = [re.findall(r"^totals: (\d+)", dump.read_text(), re.MULTILINE) for dump in dumps[-2 * len(effects) :]]
-    if done.returncode or len(totals) < 2 * len(effects) or not all(totals):
-        raise FourBarError(
-            f"{engine} with {', '.join(effects)} did not run under valgrind: {done.stderr.strip()[-300:]}"
-        )
+    if done.why or len(totals) < 2 * len(effects) or not all(totals):
+        raise FourBarError(f"{engine} with {', '.join(effects)} did not run under valgrind: {done.why}")
     each = iter(int(total[-1]) for total in totals)
     units = (many - few) * (POSITIONS if engine == "formulas" else 1)
     return {effect: (more - less) / units for effect, less, more in zip(effects, each, each, strict=False)}

@@ -4,6 +4,7 @@ from collections.abc import Iterable
 from typing import NamedTuple
 
 from validation.report.machine import machine, versions
+from validation.report.terminal import lined_up
 from validation.studies.effects.clock import Ratio
 from validation.studies.effects.work import EFFECTS
 
@@ -49,18 +50,10 @@ def rows(entries: Iterable[Entry]) -> tuple[list[str], list[list[str]]]:
 
 def show(entries: Iterable[Entry]) -> None:
     """Print it."""
-    from rich.box import SIMPLE_HEAD
     from rich.console import Console
-    from rich.table import Table
 
     engines, table = rows(entries)
-    shown = Table(caption=ABOUT, box=SIMPLE_HEAD, pad_edge=False)
-    shown.add_column("effect")
-    for engine in engines:
-        shown.add_column(engine, justify="right")
-    for cells in table:
-        shown.add_row(*(cell.replace("[", "\\[") for cell in cells))
-    Console().print(shown)
+    Console().print(lined_up(["effect", *engines], table, caption=ABOUT))
 
 
 def markdown(entries: Iterable[Entry]) -> str:

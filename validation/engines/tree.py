@@ -1,0 +1,292 @@
+"""The bars of a four-bar opened at a pin, as an engine holds them, and what follows from the few numbers that it gives.
+
+Coordinates q = (turn of bar 2 at O2, of bar 3 against bar 2 at A, of bar 4 at O4). With g(q) = B on
+bar 3 minus B on bar 4 and J = dg/dq the loop holds where g = 0, J v = 0, J a + (dJ/dt) v = 0, and
+
+    [J^T e_drive] [lambda; T] = tau(q, v, a),
+
+lambda = F43 and e_drive = the derivative of the driven bar's rotation. Every number comes from the engine.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from fourbar.linkage import MOVING_BARS
+from fourbar.scene import Scene
+from validation.compare.answer import Array
+from validation.engines.description import FORCE_AT, turned, turned_by
+
+PASSES = 1000
+"""Passes over pin loads and the friction they make; each lessens the error where the friction is unique."""
+REPEATED = 2.0 * 2.0**-52
+"""Change of a pin load, relative, that is rounding."""
+ROUNDED = 1e-11
+"""Change, relative, at or below which one that no longer falls is rounding, near a pole of the torque too."""
+DIVERGED = 1e100
+"""Load, N, that only passes running away from each other reach."""
+ON_BARS = {"A": "end2", "B": "end4", "G2": "G2", "G3": "G3", "G4": "G4"}
+"""Points whose accelerations are answered, each as a point of a bar."""
+Act = Callable[[], None]
+"""What acts on a tree, at its present motion."""
+Values = dict[str, Array | float]
+
+
+class Bars:
+    """An engine holding the bars of a scene, opened at pin A or B; every number is the engine's own."""
+
+    own: str
+    """What the engine finds alone, for the report."""
+    alone = False
+    """Whether it answers the torque that the bars without loads and effects take, too: `torque_inertia`."""
+    ground_angle: float
+
+    def place(self, q: Sequence[float]) -> None:
+        """Move to a configuration."""
+        raise NotImplementedError
+
+    def gap(self) -> tuple[float, float]:
+        """B on bar 3 minus B on bar 4, or A on bar 2 minus A on bar 3, m."""
+        raise NotImplementedError
+
+    def jacobian(self) -> Array:
+        """Derivative of the gap, (2, 3), m."""
+        raise NotImplementedError
+
+    def angle(self, bar: int) -> float:
+        """Direction of a bar's line, in (-pi, pi], rad."""
+        raise NotImplementedError
+
+    def positions(self) -> dict[str, Array]:
+        """Points O4, A, B, G2, G3, G4, "B4", the end of bar 4, and where pin A is open "A2", that of bar 2; (2,), m."""
+        raise NotImplementedError
+
+    def move(self, omega_2: float, alpha_2: float) -> Values:
+        """Motion and forces where the bars are placed, by name; empty where a toggle leaves them 0/0."""
+        raise NotImplementedError
+
+    def refusal(self) -> str:
+        """Why what was answered does not count, or nothing."""
+        return ""
+
+
+class Tree(Bars):
+    """Bars opened at pin B; the engine gives points, Jacobians, accelerations, inverse dynamics and joint forces.
+
+    The ground (bar 1) does not move; its line points from O2 to O4.
+    """
+
+    own = (
+        "assembly (Newton on its own gap), velocities (own Jacobian), accelerations (own dJ/dt v), "
+        "inverse dynamics, effects from its own state, loop multipliers, pin forces"
+    )
+    field = (0.0, 0.0)
+    """Of gravity, m/s^2."""
+    wrenches: dict[int, list[float]]
+    """What acts on each moving bar, summed: a force at its first pin and a couple, (x, y, moment), N and N m."""
+    v: Array
+    a: Array
+    terms: list[Act]
+
+    def ready(self, scene: Scene, terms: list[Act]) -> None:
+        """To be called by an engine that has built its bars, with what acts on them."""
+        self.ground_angle, self.drive_bar, self.terms = scene.linkage.ground_angle, scene.drive_bar, terms
+        self.alone = bool(scene.loads or scene.effects)
+        self.loaded = [pin for effect in scene.effects for pin in effect.loaded_pins]
+        """Pins whose friction depends on their load."""
+        self.pin_loads: dict[str, float] = {}
+        """Magnitudes of its own pin forces in the last pass, by pin, N."""
+        self.place((0.0, 0.0, 0.0))
+        self.turns = {1: np.zeros(3)} | {bar: self.turn(bar) for bar in MOVING_BARS}
+        """Derivatives of the bars' rotations by the coordinates, constant in the plane."""
+
+    # what the engine gives
+    def point(self, name: str) -> Array:
+        """A point that `description.parts` names, world axes, (2,), m; perhaps the engine's own memory."""
+        raise NotImplementedError
+
+    def rotation(self, bar: int) -> Array:
+        """Axes along and across a moving bar's line, (2, 2)."""
+        raise NotImplementedError
+
+    def point_jacobian(self, name: str) -> Array:
+        """Derivative of a point, (2, 3), m."""
+        raise NotImplementedError
+
+    def turn(self, bar: int) -> Array:
+        """Derivative of a moving bar's rotation, (3,)."""
+        raise NotImplementedError
+
+    def set_motion(self, v: Array, a: Array) -> None:
+        """Speeds and accelerations of the coordinates."""
+        raise NotImplementedError
+
+    def acceleration(self, name: str) -> Array:
+        """Of a point at the motion last set, (2,), m/s^2."""
+        raise NotImplementedError
+
+    def needed(self, field: tuple[float, float], wrenches: dict[int, list[float]]) -> Array:
+        """Generalised forces that the motion last set asks for beyond gravity and what acts, (3,), N m."""
+        raise NotImplementedError
+
+    def carried(self) -> dict[int, Array]:
+        """Force on each moving bar at its first pin, at the motion last set and under `wrenches`, (2,), N."""
+        raise NotImplementedError
+
+    # what follows
+    def gap(self) -> tuple[float, float]:
+        """B on bar 3 minus B on bar 4."""
+        x, y = (self.point("end3") - self.point("end4")).tolist()
+        return x, y
+
+    def jacobian(self) -> Array:
+        """Difference of the two points' Jacobians."""
+        return self.point_jacobian("end3") - self.point_jacobian("end4")
+
+    def positions(self) -> dict[str, Array]:
+        """Points of the bars."""
+        names = {"A": "foot3", "O4": "foot4", "B": "end3", "B4": "end4"}
+        return {name: np.array(self.point(names.get(name, name))) for name in (*names, "G2", "G3", "G4")}
+
+    def angle(self, bar: int) -> float:
+        """From the bar's axes; the ground's line as described."""
+        if bar == 1:
+            return self.ground_angle
+        along = self.rotation(bar)[:, 0]
+        return math.atan2(along[1], along[0])
+
+    def turned(self, bar: int, x: float, y: float) -> Array:
+        """World axes of the vector that is (x, y) along and across a bar's line, (2,)."""
+        found = turned(self.ground_angle, x, y) if bar == 1 else turned_by(self.rotation(bar).tolist(), x, y)
+        return np.array(found)
+
+    def foot(self, bar: int) -> Array:
+        """First pin of a bar (O2, O2, A, O4 of bars 1, 2, 3, 4), m, (2,)."""
+        return np.zeros(2) if bar == 1 else self.point(f"foot{bar}")
+
+    def centre(self, bar: int) -> Array:
+        """Mass centre of a moving bar, m, (2,)."""
+        return self.point(f"G{bar}")
+
+    def velocity(self, bar: int) -> float:
+        """Angular velocity of a bar, rad/s."""
+        return float(self.turns[bar] @ self.v)
+
+    def alpha(self, bar: int) -> float:
+        """Angular acceleration of a bar, rad/s^2."""
+        return float(self.turns[bar] @ self.a)
+
+    def pin_load(self, pin: str) -> float:
+        """Magnitude of the pin force that the engine itself found in its last pass, N; none before the first."""
+        return self.pin_loads.get(pin, 0.0)
+
+    def gravity(self, field: tuple[float, float]) -> None:
+        """A field (g_x, g_y) for the engine's own gravity, m/s^2."""
+        self.field = field
+
+    def push(self, bar: int, force: Array, point: Array) -> None:
+        """Add a force (N, world axes) at a point (m, world axes); on the ground it does nothing."""
+        if bar != 1:
+            (x, y), (f_x, f_y), wrench = (point - self.foot(bar)).tolist(), force.tolist(), self.wrenches[bar]
+            wrench[0] += f_x
+            wrench[1] += f_y
+            wrench[2] += x * f_y - y * f_x
+
+    def twist(self, bar: int, couple: float) -> None:
+        """Add a couple, N m; on the ground it does nothing."""
+        if bar != 1:
+            self.wrenches[bar][2] += couple
+
+    def _move(self, v: Array, a: Array) -> None:
+        self.v, self.a = v, a
+        self.set_motion(v, a)
+
+    def drift(self, v: Array) -> Array:
+        """Acceleration of the gap at speeds v where a = 0, (2,), m/s^2."""
+        self._move(v, np.zeros(3))
+        return self.acceleration("end3") - self.acceleration("end4")
+
+    def inertial(self, v: Array, a: Array) -> Array:
+        """What the motion asks for of the bars alone: without loads, effects and gravity, (3,), N m."""
+        self._move(v, a)
+        return self.needed((0.0, 0.0), _no_wrenches())
+
+    def torques(self, v: Array, a: Array) -> Array:
+        """What the motion asks for beyond loads and effects, (3,), N m."""
+        self._move(v, a)
+        self.wrenches = _no_wrenches()
+        for act in self.terms:
+            act()
+        return self.needed(self.field, self.wrenches)
+
+    def forces(self, loop_force: Array, torque: float) -> dict[str, Array]:
+        """F12, F32, F14 with the loop force on bar 3 at B, its opposite on bar 4, and the drive's couple put back."""
+        self.push(3, loop_force, self.point("end3"))
+        self.push(4, -loop_force, self.point("end4"))
+        self.twist(self.drive_bar, torque)
+        on = self.carried()
+        return {"F12": on[2], "F32": -on[3], "F14": on[4]}
+
+    def move(self, omega_2: float, alpha_2: float) -> Values:
+        """Velocities, accelerations and forces where the tree is placed; nothing where a toggle leaves them 0/0.
+
+        Effects that depend on the load of a pin are given the loads of the pass before, until they repeat.
+        """
+        jacobian = self.jacobian()
+        try:
+            v = closed(jacobian, omega_2)
+            a = closed(jacobian, alpha_2, *self.drift(v).tolist())
+        except np.linalg.LinAlgError:
+            return {}
+        self.pin_loads = {}
+        inertial = [self.inertial(v, a)] if self.alone else []
+        needed = self.torques(v, a)
+        values: Values = {f"a_{name}": self.acceleration(point) for name, point in ON_BARS.items()}
+        for bar in (3, 4):
+            values[f"omega_{bar}"], values[f"alpha_{bar}"] = self.velocity(bar), self.alpha(bar)
+        matrix = np.array([*jacobian, self.turns[self.drive_bar]]).T
+        try:
+            unknowns, *without = np.linalg.solve(matrix, np.array([needed, *inertial]).T).T
+            if without:
+                values["torque_inertia"] = float(without[0][2])
+            forces = self._multipliers(unknowns)
+            if self.loaded:
+                forces = self._settled(forces, lambda: self._multipliers(np.linalg.solve(matrix, self.torques(v, a))))
+        except np.linalg.LinAlgError:  # no torque on that bar balances the linkage here
+            return values
+        return values | forces
+
+    def _multipliers(self, unknowns: Array) -> dict[str, Any]:
+        """Driving torque and the four pin forces."""
+        return {**self.forces(unknowns[:2], float(unknowns[2])), "F43": unknowns[:2], "torque": unknowns[2]}
+
+    def _settled(self, forces: dict[str, Any], again: Callable[[], dict[str, Any]]) -> dict[str, Any]:
+        """Passes over pin loads and the friction they make, until they repeat; nothing where they never do."""
+        before = math.inf
+        for _ in range(PASSES):
+            loads = {pin: math.hypot(*forces[FORCE_AT[pin]]) for pin in self.loaded}
+            most = max(loads.values())
+            change = max(abs(load - self.pin_load(pin)) for pin, load in loads.items())
+            # once down to the rounding of a pass, the change falls no further
+            if change <= REPEATED * most or before <= change <= ROUNDED * most:
+                return forces
+            if not most < DIVERGED:
+                break
+            before, self.pin_loads = change, loads
+            forces = again()
+        return {}  # rather than that of some pass
+
+
+def _no_wrenches() -> dict[int, list[float]]:
+    return {bar: [0.0, 0.0, 0.0] for bar in MOVING_BARS}
+
+
+def closed(jacobian: Array, of_2: float, x: float = 0.0, y: float = 0.0) -> Array:
+    """Rates of the three coordinates where J rates + (x, y) = 0 and bar 2 has its own; LinAlgError at a toggle."""
+    (e, a, b), (f, c, d) = jacobian.tolist()
+    x, y, det = x + e * of_2, y + f * of_2, a * d - b * c
+    if det == 0.0:
+        raise np.linalg.LinAlgError("the bars are in one line")
+    return np.array([of_2, (b * y - d * x) / det, (c * x - a * y) / det])
