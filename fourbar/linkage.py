@@ -5,7 +5,13 @@ Bars: 1 ground (length d), 2 input (a), 3 coupler (b), 4 output (c).
 """
 
 import math
+from collections.abc import Container
+from contextlib import suppress
 from dataclasses import dataclass
+from numbers import Integral
+
+import numpy as np
+from numpy.typing import NDArray
 
 from fourbar.errors import InputError
 from fourbar.quantities import PIN_FORCES
@@ -16,6 +22,8 @@ PINS = {"O2": (1, 2), "A": (2, 3), "B": (3, 4), "O4": (1, 4)}
 PIN_FORCE = dict(zip(PINS, PIN_FORCES, strict=True))
 """The independent force of each pin."""
 FIRST_PIN = {2: "O2", 3: "A", 4: "O4"}
+NO_NUMBERS = (bool, str, bytes, complex)
+"""What `float` may read all the same."""
 
 
 def require(key: str, value: object, *, positive: bool = False, at_least_zero: bool = False) -> float:
@@ -25,18 +33,36 @@ def require(key: str, value: object, *, positive: bool = False, at_least_zero: b
         allowed = "a finite number > 0"
     elif at_least_zero:
         allowed = "a finite number >= 0"
-    try:
-        number = float(value)  # type: ignore[arg-type]
-    except (TypeError, ValueError, OverflowError):
-        raise InputError(key, value, f"must be {allowed}") from None
-    if (
-        isinstance(value, bool)
-        or not math.isfinite(number)
-        or (positive and number <= 0.0)
-        or (at_least_zero and number < 0.0)
-    ):
+    number = math.nan
+    if not isinstance(value, NO_NUMBERS) and not getattr(value, "shape", ()):
+        with suppress(TypeError, ValueError, OverflowError):
+            number = float(value)  # type: ignore[arg-type]
+    if not math.isfinite(number) or (positive and number <= 0.0) or (at_least_zero and number < 0.0):
         raise InputError(key, value, f"must be {allowed}")
     return number
+
+
+def require_whole(key: str, value: object, among: Container[int], allowed: str) -> int:
+    """The value as one of some whole numbers, or an InputError that says what is allowed."""
+    if isinstance(value, bool) or not isinstance(value, Integral) or value not in among:
+        raise InputError(key, value, allowed)
+    return int(value)
+
+
+def require_numbers(key: str, value: object, allowed: str = "must be finite numbers") -> NDArray[np.float64]:
+    """The value as finite floats, shape () or (n,), or an InputError that says what is allowed."""
+    try:
+        array = np.asarray(value)
+    except ValueError:  # rows of different lengths
+        array = np.asarray(None)
+    if array.dtype.kind not in "iuf" or array.ndim > 1 or not np.isfinite(array).all():
+        raise InputError(key, value, f"{allowed}, shape () or (n,)")
+    return array.astype(float)
+
+
+def require_bar(key: str, value: object) -> int:
+    """The number of a moving bar, or an InputError."""
+    return require_whole(key, value, MOVING_BARS, "must be 2, 3 or 4")
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,13 +159,14 @@ class FourBar:
 
     def bar(self, number: int) -> Bar:
         """The moving bar 2, 3 or 4."""
-        return {2: self.input, 3: self.coupler, 4: self.output}[number]
+        return self.moving[require_bar("bar", number) - 2]
 
 
 def uniform(ground: float, input: float, coupler: float, output: float, *, per_metre: float = 1.0) -> FourBar:
     """A linkage of uniform slender bars of the given lengths (m) and mass per metre (kg/m)."""
     bars: list[Bar] = []
+    density = require("per_metre", per_metre, at_least_zero=True)
     for key, length in (("input", input), ("coupler", coupler), ("output", output)):
         checked = require(f"lengths.{key}", length, positive=True)
-        bars.append(Bar(checked, mass=per_metre * checked))
+        bars.append(Bar(checked, mass=density * checked))
     return FourBar(ground, bars[0], bars[1], bars[2])

@@ -6,19 +6,19 @@ import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.errors import DependencyError, installing
+from fourbar.errors import DependencyError, InputError, expect, installing
+from fourbar.linkage import require
 from fourbar.quantities import NOT_ASSEMBLED, STATUS_NAMES, UNITS, VECTORS
 
 Array = NDArray[np.float64]
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from pandas import DataFrame
 
 SCHEMA = "fourbar-analyze/1"
@@ -125,7 +125,7 @@ class Solution:
         """Names of the quantities that were evaluated, theta_2 first; without the scene's own points."""
         return [name for name in UNITS if getattr(self, name) is not None]
 
-    def to_csv(self, path: "str | Path | None" = None, *, degrees: bool = False, units: Conversion = SI) -> str | None:
+    def to_csv(self, path: str | Path | None = None, *, degrees: bool = False, units: Conversion = SI) -> str | None:
         """One line per position, every digit; the text itself, or written to a file, whole or not at all.
 
         Parameters
@@ -135,7 +135,9 @@ class Solution:
         """
         from fourbar.writing import write_text
 
-        text = csv_text(self, {**units, **(DEGREES if degrees else SI)})
+        expect("path", path, str, Path, type(None))
+        expect("degrees", degrees, bool)
+        text = csv_text(self, {**require_units(units), **(DEGREES if degrees else SI)})
         if path is None:
             return text
         write_text(path, text)
@@ -150,7 +152,7 @@ class Solution:
             from pandas import DataFrame
         except ImportError:
             raise DependencyError(f"to_pandas needs pandas: {installing('pandas')}") from None
-        known = {name: values for name, values in scalars(self, units).items() if values is not None}
+        known = {name: values for name, values in scalars(self, require_units(units)).items() if values is not None}
         return DataFrame({**leading(self), **known})
 
 
@@ -221,6 +223,16 @@ def scalars(solution: Solution, units: Conversion = SI) -> dict[str, Array | Non
         else:
             found[name + heading] = None if values is None else values.ravel()
     return found
+
+
+def require_units(units: object) -> Conversion:
+    """Units as `fourbar.units` makes them, or an InputError."""
+    plain = isinstance(units, Mapping) and all(isinstance(to, tuple) and len(to) == 2 for to in units.values())
+    if not isinstance(units, Mapping) or not plain or not all(isinstance(name, str) for name, _ in units.values()):
+        raise InputError("units", units, 'must be as fourbar.units makes them, like fourbar.units("mm N.mm")')
+    for _, factor in units.values():
+        require("units", factor, positive=True)
+    return units
 
 
 def unit_in(unit: str, units: Conversion) -> tuple[str, float]:

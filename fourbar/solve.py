@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.errors import DependencyError, InputError, installing
+from fourbar.errors import DependencyError, InputError, expect, installing
+from fourbar.linkage import require, require_whole
 from fourbar.quantities import ANGLES, OF_DRY_FRICTION, OF_PIN_LOADS, QUANTITIES, STAGE_OF, STAGES
 from fourbar.scene import Command, Scene, command
 from fourbar.scene.case import Case, Evaluated
@@ -73,12 +74,16 @@ def solve(
     InputError : the stage or a name in `out` is unknown, its array has the wrong shape, the scene does not state
         the omega_2 that is needed, or a study, which states its own positions, is given others.
     """
+    require_whole("side", side, (-1, 0, 1), "must be -1, 0 or 1")
+    expect("compiled", compiled, bool, type(None))
     if not isinstance(scene, Scene):
         if not hasattr(scene, "solved"):
             raise InputError("scene", scene, "must be a Scene, or a Study of `vary`")
         if at is not None:
             raise InputError("at", "a command", "a study states its own positions: vary motion.theta_2")
         return scene.solved(stage, out=out, side=side, compiled=compiled)
+    if at is not None:
+        _refuse(at)
     moved = _released(scene) if scene.motion.free is not None and at is None else None
     where = moved.command if moved is not None else command(scene) if at is None else at
     n = len(where.theta_2)
@@ -101,6 +106,27 @@ def solve(
     solution = solved(scene, where, code, result)
     solution.time, solution.stopped_at = where.time, None if moved is None else moved.stopped_at
     return solution
+
+
+def _refuse(at: Command) -> None:
+    """An InputError where a command is none."""
+    expect("at", at, Command)
+    for name in ("theta_2", "branch"):
+        value = getattr(at, name)
+        expect(f"at.{name}", value, np.ndarray)
+        if value.ndim != 1 or value.shape != at.theta_2.shape or value.dtype.kind not in "iuf":
+            raise InputError(f"at.{name}", value, "must be numbers, shape (n,), as many of theta_2 as of branch")
+    for name in ("alpha_2",) if at.omega_2 is None else ("omega_2", "alpha_2"):
+        value = getattr(at, name)
+        if isinstance(value, np.ndarray):
+            if value.shape not in ((), at.theta_2.shape) or value.dtype.kind not in "iuf":
+                raise InputError(f"at.{name}", value, f"must be numbers, shape () or {at.theta_2.shape}")
+        elif not isinstance(value, float):
+            expect(f"at.{name}", value, float, int, np.integer, np.floating)
+            require(f"at.{name}", value)
+    if at.remainder is not None:
+        require("at.remainder", at.remainder)
+    expect("at.time", at.time, np.ndarray, type(None))
 
 
 def is_compiled(case: Case, wanted: int, count: int, compiled: bool | None) -> bool:
@@ -177,11 +203,12 @@ def requested(
     if out is None:
         if stage is None:
             stage = "position" if omega_2 is None else "force"
-        if stage not in STAGES:
+        if not isinstance(stage, str) or stage not in STAGES:
             raise InputError("stage", stage, "must be one of " + ", ".join(STAGES))
         wanted = STAGES.index(stage)
         names = _names(wanted, _absent(scene), tuple([point.name for point in scene.points]))
     else:
+        expect("out", out, Mapping)
         names = out.keys()
         wanted = _highest_stage(out, shape, _stages(tuple(point.name for point in scene.points)))
     if wanted > 0 and omega_2 is None:
@@ -350,6 +377,8 @@ def _highest_stage(out: Mapping[str, Array], positions: tuple[int, ...], stages:
         if name not in stages:
             raise InputError("out", name, "must be among " + ", ".join(stages))
         shape = positions if is_scalar(name) else (*positions, 2)
-        if array.shape != shape or array.dtype != np.float64:
-            raise InputError(f"out.{name}", (array.shape, str(array.dtype)), f"must be float64 of shape {shape}")
+        expect(f"out.{name}", array, np.ndarray)
+        if array.shape != shape or array.dtype != np.float64 or not array.flags.writeable:
+            allowed = f"must be float64 of shape {shape}, writeable"
+            raise InputError(f"out.{name}", (array.shape, str(array.dtype)), allowed)
     return max((STAGES.index(stages[name]) for name in out), default=0)

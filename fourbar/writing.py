@@ -6,6 +6,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from fourbar.errors import InputError
+
 TEMPORARY = ".part"
 """What the name of an unfinished file ends with."""
 
@@ -24,9 +26,14 @@ def naming(path: Path) -> Iterator[None]:
 def write_bytes(path: str | Path, data: bytes) -> None:
     """Write a file whole; on any failure the old file, or none, stays.
 
-    Raises OSError (full disk, read-only folder, a folder of that name).
+    Raises InputError for what can name no file (a folder, one in a folder that does not exist), OSError for what fails
+    otherwise (full disk, read-only folder).
     """
     target = Path(path)
+    if target.is_dir() or "\0" in str(target):
+        raise InputError("path", str(path), "must name a file, not a folder")
+    if not target.parent.is_dir():
+        raise InputError("path", str(path), f"there is no such folder: {target.parent}")
     if target.exists() and not target.is_file():
         # a device or pipe is written to; renaming onto it would replace /dev/null itself
         with naming(target), target.open("wb") as file:

@@ -1,8 +1,13 @@
 """What `fourbar` offers in Python: every public name documented, the list of them, and what a slip is answered."""
 
+import itertools
 import json
+import math
+import re
 import runpy
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from decimal import Decimal
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +16,7 @@ import pytest
 
 import fourbar
 from fourbar.cli import status
+from fourbar.effects import Point, Table
 from fourbar.files import save
 from tests.scenes import crank_rocker
 
@@ -38,24 +44,158 @@ def test_a_number_where_a_bar_belongs_gets_a_sentence(number: float) -> None:
         fourbar.FourBar(0.3, fourbar.Bar(0.1), number, fourbar.Bar(0.22))  # type: ignore[arg-type]
 
 
-def test_an_argument_of_another_type_gets_one_line() -> None:
+ALWAYS_WRONG = (5j, [[1, 2], [3]], np.zeros((3, 3)), object())
+TEXTS = ("", ".", "no/such", "1", ["1", "2"])
+WRONG = (*ALWAYS_WRONG, None, False, math.nan, -1, 10**400, Decimal(1), *TEXTS, (), {}, {"m": 1}, {5: 1})
+"""Not for every argument: some are allowed somewhere, and then the call goes through."""
+OF_OTHERS = {"Solution", "Sensitivity", "Study"}
+"""What functions return; nobody constructs them."""
+
+
+def calls() -> dict[str, tuple[Callable[..., object], tuple[Any, ...]]]:
+    """Every public function and class, used: what is called, and good arguments."""
+    link = fourbar.uniform(0.3, 0.1, 0.25, 0.22)
+    scene, rows = fourbar.Scene(link, fourbar.Motion(1.0, 10.0)), (("O2", 0.1), ("B", 0.2))
+    solution, study = fourbar.solve(scene), fourbar.vary(scene, {"lengths.input": [0.1, 0.11]})
+    out, at, ends = {"torque": np.empty(1)}, fourbar.command(scene), (Point(2, 0.1, 0.2), Point(4, 0.1, 0.2))
+    times, angles = (0.0, 1.0, 2.0, 3.0), (0.0, 0.1, 0.2, 0.1)
+
+    def moving(motion: fourbar.Motion) -> object:
+        return fourbar.solve(fourbar.Scene(link, motion))
+
+    def acting(effect: Any) -> object:
+        return fourbar.solve(fourbar.Scene(link, fourbar.Motion(1.0, 10.0), effects=(effect,)))
+
+    def by(kind: Any, *values: Any) -> object:
+        return acting(kind.at(O2=values[0]))
+
+    def law(*given: Any) -> object:
+        return moving(fourbar.Motion(law=fourbar.Law(*given)))
+
+    def bars(*given: Any) -> object:
+        return fourbar.solve(fourbar.Scene(fourbar.FourBar(0.3, fourbar.Bar(*given), link.coupler, link.output)))
+
+    def solved(*given: Any) -> object:
+        return fourbar.solve(given[0], given[1], at=given[2], side=given[3], compiled=given[4])
+
+    only_linkage = ("change_points", "circuits", "classify", "time_ratio", "transmission_extremes")
+    of_solution = ("motor_duty", "shaking_force")
+    of_scene = ("command", "dump", "sensitivity")
+    return {
+        **{name: (getattr(fourbar, name), (link,)) for name in only_linkage},
+        **{name: (getattr(fourbar, name), (solution,)) for name in of_solution},
+        **{name: (getattr(fourbar, name), (scene,)) for name in of_scene},
+        "limit_positions": (fourbar.limit_positions, (link, 4)),
+        "swing": (fourbar.swing, (link, 4)),
+        "coupler_curve": (
+            lambda *x: fourbar.coupler_curve(*x[:4], branch=x[4], steps=x[5]),
+            (link, 0.1, 0.1, 0, 1, 8),
+        ),
+        "instant_centres": (fourbar.instant_centres, (link, np.array([1.0]), 1)),
+        "point_coefficients": (fourbar.point_coefficients, (link, np.array([1.0]), 1, 3, 0.1j)),
+        "bearing_load": (fourbar.bearing_load, (solution, "A")),
+        "shaking_moment": (fourbar.shaking_moment, (link, solution)),
+        "in_units": (fourbar.in_units, (scene, "mm")),
+        "units": (fourbar.units, ("mm",)),
+        "uniform": (lambda *x: fourbar.uniform(*x[:4], per_metre=x[4]), (0.3, 0.1, 0.25, 0.22, 1.0)),
+        "load": (fourbar.load, (str(DOCS.parent / "models" / "thesis.toml"),)),
+        "save": (fourbar.save, (scene, "a.toml")),
+        "vary": (fourbar.vary, (scene, {"lengths.input": [0.1]})),
+        "vary, a value": (lambda x: fourbar.solve(fourbar.vary(scene, {"lengths.input": x})), (0.1,)),
+        "extremes": (fourbar.extremes, (scene, ("torque",))),
+        "tolerances": (
+            lambda *x: fourbar.tolerances(fourbar.Scene(link, scene.motion, tolerances=x[0]), samples=x[1], seed=x[2]),
+            ((fourbar.Tolerance("lengths.input", 1e-4),), 2, 0),
+        ),
+        "solve": (solved, (scene, "force", at, 0, False)),
+        "solve, a study": (solved, (study, "force", None, 0, False)),
+        "solve, out": (lambda x: fourbar.solve(scene, out=x), (out,)),
+        "solve, out torque": (lambda x: fourbar.solve(scene, out={"torque": x}), (out["torque"],)),
+        "Bar": (bars, (0.1, 0.2, 0.1, (0.1, 0.1))),
+        "FourBar": (fourbar.FourBar, (0.3, link.input, link.coupler, link.output, 0.1)),
+        "FourBar.bar": (link.bar, (3,)),
+        "Scene": (
+            lambda *x: fourbar.solve(fourbar.Scene(*x)),
+            (link, scene.motion, 2, (fourbar.Load(2),), (fourbar.Gravity(),), "", "", (), (), ()),
+        ),
+        "Motion": (lambda *x: moving(fourbar.Motion(*x)), (1.0, 10.0, 0.0, 1, "sign", None, None)),
+        "Sweep": (lambda *x: moving(fourbar.Motion(fourbar.Sweep(*x))), (0.0, 1.0, 2)),
+        "FromLimit": (fourbar.FromLimit, (1, 0.1)),
+        "Free": (lambda *x: moving(fourbar.Motion(1.0, free=fourbar.Free(*x))), (0.01, 2)),
+        "Law": (law, (times, angles, 2, "free")),
+        "Law.at": (fourbar.Law(times, angles).at, (np.array([0.5]),)),
+        "Point": (lambda *x: fourbar.solve(fourbar.Scene(link, points=(fourbar.Point(*x),))), ("P", 3, (0.1, 0.2))),
+        "Tolerance": (fourbar.Tolerance, ("lengths.input", 0.1, False)),
+        "Load": (
+            lambda *x: fourbar.solve(fourbar.Scene(link, scene.motion, loads=(fourbar.Load(*x),))),
+            (2, (1.0, 0.0), (0.1, 0.1), 1.0, "world", Table((0.0, 2.0), (1.0, 1.0))),
+        ),
+        "Load, its table": (Table, ((0.0, 2.0), (1.0, 1.0))),
+        "Spring": (lambda *x: acting(fourbar.Springs((fourbar.Spring(*x),))), (*ends, 1.0, 0.1, 0.1)),
+        "Springs": (lambda x: acting(fourbar.Springs(x)), ((fourbar.Spring(*ends, 1.0),),)),
+        "Gravity": (lambda *x: acting(fourbar.Gravity(*x)), (9.81, 1.0)),
+        "Flywheel": (lambda *x: acting(fourbar.Flywheel(*x)), (0.1, 2)),
+        "Viscous": (lambda x: acting(fourbar.Viscous(x)), (rows,)),
+        "Viscous.at": (partial(by, fourbar.Viscous), (0.1,)),
+        "Friction": (lambda x: acting(fourbar.Friction(x)), (rows,)),
+        "Friction.at": (partial(by, fourbar.Friction), (0.1,)),
+        "PinFriction": (lambda x: acting(fourbar.PinFriction(x)), ((("O2", 0.1, 0.01),),)),
+        "PinFriction.at": (partial(by, fourbar.PinFriction), ((0.1, 0.01),)),
+        "Torsion": (lambda x: acting(fourbar.Torsion(x)), ((("O2", 0.1, 0.0, 0.1),),)),
+        "Torsion.at": (partial(by, fourbar.Torsion), ((0.1, 0.0, 0.1),)),
+        "Solution.to_csv": (lambda *x: solution.to_csv(x[0], degrees=x[1], units=x[2]), ("a.csv", True, {})),
+        "Solution.to_pandas": (solution.to_pandas, (fourbar.units("mm"),)),
+        "Sensitivity.of": (fourbar.sensitivity(scene).of, ("torque", "motion.omega_2")),
+        "Sensitivity.value": (fourbar.sensitivity(scene).value, ("torque",)),
+    }
+
+
+def spoilt(value: Any, wrong: object) -> Iterator[Any]:
+    """The wrong value, and tuples in which it stands for one part, at any depth."""
+    yield wrong
+    if isinstance(value, tuple):
+        for i, part in enumerate(value):
+            for other in spoilt(part, wrong):
+                parts = (*value[:i], other, *value[i + 1 :])
+                yield type(value)(*parts) if hasattr(value, "_fields") else parts
+
+
+def test_whatever_an_argument_is_the_answer_is_a_value_or_one_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    table = calls()
+    public = {name for name in dir(fourbar) if name != "__version__"} - OF_OTHERS
+    errors = {name for name in public if name.endswith("Error")}
+    assert {re.split(r"[.,]", name)[0] for name in table} - OF_OTHERS == public - errors
+    holes = []
+    for name, (call, good) in table.items():
+        call(*good)
+        for wrong in WRONG:
+            for given in itertools.islice(spoilt(good, wrong), 1, None):
+                try:
+                    call(*given)
+                    if wrong is ALWAYS_WRONG[-1]:
+                        holes.append(f"{name} takes {wrong!r}")
+                except fourbar.FourBarError as error:
+                    if "\n" in str(error):
+                        holes.append(f"{name} given {wrong!r}: {error}")
+                except Exception as error:
+                    holes.append(f"{name} given {wrong!r}: {error!r}")
+    assert not holes, "\n".join(holes)
+
+
+def test_a_figure_is_refused_arguments_of_another_type(tmp_path: Path) -> None:
     scene = fourbar.Scene(fourbar.uniform(0.3, 0.1, 0.25, 0.22), fourbar.Motion(1.0, 10.0))
-    solution = fourbar.solve(scene)
+    drawing = scene.plot("linkage")  # type: ignore[attr-defined]
     calls: list[Callable[[Any], object]] = [
-        *(fourbar.sensitivity, fourbar.tolerances, fourbar.extremes, fourbar.dump, fourbar.load, fourbar.units),
-        *(fourbar.shaking_force, fourbar.motor_duty, lambda x: fourbar.bearing_load(x, "A")),
-        *(lambda x: fourbar.vary(x, {}), lambda x: fourbar.vary(scene, x), lambda x: fourbar.vary(scene, {5: x})),
-        *(lambda x: fourbar.vary(scene, {"nothing": x}), lambda x: fourbar.save(scene, x)),
-        *(lambda x: fourbar.save(x, "a.toml"), lambda x: fourbar.extremes(scene, x)),
-        *(lambda x: fourbar.bearing_load(solution, x), lambda x: fourbar.shaking_moment(x, solution)),
-        *(lambda x: fourbar.in_units(x, "SI"), lambda x: fourbar.in_units(scene, x)),
         *(lambda x: scene.plot("torque", position=x), lambda x: scene.plot("torque", units=x), scene.plot),
+        *(drawing.save, lambda x: drawing.save("a.svg", x)),
     ]
-    for call in calls:
-        for wrong in (5j, [[1, 2], [3]], np.zeros((3, 3)), object()):
-            with pytest.raises(fourbar.InputError) as caught:
-                call(wrong)
-            assert "\n" not in str(caught.value)
+    for call, wrong in itertools.product(calls, (*ALWAYS_WRONG, tmp_path / "no" / "a.svg")):
+        with pytest.raises(fourbar.InputError) as caught:
+            call(wrong)
+        assert "\n" not in str(caught.value)
 
 
 def test_the_public_formulas_agree_with_a_solution() -> None:

@@ -18,7 +18,7 @@ import pytest
 
 import fourbar
 from fourbar.cli import group, status
-from fourbar.errors import BROKEN, HOLDS, INTERRUPTED, DependencyError
+from fourbar.errors import BAD_INPUT, BROKEN, HOLDS, INTERRUPTED, DependencyError
 from fourbar.files import load, save
 from fourbar.quantities import UNITS, VECTORS
 from fourbar.show import tables
@@ -359,8 +359,12 @@ def test_a_full_disk_leaves_the_old_file(run: Fourbar, monkeypatch: pytest.Monke
     code, _, err = run("analyze", MODELS / "thesis.toml", "--json", "-o", tmp_path / "out")
     assert code == BROKEN and "No space left" in err and err.count("\n") == 1
     assert [(path.name, path.read_text()) for path in tmp_path.iterdir()] == [("out", "old")]
-    code, _, err = run("analyze", MODELS / "thesis.toml", "-o", tmp_path / "no" / "out")
-    assert code == BROKEN and f"{tmp_path / 'no' / 'out'}: No such file" in err
+
+
+@pytest.mark.parametrize(("out", "why"), [("no/out", "no such folder"), (".", "a file, not a folder")])
+def test_a_name_that_no_file_can_have_is_bad_input(run: Fourbar, out: str, why: str, tmp_path: Path) -> None:
+    code, _, err = run("analyze", MODELS / "thesis.toml", "-o", tmp_path / out)
+    assert code == BAD_INPUT and err.startswith("error: path = ") and why in err and err.count("\n") == 1
 
 
 def test_a_device_is_written_to_and_stays_one(run: Fourbar, tmp_path: Path) -> None:

@@ -7,6 +7,7 @@ import mpmath as mp
 import numpy as np
 import pytest
 
+from fourbar.errors import InputError
 from fourbar.formulas.circuits import circuits
 from fourbar.formulas.mobility import intervals, turns_fully
 from fourbar.formulas.motion import State
@@ -237,7 +238,7 @@ def test_a_curve_with_one_change_point_takes_two_turns() -> None:
 
 def test_a_circuit_that_does_not_exist_is_refused() -> None:
     bars = FourBar(2.0, Bar(2.5), Bar(4.0), Bar(2.2))
-    with pytest.raises(ValueError, match="from 0 to 0"):
+    with pytest.raises(InputError, match="from 0 to 0"):
         coupler_curve(bars, 0.0, 0.0, 1)
-    with pytest.raises(ValueError, match="multiple of 4"):
+    with pytest.raises(InputError, match="multiple of 4"):
         coupler_curve(bars, 0.0, 0.0, steps=90)

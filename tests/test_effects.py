@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from copy import copy
 from dataclasses import replace
 from functools import cache
 from itertools import combinations
@@ -204,7 +205,9 @@ def each_term(change: Callable[[Effect], list[Effect]]) -> Callable[[Scene], Sce
 def reversed_slip(term: Effect) -> list[Effect]:
     """Pin-load friction that drives instead of braking."""
     assert isinstance(term, PinFriction)
-    return [PinFriction(tuple((pin, -mu, r) for pin, mu, r in term.pins))]
+    driving = copy(term)  # which its constructor refuses
+    object.__setattr__(driving, "pins", tuple((pin, -mu, r) for pin, mu, r in term.pins))
+    return [driving]
 
 
 class Lightening(Flywheel):

@@ -137,7 +137,7 @@ STATUSES: list[tuple[Callable[[list[str]], int], str, int]] = [
     (FOURBAR, "classify 4 1 3 x", BAD_INPUT),
     (FOURBAR, "analyze scene.toml", HOLDS),
     (FOURBAR, "analyze no-such-file", BAD_INPUT),
-    (FOURBAR, "analyze scene.toml -o out/deep/file", BROKEN),
+    (FOURBAR, "analyze scene.toml -o out/deep/file", BAD_INPUT),
     (FOURBAR, "mjcf scene.toml -o out", HOLDS),
     (FOURBAR, "mjcf -o out", BAD_INPUT),
     (FOURBAR, "no-such-command", BAD_INPUT),

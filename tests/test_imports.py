@@ -12,8 +12,8 @@ HEAVY = ("pint", "click", "rich", "jinja2", "matplotlib", "scipy", "joblib", "mu
 ENGINES = {name: name.removeprefix("py") for name in ("mujoco", "pinocchio", "exudyn", "opensim", "pydrake")}
 LAYERS = {
     "fourbar": (
-        "errors quantities writing",
-        "linkage",
+        "errors quantities",
+        "linkage writing",
         "formulas",
         "many_digits solution",
         "effects",

@@ -7,7 +7,7 @@ import mpmath as mp
 import numpy as np
 import pytest
 
-from fourbar.errors import NotAssembledError
+from fourbar.errors import InputError, NotAssembledError
 from fourbar.formulas.circuits import circuit_of, circuits, same_circuit
 from fourbar.formulas.linkage_type import classify
 from fourbar.formulas.mobility import (
@@ -439,5 +439,5 @@ def test_the_default_range_is_as_wide_as_the_contract_says() -> None:
 
 
 def test_a_bar_that_does_not_move_is_refused() -> None:
-    with pytest.raises(ValueError, match="2, 3 or 4"):
+    with pytest.raises(InputError, match="2, 3 or 4"):
         limit_positions(THESIS, 1)

@@ -4,9 +4,8 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from fourbar.effects.effect import Effect
-from fourbar.errors import InputError
 from fourbar.formulas.pin_forces import Bodies
-from fourbar.linkage import require
+from fourbar.linkage import require, require_whole
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,9 +23,10 @@ class Flywheel(Effect):
     key: ClassVar[str] = "flywheel"
 
     def __post_init__(self) -> None:
-        require("effects.flywheel.inertia", self.inertia, at_least_zero=True)
-        if self.bar not in (2, 4) or isinstance(self.bar, bool):
-            raise InputError("effects.flywheel.bar", self.bar, "must be 2 or 4, a bar on a fixed pin")
+        inertia = require("effects.flywheel.inertia", self.inertia, at_least_zero=True)
+        bar = require_whole("effects.flywheel.bar", self.bar, (2, 4), "must be 2 or 4, a bar on a fixed pin")
+        object.__setattr__(self, "inertia", inertia)
+        object.__setattr__(self, "bar", bar)
 
     def carried_by(self, bodies: Bodies) -> Bodies:
         """The bar with the wheel's inertia added: a rotation has no other."""

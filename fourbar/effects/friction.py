@@ -5,7 +5,7 @@ from typing import ClassVar
 
 from fourbar.effects.actions import Actions
 from fourbar.effects.effect import Effect
-from fourbar.effects.pins import pin_values
+from fourbar.effects.pins import AT_LEAST_ZERO, checked
 from fourbar.formulas.arithmetic import anywhere
 from fourbar.formulas.motion import State
 
@@ -22,10 +22,14 @@ class Friction(Effect):
     key: ClassVar[str] = "friction"
     dry: ClassVar[bool] = True
 
+    def __post_init__(self) -> None:
+        rows = checked("effects.friction", self.torques, value=AT_LEAST_ZERO)
+        object.__setattr__(self, "torques", rows)
+
     @classmethod
     def at(cls, **torques: float) -> "Friction":
         """``Friction.at(A=0.05)``."""
-        return cls(pin_values("effects.friction", torques))
+        return cls(tuple(torques.items()))
 
     @property
     def dry_pins(self) -> tuple[str, ...]:

@@ -23,8 +23,8 @@ class Gravity(Effect):
     key: ClassVar[str] = "gravity"
 
     def __post_init__(self) -> None:
-        require("effects.gravity", self.magnitude)
-        require("effects.gravity", self.angle)
+        for name in ("magnitude", "angle"):
+            object.__setattr__(self, name, require("effects.gravity", getattr(self, name)))
 
     @property
     def field(self) -> Any:

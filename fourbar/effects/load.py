@@ -12,7 +12,7 @@ from fourbar.effects.effect import Effect
 from fourbar.errors import InputError, expect
 from fourbar.formulas.arithmetic import anywhere, polar
 from fourbar.formulas.motion import State
-from fourbar.linkage import MOVING_BARS, FourBar, require
+from fourbar.linkage import FourBar, require, require_bar, require_numbers
 from fourbar.solution import Array
 
 TURN = 2.0 * math.pi
@@ -35,8 +35,8 @@ class Table:
 
     def __post_init__(self) -> None:
         key = "loads.table"
-        angles = tuple(require(f"{key}.theta_2", angle) for angle in self.theta_2)
-        factors = tuple(require(f"{key}.factor", factor) for factor in self.factor)
+        angles = tuple(require_numbers(f"{key}.theta_2", self.theta_2).ravel().tolist())
+        factors = tuple(require_numbers(f"{key}.factor", self.factor).ravel().tolist())
         if len(angles) < 2 or len(angles) != len(factors):
             raise InputError(key, (len(angles), len(factors)), "needs two or more angles and as many factors")
         if any(b <= a for a, b in pairwise(angles)):
@@ -89,18 +89,19 @@ class Load(Effect):
     key: ClassVar[str] = "load"
 
     def __post_init__(self) -> None:
-        if self.bar not in MOVING_BARS or isinstance(self.bar, bool):
-            raise InputError("loads.bar", self.bar, "must be 2, 3 or 4")
+        set_field = object.__setattr__  # the class is frozen; this is its constructor
+        set_field(self, "bar", require_bar("loads.bar", self.bar))
+        expect("loads.frame", self.frame, str)
         if self.frame not in ("world", "bar"):
             raise InputError("loads.frame", self.frame, 'must be "world" or "bar"')
         expect("loads.table", self.table, Table, type(None))
-        for key, pair in (("loads.force", (0.0, 0.0) if self.force is None else self.force), ("loads.at", self.at)):
-            expect(key, pair, tuple, list)
+        pairs = {"at": self.at} if self.force is None else {"force": self.force, "at": self.at}
+        for name, pair in pairs.items():
+            expect(f"loads.{name}", pair, tuple, list)
             if len(pair) != 2:
-                raise InputError(key, pair, "must be a pair (size, angle)")
-            for number in pair:
-                require(key, number)
-        require("loads.moment", self.moment)
+                raise InputError(f"loads.{name}", pair, "must be a pair (size, angle)")
+            set_field(self, name, tuple(require(f"loads.{name}", number) for number in pair))
+        set_field(self, "moment", require("loads.moment", self.moment))
 
     def act(self, actions: Actions, state: State) -> None:
         """F at its point, and the couple."""

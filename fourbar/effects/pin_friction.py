@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 from fourbar.effects.actions import Actions
 from fourbar.effects.cones import NONE, ONE, settle
 from fourbar.effects.effect import Effect
-from fourbar.effects.pins import known
+from fourbar.effects.pins import AT_LEAST_ZERO, checked, rows_of
 from fourbar.errors import InputError
 from fourbar.formulas.arithmetic import anywhere
 from fourbar.formulas.pin_forces import PinForces
-from fourbar.linkage import PIN_FORCE, PINS, require
+from fourbar.linkage import PIN_FORCE
 from fourbar.quantities import JAMMED, OK, SEVERAL
 from fourbar.solution import Array
 
@@ -43,10 +43,17 @@ class PinFriction(Effect):
     key: ClassVar[str] = "pin_friction"
     dry: ClassVar[bool] = True
 
+    def __post_init__(self) -> None:
+        key = "effects.pin_friction"
+        rows = checked(key, self.pins, coefficient=AT_LEAST_ZERO, radius=AT_LEAST_ZERO)
+        if not rows:
+            raise InputError(key, {}, "must name at least one pin")
+        object.__setattr__(self, "pins", rows)
+
     @classmethod
     def at(cls, **pins: tuple[float, float]) -> "PinFriction":
         """``PinFriction.at(A=(mu, radius))``."""
-        return cls(_checked(pins))
+        return cls(rows_of(pins))
 
     @property
     def loaded_pins(self) -> tuple[str, ...]:
@@ -112,16 +119,3 @@ class PinFriction(Effect):
         for pin, mu, r in self.pins:
             load = np.hypot(*np.asarray(forces[PIN_FORCE[pin]]).T)
             actions.couple(pin, -actions.sense(pin) * (mu * r * load))
-
-
-def _checked(pins: Mapping[str, tuple[float, float]]) -> tuple[tuple[str, float, float], ...]:
-    for pin, values in pins.items():
-        known(f"effects.pin_friction.{pin}", pin, values)
-    if not pins:
-        raise InputError("effects.pin_friction", {}, "must name at least one pin")
-    rows = []
-    for pin in (name for name in PINS if name in pins):
-        key, (mu, radius) = f"effects.pin_friction.{pin}", pins[pin]
-        coefficient = require(f"{key}.coefficient", mu, at_least_zero=True)
-        rows.append((pin, coefficient, require(f"{key}.radius", radius, at_least_zero=True)))
-    return tuple(rows)

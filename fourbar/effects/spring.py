@@ -8,10 +8,11 @@ from numpy.typing import NDArray
 
 from fourbar.effects.actions import Actions
 from fourbar.effects.effect import Effect
+from fourbar.effects.pins import ANY, AT_LEAST_ZERO, POSITIVE
 from fourbar.errors import InputError, expect
 from fourbar.formulas.arithmetic import anywhere, polar
 from fourbar.formulas.motion import State
-from fourbar.linkage import BAR_NAMES, FourBar, require
+from fourbar.linkage import BAR_NAMES, FourBar, require, require_whole
 from fourbar.quantities import NO_DIRECTION, OK
 
 COINCIDE = 16.0 * 2.0**-52
@@ -51,16 +52,16 @@ class Spring:
 
     def __post_init__(self) -> None:
         for key, point in (("from", self.start), ("to", self.end)):
-            expect(f"effects.springs.{key}", point, Point)
-            if point.bar not in BAR_NAMES or isinstance(point.bar, bool):
-                raise InputError(f"effects.springs.{key}.bar", point.bar, "must be 1, 2, 3 or 4")
-            require(f"effects.springs.{key}.at", point.distance)
-            require(f"effects.springs.{key}.at", point.angle)
+            if not isinstance(point, Point):
+                raise InputError(f"effects.springs.{key}", point, "must be a fourbar.effects.Point")
+            bar = require_whole(f"effects.springs.{key}.bar", point.bar, BAR_NAMES, "must be 1, 2, 3 or 4")
+            place = (require(f"effects.springs.{key}.at", number) for number in point[1:])
+            object.__setattr__(self, {"from": "start", "to": "end"}[key], Point(bar, *place))
         if self.start.bar == self.end.bar:
             raise InputError("effects.springs.to.bar", self.end.bar, "must be another bar than that of `from`")
-        require("effects.springs.stiffness", self.stiffness, positive=True)
-        require("effects.springs.length", self.length, at_least_zero=True)
-        require("effects.springs.preload", self.preload)
+        for name, limit in (("stiffness", POSITIVE), ("length", AT_LEAST_ZERO), ("preload", ANY)):
+            number = require(f"effects.springs.{name}", getattr(self, name), **limit)
+            object.__setattr__(self, name, number)
 
     @property
     def slack(self) -> float:
@@ -83,6 +84,12 @@ class Springs(Effect):
 
     springs: tuple[Spring, ...]
     key: ClassVar[str] = "springs"
+
+    def __post_init__(self) -> None:
+        expect("effects.springs", self.springs, tuple, list)
+        for spring in self.springs:
+            expect("effects.springs", spring, Spring)
+        object.__setattr__(self, "springs", tuple(self.springs))
 
     def act(self, actions: Actions, state: State) -> None:
         """At `start` the tension along the unit vector to `end`, at `end` its opposite."""

@@ -1,8 +1,8 @@
 """Torsion springs at pins: a couple proportional to the angle between the two bars."""
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from copy import copy
+from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 
 from fourbar.effects.actions import Actions
 from fourbar.effects.effect import Effect
-from fourbar.effects.pins import known
+from fourbar.effects.pins import ANY, POSITIVE, checked, rows_of
+from fourbar.errors import expect
 from fourbar.formulas.arithmetic import Number
 from fourbar.formulas.motion import State
-from fourbar.linkage import PINS, require
+from fourbar.linkage import PINS
 from fourbar.quantities import OK, WOUND
 from fourbar.solution import Array
 
@@ -37,10 +38,15 @@ class Torsion(Effect):
     counts_turns: ClassVar[bool] = True
     key: ClassVar[str] = "torsion"
 
+    def __post_init__(self) -> None:
+        expect("effects.torsion.turns", self.turns, type(None))
+        rows = checked("effects.torsion", self.springs, stiffness=POSITIVE, rest=ANY, preload=ANY)
+        object.__setattr__(self, "springs", rows)
+
     @classmethod
     def at(cls, **springs: tuple[float, float, float]) -> "Torsion":
         """``Torsion.at(B=(stiffness, rest, preload))``."""
-        return cls(_checked(springs))
+        return cls(rows_of(springs))
 
     @property
     def greatest_couple(self) -> float:
@@ -57,7 +63,10 @@ class Torsion(Effect):
     def counted_from(self, start: State, branch: Number) -> "Torsion":
         """Whole turns counted where the motion begins."""
         away = [angle - rest for angle, (_, _, rest, _) in zip(self._along(start, branch), self.springs, strict=True)]
-        return replace(self, turns=tuple(math.tau * np.floor(angle / math.tau + 0.5) for angle in away))
+        counted = copy(self)  # a constructor checks what a user gives, one number at a time
+        turns = tuple(math.tau * np.floor(angle / math.tau + 0.5) for angle in away)
+        object.__setattr__(counted, "turns", turns)
+        return counted
 
     def status(self, state: State, branch: NDArray[np.int8] | None) -> NDArray[np.uint8] | None:
         """WOUND at half a turn from rest and beyond."""
@@ -100,14 +109,3 @@ def _continuous(state: State, branch: Number) -> dict[int, Array]:
 def _wound(angle: Array | float) -> Array:
     """The angle in [-pi, pi)."""
     return np.remainder(np.asarray(angle) + np.pi, 2.0 * np.pi) - np.pi
-
-
-def _checked(springs: Mapping[str, tuple[float, float, float]]) -> tuple[tuple[str, float, float, float], ...]:
-    for pin, values in springs.items():
-        known(f"effects.torsion.{pin}", pin, values)
-    rows = []
-    for pin in (name for name in PINS if name in springs):
-        key, (k, rest, preload) = f"effects.torsion.{pin}", springs[pin]
-        stiffness = require(f"{key}.stiffness", k, positive=True)
-        rows.append((pin, stiffness, require(f"{key}.rest", rest), require(f"{key}.preload", preload)))
-    return tuple(rows)

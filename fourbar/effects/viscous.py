@@ -5,7 +5,7 @@ from typing import ClassVar
 
 from fourbar.effects.actions import Actions
 from fourbar.effects.effect import Effect
-from fourbar.effects.pins import pin_values
+from fourbar.effects.pins import AT_LEAST_ZERO, checked
 from fourbar.formulas.motion import State
 
 
@@ -16,10 +16,14 @@ class Viscous(Effect):
     coefficients: tuple[tuple[str, float], ...]
     key: ClassVar[str] = "viscous"
 
+    def __post_init__(self) -> None:
+        rows = checked("effects.viscous", self.coefficients, value=AT_LEAST_ZERO)
+        object.__setattr__(self, "coefficients", rows)
+
     @classmethod
     def at(cls, **coefficients: float) -> "Viscous":
         """``Viscous.at(O2=0.01)``."""
-        return cls(pin_values("effects.viscous", coefficients))
+        return cls(tuple(coefficients.items()))
 
     def act(self, actions: Actions, state: State) -> None:
         """M on bar j = -k (omega_j - omega_i), its opposite on bar i."""

@@ -13,7 +13,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.linkage import MOVING_BARS, FourBar
+from fourbar.errors import expect
+from fourbar.linkage import MOVING_BARS, FourBar, require_bar
 
 Array = NDArray[np.float64]
 TURN = 2.0 * math.pi
@@ -85,13 +86,13 @@ class Reach(NamedTuple):
 
 def unit_of(linkage: FourBar) -> float:
     """A power of two near the longest bar, m."""
+    expect("linkage", linkage, FourBar)
     return math.ldexp(1.0, math.frexp(max(linkage.lengths))[1])
 
 
 def reach_of(linkage: FourBar, bar: int = 2) -> Reach:
-    """Bar 2, 3 or 4 against the rest of the loop; ValueError for another bar."""
-    if bar not in MOVING_BARS:
-        raise ValueError(f"bar = {bar!r}: must be 2, 3 or 4")
+    """Bar 2, 3 or 4 against the rest of the loop; InputError for another bar."""
+    bar = require_bar("bar", bar)
     unit = unit_of(linkage)  # exact, and no product of lengths leaves the range of doubles
     d, *moving = (length / unit for length in linkage.lengths)
     own = moving.pop(bar - 2)
@@ -114,7 +115,7 @@ def limit_positions(linkage: FourBar, bar: int = 2) -> tuple[LimitPosition, ...]
 
     Parameters
     ----------
-    bar : 2, 3 or 4; ValueError otherwise.
+    bar : 2, 3 or 4; InputError otherwise.
 
     Source: R. L. Norton, Design of Machinery; Linares Mendoza, eqs 3.7-3.15 (one of each mirror pair).
     """

@@ -10,11 +10,16 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from fourbar.errors import InputError, expect
 from fourbar.formulas.arithmetic import Number, cross
 from fourbar.formulas.circuits import circuits
 from fourbar.formulas.mobility import TURN, Array, change_points, on_smooth_path, turns_fully
+from fourbar.formulas.motion import State
 from fourbar.formulas.path import state
-from fourbar.linkage import FourBar
+from fourbar.linkage import FourBar, require, require_bar, require_numbers, require_whole
+
+MOST_STEPS = 100_000_000
+SIGN = "must be +1 (open) or -1 (crossed)"
 
 
 class PointCoefficients(NamedTuple):
@@ -37,7 +42,11 @@ def point_coefficients(linkage: FourBar, theta_2: Array, branch: Number, bar: in
 
     Source: B. Paul, Kinematics and Dynamics of Planar Machinery (1979).
     """
-    moving = state(linkage, theta_2, branch)
+    bar = require_bar("bar", bar)
+    expect("z", z, complex, float, int, np.number)
+    require("z", z.real)
+    require("z", z.imag)
+    moving = _state(linkage, theta_2, branch)
     return PointCoefficients(moving.velocity(bar, z), moving.acceleration(bar, z))
 
 
@@ -68,8 +77,8 @@ def instant_centres(linkage: FourBar, theta_2: Array, branch: Number) -> dict[tu
 
     Source: R. L. Norton, Design of Machinery, ch. 6.
     """
-    here = state(linkage, theta_2, branch)
-    at, one = here.at, np.ones_like(theta_2)
+    here = _state(linkage, theta_2, branch)
+    at, one = here.at, np.ones_like(here.theta_2)
     O4, A, B = linkage.ground * at.u1 + 0.0 * at.u2, here.foot(3), here.point(4, linkage.output.length)
     centres = {
         bars: Centre(p.real, p.imag, one) for bars, p in {(1, 2): 0.0 * A, (2, 3): A, (3, 4): B, (1, 4): O4}.items()
@@ -103,16 +112,16 @@ def coupler_curve(
     Parameters
     ----------
     r_along, r_across : the point in the coupler's frame at A, m.
-    circuit : index into `circuits`; ValueError where there is none of that number.
+    circuit : index into `circuits`; InputError where there is none of that number.
     branch : where to start, for a linkage with change points.
-    steps : number of intervals, a multiple of 4 (ValueError otherwise): limits and change points,
+    steps : number of intervals, a multiple of 4 (InputError otherwise): limits and change points,
         at which directions are undetermined or lose digits, then fall between positions.
     """
     found = circuits(linkage)
-    if not 0 <= circuit < len(found):
-        raise ValueError(f"circuit = {circuit!r}: must be from 0 to {len(found) - 1}")
-    if steps < 4 or steps % 4:
-        raise ValueError(f"steps = {steps!r}: must be a positive multiple of 4")
+    point = complex(require("r_along", r_along), require("r_across", r_across))
+    circuit = require_whole("circuit", circuit, range(len(found)), f"must be from 0 to {len(found) - 1}")
+    branch = require_whole("branch", branch, (1, -1), SIGN)
+    steps = require_whole("steps", steps, range(4, MOST_STEPS + 1, 4), f"must be a multiple of 4 up to {MOST_STEPS}")
     (start, stop), branches = found[circuit]
     branch = branch if branch in branches else branches[0]
     half = np.arange(0.5, steps, dtype=np.float64)
@@ -126,7 +135,16 @@ def coupler_curve(
         out = 0.5 * (start + stop) - 0.5 * (stop - start) * np.cos(half[: steps // 2] * (TURN / steps))
         there = on_smooth_path(linkage, out, branch)
         theta_2, signs = np.concatenate((out, out[::-1])), np.concatenate((there, -there[::-1]))
-    curve = state(linkage, theta_2, signs).point(3, complex(r_along, r_across))
+    curve = state(linkage, theta_2, signs).point(3, point)
     x, y = curve.real, curve.imag
     theta_2 = np.append(theta_2, theta_2[0] + turns * TURN)
     return CouplerCurve(theta_2, np.append(signs, signs[0]), np.append(x, x[0]), np.append(y, y[0]))
+
+
+def _state(linkage: FourBar, theta_2: object, branch: object) -> State:
+    """Of positions as a user gives them."""
+    expect("linkage", linkage, FourBar)
+    angles, signs = require_numbers("theta_2", theta_2), require_numbers("branch", branch, SIGN)
+    if not (np.abs(signs) == 1.0).all() or signs.shape not in ((), angles.shape):
+        raise InputError("branch", branch, f"{SIGN}, or one of them for each angle")
+    return state(linkage, angles, signs)

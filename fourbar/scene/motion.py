@@ -3,16 +3,13 @@
 import math
 import sys
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from fourbar.errors import InputError, expect
-from fourbar.linkage import require
+from fourbar.linkage import require, require_numbers, require_whole
+from fourbar.scene.motion_law import STEPS, Law
 from fourbar.solution import Array
-
-if TYPE_CHECKING:
-    from fourbar.scene.motion_law import Law
 
 OPEN, CROSSED = 1, -1
 BRANCH_NAMES = {OPEN: "open", CROSSED: "crossed"}
@@ -31,12 +28,12 @@ class Sweep:
     steps: int
 
     def __post_init__(self) -> None:
-        require("motion.theta_2.from", self.start)
-        require("motion.theta_2.to", self.stop)
+        set_field = object.__setattr__  # the class is frozen; this is its constructor
+        set_field(self, "start", require("motion.theta_2.from", self.start))
+        set_field(self, "stop", require("motion.theta_2.to", self.stop))
         if not math.isfinite(self.stop - self.start):
             raise InputError("motion.theta_2.to", self.stop, f"must be within the range of doubles from {self.start!r}")
-        if isinstance(self.steps, bool) or not isinstance(self.steps, int) or not 1 <= self.steps <= 100_000_000:
-            raise InputError("motion.theta_2.steps", self.steps, "must be a whole number from 1 to 100 000 000")
+        set_field(self, "steps", require_whole("motion.theta_2.steps", self.steps, *STEPS))
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,9 +44,11 @@ class FromLimit:
     offset: float = 0.0
 
     def __post_init__(self) -> None:
-        require("motion.theta_2.offset", self.offset)
-        if isinstance(self.limit, bool) or not isinstance(self.limit, int) or self.limit < 1:
-            raise InputError("motion.theta_2.limit", self.limit, "must be a whole number, 1 or more")
+        object.__setattr__(self, "offset", require("motion.theta_2.offset", self.offset))
+        limit = require_whole(
+            "motion.theta_2.limit", self.limit, range(1, sys.maxsize), "must be a whole number, 1 or more"
+        )
+        object.__setattr__(self, "limit", limit)
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,9 +59,8 @@ class Free:
     steps: int
 
     def __post_init__(self) -> None:
-        require("motion.free.duration", self.duration, positive=True)
-        if isinstance(self.steps, bool) or not isinstance(self.steps, int) or not 1 <= self.steps <= 100_000_000:
-            raise InputError("motion.free.steps", self.steps, "must be a whole number from 1 to 100 000 000")
+        object.__setattr__(self, "duration", require("motion.free.duration", self.duration, positive=True))
+        object.__setattr__(self, "steps", require_whole("motion.free.steps", self.steps, *STEPS))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -86,16 +84,13 @@ class Motion:
     branch: int = OPEN
     through: str = "sign"
     free: Free | None = None
-    law: "Law | None" = None
+    law: Law | None = None
 
     def __post_init__(self) -> None:
         if self.theta_2 is not None and not isinstance(self.theta_2, (Sweep, FromLimit)):
-            try:
-                angles = np.array(self.theta_2, dtype=float)
-            except (TypeError, ValueError, OverflowError):
-                angles = np.array([])
-            if not np.all(np.isfinite(angles)) or angles.ndim > 1 or angles.size == 0:
-                raise InputError("motion.theta_2", self.theta_2, "must be finite angles, shape () or (n,)")
+            angles = require_numbers("motion.theta_2", self.theta_2, "must be finite angles")
+            if angles.size == 0:
+                raise InputError("motion.theta_2", self.theta_2, "must be one angle or more")
             angles.flags.writeable = False
             object.__setattr__(self, "theta_2", float(angles) if angles.ndim == 0 else angles)
         if self.omega_2 is not None:
@@ -104,8 +99,10 @@ class Motion:
                 allowed = f"must be below {FASTEST:.4g} rad/s: every acceleration has its square"
                 raise InputError("motion.omega_2", self.omega_2, allowed)
         object.__setattr__(self, "alpha_2", require("motion.alpha_2", self.alpha_2))
-        for name, kinds in (("branch", (int, np.integer)), ("through", (str,)), ("free", (Free, type(None)))):
+        for name, kinds in (("branch", (int, np.integer)), ("through", (str,))):
             expect(f"motion.{name}", getattr(self, name), *kinds)
+        expect("motion.free", self.free, Free, type(None))
+        expect("motion.law", self.law, Law, type(None))
         if self.branch not in (OPEN, CROSSED):
             raise InputError("motion.branch", self.branch, "must be +1 (open) or -1 (crossed)")
         given = (self.free, self.theta_2, self.omega_2, self.alpha_2 or None)

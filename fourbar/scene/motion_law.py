@@ -5,8 +5,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from fourbar.errors import DependencyError, InputError, installing
-from fourbar.linkage import require
+from fourbar.errors import DependencyError, InputError, expect, installing
+from fourbar.linkage import require_numbers, require_whole
 from fourbar.solution import Array
 
 ENDS = {"free": "not-a-knot", "rest": "clamped", "periodic": "periodic"}
@@ -14,6 +14,8 @@ ENDS = {"free": "not-a-knot", "rest": "clamped", "periodic": "periodic"}
 LEAST = {"free": 4, "rest": 2, "periodic": 3}
 """Points that determine the cubic pieces."""
 MOST_POINTS = 100_000
+STEPS = (range(1, 100_000_001), "must be a whole number from 1 to 100 000 000")
+"""Intervals of any motion."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,16 +38,19 @@ class Law:
 
     def __post_init__(self) -> None:
         key = "motion.law"
+        expect(f"{key}.ends", self.ends, str)
         if self.ends not in ENDS:
             raise InputError(f"{key}.ends", self.ends, "must be one of " + ", ".join(ENDS))
-        time, theta_2 = (tuple(require(f"{key}.{n}", x) for x in getattr(self, n)) for n in ("time", "theta_2"))
+        time, theta_2 = (
+            tuple(require_numbers(f"{key}.{name}", getattr(self, name)).ravel().tolist())
+            for name in ("time", "theta_2")
+        )
         if len(time) != len(theta_2) or not LEAST[self.ends] <= len(time) <= MOST_POINTS:
             allowed = f"needs {LEAST[self.ends]} to {MOST_POINTS} times and as many angles"
             raise InputError(key, (len(time), len(theta_2)), allowed)
         if any(b <= a for a, b in pairwise(time)):
             raise InputError(f"{key}.time", time, "must rise")
-        if isinstance(self.steps, bool) or not isinstance(self.steps, int) or not 1 <= self.steps <= 100_000_000:
-            raise InputError(f"{key}.steps", self.steps, "must be a whole number from 1 to 100 000 000")
+        object.__setattr__(self, "steps", require_whole(f"{key}.steps", self.steps, *STEPS))
         object.__setattr__(self, "time", time)
         object.__setattr__(self, "theta_2", theta_2)
 
@@ -62,6 +67,7 @@ class Law:
             from scipy.interpolate import CubicSpline
         except ModuleNotFoundError:
             raise DependencyError(f"SciPy is needed for a motion law: {installing('dynamics')}") from None
+        time = require_numbers("time", time)
         t, angle = np.array(self.time), np.array(self.theta_2)
         mean = 0.0
         if self.ends == "periodic":

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from fourbar.errors import InputError
-from fourbar.linkage import BAR_NAMES, require
+from fourbar.linkage import BAR_NAMES, require, require_whole
 from fourbar.quantities import UNITS
 
 LETTERS = frozenset("ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_")
@@ -34,8 +34,8 @@ class Point:
             raise InputError("points", self.name, allowed)
         if {self.name, f"{self.name}_x", f"{self.name}_y"} & COLUMNS:
             raise InputError(self.key, self.name, "is the name of a quantity; a point needs another")
-        if self.bar not in BAR_NAMES or isinstance(self.bar, bool):
-            raise InputError(f"{self.key}.bar", self.bar, "must be 1, 2, 3 or 4")
+        bar = require_whole(f"{self.key}.bar", self.bar, BAR_NAMES, "must be 1, 2, 3 or 4")
+        object.__setattr__(self, "bar", bar)
         try:
             r, phi = self.from_pin
         except (TypeError, ValueError):

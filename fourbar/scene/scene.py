@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from fourbar.errors import InputError, expect
 from fourbar.formulas.mobility import default_range, limit_positions, on_smooth_path
-from fourbar.linkage import MOVING_BARS, FourBar
+from fourbar.linkage import FourBar, require_bar
 from fourbar.scene.motion import DEFAULT_STEPS, FromLimit, Motion, Sweep
 from fourbar.scene.point import Point
 from fourbar.scene.tolerance import Tolerance
@@ -35,11 +35,10 @@ class Scene:
     tolerances: tuple[Tolerance, ...] = ()
 
     def __post_init__(self) -> None:
-        one = {"linkage": FourBar, "motion": Motion, "drive_bar": int, "title": str, "source": str}
+        one = {"linkage": FourBar, "motion": Motion, "title": str, "source": str}
         for name, kind in one.items():
             expect(name, getattr(self, name), kind)
-        if self.drive_bar not in MOVING_BARS or isinstance(self.drive_bar, bool):
-            raise InputError("drive.bar", self.drive_bar, "must be 2, 3 or 4")
+        object.__setattr__(self, "drive_bar", require_bar("drive.bar", self.drive_bar))
         from fourbar.effects.effect import Effect
 
         many = {"loads": Effect, "effects": Effect, "pictures": object, "points": Point, "tolerances": Tolerance}
@@ -48,6 +47,9 @@ class Scene:
             object.__setattr__(self, name, tuple(getattr(self, name)))
             for each in getattr(self, name):
                 expect(name, each, each_kind)
+        for picture in self.pictures:
+            if not hasattr(picture, "data_uri"):
+                raise InputError("pictures", picture, "must be a Picture, as fourbar.load makes it of a file")
         names = [point.name for point in self.points]
         if len(set(names)) < len(names):
             raise InputError("points", names, "each point has a name of its own")

@@ -55,13 +55,15 @@ class Sensitivity:
         Raises InputError for a quantity or a key that is not known here.
         """
         for name, known in ((quantity, self.by), (key, self.keys)):
-            if name not in known:
+            if not isinstance(name, str) or name not in known:
                 raise InputError("sensitivity", name, "is not known here; known: " + ", ".join(known))
         found: Array = self.by[quantity][list(self.keys).index(key)]
         return found
 
     def value(self, quantity: str) -> Array:
-        """The quantity itself, (n,) or (n, 2)."""
+        """The quantity itself, (n,) or (n, 2); InputError as `of`."""
+        if not isinstance(quantity, str) or quantity not in self.by:
+            raise InputError("sensitivity", quantity, "is not known here; known: " + ", ".join(self.by))
         return quantity_of(self.solution, quantity)
 
 

@@ -105,6 +105,8 @@ def extremes(scene: Scene, quantities: Sequence[str] = NAMES) -> Extremes:
         raise DependencyError(f"Guaranteed extremes need python-flint: {installing('exact')}") from None
     expect("scene", scene, Scene)
     expect("quantities", quantities, list, tuple)
+    for name in quantities:
+        expect("quantities", name, str)
     names = [name for name in NAMES if name in quantities or name.strip("|") in quantities]
     for name in quantities:
         if name not in NAMES and f"|{name}|" not in NAMES:

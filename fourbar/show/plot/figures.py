@@ -2,13 +2,13 @@
 
 import math
 import textwrap
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from fourbar.errors import InputError, expect
+from fourbar.errors import InputError
 from fourbar.linkage import require
 from fourbar.scene import Scene
 from fourbar.show.plot import curves, freebody, hodograph, influence, linkage
@@ -17,7 +17,7 @@ from fourbar.show.plot.style import FORCE_COLOURS, MUTED, format_of, matplotlib_
 from fourbar.show.plot.transmission import draw_transmission
 from fourbar.show.plot.view import View, common_position, on_branch, over_time, view
 from fourbar.show.tables import STATIC
-from fourbar.solution import SI, Conversion
+from fourbar.solution import SI, Conversion, require_units
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -147,7 +147,8 @@ class Drawing:
     def save(self, path: str | Path, file_format: str | None = None) -> None:
         """Write it as SVG, PNG or PDF, by the ending of the path, whole or not at all."""
         with matplotlib_style():
-            save(self.figure, Path(path), format_of(path, file_format))
+            kind = format_of(path, file_format)
+            save(self.figure, Path(path), kind)
 
 
 def drawn(
@@ -211,7 +212,7 @@ def compose(
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    expect("units", units, Mapping)
+    require_units(units)
     if position is not None:
         position = require("position", position)
     scenes = [on_branch(scene, sign) for sign in (1, -1)] if branches == "both" else [scene]

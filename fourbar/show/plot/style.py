@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fourbar.errors import DependencyError, InputError, installing
+from fourbar.errors import DependencyError, InputError, expect, installing
 from fourbar.quantities import PIN_FORCES
 from fourbar.solution import SI, Array, Conversion, unit_in
 from fourbar.writing import write_bytes
@@ -104,6 +104,8 @@ def matplotlib_style() -> Iterator[None]:
 
 def format_of(path: str | Path, file_format: str | None = None) -> str:
     """The format stated, or that a file's ending names; InputError where it is none of svg, png, pdf."""
+    expect("path", path, str, Path)
+    expect("file_format", file_format, str, type(None))
     kind = (file_format or Path(path).suffix.removeprefix(".")).lower()
     if kind not in FORMATS:
         raise InputError("output", str(path), "must end in one of " + ", ".join(f".{end}" for end in FORMATS))
