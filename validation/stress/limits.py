@@ -22,11 +22,11 @@ LIMITS = {
     "positions only / floor": Limit("<=", 6.0, "the rest of two angles is arithmetic on arrays of a block"),
     "solve to forces / formulas": Limit("<=", 2.0, "new arrays and the points come on top, no second evaluation"),
     "solve with error bars / to forces": Limit(
-        "<=", 25.0, "the forces are evaluated 15 times, and every number is rounded anew"
+        "<=", 25.0, "the forces are evaluated 15 times, every number rounded anew"
     ),
     "numpy / compiled": Limit(">=", 1.2, "who installs numba gains by it on one core"),
     "compiled / C": Limit("<=", 1.5, "the blocks, statuses and copies around the compiled loop stay small"),
-    "compiled error bars / forces": Limit("<=", 6.0, "fourteen more evaluations, which share tangent and results"),
+    "compiled error bars / forces": Limit("<=", 6.0, "fourteen more evaluations, which share the tangent"),
     "study of linkages / positions": Limit("<=", 2.0, "a member is a column of the same arrays as a position"),
     "growth from 1000 positions on": Limit("<=", 1.3, "the work is linear in the positions: blocks fit the cache"),
     "memory beyond the result, MB": Limit("<=", 50.0, "work space is that of a block, not of the sweep"),
