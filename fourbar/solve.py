@@ -31,7 +31,7 @@ BLOCK = 8000
 numbers is a little more than the C library hands out again without asking the system for fresh pages."""
 
 WORTH_COMPILING = 2_000_000
-"""Evaluations of the forces, one a position, with error bars fourteen: loading numba and the compiled loop costs as much."""
+"""Evaluations of the forces, one a position, with error bars fourteen: loading numba and the loop costs as much."""
 
 PARTS_FOR_THREADS = 4
 
