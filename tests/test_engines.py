@@ -295,6 +295,10 @@ def nothing_on_bar_3(right: Callable[..., Any]) -> Callable[..., Any]:
     return lambda self, bar, couple: None if bar == 3 else right(self, bar, couple)
 
 
+def longer(right: Callable[..., Any]) -> Callable[..., Any]:
+    return lambda self: {bar: force * (1.0 + 1e-9) for bar, force in right(self).items()}
+
+
 def larger(right: Callable[..., Any]) -> Callable[..., Any]:
     return lambda self, bar: right(self, bar) + 1e-13
 
@@ -304,6 +308,7 @@ IN_A_TREE = {
     "turn": (partial(scaled, factor=1.0 + 1e-9), {"omega_3", "torque"}),
     "rotation": (partial(scaled, factor=1.0 + 1e-9), {"F43", "torque"}),
     "forces": (wrong_loop_force, {"F12", "F32", "F14"}),
+    "carried": (longer, {"F12", "F32", "F14"}),
     "twist": (nothing_on_bar_3, {"torque"}),
     "angle": (larger, {"theta_3", "theta_4"}),
 }

@@ -17,7 +17,8 @@ IN_FORCES = (
     *("with the drive on the output F43 of the wrong sense", "F23 in place of F32", "F12 of the wrong sense"),
     *("inertia about the mass centre in place of the pin", "the mass centre of a bar at its end"),
     *("a load on the wrong bar", "gravity points upwards", "inertial forces in kg cm/s^2"),
-    *("the input's own acceleration does not reach bars 3 and 4", "alpha_3 in place of the x-component of a_G4"),
+    *("m omega^2 r left out of the forces", "the alpha terms of the forces reversed"),
+    "alpha_3 in place of the x-component of a_G4",
 )
 IN_TORQUE = (
     *("J'/2 q'^2 dropped", "J' in place of J'/2", "J of bars 3 and 4 left out", "the work on the input forgotten"),

@@ -37,7 +37,8 @@ class PinocchioForward:
         if tree.terms:
             tree.place(q)  # type: ignore[arg-type]
             # what acts, as generalised forces: the difference it makes to inverse dynamics
-            acted = tree.torques(v, np.zeros(3))
+            tree.moving(v, np.zeros(3))
+            acted = tree.torques()
             tau = tau + tree.needed(tree.field, {bar: [0.0, 0.0, 0.0] for bar in tree.wrenches}) - acted
         return np.array(self.loop.acceleration(q, v, tau))
 
@@ -69,7 +70,8 @@ class PinocchioForward:
         tree = self.tree
         tree.place(q)  # type: ignore[arg-type]
         tree.model.armature = np.zeros(3)
-        needed = tree.torques(v, a)
+        tree.moving(v, a)
+        needed = tree.torques()
         if self.scene.drive_bar == 2:
             loop_force, torque = self.loop.loop_force(), -self.armature[0] * (a[0] - self.alpha)
         else:

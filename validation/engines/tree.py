@@ -199,23 +199,18 @@ class Tree(Bars):
         if bar != 1:
             self.wrenches[bar][2] += couple
 
-    def _move(self, v: Array, a: Array) -> None:
+    def moving(self, v: Array, a: Array) -> None:
+        """Take speeds and accelerations of the coordinates, for all that follows."""
         self.v, self.a = v, a
         self.set_motion(v, a)
 
     def drift(self, v: Array) -> Array:
         """Acceleration of the gap at speeds v where a = 0, (2,), m/s^2."""
-        self._move(v, np.zeros(3))
+        self.moving(v, np.zeros(3))
         return self.acceleration("end3") - self.acceleration("end4")
 
-    def inertial(self, v: Array, a: Array) -> Array:
-        """What the motion asks for of the bars alone: without loads, effects and gravity, (3,), N m."""
-        self._move(v, a)
-        return self.needed((0.0, 0.0), _no_wrenches())
-
-    def torques(self, v: Array, a: Array) -> Array:
+    def torques(self) -> Array:
         """What the motion asks for beyond loads and effects, (3,), N m."""
-        self._move(v, a)
         self.wrenches = _no_wrenches()
         for act in self.terms:
             act()
@@ -240,9 +235,10 @@ class Tree(Bars):
             a = closed(jacobian, alpha_2, *self.drift(v).tolist())
         except np.linalg.LinAlgError:
             return {}
+        self.moving(v, a)
         self.pin_loads = {}
-        inertial = [self.inertial(v, a)] if self.alone else []
-        needed = self.torques(v, a)
+        inertial = [self.needed((0.0, 0.0), _no_wrenches())] if self.alone else []
+        needed = self.torques()
         values: Values = {f"a_{name}": self.acceleration(point) for name, point in ON_BARS.items()}
         for bar in (3, 4):
             values[f"omega_{bar}"], values[f"alpha_{bar}"] = self.velocity(bar), self.alpha(bar)
@@ -253,7 +249,7 @@ class Tree(Bars):
                 values["torque_inertia"] = float(without[0][2])
             forces = self._multipliers(unknowns)
             if self.loaded:
-                forces = self._settled(forces, lambda: self._multipliers(np.linalg.solve(matrix, self.torques(v, a))))
+                forces = self._settled(forces, lambda: self._multipliers(np.linalg.solve(matrix, self.torques())))
         except np.linalg.LinAlgError:  # no torque on that bar balances the linkage here
             return values
         return values | forces

@@ -62,7 +62,7 @@ class MujocoTree(Tree):
         # the engine's own memory, read in place
         self.at = {name: self.data.site_xpos[site, :2] for name, site in self.site.items()}
         self.turned_to = {bar: self.data.xmat[body].reshape(3, 3)[:2, :2] for bar, body in self.body.items()}
-        self._jac = np.zeros((3, 3))
+        self._jac, self._dot = np.zeros((3, 3)), np.zeros((3, 3))
         self.ready(scene, acting(scene, self))
 
     def place(self, q: Sequence[float]) -> None:
@@ -96,10 +96,10 @@ class MujocoTree(Tree):
 
     def acceleration(self, name: str) -> Array:
         """J a + (dJ/dt) v of a site."""
-        of_a = self.point_jacobian(name) @ self.a
-        at, body = self.data.site_xpos[self.site[name]], self.body[int(name[-1])]
-        mujoco.mj_jacDot(self.model, self.data, self._jac, None, at, body)
-        return np.asarray(of_a + self._jac[:2] @ self.v)
+        site, body = self.site[name], self.body[int(name[-1])]
+        mujoco.mj_jacSite(self.model, self.data, self._jac, None, site)
+        mujoco.mj_jacDot(self.model, self.data, self._dot, None, self.data.site_xpos[site], body)
+        return np.asarray((self._jac @ self.a + self._dot @ self.v)[:2])
 
     def needed(self, field: tuple[float, float], wrenches: dict[int, list[float]]) -> Array:
         """mj_inverse, less what loads and effects do on the coordinates."""
