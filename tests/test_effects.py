@@ -288,6 +288,12 @@ def test_a_fault_in_the_wrench_on_the_free_bodies_fails_the_run(
     assert "torque" in {quantity for _, quantity, _ in found}
 
 
+def test_what_the_formulas_make_of_a_spring_does_not_reach_the_engines(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Spring, "slack", 0.0)
+    found = failing(scene("springs"), [witness for witness in EXACT if witness.name in ENGINES])
+    assert {engine for engine, _, _ in found} >= ENGINES
+
+
 @pytest.mark.parametrize("name", ACTING)
 @pytest.mark.parametrize("factor", [-1.0, 2.0, 0.0], ids=["wrong sign", "applied twice", "missing"])
 def test_a_fault_in_the_engine_term_fails_the_run(name: str, factor: float, monkeypatch: pytest.MonkeyPatch) -> None:

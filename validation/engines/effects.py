@@ -89,11 +89,11 @@ def _springs(effect: "Springs", tree: Tree) -> Act:
             )
             vector = np.asarray(other - one)
             distance = math.hypot(*vector)
-            if spring.slack:
+            if spring.preload == spring.stiffness * spring.length:
+                vector = spring.stiffness * vector
+            else:
                 tension = spring.preload + spring.stiffness * (distance - spring.length)
                 vector = vector * (tension / distance) if distance else np.full(2, np.nan)
-            else:
-                vector = spring.stiffness * vector
             tree.push(spring.start.bar, vector, one)
             tree.push(spring.end.bar, -vector, other)
 
