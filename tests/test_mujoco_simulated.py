@@ -16,7 +16,9 @@ from validation.compare.answer import Answer
 from validation.compare.compare import compare
 from validation.compare.rows import AGREES, FAILS, REFUSES
 from validation.compare.tolerance import SIMULATED
+from validation.engines.mujoco.closed_loop import ClosedLoop
 from validation.engines.mujoco.simulate import MujocoSimulated, observed_order
+from validation.engines.mujoco.watch import Watch
 from validation.engines.witnesses import WITNESSES
 from validation.run.judge import judge
 from validation.scenes.random import LinkageType, random_scene
@@ -149,6 +151,20 @@ def test_error_falls_with_the_fourth_power_of_the_timestep() -> None:
 
     coarse, fine, order = observed_order(posed, fourbar.command(posed), error)
     assert fine < coarse and 3.0 < order < 6.0, (coarse, fine, order)
+
+
+def test_a_residual_that_is_no_number_raises_its_alarm(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Watch, "evidence", lambda self: {"force_gap": math.nan})
+    monkeypatch.setattr(ClosedLoop, "gap", lambda self, right=ClosedLoop.gap: (right(self)[0], math.nan)
+                        if self.data.time else right(self))  # fmt: skip
+    posed = crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.1, 0.4, 3), 10.0))
+    alarms = MujocoSimulated().answer(posed, fourbar.command(posed)).alarms
+    assert {alarm.partition(" = ")[0] for alarm in alarms} == {"force_gap", "closure_gap"}
+
+
+def test_without_an_error_there_is_no_order(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(MujocoSimulated, "answer", lambda *_: Answer("", ""))
+    assert math.isnan(observed_order(crank_rocker(), fourbar.command(crank_rocker()), lambda _: 0.0)[2])
 
 
 def hood(links: float, output: float | None = None) -> fourbar.Scene:

@@ -192,7 +192,7 @@ class _Simulation:
                 self._read(run, watch, index, begins)
         self.evidence["steps"] += run.stepper.done
         for name, value in watch.evidence().items():
-            self.evidence[name] = float(np.fmax(self.evidence.get(name, 0.0), value))
+            self.evidence[name] = float(np.maximum(self.evidence.get(name, 0.0), value))
 
     def _read(self, run: Run, watch: Watch, index: int, begins: float) -> None:
         """Everything of one sample, and what the engine says of itself there."""
@@ -220,13 +220,13 @@ class _Simulation:
         speed = run.passage.speed(float(d.qpos[O2]) - run.turns - begins, run.stepper.time)
         worst = {
             "closure_gap_m": float(np.hypot(*loop.gap())),
-            "speed_error": float(abs(abs(d.qvel[O2]) - speed) / run.passage.fastest),
+            "speed_error": float(abs(abs(d.qvel[O2]) - speed) / (run.passage.fastest or 1.0)),
             "solver_iterations": float(d.solver_niter.max()),
             "bad_states": float(loop.bad()),
             "time_went_back": float(run.stepper.lost()),
         }
         for name, value in worst.items():
-            seen[name] = float(np.fmax(seen[name], value))
+            seen[name] = float(np.maximum(seen[name], value))
 
 
 def observed_order(scene: Scene, command: Command, error: Callable[[Answer], float]) -> tuple[float, float, float]:
@@ -242,4 +242,5 @@ def observed_order(scene: Scene, command: Command, error: Callable[[Answer], flo
         )
         for scale in (4.0, 2.0)
     ]
-    return errors[0], errors[1], float(np.log2(errors[0] / errors[1]))
+    ratio = errors[0] / errors[1] if errors[1] else math.inf
+    return errors[0], errors[1], math.log2(ratio) if 0.0 < ratio < math.inf else math.nan
