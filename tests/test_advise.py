@@ -20,6 +20,7 @@ from validation.engines.witnesses import WITNESSES
 from validation.run import dial
 from validation.run.judge import judge
 from validation.scenes.suites import MODELS
+from validation.stress.mutation.specimens import SPECIMENS
 from validation.studies.cost import advise, matters, measure
 from validation.studies.cost.errors import errors
 from validation.studies.cost.exhaustive import cheapest
@@ -87,6 +88,9 @@ def test_out_of_reach_is_reported_with_what_would_reach_it(tmp_path: Path, monke
     scene.write_text(fourbar.dump(still))
     result = CliRunner().invoke(advise.command, [str(scene), "--error", "1e-3"], standalone_mode=False)
     assert result.return_value == 1 and "nothing to run through" in result.output
+    scene.write_text(fourbar.dump(SPECIMENS["law"]))
+    result = CliRunner().invoke(advise.command, [str(scene), "--error", "1e-3"], standalone_mode=False)
+    assert result.return_value == 1 and "motion law" in result.output
 
 
 @pytest.mark.parametrize("required", [0.0, 1.0, -1e-3, math.nan])

@@ -20,6 +20,7 @@ from validation.engines.mujoco.one_state import MujocoOneState
 from validation.engines.mujoco.trial import Build, Rig
 from validation.engines.pinocchio_forward import PinocchioForward
 from validation.stress.bench import LINKAGE
+from validation.stress.mutation.specimens import SPECIMENS
 from validation.studies.cost import formulas, laws, orders, pictures, study
 from validation.studies.cost.cost import cost, front_lines
 from validation.studies.cost.curves import BEST
@@ -160,6 +161,18 @@ def test_formulas_in_four_precisions() -> None:
         assert wrong["50 digits"] < 1e-50
 
 
+def test_what_is_no_number_or_not_compared_has_no_small_error() -> None:
+    scene = turning(positions=8)
+    at = formulas.few(command(scene))
+    exact, ours = formulas.fifty_digits(scene, at), formulas.double(scene, at)
+    ours["torque"][3], ours["F12"][2, 1] = math.nan, math.nan
+    found = formulas.against_reference(scene, at, ours, {**exact, "F14": [(None, None)] * 9})
+    assert found.torque == found.F12 == found.F14 == math.inf and found.F43 < 1e-13
+    still = replace(scene, motion=replace(scene.motion, omega_2=0.0), drive_bar=4)
+    solution = fourbar.solve(still, "force")
+    assert errors(still, command(still), {name: getattr(solution, name) for name in QUANTITIES}).torque == math.inf
+
+
 def point(steps: float, worst: float, curve: str = "c", kind: str = study.STEPPED) -> study.Point:
     errors = [worst] * len(QUANTITIES)
     return study.Point(
@@ -282,6 +295,14 @@ def test_the_command_writes_table_report_and_pictures(tmp_path: Path, monkeypatc
         assert (folder / f"{stem}.svg").read_text().startswith("<?xml") and (
             folder / f"{stem}.png"
         ).stat().st_size > 20_000
+
+
+def test_a_scene_that_cannot_be_run_through_is_refused_before_anything_is_measured(tmp_path: Path) -> None:
+    scene, out = tmp_path / "law.toml", tmp_path / "out"
+    scene.write_text(fourbar.dump(SPECIMENS["law"]))
+    result = CliRunner().invoke(cost, [str(scene), "--out", str(out)], standalone_mode=False)
+    assert isinstance(result.exception, fourbar.errors.LimitError) and "motion law" in str(result.exception)
+    assert not out.exists()
 
 
 def test_the_scatter_of_timings_is_that_of_their_middle_half() -> None:

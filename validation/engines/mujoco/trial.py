@@ -45,6 +45,8 @@ class Rig:
     def __init__(self, scene: Scene, command: Command) -> None:
         if scene.motion.free is not None or not np.any(command.omega_2) or np.ptp(command.theta_2) == 0.0:
             raise LimitError("nothing to run through in time: a sweep of theta_2 at omega_2 is needed")
+        if scene.motion.law is not None:
+            raise LimitError("settings are tried at a constant alpha_2, not along a motion law")
         self.omega, self.alpha = float(np.max(command.omega_2)), float(np.max(command.alpha_2))  # type: ignore[arg-type]
         motion = replace(scene.motion, theta_2=command.theta_2, omega_2=self.omega, alpha_2=self.alpha)
         self.scene, self.command = replace(scene, motion=motion), command

@@ -52,6 +52,7 @@ def cost(scenes: tuple[Path, ...], out: Path, effects: bool) -> int:
     rows: list[tuple[str, ...]] = []
     for index in range(len(files)):
         name, scene = files.name(index), files.scene(index)
+        rig = Rig(scene, command_of(scene))
         study = Study(name, scene, out / name)
         columns = (
             TextColumn(name),
@@ -67,7 +68,7 @@ def cost(scenes: tuple[Path, ...], out: Path, effects: bool) -> int:
                 curves[curve] = points
                 progress.update(task, advance=1, description=curve)
         found = laws(curves)
-        dials = influences(scene, Rig(scene, command_of(scene)), BEST)
+        dials = influences(scene, rig, BEST)
         fitted += [law for law in found if law.decided]
         written = write(study, curves, found, scene.title or name)
         click.echo(summary(name, curves, found, study.left_out))

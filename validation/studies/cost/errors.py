@@ -1,5 +1,7 @@
 """How wrong an answer is: the torque and each pin force, each on its scale against the formulas."""
 
+import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -34,7 +36,7 @@ class Errors(NamedTuple):
 
 
 QUANTITIES = Errors._fields
-NO_ANSWER = Errors(*[float("inf")] * len(QUANTITIES))
+NO_ANSWER = Errors(*[math.inf] * len(QUANTITIES))
 
 
 def errors(scene: Scene, at: Command, quantities: dict[str, Array]) -> Errors:
@@ -55,6 +57,11 @@ def errors(scene: Scene, at: Command, quantities: dict[str, Array]) -> Errors:
         if name == "torque" and scene.drive_bar != 2:
             where = judged & turning(getattr(formulas, f"omega_{scene.drive_bar}"))
         error = relative_error(name, ours, quantities[name], yardstick(name, scene, formulas, ours))
-        value = float(np.max(error[where]))
-        worst[name] = value if np.isfinite(value) else float("inf")
+        worst[name] = greatest(error[where])
     return Errors(**worst)
+
+
+def greatest(errors: Array | Sequence[float]) -> float:
+    """Of some errors; inf where one is no number, and where there is none."""
+    value = float(np.max(errors, initial=-math.inf))
+    return value if math.isfinite(value) else math.inf

@@ -25,7 +25,7 @@ from validation.compare.answer import Array
 from validation.compare.error import relative
 from validation.compare.scales import yardstick
 from validation.published import thirteen
-from validation.studies.cost.errors import Errors
+from validation.studies.cost.errors import Errors, greatest
 
 FIFTY_DIGITS = 167 + 30
 """Bits: fifty digits, and what some sixty roundings of a well-conditioned position cost."""
@@ -142,13 +142,12 @@ def against_reference(scene: Scene, at: Command, quantities: Quantities, referen
     worst = {}
     for name in ("torque", *PIN_FORCES):
         sizes = yardstick(name, scene, formulas, getattr(formulas, name))
-        value = 0.0
+        found = []
         for ours, exact, size in zip(quantities[name], reference[name], sizes.tolist(), strict=True):
             pairs = ((ours, exact),) if name == "torque" else tuple(zip(ours, exact, strict=True))
-            if any(y is None for _, y in pairs):
-                continue
-            value = max(value, float(relative(math.hypot(*(_difference(x, y) for x, y in pairs)), size)))
-        worst[name] = value
+            if all(y is not None for _, y in pairs):
+                found.append(float(relative(math.hypot(*(_difference(x, y) for x, y in pairs)), size)))
+        worst[name] = greatest(found)
     return Errors(**worst)
 
 
