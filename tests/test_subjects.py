@@ -97,6 +97,19 @@ def test_a_wrong_a_missing_and_a_nan_reading_show() -> None:
     assert found["F32"] < EXACT
 
 
+def test_a_subject_that_diverges_has_its_lines_without_an_order() -> None:
+    scene, n = fourbar.load(PROBLEM), 3
+    readings = []
+    for steps, torque in ((100, 1.0), (200, math.inf), (400, math.nan), (800, 1.0)):
+        found = motion.Readings("its defaults", steps)
+        for _ in range(n):
+            found.read(scene, motion.State((1.0, math.nan, 2.0), 10.0, 0.0, torque, {}))
+        readings.append(found.plain())
+    lines = examine.lines(scene, "subject", {"version": "", "readings": readings})
+    assert lines[1].errors["torque"] == math.inf and math.isnan(lines[2].errors["torque"])
+    assert all(math.isnan(line.gap) for line in lines) and not any(line.order for line in lines)
+
+
 def test_the_page_is_written_and_names_what_is_not_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     line = examine.Line("MuJoCo", "4", "generated file", 157, {"torque": 1e-7, "F43": math.nan}, 1e-8, 0.01, 1.5)
     pytest.importorskip("jinja2")

@@ -95,7 +95,9 @@ def lines(scene: Scene, name: str, answer: dict[str, Any]) -> list[Line]:
         )
         before = made[-1] if made else None
         if before is not None and steps and before.steps and before.setting == line.setting:
-            line.order = math.log(before.errors["torque"] / found["torque"]) / math.log(steps / before.steps)
+            ratio = before.errors["torque"] / found["torque"] if found["torque"] else math.inf
+            if 0.0 < ratio < math.inf:  # one that diverged has none
+                line.order = math.log(ratio) / math.log(steps / before.steps)
         made.append(line)
     return made
 

@@ -60,7 +60,7 @@ class Readings:
             self.torque.append(float(now.torque))
         for name, force in now.forces.items():
             self.forces.setdefault(name, []).append((float(force[0]), float(force[1])))
-        self.gap = max(self.gap, gap(scene, theta))
+        self.gap = float(np.maximum(self.gap, gap(scene, theta)))  # NaN stays NaN
 
     def plain(self) -> dict[str, Any]:
         """For JSON."""
