@@ -11,11 +11,12 @@ from difflib import get_close_matches
 from pathlib import Path
 
 from fourbar.errors import DependencyError, InputError
+from validation.engines.witnesses import EXTRA
 from validation.regression.history import Run
 from validation.report.machine import PACKAGES
 from validation.run.elsewhere import Ended, ended
 
-MODULES = {name: name for name in ("mujoco", "pinocchio", "exudyn", "opensim")} | {"drake": "pydrake"}
+MODULES = {extra: module for module, extra in EXTRA.items() if extra != "exact"}
 """By engine: what must be importable, and which witnesses it is (`Witness.library`)."""
 LISTED = "Available versions:"
 """What pip's list begins with; the newest comes first."""
