@@ -58,7 +58,7 @@ IN_C = ("C", "C, vector math")
 OVER_POSITIONS = "all unknowns of a position, over the number of positions (1e6 at once at most)"
 OVER_LINKAGES = "all forces of a linkage at one position, over the number of linkages"
 SOLVED = 100_000
-"""Positions where every array is allocated, and for the error bars, which evaluate the forces 17 times."""
+"""Positions where every array is allocated, and for the error bars, which evaluate the forces 15 times."""
 PER_SCENE = 50_000
 """Positions in whose stead one random scene is judged: twenty of them by default."""
 JUDGED = "a scene judged by the exact engines"
