@@ -18,6 +18,10 @@ from validation.compare.answer import Array
 PINS = {"O2": (1, 2), "A": (2, 3), "B": (3, 4), "O4": (1, 4)}
 FIRST_PIN = {2: "O2", 3: "A", 4: "O4"}
 FORCE_AT = {"O2": "F12", "A": "F32", "B": "F43", "O4": "F14"}
+POINTS = {"A": "foot3", "O4": "foot4", "A2": "end2", "B": "end3", "B4": "end4", **{g: g for g in ("G2", "G3", "G4")}}
+"""By the name under which a point is answered, what `Part` calls it; A2 and B4 are the ends of bars 2 and 4."""
+ON_BARS = {"A": "end2", "B": "end4", "G2": "G2", "G3": "G3", "G4": "G4"}
+"""Points whose accelerations are answered, each as a point of a bar."""
 TELLS = 2.0**-53
 """A component of a direction below this is what the angle's own rounding leaves of zero."""
 SHARED = "the description, theta_2, omega_2, alpha_2 and the branch"

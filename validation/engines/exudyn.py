@@ -31,7 +31,7 @@ from fourbar.errors import LimitError
 from fourbar.linkage import MOVING_BARS, PIN_FORCE
 from fourbar.scene import Scene
 from validation.compare.answer import Array
-from validation.engines.description import about_first_pin, parts, unknown_effect
+from validation.engines.description import ON_BARS, POINTS, about_first_pin, parts, unknown_effect
 from validation.engines.exudyn_elements import ELEMENT_OF
 from validation.engines.loop import Exact
 from validation.engines.tree import Bars, Values
@@ -40,8 +40,6 @@ SIZE = 9
 """Coordinates, and constraints."""
 B_ROWS, OTHER_ROWS = [4, 5], [0, 1, 2, 3, 6, 7]
 """The rows of pin B and of the others among the constraints, which stand in the order of `JOINTS`, the drive last."""
-END = {2: "A2", 3: "B", 4: "B4"}
-"""The second pin of each bar as its own point."""
 JOINTS = {"O2": (1, 2), "A": (3, 2), "B": (4, 3), "O4": (1, 4)}
 """Of each pin the force is that on the second bar: F12, F32, F43, F14."""
 
@@ -65,8 +63,6 @@ class ExudynBars(Bars):
         self.ground_node = mbs.AddNode(NodePointGround())
         self.body = {1: mbs.AddObject(ObjectGround())}
         self.node: dict[int, Any] = {}
-        self.local = {"A": (3, (0.0, 0.0)), "O4": (4, (0.0, 0.0))}
-        """Points by name: their bar, and where they are in its axes, m."""
         self.part = {part.bar: part for part in parts(linkage)}
         for bar, part in self.part.items():
             self.node[bar] = mbs.AddNode(NodeRigidBody2D())
@@ -76,11 +72,11 @@ class ExudynBars(Bars):
                     mass=part.mass, inertia=about_pin, centerOfMass=part.centre, nodeNumber=self.node[bar]
                 )
             )
-            self.local |= {f"G{bar}": (bar, part.centre), END[bar]: (bar, part.points[f"end{bar}"])}
+        end = {bar: part.points[f"end{bar}"] for bar, part in self.part.items()}
         at = {
             "O2": ((0.0, 0.0), (0.0, 0.0)),
-            "A": ((0.0, 0.0), self.local["A2"][1]),
-            "B": (self.local["B4"][1], self.local["B"][1]),
+            "A": ((0.0, 0.0), end[2]),
+            "B": (end[4], end[3]),
             "O4": (self.part[4].foot, (0.0, 0.0)),
         }
         for pin, bars in JOINTS.items():
@@ -158,15 +154,15 @@ class ExudynBars(Bars):
         return math.remainder(self.q[self.turn[bar]], math.tau)
 
     def _output(self, kind: Any) -> dict[str, Array]:
-        """Position or acceleration of the points known by name."""
-        found = {
-            n: self.mbs.GetObjectOutputBody(self.body[bar], kind, [*at, 0.0]) for n, (bar, at) in self.local.items()
-        }
+        """Position or acceleration of the points of the parts."""
+        every = ((part.bar, name, [*at, 0.0]) for part in self.part.values() for name, at in part.points.items())
+        found = {name: self.mbs.GetObjectOutputBody(self.body[bar], kind, at) for bar, name, at in every}
         return {name: np.array(vector[:2]) for name, vector in found.items()}
 
     def positions(self) -> dict[str, Array]:
         """Points of the bars."""
-        return self._output(exu.OutputVariableType.Position)
+        at = self._output(exu.OutputVariableType.Position)
+        return {name: at[point] for name, point in POINTS.items()}
 
     def move(self, omega_2: float, alpha_2: float) -> Values:
         """Speeds, accelerations and multipliers; nothing where a toggle leaves them 0/0."""
@@ -177,13 +173,13 @@ class ExudynBars(Bars):
             self.state.SetODE2Coordinates_t(v)
             self.state.SetODE2Coordinates_tt(np.zeros(SIZE))
             at = self._output(exu.OutputVariableType.Acceleration)
-            drift = np.concatenate((np.zeros(2), at["A2"], at["B"] - at["B4"], np.zeros(3)))
+            drift = np.concatenate((np.zeros(2), at["end2"], at["end3"] - at["end4"], np.zeros(3)))
             a = np.linalg.solve(jacobian, drive * alpha_2 - drift)
         except np.linalg.LinAlgError:
             return {}
         self.state.SetODE2Coordinates_tt(a)
         at = self._output(exu.OutputVariableType.Acceleration)
-        values: Values = {f"a_{name}": at[name] for name in ("A", "B", "G2", "G3", "G4")}
+        values: Values = {f"a_{name}": at[point] for name, point in ON_BARS.items()}
         for bar in MOVING_BARS[1:]:
             values[f"omega_{bar}"], values[f"alpha_{bar}"] = float(v[self.turn[bar]]), float(a[self.turn[bar]])
         try:

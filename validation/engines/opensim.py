@@ -17,7 +17,7 @@ from fourbar.errors import LimitError
 from fourbar.linkage import MOVING_BARS
 from fourbar.scene import Scene
 from validation.compare.answer import Array
-from validation.engines.description import about_first_pin, parts, unknown_effect
+from validation.engines.description import ON_BARS, POINTS, about_first_pin, parts, unknown_effect
 from validation.engines.loop import Exact
 from validation.engines.opensim_elements import ELEMENT_OF, ZERO, constants, vec, vector
 from validation.engines.tree import Bars, Values
@@ -66,6 +66,7 @@ class OpenSimBars(Bars):
             about_z = osim.Inertia(*[part.inertia] * 3, *ZERO)
             self.body[bar] = osim.Body(f"bar{bar}", part.mass, vec(*part.centre), about_z)
             model.addBody(self.body[bar])
+        self.local = {name: (part.bar, at) for part in self.part.values() for name, at in part.points.items()}
         self.length = {bar: part.length for bar, part in self.part.items()}
         self.joint = {
             "O2": self._joint("O2", 1, ZERO, 2, ZERO),
@@ -131,22 +132,23 @@ class OpenSimBars(Bars):
         self.state.setQ(vector((theta_2, theta_4, theta_2 + of_3_to_2 - theta_4)))
         self.model.realizePosition(self.state)
 
-    def _station(self, bar: int, x: float = 0.0, y: float = 0.0) -> Array:
-        return np.array(self.body[bar].findStationLocationInGround(self.state, vec(x, y)).to_numpy()[:2])
+    def _station(self, name: str) -> Array:
+        bar, at = self.local[name]
+        return np.array(self.body[bar].findStationLocationInGround(self.state, vec(*at)).to_numpy()[:2])
 
     def gap(self) -> tuple[float, float]:
         """A on bar 2 minus A on bar 3, which opens as B would."""
-        x, y = (self._station(2, self.length[2]) - self._station(3)).tolist()
+        x, y = (self._station("end2") - self._station("foot3")).tolist()
         return x, y
 
     def jacobian(self) -> Array:
         """Derivative of the gap by the turns of bar 2, of bar 3 against bar 2, and of bar 4."""
-        by_own = self._station_jacobian(2, self.length[2]) - self._station_jacobian(3)
+        by_own = self._station_jacobian("end2") - self._station_jacobian("foot3")
         return np.column_stack((by_own[:, 0] + by_own[:, 2], by_own[:, 2], by_own[:, 1] - by_own[:, 2]))
 
-    def _station_jacobian(self, bar: int, x: float = 0.0, y: float = 0.0) -> Array:
-        matrix = osim.Matrix()
-        self.matter.calcStationJacobian(self.state, self.body[bar].getMobilizedBodyIndex(), vec(x, y), matrix)
+    def _station_jacobian(self, name: str) -> Array:
+        (bar, at), matrix = self.local[name], osim.Matrix()
+        self.matter.calcStationJacobian(self.state, self.body[bar].getMobilizedBodyIndex(), vec(*at), matrix)
         return np.array(matrix.to_numpy())[:2]
 
     def angle(self, bar: int) -> float:
@@ -158,9 +160,7 @@ class OpenSimBars(Bars):
 
     def positions(self) -> dict[str, Array]:
         """Points of the bars."""
-        where = {f"G{bar}": self._station(bar, *self.part[bar].centre) for bar in MOVING_BARS}
-        where |= {"A": self._station(3), "A2": self._station(2, self.length[2]), "O4": self._station(4)}
-        return where | {"B": self._station(3, self.length[3]), "B4": self._station(4, self.length[4])}
+        return {name: self._station(point) for name, point in POINTS.items()}
 
     def move(self, omega_2: float, alpha_2: float) -> Values:
         """Speeds and accelerations, pin forces and torque; nothing where a toggle leaves them 0/0."""
@@ -193,12 +193,10 @@ class OpenSimBars(Bars):
         for bar in (3, 4):
             values[f"omega_{bar}"] = self.velocity(bar)
             values[f"alpha_{bar}"] = float(PER_COORDINATE[bar] @ accelerations)
-        points = {"a_A": (2, self.length[2], 0.0), "a_B": (4, self.length[4], 0.0)}
-        points |= {f"a_G{bar}": (bar, *self.part[bar].centre) for bar in MOVING_BARS}
-        for name, (bar, x, y) in points.items():
-            index, station = self.body[bar].getMobilizedBodyIndex(), vec(x, y)
-            drift = self.matter.calcBiasForStationJacobian(self.state, index, station)
-            values[name] = self._station_jacobian(bar, x, y) @ accelerations + np.array(drift.to_numpy()[:2])
+        for name, point in ON_BARS.items():
+            bar, at = self.local[point]
+            drift = self.matter.calcBiasForStationJacobian(self.state, self.body[bar].getMobilizedBodyIndex(), vec(*at))
+            values[f"a_{name}"] = self._station_jacobian(point) @ accelerations + np.array(drift.to_numpy()[:2])
         return values
 
     def _forces(self, leverage: float) -> Values:

@@ -17,7 +17,7 @@ import numpy as np
 from fourbar.linkage import MOVING_BARS
 from fourbar.scene import Scene
 from validation.compare.answer import Array
-from validation.engines.description import FORCE_AT, turned, turned_by
+from validation.engines.description import FORCE_AT, ON_BARS, POINTS, turned, turned_by
 
 PASSES = 1000
 """Passes over pin loads and the friction they make; each lessens the error where the friction is unique."""
@@ -27,8 +27,6 @@ ROUNDED = 1e-11
 """Change, relative, at or below which one that no longer falls is rounding, near a pole of the torque too."""
 DIVERGED = 1e100
 """Load, N, that only passes running away from each other reach."""
-ON_BARS = {"A": "end2", "B": "end4", "G2": "G2", "G3": "G3", "G4": "G4"}
-"""Points whose accelerations are answered, each as a point of a bar."""
 Act = Callable[[], None]
 """What acts on a tree, at its present motion."""
 Values = dict[str, Array | float]
@@ -147,8 +145,7 @@ class Tree(Bars):
 
     def positions(self) -> dict[str, Array]:
         """Points of the bars."""
-        names = {"A": "foot3", "O4": "foot4", "B": "end3", "B4": "end4"}
-        return {name: np.array(self.point(names.get(name, name))) for name in (*names, "G2", "G3", "G4")}
+        return {name: np.array(self.point(point)) for name, point in POINTS.items() if name != "A2"}
 
     def angle(self, bar: int) -> float:
         """From the bar's axes; the ground's line as described."""
