@@ -13,6 +13,7 @@ import fourbar
 from fourbar.scene import Command, command
 from tests.test_cost import turning
 from validation.cli import status as ended
+from validation.compare.answer import Answer
 from validation.compare.rows import FAILS
 from validation.engines.mujoco.closed_loop import O2, ClosedLoop
 from validation.engines.mujoco.trial import Rig
@@ -91,6 +92,13 @@ def test_out_of_reach_is_reported_with_what_would_reach_it(tmp_path: Path, monke
     scene.write_text(fourbar.dump(SPECIMENS["law"]))
     result = CliRunner().invoke(advise.command, [str(scene), "--error", "1e-3"], standalone_mode=False)
     assert result.return_value == 1 and "motion law" in result.output
+
+
+def test_a_predicted_error_that_is_no_number_is_no_small_one() -> None:
+    values = {"torque": np.ones(2), "F12": np.ones((2, 2))}
+    predicted = {"torque": np.full(2, 1e-9), "F12": np.array([1e-9, np.nan])}
+    answer = Answer("", "", quantities=values, predicted=predicted)
+    assert dial.expected_error(turning(), answer) == math.inf
 
 
 @pytest.mark.parametrize("required", [0.0, 1.0, -1e-3, math.nan])

@@ -83,6 +83,17 @@ def test_bars_that_stay_parallel_are_charged_what_the_subtraction_lost_alone(num
     assert all(ratio <= TOO_SMALL for ratio in tally.too_small.values())
 
 
+def test_an_angle_without_a_value_is_beyond_what_is_allowed(monkeypatch: pytest.MonkeyPatch) -> None:
+    def lost(*arguments: object, **options: object) -> fourbar.Solution:
+        solution = fourbar.solve(*arguments, **options)  # type: ignore[arg-type]
+        solution.theta_3[:] = np.nan
+        return solution
+
+    monkeypatch.setattr("validation.stress.forward_error.judge.solve", lost)
+    tally = run("random", range(2))
+    assert tally.worst["theta_3"][0] == np.inf and tally.worst["theta_4"][0] <= 1.0 and not tally.held()
+
+
 def test_a_tally_adds_up() -> None:
     whole, parts = run("random", range(12)), Tally()
     for part in (range(5), range(5, 12)):

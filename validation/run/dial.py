@@ -113,5 +113,5 @@ def expected_error(scene: Scene, answer: Answer) -> float:
         if name == "torque" and scene.drive_bar != 2:
             known &= turning(answer.quantities[f"omega_{scene.drive_bar}"])
         if known.any() and sizes[known].max() > 0.0:
-            worst = max(worst, float(relative(predicted[known].max(), sizes[known].max())))
+            worst = float(np.maximum(worst, relative(predicted[known].max(), sizes[known].max())))  # NaN stays NaN
     return worst if np.isfinite(worst) else float("inf")

@@ -126,7 +126,7 @@ def _ratio(name: str, ours: float, value: Any, sensitivity: float) -> tuple[floa
     error = value - float(ours) if math.isfinite(ours) else math.inf
     size = abs(float(value.mid()))
     if name.startswith("theta"):
-        error, size = math.remainder(float(error), 2.0 * math.pi), 1.0
+        error, size = math.remainder(float(error), 2.0 * math.pi) if math.isfinite(ours) else error, 1.0
     wrong = abs(float(error)) if value.rad() < abs(error) else 0.0
     allowed = FACTOR * EPS * (size + sensitivity)
     return float(used(wrong, allowed)), wrong
