@@ -24,6 +24,9 @@ PIN_FORCE = dict(zip(PINS, PIN_FORCES, strict=True))
 FIRST_PIN = {2: "O2", 3: "A", 4: "O4"}
 NO_NUMBERS = (bool, str, bytes, complex)
 """What `float` may read all the same."""
+A_BRANCH = "must be +1 (open) or -1 (crossed)"
+MOST_STEPS = 100_000_000
+"""Intervals of any motion or curve."""
 
 
 def require(key: str, value: object, *, positive: bool = False, at_least_zero: bool = False) -> float:
