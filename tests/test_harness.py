@@ -108,6 +108,20 @@ def test_an_engine_that_breaks_down_costs_its_own_row_in_one_line() -> None:
     assert "\n" not in rows["all"].reason
 
 
+def test_a_basis_that_breaks_down_is_no_agreement(monkeypatch: pytest.MonkeyPatch) -> None:
+    """By the free bodies all are judged, also where they are no witness."""
+    others = [witness for witness in WITNESSES if witness.name == "mujoco-inverse"]
+
+    def broken(*_: object) -> Answer:
+        raise ArithmeticError("lost")
+
+    monkeypatch.setattr(FreeBody, "answer", broken)
+    failed = [row for row in judge("", crank_rocker(), others).rows if row.failed]
+    assert [(row.quantity, row.reason) for row in failed] == [
+        ("status", "the free bodies, by which it is judged, broke down")
+    ]
+
+
 def test_angles_are_compared_modulo_a_turn() -> None:
     assert rows_of(OneTurnMore)["theta_4"].verdict == AGREES
 

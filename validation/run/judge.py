@@ -71,6 +71,9 @@ def judge(name: str, scene: Scene, witnesses: Sequence[Witness] = WITNESSES, *, 
     basis = _basis(scene, free_body)
     if basis is not None and at.omega_2 is not None:
         record.rows.append(withheld(name, scene, record.solution, basis, *_by_exact_means(scene, at)))
+    elif basis is None and (free_body is None or free_body.refusal is None):
+        what = "the free bodies, by which it is judged, broke down"
+        record.rows.append(Row.unmeasured(name, FORMULAS, "exact", "status", FAILS, what))
     record.rows += printed(name, scene, at, record.solution, basis)
     record.jumps = reversals(scene, at, record.solution)
     stated, yardsticks = Stated(scene.linkage), Yardsticks()
