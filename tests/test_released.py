@@ -10,7 +10,7 @@ import pytest
 import fourbar
 from fourbar.scene import Scene
 from fourbar.solve import solve
-from validation.compare.rows import FAILS, Row
+from validation.compare.rows import FAILS, UNDECIDED, Row
 from validation.engines.loop import LimitWatch
 from validation.report.record import Record
 from validation.run import released as free
@@ -86,6 +86,13 @@ def test_an_engine_that_is_nan_before_it_fails_and_one_that_is_nan_behind_the_li
 def test_an_engine_that_meets_no_limit_fails(monkeypatch: pytest.MonkeyPatch) -> None:
     rows = answering(monkeypatch, lambda of: replace(of, stopped_at=None))
     assert [row.quantity for row in rows if row.verdict == FAILS] == ["stopped_at"]
+
+
+def test_an_engine_that_predicts_nothing_of_itself_is_undecided(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One that is wrong by 3 rad at its step and by 5 rad at twice it has no digit by which it could agree."""
+    off = iter([3.0, 5.0])
+    rows = answering(monkeypatch, lambda released: replace(released, theta_2=released.theta_2 + next(off)))
+    assert row(rows, "pinocchio-forward", "theta_2").verdict == UNDECIDED
 
 
 def test_formulas_that_stop_too_early_are_found(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -24,7 +24,7 @@ from validation.compare.basis import basis_of
 from validation.compare.compare import compare
 from validation.compare.error import in_own_unit, relative, worst
 from validation.compare.identities import FORMULAS
-from validation.compare.rows import AGREES, DEGRADED, FAILS, REFUSES, Row
+from validation.compare.rows import AGREES, DEGRADED, FAILS, REFUSES, UNDECIDED, Row
 from validation.compare.tolerance import DEGRADED as TIMES_PREDICTED
 from validation.compare.tolerance import EQUIVALENCE
 from validation.engines.witnesses import WITNESSES, Witness, not_installed, predicting_from
@@ -217,10 +217,12 @@ def _rows(record: Record, fine: Released, coarse: Released | None, truth: _Truth
         allowed = max(full, TIMES_PREDICTED * expected)
         if error[index] <= full:
             verdict, reason = AGREES, f"a free motion of {free.duration:g} s"
-        elif error[index] <= allowed and math.isfinite(expected):
-            verdict, reason = DEGRADED, f"{error[index]:.1e} of {expected:.1e} predicted from twice the step"
-        else:
+        elif not (error[index] <= allowed and math.isfinite(expected)):
             verdict, reason = FAILS, f"{error[index]:.1e} where {expected:.1e} was predicted"
+        elif expected >= 1.0:
+            verdict, reason = UNDECIDED, f"an error of {expected:.1e} of the value is predicted"
+        else:
+            verdict, reason = DEGRADED, f"{error[index]:.1e} of {expected:.1e} predicted from twice the step"
         rows.append(
             Row(
                 record.name,
