@@ -10,7 +10,7 @@ import pytest
 import fourbar
 from fourbar.scene import Scene
 from fourbar.solve import solve
-from validation.compare.rows import FAILS, UNDECIDED, Row
+from validation.compare.rows import DEGRADED, FAILS, UNDECIDED, Row
 from validation.engines.loop import LimitWatch
 from validation.report.record import Record
 from validation.run import released as free
@@ -86,6 +86,17 @@ def test_an_engine_that_is_nan_before_it_fails_and_one_that_is_nan_behind_the_li
 def test_an_engine_that_meets_no_limit_fails(monkeypatch: pytest.MonkeyPatch) -> None:
     rows = answering(monkeypatch, lambda of: replace(of, stopped_at=None))
     assert [row.quantity for row in rows if row.verdict == FAILS] == ["stopped_at"]
+
+
+def test_an_engine_is_run_at_twice_its_step_however_close_the_instants_are() -> None:
+    """Released from rest by a couple alone: kinetic energy and work are equal, and their difference is no scale."""
+    scene = replace(falling(), effects=(), loads=(fourbar.Load(4, moment=0.1),))
+    for steps in (20, 200):  # 10 and 1 ms apart
+        released = fourbar.Free(0.2, steps)
+        rows = judge("pushed", replace(scene, motion=replace(scene.motion, free=released))).rows
+        assert not any(row.failed for row in rows)
+        energy = row(rows, "mujoco-forward", "energy")
+        assert energy.verdict == DEGRADED and energy.error < 1e-3, energy
 
 
 def test_an_engine_that_predicts_nothing_of_itself_is_undecided(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -59,7 +59,9 @@ class Released:
     """(n,), rad, continuous."""
     omega_2: Array
     energy: Array
-    """Kinetic and potential energy, (n,), J."""
+    """Kinetic and potential energy less the work that was done, (n,), J."""
+    terms: Array
+    """Their magnitudes, summed, (n,), J."""
     stopped_at: float | None = None
     """When its bars 3 and 4 first came to lie in one line, s; None: they did not. It moves on."""
     refusal: str | None = None
@@ -68,4 +70,5 @@ class Released:
     @classmethod
     def refused(cls, engine: str, setting: str, reason: str) -> "Released":
         """No motion, and why."""
-        return cls(engine, setting, np.empty(0), np.empty(0), np.empty(0), refusal=reason)
+        none = np.empty(0)
+        return cls(engine, setting, none, none, none, none, refusal=reason)

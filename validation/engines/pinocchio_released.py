@@ -42,6 +42,7 @@ class PinocchioReleased:
                 q, v = step(lambda q, v: loop.acceleration(q, v, none), q, v, (t - now) / steps)
                 watch.look(now + taken * (t - now) / steps, q[0] + q[1], q[2])
             now = float(t)
-            rows.append((q[0], v[0], pin.computeMechanicalEnergy(tree.model, tree.data, q, v)))
-        theta_2, omega, energy = np.array(rows).T
-        return Released(NAME, setting, theta_2, omega, energy, watch.stopped_at)
+            energy, data = pin.computeMechanicalEnergy(tree.model, tree.data, q, v), tree.data
+            rows.append((q[0], v[0], energy, data.kinetic_energy + abs(data.potential_energy)))
+        theta_2, omega, energy, terms = np.array(rows).T
+        return Released(NAME, setting, theta_2, omega, energy, terms, watch.stopped_at)

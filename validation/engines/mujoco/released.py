@@ -57,9 +57,10 @@ class MujocoForward:
         for t in times:
             stepper.to(float(t), look)
             mujoco.mj_forward(loop.model, loop.data)
-            rows.append((loop.data.qpos[O2], loop.data.qvel[O2], loop.data.energy.sum() - work.done))
-        theta_2, omega, energy = np.array(rows).T
-        return Released(NAME, setting, theta_2, omega, energy, watch.stopped_at)
+            terms = np.array([*loop.data.energy, -work.done])
+            rows.append((loop.data.qpos[O2], loop.data.qvel[O2], terms.sum(), np.abs(terms).sum()))
+        theta_2, omega, energy, terms = np.array(rows).T
+        return Released(NAME, setting, theta_2, omega, energy, terms, watch.stopped_at)
 
 
 class _Work:
