@@ -238,6 +238,15 @@ def test_bars_without_mass_or_inertia(name: str) -> None:
                 assert found == []
 
 
+@each_engine
+def test_light_bars_are_held_or_refused(name: str) -> None:
+    """Below 2.2e-16 kg Pinocchio's sum of two inertias puts the mass centre elsewhere."""
+    linkage = with_bar(2, mass=0.2).linkage
+    light = {bar: replace(getattr(linkage, bar), mass=1e-18) for bar in ("input", "coupler", "output")}
+    case = Scene(replace(linkage, **light), Motion(np.linspace(0.1, 6.0, 6), 10.0, 3.0))
+    assert failures(name, case) == [] or (name == "mujoco-inverse" and failures(name, case)[0][0] == "refusal")
+
+
 def test_the_floor_of_mujoco_is_where_it_is_stated_to_be() -> None:
     d, a, b, c = MECHANISMS["crank-rocker"]
     case = Scene(FourBar(d, Bar(a, 1.0), Bar(b, 1.0), Bar(c, LEAST, LEAST)))

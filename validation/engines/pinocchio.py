@@ -29,10 +29,11 @@ class PinocchioTree(Tree):
         for part in parts(scene.linkage):
             joint = model.addJoint(self.joint[part.bearer], pin.JointModelRZ(), _at(*part.foot), FIRST_PIN[part.bar])
             self.joint[part.bar] = joint
-            inertia = pin.Inertia(part.mass, np.array([*part.centre, 0.0]), np.diag([0.0, 0.0, part.inertia]))
-            model.appendBodyToJoint(joint, inertia, pin.SE3.Identity())
+            # nothing is appended, no frame either: below 2.2e-16 kg the sum of two inertias has another mass centre
+            about_g = np.diag([0.0, 0.0, part.inertia])
+            model.inertias[joint] = pin.Inertia(part.mass, np.array([*part.centre, 0.0]), about_g)
             for name, at in part.points.items():
-                self.frame[name] = model.addFrame(pin.Frame(name, joint, 0, _at(*at), pin.FrameType.OP_FRAME))
+                self.frame[name] = model.addFrame(pin.Frame(name, joint, 0, _at(*at), pin.FrameType.OP_FRAME), False)
         self.data = data = model.createData()
         self.q = np.zeros(3)
         self.external = pin.StdVec_Force([pin.Force.Zero()] * model.njoints)
