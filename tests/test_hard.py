@@ -266,3 +266,9 @@ def test_the_file_as_shipped_is_driven_within_the_declared_limits_of_mujoco(name
     row = shipped(name, scene, fourbar.command(scene))
     assert row is not None
     assert (row.verdict, why is None or why in row.reason) == (AGREES if why is None else UNDECIDED, True)
+
+
+def test_the_file_of_an_input_that_starts_almost_at_rest_is_judged_by_the_speed_that_it_reaches() -> None:
+    scene = Scene(fourbar.uniform(0.3, 0.1, 0.25, 0.22), fourbar.Motion(fourbar.Sweep(0.1, 6.0, 4), 1e-9, 100.0))
+    row = shipped("quickening", scene, fourbar.command(scene))
+    assert row is not None and row.verdict == AGREES, row

@@ -22,7 +22,7 @@ is 1e-4 and less MuJoCo is not run."""
 STEPS = 200
 """A servo of two steps' time constant has brought the input to its speed to e^-100 by then."""
 SPEED = 100.0 * SIMULATED.factor
-"""Of omega_2: what loads and the closure make of it in as many steps, ten times what was measured."""
+"""Of the speed: what loads and the closure make of it in as many steps, ten times what was measured."""
 
 
 def shipped(name: str, scene: Scene, at: Command) -> Row | None:
@@ -65,7 +65,7 @@ def shipped(name: str, scene: Scene, at: Command) -> Row | None:
         return Row(name, NAME, "shipped", QUANTITY, error, 1.0, verdict, reason, float(d.qpos[O2]), 1.0)
     mujoco.mj_step(loop.model, d, STEPS)
     lost = d.time < 0.5 * STEPS * loop.model.opt.timestep
-    speed = math.inf if lost else abs(float(d.qvel[O2]) - moving) / (SPEED * abs(omega))
+    speed = math.inf if lost else abs(float(d.qvel[O2]) - moving) / (SPEED * max(abs(omega), abs(moving)))
     found.append((speed, f"after {STEPS} steps the input turns at {d.qvel[O2]:.6g} of {moving:.6g} rad/s"))
     error, reason = _worst(found)
     verdict = AGREES if error <= 1.0 else FAILS
