@@ -130,6 +130,13 @@ def test_every_engine_stops_where_the_spring_is_wound() -> None:
     assert [row for row in record.rows if row.failed] == [] and record.left_out == []
 
 
+def test_where_the_loop_closes_between_the_positions_alone_no_spring_begins() -> None:
+    scene = Scene(linkage("double rocker"), Motion([0.3, 2.6], 5.0), effects=(Torsion.at(B=(2.0, 0.3, 0.1)),))
+    record = judge("scene", scene)
+    assert record.solution is not None and set(record.solution.status) == {"not_assembled"}
+    assert [row for row in record.rows if row.failed] == []
+
+
 def test_a_free_motion_that_winds_a_spring_is_an_error() -> None:
     free = Motion(0.1, 12.0, free=Free(1.0, 100))
     weak = Torsion.at(O2=(1e-4, 0.0, 0.0))

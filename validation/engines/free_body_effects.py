@@ -208,12 +208,12 @@ def wound(scene: Scene, motion: Motion) -> NDArray[np.bool_] | None:
     steps = math.ceil(float(np.ptp(ends)) / FOLLOWED) + 1
     path = np.unique(np.concatenate((ends, np.linspace(ends.min(), ends.max(), steps))))
     closed = close(link, path, np.full(len(path), begins.branch[0]))
-    if not closed.assembled.any():
-        return gone
     path = path[closed.assembled]
+    if not (begun := np.isin(begins.theta_2, path)).any():
+        return gone
     theta = {1: np.full(len(path), link.ground_angle), 2: path}
     theta |= {bar: np.unwrap(closed.theta[bar - 3][closed.assembled]) for bar in (3, 4)}
-    start = begins.theta_2[np.isin(begins.theta_2, path)][0]
+    start = begins.theta_2[begun][0]
     first, here = int(np.searchsorted(path, start)), np.clip(np.searchsorted(path, motion.theta_2), 0, len(path) - 1)
     for pin, _, rest, _ in springs:
         i, j = PINS[pin]
