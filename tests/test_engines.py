@@ -357,6 +357,16 @@ def test_a_planted_fault_shows(name: str, monkeypatch: pytest.MonkeyPatch) -> No
     assert {"theta_3", "theta_4", "torque"} <= judged(name)
 
 
+@each_engine
+def test_a_position_before_leaves_nothing_behind(name: str) -> None:
+    fast = Scene(bars(MECHANISMS["crank-rocker"]), Motion(np.array([1.0, 2.0]), 3e4, 1e9))
+    whole, at = answered(name, fast).quantities, command(fast)
+    alone = answered(name, fast, at._replace(theta_2=at.theta_2[1:], branch=at.branch[1:])).quantities
+    for quantity in ("omega_3", "alpha_4", "F12", "F43", "torque"):
+        np.testing.assert_array_equal(whole[quantity][1:], alone[quantity], err_msg=quantity)
+        assert np.isfinite(alone[quantity]).all(), quantity
+
+
 def test_a_scene_before_leaves_nothing_behind() -> None:
     """MuJoCo keeps one memory for the trees of an engine."""
     linkage, at = bars(MECHANISMS["crank-rocker"]), Motion(np.linspace(0.0, 6.0, 5), 10.0, 3.0)

@@ -127,8 +127,10 @@ class OpenSimBars(Bars):
         return actuator
 
     def place(self, q: Sequence[float]) -> None:
-        """Angles of the bars as given."""
+        """Angles of the bars as given, at rest: Simbody forms its matrices by differences from the present motion."""
         theta_2, of_3_to_2, theta_4 = q
+        self.state.setTime(0.0)
+        self.state.setU(vector((0.0, 0.0, 0.0)))
         self.state.setQ(vector((theta_2, theta_4, theta_2 + of_3_to_2 - theta_4)))
         self.model.realizePosition(self.state)
 
