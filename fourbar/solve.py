@@ -116,6 +116,9 @@ def _refuse(at: Command) -> None:
         expect(f"at.{name}", value, np.ndarray)
         if value.ndim != 1 or value.shape != at.theta_2.shape or value.dtype.kind not in "iuf":
             raise InputError(f"at.{name}", value, "must be numbers, shape (n,), as many of theta_2 as of branch")
+    branch = at.branch
+    if not (branch.item() in (1, -1) if branch.size == 1 else (np.abs(branch) == 1).all()):
+        raise InputError("at.branch", branch, "must be +1 or -1 at each position")
     for name in ("alpha_2",) if at.omega_2 is None else ("omega_2", "alpha_2"):
         value = getattr(at, name)
         if isinstance(value, np.ndarray):
