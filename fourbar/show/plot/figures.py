@@ -228,7 +228,7 @@ def compose(
     )
     FigureCanvasAgg(figure)
     parts = figure.subfigures(len(views) if stacked else 1, 1 if stacked else len(views), squeeze=False).ravel()
-    labels = Labels([], [])
+    labels = Labels()
     for part, shown in zip(parts, views, strict=True):
         painter(part, shown, labels)
         heading = plain(scene.title, 90) or "Four-bar linkage"

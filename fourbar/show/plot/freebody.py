@@ -151,7 +151,7 @@ def _draw_one(
     axes.plot(
         [0.0, end[0]], [0.0, end[1]], color=BAR_COLOURS[bar], lw=5.0, alpha=0.45, solid_capstyle="round", zorder=2
     )
-    labels.keep_off(axes, (0.0, 0.0), end)
+    labels.keep_off(axes, (0.0, 0.0), end, width=5.0)
     for name, (x, y) in ((FIRST_PIN[bar], (0.0, 0.0)), (_second_pin(bar), end)):
         axes.plot([x], [y], "o", ms=5.5, mfc="white", mec=INK, mew=1.1, zorder=6)
         labels.add(

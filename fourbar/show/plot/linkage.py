@@ -64,7 +64,7 @@ def draw_linkage(axes: "Axes", view: View, labels: Labels, *, moving: bool = Fal
     for number, (start, stop) in ENDS.items():
         (x, y), colour = zip(where[start], where[stop], strict=True), BAR_COLOURS[number]
         axes.plot(x, y, color=colour, lw=4.5, solid_capstyle="round", zorder=4)
-        labels.keep_off(axes, where[start], where[stop])
+        labels.keep_off(axes, where[start], where[stop], width=4.5)
         labels.add(Label(axes, _bar_name(view, number), (0.5 * sum(x), 0.5 * sum(y)), middle, colour, 9.0, 2.0))
     for name, point in where.items():
         axes.plot(*[[v] for v in point], "o", ms=6.0, mfc="white", mec=INK, mew=1.2, zorder=6)
