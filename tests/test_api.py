@@ -26,7 +26,7 @@ DOCS = Path(__file__).parents[1] / "docs"
 def test_the_page_of_the_api_is_the_one_that_the_docstrings_make() -> None:
     written = (DOCS / "api.md").read_text(encoding="utf-8")
     assert written == runpy.run_path(str(DOCS / "api.py"))["text"](), "python docs/api.py"
-    assert all(f"\n## {name}\n" in written for name in dir(fourbar) if name != "__version__")
+    assert all(f"\n### {name}\n" in written for name in dir(fourbar) if name != "__version__")
 
 
 def test_dir_shows_what_there_is_and_nothing_else() -> None:
