@@ -54,11 +54,19 @@ def waiting(scene: "Scene") -> Iterator[None]:
 
 
 def loaded(path: Path) -> "Scene":
-    """The scene of a file; InputError where it has more positions than can be printed."""
+    """The scene of a file; InputError where it cannot be printed, or not to the file of -o.
+
+    The output is looked at before anything is solved, which may take minutes.
+    """
     from fourbar.files import load
     from fourbar.scene.motion import Free, Sweep
+    from fourbar.writing import require_file
 
-    scene = load(path)
+    scene, out = load(path), click.get_current_context().params.get("out")
+    if out is not None:
+        require_file(out)
+        if out.exists() and out.samefile(path):
+            raise InputError("--out", str(out), "is the scene itself, which would be lost")
     for key, described in (("motion.theta_2", scene.motion.theta_2), ("motion.free", scene.motion.free)):
         if isinstance(described, (Sweep, Free)) and described.steps >= MOST_POSITIONS:
             raise InputError(f"{key}.steps", described.steps, f"must be below {MOST_POSITIONS} here", str(path))
