@@ -23,12 +23,14 @@ def naming(path: Path) -> Iterator[None]:
         raise
 
 
-def require_file(target: Path) -> None:
-    """InputError for what can name no file: a folder, or one in a folder that does not exist."""
+def require_file(target: Path, *read: Path) -> None:
+    """InputError for what can name no output: a folder, a file in a folder that does not exist, one that is read."""
     if target.is_dir() or "\0" in str(target):
         raise InputError("path", str(target), "must name a file, not a folder")
     if not target.parent.is_dir():
         raise InputError("path", str(target), f"there is no such folder: {target.parent}")
+    if any(target.exists() and file.exists() and target.samefile(file) for file in read):
+        raise InputError("path", str(target), "is read here, and would be lost")
 
 
 def write_bytes(path: str | Path, data: bytes) -> None:

@@ -363,7 +363,7 @@ def test_a_full_disk_leaves_the_old_file(run: Fourbar, monkeypatch: pytest.Monke
 
 
 @pytest.mark.parametrize(
-    ("out", "why"), [("no/out", "no such folder"), (".", "a file, not a folder"), ("a.toml", "is the scene itself")]
+    ("out", "why"), [("no/out", "no such folder"), (".", "a file, not a folder"), ("a.toml", "is read here")]
 )
 @pytest.mark.parametrize("command", ["analyze", "mjcf"])
 def test_an_output_that_cannot_be_is_refused_before_anything_is_solved(

@@ -64,9 +64,7 @@ def loaded(path: Path) -> "Scene":
 
     scene, out = load(path), click.get_current_context().params.get("out")
     if out is not None:
-        require_file(out)
-        if out.exists() and out.samefile(path):
-            raise InputError("--out", str(out), "is the scene itself, which would be lost")
+        require_file(out, path)
     for key, described in (("motion.theta_2", scene.motion.theta_2), ("motion.free", scene.motion.free)):
         if isinstance(described, (Sweep, Free)) and described.steps >= MOST_POSITIONS:
             raise InputError(f"{key}.steps", described.steps, f"must be below {MOST_POSITIONS} here", str(path))
