@@ -54,10 +54,12 @@ class Labels:
 
     def settle(self, figure: "Figure") -> None:
         """Place every label once the layout is final: the first free spot, nearest first."""
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+        renderer = FigureCanvasAgg(figure).get_renderer()  # type: ignore[no-untyped-call]
         figure.draw_without_rendering()
         figure.set_layout_engine("none")  # labels must not move what they were measured against
         per_point = figure.dpi / 72.0
-        renderer = figure.canvas.get_renderer()  # type: ignore[attr-defined]
         taken: list[tuple[Axes, Box]] = []
         samples: dict[int, list[np.ndarray]] = {}
         for axes, points, width in self.lines:

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fourbar.linkage import MOVING_BARS
+from fourbar.linkage import ENDS, MOVING_BARS
 from fourbar.show.acting import acting
 from fourbar.show.plot import symbols
 from fourbar.show.plot.labels import Label, Labels
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 Point = tuple[float, float]
 POINT = "#8A3B78"
 """Of the scene's own points."""
-ENDS = {2: ("O2", "A"), 3: ("A", "B"), 4: ("O4", "B")}
 
 
 def pins(view: View) -> dict[str, Point]:
@@ -210,7 +209,7 @@ def draw_coupler_curves(axes: "Axes", view: View, labels: Labels) -> None:
     for name, point in where.items():
         axes.plot([factor * point[0]], [factor * point[1]], "o", ms=4.5, mfc="white", mec=INK, mew=1.0, zorder=5)
         if name in ("O2", "O4"):
-            labels.add(Label(axes, f"$O_{name[1]}$", (factor * point[0], factor * point[1]), (0.0, 1e9), INK, 8.5, 2.0))
+            labels.add(Label(axes, pin_name(name), (factor * point[0], factor * point[1]), (0.0, 1e9), INK, 8.5, 2.0))
     labels.keep_off(axes, *[(factor * where[k][0], factor * where[k][1]) for k in ("O2", "A", "B", "O4")])
     axes.set_aspect("equal", adjustable="datalim")
     axes.set_xlabel(f"$x$ ({unit})")

@@ -59,11 +59,9 @@ def draw(curves: Mapping[str, Sequence[Point]], title: str, folder: Path) -> lis
 
 
 def _work_precision(curves: Mapping[str, Sequence[Point]], quantity: str, title: str) -> Any:
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(9.6, 6.4))
-    FigureCanvasAgg(figure)
     axes, labels = figure.add_axes((0.085, 0.1, 0.885, 0.735)), Labels()
     points = [point for name, row in curves.items() for point in row if "slow" not in name]
     front = pareto([p for p in points if p.kind == STEPPED], quantity)
