@@ -18,9 +18,8 @@ from fourbar.scene.motion import FromLimit
 from fourbar.scene.start import started
 from fourbar.solution import Array, Solution, unwrap
 from fourbar.solve import BLOCK, arrays, each, evaluation, is_compiled, keep, positions_at_once, requested, solved
-from fourbar.studies.keys import entries, placed, refusal
+from fourbar.studies.keys import THETA_2, entries, placed, refusal
 
-THETA_2 = "motion.theta_2"
 LENGTHS = tuple(f"lengths.{name}" for name in ("ground", "input", "coupler", "output", "ground_angle"))
 NEAR_A_CHANGE_POINT = 1e-12
 """Relative to the sum of the lengths, squared: who is not so near has no change point, whatever rounding does."""

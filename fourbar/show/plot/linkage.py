@@ -26,9 +26,7 @@ POINT = "#8A3B78"
 
 def pins(view: View) -> dict[str, Point]:
     """The four pins at the position drawn, m."""
-    linkage, state = view.scene.linkage, view.state()
-    A, B = state.foot(3), state.point(4, linkage.output.length)
-    return {name: components(point) for name, point in (("O2", 0.0j), ("A", A), ("B", B), ("O4", state.foot(4)))}
+    return {name: components(pin) for name, pin in place_of(view.scene.linkage, view.here, 0, 1.0).pins.items()}
 
 
 def components(vector: Any) -> Point:
@@ -39,8 +37,8 @@ def components(vector: Any) -> Point:
 
 def centres(view: View) -> dict[int, Point]:
     """The mass centres of the bars that have mass, m."""
-    bars, state = zip(MOVING_BARS, view.scene.linkage.moving, strict=True), view.state()
-    return {number: components(state.point(number, bar.to_centre)) for number, bar in bars if bar.mass > 0.0}
+    massive = (bar for bar in MOVING_BARS if view.scene.linkage.bar(bar).mass > 0.0)
+    return {bar: tuple(getattr(view.here, f"G{bar}")[0].tolist()) for bar in massive}
 
 
 def draw_linkage(axes: "Axes", view: View, labels: Labels, *, moving: bool = False) -> None:
