@@ -26,6 +26,9 @@ ENDS = {2: ("O2", "A"), 3: ("A", "B"), 4: ("O4", "B")}
 FIRST_PIN = {bar: first for bar, (first, _) in ENDS.items()}
 NO_NUMBERS = (bool, str, bytes, complex)
 """What `float` may read all the same."""
+A_BRANCH = "must be +1 (open) or -1 (crossed)"
+MOST_STEPS = 100_000_000
+"""Intervals of any motion or curve."""
 
 
 def require(key: str, value: object, *, positive: bool = False, at_least_zero: bool = False) -> float:

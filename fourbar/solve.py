@@ -209,7 +209,7 @@ def requested(
         if not isinstance(stage, str) or stage not in STAGES:
             raise InputError("stage", stage, "must be one of " + ", ".join(STAGES))
         wanted = STAGES.index(stage)
-        names = _names(wanted, _absent(scene), tuple([point.name for point in scene.points]))
+        names = _names(wanted, _absent(scene), tuple(point.name for point in scene.points))
     else:
         expect("out", out, Mapping)
         names = out.keys()
@@ -344,7 +344,7 @@ def _alone(
         return None
     vectors = table.view(float).reshape(-1, 1, 2)
     scalars = vectors[:, :, 0]
-    return {name: (scalars if KIND.get(name) == "scalar" else vectors)[i] for i, name in enumerate(values)}
+    return {name: (scalars if is_scalar(name) else vectors)[i] for i, name in enumerate(values)}
 
 
 def _released(scene: Scene) -> "FreeMotion":

@@ -16,12 +16,8 @@ AT_REST = 50.0 * 2.0**-52
 
 def bodies(linkage: FourBar, effects: Iterable[Any] = ()) -> Bodies:
     """Of bars 2, 3, 4 of a linkage, with the inertia that effects (a flywheel) add."""
-    two, three, four = linkage.moving
-    carried: Bodies = (
-        Body(two.mass, two.moment_of_inertia, two.to_centre),
-        Body(three.mass, three.moment_of_inertia, three.to_centre),
-        Body(four.mass, four.moment_of_inertia, four.to_centre),
-    )
+    two, three, four = (Body(bar.mass, bar.moment_of_inertia, bar.to_centre) for bar in linkage.moving)
+    carried: Bodies = (two, three, four)
     for effect in effects:
         carried = effect.carried_by(carried)
     return carried
@@ -57,19 +53,19 @@ class Actions:
         arm : from the bar's first pin to where it acts, complex, m, world axes.
         """
         if bar != 1:
-            force = force if self.rounded is None else self.rounded(force)
+            force = self._rounded(force)
             self.forces[bar] = self.forces[bar] + force if bar in self.forces else force
             self.moment(bar, cross(arm, force))
 
     def moment(self, bar: int, moment: Number) -> None:
         """A pure couple on a bar, N m; on the ground it does nothing."""
         if bar != 1:
-            moment = moment if self.rounded is None else self.rounded(moment)
+            moment = self._rounded(moment)
             self.moments[bar] = self.moments[bar] + moment if bar in self.moments else moment
 
     def couple(self, pin: str, couple: Number) -> None:
         """A couple on the second of the two bars that meet at a pin, and its opposite on the first, N m."""
-        couple = couple if self.rounded is None else self.rounded(couple)
+        couple = self._rounded(couple)
         self.couples[pin] = self.couples[pin] + couple if pin in self.couples else couple
 
     def work(self) -> tuple[Number, Number]:
@@ -126,3 +122,6 @@ class Actions:
                 if i != 1:
                     M[i - 2] = M[i - 2] - couple
         return Wrenches(R[0], R[1], R[2], M[0], M[1], M[2], self.couples.get("B", 0.0))
+
+    def _rounded(self, term: Number) -> Number:
+        return term if self.rounded is None else self.rounded(term)

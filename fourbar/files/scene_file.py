@@ -19,7 +19,7 @@ from fourbar.files.effects import REGISTRY
 from fourbar.files.fields import BARE_KEY, Reader
 from fourbar.files.pictures import Picture
 from fourbar.files.scene_text import BARS, BRANCHES, dump, save
-from fourbar.linkage import BAR_NAMES, Bar, FourBar
+from fourbar.linkage import BAR_NAMES, MOST_STEPS, Bar, FourBar
 from fourbar.scene import Scene
 from fourbar.scene.motion import DEFAULT_STEPS, Free, FromLimit, Motion, Sweep
 from fourbar.scene.motion_law import ENDS, Law
@@ -30,8 +30,6 @@ __all__ = ["dump", "load", "loads", "read_text", "save"]
 
 LARGEST_FILE = 500_000
 """Bytes; a scene takes about a thousand."""
-MOST_STEPS = 100_000_000
-"""The bound that Sweep and Free hold."""
 MOST_DOTS = 100
 """In one line: the time that the TOML reader takes grows with the square of a dotted key's parts."""
 LONGEST_LINE = 60

@@ -134,6 +134,28 @@ def rates(k: Coefficients, speed: Number, acceleration: Number) -> Rates:
     return Rates(k.h2 * speed, k.h3 * speed, k.h4 * speed, alpha_2, alpha_3, alpha_4)
 
 
+class Frame(NamedTuple):
+    """A bar's frame at its first pin as it moves; arms r from that pin are complex, m, in world axes."""
+
+    u: Number
+    """e^{i theta}, which turns an arm of the frame into the world's axes."""
+    pin: Number
+    """The first pin, complex, m; its velocity, m/s; its acceleration, m/s^2."""
+    v_pin: Number
+    a_pin: Number
+    i_omega: Number
+    turn: Number
+    """i alpha - omega^2, 1/s^2."""
+
+    def velocity(self, r: Number) -> Number:
+        """Of the end of an arm, m/s: v_pin + i omega r."""
+        return self.v_pin + self.i_omega * r
+
+    def acceleration(self, r: Number) -> Number:
+        """Of the end of an arm, m/s^2: a_pin + (i alpha - omega^2) r."""
+        return self.a_pin + self.turn * r
+
+
 class State(NamedTuple):
     """One position of a linkage, or many that broadcast, and how it moves: what loads and effects act on."""
 
@@ -162,16 +184,20 @@ class State(NamedTuple):
         """Angular acceleration of bar 1, 2, 3 or 4, rad/s^2."""
         return 0.0 if bar == 1 else self.moving[bar + 1]
 
-    def turn(self, bar: int) -> Number:
-        """i alpha - omega^2 of bar 1, 2, 3 or 4, 1/s^2: what an arm is multiplied by for its acceleration."""
-        omega = self.omega(bar)
-        return vector(-omega * omega, self.alpha(bar))
-
     def foot(self, bar: int) -> Number:
         """First pin of a bar, complex, m: O2 of bars 1 and 2, A of bar 3, O4 of bar 4."""
         if bar == 3:
             return self.lengths.a * self.at.u2
         return self.lengths.d * self.at.u1 if bar == 4 else 0.0
+
+    def frame(self, bar: int) -> Frame:
+        """Of bar 1, 2, 3 or 4: the pins O2, O4 of the others rest, the coupler's moves with bar 2."""
+        pin, v_pin, a_pin = self.foot(bar), 0.0, 0.0
+        if bar == 3:
+            of_2 = self.frame(2)
+            v_pin, a_pin = of_2.velocity(pin), of_2.acceleration(pin)
+        omega = self.omega(bar)
+        return Frame(self.direction(bar), pin, v_pin, a_pin, 1j * omega, vector(-omega * omega, self.alpha(bar)))
 
     def point(self, bar: int, z: Number) -> Number:
         """The point z of a bar's frame at its first pin (complex: along + i across), m."""
@@ -183,14 +209,14 @@ class State(NamedTuple):
         return own + (1j * self.k.h2) * self.foot(3) if bar == 3 else own
 
     def velocity(self, bar: int, z: Number) -> Number:
-        """Its velocity, m/s: v_pin + i omega r."""
-        own = (1j * self.omega(bar)) * (z * self.direction(bar))
-        return own + (1j * self.omega(2)) * self.foot(3) if bar == 3 else own
+        """Its velocity, m/s."""
+        frame = self.frame(bar)
+        return frame.velocity(z * frame.u)
 
     def acceleration(self, bar: int, z: Number) -> Number:
-        """Its acceleration, m/s^2: a_pin + (i alpha - omega^2) r."""
-        own = self.turn(bar) * (z * self.direction(bar))
-        return own + self.turn(2) * self.foot(3) if bar == 3 else own
+        """Its acceleration, m/s^2."""
+        frame = self.frame(bar)
+        return frame.acceleration(z * frame.u)
 
     def slip(self, pin: str) -> tuple[Number, Number]:
         """Of the bars i, j that meet at a pin: h_j - h_i and its derivative by the independent angle."""

@@ -16,10 +16,7 @@ from fourbar.formulas.circuits import circuits
 from fourbar.formulas.mobility import TURN, Array, change_points, on_smooth_path, turns_fully
 from fourbar.formulas.motion import State
 from fourbar.formulas.path import state
-from fourbar.linkage import FourBar, require, require_bar, require_numbers, require_whole
-
-MOST_STEPS = 100_000_000
-SIGN = "must be +1 (open) or -1 (crossed)"
+from fourbar.linkage import A_BRANCH, MOST_STEPS, FourBar, require, require_bar, require_numbers, require_whole
 
 
 class PointCoefficients(NamedTuple):
@@ -120,7 +117,7 @@ def coupler_curve(
     found = circuits(linkage)
     point = complex(require("r_along", r_along), require("r_across", r_across))
     circuit = require_whole("circuit", circuit, range(len(found)), f"must be from 0 to {len(found) - 1}")
-    branch = require_whole("branch", branch, (1, -1), SIGN)
+    branch = require_whole("branch", branch, (1, -1), A_BRANCH)
     steps = require_whole("steps", steps, range(4, MOST_STEPS + 1, 4), f"must be a multiple of 4 up to {MOST_STEPS}")
     (start, stop), branches = found[circuit]
     branch = branch if branch in branches else branches[0]
@@ -144,7 +141,7 @@ def coupler_curve(
 def _state(linkage: FourBar, theta_2: object, branch: object) -> State:
     """Of positions as a user gives them."""
     expect("linkage", linkage, FourBar)
-    angles, signs = require_numbers("theta_2", theta_2), require_numbers("branch", branch, SIGN)
+    angles, signs = require_numbers("theta_2", theta_2), require_numbers("branch", branch, A_BRANCH)
     if not (np.abs(signs) == 1.0).all() or signs.shape not in ((), angles.shape):
-        raise InputError("branch", branch, f"{SIGN}, or one of them for each angle")
+        raise InputError("branch", branch, f"{A_BRANCH}, or one of them for each angle")
     return state(linkage, angles, signs)

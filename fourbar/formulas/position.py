@@ -119,7 +119,7 @@ def close_loop(lengths: Loop, u1: Number, u2: Number, half: HalfAngle, branch: N
     u1, u2 : e^{i theta_1} and e^{i theta_2}.
     half : of theta_2 - theta_1.
     branch : +1 (B lies left of the diagonal from A to O4) or -1.
-    unit : of the lengths, m, where it is another than that of the diagonal found.
+    unit : of the lengths, m; the diagonal is found in m.
 
     >>> lengths, theta_2 = loop(100, 40, 120, 80), np.radians(40)  # mm; Norton, example 4-1
     >>> at = close_loop(lengths, 1.0, direction(theta_2), half_angle(lengths, theta_2), 1)

@@ -135,7 +135,7 @@ def looped(case: Case, theta_2: Array, branch: Any, omega_2: Any, alpha_2: Any, 
 
 
 def evaluated(case: Case, where: Command, part: Part, wanted: int, names: KeysView[str]) -> Evaluated:
-    """The same through the compiled loop; what it leaves open as of `commanded`."""
+    """Some positions of a command through the compiled loop, and through `commanded` what it leaves open."""
     theta_2, branch = where.theta_2[part], sign_of(where.branch[part])
     omega_2, alpha_2 = piece(where.omega_2, part), piece(where.alpha_2, part)
     found = looped(case, theta_2, branch, omega_2, alpha_2, error_bars=wanted == ERROR)

@@ -1,4 +1,4 @@
-"""Positions of a case evaluated stage by stage: by NumPy, by the compiled loop, along a free motion."""
+"""Positions of a case evaluated stage by stage, of a command or along a free motion."""
 
 from collections.abc import Callable, Iterable, KeysView
 from typing import TYPE_CHECKING, Any
@@ -187,9 +187,9 @@ OF_BARS: dict[str, Callable[[State], Any]] = {
     "alpha_3": lambda state: state.moving.alpha_3,
     "alpha_4": lambda state: state.moving.alpha_4,
 }
-
-
+"""The scalars before the forces."""
 PLACES = frozenset(start + name for start in OF_POINTS for name in ("A", "B", "G2", "G3", "G4"))
+"""The vectors before the forces, of the linkage's own points."""
 
 
 def kinematics(case: Case, state: State, wanted: KeysView[str]) -> dict[str, Any]:
@@ -206,16 +206,13 @@ def kinematics(case: Case, state: State, wanted: KeysView[str]) -> dict[str, Any
     for name, bar, z in case.points:
         places.setdefault(bar, []).append((name, z))
     for bar, of_bar in places.items():
-        u, foot, i_omega, turn = state.direction(bar), state.foot(bar), 1j * state.omega(bar), state.turn(bar)
-        v_foot = a_foot = 0.0
-        if bar == 3:
-            v_foot, a_foot = 1j * state.omega(2) * foot, state.turn(2) * foot
+        frame = state.frame(bar)
         for name, z in of_bar:
-            r = z * u
+            r = z * frame.u
             if name in wanted:
-                values[name] = foot + r
+                values[name] = frame.pin + r
             if (velocity := f"v_{name}") in wanted:
-                values[velocity] = v_foot + i_omega * r
+                values[velocity] = frame.velocity(r)
             if (acceleration := f"a_{name}") in wanted:
-                values[acceleration] = a_foot + turn * r
+                values[acceleration] = frame.acceleration(r)
     return values

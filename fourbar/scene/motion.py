@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fourbar.errors import InputError, expect
-from fourbar.linkage import require, require_numbers, require_whole
+from fourbar.linkage import A_BRANCH, require, require_numbers, require_whole
 from fourbar.scene.motion_law import STEPS, Law
 from fourbar.solution import Array
 
@@ -104,7 +104,7 @@ class Motion:
         expect("motion.free", self.free, Free, type(None))
         expect("motion.law", self.law, Law, type(None))
         if self.branch not in (OPEN, CROSSED):
-            raise InputError("motion.branch", self.branch, "must be +1 (open) or -1 (crossed)")
+            raise InputError("motion.branch", self.branch, A_BRANCH)
         given = (self.free, self.theta_2, self.omega_2, self.alpha_2 or None)
         if self.law is not None and any(value is not None for value in given):
             raise InputError("motion.law", self.law.ends, "stands alone: it gives theta_2, omega_2 and alpha_2")

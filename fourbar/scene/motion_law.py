@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 
 from fourbar.errors import DependencyError, InputError, expect, installing
-from fourbar.linkage import require_numbers, require_whole
+from fourbar.linkage import MOST_STEPS, require_numbers, require_whole
 from fourbar.solution import Array
 
 ENDS = {"free": "not-a-knot", "rest": "clamped", "periodic": "periodic"}
@@ -14,7 +14,7 @@ ENDS = {"free": "not-a-knot", "rest": "clamped", "periodic": "periodic"}
 LEAST = {"free": 4, "rest": 2, "periodic": 3}
 """Points that determine the cubic pieces."""
 MOST_POINTS = 100_000
-STEPS = (range(1, 100_000_001), "must be a whole number from 1 to 100 000 000")
+STEPS = (range(1, MOST_STEPS + 1), f"must be a whole number from 1 to {MOST_STEPS}")
 """Intervals of any motion."""
 
 

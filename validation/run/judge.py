@@ -167,8 +167,11 @@ def _basis(scene: Scene, free_body: Answer | None) -> Solution | None:
 
     Without them each answer is measured by itself.
     """
-    with np.errstate(all="ignore"):
-        return None if free_body is None else basis_of(scene, free_body)
+    try:
+        with np.errstate(all="ignore"):
+            return None if free_body is None else basis_of(scene, free_body)
+    except ArithmeticError:
+        return None
 
 
 def _by_exact_means(scene: Scene, at: Command) -> tuple[OfSome | None, OfSome]:
