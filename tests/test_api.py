@@ -258,5 +258,5 @@ def test_a_command_on_no_branch_is_refused(wrong: float) -> None:
     scene = fourbar.Scene(fourbar.uniform(0.3, 0.1, 0.25, 0.22), fourbar.Motion(np.array([0.1, 0.2]), 10.0))
     at = fourbar.command(scene)
     for row in (np.array([wrong]), np.array([1, wrong])):
-        with pytest.raises(fourbar.InputError, match=r"at\.branch = .*\+1 or -1"):
+        with pytest.raises(fourbar.InputError, match=r"at\.branch = .*must be \+1"):
             fourbar.solve(scene, at=at._replace(theta_2=at.theta_2[: len(row)], branch=row))

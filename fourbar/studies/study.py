@@ -12,12 +12,12 @@ from fourbar.formulas.mobility import on_smooth_path
 from fourbar.formulas.position import loop
 from fourbar.quantities import ANGLES, INVALID
 from fourbar.scene import Command, Scene, command
-from fourbar.scene.case import Case
+from fourbar.scene.case import BLOCK, Case
 from fourbar.scene.evaluation import FORCE
 from fourbar.scene.motion import FromLimit
 from fourbar.scene.start import started
 from fourbar.solution import Array, Solution, unwrap
-from fourbar.solve import BLOCK, arrays, each, evaluation, is_compiled, keep, positions_at_once, requested, solved
+from fourbar.solve import arrays, each, evaluation, is_compiled, keep, positions_at_once, requested, solved
 from fourbar.studies.keys import THETA_2, entries, placed, refusal
 
 LENGTHS = tuple(f"lengths.{name}" for name in ("ground", "input", "coupler", "output", "ground_angle"))
