@@ -20,7 +20,7 @@ MOST_POSITIONS = 1_000_000
 scene_argument = click.argument("scene", type=click.Path(path_type=Path))
 out_option = click.option("-o", "--out", type=click.Path(path_type=Path), required=True, metavar="FILE")
 or_out_option = click.option(
-    "-o", "--out", type=click.Path(path_type=Path), metavar="FILE", help="Write there instead."
+    "-o", "--out", type=click.Path(path_type=Path), metavar="FILE", help="Write it to FILE instead of printing it."
 )
 units_option = click.option(
     "--units", default="SI", metavar="UNITS", help='"imperial", or a list like "mm N.mm deg"; left out: SI.'

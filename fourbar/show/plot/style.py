@@ -158,7 +158,7 @@ def unit_for(largest: float, unit: str, units: Conversion = SI) -> tuple[float, 
 
 
 def length_unit(largest: float, units: Conversion = SI) -> tuple[float, str]:
-    """Lengths in the unit stated, else in m, or in mm or µm where they are small."""
+    """Lengths in the unit stated, else in km, m, mm or µm by the largest."""
     if "m" in units:
         return unit_for(largest, "m", units)
     for size, unit in ((1e3, "km"), (1.0, "m"), (1e-3, "mm")):
