@@ -62,7 +62,7 @@ def row(name: str, of: str, what: str) -> str:
     return "| " + " | ".join(cell.replace("|", "\\|") for cell in (f"`{name}`", f"`{of}`", what)) + " |"
 
 
-def entry(name: str, thing: Any, level: str = "##") -> str:
+def entry(name: str, thing: Any, level: str = "###") -> str:
     """Heading, signature, docstring and fields of one name."""
     text = inspect.getdoc(thing) or ""
     parts = [f"{level} {name}"]
@@ -73,7 +73,7 @@ def entry(name: str, thing: Any, level: str = "##") -> str:
         rows = [row(*each) for each in fields(thing)]
         if rows:
             parts.append("\n".join(["| field | type | what |", "|---|---|---|", *rows]))
-    parts += [entry(f"{name}.{method}", getattr(thing, method), "###") for method in METHODS.get(name, ())]
+    parts += [entry(f"{name}.{method}", getattr(thing, method), "####") for method in METHODS.get(name, ())]
     return "\n\n".join(parts)
 
 
@@ -94,9 +94,9 @@ def text() -> str:
     names = [name for name in dir(fourbar) if name != "__version__"]
     functions = [name for name in names if not inspect.isclass(getattr(fourbar, name))]
     classes = [name for name in names if name not in functions]
-    parts = [HEAD, "# Functions", *(entry(name, getattr(fourbar, name)) for name in functions)]
-    parts += ["# What they return", *(entry(name, kind) for name, kind in results(functions, names).items())]
-    parts += ["# Descriptions, results and errors", *(entry(name, getattr(fourbar, name)) for name in classes)]
+    parts = [HEAD, "## Functions", *(entry(name, getattr(fourbar, name)) for name in functions)]
+    parts += ["## What they return", *(entry(name, kind) for name, kind in results(functions, names).items())]
+    parts += ["## Descriptions, results and errors", *(entry(name, getattr(fourbar, name)) for name in classes)]
     return "\n\n".join(part.strip() for part in parts) + "\n"
 
 

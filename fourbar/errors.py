@@ -108,7 +108,7 @@ def run(group: "click.Group", program: str, arguments: list[str] | None = None) 
     except ModuleNotFoundError as error:
         return _say(f"{error.name} is not installed: {installing('all')}", BROKEN)
     except OSError as error:
-        return _say(f"{error.filename or 'output'}: {error.strerror}", BROKEN)
+        return _say(f"{error.filename or 'output'}: {error.strerror or error}", BROKEN)
     except Exception as error:
         if "--traceback" in given or os.environ.get("FOURBAR_TRACEBACK"):
             raise

@@ -21,7 +21,9 @@ MOVING_BARS = (2, 3, 4)
 PINS = {"O2": (1, 2), "A": (2, 3), "B": (3, 4), "O4": (1, 4)}
 PIN_FORCE = dict(zip(PINS, PIN_FORCES, strict=True))
 """The independent force of each pin."""
-FIRST_PIN = {2: "O2", 3: "A", 4: "O4"}
+ENDS = {2: ("O2", "A"), 3: ("A", "B"), 4: ("O4", "B")}
+"""The pins at both ends of each moving bar, that which it is measured from first."""
+FIRST_PIN = {bar: first for bar, (first, _) in ENDS.items()}
 NO_NUMBERS = (bool, str, bytes, complex)
 """What `float` may read all the same."""
 A_BRANCH = "must be +1 (open) or -1 (crossed)"

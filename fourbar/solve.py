@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.errors import DependencyError, InputError, expect, installing
-from fourbar.linkage import require, require_whole
+from fourbar.linkage import A_BRANCH, require, require_whole
 from fourbar.quantities import ANGLES, OF_DRY_FRICTION, OF_PIN_LOADS, QUANTITIES, STAGE_OF, STAGES
 from fourbar.scene import Command, Scene, command
-from fourbar.scene.case import Case, Evaluated
+from fourbar.scene.case import BLOCK, Case, Evaluated
 from fourbar.scene.evaluation import ERROR, FORCE, Part, commanded, freely
 from fourbar.scene.point import OF_POINTS
 from fourbar.scene.start import refuse_wound, with_start
@@ -25,10 +25,6 @@ from fourbar.solution import Array, Solution, unwrap
 if TYPE_CHECKING:
     from fourbar.free_motion import FreeMotion
 
-
-BLOCK = 8000
-"""Positions evaluated at a time, measured: fewer pay for calls, more leave the cache; and of 8192 an array of complex
-numbers is a little more than the C library hands out again without asking the system for fresh pages."""
 
 WORTH_COMPILING = 2_000_000
 """Evaluations of the forces, one a position, with error bars fourteen: loading numba and the loop costs as much."""
@@ -116,6 +112,9 @@ def _refuse(at: Command) -> None:
         expect(f"at.{name}", value, np.ndarray)
         if value.ndim != 1 or value.shape != at.theta_2.shape or value.dtype.kind not in "iuf":
             raise InputError(f"at.{name}", value, "must be numbers, shape (n,), as many of theta_2 as of branch")
+    branch = at.branch
+    if not (branch.item() in (1, -1) if branch.size == 1 else (np.abs(branch) == 1).all()):
+        raise InputError("at.branch", branch, f"{A_BRANCH} at each position")
     for name in ("alpha_2",) if at.omega_2 is None else ("omega_2", "alpha_2"):
         value = getattr(at, name)
         if isinstance(value, np.ndarray):

@@ -23,17 +23,23 @@ def naming(path: Path) -> Iterator[None]:
         raise
 
 
+def require_file(target: Path, *read: Path) -> None:
+    """InputError for what can name no output: a folder, a file in a folder that does not exist, one that is read."""
+    if target.is_dir() or "\0" in str(target):
+        raise InputError("path", str(target), "must name a file, not a folder")
+    if not target.parent.is_dir():
+        raise InputError("path", str(target), f"there is no such folder: {target.parent}")
+    if any(target.exists() and file.exists() and target.samefile(file) for file in read):
+        raise InputError("path", str(target), "is read here, and would be lost")
+
+
 def write_bytes(path: str | Path, data: bytes) -> None:
     """Write a file whole; on any failure the old file, or none, stays.
 
-    Raises InputError for what can name no file (a folder, one in a folder that does not exist), OSError for what fails
-    otherwise (full disk, read-only folder).
+    Raises InputError as `require_file` does, OSError for what fails otherwise (full disk, read-only folder).
     """
     target = Path(path)
-    if target.is_dir() or "\0" in str(target):
-        raise InputError("path", str(path), "must name a file, not a folder")
-    if not target.parent.is_dir():
-        raise InputError("path", str(path), f"there is no such folder: {target.parent}")
+    require_file(target)
     if target.exists() and not target.is_file():
         # a device or pipe is written to; renaming onto it would replace /dev/null itself
         with naming(target), target.open("wb") as file:

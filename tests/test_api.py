@@ -26,7 +26,7 @@ DOCS = Path(__file__).parents[1] / "docs"
 def test_the_page_of_the_api_is_the_one_that_the_docstrings_make() -> None:
     written = (DOCS / "api.md").read_text(encoding="utf-8")
     assert written == runpy.run_path(str(DOCS / "api.py"))["text"](), "python docs/api.py"
-    assert all(f"\n## {name}\n" in written for name in dir(fourbar) if name != "__version__")
+    assert all(f"\n### {name}\n" in written for name in dir(fourbar) if name != "__version__")
 
 
 def test_dir_shows_what_there_is_and_nothing_else() -> None:
@@ -251,3 +251,12 @@ def test_loads_without_a_speed_are_pointed_to_the_static_torque(
     bare = fourbar.FourBar(0.3, fourbar.Bar(0.1), fourbar.Bar(0.25), fourbar.Bar(0.22))
     save(fourbar.Scene(bare, fourbar.Motion(1.0)), tmp_path / "bare.toml")
     assert status(["analyze", str(tmp_path / "bare.toml")]) == 0 and hint not in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("wrong", [0, 2, -1.5, np.nan])
+def test_a_command_on_no_branch_is_refused(wrong: float) -> None:
+    scene = fourbar.Scene(fourbar.uniform(0.3, 0.1, 0.25, 0.22), fourbar.Motion(np.array([0.1, 0.2]), 10.0))
+    at = fourbar.command(scene)
+    for row in (np.array([wrong]), np.array([1, wrong])):
+        with pytest.raises(fourbar.InputError, match=r"at\.branch = .*must be \+1"):
+            fourbar.solve(scene, at=at._replace(theta_2=at.theta_2[: len(row)], branch=row))

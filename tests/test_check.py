@@ -340,6 +340,12 @@ PUBLISHED = {
 """The thesis's section 5.7 at theta_2 = 135 deg, N and N cm, digits as printed."""
 
 
+def test_a_number_at_the_end_of_the_range_differs_without_a_warning(tmp_path: Path) -> None:
+    path = tmp_path / "theirs.csv"
+    path.write_text("theta_2,torque\n1e308,1e308\n")
+    assert status(["check", str(MODELS / "crank_rocker.toml"), str(path)]) == FAILED
+
+
 def test_the_thesis_itself_differs_and_its_unit_slip_is_hinted(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -21,6 +21,7 @@ from fourbar.cli import group, status
 from fourbar.errors import BAD_INPUT, BROKEN, HOLDS, INTERRUPTED, DependencyError
 from fourbar.files import load, save
 from fourbar.quantities import UNITS, VECTORS
+from fourbar.scene.case import Case
 from fourbar.show import tables
 from tests.scenes import crank_rocker, thesis
 
@@ -361,10 +362,19 @@ def test_a_full_disk_leaves_the_old_file(run: Fourbar, monkeypatch: pytest.Monke
     assert [(path.name, path.read_text()) for path in tmp_path.iterdir()] == [("out", "old")]
 
 
-@pytest.mark.parametrize(("out", "why"), [("no/out", "no such folder"), (".", "a file, not a folder")])
-def test_a_name_that_no_file_can_have_is_bad_input(run: Fourbar, out: str, why: str, tmp_path: Path) -> None:
-    code, _, err = run("analyze", MODELS / "thesis.toml", "-o", tmp_path / out)
-    assert code == BAD_INPUT and err.startswith("error: path = ") and why in err and err.count("\n") == 1
+@pytest.mark.parametrize(
+    ("out", "why"), [("no/out", "no such folder"), (".", "a file, not a folder"), ("a.toml", "is read here")]
+)
+@pytest.mark.parametrize("command", ["analyze", "mjcf"])
+def test_an_output_that_cannot_be_is_refused_before_anything_is_solved(
+    run: Fourbar, command: str, out: str, why: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(Case, "of", None)
+    text = (MODELS / "thesis.toml").read_text()
+    (tmp_path / "a.toml").write_text(text)
+    code, _, err = run(command, tmp_path / "a.toml", "-o", tmp_path / out)
+    assert code == BAD_INPUT and why in err and err.count("\n") == 1
+    assert [(path.name, path.read_text()) for path in tmp_path.iterdir()] == [("a.toml", text)]
 
 
 def test_a_device_is_written_to_and_stays_one(run: Fourbar, tmp_path: Path) -> None:

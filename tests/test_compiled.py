@@ -130,6 +130,6 @@ def test_a_place_that_cannot_be_written_costs_only_time(monkeypatch: pytest.Monk
         return "compiled without a cache"
 
     monkeypatch.setattr(numba, "njit", njit)
-    assert compiled.loop.__wrapped__(False) == "compiled without a cache"
+    assert compiled.loop.__wrapped__(compiled.run, False) == "compiled without a cache"
     monkeypatch.setattr(compiled, "loop", compiled.loop.__wrapped__)
-    assert compiled.loop(True) == "compiled without a cache"
+    assert compiled.loop(compiled.run) == "compiled without a cache"

@@ -5,6 +5,7 @@ import math
 import re
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import combinations
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,7 @@ from click.testing import CliRunner
 import fourbar
 from fourbar.mjcf import Settings
 from fourbar.scene import command
+from fourbar.show.plot.style import matplotlib_style
 from tests.scenes import crank_rocker, thesis
 from validation.engines.mujoco import drives
 from validation.engines.mujoco.one_state import MujocoOneState
@@ -310,6 +312,21 @@ def test_the_scatter_of_timings_is_that_of_their_middle_half() -> None:
     assert middle == 2.0 and scatter == pytest.approx(0.5 * (2.2 - 1.8) / 2.0)
     lines = front_lines({"c": [point(10, 1e-2), replace(point(20, 1e-3), scatter=math.nan)]})
     assert lines[1].endswith("3 %  c: 10/rev") and lines[2].endswith("0.02     -  c: 20/rev")
+
+
+def test_names_in_a_picture_cover_no_other_and_are_not_cut() -> None:
+    near = {"kind": "exact", "torque": 1e-12, "seconds_per_revolution": 0.3}
+    curves = {
+        "inverse": [replace(point(1, 1e-12), setting=name, **near) for name in ("pinocchio-inverse", "mujoco-inverse")],
+        "one state": [replace(point(1, 1e-12), setting="one state, extrapolated", dial=0.0, **near)],
+        "Euler": [replace(point(20, 0.2), setting=pictures.DEFAULT, seconds_per_revolution=0.3)],
+        "recommended": [replace(point(20 * 2**k, 1e-3 / 8**k), setting="tc = 20 h") for k in range(4)],
+    }
+    with matplotlib_style():
+        figure = pictures._work_precision(curves, "torque", "title")
+    boxes = [text.get_window_extent() for text in figure.axes[0].texts]
+    assert len(boxes) == 7 and not any(one.overlaps(other) for one, other in combinations(boxes, 2))
+    assert all(figure.bbox.x0 <= box.x0 <= box.x1 <= figure.bbox.x1 for box in boxes)
 
 
 def test_statement_of_a_picture() -> None:

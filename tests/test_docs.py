@@ -22,6 +22,7 @@ from fourbar.files import load
 from fourbar.files.effects import REGISTRY
 from validation.cli import COMMANDS, group
 from validation.scenes.suites import suite_file
+from validation.studies.effects.work import EFFECTS
 
 ROOT = Path(__file__).parent.parent
 DOCS = ROOT / "docs"
@@ -115,15 +116,29 @@ def test_every_other_command_line_is_one_that_its_program_takes(page: Path) -> N
             command.make_context(words[1], words[2:])
 
 
-@pytest.mark.parametrize("name", ["commands.md", "checks.md", "results-format.md"])
-def test_every_option_that_a_page_names_is_one(name: str) -> None:
-    known = set()
+def options() -> list[set[str]]:
+    """The names of each option of each command, its short one among them."""
+    found = []
     for program in GROUPS.values():
         context = click.Context(program)
         for command in (program, *(program.get_command(context, each) for each in program.list_commands(context))):
             assert command is not None
-            known |= {option for param in command.params for option in (*param.opts, *param.secondary_opts)}
-    assert set(re.findall(r"(?<![\w-])--[a-z][a-z-]*", read(f"docs/{name}"))) <= known
+            found += [{*param.opts, *param.secondary_opts} for param in command.params]
+    return found
+
+
+@pytest.mark.parametrize("name", ["commands.md", "checks.md", "results-format.md"])
+def test_every_option_that_a_page_names_is_one(name: str) -> None:
+    assert set(re.findall(r"(?<![\w-])--[a-z][a-z-]*", read(f"docs/{name}"))) <= set().union(*options())
+
+
+def test_every_out_has_its_short_name() -> None:
+    named = [names for names in options() if "--out" in names]
+    assert len(named) > 15 and all("-o" in names for names in named)
+
+
+def test_every_effect_whose_cost_is_counted_can_be_chosen_from_a_list() -> None:
+    assert not any("," in name for name in EFFECTS)
 
 
 def test_every_command_of_the_harness_is_listed() -> None:
@@ -144,7 +159,8 @@ def test_the_index_lists_every_page_for_readers_and_for_the_site() -> None:
     pages = {page.relative_to(DOCS).as_posix() for page in PAGES[1:]} - {"index.md"}
     assert pages == set(re.findall(r"\]\(([^)]+\.md)\)", text))
     (tree,) = blocks(r"\{toctree\}", text)
-    assert pages == {f"{line}.md" for line in tree.splitlines() if not line.startswith(":")}
+    lines = [line for line in tree.splitlines() if not line.startswith(":")]
+    assert pages == {re.sub(r".* <(.*)>", r"\1", line) + ".md" for line in lines}
 
 
 def test_the_gallery_is_a_suite_with_pictures_and_sources() -> None:

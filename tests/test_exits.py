@@ -58,6 +58,22 @@ def leaving() -> click.Group:
 
 
 @pytest.mark.parametrize(
+    "command",
+    ["check {0} {1} --json {1}", "check {0} {1} --junit {0}", "advise {0} --error 1e-3 -o {0}", "run {0} --junit {0}"],
+)
+def test_no_command_writes_over_what_it_reads(
+    command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    texts = {"scene.toml": Path(MODEL).read_text(), "theirs.csv": "theta_2,torque\n1.0,0.2\n"}
+    for name, text in texts.items():
+        Path(name).write_text(text)
+    assert validation.cli.status(command.format(*texts).split()) == BAD_INPUT
+    assert "is read here, and would be lost" in capsys.readouterr().err
+    assert {path.name: path.read_text() for path in tmp_path.iterdir()} == texts
+
+
+@pytest.mark.parametrize(
     ("group", "status"),
     [
         (returning(None), HOLDS),
@@ -76,6 +92,7 @@ def leaving() -> click.Group:
         (raising(DependencyError("no such library")), BROKEN),
         (raising(ModuleNotFoundError("No module named 'x'", name="x")), BROKEN),
         (raising(OSError(28, "No space left on device")), BROKEN),
+        (raising(OSError("without a number")), BROKEN),
         (raising(BrokenPipeError(32, "Broken pipe")), BROKEN),  # of a worker: standard output is whole
         (leaving(), HOLDS),
         (raising(RuntimeError("a bug")), BROKEN),
@@ -91,8 +108,10 @@ def test_every_end_has_its_status(
     monkeypatch.setattr(sys, "stderr", sys.stderr)
     assert run(group, "program", ["go"]) == status
     printed = capsys.readouterr().err.strip()
-    assert "\n" not in printed and bool(printed) == (
-        status in (BROKEN, INTERRUPTED) or "must be" in printed or "such" in printed
+    assert (
+        "\n" not in printed
+        and "None" not in printed
+        and bool(printed) == (status in (BROKEN, INTERRUPTED) or "must be" in printed or "such" in printed)
     )
 
 

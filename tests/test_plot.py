@@ -101,6 +101,17 @@ def test_every_figure_draws_both_branches_and_no_texts_overlap(name: str) -> Non
         assert not clashes(figure)
 
 
+def test_no_text_stands_on_a_bar() -> None:
+    scene = fourbar.load(Path(__file__).parents[1] / "models" / "gallery" / "hoecken.toml")
+    with matplotlib_style():
+        figure = compose(scene, FIGURES["linkage"][0], (5.6, 5.2), None, "one", dimensions=True)
+    (axes,) = figure.axes
+    bars = [line.get_path().transformed(axes.transData) for line in axes.lines if line.get_linewidth() > 4.0]
+    boxes = [text.get_window_extent().padded(2.25 * figure.dpi / 72.0) for text in axes.texts]
+    assert len(bars) == 3 and len(boxes) > 8
+    assert not any(bar.intersects_bbox(box, filled=False) for bar in bars for box in boxes)
+
+
 def test_every_axis_of_theta_2_is_in_degrees_and_every_axis_has_a_unit() -> None:
     figure = composed(CRANK_ROCKER, "overview")
     flat = [axes for axes in figure.axes if axes.name == "rectilinear"]

@@ -20,7 +20,7 @@ MOST_POSITIONS = 1_000_000
 scene_argument = click.argument("scene", type=click.Path(path_type=Path))
 out_option = click.option("-o", "--out", type=click.Path(path_type=Path), required=True, metavar="FILE")
 or_out_option = click.option(
-    "-o", "--out", type=click.Path(path_type=Path), metavar="FILE", help="Write there instead."
+    "-o", "--out", type=click.Path(path_type=Path), metavar="FILE", help="Write it to FILE instead of printing it."
 )
 units_option = click.option(
     "--units", default="SI", metavar="UNITS", help='"imperial", or a list like "mm N.mm deg"; left out: SI.'
@@ -54,11 +54,17 @@ def waiting(scene: "Scene") -> Iterator[None]:
 
 
 def loaded(path: Path) -> "Scene":
-    """The scene of a file; InputError where it has more positions than can be printed."""
+    """The scene of a file; InputError where it cannot be printed, or not to the file of -o.
+
+    The output is looked at before anything is solved, which may take minutes.
+    """
     from fourbar.files import load
     from fourbar.scene.motion import Free, Sweep
+    from fourbar.writing import require_file
 
-    scene = load(path)
+    scene, out = load(path), click.get_current_context().params.get("out")
+    if out is not None:
+        require_file(out, path)
     for key, described in (("motion.theta_2", scene.motion.theta_2), ("motion.free", scene.motion.free)):
         if isinstance(described, (Sweep, Free)) and described.steps >= MOST_POSITIONS:
             raise InputError(f"{key}.steps", described.steps, f"must be below {MOST_POSITIONS} here", str(path))

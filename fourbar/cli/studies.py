@@ -18,14 +18,14 @@ def tolerance(scene: Path, samples: int | None, seed: int, as_json: bool, out: P
     """What the [tolerances] of a scene do to torque, pin forces and points, and which dimension does it."""
     from fourbar.show import tolerances as shown
     from fourbar.show.plot import draw_tolerances, format_of
-    from fourbar.show.progress import share_done
+    from fourbar.show.progress import running
     from fourbar.show.tables import under_heading
     from fourbar.studies.spread import SAMPLES, tolerances
 
     if out is not None:
         format_of(out)
     stated = loaded(scene)
-    with named(scene), share_done("samples are solved") as progress:
+    with named(scene), running("samples are solved") as progress:
         found = tolerances(stated, SAMPLES if samples is None else samples, seed, progress=progress)
     if (found.without == found.samples).all():
         raise NotAssembledError(f"{scene}: motion.theta_2: the linkage assembles at none of the positions")

@@ -1,6 +1,5 @@
 """Scene -> MJCF text: the closed loop, a drive at omega_2 and alpha_2, and a keyframe to start from."""
 
-import cmath
 import math
 from dataclasses import replace
 from typing import NamedTuple
@@ -181,26 +180,6 @@ class Start(NamedTuple):
     qpos: tuple[float, float, float]
     qvel: tuple[float, float, float]
     run: Run
-
-
-class Standing(NamedTuple):
-    """The assembled linkage as bodies in the plane, for files that hold neither speeds nor a drive."""
-
-    turn: dict[int, float]
-    """Angle of each bar, 1 to 4, that of the ground 0, rad."""
-    foot: dict[int, complex]
-    """First pin of each bar, m."""
-    numbers: tuple[float, ...]
-    """theta_2, theta_3, theta_4, and the speeds of joints O2, A, O4."""
-
-
-def standing(scene: Scene, start: Start | None) -> Standing:
-    """The linkage in the state given, or that of `at_start`."""
-    (theta_2, of_3_to_2, theta_4), speeds = (start or at_start(scene))[:2]
-    linkage, theta_3 = scene.linkage, theta_2 + of_3_to_2
-    foot = {1: 0j, 2: 0j, 3: cmath.rect(linkage.input.length, theta_2)}
-    foot[4] = cmath.rect(linkage.ground, linkage.ground_angle)
-    return Standing({1: 0.0, 2: theta_2, 3: theta_3, 4: theta_4}, foot, (theta_2, theta_3, theta_4, *speeds))
 
 
 def run_through(theta_2: Array, omega: float, alpha: float) -> Run:

@@ -4,12 +4,14 @@ from xml.etree import ElementTree as ET
 
 from fourbar.errors import LimitError
 from fourbar.linkage import BAR_NAMES, FIRST_PIN, MOVING_BARS
-from fourbar.mjcf.document import Start, plain, standing
-from fourbar.mjcf.model import carriable, text
+from fourbar.mjcf.document import Start, plain
+from fourbar.mjcf.model import text
+from fourbar.mjcf.standing import PARENT, standing
 from fourbar.scene import Scene
 
-PARENT = {2: 1, 3: 2, 4: 1}
-"""The bar that carries each bar's first pin."""
+DAMPING = {"viscous": ("damping", "coefficients")}
+AT_JOINTS = {"gazebo": {**DAMPING, "friction": ("friction", "torques")}, "drake": DAMPING}
+"""What a joint holds, by effect: its element, and the field of the effect."""
 DRAKE = "http://drake.mit.edu"
 """Namespace of the elements that only Drake reads."""
 COMMENT = (
@@ -50,12 +52,9 @@ def sdf(scene: Scene, reader: str = "gazebo", start: Start | None = None) -> str
     Source: sdformat.org/spec, and Drake's documentation of its parser.
     """
     linkage = scene.linkage
-    if scene.motion.law is not None:
-        raise LimitError("a motion law has no counterpart in SDF")
-    carriable(linkage)
-    inertia = {number: linkage.bar(number).moment_of_inertia for number in MOVING_BARS}
-    gravity, dynamics = _acting(scene, reader, inertia)
-    turn, foot, numbers = standing(scene, start)
+    turn, foot, numbers, inertia, gravity, dynamics = standing(scene, start, f"SDF for {reader}", AT_JOINTS[reader])
+    if reader == "drake" and "B" in dynamics:
+        raise LimitError("Drake's ball constraint at pin B has no damping")
     omega_2, at_A, omega_4 = numbers[3:]
     root = ET.Element("sdf", {"version": "1.9", **({"xmlns:drake": DRAKE} if reader == "drake" else {})})
     at_B = f", joint B {omega_2 + at_A - omega_4!r} rad/s" if reader == "gazebo" else ""
@@ -82,31 +81,6 @@ def sdf(scene: Scene, reader: str = "gazebo", start: Start | None = None) -> str
             ET.SubElement(ball, f"drake:ball_constraint_{key}").text = text(length, 0.0, 0.0)
     ET.indent(root)
     return ET.tostring(root, encoding="unicode") + "\n"
-
-
-def _acting(
-    scene: Scene, reader: str, inertia: dict[int, float]
-) -> tuple[tuple[float, float], dict[str, dict[str, float]]]:
-    """Gravity, and damping and friction of each joint; what a flywheel adds goes into `inertia`."""
-    gravity, dynamics = (0.0, 0.0), dict[str, dict[str, float]]()
-    if scene.loads:
-        raise LimitError("a load has no counterpart in SDF; apply it in the simulator and leave it out of the scene")
-    at_joints = {"viscous": ("damping", "coefficients"), "friction": ("friction", "torques")}
-    for effect in scene.effects:
-        if effect.key == "gravity":
-            x, y = effect.vector  # type: ignore[attr-defined]
-            gravity = (float(x), float(y))
-        elif effect.key == "flywheel":
-            inertia[effect.bar] += effect.inertia  # type: ignore[attr-defined]
-        elif effect.key in at_joints and (effect.key == "viscous" or reader == "gazebo"):
-            key, numbers = at_joints[effect.key]
-            for pin, value in getattr(effect, numbers):
-                if pin == "B" and reader == "drake":
-                    raise LimitError("Drake's ball constraint at pin B has no damping")
-                dynamics.setdefault(pin, {})[key] = value
-        else:
-            raise LimitError(f"the effect {effect.key!r} has no counterpart in SDF for {reader}")
-    return gravity, dynamics
 
 
 def _link(

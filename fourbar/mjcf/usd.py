@@ -3,11 +3,9 @@
 import json
 import math
 
-from fourbar.errors import LimitError
 from fourbar.linkage import BAR_NAMES, FIRST_PIN, MOVING_BARS
-from fourbar.mjcf.document import Start, plain, standing
-from fourbar.mjcf.model import carriable
-from fourbar.mjcf.sdf import PARENT
+from fourbar.mjcf.document import Start, plain
+from fourbar.mjcf.standing import PARENT, standing
 from fourbar.scene import Scene
 
 COMMENT = (
@@ -37,19 +35,7 @@ def usd(scene: Scene, start: Start | None = None) -> str:
     Source: openusd.org, UsdPhysics.
     """
     linkage = scene.linkage
-    if scene.motion.law is not None or scene.loads:
-        raise LimitError("a motion law and a load have no counterpart in USD; apply them in the simulator")
-    carriable(linkage)
-    inertia = {number: linkage.bar(number).moment_of_inertia for number in MOVING_BARS}
-    x = y = 0.0
-    for effect in scene.effects:
-        if effect.key == "gravity":
-            x, y = map(float, effect.vector)  # type: ignore[attr-defined]
-        elif effect.key == "flywheel":
-            inertia[effect.bar] += effect.inertia  # type: ignore[attr-defined]
-        else:
-            raise LimitError(f"the effect {effect.key!r} has no counterpart in USD")
-    turn, foot, numbers = standing(scene, start)
+    turn, foot, numbers, inertia, (x, y), _ = standing(scene, start, "USD", {})
     pull = math.hypot(x, y)
     bodies = []
     for number in MOVING_BARS:

@@ -24,6 +24,10 @@ if TYPE_CHECKING:
     from fourbar.effects import Effect
 
 
+BLOCK = 8000
+"""Positions evaluated at a time, measured: fewer pay for calls, more leave the cache; and of 8192 an array of complex
+numbers is a little more than the C library hands out again without asking the system for fresh pages."""
+
 U = 2.0**-53
 """Unit round-off of a double."""
 UNDECIDED = 32.0 * U

@@ -1,8 +1,10 @@
-"""The functions of formulas/ compiled by numba as they stand, and the loop over the positions that calls them.
+"""The functions of formulas/ compiled by numba as they stand, and the loops over the positions that call them.
 
-The loop carries loads (in both frames, over a table too), gravity, viscous pins and flywheels, with the drive on any
-bar. Positions that it leaves open (those that need many digits, singular, not assembled, beyond the range of doubles)
-are evaluated by NumPy, as is every scene with other effects or with two pairs of equal bars.
+The loops carry loads (in both frames, over a table too), gravity, viscous pins and flywheels, with the drive on any
+bar. Positions that they leave open (those that need many digits, singular, not assembled, beyond the range of doubles)
+are evaluated by NumPy, as is every scene with other effects or with two pairs of equal bars. Arrays are one after the
+other in few places whose distances the compiler knows: it then evaluates as many positions at once as the processor's
+vectors hold, with the same roundings.
 """
 
 import zlib
@@ -18,11 +20,11 @@ from fourbar.formulas.motion import Coefficients, Rates, coefficients, rates, wi
 from fourbar.formulas.path import NO_DIGIT_LEFT, drive_sine_of_triangle
 from fourbar.formulas.pin_forces import Body, PinForces, Wrenches, coupler_about_B, inertia_wrenches
 from fourbar.formulas.pin_forces import pin_forces as pin_forces_of
-from fourbar.formulas.position import Loop, Position, close_loop, direction_of_tangent, half_angle_of_tangent
+from fourbar.formulas.position import HalfAngle, Loop, Position, close_loop, direction_of_tangent, half_angle_of_tangent
 from fourbar.formulas.torque import driving_torque, half_slope, inertia
 from fourbar.scene import case as cases
 from fourbar.scene import error_bars as bars
-from fourbar.scene.case import undecided
+from fourbar.scene.case import BLOCK, undecided
 from fourbar.scene.error_bars import (
     EVALUATIONS,
     bar,
@@ -43,7 +45,7 @@ SMALL, LARGE = 1e-130, 1e130
 
 def number(rows: Any, row: int, i: int) -> Any:
     """Of position i."""
-    return rows[row, i] if isinstance(rows, np.ndarray) else rows[row]
+    return rows[row * BLOCK + i] if isinstance(rows, np.ndarray) else rows[row]
 
 
 def complex_rounded(z: Any, turned: Any, signs: Any, first: int) -> Any:
@@ -150,19 +152,47 @@ def thirteen(signs: Any, first: int) -> Any:
     )
 
 
+def lengths_of(rows: Any, i: int) -> tuple[Loop, Loop]:
+    """The lengths in m, and in their unit with E1 and E2."""
+    in_unit = Loop(
+        *(number(rows, 0, i), number(rows, 1, i), number(rows, 2, i), number(rows, 3, i)),
+        *(number(rows, 4, i), number(rows, 5, i)),
+    )
+    return Loop(number(rows, 6, i), number(rows, 7, i), number(rows, 8, i), number(rows, 9, i), 0.0, 0.0), in_unit
+
+
+def directions_of(in_unit: Loop, rows: Any, i: int, tangent: Any, of_theta_2: Any) -> tuple[Any, Any, Any, HalfAngle]:
+    """u1, u2, whether the ground is turned, and the half angle, from the tangents as of `run`."""
+    u1, half = vector(number(rows, 10, i), number(rows, 11, i)), half_angle_of_tangent(in_unit, tangent)
+    turned = u1.imag != 0.0
+    u2 = vector(half.kk - half.ss, 2.0 * half.sk)
+    if turned or u1.real != 1.0:
+        u2 = direction_of_tangent(of_theta_2)
+    return u1, u2, turned, half
+
+
 def nearby(
-    lengths: Loop, in_unit: Loop, at: Position, rows: Any, i: int, drive_bar: int, turned: Any, signs: Any
+    lengths: Loop,
+    in_unit: Loop,
+    u1: Any,
+    u2: Any,
+    half: HalfAngle,
+    rows: Any,
+    i: int,
+    drive_bar: int,
+    turned: Any,
+    signs: Any,
 ) -> tuple[PinForces, Any]:
     """Pin forces and torque of position i with every number changed in its last digit, as `error_bars` has them."""
     d, a, b, c, E1, E2 = in_unit
-    half = rounded_half_angle(in_unit, at.half, number(rows, 15, i), False, thirteen(signs, 2))
+    half = rounded_half_angle(in_unit, half, number(rows, 15, i), False, thirteen(signs, 2))
     in_unit = Loop(d, a, b, c, rounded_real(E1, signs[0]), rounded_real(E2, signs[1]))
-    u2 = select(turned, at.u2, vector(half.kk - half.ss, 2.0 * half.sk))
-    near = close_loop(in_unit, at.u1, u2, half, number(rows, 14, i), lengths.d / d)
+    u2 = select(turned, u2, vector(half.kk - half.ss, 2.0 * half.sk))
+    near = close_loop(in_unit, u1, u2, half, number(rows, 14, i), lengths.d / d)
     k = coefficients(in_unit, near)
     near = with_sines_of_rates(in_unit, near, k)
     near = Position(
-        at.u1,
+        u1,
         rounded_complex(u2, turned, signs[19], signs[20]),
         rounded_complex(near.u3, turned, signs[21], signs[22]),
         rounded_complex(near.u4, turned, signs[23], signs[24]),
@@ -186,42 +216,22 @@ def square(z: Any) -> Any:
     return z.real * z.real + z.imag * z.imag
 
 
-def run(
-    tangents: Array,
-    of_theta_2: Array,
-    rows: Any,
-    drive_bar: int,
-    signs: Any,
-    vectors: Any,
-    scalars: Array,
-    left: Any,
-) -> None:
-    """The positions one after the other.
+def run(tangents: Array, of_theta_2: Array, rows: Any, drive_bar: int, vectors: Any, scalars: Array) -> None:
+    """Up to BLOCK positions one after the other.
 
     Parameters
     ----------
     tangents : tan of half theta_2 - theta_1, (n,).
     of_theta_2 : tan of half theta_2, (n,); empty where no ground is turned.
     rows : as of `numbers`.
-    signs : (evaluations, numbers); None where no error bars are wanted.
-    vectors : u2, u3, u4 and the pin forces, complex, (7, n), written.
-    scalars : sin mu, omega_3, omega_4, alpha_3, alpha_4, torque, sine of the drive, error bars, (9, n), written.
-    left : whether a position is left to NumPy, (n,), written.
+    vectors : u2, u3, u4 and the pin forces, complex, (7 BLOCK,), written.
+    scalars : sin mu, omega_3, omega_4, alpha_3, alpha_4, torque, sine of the drive, whether a position is left to
+        NumPy, error bars, (15 BLOCK,), written.
     """
     turns = len(of_theta_2) > 0
-    changes = np.empty((5, EVALUATIONS))
     for i in range(len(tangents)):
-        in_unit = Loop(
-            *(number(rows, 0, i), number(rows, 1, i), number(rows, 2, i), number(rows, 3, i)),
-            *(number(rows, 4, i), number(rows, 5, i)),
-        )
-        lengths = Loop(number(rows, 6, i), number(rows, 7, i), number(rows, 8, i), number(rows, 9, i), 0.0, 0.0)
-        u1 = vector(number(rows, 10, i), number(rows, 11, i))
-        half = half_angle_of_tangent(in_unit, tangents[i])
-        turned = u1.imag != 0.0
-        u2 = vector(half.kk - half.ss, 2.0 * half.sk)
-        if turns and (turned or u1.real != 1.0):
-            u2 = direction_of_tangent(of_theta_2[i])
+        lengths, in_unit = lengths_of(rows, i)
+        u1, u2, turned, half = directions_of(in_unit, rows, i, tangents[i], of_theta_2[i] if turns else np.nan)
         size = 4.0 * in_unit.a * in_unit.d
         close = undecided(half.outer, in_unit.E1, size) or undecided(half.inner, in_unit.E2, size)
         at = close_loop(in_unit, u1, u2, half, number(rows, 14, i), lengths.d / in_unit.d)
@@ -229,27 +239,48 @@ def run(
         at = with_sines_of_rates(in_unit, at, k)
         v = rates(k, number(rows, 12, i), number(rows, 13, i))
         pins, torque, sine = forces(lengths, in_unit, at, k, v, rows, i, drive_bar, turned, None)
-        vectors[0, i], vectors[1, i], vectors[2, i] = at.u2, at.u3, at.u4
-        vectors[3, i], vectors[4, i], vectors[5, i], vectors[6, i] = pins.F12, pins.F32, pins.F43, pins.F14
-        scalars[0, i], scalars[1, i], scalars[2, i] = at.sin_mu, v.omega_3, v.omega_4
-        scalars[3, i], scalars[4, i], scalars[5, i], scalars[6, i] = v.alpha_3, v.alpha_4, torque, sine
         whole = at.sin_mu + v.omega_3 + v.omega_4 + v.alpha_3 + v.alpha_4 + torque + sine
         total = pins.F12 + pins.F32 + pins.F43 + pins.F14
-        left[i] = close or not np.abs(at.sin_mu) > NO_DIGIT_LEFT or not np.isfinite(whole + total.real + total.imag)
-        if signs is not None:
-            for each in range(EVALUATIONS):
-                other, T = nearby(lengths, in_unit, at, rows, i, drive_bar, turned, signs[each])
-                changes[0, each] = square(T - torque)
-                changes[1, each], changes[2, each] = square(other.F12 - pins.F12), square(other.F32 - pins.F32)
-                changes[3, each], changes[4, each] = square(other.F43 - pins.F43), square(other.F14 - pins.F14)
-            of_forces, largest = 0.0, 0.0
-            for row in range(1, 5):
-                of_forces = max(of_forces, np.mean(changes[row]))
-            for force in (pins.F12, pins.F32, pins.F43, pins.F14):
-                largest = max(largest, np.abs(force))
-            scalars[7, i] = bar(np.sqrt(np.mean(changes[0])), torque)
-            scalars[8, i] = bar(np.sqrt(of_forces), largest)
-            left[i] = left[i] or not min(np.abs(torque), largest) > SMALL or not max(np.abs(torque), largest) < LARGE
+        left = close or not np.abs(at.sin_mu) > NO_DIGIT_LEFT or not np.isfinite(whole + total.real + total.imag)
+        vectors[i], vectors[BLOCK + i], vectors[2 * BLOCK + i] = at.u2, at.u3, at.u4
+        vectors[3 * BLOCK + i], vectors[4 * BLOCK + i] = pins.F12, pins.F32
+        vectors[5 * BLOCK + i], vectors[6 * BLOCK + i] = pins.F43, pins.F14
+        scalars[i], scalars[BLOCK + i], scalars[2 * BLOCK + i] = at.sin_mu, v.omega_3, v.omega_4
+        scalars[3 * BLOCK + i], scalars[4 * BLOCK + i], scalars[5 * BLOCK + i] = v.alpha_3, v.alpha_4, torque
+        scalars[6 * BLOCK + i], scalars[7 * BLOCK + i] = sine, 1.0 if left else 0.0
+
+
+def scatter(
+    tangents: Array, of_theta_2: Array, rows: Any, drive_bar: int, vectors: Any, scalars: Array, signs: Any
+) -> None:
+    """The error bars of positions that `run` has evaluated; for the parameters see there.
+
+    Parameters
+    ----------
+    signs : (evaluations, numbers).
+    """
+    n, turns = len(tangents), len(of_theta_2) > 0
+    scalars[10 * BLOCK :] = 0.0
+    for each in range(EVALUATIONS):
+        for i in range(n):
+            lengths, in_unit = lengths_of(rows, i)
+            u1, u2, turned, half = directions_of(in_unit, rows, i, tangents[i], of_theta_2[i] if turns else np.nan)
+            other, T = nearby(lengths, in_unit, u1, u2, half, rows, i, drive_bar, turned, signs[each])
+            scalars[10 * BLOCK + i] += square(T - scalars[5 * BLOCK + i])
+            scalars[11 * BLOCK + i] += square(other.F12 - vectors[3 * BLOCK + i])
+            scalars[12 * BLOCK + i] += square(other.F32 - vectors[4 * BLOCK + i])
+            scalars[13 * BLOCK + i] += square(other.F43 - vectors[5 * BLOCK + i])
+            scalars[14 * BLOCK + i] += square(other.F14 - vectors[6 * BLOCK + i])
+    for i in range(n):
+        torque, of_forces, largest = np.abs(scalars[5 * BLOCK + i]), 0.0, 0.0
+        for pin in range(4):
+            of_forces = max(of_forces, scalars[(11 + pin) * BLOCK + i])
+            largest = max(largest, square(vectors[(3 + pin) * BLOCK + i]))
+        largest = np.sqrt(largest)
+        scalars[8 * BLOCK + i] = bar(np.sqrt(scalars[10 * BLOCK + i] / EVALUATIONS), torque)
+        scalars[9 * BLOCK + i] = bar(np.sqrt(of_forces / EVALUATIONS), largest)
+        if not min(torque, largest) > SMALL or not max(torque, largest) < LARGE:
+            scalars[7 * BLOCK + i] = 1.0
 
 
 LEAVES: tuple[tuple[Any, str], ...] = (
@@ -263,33 +294,56 @@ LEAVES: tuple[tuple[Any, str], ...] = (
     (bars, "rounded_real rounded_complex rounded_half_angle rounded_coefficients bar"),
 )
 """What is compiled as it stands."""
-OWN = (complex_rounded, real_rounded, by_terms, body_of, push_of, viscous_of, forces, thirteen, nearby, square)
+OWN = (
+    complex_rounded,
+    real_rounded,
+    by_terms,
+    body_of,
+    push_of,
+    viscous_of,
+    forces,
+    thirteen,
+    lengths_of,
+    directions_of,
+    nearby,
+    square,
+)
 
 
 @cache
-def loop(on_disk: bool = True) -> Any:
-    """`run` compiled; on the disk, where a place can be written, for later processes until a source changes."""
-    from numba import njit, types
+def make_known() -> None:
+    """Every function that the loops call, to numba; those that ask for the type of a number in a form for one."""
+    from numba import types
     from numba.extending import overload, register_jitable
 
     overload(anywhere)(lambda mask: lambda mask: bool(mask))  # noqa: PLW0108 - numba reads the names
     overload(select)(lambda mask, x, y: lambda mask, x, y: x if mask else y)
     overload(square_root)(lambda x: lambda x: np.sqrt(x))  # noqa: PLW0108
     overload(vector)(lambda x, y: lambda x, y: complex(x, y))  # noqa: PLW0108
-    of_one, of_each = (lambda rows, row, i: rows[row]), (lambda rows, row, i: rows[row, i])
+    of_one, of_each = (lambda rows, row, i: rows[row]), (lambda rows, row, i: rows[row * BLOCK + i])
     overload(number)(lambda rows, row, i: of_each if isinstance(rows, types.Array) else of_one)
     leaves = [getattr(module, name) for module, names in LEAVES for name in names.split()]
     for leaf in (*leaves, *OWN):
         register_jitable(error_model="numpy", forceinline=True)(leaf)
-    register_jitable(error_model="numpy")(run)
+    for each in (run, scatter):
+        register_jitable(error_model="numpy")(each)
+
+
+@cache
+def loop(function: Any, on_disk: bool = True) -> Any:
+    """`run` or `scatter` compiled; on the disk, where a place can be written, for later processes until a source
+    changes."""
+    from numba import njit
+
+    make_known()
     files = sorted({str(module.__file__) for module, _ in LEAVES})
     sources = zlib.crc32(b"".join(Path(file).read_bytes() for file in files))
 
-    def compiled(tangents, of_theta_2, rows, drive_bar, signs, vectors, scalars, left):  # type: ignore[no-untyped-def]
+    def compiled(*given: Any) -> None:
         if sources >= 0:  # a part of the key on the disk, where numba looks at this file alone
-            run(tangents, of_theta_2, rows, drive_bar, signs, vectors, scalars, left)
+            function(*given)
 
     try:
         return njit(compiled, nogil=True, error_model="numpy", cache=on_disk)
     except RuntimeError:  # no place to write to
-        return loop(False)
+        return loop(function, False)

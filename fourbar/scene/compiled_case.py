@@ -14,8 +14,8 @@ from fourbar.formulas.position import Position
 from fourbar.linkage import MOVING_BARS, PINS
 from fourbar.quantities import PIN_FORCES, UNKNOWNS
 from fourbar.scene import Command
-from fourbar.scene.case import NO_MOTION, Case, Evaluated, changed
-from fourbar.scene.compiled import ROWS, loop
+from fourbar.scene.case import BLOCK, NO_MOTION, Case, Evaluated, changed
+from fourbar.scene.compiled import ROWS, loop, run, scatter
 from fourbar.scene.error_bars import signs
 from fourbar.scene.evaluation import ERROR, NO_HALF_ANGLE, Part, commanded, kinematics, piece, sign_of
 from fourbar.scene.withheld import all_finite, withheld
@@ -61,7 +61,7 @@ def carries(case: Case) -> bool:
 
 
 def numbers(case: Case, theta_2: Array, branch: Any, omega_2: Any, alpha_2: Any) -> Any:
-    """What `run` reads of a case and the motion of some positions: (ROWS,) numbers, or an array (ROWS, n).
+    """What `run` reads of a case and the motion of some positions: (ROWS,) numbers, or an array (ROWS BLOCK,).
 
     Lengths in their unit with E1 and E2; lengths, m; u1; omega_2, alpha_2, branch, what theta_2 - theta_1 loses;
     bodies; viscous pins; loads.
@@ -93,21 +93,14 @@ def numbers(case: Case, theta_2: Array, branch: Any, omega_2: Any, alpha_2: Any)
     found += [*of_bodies, *of_pins.values(), *of_loads]
     if not any(isinstance(number, np.ndarray) and number.size > 1 for number in found):
         return tuple(float(np.ravel(number)[0]) for number in found)
-    rows = np.empty((ROWS, np.size(theta_2)))
+    rows = np.empty((ROWS, BLOCK))
     for row, number in zip(rows, found, strict=True):
-        row[:] = number
-    return rows
+        row[: np.size(theta_2)] = number
+    return rows.ravel()
 
 
 SPACE = threading.local()
 """Of each thread, what the loop writes of a block: fresh pages for each would cost a tenth of the time."""
-
-
-def space(numbers: int) -> Array:
-    """So many numbers to write into, the same memory each time."""
-    if getattr(SPACE, "numbers", np.empty(0)).size < numbers:
-        SPACE.numbers = np.empty(numbers)
-    return SPACE.numbers[:numbers]  # type: ignore[no-any-return]
 
 
 class Found(NamedTuple):
@@ -115,23 +108,28 @@ class Found(NamedTuple):
 
     vectors: NDArray[np.complex128]
     scalars: Array
-    left: NDArray[np.bool_]
 
 
 def looped(case: Case, theta_2: Array, branch: Any, omega_2: Any, alpha_2: Any, *, error_bars: bool) -> Found:
-    """Some positions of a case that the loop carries; for the parameters see `run`."""
+    """Up to BLOCK positions of a case that the loop carries; for the parameters see `run`."""
     n, theta_1 = len(theta_2), case.path.theta_1
     of_theta_2 = np.tan(0.5 * theta_2) if anywhere(theta_1 != 0.0) else np.empty(0)
     rows = numbers(case, theta_2, branch, omega_2, alpha_2)
-    written = space(23 * n)
-    vectors, scalars = written[: 14 * n].view(complex).reshape(7, n), written[14 * n :].reshape(9, n)
-    found = Found(vectors, scalars, np.empty(n, dtype=bool))
-    given = np.tan(0.5 * (theta_2 - theta_1)), of_theta_2, rows, case.drive_bar, signs() if error_bars else None
+    if not hasattr(SPACE, "found"):
+        SPACE.found = Found(np.empty((7, BLOCK), dtype=complex), np.empty((15, BLOCK)))
+    vectors, scalars = SPACE.found
+    given = np.tan(0.5 * (theta_2 - theta_1)), of_theta_2, rows, case.drive_bar, vectors.ravel(), scalars.ravel()
+    _called(run, *given)
+    if error_bars:
+        _called(scatter, *given, signs())
+    return Found(vectors[:, :n], scalars[:, :n])
+
+
+def _called(function: Any, *given: Any) -> None:
     try:
-        loop()(*given, *found)
+        loop(function)(*given)
     except OSError:  # the disk is full
-        loop(False)(*given, *found)
-    return found
+        loop(function, False)(*given)
 
 
 def evaluated(case: Case, where: Command, part: Part, wanted: int, names: KeysView[str]) -> Evaluated:
@@ -140,7 +138,7 @@ def evaluated(case: Case, where: Command, part: Part, wanted: int, names: KeysVi
     omega_2, alpha_2 = piece(where.omega_2, part), piece(where.alpha_2, part)
     found = looped(case, theta_2, branch, omega_2, alpha_2, error_bars=wanted == ERROR)
     u2, u3, u4, *pins = found.vectors
-    sin_mu, omega_3, omega_4, alpha_3, alpha_4, torque, sine, *errors = found.scalars
+    sin_mu, omega_3, omega_4, alpha_3, alpha_4, torque, sine, left, *errors = found.scalars[:10]
     at = Position(polar(1.0, case.path.theta_1), u2, u3, u4, sin_mu, np.nan, np.nan, np.nan, NO_HALF_ANGLE)
     moving = Rates(omega_2, omega_3, omega_4, alpha_2, alpha_3, alpha_4)
     state = State(case.lengths, case.path.theta_1, theta_2, at, NO_MOTION, omega_2, moving)
@@ -149,16 +147,16 @@ def evaluated(case: Case, where: Command, part: Part, wanted: int, names: KeysVi
     others["drive_condition"] = np.abs(sine)
     values |= {name: value for name, value in others.items() if name in names}
     codes = np.zeros(theta_2.shape, dtype=np.uint8)
-    if found.left.any():
-        index = np.flatnonzero(found.left)
+    if left.any():
+        index = np.flatnonzero(left)
 
         def own(number: Any) -> Any:
             return number[index] if np.ndim(number) else number
 
-        left = changed(case, own)
+        alone = changed(case, own)
         where = Command(theta_2[index], own(where.branch[part]), own(omega_2), own(alpha_2))
-        rest = commanded(left, where, (...,), wanted, names)
-        withheld(left, rest)
+        rest = commanded(alone, where, (...,), wanted, names)
+        withheld(alone, rest)
         codes[index] = rest[0]
         for name, value in rest[1].items():
             whole = np.array(np.broadcast_to(values[name], theta_2.shape))

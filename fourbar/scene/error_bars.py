@@ -71,7 +71,8 @@ def error_bars(
 
     path = case.path
     q = state.theta_2 if path.bar == 2 else np.angle(state.at.u4)
-    lost, known = two_sum(q, -path.theta_1)[1], np.isin(np.arange(np.size(state.at.half.ss)), exact)
+    lost = two_sum(q, -path.theta_1)[1]
+    known = exact.size > 0 and np.isin(np.arange(np.size(state.at.half.ss)), exact)
     half = rounded_half_angle(path.lengths, state.at.half, lost, known, rounded.next(6))
     path = path._replace(lengths=Loop(*path.lengths[:4], *map(rounded, path.lengths[4:])))
     near, k = path.motion(path.position(q, half, sign), sign)

@@ -55,7 +55,7 @@ def acting(scene: Scene) -> list[Symbol]:
     for number, load in enumerate(scene.loads, 1):
         at, turns = scene.linkage.bar(load.bar).to_centre, load.frame == "bar"
         if load.force is not None and load.force[0] != 0.0:
-            beyond, force = _polar(*load.at), _polar(*load.force)
+            beyond, force = cmath.rect(*load.at), cmath.rect(*load.force)
             found.append(Symbol("force", f"load {number}", load.bar, at, beyond, force, turns, table=load.table))
         if load.moment != 0.0:
             found.append(Symbol("moment", f"load {number}", load.bar, at, moment=load.moment, table=load.table))
@@ -75,11 +75,7 @@ def _effect(effect: Any) -> list[Symbol]:
         return [Symbol("flywheel", "flywheel", effect.bar, pin=FIRST_PIN[effect.bar])]
     if effect.key == "springs":
         return [
-            Symbol("spring", "spring", s.start.bar, _polar(*s.start[1:]), end=(s.end.bar, _polar(*s.end[1:])))
+            Symbol("spring", "spring", s.start.bar, cmath.rect(*s.start[1:]), end=(s.end.bar, cmath.rect(*s.end[1:])))
             for s in effect.springs
         ]
     return []
-
-
-def _polar(size: float, angle: float) -> complex:
-    return cmath.rect(size, angle)

@@ -16,7 +16,7 @@ from string import Template
 from fourbar.errors import InputError
 from fourbar.scene import Scene
 from fourbar.show.page_data import page_data
-from fourbar.show.plot.style import plain
+from fourbar.show.plot.style import format_of, plain
 from fourbar.solution import SI, Conversion
 from fourbar.writing import write_text
 
@@ -53,10 +53,7 @@ def write(
     NotAssembledError : the linkage assembles at none of the scene's positions.
     DependencyError : a film without matplotlib, or MP4 without ffmpeg.
     """
-    target = Path(path)
-    kind = (file_format or target.suffix.removeprefix(".")).lower()
-    if kind not in FORMATS:
-        raise InputError("output", str(path), "must end in one of " + ", ".join(f".{end}" for end in FORMATS))
+    target, kind = Path(path), format_of(path, file_format, FORMATS)
     if kind == "html":
         write_text(target, page(scene, pictures or {}, units, vectors))
         return

@@ -4,8 +4,9 @@ import math
 from typing import TYPE_CHECKING
 
 from fourbar.show.tables import plain_table
+from fourbar.solution import unit_of
 from fourbar.studies.derivatives import Sensitivity
-from fourbar.studies.influence import influences, largest, shown_quantities, unit_of
+from fourbar.studies.influence import influences, largest, shown_quantities
 
 if TYPE_CHECKING:
     from rich.table import Table

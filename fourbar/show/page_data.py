@@ -19,7 +19,7 @@ from fourbar.show.plot.energy import energies
 from fourbar.show.plot.style import length_unit
 from fourbar.show.plot.view import on_branch, over_time, sweep_command
 from fourbar.show.tolerances import embedded_tolerances
-from fourbar.solution import SI, Array, Conversion, Solution
+from fourbar.solution import SI, Array, Conversion, Solution, nulled
 from fourbar.solve import solve
 
 MAX_ROWS = 1441
@@ -125,7 +125,7 @@ def _through_time(scene: Scene) -> dict[str, Any]:
     columns["theta_2"] = where.theta_2.tolist()
     if scene.motion.free is not None:
         del columns["torque"]
-        columns["energy"] = [_or_null(value) for value in energies(scene, solution).kinetic.tolist()]
+        columns["energy"] = nulled(energies(scene, solution).kinetic)
     duration = float(where.time[-1] - where.time[0])
     rate = _rate(duration)
     return {
@@ -186,19 +186,11 @@ def _solved(scene: Scene, solution: Solution) -> dict[str, Any]:
     columns: dict[str, Any] = {"sign": solution.branch.tolist()}
     if (solution.status_code != OK).any():
         columns["status"] = solution.status
-    for name in SCALARS:
+    for name in (*SCALARS, *PIN_FORCES):
         values = getattr(solution, name)
         if values is not None:
-            columns[name] = [_or_null(value) for value in values.tolist()]
-    for name in PIN_FORCES:
-        values = getattr(solution, name)
-        if values is not None:
-            columns[name] = [[_or_null(x), _or_null(y)] for x, y in values.tolist()]
+            columns[name] = nulled(values)
     return columns
-
-
-def _or_null(value: float) -> float | None:
-    return value if math.isfinite(value) else None
 
 
 def _pictures(scene: Scene, pictures: Mapping[str, str | Path]) -> dict[int, str]:

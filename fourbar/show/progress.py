@@ -7,13 +7,6 @@ from typing import TypeVar
 T = TypeVar("T")
 
 
-@contextmanager
-def running(text: str) -> Iterator[None]:
-    """A line that moves on standard error while the body runs; nothing where that is no terminal."""
-    with share_done(text):
-        yield
-
-
 def counted(items: Sequence[T], text: str) -> Iterable[T]:
     """The items, with a bar on standard error that says how many are done; nothing where that is no terminal."""
     from rich.console import Console
@@ -26,8 +19,11 @@ def counted(items: Sequence[T], text: str) -> Iterable[T]:
 
 
 @contextmanager
-def share_done(text: str) -> Iterator[Callable[[float], None] | None]:
-    """The line of `running` with the share that is done, which the body reports; None where there is no terminal."""
+def running(text: str) -> Iterator[Callable[[float], None] | None]:
+    """A line that moves on standard error while the body runs; nothing where that is no terminal.
+
+    Yields what the body may report the share that is done to; None where there is no terminal.
+    """
     from rich.console import Console
 
     console = Console(stderr=True)

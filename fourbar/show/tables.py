@@ -1,4 +1,4 @@
-"""What `fourbar analyze` prints: JSON, CSV, or a table for the reader; the quantities are those of `Solution`."""
+"""What `fourbar analyze` prints for the reader: a summary and a table; and how every printed table looks."""
 
 import io
 import math

@@ -22,10 +22,9 @@ from fourbar.scene.motion import FromLimit
 from fourbar.scene.point import OF_POINTS
 from fourbar.solution import Array, Solution
 from fourbar.solve import solve
-from fourbar.studies.keys import Entry, at_place, entries, placed
+from fourbar.studies.keys import THETA_2, Entry, at_place, entries, placed
 from fourbar.studies.sloped import Sloped, slopes, values
 
-THETA_2 = "motion.theta_2"
 AT_ONCE = 512
 """Positions: each number is then as many rows as the scene has numbers, and stays in the cache."""
 AT_REST = "at_rest"

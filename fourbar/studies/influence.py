@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fourbar.quantities import PIN_FORCES, UNITS
+from fourbar.quantities import PIN_FORCES
 from fourbar.solution import nulled
 from fourbar.studies.derivatives import Sensitivity
 
@@ -58,11 +58,6 @@ def largest(found: Sensitivity, quantity: str) -> float:
     value = found.value(quantity)
     size = np.abs(value) if value.ndim == 1 else np.hypot(*value.T)
     return float(np.nanmax(size)) if np.isfinite(size).any() else math.nan
-
-
-def unit_of(quantity: str) -> str:
-    """Of a quantity; of a scene's own points that of their position."""
-    return UNITS.get(quantity, "m")
 
 
 def json_text(found: Sensitivity) -> str:

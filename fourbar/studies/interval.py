@@ -11,8 +11,7 @@ from fourbar.formulas.mobility import TURN, change_points, intervals, limit_posi
 from fourbar.quantities import NOT_ASSEMBLED
 from fourbar.scene import Scene, command
 from fourbar.solve import solve
-from fourbar.studies.derivatives import THETA_2
-from fourbar.studies.keys import at_place, entries
+from fourbar.studies.keys import THETA_2, at_place, entries
 from fourbar.studies.study import vary
 
 DISTANCE = math.radians(1.0)

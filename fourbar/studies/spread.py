@@ -12,8 +12,8 @@ from fourbar.quantities import ANGLES, NOT_ASSEMBLED, PIN_FORCES
 from fourbar.scene import Scene, command
 from fourbar.solution import Array
 from fourbar.solve import is_scalar, solve
-from fourbar.studies.derivatives import THETA_2, Sensitivity, quantity_of, sensitivity
-from fourbar.studies.keys import LEFT_OUT, at_place, entries, left_out, refusal
+from fourbar.studies.derivatives import Sensitivity, quantity_of, sensitivity
+from fourbar.studies.keys import LEFT_OUT, THETA_2, at_place, entries, left_out, refusal
 from fourbar.studies.study import Study, vary
 
 SAMPLES = 8192

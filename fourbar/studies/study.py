@@ -12,15 +12,14 @@ from fourbar.formulas.mobility import on_smooth_path
 from fourbar.formulas.position import loop
 from fourbar.quantities import ANGLES, INVALID
 from fourbar.scene import Command, Scene, command
-from fourbar.scene.case import Case
+from fourbar.scene.case import BLOCK, Case
 from fourbar.scene.evaluation import FORCE
 from fourbar.scene.motion import FromLimit
 from fourbar.scene.start import started
 from fourbar.solution import Array, Solution, unwrap
-from fourbar.solve import BLOCK, arrays, each, evaluation, is_compiled, keep, positions_at_once, requested, solved
-from fourbar.studies.keys import entries, placed, refusal
+from fourbar.solve import arrays, each, evaluation, is_compiled, keep, positions_at_once, requested, solved
+from fourbar.studies.keys import THETA_2, entries, placed, refusal
 
-THETA_2 = "motion.theta_2"
 LENGTHS = tuple(f"lengths.{name}" for name in ("ground", "input", "coupler", "output", "ground_angle"))
 NEAR_A_CHANGE_POINT = 1e-12
 """Relative to the sum of the lengths, squared: who is not so near has no change point, whatever rounding does."""

@@ -10,7 +10,7 @@ import click
 from fourbar.errors import FAILED, HOLDS, InputError
 from fourbar.files import load
 from fourbar.scene import Scene
-from fourbar.writing import write_text
+from fourbar.writing import require_file, write_text
 from validation.check.judge import Finding, Judge, Tolerance
 from validation.check.mistakes import NEARER, Explanation, explain
 from validation.check.theirs import Table, read_table
@@ -127,6 +127,9 @@ def check(
     --rtol or --atol these decide, and how many agree exactly is printed too.
     """
     table = read_table(theirs)
+    for path in (as_json, junit):
+        if path is not None:
+            require_file(path, scene, theirs)
     judgement = judge_table(load(scene), table, tolerance_of(rtol, atol))
     if as_json is not None or junit is not None:
         from validation.check import forms

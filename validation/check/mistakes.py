@@ -239,7 +239,7 @@ def explain(judge: Judge, differing: list[str]) -> list[Explanation]:
             else:
                 where = judge.where(key)
                 before, after = (judge.judged(key, values)[0][where] for values in (judge.ours(key), predicted))
-                if np.all(NEARER * after <= before):
+                if np.all(after <= before / NEARER):
                     nearer.append(table.label(key))
         if (explained or nearer) and not broken:
             complete = len(explained) == len(differing)

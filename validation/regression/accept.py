@@ -44,7 +44,7 @@ def output_options(command: Callable[..., Any]) -> Callable[..., Any]:
 def choosing_options(command: Callable[..., Any]) -> Callable[..., Any]:
     """The options --only, --engines and --quantity."""
     for option, column in reversed(CHOICES.items()):
-        text = f"Compare these alone, comma-separated: names of column {column}."
+        text = f"These alone, comma-separated: names of column {column}."
         command = click.option(f"--{option}", metavar="NAMES", help=text)(command)
     return command
 

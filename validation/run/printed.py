@@ -8,8 +8,9 @@ from numpy.typing import NDArray
 from fourbar.linkage import PIN_FORCE
 from fourbar.quantities import FORCES, OK, PIN_FORCES
 from fourbar.scene import Command, Scene
+from fourbar.scene.case import BLOCK
 from fourbar.solution import Solution
-from fourbar.solve import BLOCK, solve
+from fourbar.solve import solve
 from validation.compare.basis import basis_of, smallest_yardstick, strictest_condition
 from validation.compare.compare import turned
 from validation.compare.error import magnitude, relative, relative_error, worst

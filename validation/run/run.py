@@ -11,7 +11,7 @@ import click
 
 from fourbar.errors import FAILED, HOLDS, DependencyError, FourBarError, InputError
 from fourbar.mjcf import mjcf
-from fourbar.writing import naming, write_text
+from fourbar.writing import naming, require_file, write_text
 from validation.compare.columns import Columns, read_columns
 from validation.compare.plain import plain
 from validation.compare.rows import FAILS, Row
@@ -321,6 +321,9 @@ def command(
             raise InputError(f"--{form}", str(path), "tells differences; say --against BASELINE or --python PATH too")
     if against is not None:
         recorded(baseline(against))  # before anything runs
+    for path in forms.values():
+        if path is not None:
+            require_file(path, *scenes)
     seed, types = seed or 0, types or ALL_TYPES
     suite, witnesses = selected(scenes, named, count, seed, types, adapters)
     if wanted is not None:

@@ -20,8 +20,9 @@ from fourbar.formulas.mobility import default_range
 from fourbar.linkage import MOVING_BARS, Bar, FourBar
 from fourbar.quantities import ANGLES, UNKNOWNS, VECTORS
 from fourbar.scene import Command, Scene
+from fourbar.scene.case import BLOCK
 from fourbar.show.plot.style import format_of
-from fourbar.solve import BLOCK, solve
+from fourbar.solve import solve
 from validation.engines.witnesses import WITNESSES, Witness
 from validation.published.thirteen import FreeBodies, solve_thirteen
 from validation.report.machine import machine

@@ -21,11 +21,9 @@ def draw_bench(over_positions: Times, over_linkages: Times, path: Path) -> None:
     """Both growths on logarithmic axes, into a file, whole or not at all."""
     kind = format_of(path)
     with matplotlib_style():
-        from matplotlib.backends.backend_agg import FigureCanvasAgg
         from matplotlib.figure import Figure
 
         figure = Figure(figsize=(8.4, 4.0), layout="constrained")
-        FigureCanvasAgg(figure)
         left, right = figure.subplots(1, 2)
         _panel(left, over_positions, "ns per position, every unknown", "positions")
         _panel(right, over_linkages, "ns per linkage, every force at one position", "linkages")

@@ -26,7 +26,9 @@ LIMITS = {
     ),
     "numpy / compiled": Limit(">=", 1.2, "who installs numba gains by it on one core"),
     "compiled / C": Limit("<=", 1.5, "the blocks, statuses and copies around the compiled loop stay small"),
-    "compiled error bars / forces": Limit("<=", 10.0, "fourteen more evaluations, which share the tangent"),
+    "compiled error bars / forces": Limit(
+        "<=", 6.0, "fourteen more evaluations, which share the tangent and the writing"
+    ),
     "study of linkages / positions": Limit("<=", 2.0, "a member is a column of the same arrays as a position"),
     "growth from 1000 positions on": Limit("<=", 1.3, "the work is linear in the positions: blocks fit the cache"),
     "memory beyond the result, MB": Limit("<=", 50.0, "work space is that of a block, not of the sweep"),

@@ -32,7 +32,7 @@ EXPLAINED = (
 @click.command()
 @click.argument("scene", type=click.Path(path_type=Path), default=PROBLEM)
 @click.option("--python", "pythons", type=click.Path(path_type=Path), multiple=True, help="An environment of subjects.")
-@click.option("--out", type=click.Path(path_type=Path), default=Path("results/standing"), show_default=True)
+@click.option("-o", "--out", type=click.Path(path_type=Path), default=Path("results/standing"), show_default=True)
 @click.option("--time-limit", default=600.0, show_default=True, help="Seconds for each subject.")
 def command(scene: Path, pythons: tuple[Path, ...], out: Path, time_limit: float) -> None:
     """Examine every simulator that is installed here or under a --python, and write one page (repeat --python)."""

@@ -45,7 +45,7 @@ Try = Callable[[str], Release]
 )
 @click.option("--with", "more", multiple=True, metavar="REQUIREMENT", help="For each that can take it (repeat).")
 @click.option("--cache", type=click.Path(path_type=Path), default=CACHE, help="Where the versions are installed.")
-@click.option("--out", type=click.Path(path_type=Path), help="Left out: results/versions-ENGINE.")
+@click.option("-o", "--out", type=click.Path(path_type=Path), help="Left out: results/versions-ENGINE.")
 def command(
     engine: str,
     scenes: tuple[Path, ...],

@@ -114,14 +114,16 @@ def chart(rows: Sequence[dict[str, Any]]) -> str:
         drawn_with: dict[str, Any] = {"color": style.colour, "marker": style.marker, "markersize": 4, "linewidth": 1}
         errors.plot(at, [row["torque"] or math.nan for row in own], label=f"{engine}: torque", **drawn_with)
         errors.plot(at, forces, linestyle="--", label=f"{engine}: pin forces", fillstyle="none", **drawn_with)
-        times.plot(at, [row[CLOCK] or math.nan for row in own], label=engine, **drawn_with)
+        times.plot(at, [1e3 * (row[CLOCK] or math.nan) for row in own], label=engine, **drawn_with)
+    label: str | None = "did not install or load"
     for row in rows:
         if row["engine"] is None:
-            errors.axvline(versions.index(row["version"]), color="#c74f00", linestyle=":", linewidth=1)
+            errors.axvline(versions.index(row["version"]), color="#c74f00", linestyle=":", linewidth=1, label=label)
+            label = None
     errors.set_yscale("log")
-    errors.set_ylabel("greatest error")
+    errors.set_ylabel("greatest relative error")
     times.set_ylim(bottom=0.0)
-    times.set_ylabel("processor s a position")
+    times.set_ylabel("CPU time per position (ms)")
     times.set_xticks(range(len(versions)), versions, rotation=45, ha="right", fontsize=7)
     for axes in (errors, times):
         axes.grid(alpha=0.3)

@@ -13,7 +13,7 @@ from fourbar.linkage import require
 from fourbar.scene import Scene
 from fourbar.show.plot import curves, freebody, hodograph, influence, linkage
 from fourbar.show.plot.labels import Labels
-from fourbar.show.plot.style import FORCE_COLOURS, MUTED, format_of, matplotlib_style, plain, rendered, save
+from fourbar.show.plot.style import CAPTION, FORCE_COLOURS, TITLE, format_of, matplotlib_style, plain, rendered, save
 from fourbar.show.plot.transmission import draw_transmission
 from fourbar.show.plot.view import View, common_position, on_branch, over_time, view
 from fourbar.show.tables import STATIC
@@ -44,23 +44,11 @@ def _overview(figure: "SubFigure", shown: View, labels: Labels) -> None:
     curves.draw_angles(panels["angles"], shown)
     curves.draw_velocities(panels["omega"], shown)
     curves.draw_accelerations(panels["alpha"], shown)
-    _drive(panels["torque"], shown)
+    # what drives: the torque, or in a free motion the work of loads and effects
+    (curves.draw_torque if shown.scene.motion.free is None else curves.draw_energy)(panels["torque"], shown)
     curves.draw_forces(panels["forces"], shown)
     draw_transmission(panels["mu"], shown)
     hodograph.draw_hodograph(cast("PolarAxes", panels["polar"]), shown)
-
-
-def _drive(axes: Any, shown: View) -> None:
-    """What drives: the torque, or in a free motion the work of loads and effects."""
-    (curves.draw_torque if shown.scene.motion.free is None else curves.draw_energy)(axes, shown)
-
-
-def _linkage(figure: "SubFigure", shown: View, labels: Labels) -> None:
-    linkage.draw_linkage(figure.subplots(), shown, labels)
-
-
-def _coupler(figure: "SubFigure", shown: View, labels: Labels) -> None:
-    linkage.draw_coupler_curves(figure.subplots(), shown, labels)
 
 
 def _kinematics(figure: "SubFigure", shown: View, labels: Labels) -> None:
@@ -80,11 +68,7 @@ def _points(figure: "SubFigure", shown: View, labels: Labels) -> None:
 
 
 def _single(paint: Callable[[Any, View], None]) -> Painter:
-    def painter(figure: "SubFigure", shown: View, labels: Labels) -> None:
-        del labels
-        paint(figure.subplots(), shown)
-
-    return painter
+    return lambda figure, shown, labels: paint(figure.subplots(), shown)
 
 
 def _hodographs(figure: "SubFigure", shown: View, labels: Labels) -> None:
@@ -104,8 +88,8 @@ def _free_bodies(figure: "SubFigure", shown: View, labels: Labels) -> None:
 
 FIGURES: dict[str, tuple[Painter, tuple[float, float], bool]] = {
     "overview": (_overview, (11.7, 8.3), False),
-    "linkage": (_linkage, (5.6, 5.2), False),
-    "coupler": (_coupler, (5.6, 5.4), False),
+    "linkage": (lambda figure, *of: linkage.draw_linkage(figure.subplots(), *of), (5.6, 5.2), False),
+    "coupler": (lambda figure, *of: linkage.draw_coupler_curves(figure.subplots(), *of), (5.6, 5.4), False),
     "kinematics": (_kinematics, (5.6, 6.8), False),
     "points": (_points, (11.0, 5.6), True),
     "torque": (_single(curves.draw_torque), (5.6, 3.2), True),
@@ -209,7 +193,6 @@ def compose(
     dimensions: bool = False,
 ) -> "Figure":
     """The figure itself, laid out and labelled."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     require_units(units)
@@ -226,24 +209,16 @@ def compose(
     figure = Figure(
         figsize=(size[0], size[1] * len(views)) if stacked else (size[0] * len(views), size[1]), layout="constrained"
     )
-    FigureCanvasAgg(figure)
     parts = figure.subfigures(len(views) if stacked else 1, 1 if stacked else len(views), squeeze=False).ravel()
-    labels = Labels([], [])
+    labels = Labels()
     for part, shown in zip(parts, views, strict=True):
         painter(part, shown, labels)
         heading = plain(scene.title, 90) or "Four-bar linkage"
-        part.suptitle(
-            f"{heading} ({shown.branch_name} branch)" if len(views) > 1 else heading,
-            parse_math=False,
-            size=10.5,
-            weight="bold",
-            x=0.012,
-            ha="left",
-        )
+        part.suptitle(f"{heading} ({shown.branch_name} branch)" if len(views) > 1 else heading, **TITLE)
         wide = int(size[0] * 18.5)
         caption = textwrap.fill(" ".join(shown.notes), wide)
         if caption:
-            part.supxlabel(caption, size=6.8, color=MUTED, x=0.012, ha="left", parse_math=False, linespacing=1.35)
+            part.supxlabel(caption, linespacing=1.35, **CAPTION)
     _to_one_scale([part.axes for part in parts])
     labels.settle(figure)
     return figure

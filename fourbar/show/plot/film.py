@@ -10,11 +10,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fourbar.errors import DependencyError, InputError, installing
+from fourbar.linkage import ENDS
 from fourbar.scene import Scene
 from fourbar.show.acting import acting
 from fourbar.show.plot import symbols
-from fourbar.show.plot.linkage import ENDS, POINT, mass_centre, path_legend, paths, pin_name, supports
-from fourbar.show.plot.style import BAR_COLOURS, INK, largest, length_unit, matplotlib_style, plain
+from fourbar.show.plot.linkage import POINT, mass_centre, path_legend, paths, pin_name, supports
+from fourbar.show.plot.style import BAR_COLOURS, INK, TITLE, largest, length_unit, matplotlib_style, plain
 from fourbar.show.plot.vectors import vectors
 from fourbar.show.plot.view import View, view
 from fourbar.show.progress import counted
@@ -165,16 +166,14 @@ def _names(axes: Any, shown: View, centres: list[int]) -> dict[str, Any]:
 
 def _stage(shown: View, moving: bool) -> tuple["Figure", Any]:
     """The figure, and the function that moves it to a position of the sweep."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     sweep, linkage = shown.sweep, shown.scene.linkage
     O4 = (linkage.ground * math.cos(linkage.ground_angle), linkage.ground * math.sin(linkage.ground_angle))
     factor, unit = length_unit(largest(sweep.A, sweep.B, sweep.G3, np.array(O4)), shown.units)
     figure = Figure(figsize=SIZE, dpi=DPI, layout="constrained")
-    FigureCanvasAgg(figure)
     axes = figure.subplots()
-    figure.suptitle(plain(shown.scene.title, 70), parse_math=False, size=10.5, weight="bold", x=0.02, ha="left")
+    figure.suptitle(plain(shown.scene.title, 70), **TITLE)
     for path, colour, dashes, name in paths(shown):
         axes.plot(*(factor * path).T, color=colour, lw=1.0, ls=dashes, label=name, zorder=2)
     reached = np.concatenate([sweep.A, sweep.B, sweep.G3, *sweep.points.values(), [(0.0, 0.0), O4]])

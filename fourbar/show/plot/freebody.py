@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.effects.actions import bodies
-from fourbar.linkage import BAR_NAMES, FIRST_PIN, MOVING_BARS, PIN_FORCE
+from fourbar.linkage import BAR_NAMES, ENDS, FIRST_PIN, MOVING_BARS, PIN_FORCE
 from fourbar.show.plot.curves import note
 from fourbar.show.plot.labels import Label, Labels
-from fourbar.show.plot.linkage import ENDS, components, mass_centre, pins
+from fourbar.show.plot.linkage import components, mass_centre, pin_name, pins
 from fourbar.show.plot.style import BAR_COLOURS, FORCE_COLOURS, HEADED, INK, MUTED, force_name, quantity, unit_for
 from fourbar.show.plot.view import Recorder, View
 from fourbar.solution import Conversion
@@ -22,12 +22,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import SubFigure
 
-PIN_FORCES = {
-    2: (("O2", "F12", 1.0), ("A", "F32", 1.0)),
-    3: (("A", "F32", -1.0), ("B", "F43", 1.0)),
-    4: (("B", "F43", -1.0), ("O4", "F14", 1.0)),
-}
-"""The pins of a bar, the force there among the independent ones, and its sign on this bar."""
 PANEL, LINE = 3.4, 0.16
 """Heights of a bar's panel and of a line of its couples, inches."""
 WINDOW = 1.3
@@ -62,9 +56,10 @@ def free_body(view: View, bar: int) -> tuple[list[Arrow], list[Couple]]:
     first = where[FIRST_PIN[bar]]
     arrows: list[Arrow] = []
     couples: list[Couple] = []
-    for pin, name, sign in PIN_FORCES[bar]:
-        fx, fy = (sign * float(v) for v in getattr(view.here, name)[0])
-        shown = name if sign > 0 else f"F{name[2]}{name[1]}"
+    for pin in ENDS[bar]:
+        name = PIN_FORCE[pin]
+        onto, shown = (1.0, name) if name[2] == str(bar) else (-1.0, f"F{name[2]}{name[1]}")
+        fx, fy = (onto * float(v) for v in getattr(view.here, name)[0])
         at = (where[pin][0] - first[0], where[pin][1] - first[1])
         arrows.append(Arrow(force_name(shown), at, (fx, fy), FORCE_COLOURS[name]))
     if view.scene.drive_bar == bar and view.scene.motion.free is None:
@@ -143,20 +138,16 @@ def _draw_one(
     reach: Points,
     span: float,
 ) -> None:
-    where = pins(view)
-    first = where[FIRST_PIN[bar]]
-    second = where[_second_pin(bar)]
+    first, second = (pins(view)[pin] for pin in ENDS[bar])
     end = (second[0] - first[0], second[1] - first[1])
     middle = (0.5 * end[0], 0.5 * end[1])
     axes.plot(
         [0.0, end[0]], [0.0, end[1]], color=BAR_COLOURS[bar], lw=5.0, alpha=0.45, solid_capstyle="round", zorder=2
     )
-    labels.keep_off(axes, (0.0, 0.0), end)
-    for name, (x, y) in ((FIRST_PIN[bar], (0.0, 0.0)), (_second_pin(bar), end)):
+    labels.keep_off(axes, (0.0, 0.0), end, width=5.0)
+    for name, (x, y) in zip(ENDS[bar], ((0.0, 0.0), end), strict=True):
         axes.plot([x], [y], "o", ms=5.5, mfc="white", mec=INK, mew=1.1, zorder=6)
-        labels.add(
-            Label(axes, f"${name[0]}_{name[1]}$" if len(name) == 2 else f"${name}$", (x, y), middle, MUTED, 8.0, 2.5)
-        )
+        labels.add(Label(axes, pin_name(name), (x, y), middle, MUTED, 8.0, 2.5))
     short: list[str] = []
     for arrow in arrows:
         size = math.hypot(*arrow.force)
@@ -194,11 +185,6 @@ def _write_couples(axes: "Axes", view: View, couples: list[Couple]) -> None:
     axes.set_axis_off()
     look: dict[str, Any] = {"va": "top", "size": 7.5, "linespacing": 1.45, "color": INK if lines else MUTED}
     axes.text(0.0, 1.0, "\n".join(lines) or "no couples", transform=axes.transAxes, **look)
-
-
-def _second_pin(bar: int) -> str:
-    """The pin of a bar that is not its first."""
-    return next(pin for pin in ENDS[bar] if pin != FIRST_PIN[bar])
 
 
 def _words(text: str) -> str:

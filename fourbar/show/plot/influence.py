@@ -6,8 +6,9 @@ from fourbar.show.influence import ranked
 from fourbar.show.plot.labels import Labels
 from fourbar.show.plot.style import FORCE_COLOURS, INK, unit_for
 from fourbar.show.plot.view import View
+from fourbar.solution import unit_of
 from fourbar.studies.derivatives import sensitivity
-from fourbar.studies.influence import influences, largest, shown_quantities, unit_of
+from fourbar.studies.influence import influences, largest, shown_quantities
 
 if TYPE_CHECKING:
     from matplotlib.figure import SubFigure

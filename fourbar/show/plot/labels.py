@@ -1,7 +1,7 @@
 """Labels next to points, where they cover neither each other nor a line of the drawing."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -38,27 +38,33 @@ class Label:
 class Labels:
     """The labels of one figure and the lines and marks (data coordinates) they must keep off."""
 
-    wanted: list[Label]
-    lines: list[tuple["Axes", list[Point]]]
+    wanted: list[Label] = field(default_factory=list)
+    lines: list[tuple["Axes", list[Point], float]] = field(default_factory=list)
 
     def add(self, label: Label) -> None:
         """Request a label; it is placed by `settle`."""
         self.wanted.append(label)
 
-    def keep_off(self, axes: "Axes", *points: Point) -> None:
-        """Lines, given by their points, that labels do not cover; twice the same point is a mark."""
-        self.lines.append((axes, list(points)))
+    def keep_off(self, axes: "Axes", *points: Point, width: float = 1.0) -> None:
+        """Lines, given by their points, that labels do not cover; twice the same point is a mark.
+
+        A broad line (`width` in typographic points) counts by what of it would be covered.
+        """
+        self.lines.append((axes, list(points), width))
 
     def settle(self, figure: "Figure") -> None:
         """Place every label once the layout is final: the first free spot, nearest first."""
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+        renderer = FigureCanvasAgg(figure).get_renderer()  # type: ignore[no-untyped-call]
         figure.draw_without_rendering()
         figure.set_layout_engine("none")  # labels must not move what they were measured against
         per_point = figure.dpi / 72.0
-        renderer = figure.canvas.get_renderer()  # type: ignore[attr-defined]
         taken: list[tuple[Axes, Box]] = []
         samples: dict[int, list[np.ndarray]] = {}
-        for axes, points in self.lines:
-            samples.setdefault(id(axes), []).append(_sampled(axes.transData.transform(points), per_point))
+        for axes, points, width in self.lines:
+            own = _sampled(axes.transData.transform(points), per_point)
+            samples.setdefault(id(axes), []).append(np.column_stack([own, np.full(len(own), width)]))
         for label in self.wanted:
             axes = label.axes
             text = axes.text(*label.at, label.text, color=label.colour, size=label.size, ha="center", va="center")
@@ -69,7 +75,7 @@ class Labels:
             x, y = axes.transData.transform(label.at)
             sx, sy = axes.transData.transform(label.shun)
             away = math.atan2(y - sy, x - sx) if (x, y) != (sx, sy) else math.pi / 2
-            dots = np.concatenate(samples[id(axes)]) if id(axes) in samples else np.empty((0, 2))
+            dots = np.concatenate(samples[id(axes)]) if id(axes) in samples else np.empty((0, 3))
             boxes = [box for owner, box in taken if owner is axes]
             centre = _spot((x, y), away, half, dots, boxes, per_point, label.dots_clear, _inside(axes))
             taken.append((axes, (centre[0] - half[0], centre[1] - half[1], centre[0] + half[0], centre[1] + half[1])))
@@ -111,19 +117,19 @@ def _spot(
     inside: Box,
 ) -> Point:
     """The centre of the label: the candidate that covers least, the nearest and most outward first."""
-    best, best_cost = at, math.inf
+    best, best_cost, edge = at, math.inf, 0.5 * per_point * dots[:, 2]
     for reach in REACH:
         for k in range(DIRECTIONS):
             angle = away + (k + 1) // 2 * (1 if k % 2 else -1) * math.tau / DIRECTIONS
             cosine, sine = math.cos(angle), math.sin(angle)
             gap = (reach + mark) * per_point
             x, y = at[0] + cosine * (gap + half[0]), at[1] + sine * (gap + half[1])
-            hit = (np.abs(dots[:, 0] - x) < half[0]) & (np.abs(dots[:, 1] - y) < half[1])
+            hit = (np.abs(dots[:, 0] - x) < half[0] + edge) & (np.abs(dots[:, 1] - y) < half[1] + edge)
             clashes = sum(abs(x - 0.5 * (b[0] + b[2])) < half[0] + 0.5 * (b[2] - b[0]) and
                           abs(y - 0.5 * (b[1] + b[3])) < half[1] + 0.5 * (b[3] - b[1]) for b in boxes)  # fmt: skip
             outside = x - half[0] < inside[0] or x + half[0] > inside[2]
             outside = outside or y - half[1] < inside[1] or y + half[1] > inside[3]
-            cost = 100.0 * clashes + 30.0 * outside + float(hit.sum()) + 0.04 * reach + 0.05 * k
+            cost = 100.0 * clashes + 30.0 * outside + float(hit @ dots[:, 2]) + 0.04 * reach + 0.05 * k
             if cost < best_cost:
                 best, best_cost = (x, y), cost
     return best

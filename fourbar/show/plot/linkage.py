@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fourbar.linkage import MOVING_BARS
+from fourbar.linkage import ENDS, MOVING_BARS
 from fourbar.show.acting import acting
 from fourbar.show.plot import symbols
 from fourbar.show.plot.labels import Label, Labels
@@ -22,14 +22,11 @@ if TYPE_CHECKING:
 Point = tuple[float, float]
 POINT = "#8A3B78"
 """Of the scene's own points."""
-ENDS = {2: ("O2", "A"), 3: ("A", "B"), 4: ("O4", "B")}
 
 
 def pins(view: View) -> dict[str, Point]:
     """The four pins at the position drawn, m."""
-    linkage, state = view.scene.linkage, view.state()
-    A, B = state.foot(3), state.point(4, linkage.output.length)
-    return {name: components(point) for name, point in (("O2", 0.0j), ("A", A), ("B", B), ("O4", state.foot(4)))}
+    return {name: components(pin) for name, pin in place_of(view.scene.linkage, view.here, 0, 1.0).pins.items()}
 
 
 def components(vector: Any) -> Point:
@@ -40,8 +37,8 @@ def components(vector: Any) -> Point:
 
 def centres(view: View) -> dict[int, Point]:
     """The mass centres of the bars that have mass, m."""
-    bars, state = zip(MOVING_BARS, view.scene.linkage.moving, strict=True), view.state()
-    return {number: components(state.point(number, bar.to_centre)) for number, bar in bars if bar.mass > 0.0}
+    massive = (bar for bar in MOVING_BARS if view.scene.linkage.bar(bar).mass > 0.0)
+    return {bar: tuple(getattr(view.here, f"G{bar}")[0].tolist()) for bar in massive}
 
 
 def draw_linkage(axes: "Axes", view: View, labels: Labels, *, moving: bool = False) -> None:
@@ -64,7 +61,7 @@ def draw_linkage(axes: "Axes", view: View, labels: Labels, *, moving: bool = Fal
     for number, (start, stop) in ENDS.items():
         (x, y), colour = zip(where[start], where[stop], strict=True), BAR_COLOURS[number]
         axes.plot(x, y, color=colour, lw=4.5, solid_capstyle="round", zorder=4)
-        labels.keep_off(axes, where[start], where[stop])
+        labels.keep_off(axes, where[start], where[stop], width=4.5)
         labels.add(Label(axes, _bar_name(view, number), (0.5 * sum(x), 0.5 * sum(y)), middle, colour, 9.0, 2.0))
     for name, point in where.items():
         axes.plot(*[[v] for v in point], "o", ms=6.0, mfc="white", mec=INK, mew=1.2, zorder=6)
@@ -210,7 +207,7 @@ def draw_coupler_curves(axes: "Axes", view: View, labels: Labels) -> None:
     for name, point in where.items():
         axes.plot([factor * point[0]], [factor * point[1]], "o", ms=4.5, mfc="white", mec=INK, mew=1.0, zorder=5)
         if name in ("O2", "O4"):
-            labels.add(Label(axes, f"$O_{name[1]}$", (factor * point[0], factor * point[1]), (0.0, 1e9), INK, 8.5, 2.0))
+            labels.add(Label(axes, pin_name(name), (factor * point[0], factor * point[1]), (0.0, 1e9), INK, 8.5, 2.0))
     labels.keep_off(axes, *[(factor * where[k][0], factor * where[k][1]) for k in ("O2", "A", "B", "O4")])
     axes.set_aspect("equal", adjustable="datalim")
     axes.set_xlabel(f"$x$ ({unit})")

@@ -42,6 +42,9 @@ def force_name(name: str) -> str:
     return f"$F_{{{name[1:]}}}$"
 
 
+TITLE: dict[str, Any] = {"parse_math": False, "size": 10.5, "weight": "bold", "x": 0.012, "ha": "left"}
+CAPTION: dict[str, Any] = {"parse_math": False, "size": 6.8, "color": MUTED, "x": 0.012, "ha": "left"}
+"""Of a whole figure, above and below its panels."""
 HEADED: dict[str, Any] = {"arrowstyle": "-|>", "lw": 1.5, "shrinkA": 0.0, "shrinkB": 0.0}
 """An arrow from end to end."""
 SETTINGS: dict[Any, Any] = {
@@ -102,13 +105,13 @@ def matplotlib_style() -> Iterator[None]:
         yield
 
 
-def format_of(path: str | Path, file_format: str | None = None) -> str:
-    """The format stated, or that a file's ending names; InputError where it is none of svg, png, pdf."""
+def format_of(path: str | Path, file_format: str | None = None, formats: tuple[str, ...] = FORMATS) -> str:
+    """The format stated, or that a file's ending names; InputError where it is none of `formats`."""
     expect("path", path, str, Path)
     expect("file_format", file_format, str, type(None))
     kind = (file_format or Path(path).suffix.removeprefix(".")).lower()
-    if kind not in FORMATS:
-        raise InputError("output", str(path), "must end in one of " + ", ".join(f".{end}" for end in FORMATS))
+    if kind not in formats:
+        raise InputError("output", str(path), "must end in one of " + ", ".join(f".{end}" for end in formats))
     return kind
 
 
@@ -155,7 +158,7 @@ def unit_for(largest: float, unit: str, units: Conversion = SI) -> tuple[float, 
 
 
 def length_unit(largest: float, units: Conversion = SI) -> tuple[float, str]:
-    """Lengths in the unit stated, else in m, or in mm or µm where they are small."""
+    """Lengths in the unit stated, else in km, m, mm or µm by the largest."""
     if "m" in units:
         return unit_for(largest, "m", units)
     for size, unit in ((1e3, "km"), (1.0, "m"), (1e-3, "mm")):

@@ -8,10 +8,11 @@ import numpy as np
 
 from fourbar.errors import InputError
 from fourbar.show.plot.style import (
+    CAPTION,
     FAINT,
     FORCE_COLOURS,
     INK,
-    MUTED,
+    TITLE,
     degree_ticks,
     format_of,
     largest,
@@ -46,13 +47,11 @@ def draw_tolerances(found: Tolerances, path: str | Path) -> None:
     if len(found.theta_2) < 2:
         raise InputError("motion.theta_2", "one position", "a picture of bands needs a sweep")
     with matplotlib_style():
-        from matplotlib.backends.backend_agg import FigureCanvasAgg
         from matplotlib.figure import Figure
 
         parts = shown_parts(found)[:MOST_PANELS]
         columns = (len(parts) + 2) // 2
         figure = Figure(figsize=(2.95 * columns, 5.6), layout="constrained")
-        FigureCanvasAgg(figure)
         panels = figure.subplots(2, columns, squeeze=False).ravel()
         for axes, part in zip(panels, parts, strict=False):
             _band(axes, found, part)
@@ -61,14 +60,14 @@ def draw_tolerances(found: Tolerances, path: str | Path) -> None:
         _shares(panels[len(parts)], found, parts[0])
         title = plain(found.scene.title, 80) or "Four-bar linkage"
         heading = f"{title}: what the tolerances do ({found.samples} samples)"
-        figure.suptitle(heading, parse_math=False, size=10.5, weight="bold", x=0.012, ha="left")
+        figure.suptitle(heading, **TITLE)
         caption = (
             f"Deviation from the nominal. Filled: {BAND[0]:g} to {BAND[1]:g} % of the samples; thin: least and "
             "greatest sampled; dashed: first-order worst case."
         )
         lines = [caption, *(line for part in parts if (line := parted(found, part)))]
         text = "\n".join(textwrap.fill(line, 52 * columns) for line in lines)
-        figure.supxlabel(text, size=6.8, color=MUTED, x=0.012, ha="left", parse_math=False)
+        figure.supxlabel(text, **CAPTION)
         save(figure, target, kind)
 
 

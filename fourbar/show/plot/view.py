@@ -72,7 +72,8 @@ class View:
     @property
     def branch_name(self) -> str:
         """ "open", "crossed", or "both signs" where the motion follows a smooth path through change points."""
-        return branch_name(self.sweep.branch)
+        branch = self.sweep.branch
+        return "open" if np.all(branch == 1) else "crossed" if np.all(branch == -1) else "both signs"
 
     def state(self) -> State:
         """Kinematics at the position drawn."""
@@ -87,13 +88,6 @@ def point_vectors(scene: Scene, solution: Solution, letter: str) -> dict[str, Ar
     found = {name: getattr(solution, f"{letter}_{name}") for name in drawn}
     found |= solution.velocity if letter == "v" else solution.acceleration
     return {name: values for name, values in found.items() if values is not None}
-
-
-def branch_name(branch: np.ndarray) -> str:
-    """The branch of a set of positions in words."""
-    if np.all(branch == 1):
-        return "open"
-    return "crossed" if np.all(branch == -1) else "both signs"
 
 
 class Recorder(Actions):

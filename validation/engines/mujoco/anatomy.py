@@ -12,10 +12,11 @@ import numpy as np
 
 from fourbar.errors import InputError
 from fourbar.linkage import BAR_NAMES, MOVING_BARS, PINS
+from fourbar.linkage import ENDS as MOVING_ENDS
 from validation.compare.answer import Array
 
 PIN_OF = {frozenset(bars): pin for pin, bars in PINS.items()}
-ENDS = {1: ("O2", "O4"), 2: ("O2", "A"), 3: ("A", "B"), 4: ("O4", "B")}
+ENDS = {1: ("O2", "O4"), **MOVING_ENDS}
 """The pins between which a bar's line runs."""
 PLANES = {2: ("x-y", (0, 1)), 1: ("x-z", (0, 2)), 0: ("y-z", (1, 2))}
 """Axis of the hinges: the plane they move in, and the world axes that stand for x and y there."""

@@ -18,7 +18,7 @@ from fourbar.errors import InputError, LimitError
 from fourbar.mjcf import Settings, mjcf
 from fourbar.scene import Command, Scene
 from fourbar.scene import command as command_of
-from fourbar.writing import write_text
+from fourbar.writing import require_file, write_text
 from validation.engines.mujoco.dialled import FEWEST_STEPS, LONGEST, ORDER, SHORTEST, dialled, guess
 from validation.engines.mujoco.trial import Rig
 from validation.report.terminal import lined_up
@@ -195,6 +195,8 @@ def command(scenes: tuple[Path, ...], wanted: float, output: Path | None) -> int
     if output is not None and len(scenes) > 1:
         raise InputError("-o", str(output), f"is the MJCF of one scene, not of {len(scenes)}")
     loaded = [(scene, load(scene)) for scene in scenes]
+    if output is not None:
+        require_file(output, *scenes)
     rows, reached = [], True
     for file, scene in loaded:
         try:

@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from fourbar.show.plot.labels import Label, Labels
 from fourbar.show.plot.style import matplotlib_style, save
 from validation.studies.cost import orders
 from validation.studies.cost.laws import pareto
@@ -36,14 +37,8 @@ LOWEST = 1e-17
 """Bottom of the picture; fifty digits lie far below and are named at the edge."""
 NONE = 1e-18
 """Where a tolerance of 0 is drawn."""
-TURN = 5e-6
-"""Labels of the recommended settings stand left of the curve above this error, right of it below."""
-LEFT = frozenset(("formulas, double", "pinocchio-inverse", "MuJoCo at one state, extrapolated", "50 digits"))
-"""Names that stand left of their mark, where the right is taken."""
 NAMES = {"torque": "driving torque", "force": "worst pin force"}
 INK = "#333333"
-NEAR_TOP = 3e-2
-"""A label above a point with a larger error would reach the legend."""
 PALE = "#d9d9d9"
 
 
@@ -67,11 +62,12 @@ def _work_precision(curves: Mapping[str, Sequence[Point]], quantity: str, title:
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(9.6, 6.4))
-    axes = figure.add_axes((0.085, 0.1, 0.885, 0.735))
+    axes, labels = figure.add_axes((0.085, 0.1, 0.885, 0.735)), Labels()
     points = [point for name, row in curves.items() for point in row if "slow" not in name]
     front = pareto([p for p in points if p.kind == STEPPED], quantity)
     broad: dict[str, Any] = {"lw": 9.0, "solid_capstyle": "round", "solid_joinstyle": "round", "zorder": 1}
     axes.plot(*_places(front, quantity), **broad, color=PALE, label="Pareto front of everything stepped")
+    labels.keep_off(axes, *zip(*_places(front, quantity), strict=True))
     for label, look in SHOWN.items():
         row = [p for p in curves.get(look[0], ()) if math.isfinite(getattr(p, quantity))]
         if row:
@@ -79,20 +75,19 @@ def _work_precision(curves: Mapping[str, Sequence[Point]], quantity: str, title:
             style: dict[str, Any] = {"mec": look[1], "mew": 1.4} if look[2] == "x" else {"mew": 0.6}
             style["zorder"] = 3 if look[0] == "recommended" else 2
             line_of(axes, *_places(row, quantity), label, look, ms=5.5, lw=1.8, **style)
-    for point in curves.get("recommended", ())[::2]:  # left of the curve above the plain settings' floor, then right
-        tc, left = point.setting.partition("tc = ")[2], getattr(point, quantity) > TURN
-        text = f"{point.steps_per_revolution:.0f} steps, tc = {tc}"
-        _note(axes, point, quantity, text, (-10, -5) if left else (12, 4), "right" if left else "left", color="#0072b2")
-    if front and front[-1].curve != "recommended":
-        text = front[-1].setting.replace("tc held", "tc a quarter turn")
-        _note(axes, front[-1], quantity, text, (0, -16), "center", color="#666666")
+            labels.keep_off(axes, *zip(*_places(row, quantity), strict=True), width=1.8)
     for point in points:  # what a new user gets
         if point.setting == DEFAULT and math.isfinite(error := getattr(point, quantity)):
             axes.plot(*_places([point], quantity), marker="*", ms=19, color="#d55e00", mec="black", mew=0.9, zorder=5)
-            offset = (14, 16 if error < NEAR_TOP else -22)  # the legend stands above the axes
             text = f"MuJoCo's defaults (Euler, 2 ms): {short(error)}"
-            _note(axes, point, quantity, text, offset, fontsize=10, weight="bold")
-    _exact(axes, points, quantity)
+            _name(labels, axes, point, quantity, text, INK, 10.0)
+    _exact(labels, axes, points, quantity)
+    for point in curves.get("recommended", ())[::2]:
+        text = f"{point.steps_per_revolution:.0f} steps, tc = {point.setting.partition('tc = ')[2]}"
+        _name(labels, axes, point, quantity, text, "#0072b2")
+    if front and front[-1].curve != "recommended":
+        text = front[-1].setting.replace("tc held", "tc a quarter turn")
+        _name(labels, axes, front[-1], quantity, text, "#666666")
     axes.set(xscale="log", yscale="log", xlabel="CPU time per revolution [ms]")
     axes.set_ylabel(f"error of the {NAMES[quantity]}, relative to its scale")
     axes.set_ylim(LOWEST / 4.0, 3.0)
@@ -103,6 +98,7 @@ def _work_precision(curves: Mapping[str, Sequence[Point]], quantity: str, title:
     axes.xaxis.label.set_fontsize(11)
     axes.yaxis.label.set_fontsize(11)
     axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=4, fontsize=8.5)
+    labels.settle(figure)
     return headed(figure, statement(curves, quantity), title, 0.965, 0.928)
 
 
@@ -112,16 +108,16 @@ def _places(points: Sequence[Point], quantity: str) -> tuple[list[float], list[f
     return [1e3 * point.seconds_per_revolution for point in points], errors
 
 
-def _note(
-    axes: Any, point: Point, quantity: str, text: str, offset: tuple[float, float], ha: str = "left", **style: Any
+def _name(
+    labels: Labels, axes: Any, point: Point, quantity: str, text: str, colour: str = INK, size: float = 8.5
 ) -> None:
-    """Words next to a point."""
+    """Words next to a point, where they cover nothing."""
     (x,), (y,) = _places([point], quantity)
-    given = {"fontsize": 8.5} | style
-    axes.annotate(text, (x, y), xytext=offset, textcoords="offset points", ha=ha, **given)
+    labels.keep_off(axes, (x, y), (x, y))
+    labels.add(Label(axes, text, (x, y), (0.5 * x, y), colour, size))  # to the right where that is free
 
 
-def _exact(axes: Any, points: Sequence[Point], quantity: str) -> None:
+def _exact(labels: Labels, axes: Any, points: Sequence[Point], quantity: str) -> None:
     """Methods that answer each position by itself: one mark each, named next to it."""
     marks = {EXACT: ("h", "#009e73"), FORMULAS: ("*", "black")}
     for point in points:
@@ -130,8 +126,7 @@ def _exact(axes: Any, points: Sequence[Point], quantity: str) -> None:
         (marker, colour), value = marks[point.kind], getattr(point, quantity)
         axes.plot(*_places([point], quantity), marker=marker, ms=9, color=colour, mec="white", mew=0.6, zorder=4)
         name = point.setting if value >= LOWEST else f"{point.setting}: {short(value)}, far below"
-        left = point.setting in LEFT
-        _note(axes, point, quantity, name, (-8 if left else 8, 0), "right" if left else "left", va="center")
+        _name(labels, axes, point, quantity, name)
 
 
 def short(value: float) -> str:

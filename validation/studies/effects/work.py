@@ -22,9 +22,9 @@ EFFECTS: dict[str, "Callable[[], Effect | None]"] = {
     "none": lambda: None,
     "gravity": lambda: kinds.Gravity(9.81),
     "viscous": lambda: kinds.Viscous.at(O2=0.01, A=0.01, O4=0.01),
-    "viscous, pin B": lambda: kinds.Viscous.at(B=0.01),
+    "viscous at pin B": lambda: kinds.Viscous.at(B=0.01),
     "friction": lambda: kinds.Friction.at(O2=0.01, A=0.01, O4=0.01),
-    "friction, pin B": lambda: kinds.Friction.at(B=0.01),
+    "friction at pin B": lambda: kinds.Friction.at(B=0.01),
     "pin_friction": lambda: kinds.PinFriction.at(O2=(0.1, 0.01), A=(0.1, 0.01), B=(0.1, 0.01), O4=(0.1, 0.01)),
     "torsion": lambda: kinds.Torsion.at(O4=(2.0, 1.9, 0.1)),
     "springs": lambda: kinds.Springs(
