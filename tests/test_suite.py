@@ -36,7 +36,7 @@ from validation.scenes.random import LinkageType
 from validation.scenes.suites import AS_LONG_AS, MOST_POSITIONS, Files, Random, Suite, scene_files
 
 SEED = 7
-KILLS = int(os.environ.get("KILLS", "2"))
+KILLS = int(os.environ.get("KILLS", "1"))
 """Kills in each of the tests that kill; `make long-test` takes 50, and runs of full size."""
 FULL = "KILLS" in os.environ
 COUNT, IN_A_CHUNK = (220, 20) if FULL else (30, 3)
@@ -60,7 +60,7 @@ def judge_all(
 @pytest.mark.timeout(300)  # its hangs alone take half a minute, and every new worker imports the harness again
 def test_an_engine_that_crashes_or_hangs_costs_its_own_rows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(validation.run.run, "CHUNK", {True: 2, False: 2})
-    hangs = 3.0 * max(1.0, os.getloadavg()[0] / (os.cpu_count() or 1))  # s; a busy machine is given longer
+    hangs = 2.0 * max(1.0, os.getloadavg()[0] / (os.cpu_count() or 1))  # s; a busy machine is given longer
     moody = added.named(["tests.unlucky:Moody"], ())
     judge_all(Few(), tmp_path / "run", (*EXACT, *moody), seconds=hangs)
     rows = from_csv(tmp_path / "run" / "results.csv")

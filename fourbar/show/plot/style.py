@@ -62,7 +62,6 @@ SETTINGS: dict[Any, Any] = {
     "axes.grid": True,
     "axes.axisbelow": True,
     "axes.unicode_minus": True,
-    "axes.formatter.use_mathtext": True,
     "axes.formatter.limits": (-4, 5),
     "grid.color": "#e4e4e4",
     "grid.linewidth": 0.6,
