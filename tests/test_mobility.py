@@ -438,6 +438,8 @@ def test_the_default_range_is_as_wide_as_the_contract_says() -> None:
         assert (start < bars.ground_angle < stop) == holds_theta_1
 
 
-def test_a_bar_that_does_not_move_is_refused() -> None:
-    with pytest.raises(InputError, match="2, 3 or 4"):
+def test_a_bar_that_does_not_move_is_refused_and_so_is_what_is_no_linkage() -> None:
+    with pytest.raises(InputError, match="^bar = 1: must be 2, 3 or 4"):
         limit_positions(THESIS, 1)
+    with pytest.raises(InputError, match="^linkage = .*FourBar"):
+        limit_positions("thesis.toml")  # type: ignore[arg-type]
