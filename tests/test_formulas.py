@@ -13,7 +13,17 @@ import numpy as np
 import pytest
 
 import fourbar.formulas
-from fourbar.formulas.arithmetic import angle, cross, exact_difference, square_root, two_sum, vector
+from fourbar.formulas.arithmetic import (
+    angle,
+    cross,
+    exact_difference,
+    polar,
+    power_of_two,
+    square_root,
+    tangent,
+    two_sum,
+    vector,
+)
 from fourbar.formulas.mobility import limit_positions
 from fourbar.formulas.motion import Coefficients, Rates, State, rates
 from fourbar.formulas.path import drive_sine, drive_sine_of_triangle, path, state
@@ -66,6 +76,9 @@ def test_plain_numbers_stay_plain_and_arrays_broadcast() -> None:
         assert np.array_equal(vector(x, y), x + 1j * np.asarray(y))
     assert type(angle(1j)) is float and angle(1j) == 0.5 * math.pi
     assert [type(square_root(x)) for x in (0.0, 0.25)] == [float, float] and square_root(0.25) == 0.5
+    assert type(polar(2.0, 0.0)) is complex and polar(2.0, 0.0) == 2.0
+    assert type(tangent(0.25)) is float and type(power_of_two(0.7)) is float
+    assert power_of_two(0.7) == 1.0 and np.array_equal(power_of_two(np.array([0.7, 1.0, 3.0])), [1.0, 2.0, 4.0])
 
 
 def hard_doubles(seed: int, count: int) -> list[tuple[float, float, float, float]]:
