@@ -439,7 +439,7 @@ def test_the_default_range_is_as_wide_as_the_contract_says() -> None:
 
 
 def test_a_bar_that_does_not_move_is_refused_and_so_is_what_is_no_linkage() -> None:
-    with pytest.raises(InputError, match="^bar = 1: must be 2, 3 or 4"):
+    with pytest.raises(InputError, match=r"^bar = 1: must be 2, 3 or 4"):
         limit_positions(THESIS, 1)
-    with pytest.raises(InputError, match="^linkage = .*FourBar"):
+    with pytest.raises(InputError, match=r"^linkage = .*FourBar"):
         limit_positions("thesis.toml")  # type: ignore[arg-type]
