@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.formulas.arithmetic import anywhere, select, two_sum, vector
-from fourbar.formulas.motion import Coefficients, State, rates, side_turns_fast
+from fourbar.formulas.motion import Coefficients, State, rates, side_may_turn_fast, side_turns_fast
 from fourbar.formulas.path import read_backwards
 from fourbar.formulas.pin_forces import Body
 from fourbar.formulas.position import HalfAngle, Loop, Position
@@ -150,10 +150,11 @@ def rounded_coefficients(lengths: Loop, at: Position, k: Coefficients, signs: An
     d, a, b, c, _, _ = lengths
     g, dg = 0.5 * k.h43, 0.5 * (k.dh4 - k.dh3)
     m, x = k.h3 + g, ((b - c) * (b + c)) / at.e2
-    fast = side_turns_fast(lengths, at)
-    of_t, of_qg = select(fast, m, m - x * g), select(fast, 0.5, x * g)
-    of_rest = select(fast, 1.0 - m, 1.0 - of_t)
-    w = select(fast, m - 0.5, x * g - 0.5 * ((d - a) * (d + a)) / at.e2)
+    of_qg, w = x * g, x * g - 0.5 * ((d - a) * (d + a)) / at.e2
+    of_t = m - of_qg
+    if anywhere(side_may_turn_fast(lengths)):
+        fast = side_turns_fast(lengths, at)
+        of_t, of_qg, w = select(fast, m, of_t), select(fast, 0.5, of_qg), select(fast, m - 0.5, w)
     of_slope, of_side = x * dg, (4.0 * a * d * at.half.sk) * w / at.e2
     g_moved, dg_moved, qg_moved = g * signs[0], dg * signs[1], of_qg * signs[2]
     m_moved = of_t * signs[3] + qg_moved
@@ -162,7 +163,7 @@ def rounded_coefficients(lengths: Loop, at: Position, k: Coefficients, signs: An
         k.h2,
         rounded_real(k.h3, signs[6]) + m_moved - g_moved,
         rounded_real(k.h4, signs[7]) + m_moved + g_moved,
-        rounded_real(k.h23, signs[8]) + of_rest * signs[9] - qg_moved + g_moved,
+        rounded_real(k.h23, signs[8]) + (1.0 - of_t) * signs[9] - qg_moved + g_moved,
         rounded_real(k.h43, signs[10]) + 2.0 * g_moved,
         k.dh2,
         rounded_real(k.dh3, signs[11]) + slope_moved - dg_moved,
