@@ -144,7 +144,7 @@ def forces(
 
 
 def thirteen(signs: Any, first: int) -> Any:
-    """Thirteen of the signs."""
+    """Thirteen of the signs; with a slice of them the positions are evaluated one at a time, in thrice the time."""
     s, k = signs, first
     return (
         *(s[k], s[k + 1], s[k + 2], s[k + 3], s[k + 4], s[k + 5], s[k + 6]),
@@ -226,7 +226,7 @@ def run(tangents: Array, of_theta_2: Array, rows: Any, drive_bar: int, vectors: 
     rows : as of `numbers`.
     vectors : u2, u3, u4 and the pin forces, complex, (7 BLOCK,), written.
     scalars : sin mu, omega_3, omega_4, alpha_3, alpha_4, torque, sine of the drive, whether a position is left to
-        NumPy, error bars, (15 BLOCK,), written.
+        NumPy, error bars, and the sums of squares that they are made of, (15 BLOCK,), written.
     """
     turns = len(of_theta_2) > 0
     for i in range(len(tangents)):
