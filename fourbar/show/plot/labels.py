@@ -58,7 +58,7 @@ class Labels:
 
         renderer = FigureCanvasAgg(figure).get_renderer()  # type: ignore[no-untyped-call]
         figure.draw_without_rendering()
-        figure.set_layout_engine("none")  # labels must not move what they were measured against
+        figure.set_layout_engine(None)  # labels must not move what they were measured against
         per_point = figure.dpi / 72.0
         taken: list[tuple[Axes, Box]] = []
         samples: dict[int, list[np.ndarray]] = {}
