@@ -29,7 +29,6 @@ from fourbar.scene.error_bars import (
     EVALUATIONS,
     bar,
     rounded_coefficients,
-    rounded_complex,
     rounded_half_angle,
     rounded_real,
 )
@@ -48,6 +47,14 @@ def number(rows: Any, row: int, i: int) -> Any:
     return rows[row * BLOCK + i] if isinstance(rows, np.ndarray) else rows[row]
 
 
+def rounded_complex(z: Any, turned: Any, of_x: Any, of_y: Any) -> Any:
+    """Each part by itself; a ground at an angle mixes those of every direction, and each carries the larger's."""
+    if turned:
+        size = np.maximum(np.abs(z.real), np.abs(z.imag))
+        return z + vector(size * of_x, size * of_y)
+    return vector(rounded_real(z.real, of_x), rounded_real(z.imag, of_y))
+
+
 def complex_rounded(z: Any, turned: Any, signs: Any, first: int) -> Any:
     """A complex number, its parts changed by two of the signs; without signs itself."""
     return z if signs is None else rounded_complex(z, turned, signs[first], signs[first + 1])
@@ -63,12 +70,11 @@ def by_terms(x: Any, size: Any, signs: Any, first: int) -> Any:
     return x if signs is None else x + size * signs[first]
 
 
-def body_of(rows: Any, i: int, bar: int, turned: Any, signs: Any) -> Body:
+def body_of(rows: Any, i: int, bar: int) -> Body:
     """Bar 2, 3 or 4."""
-    row, sign = BODIES + OF_BODY * (bar - 2), 8 + 3 * (bar - 2)
+    row = BODIES + OF_BODY * (bar - 2)
     z = vector(number(rows, row + 2, i), number(rows, row + 3, i))
-    inertia = real_rounded(number(rows, row + 1, i), signs, sign)
-    return Body(number(rows, row, i), inertia, complex_rounded(z, turned, signs, sign + 1))
+    return Body(number(rows, row, i), number(rows, row + 1, i), z)
 
 
 def push_of(rows: Any, i: int, bar: int, z: Any, u: Any, turned: Any, signs: Any) -> tuple[Any, Any]:
@@ -86,8 +92,7 @@ def push_of(rows: Any, i: int, bar: int, z: Any, u: Any, turned: Any, signs: Any
 
 def viscous_of(rows: Any, i: int, pin: int, slip: Any, signs: Any) -> Any:
     """Couple of a viscous pin."""
-    coefficient = real_rounded(number(rows, VISCOUS + pin, i), signs, 56 + pin)
-    return real_rounded(-coefficient * (slip * number(rows, 12, i)), signs, 60 + pin)
+    return real_rounded(-number(rows, VISCOUS + pin, i) * (slip * number(rows, 12, i)), signs, 60 + pin)
 
 
 def forces(
@@ -104,11 +109,7 @@ def forces(
 ) -> tuple[PinForces, Any, Any]:
     """Pin forces, torque, and the sine of the drive, as `Case.dynamics` has them."""
     a, speed, acceleration = lengths.a, number(rows, 12, i), number(rows, 13, i)
-    two, three, four = (
-        body_of(rows, i, 2, turned, signs),
-        body_of(rows, i, 3, turned, signs),
-        body_of(rows, i, 4, turned, signs),
-    )
+    two, three, four = body_of(rows, i, 2), body_of(rows, i, 3), body_of(rows, i, 4)
     bodies = (two, three, four)
     w, mass_at_A = inertia_wrenches(a, bodies, at, moving)
     of_input, of_others = inertia(a, bodies, at, k)
@@ -184,11 +185,9 @@ def nearby(
     signs: Any,
 ) -> tuple[PinForces, Any]:
     """Pin forces and torque of position i with every number changed in its last digit, as `error_bars` has them."""
-    d, a, b, c, E1, E2 = in_unit
     half = rounded_half_angle(in_unit, half, number(rows, 15, i), False, thirteen(signs, 2))
-    in_unit = Loop(d, a, b, c, rounded_real(E1, signs[0]), rounded_real(E2, signs[1]))
     u2 = select(turned, u2, vector(half.kk - half.ss, 2.0 * half.sk))
-    near = close_loop(in_unit, u1, u2, half, number(rows, 14, i), lengths.d / d)
+    near = close_loop(in_unit, u1, u2, half, number(rows, 14, i), lengths.d / in_unit.d)
     k = coefficients(in_unit, near)
     near = with_sines_of_rates(in_unit, near, k)
     near = Position(
@@ -203,10 +202,7 @@ def nearby(
         half,
     )
     k = rounded_coefficients(in_unit, near, k, thirteen(signs, 25))
-    v = rates(k, number(rows, 12, i), number(rows, 13, i))
-    omega_3, omega_4 = rounded_real(v.omega_3, signs[38]), rounded_real(v.omega_4, signs[39])
-    alpha_3, alpha_4 = rounded_real(v.alpha_3, signs[40]), rounded_real(v.alpha_4, signs[41])
-    moving = Rates(v.omega_2, omega_3, omega_4, v.alpha_2, alpha_3, alpha_4)
+    moving = rates(k, number(rows, 12, i), number(rows, 13, i))
     pins, torque, _ = forces(lengths, in_unit, near, k, moving, rows, i, drive_bar, turned, signs)
     return pins, torque
 
@@ -291,10 +287,11 @@ LEAVES: tuple[tuple[Any, str], ...] = (
     (torque, "inertia half_slope driving_torque"),
     (path, "drive_sine_of_triangle"),
     (cases, "undecided"),
-    (bars, "rounded_real rounded_complex rounded_half_angle rounded_coefficients bar"),
+    (bars, "rounded_real rounded_half_angle rounded_coefficients bar"),
 )
 """What is compiled as it stands."""
 OWN = (
+    rounded_complex,
     complex_rounded,
     real_rounded,
     by_terms,

@@ -1,9 +1,11 @@
 """Error bars of torque and pin forces: how far rounding makes them scatter.
 
-The forces are evaluated again with every number of the position, coefficient, arm and term changed in its last
+The forces are evaluated again with every number of the position, coefficient and term of a sum changed in its last
 digit. All roundings then fall differently, so the root mean square of the changes is of the size of the error
-itself, whatever the formulas lose at this position. As many changes go up as down, in an order of its own for each
-number, so that those of different numbers do not cancel over the evaluations, which run as one batch.
+itself, whatever the formulas lose at this position. What is stated of the bars, loads and effects is exact, and
+what a product of it loses is no more than its other factors are changed by. As many changes go up as down, in an order
+of its own for each number, so that those of different numbers do not cancel over the evaluations, which run as one
+batch.
 """
 
 from functools import cache
@@ -13,19 +15,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.formulas.arithmetic import anywhere, select, two_sum, vector
+from fourbar.formulas.arithmetic import anywhere, select, two_sum
 from fourbar.formulas.motion import Coefficients, State, rates, side_may_turn_fast, side_turns_fast
 from fourbar.formulas.path import read_backwards
-from fourbar.formulas.pin_forces import Body
 from fourbar.formulas.position import HalfAngle, Loop, Position
-from fourbar.scene.case import Case, Dynamics, changed
+from fourbar.scene.case import Case, Dynamics
 
 EVALUATIONS = 14
 """Of the orders of seven changes up and seven down half are the others reversed, which leaves NUMBERS of them: so many
 numbers of which no two change alike in all evaluations, or against each other, and so cancel. With fewer evaluations
 the mean scatters more."""
 NUMBERS = 1716
-"""A scene has about sixty, and a few for each load and effect."""
+"""A scene has about fifty, and a few for each load and effect."""
 LAST_DIGIT = 1.01 * 2.0**-53
 """Relative: x + x LAST_DIGIT is the next double, whatever x."""
 LAST_ROUNDING = 2.0**-53
@@ -40,18 +41,36 @@ class Roundings:
     """Changes of numbers in their last digit, up or down, EVALUATIONS times at once."""
 
     def __init__(self, u1: Any) -> None:
-        self.signs = cycle(signs().T[:, :, None])
-        self.turned = (np.real(u1) != 0.0) & (np.imag(u1) != 0.0)
+        of_reals, of_parts = in_turn()
+        self.of_reals, self.of_parts = cycle(of_reals), cycle(of_parts)
+        turned = (np.real(u1) != 0.0) & (np.imag(u1) != 0.0)
+        self.turned = turned[..., None] if np.ndim(turned) else turned
 
     def __call__(self, number: Any) -> Any:
-        """Real numbers: the next double up or down, (EVALUATIONS, ...); each part of a complex one by itself."""
-        if isinstance(number, complex) or (isinstance(number, np.ndarray) and number.dtype.kind == "c"):
-            return rounded_complex(number, self.turned, *self.next(2))
-        return rounded_real(number, next(self.signs))
+        """Real numbers: the next double up or down, (EVALUATIONS, ...); each part of a complex one by itself.
+
+        A ground at an angle mixes the parts of every direction, and each carries the larger's.
+        """
+        if type(number) is float and number == 0.0:  # exact, and quicker alone than as many zeros
+            return number
+        if not isinstance(number, complex) and not (isinstance(number, np.ndarray) and number.dtype.kind == "c"):
+            return rounded_real(number, next(self.of_reals))
+        size = parts = np.asarray(number)[..., None].view(float)
+        if anywhere(self.turned):
+            size = select(self.turned, np.maximum(np.abs(parts[..., :1]), np.abs(parts[..., 1:])), parts)
+        return (parts + size * next(self.of_parts)).view(complex)[..., 0]
 
     def next(self, count: int) -> list[Any]:
-        """The signs of some more numbers."""
-        return [next(self.signs) for _ in range(count)]
+        """The signs of some more real numbers."""
+        return [next(self.of_reals) for _ in range(count)]
+
+
+@cache
+def in_turn() -> tuple[list[NDArray[np.float64]], list[NDArray[np.float64]]]:
+    """The signs of real numbers, each (EVALUATIONS, 1), and of both parts of complex ones, (EVALUATIONS, 1, 2)."""
+    of_reals, of_parts = np.split(signs().T, 2)
+    pairs = of_parts.reshape(-1, 2, EVALUATIONS).transpose(0, 2, 1)
+    return list(of_reals[:, :, None]), list(np.ascontiguousarray(pairs)[:, :, None])
 
 
 def error_bars(
@@ -64,33 +83,19 @@ def error_bars(
     state, acceleration, sign, found : the evaluation that the error bars are for; the sign is that of the path's root.
     exact : indices of the positions whose half angle is known in many digits.
     """
-    rounded = Roundings(state.at.u1)
-
-    def rounded_body(body: Body) -> Body:
-        return Body(body.m, rounded(body.I), rounded(body.z))
-
-    path = case.path
+    rounded, path = Roundings(state.at.u1), case.path
     q = state.theta_2 if path.bar == 2 else np.angle(state.at.u4)
     lost = two_sum(q, -path.theta_1)[1]
     known = exact.size > 0 and np.isin(np.arange(np.size(state.at.half.ss)), exact)
     half = rounded_half_angle(path.lengths, state.at.half, lost, known, rounded.next(6))
-    path = path._replace(lengths=Loop(*path.lengths[:4], *map(rounded, path.lengths[4:])))
     near, k = path.motion(path.position(q, half, sign), sign)
-    moved = case._replace(
-        path=path,
-        bodies=(rounded_body(case.bodies[0]), rounded_body(case.bodies[1]), rounded_body(case.bodies[2])),
-        terms=changed(case.terms, rounded),
-    )
     near = near._replace(sin_mu=rounded(near.sin_mu), diagonal=rounded(near.diagonal))
     near = near._replace(u2=rounded(near.u2), u3=rounded(near.u3), u4=rounded(near.u4))
     k = k if path.bar == 2 else read_backwards(k)
     k = rounded_coefficients(path.lengths, near, k, rounded.next(13))
     k = k if path.bar == 2 else read_backwards(k)
-    moving = rates(k, state.speed, acceleration)
-    stated = ("omega_2", "alpha_2") if path.bar == 2 else ()
-    moving = moving._replace(**{name: rounded(rate) for name, rate in moving._asdict().items() if name not in stated})
-    nearby = state._replace(at=near, k=k, moving=moving)
-    other = moved.dynamics(nearby, acceleration, rounded=rounded)
+    nearby = state._replace(at=near, k=k, moving=rates(k, state.speed, acceleration))
+    other = case.dynamics(nearby, acceleration, rounded=rounded)
     values, others = (*found.pins, found.torque), (*other.pins, other.torque)
     spread = root_mean_square(np.array([after - before for before, after in zip(values, others, strict=True)]))
     size = np.array([np.abs(value) for value in values]).reshape(spread.shape)
@@ -105,15 +110,6 @@ def rounded_real(x: Any, sign: Any) -> Any:
     return x + x * sign
 
 
-def rounded_complex(z: Any, turned: Any, of_x: Any, of_y: Any) -> Any:
-    """Each part by itself; a ground at an angle mixes those of every direction, and each carries the larger's."""
-    x, y = z.real, z.imag
-    if anywhere(turned):
-        size = np.maximum(np.abs(x), np.abs(y))
-        return z + vector(select(turned, size, x) * of_x, select(turned, size, y) * of_y)
-    return vector(rounded_real(x, of_x), rounded_real(y, of_y))
-
-
 def rounded_half_angle(lengths: Loop, half: HalfAngle, lost: Any, known: Any, signs: Any) -> HalfAngle:
     """The five numbers with their own roundings, that of theta_2 - theta_1, and those of the two sums.
 
@@ -126,7 +122,7 @@ def rounded_half_angle(lengths: Loop, half: HalfAngle, lost: Any, known: Any, si
     d, a, b, c, E1, E2 = lengths
     ss, kk, sk, outer, inner = half
     four_ad, four_bc = 4.0 * a * d, 4.0 * b * c
-    of_outer, of_inner = np.abs(E1) + four_ad * kk, np.abs(E2) + four_ad * ss
+    of_outer, of_inner = abs(E1) + four_ad * kk, abs(E2) + four_ad * ss
     of_outer, of_inner = np.minimum(of_outer, four_bc + of_inner), np.minimum(of_inner, four_bc + of_outer)
     of_outer, of_inner = select(known, outer, of_outer), select(known, inner, of_inner)
     turned = select(known, 0.0, lost) * np.sign(signs[0])
@@ -176,7 +172,7 @@ def root_mean_square(changes: Any) -> Any:
     size = np.abs(changes)
     largest = size.max(axis=-2, keepdims=True)
     size /= np.where(largest == 0.0, 1.0, largest)
-    return largest[..., 0, :] * np.sqrt(np.square(size).mean(axis=-2))
+    return largest[..., 0, :] * np.sqrt(np.square(size).sum(axis=-2) / EVALUATIONS)
 
 
 def bar(spread: Any, value: Any) -> Any:
