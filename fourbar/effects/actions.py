@@ -35,7 +35,7 @@ class Actions:
     """
 
     def __init__(
-        self, state: State, bodies: Bodies, side: int = 0, rounded: Callable[[Number], Number] | None = None
+        self, state: State, bodies: Bodies, side: int = 0, rounded: Callable[..., Number] | None = None
     ) -> None:
         self.state, self.bodies, self.side, self.rounded = state, bodies, side, rounded
         self.forces: dict[int, Any] = {}
@@ -53,7 +53,7 @@ class Actions:
         arm : from the bar's first pin to where it acts, complex, m, world axes.
         """
         if bar != 1:
-            force = self._rounded(force)
+            force = force if self.rounded is None else self.rounded(force, turned=True)
             self.forces[bar] = self.forces[bar] + force if bar in self.forces else force
             self.moment(bar, cross(arm, force))
 

@@ -46,18 +46,22 @@ class Roundings:
         turned = (np.real(u1) != 0.0) & (np.imag(u1) != 0.0)
         self.turned = turned[..., None] if np.ndim(turned) else turned
 
-    def __call__(self, number: Any) -> Any:
+    def __call__(self, number: Any, *, turned: bool = False) -> Any:
         """Real numbers: the next double up or down, (EVALUATIONS, ...); each part of a complex one by itself.
 
-        A ground at an angle mixes the parts of every direction, and each carries the larger's.
+        Parameters
+        ----------
+        turned : whether a direction, known to its last digit, mixes the parts, and each carries the larger's, as all do
+            with a ground at an angle.
         """
         if type(number) is float and number == 0.0:  # exact, and quicker alone than as many zeros
             return number
         if not isinstance(number, complex) and not (isinstance(number, np.ndarray) and number.dtype.kind == "c"):
             return rounded_real(number, next(self.of_reals))
         size = parts = np.asarray(number)[..., None].view(float)
-        if anywhere(self.turned):
-            size = select(self.turned, np.maximum(np.abs(parts[..., :1]), np.abs(parts[..., 1:])), parts)
+        mixed = turned or self.turned
+        if anywhere(mixed):
+            size = select(mixed, np.maximum(np.abs(parts[..., :1]), np.abs(parts[..., 1:])), parts)
         return (parts + size * next(self.of_parts)).view(complex)[..., 0]
 
     def next(self, count: int) -> list[Any]:
