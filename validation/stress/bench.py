@@ -60,6 +60,8 @@ OVER_POSITIONS = "all unknowns of a position, over the number of positions (1e6 
 OVER_LINKAGES = "all forces of a linkage at one position, over the number of linkages"
 SOLVED = 100_000
 """Positions where every array is allocated, and for the error bars, which evaluate the forces 15 times."""
+ALONE = 20
+"""Calls of one position each."""
 PER_SCENE = 50_000
 """Positions in whose stead one random scene is judged: twenty of them by default."""
 JUDGED = "a scene judged by the exact engines"
@@ -204,6 +206,8 @@ def measure(positions: int, rounds: int, largest: int) -> Measured:
     everything, angles = preallocated(UNKNOWNS, VECTORS, positions), preallocated(ANGLES, VECTORS, positions)
     batch, solved = min(positions, THIRTEEN_BATCH), command(min(positions, SOLVED))
     bodies = bodies_of(scene, command(batch))
+    alone, rng = example(theta_2=1.0), np.random.default_rng(0)
+    systems, right = rng.random((1000, 13, 13)), rng.random((1000, 13, 1))
     peers, others = loops(), engines()
     actions: dict[str, Callable[[], object]] = {
         "formulas, all 11 unknowns": lambda: solve(scene, at=at, out=everything, compiled=False),
@@ -217,6 +221,9 @@ def measure(positions: int, rounds: int, largest: int) -> Measured:
         "solve with error bars": lambda: solve(scene, "error", at=solved, compiled=False),
         "compiled to forces, points too": lambda: solve(scene, "force", at=solved, compiled=True),
         "compiled with error bars": lambda: solve(scene, "error", at=solved, compiled=True),
+        "13x13 solved, 1000 at once": lambda: np.linalg.solve(systems, right),
+        "one position to forces": lambda: [solve(alone) for _ in range(ALONE)],
+        "one position with error bars": lambda: [solve(alone, "error") for _ in range(ALONE)],
     }
     out = np.zeros((15, positions))
     actions |= {f"{name}, all": partial(loop, at.theta_2, out) for name, loop in peers.here.items() if name in IN_C}
@@ -229,6 +236,8 @@ def measure(positions: int, rounds: int, largest: int) -> Measured:
     to_stages += ["compiled to forces, points too", "compiled with error bars"]
     counts |= dict.fromkeys(to_stages, len(solved.theta_2))
     counts |= dict.fromkeys(others.here, ONE_BY_ONE)
+    counts |= {"13x13 solved, 1000 at once": len(systems)}
+    counts |= dict.fromkeys(("one position to forces", "one position with error bars"), ALONE)
     rows = {name: 1e9 * value / counts.get(name, positions) for name, value in times.items()}
     by_positions = over_positions(peers.here, largest, rounds)
     by_linkages = over_linkages(positions, rounds, compiled="compiled" in peers.here)
@@ -249,6 +258,9 @@ def measure(positions: int, rounds: int, largest: int) -> Measured:
         "positions only / floor": rows["positions only"] / rows["floor: tangent, root, two arctan"],
         "solve to forces / formulas": forces / everything_ns,
         "solve with error bars / to forces": rows["solve with error bars"] / forces,
+        "one position / 13x13 solved": rows["one position to forces"] / rows["13x13 solved, 1000 at once"],
+        "one position with error bars / to forces": rows["one position with error bars"]
+        / rows["one position to forces"],
         "study of linkages / positions": by_linkages[STUDY][most] / by_linkages[POSITIONS][most],
         "growth from 1000 positions on": max(cost.values()) / cost[min(cost)],
         "memory beyond the result, MB": memory(min(positions, 1_000_000)),
