@@ -24,7 +24,7 @@ LIMITS = {
     "solve with error bars / to forces": Limit(
         "<=", 25.0, "the forces are evaluated 15 times, every number rounded anew"
     ),
-    "one position / 13x13 solved": Limit("<=", 70.0, "some hundred steps of Python, none of them said twice"),
+    "one position / 13x13 solved": Limit("<=", 70.0, "some hundred steps of Python, and no array"),
     "one position with error bars / to forces": Limit("<=", 4.5, "the evaluations run as one batch of short arrays"),
     "numpy / compiled": Limit(">=", 1.2, "who installs numba gains by it on one core"),
     "compiled / C": Limit("<=", 1.5, "the blocks, statuses and copies around the compiled loop stay small"),
