@@ -25,7 +25,7 @@ from validation.compare.compare import compare
 from validation.compare.identities import identities
 from validation.compare.rows import FAILS
 from validation.compare.statements.statements import statements
-from validation.engines.witnesses import WITNESSES, Witness
+from validation.engines.witnesses import WITNESSES, Witness, predicting_from
 
 CHANGES = 1e-9
 SECONDS = 20
@@ -119,7 +119,8 @@ def caught(scene: Scene, at: Command, answers: list[tuple[Witness, Answer]]) -> 
     solution = solve(scene, at=at)
     rows = identities("", scene, at, solution)
     for witness, answer in answers:
-        rows += compare("", scene, answer, solution, witness.tolerance, witness.expected)
+        predicted = predicting_from(witness, scene, at, answer)
+        rows += compare("", scene, answer, solution, witness.tolerance, witness.expected, predicted)
     if not any(row.verdict == FAILS for row in rows):
         rows += [row for witness, answer in answers for row in statements("", scene, witness.engine(), answer)]
     return any(row.verdict == FAILS for row in rows)
