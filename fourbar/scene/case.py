@@ -134,7 +134,7 @@ class Case(NamedTuple):
         return half, index
 
     def dynamics(
-        self, state: State, acceleration: Any, side: int = 0, rounded: Callable[[Any], Any] | None = None
+        self, state: State, acceleration: Any, side: int = 0, rounded: Callable[..., Any] | None = None
     ) -> Dynamics:
         """Pin forces and torque under everything that acts; for the parameters see `Actions`."""
         a, at, k = self.lengths.a, state.at, state.k

@@ -47,17 +47,18 @@ def number(rows: Any, row: int, i: int) -> Any:
     return rows[row * BLOCK + i] if isinstance(rows, np.ndarray) else rows[row]
 
 
-def rounded_complex(z: Any, turned: Any, of_x: Any, of_y: Any) -> Any:
-    """Each part by itself; a ground at an angle mixes those of every direction, and each carries the larger's."""
+def complex_rounded(z: Any, turned: Any, signs: Any, first: int) -> Any:
+    """A complex number, each part changed by one of two signs; without signs itself.
+
+    A ground at an angle mixes the parts of every direction, and each carries the larger's.
+    """
+    if signs is None:
+        return z
+    of_x, of_y = signs[first], signs[first + 1]
     if turned:
         size = np.maximum(np.abs(z.real), np.abs(z.imag))
         return z + vector(size * of_x, size * of_y)
     return vector(rounded_real(z.real, of_x), rounded_real(z.imag, of_y))
-
-
-def complex_rounded(z: Any, turned: Any, signs: Any, first: int) -> Any:
-    """A complex number, its parts changed by two of the signs; without signs itself."""
-    return z if signs is None else rounded_complex(z, turned, signs[first], signs[first + 1])
 
 
 def real_rounded(x: Any, signs: Any, first: int) -> Any:
@@ -192,11 +193,11 @@ def nearby(
     near = with_sines_of_rates(in_unit, near, k)
     near = Position(
         u1,
-        rounded_complex(u2, turned, signs[19], signs[20]),
-        rounded_complex(near.u3, turned, signs[21], signs[22]),
-        rounded_complex(near.u4, turned, signs[23], signs[24]),
+        complex_rounded(u2, turned, signs, 19),
+        complex_rounded(near.u3, turned, signs, 21),
+        complex_rounded(near.u4, turned, signs, 23),
         rounded_real(near.sin_mu, signs[17]),
-        rounded_complex(near.diagonal, turned, signs[18], signs[85]),
+        complex_rounded(near.diagonal, turned, signs, 0),
         near.e2,
         near.root,
         half,
@@ -291,7 +292,6 @@ LEAVES: tuple[tuple[Any, str], ...] = (
 )
 """What is compiled as it stands."""
 OWN = (
-    rounded_complex,
     complex_rounded,
     real_rounded,
     by_terms,

@@ -22,7 +22,7 @@ LIMITS = {
     "positions only / floor": Limit("<=", 6.0, "the rest of two angles is arithmetic on arrays of a block"),
     "solve to forces / formulas": Limit("<=", 2.0, "new arrays and the points come on top, no second evaluation"),
     "solve with error bars / to forces": Limit(
-        "<=", 25.0, "the forces are evaluated 15 times, every number rounded anew"
+        "<=", 25.0, "the forces are evaluated 15 times, all that is computed changed in its last digit"
     ),
     "one position / 13x13 solved": Limit("<=", 70.0, "some hundred steps of Python, and no array"),
     "one position with error bars / to forces": Limit("<=", 4.5, "the evaluations run as one batch of short arrays"),
