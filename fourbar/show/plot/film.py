@@ -195,7 +195,7 @@ def _stage(shown: View, moving: bool) -> tuple["Figure", Any]:
     axes.set_title("θ")
     pad = path_legend(axes)
     figure.draw_without_rendering()
-    figure.set_layout_engine("none")  # nothing jumps from frame to frame
+    figure.set_layout_engine(None)  # nothing jumps from frame to frame
 
     def move(index: int) -> None:
         pins = {"O2": np.zeros(2), "A": sweep.A[index], "B": sweep.B[index], "O4": np.array(O4)}
