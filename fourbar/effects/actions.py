@@ -55,7 +55,7 @@ class Actions:
         if bar != 1:
             force = force if self.rounded is None else self.rounded(force, turned=True)
             self.forces[bar] = self.forces[bar] + force if bar in self.forces else force
-            self.moment(bar, cross(arm, force))
+            self.moment(bar, cross(-force, arm))
 
     def moment(self, bar: int, moment: Number) -> None:
         """A pure couple on a bar, N m; on the ground it does nothing."""
@@ -74,7 +74,7 @@ class Actions:
         k = self.state.k
         parts = [self.moments[bar] * h for bar, h in ((3, k.h3), (4, k.h4)) if bar in self.moments]
         if 3 in self.forces:
-            parts.append(self.state.lengths.a * k.h2 * cross(self.state.at.u2, self.forces[3]))
+            parts.append(cross(-self.state.lengths.a * k.h2 * self.forces[3], self.state.at.u2))
         others = sum(parts[1:], parts[0]) if parts else 0.0
         total = others + self.moments[2] * k.h2 if 2 in self.moments else others
         for pin, couple in self.couples.items():

@@ -80,11 +80,16 @@ def power_of_two(x: Number) -> Number:
     return math.ldexp(1.0, math.frexp(x)[1]) if type(x) is float else np.ldexp(1.0, np.frexp(x)[1])
 
 
-def cross(u: Number, v: Number) -> Number:
-    """z-component of u x v."""
+def sine(u: Number, v: Number) -> Number:
+    """Of the angle from one direction to another: zero exactly where they are equal."""
     return u.real * v.imag - u.imag * v.real
+
+
+def cross(u: Number, v: Number) -> Number:
+    """z-component of u x v, the imaginary part of u* v; over arrays least work where u is one number."""
+    return (u.conjugate() * v).imag
 
 
 def dot(u: Number, v: Number) -> Number:
     """Scalar product u . v."""
-    return u.real * v.real + u.imag * v.imag
+    return (u.conjugate() * v).real

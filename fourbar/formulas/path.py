@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fourbar.formulas.arithmetic import Number, anywhere, cross, dot, polar, power_of_two, vector
+from fourbar.formulas.arithmetic import Number, anywhere, dot, polar, power_of_two, sine, vector
 from fourbar.formulas.motion import Coefficients, State, coefficients, rates, with_sines_of_rates
 from fourbar.formulas.motion import with_parallel_pairs as parallel_motion
 from fourbar.formulas.position import HalfAngle, Loop, Position, close_loop, direction, half_angle, loop, parallel_pairs
@@ -133,7 +133,7 @@ def drive_sine(at: Position, drive_bar: int) -> Number:
     """sin(theta_4 - theta_3), sin(theta_4 - theta_2), sin(theta_3 - theta_2) for the drive on bar 2, 3, 4."""
     if drive_bar == 2:
         return at.sin_mu
-    return cross(at.u2, at.u4 if drive_bar == 3 else at.u3)
+    return sine(at.u2, at.u4 if drive_bar == 3 else at.u3)
 
 
 def drive_sine_of_triangle(lengths: Loop, at: Position, drive_bar: int) -> Number:
@@ -175,8 +175,8 @@ def _turned_round(reading: Path, at: Position) -> Position:
     d, c, b, a, _, _ = reading.lengths
     u1, u2, u3, u4 = -at.u1, at.u4, -at.u3, at.u2
     diagonal = d * u1 - a * u2
-    sine, e2 = cross(u3, u4), dot(diagonal, diagonal)
-    return Position(u1, u2, u3, u4, sine, diagonal * reading.unit, e2, 2.0 * b * c * sine, at.half)
+    sin_mu, e2 = sine(u3, u4), dot(diagonal, diagonal)
+    return Position(u1, u2, u3, u4, sin_mu, diagonal * reading.unit, e2, 2.0 * b * c * sin_mu, at.half)
 
 
 def read_backwards(k: Coefficients) -> Coefficients:

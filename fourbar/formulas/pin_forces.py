@@ -75,13 +75,13 @@ def inertia_wrenches(a: Number, bodies: Bodies, at: Position, moving: Rates) -> 
     two, three, four = bodies
     w2, w3, w4, alpha_2, alpha_3, alpha_4 = moving
     of_2 = vector(w2 * w2, -alpha_2)
-    G3, turned = three.z * at.u3, of_2 * at.u2
+    to_G = (three.m * three.z) * at.u3  # m (G - A)
     return Wrenches(
-        (two.m * two.z) * turned,
-        vector(three.m * w3 * w3, -three.m * alpha_3) * G3,
-        (four.m * four.z) * vector(w4 * w4, -alpha_4) * at.u4,
+        (two.m * two.z * of_2) * at.u2,
+        vector(w3 * w3, -alpha_3) * to_G,
+        vector(w4 * w4, -alpha_4) * ((four.m * four.z) * at.u4),
         -about_first_pin(two) * alpha_2,
-        three.m * a * cross(G3, turned) - about_first_pin(three) * alpha_3,
+        cross(to_G, (a * of_2) * at.u2) - about_first_pin(three) * alpha_3,
         -about_first_pin(four) * alpha_4,
     ), (three.m * a) * of_2
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.errors import InputError, expect
-from fourbar.formulas.arithmetic import Number, cross
+from fourbar.formulas.arithmetic import Number, cross, sine
 from fourbar.formulas.circuits import circuits
 from fourbar.formulas.mobility import TURN, Array, change_points, on_smooth_path, turns_fully
 from fourbar.formulas.motion import State
@@ -81,8 +81,8 @@ def instant_centres(linkage: FourBar, theta_2: Array, branch: Number) -> dict[tu
         bars: Centre(p.real, p.imag, one) for bars, p in {(1, 2): 0.0 * A, (2, 3): A, (3, 4): B, (1, 4): O4}.items()
     }
     I13, I24 = cross(O4, at.u4) * at.u2, cross(A, at.u3) * at.u1
-    centres[1, 3] = Centre(I13.real, I13.imag, cross(at.u2, at.u4))
-    centres[2, 4] = Centre(I24.real, I24.imag, cross(at.u1, at.u3))
+    centres[1, 3] = Centre(I13.real, I13.imag, sine(at.u2, at.u4))
+    centres[2, 4] = Centre(I24.real, I24.imag, sine(at.u1, at.u3))
     return centres
 
 

@@ -133,7 +133,8 @@ def close_loop(lengths: Loop, u1: Number, u2: Number, half: HalfAngle, branch: N
     diagonal = vector((d - a) * unit + twice_a * half.ss, -twice_a * half.sk) * u1
     # e^2 + b^2 - c^2 and b^2 - e^2 - c^2 from the factor that the root is made of, so that u3, u4 keep their length
     at_A, at_O4 = half.inner + 2.0 * b * (b - c), 2.0 * c * (b - c) - half.inner
-    to_3, to_4 = (0.5 / unit) / (b * e2), (0.5 / unit) / (c * e2)
+    part = (0.5 / unit) / e2
+    to_3, to_4 = (1.0 / b) * part, (1.0 / c) * part
     u3 = diagonal * vector(at_A * to_3, root * to_3)
     u4 = diagonal * vector(at_O4 * to_4, root * to_4)
     return Position(u1, u2, u3, u4, root * (0.5 / (b * c)), diagonal, e2, root, half)

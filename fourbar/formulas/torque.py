@@ -37,11 +37,12 @@ def half_slope(a: Number, bodies: Bodies, at: Position, k: Coefficients) -> Numb
         G'.G'' = a^2 h2 h2' + r^2 h3 h3' + (h2 h3' + h3 h2') A.R + h2 h3 (h2 - h3) A x R.
     """
     two, three, four = bodies
-    AR = ((a * three.m * three.z) * at.u3) * at.u2.conjugate()
+    AR = ((a * k.h2 * three.m * three.z) * at.u3) * at.u2.conjugate()
     half = about_first_pin(three) * (k.h3 * k.dh3) + about_first_pin(four) * (k.h4 * k.dh4)
-    half = half + (k.h2 * k.dh3) * AR.real + (k.h2 * k.h3 * k.h23) * AR.imag
+    half = half + k.dh3 * AR.real + (k.h3 * k.h23) * AR.imag
     if anywhere(k.dh2 != 0.0):  # q is not theta_2
-        half = half + (k.h3 * k.dh2) * AR.real + (about_first_pin(two) + three.m * a * a) * (k.h2 * k.dh2)
+        half = half + (k.h3 * k.dh2) * dot((a * three.m) * at.u2, three.z * at.u3)
+        half = half + (about_first_pin(two) + three.m * a * a) * (k.h2 * k.dh2)
     return half
 
 

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import fourbar
 from fourbar.errors import DependencyError, FourBarError, InputError
-from fourbar.quantities import ANGLES, UNKNOWNS, VECTORS
+from fourbar.quantities import ANGLES, UNKNOWNS
 from validation.run.elsewhere import ended
 
 TREE = Path(fourbar.__file__).resolve().parents[1]
@@ -77,7 +77,7 @@ def _git(tree: Path, arguments: list[str]) -> bytes:
 def timings(tree: Path, name: str, positions: int) -> dict[str, float]:
     """CPU seconds of each timing in a fresh interpreter that imports the package from a tree."""
     script = str(Path(__file__).with_name("timed.py"))
-    line = [sys.executable, "-P", script, str(positions), *(" ".join(names) for names in (UNKNOWNS, ANGLES, VECTORS))]
+    line = [sys.executable, "-P", script, str(positions), *(" ".join(names) for names in (UNKNOWNS, ANGLES))]
     path = os.pathsep.join(filter(None, (str(tree), os.environ.get("PYTHONPATH"))))
     done = ended(line, variables=dict.fromkeys(ONE_THREAD, "1") | {"PYTHONPATH": path})
     if done.why:

@@ -18,7 +18,7 @@ from fourbar.effects import Gravity
 from fourbar.errors import BROKEN, FAILED, HOLDS
 from fourbar.formulas.mobility import default_range
 from fourbar.linkage import MOVING_BARS, Bar, FourBar
-from fourbar.quantities import ANGLES, UNKNOWNS, VECTORS
+from fourbar.quantities import ANGLES, UNKNOWNS
 from fourbar.scene import Command, Scene
 from fourbar.scene.case import BLOCK
 from fourbar.show.plot.style import format_of
@@ -102,7 +102,8 @@ def import_cost() -> float:
 
 def memory(n: int) -> float:
     """MB allocated at the peak beyond arguments and results."""
-    at, out = command(n), preallocated(UNKNOWNS, VECTORS, n)
+    at = command(n)
+    out = preallocated(UNKNOWNS, at)
     tracemalloc.start()
     solve(example(), at=at, out=out, compiled=False)
     peak = tracemalloc.get_traced_memory()[1]
@@ -203,7 +204,7 @@ def measure(positions: int, rounds: int, largest: int) -> Measured:
     """Rows of the table: the ratios of LIMITS, and ns per position; and the times by how many."""
     scene, at = example(), command(positions)
     limits, swing = example(WITH_LIMITS), command(positions, *default_range(WITH_LIMITS))
-    everything, angles = preallocated(UNKNOWNS, VECTORS, positions), preallocated(ANGLES, VECTORS, positions)
+    everything, angles = preallocated(UNKNOWNS, at), preallocated(ANGLES, at)
     batch, solved = min(positions, THIRTEEN_BATCH), command(min(positions, SOLVED))
     bodies = bodies_of(scene, command(batch))
     alone, rng = example(theta_2=1.0), np.random.default_rng(0)

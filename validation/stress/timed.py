@@ -31,9 +31,10 @@ def command(n: int, start: float = 0.0, stop: float = 2.0 * np.pi) -> Command:
     return Command(np.linspace(start, stop, n), np.broadcast_to(np.int8(1), (n,)), 10.0, 0.0)
 
 
-def preallocated(names: Iterable[str], vectors: Iterable[str], n: int) -> dict[str, Array]:
-    """Result arrays, already touched so that no page is faulted in while the clock runs."""
-    return {name: np.zeros((2, n)).T if name in vectors else np.zeros(n) for name in names}
+def preallocated(names: Iterable[str], at: Command) -> dict[str, Array]:
+    """Result arrays as `solve` itself lays them out, touched so that no page is faulted in while the clock runs."""
+    first = solve(example(), at=at)
+    return {name: getattr(first, name) for name in names}
 
 
 def seconds(action: Callable[[], object], calls: int = 1) -> float:
@@ -53,10 +54,10 @@ def in_turns(clocks: Mapping[Any, Callable[[], float]], rounds: int) -> dict[Any
     return times
 
 
-def main(positions: int, unknowns: list[str], angles: list[str], vectors: list[str]) -> dict[str, float]:
+def main(positions: int, unknowns: list[str], angles: list[str]) -> dict[str, float]:
     """CPU seconds of each timing, by name."""
     scene, whole, at, one = example(), example(theta_2=None), command(positions), command(1, 1.0, 1.0)
-    everything, alone = preallocated(unknowns, vectors, positions), preallocated(angles, vectors, positions)
+    everything, alone = preallocated(unknowns, at), preallocated(angles, at)
     actions: dict[str, Callable[[], object]] = {
         "formulas, all unknowns": lambda: solve(scene, at=at, out=everything),
         "angles alone": lambda: solve(scene, at=at, out=alone),
