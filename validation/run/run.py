@@ -28,7 +28,7 @@ from validation.report.html import Section, html
 from validation.report.junit import cases, document
 from validation.report.markdown import markdown
 from validation.report.record import Record
-from validation.report.summary import PICTURED, Summary, Summing
+from validation.report.summary import PICTURED, Summary
 from validation.run import pool
 from validation.run.code import code
 from validation.run.elsewhere import run_elsewhere
@@ -104,9 +104,9 @@ def run(
         for number, records in answers:
             store.put(number, records)
             yield len(records)
-        held_to = list(dict.fromkeys((IDENTITY, *(witness.tolerance for witness in witnesses))))
-        ladder = ladder_rows() if published else []
-        summing = Summing()
+        summary = Summary()
+        summary.tolerances = list(dict.fromkeys((IDENTITY, *(witness.tolerance for witness in witnesses))))
+        summary.missing, summary.ladder = missing, ladder_rows() if published else ()
         times = out / ".timings.csv.part"
         with (
             Columns(out) as columns,
@@ -117,18 +117,17 @@ def run(
             for number, scenes in enumerate(chunks):
                 records = store.read(number)
                 for each in records:
-                    summing.add(each)
+                    summary.add(each)
                     csv.writer(file, lineterminator="\n").writerows(timings(each))
                 columns.add([row for each in records for row in each.rows])
                 yield Collected(len(scenes))
         os.replace(times, out / "timings.csv")
-        pictured = {record.name for record in summing.pictured} if drawn else set()
+        pictured = {record.name for record in summary.pictured} if drawn else set()
         places = [index for index in range(len(suite)) if plain(suite.name(index)) in pictured]
         if drawn and not draw:
-            for shown in pictures_of(suite, places, summing.pictured, witnesses, workers, seconds):
-                summing.picture(shown)
+            for shown in pictures_of(suite, places, summary.pictured, witnesses, workers, seconds):
+                summary.picture(shown)
                 yield Drawn(1)
-        summary = summing.summary(ladder, held_to, missing)
         factors = {witness.name: witness.tolerance.factor for witness in witnesses}
         record = about(factors, suite.fingerprint(), descriptions(suite))
         if cluster is not None:
