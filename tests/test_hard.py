@@ -24,7 +24,7 @@ from validation.engines.mujoco.closed_loop import ClosedLoop
 from validation.engines.mujoco.shipped import shipped
 from validation.engines.prediction import from_data, in_world_axes
 from validation.engines.witnesses import Witness
-from validation.report.hard_page import limit_rows, page
+from validation.report.hard_page import page
 from validation.report.record import Record
 from validation.run.judge import judge
 from validation.run.released import as_pendulum, judge_released
@@ -243,7 +243,7 @@ def test_an_engine_that_drifts_unpredicted_fails(monkeypatch: pytest.MonkeyPatch
 def test_the_page_says_every_limit_and_statement() -> None:
     text = page("<svg></svg>")
     assert all(html.escape(family.statement) in text for family in FAMILIES)
-    assert all(html.escape(row[1]) in text for row in limit_rows())
+    assert all(html.escape(limit.of.name) in text for limit in LIMITS)
 
 
 def test_a_golden_file_of_others_swept_through_its_change_point() -> None:

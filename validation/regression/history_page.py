@@ -69,11 +69,9 @@ def _counts(run: Run) -> Counter[str]:
 
 
 def _figure(draw: Any, salt: str) -> str:
-    from matplotlib.backends.backend_svg import FigureCanvasSVG
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=SIZE, layout="constrained")
-    FigureCanvasSVG(figure)
     axes = figure.add_subplot()
     draw(axes)
     axes.grid(axis="y", color=GRID, linewidth=0.5)
