@@ -22,9 +22,10 @@ from tests.test_regression import HERE, ROW, save
 from validation.check.model import ModelReport
 from validation.cli import status
 from validation.compare.answer import Answer, Released
+from validation.compare.columns import read_columns
 from validation.compare.compare import compare
 from validation.compare.counts import Counts
-from validation.compare.rows import AGREES, DEGRADED, FAILS, REFUSES, UNDECIDED, VERDICTS, Row, from_csv, write_results
+from validation.compare.rows import AGREES, DEGRADED, FAILS, REFUSES, UNDECIDED, VERDICTS, Row, write_results
 from validation.compare.tolerance import EQUIVALENCE
 from validation.engines.witnesses import WITNESSES, Witness
 from validation.regression import render
@@ -94,7 +95,7 @@ def test_a_table_cannot_say_that_a_refusal_passed(tmp_path: Path) -> None:
     text = (tmp_path / "results.csv").read_text()
     assert ",false,refuses," in text
     (tmp_path / "results.csv").write_text(text.replace(",false,", ",true,"))
-    assert [row.passed for row in from_csv(tmp_path / "results.csv")] == [False]
+    assert [row.passed for row in read_columns(tmp_path / "results.csv")] == [False]
     (tmp_path / "results.csv").write_text(text.replace("refuses", "FAILED"))
     assert status(["compare", str(tmp_path), str(tmp_path)]) == 2
 

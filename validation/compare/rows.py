@@ -3,10 +3,9 @@
 import csv
 import io
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, fields
 from pathlib import Path
-from typing import Any
 
 from fourbar.writing import write_text
 from validation.compare.plain import plain
@@ -95,29 +94,6 @@ def _cell(value: object) -> str:
 
 MADE_OF = {column.name: column.type for column in fields(Row) if column.init}
 """Columns that make a row, with their types: whether it passed follows from them."""
-
-
-def rows_of_csv(path: Path) -> Iterator[Row]:
-    """The rows of a table written by `to_csv`, one after the other."""
-    with path.open(newline="", encoding="utf-8") as file:
-        for cells in csv.DictReader(file):
-            yield Row(*(_value(cells[name], kind is float) for name, kind in MADE_OF.items()))
-
-
-def _value(cell: str, number: bool) -> Any:
-    return (float(cell) if cell else math.nan) if number else plain(cell)
-
-
-def column_of_csv(path: Path, column: str) -> Iterator[str]:
-    """The words in a column of such a table."""
-    with path.open(newline="", encoding="utf-8") as file:
-        for cells in csv.DictReader(file):
-            yield plain(cells[column])
-
-
-def from_csv(path: Path) -> list[Row]:
-    """All rows of a table written by `to_csv`."""
-    return list(rows_of_csv(path))
 
 
 def write_results(rows: Iterable[Row], path: Path) -> None:

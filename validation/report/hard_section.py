@@ -3,8 +3,9 @@
 from collections.abc import Iterable
 from pathlib import Path
 
+from validation.compare.columns import read_columns
 from validation.compare.counts import Counts
-from validation.compare.rows import VERDICTS, Row, from_csv
+from validation.compare.rows import VERDICTS, Row
 from validation.report.html import Figure, Section
 from validation.scenes.hard_families import FAMILIES
 
@@ -33,7 +34,7 @@ def found_in(out: Path) -> Section | None:
         f"From the run in {FOLDER}/: each family of singular and extreme linkages must come out as its statement says. "
     )
     links = [(f"{FOLDER}/{name}", f"{FOLDER}/{name}") for name in (PAGE, "report.html")]
-    return _section(from_csv(results), text, [], links)
+    return _section(read_columns(results), text, [], links)
 
 
 def _section(rows: Iterable[Row], text: str, figures: list[Figure], links: list[tuple[str, str]]) -> Section:
