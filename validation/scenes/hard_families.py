@@ -10,7 +10,16 @@ from fourbar.effects import Gravity
 from fourbar.linkage import Bar, FourBar
 from fourbar.scene import Scene
 from fourbar.scene.motion import BRANCH_NAMES, Free, Motion, Sweep
-from validation.scenes.hard_linkages import Lengths, at, collinear_2_3, collinear_3_4, dressed, linkage_of, parallel_2_4
+from validation.scenes.hard_linkages import (
+    Lengths,
+    at,
+    collinear_2_3,
+    collinear_3_4,
+    dressed,
+    linkage_of,
+    parallel_2_4,
+    with_bars,
+)
 from validation.scenes.random import LinkageType
 
 Scenes = Iterator[tuple[str, Scene]]
@@ -105,11 +114,6 @@ def bar_ratio(*, exponents: range = range(-6, 0)) -> Scenes:
     """A crank that is ever shorter against the coupler."""
     for k in exponents:
         yield f"1e{k}", sweep_of(dressed((0.3, 0.25 * 10.0**k, 0.25, 0.22)))
-
-
-def with_bars(scene: Scene, **bars: Bar) -> Scene:
-    """The scene with other bars."""
-    return replace(scene, linkage=replace(scene.linkage, **bars))  # type: ignore[arg-type]
 
 
 def mass_ratio(*, exponents: tuple[int, ...] = (-6, -3, 3, 6)) -> Scenes:

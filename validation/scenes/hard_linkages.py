@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from fourbar.effects import Gravity, Load
-from fourbar.linkage import FourBar
+from fourbar.linkage import Bar, FourBar
 from fourbar.scene import Scene
 from fourbar.scene.motion import Motion
 from validation.scenes.random import LinkageType, Ranges, random_bars, random_lengths, uniform
@@ -45,6 +45,11 @@ def at(scene: Scene, psi: object, branch: int = 1, **changes: object) -> Scene:
     theta_2 = scene.linkage.ground_angle + np.atleast_1d(np.asarray(psi, dtype=float))
     motion = replace(scene.motion, theta_2=theta_2, branch=branch)
     return replace(scene, motion=motion, **changes)  # type: ignore[arg-type]
+
+
+def with_bars(scene: Scene, **bars: Bar) -> Scene:
+    """The scene with other bars."""
+    return replace(scene, linkage=replace(scene.linkage, **bars))  # type: ignore[arg-type]
 
 
 def collinear_3_4(lengths: Lengths) -> list[tuple[float, bool]]:
