@@ -14,7 +14,7 @@ from fourbar.writing import require_file, write_text
 from validation.check.judge import Finding, Judge, Tolerance
 from validation.check.mistakes import NEARER, Explanation, explain
 from validation.check.theirs import Table, read_table
-from validation.compare.plain import plain
+from validation.compare.rows import plain
 
 SHOWN = 3
 

@@ -24,8 +24,7 @@ from validation.check.screen import read_mjcf
 from validation.compare.answer import Answer
 from validation.compare.compare import compare
 from validation.compare.counts import Counts
-from validation.compare.plain import plain
-from validation.compare.rows import Row, write_results
+from validation.compare.rows import Row, plain, write_results
 from validation.compare.tolerance import SIMULATED, Tolerance
 from validation.engines.memory import WORKER_MEMORY, bound_memory
 from validation.report.markdown import cell

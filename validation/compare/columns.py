@@ -14,8 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from fourbar.writing import naming
-from validation.compare.plain import plain
-from validation.compare.rows import COLUMNS, MADE_OF, Row, to_csv
+from validation.compare.rows import COLUMNS, MADE_OF, Row, plain, to_csv
 
 GROUP_ROWS = 100_000
 """Rows of a row group of the Parquet file: each costs some kilobytes of footer, whatever it holds."""

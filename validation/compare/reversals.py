@@ -54,7 +54,7 @@ def reversals(scene: Scene, at: Command, solution: Solution) -> list[Reversal]:
         return []
     found = []
     for pin in dict.fromkeys(pins):
-        slip = _slip(solution, pin)
+        slip = slip_at(solution, pin)
         at_rest = _resting(solution, pin, EPS * K)
         last = None
         for i in range(len(solution)):
@@ -112,7 +112,8 @@ def broken(
     return theta_2, values
 
 
-def _slip(solution: Solution, pin: str) -> Array:
+def slip_at(solution: Solution, pin: str) -> Array:
+    """omega_j - omega_i of the bars that meet at a pin, rad/s, (n,)."""
     one, other = (_speeds(solution)[bar] for bar in PINS[pin])
     return np.asarray(other - one)
 
@@ -133,7 +134,7 @@ def _between(scene: Scene, at: Command, pin: str, i: int, j: int, slip: float) -
         middle = 0.5 * (low + high)
         if middle in (low, high):
             break
-        if float(_slip(look(middle, 0, "velocity"), pin)[0]) * slip > 0.0:
+        if float(slip_at(look(middle, 0, "velocity"), pin)[0]) * slip > 0.0:
             low = middle
         else:
             high = middle

@@ -8,7 +8,6 @@ from dataclasses import dataclass, field, fields
 from pathlib import Path
 
 from fourbar.writing import write_text
-from validation.compare.plain import plain
 
 AGREES, DEGRADED, UNDECIDED, REFUSES, FAILS = (
     *("agrees", "degraded as predicted"),
@@ -60,6 +59,14 @@ class Row:
     def failed(self) -> bool:
         """Whether it was compared and does not hold, or an answer that was due is missing."""
         return self.verdict == FAILS
+
+
+def plain(text: str) -> str:
+    """Somebody's text with every character that does not print, but for the ends of lines, written as its escape.
+
+    Characters that would steer a terminal or a reader are shown, not sent.
+    """
+    return "".join(c if c.isprintable() or c == "\n" else c.encode("unicode_escape").decode() for c in text)
 
 
 COLUMNS = tuple(column.name for column in fields(Row))

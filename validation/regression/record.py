@@ -15,8 +15,7 @@ from typing import Any, TypeVar
 from fourbar.errors import InputError
 from fourbar.writing import naming, write_text
 from validation.compare.columns import column_of, read_columns
-from validation.compare.plain import plain
-from validation.compare.rows import Row
+from validation.compare.rows import Row, plain
 from validation.compare.tolerance import SIMULATED, K
 from validation.report.machine import machine, versions
 

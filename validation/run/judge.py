@@ -20,9 +20,8 @@ from validation.compare.answer import Answer, Array, Engine
 from validation.compare.basis import basis_of
 from validation.compare.compare import Yardsticks, compare
 from validation.compare.identities import FORMULAS, closure, identities
-from validation.compare.plain import plain
 from validation.compare.reversals import reversals
-from validation.compare.rows import FAILS, REFUSES, VERDICTS, Row
+from validation.compare.rows import FAILS, REFUSES, VERDICTS, Row, plain
 from validation.compare.statements.finding import Stated
 from validation.compare.statements.statements import statements
 from validation.compare.tolerance import EQUIVALENCE

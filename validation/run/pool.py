@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
 from fourbar.errors import DependencyError
-from validation.compare.plain import plain
+from validation.compare.rows import plain
 from validation.engines.memory import bound_memory
 from validation.engines.witnesses import Witness
 from validation.report.record import Record

@@ -13,8 +13,7 @@ from fourbar.errors import FAILED, HOLDS, DependencyError, FourBarError, InputEr
 from fourbar.mjcf import mjcf
 from fourbar.writing import naming, require_file, write_text
 from validation.compare.columns import Columns, read_columns
-from validation.compare.plain import plain
-from validation.compare.rows import FAILS, Row
+from validation.compare.rows import FAILS, Row, plain
 from validation.compare.tolerance import IDENTITY, SIMULATED
 from validation.engines.hard_suite import Hard
 from validation.engines.mujoco.picture import pictures
