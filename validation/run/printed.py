@@ -181,8 +181,8 @@ def _law(name: str, scene: Scene, at: Command) -> Row:
     speed = law.at(t)[1]
     first = (6.0 * rise - 4.0 * speed[:-1] - 2.0 * speed[1:]) / h
     last = (-6.0 * rise + 2.0 * speed[:-1] + 4.0 * speed[1:]) / h
-    turned = float(np.abs(angle).max())
-    size = float(np.abs(rise).max() + np.abs(speed).max()) + turned / float(h.min())
+    farthest = float(np.abs(angle).max())
+    size = float(np.abs(rise).max() + np.abs(speed).max()) + farthest / float(h.min())
     bent = size / float(h.min())
     errors = [np.abs(first[1:] - last[:-1]) / bent]
     if law.ends == "rest":
@@ -197,7 +197,7 @@ def _law(name: str, scene: Scene, at: Command) -> Row:
         at.time - t[piece], angle[piece], speed[piece], first[piece], last[piece], h[piece]
     )
     along = [
-        np.abs(theta_2 - at.theta_2) / max(1.0, turned),
+        np.abs(theta_2 - at.theta_2) / max(1.0, farthest),
         np.abs(omega_2 - at.omega_2) / size,
         np.abs(alpha_2 - at.alpha_2) / bent,
     ]

@@ -329,14 +329,11 @@ def command(
 
         witnesses = dialled(witnesses, wanted)
     if python is not None:
-        passed_on = [*map(os.path.abspath, scenes), f"--workers={workers}"]
-        passed_on += [f"--engines={engines}"] if engines else []
-        passed_on += ["--no-pictures"]
-        passed_on += [f"--random={count}", f"--seed={seed}", f"--type={types}"] if count else []
-        passed_on += [f"--error={wanted!r}"] if wanted is not None else []
-        passed_on += [f"--witness={adapter}" for adapter in adapters]
-        passed_on += [f"--time-limit={time_limit!r}"] if time_limit is not None else []
-        passed_on += [f"--suite={named if named == 'hard' else os.path.abspath(named)}"] if named else []
+        the_same = {"workers": workers, "engines": engines or None, "error": wanted, "time-limit": time_limit}
+        the_same |= {"random": count, "seed": seed, "type": types} if count else {}
+        the_same |= {"suite": named if named == "hard" else os.path.abspath(named)} if named else {}
+        passed_on = [*map(os.path.abspath, scenes), "--no-pictures", *(f"--witness={adapter}" for adapter in adapters)]
+        passed_on += [f"--{option}={value}" for option, value in the_same.items() if value is not None]
         against = str(run_elsewhere(python, passed_on, out / "elsewhere"))
     present, missing = askable(chosen(engines, witnesses), by_name=engines is not None)
     published = not scenes and named is None and count is None  # the models, the thesis's among them
