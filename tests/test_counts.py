@@ -31,7 +31,7 @@ from validation.engines.witnesses import WITNESSES, Witness
 from validation.regression import render
 from validation.regression.changes import differences
 from validation.report.html import html as page_of
-from validation.report.markdown import markdown
+from validation.report.html import markdown
 from validation.run import released as free
 from validation.run.judge import judge, judged
 from validation.stress.mutation import mutation

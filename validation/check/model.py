@@ -27,8 +27,7 @@ from validation.compare.counts import Counts
 from validation.compare.rows import Row, plain, write_results
 from validation.compare.tolerance import SIMULATED, Tolerance
 from validation.engines.memory import WORKER_MEMORY, bound_memory
-from validation.report.markdown import cell
-from validation.report.templating import number
+from validation.report.templating import number, rendered
 
 SECONDS = 120.0
 """A four-bar takes less than one."""
@@ -198,13 +197,5 @@ def show(report: ModelReport, mjcf: Path, out: Path) -> None:
 
 def markdown(report: ModelReport, mjcf: Path) -> str:
     """The same as text for a page."""
-    lines = [f"# {cell(plain(mjcf.name))} against the generated MJCF", "", ABOUT_SHARES, ""]
-    lines += ["| share | what differs | generated | theirs | what it does |", "|---|---|---|---|---|"]
-    for cause in report.causes:
-        lines.append("| " + " | ".join(cell(plain(text)) for text in cause.cells()) + " |")
-    lines += ["", *(f"- {cell(plain(note))}" for note in report.notes), "", "## What it costs", ""]
-    lines += [f"{report.counts.sentence()}.", ""]
-    lines += [f"| method | {' | '.join(HEADINGS)} |", "|---|---|---|---|---|---|"]
-    for cost in report.costs:
-        lines.append("| " + " | ".join(cell(plain(text)) for text in (cost.method, *cost.cells())) + " |")
-    return "\n".join(lines) + "\n"
+    what = {"report": report, "mjcf": mjcf.name, "about": ABOUT_SHARES, "headings": HEADINGS}
+    return rendered("validation.check", "theirs.md.j2", **what)

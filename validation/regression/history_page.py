@@ -17,7 +17,7 @@ from validation.regression.render import line
 from validation.regression.steps import Step
 from validation.report.colours import ALLOWED, GRID, INK, SOFT, declarations, style_of
 from validation.report.svg import svg_text
-from validation.report.templating import environment
+from validation.report.templating import rendered
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -50,8 +50,9 @@ def page(runs: Sequence[Run], found: Sequence[Step]) -> str:
         )
     rows = [(" / ".join(part for part in key if part), _row(runs, key)) for key in changed[:ROWS_DRAWN]]
     listed = [(step, [(c.kind.value, line(c)) for c in step.changes[:ROWS_LISTED]]) for step in reversed(found)]
-    template = environment("validation.regression", escape=True).get_template("history.html.j2")
-    return template.render(
+    return rendered(
+        "validation.regression",
+        "history.html.j2",
         runs=[(run, _counts(run)) for run in reversed(runs)],
         verdicts=[verdict for verdict in VERDICTS if any(_counts(run)[verdict] for run in runs)],
         steps=listed,

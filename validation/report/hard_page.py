@@ -19,7 +19,7 @@ from validation.engines.prediction import in_world_axes
 from validation.engines.witnesses import Witness
 from validation.report.colours import OTHER, STYLES, declarations
 from validation.report.svg import drawn, inline
-from validation.report.templating import environment
+from validation.report.templating import rendered
 from validation.scenes.hard_families import CHANGE_POINTS, CRANK, FAMILIES, ROCKER
 from validation.scenes.hard_linkages import at, collinear_2_3, collinear_3_4, dressed, linkage_of
 
@@ -138,15 +138,13 @@ def _singular(approach: Approach) -> float:
 
 def page(svg: str) -> str:
     """The page, self-contained: the picture, what each family must show, the limits."""
-    return (
-        environment("validation.report", escape=True)
-        .get_template("hard.html.j2")
-        .render(
-            svg=inline(svg),
-            source=base64.b64encode(svg.encode()).decode("ascii"),
-            families=FAMILIES,
-            limits=LIMITS,
-            light=declarations(dark=False),
-            dark=declarations(dark=True),
-        )
+    return rendered(
+        "validation.report",
+        "hard.html.j2",
+        svg=inline(svg),
+        source=base64.b64encode(svg.encode()).decode("ascii"),
+        families=FAMILIES,
+        limits=LIMITS,
+        light=declarations(dark=False),
+        dark=declarations(dark=True),
     )

@@ -1,8 +1,6 @@
-"""report.html: one self-contained page; every number can be traced to its row in results.csv, which it carries."""
+"""report.html, one self-contained page: every number leads to its row in results.csv, which it carries; report.md."""
 
 import base64
-import gzip
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import groupby
@@ -11,11 +9,11 @@ from typing import Any, NamedTuple
 from fourbar.quantities import UNKNOWNS
 from validation.compare.counts import Counts
 from validation.compare.rows import FAILS, REFUSES, UNDECIDED, Row, sorted_rows, to_csv
-from validation.report.colours import by_variable, declarations, style_of
+from validation.report.colours import declarations
 from validation.report.costs import cost_figure
 from validation.report.record import Record
 from validation.report.summary import STATEMENT, Summary, shares
-from validation.report.templating import environment
+from validation.report.templating import rendered, share
 
 ALL_OPEN = 8
 """Up to so many scenes all stand open; the bodies of more are packed, and unpacked when they are opened."""
@@ -110,16 +108,13 @@ def html(
     """
     from markupsafe import Markup
 
-    templates = environment("validation.report", escape=True)
-    templates.filters["share"] = share
-    templates.filters["packed"] = lambda text: base64.b64encode(gzip.compress(text.encode("utf-8"), mtime=0)).decode()
-    templates.filters["colour"] = lambda engine: by_variable(style_of(engine).colour)
-    templates.filters["symbol"] = lambda engine: style_of(engine).symbol
     views = [_view(scene, first_lines.get(scene.name, 2), pictures or {}) for scene in summary.shown]
     csv = base64.b64encode(to_csv(cell.row for view in views for cell in view.cells).encode("utf-8"))
     failing = sorted((cell for view in views for cell in view.cells if cell.row.failed), key=lambda c: c.line)
     costs = cost_figure(summary.shown)
-    return templates.get_template("report.html.j2").render(
+    return rendered(
+        "validation.report",
+        "report.html.j2",
         s=summary,
         views=views,
         engines=[engine for engine in _engines(cell.row for view in views for cell in view.cells)],
@@ -136,11 +131,9 @@ def html(
     )
 
 
-def share(value: float) -> str:
-    """error/allowed in two digits."""
-    if math.isinf(value):
-        return "∞"
-    return "0" if value == 0.0 else "<0.01" if value < 0.01 else f"{value:.2f}" if value < 10.0 else f"{value:.1e}"
+def markdown(summary: Summary) -> str:
+    """The report as Markdown, short enough for a comment on a pull request."""
+    return rendered("validation.report", "report.md.j2", s=summary, statement=STATEMENT)
 
 
 def _view(scene: Record, first_line: int, pictures: Mapping[str, str]) -> SceneView:

@@ -23,9 +23,8 @@ from validation.regression.accept import output_options, report_differences
 from validation.regression.record import about, baseline, recorded, write_about
 from validation.regression.scenes import descriptions
 from validation.report import cost_section, hard_section
-from validation.report.html import Section, html
+from validation.report.html import Section, html, markdown
 from validation.report.junit import cases, document
-from validation.report.markdown import markdown
 from validation.report.record import Record
 from validation.report.summary import PICTURED, Summary
 from validation.run import pool
