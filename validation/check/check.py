@@ -179,13 +179,10 @@ def show(judgement: Judgement, table: Table, name: str) -> None:
 
 def worst_of_each(differing: list[Finding]) -> list[Finding]:
     """The worst findings of each quantity, the worst quantity first."""
-    seen: Counter[str] = Counter()
-    shown: dict[str, list[Finding]] = {}
+    by_quantity: dict[str, list[Finding]] = {}
     for finding in sorted(differing, key=lambda f: -f.error):
-        seen[finding.quantity] += 1
-        if seen[finding.quantity] <= SHOWN:
-            shown.setdefault(finding.quantity, []).append(finding)
-    return [finding for findings in shown.values() for finding in findings]
+        by_quantity.setdefault(finding.quantity, []).append(finding)
+    return [finding for findings in by_quantity.values() for finding in findings[:SHOWN]]
 
 
 def with_unit(finding: Finding, table: Table) -> str:

@@ -14,8 +14,7 @@ from fourbar.quantities import FORCES, UNITS
 from fourbar.scene import Scene
 from fourbar.solution import Solution
 from fourbar.solve import solve
-from validation.check.judge import Judge
-from validation.check.mistake import Mistake
+from validation.check.judge import Judge, Mistake
 from validation.check.theirs import Array, quantity_of
 from validation.compare.error import difference, in_own_unit
 from validation.scenes.hard_linkages import with_bars

@@ -8,16 +8,15 @@ import numpy as np
 
 from fourbar.effects import Gravity, Load
 from fourbar.errors import FourBarError
-from fourbar.linkage import BAR_NAMES, MOVING_BARS, Bar
+from fourbar.linkage import Bar
 from fourbar.quantities import FORCES, VECTORS
 from fourbar.scene import Command, Scene
 from fourbar.solution import Solution
 from fourbar.solve import solve
 from validation.check.fitted import fitted
-from validation.check.judge import Judge
-from validation.check.mistake import Mistake
+from validation.check.judge import Judge, Mistake
 from validation.check.theirs import Array
-from validation.scenes.hard_linkages import with_bars
+from validation.scenes.hard_linkages import moving, with_bars
 
 SHOWN = 5
 """Explanations that are printed."""
@@ -53,8 +52,8 @@ def _inertial(scene: Scene, at: Command) -> Iterator[Mistake]:
     if at.omega_2 is None:
         return
     bare = replace(scene, loads=(), effects=())
-    massless = {name: replace(bar, mass=0.0, inertia=bar.moment_of_inertia) for name, bar in _moving(bare)}
-    pointlike = {name: replace(bar, inertia=0.0) for name, bar in _moving(bare)}
+    massless = {name: replace(bar, mass=0.0, inertia=bar.moment_of_inertia) for name, bar in moving(bare)}
+    pointlike = {name: replace(bar, inertia=0.0) for name, bar in moving(bare)}
     of_mass, of_inertia = (solve(with_bars(bare, **bars), "force", at=at) for bars in (pointlike, massless))
 
     def scaled(by_mass: float, by_inertia: float) -> Callable[[str, Solution], Array | None]:
@@ -75,10 +74,6 @@ def _inertial(scene: Scene, at: Command) -> Iterator[Mistake]:
         "inertial forces with the wrong sign (d'Alembert's forces put on the side of m a)", scaled(-1.0, -1.0)
     )
     yield Mistake("I alpha with the wrong sign", scaled(1.0, -1.0))
-
-
-def _moving(scene: Scene) -> list[tuple[str, Bar]]:
-    return [(BAR_NAMES[number], scene.linkage.bar(number)) for number in MOVING_BARS]
 
 
 def _other_problems(scene: Scene, at: Command) -> Iterator[tuple[str, Scene, Command]]:
@@ -110,7 +105,7 @@ def _other_problems(scene: Scene, at: Command) -> Iterator[tuple[str, Scene, Com
             yield "alpha_2 is left out", scene, at._replace(alpha_2=0.0)
         rpm = np.pi / 30.0
         yield "omega_2 in rev/min taken for rad/s", scene, at._replace(omega_2=at.omega_2 / rpm)
-    for name, bar in _moving(scene):
+    for name, bar in moving(scene):
         for text, change in BAR_MISTAKES:
             if (changed := change(bar)) is not None:
                 yield f"{name}: {text}", with_bars(scene, **{name: changed}), at

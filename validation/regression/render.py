@@ -95,11 +95,7 @@ def html(found: Differences) -> str:
 
 
 def _rendered(
-    name: str,
-    found: Differences,
-    groups: list[Group],
-    rows: Callable[[Kind], Sequence[object]],
-    more: Sequence[str] = (),
+    name: str, found: Differences, groups: list[Group], rows: Callable[[Kind], Sequence[object]], more: Sequence[str]
 ) -> str:
     kinds = [(kind, [each for each in groups if each.kind is kind], rows(kind)) for kind in SHOWN if found.kinds[kind]]
     what = {"verdict": verdict(found), "questions": other_questions(found), "more": more}

@@ -17,6 +17,7 @@ from validation.scenes.hard_linkages import (
     collinear_3_4,
     dressed,
     linkage_of,
+    moving,
     parallel_2_4,
     with_bars,
 )
@@ -31,6 +32,8 @@ TOGGLE = tuple(10.0**-k for k in range(1, 13))
 NEAR = (1e-1, 3e-2, 1e-2, 3e-3)
 """rad; as far as a simulation in time follows."""
 POLE = tuple(10.0**-k for k in range(1, 10))
+PLAIN = (0.3, 0.1, 0.25, 0.22)
+"""Lengths of a crank-rocker in no way special, m."""
 CHANGE = tuple(10.0**-k for k in range(1, 9))
 
 
@@ -118,45 +121,39 @@ def bar_ratio(*, exponents: range = range(-6, 0)) -> Scenes:
 
 def mass_ratio(*, exponents: tuple[int, ...] = (-6, -3, 3, 6)) -> Scenes:
     """One bar heavier or lighter than the others by up to 1e6."""
-    base = sweep_of(dressed((0.3, 0.1, 0.25, 0.22)))
-    for name in ("input", "coupler", "output"):
+    base = sweep_of(dressed(PLAIN))
+    for name, bar in moving(base):
         for k in exponents:
-            bar: Bar = getattr(base.linkage, name)
             heavy = replace(bar, mass=bar.mass * 10.0**k, inertia=bar.moment_of_inertia * 10.0**k)
             yield f"{name} 1e{k:+d}", with_bars(base, **{name: heavy})
 
 
 def without_inertia() -> Scenes:
     """Bars without rotational inertia, without mass, and loads alone on massless bars."""
-    base = sweep_of(dressed((0.3, 0.1, 0.25, 0.22)))
-    for name in ("input", "coupler", "output"):
-        bar: Bar = getattr(base.linkage, name)
+    base = sweep_of(dressed(PLAIN))
+    for name, bar in moving(base):
         yield f"{name} point mass", with_bars(base, **{name: replace(bar, inertia=0.0)})
         yield f"{name} massless", with_bars(base, **{name: Bar(bar.length)})
-    yield (
-        "all massless",
-        with_bars(base, input=Bar(0.1), coupler=Bar(0.25), output=Bar(0.22)),
-    )
+    yield "all massless", with_bars(base, **{name: Bar(bar.length) for name, bar in moving(base)})
 
 
 def far_centres(*, times: tuple[float, ...] = (3.0, 100.0, 1e4)) -> Scenes:
     """Centres of mass far outside the bar."""
-    base = sweep_of(dressed((0.3, 0.1, 0.25, 0.22)))
-    for name in ("input", "coupler", "output"):
+    base = sweep_of(dressed(PLAIN))
+    for name, bar in moving(base):
         for k in times:
-            bar: Bar = getattr(base.linkage, name)
             yield f"{name} {k:g}", with_bars(base, **{name: replace(bar, centre=(k * bar.length, 2.0))})
 
 
 def sizes(*, exponents: range = range(-6, 7, 2)) -> Scenes:
     """The same shape from micrometres to a thousand kilometres."""
     for k in exponents:
-        yield f"1e{k:+d} m", sweep_of(dressed(tuple(x * 10.0**k for x in (0.3, 0.1, 0.25, 0.22))))  # type: ignore[arg-type]
+        yield f"1e{k:+d} m", sweep_of(dressed(tuple(x * 10.0**k for x in PLAIN)))  # type: ignore[arg-type]
 
 
 def speeds(*, exponents: tuple[int, ...] = (-6, -3, 0, 3, 6)) -> Scenes:
     """omega_2 from 1e-6 to 1e6 rad/s, in both senses."""
-    base = sweep_of(dressed((0.3, 0.1, 0.25, 0.22)))
+    base = sweep_of(dressed(PLAIN))
     for k in exponents:
         for sign, name in ((1.0, "+"), (-1.0, "-")):
             yield f"{name}1e{k:+d}", replace(base, motion=replace(base.motion, omega_2=sign * 10.0**k))
@@ -164,7 +161,7 @@ def speeds(*, exponents: tuple[int, ...] = (-6, -3, 0, 3, 6)) -> Scenes:
 
 def loads(*, exponents: tuple[int, ...] = (-9, -3, 3, 9)) -> Scenes:
     """Loads from 1e-9 to 1e9 of the weights."""
-    base = sweep_of(dressed((0.3, 0.1, 0.25, 0.22)))
+    base = sweep_of(dressed(PLAIN))
     for k in exponents:
         scaled = []
         for load in base.loads:
