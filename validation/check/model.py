@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from pkgutil import resolve_name
 from typing import Any
 
 from fourbar.errors import FourBarError, InputError
@@ -152,10 +153,7 @@ def _confine() -> None:
 
 
 def _examine(adapter: str, *arguments: object) -> Any:
-    from importlib import import_module
-
-    module, _, function = adapter.partition(":")
-    return getattr(import_module(module), function)(*arguments)
+    return resolve_name(adapter)(*arguments)
 
 
 def show(report: ModelReport, mjcf: Path, out: Path) -> None:

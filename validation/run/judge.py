@@ -4,7 +4,7 @@ import math
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
-from importlib import import_module
+from pkgutil import resolve_name
 from typing import Any
 
 import numpy as np
@@ -96,7 +96,7 @@ def judge(name: str, scene: Scene, witnesses: Sequence[Witness] = WITNESSES, *, 
 def _shipped(name: str, scene: Scene, at: Command) -> list[Row]:
     """The generated MJCF as it is shipped, if one is."""
     try:
-        row = import_module("validation.engines.mujoco.shipped").shipped(name, scene, at)
+        row = resolve_name("validation.engines.mujoco.shipped:shipped")(name, scene, at)
     except Exception as error:  # as of any engine
         return [breakdown(name, SIMULATION, error, "MJCF as shipped")]
     return [] if row is None else [row]
@@ -230,13 +230,12 @@ def _stated(
 
 def _observed_order(name: str, scene: Scene, at: Command, solution: Solution, witness: Witness) -> dict[str, float]:
     """The worst error of the torque and the pin forces at 4h and 2h, and the order in h that they show."""
-    module, _, function = witness.order.partition(":")
 
     def error(answer: Answer) -> float:
         rows = _judged(name, scene, at, solution, answer, replace(witness, expected=FORCES), None, {})
         return max((row.error for row in rows if row.quantity in FORCES), default=math.nan)  # a refusal has none
 
-    coarse, fine, order = getattr(import_module(module), function)(scene, at, error)
+    coarse, fine, order = resolve_name(witness.order)(scene, at, error)
     seen = {"error_at_4h": coarse, "error_at_2h": fine, "observed_order": order}
     return seen if all(map(math.isfinite, seen.values())) else {}  # a coarse run may leave what the scene covers
 
