@@ -231,11 +231,9 @@ def _order(judge: Judge) -> Iterator[Mistake]:
         text = f"the rows are shifted by {rows:+d}: each has the numbers of another theta_2"
     else:
         text = "the rows are in another order than their theta_2"
-    yield Mistake(
-        text,
-        lambda quantity, right: None if quantity == "theta_2" else _taken(getattr(right, quantity, None), nearest),
-    )
+    yield Mistake(text, lambda quantity, right: _in_rows(quantity, right, nearest))
 
 
-def _taken(values: Array | None, rows: Array) -> Array | None:
-    return None if values is None else values[rows]
+def _in_rows(quantity: str, right: Solution, rows: Array) -> Array | None:
+    values = None if quantity == "theta_2" else getattr(right, quantity, None)
+    return None if values is None else np.asarray(values[rows])

@@ -131,14 +131,6 @@ def _from_other_pin(bar: Bar) -> Bar | None:
     return replace(bar, centre=(float(np.hypot(x, y)), float(np.arctan2(y, x)))) if bar.mass else None
 
 
-def _about_pin(bar: Bar) -> Bar | None:
-    return replace(bar, inertia=bar.moment_of_inertia + bar.mass * bar.mass_centre[0] ** 2) if bar.mass else None
-
-
-def _mid_bar(bar: Bar) -> Bar | None:
-    return replace(bar, centre=(bar.length / 2.0, 0.0)) if bar.mass else None
-
-
 def _turned(bar: Bar) -> Bar | None:
     r, phi = bar.mass_centre
     return replace(bar, centre=(r, phi + np.pi)) if bar.mass and r else None
@@ -149,17 +141,18 @@ def _mirrored(bar: Bar) -> Bar | None:
     return replace(bar, centre=(r, -phi)) if bar.mass and r and np.sin(phi) else None
 
 
-def _no_inertia(bar: Bar) -> Bar | None:
-    return replace(bar, inertia=0.0) if bar.moment_of_inertia else None
-
-
 BAR_MISTAKES: tuple[tuple[str, Callable[[Bar], Bar | None]], ...] = (
     ("mass centre measured from the wrong pin", _from_other_pin),
-    ("mass centre taken at mid-bar", _mid_bar),
+    ("mass centre taken at mid-bar", lambda bar: replace(bar, centre=(bar.length / 2.0, 0.0)) if bar.mass else None),
     ("mass centre turned by 180 deg about the bar's first pin", _turned),
     ("mass centre on the other side of the bar's line", _mirrored),
-    ("inertia about the pin used as the inertia about G", _about_pin),
-    ("moment of inertia left out", _no_inertia),
+    (
+        "inertia about the pin used as the inertia about G",
+        lambda bar: (
+            replace(bar, inertia=bar.moment_of_inertia + bar.mass * bar.mass_centre[0] ** 2) if bar.mass else None
+        ),
+    ),
+    ("moment of inertia left out", lambda bar: replace(bar, inertia=0.0) if bar.moment_of_inertia else None),
 )
 
 

@@ -78,14 +78,10 @@ def reversing(scene: Scene, solution: Solution, slip: float, *, in_time: bool = 
     for pin in {pin for effect in scene.effects for pin in effect.dry_pins}:
         where |= _resting(solution, pin, slip)
         if in_time:
-            speeds = np.nan_to_num(_greatest_speed(solution))
+            speeds = np.max([np.abs(_speeds(solution)[bar]) for bar in MOVING_BARS], axis=0)
+            speeds = np.nan_to_num(speeds)
             where |= speeds <= slip * speeds.max()
     return where
-
-
-def _greatest_speed(solution: Solution) -> Array:
-    speeds = _speeds(solution)
-    return np.asarray(np.max([np.abs(speeds[bar]) for bar in MOVING_BARS], axis=0))
 
 
 def _resting(solution: Solution, pin: str, slip: float) -> NDArray[np.bool_]:

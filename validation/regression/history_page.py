@@ -15,7 +15,7 @@ from validation.regression.change import Key
 from validation.regression.history import Run
 from validation.regression.render import line
 from validation.regression.steps import Step
-from validation.report.colours import ALLOWED, GRID, INK, SOFT, declarations, style_of
+from validation.report.colours import ALLOWED, GRID, INK, SOFT, style_of
 from validation.report.svg import svg_text
 from validation.report.templating import rendered
 
@@ -54,8 +54,6 @@ def page(runs: Sequence[Run], found: Sequence[Step]) -> str:
         pictures=pictures,
         rows=rows,
         more=len(changed) - len(rows),
-        light=declarations(dark=False),
-        dark=declarations(dark=True),
         listed=ROWS_LISTED,
     )
 

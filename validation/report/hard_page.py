@@ -17,7 +17,7 @@ from validation.engines.hard_suite import HARD_WITNESSES
 from validation.engines.limits import LIMITS
 from validation.engines.prediction import in_world_axes
 from validation.engines.witnesses import Witness
-from validation.report.colours import OTHER, STYLES, declarations
+from validation.report.colours import style_of
 from validation.report.svg import drawn, inline
 from validation.report.templating import rendered
 from validation.scenes.hard_families import CHANGE_POINTS, CRANK, FAMILIES, ROCKER
@@ -114,7 +114,7 @@ def _draw(axes: Any, approach: Approach, quantity: str) -> None:
     for witness in HARD_WITNESSES:
         found = errors(approach.scene, quantity, witness)
         if found is not None and len(found[0]):
-            style = STYLES.get(witness.name, OTHER)
+            style = style_of(witness.name)
             axes.loglog(
                 np.abs(found[0] - singular),
                 found[1],
@@ -145,6 +145,4 @@ def page(svg: str) -> str:
         source=base64.b64encode(svg.encode()).decode("ascii"),
         families=FAMILIES,
         limits=LIMITS,
-        light=declarations(dark=False),
-        dark=declarations(dark=True),
     )

@@ -9,7 +9,6 @@ from typing import Any, NamedTuple
 from fourbar.quantities import UNKNOWNS
 from validation.compare.counts import Counts
 from validation.compare.rows import FAILS, REFUSES, UNDECIDED, Row, sorted_rows, to_csv
-from validation.report.colours import declarations
 from validation.report.costs import cost_figure
 from validation.report.record import Record
 from validation.report.summary import STATEMENT, Summary, shares
@@ -126,8 +125,6 @@ def html(
         sections=sections,
         statement=STATEMENT,
         csv=csv.decode("ascii"),
-        light=Markup(declarations(dark=False)),
-        dark=Markup(declarations(dark=True)),
     )
 
 

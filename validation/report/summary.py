@@ -104,7 +104,10 @@ class Summary:
         found = _worst(scene.rows)
         self.judged += len(found)
         self._worst = _top(WORST_SHOWN, [*self._worst, *found], lambda w: w.used)
-        _measure_k(scene.rows, self.measured_k)
+        for row in scene.rows:
+            if row.reason.startswith(EQUIVALENCE.name) and math.isfinite(row.error):
+                k = row.error * row.condition / EPS
+                self.measured_k[row.engine] = max(self.measured_k.get(row.engine, 0.0), k)
         self.independence.update(scene.independence)
         _add_costs(scene, self._costs)
         self._add_orders(scene)
@@ -220,12 +223,6 @@ def _top(most: int, of: list[T], key: Callable[[T], float]) -> list[T]:
 
 def _lowest(order: tuple[str, dict[str, float]]) -> float:
     return -order[1]["observed_order"]
-
-
-def _measure_k(rows: Sequence[Row], largest: dict[str, float]) -> None:
-    for row in rows:
-        if row.reason.startswith(EQUIVALENCE.name) and math.isfinite(row.error):
-            largest[row.engine] = max(largest.get(row.engine, 0.0), row.error * row.condition / EPS)
 
 
 class Timed(NamedTuple):

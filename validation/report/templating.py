@@ -5,7 +5,7 @@ import gzip
 import math
 
 from validation.compare.rows import plain
-from validation.report.colours import by_variable, style_of
+from validation.report.colours import by_variable, declarations, style_of
 
 PLAIN = (1e-2, 1e6)
 """Numbers between these are written without a power of ten, the larger ones where they are whole."""
@@ -34,7 +34,7 @@ def rendered(package: str, name: str, /, **what: object) -> str:
         "colour": lambda engine: by_variable(style_of(engine).colour),
         "symbol": lambda engine: style_of(engine).symbol,
     }
-    return made.get_template(name).render(**what)
+    return made.get_template(name).render(light=declarations(dark=False), dark=declarations(dark=True), **what)
 
 
 def cell(text: object) -> str:

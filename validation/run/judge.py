@@ -8,7 +8,6 @@ from pkgutil import resolve_name
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fourbar.errors import LimitError
 from fourbar.mjcf.settings import LIGHT
@@ -16,7 +15,7 @@ from fourbar.quantities import FORCES
 from fourbar.scene import Command, Scene, command
 from fourbar.solution import Solution
 from fourbar.solve import solve
-from validation.compare.answer import Answer, Array, Engine
+from validation.compare.answer import Answer, Engine
 from validation.compare.basis import basis_of
 from validation.compare.compare import Yardsticks, compare
 from validation.compare.identities import FORMULAS, closure, identities
@@ -179,13 +178,11 @@ def _basis(scene: Scene, free_body: Answer | None) -> Solution | None:
 def _by_exact_means(scene: Scene, at: Command) -> tuple[OfSome | None, OfSome]:
     """The sine between bars 3 and 4 in many digits, and how many solutions friction has, at some positions."""
 
-    def sines_at(where: NDArray[np.intp]) -> Array:
-        return sines(scene.linkage, piece(at, where))
-
-    def solutions_at(where: NDArray[np.intp]) -> Array:
-        return solutions(scene, piece(at, where))
-
-    return (None if at.remainder is not None or not_installed("flint") else sines_at), solutions_at
+    unknown = at.remainder is not None or not_installed("flint")
+    return (
+        None if unknown else lambda where: sines(scene.linkage, piece(at, where)),
+        lambda where: solutions(scene, piece(at, where)),
+    )
 
 
 def _judged(
