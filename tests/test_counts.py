@@ -270,7 +270,7 @@ def test_two_runs_without_a_comparison_in_common_are_no_success(
 
 def test_of_two_rows_of_one_name_the_worse_one_counts() -> None:
     both = [*rows(fail=1), *rows(agree=1)]
-    assert differences((HERE, rows(agree=1)), (HERE, both)).regressions
+    assert differences((HERE, rows(agree=1)), (HERE, both)).regressed
 
 
 def test_numbers_without_a_digit_do_not_agree(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -111,11 +111,6 @@ class Differences:
         return self.kinds.total()
 
     @property
-    def regressions(self) -> list[Change]:
-        """The changes for which a run fails."""
-        return [each for each in self.changes if each.regression]
-
-    @property
     def regressed(self) -> int:
         """How many rows, and times, a run fails for."""
         return sum(self.kinds[kind] for kind in REGRESSIONS) + len(self.slower)

@@ -20,7 +20,7 @@ from validation.compare.basis import basis_of
 from validation.compare.compare import Yardsticks, compare
 from validation.compare.identities import FORMULAS, closure, identities
 from validation.compare.reversals import reversals
-from validation.compare.rows import FAILS, REFUSES, VERDICTS, Row, plain
+from validation.compare.rows import FAILS, REFUSES, VERDICTS, Row, breakdown, plain
 from validation.compare.statements.finding import Stated
 from validation.compare.statements.statements import statements
 from validation.compare.tolerance import EQUIVALENCE
@@ -29,7 +29,6 @@ from validation.engines.exact import sines
 from validation.engines.free_body import FreeBody, solutions
 from validation.engines.witnesses import WITNESSES, Witness, not_installed, predicting_from
 from validation.report.record import Record, Timing
-from validation.run.breakdown import breakdown
 from validation.run.printed import piece, printed
 
 SIMULATION = "mujoco-simulated"

@@ -18,11 +18,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
 from fourbar.errors import DependencyError
-from validation.compare.rows import plain
+from validation.compare.rows import breakdown, plain
 from validation.engines.memory import bound_memory
 from validation.engines.witnesses import Witness
 from validation.report.record import Record
-from validation.run.breakdown import breakdown
 from validation.run.judge import judged
 from validation.scenes.suites import Files, Suite
 

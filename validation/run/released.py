@@ -24,12 +24,11 @@ from validation.compare.basis import basis_of
 from validation.compare.compare import compare
 from validation.compare.error import in_own_unit, relative, worst
 from validation.compare.identities import FORMULAS
-from validation.compare.rows import AGREES, DEGRADED, FAILS, REFUSES, UNDECIDED, Row
+from validation.compare.rows import AGREES, DEGRADED, FAILS, REFUSES, UNDECIDED, Row, breakdown
 from validation.compare.tolerance import DEGRADED as TIMES_PREDICTED
 from validation.compare.tolerance import EQUIVALENCE
 from validation.engines.witnesses import WITNESSES, Witness, not_installed, predicting_from
 from validation.report.record import Record, Timing
-from validation.run.breakdown import breakdown
 
 ENGINES = {
     "mujoco-forward": ("validation.engines.mujoco.released:MujocoForward", 1e-3, "mujoco"),

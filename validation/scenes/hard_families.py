@@ -35,7 +35,7 @@ NEAR = (1e-1, 3e-2, 1e-2, 3e-3)
 """rad; as far as a simulation in time follows."""
 POLE = tuple(10.0**-k for k in range(1, 10))
 PLAIN = (0.3, 0.1, 0.25, 0.22)
-"""Lengths of a crank-rocker in no way special, m."""
+"""Lengths of an ordinary crank-rocker, m."""
 CHANGE = tuple(10.0**-k for k in range(1, 9))
 
 
