@@ -154,18 +154,11 @@ class Judge:
             permitted = self.permitted(key, ours)
             for i in np.flatnonzero(self.where(key)).tolist():
                 stated = np.isfinite(np.atleast_1d(theirs[i]))
+                yours, mine = (tuple(np.atleast_1d(values[i])[stated].tolist()) for values in (theirs, ours))
+                numbers = (float(error[i]), float(allowed[i]), float(apart[i]))
+                most = None if permitted is None else float(permitted[i])
                 found.append(
-                    Finding(
-                        self.table.lines[i],
-                        label,
-                        tuple(np.atleast_1d(theirs[i])[stated].tolist()),
-                        tuple(np.atleast_1d(ours[i])[stated].tolist()),
-                        float(error[i]),
-                        float(allowed[i]),
-                        float(apart[i]),
-                        None if permitted is None else float(permitted[i]),
-                        float(self.at.theta_2[i]),
-                    )
+                    Finding(self.table.lines[i], label, yours, mine, *numbers, most, float(self.at.theta_2[i]))
                 )
         return found
 

@@ -111,8 +111,7 @@ def _once(at: Command, record: Record) -> Command:
     if len(at.theta_2) == 1 or any(np.ptp(values) != 0 for values in numbers):
         return at
     record.left_out.append("positions: all are the same, one is evaluated")
-    omega_2, alpha_2 = (x if x is None or np.ndim(x) == 0 else x[:1] for x in (at.omega_2, at.alpha_2))  # type: ignore[index]
-    return at._replace(theta_2=at.theta_2[:1], branch=at.branch[:1], omega_2=omega_2, alpha_2=alpha_2, time=None)  # type: ignore[arg-type]
+    return piece(at, np.array([0]))._replace(time=None)
 
 
 def _called_for(witnesses: Iterable[Witness], at: Command, record: Record) -> Iterator[Witness]:
