@@ -6,7 +6,6 @@ the formulas say: how wrong it is against them stays a finding.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
-from typing import Any
 
 import numpy as np
 
@@ -28,13 +27,11 @@ LEAST_GROWTH, MOST_GROWTH = 1.15, 3.0
 
 @dataclass(frozen=True, slots=True)
 class DialledWitness(Witness):
-    """The simulated witness at a wanted error."""
-
-    error: float = SIMULATED.factor
+    """The simulated witness at a wanted error, which is what it is held to."""
 
     def engine(self) -> Engine:
         """MuJoCo with settings for that error."""
-        return Dialled(self.error)
+        return Dialled(self.tolerance.factor)
 
 
 def held_to(error: float, why: str) -> Tolerance:
@@ -47,16 +44,13 @@ def held_to(error: float, why: str) -> Tolerance:
 def dialled(witnesses: Sequence[Witness], error: float) -> tuple[Witness, ...]:
     """The witnesses, with whatever runs through time held to `error` and laid out for it; exact ones stay exact."""
     tolerance = held_to(error, "steps and softness are laid out for it")
-    return tuple(
-        DialledWitness(**{**_parts(each), "tolerance": tolerance, "order": "", "error": error})
-        if each.through_time
-        else each
-        for each in witnesses
-    )
-
-
-def _parts(witness: Witness) -> dict[str, Any]:
-    return {field.name: getattr(witness, field.name) for field in fields(Witness)}
+    found = []
+    for each in witnesses:
+        if each.through_time:
+            stated = {field.name: getattr(each, field.name) for field in fields(Witness)}
+            each = DialledWitness(**stated | {"tolerance": tolerance, "order": ""})  # noqa: PLW2901
+        found.append(each)
+    return tuple(found)
 
 
 @dataclass(slots=True)
