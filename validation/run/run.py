@@ -13,7 +13,7 @@ from fourbar.errors import FAILED, HOLDS, DependencyError, FourBarError, InputEr
 from fourbar.mjcf import mjcf
 from fourbar.writing import naming, require_file, write_text
 from validation.compare.columns import Columns, read_columns
-from validation.compare.rows import FAILS, Row, plain
+from validation.compare.rows import FAILS, plain
 from validation.compare.tolerance import IDENTITY, SIMULATED
 from validation.engines.hard_suite import Hard
 from validation.engines.mujoco.picture import pictures
@@ -22,10 +22,10 @@ from validation.published import ladder_rows
 from validation.regression.accept import output_options, report_differences
 from validation.regression.record import about, baseline, recorded, write_about
 from validation.regression.scenes import descriptions
-from validation.report import cost_section, hard_section
-from validation.report.html import Section, html, markdown
+from validation.report.html import html, markdown
 from validation.report.junit import cases, document
 from validation.report.record import Record
+from validation.report.sections import sections
 from validation.report.summary import PICTURED, Summary
 from validation.run import pool
 from validation.run.code import code
@@ -138,22 +138,6 @@ def run(
         write_text(out / "report.html", page)
         store.finish()
     yield summary
-
-
-def sections(hard: Iterable[Row] | None, out: Path) -> list[Section]:
-    """Parts of the report from elsewhere: the hard cases of this run or one in OUT/hard, the study in OUT/cost.
-
-    Of rows of the hard suite the page hard.html is written too.
-    """
-    if hard is None:
-        found = hard_section.found_in(out)
-        return [*([found] if found else []), *cost_section.found_in(out)]
-    from validation.report.hard_page import page, picture
-    from validation.report.svg import inline
-
-    svg = picture()
-    write_text(out / hard_section.PAGE, page(svg))
-    return [hard_section.section(hard, inline(svg)), *cost_section.found_in(out)]
 
 
 def pictures_of(
