@@ -26,10 +26,10 @@ from validation.compare.rows import FAILS, REFUSES, Row
 from validation.compare.tolerance import EQUIVALENCE
 from validation.engines import added
 from validation.engines.witnesses import Witness
+from validation.report.machine import build, checkout, code
 from validation.report.record import Record
 from validation.report.summary import Summary
 from validation.run import pool
-from validation.run.code import build, checkout, code
 from validation.run.run import Collected, run
 from validation.run.selection import chosen
 from validation.run.store import RunningError, Store

@@ -24,11 +24,11 @@ from validation.regression.record import about, baseline, recorded, write_about
 from validation.regression.scenes import descriptions
 from validation.report.html import html, markdown
 from validation.report.junit import cases, document
+from validation.report.machine import code
 from validation.report.record import Record
 from validation.report.sections import sections
 from validation.report.summary import PICTURED, Summary
 from validation.run import pool
-from validation.run.code import code
 from validation.run.elsewhere import run_elsewhere
 from validation.run.machines import Cluster
 from validation.run.selection import askable, chosen, selected
