@@ -22,11 +22,9 @@ ATTACHED = re.compile(r"((?:actuators|tendons)\.\d+)(\..+)?")
 """Keys of what a file may have any number of: numbered, so that their names can be anything."""
 NEEDS = {
     r"(pins\.\w+)\.sol(?:ref|imp)friction": (r"\1.friction", 0.0),
-    r"(pins\.\w+)\.(?:sol(?:ref|imp)limit|margin)": (r"\1.range", "free"),
-    r"(pins\.\w+)\.(?:spring angle|springyield)": (r"\1.stiffness", 0.0),
     r"(tendons\.\d+)\.sol(?:ref|imp)friction": (r"\1.frictionloss", 0.0),
-    r"(tendons\.\d+)\.(?:sol(?:ref|imp)limit|margin)": (r"\1.range", "free"),
-    r"(tendons\.\d+)\.(?:springlength.*|springyield)": (r"\1.stiffness", 0.0),
+    r"(pins\.\w+|tendons\.\d+)\.(?:sol(?:ref|imp)limit|margin)": (r"\1.range", "free"),
+    r"(pins\.\w+|tendons\.\d+)\.(?:spring angle|springyield|springlength.*)": (r"\1.stiffness", 0.0),
     r"(actuators\.\d+)\.dynprm": (r"\1.dyntype", 0.0),
     r"option\.wind": ("option.density", 0.0),
     r"option\.noslip_tolerance": ("option.noslip_iterations", 0.0),

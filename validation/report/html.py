@@ -3,7 +3,6 @@
 import base64
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import groupby
 from typing import Any, NamedTuple
 
 from fourbar.quantities import UNKNOWNS
@@ -116,7 +115,7 @@ def html(
         "report.html.j2",
         s=summary,
         views=views,
-        engines=[engine for engine in _engines(cell.row for view in views for cell in view.cells)],
+        engines=_engines(cell.row for view in views for cell in view.cells),
         failing=failing,
         lazy=len(views) > ALL_OPEN,
         figures={scene.name: Markup(scene.figure) for scene in summary.shown if scene.figure},  # drawn by our own code
@@ -136,13 +135,9 @@ def markdown(summary: Summary) -> str:
 def _view(scene: Record, first_line: int, pictures: Mapping[str, str]) -> SceneView:
     rows = sorted_rows(scene.rows)
     cells = [Cell(line, *each) for line, each in enumerate(zip(rows, shares(rows), strict=True), first_line)]
-    by_place: dict[tuple[str, str], Cell] = {}
-    worst: dict[str, Cell] = {}
-    for cell in cells:
-        for places, place in ((by_place, (cell.row.quantity, cell.row.engine)), (worst, cell.row.engine)):
-            held: dict[Any, Cell] = places
-            if place not in held or _rank(cell) > _rank(held[place]):
-                held[place] = cell
+    ranked = sorted(reversed(cells), key=_rank)  # the last of a place stays, of equals the first
+    by_place = {(cell.row.quantity, cell.row.engine): cell for cell in ranked}
+    worst = {cell.row.engine: cell for cell in ranked}
     found = {cell.row.quantity for cell in cells}
     quantities = [name for name in ORDER if name in found] + sorted(found.difference(ORDER))
     engines = _engines(cell.row for cell in cells)
@@ -156,5 +151,4 @@ def _rank(cell: Cell) -> tuple[bool, float]:
 
 def _engines(rows: Any) -> list[str]:
     """Engines by name, the formulas (their identities) last."""
-    names = [name for name, _ in groupby(sorted(row.engine for row in rows))]
-    return sorted(names, key=lambda name: (name == "formulas", name))
+    return sorted({row.engine for row in rows}, key=lambda name: (name == "formulas", name))
