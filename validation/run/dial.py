@@ -6,6 +6,7 @@ the formulas say: how wrong it is against them stays a finding.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
+from typing import Any
 
 import numpy as np
 
@@ -43,14 +44,13 @@ def held_to(error: float, why: str) -> Tolerance:
 
 def dialled(witnesses: Sequence[Witness], error: float) -> tuple[Witness, ...]:
     """The witnesses, with whatever runs through time held to `error` and laid out for it; exact ones stay exact."""
-    tolerance = held_to(error, "steps and softness are laid out for it")
-    found = []
-    for each in witnesses:
-        if each.through_time:
-            stated = {field.name: getattr(each, field.name) for field in fields(Witness)}
-            each = DialledWitness(**stated | {"tolerance": tolerance, "order": ""})  # noqa: PLW2901
-        found.append(each)
-    return tuple(found)
+    own: dict[str, Any] = {"tolerance": held_to(error, "steps and softness are laid out for it"), "order": ""}
+    return tuple(
+        DialledWitness(**{part.name: getattr(each, part.name) for part in fields(Witness)} | own)
+        if each.through_time
+        else each
+        for each in witnesses
+    )
 
 
 @dataclass(slots=True)
