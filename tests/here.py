@@ -6,17 +6,17 @@ import pytest
 
 from validation.engines.witnesses import Witness
 from validation.report.record import Record
-from validation.report.summary import Summary, Summing
+from validation.report.summary import Summary
 from validation.run import pool
 from validation.scenes.suites import Suite
 
 
 def summary_of(records: Iterable[Record]) -> Summary:
     """What a run comes to in which these scenes were judged."""
-    summing = Summing()
+    summary = Summary()
     for each in records:
-        summing.add(each)
-    return summing.summary()
+        summary.add(each)
+    return summary
 
 
 def judge_here(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -16,8 +16,8 @@ from fourbar.errors import BAD_INPUT, FAILED, HOLDS
 from fourbar.quantities import OK, UNITS, VECTORS
 from fourbar.scene import Command, Scene, command
 from fourbar.solve import solve
-from validation.check.check import Judgement, judge_table
 from validation.check.judge import Tolerance
+from validation.check.judgement import Judgement, judge_table
 from validation.check.theirs import LARGEST_FILE, NOT_JUDGED, read_table
 from validation.cli import status
 from validation.compare.scales import TERMS, yardstick

@@ -22,15 +22,16 @@ from tests.test_regression import HERE, ROW, save
 from validation.check.model import ModelReport
 from validation.cli import status
 from validation.compare.answer import Answer, Released
+from validation.compare.columns import read_columns
 from validation.compare.compare import compare
 from validation.compare.counts import Counts
-from validation.compare.rows import AGREES, DEGRADED, FAILS, REFUSES, UNDECIDED, VERDICTS, Row, from_csv, write_results
+from validation.compare.rows import AGREES, DEGRADED, FAILS, REFUSES, UNDECIDED, VERDICTS, Row, write_results
 from validation.compare.tolerance import EQUIVALENCE
 from validation.engines.witnesses import WITNESSES, Witness
 from validation.regression import render
 from validation.regression.changes import differences
 from validation.report.html import html as page_of
-from validation.report.markdown import markdown
+from validation.report.html import markdown
 from validation.run import released as free
 from validation.run.judge import judge, judged
 from validation.stress.mutation import mutation
@@ -94,7 +95,7 @@ def test_a_table_cannot_say_that_a_refusal_passed(tmp_path: Path) -> None:
     text = (tmp_path / "results.csv").read_text()
     assert ",false,refuses," in text
     (tmp_path / "results.csv").write_text(text.replace(",false,", ",true,"))
-    assert [row.passed for row in from_csv(tmp_path / "results.csv")] == [False]
+    assert [row.passed for row in read_columns(tmp_path / "results.csv")] == [False]
     (tmp_path / "results.csv").write_text(text.replace("refuses", "FAILED"))
     assert status(["compare", str(tmp_path), str(tmp_path)]) == 2
 
@@ -221,7 +222,7 @@ def test_a_free_motion_that_every_engine_refuses_is_not_held(monkeypatch: pytest
         def release(self, scene: Scene, times: object) -> Released:
             return Released.refused("refusing", "-", "a declared limit")
 
-    monkeypatch.setattr(free, "_adapter", lambda _: Refusing)
+    monkeypatch.setattr(free, "resolve_name", lambda _: Refusing)
     scene = crank_rocker(motion=fourbar.Motion(1.0, 0.0, free=fourbar.Free(0.2, 20)))
     page = judged("free", scene, (), draw=False)
     sentence = "Nothing was compared on 1 scene: 1 of the formulas' own identities hold; 2 refuse"
@@ -269,7 +270,7 @@ def test_two_runs_without_a_comparison_in_common_are_no_success(
 
 def test_of_two_rows_of_one_name_the_worse_one_counts() -> None:
     both = [*rows(fail=1), *rows(agree=1)]
-    assert differences((HERE, rows(agree=1)), (HERE, both)).regressions
+    assert differences((HERE, rows(agree=1)), (HERE, both)).regressed
 
 
 def test_numbers_without_a_digit_do_not_agree(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -20,9 +20,9 @@ from fourbar.errors import InputError
 from tests.here import judge_here
 from tests.test_suite import COUNT, EXACT, FULL, IN_A_CHUNK, KILLS, SEED, TYPES, judge_all
 from validation.compare.rows import FAILS
+from validation.report.machine import code
 from validation.report.summary import Summary
 from validation.run import machines, pool
-from validation.run.code import code
 from validation.run.machines import ClusterError
 from validation.run.run import run
 from validation.scenes.suites import Random

@@ -11,8 +11,9 @@ from fourbar.quantities import FORCES
 from fourbar.scene import Command, Scene, command
 from tests.scenes import crank_rocker
 from validation.compare.answer import Answer
+from validation.compare.columns import read_columns
 from validation.compare.compare import COMPARED
-from validation.compare.rows import AGREES, FAILS, REFUSES, UNDECIDED, Row, from_csv, to_csv, write_results
+from validation.compare.rows import AGREES, FAILS, REFUSES, UNDECIDED, Row, to_csv, write_results
 from validation.compare.tolerance import EPS, EQUIVALENCE, K
 from validation.engines.free_body import FreeBody
 from validation.engines.witnesses import WITNESSES, Witness, predicting_from
@@ -188,7 +189,7 @@ def test_positions_alone_need_no_forces() -> None:
 def test_results_survive_the_file(tmp_path) -> None:  # type: ignore[no-untyped-def]
     rows = judge("scene", crank_rocker(), [Witness("echo", f"{__name__}:Echo", EQUIVALENCE)]).rows
     write_results(rows, tmp_path / "results.csv")
-    again = from_csv(tmp_path / "results.csv")
+    again = list(read_columns(tmp_path / "results.csv"))
     assert to_csv(again) == to_csv(rows)
     assert [(r.scene, r.engine, r.setting, r.quantity) for r in again] == sorted(
         (r.scene, r.engine, r.setting, r.quantity) for r in rows

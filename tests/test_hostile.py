@@ -18,7 +18,8 @@ from tests.here import judge_here
 from tests.scenes import crank_rocker
 from validation.cli import status
 from validation.compare.answer import Answer
-from validation.compare.rows import COLUMNS, FAILS, from_csv
+from validation.compare.columns import read_columns
+from validation.compare.rows import COLUMNS, FAILS
 from validation.compare.tolerance import EQUIVALENCE
 from validation.engines.memory import WORKER_MEMORY
 from validation.engines.witnesses import Witness
@@ -174,7 +175,7 @@ def test_a_suite_file_of_hostile_names_runs_and_they_are_shown_and_not_sent(
     suite.write_text(f"scenes = {json.dumps(names)}")
     arguments = ["--suite", str(suite), "--engines", "free-body", "--no-pictures", "--out", str(tmp_path / "out")]
     assert status(["run", *arguments]) == HOLDS
-    assert {row.scene for row in from_csv(tmp_path / "out" / "results.csv")} == {"\\x1b[31m<b>[red]x", "a\nb"}
+    assert {row.scene for row in read_columns(tmp_path / "out" / "results.csv")} == {"\\x1b[31m<b>[red]x", "a\nb"}
     # the progress bar steers the terminal itself; what is printed at the end does not
     assert not STEERING.search(capsys.readouterr().out)
 
@@ -255,6 +256,6 @@ def test_running_out_of_memory_costs_its_own_row(tmp_path: Path, monkeypatch: py
     monkeypatch.setattr(validation.run.run, "CHUNK", {True: 2, False: 2})
     greedy = Witness("greedy", f"{__name__}:Greedy", EQUIVALENCE)
     list(run(suite, tmp_path / "run", (*EXACT, greedy), workers=1, drawn=False))
-    failing = [row for row in from_csv(tmp_path / "run" / "results.csv") if row.verdict == FAILS]
+    failing = [row for row in read_columns(tmp_path / "run" / "results.csv") if row.verdict == FAILS]
     assert {(row.scene, row.engine) for row in failing} == {("b", "greedy")}
     assert "MemoryError" in failing[0].reason

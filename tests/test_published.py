@@ -14,8 +14,7 @@ from tests import scenes
 from validation.compare.tolerance import EPS
 from validation.published import ladder as command
 from validation.published import ladder_rows, published
-from validation.published.errata import ERRATA
-from validation.published.figures import Figure, compare
+from validation.published.figures import ERRATA, Figure, compare
 from validation.published.ladder import explained, figures, reason
 from validation.published.program import (
     DATA,

@@ -64,9 +64,9 @@ def test_better_and_new_rows_are_no_regression_but_a_new_failure_is() -> None:
     simulated = replace(ROW, error=4e-6, allowed=1e-5)
     found = differences((HERE, [simulated]), (HERE, [replace(simulated, error=1e-6), replace(ROW, quantity="F12")]))
     assert {change.kind for change in found.changes} == {Kind.BETTER, Kind.NEW}
-    assert not found.regressions
+    assert not found.regressed
     failing = replace(ROW, quantity="F12", verdict=FAILS)
-    assert differences((HERE, [ROW]), (HERE, [ROW, failing])).regressions
+    assert differences((HERE, [ROW]), (HERE, [ROW, failing])).regressed
 
 
 def test_other_versions_are_reported_first() -> None:
@@ -162,9 +162,9 @@ def test_options_of_a_run_that_would_do_nothing_are_refused_before_it(
 def test_what_stood_for_a_failure_and_is_gone_is_no_regression() -> None:
     alarm = replace(ROW, quantity="watch", verdict=FAILS, error=math.nan)
     assert kinds([ROW, alarm], [ROW]) == [Kind.SAME, Kind.GONE_FAILURE]
-    assert not differences((HERE, [ROW, alarm]), (HERE, [ROW])).regressions
+    assert not differences((HERE, [ROW, alarm]), (HERE, [ROW])).regressed
     failed = replace(ROW, verdict=FAILS)
-    assert differences((HERE, [failed]), (HERE, [])).regressions  # a comparison that failed and is not made any more
+    assert differences((HERE, [failed]), (HERE, [])).regressed  # a comparison that failed and is not made any more
 
 
 def test_another_python_without_the_libraries_is_one_line_and_status_3(
@@ -193,7 +193,7 @@ def test_a_run_with_too_many_rows_for_a_text_is_read_from_its_columns(tmp_path: 
     (tmp_path / "results.csv").unlink()
     from_columns = read_run(tmp_path)
     assert from_columns[0] == from_text[0] and repr(from_columns[1]) == repr(from_text[1])
-    assert not differences(from_text, from_columns).regressions
+    assert not differences(from_text, from_columns).regressed
     (tmp_path / "results.parquet").write_bytes(b"no columns")
     with pytest.raises(InputError, match="is not a table written by"):
         read_run(tmp_path)
@@ -327,7 +327,7 @@ def test_a_scene_that_changed_comes_first_and_its_rows_are_not_compared() -> Non
     found = differences(old, made([wrong, other], {"scene": heavier, "other": SCENE}))
     assert render.text(found).splitlines()[0] == "scene scene: bars.output.inertia 0.048 -> 0.05 kg m^2"
     assert found.status == 0 and found.not_compared == ["scene scene changed (1 rows)"]
-    assert differences(old, made([replace(wrong, verdict=FAILS), other], {"scene": heavier})).regressions
+    assert differences(old, made([replace(wrong, verdict=FAILS), other], {"scene": heavier})).regressed
     assert differences(made([ROW], {"scene": before}), made([wrong], {"scene": heavier})).nothing
     for form in (render.markdown, render.html):
         assert "bars.output.inertia 0.048" in form(found)
@@ -337,17 +337,17 @@ def test_more_positions_and_other_settings_are_named_so() -> None:
     finer = replace(SCENE, motion=replace(SCENE.motion, theta_2=fourbar.Sweep(0.0, 2.0 * math.pi, 720)))
     worse = replace(ROW, error=1e-9, allowed=1e-8)
     found = differences(made([ROW], {"scene": SCENE}), made([worse], {"scene": finer}))
-    assert found.not_compared == ["scene scene has other positions (1 rows)"] and not found.regressions
+    assert found.not_compared == ["scene scene has other positions (1 rows)"] and not found.regressed
     assert "360} -> " in str(found.scenes[0]) or "steps" in str(found.scenes[0])
     old, new = replace(ROW, setting="RK4 628/rev"), replace(worse, setting="RK4 1256/rev")
     found = differences(made([old], {"scene": SCENE}), made([new], {"scene": SCENE}))
-    assert found.not_compared == ["scene / engine: RK4 628/rev -> RK4 1256/rev (1 rows)"] and not found.regressions
+    assert found.not_compared == ["scene / engine: RK4 628/rev -> RK4 1256/rev (1 rows)"] and not found.regressed
 
 
 def test_of_an_older_record_only_the_hash_can_say_that_scenes_changed() -> None:
     old = About(HERE.versions, HERE.machine, {**HERE.settings, "suite": "0123456789abcdef"})
     found = differences((old, [ROW]), made([ROW], {"scene": SCENE}))
-    assert not found.scenes and not found.regressions
+    assert not found.scenes and not found.regressed
     (note,) = found.notes
     assert "0123456789ab -> suite" in note and "the older record does not say what they ask" in note
 
@@ -359,7 +359,7 @@ def test_what_was_not_wanted_is_not_run_and_what_was_wanted_is_gone() -> None:
     found = differences(old, made(rows[:2], {"a": SCENE}))
     assert found.not_run == ["scene b (2 rows)", "other (1 rows)"] and found.status == 0
     gone = differences(old, made(rows[1:2], {"a": SCENE}))
-    assert [change.key[1] for change in gone.regressions] == ["engine"]
+    assert [change.key[1] for change in gone.changes if change.regression] == ["engine"]
     assert differences(old, (HERE, rows[:2])).not_run[0] == "scene b (2 rows)"  # without a record its rows say so
 
 

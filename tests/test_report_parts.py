@@ -11,12 +11,10 @@ from tests.test_report import demo, report
 from validation.compare.rows import AGREES, FAILS, REFUSES, UNDECIDED, Row, write_results
 from validation.engines.hard_suite import HARD_WITNESSES, Hard
 from validation.engines.witnesses import FURTHER, WORK
-from validation.report import cost_section as cost
 from validation.report.costs import cost_figure
-from validation.report.hard_section import found_in, section
 from validation.report.html import html
+from validation.report.sections import LARGEST, hard_cases, sections
 from validation.report.templating import count_or_size
-from validation.run.run import sections
 from validation.scenes.hard_families import FAMILIES
 
 
@@ -27,7 +25,7 @@ def judged(scene: str, verdict: str) -> Row:
 def test_every_scene_is_counted_in_its_family_alone() -> None:
     hard = Hard()
     rows = [judged(hard.name(index), AGREES) for index in range(len(hard))]
-    table = {row[0]: row for row in section(rows).rows}
+    table = {row[0]: row for row in hard_cases(rows).rows}
     for family in FAMILIES:
         count = str(sum(1 for _ in family.scenes()))
         assert table[family.name][1:3] == (count, count) and table[family.name][7:] == ("holds", family.statement)
@@ -36,18 +34,18 @@ def test_every_scene_is_counted_in_its_family_alone() -> None:
 
 def test_a_failing_row_fails_its_family_in_the_report(tmp_path: Path) -> None:
     rows = [judged("toggle-near-a", AGREES), judged("toggle-near-a", REFUSES), judged("toggle-b", FAILS)]
-    toggle, near = section(rows).rows
+    toggle, near = hard_cases(rows).rows
     assert toggle[:8] == ("toggle", "1", "0", "0", "0", "0", "1", "1 fail")
     assert near[:8] == ("toggle-near", "1", "1", "0", "0", "1", "0", "holds")
-    (refused,) = section([judged("toggle-near-a", REFUSES), judged("toggle-near-a", UNDECIDED)]).rows
+    (refused,) = hard_cases([judged("toggle-near-a", REFUSES), judged("toggle-near-a", UNDECIDED)]).rows
     assert refused[:8] == ("toggle-near", "1", "0", "0", "1", "1", "0", "nothing compared")
-    assert found_in(tmp_path) is None
+    assert sections(None, tmp_path) == []
     (tmp_path / "hard").mkdir()
     write_results(rows, tmp_path / "hard" / "results.csv")
-    assert found_in(tmp_path) is None  # unfinished: its page is not written yet
+    assert sections(None, tmp_path) == []  # unfinished: its page is not written yet
     (tmp_path / "hard" / "hard.html").touch()
-    found = found_in(tmp_path)
-    assert found is not None and found.rows == section(rows).rows
+    (found,) = sections(None, tmp_path)
+    assert found.rows == hard_cases(rows).rows
     assert [file for _, file in found.links] == ["hard/hard.html", "hard/report.html"]
 
 
@@ -81,13 +79,13 @@ def test_the_picture_of_costs_says_what_each_did_for_a_position() -> None:
 
 
 def test_a_study_of_cost_next_to_the_report_is_part_of_it(tmp_path: Path) -> None:
-    assert cost.found_in(tmp_path) == []
+    assert sections(None, tmp_path) == []
     folder = tmp_path / "cost" / "demo"
     folder.mkdir(parents=True)
     (folder / "cost.csv").touch()
     (folder / "sources.svg").write_text("<svg onload='alert(1)'/>")
-    (folder / "work-precision-force.svg").write_bytes(bytes(cost.LARGEST + 1))
-    _, text = report([demo(draw=False)], sections=cost.found_in(tmp_path))
+    (folder / "work-precision-force.svg").write_bytes(bytes(LARGEST + 1))
+    _, text = report([demo(draw=False)], sections=sections(None, tmp_path))
     assert "The study of demo" in text and 'href="cost/demo/cost.md"' in text
     data = base64.b64encode(b"<svg onload='alert(1)'/>").decode()
     # an image runs no script; what is too large stays outside

@@ -16,7 +16,7 @@ from tests.here import judge_here
 from tests.scenes import crank_rocker
 from validation.compare.columns import read_columns
 from validation.compare.identities import FORMULAS, IDENTITIES
-from validation.compare.rows import COLUMNS, Row, from_csv
+from validation.compare.rows import COLUMNS, Row
 from validation.compare.statements.statements import statements
 from validation.engines.free_body import FreeBody
 from validation.engines.hard_suite import HARD_WITNESSES
@@ -84,7 +84,7 @@ def test_every_quantity_of_a_scene_is_described(results: Path) -> None:
     stated = {row.quantity for row in statements("", scene, engine, engine.answer(scene, command(scene)))}
     of_positions = {q.name for q in QUANTITIES}
     assert set(described) == ({*IDENTITIES, *WHOLE, *FULL, *stated, SHIPPED, *OF_A_SCENE}) - of_positions
-    seen = {row.quantity for file in (results / "results", SHIPPED_RUN) for row in from_csv(file / "results.csv")}
+    seen = {row.quantity for file in (results / "results", SHIPPED_RUN) for row in read_columns(file / "results.csv")}
     assert stated - {"through"} <= seen <= {*described, *of_positions}
 
 
@@ -116,7 +116,7 @@ def test_the_parquet_file_holds_the_rows_of_the_table(results: Path) -> None:
     file = pq.ParquetFile(results / "results" / "results.parquet")
     assert file.num_row_groups == 1  # of 100 000 rows each
     kept = list(read_columns(results / "results" / "results.parquet"))
-    table = from_csv(results / "results" / "results.csv")
+    table = list(read_columns(results / "results" / "results.csv"))
     assert len(kept) == len(table)
     for one, other in zip(kept, table, strict=True):
         for ours, theirs in zip(dataclasses.astuple(one), dataclasses.astuple(other), strict=True):

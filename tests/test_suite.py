@@ -21,14 +21,15 @@ from fourbar.scene import Command, Scene
 from tests.here import judge_here
 from tests.unlucky import Few, dies_at_first
 from validation.compare.answer import Answer
-from validation.compare.rows import FAILS, REFUSES, Row, from_csv
+from validation.compare.columns import read_columns
+from validation.compare.rows import FAILS, REFUSES, Row
 from validation.compare.tolerance import EQUIVALENCE
 from validation.engines import added
 from validation.engines.witnesses import Witness
+from validation.report.machine import build, checkout, code
 from validation.report.record import Record
 from validation.report.summary import Summary
 from validation.run import pool
-from validation.run.code import build, checkout, code
 from validation.run.run import Collected, run
 from validation.run.selection import chosen
 from validation.run.store import RunningError, Store
@@ -63,7 +64,7 @@ def test_an_engine_that_crashes_or_hangs_costs_its_own_rows(tmp_path: Path, monk
     hangs = 2.0 * max(1.0, os.getloadavg()[0] / (os.cpu_count() or 1))  # s; a busy machine is given longer
     moody = added.named(["tests.unlucky:Moody"], ())
     judge_all(Few(), tmp_path / "run", (*EXACT, *moody), seconds=hangs)
-    rows = from_csv(tmp_path / "run" / "results.csv")
+    rows = list(read_columns(tmp_path / "run" / "results.csv"))
     failing = {(row.scene, row.engine): row.reason for row in rows if row.verdict == FAILS}
     assert set(failing) == {("b", "moody"), ("c", "moody")}
     assert "crashed" in failing["b", "moody"]

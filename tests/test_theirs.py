@@ -27,8 +27,9 @@ from validation.check import model
 from validation.check.causes import causes
 from validation.check.differences import differences
 from validation.check.screen import DEEPEST, LARGEST_MJCF, read_mjcf
+from validation.compare.columns import read_columns
 from validation.compare.compare import compare
-from validation.compare.rows import FAILS, from_csv
+from validation.compare.rows import FAILS
 from validation.compare.tolerance import SIMULATED
 from validation.engines.memory import WORKER_MEMORY
 from validation.engines.mujoco.theirs import ONE_STATE, THROUGH_TIME, Examined, examine, examine_mended
@@ -408,7 +409,9 @@ def test_the_command_writes_and_prints_what_it_found(tmp_path: Path) -> None:
     assert "closure.softness" in result.output
     report = (tmp_path / "out" / "theirs.md").read_text()
     assert "\x1b" not in report
-    assert any(row.verdict == FAILS and row.engine == ONE_STATE for row in from_csv(tmp_path / "out" / "results.csv"))
+    assert any(
+        row.verdict == FAILS and row.engine == ONE_STATE for row in read_columns(tmp_path / "out" / "results.csv")
+    )
 
 
 @pytest.mark.parametrize("arguments", [["--mjcf", "x.xml"], ["SCENE", "--mjcf", "x.xml", "--name", "wheel=a"]])
@@ -434,7 +437,7 @@ def run(tmp_path: Path, text: str, *options: str) -> tuple[int | None, list[floa
     if result.exception is not None:
         raise result.exception
     return result.return_value, sorted(
-        {row.allowed for row in from_csv(out / "results.csv") if row.quantity != "undecided"}
+        {row.allowed for row in read_columns(out / "results.csv") if row.quantity != "undecided"}
     )
 
 

@@ -1,7 +1,7 @@
 """Commands of the harness; each lives in its own module and is imported when it is called."""
 
 import sys
-from importlib import import_module
+from pkgutil import resolve_name
 
 import click
 
@@ -41,8 +41,7 @@ class LazyGroup(click.Group):
         """The command of that name."""
         if cmd_name not in COMMANDS:
             return None
-        module, _, name = COMMANDS[cmd_name].partition(":")
-        command: click.Command = getattr(import_module(module), name)
+        command: click.Command = resolve_name(COMMANDS[cmd_name])
         return command
 
 

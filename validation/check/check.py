@@ -2,91 +2,20 @@
 
 import math
 from collections import Counter
-from dataclasses import dataclass
 from pathlib import Path
 
 import click
 
-from fourbar.errors import FAILED, HOLDS, InputError
+from fourbar.errors import InputError
 from fourbar.files import load
-from fourbar.scene import Scene
 from fourbar.writing import require_file, write_text
-from validation.check.judge import Finding, Judge, Tolerance
-from validation.check.mistakes import NEARER, Explanation, explain
+from validation.check.judge import Finding, Tolerance
+from validation.check.judgement import Judgement, as_json, as_junit, judge_table
+from validation.check.mistakes import NEARER, Explanation
 from validation.check.theirs import Table, read_table
-from validation.compare.plain import plain
+from validation.compare.rows import plain
 
 SHOWN = 3
-
-
-@dataclass(frozen=True, slots=True)
-class Judgement:
-    """All findings, and the known mistakes that would explain them."""
-
-    findings: list[Finding]
-    not_assembled: list[int]
-    """Lines at which this linkage does not assemble, or is singular: there is no right answer there."""
-    explanations: list[Explanation]
-    tolerance: Tolerance | None = None
-
-    @property
-    def differing(self) -> list[Finding]:
-        """The findings that do not agree, though there are digits to judge by."""
-        return [finding for finding in self.findings if finding.judged and not finding.agrees]
-
-    @property
-    def agreeing(self) -> int:
-        """How many numbers agree."""
-        return sum(finding.agrees for finding in self.findings)
-
-    @property
-    def exact(self) -> int:
-        """How many numbers agree to round-off and their printed digits."""
-        return sum(finding.exact for finding in self.findings)
-
-    @property
-    def not_judged(self) -> int:
-        """How many numbers have no digit left to judge by."""
-        return sum(not finding.judged for finding in self.findings)
-
-    @property
-    def compared(self) -> int:
-        """How many numbers were judged."""
-        return len(self.findings) - self.not_judged
-
-    @property
-    def status(self) -> int:
-        """Exit status; nothing compared is no success."""
-        return FAILED if self.differing or self.not_assembled or not self.compared else HOLDS
-
-    def sentence(self) -> str:
-        """How many numbers agree, exactly and within the stated tolerance."""
-        if not self.compared:
-            agreed = "Nothing was compared"
-        elif self.tolerance is None:
-            agreed = f"{self.agreeing} of {self.compared} numbers agree"
-        else:
-            within = f"rtol {self.tolerance.rtol:g}, atol {self.tolerance.atol:g}"
-            agreed = f"{self.agreeing} of {self.compared} numbers agree within {within}; {self.exact} to round-off"
-        return agreed + (f"; no digit left to judge {self.not_judged} more by" if self.not_judged else "")
-
-    def together(self) -> bool:
-        """Whether the explanations together account for every quantity that differs."""
-        explained = {quantity for explanation in self.explanations for quantity in explanation.quantities}
-        return explained >= {finding.quantity for finding in self.differing}
-
-
-def judge_table(scene: Scene, table: Table, tolerance: Tolerance | None = None) -> Judgement:
-    """Judge every number by K eps/condition plus half a unit of its last printed digit, and of theta_2's.
-
-    With a tolerance that decides, and what explains the rest is held to it too.
-    """
-    judge = Judge(scene, table, tolerance)
-    findings = judge.findings()
-    found = {finding.quantity for finding in findings if finding.judged and not finding.agrees}
-    differing = sorted(key for key in table.values if table.label(key) in found)
-    known = explain(judge, differing) if differing else []
-    return Judgement(findings, judge.without_answer(), known, tolerance)
 
 
 def extent(explanation: Explanation) -> str:
@@ -114,10 +43,10 @@ def tolerance_of(rtol: float | None, atol: float | None) -> Tolerance | None:
 @click.argument("theirs", type=click.Path(path_type=Path))
 @click.option("--rtol", type=float, metavar="R", help="Allow this part of each number too.")
 @click.option("--atol", type=float, metavar="A", help="Allow this too, in the SI unit of each quantity.")
-@click.option("--json", "as_json", type=click.Path(path_type=Path, dir_okay=False), help="Write it as JSON too.")
+@click.option("--json", type=click.Path(path_type=Path, dir_okay=False), help="Write it as JSON too.")
 @click.option("--junit", type=click.Path(path_type=Path, dir_okay=False), help="Write it as JUnit too.")
 def check(
-    scene: Path, theirs: Path, rtol: float | None, atol: float | None, as_json: Path | None, junit: Path | None
+    scene: Path, theirs: Path, rtol: float | None, atol: float | None, json: Path | None, junit: Path | None
 ) -> int:
     """Judge a table of torques and forces (THEIRS.csv) against the formulas, row by row.
 
@@ -127,17 +56,14 @@ def check(
     --rtol or --atol these decide, and how many agree exactly is printed too.
     """
     table = read_table(theirs)
-    for path in (as_json, junit):
+    for path in (json, junit):
         if path is not None:
             require_file(path, scene, theirs)
     judgement = judge_table(load(scene), table, tolerance_of(rtol, atol))
-    if as_json is not None or junit is not None:
-        from validation.check import forms
-
-        if as_json is not None:
-            write_text(as_json, forms.as_json(judgement, table))
-        if junit is not None:
-            write_text(junit, forms.junit(judgement, theirs.name))
+    if json is not None:
+        write_text(json, as_json(judgement, table))
+    if junit is not None:
+        write_text(junit, as_junit(judgement, theirs.name))
     show(judgement, table, theirs.name)
     return judgement.status
 
@@ -179,13 +105,10 @@ def show(judgement: Judgement, table: Table, name: str) -> None:
 
 def worst_of_each(differing: list[Finding]) -> list[Finding]:
     """The worst findings of each quantity, the worst quantity first."""
-    seen: Counter[str] = Counter()
-    shown: dict[str, list[Finding]] = {}
+    by_quantity: dict[str, list[Finding]] = {}
     for finding in sorted(differing, key=lambda f: -f.error):
-        seen[finding.quantity] += 1
-        if seen[finding.quantity] <= SHOWN:
-            shown.setdefault(finding.quantity, []).append(finding)
-    return [finding for findings in shown.values() for finding in findings]
+        by_quantity.setdefault(finding.quantity, []).append(finding)
+    return [finding for findings in by_quantity.values() for finding in findings[:SHOWN]]
 
 
 def with_unit(finding: Finding, table: Table) -> str:

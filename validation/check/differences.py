@@ -2,8 +2,10 @@
 
 import math
 import re
+import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -20,11 +22,9 @@ ATTACHED = re.compile(r"((?:actuators|tendons)\.\d+)(\..+)?")
 """Keys of what a file may have any number of: numbered, so that their names can be anything."""
 NEEDS = {
     r"(pins\.\w+)\.sol(?:ref|imp)friction": (r"\1.friction", 0.0),
-    r"(pins\.\w+)\.(?:sol(?:ref|imp)limit|margin)": (r"\1.range", "free"),
-    r"(pins\.\w+)\.(?:spring angle|springyield)": (r"\1.stiffness", 0.0),
     r"(tendons\.\d+)\.sol(?:ref|imp)friction": (r"\1.frictionloss", 0.0),
-    r"(tendons\.\d+)\.(?:sol(?:ref|imp)limit|margin)": (r"\1.range", "free"),
-    r"(tendons\.\d+)\.(?:springlength.*|springyield)": (r"\1.stiffness", 0.0),
+    r"(pins\.\w+|tendons\.\d+)\.(?:sol(?:ref|imp)limit|margin)": (r"\1.range", "free"),
+    r"(pins\.\w+|tendons\.\d+)\.(?:spring angle|springyield|springlength.*)": (r"\1.stiffness", 0.0),
     r"(actuators\.\d+)\.dynprm": (r"\1.dyntype", 0.0),
     r"option\.wind": ("option.density", 0.0),
     r"option\.noslip_tolerance": ("option.noslip_iterations", 0.0),
@@ -34,73 +34,8 @@ NEEDS = {
 """A key, and what its effect hangs on: where their file has that switched off, the key is left out."""
 NEUTRAL: dict[str, Value] = {"damping": 0.0, "friction": 0.0, "stiffness": 0.0, "armature": 0.0, "range": "free"}
 """What a pin without a hinge has of each: the pin at which the other file is cut. The rest of it is not compared."""
-WRITTEN = {
-    "friction": "frictionloss",
-    "positive": "axis",
-    "spring angle": "springref",
-    "centre.distance": "inertial pos",
-    "centre.angle": "inertial pos",
-    "inertia": "inertial",
-    "time constant": "solref",
-    "damping ratio": "solref",
-    "impedance": "solimp",
-    "impedance when open": "solimp",
-    "softness": "solimp",
-}
-"""Attributes whose name in MJCF is another."""
-SLIPS = "dry friction reaches its couple only at speed: by default over 0.02 s of slip"
-REMARKS = (
-    ("lengths.ground_angle", "the linkage is turned in the plane"),
-    ("lengths.", "another linkage; body anchors of a connect are laid off in the rest state of the file: where it is "
-     "not closed they build one of other lengths, sites do not"),
-    (".centre", "pin forces and torque carry the mass elsewhere"),
-    (".mass", "inertial forces and weight"),
-    (".inertia", "about the mass centre, normal to the plane; the torque shows it least, the pin forces more"),
-    ("gravity.across", "pulls out of the plane: the pins carry it, the plane does not feel it"),
-    ("gravity", "weight of the bars"),
-    (".damping", "a couple at this pin that the scene does not have"),
-    (".friction", "a couple at this pin that the scene does not have"),
-    (".stiffness", "a spring at this pin that the scene does not have"),
-    (".solreffriction", SLIPS),
-    (".solimpfriction", SLIPS),
-    (".spring angle", "where the spring exerts nothing"),
-    (".springlength", "where the spring exerts nothing"),
-    (".gravcomp", "takes that part of the bar's weight away"),
-    (".actuatorfrcrange", "cuts off what loads exert at this pin"),
-    (".margin", "a stop acts so much before its angle"),
-    (".armature", "adds to the inertia of what turns at this pin"),
-    (".positive", "the hinge's axis points away: its angle, speed and motor torque change sign"),
-    (".range", "a stop inside the motion acts as a contact"),
-    ("closure.softness", "the loop yields: an error in proportion, at every timestep and unseen in the gap; follows "
-     "from the impedance, the inertial frames of the bodies it joins, and their masses"),
-    ("closure.impedance when", "the loop's impedance changes with its gap: d, width, midpoint, power"),
-    ("closure.impedance", "the loop yields by (1-d)/d; 0.9999 is the most that MuJoCo takes"),
-    ("closure.time constant", "a stiff loop (few timesteps) is integrated badly, a slow one sags under load"),
-    ("closure.by", "a tendon leaves out the centripetal term (54 % measured), a weld holds the angle too"),
-    ("closure.out of plane", "the closure's ends lie in two planes: it pulls the bars across, without end"),
-    ("option.timestep", "the error of the integration goes as h (Euler, implicit) or h^4 (RK4)"),
-    ("option.integrator", "Euler and implicit lose one digit per tenth of the timestep, RK4 four"),
-    ("option.tolerance", "divided by the inertia of a flywheel, only 0 is tight"),
-    ("option.iterations", "matters where the tolerance does not stop the solver"),
-    ("option.solver", "CG and PGS leave residuals in the loop's force"),
-    ("option.density", "drag on every body that has a size"),
-    ("option.viscosity", "drag on every body that has a size"),
-    ("option.wind", "drag on every body that has a size"),
-    ("option.meaninertia", "the solver's tolerance is in proportion to it; it follows from armatures and inertias"),
-    ("option.ls_", "of the solver's line search: how well each of its steps is made"),
-    ("option.noslip", "a second solver for dry friction: it changes what the first has found"),
-    ("option.actuatorgroupdisable", "actuators of these groups are switched off"),
-    ("option.switched", "see the MuJoCo flags of that name"),
-    ("contacts", "bars that touch at the pins push each other: forces of thousands of newtons"),
-    ("plane", "x and y of the scene are these axes of the file"),
-    (".gear", "the load: force and couple in the plane, gear times bias; a control is 0 here"),
-    (".site", "where the load acts: along the bar from its first pin, and to its left"),
-    ("actuators", "loads are actuators in the generated file; one that is missing is missing in every force"),
-    ("tendons", "springs, and what acts at the cut pin, are tendons in the generated file"),
-    ("unknown", "a field of this MuJoCo that nothing is known of here"),
-    ("other equalities", "switched off here: the four pins are all that joins the bars"),
-)  # fmt: skip
-"""Part of a key, and what a difference there does; the first that fits."""
+WORDS = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
+"""Names in MJCF where they differ, and what a difference does; see there."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -183,7 +118,8 @@ def _written(key: str, theirs: Described, called: Mapping[str, str]) -> str:
     if key not in theirs:
         return ""
     part = next((known for known in called if key == known or key.startswith(known + ".")), "")
-    return f"{called[part]} {WRITTEN.get(key[len(part) + 1 :], key[len(part) + 1 :])}".strip() if part else ""
+    attribute = key[len(part) + 1 :]
+    return f"{called[part]} {WORDS['written'].get(attribute, attribute)}".strip() if part else ""
 
 
 def _is_length(key: str) -> bool:
@@ -206,7 +142,7 @@ def _same(key: str, ours: Value, theirs: Value, length: float) -> bool:
 def _remark(key: str, ours: Value, theirs: Value) -> str:
     if key in OF_THE_DRIVE:
         return OF_THE_DRIVE[key]
-    remark = next((text for part, text in REMARKS if part in key), "")
+    remark = next((text for part, text in WORDS["remarks"].items() if part in key), "")
     if isinstance(ours, float) and isinstance(theirs, float) and ours * theirs > 0.0 and not key.startswith("option"):
         power = math.log10(theirs / ours)
         if round(power) and abs(power - round(power)) <= TENFOLD:

@@ -1,9 +1,8 @@
 """Mistakes with a number in them, which is fitted to the table: a ratio, a factor, an offset, another order."""
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,10 +14,10 @@ from fourbar.quantities import FORCES, UNITS
 from fourbar.scene import Scene
 from fourbar.solution import Solution
 from fourbar.solve import solve
-from validation.check.judge import Judge
-from validation.check.mistake import Mistake
+from validation.check.judge import Judge, Mistake
 from validation.check.theirs import Array, quantity_of
 from validation.compare.error import difference, in_own_unit
+from validation.scenes.hard_linkages import with_bars
 
 OTHER_UNITS = {
     "rad": ("deg",),
@@ -133,34 +132,30 @@ def _factors(judge: Judge, differing: list[str]) -> Iterator[Mistake]:
     bars = ("input", "coupler", "output")
     inertia = ("moment of inertia", lambda bar, f: replace(bar, inertia=f * bar.moment_of_inertia))
     mass = ("mass", lambda bar, f: replace(bar, mass=f * bar.mass))
-    for which in (*((bar,) for bar in bars), bars):
-        for word, change in (inertia, mass):
-            if word == "mass" and which is bars:
-                continue
+    for which, (word, change) in (*(((bar,), each) for bar in bars for each in (inertia, mass)), (bars, inertia)):
 
-            def scaled(f: float, which: tuple[str, ...] = which, change: Callable[[Bar, float], Bar] = change) -> Scene:
-                bars: dict[str, Any] = {bar: change(getattr(scene.linkage, bar), f) for bar in which}
-                return replace(scene, linkage=replace(scene.linkage, **bars))
+        def scaled(f: float, which: Sequence[str] = which, change: Callable[[Bar, float], Bar] = change) -> Scene:
+            return with_bars(scene, **{bar: change(getattr(scene.linkage, bar), f) for bar in which})
 
-            try:
-                moves = _change(judge, solve(scaled(2.0), "force", at=judge.at), keys)
-                slope = float(moves @ moves)
-                factor = 1.0 + float(moves @ theirs) / slope if slope else math.nan
-                if not 0.0 < factor < math.inf or factor == 1.0:
-                    continue
-                plain = next((f for f in FACTORS if abs(factor / f - 1.0) < PLAIN), None) if word != "mass" else None
-                for f in (factor,) if plain is None else (plain, factor):
-                    wrong = solve(scaled(f), "force", at=judge.at)
-                    what = f"{FACTORS[f]}" if f == plain else f"{f:.6g} times ours (fitted)"
-                    yield Mistake(
-                        f"{which[0] if len(which) == 1 else 'every bar'}: {word} {what}",
-                        lambda quantity, right, wrong=wrong: getattr(wrong, quantity, None),  # type: ignore[misc]
-                        times=1.0 if f == plain else CARRIED,
-                    )
-                    if f == plain and all(judge.explained(key, judge.ours(key, wrong)) for key in keys):
-                        break
-            except FourBarError:  # what the factor makes of this scene is none
+        try:
+            moves = _change(judge, solve(scaled(2.0), "force", at=judge.at), keys)
+            slope = float(moves @ moves)
+            factor = 1.0 + float(moves @ theirs) / slope if slope else math.nan
+            if not 0.0 < factor < math.inf or factor == 1.0:
                 continue
+            plain = next((f for f in FACTORS if abs(factor / f - 1.0) < PLAIN), None) if word != "mass" else None
+            for f in (factor,) if plain is None else (plain, factor):
+                wrong = solve(scaled(f), "force", at=judge.at)
+                what = f"{FACTORS[f]}" if f == plain else f"{f:.6g} times ours (fitted)"
+                yield Mistake(
+                    f"{which[0] if len(which) == 1 else 'every bar'}: {word} {what}",
+                    lambda quantity, right, wrong=wrong: getattr(wrong, quantity, None),  # type: ignore[misc]
+                    times=1.0 if f == plain else CARRIED,
+                )
+                if f == plain and all(judge.explained(key, judge.ours(key, wrong)) for key in keys):
+                    break
+        except FourBarError:  # what the factor makes of this scene is none
+            continue
 
 
 def _offset(judge: Judge) -> Iterator[Mistake]:
@@ -236,11 +231,9 @@ def _order(judge: Judge) -> Iterator[Mistake]:
         text = f"the rows are shifted by {rows:+d}: each has the numbers of another theta_2"
     else:
         text = "the rows are in another order than their theta_2"
-    yield Mistake(
-        text,
-        lambda quantity, right: None if quantity == "theta_2" else _taken(getattr(right, quantity, None), nearest),
-    )
+    yield Mistake(text, lambda quantity, right: _in_rows(quantity, right, nearest))
 
 
-def _taken(values: Array | None, rows: Array) -> Array | None:
-    return None if values is None else values[rows]
+def _in_rows(quantity: str, right: Solution, rows: Array) -> Array | None:
+    values = None if quantity == "theta_2" else getattr(right, quantity, None)
+    return None if values is None else np.asarray(values[rows])

@@ -1,6 +1,7 @@
-"""A table judged number by number: how far each is from the formulas, and what it is allowed."""
+"""A table judged number by number: how far each is from the formulas, what it is allowed, and what may explain it."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -153,18 +154,11 @@ class Judge:
             permitted = self.permitted(key, ours)
             for i in np.flatnonzero(self.where(key)).tolist():
                 stated = np.isfinite(np.atleast_1d(theirs[i]))
+                yours, mine = (tuple(np.atleast_1d(values[i])[stated].tolist()) for values in (theirs, ours))
+                numbers = (float(error[i]), float(allowed[i]), float(apart[i]))
+                most = None if permitted is None else float(permitted[i])
                 found.append(
-                    Finding(
-                        self.table.lines[i],
-                        label,
-                        tuple(np.atleast_1d(theirs[i])[stated].tolist()),
-                        tuple(np.atleast_1d(ours[i])[stated].tolist()),
-                        float(error[i]),
-                        float(allowed[i]),
-                        float(apart[i]),
-                        None if permitted is None else float(permitted[i]),
-                        float(self.at.theta_2[i]),
-                    )
+                    Finding(self.table.lines[i], label, yours, mine, *numbers, most, float(self.at.theta_2[i]))
                 )
         return found
 
@@ -193,3 +187,21 @@ def positions(scene: Scene, table: Table) -> Command:
     if scene.motion.through == "follow":
         branch = on_smooth_path(scene.linkage, theta_2, scene.motion.branch)
     return Command(theta_2, branch, base.omega_2, base.alpha_2)
+
+
+@dataclass(frozen=True, slots=True)
+class Mistake:
+    """A mistake as a hypothesis: what was done, and what it turns the right numbers into."""
+
+    text: str
+    predict: Callable[[str, Solution], Array | None]
+    """quantity, right solution -> what would have been printed; None where it changes nothing of it."""
+    whole: bool = True
+    """Whether it was made in the calculation, and so shows in every quantity; a column's unit shows in its own."""
+    times: float = 1.0
+    """Of what is allowed: a number that was fitted to rounded ones carries their rounding once more."""
+
+    def prediction(self, key: str, right: Solution) -> Array | None:
+        """For a key of the table."""
+        predicted = self.predict(quantity_of(key), right)
+        return magnitude(predicted) if predicted is not None and key.startswith("|") else predicted

@@ -3,7 +3,6 @@
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from itertools import chain
-from typing import Any
 
 import numpy as np
 
@@ -15,9 +14,9 @@ from fourbar.scene import Command, Scene
 from fourbar.solution import Solution
 from fourbar.solve import solve
 from validation.check.fitted import fitted
-from validation.check.judge import Judge
-from validation.check.mistake import Mistake
+from validation.check.judge import Judge, Mistake
 from validation.check.theirs import Array
+from validation.scenes.hard_linkages import moving, with_bars
 
 SHOWN = 5
 """Explanations that are printed."""
@@ -27,26 +26,12 @@ NEARER = 10.0
 
 def hypotheses(scene: Scene, at: Command) -> Iterator[Mistake]:
     """Every mistake that can be made on this scene, the simplest first."""
-    yield Mistake(
-        "sign reversed, or F_ij given for F_ji",
-        lambda quantity, right: _where(quantity, right, lambda v: -v),
-        whole=False,
-    )
-    yield Mistake(
-        "degrees where radians were announced",
-        lambda quantity, right: _where(quantity, right, np.degrees) if _is_angular(quantity) else None,
-        whole=False,
-    )
-    yield Mistake(
-        "x and y exchanged",
-        lambda quantity, right: _where(quantity, right, lambda v: v[:, ::-1]) if quantity in VECTORS else None,
-        whole=False,
-    )
-    yield Mistake(
-        "measured from the other end of the bar (half a turn off): theta_4 or theta_3 from B, theta_2 from A",
-        lambda quantity, right: _where(quantity, right, lambda v: v + np.pi) if quantity.startswith("theta") else None,
-        whole=False,
-    )
+    for text, change, of in COLUMN_MISTAKES:
+        yield Mistake(
+            text,
+            lambda quantity, right, change=change, of=of: _where(quantity, right, change) if of(quantity) else None,  # type: ignore[misc]
+            whole=False,
+        )
     for bar in (2, 3):
         yield Mistake(
             f"relative to bar {bar} instead of the ground",
@@ -67,14 +52,13 @@ def _inertial(scene: Scene, at: Command) -> Iterator[Mistake]:
     if at.omega_2 is None:
         return
     bare = replace(scene, loads=(), effects=())
-    of_mass = solve(_with_bars(bare, lambda bar: replace(bar, inertia=0.0)), "force", at=at)
-    of_inertia = solve(
-        _with_bars(bare, lambda bar: replace(bar, mass=0.0, inertia=bar.moment_of_inertia)), "force", at=at
-    )
+    massless = {name: replace(bar, mass=0.0, inertia=bar.moment_of_inertia) for name, bar in moving(bare)}
+    pointlike = {name: replace(bar, inertia=0.0) for name, bar in moving(bare)}
+    of_mass, of_inertia = (solve(with_bars(bare, **bars), "force", at=at) for bars in (pointlike, massless))
 
     def scaled(by_mass: float, by_inertia: float) -> Callable[[str, Solution], Array | None]:
         def predict(quantity: str, right: Solution) -> Array | None:
-            if not _is_force(quantity):
+            if quantity not in FORCES:
                 return None
             extra = (by_mass - 1.0) * getattr(of_mass, quantity) + (by_inertia - 1.0) * getattr(of_inertia, quantity)
             return np.asarray(getattr(right, quantity) + extra)
@@ -92,14 +76,6 @@ def _inertial(scene: Scene, at: Command) -> Iterator[Mistake]:
     yield Mistake("I alpha with the wrong sign", scaled(1.0, -1.0))
 
 
-def _with_bars(scene: Scene, change: Callable[[Bar], Bar]) -> Scene:
-    link = scene.linkage
-    return replace(
-        scene,
-        linkage=replace(link, input=change(link.input), coupler=change(link.coupler), output=change(link.output)),
-    )
-
-
 def _other_problems(scene: Scene, at: Command) -> Iterator[tuple[str, Scene, Command]]:
     """The same formulas on the scene that the mistake amounts to."""
     yield "the other branch", scene, at._replace(branch=-at.branch)
@@ -111,7 +87,8 @@ def _other_problems(scene: Scene, at: Command) -> Iterator[tuple[str, Scene, Com
         flipped = tuple(replace(g, magnitude=-g.magnitude) for g in gravity)
         yield "gravity is reversed", replace(scene, effects=(*others, *flipped)), at
     else:
-        yield "gravity along -y is included though the scene has none", _with_gravity(scene), at
+        added = replace(scene, effects=(*scene.effects, Gravity()))
+        yield "gravity along -y is included though the scene has none", added, at
     if scene.loads:
         yield "the loads are missing", replace(scene, loads=()), at
         for number, load in enumerate(scene.loads, 1):
@@ -128,18 +105,12 @@ def _other_problems(scene: Scene, at: Command) -> Iterator[tuple[str, Scene, Com
             yield "alpha_2 is left out", scene, at._replace(alpha_2=0.0)
         rpm = np.pi / 30.0
         yield "omega_2 in rev/min taken for rad/s", scene, at._replace(omega_2=at.omega_2 / rpm)
-    for bar in ("input", "coupler", "output"):
+    for name, bar in moving(scene):
         for text, change in BAR_MISTAKES:
-            link = scene.linkage
-            if (changed := change(getattr(link, bar))) is not None:
-                bars: dict[str, Any] = {bar: changed}
-                yield f"{bar}: {text}", replace(scene, linkage=replace(link, **bars)), at
+            if (changed := change(bar)) is not None:
+                yield f"{name}: {text}", with_bars(scene, **{name: changed}), at
     for drive in {2, 3, 4} - {scene.drive_bar}:
         yield f"the torque acts on bar {drive} instead of bar {scene.drive_bar}", replace(scene, drive_bar=drive), at
-
-
-def _with_gravity(scene: Scene) -> Scene:
-    return replace(scene, effects=(*scene.effects, Gravity()))
 
 
 def _reversed(load: Load) -> Load:
@@ -160,14 +131,6 @@ def _from_other_pin(bar: Bar) -> Bar | None:
     return replace(bar, centre=(float(np.hypot(x, y)), float(np.arctan2(y, x)))) if bar.mass else None
 
 
-def _about_pin(bar: Bar) -> Bar | None:
-    return replace(bar, inertia=bar.moment_of_inertia + bar.mass * bar.mass_centre[0] ** 2) if bar.mass else None
-
-
-def _mid_bar(bar: Bar) -> Bar | None:
-    return replace(bar, centre=(bar.length / 2.0, 0.0)) if bar.mass else None
-
-
 def _turned(bar: Bar) -> Bar | None:
     r, phi = bar.mass_centre
     return replace(bar, centre=(r, phi + np.pi)) if bar.mass and r else None
@@ -178,22 +141,19 @@ def _mirrored(bar: Bar) -> Bar | None:
     return replace(bar, centre=(r, -phi)) if bar.mass and r and np.sin(phi) else None
 
 
-def _no_inertia(bar: Bar) -> Bar | None:
-    return replace(bar, inertia=0.0) if bar.moment_of_inertia else None
-
-
 BAR_MISTAKES: tuple[tuple[str, Callable[[Bar], Bar | None]], ...] = (
     ("mass centre measured from the wrong pin", _from_other_pin),
-    ("mass centre taken at mid-bar", _mid_bar),
+    ("mass centre taken at mid-bar", lambda bar: replace(bar, centre=(bar.length / 2.0, 0.0)) if bar.mass else None),
     ("mass centre turned by 180 deg about the bar's first pin", _turned),
     ("mass centre on the other side of the bar's line", _mirrored),
-    ("inertia about the pin used as the inertia about G", _about_pin),
-    ("moment of inertia left out", _no_inertia),
+    (
+        "inertia about the pin used as the inertia about G",
+        lambda bar: (
+            replace(bar, inertia=bar.moment_of_inertia + bar.mass * bar.mass_centre[0] ** 2) if bar.mass else None
+        ),
+    ),
+    ("moment of inertia left out", lambda bar: replace(bar, inertia=0.0) if bar.moment_of_inertia else None),
 )
-
-
-def _is_force(quantity: str) -> bool:
-    return quantity in FORCES
 
 
 def _is_angular(quantity: str) -> bool:
@@ -203,6 +163,19 @@ def _is_angular(quantity: str) -> bool:
 def _where(quantity: str, right: Solution, change: Callable[[Array], Array]) -> Array | None:
     values = getattr(right, quantity, None)
     return None if values is None else change(values)
+
+
+COLUMN_MISTAKES: tuple[tuple[str, Callable[[Array], Array], Callable[[str], bool]], ...] = (
+    ("sign reversed, or F_ij given for F_ji", np.negative, lambda quantity: True),
+    ("degrees where radians were announced", np.degrees, _is_angular),
+    ("x and y exchanged", lambda values: values[:, ::-1], VECTORS.__contains__),
+    (
+        "measured from the other end of the bar (half a turn off): theta_4 or theta_3 from B, theta_2 from A",
+        lambda values: values + np.pi,
+        lambda quantity: quantity.startswith("theta"),
+    ),
+)
+"""What was done to a column, and to the columns of which quantities it can be done."""
 
 
 @dataclass(frozen=True, slots=True)

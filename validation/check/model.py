@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from pkgutil import resolve_name
 from typing import Any
 
 from fourbar.errors import FourBarError, InputError
@@ -24,12 +25,10 @@ from validation.check.screen import read_mjcf
 from validation.compare.answer import Answer
 from validation.compare.compare import compare
 from validation.compare.counts import Counts
-from validation.compare.plain import plain
-from validation.compare.rows import Row, write_results
+from validation.compare.rows import Row, plain, write_results
 from validation.compare.tolerance import SIMULATED, Tolerance
 from validation.engines.memory import WORKER_MEMORY, bound_memory
-from validation.report.markdown import cell
-from validation.report.templating import number
+from validation.report.templating import number, rendered
 
 SECONDS = 120.0
 """A four-bar takes less than one."""
@@ -154,10 +153,7 @@ def _confine() -> None:
 
 
 def _examine(adapter: str, *arguments: object) -> Any:
-    from importlib import import_module
-
-    module, _, function = adapter.partition(":")
-    return getattr(import_module(module), function)(*arguments)
+    return resolve_name(adapter)(*arguments)
 
 
 def show(report: ModelReport, mjcf: Path, out: Path) -> None:
@@ -199,13 +195,5 @@ def show(report: ModelReport, mjcf: Path, out: Path) -> None:
 
 def markdown(report: ModelReport, mjcf: Path) -> str:
     """The same as text for a page."""
-    lines = [f"# {cell(plain(mjcf.name))} against the generated MJCF", "", ABOUT_SHARES, ""]
-    lines += ["| share | what differs | generated | theirs | what it does |", "|---|---|---|---|---|"]
-    for cause in report.causes:
-        lines.append("| " + " | ".join(cell(plain(text)) for text in cause.cells()) + " |")
-    lines += ["", *(f"- {cell(plain(note))}" for note in report.notes), "", "## What it costs", ""]
-    lines += [f"{report.counts.sentence()}.", ""]
-    lines += [f"| method | {' | '.join(HEADINGS)} |", "|---|---|---|---|---|---|"]
-    for cost in report.costs:
-        lines.append("| " + " | ".join(cell(plain(text)) for text in (cost.method, *cost.cells())) + " |")
-    return "\n".join(lines) + "\n"
+    what = {"report": report, "mjcf": mjcf.name, "about": ABOUT_SHARES, "headings": HEADINGS}
+    return rendered("validation.check", "theirs.md.j2", **what)

@@ -4,6 +4,7 @@ The text that the engine gets is written anew from the elements that were looked
 can mean one thing to the reader here and another to the engine's.
 """
 
+import io
 import re
 from pathlib import Path
 from xml.etree import ElementTree as ET
@@ -36,14 +37,15 @@ def read_mjcf(path: Path) -> str:
     for word in ("<!DOCTYPE", "<!ENTITY"):
         if word in text.upper():
             raise refuse(word, "is not allowed: an MJCF needs no document type")
+    parsed, depth = ET.iterparse(io.StringIO(text), ("start", "end")), 0
     try:
-        nesting = _Depth()
-        ET.XMLParser(target=nesting).feed(text)
-        if nesting.deepest > DEEPEST:
-            raise refuse(path.name, f"nests its elements deeper than {DEEPEST}")
-        root = ET.fromstring(text)
+        for event, _ in parsed:
+            depth += 1 if event == "start" else -1
+            if depth > DEEPEST:
+                raise refuse(path.name, f"nests its elements deeper than {DEEPEST}")
     except (ET.ParseError, ValueError) as error:
         raise refuse(path.name, f"is no XML: {error}") from None
+    root = parsed.root  # type: ignore[attr-defined]
     if root.tag != "mujoco":
         raise refuse(root.tag, "must be an MJCF, whose outermost element is <mujoco>")
     for element in root.iter():
@@ -58,19 +60,3 @@ def read_mjcf(path: Path) -> str:
             if name.startswith(OUTSIDE):
                 raise refuse(f"<{element.tag} {name}=...>", "is not allowed: no other file is read")
     return ET.tostring(root, encoding="unicode")
-
-
-class _Depth:
-    """Target of a parser that counts the nesting and keeps nothing."""
-
-    def __init__(self) -> None:
-        self.depth = self.deepest = 0
-
-    def start(self, tag: str, attributes: dict[str, str]) -> None:
-        """An element opens."""
-        self.depth += 1
-        self.deepest = max(self.deepest, self.depth)
-
-    def end(self, tag: str) -> None:
-        """An element closes."""
-        self.depth -= 1

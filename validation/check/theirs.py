@@ -113,15 +113,8 @@ def read_table(path: Path) -> Table:
             raise InputError(f"line {line}", cells, "needs a theta_2", str(path))
     units = {name: unit for name, unit in columns.values()}
     left_out |= {headings[index]: BLANK for index, (name, _) in columns.items() if np.isnan(numbers[name]).all()}
-    table = Table(
-        numbers["theta_2"],
-        {},
-        {},
-        {},
-        [line for line, _ in rows],
-        _rounded(halves["theta_2"], units["theta_2"]),
-        left_out,
-    )
+    lines, rounded = [line for line, _ in rows], _rounded(halves["theta_2"], units["theta_2"])
+    table = Table(numbers["theta_2"], {}, {}, {}, lines, rounded, left_out)
     for name in names:
         if name != "theta_2" and not np.isnan(numbers[name]).all():
             _put(table, name, units[name], numbers[name], halves[name])

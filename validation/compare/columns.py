@@ -14,8 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from fourbar.writing import naming
-from validation.compare.plain import plain
-from validation.compare.rows import COLUMNS, MADE_OF, Row, to_csv
+from validation.compare.rows import COLUMNS, MADE_OF, Row, plain, to_csv
 
 GROUP_ROWS = 100_000
 """Rows of a row group of the Parquet file: each costs some kilobytes of footer, whatever it holds."""
@@ -92,7 +91,7 @@ def or_null(value: object) -> object:
 
 
 def read_columns(path: Path) -> Iterator[Row]:
-    """The rows of a results.parquet, some thousands at a time; words that recur are kept once."""
+    """The rows of a results.parquet or results.csv, some thousands at a time; words that recur are kept once."""
     for cells in _batches(path, list(MADE_OF)):
         words: dict[str, str] = {}
         columns = [
@@ -109,11 +108,27 @@ def column_of(path: Path, column: str) -> Iterator[str]:
 
 
 def _batches(path: Path, columns: list[str]) -> Iterator[list[list[Any]]]:
+    with ExitStack() as files:
+        batches = _of_parquet if path.suffix == ".parquet" else _of_text
+        for batch in batches(path, columns, files):
+            yield [batch.column(name).to_pylist() for name in columns]
+
+
+def _of_parquet(path: Path, columns: list[str], files: ExitStack) -> Any:
     import pyarrow.parquet as pq
 
-    with pq.ParquetFile(path) as file:
-        for batch in file.iter_batches(BATCH_ROWS, columns=columns):
-            yield [batch.column(name).to_pylist() for name in columns]
+    return files.enter_context(pq.ParquetFile(path)).iter_batches(BATCH_ROWS, columns=columns)
+
+
+def _of_text(path: Path, columns: list[str], files: ExitStack) -> Any:
+    import pyarrow as pa
+    from pyarrow import csv
+
+    kinds = {name: pa.float64() if MADE_OF[name] is float else pa.string() for name in columns}
+    wanted = csv.ConvertOptions(column_types=kinds, include_columns=columns)
+    return files.enter_context(
+        csv.open_csv(path, parse_options=csv.ParseOptions(newlines_in_values=True), convert_options=wanted)
+    )
 
 
 def _words(cells: list[str], known: dict[str, str]) -> list[str]:

@@ -24,9 +24,8 @@ from fourbar.solution import Solution
 from validation.compare.answer import Answer
 from validation.compare.basis import basis_of, smallest_yardstick, strictest_condition
 from validation.compare.error import in_own_unit, magnitude, relative, relative_error, used
-from validation.compare.plain import plain
 from validation.compare.reversals import reversing
-from validation.compare.rows import AGREES, DEGRADED, FAILS, REFUSES, UNDECIDED, Row
+from validation.compare.rows import AGREES, DEGRADED, FAILS, REFUSES, UNDECIDED, Row, plain
 from validation.compare.scales import of_length
 from validation.compare.tolerance import DEGRADED as TIMES_PREDICTED
 from validation.compare.tolerance import (
@@ -122,7 +121,7 @@ class _Comparison:
         """Whether both close the loop at the same positions."""
         theirs, ours = self.answer.assembled, self.formulas
         assert theirs is not None
-        differ = (theirs != ours.assembled) & ~_undecided(self.scene, ours.theta_2)
+        differ = (theirs != ours.assembled) & ~touching(self.scene, ours.theta_2)
         count = np.count_nonzero(differ)
         return self.row(
             "assembled",
@@ -150,7 +149,7 @@ class _Comparison:
         both = formulas.assembled & self.answer.assembled
         judged = both & _stated(quantity, formulas, ours)
         self.numbers += int(np.count_nonzero(both))
-        withheld = _counted(formulas.status_code[both & ~judged])
+        withheld = counted(formulas.status_code[both & ~judged])
         if withheld and not judged.any():
             yield self.row(quantity, REFUSES, f"the formulas state no value: {withheld}")
             return
@@ -273,7 +272,7 @@ def _stated(quantity: str, formulas: Solution, ours: Array) -> Mask:
     return np.asarray((formulas.status_code != SINGULAR) & ~beyond & ~jammed)
 
 
-def _counted(codes: NDArray[np.uint8]) -> str:
+def counted(codes: NDArray[np.uint8]) -> str:
     """How many positions have which status: "3 singular, 5 no_torque"."""
     counts = np.bincount(codes, minlength=len(STATUS_NAMES)).tolist()
     return ", ".join(f"{count} {name}" for name, count in zip(STATUS_NAMES, counts, strict=True) if count)
@@ -286,7 +285,7 @@ def closing_margin(scene: Scene, theta_2: Array) -> Array:
     return np.asarray(np.minimum(b + c - e, e - abs(b - c)) / of_length(scene))
 
 
-def _undecided(scene: Scene, theta_2: Array) -> Mask:
+def touching(scene: Scene, theta_2: Array) -> Mask:
     """Positions at which rounding decides whether the loop closes."""
     return np.asarray(np.abs(closing_margin(scene, theta_2)) < TOUCHING_MARGIN)
 

@@ -54,7 +54,7 @@ def reversals(scene: Scene, at: Command, solution: Solution) -> list[Reversal]:
         return []
     found = []
     for pin in dict.fromkeys(pins):
-        slip = _slip(solution, pin)
+        slip = slip_at(solution, pin)
         at_rest = _resting(solution, pin, EPS * K)
         last = None
         for i in range(len(solution)):
@@ -78,14 +78,10 @@ def reversing(scene: Scene, solution: Solution, slip: float, *, in_time: bool = 
     for pin in {pin for effect in scene.effects for pin in effect.dry_pins}:
         where |= _resting(solution, pin, slip)
         if in_time:
-            speeds = np.nan_to_num(_greatest_speed(solution))
+            speeds = np.max([np.abs(_speeds(solution)[bar]) for bar in MOVING_BARS], axis=0)
+            speeds = np.nan_to_num(speeds)
             where |= speeds <= slip * speeds.max()
     return where
-
-
-def _greatest_speed(solution: Solution) -> Array:
-    speeds = _speeds(solution)
-    return np.asarray(np.max([np.abs(speeds[bar]) for bar in MOVING_BARS], axis=0))
 
 
 def _resting(solution: Solution, pin: str, slip: float) -> NDArray[np.bool_]:
@@ -112,7 +108,8 @@ def broken(
     return theta_2, values
 
 
-def _slip(solution: Solution, pin: str) -> Array:
+def slip_at(solution: Solution, pin: str) -> Array:
+    """omega_j - omega_i of the bars that meet at a pin, rad/s, (n,)."""
     one, other = (_speeds(solution)[bar] for bar in PINS[pin])
     return np.asarray(other - one)
 
@@ -133,7 +130,7 @@ def _between(scene: Scene, at: Command, pin: str, i: int, j: int, slip: float) -
         middle = 0.5 * (low + high)
         if middle in (low, high):
             break
-        if float(_slip(look(middle, 0, "velocity"), pin)[0]) * slip > 0.0:
+        if float(slip_at(look(middle, 0, "velocity"), pin)[0]) * slip > 0.0:
             low = middle
         else:
             high = middle

@@ -3,13 +3,11 @@
 import csv
 import io
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, fields
 from pathlib import Path
-from typing import Any
 
 from fourbar.writing import write_text
-from validation.compare.plain import plain
 
 AGREES, DEGRADED, UNDECIDED, REFUSES, FAILS = (
     *("agrees", "degraded as predicted"),
@@ -63,6 +61,27 @@ class Row:
         return self.verdict == FAILS
 
 
+def breakdown(scene: str, engine: str, error: BaseException, part: str = "") -> Row:
+    """The row of an engine that raised, took its process with it, or never came back; `part`: in what."""
+    if isinstance(error, TimeoutError):
+        reason = "the engine hung and was stopped"
+    elif type(error).__name__ == "ProcessExpired":  # of Pebble
+        reason = f"the engine crashed its process (exit code {getattr(error, 'exitcode', 'unknown')})"
+    elif type(error).__name__ == "KilledWorker":  # of Dask
+        reason = "the engine crashed its process, or hung and was stopped"
+    else:
+        reason = " ".join(f"{type(error).__name__}: {error}".split())
+    return Row.unmeasured(scene, engine, part, "all", FAILS, reason)
+
+
+def plain(text: str) -> str:
+    """Somebody's text with every character that does not print, but for the ends of lines, written as its escape.
+
+    Characters that would steer a terminal or a reader are shown, not sent.
+    """
+    return "".join(c if c.isprintable() or c == "\n" else c.encode("unicode_escape").decode() for c in text)
+
+
 COLUMNS = tuple(column.name for column in fields(Row))
 
 
@@ -95,29 +114,6 @@ def _cell(value: object) -> str:
 
 MADE_OF = {column.name: column.type for column in fields(Row) if column.init}
 """Columns that make a row, with their types: whether it passed follows from them."""
-
-
-def rows_of_csv(path: Path) -> Iterator[Row]:
-    """The rows of a table written by `to_csv`, one after the other."""
-    with path.open(newline="", encoding="utf-8") as file:
-        for cells in csv.DictReader(file):
-            yield Row(*(_value(cells[name], kind is float) for name, kind in MADE_OF.items()))
-
-
-def _value(cell: str, number: bool) -> Any:
-    return (float(cell) if cell else math.nan) if number else plain(cell)
-
-
-def column_of_csv(path: Path, column: str) -> Iterator[str]:
-    """The words in a column of such a table."""
-    with path.open(newline="", encoding="utf-8") as file:
-        for cells in csv.DictReader(file):
-            yield plain(cells[column])
-
-
-def from_csv(path: Path) -> list[Row]:
-    """All rows of a table written by `to_csv`."""
-    return list(rows_of_csv(path))
 
 
 def write_results(rows: Iterable[Row], path: Path) -> None:

@@ -117,9 +117,7 @@ TERMS: dict[str, Callable[[str, Scene, Solution], Array]] = {
 
 def _arm(scene: Scene, number: int) -> float:
     """Distance of a bar's mass centre from its first pin, m."""
-    centre = scene.linkage.bar(number).mass_centre
-    assert centre is not None
-    return abs(centre[0])
+    return abs(scene.linkage.bar(number).mass_centre[0])
 
 
 def _force_terms(scene: Scene, formulas: Solution) -> Array:

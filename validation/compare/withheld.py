@@ -5,10 +5,10 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.quantities import NOT_ASSEMBLED, OK, SEVERAL, SINGULAR, STATUS_NAMES
+from fourbar.quantities import NOT_ASSEMBLED, OK, SEVERAL, SINGULAR
 from fourbar.scene import Scene
 from fourbar.solution import Solution
-from validation.compare.compare import TOUCHING_MARGIN, Mask, closing_margin
+from validation.compare.compare import Mask, counted, touching
 from validation.compare.error import magnitude, worst
 from validation.compare.identities import FORMULAS
 from validation.compare.rows import AGREES, FAILS, Row
@@ -65,8 +65,7 @@ def withheld(
     if solutions is not None and len(many := np.flatnonzero(formulas.status_code == SEVERAL)[:SAMPLE]):
         differ[many] |= solutions(many) < 2
     index = worst(differ.astype(float))
-    counts = np.bincount(formulas.status_code, minlength=len(STATUS_NAMES)).tolist()
-    stated = ", ".join(f"{count} {STATUS_NAMES[code]}" for code, count in enumerate(counts) if count and code != OK)
+    stated = counted(formulas.status_code[formulas.status_code != OK])
     reason = f"the formulas state: {stated}" if stated else "every position has its values"
     if differ.any():
         reason = f"{np.count_nonzero(differ)} positions differ, the first is {formulas.status[index]}; {reason}"
@@ -77,8 +76,8 @@ def withheld(
 
 def _near(scene: Scene, formulas: Solution, basis: Solution) -> Mask:
     """Where bars 3 and 4 are so nearly in line that exact arithmetic has to decide, (n,)."""
-    touching = np.abs(closing_margin(scene, formulas.theta_2)) < TOUCHING_MARGIN
-    return np.asarray(touching | (basis.condition < NEAR) | (formulas.condition < NEAR))
+    close = touching(scene, formulas.theta_2)
+    return np.asarray(close | (basis.condition < NEAR) | (formulas.condition < NEAR))
 
 
 def _large(scene: Scene, basis: Solution) -> Mask:

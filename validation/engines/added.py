@@ -18,7 +18,7 @@ from fourbar.scene import Command, Scene
 from validation.compare.answer import Answer, Array, Engine
 from validation.compare.compare import COMPARED
 from validation.compare.identities import FORMULAS
-from validation.compare.plain import plain
+from validation.compare.rows import plain
 from validation.compare.tolerance import EQUIVALENCE, Tolerance
 from validation.engines.witnesses import Witness
 

@@ -17,8 +17,8 @@ from fourbar.scene.motion import Motion
 from validation.compare.answer import Answer
 from validation.compare.tolerance import SIMULATED
 from validation.engines.mujoco.limits import FASTEST, HEAVIEST, NEAREST_CENTRE, NEAREST_TOGGLE, SLOWEST, Boundary
-from validation.scenes.hard_families import loads, sweep_of, with_bars
-from validation.scenes.hard_linkages import at, dressed, linkage_of
+from validation.scenes.hard_families import loads, sweep_of
+from validation.scenes.hard_linkages import at, dressed, linkage_of, with_bars
 from validation.scenes.random import LinkageType
 
 

@@ -1,9 +1,32 @@
 """A printed figure, ours, and what the named errata make of ours."""
 
+import tomllib
 from decimal import ROUND_DOWN, ROUND_HALF_EVEN, Decimal
+from pathlib import Path
 from typing import NamedTuple
 
 VERDICTS = ("rounded", "truncated", "differs")
+
+
+class Erratum(NamedTuple):
+    """One error of a source."""
+
+    id: str
+    where: str
+    title: str
+    printed: str
+    right: str
+    derivation: str
+    effect: str
+    reproduced: bool = True
+    """Whether making the error gives the printed digits."""
+    transcription: bool = False
+    """Whether it may be a slip of the transcription that was read."""
+
+
+LISTED = tomllib.loads((Path(__file__).parent / "errata.toml").read_text(encoding="utf-8"))["erratum"]
+ERRATA = {entry["id"]: Erratum(**entry) for entry in LISTED}
+"""The errata of the sources, as data: `errata.toml` says what each field is."""
 
 
 class Figure(NamedTuple):

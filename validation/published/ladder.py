@@ -7,11 +7,9 @@ from typing import Any, NamedTuple
 import click
 
 from fourbar.errors import FAILED, HOLDS
-from validation.published.errata import ERRATA
-from validation.published.figures import VERDICTS, Figure
-from validation.published.maple import maple_figures
+from validation.published.figures import ERRATA, VERDICTS, Figure
 from validation.published.program import STEPS, ladder, printed
-from validation.published.textbook import textbook_figures
+from validation.published.textbook import maple_figures, textbook_figures
 from validation.published.thesis_dynamics import dynamics_figures
 from validation.published.thesis_positions import position_figures
 

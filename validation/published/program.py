@@ -13,8 +13,10 @@ from typing import Any
 import numpy as np
 
 import fourbar
+from fourbar.linkage import MOVING_BARS
 from fourbar.solution import Array
 from validation.compare.tolerance import EPS
+from validation.published.thirteen import FreeBodies, assemble
 
 DATA = Path(__file__).parent / "data"
 UNKNOWNS = ("F12x", "F12y", "F32x", "F32y", "F23x", "F23y", "F43x", "F43y", "F14x", "F14y", "F34x", "F34y", "T4")
@@ -95,8 +97,8 @@ def motion(theta_2: Array, branch: int = 1) -> fourbar.Solution:
 def right_unknowns() -> dict[str, float]:
     """The 13 unknowns by our formulas at theta_2 = 135 deg, N and N cm."""
     s = fourbar.solve(scene(THETA_2))
-    assert s.F12 is not None and s.F32 is not None and s.F43 is not None and s.F14 is not None and s.torque is not None
-    pins = {"F12": s.F12, "F32": s.F32, "F23": -s.F32, "F43": s.F43, "F14": s.F14, "F34": -s.F43}
+    assert s.F32 is not None and s.F43 is not None and s.torque is not None
+    pins: dict[str, Any] = {"F12": s.F12, "F32": s.F32, "F23": -s.F32, "F43": s.F43, "F14": s.F14, "F34": -s.F43}
     forces = {name + axis: float(pins[name][0, k]) for name in pins for k, axis in enumerate("xy")}
     return {**forces, "T4": 100.0 * float(s.torque[0])}
 
@@ -105,6 +107,30 @@ def inertia(bar: int, about_long_axis: bool = False) -> float:
     """I_G of bar 3 or 4, kg cm^2: m (L^2 + w^2)/12, or m w^2/12 as the thesis has it."""
     across = 0.0 if about_long_axis else LENGTHS[bar - 1] ** 2
     return MASSES[bar] * (across + WIDTH**2) / 12.0
+
+
+class Kinematics:
+    """Motion at theta_2 = 135 deg by our formulas, in cm and the thesis's angles, and the arms of the pin forces."""
+
+    def __init__(self) -> None:
+        s = motion(np.array([THETA_2]))
+        self.theta_3, self.theta_4 = float(s.theta_3[0]), to_ours(float(s.theta_4[0]))
+        self.omega, self.alpha = (
+            {bar: float(getattr(s, f"{name}_{bar}")[0]) for bar in MOVING_BARS} for name in ("omega", "alpha")
+        )
+        assert s.a_A is not None
+        self.a_A = 100.0 * s.a_A[0]
+        self.a_G = {bar: 100.0 * getattr(s, f"a_G{bar}")[0] for bar in MOVING_BARS}
+        self.slip = 2.0 * CENTRE[3] * self.alpha[3] * math.sin(self.theta_3)
+        """What erratum 4 adds to the x component of A_G3/A: -(L w^2 cos - L alpha sin) for -(... + ...), eq 4.20."""
+        self.arms = {  # from G; R14 points along B to O4, the thesis's theta_4
+            "R12": polar(-CENTRE[2], THETA_2),
+            "R32": polar(LENGTHS[1] - CENTRE[2], THETA_2),
+            "R23": polar(-CENTRE[3], self.theta_3),
+            "R43": polar(LENGTHS[2] - CENTRE[3], self.theta_3),
+            "R14": polar(CENTRE[4], self.theta_4),
+            "R34": polar(CENTRE[4] - LENGTHS[3], self.theta_4),
+        }
 
 
 def equations(errors: Errors, inertias: tuple[float, float] | None = None) -> tuple[Array, Array]:
@@ -117,43 +143,26 @@ def equations(errors: Errors, inertias: tuple[float, float] | None = None) -> tu
     errors : which of the named errors to make.
     inertias : I_G3, I_G4 as typed into the program, kg cm^2; left out: computed.
     """
-    s = motion(np.array([THETA_2]))
-    assert s.alpha_3 is not None and s.alpha_4 is not None and s.omega_3 is not None
-    assert s.a_G2 is not None and s.a_G3 is not None and s.a_G4 is not None and s.a_A is not None
-    theta_3, theta_4 = float(s.theta_3[0]), to_ours(float(s.theta_4[0]))
-    alpha = {2: 0.0, 3: float(s.alpha_3[0]), 4: float(s.alpha_4[0])}
-    A = {2: 100.0 * s.a_G2[0], 3: 100.0 * s.a_G3[0], 4: 100.0 * s.a_G4[0]}
-    if errors.sign_in_acceleration_of_G3:  # -(L w^2 cos - L alpha sin) in place of -(... + ...), eq 4.20
-        A[3][0] += 2.0 * CENTRE[3] * alpha[3] * math.sin(theta_3)
+    k = Kinematics()
+    if errors.sign_in_acceleration_of_G3:
+        k.a_G[3][0] += k.slip
     if errors.alpha_3_for_acceleration_of_G4:  # index 5 for 6
-        A[4][0] = alpha[3]
+        k.a_G[4][0] = k.alpha[3]
     if inertias is None:
         inertias = inertia(3, errors.inertia_about_long_axis), inertia(4, errors.inertia_about_long_axis)
     about_G = {2: INERTIA_2, 3: inertias[0], 4: inertias[1]}
     per_mass = 1.0 if errors.mass_times_acceleration_unscaled else TO_N
     per_inertia = 1.0 if errors.inertia_times_alpha_unscaled else TO_N
-
-    arms = {  # bar: (pin force, arm from G) twice; R14 points along B to O4, the thesis's theta_4
-        2: (("F12", polar(-CENTRE[2], THETA_2)), ("F32", polar(LENGTHS[1] - CENTRE[2], THETA_2))),
-        3: (("F23", polar(-CENTRE[3], theta_3)), ("F43", polar(LENGTHS[2] - CENTRE[3], theta_3))),
-        4: (("F14", polar(CENTRE[4], theta_4)), ("F34", polar(CENTRE[4] - LENGTHS[3], theta_4))),
-    }
-    matrix, right = np.zeros((13, 13)), np.zeros(13)
-    column = {name: index for index, name in enumerate(UNKNOWNS)}
-    force = {2: LOAD, 3: 0.0, 4: 0.0}
-    for row, (bar, pins) in zip((0, 3, 6), arms.items(), strict=True):
-        for name, (x, y) in pins:
-            fx, fy = column[name + "x"], column[name + "y"]
-            matrix[row, fx] = matrix[row + 1, fy] = 1.0
-            matrix[row + 2, fx], matrix[row + 2, fy] = -y, x
-        right[row] = per_mass * MASSES[bar] * A[bar][0] - force[bar]
-        right[row + 1] = per_mass * MASSES[bar] * A[bar][1]
-        right[row + 2] = per_inertia * about_G[bar] * alpha[bar] - COUPLE
-    right[2] += polar(LOAD_ARM, LOAD_ANGLE)[1] * force[2]  # minus the moment of the load, -y F
-    matrix[8, column["T4"]] = 1.0
-    for row, one, other in ((9, "F32x", "F23x"), (10, "F32y", "F23y"), (11, "F43x", "F34x"), (12, "F43y", "F34y")):
-        matrix[row, column[one]] = matrix[row, column[other]] = 1.0
-    return matrix, right
+    force = {bar: per_mass * MASSES[bar] * k.a_G[bar] for bar in MOVING_BARS}
+    moment = {bar: np.array([per_inertia * about_G[bar] * k.alpha[bar] - COUPLE]) for bar in MOVING_BARS}
+    force[2][0] -= LOAD
+    moment[2] += polar(LOAD_ARM, LOAD_ANGLE)[1] * LOAD  # minus the moment of the load, -y F
+    first, second = (
+        {bar: np.array([k.arms[name]]) for bar, name in zip(MOVING_BARS, names, strict=True)}
+        for names in (("R12", "R23", "R14"), ("R32", "R43", "R34"))
+    )
+    matrix, right = assemble(FreeBodies(first, second, force, moment), 4)
+    return matrix[0], right[0]
 
 
 def thesis_program(errors: Errors, inertias: tuple[float, float] | None = None) -> dict[str, float]:

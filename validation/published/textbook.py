@@ -1,5 +1,7 @@
-"""Printed answers of public test cases against ours; `textbook.toml` lists them with their addresses."""
+"""Printed answers of public test cases, listed in `textbook.toml`, and of a Maple worksheet, against ours."""
 
+import json
+import math
 import tomllib
 from collections.abc import Iterator
 from functools import cache
@@ -13,6 +15,7 @@ from validation.published.figures import Figure
 
 SCENES = Path(__file__).parent.parent.parent / "models" / "textbook"
 ANSWERS = Path(__file__).parent / "textbook.toml"
+SHEET = Path(__file__).parent / "data" / "maple.json"
 AXES = {"_x": 0, "_y": 1}
 
 
@@ -59,3 +62,18 @@ def value(solution: fourbar.Solution, quantity: str, position: int) -> float:
 @cache
 def _solved(scene: str) -> fourbar.Solution:
     return fourbar.solve(fourbar.load(SCENES / f"{scene}.toml"))
+
+
+def maple_figures() -> Iterator[Figure]:
+    """The worksheet's two solutions, positions alone, theta_1 = 0, rad; and the constant of its real equation."""
+    sheet = json.loads(SHEET.read_text(encoding="utf-8"))
+    a, b, c, d = (float(sheet["inputs"][name]) for name in "abcd")
+    theta_2 = math.pi / 3.0
+    linkage = fourbar.FourBar(d, fourbar.Bar(a), fourbar.Bar(b), fourbar.Bar(c))
+    real = sheet["reduced_equations"]["real_constant"]
+    yield Figure("Maple", "real constant", real, a * math.cos(theta_2) - d)
+    for branch, solution in zip((1, -1), sheet["solutions"], strict=True):
+        s = fourbar.solve(fourbar.Scene(linkage, fourbar.Motion(theta_2, branch=branch)))
+        for name, angle in (("theta3", s.theta_3), ("theta4", s.theta_4)):
+            key = f"{solution['configuration']} {name}"
+            yield Figure("Maple", key, solution[f"{name}_printed_rad"], float(angle[0]))

@@ -23,15 +23,14 @@ from validation.published.program import (
     STEPS,
     THETA_2,
     TO_N,
+    Kinematics,
     deg,
     inertia,
     ladder,
-    motion,
     polar,
     printed,
     right_unknowns,
     round_off,
-    to_ours,
 )
 
 ANGLE_NOISE = 4e-15
@@ -44,86 +43,58 @@ def cut(value: float, decimals: int) -> float:
     return math.trunc(value * 10.0**decimals) / 10.0**decimals
 
 
-class Kinematics:
-    """Motion at theta_2 = 135 deg, in cm and the thesis's angles, and the named slips of the thesis."""
+def arm_of_cut_angle(k: Kinematics, decimals: int) -> float:
+    """y of R23 with theta_3 cut to some decimals of a degree first, erratum 12."""
+    return -CENTRE[3] * math.sin(math.radians(cut(deg(k.theta_3), decimals)))
 
-    def __init__(self) -> None:
-        s = motion(np.array([THETA_2]))
-        assert s.omega_3 is not None and s.omega_4 is not None and s.alpha_3 is not None and s.alpha_4 is not None
-        assert s.a_A is not None and s.a_G2 is not None and s.a_G3 is not None and s.a_G4 is not None
-        self.theta_3, self.theta_4 = float(s.theta_3[0]), to_ours(float(s.theta_4[0]))
-        self.omega_3, self.omega_4 = float(s.omega_3[0]), float(s.omega_4[0])
-        self.alpha_3, self.alpha_4 = float(s.alpha_3[0]), float(s.alpha_4[0])
-        self.a_A, self.a_G2, self.a_G3, self.a_G4 = (100.0 * v[0] for v in (s.a_A, s.a_G2, s.a_G3, s.a_G4))
-        self.slip = 2.0 * CENTRE[3] * self.alpha_3 * math.sin(self.theta_3)
-        """What erratum 4 adds to the x component of A_G3/A."""
-        self.arms = {
-            "R12": polar(-CENTRE[2], THETA_2),
-            "R32": polar(a - CENTRE[2], THETA_2),
-            "R23": polar(-CENTRE[3], self.theta_3),
-            "R43": polar(b - CENTRE[3], self.theta_3),
-            "R14": polar(CENTRE[4], self.theta_4),
-            "R34": polar(CENTRE[4] - c, self.theta_4),
-        }
 
-    def loop_constants(self) -> dict[str, float]:
-        """A alpha_3 + B alpha_4 = C and D alpha_3 + E alpha_4 = F, section 4.12."""
-        speeds = ((a, OMEGA_2, THETA_2), (b, self.omega_3, self.theta_3), (c, self.omega_4, self.theta_4))
-        return {
-            "A": b * math.sin(self.theta_3),
-            "B": c * math.sin(self.theta_4),
-            "C": -sum(length * omega**2 * math.cos(theta) for length, omega, theta in speeds),
-            "D": -b * math.cos(self.theta_3),
-            "E": -c * math.cos(self.theta_4),
-            "F": -sum(length * omega**2 * math.sin(theta) for length, omega, theta in speeds),
-        }
+def our_kinematics(k: Kinematics) -> dict[str, float]:
+    """By the names of section 4.12 and of the manual's table.
 
-    def arm_of_cut_angle(self, decimals: int) -> float:
-        """y of R23 with theta_3 cut to some decimals of a degree first, erratum 12."""
-        return -CENTRE[3] * math.sin(math.radians(cut(deg(self.theta_3), decimals)))
+    A alpha_3 + B alpha_4 = C and D alpha_3 + E alpha_4 = F.
+    """
+    speeds = ((a, OMEGA_2, THETA_2), (b, k.omega[3], k.theta_3), (c, k.omega[4], k.theta_4))
+    values = {
+        "theta3_deg": deg(k.theta_3),
+        "theta4_deg": deg(k.theta_4),
+        **{f"omega{bar}": omega for bar, omega in k.omega.items()},
+        **{f"alpha{bar}": alpha for bar, alpha in k.alpha.items()},
+        "A": b * math.sin(k.theta_3),
+        "B": c * math.sin(k.theta_4),
+        "C": -sum(length * omega**2 * math.cos(theta) for length, omega, theta in speeds),
+        "D": -b * math.cos(k.theta_3),
+        "E": -c * math.cos(k.theta_4),
+        "F": -sum(length * omega**2 * math.sin(theta) for length, omega, theta in speeds),
+    }
+    vectors = {"A_G2": k.a_G[2], "A_A": k.a_A, "A_G3/A": k.a_G[3] - k.a_A, "A_G3": k.a_G[3], "A_G4": k.a_G[4], **k.arms}
+    for name, (x, y) in vectors.items():
+        values |= {f"{name}_i": x, f"{name}_j": y, f"{name}_mod": math.hypot(x, y)}
+        values[f"{name}_ang_deg"] = deg(math.atan2(y, x))
+    return {key: float(value) for key, value in values.items()}
 
-    def ours(self) -> dict[str, float]:
-        """By the names of section 4.12 and of the manual's table."""
-        values = {
-            "theta3_deg": deg(self.theta_3),
-            "theta4_deg": deg(self.theta_4),
-            "omega2": OMEGA_2,
-            "omega3": self.omega_3,
-            "omega4": self.omega_4,
-            "alpha2": 0.0,
-            "alpha3": self.alpha_3,
-            "alpha4": self.alpha_4,
-            **self.loop_constants(),
-        }
-        vectors = {"A_G2": self.a_G2, "A_A": self.a_A, "A_G3/A": self.a_G3 - self.a_A, "A_G3": self.a_G3}
-        vectors |= {"A_G4": self.a_G4, **self.arms}
-        for name, (x, y) in vectors.items():
-            values |= {f"{name}_i": x, f"{name}_j": y, f"{name}_mod": math.hypot(x, y)}
-            values[f"{name}_ang_deg"] = deg(math.atan2(y, x))
-        return {key: float(value) for key, value in values.items()}
 
-    def slips(self) -> dict[str, tuple[tuple[str, ...], float]]:
-        """The figures that the errata touch, with the value that these lead to."""
-        x, y = self.a_G3[0] + self.slip, self.a_G3[1]
-        return {
-            "A_G3/A_i": (("4",), self.a_G3[0] - self.a_A[0] + self.slip),
-            "A_G3_i": (("4",), x),
-            "A_G3_mod": (("4",), math.hypot(x, y)),
-            "A_G3_ang_deg": (("4",), deg(math.atan2(y, x))),
-            "A_G4_ang_deg": (("10",), deg(math.atan(self.a_G4[1] / self.a_G4[0]))),
-        }
+def kinematic_slips(k: Kinematics) -> dict[str, tuple[tuple[str, ...], float]]:
+    """The figures that the errata touch, with the value that these lead to."""
+    x, y = k.a_G[3][0] + k.slip, k.a_G[3][1]
+    return {
+        "A_G3/A_i": (("4",), k.a_G[3][0] - k.a_A[0] + k.slip),
+        "A_G3_i": (("4",), x),
+        "A_G3_mod": (("4",), math.hypot(x, y)),
+        "A_G3_ang_deg": (("4",), deg(math.atan2(y, x))),
+        "A_G4_ang_deg": (("10",), deg(math.atan(k.a_G[4][1] / k.a_G[4][0]))),
+    }
 
 
 def kinematics(k: Kinematics) -> Iterator[Figure]:
     """Section 4.12, and the manual's table of the program's 17 digits."""
-    ours, slips = k.ours(), k.slips()
-    by_hand = {"R23_j": (("12",), k.arm_of_cut_angle(6)), "R43_j": (("12",), -k.arm_of_cut_angle(6))}
+    ours, slips = our_kinematics(k), kinematic_slips(k)
+    by_hand = {"R23_j": (("12",), arm_of_cut_angle(k, 6)), "R43_j": (("12",), -arm_of_cut_angle(k, 6))}
     for name, text in printed()["published"]["section_4_12_hand"].items():
         errata, made = {**slips, **by_hand}.get(name, ((), None))
         yield Figure("4.12", name, text, ours[name], errata, made)
     for name, text in printed()["published"]["manual_program_kinematic"].items():
         errata, made = slips.get(name, ((), None))
-        size = {"t": math.degrees(1.0), "R": abs(CENTRE[2]), "A": float(np.abs(k.a_G2).max())}.get(name[0], 1.0)
+        size = {"t": math.degrees(1.0), "R": abs(CENTRE[2]), "A": float(np.abs(k.a_G[2]).max())}.get(name[0], 1.0)
         yield Figure("manual, kinematics", name, text, ours[name], errata, made, ANGLE_NOISE * size)
 
 
@@ -139,15 +110,14 @@ def dynamics_constants(k: Kinematics) -> Iterator[Figure]:
     load = polar(LOAD_ARM, LOAD_ANGLE)
     ours: dict[str, float] = {"R_ext_i": load[0], "R_ext_j": load[1], "moment_of_force_N_cm": -load[1] * LOAD}
     slips: dict[str, tuple[tuple[str, ...], float]] = {}
-    accelerations = {2: k.a_G2, 3: k.a_G3, 4: k.a_G4}
-    for bar, a_G in accelerations.items():
+    for bar, a_G in k.a_G.items():
         force = LOAD if bar == 2 else 0.0
         slip = k.slip if bar == 3 else 0.0
         ours[f"k{bar}x"], ours[f"k{bar}y"] = TO_N * MASSES[bar] * a_G[0] - force, TO_N * MASSES[bar] * a_G[1]
         slips[f"k{bar}x"] = (("4", "1") if slip else ("1",), MASSES[bar] * (a_G[0] + slip) - force)
         slips[f"k{bar}y"] = (("1",), MASSES[bar] * a_G[1])
     ours["k2_5"] = -COUPLE + load[1] * LOAD
-    for bar, alpha, sign in ((3, k.alpha_3, -1.0), (4, k.alpha_4, 1.0)):
+    for bar, alpha, sign in ((3, k.alpha[3], -1.0), (4, k.alpha[4], 1.0)):
         ours[f"k{bar}_5"] = TO_N * inertia(bar) * alpha - COUPLE
         # the sign of I alpha is wrong for bar 3 alone, erratum 7
         made = sign * inertia(bar, about_long_axis=True) * alpha - COUPLE
@@ -157,16 +127,16 @@ def dynamics_constants(k: Kinematics) -> Iterator[Figure]:
             x, y = k.arms[pin]
             ours[f"k{bar}_{2 * pair + 1}"], ours[f"k{bar}_{2 * pair + 2}"] = -y, x
     for number, sign in ((1, -1.0), (3, 1.0)):
-        slips[f"k3_{number}"] = (("12",), sign * k.arm_of_cut_angle(6))
-        slips[f"k3_{number}_in_eq_5_6"] = (("12",), sign * k.arm_of_cut_angle(8))
+        slips[f"k3_{number}"] = (("12",), sign * arm_of_cut_angle(k, 6))
+        slips[f"k3_{number}_in_eq_5_6"] = (("12",), sign * arm_of_cut_angle(k, 8))
     ours |= {f"k3_{number}_in_eq_5_6": ours[f"k3_{number}"] for number in (1, 2, 3, 4)}
     by_hand: dict[str, tuple[tuple[str, ...], float | None]] = {
         **slips,
         "k3_2_in_eq_5_6": (("12b",), None),
         "k4_1": (("12b",), None),
-        "k2x": (("1", "12c"), MASSES[2] * cut(k.a_G2[0], 6) - LOAD),
-        "k2y": (("1", "12c"), MASSES[2] * cut(k.a_G2[1], 6)),
-        "k4x": (("1", "12c"), MASSES[4] * cut(k.a_G4[0], 10)),
+        "k2x": (("1", "12c"), MASSES[2] * cut(k.a_G[2][0], 6) - LOAD),
+        "k2y": (("1", "12c"), MASSES[2] * cut(k.a_G[2][1], 6)),
+        "k4x": (("1", "12c"), MASSES[4] * cut(k.a_G[4][0], 10)),
     }
     for name, text in source["published"]["section_5_7_hand_constants"].items():
         errata, changed = by_hand.get(name, ((), None))

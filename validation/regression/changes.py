@@ -111,11 +111,6 @@ class Differences:
         return self.kinds.total()
 
     @property
-    def regressions(self) -> list[Change]:
-        """The changes for which a run fails."""
-        return [each for each in self.changes if each.regression]
-
-    @property
     def regressed(self) -> int:
         """How many rows, and times, a run fails for."""
         return sum(self.kinds[kind] for kind in REGRESSIONS) + len(self.slower)
@@ -265,12 +260,9 @@ def _other_settings(before: Mapping[Key, Row], after: Mapping[Key, Row]) -> dict
 def _surroundings(old: About, new: About) -> tuple[list[tuple[str, str, str]], list[str]]:
     """What the runs were made with where it differs, and what a record cannot say."""
     found = [("commit", old.commit, new.commit)] if old.commit and new.commit else []
-    for what in sorted(old.versions.keys() | new.versions.keys()):
-        found.append((what, old.versions.get(what, "not recorded"), new.versions.get(what, "not recorded")))
+    found += _both(old.versions, new.versions)
     found.append(("machine", old.machine, new.machine))
-    for what in sorted(old.settings.keys() | new.settings.keys() - {"suite"}):
-        if what != "suite":
-            found.append((what, old.settings.get(what, "not recorded"), new.settings.get(what, "not recorded")))
+    found += [each for each in _both(old.settings, new.settings) if each[0] != "suite"]
     suites = [each.settings.get("suite", "not recorded")[:12] for each in (old, new)]
     notes = []
     if suites[0] != suites[1] and not (old.scenes and new.scenes):
@@ -278,3 +270,8 @@ def _surroundings(old: About, new: About) -> tuple[list[tuple[str, str, str]], l
         notes.append(f"the scenes' hash is another ({suites[0]} -> {suites[1]}), and {silent} what they ask: "
                      "a scene that changed cannot be named, rows are compared by name alone")  # fmt: skip
     return [(what, before, after) for what, before, after in found if before != after], notes
+
+
+def _both(old: Mapping[str, str], new: Mapping[str, str]) -> list[tuple[str, str, str]]:
+    none = "not recorded"
+    return [(what, old.get(what, none), new.get(what, none)) for what in sorted(old.keys() | new.keys())]

@@ -16,8 +16,7 @@ from typing import Any
 from fourbar.errors import InputError
 from fourbar.writing import write_bytes
 from validation.compare.columns import or_null
-from validation.compare.plain import plain
-from validation.compare.rows import MADE_OF, Row, sorted_rows
+from validation.compare.rows import MADE_OF, Row, plain, sorted_rows
 from validation.regression.record import About
 
 HISTORY = "history.parquet"

@@ -2,10 +2,10 @@
 
 import math
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from datetime import datetime
 from statistics import fmean, stdev
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from validation.compare.error import used
 from validation.compare.identities import FORMULAS
@@ -15,9 +15,9 @@ from validation.regression.change import Key
 from validation.regression.history import Run
 from validation.regression.render import line
 from validation.regression.steps import Step
-from validation.report.colours import ALLOWED, GRID, INK, SOFT, declarations, style_of
+from validation.report.colours import ALLOWED, GRID, INK, SOFT, style_of
 from validation.report.svg import svg_text
-from validation.report.templating import environment
+from validation.report.templating import rendered
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -42,24 +42,18 @@ def page(runs: Sequence[Run], found: Sequence[Step]) -> str:
     changed = list(dict.fromkeys(change.key for step in reversed(found) for change in step.changes if change.new))
     pictures = [("Verdicts of each run", _verdicts(runs)), ("Worst error over what is allowed", _errors(runs))]
     if any(run.times for run in runs):
-        pictures.append(
-            (
-                TIMED,
-                _times(runs),
-            )
-        )
+        pictures.append((TIMED, _times(runs)))
     rows = [(" / ".join(part for part in key if part), _row(runs, key)) for key in changed[:ROWS_DRAWN]]
     listed = [(step, [(c.kind.value, line(c)) for c in step.changes[:ROWS_LISTED]]) for step in reversed(found)]
-    template = environment("validation.regression", escape=True).get_template("history.html.j2")
-    return template.render(
+    return rendered(
+        "validation.regression",
+        "history.html.j2",
         runs=[(run, _counts(run)) for run in reversed(runs)],
         verdicts=[verdict for verdict in VERDICTS if any(_counts(run)[verdict] for run in runs)],
         steps=listed,
         pictures=pictures,
         rows=rows,
         more=len(changed) - len(rows),
-        light=declarations(dark=False),
-        dark=declarations(dark=True),
         listed=ROWS_LISTED,
     )
 
@@ -68,21 +62,20 @@ def _counts(run: Run) -> Counter[str]:
     return Counter(row.verdict for row in run.rows)
 
 
-def _figure(draw: Any, salt: str) -> str:
-    from matplotlib.backends.backend_svg import FigureCanvasSVG
+def _figure(draw: "Callable[[Axes], None]", runs: Sequence[Run], salt: str) -> str:
+    """What was drawn over the runs, with their names and a legend."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=SIZE, layout="constrained")
-    FigureCanvasSVG(figure)
     axes = figure.add_subplot()
     draw(axes)
+    _name_runs(axes, runs)
+    figure.legend(loc="outside lower center", ncols=3, fontsize=6.5, frameon=False)
     axes.grid(axis="y", color=GRID, linewidth=0.5)
     axes.set_axisbelow(True)
     axes.tick_params(colors=SOFT)
-    for side in ("top", "right"):
-        axes.spines[side].set_visible(False)
-    for side in ("left", "bottom"):
-        axes.spines[side].set_color(SOFT)
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.spines[["left", "bottom"]].set_color(SOFT)
     return svg_text(figure, salt)
 
 
@@ -121,14 +114,8 @@ def _verdicts(runs: Sequence[Run]) -> str:
                      hatch=HATCHES.get(verdict), edgecolor=GRID, linewidth=0.3)  # fmt: skip
             below = [base + count for base, count in zip(below, counts, strict=True)]
         axes.set_ylabel("rows")
-        _name_runs(axes, runs)
-        _legend(axes)
 
-    return _figure(draw, "verdicts")
-
-
-def _legend(axes: "Axes") -> None:
-    axes.figure.legend(loc="outside lower center", ncols=3, fontsize=6.5, frameon=False)
+    return _figure(draw, runs, "verdicts")
 
 
 def _engines(runs: Sequence[Run]) -> list[str]:
@@ -148,10 +135,8 @@ def _errors(runs: Sequence[Run]) -> str:
         axes.set_yscale("log")
         axes.axhline(1.0, color=ALLOWED, linewidth=1.0, linestyle="--")
         axes.set_ylabel("error / allowed")
-        _name_runs(axes, runs)
-        _legend(axes)
 
-    return _figure(draw, "errors")
+    return _figure(draw, runs, "errors")
 
 
 def _times(runs: Sequence[Run]) -> str:
@@ -175,10 +160,8 @@ def _times(runs: Sequence[Run]) -> str:
                           linewidth=1.0, capsize=2.0, label=engine)  # fmt: skip
         axes.set_ylim(bottom=0.0)
         axes.set_ylabel("time / first time")
-        _name_runs(axes, runs)
-        _legend(axes)
 
-    return _figure(draw, "times")
+    return _figure(draw, runs, "times")
 
 
 def _row(runs: Sequence[Run], key: Key) -> str:
@@ -198,7 +181,5 @@ def _row(runs: Sequence[Run], key: Key) -> str:
                   color=COLOURS[FAILS], label="fails")  # fmt: skip
         axes.set_yscale("log")
         axes.set_ylabel("error")
-        _name_runs(axes, runs)
-        _legend(axes)
 
-    return _figure(draw, "row" + "/".join(key))
+    return _figure(draw, runs, "row" + "/".join(key))

@@ -10,18 +10,18 @@ from dataclasses import asdict, dataclass, field
 from datetime import UTC, datetime
 from itertools import groupby
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from fourbar.errors import InputError
 from fourbar.writing import naming, write_text
 from validation.compare.columns import column_of, read_columns
-from validation.compare.plain import plain
-from validation.compare.rows import Row, column_of_csv, rows_of_csv
+from validation.compare.rows import Row, plain
 from validation.compare.tolerance import SIMULATED, K
 from validation.report.machine import machine, versions
 
 SHIPPED = Path(__file__).parent
 """Where the accepted state of the models of this project is."""
+T = TypeVar("T")
 ACCEPTED = "accepted"
 TABLE, COLUMNS, ABOUT, TIMINGS = "results.csv", "results.parquet", "record.json", "timings.csv"
 UNFINISHED = "run.json"
@@ -88,7 +88,7 @@ class Recorded:
 
     def rows(self) -> Iterator[Row]:
         """Its rows in their order; InputError where the table is damaged."""
-        yield from self._read(read_columns, rows_of_csv)
+        yield from self._read(read_columns(self.table))
 
     def scenes(self, keep: Callable[[Row], bool] = lambda _: True) -> Iterator[tuple[str, list[Row]]]:
         """The rows that are wanted, scene by scene."""
@@ -97,7 +97,7 @@ class Recorded:
 
     def words(self, column: str) -> Iterator[str]:
         """What stands in a column of text, some of it more than once."""
-        yield from self._read(lambda table: column_of(table, column), lambda table: column_of_csv(table, column))
+        yield from self._read(column_of(self.table, column))
 
     def times(self) -> Iterator[tuple[str, list[tuple[str, float]]]]:
         """Scene by scene, each engine's time over the formulas' there; none where they were not kept."""
@@ -111,10 +111,10 @@ class Recorded:
         except (KeyError, TypeError, ValueError, csv.Error):
             raise InputError("RESULTS", str(table), "is not a table of times written by `run`") from None
 
-    def _read(self, of_columns: Callable[[Path], Iterator[Any]], of_text: Callable[[Path], Iterator[Any]]) -> Any:
+    def _read(self, found: Iterator[T]) -> Iterator[T]:
         try:
-            yield from (of_columns if self.table.suffix == ".parquet" else of_text)(self.table)
-        except (KeyError, TypeError, ValueError, csv.Error):  # a column, a cell or a number is missing, or is no text
+            yield from found
+        except (KeyError, TypeError, ValueError):  # a column, a cell or a number is missing, or is no text
             raise InputError("RESULTS", str(self.table), "is not a table written by `run`") from None
 
 

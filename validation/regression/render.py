@@ -1,13 +1,12 @@
 """Differences as text, Markdown, HTML and JUnit XML."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 
 from validation.regression.change import OTHER_QUESTION, Change, Kind
 from validation.regression.changes import Differences
 from validation.regression.fault import Group
 from validation.report.junit import Case, beyond, document
-from validation.report.markdown import cell
-from validation.report.templating import environment, number
+from validation.report.templating import number, rendered
 
 SHOWN = tuple(kind for kind in Kind if kind not in (Kind.SAME, Kind.ROUND_OFF, Kind.NOT_RUN, *OTHER_QUESTION))
 """By engine and cause; what was not run, or is another question, is named as a whole."""
@@ -86,31 +85,21 @@ def other_questions(found: Differences) -> list[tuple[str, list[str]]]:
 
 def markdown(found: Differences) -> str:
     """For a comment on a pull request."""
-    lines = [f"# {verdict(found)}", ""]
-    for heading, texts in other_questions(found):
-        lines += [f"## {heading}", "", *(f"- {cell(text)}" for text in texts), ""]
-    if found.surroundings:
-        lines += ["| made with | old | new |", "|---|---|---|"]
-        lines += [f"| {cell(what)} | {cell(old)} | {cell(new)} |" for what, old, new in found.surroundings]
-        lines.append("")
     groups, more = _groups(found)
-    for kind in SHOWN:
-        if found.kinds[kind]:
-            lines += [f"## {kind.value}: {found.kinds[kind]}", ""]
-            lines += [f"- **{cell(group)}**" for group in groups if group.kind is kind]
-            lines += [*(f"- {cell(each)}" for each in _worst(found, kind)), ""]
-    lines += more
-    return "\n".join(lines)
+    return _rendered("changes.md.j2", found, groups, lambda kind: _worst(found, kind), more).rstrip("\n") + "\n"
 
 
 def html(found: Differences) -> str:
     """A page of its own."""
-    groups = found.fault.groups(SHOWN)
-    kinds = [
-        (kind, [each for each in groups if each.kind is kind], found.of(kind)) for kind in SHOWN if found.kinds[kind]
-    ]
-    template = environment("validation.regression", escape=True).get_template("changes.html.j2")
-    return template.render(found=found, verdict=verdict(found), kinds=kinds, questions=other_questions(found))
+    return _rendered("changes.html.j2", found, found.fault.groups(SHOWN), found.of, ())
+
+
+def _rendered(
+    name: str, found: Differences, groups: list[Group], rows: Callable[[Kind], Sequence[object]], more: Sequence[str]
+) -> str:
+    kinds = [(kind, [each for each in groups if each.kind is kind], rows(kind)) for kind in SHOWN if found.kinds[kind]]
+    what = {"verdict": verdict(found), "questions": other_questions(found), "more": more}
+    return rendered("validation.regression", name, found=found, kinds=kinds, **what)
 
 
 def junit(found: Differences) -> str:

@@ -3,11 +3,12 @@
 import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 from fourbar.errors import FourBarError
 from fourbar.files import dump
 from fourbar.scene import Scene
+from validation.scenes.suites import Suite
 
 Description = Mapping[str, str]
 
@@ -19,19 +20,7 @@ WHERE = ("motion.theta_2", "motion.free.steps", "motion.law.steps")
 """Entries that say at which positions the same question is put."""
 
 
-class Scenes(Protocol):
-    """Named scenes, as a suite has them."""
-
-    def __len__(self) -> int: ...
-
-    def name(self, index: int) -> str:
-        """Of one."""
-
-    def scene(self, index: int) -> Scene:
-        """Itself."""
-
-
-def descriptions(suite: Scenes) -> dict[str, dict[str, str]]:
+def descriptions(suite: Suite) -> dict[str, dict[str, str]]:
     """Each scene of a suite by its name; none of a suite of more than MOST_DESCRIBED."""
     if len(suite) > MOST_DESCRIBED:
         return {}

@@ -11,6 +11,8 @@ class Style(NamedTuple):
     """How an engine is drawn: marks tell the engines apart in grey."""
 
     colour: str
+    dark: str
+    """The same on dark pages."""
     marker: str
     symbol: str
     """The mark as a character, for legends in text."""
@@ -18,13 +20,13 @@ class Style(NamedTuple):
 
 
 STYLES = {
-    "pinocchio-inverse": Style("#0072b2", "o", "○"),
-    "mujoco-inverse": Style("#00845f", "s", "□"),
-    "mujoco-simulated": Style("#c74f00", "^", "△", simulated=True),
-    "free-body": Style("#a6478a", "D", "◇"),
-    "ball-arithmetic": Style("#5f5b9e", "v", "▽"),
+    "pinocchio-inverse": Style("#0072b2", "#58b4f0", "o", "○"),
+    "mujoco-inverse": Style("#00845f", "#34c795", "s", "□"),
+    "mujoco-simulated": Style("#c74f00", "#ff9350", "^", "△", simulated=True),
+    "free-body": Style("#a6478a", "#e59fce", "D", "◇"),
+    "ball-arithmetic": Style("#5f5b9e", "#b3aef0", "v", "▽"),
 }
-OTHER = Style("#7a6a00", "P", "✚")
+OTHER = Style("#7a6a00", "#d9c64a", "P", "✚")
 INK, SOFT, GRID, BAND, ALLOWED, PAPER = "#1b1f24", "#57606a", "#d0d7dd", "#c3cad3", "#6e7781", "#fefefe"
 VARIABLES = {
     "#000000": ("--ink", "#e6edf3"),
@@ -34,12 +36,7 @@ VARIABLES = {
     BAND: ("--under", "#4a535e"),
     ALLOWED: ("--allowed", "#98a2ad"),
     PAPER: ("--paper", "#0d1117"),
-    "#0072b2": ("--e1", "#58b4f0"),
-    "#00845f": ("--e2", "#34c795"),
-    "#c74f00": ("--e3", "#ff9350"),
-    "#a6478a": ("--e4", "#e59fce"),
-    "#5f5b9e": ("--e5", "#b3aef0"),
-    "#7a6a00": ("--e6", "#d9c64a"),
+    **{style.colour: (f"--e{number}", style.dark) for number, style in enumerate((*STYLES.values(), OTHER), 1)},
 }
 """Light colour: (custom property, colour on dark pages)."""
 
@@ -58,6 +55,5 @@ def by_variable(svg: str) -> str:
 
 def declarations(*, dark: bool) -> str:
     """The custom properties as CSS."""
-    return " ".join(
-        f"{name}: {night if dark else day};" for day, (name, night) in VARIABLES.items() if day != "#000000"
-    )
+    pairs = ((name, night if dark else day) for day, (name, night) in VARIABLES.items() if day != "#000000")
+    return " ".join(f"{name}: {colour};" for name, colour in pairs)

@@ -35,11 +35,9 @@ def cost_figure(scenes: Iterable[Record]) -> str | None:
     points, formulas = cost_points(scenes)
     if not points or not formulas:
         return None
-    from matplotlib.backends.backend_svg import FigureCanvasSVG
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(7.0, 3.9), layout="constrained")
-    FigureCanvasSVG(figure)
     axes = figure.add_subplot()
     axes.set_xscale("log")
     axes.set_yscale("log")

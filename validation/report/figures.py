@@ -55,14 +55,12 @@ def _answers(record: Record, solution: Solution) -> str:
 
 
 def _picture(quantity: str, record: Record, solution: Solution, answers: list[Answer]) -> str:
-    from matplotlib.backends.backend_svg import FigureCanvasSVG
     from matplotlib.figure import Figure
 
     simulated = [answer for answer in answers if style_of(answer.engine).simulated and quantity in answer.quantities]
     exact = [answer for answer in answers if not style_of(answer.engine).simulated and quantity in answer.quantities]
     groups = [group for group in (simulated, exact) if group]
     figure = Figure(figsize=(4.3, 2.2 + 1.0 * len(groups)), layout="constrained")
-    FigureCanvasSVG(figure)
     panels = figure.subplots(1 + len(groups), 1, sharex=True, height_ratios=[1.9, *[1.0] * len(groups)], squeeze=False)
     axes = list(panels[:, 0])
     _draw_values(axes[0], quantity, solution, [*exact, *simulated], record.jumps)

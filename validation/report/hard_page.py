@@ -1,9 +1,7 @@
 """The page "where it gets hard": error against distance to the singular position, per engine, and the limits."""
 
 import base64
-import html
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,11 +14,12 @@ from validation.compare.answer import Answer, Array
 from validation.compare.error import magnitude, relative, relative_error
 from validation.compare.tolerance import DEGRADED, EPS, K, condition_of
 from validation.engines.hard_suite import HARD_WITNESSES
-from validation.engines.limits import LIMITS, Limit
+from validation.engines.limits import LIMITS
 from validation.engines.prediction import in_world_axes
 from validation.engines.witnesses import Witness
-from validation.report.colours import OTHER, STYLES, declarations
+from validation.report.colours import style_of
 from validation.report.svg import drawn, inline
+from validation.report.templating import rendered
 from validation.scenes.hard_families import CHANGE_POINTS, CRANK, FAMILIES, ROCKER
 from validation.scenes.hard_linkages import at, collinear_2_3, collinear_3_4, dressed, linkage_of
 
@@ -78,12 +77,10 @@ def errors(scene: Scene, quantity: str, witness: Witness) -> tuple[Array, Array]
 
 def picture() -> str:
     """SVG that stands by itself: a column per singular position, a row per quantity; law and prediction drawn in."""
-    from matplotlib.backends.backend_svg import FigureCanvasSVG
     from matplotlib.figure import Figure
 
     columns = approaches()
     figure = Figure(figsize=(10.5, 6.4), layout="constrained", facecolor="none")
-    FigureCanvasSVG(figure)
     axes = figure.subplots(len(SHOWN), len(columns), squeeze=False, sharex="col")
     for column, approach in enumerate(columns):
         for row, quantity in enumerate(SHOWN):
@@ -117,7 +114,7 @@ def _draw(axes: Any, approach: Approach, quantity: str) -> None:
     for witness in HARD_WITNESSES:
         found = errors(approach.scene, quantity, witness)
         if found is not None and len(found[0]):
-            style = STYLES.get(witness.name, OTHER)
+            style = style_of(witness.name)
             axes.loglog(
                 np.abs(found[0] - singular),
                 found[1],
@@ -139,44 +136,13 @@ def _singular(approach: Approach) -> float:
     return float(theta_2[0]) - side * float(approach.distances[0])
 
 
-def limit_rows(limits: Sequence[Limit] = LIMITS) -> list[tuple[str, str, str, str]]:
-    """(engine, what, boundary, reason) of every declared limit."""
-    return [
-        (limit.engine, limit.of.name, f"{limit.of.boundary:g} {limit.of.unit}".removesuffix(" 1"), limit.of.reason)
-        for limit in limits
-    ]
-
-
 def page(svg: str) -> str:
     """The page, self-contained: the picture, what each family must show, the limits."""
-    families = "".join(f"<tr><td>{html.escape(f.name)}</td><td>{html.escape(f.statement)}</td></tr>" for f in FAMILIES)
-    limits = "".join(
-        "<tr>" + "".join(f"<td>{html.escape(cell)}</td>" for cell in row) + "</tr>" for row in limit_rows()
+    return rendered(
+        "validation.report",
+        "hard.html.j2",
+        svg=inline(svg),
+        source=base64.b64encode(svg.encode()).decode("ascii"),
+        families=FAMILIES,
+        limits=LIMITS,
     )
-    source = base64.b64encode(svg.encode()).decode("ascii")
-    light, dark = declarations(dark=False), declarations(dark=True)
-    return PAGE.format(svg=inline(svg), source=source, families=families, limits=limits, light=light, dark=dark)
-
-
-PAGE = """<!doctype html>
-<html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">
-<title>Where it gets hard</title>
-<style>:root {{ color-scheme: light dark; {light} }}
-@media screen and (prefers-color-scheme: dark) {{ :root {{ {dark} }} }}
-body {{ font: 15px/1.5 system-ui, sans-serif; max-width: 76rem; margin: 0 auto; padding: 1rem; color: var(--ink);
-background: var(--paper); overflow-wrap: anywhere; }}
-a {{ color: inherit; }} figure {{ margin: 1rem 0; overflow-x: auto; }} .wide {{ overflow-x: auto; }}
-svg {{ width: 100%; min-width: 40rem; height: auto; fill: var(--ink); }}
-table {{ border-collapse: collapse; width: 100%; font-size: .9rem; }}
-td, th {{ text-align: left; padding: .2rem .6rem; border-bottom: 1px solid #8884; vertical-align: top; }}</style>
-</head><body>
-<h1>Where it gets hard</h1>
-<p>Error of each engine against the formulas, relative to the value itself, towards a singular position.
-The dotted line is the law in powers of the sines; the band is what rounding was computed to do at each position,
-and ten times that: above it a row fails, whoever agrees.</p>
-<figure>{svg}</figure><p><a download="hard.svg" href="data:image/svg+xml;base64,{source}">Download the picture</a></p>
-<h2>What must happen</h2><div class="wide"><table><tr><th>family</th><th>statement</th></tr>{families}</table></div>
-<h2>Limits of the engines</h2>
-<div class="wide"><table><tr><th>engine</th><th>of what</th><th>boundary</th><th>why</th></tr>{limits}</table></div>
-</body></html>
-"""

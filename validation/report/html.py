@@ -1,21 +1,17 @@
-"""report.html: one self-contained page; every number can be traced to its row in results.csv, which it carries."""
+"""report.html, one self-contained page: every number leads to its row in results.csv, which it carries; report.md."""
 
 import base64
-import gzip
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import groupby
 from typing import Any, NamedTuple
 
 from fourbar.quantities import UNKNOWNS
 from validation.compare.counts import Counts
 from validation.compare.rows import FAILS, REFUSES, UNDECIDED, Row, sorted_rows, to_csv
-from validation.report.colours import by_variable, declarations, style_of
 from validation.report.costs import cost_figure
 from validation.report.record import Record
 from validation.report.summary import STATEMENT, Summary, shares
-from validation.report.templating import environment
+from validation.report.templating import rendered, share
 
 ALL_OPEN = 8
 """Up to so many scenes all stand open; the bodies of more are packed, and unpacked when they are opened."""
@@ -110,19 +106,16 @@ def html(
     """
     from markupsafe import Markup
 
-    templates = environment("validation.report", escape=True)
-    templates.filters["share"] = share
-    templates.filters["packed"] = lambda text: base64.b64encode(gzip.compress(text.encode("utf-8"), mtime=0)).decode()
-    templates.filters["colour"] = lambda engine: by_variable(style_of(engine).colour)
-    templates.filters["symbol"] = lambda engine: style_of(engine).symbol
     views = [_view(scene, first_lines.get(scene.name, 2), pictures or {}) for scene in summary.shown]
     csv = base64.b64encode(to_csv(cell.row for view in views for cell in view.cells).encode("utf-8"))
     failing = sorted((cell for view in views for cell in view.cells if cell.row.failed), key=lambda c: c.line)
     costs = cost_figure(summary.shown)
-    return templates.get_template("report.html.j2").render(
+    return rendered(
+        "validation.report",
+        "report.html.j2",
         s=summary,
         views=views,
-        engines=[engine for engine in _engines(cell.row for view in views for cell in view.cells)],
+        engines=_engines(cell.row for view in views for cell in view.cells),
         failing=failing,
         lazy=len(views) > ALL_OPEN,
         figures={scene.name: Markup(scene.figure) for scene in summary.shown if scene.figure},  # drawn by our own code
@@ -131,28 +124,20 @@ def html(
         sections=sections,
         statement=STATEMENT,
         csv=csv.decode("ascii"),
-        light=Markup(declarations(dark=False)),
-        dark=Markup(declarations(dark=True)),
     )
 
 
-def share(value: float) -> str:
-    """error/allowed in two digits."""
-    if math.isinf(value):
-        return "∞"
-    return "0" if value == 0.0 else "<0.01" if value < 0.01 else f"{value:.2f}" if value < 10.0 else f"{value:.1e}"
+def markdown(summary: Summary) -> str:
+    """The report as Markdown, short enough for a comment on a pull request."""
+    return rendered("validation.report", "report.md.j2", s=summary, statement=STATEMENT)
 
 
 def _view(scene: Record, first_line: int, pictures: Mapping[str, str]) -> SceneView:
     rows = sorted_rows(scene.rows)
     cells = [Cell(line, *each) for line, each in enumerate(zip(rows, shares(rows), strict=True), first_line)]
-    by_place: dict[tuple[str, str], Cell] = {}
-    worst: dict[str, Cell] = {}
-    for cell in cells:
-        for places, place in ((by_place, (cell.row.quantity, cell.row.engine)), (worst, cell.row.engine)):
-            held: dict[Any, Cell] = places
-            if place not in held or _rank(cell) > _rank(held[place]):
-                held[place] = cell
+    ranked = sorted(reversed(cells), key=_rank)  # the last of a place stays, of equals the first
+    by_place = {(cell.row.quantity, cell.row.engine): cell for cell in ranked}
+    worst = {cell.row.engine: cell for cell in ranked}
     found = {cell.row.quantity for cell in cells}
     quantities = [name for name in ORDER if name in found] + sorted(found.difference(ORDER))
     engines = _engines(cell.row for cell in cells)
@@ -166,5 +151,4 @@ def _rank(cell: Cell) -> tuple[bool, float]:
 
 def _engines(rows: Any) -> list[str]:
     """Engines by name, the formulas (their identities) last."""
-    names = [name for name, _ in groupby(sorted(row.engine for row in rows))]
-    return sorted(names, key=lambda name: (name == "formulas", name))
+    return sorted({row.engine for row in rows}, key=lambda name: (name == "formulas", name))

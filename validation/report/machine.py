@@ -1,22 +1,29 @@
-"""Where a run was made: versions and machine, printed on top of every report."""
+"""Where a run was made, and with what: versions, machine, this code, and the build of each engine."""
 
+import hashlib
 import os
 import platform
-from importlib.metadata import PackageNotFoundError, version
+from functools import cache
+from importlib.metadata import PackageNotFoundError, distribution, version
 from pathlib import Path
 
 PACKAGES = {"fourbar": "fourbar", "numpy": "numpy", "mujoco": "mujoco", "pinocchio": "pin", "scipy": "scipy"}
 """Name in the report and name of the distribution."""
-WHERE_INSTALLED = ("drake", "exudyn", "opensim")
-"""Distributions that need not be there."""
+DISTRIBUTIONS = PACKAGES | {name: name for name in ("drake", "exudyn", "opensim")}
+"""With those that need not be there."""
+CHECKOUT = Path(__file__).parent.parent.parent
+CODE = (".py", ".toml")
+"""Endings of the files that numbers come from; templates and accepted states change none."""
+BUILT = (".so", ".pyd", ".dylib", ".py")
+"""Endings of the files of an engine that decide its numbers; others hold where and when it was installed."""
 
 
 def versions() -> dict[str, str]:
     """Version of Python and of every library that decides a number; "not installed" where missing."""
     found = {"python": platform.python_version()}
-    for name, distribution in (PACKAGES | {name: name for name in WHERE_INSTALLED}).items():
+    for name, package in DISTRIBUTIONS.items():
         try:
-            found[name] = version(distribution)
+            found[name] = version(package)
         except PackageNotFoundError:
             if name in PACKAGES:
                 found[name] = "not installed"
@@ -36,3 +43,41 @@ def _processor() -> str:
     except OSError:
         pass
     return platform.processor() or "unknown processor"
+
+
+@cache
+def code() -> dict[str, str]:
+    """Name and version or hash of everything that decides a number; one run, and all its machines, have one."""
+    builds = {name: build(package) for name, package in DISTRIBUTIONS.items()}
+    known = {f"build of {name}": found for name, found in builds.items() if found and name != "fourbar"}
+    return {"code": checkout(), **versions(), **known}
+
+
+def checkout(root: Path = CHECKOUT) -> str:
+    """Hash of the modules of `fourbar` and `validation`, wherever they lie."""
+    digest = hashlib.sha256()
+    for folder in ("fourbar", "validation"):
+        for path in sorted((root / folder).rglob("*")):
+            if path.suffix in CODE and path.is_file():
+                data = path.read_bytes()
+                digest.update(f"{path.relative_to(root).as_posix()} {len(data)}\n".encode() + data)
+    return digest.hexdigest()[:16]
+
+
+def build(package: str) -> str:
+    """Hash of what an installer wrote down of the files of a package: two builds of one version differ in it."""
+    try:
+        lines = (distribution(package).read_text("RECORD") or "").splitlines()
+    except PackageNotFoundError:
+        return ""
+    files = sorted(line for line in lines if line.partition(",")[0].endswith(BUILT))
+    return hashlib.sha256("\n".join(files).encode()).hexdigest()[:16] if files else ""
+
+
+def differing(here: dict[str, str], there: dict[str, str]) -> str:
+    """The first entry in which two differ, in words; nothing where they are the same."""
+    for name in [*here, *there]:
+        one, other = here.get(name, "none"), there.get(name, "none")
+        if one != other:
+            return f"{name} is {other} there and {one} here"
+    return ""

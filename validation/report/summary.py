@@ -3,7 +3,7 @@
 import math
 import re
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from heapq import nlargest
 from statistics import median
@@ -47,48 +47,6 @@ class Cost:
     """What it did for that."""
 
 
-@dataclass(frozen=True, slots=True)
-class Summary:
-    """The report in data."""
-
-    verdict: str
-    scenes: int
-    counts: Counts
-    versions: dict[str, str]
-    machine: str
-    worst: list[Worst]
-    """By scene and engine; of more than WORST_SHOWN those that used most of their allowance, in that order."""
-    judged: int
-    """Pairs of scene and engine of which `worst` shows the worst."""
-    failures: list[Row]
-    """At most FAILURES_KEPT of them."""
-    refusals: list[tuple[str, str, int]]
-    """(engine, reason, number of scenes): declared limits that were met; reasons that differ by their numbers
-    alone are one, with the numbers of the first scene."""
-    measured_k: dict[str, float]
-    """Largest error*condition/eps of each exact engine: what K would have sufficed."""
-    independence: list[tuple[str, str, str]]
-    """(engine, shared with the formulas, found alone)."""
-    costs: list[Cost]
-    orders: list[tuple[str, dict[str, float]]]
-    """(scene, errors at 4h and 2h and observed order) of the simulated engine: at most ORDERS_SHOWN, lowest first."""
-    ladder: list[LadderRow]
-    """The thesis's errors one by one, from the right answer to the printed ones; empty where not requested."""
-    tolerances: list[Tolerance]
-    """What the witnesses were held to."""
-    missing: list[tuple[str, str]]
-    """(engine, why it could not run here)."""
-
-    @property
-    def good(self) -> bool:
-        """Whether all that was to be compared was, and holds."""
-        return self.counts.status == HOLDS and not self.missing
-
-    shown: list[Record]
-    """The scenes shown one by one, at most SCENES_SHOWN: those that fail, then those that used most of what is
-    allowed."""
-
-
 SCENES_SHOWN = 200
 PICTURED = 24
 """Scenes with pictures, where fewer fail: to draw one takes ten times as long as to judge it by an exact engine."""
@@ -99,8 +57,6 @@ FAILURES_KEPT = 1000
 TIMED = 1000
 NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 """In a reason: what differs by it alone is one reason."""
-TOLERANCES = (IDENTITY, EQUIVALENCE, SIMULATED)
-"""Of a run with the standing witnesses."""
 STATEMENT = (
     f"K = {K:g} for every exact comparison; where eps/condition > {NOTHING_TO_TELL:g} the row is undecided. "
     "Errors are relative to the largest magnitude over the positions whose condition is at least 0.1; below that "
@@ -108,22 +64,33 @@ STATEMENT = (
 )
 
 
-class Summing:
-    """Condense a run, scene by scene; what is kept does not grow with their number."""
+class Summary:
+    """The report in data, a run condensed scene by scene; what is kept does not grow with their number."""
 
     def __init__(self) -> None:
         self.counts = Counts()
+        self.versions, self.machine = versions(), machine()
         self.failures: list[Row] = []
-        self.refusals: Counter[tuple[str, str]] = Counter()
-        self.first_reason: dict[tuple[str, str], str] = {}
-        self.worst: list[Worst] = []
+        """At most FAILURES_KEPT of them."""
         self.judged = 0
+        """Pairs of scene and engine of which `worst` shows the worst."""
         self.measured_k: dict[str, float] = {}
+        """Largest error*condition/eps of each exact engine: what K would have sufficed."""
         self.independence: dict[str, tuple[str, str]] = {}
-        self.costs: dict[tuple[str, str], list[Timed]] = {}
-        self.orders: list[tuple[str, dict[str, float]]] = []
-        self.failing: list[Record] = []
-        self.holding: list[tuple[float, Record]] = []
+        """engine: (shared with the formulas, found alone)."""
+        self.ladder: Sequence[LadderRow] = ()
+        """The thesis's errors one by one, from the right answer to the printed ones; empty where not requested."""
+        self.tolerances: Sequence[Tolerance] = (IDENTITY, EQUIVALENCE, SIMULATED)
+        """What the witnesses were held to."""
+        self.missing: Sequence[tuple[str, str]] = ()
+        """(engine, why it could not run here)."""
+        self._refusals: Counter[tuple[str, str]] = Counter()
+        self._first_reason: dict[tuple[str, str], str] = {}
+        self._worst: list[Worst] = []
+        self._costs: dict[tuple[str, str], list[Timed]] = {}
+        self._orders: list[tuple[str, dict[str, float]]] = []
+        self._failing: list[Record] = []
+        self._holding: list[tuple[float, Record]] = []
 
     def add(self, scene: Record) -> None:
         """One scene more."""
@@ -132,32 +99,23 @@ class Summing:
         self.failures += bad[: FAILURES_KEPT - len(self.failures)]
         for engine, reason in sorted(_left_out(scene)):
             kind = (engine, NUMBER.sub("#", reason))
-            self.refusals[kind] += 1
-            self.first_reason.setdefault(kind, reason)
+            self._refusals[kind] += 1
+            self._first_reason.setdefault(kind, reason)
         found = _worst(scene.rows)
         self.judged += len(found)
-        self.worst = _top(WORST_SHOWN, [*self.worst, *found], lambda w: w.used)
-        _measure_k(scene.rows, self.measured_k)
+        self._worst = _top(WORST_SHOWN, [*self._worst, *found], lambda w: w.used)
+        for row in scene.rows:
+            if row.reason.startswith(EQUIVALENCE.name) and math.isfinite(row.error):
+                k = row.error * row.condition / EPS
+                self.measured_k[row.engine] = max(self.measured_k.get(row.engine, 0.0), k)
         self.independence.update(scene.independence)
-        _add_costs(scene, self.costs)
+        _add_costs(scene, self._costs)
         self._add_orders(scene)
         if bad:
-            self.failing += [scene][: SCENES_SHOWN - len(self.failing)]
+            self._failing += [scene][: SCENES_SHOWN - len(self._failing)]
         else:
             most = max((w.used for w in found), default=0.0)
-            self.holding = _top(SCENES_SHOWN, [*self.holding, (most, scene)], lambda each: each[0])
-
-    @property
-    def shown(self) -> list[Record]:
-        """The scenes shown one by one, by name."""
-        holding = nlargest(SCENES_SHOWN - len(self.failing), self.holding, key=lambda each: each[0])
-        return sorted([*self.failing, *(scene for _, scene in holding)], key=lambda scene: scene.name)
-
-    @property
-    def pictured(self) -> list[Record]:
-        """Those of them that have pictures: all that fail, and of the others those that used most."""
-        holding = nlargest(PICTURED - len(self.failing), self.holding, key=lambda each: each[0])
-        return [*self.failing, *(scene for _, scene in holding)]
+            self._holding = _top(SCENES_SHOWN, [*self._holding, (most, scene)], lambda each: each[0])
 
     def picture(self, drawn: Record) -> None:
         """Add what was drawn and measured of a scene that is shown."""
@@ -168,50 +126,67 @@ class Summing:
 
     def _add_orders(self, scene: Record) -> None:
         known = [(scene.name, each) for each in scene.evidence.values() if "observed_order" in each]
-        self.orders = _top(ORDERS_SHOWN, [*self.orders, *known], _lowest)
+        self._orders = _top(ORDERS_SHOWN, [*self._orders, *known], _lowest)
 
-    def summary(
-        self,
-        ladder: Sequence[LadderRow] = (),
-        tolerances: Sequence[Tolerance] = TOLERANCES,
-        missing: Sequence[tuple[str, str]] = (),
-    ) -> Summary:
-        """What the scenes so far came to."""
-        verdict = self.counts.sentence()
-        if missing:
-            verdict += f"; not run: {', '.join(engine for engine, _ in missing)}"
-        few = self.judged <= WORST_SHOWN
-        orders = self.orders
-        if len(orders) > ORDERS_SHOWN:
-            orders = nlargest(ORDERS_SHOWN, orders, key=_lowest)
-        return Summary(
-            verdict=verdict,
-            scenes=self.counts.scenes,
-            counts=self.counts,
-            versions=versions(),
-            machine=machine(),
-            worst=_sorted(self.worst) if few else nlargest(WORST_SHOWN, self.worst, key=lambda w: w.used),
-            judged=self.judged,
-            failures=self.failures,
-            refusals=[(kind[0], self.first_reason[kind], count) for kind, count in sorted(self.refusals.items())],
-            measured_k=self.measured_k,
-            independence=[(engine, *self.independence[engine]) for engine in sorted(self.independence)],
-            costs=[
-                Cost(
-                    engine,
-                    _settings(values),
-                    median(t.times for t in values),
-                    median(t.microseconds for t in values),
-                    WORK[engine].full if engine in WORK else "",
-                )
-                for (engine, _), values in sorted(self.costs.items())
-            ],
-            orders=orders,
-            ladder=list(ladder),
-            tolerances=list(tolerances),
-            missing=list(missing),
-            shown=self.shown,
-        )
+    @property
+    def verdict(self) -> str:
+        """In one sentence."""
+        left = f"; not run: {', '.join(engine for engine, _ in self.missing)}" if self.missing else ""
+        return self.counts.sentence() + left
+
+    @property
+    def good(self) -> bool:
+        """Whether all that was to be compared was, and holds."""
+        return self.counts.status == HOLDS and not self.missing
+
+    @property
+    def worst(self) -> list[Worst]:
+        """By scene and engine; of more than WORST_SHOWN those that used most of their allowance, in that order."""
+        if self.judged > WORST_SHOWN:
+            return nlargest(WORST_SHOWN, self._worst, key=lambda w: w.used)
+        return sorted(self._worst, key=lambda w: (w.row.scene, w.row.engine, w.row.setting))
+
+    @property
+    def refusals(self) -> list[tuple[str, str, int]]:
+        """(engine, reason, number of scenes): declared limits that were met.
+
+        Reasons that differ by their numbers alone are one, with the numbers of the first scene.
+        """
+        return [(kind[0], self._first_reason[kind], count) for kind, count in sorted(self._refusals.items())]
+
+    @property
+    def costs(self) -> list[Cost]:
+        """What each engine took, by the kind of its setting."""
+        return [
+            Cost(
+                engine,
+                _settings(values),
+                median(t.times for t in values),
+                median(t.microseconds for t in values),
+                WORK[engine].full if engine in WORK else "",
+            )
+            for (engine, _), values in sorted(self._costs.items())
+        ]
+
+    @property
+    def orders(self) -> list[tuple[str, dict[str, float]]]:
+        """(scene, errors at 4h and 2h and observed order) of what is simulated: at most ORDERS_SHOWN, lowest first."""
+        few = len(self._orders) <= ORDERS_SHOWN
+        return self._orders if few else nlargest(ORDERS_SHOWN, self._orders, key=_lowest)
+
+    @property
+    def shown(self) -> list[Record]:
+        """The scenes shown one by one, by name, at most SCENES_SHOWN: those that fail, then those that used most."""
+        return sorted(self._most_used(SCENES_SHOWN), key=lambda scene: scene.name)
+
+    @property
+    def pictured(self) -> list[Record]:
+        """Those of them that have pictures: all that fail, and of the others those that used most."""
+        return self._most_used(PICTURED)
+
+    def _most_used(self, most: int) -> list[Record]:
+        holding = nlargest(most - len(self._failing), self._holding, key=lambda each: each[0])
+        return [*self._failing, *(scene for _, scene in holding)]
 
 
 def _left_out(scene: Record) -> set[tuple[str, str]]:
@@ -248,16 +223,6 @@ def _top(most: int, of: list[T], key: Callable[[T], float]) -> list[T]:
 
 def _lowest(order: tuple[str, dict[str, float]]) -> float:
     return -order[1]["observed_order"]
-
-
-def _sorted(worst: Iterable[Worst]) -> list[Worst]:
-    return sorted(worst, key=lambda w: (w.row.scene, w.row.engine, w.row.setting))
-
-
-def _measure_k(rows: Sequence[Row], largest: dict[str, float]) -> None:
-    for row in rows:
-        if row.reason.startswith(EQUIVALENCE.name) and math.isfinite(row.error):
-            largest[row.engine] = max(largest.get(row.engine, 0.0), row.error * row.condition / EPS)
 
 
 class Timed(NamedTuple):

@@ -1,32 +1,55 @@
-"""The Jinja environment of every report."""
+"""The templates of every report, and how numbers and somebody's text stand in them."""
 
+import base64
+import gzip
 import math
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from jinja2 import Environment
-
+from validation.compare.rows import plain
+from validation.report.colours import by_variable, declarations, style_of
 
 PLAIN = (1e-2, 1e6)
 """Numbers between these are written without a power of ten, the larger ones where they are whole."""
 
 
-def environment(package: str, *, escape: bool) -> "Environment":
-    """Templates of `package`, an unknown name an error; with `escape` every text is escaped for HTML."""
+def rendered(package: str, name: str, /, **what: object) -> str:
+    """A template of a package, an unknown name in it an error; in a page every text is escaped for HTML."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
+    page = name.endswith(".html.j2")  # in Markdown `cell` escapes what would break out
     made = Environment(
         loader=PackageLoader(package),
         undefined=StrictUndefined,
-        autoescape=escape,
+        autoescape=page,
         trim_blocks=True,
         lstrip_blocks=True,
-        keep_trailing_newline=not escape,
+        keep_trailing_newline=not page,
     )
-    made.filters["number"] = number
-    made.filters["plain"] = count_or_size
-    made.filters["degrees"] = lambda radians: "-" if math.isnan(radians) else f"{math.degrees(radians):.3f}"
-    return made
+    made.filters |= {
+        "number": number,
+        "plain": count_or_size,
+        "degrees": lambda radians: "-" if math.isnan(radians) else f"{math.degrees(radians):.3f}",
+        "share": share,
+        "cell": cell,
+        "packed": lambda text: base64.b64encode(gzip.compress(text.encode("utf-8"), mtime=0)).decode(),
+        "colour": lambda engine: by_variable(style_of(engine).colour),
+        "symbol": lambda engine: style_of(engine).symbol,
+    }
+    return made.get_template(name).render(light=declarations(dark=False), dark=declarations(dark=True), **what)
+
+
+def cell(text: object) -> str:
+    """Text that can neither end a table cell of Markdown nor start markup."""
+    shown = " ".join(plain(str(text)).split())
+    for mark in "\\|`*_[]<>#":
+        shown = shown.replace(mark, f"\\{mark}")
+    return shown.replace("\\<", "&lt;").replace("\\>", "&gt;")
+
+
+def share(value: float) -> str:
+    """error/allowed in two digits."""
+    if math.isinf(value):
+        return "∞"
+    return "0" if value == 0.0 else "<0.01" if value < 0.01 else f"{value:.2f}" if value < 10.0 else f"{value:.1e}"
 
 
 def number(value: float) -> str:

@@ -33,15 +33,9 @@ def table(summary: Summary, out: Path) -> None:
     for scene, group in groupby(summary.worst, key=lambda w: w.row.scene):
         shown.add_row(f"[bold]{escape(printable(scene))}[/]")
         for w in group:
-            shown.add_row(
-                f"  {escape(w.row.engine)}",
-                escape(w.row.quantity),
-                short(w.row.error),
-                short(w.row.allowed),
-                f"{w.used:.2f}",
-                f"{math.degrees(w.row.theta_2):.1f}",
-                style="" if w.failed == 0 else "bold red",
-            )
+            numbers = (short(w.row.error), short(w.row.allowed), f"{w.used:.2f}", f"{math.degrees(w.row.theta_2):.1f}")
+            words = (f"  {escape(w.row.engine)}", escape(w.row.quantity))
+            shown.add_row(*words, *numbers, style="" if w.failed == 0 else "bold red")
     console.print(shown)
     for row in summary.failures[:20]:
         console.print(

@@ -28,13 +28,11 @@ LEAST_GROWTH, MOST_GROWTH = 1.15, 3.0
 
 @dataclass(frozen=True, slots=True)
 class DialledWitness(Witness):
-    """The simulated witness at a wanted error."""
-
-    error: float = SIMULATED.factor
+    """The simulated witness at a wanted error, which is what it is held to."""
 
     def engine(self) -> Engine:
         """MuJoCo with settings for that error."""
-        return Dialled(self.error)
+        return Dialled(self.tolerance.factor)
 
 
 def held_to(error: float, why: str) -> Tolerance:
@@ -46,17 +44,13 @@ def held_to(error: float, why: str) -> Tolerance:
 
 def dialled(witnesses: Sequence[Witness], error: float) -> tuple[Witness, ...]:
     """The witnesses, with whatever runs through time held to `error` and laid out for it; exact ones stay exact."""
-    tolerance = held_to(error, "steps and softness are laid out for it")
+    own: dict[str, Any] = {"tolerance": held_to(error, "steps and softness are laid out for it"), "order": ""}
     return tuple(
-        DialledWitness(**{**_parts(each), "tolerance": tolerance, "order": "", "error": error})
+        DialledWitness(**{part.name: getattr(each, part.name) for part in fields(Witness)} | own)
         if each.through_time
         else each
         for each in witnesses
     )
-
-
-def _parts(witness: Witness) -> dict[str, Any]:
-    return {field.name: getattr(witness, field.name) for field in fields(Witness)}
 
 
 @dataclass(slots=True)

@@ -4,11 +4,10 @@ import math
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
-from importlib import import_module
+from pkgutil import resolve_name
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fourbar.errors import LimitError
 from fourbar.mjcf.settings import LIGHT
@@ -16,13 +15,12 @@ from fourbar.quantities import FORCES
 from fourbar.scene import Command, Scene, command
 from fourbar.solution import Solution
 from fourbar.solve import solve
-from validation.compare.answer import Answer, Array, Engine
+from validation.compare.answer import Answer, Engine
 from validation.compare.basis import basis_of
 from validation.compare.compare import Yardsticks, compare
 from validation.compare.identities import FORMULAS, closure, identities
-from validation.compare.plain import plain
 from validation.compare.reversals import reversals
-from validation.compare.rows import FAILS, REFUSES, VERDICTS, Row
+from validation.compare.rows import FAILS, REFUSES, VERDICTS, Row, breakdown, plain
 from validation.compare.statements.finding import Stated
 from validation.compare.statements.statements import statements
 from validation.compare.tolerance import EQUIVALENCE
@@ -31,7 +29,6 @@ from validation.engines.exact import sines
 from validation.engines.free_body import FreeBody, solutions
 from validation.engines.witnesses import WITNESSES, Witness, not_installed, predicting_from
 from validation.report.record import Record, Timing
-from validation.run.breakdown import breakdown
 from validation.run.printed import piece, printed
 
 SIMULATION = "mujoco-simulated"
@@ -97,7 +94,7 @@ def judge(name: str, scene: Scene, witnesses: Sequence[Witness] = WITNESSES, *, 
 def _shipped(name: str, scene: Scene, at: Command) -> list[Row]:
     """The generated MJCF as it is shipped, if one is."""
     try:
-        row = import_module("validation.engines.mujoco.shipped").shipped(name, scene, at)
+        row = resolve_name("validation.engines.mujoco.shipped:shipped")(name, scene, at)
     except Exception as error:  # as of any engine
         return [breakdown(name, SIMULATION, error, "MJCF as shipped")]
     return [] if row is None else [row]
@@ -114,8 +111,7 @@ def _once(at: Command, record: Record) -> Command:
     if len(at.theta_2) == 1 or any(np.ptp(values) != 0 for values in numbers):
         return at
     record.left_out.append("positions: all are the same, one is evaluated")
-    omega_2, alpha_2 = (x if x is None or np.ndim(x) == 0 else x[:1] for x in (at.omega_2, at.alpha_2))  # type: ignore[index]
-    return at._replace(theta_2=at.theta_2[:1], branch=at.branch[:1], omega_2=omega_2, alpha_2=alpha_2, time=None)  # type: ignore[arg-type]
+    return piece(at, np.array([0]))._replace(time=None)
 
 
 def _called_for(witnesses: Iterable[Witness], at: Command, record: Record) -> Iterator[Witness]:
@@ -180,13 +176,11 @@ def _basis(scene: Scene, free_body: Answer | None) -> Solution | None:
 def _by_exact_means(scene: Scene, at: Command) -> tuple[OfSome | None, OfSome]:
     """The sine between bars 3 and 4 in many digits, and how many solutions friction has, at some positions."""
 
-    def sines_at(where: NDArray[np.intp]) -> Array:
-        return sines(scene.linkage, piece(at, where))
-
-    def solutions_at(where: NDArray[np.intp]) -> Array:
-        return solutions(scene, piece(at, where))
-
-    return (None if at.remainder is not None or not_installed("flint") else sines_at), solutions_at
+    unknown = at.remainder is not None or not_installed("flint")
+    return (
+        None if unknown else lambda where: sines(scene.linkage, piece(at, where)),
+        lambda where: solutions(scene, piece(at, where)),
+    )
 
 
 def _judged(
@@ -231,13 +225,12 @@ def _stated(
 
 def _observed_order(name: str, scene: Scene, at: Command, solution: Solution, witness: Witness) -> dict[str, float]:
     """The worst error of the torque and the pin forces at 4h and 2h, and the order in h that they show."""
-    module, _, function = witness.order.partition(":")
 
     def error(answer: Answer) -> float:
         rows = _judged(name, scene, at, solution, answer, replace(witness, expected=FORCES), None, {})
         return max((row.error for row in rows if row.quantity in FORCES), default=math.nan)  # a refusal has none
 
-    coarse, fine, order = getattr(import_module(module), function)(scene, at, error)
+    coarse, fine, order = resolve_name(witness.order)(scene, at, error)
     seen = {"error_at_4h": coarse, "error_at_2h": fine, "observed_order": order}
     return seen if all(map(math.isfinite, seen.values())) else {}  # a coarse run may leave what the scene covers
 

@@ -9,10 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 from fourbar.errors import DependencyError, InputError
 from validation.engines.witnesses import Witness
-from validation.report.machine import machine
+from validation.report.machine import code, differing, machine
 from validation.report.record import Record
 from validation.run import pool
-from validation.run.code import code, differing
 from validation.scenes.suites import Suite
 
 if TYPE_CHECKING:

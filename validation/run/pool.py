@@ -18,11 +18,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
 from fourbar.errors import DependencyError
-from validation.compare.plain import plain
+from validation.compare.rows import breakdown, plain
 from validation.engines.memory import bound_memory
 from validation.engines.witnesses import Witness
 from validation.report.record import Record
-from validation.run.breakdown import breakdown
 from validation.run.judge import judged
 from validation.scenes.suites import Files, Suite
 
@@ -227,38 +226,36 @@ def as_done(
                 yield number, [_alone(suite, scene, witnesses, workers) for scene in scenes]
 
 
-def _outcome(scene: int, who: Sequence[Witness], workers: Workers) -> Record:
-    """One scene by some engines, or StalledError where no worker takes it up."""
+def _outcome(scene: int, who: Sequence[Witness], workers: Workers) -> Record | Exception:
+    """One scene by some engines, or what its worker died of; StalledError where no worker takes it up."""
     task = workers.submit([scene], who)
     while not workers.done([task], STALL):
         if workers.lost([task]):
             raise StalledError
-    return workers.result(task)[0]
+    try:
+        return workers.result(task)[0]
+    except (StalledError, DependencyError):
+        raise
+    except Exception as error:
+        return error
 
 
 def _alone(suite: Suite, scene: int, witnesses: Sequence[Witness], workers: Workers) -> Record:
     """One scene by itself, and if that breaks down too, one engine at a time."""
-    try:
-        return _outcome(scene, witnesses, workers)
-    except (StalledError, DependencyError):
-        raise
-    except Exception:
-        pass
+    found = _outcome(scene, witnesses, workers)
+    if isinstance(found, Record):
+        return found
     name = plain(suite.name(scene))
     record: Record | None = None
     failed = []
     for who in ([], *([witness] for witness in witnesses)):
-        for attempt in range(ATTEMPTS):
-            try:
-                part = _outcome(scene, who, workers)
-            except (StalledError, DependencyError):
-                raise
-            except Exception as error:
-                if getattr(error, "exitcode", None) in FROM_OUTSIDE and attempt + 1 < ATTEMPTS:
-                    continue  # somebody killed it: that is not the engine's doing
-                failed.append(breakdown(name, who[0].name if who else "formulas", error))
-            else:
-                record = part if record is None else record.joined(part)
-            break
+        for _ in range(ATTEMPTS):
+            found = _outcome(scene, who, workers)
+            if isinstance(found, Record) or getattr(found, "exitcode", None) not in FROM_OUTSIDE:
+                break  # otherwise somebody killed it: that is not the engine's doing
+        if isinstance(found, Record):
+            record = found if record is None else record.joined(found)
+        else:
+            failed.append(breakdown(name, who[0].name if who else "formulas", found))
     record = record or Record(name)
     return replace(record, rows=[*record.rows, *failed])

@@ -8,7 +8,7 @@ import math
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from importlib import import_module
+from pkgutil import resolve_name
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -24,12 +24,11 @@ from validation.compare.basis import basis_of
 from validation.compare.compare import compare
 from validation.compare.error import in_own_unit, relative, worst
 from validation.compare.identities import FORMULAS
-from validation.compare.rows import AGREES, DEGRADED, FAILS, REFUSES, UNDECIDED, Row
+from validation.compare.rows import AGREES, DEGRADED, FAILS, REFUSES, UNDECIDED, Row, breakdown
 from validation.compare.tolerance import DEGRADED as TIMES_PREDICTED
 from validation.compare.tolerance import EQUIVALENCE
 from validation.engines.witnesses import WITNESSES, Witness, not_installed, predicting_from
 from validation.report.record import Record, Timing
-from validation.run.breakdown import breakdown
 
 ENGINES = {
     "mujoco-forward": ("validation.engines.mujoco.released:MujocoForward", 1e-3, "mujoco"),
@@ -116,7 +115,7 @@ def judge_released(record: Record, witnesses: Sequence[Witness] = WITNESSES) -> 
             record.left_out.append(f"{name}: {reason}")
             continue
         try:
-            engine = _adapter(adapter)
+            engine: Callable[[float], Any] = resolve_name(adapter)
             pairs = math.ceil(free.duration / free.steps / (2.0 * longest) - 1e-6)
             step = free.duration / free.steps / (2.0 * pairs)  # two of them, or more, from one instant to the next
             begin = time.perf_counter()
@@ -177,21 +176,14 @@ class _Truth(NamedTuple):
     stopped_at: float | None = None
 
 
-def _adapter(adapter: str) -> Callable[[float], Any]:
-    module, _, name = adapter.partition(":")
-    return getattr(import_module(module), name)  # type: ignore[no-any-return]
-
-
 def _rows(record: Record, fine: Released, coarse: Released | None, truth: _Truth) -> list[Row]:
     assert record.scene is not None and record.scene.motion.free is not None
     free, through, n = record.scene.motion.free, record.scene.motion.through, len(truth.theta_2)
+    who = (record.name, fine.engine, fine.setting)
     if fine.refusal is not None:
-        return [Row.unmeasured(record.name, fine.engine, fine.setting, "all", REFUSES, fine.refusal)]
+        return [Row.unmeasured(*who, "all", REFUSES, fine.refusal)]
     if len(fine.theta_2) < n:
-        reason = f"it stopped after {len(fine.theta_2)} of {n} instants"
-        return [Row.unmeasured(record.name, fine.engine, fine.setting, "all", FAILS, reason)]
-    speed = float(np.abs(truth.omega_2).max())
-    sizes = {"theta_2": 1.0, "omega_2": speed, "energy": float(fine.terms[:n].max()), "stopped_at": 1.0}
+        return [Row.unmeasured(*who, "all", FAILS, f"it stopped after {len(fine.theta_2)} of {n} instants")]
 
     def numbers(of: Released) -> dict[str, Array]:
         found = {"theta_2": of.theta_2[:n], "omega_2": of.omega_2[:n]}
@@ -201,16 +193,16 @@ def _rows(record: Record, fine: Released, coarse: Released | None, truth: _Truth
                 found["stopped_at"] = _end(of.stopped_at, free.duration)
         return found
 
-    right = {
-        "theta_2": truth.theta_2,
-        "omega_2": truth.omega_2,
-        "energy": np.zeros(n),
-        "stopped_at": _end(truth.stopped_at, free.duration),
+    right_and_size = {
+        "theta_2": (truth.theta_2, 1.0),
+        "omega_2": (truth.omega_2, float(np.abs(truth.omega_2).max())),
+        "energy": (np.zeros(n), float(fine.terms[:n].max())),
+        "stopped_at": (_end(truth.stopped_at, free.duration), 1.0),
     }
     rows = []
     for name, values in numbers(fine).items():
-        size = in_own_unit(np.array(sizes[name]))
-        error, expected = relative(np.abs(values - right[name]), size), 0.0
+        right, size = right_and_size[name][0], in_own_unit(np.array(right_and_size[name][1]))
+        error, expected = relative(np.abs(values - right), size), 0.0
         if coarse is not None:
             other = numbers(coarse)[name]
             alike = len(other) == len(values)
@@ -226,20 +218,8 @@ def _rows(record: Record, fine: Released, coarse: Released | None, truth: _Truth
             verdict, reason = UNDECIDED, f"an error of {expected:.1e} of the value is predicted"
         else:
             verdict, reason = DEGRADED, f"{error[index]:.1e} of {expected:.1e} predicted from twice the step"
-        rows.append(
-            Row(
-                record.name,
-                fine.engine,
-                fine.setting,
-                name,
-                float(error[index]),
-                allowed,
-                verdict,
-                reason,
-                float(fine.theta_2[n - 1 if name == "stopped_at" else index]),
-                1.0,
-            )
-        )
+        place = float(fine.theta_2[n - 1 if name == "stopped_at" else index])
+        rows.append(Row(*who, name, float(error[index]), allowed, verdict, reason, place, 1.0))
     return rows
 
 

@@ -13,8 +13,7 @@ from fourbar.errors import FAILED, HOLDS, DependencyError, FourBarError, InputEr
 from fourbar.mjcf import mjcf
 from fourbar.writing import naming, require_file, write_text
 from validation.compare.columns import Columns, read_columns
-from validation.compare.plain import plain
-from validation.compare.rows import FAILS, Row
+from validation.compare.rows import FAILS, plain
 from validation.compare.tolerance import IDENTITY, SIMULATED
 from validation.engines.hard_suite import Hard
 from validation.engines.mujoco.picture import pictures
@@ -23,14 +22,13 @@ from validation.published import ladder_rows
 from validation.regression.accept import output_options, report_differences
 from validation.regression.record import about, baseline, recorded, write_about
 from validation.regression.scenes import descriptions
-from validation.report import cost_section, hard_section
-from validation.report.html import Section, html
+from validation.report.html import html, markdown
 from validation.report.junit import cases, document
-from validation.report.markdown import markdown
+from validation.report.machine import code
 from validation.report.record import Record
-from validation.report.summary import PICTURED, Summary, Summing
+from validation.report.sections import sections
+from validation.report.summary import PICTURED, Summary
 from validation.run import pool
-from validation.run.code import code
 from validation.run.elsewhere import run_elsewhere
 from validation.run.machines import Cluster
 from validation.run.selection import askable, chosen, selected
@@ -104,9 +102,9 @@ def run(
         for number, records in answers:
             store.put(number, records)
             yield len(records)
-        held_to = list(dict.fromkeys((IDENTITY, *(witness.tolerance for witness in witnesses))))
-        ladder = ladder_rows() if published else []
-        summing = Summing()
+        summary = Summary()
+        summary.tolerances = list(dict.fromkeys((IDENTITY, *(witness.tolerance for witness in witnesses))))
+        summary.missing, summary.ladder = missing, ladder_rows() if published else ()
         times = out / ".timings.csv.part"
         with (
             Columns(out) as columns,
@@ -117,18 +115,17 @@ def run(
             for number, scenes in enumerate(chunks):
                 records = store.read(number)
                 for each in records:
-                    summing.add(each)
+                    summary.add(each)
                     csv.writer(file, lineterminator="\n").writerows(timings(each))
                 columns.add([row for each in records for row in each.rows])
                 yield Collected(len(scenes))
         os.replace(times, out / "timings.csv")
-        pictured = {record.name for record in summing.pictured} if drawn else set()
+        pictured = {record.name for record in summary.pictured} if drawn else set()
         places = [index for index in range(len(suite)) if plain(suite.name(index)) in pictured]
         if drawn and not draw:
-            for shown in pictures_of(suite, places, summing.pictured, witnesses, workers, seconds):
-                summing.picture(shown)
+            for shown in pictures_of(suite, places, summary.pictured, witnesses, workers, seconds):
+                summary.picture(shown)
                 yield Drawn(1)
-        summary = summing.summary(ladder, held_to, missing)
         factors = {witness.name: witness.tolerance.factor for witness in witnesses}
         record = about(factors, suite.fingerprint(), descriptions(suite))
         if cluster is not None:
@@ -141,22 +138,6 @@ def run(
         write_text(out / "report.html", page)
         store.finish()
     yield summary
-
-
-def sections(hard: Iterable[Row] | None, out: Path) -> list[Section]:
-    """Parts of the report from elsewhere: the hard cases of this run or one in OUT/hard, the study in OUT/cost.
-
-    Of rows of the hard suite the page hard.html is written too.
-    """
-    if hard is None:
-        found = hard_section.found_in(out)
-        return [*([found] if found else []), *cost_section.found_in(out)]
-    from validation.report.hard_page import page, picture
-    from validation.report.svg import inline
-
-    svg = picture()
-    write_text(out / hard_section.PAGE, page(svg))
-    return [hard_section.section(hard, inline(svg)), *cost_section.found_in(out)]
 
 
 def pictures_of(
@@ -331,14 +312,11 @@ def command(
 
         witnesses = dialled(witnesses, wanted)
     if python is not None:
-        passed_on = [*map(os.path.abspath, scenes), f"--workers={workers}"]
-        passed_on += [f"--engines={engines}"] if engines else []
-        passed_on += ["--no-pictures"]
-        passed_on += [f"--random={count}", f"--seed={seed}", f"--type={types}"] if count else []
-        passed_on += [f"--error={wanted!r}"] if wanted is not None else []
-        passed_on += [f"--witness={adapter}" for adapter in adapters]
-        passed_on += [f"--time-limit={time_limit!r}"] if time_limit is not None else []
-        passed_on += [f"--suite={named if named == 'hard' else os.path.abspath(named)}"] if named else []
+        the_same = {"workers": workers, "engines": engines or None, "error": wanted, "time-limit": time_limit}
+        the_same |= {"random": count, "seed": seed, "type": types} if count else {}
+        the_same |= {"suite": named if named == "hard" else os.path.abspath(named)} if named else {}
+        passed_on = [*map(os.path.abspath, scenes), "--no-pictures", *(f"--witness={adapter}" for adapter in adapters)]
+        passed_on += [f"--{option}={value}" for option, value in the_same.items() if value is not None]
         against = str(run_elsewhere(python, passed_on, out / "elsewhere"))
     present, missing = askable(chosen(engines, witnesses), by_name=engines is not None)
     published = not scenes and named is None and count is None  # the models, the thesis's among them

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from fourbar.effects import Gravity, Load
-from fourbar.linkage import FourBar
+from fourbar.linkage import BAR_NAMES, MOVING_BARS, Bar, FourBar
 from fourbar.scene import Scene
 from fourbar.scene.motion import Motion
 from validation.scenes.random import LinkageType, Ranges, random_bars, random_lengths, uniform
@@ -47,15 +47,28 @@ def at(scene: Scene, psi: object, branch: int = 1, **changes: object) -> Scene:
     return replace(scene, motion=motion, **changes)  # type: ignore[arg-type]
 
 
+def moving(scene: Scene) -> list[tuple[str, Bar]]:
+    """The moving bars by their names."""
+    return [(BAR_NAMES[number], scene.linkage.bar(number)) for number in MOVING_BARS]
+
+
+def with_bars(scene: Scene, **bars: Bar) -> Scene:
+    """The scene with other bars."""
+    return replace(scene, linkage=replace(scene.linkage, **bars))  # type: ignore[arg-type]
+
+
+def _corners(one: float, other: float, opposite: float) -> list[float]:
+    """The angles, of either sign, between two sides of a triangle, by its third side; none where it does not close."""
+    cosine = (one * one + other * other - opposite * opposite) / (2 * one * other) if other else 2.0
+    return [math.acos(cosine), -math.acos(cosine)] if abs(cosine) < 1.0 else []
+
+
 def collinear_3_4(lengths: Lengths) -> list[tuple[float, bool]]:
     """psi in (0, pi) where bars 3, 4 are stretched (True) or folded: a^2 + d^2 - 2 a d cos psi = (b +- c)^2."""
     d, a, b, c = lengths
-    found = []
-    for diagonal, stretched in ((b + c, True), (abs(b - c), False)):
-        cosine = (a * a + d * d - diagonal**2) / (2 * a * d)
-        if abs(cosine) < 1.0:
-            found.append((math.acos(cosine), stretched))
-    return found
+    return [
+        (psi, stretched) for joined, stretched in ((b + c, True), (b - c, False)) for psi in _corners(d, a, joined)[:1]
+    ]
 
 
 def collinear_2_3(lengths: Lengths) -> list[tuple[float, int]]:
@@ -63,12 +76,9 @@ def collinear_2_3(lengths: Lengths) -> list[tuple[float, int]]:
     d, a, b, c = lengths
     found = []
     for along in (a + b, a - b):
-        cosine = (d * d + along * along - c * c) / (2 * d * along)
-        if abs(cosine) < 1.0:
-            for psi in (math.acos(cosine), -math.acos(cosine)):
-                u = complex(math.cos(psi), math.sin(psi))
-                diagonal, coupler = d - a * u, (along - a) * u
-                found.append((psi, 1 if (diagonal.conjugate() * coupler).imag > 0.0 else -1))
+        for psi in _corners(d, along, c):
+            u = complex(math.cos(psi), math.sin(psi))
+            found.append((psi, _side(d - a * u, (along - a) * u)))
     return found
 
 
@@ -77,10 +87,12 @@ def parallel_2_4(lengths: Lengths) -> list[tuple[float, int]]:
     d, a, b, c = lengths
     found = []
     for joined, side in ((a - c, 1.0), (a + c, -1.0)):
-        cosine = (d * d + joined * joined - b * b) / (2 * d * joined) if joined else 2.0
-        if abs(cosine) < 1.0:
-            for psi in (math.acos(cosine), -math.acos(cosine)):
-                u = complex(math.cos(psi), math.sin(psi))
-                coupler, output = d - joined * u, side * c * u
-                found.append((psi, 1 if (coupler.conjugate() * output).imag > 0.0 else -1))
+        for psi in _corners(d, joined, b):
+            u = complex(math.cos(psi), math.sin(psi))
+            found.append((psi, _side(d - joined * u, side * c * u)))
     return found
+
+
+def _side(one: complex, other: complex) -> int:
+    """The sign of the turn from one direction to another."""
+    return 1 if (one.conjugate() * other).imag > 0.0 else -1

@@ -13,7 +13,7 @@ from fourbar.writing import write_text
 from validation.compare.rows import csv_text
 from validation.report.machine import machine
 from validation.report.svg import drawn
-from validation.report.templating import environment
+from validation.report.templating import rendered
 from validation.subjects.examine import TORQUE_AND_FORCES, Line, Standing, examine
 
 PROBLEM = Path("models/problems/crank_rocker.toml")
@@ -58,9 +58,8 @@ def command(scene: Path, pythons: tuple[Path, ...], out: Path, time_limit: float
         "findings": findings(),
         "chart": chart,
     }
-    for ending, escape in (("html", True), ("md", False)):
-        template = environment("validation.subjects", escape=escape).get_template(f"standing.{ending}.j2")
-        write_text(out / f"standing.{ending}", template.render(page))
+    for ending in ("html", "md"):
+        write_text(out / f"standing.{ending}", rendered("validation.subjects", f"standing.{ending}.j2", **page))
     write_text(out / "standing.svg", chart)
     write_text(out / "standing.csv", table(found))
     for name, why in found.left_out.items():

@@ -12,7 +12,7 @@ from validation.regression.steps import NO_CHANGE, Step, steps
 from validation.report.colours import style_of
 from validation.report.machine import machine
 from validation.report.svg import drawn
-from validation.report.templating import environment, number
+from validation.report.templating import number, rendered
 from validation.subjects.examine import TORQUE_AND_FORCES
 from validation.subjects.releases import Release
 
@@ -84,10 +84,15 @@ def written(engine: str, found: Sequence[Release], left: int, more: Sequence[str
     about = next(release.run.about for release in found if release.run is not None)
     plain = [{key: None if isinstance(x, float) and math.isnan(x) else x for key, x in row.items()} for row in rows]
     kept = {"schema": SCHEMA, "engine": engine, "machine": machine(), "changed": sentences, "versions": plain}
-    template = environment("validation.subjects", escape=False).get_template("versions.md.j2")
     shown = [[_cell(name, row.get(name)) for name in COLUMNS] for row in rows]
-    made = {"machine": machine(), "python": about.versions.get("python", ""), "left": left, "more": more}
-    page = template.render(engine=engine, rows=shown, columns=COLUMNS, changed=sentences, **made)
+    made: dict[str, Any] = {
+        "machine": machine(),
+        "python": about.versions.get("python", ""),
+        "left": left,
+        "more": more,
+    }
+    made |= {"engine": engine, "rows": shown, "columns": COLUMNS, "changed": sentences}
+    page = rendered("validation.subjects", "versions.md.j2", **made)
     texts = {"csv": table, "json": json.dumps(kept, indent=1) + "\n", "md": page, "svg": chart(rows)}
     return {f"versions.{ending}": text for ending, text in texts.items()}
 

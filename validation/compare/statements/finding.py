@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Iterable, Sequence
+from functools import cache
 from typing import NamedTuple, TypeVar
 
 import numpy as np
@@ -37,18 +38,10 @@ def worst(name: str, answer: Answer, quantity: str, findings: Iterable[Finding])
     each = list(findings)
     found = each[int(np.argmax(used(np.array([one.error for one in each]), np.array([one.allowed for one in each]))))]
     holds = found.error <= found.allowed
-    return Row(
-        scene=name,
-        engine=answer.engine,
-        setting=answer.setting,
-        quantity=quantity,
-        error=float(found.error),
-        allowed=float(found.allowed),
-        verdict=AGREES if holds else FAILS,
-        reason=found.what,
-        theta_2=float(found.theta_2),
-        condition=float(EQUIVALENCE.factor / max(found.allowed, EQUIVALENCE.factor)),
-    )
+    error, allowed, theta_2 = (float(number) for number in found[:3])
+    verdict, condition = AGREES if holds else FAILS, float(EQUIVALENCE.factor / max(found.allowed, EQUIVALENCE.factor))
+    who = (name, answer.engine, answer.setting)
+    return Row(*who, quantity, error, allowed, verdict, found.what, theta_2, condition)
 
 
 class Stated:
@@ -56,13 +49,11 @@ class Stated:
 
     def __init__(self, linkage: FourBar) -> None:
         self.linkage = linkage
-        self._known: dict[tuple[Callable[..., object], tuple[int, ...]], object] = {}
+        self._value = cache(lambda formula, *of: formula(linkage, *of))
 
     def __call__(self, formula: Callable[..., T], *of: int) -> T:
         """The value of a formula of the linkage, and of a bar where it is of one."""
-        if (formula, of) not in self._known:
-            self._known[formula, of] = formula(self.linkage, *of)
-        value: T = self._known[formula, of]  # type: ignore[assignment]
+        value: T = self._value(formula, *of)
         return value
 
 
