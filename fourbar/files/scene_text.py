@@ -10,7 +10,7 @@ import numpy as np
 from fourbar.effects import Load
 from fourbar.errors import InputError, expect
 from fourbar.files.effects import written
-from fourbar.files.fields import Writer
+from fourbar.files.fields import polar, quantity
 from fourbar.linkage import BAR_NAMES, MOVING_BARS, Bar
 from fourbar.scene import Scene
 from fourbar.scene.motion import BRANCH_NAMES, FromLimit, Motion, Sweep
@@ -38,84 +38,83 @@ def dump(scene: Scene) -> str:
     no valid text.
     """
     expect("scene", scene, Scene)
-    write = Writer()
     linkage, motion = scene.linkage, scene.motion
     top = {"title": scene.title, "source": scene.source}
     parts = [_table("", {key: value for key, value in top.items() if value})]
     lengths: dict[str, Any] = {
-        BAR_NAMES[number]: write.quantity(length, "m") for number, length in enumerate(linkage.lengths, 1)
+        BAR_NAMES[number]: quantity(length, "m") for number, length in enumerate(linkage.lengths, 1)
     }
-    lengths["ground_angle"] = write.quantity(linkage.ground_angle, "rad")
+    lengths["ground_angle"] = quantity(linkage.ground_angle, "rad")
     parts.append(_table("lengths", lengths))
     for name, number in BARS.items():
         bar, entry = linkage.bar(number), dict[str, Any]()
         if bar != Bar(bar.length):
-            entry = {"mass": write.quantity(bar.mass, "kg")}
+            entry = {"mass": quantity(bar.mass, "kg")}
             if bar.inertia is not None:
-                entry["inertia"] = write.quantity(bar.inertia, "kg m^2")
+                entry["inertia"] = quantity(bar.inertia, "kg m^2")
             if bar.centre is not None:
-                entry["centre"] = write.polar(*bar.centre, "m")
+                entry["centre"] = polar(*bar.centre, "m")
         for picture in scene.pictures:
             if picture.bar == number:
                 entry["picture"] = picture.name
         parts.append(_table(f"bars.{name}", entry))
-    parts.append(_table("motion", _motion_entry(write, motion)))
+    parts.append(_table("motion", _motion_entry(motion)))
     parts.append(_table("drive", {"bar": scene.drive_bar}))
     points: dict[str, Any] = {
-        point.name: {"bar": point.bar, "from_pin": write.polar(*point.from_pin, "m")} for point in scene.points
+        point.name: {"bar": point.bar, "from_pin": polar(*point.from_pin, "m")} for point in scene.points
     }
     parts.append(_table("points", points))
-    parts += [_table("[loads]", _load_entry(write, load)) for load in scene.loads]
-    effects = {effect.key: written(effect, write) for effect in scene.effects}
+    parts += [_table("[loads]", _load_entry(load)) for load in scene.loads]
+    effects = {effect.key: written(effect) for effect in scene.effects}
     if len(effects) != len(scene.effects):
         raise InputError("effects", [effect.key for effect in scene.effects], "a file holds one of each kind")
     parts.append(_table("effects", effects))
     if scene.tolerances:
         from fourbar.files.tolerances import written_tolerances
 
-        parts.append(_table("tolerances", written_tolerances(write, scene)))
+        parts.append(_table("tolerances", written_tolerances(scene)))
     return "\n".join(part for part in parts if part)
 
 
-def _motion_entry(write: Writer, motion: Motion) -> dict[str, Any]:
+def _motion_entry(motion: Motion) -> dict[str, Any]:
     entry: dict[str, Any] = {}
     wanted = motion.theta_2
     if isinstance(wanted, Sweep):
-        ends = {"from": write.quantity(wanted.start, "rad"), "to": write.quantity(wanted.stop, "rad")}
+        ends = {"from": quantity(wanted.start, "rad"), "to": quantity(wanted.stop, "rad")}
         entry["theta_2"] = {**ends, "steps": wanted.steps}
     elif isinstance(wanted, FromLimit):
-        entry["theta_2"] = {"limit": wanted.limit, "offset": write.quantity(wanted.offset, "rad")}
+        entry["theta_2"] = {"limit": wanted.limit, "offset": quantity(wanted.offset, "rad")}
     elif isinstance(wanted, np.ndarray):
-        entry["theta_2"] = [write.quantity(angle, "rad") for angle in wanted.tolist()]
+        entry["theta_2"] = [quantity(angle, "rad") for angle in wanted.tolist()]
     elif wanted is not None:
-        entry["theta_2"] = write.quantity(wanted, "rad")
+        entry["theta_2"] = quantity(wanted, "rad")
     if motion.omega_2 is not None:
-        entry["omega_2"] = write.quantity(motion.omega_2, "rad/s")
+        entry["omega_2"] = quantity(motion.omega_2, "rad/s")
     if motion.law is None:
-        entry["alpha_2"] = write.quantity(motion.alpha_2, "rad/s^2")
+        entry["alpha_2"] = quantity(motion.alpha_2, "rad/s^2")
     else:
         law = motion.law
         entry["law"] = {
-            "time": [write.quantity(time, "s") for time in law.time],
-            "theta_2": [write.quantity(angle, "rad") for angle in law.theta_2],
+            "time": [quantity(time, "s") for time in law.time],
+            "theta_2": [quantity(angle, "rad") for angle in law.theta_2],
             "steps": law.steps,
             "ends": law.ends,
         }
     entry["branch"] = BRANCH_NAMES[motion.branch]
     entry["through"] = motion.through
     if motion.free is not None:
-        entry["free"] = {"duration": write.quantity(motion.free.duration, "s"), "steps": motion.free.steps}
+        entry["free"] = {"duration": quantity(motion.free.duration, "s"), "steps": motion.free.steps}
     return entry
 
 
-def _load_entry(write: Writer, load: Load) -> dict[str, Any]:
+def _load_entry(load: Load) -> dict[str, Any]:
     entry: dict[str, Any] = {"bar": load.bar}
     if load.force is not None:
-        entry["force"] = write.polar(*load.force, "N")
-        entry["at"] = write.polar(*load.at, "m")
-    entry |= {"moment": write.quantity(load.moment, "N m"), "frame": load.frame}
+        entry["force"] = polar(*load.force, "N")
+        entry["at"] = polar(*load.at, "m")
+    entry |= {"moment": quantity(load.moment, "N m"), "frame": load.frame}
     if load.table is not None:
-        angles = [write.quantity(angle, "rad") for angle in load.table.theta_2]
+        angles = [quantity(angle, "rad") for angle in load.table.theta_2]
         entry["table"] = {"theta_2": angles, "factor": list(load.table.factor)}
     return entry
 
