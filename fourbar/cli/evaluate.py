@@ -79,7 +79,7 @@ def analyze(
             raise click.UsageError("--sensitivity is a table, or with --json all of it, SI and rad")
         _sensitivity(scene, as_json, out)
         return
-    from fourbar.show.motor import motor_entry
+    from fourbar.show.duty import motor_entry
     from fourbar.show.tables import printed
     from fourbar.solution import DEGREES, csv_text, json_text
     from fourbar.solve import last_stage, solve
@@ -111,14 +111,13 @@ def _sensitivity(scene: Path, as_json: bool, out: Path | None) -> None:
     from fourbar.show import influence
     from fourbar.show.tables import under_heading
     from fourbar.studies.derivatives import sensitivity
-    from fourbar.studies.influence import json_text
 
     with opened(scene) as stated:
         found = sensitivity(stated)
     if not found.solution.assembled.any():
         raise NotAssembledError(f"{scene}: motion.theta_2: the linkage assembles at none of the positions")
     if as_json:
-        text = json_text(found)
+        text = influence.json_text(found)
     else:
         text = under_heading(stated.title, influence.heading(found), influence.table(found))
     printed_to(text, out)

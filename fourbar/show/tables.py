@@ -12,8 +12,7 @@ from fourbar.linkage import BAR_NAMES, PIN_FORCE
 from fourbar.quantities import ANGLES, PIN_FORCES, STATUS_NAMES, UNITS
 from fourbar.scene import Scene
 from fourbar.scene.motion import BRANCH_NAMES
-from fourbar.show.bearing import bearing_load
-from fourbar.show.motor import motor_duty
+from fourbar.show.duty import bearing_load, motor_duty
 from fourbar.solution import DEGREES, Array, Conversion, Solution, unit_in
 
 if TYPE_CHECKING:

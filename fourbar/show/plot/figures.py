@@ -11,7 +11,7 @@ import numpy as np
 from fourbar.errors import InputError
 from fourbar.linkage import require
 from fourbar.scene import Scene
-from fourbar.show.plot import curves, freebody, hodograph, influence, linkage
+from fourbar.show.plot import curves, freebody, hodograph, linkage, studies
 from fourbar.show.plot.labels import Labels
 from fourbar.show.plot.style import CAPTION, FORCE_COLOURS, TITLE, format_of, matplotlib_style, plain, rendered, save
 from fourbar.show.plot.transmission import draw_transmission
@@ -98,7 +98,7 @@ FIGURES: dict[str, tuple[Painter, tuple[float, float], bool]] = {
     "energy": (_single(curves.draw_energy), (5.6, 3.2), True),
     "transmission": (_single(draw_transmission), (5.6, 3.2), False),
     "freebody": (_free_bodies, (9.6, 4.6), True),
-    "sensitivity": (influence.draw_influences, (9.6, 3.6), True),
+    "sensitivity": (studies.draw_influences, (9.6, 3.6), True),
 }
 """Each figure: its painter, the size of one branch in inches, and whether it needs omega_2."""
 
