@@ -50,9 +50,9 @@ if _TYPE_CHECKING:
     from fourbar.files import load as load
     from fourbar.files import save as save
     from fourbar.show.duty import bearing_load as bearing_load
+    from fourbar.show.duty import motor_duty as motor_duty
     from fourbar.show.duty import shaking_force as shaking_force
     from fourbar.show.duty import shaking_moment as shaking_moment
-    from fourbar.show.duty import motor_duty as motor_duty
     from fourbar.show.notebook import in_units as in_units
     from fourbar.show.units import units as units
     from fourbar.studies.derivatives import Sensitivity as Sensitivity

@@ -54,7 +54,7 @@ def _overview(figure: "SubFigure", shown: View, labels: Labels) -> None:
 def _kinematics(figure: "SubFigure", shown: View, labels: Labels) -> None:
     del labels
     panels = figure.subplots(3 if shown.moves else 1, 1, squeeze=False)[:, 0]
-    painters = (curves.draw_angles, curves.draw_velocities, curves.draw_accelerations)
+    painters: tuple[Any, ...] = (curves.draw_angles, curves.draw_velocities, curves.draw_accelerations)
     for axes, paint in zip(panels, painters, strict=False):
         paint(axes, shown)
 

@@ -45,6 +45,8 @@ def force_name(name: str) -> str:
 TITLE: dict[str, Any] = {"parse_math": False, "size": 10.5, "weight": "bold", "x": 0.012, "ha": "left"}
 CAPTION: dict[str, Any] = {"parse_math": False, "size": 6.8, "color": MUTED, "x": 0.012, "ha": "left"}
 """Of a whole figure, above and below its panels."""
+OPEN: dict[str, Any] = {"mfc": "white", "mec": INK}
+"""A mark that is a ring."""
 HEADED: dict[str, Any] = {"arrowstyle": "-|>", "lw": 1.5, "shrinkA": 0.0, "shrinkB": 0.0}
 """An arrow from end to end."""
 STYLE = Path(__file__).with_name("fourbar.mplstyle")
