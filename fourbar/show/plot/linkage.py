@@ -30,10 +30,9 @@ def pins(view: View, factor: float = 1.0) -> dict[str, Point]:
     return {name: components(pin) for name, pin in place.pins.items()}
 
 
-def components(vector: Any) -> Point:
-    """x and y of a complex vector at the one position drawn."""
-    value = complex(np.ravel(vector)[0])
-    return (value.real, value.imag)
+def components(vector: complex) -> Point:
+    """x and y."""
+    return (vector.real, vector.imag)
 
 
 def draw_linkage(axes: "Axes", view: View, labels: Labels, *, moving: bool = False) -> None:
