@@ -19,8 +19,8 @@ from fourbar.formulas.path import state
 from fourbar.formulas.torque import inertia
 from fourbar.scene.motion_law import Law
 from fourbar.show import plot
+from fourbar.show.duty import energies
 from fourbar.show.plot.curves import broken, limit_of, poles
-from fourbar.show.plot.energy import energies
 from fourbar.show.plot.figures import FIGURES, drawn
 from fourbar.show.plot.freebody import free_body
 from fourbar.show.plot.style import number, plain, unit_for

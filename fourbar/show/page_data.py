@@ -12,10 +12,10 @@ from fourbar.errors import InputError, NotAssembledError
 from fourbar.files import dump
 from fourbar.files.pictures import data_uri
 from fourbar.linkage import BAR_NAMES, MOVING_BARS
-from fourbar.quantities import OK, PIN_FORCES
+from fourbar.quantities import ANGLES, OK, PIN_FORCES
 from fourbar.scene import Command, Scene, command
 from fourbar.show.acting import Symbol, acting
-from fourbar.show.plot.energy import energies
+from fourbar.show.duty import energies
 from fourbar.show.plot.style import length_unit
 from fourbar.show.plot.view import on_branch, over_time, sweep_command
 from fourbar.show.tolerances import embedded_tolerances
@@ -26,18 +26,8 @@ MAX_ROWS = 1441
 """Positions embedded in a page: a quarter of a degree over a full turn; a finer sweep is thinned out evenly."""
 WATCHED = (1.5, 60.0)
 """A motion through time that lasts between these, s, is shown in real time."""
-SCALARS = (
-    "theta_3",
-    "theta_4",
-    "condition",
-    "omega_2",
-    "omega_3",
-    "omega_4",
-    "alpha_2",
-    "alpha_3",
-    "alpha_4",
-    "torque",
-)
+RATES = (f"{letter}_{bar}" for letter in ("omega", "alpha") for bar in MOVING_BARS)
+SCALARS = (*ANGLES, "condition", *RATES, "torque")
 
 
 def page_data(scene: Scene, pictures: Mapping[str, str | Path], units: Conversion = SI) -> dict[str, Any]:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import PIN_FORCES
-from fourbar.show.plot.energy import energies
+from fourbar.show.duty import energies
 from fourbar.show.plot.style import (
     BAR_COLOURS,
     BAR_DASHES,

@@ -16,7 +16,6 @@ from fourbar.show.acting import acting
 from fourbar.show.plot import symbols
 from fourbar.show.plot.linkage import POINT, mass_centre, path_legend, paths, pin_name, supports
 from fourbar.show.plot.style import BAR_COLOURS, INK, TITLE, largest, length_unit, matplotlib_style, plain
-from fourbar.show.plot.vectors import vectors
 from fourbar.show.plot.view import View, view
 from fourbar.show.progress import counted
 from fourbar.solution import SI, Conversion
@@ -185,7 +184,7 @@ def _stage(shown: View, moving: bool) -> tuple["Figure", Any]:
     own = {name: axes.plot([], [], "D", ms=4.5, mfc="white", mec=POINT, mew=1.2, zorder=8)[0] for name in sweep.points}
     arms = {number: axes.plot([], [], color=BAR_COLOURS[number], lw=0.8, ls=":", zorder=3)[0] for number in centres}
     names = _names(axes, shown, list(centres))
-    move_vectors = vectors(axes, shown, sweep, factor, size) if moving and shown.moves else None
+    move_vectors = symbols.vectors(axes, shown, sweep, factor, size) if moving and shown.moves else None
     acts = _Acting(axes, shown, factor, size)
     acts.hold_all()
     axes.autoscale_view()

@@ -10,8 +10,7 @@ from fourbar.show.acting import acting
 from fourbar.show.plot import symbols
 from fourbar.show.plot.labels import Label, Labels
 from fourbar.show.plot.style import BAR_COLOURS, INK, MUTED, OPEN, largest, length_unit, quantity
-from fourbar.show.plot.symbols import place_of
-from fourbar.show.plot.vectors import vectors
+from fourbar.show.plot.symbols import place_of, vectors
 from fourbar.show.plot.view import View
 from fourbar.solution import Array
 
