@@ -30,9 +30,8 @@ class Reader:
             raise self.refuse(key, value, "must be a table with the keys " + ", ".join(names))
         for name, entry in value.items():
             if name not in names:
-                close = difflib.get_close_matches(name[:LONGEST_SHOWN], names, 1)
-                hint = f'did you mean "{close[0]}"? ' if close else ""
-                raise self.refuse(_joined(key, name), entry, f"unknown key; {hint}allowed: {', '.join(names)}")
+                allowed = f"unknown key; {_hint(name, names)}allowed: {', '.join(names)}"
+                raise self.refuse(_joined(key, name), entry, allowed)
         return value
 
     def text(self, key: str, value: object) -> str:
@@ -45,9 +44,7 @@ class Reader:
         """One of a few words."""
         words = list(allowed)
         if not isinstance(value, str) or value not in words:
-            close = difflib.get_close_matches(value[:LONGEST_SHOWN], words, 1) if isinstance(value, str) else []
-            hint = f'did you mean "{close[0]}"? ' if close else ""
-            raise self.refuse(key, value, f"{hint}must be " + " or ".join(f'"{word}"' for word in words))
+            raise self.refuse(key, value, f"{_hint(value, words)}must be " + " or ".join(f'"{word}"' for word in words))
         return value
 
     def whole(self, key: str, value: object, least: int, most: int) -> int:
@@ -106,6 +103,12 @@ def quantity(value: float, unit: str) -> Any:
 def polar(magnitude: float, angle: float, unit: str) -> list[str]:
     """A pair [magnitude, angle] likewise."""
     return [quantity(magnitude, unit), quantity(angle, "rad")]
+
+
+def _hint(word: object, known: list[str]) -> str:
+    """The known word that is nearest to one that is not."""
+    close = difflib.get_close_matches(word[:LONGEST_SHOWN], known, 1) if isinstance(word, str) else []
+    return f'did you mean "{close[0]}"? ' if close else ""
 
 
 def _joined(key: str, name: str) -> str:

@@ -11,9 +11,11 @@ from fourbar.effects import Load
 from fourbar.errors import InputError, expect
 from fourbar.files.effects import written
 from fourbar.files.fields import polar, quantity
+from fourbar.files.tolerances import written_tolerances
 from fourbar.linkage import BAR_NAMES, MOVING_BARS, Bar
 from fourbar.scene import Scene
 from fourbar.scene.motion import BRANCH_NAMES, FromLimit, Motion, Sweep
+from fourbar.scene.motion_law import Law
 from fourbar.writing import write_text
 
 BRANCHES = {name: branch for branch, name in BRANCH_NAMES.items()}
@@ -38,73 +40,70 @@ def dump(scene: Scene) -> str:
     no valid text.
     """
     expect("scene", scene, Scene)
-    linkage, motion = scene.linkage, scene.motion
     top = {"title": scene.title, "source": scene.source}
-    parts = [_table("", {key: value for key, value in top.items() if value})]
-    lengths: dict[str, Any] = {
-        BAR_NAMES[number]: quantity(length, "m") for number, length in enumerate(linkage.lengths, 1)
+    lengths = {
+        name: quantity(length, "m") for name, length in zip(BAR_NAMES.values(), scene.linkage.lengths, strict=True)
     }
-    lengths["ground_angle"] = quantity(linkage.ground_angle, "rad")
-    parts.append(_table("lengths", lengths))
-    for name, number in BARS.items():
-        bar, entry = linkage.bar(number), dict[str, Any]()
-        if bar != Bar(bar.length):
-            entry = {"mass": quantity(bar.mass, "kg")}
-            if bar.inertia is not None:
-                entry["inertia"] = quantity(bar.inertia, "kg m^2")
-            if bar.centre is not None:
-                entry["centre"] = polar(*bar.centre, "m")
-        for picture in scene.pictures:
-            if picture.bar == number:
-                entry["picture"] = picture.name
-        parts.append(_table(f"bars.{name}", entry))
-    parts.append(_table("motion", _motion_entry(motion)))
-    parts.append(_table("drive", {"bar": scene.drive_bar}))
-    points: dict[str, Any] = {
-        point.name: {"bar": point.bar, "from_pin": polar(*point.from_pin, "m")} for point in scene.points
-    }
-    parts.append(_table("points", points))
-    parts += [_table("[loads]", _load_entry(load)) for load in scene.loads]
+    angle = quantity(scene.linkage.ground_angle, "rad")
+    points = {point.name: {"bar": point.bar, "from_pin": polar(*point.from_pin, "m")} for point in scene.points}
     effects = {effect.key: written(effect) for effect in scene.effects}
     if len(effects) != len(scene.effects):
         raise InputError("effects", [effect.key for effect in scene.effects], "a file holds one of each kind")
-    parts.append(_table("effects", effects))
-    if scene.tolerances:
-        from fourbar.files.tolerances import written_tolerances
+    tables: list[tuple[str, dict[str, Any]]] = [
+        ("", {key: value for key, value in top.items() if value}),
+        ("lengths", {**lengths, "ground_angle": angle}),
+        *((f"bars.{name}", _bar_entry(scene, number)) for name, number in BARS.items()),
+        ("motion", _motion_entry(scene.motion)),
+        ("drive", {"bar": scene.drive_bar}),
+        ("points", points),
+        *(("[loads]", _load_entry(load)) for load in scene.loads),
+        ("effects", effects),
+        ("tolerances", written_tolerances(scene)),
+    ]
+    return "\n".join(_table(name, entries) for name, entries in tables if entries)
 
-        parts.append(_table("tolerances", written_tolerances(scene)))
-    return "\n".join(part for part in parts if part)
+
+def _bar_entry(scene: Scene, number: int) -> dict[str, Any]:
+    bar, entry = scene.linkage.bar(number), dict[str, Any]()
+    if bar != Bar(bar.length):
+        entry = {"mass": quantity(bar.mass, "kg")}
+        if bar.inertia is not None:
+            entry["inertia"] = quantity(bar.inertia, "kg m^2")
+        if bar.centre is not None:
+            entry["centre"] = polar(*bar.centre, "m")
+    for picture in scene.pictures:
+        if picture.bar == number:
+            entry["picture"] = picture.name
+    return entry
 
 
 def _motion_entry(motion: Motion) -> dict[str, Any]:
-    entry: dict[str, Any] = {}
-    wanted = motion.theta_2
+    law, free, wanted = motion.law, motion.free, motion.theta_2
+    angles: Any = wanted
     if isinstance(wanted, Sweep):
         ends = {"from": quantity(wanted.start, "rad"), "to": quantity(wanted.stop, "rad")}
-        entry["theta_2"] = {**ends, "steps": wanted.steps}
+        angles = {**ends, "steps": wanted.steps}
     elif isinstance(wanted, FromLimit):
-        entry["theta_2"] = {"limit": wanted.limit, "offset": quantity(wanted.offset, "rad")}
+        angles = {"limit": wanted.limit, "offset": quantity(wanted.offset, "rad")}
     elif isinstance(wanted, np.ndarray):
-        entry["theta_2"] = [quantity(angle, "rad") for angle in wanted.tolist()]
+        angles = [quantity(angle, "rad") for angle in wanted.tolist()]
     elif wanted is not None:
-        entry["theta_2"] = quantity(wanted, "rad")
-    if motion.omega_2 is not None:
-        entry["omega_2"] = quantity(motion.omega_2, "rad/s")
-    if motion.law is None:
-        entry["alpha_2"] = quantity(motion.alpha_2, "rad/s^2")
-    else:
-        law = motion.law
-        entry["law"] = {
-            "time": [quantity(time, "s") for time in law.time],
-            "theta_2": [quantity(angle, "rad") for angle in law.theta_2],
-            "steps": law.steps,
-            "ends": law.ends,
-        }
-    entry["branch"] = BRANCH_NAMES[motion.branch]
-    entry["through"] = motion.through
-    if motion.free is not None:
-        entry["free"] = {"duration": quantity(motion.free.duration, "s"), "steps": motion.free.steps}
-    return entry
+        angles = quantity(wanted, "rad")
+    entry = {
+        "theta_2": angles,
+        "omega_2": None if motion.omega_2 is None else quantity(motion.omega_2, "rad/s"),
+        "alpha_2": quantity(motion.alpha_2, "rad/s^2") if law is None else None,
+        "law": None if law is None else _law_entry(law),
+        "branch": BRANCH_NAMES[motion.branch],
+        "through": motion.through,
+        "free": None if free is None else {"duration": quantity(free.duration, "s"), "steps": free.steps},
+    }
+    return {key: value for key, value in entry.items() if value is not None}
+
+
+def _law_entry(law: Law) -> dict[str, Any]:
+    times, angles = ([quantity(x, unit) for x in of] for of, unit in ((law.time, "s"), (law.theta_2, "rad")))
+    return {"time": times, "theta_2": angles, "steps": law.steps, "ends": law.ends}
 
 
 def _load_entry(load: Load) -> dict[str, Any]:
@@ -120,9 +119,7 @@ def _load_entry(load: Load) -> dict[str, Any]:
 
 
 def _table(name: str, entries: dict[str, Any]) -> str:
-    """One TOML table, nothing where it is empty."""
-    if not entries:
-        return ""
+    """One TOML table."""
     heading = f"[{name}]\n" if name else ""
     return heading + "".join(f"{key} = {_value(key, value)}\n" for key, value in entries.items())
 

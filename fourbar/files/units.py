@@ -66,20 +66,14 @@ def to_si(text: str, unit: str) -> float:
     if dimension != wanted_dimension:
         raise UnitError(f'"{name}" does not convert to {unit}{_hint(found[0], name, unit)}')
     try:
-        value = float(_number(found) * factor / wanted)
+        number = Fraction(found[0]) if found.re is NUMBER else int(found[1] or 0) + Fraction(f"{found[2]}/{found[3]}")
+        value = float(number * factor / wanted)
     except OverflowError:
         value = math.inf
     if not math.isfinite(value):
         raise UnitError("the number is too large")
     # Fraction has no -0.0
     return -0.0 if value == 0.0 and found[0].startswith("-") else value
-
-
-def _number(found: re.Match[str]) -> Fraction:
-    """The number of a match, exactly."""
-    if found.re is NUMBER:
-        return Fraction(found[0])
-    return int(found[1] or 0) + Fraction(int(found[2]), int(found[3]))
 
 
 def factor_to(unit: str, given: str) -> float:

@@ -55,7 +55,7 @@ def draw_hodograph(axes: "PolarAxes", view: View, names: tuple[str, ...] = tuple
     many = 4 if factor * top < LONG_NUMBERS else 2
     ticks = MaxNLocator(many).tick_values(0.0, factor * top)
     axes.set_rticks([tick for tick in ticks if 0.0 < tick < 0.97 * factor * top])
-    axes.set_rlabel_position(_free_direction([np.column_stack([forces[n], sizes[n]]) for n in names]))
+    axes.set_rlabel_position(_free_direction(list(forces.values())))
     axes.tick_params(axis="y", labelsize=6.5, labelcolor=MUTED)
     title = ", ".join(map(force_name, names)) if len(names) < 4 else "Hodographs of the pin forces"
     axes.set_title(f"{title} ({unit})", pad=12)
@@ -74,7 +74,7 @@ def _spacing(view: View) -> tuple[Array, float, str]:
 
 def _free_direction(forces: list[np.ndarray]) -> float:
     """The multiple of 22.5 deg that lies furthest from the curves."""
-    directions = np.concatenate([np.arctan2(f[:, 1], f[:, 0])[np.isfinite(f[:, 2])] for f in forces])
+    directions = np.concatenate([np.arctan2(f[:, 1], f[:, 0])[np.isfinite(f).all(axis=1)] for f in forces])
     candidates = np.radians(np.arange(16) * 22.5)
     away = np.abs(np.angle(np.exp(1j * (directions - candidates[:, None])))).min(axis=1, initial=math.pi)
     return float(np.degrees(candidates[int(np.argmax(away))]))

@@ -10,7 +10,7 @@ from fourbar.show.acting import acting
 from fourbar.show.plot import symbols
 from fourbar.show.plot.labels import Label, Labels
 from fourbar.show.plot.style import BAR_COLOURS, INK, MUTED, OPEN, largest, length_unit, quantity
-from fourbar.show.plot.symbols import place_of, vectors
+from fourbar.show.plot.symbols import components, place_of, vectors
 from fourbar.show.plot.view import View
 from fourbar.solution import Array
 
@@ -27,11 +27,6 @@ def pins(view: View, factor: float = 1.0) -> dict[str, Point]:
     """The four pins at the position drawn, in the order O2, A, B, O4, m or what the factor makes of it."""
     place = place_of(view.scene.linkage, view.here, 0, factor)
     return {name: components(pin) for name, pin in place.pins.items()}
-
-
-def components(vector: complex) -> Point:
-    """x and y."""
-    return (vector.real, vector.imag)
 
 
 def draw_linkage(axes: "Axes", view: View, labels: Labels, *, moving: bool = False) -> None:

@@ -112,11 +112,12 @@ def draw(axes: "Axes", symbol: Symbol, place: Place, size: float) -> Drawn:
                 1j * np.linspace(0.0, math.tau, 60)
             )
         _line(axes, drawn, points, colour, 2.2 if symbol.kind == "flywheel" else 1.2)
-        drawn.label = _point(points[-1])
+        drawn.label = components(points[-1])
     return drawn
 
 
-def _point(z: complex) -> Point:
+def components(z: complex) -> Point:
+    """x and y."""
     return (z.real, z.imag)
 
 
@@ -129,10 +130,10 @@ def _line(axes: "Axes", drawn: Drawn, points: Any, colour: str, width: float) ->
 def _arrow(axes: "Axes", tail: complex, tip: complex, colour: str, drawn: Drawn) -> None:
     from matplotlib.patches import FancyArrowPatch
 
-    arrow = FancyArrowPatch(_point(tail), _point(tip), zorder=8, color=colour, mutation_scale=10.0, **HEADED)
+    arrow = FancyArrowPatch(components(tail), components(tip), zorder=8, color=colour, mutation_scale=10.0, **HEADED)
     drawn.artists.append(axes.add_patch(arrow))
-    axes.update_datalim([_point(tail), _point(tip)])
-    drawn.lines.append([_point(tail), _point(tip)])
+    axes.update_datalim([components(tail), components(tip)])
+    drawn.lines.append([components(tail), components(tip)])
 
 
 def _force(axes: "Axes", symbol: Symbol, place: Place, size: float, drawn: Drawn) -> None:
@@ -143,7 +144,7 @@ def _force(axes: "Axes", symbol: Symbol, place: Place, size: float, drawn: Drawn
         return
     tip = tail + sign * LENGTHS["force"] * size * u * symbol.vector / abs(symbol.vector)
     _arrow(axes, tail, tip, COLOURS["force"], drawn)
-    drawn.label, drawn.away = _point(tip), (tip - tail) / abs(tip - tail)
+    drawn.label, drawn.away = components(tip), (tip - tail) / abs(tip - tail)
 
 
 def _turn(axes: "Axes", centre: complex, radius: float, turn: float, colour: str, drawn: Drawn) -> None:
@@ -154,7 +155,7 @@ def _turn(axes: "Axes", centre: complex, radius: float, turn: float, colour: str
     points = centre + radius * np.exp(1j * angles)
     _line(axes, drawn, points, colour, 1.5)
     _arrow(axes, complex(points[-2]), complex(points[-1] + 2.0 * (points[-1] - points[-2])), colour, drawn)
-    drawn.label, drawn.away = _point(complex(points[20])), complex(points[20] - centre) / radius
+    drawn.label, drawn.away = components(complex(points[20])), complex(points[20] - centre) / radius
 
 
 def _zigzag(start: complex, end: complex, width: float) -> Any:
