@@ -18,7 +18,7 @@ from fourbar.files import reading
 from fourbar.files.effects import REGISTRY
 from fourbar.files.fields import BARE_KEY, Reader
 from fourbar.files.pictures import Picture
-from fourbar.files.scene_text import BARS, BRANCHES, dump, save
+from fourbar.files.scene_text import BARS, BRANCHES
 from fourbar.files.tolerances import read_tolerances
 from fourbar.linkage import BAR_NAMES, MOST_STEPS, Bar, FourBar
 from fourbar.scene import Scene
@@ -26,8 +26,6 @@ from fourbar.scene.motion import DEFAULT_STEPS, Free, FromLimit, Motion, Sweep
 from fourbar.scene.motion_law import ENDS, Law
 from fourbar.scene.point import Point
 from fourbar.solution import Array
-
-__all__ = ["dump", "load", "loads", "read_text", "save"]
 
 LARGEST_FILE = 500_000
 """Bytes; a scene takes about a thousand."""

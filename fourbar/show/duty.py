@@ -78,7 +78,7 @@ def bearing_load(solution: Solution, pin: str) -> BearingLoad:
         return BearingLoad(float("nan"), float("nan"), float("nan"))
     load, theta_2 = load[known], theta_2[known]
     worst = int(np.argmax(load))
-    return BearingLoad(float(load[worst]), float(np.sqrt(np.mean(load**2))), float(theta_2[worst]))
+    return BearingLoad(float(load[worst]), _rms(load), float(theta_2[worst]))
 
 
 class MotorDuty(NamedTuple):

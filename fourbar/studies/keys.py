@@ -1,6 +1,7 @@
 """The numbers of a scene by their keys in its file, and scenes in which they are arrays."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import fields
 from difflib import get_close_matches
 from typing import Any, NamedTuple
@@ -157,6 +158,14 @@ def at_place(whole: Any, place: Place) -> Any:
         else:
             whole = getattr(whole, name)
     return whole
+
+
+def with_numbers(scene: Scene, numbers: Mapping[str, Any]) -> Scene:
+    """A copy with some of its numbers replaced, by key."""
+    known, changed = entries(scene), scene
+    for key, number in numbers.items():
+        changed = placed(changed, known[key].place, number)
+    return changed
 
 
 def placed(whole: Any, place: Place, values: Any) -> Any:

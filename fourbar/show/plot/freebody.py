@@ -93,19 +93,16 @@ def _actions(view: View) -> Iterator[tuple[str, Recorder]]:
 
 def draw_free_bodies(figure: "SubFigure", view: View, labels: Labels) -> None:
     """The three bars, each freed from its pins, with arrows to one scale, over the couples."""
-    freed = {bar: free_body(view, bar) for bar in MOVING_BARS}
-    lines = max(len(couples) for v in view.alike for bar in MOVING_BARS for couples in free_body(v, bar)[1:])
-    panels, below = figure.subplots(2, 3, height_ratios=[PANEL, LINE * lines])
-    drawn = [(v, free_body(v, bar)[0], bar) for v in view.alike for bar in MOVING_BARS]
-    biggest = max((abs(arrow.force) for *_, arrows, _ in drawn for arrow in arrows), default=0.0)
+    freed = [(v, bar, *free_body(v, bar)) for v in view.alike for bar in MOVING_BARS]  # those of this view first
+    panels, below = figure.subplots(2, 3, height_ratios=[PANEL, LINE * max(len(couples) for *_, couples in freed)])
+    biggest = max((abs(arrow.force) for *_, arrows, _ in freed for arrow in arrows), default=0.0)
     longest = max(view.scene.linkage.bar(bar).length for bar in MOVING_BARS)
     scale = 0.75 * longest / biggest if biggest > 0.0 else 0.0
-    reach = {bar: _reach(view, bar, freed[bar][0], scale) for bar in MOVING_BARS}
     # one window size: the bars, too, are to one scale
-    span = WINDOW * max(float(np.ptp(_reach(v, bar, arrows, scale), axis=0).max()) for v, arrows, bar in drawn)
-    for axes, text, bar in zip(panels, below, MOVING_BARS, strict=True):
-        _draw_one(axes, view, bar, freed[bar][0], scale, biggest, labels, reach[bar], span)
-        _write_couples(text, view, freed[bar][1])
+    span = WINDOW * max(float(np.ptp(_reach(v, bar, arrows, scale), axis=0).max()) for v, bar, arrows, _ in freed)
+    for axes, text, (_, bar, arrows, couples) in zip(panels, below, freed, strict=False):
+        _draw_one(axes, view, bar, arrows, scale, biggest, labels, span)
+        _write_couples(text, view, couples)
     _scale_bar(panels[0], scale, biggest, view.units)
     note(
         view,
@@ -131,7 +128,6 @@ def _draw_one(
     scale: float,
     biggest: float,
     labels: Labels,
-    reach: Points,
     span: float,
 ) -> None:
     where = place_of(view.scene.linkage, view.here, 0, 1.0).pins
@@ -163,6 +159,7 @@ def _draw_one(
         labels.keep_off(axes, (0.0, 0.0), (x, y))
         mass_centre(axes, (x, y), 6.0)
         labels.add(Label(axes, f"$G_{bar}$", (x, y), middle, MUTED, 8.0, 3.0))
+    reach = _reach(view, bar, arrows, scale)
     middle_of = 0.5 * (np.min(reach, axis=0) + np.max(reach, axis=0))
     axes.set_xlim(middle_of[0] - 0.5 * span, middle_of[0] + 0.5 * span)
     axes.set_ylim(middle_of[1] - 0.5 * span, middle_of[1] + 0.5 * span)

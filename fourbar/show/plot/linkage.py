@@ -31,16 +31,13 @@ def pins(view: View, factor: float = 1.0) -> dict[str, Point]:
 
 def draw_linkage(axes: "Axes", view: View, labels: Labels, *, moving: bool = False) -> None:
     """The linkage at the position drawn, over the paths of its points; with their velocities where it is `moving`."""
-    sweep = view.sweep
     where = pins(view)
-    reached = np.concatenate([sweep.A, sweep.B, sweep.G3, *sweep.points.values(), list(where.values())])
-    factor, unit = _unit(view)
+    factor, unit, size = scale_of(view)
     where = {name: (factor * x, factor * y) for name, (x, y) in where.items()}
     for path, colour, dashes, name in paths(view):
         scaled = factor * path
         axes.plot(*scaled.T, color=colour, lw=1.0, ls=dashes, zorder=2, label=name)
         labels.keep_off(axes, *[(float(x), float(y)) for x, y in scaled[:: max(1, len(scaled) // 120)]])
-    size = 0.03 * factor * float(np.max(np.nanmax(reached, axis=0) - np.nanmin(reached, axis=0)))
     _ground(axes, labels, where["O2"], where["O4"], size)
     if view.dimensions:
         at = tuple(0.5 * (a + b) for a, b in zip(where["O2"], where["O4"], strict=True))
@@ -102,10 +99,13 @@ def _bar_name(view: View, number: int) -> str:
     return f"{number}: {length}" if view.dimensions else str(number)
 
 
-def _unit(view: View) -> tuple[float, str]:
-    """The unit of length of a drawing, the same for both branches."""
+def scale_of(view: View) -> tuple[float, str, float]:
+    """The factor to the unit of length of a drawing, the same for both branches; that unit; the size of a support."""
     most = max(largest(v.sweep.A, v.sweep.B, v.sweep.G3, *np.array(list(pins(v).values()))) for v in view.alike)
-    return length_unit(most, view.units)
+    factor, unit = length_unit(most, view.units)
+    sweep = view.sweep
+    reached = np.concatenate([sweep.A, sweep.B, sweep.G3, *sweep.points.values(), list(pins(view).values())])
+    return factor, unit, 0.03 * factor * float(np.max(np.nanmax(reached, axis=0) - np.nanmin(reached, axis=0)))
 
 
 def pin_name(name: str) -> str:
@@ -172,7 +172,7 @@ def draw_coupler_curves(axes: "Axes", view: View, labels: Labels) -> None:
     across = np.stack([-along[:, 1], along[:, 0]], axis=1)
     points = ((0.0, 0.0), (0.25, 0.0), (0.5, 0.0), (0.75, 0.0), (1.0, 0.0), (0.5, 0.5), (0.5, -0.5))
     paths = [sweep.A + u * along + v * across for u, v in points]
-    factor, unit = _unit(view)
+    factor, unit, _ = scale_of(view)
     greys = ("#0072B2", "#56A0C8", "#D55E00", "#5FA48B", "#007A5A", "#8A3B78", "#8A3B78")
     for (u, v), path, colour in zip(points, paths, greys, strict=True):
         dashes = "-" if v == 0.0 else (0, (5, 1.5)) if v > 0 else (0, (1.4, 1.4))
