@@ -18,8 +18,7 @@ from fourbar.formulas.torque import driving_torque, half_slope, inertia
 from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import PIN_FORCES
 from fourbar.scene import Command, Scene
-from fourbar.scene.case import Case
-from fourbar.scene.start import state_at
+from fourbar.scene.case import Case, state_at
 from fourbar.solve import solve
 from validation.compare.answer import Array
 from validation.compare.error import relative
