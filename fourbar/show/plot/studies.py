@@ -70,15 +70,13 @@ def draw_tolerances(found: Tolerances, path: str | Path) -> None:
             axes.set_axis_off()
         _shares(panels[len(parts)], found, parts[0])
         title = plain(found.scene.title, 80) or "Four-bar linkage"
-        heading = f"{title}: what the tolerances do ({found.samples} samples)"
-        figure.suptitle(heading, **TITLE)
+        figure.suptitle(f"{title}: what the tolerances do ({found.samples} samples)", **TITLE)
         caption = (
             f"Deviation from the nominal. Filled: {BAND[0]:g} to {BAND[1]:g} % of the samples; thin: least and "
             "greatest sampled; dashed: first-order worst case."
         )
         lines = [caption, *(line for part in parts if (line := parted(found, part)))]
-        text = "\n".join(textwrap.fill(line, 52 * columns) for line in lines)
-        figure.supxlabel(text, **CAPTION)
+        figure.supxlabel("\n".join(textwrap.fill(line, 52 * columns) for line in lines), **CAPTION)
         save(figure, target, kind)
 
 
@@ -107,8 +105,7 @@ def _band(axes: "Axes", found: Tolerances, part: str) -> None:
     if sizes.size and largest(sizes) > 2.0 * most > 0.0:
         axes.set_ylim(-factor * most, factor * most)
     axes.axhline(0.0, color=INK, lw=0.6)
-    axes.set_ylabel(f"deviation ({unit})")
-    axes.set_title(part)
+    axes.set(ylabel=f"deviation ({unit})", title=part)
 
 
 def _shares(axes: "Axes", found: Tolerances, part: str) -> None:
@@ -122,10 +119,8 @@ def _shares(axes: "Axes", found: Tolerances, part: str) -> None:
         rows.append(shares[order[MOST_SHARES:]].sum(axis=0))
         names = [*names[:MOST_SHARES], "the others"]
     axes.stackplot(over, rows, colors=SHADES[: len(rows)], labels=names, lw=0.0)
-    axes.set_ylim(0.0, 100.0)
-    axes.set_ylabel("share of the variance (%)")
+    axes.set(ylim=(0.0, 100.0), ylabel="share of the variance (%)", title=f"{part}: from which dimension")
     axes.legend(loc="upper left", bbox_to_anchor=(0.0, -0.28), ncols=1, fontsize=6.5)
-    axes.set_title(f"{part}: from which dimension")
 
 
 def draw_influences(figure: "SubFigure", shown: View, labels: Labels) -> None:
@@ -136,30 +131,18 @@ def draw_influences(figure: "SubFigure", shown: View, labels: Labels) -> None:
     keys = ranked(found, names)[:MOST_NUMBERS][::-1]
     panels = figure.subplots(1, len(names), squeeze=False)[0]
     for axes, name in zip(panels, names, strict=True):
-        size = {row.key: abs(row.change) for row in influences(found, name)}
-        factor, unit = unit_for(max([size.get(key, 0.0) for key in keys], default=0.0), unit_of(name))
-        axes.barh(
-            range(len(keys)),
-            [factor * size.get(key, 0.0) for key in keys],
-            height=0.62,
-            color=FORCE_COLOURS.get(name, INK),
-        )
+        changes = {row.key: abs(row.change) for row in influences(found, name)}
+        sizes = np.array([changes.get(key, 0.0) for key in keys])
+        factor, unit = unit_for(sizes.max(initial=0.0), unit_of(name))
+        axes.barh(range(len(keys)), factor * sizes, height=0.62, color=FORCE_COLOURS.get(name, INK))
         axes.set_yticks(range(len(keys)), keys if axes is panels[0] else [""] * len(keys), size=6.8)
-        axes.set_ylim(-0.6, len(keys) - 0.4)
-        axes.set_title(name if len(name) <= 10 else name[:9] + "…")
-        axes.set_xlabel(unit)
+        title = name if len(name) <= 10 else name[:9] + "…"
+        axes.set(ylim=(-0.6, len(keys) - 0.4), title=title, xlabel=unit)
         axes.grid(False, axis="y")
         axes.locator_params(axis="x", nbins=3)
         most, own_unit = unit_for(largest_value(found, name), unit_of(name))
-        axes.text(
-            0.98,
-            0.02,
-            f"largest\n{most * largest_value(found, name):.3g} {own_unit}",
-            transform=axes.transAxes,
-            ha="right",
-            va="bottom",
-            size=6.8,
-        )
+        text = f"largest\n{most * largest_value(found, name):.3g} {own_unit}"
+        axes.text(0.98, 0.02, text, transform=axes.transAxes, ha="right", va="bottom", size=6.8)
     shown.notes.append(
         "Bars: the largest change over the sweep by 1 % of a number, of an angle by 1°; pin forces by their magnitude."
     )
