@@ -49,27 +49,28 @@ if _TYPE_CHECKING:
     from fourbar.files import dump as dump
     from fourbar.files import load as load
     from fourbar.files import save as save
-    from fourbar.show.bearing import bearing_load as bearing_load
-    from fourbar.show.bearing import shaking_force as shaking_force
-    from fourbar.show.bearing import shaking_moment as shaking_moment
-    from fourbar.show.motor import motor_duty as motor_duty
+    from fourbar.show.duty import bearing_load as bearing_load
+    from fourbar.show.duty import motor_duty as motor_duty
+    from fourbar.show.duty import shaking_force as shaking_force
+    from fourbar.show.duty import shaking_moment as shaking_moment
     from fourbar.show.notebook import in_units as in_units
     from fourbar.show.units import units as units
-    from fourbar.studies import Sensitivity as Sensitivity
-    from fourbar.studies import Study as Study
-    from fourbar.studies import extremes as extremes
-    from fourbar.studies import sensitivity as sensitivity
-    from fourbar.studies import tolerances as tolerances
-    from fourbar.studies import vary as vary
+    from fourbar.studies.derivatives import Sensitivity as Sensitivity
+    from fourbar.studies.derivatives import sensitivity as sensitivity
+    from fourbar.studies.enclosure import extremes as extremes
+    from fourbar.studies.spread import tolerances as tolerances
+    from fourbar.studies.study import Study as Study
+    from fourbar.studies.study import vary as vary
 
 _EFFECTS = (*("Flywheel", "Friction", "Gravity", "Load", "PinFriction", "Spring", "Springs", "Torsion", "Viscous"),)
-_STUDIES = ("Sensitivity", "Study", "extremes", "sensitivity", "tolerances", "vary")
 _ON_FIRST_USE = {
     **{name: "fourbar.effects" for name in _EFFECTS},
     **{name: "fourbar.files" for name in ("dump", "load", "save")},
-    **{name: "fourbar.show.bearing" for name in ("bearing_load", "shaking_force", "shaking_moment")},
-    **{name: "fourbar.studies" for name in _STUDIES},
-    "motor_duty": "fourbar.show.motor",
+    **{name: "fourbar.show.duty" for name in ("bearing_load", "motor_duty", "shaking_force", "shaking_moment")},
+    **{name: "fourbar.studies.derivatives" for name in ("Sensitivity", "sensitivity")},
+    **{name: "fourbar.studies.study" for name in ("Study", "vary")},
+    "extremes": "fourbar.studies.enclosure",
+    "tolerances": "fourbar.studies.spread",
     "in_units": "fourbar.show.notebook",
     "units": "fourbar.show.units",
 }

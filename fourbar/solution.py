@@ -171,7 +171,7 @@ def json_text(solution: Solution, units: Conversion = SI, **more: Any) -> str:
         "branch": solution.branch.tolist(),
     }
     for name in names:
-        values = _values(solution, name, units)
+        values = values_of(solution, name, units)
         document[name] = None if values is None else nulled(values)
     if solution.time is not None:
         document["stopped_at"] = solution.stopped_at
@@ -215,7 +215,7 @@ def scalars(solution: Solution, units: Conversion = SI) -> dict[str, Array | Non
     """
     found: dict[str, Array | None] = {}
     for name in _quantities(solution):
-        values, unit = _values(solution, name, units), unit_of(name)
+        values, unit = values_of(solution, name, units), unit_of(name)
         heading = f" [{units[unit][0]}]" if unit in units else ""
         if name in VECTORS or name not in UNITS:
             for axis, letter in enumerate("xy"):
@@ -252,7 +252,8 @@ def unit_of(name: str) -> str:
     return UNITS.get(name) or {"v_": "m/s", "a_": "m/s^2"}.get(name[:2], "m")
 
 
-def _values(solution: Solution, name: str, units: Conversion) -> Array | None:
+def values_of(solution: Solution, name: str, units: Conversion = SI) -> Any:
+    """A quantity by its name, those of the scene's own points too; None where it was not evaluated."""
     values: Array | None
     if name in UNITS:
         values = getattr(solution, name)

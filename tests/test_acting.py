@@ -85,14 +85,11 @@ def test_the_points_of_a_scene_are_drawn_where_they_are() -> None:
     """Path, speed and mark in the plot, path in the notebook's drawing, place and columns in the page."""
     pytest.importorskip("matplotlib", reason="drawing needs matplotlib: pip install matplotlib")
     from fourbar.show.drawing import POINT, drawing
-    from fourbar.show.plot.figures import FIGURES, compose
-    from fourbar.show.plot.style import matplotlib_style
+    from fourbar.show.plot.figures import drawn
 
     scene = crank_rocker(points=(fourbar.Point("P", 3, (0.15, 0.7)),))
     solution = fourbar.solve(scene)
-    painter, size, _ = FIGURES["points"]
-    with matplotlib_style():
-        panels = compose(scene, painter, size, None, "one", fourbar.units("m m/s m/s^2")).subfigs[0].axes
+    panels = drawn(scene, "points", units=fourbar.units("m m/s m/s^2")).figure.subfigs[0].axes
     path = next(line for line in panels[0].lines if line.get_label() == "path of P")
     assert {f"path of $G_{bar}$" for bar in (2, 4)} <= {line.get_label() for line in panels[0].lines}
     assert np.allclose(path.get_xydata(), solution.points["P"], rtol=0.0, atol=1e-15)

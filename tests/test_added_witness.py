@@ -12,7 +12,7 @@ import pytest
 
 import fourbar
 from fourbar.errors import InputError
-from fourbar.files.scene_file import save
+from fourbar.files import save
 from tests.scenes import crank_rocker
 from validation import Answer
 from validation.cli import status

@@ -5,8 +5,7 @@ import math
 import numpy as np
 
 import fourbar
-from fourbar.show.bearing import bearing_load, drive_power, shaking_force, shaking_moment
-from fourbar.show.motor import motor_duty, motor_entry
+from fourbar.show.duty import bearing_load, drive_power, motor_duty, motor_entry, shaking_force, shaking_moment
 from fourbar.show.tables import heading
 from fourbar.show.units import units
 from tests.scenes import crank_rocker

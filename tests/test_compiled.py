@@ -14,7 +14,7 @@ from fourbar.errors import DependencyError
 from fourbar.quantities import NOT_ASSEMBLED, OK
 from fourbar.scene import compiled, compiled_case
 from fourbar.scene.error_bars import EVALUATIONS
-from fourbar.studies import vary
+from fourbar.studies.study import vary
 from validation.stress.forward_error.judge import TOO_SMALL
 from validation.stress.forward_error.stability import run
 

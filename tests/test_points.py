@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fourbar import InputError, Motion, Point, Scene, load, solve, vary
-from fourbar.files.scene_file import dump, loads
+from fourbar.files import dump, loads
 from fourbar.show.tables import columns
 from fourbar.solution import csv_text, json_text
 from tests.scenes import crank_rocker

@@ -14,7 +14,8 @@ from fourbar.effects import Friction, Gravity, Load, PinFriction, Table, Viscous
 from fourbar.linkage import BAR_NAMES, MOVING_BARS
 from fourbar.scene import Scene, command
 from fourbar.scene.motion import Free, FromLimit
-from fourbar.studies.derivatives import Sensitivity, quantity_of, sensitivity
+from fourbar.solution import values_of
+from fourbar.studies.derivatives import Sensitivity, sensitivity
 from fourbar.studies.keys import entries
 from tests.test_studies import ANGLES, DRIVEN, LINK, LOADS, RUBBING, scene
 from validation.engines.balls import BITS, Values, inputs, outputs
@@ -108,7 +109,7 @@ def test_effects_that_the_reference_lacks_by_differences(effects: tuple[Any, ...
         study[key] = x + moves[:, None] if key == "motion.theta_2" else x + moves
     solution = fourbar.solve(fourbar.vary(of, {k: v for k, v in study.items() if k not in LEFT_OUT}))
     for name in found.by:
-        of_all = quantity_of(solution, name)
+        of_all = values_of(solution, name)
         for row, key in enumerate(start):
             if key in LEFT_OUT:
                 continue

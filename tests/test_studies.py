@@ -22,9 +22,9 @@ from fourbar.quantities import VECTORS
 from fourbar.scene import command
 from fourbar.scene.motion import Free, FromLimit
 from fourbar.scene.motion_law import Law
-from fourbar.studies import Study, vary
 from fourbar.studies import study as studying
 from fourbar.studies.keys import entries, placed
+from fourbar.studies.study import Study, vary
 
 M, ANGLES = 9, np.array([0.2, 0.9, 2.5, 3.9, 5.6])
 LINK = FourBar(0.3, Bar(0.1, 0.2, 0.001, (0.04, 0.2)), Bar(0.25, 0.5), Bar(0.22, 0.4, None, (0.1, -0.3)), 0.4)

@@ -11,7 +11,7 @@ import pytest
 import fourbar.formulas.mobility
 from fourbar import Bar, FourBar, InputError, Motion, Scene, Sweep, Tolerance, uniform
 from fourbar.cli import status
-from fourbar.files.scene_file import dump, loads
+from fourbar.files import dump, loads
 from fourbar.studies import spread as studied
 from fourbar.studies.spread import tolerances
 

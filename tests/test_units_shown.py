@@ -77,19 +77,16 @@ def test_units_are_read_as_people_write_them() -> None:
 
 def test_plots_and_notebooks_say_theirs() -> None:
     pytest.importorskip("matplotlib", reason="drawing needs matplotlib: pip install matplotlib")
-    from fourbar.show.plot.figures import FIGURES, compose
-    from fourbar.show.plot.style import matplotlib_style
+    from fourbar.show.plot.figures import drawn
 
     scene, imperial = crank_rocker(), units("imperial")
-    with matplotlib_style():
-        for name, label in (("torque", "$T_2$ (lbf in)"), ("forces", "$|F|$ (lbf)")):
-            painter, size, _ = FIGURES[name]
-            axes = compose(scene, painter, size, None, "one", imperial).subfigs[0].axes[0]
-            assert axes.get_ylabel() == label
-            if name == "torque":
-                torque = fourbar.solve(scene).torque
-                curve = max((np.asarray(line.get_ydata()) for line in axes.lines), key=len)
-                assert np.nanmax(curve) == pytest.approx(np.max(torque) / (POUND * INCH), rel=0.01)
+    for name, label in (("torque", "$T_2$ (lbf in)"), ("forces", "$|F|$ (lbf)")):
+        axes = drawn(scene, name, units=imperial).figure.subfigs[0].axes[0]
+        assert axes.get_ylabel() == label
+        if name == "torque":
+            torque = fourbar.solve(scene).torque
+            curve = max((np.asarray(line.get_ydata()) for line in axes.lines), key=len)
+            assert np.nanmax(curve) == pytest.approx(np.max(torque) / (POUND * INCH), rel=0.01)
     assert " in" in notebook.in_units(scene, "imperial")._repr_html_()
     table = notebook.in_units(fourbar.solve(scene), "imperial")._repr_html_()
     assert "lbf in" in table and "deg" in table and "N m" not in table

@@ -5,10 +5,8 @@ import sys
 import click
 
 from fourbar import __version__
-from fourbar.cli.draw import animate, plot
-from fourbar.cli.evaluate import analyze, classify, new
-from fourbar.cli.export import mjcf, sdf, usd
-from fourbar.cli.studies import extremes, tolerance
+from fourbar.cli.evaluate import analyze, classify, extremes, new, tolerance
+from fourbar.cli.export import animate, mjcf, plot, sdf, usd
 from fourbar.errors import run
 
 

@@ -1,21 +1,17 @@
-"""The commands that evaluate one linkage: classify, new, analyze."""
+"""The commands that evaluate a linkage (classify, new, analyze) and what may vary of it (tolerance, extremes)."""
 
+import shutil
+import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
-from fourbar.cli.given import (
-    lengths_of,
-    loaded,
-    named,
-    or_out_option,
-    printed_to,
-    scene_argument,
-    terminal_width,
-    units_option,
-    waiting,
-)
+from fourbar.cli.given import FILE, lengths_of, opened, or_out_option, printed_to, scene_argument, units_option, waiting
 from fourbar.errors import InputError, NotAssembledError
+
+if TYPE_CHECKING:
+    from fourbar.solution import Conversion
 
 
 @click.command()
@@ -36,8 +32,8 @@ def classify(lengths: tuple[str, ...], as_json: bool, out: Path | None) -> None:
 
 
 @click.command()
-@click.argument("file", type=click.Path(path_type=Path), required=False)
-@click.option("-o", "--out", type=click.Path(path_type=Path), metavar="FILE", help="The same, as an option.")
+@click.argument("file", type=FILE, required=False)
+@click.option("-o", "--out", type=FILE, metavar="FILE", help="The same, as an option.")
 @click.option("--lengths", nargs=4, required=True, metavar="D A B C", help="Ground, input, coupler, output.")
 def new(file: Path | None, out: Path | None, lengths: tuple[str, ...]) -> None:
     """Write a new scene file with the four lengths, the rest explained in comments.
@@ -72,20 +68,19 @@ def analyze(
     as_json: bool,
     as_csv: bool,
     degrees: bool | None,
-    units: str,
+    units: "Conversion",
     sensitivity: bool,
     every: int | None,
     out: Path | None,
 ) -> None:
     """Solve a scene: angles, speeds, accelerations, driving torque and pin forces."""
     if sensitivity:
-        if as_csv or degrees or every is not None or units != "SI":
+        if as_csv or degrees or every is not None or units:
             raise click.UsageError("--sensitivity is a table, or with --json all of it, SI and rad")
         _sensitivity(scene, as_json, out)
         return
-    from fourbar.show.motor import motor_entry
+    from fourbar.show.duty import motor_entry
     from fourbar.show.tables import printed
-    from fourbar.show.units import units as units_of
     from fourbar.solution import DEGREES, csv_text, json_text
     from fourbar.solve import last_stage, solve
 
@@ -93,13 +88,12 @@ def analyze(
         raise click.UsageError("--json and --csv are two forms of the output; give one of them")
     if every is not None and (as_json or as_csv):
         raise click.UsageError("--every and --all are of the table; --json and --csv hold every position")
-    shown = dict(units_of(units))
+    shown = dict(units)
     if degrees or (degrees is None and "rad" not in shown and not (as_json or as_csv)):
         shown |= DEGREES
     elif degrees is False:
         shown.pop("rad", None)
-    described = loaded(scene)
-    with named(scene), waiting(described):
+    with opened(scene) as described, waiting(described):
         solution = solve(described, last_stage(described))
     if not solution.assembled.any():
         raise NotAssembledError(f"{scene}: motion.theta_2: the linkage assembles at none of the positions requested")
@@ -108,7 +102,7 @@ def analyze(
     elif as_csv:
         text = csv_text(solution, shown)
     else:
-        width = None if out else terminal_width()
+        width = None if out or not sys.stdout.isatty() else shutil.get_terminal_size().columns
         text = printed(described, solution, width, shown, every=every)
     printed_to(text, out)
 
@@ -117,15 +111,63 @@ def _sensitivity(scene: Path, as_json: bool, out: Path | None) -> None:
     from fourbar.show import influence
     from fourbar.show.tables import under_heading
     from fourbar.studies.derivatives import sensitivity
-    from fourbar.studies.influence import json_text
 
-    stated = loaded(scene)
-    with named(scene):
+    with opened(scene) as stated:
         found = sensitivity(stated)
     if not found.solution.assembled.any():
         raise NotAssembledError(f"{scene}: motion.theta_2: the linkage assembles at none of the positions")
     if as_json:
-        text = json_text(found)
+        text = influence.json_text(found)
     else:
         text = under_heading(stated.title, influence.heading(found), influence.table(found))
+    printed_to(text, out)
+
+
+@click.command()
+@scene_argument
+@click.option("--samples", type=int, metavar="N", help="Linkages that are tried; left out: 8192.")
+@click.option("--seed", type=int, default=0, show_default=True, metavar="S", help="Of the quasi-random samples.")
+@click.option("--json", "as_json", is_flag=True, help="One object, SI, every digit.")
+@click.option("-o", "--out", type=FILE, metavar="PLOT", help="Draw the bands: svg, png or pdf.")
+def tolerance(scene: Path, samples: int | None, seed: int, as_json: bool, out: Path | None) -> None:
+    """What the [tolerances] of a scene do to torque, pin forces and points, and which dimension does it."""
+    from fourbar.show import tolerances as shown
+    from fourbar.show.plot import draw_tolerances, format_of
+    from fourbar.show.progress import running
+    from fourbar.show.tables import under_heading
+    from fourbar.studies.spread import SAMPLES, tolerances
+
+    if out is not None:
+        format_of(out)
+    with opened(scene) as stated, running("samples are solved") as progress:
+        found = tolerances(stated, SAMPLES if samples is None else samples, seed, progress=progress)
+    if (found.without == found.samples).all():
+        raise NotAssembledError(f"{scene}: motion.theta_2: the linkage assembles at none of the positions")
+    if out is not None:
+        draw_tolerances(found, out)
+    if as_json:
+        printed_to(shown.json_text(found), None)
+    else:
+        printed_to(under_heading(stated.title, shown.heading(found), shown.table(found)), None)
+
+
+@click.command()
+@scene_argument
+@click.option("--quantity", "quantities", multiple=True, metavar="NAME", help="torque, F12 .. F14, transmission.")
+@click.option("--json", "as_json", is_flag=True, help="One object, SI and rad, every digit.")
+@or_out_option
+def extremes(scene: Path, quantities: tuple[str, ...], as_json: bool, out: Path | None) -> None:
+    """Prove the largest and smallest torque, pin forces and transmission angle over the input's whole interval."""
+    from fourbar.show import extremes as shown
+    from fourbar.show.progress import running
+    from fourbar.show.tables import under_heading
+    from fourbar.studies.enclosure import NAMES
+    from fourbar.studies.enclosure import extremes as proven
+
+    with opened(scene) as stated, running("the boxes are halved"):
+        found = proven(stated, quantities or NAMES)
+    if as_json:
+        text = shown.json_text(stated, found)
+    else:
+        text = under_heading(stated.title, shown.heading(stated, found), shown.table(found))
     printed_to(text, out)

@@ -1,14 +1,89 @@
-"""The commands that write a scene for simulators: mjcf, sdf, usd."""
+"""The commands that write files: pictures (plot, animate), and models for simulators (mjcf, sdf, usd)."""
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
-from fourbar.cli.given import lengths_of, loaded, named, number_of, out_option, scene_argument
+from fourbar.cli.given import (
+    FILE,
+    angle_of,
+    lengths_of,
+    number_of,
+    opened,
+    out_option,
+    printed_to,
+    scene_argument,
+    units_option,
+    waiting,
+)
+from fourbar.errors import InputError
+
+if TYPE_CHECKING:
+    from fourbar.solution import Conversion
 
 
 @click.command()
-@click.argument("scene", type=click.Path(path_type=Path), required=False)
+@scene_argument
+@out_option
+@click.option(
+    "--figure",
+    default="overview",
+    show_default=True,
+    metavar="NAME",
+    help="overview, linkage, coupler, kinematics, points, torque, forces, hodograph, energy, transmission, freebody, "
+    "sensitivity.",
+)
+@click.option("--position", metavar="ANGLE", help='theta_2 of the linkage and free bodies, like "135 deg".')
+@click.option("--branches", default="one", show_default=True, metavar="WHICH", help="one or both.")
+@click.option("--dimensions", is_flag=True, help="Write the lengths of the bars at them.")
+@units_option
+def plot(
+    scene: Path, out: Path, figure: str, position: str | None, branches: str, dimensions: bool, units: "Conversion"
+) -> None:
+    """Draw a scene as SVG, PNG or PDF (by the ending of FILE)."""
+    from fourbar.show.plot import draw
+
+    at = None if position is None else angle_of("--position", position)
+    with opened(scene) as described, waiting(described):
+        draw(described, out, figure, position=at, branches=branches, units=units, dimensions=dimensions)
+
+
+@click.command()
+@scene_argument
+@out_option
+@click.option(
+    "--picture",
+    "pictures",
+    multiple=True,
+    metavar="BAR=FILE",
+    help="A PNG or JPEG laid along input, coupler or output (pages).",
+)
+@click.option(
+    "--seconds",
+    type=click.FloatRange(min=0.1, max=60.0),
+    help="Length of a film; left out: 6, of a motion through time its own.",
+)
+@click.option("--vectors", is_flag=True, help="With arrows of velocity and acceleration at the points.")
+@units_option
+def animate(
+    scene: Path, out: Path, pictures: tuple[str, ...], seconds: float | None, vectors: bool, units: "Conversion"
+) -> None:
+    """Show a scene moving: one web page (.html), or a film (.gif, .mp4)."""
+    from fourbar.show.animate import write
+
+    attached = {}
+    for entry in pictures:
+        bar, equals, file = entry.partition("=")
+        if not equals:
+            raise InputError("--picture", entry, "must be like coupler=FILE")
+        attached[bar] = file
+    with opened(scene) as described, waiting(described):
+        write(described, out, pictures=attached, seconds=seconds, units=units, vectors=vectors)
+
+
+@click.command()
+@click.argument("scene", type=FILE, required=False)
 @click.option("--lengths", nargs=4, metavar="D A B C", help="Ground, input, coupler, output (bare numbers: m).")
 @click.option("--omega", metavar="W", help="Speed of the input with --lengths (a bare number: rad/s).")
 @click.option(
@@ -23,21 +98,19 @@ from fourbar.cli.given import lengths_of, loaded, named, number_of, out_option, 
 def mjcf(scene: Path | None, lengths: tuple[str, ...] | None, omega: str | None, simulator: str, out: Path) -> None:
     """Write a scene, or a linkage of uniform bars, as MJCF that runs on its own in MuJoCo and its kin."""
     from fourbar import mjcf as writer
-    from fourbar.writing import write_text
 
     if (scene is None) == (lengths is None):
         raise click.UsageError("give a scene file or --lengths D A B C, one of the two")
     if scene is not None:
         if omega is not None:
             raise click.UsageError("--omega goes with --lengths; a scene states its own omega_2")
-        with named(scene):
-            text = writer.mjcf_for(loaded(scene), simulator)
-        write_text(out, text)
+        with opened(scene) as described:
+            printed_to(writer.mjcf_for(described, simulator), out)
         return
     assert lengths is not None
     speed = {} if omega is None else {"omega": number_of("--omega", omega, "rad/s")}
     made = writer.scene_from_lengths(*lengths_of(lengths), **speed)
-    write_text(out, writer.mjcf_for(made, simulator))
+    printed_to(writer.mjcf_for(made, simulator), out)
     for line in writer.defaults_used(made):
         click.echo(line)
 
@@ -49,11 +122,9 @@ def mjcf(scene: Path | None, lengths: tuple[str, ...] | None, omega: str | None,
 def sdf(scene: Path, reader: str, out: Path) -> None:
     """Write a scene as SDF, the loop closed by a fourth joint (Gazebo) or a ball constraint (Drake)."""
     from fourbar.mjcf.sdf import sdf as written
-    from fourbar.writing import write_text
 
-    with named(scene):
-        text = written(loaded(scene), reader)
-    write_text(out, text)
+    with opened(scene) as described:
+        printed_to(written(described, reader), out)
 
 
 @click.command()
@@ -62,8 +133,6 @@ def sdf(scene: Path, reader: str, out: Path) -> None:
 def usd(scene: Path, out: Path) -> None:
     """Write a scene as USD text (.usda) for Newton, the loop closed by a fourth revolute joint."""
     from fourbar.mjcf.usd import usd as written
-    from fourbar.writing import write_text
 
-    with named(scene):
-        text = written(loaded(scene))
-    write_text(out, text)
+    with opened(scene) as described:
+        printed_to(written(described), out)

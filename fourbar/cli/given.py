@@ -1,6 +1,5 @@
 """What the commands are given: scenes, numbers with units, places to write to."""
 
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -12,30 +11,54 @@ from fourbar.errors import InputError
 
 if TYPE_CHECKING:
     from fourbar.scene import Scene
-
+    from fourbar.solution import Conversion
 
 MOST_POSITIONS = 1_000_000
 """Positions that `analyze` prints: about a gigabyte of text."""
 
-scene_argument = click.argument("scene", type=click.Path(path_type=Path))
-out_option = click.option("-o", "--out", type=click.Path(path_type=Path), required=True, metavar="FILE")
-or_out_option = click.option(
-    "-o", "--out", type=click.Path(path_type=Path), metavar="FILE", help="Write it to FILE instead of printing it."
-)
+FILE = click.Path(path_type=Path)
+KEYS_OF_A_SCENE = ("motion", "lengths", "bars", "drive", "loads", "effects", "tolerances")
+
+
+def _units(context: click.Context, parameter: click.Parameter, text: str) -> "Conversion":
+    from fourbar.show.units import units
+
+    return units(text)
+
+
+scene_argument = click.argument("scene", type=FILE)
+out_option = click.option("-o", "--out", type=FILE, required=True, metavar="FILE")
+or_out_option = click.option("-o", "--out", type=FILE, metavar="FILE", help="Write it to FILE instead of printing it.")
 units_option = click.option(
-    "--units", default="SI", metavar="UNITS", help='"imperial", or a list like "mm N.mm deg"; left out: SI.'
+    "--units",
+    default="SI",
+    callback=_units,
+    metavar="UNITS",
+    help='"imperial", or a list like "mm N.mm deg"; left out: SI.',
 )
 
 
 @contextmanager
-def named(path: Path) -> Iterator[None]:
-    """Mistakes of a scene that show only when it is solved name its file too."""
+def opened(path: Path) -> Iterator["Scene"]:
+    """The scene of a file; InputError where it cannot be printed, or not to the file of -o.
+
+    The output is looked at before anything is solved, which may take minutes. Mistakes that show only then name the
+    file too.
+    """
+    from fourbar.files import load
+    from fourbar.scene.motion import Free, Sweep
+    from fourbar.writing import require_file
+
+    scene, out = load(path), click.get_current_context().params.get("out")
+    if out is not None:
+        require_file(out, path)
+    for key, described in (("motion.theta_2", scene.motion.theta_2), ("motion.free", scene.motion.free)):
+        if isinstance(described, (Sweep, Free)) and described.steps >= MOST_POSITIONS:
+            raise InputError(f"{key}.steps", described.steps, f"must be below {MOST_POSITIONS} here", str(path))
     try:
-        yield
+        yield scene
     except InputError as error:
-        if error.file is None and error.key.startswith(
-            ("motion", "lengths", "bars", "drive", "loads", "effects", "tolerances")
-        ):
+        if error.file is None and error.key.startswith(KEYS_OF_A_SCENE):
             raise error.in_file(str(path)) from None
         raise
 
@@ -51,24 +74,6 @@ def waiting(scene: "Scene") -> Iterator[None]:
 
     with running(f"the free motion is integrated, in {STEPS} steps at most"):
         yield
-
-
-def loaded(path: Path) -> "Scene":
-    """The scene of a file; InputError where it cannot be printed, or not to the file of -o.
-
-    The output is looked at before anything is solved, which may take minutes.
-    """
-    from fourbar.files import load
-    from fourbar.scene.motion import Free, Sweep
-    from fourbar.writing import require_file
-
-    scene, out = load(path), click.get_current_context().params.get("out")
-    if out is not None:
-        require_file(out, path)
-    for key, described in (("motion.theta_2", scene.motion.theta_2), ("motion.free", scene.motion.free)):
-        if isinstance(described, (Sweep, Free)) and described.steps >= MOST_POSITIONS:
-            raise InputError(f"{key}.steps", described.steps, f"must be below {MOST_POSITIONS} here", str(path))
-    return scene
 
 
 def lengths_of(texts: tuple[str, ...]) -> list[float]:
@@ -99,15 +104,6 @@ def angle_of(key: str, text: str) -> float:
     except ValueError:
         return number_of(key, text, "rad")
     raise InputError(key, text, f'the unit is missing; did you mean "{text} deg"?')
-
-
-def terminal_width() -> int | None:
-    """Columns of the terminal; None where the output goes elsewhere."""
-    if not sys.stdout.isatty():
-        return None
-    import shutil
-
-    return shutil.get_terminal_size().columns
 
 
 def printed_to(text: str, out: Path | None) -> None:

@@ -1,7 +1,7 @@
 """Files: scenes in TOML with units, pictures, and how somebody's file is read."""
 
-from fourbar.files.scene_file import dump as dump
 from fourbar.files.scene_file import load as load
 from fourbar.files.scene_file import loads as loads
 from fourbar.files.scene_file import read_text as read_text
-from fourbar.files.scene_file import save as save
+from fourbar.files.scene_text import dump as dump
+from fourbar.files.scene_text import save as save

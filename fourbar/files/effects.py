@@ -1,6 +1,6 @@
 """Each effect in a scene file: how its entry under ``[effects]`` is read and written, one row of a table each.
 
-Units are checked here and nowhere else. An effect is imported when a file names it.
+An effect is imported when a file names it.
 """
 
 from collections.abc import Callable
@@ -8,61 +8,30 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from fourbar import effects as kinds
 from fourbar.errors import InputError
-from fourbar.files.fields import Reader, Writer
+from fourbar.files.fields import Reader, polar, quantity
 from fourbar.linkage import PINS
+from fourbar.studies.keys import AT_LEAST_ZERO, OF_EFFECT, ROWS
 
 if TYPE_CHECKING:
-    from fourbar.effects import Effect, Flywheel, PinFriction, Point, Springs, Torsion
+    from fourbar.effects import Effect, Flywheel, Point, Springs
 
-TORSION = {"stiffness": "N m/rad", "rest": "rad", "preload": "N m"}
-SPRING = {"stiffness": "N/m", "length": "m", "preload": "N"}
 MOST_SPRINGS = 1000
-
-
-def _read_pin_friction(value: object, read: Reader) -> "PinFriction":
-    key = "effects.pin_friction"
-    pins = {}
-    for pin, entry in read.table(key, value, PINS).items():
-        given = read.table(f"{key}.{pin}", entry, ("coefficient", "radius"))
-        mu = read.number(f"{key}.{pin}.coefficient", given.get("coefficient"))
-        pins[pin] = (mu, read.quantity(f"{key}.{pin}.radius", given.get("radius"), "m", at_least_zero=True))
-    return kinds.PinFriction.at(**pins)
-
-
-def _read_torsion(value: object, read: Reader) -> "Torsion":
-    """Preload 0 where it is left out."""
-    key = "effects.torsion"
-    springs = {}
-    for pin, entry in read.table(key, value, PINS).items():
-        given = read.table(f"{key}.{pin}", entry, TORSION)
-        texts = {"preload": "0 N m", **given}
-        k, rest, preload = (
-            read.quantity(f"{key}.{pin}.{name}", texts.get(name), unit) for name, unit in TORSION.items()
-        )
-        springs[pin] = (k, rest, preload)
-    return kinds.Torsion.at(**springs)
-
-
-def _write_torsion(effect: "Torsion", write: Writer) -> Any:
-    return {
-        pin: {name: write.quantity(x, TORSION[name]) for name, x in zip(TORSION, numbers, strict=True)}
-        for pin, *numbers in effect.springs
-    }
+FIELD, INERTIA = OF_EFFECT["gravity"]["magnitude"][0], OF_EFFECT["flywheel"]["inertia"][0]
 
 
 def _read_springs(value: object, read: Reader) -> "Springs":
     """Preload 0 where it is left out."""
-    key = "effects.springs"
+    key, numbers = "effects.springs", OF_EFFECT["springs"]
     if not isinstance(value, list) or not 1 <= len(value) <= MOST_SPRINGS:
         raise read.refuse(key, value, f"must be a list of 1 to {MOST_SPRINGS} springs")
     springs = []
     for index, entry in enumerate(value):
         own = f"{key}[{index}]"
-        given = read.table(own, entry, ("from", "to", *SPRING))
+        given = read.table(own, entry, ("from", "to", *numbers))
         texts = {"preload": "0 N", **given}
-        numbers = [read.quantity(f"{own}.{name}", texts.get(name), unit) for name, unit in SPRING.items()]
+        stated = [read.quantity(f"{own}.{name}", texts.get(name), unit) for name, (unit, _) in numbers.items()]
         start, end = (_read_point(read, f"{own}.{name}", given.get(name)) for name in ("from", "to"))
-        springs.append(kinds.Spring(start, end, *numbers))
+        springs.append(kinds.Spring(start, end, *stated))
     return kinds.Springs(tuple(springs))
 
 
@@ -72,23 +41,21 @@ def _read_point(read: Reader, key: str, value: object) -> "Point":
     return kinds.Point(bar, *(read.polar(f"{key}.at", entry["at"], "m") if "at" in entry else (0.0, 0.0)))
 
 
-def _write_springs(effect: "Springs", write: Writer) -> Any:
-    rows = []
-    for spring in effect.springs:
-        ends = zip(("from", "to"), (spring.start, spring.end), strict=True)
-        row: dict[str, Any] = {
-            name: {"bar": point.bar, "at": write.polar(point.distance, point.angle, "m")} for name, point in ends
+def _write_springs(effect: "Springs") -> Any:
+    return [
+        {
+            **{name: {"bar": end.bar, "at": polar(*end[1:], "m")} for name, end in (("from", s.start), ("to", s.end))},
+            **{name: quantity(getattr(s, name), unit) for name, (unit, _) in OF_EFFECT["springs"].items()},
         }
-        row.update({name: write.quantity(getattr(spring, name), unit) for name, unit in SPRING.items()})
-        rows.append(row)
-    return rows
+        for s in effect.springs
+    ]
 
 
 def _read_flywheel(value: object, read: Reader) -> "Flywheel":
     """On bar 2 where none is named."""
     key = "effects.flywheel"
     entry = read.table(key, value, ("bar", "inertia"))
-    inertia = read.quantity(f"{key}.inertia", entry.get("inertia"), "kg m^2", at_least_zero=True)
+    inertia = read.quantity(f"{key}.inertia", entry.get("inertia"), INERTIA, at_least_zero=True)
     return kinds.Flywheel(inertia, read.whole(f"{key}.bar", entry.get("bar", 2), 2, 4))
 
 
@@ -97,44 +64,55 @@ class Entry(NamedTuple):
 
     read: Callable[[object, Reader], "Effect"]
     """From the value under its key."""
-    write: Callable[[Any, Writer], Any]
+    write: Callable[[Any], Any]
     """Back to that value."""
     example: str
     """One line of a scene file."""
 
 
-def _per_pin(key: str, kind: str, field: str, unit: str, example: str) -> Entry:
-    """An effect that is one number for each pin."""
+def _per_pin(key: str, kind: str, example: str, **left_out: str) -> Entry:
+    """An effect that holds rows (pin, number, ...); where a pin has one number, that stands alone."""
+    numbers = OF_EFFECT[key]
 
-    def read(value: object, given: Reader) -> "Effect":
-        effect: Effect = getattr(kinds, kind).at(**given.per_pin(f"effects.{key}", value, unit))
+    def read_rows(value: object, read: Reader) -> "Effect":
+        rows = []
+        for pin, entry in read.table(f"effects.{key}", value, PINS).items():
+            own = f"effects.{key}.{pin}"
+            texts = {"": entry} if "" in numbers else {**left_out, **read.table(own, entry, numbers)}
+            stated = [
+                read.quantity(f"{own}.{name}".rstrip("."), texts.get(name), unit, at_least_zero=bound == AT_LEAST_ZERO)
+                for name, (unit, bound) in numbers.items()
+            ]
+            rows.append((pin, *stated))
+        effect: Effect = getattr(kinds, kind)(tuple(rows))
         return effect
 
-    def write(effect: Any, write: Writer) -> Any:
-        return {pin: write.quantity(value, unit) for pin, value in getattr(effect, field)}
+    def write_rows(effect: Any) -> Any:
+        rows = {}
+        for pin, *own in getattr(effect, ROWS[key]):
+            texts = {name: quantity(x, unit) for (name, (unit, _)), x in zip(numbers.items(), own, strict=True)}
+            rows[pin] = texts.get("", texts)
+        return rows
 
-    return Entry(read, write, example)
+    return Entry(read_rows, write_rows, example)
 
 
 REGISTRY: dict[str, Entry] = {
     "gravity": Entry(
-        lambda value, read: kinds.Gravity(*read.polar("effects.gravity", value, "m/s^2")),
-        lambda effect, write: write.polar(effect.magnitude, effect.angle, "m/s^2"),
+        lambda value, read: kinds.Gravity(*read.polar("effects.gravity", value, FIELD)),
+        lambda effect: polar(effect.magnitude, effect.angle, FIELD),
         'gravity = ["9.81 m/s^2", "-90 deg"]',
     ),
-    "viscous": _per_pin("viscous", "Viscous", "coefficients", "N m s/rad", 'viscous = { O2 = "0.01 N m s/rad" }'),
-    "friction": _per_pin("friction", "Friction", "torques", "N m", 'friction = { A = "0.05 N m" }'),
-    "pin_friction": Entry(
-        _read_pin_friction,
-        lambda effect, write: {
-            pin: {"coefficient": mu, "radius": write.quantity(r, "m")} for pin, mu, r in effect.pins
-        },
-        'pin_friction = { A = { coefficient = 0.1, radius = "8 mm" } }',
+    "viscous": _per_pin("viscous", "Viscous", 'viscous = { O2 = "0.01 N m s/rad" }'),
+    "friction": _per_pin("friction", "Friction", 'friction = { A = "0.05 N m" }'),
+    "pin_friction": _per_pin(
+        "pin_friction", "PinFriction", 'pin_friction = { A = { coefficient = 0.1, radius = "8 mm" } }'
     ),
-    "torsion": Entry(
-        _read_torsion,
-        _write_torsion,
+    "torsion": _per_pin(
+        "torsion",
+        "Torsion",
         'torsion = { B = { stiffness = "2 N m/rad", rest = "30 deg", preload = "0.1 N m" } }',
+        preload="0 N m",
     ),
     "springs": Entry(
         _read_springs,
@@ -144,15 +122,15 @@ REGISTRY: dict[str, Entry] = {
     ),
     "flywheel": Entry(
         _read_flywheel,
-        lambda effect, write: {"bar": effect.bar, "inertia": write.quantity(effect.inertia, "kg m^2")},
+        lambda effect: {"bar": effect.bar, "inertia": quantity(effect.inertia, INERTIA)},
         'flywheel = { bar = 2, inertia = "0.02 kg m^2" }',
     ),
 }
 """By the key under ``[effects]``, in the order in which they are listed; a new one is added here."""
 
 
-def written(effect: "Effect", write: Writer) -> Any:
+def written(effect: "Effect") -> Any:
     """The value of an effect under its key; InputError where a scene file has no form of it."""
     if effect.key not in REGISTRY:
         raise InputError(f"effects.{effect.key}", type(effect).__name__, "a scene file has no form of this effect")
-    return REGISTRY[effect.key].write(effect, write)
+    return REGISTRY[effect.key].write(effect)

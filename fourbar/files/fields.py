@@ -1,4 +1,4 @@
-"""Entries of a scene file, checked one by one: every mistake names the file, the key, the value and what is allowed."""
+"""Entries of a scene file, read and written: every mistake names the file, the key, the value and what is allowed."""
 
 import difflib
 import math
@@ -8,7 +8,6 @@ from typing import Any
 
 from fourbar.errors import InputError
 from fourbar.files.units import UnitError, to_si
-from fourbar.linkage import PINS
 
 BARE_KEY = re.compile(r"[A-Za-z0-9_-]{1,40}")
 LONGEST_SHOWN = 60
@@ -31,9 +30,8 @@ class Reader:
             raise self.refuse(key, value, "must be a table with the keys " + ", ".join(names))
         for name, entry in value.items():
             if name not in names:
-                close = difflib.get_close_matches(name[:LONGEST_SHOWN], names, 1)
-                hint = f'did you mean "{close[0]}"? ' if close else ""
-                raise self.refuse(_joined(key, name), entry, f"unknown key; {hint}allowed: {', '.join(names)}")
+                allowed = f"unknown key; {_hint(name, names)}allowed: {', '.join(names)}"
+                raise self.refuse(_joined(key, name), entry, allowed)
         return value
 
     def text(self, key: str, value: object) -> str:
@@ -46,9 +44,7 @@ class Reader:
         """One of a few words."""
         words = list(allowed)
         if not isinstance(value, str) or value not in words:
-            close = difflib.get_close_matches(value[:LONGEST_SHOWN], words, 1) if isinstance(value, str) else []
-            hint = f'did you mean "{close[0]}"? ' if close else ""
-            raise self.refuse(key, value, f"{hint}must be " + " or ".join(f'"{word}"' for word in words))
+            raise self.refuse(key, value, f"{_hint(value, words)}must be " + " or ".join(f'"{word}"' for word in words))
         return value
 
     def whole(self, key: str, value: object, least: int, most: int) -> int:
@@ -68,7 +64,9 @@ class Reader:
     def quantity(
         self, key: str, value: object, unit: str, *, positive: bool = False, at_least_zero: bool = False
     ) -> float:
-        """A number with a unit, in `unit`."""
+        """A number with a unit, in `unit`; of unit "1" one without."""
+        if unit == "1":
+            return self.number(key, value)
         bound = " > 0" if positive else " >= 0" if at_least_zero else ""
         wanted = f'must be a finite number{bound} with a unit, like "1 {unit}"'
         if value is None:
@@ -96,22 +94,21 @@ class Reader:
             raise self.refuse(key, value, f'must be a pair like ["1 {unit}", "0 deg"]')
         return (self.quantity(f"{key}[0]", value[0], unit), self.quantity(f"{key}[1]", value[1], "rad"))
 
-    def per_pin(self, key: str, value: object, unit: str) -> dict[str, float]:
-        """A table of quantities >= 0 by pin."""
-        pins = self.table(key, value, PINS)
-        return {pin: self.quantity(f"{key}.{pin}", entry, unit, at_least_zero=True) for pin, entry in pins.items()}
+
+def quantity(value: float, unit: str) -> Any:
+    """A number as it is written: in SI with its unit, every digit kept."""
+    return value if unit == "1" else f"{float(value)!r} {unit}"
 
 
-class Writer:
-    """Writes entries in SI and radians, every digit kept; effects are written through it too."""
+def polar(magnitude: float, angle: float, unit: str) -> list[str]:
+    """A pair [magnitude, angle] likewise."""
+    return [quantity(magnitude, unit), quantity(angle, "rad")]
 
-    def quantity(self, value: float, unit: str) -> str:
-        """A number with its unit."""
-        return f"{float(value)!r} {unit}"
 
-    def polar(self, magnitude: float, angle: float, unit: str) -> list[str]:
-        """A pair [magnitude, angle]."""
-        return [self.quantity(magnitude, unit), self.quantity(angle, "rad")]
+def _hint(word: object, known: list[str]) -> str:
+    """The known word that is nearest to one that is not."""
+    close = difflib.get_close_matches(word[:LONGEST_SHOWN], known, 1) if isinstance(word, str) else []
+    return f'did you mean "{close[0]}"? ' if close else ""
 
 
 def _joined(key: str, name: str) -> str:

@@ -18,15 +18,14 @@ from fourbar.files import reading
 from fourbar.files.effects import REGISTRY
 from fourbar.files.fields import BARE_KEY, Reader
 from fourbar.files.pictures import Picture
-from fourbar.files.scene_text import BARS, BRANCHES, dump, save
+from fourbar.files.scene_text import BARS, BRANCHES
+from fourbar.files.tolerances import read_tolerances
 from fourbar.linkage import BAR_NAMES, MOST_STEPS, Bar, FourBar
 from fourbar.scene import Scene
 from fourbar.scene.motion import DEFAULT_STEPS, Free, FromLimit, Motion, Sweep
 from fourbar.scene.motion_law import ENDS, Law
 from fourbar.scene.point import Point
 from fourbar.solution import Array
-
-__all__ = ["dump", "load", "loads", "read_text", "save"]
 
 LARGEST_FILE = 500_000
 """Bytes; a scene takes about a thousand."""
@@ -93,14 +92,13 @@ def _unreadable(text: str, reason: str, shown: str) -> InputError:
 
 def _scene(read: Reader, document: dict[str, Any], folder: str) -> Scene:
     top = read.table("", document, TABLES)
-    linkage = _linkage(read, top)
     drive = read.table("drive", top.get("drive", {}), ("bar",))
     entries = top.get("loads", [])
     if not isinstance(entries, list) or len(entries) > MOST_LOADS:
         raise read.refuse("loads", entries, f"must be written as [[loads]], at most {MOST_LOADS}")
     effects = read.table("effects", top.get("effects", {}), REGISTRY)
     scene = Scene(
-        linkage,
+        _linkage(read, top),
         _motion(read, top.get("motion", {})),
         read.whole("drive.bar", drive.get("bar", 2), 2, 4),
         tuple(_load(read, f"loads[{index}]", entry) for index, entry in enumerate(entries)),
@@ -110,11 +108,7 @@ def _scene(read: Reader, document: dict[str, Any], folder: str) -> Scene:
         _pictures(read, top.get("bars", {}), folder),
         _points(read, top.get("points", {})),
     )
-    if "tolerances" not in top:
-        return scene
-    from fourbar.files.tolerances import read_tolerances
-
-    return replace(scene, tolerances=read_tolerances(read, scene, top["tolerances"]))
+    return replace(scene, tolerances=read_tolerances(read, scene, top.get("tolerances", {})))
 
 
 def _points(read: Reader, value: object) -> tuple[Point, ...]:
@@ -146,10 +140,7 @@ def _linkage(read: Reader, top: dict[str, Any]) -> FourBar:
     tables = read.table("bars", top.get("bars", {}), BARS)
     bars = {name: _bar(read, f"bars.{name}", tables.get(name, {}), length[name]) for name in BARS}
     angle = read.quantity("lengths.ground_angle", lengths.get("ground_angle", "0 rad"), "rad")
-    try:
-        return FourBar(length["ground"], bars["input"], bars["coupler"], bars["output"], angle)
-    except OverflowError:
-        raise read.refuse("lengths", lengths, "must have a finite sum") from None
+    return FourBar(length["ground"], bars["input"], bars["coupler"], bars["output"], angle)
 
 
 def _bar(read: Reader, key: str, value: object, length: float) -> Bar:

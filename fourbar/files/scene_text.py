@@ -10,10 +10,12 @@ import numpy as np
 from fourbar.effects import Load
 from fourbar.errors import InputError, expect
 from fourbar.files.effects import written
-from fourbar.files.fields import Writer
+from fourbar.files.fields import polar, quantity
+from fourbar.files.tolerances import written_tolerances
 from fourbar.linkage import BAR_NAMES, MOVING_BARS, Bar
 from fourbar.scene import Scene
 from fourbar.scene.motion import BRANCH_NAMES, FromLimit, Motion, Sweep
+from fourbar.scene.motion_law import Law
 from fourbar.writing import write_text
 
 BRANCHES = {name: branch for branch, name in BRANCH_NAMES.items()}
@@ -38,92 +40,86 @@ def dump(scene: Scene) -> str:
     no valid text.
     """
     expect("scene", scene, Scene)
-    write = Writer()
-    linkage, motion = scene.linkage, scene.motion
     top = {"title": scene.title, "source": scene.source}
-    parts = [_table("", {key: value for key, value in top.items() if value})]
-    lengths: dict[str, Any] = {
-        BAR_NAMES[number]: write.quantity(length, "m") for number, length in enumerate(linkage.lengths, 1)
+    lengths = {
+        name: quantity(length, "m") for name, length in zip(BAR_NAMES.values(), scene.linkage.lengths, strict=True)
     }
-    lengths["ground_angle"] = write.quantity(linkage.ground_angle, "rad")
-    parts.append(_table("lengths", lengths))
-    for name, number in BARS.items():
-        bar, entry = linkage.bar(number), dict[str, Any]()
-        if bar != Bar(bar.length):
-            entry = {"mass": write.quantity(bar.mass, "kg")}
-            if bar.inertia is not None:
-                entry["inertia"] = write.quantity(bar.inertia, "kg m^2")
-            if bar.centre is not None:
-                entry["centre"] = write.polar(*bar.centre, "m")
-        for picture in scene.pictures:
-            if picture.bar == number:
-                entry["picture"] = picture.name
-        parts.append(_table(f"bars.{name}", entry))
-    parts.append(_table("motion", _motion_entry(write, motion)))
-    parts.append(_table("drive", {"bar": scene.drive_bar}))
-    points: dict[str, Any] = {
-        point.name: {"bar": point.bar, "from_pin": write.polar(*point.from_pin, "m")} for point in scene.points
-    }
-    parts.append(_table("points", points))
-    parts += [_table("[loads]", _load_entry(write, load)) for load in scene.loads]
-    effects = {effect.key: written(effect, write) for effect in scene.effects}
+    angle = quantity(scene.linkage.ground_angle, "rad")
+    points = {point.name: {"bar": point.bar, "from_pin": polar(*point.from_pin, "m")} for point in scene.points}
+    effects = {effect.key: written(effect) for effect in scene.effects}
     if len(effects) != len(scene.effects):
         raise InputError("effects", [effect.key for effect in scene.effects], "a file holds one of each kind")
-    parts.append(_table("effects", effects))
-    if scene.tolerances:
-        from fourbar.files.tolerances import written_tolerances
+    tables: list[tuple[str, dict[str, Any]]] = [
+        ("", {key: value for key, value in top.items() if value}),
+        ("lengths", {**lengths, "ground_angle": angle}),
+        *((f"bars.{name}", _bar_entry(scene, number)) for name, number in BARS.items()),
+        ("motion", _motion_entry(scene.motion)),
+        ("drive", {"bar": scene.drive_bar}),
+        ("points", points),
+        *(("[loads]", _load_entry(load)) for load in scene.loads),
+        ("effects", effects),
+        ("tolerances", written_tolerances(scene)),
+    ]
+    return "\n".join(_table(name, entries) for name, entries in tables if entries)
 
-        parts.append(_table("tolerances", written_tolerances(write, scene)))
-    return "\n".join(part for part in parts if part)
 
-
-def _motion_entry(write: Writer, motion: Motion) -> dict[str, Any]:
-    entry: dict[str, Any] = {}
-    wanted = motion.theta_2
-    if isinstance(wanted, Sweep):
-        ends = {"from": write.quantity(wanted.start, "rad"), "to": write.quantity(wanted.stop, "rad")}
-        entry["theta_2"] = {**ends, "steps": wanted.steps}
-    elif isinstance(wanted, FromLimit):
-        entry["theta_2"] = {"limit": wanted.limit, "offset": write.quantity(wanted.offset, "rad")}
-    elif isinstance(wanted, np.ndarray):
-        entry["theta_2"] = [write.quantity(angle, "rad") for angle in wanted.tolist()]
-    elif wanted is not None:
-        entry["theta_2"] = write.quantity(wanted, "rad")
-    if motion.omega_2 is not None:
-        entry["omega_2"] = write.quantity(motion.omega_2, "rad/s")
-    if motion.law is None:
-        entry["alpha_2"] = write.quantity(motion.alpha_2, "rad/s^2")
-    else:
-        law = motion.law
-        entry["law"] = {
-            "time": [write.quantity(time, "s") for time in law.time],
-            "theta_2": [write.quantity(angle, "rad") for angle in law.theta_2],
-            "steps": law.steps,
-            "ends": law.ends,
-        }
-    entry["branch"] = BRANCH_NAMES[motion.branch]
-    entry["through"] = motion.through
-    if motion.free is not None:
-        entry["free"] = {"duration": write.quantity(motion.free.duration, "s"), "steps": motion.free.steps}
+def _bar_entry(scene: Scene, number: int) -> dict[str, Any]:
+    bar, entry = scene.linkage.bar(number), dict[str, Any]()
+    if bar != Bar(bar.length):
+        entry = {"mass": quantity(bar.mass, "kg")}
+        if bar.inertia is not None:
+            entry["inertia"] = quantity(bar.inertia, "kg m^2")
+        if bar.centre is not None:
+            entry["centre"] = polar(*bar.centre, "m")
+    for picture in scene.pictures:
+        if picture.bar == number:
+            entry["picture"] = picture.name
     return entry
 
 
-def _load_entry(write: Writer, load: Load) -> dict[str, Any]:
+def _motion_entry(motion: Motion) -> dict[str, Any]:
+    law, free, wanted = motion.law, motion.free, motion.theta_2
+    angles: Any = wanted
+    if isinstance(wanted, Sweep):
+        ends = {"from": quantity(wanted.start, "rad"), "to": quantity(wanted.stop, "rad")}
+        angles = {**ends, "steps": wanted.steps}
+    elif isinstance(wanted, FromLimit):
+        angles = {"limit": wanted.limit, "offset": quantity(wanted.offset, "rad")}
+    elif isinstance(wanted, np.ndarray):
+        angles = [quantity(angle, "rad") for angle in wanted.tolist()]
+    elif wanted is not None:
+        angles = quantity(wanted, "rad")
+    entry = {
+        "theta_2": angles,
+        "omega_2": None if motion.omega_2 is None else quantity(motion.omega_2, "rad/s"),
+        "alpha_2": quantity(motion.alpha_2, "rad/s^2") if law is None else None,
+        "law": None if law is None else _law_entry(law),
+        "branch": BRANCH_NAMES[motion.branch],
+        "through": motion.through,
+        "free": None if free is None else {"duration": quantity(free.duration, "s"), "steps": free.steps},
+    }
+    return {key: value for key, value in entry.items() if value is not None}
+
+
+def _law_entry(law: Law) -> dict[str, Any]:
+    times, angles = ([quantity(x, unit) for x in of] for of, unit in ((law.time, "s"), (law.theta_2, "rad")))
+    return {"time": times, "theta_2": angles, "steps": law.steps, "ends": law.ends}
+
+
+def _load_entry(load: Load) -> dict[str, Any]:
     entry: dict[str, Any] = {"bar": load.bar}
     if load.force is not None:
-        entry["force"] = write.polar(*load.force, "N")
-        entry["at"] = write.polar(*load.at, "m")
-    entry |= {"moment": write.quantity(load.moment, "N m"), "frame": load.frame}
+        entry["force"] = polar(*load.force, "N")
+        entry["at"] = polar(*load.at, "m")
+    entry |= {"moment": quantity(load.moment, "N m"), "frame": load.frame}
     if load.table is not None:
-        angles = [write.quantity(angle, "rad") for angle in load.table.theta_2]
+        angles = [quantity(angle, "rad") for angle in load.table.theta_2]
         entry["table"] = {"theta_2": angles, "factor": list(load.table.factor)}
     return entry
 
 
 def _table(name: str, entries: dict[str, Any]) -> str:
-    """One TOML table, nothing where it is empty."""
-    if not entries:
-        return ""
+    """One TOML table."""
     heading = f"[{name}]\n" if name else ""
     return heading + "".join(f"{key} = {_value(key, value)}\n" for key, value in entries.items())
 

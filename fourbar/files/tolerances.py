@@ -3,7 +3,7 @@
 from typing import Any
 
 from fourbar.errors import InputError
-from fourbar.files.fields import Reader, Writer
+from fourbar.files.fields import Reader, quantity
 from fourbar.scene import Scene
 from fourbar.scene.tolerance import Tolerance
 from fourbar.studies.keys import ANY, LEFT_OUT, at_place, entries, left_out, refusal
@@ -24,7 +24,7 @@ def read_tolerances(read: Reader, scene: Scene, value: object) -> tuple[Toleranc
         width = given[0] if sigma else given
         if left_out(scene, entry):
             raise read.refuse(name, width, LEFT_OUT)
-        own = read.number(name, width) if entry.unit == "1" else read.quantity(name, width, entry.unit, positive=True)
+        own = read.quantity(name, width, entry.unit, positive=True)
         if own <= 0.0:
             raise read.refuse(name, width, "must be > 0")
         tolerance, number = Tolerance(key, own, sigma), at_place(scene, entry.place)
@@ -47,13 +47,12 @@ def _flat(read: Reader, value: object, before: str = "") -> dict[str, Any]:
     return found
 
 
-def written_tolerances(write: Writer, scene: Scene) -> dict[str, Any]:
+def written_tolerances(scene: Scene) -> dict[str, Any]:
     """The table as it is written."""
     known, rows = entries(scene), dict[str, Any]()
     for tolerance in scene.tolerances:
         if tolerance.key not in known:
             raise InputError("tolerances", tolerance.key, "is no number of the scene")
-        unit = known[tolerance.key].unit
-        width: Any = tolerance.width if unit == "1" else write.quantity(tolerance.width, unit)
+        width = quantity(tolerance.width, known[tolerance.key].unit)
         rows[tolerance.key] = [width, SIGMA] if tolerance.sigma else width
     return rows

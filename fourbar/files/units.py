@@ -9,52 +9,13 @@ import math
 import re
 from fractions import Fraction
 from functools import cache
+from importlib.resources import files
 from typing import Any
 
 from fourbar.errors import InputError
 
-DEFINITIONS = """
-nano- = 1e-9 = n-
-micro- = 1e-6 = µ- = μ- = u-
-milli- = 1e-3 = m-
-centi- = 1e-2 = c-
-deci- = 1e-1 = d-
-deca- = 10 = da-
-kilo- = 1e3 = k-
-mega- = 1e6 = M-
-giga- = 1e9 = G-
-meter = [length] = m = metre
-inch = 0.0254 * meter = in = inches
-foot = 0.3048 * meter = ft = feet
-yard = 3 * foot = yd
-second = [time] = s = sec
-minute = 60 * second = min
-hour = 3600 * second = h
-gram = [mass] = g
-tonne = 1000 * kilogram = t
-pound = 0.45359237 * kilogram = lb
-ounce = pound / 16 = oz
-radian = [angle] = rad
-pi = 3.14159265358979323846264338327950288419716939937510582097494
-degree = pi / 180 * radian = deg = °
-gradian = pi / 200 * radian = grad = gon
-revolution = 2 * pi * radian = rev = turn = r
-rpm = revolution / minute
-rps = revolution / second
-newton = kilogram * meter / second ** 2 = N
-standard_gravity = 9.80665 * meter / second ** 2 = g_0 = g0
-kilogram_force = kilogram * standard_gravity = kgf = kp
-pound_force = pound * standard_gravity = lbf
-ounce_force = ounce * standard_gravity = ozf
-slug = pound_force * second ** 2 / foot
-newton_meter = newton * meter = Nm
-newton_centimeter = newton * meter / 100 = Ncm
-newton_millimeter = newton * meter / 1000 = Nmm
-joule = newton * meter = J
-watt = joule / second = W
-horsepower = 550 * foot * pound_force / second = hp
-"""
-"""pi to 60 digits, so that an angle given in degrees is rounded once."""
+DEFINITIONS = files("fourbar.files").joinpath("units.txt").read_text(encoding="utf-8")
+"""In the form of the units library."""
 JOINED = re.compile(r"(?<=[A-Za-z])[.-](?=[A-Za-z])")
 """N.mm, lbf-in: a product."""
 SWAPS = (
@@ -105,20 +66,14 @@ def to_si(text: str, unit: str) -> float:
     if dimension != wanted_dimension:
         raise UnitError(f'"{name}" does not convert to {unit}{_hint(found[0], name, unit)}')
     try:
-        value = float(_number(found) * factor / wanted)
+        number = Fraction(found[0]) if found.re is NUMBER else int(found[1] or 0) + Fraction(f"{found[2]}/{found[3]}")
+        value = float(number * factor / wanted)
     except OverflowError:
         value = math.inf
     if not math.isfinite(value):
         raise UnitError("the number is too large")
     # Fraction has no -0.0
     return -0.0 if value == 0.0 and found[0].startswith("-") else value
-
-
-def _number(found: re.Match[str]) -> Fraction:
-    """The number of a match, exactly."""
-    if found.re is NUMBER:
-        return Fraction(found[0])
-    return int(found[1] or 0) + Fraction(int(found[2]), int(found[3]))
 
 
 def factor_to(unit: str, given: str) -> float:
@@ -166,9 +121,7 @@ def _registry() -> Any:
     import pint
 
     registry: Any = pint.UnitRegistry(None, non_int_type=Fraction)
-    for line in DEFINITIONS.split("\n"):
-        if line:
-            registry.define(line)
+    registry.load_definitions(DEFINITIONS.splitlines())
     return registry
 
 

@@ -13,6 +13,7 @@ from fourbar.linkage import MOVING_BARS, FourBar
 from fourbar.mjcf.appearance import add_appearance
 from fourbar.mjcf.effects import row, unwound
 from fourbar.mjcf.model import Model, carriable, constant, servo, text
+from fourbar.mjcf.notes import NOTES
 from fourbar.mjcf.settings import RECIPE, Run, Settings, fitted_pad
 from fourbar.quantities import OK
 from fourbar.scene import Command, Scene, command
@@ -27,23 +28,7 @@ RELEASED_STEPS = 6280
 """Of a free motion, in the time in which weights and loads would turn the linkage once."""
 RELEASED_CLOSURE = 2.0
 """Time constant of the closure of a released linkage, in timesteps: measured, 2 takes the least energy out of it."""
-RELEASED = (
-    " Written by fourbar. It opens assembled (each joint's ref is its angle there) and released: no drive, weights and "
-    "loads move it. Keyframe 0 starts at the scene's omega_2. Angles: O2 is theta_2, O2 + A is theta_3, O4 is theta_4. "
-)
-COMMENT = (
-    " Written by fourbar. It opens assembled (each joint's ref is its angle there) and just steps: the drive brings "
-    "the input to omega_2 within a few steps, a flywheel (armature of pin O2) keeps it there. With an alpha_2 the "
-    "drive is a constant motor: reset to keyframe 0, which starts at omega_2. Angles: O2 is theta_2, O2 + A is "
-    "theta_3, O4 is theta_4. Beyond its limit positions the linkage cannot be carried, nor everywhere through a "
-    "change point: MuJoCo then starts anew. "
-)
-READING = (
-    "Numbers: after mj_step qpos and qvel are new, but qacc, actuator_force and efc_force are of the last evaluation "
-    "within the step. Call mj_forward; then, all of this instant, T2 = actuator_force[drive] - dof_armature[O2] "
-    "qacc[O2], and efc_force[0], efc_force[1] are the force of bar 4 on bar 3 at pin B in world axes. cfrc_int (the "
-    "other pins) needs mj_rnePostConstraint after that."
-)
+READING: str = NOTES["numbers"]["mujoco"]
 
 
 def mjcf(
@@ -90,10 +75,10 @@ def mjcf(
         row(term).add(term, model)
     armature = flywheel(scene, settings)
     root = ET.Element("mujoco", model=plain(scene.title) or "four-bar")
-    root.append(ET.Comment(RELEASED if free else COMMENT))
+    root.append(ET.Comment(f" {NOTES['mjcf']['released' if free else 'driven']} "))
     root.append(ET.Comment(f" {reading} "))
     ET.SubElement(root, "compiler", angle="radian", autolimits="true")
-    model.add_option(root, timestep)
+    model.add_option(root)
     add_appearance(root, scene.linkage)
     drive = constant(armature * scene.motion.alpha_2)
     if start is not None:
@@ -103,7 +88,7 @@ def mjcf(
             drive = servo(armature / (SETTLING * timestep), start.qvel[0])
     model.add_bodies(root, armature)
     model.add_load_sites(root)
-    model.add_closure(root, timestep)
+    model.add_closure(root)
     model.add_tendons(root)
     model.add_actuators(root, drive)
     if start is not None:

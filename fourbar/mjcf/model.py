@@ -14,7 +14,7 @@ from fourbar.mjcf.settings import Settings
 
 if TYPE_CHECKING:
     from fourbar.effects import Load
-    from fourbar.effects.spring import Point, Spring
+    from fourbar.effects.spring import Spring
 
 FLOOR = 1e-15
 """mjMINVAL: MuJoCo refuses a moving body of less mass (kg) or inertia (kg m^2)."""
@@ -32,6 +32,13 @@ THICKNESS = 0.02
 def text(*numbers: float) -> str:
     """Numbers so that they read back bit for bit."""
     return " ".join(repr(float(number)) for number in numbers)
+
+
+def _body(root: ET.Element, bar: int) -> ET.Element:
+    """The body of a bar."""
+    body = root.find(f".//body[@name='{BAR_NAMES[bar]}']")
+    assert body is not None
+    return body
 
 
 def constant(force: float) -> tuple[float, float, float]:
@@ -105,11 +112,11 @@ class Model:
         """Whether any pin carries the attribute."""
         return any(attribute in attributes for attributes in self.pin.values())
 
-    def add_option(self, root: ET.Element, timestep: float) -> None:
+    def add_option(self, root: ET.Element) -> None:
         """Integrator, solver, and flags that switch off what a closed loop does not need."""
         s = self.settings
         options = {
-            "timestep": text(timestep),
+            "timestep": text(self.timestep),
             "integrator": s.integrator,
             "solver": s.solver,
             "tolerance": text(s.tolerance),
@@ -131,7 +138,7 @@ class Model:
         ET.SubElement(ground, "inertial", pos="0 0 0", mass="1", diaginertia="1 1 1")
         self._add_capsule(ground, 1, self.linkage.ground, -2.0 * self.radius)
         ET.SubElement(ground, "site", name="O2", pos="0 0 0", size=text(self.radius))
-        ET.SubElement(ground, "site", name="O4", pos=text(*self.O4, 0.0), size=text(self.radius))
+        self._add_site(ground, "O4", *self.O4)
         crank = self._add_bar(ground, 2, (0.0, 0.0), armature=flywheel)
         self._add_bar(crank, 3, (self.linkage.input.length, 0.0))
         self._add_bar(ground, 4, self.O4)
@@ -157,7 +164,7 @@ class Model:
         ET.SubElement(body, "joint", {"name": pin, "type": "hinge", "axis": "0 0 1", **joint})
         self._add_capsule(body, number, bar.length, self.radius if number == 3 else -self.radius)
         if number == 2:
-            ET.SubElement(body, "site", name="A", pos=text(bar.length, 0.0, 0.0), size=text(self.radius))
+            self._add_site(body, "A", bar.length)
             return body
         end = body
         if self.settings.pad is not None:
@@ -166,8 +173,11 @@ class Model:
             end = ET.SubElement(body, "body", name=f"{BAR_NAMES[number]}_pad")
             place = text(self.settings.pad * bar.length, 0.0, 0.0)
             ET.SubElement(end, "inertial", pos=place, mass="0", diaginertia="0 0 0")
-        ET.SubElement(end, "site", name=f"B{number}", pos=text(bar.length, 0.0, 0.0), size=text(self.radius))
+        self._add_site(end, f"B{number}", bar.length)
         return body
+
+    def _add_site(self, body: ET.Element, name: str, x: float, y: float = 0.0) -> None:
+        ET.SubElement(body, "site", name=name, pos=text(x, y, 0.0), size=text(self.radius))
 
     def _add_capsule(self, body: ET.Element, number: int, length: float, z: float) -> None:
         """A bar's shape: for the eye alone, without mass and without contact."""
@@ -183,18 +193,12 @@ class Model:
         }
         ET.SubElement(body, "geom", shape, mass="0", contype="0", conaffinity="0")
 
-    def add_closure(self, root: ET.Element, timestep: float) -> None:
+    def add_closure(self, root: ET.Element) -> None:
         """The loop closes at B."""
-        s = self.settings
-        ET.SubElement(
-            ET.SubElement(root, "equality"),
-            "connect",
-            name="B",
-            site1="B3",
-            site2="B4",
-            solref=text(s.time_constant_steps * timestep, 1.0),
-            solimp=text(s.impedance, s.impedance, 0.001, 0.5, 2.0),
-        )
+        s, pair = self.settings, {"name": "B", "site1": "B3", "site2": "B4"}
+        solref = text(s.time_constant_steps * self.timestep, 1.0)
+        solimp = text(s.impedance, s.impedance, 0.001, 0.5, 2.0)
+        ET.SubElement(ET.SubElement(root, "equality"), "connect", pair, solref=solref, solimp=solimp)
 
     def add_tendons(self, root: ET.Element) -> None:
         """At the cut pin B a tendon theta_4 - theta_3 takes what acts there; a spring is one between two sites."""
@@ -215,29 +219,21 @@ class Model:
             tendon = ET.SubElement(tendons, "spatial", {"name": name, **attributes})
             for end, point in (("start", spring.start), ("end", spring.end)):
                 ET.SubElement(tendon, "site", site=f"{name}_{end}")
-                self._add_site(root, point, f"{name}_{end}")
-
-    def _add_site(self, root: ET.Element, point: "Point", name: str) -> None:
-        """A point of a bar; the ground's body keeps world axes."""
-        body = root.find(f".//body[@name='{BAR_NAMES[point.bar]}']")
-        assert body is not None
-        x, y = point.in_bar.real, point.in_bar.imag
-        if point.bar == 1:
-            cos, sin = math.cos(self.linkage.ground_angle), math.sin(self.linkage.ground_angle)
-            x, y = cos * x - sin * y, sin * x + cos * y
-        ET.SubElement(body, "site", name=name, pos=text(x, y, 0.0), size=text(self.radius))
+                x, y = point.in_bar.real, point.in_bar.imag
+                if point.bar == 1:  # the ground's body keeps world axes
+                    cos, sin = math.cos(self.linkage.ground_angle), math.sin(self.linkage.ground_angle)
+                    x, y = cos * x - sin * y, sin * x + cos * y
+                self._add_site(_body(root, point.bar), f"{name}_{end}", x, y)
 
     def add_load_sites(self, root: ET.Element) -> None:
         """The point at which each load acts: G for world axes (the arm becomes a couple), else the point itself."""
         for index, load in enumerate(self.loads, 1):
-            body = root.find(f".//body[@name='{BAR_NAMES[load.bar]}']")
-            assert body is not None
             to_G = self.linkage.bar(load.bar).to_centre
             x, y = to_G.real, to_G.imag
             if load.frame == "bar":
                 x += load.at[0] * math.cos(load.at[1])
                 y += load.at[0] * math.sin(load.at[1])
-            ET.SubElement(body, "site", name=f"load_{index}", pos=text(x, y, 0.0), size=text(self.radius))
+            self._add_site(_body(root, load.bar), f"load_{index}", x, y)
 
     def add_actuators(self, root: ET.Element, drive: tuple[float, float, float]) -> None:
         """Actuators without a control: the drive (force, per angle, per speed) on pin O2, and the loads."""
@@ -254,12 +250,8 @@ class Model:
                 fx, fy = load.force[0] * math.cos(load.force[1]), load.force[0] * math.sin(load.force[1])
                 if load.frame == "world":  # force and arm both keep their direction: so does the couple
                     couple += load.at[0] * (math.cos(load.at[1]) * fy - math.sin(load.at[1]) * fx)
-            frame = {"refsite": "O2"} if load.frame == "world" else {}
-            attributes = {
-                "name": f"load_{index}",
-                "site": f"load_{index}",
-                **frame,
-                "gear": text(fx, fy, 0.0, 0.0, 0.0, couple),
-                "biasprm": "1 0 0",
-            }
-            ET.SubElement(actuators, "general", {**uncontrolled, **attributes})
+            placed = {"name": f"load_{index}", "site": f"load_{index}"}
+            if load.frame == "world":
+                placed["refsite"] = "O2"
+            gear = text(fx, fy, 0.0, 0.0, 0.0, couple)
+            ET.SubElement(actuators, "general", {**uncontrolled, **placed}, gear=gear, biasprm="1 0 0")

@@ -6,6 +6,7 @@ from fourbar.errors import LimitError
 from fourbar.linkage import BAR_NAMES, FIRST_PIN, MOVING_BARS
 from fourbar.mjcf.document import Start, plain
 from fourbar.mjcf.model import text
+from fourbar.mjcf.notes import NOTES
 from fourbar.mjcf.standing import PARENT, standing
 from fourbar.scene import Scene
 
@@ -14,25 +15,6 @@ AT_JOINTS = {"gazebo": {**DAMPING, "friction": ("friction", "torques")}, "drake"
 """What a joint holds, by effect: its element, and the field of the effect."""
 DRAKE = "http://drake.mit.edu"
 """Namespace of the elements that only Drake reads."""
-COMMENT = (
-    " Written by fourbar. The links stand assembled; every joint reads 0 there. SDF holds neither speeds nor a drive: "
-    "theta_2 = {} rad, theta_3 = {} rad, theta_4 = {} rad; to start at omega_2 = {} rad/s give joint A {} rad/s and "
-    "joint O4 {} rad/s{}. Pin B: {}. Numbers: {}. "
-)
-CLOSURE = {
-    "gazebo": "a revolute joint, the fourth of the loop",
-    "drake": "a ball constraint, since Drake takes no loop of joints: it needs a discrete plant with the SAP "
-    "approximation. Drake reads no gravity from a file: set the plant's gravity field",
-}
-
-
-NUMBERS = {
-    "gazebo": "T2 is what the program puts on joint O2; a force_torque sensor on joint B, with frame child and measure "
-    "direction parent_to_child, reads the force of bar 4 on bar 3 in the axes of bar 3, of the step that was made",
-    "drake": "T2 is what the program puts on joint O2; get_reaction_forces_output_port, at int(joint.index()), holds "
-    "the force of pins O2, A and O4 on bars 2, 3 and 4 in that bar's axes, all of the instant of the context; the ball "
-    "constraint's own force at B cannot be read",
-}
 
 
 def sdf(scene: Scene, reader: str = "gazebo", start: Start | None = None) -> str:
@@ -58,7 +40,9 @@ def sdf(scene: Scene, reader: str = "gazebo", start: Start | None = None) -> str
     omega_2, at_A, omega_4 = numbers[3:]
     root = ET.Element("sdf", {"version": "1.9", **({"xmlns:drake": DRAKE} if reader == "drake" else {})})
     at_B = f", joint B {omega_2 + at_A - omega_4!r} rad/s" if reader == "gazebo" else ""
-    root.append(ET.Comment(COMMENT.format(*map(repr, numbers), at_B, CLOSURE[reader], NUMBERS[reader])))
+    notes = NOTES["sdf"]
+    comment = notes["comment"].format(*map(repr, numbers), at_B, *notes[reader].values())
+    root.append(ET.Comment(f" {comment} "))
     world = ET.SubElement(root, "world", name="four_bar")
     ET.SubElement(world, "gravity").text = text(*gravity, 0.0)
     model = ET.SubElement(world, "model", name=plain(scene.title) or "four-bar")

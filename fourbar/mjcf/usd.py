@@ -5,18 +5,9 @@ import math
 
 from fourbar.linkage import BAR_NAMES, FIRST_PIN, MOVING_BARS
 from fourbar.mjcf.document import Start, plain
+from fourbar.mjcf.notes import NOTES
 from fourbar.mjcf.standing import PARENT, standing
 from fourbar.scene import Scene
-
-COMMENT = (
-    "Written by fourbar. The bodies stand assembled, every joint reads 0 there; a body's frame lies in the first pin "
-    "of its bar, x along it. theta_2 = {} rad, theta_3 = {} rad, theta_4 = {} rad; to start at omega_2 = {} rad/s give "
-    "joint A {} rad/s and joint O4 {} rad/s. USD holds no drive at a speed. Pin B closes the loop and stands outside "
-    "the articulation. Newton: ModelBuilder().add_usd(file), which takes gravity too; put the speeds into joint_qd[:3] "
-    "and call eval_fk before the first step. Numbers: with SolverKamino, after a step, of that step, rows 15 + 1 and "
-    "15 + 2 of solver._solver_kamino.data.joints.lambda_kin_j are the force of bar 4 on bar 3 at pin B along and "
-    "across axes turned by theta_3 - theta_4 of this file from bar 4. T2 is what the program puts on joint O2."
-)
 
 
 def usd(scene: Scene, start: Start | None = None) -> str:
@@ -76,7 +67,7 @@ def usd(scene: Scene, start: Start | None = None) -> str:
         )
     return f"""#usda 1.0
 (
-    doc = {json.dumps(COMMENT.format(*map(repr, numbers)), ensure_ascii=False)}
+    doc = {json.dumps(NOTES["usd"]["comment"].format(*map(repr, numbers)), ensure_ascii=False)}
     defaultPrim = "four_bar"
     metersPerUnit = 1
     kilogramsPerUnit = 1

@@ -9,9 +9,7 @@ from typing import Any, NamedTuple
 
 from fourbar.linkage import FIRST_PIN
 from fourbar.scene import Scene
-
-IN_PINS = {"torsion": "springs", "viscous": "coefficients", "friction": "torques", "pin_friction": "pins"}
-"""Effects that act in a pin, each with the field that lists them, the pin first."""
+from fourbar.studies.keys import ROWS
 
 
 class Symbol(NamedTuple):
@@ -66,8 +64,8 @@ def acting(scene: Scene) -> list[Symbol]:
 
 def _effect(effect: Any) -> list[Symbol]:
     """The symbols of one effect; of a kind that is not known here none."""
-    if effect.key in IN_PINS:
-        entries = getattr(effect, IN_PINS[effect.key])
+    if effect.key in ROWS:
+        entries = getattr(effect, ROWS[effect.key])
         return [Symbol(effect.key, effect.key.replace("_", " "), pin=entry[0]) for entry in entries]
     if effect.key == "gravity":
         return [Symbol("gravity", "g", vector=complex(*effect.vector))]

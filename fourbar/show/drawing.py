@@ -13,6 +13,7 @@ INK, SOFT, PAPER = "currentColor", "#6e7781", "#fefefe"
 WIDTH, HEIGHT, MARGIN = 300.0, 270.0, 30.0
 BARS = {2: "#0072b2", 3: "#c74f00", 4: "#00845f"}
 POINT = "#8a3b78"
+Point = tuple[float, float]
 MOST_POINTS = 120
 """Points of a path: finer than can be seen at this size."""
 
@@ -36,7 +37,7 @@ def drawing(scene: Scene, solution: Solution) -> str:
     scale = float(np.min((np.array([WIDTH, HEIGHT]) - 2.0 * MARGIN) / np.maximum(high - low, 1e-300)))
     middle = 0.5 * (low + high)
 
-    def place(point: Array) -> tuple[float, float]:
+    def place(point: Array) -> Point:
         x, y = (point - middle) * scale
         return (WIDTH / 2.0 + float(x), HEIGHT / 2.0 - float(y))
 
@@ -54,17 +55,14 @@ def drawing(scene: Scene, solution: Solution) -> str:
     return f'<svg class="linkage" xmlns="http://www.w3.org/2000/svg" {box}>{"".join(parts)}</svg>'
 
 
-def _path(points: Iterable[tuple[float, float]], colour: str) -> str:
+def _path(points: Iterable[Point], colour: str) -> str:
     line = " ".join(f"{x:.1f},{y:.1f}" for x, y in points)
     return f'<polyline points="{line}" fill="none" stroke="{colour}" stroke-dasharray="2 3" opacity=".7"/>'
 
 
-def _bar(start: tuple[float, float], end: tuple[float, float], colour: str) -> str:
-    (x1, y1), (x2, y2) = start, end
-    return (
-        f'<line x1="{x1:.1f}" y1="{y1:.1f}" x2="{x2:.1f}" y2="{y2:.1f}" stroke="{colour}" stroke-width="6" '
-        'stroke-linecap="round"/>'
-    )
+def _bar(start: Point, end: Point, colour: str) -> str:
+    line = 'x1="{:.1f}" y1="{:.1f}" x2="{:.1f}" y2="{:.1f}"'.format(*start, *end)
+    return f'<line {line} stroke="{colour}" stroke-width="6" stroke-linecap="round"/>'
 
 
 def _support(x: float, y: float) -> str:
@@ -78,7 +76,7 @@ def _text(text: str, x: float, y: float, size: int, colour: str) -> str:
     return f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="middle" font-size="{size}" fill="{colour}">{text}</text>'
 
 
-def _pin(name: str, at: tuple[float, float], centre: tuple[float, float], *, supported: bool) -> str:
+def _pin(name: str, at: Point, centre: Point, *, supported: bool) -> str:
     """A pin, and its name on the side away from the middle of the linkage."""
     (x, y), (dx, dy) = at, (at[0] - centre[0], at[1] - centre[1])
     size = max(math.hypot(dx, dy), 1e-9)

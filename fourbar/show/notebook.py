@@ -4,7 +4,8 @@ from html import escape
 from typing import TYPE_CHECKING
 
 from fourbar.errors import FourBarError, expect
-from fourbar.linkage import BAR_NAMES, MOVING_BARS
+from fourbar.linkage import BAR_NAMES
+from fourbar.scene.motion import BRANCH_NAMES
 from fourbar.solution import DEGREES, SI, Conversion, Solution
 
 if TYPE_CHECKING:
@@ -40,35 +41,20 @@ def _facts(scene: "Scene", units: Conversion) -> list[tuple[str, str]]:
 
     motion = scene.motion
     facts = [("type", classify(scene.linkage).name)]
-    facts += [
-        (name, f"{value(scene.linkage.lengths[number - 1], 'm', units)}{_mass(scene, number, units)}")
-        for number, name in BAR_NAMES.items()
+    masses = (0.0, *(bar.mass for bar in scene.linkage.moving))
+    for name, length, mass in zip(BAR_NAMES.values(), scene.linkage.lengths, masses, strict=True):
+        facts.append((name, value(length, "m", units) + (f", {value(mass, 'kg', units)}" if mass else "")))
+    speed = "positions only"
+    if motion.omega_2 is not None:
+        speed = f"ω2 = {value(motion.omega_2, 'rad/s', units)}, α2 = {value(motion.alpha_2, 'rad/s^2', units)}"
+    drive = f"bar {scene.drive_bar} ({BAR_NAMES[scene.drive_bar]})"
+    acting = [f"load on bar {load.bar}" for load in scene.loads] + [effect.key for effect in scene.effects]
+    return [
+        *facts,
+        ("motion", f"{speed}; {BRANCH_NAMES[motion.branch]} branch"),
+        ("drive", "released" if motion.free is not None else drive),
+        ("acting", ", ".join(acting) or "nothing"),
     ]
-    speed = (
-        "positions only"
-        if motion.omega_2 is None
-        else f"ω2 = {value(motion.omega_2, 'rad/s', units)}, α2 = {value(motion.alpha_2, 'rad/s^2', units)}"
-    )
-    facts.append(("motion", f"{speed}; {'open' if motion.branch > 0 else 'crossed'} branch"))
-    facts.append(
-        ("drive", "released" if motion.free is not None else f"bar {scene.drive_bar} ({BAR_NAMES[scene.drive_bar]})")
-    )
-    facts.append(
-        (
-            "acting",
-            ", ".join([f"load on bar {load.bar}" for load in scene.loads] + [e.key for e in scene.effects])
-            or "nothing",
-        )
-    )
-    return facts
-
-
-def _mass(scene: "Scene", number: int, units: Conversion) -> str:
-    if number not in MOVING_BARS or scene.linkage.bar(number).mass == 0.0:
-        return ""
-    from fourbar.show.tables import value
-
-    return f", {value(scene.linkage.bar(number).mass, 'kg', units)}"
 
 
 def solution_html(solution: Solution, units: Conversion = DEGREES) -> str:
@@ -87,9 +73,8 @@ def solution_html(solution: Solution, units: Conversion = DEGREES) -> str:
     lines = []
     for place in places:
         if count > 2 * SHOWN and place == count - SHOWN:
-            lines.append(
-                f'<tr><td colspan="{len(cells)}" style="text-align:center">… {count - 2 * SHOWN} more …</td></tr>'
-            )
+            more = f"… {count - 2 * SHOWN} more …"
+            lines.append(f'<tr><td colspan="{len(cells)}" style="text-align:center">{more}</td></tr>')
         lines.append("<tr>" + "".join(f"<td>{escape(column[place])}</td>" for column in cells.values()) + "</tr>")
     title = escape(solution.title or "Solution")
     positions = f"{count} position{'s' if count != 1 else ''}"

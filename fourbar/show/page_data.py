@@ -11,13 +11,14 @@ import numpy as np
 from fourbar.errors import InputError, NotAssembledError
 from fourbar.files import dump
 from fourbar.files.pictures import data_uri
-from fourbar.linkage import BAR_NAMES, MOVING_BARS
-from fourbar.quantities import OK, PIN_FORCES
+from fourbar.files.scene_text import BARS
+from fourbar.linkage import MOVING_BARS
+from fourbar.quantities import ANGLES, OK, PIN_FORCES
 from fourbar.scene import Command, Scene, command
 from fourbar.show.acting import Symbol, acting
-from fourbar.show.plot.energy import energies
+from fourbar.show.duty import energies
 from fourbar.show.plot.style import length_unit
-from fourbar.show.plot.view import on_branch, over_time, sweep_command
+from fourbar.show.plot.view import over_time, sweep_command
 from fourbar.show.tolerances import embedded_tolerances
 from fourbar.solution import SI, Array, Conversion, Solution, nulled
 from fourbar.solve import solve
@@ -26,18 +27,8 @@ MAX_ROWS = 1441
 """Positions embedded in a page: a quarter of a degree over a full turn; a finer sweep is thinned out evenly."""
 WATCHED = (1.5, 60.0)
 """A motion through time that lasts between these, s, is shown in real time."""
-SCALARS = (
-    "theta_3",
-    "theta_4",
-    "condition",
-    "omega_2",
-    "omega_3",
-    "omega_4",
-    "alpha_2",
-    "alpha_3",
-    "alpha_4",
-    "torque",
-)
+RATES = (f"{letter}_{bar}" for letter in ("omega", "alpha") for bar in MOVING_BARS)
+SCALARS = (*ANGLES, "condition", *RATES, "torque")
 
 
 def page_data(scene: Scene, pictures: Mapping[str, str | Path], units: Conversion = SI) -> dict[str, Any]:
@@ -107,7 +98,7 @@ def _sweep(scene: Scene) -> dict[str, Any]:
         "time": None,
         "rate": None,
         "start": start,
-        "branches": {str(sign): _columns(on_branch(scene, sign), where.theta_2) for sign in (1, -1)},
+        "branches": {str(sign): _on_branch(scene, sign, where.theta_2) for sign in (1, -1)},
         "pace": None,
         "positions": len(swept.theta_2),
     }
@@ -121,7 +112,7 @@ def _through_time(scene: Scene) -> dict[str, Any]:
     assert where.time is not None
     solution = solve(scene, at=where)
     solution.time = where.time
-    columns = _solved(scene, solution)
+    columns = _columns(solution)
     columns["theta_2"] = where.theta_2.tolist()
     if scene.motion.free is not None:
         del columns["torque"]
@@ -175,13 +166,12 @@ def _pace_in_time(whole: Solution, rate: float, shown: int) -> str:
     return words + "."
 
 
-def _columns(scene: Scene, theta_2: Array) -> dict[str, Any]:
-    """The solution on one branch, quantity by quantity."""
-    own = command(replace(scene, motion=replace(scene.motion, theta_2=theta_2)))
-    return _solved(scene, solve(scene, at=own))
+def _on_branch(scene: Scene, sign: int, theta_2: Array) -> dict[str, Any]:
+    own = replace(scene, motion=replace(scene.motion, theta_2=theta_2, branch=sign))
+    return _columns(solve(own))
 
 
-def _solved(scene: Scene, solution: Solution) -> dict[str, Any]:
+def _columns(solution: Solution) -> dict[str, Any]:
     """Quantity by quantity, as lists."""
     columns: dict[str, Any] = {"sign": solution.branch.tolist()}
     if (solution.status_code != OK).any():
@@ -195,11 +185,10 @@ def _solved(scene: Scene, solution: Solution) -> dict[str, Any]:
 
 def _pictures(scene: Scene, pictures: Mapping[str, str | Path]) -> dict[int, str]:
     """The pictures of the bars as data URIs: those of the scene, and those given in their place."""
-    numbers = {name: number for number, name in BAR_NAMES.items() if number in MOVING_BARS}
     found = {}
     for name, path in pictures.items():
-        if name not in numbers:
-            raise InputError("picture", name, "must name one of " + ", ".join(numbers))
-        found[numbers[name]] = data_uri(f"picture.{name}", path)
+        if name not in BARS:
+            raise InputError("picture", name, "must name one of " + ", ".join(BARS))
+        found[BARS[name]] = data_uri(f"picture.{name}", path)
     own = {picture.bar: picture for picture in scene.pictures if picture.bar not in found}
     return found | {bar: picture.data_uri() for bar, picture in own.items()}

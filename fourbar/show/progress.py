@@ -13,9 +13,7 @@ def counted(items: Sequence[T], text: str) -> Iterable[T]:
     from rich.progress import track
 
     console = Console(stderr=True)
-    if not console.is_terminal:
-        return items
-    return track(items, text, console=console, transient=True)
+    return track(items, text, console=console, transient=True, disable=not console.is_terminal)
 
 
 @contextmanager

@@ -12,9 +12,8 @@ from fourbar.linkage import BAR_NAMES, PIN_FORCE
 from fourbar.quantities import ANGLES, PIN_FORCES, STATUS_NAMES, UNITS
 from fourbar.scene import Scene
 from fourbar.scene.motion import BRANCH_NAMES
-from fourbar.show.bearing import bearing_load
-from fourbar.show.motor import motor_duty
-from fourbar.solution import DEGREES, Array, Conversion, Solution, unit_in
+from fourbar.show.duty import bearing_load, motor_duty
+from fourbar.solution import DEGREES, Array, Conversion, Solution, unit_in, unit_of
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -108,9 +107,8 @@ def heading(scene: Scene, solution: Solution, units: Conversion = DEGREES) -> li
         f"{branch} branch; {drive}",
     ]
     counts = np.bincount(solution.status_code, minlength=len(STATUS_NAMES))
-    parts = [
-        f"{count} {name.replace('_', ' ')}" for name, count in zip(STATUS_NAMES, counts.tolist(), strict=True) if count
-    ]
+    statuses = zip(STATUS_NAMES, counts.tolist(), strict=True)
+    parts = [f"{count} {name.replace('_', ' ')}" for name, count in statuses if count]
     lines.append(f"{len(solution)} position{'s' if len(solution) != 1 else ''}: " + ", ".join(parts))
     if solution.stopped_at is not None and scene.motion.free is not None:
         lines.append(
@@ -127,10 +125,8 @@ def heading(scene: Scene, solution: Solution, units: Conversion = DEGREES) -> li
         lines += _motor(solution, units)
     if solution.F12 is not None and np.isfinite(solution.F12).any():
         loads = {pin: bearing_load(solution, pin) for pin in PIN_FORCE}
-        parts = [
-            f"{pin} {value(load.largest, 'N', units)} at {value(load.where, 'rad', units)}"
-            for pin, load in loads.items()
-        ]
+        peaks = {pin: (value(load.largest, "N", units), value(load.where, "rad", units)) for pin, load in loads.items()}
+        parts = [f"{pin} {largest} at {where}" for pin, (largest, where) in peaks.items()]
         rms = [f"{pin} {value(load.rms, 'N', units)}" for pin, load in loads.items()]
         lines += ["largest pin loads: " + ", ".join(parts), "RMS pin loads: " + ", ".join(rms)]
     return lines
@@ -197,7 +193,7 @@ def columns(solution: Solution, units: Conversion = DEGREES) -> dict[str, list[s
 
     def add(name: str, unit: str, values: Array) -> None:
         label, factor = unit_in(unit, units)
-        shown[f"{name}\n{label}"] = _cells(values * factor, "angle" if unit == "rad" else "")
+        shown[f"{name}\n{label}"] = _cells(values * factor, ".4f" if unit == "rad" else ".6g")
 
     if solution.time is not None:
         add("time", "s", solution.time)
@@ -206,17 +202,13 @@ def columns(solution: Solution, units: Conversion = DEGREES) -> dict[str, list[s
         if solution.time is None:  # released, it has no drive: its torque is rounding
             add(f"T{solution.drive_bar}", "N m", solution.torque)
             if solution.torque_error is not None:
-                shown["digits\nof T"] = _digits(solution)
+                shown["digits\nof T"] = _digits(solution.torque, solution.torque_error)
         for name in PIN_FORCES:
             add(f"|{name}|", "N", np.hypot(*getattr(solution, name).T))
-    for start, unit, arrays in (
-        ("", "m", solution.points),
-        ("v_", "m/s", solution.velocity),
-        ("a_", "m/s^2", solution.acceleration),
-    ):
-        for name, values in arrays.items():
-            for axis, letter in enumerate("xy"):
-                add(f"{start}{name}_{letter}", unit, values[:, axis])
+    moving = {"": solution.points, "v_": solution.velocity, "a_": solution.acceleration}
+    for name, vector in ((start + name, v) for start, arrays in moving.items() for name, v in arrays.items()):
+        for axis, letter in enumerate("xy"):
+            add(f"{name}_{letter}", unit_of(name), vector[:, axis])
     for name in ANGLES:
         add(name, "rad", getattr(solution, name))
     for name in ("omega_3", "omega_4", "alpha_3", "alpha_4"):
@@ -245,27 +237,18 @@ def table(
         kept.append(name)
     rows = list(zip(*(cells[name] for name in kept), strict=True))
     last = rows[-1:] if (len(rows) - 1) % every else []
-    return plain_table(kept, rows[::every] + last, gap=GAP - 1), [
-        name.split("\n")[0] for name in cells if name not in kept
-    ]
+    left_out = [name.split("\n")[0] for name in cells if name not in kept]
+    return plain_table(kept, rows[::every] + last, gap=GAP - 1), left_out
 
 
-def _cells(values: Array, kind: str = "") -> list[str]:
-    """Six digits; angles with four decimals; a dash where there is no value."""
-    form = "{:.4f}" if kind == "angle" else "{:.6g}"
-    return [form.format(value) if math.isfinite(value) else "-" for value in values.tolist()]
+def _cells(values: Array, form: str = ".6g") -> list[str]:
+    """Six digits, or another form; a dash where there is no value."""
+    return [format(value, form) if math.isfinite(value) else "-" for value in values.tolist()]
 
 
-def _digits(solution: Solution) -> list[str]:
+def _digits(torque: Array, error: Array) -> list[str]:
     """How many digits of the torque are not rounding."""
-    if solution.torque is None or solution.torque_error is None:
-        return ["-"] * len(solution)
-    cells = []
-    for value, error in zip(solution.torque.tolist(), solution.torque_error.tolist(), strict=True):
-        if not math.isfinite(value) or not math.isfinite(error):
-            cells.append("-")
-        elif value == 0.0 or error == 0.0:
-            cells.append(str(MOST_DIGITS) if error == 0.0 else "0")
-        else:
-            cells.append(str(min(max(math.floor(math.log10(abs(value) / error)), 0), MOST_DIGITS)))
-    return cells
+    with np.errstate(all="ignore"):
+        digits = np.clip(np.floor(np.log10(np.abs(torque) / error)), 0, MOST_DIGITS)
+    known = np.isfinite(torque) & np.isfinite(error)
+    return _cells(np.where(known, np.where(error == 0.0, MOST_DIGITS, digits), np.nan))

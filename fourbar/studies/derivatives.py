@@ -20,7 +20,7 @@ from fourbar.scene.case import Case
 from fourbar.scene.evaluation import kinematics
 from fourbar.scene.motion import FromLimit
 from fourbar.scene.point import OF_POINTS
-from fourbar.solution import Array, Solution
+from fourbar.solution import Array, Solution, values_of
 from fourbar.solve import solve
 from fourbar.studies.keys import THETA_2, Entry, at_place, entries, placed
 from fourbar.studies.sloped import Sloped, slopes, values
@@ -63,16 +63,8 @@ class Sensitivity:
         """The quantity itself, (n,) or (n, 2); InputError as `of`."""
         if not isinstance(quantity, str) or quantity not in self.by:
             raise InputError("sensitivity", quantity, "is not known here; known: " + ", ".join(self.by))
-        return quantity_of(self.solution, quantity)
-
-
-def quantity_of(solution: Solution, name: str) -> Array:
-    """A quantity of a solution by name, those of the scene's own points too."""
-    for start, own in (("v_", solution.velocity), ("a_", solution.acceleration), ("", solution.points)):
-        if name.startswith(start) and name[len(start) :] in own:
-            return own[name[len(start) :]]
-    found: Array = getattr(solution, name)
-    return found
+        found: Array = values_of(self.solution, quantity)
+        return found
 
 
 def sensitivity(scene: Scene) -> Sensitivity:
@@ -107,7 +99,7 @@ def sensitivity(scene: Scene) -> Sensitivity:
     ]
     names += [f"{start}{p.name}" for p in scene.points for start in (OF_POINTS if moving else ("",))]
     p = len(keys)
-    by = {name: np.full((p, *quantity_of(solution, name).shape), np.nan) for name in names}
+    by = {name: np.full((p, *values_of(solution, name).shape), np.nan) for name in names}
     status = np.array(STATUS_NAMES, dtype="<U16")[solution.status_code]
     with np.errstate(all="ignore"):
         _, decided = Case.of(scene).half_angle(at.theta_2, None)

@@ -26,7 +26,7 @@ from fourbar.scene import Scene, command
 from fourbar.scene.case import Case
 from fourbar.studies.derivatives import differentiable
 from fourbar.studies.interval import interval, require, require_all
-from fourbar.studies.keys import at_place, entries, left_out, placed
+from fourbar.studies.keys import at_place, entries, left_out, with_numbers
 from fourbar.studies.sloped import Sloped
 
 BITS = 128
@@ -162,15 +162,13 @@ class _Search:
         moved : None: over the tolerances; else what each number is off by, in parts of its tolerance, (k, n).
         """
         self.boxes += len(theta_2)
-        scene, known = differentiable(self.scene), entries(self.scene)
         numbers = {
             key: self.number(key, at_place(self.scene, entry.place), moved)
-            for key, entry in known.items()
+            for key, entry in entries(self.scene).items()
             if not left_out(self.scene, entry)
         }
-        for key, number in numbers.items():
-            if not key.startswith("motion."):
-                scene = placed(scene, known[key].place, number)
+        still = {key: number for key, number in numbers.items() if not key.startswith("motion.")}
+        scene = with_numbers(differentiable(self.scene), still)
         by_theta = np.zeros((1 + len(self.keys), 1), dtype=object)
         by_theta[0] = 1
         q, link = Sloped(theta_2, by_theta), scene.linkage

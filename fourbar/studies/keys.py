@@ -1,7 +1,7 @@
 """The numbers of a scene by their keys in its file, and scenes in which they are arrays."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Mapping
 from dataclasses import fields
 from difflib import get_close_matches
 from typing import Any, NamedTuple
@@ -44,41 +44,41 @@ def _pair(key: str, place: Place, unit: str, names: tuple[str | int, str | int] 
     return {f"{key}.0": Entry(one, unit), f"{key}.1": Entry(other, "rad")}
 
 
-def _per_pin(rows: str, **columns: tuple[str, str]) -> Callable[[Any], dict[str, Entry]]:
-    """Entries of an effect that holds rows (pin, number, ...), by the names of the numbers, their units and bounds."""
-
-    def entries(effect: Any) -> dict[str, Entry]:
-        return {
-            f"{row[0]}.{name}".removesuffix("._"): Entry((rows, index, column), *of)
-            for index, row in enumerate(getattr(effect, rows))
-            for column, (name, of) in enumerate(columns.items(), 1)
-        }
-
-    return entries
-
-
-def _of_springs(effect: Any) -> dict[str, Entry]:
-    found = {}
-    for index in range(len(effect.springs)):
-        own: Place = ("springs", index)
-        found[f"{index}.stiffness"] = Entry((*own, "stiffness"), "N/m", POSITIVE)
-        found[f"{index}.length"] = Entry((*own, "length"), "m", AT_LEAST_ZERO)
-        found[f"{index}.preload"] = Entry((*own, "preload"), "N")
-        for key, end in (("from", "start"), ("to", "end")):
-            found |= _pair(f"{index}.{key}.at", (*own, end), "m", ("distance", "angle"))
-    return found
-
-
-OF_EFFECT: dict[str, Callable[[Any], dict[str, Entry]]] = {
-    "gravity": lambda effect: {"0": Entry(("magnitude",), "m/s^2"), "1": Entry(("angle",), "rad")},
-    "viscous": _per_pin("coefficients", _=("N m s/rad", AT_LEAST_ZERO)),
-    "friction": _per_pin("torques", _=("N m", AT_LEAST_ZERO)),
-    "pin_friction": _per_pin("pins", coefficient=("1", AT_LEAST_ZERO), radius=("m", AT_LEAST_ZERO)),
-    "torsion": _per_pin("springs", stiffness=("N m/rad", POSITIVE), rest=("rad", ANY), preload=("N m", ANY)),
-    "springs": _of_springs,
-    "flywheel": lambda effect: {"inertia": Entry(("inertia",), "kg m^2", AT_LEAST_ZERO)},
+OF_EFFECT: dict[str, dict[str, tuple[str, str]]] = {
+    "gravity": {"magnitude": ("m/s^2", ANY), "angle": ("rad", ANY)},
+    "viscous": {"": ("N m s/rad", AT_LEAST_ZERO)},
+    "friction": {"": ("N m", AT_LEAST_ZERO)},
+    "pin_friction": {"coefficient": ("1", AT_LEAST_ZERO), "radius": ("m", AT_LEAST_ZERO)},
+    "torsion": {"stiffness": ("N m/rad", POSITIVE), "rest": ("rad", ANY), "preload": ("N m", ANY)},
+    "springs": {"stiffness": ("N/m", POSITIVE), "length": ("m", AT_LEAST_ZERO), "preload": ("N", ANY)},
+    "flywheel": {"inertia": ("kg m^2", AT_LEAST_ZERO)},
 }
-"""The numbers of an effect, by its key; the places lead from the effect."""
+"""Unit and bound of each number of an effect, by its name; the one number that a pin has needs none."""
+ROWS = {"viscous": "coefficients", "friction": "torques", "pin_friction": "pins", "torsion": "springs"}
+"""Effects that hold rows (pin, number, ...), each with its field of them."""
+
+
+def _of_effect(effect: Any, key: str, place: Place) -> dict[str, Entry]:
+    """The entries of an effect under its key, at its place."""
+    numbers = OF_EFFECT.get(effect.key, {})
+    if effect.key == "gravity":
+        return _pair(key, place, numbers["magnitude"][0], ("magnitude", "angle"))
+    if effect.key in ROWS:
+        field = ROWS[effect.key]
+        return {
+            f"{key}.{row[0]}.{name}".removesuffix("."): Entry((*place, field, index, column), *of)
+            for index, row in enumerate(getattr(effect, field))
+            for column, (name, of) in enumerate(numbers.items(), 1)
+        }
+    if effect.key != "springs":
+        return {f"{key}.{name}": Entry((*place, name), *of) for name, of in numbers.items()}
+    found = dict[str, Entry]()
+    for index in range(len(effect.springs)):
+        spring, own = f"{key}.{index}", (*place, "springs", index)
+        found |= {f"{spring}.{name}": Entry((*own, name), *of) for name, of in numbers.items()}
+        for name, end in (("from", "start"), ("to", "end")):
+            found |= _pair(f"{spring}.{name}.at", (*own, end), "m", ("distance", "angle"))
+    return found
 
 
 def entries(scene: Scene) -> dict[str, Entry]:
@@ -103,8 +103,7 @@ def entries(scene: Scene) -> dict[str, Entry]:
     for index, point in enumerate(scene.points):
         found |= _pair(f"{point.key}.from_pin", ("points", index, "from_pin"), "m")
     for index, effect in enumerate(scene.effects):
-        for key, entry in OF_EFFECT.get(effect.key, lambda effect: {})(effect).items():
-            found[f"effects.{effect.key}.{key}"] = entry._replace(place=("effects", index, *entry.place))
+        found |= _of_effect(effect, f"effects.{effect.key}", ("effects", index))
     return found
 
 
@@ -159,6 +158,14 @@ def at_place(whole: Any, place: Place) -> Any:
         else:
             whole = getattr(whole, name)
     return whole
+
+
+def with_numbers(scene: Scene, numbers: Mapping[str, Any]) -> Scene:
+    """A copy with some of its numbers replaced, by key."""
+    known, changed = entries(scene), scene
+    for key, number in numbers.items():
+        changed = placed(changed, known[key].place, number)
+    return changed
 
 
 def placed(whole: Any, place: Place, values: Any) -> Any:

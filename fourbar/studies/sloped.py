@@ -115,23 +115,14 @@ def slopes(number: Any) -> Any:
     return number.slopes if isinstance(number, Sloped) else 0.0
 
 
-def real(z: Any) -> Any:
+def _by_entry(function: Callable[[Any], Any]) -> Callable[[Any], Any]:
     """Of an array; of one of objects, entry by entry."""
-    return _REAL(z) if z.dtype == object else z.real
+    each = np.frompyfunc(function, 1, 1)
+    return lambda z: each(z) if z.dtype == object else function(z)
 
 
-def imag(z: Any) -> Any:
-    """Likewise."""
-    return _IMAG(z) if z.dtype == object else z.imag
-
-
-def conjugate(z: Any) -> Any:
-    """Likewise."""
-    return _CONJUGATE(z) if z.dtype == object else np.conjugate(z)
-
-
-_CONJUGATE = np.frompyfunc(lambda z: z.conjugate() if hasattr(z, "conjugate") else z, 1, 1)
-_REAL, _IMAG = (np.frompyfunc(lambda z, part=part: getattr(z, part), 1, 1) for part in ("real", "imag"))
+real, imag = _by_entry(lambda z: z.real), _by_entry(lambda z: z.imag)
+conjugate = _by_entry(lambda z: z.conjugate() if hasattr(z, "conjugate") else z)
 
 
 def _where(mask: Any, x: Any, y: Any) -> Sloped:

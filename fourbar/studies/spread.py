@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from fourbar.errors import DependencyError, InputError, expect, installing
 from fourbar.quantities import ANGLES, NOT_ASSEMBLED, PIN_FORCES
 from fourbar.scene import Scene, command
-from fourbar.solution import Array
+from fourbar.solution import Array, values_of
 from fourbar.solve import is_scalar, solve
-from fourbar.studies.derivatives import Sensitivity, quantity_of, sensitivity
+from fourbar.studies.derivatives import Sensitivity, sensitivity
 from fourbar.studies.keys import LEFT_OUT, THETA_2, at_place, entries, left_out, refusal
 from fourbar.studies.study import Study, vary
 
@@ -120,7 +120,7 @@ def tolerances(
         without[columns] = np.count_nonzero(code, axis=0)
         gone |= ((code == NOT_ASSEMBLED) & nominal_closes[columns]).any(axis=1)
         for name in names:
-            number = quantity_of(solution, name)[:, -width:]
+            number = values_of(solution, name)[:, -width:]
             if name in ANGLES:  # each member counts its turns from its own first position
                 turns = np.rint((number - values[name][name][columns]) / (2 * np.pi))
                 number = number - 2 * np.pi * turns

@@ -17,7 +17,7 @@ from fourbar.scene.evaluation import FORCE
 from fourbar.scene.motion import FromLimit
 from fourbar.solution import Array, Solution, unwrap
 from fourbar.solve import arrays, each, evaluation, is_compiled, keep, positions_at_once, requested, solved
-from fourbar.studies.keys import THETA_2, entries, placed, refusal
+from fourbar.studies.keys import THETA_2, entries, placed, refusal, with_numbers
 
 if TYPE_CHECKING:
     from fourbar.effects import Effect
@@ -88,9 +88,7 @@ class Study:
 
     def _members(self, rows: slice, count: int, scene: Scene) -> Scene:
         """The scene of some members whose numbers are arrays, each repeated for `count` positions."""
-        known = entries(self.scene)
-        for key, values in self.values.items():
-            scene = placed(scene, known[key].place, _repeated(values[rows], count))
+        scene = with_numbers(scene, {key: _repeated(values[rows], count) for key, values in self.values.items()})
         for index, turns in _turns(scene.effects).items():
             scene = placed(scene, ("effects", index, "turns"), tuple(_repeated(turn, count) for turn in turns))
         return scene
@@ -189,23 +187,18 @@ def vary(scene: Scene, values: Mapping[str, Any]) -> Study:
 
 def _branches(scene: Scene, numbers: Mapping[str, Array], angles: Array, m: int) -> NDArray[np.int8]:
     """The branch of each position, (m, n); only a member with a change point can follow a path through it."""
-    motion, known, shape = scene.motion, entries(scene), (m, angles.shape[1])
+    motion, shape = scene.motion, (m, angles.shape[1])
     own = {key: array for key, array in numbers.items() if key in LENGTHS}
     if motion.through == "follow" and not own and len(angles) == 1:
         return np.broadcast_to(on_smooth_path(scene.linkage, angles[0], motion.branch), shape)
     branch = np.full(shape, motion.branch, dtype=np.int8)
     if motion.through == "follow":
-        linkage = scene
-        for key, array in own.items():
-            linkage = placed(linkage, known[key].place, array)
-        lengths = linkage.linkage.lengths
+        lengths = with_numbers(scene, own).linkage.lengths
         _, _, _, _, E1, E2 = loop(*lengths)
         size = NEAR_A_CHANGE_POINT * sum(lengths) ** 2
         for member in np.flatnonzero(np.broadcast_to((np.abs(E1) <= size) | (np.abs(E2) <= size), (m,))):
-            linkage = scene
-            for key, array in own.items():
-                linkage = placed(linkage, known[key].place, float(array[member]))
-            branch[member] = on_smooth_path(linkage.linkage, angles[member % len(angles)], motion.branch)
+            linkage = with_numbers(scene, {key: float(array[member]) for key, array in own.items()}).linkage
+            branch[member] = on_smooth_path(linkage, angles[member % len(angles)], motion.branch)
     return branch
 
 

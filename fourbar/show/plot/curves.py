@@ -2,6 +2,8 @@
 
 import math
 import re
+from collections.abc import Iterable
+from functools import partial
 from itertools import cycle
 from typing import TYPE_CHECKING, Any
 
@@ -10,7 +12,7 @@ from numpy.typing import NDArray
 
 from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import PIN_FORCES
-from fourbar.show.plot.energy import energies
+from fourbar.show.duty import energies
 from fourbar.show.plot.style import (
     BAR_COLOURS,
     BAR_DASHES,
@@ -138,12 +140,15 @@ def draw_angles(axes: "Axes", view: View) -> None:
         axes.plot(over, values, color=BAR_COLOURS[bar], ls=BAR_DASHES[bar], label=rf"$\theta_{bar}$")
     shown = np.concatenate([np.degrees(getattr(other.sweep, f"theta_{bar}")) for other in view.alike for bar in bars])
     degree_ticks(axes.yaxis, 1.3 * float(np.nanmax(shown) - np.nanmin(shown)) + 1e-9)
-    axes.set_ylabel(r"$\theta$ (°)" if len(bars) > 2 else r"$\theta_3,\ \theta_4$ (°)")
-    axes.set_title("Angles of the bars" if len(bars) > 2 else "Angles of coupler and output")
+    if len(bars) > 2:
+        axes.set(ylabel=r"$\theta$ (°)", title="Angles of the bars")
+    else:
+        axes.set(ylabel=r"$\theta_3,\ \theta_4$ (°)", title="Angles of coupler and output")
     legend_above(axes)
 
 
 def _rates(axes: "Axes", view: View, letter: str, unit: str, title: str, what: str) -> None:
+    """Of the input (where it is not zero), the coupler and the output."""
     over = bases(axes, view)
     name = {"omega": "ω", "alpha": "α"}[letter]
     digits = {2: "₂", 3: "₃", 4: "₄"}
@@ -155,34 +160,20 @@ def _rates(axes: "Axes", view: View, letter: str, unit: str, title: str, what: s
     for bar, values in zip((3, 4), curves.values(), strict=True):
         axes.plot(over, factor * values, color=BAR_COLOURS[bar], ls=BAR_DASHES[bar], label=rf"$\{letter}_{bar}$")
     axes.axhline(0.0, color=INK, lw=0.6, zorder=1)
-    axes.set_ylabel(rf"$\{letter}$ ({shown_unit})")
-    axes.set_title(title)
+    axes.set(ylabel=rf"$\{letter}$ ({shown_unit})", title=title)
     limit = limit_of([getattr(other.sweep, f"{letter}_{bar}") for other in view.alike for bar in (3, 4)])
     clip(axes, view, curves, limit, what, unit)
     legend_above(axes)
 
 
-def draw_velocities(axes: "Axes", view: View) -> None:
-    """omega_2, omega_3, omega_4."""
-    _rates(axes, view, "omega", "rad/s", "Angular velocities", "Angular velocity")
-
-
-def draw_accelerations(axes: "Axes", view: View) -> None:
-    """alpha_2 (where it is not zero), alpha_3, alpha_4."""
-    _rates(axes, view, "alpha", "rad/s^2", "Angular accelerations", "Angular acceleration")
-
-
-def draw_speeds(axes: "Axes", view: View) -> None:
-    """Speeds of A, B, the mass centres and the scene's own points."""
-    _of_points(axes, view, "v", "m/s", "Speeds of points")
-
-
-def draw_point_accelerations(axes: "Axes", view: View) -> None:
-    """Sizes of the accelerations of the same points."""
-    _of_points(axes, view, "a", "m/s^2", "Accelerations of points")
+draw_velocities = partial(_rates, letter="omega", unit="rad/s", title="Angular velocities", what="Angular velocity")
+draw_accelerations = partial(
+    _rates, letter="alpha", unit="rad/s^2", title="Angular accelerations", what="Angular acceleration"
+)
 
 
 def _of_points(axes: "Axes", view: View, letter: str, unit: str, title: str) -> None:
+    """Sizes at A, B, the mass centres and the scene's own points."""
     over = bases(axes, view)
     curves = {name: np.hypot(*vector.T) for name, vector in point_vectors(view.scene, view.sweep, letter).items()}
     limit = limit_of(list(curves.values()))
@@ -192,10 +183,13 @@ def _of_points(axes: "Axes", view: View, letter: str, unit: str, title: str) -> 
         colour, width = looks.get(name, FORCE_COLOURS["F43"]), 2.0 if name in view.sweep.points else 1.2
         axes.plot(over, factor * values, color=colour, ls=":" if name[0] == "G" else dashes, label=name, lw=width)
     axes.set_ylim(bottom=0.0)
-    axes.set_ylabel(f"$|{letter}|$ ({shown_unit})")
-    axes.set_title(title)
+    axes.set(ylabel=f"$|{letter}|$ ({shown_unit})", title=title)
     clip(axes, view, curves, limit, title, unit)
     legend_above(axes, 6)
+
+
+draw_speeds = partial(_of_points, letter="v", unit="m/s", title="Speeds of points")
+draw_point_accelerations = partial(_of_points, letter="a", unit="m/s^2", title="Accelerations of points")
 
 
 def draw_torque(axes: "Axes", view: View) -> None:
@@ -213,24 +207,27 @@ def draw_torque(axes: "Axes", view: View) -> None:
     if where.size:
         note(view, f"Dotted: poles of the torque on bar {bar} ({POLE_REASON[bar]}).")
     axes.axhline(0.0, color=INK, lw=0.6, zorder=1)
-    axes.set_ylabel(f"$T_{bar}$ ({unit})")
-    axes.set_title(f"Driving torque on bar {bar}")
+    axes.set(ylabel=f"$T_{bar}$ ({unit})", title=f"Driving torque on bar {bar}")
     clip(axes, view, {f"T{'₂₃₄'[bar - 2]}": torque}, limit, "Torque", "N m")
+
+
+def force_sizes(view: View, names: Iterable[str] = FORCE_COLOURS) -> list[Array]:
+    """Magnitudes of pin forces, of every branch that shares the scales."""
+    return [np.hypot(*getattr(other.sweep, name).T) for other in view.alike for name in names]
 
 
 def draw_forces(axes: "Axes", view: View) -> None:
     """Magnitudes of the four pin forces."""
     over = bases(axes, view)
     sizes = {name: np.hypot(*getattr(view.sweep, name).T) for name in FORCE_COLOURS}
-    everywhere = [np.hypot(*getattr(other.sweep, name).T) for other in view.alike for name in FORCE_COLOURS]
+    everywhere = force_sizes(view)
     limit = limit_of(everywhere)
     factor, unit = unit_for(limit or largest(*everywhere), "N", view.units)
     where = poles(view)
     for name, values in sizes.items():
         axes.plot(broken(over, where), factor * broken(values, where), **force_line(name))
     axes.set_ylim(bottom=0.0)
-    axes.set_ylabel(f"$|F|$ ({unit})")
-    axes.set_title("Pin forces")
+    axes.set(ylabel=f"$|F|$ ({unit})", title="Pin forces")
     clip(axes, view, sizes, limit, "Pin forces", "N")
     legend_above(axes)
 
@@ -240,14 +237,12 @@ def draw_energy(axes: "Axes", view: View) -> None:
     over = bases(axes, view)
     own = energies(view.scene, view.sweep)
     shared = [energies(other.scene, other.sweep) for other in view.others] + [own]
-    factor, unit = unit_for(
-        largest(*(values for each in shared for values in (each.kinetic, *each.work.values()))), "J", view.units
-    )
+    most = largest(*(values for each in shared for values in (each.kinetic, *each.work.values())))
+    factor, unit = unit_for(most, "J", view.units)
     axes.plot(over, factor * own.kinetic, color=INK, lw=2.2, label="kinetic energy")
     for (name, values), (colour, dashes) in zip(own.work.items(), cycle(WORKS), strict=False):
         axes.plot(over, factor * values, color=colour, ls=dashes, label=name.replace("_", " "))
     axes.axhline(0.0, color=INK, lw=0.6, zorder=1)
-    axes.set_ylabel(f"energy ({unit})")
-    axes.set_title("Kinetic energy, and the work done")
+    axes.set(ylabel=f"energy ({unit})", title="Kinetic energy, and the work done")
     legend_above(axes, 3)
     note(view, "The kinetic energy has grown by the work that loads and effects have done since the release.")

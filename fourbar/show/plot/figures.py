@@ -11,7 +11,7 @@ import numpy as np
 from fourbar.errors import InputError
 from fourbar.linkage import require
 from fourbar.scene import Scene
-from fourbar.show.plot import curves, freebody, hodograph, influence, linkage
+from fourbar.show.plot import curves, freebody, hodograph, linkage, studies
 from fourbar.show.plot.labels import Labels
 from fourbar.show.plot.style import CAPTION, FORCE_COLOURS, TITLE, format_of, matplotlib_style, plain, rendered, save
 from fourbar.show.plot.transmission import draw_transmission
@@ -54,7 +54,7 @@ def _overview(figure: "SubFigure", shown: View, labels: Labels) -> None:
 def _kinematics(figure: "SubFigure", shown: View, labels: Labels) -> None:
     del labels
     panels = figure.subplots(3 if shown.moves else 1, 1, squeeze=False)[:, 0]
-    painters = (curves.draw_angles, curves.draw_velocities, curves.draw_accelerations)
+    painters: tuple[Any, ...] = (curves.draw_angles, curves.draw_velocities, curves.draw_accelerations)
     for axes, paint in zip(panels, painters, strict=False):
         paint(axes, shown)
 
@@ -98,7 +98,7 @@ FIGURES: dict[str, tuple[Painter, tuple[float, float], bool]] = {
     "energy": (_single(curves.draw_energy), (5.6, 3.2), True),
     "transmission": (_single(draw_transmission), (5.6, 3.2), False),
     "freebody": (_free_bodies, (9.6, 4.6), True),
-    "sensitivity": (influence.draw_influences, (9.6, 3.6), True),
+    "sensitivity": (studies.draw_influences, (9.6, 3.6), True),
 }
 """Each figure: its painter, the size of one branch in inches, and whether it needs omega_2."""
 
@@ -162,8 +162,17 @@ def drawn(
     DependencyError : matplotlib is missing.
     """
     painter, size = _painter(scene, figure, branches)
+    require_units(units)
+    position = None if position is None else require("position", position)
     with matplotlib_style():
-        return Drawing(compose(scene, painter, size, position, branches, units, dimensions))
+        scenes = [on_branch(scene, sign) for sign in (1, -1)] if branches == "both" else [scene]
+        if position is None and len(scenes) > 1:
+            position = common_position(scenes)
+        views = [view(each, position) for each in scenes]
+        for shown in views:
+            shown.units, shown.dimensions = units, dimensions
+            shown.others = [other for other in views if other is not shown]
+        return Drawing(_composed(painter, size, views))
 
 
 def draw(
@@ -183,41 +192,20 @@ def draw(
     drawn(scene, figure, **options).save(path, file_format)
 
 
-def compose(
-    scene: Scene,
-    painter: Painter,
-    size: tuple[float, float],
-    position: float | None,
-    branches: str,
-    units: Conversion = SI,
-    dimensions: bool = False,
-) -> "Figure":
+def _composed(painter: Painter, size: tuple[float, float], views: list[View]) -> "Figure":
     """The figure itself, laid out and labelled."""
     from matplotlib.figure import Figure
 
-    require_units(units)
-    if position is not None:
-        position = require("position", position)
-    scenes = [on_branch(scene, sign) for sign in (1, -1)] if branches == "both" else [scene]
-    if position is None and len(scenes) > 1:
-        position = common_position(scenes)
-    views = [view(each, position) for each in scenes]
-    for shown in views:
-        shown.units, shown.dimensions = units, dimensions
-        shown.others = [other for other in views if other is not shown]
     stacked = size[0] > 9.0
-    figure = Figure(
-        figsize=(size[0], size[1] * len(views)) if stacked else (size[0] * len(views), size[1]), layout="constrained"
-    )
-    parts = figure.subfigures(len(views) if stacked else 1, 1 if stacked else len(views), squeeze=False).ravel()
+    rows, columns = (len(views), 1) if stacked else (1, len(views))
+    figure = Figure(figsize=(size[0] * columns, size[1] * rows), layout="constrained")
+    parts = figure.subfigures(rows, columns, squeeze=False).ravel()
     labels = Labels()
     for part, shown in zip(parts, views, strict=True):
         painter(part, shown, labels)
-        heading = plain(scene.title, 90) or "Four-bar linkage"
+        heading = plain(shown.scene.title, 90) or "Four-bar linkage"
         part.suptitle(f"{heading} ({shown.branch_name} branch)" if len(views) > 1 else heading, **TITLE)
-        wide = int(size[0] * 18.5)
-        caption = textwrap.fill(" ".join(shown.notes), wide)
-        if caption:
+        if caption := textwrap.fill(" ".join(shown.notes), int(size[0] * 18.5)):
             part.supxlabel(caption, linespacing=1.35, **CAPTION)
     _to_one_scale([part.axes for part in parts])
     labels.settle(figure)

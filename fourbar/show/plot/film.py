@@ -4,6 +4,7 @@ import math
 import shutil
 import subprocess
 import tempfile
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,9 +15,8 @@ from fourbar.linkage import ENDS
 from fourbar.scene import Scene
 from fourbar.show.acting import acting
 from fourbar.show.plot import symbols
-from fourbar.show.plot.linkage import POINT, mass_centre, path_legend, paths, pin_name, supports
-from fourbar.show.plot.style import BAR_COLOURS, INK, TITLE, largest, length_unit, matplotlib_style, plain
-from fourbar.show.plot.vectors import vectors
+from fourbar.show.plot.linkage import POINT, mass_centre, path_legend, paths, pin_name, scale_of, supports
+from fourbar.show.plot.style import BAR_COLOURS, INK, OPEN, TITLE, matplotlib_style, plain
 from fourbar.show.plot.view import View, view
 from fourbar.show.progress import counted
 from fourbar.solution import SI, Conversion
@@ -109,11 +109,8 @@ def frames(shown: View, count: int) -> list[int]:
     here = int(np.argmin(np.abs(shown.sweep.theta_2 - shown.here.theta_2[0])))
     if shown.time is not None and shown.here.time is not None:
         here = int(np.argmin(np.abs(shown.time - shown.here.time[0])))
-    first, last = here, here
-    while first > 0 and closes[first - 1]:
-        first -= 1
-    while last < len(closes) - 1 and closes[last + 1]:
-        last += 1
+    gaps = np.flatnonzero(~closes)
+    first, last = max(gaps[gaps < here], default=-1) + 1, min(gaps[gaps > here], default=len(closes)) - 1
     if shown.time is not None:
         return [round(i) for i in np.linspace(first, last, count)]
     theta_2 = shown.sweep.theta_2
@@ -123,36 +120,33 @@ def frames(shown: View, count: int) -> list[int]:
     return there + there[-2:0:-1]
 
 
-class _Acting:
-    """The symbols of what acts, which change from frame to frame."""
+def _acting(axes: Any, shown: View, factor: float, size: float) -> Callable[[int], list[symbols.Drawn]]:
+    """The function that draws the symbols of what acts at a position, in place of what stood there.
 
-    def __init__(self, axes: Any, shown: View, factor: float, size: float) -> None:
-        self.axes, self.shown, self.factor, self.size = axes, shown, factor, size
-        self.symbols = acting(shown.scene)
-        self.passing: list[Any] = []
+    The window becomes large enough for those of every position.
+    """
+    everything = acting(shown.scene)
+    passing: list[Any] = []
 
-    def draw(self, index: int) -> list[symbols.Drawn]:
-        """At a position, in place of what stood there."""
-        while self.passing:
-            self.passing.pop().remove()
-        place = symbols.place_of(self.shown.scene.linkage, self.shown.sweep, index, self.factor)
-        drawn = [symbols.draw(self.axes, symbol, place, self.size) for symbol in self.symbols]
-        for each, symbol in zip(drawn, self.symbols, strict=True):
-            self.passing += each.artists
+    def draw(index: int) -> list[symbols.Drawn]:
+        while passing:
+            passing.pop().remove()
+        place = symbols.place_of(shown.scene.linkage, shown.sweep, index, factor)
+        drawn = [symbols.draw(axes, symbol, place, size) for symbol in everything]
+        for each, symbol in zip(drawn, everything, strict=True):
+            passing.extend(each.artists)
             if each.label is not None:
                 away = each.away or 1.0  # of what surrounds a pin: to the right
                 side = {"ha": "left"} if each.away == 0.0 else {}
                 at = {**NAME, "xytext": (12.0 * away.real, 12.0 * away.imag), **side}
-                self.passing.append(self.axes.annotate(each.text, each.label, color=symbols.COLOURS[symbol.kind], **at))
+                passing.append(axes.annotate(each.text, each.label, color=symbols.COLOURS[symbol.kind], **at))
         return drawn
 
-    def hold_all(self) -> None:
-        """Make the window large enough for the symbols of every position."""
-        closes = np.flatnonzero(self.shown.sweep.assembled)
-        for index in closes[:: max(1, len(closes) // WINDOW)]:
-            for each in self.draw(int(index)):
-                for line in each.lines:
-                    self.axes.update_datalim(line)
+    closes = np.flatnonzero(shown.sweep.assembled)
+    for index in closes[:: max(1, len(closes) // WINDOW)]:
+        for line in (line for each in draw(int(index)) for line in each.lines):
+            axes.update_datalim(line)
+    return draw
 
 
 def _names(axes: Any, shown: View, centres: list[int]) -> dict[str, Any]:
@@ -170,29 +164,24 @@ def _stage(shown: View, moving: bool) -> tuple["Figure", Any]:
 
     sweep, linkage = shown.sweep, shown.scene.linkage
     O4 = (linkage.ground * math.cos(linkage.ground_angle), linkage.ground * math.sin(linkage.ground_angle))
-    factor, unit = length_unit(largest(sweep.A, sweep.B, sweep.G3, np.array(O4)), shown.units)
+    factor, unit, size = scale_of(shown)
     figure = Figure(figsize=SIZE, dpi=DPI, layout="constrained")
     axes = figure.subplots()
     figure.suptitle(plain(shown.scene.title, 70), **TITLE)
     for path, colour, dashes, name in paths(shown):
         axes.plot(*(factor * path).T, color=colour, lw=1.0, ls=dashes, label=name, zorder=2)
-    reached = np.concatenate([sweep.A, sweep.B, sweep.G3, *sweep.points.values(), [(0.0, 0.0), O4]])
-    size = 0.03 * factor * float(np.nanmax(np.nanmax(reached, 0) - np.nanmin(reached, 0)))
     supports(axes, (0.0, 0.0), (factor * O4[0], factor * O4[1]), size)
-    look: dict[str, Any] = {"lw": 4.5, "ms": 6.5, "mfc": "white", "mec": INK, "mew": 1.2, "zorder": 4}
+    look: dict[str, Any] = {"lw": 4.5, "ms": 6.5, "mew": 1.2, "zorder": 4, **OPEN}
     bars = {number: axes.plot([], [], "o-", color=BAR_COLOURS[number], **look)[0] for number in ENDS}
     centres = {number: mass_centre(axes, (0.0, 0.0)) for number in ENDS if linkage.bar(number).mass > 0.0}
     own = {name: axes.plot([], [], "D", ms=4.5, mfc="white", mec=POINT, mew=1.2, zorder=8)[0] for name in sweep.points}
     arms = {number: axes.plot([], [], color=BAR_COLOURS[number], lw=0.8, ls=":", zorder=3)[0] for number in centres}
     names = _names(axes, shown, list(centres))
-    move_vectors = vectors(axes, shown, sweep, factor, size) if moving and shown.moves else None
-    acts = _Acting(axes, shown, factor, size)
-    acts.hold_all()
+    move_vectors = symbols.vectors(axes, shown, sweep, factor, size) if moving and shown.moves else None
+    act = _acting(axes, shown, factor, size)
     axes.autoscale_view()
     axes.set_aspect("equal", adjustable="datalim")
-    axes.set_xlabel(f"$x$ ({unit})")
-    axes.set_ylabel(f"$y$ ({unit})")
-    axes.set_title("θ")
+    axes.set(xlabel=f"$x$ ({unit})", ylabel=f"$y$ ({unit})", title="θ")
     pad = path_legend(axes)
     figure.draw_without_rendering()
     figure.set_layout_engine(None)  # nothing jumps from frame to frame
@@ -215,7 +204,7 @@ def _stage(shown: View, moving: bool) -> tuple["Figure", Any]:
             away = at[key] - middle if key[0] != "G" else middle - at[key]  # across the bar from its number
             text.xy = tuple(factor * at[key])
             text.set_position(tuple(13.0 * away / max(float(np.hypot(*away)), 1e-300)))
-        acts.draw(index)
+        act(index)
         if move_vectors is not None:
             move_vectors(index)
         theta = f"{math.degrees(sweep.theta_2[index]):.1f}".replace("-", "−")

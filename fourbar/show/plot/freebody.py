@@ -13,9 +13,10 @@ from fourbar.effects.actions import bodies
 from fourbar.linkage import BAR_NAMES, ENDS, FIRST_PIN, MOVING_BARS, PIN_FORCE
 from fourbar.show.plot.curves import note
 from fourbar.show.plot.labels import Label, Labels
-from fourbar.show.plot.linkage import components, mass_centre, pin_name, pins
-from fourbar.show.plot.style import BAR_COLOURS, FORCE_COLOURS, HEADED, INK, MUTED, force_name, quantity, unit_for
-from fourbar.show.plot.view import Recorder, View
+from fourbar.show.plot.linkage import mass_centre, pin_name
+from fourbar.show.plot.style import BAR_COLOURS, FORCE_COLOURS, HEADED, INK, MUTED, OPEN, force_name, quantity, unit_for
+from fourbar.show.plot.symbols import components, place_of
+from fourbar.show.plot.view import Recorder, View, one
 from fourbar.solution import Conversion
 
 if TYPE_CHECKING:
@@ -36,8 +37,8 @@ class Arrow:
     """A force on a bar: where it acts (from the bar's first pin, world axes, m) and its vector, N."""
 
     text: str
-    at: tuple[float, float]
-    force: tuple[float, float]
+    at: complex
+    force: complex
     colour: str
     dashed: bool = False
 
@@ -52,31 +53,27 @@ class Couple:
 
 def free_body(view: View, bar: int) -> tuple[list[Arrow], list[Couple]]:
     """Every force and couple on a bar at the position drawn, d'Alembert's included: together they vanish."""
-    where = pins(view)
-    first = where[FIRST_PIN[bar]]
+    where, turned = place_of(view.scene.linkage, view.here, 0, 1.0).pins, view.state().direction(bar)
     arrows: list[Arrow] = []
     couples: list[Couple] = []
     for pin in ENDS[bar]:
         name = PIN_FORCE[pin]
         onto, shown = (1.0, name) if name[2] == str(bar) else (-1.0, f"F{name[2]}{name[1]}")
-        fx, fy = (onto * float(v) for v in getattr(view.here, name)[0])
-        at = (where[pin][0] - first[0], where[pin][1] - first[1])
-        arrows.append(Arrow(force_name(shown), at, (fx, fy), FORCE_COLOURS[name]))
+        force = onto * complex(*getattr(view.here, name)[0])
+        arrows.append(Arrow(force_name(shown), where[pin] - where[FIRST_PIN[bar]], force, FORCE_COLOURS[name]))
     if view.scene.drive_bar == bar and view.scene.motion.free is None:
         couples.append(Couple(f"$T_{bar}$", float(view.here.torque[0])))  # type: ignore[index]
     for text, recorder in _actions(view):
         name = text.replace("#", str(bar))
-        acting = [(components(arm), components(force)) for b, force, arm in recorder.arrows if b == bar]
-        arrows += [Arrow(name, arm, force, INK) for arm, force in acting]
+        arrows += [Arrow(name, arm, force, INK) for b, force, arm in recorder.arrows if b == bar]
         couples += [Couple(name, m) for b, m in recorder.turns if b == bar]
     described = view.scene.linkage.bar(bar)
-    ax, ay = (float(v) for v in getattr(view.here, f"a_G{bar}")[0])
-    arm = components(described.to_centre * view.state().direction(bar))
-    arrows.append(Arrow(rf"$-m_{bar}\,a_{{G{bar}}}$", arm, (-described.mass * ax, -described.mass * ay), INK, True))
+    inertia = -described.mass * complex(*getattr(view.here, f"a_G{bar}")[0])
+    arrows.append(Arrow(rf"$-m_{bar}\,a_{{G{bar}}}$", one(described.to_centre * turned), inertia, INK, True))
     alpha = float(getattr(view.here, f"alpha_{bar}")[0])
     carried = bodies(view.scene.linkage, view.scene.effects)[bar - 2]
     couples.append(Couple(rf"$-I_{bar}\,\alpha_{bar}$", -carried.I * alpha))
-    return [a for a in arrows if math.hypot(*a.force) > 0.0], [c for c in couples if c.moment != 0.0]
+    return [a for a in arrows if a.force != 0.0], [c for c in couples if c.moment != 0.0]
 
 
 def _actions(view: View) -> Iterator[tuple[str, Recorder]]:
@@ -96,19 +93,16 @@ def _actions(view: View) -> Iterator[tuple[str, Recorder]]:
 
 def draw_free_bodies(figure: "SubFigure", view: View, labels: Labels) -> None:
     """The three bars, each freed from its pins, with arrows to one scale, over the couples."""
-    freed = {bar: free_body(view, bar) for bar in MOVING_BARS}
-    lines = max(len(couples) for v in view.alike for bar in MOVING_BARS for couples in free_body(v, bar)[1:])
-    panels, below = figure.subplots(2, 3, height_ratios=[PANEL, LINE * lines])
-    drawn = [(v, free_body(v, bar)[0], bar) for v in view.alike for bar in MOVING_BARS]
-    biggest = max((math.hypot(*arrow.force) for *_, arrows, _ in drawn for arrow in arrows), default=0.0)
+    freed = [(v, bar, *free_body(v, bar)) for v in view.alike for bar in MOVING_BARS]  # those of this view first
+    panels, below = figure.subplots(2, 3, height_ratios=[PANEL, LINE * max(len(couples) for *_, couples in freed)])
+    biggest = max((abs(arrow.force) for *_, arrows, _ in freed for arrow in arrows), default=0.0)
     longest = max(view.scene.linkage.bar(bar).length for bar in MOVING_BARS)
     scale = 0.75 * longest / biggest if biggest > 0.0 else 0.0
-    reach = {bar: _reach(view, bar, freed[bar][0], scale) for bar in MOVING_BARS}
     # one window size: the bars, too, are to one scale
-    span = WINDOW * max(float(np.ptp(_reach(v, bar, arrows, scale), axis=0).max()) for v, arrows, bar in drawn)
-    for axes, text, bar in zip(panels, below, MOVING_BARS, strict=True):
-        _draw_one(axes, view, bar, freed[bar][0], scale, biggest, labels, reach[bar], span)
-        _write_couples(text, view, freed[bar][1])
+    span = WINDOW * max(float(np.ptp(_reach(v, bar, arrows, scale), axis=0).max()) for v, bar, arrows, _ in freed)
+    for axes, text, (_, bar, arrows, couples) in zip(panels, below, freed, strict=False):
+        _draw_one(axes, view, bar, arrows, scale, biggest, labels, span)
+        _write_couples(text, view, couples)
     _scale_bar(panels[0], scale, biggest, view.units)
     note(
         view,
@@ -120,11 +114,10 @@ def draw_free_bodies(figure: "SubFigure", view: View, labels: Labels) -> None:
 def _reach(view: View, bar: int, arrows: list[Arrow], scale: float) -> Points:
     """Every point that a bar's panel has to show, from the bar's first pin, m."""
     described, u = view.scene.linkage.bar(bar), view.state().direction(bar)
-    end, centre = list(components(described.length * u)), list(components(described.to_centre * u))
-    points = [[0.0, 0.0], end, centre]
+    points = [0.0j, one(described.length * u), one(described.to_centre * u)]
     for arrow in arrows:
-        points += [list(arrow.at), [arrow.at[k] + scale * arrow.force[k] for k in (0, 1)]]
-    return np.array(points)
+        points += [arrow.at, arrow.at + scale * arrow.force]
+    return np.array([components(point) for point in points])
 
 
 def _draw_one(
@@ -135,39 +128,38 @@ def _draw_one(
     scale: float,
     biggest: float,
     labels: Labels,
-    reach: Points,
     span: float,
 ) -> None:
-    first, second = (pins(view)[pin] for pin in ENDS[bar])
-    end = (second[0] - first[0], second[1] - first[1])
-    middle = (0.5 * end[0], 0.5 * end[1])
-    axes.plot(
-        [0.0, end[0]], [0.0, end[1]], color=BAR_COLOURS[bar], lw=5.0, alpha=0.45, solid_capstyle="round", zorder=2
-    )
+    where = place_of(view.scene.linkage, view.here, 0, 1.0).pins
+    along = where[ENDS[bar][1]] - where[ENDS[bar][0]]
+    end, middle = components(along), components(0.5 * along)
+    line = ([0.0, end[0]], [0.0, end[1]])
+    axes.plot(*line, color=BAR_COLOURS[bar], lw=5.0, alpha=0.45, solid_capstyle="round", zorder=2)
     labels.keep_off(axes, (0.0, 0.0), end, width=5.0)
     for name, (x, y) in zip(ENDS[bar], ((0.0, 0.0), end), strict=True):
-        axes.plot([x], [y], "o", ms=5.5, mfc="white", mec=INK, mew=1.1, zorder=6)
+        axes.plot([x], [y], "o", ms=5.5, mew=1.1, zorder=6, **OPEN)
         labels.add(Label(axes, pin_name(name), (x, y), middle, MUTED, 8.0, 2.5))
     short: list[str] = []
     for arrow in arrows:
-        size = math.hypot(*arrow.force)
+        size = abs(arrow.force)
         if size < SHOWN * biggest:
             short.append(f"{_words(arrow.text)} = {quantity(size, 'N', view.units)}")
             continue
-        tip = (arrow.at[0] + scale * arrow.force[0], arrow.at[1] + scale * arrow.force[1])
+        foot, tip = components(arrow.at), components(arrow.at + scale * arrow.force)
         look = {**HEADED, "color": arrow.colour, "mutation_scale": 9, "ls": "--" if arrow.dashed else "-"}
-        axes.annotate("", xy=tip, xytext=arrow.at, arrowprops=look, zorder=5, annotation_clip=False)
-        labels.keep_off(axes, arrow.at, tip)
-        labels.add(Label(axes, f"{arrow.text} = {quantity(size, 'N', view.units)}", tip, arrow.at, arrow.colour, 7.5))
+        axes.annotate("", xy=tip, xytext=foot, arrowprops=look, zorder=5, annotation_clip=False)
+        labels.keep_off(axes, foot, tip)
+        labels.add(Label(axes, f"{arrow.text} = {quantity(size, 'N', view.units)}", tip, foot, arrow.colour, 7.5))
     if short:
         note(view, f"Too short to draw on bar {bar}: {', '.join(short)}.")
     centre = view.scene.linkage.bar(bar)
     if centre.mass > 0.0:
-        x, y = components(centre.to_centre * view.state().direction(bar))
+        x, y = components(one(centre.to_centre * view.state().direction(bar)))
         axes.plot([0.0, x], [0.0, y], color=BAR_COLOURS[bar], lw=0.8, ls=":", zorder=1)
         labels.keep_off(axes, (0.0, 0.0), (x, y))
         mass_centre(axes, (x, y), 6.0)
         labels.add(Label(axes, f"$G_{bar}$", (x, y), middle, MUTED, 8.0, 3.0))
+    reach = _reach(view, bar, arrows, scale)
     middle_of = 0.5 * (np.min(reach, axis=0) + np.max(reach, axis=0))
     axes.set_xlim(middle_of[0] - 0.5 * span, middle_of[0] + 0.5 * span)
     axes.set_ylim(middle_of[1] - 0.5 * span, middle_of[1] + 0.5 * span)
@@ -178,10 +170,10 @@ def _draw_one(
 
 def _write_couples(axes: "Axes", view: View, couples: list[Couple]) -> None:
     """One line each."""
-    lines = [
-        f"{'↺' if each.moment > 0.0 else '↻'} {each.text} = {quantity(each.moment, 'N m', view.units)}"
-        for each in couples
-    ]
+    lines = []
+    for each in couples:
+        size = quantity(each.moment, "N m", view.units)
+        lines.append(f"{'↺' if each.moment > 0.0 else '↻'} {each.text} = {size}")
     axes.set_axis_off()
     look: dict[str, Any] = {"va": "top", "size": 7.5, "linespacing": 1.45, "color": INK if lines else MUTED}
     axes.text(0.0, 1.0, "\n".join(lines) or "no couples", transform=axes.transAxes, **look)

@@ -5,8 +5,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fourbar.show.plot.curves import broken, limit_of, note, poles
-from fourbar.show.plot.style import FORCE_COLOURS, MUTED, force_line, force_name, largest, number, unit_for
+from fourbar.show.plot.curves import broken, force_sizes, limit_of, note, poles
+from fourbar.show.plot.style import FORCE_COLOURS, MUTED, OPEN, force_line, force_name, largest, number, unit_for
 from fourbar.show.plot.view import View
 from fourbar.solution import Array
 
@@ -28,7 +28,7 @@ def draw_hodograph(axes: "PolarAxes", view: View, names: tuple[str, ...] = tuple
 
     forces = {name: getattr(view.sweep, name) for name in names}
     sizes = {name: np.hypot(*force.T) for name, force in forces.items()}
-    everywhere = [np.hypot(*getattr(other.sweep, name).T) for other in view.alike for name in names]
+    everywhere = force_sizes(view, names)
     limit = limit_of(everywhere)
     top = limit or 1.08 * largest(*everywhere) or 1.0
     factor, unit = unit_for(top, "N", view.units)
@@ -45,37 +45,21 @@ def draw_hodograph(axes: "PolarAxes", view: View, names: tuple[str, ...] = tuple
         axes.plot(broken(direction, where), factor * broken(size, where), **force_line(name))
         axes.plot(direction[dots], factor * size[dots], "o", ms=2.8, color=FORCE_COLOURS[name], ls="none")
         first = int(np.argmax(np.isfinite(size)))
-        axes.plot(
-            direction[[first]],
-            factor * size[[first]],
-            "o",
-            ms=4.6,
-            mfc="white",
-            mec=FORCE_COLOURS[name],
-            mew=1.1,
-            zorder=5,
-        )
+        start = {**OPEN, "mec": FORCE_COLOURS[name]}
+        axes.plot(direction[[first]], factor * size[[first]], "o", ms=4.6, mew=1.1, zorder=5, **start)
     if limit and largest(*sizes.values()) > limit:
         note(view, f"Hodographs of {', '.join(names)} clipped at {number(factor * top)} {unit}.")
     axes.set_rlim(0.0, factor * top)
     axes.set_thetagrids(range(0, 360, 45))
     axes.tick_params(pad=0.5)
     many = 4 if factor * top < LONG_NUMBERS else 2
-    axes.set_rticks(
-        [tick for tick in MaxNLocator(many).tick_values(0.0, factor * top) if 0.0 < tick < 0.97 * factor * top]
-    )
-    axes.set_rlabel_position(_free_direction([np.column_stack([forces[n], sizes[n]]) for n in names]))
+    ticks = MaxNLocator(many).tick_values(0.0, factor * top)
+    axes.set_rticks([tick for tick in ticks if 0.0 < tick < 0.97 * factor * top])
+    axes.set_rlabel_position(_free_direction(list(forces.values())))
     axes.tick_params(axis="y", labelsize=6.5, labelcolor=MUTED)
-    axes.set_title(
-        ", ".join(force_name(n) for n in names) + f" ({unit})"
-        if len(names) < 4
-        else f"Hodographs of the pin forces ({unit})",
-        pad=12,
-    )
-    note(
-        view,
-        f"Hodographs: open dot at the start, dots every {apart}; angles are directions in the x-y plane.",
-    )
+    title = ", ".join(map(force_name, names)) if len(names) < 4 else "Hodographs of the pin forces"
+    axes.set_title(f"{title} ({unit})", pad=12)
+    note(view, f"Hodographs: open dot at the start, dots every {apart}; angles are directions in the x-y plane.")
 
 
 def _spacing(view: View) -> tuple[Array, float, str]:
@@ -90,9 +74,7 @@ def _spacing(view: View) -> tuple[Array, float, str]:
 
 def _free_direction(forces: list[np.ndarray]) -> float:
     """The multiple of 22.5 deg that lies furthest from the curves."""
-    directions = np.concatenate([np.arctan2(f[:, 1], f[:, 0])[np.isfinite(f[:, 2])] for f in forces])
+    directions = np.concatenate([np.arctan2(f[:, 1], f[:, 0])[np.isfinite(f).all(axis=1)] for f in forces])
     candidates = np.radians(np.arange(16) * 22.5)
-    away = [
-        float(np.min(np.abs(np.angle(np.exp(1j * (directions - c)))))) if directions.size else 0.0 for c in candidates
-    ]
+    away = np.abs(np.angle(np.exp(1j * (directions - candidates[:, None])))).min(axis=1, initial=math.pi)
     return float(np.degrees(candidates[int(np.argmax(away))]))

@@ -9,9 +9,8 @@ from fourbar.linkage import ENDS, MOVING_BARS
 from fourbar.show.acting import acting
 from fourbar.show.plot import symbols
 from fourbar.show.plot.labels import Label, Labels
-from fourbar.show.plot.style import BAR_COLOURS, INK, MUTED, largest, length_unit, quantity
-from fourbar.show.plot.symbols import place_of
-from fourbar.show.plot.vectors import vectors
+from fourbar.show.plot.style import BAR_COLOURS, INK, MUTED, OPEN, largest, length_unit, quantity
+from fourbar.show.plot.symbols import components, place_of, vectors
 from fourbar.show.plot.view import View
 from fourbar.solution import Array
 
@@ -24,35 +23,21 @@ POINT = "#8A3B78"
 """Of the scene's own points."""
 
 
-def pins(view: View) -> dict[str, Point]:
-    """The four pins at the position drawn, m."""
-    return {name: components(pin) for name, pin in place_of(view.scene.linkage, view.here, 0, 1.0).pins.items()}
-
-
-def components(vector: Any) -> Point:
-    """x and y of a complex vector at the one position drawn."""
-    value = complex(np.ravel(vector)[0])
-    return (value.real, value.imag)
-
-
-def centres(view: View) -> dict[int, Point]:
-    """The mass centres of the bars that have mass, m."""
-    massive = (bar for bar in MOVING_BARS if view.scene.linkage.bar(bar).mass > 0.0)
-    return {bar: tuple(getattr(view.here, f"G{bar}")[0].tolist()) for bar in massive}
+def pins(view: View, factor: float = 1.0) -> dict[str, Point]:
+    """The four pins at the position drawn, in the order O2, A, B, O4, m or what the factor makes of it."""
+    place = place_of(view.scene.linkage, view.here, 0, factor)
+    return {name: components(pin) for name, pin in place.pins.items()}
 
 
 def draw_linkage(axes: "Axes", view: View, labels: Labels, *, moving: bool = False) -> None:
     """The linkage at the position drawn, over the paths of its points; with their velocities where it is `moving`."""
-    sweep = view.sweep
-    where, masses = pins(view), centres(view)
-    reached = np.concatenate([sweep.A, sweep.B, sweep.G3, *sweep.points.values(), list(where.values())])
-    factor, unit = _unit(view)
+    where = pins(view)
+    factor, unit, size = scale_of(view)
     where = {name: (factor * x, factor * y) for name, (x, y) in where.items()}
     for path, colour, dashes, name in paths(view):
         scaled = factor * path
         axes.plot(*scaled.T, color=colour, lw=1.0, ls=dashes, zorder=2, label=name)
         labels.keep_off(axes, *[(float(x), float(y)) for x, y in scaled[:: max(1, len(scaled) // 120)]])
-    size = 0.03 * factor * float(np.max(np.nanmax(reached, axis=0) - np.nanmin(reached, axis=0)))
     _ground(axes, labels, where["O2"], where["O4"], size)
     if view.dimensions:
         at = tuple(0.5 * (a + b) for a, b in zip(where["O2"], where["O4"], strict=True))
@@ -64,16 +49,19 @@ def draw_linkage(axes: "Axes", view: View, labels: Labels, *, moving: bool = Fal
         labels.keep_off(axes, where[start], where[stop], width=4.5)
         labels.add(Label(axes, _bar_name(view, number), (0.5 * sum(x), 0.5 * sum(y)), middle, colour, 9.0, 2.0))
     for name, point in where.items():
-        axes.plot(*[[v] for v in point], "o", ms=6.0, mfc="white", mec=INK, mew=1.2, zorder=6)
+        axes.plot(*[[v] for v in point], "o", ms=6.0, mew=1.2, zorder=6, **OPEN)
         labels.add(Label(axes, pin_name(name), point, middle, INK, 9.0, 2.5))
     for name, path in view.here.points.items():
         x, y = factor * path[0]
-        axes.plot([x], [y], "D", ms=4.5, mfc="white", mec=POINT, mew=1.2, zorder=8)
+        axes.plot([x], [y], "D", ms=4.5, mew=1.2, zorder=8, **{**OPEN, "mec": POINT})
         labels.keep_off(axes, (float(x), float(y)), (float(x), float(y)))
         labels.add(Label(axes, name, (float(x), float(y)), middle, POINT, 8.5, 2.5))
-    for number, (x_centre, y_centre) in masses.items():
-        here = (factor * x_centre, factor * y_centre)
+    for number in MOVING_BARS:
         bar, colour = view.scene.linkage.bar(number), BAR_COLOURS[number]
+        if bar.mass == 0.0:
+            continue
+        x, y = factor * getattr(view.here, f"G{number}")[0]
+        here = (float(x), float(y))
         r_along, r_across = bar.to_centre.real, bar.to_centre.imag
         if r_across != 0.0 or not 0.0 <= r_along <= bar.length:  # off the bar: tied to it by a line
             axes.plot(*zip(where[ENDS[number][0]], here, strict=True), color=colour, lw=0.8, ls=":", zorder=3)
@@ -92,9 +80,8 @@ def draw_linkage(axes: "Axes", view: View, labels: Labels, *, moving: bool = Fal
             labels.add(Label(axes, drawn.text, drawn.label, middle, symbols.COLOURS[symbol.kind], 8.0))
     axes.set_aspect("equal", adjustable="datalim")
     axes.margins(0.08)
-    axes.set_xlabel(f"$x$ ({unit})")
-    axes.set_ylabel(f"$y$ ({unit})")
-    axes.set_title(f"Linkage at {view.at}, {view.branch_name} branch")
+    title = f"Linkage at {view.at}, {view.branch_name} branch"
+    axes.set(xlabel=f"$x$ ({unit})", ylabel=f"$y$ ({unit})", title=title)
     path_legend(axes)
 
 
@@ -112,12 +99,13 @@ def _bar_name(view: View, number: int) -> str:
     return f"{number}: {length}" if view.dimensions else str(number)
 
 
-def _unit(view: View) -> tuple[float, str]:
-    """The unit of length of a drawing, the same for both branches."""
-    return length_unit(
-        max(largest(v.sweep.A, v.sweep.B, v.sweep.G3, *np.array(list(pins(v).values()))) for v in view.alike),
-        view.units,
-    )
+def scale_of(view: View) -> tuple[float, str, float]:
+    """The factor to the unit of length of a drawing, the same for both branches; that unit; the size of a support."""
+    most = max(largest(v.sweep.A, v.sweep.B, v.sweep.G3, *np.array(list(pins(v).values()))) for v in view.alike)
+    factor, unit = length_unit(most, view.units)
+    sweep = view.sweep
+    reached = np.concatenate([sweep.A, sweep.B, sweep.G3, *sweep.points.values(), list(pins(view).values())])
+    return factor, unit, 0.03 * factor * float(np.max(np.nanmax(reached, axis=0) - np.nanmin(reached, axis=0)))
 
 
 def pin_name(name: str) -> str:
@@ -184,40 +172,34 @@ def draw_coupler_curves(axes: "Axes", view: View, labels: Labels) -> None:
     across = np.stack([-along[:, 1], along[:, 0]], axis=1)
     points = ((0.0, 0.0), (0.25, 0.0), (0.5, 0.0), (0.75, 0.0), (1.0, 0.0), (0.5, 0.5), (0.5, -0.5))
     paths = [sweep.A + u * along + v * across for u, v in points]
-    factor, unit = _unit(view)
+    factor, unit, _ = scale_of(view)
     greys = ("#0072B2", "#56A0C8", "#D55E00", "#5FA48B", "#007A5A", "#8A3B78", "#8A3B78")
     for (u, v), path, colour in zip(points, paths, greys, strict=True):
         dashes = "-" if v == 0.0 else (0, (5, 1.5)) if v > 0 else (0, (1.4, 1.4))
         lw = 1.8 if (u, v) == (0.5, 0.0) else 1.1
         name = {0.0: "$A$", 1.0: "$B$"}.get(u, f"{u:g}") if v == 0.0 else f"{u:g}, {v:+g}".replace("-", "−")
-        scaled = factor * path
-        axes.plot(scaled[:, 0], scaled[:, 1], color=colour, lw=lw, ls=dashes, label=name, zorder=3)
-    where = pins(view)
+        axes.plot(*(factor * path).T, color=colour, lw=lw, ls=dashes, label=name, zorder=3)
+    where = pins(view, factor)
     for ends in ENDS.values():
-        x, y = zip(*(where[end] for end in ends), strict=True)
         axes.plot(
-            np.multiply(x, factor),
-            np.multiply(y, factor),
+            *zip(*(where[end] for end in ends), strict=True),
             color=MUTED,
             lw=2.5,
             alpha=0.55,
             solid_capstyle="round",
             zorder=2,
         )
-    for name, point in where.items():
-        axes.plot([factor * point[0]], [factor * point[1]], "o", ms=4.5, mfc="white", mec=INK, mew=1.0, zorder=5)
+    for name, (x, y) in where.items():
+        axes.plot([x], [y], "o", ms=4.5, mew=1.0, zorder=5, **OPEN)
         if name in ("O2", "O4"):
-            labels.add(Label(axes, pin_name(name), (factor * point[0], factor * point[1]), (0.0, 1e9), INK, 8.5, 2.0))
-    labels.keep_off(axes, *[(factor * where[k][0], factor * where[k][1]) for k in ("O2", "A", "B", "O4")])
+            labels.add(Label(axes, pin_name(name), (x, y), (0.0, 1e9), INK, 8.5, 2.0))
+    labels.keep_off(axes, *where.values())
     axes.set_aspect("equal", adjustable="datalim")
-    axes.set_xlabel(f"$x$ ({unit})")
-    axes.set_ylabel(f"$y$ ({unit})")
-    axes.set_title(f"Coupler curves, {view.branch_name} branch")
-    axes.legend(
-        loc="upper center",
-        bbox_to_anchor=(0.5, -0.14),
-        ncols=4,
-        title="point along AB (and off it), in lengths of the coupler",
-        title_fontsize=7.5,
-    )
+    title = f"Coupler curves, {view.branch_name} branch"
+    axes.set(xlabel=f"$x$ ({unit})", ylabel=f"$y$ ({unit})", title=title)
+    of_points: dict[str, Any] = {
+        "title": "point along AB (and off it), in lengths of the coupler",
+        "title_fontsize": 7.5,
+    }
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=4, **of_points)
     view.notes.append(f"The linkage is drawn at {view.at}.")

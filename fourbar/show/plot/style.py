@@ -45,52 +45,18 @@ def force_name(name: str) -> str:
 TITLE: dict[str, Any] = {"parse_math": False, "size": 10.5, "weight": "bold", "x": 0.012, "ha": "left"}
 CAPTION: dict[str, Any] = {"parse_math": False, "size": 6.8, "color": MUTED, "x": 0.012, "ha": "left"}
 """Of a whole figure, above and below its panels."""
+OPEN: dict[str, Any] = {"mfc": "white", "mec": INK}
+"""A mark that is a ring."""
 HEADED: dict[str, Any] = {"arrowstyle": "-|>", "lw": 1.5, "shrinkA": 0.0, "shrinkB": 0.0}
 """An arrow from end to end."""
-SETTINGS: dict[Any, Any] = {
-    "font.family": "DejaVu Sans",  # ships with matplotlib: the same picture on every machine
-    "font.size": 8.0,
-    "mathtext.fontset": "dejavusans",
-    "axes.titlesize": 8.5,
-    "axes.titleweight": "bold",
-    "axes.titlelocation": "left",
-    "axes.labelsize": 8.0,
-    "axes.edgecolor": INK,
-    "axes.linewidth": 0.7,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.grid": True,
-    "axes.axisbelow": True,
-    "axes.unicode_minus": True,
-    "axes.formatter.limits": (-4, 5),
-    "grid.color": "#e4e4e4",
-    "grid.linewidth": 0.6,
-    "lines.linewidth": 1.4,
-    "lines.solid_capstyle": "butt",
-    "legend.frameon": False,
-    "legend.fontsize": 7.5,
-    "legend.handlelength": 2.6,
-    "legend.columnspacing": 1.2,
-    "legend.borderaxespad": 0.0,
-    "legend.borderpad": 0.0,
-    "xtick.labelsize": 7.5,
-    "ytick.labelsize": 7.5,
-    "xtick.major.width": 0.7,
-    "ytick.major.width": 0.7,
-    "hatch.linewidth": 0.6,
-    "figure.facecolor": "white",
-    "savefig.facecolor": "white",
-    "svg.hashsalt": "fourbar",  # the same input gives the same bytes
-    "svg.fonttype": "path",
-    "pdf.fonttype": 42,
-}
+STYLE = Path(__file__).with_name("fourbar.mplstyle")
 DPI = 200
 FORMATS = ("svg", "png", "pdf")
 
 
 @contextmanager
 def matplotlib_style() -> Iterator[None]:
-    """The settings above, for the time of one drawing.
+    """The settings of `STYLE`, for the time of one drawing.
 
     Raises DependencyError where matplotlib is not installed.
     """
@@ -100,7 +66,7 @@ def matplotlib_style() -> Iterator[None]:
         raise DependencyError(f"drawing needs matplotlib: {installing('plot')}") from None
     with mpl.rc_context():
         mpl.rcdefaults()  # a user's matplotlibrc does not change a published figure
-        mpl.rcParams.update(SETTINGS)
+        mpl.rcParams.update(mpl.rc_params_from_file(STYLE, use_default_template=False))
         yield
 
 

@@ -1,7 +1,11 @@
-"""Symbols of what acts, drawn with matplotlib: springs, loads, drive, flywheel, gravity, and rings around pins."""
+"""Symbols of what acts, drawn with matplotlib: springs, loads, drive, flywheel, gravity, and rings around pins.
+
+And arrows of velocity and acceleration at points.
+"""
 
 import cmath
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -9,7 +13,9 @@ import numpy as np
 
 from fourbar.linkage import FourBar
 from fourbar.show.acting import Symbol
-from fourbar.show.plot.style import HEADED, INK, MUTED
+from fourbar.show.plot.curves import limit_of
+from fourbar.show.plot.style import HEADED, INK, MUTED, largest
+from fourbar.show.plot.view import View, point_vectors
 from fourbar.solution import Solution
 
 if TYPE_CHECKING:
@@ -24,6 +30,9 @@ COLOURS = {
 LENGTHS = {"force": 7.0, "moment": 2.6, "drive": 3.2, "flywheel": 4.0, "torsion": 2.2}
 """Length of an arrow and radii, in sizes of a support; other rings around pins have RING."""
 RING = {"viscous": 1.5, "friction": 1.8, "pin_friction": 1.8}
+ARROWS = {"v": ("#0B6E99", "velocity"), "a": ("#B3261E", "acceleration")}
+LONGEST = 7.0
+"""Of an arrow, in sizes of a support: the largest of the sweep, or where values diverge all that are as large."""
 COILS = 7
 OPENING = math.radians(250.0)
 """Of an arc with an arrow head."""
@@ -103,11 +112,12 @@ def draw(axes: "Axes", symbol: Symbol, place: Place, size: float) -> Drawn:
                 1j * np.linspace(0.0, math.tau, 60)
             )
         _line(axes, drawn, points, colour, 2.2 if symbol.kind == "flywheel" else 1.2)
-        drawn.label = _point(points[-1])
+        drawn.label = components(points[-1])
     return drawn
 
 
-def _point(z: complex) -> Point:
+def components(z: complex) -> Point:
+    """x and y."""
     return (z.real, z.imag)
 
 
@@ -120,10 +130,10 @@ def _line(axes: "Axes", drawn: Drawn, points: Any, colour: str, width: float) ->
 def _arrow(axes: "Axes", tail: complex, tip: complex, colour: str, drawn: Drawn) -> None:
     from matplotlib.patches import FancyArrowPatch
 
-    arrow = FancyArrowPatch(_point(tail), _point(tip), zorder=8, color=colour, mutation_scale=10.0, **HEADED)
+    arrow = FancyArrowPatch(components(tail), components(tip), zorder=8, color=colour, mutation_scale=10.0, **HEADED)
     drawn.artists.append(axes.add_patch(arrow))
-    axes.update_datalim([_point(tail), _point(tip)])
-    drawn.lines.append([_point(tail), _point(tip)])
+    axes.update_datalim([components(tail), components(tip)])
+    drawn.lines.append([components(tail), components(tip)])
 
 
 def _force(axes: "Axes", symbol: Symbol, place: Place, size: float, drawn: Drawn) -> None:
@@ -134,7 +144,7 @@ def _force(axes: "Axes", symbol: Symbol, place: Place, size: float, drawn: Drawn
         return
     tip = tail + sign * LENGTHS["force"] * size * u * symbol.vector / abs(symbol.vector)
     _arrow(axes, tail, tip, COLOURS["force"], drawn)
-    drawn.label, drawn.away = _point(tip), (tip - tail) / abs(tip - tail)
+    drawn.label, drawn.away = components(tip), (tip - tail) / abs(tip - tail)
 
 
 def _turn(axes: "Axes", centre: complex, radius: float, turn: float, colour: str, drawn: Drawn) -> None:
@@ -145,7 +155,7 @@ def _turn(axes: "Axes", centre: complex, radius: float, turn: float, colour: str
     points = centre + radius * np.exp(1j * angles)
     _line(axes, drawn, points, colour, 1.5)
     _arrow(axes, complex(points[-2]), complex(points[-1] + 2.0 * (points[-1] - points[-2])), colour, drawn)
-    drawn.label, drawn.away = _point(complex(points[20])), complex(points[20] - centre) / radius
+    drawn.label, drawn.away = components(complex(points[20])), complex(points[20] - centre) / radius
 
 
 def _zigzag(start: complex, end: complex, width: float) -> Any:
@@ -170,3 +180,31 @@ def _gravity(axes: "Axes", symbol: Symbol, drawn: Drawn) -> None:
         axes.annotate("", xy=middle, xytext=(-x, -y), arrowprops=style, **corner),
         axes.annotate("$g$", xy=middle, xytext=(-x - 8.0, -y), color=COLOURS["gravity"], size=9.0, **corner),
     ]
+
+
+def vectors(axes: "Axes", view: View, solution: Solution, factor: float, size: float) -> Callable[[int], None]:
+    """Draw the arrows of a solution's first position, each kind to one scale of the sweep.
+
+    Returns the function that moves them to another position.
+    """
+    drawn = []
+    for letter, (colour, label) in ARROWS.items():
+        sizes = [np.hypot(*values.T) for values in point_vectors(view.scene, view.sweep, letter).values()]
+        if not (top := limit_of(sizes) or largest(*sizes)):
+            continue
+        found = point_vectors(view.scene, solution, letter)
+        feet = [solution.points[name] if name in solution.points else getattr(solution, name) for name in found]
+        shafts = [LONGEST * size * v / np.maximum(np.hypot(*v.T), top)[:, None] for v in found.values()]
+        tips = np.concatenate([factor * foot + shaft for foot, shaft in zip(feet, shafts, strict=True)])
+        axes.update_datalim(tips[np.isfinite(tips).all(axis=1)])
+        look: dict[str, Any] = {"angles": "xy", "scale_units": "xy", "scale": 1.0, "width": 0.0045, "zorder": 7}
+        start = np.zeros((2, len(found)))
+        drawn.append((axes.quiver(*start, *start, color=colour, label=label, **look), feet, shafts))
+
+    def move(index: int) -> None:
+        for arrows, feet, shafts in drawn:
+            arrows.set_offsets(factor * np.array([foot[index] for foot in feet]))
+            arrows.set_UVC(*np.nan_to_num(np.array([shaft[index] for shaft in shafts])).T)
+
+    move(0)
+    return move

@@ -1,13 +1,13 @@
 """The transmission angle over theta_2 or time, with the limits and dead centres."""
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from fourbar.formulas.mobility import limit_positions
 from fourbar.show.plot.curves import bases
-from fourbar.show.plot.style import INK, MUTED, legend_above
+from fourbar.show.plot.style import INK, MUTED, OPEN, legend_above
 from fourbar.show.plot.view import View
 from fourbar.solution import Array
 
@@ -28,23 +28,13 @@ def draw_transmission(axes: "Axes", view: View) -> None:
     axes.plot(over, mu, color=INK)
     axes.axhline(RECOMMENDED, color=MUTED, lw=0.9, ls=(0, (4, 2)))
     place = free_place(mu)
-    axes.annotate(
-        f"{RECOMMENDED:g}° recommended",
-        (over[0] + place * (over[-1] - over[0]), RECOMMENDED),
-        xytext=(0, 2),
-        textcoords="offset points",
-        ha="center",
-        size=7.0,
-        color=MUTED,
-    )
-    axes.set_ylim(0.0, 96.0)
-    axes.yaxis.set_ticks(range(0, 91, 15))
+    at = (over[0] + place * (over[-1] - over[0]), RECOMMENDED)
+    look: dict[str, Any] = {"textcoords": "offset points", "ha": "center", "size": 7.0, "color": MUTED}
+    axes.annotate(f"{RECOMMENDED:g}° recommended", at, xytext=(0, 2), **look)
+    axes.set(ylim=(0.0, 96.0), yticks=range(0, 91, 15))
     for theta, height, marker, name in _marked(view):
-        axes.plot(
-            theta, height, marker, ms=6.0, mfc="white", mec=INK, mew=1.1, ls="none", label=name, clip_on=False, zorder=5
-        )
-    axes.set_ylabel(r"transmission angle $\mu$ (°)")
-    axes.set_title("Transmission angle")
+        axes.plot(theta, height, marker, ms=6.0, mew=1.1, ls="none", label=name, clip_on=False, zorder=5, **OPEN)
+    axes.set(ylabel=r"transmission angle $\mu$ (°)", title="Transmission angle")
     if view.time is None:
         legend_above(axes, 2)
 

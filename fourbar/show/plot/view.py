@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -90,6 +91,11 @@ def point_vectors(scene: Scene, solution: Solution, letter: str) -> dict[str, Ar
     return {name: values for name, values in found.items() if values is not None}
 
 
+def one(vector: Any) -> complex:
+    """The one complex number of an array, at the position drawn."""
+    return complex(np.ravel(vector)[0])
+
+
 class Recorder(Actions):
     """Forces and couples that are kept one by one, each force with its arm, for a free-body diagram."""
 
@@ -102,12 +108,12 @@ class Recorder(Actions):
 
     def force(self, bar: int, force: Number, arm: Number = 0.0j) -> None:
         """A force on a bar, applied at `arm` from the bar's first pin."""
-        self.arrows.append((bar, complex(np.ravel(force)[0]), complex(np.ravel(arm)[0])))
+        self.arrows.append((bar, one(force), one(arm)))
 
     def moment(self, bar: int, moment: Number) -> None:
         """A pure couple on a bar."""
         if bar != 1:
-            self.turns.append((bar, float(np.ravel(moment)[0])))
+            self.turns.append((bar, one(moment).real))
 
     def couple(self, pin: str, couple: Number) -> None:
         """A couple on the second of the two bars that meet at a pin, and its opposite on the first."""

@@ -1,4 +1,5 @@
-"""Bands of torque, pin forces and points over the sweep, and whose variance it is."""
+"""What tolerances do to torque, pin forces and points: bands over the sweep, and whose variance it is; and what these
+quantities depend on most: bars, the longest first."""
 
 import textwrap
 from pathlib import Path
@@ -7,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fourbar.errors import InputError
+from fourbar.show.influence import influences, largest_value, ranked, shown_quantities
+from fourbar.show.plot.labels import Labels
 from fourbar.show.plot.style import (
     CAPTION,
     FAINT,
@@ -21,19 +24,27 @@ from fourbar.show.plot.style import (
     save,
     unit_for,
 )
-from fourbar.show.tolerances import parted, shown_parts, unit_of
+from fourbar.show.plot.view import View
+from fourbar.show.tolerances import parted, shown_parts
+from fourbar.solution import unit_of
+from fourbar.studies.derivatives import sensitivity
 from fourbar.studies.spread import BAND, Tolerances
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import SubFigure
 
-MOST_PANELS = 7
+MOST_BANDS = 7
 """Torque, four pin forces, and the two components of one point; the eighth is for the shares."""
 MOST_SHARES = 5
 """Tolerances that have a colour of their own; the others are drawn together."""
 SHADES = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", FAINT)
 OFF_SCALE = 98.0
 """Percentile of the half widths beyond which an axis is not stretched: towards a limit they grow without end."""
+MOST_NUMBERS = 12
+"""Of a scene's numbers, those that matter most: more are thin bars that nobody reads."""
+MOST_PANELS = 6
+"""Torque, the four pin forces, and a point."""
 
 
 def draw_tolerances(found: Tolerances, path: str | Path) -> None:
@@ -49,7 +60,7 @@ def draw_tolerances(found: Tolerances, path: str | Path) -> None:
     with matplotlib_style():
         from matplotlib.figure import Figure
 
-        parts = shown_parts(found)[:MOST_PANELS]
+        parts = shown_parts(found)[:MOST_BANDS]
         columns = (len(parts) + 2) // 2
         figure = Figure(figsize=(2.95 * columns, 5.6), layout="constrained")
         panels = figure.subplots(2, columns, squeeze=False).ravel()
@@ -59,15 +70,13 @@ def draw_tolerances(found: Tolerances, path: str | Path) -> None:
             axes.set_axis_off()
         _shares(panels[len(parts)], found, parts[0])
         title = plain(found.scene.title, 80) or "Four-bar linkage"
-        heading = f"{title}: what the tolerances do ({found.samples} samples)"
-        figure.suptitle(heading, **TITLE)
+        figure.suptitle(f"{title}: what the tolerances do ({found.samples} samples)", **TITLE)
         caption = (
             f"Deviation from the nominal. Filled: {BAND[0]:g} to {BAND[1]:g} % of the samples; thin: least and "
             "greatest sampled; dashed: first-order worst case."
         )
         lines = [caption, *(line for part in parts if (line := parted(found, part)))]
-        text = "\n".join(textwrap.fill(line, 52 * columns) for line in lines)
-        figure.supxlabel(text, **CAPTION)
+        figure.supxlabel("\n".join(textwrap.fill(line, 52 * columns) for line in lines), **CAPTION)
         save(figure, target, kind)
 
 
@@ -86,7 +95,7 @@ def _band(axes: "Axes", found: Tolerances, part: str) -> None:
     sizes = np.abs(np.concatenate([*away, spread.worst]))
     sizes = sizes[np.isfinite(sizes)]
     most = 1.1 * float(np.percentile(sizes, OFF_SCALE)) if sizes.size else 0.0
-    factor, unit = unit_for(most, unit_of(part))
+    factor, unit = unit_for(most, unit_of(part.strip("|")))
     colour = FORCE_COLOURS.get(part.strip("|"), INK)
     axes.fill_between(over, factor * away[0], factor * away[1], color=colour, alpha=0.35, lw=0.0)
     for line in away[2:]:
@@ -96,8 +105,7 @@ def _band(axes: "Axes", found: Tolerances, part: str) -> None:
     if sizes.size and largest(sizes) > 2.0 * most > 0.0:
         axes.set_ylim(-factor * most, factor * most)
     axes.axhline(0.0, color=INK, lw=0.6)
-    axes.set_ylabel(f"deviation ({unit})")
-    axes.set_title(part)
+    axes.set(ylabel=f"deviation ({unit})", title=part)
 
 
 def _shares(axes: "Axes", found: Tolerances, part: str) -> None:
@@ -111,7 +119,30 @@ def _shares(axes: "Axes", found: Tolerances, part: str) -> None:
         rows.append(shares[order[MOST_SHARES:]].sum(axis=0))
         names = [*names[:MOST_SHARES], "the others"]
     axes.stackplot(over, rows, colors=SHADES[: len(rows)], labels=names, lw=0.0)
-    axes.set_ylim(0.0, 100.0)
-    axes.set_ylabel("share of the variance (%)")
+    axes.set(ylim=(0.0, 100.0), ylabel="share of the variance (%)", title=f"{part}: from which dimension")
     axes.legend(loc="upper left", bbox_to_anchor=(0.0, -0.28), ncols=1, fontsize=6.5)
-    axes.set_title(f"{part}: from which dimension")
+
+
+def draw_influences(figure: "SubFigure", shown: View, labels: Labels) -> None:
+    """One panel for each quantity over the same rows."""
+    del labels
+    found = sensitivity(shown.scene)
+    names = shown_quantities(found)[:MOST_PANELS]
+    keys = ranked(found, names)[:MOST_NUMBERS][::-1]
+    panels = figure.subplots(1, len(names), squeeze=False)[0]
+    for axes, name in zip(panels, names, strict=True):
+        changes = {row.key: abs(row.change) for row in influences(found, name)}
+        sizes = np.array([changes.get(key, 0.0) for key in keys])
+        factor, unit = unit_for(sizes.max(initial=0.0), unit_of(name))
+        axes.barh(range(len(keys)), factor * sizes, height=0.62, color=FORCE_COLOURS.get(name, INK))
+        axes.set_yticks(range(len(keys)), keys if axes is panels[0] else [""] * len(keys), size=6.8)
+        title = name if len(name) <= 10 else name[:9] + "…"
+        axes.set(ylim=(-0.6, len(keys) - 0.4), title=title, xlabel=unit)
+        axes.grid(False, axis="y")
+        axes.locator_params(axis="x", nbins=3)
+        most, own_unit = unit_for(largest_value(found, name), unit_of(name))
+        text = f"largest\n{most * largest_value(found, name):.3g} {own_unit}"
+        axes.text(0.98, 0.02, text, transform=axes.transAxes, ha="right", va="bottom", size=6.8)
+    shown.notes.append(
+        "Bars: the largest change over the sweep by 1 % of a number, of an angle by 1°; pin forces by their magnitude."
+    )
