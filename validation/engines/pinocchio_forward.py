@@ -11,6 +11,7 @@ from validation.compare.answer import Array
 from validation.engines.loop import Trial, as_made, blank
 from validation.engines.pinocchio import PinocchioTree
 from validation.engines.pinocchio_closed import ClosedTree, step
+from validation.engines.tree import multipliers
 
 
 class PinocchioForward:
@@ -75,8 +76,7 @@ class PinocchioForward:
         if self.scene.drive_bar == 2:
             loop_force, torque = self.loop.loop_force(), -self.armature[0] * (a[0] - self.alpha)
         else:
-            matrix = np.column_stack((tree.jacobian().T, tree.turns[self.scene.drive_bar]))
-            unknowns = np.asarray(np.linalg.solve(matrix, needed), dtype=np.float64)
+            unknowns = multipliers(tree.jacobian(), tree.turns[self.scene.drive_bar], needed)
             loop_force, torque = unknowns[:2], float(unknowns[2])
         forces = tree.forces(loop_force, torque)
         tree.model.armature = self.armature

@@ -10,6 +10,7 @@ lambda = F43 and e_drive = the derivative of the driven bar's rotation. Every nu
 
 import math
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -239,19 +240,18 @@ class Tree(Bars):
         values: Values = {f"a_{name}": self.acceleration(point) for name, point in ON_BARS.items()}
         for bar in (3, 4):
             values[f"omega_{bar}"], values[f"alpha_{bar}"] = self.velocity(bar), self.alpha(bar)
-        matrix = np.array([*jacobian, self.turns[self.drive_bar]]).T
+        solve = partial(multipliers, jacobian, self.turns[self.drive_bar])
         try:
-            unknowns, *without = np.linalg.solve(matrix, np.array([needed, *inertial]).T).T
-            if without:
-                values["torque_inertia"] = float(without[0][2])
-            forces = self._multipliers(unknowns)
-            if self.loaded:
-                forces = self._settled(forces, lambda: self._multipliers(np.linalg.solve(matrix, self.torques())))
+            forces = self._balanced(solve(needed))
         except np.linalg.LinAlgError:  # no torque on that bar balances the linkage here
             return values
+        if inertial:
+            values["torque_inertia"] = float(solve(inertial[0])[2])
+        if self.loaded:
+            forces = self._settled(forces, lambda: self._balanced(solve(self.torques())))
         return values | forces
 
-    def _multipliers(self, unknowns: Array) -> dict[str, Any]:
+    def _balanced(self, unknowns: Array) -> dict[str, Any]:
         """Driving torque and the four pin forces."""
         return {**self.forces(unknowns[:2], float(unknowns[2])), "F43": unknowns[:2], "torque": unknowns[2]}
 
@@ -283,3 +283,20 @@ def closed(jacobian: Array, of_2: float, x: float = 0.0, y: float = 0.0) -> Arra
     if det == 0.0:
         raise np.linalg.LinAlgError("the bars are in one line")
     return np.array([of_2, (b * y - d * x) / det, (c * x - a * y) / det])
+
+
+def multipliers(jacobian: Array, turn: Array, needed: Array) -> Array:
+    """[lambda; T] where [J^T turn] [lambda; T] = tau, (3,); LinAlgError where no torque on that bar balances tau.
+
+    By Cramer's rule: of bar 2 the determinant is that of `closed` to the last digit, so that there are forces wherever
+    there are speeds, as far as rounding leaves them digits; elimination may find the matrix singular there.
+    """
+    (a, b, c), (d, e, f) = jacobian.tolist()
+    (p, q, r), (x, y, z) = turn.tolist(), needed.tolist()
+    u, v, w = b * f - c * e, c * d - a * f, a * e - b * d
+    det = p * u + q * v + r * w
+    if det == 0.0:
+        raise np.linalg.LinAlgError("the torque is at a pole")
+    one = x * (e * r - f * q) + y * (f * p - d * r) + z * (d * q - e * p)
+    other = x * (q * c - r * b) + y * (r * a - p * c) + z * (p * b - q * a)
+    return np.array([one / det, other / det, (x * u + y * v + z * w) / det])
