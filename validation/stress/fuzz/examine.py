@@ -39,16 +39,12 @@ def _file(scene: Scene) -> list[str]:
 
 def _assembly(scene: Scene, at: Command, solution: Solution) -> list[str]:
     """No position where the loop does not close, none missing where it does, by ball arithmetic."""
-    from flint import arb, ctx
+    from validation.engines.balls import closure, stored
 
-    from validation.engines.balls import BITS, closure, inputs
-
-    ctx.prec = BITS
     found = []
     margin = np.abs(closing_margin(scene, at.theta_2))
     for i, theta_2 in enumerate(at.theta_2):
-        exact = {name: arb(value) for name, value in inputs(scene, float(theta_2)).items()}
-        closes = closure(exact, int(at.branch[i])) is not None
+        closes = closure(stored(scene, float(theta_2)), int(at.branch[i])) is not None
         if closes != bool(solution.assembled[i]) and margin[i] > TOUCHING_MARGIN:
             found.append(f"assembled: the formulas say {bool(solution.assembled[i])} at theta_2 = {theta_2!r}")
         angles = (solution.theta_3[i], solution.theta_4[i])
