@@ -98,16 +98,15 @@ def _centre_kept(r: float) -> bool:
 
 def _proximal(mu: float) -> bool:
     """Whether Pinocchio's constrained acceleration is a number with this proximal parameter."""
-    from validation.engines import pinocchio_closed
-    from validation.engines.pinocchio_released import PinocchioReleased
+    from validation.engines import pinocchio_forward
 
     scene = replace(_base(), loads=(), motion=Motion(1.0, 3.0))
-    kept = pinocchio_closed.PROXIMAL
+    kept = pinocchio_forward.PROXIMAL
     try:
-        pinocchio_closed.PROXIMAL = (kept[0], mu, kept[2] if mu else 1)
-        released = PinocchioReleased().release(scene, np.array([0.0, 0.01]))
+        pinocchio_forward.PROXIMAL = (kept[0], mu, kept[2] if mu else 1)
+        released = pinocchio_forward.PinocchioReleased().release(scene, np.array([0.0, 0.01]))
     finally:
-        pinocchio_closed.PROXIMAL = kept
+        pinocchio_forward.PROXIMAL = kept
     return bool(np.isfinite(released.theta_2).all())
 
 

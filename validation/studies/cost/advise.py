@@ -1,11 +1,7 @@
 """The cheapest settings of MuJoCo that keep torque and pin forces within a required error on a given scene.
 
-The laws of the study say where to look, and short runs of the scene itself decide:
-
-    the closure's time constant    error = STIFF (h/tc)^4, whatever the timestep        -> tc in steps
-    the timestep                   error ~ h^ORDER until a floor                         -> steps
-
-With fitted pads the softness of the closure plays no part above 1e-9 (1e-6 in a slow linkage), so that tc may be long.
+The laws of the study (`guess`) say where to look, and short runs of the scene itself decide. With fitted pads
+the softness of the closure plays no part above 1e-9 (1e-6 in a slow linkage), so that tc may be long.
 """
 
 from dataclasses import dataclass
@@ -19,8 +15,7 @@ from fourbar.mjcf import Settings, mjcf
 from fourbar.scene import Command, Scene
 from fourbar.scene import command as command_of
 from fourbar.writing import require_file, write_text
-from validation.engines.mujoco.dialled import FEWEST_STEPS, LONGEST, ORDER, SHORTEST, dialled, guess
-from validation.engines.mujoco.trial import Rig
+from validation.engines.mujoco.trial import FEWEST_STEPS, LONGEST, ORDER, SHORTEST, Rig, dialled, guess
 from validation.report.terminal import lined_up
 from validation.studies.cost.errors import Errors
 from validation.studies.cost.matters import MATTERS, influences, judged, sentence
