@@ -14,7 +14,7 @@ from fourbar.quantities import ANGLES, PIN_FORCES, STAGE_OF, STAGES, VECTORS
 from fourbar.scene import Command, Scene
 from validation.compare.answer import Answer, Array
 from validation.engines.description import SHARED, speeds
-from validation.engines.tree import Bars, Values
+from validation.engines.tree import Assembled, Bars, Values
 
 START_ANGLES = np.radians(
     (
@@ -49,7 +49,7 @@ Angles = tuple[float, float, float]
 class Position:
     """Assembles a tree at commanded angles of bar 2, one after another."""
 
-    def __init__(self, tree: Bars) -> None:
+    def __init__(self, tree: Assembled) -> None:
         self.tree = tree
 
     def find(self, theta_2: float, branch: int) -> Angles | None:
@@ -87,7 +87,7 @@ def _triangle_angle(e: float, near: float, far: float) -> float:
     return 2.0 * math.atan2(math.sqrt(max(above, 0.0)), math.sqrt(max(below, 0.0)))
 
 
-def newton(tree: Bars, q: Angles, branch: int, closed: float) -> Angles | None:
+def newton(tree: Assembled, q: Angles, branch: int, closed: float) -> Angles | None:
     """Close the gap with bar 2 held, never leaving the branch.
 
     The determinant of the gap's derivative by (q3, q4) is -b c sin(theta_4 - theta_3): its sign is the
@@ -162,7 +162,7 @@ Read = Callable[[Angles, float, float], Values]
 
 
 def at_each(
-    bars: Bars, command: Command, names: Iterable[str], read: Read
+    bars: Assembled, command: Command, names: Iterable[str], read: Read
 ) -> tuple[dict[str, Array], NDArray[np.bool_], float]:
     """What is read at each position that assembles, NaN elsewhere; where that is; the greatest gap left, m."""
     n, (omega, alpha) = len(command.theta_2), speeds(command)

@@ -7,7 +7,7 @@ import numpy as np
 
 from validation.compare.answer import Array
 from validation.engines.loop import Position
-from validation.engines.tree import Bars, closed
+from validation.engines.tree import Assembled, closed
 
 CARRIED_BY = {"input": ("input",), "coupler": ("coupler", "input"), "output": ("output",)}
 """The bodies whose parent bears what acts on a body."""
@@ -25,7 +25,7 @@ def load_force(model: mujoco.MjModel, data: mujoco.MjData, actuator: int) -> Arr
     return np.asarray(axes @ model.actuator_gear[actuator, :3] * data.actuator_force[actuator])
 
 
-class ClosedLoop(Bars):
+class ClosedLoop(Assembled):
     """Model and data of one generated MJCF; nothing is edited after it is compiled."""
 
     def __init__(self, mjcf: str) -> None:
