@@ -6,7 +6,6 @@ import mujoco
 import numpy as np
 
 from validation.compare.answer import Array
-from validation.engines.loop import Position
 from validation.engines.tree import Assembled, closed
 
 CARRIED_BY = {"input": ("input",), "coupler": ("coupler", "input"), "output": ("output",)}
@@ -62,10 +61,6 @@ class ClosedLoop(Assembled):
         """Pins O4 and A, and B at the end of bar 3 and of bar 4, (2,), m."""
         x, names = self.data.site_xpos, {"O4": "O4", "A": "A", "B": "B3", "B4": "B4"}
         return {name: x[self.site[site]][:2].copy() for name, site in names.items()}
-
-    def position(self) -> Position:
-        """Own assembly, position after position."""
-        return Position(self)
 
     def branch(self) -> int:
         """The branch of the state that was last forwarded: det = -b c sin(theta_4 - theta_3)."""

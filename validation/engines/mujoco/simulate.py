@@ -121,7 +121,7 @@ class _Simulation:
 
     def answer(self) -> Answer:
         """The answer over all positions."""
-        position = ClosedLoop(self._text(1e-3)).position()  # kinematics alone: the timestep plays no part
+        position = Position(ClosedLoop(self._text(1e-3)))  # kinematics alone: the timestep plays no part
         found = assembled(position, self.command, self.order)
         least = least_sine(self.scene.linkage, self.command.theta_2, np.array([q is not None for q in found]))
         if self.bounded and least < NEAREST_TOGGLE.boundary:

@@ -21,7 +21,7 @@ from fourbar.errors import LimitError
 from fourbar.mjcf import Settings, mjcf
 from fourbar.scene import Command, Scene
 from validation.compare.answer import Array
-from validation.engines.loop import Trial, as_made, blank
+from validation.engines.loop import Position, Trial, as_made, blank
 from validation.engines.mujoco.closed_loop import O2, ClosedLoop
 from validation.engines.mujoco.motions import Steady, order_in_time
 from validation.engines.mujoco.runner import LIGHT_FLYWHEEL, Run, assembled, stretches
@@ -87,7 +87,7 @@ class Rig:
         motion = replace(scene.motion, theta_2=command.theta_2, omega_2=self.omega, alpha_2=self.alpha)
         self.scene, self.command = replace(scene, motion=motion), command
         order = order_in_time(command, self.omega, None)
-        position = ClosedLoop(mjcf(self.scene, Settings(timestep=1e-3), keyframe=False)).position()
+        position = Position(ClosedLoop(mjcf(self.scene, Settings(timestep=1e-3), keyframe=False)))
         found = assembled(position, command, order)
         self.stretches = [stretch for stretch in stretches(found, order) if len(stretch) > 1]
         self.start = {index: angles for index, angles in enumerate(found) if angles is not None}
