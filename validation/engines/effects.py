@@ -52,7 +52,7 @@ def _friction(effect: "Friction", tree: Tree) -> None:
 def _pin_friction(effect: "PinFriction", tree: Tree) -> None:
     """Couples of mu r times the load that the engine found at the pin in its last pass."""
     for pin, mu, r in effect.pins:
-        _twist_at(tree, pin, mu * r * tree.pin_load(pin) * float(np.sign(_slip(tree, pin))))
+        _twist_at(tree, pin, mu * r * tree.pin_loads.get(pin, 0.0) * float(np.sign(_slip(tree, pin))))
 
 
 def _torsion(effect: "Torsion", tree: Tree) -> None:
@@ -94,7 +94,7 @@ def _load(load: "Load", tree: Tree) -> None:
         f, at = tree.turned(load.bar, *force), tree.turned(load.bar, *arm)
     else:
         f, at = force, arm
-    tree.push(load.bar, factor * f, tree.centre(load.bar) + at)
+    tree.push(load.bar, factor * f, tree.point(f"G{load.bar}") + at)
     tree.twist(load.bar, factor * load.moment)
 
 

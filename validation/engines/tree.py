@@ -85,7 +85,7 @@ class Tree(Bars, Protocol):
     loaded: list[str]
     """Pins whose friction depends on their load."""
     pin_loads: dict[str, float]
-    """Magnitudes of its own pin forces in the last pass, by pin, N."""
+    """Magnitudes of its own pin forces in the last pass, by pin, N; empty before the first."""
     turns: dict[int, Array]
     """Derivatives of the bars' rotations by the coordinates, constant in the plane."""
     wrenches: dict[int, list[float]]
@@ -158,10 +158,6 @@ class Tree(Bars, Protocol):
         """First pin of a bar (O2, O2, A, O4 of bars 1, 2, 3, 4), m, (2,)."""
         return np.zeros(2) if bar == 1 else self.point(f"foot{bar}")
 
-    def centre(self, bar: int) -> Array:
-        """Mass centre of a moving bar, m, (2,)."""
-        return self.point(f"G{bar}")
-
     def velocity(self, bar: int) -> float:
         """Angular velocity of a bar, rad/s."""
         return float(self.turns[bar] @ self.v)
@@ -169,10 +165,6 @@ class Tree(Bars, Protocol):
     def alpha(self, bar: int) -> float:
         """Angular acceleration of a bar, rad/s^2."""
         return float(self.turns[bar] @ self.a)
-
-    def pin_load(self, pin: str) -> float:
-        """Magnitude of the pin force that the engine itself found in its last pass, N; none before the first."""
-        return self.pin_loads.get(pin, 0.0)
 
     def gravity(self, field: tuple[float, float]) -> None:
         """A field (g_x, g_y) for the engine's own gravity, m/s^2."""
@@ -255,7 +247,7 @@ class Tree(Bars, Protocol):
         for _ in range(PASSES):
             loads = {pin: math.hypot(*forces[FORCE_AT[pin]]) for pin in self.loaded}
             most = max(loads.values())
-            change = max(abs(load - self.pin_load(pin)) for pin, load in loads.items())
+            change = max(abs(load - self.pin_loads.get(pin, 0.0)) for pin, load in loads.items())
             # once down to the rounding of a pass, the change falls no further
             if change <= REPEATED * most or before <= change <= ROUNDED * most:
                 return forces
