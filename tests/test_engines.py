@@ -23,7 +23,8 @@ from validation.compare.compare import COMPARED, compare
 from validation.compare.identities import closure
 from validation.compare.tolerance import EPS, EQUIVALENCE, K
 from validation.engines import loop
-from validation.engines.mujoco.inverse import LEAST, MujocoInverse, MujocoTree
+from validation.engines.limits import LIGHTEST
+from validation.engines.mujoco.inverse import MujocoInverse, MujocoTree
 from validation.engines.witnesses import FURTHER, WITNESSES
 from validation.scenes.random import LinkageType
 from validation.scenes.suites import Random
@@ -249,9 +250,9 @@ def test_light_bars_are_held_or_refused(name: str) -> None:
 
 def test_the_floor_of_mujoco_is_where_it_is_stated_to_be() -> None:
     d, a, b, c = MECHANISMS["crank-rocker"]
-    case = Scene(FourBar(d, Bar(a, 1.0), Bar(b, 1.0), Bar(c, LEAST, LEAST)))
+    case = Scene(FourBar(d, Bar(a, 1.0), Bar(b, 1.0), Bar(c, LIGHTEST.boundary, LIGHTEST.boundary)))
     MujocoTree(case)
-    for mass, inertia in ((0.9 * LEAST, LEAST), (LEAST, 0.9 * LEAST)):
+    for mass, inertia in ((0.9 * LIGHTEST.boundary, LIGHTEST.boundary), (LIGHTEST.boundary, 0.9 * LIGHTEST.boundary)):
         below = replace(case, linkage=replace(case.linkage, output=Bar(c, mass, inertia)))
         assert MujocoInverse().answer(below, command(below)).refusal is not None
         with pytest.raises(ValueError, match="mass and inertia"):
