@@ -359,6 +359,14 @@ def test_a_planted_fault_shows(name: str, monkeypatch: pytest.MonkeyPatch) -> No
 
 
 @each_engine
+def test_a_thousand_turns_take_no_position(name: str) -> None:
+    linkage, angles = bars(MECHANISMS["crank-rocker"]), np.array([1.0, 4.0])
+    near, far = (answered(name, Scene(linkage, Motion(x, 10.0, 3.0))) for x in (angles, angles + 2000.0 * math.pi))
+    assert far.assembled is not None and far.assembled.all()
+    np.testing.assert_allclose(far.quantities["torque"], near.quantities["torque"], rtol=1e-9)
+
+
+@each_engine
 def test_a_position_before_leaves_nothing_behind(name: str) -> None:
     fast = Scene(bars(MECHANISMS["crank-rocker"]), Motion(np.array([1.0, 2.0]), 3e4, 1e9))
     whole, at = answered(name, fast).quantities, command(fast)
