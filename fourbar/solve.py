@@ -18,7 +18,6 @@ from fourbar.scene import Command, Scene, command
 from fourbar.scene.case import BLOCK, Case, Evaluated
 from fourbar.scene.evaluation import ERROR, FORCE, Part, commanded, freely
 from fourbar.scene.point import OF_POINTS
-from fourbar.scene.start import refuse_wound, with_start
 from fourbar.scene.withheld import withheld
 from fourbar.solution import Array, Solution, unwrap
 
@@ -86,8 +85,9 @@ def solve(
     wanted, names = requested(scene, (n,), where.omega_2, stage, out)
     code = np.zeros(n, dtype=np.uint8)
     with np.errstate(all="ignore"):
-        turns = wanted >= FORCE and any(effect.counts_turns for effect in scene.effects)
-        case = Case.of(with_start(scene) if turns else scene)._replace(side=side)
+        case = Case.of(scene)._replace(side=side)
+        if wanted >= FORCE and scene.counts_turns:
+            case = case.with_start(command(scene))
         quick = moved is None and where.remainder is None and is_compiled(case, wanted, n, compiled)
         result = None
         if n == 1 and moved is None and out is None and not quick:
@@ -360,7 +360,9 @@ def _released(scene: Scene) -> "FreeMotion":
         np.linspace(0.0, free.duration, free.steps + 1),
         follow=scene.motion.through == "follow",
     )
-    refuse_wound(scene, moved.command)
+    if scene.counts_turns:
+        with np.errstate(all="ignore"):
+            Case.of(scene).with_start(start).refuse_wound(moved.command)
     return moved
 
 

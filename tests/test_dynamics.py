@@ -16,7 +16,7 @@ from fourbar.formulas.position import half_angle, loop
 from fourbar.formulas.torque import driving_torque, half_slope, inertia
 from fourbar.free_motion import _meeting, release
 from fourbar.scene import Command, command
-from fourbar.scene.start import state_at
+from fourbar.scene.case import state_at
 from fourbar.solve import solve
 from validation.engines.balls import BITS, inputs, outputs
 from validation.studies.cost.formulas import thirteen_equations

@@ -30,7 +30,6 @@ from fourbar.effects.actions import Actions, bodies
 from fourbar.files.effects import REGISTRY
 from fourbar.formulas.arithmetic import dot
 from fourbar.formulas.path import state
-from fourbar.formulas.pin_forces import Bodies
 from fourbar.linkage import MOVING_BARS
 from fourbar.scene import Scene, command
 from tests.scenes import crank_rocker
@@ -213,9 +212,9 @@ def reversed_slip(term: Effect) -> list[Effect]:
 class Lightening(Flywheel):
     """A flywheel that takes its inertia from the bar."""
 
-    def carried_by(self, bodies: Bodies) -> Bodies:
-        two, three, four = bodies
-        return two._replace(I=two.I - self.inertia), three, four
+    @property
+    def carried(self) -> dict[int, float]:
+        return {self.bar: -self.inertia}
 
 
 @pytest.mark.parametrize("name", ACTING)

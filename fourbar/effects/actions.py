@@ -16,11 +16,11 @@ AT_REST = 50.0 * 2.0**-52
 
 def bodies(linkage: FourBar, effects: Iterable[Any] = ()) -> Bodies:
     """Of bars 2, 3, 4 of a linkage, with the inertia that effects (a flywheel) add."""
-    two, three, four = (Body(bar.mass, bar.moment_of_inertia, bar.to_centre) for bar in linkage.moving)
-    carried: Bodies = (two, three, four)
+    own = [Body(bar.mass, bar.moment_of_inertia, bar.to_centre) for bar in linkage.moving]
     for effect in effects:
-        carried = effect.carried_by(carried)
-    return carried
+        for bar, inertia in effect.carried.items():
+            own[bar - 2] = own[bar - 2]._replace(I=own[bar - 2].I + inertia)
+    return own[0], own[1], own[2]
 
 
 class Actions:

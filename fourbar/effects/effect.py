@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 from fourbar.effects.actions import Actions
 from fourbar.formulas.arithmetic import Number
 from fourbar.formulas.motion import State
-from fourbar.formulas.pin_forces import Bodies
 from fourbar.solution import Array
 
 
@@ -23,7 +22,6 @@ class Effect:
     __slots__ = ()
     key: ClassVar[str]
     """Its name: under ``[effects]``, and in every table."""
-    """One line of a scene file."""
     dry: ClassVar[bool] = False
     """Whether its couples jump where the relative rotation at a pin changes its sense."""
 
@@ -36,6 +34,11 @@ class Effect:
         return ()
 
     @property
+    def carried(self) -> Mapping[int, Number]:
+        """Inertia that turns with bar 2, 3 or 4, kg m^2, by its number."""
+        return {}
+
+    @property
     def dry_pins(self) -> tuple[str, ...]:
         """Pins at which its couples jump."""
         return ()
@@ -45,10 +48,6 @@ class Effect:
 
     def act_known(self, actions: Actions, forces: Mapping[str, Array]) -> None:
         """What `act` leaves to the solution of the pin forces, once these are known (name: (n, 2), N)."""
-
-    def carried_by(self, bodies: Bodies) -> Bodies:
-        """The bars 2, 3, 4 with the inertia that the effect adds."""
-        return bodies
 
     def counted_from(self, start: State, branch: Number) -> Self:
         """The same effect in a motion that begins at this position, on this branch."""

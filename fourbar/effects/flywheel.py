@@ -1,10 +1,10 @@
 """A flywheel on a bar that ground carries: more inertia, and no weight."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
 from fourbar.effects.effect import Effect
-from fourbar.formulas.pin_forces import Bodies
 from fourbar.linkage import require, require_whole
 
 
@@ -28,9 +28,7 @@ class Flywheel(Effect):
         object.__setattr__(self, "inertia", inertia)
         object.__setattr__(self, "bar", bar)
 
-    def carried_by(self, bodies: Bodies) -> Bodies:
-        """The bar with the wheel's inertia added: a rotation has no other."""
-        two, three, four = bodies
-        if self.bar == 2:
-            return two._replace(I=two.I + self.inertia), three, four
-        return two, three, four._replace(I=four.I + self.inertia)
+    @property
+    def carried(self) -> Mapping[int, float]:
+        """The wheel's inertia on its bar: a rotation has no other."""
+        return {self.bar: self.inertia}

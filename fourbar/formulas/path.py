@@ -65,10 +65,11 @@ class Path(NamedTuple):
         d, a, b, c, _, _ = self.lengths
         ss, kk, sk, outer, inner = half
         root = branch * np.sqrt(outer * inner)
-        at_A, at_O4 = inner + 2.0 * b * (b - c), inner - 2.0 * c * (b - c)
+        at_A, at_O4 = inner + 2.0 * b * (b - c), 2.0 * c * (b - c) - inner
         x, y = (d - a) * kk + (d + a) * ss, (-2.0 * a) * sk
-        theta_3 = np.arctan2(x * root + y * at_A, x * at_A - y * root)
-        theta_4 = np.arctan2(x * root - y * at_O4, -x * at_O4 - y * root)
+        along, across = x * root, y * root
+        theta_3 = np.arctan2(along + y * at_A, x * at_A - across)
+        theta_4 = np.arctan2(along + y * at_O4, x * at_O4 - across)
         if np.any(self.theta_1):
             theta_3, theta_4 = (np.remainder(np.pi - theta - self.theta_1, 2.0 * np.pi) for theta in (theta_3, theta_4))
             theta_3, theta_4 = np.pi - theta_3, np.pi - theta_4

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.effects.actions import Actions, bodies
+from fourbar.errors import LimitError
 from fourbar.formulas.arithmetic import anywhere, polar, vector
 from fourbar.formulas.motion import Coefficients, State, rates
 from fourbar.formulas.path import Path, path
@@ -17,7 +18,7 @@ from fourbar.formulas.position import HalfAngle, Loop, Position
 from fourbar.formulas.torque import driving_torque, half_slope, inertia
 from fourbar.linkage import FourBar
 from fourbar.quantities import JAMMED
-from fourbar.scene import Scene
+from fourbar.scene import Command, Scene
 from fourbar.solution import Array
 
 if TYPE_CHECKING:
@@ -117,6 +118,39 @@ class Case(NamedTuple):
         at, k = path.motion(at, branch)
         return State(self.lengths, theta_1, q, at, k, speed, rates(k, speed, acceleration))
 
+    def at(self, where: Command) -> State:
+        """The positions of a command to the input, and their motion."""
+        half, _ = self.half_angle(where.theta_2, where.remainder)
+        found = self.path.position(where.theta_2, half, where.branch)
+        omega_2 = 0.0 if where.omega_2 is None else where.omega_2
+        return self.state(self.path, where.theta_2, found, where.branch, omega_2, where.alpha_2)
+
+    def started(self, at: Command) -> "Case":
+        """With effects that know that the motion begins at a position, of as many linkages as there are."""
+        state = self.at(at)
+        return self._replace(terms=tuple(term.counted_from(state, at.branch) for term in self.terms))
+
+    def with_start(self, motion: Command) -> "Case":
+        """The same of a whole motion: it begins where the linkage first assembles, if it keeps its branch."""
+        half, _ = self.half_angle(motion.theta_2, motion.remainder)
+        assembled = (half.outer >= 0.0) & (half.inner >= 0.0)
+        if not assembled.any() or np.ptp(motion.branch) != 0:
+            return self
+        first = int(np.argmax(assembled))
+        return self.started(Command(motion.theta_2[first], motion.branch[first], 0.0, 0.0, motion.remainder))
+
+    def refuse_wound(self, at: Command) -> None:
+        """A LimitError where a free motion winds a spring: from there on it is no longer the spring's."""
+        state = self.at(at)
+        for term in self.terms:
+            codes = term.status(state, at.branch) if term.counts_turns else None
+            if codes is not None and codes.any():
+                assert at.time is not None
+                raise LimitError(
+                    f"effects.{term.key}: at {at.time[np.argmax(codes)]:.6g} s the free motion has turned a pin "
+                    "by more than half a turn from the rest of its spring, which is not modelled"
+                )
+
     def half_angle(self, theta_2: Array, remainder: Any) -> tuple[HalfAngle, NDArray[np.intp]]:
         """The half angles, and the indices of those evaluated in many digits."""
         lengths, half = self.path.lengths, self.path.half_angle(theta_2)
@@ -194,3 +228,9 @@ class Case(NamedTuple):
         jammed = [found.status == JAMMED for found in (ahead, back) if found.status is not None]
         low, high = np.minimum(ahead.torque, back.torque), np.maximum(ahead.torque, back.torque)
         return low, high, np.any(jammed, axis=0) if jammed else None
+
+
+def state_at(scene: Scene, at: Command) -> State:
+    """The positions of a command and their motion, for what shows them."""
+    with np.errstate(all="ignore"):
+        return Case.of(scene).at(at)

@@ -56,6 +56,11 @@ class Scene:
         if len({picture.bar for picture in self.pictures}) < len(self.pictures):
             raise InputError("pictures", [picture.bar for picture in self.pictures], "a bar has one picture")
 
+    @property
+    def counts_turns(self) -> bool:
+        """Whether an effect depends on where the motion begins."""
+        return any(effect.counts_turns for effect in self.effects)
+
 
 class Command(NamedTuple):
     """What the input bar must do at each of n independent positions."""

@@ -159,7 +159,7 @@ def _columns(
 ) -> Iterator[tuple[slice, NDArray[np.intp]]]:
     """Blocks of positions, and their indices: after that at which the motion begins where an effect counts from it."""
     n, first = study.at.theta_2.shape[1], int(np.argmax(closes))
-    begins = [first] if any(effect.counts_turns for effect in scene.effects) else []
+    begins = [first] if scene.counts_turns else []
     size = max(1, AT_ONCE // samples)
     for start in range(0, n, size):
         columns = slice(start, min(start + size, n))

@@ -1,8 +1,8 @@
 """A scene with arrays in the place of some of its numbers: one linkage for each entry."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,10 +15,12 @@ from fourbar.scene import Command, Scene, command
 from fourbar.scene.case import BLOCK, Case
 from fourbar.scene.evaluation import FORCE
 from fourbar.scene.motion import FromLimit
-from fourbar.scene.start import started
 from fourbar.solution import Array, Solution, unwrap
 from fourbar.solve import arrays, each, evaluation, is_compiled, keep, positions_at_once, requested, solved
 from fourbar.studies.keys import THETA_2, entries, placed, refusal
+
+if TYPE_CHECKING:
+    from fourbar.effects import Effect
 
 LENGTHS = tuple(f"lengths.{name}" for name in ("ground", "input", "coupler", "output", "ground_angle"))
 NEAR_A_CHANGE_POINT = 1e-12
@@ -89,13 +91,13 @@ class Study:
         known = entries(self.scene)
         for key, values in self.values.items():
             scene = placed(scene, known[key].place, _repeated(values[rows], count))
-        for index, turns in _turns(scene).items():
+        for index, turns in _turns(scene.effects).items():
             scene = placed(scene, ("effects", index, "turns"), tuple(_repeated(turn, count) for turn in turns))
         return scene
 
     def _started(self, rows: slice) -> Scene:
         """The scene with effects that know where the motion of each member begins: where it first assembles."""
-        if not any(effect.counts_turns for effect in self.scene.effects):
+        if not self.scene.counts_turns:
             return self.scene
         count = rows.stop - rows.start
         first = np.full(count, -1)
@@ -112,14 +114,15 @@ class Study:
         one_branch = np.ptp(self.at.branch[rows], axis=1) == 0
         at = Command(np.where(one_branch, theta_2, np.nan), self.at.branch[rows, 0], 0.0, 0.0)
         scene = self.scene
-        for index, turns in _turns(started(self._members(rows, 1, scene), at)).items():
+        counted = Case.of(self._members(rows, 1, scene)).started(at).terms[len(scene.loads) :]
+        for index, turns in _turns(counted).items():
             scene = placed(scene, ("effects", index, "turns"), turns)
         return scene
 
 
-def _turns(scene: Scene) -> dict[int, Any]:
+def _turns(effects: "Iterable[Effect]") -> dict[int, Any]:
     """Of the effects that know where the motion begins, by their index: the whole turns of each of their pins."""
-    found = {index: getattr(effect, "turns", None) for index, effect in enumerate(scene.effects)}
+    found = {index: getattr(effect, "turns", None) for index, effect in enumerate(effects)}
     return {index: turns for index, turns in found.items() if turns is not None}
 
 

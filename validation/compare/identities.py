@@ -13,7 +13,7 @@ from fourbar.formulas.pin_forces import Wrenches
 from fourbar.linkage import MOVING_BARS, PIN_FORCE
 from fourbar.quantities import OK, OVERFLOW
 from fourbar.scene import Command, Scene
-from fourbar.scene.start import state_at
+from fourbar.scene.case import state_at
 from fourbar.solution import Solution
 from validation.compare.answer import Answer
 from validation.compare.compare import turned

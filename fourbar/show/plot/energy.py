@@ -10,7 +10,7 @@ from fourbar.formulas.arithmetic import dot
 from fourbar.formulas.motion import State
 from fourbar.linkage import MOVING_BARS
 from fourbar.scene import Command, Scene
-from fourbar.scene.start import state_at
+from fourbar.scene.case import state_at
 from fourbar.solution import Array, Solution
 
 

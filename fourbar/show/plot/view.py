@@ -11,8 +11,8 @@ from fourbar.formulas.arithmetic import Number
 from fourbar.formulas.motion import State
 from fourbar.linkage import MOVING_BARS, PINS
 from fourbar.scene import Command, Scene, command
+from fourbar.scene.case import state_at
 from fourbar.scene.motion import FromLimit
-from fourbar.scene.start import state_at
 from fourbar.solution import Array, Conversion, Solution
 from fourbar.solve import solve
 

@@ -14,8 +14,7 @@ from fourbar.formulas.pin_forces import Wrenches
 from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import PIN_FORCES
 from fourbar.scene import Command, Scene
-from fourbar.scene.case import Case, changed
-from fourbar.scene.start import state_at
+from fourbar.scene.case import Case, changed, state_at
 from fourbar.solve import solve
 from validation.compare.answer import Array
 from validation.compare.error import relative
