@@ -125,7 +125,7 @@ class Equations:
         x = dict(zip(("d", "a", "b", "c"), self.lengths, strict=True))
         closed = closure(x | {"theta_1": arb(linkage.ground_angle), "theta_2": arb(theta_2)}, branch)
         assert closed is not None
-        theta = [arb(theta_2), *(arb.atan2(u[1], u[0]).mid() for u in closed[1:])]
+        theta = [arb(theta_2), *(u.arg().mid() for u in closed[1:])]
         t = self.direction(theta)
         return theta, [(arb(omega_2) * w / t[0]).mid() for w in t]
 

@@ -15,8 +15,7 @@ from fourbar.quantities import NOT_ASSEMBLED, OK
 from fourbar.scene import compiled, compiled_case
 from fourbar.scene.error_bars import EVALUATIONS
 from fourbar.studies.study import vary
-from validation.stress.forward_error.judge import TOO_SMALL
-from validation.stress.forward_error.stability import run
+from validation.stress.forward_error.stability import TOO_SMALL, run
 
 pytest.importorskip("numba", reason="the formulas are compiled by numba: pip install numba")
 
@@ -84,7 +83,7 @@ def test_a_study_has_them_too_on_any_number_of_threads(monkeypatch: pytest.Monke
 
 def test_error_bars_keep_their_promise(monkeypatch: pytest.MonkeyPatch) -> None:
     quick = functools.partial(solve, compiled=True)
-    monkeypatch.setattr("validation.stress.forward_error.judge.solve", quick)
+    monkeypatch.setattr("validation.stress.forward_error.stability.solve", quick)
     for family in ("random", "change_point"):
         tally = run(family, range(20))
         assert all(ratio <= 1.0 for ratio, _ in tally.worst.values())

@@ -163,6 +163,11 @@ def test_formulas_in_four_precisions() -> None:
         assert wrong["50 digits"] < 1e-50
 
 
+def test_single_precision_slides_too() -> None:
+    scene = replace(crank_rocker(), effects=(fourbar.PinFriction.at(A=(0.2, 0.02), O4=(0.3, 0.03)),))
+    assert errors(scene, command(scene), formulas.single(scene, command(scene))).worst < 1e-4
+
+
 def test_what_is_no_number_or_not_compared_has_no_small_error() -> None:
     scene = turning(positions=8)
     at = formulas.few(command(scene))

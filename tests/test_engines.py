@@ -23,7 +23,8 @@ from validation.compare.compare import COMPARED, compare
 from validation.compare.identities import closure
 from validation.compare.tolerance import EPS, EQUIVALENCE, K
 from validation.engines import loop
-from validation.engines.mujoco.inverse import LEAST, MujocoInverse, MujocoTree
+from validation.engines.limits import LIGHTEST
+from validation.engines.mujoco.inverse import MujocoInverse, MujocoTree
 from validation.engines.witnesses import FURTHER, WITNESSES
 from validation.scenes.random import LinkageType
 from validation.scenes.suites import Random
@@ -249,9 +250,9 @@ def test_light_bars_are_held_or_refused(name: str) -> None:
 
 def test_the_floor_of_mujoco_is_where_it_is_stated_to_be() -> None:
     d, a, b, c = MECHANISMS["crank-rocker"]
-    case = Scene(FourBar(d, Bar(a, 1.0), Bar(b, 1.0), Bar(c, LEAST, LEAST)))
+    case = Scene(FourBar(d, Bar(a, 1.0), Bar(b, 1.0), Bar(c, LIGHTEST.boundary, LIGHTEST.boundary)))
     MujocoTree(case)
-    for mass, inertia in ((0.9 * LEAST, LEAST), (LEAST, 0.9 * LEAST)):
+    for mass, inertia in ((0.9 * LIGHTEST.boundary, LIGHTEST.boundary), (LIGHTEST.boundary, 0.9 * LIGHTEST.boundary)):
         below = replace(case, linkage=replace(case.linkage, output=Bar(c, mass, inertia)))
         assert MujocoInverse().answer(below, command(below)).refusal is not None
         with pytest.raises(ValueError, match="mass and inertia"):
@@ -355,6 +356,14 @@ def test_a_planted_fault_shows(name: str, monkeypatch: pytest.MonkeyPatch) -> No
     right = loop.Position.find
     monkeypatch.setattr(loop.Position, "find", lambda self, theta_2, branch: right(self, theta_2, -branch))
     assert {"theta_3", "theta_4", "torque"} <= judged(name)
+
+
+@each_engine
+def test_a_thousand_turns_take_no_position(name: str) -> None:
+    linkage, angles = bars(MECHANISMS["crank-rocker"]), np.array([1.0, 4.0])
+    near, far = (answered(name, Scene(linkage, Motion(x, 10.0, 3.0))) for x in (angles, angles + 2000.0 * math.pi))
+    assert far.assembled is not None and far.assembled.all()
+    np.testing.assert_allclose(far.quantities["torque"], near.quantities["torque"], rtol=1e-9)
 
 
 @each_engine

@@ -21,7 +21,7 @@ from tests.scenes import crank_rocker
 from validation.compare.rows import AGREES, FAILS, Row, write_results
 from validation.published.figures import Figure
 from validation.stress.bench import Measured
-from validation.stress.forward_error.judge import Tally
+from validation.stress.forward_error.stability import Tally
 
 ROOT = Path(__file__).parent.parent
 MODEL = str(ROOT / "models" / "crank_rocker.toml")
@@ -218,7 +218,7 @@ def test_a_torque_off_in_its_twelfth_digit_is_status_1(monkeypatch: pytest.Monke
         solution.torque *= 1.0 + 1e-12
         return solution
 
-    monkeypatch.setattr("validation.stress.forward_error.judge.solve", off)
+    monkeypatch.setattr("validation.stress.forward_error.stability.solve", off)
     assert VALIDATION(STABILITY) == FAILED
 
 

@@ -11,7 +11,7 @@ import pytest
 import fourbar.formulas.mobility
 from fourbar.files import loads
 from tests.scenes import crank_rocker
-from validation.stress.fuzz import examine
+from validation.stress.fuzz import fuzz as examine
 from validation.stress.fuzz.fuzz import examine_chunk, run
 from validation.stress.fuzz.scenes import scene_of
 from validation.stress.fuzz.shrink import KEPT, keep, shrunk

@@ -6,8 +6,7 @@ import pytest
 import fourbar
 from fourbar.show.tables import heading
 from validation.stress.forward_error.families import FAMILIES
-from validation.stress.forward_error.judge import TOO_SMALL, Tally
-from validation.stress.forward_error.stability import run
+from validation.stress.forward_error.stability import TOO_SMALL, Tally, run
 
 SAMPLES = 40
 """Per family: about 1 s each; the ten thousand of each are `python -m validation stability`."""
@@ -89,7 +88,7 @@ def test_an_angle_without_a_value_is_beyond_what_is_allowed(monkeypatch: pytest.
         solution.theta_3[:] = np.nan
         return solution
 
-    monkeypatch.setattr("validation.stress.forward_error.judge.solve", lost)
+    monkeypatch.setattr("validation.stress.forward_error.stability.solve", lost)
     tally = run("random", range(2))
     assert tally.worst["theta_3"][0] == np.inf and tally.worst["theta_4"][0] <= 1.0 and not tally.held()
 

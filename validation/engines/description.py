@@ -48,6 +48,11 @@ def components(size: float, angle: float) -> tuple[float, float]:
     return size * math.cos(angle), size * math.sin(angle)
 
 
+def within_half_a_turn(angle: float) -> float:
+    """The direction of an angle however many turns away, rad: sums with others then lose none of its digits."""
+    return angle if abs(angle) <= math.pi else math.atan2(math.sin(angle), math.cos(angle))
+
+
 def turned(angle: float, x: float, y: float) -> tuple[float, float]:
     """The vector that is (x, y) along and across a line at an angle (rad)."""
     cos, sin = math.cos(angle), math.sin(angle)

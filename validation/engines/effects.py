@@ -6,6 +6,7 @@ No engine is named here, and nothing of the formulas' `act` is used: this is the
 import bisect
 import math
 from collections.abc import Callable
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 
 
 def _gravity(effect: "Gravity", tree: Tree) -> None:
-    """The engine's own gravity, set once and for all."""
+    """The engine's own gravity."""
     tree.gravity(field(effect))
 
 
@@ -36,93 +37,65 @@ def _twist_at(tree: Tree, pin: str, couple: float) -> None:
     tree.twist(one, -couple)
 
 
-def _viscous(effect: "Viscous", tree: Tree) -> Act:
+def _viscous(effect: "Viscous", tree: Tree) -> None:
     """Couples in proportion to the spin."""
-
-    def act() -> None:
-        for pin, k in effect.coefficients:
-            _twist_at(tree, pin, k * _slip(tree, pin))
-
-    return act
+    for pin, k in effect.coefficients:
+        _twist_at(tree, pin, k * _slip(tree, pin))
 
 
-def _friction(effect: "Friction", tree: Tree) -> Act:
+def _friction(effect: "Friction", tree: Tree) -> None:
     """Couples of constant size; MuJoCo's own frictionloss is a soft constraint."""
-
-    def act() -> None:
-        for pin, f in effect.torques:
-            _twist_at(tree, pin, f * float(np.sign(_slip(tree, pin))))
-
-    return act
+    for pin, f in effect.torques:
+        _twist_at(tree, pin, f * float(np.sign(_slip(tree, pin))))
 
 
-def _pin_friction(effect: "PinFriction", tree: Tree) -> Act:
+def _pin_friction(effect: "PinFriction", tree: Tree) -> None:
     """Couples of mu r times the load that the engine found at the pin in its last pass."""
-
-    def act() -> None:
-        for pin, mu, r in effect.pins:
-            _twist_at(tree, pin, mu * r * tree.pin_load(pin) * float(np.sign(_slip(tree, pin))))
-
-    return act
+    for pin, mu, r in effect.pins:
+        _twist_at(tree, pin, mu * r * tree.pin_loads.get(pin, 0.0) * float(np.sign(_slip(tree, pin))))
 
 
-def _torsion(effect: "Torsion", tree: Tree) -> Act:
+def _torsion(effect: "Torsion", tree: Tree) -> None:
     """Couples from the engine's own angles of the two bars."""
-
-    def act() -> None:
-        for pin, k, rest, preload in effect.springs:
-            one, other = PINS[pin]
-            twist = math.remainder(tree.angle(one) - tree.angle(other) + rest, math.tau)
-            _twist_at(tree, pin, k * twist - preload)
-
-    return act
+    for pin, k, rest, preload in effect.springs:
+        one, other = PINS[pin]
+        twist = math.remainder(tree.angle(one) - tree.angle(other) + rest, math.tau)
+        _twist_at(tree, pin, k * twist - preload)
 
 
-def _springs(effect: "Springs", tree: Tree) -> Act:
+def _springs(effect: "Springs", tree: Tree) -> None:
     """Pulls at the engine's own places of the two points."""
-
-    def act() -> None:
-        for spring in effect.springs:
-            one, other = (
-                tree.foot(point.bar) + tree.turned(point.bar, *components(point.distance, point.angle))
-                for point in (spring.start, spring.end)
-            )
-            vector = np.asarray(other - one)
-            distance = math.hypot(*vector)
-            if spring.preload == spring.stiffness * spring.length:
-                vector = spring.stiffness * vector
-            else:
-                tension = spring.preload + spring.stiffness * (distance - spring.length)
-                vector = vector * (tension / distance) if distance else np.full(2, np.nan)
-            tree.push(spring.start.bar, vector, one)
-            tree.push(spring.end.bar, -vector, other)
-
-    return act
+    for spring in effect.springs:
+        one, other = (
+            tree.foot(point.bar) + tree.turned(point.bar, *components(point.distance, point.angle))
+            for point in (spring.start, spring.end)
+        )
+        vector = np.asarray(other - one)
+        distance = math.hypot(*vector)
+        if spring.preload == spring.stiffness * spring.length:
+            vector = spring.stiffness * vector
+        else:
+            tension = spring.preload + spring.stiffness * (distance - spring.length)
+            vector = vector * (tension / distance) if distance else np.full(2, np.nan)
+        tree.push(spring.start.bar, vector, one)
+        tree.push(spring.end.bar, -vector, other)
 
 
-def _flywheel(effect: "Flywheel", tree: Tree) -> Act:
+def _flywheel(effect: "Flywheel", tree: Tree) -> None:
     """The couple that turning the wheel takes, from the engine's own angular acceleration."""
-
-    def act() -> None:
-        tree.twist(effect.bar, -effect.inertia * tree.alpha(effect.bar))
-
-    return act
+    tree.twist(effect.bar, -effect.inertia * tree.alpha(effect.bar))
 
 
-def _load(load: "Load", tree: Tree) -> Act:
+def _load(load: "Load", tree: Tree) -> None:
     """A force at its point and a couple; in the bar's frame both vectors turn with the engine's bar."""
     force, arm = np.array(components(*(load.force or (0.0, 0.0)))), np.array(components(*load.at))
-
-    def act() -> None:
-        factor = 1.0 if load.table is None else look_up(load.table, tree.angle(2))
-        if load.frame == "bar":
-            f, at = tree.turned(load.bar, *force), tree.turned(load.bar, *arm)
-        else:
-            f, at = force, arm
-        tree.push(load.bar, factor * f, tree.centre(load.bar) + at)
-        tree.twist(load.bar, factor * load.moment)
-
-    return act
+    factor = 1.0 if load.table is None else look_up(load.table, tree.angle(2))
+    if load.frame == "bar":
+        f, at = tree.turned(load.bar, *force), tree.turned(load.bar, *arm)
+    else:
+        f, at = force, arm
+    tree.push(load.bar, factor * f, tree.point(f"G{load.bar}") + at)
+    tree.twist(load.bar, factor * load.moment)
 
 
 def look_up(table: "Table", theta_2: float) -> float:
@@ -133,7 +106,7 @@ def look_up(table: "Table", theta_2: float) -> float:
     return (f * (b - angle) + g * (angle - a)) / (b - a)
 
 
-TERM_OF: dict[str, Callable[[Any, Tree], Act | None]] = {
+TERM_OF: dict[str, Callable[[Any, Tree], None]] = {
     "gravity": _gravity,
     "viscous": _viscous,
     "friction": _friction,
@@ -143,10 +116,16 @@ TERM_OF: dict[str, Callable[[Any, Tree], Act | None]] = {
     "flywheel": _flywheel,
     "load": _load,
 }
-"""By the key of an effect: what acts at each state of a tree; None where all is set once and for all."""
+"""By the key of an effect: what it does at a state of a tree."""
 
 
 def acting(scene: Scene, tree: Tree) -> list[Act]:
-    """What loads and effects do at each state of a tree."""
-    terms = [TERM_OF[effect.key](effect, tree) for effect in (*scene.effects, *scene.loads)]
-    return [term for term in terms if term is not None]
+    """What loads and effects do at each state of a tree; gravity, the engine's own, is set once and for all."""
+    acts: list[Act] = []
+    for effect in (*scene.effects, *scene.loads):
+        act = partial(TERM_OF[effect.key], effect, tree)
+        if effect.key == "gravity":
+            act()
+        else:
+            acts.append(act)
+    return acts

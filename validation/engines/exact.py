@@ -30,19 +30,16 @@ class BallArithmetic:
 
     def answer(self, scene: Scene, command: Command) -> Answer:
         """Its answer, or the refusal that names an effect it does not know."""
-        from flint import arb, ctx
-
-        from validation.engines.balls import BITS, inputs, outputs
+        from validation.engines.balls import outputs, stored
 
         if reason := unknown(scene):
             return Answer(NAME, "exact", refusal=reason)
-        ctx.prec = BITS
         n = len(command.theta_2)
         names = [q for q in COMPARED if command.omega_2 is not None or q.startswith("theta")]
         out, assembled, (omega, alpha) = blank(n, names), np.zeros(n, dtype=bool), speeds(command)
         for i in range(n):
-            stored = inputs(scene, float(command.theta_2[i])) | {"omega_2": omega[i], "alpha_2": alpha[i]}
-            exact = {name: arb(float(value)) for name, value in stored.items()}
+            motion = {"omega_2": float(omega[i]), "alpha_2": float(alpha[i])}
+            exact = stored(scene, float(command.theta_2[i]), **motion)
             values = outputs(scene, int(command.branch[i]), exact, scene.drive_bar)
             if values is None:
                 continue

@@ -31,7 +31,7 @@ from fourbar.errors import LimitError
 from fourbar.linkage import MOVING_BARS, PIN_FORCE
 from fourbar.scene import Scene
 from validation.compare.answer import Array
-from validation.engines.description import ON_BARS, POINTS, about_first_pin, parts, unknown_effect
+from validation.engines.description import ON_BARS, POINTS, about_first_pin, parts, unknown_effect, within_half_a_turn
 from validation.engines.exudyn_elements import ELEMENT_OF
 from validation.engines.loop import Exact
 from validation.engines.tree import Bars, Values
@@ -115,7 +115,8 @@ class ExudynBars(Bars):
 
     def place(self, q: Sequence[float]) -> None:
         """Angles of the bars as given; the pins O2, A and O4 closed, in which Exudyn's constraints are linear."""
-        theta_2, of_3_to_2, theta_4 = q
+        of_3_to_2, theta_4 = q[1:]
+        theta_2 = within_half_a_turn(q[0])
         coordinates = np.zeros(SIZE)
         for bar, angle in zip(MOVING_BARS, (theta_2, theta_2 + of_3_to_2, theta_4), strict=True):
             coordinates[self.turn[bar]] = angle

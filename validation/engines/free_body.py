@@ -129,9 +129,7 @@ def move(linkage: FourBar, theta_2: Array, omega_2: Array, alpha_2: Array, theta
 def balance(scene: Scene, motion: Motion) -> tuple[Array, float, Array | float]:
     """The thirteen unknowns (n, 13), N and N m, the largest residual of the system, relative to its terms, and how far
     sliding friction is from jamming, in (0, 1]."""
-    wrenches = acting(scene, motion)
-    _add_inertia(motion, wrenches)
-    unknowns, loads, arms, residual = _with_unit_couples(scene, motion, wrenches)
+    unknowns, loads, arms, residual = _with_unit_couples(scene, motion)
     total: Array = unknowns[..., 0]
     from_jamming: Array | float = 1.0
     if len(arms):
@@ -141,10 +139,11 @@ def balance(scene: Scene, motion: Motion) -> tuple[Array, float, Array | float]:
     return total, residual, from_jamming
 
 
-def _with_unit_couples(scene: Scene, motion: Motion, wrenches: Wrenches) -> tuple[Array, Complex, Array, float]:
+def _with_unit_couples(scene: Scene, motion: Motion) -> tuple[Array, Complex, Array, float]:
     """The unknowns (n, 13, 1 + p) without sliding friction and per N m of it at each pin; the loads of these pins as
     complex numbers (n, p, 1 + p), mu r of each (m), and the residual."""
-    pins = sliding_pins(scene)
+    pins, wrenches = sliding_pins(scene), acting(scene, motion)
+    _add_inertia(motion, wrenches)
     columns = [_right(motion.linkage, wrenches)]
     for pin in pins:
         unit = Wrenches(len(motion.theta_2))
@@ -161,9 +160,7 @@ def solutions(scene: Scene, command: Command) -> Array:
     """How many pin forces and friction couples balance the linkage at each position, where it moves, (n,)."""
     closed = close(scene.linkage, command.theta_2, command.branch)
     motion = move(scene.linkage, command.theta_2, *speeds(command), *closed.theta)
-    wrenches = acting(scene, motion)
-    _add_inertia(motion, wrenches)
-    _, loads, arms, _ = _with_unit_couples(scene, motion, wrenches)
+    _, loads, arms, _ = _with_unit_couples(scene, motion)
     return np.array([_number(F, C, arms) for F, C in zip(loads[..., 0], loads[..., 1:], strict=True)], dtype=float)
 
 
@@ -251,7 +248,9 @@ def slide(F: Complex, C: Complex, k: Array) -> Array:
     left = np.flatnonzero(np.isfinite(F).all(axis=1) & np.isfinite(C).all(axis=(1, 2)))
     x[left] = 0.0
     for stage in range(1, FRICTION_STAGES + 1):
-        x[left], grown = _grow(F[left], C[left], k * (stage / FRICTION_STAGES), x[left])
+        x[left], settled, det = _newton(F[left], C[left], k * (stage / FRICTION_STAGES), x[left])
+        # without friction the determinant is 1: where it changes its sign the growth has turned back, into a jam
+        grown = settled & (det > 0.0) & (x[left] >= 0.0).all(axis=1)
         x[left[~grown]] = np.nan
         left = left[grown]
     return x
@@ -259,33 +258,26 @@ def slide(F: Complex, C: Complex, k: Array) -> Array:
 
 def distance_from_jamming(F: Complex, C: Complex, k: Array, x: Array) -> Array:
     """Least singular value of the slope of the equations of `slide` at their solution, at most 1, (n,)."""
-    force = F + (C * x[:, None, :]).sum(axis=-1)
     with np.errstate(invalid="ignore"):
-        direction = force / np.where(force == 0.0, 1.0, np.abs(force))
-    matrix = np.eye(len(k)) - k[:, None] * (np.conj(direction)[..., None] * C).real
+        _, matrix = _slope(F, C, k, x)
     far = np.full(len(x), np.nan)
     known = np.isfinite(matrix).all(axis=(1, 2))
     far[known] = np.minimum(np.linalg.svd(matrix[known], compute_uv=False)[:, -1], 1.0)
     return far
 
 
-def _grow(F: Complex, C: Complex, k: Array, x: Array) -> tuple[Array, NDArray[np.bool_]]:
-    """Newton's method from the couples of a smaller friction, and where it arrives.
-
-    The growth has turned back, into a jam, where the determinant of the equations, 1 without friction, changes its
-    sign.
-    """
-    x, settled, det = _newton(F, C, k, x)
-    return x, settled & (det > 0.0) & (x >= 0.0).all(axis=1)
+def _slope(F: Complex, C: Complex, k: Array, x: Array) -> tuple[Array, Array]:
+    """Loads of the pins under some couples, (n, p), N, and the slope of the equations of `slide` there, (n, p, p)."""
+    force = F + (C * x[:, None, :]).sum(axis=-1)
+    size = np.abs(force)
+    direction = force / np.where(size == 0.0, 1.0, size)
+    return size, np.eye(len(k)) - k[:, None] * (np.conj(direction)[..., None] * C).real
 
 
 def _newton(F: Complex, C: Complex, k: Array, x: Array) -> tuple[Array, NDArray[np.bool_], Array]:
-    """The couples, where their equations hold, and the determinant of these equations' slope."""
+    """The couples from those of a smaller friction, where their equations hold, and the determinant of their slope."""
     for _ in range(FRICTION_STEPS):
-        force = F + (C * x[:, None, :]).sum(axis=-1)
-        size = np.abs(force)
-        direction = force / np.where(size == 0.0, 1.0, size)
-        matrix = np.eye(len(k)) - k[:, None] * (np.conj(direction)[..., None] * C).real
+        size, matrix = _slope(F, C, k, x)
         gap, terms = k * size - x, k * (np.abs(F) + (np.abs(C) * x[:, None, :]).sum(axis=-1))
         settled = (np.abs(gap) <= FRICTION_SETTLED * terms).all(axis=1)
         step = solved(matrix, gap[..., None])[0][..., 0]

@@ -1,6 +1,7 @@
 """The hard cases as a suite of a run, and the witnesses with their predictions."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
+from functools import cache
 
 from fourbar.scene import Scene
 from validation.compare.tolerance import EQUIVALENCE, FULL_ACCURACY
@@ -25,29 +26,29 @@ class Hard:
     """Every scene of every family, by name; a worker makes them again from the parameters alone."""
 
     families: tuple[str, ...] = tuple(family.name for family in FAMILIES)
-    _scenes: list[tuple[str, Scene]] = field(default_factory=list, compare=False, repr=False)
-
-    def _all(self) -> list[tuple[str, Scene]]:
-        if not self._scenes:
-            for family in FAMILIES:
-                if family.name in self.families:
-                    for label, scene in family.scenes():
-                        titled = replace(scene, title=f"{family.name}: {label}", source=family.statement)
-                        self._scenes.append((f"{family.name} {label}".replace(" ", "-"), titled))
-            self._scenes.sort(key=lambda pair: pair[0])
-        return self._scenes
 
     def __len__(self) -> int:
-        return len(self._all())
+        return len(_scenes(self.families))
 
     def name(self, index: int) -> str:
         """Name of a scene; ascending."""
-        return self._all()[index][0]
+        return _scenes(self.families)[index][0]
 
     def scene(self, index: int) -> Scene:
         """The scene itself."""
-        return self._all()[index][1]
+        return _scenes(self.families)[index][1]
 
     def fingerprint(self) -> str:
         """The families by name, and how many scenes they make."""
         return f"hard {' '.join(self.families)} {len(self)}"
+
+
+@cache
+def _scenes(families: tuple[str, ...]) -> list[tuple[str, Scene]]:
+    """Names and scenes of some families, by name."""
+    found = []
+    for family in FAMILIES:
+        for label, scene in family.scenes() if family.name in families else ():
+            titled = replace(scene, title=f"{family.name}: {label}", source=family.statement)
+            found.append((f"{family.name} {label}".replace(" ", "-"), titled))
+    return sorted(found, key=lambda pair: pair[0])

@@ -1,114 +1,61 @@
-"""What the engines cannot do, as data: where, why, and a measurement that says whether it is still so.
+"""What the engines cannot do, as data: the measured boundary and the reason.
 
-`holds(x)` asks the engine itself at the value x of the limited quantity. It must hold at `inside` and not
-at `outside`: an engine upgrade that lifts a limit, or makes it worse, is then noticed by the test.
+Those of MuJoCo were measured with 4.0.0 and the default `Settings`; a test measures both sides of each again, so an
+engine that moves one is noticed.
 """
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from fourbar.linkage import Bar
+from fourbar.linkage import MOVING_BARS, FourBar
 from fourbar.mjcf.document import load_ratio
-from fourbar.scene import Scene, command
-from fourbar.scene.motion import Motion
-from validation.compare.answer import Answer
-from validation.compare.tolerance import SIMULATED
-from validation.engines.mujoco.limits import FASTEST, HEAVIEST, NEAREST_CENTRE, NEAREST_TOGGLE, SLOWEST, Boundary
-from validation.scenes.hard_families import loads, sweep_of
-from validation.scenes.hard_linkages import at, dressed, linkage_of, with_bars
-from validation.scenes.random import LinkageType
+from fourbar.scene import Scene
 
 
-@dataclass(frozen=True, slots=True)
-class Limit:
-    """One limit of one engine."""
+class Boundary(NamedTuple):
+    """A declared limit."""
 
-    engine: str
-    of: Boundary
-    inside: float
-    outside: float
-    holds: Callable[[float], bool]
+    name: str
+    boundary: float
+    unit: str
+    reason: str
 
 
-def _simulated(scene: Scene) -> Answer:
-    """The simulation itself, whatever its declared limits."""
-    from fourbar.mjcf import RECIPE
-    from validation.engines.mujoco import simulate
-
-    return simulate._Simulation(RECIPE, scene, command(scene), bounded=False).answer()
-
-
-def _near_toggle(sine: float) -> bool:
-    """Whether a sweep that ends where |sin mu| has this value is followed without an alarm."""
-    d, a, b, c = linkage_of(LinkageType.TRIPLE_ROCKER, 1)
-    cosine = -math.sqrt(1.0 - sine * sine)
-    squared = b * b + c * c - 2.0 * b * c * cosine
-    psi = math.acos((d * d + a * a - squared) / (2.0 * d * a))
-    return not _simulated(at(dressed((d, a, b, c), 1), np.linspace(psi - 0.5, psi, 20))).alarms
-
-
-def _base() -> Scene:
-    return sweep_of(dressed((0.3, 0.1, 0.25, 0.22)))
-
-
-def _at_speed(omega_2: float) -> Scene:
-    return replace(_base(), motion=replace(_base().motion, omega_2=omega_2))
-
-
-def _crank_acceleration(value: float) -> bool:
-    answer = _simulated(replace(_at_speed(math.sqrt(value / 0.1)), loads=(), effects=()))
-    return not answer.alarms and answer.evidence["force_gap"] < 1e-3
-
-
-def _loaded(ratio: float) -> bool:
-    (_, scene), *_ = loads(exponents=(3,))
-    times = ratio / load_ratio(scene)
-    heavier = tuple(
-        replace(load, force=load.force and (load.force[0] * times, load.force[1]), moment=load.moment * times)
-        for load in scene.loads
-    )
-    answer = _simulated(replace(scene, loads=heavier))
-    return not answer.alarms and answer.evidence["acceleration_gap"] < SIMULATED.factor
-
-
-def _compiles(inertia: float) -> bool:
-    from validation.engines.mujoco.inverse import MujocoTree
-
-    base = _base()
-    bar: Bar = base.linkage.output
-    try:
-        MujocoTree(with_bars(base, output=replace(bar, inertia=inertia)))
-    except ValueError:
-        return False
-    return True
-
-
-def _centre_kept(r: float) -> bool:
-    """Whether the compiled MJCF places a mass centre at this distance from its pin where it was put."""
-    from fourbar.mjcf import RECIPE, mjcf
-    from validation.engines.mujoco.closed_loop import ClosedLoop
-
-    base = _base()
-    scene = with_bars(base, output=replace(base.linkage.output, centre=(r, 0.5)))
-    return ClosedLoop(mjcf(scene, replace(RECIPE, timestep=1e-3), keyframe=False)).keeps_centre("output")
-
-
-def _proximal(mu: float) -> bool:
-    """Whether Pinocchio's constrained acceleration is a number with this proximal parameter."""
-    from validation.engines import pinocchio_closed
-    from validation.engines.pinocchio_released import PinocchioReleased
-
-    scene = replace(_base(), loads=(), motion=Motion(1.0, 3.0))
-    kept = pinocchio_closed.PROXIMAL
-    try:
-        pinocchio_closed.PROXIMAL = (kept[0], mu, kept[2] if mu else 1)
-        released = PinocchioReleased().release(scene, np.array([0.0, 0.01]))
-    finally:
-        pinocchio_closed.PROXIMAL = kept
-    return bool(np.isfinite(released.theta_2).all())
+NEAREST_TOGGLE = Boundary(
+    "|sin(theta_4 - theta_3)|, least",
+    0.05,
+    "1",
+    "below 0.05 bars 3 and 4 speed up faster than the time step follows: torque 1e-5 wrong at 0.1, 1e-2 at 0.03, "
+    "data reset at 0.01",
+)
+FASTEST = Boundary(
+    "omega_2, greatest",
+    3e4,
+    "rad/s",
+    "beyond 3e4 rad/s accelerations pass mjMAXVAL = 1e10, which MuJoCo takes for a bad state and resets",
+)
+SLOWEST = Boundary(
+    "a omega_2^2, least",
+    1e-10,
+    "m/s^2",
+    "below 1e-10 m/s^2 the accelerations of the crank drown in the constraint solver's rounding",
+)
+HEAVIEST = Boundary(
+    "loads and weights / inertial forces, greatest",
+    1e10,
+    "1",
+    "loads and weights beyond 1e10 times the inertial forces open the soft loop, for MuJoCo keeps a softness of 1e-15: "
+    "the gap grows as their ratio",
+)
+NEAREST_CENTRE = Boundary(
+    "distance of a mass centre from the bar's first pin, least but 0",
+    2e-6,
+    "m",
+    "a centre nearer than about 1e-6 m to its pin is silently taken to lie on it (the compiler's sameframe)",
+)
 
 
 LIGHTEST = Boundary(
@@ -123,12 +70,45 @@ PROXIMAL = Boundary(
     "1",
     "the third row of the planar loop is redundant: without proximal regularisation every number is NaN",
 )
+
+
+class Limit(NamedTuple):
+    """One limit of one engine."""
+
+    engine: str
+    of: Boundary
+
+
 LIMITS = (
-    Limit("mujoco-simulated", NEAREST_TOGGLE, 0.06, 0.01, _near_toggle),
-    Limit("mujoco-simulated", FASTEST, 3e4, 3e5, lambda omega_2: not _simulated(_at_speed(omega_2)).alarms),
-    Limit("mujoco-simulated", SLOWEST, 1e-10, 1e-11, _crank_acceleration),
-    Limit("mujoco-simulated", HEAVIEST, 1e10, 1e11, _loaded),
-    Limit("mujoco-simulated", NEAREST_CENTRE, 2e-6, 5e-7, _centre_kept),
-    Limit("mujoco-inverse and mujoco-simulated", LIGHTEST, 1.001e-15, 0.999e-15, _compiles),
-    Limit("pinocchio-forward", PROXIMAL, 1e-8, 0.0, _proximal),
+    *(Limit("mujoco-simulated", of) for of in (NEAREST_TOGGLE, FASTEST, SLOWEST, HEAVIEST, NEAREST_CENTRE)),
+    Limit("mujoco-inverse and mujoco-simulated", LIGHTEST),
+    Limit("pinocchio-forward", PROXIMAL),
 )
+
+
+def too_fast_or_loaded(scene: Scene, speed: float) -> str | None:
+    """The limit of speed, load or place of a centre that a scene passes, or None; speed in rad/s."""
+    if speed > FASTEST.boundary:
+        return FASTEST.reason
+    if scene.linkage.input.length * speed**2 < SLOWEST.boundary:
+        return SLOWEST.reason
+    centres = (abs(scene.linkage.bar(number).mass_centre[0]) for number in MOVING_BARS)
+    if any(0.0 < r < NEAREST_CENTRE.boundary for r in centres):
+        return NEAREST_CENTRE.reason
+    if load_ratio(scene) > HEAVIEST.boundary:
+        return HEAVIEST.reason
+    return None
+
+
+def least_sine(linkage: FourBar, theta_2: NDArray[np.float64], assembled: NDArray[np.bool_]) -> float:
+    """The least |sin(theta_4 - theta_3)| between one assembled position and the next, by the cosine rule."""
+    d, a, b, c = linkage.lengths
+    psi = np.sort(theta_2[assembled] - linkage.ground_angle)
+    if not len(psi):
+        return 1.0
+    turns = math.pi * np.arange(math.ceil(psi[0] / math.pi), math.floor(psi[-1] / math.pi) + 1)
+    squared = d * d + a * a - 2.0 * d * a * np.cos(np.concatenate((psi, turns)))
+    cosine = (b * b + c * c - squared) / (2.0 * b * c)
+    sine = np.sqrt(np.clip(1.0 - cosine**2, 0.0, None))
+    between = np.abs(cosine[len(psi) :]) <= 1.0  # a turn at which the loop is open splits the motion
+    return float(np.concatenate((sine[: len(psi)], sine[len(psi) :][between])).min())

@@ -14,22 +14,12 @@ from fourbar.quantities import ANGLES, PIN_FORCES, STAGE_OF, STAGES, VECTORS
 from fourbar.scene import Command, Scene
 from validation.compare.answer import Answer, Array
 from validation.engines.description import SHARED, speeds
-from validation.engines.tree import Bars, Values
+from validation.engines.free_body_closure import LONGEST_STEP, NEWTON_STEPS, STARTS
+from validation.engines.tree import Assembled, Bars, Values
 
-START_ANGLES = np.radians(
-    (
-        *((30, 30), (15, 15), (45, 45), (5, 5), (5, 120)),
-        *((120, 5), (60, 60), (2, 150), (150, 2), (1, 1)),
-    )
-).tolist()
-"""rad that bars 3 and 4 first make with the diagonal A to O4, tried in turn where the triangle of the lengths as
-measured is none to start from; they alone served 8000 of 8000 linkages, in four times as many steps."""
-LONGEST_STEP = 0.5
-"""rad; a longer Newton step leaves the region in which the gap is nearly linear."""
+START_ANGLES = np.radians(STARTS).tolist()
 SHORTEST_STEP = 2.0**-40
 """A step halved this often moves nothing that a gap above the rounding could tell."""
-NEWTON_STEPS = 100
-"""Near a toggle Newton halves its distance: fifty steps reach the last digit from any start."""
 NOT_ANSWERED = frozenset(
     (
         *("theta_2", "omega_2", "alpha_2", "condition", "drive_condition"),
@@ -49,7 +39,7 @@ Angles = tuple[float, float, float]
 class Position:
     """Assembles a tree at commanded angles of bar 2, one after another."""
 
-    def __init__(self, tree: Bars) -> None:
+    def __init__(self, tree: Assembled) -> None:
         self.tree = tree
 
     def find(self, theta_2: float, branch: int) -> Angles | None:
@@ -87,7 +77,7 @@ def _triangle_angle(e: float, near: float, far: float) -> float:
     return 2.0 * math.atan2(math.sqrt(max(above, 0.0)), math.sqrt(max(below, 0.0)))
 
 
-def newton(tree: Bars, q: Angles, branch: int, closed: float) -> Angles | None:
+def newton(tree: Assembled, q: Angles, branch: int, closed: float) -> Angles | None:
     """Close the gap with bar 2 held, never leaving the branch.
 
     The determinant of the gap's derivative by (q3, q4) is -b c sin(theta_4 - theta_3): its sign is the
@@ -162,7 +152,7 @@ Read = Callable[[Angles, float, float], Values]
 
 
 def at_each(
-    bars: Bars, command: Command, names: Iterable[str], read: Read
+    bars: Assembled, command: Command, names: Iterable[str], read: Read
 ) -> tuple[dict[str, Array], NDArray[np.bool_], float]:
     """What is read at each position that assembles, NaN elsewhere; where that is; the greatest gap left, m."""
     n, (omega, alpha) = len(command.theta_2), speeds(command)

@@ -17,7 +17,7 @@ from fourbar.errors import LimitError
 from fourbar.linkage import MOVING_BARS
 from fourbar.scene import Scene
 from validation.compare.answer import Array
-from validation.engines.description import ON_BARS, POINTS, about_first_pin, parts, unknown_effect
+from validation.engines.description import ON_BARS, POINTS, about_first_pin, parts, unknown_effect, within_half_a_turn
 from validation.engines.loop import Exact
 from validation.engines.opensim_elements import ELEMENT_OF, ZERO, constants, vec, vector
 from validation.engines.tree import Bars, Values
@@ -128,7 +128,8 @@ class OpenSimBars(Bars):
 
     def place(self, q: Sequence[float]) -> None:
         """Angles of the bars as given, at rest: Simbody forms its matrices by differences from the present motion."""
-        theta_2, of_3_to_2, theta_4 = q
+        of_3_to_2, theta_4 = q[1:]
+        theta_2 = within_half_a_turn(q[0])
         self.state.setTime(0.0)
         self.state.setU(vector((0.0, 0.0, 0.0)))
         self.state.setQ(vector((theta_2, theta_4, theta_2 + of_3_to_2 - theta_4)))

@@ -113,13 +113,11 @@ class Sensitivity(NamedTuple):
 @lru_cache(maxsize=8192)
 def _sensitivity(scene: Scene, theta_2: float, branch: int, omega_2: float, alpha_2: float) -> Sensitivity | None:
     """Sensitivities at one position; None where the loop does not close."""
-    from flint import arb, ctx
+    from flint import acb, arb
 
-    from validation.engines.balls import BITS, STEP_BITS, inputs, outputs, response
+    from validation.engines.balls import STEP_BITS, outputs, response, stored
 
-    ctx.prec = BITS
-    stored = inputs(scene, theta_2) | {"omega_2": omega_2, "alpha_2": alpha_2}
-    exact: dict[str, Any] = {name: arb(value) for name, value in stored.items()}
+    exact = stored(scene, theta_2, omega_2=omega_2, alpha_2=alpha_2)
     base = outputs(scene, branch, exact, scene.drive_bar)
     if base is None:
         return None
@@ -132,7 +130,7 @@ def _sensitivity(scene: Scene, theta_2: float, branch: int, omega_2: float, alph
             total[output] = total.get(output, 0.0) + rate
 
     data = {name: 1.0 if name.startswith("theta") else abs(float(value.mid())) for name, value in base.items()}
-    for name, weight in _weights(stored).items():
+    for name, weight in _weights({name: float(value) for name, value in exact.items()}).items():
         add(data, [{name: exact[name] + side * weight * step} for side in (1, -1)])
     data["condition"] = float(base["condition"].mid())
     loop: dict[str, float] = {}
@@ -144,8 +142,8 @@ def _sensitivity(scene: Scene, theta_2: float, branch: int, omega_2: float, alph
             if name.startswith("a_"):
                 loop[f"{name}_x"] = loop[f"{name}_y"] = float(hardest)
         for name, most in (("slip", fastest), ("jerk", hardest)):
-            for x, y in ((most * step, arb(0)), (arb(0), most * step)):
-                add(loop, [{name: (x, y)}])
+            for direction in (acb(1), acb(0, 1)):
+                add(loop, [{name: most * step * direction}])
     if "torque" in base:
         strongest = max(abs(base[name + axis]) for name in PIN_FORCES for axis in ("_x", "_y"))
         strongest += abs(base["torque"]) / _extent(scene)  # the couple on a bar is rounded too

@@ -10,7 +10,8 @@ lambda = F43 and e_drive = the derivative of the driven bar's rotation. Every nu
 
 import math
 from collections.abc import Callable, Sequence
-from typing import Any
+from functools import partial
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -32,56 +33,61 @@ Act = Callable[[], None]
 Values = dict[str, Array | float]
 
 
-class Bars:
-    """An engine holding the bars of a scene, opened at pin A or B; every number is the engine's own."""
-
-    own: str
-    """What the engine finds alone, for the report."""
-    alone = False
-    """Whether it answers the torque that the bars without loads and effects take, too: `torque_inertia`."""
-    ground_angle: float
+class Assembled(Protocol):
+    """Bars opened at pin A or B, as an engine places them; every number is the engine's own."""
 
     def place(self, q: Sequence[float]) -> None:
         """Move to a configuration."""
-        raise NotImplementedError
 
     def gap(self) -> tuple[float, float]:
         """B on bar 3 minus B on bar 4, or A on bar 2 minus A on bar 3, m."""
-        raise NotImplementedError
 
     def jacobian(self) -> Array:
         """Derivative of the gap, (2, 3), m."""
-        raise NotImplementedError
+
+    def positions(self) -> dict[str, Array]:
+        """Points O4, A, B, "B4", the end of bar 4, and where pin A is open "A2", that of bar 2; (2,), m."""
+
+
+class Bars(Assembled, Protocol):
+    """An engine holding the bars of a scene, which knows their mass centres (G2, G3, G4 among the points) and moves."""
+
+    own: str
+    """What the engine finds alone, for the report."""
+    alone: bool = False
+    """Whether it answers the torque that the bars without loads and effects take, too: `torque_inertia`."""
+    ground_angle: float
 
     def angle(self, bar: int) -> float:
         """Direction of a bar's line, in (-pi, pi], rad."""
-        raise NotImplementedError
-
-    def positions(self) -> dict[str, Array]:
-        """Points O4, A, B, G2, G3, G4, "B4", the end of bar 4, and where pin A is open "A2", that of bar 2; (2,), m."""
-        raise NotImplementedError
 
     def move(self, omega_2: float, alpha_2: float) -> Values:
         """Motion and forces where the bars are placed, by name; empty where a toggle leaves them 0/0."""
-        raise NotImplementedError
 
     def refusal(self) -> str:
         """Why what was answered does not count, or nothing."""
         return ""
 
 
-class Tree(Bars):
+class Tree(Bars, Protocol):
     """Bars opened at pin B; the engine gives points, Jacobians, accelerations, inverse dynamics and joint forces.
 
     The ground (bar 1) does not move; its line points from O2 to O4.
     """
 
-    own = (
+    own: str = (
         "assembly (Newton on its own gap), velocities (own Jacobian), accelerations (own dJ/dt v), "
         "inverse dynamics, effects from its own state, loop multipliers, pin forces"
     )
-    field = (0.0, 0.0)
+    drive_bar: int
+    field: tuple[float, float] = (0.0, 0.0)
     """Of gravity, m/s^2."""
+    loaded: list[str]
+    """Pins whose friction depends on their load."""
+    pin_loads: dict[str, float]
+    """Magnitudes of its own pin forces in the last pass, by pin, N; empty before the first."""
+    turns: dict[int, Array]
+    """Derivatives of the bars' rotations by the coordinates, constant in the plane."""
     wrenches: dict[int, list[float]]
     """What acts on each moving bar, summed: a force at its first pin and a couple, (x, y, moment), N and N m."""
     v: Array
@@ -93,45 +99,34 @@ class Tree(Bars):
         self.ground_angle, self.drive_bar, self.terms = scene.linkage.ground_angle, scene.drive_bar, terms
         self.alone = bool(scene.loads or scene.effects)
         self.loaded = [pin for effect in scene.effects for pin in effect.loaded_pins]
-        """Pins whose friction depends on their load."""
-        self.pin_loads: dict[str, float] = {}
-        """Magnitudes of its own pin forces in the last pass, by pin, N."""
+        self.pin_loads = {}
         self.place((0.0, 0.0, 0.0))
         self.turns = {1: np.zeros(3)} | {bar: self.turn(bar) for bar in MOVING_BARS}
-        """Derivatives of the bars' rotations by the coordinates, constant in the plane."""
 
     # what the engine gives
     def point(self, name: str) -> Array:
         """A point that `description.parts` names, world axes, (2,), m; perhaps the engine's own memory."""
-        raise NotImplementedError
 
     def rotation(self, bar: int) -> Array:
         """Axes along and across a moving bar's line, (2, 2)."""
-        raise NotImplementedError
 
     def point_jacobian(self, name: str) -> Array:
         """Derivative of a point, (2, 3), m."""
-        raise NotImplementedError
 
     def turn(self, bar: int) -> Array:
         """Derivative of a moving bar's rotation, (3,)."""
-        raise NotImplementedError
 
     def set_motion(self, v: Array, a: Array) -> None:
         """Speeds and accelerations of the coordinates."""
-        raise NotImplementedError
 
     def acceleration(self, name: str) -> Array:
         """Of a point at the motion last set, (2,), m/s^2."""
-        raise NotImplementedError
 
     def needed(self, field: tuple[float, float], wrenches: dict[int, list[float]]) -> Array:
         """Generalised forces that the motion last set asks for beyond gravity and what acts, (3,), N m."""
-        raise NotImplementedError
 
     def carried(self) -> dict[int, Array]:
         """Force on each moving bar at its first pin, at the motion last set and under `wrenches`, (2,), N."""
-        raise NotImplementedError
 
     # what follows
     def gap(self) -> tuple[float, float]:
@@ -163,10 +158,6 @@ class Tree(Bars):
         """First pin of a bar (O2, O2, A, O4 of bars 1, 2, 3, 4), m, (2,)."""
         return np.zeros(2) if bar == 1 else self.point(f"foot{bar}")
 
-    def centre(self, bar: int) -> Array:
-        """Mass centre of a moving bar, m, (2,)."""
-        return self.point(f"G{bar}")
-
     def velocity(self, bar: int) -> float:
         """Angular velocity of a bar, rad/s."""
         return float(self.turns[bar] @ self.v)
@@ -174,10 +165,6 @@ class Tree(Bars):
     def alpha(self, bar: int) -> float:
         """Angular acceleration of a bar, rad/s^2."""
         return float(self.turns[bar] @ self.a)
-
-    def pin_load(self, pin: str) -> float:
-        """Magnitude of the pin force that the engine itself found in its last pass, N; none before the first."""
-        return self.pin_loads.get(pin, 0.0)
 
     def gravity(self, field: tuple[float, float]) -> None:
         """A field (g_x, g_y) for the engine's own gravity, m/s^2."""
@@ -239,19 +226,18 @@ class Tree(Bars):
         values: Values = {f"a_{name}": self.acceleration(point) for name, point in ON_BARS.items()}
         for bar in (3, 4):
             values[f"omega_{bar}"], values[f"alpha_{bar}"] = self.velocity(bar), self.alpha(bar)
-        matrix = np.array([*jacobian, self.turns[self.drive_bar]]).T
+        solve = partial(multipliers, jacobian, self.turns[self.drive_bar])
         try:
-            unknowns, *without = np.linalg.solve(matrix, np.array([needed, *inertial]).T).T
-            if without:
-                values["torque_inertia"] = float(without[0][2])
-            forces = self._multipliers(unknowns)
-            if self.loaded:
-                forces = self._settled(forces, lambda: self._multipliers(np.linalg.solve(matrix, self.torques())))
+            forces = self._balanced(solve(needed))
         except np.linalg.LinAlgError:  # no torque on that bar balances the linkage here
             return values
+        if inertial:
+            values["torque_inertia"] = float(solve(inertial[0])[2])
+        if self.loaded:
+            forces = self._settled(forces, lambda: self._balanced(solve(self.torques())))
         return values | forces
 
-    def _multipliers(self, unknowns: Array) -> dict[str, Any]:
+    def _balanced(self, unknowns: Array) -> dict[str, Any]:
         """Driving torque and the four pin forces."""
         return {**self.forces(unknowns[:2], float(unknowns[2])), "F43": unknowns[:2], "torque": unknowns[2]}
 
@@ -261,7 +247,7 @@ class Tree(Bars):
         for _ in range(PASSES):
             loads = {pin: math.hypot(*forces[FORCE_AT[pin]]) for pin in self.loaded}
             most = max(loads.values())
-            change = max(abs(load - self.pin_load(pin)) for pin, load in loads.items())
+            change = max(abs(load - self.pin_loads.get(pin, 0.0)) for pin, load in loads.items())
             # once down to the rounding of a pass, the change falls no further
             if change <= REPEATED * most or before <= change <= ROUNDED * most:
                 return forces
@@ -283,3 +269,20 @@ def closed(jacobian: Array, of_2: float, x: float = 0.0, y: float = 0.0) -> Arra
     if det == 0.0:
         raise np.linalg.LinAlgError("the bars are in one line")
     return np.array([of_2, (b * y - d * x) / det, (c * x - a * y) / det])
+
+
+def multipliers(jacobian: Array, turn: Array, needed: Array) -> Array:
+    """[lambda; T] where [J^T turn] [lambda; T] = tau, (3,); LinAlgError where no torque on that bar balances tau.
+
+    By Cramer's rule: of bar 2 the determinant is that of `closed` to the last digit, so that there are forces wherever
+    there are speeds, as far as rounding leaves them digits; elimination may find the matrix singular there.
+    """
+    (a, b, c), (d, e, f) = jacobian.tolist()
+    (p, q, r), (x, y, z) = turn.tolist(), needed.tolist()
+    u, v, w = b * f - c * e, c * d - a * f, a * e - b * d
+    det = p * u + q * v + r * w
+    if det == 0.0:
+        raise np.linalg.LinAlgError("the torque is at a pole")
+    one = x * (e * r - f * q) + y * (f * p - d * r) + z * (d * q - e * p)
+    other = x * (q * c - r * b) + y * (r * a - p * c) + z * (p * b - q * a)
+    return np.array([one / det, other / det, (x * u + y * v + z * w) / det])

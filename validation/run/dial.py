@@ -62,8 +62,8 @@ class Dialled:
 
     def answer(self, scene: Scene, command: Command) -> Answer:
         """Simulated with as many steps as the laws ask for, and more while its own residuals say so."""
-        from validation.engines.mujoco.dialled import LONGEST, ORDER, dialled, guess
         from validation.engines.mujoco.simulate import MujocoSimulated
+        from validation.engines.mujoco.trial import LONGEST, ORDER, dialled, guess
 
         steps, tc = guess(self.error)
         spent, runs = 0.0, 0

@@ -32,7 +32,7 @@ from validation.report.record import Record, Timing
 
 ENGINES = {
     "mujoco-forward": ("validation.engines.mujoco.released:MujocoForward", 1e-3, "mujoco"),
-    "pinocchio-forward": ("validation.engines.pinocchio_released:PinocchioReleased", 2e-3, "pinocchio"),
+    "pinocchio-forward": ("validation.engines.pinocchio_forward:PinocchioReleased", 2e-3, "pinocchio"),
 }
 """Adapter, longest step (s) and library of each engine that integrates by itself."""
 FULL = {"theta_2": 1e-9, "omega_2": 1e-8, "energy": 1e-10, "stopped_at": 1e-9}

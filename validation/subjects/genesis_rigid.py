@@ -1,8 +1,6 @@
 """Genesis' rigid solver in double precision, from the MJCF file."""
 
-import tempfile
 from importlib.metadata import version
-from pathlib import Path
 from typing import Any
 
 import genesis
@@ -10,7 +8,7 @@ import numpy as np
 import torch
 
 from fourbar.scene import Scene
-from validation.subjects.motion import Readings, State, run_through, start, turn, weight
+from validation.subjects.motion import Readings, State, as_file, run_through, start, turn, weight
 from validation.subjects.mujoco_c import text
 
 VERSION = version("genesis-world")
@@ -31,10 +29,8 @@ def through(scene: Scene, steps: int, setting: str) -> Readings:
         rigid_options=genesis.options.RigidOptions(**common, enable_collision=False, enable_joint_limit=False),
         show_viewer=False,
     )
-    with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / "four_bar.xml"
-        file.write_text(text(scene, steps, "genesis"))
-        bars = world.add_entity(genesis.morphs.MJCF(file=str(file), default_armature=SETTINGS[setting]))
+    with as_file(text(scene, steps, "genesis"), "four_bar.xml") as file:
+        bars = world.add_entity(genesis.morphs.MJCF(file=file, default_armature=SETTINGS[setting]))
         world.build()
     world.step()  # compiled before the clock runs
     world.reset()

@@ -1,9 +1,12 @@
 """What a subject answers: numbers of a turn that it ran through, or of states that it was given."""
 
 import math
+import tempfile
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -118,6 +121,15 @@ def weight(scene: Scene) -> tuple[float, float, float]:
     """The field of gravity, m/s^2."""
     fields = [field_of(effect) for effect in scene.effects if isinstance(effect, Gravity)]
     return (*fields[0], 0.0) if fields else (0.0, 0.0, 0.0)
+
+
+@contextmanager
+def as_file(text: str, name: str) -> Iterator[str]:
+    """The path of a file of that name and text, as long as this lasts: for simulators that read no text."""
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / name
+        file.write_text(text)
+        yield str(file)
 
 
 def gap(scene: Scene, theta: tuple[float, float, float]) -> float:

@@ -1,9 +1,7 @@
 """Newton's Kamino solver (beta, single precision, maximal coordinates), from the USD file."""
 
-import tempfile
 from dataclasses import replace
 from importlib.metadata import version
-from pathlib import Path
 
 import newton
 import numpy as np
@@ -16,7 +14,7 @@ from fourbar.mjcf.usd import usd
 from fourbar.scene import Scene
 from validation.compare.answer import Array
 from validation.engines.description import turned
-from validation.subjects.motion import Readings, State, run_through, start, turn
+from validation.subjects.motion import Readings, State, as_file, run_through, start, turn
 
 VERSION = version("newton")
 DEVICE = str(warp.get_preferred_device().name)
@@ -33,10 +31,8 @@ def through(scene: Scene, steps: int, setting: str) -> Readings:
     begin, inertia = start(scene), flywheel(scene, SINGLE)
     carried = replace(scene, effects=(*scene.effects, Flywheel(inertia, 2)))
     builder = newton.ModelBuilder()
-    with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / "four_bar.usda"
-        file.write_text(usd(carried, begin))
-        builder.add_usd(str(file))
+    with as_file(usd(carried, begin), "four_bar.usda") as file:
+        builder.add_usd(file)
     model = builder.finalize(device=warp.get_preferred_device())
     solver, control = newton.solvers.SolverKamino(model), model.control()
     now, then = model.state(), model.state()

@@ -1,15 +1,13 @@
 """Newton's MuJoCo solver (MuJoCo Warp inside, single precision), from the MJCF file."""
 
-import tempfile
 from importlib.metadata import version
-from pathlib import Path
 
 import mujoco_warp as mjw
 import newton
 import warp
 
 from fourbar.scene import Scene
-from validation.subjects.motion import Readings, State, run_through, start, turn, weight
+from validation.subjects.motion import Readings, State, as_file, run_through, start, turn, weight
 from validation.subjects.mujoco_c import reading, text
 
 VERSION = version("newton")
@@ -23,10 +21,8 @@ def through(scene: Scene, steps: int, setting: str) -> Readings:
     """A turn in so many steps."""
     timestep, _ = turn(scene, steps)
     builder = newton.ModelBuilder(gravity=weight(scene))
-    with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / "four_bar.xml"
-        file.write_text(text(scene, steps, "newton"))
-        builder.add_mjcf(str(file))
+    with as_file(text(scene, steps, "newton"), "four_bar.xml") as file:
+        builder.add_mjcf(file)
     model = builder.finalize(device=warp.get_preferred_device())
     solver, control = newton.solvers.SolverMuJoCo(model), model.control()
     now, then = model.state(), model.state()

@@ -1,8 +1,6 @@
 """PyBullet: an articulated body, a point constraint at B, and a velocity motor on O2."""
 
-import tempfile
 from importlib.metadata import version
-from pathlib import Path
 from typing import Any
 
 import pybullet as bullet
@@ -10,7 +8,7 @@ import pybullet as bullet
 from fourbar.linkage import BAR_NAMES, FIRST_PIN
 from fourbar.scene import Scene
 from validation.engines.description import parts
-from validation.subjects.motion import Readings, State, run_through, start, turn, weight
+from validation.subjects.motion import Readings, State, as_file, run_through, start, turn, weight
 
 VERSION = version("pybullet")
 STEPS = (628, 2512, 10048)
@@ -43,11 +41,9 @@ def through(scene: Scene, steps: int, setting: str) -> Readings:
     (timestep, _), begin = turn(scene, steps), start(scene)
     client = bullet.connect(bullet.DIRECT)
     try:
-        with tempfile.TemporaryDirectory() as folder:
-            file = Path(folder) / "four_bar.urdf"
-            file.write_text(urdf(scene))
+        with as_file(urdf(scene), "four_bar.urdf") as file:
             flags = bullet.URDF_USE_INERTIA_FROM_FILE
-            body = bullet.loadURDF(str(file), useFixedBase=True, flags=flags, physicsClientId=client)
+            body = bullet.loadURDF(file, useFixedBase=True, flags=flags, physicsClientId=client)
         bullet.setPhysicsEngineParameter(fixedTimeStep=timestep, **SETTINGS[setting])
         bullet.setGravity(*weight(scene))
         for joint, (angle, speed) in enumerate(zip(begin.qpos, begin.qvel, strict=True)):

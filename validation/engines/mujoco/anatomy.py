@@ -35,6 +35,15 @@ def bodies_of(model: mujoco.MjModel) -> str:
     return ", ".join(model.body(i).name or f"(unnamed {i})" for i in range(1, model.nbody))
 
 
+def stated_body(model: mujoco.MjModel, names: Mapping[str, str], role: str) -> int:
+    """The body of a bar by its stated name, or by the bar's; InputError where there is none."""
+    name = names.get(role, role)
+    body = body_named(model, name)
+    if body is None:
+        raise InputError("--name", f"{role}={name}", f"no such body; the file has: {bodies_of(model)}")
+    return body
+
+
 class Anatomy:
     """Bars, pins, hinges and closure of a compiled model; everything is measured in its rest state."""
 
@@ -42,7 +51,7 @@ class Anatomy:
         self.model, self.data, self.names = model, mujoco.MjData(model), dict(names)
         mujoco.mj_kinematics(model, self.data)
         mujoco.mj_comPos(model, self.data)
-        self.root = {1: 0} | {bar: self._body(names, BAR_NAMES[bar]) for bar in MOVING_BARS}
+        self.root = {1: 0} | {bar: stated_body(model, names, BAR_NAMES[bar]) for bar in MOVING_BARS}
         self.bar_of_root = {body: bar for bar, body in self.root.items()}
         if len(self.bar_of_root) < len(self.root):
             raise InputError("--name", dict(names), "input, coupler and output must be three bodies that move")
@@ -59,17 +68,12 @@ class Anatomy:
         self.closure: int | None = None
         self.closed_by = "nothing"
         self._find_closure(names)
-        self._line = {bar: self._angle_in_rest(bar) for bar in ENDS}
+        lines = {bar: self.line(self.data, bar) for bar in ENDS}
+        self._line = {bar: math.atan2(y, x) for bar, (x, y) in lines.items()}
         self._rest = self.data.qpos.copy()
+        self._rest_angles = np.array((self._line[2], self._line[3] - self._line[2], self._line[4]))
         self.to_joints = self._to_joints()
         """Joint speeds from those of (theta_2, theta_3 - theta_2, theta_4), (3, 3)."""
-
-    def _body(self, names: Mapping[str, str], role: str) -> int:
-        name = names.get(role, role)
-        body = body_named(self.model, name)
-        if body is None:
-            raise InputError("--name", f"{role}={name}", f"no such body; the file has: {bodies_of(self.model)}")
-        return body
 
     def drives(self) -> list[int]:
         """The actuators that turn pin O2."""
@@ -179,10 +183,6 @@ class Anatomy:
         """Distance between a bar's pins in the plane, m."""
         return math.hypot(*self.line(self.data, bar))
 
-    def _angle_in_rest(self, bar: int) -> float:
-        x, y = self.line(self.data, bar)
-        return math.atan2(y, x)
-
     @property
     def ground_angle(self) -> float:
         """theta_1, rad."""
@@ -221,9 +221,8 @@ class Anatomy:
 
     def qpos(self, x: Sequence[float]) -> Array:
         """Joint positions at (theta_2, theta_3 - theta_2, theta_4)."""
-        rest = (self._line[2], self._line[3] - self._line[2], self._line[4])
         q = self._rest.copy()
-        turned = self.to_joints @ (np.asarray(x) - rest)
+        turned = self.to_joints @ (np.asarray(x) - self._rest_angles)
         for joint in self.hinge.values():
             q[self.model.jnt_qposadr[joint]] += turned[self.model.jnt_dofadr[joint]]
         return np.asarray(q)
@@ -234,5 +233,4 @@ class Anatomy:
         for joint in self.hinge.values():
             address = self.model.jnt_qposadr[joint]
             moved[self.model.jnt_dofadr[joint]] = data.qpos[address] - self._rest[address]
-        rest = (self._line[2], self._line[3] - self._line[2], self._line[4])
-        return np.asarray(np.linalg.solve(self.to_joints, moved) + rest)
+        return np.asarray(np.linalg.solve(self.to_joints, moved) + self._rest_angles)

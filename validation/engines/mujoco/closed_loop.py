@@ -6,8 +6,7 @@ import mujoco
 import numpy as np
 
 from validation.compare.answer import Array
-from validation.engines.loop import Position
-from validation.engines.tree import Bars, closed
+from validation.engines.tree import Assembled, closed
 
 CARRIED_BY = {"input": ("input",), "coupler": ("coupler", "input"), "output": ("output",)}
 """The bodies whose parent bears what acts on a body."""
@@ -25,7 +24,7 @@ def load_force(model: mujoco.MjModel, data: mujoco.MjData, actuator: int) -> Arr
     return np.asarray(axes @ model.actuator_gear[actuator, :3] * data.actuator_force[actuator])
 
 
-class ClosedLoop(Bars):
+class ClosedLoop(Assembled):
     """Model and data of one generated MJCF; nothing is edited after it is compiled."""
 
     def __init__(self, mjcf: str) -> None:
@@ -62,10 +61,6 @@ class ClosedLoop(Bars):
         """Pins O4 and A, and B at the end of bar 3 and of bar 4, (2,), m."""
         x, names = self.data.site_xpos, {"O4": "O4", "A": "A", "B": "B3", "B4": "B4"}
         return {name: x[self.site[site]][:2].copy() for name, site in names.items()}
-
-    def position(self) -> Position:
-        """Own assembly, position after position."""
-        return Position(self)
 
     def branch(self) -> int:
         """The branch of the state that was last forwarded: det = -b c sin(theta_4 - theta_3)."""

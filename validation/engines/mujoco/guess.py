@@ -8,7 +8,7 @@ import mujoco
 
 from fourbar.errors import InputError
 from fourbar.linkage import BAR_NAMES, MOVING_BARS
-from validation.engines.mujoco.anatomy import Anatomy, bodies_of, body_named
+from validation.engines.mujoco.anatomy import Anatomy, bodies_of, body_named, stated_body
 
 ROLES = tuple(BAR_NAMES[bar] for bar in MOVING_BARS)
 SITES = ("B3", "B4")
@@ -28,10 +28,7 @@ def anatomy_of(model: mujoco.MjModel, names: Mapping[str, str], lengths: Sequenc
     Raises InputError in one line: why no three bodies fit.
     """
     known = {role: names.get(role, role) for role in (*ROLES, *SITES)}
-    bodies = [body_named(model, known[role]) for role in ROLES]
-    for role, body in zip(ROLES, bodies, strict=True):
-        if role in names and body is None:
-            raise InputError("--name", f"{role}={names[role]}", f"no such body; the file has: {bodies_of(model)}")
+    bodies = [stated_body(model, names, role) if role in names else body_named(model, role) for role in ROLES]
     if None not in bodies and (_site(model, known["B3"]) or names.keys() & {*SITES} or not _open_sites(model)):
         return Anatomy(model, names), []
     candidates = sorted({int(model.body_weldid[model.jnt_bodyid[joint]]) for joint in range(model.njnt)})

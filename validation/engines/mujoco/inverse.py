@@ -12,11 +12,9 @@ from fourbar.scene import Scene
 from validation.compare.answer import Array
 from validation.engines.description import FIRST_PIN, parts, unknown_effect
 from validation.engines.effects import TERM_OF, acting
+from validation.engines.limits import LIGHTEST
 from validation.engines.loop import Exact
 from validation.engines.tree import Tree
-
-LEAST = 1e-15
-"""kg and kg m^2; the compiler raises ValueError for a moving body below it (mjMINVAL, measured with 4.0.0)."""
 
 
 def refusal(scene: Scene) -> str:
@@ -24,10 +22,10 @@ def refusal(scene: Scene) -> str:
     if reason := unknown_effect(scene, TERM_OF):
         return reason
     for part in parts(scene.linkage):
-        if part.mass < LEAST or part.inertia < LEAST:
+        if min(part.mass, part.inertia) < LIGHTEST.boundary:
             return (
                 f"bar {part.bar} has mass {part.mass:g} kg and inertia {part.inertia:g} kg m^2; "
-                f"MuJoCo compiles no moving body below {LEAST:g} of either"
+                f"MuJoCo compiles no moving body below {LIGHTEST.boundary:g} of either"
             )
     return ""
 

@@ -10,7 +10,7 @@ from fourbar.errors import InputError
 from fourbar.mjcf import RECIPE, mjcf
 from fourbar.scene import Scene, command
 from validation.compare.answer import Array, Released
-from validation.engines.loop import LimitWatch
+from validation.engines.loop import LimitWatch, Position
 from validation.engines.mujoco.closed_loop import O2, O4, A, ClosedLoop
 from validation.engines.mujoco.runner import Stepper
 
@@ -42,7 +42,7 @@ class MujocoForward:
             loop = ClosedLoop(mjcf(bare, settings, keyframe=False))
         except InputError as error:
             return Released.refused(NAME, setting, str(error))
-        q_0 = loop.position().find(float(start.theta_2[0]), int(start.branch[0]))
+        q_0 = Position(loop).find(float(start.theta_2[0]), int(start.branch[0]))
         if q_0 is None:
             return Released.refused(NAME, setting, "the loop does not close at the start")
         loop.model.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_ENERGY

@@ -11,8 +11,8 @@ from fourbar.scene import Command, Scene
 from fourbar.scene.motion import BRANCH_NAMES
 from validation.compare.rows import AGREES, FAILS, UNDECIDED, Row
 from validation.compare.tolerance import EPS, SIMULATED, K
+from validation.engines.limits import FASTEST, NEAREST_TOGGLE, least_sine
 from validation.engines.mujoco.closed_loop import O2, ClosedLoop
-from validation.engines.mujoco.limits import FASTEST, NEAREST_TOGGLE, least_sine
 
 NAME = "mujoco-simulated"
 QUANTITY = "as shipped"

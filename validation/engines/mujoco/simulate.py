@@ -17,10 +17,10 @@ from fourbar.scene import Command, Scene
 from fourbar.scene.motion import Motion
 from validation.compare.answer import Answer
 from validation.engines.description import speeds
+from validation.engines.limits import NEAREST_TOGGLE, least_sine, too_fast_or_loaded
 from validation.engines.loop import MADE, Position, as_made, blank
 from validation.engines.mujoco.called_back import ActuatorForce, at_full_size, of_loads, receiving, supplying, within
 from validation.engines.mujoco.closed_loop import O2, O4, A, ClosedLoop
-from validation.engines.mujoco.limits import NEAREST_TOGGLE, least_sine, too_fast_or_loaded
 from validation.engines.mujoco.motions import Lawful, Passage, Steady, extremes, order_in_time
 from validation.engines.mujoco.runner import LIGHT_FLYWHEEL, Run, assembled, stretches
 from validation.engines.mujoco.watch import Watch, alarms
@@ -121,7 +121,7 @@ class _Simulation:
 
     def answer(self) -> Answer:
         """The answer over all positions."""
-        position = ClosedLoop(self._text(1e-3)).position()  # kinematics alone: the timestep plays no part
+        position = Position(ClosedLoop(self._text(1e-3)))  # kinematics alone: the timestep plays no part
         found = assembled(position, self.command, self.order)
         least = least_sine(self.scene.linkage, self.command.theta_2, np.array([q is not None for q in found]))
         if self.bounded and least < NEAREST_TOGGLE.boundary:

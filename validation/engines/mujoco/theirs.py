@@ -29,7 +29,7 @@ from validation.engines.mujoco.guess import anatomy_of
 from validation.engines.mujoco.mend import mended
 from validation.engines.mujoco.motions import order_in_time
 from validation.engines.mujoco.runner import Stepper, assembled, stretches
-from validation.engines.tree import Bars, Values, closed
+from validation.engines.tree import Assembled, Values, closed
 
 ONE_STATE, THROUGH_TIME = "mjcf-one-state", "mjcf-simulated"
 POSITIONS = 37
@@ -124,7 +124,7 @@ def _answered(name: str, scene: Scene, ask: Callable[[], Answer]) -> Answer:
     return answer
 
 
-class Loop(Bars):
+class Loop(Assembled):
     """Somebody's model with its drive taken off; coordinates x = (theta_2, theta_3 - theta_2, theta_4)."""
 
     def __init__(self, anatomy: Anatomy, scene: Scene) -> None:

@@ -21,6 +21,7 @@ import numpy as np
 from fourbar.quantities import PIN_FORCES
 from validation.compare.answer import Array
 from validation.engines.mujoco.closed_loop import O2, O4, TURNED_BY, A, ClosedLoop
+from validation.engines.tree import multipliers
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,7 +147,7 @@ class Watch:
         for name, x in (("theta", q), ("omega", v), ("alpha", a)):
             answer[f"{name}_3"], answer[f"{name}_4"] = x[O2] + x[A], x[O4]
         try:
-            found = np.linalg.solve(np.column_stack((jacobian.T, self.e_drive)), needed)
+            found = multipliers(jacobian, self.e_drive, needed)
         except np.linalg.LinAlgError:
             found = np.full(3, np.inf)
         answer |= {"F43": found[:2], "torque": found[2]}

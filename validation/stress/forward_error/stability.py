@@ -1,20 +1,144 @@
-"""The command: samples of the families in parallel, and a table of what they showed."""
+"""The command: forward error of every output of `solve` against ball arithmetic, per family of hard cases.
+
+The error allowed is 8 eps (|y| + sum |x_i dy/dx_i|) with y the value (1 rad for angles) and x_i the
+stored inputs: what a change of the inputs in their last digits does to y, and nothing more.
+"""
 
 import math
+import warnings
 from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Any
 
 import click
 import numpy as np
 
 from fourbar.errors import FAILED, HOLDS
+from fourbar.quantities import OK, PIN_FORCES, UNITS, VECTORS
+from fourbar.scene import Command, Scene
+from fourbar.solve import solve
+from validation.compare.error import used
+from validation.engines.balls import reference
 from validation.report.terminal import lined_up
 from validation.stress.forward_error.families import FAMILIES
-from validation.stress.forward_error.judge import TOO_LARGE, Tally, judge
 
+EPS = 2.0**-52
+FACTOR = 8.0
+"""Of eps, as the contract states it."""
+TOO_SMALL, TOO_LARGE = 10.0, 100.0
+"""An error bar may be this much smaller (never) and this much larger (in 99 % of the samples) than the error."""
+HALF_A_DIGIT = 2.0**-53
+"""Of a result: an error below that is chance, for no double need be nearer to the truth. A bar is held to be too
+large against no less."""
 FULL = 10_000
 """Samples per family of the full set."""
 CHUNK = 250
 """Samples per task: about a second."""
+
+
+@dataclass(slots=True)
+class Tally:
+    """What a number of samples of one family showed."""
+
+    samples: int = 0
+    not_assembled: int = 0
+    no_torque: int = 0
+    """Samples in which the exact system of forces is singular: nothing to compare."""
+    worst: dict[str, tuple[float, str]] = field(default_factory=dict)
+    """Output: largest error/allowed, and the sample it belongs to."""
+    too_small: dict[str, float] = field(default_factory=dict)
+    """Error bar: largest error/bar."""
+    too_large: dict[str, int] = field(default_factory=dict)
+    """Error bar: samples in which it is more than TOO_LARGE times the error."""
+    warned: list[str] = field(default_factory=list)
+
+    def add(self, other: "Tally") -> None:
+        """Take in the samples of another tally."""
+        self.samples += other.samples
+        self.not_assembled += other.not_assembled
+        self.no_torque += other.no_torque
+        self.warned += other.warned
+        for name, entry in other.worst.items():
+            self.worst[name] = max(self.worst.get(name, (0.0, "")), entry)
+        for name, ratio in other.too_small.items():
+            self.too_small[name] = max(self.too_small.get(name, 0.0), ratio)
+        for name, count in other.too_large.items():
+            self.too_large[name] = self.too_large.get(name, 0) + count
+
+    def note(self, output: str, ratio: float, sample: str) -> None:
+        """One error over what is allowed."""
+        self.worst[output] = max(self.worst.get(output, (0.0, "")), (ratio, sample))
+
+    def held(self) -> bool:
+        """Whether anything was compared, and error and error bars are as promised."""
+        bars = all(ratio <= TOO_SMALL for ratio in self.too_small.values())
+        useful = all(count <= 0.01 * self.samples for count in self.too_large.values())
+        errors = bool(self.worst) and all(ratio <= 1.0 for ratio, _ in self.worst.values())
+        return errors and bars and useful and not self.warned
+
+
+def components(name: str) -> list[tuple[str, Any]]:
+    """The names under which the reference knows an output, and their index in its array."""
+    return [(f"{name}_x", (0, 0)), (f"{name}_y", (0, 1))] if name in VECTORS else [(name, 0)]
+
+
+def judge(scene: Scene, tally: Tally, sample: str) -> None:
+    """Compare one position with the reference; `solve` evaluates one in plain numbers, two in arrays."""
+    tally.samples += 1
+    theta_2 = float(np.asarray(scene.motion.theta_2))
+    times = 1 + hash(theta_2) % 2  # as good as random, and the same on every run
+    at = Command(
+        np.full(times, theta_2),
+        np.full(times, scene.motion.branch, np.int8),
+        scene.motion.omega_2,
+        scene.motion.alpha_2,
+    )
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        solution = solve(scene, "error", at=at)
+    tally.warned += [f"{sample}: {warning.message}" for warning in caught]
+    exact = reference(scene, scene.motion.branch, theta_2)
+    if exact is None:
+        tally.not_assembled += 1
+        if solution.status_code[0] == OK:
+            tally.worst["assembled"] = (math.inf, sample)
+        return
+    values, sensitivity = exact
+    errors: dict[str, float] = {}
+    for name in UNITS:
+        array = getattr(solution, name)
+        if array is None or name == "theta_2" or name.endswith("_error"):
+            continue
+        for component, index in components(name):
+            if component not in values:
+                continue
+            ratio, errors[component] = _ratio(name, array[index], values[component], sensitivity[component])
+            tally.note(component, ratio, sample)
+    if "torque" not in values:
+        tally.no_torque += 1
+        return
+    assert solution.status_code[0] == OK or "torque" in errors
+    force = max(math.hypot(errors[f"{name}_x"], errors[f"{name}_y"]) for name in PIN_FORCES)
+    strongest = max(math.hypot(*getattr(solution, name)[0]) for name in PIN_FORCES)
+    assert solution.torque is not None
+    for name, error, size in (
+        ("torque_error", errors["torque"], abs(solution.torque[0])),
+        ("force_error", force, strongest),
+    ):
+        bar = float(getattr(solution, name)[0])
+        tally.too_small[name] = max(tally.too_small.get(name, 0.0), float(used(error, bar)))
+        tally.too_large[name] = tally.too_large.get(name, 0) + (bar > TOO_LARGE * max(error, HALF_A_DIGIT * size))
+
+
+def _ratio(name: str, ours: float, value: Any, sensitivity: float) -> tuple[float, float]:
+    """Error over what is allowed, and the error; a number that the balls cannot tell from the truth has none."""
+    error = value - float(ours) if math.isfinite(ours) else math.inf
+    size = abs(float(value.mid()))
+    if name.startswith("theta"):
+        error, size = math.remainder(float(error), 2.0 * math.pi) if math.isfinite(ours) else error, 1.0
+    wrong = abs(float(error)) if value.rad() < abs(error) else 0.0
+    allowed = FACTOR * EPS * (size + sensitivity)
+    return float(used(wrong, allowed)), wrong
 
 
 def run(family: str, samples: range, seed: int = 0) -> Tally:

@@ -102,17 +102,10 @@ def changed(before: dict[str, Any], after: dict[str, Any]) -> bool:
     """Whether any number differs by more than 1e-9 of its scale."""
     for name, old in before.items():
         new = after.get(name)
-        if old is None and new is None:
-            continue
-        if old is None or new is None or np.shape(old) != np.shape(new):
+        if new is None or np.shape(old) != np.shape(new):
             return True
-        finite = np.isfinite(old)
-        if not np.array_equal(finite, np.isfinite(new)) or not np.array_equal(
-            old[~finite], new[~finite], equal_nan=True
-        ):
-            return True
-        scale = float(np.max(np.abs(old[finite]), initial=0.0)) or 1.0
-        if np.max(np.abs(new[finite] - old[finite]), initial=0.0) > CHANGES * scale:
+        scale = float(np.max(np.abs(old), initial=0.0, where=np.isfinite(old))) or 1.0
+        if not np.allclose(new, old, rtol=0.0, atol=CHANGES * scale, equal_nan=True):
             return True
     return False
 

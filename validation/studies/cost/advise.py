@@ -1,13 +1,10 @@
 """The cheapest settings of MuJoCo that keep torque and pin forces within a required error on a given scene.
 
-The laws of the study say where to look, and short runs of the scene itself decide:
-
-    the closure's time constant    error = STIFF (h/tc)^4, whatever the timestep        -> tc in steps
-    the timestep                   error ~ h^ORDER until a floor                         -> steps
-
-With fitted pads the softness of the closure plays no part above 1e-9 (1e-6 in a slow linkage), so that tc may be long.
+The laws of the study (`guess`) say where to look, and short runs of the scene itself decide. With fitted pads
+the softness of the closure plays no part above 1e-9 (1e-6 in a slow linkage), so that tc may be long.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -19,8 +16,7 @@ from fourbar.mjcf import Settings, mjcf
 from fourbar.scene import Command, Scene
 from fourbar.scene import command as command_of
 from fourbar.writing import require_file, write_text
-from validation.engines.mujoco.dialled import FEWEST_STEPS, LONGEST, ORDER, SHORTEST, dialled, guess
-from validation.engines.mujoco.trial import Rig
+from validation.engines.mujoco.trial import FEWEST_STEPS, LONGEST, ORDER, SHORTEST, Rig, dialled, guess
 from validation.report.terminal import lined_up
 from validation.studies.cost.errors import Errors
 from validation.studies.cost.matters import MATTERS, influences, judged, sentence
@@ -116,18 +112,17 @@ class _Search:
             other = min(max(tc * factor, SHORTEST), LONGEST)
             if other != tc:
                 self._polish(other)
-        served = [a for a in self.attempts if a.errors.worst <= MARGIN * self.error]
-        best = min(served, key=lambda a: a.steps) if served else min(self.attempts, key=lambda a: a.errors.worst)
+        served = self._served()
+        best = min(served, key=lambda a: a.steps) if served else _nearest(self.attempts)
         return Advice(self.error, best, tuple(self.attempts), bool(served))
 
     def _polish(self, tc: float) -> None:
         """Whether another time constant serves with fewer steps, or serves at all."""
-        served = [a.steps for a in self.attempts if a.errors.worst <= MARGIN * self.error]
+        served = self._served()
         if not served:
-            nearest = min(self.attempts, key=lambda a: a.errors.worst)
-            self._bisect(tc, nearest.settings.steps_per_revolution)
+            self._bisect(tc, _nearest(self.attempts).settings.steps_per_revolution)
             return
-        fewest = min((a for a in self.attempts if a.steps == min(served)), key=lambda a: a.errors.worst)
+        fewest = min(served, key=lambda a: (a.steps, a.errors.worst))
         n = fewest.settings.steps_per_revolution / CLOSE_ENOUGH
         if n >= FEWEST_STEPS and self._serves(self._try(n, tc)):
             self._bisect(tc, n / CLOSE_ENOUGH, serves=n)
@@ -166,6 +161,9 @@ class _Search:
     def _serves(self, attempt: Attempt) -> bool:
         return attempt.errors.worst <= MARGIN * self.error
 
+    def _served(self) -> list[Attempt]:
+        return [attempt for attempt in self.attempts if self._serves(attempt)]
+
     def _try(self, n: float, tc: float) -> Attempt:
         settings = dialled(n, tc)
         steps = self.rig.steps(settings)
@@ -175,6 +173,10 @@ class _Search:
         attempt = Attempt(settings, max(trial.steps, 1), judged(self.scene, trial), trial.steps_per_revolution)
         self.attempts.append(attempt)
         return attempt
+
+
+def _nearest(attempts: Sequence[Attempt]) -> Attempt:
+    return min(attempts, key=lambda a: a.errors.worst)
 
 
 @click.command(name="advise")

@@ -7,8 +7,7 @@ from dataclasses import dataclass, replace
 from fourbar.mjcf import Settings
 from fourbar.scene import Scene
 from validation.engines.mujoco import drives
-from validation.engines.mujoco.dialled import FLYWHEEL
-from validation.engines.mujoco.trial import Build
+from validation.engines.mujoco.trial import FLYWHEEL, Build
 
 STEPS = (20, 40, 80, 160, 320, 640, 1280, 2560)
 MORE_STEPS = (*STEPS, 5120, 10240)

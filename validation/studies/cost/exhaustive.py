@@ -11,8 +11,7 @@ from statistics import median
 from typing import NamedTuple
 
 from fourbar.mjcf import Settings
-from validation.engines.mujoco.dialled import FEWEST_STEPS, dialled
-from validation.engines.mujoco.trial import Rig
+from validation.engines.mujoco.trial import FEWEST_STEPS, Rig, dialled
 from validation.stress.timed import in_turns
 from validation.studies.cost.advise import MOST_STEPS
 from validation.studies.cost.matters import judged

@@ -1,7 +1,6 @@
 """The formulas' side of the study: double and single precision, the thirteen equations, fifty digits."""
 
 import math
-import time
 from collections.abc import Callable
 from typing import Any
 
@@ -9,16 +8,13 @@ import numpy as np
 
 from fourbar.effects import Actions
 from fourbar.effects.actions import bodies
-from fourbar.formulas.arithmetic import cross, polar
-from fourbar.formulas.motion import State, coefficients, rates
-from fourbar.formulas.path import drive_sine
-from fourbar.formulas.pin_forces import Wrenches, coupler_about_B, inertia_wrenches, pin_forces
-from fourbar.formulas.position import close_loop, direction, half_angle
-from fourbar.formulas.torque import driving_torque, half_slope, inertia
+from fourbar.formulas.arithmetic import cross
+from fourbar.formulas.motion import State
+from fourbar.formulas.pin_forces import Wrenches
 from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import PIN_FORCES
 from fourbar.scene import Command, Scene
-from fourbar.scene.case import Case, state_at
+from fourbar.scene.case import Case, changed, state_at
 from fourbar.solve import solve
 from validation.compare.answer import Array
 from validation.compare.error import relative
@@ -47,40 +43,22 @@ def double(scene: Scene, at: Command) -> Quantities:
 
 def single(scene: Scene, at: Command) -> Quantities:
     """The same formulas on float32 arrays."""
-    case = Case.of(scene)
-    case = case._replace(lengths=type(case.lengths)(*map(float, case.lengths)))  # NumPy's doubles would prevail
+    case = changed(Case.of(scene), float)  # NumPy's doubles would prevail
+    path = case.path._replace(u1=np.complex64(case.path.u1))
     with np.errstate(all="ignore"):
         theta_2 = at.theta_2.astype(np.float32)
-        half = half_angle(case.lengths, theta_2 - scene.linkage.ground_angle)
-        u1 = np.complex64(polar(1.0, scene.linkage.ground_angle))
-        position = close_loop(case.lengths, u1, direction(theta_2), half, at.branch)
-        sides = ("u2", "u3", "u4", "diagonal")  # made of complex doubles whatever their parts are
-        position = position._replace(**{name: _single(getattr(position, name)) for name in sides})
-        k = coefficients(case.lengths, position)
         speed, growth = (np.float32(value) for value in (at.omega_2 or 0.0, at.alpha_2))
-        moving = rates(k, speed, growth)
-        state = State(case.lengths, scene.linkage.ground_angle, theta_2, position, k, speed, moving)
-        actions = Actions(state, case.bodies)
-        for term in case.terms:
-            term.act(actions, state)
-        a = case.lengths.a
-        own, mass_at_A = inertia_wrenches(a, case.bodies, position, moving)
-        of_input, of_others = inertia(a, case.bodies, position, k)
-        others = of_others * growth + half_slope(a, case.bodies, position, k) * (speed * speed)
-        sine = _single(drive_sine(position, scene.drive_bar))
-        work, beyond_A = (_single(value) for value in actions.work())
-        moment = beyond_A - others
-        if scene.drive_bar == 4:
-            moment = -_single(actions.about_B() + coupler_about_B(case.lengths, case.bodies[1], position, moving, sine))
-        wrenches = Wrenches(*map(_single, actions.wrenches(own)))
-        pins = pin_forces(case.lengths, position, scene.drive_bar, sine, wrenches, mass_at_A, moment)
-        torque = driving_torque(k, scene.drive_bar, others + of_input * growth, work)
-    assert torque.dtype == np.float32
-    return {"torque": torque, **{name: _stack(getattr(pins, name), len(theta_2)) for name in PIN_FORCES}}
+        position = path.position(theta_2, path.half_angle(theta_2), at.branch)
+        # vectors are made of complex doubles whatever their parts are, and so is what stays parallel
+        state = case.state(path, theta_2, changed(position, _single), at.branch, speed, growth)
+        state = changed(state, _single)
+        found = case.dynamics(state, growth, rounded=_single)
+    assert found.torque.dtype == np.float32
+    return {"torque": found.torque, **{name: _stack(getattr(found.pins, name), len(theta_2)) for name in PIN_FORCES}}
 
 
-def _single(value: Any) -> Any:
-    """In single precision: a constant load would bring its double with it."""
+def _single(value: Any, *, turned: bool = False) -> Any:
+    """In single precision, both parts of a vector too."""
     return np.asarray(value).astype(np.complex64 if np.iscomplexobj(value) else np.float32)
 
 
@@ -163,10 +141,3 @@ METHODS: dict[str, Callable[[Scene, Command], Quantities]] = {
     "13x13": thirteen_equations,
     "50 digits": fifty_digits,
 }
-
-
-def seconds(method: Callable[[Scene, Command], Quantities], scene: Scene, at: Command) -> float:
-    """CPU seconds of one call."""
-    began = time.process_time()
-    method(scene, at)
-    return time.process_time() - began

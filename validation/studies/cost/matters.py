@@ -12,8 +12,7 @@ from fourbar.mjcf.settings import LIGHT
 from fourbar.scene import Command, Scene
 from fourbar.solve import solve
 from validation.engines.loop import Trial
-from validation.engines.mujoco.dialled import LONGEST, SHORTEST
-from validation.engines.mujoco.trial import Rig
+from validation.engines.mujoco.trial import LONGEST, SHORTEST, Rig
 from validation.studies.cost.errors import NO_ANSWER, Errors, errors
 
 MATTERS = 2.0

@@ -19,7 +19,7 @@ from validation.compare.answer import Engine
 from validation.engines.loop import Trial
 from validation.engines.mujoco.trial import Rig
 from validation.report.machine import versions
-from validation.stress.timed import in_turns
+from validation.stress.timed import in_turns, seconds
 from validation.studies.cost import formulas
 from validation.studies.cost.advise import advise
 from validation.studies.cost.curves import BEST, SLOW, Curve, Spot, curves
@@ -157,7 +157,7 @@ class Study:
             clocks, rig.seconds_per_step(BEST), [min(t.steps, TIMED_STEPS) or 1 for t in trials]
         )
         points = []
-        for spot, trial, (seconds, scatter) in zip(spots, trials, per_step, strict=True):
+        for spot, trial, (cost, scatter) in zip(spots, trials, per_step, strict=True):
             # the laws are those of the steps themselves: between them the advice judges
             found = NO_ANSWER if trial.broken else errors(rig.scene, trial.at, trial.quantities)
             n = trial.steps_per_revolution or spot.settings.steps_per_revolution
@@ -165,7 +165,7 @@ class Study:
             points.append(
                 Point(
                     *(name, STEPPED, spot.label, spot.x, trial.steps, n, *found),
-                    *(seconds * n, trial.reading / samples, seconds * n / reference, scatter, trial.broken),
+                    *(cost * n, trial.reading / samples, cost * n / reference, scatter, trial.broken),
                 )
             )
         return points
@@ -219,7 +219,7 @@ class Study:
                 self.left_out.append(f"{label}: {error}")
                 continue
             at = few if label == "50 digits" else self.command
-            times = [formulas.seconds(method, self.scene, at) for _ in range(ROUNDS)]
+            times = [seconds(partial(method, self.scene, at)) for _ in range(ROUNDS)]
             points.append(self._at_positions("formulas", FORMULAS, label, found, times, len(at.theta_2)))
         return points
 

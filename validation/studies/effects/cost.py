@@ -60,8 +60,7 @@ def command(engines: str, effects: str | None, workers: int, out: Path | None, a
             raise DependencyError(f"{name}: {reason}")
     from rich.progress import track
 
-    from validation.studies.effects.clock import ratio
-    from validation.studies.effects.table import Entry, markdown, show
+    from validation.studies.effects.table import Entry, markdown, ratio, show
 
     work = pairs(wanted, chosen)
     counted = costs(work, workers)

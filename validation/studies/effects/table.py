@@ -1,13 +1,23 @@
-"""The table of what effects and flags cost: instructions, and wall clock with them."""
+"""The table of what effects and flags cost: instructions, and with them wall clock, of runs with and without in turn.
 
+The wall clock is for the reader alone: on a machine that does other things the ratio scatters by several per cent.
+"""
+
+import gc
+import time
 from collections.abc import Iterable
 from typing import NamedTuple
 
+import numpy as np
+
 from validation.report.machine import machine, versions
 from validation.report.terminal import lined_up
-from validation.studies.effects.clock import Ratio
-from validation.studies.effects.work import EFFECTS
+from validation.studies.effects.work import EFFECTS, ENGINES
 
+ROUNDS = 31
+"""Pairs of runs, first one ahead and then the other."""
+AMOUNTS = {"formulas": 40, "mujoco-simulated": 1000, "mujoco-inverse": 100, "pinocchio-inverse": 100}
+"""Of one run: 10 to 20 ms, long against the clock's resolution and short against what disturbs it."""
 COMMAND = "python -m validation cost --effects"
 ABOUT = (
     "Instructions per position, per step of the simulation (RK4), counted by valgrind within the work alone, and "
@@ -15,6 +25,15 @@ ABOUT = (
     "clock of runs with and without in turn: the median of the ratios and their middle half. It scatters with whatever "
     "else the machine does."
 )
+
+
+class Ratio(NamedTuple):
+    """Time with the effect by time of the bare scene, of pairs of neighbouring runs."""
+
+    median: float
+    low: float
+    high: float
+    """The middle half of the pairs lies between them."""
 
 
 class Entry(NamedTuple):
@@ -64,3 +83,24 @@ def markdown(entries: Iterable[Entry]) -> str:
     lines += ["| " + " | ".join(cells) + " |" for cells in table]
     lines += ["", ", ".join(f"{name} {version}" for name, version in versions().items()) + f"; {machine()}.", ""]
     return "\n".join(lines)
+
+
+def ratio(engine: str, effect: str, rounds: int = ROUNDS) -> Ratio:
+    """The ratio of neighbouring runs: both meet the same disturbances."""
+    works = [ENGINES[engine](name) for name in ("none", effect)]
+    amount = AMOUNTS[engine]
+    for work in works:
+        work(amount)
+    times = np.empty((rounds, 2))
+    gc.collect()
+    gc.disable()
+    try:
+        for number in range(rounds):
+            for which in (0, 1) if number % 2 == 0 else (1, 0):
+                start = time.perf_counter()
+                works[which](amount)
+                times[number, which] = time.perf_counter() - start
+    finally:
+        gc.enable()
+    low, median, high = np.percentile(times[:, 1] / times[:, 0], [25, 50, 75])
+    return Ratio(float(median), float(low), float(high))
