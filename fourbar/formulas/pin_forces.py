@@ -75,13 +75,14 @@ def inertia_wrenches(a: Number, bodies: Bodies, at: Position, moving: Rates) -> 
     two, three, four = bodies
     w2, w3, w4, alpha_2, alpha_3, alpha_4 = moving
     of_2 = vector(w2 * w2, -alpha_2)
+    turned = of_2 * at.u2
     to_G = (three.m * three.z) * at.u3  # m (G - A)
     return Wrenches(
-        (two.m * two.z * of_2) * at.u2,
+        (two.m * two.z) * turned,
         vector(w3 * w3, -alpha_3) * to_G,
         vector(w4 * w4, -alpha_4) * ((four.m * four.z) * at.u4),
         -about_first_pin(two) * alpha_2,
-        cross(to_G, (a * of_2) * at.u2) - about_first_pin(three) * alpha_3,
+        cross(to_G, a * turned) - about_first_pin(three) * alpha_3,
         -about_first_pin(four) * alpha_4,
     ), (three.m * a) * of_2
 
