@@ -1,34 +1,25 @@
 """From a scene to its solution: block by block over the positions, stage by stage, no further than wanted."""
 
 import cmath
-import os
-from collections.abc import Callable, Iterable, KeysView, Mapping
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Iterable, KeysView, Mapping
 from functools import cache
-from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.errors import DependencyError, InputError, expect, installing
+from fourbar.errors import InputError, expect
 from fourbar.linkage import A_BRANCH, require, require_whole
-from fourbar.quantities import ANGLES, OF_DRY_FRICTION, OF_PIN_LOADS, QUANTITIES, STAGE_OF, STAGES
+from fourbar.quantities import ANGLES, OF_DRY_FRICTION, OF_PIN_LOADS, STAGE_OF, STAGES, is_scalar
 from fourbar.scene import Command, Scene, command
+from fourbar.scene.blocks import each, evaluation, is_compiled, keep, positions_at_once
 from fourbar.scene.case import BLOCK, Case, Evaluated
-from fourbar.scene.evaluation import ERROR, FORCE, Part, commanded, freely
+from fourbar.scene.evaluation import FORCE, Part, commanded, freely
 from fourbar.scene.point import OF_POINTS
-from fourbar.scene.withheld import withheld
 from fourbar.solution import Array, Solution, unwrap
 
 if TYPE_CHECKING:
     from fourbar.free_motion import FreeMotion
-
-
-WORTH_COMPILING = 2_000_000
-"""Evaluations of the forces, one a position, with error bars fourteen: loading numba and the loop costs as much."""
-
-PARTS_FOR_THREADS = 4
 
 
 class Members(Protocol):
@@ -128,61 +119,6 @@ def _refuse(at: Command) -> None:
     expect("at.time", at.time, np.ndarray, type(None))
 
 
-def is_compiled(case: Case, wanted: int, count: int, compiled: bool | None) -> bool:
-    """Whether some positions go through the compiled loop; for the parameters see `solve` and `commanded`."""
-    if compiled is False or wanted < FORCE:
-        return False
-    if compiled is None and count * (BLOCK // positions_at_once(wanted)) < WORTH_COMPILING:
-        return False
-    if not find_spec("numba"):
-        if compiled is None:
-            return False
-        raise DependencyError(f"compiled=True needs numba, which is not installed: {installing('fast')}")
-    from fourbar.scene.compiled_case import carries
-
-    return carries(case)
-
-
-def evaluation(quick: bool) -> Callable[..., Evaluated]:
-    """Of some positions, by the compiled loop or by NumPy."""
-    if not quick:
-        return commanded
-    from fourbar.scene.compiled_case import evaluated
-
-    return evaluated
-
-
-def threads() -> int:
-    """As many as this process may use cores, or as OMP_NUM_THREADS states."""
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    stated = os.environ.get("OMP_NUM_THREADS", "")
-    return min(cores, int(stated)) if stated.isdecimal() and int(stated) else cores
-
-
-def each(evaluate: Callable[[Any], Any], parts: Iterable[Any], *, at_once: bool) -> None:
-    """Evaluate the parts, one after the other or on all cores: compiled code holds no lock of the interpreter."""
-
-    def quietly(part: Any) -> Any:
-        with np.errstate(all="ignore"):  # which each thread has of its own
-            return evaluate(part)
-
-    parts, found = iter(parts), None
-    for part in parts:  # compiled by the first
-        # arrays of one part are freed when the next has its own: else the memory of each goes back to the system
-        found = quietly(part)
-        if at_once:
-            break
-    del found
-    rest = list(parts)
-    if len(rest) < PARTS_FOR_THREADS or (cores := threads()) == 1:
-        for part in rest:
-            quietly(part)
-        return
-    with ThreadPoolExecutor(cores) as pool:
-        for _ in pool.map(quietly, rest):
-            pass
-
-
 def last_stage(scene: Scene) -> str:
     """The last stage that a scene states enough for: error bars and all, or positions alone."""
     motion = scene.motion
@@ -222,14 +158,6 @@ def arrays(names: Iterable[str], shape: tuple[int, ...], out: Mapping[str, Array
     return {name: np.empty(shape if is_scalar(name) else (*shape, 2)) for name in names}
 
 
-def is_scalar(name: str) -> bool:
-    """Whether a quantity is a number at each position; the others, a scene's own points too, are vectors."""
-    return KIND.get(name) == "scalar"
-
-
-KIND = {q.name: q.kind for q in QUANTITIES}
-
-
 def _stages(points: tuple[str, ...]) -> dict[str, str]:
     """Every quantity of a scene, those of its own points too, and its stage."""
     return STAGE_OF | {start + name: stage for name in points for start, stage in OF_POINTS.items()}
@@ -253,49 +181,6 @@ def solved(scene: Scene, at: Command, code: NDArray[np.uint8], result: Mapping[s
     solution = Solution(scene.title, scene.drive_bar, code, np.asarray(at.branch), at.theta_2, **known)
     solution.points, solution.velocity, solution.acceleration = own[""], own["v_"], own["a_"]
     return solution
-
-
-def positions_at_once(wanted: int) -> int:
-    """Of a stage: for the error bars each position is evaluated many times."""
-    if wanted < ERROR:
-        return BLOCK
-    from fourbar.scene.error_bars import EVALUATIONS
-
-    return BLOCK // EVALUATIONS
-
-
-def keep(
-    case: Case,
-    found: Evaluated,
-    result: Mapping[str, Array],
-    code: NDArray[np.uint8],
-    part: Part,
-    shape: tuple[int, ...] | None = None,
-    *,
-    seen: bool = False,
-) -> None:
-    """Write what was evaluated into the arrays of all positions, where it is no number with the status that says so.
-
-    Parameters
-    ----------
-    seen : whether what is no number has its status already.
-    shape : of the part of the arrays; None: that of what was evaluated.
-    """
-    codes, values, _ = found
-    if not seen:
-        withheld(case, found)
-    code[part] = codes if shape is None else codes.reshape(shape)
-    for name, value in values.items():
-        if shape is not None and np.ndim(value):
-            value = value.reshape(shape)  # noqa: PLW2901
-        if is_scalar(name):
-            result[name][part] = value
-        else:
-            array = result[name]
-            if array.strides[-1] == array.itemsize:  # x and y next to each other: one copy
-                array.view(complex)[*part, 0] = value
-            else:
-                array[*part, 0], array[*part, 1] = value.real, value.imag
 
 
 def _by_parts(

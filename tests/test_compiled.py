@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 
 from fourbar import Bar, FourBar, Motion, Scene, Solution, Sweep, solve
-from fourbar import solve as solving
 from fourbar.effects import Flywheel, Friction, Gravity, Load, Viscous
 from fourbar.errors import DependencyError
 from fourbar.quantities import NOT_ASSEMBLED, OK
-from fourbar.scene import compiled, compiled_case
+from fourbar.scene import blocks, compiled, compiled_case
 from fourbar.scene.error_bars import EVALUATIONS
 from fourbar.studies.study import vary
 from validation.stress.forward_error.stability import TOO_SMALL, run
@@ -103,8 +102,7 @@ def test_small_work_is_left_to_numpy(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(compiled_case, "looped", lambda *given, **named: used.append(True) or true(*given, **named))
     solve(scene(), "error")
     assert not used
-    module = __import__("sys").modules[solving.__module__]
-    monkeypatch.setattr(module, "WORTH_COMPILING", 301 * (EVALUATIONS + 1) - EVALUATIONS - 301)
+    monkeypatch.setattr(blocks, "WORTH_COMPILING", 301 * (EVALUATIONS + 1) - EVALUATIONS - 301)
     solve(scene())
     assert not used
     solve(scene(), "error")
@@ -112,9 +110,8 @@ def test_small_work_is_left_to_numpy(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_without_numba_it_is_refused_only_where_it_is_wanted(monkeypatch: pytest.MonkeyPatch) -> None:
-    module = __import__("sys").modules[solving.__module__]
-    monkeypatch.setattr(module, "find_spec", lambda name: None)
-    monkeypatch.setattr(module, "WORTH_COMPILING", 1)
+    monkeypatch.setattr(blocks, "find_spec", lambda name: None)
+    monkeypatch.setattr(blocks, "WORTH_COMPILING", 1)
     assert set(solve(scene()).status) == {"ok"}
     with pytest.raises(DependencyError, match="pip install"):
         solve(scene(), compiled=True)

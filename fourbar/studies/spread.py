@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.errors import DependencyError, InputError, expect, installing
-from fourbar.quantities import ANGLES, NOT_ASSEMBLED, PIN_FORCES
+from fourbar.quantities import ANGLES, NOT_ASSEMBLED, PIN_FORCES, is_scalar
 from fourbar.scene import Scene, command
 from fourbar.solution import Array, values_of
-from fourbar.solve import is_scalar, solve
+from fourbar.solve import solve
 from fourbar.studies.derivatives import Sensitivity, sensitivity
 from fourbar.studies.keys import LEFT_OUT, THETA_2, at_place, entries, left_out, refusal
 from fourbar.studies.study import Study, vary

@@ -12,11 +12,12 @@ from fourbar.formulas.mobility import on_smooth_path
 from fourbar.formulas.position import loop
 from fourbar.quantities import ANGLES, INVALID
 from fourbar.scene import Command, Scene, command
+from fourbar.scene.blocks import each, evaluation, is_compiled, keep, positions_at_once
 from fourbar.scene.case import BLOCK, Case
 from fourbar.scene.evaluation import FORCE
 from fourbar.scene.motion import FromLimit
 from fourbar.solution import Array, Solution, unwrap
-from fourbar.solve import arrays, each, evaluation, is_compiled, keep, positions_at_once, requested, solved
+from fourbar.solve import arrays, requested, solved
 from fourbar.studies.keys import THETA_2, entries, placed, refusal, with_numbers
 
 if TYPE_CHECKING:
