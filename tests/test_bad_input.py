@@ -34,6 +34,11 @@ at = ["5 cm", "0 deg"]
 gravity = ["9.81 m/s^2", "-90 deg"]
 viscous = { O2 = "0.01 N m s/rad" }
 """
+SPRINGS = """springs = [
+    {{ from = {{ bar = 1 }}, to = {{ bar = 4 }}, stiffness = "1 N/m", length = "0 m" }},
+    {{ from = {{ bar = 1 }}, to = {{ bar = {1} }}, stiffness = "1 N/m", length = "{0}" }},
+]
+viscous ="""
 LONGEST_LINE = 700
 """Characters of an error: a few lines of a terminal, whatever was given."""
 PATIENCE = 5.0
@@ -73,6 +78,8 @@ MISTAKES = [
     ("length that rounds to zero", '"0.1 m"', '"1e-400 m"', ["lengths.input", "> 0"]),
     ("negative mass", '"0.2 kg"', '"-1 kg"', ["bars.input.mass", "-1 kg", ">= 0"]),
     ("negative damping", '"0.01 N', '"-0.01 N', ["effects.viscous.O2", "-0.01 N m s/rad", ">= 0"]),
+    ("negative spring", "viscous =", SPRINGS.format("-0.1 m", 4), ["effects.springs[1].length", "-0.1", ">= 0"]),
+    ("spring on one bar", "viscous =", SPRINGS.format("0.1 m", 1), ["effects.springs[1].to.bar", "another bar"]),
     ("inertia overflows", '"0.2 kg"', '"1e308 kg"\n[bars.coupler]\nmass = "1e400 kg"', ["bars.coupler.mass"]),
     ("lengths missing", GOOD[GOOD.index("[lengths]") : GOOD.index("[bars")], "", ["lengths.ground", "missing"]),
     ("one length missing", 'output = "0.22 m"\n', "", ["lengths.output", "missing"]),

@@ -39,7 +39,7 @@ def test_models_read_back_and_assemble_everywhere(path: Path) -> None:
     assert set(fourbar.solve(scene).status) == {"ok"}
 
 
-def test_model_names_are_those_the_issue_of_provenance_asks_for() -> None:
+def test_the_named_mechanisms_are_among_the_models() -> None:
     drives = {path.stem: load(path).drive_bar for path in MODELS}
     assert {"thesis", "thesis_printed_inertias", "crank_rocker", "drag_link", "double_rocker", "triple_rocker"} <= set(
         drives

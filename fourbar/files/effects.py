@@ -31,7 +31,10 @@ def _read_springs(value: object, read: Reader) -> "Springs":
         texts = {"preload": "0 N", **given}
         stated = [read.quantity(f"{own}.{name}", texts.get(name), unit) for name, (unit, _) in numbers.items()]
         start, end = (_read_point(read, f"{own}.{name}", given.get(name)) for name in ("from", "to"))
-        springs.append(kinds.Spring(start, end, *stated))
+        try:
+            springs.append(kinds.Spring(start, end, *stated))
+        except InputError as error:  # which knows of one spring alone
+            raise read.refuse(error.key.replace(key, own), error.value, error.allowed) from None
     return kinds.Springs(tuple(springs))
 
 
