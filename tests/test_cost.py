@@ -166,6 +166,8 @@ def test_formulas_in_four_precisions() -> None:
 def test_single_precision_slides_too() -> None:
     scene = replace(crank_rocker(), effects=(fourbar.PinFriction.at(A=(0.2, 0.02), O4=(0.3, 0.03)),))
     assert errors(scene, command(scene), formulas.single(scene, command(scene))).worst < 1e-4
+    with pytest.raises(NotImplementedError, match="pin forces"):  # thirteen equations that are not linear
+        formulas.thirteen_equations(scene, command(scene))
 
 
 def test_what_is_no_number_or_not_compared_has_no_small_error() -> None:

@@ -70,6 +70,8 @@ def _stack(vector: Any, n: int) -> Array:
 
 def thirteen_equations(scene: Scene, at: Command) -> Quantities:
     """Kinematics by the formulas, then thirteen equations per position, assembled and solved."""
+    if any(effect.loaded_pins for effect in scene.effects):
+        raise NotImplementedError("friction that depends on the pin forces is not linear in them")
     x = thirteen.solve_thirteen(_bodies(scene, state_at(scene, at)), scene.drive_bar)
     columns = {name: getattr(thirteen, name) for name in PIN_FORCES}
     return {"torque": x[:, thirteen.TORQUE], **{name: x[:, k : k + 2] for name, k in columns.items()}}
