@@ -11,7 +11,7 @@ from fourbar.formulas.pin_forces import Bodies, Body, Wrenches
 from fourbar.linkage import PINS, FourBar
 
 AT_REST = 50.0 * 2.0**-52
-"""A slip below this part of the coefficients that it is made of is what rounding leaves of zero."""
+"""A slip below this part of the input's coefficient and of those it is made of is what rounding leaves of zero."""
 
 
 def bodies(linkage: FourBar, effects: Iterable[Any] = ()) -> Bodies:
@@ -78,9 +78,9 @@ class Actions:
         others = sum(parts[1:], parts[0]) if parts else 0.0
         total = others + self.moments[2] * k.h2 if 2 in self.moments else others
         for pin, couple in self.couples.items():
-            total = total + couple * self.state.slip(pin)[0]
+            total = total + couple * self.state.slip(pin)
             if pin != "O2":
-                others = others + couple * (k.h3 if pin == "A" else self.state.slip(pin)[0])
+                others = others + couple * (k.h3 if pin == "A" else self.state.slip(pin))
         return total, others
 
     def about_B(self) -> Number:
@@ -96,7 +96,7 @@ class Actions:
         A linkage at rest begins to move as theta_2 grows or falls; a pin that is at rest in a linkage that
         moves turns in either sense.
         """
-        slip, turning = self.state.slip(pin)[0], self.turning(pin)
+        slip, turning = self.state.slip(pin), self.turning(pin)
         if self.side == 0:
             return turning * np.sign(slip * self.state.speed)
         moving = np.where(turning, np.sign(slip * self.state.speed), self.side)
@@ -104,9 +104,9 @@ class Actions:
 
     def turning(self, pin: str) -> Number:
         """Whether the two bars turn against each other in a motion, as far as rounding lets it be known."""
-        slip, growth = self.state.slip(pin)
-        k = self.state.k
-        return np.abs(slip) > AT_REST * (np.abs(k.h2) + np.abs(k.h3) + np.abs(k.h4) + np.abs(growth))
+        i, j = PINS[pin]
+        h = self.state.coefficient
+        return np.abs(self.state.slip(pin)) > AT_REST * (np.abs(h(2)) + np.abs(h(i)) + np.abs(h(j)))
 
     def wrenches(self, inertia: Wrenches) -> Wrenches:
         """Everything that acts on each bar, with d'Alembert's forces and moments."""

@@ -28,4 +28,4 @@ class Viscous(Effect):
     def act(self, actions: Actions, state: State) -> None:
         """M on bar j = -k (omega_j - omega_i), its opposite on bar i."""
         for pin, k in self.coefficients:
-            actions.couple(pin, -k * (state.slip(pin)[0] * state.speed))
+            actions.couple(pin, -k * (state.slip(pin) * state.speed))

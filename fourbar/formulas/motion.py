@@ -218,12 +218,6 @@ class State(NamedTuple):
         frame = self.frame(bar)
         return frame.acceleration(z * frame.u)
 
-    def slip(self, pin: str) -> tuple[Number, Number]:
-        """Of the bars i, j that meet at a pin: h_j - h_i and its derivative by the independent angle."""
-        k = self.k
-        return {
-            "O2": (k.h2, k.dh2),
-            "A": (-k.h23, k.dh3 - k.dh2),
-            "B": (k.h43, k.dh4 - k.dh3),
-            "O4": (k.h4, k.dh4),
-        }[pin]
+    def slip(self, pin: str) -> Number:
+        """h_j - h_i of the bars i, j that meet at a pin."""
+        return {"O2": self.k.h2, "A": -self.k.h23, "B": self.k.h43, "O4": self.k.h4}[pin]
