@@ -13,7 +13,7 @@ from fourbar.linkage import A_BRANCH, require, require_whole
 from fourbar.quantities import ANGLES, OF_DRY_FRICTION, OF_PIN_LOADS, STAGE_OF, STAGES, is_scalar
 from fourbar.scene import Command, Scene, command
 from fourbar.scene.blocks import each, evaluation, is_compiled, keep, positions_at_once
-from fourbar.scene.case import BLOCK, Case, Evaluated
+from fourbar.scene.case import BLOCK, Case
 from fourbar.scene.evaluation import FORCE, Part, commanded, freely
 from fourbar.scene.point import OF_POINTS
 from fourbar.solution import Array, Solution, unwrap
@@ -199,13 +199,13 @@ def _by_parts(
     if moved is not None:
         parts = [(np.flatnonzero(moved.bar == bar),) for bar in (2, 4)]
 
-    def evaluate(part: Part) -> Evaluated:
+    def evaluate(part: Part) -> Mapping[str, Any]:
         if moved is not None:
             found = freely(case, moved, part, wanted, names)
         else:
             found = evaluation(quick)(case, where, part, wanted, names)
         keep(case, found, result, code, part, seen=quick)
-        return found
+        return found[1]
 
     each(evaluate, parts, at_once=quick)
 

@@ -71,7 +71,7 @@ def each(evaluate: Callable[[Any], Any], parts: Iterable[Any], *, at_once: bool)
 
     parts, found = iter(parts), None
     for part in parts:  # compiled by the first
-        # arrays of one part are freed when the next has its own: else the memory of each goes back to the system
+        # what a part found is freed when the next has its own: else the memory of each goes back to the system
         found = quietly(part)
         if at_once:
             break
