@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+import tomllib
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -26,7 +27,7 @@ from validation.compare.rows import FAILS, REFUSES, Row
 from validation.compare.tolerance import EQUIVALENCE
 from validation.engines import added
 from validation.engines.witnesses import Witness
-from validation.report.machine import build, checkout, code
+from validation.report.machine import CHECKOUT, CODE, build, checkout, code
 from validation.report.record import Record
 from validation.report.summary import Summary
 from validation.run import pool
@@ -171,6 +172,9 @@ def test_the_hash_of_the_code_is_that_of_its_modules(tmp_path: Path) -> None:
         (tmp_path / name).write_text(text)
         hashes.append(checkout(tmp_path))
     assert len(set(hashes)) == 3 and hashes[2] == hashes[3]
+    project = tomllib.loads((CHECKOUT / "pyproject.toml").read_text(encoding="utf-8"))
+    read = project["tool"]["setuptools"]["package-data"]["fourbar"]  # what is only shown decides no number
+    assert {Path(name).suffix for name in read if not name.startswith("show/")} <= set(CODE)
     assert build("numpy") and build("no-such-package") == ""
 
 

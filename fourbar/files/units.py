@@ -7,6 +7,7 @@ dimension here: rad/s is not 1/s, so neither Hz nor a forgotten "deg" slips thro
 import difflib
 import math
 import re
+import tomllib
 from fractions import Fraction
 from functools import cache
 from importlib.resources import files
@@ -14,7 +15,8 @@ from typing import Any
 
 from fourbar.errors import InputError
 
-DEFINITIONS = files("fourbar.files").joinpath("units.txt").read_text(encoding="utf-8")
+FILE = files("fourbar.files").joinpath("units.toml")
+DEFINITIONS: str = tomllib.loads(FILE.read_text(encoding="utf-8"))["definitions"]
 """In the form of the units library."""
 JOINED = re.compile(r"(?<=[A-Za-z])[.-](?=[A-Za-z])")
 """N.mm, lbf-in: a product."""
