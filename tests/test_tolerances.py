@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 from pathlib import Path
 from typing import Any
 
@@ -124,6 +125,9 @@ def test_the_command_prints_draws_and_writes(tmp_path: Path, capsys: pytest.Capt
     document = json.loads(capsys.readouterr().out)
     torque = document["quantities"]["torque"]
     assert len(torque["deviation"]) == 13 and document["tolerances"]["lengths.coupler"]["distribution"] == "normal"
+    scene.write_text(text + TABLE + '\n[points]\nv = { bar = 3, from_pin = ["5 cm", "20 deg"] }\n')
+    assert status(["tolerance", str(scene), "--samples", "64"]) == 0
+    assert re.search(r"^v_x +m ", capsys.readouterr().out, re.M)  # a place, though v_ begins a velocity
     assert status(["tolerance", str(scene), "-o", "t.bmp"]) == 2
     scene.write_text(text)
     assert status(["tolerance", str(scene)]) == 2

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fourbar.errors import DependencyError, InputError
-from fourbar.quantities import PIN_FORCES
+from fourbar.quantities import PIN_FORCES, UNITS
 from fourbar.scene import Scene
 from fourbar.show.tables import plain_table
-from fourbar.solution import Array, nulled, unit_of
+from fourbar.solution import Array, nulled
 from fourbar.studies.spread import BAND, Spread, Tolerances, tolerances
 
 if TYPE_CHECKING:
@@ -27,6 +27,11 @@ def shown_parts(found: Tolerances) -> list[str]:
     own = [f"{point.name}_{letter}" for point in found.scene.points for letter in "xy"]
     first = ["torque", *(f"|{name}|" for name in PIN_FORCES)] if "torque" in found.spreads else ["theta_3", "theta_4"]
     return [*first, *own]
+
+
+def part_unit(part: str) -> str:
+    """Of a quantity, a magnitude, or a component of a point, which may be called v or a."""
+    return UNITS.get(part.strip("|"), "m")
 
 
 def heading(found: Tolerances) -> list[str]:
@@ -89,7 +94,7 @@ def table(found: Tolerances) -> "Table":
         numbers = [f"{column[at]:.6g}" for column in columns]
         numbers[1] = f"{spread.deviation[at]:.3g}"
         angle = f"{math.degrees(found.theta_2[at]):.6g}"
-        rows.append([part, unit_of(part.strip("|")), angle, *numbers, f"{spread.worst[at]:.3g}"])
+        rows.append([part, part_unit(part), angle, *numbers, f"{spread.worst[at]:.3g}"])
     return plain_table((*heads, "\nleast", "\ngreatest", "worst\n+-"), rows, left=("",), gap=0)
 
 
@@ -125,7 +130,7 @@ def embedded_tolerances(scene: Scene, theta_2: list[float]) -> dict[str, Any]:
         with np.errstate(all="ignore"):
             shares = spread.shares / spread.shares.sum(axis=0)
         parts[part] = {
-            "unit": unit_of(part.strip("|")),
+            "unit": part_unit(part),
             "nominal": short(spread.nominal, 9),
             **{name: short(values, 4) for name, values in away.items()},
             "shares": [short(share, 3) for share in shares],

@@ -25,7 +25,7 @@ from fourbar.show.plot.style import (
     unit_for,
 )
 from fourbar.show.plot.view import View
-from fourbar.show.tolerances import parted, shown_parts
+from fourbar.show.tolerances import part_unit, parted, shown_parts
 from fourbar.solution import unit_of
 from fourbar.studies.derivatives import sensitivity
 from fourbar.studies.spread import BAND, Tolerances
@@ -95,7 +95,7 @@ def _band(axes: "Axes", found: Tolerances, part: str) -> None:
     sizes = np.abs(np.concatenate([*away, spread.worst]))
     sizes = sizes[np.isfinite(sizes)]
     most = 1.1 * float(np.percentile(sizes, OFF_SCALE)) if sizes.size else 0.0
-    factor, unit = unit_for(most, unit_of(part.strip("|")))
+    factor, unit = unit_for(most, part_unit(part))
     colour = FORCE_COLOURS.get(part.strip("|"), INK)
     axes.fill_between(over, factor * away[0], factor * away[1], color=colour, alpha=0.35, lw=0.0)
     for line in away[2:]:
