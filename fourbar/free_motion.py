@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from fourbar.effects.actions import Actions, bodies
 from fourbar.errors import DependencyError, FourBarError, InputError, LimitError, installing
-from fourbar.formulas.arithmetic import cross
+from fourbar.formulas.arithmetic import sine
 from fourbar.formulas.motion import Coefficients, State, rates
 from fourbar.formulas.path import Path, path, smooth_branch
 from fourbar.formulas.pin_forces import Body
@@ -123,7 +123,7 @@ class _Reading:
 
 def _sines(at: Position) -> dict[int, float]:
     """sin(theta_4 - theta_3) and sin(theta_3 - theta_2): zero at the limits of theta_2 and of theta_4."""
-    return {2: float(cross(at.u3, at.u4)), 4: float(cross(at.u2, at.u3))}
+    return {2: float(sine(at.u3, at.u4)), 4: float(sine(at.u2, at.u3))}
 
 
 def release(

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from fourbar.errors import DependencyError, InputError, expect, installing
 from fourbar.linkage import require
-from fourbar.quantities import NOT_ASSEMBLED, STATUS_NAMES, UNITS, VECTORS
+from fourbar.quantities import NOT_ASSEMBLED, STATUS_NAMES, UNITS, is_scalar
 
 Array = NDArray[np.float64]
 
@@ -217,7 +217,7 @@ def scalars(solution: Solution, units: Conversion = SI) -> dict[str, Array | Non
     for name in _quantities(solution):
         values, unit = values_of(solution, name, units), unit_of(name)
         heading = f" [{units[unit][0]}]" if unit in units else ""
-        if name in VECTORS or name not in UNITS:
+        if not is_scalar(name):
             for axis, letter in enumerate("xy"):
                 found[f"{name}_{letter}{heading}"] = None if values is None else values[..., axis].ravel()
         else:

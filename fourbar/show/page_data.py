@@ -27,7 +27,7 @@ MAX_ROWS = 1441
 """Positions embedded in a page: a quarter of a degree over a full turn; a finer sweep is thinned out evenly."""
 WATCHED = (1.5, 60.0)
 """A motion through time that lasts between these, s, is shown in real time."""
-RATES = (f"{letter}_{bar}" for letter in ("omega", "alpha") for bar in MOVING_BARS)
+RATES = tuple(f"{letter}_{bar}" for letter in ("omega", "alpha") for bar in MOVING_BARS)
 SCALARS = (*ANGLES, "condition", *RATES, "torque")
 
 

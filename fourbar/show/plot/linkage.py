@@ -31,9 +31,8 @@ def pins(view: View, factor: float = 1.0) -> dict[str, Point]:
 
 def draw_linkage(axes: "Axes", view: View, labels: Labels, *, moving: bool = False) -> None:
     """The linkage at the position drawn, over the paths of its points; with their velocities where it is `moving`."""
-    where = pins(view)
     factor, unit, size = scale_of(view)
-    where = {name: (factor * x, factor * y) for name, (x, y) in where.items()}
+    where = pins(view, factor)
     for path, colour, dashes, name in paths(view):
         scaled = factor * path
         axes.plot(*scaled.T, color=colour, lw=1.0, ls=dashes, zorder=2, label=name)
