@@ -107,6 +107,11 @@ def column_of(path: Path, column: str) -> Iterator[str]:
         yield from dict.fromkeys(_words(cells, {}))
 
 
+def rows_in(path: Path) -> int:
+    """How many rows a table of scenes has."""
+    return sum(len(cells) for (cells,) in _batches(path, ["scene"]))
+
+
 def _batches(path: Path, columns: list[str]) -> Iterator[list[list[Any]]]:
     with ExitStack() as files:
         batches = _of_parquet if path.suffix == ".parquet" else _of_text

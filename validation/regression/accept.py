@@ -1,8 +1,9 @@
 """`python -m validation compare`, `accept` and `history`."""
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from itertools import chain, islice
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, TypeVar
 
 import click
@@ -13,9 +14,10 @@ from validation.compare.columns import CSV_ROWS
 from validation.compare.counts import Counts
 from validation.compare.rows import FAILS, Row
 from validation.regression import render
-from validation.regression.changes import Differences, compared, merged
+from validation.regression.changes import Differences, compared, merged, under_new_names
 from validation.regression.history import HISTORY, append
-from validation.regression.record import ACCEPTED, About, Recorded, accept, baseline, recorded
+from validation.regression.record import ABOUT, ACCEPTED, About, Recorded, accept, baseline, recorded
+from validation.regression.scenes import renamed
 from validation.regression.times import time_changes
 
 FORMS: dict[str, Callable[[Differences], str]] = {
@@ -54,11 +56,14 @@ def report_differences(
 ) -> int:
     """Print the differences, write the forms wanted; 1 on a regression, or where nothing was compared."""
     before, after = recorded(old), recorded(new)
-    keep = _choice(chosen or {}, lambda column: chain(before.words(column), after.words(column)))
+    names = renamed(before.about.scenes, after.about.scenes)
+    keep = _choice(chosen or {}, lambda column: chain(before.words(column), after.words(column)), names)
     engines = set(after.words("engine"))
-    times = time_changes(merged(before.times(), after.times()))
+    times = time_changes(merged(under_new_names(before.times(), names), after.times()))
     scenes = in_sight(after.scenes(keep))
     found = compared((before.about, before.scenes(keep)), (after.about, scenes), engines, times)
+    unproven = [str(run.table) for run in (before, after) if not run.verified]
+    found.notes += [f"{table}: not verified, its {ABOUT} states no SHA-256 or is missing" for table in unproven]
     for form, path in forms.items():
         if path is not None:
             write_text(path, FORMS[form](found))
@@ -76,8 +81,15 @@ def in_sight(scenes: Iterable[T]) -> Iterator[T]:
         yield from progress.track(scenes)
 
 
-def _choice(chosen: dict[str, str | None], words: Callable[[str], Iterable[str]]) -> Callable[[Row], bool]:
-    """Whether a row is of what the options name; InputError for a name that does not stand in its column."""
+def _choice(
+    chosen: dict[str, str | None],
+    words: Callable[[str], Iterable[str]],
+    renamed: Mapping[str, str] = MappingProxyType({}),
+) -> Callable[[Row], bool]:
+    """Whether a row is of what the options name; InputError for a name that does not stand in its column.
+
+    `renamed`: of a scene with an old and a new name either means both.
+    """
     wanted: dict[str, set[str]] = {}
     for option, text in chosen.items():
         if text is None:
@@ -90,7 +102,8 @@ def _choice(chosen: dict[str, str | None], words: Callable[[str], Iterable[str]]
                 known.add(word)
         for name in sorted(missing) or ([] if names else [text]):
             raise InputError(f"--{option}", name, "must be among " + ", ".join(sorted(known)))
-        wanted[CHOICES[option]] = names
+        both = {name for pair in renamed.items() if names & {*pair} for name in pair} if option == "only" else set()
+        wanted[CHOICES[option]] = names | both
     return lambda row: all(getattr(row, column) in names for column, names in wanted.items())
 
 
@@ -106,7 +119,7 @@ def compare(
 
     Scenes that changed come first, entry by entry; their rows, and those with other settings or at other
     positions, are named and not compared. What was not wanted of the new run is "not run", and no regression.
-    Exit status 1 on a regression: a verdict that got worse, an error that grew beyond round-off,
+    Exit status 1 on a regression: a verdict that got worse, an error that grew beyond round-off and its allowance,
     a row that was run for and is gone, a new row that fails; and where nothing was compared.
     """
     return report_differences(baseline(old), new, forms, {"only": only, "engines": engines, "quantity": quantity})
@@ -131,12 +144,19 @@ def accept_command(results: Path, to: Path | None, even_failing: bool) -> None:
     if counts.status != HOLDS and not even_failing:
         why = f"{counts[FAILS]} comparisons fail" if counts[FAILS] else "nothing was compared"
         raise InputError("RESULTS", str(results), f"must hold, or say --even-failing: {why}")
-    accept(run, target)
+    _require_verified(run)
     too_long = counts.total > CSV_ROWS
     if not too_long:
-        append(target / HISTORY, *_whole(run))
+        append(target / HISTORY, *_whole(run))  # first: where it is damaged nothing is written
+    accept(run, target)
     history = "too many for a history" if too_long else f"appended to {target / HISTORY}"
     click.echo(f"accepted: {target} ({counts.total} rows; {history})")
+
+
+def _require_verified(run: Recorded) -> None:
+    """InputError for a run of which nothing says whether it lost some of its rows."""
+    if not run.verified:
+        raise InputError("RESULTS", str(run.table), f"needs a {ABOUT} with its rows and SHA-256; `run` writes one")
 
 
 def _whole(run: Recorded) -> tuple[tuple[About, list[Row]], dict[tuple[str, str], float]]:
@@ -166,7 +186,9 @@ def history(
 
     file = history / HISTORY if history.is_dir() or not history.suffix else history
     if add is not None:
-        append(file, *_whole(recorded(add)))
+        run = recorded(add)
+        _require_verified(run)
+        append(file, *_whole(run))
     runs = read_history(file)
     keep = _choice(
         {"only": only, "engines": engines, "quantity": quantity},

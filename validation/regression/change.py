@@ -23,6 +23,7 @@ class Kind(Enum):
     VERDICT_BETTER = "verdict got better"
     BETTER = "better"
     GONE_FAILURE = "gone, and had failed"
+    GREW = "grew within its allowance"
     NEW = "new"
     NEW_FAILURE = "new, and fails"
     OTHER_SCENE = "of a changed scene"
@@ -89,7 +90,8 @@ def _kind(old: Row, new: Row, round_off: float) -> Kind:
     if abs(new.error - old.error) <= round_off:
         return Kind.ROUND_OFF
     if new.error > NOTICEABLE * old.error or math.isnan(new.error):
-        return Kind.WORSE
+        within = new.passed and new.error <= NOTICEABLE * old.allowed  # an allowance that was widened holds nothing
+        return Kind.GREW if within else Kind.WORSE
     if old.error > NOTICEABLE * new.error:
         return Kind.BETTER
     return Kind.SAME

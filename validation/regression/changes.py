@@ -15,7 +15,7 @@ from validation.compare.rows import FAILS, VERDICTS, Row, sorted_rows
 from validation.regression.change import OTHER_QUESTION, REGRESSIONS, Change, Key, Kind, change
 from validation.regression.fault import Fault
 from validation.regression.record import About
-from validation.regression.scenes import SceneChange, scene_changes
+from validation.regression.scenes import SceneChange, renamed, scene_changes
 from validation.regression.times import Time, TimeChange, time_changes
 
 KEPT = 10_000
@@ -61,7 +61,7 @@ class Differences:
     scenes: list[SceneChange] = field(default_factory=list)
     """Scenes that ask something else; reported first."""
     notes: list[str] = field(default_factory=list)
-    """What an older record cannot say."""
+    """Scenes of another name, and what an older record cannot say."""
     times: list[TimeChange] = field(default_factory=list)
     kept: int = KEPT
     kinds: Counter[Kind] = field(default_factory=Counter)
@@ -137,6 +137,11 @@ class Differences:
         return [*self._not_compared]
 
     @property
+    def compared(self) -> int:
+        """How many rows of the new run have their counterpart in the old one."""
+        return self._compared.total
+
+    @property
     def nothing(self) -> bool:
         """Whether no comparison of the new run has its counterpart in the old one."""
         return self._compared.nothing
@@ -162,7 +167,9 @@ def differences(
     """Compare two runs whose rows are at hand, in any order."""
     before, after = (sorted_rows(run[1]) for run in (old, new))
     engines = {row.engine for row in after}
-    changed = time_changes(merged(*(_times_by_scene(each) for each in times)))
+    names = renamed(old[0].scenes, new[0].scenes)
+    timed = under_new_names(_times_by_scene(times[0]), names), _times_by_scene(times[1])
+    changed = time_changes(merged(*timed))
     return compared((old[0], by_scene(before)), (new[0], by_scene(after)), engines, changed, kept)
 
 
@@ -185,13 +192,25 @@ def compared(
     engines : those that have rows in the new run.
     """
     scenes = {each.scene: each for each in scene_changes(old[0].scenes, new[0].scenes)}
-    surroundings, notes = _surroundings(old[0], new[0])
+    names = renamed(old[0].scenes, new[0].scenes)
+    surroundings, older = _surroundings(old[0], new[0])
+    notes = [f"renamed: {before} -> {after}" for before, after in names.items()]
     found = Differences(surroundings, list(scenes.values()), notes, times, kept)
     known = engines | (new[0].engines or set())
-    for scene, before, after in merged(old[1], new[1]):
+    for scene, before, after in merged(under_new_names(old[1], names), new[1]):
         wanted = scene in new[0].scenes if new[0].scenes else bool(after) or not engines
-        found.add(_of_scene(_by_key(before), _by_key(after), known if wanted else set(), wanted, scenes.get(scene)))
+        rows = _by_key(scene, before), _by_key(scene, after)
+        found.add(_of_scene(*rows, known if wanted else set(), wanted, scenes.get(scene)))
+    if older:
+        found.notes += [f"{found.compared} of {found.rows} rows are compared: the others are of one run alone", *older]
     return found
+
+
+def under_new_names(scenes: ByScene[T], names: Mapping[str, str]) -> ByScene[T]:
+    """Each scene of the old run by the name that the new one gives it; nothing is held where none has another."""
+    if not names:
+        return scenes
+    return sorted(((names.get(name, name), some) for name, some in scenes), key=lambda each: each[0])
 
 
 def by_scene(rows: Iterable[Row]) -> Iterator[tuple[str, list[Row]]]:
@@ -217,9 +236,9 @@ def _in_order(run: str, scenes: ByScene[T]) -> Iterator[tuple[str, str, Sequence
         yield scene, run, rows
 
 
-def _by_key(rows: Iterable[Row]) -> dict[Key, Row]:
+def _by_key(scene: str, rows: Iterable[Row]) -> dict[Key, Row]:
     worst_last = sorted(rows, key=lambda row: VERDICTS.index(row.verdict))  # of two of one name the worse one counts
-    return {(row.scene, row.engine, row.setting, row.quantity): row for row in worst_last}
+    return {(scene, row.engine, row.setting, row.quantity): row for row in worst_last}
 
 
 def _of_scene(

@@ -8,6 +8,7 @@ formulas' on that scene), with the run's date, commit, machine and versions in c
 import hashlib
 import json
 import math
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -22,9 +23,10 @@ from validation.regression.record import About
 HISTORY = "history.parquet"
 SCENES = b"fourbar.scenes"
 """Of the file's notes: JSON, what each scene states by its hash."""
+SEAL, UNSEALED = b"fourbar.sha256", b"0" * 64
+"""Of the same notes: the SHA-256 of the file with zeros in its place."""
 TIME = "time"
 OF_A_ROW = tuple(MADE_OF)
-OF_A_RUN = ("run", "date", "commit", "machine", "settings")
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,17 +75,14 @@ def read_history(file: Path) -> list[Run]:
     scenes = _scenes(table)
     runs: dict[str, Run] = {}
     hashes: dict[str, dict[str, str]] = {}
-    try:
-        for cells in table.to_pylist():
-            name = cells["run"]
-            if name not in runs:
-                runs[name] = Run(_about(cells), [], {})
-            _put(runs[name], hashes.setdefault(name, {}), cells)
-        for name, run in runs.items():
-            stated = {scene: scenes[each] for scene, each in hashes[name].items() if each in scenes}
-            runs[name] = replace(run, about=replace(run.about, scenes=stated))
-    except (AttributeError, KeyError, TypeError, ValueError):
-        raise InputError("HISTORY", str(file), "is no history written by `accept`") from None
+    for cells in table.to_pylist():
+        name = cells["run"]
+        if name not in runs:
+            runs[name] = Run(_about(cells), [], {})
+        _put(runs[name], hashes.setdefault(name, {}), cells)
+    for name, run in runs.items():
+        stated = {scene: scenes[each] for scene, each in hashes[name].items() if each in scenes}
+        runs[name] = replace(run, about=replace(run.about, scenes=stated))
     return sorted(runs.values(), key=lambda run: run.about.date)
 
 
@@ -143,16 +142,20 @@ def _read(file: Path) -> Any:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    try:
-        table = pq.read_table(file)
-    except (OSError, pa.ArrowException):
-        raise InputError("HISTORY", str(file), "is no history written by `accept`") from None
-    missing = {*OF_A_RUN, *OF_A_ROW} - set(table.column_names)
-    if missing:
-        raise InputError(
-            "HISTORY", str(file), f"is no history written by `accept`: it lacks {', '.join(sorted(missing))}"
-        )
-    return table
+    data = file.read_bytes()
+    if _sealed(data) != data:
+        raise InputError("HISTORY", str(file), "is damaged, or no history written by `accept`: its SHA-256 is another")
+    return pq.read_table(pa.BufferReader(data))
+
+
+def _sealed(data: bytes) -> bytes:
+    """The file with its SHA-256 in its notes; nothing where there is no place for one."""
+    places = [each.span(1) for each in re.finditer(re.escape(SEAL) + rb"..([0-9a-f]{64})", data, re.DOTALL)]
+    if not places:
+        return b""
+    first, last = places[-1]
+    digest = hashlib.sha256(data[:first] + UNSEALED + data[last:]).hexdigest()
+    return data[:first] + digest.encode() + data[last:]
 
 
 def _write(file: Path, table: Any) -> None:
@@ -161,6 +164,7 @@ def _write(file: Path, table: Any) -> None:
     import pyarrow.parquet as pq
 
     sink = pa.BufferOutputStream()
-    pq.write_table(table, sink, compression="zstd")
+    notes = {**(table.schema.metadata or {}), SEAL: UNSEALED}
+    pq.write_table(table.replace_schema_metadata(notes), sink, compression="zstd")
     file.parent.mkdir(parents=True, exist_ok=True)
-    write_bytes(file, sink.getvalue().to_pybytes())
+    write_bytes(file, _sealed(sink.getvalue().to_pybytes()))

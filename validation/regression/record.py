@@ -1,6 +1,7 @@
 """A recorded run: its table and the versions, machine, settings and scenes it was made with."""
 
 import csv
+import hashlib
 import json
 import os
 import shutil
@@ -14,16 +15,17 @@ from typing import Any, TypeVar
 
 from fourbar.errors import InputError
 from fourbar.writing import naming, write_text
-from validation.compare.columns import column_of, read_columns
+from validation.compare.columns import column_of, read_columns, rows_in
 from validation.compare.rows import Row, plain
 from validation.compare.tolerance import SIMULATED, K
-from validation.report.machine import machine, versions
+from validation.report.machine import kernels, machine, versions
 
 SHIPPED = Path(__file__).parent
 """Where the accepted state of the models of this project is."""
 T = TypeVar("T")
 ACCEPTED = "accepted"
 TABLE, COLUMNS, ABOUT, TIMINGS = "results.csv", "results.parquet", "record.json", "timings.csv"
+TABLES = (TABLE, COLUMNS, TIMINGS)
 UNFINISHED = "run.json"
 """What a run keeps in its folder until it is finished."""
 
@@ -33,6 +35,7 @@ class About:
     """What a run was made with."""
 
     versions: dict[str, str]
+    """Of what decides a number, the kernels that the CPU was given among them."""
     machine: str
     settings: dict[str, str]
     """Engines, suite, and the factors of the tolerances."""
@@ -56,7 +59,7 @@ def about(factors: Mapping[str, float], suite: str, scenes: Mapping[str, Mapping
     settings = {"engines": ", ".join(factors), "suite": suite, "K": repr(K), "simulated": repr(simulated)}
     described = {name: dict(entries) for name, entries in (scenes or {}).items()}
     now = datetime.now(UTC).isoformat(timespec="seconds")
-    return About(versions(), machine(), settings, described, now, _commit())
+    return About(versions() | kernels(), machine(), settings, described, now, _commit())
 
 
 def _commit() -> str:
@@ -72,8 +75,40 @@ def _commit() -> str:
 
 
 def write_about(record: About, folder: Path) -> None:
-    """Write record.json next to the results."""
-    write_text(folder / ABOUT, json.dumps(asdict(record), indent=1, sort_keys=True) + "\n")
+    """Write record.json next to the results, with rows and SHA-256 of each table, and of itself."""
+    there = [path for name in TABLES if (path := folder / name).is_file()]
+    tables = {path.name: {"rows": rows_in(path), "sha256": _sha256(path)} for path in there}
+    kept = asdict(record) | {"tables": tables}
+    write_text(folder / ABOUT, json.dumps(kept | {"sha256": _own_sha256(kept)}, indent=1, sort_keys=True) + "\n")
+
+
+def _sha256(path: Path) -> str:
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def _own_sha256(kept: Mapping[str, Any]) -> str:
+    return hashlib.sha256(json.dumps(kept, sort_keys=True).encode()).hexdigest()
+
+
+def _require_whole(tables: Mapping[str, Mapping[str, Any]], folder: Path, read: str) -> None:
+    """InputError that names the first table of a folder that is not what its record says."""
+    there = {name for name in TABLES if (folder / name).is_file()}
+    for name in sorted({*tables, *there, read}):
+        path = folder / name
+        if name not in tables:
+            why = f"is not of this run: its {ABOUT} does not name it"
+        elif name not in there:
+            why = f"is missing: {ABOUT} says that it has {tables[name]['rows']} rows"
+        elif _sha256(path) == tables[name]["sha256"]:
+            continue
+        else:
+            try:
+                rows = f"{rows_in(path)} rows"
+            except (KeyError, OSError, ValueError):
+                rows = "no rows that can be read"
+            why = f"is damaged: {rows} of {tables[name]['rows']}, and not the SHA-256 that {ABOUT} states"
+        raise InputError("RESULTS", str(path), why)
 
 
 NOTHING_KNOWN = About({}, "unknown machine", {})
@@ -85,6 +120,8 @@ class Recorded:
 
     about: About
     table: Path
+    verified: bool = False
+    """Whether the tables are those that the record was written with; older records do not say."""
 
     def rows(self) -> Iterator[Row]:
         """Its rows in their order; InputError where the table is damaged."""
@@ -114,14 +151,14 @@ class Recorded:
     def _read(self, found: Iterator[T]) -> Iterator[T]:
         try:
             yield from found
-        except (KeyError, TypeError, ValueError):  # a column, a cell or a number is missing, or is no text
+        except (KeyError, TypeError, ValueError, OSError):  # a column, a cell or a number is missing, or is no text
             raise InputError("RESULTS", str(self.table), "is not a table written by `run`") from None
 
 
 def recorded(path: Path) -> Recorded:
     """A run by its folder, or by a results.csv alone (then nothing is known of how it was made).
 
-    Raises InputError where there is no readable table, or an empty one, or that of a run that is unfinished.
+    Raises InputError where there is no readable table, an empty or a damaged one, or that of an unfinished run.
     """
     table = path / TABLE if path.is_dir() else path
     long = path / COLUMNS
@@ -129,17 +166,29 @@ def recorded(path: Path) -> Recorded:
         table = long
     if not table.is_file():
         raise InputError("RESULTS", str(path), f"must be a folder with {TABLE} or {COLUMNS}, or such a file")
-    if next(Recorded(NOTHING_KNOWN, table).rows(), None) is None:
-        raise InputError("RESULTS", str(table), "must hold at least one comparison: it has none")
     if (table.parent / UNFINISHED).is_file():
         raise InputError("RESULTS", str(table), "must be of a run that was finished: run it again, and it is resumed")
     record = table.parent / ABOUT
-    if not record.is_file():
-        return Recorded(NOTHING_KNOWN, table)
+    found = _described(record, table) if record.is_file() else Recorded(NOTHING_KNOWN, table)
+    if next(found.rows(), None) is None:
+        raise InputError("RESULTS", str(table), "must hold at least one comparison: it has none")
+    return found
+
+
+def _described(record: Path, table: Path) -> Recorded:
+    """A table and what its record says of it; InputError where either is damaged."""
     try:
-        return Recorded(about_of(json.loads(record.read_text(encoding="utf-8"))), table)
+        kept = json.loads(record.read_text(encoding="utf-8"))
+        stated = kept.pop("sha256", None)
+        about, tables = about_of(kept), kept.get("tables")
     except (AttributeError, KeyError, TypeError, ValueError, RecursionError):
         raise InputError("RESULTS", str(record), "is not a record written by `run`") from None
+    if stated is None and tables is None:
+        return Recorded(about, table)
+    if stated != _own_sha256(kept):
+        raise InputError("RESULTS", str(record), "is damaged: it is not what `run` wrote")
+    _require_whole(tables, table.parent, table.name)
+    return Recorded(about, table, verified=True)
 
 
 def read_run(path: Path) -> tuple[About, list[Row]]:
@@ -170,12 +219,13 @@ def baseline(name_or_path: str) -> Path:
 def accept(run: Recorded, target: Path) -> None:
     """Keep a run, with its times, as the accepted state in a folder."""
     target.mkdir(parents=True, exist_ok=True)
-    name, other = (COLUMNS, TABLE) if run.table.suffix == ".parquet" else (TABLE, COLUMNS)
-    _copy(run.table, target / name)
-    (target / other).unlink(missing_ok=True)  # of the state before
+    kept = {run.table.name, TIMINGS}
+    for name in TABLES:
+        if name in kept and (table := run.table.with_name(name)).is_file():
+            _copy(table, target / name)
+        else:
+            (target / name).unlink(missing_ok=True)  # of the state before
     write_about(run.about, target)
-    if (times := run.table.parent / TIMINGS).is_file():
-        _copy(times, target / TIMINGS)
 
 
 def _copy(source: Path, target: Path) -> None:

@@ -24,7 +24,8 @@ def verdict(found: Differences) -> str:
     head = f"{many} regression{'s' if many > 1 else ''}" if many else "No regression"
     if found.nothing and not many:
         head = "Nothing was compared with the old run"
-    moved = f" in {found.rows} rows: {', '.join(counts)}" if counts else ""
+    rows = f"{found.compared} of {found.rows}" if found.compared < found.rows else f"{found.rows}"
+    moved = f" in {rows} rows: {', '.join(counts)}" if counts else ""
     return f"{head}{moved}. New run: {found.counts.sentence()}"
 
 

@@ -71,6 +71,15 @@ def _shorter(old: str, new: str) -> str:
     return f"{number} -> {new}" if unit and unit == other and "," not in old else f"{old} -> {new}"
 
 
+def renamed(old: Mapping[str, Description], new: Mapping[str, Description]) -> dict[str, str]:
+    """Old name to new name of the scenes that state the same under a name that the other run does not have."""
+    names: dict[str, list[str]] = {}
+    for name in sorted(new.keys() - old.keys(), reverse=True):
+        names.setdefault(repr(sorted(new[name].items())), []).append(name)
+    found = ((name, names.get(repr(sorted(old[name].items())))) for name in sorted(old.keys() - new.keys()))
+    return {name: same.pop() for name, same in found if same}
+
+
 def scene_changes(old: Mapping[str, Description], new: Mapping[str, Description]) -> list[SceneChange]:
     """The scenes of both runs that ask something else now."""
     found = []

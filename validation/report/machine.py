@@ -6,6 +6,7 @@ import platform
 from functools import cache
 from importlib.metadata import PackageNotFoundError, distribution, version
 from pathlib import Path
+from typing import Any
 
 PACKAGES = {"fourbar": "fourbar", "numpy": "numpy", "mujoco": "mujoco", "pinocchio": "pin", "scipy": "scipy"}
 """Name in the report and name of the distribution."""
@@ -43,6 +44,22 @@ def _processor() -> str:
     except OSError:
         pass
     return platform.processor() or "unknown processor"
+
+
+def kernels() -> dict[str, str]:
+    """Kernel of the BLAS and vector instructions that NumPy took: with others the last digits are others."""
+    import numpy as np
+
+    config: dict[str, Any] = np.show_config(mode="dicts")  # type: ignore[assignment]
+    simd = config["SIMD Extensions"]
+    found = {"cpu_features": " ".join((*simd.get("baseline", ()), *simd.get("found", ())))}
+    try:
+        from threadpoolctl import threadpool_info
+    except ModuleNotFoundError:
+        return found
+    blas = (library for library in threadpool_info() if library["user_api"] == "blas")
+    known = {f"{library['internal_api']} {library.get('architecture') or library['version']}" for library in blas}
+    return found | {"blas_kernel": ", ".join(sorted(known))}
 
 
 @cache
