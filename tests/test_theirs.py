@@ -27,6 +27,7 @@ from validation.check import model
 from validation.check.causes import causes
 from validation.check.differences import differences
 from validation.check.screen import DEEPEST, LARGEST_MJCF, read_mjcf
+from validation.cli import status
 from validation.compare.columns import read_columns
 from validation.compare.compare import compare
 from validation.compare.rows import FAILS
@@ -331,17 +332,54 @@ def test_what_an_mjcf_may_not_hold(what: str, text: str | bytes, word: str, tmp_
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize("timestep", ["1e-12", "1e9", "nan", "0", "-1"])
+@pytest.mark.parametrize("timestep", ["1e-12", "1e9"])
 def test_an_absurd_timestep_is_reported_and_not_run_through(timestep: str) -> None:
     """One so long that no step is made once agreed in every position: the state at the start, again and again."""
     text = re.sub('timestep="[^"]*"', f'timestep="{timestep}"', GENERATED)
     assert text != GENERATED
-    try:
-        _, through = examine(CRANK_ROCKER, text, {}).answers
-    except InputError as error:
-        assert "does not compile" in str(error)
-    else:
-        assert through.refusal is not None and "steps of the motion; must be 1 to 400000" in through.refusal
+    _, through = examine(CRANK_ROCKER, text, {}).answers
+    assert through.refusal is not None and "steps of the motion; must be 1 to 400000" in through.refusal
+
+
+OVERDONE = [
+    ("every mass", 'mass="[^"]*"', 'mass="1e308"', "bars.coupler.mass is beyond the range of doubles: inf"),
+    ("lengths", ' pos="[^"]*"', ' pos="1e308 1e308 0"', "lengths.input is beyond the range"),
+    ("user data", "<worldbody>", '<size nuser_body="2000000000"/><worldbody>', "is a size in it too large?"),
+    ("terrain", "<worldbody>", '<asset><hfield name="h" nrow="40000" ncol="40000" size="1 1 1 1"/></asset><worldbody>',
+     "is a size in it too large?"),
+    *((f"timestep {t}", 'timestep="[^"]*"', f'timestep="{t}"', f"its timestep of {t} s must be above 0")
+      for t in ("-1", "0", "nan")),
+    ("no MJCF", "mass=", "weight=", "MuJoCo does not compile it"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("what", "old", "new", "words"), OVERDONE, ids=[case[0] for case in OVERDONE])
+def test_a_file_that_overdoes_it_is_one_line_with_its_name(
+    what: str, old: str, new: str, words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text, path = re.sub(old, new, GENERATED), tmp_path / "mine.xml"
+    assert text != GENERATED
+    path.write_text(text)
+    arguments = [
+        "run",
+        str(Path(__file__).parents[1] / "models" / "crank_rocker.toml"),
+        "--mjcf",
+        str(path),
+        "--out",
+        str(tmp_path / "out"),
+    ]
+    assert status(arguments) == 2
+    message = capsys.readouterr().err.strip().splitlines()[-1]
+    assert message.startswith(f"error: {path}: --mjcf = 'mine.xml': ") and words in message
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_ratio_beyond_the_range_of_doubles_has_its_remark() -> None:
+    heavy = examine(CRANK_ROCKER, GENERATED.replace('mass="0.4"', 'mass="4e307"'), {})
+    (difference,) = (
+        d for d in differences(generated(CRANK_ROCKER).described, heavy.described) if d.key == "bars.output.mass"
+    )
+    assert difference.remark.startswith("10^308 times")
 
 
 FIFTH = '<body name="fan"><joint/><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/></body>'
@@ -350,7 +388,10 @@ REFUSED = [
     ("no guess", other_plane().replace("</worldbody>", FIFTH + "</worldbody>"), {},
      "no guess makes a four-bar (every joint must be a hinge of the input"),
     ("a slide", other_plane().replace("<joint/>", '<joint type="slide"/>', 1), MINE, "hinge"),
-    ("nothing closes", re.sub("<site [^>]*>", "", other_plane("")), MINE, "no body is named B3, B4"),
+    ("nothing closes", re.sub("<site [^>]*>", "", other_plane("")), MINE,
+     "no body is named B3, B4, and no guess makes a four-bar (no connect, weld or pair of sites closes it)"),
+    ("too few", "<mujoco><worldbody><body name='input'><joint/><geom size='.1'/></body></worldbody></mujoco>", {},
+     "no body is named coupler, output, and no guess makes a four-bar (it has fewer bodies on hinges)"),
     ("does not compile", other_plane().replace("mass=", "weight="), MINE, "does not compile"),
     ("two names, one body", other_plane(), {**MINE, "coupler": "crank"}, "three bodies"),
 ]  # fmt: skip
@@ -382,7 +423,7 @@ def test_ctrl_c_does_not_wait_for_the_file() -> None:
     began = time.monotonic()
     threading.Timer(3.0, os.kill, (os.getpid(), signal.SIGINT)).start()
     try:
-        with pytest.raises(KeyboardInterrupt), model.guarded() as examined:
+        with pytest.raises(KeyboardInterrupt), model.guarded(Path("mine.xml")) as examined:
             examined(f"{__name__}:hang", BARE, "<mujoco/>", {})
     finally:
         signal.signal(signal.SIGINT, before)
@@ -392,7 +433,7 @@ def test_ctrl_c_does_not_wait_for_the_file() -> None:
 @pytest.mark.parametrize(("what", "word"), [(crash, "crashed"), (hang, "did not come back"), (devour, "memory")])
 def test_a_file_that_breaks_the_engine_is_one_line(what: object, word: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(model, "SECONDS", 4.0 if what is hang else 60.0)  # a busy machine starts a process slowly
-    with pytest.raises(InputError, match=word), model.guarded() as examined:
+    with pytest.raises(InputError, match=word), model.guarded(Path("mine.xml")) as examined:
         examined(f"{__name__}:{what.__name__}", BARE, "<mujoco/>", {})  # type: ignore[attr-defined]
 
 

@@ -144,7 +144,7 @@ def _remark(key: str, ours: Value, theirs: Value) -> str:
         return OF_THE_DRIVE[key]
     remark = next((text for part, text in WORDS["remarks"].items() if part in key), "")
     if isinstance(ours, float) and isinstance(theirs, float) and ours * theirs > 0.0 and not key.startswith("option"):
-        power = math.log10(theirs / ours)
+        power = math.log10(abs(theirs)) - math.log10(abs(ours))
         if round(power) and abs(power - round(power)) <= TENFOLD:
             return f"10^{round(power)} times: units? {remark}"
     return remark

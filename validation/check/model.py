@@ -96,7 +96,7 @@ def examine_model(
 ) -> ModelReport:
     """Examine a file in a guarded process, and the generated one before; theirs is held to the tolerance."""
     text = read_mjcf(mjcf)
-    with guarded() as examined:
+    with guarded(mjcf) as examined:
         generated, theirs = examined(EXAMINE, scene, None, {}), examined(EXAMINE, scene, text, dict(names))
         ours = {(row.engine, row.quantity): row.error for row in _rows(name, scene, generated.answers, SIMULATED)}
         rows = _rows(name, scene, theirs.answers, tolerance)
@@ -118,8 +118,8 @@ def _rows(name: str, scene: Scene, answers: list[Answer], tolerance: Tolerance) 
 
 
 @contextmanager
-def guarded() -> Iterator[Callable[..., Any]]:
-    """What examines, an adapter and its arguments, in a process that may crash, hang or run out of memory."""
+def guarded(mjcf: Path) -> Iterator[Callable[..., Any]]:
+    """What examines a file, an adapter and its arguments, in a process that may crash, hang or run out of memory."""
     from multiprocessing import get_context
 
     from pebble import ProcessExpired, ProcessPool
@@ -130,8 +130,10 @@ def guarded() -> Iterator[Callable[..., Any]]:
         def examined(*arguments: object) -> Any:
             try:
                 return pool.schedule(_examine, args=arguments, timeout=SECONDS).result()
-            except FourBarError:
-                raise
+            except FourBarError as error:
+                if not isinstance(error, InputError) or error.key != "--mjcf":
+                    raise
+                raise InputError(error.key, error.value or mjcf.name, error.allowed, str(mjcf)) from None
             except TimeoutError:
                 reason = f"MuJoCo did not come back in {SECONDS:g} s"
             except MemoryError:
@@ -141,7 +143,7 @@ def guarded() -> Iterator[Callable[..., Any]]:
             except KeyboardInterrupt:
                 pool.stop()  # type: ignore[no-untyped-call]  # or the pool would wait for the file to its time limit
                 raise
-            raise InputError("--mjcf", "the file", reason)
+            raise InputError("--mjcf", mjcf.name, reason, str(mjcf))
 
         yield examined
 

@@ -48,7 +48,12 @@ def anatomy_of(model: mujoco.MjModel, names: Mapping[str, str], lengths: Sequenc
             except InputError as error:
                 refused.append(error.allowed)
     if not found:
-        why = refused[0] if refused else "it has fewer bodies on hinges"
+        few = (
+            "it has fewer bodies on hinges"
+            if len(free) < len(missing)
+            else "no connect, weld or pair of sites closes it"
+        )
+        why = refused[0] if refused else few
         nowhere = f"no body is named {', '.join(missing) or 'B3, B4'}, and no guess makes a four-bar ({why})"
         raise InputError("--mjcf", bodies_of(model), f"{nowhere}; say which is which: --name input=BODY, and so on")
     best = min(each[0] for each in found)

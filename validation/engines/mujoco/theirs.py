@@ -61,9 +61,14 @@ class Examined:
 def compile_text(text: str) -> mujoco.MjModel:
     """MuJoCo's compiler on a text; its complaint as an InputError of one line."""
     try:
-        return mujoco.MjModel.from_xml_string(text)
+        model = mujoco.MjModel.from_xml_string(text)
     except ValueError as error:
         raise InputError("--mjcf", None, " ".join(f"MuJoCo does not compile it: {error}".split())) from None
+    except RuntimeError:  # "unknown exception": a size that no memory holds
+        raise InputError("--mjcf", None, "MuJoCo breaks down over it; is a size in it too large?") from None
+    if not 0.0 < model.opt.timestep < math.inf:
+        raise InputError("--mjcf", None, f"its timestep of {model.opt.timestep:g} s must be above 0")
+    return model
 
 
 def examine(scene: Scene, text: str | None, names: Mapping[str, str]) -> Examined:
@@ -71,8 +76,12 @@ def examine(scene: Scene, text: str | None, names: Mapping[str, str]) -> Examine
     model = compile_text(mjcf(scene) if text is None else text)
     anatomy, guessed = anatomy_of(model, names, scene.linkage.lengths)
     loop = Loop(anatomy, scene)
+    found = described(anatomy)
+    for key, value in found.items():
+        if key.startswith(("bars.", "lengths.")) and not math.isfinite(value):  # type: ignore[arg-type]
+            raise InputError("--mjcf", None, f"{key} is beyond the range of doubles: {value}")
     answers = _answers(loop, scene)
-    return Examined(described(anatomy), called(anatomy), answers, [*guessed, *loop.notes], anatomy.names)
+    return Examined(found, called(anatomy), answers, [*guessed, *loop.notes], anatomy.names)
 
 
 def examine_mended(
@@ -120,6 +129,8 @@ def _answered(name: str, scene: Scene, ask: Callable[[], Answer]) -> Answer:
         answer = ask()
     except LimitError as error:
         answer = Answer(name, "-", refusal=str(error))
+    except ArithmeticError as error:  # its numbers are far from those of any linkage
+        raise InputError("--mjcf", None, str(error)) from None
     answer.shared, answer.own, answer.seconds = SHARED, OWN, time.perf_counter() - start
     return answer
 
@@ -276,7 +287,7 @@ def through_time(loop: Loop, at: Command) -> Answer:
         raise LimitError("nowhere do two neighbouring positions assemble in this file")
     run = run_through(at.theta_2[stretch], at.omega_2, at.alpha_2)
     timestep, sense = float(model.opt.timestep), loop.anatomy.sense["O2"]
-    steps = run.time(run.stop) / timestep if timestep > 0.0 else math.nan
+    steps = run.time(run.stop) / timestep
     if not 1.0 <= steps <= MOST_STEPS:
         raise LimitError(
             f"its timestep of {timestep:g} s makes {steps:.3g} steps of the motion; must be 1 to {MOST_STEPS}"
