@@ -108,7 +108,8 @@ def run(group: "click.Group", program: str, arguments: list[str] | None = None) 
     except ModuleNotFoundError as error:
         return _say(f"{error.name} is not installed: {installing('all')}", BROKEN)
     except OSError as error:
-        return _say(f"{error.filename or 'output'}: {error.strerror or error}", BROKEN)
+        named = error.filename2 or error.filename or "output"  # of a file that is put in place the second is its place
+        return _say(f"{named}: {error.strerror or error}", BROKEN)
     except Exception as error:
         if "--traceback" in given or os.environ.get("FOURBAR_TRACEBACK"):
             raise

@@ -18,8 +18,9 @@ def naming(path: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        if error.filename is None or str(error.filename).endswith(TEMPORARY):
-            error.filename = str(path)
+        both = (error.filename, error.filename2)  # a copy names what it reads first, whichever of the two is full
+        if error.filename is None or any(str(name).endswith(TEMPORARY) for name in both):
+            error.filename, error.filename2 = str(path), None
         raise
 
 

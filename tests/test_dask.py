@@ -138,7 +138,10 @@ def test_a_cluster_without_workers_or_without_the_checkout_is_one_line(
 
 @pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGTERM] if FULL else [signal.SIGKILL])
 def test_a_lost_scheduler_ends_the_run_and_writes_nothing(
-    how: signal.Signals, started: Callable[..., tuple[subprocess.Popen[bytes], str]], tmp_path: Path
+    how: signal.Signals,
+    started: Callable[..., tuple[subprocess.Popen[bytes], str]],
+    tmp_path: Path,
+    caplog: pytest.LogCaptureFixture,
 ) -> None:
     scheduler, address = started("scheduler", "--host", "127.0.0.1", "--port", "0")
     started("worker", *WORKER)
@@ -148,6 +151,7 @@ def test_a_lost_scheduler_ends_the_run_and_writes_nothing(
             steps += bool(step)
             if steps:
                 scheduler.send_signal(how)
+    assert not [each for each in caplog.records if each.exc_info]  # two tracebacks before the one line
     written = [path.read_bytes().partition(b"\n")[2] for path in (tmp_path / "out" / "parts").iterdir()]
     assert len(written) >= steps
     assert all(f'"{FAILS}"' not in gzip.decompress(part).decode() for part in written)

@@ -175,7 +175,7 @@ def test_a_suite_file_of_hostile_names_runs_and_they_are_shown_and_not_sent(
     suite.write_text(f"scenes = {json.dumps(names)}")
     arguments = ["--suite", str(suite), "--engines", "free-body", "--no-pictures", "--out", str(tmp_path / "out")]
     assert status(["run", *arguments]) == HOLDS
-    assert {row.scene for row in read_columns(tmp_path / "out" / "results.csv")} == {"\\x1b[31m<b>[red]x", "a\nb"}
+    assert {row.scene for row in read_columns(tmp_path / "out" / "results.csv")} == {"\\x1b[31m<b>[red]x", "a\\nb"}
     # the progress bar steers the terminal itself; what is printed at the end does not
     assert not STEERING.search(capsys.readouterr().out)
 

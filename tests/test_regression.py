@@ -1,6 +1,8 @@
 """What changed since the accepted state: real changes distinguished from round-off, the surroundings first."""
 
 import ast
+import csv
+import errno
 import html
 import json
 import math
@@ -33,6 +35,8 @@ from validation.regression.record import About, Recorded, about, baseline, read_
 from validation.regression.scenes import description
 from validation.regression.times import TimeChange
 from validation.report.junit import cases
+from validation.run.store import Store
+from validation.scenes.suites import scene_files
 
 WithRows = tuple[About, list[Row]]
 ROW = Row("scene", "engine", "exact", "torque", 1e-15, 1e-14, AGREES, "equivalence", 1.0, 1.0)
@@ -81,6 +85,7 @@ def test_other_versions_are_reported_first() -> None:
     assert render.text(found).startswith("mujoco: 3.3.7 -> ")
 
 
+MODEL = [str(Path(__file__).parent.parent / "models" / "crank_rocker.toml")]
 HEAD = "scene,engine,setting,positions,seconds,times_formulas\n"
 
 
@@ -635,3 +640,72 @@ def test_what_is_no_history_is_one_line(tmp_path: Path, capsys: pytest.CaptureFi
         assert status(["history", str(file)]) == 2
         message = capsys.readouterr().err.strip()
         assert words in message and "\n" not in message
+
+
+def test_a_name_that_does_not_print_or_is_a_formula_is_one_name_everywhere(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Escapes change the order of names, and a spreadsheet calculates a cell that begins with =."""
+    judge_here(monkeypatch)
+    names = ["a\x1b", "aB", "b\nc", "=cmd|'calc'!A0", "+1", "'quoted"]
+    text = fourbar.dump(replace(SCENE, motion=fourbar.Motion(fourbar.Sweep(0.1, 1.0, 3), 1.0)))
+    for name in names:
+        (tmp_path / f"{name}.toml").write_text(text)
+    run, files = tmp_path / "run", [str(tmp_path / f"{name}.toml") for name in names]
+    assert status(["run", *files, "--engines", "free-body", "--no-pictures", "--out", str(run)]) == 0
+    assert status(["compare", str(run), str(run)]) == 0
+    printed = sorted(["a\\x1b", "aB", "b\\nc", *names[3:]])
+    cells = [list(csv.reader((run / name).read_text().splitlines())) for name in ("results.csv", "timings.csv")]
+    assert not any(cell.startswith(("=", "+", "@")) for rows in cells for row in rows for cell in row)
+    assert all(len(row) == len(rows[0]) for rows in cells for row in rows)
+    kept = recorded(run)
+    assert [name for name, _ in kept.scenes()] == [name for name, _ in kept.times()] == printed == [*kept.about.scenes]
+    (tmp_path / "a\\x1b.toml").write_text(text)
+    with pytest.raises(InputError, match="must have a name of its own"):
+        scene_files([tmp_path / "a\x1b.toml", tmp_path / "a\\x1b.toml"])
+
+
+@pytest.mark.parametrize("name", ["lock", "run.json", "results.csv", "timings.csv", "report.html"])
+def test_a_folder_where_a_file_of_a_run_belongs_is_one_line_before_it(
+    name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "out" / name).mkdir(parents=True)
+    assert status(["run", *MODEL, "--engines", "free-body", "--no-pictures", "--out", str(tmp_path / "out")]) == 2
+    message = capsys.readouterr().err.strip()
+    assert message == f"error: path = '{tmp_path / 'out' / name}': must name a file, not a folder"
+    assert [path.name for path in (tmp_path / "out").iterdir()] == [name]
+
+
+@pytest.mark.parametrize("name", ["results.csv", "results.parquet", "timings.csv", "record.json", HISTORY])
+def test_accept_onto_a_folder_of_that_name_writes_nothing(name: str, tmp_path: Path) -> None:
+    run, kept = save(tmp_path / "run", [ROW]), tmp_path / "kept"
+    (kept / name).mkdir(parents=True)
+    assert status(["accept", str(run), "--to", str(kept)]) == 2
+    assert [path.name for path in kept.iterdir()] == [name]
+
+
+def test_folders_among_the_parts_of_a_run_are_swept_away(tmp_path: Path) -> None:
+    for name in ("000000", "another", ".000000.part"):
+        store = Store(tmp_path / name, {"of": "this"})
+        with store.held():
+            (store.parts / name / "inner").mkdir(parents=True)
+        with store.held():
+            assert store.done() == set() and not [*store.parts.iterdir()]
+    (tmp_path / "parts").write_text("a file")
+    with (
+        pytest.raises(InputError, match="must be a folder, in which a run keeps its parts"),
+        Store(tmp_path, {}).held(),
+    ):
+        pass
+
+
+def test_a_full_disk_names_the_file_that_does_not_fit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    run = save(tmp_path / "run", [ROW])
+
+    def full(source: Path, target: Path) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device", str(source), None, str(target))  # as shutil does
+
+    monkeypatch.setattr("validation.regression.record.shutil.copyfile", full)
+    with pytest.raises(OSError) as caught:
+        record.accept(recorded(run), tmp_path / "kept")
+    assert (caught.value.filename, caught.value.filename2) == (str(tmp_path / "kept" / "results.csv"), None)

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from fourbar.writing import naming
-from validation.compare.rows import COLUMNS, MADE_OF, Row, plain, to_csv
+from validation.compare.rows import COLUMNS, MADE_OF, Row, from_text, plain, to_csv
 
 GROUP_ROWS = 100_000
 """Rows of a row group of the Parquet file: each costs some kilobytes of footer, whatever it holds."""
@@ -139,5 +139,5 @@ def _of_text(path: Path, columns: list[str], files: ExitStack) -> Any:
 def _words(cells: list[str], known: dict[str, str]) -> list[str]:
     for cell in dict.fromkeys(cells):
         if cell not in known:
-            known[cell] = sys.intern(plain(cell))
+            known[cell] = sys.intern(plain(from_text(cell)))
     return [known[cell] for cell in cells]

@@ -82,6 +82,20 @@ def plain(text: str) -> str:
     return "".join(c if c.isprintable() or c == "\n" else c.encode("unicode_escape").decode() for c in text)
 
 
+FORMULA = ("=", "+", "-", "@")
+"""What a spreadsheet takes for the beginning of a formula, and calculates."""
+
+
+def as_text(cell: str) -> str:
+    """Somebody's text as a cell that stays text in a spreadsheet: with an apostrophe before what begins a formula."""
+    return f"'{cell}" if cell.startswith(FORMULA) and len(cell) > 1 else cell
+
+
+def from_text(cell: str) -> str:
+    """What `as_text` was given."""
+    return cell[1:] if cell.startswith(tuple("'" + first for first in FORMULA)) else cell
+
+
 COLUMNS = tuple(column.name for column in fields(Row))
 
 
@@ -96,20 +110,18 @@ def to_csv(rows: Iterable[Row]) -> str:
 
 
 def csv_text(columns: Sequence[str], rows: Iterable[Iterable[object]]) -> str:
-    """A table as CSV, floats as repr, nothing for None."""
+    """A table as CSV, floats as repr, nothing for None, no text that a spreadsheet would calculate."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(columns)
-    writer.writerows(rows)
+    writer.writerows([columns] if columns else [])
+    writer.writerows([as_text(cell) if isinstance(cell, str) else cell for cell in row] for row in rows)
     return text.getvalue()
 
 
-def _cell(value: object) -> str:
+def _cell(value: object) -> object:
     if isinstance(value, bool):
         return "true" if value else "false"
-    if isinstance(value, float):
-        return "" if math.isnan(value) else repr(value)
-    return str(value)
+    return None if isinstance(value, float) and math.isnan(value) else value
 
 
 MADE_OF = {column.name: column.type for column in fields(Row) if column.init}

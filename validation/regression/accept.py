@@ -16,7 +16,7 @@ from validation.compare.rows import FAILS, Row
 from validation.regression import render
 from validation.regression.changes import Differences, compared, merged, under_new_names
 from validation.regression.history import HISTORY, append
-from validation.regression.record import ABOUT, ACCEPTED, About, Recorded, accept, baseline, recorded
+from validation.regression.record import ABOUT, ACCEPTED, TABLES, About, Recorded, accept, baseline, recorded
 from validation.regression.scenes import renamed
 from validation.regression.times import time_changes
 
@@ -139,6 +139,9 @@ def accept_command(results: Path, to: Path | None, even_failing: bool) -> None:
     target = folder.absolute().parent / ACCEPTED if to is None else to
     if target.resolve() == folder.resolve():
         raise InputError("--to", str(target), "must be another folder than that of the results")
+    for name in (*TABLES, ABOUT, HISTORY):
+        if (target / name).is_dir():
+            raise InputError("--to", str(target / name), "must name a file, not a folder")
     run = recorded(results)
     counts = Counts(run.rows())
     if counts.status != HOLDS and not even_failing:

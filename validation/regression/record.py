@@ -16,7 +16,7 @@ from typing import Any, TypeVar
 from fourbar.errors import InputError
 from fourbar.writing import naming, write_text
 from validation.compare.columns import column_of, read_columns, rows_in
-from validation.compare.rows import Row, plain
+from validation.compare.rows import Row, from_text, plain
 from validation.compare.tolerance import SIMULATED, K
 from validation.report.machine import kernels, machine, versions
 
@@ -144,7 +144,10 @@ class Recorded:
         try:
             with table.open(newline="", encoding="utf-8") as file:
                 for scene, some in groupby(csv.DictReader(file), key=lambda row: row["scene"]):
-                    yield plain(scene), [(plain(row["engine"]), float(row["times_formulas"])) for row in some]
+                    yield (
+                        plain(from_text(scene)),
+                        [(plain(from_text(row["engine"])), float(row["times_formulas"])) for row in some],
+                    )
         except (KeyError, TypeError, ValueError, csv.Error):
             raise InputError("RESULTS", str(table), "is not a table of times written by `run`") from None
 

@@ -1,5 +1,6 @@
 """Chunks of scenes over the workers of a Dask scheduler."""
 
+import logging
 import time
 from collections import Counter
 from collections.abc import Collection, Iterable, Iterator, Sequence
@@ -56,6 +57,8 @@ class Cluster:
         """
         from distributed import Client
 
+        # what it logs when the scheduler is lost, tracebacks and all, is one line of ours
+        logging.getLogger("distributed.client").setLevel(logging.CRITICAL)
         self.scheduler = scheduler
         try:
             self.client = Client(scheduler, set_as_default=False)  # type: ignore[no-untyped-call]

@@ -1,6 +1,5 @@
 """The run: every scene judged, the results streamed to disk, the report written."""
 
-import csv
 import math
 import os
 from collections.abc import Iterable, Iterator, Sequence
@@ -13,7 +12,7 @@ from fourbar.errors import FAILED, HOLDS, DependencyError, FourBarError, InputEr
 from fourbar.mjcf import mjcf
 from fourbar.writing import naming, require_file, write_text
 from validation.compare.columns import Columns, read_columns
-from validation.compare.rows import FAILS, plain
+from validation.compare.rows import FAILS, csv_text, plain
 from validation.compare.tolerance import IDENTITY, SIMULATED
 from validation.engines.hard_suite import Hard
 from validation.engines.mujoco.picture import pictures
@@ -111,12 +110,12 @@ def run(
             naming(out / "timings.csv"),
             times.open("w", encoding="utf-8", newline="") as file,
         ):
-            csv.writer(file, lineterminator="\n").writerow(TIMINGS)
+            file.write(csv_text(TIMINGS, []))
             for number, scenes in enumerate(chunks):
                 records = store.read(number)
                 for each in records:
                     summary.add(each)
-                    csv.writer(file, lineterminator="\n").writerows(timings(each))
+                    file.write(csv_text((), timings(each)))
                 columns.add([row for each in records for row in each.rows])
                 yield Collected(len(scenes))
         os.replace(times, out / "timings.csv")

@@ -15,9 +15,21 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from fourbar.errors import DependencyError, FourBarError
-from fourbar.writing import write_bytes, write_text
+from fourbar.errors import DependencyError, FourBarError, InputError
+from fourbar.writing import require_file, write_bytes, write_text
 from validation.report.record import Record
+
+WRITTEN = [
+    "lock",
+    "run.json",
+    "record.json",
+    "results.csv",
+    "results.parquet",
+    "timings.csv",
+    "report.md",
+    "report.html",
+]
+"""Files of the folder of a run."""
 
 
 class RunningError(FourBarError):
@@ -40,6 +52,10 @@ class Store:
         from filelock import FileLock, Timeout
 
         self.folder.mkdir(parents=True, exist_ok=True)
+        for name in WRITTEN:
+            require_file(self.folder / name)
+        if self.parts.exists() and not self.parts.is_dir():
+            raise InputError("--out", str(self.parts), "must be a folder, in which a run keeps its parts")
         lock = FileLock(self.folder / "lock", timeout=0)
         try:
             lock.acquire()
@@ -61,7 +77,7 @@ class Store:
             shutil.rmtree(self.parts, ignore_errors=True)
         self.parts.mkdir(exist_ok=True)
         for leftover in self.parts.glob(".*.part"):
-            leftover.unlink()
+            _remove(leftover)
         if not same:
             write_text(marker, self._identity)
 
@@ -82,7 +98,7 @@ class Store:
                 found.add(int(path.name))
             except ValueError as error:
                 self.notes.append(f"made again: {path.parent.name}/{path.name}: {error}")
-                path.unlink()
+                _remove(path)
         return found
 
     def put(self, chunk: int, records: Sequence[Record]) -> None:
@@ -96,6 +112,8 @@ class Store:
 
     def _packed(self, path: Path) -> bytes:
         """What follows the first line of a part; ValueError that says what is wrong with it."""
+        if not path.is_file():
+            raise ValueError("is no file")
         first, _, packed = path.read_bytes().partition(b"\n")
         try:
             head = dict(json.loads(first))
@@ -122,3 +140,11 @@ class Store:
         """The results are written: the parts have served."""
         shutil.rmtree(self.parts)
         (self.folder / "run.json").unlink()
+
+
+def _remove(path: Path) -> None:
+    """Whatever lies there under the name of a file."""
+    if path.is_dir() and not path.is_symlink():
+        shutil.rmtree(path)
+    else:
+        path.unlink()

@@ -13,6 +13,7 @@ from fourbar.errors import InputError
 from fourbar.files import loads, read_text, reading
 from fourbar.scene import Scene
 from fourbar.scene.motion import DEFAULT_STEPS, Free, Sweep
+from validation.compare.rows import plain
 from validation.scenes.random import LinkageType, random_scene
 
 MOST_POSITIONS = 100_000
@@ -91,20 +92,29 @@ def model_files() -> list[Path]:
 def scene_files(paths: Iterable[Path]) -> Files:
     """Read and check scene files; each is named by its stem, or by its path where two stems are alike.
 
-    Raises InputError for a file that is bad, at once: a long run does not start on bad input.
+    What does not print in a name is written as its escape. Raises InputError for a file that is bad, and for two of
+    one name, at once: a long run does not start on bad input.
     """
     files = list(dict.fromkeys(Path(path) for path in paths))
-    stems = Counter(file.stem for file in files)
-    texts = []
+    stems = Counter(_printed(file.stem) for file in files)
+    texts: dict[str, str] = {}
     most = 0
     for file in files:
-        name = file.stem if stems[file.stem] == 1 else file.with_suffix("").as_posix()
+        name = _printed(file.stem)
+        if stems[name] > 1:
+            name = _printed(file.with_suffix("").as_posix())
+        if name in texts:
+            raise InputError("SCENE", str(file), f"must have a name of its own: another file is {name!r} too")
         text = read_text(file)
         most = max(most, _positions(loads(text, str(file)), file))
-        texts.append((name, text))
+        texts[name] = text
     if not texts:
         raise InputError("SCENE", [], "no scene file to run")
-    return Files(tuple(sorted(texts)), most)
+    return Files(tuple(sorted(texts.items())), most)
+
+
+def _printed(name: str) -> str:
+    return plain(name).replace("\n", "\\n")
 
 
 def _positions(scene: Scene, file: Path) -> int:
