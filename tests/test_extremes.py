@@ -6,12 +6,14 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import flint
 import numpy as np
 import pytest
 
 import fourbar
 from fourbar import Friction, InputError, Motion, Scene, Sweep, Tolerance
 from fourbar.cli import status
+from fourbar.effects import Point, Spring, Springs
 from fourbar.scene import Command
 from fourbar.studies import enclosure, interval
 from fourbar.studies.enclosure import PROVEN, Extremes, extremes
@@ -150,3 +152,66 @@ def test_the_bound_of_a_box_holds_at_its_ends(rocker: tuple[Scene, Extremes]) ->
             least = -search._bound(-1, over[name], nominal[name], i, radius)[0]
             for end in ends:
                 assert least <= float(end[name].values[i].mid()) <= top, name
+
+
+def meeting(distance: float) -> Scene:
+    """A spring whose ends nearly meet once in a turn: the boxes there hold a distance of 0."""
+    spring = Spring(Point(1, distance, 0.5), Point(2, 0.1, 0.0), 1000.0, 0.5)
+    return Scene(fourbar.uniform(0.3, 0.1, 0.25, 0.22), Motion(0.0, 10.0), 2, (), (Springs((spring,)),))
+
+
+@pytest.mark.parametrize("distance", [0.102, 0.1005])
+def test_a_spring_whose_ends_nearly_meet_hides_no_value(distance: float) -> None:
+    scene = meeting(distance)
+    solution = fourbar.solve(scene, at=Command(np.linspace(0.4, 0.6, 2001), np.ones(2001, np.int8), 10.0, 0.0))
+    holds(extremes(scene, ["torque", "F12"]), sampled(solution))
+
+
+def test_a_spring_whose_ends_meet_has_no_bound_there() -> None:
+    with pytest.raises(fourbar.FourBarError, match=r"no bound at theta_2 = 28\.64"):
+        extremes(meeting(0.1), ["F12"])
+
+
+@pytest.mark.parametrize(
+    "lengths", [(1, 1e-7, 0.6, 0.8), (1, 1e-12, 0.6, 0.8), (1, 1e-3, 1.5, 0.51), (1, 0.3, 0.9, 0.8)]
+)
+def test_the_transmission_angle_is_that_of_the_triangle_to_the_last_digits(lengths: tuple[float, ...]) -> None:
+    d, a, b, c = (flint.arb(length) for length in lengths)
+    cosines = [(b * b + c * c - e * e) / (2 * b * c) for e in (d - a, d + a)]
+    ends = sorted(float(abs(x).acos()) for x in cosines)
+    if cosines[0] * cosines[1] < 0:
+        ends[1] = math.pi / 2
+    found = extremes(Scene(fourbar.uniform(*lengths), Motion(0.0, 1.0)), ["transmission"])
+    for end, extreme in zip(ends, (found.least["transmission"], found.greatest["transmission"]), strict=True):
+        size = 4.0 * ROUNDING
+        assert extreme.low - size <= end <= extreme.high + size
+        assert extreme.high - extreme.low <= PROVEN
+
+
+@pytest.mark.parametrize("far", [50.0, 1e11, -1e15])
+def test_turns_of_the_input_change_no_bound(far: float) -> None:
+    scene = Scene(fourbar.uniform(0.3, 0.1, 0.25, 0.22), Motion(0.0, 10.0), drive_bar=4)
+    near, found = extremes(scene, ["torque"]), extremes(replace(scene, motion=Motion(far, 10.0)), ["torque"])
+    assert found.greatest["torque"].high == pytest.approx(near.greatest["torque"].high, rel=2 * PROVEN)
+    assert found.boxes < 2 * near.boxes
+
+
+def test_a_ground_turned_too_far_is_one_line() -> None:
+    turned = replace(fourbar.uniform(0.3, 0.1, 0.25, 0.22), ground_angle=1e11)
+    with pytest.raises(InputError, match=r"lengths.ground_angle = 1\S+: must lie within 100000 rad"):
+        extremes(Scene(turned, Motion(0.0, 10.0)))
+
+
+@pytest.mark.parametrize("size", [1e-150, 1e150])
+def test_sizes_whose_squares_doubles_do_not_hold_are_bounded(size: float) -> None:
+    lengths = (0.3, 0.1, 0.25, 0.22)
+    one, found = (
+        extremes(Scene(fourbar.uniform(*(of * x for x in lengths)), Motion(0.0, 10.0)), ["F12"]) for of in (1.0, size)
+    )
+    assert found.greatest["|F12|"].high == pytest.approx(size * size * one.greatest["|F12|"].high, rel=2 * PROVEN)
+
+
+def test_what_is_zero_everywhere_is_bounded_by_zero() -> None:
+    bars = (fourbar.Bar(length) for length in (0.1, 0.25, 0.22))
+    found = extremes(Scene(fourbar.FourBar(0.3, *bars), Motion(0.0, 10.0)), ["torque", "F12"])
+    assert {end for extreme in (*found.least.values(), *found.greatest.values()) for end in extreme[:2]} == {0.0}

@@ -120,6 +120,4 @@ def _per_distance(spring: Spring, across: Any) -> Any:
     """Tension over distance, N/m."""
     if not anywhere(spring.slack != 0.0):
         return spring.stiffness
-    distance = np.abs(across)
-    # a distance of 0 has no direction, which the status says
-    return spring.stiffness + spring.slack / (distance + np.where(distance == 0.0, 1.0, 0.0))
+    return spring.stiffness + spring.slack / np.abs(across)  # at a distance of 0 no number, which the status says

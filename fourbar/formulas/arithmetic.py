@@ -8,16 +8,20 @@ import numpy as np
 
 Number = Any
 """A float, or an array that broadcasts over positions and linkages."""
+PLAIN = (int, np.generic)
+"""One truth value or code."""
 
 
 def anywhere(mask: Number) -> bool:
-    """Whether a mask holds at any entry; `np.any` costs a plain number fifty times as much."""
-    return bool(mask.any()) if isinstance(mask, np.ndarray) else bool(mask)
+    """Whether a mask may hold at any entry; `np.any` costs a plain number fifty times as much."""
+    return bool(mask) if isinstance(mask, PLAIN) else bool(mask.any())
 
 
 def select(mask: Number, x: Number, y: Number) -> Number:
-    """x where a mask holds, y elsewhere; for a plain one the number itself."""
-    return np.where(mask, x, y) if isinstance(mask, np.ndarray) else (x if mask else y)
+    """Of two forms of one number x where a mask holds, y elsewhere; for a plain one the number itself."""
+    if isinstance(mask, PLAIN):
+        return x if mask else y
+    return np.where(mask, x, y) if isinstance(mask, np.ndarray) else mask.of_one(x, y)
 
 
 def two_sum(x: Number, y: Number) -> tuple[Number, Number]:

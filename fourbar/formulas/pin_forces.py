@@ -12,7 +12,7 @@ Source: Linares Mendoza, section 5.7 (the thirteen equations); R. L. Norton, Des
 
 from typing import NamedTuple
 
-from fourbar.formulas.arithmetic import Number, anywhere, cross, dot, vector
+from fourbar.formulas.arithmetic import Number, anywhere, cross, dot, select, vector
 from fourbar.formulas.motion import Rates
 from fourbar.formulas.position import Loop, Position
 
@@ -154,5 +154,5 @@ def pin_forces(
         F32 = R3 + F43 + mass_at_A * at.u2
         short = d < a
         if anywhere(short):  # all bars turn as one, and the sum loses the small component across bar 2
-            F32 = F32 + short * (moment_of_F32 / a - cross(at.u2, F32)) * 1j * at.u2
+            F32 = F32 + select(short, moment_of_F32 / a - cross(at.u2, F32), 0.0) * 1j * at.u2
     return PinForces(-1.0 * (R2 + F32), F32, F43, F43 - R4)  # NumPy negates complex numbers slowly

@@ -24,7 +24,7 @@ def heading(scene: Scene, found: Extremes) -> list[str]:
             "nothing is proven: there the loads grow without end"
         )
     if found.nominal is None:
-        lines.append(f"each extreme lies between its two numbers, {PROVEN:g} of the largest load apart or less")
+        lines.append(f"each extreme lies between its two numbers, as a rule {PROVEN:g} of the largest load apart")
     else:
         lines.append(
             f"for every linkage within the {len(scene.tolerances)} tolerances (three sigma of a normal one): the outer "

@@ -33,14 +33,14 @@ BITS = 128
 """Working precision: rounding is far below what is promised."""
 PROVEN = 1e-9
 """Width of the enclosure, relative to the largest magnitude."""
-OUTWARDS = 1e-15
-"""Relative; the roots and arcs of the ends are rounded by less."""
 FIRST = 64
 """Boxes to begin with."""
 FINEST, FINEST_OF_MANY = 1e-10, 1e-4
 """rad; narrower boxes are not halved: without tolerances, and with them."""
 NEGLIGIBLE = 0.02
 """A box over which theta_2 adds less than this share of what the tolerances add is not halved: the rest is theirs."""
+MANY = 2**15
+"""Boxes left; a quantity so level that more would be is bounded by these: a linkage that springs balance has none."""
 NAMES = ("torque", *(f"|{name}|" for name in PIN_FORCES), "transmission")
 Balls = NDArray[Any]
 
@@ -196,9 +196,8 @@ class _Search:
         """The quantities over the boxes and all tolerances, and at the centres without any."""
         if boxes is self.start and self.at_start is not None:  # every search begins with them
             return self.at_start
-        centre, radius = boxes.mean(axis=1), 0.5 * np.ptp(boxes, axis=1)
-        # half an interval more than rounding of its ends could lose
-        wide = np.array([self.arb(x, r * (1.0 + 1e-9)) for x, r in zip(centre, radius, strict=True)], dtype=object)
+        centre, radius = _centred(boxes)
+        wide = np.array([self.arb(x, r) for x, r in zip(centre, radius, strict=True)], dtype=object)
         points, off = np.array([self.arb(x) for x in centre], dtype=object), np.zeros((len(self.keys), len(boxes)))
         found = self.evaluate(wide, None), self.evaluate(points, off)
         if boxes is self.start:
@@ -207,65 +206,86 @@ class _Search:
 
     def extreme(self, name: str, sign: int) -> Extreme:
         """The greatest (+1) or least (-1) value, enclosed and rounded outwards."""
-        if name == "torque":
-            return Extreme(*self.enclosed(name, sign))
-        if name == "transmission" and sign > 0:  # near a right angle its cosine has the digits, near zero its sine
-            least, most, where = self.enclosed("cosine", -1)
-            low, high = (math.acos(min(math.sqrt(max(x, 0.0)), 1.0)) for x in (most, least))
-        else:
-            least, most, where = self.enclosed("sine" if name == "transmission" else name, sign)
-            low, high = (math.sqrt(max(x, 0.0)) for x in (least, most))
-            if name == "transmission":
-                low, high = (math.asin(min(x, 1.0)) for x in (low, high))
-        return Extreme(low * (1.0 - OUTWARDS), high * (1.0 + OUTWARDS), where)
+        arb, of = self.arb, "sine" if name == "transmission" else name
+        if of == "sine" and _lowest(sign, self.over(self.start)[1][of]).max() * sign > 0.5:
+            of, sign = "cosine", -sign  # near a right angle it has the digits
+        low, high, where = self.enclosed(of, sign)
+        if name != "torque":
+            low, high = (end.max(arb(0)).sqrt() for end in (low, high))
+        if of == "sine":
+            low, high = (end.min(arb(1)).asin() for end in (low, high))
+        elif of == "cosine":
+            low, high = (end.min(arb(1)).acos() for end in (high, low))
+        return Extreme(_below(low), _above(high), where)
 
-    def enclosed(self, name: str, sign: int) -> tuple[float, float, float]:
+    def enclosed(self, name: str, sign: int) -> tuple[Any, Any, float]:
         """The greatest (+1) or least (-1) value of what is evaluated between two numbers, and where."""
         finest = FINEST_OF_MANY if self.keys else FINEST
-        boxes, size = self.start, 0.0
-        best, where, closed = -math.inf, math.nan, -math.inf
+        boxes = self.start
+        # all numbers below are relative to the largest value at the start: no square leaves the range of doubles
+        sizes = [abs(value).upper() for value in self.over(boxes)[1][name].values if value.is_finite()]
+        unit = max([x for x in sizes if x > 0], default=self.arb(1))
+        scale = sign / unit
+        best, where, closed, size = -math.inf, math.nan, -math.inf, 0.0
         while len(boxes):
-            centre, radius = boxes.mean(axis=1), 0.5 * np.ptp(boxes, axis=1)
+            centre, radius = _centred(boxes)
             over, nominal = (found[name] for found in self.over(boxes))
-            found = _lowest(sign, nominal)
+            found = _lowest(scale, nominal)
             size = max([size, *np.abs(found[np.isfinite(found)])])
-            bounds = [self._bound(sign, over, nominal, i, r) for i, r in enumerate(radius)]
+            bounds = [self._bound(scale, over, nominal, i, r) for i, r in enumerate(radius)]
             top, settled = np.array([bound[0] for bound in bounds]), np.array([bound[1] for bound in bounds])
             if self.keys and (tried := np.flatnonzero(top > max(best, found.max()))).size:
                 slopes = np.broadcast_to(nominal.slopes, (1 + len(self.keys), len(boxes)))[1:, tried]
                 corner = np.array([[sign * math.copysign(1.0, _mid(s)) for s in row] for row in slopes])
                 points = np.array([self.arb(x) for x in centre[tried]], dtype=object)
-                found[tried] = np.fmax(found[tried], _lowest(sign, self.evaluate(points, corner)[name]))
+                found[tried] = np.fmax(found[tried], _lowest(scale, self.evaluate(points, corner)[name]))
             if found.max() > best:
                 best, where = float(found.max()), float(centre[int(found.argmax())])
                 size = max(size, abs(best))
             allowed = PROVEN * (math.sqrt(abs(best) * size) + PROVEN * size if name != "torque" else size)
-            done = (top <= best + allowed) | ((settled | (radius < finest)) & np.isfinite(top))
+            done = (top <= best + allowed) | ((settled | (radius < finest) | (len(boxes) > MANY)) & np.isfinite(top))
             closed = max([closed, *top[done & (top > best)].tolist()])
             done |= top <= closed
             if ((radius < finest) & ~np.isfinite(top)).any():
                 at = math.degrees(float(centre[~np.isfinite(top)][0]))
-                why = "within the tolerances it has a pole there, or linkages that do not assemble"
+                why = "it has a pole there, or within the tolerances, or linkages that do not assemble"
                 raise LimitError(f"{name} has no bound at theta_2 = {at:.6g} deg: {why}")
             boxes = np.array([half for box in boxes[~done] for half in _halves(np.linspace(box[0], box[1], 3))])
-        closed = max(closed, best)
-        return (best, closed, where) if sign > 0 else (-closed, -best, where)
+        reached, proven = unit * best, unit * max(closed, best)
+        return (reached, proven, where) if sign > 0 else (-proven, -reached, where)
 
-    def _bound(self, sign: int, over: Sloped, nominal: Sloped, index: int, radius: float) -> tuple[float, bool]:
+    def _bound(self, scale: Any, over: Sloped, nominal: Sloped, index: int, radius: float) -> tuple[float, bool]:
         """Above everything that a box holds, inf where it has no bound; and whether halving it would gain nothing."""
         slopes = np.broadcast_to(over.slopes, (1 + len(self.keys), len(over.values)))[:, index]
-        reach = [radius * (1.0 + 1e-9), *(self.reach[key] for key in self.keys)]
-        added = [s * self.arb(0, r) for s, r in zip(slopes, reach, strict=True)]
-        tops = [float((sign * value).upper()) for value in (nominal.values[index] + sum(added), over.values[index])]
+        reach = [radius, *(self.reach[key] for key in self.keys)]
+        added = [scale * s * self.arb(0, r) for s, r in zip(slopes, reach, strict=True)]
+        tops = [_above(value) for value in (scale * nominal.values[index] + sum(added), scale * over.values[index])]
         by_angle, *by_tolerance = (float(part.rad()) for part in added)
-        top = math.nextafter(min([x for x in tops if math.isfinite(x)], default=math.inf), math.inf)
+        top = min([x for x in tops if math.isfinite(x)], default=math.inf)
         return top, by_angle < NEGLIGIBLE * sum(by_tolerance)
 
 
-def _lowest(sign: int, of: Sloped) -> NDArray[np.float64]:
-    """What the values, or their negatives, certainly reach; -inf where that is not known."""
-    found = np.array([float((sign * value).lower()) for value in of.values])
+def _lowest(scale: Any, of: Sloped) -> NDArray[np.float64]:
+    """What the values, scaled, certainly reach; -inf where that is not known."""
+    found = np.array([_below(scale * value) for value in of.values])
     return np.where(np.isfinite(found), found, -math.inf)
+
+
+def _below(ball: Any) -> float:
+    """The least that a ball holds, rounded outwards."""
+    low = float(ball.lower())
+    return math.nextafter(low, -math.inf) if type(ball)(low) > ball.lower() else low
+
+
+def _above(ball: Any) -> float:
+    """The greatest."""
+    return -_below(-ball)
+
+
+def _centred(boxes: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Centres, and radii that reach both ends."""
+    centre = boxes.mean(axis=1)
+    return centre, np.nextafter(np.maximum(boxes[:, 1] - centre, centre - boxes[:, 0]), math.inf)
 
 
 def _mid(ball: Any) -> float:

@@ -18,6 +18,8 @@ DISTANCE = math.radians(1.0)
 """rad; how near to a limit, where forces grow without end, the bounds reach."""
 TRIED = 10_000
 """Linkages drawn from the tolerances to say how many do not assemble: the share is known to half a percent of all."""
+FARTHEST = 1e5
+"""rad; farther round, boxes as narrow as are needed lie between two doubles."""
 KNOWN = ("gravity", "viscous", "springs", "flywheel", "load")
 
 
@@ -28,6 +30,9 @@ def require(scene: Scene) -> None:
         raise InputError("motion", "a free motion or a motion law", "has no interval of theta_2 at one speed")
     if motion.omega_2 is None:
         raise InputError("motion.omega_2", None, "is needed for extremes of torque and pin forces")
+    if abs(scene.linkage.ground_angle) > FARTHEST:
+        allowed = f"must lie within {FARTHEST:g} rad for extremes"
+        raise InputError("lengths.ground_angle", scene.linkage.ground_angle, allowed)
     if change_points(scene.linkage):
         raise InputError("lengths", scene.linkage.lengths, "has a change point, towards which forces have no bound")
     for term in (*scene.loads, *scene.effects):
@@ -38,6 +43,9 @@ def require(scene: Scene) -> None:
 def interval(scene: Scene) -> tuple[tuple[tuple[float, float], ...], float]:
     """The input's whole interval without what lies within DISTANCE of its limits and of poles of the torque."""
     linkage, first = scene.linkage, float(command(scene).theta_2[0])
+    psi = first - linkage.ground_angle
+    if abs(psi) > TURN:
+        first = linkage.ground_angle + math.atan2(math.sin(psi), math.cos(psi))
     if turns_fully(linkage):
         start, stop, gaps = first, first + TURN, False
     else:

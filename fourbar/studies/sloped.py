@@ -5,12 +5,15 @@
 Source: A. Griewank, A. Walther, Evaluating Derivatives, ch. 3 (forward mode).
 """
 
+import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.lib.mixins import NDArrayOperatorsMixin
 from numpy.typing import NDArray
+
+from fourbar.errors import LimitError
 
 Rule = Callable[..., tuple[Any, ...]]
 """The partial derivatives of a function by its arguments, from its value and them."""
@@ -27,11 +30,56 @@ RULES: dict[Any, Rule] = {
     np.arctan2: lambda z, y, x: (x / (x * x + y * y), -y / (x * x + y * y)),
     np.remainder: lambda z, x, y: (1.0, 0.0),  # by a constant
 }
-PIECEWISE = (
-    *(np.sign, np.floor, np.frexp, np.isnan, np.isfinite),
-    *(np.less, np.less_equal, np.greater, np.greater_equal),
-)
-"""Functions of the values alone."""
+COMPLEMENT = {
+    np.less: np.greater_equal,
+    np.less_equal: np.greater,
+    np.greater: np.less_equal,
+    np.greater_equal: np.less,
+}
+PIECEWISE = (np.sign, np.floor, np.frexp, np.isnan, np.isfinite, *COMPLEMENT)
+"""Functions of the values alone; of balls the comparisons, each decided where all that the balls hold agrees."""
+
+
+class Undecided:
+    """A comparison of balls that some of them leave open, (n,).
+
+    What selects by it takes both sides there, `anywhere` says that it may hold; it is no truth value.
+    """
+
+    __array_ufunc__ = None
+
+    def __init__(self, holds: Any, fails: Any) -> None:
+        self.holds, self.fails = holds, fails
+
+    def __and__(self, other: Any) -> "Undecided":
+        holds, fails = (other.holds, other.fails) if isinstance(other, Undecided) else (other, np.logical_not(other))
+        return Undecided(self.holds & holds, self.fails | fails)
+
+    __rand__ = __and__
+
+    def __bool__(self) -> bool:
+        raise LimitError("a comparison of balls is undecided: there is no bound")
+
+    def any(self) -> bool:
+        """Whether it may hold anywhere."""
+        return not self.fails.all()
+
+    def of_one(self, x: Any, y: Any) -> "Sloped":
+        """Of two forms of one number, whose slopes are those of either."""
+        return self._chosen(x, y, _hull(slopes(x), slopes(y)))
+
+    def _chosen(self, x: Any, y: Any, unknown: Any) -> "Sloped":
+        """Both sides where it is undecided, with these slopes."""
+        pairs = (values(x), values(y), _hull(values(x), values(y))), (slopes(x), slopes(y), unknown)
+        return Sloped(*(np.where(self.holds, one, np.where(self.fails, other, both)) for one, other, both in pairs))
+
+    def __array_function__(self, function: Any, types: Any, args: Sequence[Any], options: Any) -> Any:
+        return _by_name(function, args, options)
+
+
+def decided(holds: Any, fails: Any) -> Any:
+    """Where a comparison holds, if each is decided."""
+    return holds if (holds | fails).all() else Undecided(holds, fails)
 
 
 class Sloped(NDArrayOperatorsMixin):
@@ -63,10 +111,18 @@ class Sloped(NDArrayOperatorsMixin):
         """Of both."""
         return Sloped(conjugate(self.values), conjugate(self.slopes))
 
-    def differs(self, other: Any) -> NDArray[np.bool_]:
+    def differs(self, other: Any) -> Any:
         """Where the value or a derivative is not that of the other, (n,)."""
+        return self._compared(other, np.not_equal)
+
+    def _compared(self, other: Any, function: Any) -> Any:
         gap = self - other
-        return np.asarray(gap.values != 0.0) | np.asarray(gap.slopes != 0.0).any(axis=0)
+        same = np.asarray(gap.values == 0.0) & np.asarray(gap.slopes == 0.0).all(axis=0)
+        unlike = np.asarray(gap.values != 0.0) if self.values.dtype == object else ~same
+        return decided(*((unlike, same) if function is np.not_equal else (same, unlike)))
+
+    def __bool__(self) -> bool:
+        raise TypeError("numbers with derivatives are no truth value")
 
     def __array_ufunc__(self, function: Any, method: str, *inputs: Any, **options: Any) -> Any:
         if method != "__call__" or options:
@@ -74,7 +130,7 @@ class Sloped(NDArrayOperatorsMixin):
         given = [x.item() if isinstance(x, np.ndarray) and x.dtype == object and not x.ndim else x for x in inputs]
         if function in (np.equal, np.not_equal):
             sloped, other = given if isinstance(given[0], Sloped) else given[::-1]
-            return sloped.differs(other) == (function is np.not_equal)
+            return sloped._compared(other, function)
         if function is np.conjugate:
             return self.conjugate()
         plain = [values(x) for x in given]
@@ -84,18 +140,22 @@ class Sloped(NDArrayOperatorsMixin):
             size = np.absolute(plain[0])
             along = conjugate(plain[0]) / size
             return Sloped(size, real(along * self.slopes))
+        if self.values.dtype == object and function in COMPLEMENT:
+            return decided(function(*plain), COMPLEMENT[function](*plain))
+        if function not in RULES and (function not in PIECEWISE or self.values.dtype == object):
+            return NotImplemented
         found = function(*plain)
         if function in PIECEWISE:
             return found
-        if function not in RULES:
-            return NotImplemented
         partial = RULES[function](found, *plain)
         return Sloped(found, sum(by * x.slopes for by, x in zip(partial, given, strict=True) if isinstance(x, Sloped)))
 
     def __array_function__(self, function: Any, types: Any, args: Sequence[Any], options: Any) -> Any:
-        if function not in FUNCTIONS or options:
-            return NotImplemented
-        return FUNCTIONS[function](*args)
+        return _by_name(function, args, options)
+
+
+def _by_name(function: Any, args: Sequence[Any], options: Any) -> Any:
+    return NotImplemented if function not in FUNCTIONS or options else FUNCTIONS[function](*args)
 
 
 def _complex_ball(z: complex) -> Any:
@@ -125,7 +185,20 @@ real, imag = _by_entry(lambda z: z.real), _by_entry(lambda z: z.imag)
 conjugate = _by_entry(lambda z: z.conjugate() if hasattr(z, "conjugate") else z)
 
 
+def _union(x: Any, y: Any) -> Any:
+    """The least ball that holds two."""
+    from flint import acb, arb
+
+    kind: Any = acb if any(isinstance(z, (acb, complex)) for z in (x, y)) else arb
+    return kind(x).union(kind(y))
+
+
+_hull = np.frompyfunc(_union, 2, 1)
+
+
 def _where(mask: Any, x: Any, y: Any) -> Sloped:
+    if isinstance(mask, Undecided):  # there it may jump
+        return mask._chosen(x, y, math.nan)
     return Sloped(np.where(mask, values(x), values(y)), np.where(mask, slopes(x), slopes(y)))
 
 

@@ -153,7 +153,7 @@ def outputs(scene: Scene, branch: int, x: Values, drive_bar: int) -> Values | No
             moment[effect.bar] -= x["J"] * alpha[effect.bar]
     for pin, (i, j) in PINS.items():
         slip = omega.get(j, 0) - omega.get(i, 0)
-        sign = arb(1) if slip > 0 else arb(-1) if slip < 0 else arb(0)
+        sign = arb(1) if slip > 0 else arb(-1) if slip < 0 else arb(0) if slip == 0 else arb(0, 1)
         couple = -x.get(f"viscous_{pin}", arb(0)) * slip - x.get(f"friction_{pin}", arb(0)) * sign
         _twist(moment, pin, couple)
     # unknowns F12 F32 F23 F43 F34 F14 (x, y each) and T
