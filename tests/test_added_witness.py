@@ -3,6 +3,7 @@
 import re
 import sys
 from collections.abc import Iterator
+from importlib import import_module
 from importlib.metadata import EntryPoint
 from pathlib import Path
 from typing import Any, ClassVar
@@ -13,6 +14,7 @@ import pytest
 import fourbar
 from fourbar.errors import InputError
 from fourbar.files import save
+from fourbar.quantities import UNKNOWNS
 from tests.scenes import crank_rocker
 from validation import Answer
 from validation.cli import status
@@ -39,7 +41,7 @@ def verdicts(scene: fourbar.Scene, *names: str) -> dict[str, dict[str, str]]:
 
 
 @pytest.fixture(scope="module")
-def adapter(tmp_path_factory: pytest.TempPathFactory) -> str:
+def adapter(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
     folder = tmp_path_factory.mktemp("witness")
     page = (Path(__file__).parent.parent / "docs" / "adding-a-witness.md").read_text(encoding="utf-8")
     (code,) = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
@@ -47,8 +49,8 @@ def adapter(tmp_path_factory: pytest.TempPathFactory) -> str:
     (folder / "toy_world.py").write_text((Path(__file__).parent / "toy_world.py").read_text())
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(sys, "path", [str(folder), *sys.path])
-        added.named(["toy_witness:Toy"], ())  # imported while the folder is on the path
-    return "toy_witness:Toy"
+        import_module("toy_witness")  # while the folder is on the path
+        yield "toy_witness:Toy"
 
 
 def test_the_documented_one_agrees(adapter: str) -> None:
@@ -78,6 +80,15 @@ class Right:
 
     def answer(self, scene: Any, at: Any) -> Answer:
         return FreeBody().answer(scene, at)
+
+
+class Angle(Right):
+    name = "angle"
+    quantities: ClassVar[tuple[str, ...]] = ("theta_3",)
+
+    def answer(self, scene: Any, at: Any) -> Answer:
+        answer = super().answer(scene, at)
+        return Answer(self.name, "exact", at, answer.assembled, {"theta_3": answer.quantities["theta_3"]})
 
 
 class Raises(Right):
@@ -142,9 +153,16 @@ class OfAnother(Right):
 
 def test_what_answers_as_the_free_bodies_agrees_as_they_do() -> None:
     found = verdicts(SCENE, "Right")
-    stated = {"range", "limit_positions", "transmission"}
     assert set(found["right"].values()) == {"agrees"}
-    assert found["right"].keys() == found["free-body"].keys() - stated
+    assert found["right"].keys() == {*UNKNOWNS, "assembled", "undecided", "closure", "torque_inertia"}
+    page = (Path(__file__).parent.parent / "docs" / "adding-a-witness.md").read_text(encoding="utf-8")
+    (stated,) = re.findall(r"left out all of (.*?);", page, re.DOTALL)
+    assert tuple(re.findall(r"`(\w+)`", stated)) == UNKNOWNS
+
+
+def test_one_that_answers_no_torque_is_not_held_to_its_inertial_part() -> None:
+    found = verdicts(SCENE, "Angle")["angle"]
+    assert found == dict.fromkeys(("assembled", "theta_3", "undecided"), "agrees")
 
 
 def test_wrong_answers_fail_in_their_own_rows_alone() -> None:
@@ -169,7 +187,7 @@ def test_from_the_command_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
 
     monkeypatch.setattr(pool, "over_processes", here)
     monkeypatch.setattr("validation.run.run.html", lambda *_, **__: "")
-    out = ["--out", str(tmp_path / "out"), "--engines", "right,raises", "--time-limit", "2.5", "--no-pictures"]
+    out = ["--out", str(tmp_path / "out"), "--engines", "free-body", "--time-limit", "2.5", "--no-pictures"]
     assert (
         status(["run", str(tmp_path / "scene.toml"), "--witness", HERE + "Right", "--witness", HERE + "Raises", *out])
         == 1

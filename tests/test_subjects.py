@@ -22,6 +22,7 @@ from fourbar.quantities import PIN_FORCES
 from fourbar.scene import command
 from tests.test_imports import ROOT, imported
 from validation.engines.free_body import FreeBody
+from validation.run.elsewhere import Ended
 from validation.subjects import examine, motion, standing
 from validation.subjects.standing import FINDINGS, PROBLEM, findings
 
@@ -108,6 +109,63 @@ def test_a_subject_that_diverges_has_its_lines_without_an_order() -> None:
     lines = examine.lines(scene, "subject", {"version": "", "readings": readings})
     assert lines[1].errors["torque"] == math.inf and math.isnan(lines[2].errors["torque"])
     assert all(math.isnan(line.gap) for line in lines) and not any(line.order for line in lines)
+
+
+def of_a_turn(**changes: Any) -> str:
+    """What a subject says that stood still and forgot to read its torque, but for some changes."""
+    n = motion.SAMPLES
+    reading = {"setting": "s", "steps": 100, "theta": [[1.0, 2.0, 3.0]] * n, "omega_2": [10.0] * n}
+    reading |= {"alpha_2": [0.0] * n, "torque": [1.0] * n, "forces": {}, "gap": 0.0, "seconds": 1.0}
+    return json.dumps({"version": "1", "changed": "-", "device": "CPU", "readings": [reading | changes]})
+
+
+@pytest.mark.parametrize(
+    ("said", "why"),
+    [
+        ("", "JSONDecodeError"),  # it left early, as if all were well
+        ("Simulation finished\x1b[2J", "JSONDecodeError"),
+        ("[]", "TypeError"),
+        ('{"readings": []}', "KeyError"),
+        (of_a_turn(theta=[[1.0, 2.0]]), "ValueError"),
+        (of_a_turn(theta=[], omega_2=[], alpha_2=[]), "ValueError"),
+        (of_a_turn(omega_2=[10.0]), "ValueError"),
+        (of_a_turn(torque=["much"]), "ValueError"),
+        (of_a_turn(gap="none"), "TypeError"),
+        (of_a_turn(forces=None), "AttributeError"),
+    ],
+)
+def test_an_answer_that_cannot_be_read_is_left_out_and_the_page_goes_on(
+    said: str, why: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(examine, "SUBJECTS", {"one": ("One", "json"), "other": ("Other", "json")})
+    monkeypatch.setattr(examine, "_has", lambda *_: True)
+    answers = {"one": said, "other": of_a_turn(torque=[math.nan] * motion.SAMPLES)}
+    monkeypatch.setattr(examine, "ended", lambda line, **_: Ended(answers[line[3]], "", False, ""))
+    found = examine.examine(fourbar.load(PROBLEM), PROBLEM, [Path(sys.executable)], 1.0)
+    assert why in found.left_out["One"] and "\x1b" not in found.left_out["One"]
+    (line,) = found.lines
+    assert line.subject == "Other" and math.isnan(line.errors["torque"])
+
+
+@pytest.mark.parametrize("name", ["theta", "omega_2", "alpha_2"])
+def test_a_state_that_is_no_number_has_no_error_that_is_one(name: str) -> None:
+    n = motion.SAMPLES
+    answer = json.loads(of_a_turn(**{name: [[math.nan, 2.0, 3.0]] * n if name == "theta" else [math.nan] * n}))
+    assert math.isnan(examine.errors(fourbar.load(PROBLEM), answer["readings"][0])["torque"])
+
+
+def test_what_a_subject_prints_is_no_part_of_its_answer(tmp_path: Path) -> None:
+    (tmp_path / "loud.py").write_text(
+        "import atexit, os\nfrom validation.subjects.motion import Readings\nVERSION = CHANGED = '-'\n"
+        "SETTINGS, STEPS = ['s'], [1]\natexit.register(print, 'bye')\n"
+        "def through(scene, steps, setting):\n    print('hello'); os.write(1, b'there')\n    return Readings(setting)\n"
+    )
+    code = "import sys; from validation import subjects; subjects.__path__.append(sys.argv.pop(1)); import runpy; "
+    code += "runpy.run_module('validation.subjects.work', run_name='__main__', alter_sys=True)"
+    line = [sys.executable, "-c", code, str(tmp_path), "loud", str(PROBLEM.absolute())]
+    done = subprocess.run(line, cwd=ROOT, capture_output=True, text=True, check=True)
+    assert json.loads(done.stdout)["readings"][0]["setting"] == "s"
+    assert "hello" in done.stderr and "bye" in done.stderr
 
 
 def test_the_page_is_written_and_names_what_is_not_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -97,6 +97,12 @@ def test_bad_input_is_one_line(
     assert stated in error and error.count("\n") == 1
 
 
+@pytest.mark.parametrize("said", ["", "bye", "[]", '{"a": NaN}', '{"a": -1.0}', '{"a": "soon"}', '{"b": 1.0}'])
+def test_a_time_that_is_none_is_left_out(said: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(versions, "ended", lambda _: Ended(said, "", False, ""))
+    assert versions.timed(Path("python"), Path("scene.toml"), ["a"]) == {}
+
+
 def judged(version: str, error: float, verdict: str = AGREES) -> Release:
     """A run of two rows, of which the first errs so."""
     about = About({"mujoco": version, "numpy": "2"}, "here", {"engines": "mujoco-inverse"})

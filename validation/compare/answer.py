@@ -6,6 +6,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from fourbar.errors import FourBarError
 from fourbar.scene import Command, Scene
 
 Array = NDArray[np.float64]
@@ -38,6 +39,10 @@ class Answer:
     own: str = ""
     """What it found alone."""
     seconds: float = 0.0
+
+
+class WitnessError(FourBarError):
+    """What a witness from outside broke down with, in words."""
 
 
 class Engine(Protocol):

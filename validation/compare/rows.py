@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, fields
 from pathlib import Path
 
 from fourbar.writing import write_text
+from validation.compare.answer import WitnessError
 
 AGREES, DEGRADED, UNDECIDED, REFUSES, FAILS = (
     *("agrees", "degraded as predicted"),
@@ -18,6 +19,9 @@ VERDICTS = (AGREES, DEGRADED, UNDECIDED, REFUSES, FAILS)
 HELD = (AGREES, DEGRADED)
 COMPARED = (*HELD, FAILS)
 """Of the others nothing was compared: no digit of the quantity is left to decide by, or the engine declared a limit."""
+
+LONGEST = 500
+"""Characters of what somebody else's code gives as a reason."""
 
 
 @dataclass(frozen=True, slots=True, order=True)
@@ -66,12 +70,27 @@ def breakdown(scene: str, engine: str, error: BaseException, part: str = "") -> 
     if isinstance(error, TimeoutError):
         reason = "the engine hung and was stopped"
     elif type(error).__name__ == "ProcessExpired":  # of Pebble
-        reason = f"the engine crashed its process (exit code {getattr(error, 'exitcode', 'unknown')})"
+        reason = f"the engine crashed its process (exit code {getattr(error, 'exitcode', None) or 0})"
     elif type(error).__name__ == "KilledWorker":  # of Dask
         reason = "the engine crashed its process, or hung and was stopped"
     else:
-        reason = " ".join(f"{type(error).__name__}: {error}".split())
+        reason = str(error) if isinstance(error, WitnessError) else in_words(error)
     return Row.unmeasured(scene, engine, part, "all", FAILS, reason)
+
+
+def in_words(error: BaseException) -> str:
+    """Kind and message of an error, whatever its message raises."""
+    try:
+        message = str(error)
+    except BaseException as another:
+        message = f"its message raises {type(another).__name__}"
+    return one_line(f"{type(error).__name__}: {message}")
+
+
+def one_line(text: str) -> str:
+    """Somebody's text in one line that prints, its middle left out where it is long."""
+    line = plain(" ".join(text.split()))
+    return line if len(line) <= LONGEST else f"{line[: LONGEST // 2]} ... {line[-LONGEST // 2 :]}"
 
 
 def plain(text: str) -> str:

@@ -11,6 +11,7 @@ from fourbar.quantities import OF_DRY_FRICTION, STAGE_OF, UNKNOWNS
 from fourbar.scene import Command, Scene
 from validation.compare.answer import Answer, Engine
 from validation.compare.compare import COMPARED, Predicted
+from validation.compare.rows import in_words
 from validation.compare.tolerance import EQUIVALENCE, SIMULATED, Tolerance
 from validation.engines.exact import unknown
 
@@ -60,13 +61,13 @@ def not_installed(library: str) -> str | None:
         if error.name == library:
             return f"{library} is not installed: {installing(EXTRA[library])}"
         return _broken(library, error)
-    except Exception as error:  # whatever a library raises that was built for another machine
+    except (Exception, SystemExit) as error:  # whatever a library raises that was built for another machine
         return _broken(library, error)
     return None
 
 
-def _broken(library: str, error: Exception) -> str:
-    return f"{library} is installed, but does not load: {' '.join(f'{type(error).__name__}: {error}'.split())}"
+def _broken(library: str, error: BaseException) -> str:
+    return f"{library} is installed, but does not load: {in_words(error)}"
 
 
 class Work(NamedTuple):

@@ -38,6 +38,8 @@ class Record:
     independence: dict[str, tuple[str, str]] = field(default_factory=dict)
     """engine: (shared with the formulas, found alone)."""
     evidence: dict[str, dict[str, float]] = field(default_factory=dict)
+    output: dict[str, str] = field(default_factory=dict)
+    """engine: what it printed."""
     figure: str | None = None
     """SVG of the answers, or None where there is nothing to draw."""
     solution: Solution | None = None
@@ -83,4 +85,5 @@ class Record:
             left_out=[*self.left_out, *other.left_out],
             independence={**self.independence, **other.independence},
             evidence={**self.evidence, **other.evidence},
+            output={**self.output, **other.output},
         )

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from fourbar.errors import FAILED, HOLDS, DependencyError, InputError
+from validation.compare.rows import one_line
 
 CHECKOUT = Path(__file__).parent.parent.parent
 NEEDS = "numpy, pint, click, rich, jinja2, pebble, filelock, pyarrow and the engines"
@@ -55,7 +56,7 @@ def ended(
     except subprocess.TimeoutExpired:
         return Ended("", "", True, f"no answer within {seconds:g} s")
     last = (done.stderr.strip().splitlines() or [f"exit status {done.returncode}"])[-1]
-    return Ended(done.stdout, done.stderr, done.returncode not in fine, last)
+    return Ended(done.stdout, done.stderr, done.returncode not in fine, one_line(last))
 
 
 def run_elsewhere(python: Path, arguments: Sequence[str], out: Path) -> Path:

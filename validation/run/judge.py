@@ -27,23 +27,32 @@ from validation.compare.tolerance import EQUIVALENCE
 from validation.compare.withheld import OfSome, withheld
 from validation.engines.exact import sines
 from validation.engines.free_body import FreeBody, solutions
+from validation.engines.output import kept
 from validation.engines.witnesses import WITNESSES, Witness, not_installed, predicting_from
 from validation.report.record import Record, Timing
 from validation.run.printed import piece, printed
 
 SIMULATION = "mujoco-simulated"
 """The witness that runs the generated MJCF."""
+OUTPUT = "output.txt"
+"""In the folder of a run: what the engines printed."""
 
 
 def judged(name: str, scene: Scene, witnesses: Sequence[Witness] = WITNESSES, *, draw: bool = True) -> Record:
     """Judge a scene and keep what the report needs of it; `draw`: with its pictures and observed orders."""
     record = judge(name, scene, witnesses, order=draw)
+    record.rows = [naming_output(row) if row.engine in record.output else row for row in record.rows]
     figure = None
     if draw:
         from validation.report.figures import scene_figure
 
         figure = scene_figure(record)
     return record.kept(figure)
+
+
+def naming_output(row: Row) -> Row:
+    """A row that fails says where to read what its engine printed."""
+    return replace(row, reason=f"{row.reason}; what it printed: {OUTPUT}") if row.failed else row
 
 
 def judge(name: str, scene: Scene, witnesses: Sequence[Witness] = WITNESSES, *, order: bool = True) -> Record:
@@ -250,6 +259,8 @@ def _judge_inertia(
     engines = _Engines(bare, at)
     of_bare, yardsticks = _basis(bare, _of_inertia(free_body) or engines.free_body()), Yardsticks()
     for witness in witnesses:
+        if "torque" not in witness.expected:
+            continue
         answer = _of_inertia(next((each for each in record.answers if each.engine == witness.name), None))
         if answer is None:
             answer = _ask(witness, engines, record, part="inertia alone")
@@ -275,7 +286,8 @@ def _of_inertia(answer: Answer | None) -> Answer | None:
 
 def _ask(witness: Witness, engines: _Engines, record: Record, part: str = "") -> Answer | None:
     try:
-        answer, seconds = engines.answer(witness)
+        with kept(record.output, witness.name):
+            answer, seconds = engines.answer(witness)
     except Exception as error:  # whatever an engine raises is its own failure, in its own row
         record.rows.append(breakdown(record.name, witness.name, error, part))
         return None

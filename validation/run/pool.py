@@ -18,9 +18,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
 from fourbar.errors import DependencyError
-from validation.compare.rows import breakdown, plain
+from validation.compare.answer import WitnessError
+from validation.compare.rows import breakdown, in_words, plain
 from validation.engines.memory import bound_memory
+from validation.engines.output import keep_output
 from validation.engines.witnesses import Witness
+from validation.engines.workers import Workers as Spawned
 from validation.report.record import Record
 from validation.run.judge import judged
 from validation.scenes.suites import Files, Suite
@@ -85,14 +88,19 @@ def judge_watched(
             faulthandler.dump_traceback_later(seconds, exit=True, file=silent)
             try:
                 records += judge_chunk(suite, [scene], witnesses, draw)
+            except Exception:
+                raise
+            except BaseException as error:  # in the parent it would end the run
+                raise WitnessError(in_words(error)) from None
             finally:
                 faulthandler.cancel_dump_traceback_later()
     return records
 
 
 def ready(parent: int = 0) -> None:
-    """Bound the memory, import what every scene needs, and end with the parent, whose id is given."""
+    """Bound the memory, keep what is printed, import what scenes need, and end with the parent, whose id is given."""
     bound_memory()
+    keep_output()
     if parent:
         threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
     import_module("validation.run.judge")
@@ -136,13 +144,14 @@ class Processes:
         self.in_flight = IN_FLIGHT * workers
 
     def submit(self, scenes: Sequence[int], who: Sequence[Witness]) -> "Future[list[Record]]":
-        """Hand in some scenes: one by itself is stopped from outside, among several the worker ends itself."""
+        """Hand in some scenes: one by itself is stopped from outside, among several the worker ends itself, or else
+        they are stopped together."""
         alone = len(scenes) == 1
         own = self._seconds + LATER if alone else self._seconds
         task = (own, *part(self._suite, scenes), who, self._draw)
         try:
             future: Future[list[Record]] = self._pool.schedule(
-                judge_watched, args=task, timeout=self._seconds if alone else None
+                judge_watched, args=task, timeout=self._seconds if alone else self._seconds * len(scenes) + LATER
             )
         except RuntimeError:  # a broken pool takes no more
             raise StalledError from None
@@ -173,8 +182,6 @@ def over_processes(
     seconds: float | None = None,
 ) -> Iterator[tuple[int, list[Record]]]:
     """Over processes of this machine; `seconds`: after which a scene is taken to hang."""
-    from multiprocessing import get_context
-
     from pebble import ProcessPool
 
     seconds = longest(suite) if seconds is None else seconds
@@ -182,8 +189,8 @@ def over_processes(
     in_vain = 0
     while left:
         # a worker imports before its first task, so that the time for it is not taken from a scene
-        context, me = get_context("spawn"), os.getpid()
-        with ProcessPool(max_workers=workers, context=context, initializer=ready, initargs=[me]) as pool:
+        me = os.getpid()
+        with ProcessPool(max_workers=workers, context=Spawned(), initializer=ready, initargs=[me]) as pool:
             try:
                 crew = Processes(pool, suite, witnesses, draw, workers, seconds)
                 for number, records in as_done(suite, list(left.items()), witnesses, crew):

@@ -27,6 +27,7 @@ from validation.compare.identities import FORMULAS
 from validation.compare.rows import AGREES, DEGRADED, FAILS, REFUSES, UNDECIDED, Row, breakdown
 from validation.compare.tolerance import DEGRADED as TIMES_PREDICTED
 from validation.compare.tolerance import EQUIVALENCE
+from validation.engines.output import kept
 from validation.engines.witnesses import WITNESSES, Witness, not_installed, predicting_from
 from validation.report.record import Record, Timing
 
@@ -101,7 +102,7 @@ def judge_released(record: Record, witnesses: Sequence[Witness] = WITNESSES) -> 
     record.timings.append(Timing(record.name, "formulas", "exact", len(solution), time.perf_counter() - begin))
     record.solution = solution
     assert solution.omega_2 is not None
-    record.rows += _forces(record.name, record.scene, solution, witnesses)
+    record.rows += _forces(record.name, record.scene, solution, witnesses, record.output)
     pendulum = as_pendulum(record.scene)
     truth = _Truth(solution.theta_2, solution.omega_2, solution.stopped_at)
     if pendulum is not None:
@@ -132,7 +133,9 @@ def judge_released(record: Record, witnesses: Sequence[Witness] = WITNESSES) -> 
     return record
 
 
-def _forces(name: str, scene: Scene, solution: Solution, witnesses: Sequence[Witness]) -> Iterator[Row]:
+def _forces(
+    name: str, scene: Scene, solution: Solution, witnesses: Sequence[Witness], output: dict[str, str]
+) -> Iterator[Row]:
     """Motion, pin forces and the torque, which is none, of every instant, by the engines that answer one by one.
 
     They are given theta_2, omega_2 and alpha_2; that these balance without a torque is the equation of motion.
@@ -149,7 +152,8 @@ def _forces(name: str, scene: Scene, solution: Solution, witnesses: Sequence[Wit
         if witness.tolerance != EQUIVALENCE or "theta_3" not in witness.expected or witness.missing():
             continue
         try:
-            answer = witness.engine().answer(held, at)
+            with kept(output, witness.name):
+                answer = witness.engine().answer(held, at)
         except Exception as error:  # whatever an engine raises is its own failure, in its own row
             yield breakdown(name, witness.name, error, "forces")
             continue

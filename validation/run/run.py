@@ -3,8 +3,9 @@
 import math
 import os
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, TextIO
 
 import click
 
@@ -12,14 +13,15 @@ from fourbar.errors import FAILED, HOLDS, DependencyError, FourBarError, InputEr
 from fourbar.mjcf import mjcf
 from fourbar.writing import naming, require_file, write_text
 from validation.compare.columns import Columns, read_columns
-from validation.compare.rows import FAILS, csv_text, plain
+from validation.compare.identities import FORMULAS
+from validation.compare.rows import FAILS, Row, csv_text, plain
 from validation.compare.tolerance import IDENTITY, SIMULATED
 from validation.engines.hard_suite import Hard
 from validation.engines.mujoco.picture import pictures
 from validation.engines.witnesses import Witness
 from validation.published import ladder_rows
 from validation.regression.accept import output_options, report_differences
-from validation.regression.record import about, baseline, recorded, write_about
+from validation.regression.record import ABOUT, COLUMNS, TABLE, about, baseline, recorded, write_about
 from validation.regression.scenes import descriptions
 from validation.report.html import html, markdown
 from validation.report.junit import cases, document
@@ -29,6 +31,7 @@ from validation.report.sections import sections
 from validation.report.summary import PICTURED, Summary
 from validation.run import pool
 from validation.run.elsewhere import run_elsewhere
+from validation.run.judge import OUTPUT
 from validation.run.machines import Cluster
 from validation.run.selection import askable, chosen, selected
 from validation.run.store import Store
@@ -52,6 +55,8 @@ class Drawn(int):
     """Scenes of a long suite that were drawn."""
 
 
+OUTCOME = (TABLE, COLUMNS, ABOUT, "timings.csv", "report.md", "report.html", OUTPUT)
+"""What a run ends with: of an earlier one it goes first, so that none is taken for that of a run that ended early."""
 STAGES = {int: "judging", Collected: "collecting", Drawn: "drawing"}
 """What the progress says."""
 
@@ -84,11 +89,14 @@ def run(
     chunks = [range(start, min(start + size, len(suite))) for start in range(0, len(suite), size)]
     identity = {
         "scenes": suite.fingerprint(),
-        "witnesses": [f"{witness.name} {witness.tolerance.factor!r}" for witness in witnesses],
+        "witnesses": [repr(witness) for witness in witnesses],
         **code(),
         "draw": draw,
+        "time limit": seconds,
     }
     with Store(out, identity).held() as store:
+        for name in OUTCOME:
+            (out / name).unlink(missing_ok=True)
         done = store.done()
         yield from store.notes
         yield sum(len(chunks[number]) for number in done)
@@ -104,21 +112,17 @@ def run(
         summary = Summary()
         summary.tolerances = list(dict.fromkeys((IDENTITY, *(witness.tolerance for witness in witnesses))))
         summary.missing, summary.ladder = missing, ladder_rows() if published else ()
-        times = out / ".timings.csv.part"
-        with (
-            Columns(out) as columns,
-            naming(out / "timings.csv"),
-            times.open("w", encoding="utf-8", newline="") as file,
-        ):
-            file.write(csv_text(TIMINGS, []))
+        with Columns(out) as columns, drafted(out / OUTPUT) as output, drafted(out / "timings.csv") as times:
+            times.write(csv_text(TIMINGS, []))
             for number, scenes in enumerate(chunks):
                 records = store.read(number)
-                for each in records:
+                for scene, each in zip(scenes, records, strict=True):
+                    each.rows = each.rows or [nothing_judged(plain(suite.name(scene)))]
                     summary.add(each)
-                    file.write(csv_text((), timings(each)))
+                    times.write(csv_text((), timings(each)))
+                    output.writelines(f"{each.name}: {engine}\n{text}\n\n" for engine, text in each.output.items())
                 columns.add([row for each in records for row in each.rows])
                 yield Collected(len(scenes))
-        os.replace(times, out / "timings.csv")
         pictured = {record.name for record in summary.pictured} if drawn else set()
         places = [index for index in range(len(suite)) if plain(suite.name(index)) in pictured]
         if drawn and not draw:
@@ -137,6 +141,25 @@ def run(
         write_text(out / "report.html", page)
         store.finish()
     yield summary
+
+
+@contextmanager
+def drafted(path: Path) -> Iterator[TextIO]:
+    """A text file written line by line: in place once it is whole, and not there where it is empty."""
+    draft = path.with_name(f".{path.name}.part")
+    with naming(path):
+        try:
+            with draft.open("w", encoding="utf-8", newline="") as file:
+                yield file
+            if draft.stat().st_size:
+                os.replace(draft, path)
+        finally:
+            draft.unlink(missing_ok=True)
+
+
+def nothing_judged(scene: str) -> Row:
+    """The row of a scene that came back without any."""
+    return Row.unmeasured(scene, FORMULAS, "", "all", FAILS, "nothing was judged")
 
 
 def pictures_of(
@@ -317,7 +340,7 @@ def command(
         passed_on = [*map(os.path.abspath, scenes), "--no-pictures", *(f"--witness={adapter}" for adapter in adapters)]
         passed_on += [f"--{option}={value}" for option, value in the_same.items() if value is not None]
         against = str(run_elsewhere(python, passed_on, out / "elsewhere"))
-    present, missing = askable(chosen(engines, witnesses), by_name=engines is not None)
+    present, missing = askable(chosen(engines, witnesses, adapters), by_name=engines is not None)
     published = not scenes and named is None and count is None  # the models, the thesis's among them
     how: dict[str, Any] = {"workers": workers, "scheduler": scheduler, "seconds": time_limit, "drawn": not no_pictures}
     result = _in_sight(len(suite), run(suite, out, present, published=published, missing=missing, **how))

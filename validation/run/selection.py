@@ -34,8 +34,13 @@ def _added(adapters: Sequence[str], own: tuple[Witness, ...]) -> tuple[Witness, 
     return (*here, *added.installed([*known, *(witness.name for witness in here)]))
 
 
-def chosen(engines: str | None, witnesses: tuple[Witness, ...] = WITNESSES) -> tuple[Witness, ...]:
-    """The witnesses named in a comma-separated list; where there is none, all but those that need not be installed."""
+def chosen(
+    engines: str | None, witnesses: tuple[Witness, ...] = WITNESSES, adapters: Sequence[str] = ()
+) -> tuple[Witness, ...]:
+    """The witnesses named in a comma-separated list, and those of `adapters`, which are named by being given.
+
+    Where there is no list, all but those that need not be installed.
+    """
     if engines is None:
         further = {witness.name for witness in FURTHER}
         return tuple(witness for witness in witnesses if witness.name not in further or not witness.missing())
@@ -44,7 +49,7 @@ def chosen(engines: str | None, witnesses: tuple[Witness, ...] = WITNESSES) -> t
     for name in names or [engines]:
         if name not in known:
             raise InputError("--engines", name, "must be among " + ", ".join(known))
-    return tuple(witness for name, witness in known.items() if name in names)
+    return tuple(witness for name, witness in known.items() if name in names or witness.adapter in adapters)
 
 
 def askable(witnesses: tuple[Witness, ...], *, by_name: bool) -> tuple[tuple[Witness, ...], list[tuple[str, str]]]:

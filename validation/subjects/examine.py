@@ -9,10 +9,12 @@ from typing import Any
 import numpy as np
 
 import fourbar
+from fourbar.errors import FourBarError
 from fourbar.quantities import PIN_FORCES
 from fourbar.scene import Command, Scene
 from validation.compare.answer import Array
 from validation.compare.error import magnitude, relative_error
+from validation.compare.rows import in_words
 from validation.run.elsewhere import ended
 
 SUBJECTS = {
@@ -71,9 +73,14 @@ def examine(scene: Scene, file: Path, pythons: list[Path], seconds: float) -> St
         if done.why:
             found.left_out[name] = done.why
             continue
-        answer = json.loads(done.out.strip().splitlines()[-1])
-        found.changed[name], found.devices[name] = answer["changed"], answer["device"]
-        found.lines += lines(scene, name, answer)
+        try:
+            answer = json.loads(done.out)
+            judged, about = lines(scene, name, answer), (answer["changed"], answer["device"])
+        except (AttributeError, IndexError, KeyError, TypeError, ValueError, FourBarError) as error:
+            found.left_out[name] = f"no answer that can be read: {in_words(error)}"
+            continue
+        found.lines += judged
+        found.changed[name], found.devices[name] = map(str, about)
     return found
 
 
@@ -104,8 +111,10 @@ def lines(scene: Scene, name: str, answer: dict[str, Any]) -> list[Line]:
 
 def errors(scene: Scene, reading: dict[str, Any]) -> dict[str, float]:
     """Of torque and pin forces, at the subject's own theta_2, omega_2 and alpha_2; NaN where it answers NaN."""
-    theta = np.array(reading["theta"])
+    theta = np.array(reading["theta"], dtype=float)
     n = len(theta)
+    if not n or any(np.shape(reading[name]) != (n,) for name in ("omega_2", "alpha_2")) or theta.shape != (n, 3):
+        raise ValueError("its angles, speeds and accelerations are not of one length")
     at = Command(
         theta[:, 0],
         np.full(n, scene.motion.branch, dtype=np.int8),
@@ -113,8 +122,8 @@ def errors(scene: Scene, reading: dict[str, Any]) -> dict[str, float]:
         np.array(reading["alpha_2"]),
     )
     ours, whole = fourbar.solve(scene, "force", at=at), fourbar.solve(scene, "force")
-    answered: dict[str, Array] = {name: np.array(values) for name, values in reading["forces"].items()}
-    answered["torque"] = np.array(reading["torque"])
+    answered: dict[str, Array] = {name: np.array(values, float) for name, values in reading["forces"].items()}
+    answered["torque"] = np.array(reading["torque"], float)
     found = {}
     for name in TORQUE_AND_FORCES:
         if name not in answered:

@@ -96,7 +96,9 @@ def installed(engine: str, version: str, cache: Path, more: Sequence[str] = ()) 
     done = ended([python, "-c", f"import {MODULES[engine]} as engine; print(engine.__file__)"])
     if done.why:
         return None, f"does not load: {done.why}"
-    if folder not in Path(done.out.strip().splitlines()[-1]).parents:
+    if not (printed := done.out.strip()):
+        return None, "does not load: it ends the interpreter"
+    if folder not in Path(printed.splitlines()[-1]).parents:
         return None, f"does not load: another {engine} is found in its stead"
     return python, ""
 
