@@ -120,7 +120,7 @@ def of_a_turn(**changes: Any) -> str:
 
 
 @pytest.mark.parametrize(
-    ("said", "why"),
+    ("stated", "why"),
     [
         ("", "JSONDecodeError"),  # it left early, as if all were well
         ("Simulation finished\x1b[2J", "JSONDecodeError"),
@@ -135,11 +135,11 @@ def of_a_turn(**changes: Any) -> str:
     ],
 )
 def test_an_answer_that_cannot_be_read_is_left_out_and_the_page_goes_on(
-    said: str, why: str, monkeypatch: pytest.MonkeyPatch
+    stated: str, why: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(examine, "SUBJECTS", {"one": ("One", "json"), "other": ("Other", "json")})
     monkeypatch.setattr(examine, "_has", lambda *_: True)
-    answers = {"one": said, "other": of_a_turn(torque=[math.nan] * motion.SAMPLES)}
+    answers = {"one": stated, "other": of_a_turn(torque=[math.nan] * motion.SAMPLES)}
     monkeypatch.setattr(examine, "ended", lambda line, **_: Ended(answers[line[3]], "", False, ""))
     found = examine.examine(fourbar.load(PROBLEM), PROBLEM, [Path(sys.executable)], 1.0)
     assert why in found.left_out["One"] and "\x1b" not in found.left_out["One"]

@@ -97,9 +97,9 @@ def test_bad_input_is_one_line(
     assert stated in error and error.count("\n") == 1
 
 
-@pytest.mark.parametrize("said", ["", "bye", "[]", '{"a": NaN}', '{"a": -1.0}', '{"a": "soon"}', '{"b": 1.0}'])
-def test_a_time_that_is_none_is_left_out(said: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(versions, "ended", lambda _: Ended(said, "", False, ""))
+@pytest.mark.parametrize("answer", ["", "bye", "[]", '{"a": NaN}', '{"a": -1.0}', '{"a": "soon"}', '{"b": 1.0}'])
+def test_a_time_that_is_none_is_left_out(answer: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(versions, "ended", lambda _: Ended(answer, "", False, ""))
     assert versions.timed(Path("python"), Path("scene.toml"), ["a"]) == {}
 
 
