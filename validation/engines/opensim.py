@@ -194,6 +194,7 @@ class OpenSimBars(Loaded):
         """
         self.act()
         pin_a, torque, closing, before = self.point("end2"), 0.0, np.zeros(2), (math.inf, math.inf)
+        seen: set[tuple[float, float]] = set()
         for number in range(PASSES):
             for bar, wrench in self.wrenches.items():
                 for function, value in zip(self.applied[bar], wrench, strict=True):
@@ -206,9 +207,11 @@ class OpenSimBars(Loaded):
             self.push(2, force, pin_a)
             self.push(3, -force, pin_a)
             size = abs(couple), math.hypot(*force)
-            if number > 1 and not (size[0] < before[0] or size[1] < before[1]):  # torque, then force, come first
+            falls = size[0] < before[0] or size[1] < before[1]  # torque, then force, come first
+            if size in seen or (number > 1 and not falls):  # rounding may go round in a circle
                 break
             before = size
+            seen.add(size)
         reactions = {name: self._reaction(pin) for pin, name in {"O2": "F12", "B": "F43", "O4": "F14"}.items()}
         return {**reactions, "F32": closing, "torque": torque}
 
