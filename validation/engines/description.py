@@ -105,16 +105,6 @@ def parts(linkage: FourBar) -> list[Part]:
     return found
 
 
-def applied(load: Any, part: Part) -> tuple[tuple[float, float], tuple[float, float], float]:
-    """Of a load: a point of its bar, the force there, and a couple, for elements that keep the point in the bar."""
-    f, (x, y) = components(*(load.force or (0.0, 0.0))), part.centre
-    at_x, at_y = components(*load.at)
-    if load.frame == "bar":
-        return (x + at_x, y + at_y), f, load.moment
-    # arm and force keep their directions, and with them their moment about the mass centre
-    return (x, y), f, load.moment + (at_x * f[1] - at_y * f[0])
-
-
 def place(point: Any, ground_angle: float) -> tuple[float, float]:
     """An end of a spring along and across its bar's line from the first pin, on the ground in world axes, m."""
     at = components(point.distance, point.angle)
@@ -129,6 +119,8 @@ def speeds(at: Command) -> tuple[Array, Array]:
     return omega, alpha
 
 
-def unknown_effect(scene: Scene, table: Container[str], sentence: str = "the effect {!r} has no model here") -> str:
+def unknown_effect(scene: Scene, table: Container[str]) -> str:
     """The reason to refuse a scene with an effect that a table has no row for; empty where there is none."""
-    return next((sentence.format(effect.key) for effect in scene.effects if effect.key not in table), "")
+    return next(
+        (f"the effect {effect.key!r} has no model here" for effect in scene.effects if effect.key not in table), ""
+    )

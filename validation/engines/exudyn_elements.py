@@ -1,98 +1,82 @@
-"""Loads and effects of a scene as elements of Exudyn, one row of a table each."""
+"""Bodies of a linkage in Exudyn, and its own springs and dampers upon them.
 
-import sys
+They are what no other engine gives: the force laws of somebody else's program, to round-off. MuJoCo's own hold to
+the error of its steps; every other engine is given the wrenches of `effects.TERM_OF`, as Exudyn is of all the rest.
+"""
+
+import math
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-import numpy as np
 from exudyn.itemInterface import (
-    LoadForceVector,
-    LoadMassProportional,
-    LoadTorqueVector,
-    MarkerBodyMass,
+    MarkerBodyPosition,
+    MarkerBodyRigid,
+    MarkerNodeCoordinate,
+    NodePointGround,
+    NodeRigidBody2D,
     ObjectConnectorCoordinateSpringDamper,
-    ObjectConnectorCoordinateSpringDamperExt,
     ObjectConnectorSpringDamper,
     ObjectConnectorTorsionalSpringDamper,
-    ObjectGenericODE2,
+    ObjectGround,
+    ObjectRigidBody2D,
 )
 
-from fourbar.linkage import MOVING_BARS
-from validation.engines.description import PINS, applied, field, place
-from validation.engines.effects import look_up
-
-if TYPE_CHECKING:
-    from validation.engines.exudyn import ExudynBars
-
-SIGN_ZONE = sys.float_info.min
-"""rad/s; the friction law of `CoordinateSpringDamperExt` is proportional to slower slips, and a sign beyond."""
+from fourbar.linkage import FourBar
+from validation.engines.description import PINS, about_first_pin, parts, place
 
 
-def _load(load: Any, bars: "ExudynBars") -> None:
-    """`LoadForceVector`, fixed in the bar or in world axes, and `LoadTorqueVector`."""
-    point, force, couple = applied(load, bars.part[load.bar])
-    marker = bars.frame_marker(load.bar, 0.0, *point)
-    push, twist = np.array([*force, 0.0]), np.array([0.0, 0.0, couple])
-    acting = {
-        bars.mbs.AddLoad(LoadForceVector(markerNumber=marker, loadVector=push, bodyFixed=load.frame == "bar")): push,
-        bars.mbs.AddLoad(LoadTorqueVector(markerNumber=marker, loadVector=twist)): twist,
-    }
-    if load.table is not None:
+class Bodies:
+    """The ground and a body of each bar, with the coordinates of its first pin and its direction."""
 
-        def follow(theta_2: float) -> None:
-            for number, vector in acting.items():
-                bars.mbs.SetLoadParameter(number, "loadVector", look_up(load.table, theta_2) * vector)
+    def __init__(self, mbs: Any, linkage: FourBar) -> None:
+        self.mbs, self.ground_angle = mbs, linkage.ground_angle
+        self.node: dict[int, Any] = {1: mbs.AddNode(NodePointGround())}
+        self.body: dict[int, Any] = {1: mbs.AddObject(ObjectGround())}
+        for part in parts(linkage):
+            self.node[part.bar] = node = mbs.AddNode(NodeRigidBody2D())
+            inertia = about_first_pin(linkage.bar(part.bar))
+            body = ObjectRigidBody2D(mass=part.mass, inertia=inertia, centerOfMass=part.centre, nodeNumber=node)
+            self.body[part.bar] = mbs.AddObject(body)
 
-        bars.tables.append(follow)
+    def point(self, bar: int, x: float = 0.0, y: float = 0.0) -> Any:
+        """A marker of a point of a bar, along and across its line from its first pin; of the ground in world axes."""
+        return self.mbs.AddMarker(MarkerBodyPosition(bodyNumber=self.body[bar], localPosition=[x, y, 0.0]))
+
+    def direction(self, bar: int) -> Any:
+        """A marker of the direction of a bar as a coordinate; of the ground a zero."""
+        return self.mbs.AddMarker(MarkerNodeCoordinate(nodeNumber=self.node[bar], coordinate=0 if bar == 1 else 2))
+
+    def axes(self, bar: int, turn: float = 0.0) -> Any:
+        """A marker of axes fixed in a bar at its first pin, turned by an angle from its line."""
+        cos, sin = math.cos(turn), math.sin(turn)
+        frame = [[cos, -sin, 0.0, 0.0], [sin, cos, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]]
+        return self.mbs.AddMarker(MarkerBodyRigid(bodyNumber=self.body[bar], localHT=frame))
 
 
-def _gravity(effect: Any, bars: "ExudynBars") -> None:
-    """`LoadMassProportional` on each body."""
-    for bar in MOVING_BARS:
-        marker = bars.mbs.AddMarker(MarkerBodyMass(bodyNumber=bars.body[bar]))
-        bars.mbs.AddLoad(LoadMassProportional(markerNumber=marker, loadVector=[*field(effect), 0.0]))
-
-
-def _between(pin: str, bars: "ExudynBars") -> list[Any]:
-    return [bars.rotation_marker(bar) for bar in PINS[pin]]
-
-
-def _viscous(effect: Any, bars: "ExudynBars") -> None:
+def _viscous(effect: Any, bodies: Bodies) -> None:
     """`CoordinateSpringDamper` between the two directions."""
     for pin, damping in effect.coefficients:
-        markers = _between(pin, bars)
-        bars.mbs.AddObject(ObjectConnectorCoordinateSpringDamper(markerNumbers=markers, damping=damping))
+        markers = [bodies.direction(bar) for bar in PINS[pin]]
+        bodies.mbs.AddObject(ObjectConnectorCoordinateSpringDamper(markerNumbers=markers, damping=damping))
 
 
-def _friction(effect: Any, bars: "ExudynBars") -> None:
-    """`CoordinateSpringDamperExt` between the two directions."""
-    for pin, torque in effect.torques:
-        bars.mbs.AddObject(
-            ObjectConnectorCoordinateSpringDamperExt(
-                markerNumbers=_between(pin, bars), dynamicFrictionForce=torque, frictionProportionalZone=SIGN_ZONE
-            )
-        )
-
-
-def _torsion(effect: Any, bars: "ExudynBars") -> None:
+def _torsion(effect: Any, bodies: Bodies) -> None:
     """`TorsionalSpringDamper`, which measures within half a turn of rest between axes that coincide there."""
     for pin, stiffness, rest, preload in effect.springs:
         one, other = PINS[pin]
-        line = bars.ground_angle if one == 1 else 0.0
-        markers = [bars.frame_marker(one, line + rest), bars.frame_marker(other)]
-        bars.mbs.AddObject(
-            ObjectConnectorTorsionalSpringDamper(markerNumbers=markers, stiffness=stiffness, torque=preload)
-        )
+        line = bodies.ground_angle if one == 1 else 0.0
+        markers = [bodies.axes(one, line + rest), bodies.axes(other)]
+        spring = ObjectConnectorTorsionalSpringDamper(markerNumbers=markers, stiffness=stiffness, torque=preload)
+        bodies.mbs.AddObject(spring)
 
 
-def _springs(effect: Any, bars: "ExudynBars") -> None:
+def _springs(effect: Any, bodies: Bodies) -> None:
     """`SpringDamper` between two points."""
     for spring in effect.springs:
         ends = (spring.start, spring.end)
-        markers = [bars.point_marker(point.bar, *place(point, bars.ground_angle)) for point in ends]
-        bars.mbs.AddObject(
+        bodies.mbs.AddObject(
             ObjectConnectorSpringDamper(
-                markerNumbers=markers,
+                markerNumbers=[bodies.point(point.bar, *place(point, bodies.ground_angle)) for point in ends],
                 referenceLength=spring.length,
                 stiffness=spring.stiffness,
                 force=spring.preload,
@@ -100,20 +84,5 @@ def _springs(effect: Any, bars: "ExudynBars") -> None:
         )
 
 
-def _flywheel(effect: Any, bars: "ExudynBars") -> None:
-    """`ObjectGenericODE2` whose mass matrix turns with the bar's node."""
-    bars.mbs.AddObject(
-        ObjectGenericODE2(nodeNumbers=[bars.node[effect.bar]], massMatrix=np.diag([0.0, 0.0, effect.inertia]))
-    )
-
-
-ELEMENT_OF: dict[str, Callable[[Any, "ExudynBars"], None]] = {
-    "gravity": _gravity,
-    "viscous": _viscous,
-    "friction": _friction,
-    "torsion": _torsion,
-    "springs": _springs,
-    "flywheel": _flywheel,
-    "load": _load,
-}
-"""By the key of an effect; friction in proportion to a pin's load has no element in the plane."""
+ELEMENT_OF: dict[str, Callable[[Any, Bodies], None]] = {"viscous": _viscous, "torsion": _torsion, "springs": _springs}
+"""By the key of an effect."""

@@ -15,7 +15,7 @@ from fourbar.scene import Command, Scene
 from validation.compare.answer import Answer, Array
 from validation.engines.description import SHARED, speeds
 from validation.engines.free_body_closure import LONGEST_STEP, NEWTON_STEPS, STARTS
-from validation.engines.tree import Assembled, Bars, Values
+from validation.engines.loaded import Assembled, Bars, Values
 
 START_ANGLES = np.radians(STARTS).tolist()
 SHORTEST_STEP = 2.0**-40

@@ -1,12 +1,11 @@
 """OpenSim (Simbody): bars 2 and 4 on the ground, bar 3 on bar 4, closed at pin A by its own constraint and solve.
 
 Coordinates are the direction of bar 2, that of bar 4, and that of bar 3 against bar 4. The closing force, the joint
-reactions, the accelerations and the torque that moves bar 2 as commanded come from Simbody's constrained dynamics;
-loads and effects are OpenSim's own elements.
+reactions, the accelerations and the torque that moves bar 2 as commanded come from Simbody's constrained dynamics.
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Iterable, Sequence
 from functools import partial
 from typing import Any
 
@@ -18,10 +17,12 @@ from fourbar.linkage import MOVING_BARS
 from fourbar.scene import Scene
 from validation.compare.answer import Array
 from validation.engines.description import ON_BARS, POINTS, about_first_pin, parts, unknown_effect, within_half_a_turn
+from validation.engines.effects import TERM_OF, acting
+from validation.engines.loaded import Loaded, Values
 from validation.engines.loop import Exact
-from validation.engines.opensim_elements import ELEMENT_OF, ZERO, constants, vec, vector
-from validation.engines.tree import Bars, Values
 
+ZERO = (0.0, 0.0, 0.0)
+"""Nothing along three axes."""
 PER_COORDINATE = {2: np.array([1.0, 0.0, 0.0]), 3: np.array([0.0, 1.0, 1.0]), 4: np.array([0.0, 1.0, 0.0])}
 """Derivative of each bar's direction by the coordinates."""
 PASSES = 50
@@ -34,7 +35,7 @@ TIME_IS_ALPHA = (1.0 / 6.0, 0.0, 0.0, 0.0)
 
 def refusal(scene: Scene) -> str:
     """The declared limit that a scene meets, or nothing."""
-    if reason := unknown_effect(scene, ELEMENT_OF, "OpenSim has no element for the effect {!r}"):
+    if reason := unknown_effect(scene, TERM_OF):
         return reason
     for number in MOVING_BARS:
         if scene.linkage.bar(number).mass == 0.0:
@@ -42,13 +43,13 @@ def refusal(scene: Scene) -> str:
     return "" if about_first_pin(scene.linkage.input) else "bar 2 has no inertia about O2; Simbody divides by it"
 
 
-class OpenSimBars(Bars):
+class OpenSimBars(Loaded):
     """The bars, built from the description."""
 
     own = (
         "constraint equations with the loop cut at A, joint reactions, closing force and torque by Simbody's "
-        "constrained dynamics, every load and effect by an element of its own (dry friction: its actuator against its "
-        "own slip); Newton's method on its gap, and the linear solve for speeds and accelerations, are the harness's"
+        "constrained dynamics, effects from its own state; Newton's method on its gap, and the linear solve for speeds "
+        "and accelerations, are the harness's"
     )
 
     def __init__(self, scene: Scene) -> None:
@@ -57,9 +58,9 @@ class OpenSimBars(Bars):
         osim.Logger.setLevelString("Off")
         osim.Logger.removeFileSink()
         linkage = scene.linkage
-        self.ground_angle = linkage.ground_angle
         self.model = model = osim.Model()
-        model.setGravity(vec())
+        self.ready(scene, acting(scene, self))
+        model.setGravity(vec(*self.field))
         self.body = {1: model.getGround()}
         self.part = {part.bar: part for part in parts(linkage)}
         for bar, part in self.part.items():
@@ -80,16 +81,8 @@ class OpenSimBars(Bars):
         coordinate = self.joint["O2"].updCoordinate()
         coordinate.setPrescribedFunction(prescribed)
         coordinate.setDefaultIsPrescribed(True)
-        self.before_move: list[Callable[[], None]] = []
-        self.actuators: list[Any] = []
-        self.drive_bar = scene.drive_bar
-        self.motor = self.torque_between(1, scene.drive_bar)
-        self.at_a = [function for bar in (2, 3) for function in self._force_at_a(bar)]
-        for term in (*scene.loads, *scene.effects):
-            ELEMENT_OF[term.key](term, self)
+        self.applied = {bar: self._at_first_pin(bar) for bar in MOVING_BARS}
         self.state = model.initSystem()
-        for actuator in self.actuators:
-            actuator.overrideActuation(self.state, True)
         self.pin_a.setIsEnforced(self.state, True)
         self.matter = model.getMatterSubsystem()
         self.least_conditioned = 1.0
@@ -109,22 +102,16 @@ class OpenSimBars(Bars):
         self.model.addJoint(joint)
         return joint
 
-    def _force_at_a(self, bar: int) -> list[Any]:
-        """The two components of a force on a bar at pin A, to be set at each position."""
-        element = osim.PrescribedForce(f"closing{bar}", self.body[bar])
+    def _at_first_pin(self, bar: int) -> list[Any]:
+        """The components (x, y, moment) of a wrench on a bar at its first pin, to be set at each position."""
+        element = osim.PrescribedForce(f"wrench{bar}", self.body[bar])
         element.setForceIsInGlobalFrame(True)
-        element.setPointFunctions(*constants(self.length[2] if bar == 2 else 0.0, 0.0, 0.0))
-        element.setForceFunctions(*constants(*ZERO))
+        element.setPointFunctions(*_constants())
+        element.setForceFunctions(*_constants())
+        element.setTorqueFunctions(*_constants())
         self.model.addForce(element)
-        return [osim.Constant.safeDownCast(element.updForceFunctions().get(axis)) for axis in (0, 1)]
-
-    def torque_between(self, one: int, other: int) -> Any:
-        """An actuator of a couple on a bar, its opposite on another, of a value given at each position."""
-        actuator = osim.TorqueActuator(self.body[other], self.body[one], vec(0.0, 0.0, 1.0), True)
-        actuator.setName(f"couple{len(self.actuators)}")
-        self.model.addForce(actuator)
-        self.actuators.append(actuator)
-        return actuator
+        force, torque = element.updForceFunctions(), element.updTorqueFunctions()
+        return [osim.Constant.safeDownCast(x) for x in (force.get(0), force.get(1), torque.get(2))]
 
     def place(self, q: Sequence[float]) -> None:
         """Angles of the bars as given, at rest: Simbody forms its matrices by differences from the present motion."""
@@ -135,13 +122,14 @@ class OpenSimBars(Bars):
         self.state.setQ(vector((theta_2, theta_4, theta_2 + of_3_to_2 - theta_4)))
         self.model.realizePosition(self.state)
 
-    def _station(self, name: str) -> Array:
+    def point(self, name: str) -> Array:
+        """A station of a body."""
         bar, at = self.local[name]
         return np.array(self.body[bar].findStationLocationInGround(self.state, vec(*at)).to_numpy()[:2])
 
     def gap(self) -> tuple[float, float]:
         """A on bar 2 minus A on bar 3, which opens as B would."""
-        x, y = (self._station("end2") - self._station("foot3")).tolist()
+        x, y = (self.point("end2") - self.point("foot3")).tolist()
         return x, y
 
     def jacobian(self) -> Array:
@@ -154,16 +142,14 @@ class OpenSimBars(Bars):
         self.matter.calcStationJacobian(self.state, self.body[bar].getMobilizedBodyIndex(), vec(*at), matrix)
         return np.array(matrix.to_numpy())[:2]
 
-    def angle(self, bar: int) -> float:
-        """From the rotation of its body; the ground's line as described."""
-        if bar == 1:
-            return self.ground_angle
-        rotation = self.body[bar].getTransformInGround(self.state).R()
-        return math.atan2(rotation.get(1, 0), rotation.get(0, 0))
+    def rotation(self, bar: int) -> Array:
+        """That of the body."""
+        found = self.body[bar].getTransformInGround(self.state).R()
+        return np.array([[found.get(i, j) for j in (0, 1)] for i in (0, 1)])
 
     def positions(self) -> dict[str, Array]:
         """Points of the bars."""
-        return {name: self._station(point) for name, point in POINTS.items()}
+        return {name: self.point(point) for name, point in POINTS.items()}
 
     def move(self, omega_2: float, alpha_2: float) -> Values:
         """Speeds and accelerations, pin forces and torque; nothing where a toggle leaves them 0/0."""
@@ -171,11 +157,10 @@ class OpenSimBars(Bars):
             turns, accelerations = self._set_motion(omega_2, alpha_2)
         except np.linalg.LinAlgError:
             return {}
-        for act in self.before_move:
-            act()
+        self.a = accelerations
         leverage = float(PER_COORDINATE[self.drive_bar] @ turns)
-        forces = {} if leverage == 0.0 else self._forces(leverage)  # no torque on that bar moves bar 2
-        return self._motion(accelerations) | forces
+        # without leverage no torque on that bar moves bar 2
+        return self._motion() | ({} if leverage == 0.0 else self.settled(lambda: self._forces(leverage)))
 
     def _set_motion(self, omega_2: float, alpha_2: float) -> tuple[Array, Array]:
         """Turns of the coordinates per turn of bar 2, and their accelerations, from its constraint equations."""
@@ -191,36 +176,42 @@ class OpenSimBars(Bars):
         self.least_conditioned = min(self.least_conditioned, float(sizes[-1] / sizes[0]))
         return turns, np.linalg.solve(equations, -np.array(bias.to_numpy())[:3])
 
-    def _motion(self, accelerations: Array) -> Values:
+    def _motion(self) -> Values:
         values: Values = {}
         for bar in (3, 4):
-            values[f"omega_{bar}"] = self.velocity(bar)
-            values[f"alpha_{bar}"] = float(PER_COORDINATE[bar] @ accelerations)
+            values[f"omega_{bar}"], values[f"alpha_{bar}"] = self.velocity(bar), self.alpha(bar)
         for name, point in ON_BARS.items():
             bar, at = self.local[point]
             drift = self.matter.calcBiasForStationJacobian(self.state, self.body[bar].getMobilizedBodyIndex(), vec(*at))
-            values[f"a_{name}"] = self._station_jacobian(point) @ accelerations + np.array(drift.to_numpy()[:2])
+            values[f"a_{name}"] = self._station_jacobian(point) @ self.a + np.array(drift.to_numpy()[:2])
         return values
 
-    def _forces(self, leverage: float) -> Values:
+    def _forces(self, leverage: float) -> dict[str, Any]:
         """Joint reactions, closing force and torque of its constrained dynamics.
 
         Simbody holds bar 2 to its motion by a couple: over the leverage it is a torque of the drive. What it finds is
         given back as forces and found anew, until its multipliers hold nothing but rounding.
         """
-        torque, closing, before = 0.0, np.zeros(2), (math.inf, math.inf)
+        self.act()
+        pin_a, torque, closing, before = self.point("end2"), 0.0, np.zeros(2), (math.inf, math.inf)
+        seen: set[tuple[float, float]] = set()
         for number in range(PASSES):
-            self.motor.setOverrideActuation(self.state, torque)
-            for function, value in zip(self.at_a, (*closing, *-closing), strict=True):
-                function.setValue(float(value))
+            for bar, wrench in self.wrenches.items():
+                for function, value in zip(self.applied[bar], wrench, strict=True):
+                    function.setValue(value)
             self.state.setTime(self.state.getTime())  # Simbody computes again what depends on it
             self.model.realizeAcceleration(self.state)
             couple, force = self._couple_on_2(), self._closing_force()
             torque, closing = torque + couple / leverage, closing + force
+            self.twist(self.drive_bar, couple / leverage)
+            self.push(2, force, pin_a)
+            self.push(3, -force, pin_a)
             size = abs(couple), math.hypot(*force)
-            if number > 1 and not (size[0] < before[0] or size[1] < before[1]):  # torque, then force, come first
+            falls = size[0] < before[0] or size[1] < before[1]  # torque, then force, come first
+            if size in seen or (number > 1 and not falls):  # rounding may go round in a circle
                 break
             before = size
+            seen.add(size)
         reactions = {name: self._reaction(pin) for pin, name in {"O2": "F12", "B": "F43", "O4": "F14"}.items()}
         return {**reactions, "F32": closing, "torque": torque}
 
@@ -231,8 +222,12 @@ class OpenSimBars(Bars):
         return np.array(matrix.to_numpy())[:3]
 
     def velocity(self, bar: int) -> float:
-        """Spin of a body; the ground has none."""
+        """Of a body; the ground has none."""
         return 0.0 if bar == 1 else float(self.body[bar].getAngularVelocityInGround(self.state).get(2))
+
+    def alpha(self, bar: int) -> float:
+        """From the accelerations of the coordinates."""
+        return float(PER_COORDINATE[bar] @ self.a)
 
     def _reaction(self, pin: str) -> Array:
         return np.array(self.joint[pin].calcReactionOnChildExpressedInGround(self.state).get(1).to_numpy()[:2])
@@ -250,3 +245,22 @@ class OpenSimBars(Bars):
 
 
 OpenSimConstraints = partial(Exact, "opensim-constraints", OpenSimBars)
+
+
+def vec(x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Any:
+    """Three components."""
+    return osim.Vec3(float(x), float(y), float(z))
+
+
+def vector(values: Iterable[float]) -> Any:
+    """A vector of Simbody."""
+    numbers = [float(value) for value in values]
+    made = osim.Vector(len(numbers), 0.0)
+    for index, value in enumerate(numbers):
+        made.set(index, value)
+    return made
+
+
+def _constants() -> list[Any]:
+    """Three functions of time that are zero, and may be given another value later."""
+    return [osim.Constant(value) for value in ZERO]

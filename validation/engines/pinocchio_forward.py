@@ -13,6 +13,7 @@ from fourbar.errors import LimitError
 from fourbar.mjcf import Settings, flywheel, run_through
 from fourbar.scene import Command, Scene, command
 from validation.compare.answer import Array, Released
+from validation.engines.loaded import no_wrenches
 from validation.engines.loop import LimitWatch, Position, Trial, as_made, blank
 from validation.engines.pinocchio import PinocchioTree
 from validation.engines.tree import closed, multipliers
@@ -103,7 +104,7 @@ class PinocchioForward:
             # what acts, as generalised forces: the difference it makes to inverse dynamics
             tree.moving(v, np.zeros(3))
             acted = tree.torques()
-            tau = tau + tree.needed(tree.field, {bar: [0.0, 0.0, 0.0] for bar in tree.wrenches}) - acted
+            tau = tau + tree.needed(tree.field, no_wrenches()) - acted
         return np.array(self.loop.acceleration(q, v, tau))
 
     def forward(self) -> Trial:

@@ -7,6 +7,7 @@ from typing import Any
 import exudyn as exu
 import numpy as np
 
+from fourbar.errors import LimitError
 from fourbar.linkage import PIN_FORCE
 from fourbar.scene import Scene
 from validation.engines.exudyn import JOINTS, SIZE, ExudynBars
@@ -25,6 +26,8 @@ def through(scene: Scene, steps: int, setting: str) -> Readings:
     """A turn in so many steps; multipliers, speeds and accelerations are all of the end of a step."""
     timestep, stops = turn(scene, steps)
     begin, bars = start(scene), ExudynBars(scene)
+    if bars.terms:
+        raise LimitError("Exudyn's own simulation has gravity, viscous pins and springs alone")
     mbs, state = bars.mbs, bars.state
     theta_2, omega_2 = begin.qpos[0], begin.qvel[0]
     bars.place(begin.qpos)

@@ -6,7 +6,8 @@ import mujoco
 import numpy as np
 
 from validation.compare.answer import Array
-from validation.engines.tree import Assembled, closed
+from validation.engines.loaded import Assembled
+from validation.engines.tree import closed
 
 CARRIED_BY = {"input": ("input",), "coupler": ("coupler", "input"), "output": ("output",)}
 """The bodies whose parent bears what acts on a body."""

@@ -18,9 +18,9 @@ from fourbar.mjcf.effects import unwound
 from fourbar.quantities import PIN_FORCES
 from fourbar.scene import Command, Scene
 from validation.compare.answer import Answer, Array
+from validation.engines.loaded import Values
 from validation.engines.loop import Angles, at_each
 from validation.engines.mujoco.closed_loop import O2, TURNED_BY, ClosedLoop, couple_for
-from validation.engines.tree import Values
 
 NAME = "mujoco-one-state"
 RUNGS = (0.9999, 0.9998, 0.9996, 0.9992)

@@ -18,13 +18,13 @@ from fourbar.scene.motion import Motion
 from validation.compare.answer import Answer
 from validation.engines.description import speeds
 from validation.engines.limits import NEAREST_TOGGLE, least_sine, too_fast_or_loaded
+from validation.engines.loaded import Values
 from validation.engines.loop import MADE, Position, as_made, blank
 from validation.engines.mujoco.called_back import ActuatorForce, at_full_size, of_loads, receiving, supplying, within
 from validation.engines.mujoco.closed_loop import O2, O4, A, ClosedLoop
 from validation.engines.mujoco.motions import Lawful, Passage, Steady, extremes, order_in_time
 from validation.engines.mujoco.runner import LIGHT_FLYWHEEL, Run, assembled, stretches
 from validation.engines.mujoco.watch import Watch, alarms
-from validation.engines.tree import Values
 
 SHARED = (
     "lengths, masses, inertias, centres, loads and effects as MJCF text; tables of loads; omega_2, alpha_2 or the "

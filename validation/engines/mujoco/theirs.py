@@ -20,6 +20,7 @@ from fourbar.mjcf import flywheel, mjcf, run_through
 from fourbar.quantities import UNKNOWNS
 from fourbar.scene import Command, Scene, command
 from validation.compare.answer import Answer, Array
+from validation.engines.loaded import Assembled, Values
 from validation.engines.loop import MADE, Angles, Position, as_made, at_each, blank
 from validation.engines.mujoco.anatomy import Anatomy
 from validation.engines.mujoco.attached import Described, Value
@@ -29,7 +30,7 @@ from validation.engines.mujoco.guess import anatomy_of
 from validation.engines.mujoco.mend import mended
 from validation.engines.mujoco.motions import order_in_time
 from validation.engines.mujoco.runner import Stepper, assembled, stretches
-from validation.engines.tree import Assembled, Values, closed
+from validation.engines.tree import closed
 
 ONE_STATE, THROUGH_TIME = "mjcf-one-state", "mjcf-simulated"
 POSITIONS = 37
