@@ -83,7 +83,7 @@ def test_a_study_has_them_too_on_any_number_of_threads(monkeypatch: pytest.Monke
 def test_error_bars_keep_their_promise(monkeypatch: pytest.MonkeyPatch) -> None:
     quick = functools.partial(solve, compiled=True)
     monkeypatch.setattr("validation.stress.forward_error.stability.solve", quick)
-    for family in ("random", "change_point"):
+    for family in ("random", "change_point", "tables"):
         tally = run(family, range(20))
         assert all(ratio <= 1.0 for ratio, _ in tally.worst.values())
         assert all(ratio <= TOO_SMALL for ratio in tally.too_small.values())

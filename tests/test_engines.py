@@ -6,14 +6,15 @@ from dataclasses import dataclass, replace
 from functools import partial
 from importlib import import_module
 from importlib.util import find_spec
+from pkgutil import resolve_name
 from typing import Any, ClassVar
 
 import numpy as np
 import pytest
 
-from fourbar.effects import Effect, Friction, Gravity, Load, Viscous
+from fourbar.effects import Effect, Friction, Gravity, Load, PinFriction, Viscous
 from fourbar.errors import InputError
-from fourbar.linkage import Bar, FourBar
+from fourbar.linkage import Bar, FourBar, uniform
 from fourbar.scene import Command, Scene, command
 from fourbar.scene.motion import Motion
 from fourbar.solve import solve
@@ -413,3 +414,21 @@ def test_a_scene_before_leaves_nothing_behind() -> None:
     kept, fresh = (each.answer(plain, command(plain)).quantities for each in (engine, MujocoInverse()))
     for name, values in fresh.items():
         np.testing.assert_array_equal(kept[name], values, err_msg=name)
+
+
+@pytest.mark.parametrize(
+    ("drive", "mu", "r", "theta_2"),
+    [(4, 0.3, 0.1, 1.0891061452513966), (4, 0.5, 0.05, 1.0198324022346368), (3, 0.5, 0.05, 5.106983240223463)],
+)
+def test_near_a_jam_an_engine_finds_the_one_solution_that_there_is(
+    drive: int, mu: float, r: float, theta_2: float
+) -> None:
+    link, motion = uniform(0.3, 0.1, 0.25, 0.22), Motion(np.array([theta_2]), 3.0, 2.0)
+    for arms, jams in ((r, False), (50.0, True)):
+        friction = PinFriction.at(**dict.fromkeys(("A", "B", "O4"), (mu, arms)))
+        whole = Scene(link, motion, drive, (), (Gravity(), friction))
+        names = ("validation.engines.pinocchio:PinocchioInverse", "validation.engines.free_body:FreeBody")
+        answers = [resolve_name(name)().answer(whole, command(whole)) for name in names]
+        engine, bodies = (answer.quantities["torque"][0] for answer in answers)
+        assert math.isnan(engine) is math.isnan(bodies) is jams
+        assert jams or abs(engine - bodies) <= 1e-9 * abs(bodies)  # of some 1e-12 that rounding leaves near a jam

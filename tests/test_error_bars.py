@@ -4,13 +4,14 @@ import numpy as np
 import pytest
 
 import fourbar
-from fourbar.effects import Gravity, Load, Point, Spring, Springs, Torsion
+from fourbar.effects import Gravity, Load, Point, Spring, Springs, Table, Torsion
 from fourbar.linkage import Bar, FourBar
 from fourbar.quantities import PIN_FORCES
 from fourbar.scene import Scene, command
 from fourbar.scene.motion import Motion
 from validation.compare.error import magnitude
 from validation.engines.exact import BallArithmetic
+from validation.run import printed
 
 TURNS = 2000.0 * np.pi
 
@@ -64,3 +65,28 @@ def test_error_bars_are_of_the_size_of_the_error(name: str) -> None:
         assert (error <= 10.0 * width).all(), name
         assert (width >= half_a_digit).all()
         assert np.median(width / np.maximum(error, half_a_digit)) < 5.0
+
+
+def test_a_run_judges_the_bars_where_each_spring_is_nearest_to_its_rest(monkeypatch: pytest.MonkeyPatch) -> None:
+    ends = fourbar.Point("P", 1, (0.2, 0.6)), fourbar.Point("Q", 3, (0.15, -0.4))
+    spring = Spring(Point(1, 0.2, 0.6), Point(3, 0.15, -0.4), 80.0, 0.2)
+    table = Table((0.0, 1.0, 4.0, 6.2), (1.0, 1.0, -2.0, -2.0))  # 0 at 2 rad
+    scene = Scene(
+        FourBar(0.3, Bar(0.1), Bar(0.25), Bar(0.22)),
+        Motion(np.linspace(0.1, 6.0, 111), 3.0),
+        loads=(Load(4, moment=1.0, table=table),),
+        effects=(Springs((spring,)), Torsion.at(B=(0.5, 0.7, 0.0))),
+        points=ends,
+    )
+    whole = fourbar.solve(scene)
+    away = [
+        np.hypot(*(whole.points["Q"] - whole.points["P"]).T) - 0.2,
+        whole.theta_4 - whole.theta_3 - 0.7,
+        whole.theta_2 - 2.0,
+    ]
+    seen: list[np.ndarray] = []
+    true = fourbar.solve
+    monkeypatch.setattr(printed, "solve", lambda *given, at: seen.append(at.theta_2) or true(*given, at=at))
+    rows = list(printed._error_bars("", scene, command(scene), whole))
+    assert {row.verdict for row in rows} == {"agrees"}
+    assert {whole.theta_2[np.argmin(np.abs(gap))] for gap in away} <= set(seen[0])

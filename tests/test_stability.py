@@ -1,19 +1,17 @@
 """Forward errors and error bars on a small seeded set; the full one is `python -m validation stability`."""
 
+import math
+
 import numpy as np
 import pytest
 
 import fourbar
 from fourbar.show.tables import heading
 from validation.stress.forward_error.families import FAMILIES
-from validation.stress.forward_error.stability import TOO_SMALL, Tally, run
+from validation.stress.forward_error.stability import CHANCE, TOO_SMALL, USELESS, Tally, by_chance, run
 
 SAMPLES = 40
 """Per family: about 1 s each; the ten thousand of each are `python -m validation stability`."""
-USELESS = 0.01 * SAMPLES * 6
-"""Samples, one in a hundred of six families, in which an error bar may be more than a hundred times the error."""
-BY_CHANCE = 3.0
-"""Standard deviations (the root of the count) that so few samples may be off; the full set has to keep 1 %."""
 ONCE_BAD = {
     # seed, number, and what once was beyond its bound there
     "random": [
@@ -65,7 +63,22 @@ def test_every_output_is_within_what_the_inputs_last_digits_do(family: str, tall
 def test_error_bars_are_neither_too_small_nor_useless(tallies: dict[str, Tally]) -> None:
     for bar in ("torque_error", "force_error"):
         assert max(tally.too_small[bar] for tally in tallies.values()) <= TOO_SMALL
-        assert sum(tally.too_large[bar] for tally in tallies.values()) <= USELESS + BY_CHANCE * USELESS**0.5
+        assert by_chance(sum(tally.too_large[bar] for tally in tallies.values()), SAMPLES * len(tallies))
+
+
+def test_a_share_is_one_that_chance_explains() -> None:
+    # P(X >= k) of a binomial by its sum
+    def least_unexplained(samples: int) -> int:
+        beyond, k = 1.0, 0
+        while beyond >= CHANCE:
+            beyond -= math.comb(samples, k) * USELESS**k * (1.0 - USELESS) ** (samples - k)
+            k += 1
+        return k
+
+    for samples in (1, 60, 500):
+        k = least_unexplained(samples)
+        assert by_chance(k - 1, samples) and (k > samples or not by_chance(k, samples))
+    assert by_chance(100, 10_000) and not by_chance(160, 10_000)
 
 
 @pytest.mark.parametrize(("family", "seed", "number"), [(f, *sample) for f, bad in ONCE_BAD.items() for sample in bad])

@@ -23,6 +23,11 @@ def bodies(linkage: FourBar, effects: Iterable[Any] = ()) -> Bodies:
     return own[0], own[1], own[2]
 
 
+def as_it_is(number: Number, *, turned: bool = False) -> Number:
+    """The number itself."""
+    return number
+
+
 class Actions:
     """Sums over everything that acts on bars 2, 3, 4 apart from pins and inertia.
 
@@ -31,13 +36,15 @@ class Actions:
     state : positions and motion.
     bodies : of bars 2, 3, 4.
     side : the sense in which pins at rest are about to turn: +1 as theta_2 grows, -1 as it falls, 0 neither.
-    rounded : what a term becomes when it is rounded otherwise, for the error bars.
+    rounded : what a number becomes when it is rounded otherwise, for the error bars: of terms, and of what cancels in
+        them, as a distance against a spring's length.
     """
 
     def __init__(
         self, state: State, bodies: Bodies, side: int = 0, rounded: Callable[..., Number] | None = None
     ) -> None:
-        self.state, self.bodies, self.side, self.rounded = state, bodies, side, rounded
+        self.state, self.bodies, self.side = state, bodies, side
+        self.rounded = rounded or as_it_is
         self.forces: dict[int, Any] = {}
         """Resultants of the bars on which any acts, complex, N."""
         self.moments: dict[int, Any] = {}
@@ -53,19 +60,19 @@ class Actions:
         arm : from the bar's first pin to where it acts, complex, m, world axes.
         """
         if bar != 1:
-            force = force if self.rounded is None else self.rounded(force, turned=True)
+            force = self.rounded(force, turned=True)
             self.forces[bar] = self.forces[bar] + force if bar in self.forces else force
             self.moment(bar, cross(-force, arm))
 
     def moment(self, bar: int, moment: Number) -> None:
         """A pure couple on a bar, N m; on the ground it does nothing."""
         if bar != 1:
-            moment = self._rounded(moment)
+            moment = self.rounded(moment)
             self.moments[bar] = self.moments[bar] + moment if bar in self.moments else moment
 
     def couple(self, pin: str, couple: Number) -> None:
         """A couple on the second of the two bars that meet at a pin, and its opposite on the first, N m."""
-        couple = self._rounded(couple)
+        couple = self.rounded(couple)
         self.couples[pin] = self.couples[pin] + couple if pin in self.couples else couple
 
     def work(self) -> tuple[Number, Number]:
@@ -122,6 +129,3 @@ class Actions:
                 if i != 1:
                     M[i - 2] = M[i - 2] - couple
         return Wrenches(R[0], R[1], R[2], M[0], M[1], M[2], self.couples.get("B", 0.0))
-
-    def _rounded(self, term: Number) -> Number:
-        return term if self.rounded is None else self.rounded(term)

@@ -10,12 +10,13 @@ import numpy as np
 from fourbar.effects.actions import Actions
 from fourbar.effects.effect import Effect
 from fourbar.errors import InputError, expect
-from fourbar.formulas.arithmetic import anywhere, polar
+from fourbar.formulas.arithmetic import angle, anywhere, polar, two_sum
 from fourbar.formulas.motion import State
 from fourbar.linkage import FourBar, require, require_bar, require_numbers
-from fourbar.solution import Array
 
 TURN = 2.0 * math.pi
+BEYOND_TURN = 2.4492935982947064e-16
+"""2 pi less TURN, rad: what counts after many turns."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,20 +51,34 @@ class Table:
         object.__setattr__(self, "theta_2", angles)
         object.__setattr__(self, "factor", factors)
 
-    def at(self, theta_2: Any) -> Array:
+    def at(self, theta_2: Any) -> Any:
         """The factor; InputError for a position that the table does not cover."""
+        before, gained = self.from_point(theta_2)
+        return before + gained
+
+    def from_point(self, theta_2: Any) -> tuple[Any, Any]:
+        """The factor at the table's last point before an angle, and what it gains from there to the angle.
+
+        The difference is theta_2 less the point and whole turns, of which nothing is rounded but the result.
+        """
+        points, factors = np.array(self.theta_2), np.array(self.factor)
         first, last = self.theta_2[0], self.theta_2[-1]
-        angle = first + np.remainder(np.asarray(theta_2) - first, TURN)
-        beyond = angle > last + 1e-12 * TURN
+        place = first + np.remainder(angle(polar(1.0, theta_2)) - first, TURN)
+        beyond = place > last + 1e-12 * TURN
         if beyond.any():
             # a position just below the first angle has come round to a whole turn above it
-            round_ = beyond & (first + TURN - angle < 1e-12 * TURN)
+            round_ = beyond & (first + TURN - place < 1e-12 * TURN)
             if not (round_ == beyond).all():
                 raise InputError(
-                    "loads.table.theta_2", float(np.max(angle)), f"covers {first:g} to {last:g} rad; this lies outside"
+                    "loads.table.theta_2", float(np.max(place)), f"covers {first:g} to {last:g} rad; this lies outside"
                 )
-            angle = np.where(round_, first, angle)
-        return np.asarray(np.interp(angle, self.theta_2, self.factor))
+            place = np.where(round_, first, place)
+        k = np.clip(np.searchsorted(points, place, "right") - 1, 0, len(points) - 2)
+        away, lost = two_sum(theta_2, -points[k])
+        rest = np.fmod(away, TURN)
+        turns = np.rint((theta_2 - place) / TURN)
+        past = rest + (np.rint((away - rest) / TURN) - turns) * TURN + (lost - turns * BEYOND_TURN)
+        return factors[k], np.diff(factors)[k] * (past / np.diff(points)[k])
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,11 +120,14 @@ class Load(Effect):
 
     def act(self, actions: Actions, state: State) -> None:
         """F at its point, and the couple."""
-        factor = 1.0 if self.table is None else self.table.at(state.theta_2)
+        factor = 1.0
+        if self.table is not None:
+            before, gained = self.table.from_point(state.theta_2)
+            factor = before + actions.rounded(gained)
         if self.force is not None:
             force, arm = polar(*self.force), polar(*self.at)
             u = state.direction(self.bar)
-            to_G = actions.bodies[self.bar - 2].z * u
+            to_G = actions.rounded(actions.bodies[self.bar - 2].z * u)
             if self.frame == "bar":
                 force, arm = force * u, arm * u
             actions.force(self.bar, factor * force, to_G + arm)

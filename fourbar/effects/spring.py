@@ -94,8 +94,9 @@ class Springs(Effect):
     def act(self, actions: Actions, state: State) -> None:
         """At `start` the tension along the unit vector to `end`, at `end` its opposite."""
         for spring in self.springs:
-            across = _place(state, spring.end) - _place(state, spring.start)
-            force = _per_distance(spring, across) * across
+            start, end = (actions.rounded(_place(state, point)) for point in (spring.start, spring.end))
+            across = end - start
+            force = _per_distance(spring, across, actions) * across
             for point, sign in ((spring.start, 1.0), (spring.end, -1.0)):
                 actions.force(point.bar, sign * force, point.in_bar * state.direction(point.bar))
 
@@ -116,8 +117,10 @@ def _place(state: State, point: Point) -> Any:
     return state.point(point.bar, point.in_bar)
 
 
-def _per_distance(spring: Spring, across: Any) -> Any:
+def _per_distance(spring: Spring, across: Any, actions: Actions) -> Any:
     """Tension over distance, N/m."""
     if not anywhere(spring.slack != 0.0):
         return spring.stiffness
-    return spring.stiffness + spring.slack / np.abs(across)  # at a distance of 0 no number, which the status says
+    distance = actions.rounded(np.abs(across))
+    slack = spring.preload - actions.rounded(spring.stiffness * spring.length)
+    return spring.stiffness + slack / distance  # at a distance of 0 no number, which the status says

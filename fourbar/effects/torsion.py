@@ -57,8 +57,8 @@ class Torsion(Effect):
         """M on bar j = -(preload + k (theta_j - theta_i - rest)), its opposite on bar i."""
         for pin, k, rest, preload in self.springs:
             i, j = PINS[pin]
-            angle = np.angle(state.direction(j) * np.conj(state.direction(i)))
-            actions.couple(pin, -(preload + k * _wound(angle - rest)))
+            angle = actions.rounded(np.angle(state.direction(j) * np.conj(state.direction(i))))
+            actions.couple(pin, -(preload + k * _wound(actions.rounded(angle - rest))))
 
     def counted_from(self, start: State, branch: Number) -> "Torsion":
         """Whole turns counted where the motion begins."""
@@ -107,5 +107,5 @@ def _continuous(state: State, branch: Number) -> dict[int, Array]:
 
 
 def _wound(angle: Array | float) -> Array:
-    """The angle in [-pi, pi)."""
-    return np.remainder(np.asarray(angle) + np.pi, 2.0 * np.pi) - np.pi
+    """The angle in [-pi, pi], itself where it is there."""
+    return angle - math.tau * np.rint(angle / math.tau)

@@ -39,9 +39,15 @@ class Loads(NamedTuple):
     of_turning: Any = 0.0
     of_couple: Any = 0.0
 
-    def with_force(self, force: Any, at: Any, turns: bool) -> "Loads":
-        """One force more, with its arm from the mass centre, both complex and in the same frame."""
-        moment, size = cross(at, force), np.abs(force)
+    def with_force(self, force: Any, at: Any, turns: bool, factor: Any = 1.0, size: Any = 1.0) -> "Loads":
+        """One force more, times a factor, with its arm from the mass centre, both complex and in the same frame.
+
+        Parameters
+        ----------
+        size : of the terms of the factor.
+        """
+        force, size = factor * force, size * np.abs(force)
+        moment = cross(at, force)
         more = self._replace(
             couple=self.couple + moment, of_couple=self.of_couple + size * (np.abs(at.real) + np.abs(at.imag))
         )
@@ -49,9 +55,9 @@ class Loads(NamedTuple):
             return more._replace(turning=more.turning + force, of_turning=more.of_turning + size)
         return more._replace(world=more.world + force, of_world=more.of_world + size)
 
-    def with_couple(self, couple: Any) -> "Loads":
-        """One couple more."""
-        return self._replace(couple=self.couple + couple, of_couple=self.of_couple + np.abs(couple))
+    def with_couple(self, couple: Any, factor: Any, size: Any) -> "Loads":
+        """One couple more, likewise."""
+        return self._replace(couple=self.couple + factor * couple, of_couple=self.of_couple + size * np.abs(couple))
 
 
 def carries(case: Case) -> bool:
@@ -76,11 +82,12 @@ def numbers(case: Case, theta_2: Array, branch: Any, omega_2: Any, alpha_2: Any)
             for bar, body in zip(MOVING_BARS, case.bodies, strict=True):
                 loads[bar] = loads[bar].with_force(body.m * term.field, 0j, False)
         elif isinstance(term, Load):
-            factor = 1.0 if term.table is None else term.table.at(theta_2)
+            before, gained = (1.0, 0.0) if term.table is None else term.table.from_point(theta_2)
+            factor, size = before + gained, np.abs(before) + np.abs(gained)
             if term.force is not None:
-                force, at = factor * polar(*term.force), polar(*term.at)
-                loads[term.bar] = loads[term.bar].with_force(force, at, term.frame == "bar")
-            loads[term.bar] = loads[term.bar].with_couple(factor * term.moment)
+                force, at = polar(*term.force), polar(*term.at)
+                loads[term.bar] = loads[term.bar].with_force(force, at, term.frame == "bar", factor, size)
+            loads[term.bar] = loads[term.bar].with_couple(term.moment, factor, size)
     of_loads = [
         number
         for load in loads.values()

@@ -28,7 +28,7 @@ RULES: dict[Any, Rule] = {
     np.sin: lambda z, x: (np.cos(x),),
     np.cos: lambda z, x: (-np.sin(x),),
     np.arctan2: lambda z, y, x: (x / (x * x + y * y), -y / (x * x + y * y)),
-    np.remainder: lambda z, x, y: (1.0, 0.0),  # by a constant
+    **dict.fromkeys((np.remainder, np.fmod), lambda z, x, y: (1.0, 0.0)),  # by a constant
 }
 COMPLEMENT = {
     np.less: np.greater_equal,
@@ -36,7 +36,7 @@ COMPLEMENT = {
     np.greater: np.less_equal,
     np.greater_equal: np.less,
 }
-PIECEWISE = (np.sign, np.floor, np.frexp, np.isnan, np.isfinite, *COMPLEMENT)
+PIECEWISE = (np.sign, np.floor, np.rint, np.frexp, np.isnan, np.isfinite, *COMPLEMENT)
 """Functions of the values alone; of balls the comparisons, each decided where all that the balls hold agrees."""
 
 
@@ -206,18 +206,10 @@ def _angle(z: Any) -> Any:
     return np.arctan2(z.imag, z.real)
 
 
-def _interp(x: Any, xs: Any, ys: Any) -> Sloped:
-    """Of a table; at one of its points the slope that follows."""
-    xs, ys = np.asarray(xs), np.asarray(ys)
-    at = np.clip(np.searchsorted(xs, x.values, side="right") - 1, 0, len(xs) - 2)
-    rise = (np.diff(ys) / np.diff(xs))[at]
-    return Sloped(np.interp(x.values, xs, ys), rise * x.slopes)
-
-
 FUNCTIONS: dict[Any, Callable[..., Any]] = {
     np.where: _where,
     np.angle: _angle,
-    np.interp: _interp,
+    np.searchsorted: lambda points, x, side: np.searchsorted(points, x.values, side),
     np.any: lambda x: bool(x.differs(0.0).any()),
     np.shape: lambda x: x.shape,
     np.ndim: lambda x: 1,

@@ -12,7 +12,11 @@ from validation.compare.answer import Array
 from validation.engines.description import FORCE_AT, turned, turned_by
 
 PASSES = 1000
-"""Passes over pin loads and the friction they make; each lessens the error where the friction is unique."""
+"""Passes over pin loads and the friction they make; each lessens the error where the friction is far from a jam."""
+STAGES, STEPS = 16, 30
+"""Near a jam friction grows from none in so many stages, each by at most so many of Newton's steps."""
+NUDGE = 1e-6
+"""Of the greatest load: by how much each is changed for the slopes of a pass."""
 REPEATED = 2.0 * 2.0**-52
 """Change of a pin load, relative, that is rounding."""
 ROUNDED = 1e-11
@@ -136,7 +140,7 @@ class Loaded(Bars, Protocol):
             act()
 
     def settled(self, balanced: Callable[[], dict[str, Any]]) -> dict[str, Any]:
-        """Pin forces and torque that balance what acts, by name; nothing where no friction of the pins repeats.
+        """Pin forces and torque that balance what acts, by name; nothing where friction jams.
 
         Effects that depend on the load of a pin are given the loads of the pass before, until they repeat.
         """
@@ -153,7 +157,37 @@ class Loaded(Bars, Protocol):
                 break
             before, self.pin_loads = change, loads
             forces = balanced()
-        return {} if self.loaded else forces  # rather than those of some pass
+        return self._grown(balanced) if self.loaded else forces
+
+    def _grown(self, balanced: Callable[[], dict[str, Any]]) -> dict[str, Any]:
+        """The forces with friction grown from none, where passes run away; nothing where the growth ends in a jam.
+
+        By Newton's steps, the slopes from passes with each load changed a little.
+        """
+
+        def passed(loads: Array) -> tuple[dict[str, Any], Array]:
+            self.pin_loads = dict(zip(self.loaded, loads.tolist(), strict=True))
+            forces = balanced()
+            return forces, np.array([math.hypot(*forces[FORCE_AT[pin]]) for pin in self.loaded])
+
+        unit = np.eye(len(self.loaded))
+        forces, loads = passed(np.zeros(len(unit)))
+        for share in np.arange(1, STAGES + 1) / STAGES:
+            before = math.inf
+            for _ in range(STEPS):
+                forces, found = passed(share * loads)
+                most, change = float(found.max()), float(np.abs(found - loads).max())
+                if not most < DIVERGED or change <= REPEATED * most or before <= change <= ROUNDED * most:
+                    break
+                nudge, before = NUDGE * most, change
+                moved = [(passed(share * (loads + nudge * one))[1] - found) / nudge for one in unit]
+                matrix = unit - np.stack(moved, axis=1)
+                if np.linalg.det(matrix) <= 0.0:  # 1 without friction: beyond zero the growth has turned back
+                    return {}
+                loads = loads + np.linalg.solve(matrix, found - loads)
+            if not change <= ROUNDED * most or (loads < 0.0).any():
+                return {}
+        return forces
 
 
 def no_wrenches() -> dict[int, list[float]]:

@@ -1,11 +1,13 @@
 """What is printed and no engine answers: error bars, the residual of friction, the law of the motion, long sweeps."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.linkage import PIN_FORCE
+from fourbar.effects import Springs, Torsion
+from fourbar.linkage import MOVING_BARS, PIN_FORCE
 from fourbar.quantities import FORCES, OK, PIN_FORCES
 from fourbar.scene import Command, Scene
 from fourbar.scene.case import BLOCK
@@ -19,11 +21,14 @@ from validation.compare.reversals import reversing
 from validation.compare.rows import AGREES, FAILS, UNDECIDED, Row
 from validation.compare.scales import of_length, term_sizes, yardstick
 from validation.compare.tolerance import EPS, EQUIVALENCE, IDENTITY, NOTHING_TO_TELL, Array, K, condition_of
+from validation.engines.description import speeds
 from validation.engines.exact import BallArithmetic, unknown
+from validation.engines.free_body import move
+from validation.engines.free_body_effects import acting
 from validation.engines.witnesses import not_installed
 
 SAMPLE = 5
-"""Positions of a scene at which the error bars are held to the true error."""
+"""Positions of a scene at which the error bars are held to the true error, besides those nearest to a rest."""
 BARS = 10.0
 """Error bars: 2 in 100 million normal errors exceed ten of them."""
 ROUNDED_SOMEWHERE = 20
@@ -125,7 +130,8 @@ def _error_bars(name: str, scene: Scene, at: Command, solution: Solution) -> Ite
     usable = np.flatnonzero((solution.status_code == OK) & ~reversing(scene, solution, EQUIVALENCE.factor))
     if not len(usable):
         return
-    where = usable[np.unique(np.linspace(0, len(usable) - 1, SAMPLE).astype(int))]
+    spread = np.linspace(0, len(usable) - 1, SAMPLE).astype(int).tolist()
+    where = usable[np.unique([*spread, *(int(np.argmin(pull[usable])) for pull in _pulls(scene, at, solution))])]
     sampled = piece(at, where)
     exact, ours = BallArithmetic().answer(scene, sampled), solve(scene, "error", at=sampled)
     other = basis_of(scene, exact)
@@ -146,6 +152,20 @@ def _error_bars(name: str, scene: Scene, at: Command, solution: Solution) -> Ite
         yield Row(
             name, FORMULAS, "exact", bar, float(share[index]), 1.0, verdict, reason, place, float(condition[index])
         )
+
+
+def _pulls(scene: Scene, at: Command, solution: Solution) -> Iterator[Array]:
+    """What each spring, torsion spring and load over a table does, by the free bodies: (n,), N and N m together."""
+    assert solution.theta_3 is not None and solution.theta_4 is not None
+    motion = move(scene.linkage, at.theta_2, *speeds(at), solution.theta_3, solution.theta_4)
+    alone: list[Scene] = [replace(scene, loads=(load,), effects=()) for load in scene.loads if load.table is not None]
+    for effect in scene.effects:
+        if isinstance(effect, (Springs, Torsion)):
+            kind = type(effect)
+            alone += [replace(scene, loads=(), effects=(kind((one,)),)) for one in effect.springs]  # type: ignore[arg-type]
+    for one in alone:
+        wrenches = acting(one, motion)
+        yield sum(np.abs(wrenches.force[bar]) + np.abs(wrenches.moment[bar]) for bar in MOVING_BARS)  # type: ignore[misc]
 
 
 def _residual(name: str, scene: Scene, solution: Solution) -> Row:

@@ -6,8 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from fourbar.linkage import MOVING_BARS, Bar, FourBar
+from fourbar.effects import Load, Point, Spring, Springs, Table, Torsion
+from fourbar.linkage import MOVING_BARS, PINS, Bar, FourBar
 from fourbar.scene import Scene
+from fourbar.scene.point import Point as Marked
+from fourbar.solve import solve
 from validation.scenes.random import Ranges, decades, drawn, product, sometimes, uneven_lengths, uniform
 
 
@@ -109,6 +112,73 @@ def speeds(rng: np.random.Generator) -> Scene:
     return replace(scene, motion=replace(scene.motion, omega_2=omega, alpha_2=alpha))
 
 
+def off(rng: np.random.Generator) -> float:
+    """From what would be rest, relative: within 3e-2 to 1e-5, to either side."""
+    return float(rng.choice([-1.0, 1.0]) * 10.0 ** rng.uniform(-5.0, math.log10(3e-2)))
+
+
+def massless(rng: np.random.Generator) -> Scene:
+    """The random family's linkages under nothing at all: what is added alone makes the forces."""
+    scene = random(rng)
+    d, a, b, c = scene.linkage.lengths
+    return replace(scene, linkage=FourBar(d, Bar(a), Bar(b), Bar(c), scene.linkage.ground_angle), loads=(), effects=())
+
+
+def springs(rng: np.random.Generator) -> Scene:
+    """A spring whose points are nearly as far apart as where it pulls with nothing, its preload in the pull."""
+    scene = massless(rng)
+    one, other = (int(bar) for bar in rng.choice((1, *MOVING_BARS), 2, replace=False))
+    start, end = (Point(bar, *rng.uniform((0.0, -3.0), (1.0, 3.0)).tolist()) for bar in (one, other))
+    marked = replace(scene, points=(Marked("P", one, start[1:]), Marked("Q", other, end[1:])))
+    places = solve(marked, "position").points
+    distance = math.hypot(*(places["Q"] - places["P"])[0])
+    stiffness, preload = float(rng.uniform(10.0, 1000.0)), 0.0
+    if rng.random() < 0.5:
+        preload = float(rng.uniform(-0.5, 2.0)) * stiffness * distance
+    spring = Spring(start, end, stiffness, max(distance * (1.0 + off(rng)) + preload / stiffness, 0.0), preload)
+    return replace(scene, effects=(Springs((spring,)),))
+
+
+def torsion(rng: np.random.Generator) -> Scene:
+    """A torsion spring nearly where its couple is zero, its rest some turns away or none.
+
+    Not at O2: its angle, given in doubles, comes back from the directions to the last digit more often than not, and
+    an error that is zero by chance says nothing of the bar.
+    """
+    scene = massless(rng)
+    found, pin = solve(scene, "position"), str(rng.choice(["A", "B", "O4"]))
+    assert found.theta_3 is not None and found.theta_4 is not None
+    theta = (scene.linkage.ground_angle, found.theta_2[0], found.theta_3[0], found.theta_4[0])
+    first, second = PINS[pin]
+    stiffness, preload = float(rng.uniform(0.1, 10.0)), 0.0
+    if rng.random() < 0.5:
+        preload = float(rng.uniform(-2.0, 2.0)) * stiffness
+    turns = math.tau * float(rng.choice([0, 0, int(rng.integers(-100, 100))]))
+    rest = float(theta[second - 1] - theta[first - 1]) * (1.0 + off(rng)) + preload / stiffness + turns
+    return replace(scene, effects=(Torsion.at(**{pin: (stiffness, rest, preload)}),))
+
+
+def tables(rng: np.random.Generator) -> Scene:
+    """A load over a table, many turns from its angles or none, every other near where its factor is zero.
+
+    The ground is level: against another theta_2 loses digits of all directions after many turns.
+    """
+    scene = massless(rng)
+    linkage = scene.linkage
+    angle = float(np.asarray(scene.motion.theta_2)) - linkage.ground_angle
+    before, after = 10.0 ** rng.uniform(-3.0, 0.3, 2)
+    rise = float(rng.uniform(-2.0, 2.0))
+    first = -rise * before * ((1.0 + off(rng)) if rng.random() < 0.5 else float(rng.uniform(-2.0, 2.0)))
+    table = Table((angle - before, angle + after), (first, first + rise * (before + after)))
+    turns = int(rng.choice([0, 1, -1, int(10.0 ** rng.uniform(0.0, 9.0))]))
+    size, arm = float(rng.uniform(0.1, 10.0)), float(rng.uniform(0.0, 1.0))
+    turned = (float(x) for x in rng.uniform(-3.0, 3.0, 2))
+    frame, moment = str(rng.choice(["world", "bar"])), float(rng.choice([0.0, size]))
+    load = Load(int(rng.choice(MOVING_BARS)), (size, next(turned)), (arm, next(turned)), moment, frame, table)
+    motion = replace(scene.motion, theta_2=angle + math.tau * turns)
+    return replace(scene, linkage=replace(linkage, ground_angle=0.0), loads=(load,), motion=motion)
+
+
 FAMILIES: dict[str, Callable[[np.random.Generator], Scene]] = {
     "random": random,
     "limit": limit,
@@ -116,4 +186,7 @@ FAMILIES: dict[str, Callable[[np.random.Generator], Scene]] = {
     "ratios": ratios,
     "scales": scales,
     "speeds": speeds,
+    "springs": springs,
+    "torsion": torsion,
+    "tables": tables,
 }

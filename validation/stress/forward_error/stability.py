@@ -26,7 +26,10 @@ EPS = 2.0**-52
 FACTOR = 8.0
 """Of eps, as the contract states it."""
 TOO_SMALL, TOO_LARGE = 10.0, 100.0
-"""An error bar may be this much smaller (never) and this much larger (in 99 % of the samples) than the error."""
+"""An error bar may be this much smaller (never) and this much larger (in one of USELESS samples) than the error."""
+USELESS = 0.01
+CHANCE = 1e-6
+"""That so many samples or more are counted where the share is USELESS: rarer is no chance. Of 60 samples one is."""
 HALF_A_DIGIT = 2.0**-53
 """Of a result: an error below that is chance, for no double need be nearer to the truth. A bar is held to be too
 large against no less."""
@@ -72,9 +75,16 @@ class Tally:
     def held(self) -> bool:
         """Whether anything was compared, and error and error bars are as promised."""
         bars = all(ratio <= TOO_SMALL for ratio in self.too_small.values())
-        useful = all(count <= 0.01 * self.samples for count in self.too_large.values())
+        useful = all(by_chance(count, self.samples) for count in self.too_large.values())
         errors = bool(self.worst) and all(ratio <= 1.0 for ratio, _ in self.worst.values())
         return errors and bars and useful and not self.warned
+
+
+def by_chance(count: int, samples: int) -> bool:
+    """Whether a share of USELESS explains that so many samples or more are counted (binomial)."""
+    from scipy.stats import binom
+
+    return bool(binom.sf(count - 1, samples, USELESS) >= CHANCE)
 
 
 def components(name: str) -> list[tuple[str, Any]]:
