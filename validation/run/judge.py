@@ -27,7 +27,7 @@ from validation.compare.tolerance import EQUIVALENCE
 from validation.compare.withheld import OfSome, withheld
 from validation.engines.exact import sines
 from validation.engines.free_body import FreeBody, solutions
-from validation.engines.witnesses import WITNESSES, Witness, not_installed, predicting_from
+from validation.engines.witnesses import WITNESSES, Witness, answering_nearby, not_installed, predicting_from
 from validation.report.record import Record, Timing
 from validation.run.printed import piece, printed
 
@@ -200,7 +200,10 @@ def _judged(
         basis = _basis(scene, _Engines(scene, theirs).free_body())
         formulas, yardsticks = solve(scene, _stage(theirs), at=theirs), {}
     predicted = predicting_from(witness, scene, theirs, answer)
-    rows = compare(name, scene, answer, formulas, witness.tolerance, witness.expected, predicted, basis, yardsticks)
+    nearby = answering_nearby(witness, scene, theirs, formulas)
+    rows = compare(
+        name, scene, answer, formulas, witness.tolerance, witness.expected, predicted, basis, yardsticks, nearby
+    )
     if (ratio := answer.evidence.get("mass_ratio", 1.0)) > LIGHT:
         why = f"; of coupler and output one is {ratio:.1e} times lighter"
         rows = [replace(row, reason=row.reason + why) if row.failed else row for row in rows]
