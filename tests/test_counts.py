@@ -61,11 +61,11 @@ def test_a_quantity_that_every_row_calls_degraded_is_counted_and_named() -> None
     ]
     summary = summary_of(records)
     assert (summary.loose, summary.pairs) == (2, 5)
-    said = "2 of 5 quantities of a scene are at best"
+    stated = "2 of 5 quantities of a scene are at best"
     for form in (markdown(summary), page_of(summary, dict.fromkeys(scenes, 2))):
         text = html.unescape(form)
-        assert said in text and "torque of three (allowed 5.0e-01), F12 of one (allowed 2.0e-04)" in text
-    assert said not in markdown(summary_of(records[1:2]))
+        assert stated in text and "torque of three (allowed 5.0e-01), F12 of one (allowed 2.0e-04)" in text
+    assert stated not in markdown(summary_of(records[1:2]))
 
 
 IDENTITY = replace(ROW, engine="formulas", quantity="closure")

@@ -118,7 +118,7 @@ class _Comparison:
     numbers: int = 0
     decided: int = 0
     again: dict[str, Array] | None = None
-    """What `nearby` answered, once it was asked."""
+    """What `nearby` answered, once that was required."""
 
     def row(self, quantity: str, verdict: str, reason: str, **numbers: float) -> Row:
         """A row of this answer."""

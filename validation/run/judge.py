@@ -173,13 +173,14 @@ def _basis(scene: Scene, free_body: Answer | None) -> Solution | None:
         return None
 
 
-def _by_exact_means(scene: Scene, at: Command) -> tuple[OfSome | None, OfSome]:
+def _by_exact_means(scene: Scene, at: Command) -> tuple[OfSome | None, OfSome | None]:
     """The sine between bars 3 and 4 in many digits, and how many solutions friction has, at some positions."""
 
     unknown = at.remainder is not None or not_installed("flint")
+    loaded = any(effect.loaded_pins for effect in scene.effects)
     return (
         None if unknown else lambda where: sines(scene.linkage, piece(at, where)),
-        lambda where: solutions(scene, piece(at, where)),
+        (lambda where: solutions(scene, piece(at, where))) if loaded else None,
     )
 
 
