@@ -46,6 +46,28 @@ def rows(**counts: int) -> list[Row]:
     return [replace(ROW, verdict=names[name]) for name, many in counts.items() for _ in range(many)]
 
 
+def test_a_quantity_that_every_row_calls_degraded_is_counted_and_named() -> None:
+    def row(scene: str, engine: str, quantity: str, verdict: str, allowed: float) -> Row:
+        return replace(ROW, scene=scene, engine=engine, quantity=quantity, verdict=verdict, allowed=allowed)
+
+    scenes = {
+        "one": [("a", "F12", DEGRADED, 1e-3), ("b", "F12", DEGRADED, 2e-4), ("a", "F43", AGREES, 1e-14)],
+        "two": [("a", "F12", DEGRADED, 1.0), ("b", "F12", AGREES, 1e-14), ("b", "F43", FAILS, NAN)],
+        "three": [("a", "torque", DEGRADED, 0.5), ("b", "torque", REFUSES, NAN)],
+    }
+    records = [
+        replace(judged("", crank_rocker(), ()), name=name, rows=[row(name, *of) for of in many])
+        for name, many in scenes.items()
+    ]
+    summary = summary_of(records)
+    assert (summary.loose, summary.pairs) == (2, 5)
+    stated = "2 of 5 quantities of a scene are at best"
+    for form in (markdown(summary), page_of(summary, dict.fromkeys(scenes, 2))):
+        text = html.unescape(form)
+        assert stated in text and "torque of three (allowed 5.0e-01), F12 of one (allowed 2.0e-04)" in text
+    assert stated not in markdown(summary_of(records[1:2]))
+
+
 IDENTITY = replace(ROW, engine="formulas", quantity="closure")
 
 

@@ -10,6 +10,7 @@ import pytest
 from markupsafe import escape
 
 import fourbar
+import validation.run.judge
 from fourbar.mjcf import RECIPE, Settings
 from fourbar.scene import Command, Scene
 from tests.engine_limits import MEASURED, Measured
@@ -18,6 +19,7 @@ from validation.compare.answer import Answer
 from validation.compare.compare import COMPARED
 from validation.compare.rows import AGREES, DEGRADED, FAILS, UNDECIDED, VERDICTS
 from validation.compare.tolerance import FULL_ACCURACY
+from validation.engines.exact import where_it_closes
 from validation.engines.hard_suite import HARD_WITNESSES, Hard
 from validation.engines.limits import LIMITS
 from validation.engines.mujoco import simulate
@@ -75,6 +77,40 @@ def test_beyond_a_toggle_no_engine_finds_a_position() -> None:
                 witness.name,
                 name,
             )
+
+
+def test_near_a_toggle_all_but_the_sine_has_its_digits_though_it_has_few_itself(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A millionth of the torque stood within what the last digits of theta_2 excuse there, for every engine."""
+    lengths, true = linkage_of(LinkageType.TRIPLE_ROCKER, 0), validation.run.judge.solve
+    (psi, stretched), *_ = collinear_3_4(lengths)
+    near = at(dressed(lengths), psi + (-1.0 if stretched else 1.0) * np.array([*families.REGULAR, 1e-9]))
+    balls = [witness for witness in HARD_WITNESSES if witness.nearby]
+
+    def verdicts() -> dict[str, str]:
+        return {row.quantity: row.verdict for row in judge("", near, balls).rows if row.engine == balls[0].name}
+
+    assert set(verdicts().values()) == {AGREES}
+    without = [replace(balls[0], nearby="")]
+    rows = {row.quantity: row for row in judge("", near, without).rows if row.engine == balls[0].name}
+    assert rows["torque"].verdict == DEGRADED and rows["torque"].allowed > 1e-6
+
+    def spoiled(*arguments: Any, **keywords: Any) -> Any:
+        solution = true(*arguments, **keywords)
+        solution.torque[-1] *= 1.0 + 1e-6
+        return solution
+
+    monkeypatch.setattr(validation.run.judge, "solve", spoiled)
+    assert verdicts()["torque"] == FAILS
+
+
+def test_an_answer_nearby_is_one_within_the_rounding_of_theta_2() -> None:
+    scene = dressed(families.PLAIN)
+    command = fourbar.command(at(scene, [0.7, 0.7 + 4.0 * 2.0**-52, 0.7 + 1e-13]))
+    sine = np.broadcast_to(fourbar.solve(at(scene, [0.7])).sin_mu, 3)
+    found = where_it_closes(scene, command, sine, np.ones(3, dtype=bool))["torque"]
+    assert np.isfinite(found).tolist() == [True, True, False]
 
 
 class Spoiled:

@@ -16,7 +16,7 @@ from fourbar.scene import Command, Scene
 from fourbar.scene.case import state_at
 from fourbar.solution import Solution
 from validation.compare.answer import Answer
-from validation.compare.compare import turned
+from validation.compare.compare import closing_margin, turned
 from validation.compare.error import magnitude, relative, worst
 from validation.compare.reversals import reversing
 from validation.compare.rows import AGREES, FAILS, UNDECIDED, Row
@@ -25,7 +25,7 @@ from validation.compare.tolerance import IDENTITY, SIMULATED, Array, Tolerance, 
 
 FORMULAS = "formulas"
 IDENTITIES = (
-    *("closure", "force_sum", "moment_sum", "status", "blocks", "points", "law"),
+    *("closure", "force_sum", "moment_sum", "status", "blocks", "points", "law", "sweep"),
     *("torque", "torque_error", "force_error", "friction_residual"),
 )
 """Rows of the formulas that no engine answers: they do not count as compared."""
@@ -37,9 +37,29 @@ def identities(name: str, scene: Scene, at: Command, solution: Solution) -> list
     closing = solution.assembled & (solution.status_code != OVERFLOW)
     ours = Answer(FORMULAS, "exact", at, closing, angles)
     rows = [closure(name, scene, ours)]
+    if scene.motion.theta_2 is None and scene.motion.law is None:
+        rows.append(_sweep(name, scene, at))
     if solution.torque is not None and (solution.status_code == OK).any():
         rows += _sums(name, scene, at, solution, ours)
     return rows
+
+
+def _sweep(name: str, scene: Scene, at: Command) -> Row:
+    """A sweep that the scene leaves open: a whole turn, or one degree short of where the loop just closes.
+
+    At the end of an interval narrower than four degrees it leaves out a quarter of that, which is half of the sweep.
+    """
+    start, stop = float(at.theta_2[0]), float(at.theta_2[-1])
+    if (start, stop) == (0.0, 2.0 * np.pi):
+        missed = np.maximum(-closing_margin(scene, at.theta_2), 0.0)
+    else:
+        left_out = min(np.radians(1.0), 0.5 * (stop - start))
+        missed = np.abs(closing_margin(scene, np.array([start - left_out, stop + left_out])))
+    error, allowed = float(missed.max()), IDENTITY.factor * turned(scene.linkage.ground_angle, at.theta_2)
+    reason = "one degree short of where the loop just closes, or a whole turn"
+    return Row(
+        name, FORMULAS, "exact", "sweep", error, allowed, AGREES if error <= allowed else FAILS, reason, start, 1.0
+    )
 
 
 def closure(name: str, scene: Scene, answer: Answer, simulated: Tolerance = SIMULATED) -> Row:

@@ -25,7 +25,7 @@ OfSome = Callable[[NDArray[np.intp]], Array]
 IN_ONE_LINE = 32.0 * 2.0**-53
 """|sin(theta_4 - theta_3)| at which bars 3 and 4 may be called in line: their directions are rounded by that."""
 SAMPLE = 5
-"""Positions of a scene with several solutions of friction that are tried: each takes a search."""
+"""Positions of a scene with several solutions of friction, and with one, that are tried: each may take a search."""
 NEAR = 1e-6
 """|sin(theta_4 - theta_3)| below which doubles have no word in it."""
 
@@ -64,6 +64,9 @@ def withheld(
         differ[near] |= closes & np.where(in_line, sine > IN_ONE_LINE, sine < 1.0 / 16.0 * IN_ONE_LINE)
     if solutions is not None and len(many := np.flatnonzero(formulas.status_code == SEVERAL)[:SAMPLE]):
         differ[many] |= solutions(many) < 2
+    if solutions is not None and len(ok := np.flatnonzero(formulas.status_code == OK)):
+        some = ok[np.unique(np.linspace(0, len(ok) - 1, SAMPLE).astype(int))]
+        differ[some] |= solutions(some) > 1
     index = worst(differ.astype(float))
     stated = counted(formulas.status_code[formulas.status_code != OK])
     reason = f"the formulas state: {stated}" if stated else "every position has its values"

@@ -8,7 +8,13 @@ from validation.compare.tolerance import EQUIVALENCE, FULL_ACCURACY
 from validation.engines.witnesses import FROM_DATA, WITNESSES, Witness
 from validation.scenes.hard_families import FAMILIES
 
-BALLS = Witness("ball-arithmetic", "validation.engines.exact:BallArithmetic", FULL_ACCURACY, library="flint")
+BALLS = Witness(
+    "ball-arithmetic",
+    "validation.engines.exact:BallArithmetic",
+    FULL_ACCURACY,
+    nearby="validation.engines.exact:where_it_closes",
+    library="flint",
+)
 
 
 def predicting(witness: Witness) -> Witness:

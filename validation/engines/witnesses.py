@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from importlib import import_module
+from pkgutil import resolve_name
 from typing import NamedTuple
 
 import numpy as np
@@ -9,8 +10,9 @@ import numpy as np
 from fourbar.errors import installing
 from fourbar.quantities import OF_DRY_FRICTION, STAGE_OF, UNKNOWNS
 from fourbar.scene import Command, Scene
+from fourbar.solution import Solution
 from validation.compare.answer import Answer, Engine
-from validation.compare.compare import COMPARED, Predicted
+from validation.compare.compare import COMPARED, Nearby, Predicted
 from validation.compare.rows import in_words
 from validation.compare.tolerance import EQUIVALENCE, SIMULATED, Tolerance
 from validation.engines.exact import unknown
@@ -34,6 +36,9 @@ class Witness:
     predictor: str = ""
     """ "module:function" that predicts, from the description, the errors to be expected beyond the tolerance; "own":
     the engine's own residuals do; nothing: the tolerance is all."""
+    nearby: str = ""
+    """ "module:function" that answers again where an error is beyond the tolerance: at the theta_2, within its own
+    rounding, at which its loop closes as that of the formulas does."""
     stated: bool = True
     """Whether an exact engine is held to what the formulas state of the linkage too, whatever its motion."""
     library: str = ""
@@ -164,3 +169,14 @@ def predicting_from(witness: Witness, scene: Scene, at: Command, answer: Answer)
     module, _, name = witness.predictor.partition(":")
     predict = getattr(import_module(module), name)
     return lambda quantity, where: predict(scene, at, quantity, where)
+
+
+def answering_nearby(witness: Witness, scene: Scene, at: Command, formulas: Solution) -> Nearby | None:
+    """What answers within the rounding of the theta_2 that are stated, where the witness does.
+
+    A drive on bar 3 or 4 has poles of its own, which another theta_2 for the same sine does not mend.
+    """
+    if not witness.nearby or scene.drive_bar != 2 or at.remainder is not None or at.omega_2 is None:
+        return None
+    answer = resolve_name(witness.nearby)
+    return lambda where: answer(scene, at, formulas.sin_mu, where)

@@ -14,7 +14,7 @@ import numpy as np
 from fourbar.errors import HOLDS
 from validation.compare.counts import Counts
 from validation.compare.error import used
-from validation.compare.rows import REFUSES, Row
+from validation.compare.rows import DEGRADED, REFUSES, Row
 from validation.compare.tolerance import EPS, EQUIVALENCE, IDENTITY, NOTHING_TO_TELL, SIMULATED, K, Tolerance
 from validation.engines.witnesses import WORK
 from validation.published.ladder import LadderRow
@@ -51,6 +51,7 @@ SCENES_SHOWN = 200
 PICTURED = 24
 """Scenes with pictures, where fewer fail: to draw one takes ten times as long as to judge it by an exact engine."""
 WORST_SHOWN = 60
+LOOSEST_SHOWN = 5
 ORDERS_SHOWN = 20
 FAILURES_KEPT = 1000
 """Lines of a table at the most; everything is in results.csv."""
@@ -72,6 +73,9 @@ class Summary:
         self.versions, self.machine = versions(), machine()
         self.failures: list[Row] = []
         """At most FAILURES_KEPT of them."""
+        self.pairs = self.loose = 0
+        """Quantities of a scene that were compared, and those of them that no row judges tighter than degraded."""
+        self._loosest: list[Row] = []
         self.judged = 0
         """Pairs of scene and engine of which `worst` shows the worst."""
         self.measured_k: dict[str, float] = {}
@@ -97,6 +101,9 @@ class Summary:
         self.counts.add_scene(scene.rows)
         bad = [row for row in scene.rows if row.failed]
         self.failures += bad[: FAILURES_KEPT - len(self.failures)]
+        compared, loose = _compared(scene.rows)
+        self.pairs, self.loose = self.pairs + compared, self.loose + len(loose)
+        self._loosest = _top(LOOSEST_SHOWN, [*self._loosest, *loose], _allowance)
         for engine, reason in sorted(_left_out(scene)):
             kind = (engine, NUMBER.sub("#", reason))
             self._refusals[kind] += 1
@@ -133,6 +140,15 @@ class Summary:
         """In one sentence."""
         left = f"; not run: {', '.join(engine for engine, _ in self.missing)}" if self.missing else ""
         return self.counts.sentence() + left
+
+    @property
+    def loosest(self) -> str:
+        """How many quantities nobody judges tighter than degraded as predicted, and the worst, in one sentence."""
+        if not self.loose:
+            return ""
+        worst = nlargest(LOOSEST_SHOWN, self._loosest, key=_allowance)
+        named = ", ".join(f"{row.quantity} of {row.scene} (allowed {row.allowed:.1e})" for row in worst)
+        return f'{self.loose} of {self.pairs} quantities of a scene are at best "{DEGRADED}"; the widest: {named}'
 
     @property
     def good(self) -> bool:
@@ -202,6 +218,20 @@ def shares(rows: Sequence[Row]) -> list[float]:
     """error/allowed; infinite without an answer, 0 where nothing is allowed and errs, or nothing was compared."""
     of_all = used(np.array([row.error for row in rows]), np.array([row.allowed for row in rows]))
     return [share if row.compared else 0.0 for row, share in zip(rows, of_all.tolist(), strict=True)]
+
+
+def _compared(rows: Sequence[Row]) -> tuple[int, list[Row]]:
+    """How many quantities were compared, and of each that every row calls degraded the row that allows least."""
+    by_quantity: dict[str, list[Row]] = {}
+    for row in rows:
+        if row.compared:
+            by_quantity.setdefault(row.quantity, []).append(row)
+    loose = [of for of in by_quantity.values() if all(row.verdict == DEGRADED for row in of)]
+    return len(by_quantity), [min(of, key=_allowance) for of in loose]
+
+
+def _allowance(row: Row) -> float:
+    return row.allowed
 
 
 def _worst(rows: Sequence[Row]) -> list[Worst]:

@@ -28,7 +28,7 @@ from validation.compare.withheld import OfSome, withheld
 from validation.engines.exact import sines
 from validation.engines.free_body import FreeBody, solutions
 from validation.engines.output import kept
-from validation.engines.witnesses import WITNESSES, Witness, not_installed, predicting_from
+from validation.engines.witnesses import WITNESSES, Witness, answering_nearby, not_installed, predicting_from
 from validation.report.record import Record, Timing
 from validation.run.printed import piece, printed
 
@@ -182,13 +182,14 @@ def _basis(scene: Scene, free_body: Answer | None) -> Solution | None:
         return None
 
 
-def _by_exact_means(scene: Scene, at: Command) -> tuple[OfSome | None, OfSome]:
+def _by_exact_means(scene: Scene, at: Command) -> tuple[OfSome | None, OfSome | None]:
     """The sine between bars 3 and 4 in many digits, and how many solutions friction has, at some positions."""
 
     unknown = at.remainder is not None or not_installed("flint")
+    loaded = any(effect.loaded_pins for effect in scene.effects)
     return (
         None if unknown else lambda where: sines(scene.linkage, piece(at, where)),
-        lambda where: solutions(scene, piece(at, where)),
+        (lambda where: solutions(scene, piece(at, where))) if loaded else None,
     )
 
 
@@ -209,7 +210,10 @@ def _judged(
         basis = _basis(scene, _Engines(scene, theirs).free_body())
         formulas, yardsticks = solve(scene, _stage(theirs), at=theirs), {}
     predicted = predicting_from(witness, scene, theirs, answer)
-    rows = compare(name, scene, answer, formulas, witness.tolerance, witness.expected, predicted, basis, yardsticks)
+    nearby = answering_nearby(witness, scene, theirs, formulas)
+    rows = compare(
+        name, scene, answer, formulas, witness.tolerance, witness.expected, predicted, basis, yardsticks, nearby
+    )
     if (ratio := answer.evidence.get("mass_ratio", 1.0)) > LIGHT:
         why = f"; of coupler and output one is {ratio:.1e} times lighter"
         rows = [replace(row, reason=row.reason + why) if row.failed else row for row in rows]

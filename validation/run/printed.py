@@ -117,6 +117,12 @@ def _blocks(name: str, scene: Scene, at: Command, solution: Solution) -> Row:
         # evaluated by the same code, but not in the same company of a processor's registers
         apart = relative_error(quantity, one, other, size) * condition
         error[known] = np.maximum(error[known], apart[known])
+    alone = {angle: np.empty(n) for angle in ("theta_3", "theta_4")}
+    solve(scene, at=at, out=alone)  # they are found without vectors then
+    for angle, found in alone.items():
+        apart = relative_error(angle, found, getattr(solution, angle), np.ones(n))
+        apart *= condition_of(angle, scene.linkage, solution) / turned(scene.linkage.ground_angle, at.theta_2)
+        error[-1] = max(error[-1], np.nan_to_num(apart[ok], nan=np.inf).max(initial=0.0))
     index = worst(error)
     verdict = AGREES if error[index] <= EQUIVALENCE.factor else FAILS
     reason = f"{len(long)} positions at once against {n}"

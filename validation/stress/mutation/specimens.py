@@ -121,6 +121,24 @@ SPECIMENS: dict[str, Scene] = {
     "double rocker released": Scene(
         ROCKER, Motion(math.radians(50.0), 0.0, through="follow", free=Free(1.0, 100)), effects=(Gravity(),)
     ),
+    "several solutions": Scene(CRANK, Motion(np.array([2.3, 2.5]), 10.0), effects=(PinFriction.at(A=(50.0, 0.01)),)),
+    "near a reversal": Scene(
+        CRANK,
+        Motion(limit_positions(CRANK, 4)[0].theta_2 + np.array([1.0, 1e-2, 1e-4]), 10.0),
+        effects=(Friction.at(O4=0.03),),
+    ),
+    "short output": Scene(
+        FourBar(1.0, Bar(1.0, 0.2), Bar(2.0, 0.5), Bar(1e-6, 0.4)),
+        Motion(math.pi + np.array([5e-4, 1e-3, 1.9e-3, 1.99e-3]), 10.0),
+    ),
+    "left open": Scene(ROCKER, Motion(omega_2=3.0)),
+    "many turns away": Scene(CRANK, Motion(Sweep(20.0, 22.0, 10), 5.0), effects=(Torsion.at(O2=(0.5, 1.0, 0.1)),)),
+    "ends of a spring nearly meet": Scene(
+        CRANK,
+        Motion(1.0 + np.array([3e-3, 0.1, 1.0]), 10.0),
+        effects=(Springs((Spring(Point(1, 0.1, 0.8), Point(2, 0.1, 0.0), 80.0, 0.05),)),),
+    ),
+    "released to a limit": Scene(ROCKER, Motion(math.radians(50.0), 3.0, free=Free(1.0, 100)), effects=(Gravity(),)),
     "simulated": Scene(
         CRANK,
         Motion(Sweep(0.1, 6.0, 12), 10.0),
