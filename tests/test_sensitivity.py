@@ -191,3 +191,10 @@ def test_half_a_turn_from_the_ground_the_first_derivative_is_the_ratio_of_the_sp
     np.testing.assert_allclose(turned, solution.alpha_3, rtol=1e-12)
     with_ground = found.of("theta_3", "motion.theta_2") + found.of("theta_3", "lengths.ground_angle")
     np.testing.assert_allclose(with_ground, 1.0, rtol=1e-13)  # a linkage turned as a whole
+
+
+def test_a_kite_whose_halves_meet_has_derivatives() -> None:
+    """With a = d and b = c the product in Heron's factor has no slope either, and is a constant."""
+    found = sensitivity(Scene(fourbar.uniform(0.3, 0.3, 0.2, 0.2), Motion(1.0, 10.0)))
+    assert found.solution.omega_3 is not None
+    np.testing.assert_allclose(found.of("theta_3", "motion.theta_2"), found.solution.omega_3 / 10.0, rtol=1e-13)

@@ -28,7 +28,7 @@ RULES: dict[Any, Rule] = {
     np.remainder: lambda z, x, y: (1.0, 0.0),  # by a constant
 }
 PIECEWISE = (
-    *(np.sign, np.floor, np.frexp, np.isnan, np.isfinite),
+    *(np.sign, np.copysign, np.floor, np.frexp, np.isnan, np.isfinite),
     *(np.less, np.less_equal, np.greater, np.greater_equal),
 )
 """Functions of the values alone."""
