@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from pkgutil import resolve_name
 from typing import Any
+from zlib import crc32
 
 import numpy as np
 
@@ -30,14 +31,22 @@ from validation.engines.free_body import FreeBody, solutions
 from validation.engines.witnesses import WITNESSES, Witness, not_installed, predicting_from
 from validation.report.record import Record, Timing
 from validation.run.printed import piece, printed
+from validation.run.shipped.checks import judge_shipped
 
+OF_MANY = 500
+"""Of so many scenes of a long suite one is asked for what else is shipped, which takes as long as judging thirty."""
 SIMULATION = "mujoco-simulated"
 """The witness that runs the generated MJCF."""
 
 
 def judged(name: str, scene: Scene, witnesses: Sequence[Witness] = WITNESSES, *, draw: bool = True) -> Record:
-    """Judge a scene and keep what the report needs of it; `draw`: with its pictures and observed orders."""
-    record = judge(name, scene, witnesses, order=draw)
+    """Judge a scene and keep what the report needs of it.
+
+    `draw`: with its pictures and observed orders, and with what else is shipped; otherwise, in a long suite, that is
+    judged of one scene in OF_MANY, by its name.
+    """
+    asked = draw or crc32(name.encode(errors="replace")) % OF_MANY == 0
+    record = judge(name, scene, witnesses, order=draw, shipped=asked)
     figure = None
     if draw:
         from validation.report.figures import scene_figure
@@ -46,10 +55,18 @@ def judged(name: str, scene: Scene, witnesses: Sequence[Witness] = WITNESSES, *,
     return record.kept(figure)
 
 
-def judge(name: str, scene: Scene, witnesses: Sequence[Witness] = WITNESSES, *, order: bool = True) -> Record:
+def judge(
+    name: str,
+    scene: Scene,
+    witnesses: Sequence[Witness] = WITNESSES,
+    *,
+    order: bool = True,
+    shipped: bool = False,
+) -> Record:
     """Let every witness answer one scene and compare; an engine that breaks down costs its own rows.
 
     `order`: measure the observed order of what is simulated, which takes two more simulations and changes no row.
+    `shipped`: judge what else is shipped (studies, sensitivities, files of other simulators), which takes a second.
     """
     record = Record(name, scene, plain(scene.title), plain(scene.source))
     if scene.motion.free is not None:
@@ -88,6 +105,12 @@ def judge(name: str, scene: Scene, witnesses: Sequence[Witness] = WITNESSES, *, 
     if any(witness.name == SIMULATION for witness in witnesses):
         record.rows += _shipped(name, scene, at)
     _judge_inertia(record, scene, at, witnesses, free_body)
+    if shipped:
+        for row in judge_shipped(name, scene, at, record.solution, free_body):
+            if isinstance(row, str):
+                record.left_out.append(row)
+            else:
+                record.rows.append(row)
     return record
 
 
