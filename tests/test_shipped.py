@@ -111,7 +111,7 @@ def test_a_file_with_another_number_fails(monkeypatch: pytest.MonkeyPatch, engin
     assert failing(rows_of(SHIPPED, engine))
 
 
-def test_what_breaks_down_costs_its_own_rows_and_what_is_missing_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_breaks_down_costs_its_own_rows_and_what_is_missing_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     def broken(*_: object) -> None:
         raise RuntimeError("lost")
 

@@ -34,7 +34,7 @@ from validation.run.printed import piece, printed
 from validation.run.shipped.checks import judge_shipped
 
 OF_MANY = 500
-"""Of so many scenes of a long suite one is asked for what else is shipped, which takes as long as judging thirty."""
+"""Of so many scenes of a long suite one has what else is shipped judged, which takes as long as judging thirty."""
 SIMULATION = "mujoco-simulated"
 """The witness that runs the generated MJCF."""
 
@@ -45,8 +45,8 @@ def judged(name: str, scene: Scene, witnesses: Sequence[Witness] = WITNESSES, *,
     `draw`: with its pictures and observed orders, and with what else is shipped; otherwise, in a long suite, that is
     judged of one scene in OF_MANY, by its name.
     """
-    asked = draw or crc32(name.encode(errors="replace")) % OF_MANY == 0
-    record = judge(name, scene, witnesses, order=draw, shipped=asked)
+    shipped = draw or crc32(name.encode(errors="replace")) % OF_MANY == 0
+    record = judge(name, scene, witnesses, order=draw, shipped=shipped)
     figure = None
     if draw:
         from validation.report.figures import scene_figure

@@ -53,23 +53,23 @@ def sensitivity(question: Question) -> list[Row]:
     """Judge the derivatives of the unknowns and of the scene's points along one direction."""
     scene = sampled(question)
     found = fourbar.sensitivity(scene)
-    ways = {key: step for key, (_, step) in stated(scene, found.keys).items()}
-    ways["motion.theta_2"] = 1.0
+    directions = {key: step for key, (_, step) in stated(scene, found.keys).items()}
+    directions["motion.theta_2"] = 1.0
 
     def along(part: float) -> dict[str, Array]:
-        return at_free_bodies(moved(scene, {key: part * STEP * step for key, step in ways.items()})).quantities
+        return at_free_bodies(moved(scene, {key: part * STEP * step for key, step in directions.items()})).quantities
 
     near, far = [(along(part), along(-part)) for part in (1.0, 2.0)]
     rows = []
     for name in (name for name in UNKNOWNS if name in found.by):
         first, second = (_less(name, up[name], down[name]) for up, down in (near, far))
         slope = (8.0 * first - second) / (12.0 * STEP)
-        terms = np.array([step * found.of(name, key) for key, step in ways.items()])
+        terms = np.array([step * found.of(name, key) for key, step in directions.items()])
         size = magnitude(found.value(name)) + sum(magnitude(term) for term in terms)
         known = np.array([status == "ok" for status in found.status]) | (name not in FORCES)
         error = np.where(known, relative(magnitude(terms.sum(axis=0) - slope), size), 0.0)
         if known.any():
-            reason = f"along one direction in {len(ways)} numbers"
+            reason = f"along one direction in {len(directions)} numbers"
             rows.append(row_of(question, "sensitivity", name, error, DIFFERENCES, found.solution.theta_2, reason))
     return rows
 

@@ -1,4 +1,4 @@
-"""What a check of something shipped is asked, at which positions, and the rows that it answers."""
+"""What a check of something shipped is given, at which positions, and the rows that it answers."""
 
 import json
 import tomllib
