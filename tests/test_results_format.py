@@ -27,6 +27,7 @@ from validation.regression.record import ACCEPTED, baseline
 from validation.run.released import ENGINES, FULL
 from validation.run.run import run
 from validation.run.selection import chosen
+from validation.run.shipped.checks import CHECKS
 from validation.scenes.random import LinkageType
 from validation.scenes.suites import Random
 
@@ -71,7 +72,7 @@ def test_every_quantity_is_described_as_the_table_has_it() -> None:
 def test_every_engine_is_described() -> None:
     table = PAGE.partition("## The engines")[2].partition("## The quantities")[0]
     described = re.findall(r"^\| `([\w-]+)` \| [^|]+ \| .+ \|$", table, re.MULTILINE)
-    assert described == ["engine", *WORK, *ENGINES]
+    assert described == ["engine", *WORK, *ENGINES, *(check.__name__ for check in CHECKS)]
     names = {each.name for each in (*WITNESSES, *FURTHER, *HARD_WITNESSES)}
     assert names | {FORMULAS} == set(WORK)
 

@@ -1,6 +1,7 @@
 """Derivatives against 50-digit differences of another evaluation, and against differences of the formulas."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,7 @@ from fourbar.cli import status
 from fourbar.effects import Friction, Gravity, Load, PinFriction, Table, Viscous
 from fourbar.linkage import BAR_NAMES, MOVING_BARS
 from fourbar.scene import Scene, command
-from fourbar.scene.motion import Free, FromLimit
+from fourbar.scene.motion import Free, FromLimit, Motion
 from fourbar.solution import values_of
 from fourbar.studies.derivatives import Sensitivity, sensitivity
 from fourbar.studies.keys import entries
@@ -174,3 +175,26 @@ def test_the_command_ranks_the_numbers_and_writes_them_all(capsys: pytest.Captur
     own = sensitivity(fourbar.load(models / "crank_rocker.toml"))
     np.testing.assert_array_equal(document["by"]["F12"]["lengths.input"], own.of("F12", "lengths.input"))
     assert status(["analyze", str(models / "crank_rocker.toml"), "--sensitivity", "--csv"]) == 2
+
+
+@pytest.mark.parametrize(("ground_angle", "theta_2"), [(0.0, np.pi), (-0.4, np.pi - 0.4), (0.3, np.pi), (0.0, -np.pi)])
+def test_half_a_turn_from_the_ground_the_first_derivative_is_the_ratio_of_the_speeds(
+    ground_angle: float, theta_2: float
+) -> None:
+    """There the tangent of the half angle is 1e16, of whose slope no digit is left."""
+    link = replace(LINK, ground_angle=ground_angle)
+    found = sensitivity(Scene(link, Motion(theta_2, 10.0, 3.0), effects=(Gravity(),)))
+    solution = found.solution
+    assert solution.omega_3 is not None and solution.alpha_3 is not None
+    np.testing.assert_allclose(found.of("theta_3", "motion.theta_2"), solution.omega_3 / 10.0, rtol=1e-13)
+    turned = found.of("omega_3", "motion.theta_2") * 10.0 + found.of("omega_3", "motion.omega_2") * 3.0
+    np.testing.assert_allclose(turned, solution.alpha_3, rtol=1e-12)
+    with_ground = found.of("theta_3", "motion.theta_2") + found.of("theta_3", "lengths.ground_angle")
+    np.testing.assert_allclose(with_ground, 1.0, rtol=1e-13)  # a linkage turned as a whole
+
+
+def test_a_kite_whose_halves_meet_has_derivatives() -> None:
+    """With a = d and b = c the product in Heron's factor has no slope either, and is a constant."""
+    found = sensitivity(Scene(fourbar.uniform(0.3, 0.3, 0.2, 0.2), Motion(1.0, 10.0)))
+    assert found.solution.omega_3 is not None
+    np.testing.assert_allclose(found.of("theta_3", "motion.theta_2"), found.solution.omega_3 / 10.0, rtol=1e-13)

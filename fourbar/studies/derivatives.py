@@ -13,6 +13,8 @@ from fourbar.effects.cones import settle
 from fourbar.effects.pin_friction import Settled
 from fourbar.errors import InputError, expect
 from fourbar.formulas.arithmetic import polar
+from fourbar.formulas.path import Path
+from fourbar.formulas.position import HalfAngle, Position, parallel_pairs, with_parallel_pairs
 from fourbar.linkage import PIN_FORCE
 from fourbar.quantities import FORCES, NOT_ASSEMBLED, OK, SINGULAR, STAGE_OF, STAGES, STATUS_NAMES
 from fourbar.scene import Command, Scene, command
@@ -221,7 +223,7 @@ def _derivatives(
         seeded(f"motion.{name}", getattr(at, name)) for name in ("theta_2", "omega_2", "alpha_2")
     )
     case, branch = Case.of(scene), at.branch[index].astype(float)
-    position = case.path.position(theta_2, case.path.half_angle(theta_2), branch)
+    position = _position(case.path, theta_2, branch)
     state = case.state(case.path, theta_2, position, branch, omega_2, alpha_2, moving=moving)
     found = kinematics(case, state, names)
     held = np.zeros(len(index), dtype=bool)
@@ -233,3 +235,19 @@ def _derivatives(
         found |= {**dynamics.pins._asdict(), "torque": dynamics.torque}
         found["drive_condition"] = np.abs(case.path.drive_sine(position, case.drive_bar))
     return {name: found[name] for name in names}, held
+
+
+def _position(path: Path, theta_2: Any, branch: Array) -> Position:
+    """The positions, whose directions have the slopes of sines and cosines.
+
+    Those of the tangent of a half angle, which has no bound, lose every digit half a turn from where it is zero.
+    """
+    d, a, *_, E1, E2 = path.lengths
+    h = 0.5 * (theta_2 - path.theta_1)
+    s, k = np.sin(h), np.cos(h)
+    sloped = (s * s, k * k, s * k, E1 + 4.0 * a * d * (k * k), E2 + 4.0 * a * d * (s * s))
+    plain = path.half_angle(theta_2)
+    half = HalfAngle(*(Sloped(values(x), slopes(same)) for x, same in zip(plain, sloped, strict=True)))
+    at = path.position(theta_2, half, branch)
+    at = at._replace(u2=Sloped(values(at.u2), slopes(polar(1.0, theta_2))))
+    return with_parallel_pairs(at, *parallel_pairs(path.lengths, half, branch)) if path.may_stay_parallel else at

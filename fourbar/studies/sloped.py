@@ -36,7 +36,7 @@ COMPLEMENT = {
     np.greater: np.less_equal,
     np.greater_equal: np.less,
 }
-PIECEWISE = (np.sign, np.floor, np.rint, np.frexp, np.isnan, np.isfinite, *COMPLEMENT)
+PIECEWISE = (np.sign, np.copysign, np.floor, np.rint, np.frexp, np.isnan, np.isfinite, *COMPLEMENT)
 """Functions of the values alone; of balls the comparisons, each decided where all that the balls hold agrees."""
 
 

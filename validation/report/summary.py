@@ -50,7 +50,7 @@ class Cost:
 SCENES_SHOWN = 200
 PICTURED = 24
 """Scenes with pictures, where fewer fail: to draw one takes ten times as long as to judge it by an exact engine."""
-WORST_SHOWN = 60
+WORST_SHOWN = 80
 LOOSEST_SHOWN = 5
 ORDERS_SHOWN = 20
 FAILURES_KEPT = 1000

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from pkgutil import resolve_name
 from typing import Any
+from zlib import crc32
 
 import numpy as np
 
@@ -31,7 +32,10 @@ from validation.engines.output import kept
 from validation.engines.witnesses import WITNESSES, Witness, answering_nearby, not_installed, predicting_from
 from validation.report.record import Record, Timing
 from validation.run.printed import piece, printed
+from validation.run.shipped.checks import judge_shipped
 
+OF_MANY = 500
+"""Of so many scenes of a long suite one has what else is shipped judged, which takes as long as judging thirty."""
 SIMULATION = "mujoco-simulated"
 """The witness that runs the generated MJCF."""
 OUTPUT = "output.txt"
@@ -39,8 +43,13 @@ OUTPUT = "output.txt"
 
 
 def judged(name: str, scene: Scene, witnesses: Sequence[Witness] = WITNESSES, *, draw: bool = True) -> Record:
-    """Judge a scene and keep what the report needs of it; `draw`: with its pictures and observed orders."""
-    record = judge(name, scene, witnesses, order=draw)
+    """Judge a scene and keep what the report needs of it.
+
+    `draw`: with its pictures and observed orders, and with what else is shipped; otherwise, in a long suite, that is
+    judged of one scene in OF_MANY, by its name.
+    """
+    shipped = draw or crc32(name.encode(errors="replace")) % OF_MANY == 0
+    record = judge(name, scene, witnesses, order=draw, shipped=shipped)
     record.rows = [naming_output(row) if row.engine in record.output else row for row in record.rows]
     figure = None
     if draw:
@@ -55,10 +64,18 @@ def naming_output(row: Row) -> Row:
     return replace(row, reason=f"{row.reason}; what it printed: {OUTPUT}") if row.failed else row
 
 
-def judge(name: str, scene: Scene, witnesses: Sequence[Witness] = WITNESSES, *, order: bool = True) -> Record:
+def judge(
+    name: str,
+    scene: Scene,
+    witnesses: Sequence[Witness] = WITNESSES,
+    *,
+    order: bool = True,
+    shipped: bool = False,
+) -> Record:
     """Let every witness answer one scene and compare; an engine that breaks down costs its own rows.
 
     `order`: measure the observed order of what is simulated, which takes two more simulations and changes no row.
+    `shipped`: judge what else is shipped (studies, sensitivities, files of other simulators), which takes a second.
     """
     record = Record(name, scene, plain(scene.title), plain(scene.source))
     if scene.motion.free is not None:
@@ -97,6 +114,12 @@ def judge(name: str, scene: Scene, witnesses: Sequence[Witness] = WITNESSES, *, 
     if any(witness.name == SIMULATION for witness in witnesses):
         record.rows += _shipped(name, scene, at)
     _judge_inertia(record, scene, at, witnesses, free_body)
+    if shipped:
+        for row in judge_shipped(name, scene, at, record.solution, free_body):
+            if isinstance(row, str):
+                record.left_out.append(row)
+            else:
+                record.rows.append(row)
     return record
 
 

@@ -38,7 +38,7 @@ ROUNDED_SOMEWHERE = 20
 def printed(name: str, scene: Scene, at: Command, solution: Solution, basis: Solution | None) -> Iterator[Row]:
     """One row per statement that the scene makes."""
     if scene.points and basis is not None and at.omega_2 is not None:
-        yield _points(name, scene, solution, basis)
+        yield points(name, scene, solution, basis)
     if scene.motion.law is not None and at.time is not None:
         yield _law(name, scene, at)
     if at.omega_2 is None:
@@ -51,8 +51,11 @@ def printed(name: str, scene: Scene, at: Command, solution: Solution, basis: Sol
         yield _residual(name, scene, solution)
 
 
-def _points(name: str, scene: Scene, solution: Solution, basis: Solution) -> Row:
-    """Places, velocities and accelerations of the scene's own points, from the angles of another derivation."""
+def points(name: str, scene: Scene, solution: Solution, basis: Solution, least: float = 0.0) -> Row:
+    """Places, velocities and accelerations of the scene's own points, from the angles of another derivation.
+
+    `least`: the condition from which on they are judged.
+    """
     link, n = scene.linkage, len(basis)
     zero = np.zeros(n)
     theta = {1: zero + link.ground_angle, 2: basis.theta_2, 3: basis.theta_3, 4: basis.theta_4}
@@ -65,7 +68,8 @@ def _points(name: str, scene: Scene, solution: Solution, basis: Solution) -> Row
 
     feet = {3: swing(2, link.input.length, 0.0), 4: [link.ground * np.exp(1j * theta[1]), 0.0 * zero, 0.0 * zero]}
     error = np.zeros(n)
-    usable = (solution.status_code == OK) & (condition_of("F12", link, basis) * NOTHING_TO_TELL > EPS)
+    usable = (solution.status_code == OK) & (basis.condition >= least)
+    usable &= condition_of("F12", link, basis) * NOTHING_TO_TELL > EPS
     for point in scene.points:
         own, foot = swing(point.bar, *point.from_pin), feet.get(point.bar, [zero, zero, zero])
         tables, like = (solution.points, solution.velocity, solution.acceleration), ("B", "v_B", "a_B")
