@@ -1,14 +1,13 @@
 """Runs judged in this process, where it is not their workers that are tested."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
+from typing import Any
 
 import pytest
 
-from validation.engines.witnesses import Witness
+from validation.engines import workers
 from validation.report.record import Record
 from validation.report.summary import Summary
-from validation.run import pool
-from validation.scenes.suites import Suite
 
 
 def summary_of(records: Iterable[Record]) -> Summary:
@@ -20,12 +19,12 @@ def summary_of(records: Iterable[Record]) -> Summary:
 
 
 def judge_here(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A run whose workers are not under test starts none: its scenes are judged one after the other."""
+    """Do in this process, one item after another, what workers would do that are not under test."""
 
     def over_none(
-        suite: Suite, chunks: Iterable[pool.Chunk], who: tuple[Witness, ...], draw: bool, *_: object
-    ) -> Iterator[tuple[int, list[Record]]]:
-        for number, scenes in chunks:
-            yield number, pool.judge_chunk(suite, scenes, who, draw)
+        function: Callable[[Any], Any], chunks: Iterable[workers.Chunk], *_: object, **__: object
+    ) -> Iterator[tuple[int, list[Any]]]:
+        for number, items in chunks:
+            yield number, [function(item) for item in items]
 
-    monkeypatch.setattr(pool, "over_processes", over_none)
+    monkeypatch.setattr(workers, "over_processes", over_none)

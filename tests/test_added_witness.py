@@ -19,7 +19,7 @@ from tests.scenes import crank_rocker
 from validation import Answer
 from validation.cli import status
 from validation.compare.rows import FAILS, REFUSES
-from validation.engines import added
+from validation.engines import added, workers
 from validation.engines.free_body import FreeBody
 from validation.engines.witnesses import WITNESSES
 from validation.run import pool
@@ -181,11 +181,15 @@ def test_from_the_command_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     save(SCENE, tmp_path / "scene.toml")
     limits = []
 
-    def here(suite: Any, chunks: Any, witnesses: Any, draw: bool, _: int, seconds: float) -> Iterator[Any]:
-        limits.append(seconds)
-        return ((number, pool.judge_chunk(suite, scenes, witnesses, draw)) for number, scenes in chunks)
+    over_processes = workers.over_processes
 
-    monkeypatch.setattr(pool, "over_processes", here)
+    def here(function: Any, chunks: Any, *rest: Any, seconds: float, instead: Any) -> Iterator[Any]:
+        if function is not pool.judge_job:
+            return over_processes(function, chunks, *rest, seconds=seconds, instead=instead)
+        limits.append(seconds)
+        return ((number, [function(job) for job in jobs]) for number, jobs in chunks)
+
+    monkeypatch.setattr(workers, "over_processes", here)
     monkeypatch.setattr("validation.run.run.html", lambda *_, **__: "")
     out = ["--out", str(tmp_path / "out"), "--engines", "free-body", "--time-limit", "2.5", "--no-pictures"]
     assert (

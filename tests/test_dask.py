@@ -20,9 +20,10 @@ from fourbar.errors import InputError
 from tests.here import judge_here
 from tests.test_suite import COUNT, EXACT, FULL, IN_A_CHUNK, KILLS, SEED, TYPES, judge_all
 from validation.compare.rows import FAILS
+from validation.engines import workers
 from validation.report.machine import code
 from validation.report.summary import Summary
-from validation.run import machines, pool
+from validation.run import machines
 from validation.run.machines import ClusterError
 from validation.run.run import run
 from validation.scenes.suites import Random
@@ -127,8 +128,8 @@ def test_a_cluster_without_workers_or_without_the_checkout_is_one_line(
     (tmp_path / "bare" / "validation.py").write_text("raise ModuleNotFoundError('no such module')")
     _, address = started("scheduler", "--host", "127.0.0.1", "--port", "0", path=tmp_path / "bare")
     suite, out = Random(1, SEED, TYPES), tmp_path / "out"
-    with monkeypatch.context() as hurried, pytest.raises(pool.NoWorkersError, match="no workers; start some"):
-        hurried.setattr(pool, "STALL", 0.5)
+    with monkeypatch.context() as hurried, pytest.raises(workers.NoWorkersError, match="no workers; start some"):
+        hurried.setattr(workers, "STALL", 0.5)
         list(run(suite, out, EXACT, drawn=False, scheduler=address))
     started("worker", *WORKER)
     with pytest.raises(ClusterError, match="PYTHONPATH") as caught:

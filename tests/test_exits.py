@@ -218,6 +218,7 @@ def test_a_torque_off_in_its_twelfth_digit_is_status_1(monkeypatch: pytest.Monke
         solution.torque *= 1.0 + 1e-12
         return solution
 
+    judge_here(monkeypatch)
     monkeypatch.setattr("validation.stress.forward_error.stability.solve", off)
     assert VALIDATION(STABILITY) == FAILED
 
@@ -229,6 +230,7 @@ def test_samples_that_compare_nothing_are_status_1(
         tally.samples += 1
         tally.not_assembled += 1
 
+    judge_here(monkeypatch)
     monkeypatch.setattr("validation.stress.forward_error.stability.judge", open_loop)
     assert VALIDATION(STABILITY) == FAILED
     assert "random: nothing was compared" in capsys.readouterr().out

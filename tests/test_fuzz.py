@@ -1,6 +1,7 @@
 """Fuzzing: counter-examples stay fixed, the fuzzer itself notices what it must, a stretch of scenes holds."""
 
-import json
+import os
+import signal
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
@@ -11,8 +12,10 @@ import pytest
 import fourbar.formulas.mobility
 from fourbar.files import loads
 from tests.scenes import crank_rocker
+from validation.report.machine import code
+from validation.run.store import Store
 from validation.stress.fuzz import fuzz as examine
-from validation.stress.fuzz.fuzz import examine_chunk, run
+from validation.stress.fuzz.fuzz import run
 from validation.stress.fuzz.scenes import scene_of
 from validation.stress.fuzz.shrink import KEPT, keep, shrunk
 
@@ -25,7 +28,7 @@ def test_a_kept_counterexample_holds(path: Path) -> None:
 
 
 def test_a_stretch_of_scenes_holds() -> None:
-    assert examine_chunk(SEED, 0, 60) == {}
+    assert not [number for number in range(60) if examine.examine(SEED, number)]
 
 
 def test_a_scene_depends_on_its_number_alone() -> None:
@@ -116,7 +119,20 @@ def test_an_interrupted_run_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     first = run(12, 1, tmp_path, 1)
     next(first)
     first.close()
-    done = next(iter(sorted(tmp_path.glob("chunk-*.json"))))
-    done.write_text(json.dumps({"0": ["left by the run before"]}), encoding="utf-8")
+    with Store(tmp_path, {"seed": 1, **code()}).held() as store:
+        assert store.done() >= {4}
+        store.put(4, [{"0": ["left by the run before"]}])
     found = list(run(12, 1, tmp_path, 1))
     assert len(found) == 3 and found[0] == {"0": ["left by the run before"]}
+
+
+def test_a_scene_that_kills_its_worker_costs_itself_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(examine, "examine", dies_in_scene_2)
+    (found,) = run(4, 1, tmp_path, 1)
+    assert found.keys() == {"2"} and found["2"][0].startswith(examine.LOST)
+
+
+def dies_in_scene_2(seed: int, index: int) -> list[str]:
+    if index == 2:
+        os.kill(os.getpid(), signal.SIGSEGV)
+    return []

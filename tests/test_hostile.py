@@ -235,9 +235,8 @@ def test_the_pattern_of_a_suite_does_not_take_the_suite_itself(tmp_path: Path) -
 
 def test_a_worker_carries_only_its_own_scenes(tmp_path: Path) -> None:
     suite = suite_file(listed(tmp_path, "a.toml\nb.toml\n"))
-    part, indices = pool.part(suite, [1])
-    assert [part.name(i) for i in indices] == ["b"]
-    assert len(part) == 1
+    (job,) = pool.jobs(suite, [1], (), False)
+    assert job.name == "b" and len(job.suite) == 1
 
 
 class Greedy:

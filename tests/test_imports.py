@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[1]
-HEAVY = ("pint", "click", "rich", "jinja2", "matplotlib", "scipy", "joblib", "mujoco", "pinocchio", "flint", "mpmath")
+HEAVY = ("pint", "click", "rich", "jinja2", "matplotlib", "scipy", "mujoco", "pinocchio", "flint", "mpmath")
 ENGINES = {name: name.removeprefix("py") for name in ("mujoco", "pinocchio", "exudyn", "opensim", "pydrake")}
 LAYERS = {
     "fourbar": (

@@ -8,7 +8,6 @@ import subprocess
 import sys
 import time
 import tomllib
-from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import ClassVar
@@ -25,7 +24,7 @@ from validation.compare.answer import Answer
 from validation.compare.columns import read_columns
 from validation.compare.rows import FAILS, REFUSES, Row
 from validation.compare.tolerance import EQUIVALENCE
-from validation.engines import added
+from validation.engines import added, workers
 from validation.engines.witnesses import Witness
 from validation.report.machine import CHECKOUT, CODE, build, checkout, code
 from validation.report.record import Record
@@ -35,7 +34,7 @@ from validation.run.run import Collected, run
 from validation.run.selection import chosen
 from validation.run.store import RunningError, Store
 from validation.scenes.random import LinkageType
-from validation.scenes.suites import AS_LONG_AS, MOST_POSITIONS, Files, Random, Suite, scene_files
+from validation.scenes.suites import AS_LONG_AS, MOST_POSITIONS, Files, Random, scene_files
 
 SEED = 7
 KILLS = int(os.environ.get("KILLS", "1"))
@@ -77,12 +76,14 @@ def test_an_engine_that_crashes_or_hangs_costs_its_own_rows(tmp_path: Path, monk
 def test_a_worker_ends_itself_in_the_scene_that_hangs_and_with_its_parent() -> None:
     """The limit is that of a scene, whatever the others of its chunk took."""
     judge = (
-        "from tests.unlucky import Few; from validation.run import pool; "
+        "import os; from tests.unlucky import Few; from validation.engines import workers; "
+        "from validation.run import pool; "
         "from validation.compare.tolerance import EQUIVALENCE; from validation.engines.witnesses import Witness; "
-        "moody = [Witness('moody', 'tests.unlucky:Moody', EQUIVALENCE)]; pool.ready(%s); print('ready', flush=True); "
-        "pool.judge_watched(%s, Few(), [0, 2], moody, False)"
+        "moody = [Witness('moody', 'tests.unlucky:Moody', EQUIVALENCE)]; "
+        "workers.ready(%s); print('ready', flush=True); "
+        "workers.apply_watched(%s, pool.judge_job, pool.jobs(Few(), [0, 2], moody, False))"
     )
-    for parent, limit in (("0", 1.0), ("1", 100.0)):  # the parent of the second is another
+    for parent, limit in (("os.getppid()", 1.0), ("1", 100.0)):  # the parent of the second is another
         line = [sys.executable, "-c", judge % (parent, limit)]
         began = time.monotonic()
         done = subprocess.run(line, cwd=Path(__file__).parent.parent, capture_output=True, check=False, timeout=60)
@@ -103,7 +104,7 @@ def test_what_comes_from_outside_is_not_held_against_the_engine(
     assert not list((tmp_path / "lives").iterdir())
 
 
-@pytest.mark.parametrize(("lives", "pools"), [(3, pool.POOLS), (9, 2)])
+@pytest.mark.parametrize(("lives", "pools"), [(3, workers.POOLS), (9, 2)])
 def test_workers_that_die_with_nothing_to_do_are_on_nobodys_account(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, lives: int, pools: int
 ) -> None:
@@ -112,10 +113,10 @@ def test_workers_that_die_with_nothing_to_do_are_on_nobodys_account(
     for life in range(lives):
         (tmp_path / "lives" / str(life)).touch()
     monkeypatch.setenv("LIVES", str(tmp_path / "lives"))
-    monkeypatch.setattr(pool, "ready", dies_at_first)
-    monkeypatch.setattr(pool, "POOLS", pools)
+    monkeypatch.setattr(workers, "ready", dies_at_first)
+    monkeypatch.setattr(workers, "POOLS", pools)
     if lives > pools:
-        with pytest.raises(pool.NoWorkersError, match="what is finished is kept"):
+        with pytest.raises(workers.NoWorkersError, match="what is finished is kept"):
             judge_all(Few(), tmp_path / "run", workers=1)
     else:
         assert judge_all(Few(), tmp_path / "run", workers=1).counts[FAILS] == 0
@@ -182,11 +183,13 @@ def test_damaged_swapped_and_foreign_parts_are_made_again_and_named(tmp_path: Pa
     row = Row("a", "engine", "exact", "torque", math.nan, math.inf, REFUSES, "a limit", -0.0, 1e-300)
     record = Record("a", title="A", rows=[row])
     with Store(tmp_path / "foreign", {"scenes": "two"}).held() as other:
-        other.put(4, [record])
+        other.put(4, [record.kept_all()])
     with Store(tmp_path / "run", {"scenes": "one"}).held() as store:
         for chunk in range(6):
-            store.put(chunk, [record])
-        assert store.done() == set(range(6)) and repr(store.read(5)) == repr([record])
+            store.put(chunk, [record.kept_all()])
+        assert store.done() == set(range(6)) and repr([Record.restore(kept) for kept in store.read(5)]) == repr(
+            [record]
+        )
         first = store.parts / "000000"
         first.write_bytes(first.read_bytes()[:-1])
         (store.parts / "000001").write_bytes(b"")
@@ -348,13 +351,13 @@ def test_of_a_long_suite_what_fails_has_pictures_and_what_is_nearest_to_it(
     """Drawn at the end, without the engine that broke down; with --no-pictures not at all."""
     judge_here(monkeypatch)
     drawn: list[str] = []
-    judge = pool.judge_chunk
+    judge = pool.judge_job
 
-    def noting(suite: Suite, scenes: Sequence[int], who: Sequence[Witness], draw: bool) -> list[Record]:
-        drawn.extend(suite.name(scene) for scene in scenes if draw)
-        return judge(suite, scenes, who, draw)
+    def noting(job: pool.Job) -> Record:
+        drawn.extend([job.name] * job.draw)
+        return judge(job)
 
-    monkeypatch.setattr(pool, "judge_chunk", noting)
+    monkeypatch.setattr(pool, "judge_job", noting)
     monkeypatch.setattr("validation.report.summary.PICTURED", 3)
     monkeypatch.setattr(validation.run.run, "PICTURED", 3)
     monkeypatch.setattr(validation.run.run, "html", lambda *_, **__: "")

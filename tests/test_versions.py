@@ -13,6 +13,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.here import judge_here
 from validation.cli import status
 from validation.compare.rows import AGREES, FAILS, Row, to_csv
 from validation.regression.history import Run
@@ -142,7 +143,8 @@ def test_a_bisection_runs_what_it_needs_and_names_every_change() -> None:
     assert alike == [0, 31]
 
 
-def test_a_scan_runs_every_version() -> None:
+def test_a_scan_runs_every_version(monkeypatch: pytest.MonkeyPatch) -> None:
+    judge_here(monkeypatch)
     tried: list[int] = []
     changes = {0: (1e-7, AGREES), 3: (1e-3, FAILS), 4: (1e-7, AGREES)}
     found = versions.scanned(FROM_0_TO_31[:6], made_up(changes, set(), tried), 2)
@@ -163,6 +165,7 @@ def test_the_command_runs_each_version_and_says_why_one_has_no_answer(
         (out / "results.csv").write_text(to_csv(replace(row, engine="pinocchio-inverse") for row in release.run.rows))
         write_about(release.run.about, out)
 
+    judge_here(monkeypatch)
     monkeypatch.setattr(releases, "pip", lambda *_: Ended(LISTED, "", False, ""))
     loads = {"2.7": (None, "does not load: libtoy.so.7")}
     monkeypatch.setattr(versions, "installed", lambda _, version, *__: loads.get(version, (Path("its"), "")))

@@ -57,7 +57,7 @@ class Moody:
         return Answer("moody", "exact", refusal="declined")
 
 
-def dies_at_first(parent: int) -> None:
+def dies_at_first(*_: object) -> None:
     """Starts no worker of a process as long as some of its lives are left in the folder that the run was given."""
     lives = sorted(Path(os.environ["LIVES"]).iterdir())
     if lives:

@@ -21,11 +21,9 @@ from validation.compare.compare import COMPARED
 from validation.compare.identities import FORMULAS
 from validation.compare.rows import in_words, one_line, plain
 from validation.compare.tolerance import EQUIVALENCE, Tolerance
+from validation.engines import workers
 from validation.engines.checked import Checked
-from validation.engines.memory import bound_memory
-from validation.engines.output import keep_output
 from validation.engines.witnesses import Witness
-from validation.engines.workers import Workers
 
 GROUP = "fourbar.witnesses"
 """Entry points of this group join every run; their value is "module:Class" too."""
@@ -81,35 +79,23 @@ def _described(adapters: Sequence[str], known: Iterable[str]) -> list[Witness | 
     """What each class says of itself, in another process: nothing of it runs in the one that gives the verdict."""
     if not adapters:
         return []
-    from pebble import ProcessExpired, ProcessPool
-
     names, found = {FORMULAS, *known}, list[Witness | _UnusableError]()
-    with ProcessPool(max_workers=1, context=Workers(), initializer=_begin) as pool:
-        try:
-            for task in [pool.schedule(_describe, args=[adapter], timeout=LONGEST_IMPORT) for adapter in adapters]:
-                try:
-                    witness = task.result()
-                    if witness.name in names:
-                        raise _UnusableError(f"must have a name of its own; {witness.name!r} is another's")
-                    names.add(witness.name)
-                    found.append(witness)
-                except _UnusableError as reason:
-                    found.append(reason)
-                except TimeoutError:
-                    found.append(_UnusableError(f"cannot be imported: it takes more than {LONGEST_IMPORT:g} s"))
-                except ProcessExpired as end:
-                    found.append(
-                        _UnusableError(f"cannot be imported: it ends its process (exit code {end.exitcode or 0})")
-                    )
-        except BaseException:
-            pool.stop()  # type: ignore[no-untyped-call]
-            raise
+    for each in workers.each(_describe, adapters, seconds=LONGEST_IMPORT, instead=_trouble):
+        if isinstance(each, Witness) and each.name in names:
+            found.append(_UnusableError(f"must have a name of its own; {each.name!r} is another's"))
+            continue
+        names |= {each.name} if isinstance(each, Witness) else set()
+        found.append(each)
     return found
 
 
-def _begin() -> None:
-    bound_memory()
-    keep_output()
+def _trouble(_: str, error: Exception, __: object) -> _UnusableError:
+    """Say why a class cannot be used whose description failed, took too long, or ended its process."""
+    if isinstance(error, _UnusableError):
+        return error
+    if isinstance(error, TimeoutError):
+        return _UnusableError(f"cannot be imported: it takes more than {LONGEST_IMPORT:g} s")
+    return _UnusableError(f"cannot be imported: it ends its process (exit code {getattr(error, 'exitcode', 0) or 0})")
 
 
 def _describe(adapter: str) -> AddedWitness:

@@ -1,19 +1,16 @@
-"""Chunks of scenes over the workers of a Dask scheduler."""
+"""The workers of a Dask scheduler in place of the processes of this machine."""
 
 import logging
 import time
 from collections import Counter
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from concurrent.futures import CancelledError
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 from fourbar.errors import DependencyError, InputError
-from validation.engines.witnesses import Witness
+from validation.engines import workers as processes
 from validation.report.machine import code, differing, machine
-from validation.report.record import Record
-from validation.run import pool
-from validation.scenes.suites import Suite
 
 if TYPE_CHECKING:
     from distributed import Future
@@ -29,22 +26,17 @@ class ClusterError(DependencyError):
 
 
 def here() -> tuple[dict[str, str], str]:
-    """What decides the numbers of this worker, and its machine."""
+    """Tell what decides the numbers of this worker, and its machine."""
     return code(), machine()
 
 
-def judge_alike(
-    wanted: dict[str, str],
-    seconds: float,
-    suite: Suite,
-    scenes: Sequence[int],
-    witnesses: Sequence[Witness],
-    draw: bool,
-) -> list[Record]:
-    """Judge in a worker, which may have joined later: with the code and the libraries of the run, or not at all."""
+def apply_alike(
+    wanted: dict[str, str], seconds: float, function: Callable[[Any], Any], items: Sequence[Any]
+) -> list[Any]:
+    """Apply a function in a worker, which may have joined later: with the code and libraries of here, or not at all."""
     if difference := differing(wanted, code()):
         raise ClusterError(f"a worker is not set up as this machine: {difference}")
-    return pool.judge_watched(seconds, suite, scenes, witnesses, draw)
+    return processes.apply_watched(seconds, function, items)
 
 
 class Cluster:
@@ -72,9 +64,9 @@ class Cluster:
             raise
 
     def _alike(self) -> str:
-        """The machines of the workers, in words."""
+        """Name the machines of the workers."""
         try:
-            self.client.wait_for_workers(1, timeout=pool.STALL)
+            self.client.wait_for_workers(1, timeout=processes.STALL)
         except TimeoutError:
             raise self._no_workers() from None
         there = self.client.nthreads()  # type: ignore[no-untyped-call]
@@ -82,7 +74,7 @@ class Cluster:
         try:
             tasks = {self.client.submit(here, workers=[worker], pure=False): worker for worker in there}
             for task, worker in tasks.items():
-                while not self.done([task], pool.STALL):
+                while not self.done([task], processes.STALL):
                     if self.lost([task]):
                         raise self._no_workers()
                 known, where = self.result(task)
@@ -97,17 +89,16 @@ class Cluster:
 
     def over(
         self,
-        suite: Suite,
-        chunks: Iterable[pool.Chunk],
-        witnesses: Sequence[Witness],
-        draw: bool,
-        seconds: float | None = None,
-    ) -> Iterator[tuple[int, list[Record]]]:
-        """The records of each chunk as they come; `seconds`: after which a scene is taken to hang."""
-        self.task = (suite, witnesses, draw, pool.longest(suite) if seconds is None else seconds)
+        function: Callable[[Any], Any],
+        chunks: Iterable[processes.Chunk],
+        seconds: float,
+        instead: processes.Instead,
+    ) -> Iterator[tuple[int, list[Any]]]:
+        """Apply a function to chunks of items, each as it is done; `seconds`: after which an item is taken to hang."""
+        self.task = (seconds, function)
         try:
-            yield from pool.as_done(suite, chunks, witnesses, self)
-        except pool.StalledError:
+            yield from processes.as_done(chunks, self, instead)
+        except processes.StalledError:
             raise self._no_workers() from None
         finally:
             self._leave()
@@ -115,16 +106,14 @@ class Cluster:
     @property
     def in_flight(self) -> int:
         """Chunks submitted at a time."""
-        return pool.IN_FLIGHT * max(1, len(self.client.nthreads()))  # type: ignore[no-untyped-call]
+        return processes.IN_FLIGHT * max(1, len(self.client.nthreads()))  # type: ignore[no-untyped-call]
 
-    def submit(self, scenes: Sequence[int], who: Sequence[Witness]) -> "Future[list[Record]]":
-        """Hand in some scenes."""
-        suite, _, draw, seconds = self.task
-        task = (code(), seconds, *pool.part(suite, scenes), who, draw)
-        return self.client.submit(judge_alike, *task, retries=0, pure=False)
+    def submit(self, items: Sequence[Any]) -> "Future[list[Any]]":
+        """Hand in some items."""
+        return self.client.submit(apply_alike, code(), *self.task, items, retries=0, pure=False)
 
     def done(self, tasks: "Collection[Future[Any]]", seconds: float) -> "set[Future[Any]]":
-        """Those that are finished, as soon as there is one; none after some seconds."""
+        """Wait for those that are finished, until there is one; none after some seconds."""
         until = time.monotonic() + seconds
         while True:
             finished = {task for task in tasks if task.done()}  # type: ignore[no-untyped-call]
@@ -135,13 +124,13 @@ class Cluster:
             time.sleep(POLL)
 
     def result(self, task: "Future[Any]") -> Any:
-        """What a task returned or raised; ClusterError where that is not the task's own doing."""
+        """Return or raise what a task did; ClusterError where that is not the task's own doing."""
         while True:
             try:
-                return task.result(timeout=pool.STALL)
+                return task.result(timeout=processes.STALL)
             except TimeoutError:  # the worker that has it is gone, or the result was lost in transit
                 if self.lost([task]):
-                    raise pool.StalledError from None
+                    raise processes.StalledError from None
             except CancelledError:  # what was unfinished when the scheduler was lost
                 raise self._gone() from None
             except ImportError as error:  # a worker that joined later; what an engine does not find is in its row
@@ -152,7 +141,7 @@ class Cluster:
                 raise
 
     def lost(self, _: "Collection[Future[Any]]") -> bool:
-        """Whether no worker is left."""
+        """Tell whether no worker remains."""
         try:
             return not self.client.nthreads()  # type: ignore[no-untyped-call]
         except (OSError, RuntimeError):
@@ -170,8 +159,8 @@ class Cluster:
     def _gone(self) -> ClusterError:
         return ClusterError(f"{self.scheduler}: the scheduler is gone; what is finished is kept")
 
-    def _no_workers(self) -> pool.NoWorkersError:
-        return pool.NoWorkersError(f"{self.scheduler}: no workers; start some, what is finished is kept")
+    def _no_workers(self) -> processes.NoWorkersError:
+        return processes.NoWorkersError(f"{self.scheduler}: no workers; start some, what is finished is kept")
 
     def _unfit(self, error: BaseException) -> ClusterError:
         why = error.__cause__ or error

@@ -94,7 +94,7 @@ def run(
         "draw": draw,
         "time limit": seconds,
     }
-    with Store(out, identity).held() as store:
+    with Store(out, identity, OUTCOME).held() as store:
         for name in OUTCOME:
             (out / name).unlink(missing_ok=True)
         done = store.done()
@@ -102,12 +102,8 @@ def run(
         yield sum(len(chunks[number]) for number in done)
         todo = [(number, scenes) for number, scenes in enumerate(chunks) if number not in done]
         cluster = None if scheduler is None else Cluster(scheduler)
-        if cluster is not None:
-            answers = cluster.over(suite, todo, witnesses, draw, seconds)
-        else:
-            answers = pool.over_processes(suite, todo, witnesses, draw, workers, seconds)
-        for number, records in answers:
-            store.put(number, records)
+        for number, records in pool.judge_chunks(suite, todo, witnesses, draw, workers, seconds, cluster):
+            store.put(number, [record.kept_all() for record in records])
             yield len(records)
         summary = Summary()
         summary.tolerances = list(dict.fromkeys((IDENTITY, *(witness.tolerance for witness in witnesses))))
@@ -115,7 +111,7 @@ def run(
         with Columns(out) as columns, drafted(out / OUTPUT) as output, drafted(out / "timings.csv") as times:
             times.write(csv_text(TIMINGS, []))
             for number, scenes in enumerate(chunks):
-                records = store.read(number)
+                records = [Record.restore(kept) for kept in store.read(number)]
                 for scene, each in zip(scenes, records, strict=True):
                     each.rows = each.rows or [nothing_judged(plain(suite.name(scene)))]
                     summary.add(each)
@@ -182,7 +178,7 @@ def pictures_of(
         groups.setdefault(tuple(each for each in witnesses if each.name not in without), []).append(index)
     for who, indices in groups.items():
         chunks = [(index, range(index, index + 1)) for index in indices]
-        for _, judged in pool.over_processes(suite, chunks, who, True, workers, seconds):
+        for _, judged in pool.judge_chunks(suite, chunks, who, True, workers, seconds):
             yield from judged
 
 

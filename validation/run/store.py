@@ -1,9 +1,9 @@
-"""The folder of a run: a lock, finished parts, and at the end the results.
+"""The folder of whatever runs long: a lock, finished parts, and at the end the results.
 
 lock               held while a run goes on; the system frees it when the process dies
 run.json           what is being run; a rerun of the same thing resumes, of another starts over
 parts/000012       what chunk 12 came to, written whole: a line of JSON that says of which run it is, and the SHA-256
-                   of what follows; then a line of JSON for each record, packed by gzip
+                   of what follows; then a line of JSON for each result, packed by gzip
 """
 
 import gzip
@@ -17,19 +17,6 @@ from typing import Any
 
 from fourbar.errors import DependencyError, FourBarError, InputError
 from fourbar.writing import require_file, write_bytes, write_text
-from validation.report.record import Record
-
-WRITTEN = [
-    "lock",
-    "run.json",
-    "record.json",
-    "results.csv",
-    "results.parquet",
-    "timings.csv",
-    "report.md",
-    "report.html",
-]
-"""Files of the folder of a run."""
 
 
 class RunningError(FourBarError):
@@ -37,10 +24,10 @@ class RunningError(FourBarError):
 
 
 class Store:
-    """The parts of one run in its folder: `identity` is what they depend on."""
+    """The parts of one run in its folder: `identity` is what they depend on, `outcome` the files it ends with."""
 
-    def __init__(self, folder: Path, identity: dict[str, Any]) -> None:
-        self.folder, self.parts = folder, folder / "parts"
+    def __init__(self, folder: Path, identity: dict[str, Any], outcome: Sequence[str] = ()) -> None:
+        self.folder, self.parts, self._written = folder, folder / "parts", ("lock", "run.json", *outcome)
         self._identity = json.dumps(identity, indent=1, sort_keys=True) + "\n"
         self._run = hashlib.sha256(self._identity.encode()).hexdigest()
         self.notes: list[str] = []
@@ -52,7 +39,7 @@ class Store:
         from filelock import FileLock, Timeout
 
         self.folder.mkdir(parents=True, exist_ok=True)
-        for name in WRITTEN:
+        for name in self._written:
             require_file(self.folder / name)
         if self.parts.exists() and not self.parts.is_dir():
             raise InputError("--out", str(self.parts), "must be a folder, in which a run keeps its parts")
@@ -82,7 +69,7 @@ class Store:
             write_text(marker, self._identity)
 
     def _other(self, marker: Path) -> str:
-        """In what the earlier run differs from this one."""
+        """Name what the earlier run differs in from this one."""
         try:
             before, now = json.loads(marker.read_text(encoding="utf-8")), json.loads(self._identity)
             return ", ".join(name for name in sorted({*before, *now}) if before.get(name) != now.get(name))
@@ -90,7 +77,7 @@ class Store:
             return "its run.json is damaged"
 
     def done(self) -> set[int]:
-        """The chunks whose parts are whole and of this run; others are removed, and noted."""
+        """List the chunks whose parts are complete and of this run; others are removed, and noted."""
         found = set()
         for path in sorted(self.parts.iterdir()):
             try:
@@ -101,9 +88,9 @@ class Store:
                 _remove(path)
         return found
 
-    def put(self, chunk: int, records: Sequence[Record]) -> None:
-        """Write a finished chunk."""
-        packed = gzip.compress("\n".join(json.dumps(record.kept_all()) for record in records).encode(), 1, mtime=0)
+    def put(self, chunk: int, results: Sequence[Any]) -> None:
+        """Write a finished chunk, its results as JSON has them."""
+        packed = gzip.compress("\n".join(map(json.dumps, results)).encode(), 1, mtime=0)
         head = {"chunk": chunk, "run": self._run, "sha256": hashlib.sha256(packed).hexdigest()}
         write_bytes(self._path(chunk), json.dumps(head).encode() + b"\n" + packed)
 
@@ -111,7 +98,7 @@ class Store:
         return self.parts / f"{chunk:06d}"
 
     def _packed(self, path: Path) -> bytes:
-        """What follows the first line of a part; ValueError that says what is wrong with it."""
+        """Read what follows the first line of a part; ValueError that says what is wrong with it."""
         if not path.is_file():
             raise ValueError("is no file")
         first, _, packed = path.read_bytes().partition(b"\n")
@@ -127,23 +114,23 @@ class Store:
             raise ValueError("is another part")
         return packed
 
-    def read(self, chunk: int) -> list[Record]:
-        """The records of a chunk, in order; DependencyError where the part was damaged meanwhile."""
+    def read(self, chunk: int) -> list[Any]:
+        """Read the results of a chunk, in order; DependencyError where the part was damaged meanwhile."""
         path = self._path(chunk)
         try:
             lines = gzip.decompress(self._packed(path)).decode().splitlines()
         except (ValueError, FileNotFoundError) as error:
             raise DependencyError(f"{path}: {error}; run it again, and this part is made again") from None
-        return [Record.restore(json.loads(line)) for line in lines]
+        return [json.loads(line) for line in lines]
 
     def finish(self) -> None:
-        """The results are written: the parts have served."""
+        """Remove the parts, once the results are written."""
         shutil.rmtree(self.parts)
         (self.folder / "run.json").unlink()
 
 
 def _remove(path: Path) -> None:
-    """Whatever lies there under the name of a file."""
+    """Remove whatever lies there under the name of a file."""
     if path.is_dir() and not path.is_symlink():
         shutil.rmtree(path)
     else:

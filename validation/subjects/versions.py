@@ -5,7 +5,7 @@ import math
 import os
 import time
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from pathlib import Path
 
 import click
@@ -15,6 +15,7 @@ from fourbar.errors import DependencyError
 from fourbar.scene import command as on_path
 from fourbar.writing import write_text
 from validation.engines.witnesses import FURTHER, WITNESSES
+from validation.engines.workers import each
 from validation.regression.change import Change, Kind
 from validation.regression.changes import differences
 from validation.regression.history import Run
@@ -73,20 +74,8 @@ def command(
     arguments.append(f"--time-limit={SECONDS!r}")
     timing = next(iter(scenes), TIMED).absolute()
 
-    def attempt(version: str) -> Release:
-        python, why = installed(engine, version, cache, more)
-        if python is None:
-            return Release(version, None, why)
-        folder = out / "runs" / version
-        folder.mkdir(parents=True, exist_ok=True)
-        try:
-            run_elsewhere(python, arguments, folder)
-        except ElsewhereError as error:
-            return Release(version, None, str(error).partition(": ")[2])
-        run = Run(*read_run(folder), {})  # its times are of the wall clock, with other jobs
-        return Release(version, run.of(lambda row: row.engine in witnesses), seconds=timed(python, timing, witnesses))
-
-    found = bisected(chosen, attempt) if bisect else scanned(chosen, attempt, jobs)
+    there = partial(_attempt, arguments, witnesses, timing, (engine, cache, more), out / "runs")
+    found = bisected(chosen, there) if bisect else scanned(chosen, there, jobs)
     if sum(release.run is not None for release in found) < 2:
         reasons = "; ".join(f"{release.version}: {release.why}" for release in found if release.run is None)
         raise DependencyError(f"fewer than two versions of {engine} can be judged: {reasons}")
@@ -99,6 +88,28 @@ def command(
     for sentence in changed(found):
         click.echo(sentence)
     click.echo(f"{len(found)} versions of {engine}, {left} not needed: {out}/versions.md, .svg, .csv, .json")
+
+
+def _attempt(
+    arguments: list[str],
+    witnesses: list[str],
+    timing: Path,
+    what: tuple[str, Path, tuple[str, ...]],
+    runs: Path,
+    version: str,
+) -> Release:
+    engine, cache, more = what
+    python, why = installed(engine, version, cache, more)
+    if python is None:
+        return Release(version, None, why)
+    folder = runs / version
+    folder.mkdir(parents=True, exist_ok=True)
+    try:
+        run_elsewhere(python, arguments, folder)
+    except ElsewhereError as error:
+        return Release(version, None, str(error).partition(": ")[2])
+    run = Run(*read_run(folder), {})  # its times are of the wall clock, with other jobs
+    return Release(version, run.of(lambda row: row.engine in witnesses), seconds=timed(python, timing, witnesses))
 
 
 def timed(python: Path, scene: Path, witnesses: Sequence[str]) -> dict[str, float]:
@@ -129,8 +140,7 @@ def clock(file: str, *names: str) -> None:
 
 def scanned(versions: Sequence[str], attempt: Try, jobs: int) -> list[Release]:
     """Every version, so many at a time."""
-    with ThreadPoolExecutor(jobs) as pool:
-        return list(pool.map(attempt, versions))
+    return list(each(attempt, versions, jobs, seconds=None))
 
 
 def bisected(versions: Sequence[str], attempt: Try) -> list[Release]:

@@ -8,6 +8,7 @@ import math
 import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
 import click
@@ -19,6 +20,7 @@ from fourbar.scene import Command, Scene
 from fourbar.solve import solve
 from validation.compare.error import used
 from validation.engines.balls import reference
+from validation.engines.workers import each
 from validation.report.terminal import lined_up
 from validation.stress.forward_error.families import FAMILIES
 
@@ -160,6 +162,10 @@ def run(family: str, samples: range, seed: int = 0) -> Tally:
     return tally
 
 
+def _run(seed: int, task: tuple[str, range]) -> Tally:
+    return run(*task, seed)
+
+
 def chunks(samples: int) -> Iterator[range]:
     """The sample numbers in portions of one task."""
     for start in range(0, samples, CHUNK):
@@ -173,14 +179,13 @@ def chunks(samples: int) -> Iterator[range]:
 @click.option("--jobs", default=2, show_default=True, help="Processes.")
 def stability(samples: int, families: tuple[str, ...], seed: int, jobs: int) -> int:
     """Error of every output against 50-digit arithmetic, and whether the error bars hold."""
-    from joblib import Parallel, delayed
     from rich.box import HEAVY_HEAD
     from rich.console import Console
     from rich.progress import track
 
     chosen = families or tuple(FAMILIES)
     tasks = [(family, part) for family in chosen for part in chunks(samples)]
-    results = Parallel(n_jobs=jobs, return_as="generator")(delayed(run)(family, part, seed) for family, part in tasks)
+    results = each(partial(_run, seed), tasks, jobs, seconds=None)
     tallies = {family: Tally() for family in chosen}
     for (family, _), tally in track(zip(tasks, results, strict=True), "samples", total=len(tasks)):
         tallies[family].add(tally)

@@ -1,9 +1,9 @@
 """The command: random scenes through files, formulas and exact engines, in chunks; findings are shrunk and kept."""
 
-import json
 import warnings
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import click
@@ -13,14 +13,15 @@ from fourbar.files import dump, loads
 from fourbar.scene import Command, Scene, command
 from fourbar.solution import Solution
 from fourbar.solve import solve
-from fourbar.writing import write_text
 from validation.compare.compare import TOUCHING_MARGIN, closing_margin, compare
 from validation.compare.identities import identities
-from validation.compare.rows import FAILS
+from validation.compare.rows import FAILS, in_words
 from validation.compare.statements.statements import statements
 from validation.engines.hard_suite import predicting
 from validation.engines.witnesses import WITNESSES, predicting_from
-from validation.report.machine import versions
+from validation.engines.workers import over_processes
+from validation.report.machine import code
+from validation.run.store import Store
 from validation.stress.fuzz.scenes import scene_of
 from validation.stress.fuzz.shrink import keep, shrunk
 
@@ -29,6 +30,8 @@ EXACT = tuple(predicting(w) for w in WITNESSES if w.name in ("pinocchio-inverse"
 CHUNK = 200
 """Scenes per task: some seconds, which is what an interruption costs."""
 SHOWN = 20
+LOST = "worker:"
+"""How the discrepancy of a scene begins that killed its worker, or never came back."""
 
 
 def findings(scene: Scene) -> list[str]:
@@ -78,38 +81,28 @@ def _engines(scene: Scene, at: Command, solution: Solution) -> list[str]:
     return [f"{row.engine} {row.quantity}: {row.reason}" for row in failed]
 
 
-def examine_chunk(seed: int, start: int, stop: int) -> dict[str, list[str]]:
-    """Number of each scene that fails: what is wrong with it."""
-    found = {}
-    for index in range(start, stop):
-        wrong = findings(scene_of(seed, index))
-        if wrong:
-            found[str(index)] = wrong
-    return found
+def examine(seed: int, index: int) -> list[str]:
+    """Examine the scene of a number."""
+    return findings(scene_of(seed, index))
+
+
+def _lost(_: int, error: Exception, __: object) -> list[str]:
+    return [f"{LOST} {in_words(error)}"]
 
 
 def run(count: int, seed: int, out: Path, workers: int) -> Iterator[dict[str, list[str]]]:
-    """Examine the scenes chunk by chunk; chunks that an interrupted run finished are read, not done again."""
-    from joblib import Parallel, delayed
-
-    out.mkdir(parents=True, exist_ok=True)
-    marker, identity = out / "run.json", json.dumps({"seed": seed, "versions": versions()}, sort_keys=True)
-    if not marker.is_file() or marker.read_text(encoding="utf-8") != identity:
-        for old in out.glob("chunk-*.json"):
-            old.unlink()
-        write_text(marker, identity)
-    todo = []
-    for start in range(0, count, CHUNK):
-        stop = min(start + CHUNK, count)
-        part = out / f"chunk-{start:09d}-{stop:09d}.json"
-        if part.is_file():
-            yield json.loads(part.read_text(encoding="utf-8"))
-        else:
-            todo.append((part, start, stop))
-    tasks = (delayed(examine_chunk)(seed, start, stop) for _, start, stop in todo)
-    for (part, _, _), found in zip(todo, Parallel(n_jobs=workers, return_as="generator")(tasks), strict=True):
-        write_text(part, json.dumps(found))
-        yield found
+    """Examine the scenes chunk by chunk, what is wrong by number; chunks of an interrupted run are read."""
+    with Store(out, {"seed": seed, **code()}).held() as store:
+        chunks = {
+            min(start + CHUNK, count): range(start, min(start + CHUNK, count)) for start in range(0, count, CHUNK)
+        }
+        done = store.done() & chunks.keys()
+        yield from (store.read(stop)[0] for stop in sorted(done))
+        todo = [chunk for chunk in chunks.items() if chunk[0] not in done]
+        for stop, found in over_processes(partial(examine, seed), todo, workers, instead=_lost):
+            wrong = {str(number): each for number, each in zip(chunks[stop], found, strict=True) if each}
+            store.put(stop, [wrong])
+            yield wrong
 
 
 @click.command()
@@ -130,9 +123,12 @@ def fuzz(scenes: int, seed: int, workers: int, out: Path) -> int:
     for found in track(run(scenes, seed, out, workers), "fuzzing", total=chunks, console=console):
         wrong |= found
     for number in sorted(wrong, key=int)[:SHOWN]:
-        scene = shrunk(scene_of(seed, int(number)), lambda candidate: bool(findings(candidate)))
+        scene, first = scene_of(seed, int(number)), wrong[number][0]
+        if not first.startswith(LOST):  # it would end this process too
+            scene = shrunk(scene, lambda candidate: bool(findings(candidate)))
+            first = findings(scene)[0]
         title = f"found by fuzzing, seed {seed}, scene {number}"
-        path = keep(replace(scene, title=title, source=findings(scene)[0]), f"seed_{seed}_scene_{number}")
+        path = keep(replace(scene, title=title, source=first), f"seed_{seed}_scene_{number}")
         console.print(f"scene {number}: {wrong[number][0]}\n  kept as {path.name}")
     print(f"{len(wrong)} of {scenes} scenes fail (seed {seed}, half of them adversarial)")
     return 1 if wrong else 0

@@ -2,10 +2,10 @@
 
 import json
 import sys
-from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Iterator, Sequence
 from typing import Any
 
+from validation.engines.workers import each
 from validation.run.elsewhere import ended
 from validation.stress.mutation import planting
 from validation.stress.mutation.planting import ROOT, faults
@@ -18,7 +18,7 @@ Failing = dict[str, list[str]]
 """By specimen: the rows that fail."""
 
 
-def outcomes(*numbers: int) -> list[Failing] | str:
+def outcomes(numbers: Sequence[int]) -> list[Failing] | str:
     """What fails with the fault of each number, one after another, or why nothing was found; once without any fault."""
     line = [sys.executable, "-P", planting.__file__, *numbers]
     done = ended(line, folder=ROOT, seconds=SECONDS, variables={"PYTHONPATH": str(ROOT)})
@@ -41,12 +41,10 @@ def survives(entry: dict[str, Any], found: Failing | str) -> str | None:
 def planted(workers: int) -> Iterator[tuple[str, str | None]]:
     """Every fault with the reason why it survives, or None; first the tree without a fault."""
     entries = faults()
-    with ThreadPoolExecutor(workers) as pool:
-        without, *found = (pool.submit(outcomes, *number) for number in [(), *((n,) for n in range(len(entries)))])
-        rows = without.result()
-        failing = rows if isinstance(rows, str) else [row for found in rows[0].values() for row in found]
-        yield "no fault", f"the harness fails without one: {failing}" if failing else None
-        for entry, one in zip(entries, found, strict=True):
-            rows = one.result()
-            why = survives(entry, rows if isinstance(rows, str) else rows[0])
-            yield entry["fault"], None if why and "harmless" in entry else why
+    tried = each(outcomes, [(), *((n,) for n in range(len(entries)))], workers, seconds=None)
+    rows = next(tried)
+    failing = rows if isinstance(rows, str) else [row for found in rows[0].values() for row in found]
+    yield "no fault", f"the harness fails without one: {failing}" if failing else None
+    for entry, rows in zip(entries, tried, strict=True):
+        why = survives(entry, rows if isinstance(rows, str) else rows[0])
+        yield entry["fault"], None if why and "harmless" in entry else why

@@ -89,7 +89,7 @@ def write(study: Study, curves: Mapping[str, Sequence[Point]], found: Sequence[L
     """cost.csv, cost.md and the pictures."""
     from validation.studies.cost.pictures import draw
 
-    folder = study.folder.parent
+    folder = study.folder
     paths = [folder / "cost.csv", folder / "cost.md"]
     write_text(paths[0], to_csv(curves))
     pictures = draw(curves, subtitle(study.scene, title), folder)

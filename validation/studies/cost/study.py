@@ -1,6 +1,5 @@
 """The work-precision study of one scene: curve after curve, each kept once it is done."""
 
-import json
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, fields, replace
@@ -14,11 +13,11 @@ from fourbar.errors import FourBarError, LimitError
 from fourbar.files import dump
 from fourbar.formulas.mobility import turns_fully
 from fourbar.scene import Command, Scene, command
-from fourbar.writing import write_text
 from validation.compare.answer import Engine
 from validation.engines.loop import Trial
 from validation.engines.mujoco.trial import Rig
 from validation.report.machine import versions
+from validation.run.store import Store
 from validation.stress.timed import in_turns, seconds
 from validation.studies.cost import formulas
 from validation.studies.cost.advise import advise
@@ -35,7 +34,7 @@ REQUIRED = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 2e-9)
 """Errors for which the advice is drawn."""
 ONE_STATE = (0.9, 0.99, 0.999, 0.9999)
 VERSION = 6
-"""Of what is tried; parts of another one are done again."""
+"""Of what is tried; parts of another one are made again."""
 EXACT, STEPPED, FORMULAS = "exact", "stepped", "formulas"
 
 
@@ -85,17 +84,10 @@ class Study:
     """The parts of a study of one scene, each in its own file."""
 
     def __init__(self, name: str, scene: Scene, folder: Path) -> None:
-        self.name, self.scene, self.folder = name, scene, folder / "parts"
+        self.name, self.scene, self.folder = name, scene, folder
         self.command = command(scene)
         self.left_out: list[str] = []
         self._rigs: dict[tuple[bool, bool, bool], Rig] = {}
-        identity = json.dumps({"scene": dump(scene), "versions": versions(), "study": VERSION}, sort_keys=True)
-        marker = self.folder / "study.json"
-        if not (marker.is_file() and marker.read_text(encoding="utf-8") == identity):
-            for old in self.folder.glob("*.json"):
-                old.unlink()
-            self.folder.mkdir(parents=True, exist_ok=True)
-            write_text(marker, identity)
         self.units: dict[str, Callable[[], list[Point]]] = {"formulas": self._formulas, "inverse": self._inverse}
         self.units["one state"] = self._one_state
         self.units["Pinocchio forward"] = self._pinocchio_forward
@@ -108,21 +100,23 @@ class Study:
 
     def points(self) -> Iterator[tuple[str, list[Point]]]:
         """Curve after curve; what is on disk is not done again."""
-        for number, (name, unit) in enumerate(self.units.items()):
-            path = self.folder / f"{number:03d}.json"
-            if path.is_file():
-                kept = json.loads(path.read_text(encoding="utf-8"))
-                self.left_out += kept["left_out"]
-                yield name, [Point(**row) for row in kept["points"]]
-                continue
-            reasons: list[str] = []
-            try:
-                found = unit()
-            except (FourBarError, NotImplementedError) as error:
-                found, reasons = [], [f"{name}: {error}"]
-            self.left_out += reasons
-            write_text(path, json.dumps({"points": [asdict(point) for point in found], "left_out": reasons}))
-            yield name, found
+        identity = {"scene": dump(self.scene), "versions": versions(), "study": VERSION}
+        with Store(self.folder, identity).held() as store:
+            done = store.done()
+            for number, (name, unit) in enumerate(self.units.items()):
+                if number in done:
+                    points, reasons = store.read(number)
+                    self.left_out += reasons
+                    yield name, [Point(**row) for row in points]
+                    continue
+                reasons = []
+                try:
+                    found = unit()
+                except (FourBarError, NotImplementedError) as error:
+                    found, reasons = [], [f"{name}: {error}"]
+                self.left_out += reasons
+                store.put(number, [[asdict(point) for point in found], reasons])
+                yield name, found
 
     def rig(self, slow: bool = False, bare: bool = False, settled: bool = False) -> Rig:
         """The scene assembled for trials: at its own speed or slow, as it is or bare, after a turn or not."""
