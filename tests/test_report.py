@@ -17,10 +17,11 @@ from tests.scenes import crank_rocker
 from validation.compare.rows import FAILS, to_csv
 from validation.engines.witnesses import WITNESSES
 from validation.report.costs import cost_points
-from validation.report.figures import FLOOR, STRETCHES, worst_of_stretches
+from validation.report.figures import STRETCHES, worst_of_stretches
 from validation.report.html import ALL_OPEN, Section, html, markdown
 from validation.report.record import Record
 from validation.report.summary import Summary
+from validation.report.svg import FLOOR
 from validation.run.judge import judged
 
 COMMENT_LIMIT = 65_536

@@ -16,7 +16,7 @@ import pytest
 from tests.here import judge_here
 from validation.cli import status
 from validation.compare.rows import AGREES, FAILS, Row, to_csv
-from validation.regression.history import Run
+from validation.regression.history import HistoryRun
 from validation.regression.record import About, write_about
 from validation.run.elsewhere import ElsewhereError, Ended
 from validation.subjects import releases, versions, versions_page
@@ -111,7 +111,7 @@ def judged(version: str, error: float, verdict: str = AGREES) -> Release:
         Row("a", "mujoco-inverse", "exact", "F43", error, 1e-6, verdict, "", 0.0, 1.0),
         Row("a", "mujoco-inverse", "exact", "torque", 1e-9, 1e-6, AGREES, "", 0.0, 1.0),
     ]
-    return Release(version, Run(about, rows, {}), seconds={"mujoco-inverse": 1e-3})
+    return Release(version, HistoryRun(about, rows, {}), seconds={"mujoco-inverse": 1e-3})
 
 
 def made_up(changes: dict[int, tuple[float, str]], broken: set[int], tried: list[int]) -> versions.Try:

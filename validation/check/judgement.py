@@ -10,7 +10,7 @@ from fourbar.scene import Scene
 from validation.check.judge import Finding, Judge, Tolerance
 from validation.check.mistakes import Explanation, explain
 from validation.check.theirs import Table
-from validation.report.junit import Case, document
+from validation.report.junit import JunitCase, document
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,7 +115,7 @@ def as_junit(judgement: Judgement, name: str) -> str:
     return document(judgement.sentence(), _cases(judgement, name))
 
 
-def _cases(judgement: Judgement, name: str) -> Iterator[Case]:
+def _cases(judgement: Judgement, name: str) -> Iterator[JunitCase]:
     by_quantity = {quantity: [f for f in judgement.findings if f.quantity == quantity] for quantity in
                    dict.fromkeys(f.quantity for f in judgement.findings)}  # fmt: skip
     for quantity, findings in by_quantity.items():
@@ -125,11 +125,11 @@ def _cases(judgement: Judgement, name: str) -> Iterator[Case]:
             worst = max(differing, key=lambda finding: finding.error)
             text = f"{len(differing)} of {len(judged)} differ; line {worst.line}: theirs {worst.theirs}, ours "
             text += f"{worst.ours} in SI, error {worst.error:.2e}, allowed {worst.allowed:.2e}"
-            yield Case(name, name, quantity, "failure", "differs", text)
+            yield JunitCase(name, name, quantity, "failure", "differs", text)
         else:
             skipped = "no digit is left to judge by"
-            yield Case(name, name, quantity, *(("passed",) if judged else ("skipped", "not judged", skipped)))
+            yield JunitCase(name, name, quantity, *(("passed",) if judged else ("skipped", "not judged", skipped)))
     for line in judgement.not_assembled:
-        yield Case(name, name, f"line {line}", "failure", "no motion", "the linkage has no motion there")
+        yield JunitCase(name, name, f"line {line}", "failure", "no motion", "the linkage has no motion there")
     if not judgement.compared:
-        yield Case(name, name, "anything is compared", "failure", "nothing compared", judgement.sentence())
+        yield JunitCase(name, name, "anything is compared", "failure", "nothing compared", judgement.sentence())

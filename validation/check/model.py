@@ -197,5 +197,7 @@ def show(report: ModelReport, mjcf: Path, out: Path) -> None:
 
 def markdown(report: ModelReport, mjcf: Path) -> str:
     """The same as text for a page."""
-    what = {"report": report, "mjcf": mjcf.name, "about": ABOUT_SHARES, "headings": HEADINGS}
+    what = {"report": report, "mjcf": mjcf.name, "about": ABOUT_SHARES, "headings": ("method", *HEADINGS)}
+    what |= {"causes": [cause.cells() for cause in report.causes]}
+    what |= {"costs": [(cost.method, *cost.cells()) for cost in report.costs]}
     return rendered("validation.check", "theirs.md.j2", **what)

@@ -210,12 +210,12 @@ def over_processes(
     unfinished: dict[int, Sequence[Any]] = {}
     in_vain = 0
 
-    def begun() -> Iterator[Chunk]:
+    def started() -> Iterator[Chunk]:
         for number, items in chunks:
             unfinished[number] = items
             yield number, items
 
-    waiting = begun()
+    waiting = started()
     while True:
         with ProcessPool(
             max_workers=workers, context=WorkerContext(), initializer=ready, initargs=[os.getpid(), function]

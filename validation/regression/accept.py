@@ -34,7 +34,7 @@ CHOICES = {"only": "scene", "engines": "engine", "quantity": "quantity"}
 
 
 def output_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """The options --markdown, --html and --junit."""
+    """Add the options --markdown, --html and --junit."""
     for form in reversed(FORMS):
         path = click.Path(path_type=Path, dir_okay=False)
         text = f"Write the differences as {form} too"
@@ -44,7 +44,7 @@ def output_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def choosing_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """The options --only, --engines and --quantity."""
+    """Add the options --only, --engines and --quantity."""
     for option, column in reversed(CHOICES.items()):
         text = f"These alone, comma-separated: names of column {column}."
         command = click.option(f"--{option}", metavar="NAMES", help=text)(command)
@@ -72,7 +72,7 @@ def report_differences(
 
 
 def in_sight(scenes: Iterable[T]) -> Iterator[T]:
-    """The same, their number shown meanwhile where somebody looks."""
+    """Pass them on, their number shown meanwhile where somebody looks."""
     from rich.console import Console
     from rich.progress import MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 

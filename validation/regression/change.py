@@ -69,7 +69,7 @@ class Change:
 
 
 def change(key: Key, old: Row | None, new: Row | None) -> Change:
-    """A row of both runs, or of one of them."""
+    """Compare a row of both runs, or take that of one of them."""
     if old is None or new is None:
         fails = new is not None and new.verdict == FAILS
         kind = Kind.NEW_FAILURE if fails else Kind.NEW

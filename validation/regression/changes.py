@@ -38,7 +38,7 @@ class Named:
         self._last = ""
 
     def add(self, name: str) -> None:
-        """One row more of a name."""
+        """Add one more row of a name."""
         if name in self._rows or len(self._rows) < NAMED:
             self._rows[name] += 1
         else:
@@ -77,7 +77,7 @@ class Differences:
     _not_compared: Named = field(default_factory=Named)
 
     def add(self, changes: Sequence[Change]) -> None:
-        """The rows of one scene more."""
+        """Add the rows of one more scene."""
         self.kinds.update(each.kind for each in changes)
         self.counts.add(each.new for each in changes if each.new is not None)
         alike = (each for each in changes if each.kind not in OTHER_QUESTION)
@@ -97,7 +97,7 @@ class Differences:
                 self._changes[each.kind] = nlargest(self.kept, some, key=lambda one: one.severity)
 
     def of(self, kind: Kind) -> list[Change]:
-        """The changes of one kind, the worst first; at most `kept` of them."""
+        """List the changes of one kind, the worst first; at most `kept` of them."""
         return nlargest(self.kept, self._changes.get(kind, ()), key=lambda one: one.severity)
 
     @property
@@ -214,7 +214,7 @@ def under_new_names(scenes: ByScene[T], names: Mapping[str, str]) -> ByScene[T]:
 
 
 def by_scene(rows: Iterable[Row]) -> Iterator[tuple[str, list[Row]]]:
-    """The rows of one scene after the other."""
+    """Group the rows by scene."""
     for scene, some in groupby(rows, key=lambda row: row.scene):
         yield scene, list(some)
 
@@ -244,7 +244,7 @@ def _by_key(scene: str, rows: Iterable[Row]) -> dict[Key, Row]:
 def _of_scene(
     before: Mapping[Key, Row], after: Mapping[Key, Row], engines: set[str], wanted: bool, other: SceneChange | None
 ) -> list[Change]:
-    """What happened to each row of a scene; `engines`: those it was run for, where it was `wanted` at all."""
+    """Tell what happened to each row of a scene; `engines`: those it was run for, where it was `wanted` at all."""
     settings = _other_settings(before, after)
     changes = []
     for key in sorted(before.keys() | after.keys()):
@@ -277,7 +277,7 @@ def _other_settings(before: Mapping[Key, Row], after: Mapping[Key, Row]) -> dict
 
 
 def _surroundings(old: About, new: About) -> tuple[list[tuple[str, str, str]], list[str]]:
-    """What the runs were made with where it differs, and what a record cannot say."""
+    """List what the runs were made with where it differs, and what a record cannot say."""
     found = [("commit", old.commit, new.commit)] if old.commit and new.commit else []
     found += _both(old.versions, new.versions)
     found.append(("machine", old.machine, new.machine))

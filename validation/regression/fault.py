@@ -30,7 +30,7 @@ class Group:
     worst: Change | None = None
 
     def add(self, changes: Sequence[Change]) -> None:
-        """The rows of one scene more."""
+        """Add the rows of one more scene."""
         self.scenes += 1
         self.rows += len(changes)
         self.quantities.update(each.key[3] for each in changes)
@@ -52,7 +52,7 @@ class Fault:
         self._who: Counter[tuple[str, frozenset[str]]] = Counter()
 
     def add(self, changes: Iterable[Change]) -> None:
-        """The rows of one scene."""
+        """Add the rows of one scene."""
         changes = list(changes)
         self._scenes.update({each.key[1] for each in changes if each.kind is not Kind.NOT_RUN})
         groups: dict[tuple[str, Kind, str], list[Change]] = {}
@@ -96,7 +96,7 @@ def _compared_exactly(row: Row | None) -> bool:
 
 
 def cause(of: Change) -> str:
-    """What a report says of why, its numbers left out: one cause has one text in all scenes."""
+    """Take the reason without its numbers: one cause has one text in all scenes."""
     if of.kind in (Kind.VERDICT_WORSE, Kind.VERDICT_BETTER, Kind.NEW_FAILURE) and of.new is not None:
         came = f"{of.old.verdict} -> {of.new.verdict}" if of.old is not None else of.new.verdict
         return f"{came}: {NUMBER.sub('#', of.new.reason)}"

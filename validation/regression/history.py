@@ -30,7 +30,7 @@ OF_A_ROW = tuple(MADE_OF)
 
 
 @dataclass(frozen=True, slots=True)
-class Run:
+class HistoryRun:
     """One run of a history."""
 
     about: About
@@ -43,8 +43,8 @@ class Run:
         date = self.about.date[:16].replace("T", " ") or "no date"
         return f"{date} ({self.about.commit or 'no commit'})"
 
-    def of(self, keep: Callable[[Row], bool]) -> "Run":
-        """The rows that are wanted."""
+    def of(self, keep: Callable[[Row], bool]) -> "HistoryRun":
+        """Keep the rows that are wanted."""
         return replace(self, rows=[row for row in self.rows if keep(row)])
 
 
@@ -67,18 +67,18 @@ def append(file: Path, run: tuple[About, list[Row]], times: Mapping[tuple[str, s
     _write(file, new)
 
 
-def read_history(file: Path) -> list[Run]:
-    """The runs of a history by date; InputError where it is none."""
+def read_history(file: Path) -> list[HistoryRun]:
+    """Read the runs of a history by date; InputError where it is none."""
     if not file.is_file():
         raise InputError("HISTORY", str(file), "there is no such file; `accept` and `history --add` make it")
     table = _read(file)
     scenes = _scenes(table)
-    runs: dict[str, Run] = {}
+    runs: dict[str, HistoryRun] = {}
     hashes: dict[str, dict[str, str]] = {}
     for cells in table.to_pylist():
         name = cells["run"]
         if name not in runs:
-            runs[name] = Run(_about(cells), [], {})
+            runs[name] = HistoryRun(_about(cells), [], {})
         _put(runs[name], hashes.setdefault(name, {}), cells)
     for name, run in runs.items():
         stated = {scene: scenes[each] for scene, each in hashes[name].items() if each in scenes}
@@ -86,7 +86,7 @@ def read_history(file: Path) -> list[Run]:
     return sorted(runs.values(), key=lambda run: run.about.date)
 
 
-def _put(run: Run, hashes: dict[str, str], cells: Mapping[str, Any]) -> None:
+def _put(run: HistoryRun, hashes: dict[str, str], cells: Mapping[str, Any]) -> None:
     scene, engine = plain(cells["scene"]), plain(cells["engine"])
     if cells["scene_hash"]:
         hashes[scene] = cells["scene_hash"]
@@ -108,7 +108,7 @@ def _about(cells: Mapping[str, Any]) -> About:
 
 
 def _table(about: About, rows: list[Row], times: Mapping[tuple[str, str], float]) -> Any:
-    """A run as columns; words that recur are kept once."""
+    """Write a run as columns; words that recur are kept once."""
     import pyarrow as pa
 
     hashes = {name: _hash(entries) for name, entries in about.scenes.items()}
@@ -149,7 +149,7 @@ def _read(file: Path) -> Any:
 
 
 def _sealed(data: bytes) -> bytes:
-    """The file with its SHA-256 in its notes; nothing where there is no place for one."""
+    """Put the SHA-256 of a file into its notes; nothing where there is no place for one."""
     places = [each.span(1) for each in re.finditer(re.escape(SEAL) + rb"..([0-9a-f]{64})", data, re.DOTALL)]
     if not places:
         return b""

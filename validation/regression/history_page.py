@@ -10,13 +10,12 @@ from typing import TYPE_CHECKING
 from validation.compare.error import used
 from validation.compare.identities import FORMULAS
 from validation.compare.rows import AGREES, DEGRADED, FAILS, REFUSES, VERDICTS
-from validation.compare.tolerance import EPS
 from validation.regression.change import Key
-from validation.regression.history import Run
+from validation.regression.history import HistoryRun
 from validation.regression.render import line
 from validation.regression.steps import Step
 from validation.report.colours import ALLOWED, GRID, INK, SOFT, style_of
-from validation.report.svg import svg_text
+from validation.report.svg import FLOOR, frame, svg_text
 from validation.report.templating import rendered
 
 if TYPE_CHECKING:
@@ -33,23 +32,22 @@ ROWS_DRAWN, ROWS_LISTED = 12, 200
 TIMED = "Time over the formulas', as a ratio to the first run's: mean over the scenes, and its scatter"
 LABELS = 6
 """Runs named on an axis."""
-FLOOR = EPS / 16.0
-"""Errors below this, zero among them, are drawn here."""
 
 
-def page(runs: Sequence[Run], found: Sequence[Step]) -> str:
-    """The page, whole in one file."""
+def page(runs: Sequence[HistoryRun], found: Sequence[Step]) -> str:
+    """Make the page, complete in one file."""
     changed = list(dict.fromkeys(change.key for step in reversed(found) for change in step.changes if change.new))
     pictures = [("Verdicts of each run", _verdicts(runs)), ("Worst error over what is allowed", _errors(runs))]
     if any(run.times for run in runs):
         pictures.append((TIMED, _times(runs)))
     rows = [(" / ".join(part for part in key if part), _row(runs, key)) for key in changed[:ROWS_DRAWN]]
     listed = [(step, [(c.kind.value, line(c)) for c in step.changes[:ROWS_LISTED]]) for step in reversed(found)]
+    verdicts = [verdict for verdict in VERDICTS if any(_counts(run)[verdict] for run in runs)]
     return rendered(
         "validation.regression",
         "history.html.j2",
-        runs=[(run, _counts(run)) for run in reversed(runs)],
-        verdicts=[verdict for verdict in VERDICTS if any(_counts(run)[verdict] for run in runs)],
+        runs=[_cells(run, verdicts) for run in reversed(runs)],
+        headings=("date, commit", *verdicts, "versions", "machine"),
         steps=listed,
         pictures=pictures,
         rows=rows,
@@ -58,28 +56,29 @@ def page(runs: Sequence[Run], found: Sequence[Step]) -> str:
     )
 
 
-def _counts(run: Run) -> Counter[str]:
+def _cells(run: HistoryRun, verdicts: Sequence[str]) -> tuple[object, ...]:
+    versions = ", ".join(f"{name} {version}" for name, version in run.about.versions.items())
+    return run.name, *(_counts(run)[verdict] for verdict in verdicts), versions, run.about.machine
+
+
+def _counts(run: HistoryRun) -> Counter[str]:
     return Counter(row.verdict for row in run.rows)
 
 
-def _figure(draw: "Callable[[Axes], None]", runs: Sequence[Run], salt: str) -> str:
-    """What was drawn over the runs, with their names and a legend."""
+def _figure(draw: "Callable[[Axes], None]", runs: Sequence[HistoryRun], salt: str) -> str:
+    """Draw over the runs, with their names and a legend."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=SIZE, layout="constrained")
     axes = figure.add_subplot()
     draw(axes)
-    _name_runs(axes, runs)
     figure.legend(loc="outside lower center", ncols=3, fontsize=6.5, frameon=False)
-    axes.grid(axis="y", color=GRID, linewidth=0.5)
-    axes.set_axisbelow(True)
-    axes.tick_params(colors=SOFT)
-    axes.spines[["top", "right"]].set_visible(False)
-    axes.spines[["left", "bottom"]].set_color(SOFT)
+    frame(axes)
+    _name_runs(axes, runs)
     return svg_text(figure, salt)
 
 
-def _name_runs(axes: "Axes", runs: Sequence[Run]) -> None:
+def _name_runs(axes: "Axes", runs: Sequence[HistoryRun]) -> None:
     """Dates and commits under some of the runs, and a line where the version of a library changed."""
     every = max(1, math.ceil(len(runs) / LABELS))
     shown = range(len(runs) - 1, -1, -every)
@@ -103,7 +102,7 @@ def _day(date: str) -> str:
         return "no date"
 
 
-def _verdicts(runs: Sequence[Run]) -> str:
+def _verdicts(runs: Sequence[HistoryRun]) -> str:
     def draw(axes: "Axes") -> None:
         below = [0] * len(runs)
         for verdict in VERDICTS:
@@ -118,20 +117,18 @@ def _verdicts(runs: Sequence[Run]) -> str:
     return _figure(draw, runs, "verdicts")
 
 
-def _engines(runs: Sequence[Run]) -> list[str]:
+def _engines(runs: Sequence[HistoryRun]) -> list[str]:
     return list(dict.fromkeys(row.engine for run in runs for row in run.rows if row.compared))
 
 
-def _errors(runs: Sequence[Run]) -> str:
+def _errors(runs: Sequence[HistoryRun]) -> str:
     def draw(axes: "Axes") -> None:
         for engine in _engines(runs):
             judged = [[row for row in run.rows if row.engine == engine and row.compared and math.isfinite(row.error)]
                       for run in runs]  # fmt: skip
             shares = [[max(float(used(row.error, row.allowed)), FLOOR) for row in rows] for rows in judged]
             worst = [max(each, default=math.nan) for each in shares]
-            style = style_of(engine)
-            axes.plot(range(len(runs)), worst, color=style.colour, marker=style.marker, markersize=3.5,
-                      linewidth=1.0, label=engine)  # fmt: skip
+            axes.plot(range(len(runs)), worst, label=engine, **style_of(engine).line)
         axes.set_yscale("log")
         axes.axhline(1.0, color=ALLOWED, linewidth=1.0, linestyle="--")
         axes.set_ylabel("error / allowed")
@@ -139,7 +136,7 @@ def _errors(runs: Sequence[Run]) -> str:
     return _figure(draw, runs, "errors")
 
 
-def _times(runs: Sequence[Run]) -> str:
+def _times(runs: Sequence[HistoryRun]) -> str:
     """Each engine's times over those of the first run that has the scene: their mean and its standard error."""
     first: dict[tuple[str, str], float] = {}
     for run in runs:
@@ -153,27 +150,23 @@ def _times(runs: Sequence[Run]) -> str:
             where = [i for i, each in enumerate(logs) if each]
             means = [math.exp(fmean(logs[i])) for i in where]
             spread = [math.exp(stdev(logs[i]) / math.sqrt(len(logs[i]))) if len(logs[i]) > 1 else 1.0 for i in where]
-            style = style_of(engine)
             bars = [[m - m / s for m, s in zip(means, spread, strict=True)],
                     [m * s - m for m, s in zip(means, spread, strict=True)]]  # fmt: skip
-            axes.errorbar(where, means, yerr=bars, color=style.colour, marker=style.marker, markersize=3.5,
-                          linewidth=1.0, capsize=2.0, label=engine)  # fmt: skip
+            axes.errorbar(where, means, yerr=bars, capsize=2.0, label=engine, **style_of(engine).line)
         axes.set_ylim(bottom=0.0)
         axes.set_ylabel("time / first time")
 
     return _figure(draw, runs, "times")
 
 
-def _row(runs: Sequence[Run], key: Key) -> str:
-    """The error of one row over the runs, what it is allowed, and a ring where it fails."""
+def _row(runs: Sequence[HistoryRun], key: Key) -> str:
+    """Draw the error of one row over the runs, what it is allowed, and a ring where it fails."""
 
     def draw(axes: "Axes") -> None:
         rows = {i: row for i, run in enumerate(runs) for row in run.rows
                 if (row.scene, row.engine, row.setting, row.quantity) == key}  # fmt: skip
         there = [i for i, row in rows.items() if math.isfinite(row.error)]
-        style = style_of(key[1])
-        axes.plot(there, [max(rows[i].error, FLOOR) for i in there], color=style.colour, marker=style.marker,
-                  markersize=3.5, linewidth=1.0, label="error")  # fmt: skip
+        axes.plot(there, [max(rows[i].error, FLOOR) for i in there], label="error", **style_of(key[1]).line)
         axes.plot(there, [max(rows[i].allowed, FLOOR) for i in there], color=ALLOWED, linestyle="--",
                   linewidth=1.0, label="allowed")  # fmt: skip
         failed = [i for i in there if rows[i].failed]

@@ -54,7 +54,7 @@ class About:
 
 
 def about(factors: Mapping[str, float], suite: str, scenes: Mapping[str, Mapping[str, str]] | None = None) -> About:
-    """The record of a run made here and now; `factors` are the errors allowed to each engine at condition 1."""
+    """Describe a run made here and now; `factors` are the errors allowed to each engine at condition 1."""
     simulated = factors.get("mujoco-simulated", SIMULATED.factor)
     settings = {"engines": ", ".join(factors), "suite": suite, "K": repr(K), "simulated": repr(simulated)}
     described = {name: dict(entries) for name, entries in (scenes or {}).items()}
@@ -128,12 +128,12 @@ class Recorded:
         yield from self._read(read_columns(self.table))
 
     def scenes(self, keep: Callable[[Row], bool] = lambda _: True) -> Iterator[tuple[str, list[Row]]]:
-        """The rows that are wanted, scene by scene."""
+        """Read the rows that are wanted, scene by scene."""
         for scene, some in groupby(filter(keep, self.rows()), key=lambda row: row.scene):
             yield scene, list(some)
 
     def words(self, column: str) -> Iterator[str]:
-        """What stands in a column of text, some of it more than once."""
+        """Read what stands in a column of text, some of it more than once."""
         yield from self._read(column_of(self.table, column))
 
     def times(self) -> Iterator[tuple[str, list[tuple[str, float]]]]:
@@ -159,7 +159,7 @@ class Recorded:
 
 
 def recorded(path: Path) -> Recorded:
-    """A run by its folder, or by a results.csv alone (then nothing is known of how it was made).
+    """Open a run by its folder, or by a results.csv only (then how it was made is unknown).
 
     Raises InputError where there is no readable table, an empty or a damaged one, or that of an unfinished run.
     """
@@ -179,7 +179,7 @@ def recorded(path: Path) -> Recorded:
 
 
 def _described(record: Path, table: Path) -> Recorded:
-    """A table and what its record says of it; InputError where either is damaged."""
+    """Open a table with what its record says of it; InputError where either is damaged."""
     try:
         kept = json.loads(record.read_text(encoding="utf-8"))
         stated = kept.pop("sha256", None)
@@ -195,13 +195,13 @@ def _described(record: Path, table: Path) -> Recorded:
 
 
 def read_run(path: Path) -> tuple[About, list[Row]]:
-    """What is known of a run, and all its rows."""
+    """Read what a run was made with, and all its rows."""
     run = recorded(path)
     return run.about, list(run.rows())
 
 
 def about_of(kept: dict[str, Any]) -> About:
-    """What a file says of a run; its words are somebody's text."""
+    """Make the record of what a file says of a run; its words are somebody's text."""
     versions, settings = (_plain(kept[name]) for name in ("versions", "settings"))
     scenes = {plain(name): _plain(entries) for name, entries in kept.get("scenes", {}).items()}
     date, commit = (plain(kept.get(name, "")) for name in ("date", "commit"))
@@ -213,7 +213,7 @@ def _plain(entries: dict[str, str]) -> dict[str, str]:
 
 
 def baseline(name_or_path: str) -> Path:
-    """A run by its path, or the accepted state of this project's models by its name."""
+    """Find a run by its path, or the accepted state of this project's models by its name."""
     if not Path(name_or_path).exists() and (SHIPPED / name_or_path / TABLE).is_file():
         return SHIPPED / name_or_path
     return Path(name_or_path)
@@ -232,7 +232,7 @@ def accept(run: Recorded, target: Path) -> None:
 
 
 def _copy(source: Path, target: Path) -> None:
-    """A file however long, all of it or nothing."""
+    """Copy a file however long, all of it or nothing."""
     draft = target.with_name(f".{target.name}.part")
     with naming(target):
         try:

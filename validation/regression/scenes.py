@@ -21,14 +21,14 @@ WHERE = ("motion.theta_2", "motion.free.steps", "motion.law.steps")
 
 
 def descriptions(suite: Suite) -> dict[str, dict[str, str]]:
-    """Each scene of a suite by its name; none of a suite of more than MOST_DESCRIBED."""
+    """Describe each scene of a suite by its name; none of a suite of more than MOST_DESCRIBED."""
     if len(suite) > MOST_DESCRIBED:
         return {}
     return {suite.name(index): description(suite.scene(index)) for index in range(len(suite))}
 
 
 def description(scene: Scene) -> dict[str, str]:
-    """The entries of the scene's file that change a number: "bars.output.inertia": "0.05 kg m^2"."""
+    """List the entries of the scene's file that change a number: "bars.output.inertia": "0.05 kg m^2"."""
     try:
         entries = tomllib.loads(dump(scene))
     except FourBarError:  # a scene that no file can state
@@ -66,7 +66,7 @@ class SceneChange:
 
 
 def _shorter(old: str, new: str) -> str:
-    """ "0.048 -> 0.05 kg m^2": a unit that both have stands once."""
+    """Write a unit that both have once: "0.048 -> 0.05 kg m^2"."""
     (number, _, unit), (_, _, other) = old.partition(" "), new.partition(" ")
     return f"{number} -> {new}" if unit and unit == other and "," not in old else f"{old} -> {new}"
 
@@ -81,7 +81,7 @@ def renamed(old: Mapping[str, Description], new: Mapping[str, Description]) -> d
 
 
 def scene_changes(old: Mapping[str, Description], new: Mapping[str, Description]) -> list[SceneChange]:
-    """The scenes of both runs that ask something else now."""
+    """List the scenes of both runs that ask something else now."""
     found = []
     for name in sorted(old.keys() & new.keys()):
         before, after = old[name], new[name]

@@ -8,7 +8,7 @@ from validation.compare.identities import FORMULAS
 from validation.compare.rows import Row
 from validation.regression.change import Change, Key, Kind
 from validation.regression.changes import Differences, differences
-from validation.regression.history import Run
+from validation.regression.history import HistoryRun
 from validation.regression.record import About
 
 NO_CHANGE = (Kind.SAME, Kind.ROUND_OFF, Kind.NOT_RUN)
@@ -21,7 +21,7 @@ class Step:
 
     number: int
     """Of the run, from 0."""
-    run: Run
+    run: HistoryRun
     found: Differences
 
     @property
@@ -35,15 +35,15 @@ class Step:
         return "; ".join(f"{what} {old} -> {new}" for what, old, new in self.found.surroundings) or "nothing recorded"
 
     def sentence(self) -> str:
-        """The step in one line: when, with what, and how many rows."""
+        """Say in one line when, with what, and how many rows."""
         kinds = [kind for kind in Kind if kind not in NO_CHANGE and self.found.kinds[kind]]
         counts = [f"{self.found.kinds[kind]} {kind.value}" for kind in kinds]
         parts = [*map(str, self.found.scenes), ", ".join(counts), *map(str, self.found.other_times)]
         return f"{self.run.name}: {'; '.join(filter(None, parts))} [{self.made_with}]"
 
 
-def steps(runs: Sequence[Run]) -> list[Step]:
-    """Each run against what was last known of every row before it; a run of a part leaves the rest as known."""
+def steps(runs: Sequence[HistoryRun]) -> list[Step]:
+    """Compare each run with the last state of every row before it; a run of a part leaves the rest as it was."""
     found: list[Step] = []
     known: dict[Key, Row] = {}
     about: About | None = None

@@ -1,4 +1,4 @@
-"""Are an engine's times, each over the formulas' on the same scene in the same process, longer than before?"""
+"""Whether an engine's times, each over the formulas' on the same scene in the same process, grew."""
 
 import math
 from collections.abc import Iterable, Sequence

@@ -4,7 +4,7 @@ Matplotlib draws with the light values; `by_variable` then turns them into custo
 page (Okabe-Ito hues, darkened or lightened until every one has a contrast of 3:1 or more).
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 
 class Style(NamedTuple):
@@ -17,6 +17,11 @@ class Style(NamedTuple):
     symbol: str
     """The mark as a character, for legends in text."""
     simulated: bool = False
+
+    @property
+    def line(self) -> dict[str, Any]:
+        """A curve with its marks, as matplotlib takes it."""
+        return {"color": self.colour, "marker": self.marker, "markersize": 3.5, "linewidth": 1.0}
 
 
 STYLES = {
@@ -42,18 +47,18 @@ VARIABLES = {
 
 
 def style_of(engine: str) -> Style:
-    """The style of an engine; all that are not known here look alike."""
+    """Choose the style of an engine; all that are not named here look alike."""
     return STYLES.get(engine, OTHER)
 
 
 def by_variable(svg: str) -> str:
-    """The SVG with every known colour replaced by the page's custom property."""
+    """Replace every colour of the table by the page's custom property."""
     for light, (name, _) in VARIABLES.items():
         svg = svg.replace(light, f"var({name})")
     return svg
 
 
 def declarations(*, dark: bool) -> str:
-    """The custom properties as CSS."""
+    """Write the custom properties as CSS."""
     pairs = ((name, night if dark else day) for day, (name, night) in VARIABLES.items() if day != "#000000")
     return " ".join(f"{name}: {colour};" for name, colour in pairs)

@@ -6,12 +6,10 @@ from statistics import median
 
 from validation.compare.tolerance import EPS
 from validation.engines.witnesses import WORK
-from validation.report.colours import GRID, INK, PAPER, SOFT, style_of
+from validation.report.colours import INK, PAPER, SOFT, style_of
 from validation.report.record import Record
-from validation.report.svg import svg_text
+from validation.report.svg import FLOOR, frame, svg_text
 
-FLOOR = EPS / 4.0
-"""Errors below this, zero among them, are drawn here."""
 Point = tuple[float, float]
 
 
@@ -31,7 +29,7 @@ def cost_points(scenes: Iterable[Record]) -> tuple[dict[str, list[Point]], list[
 
 
 def cost_figure(scenes: Iterable[Record]) -> str | None:
-    """An SVG of these points with each engine's median; None where no torque was compared."""
+    """Draw these points as SVG, with each engine's median; None where no torque was compared."""
     points, formulas = cost_points(scenes)
     if not points or not formulas:
         return None
@@ -59,14 +57,11 @@ def cost_figure(scenes: Iterable[Record]) -> str | None:
     )  # fmt: skip
     axes.set_xlabel("µs per position, for the work that the legend names")
     axes.set_ylabel("error of the torque / scale")
-    axes.grid(color=GRID, lw=0.5)
-    axes.tick_params(which="both", labelsize=8, color=GRID)
-    axes.spines[["top", "right"]].set_visible(False)
-    axes.spines[["left", "bottom"]].set_color(GRID)
+    frame(axes)
     figure.legend(loc="outside upper left", frameon=False, fontsize=8)
     return svg_text(figure, "costs")
 
 
 def _labelled(engine: str) -> str:
-    """An engine and what it did for a position."""
+    """Name an engine and what it did for a position."""
     return f"{engine}: {WORK[engine].short}" if engine in WORK else engine

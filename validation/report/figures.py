@@ -14,10 +14,10 @@ from validation.compare.answer import Answer
 from validation.compare.error import magnitude, relative_error
 from validation.compare.reversals import Reversal, broken
 from validation.compare.scales import yardstick
-from validation.compare.tolerance import EPS, EQUIVALENCE, SIMULATED, Array, condition_of
-from validation.report.colours import ALLOWED, BAND, GRID, INK, PAPER, by_variable, style_of
+from validation.compare.tolerance import EQUIVALENCE, SIMULATED, Array, condition_of
+from validation.report.colours import ALLOWED, BAND, INK, PAPER, by_variable, style_of
 from validation.report.record import Record
-from validation.report.svg import svg_text
+from validation.report.svg import FLOOR, frame, svg_text
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -26,8 +26,6 @@ MARKS = 10
 """Marks of one engine on a curve. Every engine has its own positions, so no mark hides another."""
 STRETCHES = 24
 """Stretches of a sweep; the error shown in each is its largest."""
-FLOOR = EPS / 16.0
-"""Errors below this, zero among them, are drawn here."""
 TORQUE_AND_FORCE = ("torque", "F32")
 MOTION_AND_FORCE = ("theta_4", "F32")
 """Of a released linkage: its torque is rounding."""
@@ -70,15 +68,12 @@ def _picture(quantity: str, record: Record, solution: Solution, answers: list[An
     axes[-1].set_xlabel("time (s)" if solution.time is not None else "θ₂ (°)")
     figure.align_ylabels(axes)
     for panel in axes:
-        panel.grid(color=GRID, lw=0.5)
-        panel.tick_params(labelsize=8, color=GRID)
-        panel.spines[["top", "right"]].set_visible(False)
-        panel.spines[["left", "bottom"]].set_color(GRID)
+        frame(panel)
     return svg_text(figure, f"{record.name} {quantity}")
 
 
 def _draw_values(axes: "Axes", quantity: str, solution: Solution, answers: list[Answer], jumps: list[Reversal]) -> None:
-    """The formulas as a band, broken at jumps, and each engine's marks on it at positions of its own."""
+    """Draw the formulas as a band, broken at jumps, and each engine's marks on it at positions of its own."""
     good = solution.status_code == OK
     ours = np.where(good, _plain(quantity, getattr(solution, quantity)), np.nan)
     base, line = _base(solution, None), ours
@@ -96,7 +91,7 @@ def _draw_values(axes: "Axes", quantity: str, solution: Solution, answers: list[
 
 
 def _draw_errors(axes: "Axes", quantity: str, record: Record, solution: Solution, answers: list[Answer]) -> None:
-    """The largest error of each stretch on a logarithmic axis, the worst one ringed, and what is allowed."""
+    """Draw the largest error of each segment on a logarithmic axis, the worst one ringed, and what is allowed."""
     from matplotlib.ticker import LogLocator, NullLocator
 
     good, scene = solution.status_code == OK, record.scene
@@ -158,7 +153,7 @@ def _mark(answer: Answer, size: float) -> dict[str, Any]:
 
 
 def _plain(quantity: str, values: Array) -> Array:
-    """A scalar as it is (angles in degrees), the magnitude of a vector."""
+    """Take a scalar as it is (angles in degrees), the magnitude of a vector."""
     if quantity in ANGLES:
         return np.degrees(values)
     return magnitude(values) if values.ndim == 2 else values
@@ -172,7 +167,7 @@ def _label(quantity: str, solution: Solution) -> str:
 
 
 def _base(solution: Solution, at: Command | None) -> Array:
-    """What a curve is drawn over: the time of a free motion, else theta_2 in degrees."""
+    """Choose what a curve is drawn over: the time of a free motion, else theta_2 in degrees."""
     theta_2 = solution.theta_2 if at is None else at.theta_2
     if solution.time is not None and len(solution.time) == len(theta_2):
         return solution.time

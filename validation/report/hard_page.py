@@ -14,7 +14,7 @@ from validation.compare.answer import Answer, Array
 from validation.compare.error import magnitude, relative, relative_error
 from validation.compare.tolerance import DEGRADED, EPS, K, condition_of
 from validation.engines.hard_suite import HARD_WITNESSES
-from validation.engines.limits import LIMITS
+from validation.engines.limits import LIMITS, Boundary
 from validation.engines.prediction import in_world_axes
 from validation.engines.witnesses import Witness
 from validation.report.colours import style_of
@@ -44,7 +44,7 @@ class Approach:
 
 
 def approaches() -> list[Approach]:
-    """A toggle, a pole of T4, a change point."""
+    """List a toggle, a pole of T4 and a change point."""
     rocker, crank = linkage_of(ROCKER, 1), linkage_of(CRANK, 0)
     (limit, stretched), *_ = collinear_3_4(rocker)
     (pole, branch), *_ = collinear_2_3(crank)
@@ -114,15 +114,11 @@ def _draw(axes: Any, approach: Approach, quantity: str) -> None:
     for witness in HARD_WITNESSES:
         found = errors(approach.scene, quantity, witness)
         if found is not None and len(found[0]):
-            style = style_of(witness.name)
             axes.loglog(
                 np.abs(found[0] - singular),
                 found[1],
-                color=style.colour,
-                marker=style.marker,
-                markersize=3.5,
-                linewidth=0.8,
                 label=witness.name,
+                **style_of(witness.name).line,
             )
     axes.set_xlim(approach.distances[0] * 2, approach.distances[-1] / 2)
     axes.set_ylim(FLOOR, 1e3)
@@ -137,12 +133,16 @@ def _singular(approach: Approach) -> float:
 
 
 def page(svg: str) -> str:
-    """The page, self-contained: the picture, what each family must show, the limits."""
+    """Make the page, self-contained: the picture, what each family must show, the limits."""
     return rendered(
         "validation.report",
         "hard.html.j2",
         svg=inline(svg),
         source=base64.b64encode(svg.encode()).decode("ascii"),
-        families=FAMILIES,
-        limits=LIMITS,
+        families=[(family.name, family.statement) for family in FAMILIES],
+        limits=[(each.engine, each.of.name, _boundary(each.of), each.of.reason) for each in LIMITS],
     )
+
+
+def _boundary(of: Boundary) -> str:
+    return f"{of.boundary:g}" + (f" {of.unit}" if of.unit != "1" else "")

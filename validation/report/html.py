@@ -11,7 +11,7 @@ from validation.compare.rows import FAILS, REFUSES, UNDECIDED, Row, sorted_rows,
 from validation.report.costs import cost_figure
 from validation.report.record import Record
 from validation.report.summary import STATEMENT, Summary, shares
-from validation.report.templating import rendered, share
+from validation.report.templating import count_or_size, number, rendered, share
 
 ALL_OPEN = 8
 """Up to so many scenes all stand open; the bodies of more are packed, and unpacked when they are opened."""
@@ -38,7 +38,7 @@ class Cell(NamedTuple):
         return {"refuses": "refuses", "undecided": "undecided"}.get(self.kind, share(self.used))
 
 
-class Figure(NamedTuple):
+class SectionFigure(NamedTuple):
     """A picture of a section: an SVG drawn by our own code, which stands in the page, or an image as a data URI."""
 
     alt: str
@@ -57,7 +57,7 @@ class Section:
     text: str
     headings: Sequence[str] = ()
     rows: Sequence[Sequence[str]] = ()
-    figures: Sequence[Figure] = ()
+    figures: Sequence[SectionFigure] = ()
     links: Sequence[tuple[str, str]] = ()
     """(words, file next to the report)."""
     numbers: tuple[int, int] = (0, 0)
@@ -95,7 +95,7 @@ def html(
     no_pictures: str = "",
     sections: Sequence[Section] = (),
 ) -> str:
-    """The report as one page that fetches nothing.
+    """Write the report as one page that fetches nothing.
 
     Parameters
     ----------
@@ -122,13 +122,19 @@ def html(
         cost_figure=Markup(costs) if costs else None,
         no_pictures=no_pictures,
         sections=sections,
+        independence=[(engine, *texts) for engine, texts in sorted(summary.independence.items())],
+        tolerances=[(each.name, count_or_size(each.factor), each.reason) for each in summary.tolerances],
+        orders=[
+            (scene, *map(number, (e["error_at_4h"], e["error_at_2h"])), f"{e['observed_order']:.1f}")
+            for scene, e in summary.orders
+        ],
         statement=STATEMENT,
         csv=csv.decode("ascii"),
     )
 
 
 def markdown(summary: Summary) -> str:
-    """The report as Markdown, short enough for a comment on a pull request."""
+    """Write the report as Markdown, short enough for a comment on a pull request."""
     return rendered("validation.report", "report.md.j2", s=summary, statement=STATEMENT)
 
 
@@ -145,7 +151,7 @@ def _view(scene: Record, first_line: int, pictures: Mapping[str, str]) -> SceneV
 
 
 def _rank(cell: Cell) -> tuple[bool, float]:
-    """What was compared stands before what was not, then what used more of its allowance."""
+    """Put what was compared before what was not, then what used more of its allowance."""
     return cell.row.compared, cell.used
 
 

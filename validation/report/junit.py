@@ -9,7 +9,7 @@ LISTED = 10_000
 """Comparisons with a case of their own, besides as many that fail; the others are counted."""
 
 
-class Case(NamedTuple):
+class JunitCase(NamedTuple):
     """One comparison."""
 
     suite: str
@@ -21,30 +21,32 @@ class Case(NamedTuple):
     message: str = ""
 
 
-def cases(rows: Iterable[Row]) -> Iterator[Case]:
-    """The rows of a run: what fails is a failure, and what was not compared is skipped."""
+def cases(rows: Iterable[Row]) -> Iterator[JunitCase]:
+    """List the rows of a run: what fails is a failure, and what was not compared is skipped."""
     listed = failures = others = 0
     for row in rows:
         name = (row.scene, f"{row.scene}.{row.engine} {row.setting}", row.quantity)
         if row.failed and failures < LISTED:
             failures += 1
-            yield Case(*name, "failure", row.verdict, f"error {row.error!r}, allowed {row.allowed!r}: {row.reason}")
+            yield JunitCase(
+                *name, "failure", row.verdict, f"error {row.error!r}, allowed {row.allowed!r}: {row.reason}"
+            )
         elif not row.failed and listed < LISTED:
             listed += 1
-            yield Case(*name, "passed") if row.compared else Case(*name, "skipped", row.verdict, row.reason)
+            yield JunitCase(*name, "passed") if row.compared else JunitCase(*name, "skipped", row.verdict, row.reason)
         else:
             others += 1
     yield from beyond(others)
 
 
-def beyond(rows: int) -> Iterator[Case]:
-    """What is not listed, as one case."""
+def beyond(rows: int) -> Iterator[JunitCase]:
+    """Count what is not listed, as one case."""
     if rows > 0:
-        yield Case("all scenes", "all scenes", f"{rows} rows more: see results.parquet", "skipped", "not listed")
+        yield JunitCase("all scenes", "all scenes", f"{rows} rows more: see results.parquet", "skipped", "not listed")
 
 
-def document(title: str, cases: Iterable[Case]) -> str:
-    """The cases as JUnit XML, suite by suite."""
+def document(title: str, cases: Iterable[JunitCase]) -> str:
+    """Write the cases as JUnit XML, suite by suite."""
     from junitparser import Failure, JUnitXml, Skipped, TestCase, TestSuite
 
     report = JUnitXml(title)

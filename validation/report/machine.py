@@ -92,7 +92,7 @@ def build(package: str) -> str:
 
 
 def differing(here: dict[str, str], there: dict[str, str]) -> str:
-    """The first entry in which two differ, in words; nothing where they are the same."""
+    """Name the first entry in which two differ; nothing where they are the same."""
     for name in [*here, *there]:
         one, other = here.get(name, "none"), there.get(name, "none")
         if one != other:

@@ -76,7 +76,7 @@ class Record:
         return cls(**{**kept, "timings": timings, "independence": independence, "rows": rows})
 
     def joined(self, other: "Record") -> "Record":
-        """The same scene with the answers of another set of engines; the rows of the formulas stand once."""
+        """Add the answers of another set of engines; the rows of the formulas stand once."""
         known = set(self.rows)
         return replace(
             self,

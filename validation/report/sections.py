@@ -8,7 +8,7 @@ from fourbar.writing import write_text
 from validation.compare.columns import read_columns
 from validation.compare.counts import Counts
 from validation.compare.rows import VERDICTS, Row
-from validation.report.html import Figure, Section
+from validation.report.html import Section, SectionFigure
 from validation.scenes.hard_families import FAMILIES
 
 HARD, PAGE, COST = "hard", "hard.html", "cost"
@@ -32,7 +32,7 @@ MOST = 3
 
 
 def sections(hard: Iterable[Row] | None, out: Path) -> list[Section]:
-    """The hard cases of this run or one in OUT/hard, and the study in OUT/cost, where there are any.
+    """Collect the hard cases of this run or one in OUT/hard, and the study in OUT/cost, where there are any.
 
     Of rows of the hard suite the page hard.html is written too.
     """
@@ -54,12 +54,12 @@ def sections(hard: Iterable[Row] | None, out: Path) -> list[Section]:
 
 def hard_cases(rows: Iterable[Row], picture: str | None = None) -> Section:
     """Of a run of the hard suite; `picture`: the inline SVG of `validation.report.hard_page`."""
-    figures = [Figure(ALT, CAPTION, svg=picture)] if picture else []
+    figures = [SectionFigure(ALT, CAPTION, svg=picture)] if picture else []
     links = [("Limits of the engines, and the picture to download: " + PAGE, PAGE)]
     return _hard_cases(rows, MUST.capitalize(), figures, links)
 
 
-def _hard_cases(rows: Iterable[Row], text: str, figures: list[Figure], links: list[tuple[str, str]]) -> Section:
+def _hard_cases(rows: Iterable[Row], text: str, figures: list[SectionFigure], links: list[tuple[str, str]]) -> Section:
     found = {family.name: Counts() for family in FAMILIES}
     scenes: dict[str, set[str]] = {family.name: set() for family in FAMILIES}
     for row in rows:
@@ -83,7 +83,7 @@ def _hard_cases(rows: Iterable[Row], text: str, figures: list[Figure], links: li
 
 
 def family_of(scene: str) -> str | None:
-    """The family whose name a scene's begins with; of several the longest."""
+    """Find the family whose name a scene's begins with; of several the longest."""
     names = [family.name for family in FAMILIES if scene.startswith(family.name.replace(" ", "-") + "-")]
     return max(names, key=len, default=None)
 
@@ -94,7 +94,7 @@ def _study(folder: Path) -> Section:
         picture = folder / name
         if picture.is_file() and picture.stat().st_size <= LARGEST:
             data = base64.b64encode(picture.read_bytes()).decode("ascii")
-            figures.append(Figure(alt, f"{alt}.", image=f"data:image/svg+xml;base64,{data}"))
+            figures.append(SectionFigure(alt, f"{alt}.", image=f"data:image/svg+xml;base64,{data}"))
     text = (
         f"What each digit of {folder.name} costs, from the study in {COST}/{folder.name}/. Times are per revolution: "
         "what is stepped runs through it once and reads nothing, what is exact answers each of the scene's positions. "

@@ -36,7 +36,7 @@ class Worst:
 
 
 @dataclass(frozen=True, slots=True)
-class Cost:
+class EngineCost:
     """Time of one engine, as a ratio to the formulas on the same scene in the same process."""
 
     engine: str
@@ -97,7 +97,7 @@ class Summary:
         self._holding: list[tuple[float, Record]] = []
 
     def add(self, scene: Record) -> None:
-        """One scene more."""
+        """Add one more scene."""
         self.counts.add_scene(scene.rows)
         bad = [row for row in scene.rows if row.failed]
         self.failures += bad[: FAILURES_KEPT - len(self.failures)]
@@ -137,7 +137,7 @@ class Summary:
 
     @property
     def verdict(self) -> str:
-        """In one sentence."""
+        """Say it in one sentence."""
         left = f"; not run: {', '.join(engine for engine, _ in self.missing)}" if self.missing else ""
         return self.counts.sentence() + left
 
@@ -171,10 +171,10 @@ class Summary:
         return [(kind[0], self._first_reason[kind], count) for kind, count in sorted(self._refusals.items())]
 
     @property
-    def costs(self) -> list[Cost]:
+    def costs(self) -> list[EngineCost]:
         """What each engine took, by the kind of its setting."""
         return [
-            Cost(
+            EngineCost(
                 engine,
                 _settings(values),
                 median(t.times for t in values),
@@ -206,7 +206,7 @@ class Summary:
 
 
 def _left_out(scene: Record) -> set[tuple[str, str]]:
-    """What was not run, or refused to answer: (engine, reason)."""
+    """List what was not run, or refused to answer: (engine, reason)."""
     found = {(row.engine, row.reason) for row in scene.rows if row.verdict == REFUSES}
     for line in scene.left_out:
         engine, _, reason = line.partition(": ")
@@ -247,7 +247,7 @@ def _worst(rows: Sequence[Row]) -> list[Worst]:
 
 
 def _top(most: int, of: list[T], key: Callable[[T], float]) -> list[T]:
-    """The list, cut to its largest once it is twice too long."""
+    """Cut the list to its largest once it is twice too long."""
     return of if len(of) <= 2 * most else nlargest(most, of, key=key)
 
 
@@ -275,6 +275,6 @@ def _add_costs(scene: Record, costs: dict[tuple[str, str], list[Timed]]) -> None
 
 
 def _settings(of: Sequence[Timed]) -> str:
-    """The setting, or the first and last of those that differ by their number: "RK4 628/rev to 1490/rev"."""
+    """Name the setting, or the first and last of those that differ by their number: "RK4 628/rev to 1490/rev"."""
     known = sorted({t.setting for t in of}, key=lambda name: (len(name), name))
     return known[0] if len(known) == 1 else f"{known[0]} to {known[-1].partition(' ')[2]}"

@@ -5,8 +5,11 @@ import io
 import re
 from typing import Any
 
-from validation.report.colours import by_variable
+from validation.compare.tolerance import EPS
+from validation.report.colours import GRID, by_variable
 
+FLOOR = EPS / 16.0
+"""Errors below this, zero among them, are drawn here."""
 LONG_NUMBER = re.compile(r"(\d+\.\d)\d+")
 COORDINATES = re.compile(r' (?:d|x|y|transform|points)="[^"]*"')
 STYLE = re.compile(r' style="([^"]*)"')
@@ -15,13 +18,22 @@ METADATA = re.compile(r"<metadata>.*?</metadata>", re.DOTALL)
 GROUP_NAME = re.compile(r'<g id="[^"]*"')
 
 
+def frame(axes: Any) -> None:
+    """Give axes the frame and grid of all pictures in pages."""
+    axes.grid(color=GRID, lw=0.5)
+    axes.set_axisbelow(True)
+    axes.tick_params(which="both", labelsize=8, color=GRID)
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.spines[["left", "bottom"]].set_color(GRID)
+
+
 def svg_text(figure: Any, salt: str) -> str:
-    """The figure, to stand in a page; `salt` keeps the ids of two figures in one page apart."""
+    """Draw the figure, to stand in a page; `salt` keeps the ids of two figures in one page apart."""
     return inline(drawn(figure, salt))
 
 
 def drawn(figure: Any, salt: str) -> str:
-    """The figure as matplotlib draws it, transparent: an SVG that stands by itself."""
+    """Draw the figure as matplotlib does, transparent: an SVG that stands by itself."""
     import matplotlib
 
     text = io.StringIO()
@@ -33,7 +45,7 @@ def drawn(figure: Any, salt: str) -> str:
 
 
 def inline(svg: str) -> str:
-    """The same, smaller and in the colours of the page around it."""
+    """Make the SVG smaller, and take the colours of the page around it."""
     svg = METADATA.sub("", svg)
     svg = COORDINATES.sub(lambda found: LONG_NUMBER.sub(r"\1", found.group()), svg)
     svg = GROUP_NAME.sub("<g", BETWEEN_TAGS.sub("><", svg))

@@ -12,12 +12,15 @@ PLAIN = (1e-2, 1e6)
 
 
 def rendered(package: str, name: str, /, **what: object) -> str:
-    """A template of a package, an unknown name in it an error; in a page every text is escaped for HTML."""
-    from jinja2 import Environment, PackageLoader, StrictUndefined
+    """Fill in a template of a package, an unknown name in it an error; in a page every text is escaped for HTML.
+
+    It may build on those of the report: one page, one stylesheet, one form of a table.
+    """
+    from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
 
     page = name.endswith(".html.j2")  # in Markdown `cell` escapes what would break out
     made = Environment(
-        loader=PackageLoader(package),
+        loader=ChoiceLoader([PackageLoader(package), PackageLoader("validation.report")]),
         undefined=StrictUndefined,
         autoescape=page,
         trim_blocks=True,
@@ -34,7 +37,8 @@ def rendered(package: str, name: str, /, **what: object) -> str:
         "colour": lambda engine: by_variable(style_of(engine).colour),
         "symbol": lambda engine: style_of(engine).symbol,
     }
-    return made.get_template(name).render(light=declarations(dark=False), dark=declarations(dark=True), **what)
+    made.globals |= {"light": declarations(dark=False), "dark": declarations(dark=True)}
+    return made.get_template(name).render(**what)
 
 
 def cell(text: object) -> str:
@@ -53,7 +57,7 @@ def share(value: float) -> str:
 
 
 def number(value: float) -> str:
-    """An error: three significant digits and a power of ten; a dash where there is no number."""
+    """Write an error: three significant digits and a power of ten; a dash where there is no number."""
     return "-" if math.isnan(value) else f"{value:.2e}"
 
 

@@ -50,7 +50,7 @@ def table(summary: Summary, out: Path) -> None:
 
 
 def lined_up(headings: Sequence[str], rows: Iterable[Sequence[str]], **options: Any) -> "Table":
-    """A table whose first column is words and whose others are numbers."""
+    """Make a table whose first column is words and whose others are numbers."""
     from rich.box import SIMPLE_HEAD
     from rich.markup import escape
     from rich.table import Table

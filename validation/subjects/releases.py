@@ -12,7 +12,7 @@ from pathlib import Path
 
 from fourbar.errors import DependencyError, InputError
 from validation.engines.witnesses import EXTRA
-from validation.regression.history import Run
+from validation.regression.history import HistoryRun
 from validation.report.machine import PACKAGES
 from validation.run.elsewhere import Ended, ended
 
@@ -29,7 +29,7 @@ class Release:
     """What the suite found under one version, or why it found nothing."""
 
     version: str
-    run: Run | None
+    run: HistoryRun | None
     why: str = ""
     seconds: Mapping[str, float] = field(default_factory=dict)
     """By witness: of the processor's clock for one position."""

@@ -12,7 +12,7 @@ from fourbar.errors import InputError
 from fourbar.writing import write_text
 from validation.compare.rows import csv_text
 from validation.report.machine import machine
-from validation.report.svg import drawn
+from validation.report.svg import drawn, inline
 from validation.report.templating import rendered
 from validation.subjects.examine import TORQUE_AND_FORCES, Line, Standing, examine
 
@@ -52,11 +52,8 @@ def command(scene: Path, pythons: tuple[Path, ...], out: Path, time_limit: float
         "explained": EXPLAINED,
         "head": HEAD,
         "rows": [cells(line) for line in found.lines],
-        "changed": found.changed,
-        "devices": found.devices,
-        "left_out": found.left_out,
-        "findings": findings(),
-        "chart": chart,
+        "lists": [(heading, texts) for heading, texts in _lists(found).items() if texts],
+        "svg": inline(chart),
     }
     for ending in ("html", "md"):
         write_text(out / f"standing.{ending}", rendered("validation.subjects", f"standing.{ending}.j2", **page))
@@ -65,6 +62,17 @@ def command(scene: Path, pythons: tuple[Path, ...], out: Path, time_limit: float
     for name, why in found.left_out.items():
         click.echo(f"not examined: {name}: {why}")
     click.echo(f"wrote {out}/standing.html, .md, .csv, .svg: {len(found.lines)} lines of {len(found.changed)} subjects")
+
+
+def _lists(found: Standing) -> dict[str, list[str]]:
+    changed = [f"{name} ({found.devices[name]}): {what}" for name, what in found.changed.items()]
+    return {
+        "What had to be changed, and what it ran on": changed,
+        "Not examined": [f"{name}: {why}" for name, why in found.left_out.items()],
+        "Findings, each with a script that reproduces it (docs/findings)": [
+            f"{sentence} ({script})" for script, sentence in findings()
+        ],
+    }
 
 
 def cells(line: Line) -> list[str]:

@@ -18,7 +18,7 @@ from validation.engines.witnesses import FURTHER, WITNESSES
 from validation.engines.workers import each
 from validation.regression.change import Change, Kind
 from validation.regression.changes import differences
-from validation.regression.history import Run
+from validation.regression.history import HistoryRun
 from validation.regression.record import read_run
 from validation.regression.steps import NO_CHANGE
 from validation.run.elsewhere import ElsewhereError, ended, run_elsewhere
@@ -108,7 +108,7 @@ def _attempt(
         run_elsewhere(python, arguments, folder)
     except ElsewhereError as error:
         return Release(version, None, str(error).partition(": ")[2])
-    run = Run(*read_run(folder), {})  # its times are of the wall clock, with other jobs
+    run = HistoryRun(*read_run(folder), {})  # its times are of the wall clock, with other jobs
     return Release(version, run.of(lambda row: row.engine in witnesses), seconds=timed(python, timing, witnesses))
 
 
@@ -150,7 +150,7 @@ def bisected(versions: Sequence[str], attempt: Try) -> list[Release]:
     """
     tried: dict[int, Release] = {}
 
-    def at(index: int) -> Run | None:
+    def at(index: int) -> HistoryRun | None:
         if index not in tried:
             tried[index] = attempt(versions[index])
         return tried[index].run
@@ -177,6 +177,6 @@ def bisected(versions: Sequence[str], attempt: Try) -> list[Release]:
     return [tried[index] for index in sorted(tried)]
 
 
-def _changes(before: Run, after: Run) -> list[Change]:
+def _changes(before: HistoryRun, after: HistoryRun) -> list[Change]:
     found = differences((before.about, before.rows), (after.about, after.rows))
     return [change for change in found.changes if change.kind not in NO_CHANGE]

@@ -114,12 +114,11 @@ def chart(rows: Sequence[dict[str, Any]]) -> str:
     errors, times = figure.subplots(2, 1, sharex=True)
     for engine in dict.fromkeys(row["engine"] for row in rows if row["engine"]):
         own = [row for row in rows if row["engine"] == engine]
-        at, style = [versions.index(row["version"]) for row in own], style_of(engine)
+        at, look = [versions.index(row["version"]) for row in own], style_of(engine).line
         forces = [max((row[name] or 0.0 for name in TORQUE_AND_FORCES[1:]), default=0.0) or math.nan for row in own]
-        drawn_with: dict[str, Any] = {"color": style.colour, "marker": style.marker, "markersize": 4, "linewidth": 1}
-        errors.plot(at, [row["torque"] or math.nan for row in own], label=f"{engine}: torque", **drawn_with)
-        errors.plot(at, forces, linestyle="--", label=f"{engine}: pin forces", fillstyle="none", **drawn_with)
-        times.plot(at, [1e3 * (row[CLOCK] or math.nan) for row in own], label=engine, **drawn_with)
+        errors.plot(at, [row["torque"] or math.nan for row in own], label=f"{engine}: torque", **look)
+        errors.plot(at, forces, linestyle="--", label=f"{engine}: pin forces", fillstyle="none", **look)
+        times.plot(at, [1e3 * (row[CLOCK] or math.nan) for row in own], label=engine, **look)
     label: str | None = "did not install or load"
     for row in rows:
         if row["engine"] is None:
