@@ -215,3 +215,17 @@ def test_what_is_zero_everywhere_is_bounded_by_zero() -> None:
     bars = (fourbar.Bar(length) for length in (0.1, 0.25, 0.22))
     found = extremes(Scene(fourbar.FourBar(0.3, *bars), Motion(0.0, 10.0)), ["torque", "F12"])
     assert {end for extreme in (*found.least.values(), *found.greatest.values()) for end in extreme[:2]} == {0.0}
+
+
+@pytest.mark.parametrize(
+    ("lengths", "drive_bar"),
+    [
+        ((0.173, 0.462, 0.641, 0.00601), 2),
+        ((0.17274163525586872, 0.46219401279422845, 0.6411602856139893, 0.006228543349729581), 3),
+    ],
+)
+def test_an_interval_that_lies_near_limits_throughout_is_one_line(lengths: tuple[float, ...], drive_bar: int) -> None:
+    """The input swings by a degree, or a drive on the coupler has a pole wherever it is."""
+    scene = Scene(fourbar.uniform(*lengths), Motion(0.0, 1.0), drive_bar)
+    with pytest.raises(fourbar.FourBarError, match="nowhere farther than 1 deg from a limit"):
+        extremes(scene, ["torque"])
