@@ -28,7 +28,7 @@ CONVENTIONS = (
     "error: how far off the value may be, besides the rounding of its last digit; of a vector, its Euclidean norm."
 )
 PROMISED = 1e-9
-"""rad in 5 s of a released motion, which tests/test_free_motion_reference.py holds; beyond them in proportion."""
+"""rad in 5 s of a released motion, held by test_free_motion_reference.py; beyond them in proportion."""
 PROMISED_FOR = 5.0
 """s."""
 
