@@ -26,7 +26,7 @@ long-test: setup
 	PROBLEMS=all $(BIN)/python -m pytest tests/validation/subjects/test_problems.py
 	RELEASES=pip $(BIN)/python -m pytest tests/validation/subjects/test_versions.py
 	$(BIN)/python -m validation standing
-	FREE_MOTIONS=30 $(BIN)/python -m pytest -n 2 tests/fourbar/test_free_motion_reference.py
+	FREE_MOTIONS=30 $(BIN)/python -m pytest -n 2 tests/fourbar/evaluation/test_free_motion_reference.py
 	$(BIN)/python -m validation fuzz-files --count 100000
 	$(BIN)/python -m validation fuzz
 	$(BIN)/python -m validation stability

@@ -11,8 +11,8 @@ import pytest
 
 import fourbar.cli
 import validation.cli
-from fourbar import free_motion
 from fourbar.errors import BAD_INPUT, INTERRUPTED
+from fourbar.evaluation import free_motion
 
 ROOT = Path(__file__).parents[2]
 SCENE = str(ROOT / "models" / "crank_rocker.toml")

@@ -21,13 +21,13 @@ JUDGED_BY = {
     "whole/test_results_format.py": "validation/compare: columns",
     # one table or one evaluation, whose rows are no use alone
     "fourbar/effects/test_effects.py": "fourbar/effects: actions cones effect flywheel friction gravity load "
-    "pin_friction pins torsion viscous",
+    "numbers pin_friction pins torsion viscous",
     "fourbar/files/test_files.py": "fourbar/files: effects fields reading scene_text units",
-    "fourbar/formulas/test_formulas.py": "fourbar: many_digits; fourbar/formulas: arithmetic path",
+    "fourbar/formulas/test_formulas.py": "fourbar/formulas: arithmetic many_digits path",
     "fourbar/formulas/test_mobility.py": "fourbar/formulas: circuits linkage_type",
     "fourbar/test_solve.py": "fourbar: linkage quantities solution; "
-    "fourbar/scene: blocks case evaluation motion scene withheld",
-    "fourbar/scene/test_compiled.py": "fourbar/scene: compiled_case",
+    "fourbar/scene: motion scene; fourbar/evaluation: blocks case stages withheld",
+    "fourbar/evaluation/test_compiled.py": "fourbar/evaluation: compiled_case",
     "fourbar/studies/test_study.py": "fourbar/scene: motion_law; fourbar/studies: keys",
     "fourbar/studies/test_spread.py": "fourbar/scene: tolerance; fourbar/files: tolerances",
     "fourbar/studies/test_derivatives.py": "fourbar/show: influence",

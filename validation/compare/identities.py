@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 
 from fourbar.effects import Actions
 from fourbar.effects.actions import bodies
+from fourbar.evaluation.case import state_at
 from fourbar.formulas.pin_forces import Wrenches
 from fourbar.linkage import MOVING_BARS, PIN_FORCE
 from fourbar.quantities import OK, OVERFLOW
 from fourbar.scene import Command, Scene
-from fourbar.scene.case import state_at
 from fourbar.solution import Solution
 from validation.compare.answer import Answer
 from validation.compare.compare import closing_margin, turned

@@ -7,10 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.effects import Springs, Torsion
+from fourbar.evaluation.case import BLOCK
 from fourbar.linkage import MOVING_BARS, PIN_FORCE
 from fourbar.quantities import FORCES, OK, PIN_FORCES
 from fourbar.scene import Command, Scene
-from fourbar.scene.case import BLOCK
 from fourbar.solution import Solution
 from fourbar.solve import solve
 from validation.compare.basis import basis_of, smallest_yardstick, strictest_condition

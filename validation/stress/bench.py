@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 
 from fourbar.effects import Gravity
 from fourbar.errors import BROKEN, FAILED, HOLDS
+from fourbar.evaluation.case import BLOCK
 from fourbar.formulas.mobility import default_range
 from fourbar.linkage import MOVING_BARS, Bar, FourBar
 from fourbar.quantities import ANGLES, UNKNOWNS
 from fourbar.scene import Command, Scene
-from fourbar.scene.case import BLOCK
 from fourbar.show.plot.style import format_of
 from fourbar.solve import solve
 from validation.engines.witnesses import WITNESSES, Witness

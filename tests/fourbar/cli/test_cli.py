@@ -19,9 +19,9 @@ import pytest
 import fourbar
 from fourbar.cli import group, status
 from fourbar.errors import BAD_INPUT, BROKEN, HOLDS, INTERRUPTED, DependencyError
+from fourbar.evaluation.case import Case
 from fourbar.files import load, save
 from fourbar.quantities import UNITS, VECTORS
-from fourbar.scene.case import Case
 from fourbar.show import tables
 from tests.support.scenes import crank_rocker, thesis
 

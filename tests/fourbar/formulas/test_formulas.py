@@ -24,6 +24,8 @@ from fourbar.formulas.arithmetic import (
     two_sum,
     vector,
 )
+from fourbar.formulas.many_digits import decided, limit_remainder
+from fourbar.formulas.many_digits import half_angle as exact_half_angle
 from fourbar.formulas.mobility import limit_positions
 from fourbar.formulas.motion import Coefficients, Rates, State, rates
 from fourbar.formulas.path import drive_sine, drive_sine_of_triangle, path, state
@@ -31,8 +33,6 @@ from fourbar.formulas.pin_forces import Body, inertia_wrenches, pin_forces
 from fourbar.formulas.position import HalfAngle, close_loop, direction, half_angle, loop, parallel_pairs
 from fourbar.formulas.torque import driving_torque, half_slope, inertia
 from fourbar.linkage import MOVING_BARS, Bar, FourBar, uniform
-from fourbar.many_digits import decided, limit_remainder
-from fourbar.many_digits import half_angle as exact_half_angle
 from tests.fourbar.formulas.test_points import Drawn, random_positions
 
 U = 2.0**-53

@@ -9,9 +9,9 @@ import pytest
 
 import fourbar
 from fourbar.formulas.arithmetic import dot
+from fourbar.formulas.many_digits import limit_remainder
 from fourbar.formulas.motion import State
 from fourbar.formulas.path import singular, state
-from fourbar.many_digits import limit_remainder
 
 EPS = 2.0**-52
 LENGTHS = (0.3, 0.1, 0.25, 0.22)

@@ -8,11 +8,11 @@ import pytest
 
 import fourbar
 from fourbar.effects.actions import Actions, bodies
+from fourbar.evaluation.case import state_at
 from fourbar.formulas.arithmetic import cross, dot
 from fourbar.formulas.path import drive_sine
 from fourbar.formulas.path import state as state_of
 from fourbar.formulas.pin_forces import Wrenches, between
-from fourbar.scene.case import state_at
 from validation.published.thirteen import assemble, solve_thirteen
 from validation.stress.bench import bodies_of, command, example
 

@@ -8,15 +8,15 @@ from scipy.optimize import brentq
 
 import fourbar
 from fourbar.effects.actions import Actions, bodies
+from fourbar.evaluation.case import state_at
+from fourbar.evaluation.free_motion import _meeting, release
 from fourbar.formulas.mobility import limit_positions, on_smooth_path
 from fourbar.formulas.motion import State, rates
 from fourbar.formulas.path import path, smooth_branch
 from fourbar.formulas.path import state as state_of
 from fourbar.formulas.position import half_angle, loop
 from fourbar.formulas.torque import driving_torque, half_slope, inertia
-from fourbar.free_motion import _meeting, release
 from fourbar.scene import Command, command
-from fourbar.scene.case import state_at
 from fourbar.solve import solve
 from validation.engines.balls import BITS, inputs, outputs
 from validation.studies.cost.formulas import thirteen_equations

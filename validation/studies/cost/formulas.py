@@ -8,13 +8,13 @@ import numpy as np
 
 from fourbar.effects import Actions
 from fourbar.effects.actions import bodies
+from fourbar.evaluation.case import Case, changed, state_at
 from fourbar.formulas.arithmetic import cross
 from fourbar.formulas.motion import State
 from fourbar.formulas.pin_forces import Wrenches
 from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import PIN_FORCES
 from fourbar.scene import Command, Scene
-from fourbar.scene.case import Case, changed, state_at
 from fourbar.solve import solve
 from validation.compare.answer import Array
 from validation.compare.error import relative

@@ -49,7 +49,7 @@ def small_error(true: object) -> object:
 
 
 def test_an_error_of_a_billionth_is_found_and_shrunk(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    solving = import_module("fourbar.scene.case")
+    solving = import_module("fourbar.evaluation.case")
     monkeypatch.setattr(solving, "pin_forces", small_error(solving.pin_forces))
     scene = replace(crank_rocker(), motion=fourbar.Motion(np.array([1.0, 2.0]), 10.0, 5.0))
     assert examine.findings(scene)

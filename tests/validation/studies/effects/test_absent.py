@@ -42,7 +42,7 @@ def test_a_build_that_never_heard_of_an_effect_gives_the_same_bits(
 def test_a_build_that_pays_for_an_absent_effect_is_noticed(whole: dict[str, object], tmp_path: Path) -> None:
     """One that runs a term of size zero, and one whose MJCF leaves a flag on."""
     other = build(tmp_path)
-    solver, model = other / "fourbar" / "scene" / "case.py", other / "fourbar" / "mjcf" / "model.py"
+    solver, model = other / "fourbar" / "evaluation" / "case.py", other / "fourbar" / "mjcf" / "model.py"
     text = solver.read_text()
     changed = text.replace("(*scene.loads, *scene.effects)", "(Viscous.at(O2=0.0), *scene.loads, *scene.effects)")
     assert changed != text

@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fourbar.evaluation.case import NOWHERE, Case, Evaluated
+from fourbar.evaluation.withheld import no_value
 from fourbar.formulas.arithmetic import angle, anywhere
 from fourbar.formulas.motion import State
 from fourbar.formulas.path import NO_DIGIT_LEFT
@@ -23,13 +25,11 @@ from fourbar.quantities import (
     WOUND,
 )
 from fourbar.scene import Command
-from fourbar.scene.case import NOWHERE, Case, Evaluated
 from fourbar.scene.point import OF_POINTS
-from fourbar.scene.withheld import no_value
 from fourbar.solution import Array
 
 if TYPE_CHECKING:
-    from fourbar.free_motion import FreeMotion
+    from fourbar.evaluation.free_motion import FreeMotion
 
 
 FORCE, ERROR = STAGES.index("force"), STAGES.index("error")
@@ -154,7 +154,7 @@ def _forces(
         if held is not None and found.status is not None:
             found = found._replace(status=np.where(held & (found.status == OK), JAMMED, found.status))
     if exact is not None:
-        from fourbar.scene.error_bars import error_bars
+        from fourbar.evaluation.error_bars import error_bars
 
         values |= error_bars(case, state, alpha_2, sign, found, exact)
     without = [status for term in case.terms if (status := term.status(state, branch)) is not None]

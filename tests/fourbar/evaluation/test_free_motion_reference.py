@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 import fourbar
-from fourbar import free_motion
-from fourbar.free_motion import FreeMotion, release
+from fourbar.evaluation import free_motion
+from fourbar.evaluation.free_motion import FreeMotion, release
 from tests.support.released_reference import released
 
 PROMISED = 1e-9

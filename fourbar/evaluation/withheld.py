@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fourbar.evaluation.case import Case, Evaluated
 from fourbar.formulas.path import NO_DIGIT_LEFT
 from fourbar.quantities import NO_TORQUE, NOT_ASSEMBLED, OK, OVERFLOW, SEVERAL, SINGULAR, STAGE_OF, STAGES
-from fourbar.scene.case import Case, Evaluated
 from fourbar.scene.point import OF_POINTS
 
 

@@ -14,6 +14,16 @@ from typing import Any
 
 import numpy as np
 
+from fourbar.evaluation import case as cases
+from fourbar.evaluation import error_bars as bars
+from fourbar.evaluation.case import BLOCK, undecided
+from fourbar.evaluation.error_bars import (
+    EVALUATIONS,
+    bar,
+    rounded_coefficients,
+    rounded_half_angle,
+    rounded_real,
+)
 from fourbar.formulas import arithmetic, motion, path, pin_forces, position, torque
 from fourbar.formulas.arithmetic import anywhere, cross, select, square_root, vector
 from fourbar.formulas.motion import Coefficients, Rates, coefficients, rates, with_sines_of_rates
@@ -22,16 +32,6 @@ from fourbar.formulas.pin_forces import Body, PinForces, Wrenches, coupler_about
 from fourbar.formulas.pin_forces import pin_forces as pin_forces_of
 from fourbar.formulas.position import HalfAngle, Loop, Position, close_loop, direction_of_tangent, half_angle_of_tangent
 from fourbar.formulas.torque import driving_torque, half_slope, inertia
-from fourbar.scene import case as cases
-from fourbar.scene import error_bars as bars
-from fourbar.scene.case import BLOCK, undecided
-from fourbar.scene.error_bars import (
-    EVALUATIONS,
-    bar,
-    rounded_coefficients,
-    rounded_half_angle,
-    rounded_real,
-)
 from fourbar.solution import Array
 
 BODIES, VISCOUS, LOADS = 16, 28, 32

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.errors import DependencyError, installing
+from fourbar.evaluation.case import BLOCK, Case, Evaluated
+from fourbar.evaluation.stages import ERROR, FORCE, Part, commanded
+from fourbar.evaluation.withheld import withheld
 from fourbar.quantities import is_scalar
-from fourbar.scene.case import BLOCK, Case, Evaluated
-from fourbar.scene.evaluation import ERROR, FORCE, Part, commanded
-from fourbar.scene.withheld import withheld
 from fourbar.solution import Array
 
 WORTH_COMPILING = 2_000_000
@@ -26,7 +26,7 @@ def positions_at_once(wanted: int) -> int:
     """Of a stage: for the error bars each position is evaluated many times."""
     if wanted < ERROR:
         return BLOCK
-    from fourbar.scene.error_bars import EVALUATIONS
+    from fourbar.evaluation.error_bars import EVALUATIONS
 
     return BLOCK // EVALUATIONS
 
@@ -41,7 +41,7 @@ def is_compiled(case: Case, wanted: int, count: int, compiled: bool | None) -> b
         if compiled is None:
             return False
         raise DependencyError(f"compiled=True needs numba, which is not installed: {installing('fast')}")
-    from fourbar.scene.compiled_case import carries
+    from fourbar.evaluation.compiled_case import carries
 
     return carries(case)
 
@@ -50,7 +50,7 @@ def evaluation(quick: bool) -> Callable[..., Evaluated]:
     """Of some positions, by the compiled loop or by NumPy."""
     if not quick:
         return commanded
-    from fourbar.scene.compiled_case import evaluated
+    from fourbar.evaluation.compiled_case import evaluated
 
     return evaluated
 

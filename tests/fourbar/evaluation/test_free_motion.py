@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import fourbar
-from fourbar import free_motion
-from fourbar.free_motion import release
+from fourbar.evaluation import free_motion
+from fourbar.evaluation.free_motion import release
 from fourbar.solve import solve
 
 HANGING = fourbar.FourBar(

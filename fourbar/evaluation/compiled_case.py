@@ -8,17 +8,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.effects import Flywheel, Gravity, Load, Viscous
+from fourbar.evaluation.case import BLOCK, NO_MOTION, Case, Evaluated, changed
+from fourbar.evaluation.compiled import ROWS, loop, run, scatter
+from fourbar.evaluation.error_bars import signs
+from fourbar.evaluation.stages import ERROR, NO_HALF_ANGLE, Part, commanded, kinematics, piece, sign_of
+from fourbar.evaluation.withheld import all_finite, withheld
 from fourbar.formulas.arithmetic import anywhere, cross, polar, two_sum
 from fourbar.formulas.motion import Rates, State
 from fourbar.formulas.position import Position
 from fourbar.linkage import MOVING_BARS, PINS
 from fourbar.quantities import PIN_FORCES, UNKNOWNS
 from fourbar.scene import Command
-from fourbar.scene.case import BLOCK, NO_MOTION, Case, Evaluated, changed
-from fourbar.scene.compiled import ROWS, loop, run, scatter
-from fourbar.scene.error_bars import signs
-from fourbar.scene.evaluation import ERROR, NO_HALF_ANGLE, Part, commanded, kinematics, piece, sign_of
-from fourbar.scene.withheld import all_finite, withheld
 from fourbar.solution import Array
 
 CARRIED = (Load, Gravity, Viscous, Flywheel)

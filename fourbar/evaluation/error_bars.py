@@ -15,11 +15,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fourbar.evaluation.case import Case, Dynamics
 from fourbar.formulas.arithmetic import anywhere, select, two_sum
 from fourbar.formulas.motion import Coefficients, State, rates, side_may_turn_fast, side_turns_fast
 from fourbar.formulas.path import read_backwards
 from fourbar.formulas.position import HalfAngle, Loop, Position
-from fourbar.scene.case import Case, Dynamics
 
 EVALUATIONS = 14
 """Of the orders of seven changes up and seven down half are the others reversed, which leaves NUMBERS of them: so many

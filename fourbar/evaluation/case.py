@@ -162,7 +162,7 @@ class Case(NamedTuple):
                     close = close | undecided(factor, constant, 4.0 * lengths.a * lengths.d)
         if not anywhere(close):
             return half, NOWHERE
-        from fourbar.many_digits import decided
+        from fourbar.formulas.many_digits import decided
 
         index = np.flatnonzero(np.broadcast_to(close, np.shape(theta_2)))
         half = decided(self.linkage, self.path.unit, half, index, theta_2, remainder)

@@ -10,9 +10,9 @@ import pytest
 from fourbar import Bar, FourBar, Motion, Scene, Solution, Sweep, solve
 from fourbar.effects import Flywheel, Friction, Gravity, Load, Viscous
 from fourbar.errors import DependencyError
+from fourbar.evaluation import blocks, compiled, compiled_case
+from fourbar.evaluation.error_bars import EVALUATIONS
 from fourbar.quantities import NOT_ASSEMBLED, OK
-from fourbar.scene import blocks, compiled, compiled_case
-from fourbar.scene.error_bars import EVALUATIONS
 from fourbar.studies.study import vary
 from validation.stress.forward_error.stability import TOO_SMALL, run
 
