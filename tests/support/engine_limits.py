@@ -15,10 +15,10 @@ from fourbar.mjcf import RECIPE, mjcf
 from fourbar.mjcf.document import load_ratio
 from fourbar.scene import Scene, command
 from fourbar.scene.motion import Motion
-from validation.compare.answer import Answer
-from validation.compare.tolerance import SIMULATED
-from validation.engines import pinocchio_forward
-from validation.engines.limits import (
+from fourbar_validation.compare.answer import Answer
+from fourbar_validation.compare.tolerance import SIMULATED
+from fourbar_validation.engines import pinocchio_forward
+from fourbar_validation.engines.limits import (
     FASTEST,
     HEAVIEST,
     LIGHTEST,
@@ -28,12 +28,12 @@ from validation.engines.limits import (
     SLOWEST,
     Boundary,
 )
-from validation.engines.mujoco import simulate
-from validation.engines.mujoco.closed_loop import ClosedLoop
-from validation.engines.mujoco.inverse import MujocoTree
-from validation.scenes.hard_families import loads, sweep_of
-from validation.scenes.hard_linkages import at, dressed, linkage_of, with_bars
-from validation.scenes.random import LinkageType
+from fourbar_validation.engines.mujoco import simulate
+from fourbar_validation.engines.mujoco.closed_loop import ClosedLoop
+from fourbar_validation.engines.mujoco.inverse import MujocoTree
+from fourbar_validation.scenes.hard_families import loads, sweep_of
+from fourbar_validation.scenes.hard_linkages import at, dressed, linkage_of, with_bars
+from fourbar_validation.scenes.random import LinkageType
 
 
 class Measured(NamedTuple):

@@ -4,11 +4,11 @@ from collections.abc import Iterable, Iterator
 
 import pytest
 
-from validation.engines.witnesses import Witness
-from validation.report.record import Record
-from validation.report.summary import Summary
-from validation.run import pool
-from validation.scenes.suites import Suite
+from fourbar_validation.engines.witnesses import Witness
+from fourbar_validation.report.record import Record
+from fourbar_validation.report.summary import Summary
+from fourbar_validation.run import pool
+from fourbar_validation.scenes.suites import Suite
 
 
 def summary_of(records: Iterable[Record]) -> Summary:

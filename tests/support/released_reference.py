@@ -18,7 +18,7 @@ from flint import arb, arb_series, ctx
 
 from fourbar import FourBar, Gravity, Load, Viscous
 from fourbar.linkage import MOVING_BARS, PINS
-from validation.engines.balls import closure
+from fourbar_validation.engines.balls import closure
 
 BITS = 256
 """Near a change point the terms of 1/(t . M t) grow as SINGULAR^-ORDER = 1e-34, and cancel."""

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from fourbar.scene import Command, Scene
+from fourbar_validation.compare.answer import Answer
 from tests.support.scenes import crank_rocker
-from validation.compare.answer import Answer
 
 
 @dataclass(frozen=True)

@@ -15,19 +15,19 @@ import pytest
 
 import fourbar
 import fourbar.cli
-import validation.cli
+import fourbar_validation.cli
 from fourbar.cli import status
 from fourbar.errors import HOLDS
 from fourbar.files import load
 from fourbar.files.effects import REGISTRY
-from validation.cli import COMMANDS, group
-from validation.scenes.suites import suite_file
-from validation.studies.effects.work import EFFECTS
+from fourbar_validation.cli import COMMANDS, group
+from fourbar_validation.lab.effects.work import EFFECTS
+from fourbar_validation.scenes.suites import suite_file
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
 GALLERY = ROOT / "models" / "gallery"
-GROUPS = {"fourbar": fourbar.cli.group, "validation": validation.cli.group}
+GROUPS = {"fourbar": fourbar.cli.group, "validation": fourbar_validation.cli.group}
 PAGES = [ROOT / "README.md", *sorted(DOCS.rglob("*.md"))]
 
 

@@ -20,12 +20,12 @@ from fourbar.mjcf import mjcf
 from fourbar.mjcf.effects import MJCF_OF
 from fourbar.scene import Scene, command
 from fourbar.solve import solve
+from fourbar_validation.compare import effects as in_scales
+from fourbar_validation.engines import effects as on_trees
+from fourbar_validation.engines import free_body_effects
+from fourbar_validation.engines.free_body import FreeBody
+from fourbar_validation.run.judge import judge
 from tests.validation.engines.test_effects import ENGINES, EXACT, SIMULATED, failing
-from validation.compare import effects as in_scales
-from validation.engines import effects as on_trees
-from validation.engines import free_body_effects
-from validation.engines.free_body import FreeBody
-from validation.run.judge import judge
 
 PAGE = (Path(__file__).parents[2] / "docs" / "adding-an-effect.md").read_text(encoding="utf-8")
 REFERENCE = (Path(__file__).parents[2] / "docs" / "effects.md").read_text(encoding="utf-8")

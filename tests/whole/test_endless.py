@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 import fourbar.cli
-import validation.cli
+import fourbar_validation.cli
 from fourbar.errors import BAD_INPUT, INTERRUPTED
 from fourbar.evaluation import free_motion
 
@@ -49,7 +49,7 @@ def test_what_may_never_end_is_not_waited_for(
     before = sorted(tmp_path.rglob("*"))
     out = str(tmp_path / "out")
     program, *arguments = (part.replace("ENDLESS", str(endless)).replace("OUT", out) for part in line)
-    status = fourbar.cli.status if program == "fourbar" else validation.cli.status
+    status = fourbar.cli.status if program == "fourbar" else fourbar_validation.cli.status
     assert status(arguments) == BAD_INPUT
     printed = capsys.readouterr()
     assert printed.err.count("\n") == 1 and endless.name in printed.err
@@ -114,7 +114,10 @@ def test_a_free_motion_too_long_for_the_engines_is_refused_before_a_run(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (tmp_path / "released.toml").write_text(RELEASED)
-    assert validation.cli.status(["run", str(tmp_path / "released.toml"), "--out", str(tmp_path / "out")]) == BAD_INPUT
+    assert (
+        fourbar_validation.cli.status(["run", str(tmp_path / "released.toml"), "--out", str(tmp_path / "out")])
+        == BAD_INPUT
+    )
     printed = capsys.readouterr().err
     assert "motion.free.duration" in printed and "must not exceed 100 s in a run" in printed
     assert not (tmp_path / "out").exists()

@@ -12,16 +12,16 @@ import pytest
 
 import fourbar
 import fourbar.cli
-import validation.cli
+import fourbar_validation.cli
 from fourbar.errors import BAD_INPUT, BROKEN, FAILED, HOLDS, INTERRUPTED, DependencyError, InputError, run
 from fourbar.writing import write_text
+from fourbar_validation.compare.rows import AGREES, FAILS, Row, write_results
+from fourbar_validation.lab.stress.bench import Measured
+from fourbar_validation.lab.stress.forward_error.stability import Tally
+from fourbar_validation.published.figures import Figure
 from tests.support.alone import alone
 from tests.support.here import judge_here
 from tests.support.scenes import crank_rocker
-from validation.compare.rows import AGREES, FAILS, Row, write_results
-from validation.published.figures import Figure
-from validation.stress.bench import Measured
-from validation.stress.forward_error.stability import Tally
 
 ROOT = Path(__file__).parents[2]
 MODEL = str(ROOT / "models" / "crank_rocker.toml")
@@ -68,7 +68,7 @@ def test_no_command_writes_over_what_it_reads(
     texts = {"scene.toml": Path(MODEL).read_text(), "theirs.csv": "theta_2,torque\n1.0,0.2\n"}
     for name, text in texts.items():
         Path(name).write_text(text)
-    assert validation.cli.status(command.format(*texts).split()) == BAD_INPUT
+    assert fourbar_validation.cli.status(command.format(*texts).split()) == BAD_INPUT
     assert "is read here, and would be lost" in capsys.readouterr().err
     assert {path.name: path.read_text() for path in tmp_path.iterdir()} == texts
 
@@ -118,7 +118,7 @@ def test_every_end_has_its_status(
 @pytest.mark.parametrize("module", ["fourbar", "validation"])
 def test_an_interruption_while_the_libraries_are_imported_is_one_line(module: str, tmp_path: Path) -> None:
     (tmp_path / "numpy.py").write_text("raise KeyboardInterrupt")
-    paths = os.pathsep.join((str(tmp_path), str(ROOT)))
+    paths = os.pathsep.join((str(tmp_path), str(ROOT), str(ROOT / "validation")))
     line = [sys.executable, "-m", module, "--help"]
     done = subprocess.run(line, env={**os.environ, "PYTHONPATH": paths}, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (INTERRUPTED, "error: interrupted\n")
@@ -148,7 +148,7 @@ def study(folder: Path) -> dict[str, str]:
     return {name: str(folder / name) for name in ("good.csv", "bad.csv", "theirs.csv", "scene.toml", "out")}
 
 
-VALIDATION, FOURBAR = validation.cli.status, fourbar.cli.status
+VALIDATION, FOURBAR = fourbar_validation.cli.status, fourbar.cli.status
 STATUSES: list[tuple[Callable[[list[str]], int], str, int]] = [
     (FOURBAR, "--version", HOLDS),
     (FOURBAR, "--help", HOLDS),
@@ -196,12 +196,12 @@ def test_every_command_ends_with_its_status(
 def test_a_figure_that_no_erratum_explains_is_status_1(monkeypatch: pytest.MonkeyPatch) -> None:
     assert VALIDATION(["published"]) == HOLDS
     wrong = Figure("2.4 positions", "1 theta3_1", "167.877224", 167.8)
-    monkeypatch.setattr("validation.published.ladder.figures", lambda: iter([wrong]))
+    monkeypatch.setattr("fourbar_validation.published.check.figures", lambda: iter([wrong]))
     assert VALIDATION(["published"]) == FAILED
 
 
 def test_no_figure_at_all_is_status_1(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
-    monkeypatch.setattr("validation.published.ladder.figures", lambda: iter([]))
+    monkeypatch.setattr("fourbar_validation.published.check.figures", lambda: iter([]))
     assert VALIDATION(["published"]) == FAILED
     assert "Nothing was compared" in capsys.readouterr().out
 
@@ -218,7 +218,7 @@ def test_a_torque_off_in_its_twelfth_digit_is_status_1(monkeypatch: pytest.Monke
         solution.torque *= 1.0 + 1e-12
         return solution
 
-    monkeypatch.setattr("validation.stress.forward_error.stability.solve", off)
+    monkeypatch.setattr("fourbar_validation.lab.stress.forward_error.stability.solve", off)
     assert VALIDATION(STABILITY) == FAILED
 
 
@@ -229,7 +229,7 @@ def test_samples_that_compare_nothing_are_status_1(
         tally.samples += 1
         tally.not_assembled += 1
 
-    monkeypatch.setattr("validation.stress.forward_error.stability.judge", open_loop)
+    monkeypatch.setattr("fourbar_validation.lab.stress.forward_error.stability.judge", open_loop)
     assert VALIDATION(STABILITY) == FAILED
     assert "random: nothing was compared" in capsys.readouterr().out
 
@@ -238,7 +238,7 @@ def test_a_ratio_that_is_not_reached_is_status_1(monkeypatch: pytest.MonkeyPatch
     for name in ONE_THREAD:
         monkeypatch.setenv(name, "1")
     rows = {"growth from 1000 positions on": 1.1, "floor": 1.0}
-    monkeypatch.setattr("validation.stress.bench.measure", lambda *_: Measured(rows, {}, {}, {}))
+    monkeypatch.setattr("fourbar_validation.lab.stress.bench.measure", lambda *_: Measured(rows, {}, {}, {}))
     assert VALIDATION(["bench"]) == HOLDS
     rows["growth from 1000 positions on"] = 2.0
     assert VALIDATION(["bench"]) == FAILED
@@ -249,7 +249,7 @@ def test_bench_passes_on_how_its_own_process_ended(ended: int, status: int, monk
     for name in ONE_THREAD:
         monkeypatch.delenv(name, raising=False)
     monkeypatch.setattr(
-        "validation.stress.bench.subprocess.run", lambda line, **_: subprocess.CompletedProcess(line, ended)
+        "fourbar_validation.lab.stress.bench.subprocess.run", lambda line, **_: subprocess.CompletedProcess(line, ended)
     )
     assert VALIDATION(["bench"]) == status
 
@@ -271,7 +271,7 @@ PROCESSES = [
     ("validation", "problems --no-such-option", BAD_INPUT),
     ("validation", "standing --no-such-option", BAD_INPUT),
     ("validation", f"accept {NO_FILE}", BAD_INPUT),
-    ("validation", f"compare accepted {ROOT / 'validation/regression/accepted'}", HOLDS),
+    ("validation", f"compare accepted {ROOT / 'validation/fourbar_validation/regression/accepted'}", HOLDS),
     ("validation", f"check {NO_FILE} {NO_FILE}", BAD_INPUT),
     ("validation", "fuzz-files --count 1", HOLDS),
     ("validation", "models --no-such-option", BAD_INPUT),
@@ -297,7 +297,7 @@ def test_every_command_is_in_the_table_of_processes() -> None:
     tried = {(program, line.split()[0]) for program, line, _ in PROCESSES}
     assert tried == {
         *(("fourbar", name) for name in fourbar.cli.group.commands),
-        *(("validation", name) for name in validation.cli.COMMANDS),
+        *(("validation", name) for name in fourbar_validation.cli.COMMANDS),
     }
 
 

@@ -10,25 +10,25 @@ from pathlib import Path
 import pytest
 
 import fourbar
-import validation.run.run
+import fourbar_validation.run.run
 from fourbar.errors import BAD_INPUT, FAILED, HOLDS, InputError
 from fourbar.mjcf import mjcf
 from fourbar.scene import Command, Scene
+from fourbar_validation.cli import status
+from fourbar_validation.compare.answer import Answer
+from fourbar_validation.compare.columns import read_columns
+from fourbar_validation.compare.rows import COLUMNS, FAILS
+from fourbar_validation.compare.tolerance import EQUIVALENCE
+from fourbar_validation.engines.memory import WORKER_MEMORY
+from fourbar_validation.engines.witnesses import Witness
+from fourbar_validation.report.summary import Summary
+from fourbar_validation.report.terminal import table
+from fourbar_validation.run import pool
+from fourbar_validation.run.run import run
+from fourbar_validation.run.selection import chosen
+from fourbar_validation.scenes.suites import LARGEST_LIST, suite_file
 from tests.support.here import judge_here
 from tests.support.scenes import crank_rocker
-from validation.cli import status
-from validation.compare.answer import Answer
-from validation.compare.columns import read_columns
-from validation.compare.rows import COLUMNS, FAILS
-from validation.compare.tolerance import EQUIVALENCE
-from validation.engines.memory import WORKER_MEMORY
-from validation.engines.witnesses import Witness
-from validation.report.summary import Summary
-from validation.report.terminal import table
-from validation.run import pool
-from validation.run.run import run
-from validation.run.selection import chosen
-from validation.scenes.suites import LARGEST_LIST, suite_file
 
 HOSTILE = {
     "html": "<script>alert(1)</script><img src=x onerror=alert(2)>",
@@ -253,7 +253,7 @@ class Greedy:
 
 def test_running_out_of_memory_costs_its_own_row(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     suite = suite_file(listed(tmp_path, "a.toml\nb.toml\n"))
-    monkeypatch.setattr(validation.run.run, "CHUNK", {True: 2, False: 2})
+    monkeypatch.setattr(fourbar_validation.run.run, "CHUNK", {True: 2, False: 2})
     greedy = Witness("greedy", f"{__name__}:Greedy", EQUIVALENCE)
     list(run(suite, tmp_path / "run", (*EXACT, greedy), workers=1, drawn=False))
     failing = [row for row in read_columns(tmp_path / "run" / "results.csv") if row.verdict == FAILS]

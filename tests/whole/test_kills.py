@@ -16,26 +16,26 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
-import validation.run.run
+import fourbar_validation.run.run
 from fourbar.errors import DependencyError, FourBarError, InputError
 from fourbar.scene import Command, Scene
+from fourbar_validation.compare.answer import Answer
+from fourbar_validation.compare.columns import read_columns
+from fourbar_validation.compare.rows import FAILS, REFUSES, Row
+from fourbar_validation.compare.tolerance import EQUIVALENCE
+from fourbar_validation.engines import added
+from fourbar_validation.engines.witnesses import Witness
+from fourbar_validation.report.machine import CODE, build, code, modules
+from fourbar_validation.report.record import Record
+from fourbar_validation.report.summary import Summary
+from fourbar_validation.run import pool
+from fourbar_validation.run.run import Collected, run
+from fourbar_validation.run.selection import chosen
+from fourbar_validation.run.store import RunningError, Store
+from fourbar_validation.scenes.random import LinkageType
+from fourbar_validation.scenes.suites import AS_LONG_AS, MOST_POSITIONS, Files, Random, Suite, scene_files
 from tests.support.here import judge_here
 from tests.support.unlucky import Few, dies_at_first
-from validation.compare.answer import Answer
-from validation.compare.columns import read_columns
-from validation.compare.rows import FAILS, REFUSES, Row
-from validation.compare.tolerance import EQUIVALENCE
-from validation.engines import added
-from validation.engines.witnesses import Witness
-from validation.report.machine import CHECKOUT, CODE, build, checkout, code
-from validation.report.record import Record
-from validation.report.summary import Summary
-from validation.run import pool
-from validation.run.run import Collected, run
-from validation.run.selection import chosen
-from validation.run.store import RunningError, Store
-from validation.scenes.random import LinkageType
-from validation.scenes.suites import AS_LONG_AS, MOST_POSITIONS, Files, Random, Suite, scene_files
 
 SEED = 7
 KILLS = int(os.environ.get("KILLS", "1"))
@@ -43,7 +43,7 @@ KILLS = int(os.environ.get("KILLS", "1"))
 FULL = "KILLS" in os.environ
 COUNT, IN_A_CHUNK = (220, 20) if FULL else (30, 3)
 """Scenes of a run, none of them drawn, so that the work is the judging alone; and as many chunks in a small run."""
-SMALL = f"import validation.run.run as run; run.CHUNK = {{False: {IN_A_CHUNK}}}; "
+SMALL = f"import fourbar_validation.run.run as run; run.CHUNK = {{False: {IN_A_CHUNK}}}; "
 HARNESS = "import runpy; runpy.run_module('validation', run_name='__main__', alter_sys=True)"
 PROGRAM = ("-m", "validation") if FULL else ("-c", SMALL + HARNESS)
 TYPES = tuple(LinkageType)
@@ -61,7 +61,7 @@ def judge_all(
 
 @pytest.mark.timeout(300)  # its hangs alone take half a minute, and every new worker imports the harness again
 def test_an_engine_that_crashes_or_hangs_costs_its_own_rows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(validation.run.run, "CHUNK", {True: 2, False: 2})
+    monkeypatch.setattr(fourbar_validation.run.run, "CHUNK", {True: 2, False: 2})
     hangs = 2.0 * max(1.0, os.getloadavg()[0] / (os.cpu_count() or 1))  # s; a busy machine is given longer
     moody = added.named(["tests.support.unlucky:Moody"], ())
     judge_all(Few(), tmp_path / "run", (*EXACT, *moody), seconds=hangs)
@@ -77,8 +77,9 @@ def test_an_engine_that_crashes_or_hangs_costs_its_own_rows(tmp_path: Path, monk
 def test_a_worker_ends_itself_in_the_scene_that_hangs_and_with_its_parent() -> None:
     """The limit is that of a scene, whatever the others of its chunk took."""
     judge = (
-        "from tests.support.unlucky import Few; from validation.run import pool; "
-        "from validation.compare.tolerance import EQUIVALENCE; from validation.engines.witnesses import Witness; "
+        "from tests.support.unlucky import Few; from fourbar_validation.run import pool; "
+        "from fourbar_validation.compare.tolerance import EQUIVALENCE; "
+        "from fourbar_validation.engines.witnesses import Witness; "
         "moody = [Witness('moody', 'tests.support.unlucky:Moody', EQUIVALENCE)]; "
         "pool.ready(%s); print('ready', flush=True); pool.judge_watched(%s, Few(), [0, 2], moody, False)"
     )
@@ -126,7 +127,7 @@ def test_the_bytes_do_not_depend_on_the_workers(
     tmp_path: Path, undisturbed: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """None, in order, or two."""
-    monkeypatch.setattr(validation.run.run, "CHUNK", {False: IN_A_CHUNK})
+    monkeypatch.setattr(fourbar_validation.run.run, "CHUNK", {False: IN_A_CHUNK})
     judge_all(Random(COUNT, 0, TYPES), tmp_path, workers=2)
     for name in ("results.csv", "results.parquet"):
         assert (tmp_path / name).read_bytes() == (undisturbed / name).read_bytes()
@@ -164,15 +165,16 @@ def test_the_hash_of_the_code_is_that_of_its_modules(tmp_path: Path) -> None:
     hashes = []
     for name, text in (
         ("fourbar/a.py", "1"),
-        ("validation/b.py", "2"),
-        ("validation/b.py", "3"),
+        ("harness/b.py", "2"),
+        ("harness/b.py", "3"),
         ("fourbar/a.txt", ""),
+        ("harness/models/a.toml", ""),
     ):
-        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_text(text)
-        hashes.append(checkout(tmp_path))
-    assert len(set(hashes)) == 3 and hashes[2] == hashes[3]
-    project = tomllib.loads((CHECKOUT / "pyproject.toml").read_text(encoding="utf-8"))
+        hashes.append(modules(tmp_path / "fourbar", tmp_path / "harness"))
+    assert len(set(hashes)) == 3 and hashes[2] == hashes[3] == hashes[4]
+    project = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text(encoding="utf-8"))
     read = project["tool"]["setuptools"]["package-data"]["fourbar"]  # what is only shown decides no number
     assert {Path(name).suffix for name in read if not name.startswith("show/")} <= set(CODE)
     assert build("numpy") and build("no-such-package") == ""
@@ -355,9 +357,9 @@ def test_of_a_long_suite_what_fails_has_pictures_and_what_is_nearest_to_it(
         return judge(suite, scenes, who, draw)
 
     monkeypatch.setattr(pool, "judge_chunk", noting)
-    monkeypatch.setattr("validation.report.summary.PICTURED", 3)
-    monkeypatch.setattr(validation.run.run, "PICTURED", 3)
-    monkeypatch.setattr(validation.run.run, "html", lambda *_, **__: "")
+    monkeypatch.setattr("fourbar_validation.report.summary.PICTURED", 3)
+    monkeypatch.setattr(fourbar_validation.run.run, "PICTURED", 3)
+    monkeypatch.setattr(fourbar_validation.run.run, "html", lambda *_, **__: "")
     blunders = Witness("blunders", f"{__name__}:Blunders", EQUIVALENCE)
     *_, without = run(Few(), tmp_path / "without", (*EXACT, blunders), drawn=False)
     assert not drawn and not any(record.figure for record in without.shown)  # type: ignore[union-attr]

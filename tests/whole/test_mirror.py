@@ -10,15 +10,16 @@ import pytest
 
 from tests.whole.test_imports import ROOT
 
-SOURCES = {"fourbar": ROOT / "fourbar", "validation": ROOT / "validation"}
+SOURCES = {"fourbar": ROOT / "fourbar", "validation": ROOT / "validation" / "fourbar_validation"}
 """Folder of tests, and folder of the modules that it mirrors."""
 JUDGED_BY = {
     # what a command reads, does and prints is tested through the command
     "fourbar/cli/test_cli.py": "fourbar/cli: evaluate export given; fourbar/show: progress tables words",
     "whole/test_exits.py": "fourbar: errors writing; validation: cli; validation/report: terminal; "
-    "validation/stress: mutants",
+    "validation/lab/stress: mutants",
     "whole/test_kills.py": "validation/run: pool run selection store; validation/scenes: suites",
     "whole/test_results_format.py": "validation/compare: columns",
+    "whole/test_package.py": "validation: places",
     # one table or one evaluation, whose rows are no use alone
     "fourbar/effects/test_effects.py": "fourbar/effects: actions cones effect flywheel friction gravity load "
     "numbers pin_friction pins torsion viscous",
@@ -61,28 +62,29 @@ JUDGED_BY = {
     "validation/run: printed",
     "validation/check/test_model.py": "validation/check: causes differences screen; "
     "validation/engines: memory; validation/engines/mujoco: anatomy attached describe guess mend theirs",
-    "validation/published/test_published.py": "validation/published: figures ladder program textbook "
-    "thesis_dynamics thesis_positions thirteen",
+    "validation/published/test_published.py": "validation/published: check figures program textbook "
+    "thesis_dynamics thesis_positions thirteen; validation/lab: ladder",
     "validation/regression/test_regression.py": "validation/regression: accept change changes fault history "
     "history_page record render scenes steps times; validation/report: junit; validation/run: elsewhere",
     "validation/report/test_report.py": "validation/report: colours costs figures machine record summary svg "
     "templating",
     # studies: each through its command
-    "validation/stress/test_bench.py": "validation/stress: against bench_picture contenders in_c in_sympy limits timed",
-    "validation/stress/forward_error/test_stability.py": "validation/stress/forward_error: families",
-    "validation/stress/fuzz/test_fuzz.py": "validation/stress/fuzz: scenes shrink",
-    "validation/stress/mutation/test_mutation.py": "validation/stress/mutation: harness",
-    "validation/stress/mutation/test_planted.py": "validation/stress/mutation: planting specimens",
-    "validation/studies/cost/test_cost.py": "validation/studies/cost: curves errors formulas laws orders pictures "
-    "study; validation/engines/mujoco: one_state",
-    "validation/studies/cost/test_advise.py": "validation/studies/cost: exhaustive matters measure; "
+    "validation/lab/stress/test_bench.py": "validation/lab/stress: against bench_picture contenders in_c in_sympy "
+    "limits timed",
+    "validation/lab/stress/forward_error/test_stability.py": "validation/lab/stress/forward_error: families",
+    "validation/lab/stress/fuzz/test_fuzz.py": "validation/lab/stress/fuzz: scenes shrink",
+    "validation/lab/stress/mutation/test_mutation.py": "validation/lab/stress/mutation: harness",
+    "validation/lab/stress/mutation/test_planted.py": "validation/lab/stress/mutation: planting specimens",
+    "validation/lab/cost/test_cost.py": "validation/lab/cost: curves formulas laws orders pictures study; "
+    "validation/advise: errors; validation/engines/mujoco: one_state",
+    "validation/advise/test_advise.py": "validation/advise: matters; validation/lab/cost: exhaustive measure; "
     "validation/run: dial; validation/engines/mujoco: trial",
-    "validation/studies/effects/test_cost.py": "validation/studies/effects: counted table work; "
+    "validation/lab/effects/test_cost.py": "validation/lab/effects: counted table work; "
     "validation/engines/mujoco: stepping",
     # simulators that need not be there: their scripts run where they are installed
-    "validation/subjects/test_subjects.py": "validation/subjects: drake_sap examine exudyn_simulated genesis_rigid "
-    "motion mujoco_c mujoco_mjx mujoco_warp newton_kamino newton_mujoco pybullet standing work",
-    "validation/subjects/test_versions.py": "validation/subjects: releases versions_page",
+    "validation/lab/subjects/test_subjects.py": "validation/lab/subjects: drake_sap examine exudyn_simulated "
+    "genesis_rigid motion mujoco_c mujoco_mjx mujoco_warp newton_kamino newton_mujoco pybullet standing work",
+    "validation/lab/subjects/test_versions.py": "validation/lab/subjects: releases versions_page",
 }
 """Modules without a test of their name, folder by folder, and the test that says when one of them is wrong."""
 

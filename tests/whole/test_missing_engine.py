@@ -48,7 +48,7 @@ def without(library: str, folder: Path, *arguments: str, **settings: str) -> sub
     """`python -m validation run` where a library cannot be imported."""
     (folder / "sitecustomize.py").write_text(BLOCKER)
     (folder / "scene.toml").write_text(SCENE)
-    paths = os.pathsep.join((str(folder), str(ROOT)))
+    paths = os.pathsep.join((str(folder), str(ROOT), str(ROOT / "validation")))
     return subprocess.run(
         [
             sys.executable,

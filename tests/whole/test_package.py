@@ -19,13 +19,16 @@ from pathlib import Path
 import pytest
 
 from fourbar.cli import status
-from fourbar.errors import BROKEN, DependencyError
+from fourbar.errors import BAD_INPUT, BROKEN, HOLDS, DependencyError, installing
 from fourbar.files import save
+from fourbar_validation.cli import status as harness
+from fourbar_validation.places import import_path
 from tests.support.scenes import crank_rocker
 
 ROOT = Path(__file__).parents[2]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
 PYTHONS = ("3.11", "3.12", "3.13")
+MODELS = "fourbar_validation.models"
 MODULE_OF = {"python-flint": "flint", "pin": "pinocchio", "imageio-ffmpeg": "imageio_ffmpeg"}
 """Libraries that are imported under another name than they are installed by."""
 
@@ -35,14 +38,59 @@ def libraries(requirements: list[str]) -> set[str]:
     return {MODULE_OF.get(name, name) for name in names}
 
 
-def test_every_file_of_the_package_is_shipped() -> None:
-    patterns = PROJECT["tool"]["setuptools"]["package-data"]["fourbar"]
-    for path in (ROOT / "fourbar").rglob("*"):
+@pytest.mark.parametrize(
+    ("package", "folder"),
+    [("fourbar", "fourbar"), ("fourbar_validation", "validation/fourbar_validation"), (MODELS, "models")],
+)
+def test_every_file_of_the_package_is_shipped(package: str, folder: str) -> None:
+    patterns = PROJECT["tool"]["setuptools"]["package-data"][package]
+    for path in (ROOT / folder).rglob("*"):
         if path.is_file() and path.suffix != ".py" and path.parent.name != "__pycache__":
-            name = path.relative_to(ROOT / "fourbar").as_posix()
-            assert any(fnmatch.fnmatch(name, pattern) for pattern in patterns), name
+            name = path.relative_to(ROOT / folder).as_posix()
+            patterns_of = [pattern.removeprefix("**/") for pattern in patterns]
+            assert any(fnmatch.fnmatch(name, pattern) for pattern in patterns_of), name
         if path.suffix == ".py":
             assert (path.parent / "__init__.py").is_file(), path
+
+
+@pytest.mark.parametrize("line", ["models", "problems", "mutation --planted", "bench --against HEAD"])
+def test_what_needs_a_checkout_says_so_in_one_line(
+    line: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("fourbar_validation.places.CHECKOUT", None)
+    assert harness(line.split()) == BAD_INPUT
+    complained = capsys.readouterr().err
+    assert complained.count("\n") == 1 and "needs a checkout" in complained
+
+
+def test_the_harness_lists_a_command_whose_library_is_missing(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def without_flint(_: str) -> None:
+        raise ModuleNotFoundError("No module named 'flint'", name="flint")
+
+    monkeypatch.setattr("fourbar_validation.cli.resolve_name", without_flint)
+    assert harness(["--help"]) == HOLDS
+    assert "flint is not installed" in capsys.readouterr().out
+    assert harness(["run", "scene.toml", "--out", "results"]) == BROKEN
+    complained = capsys.readouterr().err
+    assert complained.count("\n") == 1 and "flint is not installed: pip install" in complained
+
+
+def test_extras_of_extras_are_named_one_by_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No index of packages has `fourbar[plot]`."""
+    monkeypatch.setattr("fourbar.errors.__file__", "/nowhere/fourbar/errors.py")
+    for extra in ("validation", "all"):
+        line = installing(extra)
+        assert "fourbar" not in line and all(name in line for name in ("mujoco>=", "pin>=", "python-flint>="))
+
+
+def test_another_interpreter_finds_the_code_of_a_wheel_and_no_library_of_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("fourbar_validation.places.CHECKOUT", None)
+    monkeypatch.delenv("PYTHONPATH", raising=False)
+    with import_path() as path:
+        assert sorted(entry.name for entry in Path(path).iterdir()) == ["fourbar", "fourbar_validation"]
+    assert not Path(path).exists()
 
 
 def test_every_library_that_fourbar_imports_is_declared() -> None:
@@ -124,8 +172,8 @@ def installed_works(python: str, package: Path, folder: Path, constraints: list[
     subprocess.run([own, "-m", "pip", "install", "-q", package, "-c", folder / "constraints.txt"], check=True)
     environment = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
 
-    def run(*arguments: str) -> subprocess.CompletedProcess[str]:
-        command = [str(folder / "bin" / "fourbar"), *arguments]
+    def run(*arguments: str, program: str = "fourbar") -> subprocess.CompletedProcess[str]:
+        command = [str(folder / "bin" / program), *arguments]
         return subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=False)
 
     assert run("--version").stdout == f"fourbar, version {PROJECT['project']['version']}\n"
@@ -134,6 +182,8 @@ def installed_works(python: str, package: Path, folder: Path, constraints: list[
     assert table.returncode == 0 and "361 positions: 361 ok" in table.stdout, table.stderr
     page = run("animate", "a.toml", "-o", "a.html")
     assert page.returncode == 0 and (folder / "a.html").stat().st_size > 50_000, page.stderr
+    listed = run("--help", program="fourbar-validation")
+    assert listed.returncode == 0 and "published" in listed.stdout, listed.stderr
     missing = run("plot", "a.toml", "-o", "a.svg")
     assert missing.returncode == BROKEN and missing.stderr.count("\n") == 1
     assert 'pip install "matplotlib>=' in missing.stderr
@@ -144,8 +194,13 @@ def installed_works(python: str, package: Path, folder: Path, constraints: list[
 def test_wheel_and_archive_install_on_every_python(tmp_path: Path) -> None:
     wheel, archive = built(tmp_path)
     names = set(zipfile.ZipFile(wheel).namelist())
-    assert {name.partition("/")[0] for name in names} == {"fourbar", f"{wheel.name.split('-py3')[0]}.dist-info"}
-    assert "fourbar/show/page/page.js" in names
+    assert {name.partition("/")[0] for name in names} == {
+        "fourbar",
+        "fourbar_validation",
+        f"{wheel.name.split('-py3')[0]}.dist-info",
+    }
+    assert {"fourbar/show/page/page.js", "fourbar_validation/models/thesis.toml"} <= names
+    assert "fourbar_validation/regression/accepted/results.csv" in names
     with tarfile.open(archive) as packed:
         assert any(name.endswith("/LICENSE") for name in packed.getnames())
     found = {version: shutil.which(f"python{version}") for version in PYTHONS}

@@ -12,24 +12,24 @@ from fourbar.effects import PinFriction
 from fourbar.formulas.pin_forces import PinForces
 from fourbar.quantities import FORCES, PIN_FORCES, QUANTITIES, STAGES, UNKNOWNS
 from fourbar.solution import Solution
+from fourbar_validation.compare.columns import read_columns
+from fourbar_validation.compare.identities import FORMULAS, IDENTITIES
+from fourbar_validation.compare.rows import COLUMNS, Row
+from fourbar_validation.compare.statements.statements import statements
+from fourbar_validation.engines.free_body import FreeBody
+from fourbar_validation.engines.hard_suite import HARD_WITNESSES
+from fourbar_validation.engines.mujoco.shipped import QUANTITY as SHIPPED
+from fourbar_validation.engines.witnesses import FURTHER, WITNESSES, WORK
+from fourbar_validation.regression.change import WHOLE
+from fourbar_validation.regression.record import ACCEPTED, baseline
+from fourbar_validation.run.released import ENGINES, FULL
+from fourbar_validation.run.run import run
+from fourbar_validation.run.selection import chosen
+from fourbar_validation.run.shipped.checks import CHECKS
+from fourbar_validation.scenes.random import LinkageType
+from fourbar_validation.scenes.suites import Random
 from tests.support.here import judge_here
 from tests.support.scenes import crank_rocker
-from validation.compare.columns import read_columns
-from validation.compare.identities import FORMULAS, IDENTITIES
-from validation.compare.rows import COLUMNS, Row
-from validation.compare.statements.statements import statements
-from validation.engines.free_body import FreeBody
-from validation.engines.hard_suite import HARD_WITNESSES
-from validation.engines.mujoco.shipped import QUANTITY as SHIPPED
-from validation.engines.witnesses import FURTHER, WITNESSES, WORK
-from validation.regression.change import WHOLE
-from validation.regression.record import ACCEPTED, baseline
-from validation.run.released import ENGINES, FULL
-from validation.run.run import run
-from validation.run.selection import chosen
-from validation.run.shipped.checks import CHECKS
-from validation.scenes.random import LinkageType
-from validation.scenes.suites import Random
 
 PAGE = (Path(__file__).parents[2] / "docs" / "results-format.md").read_text()
 NOT_QUANTITIES = (

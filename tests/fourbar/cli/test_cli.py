@@ -201,7 +201,7 @@ def test_no_command_is_a_question_for_help(run: Fourbar, capsys: pytest.CaptureF
     code, out, err = run()
     assert (code, err) == (HOLDS, "") and out == run("-h")[1] and "analyze" in out
     assert run("-V")[1] == f"fourbar, version {fourbar.__version__}\n"
-    harness = import_module("validation.cli").status([])
+    harness = import_module("fourbar_validation.cli").status([])
     assert harness == HOLDS and "advise" in capsys.readouterr().out
 
 

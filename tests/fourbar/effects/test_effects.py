@@ -15,8 +15,8 @@ from fourbar.scene import Scene
 from fourbar.scene.motion import Motion, Sweep
 from fourbar.scene.motion_law import Law
 from fourbar.solve import solve
+from fourbar_validation.engines.effects import look_up
 from tests.support.scenes import crank_rocker
-from validation.engines.effects import look_up
 
 SECOND_ORDER = 1e-8
 """A central difference with a step of 1e-5 rad: 1e-10 from its third derivative, 1e-11 from rounding, times the

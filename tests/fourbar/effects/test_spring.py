@@ -14,7 +14,7 @@ from fourbar.linkage import PINS
 from fourbar.scene import Scene
 from fourbar.scene.motion import Free, Motion, Sweep
 from fourbar.solve import solve
-from validation.run.judge import judge
+from fourbar_validation.run.judge import judge
 
 FINE = 20_000
 """Positions of a sweep in which no pin turns by half a turn from one to the next."""

@@ -14,7 +14,7 @@ from fourbar.evaluation import blocks, compiled, compiled_case
 from fourbar.evaluation.error_bars import EVALUATIONS
 from fourbar.quantities import NOT_ASSEMBLED, OK
 from fourbar.studies.study import vary
-from validation.stress.forward_error.stability import TOO_SMALL, run
+from fourbar_validation.lab.stress.forward_error.stability import TOO_SMALL, run
 
 pytest.importorskip("numba", reason="the formulas are compiled by numba: pip install numba")
 
@@ -82,7 +82,7 @@ def test_a_study_has_them_too_on_any_number_of_threads(monkeypatch: pytest.Monke
 
 def test_error_bars_keep_their_promise(monkeypatch: pytest.MonkeyPatch) -> None:
     quick = functools.partial(solve, compiled=True)
-    monkeypatch.setattr("validation.stress.forward_error.stability.solve", quick)
+    monkeypatch.setattr("fourbar_validation.lab.stress.forward_error.stability.solve", quick)
     for family in ("random", "change_point", "tables"):
         tally = run(family, range(20))
         assert all(ratio <= 1.0 for ratio, _ in tally.worst.values())

@@ -9,9 +9,9 @@ from fourbar.linkage import Bar, FourBar
 from fourbar.quantities import PIN_FORCES
 from fourbar.scene import Scene, command
 from fourbar.scene.motion import Motion
-from validation.compare.error import magnitude
-from validation.engines.exact import BallArithmetic
-from validation.run import printed
+from fourbar_validation.compare.error import magnitude
+from fourbar_validation.engines.exact import BallArithmetic
+from fourbar_validation.run import printed
 
 TURNS = 2000.0 * np.pi
 

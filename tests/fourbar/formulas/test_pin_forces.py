@@ -13,8 +13,8 @@ from fourbar.formulas.arithmetic import cross, dot
 from fourbar.formulas.path import drive_sine
 from fourbar.formulas.path import state as state_of
 from fourbar.formulas.pin_forces import Wrenches, between
-from validation.published.thirteen import assemble, solve_thirteen
-from validation.stress.bench import bodies_of, command, example
+from fourbar_validation.lab.stress.bench import bodies_of, command, example
+from fourbar_validation.published.thirteen import assemble, solve_thirteen
 
 EPS = 2.0**-52
 SOLVED = 1e-11

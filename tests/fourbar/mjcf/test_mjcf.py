@@ -12,8 +12,8 @@ import fourbar
 from fourbar.effects import Torsion
 from fourbar.mjcf import Settings, defaults_used, mjcf, scene_from_lengths
 from fourbar.mjcf.document import SETTLING
+from fourbar_validation.scenes.suites import model_files
 from tests.support.scenes import crank_rocker, thesis
-from validation.scenes.suites import model_files
 
 SPEED = 1e-2
 """The promise of the file: the input within 1 % of omega_2 over a revolution or its range."""

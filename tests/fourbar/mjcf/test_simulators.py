@@ -18,8 +18,8 @@ from fourbar.mjcf import SIMULATORS, mjcf_for
 from fourbar.mjcf.sdf import sdf
 from fourbar.mjcf.usd import usd
 from fourbar.scene import Command, Scene
+from fourbar_validation.compare.answer import Array
 from tests.support.scenes import crank_rocker
-from validation.compare.answer import Array
 
 STEPS = 20
 

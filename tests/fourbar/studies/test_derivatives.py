@@ -18,8 +18,8 @@ from fourbar.scene.motion import Free, FromLimit, Motion
 from fourbar.solution import values_of
 from fourbar.studies.derivatives import Sensitivity, sensitivity
 from fourbar.studies.keys import entries
+from fourbar_validation.engines.balls import BITS, Values, inputs, outputs
 from tests.fourbar.studies.test_study import ANGLES, DRIVEN, LINK, LOADS, RUBBING, scene
-from validation.engines.balls import BITS, Values, inputs, outputs
 
 TABLED = Load(4, (2.0, 0.1), (0.0, 0.0), 0.3, "world", Table((0.0, 2.0, 6.0), (0.0, 1.0, 2.0)))
 STEP = 2.0**-60

@@ -16,12 +16,12 @@ from fourbar.errors import BAD_INPUT, FAILED, HOLDS
 from fourbar.quantities import OK, UNITS, VECTORS
 from fourbar.scene import Command, Scene, command
 from fourbar.solve import solve
-from validation.check.judge import Tolerance
-from validation.check.judgement import Judgement, judge_table
-from validation.check.theirs import LARGEST_FILE, NOT_JUDGED, read_table
-from validation.cli import status
-from validation.compare.scales import TERMS, yardstick
-from validation.compare.tolerance import POWER
+from fourbar_validation.check.judge import Tolerance
+from fourbar_validation.check.judgement import Judgement, judge_table
+from fourbar_validation.check.theirs import LARGEST_FILE, NOT_JUDGED, read_table
+from fourbar_validation.cli import status
+from fourbar_validation.compare.scales import TERMS, yardstick
+from fourbar_validation.compare.tolerance import POWER
 
 MODELS = Path(__file__).parents[3] / "models"
 SCENES = {

@@ -16,24 +16,24 @@ import pytest
 from click.testing import CliRunner
 
 import fourbar
-import validation.run.run
+import fourbar_validation.run.run
 from fourbar.effects import Friction
 from fourbar.errors import InputError
 from fourbar.mjcf import mjcf
 from fourbar.quantities import UNKNOWNS
 from fourbar.scene import Scene
 from fourbar.solve import solve
-from validation.check import model
-from validation.check.causes import causes
-from validation.check.differences import differences
-from validation.check.screen import DEEPEST, LARGEST_MJCF, read_mjcf
-from validation.cli import status
-from validation.compare.columns import read_columns
-from validation.compare.compare import compare
-from validation.compare.rows import FAILS
-from validation.compare.tolerance import SIMULATED
-from validation.engines.memory import WORKER_MEMORY
-from validation.engines.mujoco.theirs import ONE_STATE, THROUGH_TIME, Examined, examine, examine_mended
+from fourbar_validation.check import model
+from fourbar_validation.check.causes import causes
+from fourbar_validation.check.differences import differences
+from fourbar_validation.check.screen import DEEPEST, LARGEST_MJCF, read_mjcf
+from fourbar_validation.cli import status
+from fourbar_validation.compare.columns import read_columns
+from fourbar_validation.compare.compare import compare
+from fourbar_validation.compare.rows import FAILS
+from fourbar_validation.compare.tolerance import SIMULATED
+from fourbar_validation.engines.memory import WORKER_MEMORY
+from fourbar_validation.engines.mujoco.theirs import ONE_STATE, THROUGH_TIME, Examined, examine, examine_mended
 
 CRANK_ROCKER = fourbar.load(Path(__file__).parents[3] / "models" / "crank_rocker.toml")
 GENERATED = mjcf(CRANK_ROCKER)
@@ -164,9 +164,9 @@ def test_loads_under_other_names_and_in_another_order_are_the_same_loads() -> No
 
 
 def described(text: str) -> Mapping[str, float | str]:
-    from validation.engines.mujoco.anatomy import Anatomy
-    from validation.engines.mujoco.describe import described as describe
-    from validation.engines.mujoco.theirs import compile_text
+    from fourbar_validation.engines.mujoco.anatomy import Anatomy
+    from fourbar_validation.engines.mujoco.describe import described as describe
+    from fourbar_validation.engines.mujoco.theirs import compile_text
 
     return describe(Anatomy(compile_text(text), {}))
 
@@ -444,7 +444,7 @@ def test_the_command_writes_and_prints_what_it_found(tmp_path: Path) -> None:
     scene.write_text(fourbar.dump(BARE))
     names = [f"--name={role}={name}" for role, name in {**MINE, "coupler": "rod<b>|"}.items()]
     arguments = [str(scene), "--mjcf", str(path), *names, "--out", str(tmp_path / "out")]
-    result = CliRunner().invoke(validation.run.run.command, arguments, standalone_mode=False)
+    result = CliRunner().invoke(fourbar_validation.run.run.command, arguments, standalone_mode=False)
     assert result.return_value == 1, result.output
     assert "\x1b" not in result.output
     assert "closure.softness" in result.output
@@ -460,7 +460,7 @@ def test_bad_options_are_reported(arguments: list[str], tmp_path: Path) -> None:
     scene = tmp_path / "scene.toml"
     scene.write_text(fourbar.dump(BARE))
     result = CliRunner().invoke(
-        validation.run.run.command,
+        fourbar_validation.run.run.command,
         [str(scene) if word == "SCENE" else word for word in arguments],
         standalone_mode=False,
     )
@@ -474,7 +474,7 @@ def run(tmp_path: Path, text: str, *options: str) -> tuple[int | None, list[floa
     path.write_text(text)
     out = tmp_path / f"out{len(options)}"
     arguments = [str(scene), "--mjcf", str(path), "--out", str(out), *options]
-    result = CliRunner().invoke(validation.run.run.command, arguments, standalone_mode=False)
+    result = CliRunner().invoke(fourbar_validation.run.run.command, arguments, standalone_mode=False)
     if result.exception is not None:
         raise result.exception
     return result.return_value, sorted(

@@ -15,27 +15,27 @@ import fourbar
 from fourbar.errors import FAILED, HOLDS
 from fourbar.formulas.mobility import limit_positions
 from fourbar.scene import Command, Scene, command
+from fourbar_validation.check.model import ModelReport
+from fourbar_validation.cli import status
+from fourbar_validation.compare.answer import Answer, Released
+from fourbar_validation.compare.columns import read_columns
+from fourbar_validation.compare.compare import compare
+from fourbar_validation.compare.counts import Counts
+from fourbar_validation.compare.rows import AGREES, DEGRADED, FAILS, REFUSES, UNDECIDED, VERDICTS, Row, write_results
+from fourbar_validation.compare.tolerance import EQUIVALENCE
+from fourbar_validation.engines.witnesses import WITNESSES, Witness
+from fourbar_validation.lab.cost.laws import Law
+from fourbar_validation.lab.stress.mutation import mutation
+from fourbar_validation.regression import render
+from fourbar_validation.regression.changes import differences
+from fourbar_validation.report.html import html as page_of
+from fourbar_validation.report.html import markdown
+from fourbar_validation.run import released as free
+from fourbar_validation.run.judge import judge, judged
 from tests.support.here import judge_here, summary_of
 from tests.support.scenes import crank_rocker
 from tests.validation.regression.test_regression import HERE, ROW, save
 from tests.validation.run.test_judge import Echo
-from validation.check.model import ModelReport
-from validation.cli import status
-from validation.compare.answer import Answer, Released
-from validation.compare.columns import read_columns
-from validation.compare.compare import compare
-from validation.compare.counts import Counts
-from validation.compare.rows import AGREES, DEGRADED, FAILS, REFUSES, UNDECIDED, VERDICTS, Row, write_results
-from validation.compare.tolerance import EQUIVALENCE
-from validation.engines.witnesses import WITNESSES, Witness
-from validation.regression import render
-from validation.regression.changes import differences
-from validation.report.html import html as page_of
-from validation.report.html import markdown
-from validation.run import released as free
-from validation.run.judge import judge, judged
-from validation.stress.mutation import mutation
-from validation.studies.cost.laws import Law
 
 NAN = math.nan
 
@@ -174,7 +174,7 @@ def test_where_no_loop_closes_no_identity_is_counted_as_held() -> None:
 
 def test_an_identity_that_is_due_nowhere_is_not_counted_as_held(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(
-        "validation.compare.identities.reversing", lambda scene, solution, _: np.ones(len(solution), bool)
+        "fourbar_validation.compare.identities.reversing", lambda scene, solution, _: np.ones(len(solution), bool)
     )
     verdicts = {row.quantity: row.verdict for row in judge("scene", crank_rocker(), []).rows}
     expected = {"closure": AGREES, "force_sum": UNDECIDED, "moment_sum": UNDECIDED}
@@ -310,11 +310,11 @@ def test_numbers_without_a_digit_do_not_agree(tmp_path: Path, capsys: pytest.Cap
 def test_a_study_in_which_no_law_is_fitted_is_no_success(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr("validation.studies.cost.study.Study.points", lambda _: iter(()))
-    monkeypatch.setattr("validation.studies.cost.cost.write", lambda *_: [])
+    monkeypatch.setattr("fourbar_validation.lab.cost.study.Study.points", lambda _: iter(()))
+    monkeypatch.setattr("fourbar_validation.lab.cost.cost.write", lambda *_: [])
     law = Law("order", "torque", 4.0, 0.1, 4.0, 9)
     for found, code in (([], FAILED), ([replace(law, points=1)], FAILED), ([law], HOLDS)):
-        monkeypatch.setattr("validation.studies.cost.cost.laws", lambda _, found=found: found)
+        monkeypatch.setattr("fourbar_validation.lab.cost.cost.laws", lambda _, found=found: found)
         assert status(["cost", "--out", str(tmp_path)]) == code
         assert ("Nothing was compared" in capsys.readouterr().out) == (code == FAILED)
 

@@ -10,9 +10,9 @@ from fourbar.effects import Friction
 from fourbar.scene import Scene, command
 from fourbar.scene.motion import Motion, Sweep
 from fourbar.solve import solve
-from validation.compare.reversals import broken, reversals
-from validation.engines.witnesses import WITNESSES
-from validation.run.judge import judge
+from fourbar_validation.compare.reversals import broken, reversals
+from fourbar_validation.engines.witnesses import WITNESSES
+from fourbar_validation.run.judge import judge
 
 D, A, B, C = 0.3, 0.1, 0.25, 0.22
 FRICTION = 0.5

@@ -15,16 +15,16 @@ import fourbar
 from fourbar.errors import InputError
 from fourbar.files import save
 from fourbar.quantities import UNKNOWNS
+from fourbar_validation import Answer
+from fourbar_validation.cli import status
+from fourbar_validation.compare.rows import FAILS, REFUSES
+from fourbar_validation.engines import added
+from fourbar_validation.engines.free_body import FreeBody
+from fourbar_validation.engines.witnesses import WITNESSES
+from fourbar_validation.run import pool
+from fourbar_validation.run.judge import judge
+from fourbar_validation.run.selection import askable, chosen, selected
 from tests.support.scenes import crank_rocker
-from validation import Answer
-from validation.cli import status
-from validation.compare.rows import FAILS, REFUSES
-from validation.engines import added
-from validation.engines.free_body import FreeBody
-from validation.engines.witnesses import WITNESSES
-from validation.run import pool
-from validation.run.judge import judge
-from validation.run.selection import askable, chosen, selected
 
 HERE = "tests.validation.engines.test_added:"
 SCENE = crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.1, 6.38, 8), 10.0), loads=())
@@ -186,7 +186,7 @@ def test_from_the_command_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
         return ((number, pool.judge_chunk(suite, scenes, witnesses, draw)) for number, scenes in chunks)
 
     monkeypatch.setattr(pool, "over_processes", here)
-    monkeypatch.setattr("validation.run.run.html", lambda *_, **__: "")
+    monkeypatch.setattr("fourbar_validation.run.run.html", lambda *_, **__: "")
     out = ["--out", str(tmp_path / "out"), "--engines", "free-body", "--time-limit", "2.5", "--no-pictures"]
     assert (
         status(["run", str(tmp_path / "scene.toml"), "--witness", HERE + "Right", "--witness", HERE + "Raises", *out])

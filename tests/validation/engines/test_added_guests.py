@@ -15,20 +15,20 @@ import pytest
 import fourbar
 from fourbar.errors import FAILED, InputError
 from fourbar.files import save
+from fourbar_validation import Answer
+from fourbar_validation.compare.columns import read_columns
+from fourbar_validation.compare.rows import AGREES, FAILS, REFUSES, Row
+from fourbar_validation.engines import added, output
+from fourbar_validation.engines.free_body import FreeBody
+from fourbar_validation.report.record import Record
+from fourbar_validation.report.summary import Summary
+from fourbar_validation.run import pool
+from fourbar_validation.run.run import run
+from fourbar_validation.run.selection import chosen
+from fourbar_validation.scenes.suites import scene_files
 from tests.support.here import judge_here
 from tests.support.scenes import crank_rocker
 from tests.whole.test_imports import ROOT
-from validation import Answer
-from validation.compare.columns import read_columns
-from validation.compare.rows import AGREES, FAILS, REFUSES, Row
-from validation.engines import added, output
-from validation.engines.free_body import FreeBody
-from validation.report.record import Record
-from validation.report.summary import Summary
-from validation.run import pool
-from validation.run.run import run
-from validation.run.selection import chosen
-from validation.scenes.suites import scene_files
 
 HERE = "tests.validation.engines.test_added_guests:"
 SCENE = crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.1, 6.38, 8), 10.0))
@@ -305,7 +305,7 @@ class Mine:
         return near.answer(scene, at)
 """
 NEAR = """
-from validation.engines.free_body import FreeBody
+from fourbar_validation.engines.free_body import FreeBody
 
 def answer(scene, at):
     answer = FreeBody().answer(scene, at)

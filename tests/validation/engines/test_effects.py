@@ -32,12 +32,12 @@ from fourbar.formulas.arithmetic import dot
 from fourbar.formulas.path import state
 from fourbar.linkage import MOVING_BARS
 from fourbar.scene import Scene, command
+from fourbar_validation.engines import free_body, free_body_effects
+from fourbar_validation.engines.effects import TERM_OF
+from fourbar_validation.engines.free_body_closure import close
+from fourbar_validation.engines.witnesses import WITNESSES
+from fourbar_validation.run.judge import judge
 from tests.support.scenes import crank_rocker
-from validation.engines import free_body, free_body_effects
-from validation.engines.effects import TERM_OF
-from validation.engines.free_body_closure import close
-from validation.engines.witnesses import WITNESSES
-from validation.run.judge import judge
 
 TABLE = Table((0.0, 1.0, 2.5, 2 * np.pi), (0.0, 1.0, -0.5, 0.0))
 ACTING: dict[str, Effect] = {
@@ -184,11 +184,11 @@ def moved(effect: Effect) -> Effect:
 @contextmanager
 def formulas_see(change: Callable[[Scene], Scene]) -> Iterator[None]:
     """The formulas work on a changed scene, the engines on the true one."""
-    import validation.run.judge
+    import fourbar_validation.run.judge
 
-    true = validation.run.judge.solve
+    true = fourbar_validation.run.judge.solve
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(validation.run.judge, "solve", lambda scene, *a, **k: true(change(scene), *a, **k))
+        patch.setattr(fourbar_validation.run.judge, "solve", lambda scene, *a, **k: true(change(scene), *a, **k))
         yield
 
 

@@ -18,18 +18,18 @@ from fourbar.linkage import Bar, FourBar, uniform
 from fourbar.scene import Command, Scene, command
 from fourbar.scene.motion import Motion
 from fourbar.solve import solve
+from fourbar_validation.compare.compare import COMPARED, compare
+from fourbar_validation.compare.identities import closure
+from fourbar_validation.compare.tolerance import EPS, EQUIVALENCE, K
+from fourbar_validation.engines import loop
+from fourbar_validation.engines.effects import TERM_OF
+from fourbar_validation.engines.limits import LIGHTEST
+from fourbar_validation.engines.mujoco.inverse import MujocoInverse, MujocoTree
+from fourbar_validation.engines.witnesses import FURTHER, WITNESSES
+from fourbar_validation.scenes.random import LinkageType
+from fourbar_validation.scenes.suites import Random
 from tests.support.scenes import thesis
 from tests.validation.engines.test_effects import ACTING, scene
-from validation.compare.compare import COMPARED, compare
-from validation.compare.identities import closure
-from validation.compare.tolerance import EPS, EQUIVALENCE, K
-from validation.engines import loop
-from validation.engines.effects import TERM_OF
-from validation.engines.limits import LIGHTEST
-from validation.engines.mujoco.inverse import MujocoInverse, MujocoTree
-from validation.engines.witnesses import FURTHER, WITNESSES
-from validation.scenes.random import LinkageType
-from validation.scenes.suites import Random
 
 WITNESS = {witness.name: witness for witness in (*WITNESSES, *FURTHER) if not witness.through_time}
 TREES = {"pinocchio-inverse": "PinocchioTree", "mujoco-inverse": "MujocoTree", "drake-inverse": "DrakeTree"}
@@ -263,7 +263,7 @@ def test_the_floor_of_mujoco_is_where_it_is_stated_to_be() -> None:
 @pytest.mark.parametrize("name", present("opensim-constraints"))
 def test_simbody_loses_a_constraint_where_the_limit_says(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Bars 3 and 4 nearly in one line: just inside the limit it is exact, well beyond it the force is lost."""
-    from validation.engines import opensim
+    from fourbar_validation.engines import opensim
 
     linkage = with_bar(2, mass=0.2).linkage
     linkage = replace(linkage, input=Bar(0.25, 0.2), coupler=Bar(0.22, 0.5), output=Bar(0.3, 0.4))
@@ -379,7 +379,7 @@ def test_a_fault_in_a_row_shows_but_where_an_engine_has_its_own(
 
 @pytest.mark.parametrize("name", present("exudyn-constraints"))
 def test_a_fault_in_an_element_of_exudyn_shows(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    from validation.engines.exudyn_elements import ELEMENT_OF
+    from fourbar_validation.engines.exudyn_elements import ELEMENT_OF
 
     assert ELEMENT_OF.keys() == OWN[name]
     for key in OWN[name]:
@@ -427,7 +427,10 @@ def test_near_a_jam_an_engine_finds_the_one_solution_that_there_is(
     for arms, jams in ((r, False), (50.0, True)):
         friction = PinFriction.at(**dict.fromkeys(("A", "B", "O4"), (mu, arms)))
         whole = Scene(link, motion, drive, (), (Gravity(), friction))
-        names = ("validation.engines.pinocchio:PinocchioInverse", "validation.engines.free_body:FreeBody")
+        names = (
+            "fourbar_validation.engines.pinocchio:PinocchioInverse",
+            "fourbar_validation.engines.free_body:FreeBody",
+        )
         answers = [resolve_name(name)().answer(whole, command(whole)) for name in names]
         engine, bodies = (answer.quantities["torque"][0] for answer in answers)
         assert math.isnan(engine) is math.isnan(bodies) is jams

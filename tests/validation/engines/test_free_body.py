@@ -15,12 +15,12 @@ from fourbar.effects import Flywheel, Friction, Gravity, Load, PinFriction, Poin
 from fourbar.linkage import PINS
 from fourbar.quantities import STAGE_OF
 from fourbar.scene import Scene, command
+from fourbar_validation.engines import free_body, free_body_closure, free_body_effects
+from fourbar_validation.engines.free_body import FreeBody, slide
+from fourbar_validation.engines.witnesses import WITNESSES
+from fourbar_validation.run.judge import judge
 from tests.support.scenes import crank_rocker
 from tests.whole.test_imports import ROOT, imported
-from validation.engines import free_body, free_body_closure, free_body_effects
-from validation.engines.free_body import FreeBody, slide
-from validation.engines.witnesses import WITNESSES
-from validation.run.judge import judge
 
 EPS = 2.0**-52
 DIGITS = 50.0 * EPS
@@ -36,11 +36,17 @@ def answered(scene: Scene) -> dict[str, Any]:
 
 
 def test_it_imports_the_description_and_nothing_of_the_formulas() -> None:
-    allowed = ("fourbar.linkage", "fourbar.scene", "validation.compare.answer", "validation.engines.free_body", "numpy")
-    allowed += ("validation.engines.description",)  # which imports the description alone
+    allowed = (
+        "fourbar.linkage",
+        "fourbar.scene",
+        "fourbar_validation.compare.answer",
+        "fourbar_validation.engines.free_body",
+        "numpy",
+    )
+    allowed += ("fourbar_validation.engines.description",)  # which imports the description alone
     standard = {"collections", "dataclasses", "math", "typing"}
     for module in (free_body, free_body_closure, free_body_effects):
-        modules = imported(ROOT / "validation/engines" / f"{module.__name__.split('.')[-1]}.py")
+        modules = imported(ROOT / "validation/fourbar_validation/engines" / f"{module.__name__.split('.')[-1]}.py")
         assert modules
         assert not {each for each in modules if not each.startswith(allowed) and each.split(".")[0] not in standard}
 

@@ -10,31 +10,31 @@ import pytest
 from markupsafe import escape
 
 import fourbar
-import validation.run.judge
+import fourbar_validation.run.judge
 from fourbar.mjcf import RECIPE, Settings
 from fourbar.scene import Command, Scene
+from fourbar_validation.compare.answer import Answer
+from fourbar_validation.compare.compare import COMPARED
+from fourbar_validation.compare.rows import AGREES, DEGRADED, FAILS, UNDECIDED, VERDICTS
+from fourbar_validation.compare.tolerance import FULL_ACCURACY
+from fourbar_validation.engines.exact import where_it_closes
+from fourbar_validation.engines.hard_suite import HARD_WITNESSES, Hard
+from fourbar_validation.engines.limits import LIMITS
+from fourbar_validation.engines.mujoco import simulate
+from fourbar_validation.engines.mujoco.closed_loop import ClosedLoop
+from fourbar_validation.engines.mujoco.shipped import shipped
+from fourbar_validation.engines.prediction import from_data, in_world_axes
+from fourbar_validation.engines.witnesses import Witness
+from fourbar_validation.report.hard_page import page
+from fourbar_validation.report.record import Record
+from fourbar_validation.run.judge import judge
+from fourbar_validation.run.released import as_pendulum, judge_released
+from fourbar_validation.scenes import hard_families as families
+from fourbar_validation.scenes.hard_families import FAMILIES, TOGGLE, Family, toggle
+from fourbar_validation.scenes.hard_linkages import at, collinear_3_4, dressed, linkage_of
+from fourbar_validation.scenes.random import LinkageType
 from tests.support.engine_limits import MEASURED, Measured
 from tests.support.scenes import crank_rocker
-from validation.compare.answer import Answer
-from validation.compare.compare import COMPARED
-from validation.compare.rows import AGREES, DEGRADED, FAILS, UNDECIDED, VERDICTS
-from validation.compare.tolerance import FULL_ACCURACY
-from validation.engines.exact import where_it_closes
-from validation.engines.hard_suite import HARD_WITNESSES, Hard
-from validation.engines.limits import LIMITS
-from validation.engines.mujoco import simulate
-from validation.engines.mujoco.closed_loop import ClosedLoop
-from validation.engines.mujoco.shipped import shipped
-from validation.engines.prediction import from_data, in_world_axes
-from validation.engines.witnesses import Witness
-from validation.report.hard_page import page
-from validation.report.record import Record
-from validation.run.judge import judge
-from validation.run.released import as_pendulum, judge_released
-from validation.scenes import hard_families as families
-from validation.scenes.hard_families import FAMILIES, TOGGLE, Family, toggle
-from validation.scenes.hard_linkages import at, collinear_3_4, dressed, linkage_of
-from validation.scenes.random import LinkageType
 
 EXACT = tuple(w for w in HARD_WITNESSES if w.name != "mujoco-simulated")
 SWEEP = crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.1, 0.1 + 2 * math.pi, 30), 10.0))
@@ -83,7 +83,7 @@ def test_near_a_toggle_all_but_the_sine_has_its_digits_though_it_has_few_itself(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """A millionth of the torque stood within what the last digits of theta_2 excuse there, for every engine."""
-    lengths, true = linkage_of(LinkageType.TRIPLE_ROCKER, 0), validation.run.judge.solve
+    lengths, true = linkage_of(LinkageType.TRIPLE_ROCKER, 0), fourbar_validation.run.judge.solve
     (psi, stretched), *_ = collinear_3_4(lengths)
     near = at(dressed(lengths), psi + (-1.0 if stretched else 1.0) * np.array([*families.REGULAR, 1e-9]))
     balls = [witness for witness in HARD_WITNESSES if witness.nearby]
@@ -101,7 +101,7 @@ def test_near_a_toggle_all_but_the_sine_has_its_digits_though_it_has_few_itself(
         solution.torque[-1] *= 1.0 + 1e-6
         return solution
 
-    monkeypatch.setattr(validation.run.judge, "solve", spoiled)
+    monkeypatch.setattr(fourbar_validation.run.judge, "solve", spoiled)
     assert verdicts()["torque"] == FAILS
 
 
@@ -141,7 +141,7 @@ def verdict_of(engine: type, scene: Scene, predictor: str) -> tuple[str, float]:
 
 
 def _equivalence() -> Any:
-    from validation.compare.tolerance import EQUIVALENCE
+    from fourbar_validation.compare.tolerance import EQUIVALENCE
 
     return EQUIVALENCE
 
@@ -151,7 +151,7 @@ def test_near_a_toggle_a_wrong_force_fails_that_the_law_excuses() -> None:
     lengths = linkage_of(LinkageType.TRIPLE_ROCKER, 1)
     (psi, _), *_ = collinear_3_4(lengths)
     scene = at(dressed(lengths, 1), psi - 1e-8)
-    predictor = "validation.engines.prediction:in_world_axes"
+    predictor = "fourbar_validation.engines.prediction:in_world_axes"
     assert verdict_of(Wrong, scene, "")[0] == AGREES
     assert verdict_of(Wrong, scene, predictor)[0] == FAILS
     verdict, allowed = verdict_of(AlmostRight, scene, predictor)
@@ -266,7 +266,7 @@ def test_a_free_motion_through_change_points_in_every_engine() -> None:
 
 def test_an_engine_that_drifts_unpredicted_fails(monkeypatch: pytest.MonkeyPatch) -> None:
     """Wrong by the same amount with either step: its own step says nothing of it, the exact solution does."""
-    from validation.engines import pinocchio_forward
+    from fourbar_validation.engines import pinocchio_forward
 
     (name, scene), *_ = families.released(durations=(1.0,), steps=4)
     true = pinocchio_forward.PinocchioReleased.release

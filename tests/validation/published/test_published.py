@@ -10,13 +10,12 @@ from click.testing import CliRunner
 
 import fourbar
 from fourbar.formulas.mobility import limit_positions
-from tests.support import scenes
-from validation.compare.tolerance import EPS
-from validation.published import ladder as command
-from validation.published import ladder_rows, published
-from validation.published.figures import ERRATA, Figure, compare
-from validation.published.ladder import explained, figures, reason
-from validation.published.program import (
+from fourbar_validation.compare.tolerance import EPS
+from fourbar_validation.lab.ladder import ladder_rows, published
+from fourbar_validation.published import check as command
+from fourbar_validation.published.check import explained, figures, reason
+from fourbar_validation.published.figures import ERRATA, Figure, compare
+from fourbar_validation.published.program import (
     DATA,
     LENGTHS,
     STEPS,
@@ -31,7 +30,8 @@ from validation.published.program import (
     scene,
     thesis_program,
 )
-from validation.published.textbook import SCENES, answers, textbook_figures, value
+from fourbar_validation.published.textbook import SCENES, answers, textbook_figures, value
+from tests.support import scenes
 
 LISTED = 0.5e-12
 """Half a unit of the last digit listed below."""

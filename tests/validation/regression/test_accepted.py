@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 import fourbar
-from validation.compare.rows import DEGRADED
-from validation.compare.tolerance import EPS, K
-from validation.engines.witnesses import WITNESSES
-from validation.regression import render
-from validation.regression.changes import differences
-from validation.regression.record import ACCEPTED, about, baseline, read_run
-from validation.run.judge import judge
-from validation.scenes.suites import model_files
+from fourbar_validation.compare.rows import DEGRADED
+from fourbar_validation.compare.tolerance import EPS, K
+from fourbar_validation.engines.witnesses import WITNESSES
+from fourbar_validation.regression import render
+from fourbar_validation.regression.changes import differences
+from fourbar_validation.regression.record import ACCEPTED, about, baseline, read_run
+from fourbar_validation.run.judge import judge
+from fourbar_validation.scenes.suites import model_files
 
 SCENES = [(file.stem, fourbar.load(file)) for file in model_files()]
 EXACT = [witness for witness in WITNESSES if not witness.through_time]

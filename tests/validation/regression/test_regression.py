@@ -20,23 +20,23 @@ from click.testing import CliRunner
 
 import fourbar
 from fourbar.errors import InputError
+from fourbar_validation.cli import status
+from fourbar_validation.compare.columns import Columns
+from fourbar_validation.compare.rows import AGREES, FAILS, REFUSES, Row, write_results
+from fourbar_validation.compare.tolerance import EPS
+from fourbar_validation.regression import record, render
+from fourbar_validation.regression.accept import accept_command, compare
+from fourbar_validation.regression.change import Kind
+from fourbar_validation.regression.changes import compared, differences
+from fourbar_validation.regression.history import HISTORY, append, read_history
+from fourbar_validation.regression.record import About, Recorded, about, baseline, read_run, recorded, write_about
+from fourbar_validation.regression.scenes import description
+from fourbar_validation.regression.times import TimeChange
+from fourbar_validation.report.junit import cases
+from fourbar_validation.run.store import Store
+from fourbar_validation.scenes.suites import scene_files
 from tests.support.another_machine import CORES, ROOT, environment, why_not
 from tests.support.here import judge_here
-from validation.cli import status
-from validation.compare.columns import Columns
-from validation.compare.rows import AGREES, FAILS, REFUSES, Row, write_results
-from validation.compare.tolerance import EPS
-from validation.regression import record, render
-from validation.regression.accept import accept_command, compare
-from validation.regression.change import Kind
-from validation.regression.changes import compared, differences
-from validation.regression.history import HISTORY, append, read_history
-from validation.regression.record import About, Recorded, about, baseline, read_run, recorded, write_about
-from validation.regression.scenes import description
-from validation.regression.times import TimeChange
-from validation.report.junit import cases
-from validation.run.store import Store
-from validation.scenes.suites import scene_files
 
 WithRows = tuple[About, list[Row]]
 ROW = Row("scene", "engine", "exact", "torque", 1e-15, 1e-14, AGREES, "equivalence", 1.0, 1.0)
@@ -306,10 +306,10 @@ def test_two_long_runs_are_read_scene_by_scene_and_little_of_them_is_kept(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """One row group after the other, both in step; every row is counted, of each kind the worst are listed."""
-    monkeypatch.setattr("validation.compare.columns.GROUP_ROWS", 60)
-    for where in ("validation.compare.columns", "validation.regression.accept"):
+    monkeypatch.setattr("fourbar_validation.compare.columns.GROUP_ROWS", 60)
+    for where in ("fourbar_validation.compare.columns", "fourbar_validation.regression.accept"):
         monkeypatch.setattr(f"{where}.CSV_ROWS", 100)
-    monkeypatch.setattr("validation.compare.columns.BATCH_ROWS", 60)
+    monkeypatch.setattr("fourbar_validation.compare.columns.BATCH_ROWS", 60)
     scenes, kept = 1000, 5
     for name, grown in (("old", 1.0), ("new", 1e3)):
         (tmp_path / name).mkdir()
@@ -465,7 +465,7 @@ def test_what_grew_within_its_allowance_is_shown_and_no_regression() -> None:
 
 def test_the_kernels_of_a_run_are_recorded_and_named_where_they_differ() -> None:
     """In two fresh processes, one of which takes this CPU for another."""
-    code = "from validation.report.machine import kernels; print(kernels())"
+    code = "from fourbar_validation.report.machine import kernels; print(kernels())"
     possible = [core for core in CORES if why_not(core) is None]
     if not possible:
         pytest.skip("this CPU can pass for no other")
@@ -566,7 +566,7 @@ def test_a_slower_engine_is_a_regression_on_the_same_machine_and_slower_formulas
 
 
 def test_the_run_itself_is_written_as_junit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("validation.report.junit.LISTED", 10)
+    monkeypatch.setattr("fourbar_validation.report.junit.LISTED", 10)
     judge_here(monkeypatch)
     xml, scene = tmp_path / "run.xml", Path(__file__).parents[3] / "models" / "crank_rocker.toml"
     arguments = ["run", str(scene), "--engines", "free-body", "--no-pictures", "--out", str(tmp_path / "out")]
@@ -705,7 +705,7 @@ def test_a_full_disk_names_the_file_that_does_not_fit(tmp_path: Path, monkeypatc
     def full(source: Path, target: Path) -> None:
         raise OSError(errno.ENOSPC, "No space left on device", str(source), None, str(target))  # as shutil does
 
-    monkeypatch.setattr("validation.regression.record.shutil.copyfile", full)
+    monkeypatch.setattr("fourbar_validation.regression.record.shutil.copyfile", full)
     with pytest.raises(OSError) as caught:
         record.accept(recorded(run), tmp_path / "kept")
     assert (caught.value.filename, caught.value.filename2) == (str(tmp_path / "kept" / "results.csv"), None)

@@ -5,9 +5,9 @@ import json
 
 import pytest
 
+from fourbar_validation.compare.rows import to_csv
+from fourbar_validation.report.html import ALL_OPEN
 from tests.validation.report.test_report import copies, report
-from validation.compare.rows import to_csv
-from validation.report.html import ALL_OPEN
 
 pytest.importorskip("selenium", reason="pages are driven by selenium: pip install selenium")
 

@@ -12,16 +12,16 @@ import numpy as np
 import pytest
 
 import fourbar
+from fourbar_validation.compare.rows import FAILS, to_csv
+from fourbar_validation.engines.witnesses import WITNESSES
+from fourbar_validation.report.costs import cost_points
+from fourbar_validation.report.figures import FLOOR, STRETCHES, worst_of_stretches
+from fourbar_validation.report.html import ALL_OPEN, Section, html, markdown
+from fourbar_validation.report.record import Record
+from fourbar_validation.report.summary import Summary
+from fourbar_validation.run.judge import judged
 from tests.support.here import summary_of
 from tests.support.scenes import crank_rocker
-from validation.compare.rows import FAILS, to_csv
-from validation.engines.witnesses import WITNESSES
-from validation.report.costs import cost_points
-from validation.report.figures import FLOOR, STRETCHES, worst_of_stretches
-from validation.report.html import ALL_OPEN, Section, html, markdown
-from validation.report.record import Record
-from validation.report.summary import Summary
-from validation.run.judge import judged
 
 COMMENT_LIMIT = 65_536
 """Characters of a comment on GitHub."""
@@ -166,14 +166,14 @@ def test_every_kind_of_scene_is_drawn(motion: fourbar.Motion, pictures: int) -> 
 
 
 def test_an_engine_that_is_missing_is_reported_as_failing() -> None:
-    absent = replace(WITNESSES[0], adapter="validation.engines.absent:Absent")
+    absent = replace(WITNESSES[0], adapter="fourbar_validation.engines.absent:Absent")
     summary, text = report([judged("demo", crank_rocker(), (absent,), draw=False)])
     assert summary.verdict.startswith("FAILS")
     assert "What fails</h2>" in text and "No module named" in text and "∞" in text
 
 
 def test_many_scenes_give_a_short_report_of_the_worst(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("validation.report.summary.SCENES_SHOWN", 20)
+    monkeypatch.setattr("fourbar_validation.report.summary.SCENES_SHOWN", 20)
     pages = copies(100)
     for number, each in enumerate(pages):
         each.rows[0] = replace(each.rows[0], error=number * 5e-3, allowed=1.0)

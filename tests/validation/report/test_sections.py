@@ -6,16 +6,16 @@ from pathlib import Path
 
 import pytest
 
+from fourbar_validation.compare.rows import AGREES, FAILS, REFUSES, UNDECIDED, Row, write_results
+from fourbar_validation.engines.hard_suite import HARD_WITNESSES, Hard
+from fourbar_validation.engines.witnesses import FURTHER, WORK
+from fourbar_validation.report.costs import cost_figure
+from fourbar_validation.report.html import html
+from fourbar_validation.report.sections import LARGEST, hard_cases, sections
+from fourbar_validation.report.templating import count_or_size
+from fourbar_validation.scenes.hard_families import FAMILIES
 from tests.support.here import summary_of
 from tests.validation.report.test_report import demo, report
-from validation.compare.rows import AGREES, FAILS, REFUSES, UNDECIDED, Row, write_results
-from validation.engines.hard_suite import HARD_WITNESSES, Hard
-from validation.engines.witnesses import FURTHER, WORK
-from validation.report.costs import cost_figure
-from validation.report.html import html
-from validation.report.sections import LARGEST, hard_cases, sections
-from validation.report.templating import count_or_size
-from validation.scenes.hard_families import FAMILIES
 
 
 def judged(scene: str, verdict: str) -> Row:
@@ -52,7 +52,7 @@ def test_a_failing_row_fails_its_family_in_the_report(tmp_path: Path) -> None:
 def test_a_run_of_the_hard_suite_writes_its_page_and_its_part_of_the_report(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("validation.report.hard_page.picture", lambda: "<svg><text>the picture</text></svg>")
+    monkeypatch.setattr("fourbar_validation.report.hard_page.picture", lambda: "<svg><text>the picture</text></svg>")
     (part,) = sections([judged("toggle-b", AGREES)], tmp_path)
     assert (part.key, part.links[0][1]) == ("hard", "hard.html")
     assert (

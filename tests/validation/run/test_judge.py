@@ -9,15 +9,15 @@ import fourbar
 from fourbar.formulas.mobility import limit_positions
 from fourbar.quantities import FORCES
 from fourbar.scene import Command, Scene, command
+from fourbar_validation.compare.answer import Answer
+from fourbar_validation.compare.columns import read_columns
+from fourbar_validation.compare.compare import COMPARED
+from fourbar_validation.compare.rows import AGREES, FAILS, REFUSES, UNDECIDED, Row, to_csv, write_results
+from fourbar_validation.compare.tolerance import EPS, EQUIVALENCE, K
+from fourbar_validation.engines.free_body import FreeBody
+from fourbar_validation.engines.witnesses import WITNESSES, Witness, predicting_from
+from fourbar_validation.run.judge import judge
 from tests.support.scenes import crank_rocker
-from validation.compare.answer import Answer
-from validation.compare.columns import read_columns
-from validation.compare.compare import COMPARED
-from validation.compare.rows import AGREES, FAILS, REFUSES, UNDECIDED, Row, to_csv, write_results
-from validation.compare.tolerance import EPS, EQUIVALENCE, K
-from validation.engines.free_body import FreeBody
-from validation.engines.witnesses import WITNESSES, Witness, predicting_from
-from validation.run.judge import judge
 
 
 class Echo:

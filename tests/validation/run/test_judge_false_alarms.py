@@ -11,12 +11,12 @@ from fourbar.linkage import Bar, FourBar
 from fourbar.scene import Scene
 from fourbar.scene.motion import Free, Motion
 from fourbar.solution import Solution
-from validation.compare.rows import AGREES, DEGRADED, FAILS
-from validation.engines.witnesses import WITNESSES
-from validation.run import printed, released
-from validation.run.judge import judge
-from validation.scenes.random import random_scene
-from validation.stress.mutation.specimens import SPECIMENS
+from fourbar_validation.compare.rows import AGREES, DEGRADED, FAILS
+from fourbar_validation.engines.witnesses import WITNESSES
+from fourbar_validation.lab.stress.mutation.specimens import SPECIMENS
+from fourbar_validation.run import printed, released
+from fourbar_validation.run.judge import judge
+from fourbar_validation.scenes.random import random_scene
 
 EXACT = [witness for witness in WITNESSES if not witness.through_time]
 BY_ITSELF = [witness for witness in EXACT if not witness.library]
@@ -72,7 +72,7 @@ def test_what_is_wrong_by_more_than_is_predicted_fails(monkeypatch: pytest.Monke
             solution.omega_3 *= 1.0 + 1e-11
         return solution
 
-    monkeypatch.setattr("validation.run.judge.solve", off)
+    monkeypatch.setattr("fourbar_validation.run.judge.solve", off)
     rows = judge("short", SCENES["short input"], BY_ITSELF).rows
     assert {row.verdict for row in rows if row.quantity == "omega_3"} == {FAILS}
 

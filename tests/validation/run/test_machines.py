@@ -15,17 +15,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import validation.run.run
+import fourbar_validation.run.run
 from fourbar.errors import InputError
+from fourbar_validation.compare.rows import FAILS
+from fourbar_validation.report.machine import code
+from fourbar_validation.report.summary import Summary
+from fourbar_validation.run import machines, pool
+from fourbar_validation.run.machines import ClusterError
+from fourbar_validation.run.run import run
+from fourbar_validation.scenes.suites import Random
 from tests.support.here import judge_here
 from tests.whole.test_kills import COUNT, EXACT, FULL, IN_A_CHUNK, KILLS, SEED, TYPES, judge_all
-from validation.compare.rows import FAILS
-from validation.report.machine import code
-from validation.report.summary import Summary
-from validation.run import machines, pool
-from validation.run.machines import ClusterError
-from validation.run.run import run
-from validation.scenes.suites import Random
 
 distributed = pytest.importorskip("distributed", reason="Dask is optional")
 dask = pytest.importorskip("dask", reason="Dask is optional")
@@ -55,7 +55,7 @@ def running(nanny: object) -> int | None:
 
 @pytest.mark.timeout(120 + 20 * KILLS)
 def test_killed_workers_change_no_byte(cluster: object, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(validation.run.run, "CHUNK", {False: IN_A_CHUNK})
+    monkeypatch.setattr(fourbar_validation.run.run, "CHUNK", {False: IN_A_CHUNK})
     suite = Random(COUNT, SEED, TYPES)
     with monkeypatch.context() as alone:
         judge_here(alone)
@@ -86,7 +86,7 @@ def distributed_process(tmp_path: Path, what: str, *options: str, path: Path = R
     """A scheduler or worker that looks for its modules in a folder first."""
     line = [sys.executable, "-P", "-m", f"distributed.cli.dask_{what}", *options, "--no-dashboard"]
     line += ["--scheduler-file", str(tmp_path / "scheduler.json")]
-    environment = os.environ | {"PYTHONPATH": str(path)}
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(map(str, (path, path / "validation")))}
     return subprocess.Popen(
         line,
         cwd=tmp_path,
@@ -124,7 +124,7 @@ def test_a_cluster_without_workers_or_without_the_checkout_is_one_line(
     started: Callable[..., tuple[subprocess.Popen[bytes], str]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "bare").mkdir()
-    (tmp_path / "bare" / "validation.py").write_text("raise ModuleNotFoundError('no such module')")
+    (tmp_path / "bare" / "fourbar_validation.py").write_text("raise ModuleNotFoundError('no such module')")
     _, address = started("scheduler", "--host", "127.0.0.1", "--port", "0", path=tmp_path / "bare")
     suite, out = Random(1, SEED, TYPES), tmp_path / "out"
     with monkeypatch.context() as hurried, pytest.raises(pool.NoWorkersError, match="no workers; start some"):

@@ -10,11 +10,11 @@ import pytest
 import fourbar
 from fourbar.scene import Scene
 from fourbar.solve import solve
-from validation.compare.rows import DEGRADED, FAILS, UNDECIDED, Row
-from validation.engines.loop import LimitWatch
-from validation.report.record import Record
-from validation.run import released as free
-from validation.run.judge import judge, judged
+from fourbar_validation.compare.rows import DEGRADED, FAILS, UNDECIDED, Row
+from fourbar_validation.engines.loop import LimitWatch
+from fourbar_validation.report.record import Record
+from fourbar_validation.run import released as free
+from fourbar_validation.run.judge import judge, judged
 
 
 def falling(coupler: float = 0.15, **motion: Any) -> Scene:
@@ -52,7 +52,7 @@ def test_what_follows_the_path_has_no_instant_to_compare() -> None:
 
 def answering(monkeypatch: pytest.MonkeyPatch, change: Any) -> list[Row]:
     """The rows of Pinocchio where its answer is changed."""
-    from validation.engines.pinocchio_forward import PinocchioReleased
+    from fourbar_validation.engines.pinocchio_forward import PinocchioReleased
 
     true = PinocchioReleased.release
     monkeypatch.setattr(PinocchioReleased, "release", lambda *given: change(true(*given)))
@@ -142,7 +142,7 @@ def test_the_table_says_that_the_motion_ended() -> None:
 
 
 def test_a_released_scene_is_reported_without_a_torque_that_is_rounding(monkeypatch: pytest.MonkeyPatch) -> None:
-    from validation.report import figures
+    from fourbar_validation.report import figures
 
     scene = falling()
     shown: list[str] = []

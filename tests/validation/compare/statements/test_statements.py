@@ -8,21 +8,21 @@ import numpy as np
 import pytest
 
 import fourbar
-import validation.compare.statements.transmission
+import fourbar_validation.compare.statements.transmission
 from fourbar.formulas import mobility, transmission
 from fourbar.linkage import uniform
 from fourbar.scene import Command, Scene, command
+from fourbar_validation import Answer
+from fourbar_validation.compare.rows import REFUSES, Row
+from fourbar_validation.compare.statements.statements import statements
+from fourbar_validation.compare.tolerance import EQUIVALENCE
+from fourbar_validation.engines.loop import Exact
+from fourbar_validation.engines.mujoco.inverse import MujocoInverse
+from fourbar_validation.engines.pinocchio import PinocchioInverse
+from fourbar_validation.engines.witnesses import Witness
+from fourbar_validation.run.judge import judge
+from fourbar_validation.scenes.random import LinkageType, random_scene
 from tests.support.scenes import crank_rocker
-from validation import Answer
-from validation.compare.rows import REFUSES, Row
-from validation.compare.statements.statements import statements
-from validation.compare.tolerance import EQUIVALENCE
-from validation.engines.loop import Exact
-from validation.engines.mujoco.inverse import MujocoInverse
-from validation.engines.pinocchio import PinocchioInverse
-from validation.engines.witnesses import Witness
-from validation.run.judge import judge
-from validation.scenes.random import LinkageType, random_scene
 
 ROCKER, TRIPLE, CHANGE = (0.3, 0.1, 0.25, 0.22), (0.22, 0.2, 0.32, 0.18), (0.3, 0.1, 0.3, 0.1)
 LENGTHS = [
@@ -137,7 +137,7 @@ FAULTS = {
     "drive condition": (
         ROCKER,
         "transmission",
-        changed("drive_sine", lambda found: found * (1.0 + SEEN), validation.compare.statements.transmission),
+        changed("drive_sine", lambda found: found * (1.0 + SEEN), fourbar_validation.compare.statements.transmission),
     ),
     "mechanical advantage": (
         ROCKER,

@@ -13,12 +13,12 @@ import fourbar
 from fourbar.effects import Friction, Gravity, Load, Table
 from fourbar.scene import Scene
 from fourbar.scene.motion_law import Law
+from fourbar_validation.compare.rows import Row
+from fourbar_validation.engines.mujoco import motions, simulate
+from fourbar_validation.engines.mujoco.called_back import OVERRUN, within
+from fourbar_validation.engines.witnesses import WITNESSES
+from fourbar_validation.run.judge import judge
 from tests.support.scenes import crank_rocker
-from validation.compare.rows import Row
-from validation.engines.mujoco import motions, simulate
-from validation.engines.mujoco.called_back import OVERRUN, within
-from validation.engines.witnesses import WITNESSES
-from validation.run.judge import judge
 
 KINK = 1e-5
 """rad; where the cubic pieces of a law meet within a step of RK4 the motion errs by h^2: measured 3e-6 here."""

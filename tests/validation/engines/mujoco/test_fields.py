@@ -15,13 +15,13 @@ from fourbar.effects import Friction, Gravity, Point, Spring, Springs, Torsion, 
 from fourbar.errors import InputError
 from fourbar.linkage import PINS
 from fourbar.mjcf import mjcf
+from fourbar_validation.check.differences import differences
+from fourbar_validation.engines.mujoco import fields
+from fourbar_validation.engines.mujoco.anatomy import Anatomy
+from fourbar_validation.engines.mujoco.attached import Described
+from fourbar_validation.engines.mujoco.describe import described
+from fourbar_validation.engines.mujoco.fields import COMPARED, list_of, members
 from tests.support.scenes import crank_rocker
-from validation.check.differences import differences
-from validation.engines.mujoco import fields
-from validation.engines.mujoco.anatomy import Anatomy
-from validation.engines.mujoco.attached import Described
-from validation.engines.mujoco.describe import described
-from validation.engines.mujoco.fields import COMPARED, list_of, members
 
 SPRING = Spring(Point(1, 0.1, -1.5), Point(4, 0.08, 0.2), 200.0, 0.05)
 EVERYTHING = crank_rocker(

@@ -9,8 +9,8 @@ import pytest
 import fourbar
 from fourbar.mjcf import mjcf
 from fourbar.mjcf.appearance import frame
+from fourbar_validation.engines.mujoco.picture import HEIGHT, MOST, WIDTH, pictures
 from tests.support.scenes import crank_rocker, thesis
-from validation.engines.mujoco.picture import HEIGHT, MOST, WIDTH, pictures
 
 HUES = {2: (0.0, 0.5, 1.0), 3: (1.0, 0.6, 0.0), 4: (0.1, 0.9, 0.2)}
 """About the colours of the bars as they are lit."""

@@ -11,17 +11,17 @@ import fourbar
 from fourbar.mjcf import RECIPE
 from fourbar.mjcf.settings import Run
 from fourbar.quantities import UNKNOWNS
+from fourbar_validation.compare.answer import Answer
+from fourbar_validation.compare.compare import compare
+from fourbar_validation.compare.rows import AGREES, FAILS, REFUSES
+from fourbar_validation.compare.tolerance import SIMULATED
+from fourbar_validation.engines.mujoco.closed_loop import ClosedLoop
+from fourbar_validation.engines.mujoco.simulate import MujocoSimulated, observed_order
+from fourbar_validation.engines.mujoco.watch import Watch
+from fourbar_validation.engines.witnesses import WITNESSES
+from fourbar_validation.run.judge import judge
+from fourbar_validation.scenes.random import LinkageType, random_scene
 from tests.support.scenes import crank_rocker, thesis
-from validation.compare.answer import Answer
-from validation.compare.compare import compare
-from validation.compare.rows import AGREES, FAILS, REFUSES
-from validation.compare.tolerance import SIMULATED
-from validation.engines.mujoco.closed_loop import ClosedLoop
-from validation.engines.mujoco.simulate import MujocoSimulated, observed_order
-from validation.engines.mujoco.watch import Watch
-from validation.engines.witnesses import WITNESSES
-from validation.run.judge import judge
-from validation.scenes.random import LinkageType, random_scene
 
 TURN = fourbar.Sweep(0.1, 0.1 + 2 * math.pi, 90)
 

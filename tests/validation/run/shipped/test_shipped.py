@@ -9,12 +9,12 @@ import pytest
 import fourbar
 from fourbar.scene import Scene, command
 from fourbar.studies.keys import entries, left_out
-from validation.compare.rows import FAILS, REFUSES, Row
-from validation.engines.free_body import FreeBody
-from validation.run.shipped import calls, checks, files
-from validation.run.shipped.checks import CHECKS, judge_shipped
-from validation.run.shipped.question import Question, moved, stated
-from validation.stress.mutation.specimens import SPECIMENS
+from fourbar_validation.compare.rows import FAILS, REFUSES, Row
+from fourbar_validation.engines.free_body import FreeBody
+from fourbar_validation.lab.stress.mutation.specimens import SPECIMENS
+from fourbar_validation.run.shipped import calls, checks, files
+from fourbar_validation.run.shipped.checks import CHECKS, judge_shipped
+from fourbar_validation.run.shipped.question import Question, moved, stated
 
 SHIPPED = SPECIMENS["shipped"]
 ENGINES = {"compiled", "study", "sensitivity", "extremes", "tolerances", "sdf", "usd"}
