@@ -1,0 +1,30 @@
+"""Runs judged in this process, where it is not their workers that are tested."""
+
+from collections.abc import Callable, Iterable, Iterator
+from typing import Any
+
+import pytest
+
+from fourbar_validation.engines import workers
+from fourbar_validation.report.record import Record
+from fourbar_validation.report.summary import Summary
+
+
+def summary_of(records: Iterable[Record]) -> Summary:
+    """What a run comes to in which these scenes were judged."""
+    summary = Summary()
+    for each in records:
+        summary.add(each)
+    return summary
+
+
+def judge_here(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Do in this process, one item after another, what workers would do that are not under test."""
+
+    def over_none(
+        function: Callable[[Any], Any], chunks: Iterable[workers.Chunk], *_: object, **__: object
+    ) -> Iterator[tuple[int, list[Any]]]:
+        for number, items in chunks:
+            yield number, [function(item) for item in items]
+
+    monkeypatch.setattr(workers, "over_processes", over_none)

@@ -1,0 +1,281 @@
+"""A function over many items by processes, the same results whatever their number and order.
+
+A worker that dies or hangs costs the item that killed it, and no other: its chunk is done again item by item.
+"""
+
+import faulthandler
+import os
+import threading
+import time
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, wait
+from concurrent.futures.process import BrokenProcessPool
+from itertools import chain, islice
+from multiprocessing.context import SpawnContext, SpawnProcess
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NoReturn, Protocol
+
+from fourbar.errors import DependencyError
+from fourbar_validation.compare.answer import WitnessError
+from fourbar_validation.compare.rows import in_words
+from fourbar_validation.engines.memory import bound_memory
+from fourbar_validation.engines.output import keep_output
+
+if TYPE_CHECKING:
+    from pebble import ProcessPool
+
+SECONDS = 60.0
+"""A scene takes 0.05 to 3 s; what takes longer than this hangs."""
+LATER = 10.0
+"""Seconds after which a worker whose parent should have stopped it ends itself."""
+IN_FLIGHT = 4
+"""Chunks submitted per worker: enough to keep it busy, few enough to keep the memory bounded."""
+STALL = 20.0
+"""Seconds in which no worker takes up any of the waiting chunks: one was killed while it held the
+lock of the queue that they share, and the pool is made anew."""
+FROM_OUTSIDE = (-9, 1)
+"""Exit codes of a worker that was killed, and of one that waited in vain for a lock that a killed one held;
+one that crashes leaves with another."""
+ATTEMPTS = 5
+"""A worker may be killed from outside so often on one item before the item is given up."""
+POOLS = 100
+"""Pools made anew, one after the other without a chunk done, before the run is given up: a worker that
+dies while it starts breaks its pool, and somebody may well kill a few in a row."""
+Chunk = tuple[int, Sequence[Any]]
+"""Number and items."""
+Attempt = Callable[[Any], Any]
+"""Do one item by itself: its result, or the exception that it ended with."""
+Instead = Callable[[Any, Exception, Attempt], Any]
+"""Make the result of an item that failed by itself, too: item, exception, how to try another."""
+
+
+class StalledError(Exception):
+    """The workers no longer take up tasks, or the pool broke."""
+
+
+class NoWorkersError(DependencyError):
+    """The cluster has no workers, or those of this machine all die."""
+
+
+class Worker(SpawnProcess):
+    """A worker that ends with exit code 0 has not ended in order: Pebble would wait for its answer for ever."""
+
+    @property
+    def exitcode(self) -> int | None:
+        """The exit code; None also for 0."""
+        return super().exitcode or None
+
+
+class WorkerContext(SpawnContext):
+    """What Pebble starts its processes by."""
+
+    Process = Worker
+
+
+def apply_watched(seconds: float | None, function: Callable[[Any], Any], items: Sequence[Any]) -> list[Any]:
+    """Apply the function in a worker that ends its own process where one item takes longer, whatever holds it up."""
+    results = []
+    with Path(os.devnull).open("w", encoding="utf-8") as silent:
+        for item in items:
+            if seconds is not None:
+                faulthandler.dump_traceback_later(seconds, exit=True, file=silent)
+            try:
+                results.append(function(item))
+            except Exception:
+                raise
+            except BaseException as error:  # in the parent it would end the run
+                raise WitnessError(in_words(error)) from None
+            finally:
+                faulthandler.cancel_dump_traceback_later()
+    return results
+
+
+def ready(parent: int, _: object = None) -> None:
+    """Bound the memory, keep what is printed, and end with the parent, whose id is given.
+
+    The function comes along so that a worker imports what it needs before its first item, whose time is limited.
+    """
+    bound_memory()
+    keep_output()
+    threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
+
+
+def _end_with(parent: int) -> None:
+    """End this process when another has become its parent: the first one was killed and cannot stop it."""
+    while os.getppid() == parent:
+        time.sleep(1.0)
+    os._exit(1)
+
+
+class Workers(Protocol):
+    """What carries out tasks: processes of this machine, or the workers of a cluster."""
+
+    @property
+    def in_flight(self) -> int:
+        """Chunks submitted at a time."""
+
+    def submit(self, items: Sequence[Any]) -> Any:
+        """Hand in some items; the task."""
+
+    def done(self, tasks: Collection[Any], seconds: float) -> set[Any]:
+        """Wait for those that are finished, until there is one; none after some seconds."""
+
+    def result(self, task: Any) -> list[Any]:
+        """Return or raise what a finished task did; StalledError where it is on nobody's account."""
+
+    def lost(self, tasks: Collection[Any]) -> bool:
+        """Tell whether nobody takes up the tasks any more."""
+
+
+class Processes:
+    """The processes of a Pebble pool."""
+
+    def __init__(
+        self, pool: "ProcessPool", function: Callable[[Any], Any], workers: int, seconds: float | None
+    ) -> None:
+        self._pool, self._function, self._seconds = pool, function, seconds
+        self.in_flight = IN_FLIGHT * workers
+
+    def submit(self, items: Sequence[Any]) -> "Future[list[Any]]":
+        """Hand in some items.
+
+        One by itself is stopped from outside; among several the worker ends itself, or else they are stopped together.
+        """
+        inside, outside = self._seconds, self._seconds
+        if inside is not None and outside is not None:
+            single = len(items) == 1
+            inside, outside = (inside + LATER, outside) if single else (inside, outside * len(items) + LATER)
+        try:
+            future: Future[list[Any]] = self._pool.schedule(
+                apply_watched, args=(inside, self._function, items), timeout=outside
+            )
+        except RuntimeError:  # a broken pool takes no more
+            raise StalledError from None
+        return future
+
+    def done(self, tasks: "Collection[Future[Any]]", seconds: float) -> "set[Future[Any]]":
+        """Wait for those that are finished, until there is one; none after some seconds."""
+        return wait(tasks, seconds, FIRST_COMPLETED).done
+
+    def result(self, task: "Future[list[Any]]") -> list[Any]:
+        """Return or raise what a task did."""
+        try:
+            return task.result()
+        except BrokenProcessPool:  # workers died while they had nothing to do
+            raise StalledError from None
+
+    def lost(self, tasks: "Collection[Future[Any]]") -> bool:
+        """Tell whether the pool broke, or none of its workers takes up a task."""
+        return not self._pool.active or not any(task.running() for task in tasks)
+
+
+def fail(_: object, error: Exception, __: Attempt) -> NoReturn:
+    """Raise what an item failed with."""
+    raise error
+
+
+def each(
+    function: Callable[[Any], Any],
+    items: Iterable[Any],
+    workers: int = 1,
+    *,
+    seconds: float | None = SECONDS,
+    instead: Instead = fail,
+) -> Iterator[Any]:
+    """Apply the function to each item; results in the order of the items, as soon as those before are there."""
+    found: dict[int, list[Any]] = {}
+    turn = 0
+    chunks = enumerate([item] for item in items)
+    for number, results in over_processes(function, chunks, workers, seconds=seconds, instead=instead):
+        found[number] = results
+        while turn in found:
+            yield from found.pop(turn)
+            turn += 1
+
+
+def over_processes(
+    function: Callable[[Any], Any],
+    chunks: Iterable[Chunk],
+    workers: int,
+    *,
+    seconds: float | None = SECONDS,
+    instead: Instead = fail,
+) -> Iterator[tuple[int, list[Any]]]:
+    """Apply the function to each item of the chunks, over processes of this machine; chunks as they are done.
+
+    `seconds`: after which an item is taken to hang; None: never.
+    """
+    from pebble import ProcessPool
+
+    unfinished: dict[int, Sequence[Any]] = {}
+    in_vain = 0
+
+    def started() -> Iterator[Chunk]:
+        for number, items in chunks:
+            unfinished[number] = items
+            yield number, items
+
+    waiting = started()
+    while True:
+        with ProcessPool(
+            max_workers=workers, context=WorkerContext(), initializer=ready, initargs=[os.getpid(), function]
+        ) as pool:
+            try:
+                crew = Processes(pool, function, workers, seconds)
+                for number, results in as_done(chain(list(unfinished.items()), waiting), crew, instead):
+                    yield number, results
+                    del unfinished[number]
+                    in_vain = 0
+                return
+            except StalledError:
+                pool.stop()  # type: ignore[no-untyped-call]
+                in_vain += 1
+                if in_vain == POOLS:
+                    lost = "the workers die before they finish anything; what is finished is kept"
+                    raise NoWorkersError(lost) from None
+            except BaseException:
+                pool.stop()  # type: ignore[no-untyped-call]
+                raise
+
+
+def as_done(chunks: Iterable[Chunk], workers: Workers, instead: Instead) -> Iterator[tuple[int, list[Any]]]:
+    """Keep a bounded number of chunks running; yield each as it is done."""
+
+    def attempt(item: Any) -> Any:
+        for _ in range(ATTEMPTS):
+            task = workers.submit([item])
+            while not workers.done([task], STALL):
+                if workers.lost([task]):
+                    raise StalledError
+            try:
+                return workers.result(task)[0]
+            except (StalledError, DependencyError):
+                raise
+            except Exception as error:
+                found = error
+            if getattr(found, "exitcode", None) not in FROM_OUTSIDE:
+                break  # otherwise somebody killed it: that is not the item's doing
+        return found
+
+    waiting = iter(chunks)
+    running: dict[Any, Chunk] = {}
+    most = workers.in_flight
+    while True:
+        for chunk in islice(waiting, most - len(running)):
+            running[workers.submit(chunk[1])] = chunk
+        if not running:
+            return
+        done = workers.done(running, STALL)
+        if not done and workers.lost(running):
+            raise StalledError
+        for task in done:
+            number, items = running.pop(task)
+            try:
+                results = workers.result(task)
+            except (StalledError, DependencyError):
+                raise
+            except Exception as error:  # the worker died or hung, or the function failed; find out on whose account
+                clear = len(items) == 1 and getattr(error, "exitcode", None) not in FROM_OUTSIDE
+                tried = [(item, error if clear else attempt(item)) for item in items]
+                results = [instead(*each, attempt) if isinstance(each[1], Exception) else each[1] for each in tried]
+            yield number, results

@@ -1,0 +1,137 @@
+"""The command: random scenes through files, formulas and exact engines, or bounds; findings are shrunk and kept."""
+
+import warnings
+from collections.abc import Iterator
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+
+import click
+import numpy as np
+
+from fourbar.files import dump, loads
+from fourbar.scene import Command, Scene, command
+from fourbar.solution import Solution
+from fourbar.solve import solve
+from fourbar_validation.compare.compare import TOUCHING_MARGIN, closing_margin, compare
+from fourbar_validation.compare.identities import identities
+from fourbar_validation.compare.rows import FAILS, in_words
+from fourbar_validation.compare.statements.statements import statements
+from fourbar_validation.engines import workers as processes
+from fourbar_validation.engines.hard_suite import predicting
+from fourbar_validation.engines.witnesses import WITNESSES, predicting_from
+from fourbar_validation.lab.stress.fuzz import outside
+from fourbar_validation.lab.stress.fuzz.scenes import scene_of
+from fourbar_validation.lab.stress.fuzz.shrink import keep, shrunk
+from fourbar_validation.report.machine import code
+from fourbar_validation.run.store import Store
+
+EXACT = tuple(predicting(w) for w in WITNESSES if w.name in ("pinocchio-inverse", "mujoco-inverse", "free-body"))
+"""The exact engines, held to full accuracy or to what was predicted for the position."""
+CHUNK, CHUNK_OF_PROOFS = 200, 10
+"""Scenes per task: some seconds, which is what an interruption costs."""
+SHOWN = 20
+LOST = "worker:"
+"""How the discrepancy of a scene begins that killed its worker, or never came back."""
+
+
+def findings(scene: Scene) -> list[str]:
+    """What is wrong with a scene, in one line each; an exception or a warning is a finding too."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            at = command(scene)
+            solution = solve(scene, "force", at=at)
+            return [*_file(scene), *_assembly(scene, at, solution), *_engines(scene, at, solution)]
+    except Exception as error:  # a traceback is what fuzzing looks for
+        return [f"{type(error).__name__}: {error}".splitlines()[0]]
+
+
+def _file(scene: Scene) -> list[str]:
+    """Written as a scene file and read again, it must be the same scene to the last digit."""
+    again = dump(loads(dump(scene)))
+    return [] if again == dump(scene) else ["file: a scene that was written and read is another one"]
+
+
+def _assembly(scene: Scene, at: Command, solution: Solution) -> list[str]:
+    """No position where the loop does not close, none missing where it does, by ball arithmetic."""
+    from fourbar_validation.engines.balls import closure, stored
+
+    found = []
+    margin = np.abs(closing_margin(scene, at.theta_2))
+    for i, theta_2 in enumerate(at.theta_2):
+        closes = closure(stored(scene, float(theta_2)), int(at.branch[i])) is not None
+        if closes != bool(solution.assembled[i]) and margin[i] > TOUCHING_MARGIN:
+            found.append(f"assembled: the formulas say {bool(solution.assembled[i])} at theta_2 = {theta_2!r}")
+        angles = (solution.theta_3[i], solution.theta_4[i])
+        if np.isfinite(angles).any() and not solution.assembled[i]:
+            found.append(f"assembled: angles where the loop does not close, theta_2 = {theta_2!r}")
+    return found
+
+
+def _engines(scene: Scene, at: Command, solution: Solution) -> list[str]:
+    rows = identities("", scene, at, solution)
+    for witness in EXACT:
+        answer = witness.engine().answer(scene, at)
+        predicted = predicting_from(witness, scene, at, answer)
+        rows += compare("", scene, answer, solution, witness.tolerance, witness.expected, predicted)
+        if witness.name == "pinocchio-inverse" and answer.refusal is None:  # of two exact engines the quicker one
+            rows += statements("", scene, witness.engine(), answer, predicted=predicted)
+    # half of the scenes are drawn where doubles have few digits: that they are undecided is no fault
+    failed = [row for row in rows if row.verdict == FAILS and row.quantity != "undecided"]
+    return [f"{row.engine} {row.quantity}: {row.reason}" for row in failed]
+
+
+def examine(seed: int, bounds: bool, index: int) -> list[str]:
+    """Examine the scene of a number, or the bounds that are proven of it."""
+    return outside.findings(outside.scene_of(seed, index)) if bounds else findings(scene_of(seed, index))
+
+
+def _lost(_: int, error: Exception, __: object) -> list[str]:
+    return [f"{LOST} {in_words(error)}"]
+
+
+def run(count: int, seed: int, out: Path, workers: int, bounds: bool = False) -> Iterator[dict[str, list[str]]]:
+    """Examine the scenes chunk by chunk, what is wrong by number; chunks of an interrupted run are read."""
+    size = CHUNK_OF_PROOFS if bounds else CHUNK
+    with Store(out, {"seed": seed, "bounds": bounds, **code()}).held() as store:
+        chunks = {min(start + size, count): range(start, min(start + size, count)) for start in range(0, count, size)}
+        done = store.done() & chunks.keys()
+        yield from (store.read(stop)[0] for stop in sorted(done))
+        todo = [chunk for chunk in chunks.items() if chunk[0] not in done]
+        of, longest = partial(examine, seed, bounds), None if bounds else processes.SECONDS
+        for stop, found in processes.over_processes(of, todo, workers, seconds=longest, instead=_lost):
+            wrong = {str(number): each for number, each in zip(chunks[stop], found, strict=True) if each}
+            store.put(stop, [wrong])
+            yield wrong
+
+
+@click.command()
+@click.option("--scenes", default=100_000, show_default=True, type=click.IntRange(1), help="Half of them adversarial.")
+@click.option("--bounds", is_flag=True, help="Search for values outside proven extremes instead; two seconds a scene.")
+@click.option("--seed", default=0, show_default=True, type=click.IntRange(0))
+@click.option("--workers", default=2, show_default=True, type=click.IntRange(1), help="Processes.")
+@click.option(
+    "-o", "--out", type=click.Path(path_type=Path, file_okay=False), default=Path("results/fuzz"), show_default=True
+)
+def fuzz(scenes: int, bounds: bool, seed: int, workers: int, out: Path) -> int:
+    """Random and adversarial scenes through files, formulas and exact engines; every failure is shrunk and kept."""
+    from rich.console import Console
+    from rich.progress import track
+
+    console = Console(stderr=True)
+    wrong: dict[str, list[str]] = {}
+    chunks = -(-scenes // (CHUNK_OF_PROOFS if bounds else CHUNK))
+    for found in track(run(scenes, seed, out, workers, bounds), "fuzzing", total=chunks, console=console):
+        wrong |= found
+    for number in sorted(wrong, key=int)[:SHOWN]:
+        source, name = wrong[number][0], "bounds_seed" if bounds else "seed"
+        scene = (outside.scene_of if bounds else scene_of)(seed, int(number))
+        if not bounds and not source.startswith(LOST):  # a proof at each step, or the end of this process
+            scene = shrunk(scene, lambda candidate: bool(findings(candidate)))
+            source = findings(scene)[0]
+        title = f"found by fuzzing, seed {seed}, scene {number}"
+        path = keep(replace(scene, title=title, source=source), f"{name}_{seed}_scene_{number}")
+        console.print(f"scene {number}: {wrong[number][0]}\n  kept as {path.name}")
+    print(f"{len(wrong)} of {scenes} scenes fail (seed {seed}{'' if bounds else ', half of them adversarial'})")
+    return 1 if wrong else 0

@@ -1,0 +1,81 @@
+"""Scenes judged over processes or machines; one that breaks down is judged again engine by engine."""
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from fourbar_validation.compare.rows import breakdown, plain
+from fourbar_validation.engines import workers as processes
+from fourbar_validation.engines.witnesses import Witness
+from fourbar_validation.report.record import Record
+from fourbar_validation.run.judge import judged
+from fourbar_validation.scenes.suites import Files, Suite
+
+if TYPE_CHECKING:
+    from fourbar_validation.run.machines import Cluster
+
+SECONDS_PER_POSITION = 0.03
+"""Ten times what a position takes with all engines: scenes of many positions have that much longer."""
+
+
+@dataclass(frozen=True, slots=True)
+class Job:
+    """One scene for a worker: its place in a suite, by whom it is judged, whether it is drawn."""
+
+    suite: Suite
+    scene: int
+    witnesses: Sequence[Witness]
+    draw: bool
+
+    @property
+    def name(self) -> str:
+        """The scene's."""
+        return plain(self.suite.name(self.scene))
+
+
+def jobs(suite: Suite, scenes: Iterable[int], witnesses: Sequence[Witness], draw: bool) -> list[Job]:
+    """Make the jobs of some scenes; one of a file carries its own text alone."""
+    if isinstance(suite, Files):
+        return [Job(replace(suite, texts=(suite.texts[i],)), 0, witnesses, draw) for i in scenes]
+    return [Job(suite, i, witnesses, draw) for i in scenes]
+
+
+def longest(suite: Suite) -> float:
+    """Give the seconds after which a scene of the suite is taken to hang."""
+    return processes.SECONDS + SECONDS_PER_POSITION * (suite.positions if isinstance(suite, Files) else 0)
+
+
+def judge_job(job: Job) -> Record:
+    """Judge one scene; runs in a worker."""
+    return judged(job.name, job.suite.scene(job.scene), job.witnesses, draw=job.draw)
+
+
+def judge_by_engine(job: Job, _: Exception, attempt: processes.Attempt) -> Record:
+    """Judge a scene that broke down one engine at a time; those at fault have a row that says of what."""
+    record: Record | None = None
+    failed = []
+    for who in ([], *([witness] for witness in job.witnesses)):
+        found = attempt(replace(job, witnesses=who))
+        if isinstance(found, Record):
+            record = found if record is None else record.joined(found)
+        else:
+            failed.append(breakdown(job.name, who[0].name if who else "formulas", found))
+    record = record or Record(job.name)
+    return replace(record, rows=[*record.rows, *failed])
+
+
+def judge_chunks(
+    suite: Suite,
+    chunks: Iterable[tuple[int, range]],
+    witnesses: Sequence[Witness],
+    draw: bool,
+    workers: int,
+    seconds: float | None = None,
+    cluster: "Cluster | None" = None,
+) -> Iterator[tuple[int, list[Record]]]:
+    """Judge chunks of scenes, each as it is done; `seconds`: after which a scene is taken to hang."""
+    made = ((number, jobs(suite, scenes, witnesses, draw)) for number, scenes in chunks)
+    seconds = longest(suite) if seconds is None else seconds
+    if cluster is not None:
+        return cluster.over(judge_job, made, seconds, judge_by_engine)
+    return processes.over_processes(judge_job, made, workers, seconds=seconds, instead=judge_by_engine)
