@@ -184,11 +184,11 @@ def moved(effect: Effect) -> Effect:
 @contextmanager
 def formulas_see(change: Callable[[Scene], Scene]) -> Iterator[None]:
     """The formulas work on a changed scene, the engines on the true one."""
-    import validation.run.judge
+    import validation.run.question
 
-    true = validation.run.judge.solve
+    true = validation.run.question.solve
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(validation.run.judge, "solve", lambda scene, *a, **k: true(change(scene), *a, **k))
+        patch.setattr(validation.run.question, "solve", lambda scene, *a, **k: true(change(scene), *a, **k))
         yield
 
 

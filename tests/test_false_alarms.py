@@ -15,6 +15,7 @@ from validation.compare.rows import AGREES, DEGRADED, FAILS
 from validation.engines.witnesses import WITNESSES
 from validation.run import printed, released
 from validation.run.judge import judge
+from validation.run.question import Question
 from validation.scenes.random import random_scene
 from validation.stress.mutation.specimens import SPECIMENS
 
@@ -72,7 +73,7 @@ def test_what_is_wrong_by_more_than_is_predicted_fails(monkeypatch: pytest.Monke
             solution.omega_3 *= 1.0 + 1e-11
         return solution
 
-    monkeypatch.setattr("validation.run.judge.solve", off)
+    monkeypatch.setattr("validation.run.question.solve", off)
     rows = judge("short", SCENES["short input"], BY_ITSELF).rows
     assert {row.verdict for row in rows if row.quantity == "omega_3"} == {FAILS}
 
@@ -82,9 +83,8 @@ def test_an_error_bar_of_no_error_fails(monkeypatch: pytest.MonkeyPatch) -> None
     true = printed.solve
 
     def judged() -> str:
-        at = fourbar.command(scene)
-        rows = {row.quantity: row.verdict for row in printed.printed("", scene, at, fourbar.solve(scene), None)}
-        return rows["force_error"]
+        rows = printed.check_error_bars(Question("", scene, fourbar.command(scene)))
+        return {row.quantity: row.verdict for row in rows}["force_error"]
 
     def without(scene: Scene, stage: str, **keywords: object) -> Solution:
         solution: Solution = true(scene, stage, **keywords)  # type: ignore[arg-type]

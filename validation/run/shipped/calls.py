@@ -14,17 +14,8 @@ from fourbar.scene.point import Point
 from validation.compare.error import magnitude
 from validation.compare.rows import Row
 from validation.engines.free_body import FreeBody
-from validation.run.shipped.question import (
-    NotAskedError,
-    Question,
-    at_free_bodies,
-    held_to,
-    member,
-    moved,
-    sampled,
-    stated,
-    worst_rows,
-)
+from validation.run.question import NotAskedError, Question
+from validation.run.shipped.variants import at_free_bodies, held_to, member, moved, sampled, stated, worst_rows
 
 MEMBERS = 5
 """As many as positions: a square study, whose axes nothing but its numbers tells apart."""
@@ -51,6 +42,7 @@ def furnished(scene: Scene, question: Question) -> Scene:
     if not scene.points:
         arms = {bar: (0.6 * scene.linkage.bar(bar).length, 0.4 * bar) for bar in (2, 3, 4)}
         scene = replace(scene, points=tuple(Point(f"P{bar}", bar, arm) for bar, arm in arms.items()))
+    assert question.free_body is not None
     size = magnitude(question.free_body.quantities["F12"])
     known = size[np.isfinite(size) & (size > 0.0)]
     if not any(load.table for load in scene.loads) and known.size and scene.motion.law is None:

@@ -15,7 +15,8 @@ from validation.compare.answer import Array
 from validation.compare.error import magnitude, relative
 from validation.compare.rows import Row
 from validation.compare.tolerance import Tolerance
-from validation.run.shipped.question import Question, at_free_bodies, moved, parts, row_of, sampled, stated
+from validation.run.question import Question
+from validation.run.shipped.variants import at_free_bodies, moved, parts, row_of, sampled, stated
 
 STEP = 1e-4
 """Of each number, of an angle in rad: what the fourth order leaves out and what rounding adds are then alike."""

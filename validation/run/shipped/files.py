@@ -19,7 +19,8 @@ from fourbar.scene import Scene
 from fourbar.solve import solve
 from validation.compare.rows import REFUSES, Row
 from validation.compare.tolerance import EPS, K
-from validation.run.shipped.question import Question, at_free_bodies, held_to, sampled, worst_rows
+from validation.run.question import Question
+from validation.run.shipped.variants import at_free_bodies, held_to, sampled, worst_rows
 
 NUMBER = r"[-+.\deE]+"
 BARS = {BAR_NAMES[number]: number for number in MOVING_BARS}

@@ -1,4 +1,4 @@
-"""What a check of something shipped is given, at which positions, and the rows that it answers."""
+"""What the checks of something shipped share: scenes with other numbers, and the rows of a comparison."""
 
 import json
 import tomllib
@@ -11,7 +11,7 @@ import numpy as np
 
 from fourbar.files import dump, loads
 from fourbar.quantities import OK, UNKNOWNS, is_scalar
-from fourbar.scene import Command, Scene, command
+from fourbar.scene import Scene, command
 from fourbar.scene.motion import Motion
 from fourbar.solution import Solution
 from validation.compare.answer import Answer, Array
@@ -22,8 +22,9 @@ from validation.compare.reversals import reversing
 from validation.compare.rows import AGREES, FAILS, VERDICTS, Row
 from validation.compare.tolerance import EQUIVALENCE, WELL_CONDITIONED, Tolerance
 from validation.engines.free_body import FreeBody
-from validation.engines.witnesses import WITNESSES, predicting_from
+from validation.engines.witnesses import predicting_from
 from validation.run.printed import points
+from validation.run.question import FREE_BODY, NotAskedError, Question
 
 SAMPLE = 5
 """Positions at which whatever takes more than one call is judged."""
@@ -32,21 +33,6 @@ FROM_A_CORNER = 0.02
 NOT_AT_REST = 1e-3
 """Of the speeds over sin^2 mu; where a dry pin slips less, small changes of a number may reverse it."""
 GOLDEN = 0.5 * (5.0**0.5 - 1.0)
-FREE_BODY = next(witness for witness in WITNESSES if witness.name == FreeBody.name)
-
-
-class Question(NamedTuple):
-    """A scene with a prescribed motion, and what the free bodies and the formulas say of it."""
-
-    name: str
-    scene: Scene
-    at: Command
-    solution: Solution
-    free_body: Answer
-
-
-class NotAskedError(Exception):
-    """A scene has nothing that a check could judge; the message says why."""
 
 
 def sampled(question: Question) -> Scene:
@@ -57,7 +43,7 @@ def sampled(question: Question) -> Scene:
     scene, at, solution = question.scene, question.at, question.solution
     if scene.motion.law is not None:
         raise NotAskedError("a motion law has no positions of its own choice")
-    basis = basis_of(scene, question.free_body)
+    basis = question.reference
     assert basis is not None and basis.drive_condition is not None and basis.torque is not None
     fit = (solution.status_code == OK) & (basis.condition >= WELL_CONDITIONED) & np.isfinite(basis.torque)
     fit &= (basis.drive_condition >= WELL_CONDITIONED) & (at.branch == scene.motion.branch)
