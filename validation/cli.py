@@ -8,11 +8,12 @@ import click
 from fourbar.errors import run
 
 COMMANDS = {
-    "run": "validation.run.run:command",
+    "run": "validation.run.command:command",
     "accept": "validation.regression.accept:accept_command",
     "compare": "validation.regression.accept:compare",
     "history": "validation.regression.accept:history",
     "check": "validation.check:check",
+    "check-mjcf": "validation.check.model:command",
     "fuzz-files": "validation.stress.mutants:fuzz_files",
     "models": "validation.studies.models:models",
     "published": "validation.published:published",

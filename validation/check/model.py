@@ -1,4 +1,4 @@
-"""`run SCENE --mjcf THEIRS.xml`: what differs from the generated MJCF, and what it costs in accuracy.
+"""`python -m validation check-mjcf`: what differs from the generated MJCF, and what it costs in accuracy.
 
 The file is somebody's: it is compiled and run in a process of its own, with a limit on time and memory.
 """
@@ -13,6 +13,8 @@ from pathlib import Path
 from pkgutil import resolve_name
 from typing import Any
 
+import click
+
 from fourbar.errors import FourBarError, InputError
 from fourbar.quantities import UNKNOWNS
 from fourbar.scene import Scene
@@ -26,9 +28,10 @@ from validation.compare.answer import Answer
 from validation.compare.compare import compare
 from validation.compare.counts import Counts
 from validation.compare.rows import Row, plain, write_results
-from validation.compare.tolerance import SIMULATED, Tolerance
+from validation.compare.tolerance import SIMULATED, Tolerance, simulated_within
 from validation.engines.memory import WORKER_MEMORY, bound_memory
 from validation.report.templating import number, rendered
+from validation.scenes.suites import scene_files
 
 SECONDS = 120.0
 """A four-bar takes less than one."""
@@ -131,7 +134,7 @@ def guarded(mjcf: Path) -> Iterator[Callable[..., Any]]:
             try:
                 return pool.schedule(_examine, args=arguments, timeout=SECONDS).result()
             except FourBarError as error:
-                if not isinstance(error, InputError) or error.key != "--mjcf":
+                if not isinstance(error, InputError) or error.key != "MJCF":
                     raise
                 raise InputError(error.key, error.value or mjcf.name, error.allowed, str(mjcf)) from None
             except TimeoutError:
@@ -143,7 +146,7 @@ def guarded(mjcf: Path) -> Iterator[Callable[..., Any]]:
             except KeyboardInterrupt:
                 pool.stop()  # type: ignore[no-untyped-call]  # or the pool would wait for the file to its time limit
                 raise
-            raise InputError("--mjcf", mjcf.name, reason, str(mjcf))
+            raise InputError("MJCF", mjcf.name, reason, str(mjcf))
 
         yield examined
 
@@ -199,3 +202,27 @@ def markdown(report: ModelReport, mjcf: Path) -> str:
     """The same as text for a page."""
     what = {"report": report, "mjcf": mjcf.name, "about": ABOUT_SHARES, "headings": HEADINGS}
     return rendered("validation.check", "theirs.md.j2", **what)
+
+
+@click.command(name="check-mjcf")
+@click.argument("scene", type=click.Path(path_type=Path))
+@click.argument("theirs", metavar="THEIRS.xml", type=click.Path(path_type=Path))
+@click.option(
+    "--name",
+    "names",
+    metavar="ROLE=NAME",
+    multiple=True,
+    help="The body that is the input, coupler or output; B3, B4: the sites of pin B on the coupler and the output, "
+    "where no connect or weld closes the loop. Left out: guessed from structure and lengths, and printed.",
+)
+@click.option("--error", "wanted", type=float, metavar="E", help="The relative error that THEIRS.xml may have.")
+@click.option(
+    "-o", "--out", type=click.Path(path_type=Path, file_okay=False), default=Path("results"), show_default=True
+)
+def command(scene: Path, theirs: Path, names: tuple[str, ...], wanted: float | None, out: Path) -> int:
+    """Compare your own MJCF of SCENE with the generated one, field by field, and say what each difference costs."""
+    suite = scene_files((scene,))
+    tolerance = SIMULATED if wanted is None else simulated_within(wanted, "what this file may be wrong by")
+    report = examine_model(suite.name(0), suite.scene(0), theirs, named(names), tolerance)
+    show(report, theirs, out)
+    return report.counts.status

@@ -5,11 +5,12 @@ condition is s = |sin(theta_4 - theta_3)|, the drive condition the sine between 
 are not driven, the lever the shorter of bars 3 and 4 over the longest bar.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fourbar.errors import InputError
 from fourbar.linkage import FourBar
 from fourbar.quantities import UNITS
 from fourbar.solution import Solution
@@ -79,6 +80,13 @@ POWER = {**dict.fromkeys(("rad", "m", "1"), 1), **dict.fromkeys(("rad/s", "m/s",
 """By unit: angles and positions lose digits as 1/s, everything that follows from them as 1/s^2."""
 OF_THE_INPUT = frozenset(("theta_2", "omega_2", "alpha_2", "A", "G2", "v_A", "v_G2", "a_A", "a_G2"))
 """Quantities that the input alone decides: they lose none."""
+
+
+def simulated_within(error: float, why: str) -> Tolerance:
+    """Hold what runs through time to a wanted error."""
+    if not 0.0 < error < 1.0:
+        raise InputError("--error", error, "must be a relative error, above 0 and below 1")
+    return replace(SIMULATED, factor=error, reason=f"{error:g} of the scale, as wanted: {why}")
 
 
 def lever(linkage: FourBar) -> float:

@@ -5,17 +5,16 @@ the formulas say: how wrong it is against them stays a finding.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
 
-from fourbar.errors import InputError
 from fourbar.scene import Command, Scene
 from validation.compare.answer import Answer, Engine
 from validation.compare.compare import COMPARED, turning
 from validation.compare.error import magnitude, relative
-from validation.compare.tolerance import SIMULATED, Tolerance
+from validation.compare.tolerance import simulated_within
 from validation.engines.witnesses import Witness
 
 ROUNDS = 6
@@ -35,16 +34,9 @@ class DialledWitness(Witness):
         return Dialled(self.tolerance.factor)
 
 
-def held_to(error: float, why: str) -> Tolerance:
-    """What runs through time, held to a wanted error."""
-    if not 0.0 < error < 1.0:
-        raise InputError("--error", error, "must be a relative error, above 0 and below 1")
-    return replace(SIMULATED, factor=error, reason=f"{error:g} of the scale, as wanted: {why}")
-
-
 def dialled(witnesses: Sequence[Witness], error: float) -> tuple[Witness, ...]:
     """The witnesses, with whatever runs through time held to `error` and laid out for it; exact ones stay exact."""
-    own: dict[str, Any] = {"tolerance": held_to(error, "steps and softness are laid out for it"), "order": ""}
+    own: dict[str, Any] = {"tolerance": simulated_within(error, "steps and softness are laid out for it"), "order": ""}
     return tuple(
         DialledWitness(**{part.name: getattr(each, part.name) for part in fields(Witness)} | own)
         if each.through_time
