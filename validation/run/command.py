@@ -29,7 +29,7 @@ EXCLUDED = (
     ("--suite", "--random", "has its own scenes; leave out scene files and --random"),
     ("--against", "--python", "cannot be combined with --python, which compares with the run made there"),
 )
-"""Option, what it cannot stand beside, and why."""
+"""Option, what it cannot be combined with, and why."""
 OF_RANDOM = ("--seed", "--type")
 
 
