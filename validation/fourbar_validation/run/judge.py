@@ -1,0 +1,158 @@
+"""One scene through every check: its rows, its timings, and what was left out and why."""
+
+import time
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import replace
+from functools import partial
+from typing import NamedTuple
+from zlib import crc32
+
+import numpy as np
+
+from fourbar.scene import Command, Scene, command
+from fourbar_validation.compare.identities import FORMULAS
+from fourbar_validation.compare.rows import Row, plain
+from fourbar_validation.engines.witnesses import WITNESSES, Witness
+from fourbar_validation.report.record import Record, Timing
+from fourbar_validation.run.answers import check_mjcf, compare_answers, compare_inertia, compare_statements
+from fourbar_validation.run.printed import check_blocks, check_error_bars, check_law, check_points, check_residual
+from fourbar_validation.run.question import Question, select_positions
+from fourbar_validation.run.released import check_released
+from fourbar_validation.run.shipped.bounds import extremes
+from fourbar_validation.run.shipped.calls import compiled, study
+from fourbar_validation.run.shipped.changes import sensitivity, tolerances
+from fourbar_validation.run.shipped.files import sdf, usd
+from fourbar_validation.run.values import check_identities, check_status, find_reversals
+
+
+class Check(NamedTuple):
+    """A check, and when it is made."""
+
+    rows: Callable[[Question], Iterable[Row]]
+    shipped: bool = False
+    """Whether it is of something shipped besides `solve`: the engine of its rows, by its own name."""
+    free: bool = False
+    """Whether it is of a free motion, the others of a prescribed one."""
+
+
+CHECKS = (
+    Check(check_identities),
+    Check(check_status),
+    Check(check_points),
+    Check(check_law),
+    Check(check_blocks),
+    Check(check_error_bars),
+    Check(check_residual),
+    Check(find_reversals),
+    Check(compare_answers),
+    Check(compare_statements),
+    Check(check_mjcf),
+    Check(compare_inertia),
+    Check(check_released, free=True),
+    *(Check(rows, shipped=True) for rows in (compiled, study, sensitivity, extremes, tolerances, sdf, usd)),
+)
+"""All that is checked of a scene; one that raises costs its own rows."""
+OF_MANY = 500
+"""Of so many scenes of a long suite one has what else is shipped judged, which takes as long as judging thirty."""
+OUTPUT = "output.txt"
+"""In the folder of a run: what the engines printed."""
+
+
+def judged(name: str, scene: Scene, witnesses: Sequence[Witness] = WITNESSES, *, draw: bool = True) -> Record:
+    """Judge a scene and keep what the report needs of it.
+
+    `draw`: with its pictures and observed orders, and with what else is shipped; otherwise, in a long suite, that is
+    judged of one scene in OF_MANY, by its name.
+    """
+    shipped = draw or crc32(name.encode(errors="replace")) % OF_MANY == 0
+    record = judge(name, scene, witnesses, order=draw, shipped=shipped)
+    record.rows = [name_output(row) if row.engine in record.output else row for row in record.rows]
+    figure = None
+    if draw:
+        from fourbar_validation.report.figures import scene_figure
+
+        figure = scene_figure(record)
+    return record.kept(figure)
+
+
+def name_output(row: Row) -> Row:
+    """Say in a row that fails where to read what its engine printed."""
+    return replace(row, reason=f"{row.reason}; what it printed: {OUTPUT}") if row.failed else row
+
+
+def judge(
+    name: str,
+    scene: Scene,
+    witnesses: Sequence[Witness] = WITNESSES,
+    *,
+    order: bool = True,
+    shipped: bool = False,
+) -> Record:
+    """Make every check of one scene.
+
+    `order`: measure the observed order of what is simulated, which takes two more simulations and changes no row.
+    `shipped`: check what else is shipped (studies, sensitivities, files of other simulators), which takes a second.
+    """
+    question, free = ask(name, scene, witnesses), scene.motion.free is not None
+    question.order = order
+    begin = time.perf_counter()
+    n = len(question.solution)
+    question.timings.append(Timing(name, FORMULAS, "exact", n, time.perf_counter() - begin))
+    if (
+        shipped
+        and not free
+        and (question.at.omega_2 is None or question.free_body is None or question.free_body.refusal)
+    ):
+        what = "judged by what the free bodies say of forces, and here they say nothing"
+        question.left_out.append(f"what else is shipped: {what}")
+        shipped = False
+    rows: list[Row] = []
+    for check in CHECKS:
+        if check.free == free and (shipped or not check.shipped):
+            called = check.rows.__name__
+            engine, part = (called, "") if check.shipped else (FORMULAS, called)
+            rows += question.attempt(partial(check.rows, question), engine, part)
+    return Record(
+        name,
+        scene,
+        plain(scene.title),
+        plain(scene.source),
+        rows,
+        question.timings,
+        question.left_out,
+        output=question.output,
+        solution=question.solution,
+        answers=[question.answered[w.name][0] for w in question.witnesses if w.name in question.answered],
+        jumps=question.jumps,
+    )
+
+
+def ask(name: str, scene: Scene, witnesses: Sequence[Witness]) -> Question:
+    """Put a scene to the witnesses that it needs, each position once; say what is left out."""
+    at = command(scene)
+    if scene.motion.free is not None:
+        return Question(name, scene, at, witnesses)
+    question = Question(name, scene, at)
+    numbers = (at.theta_2, at.branch, 0.0 if at.omega_2 is None else at.omega_2, at.alpha_2)
+    if len(at.theta_2) > 1 and all(np.ptp(values) == 0 for values in numbers):  # constant conditions are not swept
+        question.left_out.append("positions: all are the same, one is evaluated")
+        question.at = select_positions(at, np.array([0]))._replace(time=None)
+    question.witnesses = list(_called_for(witnesses, question.at, question.left_out))
+    question.solve()  # untimed: the first call of a process pays for what every later one finds loaded
+    return question
+
+
+def _called_for(witnesses: Iterable[Witness], at: Command, left_out: list[str]) -> Iterator[Witness]:
+    """Choose the witnesses that the question needs; the others are left out before their engine is imported."""
+    for witness in witnesses:
+        reason = None
+        if at.omega_2 is None:
+            reason = None if witness.positions else "the scene states positions only, and it gives forces"
+        elif witness.through_time and not np.any(at.omega_2):
+            reason = "omega_2 is 0: nothing moves through time"
+        elif witness.through_time and len(at.theta_2) == 1:
+            reason = "one position is no motion through time"
+        if reason is None:
+            yield witness if at.omega_2 is not None else replace(witness, expected=witness.positions)
+        else:
+            left_out.append(f"{witness.name}: {reason}")

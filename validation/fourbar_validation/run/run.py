@@ -1,0 +1,165 @@
+"""The run: every scene judged, the results streamed to disk, the report written."""
+
+import math
+import os
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TextIO
+
+from fourbar.writing import naming, write_text
+from fourbar_validation.compare.columns import Columns, read_columns
+from fourbar_validation.compare.identities import FORMULAS
+from fourbar_validation.compare.rows import FAILS, Row, csv_text, plain
+from fourbar_validation.compare.tolerance import IDENTITY
+from fourbar_validation.engines.hard_suite import Hard
+from fourbar_validation.engines.witnesses import Witness
+from fourbar_validation.regression.record import ABOUT, COLUMNS, TABLE, about, write_about
+from fourbar_validation.regression.scenes import descriptions
+from fourbar_validation.report.html import html, markdown
+from fourbar_validation.report.machine import code
+from fourbar_validation.report.record import Record
+from fourbar_validation.report.sections import sections
+from fourbar_validation.report.summary import PICTURED, Summary
+from fourbar_validation.run import pool
+from fourbar_validation.run.judge import OUTPUT
+from fourbar_validation.run.machines import Cluster
+from fourbar_validation.run.pictures import draw_scenes, picture_models
+from fourbar_validation.run.store import Store
+from fourbar_validation.scenes.suites import Suite
+
+WORKERS = 2
+CHUNK = {True: 1, False: 20}
+"""Scenes per task: one where something is simulated or drawn (a second each), else twenty (a second together)."""
+MOST_PARTS = 10_000
+"""Files that a run keeps while it goes on: of a million scenes a hundred stand in each."""
+TIMINGS = ("scene", "engine", "setting", "positions", "seconds", "times_formulas")
+
+
+class Collected(int):
+    """Scenes that were read back for the report."""
+
+
+class Pictured(int):
+    """Scenes of a long suite that were drawn."""
+
+
+OUTCOME = (TABLE, COLUMNS, ABOUT, "timings.csv", "report.md", "report.html", OUTPUT)
+"""What a run ends with: of an earlier one it goes first, so that none is taken for that of a run that ended early."""
+
+
+@dataclass(frozen=True, slots=True)
+class RunOptions:
+    """How a suite is run; none of it changes a result."""
+
+    workers: int = WORKERS
+    """Processes of this machine."""
+    scheduler: str | None = None
+    """Address of a Dask scheduler, whose workers are used instead."""
+    seconds: float | None = None
+    """After which a scene hangs."""
+    drawn: bool = True
+    """With pictures, of a long suite at the end, of the scenes that fail and those nearest to it."""
+
+
+def run(
+    suite: Suite,
+    out: Path,
+    witnesses: tuple[Witness, ...],
+    options: RunOptions = RunOptions(),
+    missing: Sequence[tuple[str, str]] = (),
+) -> Iterator[int | str | Summary]:
+    """Judge a suite into a folder; yields the number of scenes done as they come, then collected, at last the summary.
+
+    What of an earlier run is not kept is yielded as a line of text.
+
+    `missing` are the witnesses that cannot answer here, each with the reason.
+
+    What an interrupted run of the same suite with the same engines and versions left is kept.
+    """
+    generated = any(witness.generated for witness in witnesses)
+    workers, seconds = options.workers, options.seconds
+    draw = options.drawn and len(suite) <= PICTURED
+    size = max(CHUNK[draw or any(witness.through_time for witness in witnesses)], math.ceil(len(suite) / MOST_PARTS))
+    chunks = [range(start, min(start + size, len(suite))) for start in range(0, len(suite), size)]
+    identity = {
+        "scenes": suite.fingerprint(),
+        "witnesses": [repr(witness) for witness in witnesses],
+        **code(),
+        "draw": draw,
+        "time limit": seconds,
+    }
+    with Store(out, identity).held() as store:
+        for name in OUTCOME:
+            (out / name).unlink(missing_ok=True)
+        done = store.done()
+        yield from store.notes
+        yield sum(len(chunks[number]) for number in done)
+        todo = [(number, scenes) for number, scenes in enumerate(chunks) if number not in done]
+        cluster = None if options.scheduler is None else Cluster(options.scheduler)
+        if cluster is not None:
+            answers = cluster.over(suite, todo, witnesses, draw, seconds)
+        else:
+            answers = pool.over_processes(suite, todo, witnesses, draw, workers, seconds)
+        for number, records in answers:
+            store.put(number, records)
+            yield len(records)
+        summary = Summary()
+        summary.tolerances = list(dict.fromkeys((IDENTITY, *(witness.tolerance for witness in witnesses))))
+        summary.missing = missing
+        with Columns(out) as columns, drafted(out / OUTPUT) as output, drafted(out / "timings.csv") as times:
+            times.write(csv_text(TIMINGS, []))
+            for number, scenes in enumerate(chunks):
+                records = store.read(number)
+                for scene, each in zip(scenes, records, strict=True):
+                    each.rows = each.rows or [mark_missing(plain(suite.name(scene)))]
+                    summary.add(each)
+                    times.write(csv_text((), timings(each)))
+                    output.writelines(f"{each.name}: {engine}\n{text}\n\n" for engine, text in each.output.items())
+                columns.add([row for each in records for row in each.rows])
+                yield Collected(len(scenes))
+        pictured = {record.name for record in summary.pictured} if options.drawn else set()
+        places = [index for index in range(len(suite)) if plain(suite.name(index)) in pictured]
+        if options.drawn and not draw:
+            for shown in draw_scenes(suite, places, summary.pictured, witnesses, workers, seconds):
+                summary.picture(shown)
+                yield Pictured(1)
+        factors = {witness.name: witness.tolerance.factor for witness in witnesses}
+        record = about(factors, suite.fingerprint(), descriptions(suite))
+        if cluster is not None:
+            record.settings["machines"] = cluster.machines
+        write_about(record, out)
+        write_text(out / "report.md", markdown(summary))
+        models, why_not = picture_models(suite, places) if places and generated else ({}, "")
+        more = sections(read_columns(out / "results.parquet") if isinstance(suite, Hard) else None, out)
+        page = html(summary, columns.first_lines, pictures=models, no_pictures=why_not, sections=more)
+        write_text(out / "report.html", page)
+        store.finish()
+    yield summary
+
+
+@contextmanager
+def drafted(path: Path) -> Iterator[TextIO]:
+    """Write a text file line by line: in place once it is complete, and not there where it is empty."""
+    draft = path.with_name(f".{path.name}.part")
+    with naming(path):
+        try:
+            with draft.open("w", encoding="utf-8", newline="") as file:
+                yield file
+            if draft.stat().st_size:
+                os.replace(draft, path)
+        finally:
+            draft.unlink(missing_ok=True)
+
+
+def mark_missing(scene: str) -> Row:
+    """Make the row of a scene that came back without any."""
+    return Row.unmeasured(scene, FORMULAS, "", "all", FAILS, "nothing was judged")
+
+
+def timings(record: Record) -> Iterator[list[str]]:
+    """Give the seconds per answer, and their ratio to the formulas' on the same scene in the same process."""
+    for t in record.timings:
+        ratio = t.seconds / record.timings[0].seconds
+        yield [t.scene, t.engine, t.setting, str(t.positions), f"{t.seconds:.6f}", f"{ratio:.1f}"]
