@@ -31,7 +31,6 @@ from fourbar_validation.compare.tolerance import DEGRADED as TIMES_PREDICTED
 from fourbar_validation.compare.tolerance import (
     EPS,
     NOTHING_TO_TELL,
-    SIMULATED,
     Array,
     Tolerance,
 )
@@ -315,12 +314,12 @@ def _jumping(quantity: str, scene: Scene, formulas: Solution, tolerance: Toleran
     near_jamming = quantity == "drive_condition" and any(effect.loaded_pins for effect in scene.effects)
     if quantity not in OF_FORCES and not near_jamming:
         return np.zeros(len(formulas), dtype=bool)
-    return reversing(scene, formulas, tolerance.factor, in_time=tolerance.name == SIMULATED.name)
+    return reversing(scene, formulas, tolerance.factor, in_time=tolerance.in_time)
 
 
 def _answerable(quantity: str, scene: Scene, formulas: Solution, tolerance: Tolerance) -> Mask:
     """Where a quantity may be demanded of an engine of this class."""
-    if quantity == "torque" and scene.drive_bar != 2 and tolerance.name == SIMULATED.name:
+    if quantity == "torque" and scene.drive_bar != 2 and tolerance.in_time:
         speed = formulas.omega_3 if scene.drive_bar == 3 else formulas.omega_4
         assert speed is not None
         return turning(speed)

@@ -39,6 +39,8 @@ class Tolerance:
     """Error allowed at condition 1, relative to the scale."""
     conditioned: bool
     """Whether it is divided by the condition."""
+    in_time: bool = False
+    """Whether it is of an engine that runs through the motion in time, and has no convention at rest."""
 
     def allowed(self, condition: Array) -> Array:
         """The relative error allowed at each position, (n,)."""
@@ -67,6 +69,7 @@ SIMULATED = Tolerance(
     "two to ten times what was measured (1e-6 to 4e-6)",
     1e-5,
     conditioned=False,
+    in_time=True,
 )
 FULL_ACCURACY = Tolerance(
     "full accuracy",

@@ -125,8 +125,7 @@ def run(
             for shown in draw_scenes(suite, places, summary.pictured, witnesses, workers, seconds):
                 summary.picture(shown)
                 yield Pictured(1)
-        factors = {witness.name: witness.tolerance.factor for witness in witnesses}
-        record = about(factors, suite.fingerprint(), descriptions(suite))
+        record = about(witnesses, suite.fingerprint(), descriptions(suite))
         if cluster is not None:
             record.settings["machines"] = cluster.machines
         write_about(record, out)
