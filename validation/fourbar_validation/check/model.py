@@ -45,7 +45,7 @@ MENDED = "fourbar_validation.engines.mujoco.theirs:examine_mended"
 
 
 @dataclass(frozen=True, slots=True)
-class Cost:
+class CostOfModel:
     """One quantity by one method: the error of their file, and of the generated one."""
 
     row: Row
@@ -69,11 +69,11 @@ class ModelReport:
 
     causes: list[Cause]
     """What differs, the worst first."""
-    costs: list[Cost]
+    costs: list[CostOfModel]
     notes: list[str]
 
     def methods(self) -> list[str]:
-        """The methods by which their file was evaluated."""
+        """List the methods by which their file was evaluated."""
         return list(dict.fromkeys(cost.method for cost in self.costs))
 
     @property
@@ -83,7 +83,7 @@ class ModelReport:
 
 
 def named(pairs: tuple[str, ...]) -> dict[str, str]:
-    """ROLE=NAME pairs of the command line."""
+    """Read ROLE=NAME pairs of the command line."""
     allowed = ("input", "coupler", "output", "B3", "B4")
     names = {}
     for pair in pairs:
@@ -103,7 +103,7 @@ def examine_model(
         generated, theirs = examined(EXAMINE, scene, None, {}), examined(EXAMINE, scene, text, dict(names))
         ours = {(row.engine, row.quantity): row.error for row in _rows(name, scene, generated.answers, SIMULATED)}
         rows = _rows(name, scene, theirs.answers, tolerance)
-        costs = [Cost(row, ours.get((row.engine, row.quantity), math.nan)) for row in rows]
+        costs = [CostOfModel(row, ours.get((row.engine, row.quantity), math.nan)) for row in rows]
         found = differences(generated.described, theirs.described, theirs.called)
         entries = [(difference.key, difference.generated) for difference in found]
         failed = any(row.failed for row in rows)
@@ -122,7 +122,7 @@ def _rows(name: str, scene: Scene, answers: list[Answer], tolerance: Tolerance) 
 
 @contextmanager
 def guarded(mjcf: Path) -> Iterator[Callable[..., Any]]:
-    """What examines a file, an adapter and its arguments, in a process that may crash, hang or run out of memory."""
+    """Examine a file, by an adapter and its arguments, in a process that may crash, hang or run out of memory."""
     from multiprocessing import get_context
 
     from pebble import ProcessExpired, ProcessPool
@@ -152,7 +152,7 @@ def guarded(mjcf: Path) -> Iterator[Callable[..., Any]]:
 
 
 def _confine() -> None:
-    """Memory bounded, and MuJoCo's log where it is swept away."""
+    """Bound the memory, and put MuJoCo's log where it is swept away."""
     os.chdir(tempfile.gettempdir())
     bound_memory()
 
@@ -199,7 +199,7 @@ def show(report: ModelReport, mjcf: Path, out: Path) -> None:
 
 
 def markdown(report: ModelReport, mjcf: Path) -> str:
-    """The same as text for a page."""
+    """Write the same as text for a page."""
     what = {"report": report, "mjcf": mjcf.name, "about": ABOUT_SHARES, "headings": HEADINGS}
     return rendered("fourbar_validation.check", "theirs.md.j2", **what)
 

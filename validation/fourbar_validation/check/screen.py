@@ -28,7 +28,7 @@ a tolerance of 0 nothing else may stop a solver."""
 
 
 def read_mjcf(path: Path) -> str:
-    """The screened text of an MJCF; InputError says in one line what it may not hold."""
+    """Read the text of an MJCF; InputError says in one line what it may not hold."""
 
     def refuse(what: object, allowed: str) -> InputError:
         return InputError("MJCF", what, allowed, str(path))

@@ -43,7 +43,7 @@ class Tolerance:
     """Whether it is of an engine that runs through the motion in time, and has no convention at rest."""
 
     def allowed(self, condition: Array) -> Array:
-        """The relative error allowed at each position, (n,)."""
+        """Compute the relative error allowed at each position, (n,)."""
         if not self.conditioned:
             return np.full_like(condition, self.factor)
         with np.errstate(divide="ignore"):
@@ -93,7 +93,7 @@ def simulated_within(error: float, why: str) -> Tolerance:
 
 
 def lever(linkage: FourBar) -> float:
-    """min(b, c)/longest bar: a loop closes to eps of its longest bar, which turns a shorter bar 3 or 4 by more.
+    """Compute min(b, c)/longest bar: a loop closes to eps of its longest bar, which turns a shorter bar 3 or 4 by more.
 
     Without it 28 of 10 008 comparisons on 300 random linkages exceed K = 50 (at most 83); with it none exceeds 17.
     """
@@ -102,7 +102,7 @@ def lever(linkage: FourBar) -> float:
 
 
 def condition_of(quantity: str, linkage: FourBar, formulas: Solution) -> Array:
-    """The condition of a quantity at each position: s for positions, s^2 for what follows, times lever and drive."""
+    """Compute a quantity's condition at each position: s for positions, s^2 for what follows, times lever and drive."""
     s, unit = formulas.condition, UNITS[quantity]
     if quantity in OF_THE_INPUT:
         return np.ones_like(s)

@@ -30,12 +30,12 @@ class DialledWitness(Witness):
     """The simulated witness at a wanted error, which is what it is held to."""
 
     def engine(self) -> Engine:
-        """MuJoCo with settings for that error."""
+        """Start MuJoCo with settings for that error."""
         return Dialled(self.tolerance.factor)
 
 
 def dialled(witnesses: Sequence[Witness], error: float) -> tuple[Witness, ...]:
-    """The witnesses, with whatever runs through time held to `error` and laid out for it; exact ones stay exact."""
+    """Lay out whatever runs through time for `error`, which it is held to; exact witnesses stay exact."""
     own: dict[str, Any] = {"tolerance": simulated_within(error, "steps and softness are laid out for it"), "order": ""}
     return tuple(
         DialledWitness(**{part.name: getattr(each, part.name) for part in fields(Witness)} | own)
@@ -53,7 +53,7 @@ class Dialled:
     name: str = "mujoco-simulated"
 
     def answer(self, scene: Scene, command: Command) -> Answer:
-        """Simulated with as many steps as the laws ask for, and more while its own residuals say so."""
+        """Simulate with as many steps as the laws ask for, and more while its own residuals say so."""
         from fourbar_validation.engines.mujoco.simulate import MujocoSimulated
         from fourbar_validation.engines.mujoco.trial import LONGEST, ORDER, dialled, guess
 
@@ -83,12 +83,12 @@ class Dialled:
 
 
 def steps_per_revolution(answer: Answer) -> float:
-    """Of what was simulated: "RK4 628/rev"."""
+    """Read from what was simulated: "RK4 628/rev"."""
     return float(answer.setting.rpartition(" ")[2].removesuffix("/rev"))
 
 
 def expected_error(scene: Scene, answer: Answer) -> float:
-    """The worst error of any quantity that the engine predicts, relative to its largest magnitude (angles: 1 rad)."""
+    """Compute the worst error that the engine predicts, relative to a quantity's largest magnitude (angles: 1 rad)."""
     worst = 0.0
     for name, predicted in answer.predicted.items():
         if name not in COMPARED:

@@ -152,7 +152,7 @@ def check_error_bars(question: Question) -> Iterator[Row]:
 
 
 def _pulls(scene: Scene, at: Command, solution: Solution) -> Iterator[Array]:
-    """What each spring, torsion spring and load over a table does, by the free bodies: (n,), N and N m together."""
+    """Compute what each spring, torsion spring and load over a table does, by free bodies: (n,), N and N m together."""
     assert solution.theta_3 is not None and solution.theta_4 is not None
     motion = move(scene.linkage, at.theta_2, *speeds(at), solution.theta_3, solution.theta_4)
     alone: list[Scene] = [replace(scene, loads=(load,), effects=()) for load in scene.loads if load.table is not None]
@@ -233,7 +233,7 @@ def check_law(question: Question) -> Iterator[Row]:
 
 
 def _hermite(s: Array, angle: Array, speed: Array, first: Array, last: Array, h: Array) -> tuple[Array, Array, Array]:
-    """Angle, speed and acceleration a time s into a piece, from its acceleration at both ends."""
+    """Compute angle, speed and acceleration a time s into a piece, from its acceleration at both ends."""
     jerk = (last - first) / h
     return (
         angle + s * (speed + s * (first / 2.0 + s * jerk / 6.0)),

@@ -60,7 +60,7 @@ class Pendulum(NamedTuple):
     omega_0: float
 
     def motion(self, times: Array) -> tuple[Array, Array]:
-        """phi and phi' (rad, rad/s) of a pendulum that turns over, by Jacobi's elliptic functions."""
+        """Compute phi and phi' (rad, rad/s) of a pendulum that turns over, by Jacobi's elliptic functions."""
         from scipy.special import ellipj, ellipk, ellipkinc
 
         k, sense = self.W / self.J, math.copysign(1.0, self.omega_0)
@@ -75,7 +75,7 @@ class Pendulum(NamedTuple):
 
 
 def as_pendulum(scene: Scene) -> Pendulum | None:
-    """The pendulum that the scene is, or None; it must turn over, or none of this is an answer."""
+    """Give the pendulum that the scene is, or None; it must turn over, or none of this is an answer."""
     d, a, b, c = scene.linkage.lengths
     effects = scene.effects
     if not (a == c and b == d and scene.motion.through == "follow" and not scene.loads and len(effects) == 1):
@@ -230,5 +230,5 @@ def _rows(question: Question, fine: Released, coarse: Released | None, truth: _T
 
 
 def _end(stopped_at: float | None, duration: float) -> Array:
-    """When a motion reached its limit, or the stated end, as a part of that duration, (1,)."""
+    """Give when a motion reached its limit, or the stated end, as a part of that duration, (1,)."""
     return np.array([1.0 if stopped_at is None else stopped_at / duration])

@@ -37,7 +37,7 @@ def compiled(question: Question) -> list[Row]:
 
 
 def furnished(scene: Scene, question: Question) -> Scene:
-    """The scene with a point on each bar and a load over a table, as large as its forces, where it has none."""
+    """Give the scene a point on each bar and a load over a table, as large as its forces, where it has none."""
     coupler, first = scene.linkage.coupler, float(question.at.theta_2[0])
     if not scene.points:
         arms = {bar: (0.6 * scene.linkage.bar(bar).length, 0.4 * bar) for bar in (2, 3, 4)}

@@ -104,7 +104,7 @@ class Expected(NamedTuple):
 
 
 def _expected(scene: Scene) -> dict[str, Expected]:
-    """What the free bodies of changed linkages say, by the parts of the unknowns."""
+    """Compute what the free bodies of changed linkages answer, by the parts of the unknowns."""
     bare = replace(scene, tolerances=())
     nominal = parts(at_free_bodies(bare))
     numbers = stated(bare, [each.key for each in scene.tolerances])
@@ -162,6 +162,6 @@ def _off(spread: Spread, expected: Expected, slight: float) -> Array:
 
 
 def _less(name: str, one: Array, other: Array) -> Array:
-    """A difference, of angles within half a turn."""
+    """Subtract, angles within half a turn."""
     difference = one - other
     return np.asarray(np.angle(np.exp(1j * difference)) if name.startswith("theta") else difference)
