@@ -72,7 +72,7 @@ JUDGED_BY = {
     "validation/lab/stress/test_bench.py": "validation/lab/stress: against bench_picture contenders in_c in_sympy "
     "limits timed",
     "validation/lab/stress/forward_error/test_stability.py": "validation/lab/stress/forward_error: families",
-    "validation/lab/stress/fuzz/test_fuzz.py": "validation/lab/stress/fuzz: scenes shrink",
+    "validation/lab/stress/fuzz/test_fuzz.py": "validation/lab/stress/fuzz: outside scenes shrink",
     "validation/lab/stress/mutation/test_mutation.py": "validation/lab/stress/mutation: harness",
     "validation/lab/stress/mutation/test_planted.py": "validation/lab/stress/mutation: planting specimens",
     "validation/lab/cost/test_cost.py": "validation/lab/cost: curves formulas laws orders pictures study; "
