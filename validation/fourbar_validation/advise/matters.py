@@ -43,7 +43,7 @@ class SettingInfluence:
 
 
 def judged(scene: Scene, trial: Trial) -> WorstErrors:
-    """WorstErrors of a trial, at its steps and between them; none where MuJoCo lost the motion."""
+    """Compute the errors of a trial, at its steps and between them; none where MuJoCo lost the motion."""
     if trial.broken:
         return NO_ANSWER
     found = [errors(scene, trial.at, trial.quantities)]
@@ -53,7 +53,7 @@ def judged(scene: Scene, trial: Trial) -> WorstErrors:
 
 
 def between(scene: Scene, trial: Trial, samples: slice, steps: int) -> Iterator[WorstErrors]:
-    """WorstErrors amid the steps of a stretch, where they are fewer than its positions: a spline through what was read.
+    """Compute errors amid the steps of a segment, where they are fewer than its positions: a spline through what was read.
 
     A largest force that lies between two steps is not seen at either of them.
     """
