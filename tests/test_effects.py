@@ -57,7 +57,7 @@ ACTING: dict[str, Effect] = {
     "load over theta_2": Load(3, (4.0, 0.7), (0.05, 1.0), 0.2, "world", TABLE),
 }
 EXACT = [witness for witness in WITNESSES if not witness.through_time]
-SIMULATED = [replace(witness, order="") for witness in WITNESSES if witness.through_time]
+SIMULATED = [replace(witness, order=None) for witness in WITNESSES if witness.through_time]
 ENGINES = {"pinocchio-inverse", "mujoco-inverse"}
 """What acts by `TERM_OF`, the table of the engines."""
 INVERSE = {*ENGINES, "free-body"}

@@ -175,7 +175,7 @@ def hood(links: float, output: float | None = None) -> fourbar.Scene:
     return fourbar.Scene(fourbar.FourBar(0.11, *bars), motion, effects=(fourbar.Gravity(),), title="hood")
 
 
-SIMULATION = [replace(witness, order="") for witness in WITNESSES if witness.name == "mujoco-simulated"]
+SIMULATION = [replace(witness, order=None) for witness in WITNESSES if witness.name == "mujoco-simulated"]
 
 
 @pytest.mark.parametrize("links", [1e-2, 1e-8])

@@ -20,7 +20,7 @@ import validation.run.run
 from fourbar.errors import DependencyError, FourBarError, InputError
 from fourbar.scene import Command, Scene
 from tests.here import judge_here
-from tests.unlucky import Few, dies_at_first
+from tests.unlucky import Few, Unlucky, dies_at_first
 from validation.compare.answer import Answer
 from validation.compare.columns import read_columns
 from validation.compare.rows import FAILS, REFUSES, Row
@@ -77,9 +77,9 @@ def test_an_engine_that_crashes_or_hangs_costs_its_own_rows(tmp_path: Path, monk
 def test_a_worker_ends_itself_in_the_scene_that_hangs_and_with_its_parent() -> None:
     """The limit is that of a scene, whatever the others of its chunk took."""
     judge = (
-        "from tests.unlucky import Few; from validation.run import pool; "
+        "from tests.unlucky import Few, Moody; from validation.run import pool; "
         "from validation.compare.tolerance import EQUIVALENCE; from validation.engines.witnesses import Witness; "
-        "moody = [Witness('moody', 'tests.unlucky:Moody', EQUIVALENCE)]; pool.ready(%s); print('ready', flush=True); "
+        "moody = [Witness('moody', Moody, EQUIVALENCE)]; pool.ready(%s); print('ready', flush=True); "
         "pool.judge_watched(%s, Few(), [0, 2], moody, False)"
     )
     for parent, limit in (("0", 1.0), ("1", 100.0)):  # the parent of the second is another
@@ -98,7 +98,7 @@ def test_what_comes_from_outside_is_not_held_against_the_engine(
     for life in range(3):
         (tmp_path / "lives" / f"{how} {life}").touch()
     monkeypatch.setenv("LIVES", str(tmp_path / "lives"))
-    unlucky = Witness("unlucky", "tests.unlucky:Unlucky", EQUIVALENCE)
+    unlucky = Witness("unlucky", Unlucky, EQUIVALENCE)
     assert judge_all(Few(("a",)), tmp_path / "run", (*EXACT, unlucky), workers=1).counts[FAILS] == 0
     assert not list((tmp_path / "lives").iterdir())
 
@@ -358,7 +358,7 @@ def test_of_a_long_suite_what_fails_has_pictures_and_what_is_nearest_to_it(
     monkeypatch.setattr("validation.report.summary.PICTURED", 3)
     monkeypatch.setattr(validation.run.run, "PICTURED", 3)
     monkeypatch.setattr(validation.run.run, "html", lambda *_, **__: "")
-    blunders = Witness("blunders", f"{__name__}:Blunders", EQUIVALENCE)
+    blunders = Witness("blunders", Blunders, EQUIVALENCE)
     *_, without = run(Few(), tmp_path / "without", (*EXACT, blunders), drawn=False)
     assert not drawn and not any(record.figure for record in without.shown)  # type: ignore[union-attr]
     once = Blunders.titles.count("b")

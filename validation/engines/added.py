@@ -8,6 +8,7 @@ import hashlib
 import sys
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from importlib import import_module
 from importlib.metadata import distributions, entry_points
 from pathlib import Path
@@ -16,7 +17,6 @@ from typing import Any
 
 from fourbar.errors import InputError
 from fourbar.quantities import ANGLES, UNKNOWNS
-from validation.compare.answer import Engine
 from validation.compare.compare import COMPARED
 from validation.compare.identities import FORMULAS
 from validation.compare.rows import in_words, one_line, plain
@@ -39,14 +39,12 @@ OURS = frozenset(sys.modules)
 class AddedWitness(Witness):
     """A witness whose answers are looked at before they are compared."""
 
+    adapter: str = ""
+    """Its class, "module:Class"."""
     trouble: str = ""
     """Why its class cannot be used, or nothing."""
     code: str = ""
     """Hash of what its answers come from."""
-
-    def engine(self) -> Engine:
-        """The class of the user, its answers looked at."""
-        return Checked(self)
 
     def missing(self) -> str | None:
         """Why it cannot answer here, or None."""
@@ -70,7 +68,7 @@ def installed(known: Iterable[str]) -> tuple[Witness, ...]:
     """Those of the entry points; one that cannot be used is missing, with the reason."""
     points = sorted(entry_points(group=GROUP), key=lambda point: point.name)
     return tuple(
-        AddedWitness(plain(point.name), point.value, EQUIVALENCE, trouble=f"{point.value} {each}")
+        _added(plain(point.name), point.value, EQUIVALENCE, trouble=f"{point.value} {each}")
         if isinstance(each, _UnusableError)
         else each
         for point, each in zip(points, _described([point.value for point in points], known), strict=True)
@@ -137,7 +135,11 @@ def _read(adapter: str, made: Any) -> AddedWitness:
     positions = tuple(quantity for quantity in quantities if quantity in ANGLES)
     tolerance = _tolerance(getattr(made, "tolerance", EQUIVALENCE.name))
     code = _code(sys.modules[adapter.partition(":")[0]])
-    return AddedWitness(name, adapter, tolerance, expected=quantities, positions=positions, stated=False, code=code)
+    return _added(name, adapter, tolerance, expected=quantities, positions=positions, stated=False, code=code)
+
+
+def _added(name: str, adapter: str, tolerance: Tolerance, **rest: Any) -> AddedWitness:
+    return AddedWitness(name, partial(Checked, name, adapter), tolerance, adapter=adapter, **rest)
 
 
 def _code(module: ModuleType) -> str:

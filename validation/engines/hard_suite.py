@@ -5,14 +5,16 @@ from functools import cache
 
 from fourbar.scene import Scene
 from validation.compare.tolerance import EQUIVALENCE, FULL_ACCURACY
-from validation.engines.witnesses import FROM_DATA, WITNESSES, Witness
+from validation.engines.exact import BallArithmetic
+from validation.engines.prediction import from_data
+from validation.engines.witnesses import WITNESSES, Witness
 from validation.scenes.hard_families import FAMILIES
 
 BALLS = Witness(
     "ball-arithmetic",
-    "validation.engines.exact:BallArithmetic",
+    BallArithmetic,
     FULL_ACCURACY,
-    nearby="validation.engines.exact:where_it_closes",
+    nearby=True,
     library="flint",
 )
 
@@ -21,7 +23,7 @@ def predicting(witness: Witness) -> Witness:
     """The witness held to full accuracy, or else to the error predicted for each position."""
     if witness.tolerance not in (EQUIVALENCE, FULL_ACCURACY):
         return witness
-    return replace(witness, tolerance=FULL_ACCURACY, predictor=witness.predictor or FROM_DATA)
+    return replace(witness, tolerance=FULL_ACCURACY, predictor=witness.predictor or from_data)
 
 
 HARD_WITNESSES = tuple(predicting(witness) for witness in (BALLS, *WITNESSES))

@@ -23,11 +23,8 @@ from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import PIN_FORCES, VECTORS
 from fourbar.scene import Command, Scene
 from validation.compare.compare import Mask
-from validation.compare.tolerance import EPS, Array
+from validation.compare.tolerance import EPS, ROUNDINGS, Array
 from validation.engines.description import centre, speeds
-
-ROUNDINGS = 8.0
-"""R: a chain of some fifty roundings moves a result by sqrt(50) = 7 last digits, as a random walk."""
 
 FIRST_ORDER = 0.1
 """Where the angles are uncertain by this part of the sine that everything divides by, first order predicts nothing:

@@ -5,14 +5,15 @@ the formulas say: how wrong it is against them stays a finding.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from fourbar.errors import InputError
 from fourbar.scene import Command, Scene
-from validation.compare.answer import Answer, Engine
+from validation.compare.answer import Answer
 from validation.compare.compare import COMPARED, turning
 from validation.compare.error import magnitude, relative
 from validation.compare.tolerance import SIMULATED, Tolerance
@@ -26,15 +27,6 @@ LEAST_GROWTH, MOST_GROWTH = 1.15, 3.0
 """Factor on the steps from one round to the next."""
 
 
-@dataclass(frozen=True, slots=True)
-class DialledWitness(Witness):
-    """The simulated witness at a wanted error, which is what it is held to."""
-
-    def engine(self) -> Engine:
-        """MuJoCo with settings for that error."""
-        return Dialled(self.tolerance.factor)
-
-
 def held_to(error: float, why: str) -> Tolerance:
     """What runs through time, held to a wanted error."""
     if not 0.0 < error < 1.0:
@@ -44,13 +36,9 @@ def held_to(error: float, why: str) -> Tolerance:
 
 def dialled(witnesses: Sequence[Witness], error: float) -> tuple[Witness, ...]:
     """The witnesses, with whatever runs through time held to `error` and laid out for it; exact ones stay exact."""
-    own: dict[str, Any] = {"tolerance": held_to(error, "steps and softness are laid out for it"), "order": ""}
-    return tuple(
-        DialledWitness(**{part.name: getattr(each, part.name) for part in fields(Witness)} | own)
-        if each.through_time
-        else each
-        for each in witnesses
-    )
+    tolerance = held_to(error, "steps and softness are laid out for it")
+    own: dict[str, Any] = {"engine": partial(Dialled, error), "tolerance": tolerance, "order": None}
+    return tuple(replace(each, **own) if each.through_time else each for each in witnesses)
 
 
 @dataclass(slots=True)

@@ -4,7 +4,6 @@ import math
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
-from pkgutil import resolve_name
 from typing import Any
 from zlib import crc32
 
@@ -36,8 +35,6 @@ from validation.run.shipped.checks import judge_shipped
 
 OF_MANY = 500
 """Of so many scenes of a long suite one has what else is shipped judged, which takes as long as judging thirty."""
-SIMULATION = "mujoco-simulated"
-"""The witness that runs the generated MJCF."""
 OUTPUT = "output.txt"
 """In the folder of a run: what the engines printed."""
 
@@ -111,8 +108,9 @@ def judge(
             record.rows += _stated(name, scene, at, witness, engines.started(witness), answer, stated)
         if order and witness.order and answer.refusal is None:
             answer.evidence |= _observed_order(name, scene, at, record.solution, witness)
-    if any(witness.name == SIMULATION for witness in witnesses):
-        record.rows += _shipped(name, scene, at)
+    for witness in witnesses:
+        if witness.generated:
+            record.rows += _shipped(name, scene, at, witness)
     _judge_inertia(record, scene, at, witnesses, free_body)
     if shipped:
         for row in judge_shipped(name, scene, at, record.solution, free_body):
@@ -123,12 +121,14 @@ def judge(
     return record
 
 
-def _shipped(name: str, scene: Scene, at: Command) -> list[Row]:
+def _shipped(name: str, scene: Scene, at: Command, witness: Witness) -> list[Row]:
     """The generated MJCF as it is shipped, if one is."""
     try:
-        row = resolve_name("validation.engines.mujoco.shipped:shipped")(name, scene, at)
+        from validation.engines.mujoco.shipped import shipped
+
+        row = shipped(name, scene, at)
     except Exception as error:  # as of any engine
-        return [breakdown(name, SIMULATION, error, "MJCF as shipped")]
+        return [breakdown(name, witness.name, error, "MJCF as shipped")]
     return [] if row is None else [row]
 
 
@@ -167,30 +167,29 @@ class _Engines:
 
     def __init__(self, scene: Scene, at: Command) -> None:
         self.scene, self.at = scene, at
-        self._started: dict[str, Engine] = {}
-        self._answered: dict[str, tuple[Answer, float]] = {}
+        self._started: dict[Callable[[], Engine], Engine] = {}
+        self._answered: dict[Callable[[], Engine], tuple[Answer, float]] = {}
 
     def started(self, witness: Witness) -> Engine:
         """The engine of a witness."""
-        if witness.adapter not in self._started:
-            self._started[witness.adapter] = witness.engine()
-        return self._started[witness.adapter]
+        if witness.engine not in self._started:
+            self._started[witness.engine] = witness.engine()
+        return self._started[witness.engine]
 
     def answer(self, witness: Witness) -> tuple[Answer, float]:
         """The answer of a witness, and the seconds that it took."""
-        if witness.adapter in self._answered:
-            return self._answered[witness.adapter]
+        if witness.engine in self._answered:
+            return self._answered[witness.engine]
         return _timed(lambda: self.started(witness).answer(self.scene, self.at))
 
     def free_body(self) -> Answer | None:
         """The answer of the free bodies, or None where they break down: a row of their own fails."""
-        adapter = f"{FreeBody.__module__}:{FreeBody.__name__}"
         try:
             with np.errstate(all="ignore"):
-                self._answered[adapter] = _timed(lambda: FreeBody().answer(self.scene, self.at))
+                self._answered[FreeBody] = _timed(lambda: FreeBody().answer(self.scene, self.at))
         except Exception:  # as of any engine: what it leaves undone has rows that fail
             return None
-        return self._answered[adapter][0]
+        return self._answered[FreeBody][0]
 
 
 def _basis(scene: Scene, free_body: Answer | None) -> Solution | None:
@@ -266,7 +265,8 @@ def _observed_order(name: str, scene: Scene, at: Command, solution: Solution, wi
         rows = _judged(name, scene, at, solution, answer, replace(witness, expected=FORCES), None, {})
         return max((row.error for row in rows if row.quantity in FORCES), default=math.nan)  # a refusal has none
 
-    coarse, fine, order = resolve_name(witness.order)(scene, at, error)
+    assert witness.order is not None
+    coarse, fine, order = witness.order(scene, at, error)
     seen = {"error_at_4h": coarse, "error_at_2h": fine, "observed_order": order}
     return seen if all(map(math.isfinite, seen.values())) else {}  # a coarse run may leave what the scene covers
 

@@ -83,13 +83,13 @@ def run(
 
     What an interrupted run of the same suite with the same engines and versions left is kept.
     """
-    simulated = any(witness.name == "mujoco-simulated" for witness in witnesses)
+    simulated = any(witness.through_time for witness in witnesses)
     draw = drawn and len(suite) <= PICTURED
     size = max(CHUNK[simulated or draw], math.ceil(len(suite) / MOST_PARTS))
     chunks = [range(start, min(start + size, len(suite))) for start in range(0, len(suite), size)]
     identity = {
         "scenes": suite.fingerprint(),
-        "witnesses": [repr(witness) for witness in witnesses],
+        "witnesses": [witness.fingerprint() for witness in witnesses],
         **code(),
         "draw": draw,
         "time limit": seconds,

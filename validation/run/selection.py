@@ -49,7 +49,9 @@ def chosen(
     for name in names or [engines]:
         if name not in known:
             raise InputError("--engines", name, "must be among " + ", ".join(known))
-    return tuple(witness for name, witness in known.items() if name in names or witness.adapter in adapters)
+    return tuple(
+        witness for name, witness in known.items() if name in names or getattr(witness, "adapter", None) in adapters
+    )
 
 
 def askable(witnesses: tuple[Witness, ...], *, by_name: bool) -> tuple[tuple[Witness, ...], list[tuple[str, str]]]:
