@@ -56,7 +56,7 @@ class _UnusableError(Exception):
 
 
 def named(adapters: Sequence[str], known: Iterable[str]) -> tuple[Witness, ...]:
-    """The witnesses of the command line; InputError where one is none."""
+    """Read the witnesses of the command line; InputError where one is none."""
     found = list(zip(adapters, _described(adapters, known), strict=True))
     for adapter, each in found:
         if isinstance(each, _UnusableError):
@@ -76,7 +76,7 @@ def installed(known: Iterable[str]) -> tuple[Witness, ...]:
 
 
 def _described(adapters: Sequence[str], known: Iterable[str]) -> list[Witness | _UnusableError]:
-    """What each class says of itself, in another process: nothing of it runs in the one that gives the verdict."""
+    """Ask each class what it says of itself, in another process: nothing of it runs where the verdict is given."""
     if not adapters:
         return []
     from pebble import ProcessExpired, ProcessPool
@@ -111,7 +111,7 @@ def _begin() -> None:
 
 
 def _describe(adapter: str) -> AddedWitness:
-    """The witness that a class makes, in plain words and numbers; _UnusableError where it is none."""
+    """Describe the witness that a class makes in plain words and numbers; _UnusableError where it is none."""
     module, _, attribute = adapter.partition(":")
     if not module or not attribute:
         raise _UnusableError("must be module:Class")

@@ -24,7 +24,7 @@ class Checked:
         self.name, self._adapter = name, adapter
 
     def answer(self, scene: Scene, command: Command) -> Answer:
-        """Its answer; WitnessError where it is none, whatever the engine raises."""
+        """Return its answer; WitnessError where it is none, whatever the engine raises."""
         given_scene, at = deepcopy((scene, command))
         for array in (given_scene.motion.theta_2, *at):
             if isinstance(array, np.ndarray):
@@ -84,7 +84,7 @@ def _numbers(name: str, value: Any, shape: tuple[int, ...], kinds: str = "iuf") 
 
 
 def _motion(at: Any, command: Command) -> Command:
-    """The motion that a witness says it made, near the one that was commanded."""
+    """Check the motion that a witness says it made: it must be near the one that was commanded."""
     if not isinstance(at, Command):
         raise TypeError(f"at must be the command or one made of it, not a {type(at).__name__}")
     if not np.array_equal(at.branch, command.branch) or (at.omega_2 is None) != (command.omega_2 is None):

@@ -19,7 +19,7 @@ KNOWN = tuple(kind.key for kind in (Gravity, Viscous, Friction, Springs, Torsion
 
 
 def unknown(scene: Scene) -> str:
-    """The reason to refuse a scene, or nothing."""
+    """Give the reason to refuse a scene, if any."""
     return unknown_effect(scene, KNOWN)
 
 
@@ -29,7 +29,7 @@ class BallArithmetic:
     name = NAME
 
     def answer(self, scene: Scene, command: Command) -> Answer:
-        """Its answer, or the refusal that names an effect it does not know."""
+        """Answer, or refuse by naming an effect that it does not know."""
         from flint import arb
 
         from validation.engines.balls import outputs, stored
@@ -60,7 +60,7 @@ class BallArithmetic:
 
 
 def sines(linkage: FourBar, command: Command) -> Array:
-    """sin(theta_4 - theta_3) of each position in many digits, (n,); NaN where the loop does not close."""
+    """Compute sin(theta_4 - theta_3) of each position in many digits, (n,); NaN where the loop does not close."""
     from flint import arb, ctx
 
     from validation.engines.balls import BITS, closure, wedge
@@ -77,7 +77,7 @@ def sines(linkage: FourBar, command: Command) -> Array:
 
 
 def _put(out: dict[str, Array], i: int, values: dict[str, Any]) -> None:
-    """The numbers of one position into those of all."""
+    """Write the numbers of one position into those of all."""
     for name, array in out.items():
         if name in VECTORS:
             array[i] = _number(values.get(f"{name}_x")), _number(values.get(f"{name}_y"))

@@ -36,7 +36,7 @@ class Motion(NamedTuple):
     """Speeds of the motion that is about to begin where the linkage rests, rad/s; None: it stays at rest."""
 
     def to_centre(self, bar: int) -> Complex:
-        """From the first pin of a moving bar to its mass centre, m."""
+        """Return the vector from the first pin of a moving bar to its mass centre, m."""
         return self.unit[bar] * polar(centre(self.linkage.bar(bar)))
 
     def swing(self, bar: int, arm: Complex) -> Complex:
@@ -71,18 +71,18 @@ class Wrenches:
         self.moment: dict[int, Array] = {bar: np.zeros(n) for bar in MOVING_BARS}
 
     def push(self, bar: int, force: Any, arm: Any) -> None:
-        """A force, at `arm` from the bar's first pin; on the ground it does nothing."""
+        """Add a force, at `arm` from the bar's first pin; on the ground it does nothing."""
         if bar in self.force:
             self.force[bar] = self.force[bar] + force
             self.moment[bar] = self.moment[bar] + cross(arm, force)
 
     def twist(self, bar: int, couple: Any) -> None:
-        """A couple; on the ground it does nothing."""
+        """Add a couple; on the ground it does nothing."""
         if bar in self.moment:
             self.moment[bar] = self.moment[bar] + couple
 
     def twist_at(self, pin: str, couple: Any) -> None:
-        """A couple on bar j of a pin (i, j), its opposite on bar i."""
+        """Add a couple to bar j of a pin (i, j), its opposite to bar i."""
         i, j = PINS[pin]
         self.twist(j, couple)
         self.twist(i, -couple)
@@ -103,7 +103,7 @@ def polar(pair: Any) -> complex:
 
 
 def _gravity(effect: Any, motion: Motion, wrenches: Wrenches) -> None:
-    """Force m g at every mass centre."""
+    """Apply m g at every mass centre."""
     for bar in MOVING_BARS:
         wrenches.push(
             bar, motion.linkage.bar(bar).mass * polar((effect.magnitude, effect.angle)), motion.to_centre(bar)
@@ -177,7 +177,7 @@ def acting(scene: Scene, motion: Motion) -> Wrenches:
 
 
 def _load(load: Any, motion: Motion, wrenches: Wrenches) -> None:
-    """A force at its point, from the mass centre, and a couple; in the bar's frame both vectors turn with the bar."""
+    """Apply a force at its point, from the mass centre, and a couple; in the bar's frame both rotate with the bar."""
     turned = motion.unit[load.bar] if load.frame == "bar" else 1.0
     factor = 1.0 if load.table is None else _factor(load.table, motion.theta_2)
     arm = motion.to_centre(load.bar) + turned * polar(load.at)
@@ -186,14 +186,14 @@ def _load(load: Any, motion: Motion, wrenches: Wrenches) -> None:
 
 
 def _factor(table: Any, theta_2: Array) -> Array:
-    """Linear between the points; the angle is taken within half a turn of the middle of the table."""
+    """Interpolate between the points; the angle is taken within half a turn of the middle of the table."""
     middle = 0.5 * (table.theta_2[0] + table.theta_2[-1])
     around = np.remainder(theta_2 - middle + np.pi, 2.0 * np.pi) - np.pi
     return np.asarray(np.interp(middle + around, table.theta_2, table.factor))
 
 
 def wound(scene: Scene, motion: Motion) -> NDArray[np.bool_] | None:
-    """Where a torsion spring is turned by more than half a turn from its rest, followed from where the motion begins.
+    """Find where a torsion spring is wound by more than half a turn from its rest, followed from the motion's start.
 
     None where no spring counts turns, or the motion changes its branch.
     """
@@ -223,6 +223,6 @@ def wound(scene: Scene, motion: Motion) -> NDArray[np.bool_] | None:
 
 
 def sliding_pins(scene: Scene) -> dict[str, float]:
-    """mu r of each pin whose friction depends on its load, m."""
+    """Return mu r of each pin whose friction depends on its load, m."""
     pins = [pin for effect in scene.effects if effect.key == "pin_friction" for pin in effect.pins]  # type: ignore[attr-defined]
     return {name: mu * r for name, mu, r in pins if mu * r != 0.0}

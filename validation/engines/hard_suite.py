@@ -20,7 +20,7 @@ BALLS = Witness(
 
 
 def predicting(witness: Witness) -> Witness:
-    """The witness held to full accuracy, or else to the error predicted for each position."""
+    """Hold the witness to full accuracy, or else to the error predicted for each position."""
     if witness.tolerance not in (EQUIVALENCE, FULL_ACCURACY):
         return witness
     return replace(witness, tolerance=FULL_ACCURACY, predictor=witness.predictor or from_data)
@@ -39,21 +39,21 @@ class Hard:
         return len(_scenes(self.families))
 
     def name(self, index: int) -> str:
-        """Name of a scene; ascending."""
+        """Name a scene; ascending."""
         return _scenes(self.families)[index][0]
 
     def scene(self, index: int) -> Scene:
-        """The scene itself."""
+        """Return the scene itself."""
         return _scenes(self.families)[index][1]
 
     def fingerprint(self) -> str:
-        """The families by name, and how many scenes they make."""
+        """Name the families and count their scenes."""
         return f"hard {' '.join(self.families)} {len(self)}"
 
 
 @cache
 def _scenes(families: tuple[str, ...]) -> list[tuple[str, Scene]]:
-    """Names and scenes of some families, by name."""
+    """Make the scenes of some families, by name."""
     found = []
     for family in FAMILIES:
         for label, scene in family.scenes() if family.name in families else ():

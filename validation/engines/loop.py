@@ -43,7 +43,7 @@ class Position:
         self.tree = tree
 
     def find(self, theta_2: float, branch: int) -> Angles | None:
-        """The configuration on the branch, with the tree placed there, or None where the loop does not close."""
+        """Assemble on the branch and place the tree there; None where the loop does not close."""
         tree = self.tree
         tree.place((theta_2, 0.0, 0.0))
         at = tree.positions()
@@ -72,7 +72,7 @@ class Position:
 
 
 def _triangle_angle(e: float, near: float, far: float) -> float:
-    """The angle between the sides e and near, by half-angle tangents."""
+    """Compute the angle between the sides e and near, by half-angle tangents."""
     above, below = (e - near + far) * (far + near - e), (e + near - far) * (e + near + far)
     return 2.0 * math.atan2(math.sqrt(max(above, 0.0)), math.sqrt(max(below, 0.0)))
 
@@ -121,7 +121,7 @@ class Exact:
     """Its bars from the description; LimitError says why it cannot hold them."""
 
     def answer(self, scene: Scene, command: Command) -> Answer:
-        """Its answer, or the refusal that names what it does not know or cannot hold."""
+        """Answer, or refuse by naming what it does not know or cannot hold."""
         try:
             bars = self.build(scene)
         except LimitError as error:
@@ -154,7 +154,7 @@ Read = Callable[[Angles, float, float], Values]
 def at_each(
     bars: Assembled, command: Command, names: Iterable[str], read: Read
 ) -> tuple[dict[str, Array], NDArray[np.bool_], float]:
-    """What is read at each position that assembles, NaN elsewhere; where that is; the greatest gap left, m."""
+    """Read each position that assembles, NaN elsewhere; return that, where it assembles, and the greatest gap, m."""
     n, (omega, alpha) = len(command.theta_2), speeds(command)
     missing: dict[str, Any] = {name: (math.nan, math.nan) if name in VECTORS else math.nan for name in names}
     rows, assembled, gap, position = [missing] * n, np.zeros(n, dtype=bool), 0.0, Position(bars)
@@ -170,12 +170,12 @@ MADE = ("theta_2", "omega_2", "alpha_2")
 
 
 def blank(n: int, names: Iterable[str] = (*MADE, "torque", *PIN_FORCES)) -> dict[str, Array]:
-    """NaN for each of n positions, (n,) or (n, 2)."""
+    """Return NaN for each of n positions, (n,) or (n, 2)."""
     return {name: np.full((n, 2) if name in VECTORS else n, np.nan) for name in names}
 
 
 def as_made(out: dict[str, Array], branch: NDArray[np.int8]) -> tuple[Command, dict[str, Array]]:
-    """The motion that was made, as a command, and the other quantities read on it."""
+    """Split what was read into the motion that was made, as a command, and the other quantities."""
     theta_2, omega_2, alpha_2 = (out[name] for name in MADE)
     rest = {name: values for name, values in out.items() if name not in MADE}
     return Command(theta_2, branch, omega_2, alpha_2), rest

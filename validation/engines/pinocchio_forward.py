@@ -57,7 +57,7 @@ class ClosedTree:
         return None if q is None else (np.array(q), closed(self.tree.jacobian(), omega_2))
 
     def acceleration(self, q: Array, v: Array, tau: Array) -> Any:
-        """Under gravity and generalised forces."""
+        """Accelerate the closed loop under loads, effects and the flywheel's motor."""
         model, data = self.tree.model, self.data
         return pin.constraintDynamics(model, data, q, v, tau, self.models, self.found, self.proximal).copy()
 
@@ -67,7 +67,7 @@ class ClosedTree:
 
 
 def step(f: Acceleration, q: Array, v: Array, h: float) -> tuple[Array, Array]:
-    """One step of the classical Runge-Kutta method."""
+    """Make one step of the classical Runge-Kutta method."""
     a1 = f(q, v)
     v2 = v + 0.5 * h * a1
     a2 = f(q + 0.5 * h * v, v2)
@@ -131,7 +131,7 @@ class PinocchioForward:
         return Trial(at, quantities, done, 2.0 * np.pi / self.run.fastest / self.h, stepping)
 
     def _read(self, q: Array, v: Array, a: Array) -> dict[str, Array | float]:
-        """Torque and pin forces at a state, with the multiplier of the closure that the engine found."""
+        """Compute torque and pin forces at a state, with the multiplier of the closure that the engine solved for."""
         tree = self.tree
         tree.place(q)  # type: ignore[arg-type]
         tree.model.armature = np.zeros(3)
@@ -157,7 +157,7 @@ class PinocchioReleased:
         self.step = step
 
     def release(self, scene: Scene, times: Array) -> Released:
-        """The motion at the given times, rising from 0 (s)."""
+        """Integrate the motion at the given times, rising from 0 (s)."""
         setting = f"RK4 {self.step:g} s"
         if scene.loads or any(not isinstance(effect, Gravity) for effect in scene.effects):
             return Released.refused(NAME, setting, "in forward dynamics only gravity has a model here")

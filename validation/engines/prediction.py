@@ -32,17 +32,17 @@ speeds and forces may come out as anything, the torque too, whose own first orde
 
 
 def from_data(scene: Scene, at: Command, quantity: str, where: Mask | None = None) -> Array:
-    """For a derivation that works in angles and lengths themselves."""
+    """Predict for a derivation that works in angles and lengths themselves."""
     return predicted_error(scene, at, quantity, 0.0, where)
 
 
 def in_world_axes(scene: Scene, at: Command, quantity: str, where: Mask | None = None) -> Array:
-    """For an engine that differences points of the linkage in world axes, as Pinocchio's frame Jacobians do."""
+    """Predict for an engine that differences points of the linkage in world axes, as Pinocchio's frame Jacobians do."""
     return predicted_error(scene, at, quantity, _extent(scene), where)
 
 
 def about_mass_centre(scene: Scene, at: Command, quantity: str, where: Mask | None = None) -> Array:
-    """For an engine that moves a tree of bodies about the mass centre of all of them, as MuJoCo does.
+    """Predict for an engine that moves a tree of bodies about the mass centre of all of them, as MuJoCo does.
 
     Every bar is accelerated with the first of its tree and back again by its own joint.
     """
@@ -63,7 +63,7 @@ def predicted_error(
     *,
     carried: bool = False,
 ) -> Array:
-    """Absolute error predicted for a quantity at each position, or at those of a mask, (n,).
+    """Predict the absolute error of a quantity at each position, or at those of a mask, (n,).
 
     With `carried` the accelerations of the bars are differences of others as large as the fastest bar's at `reach`.
     NaN where the loop does not close; infinite at a singular position, where the equations have no answer.
@@ -98,7 +98,7 @@ class Sensitivity(NamedTuple):
     """By couples on the bars of the heaviest bar's inertial force at 1 m of the fastest bar, times 1 m."""
 
     def first_order(self, name: str, reach: float, *, carried: bool = False) -> float:
-        """The error predicted for an output, vectors by their norm; infinite where it has none."""
+        """Predict the error of an output, vectors by their norm; infinite where it has none."""
         parts = []
         name = "sin_mu" if name == "condition" else name
         for axis in ("_x", "_y") if name in VECTORS else ("",):
@@ -109,7 +109,7 @@ class Sensitivity(NamedTuple):
 
 @lru_cache(maxsize=8192)
 def _sensitivity(scene: Scene, theta_2: float, branch: int, omega_2: float, alpha_2: float) -> Sensitivity | None:
-    """Sensitivities at one position; None where the loop does not close."""
+    """Compute the sensitivities at one position; None where the loop does not close."""
     from flint import acb, arb
 
     from validation.engines.balls import STEP_BITS, outputs, response, stored
@@ -121,7 +121,7 @@ def _sensitivity(scene: Scene, theta_2: float, branch: int, omega_2: float, alph
     step = arb(2) ** -STEP_BITS
 
     def add(total: dict[str, float], changes: list[dict[str, Any]]) -> None:
-        """The change under the first of several changes of the inputs with which the loop still closes."""
+        """Add the change under the first of several changes of the inputs with which the loop still closes."""
         moved = (outputs(scene, branch, exact | changed, scene.drive_bar) for changed in changes)
         for output, rate in response(base, moved).items():
             total[output] = total.get(output, 0.0) + rate
@@ -152,7 +152,7 @@ def _sensitivity(scene: Scene, theta_2: float, branch: int, omega_2: float, alph
 
 
 def _weights(stored: dict[str, float]) -> dict[str, float]:
-    """How much of each input is one rounding: relative, but a chain of bars meets O4 as its longest bar is rounded."""
+    """Weigh each input by one rounding: relative, but a chain of bars meets O4 as its longest bar is rounded."""
     longest = max(stored[name] for name in ("d", "a", "b", "c"))
     weights = {name: abs(value) for name, value in stored.items() if value != 0.0}
     weights["d"] = longest

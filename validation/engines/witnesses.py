@@ -75,7 +75,7 @@ EXTRA = {name: name for name in ("mujoco", "pinocchio", "exudyn", "opensim")} | 
 
 
 def not_installed(library: str) -> str | None:
-    """The reason to give where a module cannot be found, or does not load; None where it does."""
+    """Give the reason where a module cannot be found, or does not load; None where it does."""
     try:
         import_module(library)
     except ModuleNotFoundError as error:

@@ -34,7 +34,7 @@ class LadderRow(NamedTuple):
 
 
 def ladder_rows() -> list[LadderRow]:
-    """From our answer to the two published ones, error by error: rows of `LadderRow`.
+    """List the rows from our answer to the two published ones, error by error.
 
     The first row is right: 309.309 N cm and (7.033, -2.121) N. The last two are what the manual and
     section 5.7 print: 308.804 N cm and (161.418, -156.506) N.
@@ -55,7 +55,7 @@ def ladder_rows() -> list[LadderRow]:
 
 
 def figures() -> Iterator[Figure]:
-    """Every printed figure: the thesis, the Maple worksheet, public test cases."""
+    """List every published figure: the thesis, the Maple worksheet, public test cases."""
     yield from position_figures()
     yield from dynamics_figures()
     yield from maple_figures()
@@ -63,7 +63,7 @@ def figures() -> Iterator[Figure]:
 
 
 def explained(figure: Figure) -> bool:
-    """Whether a difference is bound to errata that give the printed digits, or to a misprint that none can give."""
+    """Tell whether a difference is bound to errata that give the published digits, or to a misprint that none can give."""
     if not figure.errata or not set(figure.errata) <= set(ERRATA):
         return False
     return figure.reproduced() or not all(ERRATA[name].reproduced for name in figure.errata)
@@ -85,7 +85,7 @@ def reason(figure: Figure) -> str:
 
 
 def show_ladder(console: Any) -> None:
-    """The table of the published torque, error by error."""
+    """Print the table of the published torque, error by error."""
     from rich.table import Table
 
     table = Table(title="The published torque, error by error", show_lines=True)

@@ -54,12 +54,12 @@ class Errors:
 
 
 def printed() -> Any:
-    """The transcribed tables of the thesis."""
+    """Read the transcribed tables of the thesis."""
     return json.loads((DATA / "model_mechanism.json").read_text(encoding="utf-8"))
 
 
 def deg(angle: float) -> float:
-    """Degrees in [0, 360), as the thesis has them."""
+    """Convert to degrees in [0, 360), as the thesis has them."""
     return math.degrees(angle) % 360.0
 
 
@@ -74,7 +74,7 @@ def to_ours(theta: float) -> float:
 
 
 def scene(theta_2: Array | float, branch: int = 1) -> fourbar.Scene:
-    """The model mechanism for our formulas, SI, uniform bars of `WIDTH`."""
+    """Make the model mechanism for our formulas, SI, uniform bars of `WIDTH`."""
     d, a, b, c = (0.01 * length for length in LENGTHS)
     centre = {bar: (0.01 * distance, 0.0) for bar, distance in CENTRE.items()}
     linkage = fourbar.FourBar(
@@ -95,7 +95,7 @@ def motion(theta_2: Array, branch: int = 1) -> fourbar.Solution:
 
 
 def right_unknowns() -> dict[str, float]:
-    """The 13 unknowns by our formulas at theta_2 = 135 deg, N and N cm."""
+    """Compute the 13 unknowns by our formulas at theta_2 = 135 deg, N and N cm."""
     s = fourbar.solve(scene(THETA_2))
     assert s.F32 is not None and s.F43 is not None and s.torque is not None
     pins: dict[str, Any] = {"F12": s.F12, "F32": s.F32, "F23": -s.F32, "F43": s.F43, "F14": s.F14, "F34": -s.F43}
@@ -166,13 +166,13 @@ def equations(errors: Errors, inertias: tuple[float, float] | None = None) -> tu
 
 
 def thesis_program(errors: Errors, inertias: tuple[float, float] | None = None) -> dict[str, float]:
-    """The 13 unknowns of section 5.7 at theta_2 = 135 deg, N and N cm."""
+    """Compute the 13 unknowns of section 5.7 at theta_2 = 135 deg, N and N cm."""
     unknowns = np.linalg.solve(*equations(errors, inertias))
     return dict(zip(UNKNOWNS, map(float, unknowns), strict=True))
 
 
 def round_off(errors: Errors, inertias: tuple[float, float] | None = None) -> dict[str, float]:
-    """How far an elimination of these equations may be off in each unknown, whoever makes it: N and N cm.
+    """Bound how far an elimination of these equations may be off in each unknown, whoever makes it: N and N cm.
 
     13 eps |A^-1| (|A| |x| + |b|): each number of the system carries up to as many roundings as there are
     unknowns, from its own making and from the elimination (Higham, Accuracy and Stability, 7.2 and 9.3).
@@ -200,5 +200,5 @@ STEPS: tuple[tuple[str, Errors, tuple[float, float] | None], ...] = (
 
 
 def ladder() -> list[tuple[str, dict[str, float]]]:
-    """The unknowns after each further erratum, from right to published."""
+    """Compute the unknowns after each further erratum, from right to published."""
     return [(erratum, thesis_program(errors, inertias)) for erratum, errors, inertias in STEPS]

@@ -31,19 +31,19 @@ class Answer(NamedTuple):
 
 
 def answers() -> list[Answer]:
-    """All of them."""
+    """List all of them."""
     return [Answer(**entry) for entry in tomllib.loads(ANSWERS.read_text(encoding="utf-8"))["answer"]]
 
 
 def textbook_figures() -> Iterator[Figure]:
-    """Each answer and ours."""
+    """Compare each answer with ours."""
     for answer in answers():
         ours = value(_solved(answer.scene), answer.quantity, answer.position)
         yield Figure("public test cases", f"{answer.scene} {answer.quantity}", answer.printed, ours)
 
 
 def value(solution: fourbar.Solution, quantity: str, position: int) -> float:
-    """A result, its negative, or the difference of two, at one position."""
+    """Compute a result, its negative, or the difference of two, at one position."""
     first, minus, second = quantity.partition(" - ")
     if minus:
         return value(solution, first, position) - value(solution, second, position)
@@ -65,7 +65,7 @@ def _solved(scene: str) -> fourbar.Solution:
 
 
 def maple_figures() -> Iterator[Figure]:
-    """The worksheet's two solutions, positions alone, theta_1 = 0, rad; and the constant of its real equation."""
+    """Compute the worksheet's two solutions of positions, theta_1 = 0, rad; and the constant of its real equation."""
     sheet = json.loads(SHEET.read_text(encoding="utf-8"))
     a, b, c, d = (float(sheet["inputs"][name]) for name in "abcd")
     theta_2 = math.pi / 3.0

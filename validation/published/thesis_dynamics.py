@@ -39,17 +39,17 @@ _, a, b, c = LENGTHS
 
 
 def cut(value: float, decimals: int) -> float:
-    """The value without its further decimals."""
+    """Cut off further decimals."""
     return math.trunc(value * 10.0**decimals) / 10.0**decimals
 
 
 def arm_of_cut_angle(k: Kinematics, decimals: int) -> float:
-    """y of R23 with theta_3 cut to some decimals of a degree first, erratum 12."""
+    """Compute y of R23 with theta_3 cut to some decimals of a degree first, erratum 12."""
     return -CENTRE[3] * math.sin(math.radians(cut(deg(k.theta_3), decimals)))
 
 
 def our_kinematics(k: Kinematics) -> dict[str, float]:
-    """By the names of section 4.12 and of the manual's table.
+    """Compute ours by the names of section 4.12 and of the manual's table.
 
     A alpha_3 + B alpha_4 = C and D alpha_3 + E alpha_4 = F.
     """
@@ -74,7 +74,7 @@ def our_kinematics(k: Kinematics) -> dict[str, float]:
 
 
 def kinematic_slips(k: Kinematics) -> dict[str, tuple[tuple[str, ...], float]]:
-    """The figures that the errata touch, with the value that these lead to."""
+    """List the figures that the errata touch, with the value that these lead to."""
     x, y = k.a_G[3][0] + k.slip, k.a_G[3][1]
     return {
         "A_G3/A_i": (("4",), k.a_G[3][0] - k.a_A[0] + k.slip),
@@ -155,7 +155,7 @@ def dynamics_constants(k: Kinematics) -> Iterator[Figure]:
 
 
 def unknowns() -> Iterator[Figure]:
-    """The 13 unknowns, of the program (the manual's table) and of section 5.7."""
+    """List the 13 unknowns, of the program (the manual's table) and of section 5.7."""
     right, steps = right_unknowns(), ladder()
     names = tuple(name for name, _, _ in STEPS if name in "12345" and name)
     for key, label, step, last in (
@@ -168,7 +168,7 @@ def unknowns() -> Iterator[Figure]:
 
 
 def dynamics_figures() -> Iterator[Figure]:
-    """Every printed velocity, acceleration, constant and unknown of the thesis."""
+    """List every published velocity, acceleration, constant and unknown of the thesis."""
     k = Kinematics()
     yield from kinematics(k)
     yield from dynamics_constants(k)

@@ -54,7 +54,7 @@ def half_angle_constants() -> Iterator[Figure]:
 
 
 def simulation_window() -> Iterator[Figure]:
-    """The manual's window: angles e1..e4 in rad and deg, of theta_2 = 0."""
+    """List the manual's window: angles e1..e4 in rad and deg, of theta_2 = 0."""
     s = motion(np.array([0.0]))
     theta_3, theta_4 = float(s.theta_3[0]), to_ours(float(s.theta_4[0]))
     ours = {"e1_rad": THETA_1, "e2_rad": 0.0, "e3_rad": theta_3, "e4_rad": theta_4, "teta1_deg": deg(THETA_1)}
@@ -88,7 +88,7 @@ def limits() -> Iterator[Figure]:
 
 
 def position_figures() -> Iterator[Figure]:
-    """Every printed angle and limit position of the thesis."""
+    """List every published angle and limit position of the thesis."""
     yield from positions()
     yield from half_angle_constants()
     yield from limits()

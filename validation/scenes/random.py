@@ -34,7 +34,7 @@ def sometimes(share: float, draw: Draw, otherwise: float = 0.0) -> Draw:
 
 
 def product(*draws: Draw) -> Draw:
-    """Of several draws."""
+    """Draw the product of several draws."""
     return lambda rng: math.prod(draw(rng) for draw in draws)
 
 
@@ -117,7 +117,7 @@ def random_lengths(rng: np.random.Generator, kind: LinkageType) -> tuple[float, 
 
 
 def random_bars(rng: np.random.Generator, lengths: Sequence[float], ranges: Ranges) -> list[Bar]:
-    """Bars 2, 3, 4 of these lengths (m)."""
+    """Draw bars 2, 3, 4 of these lengths (m)."""
     bars = []
     for length in lengths:
         mass = ranges.mass(rng) * (length if ranges.by_length else 1.0)
@@ -127,7 +127,7 @@ def random_bars(rng: np.random.Generator, lengths: Sequence[float], ranges: Rang
 
 
 def drawn(rng: np.random.Generator, lengths: Sequence[float], ranges: Ranges) -> Scene:
-    """A scene on (ground, input, coupler, output), m, at theta_2 = 0."""
+    """Draw a scene on (ground, input, coupler, output), m, at theta_2 = 0."""
     d, *moving = (float(length) for length in lengths)
     bars = random_bars(rng, moving, ranges)
     linkage = FourBar(d, bars[0], bars[1], bars[2], ranges.ground_angle(rng))
@@ -146,7 +146,7 @@ def drawn(rng: np.random.Generator, lengths: Sequence[float], ranges: Ranges) ->
 
 
 def _load(rng: np.random.Generator, linkage: FourBar, weight: float, ranges: Ranges) -> Load:
-    """A force and a moment, or one of them, on any bar."""
+    """Draw a force and a moment, or one of them, on any bar."""
     bar = int(rng.choice(MOVING_BARS))
     length, size = linkage.bar(bar).length, weight * ranges.load(rng)
     force = None if rng.random() < ranges.without_force else (size, ANY_ANGLE(rng))
@@ -213,7 +213,7 @@ UNEVEN = Ranges(
 
 
 def uneven_scene(seed: int, index: int) -> Scene:
-    """A linkage whose lengths, masses, arms and loads are in ratios of 1e-5 to 1e5, with every kind of effect."""
+    """Draw a linkage whose lengths, masses, arms and loads are in ratios of 1e-5 to 1e5, with every kind of effect."""
     rng = np.random.default_rng([seed, index])
     lengths, psi = uneven_lengths(rng, TEN_DECADES, TEN_DECADES)
     size = 10.0 ** rng.uniform(-3.0, 3.0)
@@ -235,7 +235,7 @@ MACHINES = Ranges(
 
 
 def random_scene(seed: int, index: int, types: tuple[LinkageType, ...]) -> Scene:
-    """A linkage with random bars, loads, gravity and drive, at POSITIONS positions over the range it can move.
+    """Draw random bars, loads, gravity and drive, at POSITIONS positions over the range the linkage can move.
 
     Parameters
     ----------

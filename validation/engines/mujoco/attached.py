@@ -18,7 +18,7 @@ DRIVE = {"actuator_damping": "drive damping", "actuator_dampingpoly": "drive dam
 
 
 def direct(model: mujoco.MjModel, field: str, row: int, key: str) -> Described:
-    """One row of a field as it stands; nothing where this MuJoCo does not have it."""
+    """Read one row of a field as it stands; nothing where this MuJoCo does not have it."""
     if not hasattr(model, field):
         return {}
     return {key: _numbers(getattr(model, field)[row])}
@@ -29,7 +29,7 @@ def _numbers(entry: Array) -> Value:
 
 
 def limits(model: mujoco.MjModel, field: str, row: int, key: str, *, switched_on: bool = True) -> Described:
-    """A range, or "free" where it does not hold."""
+    """Read a range, or "free" where it does not hold."""
     holds, name = RANGES[field]
     if not hasattr(model, field):
         return {}
@@ -50,7 +50,7 @@ def on_the_drive(anatomy: Anatomy, pin: str) -> Described:
 
 
 def actuators(anatomy: Anatomy) -> Described:
-    """Every actuator but the drive, which is taken off: what it acts on, where, and with which wrench."""
+    """Describe every actuator but the drive, which is taken off: what it acts on, where, and with which wrench."""
     model, found = anatomy.model, Described()
     for i in sorted({*range(len(model.actuator_trntype))} - {*anatomy.drives()}):
         key = f"actuators.{i}"
@@ -72,7 +72,7 @@ def actuators(anatomy: Anatomy) -> Described:
 
 
 def _at_site(anatomy: Anatomy, key: str, gear: Array, site: int, frame: int) -> Described:
-    """Force along and across the linkage's plane in the axes that it keeps, (Fx, Fy, Fz, Mx, My, Mz)."""
+    """Resolve a force along and across the linkage's plane in the axes that it keeps, (Fx, Fy, Fz, Mx, My, Mz)."""
     model, data = anatomy.model, anatomy.data
     bar, bearer = anatomy.bar(model.site_bodyid[site]), anatomy.bar(model.site_bodyid[frame if frame >= 0 else site])
     axes = data.site_xmat[frame if frame >= 0 else site].reshape(3, 3)
@@ -97,7 +97,7 @@ def _target(anatomy: Anatomy, actuator: int) -> str:
 
 
 def tendons(anatomy: Anatomy) -> Described:
-    """Every tendon: over which pins or between which points, and what it does."""
+    """Describe every tendon: over which pins or between which points, and what it does."""
     model, found = anatomy.model, Described()
     for i in range(model.ntendon):
         key = f"tendons.{i}"
@@ -117,7 +117,7 @@ def tendons(anatomy: Anatomy) -> Described:
 
 
 def _over_pins(anatomy: Anatomy, key: str, run: range, spring: Sequence[float], rest: float) -> Described:
-    """A fixed tendon: its coefficients by pin, counter-clockwise positive; its spring by the angles of the bars."""
+    """Read a fixed tendon: coefficients by pin, counter-clockwise positive; its spring by the angles of the bars."""
     model, turns = anatomy.model, {}
     for pin, joint in anatomy.hinge.items():
         coefficients = [float(model.wrap_prm[w]) for w in run if model.wrap_objid[w] == joint]
@@ -133,7 +133,7 @@ def _over_pins(anatomy: Anatomy, key: str, run: range, spring: Sequence[float], 
 
 
 def _between_points(anatomy: Anatomy, key: str, run: range) -> Described:
-    """A spatial tendon: the points of the bars that it runs through; what it winds round counts as no point."""
+    """Read a spatial tendon: the points of the bars that it runs through; what it winds round counts as no point."""
     model, data = anatomy.model, anatomy.data
     bars, path = [], []
     for w in run:

@@ -69,7 +69,7 @@ def called(anatomy: Anatomy) -> dict[str, str]:
 
 
 def _on(model: mujoco.MjModel, *features: str) -> bool:
-    """Whether no flag switches a feature off; a flag that this MuJoCo does not have switches nothing."""
+    """Tell whether no flag switches a feature off; a flag that this MuJoCo does not have switches nothing."""
     flags = mujoco.mjtDisableBit
     return not any(model.opt.disableflags & getattr(flags, f"mjDSBL_{name}", 0) for name in features)
 

@@ -19,7 +19,7 @@ MOST_BODIES = 8
 
 
 def anatomy_of(model: mujoco.MjModel, names: Mapping[str, str], lengths: Sequence[float]) -> tuple[Anatomy, list[str]]:
-    """The four-bar in a model, and a note on what was guessed; names that are stated, or in the file, stand.
+    """Find the four-bar in a model; add a note on what was guessed. Names that are given, or in the file, stand.
 
     Parameters
     ----------
@@ -67,13 +67,13 @@ def _site(model: mujoco.MjModel, name: str) -> bool:
 
 
 def _open_sites(model: mujoco.MjModel) -> bool:
-    """Whether only sites can say where the loop closes."""
+    """Tell whether only sites can say where the loop closes."""
     kinds = mujoco.mjtEq
     return not any(kinds(kind) in (kinds.mjEQ_CONNECT, kinds.mjEQ_WELD) for kind in model.eq_type)
 
 
 def _sites(model: mujoco.MjModel, known: Mapping[str, str], names: Mapping[str, str]) -> list[dict[str, str]]:
-    """Pairs of sites that may mark pin B; none need be stated where a connect or a weld closes the loop."""
+    """List pairs of sites that may mark pin B; none need be given where a connect or a weld closes the loop."""
     if not _open_sites(model) or names.keys() & {*SITES} or _site(model, known["B3"]):
         return [{}]
     on = {role: [model.site(i).name for i in range(model.nsite) if model.site(i).name
@@ -83,7 +83,7 @@ def _sites(model: mujoco.MjModel, known: Mapping[str, str], names: Mapping[str, 
 
 
 def _misfit(anatomy: Anatomy, lengths: Sequence[float]) -> float:
-    """How far its lengths are from the scene's: the sum of |log ratio|."""
+    """Measure how far its lengths are from the scene's: the sum of |log ratio|."""
     theirs = [anatomy.length(bar) for bar in BAR_NAMES]
     if min(theirs) <= 0.0:
         return math.inf

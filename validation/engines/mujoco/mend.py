@@ -27,7 +27,7 @@ SOLREF = {"time constant": 0, "damping ratio": 1}
 
 
 def mended(anatomy: Anatomy, key: str, value: Value) -> mujoco.MjModel | None:
-    """A copy of the model with that entry of its description as stated; None where it cannot be set alone."""
+    """Copy the model with that entry of its description as specified; None where it cannot be set alone."""
     model = copy.copy(anatomy.model)
     subject, *rest = key.split(".")
     edit = EDITS.get(subject)
@@ -41,7 +41,7 @@ def mended(anatomy: Anatomy, key: str, value: Value) -> mujoco.MjModel | None:
 
 
 def _settle(model: mujoco.MjModel) -> None:
-    """What the compiler derives from masses and places."""
+    """Derive what the compiler does from masses and places."""
     model.body_sameframe[:] = mujoco.mjtSameFrame.mjSAMEFRAME_NONE
     model.body_simple[:] = model.dof_simplenum[:] = 0
     mujoco.mj_setConst(model, mujoco.MjData(model))
@@ -84,7 +84,7 @@ def _turned(anatomy: Anatomy, bar: int) -> Array:
 
 
 def _length(anatomy: Anatomy, model: mujoco.MjModel, rest: list[str], value: Value) -> None:
-    """A bar's pin moved along its line; whatever turns about it, or closes the loop there, goes with it."""
+    """Move a bar's pin along its line; whatever turns about it, or closes the loop there, goes with it."""
     bar = NUMBER[rest[0]]
     own = next((pin for pin, joint in anatomy.hinge.items() if model.body_weldid[model.jnt_bodyid[joint]]
                 == anatomy.root[bar]), "O2" if bar == 1 else None)  # fmt: skip

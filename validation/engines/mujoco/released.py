@@ -32,7 +32,7 @@ class MujocoForward:
         self.step = step
 
     def release(self, scene: Scene, times: Array) -> Released:
-        """The motion at the given times, rising from 0 (s)."""
+        """Integrate the motion at the given times, rising from 0 (s)."""
         setting, start = f"RK4 {self.step:g} s", command(scene)
         interval = float(times[1] - times[0])  # the times are evenly spaced; the step divides the interval
         timestep = interval / math.ceil(interval / self.step - 1e-6)
@@ -75,7 +75,7 @@ class _Work:
         self.before = self._power()
 
     def add(self) -> None:
-        """Of the step just made; after a Runge-Kutta step some fields are still of the step before."""
+        """Add the step just made; after a Runge-Kutta step some fields are still of the step before."""
         if self.any:
             mujoco.mj_forward(self.model, self.data)
             now = self._power()

@@ -26,7 +26,7 @@ class Stepper:
         self.model, self.data, self.timestep, self.done = model, data, timestep, 0
 
     def to(self, seconds: float, each: Callable[[float], None] | None = None) -> None:
-        """On to the step nearest to a time; `each` is called with the time after every step."""
+        """Step on to the step nearest to a time; `each` is called with the time after every step."""
         steps = round(seconds / self.timestep) - self.done
         if each is None:
             if steps > 0:
@@ -44,7 +44,7 @@ class Stepper:
         return self.done * self.timestep
 
     def lost(self) -> bool:
-        """Whether MuJoCo reset the data: that starts time again, and clears the warnings."""
+        """Tell whether MuJoCo reset the data: that starts time again, and clears the warnings."""
         return bool(self.data.time < self.time * (1.0 - 1e-6))
 
 
@@ -76,11 +76,11 @@ class Run:
         self.stepper = Stepper(loop.model, loop.data, timestep)
 
     def to(self, index: int) -> None:
-        """On to the step nearest to a position."""
+        """Step on to the step nearest to a position."""
         self.stepper.to(self.passage.seconds(index))
 
     def read(self) -> Reading:
-        """Of the state that was last forwarded."""
+        """Read torque and pin forces of the state that was last forwarded."""
         torque = self.loop.crank_torque()
         if self.light is None:
             return Reading(torque, self.loop.forces())
@@ -100,7 +100,7 @@ def assembled(position: Position, command: Command, order: Iterable[int]) -> lis
 def stretches(
     found: list[Found], order: Iterable[int], joined: Callable[[int, int], bool] = lambda one, other: True
 ) -> list[list[int]]:
-    """Positions in order of time, split where the loop does not close, or two neighbours are not joined."""
+    """Split the positions, in order of time, where the loop does not close, or two neighbours are not joined."""
     split: list[list[int]] = [[]]
     for index in order:
         if found[index] is None or (split[-1] and not joined(split[-1][-1], index)):

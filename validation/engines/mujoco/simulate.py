@@ -46,7 +46,7 @@ class MujocoSimulated:
     name: str = "mujoco-simulated"
 
     def answer(self, scene: Scene, command: Command) -> Answer:
-        """The sweep run through in time; every quantity at the crank's own angle, speed and acceleration."""
+        """Run the sweep through in time; read every quantity at the crank's own angle, speed and acceleration."""
         began = time.perf_counter()
         try:
             refusal = _refusal(scene, command)
@@ -61,7 +61,7 @@ class MujocoSimulated:
 
 
 def _refusal(scene: Scene, command: Command) -> str | None:
-    """Why this scene is not simulated, or None."""
+    """Say why this scene is not simulated, or None."""
     if scene.motion.free is not None:
         return "a free motion has no commanded sweep"
     if command.omega_2 is None or not np.any(command.omega_2):
@@ -81,7 +81,7 @@ def _refusal(scene: Scene, command: Command) -> str | None:
 
 
 def _passes_change_point(scene: Scene, command: Command) -> bool:
-    """Whether all four bars come to lie along the ground within the sweep: +-a +-b +-c = d."""
+    """Tell whether all four bars come to lie along the ground within the sweep: +-a +-b +-c = d."""
     d, a, b, c = scene.linkage.lengths
     least, most = (float(x) - scene.linkage.ground_angle for x in (command.theta_2.min(), command.theta_2.max()))
     for half_turn in range(math.ceil(least / math.pi - COLLINEAR), math.floor(most / math.pi + COLLINEAR) + 1):
@@ -92,7 +92,7 @@ def _passes_change_point(scene: Scene, command: Command) -> bool:
 
 
 def as_run(scene: Scene, command: Command) -> Scene:
-    """The scene whose MJCF is run through: at the command's positions, a law by its greatest speed and acceleration."""
+    """Make the scene whose MJCF is run through, a law by its greatest speed and acceleration."""
     if scene.motion.law is not None:
         omega, alpha = extremes(scene.motion.law)
         motion = Motion(command.theta_2, omega, alpha, scene.motion.branch, scene.motion.through)
@@ -120,7 +120,7 @@ class _Simulation:
         self.predicted = {name: np.zeros(n) for name in UNKNOWNS}
 
     def answer(self) -> Answer:
-        """The answer over all positions."""
+        """Answer over all positions."""
         position = Position(ClosedLoop(self._text(1e-3)))  # kinematics alone: the timestep plays no part
         found = assembled(position, self.command, self.order)
         least = least_sine(self.scene.linkage, self.command.theta_2, np.array([q is not None for q in found]))
@@ -146,24 +146,24 @@ class _Simulation:
         )
 
     def _passage(self, stretch: list[int]) -> Passage:
-        """How the input moves through a stretch."""
+        """Choose how the input moves through a segment."""
         if self.law is not None:
             return Lawful(self.law, self.command, stretch)
         motion = self.scene.motion
         return Steady(self.command, stretch, motion.omega_2 or 0.0, motion.alpha_2)
 
     def _loop(self, timestep: float, supplied: dict[str, ActuatorForce], flywheel: float | None = None) -> ClosedLoop:
-        """A compiled model that takes from `supplying` what its text cannot say."""
+        """Compile a model that takes from `supplying` what its text cannot say."""
         return receiving(ClosedLoop(self._text(timestep, flywheel)), supplied)
 
     def _text(self, timestep: float, flywheel: float | None = None) -> str:
-        """The generated MJCF without its keyframe."""
+        """Write the generated MJCF without its keyframe."""
         heavy = self.settings.flywheel if flywheel is None else flywheel
         settings = replace(self.settings, timestep=timestep, timestep_scale=1.0, flywheel=heavy)
         return mjcf(at_full_size(self.scene), settings, keyframe=False)
 
     def _closes_between(self, position: Position, one: int, other: int) -> bool:
-        """Whether the loop closes everywhere between two positions."""
+        """Tell whether the loop closes everywhere between two positions."""
         start, stop = float(self.command.theta_2[one]), float(self.command.theta_2[other])
         pieces = int(np.ceil(abs(stop - start) / FINE))
         branch = int(self.command.branch[one])
@@ -195,7 +195,7 @@ class _Simulation:
             self.evidence[name] = float(np.maximum(self.evidence.get(name, 0.0), value))
 
     def _read(self, run: Run, watch: Watch, index: int, begins: float) -> None:
-        """Everything of one sample, and what the engine says of itself there."""
+        """Read everything of one sample, and what the engine says of itself there."""
         loop, d, turns = run.loop, run.loop.data, run.turns
         loop.forward()
         self._watch(run, begins)
@@ -230,7 +230,7 @@ class _Simulation:
 
 
 def observed_order(scene: Scene, command: Command, error: Callable[[Answer], float]) -> tuple[float, float, float]:
-    """Errors at 4h and 2h with the closure's time constant held in seconds, and log2 of their ratio.
+    """Return errors at 4h and 2h with the closure's time constant held in seconds, and log2 of their ratio.
 
     At the recipe's own h the softness is already of the size of the truncation; the order shows above it.
     """

@@ -60,7 +60,7 @@ class Examined:
 
 
 def compile_text(text: str) -> mujoco.MjModel:
-    """MuJoCo's compiler on a text; its complaint as an InputError of one line."""
+    """Compile a text with MuJoCo; its complaint is an InputError of one line."""
     try:
         model = mujoco.MjModel.from_xml_string(text)
     except ValueError as error:
@@ -88,7 +88,7 @@ def examine(scene: Scene, text: str | None, names: Mapping[str, str]) -> Examine
 def examine_mended(
     scene: Scene, text: str, names: Mapping[str, str], entries: Sequence[tuple[str, Value]]
 ) -> list[list[Answer] | None]:
-    """The answers of a file with one entry of its description as stated, for each; None where it cannot be set alone.
+    """Answer with one entry of a file's description as specified, for each; None where it cannot be set alone.
 
     After MENDING seconds the rest are not evaluated either.
     """
@@ -114,7 +114,7 @@ def _answers(loop: "Loop", scene: Scene) -> list[Answer]:
 
 
 def _positions(at: Command) -> Command:
-    """At most so many of the positions, spread evenly."""
+    """Choose at most so many of the positions, spread evenly."""
     n = len(at.theta_2)
     if at.omega_2 is None:
         raise InputError("motion.omega_2", None, "is needed: without a speed there is no torque to compare")
@@ -168,13 +168,13 @@ class Loop(Assembled):
         mujoco.mj_comPos(self.model, self.data)
 
     def gap(self) -> tuple[float, float]:
-        """What the cut pin is open by, m: at any pin, up to its sign, A + b e^{i theta_3} - O4 - c e^{i theta_4}."""
+        """Return the opening of the cut pin, m: for any pin +-(A + b e^{i theta_3} - O4 - c e^{i theta_4})."""
         first, second = (self.anatomy.world(self.data, bar, self.anatomy.cut) for bar in PINS[self.anatomy.cut])
         x, y = self.anatomy.in_plane(first - second).tolist()
         return x, y
 
     def jacobian(self) -> Array:
-        """Derivative of the gap by x, (2, 3)."""
+        """Return the derivative of the gap by x, (2, 3)."""
         rows = []
         for bar in PINS[self.anatomy.cut]:
             body, at = self.anatomy.root[bar], self.anatomy.world(self.data, bar, self.anatomy.cut)
@@ -183,7 +183,7 @@ class Loop(Assembled):
         return np.asarray(rows[0] - rows[1])
 
     def positions(self) -> dict[str, Array]:
-        """A, B, O4, and the end of bar 4, laid off bar by bar from O2, (2,), m."""
+        """Locate A, B, O4, and the end of bar 4, laid off bar by bar from O2, (2,), m."""
         line = {bar: self.anatomy.line(self.data, bar) for bar in (1, 2, 3, 4)}
         return {"A": line[2], "B": line[2] + line[3], "O4": line[1], "B4": line[1] + line[4]}
 
@@ -247,14 +247,14 @@ class Loop(Assembled):
         return {name: on[i, j] if (i, j) in on else -on[j, i] for name, (i, j) in wanted.items()}
 
     def _carries(self, bearer: int, body: int) -> bool:
-        """Whether a body hangs, however far down, on another."""
+        """Tell whether a body hangs, however far down, on another."""
         while body not in (bearer, 0):
             body = int(self.model.body_parentid[body])
         return body == bearer
 
 
 def one_state(loop: Loop, at: Command) -> Answer:
-    """Every position by itself."""
+    """Answer every position by itself."""
     contacts = 0
 
     def read(_: Angles, omega_2: float, alpha_2: float) -> Values:
@@ -275,7 +275,7 @@ def one_state(loop: Loop, at: Command) -> Answer:
 
 
 def through_time(loop: Loop, at: Command) -> Answer:
-    """The longest stretch of positions that assembles, run through at the file's own timestep."""
+    """Run the longest segment of positions that assembles at the file's own timestep."""
     model, data = loop.model, mujoco.MjData(loop.model)
     data.eq_active[:] = loop.data.eq_active
     if loop.crank is None:

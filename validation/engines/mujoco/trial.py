@@ -45,14 +45,14 @@ Build = Callable[[str, float], ClosedLoop]
 
 
 def guess(error: float) -> tuple[float, float]:
-    """Steps per revolution and time constant in steps that the laws say for an error."""
+    """Compute the steps per revolution and the time constant in steps that the laws say for an error."""
     tc = (STIFF / (error / 2.0)) ** (1.0 / ORDER)
     steps = FIRST_STEPS * (FIRST_ERROR / error) ** (1.0 / ORDER)
     return max(steps, FEWEST_STEPS), min(max(tc, SHORTEST), LONGEST)
 
 
 def dialled(steps_per_revolution: float, time_constant_steps: float) -> Settings:
-    """The recommended settings at a number of steps and a time constant; a window has no steps of its own."""
+    """Give the recommended settings at a number of steps and a time constant; a window has no steps of its own."""
     return Settings(
         steps_per_revolution=steps_per_revolution,
         steps_per_window=1,
@@ -63,7 +63,7 @@ def dialled(steps_per_revolution: float, time_constant_steps: float) -> Settings
 
 @contextmanager
 def silence() -> Iterator[None]:
-    """A setting that fails is a result here: MuJoCo neither prints it nor leaves a log in the working folder."""
+    """Silence MuJoCo: a setting that fails is a result here, neither printed nor logged in the working folder."""
     before = mujoco.get_mju_user_warning()
     mujoco.set_mju_user_warning(lambda _: None)
     try:
@@ -95,15 +95,15 @@ class Rig:
             raise LimitError("the loop closes at no two neighbouring positions: nothing to run through in time")
 
     def text(self, settings: Settings, timestep: float) -> str:
-        """The generated MJCF, without its keyframe."""
+        """Write the generated MJCF, without its keyframe."""
         return mjcf(self.scene, replace(settings, timestep=timestep, timestep_scale=1.0), keyframe=False)
 
     def passage(self, stretch: list[int]) -> Steady:
-        """How the input moves through a stretch."""
+        """Choose how the input moves through a segment."""
         return Steady(self.command, stretch, self.omega, self.alpha)
 
     def steps(self, settings: Settings) -> int:
-        """Steps of one run, without making it."""
+        """Count the steps of one run, without making it."""
         total = 0
         for stretch in self.stretches:
             run = self.passage(stretch).run  # a whole number of steps over the stretch

@@ -52,7 +52,7 @@ OF_THE_DATA = {
 
 
 def alarms(evidence: dict[str, float], size: float) -> list[str]:
-    """What is wrong with a run, in words.
+    """Say what is wrong with a run.
 
     Parameters
     ----------
@@ -131,7 +131,7 @@ class Watch:
         self._most[name] = max(self._most[name], size)
 
     def evidence(self) -> dict[str, float]:
-        """The worst of each residual, by the largest term that it is a residual of."""
+        """Return the worst of each residual, by the largest term that it is a residual of."""
         most = self._most
         return {name: worst / most[name] if most[name] else worst for name, worst in self.worst.items()}
 
@@ -164,7 +164,7 @@ class Watch:
         return {"F14": on["output"] + loop_force, "F32": -(on["coupler"] - loop_force), "F12": on["input"] - loop_force}
 
     def _closed(self, q: Array, v: Array, a: Array, seen: _Motion) -> _Motion:
-        """The same theta_2, omega_2, alpha_2 with the loop closed in position, velocity and acceleration."""
+        """Close the loop at the same theta_2, omega_2, alpha_2 in position, velocity and acceleration."""
         q, v, a = q.copy(), v.copy(), a.copy()
         others = [A, O4]
         q[others] -= np.linalg.solve(self.bars.jacobian()[:, others], seen.gap)
