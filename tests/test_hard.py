@@ -112,7 +112,7 @@ def test_an_answer_nearby_is_one_within_the_rounding_of_theta_2() -> None:
     assert nearby is not None and np.isfinite(nearby(np.ones(3, dtype=bool))["torque"]).tolist() == [True, True, False]
 
 
-def test_an_answer_nearby_is_of_the_sine_that_was_asked_for() -> None:
+def test_an_answer_nearby_has_the_sine_of_the_formulas() -> None:
     """Of a shift in many digits: 1e-9 rad from a limit position a sine of the formulas is met to its last digit."""
     lengths = linkage_of(LinkageType.TRIPLE_ROCKER, 0)
     (psi, stretched), *_ = collinear_3_4(lengths)

@@ -56,7 +56,7 @@ class Tree(Loaded, Protocol):
         """Generalised forces that the motion last set asks for beyond gravity and what acts, (3,), N m."""
 
     def carried(self) -> dict[int, Array]:
-        """Return the force on each moving bar at its first pin, at the motion last set and under `wrenches`, (2,), N."""
+        """Return the force on each moving bar at its first pin, at the motion and wrenches last set, (2,), N."""
 
     # what follows
     def gap(self) -> tuple[float, float]:

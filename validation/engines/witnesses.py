@@ -51,7 +51,7 @@ class Witness:
     """Whether the engine's own residuals predict them."""
     nearby: bool = False
     """Whether it answers at the angle that `Command.remainder` completes, so that where an error is beyond the
-    tolerance it can be asked again within the rounding of theta_2."""
+    tolerance it can answer again within the rounding of theta_2."""
     stated: bool = True
     """Whether an exact engine is held to what the formulas state of the linkage too, whatever its motion."""
     library: str = ""

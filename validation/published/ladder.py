@@ -63,7 +63,7 @@ def figures() -> Iterator[Figure]:
 
 
 def explained(figure: Figure) -> bool:
-    """Tell whether a difference is bound to errata that give the published digits, or to a misprint that none can give."""
+    """Tell whether a difference has errata that give the published digits, or is a misprint that none can give."""
     if not figure.errata or not set(figure.errata) <= set(ERRATA):
         return False
     return figure.reproduced() or not all(ERRATA[name].reproduced for name in figure.errata)

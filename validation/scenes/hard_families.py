@@ -101,7 +101,7 @@ def through_change_point(*, steps: int = 73) -> Scenes:
 
 
 def near_grashof(*, gaps: tuple[float, ...] = (1e-3, 1e-6, 1e-9, 1e-12), steps: int = 60) -> Scenes:
-    """Miss s + l = p + q by a hair, either way: the sweep passes close to where it would change."""
+    """Miss s + l = p + q by a hair on either side: the sweep passes close to where it would change."""
     for gap in gaps:
         for sign in (1.0, -1.0):
             d, a, b = 0.4, 0.1, 0.25
