@@ -2,6 +2,7 @@
 
 import sys
 from collections.abc import Iterator
+from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 from pkgutil import iter_modules
@@ -33,6 +34,7 @@ from fourbar.studies.enclosure import _Search
 from fourbar.studies.interval import require
 from fourbar.studies.keys import at_place, entries, with_numbers
 from fourbar.studies.sloped import Sloped, Undecided
+from validation.engines.balls import closure, stored, wedge
 
 STRADDLED = [(0.0, 1.0), (0.5, 1.0), (-1.0, 1e-3), (2.0, 2.0), (0.0, 0.0)]
 """Centres and radii: over 0, over whole and half numbers, at a kink, and none at all."""
@@ -223,3 +225,14 @@ def held(each: Scene, at: float, radius: float) -> None:
         assert (
             over["torque"].values[0].overlaps(flint.arb(solution.torque[0], ROUNDING * (1.0 + abs(solution.torque[0]))))
         )
+
+
+@pytest.mark.parametrize("ground_angle", [0.0, 1.0, 2.5])
+def test_a_loop_that_just_closes_closes_however_the_ground_is_turned(ground_angle: float) -> None:
+    """Its discriminant is 0 exactly; from turned directions it was undecided, and read as open."""
+    bars = (Bar(length) for length in (1.0, 2.0, 4.0))
+    folded = Scene(FourBar(3.0, *bars, ground_angle=ground_angle), Motion(ground_angle, 1.0))  # type: ignore[misc]
+    closed = closure(stored(folded, ground_angle), 1)
+    assert closed is not None and abs(float(wedge(*closed[1:]).mid())) < 1e-60
+    apart = replace(folded, linkage=replace(folded.linkage, ground=3.0 - 1e-15))
+    assert closure(stored(apart, ground_angle), 1) is None

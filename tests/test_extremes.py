@@ -13,7 +13,7 @@ import pytest
 import fourbar
 from fourbar import Friction, InputError, Motion, Scene, Sweep, Tolerance
 from fourbar.cli import status
-from fourbar.effects import Point, Spring, Springs
+from fourbar.effects import Gravity, Point, Spring, Springs
 from fourbar.scene import Command
 from fourbar.studies import enclosure, interval
 from fourbar.studies.enclosure import PROVEN, Extremes, extremes
@@ -215,3 +215,34 @@ def test_what_is_zero_everywhere_is_bounded_by_zero() -> None:
     bars = (fourbar.Bar(length) for length in (0.1, 0.25, 0.22))
     found = extremes(Scene(fourbar.FourBar(0.3, *bars), Motion(0.0, 10.0)), ["torque", "F12"])
     assert {end for extreme in (*found.least.values(), *found.greatest.values()) for end in extreme[:2]} == {0.0}
+
+
+def test_a_torque_that_springs_balance_is_bounded_by_as_many_boxes_as_are_allowed(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Its 1e-16 N m would take boxes as narrow as they get."""
+    monkeypatch.setattr(enclosure, "MANY", 128)
+    bars = (fourbar.Bar(0.1, 2.0, 1e-3, (0.05, 0.0)), fourbar.Bar(0.25), fourbar.Bar(0.22))
+    balancing = Springs((Spring(Point(1, 0.1, 0.5 * math.pi), Point(2, 0.1, 0.0), 80.0),))
+    scene = Scene(fourbar.FourBar(0.3, *bars), Motion(0.0, 10.0), 2, (), (Gravity(8.0), balancing))
+    found = extremes(scene, ["torque"])
+    assert 4 * 128 < found.boxes < 20 * 128  # over two searches
+    moment = 2.0 * 8.0 * 0.05
+    for extreme in (found.least["torque"], found.greatest["torque"]):
+        assert -1e-2 * moment < extreme.low <= extreme.high < 1e-2 * moment
+    assert found.least["torque"].low < -1e-9 * moment  # not halved to the end
+    holds(found, sampled(fourbar.solve(scene, at=Command(np.linspace(0, 6, 500), np.ones(500, np.int8), 10.0, 0.0))))
+
+
+@pytest.mark.parametrize(
+    ("lengths", "drive_bar"),
+    [
+        ((0.173, 0.462, 0.641, 0.00601), 2),
+        ((0.17274163525586872, 0.46219401279422845, 0.6411602856139893, 0.006228543349729581), 3),
+    ],
+)
+def test_an_interval_that_lies_near_limits_throughout_is_one_line(lengths: tuple[float, ...], drive_bar: int) -> None:
+    """The input swings by a degree, or a drive on the coupler has a pole wherever it is."""
+    scene = Scene(fourbar.uniform(*lengths), Motion(0.0, 1.0), drive_bar)
+    with pytest.raises(fourbar.FourBarError, match="nowhere farther than 1 deg from a limit"):
+        extremes(scene, ["torque"])

@@ -86,9 +86,9 @@ def test_an_error_bar_of_no_error_fails(monkeypatch: pytest.MonkeyPatch) -> None
         rows = {row.quantity: row.verdict for row in printed.printed("", scene, at, fourbar.solve(scene), None)}
         return rows["force_error"]
 
-    def without(scene: Scene, stage: str, **keywords: object) -> Solution:
-        solution: Solution = true(scene, stage, **keywords)  # type: ignore[arg-type]
-        if stage == "error":
+    def without(scene: Scene, *stage: str, **keywords: object) -> Solution:
+        solution: Solution = true(scene, *stage, **keywords)  # type: ignore[arg-type]
+        if stage == ("error",):
             assert solution.F12 is not None
             solution.F12[1] = np.nan
         return solution

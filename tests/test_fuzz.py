@@ -4,14 +4,20 @@ import json
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 import fourbar.formulas.mobility
+from fourbar.effects import spring
 from fourbar.files import loads
+from fourbar.studies.enclosure import Extreme, Extremes
+from fourbar.studies.sloped import Sloped
 from tests.scenes import crank_rocker
+from tests.test_extremes import meeting
 from validation.stress.fuzz import fuzz as examine
+from validation.stress.fuzz import outside
 from validation.stress.fuzz.fuzz import examine_chunk, run
 from validation.stress.fuzz.scenes import scene_of
 from validation.stress.fuzz.shrink import KEPT, keep, shrunk
@@ -21,7 +27,8 @@ SEED = 0
 
 @pytest.mark.parametrize("path", sorted(KEPT.glob("*.toml")), ids=lambda path: path.stem)
 def test_a_kept_counterexample_holds(path: Path) -> None:
-    assert examine.findings(loads(path.read_text(encoding="utf-8"))) == []
+    findings = (outside if path.stem.startswith("bounds") else examine).findings
+    assert findings(loads(path.read_text(encoding="utf-8"))) == []
 
 
 def test_a_stretch_of_scenes_holds() -> None:
@@ -120,3 +127,64 @@ def test_an_interrupted_run_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     done.write_text(json.dumps({"0": ["left by the run before"]}), encoding="utf-8")
     found = list(run(12, 1, tmp_path, 1))
     assert len(found) == 3 and found[0] == {"0": ["left by the run before"]}
+
+
+def watched(monkeypatch: pytest.MonkeyPatch, change: Any = lambda found: found) -> list[Extremes]:
+    """The proofs that the search is held against, each changed."""
+    proven, true = [], outside.extremes
+
+    def proof(*arguments: Any) -> Extremes:
+        proven.append(change(true(*arguments)))
+        return proven[-1]
+
+    monkeypatch.setattr(outside, "extremes", proof)
+    return proven
+
+
+def test_no_value_lies_outside_what_is_proven(monkeypatch: pytest.MonkeyPatch) -> None:
+    proven = watched(monkeypatch)
+    assert examine_chunk(SEED, 45, 48, bounds=True) == {}
+    assert len(proven) == 3 and any(found.nominal for found in proven)
+
+
+def test_bounds_narrower_by_a_millionth_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    def within(extremes: dict[str, Extreme], part: float) -> dict[str, Extreme]:
+        return {
+            name: x._replace(low=x.low + part * abs(x.low), high=x.high + part * abs(x.high))
+            for name, x in extremes.items()
+        }
+
+    def narrower(found: Extremes) -> Extremes:
+        return found._replace(least=within(found.least, 1e-6), greatest=within(found.greatest, -1e-6))
+
+    watched(monkeypatch, narrower)
+    found = outside.findings(outside.scene_of(SEED, 45))
+    assert [line.split(":")[0] for line in found if "beyond" in line] == ["extremes torque"] * 2 + [
+        "extremes |F12|"
+    ] * 2
+
+
+def test_a_ball_that_decides_silently_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A distance that may be 0 had 1 m added."""
+
+    def silent(of: spring.Spring, across: Any) -> Any:
+        distance = np.abs(across)
+        if isinstance(distance, Sloped):
+            distance.values += np.array([float(ball.contains(0)) for ball in distance.values], dtype=object)
+        return of.stiffness + of.slack / distance
+
+    assert outside.findings(meeting(0.1005)) == []
+    monkeypatch.setattr(spring, "_per_distance", silent)
+    assert any("beyond" in line for line in outside.findings(meeting(0.1005)))
+
+
+def test_a_scene_with_a_value_outside_is_kept_as_it_is(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    scene = fourbar.dump(outside.scene_of(3, 1))
+    monkeypatch.setattr(outside, "findings", lambda of: ["outside"] if fourbar.dump(of) == scene else [])
+    monkeypatch.setattr(examine, "keep", lambda of, name: keep(of, name, tmp_path))
+    assert examine.fuzz.callback(2, True, 3, 1, tmp_path / "out") == 1
+    assert capsys.readouterr().out == "1 of 2 scenes fail (seed 3)\n"
+    (kept,) = tmp_path.glob("bounds_seed_3_scene_1.toml")
+    assert fourbar.dump(replace(loads(kept.read_text(encoding="utf-8")), title="", source="")) == scene

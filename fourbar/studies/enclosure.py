@@ -86,7 +86,8 @@ def extremes(scene: Scene, quantities: Sequence[str] = NAMES) -> Extremes:
 
     At the scene's omega_2, alpha_2 and branch. Where the scene has tolerances the bounds hold for every linkage within
     them (three sigma of a normal one): `high` of the greatest and `low` of the least are then proven, and the other end
-    is what the worst corner found reaches.
+    is what the worst corner found reaches. All bounds are those of the stated doubles without any rounding: a spring's
+    preload - stiffness length, or the inertia m L^2/12 that a bar leaves out, is exact.
 
     Parameters
     ----------

@@ -90,10 +90,11 @@ def closure(x: Values, branch: int) -> tuple[Complex, Complex, Complex] | None:
     w2 = polar(arb(1), x["theta_2"])
     D = polar(x["d"], x["theta_1"]) - x["a"] * w2
     b, c = x["b"], x["c"]
-    squared = D.real * D.real + D.imag * D.imag
+    # |D|^2 by the angle between ground and input: where they are in line it is exact, and so is a loop that just closes
+    squared = x["d"] ** 2 + x["a"] ** 2 - 2 * x["d"] * x["a"] * (x["theta_2"] - x["theta_1"]).cos()
     K = squared + b * b - c * c
     discriminant = 4 * b * b * squared - K * K
-    if not discriminant >= 0:
+    if discriminant < 0:  # an undecided one has no root, and what follows is NaN
         return None
     w3 = acb(K, branch * discriminant.sqrt()) * D / (2 * b * squared)
     return w2, w3, (b * w3 - D) / c

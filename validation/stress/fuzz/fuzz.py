@@ -1,4 +1,4 @@
-"""The command: random scenes through files, formulas and exact engines, in chunks; findings are shrunk and kept."""
+"""The command: random scenes through files, formulas and exact engines, or bounds; findings are shrunk and kept."""
 
 import json
 import warnings
@@ -21,12 +21,13 @@ from validation.compare.statements.statements import statements
 from validation.engines.hard_suite import predicting
 from validation.engines.witnesses import WITNESSES, predicting_from
 from validation.report.machine import versions
+from validation.stress.fuzz import outside
 from validation.stress.fuzz.scenes import scene_of
 from validation.stress.fuzz.shrink import keep, shrunk
 
 EXACT = tuple(predicting(w) for w in WITNESSES if w.name in ("pinocchio-inverse", "mujoco-inverse", "free-body"))
 """The exact engines, held to full accuracy or to what was predicted for the position."""
-CHUNK = 200
+CHUNK, CHUNK_OF_PROOFS = 200, 10
 """Scenes per task: some seconds, which is what an interruption costs."""
 SHOWN = 20
 
@@ -78,35 +79,36 @@ def _engines(scene: Scene, at: Command, solution: Solution) -> list[str]:
     return [f"{row.engine} {row.quantity}: {row.reason}" for row in failed]
 
 
-def examine_chunk(seed: int, start: int, stop: int) -> dict[str, list[str]]:
-    """Number of each scene that fails: what is wrong with it."""
+def examine_chunk(seed: int, start: int, stop: int, bounds: bool = False) -> dict[str, list[str]]:
+    """Number of each scene that fails: what is wrong with it, or with the bounds that are proven of it."""
     found = {}
     for index in range(start, stop):
-        wrong = findings(scene_of(seed, index))
+        wrong = outside.findings(outside.scene_of(seed, index)) if bounds else findings(scene_of(seed, index))
         if wrong:
             found[str(index)] = wrong
     return found
 
 
-def run(count: int, seed: int, out: Path, workers: int) -> Iterator[dict[str, list[str]]]:
+def run(count: int, seed: int, out: Path, workers: int, bounds: bool = False) -> Iterator[dict[str, list[str]]]:
     """Examine the scenes chunk by chunk; chunks that an interrupted run finished are read, not done again."""
     from joblib import Parallel, delayed
 
     out.mkdir(parents=True, exist_ok=True)
-    marker, identity = out / "run.json", json.dumps({"seed": seed, "versions": versions()}, sort_keys=True)
+    state = {"seed": seed, "bounds": bounds, "versions": versions()}
+    marker, identity = out / "run.json", json.dumps(state, sort_keys=True)
     if not marker.is_file() or marker.read_text(encoding="utf-8") != identity:
         for old in out.glob("chunk-*.json"):
             old.unlink()
         write_text(marker, identity)
-    todo = []
-    for start in range(0, count, CHUNK):
-        stop = min(start + CHUNK, count)
+    todo, size = [], CHUNK_OF_PROOFS if bounds else CHUNK
+    for start in range(0, count, size):
+        stop = min(start + size, count)
         part = out / f"chunk-{start:09d}-{stop:09d}.json"
         if part.is_file():
             yield json.loads(part.read_text(encoding="utf-8"))
         else:
             todo.append((part, start, stop))
-    tasks = (delayed(examine_chunk)(seed, start, stop) for _, start, stop in todo)
+    tasks = (delayed(examine_chunk)(seed, start, stop, bounds) for _, start, stop in todo)
     for (part, _, _), found in zip(todo, Parallel(n_jobs=workers, return_as="generator")(tasks), strict=True):
         write_text(part, json.dumps(found))
         yield found
@@ -114,25 +116,30 @@ def run(count: int, seed: int, out: Path, workers: int) -> Iterator[dict[str, li
 
 @click.command()
 @click.option("--scenes", default=100_000, show_default=True, type=click.IntRange(1), help="Half of them adversarial.")
+@click.option("--bounds", is_flag=True, help="Search for values outside proven extremes instead; two seconds a scene.")
 @click.option("--seed", default=0, show_default=True, type=click.IntRange(0))
 @click.option("--workers", default=2, show_default=True, type=click.IntRange(1), help="Processes.")
 @click.option(
     "-o", "--out", type=click.Path(path_type=Path, file_okay=False), default=Path("results/fuzz"), show_default=True
 )
-def fuzz(scenes: int, seed: int, workers: int, out: Path) -> int:
+def fuzz(scenes: int, bounds: bool, seed: int, workers: int, out: Path) -> int:
     """Random and adversarial scenes through files, formulas and exact engines; every failure is shrunk and kept."""
     from rich.console import Console
     from rich.progress import track
 
     console = Console(stderr=True)
     wrong: dict[str, list[str]] = {}
-    chunks = -(-scenes // CHUNK)
-    for found in track(run(scenes, seed, out, workers), "fuzzing", total=chunks, console=console):
+    chunks = -(-scenes // (CHUNK_OF_PROOFS if bounds else CHUNK))
+    for found in track(run(scenes, seed, out, workers, bounds), "fuzzing", total=chunks, console=console):
         wrong |= found
     for number in sorted(wrong, key=int)[:SHOWN]:
-        scene = shrunk(scene_of(seed, int(number)), lambda candidate: bool(findings(candidate)))
+        if bounds:  # each step of shrinking would be a proof
+            scene, source, name = outside.scene_of(seed, int(number)), wrong[number][0], "bounds_seed"
+        else:
+            scene = shrunk(scene_of(seed, int(number)), lambda candidate: bool(findings(candidate)))
+            source, name = findings(scene)[0], "seed"
         title = f"found by fuzzing, seed {seed}, scene {number}"
-        path = keep(replace(scene, title=title, source=findings(scene)[0]), f"seed_{seed}_scene_{number}")
+        path = keep(replace(scene, title=title, source=source), f"{name}_{seed}_scene_{number}")
         console.print(f"scene {number}: {wrong[number][0]}\n  kept as {path.name}")
-    print(f"{len(wrong)} of {scenes} scenes fail (seed {seed}, half of them adversarial)")
+    print(f"{len(wrong)} of {scenes} scenes fail (seed {seed}{'' if bounds else ', half of them adversarial'})")
     return 1 if wrong else 0
