@@ -18,12 +18,12 @@ from numpy.typing import NDArray
 
 from fourbar.effects.actions import bodies
 from fourbar.errors import DependencyError, InputError, LimitError, expect, installing
+from fourbar.evaluation.case import Case
 from fourbar.formulas.arithmetic import dot
 from fourbar.formulas.path import Path
 from fourbar.formulas.position import HalfAngle, Loop, close_loop
 from fourbar.quantities import PIN_FORCES
 from fourbar.scene import Scene, command
-from fourbar.scene.case import Case
 from fourbar.studies.derivatives import differentiable
 from fourbar.studies.interval import interval, require, require_all
 from fourbar.studies.keys import at_place, entries, left_out, with_numbers

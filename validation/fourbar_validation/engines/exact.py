@@ -1,0 +1,89 @@
+"""The scene in 320-bit ball arithmetic as a witness: the loop as a quadratic, all thirteen equations, no shortcuts."""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from fourbar.effects import Flywheel, Friction, Gravity, Springs, Torsion, Viscous
+from fourbar.linkage import FourBar
+from fourbar.quantities import VECTORS
+from fourbar.scene import Command, Scene
+from fourbar_validation.compare.answer import Answer, Array
+from fourbar_validation.compare.compare import COMPARED
+from fourbar_validation.engines.description import SHARED, speeds, unknown_effect
+from fourbar_validation.engines.loop import blank
+
+NAME = "ball-arithmetic"
+KNOWN = tuple(kind.key for kind in (Gravity, Viscous, Friction, Springs, Torsion, Flywheel))
+
+
+def unknown(scene: Scene) -> str:
+    """Give the reason to refuse a scene, if any."""
+    return unknown_effect(scene, KNOWN)
+
+
+class BallArithmetic:
+    """Every compared quantity at each position, rounded once from 320 bits."""
+
+    name = NAME
+
+    def answer(self, scene: Scene, command: Command) -> Answer:
+        """Answer, or refuse by naming an effect that it does not know."""
+        from flint import arb
+
+        from fourbar_validation.engines.balls import outputs, stored
+
+        if reason := unknown(scene):
+            return Answer(NAME, "exact", refusal=reason)
+        n = len(command.theta_2)
+        names = [q for q in COMPARED if command.omega_2 is not None or q.startswith("theta")]
+        out, assembled, (omega, alpha) = blank(n, names), np.zeros(n, dtype=bool), speeds(command)
+        for i in range(n):
+            motion = {"omega_2": float(omega[i]), "alpha_2": float(alpha[i])}
+            exact = stored(scene, float(command.theta_2[i]), **motion)
+            exact["theta_2"] += arb(0 if command.remainder is None else command.remainder)
+            values = outputs(scene, int(command.branch[i]), exact, scene.drive_bar)
+            if values is None:
+                continue
+            assembled[i] = True
+            _put(out, i, values)
+        return Answer(
+            NAME,
+            "exact",
+            at=command,
+            assembled=assembled,
+            quantities=out,
+            shared=SHARED,
+            own="closure as a complex quadratic, linear speeds and accelerations, thirteen Newton-Euler equations",
+        )
+
+
+def sines(linkage: FourBar, command: Command) -> Array:
+    """Compute sin(theta_4 - theta_3) of each position in many digits, (n,); NaN where the loop does not close."""
+    from flint import arb, ctx
+
+    from fourbar_validation.engines.balls import BITS, closure, wedge
+
+    ctx.prec = BITS
+    x = {name: arb(length) for name, length in zip("dabc", linkage.lengths, strict=True)}
+    x["theta_1"] = arb(linkage.ground_angle)
+    found = np.full(len(command.theta_2), np.nan)
+    for i, (theta_2, branch) in enumerate(zip(command.theta_2.tolist(), command.branch.tolist(), strict=True)):
+        closed = closure(x | {"theta_2": arb(theta_2)}, branch)
+        # with A on O4 bars 3 and 4 have no direction
+        found[i] = math.nan if closed is None else np.nan_to_num(_number(wedge(*closed[1:])))
+    return found
+
+
+def _put(out: dict[str, Array], i: int, values: dict[str, Any]) -> None:
+    """Write the numbers of one position into those of all."""
+    for name, array in out.items():
+        if name in VECTORS:
+            array[i] = _number(values.get(f"{name}_x")), _number(values.get(f"{name}_y"))
+        else:
+            array[i] = _number(values.get(name))
+
+
+def _number(ball: Any) -> float:
+    return math.nan if ball is None else float(ball.mid())

@@ -1,0 +1,62 @@
+"""The hard cases as a suite of a run, and the witnesses with their predictions."""
+
+from dataclasses import dataclass, replace
+from functools import cache
+
+from fourbar.scene import Scene
+from fourbar_validation.compare.tolerance import EQUIVALENCE, FULL_ACCURACY
+from fourbar_validation.engines.exact import BallArithmetic
+from fourbar_validation.engines.prediction import from_data
+from fourbar_validation.engines.witnesses import WITNESSES, Witness
+from fourbar_validation.scenes.hard_families import FAMILIES
+
+BALLS = Witness(
+    "ball-arithmetic",
+    BallArithmetic,
+    FULL_ACCURACY,
+    nearby=True,
+    library="flint",
+)
+
+
+def predicting(witness: Witness) -> Witness:
+    """Hold the witness to full accuracy, or else to the error predicted for each position."""
+    if witness.tolerance not in (EQUIVALENCE, FULL_ACCURACY):
+        return witness
+    return replace(witness, tolerance=FULL_ACCURACY, predictor=witness.predictor or from_data)
+
+
+HARD_WITNESSES = tuple(predicting(witness) for witness in (BALLS, *WITNESSES))
+
+
+@dataclass(frozen=True, slots=True)
+class Hard:
+    """Every scene of every family, by name; a worker makes them again from the parameters alone."""
+
+    families: tuple[str, ...] = tuple(family.name for family in FAMILIES)
+
+    def __len__(self) -> int:
+        return len(_scenes(self.families))
+
+    def name(self, index: int) -> str:
+        """Name a scene; ascending."""
+        return _scenes(self.families)[index][0]
+
+    def scene(self, index: int) -> Scene:
+        """Return the scene itself."""
+        return _scenes(self.families)[index][1]
+
+    def fingerprint(self) -> str:
+        """Name the families and count their scenes."""
+        return f"hard {' '.join(self.families)} {len(self)}"
+
+
+@cache
+def _scenes(families: tuple[str, ...]) -> list[tuple[str, Scene]]:
+    """Make the scenes of some families, by name."""
+    found = []
+    for family in FAMILIES:
+        for label, scene in family.scenes() if family.name in families else ():
+            titled = replace(scene, title=f"{family.name}: {label}", source=family.statement)
+            found.append((f"{family.name} {label}".replace(" ", "-"), titled))
+    return sorted(found, key=lambda pair: pair[0])
