@@ -53,7 +53,7 @@ JUDGED_BY = {
     "validation/engines/mujoco: closed_loop inverse",
     "validation/engines/test_added_guests.py": "validation/engines: checked output workers",
     "validation/engines/test_free_body.py": "validation/engines: free_body_closure free_body_effects",
-    "validation/engines/test_hard_suite.py": "validation/scenes: hard_families hard_linkages; "
+    "validation/engines/test_hard_suite.py": "validation/scenes: hard_families hard_linkages; validation/compare: nearby; "
     "validation/engines: exact; validation/engines/mujoco: shipped; validation/report: hard_page",
     "validation/engines/mujoco/test_simulate.py": "validation/engines/mujoco: drives motions runner watch",
     "validation/run/shipped/test_shipped.py": "validation/run/shipped: bounds calls changes checks files question",
@@ -72,7 +72,7 @@ JUDGED_BY = {
     "validation/lab/stress/test_bench.py": "validation/lab/stress: against bench_picture contenders in_c in_sympy "
     "limits timed",
     "validation/lab/stress/forward_error/test_stability.py": "validation/lab/stress/forward_error: families",
-    "validation/lab/stress/fuzz/test_fuzz.py": "validation/lab/stress/fuzz: scenes shrink",
+    "validation/lab/stress/fuzz/test_fuzz.py": "validation/lab/stress/fuzz: outside scenes shrink",
     "validation/lab/stress/mutation/test_mutation.py": "validation/lab/stress/mutation: harness",
     "validation/lab/stress/mutation/test_planted.py": "validation/lab/stress/mutation: planting specimens",
     "validation/lab/cost/test_cost.py": "validation/lab/cost: curves formulas laws orders pictures study; "

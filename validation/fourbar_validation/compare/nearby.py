@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from fourbar.evaluation.many_digits import DIGITS
+from fourbar.formulas.many_digits import DIGITS
 from fourbar.linkage import FourBar
 from fourbar_validation.compare.tolerance import EPS, ROUNDINGS
 

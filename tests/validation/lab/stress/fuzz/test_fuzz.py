@@ -19,8 +19,8 @@ from fourbar_validation.lab.stress.fuzz import outside
 from fourbar_validation.lab.stress.fuzz.fuzz import examine_chunk, run
 from fourbar_validation.lab.stress.fuzz.scenes import scene_of
 from fourbar_validation.lab.stress.fuzz.shrink import KEPT, keep, shrunk
+from tests.fourbar.studies.test_enclosure import meeting
 from tests.support.scenes import crank_rocker
-from tests.test_extremes import meeting
 
 SEED = 0
 
@@ -167,7 +167,7 @@ def test_bounds_narrower_by_a_millionth_are_found(monkeypatch: pytest.MonkeyPatc
 def test_a_ball_that_decides_silently_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     """A distance that may be 0 had 1 m added."""
 
-    def silent(of: spring.Spring, across: Any) -> Any:
+    def silent(of: spring.Spring, across: Any, _: object) -> Any:
         distance = np.abs(across)
         if isinstance(distance, Sloped):
             distance.values += np.array([float(ball.contains(0)) for ball in distance.values], dtype=object)
