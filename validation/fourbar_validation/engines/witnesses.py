@@ -226,7 +226,7 @@ def answering_nearby(witness: Witness, scene: Scene, at: Command, formulas: Solu
     Near a limit position the last digits of theta_2 decide sin(theta_4 - theta_3), and with it every other number:
     once they are chosen such that this sine is that of the formulas, all the others have their digits.
 
-    A drive on bar 3 or 4 has poles of its own, which another theta_2 for the same sine does not mend.
+    A drive on bar 3 or 4 has poles of its own, which another theta_2 for the same sine does not correct.
     """
     if not witness.nearby or scene.drive_bar != 2 or at.remainder is not None or at.omega_2 is None:
         return None

@@ -44,7 +44,7 @@ def stated_body(model: mujoco.MjModel, names: Mapping[str, str], role: str) -> i
     return body
 
 
-class Anatomy:
+class Topology:
     """Bars, pins, hinges and closure of a compiled model; everything is measured in its rest state."""
 
     def __init__(self, model: mujoco.MjModel, names: Mapping[str, str]) -> None:
