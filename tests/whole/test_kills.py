@@ -32,7 +32,7 @@ from fourbar_validation.run import pool
 from fourbar_validation.run.run import Collected, run
 from fourbar_validation.run.selection import chosen
 from fourbar_validation.run.store import RunningError, Store
-from fourbar_validation.scenes.random import LinkageType
+from fourbar_validation.scenes.random import DrawnType
 from fourbar_validation.scenes.suites import AS_LONG_AS, MOST_POSITIONS, Files, Random, Suite, scene_files
 from tests.support.here import judge_here
 from tests.support.unlucky import Few, Unlucky, dies_at_first
@@ -46,7 +46,7 @@ COUNT, IN_A_CHUNK = (220, 20) if FULL else (30, 3)
 SMALL = f"import fourbar_validation.run.run as run; run.CHUNK = {{False: {IN_A_CHUNK}}}; "
 HARNESS = "import runpy; runpy.run_module('validation', run_name='__main__', alter_sys=True)"
 PROGRAM = ("-m", "validation") if FULL else ("-c", SMALL + HARNESS)
-TYPES = tuple(LinkageType)
+TYPES = tuple(DrawnType)
 EXACT = chosen("free-body")
 
 

@@ -26,7 +26,7 @@ from fourbar_validation.run.released import ENGINES, FULL
 from fourbar_validation.run.run import run
 from fourbar_validation.run.selection import chosen
 from fourbar_validation.run.shipped.checks import CHECKS
-from fourbar_validation.scenes.random import LinkageType
+from fourbar_validation.scenes.random import DrawnType
 from fourbar_validation.scenes.suites import Random
 from tests.support.here import judge_here
 from tests.support.scenes import crank_rocker
@@ -53,7 +53,7 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("run")
     with pytest.MonkeyPatch.context() as monkeypatch:
         judge_here(monkeypatch)
-        list(run(Random(8, 1, tuple(LinkageType)), folder / "results", chosen("free-body"), workers=1, drawn=False))
+        list(run(Random(8, 1, tuple(DrawnType)), folder / "results", chosen("free-body"), workers=1, drawn=False))
     return folder
 
 

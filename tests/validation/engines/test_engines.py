@@ -24,10 +24,10 @@ from fourbar_validation.engines.effects import TERM_OF
 from fourbar_validation.engines.limits import LIGHTEST
 from fourbar_validation.engines.mujoco.inverse import MujocoInverse, MujocoTree
 from fourbar_validation.engines.witnesses import FURTHER, WITNESSES
-from fourbar_validation.scenes.random import LinkageType
+from fourbar_validation.scenes.random import DrawnType
 from fourbar_validation.scenes.suites import Random
-from tests.fourbar_validation.engines.test_effects import ACTING, scene
 from tests.support.scenes import thesis
+from tests.validation.engines.test_effects import ACTING, scene
 
 WITNESS = {witness.name: witness for witness in (*WITNESSES, *FURTHER) if not witness.through_time}
 TREES = ("pinocchio-inverse", "mujoco-inverse", "drake-inverse")
@@ -135,7 +135,7 @@ def test_each_load_and_effect(name: str) -> None:
 
 @further
 def test_random_linkages(name: str) -> None:
-    suite = Random(20, 3, tuple(LinkageType))
+    suite = Random(20, 3, tuple(DrawnType))
     for index in range(len(suite)):
         assert failures(name, suite.scene(index), every=6) == [], suite.name(index)
 
@@ -356,8 +356,8 @@ def test_a_planted_fault_shows(name: str, monkeypatch: pytest.MonkeyPatch) -> No
         with monkeypatch.context() as patch:
             patch.setattr(owner, method, fault(getattr(owner, method)))
             assert seen <= judged(name), method
-    right = loop.Position.find
-    monkeypatch.setattr(loop.Position, "find", lambda self, theta_2, branch: right(self, theta_2, -branch))
+    right = loop.Assembler.find
+    monkeypatch.setattr(loop.Assembler, "find", lambda self, theta_2, branch: right(self, theta_2, -branch))
     assert {"theta_3", "theta_4", "torque"} <= judged(name)
 
 

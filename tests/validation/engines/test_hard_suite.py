@@ -31,7 +31,7 @@ from fourbar_validation.run.released import as_pendulum, judge_released
 from fourbar_validation.scenes import hard_families as families
 from fourbar_validation.scenes.hard_families import FAMILIES, TOGGLE, Family, toggle
 from fourbar_validation.scenes.hard_linkages import at, collinear_3_4, dressed, linkage_of
-from fourbar_validation.scenes.random import LinkageType
+from fourbar_validation.scenes.random import DrawnType
 from tests.support.engine_limits import MEASURED, Measured
 from tests.support.scenes import crank_rocker
 
@@ -64,7 +64,7 @@ def _fewer(scene: Scene, steps: int = 12) -> Scene:
 
 
 def test_beyond_a_toggle_no_engine_finds_a_position() -> None:
-    lengths = linkage_of(LinkageType.TRIPLE_ROCKER, 0)
+    lengths = linkage_of(DrawnType.TRIPLE_ROCKER, 0)
     (psi, stretched), *_ = collinear_3_4(lengths)
     beyond = at(dressed(lengths), psi + (1.0 if stretched else -1.0) * np.array(TOGGLE))
     assert not fourbar.solve(beyond).assembled.any()
@@ -82,7 +82,7 @@ def test_near_a_toggle_all_but_the_sine_has_its_digits_though_it_has_few_itself(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """A millionth of the torque stood within what the last digits of theta_2 excuse there, for every engine."""
-    lengths, true = linkage_of(LinkageType.TRIPLE_ROCKER, 0), fourbar_validation.run.judge.solve
+    lengths, true = linkage_of(DrawnType.TRIPLE_ROCKER, 0), fourbar_validation.run.judge.solve
     (psi, stretched), *_ = collinear_3_4(lengths)
     near = at(dressed(lengths), psi + (-1.0 if stretched else 1.0) * np.array([*families.REGULAR, 1e-9]))
     balls = [witness for witness in HARD_WITNESSES if witness.nearby]
@@ -114,7 +114,7 @@ def test_an_answer_nearby_is_one_within_the_rounding_of_theta_2() -> None:
 
 def test_an_answer_nearby_has_the_sine_of_the_formulas() -> None:
     """Of a shift in many digits: 1e-9 rad from a limit position a sine of the formulas is met to its last digit."""
-    lengths = linkage_of(LinkageType.TRIPLE_ROCKER, 0)
+    lengths = linkage_of(DrawnType.TRIPLE_ROCKER, 0)
     (psi, stretched), *_ = collinear_3_4(lengths)
     near = at(dressed(lengths), psi + (-1.0 if stretched else 1.0) * np.array([0.3, 1e-3, 1e-9]))
     command, formulas = fourbar.command(near), fourbar.solve(near)
@@ -158,7 +158,7 @@ def _equivalence() -> Any:
 
 def test_near_a_toggle_a_wrong_force_fails_that_the_law_excuses() -> None:
     """1e-8 rad from a toggle K eps/s^3 allows all; roundings of the data allow 4e-5."""
-    lengths = linkage_of(LinkageType.TRIPLE_ROCKER, 1)
+    lengths = linkage_of(DrawnType.TRIPLE_ROCKER, 1)
     (psi, _), *_ = collinear_3_4(lengths)
     scene = at(dressed(lengths, 1), psi - 1e-8)
     assert verdict_of(Wrong, scene, None)[0] == AGREES

@@ -17,7 +17,15 @@ from fourbar.scene import Command, Scene
 from fourbar_validation.compare.answer import Answer, Array
 from fourbar_validation.engines.description import FORCE_AT, SHARED, about_first_pin, centre, speeds, unknown_effect
 from fourbar_validation.engines.free_body_closure import Complex, close, cross
-from fourbar_validation.engines.free_body_effects import WRENCH_OF, Motion, Wrenches, acting, polar, sliding_pins, wound
+from fourbar_validation.engines.free_body_effects import (
+    WRENCH_OF,
+    BodyMotion,
+    BodyWrenches,
+    acting,
+    polar,
+    sliding_pins,
+    wound,
+)
 
 NAME = "free-body"
 COLUMN = {"F12": 0, "F32": 2, "F23": 4, "F43": 6, "F34": 8, "F14": 10}
@@ -109,7 +117,9 @@ def _answered(
     return found | {"torque": unknowns[:, TORQUE]}, residual
 
 
-def move(linkage: FourBar, theta_2: Array, omega_2: Array, alpha_2: Array, theta_3: Array, theta_4: Array) -> Motion:
+def move(
+    linkage: FourBar, theta_2: Array, omega_2: Array, alpha_2: Array, theta_3: Array, theta_4: Array
+) -> BodyMotion:
     """Compute speeds and accelerations; NaN where the Jacobian is singular."""
     d, a, b, c = linkage.lengths
     n = len(theta_2)
@@ -123,10 +133,10 @@ def move(linkage: FourBar, theta_2: Array, omega_2: Array, alpha_2: Array, theta
     alpha = {1: np.zeros(n), 2: alpha_2, 3: w_3 / b, 4: w_4 / c}
     zero = np.zeros(n, dtype=complex)
     foot = {1: zero, 2: zero, 3: a * u_2, 4: zero + d * u_1}
-    return Motion(linkage, theta_2, {1: zero + u_1, 2: u_2, 3: u_3, 4: u_4}, foot, omega, alpha)
+    return BodyMotion(linkage, theta_2, {1: zero + u_1, 2: u_2, 3: u_3, 4: u_4}, foot, omega, alpha)
 
 
-def balance(scene: Scene, motion: Motion) -> tuple[Array, float, Array | float]:
+def balance(scene: Scene, motion: BodyMotion) -> tuple[Array, float, Array | float]:
     """Solve for the thirteen unknowns (n, 13), N and N m, their residual, and how far friction is from jamming."""
     unknowns, loads, arms, residual = _with_unit_couples(scene, motion)
     total: Array = unknowns[..., 0]
@@ -138,7 +148,7 @@ def balance(scene: Scene, motion: Motion) -> tuple[Array, float, Array | float]:
     return total, residual, from_jamming
 
 
-def _with_unit_couples(scene: Scene, motion: Motion) -> tuple[Array, Complex, Array, float]:
+def _with_unit_couples(scene: Scene, motion: BodyMotion) -> tuple[Array, Complex, Array, float]:
     """Solve without sliding friction and per N m of it at each pin, (n, 13, 1 + p).
 
     Returns also the loads of these pins as complex numbers (n, p, 1 + p), mu r of each (m), and the residual.
@@ -147,7 +157,7 @@ def _with_unit_couples(scene: Scene, motion: Motion) -> tuple[Array, Complex, Ar
     _add_inertia(motion, wrenches)
     columns = [_right(motion.linkage, wrenches)]
     for pin in pins:
-        unit = Wrenches(len(motion.theta_2))
+        unit = BodyWrenches(len(motion.theta_2))
         unit.twist_at(pin, -motion.sense(pin))
         columns.append(_right(motion.linkage, unit))
     unknowns, residual = solved(_matrix(motion, scene.drive_bar), np.stack(columns, axis=-1))
@@ -183,7 +193,7 @@ def _number(F: Complex, C: Complex, k: Array) -> int:
     return len(found)
 
 
-def _add_inertia(motion: Motion, wrenches: Wrenches) -> None:
+def _add_inertia(motion: BodyMotion, wrenches: BodyWrenches) -> None:
     """-m a_G and -I alpha (d'Alembert), moments about the first pin, of which that of bar 3 moves."""
     for number in MOVING_BARS:
         bar = motion.linkage.bar(number)
@@ -193,7 +203,7 @@ def _add_inertia(motion: Motion, wrenches: Wrenches) -> None:
     wrenches.push(3, -motion.linkage.coupler.mass * motion.swing(2, motion.foot[3]), motion.to_centre(3))
 
 
-def _matrix(motion: Motion, drive_bar: int) -> Array:
+def _matrix(motion: BodyMotion, drive_bar: int) -> Array:
     """Rows: forces on bars 2, 3, 4 and moments over the bar's length, reactions at A and B; (n, 13, 13).
 
     The last column is the torque over the driven bar's length, so that every number is 0, 1 or of a unit vector.
@@ -211,7 +221,7 @@ def _matrix(motion: Motion, drive_bar: int) -> Array:
     return matrix
 
 
-def _right(linkage: FourBar, wrenches: Wrenches) -> Array:
+def _right(linkage: FourBar, wrenches: BodyWrenches) -> Array:
     """Right-hand sides, (n, 13), N."""
     right = np.zeros((len(wrenches.moment[2]), 13))
     for bar, (row, _, _) in ROWS.items():

@@ -72,7 +72,7 @@ PROXIMAL = Boundary(
 )
 
 
-class Limit(NamedTuple):
+class DeclaredLimit(NamedTuple):
     """One limit of one engine."""
 
     engine: str
@@ -80,9 +80,9 @@ class Limit(NamedTuple):
 
 
 LIMITS = (
-    *(Limit("mujoco-simulated", of) for of in (NEAREST_TOGGLE, FASTEST, SLOWEST, HEAVIEST, NEAREST_CENTRE)),
-    Limit("mujoco-inverse and mujoco-simulated", LIGHTEST),
-    Limit("pinocchio-forward", PROXIMAL),
+    *(DeclaredLimit("mujoco-simulated", of) for of in (NEAREST_TOGGLE, FASTEST, SLOWEST, HEAVIEST, NEAREST_CENTRE)),
+    DeclaredLimit("mujoco-inverse and mujoco-simulated", LIGHTEST),
+    DeclaredLimit("pinocchio-forward", PROXIMAL),
 )
 
 

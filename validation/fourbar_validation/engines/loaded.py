@@ -44,7 +44,7 @@ class Assembled(Protocol):
         """Locate O4, A, B, "B4", the end of bar 4, and where pin A is open "A2", that of bar 2; (2,), m."""
 
 
-class Bars(Assembled, Protocol):
+class EngineBars(Assembled, Protocol):
     """An engine holding the bars of a scene, which knows their mass centres (G2, G3, G4 among the points) and moves."""
 
     own: str
@@ -64,7 +64,7 @@ class Bars(Assembled, Protocol):
         return ""
 
 
-class Loaded(Bars, Protocol):
+class Loaded(EngineBars, Protocol):
     """Bars on which loads and effects act, each by its row of the table `effects.TERM_OF`.
 
     The ground (bar 1) does not move; its line points from O2 to O4.

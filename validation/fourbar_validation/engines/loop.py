@@ -15,7 +15,7 @@ from fourbar.scene import Command, Scene
 from fourbar_validation.compare.answer import Answer, Array
 from fourbar_validation.engines.description import SHARED, speeds
 from fourbar_validation.engines.free_body_closure import LONGEST_STEP, NEWTON_STEPS, STARTS
-from fourbar_validation.engines.loaded import Assembled, Bars, Values
+from fourbar_validation.engines.loaded import Assembled, EngineBars, Values
 
 START_ANGLES = np.radians(STARTS).tolist()
 SHORTEST_STEP = 2.0**-40
@@ -36,7 +36,7 @@ Angles = tuple[float, float, float]
 """Turns of bar 2 at O2, of bar 3 against bar 2 at A, of bar 4 at O4, rad."""
 
 
-class Position:
+class Assembler:
     """Assembles a tree at commanded angles of bar 2, one after another."""
 
     def __init__(self, tree: Assembled) -> None:
@@ -117,7 +117,7 @@ class Exact:
     """An engine that answers each position by itself."""
 
     name: str
-    build: Callable[[Scene], Bars]
+    build: Callable[[Scene], EngineBars]
     """Its bars from the description; LimitError says why it cannot hold them."""
 
     def answer(self, scene: Scene, command: Command) -> Answer:
@@ -157,7 +157,7 @@ def at_each(
     """Read each position that assembles, NaN elsewhere; return that, where it assembles, and the greatest gap, m."""
     n, (omega, alpha) = len(command.theta_2), speeds(command)
     missing: dict[str, Any] = {name: (math.nan, math.nan) if name in VECTORS else math.nan for name in names}
-    rows, assembled, gap, position = [missing] * n, np.zeros(n, dtype=bool), 0.0, Position(bars)
+    rows, assembled, gap, position = [missing] * n, np.zeros(n, dtype=bool), 0.0, Assembler(bars)
     for i, (theta_2, branch) in enumerate(zip(command.theta_2.tolist(), command.branch.tolist(), strict=True)):
         if (q := position.find(theta_2, branch)) is not None:
             assembled[i], gap = True, max(gap, math.hypot(*bars.gap()))
@@ -202,7 +202,7 @@ class Trial:
     """Where the engine lost the motion: what it reported of itself."""
 
 
-class LimitWatch:
+class LimitDetector:
     """Sees bars 3 and 4 of one branch come to lie in one line, from step to step of an engine."""
 
     def __init__(self, branch: int) -> None:

@@ -86,7 +86,7 @@ def predicted_error(
     return errors
 
 
-class Sensitivity(NamedTuple):
+class Sensitivities(NamedTuple):
     """How far each output moves at one position."""
 
     data: dict[str, float]
@@ -108,7 +108,7 @@ class Sensitivity(NamedTuple):
 
 
 @lru_cache(maxsize=8192)
-def _sensitivity(scene: Scene, theta_2: float, branch: int, omega_2: float, alpha_2: float) -> Sensitivity | None:
+def _sensitivity(scene: Scene, theta_2: float, branch: int, omega_2: float, alpha_2: float) -> Sensitivities | None:
     """Compute the sensitivities at one position; None where the loop does not close."""
     from flint import acb, arb
 
@@ -148,7 +148,7 @@ def _sensitivity(scene: Scene, theta_2: float, branch: int, omega_2: float, alph
         for bar in MOVING_BARS:
             add(loop, [{f"couple_{bar}": strongest * step}])
             add(carried, [{f"couple_{bar}": heaviest * hardest * step}])
-    return Sensitivity(data, loop, carried)
+    return Sensitivities(data, loop, carried)
 
 
 def _weights(stored: dict[str, float]) -> dict[str, float]:

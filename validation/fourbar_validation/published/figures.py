@@ -29,7 +29,7 @@ ERRATA = {entry["id"]: Erratum(**entry) for entry in LISTED}
 """The errata of the sources, as data: `errata.toml` says what each field is."""
 
 
-class Figure(NamedTuple):
+class PublishedFigure(NamedTuple):
     """One printed figure and ours, in the unit printed."""
 
     table: str

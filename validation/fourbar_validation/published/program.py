@@ -43,7 +43,7 @@ TO_N = 0.01
 
 
 @dataclass(frozen=True, slots=True)
-class Errors:
+class ProgramErrors:
     """What the program did; all False is right."""
 
     inertia_about_long_axis: bool = False
@@ -133,7 +133,7 @@ class Kinematics:
         }
 
 
-def equations(errors: Errors, inertias: tuple[float, float] | None = None) -> tuple[Array, Array]:
+def equations(errors: ProgramErrors, inertias: tuple[float, float] | None = None) -> tuple[Array, Array]:
     """Matrix and right side of section 5.7 at theta_2 = 135 deg, N and N cm.
 
     sum F = m A and sum M_G = I alpha of bars 2, 3, 4; F32 = -F23 and F34 = -F43.
@@ -165,13 +165,13 @@ def equations(errors: Errors, inertias: tuple[float, float] | None = None) -> tu
     return matrix[0], right[0]
 
 
-def thesis_program(errors: Errors, inertias: tuple[float, float] | None = None) -> dict[str, float]:
+def thesis_program(errors: ProgramErrors, inertias: tuple[float, float] | None = None) -> dict[str, float]:
     """Compute the 13 unknowns of section 5.7 at theta_2 = 135 deg, N and N cm."""
     unknowns = np.linalg.solve(*equations(errors, inertias))
     return dict(zip(UNKNOWNS, map(float, unknowns), strict=True))
 
 
-def round_off(errors: Errors, inertias: tuple[float, float] | None = None) -> dict[str, float]:
+def round_off(errors: ProgramErrors, inertias: tuple[float, float] | None = None) -> dict[str, float]:
     """Bound how far an elimination of these equations may be off in each unknown, whoever makes it: N and N cm.
 
     13 eps |A^-1| (|A| |x| + |b|): each number of the system carries up to as many roundings as there are
@@ -186,15 +186,15 @@ def round_off(errors: Errors, inertias: tuple[float, float] | None = None) -> di
 PRINTED_INERTIAS = (0.2924725333, 0.1075266667)
 TYPED_INERTIAS = (0.292472, 0.107526)
 """I_G3, I_G4 of the manual's table and of section 5.7, kg cm^2: solved back from the printed unknowns."""
-STEPS: tuple[tuple[str, Errors, tuple[float, float] | None], ...] = (
-    ("", Errors(), None),
-    ("3", Errors(True), None),
-    ("1", Errors(True, True), None),
-    ("2", Errors(True, True, True), None),
-    ("4", Errors(True, True, True, True), None),
-    ("5", Errors(True, True, True, True, True), None),
-    ("manual", Errors(True, True, True, True, True), PRINTED_INERTIAS),
-    ("5b", Errors(True, True, True, True, True), TYPED_INERTIAS),
+STEPS: tuple[tuple[str, ProgramErrors, tuple[float, float] | None], ...] = (
+    ("", ProgramErrors(), None),
+    ("3", ProgramErrors(True), None),
+    ("1", ProgramErrors(True, True), None),
+    ("2", ProgramErrors(True, True, True), None),
+    ("4", ProgramErrors(True, True, True, True), None),
+    ("5", ProgramErrors(True, True, True, True, True), None),
+    ("manual", ProgramErrors(True, True, True, True, True), PRINTED_INERTIAS),
+    ("5b", ProgramErrors(True, True, True, True, True), TYPED_INERTIAS),
 )
 """The errata in the order in which they are made, from right to published."""
 

@@ -34,11 +34,11 @@ from fourbar_validation.run.judge import OUTPUT
 from fourbar_validation.run.machines import Cluster
 from fourbar_validation.run.selection import askable, chosen, selected
 from fourbar_validation.run.store import Store
-from fourbar_validation.scenes.random import LinkageType
+from fourbar_validation.scenes.random import DrawnType
 from fourbar_validation.scenes.suites import Suite, scene_files
 
 WORKERS = 2
-ALL_TYPES = ",".join(kind.value for kind in LinkageType)
+ALL_TYPES = ",".join(kind.value for kind in DrawnType)
 CHUNK = {True: 1, False: 20}
 """Scenes per task: one where something is simulated or drawn (a second each), else twenty (a second together)."""
 MOST_PARTS = 10_000

@@ -23,11 +23,11 @@ from fourbar_validation.scenes.hard_linkages import (
     parallel_2_4,
     with_bars,
 )
-from fourbar_validation.scenes.random import LinkageType
+from fourbar_validation.scenes.random import DrawnType
 
 Scenes = Iterator[tuple[str, Scene]]
-ROCKERS = (LinkageType.DOUBLE_ROCKER, LinkageType.TRIPLE_ROCKER)
-CRANK, ROCKER = LinkageType.CRANK_ROCKER, LinkageType.TRIPLE_ROCKER
+ROCKERS = (DrawnType.DOUBLE_ROCKER, DrawnType.TRIPLE_ROCKER)
+CRANK, ROCKER = DrawnType.CRANK_ROCKER, DrawnType.TRIPLE_ROCKER
 REGULAR = (0.5, 0.4, 0.3)
 """rad from the singular position: positions that set the scale of each quantity."""
 TOGGLE = tuple(10.0**-k for k in range(1, 13))

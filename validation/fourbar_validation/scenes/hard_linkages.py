@@ -9,7 +9,7 @@ from fourbar.effects import Gravity, Load
 from fourbar.linkage import BAR_NAMES, MOVING_BARS, Bar, FourBar
 from fourbar.scene import Scene
 from fourbar.scene.motion import Motion
-from fourbar_validation.scenes.random import LinkageType, Ranges, random_bars, random_lengths, uniform
+from fourbar_validation.scenes.random import DrawnType, Ranges, random_bars, random_lengths, uniform
 
 Lengths = tuple[float, float, float, float]
 """(ground, input, coupler, output), m."""
@@ -21,9 +21,9 @@ BARS = Ranges(
 )
 
 
-def linkage_of(kind: LinkageType, seed: int) -> Lengths:
+def linkage_of(kind: DrawnType, seed: int) -> Lengths:
     """Random lengths of a type, from its seed alone."""
-    return random_lengths(np.random.default_rng([seed, list(LinkageType).index(kind)]), kind)
+    return random_lengths(np.random.default_rng([seed, list(DrawnType).index(kind)]), kind)
 
 
 def dressed(lengths: Lengths, seed: int = 0) -> Scene:

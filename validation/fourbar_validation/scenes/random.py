@@ -74,7 +74,7 @@ class Ranges:
     """Whether the mass is per metre."""
 
 
-class LinkageType(Enum):
+class DrawnType(Enum):
     """What the input and output of a linkage do."""
 
     CRANK_ROCKER = "crank-rocker"
@@ -85,10 +85,10 @@ class LinkageType(Enum):
 
 
 SHORTEST = {
-    LinkageType.DRAG_LINK: 0,
-    LinkageType.CRANK_ROCKER: 1,
-    LinkageType.DOUBLE_ROCKER: 2,
-    LinkageType.ROCKER_CRANK: 3,
+    DrawnType.DRAG_LINK: 0,
+    DrawnType.CRANK_ROCKER: 1,
+    DrawnType.DOUBLE_ROCKER: 2,
+    DrawnType.ROCKER_CRANK: 3,
 }
 """Which of (ground, input, coupler, output) is the shortest bar of a Grashof linkage of that type."""
 UNEVEN_TYPE = "uneven"
@@ -98,7 +98,7 @@ CLEARANCE = 0.02
 """A random linkage keeps this part of its longest bar away from the change-point equality s + l = p + q."""
 
 
-def random_lengths(rng: np.random.Generator, kind: LinkageType) -> tuple[float, float, float, float]:
+def random_lengths(rng: np.random.Generator, kind: DrawnType) -> tuple[float, float, float, float]:
     """(ground, input, coupler, output) of the given type, longest bar 1, away from change points."""
     while True:
         lengths = np.sort(rng.uniform(0.1, 1.0, 4))
@@ -107,7 +107,7 @@ def random_lengths(rng: np.random.Generator, kind: LinkageType) -> tuple[float, 
         surplus = p + q - shortest - longest
         if p + q + shortest - longest < CLEARANCE:
             continue
-        if kind is LinkageType.TRIPLE_ROCKER:
+        if kind is DrawnType.TRIPLE_ROCKER:
             if surplus < -CLEARANCE:
                 return tuple(float(x) for x in rng.permutation(lengths))  # type: ignore[return-value]
         elif surplus > CLEARANCE:
@@ -234,7 +234,7 @@ MACHINES = Ranges(
 """Bars as machines have them."""
 
 
-def random_scene(seed: int, index: int, types: tuple[LinkageType, ...]) -> Scene:
+def random_scene(seed: int, index: int, types: tuple[DrawnType, ...]) -> Scene:
     """Draw random bars, loads, gravity and drive, at POSITIONS positions over the range the linkage can move.
 
     Parameters

@@ -15,7 +15,7 @@ from fourbar.scene import Scene
 from fourbar.scene.motion import DEFAULT_STEPS, Free, Sweep
 from fourbar_validation.compare.rows import plain
 from fourbar_validation.places import MODELS
-from fourbar_validation.scenes.random import LinkageType, random_scene
+from fourbar_validation.scenes.random import DrawnType, random_scene
 
 MOST_POSITIONS = 100_000
 """Of a scene in a run, where every engine solves each of them: 3 ms each, with all engines."""
@@ -72,7 +72,7 @@ class Random:
 
     count: int
     seed: int
-    types: tuple[LinkageType, ...]
+    types: tuple[DrawnType, ...]
 
     def __len__(self) -> int:
         return self.count

@@ -8,7 +8,7 @@ import mujoco
 from fourbar.mjcf.effects import unwound
 from fourbar.scene import Command, Scene
 from fourbar_validation.compare.answer import Array
-from fourbar_validation.engines.loop import Position
+from fourbar_validation.engines.loop import Assembler
 from fourbar_validation.engines.mujoco.closed_loop import O2, ClosedLoop, couple_elsewhere
 from fourbar_validation.engines.mujoco.motions import Passage
 
@@ -56,7 +56,7 @@ class Reading(NamedTuple):
     forces: dict[str, Array]
 
 
-class Run:
+class SimulatedRun:
     """One stretch of positions at a prescribed motion; `light` is the model that a drive on bar 3 or 4 is read from."""
 
     def __init__(
@@ -89,7 +89,7 @@ class Run:
         return Reading(couple, self.light.forces())
 
 
-def assembled(position: Position, command: Command, order: Iterable[int]) -> list[Found]:
+def assembled(position: Assembler, command: Command, order: Iterable[int]) -> list[Found]:
     """Own joint angles of every commanded position, found one after the other in an order."""
     found: list[Found] = [None] * len(command.theta_2)
     for index in order:

@@ -19,7 +19,7 @@ from fourbar_validation.compare.answer import Answer
 from fourbar_validation.engines.description import speeds
 from fourbar_validation.engines.limits import NEAREST_TOGGLE, least_sine, too_fast_or_loaded
 from fourbar_validation.engines.loaded import Values
-from fourbar_validation.engines.loop import MADE, Position, as_made, blank
+from fourbar_validation.engines.loop import MADE, Assembler, as_made, blank
 from fourbar_validation.engines.mujoco.called_back import (
     ActuatorForce,
     at_full_size,
@@ -29,9 +29,9 @@ from fourbar_validation.engines.mujoco.called_back import (
     within,
 )
 from fourbar_validation.engines.mujoco.closed_loop import O2, O4, A, ClosedLoop
+from fourbar_validation.engines.mujoco.monitor import ResidualMonitor, alarms
 from fourbar_validation.engines.mujoco.motions import Lawful, Passage, Steady, extremes, order_in_time
-from fourbar_validation.engines.mujoco.runner import LIGHT_FLYWHEEL, Run, assembled, stretches
-from fourbar_validation.engines.mujoco.watch import Watch, alarms
+from fourbar_validation.engines.mujoco.runner import LIGHT_FLYWHEEL, SimulatedRun, assembled, stretches
 
 SHARED = (
     "lengths, masses, inertias, centres, loads and effects as MJCF text; tables of loads; omega_2, alpha_2 or the "
@@ -128,7 +128,7 @@ class _Simulation:
 
     def answer(self) -> Answer:
         """Answer over all positions."""
-        position = Position(ClosedLoop(self._text(1e-3)))  # kinematics alone: the timestep plays no part
+        position = Assembler(ClosedLoop(self._text(1e-3)))  # kinematics alone: the timestep plays no part
         found = assembled(position, self.command, self.order)
         least = least_sine(self.scene.linkage, self.command.theta_2, np.array([q is not None for q in found]))
         if self.bounded and least < NEAREST_TOGGLE.boundary:
@@ -169,7 +169,7 @@ class _Simulation:
         settings = replace(self.settings, timestep=timestep, timestep_scale=1.0, flywheel=heavy)
         return mjcf(at_full_size(self.scene), settings, keyframe=False)
 
-    def _closes_between(self, position: Position, one: int, other: int) -> bool:
+    def _closes_between(self, position: Assembler, one: int, other: int) -> bool:
         """Tell whether the loop closes everywhere between two positions."""
         start, stop = float(self.command.theta_2[one]), float(self.command.theta_2[other])
         pieces = int(np.ceil(abs(stop - start) / FINE))
@@ -191,21 +191,21 @@ class _Simulation:
         with supplying(supplied):
             loop = self._loop(timestep, supplied)
             light = None if self.scene.drive_bar == 2 else self._loop(timestep, supplied, LIGHT_FLYWHEEL)
-            watch = Watch(self._loop(timestep, supplied), self.scene.drive_bar)
-            run = Run(self.scene, loop, light, passage, start, timestep)
+            monitor = ResidualMonitor(self._loop(timestep, supplied), self.scene.drive_bar)
+            run = SimulatedRun(self.scene, loop, light, passage, start, timestep)
             begins = float(self.command.theta_2[stretch[0]])
             for index in stretch:
                 run.to(index)
-                self._read(run, watch, index, begins)
+                self._read(run, monitor, index, begins)
         self.evidence["steps"] += run.stepper.done
-        for name, value in watch.evidence().items():
+        for name, value in monitor.evidence().items():
             self.evidence[name] = float(np.maximum(self.evidence.get(name, 0.0), value))
 
-    def _read(self, run: Run, watch: Watch, index: int, begins: float) -> None:
+    def _read(self, run: SimulatedRun, monitor: ResidualMonitor, index: int, begins: float) -> None:
         """Read everything of one sample, and what the engine says of itself there."""
         loop, d, turns = run.loop, run.loop.data, run.turns
         loop.forward()
-        self._watch(run, begins)
+        self._keep_worst(run, begins)
         q = (float(d.qpos[O2]), float(d.qpos[A]), float(d.qpos[O4]))
         if unwound(self.scene, q) != q:
             raise LimitError("a torsion spring is wound by more than half a turn from its rest")
@@ -218,10 +218,10 @@ class _Simulation:
             values |= {f"{name}_2": x[O2] - ahead, f"{name}_3": x[O2] + x[A] - ahead, f"{name}_4": x[O4]}
         for name, value in values.items():
             self.out[name][index] = value
-        for name, error in watch.look(loop, torque, pins["F43"]).items():
+        for name, error in monitor.look(loop, torque, pins["F43"]).items():
             self.predicted[name][index] = error
 
-    def _watch(self, run: Run, begins: float) -> None:
+    def _keep_worst(self, run: SimulatedRun, begins: float) -> None:
         """Keep the worst of what the engine says of itself."""
         loop, d, seen = run.loop, run.loop.data, self.evidence
         speed = run.passage.speed(float(d.qpos[O2]) - run.turns - begins, run.stepper.time)

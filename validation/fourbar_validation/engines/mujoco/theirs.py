@@ -21,7 +21,7 @@ from fourbar.quantities import UNKNOWNS
 from fourbar.scene import Command, Scene, command
 from fourbar_validation.compare.answer import Answer, Array
 from fourbar_validation.engines.loaded import Assembled, Values
-from fourbar_validation.engines.loop import MADE, Angles, Position, as_made, at_each, blank
+from fourbar_validation.engines.loop import MADE, Angles, Assembler, as_made, at_each, blank
 from fourbar_validation.engines.mujoco.attached import Described, Value
 from fourbar_validation.engines.mujoco.closed_loop import WARNINGS, couple_for, load_force
 from fourbar_validation.engines.mujoco.corrections import correct
@@ -76,7 +76,7 @@ def examine(scene: Scene, text: str | None, names: Mapping[str, str]) -> Examine
     """Describe an MJCF, evaluate it at single states and through time; None: the one generated from the scene."""
     model = compile_text(mjcf(scene) if text is None else text)
     topology, guessed = find_topology(model, names, scene.linkage.lengths)
-    loop = Loop(topology, scene)
+    loop = UserLoop(topology, scene)
     found = described(topology)
     for key, value in found.items():
         if key.startswith(("bars.", "lengths.")) and not math.isfinite(value):  # type: ignore[arg-type]
@@ -98,14 +98,14 @@ def examine_corrected(
         answers = None
         if time.perf_counter() - start < CORRECTING and (model := correct(topology, key, value)) is not None:
             try:
-                answers = _answers(Loop(Topology(model, names), scene), scene)
+                answers = _answers(UserLoop(Topology(model, names), scene), scene)
             except FourBarError:  # what the other differences make of it is no four-bar
                 answers = None
         found.append(answers)
     return found
 
 
-def _answers(loop: "Loop", scene: Scene) -> list[Answer]:
+def _answers(loop: "UserLoop", scene: Scene) -> list[Answer]:
     at = _positions(command(scene))
     answers = [_answered(ONE_STATE, scene, lambda: one_state(loop, at))]
     if at.omega_2 is not None and np.any(at.omega_2) and np.ptp(at.theta_2) > 0.0:
@@ -136,7 +136,7 @@ def _answered(name: str, scene: Scene, ask: Callable[[], Answer]) -> Answer:
     return answer
 
 
-class Loop(Assembled):
+class UserLoop(Assembled):
     """Somebody's model with its drive taken off; coordinates x = (theta_2, theta_3 - theta_2, theta_4)."""
 
     def __init__(self, topology: Topology, scene: Scene) -> None:
@@ -160,7 +160,7 @@ class Loop(Assembled):
                 self.data.eq_active[i] = 0
                 self.notes.append(f"its equality {model.equality(i).name or i!r} is switched off: it is no pin")
 
-    # what `Position` asks of a tree
+    # what `Assembler` asks of a tree
     def place(self, x: Sequence[float]) -> None:
         """Move to a configuration."""
         self.data.qpos[:] = self.topology.qpos(x)
@@ -253,7 +253,7 @@ class Loop(Assembled):
         return body == bearer
 
 
-def one_state(loop: Loop, at: Command) -> Answer:
+def one_state(loop: UserLoop, at: Command) -> Answer:
     """Answer every position by itself."""
     contacts = 0
 
@@ -274,14 +274,14 @@ def one_state(loop: Loop, at: Command) -> Answer:
     return Answer(ONE_STATE, "as compiled", at, assembled, out, evidence=evidence)
 
 
-def through_time(loop: Loop, at: Command) -> Answer:
+def through_time(loop: UserLoop, at: Command) -> Answer:
     """Run the longest segment of positions that assembles at the file's own timestep."""
     model, data = loop.model, mujoco.MjData(loop.model)
     data.eq_active[:] = loop.data.eq_active
     if loop.crank is None:
         raise LimitError("pin O2 is not a hinge in this file: nothing can keep its crank at a speed")
     assert isinstance(at.omega_2, float) and isinstance(at.alpha_2, float)
-    position = Position(loop)
+    position = Assembler(loop)
     order = order_in_time(at, at.omega_2, None)
     stretch = max(stretches(assembled(position, at, order), order), key=len, default=[])
     if len(stretch) < 2:

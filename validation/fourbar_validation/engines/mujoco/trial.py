@@ -21,10 +21,10 @@ from fourbar.errors import LimitError
 from fourbar.mjcf import Settings, mjcf
 from fourbar.scene import Command, Scene
 from fourbar_validation.compare.answer import Array
-from fourbar_validation.engines.loop import Position, Trial, as_made, blank
+from fourbar_validation.engines.loop import Assembler, Trial, as_made, blank
 from fourbar_validation.engines.mujoco.closed_loop import O2, ClosedLoop
 from fourbar_validation.engines.mujoco.motions import Steady, order_in_time
-from fourbar_validation.engines.mujoco.runner import LIGHT_FLYWHEEL, Run, assembled, stretches
+from fourbar_validation.engines.mujoco.runner import LIGHT_FLYWHEEL, SimulatedRun, assembled, stretches
 
 STIFF = 4e-2
 """error (tc/h)^4 of RK4 with tc in steps: measured 1.3e-2 to 6e-2 on crank-rocker, drag link and double rocker."""
@@ -72,7 +72,7 @@ def silence() -> Iterator[None]:
         mujoco.set_mju_user_warning(before)
 
 
-class Rig:
+class TrialSetup:
     """A scene, ready to be tried with any settings.
 
     Raises LimitError for a scene that cannot be run through in time.
@@ -87,7 +87,7 @@ class Rig:
         motion = replace(scene.motion, theta_2=command.theta_2, omega_2=self.omega, alpha_2=self.alpha)
         self.scene, self.command = replace(scene, motion=motion), command
         order = order_in_time(command, self.omega, None)
-        position = Position(ClosedLoop(mjcf(self.scene, Settings(timestep=1e-3), keyframe=False)))
+        position = Assembler(ClosedLoop(mjcf(self.scene, Settings(timestep=1e-3), keyframe=False)))
         found = assembled(position, command, order)
         self.stretches = [stretch for stretch in stretches(found, order) if len(stretch) > 1]
         self.start = {index: angles for index, angles in enumerate(found) if angles is not None}
@@ -132,7 +132,7 @@ class Rig:
         light = None
         if self.scene.drive_bar != 2:
             light = ClosedLoop(self.text(replace(settings, flywheel=LIGHT_FLYWHEEL), timestep))
-        run = Run(self.scene, loop, light, passage, self.start[stretch[0]], timestep)
+        run = SimulatedRun(self.scene, loop, light, passage, self.start[stretch[0]], timestep)
         for row, index in enumerate(stretch):
             began = time.process_time()
             run.to(index)

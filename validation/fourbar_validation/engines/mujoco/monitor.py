@@ -25,7 +25,7 @@ from fourbar_validation.engines.tree import multipliers
 
 
 @dataclass(frozen=True, slots=True)
-class Limit:
+class ResidualLimit:
     """What a residual may be, and why."""
 
     value: float
@@ -33,20 +33,24 @@ class Limit:
 
 
 LIMITS = {
-    "acceleration_gap": Limit(
+    "acceleration_gap": ResidualLimit(
         1e-3, "of the greatest a_B: healthy runs have 1e-7..1e-4, a step that errs by 98 % has 4"
     ),
-    "power_gap": Limit(1e-4, "of the greatest power: healthy runs have 1e-8..1e-5, that step 4e-2, a stopped solver 1"),
-    "force_gap": Limit(1e-3, "of the greatest joint torque: the solver did not converge; healthy runs have 1e-8..1e-4"),
+    "power_gap": ResidualLimit(
+        1e-4, "of the greatest power: healthy runs have 1e-8..1e-5, that step 4e-2, a stopped solver 1"
+    ),
+    "force_gap": ResidualLimit(
+        1e-3, "of the greatest joint torque: the solver did not converge; healthy runs have 1e-8..1e-4"
+    ),
 }
-"""Residuals of motion and forces that `Watch` measures."""
+"""Residuals of motion and forces that `ResidualMonitor` measures."""
 EXCUSED = 1e-3
 """A solver's residual excuses an error of this part of a force, not more."""
 OF_THE_DATA = {
-    "bad_states": Limit(0.0, "MuJoCo warned of a bad position, velocity or acceleration, and reset its data"),
-    "time_went_back": Limit(0.0, "the time ran backwards: the data were reset"),
-    "closure_gap": Limit(1e-5, "of the sum of the lengths: the loop is open"),
-    "speed_error": Limit(1e-4, "of the greatest speed: the crank does not turn as commanded"),
+    "bad_states": ResidualLimit(0.0, "MuJoCo warned of a bad position, velocity or acceleration, and reset its data"),
+    "time_went_back": ResidualLimit(0.0, "the time ran backwards: the data were reset"),
+    "closure_gap": ResidualLimit(1e-5, "of the sum of the lengths: the loop is open"),
+    "speed_error": ResidualLimit(1e-4, "of the greatest speed: the crank does not turn as commanded"),
 }
 """What the data of the simulation tell without a second look."""
 
@@ -86,7 +90,7 @@ class _Motion:
     """theta, omega, alpha of bars 3 and 4, and what inverse dynamics makes of the motion."""
 
 
-class Watch:
+class ResidualMonitor:
     """Looks at a simulated motion with the bars alone, sample after sample."""
 
     def __init__(self, bars: ClosedLoop, drive_bar: int) -> None:
