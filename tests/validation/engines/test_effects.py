@@ -57,7 +57,7 @@ ACTING: dict[str, Effect] = {
     "load over theta_2": Load(3, (4.0, 0.7), (0.05, 1.0), 0.2, "world", TABLE),
 }
 EXACT = [witness for witness in WITNESSES if not witness.through_time]
-SIMULATED = [replace(witness, order="") for witness in WITNESSES if witness.through_time]
+SIMULATED = [replace(witness, order=None) for witness in WITNESSES if witness.through_time]
 ENGINES = {"pinocchio-inverse", "mujoco-inverse"}
 """What acts by `TERM_OF`, the table of the engines."""
 INVERSE = {*ENGINES, "free-body"}
@@ -270,8 +270,8 @@ def test_a_fault_in_the_wrench_on_the_free_bodies_fails_the_run(
     name: str, factor: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def faulty(right: Callable[..., None]) -> Callable[..., None]:
-        def act(effect: Any, motion: Any, wrenches: free_body_effects.Wrenches) -> None:
-            alone = free_body_effects.Wrenches(len(motion.theta_2))
+        def act(effect: Any, motion: Any, wrenches: free_body_effects.BodyWrenches) -> None:
+            alone = free_body_effects.BodyWrenches(len(motion.theta_2))
             right(effect, motion, alone)
             for bar in (2, 3, 4):
                 wrenches.push(bar, factor * alone.force[bar], 0.0)
