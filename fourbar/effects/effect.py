@@ -47,10 +47,10 @@ class Effect:
         """Its forces and couples on the bars."""
 
     def act_known(self, actions: Actions, forces: Mapping[str, Array]) -> None:
-        """What `act` leaves to the solution of the pin forces, once these are known (name: (n, 2), N)."""
+        """Add what `act` leaves to the solution of the pin forces, once these are computed (name: (n, 2), N)."""
 
     def counted_from(self, start: State, branch: Number) -> Self:
-        """The same effect in a motion that begins at this position, on this branch."""
+        """Return the same effect in a motion that begins at this position, on this branch."""
         return self
 
     def status(self, state: State, branch: NDArray[np.int8] | None) -> NDArray[np.uint8] | None:

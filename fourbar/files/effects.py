@@ -74,7 +74,7 @@ class Entry(NamedTuple):
 
 
 def _per_pin(key: str, kind: str, example: str, **left_out: str) -> Entry:
-    """An effect that holds rows (pin, number, ...); where a pin has one number, that stands alone."""
+    """Describe an effect that holds rows (pin, number, ...); where a pin has one number, that stands without a list."""
     numbers = OF_EFFECT[key]
 
     def read_rows(value: object, read: Reader) -> "Effect":
@@ -133,7 +133,7 @@ REGISTRY: dict[str, Entry] = {
 
 
 def written(effect: "Effect") -> Any:
-    """The value of an effect under its key; InputError where a scene file has no form of it."""
+    """Write the value of an effect under its key; InputError where a scene file has no form of it."""
     if effect.key not in REGISTRY:
         raise InputError(f"effects.{effect.key}", type(effect).__name__, "a scene file has no form of this effect")
     return REGISTRY[effect.key].write(effect)

@@ -29,7 +29,7 @@ class Frame(NamedTuple):
 
 
 def frame(linkage: FourBar) -> Frame:
-    """The box around the circle of A about O2 and of B about O4: no position leaves it."""
+    """Compute the box around the circle of A about O2 and of B about O4: no position leaves it."""
     d, a, _, c = linkage.lengths
     x, y = d * math.cos(linkage.ground_angle), d * math.sin(linkage.ground_angle)
     left, right = min(-a, x - c), max(a, x + c)
@@ -52,7 +52,7 @@ def add_appearance(root: ET.Element, linkage: FourBar) -> None:
 
 
 def add_camera(world: ET.Element, linkage: FourBar) -> None:
-    """The camera `plane`, and a light at the same place."""
+    """Add the camera `plane`, and a light at the same place."""
     seen = frame(linkage)
     place = f"{seen.x!r} {seen.y!r} {seen.distance!r}"
     shining = {"diffuse": ".2 .2 .2", "specular": ".1 .1 .1"}  # with the headlight 1

@@ -39,7 +39,7 @@ def mjcf(
     keyframe: bool = True,
     start: "Start | None" = None,
 ) -> str:
-    """The MJCF text of a scene: it runs on its own in MuJoCo.
+    """Write the MJCF text of a scene: it runs on its own in MuJoCo.
 
     Parameters
     ----------
@@ -136,7 +136,7 @@ def mass_ratio(linkage: FourBar) -> float:
 
 
 def _quickness(scene: Scene) -> float:
-    """The greater of omega_2^2 and |alpha_2|: by it the accelerations of all bars scale, rad/s^2."""
+    """Return the greater of omega_2^2 and |alpha_2|: by it the accelerations of all bars scale, rad/s^2."""
     return max((scene.motion.omega_2 or AT_REST) ** 2, abs(scene.motion.alpha_2))
 
 
@@ -168,7 +168,7 @@ class Start(NamedTuple):
 
 
 def run_through(theta_2: Array, omega: float, alpha: float) -> Run:
-    """The motion through positions: counter-clockwise from the least, or clockwise from the greatest."""
+    """Choose the motion through positions: counter-clockwise from the least, or clockwise from the greatest."""
     least, most = float(np.min(theta_2)), float(np.max(theta_2))
     return Run(least, most, omega, alpha) if omega > 0.0 else Run(most, least, omega, alpha)
 
@@ -204,5 +204,5 @@ def _span(linkage: FourBar) -> float:
 
 
 def plain(title: str) -> str:
-    """A title that XML can hold: every character that does not print becomes a blank."""
+    """Return a title that XML can hold: every character that does not print becomes a blank."""
     return "".join(character if character.isprintable() else " " for character in title).strip()

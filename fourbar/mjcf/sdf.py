@@ -18,7 +18,7 @@ DRAKE = "http://drake.mit.edu"
 
 
 def sdf(scene: Scene, reader: str = "gazebo", start: Start | None = None) -> str:
-    """The SDF 1.9 text of a scene: a world with gravity, four links, and the pins as joints.
+    """Write the SDF 1.9 text of a scene: a world with gravity, four links, and the pins as joints.
 
     Parameters
     ----------

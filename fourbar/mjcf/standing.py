@@ -32,7 +32,7 @@ class Standing(NamedTuple):
 
 
 def standing(scene: Scene, start: Start | None, form: str, at_pins: Mapping[str, tuple[str, str]]) -> Standing:
-    """The linkage in the state given, or that of `at_start`.
+    """Evaluate the linkage in the state given, or in that of `at_start`.
 
     Parameters
     ----------

@@ -11,7 +11,7 @@ from fourbar.scene import Scene
 
 
 def usd(scene: Scene, start: Start | None = None) -> str:
-    """The USD text (.usda) of a scene: three rigid bodies, four revolute joints, the fourth closing the loop.
+    """Write the USD text (.usda) of a scene: three rigid bodies, four revolute joints, the fourth closing the loop.
 
     Parameters
     ----------

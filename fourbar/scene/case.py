@@ -45,7 +45,7 @@ Evaluated = tuple[NDArray[np.uint8], dict[str, Any], Position | None]
 
 
 def changed(value: Any, change: Callable[[Any], Any]) -> Any:
-    """The same with each of its floats and arrays changed, in tuples and dataclasses too; all else stays."""
+    """Change each float and array of a value, in tuples and dataclasses too; all else stays."""
     if isinstance(value, (float, np.ndarray)):
         return change(value)
     if isinstance(value, tuple):
@@ -96,7 +96,7 @@ class Case(NamedTuple):
 
     @classmethod
     def of(cls, scene: Scene) -> "Case":
-        """The numbers that stay the same over the positions."""
+        """Collect the numbers that stay the same over the positions."""
         terms, linkage = (*scene.loads, *scene.effects), scene.linkage
         own = path(Loop(*linkage.lengths, 0.0, 0.0), linkage.ground_angle)
         square = own.unit * own.unit
@@ -120,7 +120,7 @@ class Case(NamedTuple):
         return State(self.lengths, theta_1, q, at, k, speed, rates(k, speed, acceleration))
 
     def at(self, where: Command) -> State:
-        """The positions of a command to the input, and their motion."""
+        """Compute the positions of a command to the input, and their motion."""
         half, _ = self.half_angle(where.theta_2, where.remainder)
         found = self.path.position(where.theta_2, half, where.branch)
         omega_2 = 0.0 if where.omega_2 is None else where.omega_2
@@ -132,7 +132,7 @@ class Case(NamedTuple):
         return self._replace(terms=tuple(term.counted_from(state, at.branch) for term in self.terms))
 
     def with_start(self, motion: Command) -> "Case":
-        """The same of a whole motion: it begins where the linkage first assembles, if it keeps its branch."""
+        """Let the effects begin where the linkage first assembles in a motion, if that keeps its branch."""
         half, _ = self.half_angle(motion.theta_2, motion.remainder)
         assembled = (half.outer >= 0.0) & (half.inner >= 0.0)
         if not assembled.any() or np.ptp(motion.branch) != 0:
@@ -141,7 +141,7 @@ class Case(NamedTuple):
         return self.started(Command(motion.theta_2[first], motion.branch[first], 0.0, 0.0, motion.remainder))
 
     def refuse_wound(self, at: Command) -> None:
-        """A LimitError where a free motion winds a spring: from there on it is no longer the spring's."""
+        """Raise a LimitError where a free motion winds a spring: from there on it is no longer the spring's."""
         state = self.at(at)
         for term in self.terms:
             codes = term.status(state, at.branch) if term.counts_turns else None
@@ -153,7 +153,7 @@ class Case(NamedTuple):
                 )
 
     def half_angle(self, theta_2: Array, remainder: Any) -> tuple[HalfAngle, NDArray[np.intp]]:
-        """The half angles, and the indices of those evaluated in many digits."""
+        """Compute the half angles, and the indices of those evaluated in many digits."""
         lengths, half = self.path.lengths, self.path.half_angle(theta_2)
         close: Any = remainder is not None
         if remainder is None:
@@ -232,6 +232,6 @@ class Case(NamedTuple):
 
 
 def state_at(scene: Scene, at: Command) -> State:
-    """The positions of a command and their motion, for what shows them."""
+    """Compute the positions of a command and their motion, for what shows them."""
     with np.errstate(all="ignore"):
         return Case.of(scene).at(at)

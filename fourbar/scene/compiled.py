@@ -48,7 +48,7 @@ def number(rows: Any, row: int, i: int) -> Any:
 
 
 def complex_rounded(z: Any, turned: Any, signs: Any, first: int) -> Any:
-    """A complex number, each part changed by one of two signs; without signs itself.
+    """Change each part of a complex number by one of two signs; without signs nothing changes.
 
     A ground at an angle mixes the parts of every direction, and each carries the larger's.
     """
@@ -62,12 +62,12 @@ def complex_rounded(z: Any, turned: Any, signs: Any, first: int) -> Any:
 
 
 def real_rounded(x: Any, signs: Any, first: int) -> Any:
-    """A real number likewise."""
+    """Change a real number likewise."""
     return x if signs is None else rounded_real(x, signs[first])
 
 
 def by_terms(x: Any, size: Any, signs: Any, first: int) -> Any:
-    """A sum changed by the last digit of its terms."""
+    """Change a sum by the last digit of its terms."""
     return x if signs is None else x + size * signs[first]
 
 
@@ -155,7 +155,7 @@ def thirteen(signs: Any, first: int) -> Any:
 
 
 def lengths_of(rows: Any, i: int) -> tuple[Loop, Loop]:
-    """The lengths in m, and in their unit with E1 and E2."""
+    """Read the lengths in m, and in their unit with E1 and E2."""
     in_unit = Loop(
         *(number(rows, 0, i), number(rows, 1, i), number(rows, 2, i), number(rows, 3, i)),
         *(number(rows, 4, i), number(rows, 5, i)),
@@ -250,7 +250,7 @@ def run(tangents: Array, of_theta_2: Array, rows: Any, drive_bar: int, vectors: 
 def scatter(
     tangents: Array, of_theta_2: Array, rows: Any, drive_bar: int, vectors: Any, scalars: Array, signs: Any
 ) -> None:
-    """The error bars of positions that `run` has evaluated; for the parameters see there.
+    """Compute the error bars of positions that `run` has evaluated; for the parameters see there.
 
     Parameters
     ----------
@@ -328,8 +328,7 @@ def make_known() -> None:
 
 @cache
 def loop(function: Any, on_disk: bool = True) -> Any:
-    """`run` or `scatter` compiled; on the disk, where a place can be written, for later processes until a source
-    changes."""
+    """Compile `run` or `scatter`; on the disk, where it can be written, for later processes until a source changes."""
     from numba import njit
 
     make_known()

@@ -67,7 +67,7 @@ def carries(case: Case) -> bool:
 
 
 def numbers(case: Case, theta_2: Array, branch: Any, omega_2: Any, alpha_2: Any) -> Any:
-    """What `run` reads of a case and the motion of some positions: (ROWS,) numbers, or an array (ROWS BLOCK,).
+    """Pack what `run` reads of a case and the motion of some positions: (ROWS,) numbers, or an array (ROWS BLOCK,).
 
     Lengths in their unit with E1 and E2; lengths, m; u1; omega_2, alpha_2, branch, what theta_2 - theta_1 loses;
     bodies; viscous pins; loads.
@@ -140,7 +140,7 @@ def _called(function: Any, *given: Any) -> None:
 
 
 def evaluated(case: Case, where: Command, part: Part, wanted: int, names: KeysView[str]) -> Evaluated:
-    """Some positions of a command through the compiled loop, and through `commanded` what it leaves open."""
+    """Evaluate some positions of a command by the compiled loop, and through `commanded` what it leaves open."""
     theta_2, branch = where.theta_2[part], sign_of(where.branch[part])
     omega_2, alpha_2 = piece(where.omega_2, part), piece(where.alpha_2, part)
     found = looped(case, theta_2, branch, omega_2, alpha_2, error_bars=wanted == ERROR)

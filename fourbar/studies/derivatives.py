@@ -62,7 +62,7 @@ class Sensitivity:
         return found
 
     def value(self, quantity: str) -> Array:
-        """The quantity itself, (n,) or (n, 2); InputError as `of`."""
+        """Return the quantity itself, (n,) or (n, 2); InputError as `of`."""
         if not isinstance(quantity, str) or quantity not in self.by:
             raise InputError("sensitivity", quantity, "is not known here; known: " + ", ".join(self.by))
         found: Array = values_of(self.solution, quantity)
@@ -70,7 +70,7 @@ class Sensitivity:
 
 
 def sensitivity(scene: Scene) -> Sensitivity:
-    """The derivatives of every quantity at each position of a scene by each of its numbers.
+    """Differentiate every quantity at each position of a scene by each of its numbers.
 
     d(quantity)/d(key), the other numbers held; what the scene leaves out (the inertia of a uniform bar, its centre
     at mid-bar) follows the length. theta_2 is held too, and "motion.theta_2" is the derivative by it.
@@ -135,7 +135,7 @@ class _Directed(Gravity):
 
     @property
     def field(self) -> Any:
-        """g e^{i angle}."""
+        """Compute g e^{i angle}."""
         return polar(self.magnitude, self.angle)
 
 
@@ -185,7 +185,7 @@ class _Sliding(PinFriction):
 
 
 def differentiable(scene: Scene) -> Scene:
-    """The scene with effects that say their derivatives too."""
+    """Replace the scene's effects by some that compute their derivatives too."""
     twins: dict[Any, Any] = {
         Gravity: lambda own: _Directed(own.magnitude, own.angle),
         PinFriction: lambda own: _Sliding(own.pins),
@@ -194,7 +194,7 @@ def differentiable(scene: Scene) -> Scene:
 
 
 def _seeded(scene: Scene, keys: dict[str, Entry]) -> Scene:
-    """The scene with every number carrying its own unit slope; what it leaves out carries that of its length too."""
+    """Give every number of the scene its own unit slope; what it leaves out carries that of its length too."""
     scene = differentiable(scene)
     for index, (key, entry) in enumerate(keys.items()):
         if not key.startswith("motion."):
@@ -210,7 +210,7 @@ def unit_slope(index: int, count: int) -> Sloped:
 def _derivatives(
     scene: Scene, keys: dict[str, Entry], at: Command, index: NDArray[np.intp], names: KeysView[str], moving: bool
 ) -> tuple[dict[str, Any], NDArray[np.bool_]]:
-    """The quantities at some positions, with their slopes; and where dry friction holds a pin at rest."""
+    """Compute the quantities at some positions, with their slopes; and where dry friction holds a pin at rest."""
     place = {key: number for number, key in enumerate(keys)}
 
     def seeded(key: str, number: Any) -> Any:
@@ -238,7 +238,7 @@ def _derivatives(
 
 
 def _position(path: Path, theta_2: Any, branch: Array) -> Position:
-    """The positions, whose directions have the slopes of sines and cosines.
+    """Compute the positions, whose directions have the slopes of sines and cosines.
 
     Those of the tangent of a half angle, which has no bound, lose every digit half a turn from where it is zero.
     """

@@ -39,7 +39,7 @@ class Entry(NamedTuple):
 
 
 def _pair(key: str, place: Place, unit: str, names: tuple[str | int, str | int] = (0, 1)) -> dict[str, Entry]:
-    """The two entries of a magnitude with its angle."""
+    """Make the two entries of a magnitude with its angle."""
     one, other = ((*place, name) for name in names)
     return {f"{key}.0": Entry(one, unit), f"{key}.1": Entry(other, "rad")}
 
@@ -59,7 +59,7 @@ ROWS = {"viscous": "coefficients", "friction": "torques", "pin_friction": "pins"
 
 
 def _of_effect(effect: Any, key: str, place: Place) -> dict[str, Entry]:
-    """The entries of an effect under its key, at its place."""
+    """List the entries of an effect under its key, at its place."""
     numbers = OF_EFFECT.get(effect.key, {})
     if effect.key == "gravity":
         return _pair(key, place, numbers["magnitude"][0], ("magnitude", "angle"))
@@ -82,7 +82,7 @@ def _of_effect(effect: Any, key: str, place: Place) -> dict[str, Entry]:
 
 
 def entries(scene: Scene) -> dict[str, Entry]:
-    """The numbers of a scene that a study varies, lengths first, by key; motion.theta_2 is not among them."""
+    """List the numbers of a scene that a study varies, lengths first, by key; motion.theta_2 is not among them."""
     found = {"lengths.ground": Entry(("linkage", "ground"), "m", POSITIVE)}
     bars = [BAR_NAMES[number] for number in MOVING_BARS]
     found |= {f"lengths.{name}": Entry(("linkage", name, "length"), "m", POSITIVE) for name in bars}
@@ -108,7 +108,7 @@ def entries(scene: Scene) -> dict[str, Entry]:
 
 
 def refusal(key: str, value: object, known: list[str]) -> InputError:
-    """The error for a key that a study cannot vary."""
+    """Make the error for a key that a study cannot vary."""
     expect("key", key, str)
     inner = [name for name in known if name.startswith(f"{key}.")]
     if inner:
@@ -149,7 +149,7 @@ def left_out(scene: Scene, entry: Entry) -> bool:
 
 
 def at_place(whole: Any, place: Place) -> Any:
-    """The number at a place; what a bar leaves out is that of a uniform one."""
+    """Read the number at a place; what a bar leaves out is that of a uniform one."""
     for name in place:
         if isinstance(name, int):
             whole = whole[name]
@@ -161,7 +161,7 @@ def at_place(whole: Any, place: Place) -> Any:
 
 
 def with_numbers(scene: Scene, numbers: Mapping[str, Any]) -> Scene:
-    """A copy with some of its numbers replaced, by key."""
+    """Copy the scene with some of its numbers replaced, by key."""
     known, changed = entries(scene), scene
     for key, number in numbers.items():
         changed = placed(changed, known[key].place, number)
@@ -169,7 +169,7 @@ def with_numbers(scene: Scene, numbers: Mapping[str, Any]) -> Scene:
 
 
 def placed(whole: Any, place: Place, values: Any) -> Any:
-    """A copy with one number replaced; what a constructor checks is not checked again."""
+    """Copy with one number replaced; what a constructor checks is not checked again."""
     if not place:
         return values
     name, *rest = place

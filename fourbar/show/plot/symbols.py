@@ -53,7 +53,7 @@ class Place(NamedTuple):
     """N m; NaN where there is none."""
 
     def point(self, bar: int, z: complex) -> complex:
-        """A point given in the frame of a bar."""
+        """Place a point given in the frame of a bar."""
         return self.foot[bar] + self.factor * z * self.u[bar]
 
 
@@ -72,7 +72,7 @@ class Drawn:
 
 
 def place_of(linkage: FourBar, solution: Solution, index: int, factor: float) -> Place:
-    """The place of one position of a solution."""
+    """Collect what symbols need of one position of a solution."""
     A, B = (factor * complex(*point[index]) for point in (solution.A, solution.B))
     O4 = factor * cmath.rect(linkage.ground, linkage.ground_angle)
     angles = {k: float(getattr(solution, f"theta_{k}")[index]) for k in (2, 3, 4)}
@@ -117,7 +117,7 @@ def draw(axes: "Axes", symbol: Symbol, place: Place, size: float) -> Drawn:
 
 
 def components(z: complex) -> Point:
-    """x and y."""
+    """Split z into x and y."""
     return (z.real, z.imag)
 
 
@@ -148,7 +148,7 @@ def _force(axes: "Axes", symbol: Symbol, place: Place, size: float, drawn: Drawn
 
 
 def _turn(axes: "Axes", centre: complex, radius: float, turn: float, colour: str, drawn: Drawn) -> None:
-    """An arc with a head, counter-clockwise where turn > 0; none where nothing turns."""
+    """Draw an arc with a head, counter-clockwise where turn > 0; none where nothing turns."""
     if turn == 0.0:
         return
     angles = math.radians(-35.0) * turn + turn * np.linspace(0.0, OPENING, 40)
@@ -159,7 +159,7 @@ def _turn(axes: "Axes", centre: complex, radius: float, turn: float, colour: str
 
 
 def _zigzag(start: complex, end: complex, width: float) -> Any:
-    """A coil spring seen from the side: straight ends, teeth between."""
+    """Draw a coil spring seen from the side: straight ends, teeth between."""
     along = end - start
     across = 1j * along / abs(along) * width if along else 0.0
     teeth = [start, start + 0.15 * along]
@@ -168,7 +168,7 @@ def _zigzag(start: complex, end: complex, width: float) -> Any:
 
 
 def _gravity(axes: "Axes", symbol: Symbol, drawn: Drawn) -> None:
-    """An arrow in the corner, of no length in the plane."""
+    """Draw an arrow in the corner, of no length in the plane."""
     size = abs(symbol.vector)
     if size == 0.0:
         return
