@@ -13,7 +13,7 @@ import pytest
 import fourbar
 from fourbar import Friction, InputError, Motion, Scene, Sweep, Tolerance
 from fourbar.cli import status
-from fourbar.effects import Point, Spring, Springs
+from fourbar.effects import Spring, SpringEnd, Springs
 from fourbar.scene import Command
 from fourbar.studies import enclosure, interval
 from fourbar.studies.enclosure import PROVEN, Extremes, extremes
@@ -156,7 +156,7 @@ def test_the_bound_of_a_box_holds_at_its_ends(rocker: tuple[Scene, Extremes]) ->
 
 def meeting(distance: float) -> Scene:
     """A spring whose ends nearly meet once in a turn: the boxes there hold a distance of 0."""
-    spring = Spring(Point(1, distance, 0.5), Point(2, 0.1, 0.0), 1000.0, 0.5)
+    spring = Spring(SpringEnd(1, distance, 0.5), SpringEnd(2, 0.1, 0.0), 1000.0, 0.5)
     return Scene(fourbar.uniform(0.3, 0.1, 0.25, 0.22), Motion(0.0, 10.0), 2, (), (Springs((spring,)),))
 
 

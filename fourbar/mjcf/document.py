@@ -14,7 +14,7 @@ from fourbar.mjcf.appearance import add_appearance
 from fourbar.mjcf.effects import row, unwound
 from fourbar.mjcf.model import Model, carriable, constant, servo, text
 from fourbar.mjcf.notes import NOTES
-from fourbar.mjcf.settings import RECIPE, Run, Settings, fitted_pad
+from fourbar.mjcf.settings import RECIPE, Settings, WindowMotion, fitted_pad
 from fourbar.quantities import OK
 from fourbar.scene import Command, Scene, command
 from fourbar.solution import Array
@@ -164,13 +164,13 @@ class Start(NamedTuple):
 
     qpos: tuple[float, float, float]
     qvel: tuple[float, float, float]
-    run: Run
+    run: WindowMotion
 
 
-def run_through(theta_2: Array, omega: float, alpha: float) -> Run:
+def run_through(theta_2: Array, omega: float, alpha: float) -> WindowMotion:
     """Choose the motion through positions: counter-clockwise from the least, or clockwise from the greatest."""
     least, most = float(np.min(theta_2)), float(np.max(theta_2))
-    return Run(least, most, omega, alpha) if omega > 0.0 else Run(most, least, omega, alpha)
+    return WindowMotion(least, most, omega, alpha) if omega > 0.0 else WindowMotion(most, least, omega, alpha)
 
 
 def at_start(scene: Scene) -> Start:

@@ -91,7 +91,7 @@ def _load(effect: "Load", model: Model) -> None:
     model.loads.append(effect)
 
 
-class Row(NamedTuple):
+class MjcfForm(NamedTuple):
     """One effect in MJCF."""
 
     add: Callable[[Any, Model], None]
@@ -102,19 +102,19 @@ class Row(NamedTuple):
     """The angles of pins O2, A, O4, moved by the whole turns that the effect tells apart, rad."""
 
 
-MJCF_OF: dict[str, Row] = {
-    "gravity": Row(_gravity, _weights),
-    "viscous": Row(_viscous, lambda effect, linkage, speed: sum((k for _, k in effect.coefficients), 0.0) * speed),
-    "friction": Row(_friction, lambda effect, linkage, speed: sum((f for _, f in effect.torques), 0.0)),
-    "torsion": Row(_torsion, lambda effect, linkage, speed: effect.greatest_couple, _unwind_torsion),
-    "springs": Row(_springs, _tensions),
-    "flywheel": Row(_flywheel),
-    "load": Row(_load, lambda effect, linkage, speed: effect.greatest_force(linkage) * max(linkage.lengths)),
+MJCF_OF: dict[str, MjcfForm] = {
+    "gravity": MjcfForm(_gravity, _weights),
+    "viscous": MjcfForm(_viscous, lambda effect, linkage, speed: sum((k for _, k in effect.coefficients), 0.0) * speed),
+    "friction": MjcfForm(_friction, lambda effect, linkage, speed: sum((f for _, f in effect.torques), 0.0)),
+    "torsion": MjcfForm(_torsion, lambda effect, linkage, speed: effect.greatest_couple, _unwind_torsion),
+    "springs": MjcfForm(_springs, _tensions),
+    "flywheel": MjcfForm(_flywheel),
+    "load": MjcfForm(_load, lambda effect, linkage, speed: effect.greatest_force(linkage) * max(linkage.lengths)),
 }
 """By the key of an effect; MJCF has no counterpart of what is not here (friction that depends on the pin forces)."""
 
 
-def row(effect: "Effect") -> Row:
+def row(effect: "Effect") -> MjcfForm:
     """Return the row of an effect; LimitError where it has none."""
     if effect.key not in MJCF_OF:
         raise LimitError(f"the effect {effect.key!r} has no counterpart in MJCF")

@@ -74,7 +74,7 @@ FULL_TURN = 2.0 * math.pi * (1.0 - 1e-9)
 """rad; a sweep over 0..360 deg may miss the turn by its rounding."""
 
 
-class Run:
+class WindowMotion:
     """The input's motion through a window of theta_2, in time.
 
     theta_2 = start + omega t + alpha t^2/2 from `start` to `stop`, at the speed `omega` at the start.

@@ -24,7 +24,7 @@ from fourbar.scene.motion import FromLimit
 from fourbar.scene.point import OF_POINTS
 from fourbar.solution import Array, Solution, values_of
 from fourbar.solve import solve
-from fourbar.studies.keys import THETA_2, Entry, at_place, entries, placed
+from fourbar.studies.keys import THETA_2, SceneNumber, at_place, entries, placed
 from fourbar.studies.sloped import Sloped, slopes, values
 
 AT_ONCE = 512
@@ -40,7 +40,7 @@ class Sensitivity:
     scene: Scene
     solution: Solution
     """The quantities themselves."""
-    keys: dict[str, Entry]
+    keys: dict[str, SceneNumber]
     """The p numbers by which they are derived, as in the scene file, pairs and lists by index."""
     numbers: Array
     """Their values, (p,); of motion.theta_2 and of what a motion law varies NaN."""
@@ -91,7 +91,9 @@ def sensitivity(scene: Scene) -> Sensitivity:
         raise InputError(THETA_2, scene.motion.theta_2, "has no sensitivities: the limit moves with the lengths")
     at, solution, known = command(scene), solve(scene), entries(scene)
     moving = at.omega_2 is not None
-    keys = {THETA_2: Entry((), "rad")} | (known if moving else {k: e for k, e in known.items() if _of_position(k)})
+    keys = {THETA_2: SceneNumber((), "rad")} | (
+        known if moving else {k: e for k, e in known.items() if _of_position(k)}
+    )
     numbers = [np.nan if key == THETA_2 else at_place(scene, entry.place) for key, entry in keys.items()]
     forces = FORCES if any(effect.loaded_pins for effect in scene.effects) else (*FORCES, "drive_condition")
     names = [
@@ -193,7 +195,7 @@ def differentiable(scene: Scene) -> Scene:
     return replace(scene, effects=tuple(twins.get(type(own), lambda own: own)(own) for own in scene.effects))
 
 
-def _seeded(scene: Scene, keys: dict[str, Entry]) -> Scene:
+def _seeded(scene: Scene, keys: dict[str, SceneNumber]) -> Scene:
     """Give every number of the scene its own unit slope; what it leaves out carries that of its length too."""
     scene = differentiable(scene)
     for index, (key, entry) in enumerate(keys.items()):
@@ -208,7 +210,7 @@ def unit_slope(index: int, count: int) -> Sloped:
 
 
 def _derivatives(
-    scene: Scene, keys: dict[str, Entry], at: Command, index: NDArray[np.intp], names: KeysView[str], moving: bool
+    scene: Scene, keys: dict[str, SceneNumber], at: Command, index: NDArray[np.intp], names: KeysView[str], moving: bool
 ) -> tuple[dict[str, Any], NDArray[np.bool_]]:
     """Compute the quantities at some positions, with their slopes; and where dry friction holds a pin at rest."""
     place = {key: number for number, key in enumerate(keys)}

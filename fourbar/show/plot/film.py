@@ -120,7 +120,7 @@ def frames(shown: View, count: int) -> list[int]:
     return there + there[-2:0:-1]
 
 
-def _acting(axes: Any, shown: View, factor: float, size: float) -> Callable[[int], list[symbols.Drawn]]:
+def _acting(axes: Any, shown: View, factor: float, size: float) -> Callable[[int], list[symbols.DrawnSymbol]]:
     """Make the function that draws the symbols of what acts at a position, in place of what stood there.
 
     The window becomes large enough for those of every position.
@@ -128,7 +128,7 @@ def _acting(axes: Any, shown: View, factor: float, size: float) -> Callable[[int
     everything = acting(shown.scene)
     passing: list[Any] = []
 
-    def draw(index: int) -> list[symbols.Drawn]:
+    def draw(index: int) -> list[symbols.DrawnSymbol]:
         while passing:
             passing.pop().remove()
         place = symbols.place_of(shown.scene.linkage, shown.sweep, index, factor)
