@@ -9,7 +9,7 @@ import pytest
 
 import fourbar
 from fourbar.effects import Flywheel, Friction, Gravity, Load, PinFriction, Spring, SpringEnd, Springs, Table, Torsion
-from fourbar.effects.cones import NONE, ONE, SEVERAL, settle
+from fourbar.effects.cones import NONE, ONE, SEVERAL, solve_sliding
 from fourbar.errors import InputError, LimitError
 from fourbar.scene import Scene
 from fourbar.scene.motion import Motion, Sweep
@@ -172,7 +172,7 @@ def test_one_cone_has_one_none_or_two_solutions() -> None:
         ((1.0, 0.0), (1.0 - 2.0**-20, 0.0)): (ONE, 2.0**20, 2.0**-20),
     }
     for (F, C), (number, x, far) in cases.items():
-        found = settle(np.array([[F]]), np.array([[[C]]]), np.array([[1.0]]))
+        found = solve_sliding(np.array([[F]]), np.array([[[C]]]), np.array([[1.0]]))
         assert found.number[0] == number, (F, C)
         assert found.x[0, 0] == pytest.approx(x, rel=1e-15, nan_ok=True), (F, C)
         if far is not None:
@@ -184,7 +184,7 @@ def test_several_cones_one_of_which_is_known() -> None:
     for c1, c2, number in ((0.5, 0.3, ONE), (2.0, 0.3, NONE), (-2.0, 0.3, SEVERAL), (-2.0, -3.0, SEVERAL)):
         F = np.array([[[1.0, 0.0], [2.0, 0.0]]] * 2)
         C = np.array([[[[c1, 0.0], [0.0, 0.0]], [[0.0, 0.0], [c2, 0.0]]]] * 2)
-        found = settle(F, C, np.array([[1.0, 1.0], [0.25, 0.125]]))
+        found = solve_sliding(F, C, np.array([[1.0, 1.0], [0.25, 0.125]]))
         assert list(found.number) == [number, ONE]
         if number != NONE:
             assert found.x[0] == pytest.approx([1.0 / (1.0 - c1), 2.0 / (1.0 - c2)], rel=1e-12)

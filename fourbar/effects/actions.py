@@ -40,11 +40,8 @@ class Actions:
         them, as a distance against a spring's length.
     """
 
-    def __init__(
-        self, state: State, bodies: Bodies, side: int = 0, rounded: Callable[..., Number] | None = None
-    ) -> None:
-        self.state, self.bodies, self.side = state, bodies, side
-        self.rounded = rounded or as_it_is
+    def __init__(self, state: State, bodies: Bodies, side: int = 0, rounded: Callable[..., Number] = as_it_is) -> None:
+        self.state, self.bodies, self.side, self.rounded = state, bodies, side, rounded
         self.forces: dict[int, Any] = {}
         """Resultants of the bars on which any acts, complex, N."""
         self.moments: dict[int, Any] = {}

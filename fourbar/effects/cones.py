@@ -35,7 +35,7 @@ class Sliding(NamedTuple):
     """(n,), in (0, 1]: the least stretch of the equations' slope, 0 where they jam."""
 
 
-def settle(F: Array, C: Array, k: Array) -> Sliding:
+def solve_sliding(F: Array, C: Array, k: Array) -> Sliding:
     """Solve n problems in p unknowns: F (n, p, 2) in N, C (n, p, p, 2) in 1/m, k (n, p) in m."""
     n, p = F.shape[:2]
     known = np.isfinite(F).all(axis=(1, 2)) & np.isfinite(C).all(axis=(1, 2, 3))

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.effects.actions import Actions, bodies
+from fourbar.effects.actions import Actions, as_it_is, bodies
+from fourbar.effects.effect import SolvedFriction
 from fourbar.errors import LimitError
 from fourbar.formulas.arithmetic import anywhere, polar, vector
 from fourbar.formulas.motion import Coefficients, State, rates
@@ -71,13 +72,13 @@ def undecided(factor: Any, constant: Any, size: Any) -> Any:
 
 
 class Dynamics(NamedTuple):
-    """Pin forces and driving torque, and what friction that depends on the pin forces was solved to."""
+    """Pin forces and what friction that depends on them was solved to, as `SolvedFriction`, and the driving torque."""
 
     pins: PinForces
+    from_jamming: Any
+    residual: Any
+    status: Any
     torque: Any
-    from_jamming: Any = None
-    residual: Any = None
-    status: Any = None
 
 
 class Case(NamedTuple):
@@ -169,9 +170,9 @@ class Case(NamedTuple):
         return half, index
 
     def dynamics(
-        self, state: State, acceleration: Any, side: int = 0, rounded: Callable[..., Any] | None = None
+        self, state: State, acceleration: Any, side: int = 0, rounded: Callable[..., Any] = as_it_is
     ) -> Dynamics:
-        """Pin forces and torque under everything that acts; for the parameters see `Actions`."""
+        """Compute pin forces and torque under everything that acts; for the parameters see `Actions`."""
         a, at, k = self.lengths.a, state.at, state.k
         actions = Actions(state, self.bodies, side, rounded)
         for term in self.terms:
@@ -183,36 +184,27 @@ class Case(NamedTuple):
             of_input, of_others = inertia(a, self.bodies, at, k)
             others = others + of_others * acceleration
             inertial = others + of_input * acceleration
-        if rounded is not None:
+        if rounded is not as_it_is:
             own, mass_at_A = Wrenches(*map(rounded, own)), vector(rounded(mass_at_A.real), rounded(mass_at_A.imag))
             inertial, others = rounded(inertial), rounded(others)
-
-        sine, short = self.path.drive_sine(at, self.drive_bar), anywhere(self.lengths.d < self.lengths.a)
-        if rounded is not None:
-            sine = rounded(sine)
+        sine, short = rounded(self.path.drive_sine(at, self.drive_bar)), anywhere(self.lengths.d < self.lengths.a)
         if self.drive_bar == 4:
-            about_B = coupler_about_B(self.lengths, self.bodies[1], at, state.moving, sine)
-            others = about_B if rounded is None else rounded(about_B)
+            others = rounded(coupler_about_B(self.lengths, self.bodies[1], at, state.moving, sine))
 
-        def eliminate(
-            acting: Actions, own: Wrenches = own, mass_at_A: Any = mass_at_A, others: Any = others
-        ) -> PinForces:
-            w, moment = acting.wrenches(own), 0.0
+        def eliminate(acting: Actions, *, with_inertia: bool = True) -> PinForces:
+            w, mass, rest = (own, mass_at_A, others) if with_inertia else (Wrenches(), 0.0j, 0.0)
+            moment: Any = 0.0
             if self.drive_bar == 4:
-                moment = -(acting.about_B() + others)
+                moment = -(acting.about_B() + rest)
             elif self.drive_bar == 2 and short:
-                moment = acting.work()[1] - others
-            return pin_forces(self.lengths, at, self.drive_bar, sine, w, mass_at_A, moment)
+                moment = acting.work()[1] - rest
+            return pin_forces(self.lengths, at, self.drive_bar, sine, acting.wrenches(w), mass, moment)
 
-        def by_couples(acting: Actions) -> PinForces:
-            return eliminate(acting, Wrenches(), 0.0j, 0.0)
-
-        pins = eliminate(actions)
-        settled: list[Any] = []
+        solved = SolvedFriction(eliminate(actions))
         for term in self.terms:  # a scene holds one effect of a kind, and one kind depends on the forces
             if term.loaded_pins:
-                pins, *settled = term.settle(actions, pins, eliminate, by_couples)  # type: ignore[attr-defined]
-        return Dynamics(pins, driving_torque(k, self.drive_bar, inertial, actions.work()[0]), *settled)
+                solved = term.solve_friction(actions, solved.pins, eliminate)
+        return Dynamics(*solved, driving_torque(k, self.drive_bar, inertial, actions.work()[0]))
 
     def torque_interval(self, state: State, alpha_2: Any, torque: Any) -> tuple[Any, Any, Any]:
         """Least and greatest driving torque where dry friction holds a pin at rest, elsewhere the torque twice, N m.

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from fourbar.effects import Gravity, PinFriction
 from fourbar.effects.actions import Actions
-from fourbar.effects.cones import settle
-from fourbar.effects.pin_friction import Settled
+from fourbar.effects.cones import solve_sliding
+from fourbar.effects.effect import SolvedFriction
 from fourbar.errors import InputError, expect
 from fourbar.formulas.arithmetic import polar
 from fourbar.formulas.path import Path
@@ -146,13 +146,9 @@ class _Sliding(PinFriction):
 
     __slots__ = ()
 
-    def settle(self, actions: Actions, pins: Any, eliminate: Any, by_couples: Any) -> Settled:
+    def solve_friction(self, actions: Actions, pins: Any, eliminate: Any) -> SolvedFriction:
         names, arms = self.loaded_pins, {pin: mu * r for pin, mu, r in self.pins}
-        senses, per_unit = {pin: actions.sense(pin) for pin in names}, {}
-        for turned in names:
-            alone = Actions(actions.state, actions.bodies)
-            alone.couple(turned, -senses[turned])
-            per_unit[turned] = by_couples(alone)
+        senses, per_unit = {pin: actions.sense(pin) for pin in names}, self.per_unit(actions, eliminate)
         force = [getattr(pins, PIN_FORCE[pin]) for pin in names]
         by = [[getattr(per_unit[q], PIN_FORCE[pin]) for q in names] for pin in names]
         shape = values(pins.F12).shape
@@ -163,7 +159,7 @@ class _Sliding(PinFriction):
 
         C = np.stack([np.stack([plain(c) for c in row], axis=1) for row in by], axis=1)
         k = np.stack([plain(arms[pin]) for pin in names], axis=1)
-        found = settle(np.stack([plain(f) for f in force], axis=1), C, k)
+        found = solve_sliding(np.stack([plain(f) for f in force], axis=1), C, k)
         x = found.x
         gaps, J = [], np.empty((len(x), len(names), len(names)))
         for row, pin in enumerate(names):
@@ -182,8 +178,7 @@ class _Sliding(PinFriction):
         dx[:, :, solvable] = np.moveaxis(np.linalg.solve(matrix, np.moveaxis(rows[:, :, solvable], -1, 0)), 0, -1)
         for row, pin in enumerate(names):
             actions.couple(pin, -senses[pin] * Sloped(x[:, row], dx[row]))
-        none: Any = None
-        return Settled(eliminate(actions), none, none, none)
+        return SolvedFriction(eliminate(actions))
 
 
 def differentiable(scene: Scene) -> Scene:
