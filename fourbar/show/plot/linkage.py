@@ -55,19 +55,7 @@ def draw_linkage(axes: "Axes", view: View, labels: Labels, *, moving: bool = Fal
         axes.plot([x], [y], "D", ms=4.5, mew=1.2, zorder=8, **{**OPEN, "mec": POINT})
         labels.keep_off(axes, (float(x), float(y)), (float(x), float(y)))
         labels.add(Label(axes, name, (float(x), float(y)), middle, POINT, 8.5, 2.5))
-    for number in MOVING_BARS:
-        bar, colour = view.scene.linkage.bar(number), BAR_COLOURS[number]
-        if bar.mass == 0.0:
-            continue
-        x, y = factor * getattr(view.here, f"G{number}")[0]
-        here = (float(x), float(y))
-        r_along, r_across = bar.to_centre.real, bar.to_centre.imag
-        if r_across != 0.0 or not 0.0 <= r_along <= bar.length:  # off the bar: tied to it by a line
-            axes.plot(*zip(where[ENDS[number][0]], here, strict=True), color=colour, lw=0.8, ls=":", zorder=3)
-            labels.keep_off(axes, where[ENDS[number][0]], here)
-        mass_centre(axes, here)
-        labels.keep_off(axes, here, here)
-        labels.add(Label(axes, f"$G_{number}$", here, middle, colour, 8.0, 3.0))
+    _mass_centres(axes, view, labels, where, middle)
     if moving:
         vectors(axes, view, view.here, factor, size)
     place = place_of(view.scene.linkage, view.here, 0, factor)
@@ -82,6 +70,23 @@ def draw_linkage(axes: "Axes", view: View, labels: Labels, *, moving: bool = Fal
     title = f"Linkage at {view.at}, {view.branch_name} branch"
     axes.set(xlabel=f"$x$ ({unit})", ylabel=f"$y$ ({unit})", title=title)
     path_legend(axes)
+
+
+def _mass_centres(axes: "Axes", view: View, labels: Labels, where: dict[str, Point], middle: Point) -> None:
+    factor, _, _ = scale_of(view)
+    for number in MOVING_BARS:
+        bar, colour = view.scene.linkage.bar(number), BAR_COLOURS[number]
+        if bar.mass == 0.0:
+            continue
+        x, y = factor * getattr(view.here, f"G{number}")[0]
+        here = (float(x), float(y))
+        r_along, r_across = bar.to_centre.real, bar.to_centre.imag
+        if r_across != 0.0 or not 0.0 <= r_along <= bar.length:  # off the bar: tied to it by a line
+            axes.plot(*zip(where[ENDS[number][0]], here, strict=True), color=colour, lw=0.8, ls=":", zorder=3)
+            labels.keep_off(axes, where[ENDS[number][0]], here)
+        mass_centre(axes, here)
+        labels.keep_off(axes, here, here)
+        labels.add(Label(axes, f"$G_{number}$", here, middle, colour, 8.0, 3.0))
 
 
 def path_legend(axes: "Axes") -> float:
