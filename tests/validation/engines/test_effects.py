@@ -19,8 +19,8 @@ from fourbar.effects import (
     Gravity,
     Load,
     PinFriction,
-    Point,
     Spring,
+    SpringEnd,
     Springs,
     Table,
     Torsion,
@@ -48,8 +48,8 @@ ACTING: dict[str, Effect] = {
     "torsion": Torsion.at(O4=(2.0, 1.9, 0.1), B=(1.0, 0.8, -0.2)),
     "springs": Springs(
         (
-            Spring(Point(1, 0.1, -1.5), Point(4, 0.08, 0.2), 200.0, 0.05, 3.0),
-            Spring(Point(2, 0.05, 0.5), Point(3, 0.1, 0.3), 50.0, 0.05, 1.0),
+            Spring(SpringEnd(1, 0.1, -1.5), SpringEnd(4, 0.08, 0.2), 200.0, 0.05, 3.0),
+            Spring(SpringEnd(2, 0.05, 0.5), SpringEnd(3, 0.1, 0.3), 50.0, 0.05, 1.0),
         )
     ),
     "flywheel": Flywheel(0.02, 2),

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from fourbar.effects import Flywheel, Friction, Gravity, Load, Point, Spring, Springs, Torsion, Viscous
+from fourbar.effects import Flywheel, Friction, Gravity, Load, Spring, SpringEnd, Springs, Torsion, Viscous
 from fourbar.formulas.mobility import default_range
 from fourbar.linkage import MOVING_BARS, PINS, Bar, FourBar
 from fourbar.scene import Scene
@@ -161,7 +161,9 @@ def _sprung(rng: np.random.Generator, linkage: FourBar, weight: float, ranges: R
     size = weight * abs(ranges.load(rng))
     if rng.random() < ranges.sprung:
         one, other = (int(bar) for bar in rng.choice([1, *MOVING_BARS], 2, replace=False))
-        start, end = (Point(bar, linkage.lengths[bar - 1] * ranges.arm(rng), ANY_ANGLE(rng)) for bar in (one, other))
+        start, end = (
+            SpringEnd(bar, linkage.lengths[bar - 1] * ranges.arm(rng), ANY_ANGLE(rng)) for bar in (one, other)
+        )
         length = max(linkage.lengths)
         found.append(
             Springs((Spring(start, end, (size or 1.0) / length, length * ANY_PART(rng), size * EITHER_SIGN(rng)),))

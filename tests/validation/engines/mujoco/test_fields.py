@@ -11,7 +11,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from fourbar.effects import Friction, Gravity, Point, Spring, Springs, Torsion, Viscous
+from fourbar.effects import Friction, Gravity, Spring, SpringEnd, Springs, Torsion, Viscous
 from fourbar.errors import InputError
 from fourbar.linkage import PINS
 from fourbar.mjcf import mjcf
@@ -23,7 +23,7 @@ from fourbar_validation.engines.mujoco.fields import COMPARED, list_of, members
 from fourbar_validation.engines.mujoco.topology import Topology
 from tests.support.scenes import crank_rocker
 
-SPRING = Spring(Point(1, 0.1, -1.5), Point(4, 0.08, 0.2), 200.0, 0.05)
+SPRING = Spring(SpringEnd(1, 0.1, -1.5), SpringEnd(4, 0.08, 0.2), 200.0, 0.05)
 EVERYTHING = crank_rocker(
     effects=(
         Gravity(),

@@ -9,7 +9,7 @@ import pytest
 
 import fourbar
 from fourbar.mjcf import RECIPE
-from fourbar.mjcf.settings import Run
+from fourbar.mjcf.settings import WindowMotion
 from fourbar.quantities import UNKNOWNS
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.compare import compare
@@ -86,7 +86,7 @@ def test_slow_linkages_hold_as_well(loaded: bool, index: int) -> None:
 
 
 def test_an_input_that_speeds_up_covers_the_end_of_its_window_in_as_many_steps() -> None:
-    run = Run(0.0, 3.0, 0.01, 5.0)
+    run = WindowMotion(0.0, 3.0, 0.01, 5.0)
     assert run.fastest * run.timestep(RECIPE) <= 3.0 / RECIPE.steps_per_window
 
 
