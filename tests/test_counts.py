@@ -1,9 +1,7 @@
 """What is counted as agreeing: no refusal, no missing number, no empty table; and every form says the same."""
 
 import html
-import json
 import math
-import subprocess
 import xml.etree.ElementTree as ET
 from dataclasses import replace
 from pathlib import Path
@@ -34,7 +32,6 @@ from validation.report.html import html as page_of
 from validation.report.html import markdown
 from validation.run import released as free
 from validation.run.judge import judge, judged
-from validation.stress.mutation import mutation
 from validation.studies.cost.laws import Law
 
 NAN = math.nan
@@ -317,15 +314,3 @@ def test_a_study_in_which_no_law_is_fitted_is_no_success(
         monkeypatch.setattr("validation.studies.cost.cost.laws", lambda _, found=found: found)
         assert status(["cost", "--out", str(tmp_path)]) == code
         assert ("Nothing was compared" in capsys.readouterr().out) == (code == FAILED)
-
-
-def test_a_harness_that_was_tried_on_no_changing_mutant_is_no_success(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    tally = {"mutants": 0, "changing": 0, "caught": 0, "missed": []}
-    monkeypatch.setattr(mutation, "_generate", lambda *_: None)
-    for changing, caught, code in ((0, 0, FAILED), (100, 94, FAILED), (100, 95, HOLDS)):
-        printed = json.dumps({"mobility": tally | {"changing": changing, "caught": caught}})
-        done = subprocess.CompletedProcess([], 0, printed)
-        monkeypatch.setattr(mutation.subprocess, "run", lambda *_, done=done, **__: done)
-        assert mutation._harness(tmp_path, tmp_path, "mobility", 0, tmp_path) == code

@@ -23,7 +23,7 @@ BETTER = {
 }
 """Words of this project alone, and words that a mechanical engineer uses for the same."""
 STORED = ("asked: float", "self.asked", '"asked", "error"')
-"""A column that `advise-study` stores."""
+"""A column that `advise --study` stores."""
 KINDS = {".py", ".md", ".toml", ".js", ".css", ".html", ".j2", ".yml"}
 GENERATED = {"docs/examples"}
 WORDS = re.compile(rf"(?<![a-z])({'|'.join(BETTER)})(?![a-z])", re.IGNORECASE)

@@ -6,6 +6,9 @@ from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
+import click
+
+from fourbar.errors import FAILED, HOLDS
 from validation.run.elsewhere import ended
 from validation.stress.mutation import planting
 from validation.stress.mutation.planting import ROOT, faults
@@ -50,3 +53,18 @@ def planted(workers: int) -> Iterator[tuple[str, str | None]]:
             rows = one.result()
             why = survives(entry, rows if isinstance(rows, str) else rows[0])
             yield entry["fault"], None if why and "harmless" in entry else why
+
+
+@click.command()
+@click.option("--workers", default=2, show_default=True, type=click.IntRange(1))
+def command(workers: int) -> int:
+    """Make each fault of planted.toml in formulas, effects, MJCF and engines, one at a time; each must be caught."""
+    from rich.console import Console
+    from rich.progress import track
+
+    results = list(track(planted(workers), "planting", total=len(faults()) + 1, console=Console(stderr=True)))
+    survivors = [(fault, why) for fault, why in results if why is not None]
+    for fault, why in survivors:
+        click.echo(f"{fault}: {why}")
+    click.echo(f"{len(results) - 1} faults, {len(survivors)} of them survive without a reason on record")
+    return FAILED if survivors else HOLDS

@@ -33,17 +33,12 @@ ORDERS = "Errors are the worst over the scene's positions, each on its scale, ag
 @click.option(
     "-o", "--out", type=click.Path(path_type=Path, file_okay=False), default=Path("results/cost"), show_default=True
 )
-@click.option("--effects", is_flag=True, help="Count instead what each effect costs in each engine (`effects-cost`).")
-def cost(scenes: tuple[Path, ...], out: Path, effects: bool) -> int:
+def cost(scenes: tuple[Path, ...], out: Path) -> int:
     """What accuracy costs in time: work and precision of every method, on SCENES (default: the crank-rocker).
 
     An interrupted study is resumed where it stopped. Exit status 1 where the law of any quantity does not hold, or
     none is decided.
     """
-    if effects:
-        from validation.studies.effects.cost import command
-
-        return int(command.main(["--out", str(out / "effects.md")], standalone_mode=False))
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
