@@ -135,7 +135,7 @@ def hopeless(scene: fourbar.Scene) -> object:
 def test_a_count_that_cannot_decide_says_which_one_can(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    case = measure.Case(0, "drag-link", 1.0, True, 2, 1e-3, True, 5e-4, 20.0, 19.0, 5)
+    case = measure.AdviceCase(0, "drag-link", 1.0, True, 2, 1e-3, True, 5e-4, 20.0, 19.0, 5)
     monkeypatch.setattr(measure, "case", lambda seed, index, costs: replace(case, index=index))
     monkeypatch.setattr(measure, "relative_costs", lambda rig: {})
     for count, status in ((40, 1), (73, 0)):
@@ -147,9 +147,9 @@ def test_a_count_that_cannot_decide_says_which_one_can(
 def test_a_measure_is_resumed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     made: list[int] = []
 
-    def case(seed: int, index: int, costs: object) -> measure.Case:
+    def case(seed: int, index: int, costs: object) -> measure.AdviceCase:
         made.append(index)
-        return measure.Case(index, "drag-link", 1.0, True, 2, 1e-3, True, 5e-4, 20.0, 19.0, 5)
+        return measure.AdviceCase(index, "drag-link", 1.0, True, 2, 1e-3, True, 5e-4, 20.0, 19.0, 5)
 
     monkeypatch.setattr(measure, "case", case)
     monkeypatch.setattr(measure, "relative_costs", lambda rig: {})

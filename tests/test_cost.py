@@ -26,7 +26,7 @@ from validation.stress.mutation.specimens import SPECIMENS
 from validation.studies.cost import formulas, laws, orders, pictures, study
 from validation.studies.cost.cost import cost, front_lines
 from validation.studies.cost.curves import BEST
-from validation.studies.cost.errors import NO_ANSWER, QUANTITIES, Errors, errors
+from validation.studies.cost.errors import NO_ANSWER, QUANTITIES, WorstErrors, errors
 
 
 def turning(omega: float = 10.0, positions: int = 36) -> fourbar.Scene:
@@ -35,10 +35,10 @@ def turning(omega: float = 10.0, positions: int = 36) -> fourbar.Scene:
     return fourbar.Scene(LINKAGE, fourbar.Motion(sweep, omega), effects=(fourbar.Gravity(),))
 
 
-def tried(scene: fourbar.Scene, build: Build | None = None) -> Callable[[Settings], Errors]:
+def tried(scene: fourbar.Scene, build: Build | None = None) -> Callable[[Settings], WorstErrors]:
     rig = Rig(scene, command(scene))
 
-    def error(settings: Settings) -> Errors:
+    def error(settings: Settings) -> WorstErrors:
         trial = rig.try_out(settings, build)
         return NO_ANSWER if trial.broken else errors(scene, trial.at, trial.quantities)
 

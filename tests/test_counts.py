@@ -32,7 +32,7 @@ from validation.report.html import html as page_of
 from validation.report.html import markdown
 from validation.run import released as free
 from validation.run.judge import judge, judged
-from validation.studies.cost.laws import Law
+from validation.studies.cost.laws import ErrorLaw
 
 NAN = math.nan
 
@@ -307,9 +307,9 @@ def test_numbers_without_a_digit_do_not_agree(tmp_path: Path, capsys: pytest.Cap
 def test_a_study_in_which_no_law_is_fitted_is_no_success(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr("validation.studies.cost.study.Study.points", lambda _: iter(()))
+    monkeypatch.setattr("validation.studies.cost.study.CostStudy.points", lambda _: iter(()))
     monkeypatch.setattr("validation.studies.cost.cost.write", lambda *_: [])
-    law = Law("order", "torque", 4.0, 0.1, 4.0, 9)
+    law = ErrorLaw("order", "torque", 4.0, 0.1, 4.0, 9)
     for found, code in (([], FAILED), ([replace(law, points=1)], FAILED), ([law], HOLDS)):
         monkeypatch.setattr("validation.studies.cost.cost.laws", lambda _, found=found: found)
         assert status(["cost", "--out", str(tmp_path)]) == code

@@ -89,7 +89,7 @@ def test_few_mutants_may_be_missed_and_none_that_matters_is_no_success(
 ) -> None:
     some = [code_mutants.Mutant(str(n), lambda: None, (lambda: None).__code__) for n, _ in enumerate(verdicts)]  # type: ignore[arg-type]
     each = iter(verdicts)
-    monkeypatch.setattr(harness, "trials", list)
+    monkeypatch.setattr(harness, "baselines", list)
     monkeypatch.setattr(harness, "mutants", lambda _: some)
     monkeypatch.setattr(harness, "verdict", lambda *_: next(each))
     assert ended(["faults", "--mutants", "--module", "torque"]) == status
@@ -97,7 +97,7 @@ def test_few_mutants_may_be_missed_and_none_that_matters_is_no_success(
 
 
 def test_a_mutant_that_hangs_or_raises_is_caught(monkeypatch: pytest.MonkeyPatch) -> None:
-    tried = [harness.Trial(SCENE, at := command_of(SCENE), [], numbers(SCENE, at))]
+    tried = [harness.Baseline(SCENE, at := command_of(SCENE), [], numbers(SCENE, at))]
     mutant = next(mutants(torque))
 
     def raises(*_: object) -> None:

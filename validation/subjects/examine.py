@@ -51,7 +51,7 @@ class Line:
 
 
 @dataclass(slots=True)
-class Standing:
+class Examination:
     """All that the page shows."""
 
     lines: list[Line] = field(default_factory=list)
@@ -61,9 +61,9 @@ class Standing:
     left_out: dict[str, str] = field(default_factory=dict)
 
 
-def examine(scene: Scene, file: Path, pythons: list[Path], seconds: float) -> Standing:
+def examine(scene: Scene, file: Path, pythons: list[Path], seconds: float) -> Examination:
     """Every subject under the first of the interpreters that has it."""
-    found = Standing()
+    found = Examination()
     for module, (name, library) in SUBJECTS.items():
         python = next((python for python in pythons if _has(python, library)), None)
         if python is None:
@@ -85,7 +85,7 @@ def examine(scene: Scene, file: Path, pythons: list[Path], seconds: float) -> St
 
 
 def lines(scene: Scene, name: str, answer: dict[str, Any]) -> list[Line]:
-    """The judged lines of one subject's answer."""
+    """Compare one simulator's readings with the formulas, line by line."""
     made: list[Line] = []
     turn = abs(math.tau / scene.motion.omega_2) if scene.motion.omega_2 else math.nan
     for reading in answer["readings"]:

@@ -14,7 +14,7 @@ from validation.compare.rows import csv_text
 from validation.report.machine import machine
 from validation.report.svg import drawn
 from validation.report.templating import rendered
-from validation.subjects.examine import TORQUE_AND_FORCES, Line, Standing, examine
+from validation.subjects.examine import TORQUE_AND_FORCES, Examination, Line, examine
 
 PROBLEM = Path("models/problems/crank_rocker.toml")
 FINDINGS = Path(__file__).parents[2] / "docs" / "findings"
@@ -76,7 +76,7 @@ def cells(line: Line) -> list[str]:
     return [line.subject, line.version, line.setting, of, *numbers, f"{line.gap:.1e}", cost, order]
 
 
-def table(found: Standing) -> str:
+def table(found: Examination) -> str:
     """CSV, every digit."""
     columns = ["subject", "version", "setting", "steps", *TORQUE_AND_FORCES, "gap", "cpu_s_per_s", "order"]
     rows: list[list[Any]] = []
@@ -86,7 +86,7 @@ def table(found: Standing) -> str:
     return csv_text(columns, rows)
 
 
-def work_precision(found: Standing) -> str:
+def work_precision(found: Examination) -> str:
     """SVG: error of the torque through a turn by what a simulated second costs."""
     from matplotlib.figure import Figure
 

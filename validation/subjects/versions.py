@@ -1,4 +1,4 @@
-"""`python -m validation versions ENGINE`: the same suite under each released version, and where something changed."""
+"""`python -m validation standing --versions ENGINE`: the same suite under each released version."""
 
 import json
 import math
@@ -21,7 +21,7 @@ from validation.regression.history import Run
 from validation.regression.record import read_run
 from validation.regression.steps import NO_CHANGE
 from validation.run.elsewhere import ElsewhereError, ended, run_elsewhere
-from validation.subjects.releases import Release, installed, known, released
+from validation.subjects.releases import Release, installed, module_of, released
 from validation.subjects.versions_page import changed, written
 
 CACHE = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "fourbar-versions"
@@ -62,7 +62,7 @@ def command(
 
     Writes versions.md, .svg, .csv and .json: error and time by version, and the versions where something changed.
     """
-    module = known(engine)
+    module = module_of(engine)
     for scene in scenes:
         fourbar.load(scene)  # before anything is installed
     chosen = released(engine, first, last)
@@ -102,7 +102,7 @@ def command(
 
 
 def timed(python: Path, scene: Path, witnesses: Sequence[str]) -> dict[str, float]:
-    """What one position of a scene costs each witness under another Python, s of the processor's clock."""
+    """Time one position of a scene for each witness under another Python, s of the processor's clock."""
     code = "import sys; from validation.subjects.versions import clock; clock(*sys.argv[1:])"
     done = ended([python, "-c", code, scene, *witnesses])
     try:
@@ -128,13 +128,13 @@ def clock(file: str, *names: str) -> None:
 
 
 def scanned(versions: Sequence[str], attempt: Try, jobs: int) -> list[Release]:
-    """Every version, so many at a time."""
+    """Run every version, `jobs` at a time."""
     with ThreadPoolExecutor(jobs) as pool:
         return list(pool.map(attempt, versions))
 
 
 def bisected(versions: Sequence[str], attempt: Try) -> list[Release]:
-    """The versions that had to be run to find those between which something changed.
+    """Run the versions that it takes to find those between which something changed.
 
     Of two versions that say the same, none between is run: what came and went again is not found.
     """

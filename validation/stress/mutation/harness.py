@@ -47,7 +47,7 @@ class HangError(Exception):
 
 
 def scenes() -> list[Scene]:
-    """Random linkages of every type, drive and branch, and a parallelogram near and on its change point."""
+    """Choose random linkages of every type, drive and branch, and a parallelogram near its change point."""
     from validation.scenes.hard_families import change_point, sweep_of
     from validation.scenes.hard_linkages import dressed
     from validation.scenes.random import LinkageType, random_scene
@@ -59,7 +59,7 @@ def scenes() -> list[Scene]:
 
 
 def numbers(scene: Scene, at: Command) -> dict[str, Any]:
-    """Everything that the formulas say of a scene and of its linkage."""
+    """Compute every number that the formulas state of a scene and of its linkage."""
     solution = solve(scene, "force", at=at)
     found = {name: getattr(solution, name) for name in UNITS if getattr(solution, name) is not None}
     found["status"] = solution.status_code.astype(float)
@@ -67,7 +67,7 @@ def numbers(scene: Scene, at: Command) -> dict[str, Any]:
 
 
 def stated(linkage: FourBar) -> dict[str, Any]:
-    """What the formulas state of a linkage whatever its motion."""
+    """Collect what the formulas state of a linkage whatever its motion."""
     found: dict[str, Any] = {
         "default_range": mobility.default_range(linkage),
         "change_points": mobility.change_points(linkage),
@@ -85,7 +85,7 @@ def stated(linkage: FourBar) -> dict[str, Any]:
 
 
 def stated_of_motion(scene: Scene, at: Command) -> dict[str, Any]:
-    """How well the positions of a motion transmit."""
+    """Compute how well the positions of a motion transmit."""
     state = state_of(scene.linkage, at.theta_2, at.branch)
     branch = at.branch.astype(float)
     return {
@@ -97,7 +97,7 @@ def stated_of_motion(scene: Scene, at: Command) -> dict[str, Any]:
 
 
 def changed(before: dict[str, Any], after: dict[str, Any]) -> bool:
-    """Whether any number differs by more than 1e-9 of its scale."""
+    """Compare numbers: whether any differs by more than 1e-9 of its scale."""
     for name, old in before.items():
         new = after.get(name)
         if new is None or np.shape(old) != np.shape(new):
@@ -109,7 +109,7 @@ def changed(before: dict[str, Any], after: dict[str, Any]) -> bool:
 
 
 def caught(scene: Scene, at: Command, answers: list[tuple[Witness, Answer]]) -> bool:
-    """Whether any comparison or identity fails."""
+    """Check a scene: whether any comparison or identity fails."""
     solution = solve(scene, at=at)
     rows = identities("", scene, at, solution)
     for witness, answer in answers:
@@ -122,7 +122,7 @@ def caught(scene: Scene, at: Command, answers: list[tuple[Witness, Answer]]) -> 
     return any(row.verdict == FAILS for row in rows)
 
 
-class Trial(NamedTuple):
+class Baseline(NamedTuple):
     """A scene, and what engines and formulas say of it without a mutant."""
 
     scene: Scene
@@ -131,7 +131,7 @@ class Trial(NamedTuple):
     before: dict[str, Any]
 
 
-def trials() -> list[Trial]:
+def baselines() -> list[Baseline]:
     """Solve the scenes; RuntimeError where the harness fails on one of them."""
     made = []
     for scene in scenes():
@@ -139,11 +139,11 @@ def trials() -> list[Trial]:
         answers = [(w, w.engine().answer(scene, at)) for w in WITNESSES if w.name in EXACT]
         if caught(scene, at, answers):
             raise RuntimeError(f"the harness fails without a mutant: {scene.title}")
-        made.append(Trial(scene, at, answers, numbers(scene, at)))
+        made.append(Baseline(scene, at, answers, numbers(scene, at)))
     return made
 
 
-def verdict(mutant: Mutant, tried: Sequence[Trial]) -> bool | None:
+def verdict(mutant: Mutant, tried: Sequence[Baseline]) -> bool | None:
     """Return whether a mutant is caught, or None where it changes nothing."""
     differs = False
     signal.alarm(SECONDS)
@@ -176,7 +176,7 @@ def command(module: str | None, most: int) -> int:
         raise HangError
 
     before = signal.signal(signal.SIGALRM, alarm)
-    tried, shown = trials(), Console(stderr=True)
+    tried, shown = baselines(), Console(stderr=True)
     changing, missed = 0, list[str]()
     for name in [module] if module else MODULES:
         chosen = list(mutants(import_module(f"fourbar.formulas.{name}")))

@@ -1,4 +1,4 @@
-"""Every planted fault against the harness, each in a process of its own; none may survive without a reason."""
+"""Injected faults against the harness, each in a process of its own; none may survive without a reason."""
 
 import json
 import sys
@@ -18,18 +18,18 @@ SECONDS = 300
 
 
 Failing = dict[str, list[str]]
-"""By specimen: the rows that fail."""
+"""By test scene: the rows that fail."""
 
 
 def outcomes(*numbers: int) -> list[Failing] | str:
-    """What fails with the fault of each number, one after another, or why nothing was found; once without any fault."""
+    """Try the fault of each number in turn, or none: the rows that fail, or why there is no result."""
     line = [sys.executable, "-P", planting.__file__, *numbers]
     done = ended(line, folder=ROOT, seconds=SECONDS, variables={"PYTHONPATH": str(ROOT)})
     return done.why or [json.loads(each) for each in done.out.splitlines()[-max(1, len(numbers)) :]]
 
 
 def survives(entry: dict[str, Any], found: Failing | str) -> str | None:
-    """Why an entry does not count as caught on each of its specimens, or None."""
+    """Say why an entry does not count as caught on each of its test scenes; None where it does."""
     if isinstance(found, str):
         return f"it raises, which is no physical fault: {found}"
     for specimen, rows in found.items():
@@ -42,7 +42,7 @@ def survives(entry: dict[str, Any], found: Failing | str) -> str | None:
 
 
 def planted(workers: int) -> Iterator[tuple[str, str | None]]:
-    """Every fault with the reason why it survives, or None; first the tree without a fault."""
+    """Try every fault: the reason why it survives, or None; first the tree without a fault."""
     entries = faults()
     with ThreadPoolExecutor(workers) as pool:
         without, *found = (pool.submit(outcomes, *number) for number in [(), *((n,) for n in range(len(entries)))])

@@ -13,7 +13,7 @@ from fourbar.scene import Command, Scene
 from fourbar.solve import solve
 from validation.engines.loop import Trial
 from validation.engines.mujoco.trial import LONGEST, SHORTEST, Rig
-from validation.studies.cost.errors import NO_ANSWER, Errors, errors
+from validation.studies.cost.errors import NO_ANSWER, WorstErrors, errors
 
 MATTERS = 2.0
 """A setting that a change of a factor of two, or its loss, makes the error grow by less does not matter."""
@@ -26,7 +26,7 @@ MUJOCO_TOLERANCE = 1e-8
 
 
 @dataclass(frozen=True, slots=True)
-class Influence:
+class SettingInfluence:
     """One setting changed alone."""
 
     setting: str
@@ -42,18 +42,18 @@ class Influence:
         return f"{self.setting} matters most here: {self.changed} {lost}, because {self.why}"
 
 
-def judged(scene: Scene, trial: Trial) -> Errors:
+def judged(scene: Scene, trial: Trial) -> WorstErrors:
     """Errors of a trial, at its steps and between them; none where MuJoCo lost the motion."""
     if trial.broken:
         return NO_ANSWER
     found = [errors(scene, trial.at, trial.quantities)]
     if scene.drive_bar == 2:  # the torque of another bar has poles, through which no curve can be drawn
         found += [each for stretch in trial.stretches for each in between(scene, trial, *stretch)]
-    return Errors(*map(max, *found)) if len(found) > 1 else found[0]
+    return WorstErrors(*map(max, *found)) if len(found) > 1 else found[0]
 
 
-def between(scene: Scene, trial: Trial, samples: slice, steps: int) -> Iterator[Errors]:
-    """Errors amid the steps of a stretch, where they are fewer than its positions: a spline through what was read.
+def between(scene: Scene, trial: Trial, samples: slice, steps: int) -> Iterator[WorstErrors]:
+    """Find errors between the steps of a segment that has more positions: a spline through what was read.
 
     A largest force that lies between two steps is not seen at either of them.
     """
@@ -76,26 +76,26 @@ def between(scene: Scene, trial: Trial, samples: slice, steps: int) -> Iterator[
     yield errors(scene, at, there)
 
 
-def influences(scene: Scene, rig: Rig, settings: Settings) -> list[Influence]:
+def influences(scene: Scene, rig: Rig, settings: Settings) -> list[SettingInfluence]:
     """Every setting changed alone, the one that matters most first."""
     before = judged(scene, rig.try_out(settings)).worst
     found = []
     for name, changed, other, why in _changes(scene, settings):
         worst = judged(scene, rig.try_out(other)).worst
         times = worst / before if before > 0.0 and math.isfinite(before) else math.nan
-        found.append(Influence(name, changed, worst, times, why(rig)))
+        found.append(SettingInfluence(name, changed, worst, times, why(rig)))
     return sorted(found, key=lambda each: -each.times if each.times == each.times else math.inf)
 
 
-def sentence(found: list[Influence]) -> str:
-    """The one that matters most, and why."""
+def sentence(found: list[SettingInfluence]) -> str:
+    """Name the setting that matters most, and why."""
     if found and found[0].times >= MATTERS:
         return str(found[0])
     return f"no setting matters by itself here: changed alone none makes the error {MATTERS:g} times as large"
 
 
 def _changes(scene: Scene, settings: Settings) -> Iterator[tuple[str, str, Settings, Callable[[Rig], str]]]:
-    """What is changed, in words, to what, and what a growth of the error would come from."""
+    """List the changes: in words, the settings, and what a growth of the error would come from."""
     steps, tc = settings.steps_per_revolution, settings.time_constant_steps
     window = max(settings.steps_per_window // 2, 1)
     coarse = replace(settings, steps_per_revolution=steps / 2.0, steps_per_window=window)
