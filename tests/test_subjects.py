@@ -117,7 +117,7 @@ def test_a_subject_that_diverges_has_its_lines_without_an_order() -> None:
     for steps, torque in ((100, 1.0), (200, math.inf), (400, math.nan), (800, 1.0)):
         found = motion.Readings("its defaults", steps)
         for _ in range(n):
-            found.read(scene, motion.State((1.0, math.nan, 2.0), 10.0, 0.0, torque, {}))
+            found.read(scene, motion.Instant((1.0, math.nan, 2.0), 10.0, 0.0, torque, {}))
         readings.append(found.plain())
     lines = examine.lines(scene, "subject", {"version": "", "readings": readings})
     assert lines[1].errors["torque"] == math.inf and math.isnan(lines[2].errors["torque"])
@@ -185,7 +185,7 @@ def test_the_page_is_written_and_names_what_is_not_there(tmp_path: Path, monkeyp
     line = examine.Line("MuJoCo", "4", "generated file", 157, {"torque": 1e-7, "F43": math.nan}, 1e-8, 0.01, 1.5)
     pytest.importorskip("jinja2")
     pytest.importorskip("matplotlib")
-    given = examine.Standing([line], {"MuJoCo": "nothing"}, {"MuJoCo": "CPU"})
+    given = examine.Examination([line], {"MuJoCo": "nothing"}, {"MuJoCo": "CPU"})
     given.left_out["PyBullet"] = "not installed under any --python"
     monkeypatch.setattr("validation.subjects.standing.examine", lambda *_: given)
     done = CliRunner().invoke(standing.command, ["--out", str(tmp_path)], catch_exceptions=False)
