@@ -1,4 +1,4 @@
-"""Each subject in its own environment, held against the formulas at the states that it reached by itself."""
+"""Each simulator in its own environment, compared with the formulas at the states that it reached by itself."""
 
 import json
 import math
@@ -17,7 +17,7 @@ from validation.compare.error import magnitude, relative_error
 from validation.compare.rows import in_words
 from validation.run.elsewhere import ended
 
-SUBJECTS = {
+SIMULATORS = {
     "mujoco_c": ("MuJoCo", "mujoco"),
     "mujoco_warp": ("MuJoCo Warp", "mujoco_warp"),
     "mujoco_mjx": ("MJX", "mujoco.mjx"),
@@ -34,9 +34,9 @@ TORQUE_AND_FORCES = ("torque", *PIN_FORCES)
 
 @dataclass(slots=True)
 class Line:
-    """One setting of a subject, over single states or over a turn in so many steps."""
+    """One setting of a simulator, over single states or over a turn in so many steps."""
 
-    subject: str
+    simulator: str
     version: str
     setting: str
     steps: int | None
@@ -62,9 +62,9 @@ class Examination:
 
 
 def examine(scene: Scene, file: Path, pythons: list[Path], seconds: float) -> Examination:
-    """Every subject under the first of the interpreters that has it."""
+    """Examine every simulator under the first of the interpreters that has it."""
     found = Examination()
-    for module, (name, library) in SUBJECTS.items():
+    for module, (name, library) in SIMULATORS.items():
         python = next((python for python in pythons if _has(python, library)), None)
         if python is None:
             found.left_out[name] = "not installed under any --python"
@@ -110,7 +110,7 @@ def lines(scene: Scene, name: str, answer: dict[str, Any]) -> list[Line]:
 
 
 def errors(scene: Scene, reading: dict[str, Any]) -> dict[str, float]:
-    """Of torque and pin forces, at the subject's own theta_2, omega_2 and alpha_2; NaN where it answers NaN."""
+    """Compute the errors of torque and pin forces at the simulator's own state; NaN where it answers NaN."""
     theta = np.array(reading["theta"], dtype=float)
     n = len(theta)
     if not n or any(np.shape(reading[name]) != (n,) for name in ("omega_2", "alpha_2")) or theta.shape != (n, 3):

@@ -1,4 +1,4 @@
-"""What a subject answers: numbers of a turn that it ran through, or of states that it was given."""
+"""What a simulator answers: numbers of a turn that it ran through, or of states that it was given."""
 
 import math
 import tempfile
