@@ -1,0 +1,194 @@
+"""The harness against mutants of the formulas: no unit test takes part.
+
+A mutant counts where it changes a number that `solve` returns, or that is specified of the linkage, by more than 1e-9
+of its scale (or what assembles, or which numbers exist, or raises); it is caught where a comparison then fails.
+"""
+
+import math
+import signal
+from collections.abc import Sequence
+from importlib import import_module
+from typing import Any, NamedTuple
+
+import click
+import numpy as np
+
+from fourbar.errors import FAILED, HOLDS
+from fourbar.formulas import mobility, transmission
+from fourbar.formulas.path import state as state_of
+from fourbar.linkage import MOVING_BARS, FourBar
+from fourbar.quantities import UNITS
+from fourbar.scene import Command, Scene
+from fourbar.scene import command as command_of
+from fourbar.solve import solve
+from fourbar_validation.compare.answer import Answer
+from fourbar_validation.compare.basis import basis_of
+from fourbar_validation.compare.compare import compare
+from fourbar_validation.compare.identities import identities
+from fourbar_validation.compare.rows import FAILS
+from fourbar_validation.compare.statements.statements import statements
+from fourbar_validation.compare.withheld import withheld
+from fourbar_validation.engines.free_body import NAME as FREE_BODY
+from fourbar_validation.engines.witnesses import WITNESSES, Witness, predicting_from
+from fourbar_validation.lab.stress.mutation.code_mutants import Mutant, mutants
+
+CHANGES = 1e-9
+SECONDS = 20
+"""A mutant that computes longer than this hangs: the run would be stopped, which is a failure too."""
+LEAST = 0.95
+"""Share of the mutants that must be caught."""
+MODULES = ("arithmetic", "position", "motion", "pin_forces", "torque", "path", "mobility", "transmission")
+SCENES = 10
+EXACT = ("pinocchio-inverse", "mujoco-inverse", FREE_BODY)
+
+
+class HangError(Exception):
+    """A mutant did not come back."""
+
+
+def scenes() -> list[Scene]:
+    """Choose random linkages of every type, drive and branch, and a parallelogram near its change point."""
+    from fourbar_validation.scenes.hard_families import change_point, sweep_of
+    from fourbar_validation.scenes.hard_linkages import dressed
+    from fourbar_validation.scenes.random import LinkageType, random_scene
+
+    chosen = [random_scene(0, index, tuple(LinkageType)) for index in range(SCENES)]
+    chosen.append(sweep_of(dressed((0.3, 0.1, 0.25, 0.22)), 12))
+    chosen += [scene for name, scene in change_point(distances=(1e-2, 1e-4)) if name.startswith(("par", "kite a = d"))]
+    return chosen
+
+
+def numbers(scene: Scene, at: Command) -> dict[str, Any]:
+    """Compute every number that the formulas state of a scene and of its linkage."""
+    solution = solve(scene, "force", at=at)
+    found = {name: getattr(solution, name) for name in UNITS if getattr(solution, name) is not None}
+    found["status"] = solution.status_code.astype(float)
+    return found | stated(scene.linkage) | stated_of_motion(scene, at)
+
+
+def stated(linkage: FourBar) -> dict[str, Any]:
+    """Collect what the formulas state of a linkage whatever its motion."""
+    found: dict[str, Any] = {
+        "default_range": mobility.default_range(linkage),
+        "change_points": mobility.change_points(linkage),
+        "time_ratio": mobility.time_ratio(linkage) or math.nan,
+        "extremes": [*transmission.transmission_extremes(linkage), transmission.transmission_extremes(linkage).worst],
+    }
+    for bar in MOVING_BARS:
+        found[f"limits_{bar}"] = mobility.limit_positions(linkage, bar)
+        found[f"intervals_{bar}"] = mobility.intervals(linkage, bar)
+        found[f"turns_{bar}"] = mobility.turns_fully(linkage, bar)
+        found[f"swing_{bar}"] = mobility.swing(linkage, bar)
+    sweep = linkage.ground_angle + np.array([-0.5, 0.5, 4.0, 2.0])  # through both change points, and back
+    found["through"] = mobility.on_smooth_path(linkage, sweep, 1)
+    return {name: np.array(value, dtype=float) for name, value in found.items()}
+
+
+def stated_of_motion(scene: Scene, at: Command) -> dict[str, Any]:
+    """Compute how well the positions of a motion transmit."""
+    state = state_of(scene.linkage, at.theta_2, at.branch)
+    branch = at.branch.astype(float)
+    return {
+        "transmission_angle": transmission.transmission_angle(state),
+        "speed_ratio": transmission.speed_ratio(state),
+        "mechanical_advantage": transmission.mechanical_advantage(state, 0.2, 0.3),
+        "to_singular": transmission.distance_to_singular(scene.linkage, at.theta_2, scene.drive_bar, branch),
+    }
+
+
+def changed(before: dict[str, Any], after: dict[str, Any]) -> bool:
+    """Compare numbers: whether any differs by more than 1e-9 of its scale."""
+    for name, old in before.items():
+        new = after.get(name)
+        if new is None or np.shape(old) != np.shape(new):
+            return True
+        scale = float(np.max(np.abs(old), initial=0.0, where=np.isfinite(old))) or 1.0
+        if not np.allclose(new, old, rtol=0.0, atol=CHANGES * scale, equal_nan=True):
+            return True
+    return False
+
+
+def caught(scene: Scene, at: Command, answers: list[tuple[Witness, Answer]]) -> bool:
+    """Check a scene: whether any comparison or identity fails."""
+    solution = solve(scene, at=at)
+    rows = identities("", scene, at, solution)
+    for witness, answer in answers:
+        predicted = predicting_from(witness, scene, at, answer)
+        rows += compare("", scene, answer, solution, witness.tolerance, witness.expected, predicted)
+        if witness.name == FREE_BODY and (basis := basis_of(scene, answer)) is not None:
+            rows.append(withheld("", scene, solution, basis))
+    if not any(row.verdict == FAILS for row in rows):
+        rows += [row for witness, answer in answers for row in statements("", scene, witness.engine(), answer)]
+    return any(row.verdict == FAILS for row in rows)
+
+
+class Baseline(NamedTuple):
+    """A scene, and what engines and formulas say of it without a mutant."""
+
+    scene: Scene
+    at: Command
+    answers: list[tuple[Witness, Answer]]
+    before: dict[str, Any]
+
+
+def baselines() -> list[Baseline]:
+    """Solve the scenes; RuntimeError where the harness fails on one of them."""
+    made = []
+    for scene in scenes():
+        at = command_of(scene)
+        answers = [(w, w.engine().answer(scene, at)) for w in WITNESSES if w.name in EXACT]
+        if caught(scene, at, answers):
+            raise RuntimeError(f"the harness fails without a mutant: {scene.title}")
+        made.append(Baseline(scene, at, answers, numbers(scene, at)))
+    return made
+
+
+def verdict(mutant: Mutant, tried: Sequence[Baseline]) -> bool | None:
+    """Return whether a mutant is caught, or None where it changes nothing."""
+    differs = False
+    signal.alarm(SECONDS)
+    try:
+        with np.errstate(all="ignore"), mutant.active():
+            for scene, at, answers, before in tried:
+                if changed(before, numbers(scene, at)):
+                    differs = True
+                    if caught(scene, at, answers):
+                        return True
+    except Exception:  # a mutant that raises or hangs ends the run: that is noticed
+        return True
+    finally:
+        signal.alarm(0)
+    return False if differs else None
+
+
+@click.command()
+@click.option("--module", type=click.Choice(MODULES), help="Only this one.")
+@click.option("--most", default=0, type=click.IntRange(0), help="At most this many of each module.")
+def command(module: str | None, most: int) -> int:
+    """Change operators and numbers of the formulas, one at a time; 95 % of those that matter must fail the harness.
+
+    A change matters that alters a number by more than 1e-9. Those that are not caught are listed.
+    """
+    from rich.console import Console
+    from rich.progress import track
+
+    def alarm(*_: object) -> None:
+        raise HangError
+
+    before = signal.signal(signal.SIGALRM, alarm)
+    tried, shown = baselines(), Console(stderr=True)
+    changing, missed = 0, list[str]()
+    for name in [module] if module else MODULES:
+        chosen = list(mutants(import_module(f"fourbar.formulas.{name}")))
+        if most and len(chosen) > most:
+            chosen = [chosen[i] for i in np.random.default_rng(0).choice(len(chosen), most, replace=False)]
+        verdicts = [verdict(mutant, tried) for mutant in track(chosen, name, console=shown)]
+        own = [mutant.name for mutant, each in zip(chosen, verdicts, strict=True) if each is False]
+        count = sum(each is not None for each in verdicts)
+        click.echo(f"{name}: {count - len(own)} of {count} caught, of {len(chosen)} mutants tried")
+        changing, missed = changing + count, missed + own
+    signal.signal(signal.SIGALRM, before)
+    for line in missed:
+        click.echo(f"not caught: {line}")
+    click.echo(f"the harness catches {changing - len(missed)} of {changing} mutants that change a number")
+    return HOLDS if changing and len(missed) <= (1.0 - LEAST) * changing else FAILED
