@@ -155,7 +155,7 @@ def test_an_answer_that_cannot_be_read_is_left_out_and_the_page_goes_on(
     monkeypatch.setattr(examine, "SIMULATORS", {"one": ("One", "json"), "other": ("Other", "json")})
     monkeypatch.setattr(examine, "_has", lambda *_: True)
     answers = {"one": stated, "other": of_a_turn(torque=[math.nan] * motion.SAMPLES)}
-    monkeypatch.setattr(examine, "ended", lambda line, **_: Ended(answers[line[3]], "", False, ""))
+    monkeypatch.setattr(examine, "of_the_harness", lambda line, **_: Ended(answers[line[3]], "", False, ""))
     found = examine.examine(fourbar.load(PROBLEM), PROBLEM, [Path(sys.executable)], 1.0)
     assert why in found.left_out["One"] and "\x1b" not in found.left_out["One"]
     (line,) = found.lines
