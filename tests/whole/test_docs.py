@@ -148,7 +148,7 @@ def test_every_command_of_the_harness_is_listed() -> None:
     text = read("docs/checks.md")
     table = text[text.index("| `python -m validation` |") : text.index("The columns of the results:")]
     first = "".join(line.split("|")[1] for line in table.splitlines()[2:] if line)
-    listed = [re.match(r"[a-z]+( --[a-z]+)?", each)[0] for each in re.findall("`([^`]*)`", first)]  # type: ignore[index]
+    listed = [re.match(r"[a-z]+(-[a-z]+)?( --[a-z]+)?", each)[0] for each in re.findall("`([^`]*)`", first)]  # type: ignore[index]
     assert sorted(listed) == sorted(COMMANDS)
 
 

@@ -84,11 +84,11 @@ def advise(scene: Scene, error: float, rig: Rig | None = None) -> Advice:
     """
     if not 0.0 < error < 1.0:
         raise InputError("--error", error, "must be a relative error, above 0 and below 1")
-    return _SettingsSearch(scene, error, rig or Rig(scene, looked_at(scene))).advice()
+    return _CheapestSearch(scene, error, rig or Rig(scene, looked_at(scene))).advice()
 
 
 def looked_at(scene: Scene) -> Command:
-    """Add positions between those of the scene: the error peaks there, most of all near a pole of T3, T4."""
+    """Take the scene's positions and others between them: the error peaks there, most near a pole of T3, T4."""
     own = command_of(scene)
     if np.ptp(own.branch) != 0:
         return own
@@ -97,7 +97,7 @@ def looked_at(scene: Scene) -> Command:
     return own._replace(theta_2=theta_2, branch=np.full(theta_2.shape, own.branch[0], dtype=np.int8))
 
 
-class _SettingsSearch:
+class _CheapestSearch:
     """Settings tried on one scene, for one required error."""
 
     def __init__(self, scene: Scene, error: float, rig: Rig) -> None:
@@ -188,7 +188,7 @@ def _nearest(attempts: Sequence[Attempt]) -> Attempt:
     help="Write the MJCF of one SCENE.",
 )
 def command(scenes: tuple[Path, ...], wanted: float, output: Path | None) -> int:
-    """Find the cheapest MuJoCo settings that keep SCENES within an error; exit 1 where there are none for one of them.
+    """Find the cheapest MuJoCo settings that keep SCENES within an error; exit 1 where none is found for one of them.
 
     Of each scene it says which of the settings matters, and why; of several scenes a table is printed at the end.
     """
