@@ -292,6 +292,7 @@ PROCESSES = [
     ("validation", f"accept {NO_FILE}", BAD_INPUT),
     ("validation", f"compare accepted {ROOT / 'validation/fourbar_validation/regression/accepted'}", HOLDS),
     ("validation", f"check {NO_FILE} {NO_FILE}", BAD_INPUT),
+    ("validation", f"check-mjcf {NO_FILE} {NO_FILE}", BAD_INPUT),
     ("validation", "fuzz --files --count 1", HOLDS),
     ("validation", "write --no-such-option", BAD_INPUT),
     ("validation", "published --no-such-option", BAD_INPUT),
