@@ -70,18 +70,16 @@ JUDGED_BY = {
     "validation/report/test_report.py": "validation/report: colours costs figures machine record summary svg "
     "templating",
     # studies: each through its command
-    "validation/lab/stress/test_bench.py": "validation/lab/stress: against bench_picture contenders in_c in_sympy "
-    "limits timed",
+    "validation/lab/stress/test_bench.py": "validation/lab/stress: against bench_picture contenders in_c limits timed",
     "validation/lab/stress/forward_error/test_stability.py": "validation/lab/stress/forward_error: families",
     "validation/lab/stress/fuzz/test_fuzz.py": "validation/lab/stress/fuzz: outside scenes shrink",
-    "validation/lab/stress/mutation/test_mutation.py": "validation/lab/stress/mutation: harness",
+    "validation/lab/stress/mutation/test_mutation.py": "validation/lab/stress/mutation: code_mutants harness",
     "validation/lab/stress/mutation/test_planted.py": "validation/lab/stress/mutation: planting specimens",
     "validation/lab/cost/test_cost.py": "validation/lab/cost: curves formulas laws orders pictures study; "
     "validation/advise: errors; validation/engines/mujoco: one_state",
     "validation/advise/test_advise.py": "validation/advise: matters; validation/lab/cost: exhaustive measure; "
     "validation/run: dial; validation/engines/mujoco: trial",
-    "validation/lab/effects/test_cost.py": "validation/lab/effects: counted table work; "
-    "validation/engines/mujoco: stepping",
+    "validation/lab/effects/test_cost.py": "validation/lab/effects: table work; validation/engines/mujoco: stepping",
     # simulators that need not be there: their scripts run where they are installed
     "validation/lab/subjects/test_subjects.py": "validation/lab/subjects: drake_sap examine exudyn_simulated "
     "genesis_rigid motion mujoco_c mujoco_mjx mujoco_warp newton_kamino newton_mujoco pybullet standing work",

@@ -11,7 +11,6 @@ from typing import Any
 import flint
 import numpy as np
 import pytest
-from validation.engines.balls import closure, stored, wedge
 
 import fourbar
 import fourbar.effects
@@ -35,6 +34,7 @@ from fourbar.studies.enclosure import _Search
 from fourbar.studies.interval import require
 from fourbar.studies.keys import at_place, entries, with_numbers
 from fourbar.studies.sloped import Sloped, Undecided
+from fourbar_validation.engines.balls import closure, stored, wedge
 
 STRADDLED = [(0.0, 1.0), (0.5, 1.0), (-1.0, 1e-3), (2.0, 2.0), (0.0, 0.0)]
 """Centres and radii: over 0, over whole and half numbers, at a kink, and none at all."""

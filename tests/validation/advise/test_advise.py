@@ -111,7 +111,7 @@ def test_an_error_is_between_0_and_1(required: float) -> None:
 
 
 def test_unseen_linkages_are_served_and_not_at_three_times_the_cheapest() -> None:
-    """A few of those of `advise-study`, of every type, judged between the positions that the advice saw."""
+    """A few of those of `advise --study`, of every type, judged between the positions that the advice saw."""
     costs = {("RK4", True): 1.0}
     for index in range(2):
         case = measure.case(99, index, costs)
@@ -136,11 +136,11 @@ def hopeless(scene: fourbar.Scene) -> object:
 def test_a_count_that_cannot_decide_says_which_one_can(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    case = measure.Case(0, "drag-link", 1.0, True, 2, 1e-3, True, 5e-4, 20.0, 19.0, 5)
+    case = measure.AdviceCase(0, "drag-link", 1.0, True, 2, 1e-3, True, 5e-4, 20.0, 19.0, 5)
     monkeypatch.setattr(measure, "case", lambda seed, index, costs: replace(case, index=index))
     monkeypatch.setattr(measure, "relative_costs", lambda rig: {})
     for count, status in ((40, 1), (73, 0)):
-        assert ended(["advise-study", "--count", str(count), "--out", str(tmp_path / f"{count}.csv")]) == status
+        assert ended(["advise", "--study", "--count", str(count), "--out", str(tmp_path / f"{count}.csv")]) == status
         stated = "undecided: with 0 not met the bound is reached from --count 73 on" in capsys.readouterr().out
         assert stated == (status == 1)
 
@@ -148,9 +148,9 @@ def test_a_count_that_cannot_decide_says_which_one_can(
 def test_a_measure_is_resumed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     made: list[int] = []
 
-    def case(seed: int, index: int, costs: object) -> measure.Case:
+    def case(seed: int, index: int, costs: object) -> measure.AdviceCase:
         made.append(index)
-        return measure.Case(index, "drag-link", 1.0, True, 2, 1e-3, True, 5e-4, 20.0, 19.0, 5)
+        return measure.AdviceCase(index, "drag-link", 1.0, True, 2, 1e-3, True, 5e-4, 20.0, 19.0, 5)
 
     monkeypatch.setattr(measure, "case", case)
     monkeypatch.setattr(measure, "relative_costs", lambda rig: {})

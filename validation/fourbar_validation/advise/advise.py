@@ -55,7 +55,7 @@ class Advice:
     reached: bool
 
     def cells(self) -> tuple[str, str, str]:
-        """Error, steps per revolution and time constant, for a table of several scenes."""
+        """Format error, steps per revolution and time constant for a table of several scenes."""
         error = f"{self.best.errors.worst:.1e}" + ("" if self.reached else " (not reached)")
         return error, f"{self.best.steps_per_revolution:.0f}", f"{self.best.settings.time_constant_steps:.3g}"
 
@@ -117,7 +117,7 @@ class _CheapestSearch:
         return Advice(self.error, best, tuple(self.attempts), bool(served))
 
     def _polish(self, tc: float) -> None:
-        """Whether another time constant serves with fewer steps, or serves at all."""
+        """Try whether another time constant serves with fewer steps, or serves at all."""
         served = self._served()
         if not served:
             self._bisect(tc, _nearest(self.attempts).settings.steps_per_revolution)
@@ -154,7 +154,7 @@ class _CheapestSearch:
             n = max(ahead, FEWEST_STEPS)
 
     def _floored(self, before: Attempt, after: Attempt) -> bool:
-        """More steps bought nothing."""
+        """Tell whether more steps bought nothing."""
         worst = after.errors.worst
         return worst < 1e-2 and worst > LEAST_GAIN * before.errors.worst and after.steps > 1.3 * before.steps
 

@@ -88,7 +88,7 @@ def influences(scene: Scene, rig: TrialSetup, settings: Settings) -> list[Settin
 
 
 def sentence(found: list[SettingInfluence]) -> str:
-    """Choose the one that matters most, and say why."""
+    """Name the setting that matters most, and why."""
     if found and found[0].times >= MATTERS:
         return str(found[0])
     return f"no setting matters by itself here: changed alone none makes the error {MATTERS:g} times as large"

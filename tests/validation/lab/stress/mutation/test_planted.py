@@ -23,7 +23,7 @@ IN_TORQUE = (
     "the other branch is closed",
 )
 ELSEWHERE = ("a third of all positions is called singular", "MuJoCo's loop without the drift of its Jacobian")
-"""Some of each kind; `mutation --planted` tries them all."""
+"""Some of each kind; `python -m validation faults` tries them all."""
 EXACT = {"pinocchio-inverse", "mujoco-inverse", "free-body"}
 
 
