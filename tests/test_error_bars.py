@@ -1,10 +1,12 @@
 """Error bars against the true error, by ball arithmetic, where they once were too small, too large, or none."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import fourbar
-from fourbar.effects import Gravity, Load, Point, Spring, Springs, Table, Torsion
+from fourbar.effects import Gravity, Load, Point, Spring, Springs, Table, Torsion, cones
 from fourbar.linkage import Bar, FourBar
 from fourbar.quantities import PIN_FORCES
 from fourbar.scene import Scene, command
@@ -12,6 +14,7 @@ from fourbar.scene.motion import Motion
 from validation.compare.error import magnitude
 from validation.engines.exact import BallArithmetic
 from validation.run import printed
+from validation.stress.mutation.specimens import SPECIMENS
 
 TURNS = 2000.0 * np.pi
 
@@ -90,3 +93,34 @@ def test_a_run_judges_the_bars_where_each_spring_is_nearest_to_its_rest(monkeypa
     rows = list(printed._error_bars("", scene, command(scene), whole))
     assert {row.verdict for row in rows} == {"agrees"}
     assert {whole.theta_2[np.argmin(np.abs(gap))] for gap in away} <= set(seen[0])
+
+
+def test_a_bar_is_of_the_motion_that_begins_to_one_side() -> None:
+    """The bar of a linkage about to move was the friction itself, of which the other evaluation knew nothing."""
+    still = replace(sized(), motion=Motion(np.array([1.0, 2.0]), 0.0), effects=(fourbar.Friction.at(A=0.5, O4=2.0),))
+    for side in (-1, 1):
+        torque_error = fourbar.solve(still, "error", side=side).torque_error
+        assert torque_error is not None and torque_error.max() < 1e-13
+
+
+def test_a_bar_is_as_wide_as_what_a_position_loses() -> None:
+    """Where a spring's ends nearly meet the direction in which it pulls is lost, which is no power of any sine."""
+    scene = SPECIMENS["ends of a spring nearly meet"]
+    rows = printed.printed("", scene, command(scene), fourbar.solve(scene, "force"), None)
+    assert [row.verdict for row in rows if row.quantity.endswith("_error")] == ["agrees", "agrees"]
+
+
+def test_a_long_sweep_searches_for_friction_at_its_ends_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Eight thousand positions of several loaded pins, each searched from many starts, took eight minutes."""
+    searched, search = [], cones._search
+    monkeypatch.setattr(cones, "_search", lambda *problem: searched.append(1) or search(*problem))
+    jammed = replace(
+        sized(),
+        motion=Motion(np.array([0.3, 0.5]), 10.0),
+        effects=(fourbar.PinFriction.at(A=(50.0, 0.01), B=(40.0, 0.02)),),
+    )
+    solution = fourbar.solve(jammed, "force")
+    assert set(solution.status) == {"jammed"}
+    del searched[:]
+    assert printed._blocks("", jammed, command(jammed), solution).passed
+    assert 0 < len(searched) < 10

@@ -20,11 +20,12 @@ from validation.compare.identities import FORMULAS
 from validation.compare.reversals import reversing
 from validation.compare.rows import AGREES, FAILS, UNDECIDED, Row
 from validation.compare.scales import of_length, term_sizes, yardstick
-from validation.compare.tolerance import EPS, EQUIVALENCE, IDENTITY, NOTHING_TO_TELL, Array, K, condition_of
+from validation.compare.tolerance import DEGRADED, EPS, EQUIVALENCE, IDENTITY, NOTHING_TO_TELL, Array, K, condition_of
 from validation.engines.description import speeds
 from validation.engines.exact import BallArithmetic, unknown
 from validation.engines.free_body import move
 from validation.engines.free_body_effects import acting
+from validation.engines.prediction import from_data
 from validation.engines.witnesses import not_installed
 
 SAMPLE = 5
@@ -105,10 +106,15 @@ def piece(at: Command, where: NDArray[np.intp]) -> Command:
 def _blocks(name: str, scene: Scene, at: Command, solution: Solution) -> Row:
     """A sweep of more than one block of positions, at the ends of its blocks, against the scene's own sweep."""
     n = len(at.theta_2)
-    ok = np.flatnonzero(solution.status_code == OK)  # elsewhere loaded friction takes a search, at each repetition
+    ok = np.flatnonzero(solution.status_code == OK)
     long = np.concatenate((np.resize(ok if len(ok) else np.arange(n), BLOCK), np.arange(n)))
     ends = np.unique([0, BLOCK - 1, BLOCK, len(long) - 1])
-    whole = solve(scene, "force", at=piece(at, long))
+    repeated = piece(at, long)
+    if (
+        sum(len(effect.loaded_pins) for effect in scene.effects) > 1
+    ):  # each may take a search, and the ends are compared
+        repeated.theta_2[1 : BLOCK - 1] = np.nan
+    whole = solve(scene, "force", at=repeated)
     error = (whole.status_code[ends] != solution.status_code[long[ends]]).astype(float)
     for quantity in ("sin_mu", "B", "alpha_3", *FORCES):
         ours = getattr(solution, quantity)
@@ -153,6 +159,9 @@ def _error_bars(name: str, scene: Scene, at: Command, solution: Solution) -> Ite
         tells = condition * NOTHING_TO_TELL > EPS
         turns = np.array([turned(scene.linkage.ground_angle, theta_2) for theta_2 in sampled.theta_2])
         wide = relative(width, size) * condition / (K * EPS * turns)
+        if (beyond := tells & (wide > 1.0)).any():  # as of an engine
+            expected = np.max([from_data(scene, sampled, quantity, beyond) for quantity in quantities], axis=0)
+            wide = np.where(beyond, relative(width, DEGRADED * expected), wide)
         share = np.where(tells, np.maximum(relative(true, BARS * width), wide), 0.0)
         share[tells & ~np.isfinite(width)] = np.inf
         index = worst(share)

@@ -12,9 +12,10 @@ from pkgutil import resolve_name
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from fourbar.effects import Gravity
-from fourbar.linkage import MOVING_BARS
+from fourbar.effects import Friction, Gravity, Load
+from fourbar.linkage import MOVING_BARS, PINS
 from fourbar.quantities import UNKNOWNS
 from fourbar.scene import Command, Scene
 from fourbar.solution import Solution
@@ -27,9 +28,12 @@ from validation.compare.identities import FORMULAS
 from validation.compare.rows import AGREES, DEGRADED, FAILS, REFUSES, UNDECIDED, Row, breakdown
 from validation.compare.tolerance import DEGRADED as TIMES_PREDICTED
 from validation.compare.tolerance import EQUIVALENCE
+from validation.engines.free_body import FreeBody
 from validation.engines.output import kept
 from validation.engines.witnesses import WITNESSES, Witness, not_installed, predicting_from
 from validation.report.record import Record, Timing
+from validation.run.printed import piece
+from validation.run.shipped.question import member, worst_rows
 
 ENGINES = {
     "mujoco-forward": ("validation.engines.mujoco.released:MujocoForward", 1e-3, "mujoco"),
@@ -143,6 +147,7 @@ def _forces(
     assert solution.omega_2 is not None and solution.alpha_2 is not None and solution.torque is not None
     held = replace(scene, motion=replace(scene.motion, free=None, alpha_2=0.0), drive_bar=2)
     at = Command(solution.theta_2, solution.branch, solution.omega_2, solution.alpha_2)
+    asked = list(_parts(held, at))
     driven = worst(np.abs(solution.torque))
     torque = float(np.abs(solution.torque[driven]))
     what = "a released linkage has no drive"
@@ -153,23 +158,65 @@ def _forces(
             continue
         try:
             with kept(output, witness.name):
-                answer = witness.engine().answer(held, at)
+                rows = [
+                    row
+                    for own, where in asked
+                    for row in _at_instants(name, own, piece(at, where), member(solution, where), witness)
+                ]
         except Exception as error:  # whatever an engine raises is its own failure, in its own row
             yield breakdown(name, witness.name, error, "forces")
             continue
-        if answer.refusal is not None:
-            yield Row.unmeasured(name, answer.engine, answer.setting, "all", REFUSES, answer.refusal)
-            continue
-        basis = basis_of(held, answer)
-        assert basis is not None
-        # the formulas are conditioned by the angle that is independent there, an engine by theta_2
-        conditioned = replace(solution, condition=basis.condition, drive_condition=basis.drive_condition)
-        conditioned.drive_bar = 2
-        names = [q for q in UNKNOWNS if q in witness.expected]
-        # nor are theta_2, omega_2 and alpha_2 more than that angle's, rounded: what that costs there is computed
-        predicted = predicting_from(witness, held, at, answer)
-        rows = compare(name, held, answer, conditioned, witness.tolerance, names, predicted, basis)
-        yield from (row for row in rows if row.quantity != "undecided")
+        yield from worst_rows(row for row in rows if row.quantity != "undecided")
+
+
+def _at_instants(name: str, scene: Scene, at: Command, solution: Solution, witness: Witness) -> list[Row]:
+    """Rows of one engine at some instants of the motion."""
+    answer = witness.engine().answer(scene, at)
+    if answer.refusal is not None:
+        return [Row.unmeasured(name, answer.engine, answer.setting, "all", REFUSES, answer.refusal)]
+    basis = basis_of(scene, answer)
+    assert basis is not None
+    # the formulas are conditioned by the angle that is independent there, an engine by theta_2
+    conditioned = replace(solution, condition=basis.condition, drive_condition=basis.drive_condition)
+    conditioned.drive_bar = 2
+    names = [q for q in UNKNOWNS if q in witness.expected]
+    # nor are theta_2, omega_2 and alpha_2 more than that angle's, rounded: what that costs there is computed
+    predicted = predicting_from(witness, scene, at, answer)
+    return compare(name, scene, answer, conditioned, witness.tolerance, names, predicted, basis)
+
+
+def _parts(scene: Scene, at: Command) -> Iterator[tuple[Scene, NDArray[np.intp]]]:
+    """The instants at which the linkage moves, and each standstill with the couples by which dry friction acts there.
+
+    An engine has no friction at rest. A standstill that lasts is held: every pin takes the same part of its torque, and
+    no more than all of it; one that ends begins to move against the whole torque.
+    """
+    assert at.omega_2 is not None
+    friction = next((effect for effect in scene.effects if isinstance(effect, Friction)), None)
+    resting = np.flatnonzero(at.omega_2 == 0.0) if friction is not None else np.empty(0, dtype=int)
+    moving = np.setdiff1d(np.arange(len(at.theta_2)), resting)
+    if len(moving):
+        yield scene, moving
+    if friction is None:
+        return
+    bare = replace(scene, effects=tuple(effect for effect in scene.effects if effect is not friction))
+    numbers = np.stack((at.theta_2, at.alpha_2), axis=1)[resting]
+    for first in resting[np.unique(numbers, axis=0, return_index=True)[1]].tolist():
+        where = np.array([first])
+        here = piece(at, where)
+        needed, begins = FreeBody().answer(bare, here).quantities["torque"][0], float(np.sign(here.alpha_2)[0])
+        turning = FreeBody().answer(bare, here._replace(omega_2=np.ones(1))).quantities
+        rate = {1: 0.0, 2: 1.0, 3: turning["omega_3"][0], 4: turning["omega_4"][0]}
+        slips = {pin: rate[PINS[pin][1]] - rate[PINS[pin][0]] for pin, _ in friction.torques}
+        most = sum(torque * abs(slips[pin]) for pin, torque in friction.torques)
+        part = -begins or float(np.clip(needed / most, -1.0, 1.0))
+        loads = [
+            Load(bar, moment=sense * part * torque * float(np.sign(slips[pin])))
+            for pin, torque in friction.torques
+            for bar, sense in zip(PINS[pin], (-1.0, 1.0), strict=True)
+            if bar != 1
+        ]
+        yield replace(bare, loads=(*scene.loads, *loads)), where
 
 
 class _Truth(NamedTuple):

@@ -8,6 +8,7 @@ from dataclasses import fields, replace
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fourbar.files import dump, loads
 from fourbar.quantities import OK, UNKNOWNS, is_scalar
@@ -172,8 +173,8 @@ def row_of(
     return Row(question.name, engine, "exact", quantity, *numbers)
 
 
-def member(study: Solution, index: int) -> Solution:
-    """One linkage of a solved study."""
+def member(study: Solution, index: int | NDArray[np.intp]) -> Solution:
+    """One linkage of a solved study, or some positions of one linkage."""
 
     def own(value: Any) -> Any:
         if isinstance(value, dict):

@@ -135,11 +135,17 @@ SPECIMENS: dict[str, Scene] = {
     "many turns away": Scene(CRANK, Motion(Sweep(20.0, 22.0, 10), 5.0), effects=(Torsion.at(O2=(0.5, 1.0, 0.1)),)),
     "ends of a spring nearly meet": Scene(
         CRANK,
-        Motion(1.0 + np.array([3e-3, 0.1, 1.0]), 10.0),
+        Motion(1.0 + np.array([1e-5, 0.1, 1.0]), 10.0),
         effects=(Springs((Spring(Point(1, 0.1, 0.8), Point(2, 0.1, 0.0), 80.0, 0.05),)),),
+    ),
+    "held by friction": Scene(CRANK, Motion(1.0, 0.0, free=Free(0.5, 5)), effects=(WEIGHT, Friction.at(B=0.3, O2=2.0))),
+    "held in the end": Scene(CRANK, Motion(1.0, 3.0, free=Free(1.0, 20)), effects=(WEIGHT, Friction.at(A=0.3, O4=1.0))),
+    "from rest against friction": Scene(
+        CRANK, Motion(1.0, 0.0, free=Free(0.5, 20)), effects=(WEIGHT, Friction.at(A=0.01, O4=0.02))
     ),
     "released to a limit": Scene(ROCKER, Motion(math.radians(50.0), 3.0, free=Free(1.0, 100)), effects=(Gravity(),)),
     "shipped": Scene(SLENDER, TURN, effects=(WEIGHT,), points=POINTS),
+    "shipped, limited": Scene(ROCKER, Motion(Sweep(0.3, 1.4, 22), 3.0), effects=(WEIGHT,)),
     "simulated": Scene(
         CRANK,
         Motion(Sweep(0.1, 6.0, 12), 10.0),
