@@ -144,6 +144,17 @@ SPECIMENS: dict[str, Scene] = {
         CRANK, Motion(1.0, 0.0, free=Free(0.5, 20)), effects=(WEIGHT, Friction.at(A=0.01, O4=0.02))
     ),
     "released to a limit": Scene(ROCKER, Motion(math.radians(50.0), 3.0, free=Free(1.0, 100)), effects=(Gravity(),)),
+    "turning over change points": Scene(
+        FourBar(0.3, Bar(0.1, 0.2), Bar(0.3, 0.5), Bar(0.1, 0.4)),
+        Motion(0.5, 25.0, through="follow", free=Free(0.4, 400)),
+        effects=(Gravity(),),
+    ),
+    "to full accuracy: short diagonal": Scene(
+        uniform(0.859375, 0.853515625, 0.58984375, 0.583984375),
+        Motion(np.array([0.0018, 0.01]), 10.0),
+        effects=(WEIGHT,),
+    ),
+    "no torque": Scene(uniform(0.3, 0.1, 0.3, 0.1), Motion(np.array([0.5, 1.0]), 10.0), 3, effects=(WEIGHT,)),
     "shipped": Scene(SLENDER, TURN, effects=(WEIGHT,), points=POINTS),
     "shipped, limited": Scene(ROCKER, Motion(Sweep(0.3, 1.4, 22), 3.0), effects=(WEIGHT,)),
     "simulated": Scene(
