@@ -73,9 +73,14 @@ def installing(extra: str) -> str:
         return f'pip install ".[{extra}]" in the checkout'
     from importlib.metadata import requires
 
-    wanted = f"extra == [\"']{extra}[\"']"
-    found = [each.partition(";")[0].strip() for each in requires("fourbar") or () if re.search(wanted, each)]
-    return "pip install " + " ".join(f'"{each}"' for each in found)
+    def needed(name: str) -> list[str]:
+        wanted = f"extra == [\"']{name}[\"']"
+        found = [each.partition(";")[0].strip() for each in requires("fourbar") or () if re.search(wanted, each)]
+        inner = [each.removeprefix("fourbar[").removesuffix("]").split(",") for each in found if "fourbar[" in each]
+        own = [each for each in found if "fourbar[" not in each]
+        return own + [each for names in inner for name in names for each in needed(name)]
+
+    return "pip install " + " ".join(f'"{each}"' for each in dict.fromkeys(needed(extra)))
 
 
 HOLDS, FAILED, BAD_INPUT, BROKEN, INTERRUPTED = 0, 1, 2, 3, 130
@@ -173,9 +178,9 @@ def _report_interruption(kind: type[BaseException], error: BaseException, trace:
     os._exit(INTERRUPTED)
 
 
-STARTED_AS = [("-m", "fourbar"), ("-m", "validation")]
+STARTED_AS = [("-m", name) for name in ("fourbar", "validation", "fourbar_validation")]
 """The commands of this project: another program that imports it reports its own interruptions."""
-if Path(sys.argv[0] if sys.argv else "").stem == "fourbar" or any(
+if Path(sys.argv[0] if sys.argv else "").stem in ("fourbar", "fourbar-validation") or any(
     pair in STARTED_AS for pair in zip(sys.orig_argv, sys.orig_argv[1:], strict=False)
 ):
     sys.excepthook = _report_interruption

@@ -9,17 +9,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.errors import InputError, expect
+from fourbar.evaluation.blocks import each, evaluation, is_compiled, keep, positions_at_once
+from fourbar.evaluation.case import BLOCK, Case
+from fourbar.evaluation.stages import FORCE, Part, commanded, freely
 from fourbar.linkage import A_BRANCH, require, require_whole
 from fourbar.quantities import ANGLES, OF_DRY_FRICTION, OF_PIN_LOADS, STAGE_OF, STAGES, is_scalar
 from fourbar.scene import Command, Scene, command
-from fourbar.scene.blocks import each, evaluation, is_compiled, keep, positions_at_once
-from fourbar.scene.case import BLOCK, Case
-from fourbar.scene.evaluation import FORCE, Part, commanded, freely
 from fourbar.scene.point import OF_POINTS
 from fourbar.solution import Array, Solution, unwrap
 
 if TYPE_CHECKING:
-    from fourbar.free_motion import FreeMotion
+    from fourbar.evaluation.free_motion import FreeMotion
 
 
 class Members(Protocol):
@@ -230,7 +230,7 @@ def _alone(
 
 def _released(scene: Scene) -> "FreeMotion":
     """The motion that the linkage makes when it is released."""
-    from fourbar.free_motion import release
+    from fourbar.evaluation.free_motion import release
 
     free, start = scene.motion.free, command(scene)
     assert free is not None

@@ -1,4 +1,1 @@
-"""The cross-check of the formulas against engines that know nothing of them."""
-
-from fourbar.errors import FourBarError as FourBarError  # before the libraries: an interruption meanwhile is one line
-from validation.compare.answer import Answer as Answer
+"""The folder of the harness in a checkout: `python -m validation` starts it."""

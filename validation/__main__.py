@@ -1,6 +1,14 @@
-"""`python -m validation`: the command line of the harness."""
+"""`python -m validation`: the command line of the harness, in a checkout."""
 
-from validation.cli import main
+import os
+import sys
+from pathlib import Path
+
+HERE = str(Path(__file__).parent)
+sys.path.insert(0, HERE)  # where the checkout is not installed, and for the processes that are started from here
+os.environ["PYTHONPATH"] = os.pathsep.join(filter(None, (HERE, os.environ.get("PYTHONPATH"))))
+
+from fourbar_validation.cli import main  # noqa: E402
 
 if __name__ == "__main__":
     main()

@@ -21,7 +21,7 @@ from fourbar.errors import run
 def group(context: click.Context, traceback: bool) -> None:
     """Closed formulas of the planar four-bar linkage: from a scene file to driving torque and pin forces.
 
-    The checks against MuJoCo and Pinocchio are no part of the installed package: in a checkout, python -m validation.
+    The checks against MuJoCo and Pinocchio are fourbar-validation, with the extra "validation".
 
     Exit status: 0 all well (also when some positions do not assemble), 2 the input is bad, 3 the
     environment or the program failed, 130 interrupted.

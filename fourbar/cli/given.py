@@ -69,7 +69,7 @@ def waiting(scene: "Scene") -> Iterator[None]:
     if scene.motion.free is None:
         yield
         return
-    from fourbar.free_motion import STEPS
+    from fourbar.evaluation.free_motion import STEPS
     from fourbar.show.progress import running
 
     with running(f"the free motion is integrated, in {STEPS} steps at most"):

@@ -7,10 +7,10 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from fourbar import effects as kinds
+from fourbar.effects.numbers import AT_LEAST_ZERO, OF_EFFECT, ROWS
 from fourbar.errors import InputError
 from fourbar.files.fields import Reader, polar, quantity
 from fourbar.linkage import PINS
-from fourbar.studies.keys import AT_LEAST_ZERO, OF_EFFECT, ROWS
 
 if TYPE_CHECKING:
     from fourbar.effects import Effect, Flywheel, Point, Springs

@@ -2,11 +2,12 @@
 
 from typing import Any
 
+from fourbar.effects.numbers import ANY
 from fourbar.errors import InputError
 from fourbar.files.fields import Reader, quantity
 from fourbar.scene import Scene
 from fourbar.scene.tolerance import Tolerance
-from fourbar.studies.keys import ANY, LEFT_OUT, at_place, entries, left_out, refusal
+from fourbar.studies.keys import LEFT_OUT, at_place, entries, left_out, refusal
 
 SIGMA = "sigma"
 

@@ -99,7 +99,7 @@ def command(scene: Scene) -> Command:
             raise InputError("motion.theta_2.limit", stated.limit, "the input of this linkage has no limit positions")
         if stated.limit > len(limits):
             raise InputError("motion.theta_2.limit", stated.limit, f"must be from 1 to {len(limits)}")
-        from fourbar.many_digits import limit_remainder
+        from fourbar.formulas.many_digits import limit_remainder
 
         limit = limits[stated.limit - 1].theta_2
         theta_2 = np.array([limit + stated.offset])

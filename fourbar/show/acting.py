@@ -7,9 +7,9 @@ any position.
 import cmath
 from typing import Any, NamedTuple
 
+from fourbar.effects.numbers import ROWS
 from fourbar.linkage import FIRST_PIN
 from fourbar.scene import Scene
-from fourbar.studies.keys import ROWS
 
 
 class Symbol(NamedTuple):

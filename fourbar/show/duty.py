@@ -7,11 +7,11 @@ import numpy as np
 
 from fourbar.effects.actions import Actions, bodies
 from fourbar.errors import DependencyError, InputError, expect, installing
+from fourbar.evaluation.case import state_at
 from fourbar.formulas.arithmetic import dot
 from fourbar.formulas.motion import State
 from fourbar.linkage import MOVING_BARS, PIN_FORCE, FourBar
 from fourbar.scene import Command, Scene
-from fourbar.scene.case import state_at
 from fourbar.solution import Array, Conversion, Solution, unit_in
 
 

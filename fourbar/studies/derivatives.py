@@ -12,14 +12,14 @@ from fourbar.effects.actions import Actions
 from fourbar.effects.cones import settle
 from fourbar.effects.pin_friction import Settled
 from fourbar.errors import InputError, expect
+from fourbar.evaluation.case import Case
+from fourbar.evaluation.stages import kinematics
 from fourbar.formulas.arithmetic import polar
 from fourbar.formulas.path import Path
 from fourbar.formulas.position import HalfAngle, Position, parallel_pairs, with_parallel_pairs
 from fourbar.linkage import PIN_FORCE
 from fourbar.quantities import FORCES, NOT_ASSEMBLED, OK, SINGULAR, STAGE_OF, STAGES, STATUS_NAMES
 from fourbar.scene import Command, Scene, command
-from fourbar.scene.case import Case
-from fourbar.scene.evaluation import kinematics
 from fourbar.scene.motion import FromLimit
 from fourbar.scene.point import OF_POINTS
 from fourbar.solution import Array, Solution, values_of

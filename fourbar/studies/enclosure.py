@@ -18,12 +18,12 @@ from numpy.typing import NDArray
 
 from fourbar.effects.actions import bodies
 from fourbar.errors import DependencyError, InputError, LimitError, expect, installing
+from fourbar.evaluation.case import Case
 from fourbar.formulas.arithmetic import dot
 from fourbar.formulas.path import Path
 from fourbar.formulas.position import HalfAngle, Loop, close_loop
 from fourbar.quantities import PIN_FORCES
 from fourbar.scene import Scene, command
-from fourbar.scene.case import Case
 from fourbar.studies.derivatives import differentiable
 from fourbar.studies.interval import interval, require, require_all
 from fourbar.studies.keys import at_place, entries, left_out, with_numbers
@@ -86,7 +86,8 @@ def extremes(scene: Scene, quantities: Sequence[str] = NAMES) -> Extremes:
 
     At the scene's omega_2, alpha_2 and branch. Where the scene has tolerances the bounds hold for every linkage within
     them (three sigma of a normal one): `high` of the greatest and `low` of the least are then proven, and the other end
-    is what the worst corner found reaches.
+    is what the worst corner found reaches. All bounds are those of the stated doubles without any rounding: a spring's
+    preload - stiffness length, or the inertia m L^2/12 that a bar leaves out, is exact.
 
     Parameters
     ----------

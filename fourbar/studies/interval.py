@@ -67,6 +67,10 @@ def interval(scene: Scene) -> tuple[tuple[tuple[float, float], ...], float]:
                 if kept != parts:
                     gaps = True
                 parts = sorted(set(kept))
+    parts = [(low, high) for low, high in parts if low < high]
+    if not parts:
+        nowhere = f"is nowhere farther than {math.degrees(DISTANCE):g} deg from a limit of the input or a pole"
+        raise LimitError(f"the interval of theta_2 {nowhere}: nothing is proven there")
     return tuple(parts), DISTANCE if gaps else 0.0
 
 

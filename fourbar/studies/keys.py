@@ -9,12 +9,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.lib.mixins import NDArrayOperatorsMixin
 
+from fourbar.effects.numbers import ANY, AT_LEAST_ZERO, OF_EFFECT, POSITIVE, ROWS
 from fourbar.errors import InputError, expect
 from fourbar.formulas.arithmetic import polar
 from fourbar.linkage import BAR_NAMES, MOVING_BARS, Bar
 from fourbar.scene import Scene
 
-ANY, AT_LEAST_ZERO, POSITIVE = "a finite number", "a finite number >= 0", "a finite number > 0"
 THETA_2 = "motion.theta_2"
 SAME_FOR_ALL = (
     *("title", "source", "drive", "bar", "branch", "through", "free", "law", "frame", "table", "picture"),
@@ -42,20 +42,6 @@ def _pair(key: str, place: Place, unit: str, names: tuple[str | int, str | int] 
     """The two entries of a magnitude with its angle."""
     one, other = ((*place, name) for name in names)
     return {f"{key}.0": Entry(one, unit), f"{key}.1": Entry(other, "rad")}
-
-
-OF_EFFECT: dict[str, dict[str, tuple[str, str]]] = {
-    "gravity": {"magnitude": ("m/s^2", ANY), "angle": ("rad", ANY)},
-    "viscous": {"": ("N m s/rad", AT_LEAST_ZERO)},
-    "friction": {"": ("N m", AT_LEAST_ZERO)},
-    "pin_friction": {"coefficient": ("1", AT_LEAST_ZERO), "radius": ("m", AT_LEAST_ZERO)},
-    "torsion": {"stiffness": ("N m/rad", POSITIVE), "rest": ("rad", ANY), "preload": ("N m", ANY)},
-    "springs": {"stiffness": ("N/m", POSITIVE), "length": ("m", AT_LEAST_ZERO), "preload": ("N", ANY)},
-    "flywheel": {"inertia": ("kg m^2", AT_LEAST_ZERO)},
-}
-"""Unit and bound of each number of an effect, by its name; the one number that a pin has needs none."""
-ROWS = {"viscous": "coefficients", "friction": "torques", "pin_friction": "pins", "torsion": "springs"}
-"""Effects that hold rows (pin, number, ...), each with its field of them."""
 
 
 def _of_effect(effect: Any, key: str, place: Place) -> dict[str, Entry]:

@@ -8,13 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.errors import InputError, expect
+from fourbar.evaluation.blocks import each, evaluation, is_compiled, keep, positions_at_once
+from fourbar.evaluation.case import BLOCK, Case
+from fourbar.evaluation.stages import FORCE
 from fourbar.formulas.mobility import on_smooth_path
 from fourbar.formulas.position import loop
 from fourbar.quantities import ANGLES, INVALID
 from fourbar.scene import Command, Scene, command
-from fourbar.scene.blocks import each, evaluation, is_compiled, keep, positions_at_once
-from fourbar.scene.case import BLOCK, Case
-from fourbar.scene.evaluation import FORCE
 from fourbar.scene.motion import FromLimit
 from fourbar.solution import Array, Solution, unwrap
 from fourbar.solve import arrays, requested, solved

@@ -8,11 +8,11 @@ import numpy as np
 
 from fourbar.effects.actions import Actions, bodies
 from fourbar.errors import NotAssembledError
+from fourbar.evaluation.case import state_at
 from fourbar.formulas.arithmetic import Number
 from fourbar.formulas.motion import State
 from fourbar.linkage import MOVING_BARS, PINS
 from fourbar.scene import Command, Scene, command
-from fourbar.scene.case import state_at
 from fourbar.scene.motion import FromLimit
 from fourbar.solution import Array, Conversion, Solution
 from fourbar.solve import solve

@@ -1,0 +1,237 @@
+"""A scene in the numbers of the formulas: positions, motion, and the forces under everything that acts."""
+
+from collections.abc import Callable
+from dataclasses import fields, is_dataclass
+from functools import cache
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fourbar.effects.actions import Actions, bodies
+from fourbar.errors import LimitError
+from fourbar.formulas.arithmetic import anywhere, polar, vector
+from fourbar.formulas.motion import Coefficients, State, rates
+from fourbar.formulas.path import Path, path
+from fourbar.formulas.pin_forces import Bodies, PinForces, Wrenches, coupler_about_B, inertia_wrenches, pin_forces
+from fourbar.formulas.position import HalfAngle, Loop, Position
+from fourbar.formulas.torque import driving_torque, half_slope, inertia
+from fourbar.linkage import FourBar
+from fourbar.quantities import JAMMED
+from fourbar.scene import Command, Scene
+from fourbar.solution import Array
+
+if TYPE_CHECKING:
+    from fourbar.effects import Effect
+
+
+BLOCK = 8000
+"""Positions evaluated at a time, measured: fewer pay for calls, more leave the cache. Of 8192 an array of complex
+numbers is a little more than the C library hands out again without asking the system for fresh pages, and from 10 000
+on OpenBLAS starts threads for the squares by which `withheld` looks for what is no number."""
+
+U = 2.0**-53
+"""Unit round-off of a double."""
+UNDECIDED = 32.0 * U
+"""A factor of Heron's formula smaller than this times its terms is evaluated in many digits: in doubles it is wrong
+by at most about 12 U times them."""
+
+NOWHERE = np.empty(0, dtype=np.intp)
+
+NO_MOTION = Coefficients(*[np.nan] * 8)
+"""Where positions alone are wanted."""
+Evaluated = tuple[NDArray[np.uint8], dict[str, Any], Position | None]
+"""Status codes and quantities of some positions, vectors as x + i y, and where the drive must balance."""
+
+
+def changed(value: Any, change: Callable[[Any], Any]) -> Any:
+    """The same with each of its floats and arrays changed, in tuples and dataclasses too; all else stays."""
+    if isinstance(value, (float, np.ndarray)):
+        return change(value)
+    if isinstance(value, tuple):
+        parts = [changed(part, change) for part in value]
+        return type(value)(*parts) if hasattr(value, "_fields") else tuple(parts)
+    if not (names := _fields(value.__class__)):
+        return value
+    other = object.__new__(type(value))  # a constructor checks what a user gives, one number at a time
+    for name in names:
+        object.__setattr__(other, name, changed(getattr(value, name), change))
+    return other
+
+
+@cache
+def _fields(of: type) -> tuple[str, ...]:
+    """Of a dataclass whose numbers may be changed."""
+    return tuple(field.name for field in fields(of)) if is_dataclass(of) and not getattr(of, "as_given", False) else ()
+
+
+def undecided(factor: Any, constant: Any, size: Any) -> Any:
+    """Where doubles cannot decide the sign of a factor of Heron's formula, the constant and 4 a d times a square."""
+    return (constant < 0.0) & (np.abs(factor) < UNDECIDED * (np.abs(constant) + size))
+
+
+class Dynamics(NamedTuple):
+    """Pin forces and driving torque, and what friction that depends on the pin forces was solved to."""
+
+    pins: PinForces
+    torque: Any
+    from_jamming: Any = None
+    residual: Any = None
+    status: Any = None
+
+
+class Case(NamedTuple):
+    """A scene in the numbers of the formulas."""
+
+    linkage: FourBar
+    lengths: Loop
+    bodies: Bodies
+    terms: "tuple[Effect, ...]"
+    drive_bar: int
+    path: Path
+    points: tuple[tuple[str, int, Any], ...] = ()
+    """The scene's own: name, bar, and place in the bar's frame at its first pin, complex, m."""
+    side: Any = 0
+    """In which sense pins at rest are about to turn, or the part of its torque that dry friction holds them with."""
+
+    @classmethod
+    def of(cls, scene: Scene) -> "Case":
+        """The numbers that stay the same over the positions."""
+        terms, linkage = (*scene.loads, *scene.effects), scene.linkage
+        own = path(Loop(*linkage.lengths, 0.0, 0.0), linkage.ground_angle)
+        square = own.unit * own.unit
+        lengths = Loop(*linkage.lengths, own.lengths.E1 * square, own.lengths.E2 * square)
+        points = tuple((point.name, point.bar, polar(*point.from_pin)) for point in scene.points)
+        return cls(linkage, lengths, bodies(linkage, terms), terms, scene.drive_bar, own, points)
+
+    def state(
+        self, path: Path, q: Any, at: Position, branch: Any, speed: Any, acceleration: Any, *, moving: bool = True
+    ) -> State:
+        """Positions and, where more than they is wanted, motion.
+
+        Parameters
+        ----------
+        at : in the order in which the path reads the loop.
+        """
+        theta_1 = self.linkage.ground_angle
+        if not moving:
+            return State(self.lengths, theta_1, q, at, NO_MOTION, 0.0, rates(NO_MOTION, 0.0, 0.0))
+        at, k = path.motion(at, branch)
+        return State(self.lengths, theta_1, q, at, k, speed, rates(k, speed, acceleration))
+
+    def at(self, where: Command) -> State:
+        """The positions of a command to the input, and their motion."""
+        half, _ = self.half_angle(where.theta_2, where.remainder)
+        found = self.path.position(where.theta_2, half, where.branch)
+        omega_2 = 0.0 if where.omega_2 is None else where.omega_2
+        return self.state(self.path, where.theta_2, found, where.branch, omega_2, where.alpha_2)
+
+    def started(self, at: Command) -> "Case":
+        """With effects that know that the motion begins at a position, of as many linkages as there are."""
+        state = self.at(at)
+        return self._replace(terms=tuple(term.counted_from(state, at.branch) for term in self.terms))
+
+    def with_start(self, motion: Command) -> "Case":
+        """The same of a whole motion: it begins where the linkage first assembles, if it keeps its branch."""
+        half, _ = self.half_angle(motion.theta_2, motion.remainder)
+        assembled = (half.outer >= 0.0) & (half.inner >= 0.0)
+        if not assembled.any() or np.ptp(motion.branch) != 0:
+            return self
+        first = int(np.argmax(assembled))
+        return self.started(Command(motion.theta_2[first], motion.branch[first], 0.0, 0.0, motion.remainder))
+
+    def refuse_wound(self, at: Command) -> None:
+        """A LimitError where a free motion winds a spring: from there on it is no longer the spring's."""
+        state = self.at(at)
+        for term in self.terms:
+            codes = term.status(state, at.branch) if term.counts_turns else None
+            if codes is not None and codes.any():
+                assert at.time is not None
+                raise LimitError(
+                    f"effects.{term.key}: at {at.time[np.argmax(codes)]:.6g} s the free motion has turned a pin "
+                    "by more than half a turn from the rest of its spring, which is not modelled"
+                )
+
+    def half_angle(self, theta_2: Array, remainder: Any) -> tuple[HalfAngle, NDArray[np.intp]]:
+        """The half angles, and the indices of those evaluated in many digits."""
+        lengths, half = self.path.lengths, self.path.half_angle(theta_2)
+        close: Any = remainder is not None
+        if remainder is None:
+            for factor, constant in ((half.outer, lengths.E1), (half.inner, lengths.E2)):
+                if anywhere(constant < 0.0):  # else it is a sum of two positive terms
+                    close = close | undecided(factor, constant, 4.0 * lengths.a * lengths.d)
+        if not anywhere(close):
+            return half, NOWHERE
+        from fourbar.formulas.many_digits import decided
+
+        index = np.flatnonzero(np.broadcast_to(close, np.shape(theta_2)))
+        half = decided(self.linkage, self.path.unit, half, index, theta_2, remainder)
+        return half, index
+
+    def dynamics(
+        self, state: State, acceleration: Any, side: Any = 0, rounded: Callable[..., Any] | None = None
+    ) -> Dynamics:
+        """Pin forces and torque under everything that acts; for the parameters see `Actions`."""
+        a, at, k = self.lengths.a, state.at, state.k
+        actions = Actions(state, self.bodies, side, rounded)
+        for term in self.terms:
+            term.act(actions, state)
+        own, mass_at_A = inertia_wrenches(a, self.bodies, at, state.moving)
+        # J q'' + J'/2 q'^2 of all bars, and of bars 3 and 4
+        inertial = others = half_slope(a, self.bodies, at, k) * (state.speed * state.speed)
+        if anywhere(acceleration != 0.0):
+            of_input, of_others = inertia(a, self.bodies, at, k)
+            others = others + of_others * acceleration
+            inertial = others + of_input * acceleration
+        if rounded is not None:
+            own, mass_at_A = Wrenches(*map(rounded, own)), vector(rounded(mass_at_A.real), rounded(mass_at_A.imag))
+            inertial, others = rounded(inertial), rounded(others)
+
+        sine, short = self.path.drive_sine(at, self.drive_bar), anywhere(self.lengths.d < self.lengths.a)
+        if rounded is not None:
+            sine = rounded(sine)
+        if self.drive_bar == 4:
+            about_B = coupler_about_B(self.lengths, self.bodies[1], at, state.moving, sine)
+            others = about_B if rounded is None else rounded(about_B)
+
+        def eliminate(
+            acting: Actions, own: Wrenches = own, mass_at_A: Any = mass_at_A, others: Any = others
+        ) -> PinForces:
+            w, moment = acting.wrenches(own), 0.0
+            if self.drive_bar == 4:
+                moment = -(acting.about_B() + others)
+            elif self.drive_bar == 2 and short:
+                moment = acting.work()[1] - others
+            return pin_forces(self.lengths, at, self.drive_bar, sine, w, mass_at_A, moment)
+
+        def by_couples(acting: Actions) -> PinForces:
+            return eliminate(acting, Wrenches(), 0.0j, 0.0)
+
+        pins = eliminate(actions)
+        settled: list[Any] = []
+        for term in self.terms:  # a scene holds one effect of a kind, and one kind depends on the forces
+            if term.loaded_pins:
+                pins, *settled = term.settle(actions, pins, eliminate, by_couples)  # type: ignore[attr-defined]
+        return Dynamics(pins, driving_torque(k, self.drive_bar, inertial, actions.work()[0]), *settled)
+
+    def torque_interval(self, state: State, alpha_2: Any, torque: Any) -> tuple[Any, Any, Any]:
+        """Least and greatest driving torque where dry friction holds a pin at rest, elsewhere the torque twice, N m.
+
+        The third is where one of them is NaN because friction jams the motion that would begin; None: nowhere.
+        The ends are the torques at which the linkage would begin to move forwards or backwards, or, where only a
+        pin comes to rest while the linkage moves, the torques just before and after its reversal.
+        """
+        actions = Actions(state, self.bodies)
+        pins = {pin for term in self.terms for pin in term.dry_pins}
+        if np.all(state.speed) and all(np.all(actions.turning(pin)) for pin in pins):
+            return torque, torque, None
+        ahead, back = (self.dynamics(state, alpha_2, side) for side in (1, -1))
+        jammed = [found.status == JAMMED for found in (ahead, back) if found.status is not None]
+        low, high = np.minimum(ahead.torque, back.torque), np.maximum(ahead.torque, back.torque)
+        return low, high, np.any(jammed, axis=0) if jammed else None
+
+
+def state_at(scene: Scene, at: Command) -> State:
+    """The positions of a command and their motion, for what shows them."""
+    with np.errstate(all="ignore"):
+        return Case.of(scene).at(at)

@@ -1,0 +1,199 @@
+"""Error bars of torque and pin forces: how far rounding makes them scatter.
+
+The forces are evaluated again with every number of the position, coefficient and term of a sum changed in its last
+digit. All roundings then fall differently, so the root mean square of the changes is of the size of the error
+itself, whatever the formulas lose at this position. What is stated of the bars, loads and effects is exact, and
+what a product of it loses is no more than its other factors are changed by. As many changes go up as down, in an order
+of its own for each number, so that those of different numbers do not cancel over the evaluations, which run as one
+batch.
+"""
+
+from functools import cache
+from itertools import combinations, cycle
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fourbar.evaluation.case import Case, Dynamics
+from fourbar.formulas.arithmetic import anywhere, select, two_sum
+from fourbar.formulas.motion import Coefficients, State, rates, side_may_turn_fast, side_turns_fast
+from fourbar.formulas.path import read_backwards
+from fourbar.formulas.position import HalfAngle, Loop, Position
+
+EVALUATIONS = 14
+"""Of the orders of seven changes up and seven down half are the others reversed, which leaves NUMBERS of them: so many
+numbers of which no two change alike in all evaluations, or against each other, and so cancel. With fewer evaluations
+the mean scatters more."""
+NUMBERS = 1716
+"""A scene has about fifty, and a few for each load and effect."""
+LAST_DIGIT = 1.01 * 2.0**-53
+"""Relative: x + x LAST_DIGIT is the next double, whatever x."""
+LAST_ROUNDING = 2.0**-53
+"""Relative: half the distance to the next double, or more; the result itself was rounded by as much."""
+TYPICAL = 0.45
+"""The error bar as a share of the root mean square. That holds the error of the answer besides the scatter, sqrt 2
+times either, so the bar is 0.64 standard deviations: 2 in ten billion normal errors exceed ten bars, and 5 in 1000
+are below a hundredth of one."""
+
+
+class Roundings:
+    """Changes of numbers in their last digit, up or down, EVALUATIONS times at once."""
+
+    def __init__(self, u1: Any) -> None:
+        of_reals, of_parts = in_turn()
+        self.of_reals, self.of_parts = cycle(of_reals), cycle(of_parts)
+        turned = (np.real(u1) != 0.0) & (np.imag(u1) != 0.0)
+        self.turned = turned[..., None] if np.ndim(turned) else turned
+
+    def __call__(self, number: Any, *, turned: bool = False) -> Any:
+        """Real numbers: the next double up or down, (EVALUATIONS, ...); each part of a complex one by itself.
+
+        Parameters
+        ----------
+        turned : whether a direction, known to its last digit, mixes the parts, and each carries the larger's, as all do
+            with a ground at an angle.
+        """
+        if type(number) is float and number == 0.0:  # exact, and quicker alone than as many zeros
+            return number
+        if not isinstance(number, complex) and not (isinstance(number, np.ndarray) and number.dtype.kind == "c"):
+            return rounded_real(number, next(self.of_reals))
+        size = parts = np.asarray(number)[..., None].view(float)
+        mixed = turned or self.turned
+        if anywhere(mixed):
+            size = select(mixed, np.maximum(np.abs(parts[..., :1]), np.abs(parts[..., 1:])), parts)
+        return (parts + size * next(self.of_parts)).view(complex)[..., 0]
+
+    def next(self, count: int) -> list[Any]:
+        """The signs of some more real numbers."""
+        return [next(self.of_reals) for _ in range(count)]
+
+
+@cache
+def in_turn() -> tuple[list[NDArray[np.float64]], list[NDArray[np.float64]]]:
+    """The signs of real numbers, each (EVALUATIONS, 1), and of both parts of complex ones, (EVALUATIONS, 1, 2)."""
+    of_reals, of_parts = np.split(signs().T, 2)
+    pairs = of_parts.reshape(-1, 2, EVALUATIONS).transpose(0, 2, 1)
+    return list(of_reals[:, :, None]), list(np.ascontiguousarray(pairs)[:, :, None])
+
+
+def error_bars(
+    case: Case, state: State, acceleration: Any, sign: Any, found: Dynamics, exact: NDArray[np.intp]
+) -> dict[str, Any]:
+    """`torque_error` (N m) and `force_error` (N, worst of the four pin forces), each (n,).
+
+    Parameters
+    ----------
+    state, acceleration, sign, found : the evaluation that the error bars are for; the sign is that of the path's root.
+    exact : indices of the positions whose half angle is known in many digits.
+    """
+    rounded, path = Roundings(state.at.u1), case.path
+    q = state.theta_2 if path.bar == 2 else np.angle(state.at.u4)
+    lost = two_sum(q, -path.theta_1)[1]
+    known = exact.size > 0 and np.isin(np.arange(np.size(state.at.half.ss)), exact)
+    half = rounded_half_angle(path.lengths, state.at.half, lost, known, rounded.next(6))
+    near, k = path.motion(path.position(q, half, sign), sign)
+    near = near._replace(sin_mu=rounded(near.sin_mu), diagonal=rounded(near.diagonal))
+    near = near._replace(u2=rounded(near.u2), u3=rounded(near.u3), u4=rounded(near.u4))
+    k = k if path.bar == 2 else read_backwards(k)
+    k = rounded_coefficients(path.lengths, near, k, rounded.next(13))
+    k = k if path.bar == 2 else read_backwards(k)
+    nearby = state._replace(at=near, k=k, moving=rates(k, state.speed, acceleration))
+    other = case.dynamics(nearby, acceleration, case.side, rounded)
+    values, others = (*found.pins, found.torque), (*other.pins, other.torque)
+    spread = root_mean_square(np.array([after - before for before, after in zip(values, others, strict=True)]))
+    size = np.array([np.abs(value) for value in values]).reshape(spread.shape)
+    force_error, torque_error = bar(
+        np.array([spread[:4].max(axis=0), spread[4]]), np.array([size[:4].max(axis=0), size[4]])
+    ).reshape(2, *np.shape(found.torque))
+    return {"torque_error": torque_error, "force_error": force_error}
+
+
+def rounded_real(x: Any, sign: Any) -> Any:
+    """The next double up or down."""
+    return x + x * sign
+
+
+def rounded_half_angle(lengths: Loop, half: HalfAngle, lost: Any, known: Any, signs: Any) -> HalfAngle:
+    """The five numbers with their own roundings, that of theta_2 - theta_1, and those of the two sums.
+
+    Parameters
+    ----------
+    lost : what the difference theta_2 - theta_1 lost, rad.
+    known : where the five are known in many digits and carry one rounding each.
+    signs : six of them.
+    """
+    d, a, b, c, E1, E2 = lengths
+    ss, kk, sk, outer, inner = half
+    four_ad, four_bc = 4.0 * a * d, 4.0 * b * c
+    of_outer, of_inner = abs(E1) + four_ad * kk, abs(E2) + four_ad * ss
+    of_outer, of_inner = np.minimum(of_outer, four_bc + of_inner), np.minimum(of_inner, four_bc + of_outer)
+    of_outer, of_inner = select(known, outer, of_outer), select(known, inner, of_inner)
+    turned = select(known, 0.0, lost) * np.sign(signs[0])
+    return HalfAngle(
+        rounded_real(ss, signs[1]) + sk * turned,
+        rounded_real(kk, signs[2]) - sk * turned,
+        rounded_real(sk, signs[3]) + (0.5 * (kk - ss)) * turned,
+        outer - (four_ad * sk) * turned + of_outer * signs[4],
+        inner + (four_ad * sk) * turned + of_inner * signs[5],
+    )
+
+
+def rounded_coefficients(lengths: Loop, at: Position, k: Coefficients, signs: Any) -> Coefficients:
+    """The coefficients from parts rounded each: h3 = m - g, h4 = m + g with m = t + q g, and so their slopes.
+
+    Parameters
+    ----------
+    at, k : in the order in which the loop is read.
+    signs : thirteen of them.
+    """
+    d, a, b, c, _, _ = lengths
+    g, dg = 0.5 * k.h43, 0.5 * (k.dh4 - k.dh3)
+    m, x = k.h3 + g, ((b - c) * (b + c)) / at.e2
+    of_qg, w = x * g, x * g - 0.5 * ((d - a) * (d + a)) / at.e2
+    of_t = m - of_qg
+    if anywhere(side_may_turn_fast(lengths)):
+        fast = side_turns_fast(lengths, at)
+        of_t, of_qg, w = select(fast, m, of_t), select(fast, 0.5, of_qg), select(fast, m - 0.5, w)
+    of_slope, of_side = x * dg, (4.0 * a * d * at.half.sk) * w / at.e2
+    g_moved, dg_moved, qg_moved = g * signs[0], dg * signs[1], of_qg * signs[2]
+    m_moved = of_t * signs[3] + qg_moved
+    slope_moved = of_slope * signs[4] + of_side * signs[5]
+    return Coefficients(
+        k.h2,
+        rounded_real(k.h3, signs[6]) + m_moved - g_moved,
+        rounded_real(k.h4, signs[7]) + m_moved + g_moved,
+        rounded_real(k.h23, signs[8]) + (1.0 - of_t) * signs[9] - qg_moved + g_moved,
+        rounded_real(k.h43, signs[10]) + 2.0 * g_moved,
+        k.dh2,
+        rounded_real(k.dh3, signs[11]) + slope_moved - dg_moved,
+        rounded_real(k.dh4, signs[12]) + slope_moved + dg_moved,
+    )
+
+
+def root_mean_square(changes: Any) -> Any:
+    """Of the sizes of the changes, (..., EVALUATIONS, n), whose squares may be beyond the range of a double."""
+    size = np.abs(changes)
+    largest = size.max(axis=-2, keepdims=True)
+    size /= np.where(largest == 0.0, 1.0, largest)
+    return largest[..., 0, :] * np.sqrt(np.square(size).sum(axis=-2) / EVALUATIONS)
+
+
+def bar(spread: Any, value: Any) -> Any:
+    """The error bar from the root mean square of the changes and the size of the value.
+
+    A change that leaves no value, or none in the range of a double: of the value itself no digit is left.
+    """
+    size = np.abs(value)
+    width = np.maximum(TYPICAL * spread, LAST_ROUNDING * size)
+    return select(np.isfinite(width), width, size)
+
+
+@cache
+def signs() -> NDArray[np.float64]:
+    """+- one last digit, (EVALUATIONS, NUMBERS): of number 1, 2, ... in each evaluation, by a fixed seed."""
+    rng, others = np.random.default_rng(0), range(1, EVALUATIONS)
+    up = np.array([[0, *rest] for rest in combinations(others, EVALUATIONS // 2 - 1)])
+    changes = np.full((NUMBERS, EVALUATIONS), -LAST_DIGIT)
+    np.put_along_axis(changes, up, LAST_DIGIT, axis=1)
+    return np.asarray((rng.permutation(changes) * rng.choice([1.0, -1.0], (NUMBERS, 1))).T)

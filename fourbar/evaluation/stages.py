@@ -1,0 +1,218 @@
+"""Positions of a case evaluated stage by stage, of a command or along a free motion."""
+
+from collections.abc import Callable, Iterable, KeysView
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fourbar.evaluation.case import NOWHERE, Case, Evaluated
+from fourbar.evaluation.withheld import no_value
+from fourbar.formulas.arithmetic import angle, anywhere
+from fourbar.formulas.motion import State
+from fourbar.formulas.path import NO_DIGIT_LEFT
+from fourbar.formulas.position import HalfAngle
+from fourbar.quantities import (
+    ANGLES,
+    JAMMED,
+    NO_DIRECTION,
+    NOT_ASSEMBLED,
+    OF_DRY_FRICTION,
+    OK,
+    OVERFLOW,
+    SINGULAR,
+    STAGES,
+    WOUND,
+)
+from fourbar.scene import Command
+from fourbar.scene.point import OF_POINTS
+from fourbar.solution import Array
+
+if TYPE_CHECKING:
+    from fourbar.evaluation.free_motion import FreeMotion
+
+
+FORCE, ERROR = STAGES.index("force"), STAGES.index("error")
+
+NO_HALF_ANGLE = HalfAngle(*[np.nan] * 5)
+"""Of positions whose motion and forces are known."""
+
+Part = tuple[Any, ...]
+"""Index of some positions in the arrays of all."""
+
+
+WITHOUT_FORCES = (NO_DIRECTION, WOUND)
+"""Statuses of positions at which an effect has no value, and so the forces have none."""
+
+
+def commanded(case: Case, where: Command, part: Part, wanted: int, names: KeysView[str]) -> Evaluated:
+    """Some positions of a command to the input, evaluated.
+
+    Parameters
+    ----------
+    wanted : number of the last stage that the quantities named need.
+    """
+    theta_2: Any = where.theta_2[part]
+    if theta_2.ndim == 0:
+        theta_2 = theta_2.item()  # with Python's own numbers a formula takes half the time
+    branch = sign_of(where.branch[part])
+    half, exact = case.half_angle(theta_2, where.remainder)
+    of_angles = len(names) <= len(ANGLES) and set(names) <= set(ANGLES)
+    if of_angles and where.remainder is None and not case.path.may_stay_parallel:
+        return _angles(case, half, branch, names)
+    at = case.path.position(theta_2, half, branch)
+    codes = _codes(at.sin_mu, half, NO_DIGIT_LEFT if where.remainder is None else 0.0)
+    if anywhere(codes):  # velocities are 0/0
+        at = at._replace(root=np.where(codes == SINGULAR, np.nan, at.root))
+    omega_2, alpha_2 = piece(where.omega_2, part), piece(where.alpha_2, part)
+    state = case.state(case.path, theta_2, at, branch, omega_2, alpha_2, moving=wanted > 0)
+    values = kinematics(case, state, names)
+    if wanted >= FORCE:
+        known = exact if wanted == ERROR else None
+        codes, forces = _forces(case, state, alpha_2, branch, branch, codes, names, known)
+        values |= forces
+    return codes, values, at
+
+
+def _codes(sine: Any, half: HalfAngle, margin: float) -> Any:
+    """Statuses of positions from the sine of the transmission angle, or a multiple of it."""
+    size = abs(sine)
+    if type(size) is float and size > margin:
+        return OK
+    codes = np.zeros(np.shape(sine), dtype=np.uint8)
+    if not np.min(size, initial=np.inf) > margin:  # NaN where the loop does not close
+        codes[size <= margin] = SINGULAR
+        codes[np.isnan(sine)] = NOT_ASSEMBLED
+        codes[np.isnan(half.kk)] = OVERFLOW  # of theta_2 - theta_1: not even where it closes is known
+    return codes
+
+
+def sign_of(branch: NDArray[np.int8]) -> Any:
+    """The branch of each position, or one number where all have the same."""
+    if branch.ndim == 0 or (branch.size and branch.min() == branch.max()):
+        return float(branch.flat[0]) if branch.ndim else float(branch)
+    return branch
+
+
+def _angles(case: Case, half: HalfAngle, branch: Any, names: Iterable[str]) -> Evaluated:
+    """The same where two angles alone are wanted: without vectors and the rest of the triangle."""
+    theta_3, theta_4, root = case.path.angles(half, branch)
+    codes = _codes(root, half, NO_DIGIT_LEFT * 2.0 * case.path.lengths.b * case.path.lengths.c)
+    found = {"theta_3": theta_3, "theta_4": theta_4}
+    return codes, {name: found[name] for name in names}, None
+
+
+def freely(case: Case, moved: "FreeMotion", part: Part, wanted: int, names: KeysView[str]) -> Evaluated:
+    """The same at instants of a free motion that have one independent angle; there is no driving torque."""
+    codes = np.zeros(len(part[0]), dtype=np.uint8)
+    if not codes.size:
+        return codes, {}, None
+    bar = int(moved.bar[part][0])
+    free = case._replace(drive_bar=bar, path=moved.paths[bar], side=moved.side[part])
+    q, speed, growth, branch = (x[part] for x in (moved.q, moved.speed, moved.acceleration, moved.sign))
+    at = free.path.position(q, free.path.half_angle(q), branch)
+    state = free.state(free.path, q, at, branch, speed, growth)._replace(theta_2=moved.command.theta_2[part])
+    values = kinematics(case, state, names)
+    if wanted >= FORCE:
+        exact = NOWHERE if wanted == ERROR else None
+        codes, forces = _forces(free, state, growth, None, branch, codes, names, exact)
+        values |= forces
+        values |= {
+            name: np.zeros(codes.shape) for name in values if name in ("torque", "torque_error", *OF_DRY_FRICTION)
+        }
+    return codes, values, None
+
+
+def _forces(
+    case: Case,
+    state: State,
+    alpha_2: Any,
+    branch: NDArray[np.int8] | None,
+    sign: Any,
+    codes: Any,
+    names: KeysView[str],
+    exact: NDArray[np.intp] | None,
+) -> tuple[Any, dict[str, Any]]:
+    """The statuses with those of the effects, and the quantities of the force stage.
+
+    Parameters
+    ----------
+    branch : of each position; None where no effect counts turns by it.
+    sign : of the path's root.
+    exact : indices of the positions known in many digits; None: no error bars.
+    """
+    found = case.dynamics(state, alpha_2, case.side)
+    values: dict[str, Any] = {**found.pins._asdict(), "torque": found.torque}
+    if "drive_condition" in names:
+        condition = abs(case.path.drive_sine(state.at, case.drive_bar))
+        values["drive_condition"] = condition if found.from_jamming is None else condition * found.from_jamming
+    if "friction_residual" in names:
+        values["friction_residual"] = 0.0 if found.residual is None else found.residual
+    if "torque_low" in names or "torque_high" in names:
+        *ends, held = case.torque_interval(state, alpha_2, found.torque)
+        values |= zip(OF_DRY_FRICTION, ends, strict=True)
+        if held is not None and found.status is not None:
+            found = found._replace(status=np.where(held & (found.status == OK), JAMMED, found.status))
+    if exact is not None:
+        from fourbar.evaluation.error_bars import error_bars
+
+        values |= error_bars(case, state, alpha_2, sign, found, exact)
+    without = [status for term in case.terms if (status := term.status(state, branch)) is not None]
+    if found.status is not None:
+        without.append(found.status)
+    if without:
+        codes = np.where(codes == OK, np.max(without, axis=0), codes).astype(np.uint8)
+    if anywhere(codes > SINGULAR):
+        gone = np.isin(codes, WITHOUT_FORCES)
+        values |= {
+            name: np.where(gone, no_value(value), value) for name, value in values.items() if name != "drive_condition"
+        }
+    return codes, {name: value for name, value in values.items() if name in names}
+
+
+def piece(value: float | Array | None, part: Part) -> float | Array:
+    """A number for all positions, or the part of an array that belongs to a block."""
+    return value[part] if isinstance(value, np.ndarray) and value.ndim else value or 0.0
+
+
+OF_BARS: dict[str, Callable[[State], Any]] = {
+    "theta_3": lambda state: angle(state.at.u3),
+    "theta_4": lambda state: angle(state.at.u4),
+    "sin_mu": lambda state: state.at.sin_mu,
+    "condition": lambda state: abs(state.at.sin_mu),
+    "omega_2": lambda state: state.moving.omega_2,
+    "omega_3": lambda state: state.moving.omega_3,
+    "omega_4": lambda state: state.moving.omega_4,
+    "alpha_2": lambda state: state.moving.alpha_2,
+    "alpha_3": lambda state: state.moving.alpha_3,
+    "alpha_4": lambda state: state.moving.alpha_4,
+}
+"""The scalars before the forces."""
+PLACES = frozenset(start + name for start in OF_POINTS for name in ("A", "B", "G2", "G3", "G4"))
+"""The vectors before the forces, of the linkage's own points."""
+
+
+def kinematics(case: Case, state: State, wanted: KeysView[str]) -> dict[str, Any]:
+    """Those of the quantities that come before the forces, a scene's own points among them."""
+    values = {name: evaluate(state) for name, evaluate in OF_BARS.items() if name in wanted}
+    if not case.points and wanted.isdisjoint(PLACES):
+        return values
+    lengths, (two, three, four) = case.lengths, case.bodies
+    places: dict[int, list[tuple[str, Any]]] = {
+        2: [("A", lengths.a), ("G2", two.z)],
+        3: [("G3", three.z)],
+        4: [("B", lengths.c), ("G4", four.z)],
+    }
+    for name, bar, z in case.points:
+        places.setdefault(bar, []).append((name, z))
+    for bar, of_bar in places.items():
+        frame = state.frame(bar)
+        for name, z in of_bar:
+            r = z * frame.u
+            if name in wanted:
+                values[name] = frame.pin + r
+            if (velocity := f"v_{name}") in wanted:
+                values[velocity] = frame.velocity(r)
+            if (acceleration := f"a_{name}") in wanted:
+                values[acceleration] = frame.acceleration(r)
+    return values

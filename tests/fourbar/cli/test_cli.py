@@ -1,0 +1,428 @@
+"""The command line: schema of JSON and CSV, the table, exit statuses, files that appear whole or not at all."""
+
+import csv
+import io
+import json
+import math
+import os
+import re
+import stat
+import subprocess
+import sys
+from collections.abc import Callable
+from importlib import import_module
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import fourbar
+from fourbar.cli import group, status
+from fourbar.errors import BAD_INPUT, BROKEN, HOLDS, INTERRUPTED, DependencyError
+from fourbar.evaluation.case import Case
+from fourbar.files import load, save
+from fourbar.quantities import UNITS, VECTORS
+from fourbar.show import tables
+from tests.support.scenes import crank_rocker, thesis
+
+ROOT = Path(__file__).parents[3]
+MODELS = ROOT / "models"
+CONTRACT = (
+    "schema", "title", "status", "branch", "theta_2", "theta_3", "theta_4", "omega_2", "omega_3", "omega_4", "alpha_2",
+    "alpha_3", "alpha_4", "A", "B", "G2", "G3", "G4", "a_A", "a_B", "a_G2", "a_G3", "a_G4", "F12", "F32", "F43", "F14",
+    "torque", "drive_bar", "sin_mu", "condition", "assembled",
+)  # fmt: skip
+"""The keys that programs which read the JSON rely on."""
+Ended = tuple[int, str, str]
+Fourbar = Callable[..., Ended]
+
+
+@pytest.fixture
+def run(capsys: pytest.CaptureFixture[str]) -> Fourbar:
+    """Runs a command in this process: exit status, standard output, standard error."""
+
+    def call(*arguments: object) -> Ended:
+        code = status([str(argument) for argument in arguments])
+        printed = capsys.readouterr()
+        return code, printed.out, printed.err
+
+    return call
+
+
+def strict(text: str) -> dict[str, object]:
+    """JSON without the NaN and Infinity that Python would let pass."""
+
+    def refuse(name: str) -> float:
+        raise AssertionError(name)
+
+    document = json.loads(text, parse_constant=refuse)
+    assert isinstance(document, dict)
+    return document
+
+
+def same(found: object, array: np.ndarray) -> bool:
+    """Bit-equal, with null for NaN."""
+    expected = np.where(np.isfinite(array), array, np.nan)
+    return np.array_equal(np.array(found, dtype=float), expected, equal_nan=True)
+
+
+@pytest.mark.parametrize("name", ["thesis", "drag_link"])
+def test_json_has_every_key_and_every_digit(name: str, run: Fourbar) -> None:
+    code, out, err = run("analyze", MODELS / f"{name}.toml", "--json")
+    document, solution = strict(out), fourbar.solve(load(MODELS / f"{name}.toml"))
+    assert (code, err, out.count("\n")) == (HOLDS, "", 1)
+    assert set(CONTRACT) <= set(document)
+    for quantity in solution.evaluated():
+        assert same(document[quantity], getattr(solution, quantity)), quantity
+    assert document["status"] == solution.status and document["assembled"] == [True] * len(solution)
+    assert document["drive_bar"] == solution.drive_bar and document["branch"] == [1] * len(solution)
+    assert document["title"] == solution.title and document["angle_unit"] == "rad"
+    assert "time" not in document
+
+
+def test_one_position_is_still_an_array(tmp_path: Path, run: Fourbar) -> None:
+    save(thesis(math.radians(135.0)), tmp_path / "scene.toml")
+    document = strict(run("analyze", tmp_path / "scene.toml", "--json")[1])
+    assert np.shape(document["torque"]) == (1,) and np.shape(document["F12"]) == (1, 2)
+
+
+def test_null_where_there_is_no_value(tmp_path: Path, run: Fourbar) -> None:
+    sweep = fourbar.Motion(np.radians([10.0, 135.0]), 0.2244)
+    save(crank_rocker(linkage=thesis().linkage, motion=sweep), tmp_path / "scene.toml")
+    code, out, _ = run("analyze", tmp_path / "scene.toml", "--json")
+    document = strict(out)
+    assert code == HOLDS and document["status"] == ["not_assembled", "ok"] and document["assembled"] == [False, True]
+    for quantity in set(UNITS) & set(CONTRACT) - {"theta_2", "omega_2", "alpha_2", "A", "G2", "a_A", "a_G2"}:
+        first, second = document[quantity]  # type: ignore[misc]
+        nothing = [None, None] if quantity in VECTORS else None
+        assert first == nothing and second not in (None, [None, None]), quantity
+
+
+def test_positions_only(tmp_path: Path, run: Fourbar) -> None:
+    save(crank_rocker(motion=fourbar.Motion(1.0)), tmp_path / "scene.toml")
+    document = strict(run("analyze", tmp_path / "scene.toml", "--json")[1])
+    assert document["theta_3"] is not None and set(CONTRACT) <= set(document)
+    assert document["torque"] is None and document["F12"] is None and document["omega_2"] is None
+    code, out, _ = run("analyze", tmp_path / "scene.toml")
+    assert code == HOLDS and "theta_3" in out and "N m" not in out
+    rows = list(csv.DictReader(io.StringIO(run("analyze", tmp_path / "scene.toml", "--csv")[1])))
+    assert rows[0]["torque"] == "" and rows[0]["theta_2"] == "1.0"
+
+
+def test_a_free_motion_has_time_and_no_drive(tmp_path: Path, run: Fourbar) -> None:
+    released = fourbar.Motion(0.5, 0.0, free=fourbar.Free(0.5, 4))
+    save(crank_rocker(motion=released), tmp_path / "scene.toml")
+    assert strict(run("analyze", tmp_path / "scene.toml", "--json")[1])["time"] == [0.0, 0.125, 0.25, 0.375, 0.5]
+    out = run("analyze", tmp_path / "scene.toml")[1]
+    assert "released, no drive" in out and "time" in out and "T2" not in out and "torque" not in out
+
+
+def test_csv_has_the_same_numbers(run: Fourbar) -> None:
+    file = MODELS / "crank_rocker.toml"
+    code, out, err = run("analyze", file, "--csv")
+    rows, solution = list(csv.DictReader(io.StringIO(out))), fourbar.solve(load(file))
+    assert (code, err, len(rows)) == (HOLDS, "", 361)
+    for quantity in solution.evaluated():
+        names = [f"{quantity}_x", f"{quantity}_y"] if quantity in VECTORS else [quantity]
+        found = np.array([[float(row[name]) for name in names] for row in rows])
+        assert np.array_equal(found, getattr(solution, quantity).reshape(found.shape)), quantity
+    assert {row["status"] for row in rows} == {"ok"} and {row["drive_bar"] for row in rows} == {"2"}
+
+
+def test_degrees_are_of_angles_alone_and_named(run: Fourbar) -> None:
+    file = MODELS / "crank_rocker.toml"
+    plain, turned = (strict(run("analyze", file, "--json", *more)[1]) for more in ((), ("--degrees",)))
+    assert turned["angle_unit"] == "deg"
+    for key in CONTRACT[1:]:
+        if key in ("theta_2", "theta_3", "theta_4"):
+            assert np.allclose(turned[key], np.degrees(plain[key]), rtol=1e-15, atol=0.0)  # type: ignore[arg-type]
+        else:
+            assert turned[key] == plain[key], key
+    rows = list(csv.DictReader(io.StringIO(run("analyze", file, "--csv", "--degrees")[1])))
+    assert float(rows[90]["theta_2 [deg]"]) == pytest.approx(90.0, rel=1e-15) and "theta_2" not in rows[0]
+
+
+def test_the_table_says_what_was_requested_and_in_what_units(run: Fourbar) -> None:
+    code, out, err = run("analyze", MODELS / "thesis.toml")
+    assert (code, err) == (HOLDS, "")
+    lines = out.split("\n")
+    assert lines[0] == "Thesis model mechanism"
+    assert "open branch; drive on bar 4 (output)" in out and "361 positions: 361 ok" in out
+    heading = next(index for index, line in enumerate(lines) if "theta_2 " in line and "T4" in line)
+    assert lines[heading + 1].split()[:3] == ["deg", "N", "m"]
+    assert "…" not in out and len([line for line in lines if line.strip()]) > 361
+    radians = run("analyze", MODELS / "thesis.toml", "--radians")[1].split("\n")
+    assert radians[heading + 1].split()[0] == "rad"
+
+
+def test_the_largest_pin_loads_stand_above_the_table(run: Fourbar) -> None:
+    """As found row by row in the JSON."""
+    _, printed, _ = run("analyze", str(MODELS / "crank_rocker.toml"))
+    whole = json.loads(run("analyze", str(MODELS / "crank_rocker.toml"), "--json")[1])
+    line = next(line for line in printed.splitlines() if line.startswith("largest pin loads"))
+    for pin, name in {"O2": "F12", "A": "F32", "B": "F43", "O4": "F14"}.items():
+        size, at = max((math.hypot(*force), at) for force, at in zip(whole[name], whole["theta_2"], strict=True))
+        assert f" {pin} {size:.6g} N at {math.degrees(at):.6g} deg" in line
+
+
+def test_a_terminal_gets_some_forty_rows_and_the_summary_last() -> None:
+    lines = tables_text(load(MODELS / "crank_rocker.toml"), 80).splitlines()
+    rows = [line for line in lines if re.match(r" *\d+\.\d{4} ", line)]
+    assert len(rows) == 37 and rows[1].split()[0] == "10.0000" and rows[-1].split()[0] == "360.0000"
+    place = lines.index("shown: every 10th of the 361 positions; --all shows each")
+    assert lines.index(rows[-1]) < place < lines.index("361 positions: 361 ok")
+    assert max(map(len, lines)) <= 80
+
+
+def test_every_thins_the_table_and_keeps_its_last_position(run: Fourbar) -> None:
+    thinned = run("analyze", MODELS / "crank_rocker.toml", "--every", 100)[1].splitlines()
+    rows = [line.split()[0] for line in thinned if re.match(r" *\d+\.\d{4} ", line)]
+    assert rows == ["0.0000", "100.0000", "200.0000", "300.0000", "360.0000"]
+    assert run("analyze", MODELS / "crank_rocker.toml", "--all")[1] == run("analyze", MODELS / "crank_rocker.toml")[1]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("analyze", "x.toml", "--json", "--csv"), "give one of them"),
+        (("analyze", "x.toml", "--json", "--every", 2), "hold every position"),
+        (("plot", "x.toml", "-o", "a.svg", "--position", "12"), 'did you mean "12 deg"?'),
+        (("new", "--lengths", 3, 1, 2, 2), "name the new file once"),
+    ],
+)
+def test_what_contradicts_itself_or_lacks_a_unit_is_refused(
+    arguments: tuple[object, ...], words: str, run: Fourbar
+) -> None:
+    code, out, err = run(*arguments)
+    assert (code, out) == (2, "") and words in err and err.count("\n") == 1
+
+
+def test_no_command_is_a_question_for_help(run: Fourbar, capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, err = run()
+    assert (code, err) == (HOLDS, "") and out == run("-h")[1] and "analyze" in out
+    assert run("-V")[1] == f"fourbar, version {fourbar.__version__}\n"
+    harness = import_module("fourbar_validation.cli").status([])
+    assert harness == HOLDS and "advise" in capsys.readouterr().out
+
+
+def test_the_shell_completes(run: Fourbar, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("_FOURBAR_COMPLETE", "zsh_source")
+    code, out, _ = run()
+    assert code == HOLDS and "compdef" in out
+
+
+def test_a_narrow_terminal_gets_whole_columns_and_the_names_of_what_is_missing() -> None:
+    scene = crank_rocker()
+    for width in (40, 80, 120):
+        text = tables_text(scene, width)
+        assert max(len(line) for line in text.split("\n") if not line.startswith("not shown")) <= width
+        assert "…" not in text and "not shown: " in text and "T2" in text
+    assert "not shown" not in tables_text(scene, 400)
+
+
+def tables_text(scene: fourbar.Scene, width: int) -> str:
+    return tables.printed(scene, fourbar.solve(scene), width)
+
+
+def test_the_digits_of_the_torque() -> None:
+    solution = fourbar.solve(crank_rocker(), "error")
+    assert solution.torque is not None and solution.torque_error is not None
+    column = next(cells for name, cells in tables.columns(solution).items() if "digits" in name)
+    for cell, torque, error in zip(column, solution.torque, solution.torque_error, strict=True):
+        digits = int(cell)
+        assert error <= abs(torque) * 10.0**-digits or digits == 0
+        assert digits == tables.MOST_DIGITS or error > abs(torque) * 10.0 ** -(digits + 1)
+
+
+@pytest.mark.parametrize("form", [(), ("--json",), ("--csv",)])
+def test_out_holds_what_would_be_printed(form: tuple[str, ...], tmp_path: Path, run: Fourbar) -> None:
+    printed = run("analyze", MODELS / "crank_rocker.toml", *form)[1]
+    code, out, err = run("analyze", MODELS / "crank_rocker.toml", *form, "-o", tmp_path / "out")
+    assert (code, out, err) == (HOLDS, "", "")
+    assert (tmp_path / "out").read_text() == printed
+
+
+CLASSES = [
+    ("0.3 0.1 0.25 0.22", "crank-rocker"),
+    ("0.1 0.3 0.25 0.28", "double crank"),
+    ("0.3 0.24 0.1 0.22", "double rocker"),
+    ("0.3 0.22 0.25 0.1", "rocker-crank"),
+    ("20cm 48cm 55cm 20cm", "triple rocker"),
+    ("0.3 0.1 0.2 0.2", "change-point crank-rocker"),  # 0.3 + 0.1 and 0.2 + 0.2 differ as doubles
+    ("0.1 0.3 0.1 0.3", "parallelogram"),
+]
+
+
+@pytest.mark.parametrize(("lengths", "name"), CLASSES)
+def test_classify(lengths: str, name: str, run: Fourbar) -> None:
+    code, out, err = run("classify", *lengths.split())
+    assert (code, err) == (HOLDS, "") and out.startswith(name)
+
+
+def test_what_is_printed_can_be_written(tmp_path: Path, run: Fourbar) -> None:
+    assert run("classify", 3, 1, 2.5, 2.2, "-o", tmp_path / "type.txt") == (HOLDS, "", "")
+    assert (tmp_path / "type.txt").read_text() == run("classify", 3, 1, 2.5, 2.2)[1]
+    assert run("new", "-o", tmp_path / "a.toml", "--lengths", 3, 1, 2.5, 2.2)[0] == HOLDS
+    assert load(tmp_path / "a.toml").linkage.lengths == (3.0, 1.0, 2.5, 2.2)
+    for name, command in group.commands.items():
+        assert any("--out" in option.opts for option in command.params), name
+
+
+def test_classify_says_what_turns_and_how_far(run: Fourbar) -> None:
+    """Numbers by the law of cosines in the triangles that the bars make where two of them are in line."""
+
+    def angle(opposite: float, one: float, other: float) -> float:
+        return math.degrees(math.acos((one**2 + other**2 - opposite**2) / (2.0 * one * other)))
+
+    d, a, b, c = 0.3, 0.1, 0.25, 0.22
+    lines = run("classify", d, a, b, c)[1].splitlines()
+    stretched, folded = angle(c, d, b + a), 180.0 + angle(c, d, b - a)
+    row = next(
+        line.split() for line in lines if line.startswith("  output: input, coupler stretched") and "open" in line
+    )
+    assert [float(cell) for cell in row[4:7]] == pytest.approx(
+        [stretched, stretched, 180.0 - angle(a + b, d, c)], abs=6e-5
+    )
+    row = next(line.split() for line in lines if line.startswith("  output: input, coupler folded") and "open" in line)
+    assert [float(cell) for cell in row[4:6]] == pytest.approx([folded, folded - 180.0], abs=6e-5)
+    least, greatest = angle(d - a, b, c), angle(d + a, b, c)
+    swung = angle(b - a, d, c) - angle(b + a, d, c)
+    one_stroke = folded - stretched
+    for line in (
+        f"angle between coupler and output: {least:.4f} deg at theta_2 = 0.0000 deg "
+        f"to {greatest:.4f} deg at 180.0000 deg",
+        f"smallest transmission angle: {least:.4f} deg",
+        f"slower stroke of the output over the faster, at constant omega_2: {one_stroke / (360.0 - one_stroke):.4f}",
+    ):
+        assert line in lines
+    assert f"output {abs(swung):.4f} deg" in lines[3]
+    assert "change points: theta_2 = 0.0000 deg and 180.0000 deg" in run("classify", 2, 1, 2, 1)[1]
+    assert len(run("classify", 3, 1, 1, 1)[1].splitlines()) == 3  # a structure does not move
+
+
+def test_mjcf_of_a_scene_and_of_bare_lengths(tmp_path: Path, run: Fourbar) -> None:
+    from fourbar.mjcf import defaults_used, scene_from_lengths
+    from fourbar.mjcf.simulators import mjcf_for
+
+    code, out, err = run("mjcf", MODELS / "crank_rocker.toml", "-o", tmp_path / "a.xml")
+    assert (code, out, err) == (HOLDS, "", "")
+    assert (tmp_path / "a.xml").read_text() == mjcf_for(load(MODELS / "crank_rocker.toml"))
+    lengths = ["--lengths", 0.3, "10 cm", "250 mm", 0.22]
+    code, out, err = run("mjcf", *lengths, "--omega", "60 rpm", "-o", tmp_path / "b.xml")
+    scene = scene_from_lengths(0.3, 0.1, 0.25, 0.22, omega=2.0 * math.pi)
+    assert (code, err) == (HOLDS, "") and out.splitlines() == defaults_used(scene)
+    assert (tmp_path / "b.xml").read_text() == mjcf_for(scene)
+
+
+def test_plot_and_animate_write_what_their_ending_says(tmp_path: Path, run: Fourbar) -> None:
+    file = MODELS / "crank_rocker.toml"
+    drawn = tmp_path / "a.svg"
+    assert run("plot", file, "-o", drawn, "--figure", "linkage", "--position", "30 deg") == (HOLDS, "", "")
+    assert "<svg" in drawn.read_text()
+    assert run("animate", file, "-o", tmp_path / "a.html") == (HOLDS, "", "")
+    assert "<html" in (tmp_path / "a.html").read_text()
+    code, _, err = run("plot", file, "-o", tmp_path / "a.doc")
+    assert code == 2 and err.count("\n") == 1 and not (tmp_path / "a.doc").exists()
+
+
+@pytest.mark.parametrize(
+    ("error", "code"),
+    [
+        (RuntimeError("two\nlines"), BROKEN),
+        (MemoryError(), BROKEN),
+        (DependencyError("no such library"), BROKEN),
+        (KeyboardInterrupt(), INTERRUPTED),
+    ],
+)
+def test_what_goes_wrong_is_one_line_and_a_status(
+    error: BaseException, code: int, run: Fourbar, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    def broken(_: object, stage: str) -> None:
+        raise error
+
+    monkeypatch.setattr(import_module("fourbar.solve"), "solve", broken)
+    monkeypatch.delenv("FOURBAR_TRACEBACK", raising=False)
+    found, out, err = run("analyze", MODELS / "thesis.toml", "--json", "-o", tmp_path / "out")
+    # after an interrupt click ends the line that the terminal has started with ^C
+    assert (found, out, err.strip().count("\n")) == (code, "", 0) and not list(tmp_path.iterdir())
+    if isinstance(error, RuntimeError):
+        monkeypatch.setenv("FOURBAR_TRACEBACK", "1")
+        with pytest.raises(RuntimeError):
+            run("analyze", MODELS / "thesis.toml")
+
+
+def test_a_full_disk_leaves_the_old_file(run: Fourbar, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    def full(_: int) -> None:
+        raise OSError(28, "No space left on device")
+
+    (tmp_path / "out").write_text("old")
+    monkeypatch.setattr("os.fsync", full)
+    code, _, err = run("analyze", MODELS / "thesis.toml", "--json", "-o", tmp_path / "out")
+    assert code == BROKEN and "No space left" in err and err.count("\n") == 1
+    assert [(path.name, path.read_text()) for path in tmp_path.iterdir()] == [("out", "old")]
+
+
+@pytest.mark.parametrize(
+    ("out", "why"), [("no/out", "no such folder"), (".", "a file, not a folder"), ("a.toml", "is read here")]
+)
+@pytest.mark.parametrize("command", ["analyze", "mjcf"])
+def test_an_output_that_cannot_be_is_refused_before_anything_is_solved(
+    run: Fourbar, command: str, out: str, why: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(Case, "of", None)
+    text = (MODELS / "thesis.toml").read_text()
+    (tmp_path / "a.toml").write_text(text)
+    code, _, err = run(command, tmp_path / "a.toml", "-o", tmp_path / out)
+    assert code == BAD_INPUT and why in err and err.count("\n") == 1
+    assert [(path.name, path.read_text()) for path in tmp_path.iterdir()] == [("a.toml", text)]
+
+
+def test_a_device_is_written_to_and_stays_one(run: Fourbar, tmp_path: Path) -> None:
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    reader = os.open(pipe, os.O_RDWR | os.O_NONBLOCK)
+    try:
+        assert run("mjcf", "--lengths", 0.3, 0.1, 0.25, 0.22, "-o", pipe)[0] == HOLDS
+        assert b"</mujoco>" in os.read(reader, 60_000) and stat.S_ISFIFO(pipe.stat().st_mode)
+    finally:
+        os.close(reader)
+
+
+def test_a_title_does_not_steer_the_terminal(tmp_path: Path, run: Fourbar) -> None:
+    title = "\x1b[2J\x1b]0;x\x07\r\n[bold]name"
+    save(crank_rocker(title=title), tmp_path / "scene.toml")
+    out = run("analyze", tmp_path / "scene.toml")[1]
+    assert "\x1b" not in out and "\x07" not in out and out.startswith("[2J ]0;x [bold]name\n")
+    assert strict(run("analyze", tmp_path / "scene.toml", "--json")[1])["title"] == title
+
+
+def child(*arguments: str) -> "subprocess.CompletedProcess[str]":
+    return subprocess.run([sys.executable, *arguments], cwd=ROOT, text=True, capture_output=True, check=False)
+
+
+def test_the_command_line_starts_light() -> None:
+    heavy = "pint rich matplotlib scipy mujoco pinocchio jinja2"
+    code = f"import sys, fourbar.cli; print([m for m in {heavy.split()!r} if m in sys.modules])"
+    assert child("-c", code).stdout == "[]\n"
+    done = child("-m", "fourbar", "--version")
+    assert (done.returncode, done.stdout) == (0, f"fourbar, version {fourbar.__version__}\n")
+
+
+@pytest.mark.parametrize("arguments", [("classify", "3", "1", "2", "3"), ("analyze", "models/thesis.toml", "--json")])
+def test_a_reader_that_leaves_early_is_no_error(arguments: tuple[str, ...]) -> None:
+    reading, writing = os.pipe()
+    os.close(reading)
+    command = [sys.executable, "-m", "fourbar", *arguments]
+    done = subprocess.run(command, cwd=ROOT, stdout=writing, stderr=subprocess.PIPE, text=True, check=False)
+    os.close(writing)
+    assert (done.returncode, done.stderr) == (HOLDS, "")
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="only Linux has a device that is always full")
+def test_standard_output_that_is_full() -> None:
+    with Path("/dev/full").open("w") as full:
+        done = subprocess.run(
+            [sys.executable, "-m", "fourbar", "analyze", "models/thesis.toml"],
+            cwd=ROOT, stdout=full, stderr=subprocess.PIPE, text=True, check=False,
+        )  # fmt: skip
+    assert (done.returncode, done.stderr.count("\n")) == (BROKEN, 1) and "No space left" in done.stderr

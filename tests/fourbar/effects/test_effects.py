@@ -1,0 +1,321 @@
+"""The effects' formulas against other derivations: potentials, exact arithmetic, limiting cases."""
+
+import math
+from dataclasses import replace
+
+import mpmath as mp
+import numpy as np
+import pytest
+
+import fourbar
+from fourbar.effects import Flywheel, Friction, Gravity, Load, PinFriction, Point, Spring, Springs, Table, Torsion
+from fourbar.effects.cones import NONE, ONE, SEVERAL, settle
+from fourbar.errors import InputError, LimitError
+from fourbar.scene import Scene
+from fourbar.scene.motion import Motion, Sweep
+from fourbar.scene.motion_law import Law
+from fourbar.solve import solve
+from fourbar_validation.engines.effects import look_up
+from tests.support.scenes import crank_rocker
+
+SECOND_ORDER = 1e-8
+"""A central difference with a step of 1e-5 rad: 1e-10 from its third derivative, 1e-11 from rounding, times the
+derivatives of these springs, which are some tens of N m."""
+STEP = 1e-5
+LAST_DIGITS = 64 * 2.0**-52
+"""The roundings of one evaluation."""
+
+
+def alone(*effects: object, omega_2: float = 0.0, theta_2: object = None, **changes: object) -> Scene:
+    """Massless in effect: static, so that only the effects act."""
+    where = np.linspace(0.2, 6.0, 9) if theta_2 is None else theta_2
+    return crank_rocker(motion=Motion(where, omega_2), loads=(), effects=effects, **changes)  # type: ignore[arg-type]
+
+
+def potential_torque(scene: Scene, energy: object) -> np.ndarray:
+    """T2 = dV/dtheta_2 of a static linkage under a potential, by central differences."""
+    theta_2 = np.asarray(scene.motion.theta_2)
+    ends = [solve(replace(scene, motion=Motion(theta_2 + step, 0.0)), "position") for step in (STEP, -STEP)]
+    values = [energy(end) for end in ends]  # type: ignore[operator]
+    return (values[0] - values[1]) / (2.0 * STEP)
+
+
+def test_a_spring_is_the_slope_of_its_energy() -> None:
+    spring = Spring(Point(1, 0.1, -1.5), Point(3, 0.08, 0.2), 200.0, 0.05, 3.0)
+
+    def energy(s: fourbar.Solution) -> np.ndarray:
+        theta_1 = scene.linkage.ground_angle
+        ground = 0.1 * np.exp(1j * (theta_1 - 1.5))
+        end = s.A @ [1, 1j] + 0.08 * np.exp(1j * (s.theta_3 + 0.2))
+        distance = np.abs(end - ground)
+        return 3.0 * distance + 100.0 * (distance - 0.05) ** 2
+
+    scene = alone(Springs((spring,)))
+    torque = solve(scene).torque
+    assert torque is not None and np.abs(torque).max() > 1.0
+    assert torque == pytest.approx(potential_torque(scene, energy), abs=SECOND_ORDER * 10, rel=0)
+
+
+def test_a_spring_without_free_length_has_a_force_where_its_points_meet() -> None:
+    """Force k times the distance vector: zero, not NaN, where both ends lie on pin A."""
+    ends = Point(2, 0.1, 0.0), Point(3, 0.0, 0.0)
+    torque = solve(alone(Springs((Spring(*ends, 100.0),)))).torque
+    assert torque is not None and np.array_equal(torque, np.zeros(9))
+
+
+def test_torsion_springs_are_the_slope_of_their_energy() -> None:
+    springs = {"O2": (1.5, 0.3, 0.2), "A": (1.0, 0.4, 0.0), "B": (2.0, 0.5, -0.1), "O4": (0.5, 2.0, 0.3)}
+    scene = alone(Torsion.at(**springs), theta_2=np.linspace(-1.0, 2.0, 7))
+
+    def energy(s: fourbar.Solution) -> np.ndarray:
+        theta = {1: scene.linkage.ground_angle, 2: s.theta_2, 3: s.theta_3, 4: s.theta_4}
+        total = np.zeros(len(s))
+        for pin, (k, rest, preload) in springs.items():
+            i, j = fourbar.linkage.PINS[pin]
+            beta = np.angle(np.exp(1j * (theta[j] - theta[i] - rest)))
+            total += preload * beta + 0.5 * k * beta**2
+        return total
+
+    assert solve(scene).torque == pytest.approx(potential_torque(scene, energy), abs=SECOND_ORDER * 10, rel=0)
+
+
+def test_a_flywheel_is_inertia_of_the_bar() -> None:
+    scene = crank_rocker(effects=(Gravity(), Flywheel(0.02, 4)), drive_bar=4)
+    bar = scene.linkage.output
+    heavier = replace(scene.linkage, output=replace(bar, inertia=bar.moment_of_inertia + 0.02))
+    with_wheel, with_bar = solve(scene), solve(replace(scene, linkage=heavier, effects=(Gravity(),)))
+    for name in ("torque", "F12", "F32", "F14"):
+        one, other = getattr(with_wheel, name), getattr(with_bar, name)
+        assert np.abs(one - other).max() <= LAST_DIGITS * np.abs(other).max(), name
+
+
+def test_friction_at_one_pin_in_fifty_digits() -> None:
+    """The crank alone carries the friction at O2: T = T0 + mu r |F12| sign(omega_2), and F12 does not change."""
+    bare, mu, r = crank_rocker(), 0.3, 0.02
+    free, slowed = solve(bare), solve(replace(bare, effects=(*bare.effects, PinFriction.at(O2=(mu, r)))))
+    assert free.torque is not None and free.F12 is not None and slowed.torque is not None
+    expected = free.torque + mu * r * np.hypot(*free.F12.T)
+    assert slowed.torque == pytest.approx(expected, abs=LAST_DIGITS * np.abs(expected).max(), rel=0)
+
+
+def test_friction_couples_fulfil_their_equation_with_forces_of_thirteen_equations() -> None:
+    """Nine unknowns by Newton-Euler about the mass centres, written anew, with the friction found here."""
+    pins = {"O2": (0.3, 0.02), "A": (0.25, 0.015), "B": (0.4, 0.01), "O4": (0.2, 0.02)}
+    scene = crank_rocker(effects=(PinFriction.at(**pins),), loads=())
+    s = solve(scene)
+    assert s.friction_residual is not None and s.torque is not None
+    link = scene.linkage
+    for i in range(0, len(s), 10):
+        speed = {1: 0.0, 2: s.omega_2[i], 3: s.omega_3[i], 4: s.omega_4[i]}  # type: ignore[index]
+        A, B = s.A[i], s.B[i]
+        O4 = link.ground * np.array([math.cos(link.ground_angle), math.sin(link.ground_angle)])
+        ends = {2: (np.zeros(2), A), 3: (A, B), 4: (O4, B)}
+        with mp.workdps(50):
+            couples, change = {pin: mp.mpf(0) for pin in pins}, mp.mpf(1)
+            while change > 1e-30:  # each pass leaves a tenth of it or less
+                x = _newton_euler(link, s, i, ends, speed, couples)
+                load = dict(zip(("O2", "A", "B", "O4"), (mp.hypot(x[k], x[k + 1]) for k in (0, 2, 4, 6)), strict=True))
+                before, couples = couples, {pin: mu * r * load[pin] for pin, (mu, r) in pins.items()}
+                change = max(abs(couples[pin] - before[pin]) / couples[pin] for pin in pins)
+            torque = float(x[8])
+        assert s.torque[i] == pytest.approx(torque, abs=1e3 * 2.0**-52 * np.abs(s.torque).max(), rel=0)
+    # what is left of the couples' own equation, of couples up to
+    assert np.nanmax(s.friction_residual) < LAST_DIGITS * 0.3 * 0.02 * np.nanmax(np.hypot(*s.F12.T))  # type: ignore[union-attr]
+
+
+def _newton_euler(link, s, i, ends, speed, couples):  # type: ignore[no-untyped-def]
+    """F12, F32, F43, F14, T2 from m a_G = sum F and I alpha = sum M about G, in mpmath."""
+    rows, right = [], []
+    acts = {
+        2: ((0, 1), (2, 1)),
+        3: ((2, -1), (4, 1)),
+        4: ((4, -1), (6, 1)),
+    }  # (unknown, sign) at each pin
+    places = {2: (0, 1), 3: (0, 1), 4: (1, 0)}
+    pins_of = {2: (("O2", 1), ("A", -1)), 3: (("A", 1), ("B", -1)), 4: (("O4", 1), ("B", 1))}
+    slip = {"O2": speed[2], "A": speed[3] - speed[2], "B": speed[4] - speed[3], "O4": speed[4]}
+    for bar in (2, 3, 4):
+        body = link.bar(bar)
+        G, a, alpha = (getattr(s, f"{name}{bar}")[i] for name in ("G", "a_G", "alpha_"))
+        arms = [ends[bar][place] - G for place in places[bar]]
+        for axis in (0, 1):
+            row = [mp.mpf(0)] * 9
+            for unknown, sign in acts[bar]:
+                row[unknown + axis] = mp.mpf(sign)
+            rows.append(row)
+            right.append(mp.mpf(body.mass) * mp.mpf(a[axis]))
+        row = [mp.mpf(0)] * 9
+        for (unknown, sign), arm in zip(acts[bar], arms, strict=True):
+            row[unknown], row[unknown + 1] = -sign * mp.mpf(arm[1]), sign * mp.mpf(arm[0])
+        if bar == 2:
+            row[8] = mp.mpf(1)
+        rows.append(row)
+        friction = sum(-side * mp.sign(mp.mpf(slip[pin])) * couples[pin] for pin, side in pins_of[bar])
+        right.append(mp.mpf(body.moment_of_inertia) * mp.mpf(alpha) - friction)
+    return mp.lu_solve(mp.matrix(rows), mp.matrix(right))
+
+
+def test_one_cone_has_one_none_or_two_solutions() -> None:
+    """x = k |F + C x| on a line: F = 1, C = c: x = k (1 + c x), x = k |1 - c x| ...
+
+    Its distance from jamming is the slope 1 - k e.C of x - k |F + C x|, e along F + C x, and at most 1.
+    """
+    cases = {  # (F, C): solutions of x = |F + C x| with k = 1, and how far from jamming
+        ((1.0, 0.0), (0.5, 0.0)): (ONE, 2.0, 0.5),
+        ((1.0, 0.0), (-0.5, 0.0)): (ONE, 2.0 / 3.0, 1.0),
+        ((1.0, 0.0), (2.0, 0.0)): (NONE, math.nan, None),
+        ((1.0, 0.0), (-2.0, 0.0)): (SEVERAL, 1.0 / 3.0, 1.0),
+        ((1.0, 0.0), (0.0, 2.0)): (NONE, math.nan, None),
+        ((1.0, 0.0), (0.0, 0.6)): (ONE, 1.25, 0.64),
+        ((0.0, 0.0), (0.5, 0.3)): (ONE, 0.0, 1.0),
+        ((3.0, 4.0), (0.0, 0.0)): (ONE, 5.0, 1.0),
+        ((1.0, 0.0), (1.0 - 2.0**-20, 0.0)): (ONE, 2.0**20, 2.0**-20),
+    }
+    for (F, C), (number, x, far) in cases.items():
+        found = settle(np.array([[F]]), np.array([[[C]]]), np.array([[1.0]]))
+        assert found.number[0] == number, (F, C)
+        assert found.x[0, 0] == pytest.approx(x, rel=1e-15, nan_ok=True), (F, C)
+        if far is not None:
+            assert found.from_jamming[0] == pytest.approx(far, rel=LAST_DIGITS), (F, C)
+
+
+def test_several_cones_one_of_which_is_known() -> None:
+    """Two pins that do not feel each other are two single ones, in every outcome, each position with its own arms."""
+    for c1, c2, number in ((0.5, 0.3, ONE), (2.0, 0.3, NONE), (-2.0, 0.3, SEVERAL), (-2.0, -3.0, SEVERAL)):
+        F = np.array([[[1.0, 0.0], [2.0, 0.0]]] * 2)
+        C = np.array([[[[c1, 0.0], [0.0, 0.0]], [[0.0, 0.0], [c2, 0.0]]]] * 2)
+        found = settle(F, C, np.array([[1.0, 1.0], [0.25, 0.125]]))
+        assert list(found.number) == [number, ONE]
+        if number != NONE:
+            assert found.x[0] == pytest.approx([1.0 / (1.0 - c1), 2.0 / (1.0 - c2)], rel=1e-12)
+            # both slopes are 1 - k c where F + C x keeps the sense of F
+            assert found.from_jamming[0] == pytest.approx(min(1.0, 1.0 - c1, 1.0 - c2), rel=1e-12)
+        assert found.x[1] == pytest.approx([0.25 / (1.0 - 0.25 * c1), 0.25 / (1.0 - 0.125 * c2)], rel=1e-12)
+
+
+def test_jamming_is_a_status_and_leaves_no_force() -> None:
+    s = solve(crank_rocker(effects=(PinFriction.at(A=(50.0, 0.01)),)))
+    assert {"jammed", "several"} == set(s.status)
+    assert s.torque is not None
+    jammed = np.array([status == "jammed" for status in s.status])
+    assert np.isnan(s.torque[jammed]).all() and np.isfinite(s.torque[~jammed]).all()
+    assert np.isfinite(s.theta_3).all()
+
+
+@pytest.mark.parametrize("friction", [Friction.at(O2=0.02, B=0.03), PinFriction.at(O2=(0.2, 0.01), B=(0.3, 0.02))])
+def test_at_rest_the_interval_is_that_of_beginning_to_move(friction: object) -> None:
+    """Its ends are the limits of the torque for slow motions in either sense; at rest itself it is their inside."""
+    scene = alone(Gravity(), friction)
+    rest = solve(scene)
+    slow = [solve(replace(scene, motion=replace(scene.motion, omega_2=speed))).torque for speed in (1e-9, -1e-9)]
+    assert rest.torque_low is not None and rest.torque_high is not None and rest.torque is not None
+    # (1e-9 rad/s)^2 of inertia is nothing against these torques
+    assert rest.torque_high == pytest.approx(np.maximum(*slow), rel=1e-13)
+    assert rest.torque_low == pytest.approx(np.minimum(*slow), rel=1e-13)
+    assert ((rest.torque_low < rest.torque) & (rest.torque < rest.torque_high)).all()
+    for side, beginning in zip((1, -1), slow, strict=True):
+        assert solve(scene, "force", side=side).torque == pytest.approx(beginning, rel=1e-13)
+
+
+def test_without_dry_friction_there_is_no_interval() -> None:
+    s = solve(crank_rocker())
+    assert s.torque_low is s.torque_high is s.friction_residual is None
+
+
+def test_pin_load_friction_needs_the_pin_forces() -> None:
+    free = crank_rocker(motion=Motion(1.0, 0.0, free=fourbar.Free(1.0, 10)), effects=(PinFriction.at(A=(0.1, 0.01)),))
+    with pytest.raises(LimitError, match="pin forces"):
+        solve(free)
+
+
+def test_a_table_is_linear_between_its_points_and_periodic() -> None:
+    table = Table((1.0, 2.0, 1.0 + 2 * math.pi), (0.0, 4.0, 0.0))
+    at = np.array([1.0, 1.25, 2.0, 1.5 - 2 * math.pi, 1.25 + 6 * math.pi])
+    assert table.at(at) == pytest.approx([0.0, 1.0, 4.0, 2.0, 1.0], abs=1e-14)
+    for theta_2, factor in zip(at.tolist(), table.at(at), strict=True):
+        assert look_up(table, theta_2) == pytest.approx(factor, abs=1e-14)
+    with pytest.raises(InputError, match="lies outside"):
+        Table((0.0, 1.0), (1.0, 2.0)).at(np.array([0.5, 1.5]))
+
+
+def test_a_load_over_theta_2_is_the_load_times_its_factor() -> None:
+    load = Load(4, (3.0, 0.7), (0.05, 1.0), 0.2)
+    table = Table((0.0, math.pi, 2 * math.pi), (1.0, 3.0, 1.0))
+    where = np.array([math.pi / 2])
+    tabled = solve(alone(theta_2=where)), solve(replace(alone(theta_2=where), loads=(replace(load, table=table),)))
+    twice = replace(alone(theta_2=where), loads=(replace(load, force=(6.0, 0.7), moment=0.4),))
+    assert tabled[1].torque == pytest.approx(solve(twice).torque, rel=1e-14)
+
+
+def test_a_law_through_a_cubic_is_that_cubic() -> None:
+    time = np.linspace(0.0, 2.0, 7)
+    law = Law(tuple(time), tuple(0.3 + time - 2.0 * time**2 + 0.5 * time**3), 40)
+    s = solve(crank_rocker(motion=Motion(law=law)))
+    t = s.time
+    assert t is not None and len(t) == 41
+    assert s.theta_2 == pytest.approx(0.3 + t - 2.0 * t**2 + 0.5 * t**3, abs=1e-13)
+    assert s.omega_2 == pytest.approx(1.0 - 4.0 * t + 1.5 * t**2, abs=1e-12)
+    assert s.alpha_2 == pytest.approx(-4.0 + 3.0 * t, abs=1e-11)
+
+
+def test_the_ends_of_a_law() -> None:
+    points = (0.0, 0.2, 0.5, 1.0), (0.0, 1.0, 2.5, 2 * math.pi)
+    rest, periodic = (Law(*points, 10, ends).at(np.array([0.0, 1.0])) for ends in ("rest", "periodic"))
+    assert rest[1] == pytest.approx([0.0, 0.0], abs=1e-13)
+    assert periodic[0] == pytest.approx([0.0, 2 * math.pi], abs=1e-13)
+    assert periodic[1][0] == pytest.approx(periodic[1][1], rel=1e-12)
+    assert periodic[2][0] == pytest.approx(periodic[2][1], rel=1e-11)
+
+
+@pytest.mark.parametrize("ends", ["free", "rest", "periodic"])
+def test_speed_and_acceleration_are_the_slopes_of_the_law(ends: str) -> None:
+    law = Law((0.0, 0.2, 0.5, 1.0), (0.0, 1.0, 2.5, 2 * math.pi), 10, ends)
+    inside, step = np.array([0.05, 0.33, 0.71, 0.93]), 1e-5
+    before, here, after = (law.at(inside + shift) for shift in (-step, 0.0, step))
+    # central differences: third derivative times step^2/6, and rounding over the step
+    assert here[1] == pytest.approx((after[0] - before[0]) / (2 * step), rel=1e-7)
+    assert here[2] == pytest.approx((after[1] - before[1]) / (2 * step), rel=1e-7)
+
+
+def test_each_position_of_a_law_is_that_motion_alone() -> None:
+    law = Law((0.0, 0.2, 0.5, 1.0), (0.0, 1.0, 2.5, 2 * math.pi), 12, "periodic")
+    whole = solve(crank_rocker(motion=Motion(law=law)))
+    assert whole.torque is not None and whole.omega_2 is not None and whole.alpha_2 is not None
+    for i in (0, 5, 11):
+        here = Motion(float(whole.theta_2[i]), float(whole.omega_2[i]), float(whole.alpha_2[i]))
+        assert solve(crank_rocker(motion=here)).torque[0] == pytest.approx(whole.torque[i], rel=1e-13)  # type: ignore[index]
+
+
+@pytest.mark.parametrize(
+    ("make", "key"),
+    [
+        (lambda: Law((0.0, 1.0), (0.0, 1.0)), "motion.law"),
+        (lambda: Law((0.0, 1.0, 1.0, 2.0), (0.0, 1.0, 2.0, 3.0)), "motion.law.time"),
+        (lambda: Motion(1.0, law=Law((0.0, 1.0), (0.0, 1.0), 5, "rest")), "motion.law"),
+        (lambda: Flywheel(1.0, 3), "effects.flywheel.bar"),
+        (lambda: Spring(Point(2, 0.1, 0.0), Point(2, 0.2, 0.0), 1.0), "effects.springs.to.bar"),
+        (lambda: Torsion.at(A=(0.0, 1.0, 0.0)), "effects.torsion.A.stiffness"),
+        (lambda: PinFriction.at(C=(0.1, 0.1)), "effects.pin_friction.C"),
+        (lambda: PinFriction.at(A=(-0.1, 0.1)), "effects.pin_friction.A.coefficient"),
+        (lambda: Table((0.0, 1.0, 7.0), (1.0, 1.0, 1.0)), "loads.table.theta_2"),
+    ],
+)
+def test_bad_input_names_its_key(make: object, key: str) -> None:
+    with pytest.raises(InputError) as error:
+        make()  # type: ignore[operator]
+    assert error.value.key == key
+
+
+def test_a_flywheel_on_the_driven_bar_asks_for_its_inertia_times_the_acceleration() -> None:
+    """And for nothing else: motion and pin forces are those without it."""
+    scene = crank_rocker()
+    bare, wheel = solve(scene), solve(replace(scene, effects=(*scene.effects, Flywheel(0.02))))
+    assert bare.torque is not None and wheel.torque is not None
+    assert wheel.torque - bare.torque == pytest.approx(0.02 * 5.0, abs=LAST_DIGITS * np.abs(wheel.torque).max())
+    for name in ("F12", "F32", "F43", "F14"):
+        assert np.array_equal(getattr(wheel, name), getattr(bare, name)), name
+
+
+def test_a_sweep_without_theta_2_still_runs_over_the_range() -> None:
+    assert len(solve(crank_rocker(motion=Motion(None, 1.0)), "position")) == 361
+    assert isinstance(crank_rocker().motion.theta_2, Sweep)

@@ -1,0 +1,146 @@
+"""Where a spring has no value: the status says so, there are no forces, and every engine says the same."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import fourbar
+from fourbar.effects import Gravity, PinFriction, Point, Spring, Springs, Torsion
+from fourbar.errors import LimitError
+from fourbar.formulas.mobility import default_range
+from fourbar.linkage import PINS
+from fourbar.scene import Scene
+from fourbar.scene.motion import Free, Motion, Sweep
+from fourbar.solve import solve
+from fourbar_validation.run.judge import judge
+
+FINE = 20_000
+"""Positions of a sweep in which no pin turns by half a turn from one to the next."""
+EDGE = 1e-9
+"""rad; nearer than this to half a turn rounding may put a position on either side."""
+LINKAGES = {
+    "crank-rocker": (0.3, 0.1, 0.25, 0.22),
+    "drag link": (0.1, 0.25, 0.3, 0.28),
+    "double rocker": (0.25, 0.22, 0.1, 0.3),
+    "triple rocker": (0.4, 0.25, 0.25, 0.28),
+    "kite": (0.2, 0.2, 0.3, 0.3),
+}
+"""Ground, input, coupler, output, m."""
+
+
+def linkage(name: str) -> fourbar.FourBar:
+    return fourbar.uniform(*LINKAGES[name])
+
+
+@pytest.mark.parametrize("pin", ["A", "B"])
+@pytest.mark.parametrize("name", ["crank-rocker", "drag link"])
+def test_a_spring_with_both_ends_in_one_pin_has_no_direction(name: str, pin: str) -> None:
+    link = linkage(name)
+    ends = {
+        "A": (Point(2, link.input.length, 0.0), Point(3, 0.0, 0.0)),
+        "B": (Point(3, link.coupler.length, 0.0), Point(4, link.output.length, 0.0)),
+    }[pin]
+    scene = Scene(link, Motion(Sweep(0.3, 5.9, 40), 8.0), effects=(Springs((Spring(*ends, 150.0, 0.05),)),))
+    solution = solve(scene, "error")
+    assert set(solution.status) == {"no_direction"}
+    for quantity in ("F12", "F32", "F43", "F14", "torque", "torque_error", "force_error"):
+        assert np.isnan(getattr(solution, quantity)).all(), quantity
+    assert solution.omega_4 is not None and np.isfinite(solution.omega_4).all()
+    assert solve(scene, "velocity").status == ["ok"] * 41  # the spring plays no part
+    assert [row for row in judge("scene", scene).rows if row.failed] == []
+
+
+def test_a_spring_whose_ends_meet_once_loses_that_position_alone() -> None:
+    spring = Spring(Point(1, 0.1, 0.5), Point(2, 0.1, 0.0), 200.0, 0.05)
+    at = [0.3, 0.5, 0.5 + 1e-9, 0.7]
+    scenes = [
+        Scene(linkage("crank-rocker"), Motion(at, 8.0), effects=effects)
+        for effects in ((Springs((spring,)),), (PinFriction.at(O2=(0.2, 0.01)), Springs((spring,))))
+    ]
+    for scene in scenes:
+        solution = solve(scene)
+        assert solution.status == ["ok", "no_direction", "ok", "ok"]
+        assert solution.torque is not None
+        assert list(np.isnan(solution.torque)) == [False, True, False, False]
+
+
+def continuous(scene: Scene, pin: str) -> np.ndarray:
+    """theta_j - theta_i along a sweep, each position from the one before."""
+    solution = solve(scene, "position")
+    angle = {1: np.full(len(solution), scene.linkage.ground_angle), 2: solution.theta_2}
+    angle |= {3: solution.theta_3, 4: solution.theta_4}
+    i, j = PINS[pin]
+    between = angle[j] - angle[i]
+    known = np.isfinite(between)
+    between[known] = np.unwrap(between[known])
+    return between
+
+
+@pytest.mark.parametrize("pin", PINS)
+@pytest.mark.parametrize("branch", [1, -1])
+@pytest.mark.parametrize("name", LINKAGES)
+def test_a_torsion_spring_is_wound_where_the_continuous_angle_says_so(name: str, branch: int, pin: str) -> None:
+    """Followed position by position, and evaluated at each fiftieth by itself and in another order."""
+    link = replace(linkage(name), ground_angle=0.4)
+    least, most = default_range(link)
+    if name == "kite":  # from its change point to the same again: there bars 3 and 4 are free to turn
+        least, most = 0.4, 0.4 + 2.0 * math.pi
+    margin = 1e-3 * (most - least)
+    # a whole turn and a half where the input turns, else its one range
+    turns = most - least > 2.0 * math.pi - 1e-6 and name != "kite"
+    sweep = (least + margin, least + 3.0 * math.pi) if turns else (least + margin, most - margin)
+    fine = Scene(link, Motion(Sweep(*sweep, FINE), 5.0, branch=branch))
+    between = continuous(fine, pin)
+    assert np.isfinite(between).all()
+    theta_2 = np.linspace(*sweep, FINE + 1)
+    some = np.r_[0, np.random.default_rng(5).permutation(np.arange(50, FINE + 1, 50))]
+    for rest in (between[0] - 3.0, between[0] + 1.0, between[0] + 6.0 * math.pi):
+        spring = Torsion.at(**{pin: (2.0, rest, 0.1)})
+        solution = solve(Scene(link, Motion(theta_2[some], 5.0, branch=branch), effects=(spring,)), "force")
+        away = between[some] - rest - 2.0 * math.pi * round((between[0] - rest) / (2.0 * math.pi))
+        wound = np.abs(away) > math.pi
+        sure = np.abs(np.abs(away) - math.pi) > EDGE
+        assert np.array_equal(solution.status_code[sure] == 6, wound[sure])
+        assert solution.torque is not None and np.array_equal(np.isnan(solution.torque), solution.status_code == 6)
+
+
+def test_the_pins_that_turn_do_wind_their_springs() -> None:
+    """The test above has something to find: of a crank-rocker the pins of the crank turn, the others swing."""
+    scene = Scene(linkage("crank-rocker"), Motion(Sweep(0.0, 2.0 * math.pi, FINE), 5.0))
+    travel = {pin: np.ptp(continuous(scene, pin)) for pin in PINS}
+    assert travel["O2"] > 6.2 and travel["A"] > 6.2 and travel["B"] < math.pi and travel["O4"] < math.pi
+
+
+def test_every_engine_stops_where_the_spring_is_wound() -> None:
+    spring = Torsion.at(O2=(0.2, 0.5, 0.0))
+    scene = Scene(linkage("crank-rocker"), Motion(Sweep(0.1, 6.2, 12), 10.0), effects=(spring,))
+    record = judge("scene", scene)
+    assert [row for row in record.rows if row.failed] == []
+    assert {row.engine for row in record.rows if row.verdict == "refuses"} == {"mujoco-simulated"}
+    assert any("wound by more than half a turn" in line for line in record.left_out)
+    assert record.solution is not None and record.solution.status.count("wound") == 6  # of theta_2 beyond 0.5 + pi
+    at_half = Scene(scene.linkage, Motion([0.5, 1.0, 0.5 + math.pi, 4.0], 10.0), effects=(spring,))
+    record = judge("scene", at_half)
+    assert record.solution is not None and record.solution.status == ["ok", "ok", "wound", "wound"]
+    assert [row for row in record.rows if row.failed] == []
+    within = Scene(scene.linkage, Motion(Sweep(0.1, 3.6, 12), 10.0), effects=(spring,))
+    record = judge("scene", within)
+    assert [row for row in record.rows if row.failed] == [] and record.left_out == []
+
+
+def test_where_the_loop_closes_between_the_positions_alone_no_spring_begins() -> None:
+    scene = Scene(linkage("double rocker"), Motion([0.3, 2.6], 5.0), effects=(Torsion.at(B=(2.0, 0.3, 0.1)),))
+    record = judge("scene", scene)
+    assert record.solution is not None and set(record.solution.status) == {"not_assembled"}
+    assert [row for row in record.rows if row.failed] == []
+
+
+def test_a_free_motion_that_winds_a_spring_is_an_error() -> None:
+    free = Motion(0.1, 12.0, free=Free(1.0, 100))
+    weak = Torsion.at(O2=(1e-4, 0.0, 0.0))
+    with pytest.raises(LimitError, match=r"effects\.torsion: at 0\.\d+ s .* half a turn"):
+        solve(Scene(linkage("crank-rocker"), free, effects=(weak,)))
+    held = Torsion.at(O2=(2.0, 0.0, 0.0))
+    assert len(solve(Scene(linkage("crank-rocker"), free, effects=(held, Gravity()))))

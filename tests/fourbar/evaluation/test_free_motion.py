@@ -1,0 +1,163 @@
+"""Free motion against exact solutions and its own equilibrium; test_free_motion_reference.py has the digits."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import fourbar
+from fourbar.evaluation import free_motion
+from fourbar.evaluation.free_motion import release
+from fourbar.solve import solve
+
+HANGING = fourbar.FourBar(
+    0.3, fourbar.Bar(0.1, 0.2), fourbar.Bar(0.25, 0.5, 0.004, (0.13, 0.3)), fourbar.Bar(0.22, 0.4)
+)
+
+
+def test_one_window_of_iftomm_a02() -> None:
+    """Ten seconds through the change points (lim.ii.udc.es/mbsbenchmark, A02)."""
+    bar = fourbar.Bar(1.0, 1.0)
+    linkage = fourbar.FourBar(1.0, bar, bar, bar)
+    m = release(linkage, (fourbar.Gravity(),), math.pi / 2, -1.0, 1, np.array([0.0, 10.0]), follow=True)
+    x, y, w = math.cos(m.command.theta_2[-1]), math.sin(m.command.theta_2[-1]), m.command.omega_2[-1]
+    printed = (0.478385058, 0.878150179, 1.727264076, -0.940952179)
+    for ours, theirs in zip((x, y, -y * w, x * w), printed, strict=True):
+        assert abs(ours - theirs) <= 0.5e-9
+    assert m.energy_drift < 1e-12  # hundreds of steps of 3e-14
+
+
+def test_needs_no_driving_torque() -> None:
+    terms = (fourbar.Gravity(), fourbar.Viscous.at(O2=0.002, B=0.001))
+    m = release(HANGING, terms, 0.3, 2.0, -1, np.linspace(0.0, 2.0, 41))
+    s = solve(fourbar.Scene(HANGING, effects=terms), "force", at=m.command)
+    assert s.torque is not None
+    assert np.abs(s.torque).max() < 1e-12 * 9.81 * 1.1  # of all the weights at one metre
+
+
+@pytest.mark.parametrize("coupler", [0.12, 0.15])  # the first has a change point, the second a limit position only
+def test_stops_at_a_limit_unless_set_to_follow(coupler: float) -> None:
+    linkage = fourbar.FourBar(0.3, fourbar.Bar(0.2, 0.2), fourbar.Bar(coupler, 0.5), fourbar.Bar(0.22, 0.4))
+    times = np.linspace(0.0, 1.0, 21)  # there, back and there again
+    halted = release(linkage, (fourbar.Gravity(),), 1.0, 0.0, 1, times)
+    assert halted.stopped_at is not None and halted.command.time[-1] <= halted.stopped_at < 0.5
+    assert set(halted.command.branch) == {1}
+    passed = release(linkage, (fourbar.Gravity(),), 1.0, 0.0, 1, times, follow=True)
+    assert passed.stopped_at is None and set(passed.command.branch) == {1, -1} and passed.energy_drift < 1e-11
+    n = len(halted.command.time)
+    assert np.array_equal(passed.command.theta_2[:n], halted.command.theta_2)
+
+
+def test_dry_friction_holds() -> None:
+    m = release(HANGING, (fourbar.Gravity(), fourbar.Friction.at(O2=0.3)), 0.3, 1.0, 1, np.linspace(0.0, 5.0, 51))
+    assert (
+        m.command.omega_2[-1] == 0.0 and m.command.alpha_2[-1] == 0.0 and m.command.theta_2[-1] == m.command.theta_2[-2]
+    )
+
+
+def test_a_scene_reports_its_times() -> None:
+    motion = fourbar.Motion(0.3, 2.0, free=fourbar.Free(1.0, 10))
+    s = solve(fourbar.Scene(HANGING, motion, effects=(fourbar.Gravity(),)))
+    assert s.time is not None and s.torque is not None and s.F12 is not None
+    assert np.array_equal(s.time, np.linspace(0.0, 1.0, 11))
+    assert np.abs(s.torque).max() < 1e-12 * 9.81 * 1.1
+
+
+ROCKER = fourbar.FourBar(0.3, fourbar.Bar(0.25, 0.7), fourbar.Bar(0.1, 1.3), fourbar.Bar(0.22, 0.9))
+"""A double rocker; released at rest at 50 deg, open, it swings through limit positions of its input."""
+SWING = fourbar.Scene(
+    ROCKER,
+    fourbar.Motion(math.radians(50.0), 0.0, through="follow", free=fourbar.Free(1.2, 120)),
+    effects=(fourbar.Gravity(),),
+)
+PINS = ("F12", "F32", "F43", "F14")
+BY_ENERGY = 1e-12
+"""Of the largest force: some hundred steps of 3e-15, and a system of 17 equations whose condition is below 1e4."""
+STEEPER = 2.0
+"""A slope at an instant over the steepest mean slope of a step of 10 ms: the forces bend little within one."""
+
+
+def forces_by_energy(theta: np.ndarray, start: np.ndarray) -> np.ndarray:
+    """Pin forces F12, F32, F43, F14 of ROCKER, (4, 2), at the angles of its bars 2, 3, 4 if it is released at others.
+
+    Speeds by the conservation of energy, along the one direction that the loop allows. Accelerations of the three
+    mass centres and the four pin forces together are 17 linear equations, regular where any two bars are in line.
+    """
+    _, a, b, c = ROCKER.lengths
+    half = 0.5 * np.array([a, b, c])
+    m = np.array([bar.mass for bar in ROCKER.moving])
+    inertia = np.array([bar.moment_of_inertia for bar in ROCKER.moving])
+
+    def height(angles: np.ndarray) -> float:
+        y = np.sin(angles)
+        return float(m @ (half * y)) + m[1] * a * float(y[0])
+
+    x, y = np.cos(theta), np.sin(theta)
+    unit, across = np.array([x, y]), np.array([-y, x])
+    moves = np.cross(*(across * [a, b, -c]))
+    speed = across * half * moves
+    speed[:, 1] += across[:, 0] * a * moves[0]
+    of_moves = float(m @ (speed * speed).sum(axis=0) + inertia @ (moves * moves))
+    squared = moves * moves * (2.0 * 9.81 * (height(start) - height(theta)) / of_moves)
+    # unknown: a_G2, alpha_2, a_G3, alpha_3, a_G4, alpha_4, then the forces; row by row Newton and Euler ...
+    left, right = np.zeros((17, 17)), np.zeros(17)
+    pins = ((0, -1, 9, 1), (0, 1, 11, 1), (1, -1, 11, -1), (1, 1, 13, 1), (2, 1, 13, -1), (2, -1, 15, 1))
+    for k in range(3):
+        left[3 * k, 3 * k] = left[3 * k + 1, 3 * k + 1] = m[k]
+        left[3 * k + 2, 3 * k + 2] = inertia[k]
+        right[3 * k + 1] = -9.81 * m[k]
+    for k, end, column, sign in pins:
+        arm = end * half[k] * unit[:, k]
+        left[3 * k, column] = left[3 * k + 1, column + 1] = -sign
+        left[3 * k + 2, column : column + 2] = -sign * np.array([-arm[1], arm[0]])
+        # ... and the two bars that meet at a pin, or the ground, accelerate there alike
+        left[column, 3 * k], left[column + 1, 3 * k + 1] = sign, sign
+        left[column : column + 2, 3 * k + 2] = sign * np.array([-arm[1], arm[0]])
+        right[column : column + 2] += sign * squared[k] * arm
+    return np.linalg.solve(left, right)[9:].reshape(4, 2)
+
+
+def test_pin_forces_pass_a_limit_position_smoothly(monkeypatch: pytest.MonkeyPatch) -> None:
+    """theta_2, omega_2, alpha_2 as doubles do not hold the forces there, the angle of bar 4 does."""
+    motion = SWING.motion
+    halted = solve(replace(SWING, motion=replace(motion, through="sign")), "position")
+    assert halted.stopped_at is not None and halted.stopped_at < 1.0
+    distances = np.logspace(-14, -2, 49)
+    evenly = np.linspace(0.0, 1.2, 121)
+    dense = halted.stopped_at + np.concatenate([-distances[::-1], [0.0], distances])
+    times = np.unique(np.concatenate([evenly, dense]))
+    true = free_motion.release
+    monkeypatch.setattr(free_motion, "release", lambda *given, **how: true(*given[:-1], times, **how))
+    s = solve(SWING, "force")
+    assert set(s.status) == {"ok"} and np.array_equal(s.time, times)
+    assert set(s.branch) == {1, -1} and np.abs(s.sin_mu).min() < 1e-12
+    assert not np.any(s.torque)
+    theta = np.stack([s.theta_2, s.theta_3, s.theta_4], axis=1)
+    expected = np.array([forces_by_energy(each, theta[0]) for each in theta])
+    size = np.max(np.hypot(expected[..., 0], expected[..., 1]))
+    F = np.stack([getattr(s, name) for name in PINS], axis=1)
+    assert np.abs(F - expected).max() <= BY_ENERGY * size
+    change, steps = np.abs(np.diff(F, axis=0)).max(axis=(1, 2)), np.diff(times)
+    even = np.abs(np.diff(F[np.isin(times, evenly)], axis=0)).max() / 0.01
+    assert np.all(change <= STEEPER * even * steps + BY_ENERGY * size)
+
+
+@pytest.mark.parametrize(("pin", "bar"), [("O2", 2), ("O4", 4)])
+def test_friction_that_holds_at_the_ground_loads_the_pins_as_a_drive_there(pin: str, bar: int) -> None:
+    """The ground's couple on a bar is that of a drive on it, which holds a linkage still just as well."""
+    held = fourbar.Motion(0.3, 0.0, free=fourbar.Free(0.2, 4))
+    s = solve(fourbar.Scene(HANGING, held, effects=(fourbar.Gravity(), fourbar.Friction.at(**{pin: 9.0}))))
+    driven = solve(fourbar.Scene(HANGING, fourbar.Motion(0.3, 0.0), bar, effects=(fourbar.Gravity(),)))
+    assert s.alpha_2 is not None and not s.alpha_2.any()
+    for force in PINS:
+        assert np.allclose(getattr(s, force), getattr(driven, force), rtol=0.0, atol=1e-12)
+
+
+def test_what_begins_to_move_against_friction_does_so_at_once() -> None:
+    motion = fourbar.Motion(0.3, 0.0, free=fourbar.Free(1e-4, 2))
+    s = solve(fourbar.Scene(HANGING, motion, effects=(fourbar.Gravity(), fourbar.Friction.at(O4=0.02))))
+    assert s.alpha_2 is not None and s.alpha_2[0] != 0.0
+    assert np.allclose(s.alpha_2, s.alpha_2[1], rtol=1e-5)
+    for force in PINS:
+        assert np.allclose(getattr(s, force), getattr(s, force)[1], rtol=1e-4, atol=1e-5)

@@ -1,0 +1,215 @@
+"""Free motions to 1e-9 rad over 5 s against Taylor series in 77 digits, linkages of every type at random.
+
+`FREE_MOTIONS=n` tests n motions of each kind besides the few that `make test` takes.
+"""
+
+import os
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+
+import fourbar
+from fourbar.evaluation import free_motion
+from fourbar.evaluation.free_motion import FreeMotion, release
+from tests.support.released_reference import released
+
+PROMISED = 1e-9
+"""rad over 5 s, where the motion amplifies errors by no more than AMPLIFIED; beyond it in proportion."""
+AMPLIFIED = 1000.0
+TIMES = np.linspace(0.0, 5.0, 51)
+NUDGE = 1e-6
+"""Of the angle at the start (rad), and of the speed by the greatest speed."""
+SURE = 1e-6
+"""|sin(theta_4 - theta_3)| from which on the branch is known from its sign."""
+LOOSE = 1e-10
+"""Tolerance of the motions whose difference over NUDGE is the amplification: 1e-4 of it."""
+
+
+class Released(NamedTuple):
+    """A motion to be examined."""
+
+    linkage: fourbar.FourBar
+    terms: tuple[Any, ...]
+    theta_2: float
+    omega_2: float
+    branch: int
+    follow: bool
+
+
+def four_lengths(rng: np.random.Generator, grashof: bool) -> list[float]:
+    """Shortest to longest, m, away from the change points."""
+    while True:
+        x = sorted(rng.uniform(0.1, 0.6, 4))
+        gap = (x[1] + x[2] - x[0] - x[3]) / sum(x)
+        if (gap > 0.05) if grashof else (gap < -0.05 and x[3] < 0.9 * (x[0] + x[1] + x[2])):
+            return [float(v) for v in x]
+
+
+def with_shortest(place: int) -> Callable[[np.random.Generator], list[float]]:
+    """Grashof linkages by the place of the shortest bar among ground, input, coupler, output."""
+
+    def lengths(rng: np.random.Generator) -> list[float]:
+        shortest, *others = four_lengths(rng, grashof=True)
+        rng.shuffle(others)
+        return [*others[:place], shortest, *others[place:]]
+
+    return lengths
+
+
+def with_longest(place: int) -> Callable[[np.random.Generator], list[float]]:
+    """Triple rockers, by the place of the longest bar."""
+
+    def lengths(rng: np.random.Generator) -> list[float]:
+        *others, longest = four_lengths(rng, grashof=False)
+        rng.shuffle(others)
+        return [*others[:place], longest, *others[place:]]
+
+    return lengths
+
+
+def at_change_point(rng: np.random.Generator) -> list[float]:
+    """s + l = p + q exactly: multiples of 2^-10."""
+    while True:
+        s, p, q = (float(round(v * 2**10)) / 2**10 for v in sorted(rng.uniform(0.1, 0.5, 3)))
+        x = [s, p, q, p + q - s]
+        if s < 0.9 * p:
+            rng.shuffle(x)
+            return x
+
+
+def parallelogram(rng: np.random.Generator) -> list[float]:
+    """Opposite bars equal."""
+    x, y = rng.uniform(0.1, 0.5, 2)
+    return [float(x), float(y), float(x), float(y)]
+
+
+KINDS: dict[str, Callable[[np.random.Generator], list[float]]] = {
+    "double-crank": with_shortest(0),
+    "crank-rocker": with_shortest(1),
+    "double-rocker": with_shortest(2),
+    "rocker-crank": with_shortest(3),
+    "triple rocker, longest ground": with_longest(0),
+    "triple rocker, longest input": with_longest(1),
+    "triple rocker, longest coupler": with_longest(2),
+    "triple rocker, longest output": with_longest(3),
+    "change point": at_change_point,
+    "parallelogram": parallelogram,
+}
+
+
+def motion(kind: str, number: int) -> Released:
+    """One motion at random; it depends on its kind and number alone."""
+    rng = np.random.default_rng([list(KINDS).index(kind), number])
+    lengths = KINDS[kind](rng)
+    bars = []
+    for length in lengths[1:]:
+        mass, centre = float(rng.uniform(0.2, 2.0)), (length * float(rng.uniform(0.2, 0.8)), float(rng.uniform(-1, 1)))
+        bars.append(fourbar.Bar(length, mass, mass * length**2 * float(rng.uniform(0.05, 0.3)), centre))
+    linkage = fourbar.FourBar(lengths[0], *bars, ground_angle=float(rng.uniform(-3.0, 3.0)))
+    weight = 9.81 * sum(bar.mass * bar.length for bar in bars)
+    terms: list[Any] = [fourbar.Gravity()]
+    if rng.random() < 0.6:
+        damping = {pin: 0.01 * weight * float(rng.uniform(0, 1)) for pin in fourbar.linkage.PINS if rng.random() < 0.5}
+        terms.append(fourbar.Viscous.at(**damping))
+    if rng.random() < 0.6:
+        terms.append(fourbar.Load(int(rng.integers(2, 5)), moment=float(rng.uniform(-0.3, 0.3)) * weight))
+    if rng.random() < 0.3:
+        force = (float(rng.uniform(0, 2)), float(rng.uniform(-3, 3)))
+        terms.append(fourbar.Load(int(rng.integers(2, 5)), force, (0.1, 1.0), 0.0, str(rng.choice(["world", "bar"]))))
+    branch, omega_2, follow = int(rng.choice([-1, 1])), float(rng.uniform(-5.0, 5.0)), bool(rng.random() < 0.6)
+    while True:
+        theta_2 = float(rng.uniform(-3.0, 3.0))
+        at = fourbar.scene.Command(np.array([theta_2]), np.array([branch], dtype=np.int8), None, 0.0)
+        if fourbar.solve(fourbar.Scene(linkage), at=at).condition[0] > 0.3:
+            return Released(linkage, tuple(terms), theta_2, omega_2, branch, follow)
+
+
+def ours(of: Released, nudge: Sequence[float] = (0.0, 0.0)) -> FreeMotion:
+    """The motion of the formulas."""
+    start = (of.theta_2 + nudge[0], of.omega_2 + nudge[1])
+    return release(of.linkage, of.terms, *start, of.branch, TIMES, follow=of.follow)
+
+
+def amplification(of: Released) -> float:
+    """Largest change of theta_2 over that of the start, by finite differences."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(free_motion, "RELATIVE", LOOSE)
+        patch.setattr(free_motion, "ABSOLUTE", LOOSE)
+        base = ours(of)
+        speed = float(np.abs(base.command.omega_2).max())
+        moved = [ours(of, nudge) for nudge in ((NUDGE, 0.0), (0.0, NUDGE * speed))]
+    n = min(len(m.command.time) for m in (base, *moved))
+    return max(float(np.abs(m.command.theta_2[:n] - base.command.theta_2[:n]).max()) for m in moved) / NUDGE
+
+
+TURNS, STOPS, AT_LIMITS, AT_CHANGE_POINTS, AMPLIFIES = range(5)
+SHOWN = {
+    ("double-crank", 10): AMPLIFIES,
+    ("crank-rocker", 8): TURNS,
+    ("double-rocker", 3): STOPS,
+    ("rocker-crank", 2): STOPS,
+    ("triple rocker, longest ground", 0): STOPS,
+    ("triple rocker, longest input", 0): AT_LIMITS,
+    ("triple rocker, longest coupler", 0): STOPS,
+    ("triple rocker, longest output", 6): STOPS,
+    ("change point", 5): STOPS,
+    ("change point", 10): AT_CHANGE_POINTS,
+    ("parallelogram", 4): AT_CHANGE_POINTS,
+}
+"""The motions of `make test`, and what each is to show: a few seconds in all."""
+MANY = [(kind, number) for kind in KINDS for number in range(int(os.environ.get("FREE_MOTIONS", "0")))]
+
+
+@pytest.mark.timeout(600)
+@pytest.mark.parametrize(("kind", "number"), list(dict.fromkeys([*SHOWN, *MANY])))
+def test_nine_digits_over_five_seconds(kind: str, number: int) -> None:
+    of = motion(kind, number)
+    m, theirs = ours(of), released(*of[:5], TIMES, follow=of.follow)
+    shown = SHOWN.get((kind, number))
+    promised, amplified = PROMISED, 0.0
+    n = len(theirs.theta_2)
+    assert len(m.command.time) == n
+    off = [float(np.abs(m.command.theta_2 - theirs.theta_2).max())]
+    if m.stopped_at is not None and theirs.stopped_at is not None:
+        off.append(abs(m.stopped_at - theirs.stopped_at) * float(np.abs(m.command.omega_2).max()))
+    worst = float(np.max(off))  # NaN where one is
+    if worst > PROMISED or shown == AMPLIFIES:  # three more motions, only where they decide
+        amplified = amplification(of)
+        promised *= max(1.0, amplified / AMPLIFIED)
+    assert worst <= promised
+    sure = np.abs(theirs.sine) > SURE
+    assert np.array_equal(m.command.branch[sure], np.sign(theirs.sine[sure]))
+    assert (m.stopped_at is None) is (theirs.stopped_at is None)
+    if shown is not None:
+        passed = theirs.limits > 0, theirs.change_points > 0
+        kinds = [not any(passed), any(passed) and not of.follow, *(of.follow and one for one in passed)]
+        assert [*kinds, amplified > AMPLIFIED][shown]
+
+
+def test_the_motions_shown_meet_every_force() -> None:
+    terms = [term for shown in SHOWN for term in motion(*shown).terms]
+    assert {type(term) for term in terms} == {fourbar.Gravity, fourbar.Viscous, fourbar.Load}
+    loads = [term for term in terms if isinstance(term, fourbar.Load)]
+    assert any(load.moment != 0.0 for load in loads) and {load.frame for load in loads if load.force} == {
+        "world",
+        "bar",
+    }
+
+
+def test_the_reference_against_a_printed_answer() -> None:
+    """One window of IFToMM's A02 after ten seconds (lim.ii.udc.es/mbsbenchmark), through its change points."""
+    bar = fourbar.Bar(1.0, 1.0)
+    theirs = released(
+        fourbar.FourBar(1.0, bar, bar, bar),
+        (fourbar.Gravity(),),
+        np.pi / 2,
+        -1.0,
+        1,
+        np.array([0.0, 10.0]),
+        follow=True,
+    )
+    end = theirs.theta_2[-1]
+    assert abs(np.cos(end) - 0.478385058) <= 0.5e-9 and abs(np.sin(end) - 0.878150179) <= 0.5e-9
+    assert theirs.change_points == 10  # multiples of 180 deg between 90 deg and -1739 deg

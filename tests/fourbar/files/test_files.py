@@ -1,0 +1,277 @@
+"""Scene files: read exactly, written back bit for bit; the models say what their sources say."""
+
+import math
+import re
+from dataclasses import replace
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import fourbar
+from fourbar.errors import InputError
+from fourbar.files import dump, load, loads, save
+from fourbar.files.units import UnitError, to_si
+
+MODELS = sorted((Path(__file__).parents[3] / "models").glob("*.toml"))
+LENGTHS = '[lengths]\nground = "0.3 m"\ninput = "0.1 m"\ncoupler = "0.25 m"\noutput = "0.22 m"\n'
+PRINTED = 0.5e-9
+"""Half a unit of the last digit that the figures are given with."""
+
+
+def facts(scene: fourbar.Scene) -> tuple[object, ...]:
+    """Every number of a scene, in a form that compares bit for bit (repr tells -0.0 from 0.0)."""
+    motion = scene.motion
+    angles = motion.theta_2.tolist() if isinstance(motion.theta_2, np.ndarray) else motion.theta_2
+    rest = (motion.omega_2, motion.alpha_2, motion.branch, motion.through, motion.free)
+    parts = (scene.linkage, angles, rest, scene.drive_bar, scene.loads, scene.effects)
+    return (*(repr(part) for part in parts), scene.title, scene.source)
+
+
+@pytest.mark.parametrize("path", MODELS, ids=lambda path: path.stem)
+def test_models_read_back_and_assemble_everywhere(path: Path) -> None:
+    scene = load(path)
+    assert facts(loads(dump(scene))) == facts(scene)
+    assert scene.title and scene.source
+    assert set(fourbar.solve(scene).status) == {"ok"}
+
+
+def test_the_named_mechanisms_are_among_the_models() -> None:
+    drives = {path.stem: load(path).drive_bar for path in MODELS}
+    assert {"thesis", "thesis_printed_inertias", "crank_rocker", "drag_link", "double_rocker", "triple_rocker"} <= set(
+        drives
+    )
+    assert set(drives.values()) == {2, 3, 4}
+
+
+@pytest.mark.parametrize(("name", "torque"), [("thesis", 3.0930935923), ("thesis_printed_inertias", 3.0933077994)])
+def test_the_thesis_scenes_reach_the_figures(name: str, torque: float) -> None:
+    scene = load(next(path for path in MODELS if path.stem == name))
+    there = replace(scene, motion=replace(scene.motion, theta_2=math.radians(135.0)))
+    solution = fourbar.solve(there)
+    assert solution.torque == pytest.approx(torque, rel=0.0, abs=PRINTED / 10)
+    if name == "thesis":
+        forces = {
+            "F12": (7.033117757, -2.121209407),
+            "F32": (-15.480491243, 0.568582894),
+            "F43": (-15.476569658, 0.555136181),
+            "F14": (-15.476837016, 0.551901654),
+        }
+        for key, force in forces.items():
+            assert getattr(solution, key)[0] == pytest.approx(force, rel=0.0, abs=PRINTED), key
+
+
+@pytest.mark.parametrize(
+    ("text", "unit", "value"),
+    [
+        ("48 cm", "m", Fraction(48, 100)),
+        ("1 in", "m", Fraction(254, 10000)),
+        ("111192.75 kg cm^2", "kg m^2", Fraction("11.119275")),
+        ("0.2924725333 kg·cm²", "kg m^2", Fraction("0.2924725333") / 10000),
+        ("-15 N cm", "N m", Fraction(-15, 100)),
+        ("1 kg cm/s^2", "N", Fraction(1, 100)),
+        ("9.81 m s^-2", "m/s^2", Fraction("9.81")),
+        ("1 g_0", "m/s^2", Fraction("9.80665")),
+        ("3 N m/(rad/s)", "N m s/rad", Fraction(3)),
+        ("2 kNm", "N m", Fraction(2000)),
+        ("3 N.mm", "N m", Fraction(3, 1000)),
+        ("2 inches", "m", Fraction(508, 10000)),
+        ("16 ozf in", "N m", Fraction("0.45359237") * Fraction("9.80665") * Fraction("0.0254")),
+        ("1 lbf", "N", Fraction("0.45359237") * Fraction("9.80665")),
+        ("2 tonne", "kg", Fraction(2000)),
+        ("5e-324 rad", "rad", Fraction(5e-324)),
+        *((text, "N m", Fraction(15)) for text in ("15 N⋅m", "15 N×m", "15 N•m", "15 kg·m²·s⁻²")),
+        *((text, "m", Fraction("0.3175")) for text in ("12 1/2 in", '12-1/2"', "12.5 in.", "25/2 inches", "12.5″")),
+        ("2/3 yd", "m", Fraction("0.6096")),
+        ("1 kp", "N", Fraction("9.80665")),
+    ],
+)
+def test_units_are_converted_exactly_and_rounded_once(text: str, unit: str, value: Fraction) -> None:
+    assert to_si(text, unit) == float(value)
+
+
+@pytest.mark.parametrize(("degrees", "turns"), [("360", 1.0), ("45", 0.125), ("-90", -0.25), ("1080", 3.0)])
+def test_degrees_are_the_nearest_doubles(degrees: str, turns: float) -> None:
+    # 2 pi times a power of two, or three, of the double nearest to pi: math.tau itself is correctly rounded
+    assert to_si(f"{degrees} deg", "rad") == turns * math.tau
+    assert to_si(f"{turns!r} rev", "rad") == turns * math.tau
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["1", "", "m", "nan m", "inf m", "1e309 m", "1e400 m", "1_0 m", "1 kg", "1 s", "20 degC", "1 rad", "1 m^99",
+     "1 m**2**9", "1 ((cm^9)^9)^9", "1 cm²²", "1 m + 1 m", "1 m; import os", "1 __import__('os')", "1 m" + " m" * 99,
+     "1 (((((((", "0x10 m", "1,5 m", "1.2.3 m", "9" * 200 + " m", "1e9999999 m"],
+)  # fmt: skip
+def test_what_is_no_length_is_refused(text: str) -> None:
+    with pytest.raises(UnitError):
+        to_si(text, "m")
+
+
+@pytest.mark.parametrize("text", ["1 Hz", "1 1/s", "1 s^-1", "1 rad", "1 deg"])
+def test_an_angle_is_a_dimension(text: str) -> None:
+    with pytest.raises(UnitError):
+        to_si(text, "rad/s")
+
+
+@pytest.mark.parametrize(
+    ("text", "unit", "meant"),
+    [
+        ("5 lb", "N", "5 lbf"), ("5 lbf", "kg", "5 lb"), ("3 oz in", "N m", "3 ozf in"), ("5 Hz", "rad/s", "5 rev/s"),
+        ("5 RPM", "rad/s", "5 rpm"), ("5 Newton", "N", "5 newton"), ("2 N m", "N m/rad", "2 N m/rad"),
+        ("5 1/s", "rad/s", "5 rad /s"), ("5 kg cm2", "kg m^2", "5 kg cm^2"), ("1 m/s2", "m/s^2", "1 m/s^2"),
+        ("30 cms", "m", "30 cm"), ("300 MM", "m", "300 mm"), ("5 pounds", "N", "5 lbf"), ("0,3 m", "m", "0.3 m"),
+    ],
+)  # fmt: skip
+def test_what_may_have_been_meant_is_one(text: str, unit: str, meant: str) -> None:
+    with pytest.raises(UnitError, match=re.escape(f'did you mean "{meant}"?')):
+        to_si(text, unit)
+    assert to_si(meant, unit) > 0.0
+
+
+def test_defaults_are_those_of_the_contract() -> None:
+    scene = loads(LENGTHS)
+    assert scene.linkage == fourbar.FourBar(0.3, fourbar.Bar(0.1), fourbar.Bar(0.25), fourbar.Bar(0.22), 0.0)
+    motion = scene.motion
+    assert (motion.theta_2, motion.omega_2, motion.alpha_2, motion.branch) == (None, None, 0.0, 1)
+    assert (motion.through, motion.free, scene.drive_bar) == ("sign", None, 2)
+    assert (scene.loads, scene.effects, scene.title, scene.source) == ((), (), "", "")
+    bar = loads(LENGTHS + '[bars.coupler]\nmass = "6 kg"\n').linkage.coupler
+    assert bar.moment_of_inertia == pytest.approx(6.0 * 0.25**2 / 12.0, rel=1e-15) and bar.mass_centre == (0.125, 0.0)
+
+
+def test_every_form_of_theta_2() -> None:
+    def motion(text: str) -> fourbar.Motion:
+        return loads(f'{LENGTHS}[motion]\ntheta_2 = {text}\nbranch = "crossed"').motion
+
+    assert motion('"180 deg"').theta_2 == math.pi and motion('"0 rad"').branch == -1
+    assert motion('{ from = "0 deg", to = "360 deg", steps = 7 }').theta_2 == fourbar.Sweep(0.0, math.tau, 7)
+    assert motion('{ limit = 2, offset = "1e-9 rad" }').theta_2 == fourbar.FromLimit(2, 1e-9)
+    assert np.array_equal(motion('["0 deg", "180 deg"]').theta_2, [0.0, math.pi])  # type: ignore[arg-type]
+
+
+def test_free_motion_and_frames_are_read() -> None:
+    text = (
+        LENGTHS
+        + """
+[motion]
+theta_2 = "10 deg"
+omega_2 = "0 rad/s"
+through = "follow"
+free = { duration = "5 s", steps = 500 }
+[[loads]]
+bar = 3
+force = ["2 N", "90 deg"]
+at = ["1 cm", "0 deg"]
+frame = "bar"
+[effects]
+viscous = { O2 = "0.01 N m s/rad", B = "1 N m s/rad" }
+friction = { A = "5 N cm" }
+"""
+    )
+    scene = loads(text)
+    assert scene.motion.free == fourbar.Free(5.0, 500) and scene.motion.through == "follow"
+    assert scene.loads == (fourbar.Load(3, (2.0, math.pi / 2), (0.01, 0.0), frame="bar"),)
+    assert scene.effects == (fourbar.Viscous.at(O2=0.01, B=1.0), fourbar.Friction.at(A=0.05))
+    assert facts(loads(dump(scene))) == facts(scene)
+
+
+def numbers(least: float = -1e300, most: float = 1e300, **more: bool) -> st.SearchStrategy[float]:
+    return st.floats(least, most, allow_nan=False, allow_infinity=False, **more)
+
+
+LENGTH = numbers(1.0, 1.4)  # any four of these close
+BAR = st.builds(fourbar.Bar, LENGTH, numbers(0.0, 1e9), numbers(0.0), st.tuples(numbers(), numbers()))
+LOAD = st.builds(
+    fourbar.Load,
+    st.integers(2, 4),
+    st.tuples(numbers(), numbers()),
+    st.tuples(numbers(), numbers()),
+    numbers(),
+    st.sampled_from(("world", "bar")),
+)
+PER_PIN = st.dictionaries(st.sampled_from(("O2", "A", "B", "O4")), numbers(0.0), min_size=1)
+THETA_2 = (
+    st.none()
+    | numbers()
+    | st.lists(numbers(), min_size=1, max_size=4).map(np.array)
+    | st.builds(fourbar.Sweep, numbers(), numbers(), st.integers(1, 10**8))
+    | st.builds(fourbar.FromLimit, st.integers(1, 4), numbers())
+)
+MOTION = st.builds(
+    fourbar.Motion,
+    THETA_2,
+    st.none() | numbers(-1e150, 1e150),
+    numbers(),
+    st.sampled_from((1, -1)),
+    st.sampled_from(("sign", "follow")),
+    st.none() | st.builds(fourbar.Free, numbers(0.0, exclude_min=True), st.integers(1, 10**8)),
+)
+EFFECTS = st.tuples(
+    st.builds(fourbar.Gravity, numbers(), numbers()),
+    PER_PIN.map(lambda values: fourbar.Viscous.at(**values)),
+    PER_PIN.map(lambda values: fourbar.Friction.at(**values)),
+)
+TEXT = st.text(st.characters(exclude_categories=["Cs"]), max_size=20)
+SCENE = st.builds(
+    fourbar.Scene,
+    st.builds(fourbar.FourBar, LENGTH, BAR, BAR, BAR, numbers()),
+    MOTION,
+    st.integers(2, 4),
+    st.lists(LOAD, max_size=3).map(tuple),
+    EFFECTS | st.just(()),
+    TEXT,
+    TEXT,
+)
+
+
+@settings(max_examples=150, deadline=None, derandomize=True)
+@given(SCENE)
+def test_any_scene_reads_back_bit_for_bit(scene: fourbar.Scene) -> None:
+    assert facts(loads(dump(scene))) == facts(scene)
+
+
+def test_every_letter_of_a_title_reads_back() -> None:
+    title = "".join(map(chr, range(0x180))) + "\u2028\ufeff\U0001f980"
+    assert loads(dump(replace(load(MODELS[0]), title=title))).title == title
+
+
+def test_save_is_whole_or_not_at_all(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = load(MODELS[0])
+    target = tmp_path / "scene.toml"
+    save(scene, target)
+    before = target.read_bytes()
+    assert facts(load(target)) == facts(scene)
+
+    def full(_: int) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("os.fsync", full)
+    with pytest.raises(OSError, match="No space"):
+        save(replace(scene, title="other"), target)
+    assert target.read_bytes() == before and list(tmp_path.iterdir()) == [target]
+
+
+def test_what_a_file_cannot_hold_is_refused() -> None:
+    scene = load(MODELS[0])
+    with pytest.raises(InputError, match="one of each kind"):
+        dump(replace(scene, effects=(fourbar.Gravity(), fourbar.Gravity())))
+    with pytest.raises(InputError, match="Unicode"):
+        dump(replace(scene, title="\ud800"))
+
+
+@pytest.mark.parametrize("length", [0.05, 0.4])
+def test_what_a_bar_leaves_out_follows_its_length(length: float) -> None:
+    """The inertia m L^2/12 and mid-bar, of a bar that was read and then given another length; what is stated stays."""
+    read = loads(
+        '[lengths]\nground = "30 cm"\ninput = "10 cm"\ncoupler = "25 cm"\noutput = "22 cm"\n'
+        '[bars.coupler]\nmass = "0.5 kg"\n'
+        '[bars.output]\nmass = "2 kg"\ninertia = "3 kg m^2"\ncentre = ["7 cm", "0 deg"]\n'
+    ).linkage
+    coupler, output = (replace(bar, length=length) for bar in (read.coupler, read.output))
+    assert coupler.moment_of_inertia == pytest.approx(0.5 * length**2 / 12.0, rel=1e-15)
+    assert coupler.mass_centre == (0.5 * length, 0.0)
+    assert output.moment_of_inertia == 3.0 and output.mass_centre == pytest.approx((0.07, 0.0), rel=1e-15)

@@ -1,0 +1,119 @@
+"""Pictures named in a scene file: kept by it, shown by the page, and no path out of the scene's folder."""
+
+import base64
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+import fourbar
+from fourbar.cli import status
+from fourbar.errors import InputError
+from fourbar.files import dump, load, loads, save
+from fourbar.files.pictures import LARGEST, Picture
+from fourbar.show import animate
+from tests.fourbar.show.test_animate import PNG, embedded
+from tests.support.scenes import crank_rocker
+
+LENGTHS = '[lengths]\nground = "0.3 m"\ninput = "0.1 m"\ncoupler = "0.25 m"\noutput = "0.22 m"\n'
+EMBEDDED = "data:image/png;base64," + base64.b64encode(PNG).decode()
+
+
+def scene_file(folder: Path, name: str, bar: str = "coupler") -> Path:
+    file = folder / "scene.toml"
+    file.write_text(f'{LENGTHS}[bars.{bar}]\npicture = "{name}"\n', encoding="utf-8")
+    return file
+
+
+@pytest.mark.parametrize("name", ("bar.png", "parts/bar.png"))
+def test_the_picture_of_a_scene_file_is_shown_and_saved(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    (tmp_path / "parts").mkdir()
+    (tmp_path / name).write_bytes(PNG)
+    monkeypatch.chdir("/")  # the name is relative to the scene file
+    scene = load(scene_file(tmp_path, name))
+    assert embedded(animate.page(scene))["pictures"] == {"3": EMBEDDED}
+    save(scene, tmp_path / "again.toml")
+    again = load(tmp_path / "again.toml")
+    assert again.pictures == scene.pictures
+    assert dump(loads(dump(scene), str(tmp_path / "x.toml"))) == dump(scene)
+    assert again.linkage == scene.linkage  # a massless bar with a picture stays massless
+
+
+def test_a_scene_saved_elsewhere_names_the_same_file_or_says_why_not(tmp_path: Path) -> None:
+    inner = tmp_path / "inner"
+    inner.mkdir()
+    (inner / "bar.png").write_bytes(PNG)
+    scene = load(scene_file(inner, "bar.png", "output"))
+    save(scene, tmp_path / "outer.toml")
+    assert 'picture = "inner/bar.png"' in (tmp_path / "outer.toml").read_text()
+    assert embedded(animate.page(load(tmp_path / "outer.toml")))["pictures"] == {"4": EMBEDDED}
+    other = tmp_path / "other"
+    other.mkdir()
+    with pytest.raises(InputError, match=r"^bars\.output\.picture.*copy it there first[^\n]*$"):
+        save(scene, other / "scene.toml")
+    assert not list(other.iterdir())
+
+
+def test_one_given_with_the_command_takes_its_place(tmp_path: Path) -> None:
+    (tmp_path / "bar.png").write_bytes(PNG)
+    (tmp_path / "other.png").write_bytes(PNG + b"x")
+    scene = load(scene_file(tmp_path, "bar.png"))
+    shown = embedded(animate.page(scene, {"coupler": tmp_path / "other.png"}))["pictures"]["3"]
+    assert base64.b64decode(shown.partition(",")[2]) == PNG + b"x"
+
+
+@pytest.mark.parametrize(
+    "name",
+    (
+        *("", ".", "..", "../secret.png", "a/../../secret.png", "/etc/passwd", "//host/x.png", "a//b.png"),
+        *(r"..\\secret.png", "C:/x.png", "C:x.png", "a\\u0000b.png", "a\\nb.png", "x" * 300, "file:x.png", "./x.png"),
+    ),
+)
+def test_a_name_that_leads_elsewhere_is_refused_when_the_file_is_read(
+    tmp_path: Path, name: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "secret.png").write_bytes(PNG)
+    inner = tmp_path / "inner"
+    inner.mkdir()
+    file = scene_file(inner, name)
+    assert status(["analyze", str(file)]) == 2
+    (line,) = capsys.readouterr().err.strip().split("\n")
+    assert str(file) in line and "bars.coupler.picture" in line and "PNG or JPEG" in line
+
+
+def test_a_picture_that_is_no_text_is_refused() -> None:
+    with pytest.raises(InputError, match=r"bars\.input\.picture.*text"):
+        loads(LENGTHS + "[bars.input]\npicture = 3\n")
+
+
+def test_what_the_name_leads_to_is_looked_at_before_it_is_shown(tmp_path: Path) -> None:
+    inner = tmp_path / "inner"
+    inner.mkdir()
+    (tmp_path / "secret.png").write_bytes(PNG)
+    (inner / "link.png").symlink_to(tmp_path / "secret.png")
+    (inner / "up").symlink_to(tmp_path)
+    (inner / "text.png").write_text("<svg onload='alert(1)'/>")
+    (inner / "big.png").write_bytes(PNG + bytes(LARGEST))
+    (inner / "folder.png").mkdir()
+    for name, word in (
+        ("link.png", "out of the scene's folder"),
+        ("up/secret.png", "out of the scene's folder"),
+        ("text.png", "PNG or JPEG"),
+        ("big.png", "must not exceed 2000000"),
+        ("folder.png", "is a directory"),
+        ("missing.png", "no such file"),
+    ):
+        scene = load(scene_file(inner, name))
+        fourbar.solve(scene)  # nobody has to see it to compute
+        with pytest.raises(InputError, match=rf"^bars\.coupler\.picture[^\n]*{word}[^\n]*$"):
+            animate.write(scene, tmp_path / "page.html")
+        assert not (tmp_path / "page.html").exists()
+
+
+def test_a_bar_has_one_picture_and_the_ground_none() -> None:
+    with pytest.raises(InputError, match="one picture"):
+        replace(crank_rocker(), pictures=[Picture(3, "a.png"), Picture(3, "b.png")])
+    with pytest.raises(InputError, match="2, 3 or 4"):
+        Picture(1, "a.png")

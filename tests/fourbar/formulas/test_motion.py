@@ -1,0 +1,360 @@
+"""Kinematics against second derivations: Newton on the closure, 50-digit differences of positions, symmetry."""
+
+import cmath
+import math
+
+import mpmath
+import numpy as np
+import pytest
+
+import fourbar
+from fourbar.formulas.arithmetic import dot
+from fourbar.formulas.many_digits import limit_remainder
+from fourbar.formulas.motion import State
+from fourbar.formulas.path import singular, state
+
+EPS = 2.0**-52
+LENGTHS = (0.3, 0.1, 0.25, 0.22)
+ANGLES = np.linspace(-3.0, 6.0, 41)
+CLOSURE = 8 * EPS
+"""Of the sum of the lengths: eight roundings of unit vectors and their sum."""
+DIFFERENCES = 1e-12
+"""Relative: the double results against 50-digit differences, well away from limits."""
+
+
+def linkage(theta_1: float = 0.4) -> fourbar.FourBar:
+    d, a, b, c = LENGTHS
+    return fourbar.FourBar(d, fourbar.Bar(a), fourbar.Bar(b), fourbar.Bar(c), theta_1)
+
+
+def angle(at: State, bar: int) -> np.ndarray:
+    return np.angle(at.direction(bar))
+
+
+def assembled(at: State) -> np.ndarray:
+    return (at.at.half.outer >= 0.0) & (at.at.half.inner >= 0.0)
+
+
+def newton(link: fourbar.FourBar, theta_2: mpmath.mpf, start: tuple[float, float]) -> tuple[mpmath.mpf, mpmath.mpf]:
+    """theta_3, theta_4 of the branch nearest to a start, by Newton's iteration on the closure in 50 digits."""
+    d, a, b, c = (mpmath.mpf(length) for length in link.lengths)
+
+    def gap(t3: mpmath.mpf, t4: mpmath.mpf) -> list[mpmath.mpf]:
+        z = (
+            a * mpmath.expj(mpmath.mpc(theta_2))
+            + b * mpmath.expj(mpmath.mpc(t3))
+            - d * mpmath.expj(mpmath.mpc(link.ground_angle))
+            - c * mpmath.expj(mpmath.mpc(t4))
+        )
+        return [z.real, z.imag]
+
+    solution = mpmath.findroot(gap, start)
+    return solution[0], solution[1]
+
+
+@pytest.mark.parametrize("branch", [1, -1])
+@pytest.mark.parametrize("theta_1", [0.0, 0.4, 1.0, -2.5])
+@pytest.mark.parametrize("lengths", [LENGTHS, (0.3, 0.1, 0.3, 0.1), (0.3, 0.1, 0.1, 0.3)])
+def test_the_loop_closes_on_the_requested_branch(lengths: tuple[float, ...], branch: int, theta_1: float) -> None:
+    d, a, b, c = lengths
+    link = fourbar.FourBar(d, fourbar.Bar(a), fourbar.Bar(b), fourbar.Bar(c), theta_1)
+    moving = state(link, theta_1 + ANGLES, branch)
+    e2, e3, e4 = (np.exp(1j * angle(moving, bar)) for bar in (2, 3, 4))
+    gap = a * e2 + b * e3 - d * cmath.exp(1j * theta_1) - c * e4
+    assert np.max(np.abs(gap)) <= CLOSURE * sum(lengths)
+    diagonal = d * cmath.exp(1j * theta_1) - a * e2
+    assert np.all(np.sign((np.conj(diagonal) * b * e3).imag) == branch)
+
+
+def test_velocity_and_acceleration_are_differences_of_the_position() -> None:
+    link, omega, alpha = linkage(), 3.0, -7.0
+    moving = state(link, np.array([1.1]), -1, omega, alpha)
+    start = (float(angle(moving, 3)[0]), float(angle(moving, 4)[0]))
+    with mpmath.workdps(50):
+        h = mpmath.mpf("1e-12")
+        at = [newton(link, mpmath.mpf(1.1) + omega * t + alpha * t * t / 2, start) for t in (-h, mpmath.mpf(0), h)]
+        for k, bar in enumerate((3, 4)):
+            speed = (at[2][k] - at[0][k]) / (2 * h)
+            growth = (at[2][k] - 2 * at[1][k] + at[0][k]) / h**2
+            assert abs(moving.omega(bar)[0] / speed - 1) < DIFFERENCES
+            assert abs(moving.alpha(bar)[0] / growth - 1) < DIFFERENCES
+
+
+def test_mirror_image() -> None:
+    """Mirrored at the ground line: angles change sign, and so does the branch."""
+    up, down = state(linkage(0.0), ANGLES, 1), state(linkage(0.0), -ANGLES, -1)
+    for bar in (3, 4):
+        assert np.array_equal(angle(up, bar), -angle(down, bar))
+
+
+@pytest.mark.parametrize("lengths", [(0.3, 0.1, 0.3, 0.1), (0.1, 0.3, 0.3, 0.1)], ids=["parallelogram", "kite"])
+def test_parallel_bars_are_exact_near_the_change_point(lengths: tuple[float, ...]) -> None:
+    d, a, b, c = lengths
+    link = fourbar.FourBar(d, fourbar.Bar(a), fourbar.Bar(b), fourbar.Bar(c))
+    parallelogram = a == c
+    for delta in (1e-8, 1e-4, 0.5):
+        moving = state(link, np.array([math.pi - delta]), 1 if parallelogram else -1, 2.0)
+        expected = (0.0, 2.0) if parallelogram else (2.0, 0.0)
+        assert (moving.omega(3)[0], moving.omega(4)[0]) == expected
+        assert (moving.alpha(3)[0], moving.alpha(4)[0]) == (0.0, 0.0)
+
+
+def test_positions_that_cannot_close_are_nan_and_say_so() -> None:
+    link = fourbar.uniform(1.0, 1.0, 0.4, 0.4)
+    moving = state(link, np.array([0.5, 2.0]), 1)
+    assert assembled(moving).tolist() == [True, False]
+    for value in (angle(moving, 3), moving.omega(3), moving.alpha(4), moving.point(3, 0.1)):
+        assert np.isnan(value).tolist() == [False, True]
+
+
+@pytest.mark.parametrize(
+    "lengths",  # no bars alike, or one pair: one alone never stays parallel
+    [(0.5, 0.4, 0.3, 0.25), (0.5, 0.3, 0.4, 0.3), (0.5, 0.6, 0.5, 0.45), (0.5, 0.3, 0.3, 0.25), (0.5, 0.6, 0.45, 0.5)],
+)
+@pytest.mark.parametrize("offset", [1e-6, 1e-12, 1e-20, 1e-40])
+def test_beyond_a_limit_nothing_assembles_however_near(lengths: tuple[float, ...], offset: float) -> None:
+    d, a, b, c = lengths
+    link = fourbar.FourBar(d, fourbar.Bar(a), fourbar.Bar(b), fourbar.Bar(c), 0.2)
+    # the first limit ends the range in which the linkage closes, the second begins it
+    for limit, inside in ((1, -1.0), (2, 1.0)):
+        status = [
+            fourbar.solve(fourbar.Scene(link, fourbar.Motion(fourbar.FromLimit(limit, side * offset), 1.0))).status
+            for side in (inside, 0.0, -inside)
+        ]
+        assert status == [["ok"], ["singular"], ["not_assembled"]]
+
+
+@pytest.mark.parametrize("offset", [1e-6, 1e-12, 1e-20])
+def test_an_offset_from_a_limit_keeps_all_its_digits(offset: float) -> None:
+    """Near a limit sin mu grows as the square root of the offset, however small."""
+    link = fourbar.FourBar(0.5, fourbar.Bar(0.4), fourbar.Bar(0.3), fourbar.Bar(0.25), 0.2)
+    with mpmath.workdps(60):
+        D, A, B, C = (mpmath.mpf(x) for x in link.lengths)
+        limit = mpmath.mpf(0.2) + mpmath.acos((A**2 + D**2 - (B + C) ** 2) / (2 * A * D))
+        psi = limit - mpmath.mpf(offset) - mpmath.mpf(0.2)
+        squared = A**2 + D**2 - 2 * A * D * mpmath.cos(psi)
+        cosine = (B**2 + C**2 - squared) / (2 * B * C)
+        sine = float(mpmath.sqrt(1 - cosine**2))
+        theta_2 = float(limit) - offset
+    remainder = limit_remainder(link, float(limit), theta_2, -offset)
+    at = fourbar.scene.Command(np.array([theta_2]), np.array([1], np.int8), 1.0, 0.0, remainder)
+    scene = fourbar.Scene(link, fourbar.Motion(theta_2, 1.0))
+    solution = fourbar.solve(scene, at=at)
+    assert isinstance(remainder, mpmath.mpf)
+    assert abs(solution.sin_mu[0] / sine - 1.0) < 8 * EPS
+    assert solution.status == ["ok"]
+    assert solution.omega_3 is not None and np.isfinite(solution.omega_3).all()
+
+
+STEP = 1e-4
+"""s; a central difference then misses STEP^2 of the third derivative of positions that turn at 3 rad/s."""
+BY_DIFFERENCES = 1e-5
+
+
+@pytest.mark.parametrize("alpha", [0.0, 1.0, -7.0])
+@pytest.mark.parametrize("theta_1", [0.0, 0.4])
+@pytest.mark.parametrize("point", [(0.05, -0.02), (0.07, 0.0), (0.0, 1.0)])
+def test_points_move_as_their_positions_do(point: tuple[float, float], theta_1: float, alpha: float) -> None:
+    """Points of all bars as complex numbers; speeds and accelerations as differences of their positions."""
+    link, omega = linkage(theta_1), 3.0
+    angles = np.linspace(0.3, 6.0, 9)
+
+    def at(t: float) -> State:
+        return state(link, angles + omega * t + 0.5 * alpha * t * t, 1)
+
+    z = complex(*point)
+    moving = state(link, angles, 1, omega, alpha)
+    d, a, b, c = link.lengths
+    e2, e3, e4 = (np.exp(1j * angle(moving, bar)) for bar in (2, 3, 4))
+    O4 = d * cmath.exp(1j * theta_1)
+    first = {2: np.zeros(9), 3: a * e2, 4: np.full(9, O4)}
+    pins = {(2, a): a * e2, (3, 0.0): a * e2, (3, b): a * e2 + b * e3, (4, c): a * e2 + b * e3, (4, 0.0): first[4]}
+    for (bar, along), place in pins.items():
+        assert np.max(np.abs(moving.point(bar, along) - place)) <= CLOSURE
+    for bar, unit in ((2, e2), (3, e3), (4, e4)):
+        assert np.max(np.abs(moving.direction(bar) - unit)) <= CLOSURE
+        assert np.max(np.abs(moving.foot(bar) - first[bar])) <= CLOSURE
+        place = moving.point(bar, z)
+        assert place.shape == (9,) and np.max(np.abs(place - (first[bar] + z * unit))) <= CLOSURE
+        ahead, back = (at(t).point(bar, z) for t in (STEP, -STEP))
+        assert moving.velocity(bar, z) == pytest.approx((ahead - back) / (2 * STEP), abs=BY_DIFFERENCES)
+        assert moving.point_coefficient(bar, z) * omega == pytest.approx(moving.velocity(bar, z), abs=CLOSURE * omega)
+        bend = (ahead - 2.0 * place + back) / STEP**2
+        assert moving.acceleration(bar, z) == pytest.approx(bend, abs=BY_DIFFERENCES)
+
+
+@pytest.mark.parametrize("branch", [1, -1])
+def test_slip_at_a_pin_is_the_difference_of_its_two_bars(branch: int) -> None:
+    unit, growing = state(linkage(), ANGLES, branch, 1.0, 0.0), state(linkage(), ANGLES, branch, 0.0, 1.0)
+    for pin, (i, j) in fourbar.linkage.PINS.items():
+        assert unit.slip(pin) == pytest.approx(unit.omega(j) - unit.omega(i), abs=CLOSURE)
+        assert unit.slip(pin) == pytest.approx(growing.alpha(j) - growing.alpha(i), abs=CLOSURE)
+    with pytest.raises(KeyError, match="C"):
+        unit.slip("C")
+
+
+def test_speeds_given_one_by_one_are_speeds_given_at_once() -> None:
+    """Zero at every position, as a number or as an array, is the same motion; the ground does not move."""
+    states = []
+    for omega, alpha in ((3.0, 0.0), (np.full(5, 3.0), np.zeros(5)), (3, 0)):
+        states.append(state(linkage(), np.linspace(0.3, 6.0, 5), 1, omega, alpha))
+        assert states[-1].omega(1) == 0.0 and states[-1].alpha(1) == 0.0 and states[-1].coefficient(1) == 0.0
+    for other in states[1:]:
+        for bar in (2, 3, 4):
+            assert np.all(other.omega(bar) == states[0].omega(bar))
+            assert np.all(other.alpha(bar) == states[0].alpha(bar))
+            assert np.array_equal(other.acceleration(bar, 0.1 + 0.2j), states[0].acceleration(bar, 0.1 + 0.2j))
+
+
+def test_the_cosine_at_B_is_that_of_the_two_bars() -> None:
+    for lengths, branch in ((LENGTHS, 1), (LENGTHS, -1), ((0.3, 0.1, 0.3, 0.1), 1), ((0.1, 0.3, 0.3, 0.1), -1)):
+        d, a, b, c = lengths
+        moving = state(fourbar.FourBar(d, fourbar.Bar(a), fourbar.Bar(b), fourbar.Bar(c), 0.4), ANGLES, branch)
+        ok = assembled(moving)
+        expected = np.cos(angle(moving, 4) - angle(moving, 3))
+        assert dot(moving.at.u3, moving.at.u4)[ok] == pytest.approx(expected[ok], abs=64 * EPS)
+        assert moving.at.sin_mu[ok] == pytest.approx(np.sin(angle(moving, 4) - angle(moving, 3))[ok], abs=1e-13)
+
+
+def test_singular_positions_have_no_speed_and_their_neighbours_keep_theirs() -> None:
+    link = fourbar.uniform(0.3, 0.1, 0.3, 0.1)
+    theta_2 = np.array([0.0, 1.0, math.pi])
+    moving = state(link, theta_2, 1, 2.0, 5.0)
+    assert singular(moving.at).tolist() == [True, False, True] and assembled(moving).all()
+    assert np.isnan(moving.at.root).tolist() == [True, False, True]
+    assert np.isfinite(moving.at.sin_mu).all() and np.isfinite(moving.at.u3).all()
+    for bar in (3, 4):
+        assert np.isnan(moving.omega(bar)).tolist() == [True, False, True]
+    assert (moving.omega(4)[1], moving.alpha(4)[1], moving.alpha(3)[1]) == (2.0, 5.0, 0.0)
+    still = state(link, theta_2, 1, 2.0)
+    assert np.isnan(still.alpha(3)).tolist() == np.isnan(still.alpha(4)).tolist() == [True, False, True]
+    assert not singular(state(linkage(), ANGLES, 1).at).any()
+
+
+@pytest.mark.parametrize("lengths", [(3, 1, 2, 2), (0.99, 0.97, 0.98, 0.98)])
+def test_within_the_rounding_of_a_change_point_no_direction_is_left(lengths: tuple[float, ...]) -> None:
+    theta_2 = math.pi + 2.0 * EPS * np.arange(5)  # the next doubles after pi
+    moving = state(fourbar.uniform(*lengths), theta_2, 1)
+    assert (moving.at.sin_mu > 0.0).all() and (moving.at.sin_mu < 8.0 * EPS).all()
+    assert singular(moving.at).all() and np.isnan(moving.omega(3)).all()
+    assert not singular(state(fourbar.uniform(*lengths), theta_2 + 1e-13, 1).at).any()
+
+
+def test_branches_may_differ_from_position_to_position() -> None:
+    branches = np.where(np.arange(41) % 3 == 0, -1, 1).astype(np.int8)
+    mixed = state(linkage(), ANGLES, branches, 2.0, 1.0)
+    for branch in (1, -1):
+        alone = state(linkage(), ANGLES, branch, 2.0, 1.0)
+        which = branches == branch
+        for bar in (3, 4):
+            assert np.array_equal(mixed.direction(bar)[which], alone.direction(bar)[which])
+            assert np.array_equal(mixed.omega(bar)[which], alone.omega(bar)[which])
+            assert np.array_equal(mixed.alpha(bar)[which], alone.alpha(bar)[which])
+
+
+@pytest.mark.parametrize("centre", [(0.3, 0.0), (0.3, 1.0), (0.3, -2.5), (0.0, 0.0)])
+def test_a_mass_centre_in_the_frame_of_its_bar(centre: tuple[float, float]) -> None:
+    place = fourbar.Bar(0.2, 1.0, 0.1, centre).to_centre
+    assert place == pytest.approx(cmath.rect(*centre), abs=EPS)
+    assert place.imag == 0.0 or centre[1] != 0.0
+    assert type(place) is complex
+
+
+@pytest.mark.parametrize(
+    ("lengths", "branch"), [((0.3, 0.1, 0.3, 0.1), 1), ((0.1, 0.3, 0.3, 0.1), -1), ((0.2, 0.2, 0.2, 0.2), 1)]
+)
+@pytest.mark.parametrize("half_turn", [0, 1])
+@pytest.mark.parametrize("theta_1", [0.0, 0.4])
+def test_pairs_that_stay_parallel_keep_the_directions_of_ground_and_input(
+    lengths: tuple[float, ...], branch: int, half_turn: int, theta_1: float
+) -> None:
+    """A parallelogram's coupler lies as its ground and bar 4 as bar 2; a folded kite has B on O2."""
+    d, a, b, c = lengths
+    link = fourbar.FourBar(d, fourbar.Bar(a), fourbar.Bar(b), fourbar.Bar(c), theta_1)
+    theta_2 = theta_1 + math.pi * half_turn + np.array([1e-9, 0.5, 2.0])
+    branch = -branch if half_turn else branch
+    moving = state(link, theta_2, branch, 2.0, 3.0)
+    u1, u2 = cmath.exp(1j * theta_1), moving.at.u2
+    together = a == c
+    directions, speeds, growths = (
+        ((u1, u2), (0.0, 2.0), (0.0, 3.0)) if together else ((-u2, -u1), (2.0, 0.0), (3.0, 0.0))
+    )
+    for k, bar in enumerate((3, 4)):
+        assert moving.direction(bar) == pytest.approx(np.broadcast_to(directions[k], 3), abs=EPS)
+        assert np.array_equal(moving.omega(bar), np.full(3, speeds[k]))
+        assert np.array_equal(moving.alpha(bar), np.full(3, growths[k]))
+    # between the bars: the angle of input and ground
+    assert np.abs(moving.at.sin_mu) == pytest.approx(np.abs(np.sin(theta_2 - theta_1)), rel=8 * EPS, abs=2 * EPS)
+
+
+def test_a_kite_whose_A_lies_on_O4_has_no_speed_there_and_no_warning() -> None:
+    """a = d, b = c: at theta_2 = theta_1 bars 3 and 4 lie on each other and turn freely."""
+    link = fourbar.uniform(0.3, 0.3, 0.2, 0.2)
+    for branch in (1, -1):
+        moving = state(link, np.array([0.0, 0.5]), branch, 2.0, 3.0)
+        for value in (moving.omega(3), moving.omega(4), moving.alpha(3), moving.alpha(4)):
+            assert np.isfinite(value).tolist() == [False, True]
+
+
+@pytest.mark.parametrize("theta_1", [0.0, 0.4, -2.5])
+@pytest.mark.parametrize("branch", [1, -1])
+def test_a_kite_whose_A_lies_on_O4_lies_where_its_neighbours_do(branch: int, theta_1: float) -> None:
+    """As theta_2 falls to theta_1 bars 3 and 4 come to lie on the ground's line, both in the same direction."""
+    link = fourbar.FourBar(0.3, fourbar.Bar(0.3), fourbar.Bar(0.2), fourbar.Bar(0.2), theta_1)
+    step = 2.0**-30
+    # on it, and so near that e^2 leaves the range of doubles
+    for psi, towards in ((0.0, 1.0), *((side * psi, side) for psi in (1e-170, 1e-157) for side in (1.0, -1.0))):
+        if psi != 0.0 and theta_1 != 0.0:
+            continue
+        on, near = (state(link, theta_1 + np.array([psi, 0.5]), branch, 2.0, 3.0) for psi in (psi, towards * step))
+        for bar in (3, 4):
+            assert on.direction(bar) == pytest.approx(near.direction(bar), abs=2.0 * step)
+        assert singular(on.at).tolist() == [True, False]
+        assert np.isnan(on.omega(3)).tolist() == np.isnan(on.alpha(4)).tolist() == [True, False]
+    # with b and c unlike each other nothing closes there
+    assert not assembled(state(fourbar.uniform(0.3, 0.3, 0.2, 0.25), np.zeros(1), branch)).any()
+
+
+def test_near_parallel_bars_mu_is_the_angle_of_the_input_to_the_last_bit() -> None:
+    """Bars 3 and 4 of a parallelogram lie as its ground and input do: so does the angle between them."""
+    link = fourbar.uniform(0.3, 0.1, 0.3, 0.1)
+    at = state(link, np.linspace(0.01, 3.1, 200), 1).at
+    assert np.array_equal(at.sin_mu, at.u2.imag) and np.array_equal(dot(at.u3, at.u4), at.u2.real)
+    # 8 EPS has no digit left, the next double has
+    assert singular(state(link, np.array([8.0 * EPS, 8.0 * EPS * (1.0 + EPS)]), 1).at).tolist() == [True, False]
+
+
+def test_short_ground_and_input_leave_no_digit_of_mu() -> None:
+    """b = c, d and a a billiardth of them: mu = e/b, and A passes O4 so near that 8 EPS is reached."""
+    b, psi = 0.9, np.linspace(0.0, 2.0 * math.pi, 41)
+    for least, most in ((0.7, 2.0), (0.02, 0.03), (1.1, 1.3)):
+        d, a = (4.0 * EPS * b * part for part in (most + least, most - least))
+        link = fourbar.uniform(d, a, b, b)
+        moving = state(link, psi, 1, 2.0)
+        e = np.abs(d - a * np.exp(1j * psi))
+        assert assembled(moving).all() and np.array_equal(singular(moving.at), e / b <= 8.0 * EPS)
+        assert np.array_equal(np.isnan(moving.omega(3)), singular(moving.at))
+        status = fourbar.solve(fourbar.Scene(link, fourbar.Motion(psi, 2.0))).status
+        assert [each == "singular" for each in status] == singular(moving.at).tolist()
+
+
+@pytest.mark.parametrize("theta_1", [0.0, 1.2, -2.9])
+@pytest.mark.parametrize("branch", [1, -1])
+@pytest.mark.parametrize("lengths", [(0.3, 0.1, 0.25, 0.22), (0.3, 0.25, 0.1, 0.22), (0.3, 0.3, 0.2, 0.2)])
+def test_angles_alone_are_those_of_the_whole_position(
+    lengths: tuple[float, float, float, float], branch: int, theta_1: float
+) -> None:
+    """The same angles, statuses and gaps, a limit and A on O4 among them; to the roundings of an angle."""
+    d, *moving = lengths
+    link = fourbar.FourBar(d, *[fourbar.Bar(length) for length in moving], theta_1)
+    theta_2 = theta_1 + np.concatenate([np.linspace(-7.0, 7.0, 57), [0.0, np.pi, 1e-9]])
+    at = fourbar.scene.Command(theta_2, np.full(theta_2.shape, branch, np.int8), None, 0.0)
+    whole = fourbar.solve(fourbar.Scene(link), "position", at=at)
+    alone = fourbar.solve(
+        fourbar.Scene(link), at=at, out={"theta_3": np.empty(theta_2.shape), "theta_4": np.empty(theta_2.shape)}
+    )
+    assert alone.status == whole.status
+    for name in ("theta_3", "theta_4"):
+        ours, theirs = getattr(alone, name), getattr(whole, name)
+        assert np.array_equal(np.isnan(ours), np.isnan(theirs))
+        assert np.nanmax(np.abs(np.remainder(ours - theirs + np.pi, 2.0 * np.pi) - np.pi)) <= 1e-15 * 32

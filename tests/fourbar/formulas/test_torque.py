@@ -1,0 +1,474 @@
+"""The torque by virtual work against the equations of the free bodies, against energy, and against outside answers."""
+
+import mpmath as mp
+import numpy as np
+import pytest
+from flint import arb, ctx
+from scipy.optimize import brentq
+
+import fourbar
+from fourbar.effects.actions import Actions, bodies
+from fourbar.evaluation.case import state_at
+from fourbar.evaluation.free_motion import _meeting, release
+from fourbar.formulas.mobility import limit_positions, on_smooth_path
+from fourbar.formulas.motion import State, rates
+from fourbar.formulas.path import path, smooth_branch
+from fourbar.formulas.path import state as state_of
+from fourbar.formulas.position import half_angle, loop
+from fourbar.formulas.torque import driving_torque, half_slope, inertia
+from fourbar.scene import Command, command
+from fourbar.solve import solve
+from fourbar_validation.engines.balls import BITS, inputs, outputs
+from fourbar_validation.lab.cost.formulas import thirteen_equations
+
+EPS = 2.0**-52
+K = 200.0
+"""eps/condition of the sum of absolute terms; two derivations of some hundred roundings each, over 7000 samples."""
+PINS = ("F12", "F32", "F43", "F14")
+U = 2.0**-53
+"""Unit round-off of a double."""
+
+
+def random_case(rng: np.random.Generator) -> tuple[fourbar.FourBar, tuple, Command]:  # type: ignore[type-arg]
+    while True:
+        lengths = rng.uniform(0.1, 1.0, 4)
+        if 2.0 * lengths.max() < 0.999 * lengths.sum():
+            break
+    bars = [
+        fourbar.Bar(x, rng.uniform(0, 2), rng.uniform(0, 0.1), (rng.uniform(-0.5, 0.5), rng.uniform(-3, 3)))
+        for x in lengths[1:]
+    ]
+    linkage = fourbar.FourBar(lengths[0], *bars, ground_angle=rng.uniform(-3, 3))
+    pins = {"O2": 0.1, "A": 0.2, "B": 0.3, "O4": 0.1}
+    terms = (
+        fourbar.Load(2, (3.0, 0.7), (0.05, 1.0)),
+        fourbar.Load(3, (2.0, 0.3), (0.1, 2.0), 0.4, "bar"),
+        fourbar.Load(4, (1.0, 0.9), (0.2, -1.0), -0.3),
+        fourbar.Gravity(),
+        fourbar.Viscous.at(**pins),
+        fourbar.Friction.at(**pins),
+    )
+    omega, alpha = rng.uniform(-3, 3, 40), rng.uniform(-3, 3, 40)
+    omega[:5] = 0.0
+    alpha[:3] = 0.0
+    branch = rng.choice([-1, 1], 40).astype(np.int8)
+    return linkage, terms, Command(rng.uniform(-3, 3, 40), branch, omega, alpha)
+
+
+def some_of(at: Command, where: np.ndarray) -> Command:
+    """The positions of a command at which `where` is true."""
+    omega, alpha = (np.broadcast_to(x, at.theta_2.shape)[where] for x in (at.omega_2, at.alpha_2))
+    return at._replace(theta_2=at.theta_2[where], branch=at.branch[where], omega_2=omega, alpha_2=alpha)
+
+
+@pytest.mark.parametrize("drive", [2, 3, 4])
+def test_torque_and_pin_forces_agree_with_the_thirteen_equations(drive: int) -> None:
+    rng = np.random.default_rng(drive)
+    compared = 0
+    for _ in range(80):
+        linkage, terms, at = random_case(rng)
+        scene = fourbar.Scene(linkage, fourbar.Motion(0.0, 1.0), drive, terms[:3], terms[3:])
+        ok = solve(scene, "force", at=at).status_code == 0
+        at = some_of(at, ok)
+        s, theirs = solve(scene, "force", at=at), thirteen_equations(scene, at)
+        assert s.torque is not None and s.drive_condition is not None
+        force = sum(np.hypot(*theirs[name].T) for name in PINS)
+        worth = K * EPS / (s.condition**2 * s.drive_condition)
+        # the moments of the thirteen equations are those of forces at the arm of the longest bar
+        size = force * max(linkage.lengths) + np.abs(s.torque)
+        assert np.all(np.abs(theirs["torque"] - s.torque) <= worth * size)
+        for name in PINS:
+            assert np.all(np.hypot(*(theirs[name] - getattr(s, name)).T) <= worth * force)
+        compared += len(s)
+    assert compared > 1000
+
+
+def exactly(scene: fourbar.Scene, at: Command) -> dict[str, arb] | None:
+    """Balls at the one position of a command, its remainder included; None where the loop does not close."""
+    before, ctx.prec = ctx.prec, BITS
+    try:
+        x = {name: arb(value) for name, value in inputs(scene, float(at.theta_2[0])).items()}
+        if at.remainder is not None:
+            x["theta_2"] += arb(mp.nstr(at.remainder, 100))
+        return outputs(scene, int(at.branch[0]), x, scene.drive_bar)
+    finally:
+        ctx.prec = before
+
+
+@pytest.mark.parametrize("offset", [1e-2, 1e-8, 1e-14, 1e-30])
+def test_they_keep_their_digits_at_a_stated_distance_from_a_limit(offset: float) -> None:
+    """theta_2 = limit + offset: it assembles on one side of the limit, with the torque of the free bodies in balls."""
+    for seed in range(6):
+        rng = np.random.default_rng(seed)
+        linkage, terms, _ = random_case(rng)
+        for number in range(1, len(limit_positions(linkage)) + 1):
+            drive, branch = int(rng.integers(2, 5)), int(rng.choice([-1, 1]))
+            assembled = []
+            for side in (offset, -offset):
+                motion = fourbar.Motion(fourbar.FromLimit(number, side), 1.3, 0.7, branch=branch)
+                scene = fourbar.Scene(linkage, motion, drive, terms[:3], terms[3:5])
+                at = command(scene)
+                s, exact = solve(scene, "force", at=at), exactly(scene, at)
+                assert s.torque is not None and s.drive_condition is not None
+                assembled.append(bool(s.assembled[0]))
+                assert assembled[-1] == (exact is not None)
+                if exact is not None:
+                    wrong = abs(float((exact["torque"] - float(s.torque[0])).mid()))
+                    assert wrong <= K * EPS * abs(s.torque[0]) / s.drive_condition[0]
+            assert any(assembled) and (offset > 1e-3 or not all(assembled))
+
+
+def test_where_the_loop_closes_is_known_at_the_last_digits_of_a_limit() -> None:
+    """Bars that miss each other by less than the rounding of the lengths meet."""
+    compared = [0, 0]
+    for seed in range(10):
+        linkage, _, _ = random_case(np.random.default_rng(seed))
+        for limit in limit_positions(linkage):
+            angles = limit.theta_2 + np.arange(-4, 5) * np.spacing(limit.theta_2)
+            at = Command(angles, np.ones(9, dtype=np.int8), None, 0.0)
+            ours = solve(fourbar.Scene(linkage), at=at).assembled
+            with mp.workdps(50):
+                d, a, b, c = (mp.mpf(length) for length in linkage.lengths)
+                for angle, assembled in zip(angles.tolist(), ours.tolist(), strict=True):
+                    e = abs(d - a * mp.expj(mp.mpf(angle) - mp.mpf(linkage.ground_angle)))
+                    missed = max(e - (b + c), abs(b - c) - e)
+                    assert assembled == (missed <= U * (a + b + c + d))
+                    compared[assembled] += 1
+    assert min(compared) > 20
+
+
+def free_acceleration(
+    linkage: fourbar.FourBar,
+    theta_2: float,
+    omega_2: float,
+    branch: int,
+    terms: tuple = (),  # type: ignore[type-arg]
+) -> float:
+    """alpha_2 of the linkage just released, rad/s^2."""
+    return float(release(linkage, terms, theta_2, omega_2, branch, np.zeros(1)).command.alpha_2[0])
+
+
+def test_four_bar_of_gtdynamics() -> None:
+    """Torque 1 N m between crank and coupler of a square: 0.125 rad/s^2 (borglab/GTDynamics test_four_bar.py)."""
+    bar = fourbar.Bar(2.0, 1.0, 1.0)
+    linkage = fourbar.FourBar(2.0, bar, bar, bar)
+    terms = (fourbar.Load(2, moment=1.0), fourbar.Load(3, moment=-1.0))
+    assert abs(free_acceleration(linkage, np.pi / 2, 0.0, 1, terms) - 0.125) < 0.0005
+
+
+def test_free_acceleration_of_sympy() -> None:
+    """Links of 997 kg/m, crossed (sympy test_jointsmethod.py, four bar with manual constraints)."""
+    linkage = fourbar.uniform(0.13, 0.24, 0.21, 0.34, per_metre=997.0)
+    relative = np.array([2.1, 0.6655470375077588, 2.527408138024188])
+    rate = 0.2
+    for theta_1 in (0.0, np.pi):
+        linkage = fourbar.FourBar(0.13, linkage.input, linkage.coupler, linkage.output, theta_1)
+        for branch in (1, -1):
+            at = state_of(linkage, relative[0], branch)
+            if abs(np.angle(at.at.u3 / at.at.u2) - relative[1]) < 1e-8:
+                alpha = free_acceleration(linkage, relative[0], rate, branch)
+                alpha_3 = at.k.h3 * alpha + at.k.dh3 * rate**2
+                assert abs(at.k.h3 * rate - rate - -0.17963733938852067) < 1e-9
+                assert abs(alpha - 0.00487581) < 0.5e-8
+                assert abs(alpha_3 - alpha - -0.01990181) < 0.5e-8
+                return
+    pytest.fail("the configuration of the source was not found")
+
+
+def test_statics_of_motiongenesis() -> None:
+    """Equilibrium angles under H = 200 N (motiongenesis MGFourBarDynamicsFBD)."""
+    bars = (fourbar.Bar(1.0, 10.0), fourbar.Bar(2.0, 20.0), fourbar.Bar(2.0, 20.0))
+    linkage = fourbar.FourBar(1.0, *bars, ground_angle=np.pi / 2)
+
+    def held(angle: float, branch: int) -> tuple[float, float, float]:
+        """The torque that holds it at rest, and theta_3, theta_4."""
+        at = state_of(linkage, angle, branch).at
+        theta_3, theta_4 = float(np.angle(at.u3)), float(np.angle(at.u4))
+        loads = (fourbar.Load(3, (200.0, np.pi / 2), (1.0, theta_3)),)
+        motion = fourbar.Motion(angle, 0.0, branch=branch)
+        s = solve(fourbar.Scene(linkage, motion, 2, loads, (fourbar.Gravity(9.81, 0.0),)), "force")
+        return float(s.torque[0]), theta_3, theta_4
+
+    near = np.radians(19.98690555)
+    branch = min((1, -1), key=lambda sign: abs(held(near, sign)[0]))
+    angle = brentq(lambda q: held(q, branch)[0], near - 1e-3, near + 1e-3, xtol=1e-15)
+    _, theta_3, theta_4 = held(angle, branch)
+    for ours, theirs in ((angle, 19.98690555), (theta_3, 71.66202052), (theta_4, 38.32488502)):
+        assert abs(np.degrees(ours) - theirs) <= 0.5e-8
+
+
+CIRCLES = mp.mpf(10) ** -45
+"""What 50 digits leave of the loop."""
+PATH = 64.0 * EPS
+"""Roundings of a coefficient, divided by the sine squared and by e^2 over the lengths squared, both above 0.05 here."""
+SHAPES = {
+    "crank-rocker": (0.3, 0.1, 0.25, 0.22, 0.4),
+    "a = d": (0.3, 0.3, 0.25, 0.22, -2.0),
+    "b = c": (0.3, 0.1, 0.25, 0.25, 1.0),
+    "input longer than ground": (0.1, 0.3, 0.25, 0.32, 0.0),
+    "parallelogram": (0.3, 0.1, 0.3, 0.1, 0.4),
+    "kite b = c, a = d": (0.3, 0.3, 0.2, 0.2, 0.4),
+    "change point in line": (0.3, 0.1, 0.2, 0.2, 0.4),
+    "touching folded": (0.2, 0.1, 0.4, 0.3, 0.4),
+}
+
+
+def of(lengths: tuple[float, ...]) -> fourbar.FourBar:
+    """A linkage with masses off their bars."""
+    d, *moving, theta_1 = lengths
+    bars = (fourbar.Bar(x, 2.0 + x, 0.01, (0.4 * x, phase)) for x, phase in zip(moving, (0.5, -0.7, 2.0), strict=True))
+    return fourbar.FourBar(d, *bars, ground_angle=theta_1)
+
+
+def angles_in_fifty_digits(
+    linkage: fourbar.FourBar, theta_2: mp.mpf, near: tuple[float, float]
+) -> tuple[mp.mpf, mp.mpf]:
+    """theta_3, theta_4 by Newton on the loop from an assembly near it."""
+    d, a, b, c = (mp.mpf(length) for length in linkage.lengths)
+
+    theta_1 = mp.mpf(linkage.ground_angle)
+
+    def gap(theta_3: mp.mpf, theta_4: mp.mpf) -> tuple[mp.mpf, mp.mpf]:
+        return (
+            a * mp.cos(theta_2) + b * mp.cos(theta_3) - c * mp.cos(theta_4) - d * mp.cos(theta_1),
+            a * mp.sin(theta_2) + b * mp.sin(theta_3) - c * mp.sin(theta_4) - d * mp.sin(theta_1),
+        )
+
+    theta_3, theta_4 = mp.findroot(gap, near, tol=CIRCLES**2)
+    return theta_3, theta_4
+
+
+@pytest.mark.parametrize("lengths", SHAPES.values(), ids=SHAPES.keys())
+@pytest.mark.parametrize("branch", [1, -1])
+def test_coefficients_are_the_derivatives_of_the_loop(lengths: tuple[float, ...], branch: int) -> None:
+    linkage = of(lengths)
+    d, a, b, c = linkage.lengths
+    for psi in (0.7, 2.5, 4.6):
+        theta_2 = linkage.ground_angle + psi
+        e = abs(a * np.exp(1j * psi) - d)
+        if not abs(b - c) + 0.01 < e < b + c - 0.01:
+            continue
+        ours = state_of(linkage, np.array([theta_2]), branch)
+        unit, k = {3: ours.at.u3[0], 4: ours.at.u4[0]}, ours.k
+        near = tuple(float(np.angle(unit[bar])) for bar in (3, 4))
+        assert np.sign(np.sin(near[1] - near[0])) == branch
+        with mp.workdps(50):
+            at = mp.mpf(theta_2)
+            exact = angles_in_fifty_digits(linkage, at, near)
+            # central differences, 15 digits at least: the step is 1e-15 and 1e-13 of a number with 45
+            one, two = mp.mpf(10) ** -15, mp.mpf(10) ** -13
+            ends = [angles_in_fifty_digits(linkage, at + step, near) for step in (one, -one, two, -two)]
+            first = [(ends[0][i] - ends[1][i]) / (2 * one) for i in (0, 1)]
+            second = [(ends[2][i] - 2 * exact[i] + ends[3][i]) / two**2 for i in (0, 1)]
+            size = 1.0 + max(abs(float(x)) for x in (*first, *second))
+            worth = PATH * size / float(abs(mp.sin(exact[1] - exact[0]))) ** 2 * (d + a + b + c) ** 2 / e**2
+            for bar, i in ((3, 0), (4, 1)):
+                assert abs(mp.mpc(mp.cos(exact[i]), mp.sin(exact[i])) - complex(unit[bar])) <= worth
+                assert abs(first[i] - float(k[bar - 2][0])) <= worth
+                assert abs(second[i] - float((k.dh3, k.dh4)[i][0])) <= worth
+            assert abs((1 - first[0]) - float(k.h23[0])) <= worth
+            assert abs((first[1] - first[0]) - float(k.h43[0])) <= worth
+            assert abs(mp.sin(exact[1] - exact[0]) - float(ours.at.sin_mu[0])) <= worth
+        assert k.h2 == 1.0 and k.dh2 == 0.0 and abs(ours.at.u2[0] - np.exp(1j * theta_2)) <= 4 * EPS
+
+
+def J_of(linkage: fourbar.FourBar, state: State) -> np.ndarray:
+    """The equivalent inertia of all bars, kg m^2."""
+    return np.asarray(sum(inertia(linkage.input.length, bodies(linkage), state.at, state.k)))
+
+
+def slope_of(linkage: fourbar.FourBar, state: State) -> np.ndarray:
+    """Its derivative by the independent angle."""
+    return np.asarray(2.0 * half_slope(linkage.input.length, bodies(linkage), state.at, state.k))
+
+
+@pytest.mark.parametrize("lengths", SHAPES.values(), ids=SHAPES.keys())
+def test_equivalent_inertia_is_that_of_the_kinetic_energy(lengths: tuple[float, ...]) -> None:
+    """J against the speeds of the mass centres, J' against its difference, both also in another coordinate."""
+    linkage = of(lengths)
+    theta_2 = linkage.ground_angle + np.array([0.7, 2.5, 4.6])
+    state = state_of(linkage, theta_2, 1, 3.0)
+    energy = np.zeros(3)
+    for number in (2, 3, 4):
+        bar = linkage.bar(number)
+        v = np.abs(state.velocity(number, bar.to_centre))
+        energy += 0.5 * bar.mass * v**2 + 0.5 * bar.moment_of_inertia * np.asarray(state.omega(number)) ** 2
+    ok = np.isfinite(state.at.u3)
+    assert ok.any()
+    J, slope = J_of(linkage, state), slope_of(linkage, state)
+    assert 0.5 * J[ok] * 3.0**2 == pytest.approx(energy[ok], rel=1e-13)
+    step = 1e-5
+    ahead, back = (J_of(linkage, state_of(linkage, theta_2 + s, 1)) for s in (step, -step))
+    assert slope[ok] == pytest.approx(((ahead - back) / (2 * step))[ok], abs=1e-6 * float(np.max(J[ok])))
+    # q = theta_4: the chain rule, on the path that reads the loop from bar 4
+    rate, bend = state.k.h4, state.k.dh4
+    backwards = path(state.lengths, linkage.ground_angle, 4)
+    q = np.angle(state.at.u4)
+    half = backwards.half_angle(q)
+    for sign in (1.0, -1.0):
+        at, k = backwards.motion(backwards.position(q, half, sign), sign)
+        same = ok & (np.abs(at.u2 - state.at.u2) < 1e-9)
+        other = State(state.lengths, linkage.ground_angle, theta_2, at, k, 1.0, rates(k, 1.0, 0.0))
+        expected = ((slope - 2.0 * J * bend / rate) / rate**3)[same]
+        size = float(np.max(np.abs(expected), initial=0.0))
+        assert J_of(linkage, other)[same] == pytest.approx((J / rate**2)[same], rel=1e-12)
+        assert slope_of(linkage, other)[same] == pytest.approx(expected, rel=1e-10, abs=1e-10 * size)
+        ok = ok & ~same
+    assert not ok.any()
+
+
+def test_bars_whose_inertia_about_the_pin_is_one() -> None:
+    """A crank with I = 1 kg m^2, without mass: J = 1 and J' = 0 whatever the position."""
+    linkage = fourbar.FourBar(0.3, fourbar.Bar(0.1, 0.0, 1.0), fourbar.Bar(0.25), fourbar.Bar(0.22))
+    state = state_of(linkage, np.linspace(0.0, 6.0, 5), 1)
+    assert np.array_equal(np.broadcast_to(J_of(linkage, state), 5), np.ones(5)) and not slope_of(linkage, state).any()
+    rocker = fourbar.FourBar(0.3, fourbar.Bar(0.1), fourbar.Bar(0.25), fourbar.Bar(0.22, 0.0, 1.0))
+    k = state_of(rocker, np.linspace(0.0, 6.0, 5), 1).k
+    state = state_of(rocker, np.linspace(0.0, 6.0, 5), 1)
+    assert np.array_equal(J_of(rocker, state), k.h4**2)
+    assert np.array_equal(slope_of(rocker, state), 2.0 * (k.h4 * k.dh4))
+
+
+@pytest.mark.parametrize("drive", [2, 3, 4])
+def test_springs_tables_and_rest_have_the_torque_of_the_thirteen_equations(drive: int) -> None:
+    """What depends on O4, on theta_2 and on rest next to motion, in one sweep."""
+    linkage = of(SHAPES["crank-rocker"])
+    ends = fourbar.effects.Point(1, 0.2, 0.3), fourbar.effects.Point(4, 0.15, 0.2)
+    table = fourbar.effects.Table((0.0, 2.0, 6.0), (1.0, 3.0, -1.0))
+    loads = (fourbar.Load(3, (2.0, 0.3), (0.1, 2.0), 0.4, table=table),)
+    effects = (
+        fourbar.effects.Springs((fourbar.effects.Spring(*ends, 300.0, 0.05),)),
+        fourbar.Friction.at(O2=0.1, B=0.3),
+    )
+    omega = np.array([0.0, 3.0, -3.0, 0.0, 1.0])
+    at = Command(np.linspace(0.2, 5.5, 5), np.ones(5, np.int8), omega, np.full(5, 4.0))
+    for terms in ((loads, effects), (loads, effects[:1]), ((), ())):
+        scene = fourbar.Scene(linkage, fourbar.Motion(0.0, 1.0), drive, *terms)
+        s = solve(scene, "force", at=at)
+        assert thirteen_equations(scene, at)["torque"] == pytest.approx(s.torque, rel=1e-11)
+        for i in range(5):  # one by one
+            alone = solve(scene, "force", at=some_of(at, np.arange(5) == i)).torque
+            assert alone[0] == pytest.approx(s.torque[i], rel=1e-13)
+    state = state_at(scene, at)
+    assert Actions(state, bodies(linkage)).work() == (0.0, 0.0)
+
+
+def test_a_free_linkage_needs_no_torque() -> None:
+    """Of the thirteen equations at the acceleration with which it begins to move."""
+    linkage = of(SHAPES["crank-rocker"])
+    angles, gravity = np.linspace(0.2, 5.5, 5), (fourbar.Gravity(),)
+    alpha = np.array([free_acceleration(linkage, float(q), 3.0, 1, gravity) for q in angles])
+    at = Command(angles, np.ones(5, np.int8), 3.0, alpha)
+    scene = fourbar.Scene(linkage, fourbar.Motion(0.0, 3.0), effects=gravity)
+    theirs, state = thirteen_equations(scene, at), state_at(scene, at)
+    size = np.hypot(*theirs["F32"].T) * max(linkage.lengths) + np.abs(J_of(linkage, state) * alpha)
+    assert np.all(np.abs(theirs["torque"]) <= 1e-13 * size)
+
+
+def test_positions_that_do_not_close_and_limits_are_quiet() -> None:
+    linkage = of((0.3, 0.25, 0.1, 0.22, 0.4))
+    limit = limit_positions(linkage)[0].theta_2
+    state = state_of(linkage, np.array([limit, 0.4 + np.pi, 0.4]), 1, 3.0, 4.0)
+    assert np.isnan(state.at.u3[1:]).all() and not np.isfinite(state.k.h3[1:]).any()
+    for number in (1, 2):
+        motion = fourbar.Motion(fourbar.FromLimit(number), 3.0, 4.0)
+        effects = (fourbar.Gravity(), fourbar.Viscous.at(B=0.1))
+        s = solve(fourbar.Scene(linkage, motion, effects=effects))
+        assert s.status == ["singular"] and s.sin_mu[0] == 0.0 and np.isfinite(s.theta_3).all()
+        assert np.isnan(s.omega_3).all() and np.isnan(s.torque).all()
+
+
+@pytest.mark.parametrize(
+    "lengths", [(2, 1, 2, 1), (1, 1, 2, 2), (2, 1, 1, 2), (2, 1, 4, 3), (3, 1, 2, 2), (1, 1, 1, 1)]
+)
+def test_followed_through_change_points_it_is_the_smooth_path(lengths: tuple[float, ...]) -> None:
+    """The sign that a free motion follows is that of the sweep, and no bar jumps: it turns as its coefficient says."""
+    linkage = of((*lengths, 0.4))
+    q = 0.4 + np.linspace(0.1, 12.0, 4001)
+    branch = on_smooth_path(linkage, q, 1)
+    assert (branch == -1).any()
+    found = smooth_branch(loop(*map(float, lengths)), q - 0.4, float(branch[0]))
+    assert np.array_equal(found, branch)
+    state, step = state_of(linkage, q, found), q[1] - q[0]
+    for u, h, dh in ((state.at.u3, state.k.h3, state.k.dh3), (state.at.u4, state.k.h4, state.k.dh4)):
+        turned = np.angle(u[1:] / u[:-1])
+        bent = np.maximum(np.abs(dh[1:]), np.abs(dh[:-1]))
+        middle = 0.5 * (h[1:] + h[:-1])
+        assert np.all(np.abs(turned - middle * step) <= bent * step**2 + 1e-12)
+
+
+def test_what_touches_is_up_to_the_rounding_of_the_lengths() -> None:
+    """The lengths add up to 2: what misses a change point by 2 U = EPS touches, by twice that it does not."""
+    exact, beyond = (0.5, 0.5 + EPS, 0.5, 0.5), (0.5, 0.5 + 2 * EPS, 0.5, 0.5)
+    for lengths, touches in ((exact, True), (beyond, False)):
+        assert (_meeting(loop(*lengths)).E1 == 0.0) == touches
+        assert (_meeting(loop(*lengths)).E2 == 0.0) == touches
+        assert loop(*lengths).E1 < 0.0
+    wide = loop(0.3, 0.1, 0.25, 0.22)
+    assert _meeting(wide) == wide
+    products = 0.47**2 - 0.4**2, 0.2**2 - 0.03**2
+    assert wide[4:] == pytest.approx(products)
+
+
+def test_half_angles_keep_their_digits_after_many_turns() -> None:
+    """sin^2 h, cos^2 h and their product near the zeros, and the factors of Heron's formula."""
+    shape = loop(0.3, 0.1, 0.25, 0.22)
+    for turns in (0, 3, 800, -800):
+        psi = 2.0 * np.pi * turns + np.array([1e-9, 0.7, np.pi + 1e-9])
+        found = half_angle(shape, psi)
+        with mp.workdps(50):
+            d, a, b, c = (mp.mpf(x) for x in shape[:4])
+            for i, x in enumerate(psi.tolist()):
+                s, k = mp.sin(mp.mpf(x) / 2), mp.cos(mp.mpf(x) / 2)
+                e2 = (d - a) ** 2 + 4 * a * d * s * s
+                exact = (s * s, k * k, s * k, (b + c) ** 2 - e2, e2 - (b - c) ** 2)
+                for ours, theirs in zip(found, exact, strict=True):
+                    assert abs(mp.mpf(float(ours[i])) / theirs - 1) <= 8 * EPS
+
+
+def test_directions_are_unit_vectors_and_the_last_rate_is_that_of_bar_4_against_bar_3() -> None:
+    lengths = (0.3, 0.3 + 1e-9, 0.25, 0.25 - 1e-9)  # A passes O4 at a billionth of the bars
+    q = np.concatenate([np.linspace(0.3, 1.5, 20), np.linspace(-1e-8, 1e-8, 40)])
+    for sign in (1, -1):
+        state = state_of(of((*lengths, 0.0)), q, sign)
+        k, closed = state.k, np.isfinite(state.k.h3)
+        assert closed.sum() > 30 and closed[:20].all()
+        for u in (state.at.u2, state.at.u3, state.at.u4):
+            assert np.all(np.abs(np.abs(u[closed]) - 1.0) <= 2 * EPS)
+        assert np.all(np.abs(k.h43 - (k.h4 - k.h3))[:20] <= 64 * EPS * (np.abs(k.h3) + np.abs(k.h4))[:20])
+
+
+@pytest.mark.parametrize("drive", [2, 3, 4])
+def test_a_drive_shares_the_power_of_the_input(drive: int) -> None:
+    """T_k omega_k is one power, whichever bar is driven."""
+    linkage, terms, at = random_case(np.random.default_rng(7))
+    at = some_of(at, solve(fourbar.Scene(linkage), "position", at=at).condition > 0.2)
+    s, two = (
+        solve(fourbar.Scene(linkage, fourbar.Motion(0.0, 1.0), bar, terms[:3], terms[3:]), "force", at=at)
+        for bar in (drive, 2)
+    )
+    rate = getattr(s, f"omega_{drive}")
+    assert len(s) > 5 and s.torque * rate == pytest.approx(two.torque * at.omega_2, rel=1e-13)
+    assert driving_torque(state_at(fourbar.Scene(linkage), at).k, 2, 3.0, 1.0) == 2.0
+
+
+def test_a_single_pendulum() -> None:
+    """Of a crank alone: T = (I + m r^2) alpha + m g r cos(theta_2 + phi); of bars without mass none."""
+    m, r, phi = 0.7, 0.04, 0.5
+    linkage = fourbar.FourBar(0.3, fourbar.Bar(0.1, m, 1e-3, (r, phi)), fourbar.Bar(0.25), fourbar.Bar(0.22))
+    for alpha in (0.0, 5.0):
+        motion = fourbar.Motion(np.linspace(0.0, 6.0, 13), 3.0, alpha)
+        s = solve(fourbar.Scene(linkage, motion, effects=(fourbar.Gravity(),)), "force")
+        expected = (1e-3 + m * r * r) * alpha + m * 9.81 * r * np.cos(s.theta_2 + phi)
+        assert s.torque == pytest.approx(expected, rel=0.0, abs=16 * EPS * m * 9.81 * r)
+
+
+def test_a_parallelogram_moves_its_coupler_without_turning_it() -> None:
+    """T = (I2 + I4 about the pins + m3 a^2) alpha + the weights at their arms, m3 at A and its own arm at none."""
+    a, m2, m3, m4 = 0.1, 0.2, 0.5, 0.4
+    bars = fourbar.Bar(a, m2), fourbar.Bar(0.3, m3, None, (0.2, 1.0)), fourbar.Bar(a, m4)
+    motion = fourbar.Motion(np.linspace(0.2, 2.9, 13), 3.0, 5.0)
+    s = solve(fourbar.Scene(fourbar.FourBar(0.3, *bars), motion, effects=(fourbar.Gravity(),)), "force")
+    J = (m2 + m4) * a**2 / 3.0 + m3 * a**2
+    weight = 9.81 * (0.5 * m2 + m3 + 0.5 * m4) * a
+    assert s.torque == pytest.approx(J * 5.0 + weight * np.cos(s.theta_2), rel=0.0, abs=16 * EPS * (weight + J * 5.0))

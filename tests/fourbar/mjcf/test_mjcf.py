@@ -1,0 +1,257 @@
+"""The MJCF on its own: exact numbers, clear refusals, and a file that runs in plain MuJoCo."""
+
+import math
+from pathlib import Path
+from xml.etree import ElementTree as ET
+
+import mujoco
+import numpy as np
+import pytest
+
+import fourbar
+from fourbar.effects import Torsion
+from fourbar.mjcf import Settings, defaults_used, mjcf, scene_from_lengths
+from fourbar.mjcf.document import SETTLING
+from fourbar_validation.scenes.suites import model_files
+from tests.support.scenes import crank_rocker, thesis
+
+SPEED = 1e-2
+"""The promise of the file: the input within 1 % of omega_2 over a revolution or its range."""
+GAP = 1e-4
+"""The promise of the file: the loop closed within this part of the longest bar."""
+SHORT_OF_LIMIT = math.radians(2.0)
+SEED = 20261121
+
+
+def limits(d: float, a: float, b: float, c: float) -> tuple[float, float] | None:
+    """The input's range about theta_1 by the cosine rule, both ends 2 deg short; None: change point or no range."""
+    cosines = [(a * a + d * d - e * e) / (2 * a * d) for e in (abs(b - c), b + c)]
+    least, most = (math.acos(x) if abs(x) < 1 else None for x in cosines)
+    if least is None and most is None:
+        return (0.0, 2 * math.pi) if cosines[0] > 1 and cosines[1] < -1 else None
+    if least is None:
+        assert most is not None
+        ends = (-most, most)
+    else:
+        ends = (least, 2 * math.pi - least if most is None else most)
+    start, stop = ends[0] + SHORT_OF_LIMIT, ends[1] - SHORT_OF_LIMIT
+    return (start, stop) if stop - start > SHORT_OF_LIMIT else None
+
+
+def random_scene(rng: np.random.Generator) -> tuple[str, fourbar.Scene]:
+    """Lengths from 5 mm to 100 m, bars ten times lighter or heavier, any speed, branch and direction."""
+    while True:
+        lengths = 10 ** rng.uniform(math.log10(0.005), 2) * np.exp(rng.uniform(-1.2, 1.2, 4))
+        d, a, b, c = (float(x) for x in np.clip(lengths, 0.005, 100.0))
+        total, shortest, longest = d + a + b + c, min(d, a, b, c), max(d, a, b, c)
+        margin = 2 * (shortest + longest) - total
+        window = limits(d, a, b, c) if 2 * longest < 0.999 * total and abs(margin) > 0.01 * total else None
+        if window is not None:
+            break
+    theta_1 = float(rng.uniform(-3, 3))
+    bars = [
+        fourbar.Bar(x, x * float(10 ** rng.uniform(-1, 1)), None, (x * float(rng.uniform(0, 1.2)), float(rng.normal())))
+        for x in (a, b, c)
+    ]
+    linkage = fourbar.FourBar(d, bars[0], bars[1], bars[2], theta_1)
+    omega = float(10 ** rng.uniform(-1, 2.5) * rng.choice([-1, 1]))
+    sweep = fourbar.Sweep(theta_1 + window[0], theta_1 + window[1], 90)
+    motion = fourbar.Motion(sweep, omega, 0.0, int(rng.choice([1, -1])))
+    effects = (fourbar.Gravity(),) if rng.random() < 0.5 else ()
+    kind = ("Grashof" if margin < 0 else "not Grashof") + ", shortest " + "dabc"[int(np.argmin([d, a, b, c]))]
+    return kind, fourbar.Scene(linkage, motion, effects=effects)
+
+
+def run_alone(scene: fourbar.Scene) -> tuple[float, float, float]:
+    """Plain MuJoCo from keyframe 0 through the sweep: worst gap, worst speed, angle still missing at the end."""
+    assert isinstance(scene.motion.theta_2, fourbar.Sweep) and scene.motion.omega_2 is not None
+    model = mujoco.MjModel.from_xml_string(mjcf(scene))
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, 0)
+    start, stop, omega = scene.motion.theta_2.start, scene.motion.theta_2.stop, scene.motion.omega_2
+    gap = speed = 0.0
+    for _ in range(round((stop - start) / abs(omega) / model.opt.timestep)):
+        mujoco.mj_step(model, data)
+        gap = max(gap, math.dist(data.site("B3").xpos, data.site("B4").xpos) / max(scene.linkage.lengths))
+        speed = max(speed, abs(data.qvel[0] / omega - 1.0))
+    return gap, speed, abs(data.qpos[0] - (stop if omega > 0 else start)) / (stop - start)
+
+
+def test_runs_alone() -> None:
+    rng, kinds = np.random.default_rng(SEED), set()
+    for _ in range(40):
+        kind, scene = random_scene(rng)
+        kinds.add(kind)
+        gap, speed, missing = run_alone(scene)
+        assert gap <= GAP and speed <= SPEED and missing <= SPEED, (kind, scene, gap, speed, missing)
+    assert len(kinds) == 8
+
+
+OPEN = 1e-9
+"""m; of the loop as the file opens: sixteen roundings of 100 m are 4e-13 m."""
+LAG = 1e-3
+"""Of the crank behind omega_2 t, beyond the settling of its drive, in timesteps."""
+
+
+def opened(scene: fourbar.Scene) -> tuple[mujoco.MjModel, mujoco.MjData]:
+    """As MuJoCo's viewer does it: no keyframe, no control."""
+    model = mujoco.MjModel.from_xml_string(mjcf(scene))
+    data = mujoco.MjData(model)
+    mujoco.mj_resetData(model, data)
+    mujoco.mj_forward(model, data)
+    return model, data
+
+
+def gap(data: mujoco.MjData) -> float:
+    return math.dist(data.site("B3").xpos, data.site("B4").xpos)
+
+
+def sprung() -> fourbar.Scene:
+    """Springs that count whole turns: the joints start where those put them, far from the angles' first turn."""
+    springs = Torsion.at(O2=(0.1, 9.0, 0.0), A=(0.1, -12.0, 0.0))
+    return crank_rocker(motion=fourbar.Motion(1.0, 10.0), effects=(springs,))
+
+
+def test_opens_assembled_and_moves_without_keyframe_or_control() -> None:
+    rng = np.random.default_rng(SEED)
+    scenes = [fourbar.load(file) for file in model_files()] + [sprung()]
+    for scene in [*scenes, *(random_scene(rng)[1] for _ in range(12))]:
+        model, data = opened(scene)
+        assert gap(data) < OPEN and (model.qpos0 == model.key_qpos[0]).all()
+        omega = scene.motion.omega_2
+        assert omega and not data.qvel.any() and not data.ctrl.any()
+        # a second, or what is left of the range where it ends before
+        travel = scene.motion.theta_2
+        travelled = 0.9 * (travel.stop - travel.start) if isinstance(travel, fourbar.Sweep) else 0.5
+        steps = int(min(1.0, travelled / abs(omega)) / model.opt.timestep)
+        worst = 0.0
+        for _ in range(steps):
+            mujoco.mj_step(model, data)
+            worst = max(worst, gap(data))
+        assert worst < GAP * max(scene.linkage.lengths), scene
+        turned = data.qpos[0] - model.qpos0[0]
+        assert turned == pytest.approx(
+            omega * (data.time - SETTLING * model.opt.timestep), abs=LAG * abs(omega) * model.opt.timestep
+        )
+
+
+def test_with_alpha_2_the_keyframe_keeps_it() -> None:
+    scene = crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.1, 2.0, 60), 10.0, 30.0), effects=())
+    model, data = opened(scene)
+    mujoco.mj_resetDataKeyframe(model, data, 0)
+    while data.qpos[0] < 2.0:
+        mujoco.mj_step(model, data)
+    assert data.qvel[0] ** 2 == pytest.approx(100.0 + 60.0 * (data.qpos[0] - 0.1), rel=1e-6)
+
+
+RELEASE = 1e-4
+"""rad, of a free motion of half a second at the file's own timestep; measured 1e-6."""
+
+
+@pytest.mark.parametrize("scale", (1.0, 0.01))
+def test_a_released_linkage_falls_by_itself(scale: float) -> None:
+    bars = [fourbar.Bar(scale * length, mass) for length, mass in ((0.1, 0.2), (0.25, 0.5), (0.22, 0.4))]
+    linkage = fourbar.FourBar(scale * 0.3, *bars, ground_angle=0.2)
+    motion = fourbar.Motion(0.5, 0.0, free=fourbar.Free(0.5 * math.sqrt(scale), 10))
+    scene = fourbar.Scene(linkage, motion, effects=(fourbar.Gravity(),))
+    model, data = opened(scene)
+    assert gap(data) < OPEN and model.nu == 0 and model.dof_armature[0] == 0.0
+    expected = fourbar.solve(scene)
+    assert expected.time is not None and np.ptp(expected.theta_2) > 0.5
+    for time, theta_2 in zip(expected.time[1:], expected.theta_2[1:], strict=True):
+        mujoco.mj_step(model, data, round((time - data.time) / model.opt.timestep))
+        assert data.qpos[0] + data.qvel[0] * (time - data.time) == pytest.approx(theta_2, abs=RELEASE)
+
+
+def test_past_a_limit_position_it_starts_anew_assembled(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What the viewer shows of an input that cannot turn fully: the same stretch again and again."""
+    monkeypatch.chdir(tmp_path)  # MuJoCo writes a log of its resets into the working folder
+    scene = thesis()
+    model, data = opened(scene)
+    assert scene.motion.omega_2
+    starts, last = 0, 0.0
+    for _ in range(int(2.0 * math.tau / scene.motion.omega_2 / model.opt.timestep)):
+        mujoco.mj_step(model, data)
+        if data.time < last:
+            starts += 1
+            assert gap(data) < GAP and abs(data.qpos[0] - model.qpos0[0]) < 0.01
+        last = data.time
+    assert starts >= 1
+
+
+def test_keyframe_is_on_the_requested_branch_and_closed() -> None:
+    for branch in (1, -1):
+        scene = crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.1, 6.0, 60), 10.0, 0.0, branch))
+        model = mujoco.MjModel.from_xml_string(mjcf(scene))
+        data = mujoco.MjData(model)
+        mujoco.mj_resetDataKeyframe(model, data, 0)
+        mujoco.mj_forward(model, data)
+        A, B, O4 = (data.site(name).xpos[:2] for name in ("A", "B3", "O4"))
+        diagonal, to_B = O4 - A, B - A
+        assert np.sign(diagonal[0] * to_B[1] - diagonal[1] * to_B[0]) == branch
+        # sixteen roundings of numbers below 1 m
+        assert math.dist(B, data.site("B4").xpos[:2]) < 16 * 2.0**-52
+        assert data.qpos[0] == 0.1 and data.qvel[0] == 10.0
+
+
+def test_numbers_survive_bit_for_bit() -> None:
+    scene = thesis()
+    model = mujoco.MjModel.from_xml_string(mjcf(scene))
+    for name, bar in (("input", scene.linkage.input), ("coupler", scene.linkage.coupler)):
+        assert model.body(name).mass[0] == bar.mass
+        assert model.body(name).inertia[2] == bar.moment_of_inertia
+    assert model.site("A").pos[0] == scene.linkage.input.length
+    assert not model.opt.gravity.any()
+
+
+def test_shapes_add_no_mass_and_change_no_bit() -> None:
+    text = mjcf(crank_rocker())
+    bare = ET.fromstring(text)
+    for body in bare.iter("body"):
+        for geom in body.findall("geom"):
+            body.remove(geom)
+    states = []
+    for xml in (text, ET.tostring(bare, encoding="unicode")):
+        model = mujoco.MjModel.from_xml_string(xml)
+        data = mujoco.MjData(model)
+        mujoco.mj_resetDataKeyframe(model, data, 0)
+        mujoco.mj_step(model, data, 200)
+        states.append((*data.qpos, *data.qvel))
+    assert states[0] == states[1]
+
+
+@pytest.mark.parametrize("title", ["</mujoco>\"'&<!-- -->", "a\x00b\x1b[31m\n\t", "\ud800", "é" * 10_000, ""])
+def test_hostile_titles(title: str) -> None:
+    mujoco.MjModel.from_xml_string(mjcf(crank_rocker(title=title)))
+
+
+@pytest.mark.parametrize(("mass", "inertia"), [(0.0, None), (1e-16, 1.0), (1.0, 1e-16)])
+def test_massless_bar_is_refused_in_one_line(mass: float, inertia: float | None) -> None:
+    linkage = fourbar.FourBar(0.3, fourbar.Bar(0.1, 1.0), fourbar.Bar(0.25, mass, inertia), fourbar.Bar(0.22, 1.0))
+    with pytest.raises(fourbar.InputError, match=r"^bars\.coupler\..*massless[^\n]*$"):
+        mjcf(crank_rocker(linkage=linkage))
+
+
+@pytest.mark.parametrize("omega", [None, 0.0])
+def test_at_rest_a_file_is_written_that_stays_at_rest(omega: float | None) -> None:
+    scene = crank_rocker(motion=fourbar.Motion(1.0, omega), loads=(), effects=())
+    model = mujoco.MjModel.from_xml_string(mjcf(scene))
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, 0)
+    mujoco.mj_step(model, data, 100)
+    assert np.abs(data.qvel).max() < 1e-9  # rounding of the keyframe's gap, nothing else moves it
+
+
+def test_from_lengths_alone() -> None:
+    scene = scene_from_lengths(0.3, 0.1, 0.25, 0.22)
+    assert (scene.motion.omega_2, scene.motion.branch) == (1.0, 1)
+    assert scene.linkage.coupler.mass == 0.25
+    mujoco.MjModel.from_xml_string(mjcf(scene))
+    assert all("\n" not in line for line in defaults_used(scene))
+
+
+def test_without_keyframe_no_position_is_written() -> None:
+    text = mjcf(crank_rocker(), Settings(timestep=1e-3), keyframe=False)
+    assert mujoco.MjModel.from_xml_string(text).nkey == 0
+    with pytest.raises(fourbar.InputError, match="timestep"):
+        mjcf(crank_rocker(), keyframe=False)

@@ -1,0 +1,261 @@
+"""The model files of `fourbar mjcf --for` and `fourbar sdf`, loaded, stepped and read as their comments say."""
+
+import cmath
+import importlib
+import re
+import tempfile
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree as ET
+
+import numpy as np
+import pytest
+
+import fourbar
+from fourbar.effects import Torsion
+from fourbar.errors import LimitError
+from fourbar.mjcf import SIMULATORS, mjcf_for
+from fourbar.mjcf.sdf import sdf
+from fourbar.mjcf.usd import usd
+from fourbar.scene import Command, Scene
+from fourbar_validation.compare.answer import Array
+from tests.support.scenes import crank_rocker
+
+STEPS = 20
+
+
+def ours(scene: Scene, q: Array, v: Array, a: Array) -> Any:
+    """The formulas at the simulator's own angle, speed and acceleration."""
+    at = Command(np.array([q[0]]), np.array([1]), np.array([v[0]]), np.array([a[0]]))
+    return fourbar.solve(scene, "force", at=at)
+
+
+def errors(scene: Scene, q: Array, v: Array, a: Array, torque: float, force: Array) -> tuple[float, float]:
+    """Of T2 and of the pin force at B, by their greatest value in a turn."""
+    expected, turn = ours(scene, q, v, a), fourbar.solve(scene, "force")
+    assert turn.torque is not None and turn.F43 is not None
+    return (
+        abs(torque - expected.torque[0]) / np.abs(turn.torque).max(),
+        float(np.hypot(*(force - expected.F43[0])) / np.hypot(*turn.F43.T).max()),
+    )
+
+
+def read_mujoco(text: str, forward: int) -> tuple[Array, Array, Array, float, Array]:
+    """As the comment of the file says."""
+    mujoco = pytest.importorskip("mujoco")
+    model = mujoco.MjModel.from_xml_string(text)
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, 0)
+    mujoco.mj_step(model, data, STEPS)
+    for _ in range(forward):
+        mujoco.mj_forward(model, data)
+    torque = data.actuator_force[model.actuator("drive").id] - model.dof_armature[0] * data.qacc[0]
+    return data.qpos, data.qvel, data.qacc, float(torque), data.efc_force[:2]
+
+
+def read_warp(text: str, forward: int) -> tuple[Array, Array, Array, float, Array]:
+    """As the comment of the file says; the kernels compile for minutes the first time."""
+    mjw = pytest.importorskip("mujoco_warp")
+    mujoco = importlib.import_module("mujoco")
+    model = mujoco.MjModel.from_xml_string(text)
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, 0)
+    mujoco.mj_forward(model, data)
+    theirs, state = mjw.put_model(model), mjw.put_data(model, data)
+    for _ in range(STEPS):
+        mjw.step(theirs, state)
+    for _ in range(forward):
+        mjw.forward(theirs, state)
+    q, v, a, drive = (x.numpy()[0].astype(float) for x in (state.qpos, state.qvel, state.qacc, state.actuator_force))
+    torque = drive[model.actuator("drive").id] - model.dof_armature[0] * a[0]
+    return q, v, a, float(torque), state.efc.force.numpy()[0, :2].astype(float)
+
+
+def read_mjx(text: str, steps: int) -> tuple[Array, Array, Array, float, Array]:
+    """As the comment of the file says."""
+    mjx = pytest.importorskip("mujoco.mjx")
+    mujoco, jax = importlib.import_module("mujoco"), importlib.import_module("jax")
+    jax.config.update("jax_enable_x64", True)
+    model = mujoco.MjModel.from_xml_string(text)
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, 0)
+    theirs, state, step = mjx.put_model(model), mjx.put_data(model, data), jax.jit(mjx.step)
+    for _ in range(steps):
+        state = step(theirs, state)
+    state = jax.jit(mjx.forward)(theirs, state)
+    q, v, a, drive = (np.array(x, dtype=float) for x in (state.qpos, state.qvel, state.qacc, state.actuator_force))
+    torque = drive[model.actuator("drive").id] - model.dof_armature[0] * a[0]
+    closing = getattr(state, "_impl", state).efc_force
+    return q, v, a, float(torque), np.array(closing, dtype=float)[:2]
+
+
+EXACT = 1e-6
+"""Of MuJoCo's closing force and torque at its own state, 20 steps from the start; measured 1e-7."""
+
+
+def test_mujoco_reads_as_the_comment_says() -> None:
+    scene = crank_rocker()
+    text = mjcf_for(scene)
+    assert max(errors(scene, *read_mujoco(text, forward=1))) < EXACT
+    assert max(errors(scene, *read_mujoco(text, forward=0))) > 1e3 * EXACT, "the step alone leaves them of the old time"
+    names = (r"mj_forward", r"actuator_force\[drive\]", r"dof_armature\[O2\]", r"efc_force\[0\]")
+    assert all(re.search(name, text) for name in names)
+
+
+SINGLE = 1e-2
+"""Of MuJoCo Warp: single precision in a closure of impedance 0.9999 keeps 1e4 roundings; measured 2.5e-3 in a turn."""
+YIELDING = 1e-2
+"""Of MJX, whose closure makes up for the missing term by yielding; measured 8.5e-4 in a turn."""
+
+
+def test_warp_reads_as_the_comment_says() -> None:
+    scene = crank_rocker()
+    text = mjcf_for(scene, "warp")
+    assert max(errors(scene, *read_warp(text, forward=2))) < SINGLE
+    assert "forward twice" in text
+
+
+def test_mjx_reads_as_the_comment_says() -> None:
+    scene = crank_rocker()
+    assert max(errors(scene, *read_mjx(mjcf_for(scene, "mjx"), STEPS))) < YIELDING
+    assert max(errors(scene, *read_mjx(mjcf_for(scene, "mjx"), 0))) > 0.1, "a state that was only set"
+
+
+@pytest.mark.parametrize("simulator", SIMULATORS)
+def test_each_file_loads_in_mujoco_and_runs(simulator: str) -> None:
+    """Single precision, pads or none: MuJoCo itself carries all of them."""
+    scene = crank_rocker()
+    assert max(errors(scene, *read_mujoco(mjcf_for(scene, simulator), forward=1))) < CARRIED
+
+
+CARRIED = 2e-3
+"""Of a closure with a time constant of two timesteps; measured 1.4e-3, the others 1e-5 and less."""
+
+
+def released(**changes: Any) -> Scene:
+    """A linkage let go under its weight, with a damper."""
+    motion = fourbar.Motion(1.0, 3.0, free=fourbar.Free(0.2, 2))
+    effects = (fourbar.Gravity(), fourbar.Viscous.at(O2=0.05))
+    return crank_rocker(**({"motion": motion, "effects": effects, "loads": ()} | changes))
+
+
+FIRST_ORDER = 0.5
+"""Drake's discrete plant errs as its step: half the step leaves half the error, within this factor of two."""
+
+
+FORCE = 0.01
+"""Of Drake's reaction at A after 200 steps of 1 ms, of first order; measured 1.1e-3."""
+
+
+def test_drake_loads_the_sdf_and_moves_as_released() -> None:
+    pytest.importorskip("pydrake")
+    plants, parsing = (importlib.import_module(f"pydrake.multibody.{name}") for name in ("plant", "parsing"))
+    simulator = importlib.import_module("pydrake.systems.analysis").Simulator
+    scene = released()
+    text = sdf(scene, "drake")
+    theta_2, theta_3, _, *speeds = (float(x) for x in re.findall(r"(-?[\d.]+(?:e-?\d+)?) rad", text))
+    ours, missed, pulls = fourbar.solve(scene), [], []
+    for step in (1e-3, 5e-4):
+        plant = plants.MultibodyPlant(step)
+        plant.set_discrete_contact_approximation(plants.DiscreteContactApproximation.kSap)
+        parsing.Parser(plant).AddModelsFromString(text, "sdf")
+        plant.mutable_gravity_field().set_gravity_vector([0.0, -9.81, 0.0])
+        plant.Finalize()
+        context = plant.CreateDefaultContext()
+        for name, speed in zip(("O2", "A", "O4"), speeds, strict=True):
+            plant.GetJointByName(name).set_angular_rate(context, speed)
+        simulator(plant, context).AdvanceTo(0.2)
+        missed.append(theta_2 + plant.GetJointByName("O2").get_angle(context) - ours.theta_2[-1])
+        joint = plant.GetJointByName("A")
+        on_3 = plant.get_reaction_forces_output_port().Eval(context)[int(joint.index())].translational()[:2]
+        turned = theta_3 + plant.GetJointByName("O2").get_angle(context) + joint.get_angle(context)
+        pulls.append(abs(complex(*on_3) * cmath.exp(1j * turned) + complex(*ours.F32[-1])))
+    assert pulls[0] < FORCE * abs(complex(*ours.F32[-1])), "the force at A as the comment says"
+    assert abs(missed[1]) < 1e-2 and missed[1] / missed[0] == pytest.approx(0.5, rel=FIRST_ORDER)
+
+
+def test_sdf_closes_its_loop_and_keeps_masses() -> None:
+    scene = released()
+    root = ET.fromstring(sdf(scene))
+    pose = {link.get("name"): [float(x) for x in str(link.findtext("pose")).split()] for link in root.iter("link")}
+    joints = {joint.get("name"): joint for joint in root.iter("joint")}
+    assert set(joints) == {"ground_on_world", "O2", "A", "O4", "B"}
+    ends = []
+    for name, bar in (("coupler", scene.linkage.coupler), ("output", scene.linkage.output)):
+        x, y, *_, turn = pose[name]
+        ends.append(complex(x, y) + cmath.rect(bar.length, turn))
+    assert abs(ends[0] - ends[1]) < 1e-15 * 8
+    assert float(str(joints["B"].findtext("pose")).split()[0]) == scene.linkage.coupler.length
+    assert float(str(joints["O2"].findtext("axis/dynamics/damping"))) == 0.05
+    assert [float(str(x.text)) for x in root.iter("mass")][1:] == [scene.linkage.bar(bar).mass for bar in (2, 3, 4)]
+
+
+def test_sdf_refuses_what_it_cannot_hold() -> None:
+    with pytest.raises(LimitError, match="load"):
+        sdf(crank_rocker(loads=(fourbar.Load(4, moment=1.0),)))
+    with pytest.raises(LimitError, match="torsion"):
+        sdf(released(effects=(Torsion.at(O2=(1.0, 0.0, 0.0)),)), "drake")
+    with pytest.raises(LimitError, match="pin B"):
+        sdf(released(effects=(fourbar.Viscous.at(B=1.0),)), "drake")
+
+
+def points(text: str, name: str) -> list[complex]:
+    """The points of that name in a USD file, in the order in which they stand there."""
+    found = re.findall(rf"{name} = \((\S+), (\S+), 0\)", text)
+    return [complex(float(x), float(y)) for x, y in found]
+
+
+def test_usd_closes_its_loop_keeps_masses_and_refuses_what_it_cannot_hold() -> None:
+    scene = released(effects=(fourbar.Gravity(),))
+    text, linkage = usd(scene), scene.linkage
+    turns = [2.0 * cmath.phase(complex(float(w), float(z)))
+             for w, z in re.findall(r"xformOp:orient = \((\S+), 0, 0, (\S+)\)", text)]  # fmt: skip
+    places = points(text, "xformOp:translate")
+    ends = [places[bar - 2] + cmath.rect(linkage.bar(bar).length, turns[bar - 2]) for bar in (2, 3, 4)]
+    assert abs(ends[0] - places[1]) < 8e-15 and abs(ends[1] - ends[2]) < 8e-15
+    fixed = [2.0 * cmath.phase(complex(float(w), float(z)))
+             for w, z in re.findall(r"localRot0 = \((\S+), 0, 0, (\S+)\)", text)]  # fmt: skip
+    between = [turns[0], turns[1] - turns[0], turns[2], turns[1] - turns[2]]
+    assert all(abs(one - other) < 8e-15 for one, other in zip(fixed, between, strict=True))
+    assert points(text, "localPos0")[1::2] == [linkage.input.length, linkage.output.length]
+    assert points(text, "localPos1") == [0.0, 0.0, 0.0, linkage.coupler.length]
+    assert re.findall(r'Joint "(\w+)"', text) == ["O2", "A", "O4", "B"] and text.count("Articulation = true") == 1
+    assert [float(x) for x in re.findall(r"physics:mass = (\S+)", text)] == [linkage.bar(n).mass for n in (2, 3, 4)]
+    for wrong in (crank_rocker(loads=(fourbar.Load(4, moment=1.0),)), released()):
+        with pytest.raises(LimitError, match="no counterpart in USD"):
+            usd(wrong)
+
+
+KAMINO = 0.01
+"""Of Kamino's force at B in its third step of 1 ms: single precision, and a first-order step; measured 1.5e-3."""
+
+
+def test_newton_loads_the_usd_and_reads_as_the_comment_says() -> None:
+    newton = pytest.importorskip("newton")
+    pytest.importorskip("newton_usd_schemas")
+    wheel = fourbar.Flywheel(100.0, 2)
+    scene = crank_rocker(effects=(fourbar.Gravity(), wheel), loads=(), motion=fourbar.Motion(1.0, 3.0))
+    text = usd(scene)
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "four_bar.usda"
+        file.write_text(text)
+        builder = newton.ModelBuilder()
+        builder.add_usd(str(file))
+    model = builder.finalize(device="cpu")
+    solver, now, then = newton.solvers.SolverKamino(model), model.state(), model.state()
+    *angles, omega_2, at_A, omega_4 = (float(x) for x in re.findall(r"= (-?[\d.]+(?:e-?\d+)?) rad", text)[:4] +
+                                       re.findall(r"joint (?:A|O4) (\S+) rad/s", text))  # fmt: skip
+    speeds = now.joint_qd.numpy()
+    speeds[:3] = omega_2, at_A, omega_4
+    now.joint_qd.assign(speeds)
+    newton.eval_fk(model, now.joint_q, now.joint_qd, now)
+    for _ in range(3):
+        turned = now.body_q.numpy().astype(float)
+        solver.step(now, then, model.control(), None, 1e-3)
+        now, then = then, now
+    row = solver._solver_kamino.data.joints.lambda_kin_j.numpy().astype(float)[15 + 1 : 15 + 3]
+    theta = 2.0 * np.arctan2(turned[:, 5], turned[:, 6])
+    force = complex(*row) * cmath.exp(1j * (theta[2] + angles[1] - angles[2]))
+    at = Command(theta[:1], np.array([1]), np.array([omega_2]), np.zeros(1))
+    expected = complex(*fourbar.solve(scene, "force", at=at).F43[0])
+    assert abs(force - expected) < KAMINO * abs(expected)

@@ -1,0 +1,415 @@
+"""Drawings: what they show against the formulas, that nothing overlaps, and that they reach the file whole."""
+
+import math
+import subprocess
+import sys
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.text import Text
+
+import fourbar
+from fourbar.effects import Effect, Flywheel, PinFriction, Point, Spring, Springs, Torsion
+from fourbar.effects.actions import bodies
+from fourbar.errors import DependencyError, InputError, NotAssembledError
+from fourbar.formulas.path import state
+from fourbar.formulas.torque import inertia
+from fourbar.scene.motion_law import Law
+from fourbar.show import plot
+from fourbar.show.duty import energies
+from fourbar.show.plot.curves import broken, limit_of, poles
+from fourbar.show.plot.figures import FIGURES, drawn
+from fourbar.show.plot.freebody import free_body
+from fourbar.show.plot.style import number, plain, unit_for
+from fourbar.show.plot.transmission import free_place
+from fourbar.show.plot.view import CLEAR, common_position, on_branch, view
+from tests.support.scenes import crank_rocker, thesis
+
+SIGNATURES = {"svg": b"<?xml", "png": b"\x89PNG", "pdf": b"%PDF"}
+BALANCE = 1e-12
+"""Force and moment sums of a free body, relative to their largest term: a few tens of roundings."""
+
+
+TOUCH = 1.0
+"""Boxes of texts may share this many pixels: a box is wider than its ink."""
+
+
+FULL_TURN = fourbar.Sweep(0.0, 2 * math.pi, 360)
+
+
+CRANK_ROCKER = crank_rocker()
+
+
+@cache
+def composed(scene, name, branches="one", position=None, units="SI"):
+    """A figure of a scene, composed once for all that look at it."""
+    return drawn(scene, name, position=position, branches=branches, units=fourbar.units(units)).figure
+
+
+@pytest.mark.parametrize("file_format", plot.FORMATS)
+def test_the_same_scene_gives_the_same_bytes(tmp_path: Path, file_format: str) -> None:
+    files = [tmp_path / f"{k}.{file_format}" for k in (1, 2)]
+    for path in files:
+        plot.draw(crank_rocker(), path, "linkage")
+    first, second = (path.read_bytes() for path in files)
+    assert first.startswith(SIGNATURES[file_format])
+    assert first == second
+    assert sorted(p.name for p in tmp_path.iterdir()) == sorted(p.name for p in files)  # nothing half-written
+
+
+def texts_shown(figure):
+    """Every text that reaches the paper, with its box in pixels."""
+    renderer = figure.canvas.get_renderer()
+    off_axis = set()
+    for axes in figure.axes:
+        for axis in (axes.xaxis, axes.yaxis):
+            low, high = sorted(axis.get_view_interval())
+            for tick in (*axis.get_major_ticks(), *axis.get_minor_ticks()):
+                if not axes.axison or not low - 1e-9 <= tick.get_loc() <= high + 1e-9:
+                    off_axis |= {tick.label1, tick.label2}
+        if not axes.axison:
+            off_axis |= {axes.xaxis.label, axes.yaxis.label}
+    found = figure.findobj(lambda artist: isinstance(artist, Text))
+    shown = [t for t in found if t.get_visible() and t.get_text().strip() and t not in off_axis]
+    return [(t.get_text(), t.get_window_extent(renderer)) for t in shown]
+
+
+def clashes(figure) -> list[tuple[str, str]]:
+    """Texts that cover each other."""
+    texts = texts_shown(figure)
+    return [
+        (p, q)
+        for k, (p, a) in enumerate(texts)
+        for q, b in texts[k + 1 :]
+        if min(a.x1, b.x1) - max(a.x0, b.x0) > TOUCH and min(a.y1, b.y1) - max(a.y0, b.y0) > TOUCH
+    ]
+
+
+@pytest.mark.parametrize("name", sorted(set(FIGURES) - {"energy"}))
+def test_every_figure_draws_both_branches_and_no_texts_overlap(name: str) -> None:
+    for scene, branches in ((CRANK_ROCKER, "both"), (thesis(), "one")):
+        figure = composed(scene, name, branches)
+        texts, page = texts_shown(figure), figure.bbox
+        assert len(texts) > 5
+        for text, box in texts:
+            assert page.x0 <= box.x0 and box.x1 <= page.x1 and page.y0 <= box.y0 and box.y1 <= page.y1, text
+        assert not clashes(figure)
+
+
+def test_no_text_stands_on_a_bar() -> None:
+    scene = fourbar.load(Path(__file__).parents[4] / "models" / "gallery" / "hoecken.toml")
+    figure = drawn(scene, "linkage", dimensions=True).figure
+    (axes,) = figure.axes
+    bars = [line.get_path().transformed(axes.transData) for line in axes.lines if line.get_linewidth() > 4.0]
+    boxes = [text.get_window_extent().padded(2.25 * figure.dpi / 72.0) for text in axes.texts]
+    assert len(bars) == 3 and len(boxes) > 8
+    assert not any(bar.intersects_bbox(box, filled=False) for bar in bars for box in boxes)
+
+
+def test_every_axis_of_theta_2_is_in_degrees_and_every_axis_has_a_unit() -> None:
+    figure = composed(CRANK_ROCKER, "overview")
+    flat = [axes for axes in figure.axes if axes.name == "rectilinear"]
+    assert len(flat) == 7
+    for axes in flat:
+        for label in (axes.get_xlabel(), axes.get_ylabel()):
+            assert label.endswith(")"), label
+        if "theta_2" in axes.get_xlabel():
+            assert axes.get_xlabel().endswith("(°)")
+            assert axes.get_xlim() == pytest.approx(np.degrees([0.1, 0.1 + 2 * math.pi]))
+
+
+def test_drawn_curves_are_those_of_the_solution() -> None:
+    scene = crank_rocker()
+    solution = fourbar.solve(scene)
+    axes = composed(scene, "kinematics").axes
+    drawn = {line.get_label(): line.get_ydata() for panel in axes for line in panel.lines}
+    np.testing.assert_allclose(drawn[r"$\theta_4$"], np.degrees(solution.theta_4))
+    np.testing.assert_allclose(drawn[r"$\omega_3$"], solution.omega_3)
+    np.testing.assert_allclose(drawn[r"$\alpha_4$"], solution.alpha_4)
+    torque = composed(scene, "torque").axes[0]
+    assert torque.get_ylabel() == "$T_2$ (mN m)"
+    np.testing.assert_allclose(torque.lines[1].get_ydata(), 1e3 * solution.torque)
+
+
+def test_bars_are_drawn_to_scale_at_the_requested_position() -> None:
+    scene = crank_rocker()
+    axes = composed(scene, "linkage", position=1.3).axes[0]
+    bars = [line for line in axes.lines if line.get_linewidth() == 4.5]
+    lengths = [float(np.hypot(*np.diff(line.get_xydata(), axis=0)[0])) for line in bars]
+    assert lengths == pytest.approx([100.0, 250.0, 220.0])  # mm
+    (x, y) = bars[0].get_xydata()[1]
+    assert math.atan2(y, x) == pytest.approx(1.3)
+    x_scale, y_scale = (np.diff(axes.transData.transform([(0, 0), step]), axis=0)[0] for step in ((1, 0), (0, 1)))
+    assert x_scale[0] == pytest.approx(y_scale[1])
+
+
+def test_positions_that_do_not_assemble_leave_a_gap_and_poles_cut_the_line() -> None:
+    shown = view(thesis(FULL_TURN))
+    panel = composed(thesis(FULL_TURN), "torque").axes[0]
+    curve = panel.lines[1]
+    closed = np.degrees(shown.sweep.theta_2[~shown.sweep.assembled])
+    assert closed.size > 30
+    at_closed = np.isin(curve.get_xdata(), closed)
+    assert np.all(np.isnan(curve.get_ydata()[at_closed]))
+    (pole,) = poles(shown)
+    # the torque of bar 4 diverges where omega_4 changes sign, bars 2 and 3 being in line
+    assert shown.sweep.omega_4[pole] * shown.sweep.omega_4[pole + 1] < 0
+    assert shown.sweep.torque[pole] * shown.sweep.torque[pole + 1] < 0
+    assert np.isnan(broken(shown.sweep.torque, np.array([pole]))[pole + 1])
+    _, top = panel.get_ylim()
+    assert top < np.nanmax(np.abs(shown.sweep.torque))
+    caption = " ".join(
+        t.get_text() for t in composed(thesis(FULL_TURN), "torque").findobj(lambda artist: isinstance(artist, Text))
+    )
+    assert "Torque clipped at" in caption.replace("\n", " ")
+
+
+def test_an_ordinary_curve_is_not_clipped() -> None:
+    assert limit_of([np.sin(np.linspace(0, 6, 100))]) is None
+    assert limit_of([1.0 / np.linspace(-1, 1, 100)]) is not None
+    assert limit_of([np.full(3, np.nan)]) is None
+
+
+def test_transmission_angle_marks_limits_and_dead_centres() -> None:
+    panel = composed(thesis(FULL_TURN), "transmission").axes[0]
+    marks = {line.get_label(): np.sort(line.get_xdata()) for line in panel.lines if line.get_marker() in "sD"}
+    d, a, b, c = thesis().linkage.lengths
+    # bars 3 and 4 folded: |b - c| between A and O4; bars 2 and 3 in line on the sweep: c seen from O2 at b - a or a + b
+    limit = math.degrees(math.acos((a * a + d * d - (b - c) ** 2) / (2 * a * d)))
+    assert marks["limit"] == pytest.approx(np.sort([45 - limit, 45 + limit]), abs=1e-9)
+    inner = math.degrees(math.acos(((b - a) ** 2 + d * d - c * c) / (2 * (b - a) * d)))
+    expected = [(45 + s * inner + 180) % 360 for s in (1, -1)]
+    assert len(marks["dead centre"]) == 1
+    assert min(abs(marks["dead centre"][0] - e) for e in expected) < 1e-9
+    other = thesis(FULL_TURN)
+    other = replace(other, motion=replace(other.motion, branch=-1))
+    panel = composed(other, "transmission").axes[0]
+    crossed = next(line.get_xdata()[0] for line in panel.lines if line.get_marker() == "D")
+    assert crossed + marks["dead centre"][0] == pytest.approx(sum(expected))  # its mirror image in the ground's line
+
+
+EFFECTS = (
+    fourbar.Gravity(),
+    fourbar.Viscous.at(A=0.02, O4=0.01),
+    fourbar.Friction.at(B=0.03),
+    PinFriction.at(A=(0.2, 0.01), O4=(0.1, 0.02)),
+    Torsion.at(B=(0.5, 1.0, 0.1)),
+    Springs((Spring(Point(1, 0.1, -1.5), Point(3, 0.08, 0.2), 50.0, 0.05),)),
+    Flywheel(0.01, 4),
+)
+
+
+@pytest.mark.parametrize("drive_bar", (2, 3, 4))
+@pytest.mark.parametrize(
+    "effects", [EFFECTS, *((one,) for one in EFFECTS)], ids=lambda some: "+".join(e.key for e in some)
+)
+def test_free_bodies_balance(drive_bar: int, effects: tuple[Effect, ...]) -> None:
+    shown = view(crank_rocker(drive_bar=drive_bar, effects=effects))
+    for bar in (2, 3, 4):
+        arrows, couples = free_body(shown, bar)
+        forces = np.array([arrow.force for arrow in arrows])
+        assert np.abs(forces.sum()) <= BALANCE * np.abs(forces).max()
+        moments = [(a.at.conjugate() * a.force).imag for a in arrows] + [c.moment for c in couples]
+        assert abs(sum(moments)) <= BALANCE * max(map(abs, moments))
+        assert any(c.text == f"$T_{bar}$" for c in couples) == (bar == drive_bar)
+
+
+def test_a_scene_without_velocity_draws_positions_only(tmp_path: Path) -> None:
+    scene = crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.0, 6.0, 30)))
+    plot.draw(scene, tmp_path / "a.svg")
+    with pytest.raises(InputError, match="omega_2"):
+        plot.draw(scene, tmp_path / "b.svg", "torque")
+    assert not (tmp_path / "b.svg").exists()
+
+
+def test_the_position_drawn_of_both_branches_is_one_and_stands_clear_of_their_poles() -> None:
+    alone = view(thesis(FULL_TURN)).here
+    scenes = [on_branch(thesis(FULL_TURN), sign) for sign in (1, -1)]
+    position = common_position(scenes)
+    assert position is not None
+    sweeps = [view(scene).sweep for scene in scenes]
+    both = np.fmin.reduce([quality for s in sweeps for quality in (s.condition, s.drive_condition)])
+    best = min(CLEAR, float(np.nanmax(both)))  # the two poles leave no position clear of both by more than 0.25
+    assert best > 0.2
+    for scene in scenes:
+        here = view(scene, position).here
+        assert min(here.condition[0], here.drive_condition[0]) >= best
+    assert min(alone.condition[0], alone.drive_condition[0]) >= CLEAR
+    # the position of the open branch alone is a pole of the crossed one
+    assert view(scenes[1], float(alone.theta_2[0])).here.drive_condition[0] < CLEAR
+    titles = {axes.get_title(loc="left").split(",")[0] for axes in composed(thesis(FULL_TURN), "linkage", "both").axes}
+    assert len(titles) == 1
+
+
+def test_a_remark_stands_where_the_curve_keeps_away() -> None:
+    share = np.linspace(0.0, 1.0, 361)
+    for mu, low, high in (
+        (90.0 * np.sin(np.pi * share), 0.3, 0.7),
+        (90.0 * share, 0.6, 1.0),
+        (90.0 - 90.0 * share, 0.0, 0.4),
+    ):
+        assert low <= free_place(mu) <= high
+    assert 0.0 < free_place(np.full(361, np.nan)) < 1.0
+
+
+def test_hostile_titles_are_text(tmp_path: Path) -> None:
+    title = "$\\frac{ <script>alert(1)</script> & \x1b[31m\u2028 %s {0} " + 300 * "x"
+    plot.draw(replace(crank_rocker(), title=title), tmp_path / "a.svg", "linkage")
+    assert "<script" not in (tmp_path / "a.svg").read_text(encoding="utf-8")
+    assert len(plain(title, 50)) == 50
+
+
+@pytest.mark.parametrize(
+    ("name", "options"),
+    [("a.bmp", {}), ("a.png", {"figure": "pie"}), ("a.png", {"branches": "all"})],
+)
+def test_what_is_not_allowed_is_named(tmp_path: Path, name: str, options: dict[str, str]) -> None:
+    with pytest.raises(InputError, match="must"):
+        plot.draw(crank_rocker(), tmp_path / name, **options)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_position_that_does_not_assemble_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(NotAssembledError, match="45 deg"):
+        plot.draw(thesis(), tmp_path / "a.png", "linkage", position=math.radians(45.0))
+
+
+def released(steps: int = 300, duration: float = 0.6, **changes: object) -> fourbar.Scene:
+    """The crank-rocker let go from rest under gravity, a load and damping."""
+    motion = fourbar.Motion(0.5, 0.0, free=fourbar.Free(duration, steps))
+    parts = {"motion": motion, "effects": (fourbar.Gravity(), fourbar.Viscous.at(O2=0.002, B=0.001)), **changes}
+    return crank_rocker(**parts)
+
+
+def by_law() -> fourbar.Scene:
+    law = Law((0.0, 1.0, 2.0), (0.3, 2.0, 1.0), ends="rest")
+    return crank_rocker(motion=fourbar.Motion(law=law), drive_bar=4)
+
+
+@pytest.mark.parametrize("scene", (released(60, 1.2), by_law()), ids=("released", "by law"))
+def test_a_motion_through_time_is_drawn_over_time(scene: fourbar.Scene) -> None:
+    solution = fourbar.solve(scene)
+    drawn = {line.get_label(): line for panel in composed(scene, "kinematics").axes for line in panel.lines}
+    for name, values in ((r"$\theta_2$", np.degrees(solution.theta_2)), (r"$\omega_4$", solution.omega_4)):
+        np.testing.assert_allclose(drawn[name].get_xdata(), solution.time)
+        np.testing.assert_allclose(drawn[name].get_ydata(), values)
+    free = scene.motion.free is not None
+    for name in ("overview", "energy" if free else "torque"):
+        figure = composed(scene, name)
+        assert not clashes(figure), name
+        flat = [axes for axes in figure.axes if axes.name == "rectilinear" and axes.axison]
+        assert all(axes.get_xlabel().endswith(("(s)", "m)")) for axes in flat)
+
+
+def test_branches_that_are_released_for_different_times_share_their_scales() -> None:
+    bars = [fourbar.Bar(0.22, 0.5), fourbar.Bar(0.25, 0.8), fourbar.Bar(0.2, 0.4)]
+    motion = fourbar.Motion(math.radians(60.0), 0.0, free=fourbar.Free(2.0, 200))
+    scene = fourbar.Scene(fourbar.FourBar(0.3, *bars), motion, effects=(fourbar.Gravity(),))
+    lasting = [len(view(on_branch(scene, sign)).sweep) for sign in (1, -1)]
+    assert lasting[0] != lasting[1]  # each stops at a limit position of its own
+    for name in ("kinematics", "energy"):
+        axes = composed(scene, name, "both").axes
+        half = len(axes) // 2
+        for one, other in zip(axes[:half], axes[half:], strict=True):
+            assert (one.get_xlim(), one.get_ylim()) == (other.get_xlim(), other.get_ylim())
+            assert (one.get_xlabel(), one.get_ylabel()) == (other.get_xlabel(), other.get_ylabel())
+
+
+def test_the_position_of_a_motion_through_time_is_one_that_it_passes(tmp_path: Path) -> None:
+    shown = view(released(), position=0.3)
+    k = int(np.argmin(np.abs(shown.sweep.theta_2 - 0.3)))
+    assert shown.here.time[0] == shown.sweep.time[k] and shown.here.F12[0] == pytest.approx(shown.sweep.F12[k])
+    with pytest.raises(NotAssembledError, match="does not pass"):
+        plot.draw(released(), tmp_path / "a.svg", position=9.0)
+
+
+ENERGY = 1e-6
+"""Of the work against the kinetic energy, relative: the spline's (dt omega)^4, its instants 2 ms apart."""
+
+
+def test_the_work_of_what_acts_is_the_kinetic_energy() -> None:
+    scene = released(effects=(fourbar.Gravity(), fourbar.Viscous.at(O2=0.002, B=0.001), Flywheel(0.01, 4)))
+    motion = fourbar.solve(scene)
+    found = energies(scene, motion)
+    assert set(found.work) == {"loads", "gravity", "viscous"}
+    carried, place = bodies(scene.linkage, scene.effects), state(scene.linkage, motion.theta_2, motion.branch)
+    of_input, of_others = inertia(scene.linkage.input.length, carried, place.at, place.k)
+    expected = 0.5 * (of_input + of_others) * motion.omega_2**2
+    np.testing.assert_allclose(found.kinetic, expected, rtol=1e-9, atol=1e-15)
+    assert found.kinetic.max() > 0.1
+    assert np.all(np.diff(found.work["viscous"]) <= 0.0)
+    np.testing.assert_allclose(sum(found.work.values()), found.kinetic, atol=ENERGY * found.kinetic.max())
+    panel = composed(scene, "energy").axes[0]
+    assert panel.get_ylabel() in ("energy (J)", "energy (mJ)")
+
+
+def test_figures_that_a_motion_does_not_have_are_refused_in_one_line(tmp_path: Path) -> None:
+    for scene, figure in ((released(), "torque"), (crank_rocker(), "energy"), (by_law(), "energy")):
+        with pytest.raises(InputError, match="free motion"):
+            plot.draw(scene, tmp_path / "a.svg", figure)
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("name", ("overview", "coupler", "hodograph", "freebody"))
+def test_both_branches_are_drawn_to_one_scale(name: str) -> None:
+    figure = composed(CRANK_ROCKER, name, "both")
+    half = len(figure.axes) // 2
+    assert half and len(figure.axes) == 2 * half
+    figure.draw_without_rendering()
+    for one, other in zip(figure.axes[:half], figure.axes[half:], strict=True):
+        # free bodies move their window with the bar: its width is the scale
+        ends = [np.array([axes.get_xlim(), axes.get_ylim()]) for axes in (one, other)]
+        if one.axison:
+            np.testing.assert_allclose(ends[0], ends[1], rtol=1e-9)
+        np.testing.assert_allclose(np.diff(ends[0]), np.diff(ends[1]), rtol=1e-9)
+        assert one.get_ylabel() == other.get_ylabel()
+
+
+def test_the_settings_of_the_reader_are_left_alone(tmp_path: Path) -> None:
+    import matplotlib as mpl
+
+    before = dict(mpl.rcParams)
+    plot.draw(crank_rocker(), tmp_path / "a.svg", "torque")
+    assert dict(mpl.rcParams) == before
+
+
+def test_matplotlib_is_loaded_only_to_draw_and_its_absence_is_one_line(tmp_path: Path) -> None:
+    code = (
+        "import sys, fourbar.show.plot, fourbar.show.animate\n"
+        "assert 'matplotlib' not in sys.modules\n"
+        "sys.modules['matplotlib'] = None\n"
+        "from tests.support.scenes import crank_rocker\n"
+        "try:\n"
+        "    fourbar.show.plot.draw(crank_rocker(), sys.argv[1])\n"
+        "except fourbar.errors.DependencyError as error:\n"
+        "    print(error)\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code, str(tmp_path / "a.png")], capture_output=True, text=True, check=True
+    )
+    assert done.stdout.strip() == 'drawing needs matplotlib: pip install ".[plot]" in the checkout'
+    assert issubclass(DependencyError, fourbar.FourBarError)
+
+
+@pytest.mark.parametrize(
+    ("value", "shown"),
+    [
+        (0.0, "0"),
+        (-1234.6, "−1235"),
+        (0.012345, "0.0123"),
+        (3.09312, "3.09"),
+        (2.5e7, "2.50·10⁷"),
+        (-3.12e-14, "−3.12·10⁻¹⁴"),
+    ],
+)
+def test_numbers_have_three_digits(value: float, shown: str) -> None:
+    assert number(value) == shown
+
+
+def test_units_get_the_prefix_that_suits() -> None:
+    assert unit_for(0.94, "N m") == (1e3, "mN m")
+    assert unit_for(15218.0, "N m") == (1e-3, "kN m")
+    assert unit_for(0.0, "N") == (1.0, "N")

@@ -1,0 +1,138 @@
+"""What acts is drawn: a symbol for everything a scene file can name, where and in the direction it acts."""
+
+import cmath
+import json
+import math
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import fourbar
+from fourbar.effects import Load
+from fourbar.effects.load import Table
+from fourbar.files import loads
+from fourbar.files.effects import REGISTRY
+from fourbar.scene import Scene
+from fourbar.show import animate
+from fourbar.show.acting import acting
+from fourbar.show.page_data import page_data
+from tests.support.scenes import crank_rocker
+
+TURNING = Load(3, (2.0, 0.5), (0.03, 1.0), frame="bar")
+TABLED = Load(4, (5.0, 0.2), table=Table((0.0, math.pi, math.tau), (1.0, -1.0, 1.0)))
+
+
+@pytest.fixture(scope="module")
+def everything() -> Scene:
+    """Every effect that a scene file can name, by its own example, and loads of both frames."""
+    effects = "\n".join(entry.example for entry in REGISTRY.values())
+    lengths = '[lengths]\nground = "0.3 m"\ninput = "0.1 m"\ncoupler = "0.25 m"\noutput = "0.22 m"\n'
+    described = loads(f'{lengths}[motion]\nomega_2 = "3 rad/s"\n[effects]\n{effects}\n')
+    return crank_rocker(loads=(TURNING, TABLED), effects=described.effects, drive_bar=4)
+
+
+def test_everything_that_acts_has_a_symbol(everything: Scene) -> None:
+    kinds = [symbol.kind for symbol in acting(everything)]
+    for key in REGISTRY:
+        assert {"springs": "spring"}.get(key, key) in kinds
+    assert kinds.count("force") == 2 and kinds[0] == "drive"
+    released = crank_rocker(motion=fourbar.Motion(0.5, 0.0, free=fourbar.Free(0.5, 4)))
+    assert "drive" not in [symbol.kind for symbol in acting(released)]
+
+
+def test_symbols_stand_where_the_formulas_let_them_act(everything: Scene) -> None:
+    """A load's arrow begins at its point and points along it; a spring joins its two points."""
+    pytest.importorskip("matplotlib", reason="drawing needs matplotlib: pip install matplotlib")
+    from matplotlib.figure import Figure
+
+    from fourbar.show.plot import symbols
+
+    solution = fourbar.solve(everything)
+    axes = Figure().subplots()
+    for index in (5, 30):
+        place = symbols.place_of(everything.linkage, solution, index, 1.0)
+        drawn = {
+            s.name: symbols.draw(axes, s, place, 0.01) for s in acting(everything) if s.kind in ("force", "spring")
+        }
+        theta_3, theta_4 = solution.theta_3[index], solution.theta_4[index]
+        tail, tip = (complex(*point) for point in drawn["load 1"].lines[0])
+        expected = complex(*solution.G3[index]) + cmath.rect(0.03, 1.0 + theta_3)
+        assert abs(tail - expected) < 1e-15 and abs(cmath.phase((tip - tail) / cmath.rect(1.0, 0.5 + theta_3))) < 1e-12
+        tail, tip = (complex(*point) for point in drawn["load 2"].lines[0])
+        factor = float(TABLED.table.at(solution.theta_2[index]))  # type: ignore[union-attr]
+        assert abs(tail - complex(*solution.G4[index])) < 1e-15
+        assert abs(cmath.phase((tip - tail) / cmath.rect(math.copysign(1.0, factor), 0.2))) < 1e-12
+        line = drawn["spring"].lines[0]
+        O4 = cmath.rect(everything.linkage.ground, everything.linkage.ground_angle)
+        assert abs(complex(*line[0]) - cmath.rect(0.1, everything.linkage.ground_angle - 0.5 * math.pi)) < 1e-15
+        assert abs(complex(*line[-1]) - O4 - cmath.rect(0.08, theta_4)) < 1e-15
+
+
+def test_the_page_is_given_the_same_symbols(everything: Scene) -> None:
+    text = animate.page(everything)
+    match = re.search(r'<script type="application/json" id="data">(.*?)</script>', text, re.DOTALL)
+    assert match is not None
+    data = json.loads(match[1])
+    assert [one["kind"] for one in data["acting"]] == [symbol.kind for symbol in acting(everything)]
+    factors = next(one["factor"] for one in data["acting"] if one["name"] == "load 2")
+    assert np.allclose(factors, TABLED.table.at(np.array(data["theta_2"])), rtol=1e-15)  # type: ignore[union-attr]
+
+
+def test_the_points_of_a_scene_are_drawn_where_they_are() -> None:
+    """Path, speed and mark in the plot, path in the notebook's drawing, place and columns in the page."""
+    pytest.importorskip("matplotlib", reason="drawing needs matplotlib: pip install matplotlib")
+    from fourbar.show.drawing import POINT, drawing
+    from fourbar.show.plot.figures import drawn
+
+    scene = crank_rocker(points=(fourbar.Point("P", 3, (0.15, 0.7)),))
+    solution = fourbar.solve(scene)
+    panels = drawn(scene, "points", units=fourbar.units("m m/s m/s^2")).figure.subfigs[0].axes
+    path = next(line for line in panels[0].lines if line.get_label() == "path of P")
+    assert {f"path of $G_{bar}$" for bar in (2, 4)} <= {line.get_label() for line in panels[0].lines}
+    assert np.allclose(path.get_xydata(), solution.points["P"], rtol=0.0, atol=1e-15)
+    for panel, own in zip(panels[1:], (solution.velocity, solution.acceleration), strict=True):
+        line = next(line for line in panel.lines if line.get_label() == "P")
+        assert np.allclose(line.get_ydata(), np.hypot(*own["P"].T), rtol=1e-15)
+    assert drawing(scene, solution).count(f'stroke="{POINT}"') == 1
+    data = page_data(scene, {})
+    assert data["points"][0]["name"] == "P" and abs(complex(*data["points"][0]["at"]) - cmath.rect(0.15, 0.7)) < 1e-15
+
+
+def test_no_text_covers_another_where_much_acts_and_numbers_are_long(everything: Scene) -> None:
+    pytest.importorskip("matplotlib", reason="drawing needs matplotlib: pip install matplotlib")
+    from tests.fourbar.show.plot.test_plot import clashes, composed
+
+    pins = fourbar.Viscous((("O2", 0.01), ("A", 0.01))), fourbar.Friction((("O2", 0.05), ("A", 0.05)))
+    loads = (*everything.loads, Load(2, moment=0.1), Load(2, (15.0, 0.0)))
+    kept = [effect for effect in everything.effects if effect.key not in ("viscous", "friction")]
+    scene = replace(everything, loads=loads, effects=(*kept, *pins), drive_bar=2)
+    assert not clashes(composed(scene, "freebody"))
+    pump = fourbar.load(Path(__file__).parents[3] / "models" / "gallery" / "pump_jack.toml")
+    assert not clashes(composed(pump, "overview", units="imperial"))
+
+
+def test_a_film_names_and_moves_what_the_plot_does(everything: Scene) -> None:
+    pytest.importorskip("matplotlib", reason="drawing needs matplotlib: pip install matplotlib")
+    from fourbar.show.plot.film import _stage
+    from fourbar.show.plot.style import matplotlib_style
+    from fourbar.show.plot.view import view
+
+    scene = replace(everything, points=(fourbar.Point("P", 3, (0.15, 0.7)),))
+    with matplotlib_style():
+        figure, move = _stage(view(scene), moving=True)
+        move(7)
+        figure.draw_without_rendering()
+    (axes,) = figure.axes
+    named = {text.get_text() for text in axes.texts}
+    assert named >= {"$O_2$", "$A$", "2", "3", "4", "$G_2$", "$G_3$", "$G_4$", "P", "load 1", "viscous", "pin friction"}
+    assert axes.title.get_window_extent().y0 > axes.get_legend().get_window_extent().y1
+    solution = fourbar.solve(scene)
+    for arrows, at, own in zip(
+        axes.collections[-2:], ("v_A", "a_A"), (solution.velocity, solution.acceleration), strict=True
+    ):
+        shafts = np.column_stack([arrows.U, arrows.V])
+        scale = np.hypot(*shafts[0]) / np.hypot(*getattr(solution, at)[7])
+        assert np.allclose(shafts[[0, -1]], scale * np.array([getattr(solution, at)[7], own["P"][7]]), rtol=1e-12)

@@ -1,0 +1,249 @@
+"""The moving page as a file: what is embedded, that nothing foreign gets in or out, and the films."""
+
+import base64
+import json
+import math
+import re
+import shutil
+import sys
+from dataclasses import replace
+from html.parser import HTMLParser
+from importlib.util import find_spec
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import fourbar
+from fourbar.errors import DependencyError, InputError, NotAssembledError
+from fourbar.files.pictures import LARGEST
+from fourbar.scene.motion_law import Law
+from fourbar.show import animate, page_data
+from tests.support.scenes import crank_rocker, thesis
+
+HOSTILE = "</script><script>alert(1)</script> \"'><img src=x onerror=alert(2)> $style ${data} {{x}} \u2028 \x00 é"
+PNG = base64.b64decode(
+    "iVBORw0KGgoAAAANSUhEUgAAAAIAAAABCAIAAAB7QOjdAAAAD0lEQVR4nGP4z8DwHwYBABv2A/0Fj9VPAAAAAElFTkSuQmCC"
+)
+
+
+class Tags(HTMLParser):
+    """Every tag with its attributes, and the text of script elements."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.tags: list[tuple[str, dict[str, str | None]]] = []
+        self.scripts: list[str] = []
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append((tag, dict(attrs)))
+
+    def handle_data(self, data: str) -> None:
+        if self.tags and self.tags[-1][0] == "script":
+            self.scripts.append(data)
+
+
+def embedded(page: str) -> dict:
+    return json.loads(Tags(page).scripts[0])
+
+
+def test_embedded_numbers_are_those_of_solve_on_both_branches() -> None:
+    scene = crank_rocker()
+    data = embedded(animate.page(scene))
+    for sign in (1, -1):
+        solution = fourbar.solve(replace(scene, motion=replace(scene.motion, branch=sign)))
+        columns = data["branches"][str(sign)]
+        for name in ("theta_3", "theta_4", "omega_3", "alpha_4", "torque", "F12", "F32", "F43", "F14"):
+            np.testing.assert_array_equal(np.array(columns[name]), getattr(solution, name))  # to the last bit
+        assert columns["sign"] == [sign] * 61
+    np.testing.assert_array_equal(data["theta_2"], fourbar.solve(scene).theta_2)
+
+
+def test_a_single_position_is_one_of_the_rows_and_the_first_shown() -> None:
+    theta_2 = math.radians(123.456)
+    data = embedded(animate.page(thesis(theta_2)))
+    assert data["theta_2"][data["start"]] == theta_2
+    assert data["branches"]["1"]["torque"][data["start"]] == fourbar.solve(thesis(theta_2)).torque[0]
+    assert len(data["theta_2"]) > 300
+
+
+RELEASED = crank_rocker(motion=fourbar.Motion(0.5, 0.0, free=fourbar.Free(1.8, 90)), drive_bar=2)
+
+
+def test_a_free_motion_is_embedded_instant_by_instant() -> None:
+    data, solution = embedded(animate.page(RELEASED)), fourbar.solve(RELEASED)
+    (columns,) = data["branches"].values()
+    np.testing.assert_array_equal(data["time"], solution.time)
+    for name in ("theta_2", "theta_4", "omega_2", "alpha_3", "F12"):
+        np.testing.assert_array_equal(np.array(columns[name]), getattr(solution, name))  # to the last bit
+    assert columns["energy"][0] == 0.0 and max(columns["energy"]) > 0.1
+    assert "torque" not in columns  # nothing drives it
+    assert data["rate"] == 1.0 and "real time" in data["pace"]
+
+
+@pytest.mark.parametrize(("duration", "rate"), [(0.2, 0.1), (1.4e-3, 1e-4), (30.0, 1.0), (6e3, 100.0), (6.1e3, 1e3)])
+def test_what_is_too_quick_to_see_is_slowed_down_by_a_power_of_ten(duration: float, rate: float) -> None:
+    law = Law((0.0, 0.5 * duration, duration), (0.0, 1.0, 2.0), ends="rest")
+    data = embedded(animate.page(crank_rocker(motion=fourbar.Motion(law=law))))
+    assert data["rate"] == pytest.approx(rate)
+    assert 1.5 <= duration / rate <= 60.0
+    assert len(data["branches"]["1"]["torque"]) == 361
+
+
+def test_positions_that_do_not_assemble_are_null() -> None:
+    data = embedded(animate.page(thesis(fourbar.Sweep(0.0, 2 * math.pi, 360))))
+    solution = fourbar.solve(replace(thesis(), motion=fourbar.Motion(np.array(data["theta_2"]), 0.2244)))
+    assert [v is None for v in data["branches"]["1"]["torque"]] == np.isnan(solution.torque).tolist()
+    assert data["branches"]["1"]["F12"][30] == [None, None]
+
+
+def test_a_fine_sweep_is_thinned_evenly_and_says_so() -> None:
+    scene = crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.0, 2 * math.pi, 36_000), 1.0))
+    data = embedded(animate.page(scene))
+    assert len(data["theta_2"]) == page_data.MAX_ROWS
+    assert np.diff(data["theta_2"]) == pytest.approx(2 * math.pi / (page_data.MAX_ROWS - 1))
+    assert data["positions"] == 36_001
+
+
+def test_nothing_is_fetched_and_hostile_text_stays_text() -> None:
+    page = animate.page(replace(crank_rocker(), title=HOSTILE, source=HOSTILE))
+    tags = Tags(page).tags
+    assert [name for name, _ in tags].count("script") == 2
+    assert "img" not in [name for name, _ in tags]
+    for _, attributes in tags:
+        assert not {"src", "onerror", "onclick", "style"} & set(attributes)
+        assert attributes.get("href", "#").startswith("#")
+    assert not re.search(r"(?:https?:)?//(?!www\.w3\.org/2000/svg)[a-z]+\.[a-z]", page)
+    assert "\x00" not in page
+    assert "$style" in page  # a stranger's text is no template
+
+
+def test_the_policy_of_the_page_allows_its_own_script_and_nothing_else() -> None:
+    import hashlib
+
+    page = animate.page(crank_rocker())
+    policy = next(a["content"] for name, a in Tags(page).tags if a.get("http-equiv"))
+    assert policy is not None
+    assert "default-src 'none'" in policy
+    assert "unsafe" not in policy
+    script = page[page.rindex("<script>") + len("<script>") : page.rindex("</script>")]
+    digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+    assert f"'sha256-{digest}'" in policy
+
+
+def test_embedded_json_survives_any_string() -> None:
+    text = animate.embedded({"a": HOSTILE})
+    assert not set("<>&\u2028") & set(text)
+    assert json.loads(text) == {"a": HOSTILE}
+
+
+def test_a_picture_is_embedded_where_it_is_one(tmp_path: Path) -> None:
+    good = tmp_path / "bar.png"
+    good.write_bytes(PNG)
+    data = embedded(animate.page(crank_rocker(), {"coupler": good}))
+    assert data["pictures"] == {"3": "data:image/png;base64," + base64.b64encode(PNG).decode()}
+
+
+@pytest.mark.parametrize(
+    ("bar", "content", "message"),
+    [
+        ("input", b"<svg onload='alert(1)'/>", "PNG or JPEG"),
+        ("input", b"", "PNG or JPEG"),
+        ("input", PNG + bytes(LARGEST), f"must not exceed {LARGEST}"),
+        ("input", None, "there is no such file"),
+        ("wheel", PNG, "must name one of input, coupler, output"),
+    ],
+)
+def test_what_is_no_picture_is_refused(tmp_path: Path, bar: str, content: bytes | None, message: str) -> None:
+    path = tmp_path / "picture.png"
+    if content is not None:
+        path.write_bytes(content)
+    with pytest.raises(InputError, match=message):
+        animate.write(crank_rocker(), tmp_path / "page.html", pictures={bar: path})
+    assert not (tmp_path / "page.html").exists()
+
+
+def test_what_cannot_be_shown_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"\.html, \.gif, \.mp4"):
+        animate.write(crank_rocker(), tmp_path / "a.avi")
+    with pytest.raises(NotAssembledError):
+        animate.write(thesis(fourbar.Sweep(math.radians(40), math.radians(50), 5)), tmp_path / "a.html")
+    with pytest.raises(InputError, match="seconds"):
+        animate.write(crank_rocker(), tmp_path / "a.gif", seconds=math.nan)
+    with pytest.raises(InputError, match="html page only"):
+        animate.write(crank_rocker(), tmp_path / "a.gif", pictures={"input": tmp_path / "x.png"})
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_gif_moves_the_linkage(tmp_path: Path) -> None:
+    from PIL import Image
+
+    animate.write(crank_rocker(), tmp_path / "a.gif", seconds=0.2)
+    with Image.open(tmp_path / "a.gif") as film:
+        assert film.n_frames == 5
+        pictures = []
+        for index in range(film.n_frames):
+            film.seek(index)
+            pictures.append(np.asarray(film.convert("L")))
+    assert all(np.any(p != q) for p, q in pairwise(pictures))
+
+
+@pytest.mark.skipif(
+    shutil.which("ffmpeg") is None and find_spec("imageio_ffmpeg") is None, reason="neither ffmpeg nor imageio-ffmpeg"
+)
+def test_an_mp4_is_written(tmp_path: Path) -> None:
+    animate.write(thesis(), tmp_path / "a.mp4", seconds=0.2)
+    assert (tmp_path / "a.mp4").read_bytes()[4:8] == b"ftyp"
+
+
+def test_without_ffmpeg_an_mp4_is_refused_in_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PATH", str(tmp_path))
+    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
+    with pytest.raises(DependencyError, match=r"^an \.mp4 film needs the program ffmpeg[^\n]*$"):
+        animate.write(crank_rocker(), tmp_path / "a.mp4")
+    assert not list(tmp_path.iterdir())
+
+
+def test_an_ffmpeg_without_the_encoder_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    program = tmp_path / "bin" / "ffmpeg"
+    program.parent.mkdir()
+    program.write_text("#!/bin/sh\nexit 1\n")
+    program.chmod(0o755)
+    monkeypatch.setenv("PATH", f"{program.parent}:/bin:/usr/bin")
+    with pytest.raises(DependencyError, match=r"cannot encode H\.264[^\n]*$"):
+        animate.write(crank_rocker(), tmp_path / "a.mp4", seconds=0.2)
+    assert not list(tmp_path.glob("*.mp4"))
+
+
+def test_a_film_of_a_free_motion_runs_forward_and_as_long_as_it_does(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from PIL import Image
+
+    from fourbar.show.plot import film as films
+    from fourbar.show.plot.film import frames
+    from fourbar.show.plot.view import view
+
+    shown = view(RELEASED)
+    assert np.all(np.diff(frames(shown, 46)) == 2) and shown.sweep.time[frames(shown, 46)[-1]] == 1.8
+    monkeypatch.setattr(films, "FRAMES_PER_SECOND", 5)
+    animate.write(RELEASED, tmp_path / "a.gif")
+    with Image.open(tmp_path / "a.gif") as film:
+        assert film.n_frames == 9
+
+
+def test_a_film_of_a_rocker_goes_there_and_back() -> None:
+    from fourbar.show.plot.film import frames
+    from fourbar.show.plot.view import view
+
+    shown = view(thesis())
+    order = frames(shown, 40)
+    theta_2 = shown.sweep.theta_2[order]
+    assert shown.sweep.assembled[order].all()
+    assert len(order) == pytest.approx(40, abs=2)
+    assert theta_2[0] == theta_2.min()
+    assert 0 < int(np.argmax(theta_2)) < len(order) - 1
+    turning = view(crank_rocker())
+    assert np.all(np.diff(frames(turning, 30)) == 2)

@@ -1,0 +1,72 @@
+"""Shaking force and moment from momentum, the loads of the pins, and the duty of a motor."""
+
+import math
+
+import numpy as np
+
+import fourbar
+from fourbar.show.duty import bearing_load, drive_power, motor_duty, motor_entry, shaking_force, shaking_moment
+from fourbar.show.tables import heading
+from fourbar.show.units import units
+from tests.support.scenes import crank_rocker
+
+ROUND_OFF = 1e-11
+"""Some hundred roundings, divided by the smallest sine of this sweep squared."""
+
+
+def test_shaking_is_the_momentum_that_the_bars_lose() -> None:
+    scene = crank_rocker(loads=(), effects=())
+    s = fourbar.solve(scene)
+    force, moment = np.zeros((61, 2)), np.zeros(61)
+    for number, G, a, alpha in (
+        (2, s.G2, s.a_G2, s.alpha_2),
+        (3, s.G3, s.a_G3, s.alpha_3),
+        (4, s.G4, s.a_G4, s.alpha_4),
+    ):
+        bar = scene.linkage.bar(number)
+        force -= bar.mass * a
+        moment -= bar.mass * (G[:, 0] * a[:, 1] - G[:, 1] * a[:, 0]) + bar.moment_of_inertia * alpha
+    assert np.abs(shaking_force(s) - force).max() < ROUND_OFF * np.abs(force).max()
+    assert np.abs(shaking_moment(scene.linkage, s) - moment).max() < ROUND_OFF * np.abs(moment).max()
+    assert np.array_equal(drive_power(s), s.torque * 10.0)
+
+
+def test_bearing_load() -> None:
+    s = fourbar.solve(crank_rocker())
+    load = np.hypot(s.F43[:-1, 0], s.F43[:-1, 1])
+    found = bearing_load(s, "B")
+    assert found.largest == load.max() and found.where == s.theta_2[load.argmax()]
+    assert abs(found.rms - np.linalg.norm(load) / np.sqrt(60)) < 1e-14 * found.rms * 60
+
+
+def test_the_duty_of_a_motor() -> None:
+    """Over a turn the drive gives what the damping turns into heat and no more; all else comes back."""
+    pins = {"O2": 0.004, "B": 0.02}
+    damped = (fourbar.Gravity(), fourbar.Viscous.at(**pins))
+    sweep = fourbar.Motion(fourbar.Sweep(0.0, math.tau, 360), 10.0)
+    s = fourbar.solve(crank_rocker(motion=sweep, loads=(), effects=damped))
+    duty = motor_duty(s)
+    assert duty is not None and duty.energy_in is not None and duty.energy_out is not None and duty.closed
+    heat = (pins["O2"] * 10.0**2 + pins["B"] * (s.omega_3 - s.omega_4) ** 2)[:-1].mean() * math.tau / 10.0
+    assert abs(duty.energy_in - duty.energy_out - heat) < ROUND_OFF * duty.energy_in  # the rule is exact on periods
+    assert duty.peak_torque == np.abs(s.torque).max() and duty.peak_speed == 10.0
+    assert abs(duty.rms_torque - np.linalg.norm(s.torque[:-1]) / math.sqrt(360)) < ROUND_OFF * duty.rms_torque
+    assert abs(duty.peak_power - 10.0 * duty.peak_torque) < ROUND_OFF * duty.peak_power
+    still = motor_duty(fourbar.solve(crank_rocker(motion=fourbar.Motion(1.0, 0.0))))
+    assert still is not None and still.energy_in is None and still.peak_power == 0.0 and not still.closed
+    assert motor_duty(fourbar.solve(crank_rocker(), "position")) is None
+
+
+def test_the_summary_and_the_json_hold_the_duty() -> None:
+    scene = crank_rocker()
+    s, imperial = fourbar.solve(scene), units("imperial")
+    duty, entry = motor_duty(s), motor_entry(s, imperial)
+    assert duty is not None and entry is not None and duty.energy_out is not None
+    inch_pound = 0.0254 * 0.45359237 * 9.80665
+    assert entry["units"]["rms_power"] == "lbf in/s" and entry["units"]["energy_out"] == "lbf in"
+    assert abs(entry["rms_power"] * inch_pound - duty.rms_power) < ROUND_OFF * duty.rms_power
+    assert abs(entry["energy_out"] * inch_pound - duty.energy_out) < ROUND_OFF * duty.energy_out
+    assert abs(entry["pins"]["B"]["rms"] * inch_pound / 0.0254 - bearing_load(s, "B").rms) < ROUND_OFF * 100.0
+    lines = "\n".join(heading(scene, s))
+    assert f"motor: RMS torque {duty.rms_torque:.6g} N m, peak speed 10 rad/s, power peak" in lines
+    assert f"the drive gives {duty.energy_in:.6g} J per turn and takes back {duty.energy_out:.6g} J" in lines

@@ -1,0 +1,129 @@
+"""Scenes and solutions in a notebook, as tables, and new scene files."""
+
+import csv
+import io
+import math
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+from xml.etree import ElementTree as ET
+
+import numpy as np
+import pytest
+
+import fourbar
+from fourbar.cli import status
+from fourbar.errors import DependencyError, InputError
+from fourbar.files import scene_file as files
+from fourbar.files.new import new_scene
+from fourbar.show.drawing import HEIGHT, WIDTH, drawing
+from tests.support.scenes import crank_rocker, thesis
+
+HOSTILE = "<script>alert(1)</script>&"
+PIXEL = 0.11
+"""Coordinates are written with one decimal, and two of them make a length."""
+
+
+def test_the_drawing_is_to_scale_and_inside_its_frame() -> None:
+    scene = thesis(np.radians([100.0, 135.0, 200.0]))
+    root = ET.fromstring(drawing(scene, fourbar.solve(scene)))
+    lines = [[float(e.attrib[k]) for k in ("x1", "y1", "x2", "y2")] for e in root.iter() if e.tag.endswith("line")
+             and "x1" in e.attrib]  # fmt: skip
+    assert len(lines) == 3
+    drawn = [math.hypot(x2 - x1, y2 - y1) for x1, y1, x2, y2 in lines]
+    scale = drawn[1] / 0.55
+    assert drawn == pytest.approx([0.48 * scale, 0.55 * scale, 0.20 * scale], abs=2 * PIXEL)
+    for x1, y1, x2, y2 in lines:
+        assert min(x1, x2) > 0 and max(x1, x2) < WIDTH and min(y1, y2) > 0 and max(y1, y2) < HEIGHT
+    assert lines[0][2:] == lines[1][:2] and lines[1][2:] == lines[2][2:]  # joined at A and at B
+
+
+def test_a_scene_shows_itself() -> None:
+    shown = thesis()._repr_html_()
+    assert "<svg" in shown and "triple rocker" in shown and "57 kg" in shown and "bar 4 (output)" in shown
+    assert HOSTILE not in replace(thesis(), title=HOSTILE)._repr_html_()
+
+
+def test_a_scene_that_cannot_be_drawn_shows_why() -> None:
+    shown = thesis(0.9)._repr_html_()
+    assert "<svg" not in shown and "assembles at none" in shown
+
+
+def test_a_solution_shows_its_ends_and_says_what_is_between() -> None:
+    solution = fourbar.solve(crank_rocker())
+    shown = solution._repr_html_()
+    assert shown.count("<tr>") == 1 + 10 + 1 and "51 more" in shown
+    assert f"{math.degrees(solution.theta_2[-1]):.4f}" in shown
+    short = fourbar.solve(thesis())._repr_html_()
+    assert short.count("<tr>") == 2 and "more" not in short
+
+
+def test_a_solution_as_pandas_and_csv_says_the_same_bit_for_bit() -> None:
+    pytest.importorskip("pandas", reason="to_pandas needs pandas: pip install pandas")
+    solution = fourbar.solve(crank_rocker())
+    table = solution.to_pandas()
+    assert len(table) == len(solution)
+    assert np.array_equal(table["torque"].to_numpy(), solution.torque)
+    assert np.array_equal(table[["F12_x", "F12_y"]].to_numpy(), solution.F12)
+    text = solution.to_csv()
+    assert text is not None
+    rows = list(csv.DictReader(io.StringIO(text)))
+    assert [float(row["F14_y"]) for row in rows] == solution.F14[:, 1].tolist()
+    assert set(table.columns) <= set(rows[0])
+    positions = fourbar.solve(crank_rocker(), "position").to_pandas()
+    assert "torque" not in positions and "theta_3" in positions
+
+
+def test_csv_goes_to_a_file(tmp_path: Path) -> None:
+    solution = fourbar.solve(thesis())
+    assert solution.to_csv(tmp_path / "a.csv", degrees=True) is None
+    assert (tmp_path / "a.csv").read_text() == solution.to_csv(degrees=True)
+
+
+def test_without_pandas_one_line_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    with pytest.raises(DependencyError, match=r'pip install ".*pandas.*"'):
+        fourbar.solve(thesis()).to_pandas()
+
+
+def test_showing_needs_numpy_alone() -> None:
+    code = (
+        "import sys, fourbar as f; s = f.Scene(f.FourBar(4.0, f.Bar(2.0), f.Bar(5.0), f.Bar(5.0)), f.Motion(1.0, 1.0));"
+        "s._repr_html_(); f.solve(s)._repr_html_(); print(*{n.partition('.')[0] for n in sys.modules})"
+    )
+    loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
+    assert not {"pandas", "matplotlib", "pint", "rich", "click", "scipy"} & set(loaded)
+
+
+def test_a_new_scene_is_a_scene_and_its_comments_are_entries(tmp_path: Path) -> None:
+    text = new_scene(("20 cm", "0.48", "55 cm", "20 cm"))
+    scene = files.loads(text)
+    assert scene.linkage.lengths == (0.2, 0.48, 0.55, 0.2)
+    assert [scene.linkage.bar(n).mass for n in (2, 3, 4)] == [0.48, 0.55, 0.2]
+    assert np.isfinite(fourbar.solve(scene).torque).all()
+    opened = []
+    for line in text.splitlines():  # every commented entry is one that a scene file may have
+        entry = line.removeprefix("# ")
+        opened.append(entry if line != entry and ("=" in entry.split("#")[0] or entry.startswith("[")) else line)
+    whole = "\n".join(line for line in opened if not line.startswith("As many"))
+    full = files.loads(whole.replace("# As many loads", "#"))
+    assert len(full.loads) == 2 and len(full.effects) == 2 and full.motion.branch == -1
+
+
+@pytest.mark.parametrize(
+    ("lengths", "named"),
+    [(("1", "2", "3", "40"), "never close"), (("1 kg", "2", "3", "4"), "ground"), (("1", "2", "-3", "4"), "coupler")],
+)
+def test_a_new_scene_of_bad_lengths_is_refused(lengths: tuple[str, ...], named: str) -> None:
+    with pytest.raises(InputError, match=named):
+        new_scene(lengths)
+
+
+def test_a_new_scene_never_replaces_a_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "mine.toml"
+    assert status(["new", str(file), "--lengths", "4", "2", "5", "5"]) == 0
+    before = file.read_text()
+    assert status(["new", str(file), "--lengths", "4", "2", "5", "6"]) == 2
+    assert "is there already" in capsys.readouterr().err
+    assert file.read_text() == before

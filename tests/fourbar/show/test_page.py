@@ -1,0 +1,561 @@
+"""The moving page in a real browser, its picture and numbers against the formulas in Python."""
+
+import math
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import fourbar
+from fourbar.effects import Point
+from fourbar.files import loads
+from fourbar.show import animate
+from fourbar.show.tolerances import PAGE_SAMPLES
+from tests.fourbar.show.test_animate import HOSTILE, PNG, RELEASED, embedded
+from tests.support.scenes import crank_rocker, thesis
+
+pytest.importorskip("selenium", reason="pages are driven by selenium: pip install selenium")
+
+PRINTED = 6e-5
+"""Numbers are shown with five significant digits."""
+PRINTED_DEG = 6e-4
+"""Angles are shown with three decimals of a degree."""
+SPREAD_PRINTED = 6e-3
+"""Of the worst case: numbers next to it are shown with the digits that it has, three significant ones."""
+PIXEL = 0.01
+"""Coordinates in the picture are exact but for rounding; a hundredth of a pixel is far below what is seen."""
+RADIANS = 1e-9
+"""closeLoop in the page against fourbar, rad: the diagonal is a Math.hypot of rounded components, and the
+samples keep |sin mu| above 1e-4, where 30 roundings amount to less than 1e-10."""
+
+
+def number(text: str) -> float:
+    return float(text.replace("−", "-"))
+
+
+def shown(driver, *ids: str) -> list[float]:
+    return [number(driver.find_element("id", name).text) for name in ids]
+
+
+def pins(driver) -> dict[str, np.ndarray]:
+    """The pins as drawn, in lengths of the ground from O2 and in the plane's axes."""
+    script = """return Object.fromEntries(["O2", "A", "B", "O4"].map(name => {
+        const e = document.getElementById("pin-" + name);
+        return [name, [Number(e.getAttribute("cx")), -Number(e.getAttribute("cy"))]]; }));"""
+    found = {name: np.array(point) for name, point in driver.execute_script(script).items()}
+    return {name: point - found["O2"] for name, point in found.items()}
+
+
+def state_of(driver, expression: str):
+    return driver.execute_script(f"return {expression};")
+
+
+def type_length(driver, bar: int, value: float | str) -> None:
+    script = (
+        "const e = document.getElementById(arguments[0]); e.value = arguments[1]; e.dispatchEvent(new Event('input'))"
+    )
+    driver.execute_script(script, f"length-{bar}", str(value))
+
+
+def test_numbers_are_shown_in_the_units_of_the_page(browse) -> None:
+    scene = crank_rocker()
+    driver = browse(animate.page(scene, units=fourbar.units("mm kN N.mm rpm")))
+    s = fourbar.solve(scene)
+    expected = [s.torque[0] * 1e3, s.F43[0, 0] * 1e-3, s.omega_4[0] * 30.0 / math.pi]
+    assert shown(driver, "torque", "F43_x", "omega_4") == pytest.approx(expected, rel=PRINTED)
+    text = driver.find_element("tag name", "body").text
+    assert "N mm" in text and "kN" in text and "rpm" in text and "rad/s²" in text and "Lengths (mm)" in text
+    labels = [option.text for option in driver.find_elements("css selector", "#quantity option")]
+    assert {"torque on bar 2, N mm", "|F₁₂|, kN", "acceleration of G₄, mm/s²"} <= set(labels)
+    assert len(driver.find_elements("css selector", "#traces .b2, #traces .b4")) == 2
+    top = max(number(text.text) for text in driver.find_elements("css selector", "#chart text")[-3:] if text.text)
+    assert top == pytest.approx(1e3 * s.torque.max(), rel=0.01)
+
+
+def test_it_loads_and_shows_the_first_position(browse) -> None:
+    scene = crank_rocker()
+    driver = browse(animate.page(scene))
+    s = fourbar.solve(scene)
+    assert driver.title == "crank-rocker"
+    assert shown(driver, "theta_2", "theta_3", "theta_4") == pytest.approx(
+        np.degrees([s.theta_2[0], s.theta_3[0], s.theta_4[0]]), abs=PRINTED_DEG
+    )
+    assert shown(driver, "omega_3", "alpha_4", "torque", "F43_x", "F14_y") == pytest.approx(
+        [s.omega_3[0], s.alpha_4[0], s.torque[0], s.F43[0, 0], s.F14[0, 1]], rel=PRINTED
+    )
+
+
+def test_a_step_changes_the_numbers_by_the_right_amount(browse) -> None:
+    scene = crank_rocker()
+    driver = browse(animate.page(scene))
+    s = fourbar.solve(scene)
+    names = ("theta_2", "theta_3", "torque", "F12_x")
+    for clicks in (1, 2, 3):
+        before = shown(driver, *names)
+        driver.find_element("id", "forward").click()
+        after = shown(driver, *names)
+        k = clicks
+        expected = [
+            math.degrees(s.theta_2[k] - s.theta_2[k - 1]),
+            math.degrees(s.theta_3[k] - s.theta_3[k - 1]),
+            s.torque[k] - s.torque[k - 1],
+            s.F12[k, 0] - s.F12[k - 1, 0],
+        ]
+        assert np.subtract(after, before) == pytest.approx(expected, abs=2e-3)
+        assert np.subtract(after, before)[0] == pytest.approx(6.0, abs=2 * PRINTED_DEG)
+    driver.find_element("id", "back").click()
+    assert shown(driver, "torque")[0] == pytest.approx(s.torque[2], rel=PRINTED)
+    assert "torque" in state_of(driver, "document.getElementById('live').textContent")
+
+
+def test_play_moves_the_linkage_and_pause_leaves_true_numbers(browse) -> None:
+    scene = crank_rocker()
+    driver = browse(animate.page(scene))
+    start = pins(driver)["A"]
+    driver.find_element("id", "play").click()
+    assert driver.find_element("id", "play").text == "Pause"
+    deadline = time.monotonic() + 10.0
+    while state_of(driver, "row") < 4:
+        assert time.monotonic() < deadline, "the linkage does not move"
+    driver.find_element("id", "play").click()
+    row = state_of(driver, "row")
+    s = fourbar.solve(scene)
+    assert np.hypot(*(pins(driver)["A"] - start)) > 10
+    assert shown(driver, "torque", "omega_4") == pytest.approx([s.torque[row], s.omega_4[row]], rel=PRINTED)
+    drawn, ground = pins(driver), scene.linkage.ground
+    scale = np.hypot(*drawn["O4"]) / ground
+    np.testing.assert_allclose(drawn["A"], scale * s.A[row], atol=PIXEL)
+    np.testing.assert_allclose(drawn["B"], scale * s.B[row], atol=PIXEL)
+
+
+def clockwork(driver, ticks: int) -> list[int]:
+    """Play without waiting: frames 50 ms apart, and the row after each."""
+    script = """window.requestAnimationFrame = () => 0; play(true);
+        const rows = []; for (let i = 0; i < arguments[0]; i++) { frame(50 * i); rows.push(row); }
+        play(false); return rows;"""
+    return driver.execute_script(script, ticks)
+
+
+def test_an_input_that_turns_fully_goes_round_and_one_that_does_not_swings(browse) -> None:
+    driver = browse(animate.page(crank_rocker()))
+    rows = clockwork(driver, 241)  # 12 s: two sweeps
+    assert set(rows) == set(range(61)) or set(rows) == set(range(60))
+    assert sum(np.diff(rows) < 0) == 2
+    text = animate.page(thesis(fourbar.Sweep(0.0, 2 * math.pi, 360)))
+    data = embedded(text)
+    driver = browse(text)
+    driver.execute_script("go(200); document.getElementById('speed').value = '0.25'")  # less than a row per frame
+    rows = clockwork(driver, 1200)
+    closes = [k for k, v in enumerate(data["branches"]["1"]["theta_3"]) if v is not None and k >= 20]
+    assert (min(rows), max(rows)) == (min(closes), max(closes))
+    assert np.abs(np.diff(rows)).max() <= 1  # it never jumps
+
+
+def test_a_free_motion_plays_once_in_its_own_time(browse) -> None:
+    driver = browse(animate.page(RELEASED))
+    s = fourbar.solve(RELEASED)
+    assert not driver.find_element("id", "branch").is_displayed()
+    assert not driver.find_element("id", "torque").is_displayed()
+    rows = clockwork(driver, 20)  # 0.95 s: the first frame starts the clock
+    np.testing.assert_allclose(s.time[rows], 0.05 * np.arange(20), atol=0.011)  # half a row
+    assert clockwork(driver, 41)[-1] == 90 and not state_of(driver, "playing")
+    driver.execute_script("go(37)")
+    assert driver.find_element("id", "theta-text").text == "0.740 s"
+    assert driver.find_element("id", "theta").get_attribute("aria-valuetext") == "0.740 seconds"
+    assert shown(driver, "omega_2", "alpha_4") == pytest.approx([s.omega_2[37], s.alpha_4[37]], rel=PRINTED)
+    kinetic = embedded(animate.page(RELEASED))["branches"]["1"]["energy"][37]
+    assert shown(driver, "energy") == pytest.approx([kinetic], rel=PRINTED)
+    drawn = pins(driver)
+    np.testing.assert_allclose(drawn["B"], np.hypot(*drawn["O4"]) / 0.3 * s.B[37], atol=PIXEL)
+
+
+def test_a_released_linkage_with_other_lengths_is_swept_over_the_angle(browse) -> None:
+    driver = browse(animate.page(RELEASED))
+    driver.execute_script("go(37)")
+    type_length(driver, 3, 283.0)
+    assert driver.find_element("id", "branch").is_displayed()
+    assert not driver.find_element("id", "energy").is_displayed()
+    assert driver.find_element("id", "theta-text").text.endswith("°")
+    driver.execute_script("chooseBranch(-1)")
+    driver.find_element("id", "original").click()
+    assert driver.find_element("id", "theta-text").text.endswith(" s")
+    s = fourbar.solve(RELEASED)
+    row = state_of(driver, "row")
+    drawn = pins(driver)
+    np.testing.assert_allclose(drawn["B"], np.hypot(*drawn["O4"]) / 0.3 * s.B[row], atol=PIXEL)
+
+
+def test_a_changed_length_redraws_by_the_formulas_and_hides_the_forces(browse) -> None:
+    scene = crank_rocker()
+    driver = browse(animate.page(scene))
+    driver.execute_script("go(7)")
+    type_length(driver, 3, 283.0)
+    changed = fourbar.FourBar(0.3, fourbar.Bar(0.1), fourbar.Bar(0.283), fourbar.Bar(0.22), ground_angle=0.2)
+    theta_2 = state_of(driver, "grid[row]")
+    s = fourbar.solve(fourbar.Scene(changed, fourbar.Motion(theta_2, 10.0, 5.0)))
+    assert math.remainder(theta_2 - fourbar.solve(scene).theta_2[7], 2 * math.pi) == pytest.approx(
+        0, abs=math.radians(0.51)
+    )
+    drawn = pins(driver)
+    scale = np.hypot(*drawn["O4"]) / 0.3
+    np.testing.assert_allclose(drawn["A"], scale * s.A[0], atol=PIXEL)
+    np.testing.assert_allclose(drawn["B"], scale * s.B[0], atol=PIXEL)
+    angles = shown(driver, "theta_3", "theta_4")
+    for angle, expected in zip(angles, (s.theta_3[0], s.theta_4[0]), strict=True):
+        assert math.remainder(angle - math.degrees(expected), 360.0) == pytest.approx(0, abs=PRINTED_DEG)
+    assert shown(driver, "omega_3", "omega_4", "alpha_3", "alpha_4") == pytest.approx(
+        [s.omega_3[0], s.omega_4[0], s.alpha_3[0], s.alpha_4[0]], rel=PRINTED
+    )
+    assert not driver.find_element("id", "torque").is_displayed()
+    assert not driver.find_element("id", "forces").is_displayed()
+    assert not driver.find_element("id", "arrow-F12").is_displayed()
+    assert driver.find_element("id", "edited").is_displayed()
+    driver.find_element("id", "original").click()
+    assert driver.find_element("id", "torque").is_displayed()
+    assert shown(driver, "theta_2")[0] == pytest.approx(math.degrees(fourbar.solve(scene).theta_2[7]), abs=PRINTED_DEG)
+
+
+def test_type_time_and_scene_file_follow_the_lengths(browse, tmp_path: Path) -> None:
+    scene = crank_rocker(title="a\\nb", motion=fourbar.Motion(np.array([0.1, 0.2, 0.3, 0.4]), 10.0, 5.0))
+    driver = browse(animate.page(scene))
+    assert driver.find_element("id", "type").text == "crank-rocker"
+    assert loads(state_of(driver, "sceneFile()")).linkage == scene.linkage
+    type_length(driver, 2, 200.0)
+    driver.execute_script("chooseBranch(-1)")
+    assert driver.find_element("id", "type").text.startswith("triple rocker (longest: ground); with the original")
+    swept = state_of(driver, "grid[grid.length - 1] - grid[0]")
+    here = fourbar.solve(loads(state_of(driver, "sceneFile()")))
+    speeds, accelerations = zip(*state_of(driver, "grid.map((_, i) => pointMotion(i, POINTS[3]))"), strict=True)
+    np.testing.assert_allclose(speeds, here.v_G3, rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(accelerations, here.a_G3, rtol=1e-9, atol=1e-7)
+    assert "speed of G₃, m/s" in [option.text for option in driver.find_elements("css selector", "#quantity option")]
+    assert f"at ω₂ = 10 rad/s the mechanism takes {swept / 10.0:.3g} s." in driver.find_element("id", "pace").text
+    saved = loads(state_of(driver, "sceneFile()"))
+    assert saved.linkage.lengths == (0.3, 0.2, 0.25, 0.22) and saved.linkage.coupler.mass == scene.linkage.coupler.mass
+    assert saved.motion.branch == -1 and saved.title == "a\\nb" and len(saved.loads) == len(scene.loads)
+    assert fourbar.solve(saved).theta_2[-1] == state_of(driver, "grid[grid.length - 1]")
+    driver.execute_cdp_cmd("Browser.setDownloadBehavior", {"behavior": "allow", "downloadPath": str(tmp_path)})
+    driver.find_element("id", "download").click()
+    until = time.monotonic() + 10.0
+    saved_file = tmp_path / "linkage.toml"
+    while not (saved_file.exists() and saved_file.stat().st_size) and time.monotonic() < until:  # made empty at first
+        time.sleep(0.02)
+    assert saved_file.read_text() == state_of(driver, "sceneFile()")
+
+
+def test_the_page_names_a_linkage_as_fourbar_does(browse) -> None:
+    driver = browse(animate.page(crank_rocker()))
+    rng = np.random.default_rng(19)
+    cases = [[*map(float, rng.integers(1, 6, 4) / 10.0)] for _ in range(300)]
+    cases = [lengths for lengths in cases if 2 * max(lengths) <= sum(lengths)]
+    names = [fourbar.classify(fourbar.uniform(*lengths)).name for lengths in cases]
+    assert len(set(names)) > 12
+    assert driver.execute_script("return arguments[0].map(typeName)", cases) == names
+
+
+def test_what_acts_is_drawn_at_its_place_and_dimensions_on_request(browse) -> None:
+    spring = fourbar.Spring(Point(1, 0.1, -0.5), Point(4, 0.08, 0.0), 20.0, 0.1)
+    load = fourbar.Load(3, (2.0, 0.5), (0.03, 1.0), frame="bar")
+    scene = crank_rocker(loads=(load,), effects=(fourbar.Springs((spring,)), fourbar.Gravity()))
+    driver = browse(animate.page(scene))
+    driver.execute_script("go(20)")
+    s = fourbar.solve(scene)
+    script = """return [...document.querySelectorAll("#acting path.act")].map(e => [e.getAttribute("class"),
+        [...e.getAttribute("d").matchAll(/[ML]([^ ]+) ([^ML]+)/g)].map(
+            m => [(m[1] - view.x) / view.k, (view.y - m[2]) / view.k])])"""
+    found = dict(driver.execute_script(script))
+    zigzag, arrow = found["act act-spring"], found["act act-force"]
+    end = s.B[20] + (0.08 - 0.22) * np.array([math.cos(s.theta_4[20]), math.sin(s.theta_4[20])])
+    np.testing.assert_allclose(zigzag[-1], end, atol=1e-4)
+    angle = s.theta_3[20] + 1.0
+    np.testing.assert_allclose(arrow[0], s.G3[20] + 0.03 * np.array([math.cos(angle), math.sin(angle)]), atol=1e-4)
+    towards = np.subtract(arrow[1], arrow[0])
+    assert math.atan2(towards[1], towards[0]) == pytest.approx(s.theta_3[20] + 0.5, abs=0.01)
+    assert found.keys() >= {"act act-drive", "act act-gravity"}
+    names = 'return ["1", "3"].map(k => [parts.label[k].textContent, parts.label[k].style.display])'
+    assert driver.execute_script(names) == [["1", "none"], ["3", ""]]
+    driver.execute_script("toggle('show-v'); toggle('show-a')")
+    arrows = driver.execute_script("""return [...document.querySelectorAll("#motion path.act")].map(e =>
+        [...e.getAttribute("d").matchAll(/[ML]([^ ]+) ([^ML]+)/g)].map(m => [Number(m[1]), -Number(m[2])]))""")
+    assert len(arrows) == 2 * 5
+    shafts = np.diff(arrows, axis=1)[:, 0]
+    for (x, y), expected in zip(shafts[[0, 5]], (s.v_A[20], s.a_A[20]), strict=True):
+        assert math.atan2(y, x) == pytest.approx(math.atan2(*expected[::-1]), abs=0.001)
+    driver.execute_script("toggle('show-dimensions'); toggle('show-acting')")
+    assert [text for text, _ in driver.execute_script(names)] == ["1: 300 mm", "3: 250 mm"]
+    assert not driver.find_elements("css selector", "#acting *")
+
+
+@pytest.mark.parametrize("value", ("-1", "0", "5000", ""))
+def test_lengths_that_cannot_be_are_refused_and_the_picture_stays(browse, value: str) -> None:
+    driver = browse(animate.page(crank_rocker()))
+    before = pins(driver)
+    type_length(driver, 2, value)
+    assert driver.find_element("id", "length-error").is_displayed()
+    assert all(np.array_equal(before[name], point) for name, point in pins(driver).items())
+
+
+def test_the_formulas_of_the_page_agree_with_fourbar(browse) -> None:
+    driver = browse(animate.page(crank_rocker()))
+    rng = np.random.default_rng(5)
+    cases, expected = [], []
+    while len(cases) < 300:
+        lengths = np.exp(rng.uniform(-2, 2, 4))
+        theta_1, theta_2, sign = rng.uniform(-7, 7), rng.uniform(-7, 7), int(rng.choice([-1, 1]))
+        if 2 * lengths.max() >= lengths.sum():
+            continue
+        linkage = fourbar.FourBar(lengths[0], *(fourbar.Bar(v) for v in lengths[1:]), ground_angle=theta_1)
+        s = fourbar.solve(fourbar.Scene(linkage, fourbar.Motion(theta_2, 1.3, -0.7, branch=sign)))
+        if s.assembled[0] and s.condition[0] < 1e-4:
+            continue
+        cases.append([lengths.tolist(), theta_1, theta_2, sign])
+        expected.append(s)
+    script = """return arguments[0].map(([l, t1, t2, s]) => { const p = closeLoop(l, t1, t2, s);
+        return p && [p, rates(l, p, 1.3, -0.7)]; });"""
+    found = driver.execute_script(script, cases)
+    assert 50 < sum(p is not None for p in found) < 300
+    for answer, s in zip(found, expected, strict=True):
+        assert (answer is not None) == bool(s.assembled[0])
+        if answer is None:
+            continue
+        position, speed = answer
+        for name in ("theta_3", "theta_4"):
+            away = position[name.replace("_", "")] - getattr(s, name)[0]
+            assert abs(math.remainder(away, 2 * math.pi)) <= RADIANS
+        assert speed["omega3"] == pytest.approx(s.omega_3[0], rel=1e-6)
+        assert speed["alpha4"] == pytest.approx(s.alpha_4[0], rel=1e-6)
+
+
+def test_the_intervals_of_the_page_are_those_that_assemble(browse) -> None:
+    driver = browse(animate.page(crank_rocker()))
+    rng = np.random.default_rng(6)
+    kinds = set()
+    for _ in range(60):
+        lengths = rng.uniform(0.2, 1.0, 4)
+        if 2 * lengths.max() >= lengths.sum():
+            continue
+        linkage = fourbar.FourBar(lengths[0], *(fourbar.Bar(v) for v in lengths[1:]))
+        theta_2 = np.linspace(-math.pi, math.pi, 721)
+        closes = fourbar.solve(fourbar.Scene(linkage, fourbar.Motion(theta_2))).assembled
+        intervals = driver.execute_script("return closingIntervals(arguments[0])", lengths.tolist())
+        kinds.add((len(intervals), intervals[0][0] == 0.0))
+        inside = np.zeros_like(closes)
+        for low, high in intervals:
+            inside |= np.mod(theta_2 - low, 2 * math.pi) <= high - low
+        assert np.array_equal(inside, closes)
+    assert len(kinds) >= 3  # full turns, one interval and two have all been seen
+
+
+def test_the_branch_switches_the_picture_and_the_numbers(browse) -> None:
+    scene = crank_rocker()
+    driver = browse(animate.page(scene))
+    driver.execute_script("chooseBranch(-1)")
+    s = fourbar.solve(replace(scene, motion=replace(scene.motion, branch=-1)))
+    assert shown(driver, "torque", "F32_y") == pytest.approx([s.torque[0], s.F32[0, 1]], rel=PRINTED)
+    drawn = pins(driver)
+    np.testing.assert_allclose(drawn["B"], np.hypot(*drawn["O4"]) / 0.3 * s.B[0], atol=PIXEL)
+
+
+@pytest.mark.parametrize("scaling", ("sweep", "position"))
+def test_arrows_point_along_the_forces_to_the_scale_of_the_legend(browse, scaling: str) -> None:
+    scene = crank_rocker()
+    driver = browse(animate.page(scene))
+    choose = """const e = document.getElementById("arrow-scale"); e.value = arguments[0];
+        e.dispatchEvent(new Event("change")); go(50)"""
+    driver.execute_script(choose, scaling)
+    s = fourbar.solve(scene)
+    script = """const shaft = document.getElementById("arrow-" + arguments[0]), n = k => Number(shaft.getAttribute(k));
+        const tip = shaft.nextElementSibling.getAttribute("d").match(/M(\\S+) ([^L]+)/);
+        return [Number(tip[1]) - n("x1"), n("y1") - Number(tip[2])];"""
+    length = """const e = document.querySelector("#force-scale line");
+        return Number(e.getAttribute("x2")) - Number(e.getAttribute("x1"))"""
+    bar = driver.execute_script(length)
+    newtons = float(driver.find_element("css selector", "#force-scale text").text.split()[0])
+    for name in ("F12", "F32", "F43", "F14"):
+        drawn = np.array(driver.execute_script(script, name))
+        np.testing.assert_allclose(drawn, getattr(s, name)[50] * bar / newtons, atol=PIXEL)
+
+
+@pytest.mark.parametrize(("width", "scaling"), [(360, "position"), (1100, "position"), (360, "sweep"), (1100, "sweep")])
+def test_no_arrow_and_no_name_of_one_leaves_the_picture(browse, width: int, scaling: str) -> None:
+    driver = browse(animate.page(thesis() if scaling == "position" else crank_rocker()), width)
+    script = """const choice = document.getElementById("arrow-scale"); choice.value = arguments[0];
+        choice.dispatchEvent(new Event("change"));
+        const least = []; for (let i = 0; i < grid.length; i += 7) { go(i);
+          for (const e of document.querySelectorAll("#arrows .head")) { if (e.style.display === "none") continue;
+            const [x, y] = e.getAttribute("d").slice(1).split("L")[0].split(" ").map(Number);
+            least.push(Math.min(x, y, view.width - x, view.height - y)); } }
+        return least;"""
+    distances = driver.execute_script(script, scaling)
+    assert len(distances) > 30 and min(distances) > 15.0  # its name stands beyond the tip
+
+
+def test_keyboard_drives_it(browse) -> None:
+    from selenium.webdriver.common.action_chains import ActionChains
+    from selenium.webdriver.common.keys import Keys
+
+    driver = browse(animate.page(crank_rocker()))
+    press = lambda *keys: ActionChains(driver).send_keys(*keys).perform()  # noqa: E731
+    press(Keys.ARROW_RIGHT, Keys.ARROW_RIGHT, Keys.ARROW_LEFT, Keys.ARROW_RIGHT)
+    assert state_of(driver, "row") == 2
+    press(Keys.SPACE)
+    assert state_of(driver, "playing")
+    press(Keys.SPACE)
+    assert not state_of(driver, "playing")
+    press(Keys.HOME)
+    assert state_of(driver, "row") == 0
+    press("b")
+    assert state_of(driver, "branch") == 1  # single letters act only on the picture in focus
+    driver.execute_script("document.getElementById('picture').focus()")
+    press("b", "f")
+    assert state_of(driver, "branch") == -1
+    assert not state_of(driver, "document.getElementById('show-forces').checked")
+    assert not driver.find_element("id", "arrow-F12").is_displayed()
+    order = []
+    driver.execute_script("document.body.tabIndex = -1; document.body.focus()")
+    for _ in range(6):
+        press(Keys.TAB)
+        order.append(state_of(driver, "document.activeElement.id"))
+    assert order == ["", "picture", "play", "back", "forward", "reset"]  # first the link that skips to the controls
+
+
+def test_every_control_has_a_name(browse) -> None:
+    driver = browse(animate.page(crank_rocker()))
+    controls = driver.find_elements("css selector", "button, select, input, [role=img]")
+    assert len(controls) > 15
+    for control in (c for c in controls if c.is_displayed()):
+        assert control.accessible_name.strip(), control.get_attribute("id")
+    driver.execute_script("go(3)")
+    assert driver.find_element("id", "theta").get_attribute("aria-valuetext").endswith("degrees")
+
+
+@pytest.mark.parametrize("dark", (False, True))
+@pytest.mark.parametrize("scene", (crank_rocker(), thesis()), ids=("crank-rocker", "thesis"))
+def test_at_360_pixels_nothing_sticks_out_and_all_text_is_readable(browse, scene: fourbar.Scene, dark: bool) -> None:
+    driver = browse(animate.page(scene), 360, dark=dark)
+    assert state_of(driver, "document.documentElement.scrollWidth") <= 360
+    assert state_of(driver, "document.getElementById('picture').getBoundingClientRect().width") > 300
+    for control in driver.find_elements("css selector", "button, select, input[type=number], input[type=range]"):
+        if control.is_displayed():
+            assert control.size["height"] >= 40  # large enough for a finger
+    script = """return [...document.querySelectorAll("body *")]
+        .filter(e => [...e.childNodes].some(c => c.nodeType === 3 && c.textContent.trim()))
+        .filter(e => e.checkVisibility() && !e.closest("svg, noscript, script, [disabled]"))
+        .map(e => { let ground = e;
+            while (getComputedStyle(ground).backgroundColor === "rgba(0, 0, 0, 0)") ground = ground.parentElement;
+            const colours = [getComputedStyle(e).color, getComputedStyle(ground).backgroundColor];
+            return [...colours, e.textContent.trim().slice(0, 30)]; })"""
+    seen = driver.execute_script(script)
+    assert len(seen) > 40
+    for colour, ground, text in seen:
+        assert contrast(colour, ground) >= 4.5, (text, colour, ground)  # WCAG AA
+    page = luminance(state_of(driver, "getComputedStyle(document.body).backgroundColor"))
+    assert page < 0.05 if dark else page > 0.9
+
+
+def luminance(colour: str) -> float:
+    parts = [int(v) / 255 for v in colour[colour.index("(") + 1 : -1].split(",")[:3]]
+    linear = [v / 12.92 if v <= 0.03928 else ((v + 0.055) / 1.055) ** 2.4 for v in parts]
+    return float(np.dot([0.2126, 0.7152, 0.0722], linear))
+
+
+def contrast(first: str, second: str) -> float:
+    low, high = sorted((luminance(first), luminance(second)))
+    return (high + 0.05) / (low + 0.05)
+
+
+def test_labels_of_the_picture_do_not_cover_each_other(browse) -> None:
+    driver = browse(animate.page(thesis()), 360)
+    script = """return [...document.querySelectorAll("#labels text")].filter(e => e.style.display !== "none")
+        .map(e => { const b = e.getBBox(); return [b.x, b.y, b.x + b.width, b.y + b.height]; })"""
+    for row in (90, 136, 200, 300):
+        driver.execute_script("go(arguments[0])", row)
+        boxes = driver.execute_script(script)
+        assert len(boxes) >= 8
+        for k, a in enumerate(boxes):
+            for b in boxes[k + 1 :]:
+                wide, high = min(a[2], b[2]) - max(a[0], b[0]), min(a[3], b[3]) - max(a[1], b[1])
+                assert wide < 3 or high < 6  # a box leaves space for accents and descenders around the ink
+
+
+def test_hostile_titles_do_nothing_but_appear(browse) -> None:
+    driver = browse(animate.page(replace(crank_rocker(), title=HOSTILE)))
+    assert "<script>alert(1)</script>" in driver.find_element("css selector", "h1").text
+    driver.find_element("id", "forward").click()
+    assert state_of(driver, "row") == 1
+
+
+def test_a_picture_lies_along_its_bar(browse, tmp_path: Path) -> None:
+    (tmp_path / "bar.png").write_bytes(PNG)
+    driver = browse(animate.page(crank_rocker(), {"output": tmp_path / "bar.png"}))
+    driver.execute_script("go(9)")
+    length = state_of(driver, "Number(document.getElementById('picture-4').getAttribute('width'))")
+    drawn = pins(driver)
+    assert length == pytest.approx(np.hypot(*(drawn["B"] - drawn["O4"])))
+    turn = driver.find_element("id", "picture-4").get_attribute("transform")
+    angle = float(turn[turn.index("rotate(") + 7 : -1])
+    assert math.remainder(angle + math.degrees(fourbar.solve(crank_rocker()).theta_4[9]), 360) == pytest.approx(
+        0, abs=1e-6
+    )
+
+
+def test_with_reduced_motion_it_moves_twice_a_second(browse) -> None:
+    driver = browse(animate.page(crank_rocker()), still=True)
+    script = """window.requestAnimationFrame = () => 0; play(true); const seen = new Set();
+        const x = () => document.getElementById("pin-A").getAttribute("cx");
+        for (let i = 0; i < 60; i++) { frame(10000 + 50 * i); seen.add(x()); }
+        play(false); return seen.size;"""
+    assert 4 <= driver.execute_script(script) <= 8  # 3 s
+
+
+def test_positions_alone_show_no_dynamics(browse) -> None:
+    scene = crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.0, 2 * math.pi, 36)))
+    driver = browse(animate.page(scene))
+    assert not driver.find_element("id", "forces").is_displayed()
+    assert driver.find_element("id", "omega_3").text == "–"
+    driver.find_element("id", "forward").click()
+    assert shown(driver, "theta_2") == pytest.approx([10.0], abs=PRINTED_DEG)
+
+
+def test_it_says_why_a_position_has_no_forces(browse) -> None:
+    """T3 of a parallelogram exists nowhere; on its input the drive has forces everywhere, and no remark is shown."""
+    motion = fourbar.Motion(fourbar.Sweep(0.3, 2.0, 4), 1.0)
+    for drive_bar, remark in ((3, "no torque of the drive holds them in balance"), (2, "")):
+        scene = fourbar.Scene(fourbar.uniform(1.0, 0.5, 1.0, 0.5), motion, drive_bar)
+        status = browse(animate.page(scene)).find_element("id", "status")
+        assert (remark in status.text) and status.is_displayed() == bool(remark)
+
+
+def test_tolerances_have_bands_and_shares_in_the_units_of_the_page(browse) -> None:
+    loose = (fourbar.Tolerance("lengths.input", 5e-5), fourbar.Tolerance("bars.coupler.mass", 0.001, True))
+    scene = crank_rocker(tolerances=loose, points=(fourbar.Point("P", 3, (0.1, 0.2)),))
+    driver = browse(animate.page(scene, units=fourbar.units("N.mm")), 360)
+    found = fourbar.tolerances(scene, PAGE_SAMPLES)
+    driver.execute_script("go(20)")
+    rows = {
+        row.find_element("tag name", "th").text: [number(cell.text.replace("±", "")) for cell in cells]
+        for row in driver.find_elements("css selector", "#spreads tbody tr, #shares tbody tr")
+        for cells in [row.find_elements("tag name", "td")]
+    }
+    for label, part, factor in (("torque, N mm", "torque", 1e3), ("|F₄₃|, N", "|F43|", 1.0), ("P_x, mm", "P_x", 1e3)):
+        spread = found.spreads[part]
+        names = ("nominal", "deviation", "low", "high", "worst", "least", "greatest")
+        expected = np.array([getattr(spread, name)[20] * factor for name in names])
+        np.testing.assert_allclose(rows[label], expected, rtol=0, atol=SPREAD_PRINTED * spread.worst[20] * factor)
+    shares = found.spreads["torque"].shares[:, 20]
+    assert [rows[each.key][0] for each in loose] == pytest.approx(100 * shares / shares.sum(), abs=0.51)
+    assert state_of(driver, "document.documentElement.scrollWidth") <= 360
+    box = driver.find_element("css selector", "#bands .band").rect
+    assert box["height"] > 40 and box["width"] > 200
+    type_length(driver, 2, 90.0)
+    assert not driver.find_element("id", "spreads").is_displayed()
+    assert "original lengths and branch" in driver.find_element("id", "tolerance-note").text
+
+
+def test_a_scene_without_bands_says_why_or_shows_nothing(browse) -> None:
+    driver = browse(animate.page(replace(RELEASED, tolerances=(fourbar.Tolerance("lengths.input", 5e-5),))))
+    assert "free motion" in driver.find_element("id", "tolerance-note").text
+    assert not driver.find_element("id", "bands").is_displayed()
+    assert not browse(animate.page(crank_rocker())).find_element("id", "tolerances").is_displayed()

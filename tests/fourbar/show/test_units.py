@@ -1,0 +1,92 @@
+"""Results in other units: table, CSV, JSON, data frame, plot, page, notebook."""
+
+import csv
+import io
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import fourbar
+from fourbar.cli import status
+from fourbar.errors import HOLDS, InputError
+from fourbar.quantities import UNITS
+from fourbar.show import notebook
+from fourbar.show.units import units
+from tests.support.scenes import crank_rocker
+
+MODEL = Path(__file__).parents[3] / "models" / "crank_rocker.toml"
+INCH, POUND = 0.0254, 0.45359237 * 9.80665
+IN_SI = {
+    **{"in": INCH, "in/s": INCH, "in/s^2": INCH, "lbf": POUND, "lbf in": POUND * INCH, "rpm": math.tau / 60.0},
+    **{"deg": math.pi / 180.0, "rad/s^2": 1.0, "1": 1.0, "J": 1.0},
+}
+"""Size of each unit that a result of the model has in imperial units, by definition."""
+
+
+def test_every_number_is_in_the_unit_that_is_named(capsys: pytest.CaptureFixture[str]) -> None:
+    solution = fourbar.solve(fourbar.load(MODEL), "error")
+    for form in ("--json", "--csv"):
+        assert status(["analyze", str(MODEL), form, "--units", "imperial"]) == HOLDS
+        out = capsys.readouterr().out
+        if form == "--json":
+            document = json.loads(out)
+            assert document["angle_unit"] == "deg" and set(document["units"]) <= set(document)
+            found = {name: (np.array(document[name], dtype=float), unit) for name, unit in document["units"].items()}
+        else:
+            header, *rows = csv.reader(io.StringIO(out))
+            at = next(index for index, name in enumerate(header) if name.startswith("F12_y"))
+            assert header[at] == "F12_y [lbf]" and "torque [lbf in]" in header and "condition" in header
+            assert float(rows[90][at]) * POUND == pytest.approx(solution.F12[90, 1], rel=1e-14)  # type: ignore[index]
+    for name, (values, unit) in found.items():
+        if UNITS[name] != unit or unit in ("rad/s^2", "1"):
+            own = getattr(solution, name)
+            assert np.allclose(values * IN_SI[unit], np.full_like(values, np.nan) if own is None else own,
+                               rtol=4e-16 * 4, atol=0.0, equal_nan=True), name  # fmt: skip
+    assert {unit for _, unit in found.values()} >= {"in", "lbf", "lbf in", "deg", "rpm", "in/s^2"}
+
+
+def test_the_table_names_its_units(capsys: pytest.CaptureFixture[str]) -> None:
+    assert status(["analyze", str(MODEL), "--units", "mm kN N.mm"]) == HOLDS
+    lines = capsys.readouterr().out.splitlines()
+    heading = next(index for index, line in enumerate(lines) if line.startswith(" theta_2"))
+    assert lines[1] == "ground 300 mm, input 100 mm, coupler 250 mm, output 220 mm"
+    assert lines[heading + 1].split() == [
+        *["deg", "N", "mm", "of", "T", "kN", "kN", "kN", "kN", "deg", "deg", "rad/s", "rad/s", "rad/s^2", "rad/s^2"]
+    ]
+    assert f"largest torque {1000.0 * np.max(np.abs(fourbar.solve(fourbar.load(MODEL)).torque)):.6g} N mm" in "".join(
+        lines
+    )
+
+
+@pytest.mark.parametrize("text", ["furlong", "mm in", "N.mm J", "m^2"])
+def test_what_is_no_list_of_units_is_refused(text: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(InputError):
+        units(text)
+    assert status(["analyze", str(MODEL), "--units", text]) == 2
+    assert "units" in capsys.readouterr().err
+
+
+def test_units_are_read_as_people_write_them() -> None:
+    assert units("mm, N,lbf-in") == units("mm N lbf-in") and units("Imperial") == units("imperial") and not units("si")
+    with pytest.raises(InputError, match=r'lb-in.*did you mean "lbf-in"'):
+        units("mm lb-in")
+
+
+def test_plots_and_notebooks_say_theirs() -> None:
+    pytest.importorskip("matplotlib", reason="drawing needs matplotlib: pip install matplotlib")
+    from fourbar.show.plot.figures import drawn
+
+    scene, imperial = crank_rocker(), units("imperial")
+    for name, label in (("torque", "$T_2$ (lbf in)"), ("forces", "$|F|$ (lbf)")):
+        axes = drawn(scene, name, units=imperial).figure.subfigs[0].axes[0]
+        assert axes.get_ylabel() == label
+        if name == "torque":
+            torque = fourbar.solve(scene).torque
+            curve = max((np.asarray(line.get_ydata()) for line in axes.lines), key=len)
+            assert np.nanmax(curve) == pytest.approx(np.max(torque) / (POUND * INCH), rel=0.01)
+    assert " in" in notebook.in_units(scene, "imperial")._repr_html_()
+    table = notebook.in_units(fourbar.solve(scene), "imperial")._repr_html_()
+    assert "lbf in" in table and "deg" in table and "N m" not in table

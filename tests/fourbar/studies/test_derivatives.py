@@ -1,0 +1,200 @@
+"""Derivatives against 50-digit differences of another evaluation, and against differences of the formulas."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from flint import arb, ctx
+
+import fourbar
+from fourbar.cli import status
+from fourbar.effects import Friction, Gravity, Load, PinFriction, Table, Viscous
+from fourbar.linkage import BAR_NAMES, MOVING_BARS
+from fourbar.scene import Scene, command
+from fourbar.scene.motion import Free, FromLimit, Motion
+from fourbar.solution import values_of
+from fourbar.studies.derivatives import Sensitivity, sensitivity
+from fourbar.studies.keys import entries
+from fourbar_validation.engines.balls import BITS, Values, inputs, outputs
+from tests.fourbar.studies.test_study import ANGLES, DRIVEN, LINK, LOADS, RUBBING, scene
+
+TABLED = Load(4, (2.0, 0.1), (0.0, 0.0), 0.3, "world", Table((0.0, 2.0, 6.0), (0.0, 1.0, 2.0)))
+STEP = 2.0**-60
+"""Relative; a central difference of it in 320 bits is wrong by about STEP^2 = 1e-36."""
+EXACT = 1e-10
+"""Of the derivative, or of what the quantity would change by if it were proportional to the number."""
+OF_DIFFERENCES = 3e-9
+"""Central differences of fourth order in doubles: rounding, 1e-15, over a step of 1e-5, with what conditioning adds."""
+LEFT_OUT = ("bars.coupler.inertia", "bars.output.inertia", "bars.coupler.centre.0", "bars.coupler.centre.1")
+"""Of the studies' linkage: stated, they would not follow the length."""
+PARTS = {"lengths.ground": "d", "lengths.ground_angle": "theta_1"} | {
+    f"motion.{name}": name for name in ("theta_2", "omega_2", "alpha_2")
+}
+for _bar, _letter in zip(MOVING_BARS, "abc", strict=True):
+    _own = f"bars.{BAR_NAMES[_bar]}"
+    PARTS |= {f"lengths.{BAR_NAMES[_bar]}": _letter, f"{_own}.mass": f"m{_bar}", f"{_own}.inertia": f"I{_bar}"}
+    PARTS |= {f"{_own}.centre.0": f"r{_bar}", f"{_own}.centre.1": f"phi{_bar}"}
+PARTS |= {"effects.gravity.0": "g", "effects.gravity.1": "g_angle"}
+
+
+def part(key: str) -> str:
+    """The name that the reference has for a number of the scene."""
+    if key.startswith("loads."):
+        _, load, *rest = key.split(".")
+        return {"force0": "F", "force1": "F_angle", "at0": "at", "at1": "at_angle", "moment": "M"}[
+            "".join(rest)
+        ] + f"_{load}"
+    if key.startswith(("effects.viscous", "effects.friction")):
+        return "_".join(key.split(".")[1:])
+    return PARTS[key]
+
+
+def moved(of: Scene, exact: Values, key: str, step: Any) -> Values:
+    """The numbers with one of them moved, and with it what the scene leaves out."""
+    x = exact | {part(key): exact[part(key)] + step}
+    for bar in MOVING_BARS:
+        own, length, mass = of.linkage.bar(bar), x[".abc"[bar - 1]], x[f"m{bar}"]
+        if own.inertia is None and part(key) != f"I{bar}":
+            x[f"I{bar}"] = mass * length * length / 12
+        if own.centre is None and part(key) != f"r{bar}":
+            x[f"r{bar}"] = length / 2
+    return x
+
+
+def check_against_balls(of: Scene, found: Sensitivity) -> int:
+    """Compare every derivative at every position; how many were compared."""
+    ctx.prec, at, compared = BITS, command(of), 0
+    for i, theta_2 in enumerate(at.theta_2):
+        exact = {name: arb(value) for name, value in inputs(of, float(theta_2)).items()}
+        exact = moved(of, exact, "motion.omega_2", arb(0))  # what is left out, unrounded
+        for key, entry in found.keys.items():
+            step = arb(STEP) * max(abs(float(exact[part(key)])), 1e-3)
+            ends = [outputs(of, int(at.branch[i]), moved(of, exact, key, h), of.drive_bar) for h in (-step, step)]
+            assert ends[0] is not None and ends[1] is not None, entry
+            for name in found.by:
+                value, own = found.value(name)[i], found.of(name, key)[i]
+                columns = [f"{name}_x", f"{name}_y"] if np.ndim(own) else [name]
+                true = np.array([float(((ends[1][c] - ends[0][c]) / (2 * step)).mid()) for c in columns])
+                scale = np.linalg.norm(np.atleast_1d(value)) / max(abs(float(exact[part(key)])), 1.0)
+                error = np.linalg.norm(np.atleast_1d(own) - true)
+                assert error <= EXACT * max(np.linalg.norm(true), scale), (key, name, i, own, true)
+                compared += 1
+    return compared
+
+
+@pytest.mark.parametrize("drive", [2, 3, 4])
+def test_derivatives_are_those_of_a_50_digit_reference(drive: int) -> None:
+    effects = (Gravity(), Viscous.at(O2=0.01, A=0.02), Friction.at(B=0.05))
+    of = scene(effects, drive, theta_2=ANGLES[1:3])
+    found = sensitivity(of)
+    assert found.status == ["ok", "ok"]
+    assert check_against_balls(of, found) == 2 * len(found.keys) * len(found.by)
+    assert set(found.keys) == {"motion.theta_2", *entries(of)}
+
+
+@pytest.mark.parametrize(("effects", "drive"), [(DRIVEN, 4), (RUBBING, 2)])
+def test_effects_that_the_reference_lacks_by_differences(effects: tuple[Any, ...], drive: int) -> None:
+    of, points = scene(effects, drive), (fourbar.Point("P", 3, (0.1, 0.4)),)
+    of = Scene(of.linkage, of.motion, drive, (*LOADS, TABLED), effects, points=points)
+    found = sensitivity(of)
+    assert found.status == ["ok"] * len(ANGLES) and {"P", "v_P", "a_P"} <= set(found.by)
+    start = {key: ANGLES if key == "motion.theta_2" else x for key, x in zip(found.keys, found.numbers, strict=True)}
+    steps = {key: 1e-5 * (np.max(np.abs(x)) or 1.0) for key, x in start.items()}
+    study = {}
+    for row, (key, x) in enumerate(start.items()):  # each key moves in its own four members
+        moves = np.zeros(4 * len(start))
+        moves[4 * row : 4 * row + 4] = steps[key] * np.array([-2, -1, 1, 2])
+        study[key] = x + moves[:, None] if key == "motion.theta_2" else x + moves
+    solution = fourbar.solve(fourbar.vary(of, {k: v for k, v in study.items() if k not in LEFT_OUT}))
+    for name in found.by:
+        of_all = values_of(solution, name)
+        for row, key in enumerate(start):
+            if key in LEFT_OUT:
+                continue
+            low, less, more, high = of_all[4 * row : 4 * row + 4]
+            difference = (low - 8 * less + 8 * more - high) / (12 * steps[key])
+            scale = np.abs(found.value(name)).max() * 1e-5 / steps[key] + np.abs(difference).max()
+            np.testing.assert_allclose(
+                found.of(name, key), difference, rtol=0, atol=OF_DIFFERENCES * scale, err_msg=f"{name} by {key}"
+            )
+
+
+def test_where_there_is_no_derivative_a_status_says_why() -> None:
+    rest = sensitivity(scene((Friction.at(B=0.05),), 2, omega_2=0.0))
+    assert rest.status == ["at_rest"] * len(ANGLES)
+    assert np.isnan(rest.by["torque"]).all() and np.isfinite(rest.by["a_G3"]).all()
+    jammed = sensitivity(scene((PinFriction.at(A=(9.0, 2.0)),), 2))
+    assert set(jammed.status) <= {"jammed", "several"} and np.isnan(jammed.by["F12"]).all()
+    apart = fourbar.Scene(fourbar.uniform(0.2, 0.48, 0.55, 0.2), fourbar.Motion(np.array([0.0, 1.2, np.pi]), 1.0))
+    found = sensitivity(apart)
+    assert found.status == fourbar.solve(apart).status
+    lost = np.array(found.status) != "ok"
+    assert lost.any() and not lost.all()
+    for name, rows in found.by.items():
+        assert np.isnan(rows[:, lost]).all() and np.isfinite(rows[:, ~lost]).all(), name
+
+
+def test_positions_alone_and_through_a_change_point() -> None:
+    plain = sensitivity(Scene(fourbar.uniform(0.3, 0.1, 0.3, 0.1), fourbar.Motion(np.array([1.0, 2.0]))))
+    assert "torque" not in plain.by and "bars.input.mass" not in plain.keys
+    # a parallelogram: the output follows the input, and its angle feels each length by itself
+    np.testing.assert_allclose(plain.of("theta_4", "motion.theta_2"), 1.0, rtol=EXACT)
+    np.testing.assert_allclose(plain.of("theta_4", "lengths.input"), -1 / (0.1 * np.tan([1.0, 2.0])), rtol=EXACT)
+
+
+@pytest.mark.parametrize(
+    ("motion", "word"),
+    [({"theta_2": FromLimit(1, 0.1)}, "limit moves"), ({"theta_2": 1.0, "free": Free(1.0, 2)}, "free motion")],
+)
+def test_what_has_no_sensitivities(motion: dict[str, Any], word: str) -> None:
+    with pytest.raises(fourbar.InputError, match=word):
+        sensitivity(Scene(LINK, fourbar.Motion(**motion, omega_2=1.0)))
+
+
+def test_an_unknown_name_is_refused() -> None:
+    found = sensitivity(scene())
+    for quantity, key in (("torque", "lengths.inptu"), ("torqe", "lengths.input")):
+        with pytest.raises(fourbar.InputError, match="is not known here"):
+            found.of(quantity, key)
+
+
+def test_the_command_ranks_the_numbers_and_writes_them_all(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    models, out = Path(__file__).parents[3] / "models", tmp_path / "s.json"
+    assert status(["analyze", str(models / "crank_rocker.toml"), "--sensitivity"]) == 0
+    text = capsys.readouterr().out
+    assert "torque depends most on lengths.ground (at theta_2 = " in text
+    # the torque of inertia grows with the square of the speed, that of weight and loads does not
+    row = next(line for line in text.splitlines() if line.startswith("bars.input.mass"))
+    assert row.split()[3:] == ["0", "0", "0"]
+    assert status(["analyze", str(models / "crank_rocker.toml"), "--sensitivity", "--json", "-o", str(out)]) == 0
+    document = json.loads(out.read_text())
+    assert document["schema"] == "fourbar-sensitivity/1" and document["keys"]["lengths.input"]["unit"] == "m"
+    own = sensitivity(fourbar.load(models / "crank_rocker.toml"))
+    np.testing.assert_array_equal(document["by"]["F12"]["lengths.input"], own.of("F12", "lengths.input"))
+    assert status(["analyze", str(models / "crank_rocker.toml"), "--sensitivity", "--csv"]) == 2
+
+
+@pytest.mark.parametrize(("ground_angle", "theta_2"), [(0.0, np.pi), (-0.4, np.pi - 0.4), (0.3, np.pi), (0.0, -np.pi)])
+def test_half_a_turn_from_the_ground_the_first_derivative_is_the_ratio_of_the_speeds(
+    ground_angle: float, theta_2: float
+) -> None:
+    """There the tangent of the half angle is 1e16, of whose slope no digit is left."""
+    link = replace(LINK, ground_angle=ground_angle)
+    found = sensitivity(Scene(link, Motion(theta_2, 10.0, 3.0), effects=(Gravity(),)))
+    solution = found.solution
+    assert solution.omega_3 is not None and solution.alpha_3 is not None
+    np.testing.assert_allclose(found.of("theta_3", "motion.theta_2"), solution.omega_3 / 10.0, rtol=1e-13)
+    turned = found.of("omega_3", "motion.theta_2") * 10.0 + found.of("omega_3", "motion.omega_2") * 3.0
+    np.testing.assert_allclose(turned, solution.alpha_3, rtol=1e-12)
+    with_ground = found.of("theta_3", "motion.theta_2") + found.of("theta_3", "lengths.ground_angle")
+    np.testing.assert_allclose(with_ground, 1.0, rtol=1e-13)  # a linkage turned as a whole
+
+
+def test_a_kite_whose_halves_meet_has_derivatives() -> None:
+    """With a = d and b = c the product in Heron's factor has no slope either, and is a constant."""
+    found = sensitivity(Scene(fourbar.uniform(0.3, 0.3, 0.2, 0.2), Motion(1.0, 10.0)))
+    assert found.solution.omega_3 is not None
+    np.testing.assert_allclose(found.of("theta_3", "motion.theta_2"), found.solution.omega_3 / 10.0, rtol=1e-13)

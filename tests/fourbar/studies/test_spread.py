@@ -1,0 +1,134 @@
+"""Tolerances: samples against first order and against cases known by hand; what a file may not state."""
+
+import json
+import math
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import fourbar.formulas.mobility
+from fourbar import Bar, FourBar, InputError, Motion, Scene, Sweep, Tolerance, uniform
+from fourbar.cli import status
+from fourbar.files import dump, loads
+from fourbar.studies import spread as studied
+from fourbar.studies.spread import tolerances
+
+MODEL = (Path(__file__).parents[3] / "models" / "crank_rocker.toml").read_text()
+TABLE = '[tolerances]\n"lengths.input" = "0.05 mm"\nlengths.coupler = ["0.02 mm", "sigma"]\n'
+QUASI = 0.02
+"""Of a standard deviation from 2048 quasi-random samples: a random sample would scatter by 1/sqrt(2 N) = 0.016."""
+
+
+def spread(*given: Tolerance, samples: int = 2048, **motion: Any) -> Any:
+    linkage = FourBar(0.3, Bar(0.1, 0.2), Bar(0.25, 0.5), Bar(0.22, 0.4))
+    of = Scene(linkage, Motion(**({"theta_2": Sweep(0.3, 6.0, 6), "omega_2": 10.0} | motion)), tolerances=given)
+    return tolerances(of, samples)
+
+
+def test_a_number_that_the_torque_is_proportional_to() -> None:
+    omega = Tolerance("motion.omega_2", 0.3)  # the torque of inertia alone is proportional to its square
+    found = spread(omega)
+    torque = found.spreads["torque"]
+    size = np.abs(torque.nominal)
+    np.testing.assert_allclose(np.fmax(np.abs(torque.least), np.abs(torque.greatest)), 1.0609 * size, rtol=1e-4)
+    np.testing.assert_allclose(torque.worst, 2 * 0.03 * size, rtol=1e-12)
+    np.testing.assert_allclose(torque.first_order, 2 * 0.03 / math.sqrt(3) * size, rtol=1e-12)
+    np.testing.assert_allclose(torque.deviation, torque.first_order, rtol=QUASI)
+    np.testing.assert_allclose(found.spreads["theta_4"].deviation, 0.0, atol=1e-14)
+    assert not torque.parted.any() and found.apart == found.invalid == 0
+
+
+def test_samples_and_first_order_agree_where_it_is_straight_and_shares_are_those_of_the_samples() -> None:
+    both = Tolerance("lengths.input", 5e-5), Tolerance("lengths.output", 2e-5, True)
+    found, alone = spread(*both), [spread(each) for each in both]
+    for name in ("torque", "|F12|", "F43_x", "theta_4"):
+        own = found.spreads[name]
+        np.testing.assert_allclose(own.deviation, own.first_order, rtol=QUASI)
+        for share, one in zip(own.shares, alone, strict=True):
+            np.testing.assert_allclose(np.sqrt(share), one.spreads[name].deviation, rtol=QUASI)
+        assert (own.least <= own.low).all() and (own.low < own.nominal).all() and (own.high <= own.greatest).all()
+
+
+def test_the_same_seed_gives_the_same_samples_in_blocks_of_any_size(monkeypatch: pytest.MonkeyPatch) -> None:
+    given = Tolerance("lengths.input", 5e-5), Tolerance("lengths.coupler", 2e-5)
+    whole = spread(*given, samples=100)
+    monkeypatch.setattr(studied, "AT_ONCE", 200)
+    pieces = spread(*given, samples=100)
+    for name, own in whole.spreads.items():
+        for one, other in zip(own, pieces.spreads[name], strict=True):
+            np.testing.assert_allclose(one, other, rtol=1e-12, atol=1e-12, err_msg=name)
+
+
+def test_members_that_come_apart_are_counted_and_first_order_is_not_trusted_there() -> None:
+    linkage = uniform(0.2, 0.48, 0.55, 0.2)
+    edge = fourbar.formulas.mobility.limit_positions(linkage)[0].theta_2
+    at = edge + 2e-4 * np.sign(fourbar.formulas.mobility.default_range(linkage)[0] - edge)
+    of = Scene(linkage, Motion(np.array([at, at + 0.3]), 1.0), tolerances=(Tolerance("lengths.output", 2e-4),))
+    found = tolerances(of, 256)
+    assert 0 < found.apart == found.without[0] < 256 and found.without[1] == 0
+    assert found.spreads["torque"].parted.tolist() == [True, False]
+
+
+def test_tolerances_of_a_file_come_back_as_they_were() -> None:
+    scene = loads(MODEL + TABLE)
+    assert scene.tolerances == (Tolerance("lengths.input", 5e-5), Tolerance("lengths.coupler", 2e-5, True))
+    assert loads(dump(scene)).tolerances == scene.tolerances
+
+
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        ('"lengths.input" = "150 mm"', "less than the number itself, 0.1 m"),
+        ('"lengths.input" = ["40 mm", "sigma"]', "three sigma of it must be less"),
+        ('"lengths.inptu" = "1 mm"', 'did you mean "lengths.input"'),
+        ('"lengths.input" = "1 deg"', '"deg" does not convert to m'),
+        ('"lengths.input" = 0.1', "with a unit"),
+        ('"lengths.input" = ["1 mm", "normal"]', '"sigma"]'),
+        ('"lengths.input" = "0 mm"', "> 0"),
+        ('"bars.input.inertia" = "1 kg m^2"', "follows the length"),
+        ('"bars.input.centre" = "1 mm"', "is more than one number"),
+        ('"motion.theta_2" = "1 deg"', "unknown key"),
+    ],
+)
+def test_a_bad_tolerance_is_one_line(line: str, words: str) -> None:
+    with pytest.raises(InputError) as error:
+        loads(MODEL + "[tolerances]\n" + line, "s.toml")
+    text = str(error.value)
+    assert words in text and text.startswith("s.toml: tolerances") and "\n" not in text
+
+
+def test_what_the_study_refuses() -> None:
+    for given, words in (
+        ((), "states none"),
+        ((Tolerance("lengths.x", 1.0),), "did you mean"),
+        ((Tolerance("bars.input.inertia", 1.0),), "left out"),
+    ):
+        with pytest.raises(InputError, match=words):
+            spread(*given)
+    for samples in (1, 2.5, 10**9):
+        with pytest.raises(InputError, match="whole number"):
+            spread(Tolerance("lengths.input", 1e-5), samples=samples)  # type: ignore[arg-type]
+
+
+def test_the_command_prints_draws_and_writes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    scene, plot = tmp_path / "s.toml", tmp_path / "t.png"
+    text = MODEL.replace("steps = 360", "steps = 12")
+    scene.write_text(text + TABLE)
+    assert status(["tolerance", str(scene), "--samples", "64", "-o", str(plot)]) == 0
+    printed = capsys.readouterr().out
+    assert "64 samples (seed 0), 13 positions" in printed and "lengths.input" in printed
+    assert plot.read_bytes().startswith(b"\x89PNG")
+    assert status(["tolerance", str(scene), "--samples", "64", "--json"]) == 0
+    document = json.loads(capsys.readouterr().out)
+    torque = document["quantities"]["torque"]
+    assert len(torque["deviation"]) == 13 and document["tolerances"]["lengths.coupler"]["distribution"] == "normal"
+    scene.write_text(text + TABLE + '\n[points]\nv = { bar = 3, from_pin = ["5 cm", "20 deg"] }\n')
+    assert status(["tolerance", str(scene), "--samples", "64"]) == 0
+    assert re.search(r"^v_x +m ", capsys.readouterr().out, re.M)  # a place, though v_ begins a velocity
+    assert status(["tolerance", str(scene), "-o", "t.bmp"]) == 2
+    scene.write_text(text)
+    assert status(["tolerance", str(scene)]) == 2
+    assert "tolerances = None: the scene states none" in capsys.readouterr().err

@@ -1,0 +1,75 @@
+"""Other machines that this one can pass for; `test_machines.py` starts the tests there, the one below first."""
+
+import os
+import subprocess
+import sys
+from functools import cache
+from pathlib import Path
+from typing import NamedTuple
+
+from numpy._core._multiarray_umath import __cpu_dispatch__, __cpu_features__
+from threadpoolctl import threadpool_info
+
+ROOT = Path(__file__).parents[2]
+BEFORE = "MACHINE_BEFORE"
+"""The environment variable that tells the child what its parent calculates with."""
+
+
+class Core(NamedTuple):
+    """A kernel of OpenBLAS, by the name that OPENBLAS_CORETYPE takes, and the CPU it is made for."""
+
+    needs: str
+    """The feature without which its instructions are illegal."""
+    lacks: tuple[str, ...]
+    """Beginnings of NumPy's names for what such a CPU has not; "" is all of them."""
+    tunables: str = ""
+    """The same for the sine of the GNU C library."""
+
+
+AVX512 = ("X86_V4", "AVX512")
+NO_FMA = "glibc.cpu.hwcaps=-AVX2,-FMA"
+CORES = {
+    "Haswell": Core("AVX2", AVX512),
+    "Prescott": Core("SSE3", ("",), NO_FMA),
+    "Nehalem": Core("SSE42", ("",), NO_FMA),
+    "Zen": Core("AVX2", AVX512),
+    "SkylakeX": Core("AVX512_SKX", ()),
+}
+"""The commonest first."""
+
+
+def here() -> str:
+    """What this process calculates with: the BLAS kernel of NumPy and the vectorised functions of NumPy."""
+    blas = next((lib for lib in threadpool_info() if lib["user_api"] == "blas"), {})  # NumPy's is loaded first
+    kernel = f"{blas.get('internal_api', 'unknown BLAS')} {blas.get('architecture', '')}"
+    return " ".join([kernel, *(name for name in __cpu_dispatch__ if __cpu_features__[name])])
+
+
+def environment(core: str) -> dict[str, str]:
+    """The variables under which OpenBLAS, NumPy and the C library take this CPU for another."""
+    off = [name for name in __cpu_dispatch__ if __cpu_features__[name] and name.startswith(CORES[core].lacks)]
+    blas_and_numpy = {"OPENBLAS_CORETYPE": core, "NPY_DISABLE_CPU_FEATURES": " ".join(off)}
+    return blas_and_numpy | {"GLIBC_TUNABLES": CORES[core].tunables}
+
+
+@cache
+def machine(core: str | None = None) -> str:
+    """What a fresh process calculates with, as it is started or under the variables of a core."""
+    line = [sys.executable, "-c", f"from {__name__} import here; print(here())"]
+    changed = os.environ | ({} if core is None else environment(core))
+    return subprocess.run(line, cwd=ROOT, env=changed, capture_output=True, text=True, check=True).stdout.strip()
+
+
+def why_not(core: str) -> str | None:
+    """Why nothing is to be learned from a core here, or None."""
+    if not __cpu_features__.get(CORES[core].needs):
+        return f"this CPU has no {CORES[core].needs}"
+    if machine(core) == machine():
+        return "it is what this process calculates with"
+    before = list(CORES)[: list(CORES).index(core)]
+    twin = next((other for other in before if why_not(other) is None and machine(other) == machine(core)), None)
+    return twin and f"the same as {twin} here"
+
+
+def test_this_is_another_machine() -> None:
+    assert here() != os.environ[BEFORE]

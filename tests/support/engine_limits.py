@@ -1,0 +1,123 @@
+"""Where the declared limits of the engines lie, measured: each holds at one value of what it limits, not at another.
+
+An engine upgrade that lifts a limit, or makes it worse, is then noticed.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from fourbar.linkage import Bar
+from fourbar.mjcf import RECIPE, mjcf
+from fourbar.mjcf.document import load_ratio
+from fourbar.scene import Scene, command
+from fourbar.scene.motion import Motion
+from fourbar_validation.compare.answer import Answer
+from fourbar_validation.compare.tolerance import SIMULATED
+from fourbar_validation.engines import pinocchio_forward
+from fourbar_validation.engines.limits import (
+    FASTEST,
+    HEAVIEST,
+    LIGHTEST,
+    NEAREST_CENTRE,
+    NEAREST_TOGGLE,
+    PROXIMAL,
+    SLOWEST,
+    Boundary,
+)
+from fourbar_validation.engines.mujoco import simulate
+from fourbar_validation.engines.mujoco.closed_loop import ClosedLoop
+from fourbar_validation.engines.mujoco.inverse import MujocoTree
+from fourbar_validation.scenes.hard_families import loads, sweep_of
+from fourbar_validation.scenes.hard_linkages import at, dressed, linkage_of, with_bars
+from fourbar_validation.scenes.random import LinkageType
+
+
+class Measured(NamedTuple):
+    """One limit, and what asks the engine itself at a value of the limited quantity."""
+
+    of: Boundary
+    inside: float
+    outside: float
+    holds: Callable[[float], bool]
+
+
+def _simulated(scene: Scene) -> Answer:
+    """The simulation itself, whatever its declared limits."""
+    return simulate._Simulation(RECIPE, scene, command(scene), bounded=False).answer()
+
+
+def _near_toggle(sine: float) -> bool:
+    """Whether a sweep that ends where |sin mu| has this value is followed without an alarm."""
+    d, a, b, c = linkage_of(LinkageType.TRIPLE_ROCKER, 1)
+    cosine = -math.sqrt(1.0 - sine * sine)
+    squared = b * b + c * c - 2.0 * b * c * cosine
+    psi = math.acos((d * d + a * a - squared) / (2.0 * d * a))
+    return not _simulated(at(dressed((d, a, b, c), 1), np.linspace(psi - 0.5, psi, 20))).alarms
+
+
+def _base() -> Scene:
+    return sweep_of(dressed((0.3, 0.1, 0.25, 0.22)))
+
+
+def _at_speed(omega_2: float) -> Scene:
+    return replace(_base(), motion=replace(_base().motion, omega_2=omega_2))
+
+
+def _crank_acceleration(value: float) -> bool:
+    answer = _simulated(replace(_at_speed(math.sqrt(value / 0.1)), loads=(), effects=()))
+    return not answer.alarms and answer.evidence["force_gap"] < 1e-3
+
+
+def _loaded(ratio: float) -> bool:
+    (_, scene), *_ = loads(exponents=(3,))
+    times = ratio / load_ratio(scene)
+    heavier = tuple(
+        replace(load, force=load.force and (load.force[0] * times, load.force[1]), moment=load.moment * times)
+        for load in scene.loads
+    )
+    answer = _simulated(replace(scene, loads=heavier))
+    return not answer.alarms and answer.evidence["acceleration_gap"] < SIMULATED.factor
+
+
+def _compiles(inertia: float) -> bool:
+    base = _base()
+    bar: Bar = base.linkage.output
+    try:
+        MujocoTree(with_bars(base, output=replace(bar, inertia=inertia)))
+    except ValueError:
+        return False
+    return True
+
+
+def _centre_kept(r: float) -> bool:
+    """Whether the compiled MJCF places a mass centre at this distance from its pin where it was put."""
+    base = _base()
+    scene = with_bars(base, output=replace(base.linkage.output, centre=(r, 0.5)))
+    return ClosedLoop(mjcf(scene, replace(RECIPE, timestep=1e-3), keyframe=False)).keeps_centre("output")
+
+
+def _proximal(mu: float) -> bool:
+    """Whether Pinocchio's constrained acceleration is a number with this proximal parameter."""
+    scene = replace(_base(), loads=(), motion=Motion(1.0, 3.0))
+    kept = pinocchio_forward.PROXIMAL
+    try:
+        pinocchio_forward.PROXIMAL = (kept[0], mu, kept[2] if mu else 1)
+        released = pinocchio_forward.PinocchioReleased().release(scene, np.array([0.0, 0.01]))
+    finally:
+        pinocchio_forward.PROXIMAL = kept
+    return bool(np.isfinite(released.theta_2).all())
+
+
+MEASURED = (
+    Measured(NEAREST_TOGGLE, 0.06, 0.01, _near_toggle),
+    Measured(FASTEST, 3e4, 3e5, lambda omega_2: not _simulated(_at_speed(omega_2)).alarms),
+    Measured(SLOWEST, 1e-10, 1e-11, _crank_acceleration),
+    Measured(HEAVIEST, 1e10, 1e11, _loaded),
+    Measured(NEAREST_CENTRE, 2e-6, 5e-7, _centre_kept),
+    Measured(LIGHTEST, 1.001e-15, 0.999e-15, _compiles),
+    Measured(PROXIMAL, 1e-8, 0.0, _proximal),
+)

@@ -1,0 +1,65 @@
+"""Scenes and engines that cost a worker its life; a worker that imports them imports no more than it needs to judge."""
+
+import os
+import signal
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+from fourbar.scene import Command, Scene
+from fourbar_validation.compare.answer import Answer
+from tests.support.scenes import crank_rocker
+
+
+@dataclass(frozen=True)
+class Few:
+    """Scenes made in code; the names say which engine misbehaves where."""
+
+    names: tuple[str, ...] = ("a", "b", "c", "d")
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    def name(self, index: int) -> str:
+        return self.names[index]
+
+    def scene(self, index: int) -> Scene:
+        return crank_rocker(title=self.names[index])
+
+    def fingerprint(self) -> str:
+        return repr(self.names)
+
+
+class Unlucky:
+    """Agrees, once its process was killed, or waited in vain for a lock, as often as the folder LIVES has files."""
+
+    name = "unlucky"
+
+    def answer(self, scene: Scene, command: Command) -> Answer:
+        for life in sorted(Path(os.environ["LIVES"]).iterdir()):
+            life.unlink()
+            if life.name.startswith("killed"):
+                os.kill(os.getpid(), signal.SIGKILL)
+            os._exit(1)
+        return Answer("unlucky", "exact", refusal="declined")
+
+
+class Moody:
+    """Agrees, except that it kills its process on scene b and hangs on scene c."""
+
+    name = "moody"
+
+    def answer(self, scene: Scene, command: Command) -> Answer:
+        if scene.title == "b":
+            os.kill(os.getpid(), signal.SIGSEGV)
+        if scene.title == "c":
+            time.sleep(3600.0)
+        return Answer("moody", "exact", refusal="declined")
+
+
+def dies_at_first(parent: int) -> None:
+    """Starts no worker of a process as long as some of its lives are left in the folder that the run was given."""
+    lives = sorted(Path(os.environ["LIVES"]).iterdir())
+    if lives:
+        lives[0].unlink(missing_ok=True)
+        os._exit(1)

@@ -1,0 +1,533 @@
+"""Other people's numbers: judged row by row, and a known mistake is named as such."""
+
+import csv
+import json
+import math
+import xml.etree.ElementTree as ET
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import fourbar
+from fourbar.errors import BAD_INPUT, FAILED, HOLDS
+from fourbar.quantities import OK, UNITS, VECTORS
+from fourbar.scene import Command, Scene, command
+from fourbar.solve import solve
+from fourbar_validation.check.judge import Tolerance
+from fourbar_validation.check.judgement import Judgement, judge_table
+from fourbar_validation.check.theirs import LARGEST_FILE, NOT_JUDGED, read_table
+from fourbar_validation.cli import status
+from fourbar_validation.compare.scales import TERMS, yardstick
+from fourbar_validation.compare.tolerance import POWER
+
+MODELS = Path(__file__).parents[3] / "models"
+SCENES = {
+    "thesis": fourbar.load(MODELS / "thesis.toml"),
+    "crank_rocker": fourbar.load(MODELS / "crank_rocker.toml"),
+}
+FORCES = ("torque", "F12", "F32", "F43", "F14")
+ALL = ("theta_3", "theta_4", "omega_3", "omega_4", "alpha_3", "alpha_4", *FORCES)
+EVERY = 31
+"""One position of so many is written."""
+Numbers = dict[str, np.ndarray]
+
+
+def right(scene: Scene, **changed: object) -> Numbers:
+    """The right numbers at some positions; the command may be changed."""
+    at = command(scene)
+    at = Command(at.theta_2[::EVERY], at.branch[::EVERY], at.omega_2, at.alpha_2)._replace(**changed)
+    solution = solve(scene, at=at)
+    assert np.all(solution.status_code == OK)
+    return {name: np.array(getattr(solution, name)) for name in ("theta_2", *ALL)}
+
+
+def write(path: Path, numbers: Numbers, names: tuple[str, ...] = ALL, digits: int | None = None) -> Path:
+    columns = {"theta_2": numbers["theta_2"]}
+    for name in names:
+        if name in VECTORS:
+            columns |= {f"{name}_x": numbers[name][:, 0], f"{name}_y": numbers[name][:, 1]}
+        else:
+            columns[name] = numbers[name]
+    with path.open("w", newline="") as file:
+        writer = csv.writer(file)
+        writer.writerow(columns)
+        for row in zip(*columns.values(), strict=True):
+            # the angle stays exact: rounding it would ask for another position
+            writer.writerow(
+                [repr(float(row[0])), *(repr(float(x)) if digits is None else f"{x:.{digits}e}" for x in row[1:])]
+            )
+    return path  # fmt: skip
+
+
+def judged(scene: Scene, path: Path) -> Judgement:
+    return judge_table(scene, read_table(path))
+
+
+@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize("digits", [None, 5])
+def test_the_right_numbers_agree_also_when_rounded(name: str, digits: int | None, tmp_path: Path) -> None:
+    path = write(tmp_path / "theirs.csv", right(SCENES[name]), digits=digits)
+    assert judged(SCENES[name], path).differing == []
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_a_torque_off_by_one_in_the_last_of_six_digits_is_found(name: str, tmp_path: Path) -> None:
+    numbers = right(SCENES[name])
+    numbers["torque"] = numbers["torque"] * (1.0 + 3e-5)
+    found = judged(SCENES[name], write(tmp_path / "theirs.csv", numbers, digits=5))
+    assert {finding.quantity for finding in found.differing} == {"torque"}
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_a_theta_2_rounded_as_the_rest_is_allowed_for_and_excuses_no_more(name: str, tmp_path: Path) -> None:
+    numbers = right(SCENES[name])
+    rounded = numbers | {"theta_2": np.array([float(f"{x:.6g}") for x in numbers["theta_2"]])}
+    assert np.any(rounded["theta_2"] != numbers["theta_2"])
+    assert judged(SCENES[name], write(tmp_path / "theirs.csv", rounded, digits=5)).differing == []
+    wrong = rounded | {"F43": rounded["F43"] * (1.0 + 1e-4)}
+    found = judged(SCENES[name], write(tmp_path / "wrong.csv", wrong, digits=5))
+    assert {finding.quantity for finding in found.differing} == {"F43"}
+
+
+def test_whole_degrees_are_positions_that_somebody_chose(tmp_path: Path) -> None:
+    path = tmp_path / "theirs.csv"
+    path.write_text("theta_2 [deg],torque\n10,1.0\n20.5,1.0\n")
+    assert not read_table(path).theta_2_rounding.any()
+    path.write_text("theta_2 [deg],torque\n10,1.0\n20.5003,1.0\n")  # zeros left off: the column has four decimals
+    assert read_table(path).theta_2_rounding == pytest.approx(np.radians(0.00005), rel=1e-9)
+
+
+def bars(scene: Scene, **changes: object) -> Scene:
+    return replace(scene, linkage=replace(scene.linkage, **changes))
+
+
+def units(*names: str, factor: float) -> Callable[[Scene], Numbers]:
+    def planted(scene: Scene) -> Numbers:
+        numbers = right(scene)
+        return numbers | {name: numbers[name] * factor for name in names}
+
+    return planted
+
+
+def solved(change: Callable[[Scene], Scene], **command: object) -> Callable[[Scene], Numbers]:
+    return lambda scene: right(change(scene), **command)
+
+
+def same(scene: Scene) -> Scene:
+    return scene
+
+
+def inertial_times(scene: Scene, by_mass: float, by_inertia: float) -> Numbers:
+    """m a and I alpha by hand: what they add to static equilibrium is put on as loads at G, as d'Alembert does."""
+    motion = solve(scene, at=(at := command(scene)))
+    numbers: dict[str, list[np.ndarray]] = {name: [] for name in ("theta_2", *ALL)}
+    for i in range(0, len(at.theta_2), EVERY):
+        extra = []
+        for bar in (2, 3, 4):
+            described = scene.linkage.bar(bar)
+            x, y = (by_mass - 1.0) * -described.mass * getattr(motion, f"a_G{bar}")[i]
+            couple = (by_inertia - 1.0) * -described.moment_of_inertia * float(getattr(motion, f"alpha_{bar}")[i])
+            force = (math.hypot(x, y), math.atan2(y, x))
+            extra.append(fourbar.Load(bar, force, moment=couple))
+        here = Command(at.theta_2[i : i + 1], at.branch[i : i + 1], at.omega_2, at.alpha_2)
+        one = solve(replace(scene, loads=(*scene.loads, *extra)), at=here)
+        for name, values in numbers.items():
+            values.append(getattr(one, name)[0])
+    return {name: np.array(values) for name, values in numbers.items()}
+
+
+def other_pin(scene: Scene) -> Scene:
+    bar = scene.linkage.coupler
+    r, phi = bar.mass_centre
+    x, y = bar.length - r * math.cos(phi), r * math.sin(phi)
+    return bars(scene, coupler=replace(bar, centre=(math.hypot(x, y), math.atan2(y, x))))
+
+
+def about_pin(scene: Scene) -> Scene:
+    bar = scene.linkage.output
+    return bars(scene, output=replace(bar, inertia=bar.moment_of_inertia + bar.mass * bar.mass_centre[0] ** 2))
+
+
+def half_a_turn(bar: fourbar.Bar) -> tuple[float, float]:
+    return bar.mass_centre[0], bar.mass_centre[1] + math.pi
+
+
+def reversed_load(load: fourbar.Load) -> fourbar.Load:
+    return replace(load, force=load.force and (-load.force[0], load.force[1]), moment=-load.moment)
+
+
+def exchanged(scene: Scene) -> Numbers:
+    numbers = right(scene)
+    return numbers | {"F32": numbers["F32"][:, ::-1]}
+
+
+OMEGA = {"thesis": 0.2244, "crank_rocker": 10.0}
+MISTAKES: list[tuple[str, str, tuple[str, ...], Callable[[Scene], Numbers], str]] = [
+    # id, scene, columns, what was done, words of the explanation
+    ("torque in N cm", "thesis", ALL, units("torque", factor=1e2), "numbers in N cm where N m was announced"),
+    ("torque in N mm", "crank_rocker", ALL, units("torque", factor=1e3), "numbers in N mm where N m"),
+    ("forces in kN", "crank_rocker", ALL, units("F12", "F32", "F43", "F14", factor=1e-3), "numbers in kN where N was"),
+    ("forces in kgf", "thesis", ALL, units("F12", "F32", "F43", "F14", factor=1 / 9.80665), "kgf"),
+    ("torque of the bar on the ground", "thesis", ALL, units("torque", factor=-1.0), "sign reversed"),
+    ("F23 for F32", "crank_rocker", ALL, units("F32", factor=-1.0), "F_ij given for F_ji"),
+    ("angles in degrees", "crank_rocker", ALL, units("theta_3", "theta_4", factor=180 / math.pi), "degrees"),
+    ("x and y exchanged", "thesis", ALL, exchanged, "x and y exchanged"),
+    ("other branch", "thesis", ALL, solved(same, branch=np.full(12, -1, np.int8)), "other branch"),
+    ("gravity missing", "crank_rocker", FORCES, solved(lambda s: replace(s, effects=())), "gravity is missing"),
+    ("gravity upwards", "crank_rocker", FORCES,
+     solved(lambda s: replace(s, effects=(fourbar.Gravity(-9.81),))), "gravity is reversed"),
+    ("gravity added", "thesis", FORCES,
+     solved(lambda s: replace(s, effects=(fourbar.Gravity(),))), "gravity along -y is included"),
+    ("loads missing", "thesis", FORCES, solved(lambda s: replace(s, loads=())), "the loads are missing"),
+    ("third load missing", "thesis", FORCES,
+     solved(lambda s: replace(s, loads=(*s.loads[:2], s.loads[3]))), "load 3 (bar 3) is missing"),
+    ("statics", "crank_rocker", FORCES, solved(same, omega_2=0.0, alpha_2=0.0), "statics"),
+    ("omega_2 in rev/min", "crank_rocker", ALL, solved(same, omega_2=10.0 * 30 / math.pi), "rev/min"),
+    ("wrong pin", "crank_rocker", FORCES, solved(other_pin), "coupler: mass centre measured from the wrong pin"),
+    ("mid-bar", "crank_rocker", FORCES,
+     solved(lambda s: bars(s, coupler=replace(s.linkage.coupler, centre=(0.125, 0.0)))), "centre taken at"),
+    ("inertia about the pin", "crank_rocker", FORCES, solved(about_pin), "output: inertia about the pin"),
+    ("no inertia", "thesis", FORCES,
+     solved(lambda s: bars(s, coupler=replace(s.linkage.coupler, inertia=0.0))), "coupler: moment of inertia left out"),
+    ("kg cm^2 for kg m^2", "thesis", FORCES,
+     solved(lambda s: bars(s, output=replace(s.linkage.output, inertia=s.linkage.output.moment_of_inertia * 1e4))),
+     "output: moment of inertia in kg cm^2 taken for kg m^2"),
+    ("drive on bar 2", "thesis", FORCES, solved(lambda s: replace(s, drive_bar=2)), "on bar 2 instead of bar 4"),
+    ("m a in kg cm/s^2", "thesis", FORCES, lambda s: inertial_times(s, 100.0, 1.0), "m a in kg cm/s^2 added to N"),
+    ("I alpha in kg cm^2/s^2", "thesis", FORCES, lambda s: inertial_times(s, 1.0, 100.0), "I alpha in kg cm^2/s^2"),
+    ("both", "crank_rocker", FORCES, lambda s: inertial_times(s, 100.0, 100.0), "m a and I alpha in kg cm/s^2"),
+    ("m a in kg mm/s^2", "crank_rocker", FORCES, lambda s: inertial_times(s, 1e3, 1.0), "m a in kg mm/s^2"),
+    ("d'Alembert's sign", "crank_rocker", FORCES, lambda s: inertial_times(s, -1.0, -1.0), "d'Alembert"),
+    ("lbf ft", "crank_rocker", ALL, units("torque", factor=1 / 1.3558179483314004), "numbers in lbf ft where N m"),
+    ("an unknown ratio", "thesis", ALL, units("F12", "F14", factor=0.37), "every number is 0.37 times ours"),
+    ("inertia halved", "thesis", FORCES,
+     solved(lambda s: bars(s, coupler=replace(s.linkage.coupler, inertia=s.linkage.coupler.moment_of_inertia / 2))),
+     "coupler: moment of inertia halved"),
+    ("inertia times 0.83", "crank_rocker", FORCES,
+     solved(lambda s: bars(s, output=replace(s.linkage.output, inertia=s.linkage.output.moment_of_inertia * 0.83))),
+     "output: moment of inertia 0.83 times ours"),
+    ("mass times 1.2", "crank_rocker", FORCES,
+     solved(lambda s: bars(s, coupler=replace(s.linkage.coupler, mass=s.linkage.coupler.mass * 1.2))),
+     "coupler: mass 1.2 times ours"),
+    ("mass centre turned", "crank_rocker", FORCES,
+     solved(lambda s: bars(s, output=replace(s.linkage.output, centre=half_a_turn(s.linkage.output)))),
+     "output: mass centre turned by 180 deg"),
+    ("load reversed", "thesis", FORCES,
+     solved(lambda s: replace(s, loads=(reversed_load(s.loads[0]), *s.loads[1:]))), "load 1 (bar 2) is reversed"),
+    ("theta_4 from B", "thesis", ALL, lambda s: right(s) | {"theta_4": right(s)["theta_4"] + math.pi}, "theta_4 or"),
+    ("theta_4 from the coupler", "thesis", ALL,
+     lambda s: right(s) | {"theta_4": right(s)["theta_4"] - right(s)["theta_3"]}, "relative to bar 3"),
+    ("crank from another zero", "crank_rocker", ALL,
+     lambda s: right(s, theta_2=right(s)["theta_2"] + math.radians(37.0)) | {"theta_2": right(s)["theta_2"]},
+     "from another zero: theta_2 +37 deg"),
+    ("backwards", "thesis", ALL, lambda s: {name: x[::-1] for name, x in right(s).items()}
+     | {"theta_2": right(s)["theta_2"]}, "in reverse order"),
+    ("one row down", "crank_rocker", ALL, lambda s: {name: np.roll(x, 1, axis=0) for name, x in right(s).items()}
+     | {"theta_2": right(s)["theta_2"]}, "the rows are shifted by -1"),
+    ("theta_2 as degrees", "crank_rocker", ALL,
+     lambda s: right(s, theta_2=np.radians(right(s)["theta_2"])) | {"theta_2": right(s)["theta_2"]}, "read as degrees"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("what", "scene", "columns", "planted", "words"), MISTAKES, ids=[m[0] for m in MISTAKES])
+def test_a_known_mistake_is_the_first_explanation(
+    what: str,
+    scene: str,
+    columns: tuple[str, ...],
+    planted: Callable[[Scene], Numbers],
+    words: str,
+    tmp_path: Path,
+) -> None:
+    found = judged(SCENES[scene], write(tmp_path / "theirs.csv", planted(SCENES[scene]), columns))
+    assert found.differing
+    first = found.explanations[0]
+    assert words in first.text
+    assert first.complete
+
+
+def test_two_mistakes_in_two_columns_are_both_named(tmp_path: Path) -> None:
+    scene = SCENES["crank_rocker"]
+    numbers = right(scene)
+    numbers |= {"torque": numbers["torque"] * 100.0, "F43": -numbers["F43"]}
+    found = judged(scene, write(tmp_path / "theirs.csv", numbers))
+    found_causes = {explanation.text[:14]: explanation for explanation in found.explanations}
+    assert found_causes["units: numbers"].quantities == ("torque",)
+    assert found_causes["sign reversed,"].quantities == ("F43",)
+    assert not any(explanation.complete for explanation in found.explanations)
+
+
+EVERY_QUANTITY = [name for name in UNITS if name not in NOT_JUDGED and name != "theta_2"]
+
+
+@pytest.mark.parametrize("quantity", [name for name in EVERY_QUANTITY if not name.startswith("torque_")])
+@pytest.mark.parametrize("name", SCENES)
+def test_every_quantity_is_judged_at_its_own_scale(name: str, quantity: str, tmp_path: Path) -> None:
+    """Off by 1e-9 of its largest value it differs, whatever its unit: A_x was once judged in newtons."""
+    scene = SCENES[name]
+    at = command(scene)
+    at = Command(at.theta_2[::EVERY], at.branch[::EVERY], at.omega_2, at.alpha_2)
+    solution = solve(scene, at=at)
+    numbers = {"theta_2": at.theta_2, quantity: np.array(getattr(solution, quantity))}
+    assert judged(scene, write(tmp_path / "right.csv", numbers, (quantity,))).differing == []
+    size = np.abs(numbers[quantity]).max()
+    off = numbers | {quantity: numbers[quantity] + 1e-9 * (size or 1.0)}
+    found = judged(scene, write(tmp_path / "off.csv", off, (quantity,)))
+    assert len(found.differing) == len(found.findings) > 0
+
+
+def test_a_quantity_of_no_known_scale_is_not_judged_by_another() -> None:
+    """Every unit that is judged has its sum of terms."""
+    scene = SCENES["thesis"]
+    assert {UNITS[name] for name in EVERY_QUANTITY} == TERMS.keys() == POWER.keys()
+    for quantity in ("time", "wheel"):
+        with pytest.raises(KeyError):
+            yardstick(quantity, scene, solve(scene), np.ones(1))
+
+
+@pytest.mark.parametrize("letter", "xy")
+def test_one_component_is_judged_by_itself(letter: str, tmp_path: Path) -> None:
+    scene, path = SCENES["crank_rocker"], tmp_path / "theirs.csv"
+    numbers = right(scene)
+    column = numbers["F12"][:, "xy".index(letter)]
+
+    def found(values: np.ndarray) -> Judgement:
+        rows = [f"{t!r},{x!r}" for t, x in zip(numbers["theta_2"].tolist(), values.tolist(), strict=True)]
+        path.write_text("\n".join([f"theta_2,F12_{letter}", *rows]))
+        return judged(scene, path)
+
+    assert found(column).differing == [] and len(found(column).findings) == len(column)
+    off = found(column + 1e-6 * np.abs(column).max())
+    assert {finding.quantity for finding in off.differing} == {f"F12_{letter}"}
+    first = found(-column).explanations[0]
+    assert "sign reversed" in first.text and first.complete and first.quantities == (f"F12_{letter}",)
+
+
+@pytest.mark.parametrize(("torque", "code"), [("0.0", HOLDS), ("0.04", FAILED), ("5.0", FAILED)])
+def test_what_is_zero_by_all_its_terms_is_judged_in_its_own_unit(torque: str, code: int, tmp_path: Path) -> None:
+    """Bars without mass or load take no torque; half a printed digit over a scale of 0 once excused any number."""
+    linkage = fourbar.FourBar(0.3, fourbar.Bar(0.1), fourbar.Bar(0.25), fourbar.Bar(0.22))
+    (tmp_path / "scene.toml").write_text(fourbar.dump(Scene(linkage, fourbar.Motion(1.0, 2.0))))
+    (tmp_path / "theirs.csv").write_text(f"theta_2,torque\n1.0,{torque}\n")
+    assert status(["check", str(tmp_path / "scene.toml"), str(tmp_path / "theirs.csv")]) == code
+
+
+def test_a_released_scene_is_not_judged_at_the_speed_of_its_start(tmp_path: Path) -> None:
+    released = replace(SCENES["crank_rocker"], motion=fourbar.Motion(1.0, 2.0, free=fourbar.Free(1.0, 10)))
+    path = write(tmp_path / "theirs.csv", right(SCENES["crank_rocker"]))
+    with pytest.raises(fourbar.InputError, match="not while released"):
+        judged(released, path)
+
+
+def test_nonsense_is_explained_by_nothing(tmp_path: Path) -> None:
+    scene = SCENES["crank_rocker"]
+    numbers = right(scene)
+    rng = np.random.default_rng(3)
+    numbers |= {name: rng.normal(size=numbers[name].shape) for name in FORCES}
+    found = judged(scene, write(tmp_path / "theirs.csv", numbers, FORCES))
+    assert found.explanations == []
+
+
+PUBLISHED = {
+    "T4": "308.80440716278196",
+    "F12": ("161.41816840858934", "-156.5062600586869"),
+    "F32": ("-16.155517050935163", "1.2436087010327004"),
+    "F43": ("-15.747450980232276", "-0.10106254809495736"),
+    "F14": ("-15.753131487864277", "-0.4245152186008738"),
+}
+"""The thesis's section 5.7 at theta_2 = 135 deg, N and N cm, digits as printed."""
+
+
+def test_a_number_at_the_end_of_the_range_differs_without_a_warning(tmp_path: Path) -> None:
+    path = tmp_path / "theirs.csv"
+    path.write_text("theta_2,torque\n1e308,1e308\n")
+    assert status(["check", str(MODELS / "crank_rocker.toml"), str(path)]) == FAILED
+
+
+def test_the_thesis_itself_differs_and_its_unit_slip_is_hinted(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    forces = ("F12", "F32", "F43", "F14")
+    path = tmp_path / "thesis.csv"
+    heading = ",".join(f"{name}_x,{name}_y" for name in forces)
+    cells = ",".join(x for name in forces for x in PUBLISHED[name])
+    path.write_text(f"theta_2 [deg],torque [N cm],{heading}\n135,{PUBLISHED['T4']},{cells}\n")
+    assert status(["check", str(MODELS / "thesis.toml"), str(path)]) == FAILED
+    printed = capsys.readouterr().out
+    assert "0 of 5 numbers agree" in printed
+    hint = next(line for line in printed.splitlines() if line.startswith("looks like: m a"))
+    assert "kg cm/s^2 added to N" in hint
+    assert "F12" in hint
+
+
+BAD_TABLES = [
+    ("empty", "", "header and at least one row"),
+    ("header alone", "theta_2,torque\n", "header and at least one row"),
+    ("no angle", "torque\n1\n", "theta_2"),
+    ("no result", "theta_2\n1\n", "needs a result"),
+    ("error bars alone", "theta_2,torque_error\n1,0\n", "needs a result"),
+    ("a row without its angle", "theta_2,torque\n,2\n", "line 2 = ['', '2']: needs a theta_2"),
+    ("blank column alone", "theta_2,torque\n1,\n", "needs a result"),
+    ("one cell more", "theta_2,torque\n1,2,3\n", "needs 2 cells"),
+    ("unit of another kind in a line of its own", "theta_2,torque\nrad,kg\n1,2\n", "kg"),
+    ("of dry friction", "theta_2,torque_low\n1,2\n", "no dry friction"),
+    ("unknown column", "theta_2,wheel\n1,2\n", "known are theta_2"),
+    ("unit of another kind", "theta_2,torque [kg]\n1,2\n", "kg"),
+    ("twice", "theta_2,torque,torque\n1,2,2\n", "twice"),
+    ("word", "theta_2,torque\n1,much\n", "line 2"),
+    ("NaN", "theta_2,torque\n1,nan\n", "finite"),
+    ("too large", "theta_2,torque\n1,1e999\n", "larger than a double"),
+    ("cells missing", "theta_2,torque\n\n1,2\n3\n", "line 4"),
+    ("decimal comma", 'theta_2,torque\n1,"2,5"\n', "must be a number"),
+    ("binary", b"\xff\xfe\x00\x01", "UTF-8"),
+    ("null byte", "theta_2,torque\n1,2\x00\n", "table"),
+    ("escape", "theta_2,\x1b[31mtorque\n1,2\n", "known are"),
+    ("endless exponent", "theta_2,torque\n1,1e-99999999\n", "torque"),
+]
+
+
+@pytest.mark.parametrize(("what", "text", "words"), BAD_TABLES, ids=[case[0] for case in BAD_TABLES])
+def test_a_bad_table_is_one_line(
+    what: str, text: str | bytes, words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "theirs.csv"
+    path.write_bytes(text if isinstance(text, bytes) else text.encode())
+    code = status(["check", str(MODELS / "thesis.toml"), str(path)])
+    printed = capsys.readouterr()
+    if what == "endless exponent":  # a zero, printed to many digits: judged like any other
+        assert code == FAILED
+        return
+    assert code == BAD_INPUT
+    assert words in printed.err
+    assert len(printed.err.splitlines()) == 1
+    assert "\x1b" not in printed.err
+
+
+def test_a_table_that_is_too_large_or_missing_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    large = tmp_path / "large.csv"
+    with large.open("wb") as file:
+        file.truncate(LARGEST_FILE + 1)
+    for path, words in ((large, "must not exceed"), (tmp_path / "none.csv", "no such file"), (tmp_path, "directory")):
+        assert status(["check", str(MODELS / "thesis.toml"), str(path)]) == BAD_INPUT
+        assert words in capsys.readouterr().err
+
+
+def test_positions_that_do_not_assemble_are_named_by_their_line(tmp_path: Path) -> None:
+    path = tmp_path / "theirs.csv"
+    path.write_text("theta_2 [deg],theta_3\n\n45,1\n")
+    found = judged(SCENES["thesis"], path)
+    assert found.not_assembled == [3]
+    assert status(["check", str(MODELS / "thesis.toml"), str(path)]) == FAILED
+
+
+def test_agreement_is_exit_0_in_every_unit(tmp_path: Path) -> None:
+    numbers = right(SCENES["thesis"])
+    path = tmp_path / "theirs.csv"
+    rows = zip(np.degrees(numbers["theta_2"]), numbers["torque"] * 100.0, numbers["F12"] / 9.80665, strict=True)
+    lines = [f"{theta!r},{torque:.9e},{x:.9e},{y:.9e}" for theta, torque, (x, y) in rows]
+    heading = "theta_2 [deg],torque [N cm],F12_x [kgf],F12_y [kgf]"
+    path.write_text("\n".join([heading, *lines]).replace("np.float64(", "").replace(")", ""))
+    assert status(["check", str(MODELS / "thesis.toml"), str(path)]) == HOLDS
+
+
+def rows_of(name: str, *options: str) -> list[list[str]]:
+    """The file of `fourbar analyze --csv`, cell by cell."""
+    text = fourbar.solve(SCENES[name], "error").to_csv(degrees="--degrees" in options)
+    assert text is not None
+    return [line.split(",") for line in text.splitlines()]
+
+
+@pytest.mark.parametrize("options", [(), ("--degrees",)])
+@pytest.mark.parametrize("delimiter", [",", ";", "\t"])
+def test_the_file_of_analyze_is_read_as_it_is_and_as_a_spreadsheet_saves_it(
+    delimiter: str, options: tuple[str, ...], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rows = [row[:14] + row[-8:] for row in rows_of("thesis", *options)[:40]]
+    if delimiter == ";":  # decimal commas, and what is left of a deleted column
+        rows = [[cell.replace(".", ",") for cell in row] + [""] for row in rows]
+    path = tmp_path / "theirs.csv"
+    path.write_text("\ufeff" + "\r\n".join(delimiter.join(row) for row in rows))
+    assert status(["check", str(MODELS / "thesis.toml"), str(path)]) == HOLDS
+    out = capsys.readouterr().out
+    assert "left out (stated by the scene): status, branch, drive_bar" in out
+    assert "left out (blank): torque_low, torque_high" in out and "390 of 390 numbers agree" in out
+
+
+def test_blank_cells_state_nothing_and_the_rest_of_their_row_is_judged(tmp_path: Path) -> None:
+    numbers = right(SCENES["thesis"])
+    path = tmp_path / "theirs.csv"
+    (one, two), (first, second) = numbers["theta_2"][:2].tolist(), numbers["torque"][:2].tolist()
+    third = numbers["F12"][1, 0].item()
+    path.write_text(f"theta_2,torque,F12_x,F12_y,note\n{one},{first},,,a\n{two},{2 * second},{third},,b\n")
+    found = judged(SCENES["thesis"], path)
+    assert [(f.line, f.quantity, f.agrees) for f in found.findings] == [
+        (2, "torque", True), (3, "torque", False), (3, "F12_x", True)
+    ]  # fmt: skip
+    (wrong,) = found.differing
+    assert wrong.theirs == (2 * second,) and wrong.ours == pytest.approx((second,), rel=1e-12)
+
+
+def test_magnitudes_and_a_whole_imperial_table(tmp_path: Path) -> None:
+    numbers = right(SCENES["crank_rocker"])
+    inch, pound = 0.0254, 4.4482216152605
+    columns = {
+        "theta_2 [deg]": np.degrees(numbers["theta_2"]),
+        "omega_3 (rpm)": numbers["omega_3"] * 30.0 / math.pi,
+        "F12 [lbf]": np.hypot(*numbers["F12"].T) / pound,
+        "|F43| [kN]": np.hypot(*numbers["F43"].T) / 1e3,
+        "torque": numbers["torque"] / (pound * inch),
+    }
+    for wrong in (False, True):
+        columns["|F43| [kN]"] *= 1.0 + 1e-6 * wrong
+        rows = zip(*columns.values(), strict=True)
+        under = ",,,,lbf in"  # a line of units under the names
+        lines = [",".join(columns), under, *(",".join(f"{x:.12g}" for x in row) for row in rows)]
+        path = tmp_path / f"theirs{wrong}.csv"
+        path.write_text("\n".join(lines))
+        assert {f.quantity for f in judged(SCENES["crank_rocker"], path).differing} == ({"|F43|"} if wrong else set())
+
+
+def test_a_stated_tolerance_decides_and_the_exact_count_stands_next_to_it(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    numbers = right(SCENES["thesis"])
+    off = numbers | {"torque": numbers["torque"] * (1.0 + 1e-4)}
+    path, model = str(write(tmp_path / "theirs.csv", off)), str(MODELS / "thesis.toml")
+    reports = [f"--json={tmp_path / 'out.json'}", f"--junit={tmp_path / 'out.xml'}"]
+    rows, count = len(numbers["theta_2"]), len(ALL) * len(numbers["theta_2"])
+    assert status(["check", model, path, *reports]) == FAILED
+    report = json.loads((tmp_path / "out.json").read_text())
+    assert (report["compared"], report["agree"], report["holds"]) == (count, count - rows, False)
+    assert {finding["quantity"] for finding in report["differing"]} == {"torque"}
+    first = report["differing"][0]
+    assert first["theirs"] == pytest.approx([off["torque"][0]], rel=1e-15) and first["ours"] != first["theirs"]
+    suites = ET.parse(tmp_path / "out.xml").getroot()
+    assert [case.get("name") for case in suites.iter("testcase") if case.find("failure") is not None] == ["torque"]
+    capsys.readouterr()
+    assert status(["check", model, path, "--rtol", "1e-3", *reports]) == HOLDS
+    sentence = f"{count} of {count} numbers agree within rtol 0.001, atol 0; {count - rows} to round-off"
+    assert sentence in capsys.readouterr().out
+    assert json.loads((tmp_path / "out.json").read_text())["agree_to_round_off"] == count - rows
+    assert ET.parse(tmp_path / "out.xml").getroot().find(".//failure") is None
+    assert status(["check", model, path, "--atol", "1e-9"]) == FAILED
+    assert status(["check", model, path, "--rtol", "-1"]) == BAD_INPUT
+
+
+def test_a_mistake_is_recognised_in_numbers_that_are_right_only_to_the_stated_tolerance(tmp_path: Path) -> None:
+    """A simulation's torque, a ten-thousandth off, under the wrong unit."""
+    numbers = right(SCENES["crank_rocker"])
+    numbers["torque"] = numbers["torque"] * 1e3 * (1.0 + 1e-4 * np.sin(np.arange(len(numbers["torque"]))))
+    table = read_table(write(tmp_path / "theirs.csv", numbers))
+    found = judge_table(SCENES["crank_rocker"], table, Tolerance(rtol=1e-3))
+    assert "N mm where N m" in found.explanations[0].text and found.explanations[0].complete
+
+
+def test_a_law_and_a_changing_branch_are_judged_at_the_positions_of_the_scene(tmp_path: Path) -> None:
+    parallelogram = fourbar.FourBar(0.3, fourbar.Bar(0.1, 0.2), fourbar.Bar(0.3, 0.5), fourbar.Bar(0.1, 0.2))
+    scene = Scene(parallelogram, fourbar.Motion(fourbar.Sweep(0.5, 4.0, 21), 2.0, through="follow"))
+    (tmp_path / "theirs.csv").write_text(str(fourbar.solve(scene).to_csv()))
+    found = judged(scene, tmp_path / "theirs.csv")
+    assert {*solve(scene).branch.tolist()} == {1, -1}
+    assert found.differing == [] and found.not_assembled == [] and found.compared > 100

@@ -1,0 +1,196 @@
+"""What the formulas state of a linkage, compared with engines: it holds on every type, and planted errors are seen."""
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+import fourbar
+import fourbar_validation.compare.statements.transmission
+from fourbar.formulas import mobility, transmission
+from fourbar.linkage import uniform
+from fourbar.scene import Command, Scene, command
+from fourbar_validation import Answer
+from fourbar_validation.compare.rows import REFUSES, Row
+from fourbar_validation.compare.statements.statements import statements
+from fourbar_validation.compare.tolerance import EQUIVALENCE
+from fourbar_validation.engines.loop import Exact
+from fourbar_validation.engines.mujoco.inverse import MujocoInverse
+from fourbar_validation.engines.pinocchio import PinocchioInverse
+from fourbar_validation.engines.witnesses import Witness
+from fourbar_validation.run.judge import judge
+from fourbar_validation.scenes.random import LinkageType, random_scene
+from tests.support.scenes import crank_rocker
+
+ROCKER, TRIPLE, CHANGE = (0.3, 0.1, 0.25, 0.22), (0.22, 0.2, 0.32, 0.18), (0.3, 0.1, 0.3, 0.1)
+LENGTHS = [
+    *(ROCKER, TRIPLE, CHANGE),
+    *((0.3, 0.24, 0.1, 0.22), (0.08, 0.24, 0.2, 0.26), (0.25, 0.22, 0.3, 0.1)),
+    *((0.1, 0.3, 0.3, 0.1), (0.3, 0.3, 0.1, 0.1), (0.2, 0.2, 0.2, 0.2), (3.0, 1.0, 2.0, 2.0), (1.0, 1.0, 0.4, 0.4)),
+]
+SEEN = 1e-9
+"""rad. An error of a limit, an extreme or a ratio of this size must be seen."""
+
+
+def judged(
+    lengths: tuple[float, ...], engine: Callable[[], Exact] = PinocchioInverse, theta_1: float = 0.4
+) -> dict[str, Row]:
+    bars = uniform(*lengths)
+    linkage = fourbar.FourBar(bars.ground, bars.input, bars.coupler, bars.output, theta_1)
+    low, high = mobility.default_range(linkage)
+    scene = Scene(linkage, fourbar.Motion(fourbar.Sweep(low + 0.01, high - 0.01, 7), 2.0), drive_bar=4)
+    witness = engine()
+    rows = statements("scene", scene, witness, witness.answer(scene, command(scene)))
+    return {row.quantity: row for row in rows}
+
+
+@pytest.mark.parametrize("engine", [PinocchioInverse, MujocoInverse])
+@pytest.mark.parametrize("lengths", LENGTHS, ids=str)
+def test_what_is_stated_holds(lengths: tuple[float, ...], engine: type) -> None:
+    rows = judged(lengths, engine)
+    assert all(row.passed for row in rows.values()), rows
+    assert ("through" in rows) == bool(mobility.change_points(uniform(*lengths)))
+
+
+def test_what_is_stated_holds_of_random_linkages() -> None:
+    for index in range(20):
+        scene = random_scene(1, index, tuple(LinkageType))
+        engine = PinocchioInverse()
+        rows = statements("scene", scene, engine, engine.answer(scene, command(scene)))
+        assert all(row.passed for row in rows), rows
+
+
+def changed(function: str, change: Callable[[Any], Any], where: Any = mobility) -> Callable[[pytest.MonkeyPatch], None]:
+    """A module's function answers something else."""
+    true = getattr(where, function)
+
+    def plant(monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setattr(where, function, lambda *a, **k: change(true(*a, **k)))
+
+    return plant
+
+
+def moved(limits: tuple[mobility.LimitPosition, ...], field: str) -> tuple[mobility.LimitPosition, ...]:
+    return tuple(limit._replace(**{field: getattr(limit, field) + SEEN}) for limit in limits)
+
+
+FAULTS = {
+    "a limit missing": (TRIPLE, "range", changed("limit_positions", lambda found: found[:-1])),
+    "interval begins late": (
+        TRIPLE,
+        "range",
+        changed("intervals", lambda found: tuple((low + SEEN, high) for low, high in found)),
+    ),
+    "the complement of the range": (
+        TRIPLE,
+        "range",
+        changed("intervals", lambda found: tuple((high, low + 2 * math.pi) for low, high in found)),
+    ),
+    "turns fully": (TRIPLE, "range", changed("turns_fully", lambda found: True)),
+    "a full turn denied": (ROCKER, "range", changed("turns_fully", lambda found: False)),
+    "sweep leaves the range": (TRIPLE, "range", changed("default_range", lambda found: (found[0] - 0.1, found[1]))),
+    "swing": (ROCKER, "range", changed("swing", lambda found: found + SEEN)),
+    "change point": (CHANGE, "range", changed("change_points", lambda found: found[:1])),
+    "a change point that is none": (ROCKER, "range", changed("change_points", lambda found: (0.4,))),
+    "theta_2 of a dead centre": (
+        ROCKER,
+        "limit_positions",
+        changed("limit_positions", lambda found: moved(found, "theta_2")),
+    ),
+    "theta_3 of a dead centre": (
+        ROCKER,
+        "limit_positions",
+        changed("limit_positions", lambda found: moved(found, "theta_3")),
+    ),
+    "branch of a dead centre": (
+        ROCKER,
+        "limit_positions",
+        changed("limit_positions", lambda found: tuple(limit._replace(branch=-limit.branch) for limit in found)),
+    ),
+    "no branch of a dead centre": (
+        ROCKER,
+        "limit_positions",
+        changed("limit_positions", lambda found: tuple(limit._replace(branch=0) for limit in found)),
+    ),
+    "stretched for folded": (
+        TRIPLE,
+        "limit_positions",
+        changed("limit_positions", lambda found: tuple(limit._replace(stretched=False) for limit in found)),
+    ),
+    "least angle at B": (
+        ROCKER,
+        "transmission",
+        changed("transmission_extremes", lambda found: found._replace(least=found.least + SEEN), transmission),
+    ),
+    "where the angle at B is greatest": (
+        ROCKER,
+        "transmission",
+        changed("transmission_extremes", lambda found: found._replace(theta_2_greatest=0.4), transmission),
+    ),
+    "transmission angle": (
+        ROCKER,
+        "transmission",
+        changed("transmission_angle", lambda found: found + SEEN, transmission),
+    ),
+    "drive condition": (
+        ROCKER,
+        "transmission",
+        changed("drive_sine", lambda found: found * (1.0 + SEEN), fourbar_validation.compare.statements.transmission),
+    ),
+    "mechanical advantage": (
+        ROCKER,
+        "transmission",
+        changed("mechanical_advantage", lambda found: -found, transmission),
+    ),
+    "distance to a singular position": (
+        ROCKER,
+        "transmission",
+        changed("distance_to_singular", lambda found: found + SEEN, transmission),
+    ),
+    "time ratio": (ROCKER, "transmission", changed("time_ratio", lambda found: 1.0 / found)),
+    "no time ratio": (ROCKER, "transmission", changed("time_ratio", lambda found: None)),
+    "branch through a change point": (CHANGE, "through", changed("on_smooth_path", np.negative)),
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_each_error_in_a_statement_is_seen(fault: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    lengths, quantity, plant = FAULTS[fault]
+    plant(monkeypatch)
+    row = judged(lengths)[quantity]
+    assert not row.passed and row.verdict == "fails", row
+    assert row.reason
+
+
+def test_an_engine_that_does_not_answer_agrees_with_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    true = Exact.answer
+
+    def silent(self: Exact, scene: Scene, at: fourbar.scene.Command) -> Any:
+        answer = true(self, scene, at)
+        answer.quantities = {name: np.full_like(value, np.nan) for name, value in answer.quantities.items()}
+        return answer
+
+    monkeypatch.setattr(Exact, "answer", silent)
+    for lengths in (ROCKER, TRIPLE):
+        assert not judged(lengths)["limit_positions"].passed
+        assert not judged(lengths)["transmission"].passed
+
+
+class Shy:
+    """Refuses whatever is not the scene of the test: the positions of the statements."""
+
+    name = "shy"
+
+    def answer(self, scene: Scene, at: Command) -> Answer:
+        return (
+            PinocchioInverse().answer(scene, at) if scene.title else Answer("shy", "exact", refusal="too near a limit")
+        )
+
+
+def test_an_engine_that_refuses_the_positions_of_the_statements_refuses_them_in_a_row() -> None:
+    rows = judge("scene", crank_rocker(), [Witness("shy", f"{__name__}:Shy", EQUIVALENCE)]).rows
+    (row,) = (row for row in rows if row.setting == "statements of the linkage")
+    assert (row.verdict, row.reason) == (REFUSES, "too near a limit")
+    assert not any(row.failed for row in rows)

@@ -1,0 +1,331 @@
+"""What is counted as agreeing: no refusal, no missing number, no empty table; and every form says the same."""
+
+import html
+import json
+import math
+import subprocess
+import xml.etree.ElementTree as ET
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import fourbar
+from fourbar.errors import FAILED, HOLDS
+from fourbar.formulas.mobility import limit_positions
+from fourbar.scene import Command, Scene, command
+from fourbar_validation.check.model import ModelReport
+from fourbar_validation.cli import status
+from fourbar_validation.compare.answer import Answer, Released
+from fourbar_validation.compare.columns import read_columns
+from fourbar_validation.compare.compare import compare
+from fourbar_validation.compare.counts import Counts
+from fourbar_validation.compare.rows import AGREES, DEGRADED, FAILS, REFUSES, UNDECIDED, VERDICTS, Row, write_results
+from fourbar_validation.compare.tolerance import EQUIVALENCE
+from fourbar_validation.engines.witnesses import WITNESSES, Witness
+from fourbar_validation.lab.cost.laws import Law
+from fourbar_validation.lab.stress.mutation import mutation
+from fourbar_validation.regression import render
+from fourbar_validation.regression.changes import differences
+from fourbar_validation.report.html import html as page_of
+from fourbar_validation.report.html import markdown
+from fourbar_validation.run import released as free
+from fourbar_validation.run.judge import judge, judged
+from tests.support.here import judge_here, summary_of
+from tests.support.scenes import crank_rocker
+from tests.validation.regression.test_regression import HERE, ROW, save
+from tests.validation.run.test_judge import Echo
+
+NAN = math.nan
+
+
+def rows(**counts: int) -> list[Row]:
+    """So many rows of each verdict."""
+    names = {"agree": AGREES, "degraded": DEGRADED, "undecided": UNDECIDED, "refuse": REFUSES, "fail": FAILS}
+    return [replace(ROW, verdict=names[name]) for name, many in counts.items() for _ in range(many)]
+
+
+def test_a_quantity_that_every_row_calls_degraded_is_counted_and_named() -> None:
+    def row(scene: str, engine: str, quantity: str, verdict: str, allowed: float) -> Row:
+        return replace(ROW, scene=scene, engine=engine, quantity=quantity, verdict=verdict, allowed=allowed)
+
+    scenes = {
+        "one": [("a", "F12", DEGRADED, 1e-3), ("b", "F12", DEGRADED, 2e-4), ("a", "F43", AGREES, 1e-14)],
+        "two": [("a", "F12", DEGRADED, 1.0), ("b", "F12", AGREES, 1e-14), ("b", "F43", FAILS, NAN)],
+        "three": [("a", "torque", DEGRADED, 0.5), ("b", "torque", REFUSES, NAN)],
+    }
+    records = [
+        replace(judged("", crank_rocker(), ()), name=name, rows=[row(name, *of) for of in many])
+        for name, many in scenes.items()
+    ]
+    summary = summary_of(records)
+    assert (summary.loose, summary.pairs) == (2, 5)
+    stated = "2 of 5 quantities of a scene are at best"
+    for form in (markdown(summary), page_of(summary, dict.fromkeys(scenes, 2))):
+        text = html.unescape(form)
+        assert stated in text and "torque of three (allowed 5.0e-01), F12 of one (allowed 2.0e-04)" in text
+    assert stated not in markdown(summary_of(records[1:2]))
+
+
+IDENTITY = replace(ROW, engine="formulas", quantity="closure")
+
+
+@pytest.mark.parametrize(
+    ("of", "sentence", "status"),
+    [
+        (rows(agree=2), "All 2 comparisons hold: 2 agree", HOLDS),
+        (
+            rows(agree=1, degraded=2, undecided=1, refuse=3),
+            "All 3 comparisons hold: 1 agrees, 2 degraded as predicted; not compared: 1 undecided, 3 refuse",
+            HOLDS,
+        ),
+        (
+            rows(agree=1, fail=2, refuse=1),
+            "FAILS: 2 of 3 comparisons do not hold: 1 agrees, 2 fail; not compared: 1 refuses",
+            FAILED,
+        ),
+        (rows(refuse=2), "Nothing was compared: 2 refuse", FAILED),
+        (rows(undecided=1), "Nothing was compared: 1 undecided", FAILED),
+        ([], "Nothing was compared", FAILED),
+        ([IDENTITY], "Nothing was compared: 1 of the formulas' own identities hold", FAILED),
+        (
+            [replace(IDENTITY, verdict=FAILS)],
+            "FAILS: 1 of 1 comparisons do not hold: 1 fails",
+            FAILED,
+        ),
+        ([replace(IDENTITY, quantity="theta_2")], "All 1 comparisons hold: 1 agrees", HOLDS),  # with an exact solution
+    ],
+)
+def test_all_hold_counts_what_was_compared_alone(of: list[Row], sentence: str, status: int) -> None:
+    counts = Counts(of)
+    assert (counts.sentence(), counts.status) == (sentence, status)
+
+
+def test_a_row_passes_where_it_was_compared_and_holds() -> None:
+    assert {verdict: replace(ROW, verdict=verdict).passed for verdict in VERDICTS} == {
+        **dict.fromkeys((AGREES, DEGRADED), True),
+        **dict.fromkeys((UNDECIDED, REFUSES, FAILS), False),
+    }
+    for changed in ({"error": NAN}, {"verdict": DEGRADED, "error": NAN}, {"verdict": "passes"}):
+        with pytest.raises(ValueError, match="no verdict"):
+            replace(ROW, **changed)  # type: ignore[arg-type]
+
+
+def test_a_table_cannot_say_that_a_refusal_passed(tmp_path: Path) -> None:
+    write_results(rows(refuse=1), tmp_path / "results.csv")
+    text = (tmp_path / "results.csv").read_text()
+    assert ",false,refuses," in text
+    (tmp_path / "results.csv").write_text(text.replace(",false,", ",true,"))
+    assert [row.passed for row in read_columns(tmp_path / "results.csv")] == [False]
+    (tmp_path / "results.csv").write_text(text.replace("refuses", "FAILED"))
+    assert status(["compare", str(tmp_path), str(tmp_path)]) == 2
+
+
+class OnlyWithEffects(Echo):
+    """Refuses the scene without loads and effects."""
+
+    def answer(self, scene: Scene, command: Command) -> Answer:
+        if scene.effects:
+            return super().answer(scene, command)
+        return Answer("echo", "exact", refusal="nothing acts")
+
+
+class AlarmedWithoutEffects(Echo):
+    """Its watch on itself finds something wrong where nothing acts."""
+
+    def answer(self, scene: Scene, command: Command) -> Answer:
+        answer = super().answer(scene, command)
+        answer.alarms += [] if scene.effects else ["it shakes"]
+        return answer
+
+
+class SilentWithoutEffects(Echo):
+    """Does not say where the loop closes where nothing acts."""
+
+    def answer(self, scene: Scene, command: Command) -> Answer:
+        answer = super().answer(scene, command)
+        return answer if scene.effects else replace(answer, assembled=None)
+
+
+@pytest.mark.parametrize(
+    ("engine", "verdict", "reason"),
+    [
+        (OnlyWithEffects, REFUSES, "nothing acts"),
+        (AlarmedWithoutEffects, FAILS, "watch: it shakes"),
+        (SilentWithoutEffects, FAILS, "assembled: the engine did not say where the loop closes"),
+    ],
+)
+def test_what_is_wrong_with_the_inertia_alone_is_a_row(engine: type, verdict: str, reason: str) -> None:
+    witness = Witness("echo", f"{__name__}:{engine.__name__}", EQUIVALENCE)
+    found = [row for row in judge("scene", crank_rocker(), [witness]).rows if row.quantity == "torque_inertia"]
+    assert [(row.verdict, row.reason) for row in found] == [(verdict, reason)]
+
+
+def test_where_no_loop_closes_no_identity_is_counted_as_held() -> None:
+    apart = fourbar.Motion(fourbar.Sweep(2.0, 4.0, 5), 1.0)  # beyond the limits of this input
+    scene = Scene(fourbar.uniform(0.3, 0.25, 0.1, 0.22), apart)
+    assert not fourbar.solve(scene).assembled.any()
+    found = judge("scene", scene, [w for w in WITNESSES if w.name == "free-body"]).rows
+    verdicts = {(row.engine, row.quantity): row.verdict for row in found}
+    assert verdicts["formulas", "closure"] == verdicts["free-body", "torque"] == UNDECIDED
+    assert verdicts["free-body", "assembled"] == AGREES
+
+
+def test_an_identity_that_is_due_nowhere_is_not_counted_as_held(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(
+        "fourbar_validation.compare.identities.reversing", lambda scene, solution, _: np.ones(len(solution), bool)
+    )
+    verdicts = {row.quantity: row.verdict for row in judge("scene", crank_rocker(), []).rows}
+    expected = {"closure": AGREES, "force_sum": UNDECIDED, "moment_sum": UNDECIDED}
+    assert verdicts.items() >= expected.items()
+
+
+def test_formulas_without_an_answer_fail() -> None:
+    scene = crank_rocker()
+    at = command(scene)
+    answer = Echo().answer(scene, at)
+    positions = fourbar.solve(scene, "position", at=at)
+    (row,) = [r for r in compare("", scene, answer, positions, EQUIVALENCE, ("torque",)) if r.quantity == "torque"]
+    assert (row.verdict, row.reason) == (FAILS, "the formulas have no answer")
+
+
+ONE_POSITION = """
+[lengths]
+ground = "4 m"
+input = "1 m"
+coupler = "3 m"
+output = "3 m"
+[motion]
+theta_2 = "10 deg"
+omega_2 = "1 rad/s"
+"""
+
+
+def test_a_run_in_which_nothing_was_compared_says_so_everywhere_and_ends_with_1(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    judge_here(monkeypatch)
+    (tmp_path / "scene.toml").write_text(ONE_POSITION)
+    out = tmp_path / "out"
+    arguments = ["run", str(tmp_path / "scene.toml"), "--no-pictures", "--out", str(out)]
+    assert status([*arguments, "--engines", "mujoco-simulated"]) == FAILED  # one position is no motion through time
+    sentence = "Nothing was compared on 1 scene: 7 of the formulas' own identities hold"
+    assert sentence in " ".join(capsys.readouterr().out.split())
+    assert sentence in (out / "report.md").read_text()
+    page = html.unescape((out / "report.html").read_text())
+    assert f'<h1 class="bad">{sentence}</h1>' in page and '<span class="bad">nothing compared</span>' in page
+    assert status([*arguments, "--engines", "mujoco-simulated,free-body"]) == HOLDS
+
+
+def test_every_form_of_a_report_says_the_same_counts() -> None:
+    refused = Witness("echo", "tests.validation.run.test_judge:Refuses", EQUIVALENCE)
+    exact = next(w for w in WITNESSES if w.name == "free-body")
+    good, bad = (
+        judged(name, crank_rocker(title=name), witnesses, draw=False)
+        for name, witnesses in (("good", (exact, refused)), ("refused", (refused,)))
+    )
+    summary = summary_of([good, bad])
+    # the rows of the formulas themselves stand on both scenes; the others are of the free bodies
+    sentence = "All 52 comparisons on 1 of 2 scenes hold: 52 agree; not compared: 2 refuse"
+    assert summary.verdict == sentence == summary.counts.sentence() and summary.good
+    assert sentence in markdown(summary)
+    page = page_of(summary, {})
+    assert sentence in html.unescape(page)
+    assert page.count('class="cell refuses"') == 4 and ">nothing compared</span>" in page
+    assert ModelReport([], [], []).counts.status == FAILED
+
+
+def test_a_free_motion_that_every_engine_refuses_is_not_held(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Refusing:
+        def __init__(self, step: float) -> None:
+            self.step = step
+
+        def release(self, scene: Scene, times: object) -> Released:
+            return Released.refused("refusing", "-", "a declared limit")
+
+    monkeypatch.setattr(free, "resolve_name", lambda _: Refusing)
+    scene = crank_rocker(motion=fourbar.Motion(1.0, 0.0, free=fourbar.Free(0.2, 20)))
+    page = judged("free", scene, (), draw=False)
+    sentence = "Nothing was compared on 1 scene: 1 of the formulas' own identities hold; 2 refuse"
+    assert summary_of([page]).verdict == sentence
+
+
+def junit(old: list[Row], new: list[Row]) -> ET.Element:
+    return ET.fromstring(render.junit(differences((HERE, old), (HERE, new))))
+
+
+def test_junit_skips_what_was_not_compared_and_fails_what_fails_as_before() -> None:
+    def of(quantity: str, verdict: str) -> Row:
+        return replace(ROW, quantity=quantity, verdict=verdict, error=1e-15 if verdict == AGREES else NAN)
+
+    both = [of("torque", AGREES), of("all", REFUSES), of("F12", UNDECIDED), of("F14", FAILS)]
+    suites = junit(both, both)
+    kinds = {case.get("name"): [child.tag for child in case] for case in suites.iter("testcase")}
+    assert kinds == {"torque": [], "all": ["skipped"], "F12": ["skipped"], "F14": ["failure"]}
+    assert (suites.get("tests"), suites.get("failures"), suites.get("skipped")) == ("4", "1", "2")
+    worse = junit([of("torque", AGREES)], [of("torque", REFUSES)])
+    assert next(child.tag for case in worse.iter("testcase") for child in case) == "failure"
+    nothing = junit(both[1:2], both[1:2])
+    assert nothing.get("failures") == "1" and nothing.get("skipped") == "1"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "sentence", "code"),
+    [
+        (rows(agree=1), rows(agree=1), "No regression in 1 rows: 1 same. New run: All 1 comparisons hold", HOLDS),
+        (rows(refuse=1), rows(refuse=1), "Nothing was compared with the old run in 1 rows: 1 same", FAILED),
+        (rows(fail=1), rows(fail=1), "No regression in 1 rows: 1 same. New run: FAILS: 1 of 1", HOLDS),
+        (rows(agree=1), rows(refuse=1), "1 regression in 1 rows: 1 verdict got worse", FAILED),
+    ],
+)
+def test_two_runs_without_a_comparison_in_common_are_no_success(
+    old: list[Row], new: list[Row], sentence: str, code: int, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folders = [str(save(tmp_path / name, each)) for name, each in (("old", old), ("new", new))]
+    assert status(["compare", *folders]) == code
+    assert sentence in capsys.readouterr().out
+    found = differences((HERE, old), (HERE, new))
+    sentence = render.verdict(found)
+    assert sentence in html.unescape(render.html(found)) and sentence in render.markdown(found)
+
+
+def test_of_two_rows_of_one_name_the_worse_one_counts() -> None:
+    both = [*rows(fail=1), *rows(agree=1)]
+    assert differences((HERE, rows(agree=1)), (HERE, both)).regressed
+
+
+def test_numbers_without_a_digit_do_not_agree(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    # 1e-13 rad from a limit of theta_2 the condition of the accelerations is about 1e-13
+    rocker = fourbar.uniform(0.3, 0.25, 0.1, 0.22)
+    limit = limit_positions(rocker)[0].theta_2
+    near = (Scene(rocker, fourbar.Motion(limit + side * 1e-13, 1.0)) for side in (1.0, -1.0))
+    scene = next(each for each in near if fourbar.solve(each).assembled.all())
+    (tmp_path / "scene.toml").write_text(fourbar.dump(scene))
+    (tmp_path / "theirs.csv").write_text(f"theta_2, torque\n{scene.motion.theta_2!r}, 17.0\n")
+    assert status(["check", str(tmp_path / "scene.toml"), str(tmp_path / "theirs.csv")]) == FAILED
+    assert "Nothing was compared; no digit left to judge 1 more by" in capsys.readouterr().out
+
+
+def test_a_study_in_which_no_law_is_fitted_is_no_success(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("fourbar_validation.lab.cost.study.Study.points", lambda _: iter(()))
+    monkeypatch.setattr("fourbar_validation.lab.cost.cost.write", lambda *_: [])
+    law = Law("order", "torque", 4.0, 0.1, 4.0, 9)
+    for found, code in (([], FAILED), ([replace(law, points=1)], FAILED), ([law], HOLDS)):
+        monkeypatch.setattr("fourbar_validation.lab.cost.cost.laws", lambda _, found=found: found)
+        assert status(["cost", "--out", str(tmp_path)]) == code
+        assert ("Nothing was compared" in capsys.readouterr().out) == (code == FAILED)
+
+
+def test_a_harness_that_was_tried_on_no_changing_mutant_is_no_success(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    tally = {"mutants": 0, "changing": 0, "caught": 0, "missed": []}
+    monkeypatch.setattr(mutation, "_generate", lambda *_: None)
+    for changing, caught, code in ((0, 0, FAILED), (100, 94, FAILED), (100, 95, HOLDS)):
+        printed = json.dumps({"mobility": tally | {"changing": changing, "caught": caught}})
+        done = subprocess.CompletedProcess([], 0, printed)
+        monkeypatch.setattr(mutation.subprocess, "run", lambda *_, done=done, **__: done)
+        assert mutation._harness(tmp_path, tmp_path, "mobility", 0, tmp_path) == code

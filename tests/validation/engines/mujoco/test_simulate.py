@@ -1,0 +1,205 @@
+"""MuJoCo's simulation against the formulas at the motion it really made."""
+
+import math
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import fourbar
+from fourbar.mjcf import RECIPE
+from fourbar.mjcf.settings import Run
+from fourbar.quantities import UNKNOWNS
+from fourbar_validation.compare.answer import Answer
+from fourbar_validation.compare.compare import compare
+from fourbar_validation.compare.rows import AGREES, FAILS, REFUSES
+from fourbar_validation.compare.tolerance import SIMULATED
+from fourbar_validation.engines.mujoco.closed_loop import ClosedLoop
+from fourbar_validation.engines.mujoco.simulate import MujocoSimulated, observed_order
+from fourbar_validation.engines.mujoco.watch import Watch
+from fourbar_validation.engines.witnesses import WITNESSES
+from fourbar_validation.run.judge import judge
+from fourbar_validation.scenes.random import LinkageType, random_scene
+from tests.support.scenes import crank_rocker, thesis
+
+TURN = fourbar.Sweep(0.1, 0.1 + 2 * math.pi, 90)
+
+
+def scene(
+    lengths: tuple[float, float, float, float], sweep: fourbar.Sweep, omega: float, **parts: object
+) -> fourbar.Scene:
+    """Offset mass centres, gravity, loads in both frames."""
+    d, a, b, c = lengths
+    bars = [fourbar.Bar(x, 0.4, None, (0.55 * x, turn)) for x, turn in ((a, 0.2), (b, 0.3), (c, -0.2))]
+    loads = (
+        fourbar.Load(4, (3.0, 0.7), (0.05, 1.0)),
+        fourbar.Load(3, (2.0, 0.3), (0.03, 0.2), frame="bar"),
+        fourbar.Load(2, moment=-0.2),
+    )
+    whole: dict[str, object] = {
+        "linkage": fourbar.FourBar(d, bars[0], bars[1], bars[2], 0.2),
+        "motion": fourbar.Motion(sweep, omega, 0.0),
+        "loads": loads,
+        "effects": (fourbar.Gravity(),),
+    }
+    return fourbar.Scene(**{**whole, **parts})  # type: ignore[arg-type]
+
+
+DRAG, ROCKER, TRIPLE = (0.1, 0.3, 0.25, 0.28), (0.3, 0.25, 0.1, 0.28), (0.35, 0.25, 0.2, 0.25)
+EVERY_PIN = {"O2": 0.02, "A": 0.03, "B": 0.04, "O4": 0.05}
+SCENES = {
+    "crank-rocker": crank_rocker(motion=fourbar.Motion(TURN, 10.0, 5.0)),
+    "backwards": crank_rocker(motion=fourbar.Motion(TURN, -10.0)),
+    "crossed": crank_rocker(motion=fourbar.Motion(TURN, 10.0, branch=-1)),
+    "drive on bar 4": crank_rocker(motion=fourbar.Motion(TURN, 10.0, 3.0), drive_bar=4),
+    "drag link": scene(DRAG, TURN, 10.0),
+    "drag link, drive on bar 3": scene(DRAG, TURN, 10.0, drive_bar=3),
+    "double rocker": scene(ROCKER, fourbar.Sweep(0.2 + math.radians(38), 0.2 + math.radians(85), 90), 10.0),
+    "triple rocker": scene(TRIPLE, fourbar.Sweep(0.2 - math.radians(94), 0.2 + math.radians(94), 90), 10.0),
+    "thesis": thesis(fourbar.Sweep(math.radians(86.618), math.radians(363.382), 180)),
+    "viscous": crank_rocker(motion=fourbar.Motion(TURN, 10.0), effects=(fourbar.Viscous.at(**EVERY_PIN),)),
+}
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_within_1e_5_of_the_scale(name: str) -> None:
+    posed = SCENES[name]
+    answer = MujocoSimulated().answer(posed, fourbar.command(posed))
+    assert answer.refusal is None and answer.at is not None
+    rows = compare(name, posed, answer, fourbar.solve(posed, at=answer.at), SIMULATED, UNKNOWNS)
+    assert {row.quantity for row in rows} == {"assembled", "undecided", *UNKNOWNS}
+    assert all(row.passed for row in rows), [row for row in rows if not row.passed]
+    assert answer.evidence["time_went_back"] == answer.evidence["bad_states"] == 0.0
+
+
+@pytest.mark.parametrize("index", [1, 6, 10, 21])
+@pytest.mark.parametrize("loaded", [False, True], ids=["bare", "loaded"])
+def test_slow_linkages_hold_as_well(loaded: bool, index: int) -> None:
+    """One pass of Newton's method is all they get; under loads the closure must be the stiffer for it."""
+    drawn = random_scene(7, index, tuple(LinkageType))
+    slow = replace(drawn, motion=replace(drawn.motion, omega_2=0.001 if loaded else 0.01, alpha_2=0.0), drive_bar=2)
+    posed = slow if loaded else replace(slow, loads=(), effects=())
+    answer = MujocoSimulated().answer(posed, fourbar.command(posed))
+    rows = compare("", posed, answer, fourbar.solve(posed, at=answer.at), SIMULATED, UNKNOWNS)
+    assert all(row.passed for row in rows), [row for row in rows if not row.passed]
+
+
+def test_an_input_that_speeds_up_covers_the_end_of_its_window_in_as_many_steps() -> None:
+    run = Run(0.0, 3.0, 0.01, 5.0)
+    assert run.fastest * run.timestep(RECIPE) <= 3.0 / RECIPE.steps_per_window
+
+
+def test_it_is_run_near_the_requested_positions() -> None:
+    posed = SCENES["crank-rocker"]
+    command = fourbar.command(posed)
+    at = MujocoSimulated().answer(posed, command).at
+    assert at is not None
+    assert np.abs(at.theta_2 - command.theta_2).max() <= math.pi / 600  # half a step of some 628 a turn
+
+
+def test_a_wrong_load_is_seen() -> None:
+    posed = SCENES["crank-rocker"]
+    answer = MujocoSimulated().answer(posed, fourbar.command(posed))
+    other = replace(posed, loads=(replace(posed.loads[0], bar=3), *posed.loads[1:]))
+    rows = compare("", other, answer, fourbar.solve(other, at=answer.at), SIMULATED, UNKNOWNS)
+    assert {row.quantity for row in rows if not row.passed} >= {"F12", "F32", "F43", "F14", "torque"}
+
+
+def test_positions_outside_the_range_are_not_assembled() -> None:
+    posed = scene(TRIPLE, fourbar.Sweep(0.2 - math.pi, 0.2 + math.pi, 72), 10.0)
+    command = fourbar.command(posed)
+    answer = MujocoSimulated().answer(posed, command)
+    inside = np.abs(command.theta_2 - 0.2) < math.radians(95.739)  # cosine rule at b + c
+    assert answer.assembled is not None and np.array_equal(answer.assembled, inside)
+    assert np.isfinite(answer.quantities["F43"]).all(axis=1).tolist() == inside.tolist()
+
+
+@pytest.mark.parametrize(
+    ("motion", "reason"),
+    [
+        (fourbar.Motion(TURN, 0.0), "nothing to simulate"),
+        (fourbar.Motion(TURN), "nothing to simulate"),
+        (fourbar.Motion(1.0, 10.0), "nothing to run through"),
+        (fourbar.Motion(TURN, 1.0, -5.0), "to rest"),
+    ],
+)
+def test_refusals_state_their_reason(motion: fourbar.Motion, reason: str) -> None:
+    posed = crank_rocker(motion=motion)
+    refusal = MujocoSimulated().answer(posed, fourbar.command(posed)).refusal
+    assert refusal is not None and reason in refusal and "\n" not in refusal
+
+
+def test_a_change_point_is_a_declared_limit() -> None:
+    motion = fourbar.Motion(TURN, 10.0)
+    for lengths, refused in (
+        ((0.3, 0.1, 0.3, 0.1), True),
+        ((0.1, 0.1, 0.25, 0.25), True),
+        ((0.3, 0.1, 0.3, 0.11), False),
+    ):
+        posed = fourbar.Scene(fourbar.uniform(*lengths), motion)
+        refusal = MujocoSimulated().answer(posed, fourbar.command(posed)).refusal
+        assert (refusal is not None and "change point" in refusal) == refused
+
+
+def test_error_falls_with_the_fourth_power_of_the_timestep() -> None:
+    """RK4, the closure's time constant held in seconds, so that the softness stays what it is."""
+    posed = crank_rocker(motion=fourbar.Motion(TURN, 10.0))
+
+    def error(answer: Answer) -> float:
+        return float(np.abs(answer.quantities["F43"] - fourbar.solve(posed, at=answer.at).F43).max())  # type: ignore[operator]
+
+    coarse, fine, order = observed_order(posed, fourbar.command(posed), error)
+    assert fine < coarse and 3.0 < order < 6.0, (coarse, fine, order)
+
+
+def test_a_residual_that_is_no_number_raises_its_alarm(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Watch, "evidence", lambda self: {"force_gap": math.nan})
+    monkeypatch.setattr(ClosedLoop, "gap", lambda self, right=ClosedLoop.gap: (right(self)[0], math.nan)
+                        if self.data.time else right(self))  # fmt: skip
+    posed = crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.1, 0.4, 3), 10.0))
+    alarms = MujocoSimulated().answer(posed, fourbar.command(posed)).alarms
+    assert {alarm.partition(" = ")[0] for alarm in alarms} == {"force_gap", "closure_gap"}
+
+
+def test_without_an_error_there_is_no_order(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(MujocoSimulated, "answer", lambda *_: Answer("", ""))
+    assert math.isnan(observed_order(crank_rocker(), fourbar.command(crank_rocker()), lambda _: 0.0)[2])
+
+
+def hood(links: float, output: float | None = None) -> fourbar.Scene:
+    """14.5 kg that reach far out on light links, slowly."""
+    coupler = fourbar.Bar(0.08, 14.5, 5.0, (1.0, 0.2))
+    bars = (fourbar.Bar(0.10, links), coupler, fourbar.Bar(0.12, links if output is None else output))
+    motion = fourbar.Motion(fourbar.Sweep(0.8, 1.8, 12), 0.5)
+    return fourbar.Scene(fourbar.FourBar(0.11, *bars), motion, effects=(fourbar.Gravity(),), title="hood")
+
+
+SIMULATION = [replace(witness, order="") for witness in WITNESSES if witness.name == "mujoco-simulated"]
+
+
+@pytest.mark.parametrize("links", [1e-2, 1e-8])
+def test_the_closure_is_as_stiff_as_the_lightest_bar_that_it_joins_needs(links: float) -> None:
+    """With pads for bars of one size the inertial torque was 3e-5 wrong at 10 g, 3e-3 at 1 g."""
+    record = judge("hood", hood(links), SIMULATION)
+    assert {row.verdict for row in record.rows} == {AGREES}
+    assert record.answers[0].evidence["mass_ratio"] > 1e5
+    (inertia,) = (row for row in record.rows if row.quantity == "torque_inertia")
+    assert inertia.error < 1e-6
+
+
+def test_a_simulation_that_fails_names_the_ratio_of_masses(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("fourbar.mjcf.document.mass_ratio", lambda linkage: 1.0)  # pads for bars of one size
+    (failed,) = (row for row in judge("hood", hood(1e-3), SIMULATION).rows if row.verdict == FAILS)
+    assert failed.quantity == "torque_inertia"
+    assert failed.reason == "modelling + integration; of coupler and output one is 9.1e+06 times lighter"
+
+
+@pytest.mark.parametrize(("links", "output"), [(0.0, None), (0.01, 0.0)])
+def test_the_mass_that_a_massless_bar_is_advised_to_have_leads_to_a_pass(links: float, output: float | None) -> None:
+    (refused,) = (row for row in judge("hood", hood(links, output), SIMULATION).rows if row.quantity == "all")
+    advised = re.search('with mass = "(.*) kg"', refused.reason)
+    assert refused.verdict == REFUSES and advised is not None
+    mass = float(advised[1])
+    scene = hood(links or mass, None if output is None else mass)
+    assert {row.verdict for row in judge("hood", scene, SIMULATION).rows} == {AGREES}

@@ -1,0 +1,335 @@
+"""Each effect and each pair of effects through every engine that has it, and faults that the run must catch."""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from copy import copy
+from dataclasses import replace
+from functools import cache
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+import pytest
+
+import fourbar
+from fourbar.effects import (
+    Effect,
+    Flywheel,
+    Friction,
+    Gravity,
+    Load,
+    PinFriction,
+    Point,
+    Spring,
+    Springs,
+    Table,
+    Torsion,
+    Viscous,
+)
+from fourbar.effects.actions import Actions, bodies
+from fourbar.files.effects import REGISTRY
+from fourbar.formulas.arithmetic import dot
+from fourbar.formulas.path import state
+from fourbar.linkage import MOVING_BARS
+from fourbar.scene import Scene, command
+from fourbar_validation.engines import free_body, free_body_effects
+from fourbar_validation.engines.effects import TERM_OF
+from fourbar_validation.engines.free_body_closure import close
+from fourbar_validation.engines.witnesses import WITNESSES
+from fourbar_validation.run.judge import judge
+from tests.support.scenes import crank_rocker
+
+TABLE = Table((0.0, 1.0, 2.5, 2 * np.pi), (0.0, 1.0, -0.5, 0.0))
+ACTING: dict[str, Effect] = {
+    "gravity": Gravity(9.81, 0.3),
+    "viscous": Viscous.at(O2=0.02, A=0.03, B=0.04, O4=0.05),
+    "friction": Friction.at(O2=0.02, A=0.03, B=0.04, O4=0.05),
+    "pin_friction": PinFriction.at(O2=(0.2, 0.01), A=(0.3, 0.01), B=(0.1, 0.02), O4=(0.2, 0.01)),
+    "torsion": Torsion.at(O4=(2.0, 1.9, 0.1), B=(1.0, 0.8, -0.2)),
+    "springs": Springs(
+        (
+            Spring(Point(1, 0.1, -1.5), Point(4, 0.08, 0.2), 200.0, 0.05, 3.0),
+            Spring(Point(2, 0.05, 0.5), Point(3, 0.1, 0.3), 50.0, 0.05, 1.0),
+        )
+    ),
+    "flywheel": Flywheel(0.02, 2),
+    "load": Load(4, (3.0, 0.7), (0.05, 1.0), 0.2, "bar"),
+    "load over theta_2": Load(3, (4.0, 0.7), (0.05, 1.0), 0.2, "world", TABLE),
+}
+EXACT = [witness for witness in WITNESSES if not witness.through_time]
+SIMULATED = [replace(witness, order="") for witness in WITNESSES if witness.through_time]
+ENGINES = {"pinocchio-inverse", "mujoco-inverse"}
+"""What acts by `TERM_OF`, the table of the engines."""
+INVERSE = {*ENGINES, "free-body"}
+NO_COUNTERPART = {"mujoco-simulated": {"pin_friction"}}
+"""What an engine cannot do; it must say so, and the others remain."""
+
+
+@cache
+def scene(*names: str) -> Scene:
+    """A crank-rocker with the effects named, driven on bar 2; one for all faults in them."""
+    terms = [ACTING[name] for name in names]
+    return crank_rocker(
+        motion=fourbar.Motion(fourbar.Sweep(0.13, 0.13 + 2 * np.pi, 12), 10.0, 3.0),
+        loads=tuple(term for term in terms if isinstance(term, Load)),
+        effects=tuple(term for term in terms if not isinstance(term, Load)),
+    )
+
+
+def outcome(posed: Scene, witnesses: list[Any]) -> tuple[list[tuple[str, str, str]], set[str]]:
+    """What fails, and who refuses."""
+    rows = judge("scene", posed, witnesses).rows
+    return [(r.engine, r.quantity, r.reason) for r in rows if r.failed], {
+        r.engine for r in rows if r.verdict == "refuses"
+    }
+
+
+def failing(posed: Scene, witnesses: list[Any]) -> list[tuple[str, str, str]]:
+    return outcome(posed, witnesses)[0]
+
+
+def test_every_effect_of_the_registry_is_here() -> None:
+    assert set(REGISTRY) <= set(ACTING)
+
+
+@pytest.mark.parametrize("names", [*((one,) for one in ACTING), *combinations(ACTING, 2)], ids="+".join)
+def test_exact_engines_agree(names: tuple[str, ...]) -> None:
+    assert outcome(scene(*names), EXACT) == ([], set())
+
+
+@pytest.mark.parametrize("names", [*((one,) for one in ACTING), tuple(ACTING)], ids="+".join)
+def test_the_simulation_agrees_or_says_what_it_has_no_counterpart_for(names: tuple[str, ...]) -> None:
+    missing = NO_COUNTERPART["mujoco-simulated"] & set(names)
+    assert outcome(scene(*names), SIMULATED) == ([], {"mujoco-simulated"} if missing else set())
+
+
+@pytest.mark.parametrize("pair", list(combinations(sorted(ACTING.keys() - NO_COUNTERPART["mujoco-simulated"]), 2)))
+def test_the_simulation_agrees_on_pairs(pair: tuple[str, str]) -> None:
+    assert failing(scene(*pair), SIMULATED) == []
+
+
+@pytest.mark.parametrize("drive", [2, 3, 4])
+@pytest.mark.parametrize("branch", [1, -1])
+def test_all_at_once_on_every_drive_and_branch(drive: int, branch: int) -> None:
+    posed = scene(*ACTING)
+    motion = replace(posed.motion, branch=branch, omega_2=-7.0)
+    assert failing(replace(posed, drive_bar=drive, motion=motion), EXACT) == []
+
+
+def test_a_turned_frame_turns_gravity_with_it() -> None:
+    """Ground, input and gravity turned by one angle: the same torque and the same forces, turned."""
+    posed, by = scene("gravity"), 0.7
+    motion = replace(posed.motion, theta_2=fourbar.Sweep(0.13 + by, 0.13 + by + 2 * np.pi, 12))
+    turned = replace(
+        posed,
+        linkage=replace(posed.linkage, ground_angle=posed.linkage.ground_angle + by),
+        motion=motion,
+        effects=(Gravity(9.81, 0.3 + by),),
+    )
+    one, other = fourbar.solve(posed), fourbar.solve(turned)
+    assert one.torque is not None and one.F32 is not None and other.F32 is not None
+    # 60 roundings of numbers of the size of the largest
+    assert other.torque == pytest.approx(one.torque, abs=60 * 2.0**-52 * np.abs(one.torque).max(), rel=0)
+    spin = np.exp(1j * by)
+    expected = (one.F32 @ [1, 1j]) * spin
+    assert np.abs(other.F32 @ [1, 1j] - expected).max() <= 60 * 2.0**-52 * np.abs(expected).max()
+
+
+# faults
+
+
+def changed(effect: Effect, factor: float) -> Callable[[Any, Actions, Any], None]:
+    right = type(effect).act
+
+    def faulty(self: Any, actions: Actions, state: Any) -> None:
+        alone = Actions(state, actions.bodies, actions.side)
+        right(self, alone, state)
+        for put, sums in (
+            (actions.force, alone.forces),
+            (actions.moment, alone.moments),
+            (actions.couple, alone.couples),
+        ):
+            for where, acting in sums.items():
+                put(where, factor * acting)  # type: ignore[operator]
+
+    return faulty
+
+
+OTHER_PIN = {"O2": "A", "A": "B", "B": "O4", "O4": "O2"}
+
+
+def moved(effect: Effect) -> Effect:
+    """The effect at another pin, on another bar, or in another direction."""
+    match effect:
+        case Viscous():
+            return Viscous.at(**{OTHER_PIN[pin]: k for pin, k in effect.coefficients})
+        case Friction():
+            return Friction.at(**{OTHER_PIN[pin]: f for pin, f in effect.torques})
+        case PinFriction():
+            return PinFriction.at(**{OTHER_PIN[pin]: (mu, r) for pin, mu, r in effect.pins})
+        case Torsion():
+            return Torsion.at(**{OTHER_PIN[pin]: (k, rest, preload) for pin, k, rest, preload in effect.springs})
+        case Springs():
+            first, *others = effect.springs
+            return Springs((replace(first, end=first.end._replace(bar=3)), *others))
+        case Flywheel():
+            return Flywheel(effect.inertia, 4)
+        case Gravity():
+            return Gravity(effect.magnitude, effect.angle + 1.0)
+        case Load():
+            return replace(effect, bar=5 - effect.bar if effect.bar == 3 else 3)
+    raise NotImplementedError(effect)
+
+
+@contextmanager
+def formulas_see(change: Callable[[Scene], Scene]) -> Iterator[None]:
+    """The formulas work on a changed scene, the engines on the true one."""
+    import fourbar_validation.run.judge
+
+    true = fourbar_validation.run.judge.solve
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(fourbar_validation.run.judge, "solve", lambda scene, *a, **k: true(change(scene), *a, **k))
+        yield
+
+
+def each_term(change: Callable[[Effect], list[Effect]]) -> Callable[[Scene], Scene]:
+    def changed_scene(posed: Scene) -> Scene:
+        terms = [new for term in (*posed.loads, *posed.effects) for new in change(term)]
+        loads = tuple(term for term in terms if isinstance(term, Load))
+        return replace(posed, loads=loads, effects=tuple(term for term in terms if not isinstance(term, Load)))
+
+    return changed_scene
+
+
+def reversed_slip(term: Effect) -> list[Effect]:
+    """Pin-load friction that drives instead of braking."""
+    assert isinstance(term, PinFriction)
+    driving = copy(term)  # which its constructor refuses
+    object.__setattr__(driving, "pins", tuple((pin, -mu, r) for pin, mu, r in term.pins))
+    return [driving]
+
+
+class Lightening(Flywheel):
+    """A flywheel that takes its inertia from the bar."""
+
+    @property
+    def carried(self) -> dict[int, float]:
+        return {self.bar: -self.inertia}
+
+
+@pytest.mark.parametrize("name", ACTING)
+@pytest.mark.parametrize("fault", ["wrong sign", "wrong pin or bar", "applied twice", "missing"])
+def test_a_fault_in_the_formulas_fails_the_run(name: str, fault: str) -> None:
+    posed, effect = scene(name), ACTING[name]
+    inverse = [witness for witness in EXACT if witness.name in INVERSE]
+    if fault == "missing":
+        with formulas_see(each_term(lambda term: [])):
+            found = failing(posed, inverse)
+    elif fault == "wrong pin or bar":
+        with formulas_see(each_term(lambda term: [moved(term)])):
+            found = failing(posed, inverse)
+    elif fault == "applied twice":
+        with formulas_see(each_term(lambda term: [term, term])):
+            found = failing(posed, inverse)
+    elif name == "pin_friction":
+        with formulas_see(each_term(reversed_slip)):
+            found = failing(posed, inverse)
+    elif name == "flywheel":
+        with formulas_see(each_term(lambda term: [Lightening(0.02, 2)])):
+            found = failing(posed, inverse)
+    else:
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(type(effect), "act", changed(effect, -1.0))
+            found = failing(posed, inverse)
+    assert {engine for engine, _, _ in found} >= INVERSE
+    assert "torque" in {quantity for _, quantity, _ in found}
+
+
+class FaultyTree:
+    """An engine's tree on which whatever acts is multiplied."""
+
+    def __init__(self, tree: Any, factor: float) -> None:
+        self.tree, self.factor = tree, factor
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.tree, name)
+
+    def push(self, bar: int, force: Any, point: Any) -> None:
+        self.tree.push(bar, self.factor * force, point)
+
+    def twist(self, bar: int, couple: float) -> None:
+        self.tree.twist(bar, self.factor * couple)
+
+    def gravity(self, vector: tuple[float, float]) -> None:
+        self.tree.gravity((self.factor * vector[0], self.factor * vector[1]))
+
+
+@pytest.mark.parametrize("name", [name for name in ACTING if name != "pin_friction"])
+@pytest.mark.parametrize("factor", [-1.0, 2.0, 0.0], ids=["wrong sign", "applied twice", "missing"])
+def test_a_fault_in_the_wrench_on_the_free_bodies_fails_the_run(
+    name: str, factor: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def faulty(right: Callable[..., None]) -> Callable[..., None]:
+        def act(effect: Any, motion: Any, wrenches: free_body_effects.Wrenches) -> None:
+            alone = free_body_effects.Wrenches(len(motion.theta_2))
+            right(effect, motion, alone)
+            for bar in (2, 3, 4):
+                wrenches.push(bar, factor * alone.force[bar], 0.0)
+                wrenches.twist(bar, factor * alone.moment[bar])
+
+        return act
+
+    if isinstance(ACTING[name], Load):
+        monkeypatch.setattr(free_body_effects, "_load", faulty(free_body_effects._load))
+    else:
+        monkeypatch.setitem(free_body_effects.WRENCH_OF, name, faulty(free_body_effects.WRENCH_OF[name]))
+    found = failing(scene(name), [witness for witness in EXACT if witness.name == "free-body"])
+    assert "torque" in {quantity for _, quantity, _ in found}
+
+
+def test_what_the_formulas_make_of_a_spring_does_not_reach_the_engines(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Spring, "slack", 0.0)
+    found = failing(scene("springs"), [witness for witness in EXACT if witness.name in ENGINES])
+    assert {engine for engine, _, _ in found} >= ENGINES
+
+
+@pytest.mark.parametrize("name", ACTING)
+@pytest.mark.parametrize("factor", [-1.0, 2.0, 0.0], ids=["wrong sign", "applied twice", "missing"])
+def test_a_fault_in_the_engine_term_fails_the_run(name: str, factor: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    key = ACTING[name].key
+    right = TERM_OF[key]
+    monkeypatch.setitem(TERM_OF, key, lambda effect, tree: right(effect, FaultyTree(tree, factor)))
+    found = failing(scene(name), [witness for witness in EXACT if witness.name in ENGINES])
+    assert {engine for engine, _, _ in found} >= ENGINES
+
+
+@pytest.mark.parametrize("name", [n for n in ACTING if n not in ("pin_friction", "flywheel")])
+def test_the_work_of_an_effect_is_that_of_the_forces_on_the_free_bodies(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Power = sum of F v + M omega, with F and M of the witness and velocities of the first pins; a sign must show."""
+    posed, effect = scene(name), ACTING[name]
+    where, linkage = command(posed), posed.linkage
+    moving = state(linkage, where.theta_2, where.branch, 10.0, 3.0)
+    n = len(where.theta_2)
+    closed = close(linkage, where.theta_2, where.branch)
+    on = free_body_effects.acting(
+        posed, free_body.move(linkage, where.theta_2, np.full(n, 10.0), np.full(n, 3.0), *closed.theta)
+    )
+    pin = {2: 0.0j, 3: moving.velocity(2, linkage.input.length), 4: 0.0j}
+    by_bar = {bar: dot(on.force[bar], pin[bar]) + on.moment[bar] * moving.omega(bar) for bar in MOVING_BARS}
+    others = by_bar[3] + by_bar[4]
+    expected = np.array([by_bar[2] + others, others])
+
+    def off() -> float:
+        actions = Actions(moving, bodies(linkage))
+        effect.act(actions, moving)
+        # of all bars, and of bars 3 and 4 alone
+        return max(
+            np.abs(work * moving.speed - power).max() for work, power in zip(actions.work(), expected, strict=True)
+        )
+
+    allowed = 1e-12 * np.abs(expected).max()
+    assert off() <= allowed
+    monkeypatch.setattr(type(effect), "act", changed(effect, -1.0))
+    assert off() > 1e6 * allowed

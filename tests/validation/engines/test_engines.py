@@ -1,0 +1,437 @@
+"""The exact engines: published figures, round-off agreement, the right branch, limits, faults that must show."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
+from importlib import import_module
+from importlib.util import find_spec
+from pkgutil import resolve_name
+from typing import Any, ClassVar
+
+import numpy as np
+import pytest
+
+from fourbar.effects import Effect, Friction, Gravity, Load, PinFriction, Viscous
+from fourbar.errors import InputError
+from fourbar.linkage import Bar, FourBar, uniform
+from fourbar.scene import Command, Scene, command
+from fourbar.scene.motion import Motion
+from fourbar.solve import solve
+from fourbar_validation.compare.compare import COMPARED, compare
+from fourbar_validation.compare.identities import closure
+from fourbar_validation.compare.tolerance import EPS, EQUIVALENCE, K
+from fourbar_validation.engines import loop
+from fourbar_validation.engines.effects import TERM_OF
+from fourbar_validation.engines.limits import LIGHTEST
+from fourbar_validation.engines.mujoco.inverse import MujocoInverse, MujocoTree
+from fourbar_validation.engines.witnesses import FURTHER, WITNESSES
+from fourbar_validation.scenes.random import LinkageType
+from fourbar_validation.scenes.suites import Random
+from tests.support.scenes import thesis
+from tests.validation.engines.test_effects import ACTING, scene
+
+WITNESS = {witness.name: witness for witness in (*WITNESSES, *FURTHER) if not witness.through_time}
+TREES = {"pinocchio-inverse": "PinocchioTree", "mujoco-inverse": "MujocoTree", "drake-inverse": "DrakeTree"}
+BARS = {**TREES, "exudyn-constraints": "ExudynBars", "opensim-constraints": "OpenSimBars"}
+OWN = {"exudyn-constraints": {"viscous", "torsion", "springs"}}
+"""Effects that an engine has elements for."""
+PRINTED = 5e-10
+"""The last digit of the figures, which were computed with ten."""
+
+LOADS = (
+    Load(2, (10.0, 1.0), (0.05, 2.0), -0.15),
+    Load(3, (4.0, 0.3), (0.1, 0.5), 0.3, "bar"),
+    Load(4, (3.0, 0.1), (0.02, 2.0), 1.0),
+)
+EFFECTS = (
+    Gravity(),
+    Viscous.at(O2=0.1, A=0.2, B=0.3, O4=0.1),
+    Friction.at(O2=0.2, A=0.5, B=0.7, O4=0.1),
+)
+MECHANISMS = {  # ground, input, coupler, output
+    "crank-rocker": (0.3, 0.1, 0.25, 0.22),
+    "drag link": (0.1, 0.3, 0.25, 0.22),
+    "Grashof double rocker": (0.3, 0.25, 0.1, 0.22),
+    "triple rocker": (0.3, 0.25, 0.22, 0.3),
+}
+
+
+def present(*names: str) -> list[Any]:
+    """Engines, each skipped by its name where it is not installed."""
+    libraries = {name: WITNESS[name].library for name in names}
+    return [
+        pytest.param(
+            name,
+            marks=pytest.mark.skipif(bool(lib) and find_spec(lib) is None, reason=str(WITNESS[name].missing())),
+        )
+        for name, lib in libraries.items()
+    ]
+
+
+each_witness = pytest.mark.parametrize("name", present(*WITNESS))
+each_engine = pytest.mark.parametrize("name", present(*BARS))
+each_tree = pytest.mark.parametrize("name", present(*TREES))
+further = pytest.mark.parametrize("name", present(*(witness.name for witness in FURTHER)))
+
+
+def bars(lengths: tuple[float, ...], ground_angle: float = 0.4) -> FourBar:
+    """Bars whose mass centres lie off their lines."""
+    d, *moving = lengths
+    two, three, four = (Bar(x, 1.0 + x, 0.3 * x * x, (0.6 * x, 0.5 + x)) for x in moving)
+    return FourBar(d, two, three, four, ground_angle)
+
+
+def random_linkage(rng: np.random.Generator) -> FourBar:
+    while True:
+        try:
+            return bars(tuple(10.0 ** rng.uniform(-1.0, 0.0, 4)), rng.uniform(-3.0, 3.0))
+        except InputError:
+            continue
+
+
+def answered(name: str, case: Scene, at: Command | None = None) -> Any:
+    return WITNESS[name].engine().answer(case, at or command(case))
+
+
+def failures(name: str, case: Scene, every: int = 1) -> list[tuple[str, str]]:
+    """Quantities on which an engine and the formulas disagree, or its refusal."""
+    at = command(case)
+    at = at._replace(theta_2=at.theta_2[::every], branch=at.branch[::every])
+    answer = answered(name, case, at)
+    if answer.refusal is not None:
+        return [("refusal", answer.refusal)]
+    rows = compare("scene", case, answer, solve(case, "force", at=at), EQUIVALENCE, COMPARED)
+    rows.append(closure("scene", case, answer))
+    return [(row.quantity, row.reason) for row in rows if not row.passed]
+
+
+@each_witness
+def test_thesis_figures(name: str) -> None:
+    got = answered(name, thesis()).quantities
+    assert got["torque"][0] == pytest.approx(3.0930935923, abs=PRINTED, rel=0.0)
+    figures = {"F12": (7.033117757, -2.121209407), "F32": (-15.480491243, 0.568582894)}
+    figures |= {"F43": (-15.476569658, 0.555136181), "F14": (-15.476837016, 0.551901654)}
+    for force, figure in figures.items():
+        assert got[force][0] == pytest.approx(figure, abs=PRINTED, rel=0.0), force
+
+
+@each_witness
+@pytest.mark.parametrize("lengths", MECHANISMS.values(), ids=MECHANISMS.keys())
+def test_agrees_to_round_off(name: str, lengths: tuple[float, ...]) -> None:
+    for drive in (2, 3, 4):
+        for branch in (1, -1):
+            case = Scene(bars(lengths), Motion(None, 10.0, 3.0, branch), drive, LOADS, EFFECTS)
+            assert failures(name, case, every=12) == [], (drive, branch)
+
+
+@further
+def test_each_load_and_effect(name: str) -> None:
+    assert {effect: failures(name, scene(effect)) for effect in ACTING} == {effect: [] for effect in ACTING}
+    case = scene(*ACTING)
+    for drive in (2, 3, 4):
+        for branch in (1, -1):
+            motion = replace(case.motion, branch=branch, omega_2=-7.0)
+            assert failures(name, replace(case, drive_bar=drive, motion=motion)) == [], (drive, branch)
+
+
+@further
+def test_random_linkages(name: str) -> None:
+    suite = Random(20, 3, tuple(LinkageType))
+    for index in range(len(suite)):
+        assert failures(name, suite.scene(index), every=6) == [], suite.name(index)
+
+
+@each_engine
+def test_accelerations_of_points(name: str) -> None:
+    case = Scene(bars(MECHANISMS["crank-rocker"]), Motion(np.linspace(0.0, 6.0, 25), 10.0, 3.0), 2, (), (Gravity(),))
+    ours, got = solve(case), answered(name, case).quantities
+    for point in ("A", "B", "G2", "G3", "G4", "a_A", "a_B", "a_G2", "a_G3", "a_G4"):
+        expected = getattr(ours, point)
+        allowed = K * EPS * np.abs(expected).max() / ours.condition.min() ** 2
+        assert np.abs(got[point] - expected).max() <= allowed, point
+
+
+@each_tree
+def test_the_branch_is_the_commanded_one(name: str) -> None:
+    """On 300 random linkages, cold and warm; B lies left of the diagonal from A to O4 on branch +1."""
+    rng = np.random.default_rng(7)
+    missing = 0
+    for _ in range(300):
+        linkage = random_linkage(rng)
+        theta_2 = rng.uniform(-10.0, 10.0, 8)
+        branch = rng.choice(np.array([1, -1], dtype=np.int8), 8)
+        answer = answered(name, Scene(linkage, Motion(theta_2)), Command(theta_2, branch, None, 0.0))
+        here = answer.assembled
+        a, b = answer.quantities["A"], answer.quantities["B"]
+        foot = linkage.ground * np.array([math.cos(linkage.ground_angle), math.sin(linkage.ground_angle)])
+        side = (foot - a)[:, 0] * (b - a)[:, 1] - (foot - a)[:, 1] * (b - a)[:, 0]
+        assert np.array_equal(np.sign(side[here]), branch[here])
+        assert np.isnan(b[~here]).all()
+        # circles about A and O4 meet: the criterion, from squares of lengths alone
+        d2 = ((foot - linkage.input.length * np.c_[np.cos(theta_2), np.sin(theta_2)]) ** 2).sum(axis=1)
+        lengths = linkage.coupler.length, linkage.output.length
+        meets = (d2 <= sum(lengths) ** 2) & (d2 >= (lengths[0] - lengths[1]) ** 2)
+        assert np.array_equal(meets, here)
+        missing += int((~here).sum())
+    assert missing > 100, "the sample must hold positions that do not assemble"
+
+
+@each_witness
+@pytest.mark.parametrize("offset", [1e-3, 1e-6, 1e-9, 1e-12])
+def test_assembles_up_to_a_limit_and_not_beyond(name: str, offset: float) -> None:
+    linkage = bars(MECHANISMS["triple rocker"], 0.0)
+    d, a, b, c = linkage.lengths
+    limit = math.acos((d * d + a * a - (b + c) ** 2) / (2.0 * d * a))  # bars 3 and 4 stretched
+    for sign in (1, -1):
+        for branch in (1, -1):
+            answer = answered(name, Scene(linkage, Motion(limit - sign * offset, 1.0, branch=branch)))
+            if answer.refusal is not None:  # Simbody's declared limit
+                assert "dependent" in answer.refusal and offset < 1e-6
+                continue
+            assert bool(answer.assembled[0]) == (sign > 0)
+            assert np.isnan(answer.quantities["torque"][0]) == (not answer.assembled[0])
+
+
+@each_witness
+def test_positions_only(name: str) -> None:
+    quantities = answered(name, Scene(bars(MECHANISMS["crank-rocker"]), Motion(np.array([0.5, 1.0])))).quantities
+    assert "theta_3" in quantities and "torque" not in quantities and "omega_3" not in quantities
+
+
+@each_tree
+def test_angles_are_continuous(name: str) -> None:
+    theta_4 = answered(name, Scene(bars(MECHANISMS["drag link"]), Motion(np.linspace(0.0, 12.0, 240), 1.0)))
+    theta_4 = theta_4.quantities["theta_4"]
+    assert -math.pi < theta_4[0] <= math.pi
+    assert np.abs(np.diff(theta_4)).max() < 1.0
+    assert np.ptp(theta_4) > math.tau
+
+
+def with_bar(number: int, **values: Any) -> Scene:
+    """A crank-rocker with another mass, inertia or mass centre of one bar."""
+    bars = {2: Bar(0.1, 0.2), 3: Bar(0.25, 0.5), 4: Bar(0.22, 0.4)}
+    bars[number] = Bar(bars[number].length, **values)
+    return Scene(FourBar(0.3, bars[2], bars[3], bars[4]), Motion(np.linspace(0.1, 6.0, 6), 10.0, 3.0), 2, LOADS)
+
+
+MASSLESS = {"mass": 0.0}, {"mass": 0.0, "inertia": 0.1}
+POINT = {"mass": 1.0, "inertia": 0.0, "centre": (0.0, 0.0)}
+REFUSED = {
+    "pinocchio-inverse": ((), ()),
+    "mujoco-inverse": ((2, 3, 4), (2, 3, 4)),
+    "exudyn-constraints": ((), ()),
+    "opensim-constraints": ((2, 3, 4), (2,)),
+    "drake-inverse": ((2, 3, 4), (3, 4)),
+}
+"""The bars that an engine refuses without mass, and without inertia about their pin."""
+
+
+@each_engine
+def test_bars_without_mass_or_inertia(name: str) -> None:
+    """Exudyn and Pinocchio hold them; MuJoCo and OpenSim would drop them, and OpenSim and Drake divide by some."""
+    without_mass, without_inertia = REFUSED[name]
+    for number in (2, 3, 4):
+        for values, refused in (*((each, without_mass) for each in MASSLESS), (POINT, without_inertia)):
+            found = failures(name, with_bar(number, **values))
+            if number in refused:
+                assert found[0][0] == "refusal" and f"bar {number}" in found[0][1]
+            else:
+                assert found == []
+
+
+@each_engine
+def test_light_bars_are_held_or_refused(name: str) -> None:
+    """Below 2.2e-16 kg Pinocchio's sum of two inertias puts the mass centre elsewhere."""
+    linkage = with_bar(2, mass=0.2).linkage
+    light = {bar: replace(getattr(linkage, bar), mass=1e-18) for bar in ("input", "coupler", "output")}
+    case = Scene(replace(linkage, **light), Motion(np.linspace(0.1, 6.0, 6), 10.0, 3.0))
+    assert failures(name, case) == [] or (name == "mujoco-inverse" and failures(name, case)[0][0] == "refusal")
+
+
+def test_the_floor_of_mujoco_is_where_it_is_stated_to_be() -> None:
+    d, a, b, c = MECHANISMS["crank-rocker"]
+    case = Scene(FourBar(d, Bar(a, 1.0), Bar(b, 1.0), Bar(c, LIGHTEST.boundary, LIGHTEST.boundary)))
+    MujocoTree(case)
+    for mass, inertia in ((0.9 * LIGHTEST.boundary, LIGHTEST.boundary), (LIGHTEST.boundary, 0.9 * LIGHTEST.boundary)):
+        below = replace(case, linkage=replace(case.linkage, output=Bar(c, mass, inertia)))
+        assert MujocoInverse().answer(below, command(below)).refusal is not None
+        with pytest.raises(ValueError, match="mass and inertia"):
+            MujocoTree(below)
+
+
+@pytest.mark.parametrize("name", present("opensim-constraints"))
+def test_simbody_loses_a_constraint_where_the_limit_says(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Bars 3 and 4 nearly in one line: just inside the limit it is exact, well beyond it the force is lost."""
+    from fourbar_validation.engines import opensim
+
+    linkage = with_bar(2, mass=0.2).linkage
+    linkage = replace(linkage, input=Bar(0.25, 0.2), coupler=Bar(0.22, 0.5), output=Bar(0.3, 0.4))
+    d, a, b, c = linkage.lengths
+    limit = math.acos((d * d + a * a - (b + c) ** 2) / (2.0 * d * a))
+
+    def near(offset: float) -> Scene:
+        return Scene(linkage, Motion(limit - offset, 1.0))
+
+    assert failures(name, near(1e-6)) == []
+    assert "drops" in failures(name, near(1e-13))[0][1]
+    monkeypatch.setattr(opensim, "LEAST_CONDITIONED", 0.0)
+    assert {"F12", "F32", "F43", "F14", "torque"} <= {quantity for quantity, _ in failures(name, near(1e-13))}
+
+
+@dataclass(frozen=True)
+class Wind(Effect):
+    """An effect that no engine knows."""
+
+    key: ClassVar[str] = "wind"
+
+
+@each_witness
+def test_what_has_no_model_is_refused_by_name(name: str) -> None:
+    assert "'wind'" in (answered(name, replace(scene(), effects=(Wind(),))).refusal or "")
+
+
+def scaled(method: Callable[..., Any], factor: float) -> Callable[..., Any]:
+    """A method that answers another number."""
+    return lambda *arguments: method(*arguments) * factor
+
+
+def wrong_loop_force(right: Callable[..., Any]) -> Callable[..., Any]:
+    return lambda self, force, torque: right(self, -force, torque)
+
+
+def nothing_on_bar_3(right: Callable[..., Any]) -> Callable[..., Any]:
+    return lambda self, bar, couple: None if bar == 3 else right(self, bar, couple)
+
+
+def longer(right: Callable[..., Any]) -> Callable[..., Any]:
+    return lambda self: {bar: force * (1.0 + 1e-9) for bar, force in right(self).items()}
+
+
+def larger(right: Callable[..., Any]) -> Callable[..., Any]:
+    return lambda self, bar: right(self, bar) + 1e-13
+
+
+IN_A_TREE = {
+    "drift": (partial(scaled, factor=0.0), {"alpha_3", "alpha_4", "torque", "F12"}),
+    "turn": (partial(scaled, factor=1.0 + 1e-9), {"omega_3", "torque"}),
+    "rotation": (partial(scaled, factor=1.0 + 1e-9), {"F43", "torque"}),
+    "forces": (wrong_loop_force, {"F12", "F32", "F14"}),
+    "carried": (longer, {"F12", "F32", "F14"}),
+    "twist": (nothing_on_bar_3, {"torque"}),
+    "angle": (larger, {"theta_3", "theta_4"}),
+}
+PLANTED = {
+    **dict.fromkeys(TREES, IN_A_TREE),
+    "exudyn-constraints": {
+        "_applied": (partial(scaled, factor=1.0 + 1e-9), {"F12", "F32", "F43", "F14", "torque"}),
+        "acceleration": (partial(scaled, factor=0.0), {"alpha_3", "alpha_4", "torque"}),
+        "_constraint_jacobian": (partial(scaled, factor=1.0 + 1e-9), {"omega_3", "omega_4", "torque"}),
+        "rotation": (partial(scaled, factor=1.0 + 1e-9), {"F43", "torque"}),
+        "twist": (nothing_on_bar_3, {"torque"}),
+        "angle": (larger, {"theta_3", "theta_4"}),
+    },
+    "opensim-constraints": {
+        "_equations": (partial(scaled, factor=1.0 + 1e-9), {"omega_3", "omega_4", "torque"}),
+        "_reaction": (partial(scaled, factor=1.0 + 1e-9), {"F12", "F43", "F14"}),
+        "_closing_force": (partial(scaled, factor=-1.0), {"F32"}),
+        "rotation": (partial(scaled, factor=1.0 + 1e-9), {"F43", "torque"}),
+        "twist": (nothing_on_bar_3, {"torque"}),
+        "angle": (larger, {"theta_3", "theta_4"}),
+    },
+}
+"""By engine and method: what is put in its place, and the quantities on which that must show."""
+
+
+def judged(name: str) -> set[str]:
+    motion = Motion(np.linspace(0.3, 6.0, 6), 10.0, 3.0)
+    return {found for found, _ in failures(name, Scene(bars(MECHANISMS["crank-rocker"]), motion, 4, LOADS, EFFECTS))}
+
+
+@each_engine
+def test_a_planted_fault_shows(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    owner = getattr(import_module(WITNESS[name].adapter.partition(":")[0]), BARS[name])
+    assert judged(name) == set()
+    for method, (fault, seen) in PLANTED[name].items():
+        with monkeypatch.context() as patch:
+            patch.setattr(owner, method, fault(getattr(owner, method)))
+            assert seen <= judged(name), method
+    right = loop.Position.find
+    monkeypatch.setattr(loop.Position, "find", lambda self, theta_2, branch: right(self, theta_2, -branch))
+    assert {"theta_3", "theta_4", "torque"} <= judged(name)
+
+
+def twice(row: Callable[..., Any]) -> Callable[..., Any]:
+    """A row of a table that acts two times."""
+    return lambda effect, bars: (row(effect, bars), row(effect, bars))
+
+
+@each_engine
+@pytest.mark.parametrize("key", sorted(TERM_OF.keys() - {"gravity"}))
+def test_a_fault_in_a_row_shows_but_where_an_engine_has_its_own(
+    name: str, key: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also in what depends on the load of a pin."""
+    monkeypatch.setitem(TERM_OF, key, twice(TERM_OF[key]))
+    shown = {quantity for quantity, _ in failures(name, scene(key))}
+    assert shown == set() if key in OWN.get(name, ()) else "torque" in shown
+
+
+@pytest.mark.parametrize("name", present("exudyn-constraints"))
+def test_a_fault_in_an_element_of_exudyn_shows(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    from fourbar_validation.engines.exudyn_elements import ELEMENT_OF
+
+    assert ELEMENT_OF.keys() == OWN[name]
+    for key in OWN[name]:
+        monkeypatch.setitem(ELEMENT_OF, key, twice(ELEMENT_OF[key]))
+        assert {"F43", "torque"} <= {quantity for quantity, _ in failures(name, scene(key))}, key
+
+
+@each_engine
+def test_a_thousand_turns_take_no_position(name: str) -> None:
+    linkage, angles = bars(MECHANISMS["crank-rocker"]), np.array([1.0, 4.0])
+    near, far = (answered(name, Scene(linkage, Motion(x, 10.0, 3.0))) for x in (angles, angles + 2000.0 * math.pi))
+    assert far.assembled is not None and far.assembled.all()
+    np.testing.assert_allclose(far.quantities["torque"], near.quantities["torque"], rtol=1e-9)
+
+
+@each_engine
+def test_a_position_before_leaves_nothing_behind(name: str) -> None:
+    fast = Scene(bars(MECHANISMS["crank-rocker"]), Motion(np.array([1.0, 2.0]), 3e4, 1e9))
+    whole, at = answered(name, fast).quantities, command(fast)
+    alone = answered(name, fast, at._replace(theta_2=at.theta_2[1:], branch=at.branch[1:])).quantities
+    for quantity in ("omega_3", "alpha_4", "F12", "F43", "torque"):
+        np.testing.assert_array_equal(whole[quantity][1:], alone[quantity], err_msg=quantity)
+        assert np.isfinite(alone[quantity]).all(), quantity
+
+
+def test_a_scene_before_leaves_nothing_behind() -> None:
+    """MuJoCo keeps one memory for the trees of an engine."""
+    linkage, at = bars(MECHANISMS["crank-rocker"]), Motion(np.linspace(0.0, 6.0, 5), 10.0, 3.0)
+    plain, loaded = Scene(linkage, at), Scene(replace(linkage, ground=0.31), at, 4, LOADS, EFFECTS)
+    engine = MujocoInverse()
+    engine.answer(loaded, command(loaded))
+    kept, fresh = (each.answer(plain, command(plain)).quantities for each in (engine, MujocoInverse()))
+    for name, values in fresh.items():
+        np.testing.assert_array_equal(kept[name], values, err_msg=name)
+
+
+@pytest.mark.parametrize(
+    ("drive", "mu", "r", "theta_2"),
+    [(4, 0.3, 0.1, 1.0891061452513966), (4, 0.5, 0.05, 1.0198324022346368), (3, 0.5, 0.05, 5.106983240223463)],
+)
+def test_near_a_jam_an_engine_finds_the_one_solution_that_there_is(
+    drive: int, mu: float, r: float, theta_2: float
+) -> None:
+    link, motion = uniform(0.3, 0.1, 0.25, 0.22), Motion(np.array([theta_2]), 3.0, 2.0)
+    for arms, jams in ((r, False), (50.0, True)):
+        friction = PinFriction.at(**dict.fromkeys(("A", "B", "O4"), (mu, arms)))
+        whole = Scene(link, motion, drive, (), (Gravity(), friction))
+        names = (
+            "fourbar_validation.engines.pinocchio:PinocchioInverse",
+            "fourbar_validation.engines.free_body:FreeBody",
+        )
+        answers = [resolve_name(name)().answer(whole, command(whole)) for name in names]
+        engine, bodies = (answer.quantities["torque"][0] for answer in answers)
+        assert math.isnan(engine) is math.isnan(bodies) is jams
+        assert jams or abs(engine - bodies) <= 1e-9 * abs(bodies)  # of some 1e-12 that rounding leaves near a jam

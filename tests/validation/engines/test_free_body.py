@@ -1,0 +1,272 @@
+"""The free bodies against levers, energy and 50 digits, never against the formulas; and faults in them must show."""
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+import mpmath as mp
+import numpy as np
+import pytest
+
+import fourbar
+from fourbar.effects import Flywheel, Friction, Gravity, Load, PinFriction, Point, Spring, Springs, Viscous
+from fourbar.linkage import PINS
+from fourbar.quantities import STAGE_OF
+from fourbar.scene import Scene, command
+from fourbar_validation.engines import free_body, free_body_closure, free_body_effects
+from fourbar_validation.engines.free_body import FreeBody, slide
+from fourbar_validation.engines.witnesses import WITNESSES
+from fourbar_validation.run.judge import judge
+from tests.support.scenes import crank_rocker
+from tests.whole.test_imports import ROOT, imported
+
+EPS = 2.0**-52
+DIGITS = 50.0 * EPS
+"""Of the sum of the terms: an equation of some fifty roundings, evaluated in doubles."""
+ONE = [witness for witness in WITNESSES if witness.name == "free-body"]
+RECTANGLE = fourbar.FourBar(0.3, fourbar.Bar(0.1), fourbar.Bar(0.3), fourbar.Bar(0.1))
+
+
+def answered(scene: Scene) -> dict[str, Any]:
+    answer = FreeBody().answer(scene, command(scene))
+    assert answer.refusal is None and answer.assembled is not None and answer.assembled.all()
+    return answer.quantities
+
+
+def test_it_imports_the_description_and_nothing_of_the_formulas() -> None:
+    allowed = (
+        "fourbar.linkage",
+        "fourbar.scene",
+        "fourbar_validation.compare.answer",
+        "fourbar_validation.engines.free_body",
+        "numpy",
+    )
+    allowed += ("fourbar_validation.engines.description",)  # which imports the description alone
+    standard = {"collections", "dataclasses", "math", "typing"}
+    for module in (free_body, free_body_closure, free_body_effects):
+        modules = imported(ROOT / "validation/fourbar_validation/engines" / f"{module.__name__.split('.')[-1]}.py")
+        assert modules
+        assert not {each for each in modules if not each.startswith(allowed) and each.split(".")[0] not in standard}
+
+
+# the closure
+
+
+def gap(lengths: tuple[float, ...], theta_2: Any, theta_3: Any, theta_4: Any) -> list[Any]:
+    """Both closure equations, theta_1 = 0, m."""
+    d, a, b, c = lengths
+    z = a * mp.exp(1j * theta_2) + b * mp.exp(1j * theta_3) - d - c * mp.exp(1j * theta_4)
+    return [mp.re(z), mp.im(z)]
+
+
+def test_the_angles_solve_the_closure_equations_to_50_digits() -> None:
+    """Against Newton in 50 digits from its own angles: the error is that of the last digits of the longest bar."""
+    rng = np.random.default_rng(3)
+    checked = 0
+    with mp.workdps(50):
+        for _ in range(120):
+            d, a, b, c = (10.0 ** rng.uniform(-1.5, 0.5, 4)).tolist()
+            if 2.0 * max(d, a, b, c) > 0.99 * (d + a + b + c):
+                continue
+            linkage = fourbar.uniform(d, a, b, c)
+            theta_2, branch = rng.uniform(-7.0, 7.0, 5), rng.choice([-1, 1], 5).astype(np.int8)
+            closed = free_body_closure.close(linkage, theta_2, branch)
+            for i in np.flatnonzero(closed.assembled):
+                near = [mp.mpf(float(closed.theta[k, i])) for k in (0, 1)]
+                x, y = mp.findroot(partial(gap, (d, a, b, c), mp.mpf(float(theta_2[i]))), near)
+                sine = float(mp.sin(y - x))
+                assert sine * branch[i] > 0.0
+                allowed = DIGITS * max(d, a, b, c) / (min(b, c) * abs(sine))
+                assert max(abs(x - near[0]), abs(y - near[1])) <= allowed
+                checked += 1
+    assert checked > 80
+
+
+def test_it_assembles_where_the_circles_meet_and_on_the_requested_branch() -> None:
+    """B lies to the left of the diagonal from A to O4 on branch +1; bars up to a million times shorter than others."""
+    rng = np.random.default_rng(7)
+    missing = 0
+    for number in range(400):
+        lengths = 10.0 ** rng.uniform(-6.0 if number % 2 else -1.0, 0.0, 4)
+        if 2.0 * lengths.max() > lengths.sum():
+            continue
+        d, a, b, c = lengths.tolist()
+        theta_2, branch = rng.uniform(-10.0, 10.0, 8), rng.choice([-1, 1], 8).astype(np.int8)
+        closed = free_body_closure.close(fourbar.uniform(d, a, b, c), theta_2, branch)
+        diagonal = d - a * np.exp(1j * theta_2)
+        squared = (diagonal * diagonal.conj()).real
+        miss = np.maximum(squared - (b + c) ** 2, (b - c) ** 2 - squared)
+        sure = np.abs(miss) > 1e-14 * lengths.sum() ** 2
+        assert np.array_equal(closed.assembled[sure], miss[sure] < 0.0)
+        side = (diagonal.conj() * b * np.exp(1j * closed.theta[0])).imag
+        here = closed.assembled & sure
+        assert np.array_equal(np.sign(side[here]), branch[here])
+        assert np.isnan(closed.theta[:, ~closed.assembled]).all()
+        missing += int((~closed.assembled).sum())
+    assert missing > 100, "the sample must hold positions that do not assemble"
+
+
+# forces
+
+
+@pytest.mark.parametrize(
+    ("drive", "torque", "F12", "F32", "F43", "F14"),
+    [(2, 1.0, (-10, 0), (10, 0), (10, 0), (0, 0)), (4, 1.0, (0, 0), (0, 0), (0, 0), (-10, 0))],
+)
+def test_a_lever_of_an_upright_rectangle(
+    drive: int, torque: float, F12: tuple[int, int], F32: tuple[int, int], F43: tuple[int, int], F14: tuple[int, int]
+) -> None:
+    """10 N push bar 4 at B along the coupler; the bars are upright and 0.1 m long, and the coupler a two-force bar."""
+    load = Load(4, (10.0, 0.0), (0.05, math.pi / 2))
+    got = answered(Scene(RECTANGLE, fourbar.Motion(math.pi / 2, 0.0), drive, (load,)))
+    assert got["torque"][0] == pytest.approx(torque, abs=1e-14)
+    for name, force in {"F12": F12, "F32": F32, "F43": F43, "F14": F14}.items():
+        assert got[name][0] == pytest.approx(force, abs=1e-13), name
+
+
+def test_weight_of_a_crank_and_a_flywheel() -> None:
+    """Bar 2 alone has mass: T = (I + m r^2 + J) alpha + m g r cos theta_2, and O2 carries its weight and m a_G."""
+    bar = fourbar.Bar(0.1, 2.0, 0.003, (0.04, 0.0))
+    linkage = replace(RECTANGLE, input=bar)
+    scene = Scene(linkage, fourbar.Motion(0.7, 3.0, 5.0), 2, (), (Gravity(), Flywheel(0.02)))
+    got = answered(scene)
+    assert got["torque"][0] == pytest.approx((0.003 + 2.0 * 0.04**2 + 0.02) * 5.0 + 2.0 * 9.81 * 0.04 * math.cos(0.7))
+    a_G = 0.04 * np.exp(0.7j) * (5.0j - 9.0)
+    assert got["F12"][0] == pytest.approx([2.0 * a_G.real, 2.0 * (a_G.imag + 9.81)])
+    for name in ("F32", "F43", "F14"):
+        assert got[name][0] == pytest.approx([0.0, 0.0], abs=1e-14)
+
+
+SPRING = Springs((Spring(Point(1, 0.1, -1.5), Point(4, 0.08, 0.2), 200.0, 0.05, 3.0),))
+TORSION = fourbar.effects.Torsion.at(O4=(2.0, 1.9, 0.1))
+
+
+@pytest.mark.parametrize("drive", [2, 4])
+def test_over_a_turn_what_stores_energy_gives_it_back(drive: int) -> None:
+    """The work of the drive over a revolution at constant speed is zero; the sum over a period converges like n^-n."""
+    motion = fourbar.Motion(np.arange(512) * (2.0 * math.pi / 512), 10.0)
+    got = answered(crank_rocker(motion=motion, loads=(), effects=(Gravity(), SPRING, TORSION), drive_bar=2))
+    if drive == 4:
+        four = answered(crank_rocker(motion=motion, loads=(), effects=(Gravity(), SPRING, TORSION), drive_bar=4))
+        power = four["torque"] * four["omega_4"]
+        assert power == pytest.approx(got["torque"] * 10.0, abs=1e-10 * np.abs(power).max(), rel=0)
+    assert abs(got["torque"].sum()) < 512 * 1e-14 * np.abs(got["torque"]).max()
+    assert np.abs(got["torque"]).max() > 0.1
+
+
+@pytest.mark.parametrize(
+    "effect",
+    [
+        Viscous.at(O2=0.02, A=0.03, B=0.04, O4=0.05),
+        Friction.at(O2=0.02, A=0.03, B=0.04, O4=0.05),
+        PinFriction.at(O2=(0.2, 0.01), A=(0.3, 0.01), B=(0.1, 0.02), O4=(0.2, 0.01)),
+    ],
+    ids=lambda effect: effect.key,
+)
+def test_what_brakes_takes_the_power_that_the_drive_gives_more(effect: Any) -> None:
+    """Couple times slip at each pin, at every position; of pin friction with the forces that it changes itself."""
+    with_, without = answered(crank_rocker(effects=(effect,))), answered(crank_rocker(effects=()))
+    omega = {1: 0.0, 2: 10.0, 3: with_["omega_3"], 4: with_["omega_4"]}
+    loss = np.zeros(len(with_["torque"]))
+    for pin, *numbers in getattr(effect, {"viscous": "coefficients", "friction": "torques"}.get(effect.key, "pins")):
+        i, j = PINS[pin]
+        slip = np.abs(omega[j] - omega[i])
+        load = np.hypot(*with_[{"O2": "F12", "A": "F32", "B": "F43", "O4": "F14"}[pin]].T)
+        loss += math.prod(numbers) * slip * {"viscous": slip, "friction": 1.0, "pin_friction": load}[effect.key]
+    more = 10.0 * (with_["torque"] - without["torque"])
+    assert (loss > 0.0).all()
+    assert more == pytest.approx(loss, abs=1e-12 * 10.0 * np.abs(with_["torque"]).max(), rel=0)
+
+
+def test_dry_friction_does_nothing_at_rest() -> None:
+    dry = (Friction.at(A=1.0), PinFriction.at(B=(0.2, 0.1)))
+    still = crank_rocker(motion=fourbar.Motion([0.3, 2.0], 0.0), effects=dry)
+    assert answered(still)["torque"] == pytest.approx(answered(replace(still, effects=()))["torque"], rel=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("F", "C", "x"),
+    [
+        (1.0, 0.5, 2.0),
+        (1.0, -0.5, 2.0 / 3.0),
+        (3j, 0.0, 3.0),
+        (0.0, 0.7, 0.0),
+        (1.0, 2.0, math.nan),
+        (1.0, 1.0, math.nan),
+    ],
+)
+def test_friction_of_one_pin(F: complex, C: complex, x: float) -> None:
+    """x = |F + C x| by hand; where the couple adds to its own load by as much as it is, the pin jams."""
+    found = slide(np.array([[F]], dtype=complex), np.array([[[C]]], dtype=complex), np.array([1.0]))
+    assert found[0, 0] == pytest.approx(x, rel=1e-14, nan_ok=True)
+
+
+def test_friction_of_several_pins_fulfils_its_equations() -> None:
+    rng = np.random.default_rng(0)
+    F, C = (rng.normal(size=(200, *shape)) + 1j * rng.normal(size=(200, *shape)) for shape in ((3,), (3, 3)))
+    k = np.array([0.05, 0.1, 0.02])
+    x = slide(F, C, k)
+    load = np.abs(F + (C * x[:, None, :]).sum(axis=-1))
+    assert (x > 0.0).all()
+    assert np.abs(x - k * load).max() <= DIGITS * np.abs(x).max()
+
+
+def test_a_singular_position_costs_no_other() -> None:
+    matrix = np.array([[[1.0, 2.0], [2.0, 4.0]], [[2.0, 0.0], [0.0, 4.0]], [[np.nan, 1.0], [1.0, 1.0]]])
+    x, residual = free_body.solved(matrix, np.ones((3, 2, 1)))
+    assert np.isnan(x[[0, 2]]).all() and np.array_equal(x[1, :, 0], [0.5, 0.25]) and residual == 0.0
+
+
+def test_positions_alone_are_judged_with_what_is_stated_of_the_linkage() -> None:
+    rows = judge("scene", crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.0, 6.0, 20))), ONE).rows
+    found = {row.quantity for row in rows if row.engine == "free-body"}
+    of_the_linkage = {"assembled", "undecided", "closure", "range", "limit_positions", "transmission"}
+    assert found == of_the_linkage | {name for name, stage in STAGE_OF.items() if stage == "position"}
+    assert all(row.passed for row in rows)
+
+
+# faults in it
+
+
+SCENE = crank_rocker()
+"""One for all faults: what rounding must be expected to do to it is computed once."""
+
+
+def failing() -> set[str]:
+    return {row.quantity for row in judge("scene", SCENE, ONE).rows if not row.passed}
+
+
+def test_without_a_fault_nothing_fails() -> None:
+    assert failing() == set()
+
+
+def test_faults_in_the_free_bodies_show(monkeypatch: pytest.MonkeyPatch) -> None:
+    close, matrix, inertia, acting = free_body.close, free_body._matrix, free_body._add_inertia, free_body.acting
+
+    def arm_turned(motion: Any, drive_bar: int) -> Any:
+        made = matrix(motion, drive_bar)
+        made[:, 2] *= [1.0] * 3 + [-1.0] + [1.0] * 9
+        return made
+
+    def still(motion: Any, wrenches: Any) -> None:
+        inertia(motion._replace(omega=dict.fromkeys(motion.omega, 0.0 * motion.omega[2])), wrenches)
+
+    faults: dict[str, tuple[Callable[..., Any], set[str]]] = {
+        "close": (lambda linkage, theta_2, branch: close(linkage, theta_2, -branch), {"theta_3", "theta_4", "torque"}),
+        "_matrix": (arm_turned, {"torque"}),
+        "_add_inertia": (still, {"F12", "F32", "F43", "F14", "torque"}),
+        "acting": (lambda scene, motion: acting(replace(scene, loads=()), motion), {"F43", "torque"}),
+    }
+    for name, (fault, expected) in faults.items():
+        with monkeypatch.context() as patch:
+            patch.setattr(free_body, name, fault)
+            assert failing() >= expected, name
+
+
+def test_blocks_of_positions_make_no_difference(monkeypatch: pytest.MonkeyPatch) -> None:
+    whole = answered(crank_rocker())
+    monkeypatch.setattr(free_body, "BLOCK", 7)
+    for name, values in answered(crank_rocker()).items():
+        assert np.array_equal(values, whole[name]), name

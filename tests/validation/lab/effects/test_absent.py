@@ -1,0 +1,199 @@
+"""What a scene does not name does not exist: nothing of it in the formulas, in the MJCF or in the compiled model."""
+
+import math
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import pytest
+
+import fourbar
+from fourbar.effects import FILE_OF, Friction, Viscous
+from fourbar.errors import BROKEN, FAILED
+from fourbar.mjcf import mjcf
+from fourbar_validation.cli import status
+from fourbar_validation.lab.effects import absent, cost
+from fourbar_validation.lab.effects.absent import ABSENT, TABLES, build, differences, made
+from fourbar_validation.report.record import Record
+from fourbar_validation.run.judge import judge
+from tests.support.scenes import crank_rocker
+from tests.validation.engines.test_effects import ACTING
+
+ROOT = Path(fourbar.__file__).parent.parent
+
+
+@pytest.fixture(scope="module")
+def whole() -> dict[str, object]:
+    return made(ROOT)
+
+
+@pytest.mark.parametrize("key", ABSENT)
+def test_a_build_that_never_heard_of_an_effect_gives_the_same_bits(
+    key: str, whole: dict[str, object], tmp_path: Path
+) -> None:
+    other = build(tmp_path, key)
+    assert not any(f'"{key}": ' in (other / "fourbar" / table).read_text() for table in TABLES)
+    assert differences(whole, made(other)) == []
+
+
+def test_a_build_that_pays_for_an_absent_effect_is_noticed(whole: dict[str, object], tmp_path: Path) -> None:
+    """One that runs a term of size zero, and one whose MJCF leaves a flag on."""
+    other = build(tmp_path)
+    solver, model = other / "fourbar" / "evaluation" / "case.py", other / "fourbar" / "mjcf" / "model.py"
+    text = solver.read_text()
+    changed = text.replace("(*scene.loads, *scene.effects)", "(Viscous.at(O2=0.0), *scene.loads, *scene.effects)")
+    assert changed != text
+    solver.write_text(changed + "\n\nfrom fourbar.effects import Viscous\n")
+    text = model.read_text()
+    assert '"island", ' in text
+    model.write_text(text.replace('"island", ', ""))
+    found = differences(whole, made(other))
+    assert "list of the terms that run" in found and "bytes of the MJCF" in found
+    assert "disabled of the compiled model" in found
+    line = [sys.executable, "-m", "fourbar_validation.lab.effects.work", "formulas", "1", "2", "none"]
+    subprocess.run(line, env={**os.environ, "PYTHONPATH": str(other)}, cwd=tmp_path, check=True)  # its work is counted
+
+
+def test_instructions_are_judged_by_the_noise_of_the_whole_build(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    counted = iter([100.0, 100.1, 99.9, 100.12, 100.0, 100.35, 100.37])
+    same = {"numbers": {}, "calls": [], "mjcf": ""}
+    monkeypatch.setattr(absent, "build", lambda root, _: (root / "fourbar" / "effects").mkdir(parents=True))
+    monkeypatch.setattr(absent, "made", lambda _: same)
+    monkeypatch.setattr(absent, "counts", lambda *_: {"none": next(counted)})
+    for module in (absent, cost):
+        monkeypatch.setattr(module, "available", lambda: True)
+        monkeypatch.setattr(module, "not_installed", lambda _: "mujoco is not installed")
+    monkeypatch.setattr(absent, "ABSENT", ("gravity", "viscous"))
+    assert status(["effects-cost", "--absent"]) == FAILED
+    first, gravity, viscous, last = capsys.readouterr().out.splitlines()
+    assert first == "compiled models are not compared: mujoco is not installed"
+    assert gravity.endswith("bits, MJCF and terms are equal; instructions +0.350 %") and "+0.370 %" in viscous
+    assert last == "FAILS: at most 0.36 %, by the noise of the whole build, and no difference are required"
+    assert [absent.Trace("", [], more, 0.0036).holds for more in (0.0035, -0.0037, math.nan)] == [True, False, False]
+    assert status(["effects-cost", "--engines", "formulas,mujoco-inverse"]) == BROKEN
+    assert capsys.readouterr().err == "error: mujoco-inverse: mujoco is not installed\n"
+
+
+def test_no_term_of_an_effect_runs_in_a_scene_without_effects(whole: dict[str, object]) -> None:
+    calls = whole["calls"]
+    assert isinstance(calls, list) and "inertia_wrenches" in calls
+    names = {*FILE_OF, "Load", "torque_interval", "settle"}
+    assert not [call for call in calls if names & set(call.split("."))]
+
+
+def test_an_effect_that_is_named_runs() -> None:
+    """The check above could fail: the same profile sees the term where the scene has it."""
+    calls = []
+
+    def note(frame, event, argument):  # type: ignore[no-untyped-def]
+        if event == "call":
+            calls.append(frame.f_code.co_qualname)
+
+    sys.setprofile(note)
+    fourbar.solve(crank_rocker(loads=(), effects=(Viscous.at(O2=0.1),)))
+    sys.setprofile(None)
+    assert "Viscous.act" in calls and "Gravity.act" not in calls
+
+
+def compiled(*names: str) -> mujoco.MjModel:
+    effects = tuple(ACTING[name] for name in names)
+    return mujoco.MjModel.from_xml_string(mjcf(crank_rocker(loads=(), effects=effects)))
+
+
+def rows(model: mujoco.MjModel) -> int:
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, 0)
+    mujoco.mj_forward(model, data)
+    return int(data.nefc)
+
+
+def disabled(model: mujoco.MjModel) -> set[str]:
+    flags = mujoco.mjtDisableBit
+    return {
+        name.removeprefix("mjDSBL_").lower()
+        for name in flags.__members__
+        if name != "mjNDISABLE" and model.opt.disableflags & int(flags.__members__[name])
+    }
+
+
+BARE = {"contact", "limit", "island", "sensor", "spring", "damper", "frictionloss"}
+
+
+def test_the_bare_model_has_the_closed_loop_and_nothing_else() -> None:
+    model = compiled()
+    assert (model.nv, model.neq, model.nu, model.ntendon, model.nsensor, model.njnt) == (3, 1, 1, 0, 0, 3)
+    assert rows(model) == 3  # connect has three, the third of them empty in the plane
+    assert disabled(model) == BARE
+    assert not model.opt.gravity.any() and not model.dof_damping.any() and not model.dof_frictionloss.any()
+    assert not (model.opt.enableflags or model.geom_contype.any() or model.jnt_limited.any())
+
+
+@pytest.mark.parametrize(
+    ("name", "enabled", "more_rows", "tendons"),
+    [
+        ("gravity", set(), 0, 0),
+        ("viscous", {"damper"}, 0, 1),
+        ("friction", {"frictionloss"}, 4, 1),
+        ("torsion", {"spring"}, 0, 1),
+        ("springs", {"spring"}, 0, 2),
+        ("flywheel", set(), 0, 0),
+    ],
+)
+def test_each_effect_adds_what_it_needs_and_no_more(name: str, enabled: set[str], more_rows: int, tendons: int) -> None:
+    model = compiled(name)
+    assert (model.nv, model.neq, model.nu, model.nsensor) == (3, 1, 1, 0)
+    assert disabled(model) == BARE - enabled
+    assert rows(model) == 3 + more_rows
+    assert model.ntendon == tendons  # one at the cut pin B, one for each linear spring
+
+
+def test_an_effect_of_zero_size_is_still_named() -> None:
+    """A torque of 0 that the scene writes down is the scene's; what it leaves out is not there at all."""
+    named = mjcf(crank_rocker(loads=(), effects=(Friction.at(A=0.0),)))
+    assert "frictionloss=" in named and 'frictionloss="0.0"' not in mjcf(crank_rocker(loads=(), effects=()))
+
+
+POSITIONS_ONLY = """
+import sys
+import fourbar
+from fourbar_validation.run.judge import judge
+link = fourbar.uniform(0.3, 0.1, 0.25, 0.22)
+record = judge("scene", fourbar.Scene(link, fourbar.Motion(fourbar.Sweep(0.0, 6.0, 20))))
+print(sorted(name for name in ("mujoco", "pinocchio") if name in sys.modules))
+print(*record.left_out, sep="\\n")
+print(*sorted({row.engine for row in record.rows}))
+"""
+
+
+def test_positions_alone_start_no_force_engine() -> None:
+    done = subprocess.run([sys.executable, "-c", POSITIONS_ONLY], capture_output=True, text=True, check=True, cwd=ROOT)
+    engines, *left_out, answered = done.stdout.splitlines()
+    assert engines == "[]" and answered == "formulas free-body"
+    assert {line.split(":")[0] for line in left_out} == {"pinocchio-inverse", "mujoco-inverse", "mujoco-simulated"}
+    assert all("the scene states positions only" in line for line in left_out)
+
+
+def moved(*motion: Any) -> Record:
+    return judge("scene", fourbar.Scene(fourbar.uniform(0.3, 0.1, 0.25, 0.22), fourbar.Motion(*motion)))
+
+
+@pytest.mark.parametrize(
+    ("motion", "reason"),
+    [
+        ((fourbar.Sweep(0.0, 6.0, 20), 0.0), "omega_2 is 0: nothing moves through time"),
+        ((1.0, 2.0), "one position is no motion through time"),
+    ],
+)
+def test_what_does_not_move_through_time_is_not_simulated(motion: tuple[Any, float], reason: str) -> None:
+    record = moved(*motion)
+    assert record.left_out == [f"mujoco-simulated: {reason}"]
+    assert {row.engine for row in record.rows} == {"formulas", "free-body", "mujoco-inverse", "pinocchio-inverse"}
+
+
+def test_equal_positions_are_evaluated_once() -> None:
+    assert "positions: all are the same, one is evaluated" in moved([1.0, 1.0, 1.0], 2.0).left_out

@@ -1,0 +1,138 @@
+"""Forward errors and error bars on a small seeded set; the full one is `python -m validation stability`."""
+
+import math
+
+import numpy as np
+import pytest
+
+import fourbar
+from fourbar.show.tables import heading
+from fourbar_validation.lab.stress.forward_error.families import FAMILIES
+from fourbar_validation.lab.stress.forward_error.stability import CHANCE, TOO_SMALL, USELESS, Tally, by_chance, run
+
+SAMPLES = 40
+"""Per family: about 1 s each; the ten thousand of each are `python -m validation stability`."""
+ONCE_BAD = {
+    # seed, number, and what once was beyond its bound there
+    "random": [
+        (0, 131),  # bar of the torque
+        (0, 986),  # F43, F14: the moment of -m a_A about O2 as a difference of large numbers
+        (3, 78),  # sin mu: Heron's factor of a short coupler and output by the longer route
+        (3, 1063),  # bars: rounding of theta_2 - theta_1 near a whole turn
+    ],
+    "scales": [
+        (0, 347),  # bars, likewise
+        (0, 952),
+        (0, 1091),
+        (0, 5133),  # F32, driven on bar 4: the moment about B of a coupler whose mass centre lies there
+    ],
+    "speeds": [(0, 246), (0, 784)],  # bars, likewise
+    "ratios": [
+        (0, 36),  # torque: products of constants rounded to doubles in the pass with 32 digits
+        (0, 828),  # drive condition: length of the unit vector of a short bar
+    ],
+    "change_point": [
+        (0, 12),  # dry friction taken for at rest, at margins of 60 digits
+        (0, 58),  # likewise, in 32 digits
+        (0, 656),  # likewise, where bars stay parallel
+        (0, 164),  # bar of the forces: directions of bars that stay parallel
+        (0, 580),  # bars: products of constants
+        (0, 464),  # v_B: the small sine of theta_4 as a difference of large angles
+        (0, 6915),  # bar of the forces: half a last digit lost in theta_2 - theta_1, added to it, was rounded away
+    ],
+}
+ONCE_TOO_WIDE = [126, 1497, 2410, 6894, 7017]
+"""Of `change_point`: a bar of the forces was 2e7 to 9e7 times the error, though theta_2 - theta_1 had lost nothing."""
+
+
+@pytest.fixture(scope="module")
+def tallies() -> dict[str, Tally]:
+    return {family: run(family, range(SAMPLES)) for family in FAMILIES}
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_every_output_is_within_what_the_inputs_last_digits_do(family: str, tallies: dict[str, Tally]) -> None:
+    tally = tallies[family]
+    assert tally.samples == SAMPLES
+    assert tally.not_assembled < SAMPLES / 10
+    assert not tally.warned
+    bad = {name: entry for name, entry in tally.worst.items() if not entry[0] <= 1.0}
+    assert not bad
+
+
+def test_error_bars_are_neither_too_small_nor_useless(tallies: dict[str, Tally]) -> None:
+    for bar in ("torque_error", "force_error"):
+        assert max(tally.too_small[bar] for tally in tallies.values()) <= TOO_SMALL
+        assert by_chance(sum(tally.too_large[bar] for tally in tallies.values()), SAMPLES * len(tallies))
+
+
+def test_a_share_is_one_that_chance_explains() -> None:
+    # P(X >= k) of a binomial by its sum
+    def least_unexplained(samples: int) -> int:
+        beyond, k = 1.0, 0
+        while beyond >= CHANCE:
+            beyond -= math.comb(samples, k) * USELESS**k * (1.0 - USELESS) ** (samples - k)
+            k += 1
+        return k
+
+    for samples in (1, 60, 500):
+        k = least_unexplained(samples)
+        assert by_chance(k - 1, samples) and (k > samples or not by_chance(k, samples))
+    assert by_chance(100, 10_000) and not by_chance(160, 10_000)
+
+
+@pytest.mark.parametrize(("family", "seed", "number"), [(f, *sample) for f, bad in ONCE_BAD.items() for sample in bad])
+def test_samples_that_once_were_bad(family: str, seed: int, number: int) -> None:
+    tally = run(family, range(number, number + 1), seed)
+    assert all(ratio <= 1.0 for ratio, _ in tally.worst.values())
+    assert all(ratio <= TOO_SMALL for ratio in tally.too_small.values())
+
+
+@pytest.mark.parametrize("number", ONCE_TOO_WIDE)
+def test_bars_that_stay_parallel_are_charged_what_the_subtraction_lost_alone(number: int) -> None:
+    tally = run("change_point", range(number, number + 1))
+    assert not any(tally.too_large.values())
+    assert all(ratio <= TOO_SMALL for ratio in tally.too_small.values())
+
+
+def test_an_angle_without_a_value_is_beyond_what_is_allowed(monkeypatch: pytest.MonkeyPatch) -> None:
+    def lost(*arguments: object, **options: object) -> fourbar.Solution:
+        solution = fourbar.solve(*arguments, **options)  # type: ignore[arg-type]
+        solution.theta_3[:] = np.nan
+        return solution
+
+    monkeypatch.setattr("fourbar_validation.lab.stress.forward_error.stability.solve", lost)
+    tally = run("random", range(2))
+    assert tally.worst["theta_3"][0] == np.inf and tally.worst["theta_4"][0] <= 1.0 and not tally.held()
+
+
+def test_a_tally_adds_up() -> None:
+    whole, parts = run("random", range(12)), Tally()
+    for part in (range(5), range(5, 12)):
+        parts.add(run("random", part))
+    assert parts == whole
+
+
+def test_the_command_line_says_how_few_digits_are_left() -> None:
+    linkage = fourbar.uniform(0.3, 0.1, 0.25, 0.22)
+    dead = float(np.arccos((0.3**2 + 0.35**2 - 0.22**2) / (2 * 0.3 * 0.35)))  # bars 2, 3 in line
+    for angle, warned in ((dead + 1e-11, True), (dead + 0.5, False)):
+        scene = fourbar.Scene(linkage, fourbar.Motion(angle, 10.0), drive_bar=4)
+        lines = heading(scene, fourbar.solve(scene, "error"))
+        assert any("digits left of T4" in line and "bars 2 and 3" in line for line in lines) is warned
+    nothing = fourbar.FourBar(0.3, fourbar.Bar(0.1), fourbar.Bar(0.25), fourbar.Bar(0.22))
+    scene = fourbar.Scene(nothing, fourbar.Motion(1.0, 5.0))
+    assert not any("digits" in line for line in heading(scene, fourbar.solve(scene, "error")))
+
+
+def test_error_bars_grow_towards_a_dead_centre() -> None:
+    linkage = fourbar.uniform(0.3, 0.1, 0.25, 0.22)
+    # bars 2 and 3 in line: e^2 = c^2 with O2, B, O4; the input angle by the cosine rule
+    reach = 0.35
+    theta = float(np.arccos((0.3**2 + reach**2 - 0.22**2) / (2 * 0.3 * reach)))
+    bars = [
+        fourbar.solve(fourbar.Scene(linkage, fourbar.Motion(theta + offset, 10.0), drive_bar=4), "error").torque_error
+        for offset in (1e-1, 1e-4, 1e-7)
+    ]
+    assert bars[0] is not None and bars[1] is not None and bars[2] is not None
+    assert bars[0][0] < bars[1][0] * 1e-1 < bars[2][0] * 1e-2

@@ -1,0 +1,70 @@
+"""A harness that cannot catch a planted fault is none: the list fits the tree, and some of its faults are tried."""
+
+import numpy as np
+import pytest
+
+import fourbar_validation.run.judge
+from fourbar.solution import Solution
+from fourbar_validation.engines.witnesses import WITNESSES
+from fourbar_validation.lab.stress.mutation.planted import outcomes, survives
+from fourbar_validation.lab.stress.mutation.planting import faults, planted
+from fourbar_validation.lab.stress.mutation.specimens import SPECIMENS
+from fourbar_validation.run.judge import judge
+from tests.support.scenes import thesis
+
+ENTRIES = {entry["fault"]: number for number, entry in enumerate(faults())}
+IN_FORCES = (
+    *("with the drive on the output F43 of the wrong sense", "F23 in place of F32", "a load on the wrong bar"),
+    *("inertia about the mass centre in place of the pin", "gravity points upwards"),
+    "alpha_3 in place of the x-component of a_G4",
+)
+IN_TORQUE = (
+    *("J'/2 q'^2 dropped", "the torque off by 1e-9", "the centripetal part of a point outwards"),
+    "the other branch is closed",
+)
+ELSEWHERE = ("a third of all positions is called singular", "MuJoCo's loop without the drift of its Jacobian")
+"""Some of each kind; `mutation --planted` tries them all."""
+EXACT = {"pinocchio-inverse", "mujoco-inverse", "free-body"}
+
+
+def test_every_entry_fits_its_module_and_is_tried_on_a_specimen() -> None:
+    assert len(ENTRIES) == len(faults()) >= 70
+    for entry in faults():
+        for name, text in planted(entry).items():
+            compile(text, name, "exec")
+        assert entry["specimens"] and set(entry["specimens"]) <= SPECIMENS.keys(), entry["fault"]
+        assert entry["caught_by"] or entry["harmless"], entry["fault"]
+
+
+@pytest.mark.parametrize("chosen", [IN_FORCES, IN_TORQUE, ELSEWHERE], ids=["forces", "torque", "elsewhere"])
+def test_a_planted_fault_fails_the_harness_where_its_entry_says(chosen: tuple[str, ...]) -> None:
+    """A fault of the formulas is noticed by every exact engine by itself."""
+    found = outcomes(*(ENTRIES[fault] for fault in chosen))
+    assert not isinstance(found, str), found
+    for fault, failing in zip(chosen, found, strict=True):
+        assert survives(faults()[ENTRIES[fault]], failing) is None, fault
+        noticed = {row.partition(" ")[0] for rows in failing.values() for row in rows}
+        assert chosen is ELSEWHERE or noticed >= EXACT, (fault, noticed)
+
+
+def test_what_does_not_fail_or_fails_elsewhere_survives() -> None:
+    entry = {"caught_by": ["torque"]}
+    assert "nothing fails" in (survives(entry, {"crank": []}) or "")
+    assert "none of torque" in (survives(entry, {"crank": ["free-body F12: equivalence"]}) or "")
+    assert "raises" in (survives(entry, "NameError") or "")
+    assert survives(entry, {"crank": ["free-body torque: equivalence"]}) is None
+
+
+def test_positions_outside_the_range_fail_the_run(monkeypatch: pytest.MonkeyPatch) -> None:
+    true = fourbar_validation.run.judge.solve
+
+    def pretend(*arguments: object, **keywords: object) -> Solution:
+        solution: Solution = true(*arguments, **keywords)  # type: ignore[arg-type]
+        solution.status_code[:] = 0
+        return solution
+
+    monkeypatch.setattr(fourbar_validation.run.judge, "solve", pretend)
+    scene = thesis(np.radians([80.0, 135.0]))  # the range starts at 84.6 deg
+    failing = {(row.engine, row.quantity) for row in judge("", scene, [w for w in WITNESSES if w.name in EXACT]).rows
+               if not row.passed}  # fmt: skip
+    assert {(engine, "assembled") for engine in EXACT} <= failing

@@ -1,0 +1,197 @@
+"""The limits of speed: each is of a row that is measured, is reported with its reason, and costs the run."""
+
+import math
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from fourbar.errors import BAD_INPUT, BROKEN, HOLDS
+from fourbar.quantities import UNKNOWNS
+from fourbar.solve import solve
+from fourbar_validation.cli import status as ended
+from fourbar_validation.lab.stress import against, bench, contenders
+from fourbar_validation.lab.stress.bench_picture import draw_bench
+from fourbar_validation.lab.stress.timed import command, example
+
+ROOT = Path(__file__).parents[4]
+
+
+ROUNDING = 1e-11
+"""Relative to the largest of each unknown: a few hundred roundings, fewer digits in the vector math library."""
+
+
+@pytest.fixture
+def quick(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Counts at which the times mean nothing, but everything runs."""
+    monkeypatch.setattr(bench, "import_cost", lambda: 0.5)
+    for name, count in (("SHORTEST", 1), ("ONE_BY_ONE", 2), ("MOST_LOOPED", 10)):
+        monkeypatch.setattr(contenders, name, count)
+
+
+@pytest.mark.usefixtures("quick")
+def test_every_limit_is_of_a_row_that_is_measured(tmp_path: Path) -> None:
+    found = bench.measure(1000, 1, 10_000)
+    assert bench.LIMITS.keys() - found.not_run.keys() <= found.rows.keys()
+    numbers = [found.rows, *found.over_positions.values(), *found.over_linkages.values()]
+    assert all(math.isfinite(value) and value > 0.0 for own in numbers for value in own.values())
+    assert set(found.over_positions["NumPy"]) == {1000, 10_000}
+    assert set(found.over_linkages["study, NumPy"]) == {1, 10, 100, 1000}
+    assert set(found.over_linkages["one after the other"]) == {1, 10}
+    draw_bench(found.over_positions, found.over_linkages, tmp_path / "bench.svg")
+    picture = (tmp_path / "bench.svg").read_text()
+    assert picture.count('<g id="axes_') == 2 and picture.count('<g id="line2d_') > 20
+
+
+def test_every_contender_finds_the_same_unknowns(monkeypatch: pytest.MonkeyPatch) -> None:
+    scene, at = example(), command(500)
+    own = solve(scene, at=at, compiled=False)
+    expected = np.concatenate([np.atleast_2d(getattr(own, name).T) for name in UNKNOWNS])
+    peers = contenders.loops()
+    assert {"NumPy", "C"} <= set(peers.here) or "C" in peers.not_run
+    assert float(np.float64(5e-324) * 1.0) > 0.0  # no library has taken subnormal numbers from this process
+    for name, loop in peers.here.items():
+        out = np.full((15, 500), np.nan)
+        loop(at.theta_2, out)
+        off = out - expected
+        off[:2] = np.remainder(off[:2] + np.pi, 2 * np.pi) - np.pi
+        assert (np.abs(off).max(axis=1) <= ROUNDING * np.abs(expected).max(axis=1)).all(), name
+
+
+def test_more_positions_than_fit_are_evaluated_in_pieces(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(contenders, "AT_ONCE", 1000)
+    monkeypatch.setattr(contenders, "SHORTEST", 1)
+    sizes: list[int] = []
+    times = contenders.over_positions({"it": lambda theta_2, out: sizes.append(len(theta_2))}, 10_000, 1)
+    assert set(times["it"]) == {1000, 10_000} and sizes == [1000] * (2 + 2 * 10)
+
+
+def test_what_is_missing_is_named_with_its_reason(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PATH", "")
+    for module in ("numba", "sympy"):
+        monkeypatch.setitem(sys.modules, module, None)
+    peers = contenders.loops()
+    assert set(peers.here) == {"NumPy"} and set(peers.not_run) == {"compiled", "C", "C, vector math", "SymPy"}
+    assert peers.not_run["SymPy"] == "SymPy is not installed: pip install sympy"
+    rows = {"growth from 1000 positions on": 1.0}
+    monkeypatch.setattr(bench, "measure", lambda *_: bench.Measured(rows, {}, {}, peers.not_run))
+    for variable in bench.ONE_THREAD:
+        monkeypatch.setenv(variable, "1")
+    result = CliRunner().invoke(bench.bench, standalone_mode=False)
+    assert result.return_value == HOLDS and "not run: C: no C compiler is installed\n" in result.output
+
+
+@pytest.mark.parametrize("name", bench.LIMITS)
+@pytest.mark.parametrize("spoiled", [math.nan, "beyond", None])
+def test_what_is_beyond_its_limit_fails_with_the_reason(
+    name: str, spoiled: float | str | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rows = {what: limit.bound for what, limit in bench.LIMITS.items()} | {"all, 1000 positions": 100.0}
+    limit = bench.LIMITS[name]
+    if spoiled is not None:
+        rows[name] = math.nan if spoiled != "beyond" else limit.bound * (0.99 if limit.sign == ">=" else 1.01)
+    monkeypatch.setattr(bench, "measure", lambda *_: bench.Measured(rows, {}, {}, {}))
+    for variable in bench.ONE_THREAD:
+        monkeypatch.setenv(variable, "1")
+    result = CliRunner().invoke(bench.bench, standalone_mode=False)
+    assert result.return_value == (0 if spoiled is None else 1)
+    assert (f"fails: {name}: {limit.reason}" in result.output) == (spoiled is not None)
+
+
+SLOWER = """
+import time as _time
+_quick = solve
+def solve(*given, **named):
+    end = _time.process_time() + 0.02
+    while _time.process_time() < end:
+        pass
+    return _quick(*given, **named)
+"""
+
+
+def git(folder: Path, *arguments: str) -> None:
+    named = ("-c", "user.name=test", "-c", "user.email=test@example.invalid", "-c", "commit.gpgsign=false")
+    subprocess.run(["git", "-C", str(folder), *named, *arguments], check=True, capture_output=True)
+
+
+@pytest.fixture
+def repository(tmp_path: Path) -> Path:
+    """A repository whose one commit is the package, with the tag `broken` for one that cannot solve."""
+    if shutil.which("git") is None:
+        pytest.skip("git is not installed")
+    package = tmp_path / "fourbar"
+    shutil.copytree(ROOT / "fourbar", package, ignore=shutil.ignore_patterns("__pycache__"))
+    git(tmp_path, "init", "-q")
+    git(tmp_path, "add", "fourbar")
+    git(tmp_path, "commit", "-q", "-m", "whole")
+    whole = (package / "__init__.py").read_text()
+    (package / "__init__.py").write_text("")
+    git(tmp_path, "commit", "-q", "-a", "-m", "empty")
+    git(tmp_path, "tag", "broken")
+    git(tmp_path, "reset", "-q", "--hard", "HEAD~1")
+    assert (package / "__init__.py").read_text() == whole
+    return tmp_path
+
+
+def test_a_slower_tree_is_found_by_every_timing(repository: Path) -> None:
+    with (repository / "fourbar" / "__init__.py").open("a") as module:
+        module.write(SLOWER)
+    before = sorted(path for path in repository.iterdir())
+    rows = against.against("HEAD", 1000, 1, repository)
+    assert len(rows) == 5
+    for row in rows.values():
+        assert row.least <= row.ratio <= row.most
+        assert row.ours > 0.02 and row.least > 1.5
+    assert sorted(path for path in repository.iterdir()) == before
+
+
+def reported(capsys: pytest.CaptureFixture[str], revision: str) -> tuple[int, str]:
+    status = ended(["bench", "--against", revision, "--positions", "1000", "--rounds", "1"])
+    return status, capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("revision", "words"),
+    [
+        ("no-such-revision", "must be a revision of the git repository"),
+        ("--output=made", "must be a revision of the git repository"),
+        ("", "must be a revision of the git repository"),
+        ("broken", "broken cannot be timed: ImportError: cannot import name 'Bar'"),
+    ],
+)
+def test_a_revision_that_cannot_be_timed_is_one_line(
+    revision: str, words: str, repository: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(against, "TREE", repository)
+    status, line = reported(capsys, revision)
+    assert status == BAD_INPUT and line.startswith("error: ") and line.count("\n") == 1 and words in line
+    assert {path.name for path in repository.iterdir()} == {".git", "fourbar"}
+
+
+def test_without_a_repository_no_revision_exists(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(against, "TREE", tmp_path)
+    status, line = reported(capsys, "HEAD")
+    assert status == BAD_INPUT and line.count("\n") == 1
+
+
+def test_without_git_the_command_says_so(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.setenv("PATH", "")
+    assert reported(capsys, "HEAD") == (BROKEN, "error: bench --against needs git, which is not installed\n")
+
+
+def test_the_ratios_are_printed_whole_on_a_narrow_terminal(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    row = against.Ratio(0.3875, 0.001, 387.5, 375.25, 400.125)
+    monkeypatch.setenv("COLUMNS", "80")
+    monkeypatch.setattr(bench, "against_revision", lambda *_: {"one position with error bars": row})
+    assert ended(["bench", "--against", "HEAD"]) == HOLDS
+    line = next(line for line in capsys.readouterr().out.splitlines() if "error bars" in line)
+    cells = [cell.strip() for cell in line.split("│")[1:7]]
+    assert cells == ["one position with error bars", "387.5", "1", "387.500", "375.250", "400.125"]

@@ -1,0 +1,234 @@
+"""Simulators as subjects: what is judged, and the findings' scripts where their simulator is installed."""
+
+import ast
+import json
+import math
+import subprocess
+import sys
+from dataclasses import replace
+from importlib import import_module
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import fourbar
+from fourbar.effects import Friction, Viscous
+from fourbar.errors import LimitError
+from fourbar.mjcf import mjcf
+from fourbar.mjcf.sdf import sdf
+from fourbar.quantities import PIN_FORCES
+from fourbar.scene import command
+from fourbar_validation.engines.free_body import FreeBody
+from fourbar_validation.lab.subjects import examine, motion, standing
+from fourbar_validation.lab.subjects.standing import PROBLEM, findings
+from fourbar_validation.run.elsewhere import Ended
+from tests.whole.test_imports import ROOT, imported
+
+EXACT = 1e-10
+"""Of single states of MuJoCo with the generated file; measured 2e-12."""
+THROUGH = 1e-5
+"""Of a turn in 157 steps with the generated file; measured 4e-7."""
+
+IN_EXUDYN = 1e-3
+"""Of a turn in 314 steps of its trapezoidal rule; measured 1.2e-4."""
+
+JUDGES = {"examine.py", "problems.py"}
+"""The modules of subjects that state or judge by the formulas; every other hands things to a simulator."""
+
+
+@pytest.fixture
+def sealed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The writers of model files have no formulas: what a simulator receives is the subject's own assembly."""
+
+    def refused(*_: Any, **__: Any) -> None:
+        raise AssertionError("a simulator would receive what the formulas computed")
+
+    monkeypatch.setattr("fourbar.mjcf.document.solve", refused)
+
+
+@pytest.mark.usefixtures("sealed")
+def test_a_subject_starts_from_its_own_assembly_without_the_formulas() -> None:
+    for path in (
+        path for path in (ROOT / "validation/fourbar_validation/lab/subjects").glob("*.py") if path.name not in JUDGES
+    ):
+        assert not {name for name in imported(path) if name.startswith(("fourbar.solve", "fourbar.formulas"))}, path
+        assert not {name for name in imported(path) if name.endswith(("at_start", "mjcf_for"))}, path
+        assert "fourbar.solve" not in path.read_text(), path
+    for branch in (1, -1):
+        scene = fourbar.load(PROBLEM)
+        scene = replace(scene, motion=replace(scene.motion, branch=branch, omega_2=-10.0 * branch))
+        begin = motion.start(scene)
+        assert mjcf(scene, start=begin).count("<key ") == 1 and "coupler" in sdf(scene, "drake", begin)
+        theta = (begin.qpos[0], begin.qpos[0] + begin.qpos[1], begin.qpos[2])
+        assert motion.gap(scene, theta) < 1e-15 and np.sin(theta[2] - theta[1]) * branch > 0.0
+        assert begin.qpos[0] == (math.tau if branch > 0 else 0.0) and begin.qvel[0] == -10.0 * branch
+
+
+def test_a_subject_is_judged_on_the_branch_of_its_scene() -> None:
+    scene = fourbar.load(PROBLEM)
+    scene = replace(scene, motion=replace(scene.motion, branch=-1))
+    found = FreeBody().answer(scene, command(scene)).quantities
+    reading = {"theta": np.column_stack([command(scene).theta_2, found["theta_3"], found["theta_4"]]).tolist()}
+    reading |= {"omega_2": [10.0] * 25, "alpha_2": [0.0] * 25, "torque": found["torque"].tolist()}
+    errors = examine.errors(scene, {**reading, "forces": {"F43": found["F43"].tolist()}})
+    assert max(errors.values()) < EXACT
+
+
+@pytest.mark.usefixtures("sealed")
+def test_mujoco_answers_at_states_and_through_a_turn() -> None:
+    mujoco_c = pytest.importorskip("fourbar_validation.lab.subjects.mujoco_c", exc_type=ImportError)
+    scene = fourbar.load(PROBLEM)
+    setting = "generated file"
+    readings = [mujoco_c.states(scene, setting), mujoco_c.through(scene, 157, setting)]
+    answer = {"version": "", "readings": [each.plain() for each in readings]}
+    at_states, through = examine.lines(scene, "MuJoCo", json.loads(json.dumps(answer)))
+    assert set(at_states.errors) == {"torque", *PIN_FORCES} == set(through.errors)
+    assert max(at_states.errors.values()) < EXACT < max(through.errors.values()) < THROUGH
+    assert at_states.cost is None and through.cost is not None and through.gap < THROUGH
+
+
+def test_a_wrong_a_missing_and_a_nan_reading_show() -> None:
+    mujoco_c = pytest.importorskip("fourbar_validation.lab.subjects.mujoco_c", exc_type=ImportError)
+    scene = fourbar.load(PROBLEM)
+    reading = json.loads(json.dumps(mujoco_c.states(scene, "generated file").plain()))
+    reading["forces"]["F43"] = [[-x, -y] for x, y in reading["forces"]["F43"]]
+    reading["forces"]["F12"][3][0] = math.nan
+    reading["torque"] = reading["torque"][:-1]
+    del reading["forces"]["F14"]
+    found = examine.errors(scene, reading)
+    assert found["F43"] > 0.5 and np.isnan(found["F12"]) and np.isnan(found["torque"]) and "F14" not in found
+    assert found["F32"] < EXACT
+
+
+def test_exudyn_refuses_what_it_has_no_element_for() -> None:
+    exudyn = pytest.importorskip("fourbar_validation.lab.subjects.exudyn_simulated", exc_type=ImportError)
+    scene, (_, setting) = fourbar.load(PROBLEM), exudyn.SETTINGS
+    damped = replace(scene, effects=(*scene.effects, Viscous.at(B=0.01)))
+    assert max(examine.errors(damped, exudyn.through(damped, 314, setting).plain()).values()) < IN_EXUDYN
+    with pytest.raises(LimitError, match="alone"):
+        exudyn.through(replace(scene, effects=(Friction.at(B=0.01),)), 314, setting)
+
+
+def test_a_subject_that_diverges_has_its_lines_without_an_order() -> None:
+    scene, n = fourbar.load(PROBLEM), 3
+    readings = []
+    for steps, torque in ((100, 1.0), (200, math.inf), (400, math.nan), (800, 1.0)):
+        found = motion.Readings("its defaults", steps)
+        for _ in range(n):
+            found.read(scene, motion.State((1.0, math.nan, 2.0), 10.0, 0.0, torque, {}))
+        readings.append(found.plain())
+    lines = examine.lines(scene, "subject", {"version": "", "readings": readings})
+    assert lines[1].errors["torque"] == math.inf and math.isnan(lines[2].errors["torque"])
+    assert all(math.isnan(line.gap) for line in lines) and not any(line.order for line in lines)
+
+
+def of_a_turn(**changes: Any) -> str:
+    """What a subject says that stood still and forgot to read its torque, but for some changes."""
+    n = motion.SAMPLES
+    reading = {"setting": "s", "steps": 100, "theta": [[1.0, 2.0, 3.0]] * n, "omega_2": [10.0] * n}
+    reading |= {"alpha_2": [0.0] * n, "torque": [1.0] * n, "forces": {}, "gap": 0.0, "seconds": 1.0}
+    return json.dumps({"version": "1", "changed": "-", "device": "CPU", "readings": [reading | changes]})
+
+
+@pytest.mark.parametrize(
+    ("stated", "why"),
+    [
+        ("", "JSONDecodeError"),  # it left early, as if all were well
+        ("Simulation finished\x1b[2J", "JSONDecodeError"),
+        ("[]", "TypeError"),
+        ('{"readings": []}', "KeyError"),
+        (of_a_turn(theta=[[1.0, 2.0]]), "ValueError"),
+        (of_a_turn(theta=[], omega_2=[], alpha_2=[]), "ValueError"),
+        (of_a_turn(omega_2=[10.0]), "ValueError"),
+        (of_a_turn(torque=["much"]), "ValueError"),
+        (of_a_turn(gap="none"), "TypeError"),
+        (of_a_turn(forces=None), "AttributeError"),
+    ],
+)
+def test_an_answer_that_cannot_be_read_is_left_out_and_the_page_goes_on(
+    stated: str, why: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(examine, "SUBJECTS", {"one": ("One", "json"), "other": ("Other", "json")})
+    monkeypatch.setattr(examine, "_has", lambda *_: True)
+    answers = {"one": stated, "other": of_a_turn(torque=[math.nan] * motion.SAMPLES)}
+    monkeypatch.setattr(examine, "ended", lambda line, **_: Ended(answers[line[3]], "", False, ""))
+    found = examine.examine(fourbar.load(PROBLEM), PROBLEM, [Path(sys.executable)], 1.0)
+    assert why in found.left_out["One"] and "\x1b" not in found.left_out["One"]
+    (line,) = found.lines
+    assert line.subject == "Other" and math.isnan(line.errors["torque"])
+
+
+@pytest.mark.parametrize("name", ["theta", "omega_2", "alpha_2"])
+def test_a_state_that_is_no_number_has_no_error_that_is_one(name: str) -> None:
+    n = motion.SAMPLES
+    answer = json.loads(of_a_turn(**{name: [[math.nan, 2.0, 3.0]] * n if name == "theta" else [math.nan] * n}))
+    assert math.isnan(examine.errors(fourbar.load(PROBLEM), answer["readings"][0])["torque"])
+
+
+def test_what_a_subject_prints_is_no_part_of_its_answer(tmp_path: Path) -> None:
+    (tmp_path / "loud.py").write_text(
+        "import atexit, os\nfrom fourbar_validation.lab.subjects.motion import Readings\nVERSION = CHANGED = '-'\n"
+        "SETTINGS, STEPS = ['s'], [1]\natexit.register(print, 'bye')\n"
+        "def through(scene, steps, setting):\n    print('hello'); os.write(1, b'there')\n    return Readings(setting)\n"
+    )
+    code = "import sys; from validation import subjects; subjects.__path__.append(sys.argv.pop(1)); import runpy; "
+    code += "runpy.run_module('fourbar_validation.lab.subjects.work', run_name='__main__', alter_sys=True)"
+    line = [sys.executable, "-c", code, str(tmp_path), "loud", str(PROBLEM.absolute())]
+    done = subprocess.run(line, cwd=ROOT, capture_output=True, text=True, check=True)
+    assert json.loads(done.stdout)["readings"][0]["setting"] == "s"
+    assert "hello" in done.stderr and "bye" in done.stderr
+
+
+def test_the_page_is_written_and_names_what_is_not_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    line = examine.Line("MuJoCo", "4", "generated file", 157, {"torque": 1e-7, "F43": math.nan}, 1e-8, 0.01, 1.5)
+    pytest.importorskip("jinja2")
+    pytest.importorskip("matplotlib")
+    given = examine.Standing([line], {"MuJoCo": "nothing"}, {"MuJoCo": "CPU"})
+    given.left_out["PyBullet"] = "not installed under any --python"
+    monkeypatch.setattr("fourbar_validation.lab.subjects.standing.examine", lambda *_: given)
+    done = CliRunner().invoke(standing.command, ["--out", str(tmp_path)], catch_exceptions=False)
+    assert done.exit_code == 0 and "not examined: PyBullet" in done.output
+    for name in ("standing.html", "standing.md"):
+        text = (tmp_path / name).read_text()
+        assert (
+            "1.0e-07" in text and "nan" in text and "PyBullet" in text and all(each in text for each, _ in findings())
+        )
+    assert (tmp_path / "standing.csv").read_text().splitlines()[1].startswith("MuJoCo,4,generated file,157,1e-07,")
+
+
+@pytest.mark.parametrize("script", sorted((ROOT / "docs" / "findings").glob("*.py")), ids=lambda path: path.stem)
+def test_each_finding_is_reproduced_where_its_simulator_is(script: Path) -> None:
+    tree = ast.parse(script.read_text())
+    names = {alias.name for node in ast.walk(tree) if isinstance(node, ast.Import) for alias in node.names}
+    names |= {node.module for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) and node.module}
+    for name in {name.partition(".")[0] for name in names}:
+        if find_spec(name) is None:
+            pytest.skip(f"not run: {name} is not installed")
+    subprocess.run([sys.executable, str(script)], check=True, capture_output=True)
+
+
+COARSE = 0.05
+"""Of a turn in the fewest steps that each subject is examined with; measured 2e-2 and less."""
+
+
+COARSE_OF = {"newton_kamino": 0.2}
+"""Single precision and of first order; measured 9.7e-2 in 157 steps."""
+
+
+@pytest.mark.usefixtures("sealed")
+@pytest.mark.parametrize("module", examine.SUBJECTS)
+def test_each_subject_that_is_installed_carries_the_loop(module: str) -> None:
+    name, library = examine.SUBJECTS[module]
+    try:
+        found = find_spec(library)
+    except ModuleNotFoundError:
+        found = None
+    if found is None:
+        pytest.skip(f"not run: {name} is not installed")
+    scene, subject = fourbar.load(PROBLEM), import_module(f"fourbar_validation.lab.subjects.{module}")
+    reading = subject.through(scene, subject.STEPS[0], next(iter(subject.SETTINGS))).plain()
+    assert max(examine.errors(scene, reading).values()) < COARSE_OF.get(module, COARSE)

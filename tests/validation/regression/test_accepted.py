@@ -1,0 +1,47 @@
+"""What the exact engines say of the models is the accepted state, on whatever machine that was made."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import fourbar
+from fourbar_validation.compare.rows import DEGRADED
+from fourbar_validation.compare.tolerance import EPS, K
+from fourbar_validation.engines.witnesses import WITNESSES
+from fourbar_validation.regression import render
+from fourbar_validation.regression.changes import differences
+from fourbar_validation.regression.record import ACCEPTED, about, baseline, read_run
+from fourbar_validation.run.judge import judge
+from fourbar_validation.scenes.suites import model_files
+
+SCENES = [(file.stem, fourbar.load(file)) for file in model_files()]
+EXACT = [witness for witness in WITNESSES if not witness.through_time]
+"""A simulation through time takes longer than all of them; `validation run --against accepted` asks it too."""
+
+
+def test_nothing_got_worse_since_the_accepted_state() -> None:
+    left_out = {witness.name for witness in WITNESSES} - {witness.name for witness in EXACT}
+    record, accepted = read_run(baseline(ACCEPTED))
+    kept = [row for row in accepted if row.engine not in left_out]
+    rows = [row for scene in SCENES for row in judge(*scene, EXACT).rows]
+    found = differences((record, kept), (about({}, "models"), rows))
+    assert {row.engine for row in kept} == {"formulas", *(witness.name for witness in EXACT)}
+    assert not found.regressed, render.text(found)
+
+
+@pytest.mark.parametrize("turns", [0, 800])
+def test_a_row_states_the_condition_that_its_allowance_comes_from(turns: int) -> None:
+    """By which a move is distinguished from round-off: one limit position has 7 digits, the next 13."""
+    name, scene = next((name, scene) for name, scene in SCENES if name == "triple_rocker")
+    if turns:
+        motion = replace(scene.motion, theta_2=np.array([2.0, 3.0]) + turns * 2.0 * np.pi)
+        scene = replace(scene, motion=motion)
+    apart = {"torque_error", "force_error", "undecided", "status"}  # bars against their errors, and counts
+    rows = [row for row in judge(name, scene, EXACT).rows if row.allowed > 0.0 and row.quantity not in apart]
+    assert {"closure", "moment_sum", "F12", "limit_positions", "transmission"} <= {row.quantity for row in rows}
+    assert all(row.passed for row in rows)
+    for row in rows:
+        if row.verdict == DEGRADED:  # held to what is computed for the position: no law in the condition
+            continue
+        assert row.condition == pytest.approx(min(1.0, K * EPS / row.allowed), rel=1e-9), row

@@ -1,0 +1,711 @@
+"""What changed since the accepted state: real changes distinguished from round-off, the surroundings first."""
+
+import ast
+import csv
+import errno
+import html
+import json
+import math
+import os
+import subprocess
+import sys
+import xml.etree.ElementTree as ET
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import pyarrow.parquet as pq
+import pytest
+from click.testing import CliRunner
+
+import fourbar
+from fourbar.errors import InputError
+from fourbar_validation.cli import status
+from fourbar_validation.compare.columns import Columns
+from fourbar_validation.compare.rows import AGREES, FAILS, REFUSES, Row, write_results
+from fourbar_validation.compare.tolerance import EPS
+from fourbar_validation.regression import record, render
+from fourbar_validation.regression.accept import accept_command, compare
+from fourbar_validation.regression.change import Kind
+from fourbar_validation.regression.changes import compared, differences
+from fourbar_validation.regression.history import HISTORY, append, read_history
+from fourbar_validation.regression.record import About, Recorded, about, baseline, read_run, recorded, write_about
+from fourbar_validation.regression.scenes import description
+from fourbar_validation.regression.times import TimeChange
+from fourbar_validation.report.junit import cases
+from fourbar_validation.run.store import Store
+from fourbar_validation.scenes.suites import scene_files
+from tests.support.another_machine import CORES, ROOT, environment, why_not
+from tests.support.here import judge_here
+
+WithRows = tuple[About, list[Row]]
+ROW = Row("scene", "engine", "exact", "torque", 1e-15, 1e-14, AGREES, "equivalence", 1.0, 1.0)
+HERE = about({"engine": 1.0}, "suite")
+
+
+def kinds(old: list[Row], new: list[Row]) -> list[Kind]:
+    return [change.kind for change in differences((HERE, old), (HERE, new)).changes]
+
+
+@pytest.mark.parametrize(
+    ("changed", "kind"),
+    [
+        ({}, Kind.SAME),
+        ({"error": 9e-15}, Kind.ROUND_OFF),
+        ({"error": 1e-10, "allowed": 1e-9}, Kind.WORSE),
+        ({"error": math.nan, "verdict": FAILS}, Kind.VERDICT_WORSE),
+        ({"quantity": "F12"}, Kind.GONE),
+    ],
+)
+def test_each_kind_of_change(changed: dict[str, object], kind: Kind) -> None:
+    assert kind in kinds([ROW], [replace(ROW, **changed)])  # type: ignore[arg-type]
+
+
+def test_round_off_grows_with_the_condition() -> None:
+    hard = replace(ROW, error=1e-9, condition=1e-6)
+    assert kinds([hard], [replace(hard, error=5e-9)]) == [Kind.ROUND_OFF]
+    assert kinds([replace(hard, condition=1.0)], [replace(hard, error=5e-9, condition=1.0)]) == [Kind.WORSE]
+    beyond = 60 * EPS / 1e-6
+    assert kinds([hard], [replace(hard, error=1e-9 + beyond)]) == [Kind.WORSE]
+
+
+def test_better_and_new_rows_are_no_regression_but_a_new_failure_is() -> None:
+    simulated = replace(ROW, error=4e-6, allowed=1e-5)
+    found = differences((HERE, [simulated]), (HERE, [replace(simulated, error=1e-6), replace(ROW, quantity="F12")]))
+    assert {change.kind for change in found.changes} == {Kind.BETTER, Kind.NEW}
+    assert not found.regressed
+    failing = replace(ROW, quantity="F12", verdict=FAILS)
+    assert differences((HERE, [ROW]), (HERE, [ROW, failing])).regressed
+
+
+def test_other_versions_are_reported_first() -> None:
+    other = About({**HERE.versions, "mujoco": "3.3.7"}, HERE.machine, HERE.settings)
+    found = differences((other, [ROW]), (HERE, [ROW]))
+    assert [what for what, _, _ in found.surroundings] == ["mujoco"]
+    assert render.text(found).startswith("mujoco: 3.3.7 -> ")
+
+
+MODEL = [str(Path(__file__).parents[3] / "models" / "crank_rocker.toml")]
+HEAD = "scene,engine,setting,positions,seconds,times_formulas\n"
+
+
+def save(folder: Path, rows: list[Row], times: str = "", about: About = HERE) -> Path:
+    folder.mkdir()
+    write_results(rows, folder / "results.csv")
+    if times:
+        (folder / "timings.csv").write_text(HEAD + times)
+    write_about(about, folder)
+    return folder
+
+
+def test_command_writes_every_form_and_leaves_with_the_status(tmp_path: Path) -> None:
+    hostile = replace(ROW, scene="<script>alert(1)</script>|`x`")
+    old = save(tmp_path / "old", [ROW, hostile])
+    new = save(tmp_path / "new", [replace(ROW, error=1e-9), replace(hostile, error=1e-9)])
+    forms = [f"--{form}={tmp_path / form}" for form in ("markdown", "html", "junit")]
+    runner = CliRunner()
+    result = runner.invoke(compare, [str(old), str(new), *forms], standalone_mode=False)
+    assert result.return_value == 1
+    assert "2 regressions" in result.output
+    assert "<script>" not in (tmp_path / "html").read_text()
+    assert "<script>" not in (tmp_path / "markdown").read_text()
+    suites = ET.parse(tmp_path / "junit").getroot()
+    assert len(suites.findall(".//failure")) == 2
+    same = runner.invoke(compare, [str(old), str(old)], standalone_mode=False)
+    assert same.return_value == 0
+    assert "No regression" in same.output
+
+
+def test_accept_keeps_the_run_next_to_the_results_or_in_a_stated_folder(tmp_path: Path) -> None:
+    run = save(tmp_path / "run", [ROW], "scene,engine,-,1,1,3.0\n")
+    runner = CliRunner()
+    for options, kept in (([], tmp_path / "accepted"), (["--to", str(tmp_path / "mine")], tmp_path / "mine")):
+        assert runner.invoke(accept_command, [str(run), *options]).exit_code == 0
+        assert read_run(kept) == read_run(run)
+        assert dict(recorded(kept).times()) == {"scene": [("engine", 3.0)]}
+        assert json.loads((kept / "record.json").read_text())["machine"] == HERE.machine
+        assert runner.invoke(compare, [str(kept), str(run)], standalone_mode=False).return_value == 0
+    assert runner.invoke(accept_command, [str(run), "--to", str(run)]).exit_code != 0
+    assert baseline("accepted").parent == Path(record.__file__).parent  # of this project, where no such folder is
+
+
+def damaged(folder: Path) -> Iterator[tuple[Path, str]]:
+    """A run's folder damaged in one place after the other: the file that is to blame, and words of the message."""
+    files = {path: path.read_bytes() for path in folder.iterdir()}
+    table, times, about = (folder / name for name in ("results.csv", "timings.csv", "record.json"))
+    lines = files[table].splitlines(keepends=True)
+    rows = len(lines) - 1
+    for words, damage in {
+        f"{rows - 2} rows of {rows}": b"".join(lines[:-2]),
+        f"{2 * rows} rows of {rows}": b"".join([*lines, *lines[1:]]),
+        f"{rows - 1} rows of {rows}": b"".join(line for line in lines if b"engine 1" not in line),
+        f"{rows} rows of {rows}, and not the SHA-256": files[table].replace(b"1e-15", b"1e-16"),
+        "no rows that can be read": b"\xff",
+    }.items():
+        table.write_bytes(damage)
+        yield table, words
+    table.write_bytes(files[table])
+    times.write_bytes(files[times].replace(b"3.0", b"3.1"))
+    yield times, "1 rows of 1"
+    times.unlink()
+    yield times, "is missing"
+    times.write_bytes(files[times])
+    (folder / "results.parquet").write_bytes(b"")
+    yield folder / "results.parquet", "is not of this run"
+    (folder / "results.parquet").unlink()
+    for old, new in ((b'"K": "50.0"', b'"K": "51.0"'), (b'"sha256"', b'"sha257"'), (b'"rows"', b'"raws"'),
+                     (b'"scenes"', b'"scones"'), (HERE.machine.encode(), b"another machine")):  # fmt: skip
+        assert old in files[about]
+        about.write_bytes(files[about].replace(old, new))
+        yield about, "is damaged"
+    about.write_bytes(files[about])
+
+
+def test_a_damaged_run_is_named_and_nothing_is_written(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    rows = [replace(ROW, engine=f"engine {k}") for k in range(4)]
+    good, run = (save(tmp_path / name, rows, "scene,engine,-,1,1,3.0\n") for name in ("good", "run"))
+    kept = tmp_path / "kept"
+    assert status(["accept", str(good), "--to", str(kept)]) == 0
+    before = {path: path.read_bytes() for path in kept.iterdir()}
+    accepting, adding = ["accept", str(run), "--to", str(kept)], ["history", str(kept), "--add", str(run)]
+    comparing = (["compare", str(run), str(good)], ["compare", str(good), str(run)])
+    capsys.readouterr()
+    for file, words in damaged(run):
+        for command in (accepting, adding, *comparing):
+            assert status(command) == 2
+            out, message = capsys.readouterr()
+            assert not out and message.startswith(f"error: RESULTS = '{file}': ") and words in message
+            assert message.count("\n") == 1
+        assert {path: path.read_bytes() for path in kept.iterdir()} == before
+    assert [status(command) for command in (accepting, adding, *comparing)] == [0, 0, 0, 0]
+
+
+def test_every_bit_of_a_history_is_guarded(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    run = save(tmp_path / "run", [ROW])
+    kept = tmp_path / "kept"
+    assert status(["accept", str(run), "--to", str(kept)]) == 0
+    file = kept / HISTORY
+    whole = file.read_bytes()
+    table = (kept / "results.csv").read_bytes()
+    run = save(tmp_path / "later", [replace(ROW, error=2e-15)])
+    for place in range(0, len(whole), 7):
+        file.write_bytes(whole[:place] + bytes([whole[place] ^ 1 << place % 8]) + whole[place + 1 :])
+        with pytest.raises(InputError, match="is damaged, or no history"):
+            read_history(file)
+    for command in (
+        ["history", str(kept)],
+        ["accept", str(run), "--to", str(kept)],
+        ["history", str(kept), "--add", str(run)],
+    ):
+        capsys.readouterr()
+        assert status(command) == 2
+        assert capsys.readouterr().err.count("\n") == 1
+    assert (kept / "results.csv").read_bytes() == table and not (kept / "history.html").exists()
+
+
+def test_what_has_no_record_of_its_rows_is_compared_with_a_note_and_not_accepted(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    good, bare = (save(tmp_path / name, [ROW]) for name in ("good", "bare"))
+    (bare / "record.json").unlink()
+    assert status(["compare", str(bare), str(good)]) == 0
+    assert f"{bare / 'results.csv'}: not verified" in capsys.readouterr().out
+    assert status(["accept", str(bare)]) == 2 and status(["history", str(tmp_path), "--add", str(bare)]) == 2
+    assert not (tmp_path / "accepted").exists() and not (tmp_path / HISTORY).exists()
+
+
+def test_what_is_empty_unfinished_or_fails_is_not_accepted(tmp_path: Path) -> None:
+    fails, refuses = replace(ROW, verdict=FAILS, error=1.0), replace(ROW, verdict=REFUSES)
+    folders = {name: save(tmp_path / name, rows) for name, rows in (("empty", []), ("good", [ROW]), ("bad", [fails]))}
+    folders |= {name: save(tmp_path / name, [row]) for name, row in (("unfinished", ROW), ("nothing", refuses))}
+    (folders["unfinished"] / "run.json").write_text("{}")
+    reasons = {
+        "empty": "at least one comparison",
+        "unfinished": "a run that was finished",
+        "bad": "--even-failing: 1 comparisons fail",
+        "nothing": "--even-failing: nothing was compared",
+    }
+    for name, reason in reasons.items():
+        with pytest.raises(InputError, match=reason):
+            CliRunner().invoke(accept_command, [str(folders[name])], standalone_mode=False, catch_exceptions=False)
+        assert not (tmp_path / "accepted").exists()
+    for name in ("empty", "unfinished"):
+        with pytest.raises(InputError, match=reasons[name]):
+            read_run(folders[name])
+    for name in ("bad", "nothing"):
+        assert status(["accept", str(folders[name]), "--even-failing"]) == 0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--type", "crank-rocker"], "say --random N too"),
+        (["--seed", "3"], "say --random N too"),
+        (["--random", "3", "--type", "crank"], "crank-rocker, drag-link"),
+        (["--engines", ","], "must be among pinocchio-inverse"),
+        (["--against", "no-such-run"], "must be a folder with results.csv"),
+        (["--against", "accepted", "--python", "python"], "cannot be combined with --python"),
+        (["--html", "changes.html"], "say --against BASELINE or --python PATH too"),
+        (["--name", "coupler=link"], "names a body or site of --mjcf"),
+    ],
+)
+def test_options_of_a_run_that_would_do_nothing_are_refused_before_it(
+    arguments: list[str], words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert status(["run", *arguments, "--out", str(tmp_path / "out")]) == 2
+    message = capsys.readouterr().err.strip()
+    assert message.startswith("error: ") and words in message and "\n" not in message
+    assert not (tmp_path / "out").exists()
+
+
+def test_what_stood_for_a_failure_and_is_gone_is_no_regression() -> None:
+    alarm = replace(ROW, quantity="watch", verdict=FAILS, error=math.nan)
+    assert kinds([ROW, alarm], [ROW]) == [Kind.SAME, Kind.GONE_FAILURE]
+    assert not differences((HERE, [ROW, alarm]), (HERE, [ROW])).regressed
+    failed = replace(ROW, verdict=FAILS)
+    assert differences((HERE, [failed]), (HERE, [])).regressed  # a comparison that failed and is not made any more
+
+
+def test_another_python_without_the_libraries_is_one_line_and_status_3(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    bare = tmp_path / "python"
+    bare.write_text("#!/bin/sh\necho \"ModuleNotFoundError: No module named 'click'\" >&2\nexit 1\n")
+    bare.chmod(0o755)
+    earlier = tmp_path / "out" / "elsewhere" / "results.csv"
+    earlier.parent.mkdir(parents=True)
+    earlier.write_text("of an earlier run")
+    scene = Path(__file__).parents[3] / "models" / "crank_rocker.toml"
+    assert status(["run", str(scene), "--python", str(bare), "--out", str(tmp_path / "out")]) == 3
+    message = capsys.readouterr().err.strip()
+    assert "did not run there: ModuleNotFoundError: No module named 'click' (it needs" in message
+    assert "\n" not in message
+
+
+def test_a_run_with_too_many_rows_for_a_text_is_read_from_its_columns(tmp_path: Path) -> None:
+    rows = [ROW, replace(ROW, quantity="watch", error=math.nan, verdict=FAILS)]
+    with Columns(tmp_path) as columns:
+        columns.add(rows)
+    write_about(HERE, tmp_path)
+    from_text = read_run(tmp_path)
+    assert pq.read_table(tmp_path / "results.parquet")["error"].null_count == 1  # no greatest error is NaN by it
+    (tmp_path / "results.csv").unlink()
+    write_about(HERE, tmp_path)
+    from_columns = read_run(tmp_path)
+    assert from_columns[0] == from_text[0] and repr(from_columns[1]) == repr(from_text[1])
+    assert not differences(from_text, from_columns).regressed
+    (tmp_path / "results.parquet").write_bytes(b"no columns")
+    with pytest.raises(InputError, match="is damaged: no rows that can be read of 2"):
+        read_run(tmp_path)
+    (tmp_path / "record.json").unlink()
+    with pytest.raises(InputError, match="is not a table written by"):
+        read_run(tmp_path)
+
+
+def test_two_long_runs_are_read_scene_by_scene_and_little_of_them_is_kept(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One row group after the other, both in step; every row is counted, of each kind the worst are listed."""
+    monkeypatch.setattr("fourbar_validation.compare.columns.GROUP_ROWS", 60)
+    for where in ("fourbar_validation.compare.columns", "fourbar_validation.regression.accept"):
+        monkeypatch.setattr(f"{where}.CSV_ROWS", 100)
+    monkeypatch.setattr("fourbar_validation.compare.columns.BATCH_ROWS", 60)
+    scenes, kept = 1000, 5
+    for name, grown in (("old", 1.0), ("new", 1e3)):
+        (tmp_path / name).mkdir()
+        with Columns(tmp_path / name) as columns:
+            for k in range(scenes):
+                row = replace(ROW, scene=f"random-0-{k:09d}", condition=1e-3, error=1e-9 * (1.0 + k * (grown - 1.0)))
+                columns.add([replace(row, quantity="F12", error=1e-15), row])
+        write_about(HERE, tmp_path / name)
+        assert not (tmp_path / name / "results.csv").exists() and len(columns.first_lines) < 60
+    alive = most = 0
+    before, after = (recorded(tmp_path / name) for name in ("old", "new"))
+
+    def watched(run: Recorded) -> Iterator[tuple[str, list[Row]]]:
+        nonlocal alive, most
+        for scene, rows in run.scenes():
+            alive += 1
+            most = max(most, alive)
+            yield scene, rows
+            alive -= 1
+
+    found = compared((HERE, watched(before)), (HERE, watched(after)), {"engine"}, [], kept)
+    assert most == 2 and found.rows == 2 * scenes and found.regressed == found.kinds[Kind.WORSE] == scenes - 1
+    assert [change.key[0][-3:] for change in found.of(Kind.WORSE)] == ["999", "998", "997", "996", "995"]
+    assert len(found.changes) == 2 * kept
+    cases = ET.fromstring(render.junit(found))
+    assert cases.findall(".//testcase")[-1].get("name") == f"{2 * (scenes - kept)} rows more: see results.parquet"
+    arguments = ["compare", str(tmp_path / "old"), str(tmp_path / "new")]
+    assert [status(arguments), status([*arguments, "--only", "random-0-000000000"])] == [1, 0]
+    kept_as = tmp_path / "kept"
+    assert status(["accept", str(tmp_path / "new"), "--to", str(kept_as)]) == 0
+    assert {path.name for path in kept_as.iterdir()} == {"record.json", "results.parquet"}  # too long for a history
+    assert status(["compare", str(kept_as), str(tmp_path / "new")]) == 0
+
+
+def test_a_part_of_a_long_run_compares_with_its_part_and_a_table_out_of_order_with_nothing(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rows = [replace(ROW, scene=f"scene {k:03d}") for k in range(80)]
+    whole, some = save(tmp_path / "whole", rows), save(tmp_path / "some", [rows[7], rows[70]])
+    assert status(["compare", str(whole), str(some)]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0] == "not run: scene scene 000 (1 rows)" and lines[50] == "not run: and 28 more (28 rows)"
+    assert lines[-1].startswith("No regression in 2 of 80 rows: 78 not run, 2 same")
+    table = some / "results.csv"
+    first, *others = table.read_text().splitlines(keepends=True)
+    table.write_text(first + "".join(reversed(others)))
+    write_about(HERE, some)
+    assert status(["compare", str(whole), str(some)]) == 2
+    assert "is sorted by scene" in capsys.readouterr().err
+
+
+def disagreeing(worse: set[tuple[str, str]]) -> tuple[list[Row], list[Row]]:
+    """Two runs of three scenes by three exact engines, a simulation and an identity; `worse`: engine and quantity."""
+    names = [(engine, quantity) for engine in ("one", "two", "three", "sim") for quantity in ("F12", "torque")]
+    rows = [replace(ROW, engine=engine, quantity=quantity) for engine, quantity in (*names, ("formulas", "power"))]
+    rows = [replace(row, setting="RK4 628/rev") if row.engine == "sim" else row for row in rows]
+    old = [replace(row, scene=scene) for scene in "abc" for row in rows]
+    fails = {"verdict": FAILS, "error": 1e-6}
+    return old, [
+        replace(row, **fails, reason=f"{ord(row.scene)}e-6 where 1e-9 was predicted")  # type: ignore[arg-type]
+        if (row.engine, row.quantity) in worse
+        else row
+        for row in old
+    ]
+
+
+@pytest.mark.parametrize(
+    ("worse", "sentence"),
+    [
+        ({("sim", "F12"), ("sim", "torque")}, "only sim, 3 of 3 scenes"),
+        ({("one", "torque"), ("sim", "torque")}, "only one, sim, 3 of 3 scenes"),
+        (
+            {(engine, "torque") for engine in ("one", "two", "three")} | {("formulas", "power")},
+            "all engines and the identity disagree: the formulas, 3 of 3 scenes",
+        ),
+        (
+            {(engine, "F12") for engine in ("one", "two", "three")},
+            "all engines disagree, and the identities hold: the formulas, or what all engines are given, 3 of 3 scenes",
+        ),
+        ({("formulas", "power")}, "only the identities: the formulas, or what is stated of them, 3 of 3 scenes"),
+    ],
+)
+def test_the_report_says_who_is_at_fault(worse: set[tuple[str, str]], sentence: str) -> None:
+    old, new = disagreeing(worse)
+    found = differences((HERE, old), (HERE, new))
+    assert found.fault.sentences == [sentence]
+    for form in (render.text, render.markdown, render.html):
+        assert sentence in html.unescape(form(found))
+
+
+def test_rows_that_changed_are_grouped_by_engine_and_cause_the_worst_first() -> None:
+    old, new = disagreeing({("sim", "F12"), ("sim", "torque"), ("one", "torque")})
+    better = [replace(row, error=1e-9) if row.engine == "two" else row for row in old]
+    new = [replace(row, error=1.0) if row.failed and row.engine == "one" and row.scene == "b" else row for row in new]
+    found = differences((HERE, better), (HERE, new))
+    groups = [line for line in render.text(found).splitlines() if "scenes, " in line and "rows (" in line]
+    cause = "agrees -> fails: # where # was predicted"
+    assert groups == [
+        f"verdict got worse: one, 3 of 3 scenes, 3 rows (torque 3), {cause}",
+        f"verdict got worse: sim, 3 of 3 scenes, 6 rows (F12 3, torque 3), {cause}",
+        "better: two, 3 of 3 scenes, 6 rows (F12 3, torque 3)",
+    ]
+    assert found.of(Kind.VERDICT_WORSE)[0].key[:2] == ("b", "one")
+    assert groups[0].partition(": ")[2] in html.unescape(render.html(found))
+
+
+SCENE = fourbar.load(Path(__file__).parents[3] / "models" / "crank_rocker.toml")
+
+
+def made(rows: list[Row], scenes: dict[str, fourbar.Scene], engines: tuple[str, ...] = ("engine",)) -> WithRows:
+    return about(dict.fromkeys(engines, 1.0), "suite", {name: description(s) for name, s in scenes.items()}), rows
+
+
+def test_a_scene_that_changed_comes_first_and_its_rows_are_not_compared() -> None:
+    output = replace(SCENE.linkage.output, inertia=0.05)
+    heavier = replace(SCENE, linkage=replace(SCENE.linkage, output=output), title="another title")
+    before = replace(SCENE, linkage=replace(SCENE.linkage, output=replace(output, inertia=0.048)))
+    other, wrong = replace(ROW, scene="other"), replace(ROW, error=1e-9, allowed=1e-8)
+    old = made([ROW, other], {"scene": before, "other": SCENE})
+    found = differences(old, made([wrong, other], {"scene": heavier, "other": SCENE}))
+    assert render.text(found).splitlines()[0] == "scene scene: bars.output.inertia 0.048 -> 0.05 kg m^2"
+    assert found.status == 0 and found.not_compared == ["scene scene changed (1 rows)"]
+    assert differences(old, made([replace(wrong, verdict=FAILS), other], {"scene": heavier})).regressed
+    assert differences(made([ROW], {"scene": before}), made([wrong], {"scene": heavier})).nothing
+    for form in (render.markdown, render.html):
+        assert "bars.output.inertia 0.048" in form(found)
+
+
+def test_a_renamed_scene_is_found_by_what_it_states(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    other = replace(SCENE, linkage=replace(SCENE.linkage, output=replace(SCENE.linkage.output, inertia=0.05)))
+    names = {"g": SCENE, "h": other, "same": SCENE}, {"a": other, "gate": SCENE, "same": SCENE}
+    both = []
+    for folder, error, scenes in zip(("old", "new"), (1e-9, 2e-9), names, strict=True):
+        stated, rows = made([replace(ROW, scene=name, error=error, allowed=1e-9) for name in scenes], scenes)
+        both.append(str(save(tmp_path / folder, rows, "".join(f"{n},engine,-,1,1,3.0\n" for n in scenes), stated)))
+    assert status(["compare", *both]) == 1
+    out = capsys.readouterr().out.splitlines()
+    assert out[:2] == ["renamed: g -> gate", "renamed: h -> a"]
+    assert out[-1].startswith("3 regressions in 3 rows: 3 worse.")
+    for name, rows in (("gate", "1 regression in 1 rows"), ("h", "1 regression in 1 rows")):
+        assert status(["compare", *both, "--only", name]) == 1
+        assert rows in capsys.readouterr().out
+
+
+def test_what_grew_within_its_allowance_is_shown_and_no_regression() -> None:
+    """Another kernel of the BLAS turns 3.4e-7 into 5.2e-7 where 1 is allowed; a wider allowance excuses nothing."""
+    shipped = replace(ROW, quantity="as shipped", error=3.4e-7, allowed=1.0)
+    found = differences((HERE, [shipped]), (HERE, [replace(shipped, error=5.2e-7)]))
+    assert [change.kind for change in found.changes] == [Kind.GREW] and found.status == 0
+    assert "grew within its allowance: scene / engine / exact / as shipped" in render.text(found)
+    assert kinds([replace(shipped, allowed=4e-7)], [replace(shipped, error=6e-7)]) == [Kind.WORSE]
+
+
+def test_the_kernels_of_a_run_are_recorded_and_named_where_they_differ() -> None:
+    """In two fresh processes, one of which takes this CPU for another."""
+    code = "from fourbar_validation.report.machine import kernels; print(kernels())"
+    possible = [core for core in CORES if why_not(core) is None]
+    if not possible:
+        pytest.skip("this CPU can pass for no other")
+    found = [
+        subprocess.check_output([sys.executable, "-c", code], cwd=ROOT, env=os.environ | more, text=True)
+        for more in ({}, environment(possible[0]))
+    ]
+    one, other = map(ast.literal_eval, found)
+    assert set(one) == {"cpu_features", "blas_kernel"} and one != other
+    old, new = (replace(HERE, versions=HERE.versions | kernels) for kernels in (one, other))
+    text = render.text(differences((old, [ROW]), (new, [ROW])))
+    assert any(f"{name}: {one[name]} -> {other[name]}" in text for name in one)
+    assert set(one) <= set(HERE.versions)
+
+
+def test_more_positions_and_other_settings_are_named_so() -> None:
+    finer = replace(SCENE, motion=replace(SCENE.motion, theta_2=fourbar.Sweep(0.0, 2.0 * math.pi, 720)))
+    worse = replace(ROW, error=1e-9, allowed=1e-8)
+    found = differences(made([ROW], {"scene": SCENE}), made([worse], {"scene": finer}))
+    assert found.not_compared == ["scene scene has other positions (1 rows)"] and not found.regressed
+    assert "360} -> " in str(found.scenes[0]) or "steps" in str(found.scenes[0])
+    old, new = replace(ROW, setting="RK4 628/rev"), replace(worse, setting="RK4 1256/rev")
+    found = differences(made([old], {"scene": SCENE}), made([new], {"scene": SCENE}))
+    assert found.not_compared == ["scene / engine: RK4 628/rev -> RK4 1256/rev (1 rows)"] and not found.regressed
+
+
+def test_of_an_older_record_only_the_hash_can_say_that_scenes_changed() -> None:
+    old = About(HERE.versions, HERE.machine, {**HERE.settings, "suite": "0123456789abcdef"})
+    found = differences((old, [ROW]), made([ROW], {"scene": SCENE}))
+    assert not found.scenes and not found.regressed
+    first, note = found.notes
+    assert "0123456789ab -> suite" in note and "the older record does not say what they ask" in note
+    assert first == "1 of 1 rows are compared: the others are of one run alone"
+    others = [replace(ROW, scene=f"another {k}") for k in range(3)]
+    found = differences((old, [ROW, others[0]]), made([ROW, *others[1:]], {"scene": SCENE}))
+    assert render.text(found).startswith("1 of 4 rows are compared") and "No regression in 1 of 4 rows" in render.text(
+        found
+    )
+
+
+def test_what_was_not_wanted_is_not_run_and_what_was_wanted_is_gone() -> None:
+    rows = [replace(ROW, scene=scene, engine=engine) for scene in ("a", "b") for engine in ("engine", "formulas")]
+    rows.append(replace(ROW, scene="a", engine="other"))
+    old = made(rows, dict.fromkeys("ab", SCENE), ("engine", "other"))
+    found = differences(old, made(rows[:2], {"a": SCENE}))
+    assert found.not_run == ["scene b (2 rows)", "other (1 rows)"] and found.status == 0
+    gone = differences(old, made(rows[1:2], {"a": SCENE}))
+    assert [change.key[1] for change in gone.changes if change.regression] == ["engine"]
+    assert differences(old, (HERE, rows[:2])).not_run[0] == "scene b (2 rows)"  # without a record its rows say so
+
+
+def test_what_is_compared_can_be_chosen(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    bad = replace(ROW, quantity="F12")
+    old = save(tmp_path / "old", [ROW, bad])
+    new = save(tmp_path / "new", [ROW, replace(bad, error=1e-9)])
+    arguments = ["compare", str(old), str(new)]
+    assert [status([*arguments, *more]) for more in ([], ["--quantity", "torque"], ["--only", "scene"])] == [1, 0, 1]
+    capsys.readouterr()
+    assert status([*arguments, "--engines", "motor"]) == 2
+    assert capsys.readouterr().err == "error: --engines = 'motor': must be among engine\n"
+
+
+def test_an_engine_is_slower_only_beyond_the_scatter_of_its_times() -> None:
+    scenes = [f"scene {k}" for k in range(6)]
+    old = {(scene, "engine"): 100.0 for scene in scenes}
+
+    def ratios(*factors: float) -> list[TimeChange]:
+        new = {key: 100.0 * factor for key, factor in zip(old, factors, strict=False)}
+        return differences((HERE, [ROW]), (HERE, [ROW]), (old, new)).other_times
+
+    (slower,) = ratios(1.9, 2.1, 2.0, 2.0, 1.9, 2.1)
+    assert str(slower).startswith("engine is 2.00 times slower") and slower.ratio > 1.0
+    assert not ratios(1.1, 1.15, 1.1, 1.2, 1.1, 1.1)  # of one mind, and less than nights differ
+    assert not ratios(9.0, 1.0, 1.0, 4.0, 1.0, 1.0)  # twice as slow on the mean, by two scenes
+    assert not ratios(2.0, 2.0)
+    (faster,) = ratios(0.5, 0.5, 0.5)
+    assert "2.00 times faster" in str(faster)
+
+
+def test_a_slower_engine_is_a_regression_on_the_same_machine_and_slower_formulas_are_theirs(tmp_path: Path) -> None:
+    def timed(name: str, **ratios: float) -> Path:
+        lines = [f"{scene},{engine},-,1,1,{ratio}\n" for scene in "abcd" for engine, ratio in ratios.items()]
+        return save(tmp_path / name, [ROW], "".join(lines))
+
+    old, slower = timed("old", engine=100.0, other=50.0), timed("slower", engine=180.0, other=50.0)
+    xml = tmp_path / "changes.xml"
+    assert status(["compare", str(old), str(slower), "--junit", str(xml)]) == 1
+    (failure,) = ET.parse(xml).getroot().findall(".//failure")
+    assert failure.get("message") == "engine is 1.80 times slower (factor of scatter 1.00, 4 scenes)"
+    assert status(["compare", str(slower), str(old)]) == 0
+    write_about(replace(HERE, machine="another"), slower)
+    assert status(["compare", str(old), str(slower)]) == 0
+    both = {("a", "b"): 100.0}
+    halved, doubled = ({(s, e): t for s in "abcd" for e in ("engine", "other")} for t in (50.0, 200.0))
+    for one, other, word in ((doubled, halved, "slower"), (halved, doubled, "faster")):
+        (change,) = differences((HERE, [ROW]), (HERE, [ROW]), ({**both, **one}, {**both, **other})).times
+        assert str(change).startswith(f"formulas is 4.00 times {word}")
+
+
+def test_the_run_itself_is_written_as_junit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("fourbar_validation.report.junit.LISTED", 10)
+    judge_here(monkeypatch)
+    xml, scene = tmp_path / "run.xml", Path(__file__).parents[3] / "models" / "crank_rocker.toml"
+    arguments = ["run", str(scene), "--engines", "free-body", "--no-pictures", "--out", str(tmp_path / "out")]
+    assert status([*arguments, "--junit", str(xml)]) == 0
+    found, rows = ET.parse(xml).getroot(), read_run(tmp_path / "out")[1]
+    names = [case.get("name") for case in found.iter("testcase")]
+    assert names == [row.quantity for row in rows[:10]] + [f"{len(rows) - 10} rows more: see results.parquet"]
+    assert found.get("failures") == "0" and found.get("name", "").startswith("All ")
+    failing = [replace(row, verdict=FAILS, reason="not held") for row in rows[20:22]]
+    kinds = [(case.outcome, case.message.partition(": ")[2]) for case in cases([*rows, *failing])][10:]
+    assert kinds == [("failure", "not held")] * 2 + [("skipped", "")]
+
+
+@pytest.fixture(scope="module")
+def nights(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Eight runs of three scenes: a drift of 10 % a night in one row, a new version and a failure in the sixth."""
+    folder = tmp_path_factory.mktemp("nights")
+    for night in range(8):
+        scenes = [f"scene {k}" for k in range(3)]
+        error = 1e-9 * 1.1**night
+        rows = [replace(ROW, scene=scene, error=1e-9, allowed=1e-8, condition=1e-5) for scene in scenes]
+        rows[0] = replace(rows[0], error=error, condition=1.0)
+        if night >= 5:
+            rows[1] = replace(rows[1], error=1e-3, verdict=FAILS)
+        if night == 3:
+            rows = rows[:1]  # a part of the suite
+        record, _ = made(rows, {row.scene: SCENE for row in rows})
+        versions = {**record.versions, "mujoco": "4.0.0" if night < 5 else "4.1.0"}
+        date, commit = f"2026-01-0{night + 1}T02:00:00+00:00", f"{night}abcdef"
+        record = replace(record, versions=versions, date=date, commit=commit)
+        times = {(scene, "engine"): 50.0 * (3.0 if night >= 6 else 1.0) for scene in scenes}
+        append(folder / HISTORY, (record, rows), times)
+    return folder
+
+
+def test_a_history_names_the_step_at_which_a_row_changed(nights: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert status(["history", str(nights)]) == 0
+    out = capsys.readouterr().out.splitlines()
+    assert [line.split()[2] for line in out[:-1]] == ["(3abcdef):", "(5abcdef):", "(6abcdef):"]
+    assert "1 grew within its allowance" in out[0]  # 1.1^3: no night by itself was beyond 1.25
+    assert "1 verdict got worse" in out[1] and "mujoco 4.0.0 -> 4.1.0" in out[1]
+    assert "engine is 3.00 times slower" in out[2] and out[-1].startswith("8 runs, 3 steps")
+    page = (nights / "history.html").read_text()
+    assert page.count("<svg") == 3 + 2 and "scene 1 / engine / exact / torque" in page and "mujoco 4.1.0" in page
+    assert status(["history", str(nights), "--only", "scene 2", "-o", str(nights / "two.html")]) == 0
+    assert "1 step changed" in capsys.readouterr().out
+
+
+def test_a_history_is_read_by_pandas_and_keeps_what_each_scene_states(nights: Path) -> None:
+    import pandas as pd
+
+    table = pd.read_parquet(nights / HISTORY)
+    assert table.groupby("commit", observed=True).size().tolist() == [6, 6, 6, 4, 6, 6, 6, 6]
+    errors = table[(table.quantity == "torque") & (table.scene == "scene 0")].error
+    assert errors.tolist() == pytest.approx([1e-9 * 1.1**night for night in range(8)], rel=1e-15)
+    assert set(table.version_mujoco) == {"4.0.0", "4.1.0"}
+    runs = read_history(nights / HISTORY)
+    assert runs[0].about.scenes["scene 2"] == description(SCENE) and len(runs[3].rows) == 1
+    before = (nights / HISTORY).read_bytes()
+    append(nights / HISTORY, (runs[4].about, runs[4].rows), runs[4].times)  # it is in it
+    assert (nights / HISTORY).read_bytes() == before
+
+
+def test_what_is_no_history_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    run = save(tmp_path / "run", [ROW])
+    with Columns(run) as columns:
+        columns.add([ROW])
+    (tmp_path / "text.parquet").write_text("no columns")
+    for file, words in ((tmp_path, "there is no such file"), (run / "results.parquet", "no history written by"),
+                        (tmp_path / "text.parquet", "no history written by")):  # fmt: skip
+        assert status(["history", str(file)]) == 2
+        message = capsys.readouterr().err.strip()
+        assert words in message and "\n" not in message
+
+
+def test_a_name_that_does_not_print_or_is_a_formula_is_one_name_everywhere(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Escapes change the order of names, and a spreadsheet calculates a cell that begins with =."""
+    judge_here(monkeypatch)
+    names = ["a\x1b", "aB", "b\nc", "=cmd|'calc'!A0", "+1", "'quoted"]
+    text = fourbar.dump(replace(SCENE, motion=fourbar.Motion(fourbar.Sweep(0.1, 1.0, 3), 1.0)))
+    for name in names:
+        (tmp_path / f"{name}.toml").write_text(text)
+    run, files = tmp_path / "run", [str(tmp_path / f"{name}.toml") for name in names]
+    assert status(["run", *files, "--engines", "free-body", "--no-pictures", "--out", str(run)]) == 0
+    assert status(["compare", str(run), str(run)]) == 0
+    printed = sorted(["a\\x1b", "aB", "b\\nc", *names[3:]])
+    cells = [list(csv.reader((run / name).read_text().splitlines())) for name in ("results.csv", "timings.csv")]
+    assert not any(cell.startswith(("=", "+", "@")) for rows in cells for row in rows for cell in row)
+    assert all(len(row) == len(rows[0]) for rows in cells for row in rows)
+    kept = recorded(run)
+    assert [name for name, _ in kept.scenes()] == [name for name, _ in kept.times()] == printed == [*kept.about.scenes]
+    (tmp_path / "a\\x1b.toml").write_text(text)
+    with pytest.raises(InputError, match="must have a name of its own"):
+        scene_files([tmp_path / "a\x1b.toml", tmp_path / "a\\x1b.toml"])
+
+
+@pytest.mark.parametrize("name", ["lock", "run.json", "results.csv", "timings.csv", "report.html"])
+def test_a_folder_where_a_file_of_a_run_belongs_is_one_line_before_it(
+    name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "out" / name).mkdir(parents=True)
+    assert status(["run", *MODEL, "--engines", "free-body", "--no-pictures", "--out", str(tmp_path / "out")]) == 2
+    message = capsys.readouterr().err.strip()
+    assert message == f"error: path = '{tmp_path / 'out' / name}': must name a file, not a folder"
+    assert [path.name for path in (tmp_path / "out").iterdir()] == [name]
+
+
+@pytest.mark.parametrize("name", ["results.csv", "results.parquet", "timings.csv", "record.json", HISTORY])
+def test_accept_onto_a_folder_of_that_name_writes_nothing(name: str, tmp_path: Path) -> None:
+    run, kept = save(tmp_path / "run", [ROW]), tmp_path / "kept"
+    (kept / name).mkdir(parents=True)
+    assert status(["accept", str(run), "--to", str(kept)]) == 2
+    assert [path.name for path in kept.iterdir()] == [name]
+
+
+def test_folders_among_the_parts_of_a_run_are_swept_away(tmp_path: Path) -> None:
+    for name in ("000000", "another", ".000000.part"):
+        store = Store(tmp_path / name, {"of": "this"})
+        with store.held():
+            (store.parts / name / "inner").mkdir(parents=True)
+        with store.held():
+            assert store.done() == set() and not [*store.parts.iterdir()]
+    (tmp_path / "parts").write_text("a file")
+    with (
+        pytest.raises(InputError, match="must be a folder, in which a run keeps its parts"),
+        Store(tmp_path, {}).held(),
+    ):
+        pass
+
+
+def test_a_full_disk_names_the_file_that_does_not_fit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    run = save(tmp_path / "run", [ROW])
+
+    def full(source: Path, target: Path) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device", str(source), None, str(target))  # as shutil does
+
+    monkeypatch.setattr("fourbar_validation.regression.record.shutil.copyfile", full)
+    with pytest.raises(OSError) as caught:
+        record.accept(recorded(run), tmp_path / "kept")
+    assert (caught.value.filename, caught.value.filename2) == (str(tmp_path / "kept" / "results.csv"), None)

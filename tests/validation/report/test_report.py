@@ -1,0 +1,192 @@
+"""The report as text: every number traceable to its row, short enough where it must be, whatever a scene is called."""
+
+import base64
+import csv
+import gzip
+import io
+import re
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+import fourbar
+from fourbar_validation.compare.rows import FAILS, to_csv
+from fourbar_validation.engines.witnesses import WITNESSES
+from fourbar_validation.report.costs import cost_points
+from fourbar_validation.report.figures import FLOOR, STRETCHES, worst_of_stretches
+from fourbar_validation.report.html import ALL_OPEN, Section, html, markdown
+from fourbar_validation.report.record import Record
+from fourbar_validation.report.summary import Summary
+from fourbar_validation.run.judge import judged
+from tests.support.here import summary_of
+from tests.support.scenes import crank_rocker
+
+COMMENT_LIMIT = 65_536
+"""Characters of a comment on GitHub."""
+HOSTILE = "</script><img src=x onerror=alert(1)>\"'&|`*"
+
+
+@cache
+def demo(*, draw: bool = True) -> Record:
+    """A small scene as two exact engines and the free bodies judge it."""
+    scene = crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.0, 6.0, 36), 5.0))
+    return judged("demo", scene, tuple(w for w in WITNESSES if w.name != "mujoco-simulated"), draw=draw)
+
+
+def copies(count: int, *, failing: int = 0) -> list[Record]:
+    """The scene under many names; in the first ones a torque fails."""
+    made = []
+    for number in range(count):
+        name = f"scene-{number:03d}"
+        rows = [replace(row, scene=name) for row in demo().rows]
+        if number < failing:
+            at = next(i for i, row in enumerate(rows) if row.quantity == "torque")
+            rows[at] = replace(rows[at], error=0.5, verdict=FAILS)
+        made.append(replace(demo(), name=name, rows=rows))
+    return made
+
+
+def report(pages: list[Record], **more) -> tuple[Summary, str]:
+    """Summary and page, the lines of results.csv counted as `run` does."""
+    lines, line = {}, 2
+    for each in pages:
+        lines[each.name] = line
+        line += len(each.rows)
+    summary = summary_of(pages)
+    return summary, html(summary, lines, **more)
+
+
+def unpacked(text: str) -> str:
+    """The page with the packed bodies of its scenes laid open."""
+    return re.sub(
+        r'<script type="application/gzip">(.*?)</script>',
+        lambda found: gzip.decompress(base64.b64decode(found.group(1))).decode(),
+        text,
+        flags=re.DOTALL,
+    )
+
+
+@pytest.mark.parametrize("count", [2, ALL_OPEN + 1])
+def test_every_link_leads_to_a_row_and_the_row_says_what_results_csv_says_there(count: int) -> None:
+    pages = copies(count, failing=1)
+    _, text = report(pages)
+    text = unpacked(text)
+    lines = list(csv.reader(io.StringIO(to_csv(row for each in pages for row in each.rows))))
+    rows = dict(re.findall(r'<tr id="row-(\d+)"[^>]*>(.*?)</tr>', text))
+    assert {int(line) for line in rows} == set(range(2, len(lines) + 1))
+    for line, shown in rows.items():
+        cells = [re.sub(r"<[^>]*>", "", cell).split() for cell in re.findall(r"<td[^>]*>(.*?)</td>", shown)]
+        record = dict(zip(lines[0], lines[int(line) - 1], strict=True))
+        assert cells[1][0] == record["engine"] and cells[2] == [record["quantity"]]
+        assert cells[3] == [f"{float(record['error']):.2e}"]
+    linked = {int(line) for line in re.findall(r'href="#row-(\d+)"', text)}
+    assert linked <= {int(line) for line in rows} and len(linked) > 20 * count
+
+
+def test_the_page_carries_results_csv_to_the_byte() -> None:
+    pages = copies(3)
+    _, text = report(pages)
+    data = re.search(r'download="results.csv" href="data:text/csv;base64,([^"]*)"', text)
+    assert data is not None
+    assert base64.b64decode(data.group(1)).decode() == to_csv(row for each in pages for row in each.rows)
+
+
+def test_the_verdict_stands_first_and_a_failure_is_named_before_anything_else() -> None:
+    summary, text = report(copies(3, failing=1))
+    assert summary.verdict.startswith("FAILS: 1 of ")
+    body = text[text.index("<body>") :]
+    assert body.index(summary.verdict) < body.index("What fails</h2>") < body.index("Overview</h2>")
+    assert "What fails</h2>" not in report(copies(3))[1]
+
+
+def test_a_scene_cannot_write_into_the_demo() -> None:
+    hostile = replace(demo(), title=HOSTILE, source=HOSTILE, name=HOSTILE, left_out=[HOSTILE])
+    summary, text = report([hostile], sections=[Section("more", HOSTILE, HOSTILE, [HOSTILE], [[HOSTILE]])])
+    assert "<img src=x" not in text
+    assert len(re.findall("<script", text)) == 1
+    assert "<img" not in markdown(summary)
+
+
+def test_nothing_is_fetched() -> None:
+    _, text = report(copies(2), pictures={"scene-000": "iVBORw0KGgo="}, no_pictures="none")
+    text = re.sub(r'xmlns(:xlink)?="[^"]*"', "", text)
+    assert not re.search(r'(?:src|href)="(?!#|data:)', text)
+    assert "url(" not in re.sub(r"url\(#", "", text) and "@import" not in text
+
+
+def test_the_comment_of_a_pull_request_holds_200_scenes_that_all_fail() -> None:
+    assert len(markdown(summary_of(copies(200, failing=200)))) < COMMENT_LIMIT
+
+
+def test_a_section_of_another_module_is_shown_and_linked() -> None:
+    _, text = report(copies(2), sections=[Section("hard", "Hard cases", "As predicted.", ["family"], [["toggle"]])])
+    assert '<a href="#hard">Hard cases</a>' in text and '<h2 id="hard">' in text and ">toggle</th>" in text
+
+
+def test_the_errors_drawn_are_the_largest_of_their_stretches() -> None:
+    error = np.random.default_rng(1).uniform(size=1000)
+    for phase in (0.0, 0.3, 0.9):
+        found = worst_of_stretches(error, phase)
+        assert STRETCHES <= len(found) <= STRETCHES + 1
+        assert int(np.argmax(error)) in found
+        assert np.all(np.diff(found) > 0)
+    error[found[3]] = np.nan
+    assert found[3] not in worst_of_stretches(error, 0.9)
+    assert len(worst_of_stretches(np.full(40, np.nan), 0.0)) == 0
+    assert len(worst_of_stretches(np.array([FLOOR]), 0.5)) == 1
+
+
+def test_costs_are_those_of_the_run() -> None:
+    points, formulas = cost_points([demo()])
+    timings = {timing.engine: timing for timing in demo().timings}
+    errors = {row.engine: row.error for row in demo().rows if row.quantity == "torque"}
+    assert formulas == [1e6 * timings["formulas"].seconds / 37]
+    timed = {name: error for name, error in errors.items() if name in timings}  # what is shipped besides is not timed
+    assert points == {name: [(1e6 * timings[name].seconds / 37, error)] for name, error in timed.items()}
+    assert set(points) == {"pinocchio-inverse", "mujoco-inverse", "free-body"}
+
+
+@pytest.mark.parametrize(
+    ("motion", "pictures"),
+    [
+        (fourbar.Motion(fourbar.Sweep(0.0, 6.0, 24)), 3),  # positions only: angles are drawn
+        (fourbar.Motion(1.0, 5.0), 1),  # one position: the linkage alone
+        (fourbar.Motion(1.0, 0.0, free=fourbar.Free(0.2, 20)), 3),
+        (fourbar.Motion(fourbar.Sweep(0.0, 6.0, 24), 5.0), 3),
+    ],
+    ids=["positions", "one position", "released", "sweep"],
+)
+def test_every_kind_of_scene_is_drawn(motion: fourbar.Motion, pictures: int) -> None:
+    witnesses = tuple(w for w in WITNESSES if w.name == "free-body")
+    made = judged("kind", crank_rocker(motion=motion), witnesses)
+    assert made.figure is not None and made.figure.count("<svg") == pictures
+    _, text = report([made])
+    assert "kind: crank-rocker" in text
+
+
+def test_an_engine_that_is_missing_is_reported_as_failing() -> None:
+    absent = replace(WITNESSES[0], adapter="fourbar_validation.engines.absent:Absent")
+    summary, text = report([judged("demo", crank_rocker(), (absent,), draw=False)])
+    assert summary.verdict.startswith("FAILS")
+    assert "What fails</h2>" in text and "No module named" in text and "∞" in text
+
+
+def test_many_scenes_give_a_short_report_of_the_worst(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("fourbar_validation.report.summary.SCENES_SHOWN", 20)
+    pages = copies(100)
+    for number, each in enumerate(pages):
+        each.rows[0] = replace(each.rows[0], error=number * 5e-3, allowed=1.0)
+        each.left_out = [f"mujoco-simulated: falls to {number * 1e-3:.1e}; below 0.05 it is not simulated"]
+        each.evidence = {"sim": {"error_at_4h": 1e-3, "error_at_2h": 1e-4, "observed_order": 3.0 + number}}
+        each.timings = [*each.timings, replace(each.timings[0], engine="sim", setting=f"RK4 {628 + number}/rev")]
+    summary, text = report(pages)
+    assert [w.row.scene for w in summary.worst[:2]] == ["scene-099", "scene-098"]
+    assert {scene.name for scene in summary.shown} == {f"scene-0{number}" for number in range(80, 100)}
+    assert summary.refusals == [("mujoco-simulated", "falls to 0.0e+00; below 0.05 it is not simulated", 100)]
+    assert [cost.setting for cost in summary.costs if cost.engine == "sim"] == ["RK4 628/rev to 727/rev"]
+    assert summary.orders[0][0] == "scene-000"
+    assert "the 80 of 1100 scenes and engines" in markdown(summary)
+    assert markdown(summary).count("\n") < 150
+    assert len(text) < 1.8e6  # 20 scenes, each with a figure of 20 kB and some 55 kB of rows of eleven engines

@@ -1,0 +1,141 @@
+"""What is shipped besides `solve` is judged: each check holds, and each fails where its public call errs."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+import fourbar
+from fourbar.scene import Scene, command
+from fourbar.studies.keys import entries, left_out
+from fourbar_validation.compare.rows import FAILS, REFUSES, Row
+from fourbar_validation.engines.free_body import FreeBody
+from fourbar_validation.lab.stress.mutation.specimens import SPECIMENS
+from fourbar_validation.run.shipped import calls, checks, files
+from fourbar_validation.run.shipped.checks import CHECKS, judge_shipped
+from fourbar_validation.run.shipped.question import Question, moved, stated
+
+SHIPPED = SPECIMENS["shipped"]
+ENGINES = {"compiled", "study", "sensitivity", "extremes", "tolerances", "sdf", "usd"}
+
+
+def rows_of(scene: Scene, engine: str = "") -> list[Row]:
+    at = command(scene)
+    question = Question("", scene, at, fourbar.solve(scene, at=at), FreeBody().answer(scene, at))
+    return [row for check in CHECKS if engine in ("", check.__name__) for row in check(question)]
+
+
+def failing(found: list[Row]) -> set[str]:
+    return {row.quantity for row in found if row.failed}
+
+
+def test_every_engine_compares_and_holds() -> None:
+    found = rows_of(SHIPPED)
+    compared = {row.engine for row in found if row.compared}
+    assert compared == ENGINES == {check.__name__ for check in CHECKS}
+    assert not failing(found)
+
+
+def altered(call: Callable[..., Any], change: Callable[[Any], None]) -> Callable[..., Any]:
+    def wrong(*arguments: Any, **options: Any) -> Any:
+        found = call(*arguments, **options)
+        change(found)
+        return found
+
+    return wrong
+
+
+def scaled_force(solution: Any) -> None:
+    solution.F43 *= 1.000001
+
+
+def swapped(solution: Any) -> None:
+    solution.torque[[1, 2]] = solution.torque[[2, 1]]
+
+
+def steeper(found: Any) -> None:
+    found.by["torque"] *= 1.000001
+
+
+def narrower(found: Any) -> None:
+    found.spreads["torque"].deviation[:] *= 0.9
+
+
+@pytest.mark.parametrize(
+    ("engine", "call", "change", "quantity"),
+    [
+        ("compiled", "solve", scaled_force, "F43"),
+        ("study", "solve", swapped, "torque"),
+        ("sensitivity", "sensitivity", steeper, "torque"),
+        ("tolerances", "tolerances", narrower, "torque"),
+    ],
+)
+def test_a_public_call_that_errs_fails(
+    monkeypatch: pytest.MonkeyPatch, engine: str, call: str, change: Callable[[Any], None], quantity: str
+) -> None:
+    at = command(SHIPPED)
+    question = Question("", SHIPPED, at, fourbar.solve(SHIPPED, at=at), FreeBody().answer(SHIPPED, at))
+    monkeypatch.setattr(fourbar, call, altered(getattr(fourbar, call), change))
+    assert quantity in failing(next(check for check in CHECKS if check.__name__ == engine)(question))
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_bounds_that_are_narrower_fail(monkeypatch: pytest.MonkeyPatch, sign: float) -> None:
+    call = fourbar.extremes
+
+    def narrow(*arguments: Any) -> Any:
+        found = call(*arguments)
+        ends = found.greatest if sign > 0 else found.least
+        end = ends["torque"]
+        off = 1e-3 * abs(end.high)
+        ends["torque"] = end._replace(high=end.high - off) if sign > 0 else end._replace(low=end.low + off)
+        return found
+
+    monkeypatch.setattr(fourbar, "extremes", narrow)
+    assert failing(rows_of(SHIPPED, "extremes")) == {"torque"}
+
+
+@pytest.mark.parametrize(("engine", "number"), [("sdf", "0.2"), ("sdf", "0.25"), ("usd", "0.2")])
+def test_a_file_with_another_number_fails(monkeypatch: pytest.MonkeyPatch, engine: str, number: str) -> None:
+    """0.2 kg is the mass of the input, 0.25 m the length of the coupler."""
+    text = getattr(files, f"{engine}_text")
+
+    def wrong(scene: Scene) -> str:
+        written: str = text(scene)
+        for before, after in ((">", "<"), (">", " "), ("= ", "\n"), ("(", ",")):
+            written = written.replace(f"{before}{number}{after}", f"{before}{float(number) * 1.000001!r}{after}")
+        return written
+
+    monkeypatch.setattr(files, f"{engine}_text", wrong)
+    assert failing(rows_of(SHIPPED, engine))
+
+
+def test_what_breaks_down_costs_its_own_rows_and_what_is_missing_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    def broken(*_: object) -> None:
+        raise RuntimeError("lost")
+
+    monkeypatch.setattr(fourbar, "vary", broken)
+    monkeypatch.setattr(calls, "find_spec", lambda _: None)
+    monkeypatch.setattr(checks, "CHECKS", CHECKS[:2])
+    at = command(SHIPPED)
+    found = list(judge_shipped("", SHIPPED, at, fourbar.solve(SHIPPED), FreeBody().answer(SHIPPED, at)))
+    (row,) = (each for each in found if isinstance(each, Row))
+    assert (row.engine, row.quantity, row.verdict) == ("study", "all", FAILS)
+    assert any(isinstance(line, str) and line.startswith("compiled: numba is not installed") for line in found)
+
+
+def test_what_a_file_cannot_hold_is_refused() -> None:
+    (row,) = rows_of(SPECIMENS["sliding pins"], "usd")
+    assert row.verdict == REFUSES and "pin_friction" in row.reason
+
+
+@pytest.mark.parametrize("name", ["crank-rocker", "damped", "sprung", "flywheel", "sliding pins", "table"])
+def test_every_number_that_a_scene_states_is_found_in_its_file(name: str) -> None:
+    scene = SPECIMENS[name]
+    known = {key for key, entry in entries(scene).items() if not left_out(scene, entry)}
+    found = stated(scene, known)
+    assert found.keys() >= known - {key for key in known if ".centre." in key or ".inertia" in key}
+    changed = moved(scene, {"lengths.coupler": 0.01})
+    assert changed.linkage.coupler.length == scene.linkage.coupler.length + 0.01
+    assert np.array_equal(command(changed).theta_2, command(scene).theta_2)

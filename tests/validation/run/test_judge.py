@@ -1,0 +1,272 @@
+"""The harness itself, with witnesses with given answers: silence, NaN and breakdowns must cost the run."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import fourbar
+from fourbar.formulas.mobility import limit_positions
+from fourbar.quantities import FORCES
+from fourbar.scene import Command, Scene, command
+from fourbar_validation.compare.answer import Answer
+from fourbar_validation.compare.columns import read_columns
+from fourbar_validation.compare.compare import COMPARED
+from fourbar_validation.compare.rows import AGREES, FAILS, REFUSES, UNDECIDED, Row, to_csv, write_results
+from fourbar_validation.compare.tolerance import EPS, EQUIVALENCE, K
+from fourbar_validation.engines.free_body import FreeBody
+from fourbar_validation.engines.witnesses import WITNESSES, Witness, predicting_from
+from fourbar_validation.run.judge import judge
+from tests.support.scenes import crank_rocker
+
+
+class Echo:
+    """Answers with the formulas' own numbers, changed by `spoil`; only for tests of the harness."""
+
+    name = "echo"
+
+    def spoil(self, answer: Answer) -> Answer:
+        return answer
+
+    def answer(self, scene: Scene, command: Command) -> Answer:
+        s = fourbar.solve(scene, at=command)
+        numbers = {name: np.array(getattr(s, name)) for name in COMPARED}
+        return self.spoil(Answer("echo", "exact", command, np.array(s.assembled), numbers))
+
+
+class Silent(Echo):
+    def spoil(self, answer: Answer) -> Answer:
+        del answer.quantities["F12"]
+        return answer
+
+
+class NotANumber(Echo):
+    def spoil(self, answer: Answer) -> Answer:
+        answer.quantities["torque"][3] = np.nan
+        return answer
+
+
+class Elsewhere(Echo):
+    def spoil(self, answer: Answer) -> Answer:
+        assert answer.assembled is not None
+        answer.assembled[5] = False
+        return answer
+
+
+class Refuses(Echo):
+    def answer(self, scene: Scene, command: Command) -> Answer:
+        return Answer("echo", "exact", refusal="a declared limit")
+
+
+class Breaks(Echo):
+    def answer(self, scene: Scene, command: Command) -> Answer:
+        raise RuntimeError("engine on fire\nsecond line")
+
+
+class OneTurnMore(Echo):
+    def spoil(self, answer: Answer) -> Answer:
+        answer.quantities["theta_4"] += 2 * np.pi
+        return answer
+
+
+class SlightlyOff(Echo):
+    def spoil(self, answer: Answer) -> Answer:
+        answer.quantities["torque"] *= 1.0 + 1e-9
+        return answer
+
+
+def rows_of(engine: type, scene: Scene | None = None) -> dict[str, Row]:
+    witness = Witness("echo", f"{__name__}:{engine.__name__}", EQUIVALENCE)
+    record = judge("scene", scene or crank_rocker(), [witness])
+    return {row.quantity: row for row in record.rows if row.engine == "echo"}
+
+
+def test_an_equal_answer_agrees_in_every_quantity() -> None:
+    rows = rows_of(Echo)
+    stated = {"range", "limit_positions", "transmission"}
+    assert set(rows) == {*COMPARED, "assembled", "undecided", "closure", "torque_inertia"} | stated
+    assert all(row.verdict == AGREES for row in rows.values())
+
+
+@pytest.mark.parametrize(("engine", "quantity"), [(Silent, "F12"), (NotANumber, "torque"), (Elsewhere, "assembled")])
+def test_silence_nan_and_a_missing_position_fail(engine: type, quantity: str) -> None:
+    row = rows_of(engine)[quantity]
+    assert row.verdict == FAILS
+    assert not row.passed
+
+
+def test_a_declared_refusal_is_reported_and_does_not_fail() -> None:
+    rows = rows_of(Refuses)
+    assert set(rows) == {"all"}
+    assert rows["all"].verdict == REFUSES
+    assert not rows["all"].failed and not rows["all"].passed  # nothing was compared
+
+
+def test_an_engine_that_breaks_down_costs_its_own_row_in_one_line() -> None:
+    rows = rows_of(Breaks)
+    assert rows["all"].verdict == FAILS
+    assert "engine on fire" in rows["all"].reason
+    assert "\n" not in rows["all"].reason
+
+
+def test_a_basis_that_breaks_down_is_no_agreement(monkeypatch: pytest.MonkeyPatch) -> None:
+    """By the free bodies all are judged, also where they are no witness."""
+    others = [witness for witness in WITNESSES if witness.name == "mujoco-inverse"]
+
+    def broken(*_: object) -> Answer:
+        raise IndexError("lost")
+
+    monkeypatch.setattr(FreeBody, "answer", broken)
+    failed = [row for row in judge("", crank_rocker(), others).rows if row.failed]
+    assert [(row.quantity, row.reason) for row in failed] == [
+        ("status", "the free bodies, by which it is judged, broke down")
+    ]
+
+
+def test_angles_are_compared_modulo_a_turn() -> None:
+    assert rows_of(OneTurnMore)["theta_4"].verdict == AGREES
+
+
+def test_a_torque_off_by_a_billionth_fails() -> None:
+    row = rows_of(SlightlyOff)["torque"]
+    assert row.verdict == FAILS
+    assert row.error == pytest.approx(1e-9, rel=0.5)
+    assert row.allowed == pytest.approx(K * EPS / row.condition)
+
+
+class OffAtTheReversal(Echo):
+    """Everything is off by a thousandth at the dead centre of `with_friction`, and nowhere else."""
+
+    def spoil(self, answer: Answer) -> Answer:
+        for values in answer.quantities.values():
+            values[AT_REST] += 1e-3 + 1e-3 * np.abs(values[AT_REST])
+        return answer
+
+
+AT_REST = 1
+"""Position at which bar 4 stands still in its dry pin."""
+
+
+def with_friction() -> Scene:
+    """A crank-rocker with dry friction at O4, at the dead centre of bar 4 and on either side of it."""
+    linkage = fourbar.uniform(0.3, 0.1, 0.25, 0.22)
+    d, a, b, c = linkage.lengths
+    psi = np.arccos((d * d + (a + b) ** 2 - c * c) / (2.0 * d * (a + b)))
+    motion = fourbar.Motion(np.array([psi - 0.2, psi, psi + 0.2]), 10.0)
+    return Scene(linkage, motion, effects=(fourbar.Friction.at(O4=0.5),))
+
+
+def test_where_dry_friction_reverses_forces_are_not_judged_and_the_motion_is() -> None:
+    rows = rows_of(OffAtTheReversal, with_friction())
+    for quantity in COMPARED:
+        row = rows[quantity]
+        noted = "1 positions at which dry friction reverses not judged" in row.reason
+        assert (row.verdict, noted) == ((AGREES, True) if quantity in FORCES else (FAILS, False)), quantity
+        if quantity not in FORCES:
+            assert row.theta_2 == with_friction().motion.theta_2[AT_REST], quantity  # type: ignore[index]
+
+
+def test_where_no_digit_is_left_nothing_is_judged() -> None:
+    # 1e-13 rad from a limit of theta_2 the condition of the accelerations is about 1e-13
+    rocker = fourbar.uniform(0.3, 0.25, 0.1, 0.22)
+    first = limit_positions(rocker)[0].theta_2
+    for side in (1.0, -1.0):
+        near = Scene(rocker, fourbar.Motion(np.array([first + side * 1e-13]), 1.0))
+        if fourbar.solve(near).assembled.all():
+            rows = rows_of(Echo, near)
+            assert rows["torque"].verdict == UNDECIDED and not rows["torque"].passed
+            assert "eps/condition" in rows["torque"].reason
+            return
+    pytest.fail("neither side of the limit assembles")
+
+
+def test_positions_alone_need_no_forces() -> None:
+    scene = replace(crank_rocker(), motion=fourbar.Motion(fourbar.Sweep(0.0, 6.0, 10)))
+    rows = judge("scene", scene, []).rows
+    assert {row.quantity for row in rows} == {"closure"}
+
+
+def test_results_survive_the_file(tmp_path) -> None:  # type: ignore[no-untyped-def]
+    rows = judge("scene", crank_rocker(), [Witness("echo", f"{__name__}:Echo", EQUIVALENCE)]).rows
+    write_results(rows, tmp_path / "results.csv")
+    again = list(read_columns(tmp_path / "results.csv"))
+    assert to_csv(again) == to_csv(rows)
+    assert [(r.scene, r.engine, r.setting, r.quantity) for r in again] == sorted(
+        (r.scene, r.engine, r.setting, r.quantity) for r in rows
+    )
+
+
+def test_an_engine_that_raised_an_alarm_is_excused_by_no_prediction_of_its_own() -> None:
+    scene = crank_rocker()
+    at = command(scene)
+    witness = next(witness for witness in WITNESSES if witness.predictor == "own")
+    answer = Answer(witness.name, "RK4", at, predicted={"torque": np.ones(len(at.theta_2))})
+    predicted = predicting_from(witness, scene, at, answer)
+    assert predicted is not None and predicted("torque", np.ones(len(at.theta_2), bool))[0] == 1.0
+    answer.alarms.append("the loop is open")
+    assert predicting_from(witness, scene, at, answer) is None
+
+
+class AnswersAnyway(Echo):
+    """Numbers of its own where the formulas state none."""
+
+    def spoil(self, answer: Answer) -> Answer:
+        answer.quantities = {name: np.nan_to_num(values, nan=7.0) for name, values in answer.quantities.items()}
+        return answer
+
+
+def test_an_answer_that_the_formulas_withhold_is_not_compared() -> None:
+    """On bar 3 of a parallelogram no torque exists: no agreement, whatever the engine says; the motion is judged."""
+    motion = fourbar.Motion(np.linspace(0.3, 2.0, 5), 1.0)
+    for engine in (Echo, AnswersAnyway):
+        rows = rows_of(engine, Scene(fourbar.uniform(1.0, 0.5, 1.0, 0.5), motion, 3))
+        for quantity in COMPARED:
+            row = rows[quantity]
+            expected = (REFUSES, "the formulas state no value: 5 no_torque")
+            assert (row.verdict, row.reason) == (expected if quantity in FORCES else (AGREES, EQUIVALENCE.name))
+
+
+def test_positions_without_a_value_are_counted_next_to_those_that_were_compared() -> None:
+    """A parallelogram from the crossed branch through its change point into bars that stay parallel."""
+    motion = fourbar.Motion(np.array([-0.5, -0.3, 0.0, 0.3]), 1.0)
+    scene = Scene(fourbar.uniform(1.0, 0.5, 1.0, 0.5), motion, 3)
+    rows = rows_of(AnswersAnyway, scene)
+    assert (rows["torque"].verdict, rows["torque"].reason) == (
+        AGREES,
+        f"{EQUIVALENCE.name}; not judged: 1 singular, 1 no_torque",
+    )
+    assert rows["omega_3"].reason == f"{EQUIVALENCE.name}; not judged: 1 singular"
+
+
+def test_beyond_the_range_of_doubles_what_was_before_is_judged() -> None:
+    heavy = fourbar.FourBar(3.0, fourbar.Bar(1.0, 1.0), fourbar.Bar(2.5, 1e308, 1.0), fourbar.Bar(2.2, 1.0))
+    rows = rows_of(AnswersAnyway, Scene(heavy, fourbar.Motion(np.linspace(0.3, 2.0, 5), 10.0)))
+    for quantity in COMPARED:
+        assert rows[quantity].verdict == (REFUSES if quantity in FORCES else AGREES), quantity
+
+
+class Counting(FreeBody):
+    """The free bodies, with who was started and what it was given."""
+
+    started = 0
+
+    def __init__(self) -> None:
+        Counting.started += 1
+
+
+def test_an_engine_is_started_once_a_scene_and_no_question_is_put_twice(monkeypatch: pytest.MonkeyPatch) -> None:
+    put: list[tuple[Scene, Command]] = []
+    true = FreeBody.answer
+
+    def noting(self: FreeBody, scene: Scene, command: Command) -> Answer:
+        put.append((scene, command))
+        return true(self, scene, command)
+
+    monkeypatch.setattr(FreeBody, "answer", noting)
+    scene = crank_rocker()
+    judge("scene", scene, [witness for witness in WITNESSES if witness.name == "free-body"])
+    assert len({(id(of), id(command)) for of, command in put}) == len(put)
+    # nor of the bars without loads, which the answer holds too
+    assert [of for of, _ in put if of.linkage is scene.linkage] == [scene]
+    judge("scene", scene, [Witness("free-body", f"{__name__}:Counting", EQUIVALENCE)])
+    assert Counting.started == 1

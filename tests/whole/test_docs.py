@@ -1,0 +1,187 @@
+"""README and docs are run: commands, program, scene file; every link leads somewhere, every page is listed.
+
+The tutorial has a test of its own, which runs it from top to bottom.
+"""
+
+import contextlib
+import io
+import math
+import re
+import shlex
+from pathlib import Path
+
+import click
+import pytest
+
+import fourbar
+import fourbar.cli
+import fourbar_validation.cli
+from fourbar.cli import status
+from fourbar.errors import HOLDS
+from fourbar.files import load
+from fourbar.files.effects import REGISTRY
+from fourbar_validation.cli import COMMANDS, group
+from fourbar_validation.lab.effects.work import EFFECTS
+from fourbar_validation.scenes.suites import suite_file
+
+ROOT = Path(__file__).parents[2]
+DOCS = ROOT / "docs"
+GALLERY = ROOT / "models" / "gallery"
+GROUPS = {"fourbar": fourbar.cli.group, "validation": fourbar_validation.cli.group}
+PAGES = [ROOT / "README.md", *sorted(DOCS.rglob("*.md"))]
+
+
+def read(name: str) -> str:
+    return (ROOT / name).read_text(encoding="utf-8")
+
+
+def blocks(language: str, text: str) -> list[str]:
+    return re.findall(rf"^```{language}\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
+
+
+def test_the_examples_of_continuous_integration_use_commands_and_options_that_exist() -> None:
+    for file in sorted((DOCS / "ci").glob("*.yml")):
+        text = re.sub(r"\\\n\s*|>\n\s*|(?<=\S)\n\s+(?=--)", " ", file.read_text())
+        lines = re.findall(r"-m validation (\w+)(.*)", text)
+        assert {name for name, _ in lines} >= {"run", "accept"}
+        for name, options in lines:
+            known = {option for each in group.get_command(None, name).params for option in each.opts}  # type: ignore[arg-type,union-attr]
+            wanted = set(re.findall(r"(?<=\s)--[a-z-]+", options))
+            assert wanted <= known and wanted, (file.name, name, wanted - known)
+
+
+@pytest.fixture
+def checkout(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder that looks like a checkout and may be written to."""
+    (tmp_path / "models").symlink_to(ROOT / "models")
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    ("name", "count"),
+    [("README.md", 2), ("docs/commands.md", 9), ("docs/gallery.md", 6)],
+    ids=["readme", "commands", "gallery"],
+)
+def test_every_command_prints_what_is_shown(
+    name: str, count: int, checkout: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    sessions = re.findall(r"^\$ (.*)\n((?:(?!\$ ).*\n)*)", "".join(blocks("console", read(name))), re.MULTILINE)
+    assert len(sessions) == count
+    for command, shown in sessions:
+        program, *arguments = shlex.split(command)
+        assert program == "fourbar" and status(arguments) == HOLDS, command
+        captured = capsys.readouterr()
+        beginning = shown.removesuffix("...\n")
+        assert captured.out.startswith(beginning), command
+        assert (len(captured.out) > len(beginning)) == (shown != beginning), command
+        assert captured.err == ""
+        for file in re.findall(r"-o (\S+)", command):
+            assert (checkout / file).stat().st_size > 0, command
+
+
+@pytest.mark.usefixtures("checkout")
+def test_the_programs_print_what_is_shown() -> None:
+    programs, texts = blocks("python", read("README.md")), blocks("text", read("README.md"))
+    assert len(programs) == 2
+    for program, shown in zip(programs, texts, strict=True):
+        printed = io.StringIO()
+        with contextlib.redirect_stdout(printed):
+            exec(compile(program, "README.md", "exec"), {})
+        ours, theirs = (re.split(r"(?<=take )(.*)", text) for text in (printed.getvalue(), shown))
+        assert ours[::2] == theirs[::2]
+        # the error bar is itself rounding: it may differ a little from one machine to the next
+        assert [float(x) for x in ours[1::2]] == pytest.approx([float(x) for x in theirs[1::2]], rel=0.4, abs=0.0)
+
+
+def test_the_scene_file_is_one(checkout: Path) -> None:
+    (text,) = blocks("toml", read("docs/scene-file.md"))
+    (checkout / "example.toml").write_text(text)
+    scene = fourbar.load(checkout / "example.toml")
+    assert set(fourbar.solve(scene).status) == {"ok"}
+    assert {effect.key for effect in scene.effects} <= set(REGISTRY)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_every_other_command_line_is_one_that_its_program_takes(page: Path) -> None:
+    """Those in running text and shell blocks run for minutes or name a SCENE: they are parsed as they stand."""
+    text = page.read_text(encoding="utf-8")
+    lines = re.findall(r"`((?:fourbar|python -m validation) [^`]+)`", text)
+    lines += re.findall(r"^(python -m validation .*)$", "".join(blocks("sh", text)), re.MULTILINE)
+    for line in lines:
+        words = shlex.split(line.removeprefix("python -m "), comments=True)
+        command = GROUPS[words[0]].get_command(click.Context(GROUPS[words[0]]), words[1])
+        assert command is not None, line
+        if words[2:]:
+            command.make_context(words[1], words[2:])
+
+
+def options() -> list[set[str]]:
+    """The names of each option of each command, its short one among them."""
+    found = []
+    for program in GROUPS.values():
+        context = click.Context(program)
+        for command in (program, *(program.get_command(context, each) for each in program.list_commands(context))):
+            assert command is not None
+            found += [{*param.opts, *param.secondary_opts} for param in command.params]
+    return found
+
+
+@pytest.mark.parametrize("name", ["commands.md", "checks.md", "results-format.md"])
+def test_every_option_that_a_page_names_is_one(name: str) -> None:
+    assert set(re.findall(r"(?<![\w-])--[a-z][a-z-]*", read(f"docs/{name}"))) <= set().union(*options())
+
+
+def test_every_out_has_its_short_name() -> None:
+    named = [names for names in options() if "--out" in names]
+    assert len(named) > 15 and all("-o" in names for names in named)
+
+
+def test_every_effect_whose_cost_is_counted_can_be_chosen_from_a_list() -> None:
+    assert not any("," in name for name in EFFECTS)
+
+
+def test_every_command_of_the_harness_is_listed() -> None:
+    text = read("docs/checks.md")
+    table = text[text.index("| `python -m validation` |") : text.index("The columns of the results:")]
+    listed = re.findall(r"`([a-z-]+)[^`]*`", "".join(line.split("|")[1] for line in table.splitlines()[2:] if line))
+    assert sorted(listed) == sorted(COMMANDS)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_every_link_leads_somewhere(page: Path) -> None:
+    for target in re.findall(r"\]\(([^)#\s]+)\)", page.read_text(encoding="utf-8")):
+        assert target.startswith("http") or (page.parent / target).is_file(), target
+
+
+def test_the_index_lists_every_page_for_readers_and_for_the_site() -> None:
+    text = read("docs/index.md")
+    pages = {page.relative_to(DOCS).as_posix() for page in PAGES[1:]} - {"index.md"}
+    assert pages == set(re.findall(r"\]\(([^)]+\.md)\)", text))
+    (tree,) = blocks(r"\{toctree\}", text)
+    lines = [line for line in tree.splitlines() if not line.startswith(":")]
+    assert pages == {re.sub(r".* <(.*)>", r"\1", line) + ".md" for line in lines}
+
+
+def test_the_gallery_is_a_suite_with_pictures_and_sources() -> None:
+    suite = suite_file(GALLERY / "suite.txt")
+    names = [suite.name(index) for index in range(len(suite))]
+    assert names == sorted(path.stem for path in GALLERY.glob("*.toml")) and len(names) == 6
+    for name in names:
+        scene = load(GALLERY / f"{name}.toml")
+        assert set(fourbar.solve(scene, "force").status) == {"ok"} and len(scene.source) > 100
+        assert (DOCS / "gallery" / f"{name}.svg").is_file() and f"gallery/{name}.svg" in read("docs/gallery.md")
+    # what the sources state of them: a stroke of 54 in, 60 deg to and fro in the same time, 450 mm straight to 1.5 mm
+    pump = load(GALLERY / "pump_jack.toml").linkage
+    assert fourbar.swing(pump) * 72.0 == pytest.approx(54.0, rel=0.03)
+    wiper = load(GALLERY / "wiper.toml").linkage
+    assert math.degrees(fourbar.swing(wiper)) == pytest.approx(60.0, rel=1e-8)
+    assert fourbar.time_ratio(wiper) == pytest.approx(1.0, rel=1e-8)
+    gear = fourbar.solve(load(GALLERY / "landing_gear.toml")).points["foot"]
+    assert gear[0] == pytest.approx([-0.250962, -0.162331], abs=2e-5)  # retracted: D of the source
+    assert gear[-1] == pytest.approx([0.654038, -1.067331], abs=3e-4)  # plumb under O4
+    pump_cranks = fourbar.solve(load(GALLERY / "double_crank_pump.toml")).omega_4 / math.tau * 60.0
+    assert (pump_cranks.min(), pump_cranks.max()) == pytest.approx((240.0, 375.0), rel=1e-3)
+    curve = fourbar.coupler_curve(load(GALLERY / "hoecken.toml").linkage, 0.5, 0.0, steps=720)
+    straight = curve.y < 0.4015
+    assert straight.mean() > 0.5 and curve.y.min() > 0.3999 and curve.x[straight].max() - curve.x[straight].min() > 0.44

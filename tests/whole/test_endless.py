@@ -1,0 +1,123 @@
+"""Input that never ends, and work that would not: refused in one line with exit status 2, or bounded and stopped."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+import fourbar.cli
+import fourbar_validation.cli
+from fourbar.errors import BAD_INPUT, INTERRUPTED
+from fourbar.evaluation import free_motion
+
+ROOT = Path(__file__).parents[2]
+SCENE = str(ROOT / "models" / "crank_rocker.toml")
+READING = [
+    # what reads a file of somebody's; ENDLESS stands for the file
+    ["fourbar", "analyze", "ENDLESS"],
+    ["fourbar", "mjcf", "ENDLESS", "-o", "OUT"],
+    ["fourbar", "plot", "ENDLESS", "-o", "OUT.svg"],
+    ["fourbar", "animate", "ENDLESS", "-o", "OUT.html"],
+    ["fourbar", "animate", SCENE, "--picture", "coupler=ENDLESS", "-o", "OUT.html"],
+    ["validation", "check", "ENDLESS", "ENDLESS"],
+    ["validation", "check", SCENE, "ENDLESS"],
+    ["validation", "run", "ENDLESS", "--out", "OUT"],
+    ["validation", "run", SCENE, "--mjcf", "ENDLESS", "--out", "OUT"],
+    ["validation", "run", SCENE, "--against", "ENDLESS", "--out", "OUT"],
+    ["validation", "run", SCENE, "--python", "ENDLESS", "--out", "OUT"],
+    ["validation", "run", "--suite", "ENDLESS", "--out", "OUT"],
+    ["validation", "compare", "ENDLESS", "ENDLESS"],
+    ["validation", "accept", "ENDLESS"],
+    ["validation", "advise", "ENDLESS", "--error", "1e-3"],
+    ["validation", "cost", "ENDLESS", "--out", "OUT"],
+]
+
+
+@pytest.mark.timeout(30)
+@pytest.mark.parametrize("what", ["pipe", "device", "directory"])
+@pytest.mark.parametrize("line", READING, ids=lambda line: " ".join(line[:2]))
+def test_what_may_never_end_is_not_waited_for(
+    line: list[str], what: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    endless = {"pipe": tmp_path / "pipe", "device": Path("/dev/zero"), "directory": tmp_path / "folder"}[what]
+    os.mkfifo(tmp_path / "pipe")
+    (tmp_path / "folder").mkdir()
+    before = sorted(tmp_path.rglob("*"))
+    out = str(tmp_path / "out")
+    program, *arguments = (part.replace("ENDLESS", str(endless)).replace("OUT", out) for part in line)
+    status = fourbar.cli.status if program == "fourbar" else fourbar_validation.cli.status
+    assert status(arguments) == BAD_INPUT
+    printed = capsys.readouterr()
+    assert printed.err.count("\n") == 1 and endless.name in printed.err
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_a_file_on_standard_input_is_read_and_a_pipe_is_not() -> None:
+    """`< scene.toml` is an ordinary file with a size, `cat scene.toml |` is a pipe."""
+    command = [sys.executable, "-m", "fourbar", "analyze", "/dev/stdin"]
+    with Path(SCENE).open("rb") as scene:
+        assert subprocess.run(command, stdin=scene, stdout=subprocess.DEVNULL, check=False).returncode == 0
+    piped = subprocess.run(command, input=Path(SCENE).read_bytes(), capture_output=True, check=False)
+    assert piped.returncode == BAD_INPUT and b"must be an ordinary file" in piped.stderr
+
+
+RELEASED = """[lengths]
+ground = "0.3 m"
+input = "0.1 m"
+coupler = "0.25 m"
+output = "0.22 m"
+[bars.input]
+mass = "0.2 kg"
+[motion]
+theta_2 = "60 deg"
+omega_2 = "1 rad/s"
+free = { duration = "1e9 s", steps = 10 }
+[effects]
+gravity = ["9.81 m/s^2", "-90 deg"]
+"""
+
+
+def test_a_free_motion_without_end_is_given_up_with_its_reason(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "released.toml").write_text(RELEASED)
+    monkeypatch.setattr(free_motion, "STEPS", 500)
+    for command in ("analyze", "plot", "animate"):
+        out = tmp_path / ("out.html" if command == "animate" else "out.svg")
+        assert fourbar.cli.status([command, str(tmp_path / "released.toml"), "-o", str(out)]) == BAD_INPUT
+        printed = capsys.readouterr().err
+        assert printed.count("\n") == 1 and "released.toml: motion.free.duration = 1000000000.0" in printed
+        assert "followed for 500 steps" in printed and not out.exists()
+
+
+def test_a_long_free_motion_stops_at_ctrl_c(tmp_path: Path) -> None:
+    (tmp_path / "released.toml").write_text(RELEASED)
+    command = [sys.executable, "-m", "fourbar", "analyze", str(tmp_path / "released.toml")]
+    with subprocess.Popen(
+        command,
+        stderr=subprocess.PIPE,
+        # a job in the background inherits SIGINT ignored; no other thread runs here
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # noqa: PLW1509
+    ) as running:
+        time.sleep(5.0)
+        assert running.poll() is None
+        running.send_signal(signal.SIGINT)
+        _, printed = running.communicate(timeout=30.0)
+    assert running.returncode == INTERRUPTED and printed.strip() == b"error: interrupted"
+
+
+def test_a_free_motion_too_long_for_the_engines_is_refused_before_a_run(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "released.toml").write_text(RELEASED)
+    assert (
+        fourbar_validation.cli.status(["run", str(tmp_path / "released.toml"), "--out", str(tmp_path / "out")])
+        == BAD_INPUT
+    )
+    printed = capsys.readouterr().err
+    assert "motion.free.duration" in printed and "must not exceed 100 s in a run" in printed
+    assert not (tmp_path / "out").exists()

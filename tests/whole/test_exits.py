@@ -1,0 +1,318 @@
+"""How a command ends: one table of commands and their statuses, and every command once in a process of its own."""
+
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import click
+import numpy as np
+import pytest
+
+import fourbar
+import fourbar.cli
+import fourbar_validation.cli
+from fourbar.errors import BAD_INPUT, BROKEN, FAILED, HOLDS, INTERRUPTED, DependencyError, InputError, run
+from fourbar.writing import write_text
+from fourbar_validation.compare.rows import AGREES, FAILS, Row, write_results
+from fourbar_validation.lab.stress.bench import Measured
+from fourbar_validation.lab.stress.forward_error.stability import Tally
+from fourbar_validation.published.figures import Figure
+from tests.support.alone import alone
+from tests.support.here import judge_here
+from tests.support.scenes import crank_rocker
+
+ROOT = Path(__file__).parents[2]
+MODEL = str(ROOT / "models" / "crank_rocker.toml")
+NO_FILE = "no-such-file"
+ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+
+
+def raising(error: BaseException) -> click.Group:
+    """A group whose command `go` ends by an exception."""
+
+    @click.command()
+    def go() -> None:
+        raise error
+
+    return click.Group(commands={"go": go})
+
+
+def returning(result: object) -> click.Group:
+    """A group whose command `go` returns something."""
+    return click.Group(commands={"go": click.command(name="go")(lambda: result)})
+
+
+def leaving() -> click.Group:
+    """A group whose command ends as rich ends where the reader of its pipe has gone."""
+
+    @click.command()
+    def go() -> None:
+        try:
+            raise BrokenPipeError(32, "Broken pipe")
+        except BrokenPipeError:
+            raise SystemExit(1) from None
+
+    return click.Group(commands={"go": go})
+
+
+@pytest.mark.parametrize(
+    "command",
+    ["check {0} {1} --json {1}", "check {0} {1} --junit {0}", "advise {0} --error 1e-3 -o {0}", "run {0} --junit {0}"],
+)
+def test_no_command_writes_over_what_it_reads(
+    command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    texts = {"scene.toml": Path(MODEL).read_text(), "theirs.csv": "theta_2,torque\n1.0,0.2\n"}
+    for name, text in texts.items():
+        Path(name).write_text(text)
+    assert fourbar_validation.cli.status(command.format(*texts).split()) == BAD_INPUT
+    assert "is read here, and would be lost" in capsys.readouterr().err
+    assert {path.name: path.read_text() for path in tmp_path.iterdir()} == texts
+
+
+@pytest.mark.parametrize(
+    ("group", "status"),
+    [
+        (returning(None), HOLDS),
+        (returning(0), HOLDS),
+        (returning(1), FAILED),
+        (returning(np.int64(1)), FAILED),
+        (returning("all is well"), BROKEN),  # no status
+        (raising(SystemExit()), HOLDS),
+        (raising(SystemExit(0)), HOLDS),
+        (raising(SystemExit(1)), FAILED),
+        (raising(SystemExit(2)), BAD_INPUT),
+        (raising(SystemExit("it is wrong")), BROKEN),
+        (raising(click.exceptions.Exit(1)), FAILED),
+        (raising(InputError("key", 1, "must be 2")), BAD_INPUT),
+        (raising(click.UsageError("no such option")), BAD_INPUT),
+        (raising(DependencyError("no such library")), BROKEN),
+        (raising(ModuleNotFoundError("No module named 'x'", name="x")), BROKEN),
+        (raising(OSError(28, "No space left on device")), BROKEN),
+        (raising(OSError("without a number")), BROKEN),
+        (raising(BrokenPipeError(32, "Broken pipe")), BROKEN),  # of a worker: standard output is whole
+        (leaving(), HOLDS),
+        (raising(RuntimeError("a bug")), BROKEN),
+        (raising(KeyboardInterrupt()), INTERRUPTED),
+        (raising(click.Abort()), INTERRUPTED),
+    ],
+)
+def test_every_end_has_its_status(
+    group: click.Group, status: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.delenv("FOURBAR_TRACEBACK", raising=False)
+    monkeypatch.setattr(sys, "stdout", sys.stdout)  # click lets go of it where a pipe breaks
+    monkeypatch.setattr(sys, "stderr", sys.stderr)
+    assert run(group, "program", ["go"]) == status
+    printed = capsys.readouterr().err.strip()
+    assert (
+        "\n" not in printed
+        and "None" not in printed
+        and bool(printed) == (status in (BROKEN, INTERRUPTED) or "must be" in printed or "such" in printed)
+    )
+
+
+@pytest.mark.parametrize("module", ["fourbar", "validation"])
+def test_an_interruption_while_the_libraries_are_imported_is_one_line(module: str, tmp_path: Path) -> None:
+    (tmp_path / "numpy.py").write_text("raise KeyboardInterrupt")
+    paths = os.pathsep.join((str(tmp_path), str(ROOT), str(ROOT / "validation")))
+    line = [sys.executable, "-m", module, "--help"]
+    done = subprocess.run(line, env={**os.environ, "PYTHONPATH": paths}, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (INTERRUPTED, "error: interrupted\n")
+
+
+def test_a_full_disk_names_the_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(_: int) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("os.fsync", full)
+    with pytest.raises(OSError, match="No space left on device") as caught:
+        write_text(tmp_path / "report.md", "text")
+    assert caught.value.filename == str(tmp_path / "report.md") and not list(tmp_path.iterdir())
+
+
+ROW = Row("scene", "engine", "exact", "torque", 1e-15, 1e-14, AGREES, "equivalence", 1.0, 1.0)
+TABLE = "theta_2 [deg], torque\n60, 1.0\n"
+"""A torque that is not that of the crank-rocker."""
+
+
+def study(folder: Path) -> dict[str, str]:
+    """Files that the commands of the table are given."""
+    write_results([ROW], folder / "good.csv")
+    write_results([Row("scene", "engine", "exact", "torque", 1.0, 1e-14, FAILS, "", 1.0, 1.0)], folder / "bad.csv")
+    (folder / "theirs.csv").write_text(TABLE)
+    (folder / "scene.toml").write_text(fourbar.dump(crank_rocker()))
+    return {name: str(folder / name) for name in ("good.csv", "bad.csv", "theirs.csv", "scene.toml", "out")}
+
+
+VALIDATION, FOURBAR = fourbar_validation.cli.status, fourbar.cli.status
+STATUSES: list[tuple[Callable[[list[str]], int], str, int]] = [
+    (FOURBAR, "--version", HOLDS),
+    (FOURBAR, "--help", HOLDS),
+    (FOURBAR, "classify 4 1 3 3", HOLDS),
+    (FOURBAR, "classify 4 1 3 x", BAD_INPUT),
+    (FOURBAR, "analyze scene.toml", HOLDS),
+    (FOURBAR, "analyze no-such-file", BAD_INPUT),
+    (FOURBAR, "analyze scene.toml -o out/deep/file", BAD_INPUT),
+    (FOURBAR, "mjcf scene.toml -o out", HOLDS),
+    (FOURBAR, "mjcf -o out", BAD_INPUT),
+    (FOURBAR, "no-such-command", BAD_INPUT),
+    (VALIDATION, "--help", HOLDS),
+    (VALIDATION, "no-such-command", BAD_INPUT),
+    (VALIDATION, "compare good.csv good.csv", HOLDS),
+    (VALIDATION, "compare good.csv bad.csv", FAILED),
+    (VALIDATION, "compare good.csv no-such-file", BAD_INPUT),
+    (VALIDATION, "check scene.toml theirs.csv", FAILED),
+    (VALIDATION, "check scene.toml no-such-file", BAD_INPUT),
+    (VALIDATION, "run scene.toml --engines free-body --no-pictures --out out", HOLDS),
+    (VALIDATION, "run scene.toml --engines nobody --out out", BAD_INPUT),
+    (VALIDATION, "fuzz-files --count 3", HOLDS),
+    (VALIDATION, "stability --samples 2 --family random --jobs 1", HOLDS),
+    (VALIDATION, "stability --samples 0", BAD_INPUT),
+    (VALIDATION, "bench --positions 1", BAD_INPUT),
+    (VALIDATION, "cost no-such-file", BAD_INPUT),
+    (VALIDATION, "advise no-such-file --error 1e-3", BAD_INPUT),
+    (VALIDATION, "advise-study --count 0", BAD_INPUT),
+    (VALIDATION, "effects-cost --engines nobody", BAD_INPUT),
+    (VALIDATION, "mutation --most 3", BAD_INPUT),
+    (VALIDATION, "fuzz --scenes 0", BAD_INPUT),
+    (VALIDATION, "accept no-such-file", BAD_INPUT),
+]
+
+
+@pytest.mark.parametrize(("command", "line", "status"), STATUSES, ids=[line for _, line, _ in STATUSES])
+def test_every_command_ends_with_its_status(
+    command: Callable[[list[str]], int], line: str, status: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    files = study(tmp_path)
+    monkeypatch.chdir(tmp_path)
+    judge_here(monkeypatch)
+    assert command([files.get(word, word) for word in line.split()]) == status
+
+
+def test_a_figure_that_no_erratum_explains_is_status_1(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert VALIDATION(["published"]) == HOLDS
+    wrong = Figure("2.4 positions", "1 theta3_1", "167.877224", 167.8)
+    monkeypatch.setattr("fourbar_validation.published.check.figures", lambda: iter([wrong]))
+    assert VALIDATION(["published"]) == FAILED
+
+
+def test_no_figure_at_all_is_status_1(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.setattr("fourbar_validation.published.check.figures", lambda: iter([]))
+    assert VALIDATION(["published"]) == FAILED
+    assert "Nothing was compared" in capsys.readouterr().out
+
+
+STABILITY = ["stability", "--samples", "3", "--family", "random", "--jobs", "1"]
+
+
+def test_a_torque_off_in_its_twelfth_digit_is_status_1(monkeypatch: pytest.MonkeyPatch) -> None:
+    true = fourbar.solve
+
+    def off(*arguments: object, **options: object) -> fourbar.Solution:
+        solution = true(*arguments, **options)  # type: ignore[arg-type]
+        assert solution.torque is not None
+        solution.torque *= 1.0 + 1e-12
+        return solution
+
+    monkeypatch.setattr("fourbar_validation.lab.stress.forward_error.stability.solve", off)
+    assert VALIDATION(STABILITY) == FAILED
+
+
+def test_samples_that_compare_nothing_are_status_1(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def open_loop(scene: fourbar.Scene, tally: Tally, sample: str) -> None:
+        tally.samples += 1
+        tally.not_assembled += 1
+
+    monkeypatch.setattr("fourbar_validation.lab.stress.forward_error.stability.judge", open_loop)
+    assert VALIDATION(STABILITY) == FAILED
+    assert "random: nothing was compared" in capsys.readouterr().out
+
+
+def test_a_ratio_that_is_not_reached_is_status_1(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ONE_THREAD:
+        monkeypatch.setenv(name, "1")
+    rows = {"growth from 1000 positions on": 1.1, "floor": 1.0}
+    monkeypatch.setattr("fourbar_validation.lab.stress.bench.measure", lambda *_: Measured(rows, {}, {}, {}))
+    assert VALIDATION(["bench"]) == HOLDS
+    rows["growth from 1000 positions on"] = 2.0
+    assert VALIDATION(["bench"]) == FAILED
+
+
+@pytest.mark.parametrize(("ended", "status"), [(0, HOLDS), (1, FAILED), (3, BROKEN), (-11, BROKEN)])
+def test_bench_passes_on_how_its_own_process_ended(ended: int, status: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ONE_THREAD:
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr(
+        "fourbar_validation.lab.stress.bench.subprocess.run", lambda line, **_: subprocess.CompletedProcess(line, ended)
+    )
+    assert VALIDATION(["bench"]) == status
+
+
+PROCESSES = [
+    ("fourbar", "classify 4 1 3 3", HOLDS),
+    ("fourbar", f"new {ROOT / 'README.md'} --lengths 4 1 3 3", BAD_INPUT),
+    ("fourbar", f"analyze {MODEL}", HOLDS),
+    ("fourbar", f"mjcf {MODEL} -o {os.devnull}", HOLDS),
+    ("fourbar", f"plot {NO_FILE} -o a.svg", BAD_INPUT),
+    ("fourbar", f"animate {NO_FILE} -o a.html", BAD_INPUT),
+    ("fourbar", f"tolerance {NO_FILE}", BAD_INPUT),
+    ("fourbar", f"extremes {NO_FILE}", BAD_INPUT),
+    ("validation", f"run {NO_FILE}", BAD_INPUT),
+    ("fourbar", f"sdf {NO_FILE} -o a.sdf", BAD_INPUT),
+    ("fourbar", f"usd {NO_FILE} -o a.usda", BAD_INPUT),
+    ("validation", f"history {NO_FILE}", BAD_INPUT),
+    ("validation", "versions nobody", BAD_INPUT),
+    ("validation", "problems --no-such-option", BAD_INPUT),
+    ("validation", "standing --no-such-option", BAD_INPUT),
+    ("validation", f"accept {NO_FILE}", BAD_INPUT),
+    ("validation", f"compare accepted {ROOT / 'validation/fourbar_validation/regression/accepted'}", HOLDS),
+    ("validation", f"check {NO_FILE} {NO_FILE}", BAD_INPUT),
+    ("validation", "fuzz-files --count 1", HOLDS),
+    ("validation", "models --no-such-option", BAD_INPUT),
+    ("validation", "published --no-such-option", BAD_INPUT),
+    ("validation", "mutation --most 3", BAD_INPUT),
+    ("validation", "fuzz --scenes 0", BAD_INPUT),
+    ("validation", "stability --samples 0", BAD_INPUT),
+    ("validation", "bench --positions 1", BAD_INPUT),
+    ("validation", f"cost {NO_FILE}", BAD_INPUT),
+    ("validation", f"advise {NO_FILE} --error 1e-3", BAD_INPUT),
+    ("validation", "advise-study --count 0", BAD_INPUT),
+    ("validation", "effects-cost --engines nobody", BAD_INPUT),
+]
+
+
+@pytest.mark.parametrize(("program", "line", "status"), PROCESSES, ids=[f"{p} {w.split()[0]}" for p, w, _ in PROCESSES])
+def test_each_command_in_a_process_of_its_own(program: str, line: str, status: int, tmp_path: Path) -> None:
+    ended, complained = alone(program, line.split(), tmp_path)
+    assert (ended, bool(complained.strip())) == (status, status == BAD_INPUT), complained
+
+
+def test_every_command_is_in_the_table_of_processes() -> None:
+    tried = {(program, line.split()[0]) for program, line, _ in PROCESSES}
+    assert tried == {
+        *(("fourbar", name) for name in fourbar.cli.group.commands),
+        *(("validation", name) for name in fourbar_validation.cli.COMMANDS),
+    }
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="only Linux has a device that is always full")
+def test_what_was_printed_without_being_written_out_is_not_lost_in_silence() -> None:
+    code = "import click, sys; from fourbar.errors import run; "
+    code += (
+        "sys.exit(run(click.Group(commands={'go': click.command(name='go')(lambda: print('printed'))}), 'p', ['go']))"
+    )
+    reading, writing = os.pipe()
+    os.close(reading)
+    full = os.open("/dev/full", os.O_WRONLY)
+    for out, status, printed in ((full, BROKEN, "error: output: No space left on device\n"), (writing, HOLDS, "")):
+        done = subprocess.run(
+            [sys.executable, "-c", code], cwd=ROOT, stdout=out, stderr=subprocess.PIPE, text=True, check=False
+        )
+        os.close(out)
+        assert (done.returncode, done.stderr) == (status, printed)

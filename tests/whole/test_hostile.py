@@ -1,0 +1,261 @@
+"""Files are data: hostile names and titles end escaped wherever they are shown, and no path escapes."""
+
+import csv
+import json
+import re
+import xml.etree.ElementTree as ET
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+import fourbar
+import fourbar_validation.run.run
+from fourbar.errors import BAD_INPUT, FAILED, HOLDS, InputError
+from fourbar.mjcf import mjcf
+from fourbar.scene import Command, Scene
+from fourbar_validation.cli import status
+from fourbar_validation.compare.answer import Answer
+from fourbar_validation.compare.columns import read_columns
+from fourbar_validation.compare.rows import COLUMNS, FAILS
+from fourbar_validation.compare.tolerance import EQUIVALENCE
+from fourbar_validation.engines.memory import WORKER_MEMORY
+from fourbar_validation.engines.witnesses import Witness
+from fourbar_validation.report.summary import Summary
+from fourbar_validation.report.terminal import table
+from fourbar_validation.run import pool
+from fourbar_validation.run.run import run
+from fourbar_validation.run.selection import chosen
+from fourbar_validation.scenes.suites import LARGEST_LIST, suite_file
+from tests.support.here import judge_here
+from tests.support.scenes import crank_rocker
+
+HOSTILE = {
+    "html": "<script>alert(1)</script><img src=x onerror=alert(2)>",
+    "attribute": '" onmouseover="alert(3)" x="',
+    "xml": "</testcase></mujoco>]]><!--",
+    "markdown": "| [x](javascript:alert(4)) `![y](http://example.invalid/z)` |\n# heading",
+    "ansi": "\x1b[2J\x1b]0;owned\x07\x9b31m",
+    "rich": "[bold red]not ours[/] [link=http://example.invalid]x[/link]",
+    "null": "before\x00after",
+    "template": "{{ 7*7 }}${7*7}%s",
+    "bidi": "\u202etxt.exe\u202c",
+    "path": "../../../../tmp/escaped",
+}
+STEERING = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f]")
+"""Control characters, but for the ends of lines."""
+EXACT = chosen("free-body")
+
+
+def scene_text(title: str) -> str:
+    return fourbar.dump(crank_rocker(title=title, source=title))
+
+
+@dataclass(frozen=True)
+class Named:
+    """Scenes whose name, title and source are hostile: where the beginning or the whole matters each by itself."""
+
+    texts: tuple[str, ...] = (*(HOSTILE[kind] for kind in ("path", "markdown", "rich")), " ".join(HOSTILE.values()))
+
+    def __len__(self) -> int:
+        return len(self.texts)
+
+    def name(self, index: int) -> str:
+        return self.texts[index]
+
+    def scene(self, index: int) -> Scene:
+        text = self.texts[index]
+        motion = fourbar.Motion(fourbar.Sweep(0.1, 1.0, 3), 1.0)
+        return crank_rocker(title=text, source=text, motion=motion)
+
+    def fingerprint(self) -> str:
+        return repr(self.texts)
+
+
+def test_reports_hold_hostile_text_as_text(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    judge_here(monkeypatch)
+    out = tmp_path / "deep" / "out"
+    *_, summary = run(Named(), out, EXACT, workers=1)
+    assert isinstance(summary, Summary)
+    html = (out / "report.html").read_text()
+    assert "<script>alert" not in html
+    assert "<img src=x" not in html
+    assert '" onmouseover="' not in html
+    assert "7*7 }}" in html
+    markdown = (out / "report.md").read_text()
+    assert "<script>" not in markdown
+    assert "\n# heading" not in markdown
+    assert not re.search(r"(?<!\\)\]\(", markdown)
+    table(summary, out)
+    shown = capsys.readouterr().out
+    assert "[bold red]" in shown
+    for name, where in (("terminal", shown), ("markdown", markdown), ("html", html)):
+        assert not STEERING.search(where), (name, STEERING.findall(where))
+    # nothing was written outside the requested folder
+    assert {path.name for path in tmp_path.rglob("*") if path.is_dir()} == {"deep", "out"}
+
+
+@pytest.mark.parametrize("kind", HOSTILE)
+def test_mjcf_holds_a_hostile_title_as_an_attribute(kind: str) -> None:
+    root = ET.fromstring(mjcf(crank_rocker(title=HOSTILE[kind])))
+    assert root.tag == "mujoco"
+    assert not STEERING.search(root.attrib["model"])
+    assert not root.findall(".//script")
+
+
+@pytest.mark.parametrize("kind", HOSTILE)
+def test_differences_hold_hostile_names_as_text(kind: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    name = HOSTILE[kind]
+    # a table written by somebody else, whose names nothing has looked at
+    for folder, cells in (("old", ("1e-15", "1e-14", "true", "agrees")), ("new", ("1e-3", "1e-14", "false", "fails"))):
+        (tmp_path / folder).mkdir()
+        with (tmp_path / folder / "results.csv").open("w", newline="") as file:
+            writer = csv.writer(file)
+            writer.writerow(COLUMNS)
+            writer.writerow([name, name[:7], "exact", "torque", *cells, name, 1.0, 1.0])
+        about = {"versions": {name: folder}, "machine": name + folder, "settings": {}}
+        (tmp_path / folder / "record.json").write_text(json.dumps(about))
+    forms = [f"--{form}={tmp_path / form}" for form in ("markdown", "html", "junit")]
+    code = status(["compare", str(tmp_path / "old"), str(tmp_path / "new"), *forms])
+    printed = capsys.readouterr()
+    assert code == FAILED
+    assert not STEERING.search(printed.out)
+    suites = ET.parse(tmp_path / "junit").getroot()
+    assert len(suites.findall(".//failure")) == 1
+    assert not re.search("<script>alert|<img src=x", (tmp_path / "html").read_text())
+    assert "<script>" not in (tmp_path / "markdown").read_text()
+    for form in ("markdown", "html", "junit"):
+        assert not STEERING.search((tmp_path / form).read_text()), form
+
+
+@pytest.mark.parametrize("text", ["scene\n", "scene,engine\nx\n", "\0", "a" * 200_000 + ",b\n1,2\n", '"', "[" * 9999])
+def test_what_is_no_table_of_results_is_one_line(text: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    good = ",".join(COLUMNS) + "\n"
+    for rows, record in ((text, "{}"), (good + "x,y\n", "{}"), (good, text), (good, '{"versions": 3}'), (good, "[]")):
+        (tmp_path / "results.csv").write_text(rows)
+        (tmp_path / "record.json").write_text(record)
+        code = status(["compare", str(tmp_path), str(tmp_path)])
+        printed = capsys.readouterr()
+        assert code == BAD_INPUT, (rows[:20], record[:20])
+        assert len(printed.err.splitlines()) == 1
+
+
+@pytest.mark.parametrize("name", ["../out", "/tmp/out", "a/b", "..", ".", "", "a\x00b", "a\x1b[0m"])
+def test_a_baseline_has_a_name_and_no_path(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert status(["accept", "results", "--as", name]) == BAD_INPUT
+    printed = capsys.readouterr().err
+    assert "--as" in printed
+    assert not STEERING.search(printed)
+
+
+FILE_NAMES = ("\x1b[31mred.toml", "a\nb.toml", "<b>.toml", "[red]x.toml")
+
+
+@pytest.mark.parametrize("name", FILE_NAMES)
+def test_a_hostile_name_of_a_bad_file_is_shown_and_not_sent(
+    name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / name).write_text('title = "no lengths"')
+    assert status(["run", str(tmp_path / name), "--out", str(tmp_path / "out")]) == BAD_INPUT
+    printed = capsys.readouterr().err
+    assert not STEERING.search(printed)
+    assert len(printed.splitlines()) == 1
+
+
+def test_a_suite_file_of_hostile_names_runs_and_they_are_shown_and_not_sent(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    judge_here(monkeypatch)
+    names = ("\x1b[31m<b>[red]x.toml", "a\nb.toml")
+    for name in names:
+        (tmp_path / name).write_text(scene_text("fine"))
+    suite = tmp_path / "suite.toml"
+    suite.write_text(f"scenes = {json.dumps(names)}")
+    arguments = ["--suite", str(suite), "--engines", "free-body", "--no-pictures", "--out", str(tmp_path / "out")]
+    assert status(["run", *arguments]) == HOLDS
+    assert {row.scene for row in read_columns(tmp_path / "out" / "results.csv")} == {"\\x1b[31m<b>[red]x", "a\\nb"}
+    # the progress bar steers the terminal itself; what is printed at the end does not
+    assert not STEERING.search(capsys.readouterr().out)
+
+
+def listed(tmp_path: Path, text: str | bytes, name: str = "suite.txt") -> Path:
+    for file in ("a.toml", "b.toml"):
+        (tmp_path / file).write_text(scene_text(file))
+    path = tmp_path / name
+    path.write_bytes(text if isinstance(text, bytes) else text.encode())
+    return path
+
+
+LISTS = [
+    ("lines", "suite.txt", "a.toml  # the first\n\n# none\nb.toml\n"),
+    ("TOML", "suite.toml", 'scenes = ["a.toml", "b.toml"]\n'),
+    ("any name", "suite.txt", "?.toml\n".replace("?", "*")),
+]
+
+
+@pytest.mark.parametrize(("what", "name", "text"), LISTS, ids=[case[0] for case in LISTS])
+def test_a_suite_file_lists_scenes_from_its_own_folder(what: str, name: str, text: str, tmp_path: Path) -> None:
+    suite = suite_file(listed(tmp_path, text, name))
+    assert [suite.name(i) for i in range(len(suite))] == ["a", "b"]
+
+
+BAD_LISTS = [
+    ("outside", "../a.toml", "must lie in the folder"),
+    ("absolute", "/etc/passwd", "must lie in the folder"),
+    ("outside by pattern", "../*.toml", "must lie in the folder"),
+    ("null byte", "a\0.toml", "must lie in the folder"),
+    ("missing", "c.toml", "c.toml"),
+    ("pattern without a file", "*.xml", "names no file"),
+    ("empty", "", "no scene file"),
+    ("binary", b"\xff\xfe", "must be UTF-8 text"),
+    ("large", b" " * (LARGEST_LIST + 1), "must not exceed"),
+]
+
+
+@pytest.mark.parametrize(("what", "text", "words"), BAD_LISTS, ids=[case[0] for case in BAD_LISTS])
+def test_a_bad_suite_file_is_one_line(what: str, text: str | bytes, words: str, tmp_path: Path) -> None:
+    with pytest.raises(InputError) as caught:
+        suite_file(listed(tmp_path, text))
+    assert words in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("text", ["scenes = 3", "scenes = [3]", "scene = []", "scenes = [", "scenes = " + "[" * 9999])
+def test_a_bad_suite_in_toml_is_one_line(text: str, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"suite\.toml"):
+        suite_file(listed(tmp_path, text, "suite.toml"))
+
+
+def test_the_pattern_of_a_suite_does_not_take_the_suite_itself(tmp_path: Path) -> None:
+    suite = suite_file(listed(tmp_path, 'scenes = ["*.toml"]', "suite.toml"))
+    assert [suite.name(i) for i in range(len(suite))] == ["a", "b"]
+
+
+def test_a_worker_carries_only_its_own_scenes(tmp_path: Path) -> None:
+    suite = suite_file(listed(tmp_path, "a.toml\nb.toml\n"))
+    part, indices = pool.part(suite, [1])
+    assert [part.name(i) for i in indices] == ["b"]
+    assert len(part) == 1
+
+
+class Greedy:
+    """Agrees, except that it asks for all memory on scene b."""
+
+    name = "greedy"
+
+    def answer(self, scene: Scene, command: Command) -> Answer:
+        if scene.title == "b.toml":
+            bytearray(2 * WORKER_MEMORY)
+        return Answer("greedy", "exact", refusal="declined")
+
+
+def test_running_out_of_memory_costs_its_own_row(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    suite = suite_file(listed(tmp_path, "a.toml\nb.toml\n"))
+    monkeypatch.setattr(fourbar_validation.run.run, "CHUNK", {True: 2, False: 2})
+    greedy = Witness("greedy", f"{__name__}:Greedy", EQUIVALENCE)
+    list(run(suite, tmp_path / "run", (*EXACT, greedy), workers=1, drawn=False))
+    failing = [row for row in read_columns(tmp_path / "run" / "results.csv") if row.verdict == FAILS]
+    assert {(row.scene, row.engine) for row in failing} == {("b", "greedy")}
+    assert "MemoryError" in failing[0].reason

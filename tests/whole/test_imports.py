@@ -1,0 +1,153 @@
+"""Imports run downwards from layer to layer, and `import fourbar` loads numpy alone."""
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+HEAVY = ("pint", "click", "rich", "jinja2", "matplotlib", "scipy", "joblib", "mujoco", "pinocchio", "flint", "mpmath")
+ENGINES = {name: name.removeprefix("py") for name in ("mujoco", "pinocchio", "exudyn", "opensim", "pydrake")}
+PACKAGES = {"fourbar": ROOT / "fourbar", "fourbar_validation": ROOT / "validation" / "fourbar_validation"}
+LAYERS = {
+    "fourbar": (
+        "errors quantities",
+        "linkage writing",
+        "formulas",
+        "solution",
+        "effects",
+        "scene",
+        "evaluation",
+        "solve",
+        "files mjcf studies",
+        "show",
+        "cli",
+    ),
+    "fourbar_validation": (
+        "models places",
+        "compare scenes",
+        "engines published",
+        "report",
+        "regression",
+        "advise check run",
+        "lab",
+        "cli",
+    ),
+}
+"""From the ground up: no layer imports one above it or on its own floor, not even inside a function."""
+ON_ONE_FLOOR = {
+    ("files", "studies"),
+    ("scenes", "compare"),
+    ("published", "engines"),
+    ("run", "check"),
+}
+"""Of two layers on one floor the first may use the second."""
+MOST = {"fourbar": 15, "fourbar_validation": 13}
+"""Entries at a package's own level, dunder files not counted: what a stranger can take in at a glance."""
+
+
+def imported(path: Path) -> set[str]:
+    """Full names of all modules that a file imports when it runs, at any depth."""
+    names = set()
+    tree = ast.parse(path.read_text())
+    typing = {
+        inner
+        for node in ast.walk(tree)
+        if isinstance(node, ast.If) and isinstance(node.test, ast.Name) and node.test.id == "TYPE_CHECKING"
+        for inner in ast.walk(node)
+    }
+    for node in set(ast.walk(tree)) - typing:
+        if isinstance(node, ast.Import):
+            names |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            names.add(node.module)
+            names |= {f"{node.module}.{alias.name}" for alias in node.names}
+    return names
+
+
+def test_import_fourbar_loads_numpy_alone() -> None:
+    code = "import sys, fourbar; print(*sorted({name.partition('.')[0] for name in sys.modules}))"
+    out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
+    assert "numpy" in out
+    assert not set(HEAVY) & set(out)
+
+
+@pytest.mark.parametrize("path", sorted((ROOT / "fourbar").rglob("*.py")), ids=lambda path: path.stem)
+def test_the_product_knows_neither_harness_nor_engines(path: Path) -> None:
+    roots = {name.partition(".")[0] for name in imported(path)}
+    assert not roots & {"fourbar_validation", "tests", *ENGINES}
+
+
+@pytest.mark.parametrize("path", sorted(PACKAGES["fourbar_validation"].rglob("*.py")), ids=lambda path: path.stem)
+def test_each_engine_is_imported_under_its_own_name_alone(path: Path) -> None:
+    names = imported(path)
+    assert not {name for name in names if name.partition(".")[0] == "tests"}
+    for engine, its_name in ENGINES.items():
+        if any(name.partition(".")[0] == engine for name in names):
+            assert {"engines", "subjects"} & {path.parent.name, path.parent.parent.name}
+            assert its_name in path.relative_to(ROOT).as_posix()
+
+
+def layer(name: str) -> str:
+    """The layer of a module: the second part of its name."""
+    return name.split(".")[1]
+
+
+def modules(package: str) -> dict[str, Path]:
+    """Every module of a package, but for its dunder files at the top."""
+    top = PACKAGES[package]
+    names = {
+        path.relative_to(top.parent).with_suffix("").as_posix().replace("/", "."): path for path in top.rglob("*.py")
+    }
+    return {name: path for name, path in names.items() if not name.split(".")[1].startswith("__")}
+
+
+@pytest.mark.parametrize("package", LAYERS)
+def test_layers_stand_on_floors(package: str) -> None:
+    floors = [floor.split() for floor in LAYERS[package]]
+    entries = {
+        path.name.removesuffix(".py")
+        for path in PACKAGES[package].iterdir()
+        if not path.name.startswith("__") and (path.suffix == ".py" or any(path.glob("*.py")))
+    }
+    assert {name for floor in floors for name in floor} == entries
+    assert len([path for path in PACKAGES[package].iterdir() if not path.name.startswith("__")]) <= MOST[package]
+    height = {name: number for number, floor in enumerate(floors) for name in floor}
+    for name, path in modules(package).items():
+        for other in (each for each in imported(path) if each.startswith(f"{package}.")):
+            own, used = layer(name), layer(other)
+            if used in height and used != own:
+                assert height[used] < height[own] or (own, used) in ON_ONE_FLOOR, f"{name} imports {other}"
+
+
+@pytest.mark.parametrize("package", LAYERS)
+def test_no_modules_import_each_other_in_a_circle(package: str) -> None:
+    names = modules(package)
+    uses = {name: {other for other in imported(path) if other in names} - {name} for name, path in names.items()}
+    while leaves := {name for name, used in uses.items() if not used & uses.keys()}:
+        uses = {name: used for name, used in uses.items() if name not in leaves}
+    assert not uses
+
+
+def test_the_formulas_know_numpy_and_the_linkage_alone() -> None:
+    for path in (ROOT / "fourbar" / "formulas").glob("*.py"):
+        known = {name for name in imported(path) if name.startswith("fourbar.")}
+        assert {layer(name) for name in known} <= {"formulas", "linkage", "errors"}, path
+
+
+@pytest.mark.parametrize("name", ["compare", "report"])
+def test_what_judges_knows_no_engine_library(name: str) -> None:
+    paths = [*(PACKAGES["fourbar_validation"] / name).rglob("*.py")]
+    assert paths
+    for path in paths:
+        assert not {each.partition(".")[0] for each in imported(path)} & set(ENGINES), path
+
+
+def test_what_judges_does_not_know_the_lab() -> None:
+    """Not even as a text such as "module:Class", which no import shows; cli.py names every command."""
+    top = PACKAGES["fourbar_validation"]
+    judging = [path for path in top.rglob("*.py") if path != top / "cli.py" and top / "lab" not in path.parents]
+    assert len(judging) > 100
+    assert not [path for path in judging if "fourbar_validation.lab" in path.read_text(encoding="utf-8")]

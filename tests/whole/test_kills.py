@@ -1,0 +1,371 @@
+"""Nothing is lost: whatever dies, finished scenes stay, and a rerun ends with the same bytes."""
+
+import math
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+import tomllib
+from collections.abc import Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import ClassVar
+
+import numpy as np
+import pytest
+
+import fourbar_validation.run.run
+from fourbar.errors import DependencyError, FourBarError, InputError
+from fourbar.scene import Command, Scene
+from fourbar_validation.compare.answer import Answer
+from fourbar_validation.compare.columns import read_columns
+from fourbar_validation.compare.rows import FAILS, REFUSES, Row
+from fourbar_validation.compare.tolerance import EQUIVALENCE
+from fourbar_validation.engines import added
+from fourbar_validation.engines.witnesses import Witness
+from fourbar_validation.report.machine import CODE, build, code, modules
+from fourbar_validation.report.record import Record
+from fourbar_validation.report.summary import Summary
+from fourbar_validation.run import pool
+from fourbar_validation.run.run import Collected, run
+from fourbar_validation.run.selection import chosen
+from fourbar_validation.run.store import RunningError, Store
+from fourbar_validation.scenes.random import LinkageType
+from fourbar_validation.scenes.suites import AS_LONG_AS, MOST_POSITIONS, Files, Random, Suite, scene_files
+from tests.support.here import judge_here
+from tests.support.unlucky import Few, dies_at_first
+
+SEED = 7
+KILLS = int(os.environ.get("KILLS", "1"))
+"""Kills in each of the tests that kill; `make long-test` takes 50, and runs of full size."""
+FULL = "KILLS" in os.environ
+COUNT, IN_A_CHUNK = (220, 20) if FULL else (30, 3)
+"""Scenes of a run, none of them drawn, so that the work is the judging alone; and as many chunks in a small run."""
+SMALL = f"import fourbar_validation.run.run as run; run.CHUNK = {{False: {IN_A_CHUNK}}}; "
+HARNESS = "import runpy; runpy.run_module('validation', run_name='__main__', alter_sys=True)"
+PROGRAM = ("-m", "validation") if FULL else ("-c", SMALL + HARNESS)
+TYPES = tuple(LinkageType)
+EXACT = chosen("free-body")
+
+
+def judge_all(
+    suite: object, out: Path, witnesses: tuple[Witness, ...] = EXACT, workers: int = 2, seconds: float | None = None
+) -> Summary:
+    *steps, last = run(suite, out, witnesses, workers=workers, seconds=seconds, drawn=False)  # type: ignore[arg-type]
+    assert isinstance(last, Summary)
+    assert sum(step for step in steps if isinstance(step, Collected)) == len(suite)  # type: ignore[arg-type]
+    return last
+
+
+@pytest.mark.timeout(300)  # its hangs alone take half a minute, and every new worker imports the harness again
+def test_an_engine_that_crashes_or_hangs_costs_its_own_rows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(fourbar_validation.run.run, "CHUNK", {True: 2, False: 2})
+    hangs = 2.0 * max(1.0, os.getloadavg()[0] / (os.cpu_count() or 1))  # s; a busy machine is given longer
+    moody = added.named(["tests.support.unlucky:Moody"], ())
+    judge_all(Few(), tmp_path / "run", (*EXACT, *moody), seconds=hangs)
+    rows = list(read_columns(tmp_path / "run" / "results.csv"))
+    failing = {(row.scene, row.engine): row.reason for row in rows if row.verdict == FAILS}
+    assert set(failing) == {("b", "moody"), ("c", "moody")}
+    assert "crashed" in failing["b", "moody"]
+    assert "hung" in failing["c", "moody"]
+    for scene in "abcd":
+        assert any(row.scene == scene and row.engine == "free-body" for row in rows)
+
+
+def test_a_worker_ends_itself_in_the_scene_that_hangs_and_with_its_parent() -> None:
+    """The limit is that of a scene, whatever the others of its chunk took."""
+    judge = (
+        "from tests.support.unlucky import Few; from fourbar_validation.run import pool; "
+        "from fourbar_validation.compare.tolerance import EQUIVALENCE; "
+        "from fourbar_validation.engines.witnesses import Witness; "
+        "moody = [Witness('moody', 'tests.support.unlucky:Moody', EQUIVALENCE)]; "
+        "pool.ready(%s); print('ready', flush=True); pool.judge_watched(%s, Few(), [0, 2], moody, False)"
+    )
+    for parent, limit in (("0", 1.0), ("1", 100.0)):  # the parent of the second is another
+        line = [sys.executable, "-c", judge % (parent, limit)]
+        began = time.monotonic()
+        done = subprocess.run(line, cwd=Path(__file__).parents[2], capture_output=True, check=False, timeout=60)
+        assert done.returncode == 1 and time.monotonic() - began < 60.0, done.stderr
+
+
+@pytest.mark.parametrize("how", ["killed", "locked out"])
+def test_what_comes_from_outside_is_not_held_against_the_engine(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, how: str
+) -> None:
+    """Three times: in a chunk, in the scene by itself, and when it is the only engine that runs."""
+    (tmp_path / "lives").mkdir()
+    for life in range(3):
+        (tmp_path / "lives" / f"{how} {life}").touch()
+    monkeypatch.setenv("LIVES", str(tmp_path / "lives"))
+    unlucky = Witness("unlucky", "tests.support.unlucky:Unlucky", EQUIVALENCE)
+    assert judge_all(Few(("a",)), tmp_path / "run", (*EXACT, unlucky), workers=1).counts[FAILS] == 0
+    assert not list((tmp_path / "lives").iterdir())
+
+
+@pytest.mark.parametrize(("lives", "pools"), [(3, pool.POOLS), (9, 2)])
+def test_workers_that_die_with_nothing_to_do_are_on_nobodys_account(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, lives: int, pools: int
+) -> None:
+    """Pebble gives up a pool whose workers die while none is at work; the run makes it anew, but not for ever."""
+    (tmp_path / "lives").mkdir()
+    for life in range(lives):
+        (tmp_path / "lives" / str(life)).touch()
+    monkeypatch.setenv("LIVES", str(tmp_path / "lives"))
+    monkeypatch.setattr(pool, "ready", dies_at_first)
+    monkeypatch.setattr(pool, "POOLS", pools)
+    if lives > pools:
+        with pytest.raises(pool.NoWorkersError, match="what is finished is kept"):
+            judge_all(Few(), tmp_path / "run", workers=1)
+    else:
+        assert judge_all(Few(), tmp_path / "run", workers=1).counts[FAILS] == 0
+        assert not list((tmp_path / "lives").iterdir())
+
+
+def test_the_bytes_do_not_depend_on_the_workers(
+    tmp_path: Path, undisturbed: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """None, in order, or two."""
+    monkeypatch.setattr(fourbar_validation.run.run, "CHUNK", {False: IN_A_CHUNK})
+    judge_all(Random(COUNT, 0, TYPES), tmp_path, workers=2)
+    for name in ("results.csv", "results.parquet"):
+        assert (tmp_path / name).read_bytes() == (undisturbed / name).read_bytes()
+
+
+def test_random_scenes_depend_on_seed_and_index_alone() -> None:
+    short, long = Random(3, SEED, TYPES), Random(30, SEED, TYPES)
+    assert short.scene(2).linkage == long.scene(2).linkage
+    assert short.scene(2).linkage != Random(3, SEED + 1, TYPES).scene(2).linkage
+    names = [long.name(index) for index in range(len(long))]
+    assert names == sorted(names)
+
+
+def test_two_runs_into_one_folder_refuse_each_other(tmp_path: Path) -> None:
+    with Store(tmp_path, {}).held(), pytest.raises(RunningError), Store(tmp_path, {}).held():
+        pass
+    with Store(tmp_path, {}).held():
+        pass
+
+
+def test_another_suite_or_code_does_not_resume_the_parts_of_this_one(tmp_path: Path) -> None:
+    one = {"scenes": "one", **code()}
+    for identity, kept, note in (
+        (one, 0, []),
+        (one, 1, []),
+        (one | {"scenes": "two"}, 0, ["made again: the parts of another run (scenes)"]),
+        (one | {"code": "changed"}, 0, ["made again: the parts of another run (code, scenes)"]),
+    ):
+        with Store(tmp_path, identity).held() as store:
+            assert (len(store.done()), store.notes) == (kept, note)
+            store.put(0, [])
+
+
+def test_the_hash_of_the_code_is_that_of_its_modules(tmp_path: Path) -> None:
+    hashes = []
+    for name, text in (
+        ("fourbar/a.py", "1"),
+        ("harness/b.py", "2"),
+        ("harness/b.py", "3"),
+        ("fourbar/a.txt", ""),
+        ("harness/models/a.toml", ""),
+    ):
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text(text)
+        hashes.append(modules(tmp_path / "fourbar", tmp_path / "harness"))
+    assert len(set(hashes)) == 3 and hashes[2] == hashes[3] == hashes[4]
+    project = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text(encoding="utf-8"))
+    read = project["tool"]["setuptools"]["package-data"]["fourbar"]  # what is only shown decides no number
+    assert {Path(name).suffix for name in read if not name.startswith("show/")} <= set(CODE)
+    assert build("numpy") and build("no-such-package") == ""
+
+
+def test_damaged_swapped_and_foreign_parts_are_made_again_and_named(tmp_path: Path) -> None:
+    row = Row("a", "engine", "exact", "torque", math.nan, math.inf, REFUSES, "a limit", -0.0, 1e-300)
+    record = Record("a", title="A", rows=[row])
+    with Store(tmp_path / "foreign", {"scenes": "two"}).held() as other:
+        other.put(4, [record])
+    with Store(tmp_path / "run", {"scenes": "one"}).held() as store:
+        for chunk in range(6):
+            store.put(chunk, [record])
+        assert store.done() == set(range(6)) and repr(store.read(5)) == repr([record])
+        first = store.parts / "000000"
+        first.write_bytes(first.read_bytes()[:-1])
+        (store.parts / "000001").write_bytes(b"")
+        (store.parts / "000002").rename(store.parts / "swap")
+        (store.parts / "000003").rename(store.parts / "000002")
+        (store.parts / "swap").rename(store.parts / "000003")
+        shutil.copy(tmp_path / "foreign" / "parts" / "000004", store.parts / "000004")
+        assert store.done() == {5}
+        assert [note.rpartition(": ")[2] for note in store.notes] == [
+            *("is damaged", "is damaged", "is another part", "is another part", "is of another run")
+        ]
+        (store.parts / "000005").write_bytes(b"{}")
+        with pytest.raises(DependencyError, match="is damaged; run it again"):
+            store.read(5)
+
+
+LIMIT = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (60_000, resource.RLIM_INFINITY)); "
+LIMITED = LIMIT + ("" if FULL else SMALL) + HARNESS
+"""The harness on a disk that takes no file of more than 60 kB: the parts fit, the results do not."""
+
+
+def start(
+    out: Path, count: int, *program: str, workers: int = 2 if FULL else 1, stderr: int = subprocess.DEVNULL
+) -> subprocess.Popen[bytes]:
+    command = [sys.executable, *(program or PROGRAM), "run", "--random", str(count), "--workers", str(workers)]
+    return subprocess.Popen(
+        [*command, "--engines", "free-body", "--no-pictures", "--out", str(out)],
+        cwd=Path(__file__).parents[2],
+        stdout=subprocess.DEVNULL,
+        stderr=stderr,
+        start_new_session=True,
+        # a job in the background inherits SIGINT ignored; no other thread runs here
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # noqa: PLW1509
+    )
+
+
+def wait_for_parts(out: Path, process: subprocess.Popen[bytes], at_least: int) -> None:
+    deadline = time.monotonic() + 60.0
+    while len(list(out.glob("parts/0*"))) < at_least and process.poll() is None and time.monotonic() < deadline:
+        time.sleep(0.01)
+
+
+@pytest.fixture(scope="module")
+def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a run that nothing disturbed, judged in this process."""
+    out = tmp_path_factory.mktemp("undisturbed")
+    with pytest.MonkeyPatch.context() as monkeypatch:
+        judge_here(monkeypatch)
+        judge_all(Random(COUNT, 0, TYPES), out)
+    return out
+
+
+@pytest.mark.timeout(120 + 20 * KILLS)
+def test_whatever_ended_it_a_rerun_goes_on_and_ends_with_the_same_bytes(tmp_path: Path, undisturbed: Path) -> None:
+    """Interrupted, killed at random moments and met with a full disk, one after the other in one folder."""
+    process = start(tmp_path, COUNT)
+    wait_for_parts(tmp_path, process, at_least=1)
+    os.kill(process.pid, signal.SIGINT)
+    assert process.wait(timeout=60) == 130
+    assert not list(tmp_path.glob("**/*.part"))
+
+    rng = np.random.default_rng(SEED)
+    chunks = len(range(0, COUNT, IN_A_CHUNK))
+    for _ in range(KILLS):
+        process = start(tmp_path, COUNT)
+        wait_for_parts(tmp_path, process, at_least=int(rng.integers(1, chunks)))
+        time.sleep(float(rng.uniform(0.0, 0.3)))
+        os.killpg(process.pid, signal.SIGKILL)
+        process.communicate()
+
+    process = start(tmp_path, COUNT, "-c", LIMITED, stderr=subprocess.PIPE)
+    _, printed = process.communicate(timeout=100)
+    assert process.returncode == 3
+    assert b"Traceback" not in printed
+    last = printed.decode().strip().splitlines()[-1]
+    assert last.startswith("error: ") and str(tmp_path / "results.") in last
+    assert not (tmp_path / "results.csv").exists()
+
+    assert start(tmp_path, COUNT).wait(timeout=100) == 0
+    for name in ("results.csv", "results.parquet"):
+        assert (tmp_path / name).read_bytes() == (undisturbed / name).read_bytes()
+    assert {path.name for path in tmp_path.iterdir()} == {path.name for path in undisturbed.iterdir()}
+
+
+def workers_of(process: subprocess.Popen[bytes]) -> list[int]:
+    """The processes that judge: no zombie of one that was killed, nor Python's tracker of resources."""
+    try:
+        children = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
+        return [int(pid) for pid in children if b"spawn_main" in Path(f"/proc/{pid}/cmdline").read_bytes()]
+    except OSError:  # one of them has just gone
+        return []
+
+
+@pytest.mark.timeout(60 + 20 * KILLS)
+def test_a_worker_killed_at_random_moments_changes_no_byte(tmp_path: Path, undisturbed: Path) -> None:
+    rng = np.random.default_rng(SEED + 1)
+    kills = runs = 0
+    while kills < KILLS:  # a run is over after some ten of them, or before the first: another one takes the rest
+        out, runs = tmp_path / str(runs), runs + 1
+        process = start(out, COUNT, workers=2)
+        while kills < KILLS and process.poll() is None:
+            wait_for_parts(out, process, at_least=1)
+            time.sleep(float(rng.uniform(0.0, 0.5)))  # a worker needs a moment to start again
+            workers = workers_of(process)
+            if workers:
+                with suppress(ProcessLookupError):
+                    os.kill(workers[int(rng.integers(len(workers)))], signal.SIGKILL)
+                    kills += 1
+        assert process.wait(timeout=100) == 0
+        assert (out / "results.csv").read_bytes() == (undisturbed / "results.csv").read_bytes()
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")
+def test_a_read_only_folder_is_reported(tmp_path: Path) -> None:
+    tmp_path.chmod(0o500)
+    with pytest.raises((OSError, FourBarError)):
+        judge_all(Few(), tmp_path / "run")
+
+
+@pytest.mark.parametrize(
+    ("motion", "key"),
+    [
+        ('theta_2 = { from = "0 deg", to = "9 deg", steps = %d }', "motion.theta_2"),
+        ('theta_2 = "1 deg"\nfree = { duration = "1 s", steps = %d }', "motion.free"),
+    ],
+)
+def test_a_scene_of_too_many_positions_is_refused_before_anything_runs(motion: str, key: str, tmp_path: Path) -> None:
+    lengths = '[lengths]\nground = "4 m"\ninput = "1 m"\ncoupler = "3 m"\noutput = "3 m"\n'
+    masses = '[bars.input]\nmass = "1 kg"\n[bars.coupler]\nmass = "1 kg"\n[bars.output]\nmass = "1 kg"\n'
+    path = tmp_path / "long.toml"
+    path.write_text(f"{lengths}{masses}[motion]\n{motion % (MOST_POSITIONS - 1)}\n")
+    a_second = AS_LONG_AS if key == "motion.free" else 0
+    assert scene_files([path]).positions == MOST_POSITIONS + a_second
+    path.write_text(f"{lengths}{masses}[motion]\n{motion % MOST_POSITIONS}\n")
+    with pytest.raises(InputError, match=rf"{key}.steps = {MOST_POSITIONS}: must be below {MOST_POSITIONS} in a run"):
+        scene_files([path])
+
+
+def test_a_scene_of_many_positions_has_longer_before_it_counts_as_hanging() -> None:
+    assert pool.longest(Files((), 50_000)) > 20 * pool.longest(Random(1, 0, TYPES))
+
+
+class Blunders:
+    """Breaks down in scene b, answers nothing in scene c, and declines elsewhere."""
+
+    name = "blunders"
+    titles: ClassVar[list[str]] = []
+
+    def answer(self, scene: Scene, command: Command) -> Answer:
+        self.titles.append(scene.title)
+        if scene.title == "b":
+            raise RuntimeError("no licence")
+        return Answer("blunders", "exact", refusal=None if scene.title == "c" else "declined")
+
+
+def test_of_a_long_suite_what_fails_has_pictures_and_what_is_nearest_to_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Drawn at the end, without the engine that broke down; with --no-pictures not at all."""
+    judge_here(monkeypatch)
+    drawn: list[str] = []
+    judge = pool.judge_chunk
+
+    def noting(suite: Suite, scenes: Sequence[int], who: Sequence[Witness], draw: bool) -> list[Record]:
+        drawn.extend(suite.name(scene) for scene in scenes if draw)
+        return judge(suite, scenes, who, draw)
+
+    monkeypatch.setattr(pool, "judge_chunk", noting)
+    monkeypatch.setattr("fourbar_validation.report.summary.PICTURED", 3)
+    monkeypatch.setattr(fourbar_validation.run.run, "PICTURED", 3)
+    monkeypatch.setattr(fourbar_validation.run.run, "html", lambda *_, **__: "")
+    blunders = Witness("blunders", f"{__name__}:Blunders", EQUIVALENCE)
+    *_, without = run(Few(), tmp_path / "without", (*EXACT, blunders), drawn=False)
+    assert not drawn and not any(record.figure for record in without.shown)  # type: ignore[union-attr]
+    once = Blunders.titles.count("b")
+    *_, last = run(Few(), tmp_path / "with", (*EXACT, blunders))
+    assert isinstance(last, Summary) and len(drawn) == 3 and {"b", "c"} < set(drawn)
+    assert {record.name for record in last.shown if record.figure} == set(drawn)
+    assert Blunders.titles.count("b") == 2 * once
+    assert (tmp_path / "with" / "results.csv").read_bytes() == (tmp_path / "without" / "results.csv").read_bytes()

@@ -1,0 +1,127 @@
+"""Whoever opens a module knows its test: tests/ mirrors the tree, and what has no test of its name stands below.
+
+`tests/fourbar/formulas/test_position.py` is of `fourbar/formulas/position.py`, as is `test_position_more.py`; a test
+may have the name of its folder. `whole/` is of no module alone, `support/` holds what tests share.
+"""
+
+from pathlib import Path
+
+import pytest
+
+from tests.whole.test_imports import ROOT
+
+SOURCES = {"fourbar": ROOT / "fourbar", "validation": ROOT / "validation" / "fourbar_validation"}
+"""Folder of tests, and folder of the modules that it mirrors."""
+JUDGED_BY = {
+    # what a command reads, does and prints is tested through the command
+    "fourbar/cli/test_cli.py": "fourbar/cli: evaluate export given; fourbar/show: progress tables words",
+    "whole/test_exits.py": "fourbar: errors writing; validation: cli; validation/report: terminal; "
+    "validation/lab/stress: mutants",
+    "whole/test_kills.py": "validation/run: pool run selection store; validation/scenes: suites",
+    "whole/test_results_format.py": "validation/compare: columns",
+    "whole/test_package.py": "validation: places",
+    # one table or one evaluation, whose rows are no use alone
+    "fourbar/effects/test_effects.py": "fourbar/effects: actions cones effect flywheel friction gravity load "
+    "numbers pin_friction pins torsion viscous",
+    "fourbar/files/test_files.py": "fourbar/files: effects fields reading scene_text units",
+    "fourbar/formulas/test_formulas.py": "fourbar/formulas: arithmetic many_digits path",
+    "fourbar/formulas/test_mobility.py": "fourbar/formulas: circuits linkage_type",
+    "fourbar/test_solve.py": "fourbar: linkage quantities solution; "
+    "fourbar/scene: motion scene; fourbar/evaluation: blocks case stages withheld",
+    "fourbar/evaluation/test_compiled.py": "fourbar/evaluation: compiled_case",
+    "fourbar/studies/test_study.py": "fourbar/scene: motion_law; fourbar/studies: keys",
+    "fourbar/studies/test_spread.py": "fourbar/scene: tolerance; fourbar/files: tolerances",
+    "fourbar/studies/test_derivatives.py": "fourbar/show: influence",
+    "fourbar/studies/test_enclosure.py": "fourbar/studies: interval; fourbar/show: extremes",
+    # parts of one document or picture
+    "fourbar/mjcf/test_mjcf.py": "fourbar/mjcf: defaults document effects model notes settings",
+    "fourbar/mjcf/test_simulators.py": "fourbar/mjcf: sdf standing usd",
+    "fourbar/show/test_animate.py": "fourbar/show/plot: film",
+    "fourbar/show/test_notebook.py": "fourbar/files: new; fourbar/show: drawing",
+    "fourbar/show/test_page.py": "fourbar/show: page_data tolerances",
+    "fourbar/show/plot/test_plot.py": "fourbar/show/plot: curves figures freebody hodograph labels linkage "
+    "studies style symbols transmission view",
+    "validation/engines/mujoco/test_picture.py": "fourbar/mjcf: appearance",
+    # a comparison is tested by witnesses with given answers
+    "validation/run/test_judge.py": "validation/compare: answer basis compare effects identities rows scales "
+    "tolerance withheld",
+    "validation/compare/statements/test_statements.py": "validation/compare/statements: finding limits ranges "
+    "transmission",
+    # adapters: judged against printed figures, each other, and faults put in front of them
+    "validation/engines/test_engines.py": "validation/engines: balls description drake exudyn exudyn_elements limits "
+    "loaded loop opensim pinocchio prediction tree witnesses; validation/scenes: random; "
+    "validation/engines/mujoco: closed_loop inverse",
+    "validation/engines/test_added_guests.py": "validation/engines: checked output workers",
+    "validation/engines/test_free_body.py": "validation/engines: free_body_closure free_body_effects",
+    "validation/engines/test_hard_suite.py": "validation/scenes: hard_families hard_linkages; "
+    "validation/engines: exact; validation/engines/mujoco: shipped; validation/report: hard_page",
+    "validation/engines/mujoco/test_simulate.py": "validation/engines/mujoco: drives motions runner watch",
+    "validation/run/shipped/test_shipped.py": "validation/run/shipped: bounds calls changes checks files question",
+    "validation/run/test_released.py": "validation/engines: pinocchio_forward; validation/engines/mujoco: released",
+    "validation/check/test_check.py": "validation/check: fitted judge judgement mistakes theirs; "
+    "validation/run: printed",
+    "validation/check/test_model.py": "validation/check: causes differences screen; "
+    "validation/engines: memory; validation/engines/mujoco: anatomy attached describe guess mend theirs",
+    "validation/published/test_published.py": "validation/published: check figures program textbook "
+    "thesis_dynamics thesis_positions thirteen; validation/lab: ladder",
+    "validation/regression/test_regression.py": "validation/regression: accept change changes fault history "
+    "history_page record render scenes steps times; validation/report: junit; validation/run: elsewhere",
+    "validation/report/test_report.py": "validation/report: colours costs figures machine record summary svg "
+    "templating",
+    # studies: each through its command
+    "validation/lab/stress/test_bench.py": "validation/lab/stress: against bench_picture contenders in_c in_sympy "
+    "limits timed",
+    "validation/lab/stress/forward_error/test_stability.py": "validation/lab/stress/forward_error: families",
+    "validation/lab/stress/fuzz/test_fuzz.py": "validation/lab/stress/fuzz: outside scenes shrink",
+    "validation/lab/stress/mutation/test_mutation.py": "validation/lab/stress/mutation: harness",
+    "validation/lab/stress/mutation/test_planted.py": "validation/lab/stress/mutation: planting specimens",
+    "validation/lab/cost/test_cost.py": "validation/lab/cost: curves formulas laws orders pictures study; "
+    "validation/advise: errors; validation/engines/mujoco: one_state",
+    "validation/advise/test_advise.py": "validation/advise: matters; validation/lab/cost: exhaustive measure; "
+    "validation/run: dial; validation/engines/mujoco: trial",
+    "validation/lab/effects/test_cost.py": "validation/lab/effects: counted table work; "
+    "validation/engines/mujoco: stepping",
+    # simulators that need not be there: their scripts run where they are installed
+    "validation/lab/subjects/test_subjects.py": "validation/lab/subjects: drake_sap examine exudyn_simulated "
+    "genesis_rigid motion mujoco_c mujoco_mjx mujoco_warp newton_kamino newton_mujoco pybullet standing work",
+    "validation/lab/subjects/test_versions.py": "validation/lab/subjects: releases versions_page",
+}
+"""Modules without a test of their name, folder by folder, and the test that says when one of them is wrong."""
+
+
+def listed() -> dict[str, str]:
+    """The test of each module of the table."""
+    found = {}
+    for test, groups in JUDGED_BY.items():
+        for group in groups.split(";"):
+            folder, _, names = group.strip().partition(": ")
+            found |= {f"{folder}/{name}.py": test for name in names.split()}
+    return found
+
+
+def own_test(path: Path, top: str) -> bool:
+    """Whether a module has a test of its name."""
+    folder = ROOT / "tests" / top / path.parent.relative_to(SOURCES[top])
+    return any([*folder.glob(f"test_{path.stem}.py"), *folder.glob(f"test_{path.stem}_*.py")])
+
+
+@pytest.mark.parametrize("top", SOURCES)
+def test_every_module_has_a_test_or_is_listed(top: str) -> None:
+    paths = [path for path in SOURCES[top].rglob("*.py") if not path.name.startswith("__")]
+    assert paths
+    without = {f"{top}/{path.relative_to(SOURCES[top]).as_posix()}" for path in paths if not own_test(path, top)}
+    of_top = {name for name in listed() if name.partition("/")[0] == top}
+    assert without == of_top
+
+
+def test_the_tests_of_the_table_are_there() -> None:
+    assert all((ROOT / "tests" / test).is_file() for test in JUDGED_BY)
+
+
+@pytest.mark.parametrize("top", SOURCES)
+def test_every_test_has_the_name_of_a_module_or_folder(top: str) -> None:
+    for test in (ROOT / "tests" / top).rglob("test_*.py"):
+        folder = SOURCES[top] / test.parent.relative_to(ROOT / "tests" / top)
+        names = {folder.name, *(entry.stem for entry in folder.iterdir())}
+        name = test.stem.removeprefix("test_")
+        assert any(name == each or name.startswith(f"{each}_") for each in names), test

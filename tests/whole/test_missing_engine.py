@@ -1,0 +1,103 @@
+"""An environment without one of the engines: what is left is judged, and what is missing is named."""
+
+import csv
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+BLOCKER = """
+import os
+import sys
+
+
+class Blocker:
+    def find_spec(self, name, path=None, target=None):
+        if name.partition(".")[0] == os.environ["BLOCKED"]:
+            if "BROKEN" in os.environ:
+                raise ImportError("libboost.so: cannot open shared object file", name=name)
+            raise ModuleNotFoundError(f"No module named {name!r}", name=name)
+
+
+sys.meta_path.insert(0, Blocker())
+"""
+"""As `sitecustomize` it is imported by every Python started with it on its path, the workers too."""
+WITNESSES = {
+    "mujoco": {"mujoco-inverse", "mujoco-simulated"},
+    "pinocchio": {"pinocchio-inverse"},
+}
+ALL = {"free-body", *WITNESSES["mujoco"], *WITNESSES["pinocchio"]}
+SCENE = """
+[lengths]
+ground = "4 m"
+input = "1 m"
+coupler = "3 m"
+output = "3 m"
+[bars.coupler]
+mass = "1 kg"
+[motion]
+theta_2 = { from = "10 deg", to = "50 deg", steps = 8 }
+omega_2 = "1 rad/s"
+"""
+
+
+def without(library: str, folder: Path, *arguments: str, **settings: str) -> subprocess.CompletedProcess[str]:
+    """`python -m validation run` where a library cannot be imported."""
+    (folder / "sitecustomize.py").write_text(BLOCKER)
+    (folder / "scene.toml").write_text(SCENE)
+    paths = os.pathsep.join((str(folder), str(ROOT), str(ROOT / "validation")))
+    return subprocess.run(
+        [
+            sys.executable,
+            "-m",
+            "validation",
+            "run",
+            "scene.toml",
+            "--workers",
+            "1",
+            "--no-pictures",
+            "--out",
+            "out",
+            *arguments,
+        ],
+        cwd=folder,
+        env={**os.environ, "PYTHONPATH": paths, "BLOCKED": library, "COLUMNS": "200", **settings},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+@pytest.mark.parametrize("library", WITNESSES)
+def test_the_others_run_and_the_missing_named_with_the_reason(library: str, tmp_path: Path) -> None:
+    done = without(library, tmp_path)
+    reason = f'{library} is not installed: pip install ".[{library}]" in the checkout'
+    with (tmp_path / "out" / "results.csv").open() as table:
+        rows = list(csv.DictReader(table))
+    assert {row["engine"] for row in rows} == {"formulas", *(ALL - WITNESSES[library])}
+    assert "fails" not in {row["verdict"] for row in rows}  # MuJoCo refuses bars without mass
+    for name in WITNESSES[library]:
+        assert f"not run {name}: {reason}" in done.stdout
+        assert f"Not run: {name}: " in (tmp_path / "out" / "report.html").read_text()
+        assert f"not run: {name}: " in (tmp_path / "out" / "report.md").read_text()
+    printed = done.stderr.strip().splitlines()[-1]
+    assert printed.startswith(f"error: {reason}, or say --engines ")
+    assert done.returncode == 3  # the environment, not the formulas
+
+
+def test_requested_by_name_nothing_is_run(tmp_path: Path) -> None:
+    done = without("mujoco", tmp_path, "--engines", "free-body,mujoco-inverse")
+    reason = 'mujoco is not installed: pip install ".[mujoco]" in the checkout'
+    assert done.stderr.strip() == f"error: mujoco-inverse: {reason}"
+    assert done.returncode == 3
+    assert not (tmp_path / "out").exists()
+
+
+def test_an_engine_that_is_there_and_does_not_load_is_one_line(tmp_path: Path) -> None:
+    done = without("pinocchio", tmp_path, "--engines", "pinocchio-inverse", BROKEN="1")
+    what = "ImportError: libboost.so: cannot open shared object file"
+    assert done.stderr.strip() == f"error: pinocchio-inverse: pinocchio is installed, but does not load: {what}"
+    assert done.returncode == 3 and not (tmp_path / "out").exists()

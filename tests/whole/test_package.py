@@ -1,0 +1,215 @@
+"""What is installed: every file goes along, every library is declared, and one that is missing is one line.
+
+`PACKAGE=all` (of `make long-test`) builds the wheel and the source archive and installs them afresh on each Python that
+the machine has, and once more with the lowest versions that pyproject.toml allows.
+"""
+
+import ast
+import fnmatch
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tarfile
+import tomllib
+import zipfile
+from pathlib import Path
+
+import pytest
+
+from fourbar.cli import status
+from fourbar.errors import BAD_INPUT, BROKEN, HOLDS, DependencyError, installing
+from fourbar.files import save
+from fourbar_validation.cli import status as harness
+from fourbar_validation.places import import_path
+from tests.support.scenes import crank_rocker
+
+ROOT = Path(__file__).parents[2]
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
+PYTHONS = ("3.11", "3.12", "3.13")
+MODELS = "fourbar_validation.models"
+MODULE_OF = {"python-flint": "flint", "pin": "pinocchio", "imageio-ffmpeg": "imageio_ffmpeg"}
+"""Libraries that are imported under another name than they are installed by."""
+
+
+def libraries(requirements: list[str]) -> set[str]:
+    names = {re.split(r"[<>=\[]", requirement)[0] for requirement in requirements}
+    return {MODULE_OF.get(name, name) for name in names}
+
+
+@pytest.mark.parametrize(
+    ("package", "folder"),
+    [("fourbar", "fourbar"), ("fourbar_validation", "validation/fourbar_validation"), (MODELS, "models")],
+)
+def test_every_file_of_the_package_is_shipped(package: str, folder: str) -> None:
+    patterns = PROJECT["tool"]["setuptools"]["package-data"][package]
+    for path in (ROOT / folder).rglob("*"):
+        if path.is_file() and path.suffix != ".py" and path.parent.name != "__pycache__":
+            name = path.relative_to(ROOT / folder).as_posix()
+            patterns_of = [pattern.removeprefix("**/") for pattern in patterns]
+            assert any(fnmatch.fnmatch(name, pattern) for pattern in patterns_of), name
+        if path.suffix == ".py":
+            assert (path.parent / "__init__.py").is_file(), path
+
+
+@pytest.mark.parametrize("line", ["models", "problems", "mutation --planted", "bench --against HEAD"])
+def test_what_needs_a_checkout_says_so_in_one_line(
+    line: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("fourbar_validation.places.CHECKOUT", None)
+    assert harness(line.split()) == BAD_INPUT
+    complained = capsys.readouterr().err
+    assert complained.count("\n") == 1 and "needs a checkout" in complained
+
+
+def test_the_harness_lists_a_command_whose_library_is_missing(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def without_flint(_: str) -> None:
+        raise ModuleNotFoundError("No module named 'flint'", name="flint")
+
+    monkeypatch.setattr("fourbar_validation.cli.resolve_name", without_flint)
+    assert harness(["--help"]) == HOLDS
+    assert "flint is not installed" in capsys.readouterr().out
+    assert harness(["run", "scene.toml", "--out", "results"]) == BROKEN
+    complained = capsys.readouterr().err
+    assert complained.count("\n") == 1 and "flint is not installed: pip install" in complained
+
+
+def test_extras_of_extras_are_named_one_by_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No index of packages has `fourbar[plot]`."""
+    monkeypatch.setattr("fourbar.errors.__file__", "/nowhere/fourbar/errors.py")
+    for extra in ("validation", "all"):
+        line = installing(extra)
+        assert "fourbar" not in line and all(name in line for name in ("mujoco>=", "pin>=", "python-flint>="))
+
+
+def test_another_interpreter_finds_the_code_of_a_wheel_and_no_library_of_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("fourbar_validation.places.CHECKOUT", None)
+    monkeypatch.delenv("PYTHONPATH", raising=False)
+    with import_path() as path:
+        assert sorted(entry.name for entry in Path(path).iterdir()) == ["fourbar", "fourbar_validation"]
+    assert not Path(path).exists()
+
+
+def test_every_library_that_fourbar_imports_is_declared() -> None:
+    project = PROJECT["project"]
+    declared = libraries(project["dependencies"]) | libraries(
+        [each for extra in project["optional-dependencies"].values() for each in extra]
+    )
+    for path in (ROOT / "fourbar").rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text())):
+            names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
+            names += [node.module or ""] if isinstance(node, ast.ImportFrom) else []
+            for name in (name.partition(".")[0] for name in names):
+                assert name == "fourbar" or name in sys.stdlib_module_names or name in declared, f"{path}: {name}"
+
+
+@pytest.mark.parametrize(
+    ("library", "extra", "command"),
+    [
+        ("matplotlib", "plot", ["plot", "scene.toml", "-o", "a.svg"]),
+        ("matplotlib", "plot", ["animate", "scene.toml", "-o", "a.gif"]),
+        ("scipy", "dynamics", ["analyze", "free.toml"]),
+        ("scipy", "dynamics", ["animate", "free.toml", "-o", "a.html"]),
+    ],
+)
+def test_an_extra_that_is_missing_is_one_line(
+    library: str,
+    extra: str,
+    command: list[str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    import fourbar
+
+    monkeypatch.chdir(tmp_path)
+    save(crank_rocker(), "scene.toml")
+    save(crank_rocker(motion=fourbar.Motion(0.5, 0.0, free=fourbar.Free(0.5, 4))), "free.toml")
+    for name in [name for name in sys.modules if name.partition(".")[0] == library]:
+        monkeypatch.delitem(sys.modules, name)
+    monkeypatch.setitem(sys.modules, library, None)
+    before = sorted(tmp_path.iterdir())
+    assert status(command) == BROKEN
+    err = capsys.readouterr().err
+    assert err.count("\n") == 1 and f'pip install ".[{extra}]" in the checkout' in err
+    assert sorted(tmp_path.iterdir()) == before
+
+
+def test_pandas_missing_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    import fourbar
+
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    with pytest.raises(DependencyError, match=r'pip install "\.\[pandas\]"'):
+        fourbar.solve(crank_rocker(), "position").to_pandas()
+
+
+def built(folder: Path) -> tuple[Path, Path]:
+    """Wheel and source archive of the tree, made from a copy."""
+    tree = folder / "tree"
+    keep = shutil.ignore_patterns(".*", "__pycache__", "*.egg-info", "build", "results")
+    shutil.copytree(ROOT, tree, ignore=keep)
+    subprocess.run([sys.executable, "-m", "venv", folder / "builder"], check=True)
+    python = folder / "builder" / "bin" / "python"
+    subprocess.run([python, "-m", "pip", "install", "-q", "build"], check=True)
+    subprocess.run([python, "-m", "build", "-o", folder / "dist", tree], check=True, capture_output=True)
+    (wheel,), (archive,) = (folder / "dist").glob("*.whl"), (folder / "dist").glob("*.tar.gz")
+    return wheel, archive
+
+
+def lowest(requirements: list[str]) -> list[str]:
+    """The lowest versions that are declared: the constraints of an installation."""
+    return [re.sub(r">=([0-9.]+).*", r"==\1.*", requirement) for requirement in requirements]
+
+
+def installed_works(python: str, package: Path, folder: Path, constraints: list[str]) -> None:
+    """Install afresh, outside the tree; then version, numbers, a page, and the one line of a missing extra."""
+    subprocess.run([python, "-m", "venv", folder], check=True)
+    own = folder / "bin" / "python"
+    (folder / "constraints.txt").write_text("\n".join(constraints))
+    subprocess.run([own, "-m", "pip", "install", "-q", package, "-c", folder / "constraints.txt"], check=True)
+    environment = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
+
+    def run(*arguments: str, program: str = "fourbar") -> subprocess.CompletedProcess[str]:
+        command = [str(folder / "bin" / program), *arguments]
+        return subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=False)
+
+    assert run("--version").stdout == f"fourbar, version {PROJECT['project']['version']}\n"
+    assert run("new", "a.toml", "--lengths", "300mm", "10 cm", "0.25", "22cm").returncode == 0
+    table = run("analyze", "a.toml", "--units", "imperial")
+    assert table.returncode == 0 and "361 positions: 361 ok" in table.stdout, table.stderr
+    page = run("animate", "a.toml", "-o", "a.html")
+    assert page.returncode == 0 and (folder / "a.html").stat().st_size > 50_000, page.stderr
+    listed = run("--help", program="fourbar-validation")
+    assert listed.returncode == 0 and "published" in listed.stdout, listed.stderr
+    missing = run("plot", "a.toml", "-o", "a.svg")
+    assert missing.returncode == BROKEN and missing.stderr.count("\n") == 1
+    assert 'pip install "matplotlib>=' in missing.stderr
+
+
+@pytest.mark.skipif(os.environ.get("PACKAGE") != "all", reason="PACKAGE=all builds and installs wheel and archive")
+@pytest.mark.timeout(1800)
+def test_wheel_and_archive_install_on_every_python(tmp_path: Path) -> None:
+    wheel, archive = built(tmp_path)
+    names = set(zipfile.ZipFile(wheel).namelist())
+    assert {name.partition("/")[0] for name in names} == {
+        "fourbar",
+        "fourbar_validation",
+        f"{wheel.name.split('-py3')[0]}.dist-info",
+    }
+    assert {"fourbar/show/page/page.js", "fourbar_validation/models/thesis.toml"} <= names
+    assert "fourbar_validation/regression/accepted/results.csv" in names
+    with tarfile.open(archive) as packed:
+        assert any(name.endswith("/LICENSE") for name in packed.getnames())
+    found = {version: shutil.which(f"python{version}") for version in PYTHONS}
+    here = f"{sys.version_info.major}.{sys.version_info.minor}"
+    found[here] = sys.executable
+    for version, python in found.items():
+        if (
+            python is not None
+            and subprocess.run([python, "--version"], capture_output=True, check=False).returncode == 0
+        ):
+            installed_works(python, wheel, tmp_path / version, [])
+    installed_works(sys.executable, archive, tmp_path / "lowest", lowest(PROJECT["project"]["dependencies"]))

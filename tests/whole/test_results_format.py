@@ -1,0 +1,141 @@
+"""docs/results-format.md: its columns are those of the file, and its snippets run."""
+
+import dataclasses
+import math
+import re
+from pathlib import Path
+
+import pytest
+
+from fourbar import Motion, Scene, Sweep, command, solve, uniform
+from fourbar.effects import PinFriction
+from fourbar.formulas.pin_forces import PinForces
+from fourbar.quantities import FORCES, PIN_FORCES, QUANTITIES, STAGES, UNKNOWNS
+from fourbar.solution import Solution
+from fourbar_validation.compare.columns import read_columns
+from fourbar_validation.compare.identities import FORMULAS, IDENTITIES
+from fourbar_validation.compare.rows import COLUMNS, Row
+from fourbar_validation.compare.statements.statements import statements
+from fourbar_validation.engines.free_body import FreeBody
+from fourbar_validation.engines.hard_suite import HARD_WITNESSES
+from fourbar_validation.engines.mujoco.shipped import QUANTITY as SHIPPED
+from fourbar_validation.engines.witnesses import FURTHER, WITNESSES, WORK
+from fourbar_validation.regression.change import WHOLE
+from fourbar_validation.regression.record import ACCEPTED, baseline
+from fourbar_validation.run.released import ENGINES, FULL
+from fourbar_validation.run.run import run
+from fourbar_validation.run.selection import chosen
+from fourbar_validation.run.shipped.checks import CHECKS
+from fourbar_validation.scenes.random import LinkageType
+from fourbar_validation.scenes.suites import Random
+from tests.support.here import judge_here
+from tests.support.scenes import crank_rocker
+
+PAGE = (Path(__file__).parents[2] / "docs" / "results-format.md").read_text()
+NOT_QUANTITIES = (
+    *("title", "drive_bar", "status_code", "branch", "stopped_at"),
+    *("points", "velocity", "acceleration"),
+)
+OF_A_SCENE = ("assembled", "undecided", "torque_inertia")
+"""Of every engine, besides what it says of positions and of the linkage."""
+SHIPPED_RUN = baseline(ACCEPTED)
+TYPES = {"string": str, "double": float, "boolean": bool}
+
+
+def block(language: str) -> str:
+    found = re.search(f"```{language}\n(.*?)```", PAGE, re.DOTALL)
+    assert found is not None
+    return found[1]
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("run")
+    with pytest.MonkeyPatch.context() as monkeypatch:
+        judge_here(monkeypatch)
+        list(run(Random(8, 1, tuple(LinkageType)), folder / "results", chosen("free-body"), workers=1, drawn=False))
+    return folder
+
+
+def test_every_column_is_described_with_its_type() -> None:
+    described = dict(re.findall(r"^\| `(\w+)` \| (string|double|boolean) \|", PAGE, re.MULTILINE))
+    assert tuple(described) == COLUMNS
+    assert {field.name: field.type for field in dataclasses.fields(Row)} == {k: TYPES[t] for k, t in described.items()}
+
+
+def test_every_quantity_is_described_as_the_table_has_it() -> None:
+    described = re.findall(r"^\| `(\w+)` \| (.+?) \| (\w+) \| (scalar|vector) \| (.+) \|$", PAGE, re.MULTILINE)
+    table = [(q.name, q.unit, q.stage or "commanded", q.kind, q.meaning.replace("|", r"\|")) for q in QUANTITIES]
+    assert described == table
+
+
+def test_every_engine_is_described() -> None:
+    table = PAGE.partition("## The engines")[2].partition("## The quantities")[0]
+    described = re.findall(r"^\| `([\w-]+)` \| [^|]+ \| .+ \|$", table, re.MULTILINE)
+    assert described == ["engine", *WORK, *ENGINES, *(check.__name__ for check in CHECKS)]
+    names = {each.name for each in (*WITNESSES, *FURTHER, *HARD_WITNESSES)}
+    assert names | {FORMULAS} == set(WORK)
+
+
+def test_every_quantity_of_a_scene_is_described(results: Path) -> None:
+    table = PAGE.partition("## Quantities of a scene")[2].partition("## pandas")[0]
+    described = re.findall(r"^\| `([\w ]+)` \| [^|]+ \| .+ \|$", table, re.MULTILINE)
+    linkage = uniform(2.0, 1.0, 2.0, 1.0)  # with change points
+    scene, engine = Scene(linkage, Motion(Sweep(0.3, 1.0, 3), 1.0)), FreeBody()
+    stated = {row.quantity for row in statements("", scene, engine, engine.answer(scene, command(scene)))}
+    of_positions = {q.name for q in QUANTITIES}
+    assert set(described) == ({*IDENTITIES, *WHOLE, *FULL, *stated, SHIPPED, *OF_A_SCENE}) - of_positions
+    seen = {row.quantity for file in (results / "results", SHIPPED_RUN) for row in read_columns(file / "results.csv")}
+    assert stated - {"through"} <= seen <= {*described, *of_positions}
+
+
+def test_the_fields_of_a_solution_are_the_rows_of_the_table() -> None:
+    named = [field.name for field in dataclasses.fields(Solution)]
+    assert [name for name in named if name not in NOT_QUANTITIES] == [q.name for q in QUANTITIES]
+    assert set(NOT_QUANTITIES) <= set(named)
+    assert {q.kind for q in QUANTITIES} == {"scalar", "vector"}
+    assert {q.group for q in QUANTITIES} == {"", "unknown", "dry friction", "pin loads"}
+    assert STAGES == ("position", "velocity", "acceleration", "force", "error")
+
+
+def test_a_solution_has_the_shapes_of_the_table_and_no_other_quantity() -> None:
+    solution = solve(crank_rocker(effects=(PinFriction.at(A=(0.1, 0.01)),)), "error")
+    for q in QUANTITIES:
+        values = getattr(solution, q.name)
+        assert (values is None) == (q.name == "time")
+        assert values is None or values.shape == ((len(solution), 2) if q.kind == "vector" else (len(solution),))
+
+
+def test_the_formulas_name_the_pin_forces_as_the_table_does() -> None:
+    assert PinForces._fields == PIN_FORCES == ("F12", "F32", "F43", "F14")
+    assert tuple(name for name in UNKNOWNS if name not in FORCES) + FORCES == UNKNOWNS
+
+
+def test_the_parquet_file_holds_the_rows_of_the_table(results: Path) -> None:
+    import pyarrow.parquet as pq
+
+    file = pq.ParquetFile(results / "results" / "results.parquet")
+    assert file.num_row_groups == 1  # of 100 000 rows each
+    kept = list(read_columns(results / "results" / "results.parquet"))
+    table = list(read_columns(results / "results" / "results.csv"))
+    assert len(kept) == len(table)
+    for one, other in zip(kept, table, strict=True):
+        for ours, theirs in zip(dataclasses.astuple(one), dataclasses.astuple(other), strict=True):
+            assert ours == theirs or (math.isnan(ours) and math.isnan(theirs))
+
+
+def test_the_pandas_snippet_runs(
+    results: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    pytest.importorskip("pandas", reason="pandas is optional")
+    monkeypatch.chdir(results)
+    exec(block("python"), {})
+    printed = capsys.readouterr().out
+    assert "free-body" in printed
+    assert "0 of " in printed
+
+
+def test_the_sql_runs(results: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    duckdb = pytest.importorskip("duckdb", reason="DuckDB is optional")
+    monkeypatch.chdir(results)
+    assert ("free-body", "torque") in {row[:2] for row in duckdb.sql(block("sql")).fetchall()}

@@ -1,3 +1,0 @@
-"""Other people's numbers: a table of torques and forces judged row by row against the formulas."""
-
-from validation.check.check import check as check

@@ -1,0 +1,6 @@
+"""`python -m fourbar_validation`: the command line of the harness, wherever it is installed."""
+
+from fourbar_validation.cli import main
+
+if __name__ == "__main__":
+    main()

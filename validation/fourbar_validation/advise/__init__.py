@@ -1,0 +1,1 @@
+"""The cheapest settings of MuJoCo that keep torque and pin forces within a required error."""

@@ -1,0 +1,148 @@
+"""Which of MuJoCo's settings matters for a scene, and why: each is changed alone, and the error that comes of it."""
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fourbar.mjcf import Settings
+from fourbar.mjcf.document import load_ratio, mass_ratio
+from fourbar.mjcf.settings import LIGHT
+from fourbar.scene import Command, Scene
+from fourbar.solve import solve
+from fourbar_validation.advise.errors import NO_ANSWER, Errors, errors
+from fourbar_validation.engines.loop import Trial
+from fourbar_validation.engines.mujoco.trial import LONGEST, SHORTEST, Rig
+
+MATTERS = 2.0
+"""A setting that a change of a factor of two, or its loss, makes the error grow by less does not matter."""
+SPLINE = 7
+"""Degree of the curve through what was read at the steps: its error falls faster with them than that of RK4."""
+IN_LINE = 0.3
+"""|sin(theta_4 - theta_3)| below which bars 3 and 4 speed up so much that the timestep feels it."""
+MUJOCO_TOLERANCE = 1e-8
+"""MuJoCo's own default."""
+
+
+@dataclass(frozen=True, slots=True)
+class Influence:
+    """One setting changed alone."""
+
+    setting: str
+    changed: str
+    error: float
+    times: float
+    """The error over that of the settings as they were."""
+    why: str
+
+    def __str__(self) -> str:
+        error = f"the error is {self.error:.1e}, {self.times:.2g} times as large"
+        lost = error if math.isfinite(self.error) else "MuJoCo loses the motion"
+        return f"{self.setting} matters most here: {self.changed} {lost}, because {self.why}"
+
+
+def judged(scene: Scene, trial: Trial) -> Errors:
+    """Errors of a trial, at its steps and between them; none where MuJoCo lost the motion."""
+    if trial.broken:
+        return NO_ANSWER
+    found = [errors(scene, trial.at, trial.quantities)]
+    if scene.drive_bar == 2:  # the torque of another bar has poles, through which no curve can be drawn
+        found += [each for stretch in trial.stretches for each in between(scene, trial, *stretch)]
+    return Errors(*map(max, *found)) if len(found) > 1 else found[0]
+
+
+def between(scene: Scene, trial: Trial, samples: slice, steps: int) -> Iterator[Errors]:
+    """Errors amid the steps of a stretch, where they are fewer than its positions: a spline through what was read.
+
+    A largest force that lies between two steps is not seen at either of them.
+    """
+    theta_2, first = np.unique(trial.at.theta_2[samples], return_index=True)
+    n = samples.stop - samples.start
+    if len(theta_2) <= steps or not np.isfinite(theta_2).all():  # each gap has a position of its own
+        return
+    from scipy.interpolate import make_interp_spline
+
+    made = {"omega_2": trial.at.omega_2, "alpha_2": trial.at.alpha_2, **trial.quantities}
+    read = {name: np.asarray(values)[samples][first] for name, values in made.items()}
+    if len(theta_2) < 2 or not all(np.isfinite(values).all() for values in read.values()):
+        yield NO_ANSWER
+        return
+    where = np.linspace(theta_2[0], theta_2[-1], 2 * n)
+    degree = min(SPLINE, len(theta_2) - 1)
+    there = {name: make_interp_spline(theta_2, values, degree)(where) for name, values in read.items()}
+    branch = np.full(where.shape, trial.at.branch[samples][0], dtype=np.int8)
+    at = Command(where, branch, there.pop("omega_2"), there.pop("alpha_2"))
+    yield errors(scene, at, there)
+
+
+def influences(scene: Scene, rig: Rig, settings: Settings) -> list[Influence]:
+    """Every setting changed alone, the one that matters most first."""
+    before = judged(scene, rig.try_out(settings)).worst
+    found = []
+    for name, changed, other, why in _changes(scene, settings):
+        worst = judged(scene, rig.try_out(other)).worst
+        times = worst / before if before > 0.0 and math.isfinite(before) else math.nan
+        found.append(Influence(name, changed, worst, times, why(rig)))
+    return sorted(found, key=lambda each: -each.times if each.times == each.times else math.inf)
+
+
+def sentence(found: list[Influence]) -> str:
+    """The one that matters most, and why."""
+    if found and found[0].times >= MATTERS:
+        return str(found[0])
+    return f"no setting matters by itself here: changed alone none makes the error {MATTERS:g} times as large"
+
+
+def _changes(scene: Scene, settings: Settings) -> Iterator[tuple[str, str, Settings, Callable[[Rig], str]]]:
+    """What is changed, in words, to what, and what a growth of the error would come from."""
+    steps, tc = settings.steps_per_revolution, settings.time_constant_steps
+    window = max(settings.steps_per_window // 2, 1)
+    coarse = replace(settings, steps_per_revolution=steps / 2.0, steps_per_window=window)
+    yield "the timestep", "twice as long", coarse, _why_timestep
+    if tc / 2.0 >= SHORTEST / 2.0:
+        stiff = replace(settings, time_constant_steps=tc / 2.0)
+        yield (
+            "the closure's time constant",
+            "half as long",
+            stiff,
+            lambda _: "a closure of few steps is a spring that RK4 follows badly, in proportion to (h/tc)^4",
+        )
+    if 2.0 * tc <= LONGEST:
+        slow = replace(settings, time_constant_steps=2.0 * tc)
+        yield "the closure's time constant", "twice as long", slow, lambda _: _yields(scene, "a slow closure")
+    if settings.pad is not None:
+        yield (
+            "the stiffness by pads",
+            "without it",
+            replace(settings, pad=None),
+            lambda _: _yields(scene, "without pads the closure"),
+        )
+    if settings.tolerance == 0.0:
+        loose = replace(settings, tolerance=MUJOCO_TOLERANCE)
+        yield (
+            "the solver's tolerance",
+            f"at MuJoCo's own {MUJOCO_TOLERANCE:g}",
+            loose,
+            lambda _: "MuJoCo divides it by the inertia of the flywheel, next to which the linkage is small",
+        )
+
+
+def _why_timestep(rig: Rig) -> str:
+    motion = solve(rig.scene, "position", at=rig.command)
+    sines = np.abs(motion.sin_mu)
+    nearest = int(np.nanargmin(sines))
+    if sines[nearest] < IN_LINE:
+        near, where = (math.degrees(x) for x in (math.asin(sines[nearest]), float(rig.command.theta_2[nearest])))
+        return f"bars 3 and 4 come within {near:.2g} deg of one line at theta_2 = {where:.4g} deg and speed up there"
+    return "the error of RK4 goes as the fourth power of it"
+
+
+def _yields(scene: Scene, what: str) -> str:
+    """To what a soft closure yields, of this scene."""
+    loads, masses = load_ratio(scene), mass_ratio(scene.linkage)
+    if masses > LIGHT:
+        return f"{what} is soft at the lighter of coupler and output, whose inertia is {masses:.1e} times smaller"
+    if loads > 1.0:
+        return f"{what} sags under loads and weights, which are {loads:.2g} times the inertial forces"
+    return f"{what} yields to the inertial forces"

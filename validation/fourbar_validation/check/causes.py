@@ -1,0 +1,82 @@
+"""What a model differs in, the worst first: each entry is mended alone, and the error that goes is its share."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from fourbar.quantities import FORCES
+from fourbar_validation.check.differences import Difference, Value
+from fourbar_validation.compare.rows import Row
+
+MATTERS = 0.005
+"""Of the error of a quantity; a smaller share is printed as none."""
+
+
+@dataclass(frozen=True, slots=True)
+class Cause:
+    """One difference and its share of the error."""
+
+    difference: Difference
+    share: float | None = None
+    """Of the error of `quantity` that goes with it; None: it was not mended."""
+    quantity: str = ""
+    gain: float = 0.0
+    """By which that error falls, relative to the scale."""
+
+    def percent(self) -> str:
+        """The share, with its quantity."""
+        if self.share is None:
+            return "-"
+        return f"{100.0 * self.share:.0f} % {self.quantity}" if self.share >= MATTERS else "0 %"
+
+    def line(self) -> str:
+        """The entry, and both values where they are short."""
+        d = self.difference
+        return f"{d.key}: {value(d.theirs)}, generated {value(d.generated)}"
+
+    def texts(self) -> list[str]:
+        """What it is in their file, and what it does."""
+        d = self.difference
+        return [text for text in (f"in the file: {d.written}" if d.written else "", d.remark) if text]
+
+    def cells(self) -> tuple[str, ...]:
+        """For a row of the page."""
+        d = self.difference
+        key = f"{d.key} ({d.written})" if d.written else d.key
+        return self.percent(), key, value(d.generated), value(d.theirs), d.remark
+
+
+def causes(differences: Sequence[Difference], before: Sequence[Row], after: Sequence[Sequence[Row]]) -> list[Cause]:
+    """The differences with their shares, the one whose mending gains most first; those not mended keep their order.
+
+    Parameters
+    ----------
+    before : rows of the file as it is.
+    after : for each difference, rows of the file with that one mended; empty where it was not.
+    """
+    errors = _errors(before)
+    found = []
+    for number, difference in enumerate(differences):
+        mended = _errors(after[number]) if number < len(after) else {}
+        gains = {key: errors[key] - mended[key] for key in errors if key in mended and errors[key] > 0.0}
+        if not gains:
+            found.append(Cause(difference))
+            continue
+        key = max(gains, key=lambda each: gains[each])
+        share = max(gains[key] / errors[key], 0.0)
+        found.append(Cause(difference, share, key[1], max(gains[key], 0.0)))
+    return sorted(found, key=lambda cause: (cause.share is None, -cause.gain))
+
+
+def _errors(rows: Sequence[Row]) -> dict[tuple[str, str], float]:
+    """The error of the torque and of each pin force, by method."""
+    return {
+        (row.engine, row.quantity): row.error for row in rows if row.quantity in FORCES and math.isfinite(row.error)
+    }
+
+
+def value(entry: Value) -> str:
+    """Numbers with the digits that set them apart, or the word itself."""
+    if isinstance(entry, str):
+        return entry
+    return " ".join(f"{x:.12g}" for x in (entry if isinstance(entry, tuple) else (entry,)))

@@ -1,0 +1,128 @@
+"""`python -m validation check SCENE THEIRS.csv`: judge a user's own torques and forces."""
+
+import math
+from collections import Counter
+from pathlib import Path
+
+import click
+
+from fourbar.errors import InputError
+from fourbar.files import load
+from fourbar.writing import require_file, write_text
+from fourbar_validation.check.judge import Finding, Tolerance
+from fourbar_validation.check.judgement import Judgement, as_json, as_junit, judge_table
+from fourbar_validation.check.mistakes import NEARER, Explanation
+from fourbar_validation.check.theirs import Table, read_table
+from fourbar_validation.compare.rows import plain
+
+SHOWN = 3
+
+
+def extent(explanation: Explanation) -> str:
+    """How far a mistake explains what differs."""
+    if explanation.complete:
+        return "explains everything that differs: " + ", ".join(explanation.quantities)
+    parts = []
+    if explanation.quantities:
+        parts.append("explains " + ", ".join(explanation.quantities))
+    if explanation.nearer:
+        parts.append(", ".join(explanation.nearer) + f" then at least {NEARER:g} times nearer")
+    return "; ".join(parts)
+
+
+def tolerance_of(rtol: float | None, atol: float | None) -> Tolerance | None:
+    """What the options state; None where they state nothing."""
+    for option, value in (("--rtol", rtol), ("--atol", atol)):
+        if value is not None and not 0.0 <= value < math.inf:
+            raise InputError(option, value, "must be a finite number >= 0")
+    return None if rtol is None and atol is None else Tolerance(rtol or 0.0, atol or 0.0)
+
+
+@click.command()
+@click.argument("scene", type=click.Path(path_type=Path))
+@click.argument("theirs", type=click.Path(path_type=Path))
+@click.option("--rtol", type=float, metavar="R", help="Allow this part of each number too.")
+@click.option("--atol", type=float, metavar="A", help="Allow this too, in the SI unit of each quantity.")
+@click.option("--json", type=click.Path(path_type=Path, dir_okay=False), help="Write it as JSON too.")
+@click.option("--junit", type=click.Path(path_type=Path, dir_okay=False), help="Write it as JUnit too.")
+def check(
+    scene: Path, theirs: Path, rtol: float | None, atol: float | None, json: Path | None, junit: Path | None
+) -> int:
+    """Judge a table of torques and forces (THEIRS.csv) against the formulas, row by row.
+
+    Columns are named as by `fourbar analyze --csv`, whose file is read as it is; a unit may follow in
+    brackets: theta_2 [deg], torque [lbf ft], F12_x, F12_y, F43 [kN] (a magnitude). A spreadsheet's
+    semicolons and blank cells are understood. Half a unit of the last printed digit is allowed; with
+    --rtol or --atol these decide, and how many agree exactly is printed too.
+    """
+    table = read_table(theirs)
+    for path in (json, junit):
+        if path is not None:
+            require_file(path, scene, theirs)
+    judgement = judge_table(load(scene), table, tolerance_of(rtol, atol))
+    if json is not None:
+        write_text(json, as_json(judgement, table))
+    if junit is not None:
+        write_text(junit, as_junit(judgement, theirs.name))
+    show(judgement, table, theirs.name)
+    return judgement.status
+
+
+def show(judgement: Judgement, table: Table, name: str) -> None:
+    """Print what differs, what explains it, and the count."""
+    from rich.box import SIMPLE_HEAD
+    from rich.console import Console
+    from rich.markup import escape
+    from rich.table import Table as Shown
+
+    console = Console(soft_wrap=True)
+    for why in dict.fromkeys(table.left_out.values()):
+        headings = ", ".join(heading for heading, reason in table.left_out.items() if reason == why)
+        console.print(f"left out ({why}): {escape(plain(headings))}")
+    differing = judgement.differing
+    if differing:
+        title = f"{escape(plain(name))}: what differs, the {SHOWN} worst of each quantity"
+        shown = Shown(title=title, box=SIMPLE_HEAD, pad_edge=False, show_edge=False, padding=(0, 1, 0, 0))
+        for heading in ("line", "theta_2\ndeg", "quantity", "theirs", "ours", "error", "allowed"):
+            shown.add_column(heading, justify="right")
+        for finding in worst_of_each(differing):
+            theirs, ours = in_their_unit(finding, table)
+            numbers = (theirs, ours, f"{finding.error:.1e}", f"{finding.allowed:.1e}")
+            where = f"{math.degrees(finding.theta_2):.7g}"
+            shown.add_row(str(finding.line), where, escape(with_unit(finding, table)), *numbers)
+        console.print(shown)
+        counted = Counter(finding.quantity for finding in differing)
+        console.print("in all: " + ", ".join(f"{count} of {quantity}" for quantity, count in counted.items()))
+    for line in judgement.not_assembled:
+        console.print(f"line {line}: the linkage has no motion there (it does not assemble, or is singular)")
+    for explanation in judgement.explanations:
+        console.print(f"looks like: {escape(explanation.text)} ({extent(explanation)})")
+    if differing and not any(explanation.complete for explanation in judgement.explanations):
+        together = "these together explain all of it" if judgement.together() else "no single known mistake explains it"
+        console.print(together)
+    console.print(f"[bold]{judgement.sentence()}[/]")
+
+
+def worst_of_each(differing: list[Finding]) -> list[Finding]:
+    """The worst findings of each quantity, the worst quantity first."""
+    by_quantity: dict[str, list[Finding]] = {}
+    for finding in sorted(differing, key=lambda f: -f.error):
+        by_quantity.setdefault(finding.quantity, []).append(finding)
+    return [finding for findings in by_quantity.values() for finding in findings[:SHOWN]]
+
+
+def with_unit(finding: Finding, table: Table) -> str:
+    """The quantity and the unit of their column."""
+    return f"{finding.quantity} [{plain(table.units[_key(finding, table)].text)}]"
+
+
+def in_their_unit(finding: Finding, table: Table) -> tuple[str, str]:
+    """Both numbers in the unit of their column, with the digits that set them apart."""
+    factor = table.units[_key(finding, table)].factor
+    theirs, ours = ([x / factor for x in numbers] for numbers in (finding.theirs, finding.ours))
+    digits = next((d for d in (4, 6, 9, 12) if any(f"{a:.{d}g}" != f"{b:.{d}g}" for a, b in zip(theirs, ours))), 15)  # noqa: B905
+    return tuple(", ".join(f"{x:.{digits}g}" for x in numbers) for numbers in (theirs, ours))  # type: ignore[return-value]
+
+
+def _key(finding: Finding, table: Table) -> str:
+    return next(key for key in table.values if table.label(key) == finding.quantity)

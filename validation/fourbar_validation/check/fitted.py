@@ -1,0 +1,239 @@
+"""Mistakes with a number in them, which is fitted to the table: a ratio, a factor, an offset, another order."""
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fourbar.errors import FourBarError
+from fourbar.files.units import factor_to
+from fourbar.linkage import Bar
+from fourbar.quantities import FORCES, UNITS
+from fourbar.scene import Scene
+from fourbar.solution import Solution
+from fourbar.solve import solve
+from fourbar_validation.check.judge import Judge, Mistake
+from fourbar_validation.check.theirs import Array, quantity_of
+from fourbar_validation.compare.error import difference, in_own_unit
+from fourbar_validation.scenes.hard_linkages import with_bars
+
+OTHER_UNITS = {
+    "rad": ("deg",),
+    "rad/s": ("deg/s", "rpm", "rev/s"),
+    "rad/s^2": ("deg/s^2", "rpm/s"),
+    "m": ("mm", "cm", "in", "ft"),
+    "m/s^2": ("mm/s^2", "cm/s^2", "in/s^2", "ft/s^2", "g0"),
+    "N": ("kN", "mN", "lbf", "kgf"),
+    "N m": ("N mm", "N cm", "kN m", "mN m", "lbf ft", "lbf in", "kgf m", "kgf cm", "kgf mm"),
+}
+"""What each SI unit is taken for."""
+ENOUGH = 3
+"""Numbers that a fitted one must explain: fewer are explained by chance."""
+CARRIED = 2.0
+"""Times what is allowed: the fitted number carries the rounding of the numbers it was fitted to."""
+FACTORS = {0.5: "halved", 2.0: "doubled", 1e4: "in kg cm^2 taken for kg m^2", 1e-4: "10^4 too small"}
+"""Of a moment of inertia, and what was done."""
+PLAIN = 1e-2
+"""Relative; a fitted number this near a plain one is tried as that."""
+GRID = 72
+"""Offsets of the crank angle that are tried before one is fitted, 5 deg apart."""
+TRIED = 37
+"""Rows by which the offsets are tried."""
+NEWTON = 12
+"""Steps of the fit; it is quadratic, and starts within 5 deg."""
+STEP = 1e-6
+"""Of the difference by which the fit finds its slope, rad."""
+MOST_ROWS = 1000
+"""Rows among which another order is looked for: every one is held against every other."""
+
+
+def fitted(judge: Judge, differing: list[str]) -> Iterator[Mistake]:
+    """Every mistake whose number the table gives, the simplest first."""
+    yield from _ratios(judge, differing)
+    yield from _order(judge)
+    if any(quantity_of(key) in FORCES for key in differing):
+        yield from _factors(judge, differing)
+    yield from _offset(judge)
+
+
+def _ratios(judge: Judge, differing: list[str]) -> Iterator[Mistake]:
+    """Columns that are one number times ours: a unit, by name where a pair of units has that ratio."""
+    by_ratio: dict[tuple[str, float], set[str]] = {}
+    for key in differing:
+        where = judge.where(key)
+        ours, theirs = judge.ours(key)[where], judge.table.values[key][where]
+        there = np.isfinite(theirs)
+        ours, theirs = ours[there], theirs[there]
+        if not where.any() or not (squares := float(ours @ ours)):
+            continue
+        announced, unit = judge.table.units[key], UNITS[quantity_of(key)]
+        near = float(ours @ theirs) / squares
+        named = _named_ratio(judge, key, announced.text, announced.factor, unit, near)
+        if named is None and np.count_nonzero(ours) >= ENOUGH and near:
+            named = _plain_ratio(judge, key, near)
+        if named is not None:
+            group = next((g for g in by_ratio if g[0] == named[0]), named)
+            by_ratio.setdefault(group, set()).add(quantity_of(key))
+    for (text, ratio), quantities in by_ratio.items():
+        yield Mistake(
+            text,
+            lambda quantity, right, ratio=ratio, own=quantities: (  # type: ignore[misc]
+                ratio * getattr(right, quantity) if quantity in own else None
+            ),
+            whole=False,
+            times=CARRIED,
+        )
+
+
+def _named_ratio(
+    judge: Judge, key: str, announced: str, factor: float, unit: str, near: float
+) -> tuple[str, float] | None:
+    for other in OTHER_UNITS.get(unit, ()):
+        ratio = math.copysign(factor / factor_to(unit, other), near)
+        if abs(near / ratio - 1.0) < PLAIN and abs(ratio) != 1.0 and judge.explained(key, ratio * judge.ours(key)):
+            reversed_too = ", and reversed" if near < 0.0 else ""
+            return f"units: numbers in {other} where {announced} was announced ({ratio:.6g} times){reversed_too}", ratio
+    return None
+
+
+def _plain_ratio(judge: Judge, key: str, near: float) -> tuple[str, float] | None:
+    """A power of ten, or the ratio as fitted; a reversed sign is a mistake of its own."""
+    if judge.explained(key, -judge.ours(key)):
+        return None
+    power = round(math.log10(abs(near)))
+    ten = math.copysign(10.0**power, near)
+    if power and judge.explained(key, ten * judge.ours(key)):
+        return f"every number is {'-' if near < 0.0 else ''}10^{power} times ours", ten
+    return (f"every number is {near:.6g} times ours", near) if judge.explained(key, near * judge.ours(key)) else None
+
+
+def _change(judge: Judge, wrong: Solution, keys: list[str]) -> Array:
+    """What a changed scene adds to the right numbers, each quantity over its scale, in one line."""
+    return np.concatenate([_residual(judge, key, judge.ours(key, wrong), judge.ours(key)) for key in keys])
+
+
+def _residual(judge: Judge, key: str, one: Array, other: Array) -> Array:
+    yard = judge.yard(key)
+    where = judge.where(key) & (yard > 0.0)
+    scaled = (one[where] - other[where]) / (yard[where][:, None] if one.ndim == 2 else yard[where])
+    stated = np.isfinite(judge.table.values[key][where])
+    return np.asarray(np.where(stated, scaled, 0.0)).ravel()
+
+
+def _factors(judge: Judge, differing: list[str]) -> Iterator[Mistake]:
+    """A moment of inertia or a mass times a factor: forces and torque are linear in each."""
+    scene = judge.scene
+    keys = [key for key in differing if quantity_of(key) in FORCES]
+    theirs = np.concatenate([_residual(judge, key, judge.table.values[key], judge.ours(key)) for key in keys])
+    if np.count_nonzero(theirs) < ENOUGH:
+        return
+    bars = ("input", "coupler", "output")
+    inertia = ("moment of inertia", lambda bar, f: replace(bar, inertia=f * bar.moment_of_inertia))
+    mass = ("mass", lambda bar, f: replace(bar, mass=f * bar.mass))
+    for which, (word, change) in (*(((bar,), each) for bar in bars for each in (inertia, mass)), (bars, inertia)):
+
+        def scaled(f: float, which: Sequence[str] = which, change: Callable[[Bar, float], Bar] = change) -> Scene:
+            return with_bars(scene, **{bar: change(getattr(scene.linkage, bar), f) for bar in which})
+
+        try:
+            moves = _change(judge, solve(scaled(2.0), "force", at=judge.at), keys)
+            slope = float(moves @ moves)
+            factor = 1.0 + float(moves @ theirs) / slope if slope else math.nan
+            if not 0.0 < factor < math.inf or factor == 1.0:
+                continue
+            plain = next((f for f in FACTORS if abs(factor / f - 1.0) < PLAIN), None) if word != "mass" else None
+            for f in (factor,) if plain is None else (plain, factor):
+                wrong = solve(scaled(f), "force", at=judge.at)
+                what = f"{FACTORS[f]}" if f == plain else f"{f:.6g} times ours (fitted)"
+                yield Mistake(
+                    f"{which[0] if len(which) == 1 else 'every bar'}: {word} {what}",
+                    lambda quantity, right, wrong=wrong: getattr(wrong, quantity, None),  # type: ignore[misc]
+                    times=1.0 if f == plain else CARRIED,
+                )
+                if f == plain and all(judge.explained(key, judge.ours(key, wrong)) for key in keys):
+                    break
+        except FourBarError:  # what the factor makes of this scene is none
+            continue
+
+
+def _offset(judge: Judge) -> Iterator[Mistake]:
+    """The crank angle measured from another zero: the offset at which theirs fit best, refined by Gauss and Newton."""
+    keys = [key for key in judge.table.values if judge.yard(key).any()]
+    rows = np.unique(np.linspace(0, len(judge.at.theta_2) - 1, TRIED).round().astype(int))
+
+    def residuals(offsets: Array, rows: NDArray[np.int_]) -> Array:
+        """One line for each offset."""
+        at, m = judge.at, len(offsets)
+        many = {
+            name: np.tile(values[rows], m)
+            for name in ("theta_2", "branch", "omega_2", "alpha_2")
+            if np.ndim(values := getattr(at, name)) == 1
+        }
+        many["theta_2"] += np.repeat(offsets, len(rows))
+        moved = solve(judge.scene, judge.stage, at=at._replace(**many, remainder=None, time=None))
+        parts = []
+        for key in keys:
+            theirs = judge.table.values[key][rows].reshape(len(rows), -1)
+            apart = judge.ours(key, moved).reshape(m, *theirs.shape) - theirs
+            if quantity_of(key).startswith("theta"):
+                apart = np.remainder(apart + np.pi, 2.0 * np.pi) - np.pi
+            scaled = apart / in_own_unit(judge.yard(key)[rows])[:, None]
+            parts.append(np.where(np.isfinite(theirs), scaled, 0.0).reshape(m, -1))
+        return np.concatenate(parts, axis=1)
+
+    if sum(np.count_nonzero(judge.where(key)) for key in keys) < ENOUGH:
+        return
+    tried = 2.0 * np.pi * np.arange(1, GRID) / GRID
+    sizes = np.mean(np.minimum(np.abs(np.nan_to_num(residuals(tried, rows), nan=1.0)), 1.0), axis=1)
+    offset = float(tried[np.argmin(sizes)])
+    everything = np.arange(len(judge.at.theta_2))
+    for _ in range(NEWTON):
+        here, more, less = residuals(offset + np.array([0.0, STEP, -STEP]), everything)
+        slope = (more - less) / (2.0 * STEP)
+        there = np.isfinite(here) & np.isfinite(slope)
+        if not there.any() or not (size := float(slope[there] @ slope[there])):
+            return
+        step = float(slope[there] @ here[there]) / size
+        offset -= step
+        if abs(step) < STEP**2:
+            break
+    offset = math.remainder(offset, 2.0 * np.pi)
+    wrong = solve(judge.scene, judge.stage, at=judge.at._replace(theta_2=judge.at.theta_2 + offset, remainder=None))
+    yield Mistake(
+        f"the crank angle is measured from another zero: theta_2 {math.degrees(offset):+.6g} deg is what they solved",
+        lambda quantity, right: None if quantity == "theta_2" else getattr(wrong, quantity, None),
+        times=CARRIED,
+    )
+
+
+def _order(judge: Judge) -> Iterator[Mistake]:
+    """The right numbers in other rows: each row of theirs goes to the nearest of ours."""
+    table, n = judge.table, len(judge.at.theta_2)
+    keys = [key for key in table.values if judge.where(key).all() and judge.yard(key).all()]
+    if not ENOUGH <= n <= MOST_ROWS or not keys:
+        return
+    apart = np.zeros((n, n))
+    for key in keys:
+        ours, theirs, yard = judge.ours(key), table.values[key], judge.yard(key).max()
+        for i in range(n):
+            there = np.where(np.isnan(theirs[i]), ours, theirs[i]) if ours.ndim == 2 else np.full(n, theirs[i])
+            apart[i] += difference(quantity_of(key), ours, there) / yard
+    nearest = np.argmin(apart, axis=1)
+    if len(np.unique(nearest)) < n - 1 or np.array_equal(nearest, np.arange(n)):  # a revolution ends where it began
+        return
+    steps = np.diff(nearest)
+    if np.all(steps[1:-1] == -1):
+        text = "the rows are in reverse order: theta_2 runs the other direction"
+    elif np.count_nonzero(steps == 1) >= n - 2:
+        rows = round(float(np.median(np.remainder(nearest - np.arange(n) + n / 2, n) - n / 2)))
+        text = f"the rows are shifted by {rows:+d}: each has the numbers of another theta_2"
+    else:
+        text = "the rows are in another order than their theta_2"
+    yield Mistake(text, lambda quantity, right: _in_rows(quantity, right, nearest))
+
+
+def _in_rows(quantity: str, right: Solution, rows: Array) -> Array | None:
+    values = None if quantity == "theta_2" else getattr(right, quantity, None)
+    return None if values is None else np.asarray(values[rows])

@@ -1,0 +1,207 @@
+"""A table judged number by number: how far each is from the formulas, what it is allowed, and what may explain it."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fourbar.errors import InputError
+from fourbar.formulas.mobility import on_smooth_path
+from fourbar.quantities import OK
+from fourbar.scene import Command, Scene, command
+from fourbar.solution import Solution
+from fourbar.solve import solve
+from fourbar_validation.check.theirs import Array, Table, quantity_of
+from fourbar_validation.compare.error import difference, in_own_unit, magnitude, relative
+from fourbar_validation.compare.scales import yardstick
+from fourbar_validation.compare.tolerance import EPS, EQUIVALENCE, NOTHING_TO_TELL, condition_of
+
+Mask = NDArray[np.bool_]
+
+AS_PRINTED = 4.0 * EPS
+"""Relative; a position of the scene that went to degrees and back."""
+
+
+@dataclass(frozen=True, slots=True)
+class Tolerance:
+    """What a user allows, as numpy has it: atol + rtol |ours|, atol in the SI unit of each quantity."""
+
+    rtol: float = 0.0
+    atol: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One quantity at one position of the user's table, in SI."""
+
+    line: int
+    """In the user's file."""
+    quantity: str
+    theirs: tuple[float, ...]
+    ours: tuple[float, ...]
+    error: float
+    """Relative to the scale of the quantity (angles: rad)."""
+    allowed: float
+    difference: float
+    """In the unit of the quantity, as `permitted`."""
+    permitted: float | None
+    """By the tolerance that was stated, and by printed digits; None where none was stated."""
+    theta_2: float
+
+    @property
+    def judged(self) -> bool:
+        """Whether any digit is left by which it can be judged."""
+        return self.allowed != math.inf
+
+    @property
+    def exact(self) -> bool:
+        """Whether it agrees to round-off and its printed digits."""
+        return self.judged and self.error <= self.allowed
+
+    @property
+    def agrees(self) -> bool:
+        """Whether it is within what is allowed: the stated tolerance, where there is one."""
+        if self.permitted is None:
+            return self.exact
+        return self.exact or (self.judged and self.difference <= self.permitted)
+
+
+class Judge:
+    """Numbers of a table against the formulas at its positions."""
+
+    def __init__(self, scene: Scene, table: Table, tolerance: Tolerance | None) -> None:
+        self.scene, self.table, self.tolerance = scene, table, tolerance
+        self.at = positions(scene, table)
+        self.stage = "position" if self.at.omega_2 is None else "force"
+        self.right = solve(scene, self.stage, at=self.at)
+        self.ok = self.right.status_code == OK
+        self._yards: dict[str, Array] = {}
+        for key in table.values:
+            if getattr(self.right, quantity_of(key)) is None:
+                if self.at.omega_2 is None:
+                    raise InputError("motion.omega_2", None, f"is needed in the scene to judge {key}")
+                raise InputError("header", key, "does not exist in this scene: it has no dry friction")
+
+    def ours(self, key: str, solution: Solution | None = None) -> Array:
+        """The formulas' values of a key of the table."""
+        values: Array = getattr(self.right if solution is None else solution, quantity_of(key))
+        return magnitude(values) if key.startswith("|") else values
+
+    def where(self, key: str) -> Mask:
+        """The rows in which both state a number, (n,)."""
+        return np.asarray(self._answered(key) & self.table.stated(key))
+
+    def yard(self, key: str) -> Array:
+        """What the error of a key is divided by at each position, (n,)."""
+        if key not in self._yards:
+            quantity = quantity_of(key)
+            self._yards[key] = yardstick(quantity, self.scene, self.right, getattr(self.right, quantity))
+        return self._yards[key]
+
+    @cached_property
+    def near(self) -> list[Solution]:
+        """The same half a unit of a rounded theta_2 away."""
+        rounding = self.table.theta_2_rounding
+        if not rounding.any():
+            return []
+        moved = (self.at.theta_2 + shift for shift in (-rounding, rounding))
+        return [solve(self.scene, self.stage, at=self.at._replace(theta_2=x, remainder=None)) for x in moved]
+
+    def judged(self, key: str, ours: Array) -> tuple[Array, Array, Array]:
+        """(error, allowed, apart) of the table where `ours` is taken for the right numbers, each (n,)."""
+        quantity, yard = quantity_of(key), self.yard(key)
+        scale = in_own_unit(yard)  # what all its terms leave 0
+        theirs = self.table.values[key]
+        theirs = np.where(np.isnan(theirs), ours, theirs)  # a component that their table does not have
+        apart = difference(quantity, ours, theirs)
+        condition = condition_of(quantity, self.scene.linkage, self.right)
+        # what a mistake would have printed is rounded at its own size, however much larger
+        there = self.ours(key)
+        larger: Array | float = 1.0
+        if ours is not there and not quantity.startswith("theta"):
+            larger = np.maximum(np.nanmax(magnitude(ours)[self.ok], initial=0.0) / scale, 1.0)
+        moves = [difference(quantity, there, self.ours(key, other)) for other in self.near]
+        spread = relative(np.fmax.reduce(moves), scale) if moves else 0.0
+        exact = np.where(yard == 0.0, 0.0, EQUIVALENCE.allowed(condition))
+        allowed = (exact + spread) * larger + relative(self.table.rounding[key], scale)
+        return relative(apart, scale), np.where(condition * NOTHING_TO_TELL > EPS, allowed, np.inf), apart
+
+    def permitted(self, key: str, ours: Array) -> Array | None:
+        """The difference that the stated tolerance allows, (n,), in the quantity's unit."""
+        if self.tolerance is None:
+            return None
+        return np.asarray(self.tolerance.atol + self.tolerance.rtol * magnitude(ours) + self.table.rounding[key])
+
+    def explained(self, key: str, predicted: Array, times: float = 1.0) -> bool:
+        """Whether all of a key is what `predicted` says, within `times` what is allowed."""
+        where = self.where(key)
+        error, allowed, apart = (values[where] for values in self.judged(key, predicted))
+        within = error <= times * allowed
+        permitted = self.permitted(key, predicted)
+        if permitted is not None:
+            within |= apart <= permitted[where]
+        return bool(where.any() and np.all(within))
+
+    def findings(self) -> list[Finding]:
+        """Every number that the table states where the formulas have one."""
+        found = []
+        for key, theirs in self.table.values.items():
+            ours, label = self.ours(key), self.table.label(key)
+            error, allowed, apart = self.judged(key, ours)
+            permitted = self.permitted(key, ours)
+            for i in np.flatnonzero(self.where(key)).tolist():
+                stated = np.isfinite(np.atleast_1d(theirs[i]))
+                yours, mine = (tuple(np.atleast_1d(values[i])[stated].tolist()) for values in (theirs, ours))
+                numbers = (float(error[i]), float(allowed[i]), float(apart[i]))
+                most = None if permitted is None else float(permitted[i])
+                found.append(
+                    Finding(self.table.lines[i], label, yours, mine, *numbers, most, float(self.at.theta_2[i]))
+                )
+        return found
+
+    def without_answer(self) -> list[int]:
+        """Lines that state a number where this linkage does not assemble, or is singular: none is right there."""
+        missing = [self.table.stated(key) & ~self._answered(key) for key in self.table.values]
+        return [self.table.lines[i] for i in np.flatnonzero(np.any(missing, axis=0))]
+
+    def _answered(self, key: str) -> Mask:
+        there = np.isfinite(self.ours(key))
+        return np.asarray(there.all(axis=1) if there.ndim == 2 else there)
+
+
+def positions(scene: Scene, table: Table) -> Command:
+    """The command at each row of the table: the scene's own where it has the same positions."""
+    base = command(scene)
+    if scene.motion.free is not None:
+        raise InputError("motion.free", scene.title, "a table is judged at one omega_2 and alpha_2, not while released")
+    theta_2 = table.theta_2
+    if base.theta_2.shape == theta_2.shape and np.allclose(base.theta_2, theta_2, rtol=AS_PRINTED, atol=0.0):
+        return base
+    if np.ndim(base.omega_2 or 0.0) or np.ndim(base.alpha_2):
+        allowed = "a table is judged along a law at the scene's own positions, all of them in its order"
+        raise InputError("motion.law", scene.title, allowed)
+    branch = np.full(len(theta_2), scene.motion.branch, dtype=np.int8)
+    if scene.motion.through == "follow":
+        branch = on_smooth_path(scene.linkage, theta_2, scene.motion.branch)
+    return Command(theta_2, branch, base.omega_2, base.alpha_2)
+
+
+@dataclass(frozen=True, slots=True)
+class Mistake:
+    """A mistake as a hypothesis: what was done, and what it turns the right numbers into."""
+
+    text: str
+    predict: Callable[[str, Solution], Array | None]
+    """quantity, right solution -> what would have been printed; None where it changes nothing of it."""
+    whole: bool = True
+    """Whether it was made in the calculation, and so shows in every quantity; a column's unit shows in its own."""
+    times: float = 1.0
+    """Of what is allowed: a number that was fitted to rounded ones carries their rounding once more."""
+
+    def prediction(self, key: str, right: Solution) -> Array | None:
+        """For a key of the table."""
+        predicted = self.predict(quantity_of(key), right)
+        return magnitude(predicted) if predicted is not None and key.startswith("|") else predicted

@@ -1,0 +1,201 @@
+"""`run SCENE --mjcf THEIRS.xml`: what differs from the generated MJCF, and what it costs in accuracy.
+
+The file is somebody's: it is compiled and run in a process of its own, with a limit on time and memory.
+"""
+
+import math
+import os
+import tempfile
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from pkgutil import resolve_name
+from typing import Any
+
+from fourbar.errors import FourBarError, InputError
+from fourbar.quantities import UNKNOWNS
+from fourbar.scene import Scene
+from fourbar.show.progress import running
+from fourbar.solve import solve
+from fourbar.writing import write_text
+from fourbar_validation.check.causes import Cause, causes
+from fourbar_validation.check.differences import differences
+from fourbar_validation.check.screen import read_mjcf
+from fourbar_validation.compare.answer import Answer
+from fourbar_validation.compare.compare import compare
+from fourbar_validation.compare.counts import Counts
+from fourbar_validation.compare.rows import Row, plain, write_results
+from fourbar_validation.compare.tolerance import SIMULATED, Tolerance
+from fourbar_validation.engines.memory import WORKER_MEMORY, bound_memory
+from fourbar_validation.report.templating import number, rendered
+
+SECONDS = 120.0
+"""A four-bar takes less than one."""
+ABOUT_SHARES = (
+    "share: of the error of that quantity, what goes when this one entry alone is as generated; "
+    "a dash: it cannot be mended alone in the compiled file"
+)
+HEADINGS = ("quantity", "theirs", "generated", "allowed", "verdict")
+EXAMINE = "fourbar_validation.engines.mujoco.theirs:examine"
+MENDED = "fourbar_validation.engines.mujoco.theirs:examine_mended"
+
+
+@dataclass(frozen=True, slots=True)
+class Cost:
+    """One quantity by one method: the error of their file, and of the generated one."""
+
+    row: Row
+    generated: float
+
+    @property
+    def method(self) -> str:
+        """Engine and setting."""
+        return f"{self.row.engine} {self.row.setting}"
+
+    def cells(self) -> tuple[str, ...]:
+        """Under HEADINGS; a row without an error says why."""
+        row = self.row
+        verdict = row.verdict if not math.isnan(row.error) else f"{row.verdict}: {row.reason}"
+        return row.quantity, number(row.error), number(self.generated), number(row.allowed), verdict
+
+
+@dataclass(frozen=True, slots=True)
+class ModelReport:
+    """All that is reported of somebody's file."""
+
+    causes: list[Cause]
+    """What differs, the worst first."""
+    costs: list[Cost]
+    notes: list[str]
+
+    def methods(self) -> list[str]:
+        """The methods by which their file was evaluated."""
+        return list(dict.fromkeys(cost.method for cost in self.costs))
+
+    @property
+    def counts(self) -> Counts:
+        """The comparisons of their file by verdict."""
+        return Counts(cost.row for cost in self.costs)
+
+
+def named(pairs: tuple[str, ...]) -> dict[str, str]:
+    """ROLE=NAME pairs of the command line."""
+    allowed = ("input", "coupler", "output", "B3", "B4")
+    names = {}
+    for pair in pairs:
+        role, equals, name = pair.partition("=")
+        if not equals or role not in allowed or not name:
+            raise InputError("--name", pair, f"must be ROLE=NAME, ROLE one of {', '.join(allowed)}")
+        names[role] = name
+    return names
+
+
+def examine_model(
+    name: str, scene: Scene, mjcf: Path, names: Mapping[str, str], tolerance: Tolerance = SIMULATED
+) -> ModelReport:
+    """Examine a file in a guarded process, and the generated one before; theirs is held to the tolerance."""
+    text = read_mjcf(mjcf)
+    with guarded(mjcf) as examined:
+        generated, theirs = examined(EXAMINE, scene, None, {}), examined(EXAMINE, scene, text, dict(names))
+        ours = {(row.engine, row.quantity): row.error for row in _rows(name, scene, generated.answers, SIMULATED)}
+        rows = _rows(name, scene, theirs.answers, tolerance)
+        costs = [Cost(row, ours.get((row.engine, row.quantity), math.nan)) for row in rows]
+        found = differences(generated.described, theirs.described, theirs.called)
+        entries = [(difference.key, difference.generated) for difference in found]
+        failed = any(row.failed for row in rows)
+        mended = examined(MENDED, scene, text, dict(theirs.names), entries) if failed else []
+    after = [[] if answers is None else _rows(name, scene, answers, tolerance) for answers in mended]
+    return ModelReport(causes(found, rows, after), costs, theirs.notes)
+
+
+def _rows(name: str, scene: Scene, answers: list[Answer], tolerance: Tolerance) -> list[Row]:
+    found = []
+    for answer in answers:
+        formulas = solve(scene, "force", at=answer.at)
+        found += compare(name, scene, answer, formulas, tolerance, UNKNOWNS)
+    return found
+
+
+@contextmanager
+def guarded(mjcf: Path) -> Iterator[Callable[..., Any]]:
+    """What examines a file, an adapter and its arguments, in a process that may crash, hang or run out of memory."""
+    from multiprocessing import get_context
+
+    from pebble import ProcessExpired, ProcessPool
+
+    waiting = running(f"MuJoCo examines the file, in {SECONDS:g} s at most")
+    with waiting, ProcessPool(max_workers=1, context=get_context("spawn"), initializer=_confine) as pool:
+
+        def examined(*arguments: object) -> Any:
+            try:
+                return pool.schedule(_examine, args=arguments, timeout=SECONDS).result()
+            except FourBarError as error:
+                if not isinstance(error, InputError) or error.key != "--mjcf":
+                    raise
+                raise InputError(error.key, error.value or mjcf.name, error.allowed, str(mjcf)) from None
+            except TimeoutError:
+                reason = f"MuJoCo did not come back in {SECONDS:g} s"
+            except MemoryError:
+                reason = f"asks for more than {WORKER_MEMORY // 2**30} GB of memory"
+            except ProcessExpired as error:
+                reason = f"MuJoCo crashed on it (exit code {error.exitcode})"
+            except KeyboardInterrupt:
+                pool.stop()  # type: ignore[no-untyped-call]  # or the pool would wait for the file to its time limit
+                raise
+            raise InputError("--mjcf", mjcf.name, reason, str(mjcf))
+
+        yield examined
+
+
+def _confine() -> None:
+    """Memory bounded, and MuJoCo's log where it is swept away."""
+    os.chdir(tempfile.gettempdir())
+    bound_memory()
+
+
+def _examine(adapter: str, *arguments: object) -> Any:
+    return resolve_name(adapter)(*arguments)
+
+
+def show(report: ModelReport, mjcf: Path, out: Path) -> None:
+    """Print the report and write theirs.md and results.csv."""
+    from rich.box import SIMPLE_HEAD
+    from rich.console import Console
+    from rich.markup import escape
+    from rich.padding import Padding
+    from rich.table import Table
+
+    console = Console()
+    if not report.causes:
+        console.print("It differs in nothing from the generated MJCF.")
+    else:
+        console.print(f"{escape(plain(mjcf.name))} against the generated MJCF, the worst cause first")
+        console.print(f"[dim]{ABOUT_SHARES}[/]\n")
+    for cause in report.causes:
+        style = "bold" if cause.share is not None and cause.share >= 0.5 else ""
+        console.print(f"{cause.percent():>12}  {escape(plain(cause.line()))}", style=style)
+        for text in cause.texts():
+            console.print(Padding(escape(plain(text)), (0, 0, 0, 14)))
+    for note in report.notes:
+        console.print(f"note: {escape(plain(note))}")
+    for method in report.methods():
+        costs = Table(title=f"what it costs, {escape(plain(method))}: error", box=SIMPLE_HEAD, pad_edge=False)
+        for heading in HEADINGS:
+            costs.add_column(heading, overflow="fold")
+        for cost in report.costs:
+            if cost.method == method:
+                style = "bold red" if cost.row.failed else ""
+                costs.add_row(*(escape(plain(text)) for text in cost.cells()), style=style)
+        console.print(costs)
+    out.mkdir(parents=True, exist_ok=True)
+    write_text(out / "theirs.md", markdown(report, mjcf))
+    write_results([cost.row for cost in report.costs], out / "results.csv")
+    sentence = f"{report.counts.sentence()}. It differs in {len(report.causes)} entries"
+    console.print(f"[bold]{sentence}[/]; written to {escape(plain(str(out)))}")
+
+
+def markdown(report: ModelReport, mjcf: Path) -> str:
+    """The same as text for a page."""
+    what = {"report": report, "mjcf": mjcf.name, "about": ABOUT_SHARES, "headings": HEADINGS}
+    return rendered("fourbar_validation.check", "theirs.md.j2", **what)

@@ -1,0 +1,222 @@
+"""Reading a table of somebody's results: columns named as `fourbar analyze --csv` names them, units in brackets.
+
+    theta_2 [deg], torque [N cm], F12_x, F12_y, F43 [kN]
+
+A vector under its own name is its magnitude; one of its components may stand alone. Units may also
+stand in a line of their own under the names; without a unit a column is SI (rad). Columns are parted
+by commas, by tabs, or by a spreadsheet's semicolons, with which a number may have a decimal comma.
+A blank cell states nothing, and a column that is no answer is left out by name. How many digits were
+printed decides how much rounding is theirs: half a unit of the last printed digit is always allowed,
+and what half a unit of a rounded theta_2 changes.
+"""
+
+import csv
+import io
+import math
+import re
+from dataclasses import dataclass
+from decimal import Decimal, InvalidOperation
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fourbar.errors import InputError
+from fourbar.files.reading import read_text
+from fourbar.quantities import UNITS, VECTORS
+from fourbar_validation.compare.tolerance import EPS
+
+Array = NDArray[np.float64]
+
+DECIMALS = 4
+"""12.5 deg and 0.25 rad are positions that somebody chose, 0.1745 rad is one that was rounded."""
+NOT_JUDGED = {
+    "time": "a row is found by its theta_2",
+    **dict.fromkeys(("torque_error", "force_error", "friction_residual"), "an error of the formulas themselves"),
+    **dict.fromkeys(("status", "branch", "drive_bar"), "stated by the scene"),
+}
+"""Columns of `fourbar analyze --csv` that are no answer, and why."""
+BLANK = "blank"
+LARGEST_FILE = 64 * 2**20
+"""Bytes; a table larger than this is not a hand-made comparison."""
+HEADING = re.compile(r"\|?(?P<name>\w+)\|?\s*(?:\[(?P<square>[^\]]*)\]|\((?P<round>.*)\))?(?P<letter>_[xy])?")
+
+
+@dataclass(frozen=True, slots=True)
+class Unit:
+    """What the numbers of a column are in."""
+
+    text: str
+    factor: float
+    """To SI."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Table:
+    """Somebody's numbers in SI: theta_2 (n,), and per quantity values (n,) or (n, 2) with their rounding.
+
+    Of a vector (n,) are its magnitudes, under |name|. What the table does not state is NaN.
+    """
+
+    theta_2: Array
+    values: dict[str, Array]
+    rounding: dict[str, Array]
+    """Half a unit of the last digit printed, in SI, (n,)."""
+    units: dict[str, Unit]
+    lines: list[int]
+    """The line of the file that each row stands in."""
+    theta_2_rounding: Array
+    """Half a unit of the last digit of theta_2 in a column that is printed with DECIMALS, rad, (n,); else 0."""
+    left_out: dict[str, str]
+    """Headings of columns that are not judged, and why."""
+
+    def label(self, key: str) -> str:
+        """The quantity, or the one component of it that the table has."""
+        values = self.values[key]
+        there = [letter for letter, gone in zip("xy", np.isnan(values).T, strict=False) if not gone.all()]
+        return f"{key}_{there[0]}" if values.ndim == 2 and len(there) == 1 else key
+
+    def stated(self, key: str) -> NDArray[np.bool_]:
+        """The rows in which anything is stated of a quantity, (n,)."""
+        there = np.isfinite(self.values[key])
+        return np.asarray(there.any(axis=1) if there.ndim == 2 else there)
+
+
+def quantity_of(key: str) -> str:
+    """The quantity of a key of `Table.values`."""
+    return key.strip("|")
+
+
+def read_table(path: Path) -> Table:
+    """Read a CSV table; InputError names the column or line that cannot be read."""
+    (_, headings), *rows = _lines(path)
+    unit_line = [""] * len(headings)
+    if rows and _is_unit_line(rows[0][1]):
+        unit_line = rows.pop(0)[1]
+    if not rows:
+        raise InputError("table", path.name, "needs a header and at least one row", str(path))
+    columns, left_out = _columns(path, headings, unit_line)
+    names = [name for name, _ in columns.values()]
+    if len(set(names)) != len(names):
+        raise InputError("header", headings, "names a column twice", str(path))
+    if "theta_2" not in names:
+        raise InputError("header", headings, "needs a column theta_2 (say theta_2 [deg] for degrees)", str(path))
+    numbers = {name: np.empty(len(rows)) for name in names}
+    halves = {name: np.empty(len(rows)) for name in names}
+    for row, (line, cells) in enumerate(rows):
+        if len(cells) < len(headings) or any(cell.strip() for cell in cells[len(headings) :]):
+            raise InputError(f"line {line}", cells, f"needs {len(headings)} cells", str(path))
+        for index, (name, unit) in columns.items():
+            value, half = _number(path, line, cells[index])
+            numbers[name][row], halves[name][row] = value * unit.factor, half * unit.factor
+        if math.isnan(numbers["theta_2"][row]):
+            raise InputError(f"line {line}", cells, "needs a theta_2", str(path))
+    units = {name: unit for name, unit in columns.values()}
+    left_out |= {headings[index]: BLANK for index, (name, _) in columns.items() if np.isnan(numbers[name]).all()}
+    lines, rounded = [line for line, _ in rows], _rounded(halves["theta_2"], units["theta_2"])
+    table = Table(numbers["theta_2"], {}, {}, {}, lines, rounded, left_out)
+    for name in names:
+        if name != "theta_2" and not np.isnan(numbers[name]).all():
+            _put(table, name, units[name], numbers[name], halves[name])
+    if not table.values:
+        known = "torque, F12_x and F12_y, or F12 (its magnitude)"
+        raise InputError("header", headings, f"needs a result, such as {known}; known are {_known()}", str(path))
+    return table
+
+
+def _put(table: Table, name: str, unit: Unit, numbers: Array, halves: Array) -> None:
+    """Enter a column into the table, a component into its vector."""
+    halves = np.where(np.isnan(numbers), 0.0, halves)
+    if name[-2:] not in ("_x", "_y"):
+        table.values[name], table.rounding[name], table.units[name] = numbers, halves, unit
+        return
+    vector, axis = name[:-2], "xy".index(name[-1])
+    values = table.values.setdefault(vector, np.full((len(numbers), 2), np.nan))
+    values[:, axis] = numbers
+    table.rounding[vector] = np.hypot(table.rounding.get(vector, 0.0), halves)
+    table.units.setdefault(vector, unit)
+
+
+def _rounded(halves: Array, unit: Unit) -> Array:
+    """Half a unit of each theta_2; of a cell whose zeros were left off, that of the column."""
+    least = halves.min()
+    if least > 0.5 * unit.factor * 10.0**-DECIMALS * (1.0 + EPS):
+        return np.zeros_like(halves)
+    return np.where(halves <= 0.5 * unit.factor * 10.0 ** (1 - DECIMALS) * (1.0 + EPS), halves, least)
+
+
+def _lines(path: Path) -> list[tuple[int, list[str]]]:
+    """The lines that hold anything, with their numbers; at least a header."""
+    text = read_text(path, "table", LARGEST_FILE)
+    header = next((line for line in text.splitlines() if line.strip()), "")
+    delimiter = next((mark for mark in ";\t" if mark in header), ",")
+    try:
+        reader = csv.reader(io.StringIO(text, newline=""), delimiter=delimiter)
+        found = [(reader.line_num, row) for row in reader if any(cell.strip() for cell in row)]
+    except csv.Error:
+        raise InputError("table", path.name, "must be a CSV file", str(path)) from None
+    if len(found) < 2:
+        raise InputError("table", path.name, "needs a header and at least one row", str(path))
+    if delimiter != ",":  # there a comma is a decimal comma
+        found[1:] = [(line, [cell.replace(",", ".") for cell in cells]) for line, cells in found[1:]]
+    return found
+
+
+def _is_unit_line(cells: list[str]) -> bool:
+    """Whether a line under the header states units: words alone."""
+    return not any(re.search("[0-9]", re.sub(r"[\^*][0-9]|[²³]", "", cell)) for cell in cells)
+
+
+def _columns(
+    path: Path, headings: list[str], unit_line: list[str]
+) -> tuple[dict[int, tuple[str, Unit]], dict[str, str]]:
+    """By its place in a row, each column's name and unit; and the headings that are left out, each with the reason."""
+    columns: dict[int, tuple[str, Unit]] = {}
+    left_out: dict[str, str] = {}
+    for index, heading in enumerate(headings):
+        found = HEADING.fullmatch(heading.strip())
+        name = found["name"] + (found["letter"] or "") if found else heading.strip()
+        quantity = name[:-2] if name[-2:] in ("_x", "_y") and name[:-2] in VECTORS else name
+        if not name and index >= len(headings) - 1:
+            continue  # what a spreadsheet leaves at the end of a line
+        if found is None or quantity in NOT_JUDGED or quantity not in UNITS:
+            left_out[heading.strip() or f"column {index + 1}"] = NOT_JUDGED.get(quantity, "not a known column")
+            continue
+        below = unit_line[index].strip(" []()") if index < len(unit_line) else ""
+        text = (found["square"] or found["round"] or below).strip()
+        columns[index] = f"|{name}|" if name in VECTORS else name, _unit(path, heading, quantity, text)
+    return columns, left_out
+
+
+def _unit(path: Path, heading: str, quantity: str, text: str) -> Unit:
+    if not text or text == UNITS[quantity]:
+        return Unit(UNITS[quantity], 1.0)
+    from fourbar.files.units import factor_to
+
+    try:
+        return Unit(text, factor_to(UNITS[quantity], text))
+    except InputError as error:
+        raise InputError("header", heading, f"{text}: {error.allowed}", str(path)) from None
+
+
+def _known() -> str:
+    return ", ".join(f"{q}_x, {q}_y" if q in VECTORS else q for q in UNITS if q not in NOT_JUDGED)
+
+
+def _number(path: Path, line: int, cell: str) -> tuple[float, float]:
+    """The number in a cell and half a unit of its last printed digit; NaN for a blank."""
+    text = cell.strip().replace("\N{MINUS SIGN}", "-")
+    if not text:
+        return math.nan, math.nan
+    try:
+        exact = Decimal(text)
+    except InvalidOperation:
+        raise InputError(f"line {line}", cell, "must be a number", str(path)) from None
+    if not exact.is_finite():
+        raise InputError(f"line {line}", cell, "must be a finite number", str(path))
+    exponent = exact.as_tuple().exponent
+    assert isinstance(exponent, int)
+    value = float(exact)
+    if not math.isfinite(value):
+        raise InputError(f"line {line}", cell, "is larger than a double can hold", str(path))
+    return value, 0.5 * 10.0**exponent

@@ -1,0 +1,143 @@
+"""The results of a run as results.csv and, for pandas and DuckDB, results.parquet.
+
+Both hold the columns of `fourbar_validation.compare.rows.Row`, sorted by scene, engine, setting and quantity;
+both are written as the chunks are read.
+"""
+
+import math
+import os
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+from fourbar.writing import naming
+from fourbar_validation.compare.rows import COLUMNS, MADE_OF, Row, from_text, plain, to_csv
+
+GROUP_ROWS = 100_000
+"""Rows of a row group of the Parquet file: each costs some kilobytes of footer, whatever it holds."""
+BATCH_ROWS = 20_000
+"""Rows in memory while the file is read."""
+CSV_ROWS = 1_000_000
+"""Rows beyond this are in results.parquet alone: a text table of that size serves nobody."""
+
+
+class Columns:
+    """Both files while they are written: whole at the end of a `with`, not there where it fails."""
+
+    def __init__(self, out: Path) -> None:
+        self.out = out
+        self.first_lines: dict[str, int] = {}
+        """The line of results.csv at which each scene starts."""
+        self._line = 2
+        self._waiting: list[Row] = []
+        self._files = ExitStack()
+
+    def __enter__(self) -> "Columns":
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+
+        kinds = {str: pa.string(), float: pa.float64(), bool: pa.bool_()}
+        self._schema = pa.schema([(field.name, kinds[field.type]) for field in fields(Row)])  # type: ignore[index]
+        self._text, self._columns = (self.out / f".results.{kind}.part" for kind in ("csv", "parquet"))
+        with self._files:
+            self._csv = self._files.enter_context(self._text.open("w", encoding="utf-8", newline=""))
+            self._parquet = self._files.enter_context(pq.ParquetWriter(self._columns, self._schema))
+            self._csv.write(to_csv([]))
+            self._files = self._files.pop_all()
+        return self
+
+    def add(self, rows: Sequence[Row]) -> None:
+        """The rows that come next."""
+        for row in rows:
+            if self._line <= CSV_ROWS:
+                self.first_lines.setdefault(row.scene, self._line)
+            self._line += 1
+        self._waiting += rows
+        if self._line <= CSV_ROWS:
+            with naming(self.out / "results.csv"):
+                self._csv.write(to_csv(rows).partition("\n")[2])
+        if len(self._waiting) >= GROUP_ROWS:
+            self._write_group()
+
+    def _write_group(self) -> None:
+        import pyarrow as pa
+
+        by_column = {name: [or_null(getattr(row, name)) for row in self._waiting] for name in COLUMNS}
+        with naming(self.out / "results.parquet"):
+            self._parquet.write_table(pa.table(by_column, schema=self._schema))
+        self._waiting.clear()
+
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        """Put both in place, the text only where it is not too long."""
+        with naming(self.out), self._files:
+            if kind is None and self._waiting:
+                self._write_group()
+        if kind is not None:
+            return
+        os.replace(self._columns, self.out / "results.parquet")
+        if self._line <= CSV_ROWS:
+            os.replace(self._text, self.out / "results.csv")
+        else:
+            self._text.unlink()
+            (self.out / "results.csv").unlink(missing_ok=True)
+
+
+def or_null(value: object) -> object:
+    """A missing number as null: no greatest error is NaN by it, and every reader takes it for none."""
+    return None if isinstance(value, float) and math.isnan(value) else value
+
+
+def read_columns(path: Path) -> Iterator[Row]:
+    """The rows of a results.parquet or results.csv, some thousands at a time; words that recur are kept once."""
+    for cells in _batches(path, list(MADE_OF)):
+        words: dict[str, str] = {}
+        columns = [
+            [math.nan if cell is None else cell for cell in column] if kind is float else _words(column, words)
+            for column, kind in zip(cells, MADE_OF.values(), strict=True)
+        ]
+        yield from map(Row, *columns)
+
+
+def column_of(path: Path, column: str) -> Iterator[str]:
+    """The words in a column, each once in every batch."""
+    for (cells,) in _batches(path, [column]):
+        yield from dict.fromkeys(_words(cells, {}))
+
+
+def rows_in(path: Path) -> int:
+    """How many rows a table of scenes has."""
+    return sum(len(cells) for (cells,) in _batches(path, ["scene"]))
+
+
+def _batches(path: Path, columns: list[str]) -> Iterator[list[list[Any]]]:
+    with ExitStack() as files:
+        batches = _of_parquet if path.suffix == ".parquet" else _of_text
+        for batch in batches(path, columns, files):
+            yield [batch.column(name).to_pylist() for name in columns]
+
+
+def _of_parquet(path: Path, columns: list[str], files: ExitStack) -> Any:
+    import pyarrow.parquet as pq
+
+    return files.enter_context(pq.ParquetFile(path)).iter_batches(BATCH_ROWS, columns=columns)
+
+
+def _of_text(path: Path, columns: list[str], files: ExitStack) -> Any:
+    import pyarrow as pa
+    from pyarrow import csv
+
+    kinds = {name: pa.float64() if MADE_OF[name] is float else pa.string() for name in columns}
+    wanted = csv.ConvertOptions(column_types=kinds, include_columns=columns)
+    return files.enter_context(
+        csv.open_csv(path, parse_options=csv.ParseOptions(newlines_in_values=True), convert_options=wanted)
+    )
+
+
+def _words(cells: list[str], known: dict[str, str]) -> list[str]:
+    for cell in dict.fromkeys(cells):
+        if cell not in known:
+            known[cell] = sys.intern(plain(from_text(cell)))
+    return [known[cell] for cell in cells]

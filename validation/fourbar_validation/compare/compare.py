@@ -1,0 +1,333 @@
+"""An engine's answer against the formulas: one row per quantity, at the position where it is worst."""
+
+import math
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fourbar.quantities import (
+    FORCES,
+    JAMMED,
+    OF_DRY_FRICTION,
+    OF_PIN_LOADS,
+    OK,
+    OVERFLOW,
+    SINGULAR,
+    STAGE_OF,
+    STATUS_NAMES,
+)
+from fourbar.scene import Scene
+from fourbar.solution import Solution
+from fourbar_validation.compare.answer import Answer
+from fourbar_validation.compare.basis import basis_of, smallest_yardstick, strictest_condition
+from fourbar_validation.compare.error import in_own_unit, magnitude, relative, relative_error, used
+from fourbar_validation.compare.reversals import reversing
+from fourbar_validation.compare.rows import AGREES, DEGRADED, FAILS, REFUSES, UNDECIDED, Row, plain
+from fourbar_validation.compare.scales import of_length
+from fourbar_validation.compare.tolerance import DEGRADED as TIMES_PREDICTED
+from fourbar_validation.compare.tolerance import (
+    EPS,
+    NOTHING_TO_TELL,
+    SIMULATED,
+    Array,
+    Tolerance,
+)
+
+Mask = NDArray[np.bool_]
+Predicted = Callable[[str, Mask], Array]
+"""The error to be expected of a quantity, in its own unit, (n,); it matters at the positions of the mask alone."""
+Nearby = Callable[[Mask], dict[str, Array]]
+"""Every quantity again at the positions of a mask, each within the rounding of its theta_2; NaN elsewhere."""
+Yardsticks = dict[str, tuple[Array, Array]]
+"""Size and condition of each quantity at each position."""
+
+OF_THE_FORMULAS = (*OF_DRY_FRICTION, *OF_PIN_LOADS, "torque_error", "force_error")
+"""What has judges of its own: the range in which dry friction holds, what it leaves, and the error bars."""
+COMPARED = tuple(name for name in STAGE_OF if name not in OF_THE_FORMULAS)
+"""Every quantity that an exact engine is held to: all that is printed of a position."""
+OF_FORCES = (*FORCES, *OF_DRY_FRICTION)
+MOST_UNDECIDED = 0.5
+"""Share of the numbers of a scene that are undecided, beyond which it does not hold."""
+SLOW_DRIVE = 0.1
+"""T3 and T4 have poles where omega_3, omega_4 vanish: a simulation is judged where the driven bar
+turns at more than this part of its greatest speed."""
+NUMBERS = ("error", "allowed", "theta_2", "condition")
+"""Of a row."""
+TOUCHING_MARGIN = 32.0 * EPS
+"""A loop that closes, or misses, by less than this part of the sum of its lengths does so by the
+rounding of the data, and the engines may differ on whether it closes."""
+
+
+def compare(
+    name: str,
+    scene: Scene,
+    answer: Answer,
+    formulas: Solution,
+    tolerance: Tolerance,
+    expected: Iterable[str],
+    predicted: Predicted | None = None,
+    basis: Solution | None = None,
+    yardsticks: Yardsticks | None = None,
+    nearby: Nearby | None = None,
+) -> list[Row]:
+    """Judge an answer; `formulas` is the solution at `answer.at`, `expected` what the engine must answer.
+
+    What the formulas may be wrong by is decided by the stricter of their own conditions and sizes and those of
+    `basis`, another derivation at the same positions; left out: the answer itself.
+
+    `yardsticks` are those of `formulas` and `basis` where another answer was held to them before.
+
+    With `nearby` an error beyond the tolerance is taken again within the rounding of theta_2, where that then has no
+    other excuse.
+
+    With `predicted` an error beyond the tolerance must be within DEGRADED times the error to be expected there.
+    """
+
+    if answer.refusal is not None:
+        return [Row.unmeasured(name, answer.engine, answer.setting, "all", REFUSES, answer.refusal)]
+    if answer.assembled is None or len(answer.assembled) != len(formulas):
+        what = "the engine did not say where the loop closes"
+        return [Row.unmeasured(name, answer.engine, answer.setting, "assembled", FAILS, what)]
+    own = basis_of(scene, answer)
+    held_to = own if basis is None else basis
+    known = {} if yardsticks is None or basis is None else yardsticks
+    each = _Comparison(name, scene, answer, formulas, tolerance, predicted, own, held_to, known, nearby)
+    rows = [each.assembled()]
+    rows += [row for quantity in STAGE_OF if quantity in expected for row in each.judged(quantity)]
+    rows += [each.row("watch", FAILS, alarm) for alarm in answer.alarms]
+    return [*rows, *each.undecided()]
+
+
+@dataclass(slots=True)
+class _Comparison:
+    """One answer, quantity by quantity; counts how many numbers there are and of how many a verdict is drawn."""
+
+    name: str
+    scene: Scene
+    answer: Answer
+    formulas: Solution
+    tolerance: Tolerance
+    predicted: Predicted | None
+    own: Solution | None
+    basis: Solution | None
+    yardsticks: Yardsticks
+    nearby: Nearby | None
+    numbers: int = 0
+    decided: int = 0
+    again: dict[str, Array] | None = None
+    """What `nearby` answered, once that was required."""
+
+    def row(self, quantity: str, verdict: str, reason: str, **numbers: float) -> Row:
+        """A row of this answer."""
+        error, allowed, theta_2, condition = (float(numbers.get(key, math.nan)) for key in NUMBERS)
+        engine, setting = self.answer.engine, self.answer.setting or "-"
+        return Row(self.name, engine, setting, quantity, error, allowed, verdict, plain(reason), theta_2, condition)
+
+    def assembled(self) -> Row:
+        """Whether both close the loop at the same positions."""
+        theirs, ours = self.answer.assembled, self.formulas
+        assert theirs is not None
+        differ = (theirs != ours.assembled) & ~touching(self.scene, ours.theta_2)
+        count = np.count_nonzero(differ)
+        return self.row(
+            "assembled",
+            FAILS if count else AGREES,
+            f"{count} of {len(differ)} positions differ" if count else "the same positions",
+            error=float(count),
+            allowed=0.0,
+            theta_2=ours.theta_2[int(np.argmax(differ))],
+            condition=1.0,
+        )
+
+    def judged(self, quantity: str) -> Iterator[Row]:
+        """The row of a quantity, if either side has it."""
+        formulas, scene, tolerance = self.formulas, self.scene, self.tolerance
+        ours, theirs = getattr(formulas, quantity, None), self.answer.quantities.get(quantity)
+        if theirs is None and self.own is not None:
+            if quantity == "drive_condition" and any(effect.loaded_pins for effect in scene.effects):
+                return  # an engine that passes over loads and friction does not know how near they are to jamming
+            theirs = getattr(self.own, quantity)
+        if ours is None or theirs is None:
+            if ours is not theirs:  # both are missing where the scene states positions only
+                yield self.row(quantity, FAILS, "no answer" if theirs is None else "the formulas have no answer")
+            return
+        assert self.answer.assembled is not None
+        both = formulas.assembled & self.answer.assembled
+        judged = both & _stated(quantity, formulas, ours)
+        self.numbers += int(np.count_nonzero(both))
+        withheld = counted(formulas.status_code[both & ~judged])
+        if withheld and not judged.any():
+            yield self.row(quantity, REFUSES, f"the formulas state no value: {withheld}")
+            return
+        where = judged & _answerable(quantity, scene, formulas, tolerance)
+        jumping = where & _jumping(quantity, scene, formulas, tolerance)
+        where &= ~jumping
+        note = f"; not judged: {withheld}" if withheld else ""
+        if jumping.any():
+            count = int(np.count_nonzero(jumping))  # of either side of a reversal the forces are right
+            self.decided += count
+            note += f"; {count} positions at which dry friction reverses not judged"
+        if not where.any():
+            yield self.row(quantity, UNDECIDED, "no position at which both may be held to it" + note)
+            return
+        found, error, condition = self._measured(quantity, ours, theirs, where)
+        self.decided += found.decided
+        at = {"theta_2": formulas.theta_2[found.worst], "condition": condition[found.worst]}
+        yield self.row(
+            quantity, found.verdict, found.reason + note, error=error[found.worst], allowed=found.allowed, **at
+        )
+
+    def _measured(self, quantity: str, ours: Array, theirs: Array, where: Mask) -> "tuple[_Finding, Array, Array]":
+        """What is found over the positions `where`, with the errors and the conditions, (n,)."""
+        if quantity not in self.yardsticks:
+            self.yardsticks[quantity] = (
+                smallest_yardstick(quantity, self.scene, self.formulas, self.basis),
+                strictest_condition(quantity, self.scene.linkage, self.formulas, self.basis),
+            )
+        size, condition = self.yardsticks[quantity]
+        full, predicted, expected = self.tolerance.allowed(condition), self.predicted, None
+        if predicted is not None:
+            full, size = np.where(size == 0.0, 0.0, full), in_own_unit(size)
+        error = relative_error(quantity, ours, theirs, size)
+        beyond, again, note = where & (error > full), np.full_like(error, np.nan), ""
+        if self.nearby is not None and beyond.any():
+            if self.again is None:
+                self.again = self.nearby(self.formulas.assembled)
+            again = relative_error(quantity, ours, self.again[quantity], size)
+            error = np.where(beyond, np.fmin(error, again), error)
+            mended = np.count_nonzero(beyond & (again <= full))
+            note = f"; {mended} positions within the rounding of theta_2" if mended else ""
+        if predicted is not None:
+
+            def expected(where: Mask) -> Array:
+                of_data = relative(predicted(quantity, where), size)
+                return np.where(np.isfinite(again), np.fmin(of_data, full), of_data)
+
+        found = _found(error, condition, where, full, self.tolerance, expected)
+        return found._replace(reason=found.reason + note), error, condition
+
+    def undecided(self) -> Iterator[Row]:
+        """A scene of which most numbers are undecided does not hold."""
+        if not self.numbers:
+            return
+        missing = self.numbers - self.decided
+        share = missing / self.numbers
+        reason = f"{missing} of {self.numbers} numbers are undecided"
+        verdict = AGREES if share <= MOST_UNDECIDED else FAILS
+        yield self.row("undecided", verdict, reason, error=share, allowed=MOST_UNDECIDED, condition=1.0)
+
+
+class _Finding(NamedTuple):
+    """What was found of one quantity at the position where it is worst."""
+
+    worst: int
+    verdict: str
+    reason: str
+    allowed: float
+    decided: int
+    """Positions of which a verdict is drawn."""
+
+
+def _found(
+    error: Array,
+    condition: Array,
+    where: Mask,
+    full: Array,
+    tolerance: Tolerance,
+    predicted: Callable[[Mask], Array] | None,
+) -> _Finding:
+    """Errors over the positions `where` against the tolerance, `full`, and beyond it against what was predicted there.
+
+    NaN at any of them fails. `full` is 0 where the quantity vanishes; the error is in its own unit there.
+    """
+    decidable = where & (condition * NOTHING_TO_TELL > EPS) if tolerance.conditioned else where
+    undecided = int(np.count_nonzero(where & ~decidable))
+    note = f"; {undecided} positions with eps/condition > {NOTHING_TO_TELL:g} not judged" if undecided else ""
+    beyond = (decidable & ~(error <= full)) | (where & ~np.isfinite(error))
+    if not (decidable | beyond).any():
+        index = int(np.flatnonzero(where)[0])
+        return _Finding(index, UNDECIDED, f"eps/condition = {EPS / condition[index]:.1e}", full[index], 0)
+    if not beyond.any():
+        index = int(np.argmax(np.where(decidable, used(error, full), -1.0)))
+        return _Finding(index, AGREES, tolerance.name + note, full[index], int(np.count_nonzero(decidable)))
+    expected = np.zeros_like(error)
+    if predicted is not None:
+        expected = np.nan_to_num(predicted(beyond), nan=0.0, posinf=np.inf)
+    allowed = np.maximum(full, TIMES_PREDICTED * expected)
+    ratio = used(error, allowed)
+    # first order says that no digit is left, no more
+    lost = beyond & np.isfinite(error) & np.where(full > 0.0, expected >= 1.0, expected == np.inf)
+    ratio[lost] = np.minimum(ratio[lost], 1.0)
+    index = int(np.argmax(np.where(beyond, ratio, -1.0)))
+    if math.isnan(error[index]):
+        verdict, reason = FAILS, "NaN"
+    elif lost[index]:
+        verdict, reason = UNDECIDED, f"an error of {expected[index]:.1e} of the value is predicted"
+    elif predicted is None:
+        verdict, reason = FAILS, tolerance.name
+    elif ratio[index] <= 1.0:
+        verdict, reason = DEGRADED, f"{error[index]:.1e} of {expected[index]:.1e} predicted for this position"
+    else:
+        verdict, reason = FAILS, f"{error[index]:.1e} where {expected[index]:.1e} was predicted"
+    return _Finding(index, verdict, reason + note, allowed[index], int(np.count_nonzero(decidable & ~lost)))
+
+
+def turned(ground_angle: float, theta_2: Array | float = 0.0) -> float:
+    """Angles many turns away carry fewer digits of their direction: the largest of them in half turns, at least 1."""
+    return max(1.0, abs(ground_angle) / np.pi, float(np.abs(theta_2).max(initial=0.0)) / np.pi)
+
+
+def _stated(quantity: str, formulas: Solution, ours: Array) -> Mask:
+    """Where the formulas state one value: beyond the range of doubles the motion is, up to the stage that met it."""
+    if quantity in OF_FORCES:
+        # at rest a jam is of the motion that would begin
+        # where there are several solutions an engine may find another, or none by its own iteration
+        stated = (formulas.status_code == JAMMED) & np.isfinite(magnitude(ours))
+        return np.asarray(stated | (formulas.status_code == OK))
+    beyond = (formulas.status_code == OVERFLOW) & np.isnan(magnitude(ours))
+    jammed = (formulas.status_code == JAMMED) & (quantity == "drive_condition")  # which holds how near that is
+    return np.asarray((formulas.status_code != SINGULAR) & ~beyond & ~jammed)
+
+
+def counted(codes: NDArray[np.uint8]) -> str:
+    """How many positions have which status: "3 singular, 5 no_torque"."""
+    counts = np.bincount(codes, minlength=len(STATUS_NAMES)).tolist()
+    return ", ".join(f"{count} {name}" for name, count in zip(STATUS_NAMES, counts, strict=True) if count)
+
+
+def closing_margin(scene: Scene, theta_2: Array) -> Array:
+    """By what part of the sum of the lengths the loop closes (> 0) or misses (< 0)."""
+    d, a, b, c = scene.linkage.lengths
+    e = np.abs(d * np.exp(1j * scene.linkage.ground_angle) - a * np.exp(1j * theta_2))
+    return np.asarray(np.minimum(b + c - e, e - abs(b - c)) / of_length(scene))
+
+
+def touching(scene: Scene, theta_2: Array) -> Mask:
+    """Positions at which rounding decides whether the loop closes."""
+    return np.asarray(np.abs(closing_margin(scene, theta_2)) < TOUCHING_MARGIN)
+
+
+def _jumping(quantity: str, scene: Scene, formulas: Solution, tolerance: Tolerance) -> Mask:
+    """Where dry friction reverses and a force may have either value; the motion is prescribed and has one."""
+    near_jamming = quantity == "drive_condition" and any(effect.loaded_pins for effect in scene.effects)
+    if quantity not in OF_FORCES and not near_jamming:
+        return np.zeros(len(formulas), dtype=bool)
+    return reversing(scene, formulas, tolerance.factor, in_time=tolerance.name == SIMULATED.name)
+
+
+def _answerable(quantity: str, scene: Scene, formulas: Solution, tolerance: Tolerance) -> Mask:
+    """Where a quantity may be demanded of an engine of this class."""
+    if quantity == "torque" and scene.drive_bar != 2 and tolerance.name == SIMULATED.name:
+        speed = formulas.omega_3 if scene.drive_bar == 3 else formulas.omega_4
+        assert speed is not None
+        return turning(speed)
+    return np.ones(len(formulas), dtype=bool)
+
+
+def turning(speed: Array) -> Mask:
+    """Where a driven bar turns fast enough that its torque is no pole's, (n,)."""
+    fast = np.abs(np.nan_to_num(speed))
+    return np.asarray(fast > SLOW_DRIVE * fast.max())

@@ -1,0 +1,152 @@
+"""The flat sorted table that joins run and report: one row per scene, engine, setting and quantity."""
+
+import csv
+import io
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+
+from fourbar.writing import write_text
+from fourbar_validation.compare.answer import WitnessError
+
+AGREES, DEGRADED, UNDECIDED, REFUSES, FAILS = (
+    *("agrees", "degraded as predicted"),
+    *("undecided", "refuses", "fails"),
+)
+VERDICTS = (AGREES, DEGRADED, UNDECIDED, REFUSES, FAILS)
+"""From the best to the worst."""
+HELD = (AGREES, DEGRADED)
+COMPARED = (*HELD, FAILS)
+"""Of the others nothing was compared: no digit of the quantity is left to decide by, or the engine declared a limit."""
+
+LONGEST = 500
+"""Characters of what somebody else's code gives as a reason."""
+
+
+@dataclass(frozen=True, slots=True, order=True)
+class Row:
+    """One comparison at the position where error/allowed is worst."""
+
+    scene: str
+    engine: str
+    setting: str
+    quantity: str
+    error: float
+    """Relative to the scale of the quantity (angles: rad); NaN where there is no answer."""
+    allowed: float
+    passed: bool = field(init=False)
+    """Whether it was compared and holds; the verdict decides."""
+    verdict: str
+    reason: str
+    theta_2: float
+    condition: float
+
+    def __post_init__(self) -> None:
+        """Raise ValueError for a verdict that nobody knows, and for one that holds without a number."""
+        if self.verdict not in VERDICTS or (self.verdict in HELD and math.isnan(self.error)):
+            raise ValueError(f"{self.verdict!r} is no verdict on an error of {self.error!r}")
+        object.__setattr__(self, "passed", self.verdict in HELD)
+
+    @classmethod
+    def unmeasured(cls, scene: str, engine: str, setting: str, quantity: str, verdict: str, reason: str) -> "Row":
+        """A verdict without numbers: a refusal, a breakdown, an answer that is missing."""
+        nan = math.nan
+        return cls(scene, engine, setting or "-", quantity, nan, nan, verdict, plain(reason), nan, nan)
+
+    @property
+    def compared(self) -> bool:
+        """Whether anything was compared."""
+        return self.verdict in COMPARED
+
+    @property
+    def failed(self) -> bool:
+        """Whether it was compared and does not hold, or an answer that was due is missing."""
+        return self.verdict == FAILS
+
+
+def breakdown(scene: str, engine: str, error: BaseException, part: str = "") -> Row:
+    """The row of an engine that raised, took its process with it, or never came back; `part`: in what."""
+    if isinstance(error, TimeoutError):
+        reason = "the engine hung and was stopped"
+    elif type(error).__name__ == "ProcessExpired":  # of Pebble
+        reason = f"the engine crashed its process (exit code {getattr(error, 'exitcode', None) or 0})"
+    elif type(error).__name__ == "KilledWorker":  # of Dask
+        reason = "the engine crashed its process, or hung and was stopped"
+    else:
+        reason = str(error) if isinstance(error, WitnessError) else in_words(error)
+    return Row.unmeasured(scene, engine, part, "all", FAILS, reason)
+
+
+def in_words(error: BaseException) -> str:
+    """Kind and message of an error, whatever its message raises."""
+    try:
+        message = str(error)
+    except BaseException as another:
+        message = f"its message raises {type(another).__name__}"
+    return one_line(f"{type(error).__name__}: {message}")
+
+
+def one_line(text: str) -> str:
+    """Somebody's text in one line that prints, its middle left out where it is long."""
+    line = plain(" ".join(text.split()))
+    return line if len(line) <= LONGEST else f"{line[: LONGEST // 2]} ... {line[-LONGEST // 2 :]}"
+
+
+def plain(text: str) -> str:
+    """Somebody's text with every character that does not print, but for the ends of lines, written as its escape.
+
+    Characters that would steer a terminal or a reader are shown, not sent.
+    """
+    return "".join(c if c.isprintable() or c == "\n" else c.encode("unicode_escape").decode() for c in text)
+
+
+FORMULA = ("=", "+", "-", "@")
+"""What a spreadsheet takes for the beginning of a formula, and calculates."""
+
+
+def as_text(cell: str) -> str:
+    """Somebody's text as a cell that stays text in a spreadsheet: with an apostrophe before what begins a formula."""
+    return f"'{cell}" if cell.startswith(FORMULA) and len(cell) > 1 else cell
+
+
+def from_text(cell: str) -> str:
+    """What `as_text` was given."""
+    return cell[1:] if cell.startswith(tuple("'" + first for first in FORMULA)) else cell
+
+
+COLUMNS = tuple(column.name for column in fields(Row))
+
+
+def sorted_rows(rows: Iterable[Row]) -> list[Row]:
+    """The rows by scene, engine, setting and quantity."""
+    return sorted(rows, key=lambda row: (row.scene, row.engine, row.setting, row.quantity))
+
+
+def to_csv(rows: Iterable[Row]) -> str:
+    """The table as text, sorted, floats as repr, a missing number left empty."""
+    return csv_text(COLUMNS, ([_cell(getattr(row, name)) for name in COLUMNS] for row in sorted_rows(rows)))
+
+
+def csv_text(columns: Sequence[str], rows: Iterable[Iterable[object]]) -> str:
+    """A table as CSV, floats as repr, nothing for None, no text that a spreadsheet would calculate."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerows([columns] if columns else [])
+    writer.writerows([as_text(cell) if isinstance(cell, str) else cell for cell in row] for row in rows)
+    return text.getvalue()
+
+
+def _cell(value: object) -> object:
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    return None if isinstance(value, float) and math.isnan(value) else value
+
+
+MADE_OF = {column.name: column.type for column in fields(Row) if column.init}
+"""Columns that make a row, with their types: whether it passed follows from them."""
+
+
+def write_results(rows: Iterable[Row], path: Path) -> None:
+    """Write the table, all of it or nothing."""
+    write_text(path, to_csv(rows))

@@ -1,0 +1,138 @@
+"""How large a quantity is: the yardstick of its error.
+
+The scale of a quantity is its largest magnitude over the well-conditioned positions; a position
+below that is judged relative to its own magnitude, or the forces that diverge near a limit would
+excuse every other row. A quantity that (nearly) vanishes is judged against the sum of the
+absolute terms of its equation; if those vanish too, the answer must be exactly zero.
+"""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from fourbar.linkage import MOVING_BARS
+from fourbar.quantities import UNITS
+from fourbar.scene import Scene
+from fourbar.solution import Solution
+from fourbar_validation.compare.effects import size as size_of
+from fourbar_validation.compare.error import magnitude
+from fourbar_validation.compare.tolerance import WELL_CONDITIONED, Array, K
+
+VANISHING = 1.0 / K
+"""A quantity below this part of the sum of its terms has lost more to cancellation than K covers."""
+
+
+def yardstick(quantity: str, scene: Scene, formulas: Solution, values: Array) -> Array:
+    """What the error of a quantity is divided by at each position, (n,)."""
+    if UNITS[quantity] in ("rad", "1"):
+        return np.ones(len(formulas))
+    size = magnitude(values)
+    terms = term_sizes(quantity, scene, formulas)
+    well = (formulas.condition >= WELL_CONDITIONED) & np.isfinite(size)
+    if UNITS[quantity] == "N m":  # its poles are not where sin_mu vanishes
+        assert formulas.drive_condition is not None
+        well &= formulas.drive_condition >= WELL_CONDITIONED
+    own = np.where(size < VANISHING * terms, terms, size)
+    if not well.any():
+        return own
+    scale = float(size[well].max())
+    most = float(terms[well].max())
+    return np.where(well, most if scale < VANISHING * most else scale, own)
+
+
+def term_sizes(quantity: str, scene: Scene, formulas: Solution) -> Array:
+    """Sum of the absolute terms of the equation that a quantity is computed from, (n,), in its unit.
+
+    Raises KeyError for a quantity of a unit that has no such sum here: nothing is judged by another's scale.
+    """
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.asarray(TERMS[UNITS[quantity]](quantity, scene, formulas), dtype=float)
+
+
+def _one(quantity: str, scene: Scene, formulas: Solution) -> Array:
+    return np.ones(len(formulas))
+
+
+def _lengths(quantity: str, scene: Scene, formulas: Solution) -> Array:
+    return np.full(len(formulas), of_length(scene) + sum(_arm(scene, number) for number in MOVING_BARS))
+
+
+def _speeds(quantity: str, scene: Scene, formulas: Solution) -> Array:
+    _, a, b, c = scene.linkage.lengths
+    assert formulas.omega_2 is not None
+    omega_2 = np.abs(formulas.omega_2)
+    return (
+        omega_2 if quantity == "omega_2" else a * omega_2 / ((b if quantity == "omega_3" else c) * formulas.condition)
+    )
+
+
+def _angular_accelerations(quantity: str, scene: Scene, formulas: Solution) -> Array:
+    _, a, b, c = scene.linkage.lengths
+    w2, w3, w4, a2 = formulas.omega_2, formulas.omega_3, formulas.omega_4, formulas.alpha_2
+    assert w2 is not None and w3 is not None and w4 is not None and a2 is not None
+    if quantity == "alpha_2":
+        return np.abs(a2)
+    terms = a * w2 * w2 + a * np.abs(a2) + b * w3 * w3 + c * w4 * w4
+    return np.asarray(terms / ((b if quantity == "alpha_3" else c) * formulas.condition))
+
+
+def _velocities(quantity: str, scene: Scene, formulas: Solution) -> Array:
+    total = np.zeros(len(formulas))
+    for number in MOVING_BARS:
+        total += (scene.linkage.bar(number).length + _arm(scene, number)) * np.abs(getattr(formulas, f"omega_{number}"))
+    return total
+
+
+def _accelerations(quantity: str, scene: Scene, formulas: Solution) -> Array:
+    total = np.zeros(len(formulas))
+    for number in MOVING_BARS:
+        omega, alpha = getattr(formulas, f"omega_{number}"), getattr(formulas, f"alpha_{number}")
+        total += (scene.linkage.bar(number).length + _arm(scene, number)) * (omega * omega + np.abs(alpha))
+    return total
+
+
+def _forces(quantity: str, scene: Scene, formulas: Solution) -> Array:
+    assert formulas.drive_condition is not None
+    return np.asarray(_force_terms(scene, formulas) / formulas.drive_condition)
+
+
+def _torques(quantity: str, scene: Scene, formulas: Solution) -> Array:
+    return np.asarray(max(scene.linkage.lengths[1:]) * _forces(quantity, scene, formulas))
+
+
+TERMS: dict[str, Callable[[str, Scene, Solution], Array]] = {
+    "rad": _one,
+    "1": _one,
+    "m": _lengths,
+    "rad/s": _speeds,
+    "m/s": _velocities,
+    "rad/s^2": _angular_accelerations,
+    "m/s^2": _accelerations,
+    "N": _forces,
+    "N m": _torques,
+}
+"""By the unit of a quantity, the sum of the terms of its equation."""
+
+
+def _arm(scene: Scene, number: int) -> float:
+    """Distance of a bar's mass centre from its first pin, m."""
+    return abs(scene.linkage.bar(number).mass_centre[0])
+
+
+def _force_terms(scene: Scene, formulas: Solution) -> Array:
+    """Sum of the magnitudes of all inertial and external forces, couples divided by their bar's length, N."""
+    total = np.zeros(len(formulas))
+    for number in MOVING_BARS:
+        bar = scene.linkage.bar(number)
+        acceleration, alpha = getattr(formulas, f"a_G{number}"), getattr(formulas, f"alpha_{number}")
+        lever = 1.0 + abs(bar.mass_centre[0]) / bar.length
+        total += lever * bar.mass * magnitude(acceleration) + bar.moment_of_inertia * np.abs(alpha) / bar.length
+    for term in (*scene.loads, *scene.effects):
+        total += size_of(term, scene.linkage, formulas)
+    return total
+
+
+def of_length(scene: Scene) -> float:
+    """Sum of the four lengths, m: the terms of the loop closure."""
+    return math.fsum(scene.linkage.lengths)

@@ -1,0 +1,161 @@
+"""How well the linkage transmits: the angle between bars 3 and 4, its extremes, ratios of speed and of stroke times."""
+
+import math
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from fourbar.formulas import mobility, transmission
+from fourbar.formulas.path import drive_sine, singular
+from fourbar.formulas.path import state as state_of
+from fourbar.linkage import MOVING_BARS, FourBar
+from fourbar.scene import Scene
+from fourbar_validation.compare.answer import Answer
+from fourbar_validation.compare.compare import Predicted, turned
+from fourbar_validation.compare.error import used, worst
+from fourbar_validation.compare.statements.finding import TURN, Finding, Place, Seen, Stated, roundoff, wrapped
+from fourbar_validation.compare.tolerance import DEGRADED, EPS, EQUIVALENCE, NOTHING_TO_TELL, Array, lever
+
+RADII = (0.2, 0.3)
+"""m; where the forces of the mechanical advantage act. Any two that differ."""
+
+
+def places(stated: Stated) -> list[Place]:
+    """Where an engine is looked at for it: at the extremes that are no limits, and in both strokes of bar 4."""
+    strokes = stated(_strokes)
+    inner = [(theta_2, 1) for value, theta_2, collinear in _ends(stated) if value != collinear]
+    return inner + ([] if strokes is None else [(theta_2, -1) for theta_2 in strokes.middles])
+
+
+def transmitted(
+    scene: Scene, stated: Stated, seen: Seen, answer: Answer, predicted: Predicted | None
+) -> Iterator[Finding]:
+    """Over the scene's own motion, if it is one, at the stated extremes, and between the stated limits of bar 4."""
+    if answer.at is not None and answer.at.omega_2 is not None:
+        yield from _over(scene, answer, stated, predicted)
+    yield from _extremes(stated, seen)
+    yield from _time_ratio(stated, seen)
+
+
+def _over(scene: Scene, answer: Answer, stated: Stated, predicted: Predicted | None) -> Iterator[Finding]:
+    at, linkage, extremes = answer.at, scene.linkage, stated(transmission.transmission_extremes)
+    assert at is not None and at.omega_2 is not None and answer.assembled is not None
+    state = state_of(linkage, at.theta_2, at.branch)
+    half = state.at.half
+    theta = {2: at.theta_2, **{bar: answer.quantities[f"theta_{bar}"] for bar in (3, 4)}}
+    one, other = (theta[bar] for bar in MOVING_BARS if bar != scene.drive_bar)
+    driven = np.abs(np.sin(other - one))
+    angle = np.abs(wrapped(theta[4] - theta[3]))
+    sine = np.abs(np.sin(angle))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        allowed = EQUIVALENCE.factor * turned(linkage.ground_angle, at.theta_2) / (lever(linkage) * sine)
+        ratio = answer.quantities["omega_4"] / at.omega_2
+        gained = transmission.mechanical_advantage(state, *RADII) * ratio * (RADII[1] / RADII[0]) - 1.0
+        largest = np.maximum(1.0, np.maximum(np.abs(ratio), np.abs(answer.quantities["omega_3"] / at.omega_2)))
+        allowed_gain = allowed / sine * largest / np.abs(ratio)
+    closed = (
+        answer.assembled & (half.outer >= 0.0) & (half.inner >= 0.0) & ~singular(state.at)
+    )  # whether both say so is a row of its own
+    where = closed & ~(allowed >= NOTHING_TO_TELL)  # a missing number is none that holds
+    moving = where & (at.omega_2 != 0.0)
+    acute = np.minimum(angle, math.pi - angle)
+    outside = np.maximum(np.maximum(extremes.least - angle, angle - extremes.greatest), 0.0)
+    for what, error, bound, counts in (
+        # what divides every tolerance is not to be had from the formulas alone
+        ("condition", np.abs(state.at.sin_mu - np.sin(theta[4] - theta[3])), allowed, where),
+        ("drive condition", np.abs(np.abs(drive_sine(state.at, scene.drive_bar)) - driven), allowed, where),
+        ("transmission angle", np.abs(transmission.transmission_angle(state) - acute), allowed, where),
+        ("beyond the extremes", outside, allowed, where),
+        ("mechanical advantage", np.abs(gained), allowed_gain, moving & ~(allowed_gain >= NOTHING_TO_TELL)),
+    ):
+        beyond = counts & ~(error <= bound)
+        if predicted is not None and beyond.any():
+            if what == "mechanical advantage":
+                lost = predicted("omega_4", beyond) / np.abs(answer.quantities["omega_4"])
+            else:
+                lost = predicted("theta_3", beyond) + predicted("theta_4", beyond)
+            bound = np.where(beyond, np.fmax(bound, DEGRADED * lost), bound)  # noqa: PLW2901
+            counts = counts & ~(bound >= NOTHING_TO_TELL)  # noqa: PLW2901
+        if counts.any():
+            most = np.flatnonzero(counts)[worst(used(error[counts], bound[counts]))]
+            yield Finding(float(error[most]), float(bound[most]), float(at.theta_2[most]), what)
+    branch = at.branch.astype(float)
+    nearest = transmission.distance_to_singular(linkage, at.theta_2, scene.drive_bar, branch)
+    found = _to_singular(scene, at.theta_2, branch, stated)
+    error = np.where(np.isinf(nearest) == np.isinf(found), 0.0, math.inf)
+    finite = np.isfinite(nearest) & np.isfinite(found)
+    error[finite] = np.abs(nearest[finite] - found[finite])
+    most = int(np.argmax(error))
+    bound = EPS * 8.0 * (np.abs(at.theta_2) + abs(linkage.ground_angle) + TURN)
+    yield Finding(float(error[most]), float(bound[most]), float(at.theta_2[most]), "distance to a singular position")
+
+
+def _always(stated: Stated) -> list[float]:
+    """theta_2 where bars 3 and 4 are collinear on either branch."""
+    limits = stated(mobility.limit_positions, 2)
+    return [*(limit.theta_2 for limit in limits), *stated(mobility.change_points)]
+
+
+def _to_singular(scene: Scene, theta_2: Array, branch: Array, stated: Stated) -> Array:
+    """The angle to the nearest position at which bars are collinear that must not be, inf where there is none."""
+    drive, always = scene.drive_bar, _always(stated)
+    dead = stated(mobility.limit_positions, drive) if drive != 2 else ()
+    nearest = np.full(theta_2.shape, math.inf)
+    for point, side in [*((point, 0) for point in always), *((limit.theta_2, limit.branch) for limit in dead)]:
+        apart = np.abs(np.angle(np.exp(1j * (theta_2 - point))))
+        nearest = np.where((branch == side) | (side == 0), np.minimum(nearest, apart), nearest)
+    return nearest
+
+
+def _ends(stated: Stated) -> tuple[tuple[float, float, float], ...]:
+    """Least and greatest angle between bars 3 and 4, theta_2 there, and what the angle is where they are collinear."""
+    of = stated(transmission.transmission_extremes)
+    return (of.least, of.theta_2_least, 0.0), (of.greatest, of.theta_2_greatest, math.pi)
+
+
+def _extremes(stated: Stated, seen: Seen) -> Iterator[Finding]:
+    for value, theta_2, collinear in _ends(stated):
+        if value == collinear:
+            error = min((abs(wrapped(theta_2 - point)) for point in _always(stated)), default=math.inf)
+            yield Finding(error, EQUIVALENCE.factor * turned(0.0, theta_2), theta_2, "extreme at a limit")
+            continue
+        angle = abs(wrapped(seen.at((theta_2, 1), "theta_4") - seen.at((theta_2, 1), "theta_3")))
+        digits = lever(stated.linkage) * math.sin(angle)
+        if not digits * NOTHING_TO_TELL <= EPS:
+            yield Finding(abs(angle - value), roundoff(stated.linkage) / digits, theta_2, "extreme of the angle at B")
+    of = stated(transmission.transmission_extremes)
+    smallest = min(of.least, math.pi - of.greatest)
+    yield Finding(abs(of.worst - smallest), EPS, of.theta_2_least, "smallest transmission angle")
+
+
+class _Strokes(NamedTuple):
+    """Bar 4 turns in one sense between its two limits on a branch, and in the other for the rest of the turn."""
+
+    there: float
+    """rad of bar 2 in the first."""
+    middles: tuple[float, float]
+    """theta_2 amid each."""
+
+
+def _strokes(linkage: FourBar) -> _Strokes | None:
+    dead = [limit.theta_2 for limit in mobility.limit_positions(linkage, 4) if limit.branch == -1]
+    if len(dead) != 2 or not mobility.turns_fully(linkage) or mobility.change_points(linkage):
+        return None
+    there = (dead[1] - dead[0]) % TURN
+    return _Strokes(there, (dead[0] + there / 2.0, dead[1] + (TURN - there) / 2.0))
+
+
+def _time_ratio(stated: Stated, seen: Seen) -> Iterator[Finding]:
+    ratio, strokes, theta_1 = stated(mobility.time_ratio), stated(_strokes), stated.linkage.ground_angle
+    known = (strokes is None) == (ratio is None)
+    yield Finding(float(not known), 0.0, theta_1, "whether there is a time ratio")
+    if strokes is not None and ratio is not None:
+        one, other = (seen.at((theta_2, -1), "omega_4") for theta_2 in strokes.middles)
+        place = strokes.middles[0]
+        yield Finding(float(not one * other < 0.0), 0.0, place, "bar 4 turns in both senses")
+        shorter, longer = sorted((strokes.there, TURN - strokes.there))
+        # both angles are differences of two that were rounded
+        yield Finding(
+            abs(ratio / (longer / shorter) - 1.0), roundoff(stated.linkage) * TURN / shorter, place, "time ratio"
+        )

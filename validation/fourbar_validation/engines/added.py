@@ -1,0 +1,168 @@
+"""Witnesses from outside: a class named on the command line, or by an entry point of an installed package.
+
+Such a class has a `name` and `answer(scene, at) -> fourbar_validation.Answer`; it may state `quantities`, the names
+that it answers (left out: `UNKNOWNS`), and `tolerance`: "equivalence" (default), or a relative error and its reason.
+"""
+
+import hashlib
+import os
+import sys
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from importlib import import_module
+from importlib.metadata import distributions, entry_points
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from fourbar.errors import InputError
+from fourbar.quantities import ANGLES, UNKNOWNS
+from fourbar_validation.compare.answer import Engine
+from fourbar_validation.compare.compare import COMPARED
+from fourbar_validation.compare.identities import FORMULAS
+from fourbar_validation.compare.rows import in_words, one_line, plain
+from fourbar_validation.compare.tolerance import EQUIVALENCE, Tolerance
+from fourbar_validation.engines.checked import Checked
+from fourbar_validation.engines.memory import bound_memory
+from fourbar_validation.engines.output import keep_output
+from fourbar_validation.engines.witnesses import Witness
+from fourbar_validation.engines.workers import Workers
+
+GROUP = "fourbar.witnesses"
+"""Entry points of this group join every run; their value is "module:Class" too."""
+LONGEST_IMPORT = 60.0
+"""Seconds after which a module that is imported hangs."""
+OURS = frozenset(sys.modules)
+"""Modules that were imported before any witness's."""
+
+
+@dataclass(frozen=True, slots=True)
+class AddedWitness(Witness):
+    """A witness whose answers are looked at before they are compared."""
+
+    trouble: str = ""
+    """Why its class cannot be used, or nothing."""
+    code: str = ""
+    """Hash of what its answers come from."""
+
+    def engine(self) -> Engine:
+        """The class of the user, its answers looked at."""
+        return Checked(self)
+
+    def missing(self) -> str | None:
+        """Why it cannot answer here, or None."""
+        return self.trouble or None
+
+
+class _UnusableError(Exception):
+    """A class that is no witness; the text says what is allowed."""
+
+
+def named(adapters: Sequence[str], known: Iterable[str]) -> tuple[Witness, ...]:
+    """The witnesses of the command line; InputError where one is none."""
+    if os.getcwd() not in sys.path:  # a console script does not look there
+        sys.path.append(os.getcwd())
+    found = list(zip(adapters, _described(adapters, known), strict=True))
+    for adapter, each in found:
+        if isinstance(each, _UnusableError):
+            raise InputError("--witness", adapter, str(each))
+    return tuple(each for _, each in found if isinstance(each, Witness))
+
+
+def installed(known: Iterable[str]) -> tuple[Witness, ...]:
+    """Those of the entry points; one that cannot be used is missing, with the reason."""
+    points = sorted(entry_points(group=GROUP), key=lambda point: point.name)
+    return tuple(
+        AddedWitness(plain(point.name), point.value, EQUIVALENCE, trouble=f"{point.value} {each}")
+        if isinstance(each, _UnusableError)
+        else each
+        for point, each in zip(points, _described([point.value for point in points], known), strict=True)
+    )
+
+
+def _described(adapters: Sequence[str], known: Iterable[str]) -> list[Witness | _UnusableError]:
+    """What each class says of itself, in another process: nothing of it runs in the one that gives the verdict."""
+    if not adapters:
+        return []
+    from pebble import ProcessExpired, ProcessPool
+
+    names, found = {FORMULAS, *known}, list[Witness | _UnusableError]()
+    with ProcessPool(max_workers=1, context=Workers(), initializer=_begin) as pool:
+        try:
+            for task in [pool.schedule(_describe, args=[adapter], timeout=LONGEST_IMPORT) for adapter in adapters]:
+                try:
+                    witness = task.result()
+                    if witness.name in names:
+                        raise _UnusableError(f"must have a name of its own; {witness.name!r} is another's")
+                    names.add(witness.name)
+                    found.append(witness)
+                except _UnusableError as reason:
+                    found.append(reason)
+                except TimeoutError:
+                    found.append(_UnusableError(f"cannot be imported: it takes more than {LONGEST_IMPORT:g} s"))
+                except ProcessExpired as end:
+                    found.append(
+                        _UnusableError(f"cannot be imported: it ends its process (exit code {end.exitcode or 0})")
+                    )
+        except BaseException:
+            pool.stop()  # type: ignore[no-untyped-call]
+            raise
+    return found
+
+
+def _begin() -> None:
+    bound_memory()
+    keep_output()
+
+
+def _describe(adapter: str) -> AddedWitness:
+    """The witness that a class makes, in plain words and numbers; _UnusableError where it is none."""
+    module, _, attribute = adapter.partition(":")
+    if not module or not attribute:
+        raise _UnusableError("must be module:Class")
+    try:
+        return _read(adapter, getattr(import_module(module), attribute))
+    except _UnusableError:
+        raise
+    except BaseException as error:  # whatever the user's module raises while it is imported
+        raise _UnusableError(f"cannot be imported: {in_words(error)}") from None
+
+
+def _read(adapter: str, made: Any) -> AddedWitness:
+    name = getattr(made, "name", None)
+    if type(name) is not str or not name or name != one_line(name) or not callable(getattr(made, "answer", None)):
+        raise _UnusableError("must have a `name` of printable characters and a method `answer(scene, at)`")
+    stated = tuple(getattr(made, "quantities", UNKNOWNS))
+    unknown = [quantity for quantity in stated if quantity not in COMPARED]
+    if unknown or not stated:
+        raise _UnusableError(f"must have `quantities` among {', '.join(COMPARED)}; it has {unknown or 'none'}")
+    quantities = tuple(quantity for quantity in COMPARED if quantity in stated)
+    positions = tuple(quantity for quantity in quantities if quantity in ANGLES)
+    tolerance = _tolerance(getattr(made, "tolerance", EQUIVALENCE.name))
+    code = _code(sys.modules[adapter.partition(":")[0]])
+    return AddedWitness(name, adapter, tolerance, expected=quantities, positions=positions, stated=False, code=code)
+
+
+def _code(module: ModuleType) -> str:
+    """Hash of the modules imported with a witness, of the others in its folder, and of what is installed."""
+    files = {getattr(each, "__file__", None) for name, each in list(sys.modules.items()) if name not in OURS}
+    files |= {str(path) for path in Path(module.__file__ or "").parent.glob("*.py")}
+    digest = hashlib.sha256()
+    for file in sorted(filter(None, files)):
+        digest.update(f"{file} ".encode() + hashlib.sha256(Path(file).read_bytes()).digest())
+    digest.update(repr(sorted(f"{each.name} {each.version}" for each in distributions())).encode())
+    return digest.hexdigest()[:16]
+
+
+def _tolerance(stated: Any) -> Tolerance:
+    if isinstance(stated, str) and stated == EQUIVALENCE.name:
+        return EQUIVALENCE
+    try:
+        error, reason = stated
+        error = float(error)
+    except (TypeError, ValueError):
+        error, reason = 0.0, ""
+    if not (0.0 < error < 1.0 and isinstance(reason, str) and reason):
+        allowed = f'"{EQUIVALENCE.name}", or a relative error above 0 and below 1 and its reason'
+        raise _UnusableError(f"must have a `tolerance` that is {allowed}")
+    return Tolerance("as the witness states", f"{error:g} of the scale: {one_line(reason)}", error, conditioned=False)

@@ -1,0 +1,290 @@
+"""The linkage in ball arithmetic: every output of `solve` to 50 digits with a rigorous radius, and its sensitivities.
+
+Shares nothing with the formulas: the loop is closed by the complex quadratic in e^{i theta_3}, the
+velocities and accelerations come from the linear systems of the differentiated loop, the pin forces
+and the torque from the full thirteen Newton-Euler equations about the mass centres.
+"""
+
+import math
+from bisect import bisect
+from collections.abc import Iterable
+from typing import Any, TypeAlias
+
+from flint import acb, arb, arb_mat, ctx
+
+from fourbar.effects import Flywheel, Friction, Gravity, Spring, Springs, Table, Torsion, Viscous
+from fourbar.linkage import MOVING_BARS
+from fourbar.scene import Scene
+from fourbar_validation.engines.description import PINS, centre, inertia
+
+BITS = 320
+"""Working precision; 50 digits are 167 bits, the rest is what the worst sample (a limit position at 1e-20) cancels."""
+STEP_BITS = 90
+"""Sensitivities are difference quotients with a relative step of 2^-90: wrong by about 2^-90 / (distance to the
+nearest singular position), and the cancelled 90 bits are there to lose."""
+
+Ball: TypeAlias = Any
+Complex: TypeAlias = Any
+"""A vector of the plane, x + i y, of two balls."""
+Values: TypeAlias = dict[str, Ball]
+
+
+def inputs(scene: Scene, theta_2: float) -> dict[str, float]:
+    """The stored doubles that the outputs at one position depend on."""
+    link, motion = scene.linkage, scene.motion
+    d, a, b, c = link.lengths
+    values = {"d": d, "a": a, "b": b, "c": c, "theta_1": link.ground_angle, "theta_2": theta_2}
+    values |= {"omega_2": motion.omega_2 or 0.0, "alpha_2": motion.alpha_2}
+    for k in MOVING_BARS:
+        bar = link.bar(k)
+        values |= {f"m{k}": bar.mass, f"I{k}": inertia(bar)}
+        values[f"r{k}"], values[f"phi{k}"] = centre(bar)
+    for k, load in enumerate(scene.loads):
+        f, f_angle = load.force or (0.0, 0.0)
+        values |= {f"F_{k}": f, f"F_angle_{k}": f_angle, f"M_{k}": load.moment}
+        values |= {f"at_{k}": load.at[0], f"at_angle_{k}": load.at[1]}
+    for effect in scene.effects:
+        if isinstance(effect, Gravity):
+            values |= {"g": effect.magnitude, "g_angle": effect.angle}
+        elif isinstance(effect, Viscous):
+            values |= {f"viscous_{pin}": value for pin, value in effect.coefficients}
+        elif isinstance(effect, Friction):
+            values |= {f"friction_{pin}": value for pin, value in effect.torques}
+        elif isinstance(effect, Flywheel):
+            values["J"] = effect.inertia
+        elif isinstance(effect, Torsion):
+            for pin, stiffness, rest, preload in effect.springs:
+                values |= {f"torsion_{pin}": stiffness, f"rest_{pin}": rest, f"wound_{pin}": preload}
+        elif isinstance(effect, Springs):
+            for k, spring in enumerate(effect.springs):
+                values |= {f"stiffness_{k}": spring.stiffness, f"length_{k}": spring.length}
+                values[f"pull_{k}"] = spring.preload
+                for end, point in (("start", spring.start), ("end", spring.end)):
+                    values |= {f"{end}_{k}": point.distance, f"{end}_angle_{k}": point.angle}
+        else:
+            raise NotImplementedError(f"the reference knows no effect {type(effect).__name__}")
+    return values
+
+
+def stored(scene: Scene, theta_2: float, **motion: float) -> Values:
+    """The same as balls of no radius, with another omega_2 or alpha_2 where stated; sets the working precision."""
+    ctx.prec = BITS
+    return {name: arb(value) for name, value in (inputs(scene, theta_2) | motion).items()}
+
+
+def polar(r: Ball, angle: Ball) -> Complex:
+    """r e^{i angle}."""
+    return acb(r * angle.cos(), r * angle.sin())
+
+
+def wedge(u: Complex, v: Complex) -> Ball:
+    """u_x v_y - u_y v_x."""
+    return (u.conjugate() * v).imag
+
+
+def closure(x: Values, branch: int) -> tuple[Complex, Complex, Complex] | None:
+    """e^{i theta_2}, e^{i theta_3}, e^{i theta_4}; None where the loop does not close.
+
+    With D = d e^{i theta_1} - a e^{i theta_2}, |D - b w| = c is b conj(D) w^2 - K w + b D = 0, K = D^2 + b^2 - c^2.
+    """
+    w2 = polar(arb(1), x["theta_2"])
+    D = polar(x["d"], x["theta_1"]) - x["a"] * w2
+    b, c = x["b"], x["c"]
+    # |D|^2 by the angle between ground and input: where they are in line it is exact, and so is a loop that just closes
+    squared = x["d"] ** 2 + x["a"] ** 2 - 2 * x["d"] * x["a"] * (x["theta_2"] - x["theta_1"]).cos()
+    K = squared + b * b - c * c
+    discriminant = 4 * b * b * squared - K * K
+    if discriminant < 0:  # an undecided one has no root, and what follows is NaN
+        return None
+    w3 = acb(K, branch * discriminant.sqrt()) * D / (2 * b * squared)
+    return w2, w3, (b * w3 - D) / c
+
+
+def linear(rows: list[list[Ball]], right: list[Ball]) -> list[Ball]:
+    """Solution of a linear system, rigorous; ZeroDivisionError where it is singular to working precision."""
+    solution = arb_mat(rows).solve(arb_mat([[value] for value in right]))
+    return [solution[k, 0] for k in range(len(right))]
+
+
+def outputs(scene: Scene, branch: int, x: Values, drive_bar: int) -> Values | None:  # noqa: PLR0915 - one system
+    """Every output at one position as balls; vectors as name_x, name_y; None where the loop does not close."""
+    closed = closure(x, branch)
+    if closed is None:
+        return None
+    w = dict(zip(MOVING_BARS, closed, strict=True))
+    a, b, c = x["a"], x["b"], x["c"]
+    y: Values = {"theta_3": w[3].arg(), "theta_4": w[4].arg(), "sin_mu": wedge(w[3], w[4])}
+    y["condition"] = abs(y["sin_mu"])
+    if not y["condition"] > 0:  # singular; NaN where A lies on O4, about which bars 3 and 4 then turn freely
+        return y
+    zero = acb(0)
+    of_3, of_4 = acb(0, b) * w[3], acb(0, -c) * w[4]
+
+    def rates(known: Complex) -> list[Ball]:
+        """Of bars 3 and 4, where b i w3 rate_3 - c i w4 rate_4 is known."""
+        return linear([[of_3.real, of_4.real], [of_3.imag, of_4.imag]], [known.real, known.imag])
+
+    # what a probe opens the loop by: slip, m/s, and jerk, m/s^2
+    omega, alpha = {2: x["omega_2"]}, {2: x["alpha_2"]}
+    omega[3], omega[4] = rates(x.get("slip", zero) - acb(0, a * omega[2]) * w[2])
+    centripetal = a * omega[2] ** 2 * w[2] + b * omega[3] ** 2 * w[3] - c * omega[4] ** 2 * w[4]
+    alpha[3], alpha[4] = rates(x.get("jerk", zero) + centripetal - acb(0, a * alpha[2]) * w[2])
+    for k in MOVING_BARS:
+        y[f"omega_{k}"], y[f"alpha_{k}"] = omega[k], alpha[k]
+
+    O4, tip = polar(x["d"], x["theta_1"]), {2: a * w[2], 3: b * w[3], 4: c * w[4]}
+    spin = {k: acb(0, omega[k]) for k in MOVING_BARS}
+    swing = {k: acb(-omega[k] * omega[k], alpha[k]) for k in MOVING_BARS}
+    foot = {1: zero, 2: zero, 3: tip[2], 4: O4}
+    v_foot, a_foot = ({2: zero, 3: turn[2] * tip[2], 4: zero} for turn in (spin, swing))
+    centre = {k: w[k] * polar(x[f"r{k}"], x[f"phi{k}"]) for k in MOVING_BARS}
+    acceleration = {k: a_foot[k] + swing[k] * centre[k] for k in MOVING_BARS}
+    points = {"A": tip[2], "B": O4 + tip[4], "a_A": a_foot[3], "a_B": swing[4] * tip[4]}
+    points |= {"v_A": v_foot[3], "v_B": spin[4] * tip[4]}
+    for k in MOVING_BARS:
+        points |= {f"G{k}": foot[k] + centre[k], f"a_G{k}": acceleration[k]}
+        points[f"v_G{k}"] = v_foot[k] + spin[k] * centre[k]
+    _put(y, points)
+
+    force = {k: x[f"m{k}"] * polar(x["g"], x["g_angle"]) if "g" in x else zero for k in MOVING_BARS}
+    moment = {k: x.get(f"couple_{k}", arb(0)) for k in MOVING_BARS}  # about G; a probe may add one
+    _add_effects(scene, x, {1: polar(arb(1), x["theta_1"]), **w}, foot, centre, force, moment)
+    for effect in scene.effects:
+        if isinstance(effect, Flywheel):
+            moment[effect.bar] -= x["J"] * alpha[effect.bar]
+    for pin, (i, j) in PINS.items():
+        slip = omega.get(j, 0) - omega.get(i, 0)
+        sign = arb(1) if slip > 0 else arb(-1) if slip < 0 else arb(0) if slip == 0 else arb(0, 1)
+        couple = -x.get(f"viscous_{pin}", arb(0)) * slip - x.get(f"friction_{pin}", arb(0)) * sign
+        _twist(moment, pin, couple)
+    # unknowns F12 F32 F23 F43 F34 F14 (x, y each) and T
+    joints = {2: ((0, "foot"), (1, "tip")), 3: ((2, "foot"), (3, "tip")), 4: ((4, "tip"), (5, "foot"))}
+    matrix = [[arb(0)] * 13 for _ in range(13)]
+    known = []
+    for n, k in enumerate(MOVING_BARS):
+        for column, end in joints[k]:
+            arm = -centre[k] if end == "foot" else tip[k] - centre[k]
+            matrix[3 * n][2 * column] = matrix[3 * n + 1][2 * column + 1] = arb(1)
+            matrix[3 * n + 2][2 * column], matrix[3 * n + 2][2 * column + 1] = -arm.imag, arm.real
+        if k == drive_bar:
+            matrix[3 * n + 2][12] = arb(1)
+        needed = x[f"m{k}"] * acceleration[k] - force[k]
+        known += [needed.real, needed.imag, x[f"I{k}"] * alpha[k] - moment[k]]
+    for row, (i, j) in enumerate(((2, 4), (3, 5), (6, 8), (7, 9)), start=9):
+        matrix[row][i] = matrix[row][j] = arb(1)
+        known.append(arb(0))
+    sines = {2: y["sin_mu"], 3: wedge(w[2], w[4]), 4: wedge(w[2], w[3])}
+    y["drive_condition"] = abs(sines[drive_bar])
+    try:
+        solved = linear(matrix, known)
+    except ZeroDivisionError:
+        return y
+    columns = {"F12": 0, "F32": 1, "F43": 3, "F14": 5}
+    _put(y, {name: acb(solved[2 * column], solved[2 * column + 1]) for name, column in columns.items()})
+    y["torque"] = solved[12]
+    return y
+
+
+def _put(y: Values, vectors: dict[str, Complex]) -> None:
+    """Vectors by their components."""
+    for name, vector in vectors.items():
+        y[f"{name}_x"], y[f"{name}_y"] = vector.real, vector.imag
+
+
+def _twist(moment: dict[int, Ball], pin: str, couple: Ball) -> None:
+    """A couple on bar j of a pin (i, j), its opposite on bar i; on the ground it does nothing."""
+    i, j = PINS[pin]
+    for bar, value in ((j, couple), (i, -couple)):
+        if bar in moment:
+            moment[bar] += value
+
+
+def _add_effects(
+    scene: Scene,
+    x: Values,
+    w: dict[int, Complex],
+    foot: dict[int, Complex],
+    centre: dict[int, Complex],
+    force: dict[int, Complex],
+    moment: dict[int, Ball],
+) -> None:
+    """Loads and springs, from the directions and first pins of all bars, the ground's too."""
+    for k, load in enumerate(scene.loads):
+        factor = _factor(load.table, x["theta_2"]) if load.table else arb(1)
+        axes = w[load.bar] if load.frame == "bar" else acb(1)
+        f, arm = (axes * polar(x[f"{name}_{k}"], x[f"{name}_angle_{k}"]) for name in ("F", "at"))
+        force[load.bar] += factor * f
+        moment[load.bar] += factor * (wedge(arm, f) + x[f"M_{k}"])
+    for effect in scene.effects:
+        if isinstance(effect, Torsion):
+            for pin, *_ in effect.springs:
+                i, j = PINS[pin]
+                turned = (w[j] * w[i].conjugate() * polar(arb(1), -x[f"rest_{pin}"])).arg()
+                _twist(moment, pin, -x[f"wound_{pin}"] - x[f"torsion_{pin}"] * turned)
+        elif isinstance(effect, Springs):
+            for k, spring in enumerate(effect.springs):
+                start, end = spring.start.bar, spring.end.bar
+                arms = [
+                    w[bar] * polar(x[f"{name}_{k}"], x[f"{name}_angle_{k}"])
+                    for bar, name in ((start, "start"), (end, "end"))
+                ]
+                pull = _pull(spring, x, k, foot[end] + arms[1] - foot[start] - arms[0])
+                for bar, arm, f in ((start, arms[0], pull), (end, arms[1], -pull)):
+                    if bar in force:
+                        force[bar] += f
+                        moment[bar] += wedge(arm - centre[bar], f)
+
+
+def _factor(table: Table, theta_2: Ball) -> Ball:
+    """On the straight line between the two points of a table that enclose an angle, taken modulo a turn."""
+    turns = math.floor((float(theta_2.mid()) - table.theta_2[0]) / math.tau + 1e-12)
+    angle = theta_2 - 2 * turns * arb.pi()
+    after = min(max(bisect(table.theta_2, float(angle.mid())), 1), len(table.theta_2) - 1)
+    start, stop = (arb(table.theta_2[k]) for k in (after - 1, after))
+    first, last = (arb(table.factor[k]) for k in (after - 1, after))
+    return first + (last - first) * (angle - start) / (stop - start)
+
+
+def _pull(spring: Spring, x: Values, k: int, across: Complex) -> Complex:
+    """Preload + stiffness (distance - length) along the line of the two points, and nothing where they meet."""
+    if spring.preload == spring.stiffness * spring.length:  # the pull is k times the distance, wherever that ends
+        return x[f"stiffness_{k}"] * across
+    distance = abs(across)
+    return (x[f"pull_{k}"] + x[f"stiffness_{k}"] * (distance - x[f"length_{k}"])) / distance * across
+
+
+def response(base: Values, changed: Iterable[Values | None]) -> dict[str, float]:
+    """How far each output moves, by 2^-STEP_BITS, under the first of several changes with which the loop closes."""
+    for moved in changed:
+        if moved is None:
+            continue
+        found = {}
+        for output, y in base.items():
+            if output not in moved:  # singular there
+                found[output] = math.inf
+                continue
+            change = abs(moved[output] - y)
+            if output.startswith("theta") and change > 3:
+                change = 2 * arb.pi() - change
+            found[output] = abs(float((change * arb(2) ** STEP_BITS).mid()))
+        return found
+    return {}
+
+
+def reference(scene: Scene, branch: int, theta_2: float) -> tuple[Values, dict[str, float]] | None:
+    """Values at one position as balls, and sum |x_i dy/dx_i| of each; None where the loop does not close."""
+    exact = stored(scene, theta_2)
+
+    def evaluate(**changed: Ball) -> Values | None:
+        return outputs(scene, branch, exact | changed, scene.drive_bar)
+
+    base = evaluate()
+    if base is None:
+        return None
+    sensitivity = dict.fromkeys(base, 0.0)
+    for name, value in exact.items():
+        step = abs(value) * arb(2) ** -STEP_BITS
+        moved = response(base, (evaluate(**{name: value + side * step}) for side in (1, -1))) if value != 0 else {}
+        for output, rate in moved.items():
+            sensitivity[output] += rate
+    return base, sensitivity

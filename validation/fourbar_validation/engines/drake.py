@@ -1,0 +1,130 @@
+"""Drake: inverse dynamics on the open tree, the loop closed by multipliers, pin forces from its reaction port."""
+
+from collections.abc import Sequence
+from functools import partial
+from typing import Any
+
+import numpy as np
+from pydrake.common.value import Value
+from pydrake.math import RigidTransform
+from pydrake.multibody.math import SpatialForce
+from pydrake.multibody.plant import ExternallyAppliedSpatialForce, MultibodyPlant
+from pydrake.multibody.tree import (
+    FixedOffsetFrame,
+    JacobianWrtVariable,
+    MultibodyForces,
+    RevoluteJoint,
+    RotationalInertia,
+    SpatialInertia,
+)
+
+from fourbar.errors import LimitError
+from fourbar.scene import Scene
+from fourbar_validation.compare.answer import Array
+from fourbar_validation.engines.description import FIRST_PIN, about_first_pin, parts, unknown_effect
+from fourbar_validation.engines.effects import TERM_OF, acting
+from fourbar_validation.engines.loop import Exact
+from fourbar_validation.engines.tree import Tree
+
+BY_SPEEDS = JacobianWrtVariable.kV
+UP = (0.0, 0.0, 1.0)
+
+
+def refusal(scene: Scene) -> str:
+    """The declared limit that a scene meets, or nothing."""
+    if reason := unknown_effect(scene, TERM_OF):
+        return reason
+    for number in FIRST_PIN:
+        bar = scene.linkage.bar(number)
+        if bar.mass == 0.0:
+            return f"bar {number} has no mass; the reaction port of Drake divides by it"
+        if number != 2 and about_first_pin(bar) == 0.0:
+            return f"bar {number} has no inertia about its pin; the reaction port of Drake divides by it"
+    return ""
+
+
+class DrakeTree(Tree):
+    """The open tree, built from the description."""
+
+    def __init__(self, scene: Scene) -> None:
+        if reason := refusal(scene):
+            raise LimitError(reason)
+        self.plant = plant = MultibodyPlant(time_step=0.0)
+        self.body: dict[int, Any] = {1: plant.world_body()}
+        self.joint: dict[int, Any] = {}
+        self.local: dict[str, tuple[Any, Array]] = {}
+        for part in parts(scene.linkage):
+            about_g = RotationalInertia(*[part.inertia] * 3)
+            inertia = SpatialInertia.MakeFromCentralInertia(part.mass, np.array([*part.centre, 0.0]), about_g)
+            body = self.body[part.bar] = plant.AddRigidBody(f"bar{part.bar}", inertia)
+            at, bearer = RigidTransform(np.array([*part.foot, 0.0])), self.body[part.bearer].body_frame()
+            frame = plant.AddFrame(FixedOffsetFrame(f"foot{part.bar}", bearer, at))
+            joint = RevoluteJoint(FIRST_PIN[part.bar], frame, body.body_frame(), UP)
+            self.joint[part.bar] = plant.AddJoint(joint)
+            self.local |= {name: (body.body_frame(), np.array([*place, 0.0])) for name, place in part.points.items()}
+        plant.Finalize()
+        self.context, self.world = plant.CreateDefaultContext(), plant.world_frame()
+        self.ready(scene, acting(scene, self))
+        plant.mutable_gravity_field().set_gravity_vector(np.array([*self.field, 0.0]))
+
+    def place(self, q: Sequence[float]) -> None:
+        """Set the coordinates."""
+        self.plant.SetPositions(self.context, np.array(q, dtype=float))
+
+    def point(self, name: str) -> Array:
+        """A point fixed in a body."""
+        return np.array(self.plant.CalcPointsPositions(self.context, *self.local[name], self.world)[:2, 0])
+
+    def rotation(self, bar: int) -> Array:
+        """That of the body."""
+        pose = self.plant.EvalBodyPoseInWorld(self.context, self.body[bar])
+        return np.asarray(pose.rotation().matrix()[:2, :2])
+
+    def point_jacobian(self, name: str) -> Array:
+        """Of the translational velocity."""
+        at = (*self.local[name], self.world, self.world)
+        return np.asarray(self.plant.CalcJacobianTranslationalVelocity(self.context, BY_SPEEDS, *at)[:2])
+
+    def turn(self, bar: int) -> Array:
+        """Last row of the angular velocity's Jacobian."""
+        at = (self.body[bar].body_frame(), self.world, self.world)
+        return np.array(self.plant.CalcJacobianAngularVelocity(self.context, BY_SPEEDS, *at)[2])
+
+    def set_motion(self, v: Array, a: Array) -> None:
+        """Speeds; accelerations are given with each request."""
+        self.plant.SetVelocities(self.context, v)
+
+    def acceleration(self, name: str) -> Array:
+        """J a + (dJ/dt) v of a point."""
+        at = (*self.local[name], self.world, self.world)
+        bias = self.plant.CalcBiasTranslationalAcceleration(self.context, BY_SPEEDS, *at)
+        return np.asarray(self.point_jacobian(name) @ self.a + bias[:2, 0])
+
+    def needed(self, field: tuple[float, float], wrenches: dict[int, list[float]]) -> Array:
+        """Inverse dynamics with gravity as a force element and what acts on the bars as external forces."""
+        forces = MultibodyForces(self.plant)
+        if any(field):
+            self.plant.CalcForceElementsContribution(self.context, forces)
+        for bar, wrench in wrenches.items():
+            self.body[bar].AddInForceInWorld(self.context, _spatial(wrench), forces)
+        return np.array(self.plant.CalcInverseDynamics(self.context, self.a, forces))
+
+    def carried(self) -> dict[int, Array]:
+        """The reaction port, which finds the accelerations once more."""
+        applied = []
+        for bar, wrench in self.wrenches.items():
+            force = ExternallyAppliedSpatialForce()
+            force.body_index, force.F_Bq_W = self.body[bar].index(), _spatial(wrench)
+            applied.append(force)
+        port = self.plant.get_applied_spatial_force_input_port()
+        port.FixValue(self.context, Value[list[ExternallyAppliedSpatialForce]](applied))
+        found = self.plant.get_reaction_forces_output_port().Eval(self.context)
+        return {b: self.rotation(b) @ found[int(joint.index())].translational()[:2] for b, joint in self.joint.items()}
+
+
+DrakeInverse = partial(Exact, "drake-inverse", DrakeTree)
+
+
+def _spatial(wrench: Sequence[float]) -> Any:
+    x, y, couple = wrench
+    return SpatialForce(np.array([0.0, 0.0, couple]), np.array([x, y, 0.0]))

@@ -1,0 +1,210 @@
+"""Exudyn: nine absolute coordinates, the multipliers of four pins and a drive; springs and dampers are its own.
+
+A bar is `ObjectRigidBody2D` with coordinates (x, y of its first pin, direction). With g = 0 the nine
+constraints (two of each pin and the drive of bar 2), J = dg/dq, M the mass matrix and f what acts,
+
+    J v = e omega_2,   J a = e alpha_2 - (dJ/dt) v,   [J_pins^T e_k] [F12 F32 F43 F14 T_k] = M a - f.
+
+g, J, (dJ/dt) v, M and f are Exudyn's; the three linear systems are solved here.
+"""
+
+import math
+from collections.abc import Sequence
+from functools import partial
+from typing import Any
+
+import exudyn as exu
+import numpy as np
+from exudyn.itemInterface import (
+    LoadForceVector,
+    LoadMassProportional,
+    LoadTorqueVector,
+    MarkerBodyMass,
+    ObjectConnectorCoordinate,
+    ObjectJointRevolute2D,
+)
+
+from fourbar.errors import LimitError
+from fourbar.linkage import MOVING_BARS, PIN_FORCE
+from fourbar.scene import Scene
+from fourbar_validation.compare.answer import Array
+from fourbar_validation.engines.description import ON_BARS, POINTS, parts, unknown_effect, within_half_a_turn
+from fourbar_validation.engines.effects import TERM_OF, acting
+from fourbar_validation.engines.exudyn_elements import ELEMENT_OF, Bodies
+from fourbar_validation.engines.loaded import Loaded, Values
+from fourbar_validation.engines.loop import Exact
+
+SIZE = 9
+"""Coordinates, and constraints."""
+B_ROWS, OTHER_ROWS = [4, 5], [0, 1, 2, 3, 6, 7]
+"""The rows of pin B and of the others among the constraints, which stand in the order of `JOINTS`, the drive last."""
+JOINTS = {"O2": (1, 2), "A": (3, 2), "B": (4, 3), "O4": (1, 4)}
+"""Of each pin the force is that on the second bar: F12, F32, F43, F14."""
+
+
+class ExudynBars(Loaded):
+    """The bars, built from the description."""
+
+    own = (
+        "nine absolute coordinates, constraint equations, their Jacobian and (dJ/dt) v, mass matrix, springs and "
+        "dampers by elements of its own, other effects from its own state; Newton's method on its gap and the linear "
+        "solves are the harness's"
+    )
+
+    def __init__(self, scene: Scene) -> None:
+        if reason := unknown_effect(scene, TERM_OF):
+            raise LimitError(reason)
+        exu.config.printToConsole = False
+        self.container = exu.SystemContainer()
+        self.mbs = mbs = self.container.AddSystem()
+        bodies = Bodies(mbs, scene.linkage)
+        self.body = bodies.body
+        of_bar = {part.bar: part for part in parts(scene.linkage)}
+        self.local = {name: (part.bar, [*at, 0.0]) for part in of_bar.values() for name, at in part.points.items()}
+        end = {bar: part.points[f"end{bar}"] for bar, part in of_bar.items()}
+        at = {
+            "O2": ((0.0, 0.0), (0.0, 0.0)),
+            "A": ((0.0, 0.0), end[2]),
+            "B": (end[4], end[3]),
+            "O4": (of_bar[4].foot, (0.0, 0.0)),
+        }
+        for pin, bars in JOINTS.items():
+            markers = [bodies.point(bar, *place) for bar, place in zip(bars, at[pin], strict=True)]
+            mbs.AddObject(ObjectJointRevolute2D(markerNumbers=markers))
+        markers = [bodies.direction(bar) for bar in (1, 2)]
+        self.drive = mbs.AddObject(ObjectConnectorCoordinate(markerNumbers=markers))
+        for effect in scene.effects:
+            if effect.key in ELEMENT_OF:
+                ELEMENT_OF[effect.key](effect, bodies)
+        self.ready(scene, acting(scene, self, ELEMENT_OF))
+        self.load = {}
+        for bar in MOVING_BARS:
+            mass = mbs.AddMarker(MarkerBodyMass(bodyNumber=self.body[bar]))
+            mbs.AddLoad(LoadMassProportional(markerNumber=mass, loadVector=[*self.field, 0.0]))
+            foot = bodies.axes(bar)
+            self.load[bar] = tuple(mbs.AddLoad(kind(markerNumber=foot)) for kind in (LoadForceVector, LoadTorqueVector))
+        mbs.Assemble()
+        self.state = mbs.systemData
+        settings = exu.SimulationSettings()
+        settings.solution.file.write = False
+        self.solver = exu.MainSolverImplicitSecondOrder()
+        self.solver.InitializeSolver(mbs, settings)
+        self.turn = {bar: self.state.GetObjectLTGODE2(self.body[bar])[2] for bar in MOVING_BARS}
+        self.shifts = [i for i in range(SIZE) if i not in self.turn.values()]
+        self.e_drive = np.zeros(SIZE)
+        self.e_drive[self.turn[scene.drive_bar]] = 1.0
+
+    def place(self, q: Sequence[float]) -> None:
+        """Angles of the bars as given; the pins O2, A and O4 closed, in which Exudyn's constraints are linear."""
+        of_3_to_2, theta_4 = q[1:]
+        theta_2 = within_half_a_turn(q[0])
+        coordinates = np.zeros(SIZE)
+        for bar, angle in zip(MOVING_BARS, (theta_2, theta_2 + of_3_to_2, theta_4), strict=True):
+            coordinates[self.turn[bar]] = angle
+        self.mbs.SetObjectParameter(self.drive, "offset", theta_2)
+        self.state.SetODE2Coordinates(coordinates)
+        jacobian, gap = self._constraint_jacobian(), self._constraint_gap()
+        coordinates[self.shifts] = np.linalg.solve(jacobian[OTHER_ROWS][:, self.shifts], -gap[OTHER_ROWS])
+        self.state.SetODE2Coordinates(coordinates)
+        self.q, self.jacobians = coordinates, jacobian
+
+    def _constraint_gap(self) -> Array:
+        self.solver.ComputeAlgebraicEquations(self.mbs, False)
+        return np.array(self.solver.GetSystemResidual())[SIZE:]
+
+    def _constraint_jacobian(self) -> Array:
+        self.solver.SetSystemJacobian(np.zeros((2 * SIZE, 2 * SIZE)))  # what is computed is added
+        self.solver.ComputeJacobianAE(
+            self.mbs, scalarFactor_ODE2=1.0, scalarFactor_ODE2_t=0.0, scalarFactor_ODE1=0.0, velocityLevel=False
+        )
+        return np.array(self.solver.GetSystemJacobian())[SIZE:, :SIZE]
+
+    def gap(self) -> tuple[float, float]:
+        """B on bar 3 minus B on bar 4, from the constraint of pin B."""
+        x, y = self._constraint_gap()[B_ROWS].tolist()
+        return x, y
+
+    def jacobian(self) -> Array:
+        """Derivative of the gap by the turns, pins O2, A and O4 kept closed."""
+        turns, pins, b = list(self.turn.values()), self.jacobians[OTHER_ROWS], self.jacobians[B_ROWS]
+        shifts = np.linalg.solve(pins[:, self.shifts], -pins[:, turns])
+        by_angle = b[:, turns] + b[:, self.shifts] @ shifts
+        return np.column_stack((by_angle[:, 0] + by_angle[:, 1], by_angle[:, 1:]))
+
+    def angle(self, bar: int) -> float:
+        """Its coordinate, within half a turn; the ground's line as described."""
+        return self.ground_angle if bar == 1 else math.remainder(self.q[self.turn[bar]], math.tau)
+
+    def _output(self, kind: Any, name: str) -> Array:
+        bar, at = self.local[name]
+        return np.array(self.mbs.GetObjectOutputBody(self.body[bar], kind, at)[:2])
+
+    def point(self, name: str) -> Array:
+        """A point of a body."""
+        return self._output(exu.OutputVariableType.Position, name)
+
+    def acceleration(self, name: str) -> Array:
+        """Of a point of a body, (2,), m/s^2."""
+        return self._output(exu.OutputVariableType.Acceleration, name)
+
+    def rotation(self, bar: int) -> Array:
+        """That of the body."""
+        found = self.mbs.GetObjectOutputBody(self.body[bar], exu.OutputVariableType.RotationMatrix, [0.0, 0.0, 0.0])
+        return np.reshape(found, (3, 3))[:2, :2]
+
+    def velocity(self, bar: int) -> float:
+        """Of its coordinate; the ground has none."""
+        return 0.0 if bar == 1 else float(self.v[self.turn[bar]])
+
+    def alpha(self, bar: int) -> float:
+        """Of its coordinate."""
+        return float(self.a[self.turn[bar]])
+
+    def positions(self) -> dict[str, Array]:
+        """Points of the bars."""
+        return {name: self.point(point) for name, point in POINTS.items()}
+
+    def move(self, omega_2: float, alpha_2: float) -> Values:
+        """Speeds, accelerations and multipliers; nothing where a toggle leaves them 0/0."""
+        jacobian = self.jacobians
+        drive = np.eye(SIZE)[-1]
+        try:
+            self.v = v = np.linalg.solve(jacobian, drive * omega_2)
+            self.state.SetODE2Coordinates_t(v)
+            self.state.SetODE2Coordinates_tt(np.zeros(SIZE))
+            at_b = self.acceleration("end3") - self.acceleration("end4")
+            drift = np.concatenate((np.zeros(2), self.acceleration("end2"), at_b, np.zeros(3)))
+            self.a = a = np.linalg.solve(jacobian, drive * alpha_2 - drift)
+        except np.linalg.LinAlgError:
+            return {}
+        self.state.SetODE2Coordinates_tt(a)
+        values: Values = {f"a_{name}": self.acceleration(point) for name, point in ON_BARS.items()}
+        for bar in MOVING_BARS[1:]:
+            values[f"omega_{bar}"], values[f"alpha_{bar}"] = self.velocity(bar), self.alpha(bar)
+        matrix = np.column_stack((jacobian[:-1].T, self.e_drive))
+        self.solver.ComputeMassMatrix(self.mbs)
+        inertial = np.array(self.solver.GetSystemMassMatrix()) @ a
+
+        def balanced() -> dict[str, Any]:
+            unknowns = np.linalg.solve(matrix, inertial - self._applied())
+            pins = zip(JOINTS, unknowns[:-1].reshape(4, 2), strict=True)
+            return {PIN_FORCE[pin]: force for pin, force in pins} | {"torque": unknowns[-1]}
+
+        try:
+            return values | self.settled(balanced)
+        except np.linalg.LinAlgError:  # no torque on that bar balances the linkage here
+            return values
+
+    def _applied(self) -> Array:
+        """What acts, less what the speeds ask for, (9,)."""
+        if self.terms:
+            self.act()
+            for bar, (x, y, couple) in self.wrenches.items():
+                force, torque = self.load[bar]
+                self.mbs.SetLoadParameter(force, "loadVector", [x, y, 0.0])
+                self.mbs.SetLoadParameter(torque, "loadVector", [0.0, 0.0, couple])
+        self.solver.ComputeODE2RHS(self.mbs)
+        return np.array(self.solver.GetSystemResidual())[:SIZE]
+
+
+ExudynConstraints = partial(Exact, "exudyn-constraints", ExudynBars)

@@ -1,0 +1,88 @@
+"""Bodies of a linkage in Exudyn, and its own springs and dampers upon them.
+
+They are what no other engine gives: the force laws of somebody else's program, to round-off. MuJoCo's own hold to
+the error of its steps; every other engine is given the wrenches of `effects.TERM_OF`, as Exudyn is of all the rest.
+"""
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+from exudyn.itemInterface import (
+    MarkerBodyPosition,
+    MarkerBodyRigid,
+    MarkerNodeCoordinate,
+    NodePointGround,
+    NodeRigidBody2D,
+    ObjectConnectorCoordinateSpringDamper,
+    ObjectConnectorSpringDamper,
+    ObjectConnectorTorsionalSpringDamper,
+    ObjectGround,
+    ObjectRigidBody2D,
+)
+
+from fourbar.linkage import FourBar
+from fourbar_validation.engines.description import PINS, about_first_pin, parts, place
+
+
+class Bodies:
+    """The ground and a body of each bar, with the coordinates of its first pin and its direction."""
+
+    def __init__(self, mbs: Any, linkage: FourBar) -> None:
+        self.mbs, self.ground_angle = mbs, linkage.ground_angle
+        self.node: dict[int, Any] = {1: mbs.AddNode(NodePointGround())}
+        self.body: dict[int, Any] = {1: mbs.AddObject(ObjectGround())}
+        for part in parts(linkage):
+            self.node[part.bar] = node = mbs.AddNode(NodeRigidBody2D())
+            inertia = about_first_pin(linkage.bar(part.bar))
+            body = ObjectRigidBody2D(mass=part.mass, inertia=inertia, centerOfMass=part.centre, nodeNumber=node)
+            self.body[part.bar] = mbs.AddObject(body)
+
+    def point(self, bar: int, x: float = 0.0, y: float = 0.0) -> Any:
+        """A marker of a point of a bar, along and across its line from its first pin; of the ground in world axes."""
+        return self.mbs.AddMarker(MarkerBodyPosition(bodyNumber=self.body[bar], localPosition=[x, y, 0.0]))
+
+    def direction(self, bar: int) -> Any:
+        """A marker of the direction of a bar as a coordinate; of the ground a zero."""
+        return self.mbs.AddMarker(MarkerNodeCoordinate(nodeNumber=self.node[bar], coordinate=0 if bar == 1 else 2))
+
+    def axes(self, bar: int, turn: float = 0.0) -> Any:
+        """A marker of axes fixed in a bar at its first pin, turned by an angle from its line."""
+        cos, sin = math.cos(turn), math.sin(turn)
+        frame = [[cos, -sin, 0.0, 0.0], [sin, cos, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]]
+        return self.mbs.AddMarker(MarkerBodyRigid(bodyNumber=self.body[bar], localHT=frame))
+
+
+def _viscous(effect: Any, bodies: Bodies) -> None:
+    """`CoordinateSpringDamper` between the two directions."""
+    for pin, damping in effect.coefficients:
+        markers = [bodies.direction(bar) for bar in PINS[pin]]
+        bodies.mbs.AddObject(ObjectConnectorCoordinateSpringDamper(markerNumbers=markers, damping=damping))
+
+
+def _torsion(effect: Any, bodies: Bodies) -> None:
+    """`TorsionalSpringDamper`, which measures within half a turn of rest between axes that coincide there."""
+    for pin, stiffness, rest, preload in effect.springs:
+        one, other = PINS[pin]
+        line = bodies.ground_angle if one == 1 else 0.0
+        markers = [bodies.axes(one, line + rest), bodies.axes(other)]
+        spring = ObjectConnectorTorsionalSpringDamper(markerNumbers=markers, stiffness=stiffness, torque=preload)
+        bodies.mbs.AddObject(spring)
+
+
+def _springs(effect: Any, bodies: Bodies) -> None:
+    """`SpringDamper` between two points."""
+    for spring in effect.springs:
+        ends = (spring.start, spring.end)
+        bodies.mbs.AddObject(
+            ObjectConnectorSpringDamper(
+                markerNumbers=[bodies.point(point.bar, *place(point, bodies.ground_angle)) for point in ends],
+                referenceLength=spring.length,
+                stiffness=spring.stiffness,
+                force=spring.preload,
+            )
+        )
+
+
+ELEMENT_OF: dict[str, Callable[[Any, Bodies], None]] = {"viscous": _viscous, "torsion": _torsion, "springs": _springs}
+"""By the key of an effect."""

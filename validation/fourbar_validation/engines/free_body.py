@@ -1,0 +1,293 @@
+"""The four-bar as three free bodies, by numpy alone: no closed formula, no engine.
+
+The two closure equations, closed by Newton's method, are once and twice differentiated linear in the
+speeds b omega_3, c omega_4 and in b alpha_3, c alpha_4. Forces and moments about the first pin of each bar
+and the two reactions at A and B are thirteen linear equations in F12, F32, F23, F43, F34, F14 and the
+torque (R. L. Norton, Design of Machinery, ch. 11, has them about the mass centres). Vectors of the plane
+are complex numbers, x + i y.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fourbar.linkage import MOVING_BARS, FourBar
+from fourbar.scene import Command, Scene
+from fourbar_validation.compare.answer import Answer, Array
+from fourbar_validation.engines.description import FORCE_AT, SHARED, about_first_pin, centre, speeds, unknown_effect
+from fourbar_validation.engines.free_body_closure import Complex, close, cross
+from fourbar_validation.engines.free_body_effects import WRENCH_OF, Motion, Wrenches, acting, polar, sliding_pins, wound
+
+NAME = "free-body"
+COLUMN = {"F12": 0, "F32": 2, "F23": 4, "F43": 6, "F34": 8, "F14": 10}
+TORQUE = 12
+ROWS = {2: (0, "F12", "F32"), 3: (3, "F23", "F43"), 4: (6, "F14", "F34")}
+"""First row of a bar, the force at its first pin and that at its second."""
+BLOCK = 4096
+"""Positions solved at once: 1.4 kB a matrix, and some four of them at a time, are 22 MB."""
+FRICTION_STAGES = 16
+"""Friction grows from none to its full coefficient in so many stages, each the start of the next."""
+FRICTION_STEPS = 60
+"""Newton's steps in a stage; where it converges it needs a tenth of them."""
+FRICTION_SETTLED = 8.0 * 2.0**-52
+"""Of the sum of the terms of a friction couple's equation: what is left of it is rounding."""
+FRICTION_STARTS = 100
+"""From which other solutions are looked for, over six decades of couples."""
+APART = 1e-6
+"""Relative; two solutions that differ by less are one."""
+
+
+class FreeBody:
+    """Every compared quantity, all positions at once."""
+
+    name = NAME
+
+    def answer(self, scene: Scene, command: Command) -> Answer:
+        """Its answer, or the refusal that names an effect it does not know."""
+        if reason := unknown_effect(scene, WRENCH_OF):
+            return Answer(NAME, "exact", refusal=reason)
+        closed = close(scene.linkage, command.theta_2, command.branch)
+        answer = Answer(
+            NAME,
+            "exact",
+            at=command,
+            assembled=closed.assembled,
+            quantities=_places(scene.linkage, command.theta_2, *closed.theta),
+            evidence={"closure_gap": float(np.max(closed.gap, initial=0.0, where=closed.assembled))},
+            shared=SHARED,
+            own="assembly (Newton on the two closure equations), speeds and accelerations (own 2x2 Jacobian), every "
+            "effect from its definition, the thirteen equations of the free bodies as one system",
+        )
+        if command.omega_2 is not None:
+            commanded = (command.theta_2, *speeds(command), *closed.theta)
+            blocks = [slice(start, start + BLOCK) for start in range(0, len(command.theta_2), BLOCK)]
+            parts = [_answered(scene, *(array[block] for array in commanded)) for block in blocks]
+            answer.evidence["residual"] = max((residual for _, residual in parts), default=0.0)
+            for name in parts[0][0] if parts else ():
+                answer.quantities[name] = np.concatenate([part[name] for part, _ in parts])
+        return answer
+
+
+def _places(linkage: FourBar, theta_2: Array, theta_3: Array, theta_4: Array) -> dict[str, Array]:
+    """Angles of bars 3 and 4, their sine, pins A, B and the mass centres."""
+    unit = {2: np.exp(1j * theta_2), 3: np.exp(1j * theta_3), 4: np.exp(1j * theta_4)}
+    O4 = linkage.ground * np.exp(1j * linkage.ground_angle)
+    foot = {2: 0.0, 3: linkage.input.length * unit[2], 4: O4}
+    found = {"theta_3": theta_3, "theta_4": theta_4, "sin_mu": np.sin(theta_4 - theta_3)}
+    found |= {"A": _plane(foot[3]), "B": _plane(O4 + linkage.output.length * unit[4])}
+    for bar in MOVING_BARS:
+        found[f"G{bar}"] = _plane(foot[bar] + polar(centre(linkage.bar(bar))) * unit[bar])
+    return found
+
+
+def _answered(
+    scene: Scene, theta_2: Array, omega_2: Array, alpha_2: Array, theta_3: Array, theta_4: Array
+) -> tuple[dict[str, Array], float]:
+    """Motion, pin forces and torque at some positions, and the residual of their thirteen equations."""
+    motion = move(scene.linkage, theta_2, omega_2, alpha_2, theta_3, theta_4)
+    unknowns, residual, from_jamming = balance(scene, motion)
+    one, other = (motion.unit[bar] for bar in MOVING_BARS if bar != scene.drive_bar)
+    if (gone := wound(scene, motion)) is not None:
+        unknowns[gone] = np.nan
+    found = {name: unknowns[:, COLUMN[name] : COLUMN[name] + 2] for name in FORCE_AT.values()}
+    for bar in MOVING_BARS:
+        found |= {f"omega_{bar}": motion.omega[bar], f"alpha_{bar}": motion.alpha[bar]}
+    a_A = motion.swing(2, motion.foot[3])
+    found["drive_condition"] = np.abs(cross(one, other)) * from_jamming
+    found |= {"a_A": _plane(a_A), "a_B": _plane(motion.swing(4, scene.linkage.output.length * motion.unit[4]))}
+    for bar in MOVING_BARS:
+        found[f"a_G{bar}"] = _plane(motion.swing(bar, motion.to_centre(bar)) + (a_A if bar == 3 else 0.0))
+    if any(effect.dry for effect in scene.effects):
+        ends = []
+        for side in (1.0, -1.0):
+            begins = move(scene.linkage, theta_2, np.full_like(theta_2, side), 0.0 * theta_2, theta_3, theta_4)
+            ends.append(balance(scene, motion._replace(beginning=begins.omega))[0][:, TORQUE])
+        found |= {"torque_low": np.minimum(*ends), "torque_high": np.maximum(*ends)}
+    if scene.loads or scene.effects:
+        found["torque_inertia"] = balance(replace(scene, loads=(), effects=()), motion)[0][:, TORQUE]
+    return found | {"torque": unknowns[:, TORQUE]}, residual
+
+
+def move(linkage: FourBar, theta_2: Array, omega_2: Array, alpha_2: Array, theta_3: Array, theta_4: Array) -> Motion:
+    """Speeds and accelerations; NaN where the Jacobian is singular."""
+    d, a, b, c = linkage.lengths
+    n = len(theta_2)
+    u_1, u_2 = np.exp(1j * linkage.ground_angle), np.exp(1j * theta_2)
+    u_3, u_4 = np.exp(1j * theta_3), np.exp(1j * theta_4)
+    jacobian = np.stack((_plane(u_3), -_plane(u_4)), axis=-1)
+    v_3, v_4 = solved(jacobian, _plane(-a * omega_2 * u_2)[..., None])[0][..., 0].T
+    omega = {1: np.zeros(n), 2: omega_2, 3: v_3 / b, 4: v_4 / c}
+    centripetal = a * omega_2**2 * u_2 + b * omega[3] ** 2 * u_3 - c * omega[4] ** 2 * u_4
+    w_3, w_4 = solved(jacobian, _plane(-a * alpha_2 * u_2 - 1j * centripetal)[..., None])[0][..., 0].T
+    alpha = {1: np.zeros(n), 2: alpha_2, 3: w_3 / b, 4: w_4 / c}
+    zero = np.zeros(n, dtype=complex)
+    foot = {1: zero, 2: zero, 3: a * u_2, 4: zero + d * u_1}
+    return Motion(linkage, theta_2, {1: zero + u_1, 2: u_2, 3: u_3, 4: u_4}, foot, omega, alpha)
+
+
+def balance(scene: Scene, motion: Motion) -> tuple[Array, float, Array | float]:
+    """The thirteen unknowns (n, 13), N and N m, the largest residual of the system, relative to its terms, and how far
+    sliding friction is from jamming, in (0, 1]."""
+    unknowns, loads, arms, residual = _with_unit_couples(scene, motion)
+    total: Array = unknowns[..., 0]
+    from_jamming: Array | float = 1.0
+    if len(arms):
+        couples = slide(loads[..., 0], loads[..., 1:], arms)
+        from_jamming = distance_from_jamming(loads[..., 0], loads[..., 1:], arms, couples)
+        total = total + (unknowns[..., 1:] * couples[:, None, :]).sum(axis=-1)
+    return total, residual, from_jamming
+
+
+def _with_unit_couples(scene: Scene, motion: Motion) -> tuple[Array, Complex, Array, float]:
+    """The unknowns (n, 13, 1 + p) without sliding friction and per N m of it at each pin; the loads of these pins as
+    complex numbers (n, p, 1 + p), mu r of each (m), and the residual."""
+    pins, wrenches = sliding_pins(scene), acting(scene, motion)
+    _add_inertia(motion, wrenches)
+    columns = [_right(motion.linkage, wrenches)]
+    for pin in pins:
+        unit = Wrenches(len(motion.theta_2))
+        unit.twist_at(pin, -motion.sense(pin))
+        columns.append(_right(motion.linkage, unit))
+    unknowns, residual = solved(_matrix(motion, scene.drive_bar), np.stack(columns, axis=-1))
+    unknowns[:, TORQUE] *= motion.linkage.bar(scene.drive_bar).length
+    first = [COLUMN[FORCE_AT[pin]] for pin in pins]
+    loads = unknowns[:, first] + 1j * unknowns[:, [column + 1 for column in first]]
+    return unknowns, loads, np.array(list(pins.values())), residual
+
+
+def solutions(scene: Scene, command: Command) -> Array:
+    """How many pin forces and friction couples balance the linkage at each position, where it moves, (n,)."""
+    closed = close(scene.linkage, command.theta_2, command.branch)
+    motion = move(scene.linkage, command.theta_2, *speeds(command), *closed.theta)
+    _, loads, arms, _ = _with_unit_couples(scene, motion)
+    return np.array([_number(F, C, arms) for F, C in zip(loads[..., 0], loads[..., 1:], strict=True)], dtype=float)
+
+
+def _number(F: Complex, C: Complex, k: Array) -> int:
+    """Of one position: one where the couples are a contraction, else those found from many starts."""
+    if not (np.isfinite(F).all() and np.isfinite(C).all()):
+        return 0
+    if np.abs(np.linalg.eigvals(k[:, None] * np.abs(C))).max() < 1.0:
+        return 1
+    rng, n = np.random.default_rng(0), FRICTION_STARTS
+    size = float((k * np.abs(F)).max()) or 1.0
+    x = size * 10.0 ** rng.uniform(-3.0, 3.0, (n, 1)) * rng.uniform(0.0, 1.0, (n, len(k)))
+    many = (np.broadcast_to(F, (n, *F.shape)), np.broadcast_to(C, (n, *C.shape)))
+    x, settled, _ = _newton(*many, k, x)
+    found: list[Array] = []
+    for each in x[settled & (x >= 0.0).all(axis=1)]:
+        if all(np.abs(each - other).max() > APART * max(each.max(), other.max()) for other in found):
+            found.append(each)
+    return len(found)
+
+
+def _add_inertia(motion: Motion, wrenches: Wrenches) -> None:
+    """-m a_G and -I alpha (d'Alembert), moments about the first pin, of which that of bar 3 moves."""
+    for number in MOVING_BARS:
+        bar = motion.linkage.bar(number)
+        arm, alpha = motion.to_centre(number), motion.alpha[number]
+        wrenches.push(number, -bar.mass * motion.swing(number, arm), 0.0)
+        wrenches.twist(number, -about_first_pin(bar) * alpha)
+    wrenches.push(3, -motion.linkage.coupler.mass * motion.swing(2, motion.foot[3]), motion.to_centre(3))
+
+
+def _matrix(motion: Motion, drive_bar: int) -> Array:
+    """Rows: forces on bars 2, 3, 4 and moments over the bar's length, reactions at A and B; (n, 13, 13).
+
+    The last column is the torque over the driven bar's length, so that every number is 0, 1 or of a unit vector.
+    """
+    matrix = np.zeros((len(motion.theta_2), 13, 13))
+    for bar, (row, first, second) in ROWS.items():
+        for force in (first, second):
+            matrix[:, row, COLUMN[force]] = matrix[:, row + 1, COLUMN[force] + 1] = 1.0
+        u = motion.unit[bar]
+        matrix[:, row + 2, COLUMN[second]], matrix[:, row + 2, COLUMN[second] + 1] = -u.imag, u.real
+    matrix[:, ROWS[drive_bar][0] + 2, TORQUE] = 1.0
+    for row, (force, reaction) in ((9, ("F32", "F23")), (11, ("F43", "F34"))):
+        for axis in (0, 1):
+            matrix[:, row + axis, COLUMN[force] + axis] = matrix[:, row + axis, COLUMN[reaction] + axis] = 1.0
+    return matrix
+
+
+def _right(linkage: FourBar, wrenches: Wrenches) -> Array:
+    """Right-hand sides, (n, 13), N."""
+    right = np.zeros((len(wrenches.moment[2]), 13))
+    for bar, (row, _, _) in ROWS.items():
+        right[:, row : row + 2] = -_plane(wrenches.force[bar])
+        right[:, row + 2] = -wrenches.moment[bar] / linkage.bar(bar).length
+    return right
+
+
+def solved(matrix: Array, right: Array) -> tuple[Array, float]:
+    """Solutions, NaN where the matrix is singular, and the largest residual relative to |matrix| |x| + |right|.
+
+    One step of refinement makes each equation hold to the rounding of its own terms.
+    """
+    x = np.full(right.shape, np.nan)
+    known = np.asarray(np.isfinite(matrix).all(axis=(1, 2)))
+    known[known] = np.linalg.det(matrix[known]) != 0.0
+    matrix, right = matrix[known], right[known]
+    x[known] = np.linalg.solve(matrix, right)
+    x[known] += np.linalg.solve(matrix, right - matrix @ x[known])
+    terms = np.abs(matrix) @ np.abs(x[known]) + np.abs(right)
+    left = np.abs(right - matrix @ x[known]) / np.where(terms == 0.0, 1.0, terms)
+    return x, float(np.max(left, initial=0.0, where=np.isfinite(left)))
+
+
+def slide(F: Complex, C: Complex, k: Array) -> Array:
+    """The couples x_p = k_p |F_p + sum over q of C_pq x_q|, (n, p), grown from none; NaN where that ends in a jam.
+
+    Parameters
+    ----------
+    F : pin forces without this friction, (n, p), N.
+    C : what a couple of 1 N m against the rotation at pin q adds to the force at pin p, (n, p, p), 1/m.
+    k : mu r of each pin, m.
+    """
+    x = np.full(F.shape, np.nan)
+    left = np.flatnonzero(np.isfinite(F).all(axis=1) & np.isfinite(C).all(axis=(1, 2)))
+    x[left] = 0.0
+    for stage in range(1, FRICTION_STAGES + 1):
+        x[left], settled, det = _newton(F[left], C[left], k * (stage / FRICTION_STAGES), x[left])
+        # without friction the determinant is 1: where it changes its sign the growth has turned back, into a jam
+        grown = settled & (det > 0.0) & (x[left] >= 0.0).all(axis=1)
+        x[left[~grown]] = np.nan
+        left = left[grown]
+    return x
+
+
+def distance_from_jamming(F: Complex, C: Complex, k: Array, x: Array) -> Array:
+    """Least singular value of the slope of the equations of `slide` at their solution, at most 1, (n,)."""
+    with np.errstate(invalid="ignore"):
+        _, matrix = _slope(F, C, k, x)
+    far = np.full(len(x), np.nan)
+    known = np.isfinite(matrix).all(axis=(1, 2))
+    far[known] = np.minimum(np.linalg.svd(matrix[known], compute_uv=False)[:, -1], 1.0)
+    return far
+
+
+def _slope(F: Complex, C: Complex, k: Array, x: Array) -> tuple[Array, Array]:
+    """Loads of the pins under some couples, (n, p), N, and the slope of the equations of `slide` there, (n, p, p)."""
+    force = F + (C * x[:, None, :]).sum(axis=-1)
+    size = np.abs(force)
+    direction = force / np.where(size == 0.0, 1.0, size)
+    return size, np.eye(len(k)) - k[:, None] * (np.conj(direction)[..., None] * C).real
+
+
+def _newton(F: Complex, C: Complex, k: Array, x: Array) -> tuple[Array, NDArray[np.bool_], Array]:
+    """The couples from those of a smaller friction, where their equations hold, and the determinant of their slope."""
+    for _ in range(FRICTION_STEPS):
+        size, matrix = _slope(F, C, k, x)
+        gap, terms = k * size - x, k * (np.abs(F) + (np.abs(C) * x[:, None, :]).sum(axis=-1))
+        settled = (np.abs(gap) <= FRICTION_SETTLED * terms).all(axis=1)
+        step = solved(matrix, gap[..., None])[0][..., 0]
+        moving = ~settled & np.isfinite(step).all(axis=1)
+        if not moving.any():
+            break
+        x = np.where(moving[:, None], x + step, x)
+    return x, settled, np.linalg.det(matrix)
+
+
+def _plane(vectors: Complex) -> Array:
+    """Components, (n, 2)."""
+    return np.stack((vectors.real, vectors.imag), axis=-1)

@@ -1,0 +1,228 @@
+"""What each load and each effect does to the free bodies of a four-bar: a table from its kind to its wrench.
+
+Definitions as in docs/effects.md, from the numbers of the description alone. Vectors of the plane are
+complex numbers, x + i y.
+"""
+
+import math
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fourbar.linkage import MOVING_BARS, FourBar
+from fourbar.scene import Scene, command
+from fourbar_validation.compare.answer import Array
+from fourbar_validation.engines.description import PINS, centre
+from fourbar_validation.engines.free_body_closure import Complex, close, cross
+
+HALF_TURN = math.pi * (1.0 - 1e-12)
+"""From rest a spring is wound; angles of some turns are known so far."""
+
+
+class Motion(NamedTuple):
+    """The bars at n positions, by number, each (n,); the ground is bar 1."""
+
+    linkage: FourBar
+    theta_2: Array
+    unit: dict[int, Complex]
+    """Directions e^{i theta}."""
+    foot: dict[int, Complex]
+    """Where the first pin of each bar is (O2, O2, A, O4), m."""
+    omega: dict[int, Array]
+    alpha: dict[int, Array]
+    beginning: dict[int, Array] | None = None
+    """Speeds of the motion that is about to begin where the linkage rests, rad/s; None: it stays at rest."""
+
+    def to_centre(self, bar: int) -> Complex:
+        """From the first pin of a moving bar to its mass centre, m."""
+        return self.unit[bar] * polar(centre(self.linkage.bar(bar)))
+
+    def swing(self, bar: int, arm: Complex) -> Complex:
+        """Acceleration of the end of an arm of a bar about its foot, m/s^2."""
+        return (1j * self.alpha[bar] - self.omega[bar] ** 2) * arm
+
+    def slip(self, pin: str) -> Array:
+        """omega_j - omega_i of the bars that meet at a pin, rad/s."""
+        i, j = PINS[pin]
+        return self.omega[j] - self.omega[i]
+
+    def sense(self, pin: str) -> Array:
+        """Sign of the slip; where the linkage rests that of the motion about to begin."""
+        slip = self.slip(pin)
+        if self.beginning is None:
+            return np.sign(slip)
+        i, j = PINS[pin]
+        begins = self.beginning[j] - self.beginning[i]
+        begins[np.abs(begins) < TURNS_AS_ONE * (np.abs(self.beginning[j]) + np.abs(self.beginning[i]))] = 0.0
+        return np.where(self.omega[2] == 0.0, np.sign(begins), np.sign(slip))
+
+
+TURNS_AS_ONE = 64.0 * 2.0**-52
+"""Two bars whose speeds differ by less than this part of them turn as one."""
+
+
+class Wrenches:
+    """Sums of the forces (N) on the moving bars and of their moments (N m) about the first pins, (n,) each."""
+
+    def __init__(self, n: int) -> None:
+        self.force: dict[int, Complex] = {bar: np.zeros(n, dtype=complex) for bar in MOVING_BARS}
+        self.moment: dict[int, Array] = {bar: np.zeros(n) for bar in MOVING_BARS}
+
+    def push(self, bar: int, force: Any, arm: Any) -> None:
+        """A force, at `arm` from the bar's first pin; on the ground it does nothing."""
+        if bar in self.force:
+            self.force[bar] = self.force[bar] + force
+            self.moment[bar] = self.moment[bar] + cross(arm, force)
+
+    def twist(self, bar: int, couple: Any) -> None:
+        """A couple; on the ground it does nothing."""
+        if bar in self.moment:
+            self.moment[bar] = self.moment[bar] + couple
+
+    def twist_at(self, pin: str, couple: Any) -> None:
+        """A couple on bar j of a pin (i, j), its opposite on bar i."""
+        i, j = PINS[pin]
+        self.twist(j, couple)
+        self.twist(i, -couple)
+
+
+MEET = 16.0 * 2.0**-52
+"""Two points nearer than this part of the lengths by which they are reached lie in one."""
+
+
+FOLLOWED = np.radians(2.0)
+"""Step in which angles are followed from where a motion begins, rad."""
+
+
+def polar(pair: Any) -> complex:
+    """(distance, angle) as a vector."""
+    length, angle = pair
+    return complex(length * np.cos(angle), length * np.sin(angle))
+
+
+def _gravity(effect: Any, motion: Motion, wrenches: Wrenches) -> None:
+    """Force m g at every mass centre."""
+    for bar in MOVING_BARS:
+        wrenches.push(
+            bar, motion.linkage.bar(bar).mass * polar((effect.magnitude, effect.angle)), motion.to_centre(bar)
+        )
+
+
+def _viscous(effect: Any, motion: Motion, wrenches: Wrenches) -> None:
+    """Couple -k (omega_j - omega_i)."""
+    for pin, k in effect.coefficients:
+        wrenches.twist_at(pin, -k * motion.slip(pin))
+
+
+def _friction(effect: Any, motion: Motion, wrenches: Wrenches) -> None:
+    """Couple -f sign(omega_j - omega_i), none at rest."""
+    for pin, f in effect.torques:
+        wrenches.twist_at(pin, -f * motion.sense(pin))
+
+
+def _torsion(effect: Any, motion: Motion, wrenches: Wrenches) -> None:
+    """Couple -(preload + k (theta_j - theta_i - rest)), the angle within half a turn."""
+    for pin, k, rest, preload in effect.springs:
+        i, j = PINS[pin]
+        angle = np.angle(motion.unit[j] * np.conj(motion.unit[i]) * polar((1.0, -rest)))
+        wrenches.twist_at(pin, -(preload + k * angle))
+
+
+def _springs(effect: Any, motion: Motion, wrenches: Wrenches) -> None:
+    """Pull preload + k (distance - length) along the line of the two points; none is known where they coincide."""
+    for spring in effect.springs:
+        arms = [motion.unit[point.bar] * polar((point.distance, point.angle)) for point in (spring.start, spring.end)]
+        across = motion.foot[spring.end.bar] + arms[1] - motion.foot[spring.start.bar] - arms[0]
+        if spring.preload == spring.stiffness * spring.length:
+            pull = spring.stiffness * across
+        else:
+            reach = sum(motion.linkage.lengths) + abs(spring.start.distance) + abs(spring.end.distance)
+            distance = np.where(np.abs(across) <= MEET * reach, np.nan, np.abs(across))
+            pull = (spring.preload + spring.stiffness * (distance - spring.length)) / distance * across
+        wrenches.push(spring.start.bar, pull, arms[0])
+        wrenches.push(spring.end.bar, -pull, arms[1])
+
+
+def _flywheel(effect: Any, motion: Motion, wrenches: Wrenches) -> None:
+    """Couple -J alpha (d'Alembert)."""
+    wrenches.twist(effect.bar, -effect.inertia * motion.alpha[effect.bar])
+
+
+def _later(effect: Any, motion: Motion, wrenches: Wrenches) -> None:
+    """Nothing: it depends on the pin forces, and is solved with them."""
+
+
+WRENCH_OF: dict[str, Callable[[Any, Motion, Wrenches], None]] = {
+    "gravity": _gravity,
+    "viscous": _viscous,
+    "friction": _friction,
+    "pin_friction": _later,
+    "torsion": _torsion,
+    "springs": _springs,
+    "flywheel": _flywheel,
+}
+"""By the name under which a scene file knows an effect."""
+
+
+def acting(scene: Scene, motion: Motion) -> Wrenches:
+    """Everything that acts on the bars but pins, inertia, drive and what depends on the pin forces."""
+    wrenches = Wrenches(len(motion.theta_2))
+    for load in scene.loads:
+        _load(load, motion, wrenches)
+    for effect in scene.effects:
+        WRENCH_OF[effect.key](effect, motion, wrenches)
+    return wrenches
+
+
+def _load(load: Any, motion: Motion, wrenches: Wrenches) -> None:
+    """A force at its point, from the mass centre, and a couple; in the bar's frame both vectors turn with the bar."""
+    turned = motion.unit[load.bar] if load.frame == "bar" else 1.0
+    factor = 1.0 if load.table is None else _factor(load.table, motion.theta_2)
+    arm = motion.to_centre(load.bar) + turned * polar(load.at)
+    wrenches.push(load.bar, factor * turned * polar(load.force or (0.0, 0.0)), arm)
+    wrenches.twist(load.bar, factor * load.moment)
+
+
+def _factor(table: Any, theta_2: Array) -> Array:
+    """Linear between the points; the angle is taken within half a turn of the middle of the table."""
+    middle = 0.5 * (table.theta_2[0] + table.theta_2[-1])
+    around = np.remainder(theta_2 - middle + np.pi, 2.0 * np.pi) - np.pi
+    return np.asarray(np.interp(middle + around, table.theta_2, table.factor))
+
+
+def wound(scene: Scene, motion: Motion) -> NDArray[np.bool_] | None:
+    """Where a torsion spring is turned by more than half a turn from its rest, followed from where the motion begins.
+
+    None where no spring counts turns, or the motion changes its branch.
+    """
+    springs = [spring for effect in scene.effects if effect.key == "torsion" for spring in effect.springs]  # type: ignore[attr-defined]
+    if not springs or scene.motion.free is not None:
+        return None
+    begins = command(scene)
+    if np.ptp(begins.branch) != 0:
+        return None
+    link, gone = scene.linkage, np.zeros(len(motion.theta_2), dtype=bool)
+    ends = np.concatenate((begins.theta_2, motion.theta_2))
+    steps = math.ceil(float(np.ptp(ends)) / FOLLOWED) + 1
+    path = np.unique(np.concatenate((ends, np.linspace(ends.min(), ends.max(), steps))))
+    closed = close(link, path, np.full(len(path), begins.branch[0]))
+    path = path[closed.assembled]
+    if not (known := np.isin(begins.theta_2, path)).any():
+        return gone
+    theta = {1: np.full(len(path), link.ground_angle), 2: path}
+    theta |= {bar: np.unwrap(closed.theta[bar - 3][closed.assembled]) for bar in (3, 4)}
+    start = begins.theta_2[known][0]
+    first, here = int(np.searchsorted(path, start)), np.clip(np.searchsorted(path, motion.theta_2), 0, len(path) - 1)
+    for pin, _, rest, _ in springs:
+        i, j = PINS[pin]
+        away = theta[j] - theta[i] - rest
+        gone |= np.abs(away[here] - 2.0 * np.pi * np.floor(away[first] / (2.0 * np.pi) + 0.5)) > HALF_TURN
+    return gone
+
+
+def sliding_pins(scene: Scene) -> dict[str, float]:
+    """mu r of each pin whose friction depends on its load, m."""
+    pins = [pin for effect in scene.effects if effect.key == "pin_friction" for pin in effect.pins]  # type: ignore[attr-defined]
+    return {name: mu * r for name, mu, r in pins if mu * r != 0.0}

@@ -1,0 +1,195 @@
+"""The bars of a four-bar as an engine holds them; loads and effects act on them as wrenches, from its own numbers."""
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Any, Protocol
+
+import numpy as np
+
+from fourbar.linkage import MOVING_BARS
+from fourbar.scene import Scene
+from fourbar_validation.compare.answer import Array
+from fourbar_validation.engines.description import FORCE_AT, turned, turned_by
+
+PASSES = 1000
+"""Passes over pin loads and the friction they make; each lessens the error where the friction is far from a jam."""
+STAGES, STEPS = 16, 30
+"""Near a jam friction grows from none in so many stages, each by at most so many of Newton's steps."""
+NUDGE = 1e-6
+"""Of the greatest load: by how much each is changed for the slopes of a pass."""
+REPEATED = 2.0 * 2.0**-52
+"""Change of a pin load, relative, that is rounding."""
+ROUNDED = 1e-11
+"""Change, relative, at or below which one that no longer falls is rounding, near a pole of the torque too."""
+DIVERGED = 1e100
+"""Load, N, that only passes running away from each other reach."""
+Act = Callable[[], None]
+"""What acts on the bars, at their present motion."""
+Values = dict[str, Array | float]
+
+
+class Assembled(Protocol):
+    """Bars opened at pin A or B, as an engine places them; every number is the engine's own."""
+
+    def place(self, q: Sequence[float]) -> None:
+        """Move to a configuration."""
+
+    def gap(self) -> tuple[float, float]:
+        """B on bar 3 minus B on bar 4, or A on bar 2 minus A on bar 3, m."""
+
+    def jacobian(self) -> Array:
+        """Derivative of the gap, (2, 3), m."""
+
+    def positions(self) -> dict[str, Array]:
+        """Points O4, A, B, "B4", the end of bar 4, and where pin A is open "A2", that of bar 2; (2,), m."""
+
+
+class Bars(Assembled, Protocol):
+    """An engine holding the bars of a scene, which knows their mass centres (G2, G3, G4 among the points) and moves."""
+
+    own: str
+    """What the engine finds alone, for the report."""
+    alone: bool = False
+    """Whether it answers the torque that the bars without loads and effects take, too: `torque_inertia`."""
+    ground_angle: float
+
+    def angle(self, bar: int) -> float:
+        """Direction of a bar's line, in (-pi, pi], rad."""
+
+    def move(self, omega_2: float, alpha_2: float) -> Values:
+        """Motion and forces where the bars are placed, by name; empty where a toggle leaves them 0/0."""
+
+    def refusal(self) -> str:
+        """Why what was answered does not count, or nothing."""
+        return ""
+
+
+class Loaded(Bars, Protocol):
+    """Bars on which loads and effects act, each by its row of the table `effects.TERM_OF`.
+
+    The ground (bar 1) does not move; its line points from O2 to O4.
+    """
+
+    drive_bar: int
+    field: tuple[float, float] = (0.0, 0.0)
+    """Of gravity, m/s^2."""
+    loaded: list[str]
+    """Pins whose friction depends on their load."""
+    pin_loads: dict[str, float]
+    """Magnitudes of its own pin forces in the last pass, by pin, N; empty before the first."""
+    wrenches: dict[int, list[float]]
+    """What acts on each moving bar, summed: a force at its first pin and a couple, (x, y, moment), N and N m."""
+    terms: list[Act]
+
+    def ready(self, scene: Scene, terms: list[Act]) -> None:
+        """To be called by an engine that has its bars, with what acts on them."""
+        self.ground_angle, self.drive_bar, self.terms = scene.linkage.ground_angle, scene.drive_bar, terms
+        self.loaded = [pin for effect in scene.effects for pin in effect.loaded_pins]
+
+    # what the engine gives
+    def point(self, name: str) -> Array:
+        """A point that `description.parts` names, world axes, (2,), m; perhaps the engine's own memory."""
+
+    def rotation(self, bar: int) -> Array:
+        """Axes along and across a moving bar's line, (2, 2)."""
+
+    def velocity(self, bar: int) -> float:
+        """Angular velocity of a bar, rad/s."""
+
+    def alpha(self, bar: int) -> float:
+        """Angular acceleration of a bar, rad/s^2."""
+
+    # what follows
+    def angle(self, bar: int) -> float:
+        """From the bar's axes; the ground's line as described."""
+        if bar == 1:
+            return self.ground_angle
+        along = self.rotation(bar)[:, 0]
+        return math.atan2(along[1], along[0])
+
+    def turned(self, bar: int, x: float, y: float) -> Array:
+        """World axes of the vector that is (x, y) along and across a bar's line, (2,)."""
+        found = turned(self.ground_angle, x, y) if bar == 1 else turned_by(self.rotation(bar).tolist(), x, y)
+        return np.array(found)
+
+    def foot(self, bar: int) -> Array:
+        """First pin of a bar (O2, O2, A, O4 of bars 1, 2, 3, 4), m, (2,)."""
+        return np.zeros(2) if bar == 1 else self.point(f"foot{bar}")
+
+    def gravity(self, field: tuple[float, float]) -> None:
+        """A field (g_x, g_y) for the engine's own gravity, m/s^2."""
+        self.field = field
+
+    def push(self, bar: int, force: Array, point: Array) -> None:
+        """Add a force (N, world axes) at a point (m, world axes); on the ground it does nothing."""
+        if bar != 1:
+            (x, y), (f_x, f_y), wrench = (point - self.foot(bar)).tolist(), force.tolist(), self.wrenches[bar]
+            wrench[0] += f_x
+            wrench[1] += f_y
+            wrench[2] += x * f_y - y * f_x
+
+    def twist(self, bar: int, couple: float) -> None:
+        """Add a couple, N m; on the ground it does nothing."""
+        if bar != 1:
+            self.wrenches[bar][2] += couple
+
+    def act(self) -> None:
+        """Sum anew what acts on the bars at their present motion."""
+        self.wrenches = no_wrenches()
+        for act in self.terms:
+            act()
+
+    def settled(self, balanced: Callable[[], dict[str, Any]]) -> dict[str, Any]:
+        """Pin forces and torque that balance what acts, by name; nothing where friction jams.
+
+        Effects that depend on the load of a pin are given the loads of the pass before, until they repeat.
+        """
+        self.pin_loads, before = {}, math.inf
+        forces = balanced()
+        for _ in range(PASSES if self.loaded else 0):
+            loads = {pin: math.hypot(*forces[FORCE_AT[pin]]) for pin in self.loaded}
+            most = max(loads.values())
+            change = max(abs(load - self.pin_loads.get(pin, 0.0)) for pin, load in loads.items())
+            # once down to the rounding of a pass, the change falls no further
+            if change <= REPEATED * most or before <= change <= ROUNDED * most:
+                return forces
+            if not most < DIVERGED:
+                break
+            before, self.pin_loads = change, loads
+            forces = balanced()
+        return self._grown(balanced) if self.loaded else forces
+
+    def _grown(self, balanced: Callable[[], dict[str, Any]]) -> dict[str, Any]:
+        """The forces with friction grown from none, where passes run away; nothing where the growth ends in a jam.
+
+        By Newton's steps, the slopes from passes with each load changed a little.
+        """
+
+        def passed(loads: Array) -> tuple[dict[str, Any], Array]:
+            self.pin_loads = dict(zip(self.loaded, loads.tolist(), strict=True))
+            forces = balanced()
+            return forces, np.array([math.hypot(*forces[FORCE_AT[pin]]) for pin in self.loaded])
+
+        unit = np.eye(len(self.loaded))
+        forces, loads = passed(np.zeros(len(unit)))
+        for share in np.arange(1, STAGES + 1) / STAGES:
+            before = math.inf
+            for _ in range(STEPS):
+                forces, found = passed(share * loads)
+                most, change = float(found.max()), float(np.abs(found - loads).max())
+                if not most < DIVERGED or change <= REPEATED * most or before <= change <= ROUNDED * most:
+                    break
+                nudge, before = NUDGE * most, change
+                moved = [(passed(share * (loads + nudge * one))[1] - found) / nudge for one in unit]
+                matrix = unit - np.stack(moved, axis=1)
+                if np.linalg.det(matrix) <= 0.0:  # 1 without friction: beyond zero the growth has turned back
+                    return {}
+                loads = loads + np.linalg.solve(matrix, found - loads)
+            if not change <= ROUNDED * most or (loads < 0.0).any():
+                return {}
+        return forces
+
+
+def no_wrenches() -> dict[int, list[float]]:
+    """Of bars on which nothing acts."""
+    return {bar: [0.0, 0.0, 0.0] for bar in MOVING_BARS}

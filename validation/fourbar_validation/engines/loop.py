@@ -1,0 +1,220 @@
+"""A four-bar assembled position by position, by whatever engine moves its bars: what an exact engine answers."""
+
+import math
+import time
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fourbar.errors import LimitError
+from fourbar.quantities import ANGLES, PIN_FORCES, STAGE_OF, STAGES, VECTORS
+from fourbar.scene import Command, Scene
+from fourbar_validation.compare.answer import Answer, Array
+from fourbar_validation.engines.description import SHARED, speeds
+from fourbar_validation.engines.free_body_closure import LONGEST_STEP, NEWTON_STEPS, STARTS
+from fourbar_validation.engines.loaded import Assembled, Bars, Values
+
+START_ANGLES = np.radians(STARTS).tolist()
+SHORTEST_STEP = 2.0**-40
+"""A step halved this often moves nothing that a gap above the rounding could tell."""
+NOT_ANSWERED = frozenset(
+    (
+        *("theta_2", "omega_2", "alpha_2", "condition", "drive_condition"),
+        *("torque_error", "force_error", "torque_low", "torque_high", "friction_residual"),
+        *("v_A", "v_B", "v_G2", "v_G3", "v_G4"),
+    )
+)
+"""What is commanded, follows from others that are answered, or is of the formulas alone."""
+ROUNDING = 16.0 * 2.0**-52
+"""Gap, relative to the sum of the lengths, that the roundings of a chain of three bars alone can leave."""
+
+
+Angles = tuple[float, float, float]
+"""Turns of bar 2 at O2, of bar 3 against bar 2 at A, of bar 4 at O4, rad."""
+
+
+class Position:
+    """Assembles a tree at commanded angles of bar 2, one after another."""
+
+    def __init__(self, tree: Assembled) -> None:
+        self.tree = tree
+
+    def find(self, theta_2: float, branch: int) -> Angles | None:
+        """The configuration on the branch, with the tree placed there, or None where the loop does not close."""
+        tree = self.tree
+        tree.place((theta_2, 0.0, 0.0))
+        at = tree.positions()
+        pin_a = at.get("A2", at["A"])
+        diagonal = at["O4"] - pin_a
+        e, a, d, b, c = (
+            math.hypot(*vector.tolist())
+            for vector in (diagonal, pin_a, at["O4"], at["B"] - at["A"], at["B4"] - at["O4"])
+        )
+        closed = ROUNDING * (a + d + b + c)
+        # with bar 2 held, the gap is stationary only where bars 3 and 4 lie along the diagonal: this is its least value
+        if max(e - (b + c), abs(b - c) - e) > closed:
+            return None
+        phi = math.atan2(diagonal[1], diagonal[0])
+        # the triangle as measured is the nearest start, also where a bar is a millionth of the others
+        triangle = _triangle_angle(e, b, c), _triangle_angle(e, c, b)
+        for alpha, beta in (triangle, *START_ANGLES):
+            theta_3, theta_4 = phi + branch * alpha, phi + math.pi - branch * beta
+            q = theta_2, math.remainder(theta_3 - theta_2, math.tau), math.remainder(theta_4, math.tau)
+            found = newton(tree, q, branch, closed)
+            if found is not None:
+                return found
+        if max(e - (b + c), abs(b - c) - e) < -closed:
+            raise ArithmeticError(f"the loop closes at theta_2 = {theta_2!r}, but Newton's method does not find it")
+        return None
+
+
+def _triangle_angle(e: float, near: float, far: float) -> float:
+    """The angle between the sides e and near, by half-angle tangents."""
+    above, below = (e - near + far) * (far + near - e), (e + near - far) * (e + near + far)
+    return 2.0 * math.atan2(math.sqrt(max(above, 0.0)), math.sqrt(max(below, 0.0)))
+
+
+def newton(tree: Assembled, q: Angles, branch: int, closed: float) -> Angles | None:
+    """Close the gap with bar 2 held, never leaving the branch.
+
+    The determinant of the gap's derivative by (q3, q4) is -b c sin(theta_4 - theta_3): its sign is the
+    branch's. A step is halved until the gap falls and the sign is kept; the last one is taken where
+    nothing smaller than `closed` (m) falls any further.
+    """
+
+    def look(q: Angles) -> tuple[float, float, float, float, float, float, float]:
+        tree.place(q)
+        x, y = tree.gap()
+        (_, a, b), (_, c, d) = tree.jacobian().tolist()
+        return x, y, a, b, c, d, a * d - b * c
+
+    here = look(q)
+    if here[6] * branch >= 0.0:
+        return None
+    for _ in range(NEWTON_STEPS):
+        x, y, a, b, c, d, det = here
+        step_3, step_4 = (b * y - d * x) / det, (c * x - a * y) / det
+        size = math.hypot(x, y)
+        part = min(1.0, LONGEST_STEP / max(abs(step_3), abs(step_4), LONGEST_STEP))
+        while True:
+            trial = (q[0], q[1] + part * step_3, q[2] + part * step_4)
+            there = look(trial)
+            if math.hypot(there[0], there[1]) < size and there[6] * branch < 0.0:
+                break
+            part /= 2.0
+            if size <= closed or part < SHORTEST_STEP:
+                tree.place(q)
+                return q if size <= closed else None
+        q, here = trial, there
+    return q if math.hypot(here[0], here[1]) <= closed else None
+
+
+@dataclass(slots=True)
+class Exact:
+    """An engine that answers each position by itself."""
+
+    name: str
+    build: Callable[[Scene], Bars]
+    """Its bars from the description; LimitError says why it cannot hold them."""
+
+    def answer(self, scene: Scene, command: Command) -> Answer:
+        """Its answer, or the refusal that names what it does not know or cannot hold."""
+        try:
+            bars = self.build(scene)
+        except LimitError as error:
+            return Answer(self.name, "exact", refusal=str(error))
+        start, moves = time.perf_counter(), command.omega_2 is not None
+        wanted = STAGES if moves else ("position",)
+        names = [name for name, stage in STAGE_OF.items() if stage in wanted and name not in NOT_ANSWERED]
+        names += ["torque_inertia"] if bars.alone and moves else []
+
+        def read(q: Angles, omega_2: float, alpha_2: float) -> Values:
+            points, theta_3, theta_4 = bars.positions(), bars.angle(3), bars.angle(4)
+            values: Values = {name: points[name] for name in ("A", "B", "G2", "G3", "G4")}
+            values |= {"theta_3": theta_3, "theta_4": theta_4, "sin_mu": math.sin(theta_4 - theta_3)}
+            return values | (bars.move(omega_2, alpha_2) if moves else {})
+
+        out, assembled, gap = at_each(bars, command, names, read)
+        if reason := bars.refusal():
+            return Answer(self.name, "exact", refusal=reason)
+        for name in ANGLES:
+            out[name][assembled] = np.unwrap(out[name][assembled])
+        answer = Answer(self.name, "exact", command, assembled, out, evidence={"closure_gap": gap})
+        answer.shared, answer.own, answer.seconds = SHARED, bars.own, time.perf_counter() - start
+        return answer
+
+
+Read = Callable[[Angles, float, float], Values]
+"""Of the configuration in which the bars stand, omega_2 and alpha_2: values by name."""
+
+
+def at_each(
+    bars: Assembled, command: Command, names: Iterable[str], read: Read
+) -> tuple[dict[str, Array], NDArray[np.bool_], float]:
+    """What is read at each position that assembles, NaN elsewhere; where that is; the greatest gap left, m."""
+    n, (omega, alpha) = len(command.theta_2), speeds(command)
+    missing: dict[str, Any] = {name: (math.nan, math.nan) if name in VECTORS else math.nan for name in names}
+    rows, assembled, gap, position = [missing] * n, np.zeros(n, dtype=bool), 0.0, Position(bars)
+    for i, (theta_2, branch) in enumerate(zip(command.theta_2.tolist(), command.branch.tolist(), strict=True)):
+        if (q := position.find(theta_2, branch)) is not None:
+            assembled[i], gap = True, max(gap, math.hypot(*bars.gap()))
+            rows[i] = missing | read(q, float(omega[i]), float(alpha[i]))
+    return {name: np.array([row[name] for row in rows], float) for name in missing}, assembled, gap
+
+
+MADE = ("theta_2", "omega_2", "alpha_2")
+"""The motion that an engine really made."""
+
+
+def blank(n: int, names: Iterable[str] = (*MADE, "torque", *PIN_FORCES)) -> dict[str, Array]:
+    """NaN for each of n positions, (n,) or (n, 2)."""
+    return {name: np.full((n, 2) if name in VECTORS else n, np.nan) for name in names}
+
+
+def as_made(out: dict[str, Array], branch: NDArray[np.int8]) -> tuple[Command, dict[str, Array]]:
+    """The motion that was made, as a command, and the other quantities read on it."""
+    theta_2, omega_2, alpha_2 = (out[name] for name in MADE)
+    rest = {name: values for name, values in out.items() if name not in MADE}
+    return Command(theta_2, branch, omega_2, alpha_2), rest
+
+
+@dataclass(slots=True, eq=False)
+class Trial:
+    """What one run through a scene gave, with some settings."""
+
+    at: Command
+    """The motion that was really made."""
+    quantities: dict[str, Array] = field(default_factory=dict)
+    """Torque (n,) and pin forces (n, 2), under the names of `fourbar.Solution`."""
+    steps: int = 0
+    steps_per_revolution: float = 0.0
+    """At the fastest speed of the run."""
+    stepping: float = 0.0
+    """CPU seconds in steps."""
+    reading: float = 0.0
+    """CPU seconds in reading the samples."""
+    stretches: tuple[tuple[slice, int], ...] = ()
+    """The samples of each stretch, and its steps: several samples are of one step where these are fewer."""
+    broken: str = ""
+    """Where the engine lost the motion: what it reported of itself."""
+
+
+class LimitWatch:
+    """Sees bars 3 and 4 of one branch come to lie in one line, from step to step of an engine."""
+
+    def __init__(self, branch: int) -> None:
+        self.branch, self.before = branch, (0.0, 0.0)
+        self.stopped_at: float | None = None
+
+    def look(self, time: float, theta_3: float, theta_4: float) -> None:
+        """Take in a state; the instant between two of them is that of the line through their sines."""
+        if self.stopped_at is not None:
+            return
+        sine = self.branch * math.sin(theta_4 - theta_3)
+        began, last = self.before
+        if sine < 0.0:
+            self.stopped_at = began + (time - began) * max(last, 0.0) / (max(last, 0.0) - sine)
+        self.before = (time, sine)

@@ -1,0 +1,236 @@
+"""The four-bar in somebody's compiled MJCF: which body is which bar, where its pins are, what holds the loop closed.
+
+Any cut is understood: three of the pins are hinges, the fourth is an equality (connect, weld) or two sites by
+name. The plane may be any of the world's three.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+
+import mujoco
+import numpy as np
+
+from fourbar.errors import InputError
+from fourbar.linkage import BAR_NAMES, MOVING_BARS, PINS
+from fourbar.linkage import ENDS as MOVING_ENDS
+from fourbar_validation.compare.answer import Array
+
+PIN_OF = {frozenset(bars): pin for pin, bars in PINS.items()}
+ENDS = {1: ("O2", "O4"), **MOVING_ENDS}
+"""The pins between which a bar's line runs."""
+PLANES = {2: ("x-y", (0, 1)), 1: ("x-z", (0, 2)), 0: ("y-z", (1, 2))}
+"""Axis of the hinges: the plane they move in, and the world axes that stand for x and y there."""
+STRAIGHT = 1e-9
+"""A hinge tilted by more than this (sine) leaves the plane."""
+
+
+def body_named(model: mujoco.MjModel, name: str) -> int | None:
+    """The body of a name, by what it is welded to; None where there is none."""
+    number = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, name)
+    return int(model.body_weldid[number]) if number >= 0 else None
+
+
+def bodies_of(model: mujoco.MjModel) -> str:
+    """The bodies of a file by name, for a message."""
+    return ", ".join(model.body(i).name or f"(unnamed {i})" for i in range(1, model.nbody))
+
+
+def stated_body(model: mujoco.MjModel, names: Mapping[str, str], role: str) -> int:
+    """The body of a bar by its stated name, or by the bar's; InputError where there is none."""
+    name = names.get(role, role)
+    body = body_named(model, name)
+    if body is None:
+        raise InputError("--name", f"{role}={name}", f"no such body; the file has: {bodies_of(model)}")
+    return body
+
+
+class Anatomy:
+    """Bars, pins, hinges and closure of a compiled model; everything is measured in its rest state."""
+
+    def __init__(self, model: mujoco.MjModel, names: Mapping[str, str]) -> None:
+        self.model, self.data, self.names = model, mujoco.MjData(model), dict(names)
+        mujoco.mj_kinematics(model, self.data)
+        mujoco.mj_comPos(model, self.data)
+        self.root = {1: 0} | {bar: stated_body(model, names, BAR_NAMES[bar]) for bar in MOVING_BARS}
+        self.bar_of_root = {body: bar for bar, body in self.root.items()}
+        if len(self.bar_of_root) < len(self.root):
+            raise InputError("--name", dict(names), "input, coupler and output must be three bodies that move")
+        self.point: dict[tuple[int, str], Array] = {}
+        """(bar, pin): where the pin is in the frame of the bar's body, (3,), m."""
+        self.hinge: dict[str, int] = {}
+        self.sense: dict[str, float] = {}
+        self._find_plane()
+        for joint in range(model.njnt):
+            self._add_hinge(joint)
+        if len(self.hinge) != 3:
+            raise InputError("--mjcf", sorted(self.hinge), "must have hinges at three of the pins O2, A, B, O4")
+        (self.cut,) = PINS.keys() - self.hinge.keys()
+        self.closure: int | None = None
+        self.closed_by = "nothing"
+        self._find_closure(names)
+        lines = {bar: self.line(self.data, bar) for bar in ENDS}
+        self._line = {bar: math.atan2(y, x) for bar, (x, y) in lines.items()}
+        self._rest = self.data.qpos.copy()
+        self._rest_angles = np.array((self._line[2], self._line[3] - self._line[2], self._line[4]))
+        self.to_joints = self._to_joints()
+        """Joint speeds from those of (theta_2, theta_3 - theta_2, theta_4), (3, 3)."""
+
+    def drives(self) -> list[int]:
+        """The actuators that turn pin O2."""
+        model, joint = self.model, self.hinge.get("O2")
+        on_joints = np.flatnonzero(model.actuator_trntype == mujoco.mjtTrn.mjTRN_JOINT).tolist()
+        return [i for i in on_joints if model.actuator_trnid[i, 0] == joint]
+
+    def bar(self, body: int) -> int | None:
+        """The bar that a body belongs to; None where it is no part of the four-bar."""
+        return self.bar_of_root.get(int(self.model.body_weldid[body]))
+
+    def _find_plane(self) -> None:
+        hinges = self.model.jnt_type == mujoco.mjtJoint.mjJNT_HINGE
+        if not hinges.any():
+            raise InputError("--mjcf", None, "must have hinges at three of the pins O2, A, B, O4")
+        across = int(np.argmax(np.abs(self.data.xaxis[np.argmax(hinges)])))
+        self.plane, self.axes = PLANES[across]
+        e = np.eye(3)
+        self.normal = np.cross(e[self.axes[0]], e[self.axes[1]])
+
+    def _add_hinge(self, joint: int) -> None:
+        model, name = self.model, self.model.joint(joint).name or f"(unnamed {joint})"
+        body = model.jnt_bodyid[joint]
+        bars = [self.bar(body), self.bar(model.body_parentid[body])]
+        kind = mujoco.mjtJoint(model.jnt_type[joint])
+        if kind != mujoco.mjtJoint.mjJNT_HINGE or None in bars:
+            raise InputError(
+                "--mjcf", name, "every joint must be a hinge of the input, coupler or output; name the bodies by --name"
+            )
+        pin = PIN_OF.get(frozenset(bars))  # type: ignore[arg-type]
+        if pin is None or pin in self.hinge:
+            raise InputError("--mjcf", name, "joins bars that have no pin in common, or have one already")
+        along = float(self.data.xaxis[joint] @ self.normal)
+        if abs(along) < 1.0 - STRAIGHT**2:
+            raise InputError("--mjcf", name, f"the hinge must be normal to the {self.plane} plane")
+        self.hinge[pin], self.sense[pin] = joint, math.copysign(1.0, along)
+        for bar in bars:
+            assert bar is not None
+            self.point[bar, pin] = self._in_bar(bar, self.data.xanchor[joint])
+
+    def _in_bar(self, bar: int, world: Array) -> Array:
+        body = self.root[bar]
+        return np.asarray(self.data.xmat[body].reshape(3, 3).T @ (world - self.data.xpos[body]))
+
+    def _on(self, body: int, local: Array) -> Array:
+        return np.asarray(self.data.xpos[body] + self.data.xmat[body].reshape(3, 3) @ local)
+
+    def _find_closure(self, names: Mapping[str, str]) -> None:
+        """The equality between the two bars of the cut pin, or two sites that mark it."""
+        model, kinds = self.model, mujoco.mjtEq
+        for number in range(model.neq):
+            kind = kinds(model.eq_type[number])
+            if kind not in (kinds.mjEQ_CONNECT, kinds.mjEQ_WELD) or not model.eq_active0[number]:
+                continue
+            ends = self._ends(number, kind)
+            bars = [self.bar(body) for body, _ in ends]
+            if None in bars or PIN_OF.get(frozenset(bars)) != self.cut:  # type: ignore[arg-type]
+                continue
+            for bar, (_, world) in zip(bars, ends, strict=True):
+                assert bar is not None
+                self.point[bar, self.cut] = self._in_bar(bar, world)
+            self.closure, self.first = number, bars[0]
+            by_sites = model.eq_objtype[number] == mujoco.mjtObj.mjOBJ_SITE
+            word = "connect" if kind == kinds.mjEQ_CONNECT else "weld"
+            self.closed_by = f"{word} of {'sites' if by_sites else 'body anchors'}"
+            return
+        for role, bar in zip(("B3", "B4"), PINS["B"], strict=True):
+            name = names.get(role, role)
+            site = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SITE, name)
+            if self.cut != "B" or site < 0 or self.bar(model.site_bodyid[site]) != bar:
+                raise InputError(
+                    "--mjcf",
+                    self.cut,
+                    "no connect or weld closes the loop at this pin; where something else does, say where pin B is: "
+                    "--name B3=SITE on the coupler, --name B4=SITE on the output",
+                )
+            self.point[bar, "B"] = self._in_bar(bar, self.data.site_xpos[site])
+        if (model.eq_type == kinds.mjEQ_TENDON).any():
+            self.closed_by = "tendon"
+
+    def _ends(self, number: int, kind: mujoco.mjtEq) -> list[tuple[int, Array]]:
+        """The body and the world point at either end of an equality."""
+        model = self.model
+        objects = (int(model.eq_obj1id[number]), int(model.eq_obj2id[number]))
+        if model.eq_objtype[number] == mujoco.mjtObj.mjOBJ_SITE:
+            return [(int(model.site_bodyid[site]), self.data.site_xpos[site].copy()) for site in objects]
+        anchors = [model.eq_data[number, 0:3], model.eq_data[number, 3:6]]
+        if kind == mujoco.mjtEq.mjEQ_WELD:  # it keeps the second body's anchor first
+            anchors.reverse()
+        return [(body, self._on(body, anchor)) for body, anchor in zip(objects, anchors, strict=True)]
+
+    def in_plane(self, vector: Array) -> Array:
+        """The two components in the linkage's plane, (2,)."""
+        return np.array(vector)[list(self.axes)]
+
+    def world(self, data: mujoco.MjData, bar: int, pin: str) -> Array:
+        """Where a bar has a pin, world axes, (3,)."""
+        body = self.root[bar]
+        return np.asarray(data.xpos[body] + data.xmat[body].reshape(3, 3) @ self.point[bar, pin])
+
+    def line(self, data: mujoco.MjData, bar: int) -> Array:
+        """A bar's line from its first pin to its second, in the plane, (2,), m."""
+        first, second = (self.world(data, bar, pin) for pin in ENDS[bar])
+        return self.in_plane(second - first)
+
+    def length(self, bar: int) -> float:
+        """Distance between a bar's pins in the plane, m."""
+        return math.hypot(*self.line(self.data, bar))
+
+    @property
+    def ground_angle(self) -> float:
+        """theta_1, rad."""
+        return self._line[1]
+
+    def rest_angle(self, pin: str) -> float:
+        """What a hinge is turned by in the rest state: the line of the bar that hangs on it from that of its bearer."""
+        child, parent = self.turning(pin)
+        return self._line[child] - self._line[parent]
+
+    def along_bar(self, bar: int, world: Array) -> tuple[float, float]:
+        """Where a point is from a bar's first pin in the rest state: along its line and to its left, m."""
+        return self.turned_back(bar, world - self.world(self.data, bar, ENDS[bar][0]))
+
+    def turned_back(self, bar: int, vector: Array) -> tuple[float, float]:
+        """A vector's components along a bar's line in the rest state and to its left."""
+        x, y = self.in_plane(vector)
+        cos, sin = math.cos(self._line[bar]), math.sin(self._line[bar])
+        return float(cos * x + sin * y), float(cos * y - sin * x)
+
+    def _to_joints(self) -> Array:
+        turns = {1: np.zeros(3), 2: np.array([1.0, 0, 0]), 3: np.array([1.0, 1.0, 0]), 4: np.array([0, 0, 1.0])}
+        matrix = np.zeros((self.model.nv, 3))
+        for pin, joint in self.hinge.items():
+            child, parent = self.turning(pin)
+            matrix[self.model.jnt_dofadr[joint]] = self.sense[pin] * (turns[child] - turns[parent])
+        return matrix
+
+    def turning(self, pin: str) -> tuple[int, int]:
+        """The bar that hangs on the hinge of a pin, and the bar that bears it."""
+        body = self.model.jnt_bodyid[self.hinge[pin]]
+        child = self.bar(body)
+        assert child is not None
+        (parent,) = set(PINS[pin]) - {child}
+        return child, parent
+
+    def qpos(self, x: Sequence[float]) -> Array:
+        """Joint positions at (theta_2, theta_3 - theta_2, theta_4)."""
+        q = self._rest.copy()
+        turned = self.to_joints @ (np.asarray(x) - self._rest_angles)
+        for joint in self.hinge.values():
+            q[self.model.jnt_qposadr[joint]] += turned[self.model.jnt_dofadr[joint]]
+        return np.asarray(q)
+
+    def angles(self, data: mujoco.MjData) -> Array:
+        """(theta_2, theta_3 - theta_2, theta_4) of a state."""
+        moved = np.empty(3)
+        for joint in self.hinge.values():
+            address = self.model.jnt_qposadr[joint]
+            moved[self.model.jnt_dofadr[joint]] = data.qpos[address] - self._rest[address]
+        return np.asarray(np.linalg.solve(self.to_joints, moved) + self._rest_angles)

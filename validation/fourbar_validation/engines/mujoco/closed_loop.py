@@ -1,0 +1,168 @@
+"""A compiled MJCF as a closed loop: MuJoCo's own kinematics, assembly, velocities and pin forces."""
+
+from collections.abc import Callable, Sequence
+
+import mujoco
+import numpy as np
+
+from fourbar_validation.compare.answer import Array
+from fourbar_validation.engines.loaded import Assembled
+from fourbar_validation.engines.tree import closed
+
+CARRIED_BY = {"input": ("input",), "coupler": ("coupler", "input"), "output": ("output",)}
+"""The bodies whose parent bears what acts on a body."""
+O2, A, O4 = 0, 1, 2
+"""Degrees of freedom, in the order of the bodies."""
+TURNED_BY = {2: [O2], 3: [O2, A], 4: [O4]}
+"""Joints whose angles a bar's rotation is the sum of."""
+WARNINGS = (mujoco.mjtWarning.mjWARN_BADQPOS, mujoco.mjtWarning.mjWARN_BADQVEL, mujoco.mjtWarning.mjWARN_BADQACC)
+
+
+def load_force(model: mujoco.MjModel, data: mujoco.MjData, actuator: int) -> Array:
+    """World force of an actuator on a site, (3,): MuJoCo counts it into the force of the parent."""
+    site, frame = model.actuator_trnid[actuator]
+    axes = data.site_xmat[frame if frame >= 0 else site].reshape(3, 3)
+    return np.asarray(axes @ model.actuator_gear[actuator, :3] * data.actuator_force[actuator])
+
+
+class ClosedLoop(Assembled):
+    """Model and data of one generated MJCF; nothing is edited after it is compiled."""
+
+    def __init__(self, mjcf: str) -> None:
+        self.model = mujoco.MjModel.from_xml_string(mjcf)
+        self.data = mujoco.MjData(self.model)
+        self.site = {name: self.model.site(name).id for name in ("A", "O4", "B3", "B4")}
+        self.body = {name: self.model.body(name).id for name in ("input", "coupler", "output")}
+        loads = [i for i in range(self.model.nu) if self.model.actuator(i).name.startswith("load_")]
+        self.loads = [(i, self.model.site_bodyid[self.model.actuator_trnid[i, 0]]) for i in loads]
+        self.drive = next((i for i in range(self.model.nu) if self.model.actuator(i).name == "drive"), None)
+        self._jac = np.zeros((3, self.model.nv))
+
+    def gap(self) -> tuple[float, float]:
+        """B on bar 3 minus B on bar 4, m."""
+        x = self.data.site_xpos[self.site["B3"]] - self.data.site_xpos[self.site["B4"]]
+        return (float(x[0]), float(x[1]))
+
+    def jacobian(self) -> Array:
+        """Derivative of the gap by the joint angles, (2, 3)."""
+        return self.jacobian_at("B3") - self.jacobian_at("B4")
+
+    def jacobian_at(self, site: str) -> Array:
+        """Derivative of a site's position by the joint angles, (2, 3)."""
+        mujoco.mj_jacSite(self.model, self.data, self._jac, None, self.site[site])
+        return self._jac[:2].copy()
+
+    def place(self, q: Sequence[float]) -> None:
+        """Move to the joint angles (O2, A, O4)."""
+        self.data.qpos[:] = q
+        mujoco.mj_kinematics(self.model, self.data)
+        mujoco.mj_comPos(self.model, self.data)
+
+    def positions(self) -> dict[str, Array]:
+        """Pins O4 and A, and B at the end of bar 3 and of bar 4, (2,), m."""
+        x, names = self.data.site_xpos, {"O4": "O4", "A": "A", "B": "B3", "B4": "B4"}
+        return {name: x[self.site[site]][:2].copy() for name, site in names.items()}
+
+    def branch(self) -> int:
+        """The branch of the state that was last forwarded: det = -b c sin(theta_4 - theta_3)."""
+        return int(-np.sign(np.linalg.det(self.jacobian()[:, [A, O4]])))
+
+    def set_state(self, q: Sequence[float], omega_2: float) -> None:
+        """Start from own joint angles at omega_2, with the velocities that keep the gap closed."""
+        mujoco.mj_resetData(self.model, self.data)
+        self.place(q)
+        self.data.qvel[:3] = closed(self.jacobian()[:, :3], omega_2)
+
+    def forward(self) -> None:
+        """Everything at the present state: after a Runge-Kutta step some fields are still of the step before."""
+        mujoco.mj_forward(self.model, self.data)
+        mujoco.mj_rnePostConstraint(self.model, self.data)
+
+    def forces(self) -> dict[str, Array]:
+        """Pin forces of the state that was last forwarded, world axes, N."""
+        on = self.carried()
+        closure = self.data.efc_force[:2].copy()
+        return {"F12": on["input"], "F32": -on["coupler"], "F43": closure, "F14": on["output"]}
+
+    def carried(self) -> dict[str, Array]:
+        """Force of the parent on each bar and all that the bar carries, world axes, N.
+
+        That is cfrc_int, but MuJoCo counts the forces
+        of actuators on sites into it; they are taken out again. Those of tendons it keeps apart.
+        """
+        d = self.data
+        on = {name: d.cfrc_int[body][3:5].copy() for name, body in self.body.items()}
+        for actuator, body in self.loads:
+            force = load_force(self.model, self.data, actuator)[:2]
+            for name in CARRIED_BY[self.model.body(body).name]:
+                on[name] -= force
+        return on
+
+    def crank_torque(self) -> float:
+        """T2: what the flywheel gives the crank, and the motor next to it, N m."""
+        flywheel = -self.model.dof_armature[O2] * self.data.qacc[O2]
+        motor = 0.0 if self.drive is None else self.data.actuator_force[self.drive]
+        return float(flywheel + motor)
+
+    def keeps_centre(self, name: str) -> bool:
+        """Whether the compiler left a bar's mass centre where the file has it, and not at the bar's origin."""
+        return int(self.model.body_sameframe[self.body[name]]) != int(mujoco.mjtSameFrame.mjSAMEFRAME_BODY)
+
+    def bad(self) -> int:
+        """Warnings of a bad position, velocity or acceleration: each resets the data."""
+        return sum(int(self.data.warning[kind].number) for kind in WARNINGS)
+
+
+def couple_elsewhere(
+    loop: ClosedLoop, light: ClosedLoop, drive_bar: int, alpha_2: float, crank_torque: float
+) -> float | None:
+    """The couple on bar 3 or 4 with which the crank accelerates as it did, or None where it does not move the crank.
+
+    The accelerations are linear in the couple; two trials give it, and `light` is left at a third, to be read.
+
+    Parameters
+    ----------
+    loop : at the simulated state.
+    light : the same linkage with a light flywheel.
+    alpha_2 : what the flywheel's motor was given, rad/s^2.
+    crank_torque : T2 at that state, N m: the size of the trials.
+    """
+    d = light.data
+    d.qpos[:], d.qvel[:] = loop.data.qpos[: d.qpos.size], loop.data.qvel[: d.qvel.size]  # a drive may have its own
+    d.time = loop.data.time
+    happened = loop.data.qacc[O2]
+    # the light flywheel's motor gives it alpha_2 as commanded; this gives it what the crank really had
+    correction = light.model.dof_armature[O2] * (happened - alpha_2)
+    acts_on = TURNED_BY[drive_bar]
+    speed = d.qvel[acts_on].sum()
+    guess = crank_torque * d.qvel[O2] / speed if speed else crank_torque
+    trials = (0.5 * guess, 1.5 * guess) if guess else (-1.0, 1.0)
+
+    def crank_acceleration(couple: float) -> float:
+        d.qfrc_applied[:] = (correction, 0.0, 0.0)
+        d.qfrc_applied[acts_on] += couple
+        mujoco.mj_forward(light.model, d)
+        return float(d.qacc[O2])
+
+    couple = couple_for(crank_acceleration, happened, *trials)
+    mujoco.mj_rnePostConstraint(light.model, d)
+    return couple
+
+
+def couple_for(
+    acceleration: Callable[[float], float], wanted: float, low: float, high: float, refinements: int = 0
+) -> float | None:
+    """The couple under which an acceleration, linear in it, is the wanted one, and which was evaluated last.
+
+    None where it does not depend on the couple. The difference of the two trials loses digits: each refinement, from
+    where the couple before leads, brings some of them back.
+    """
+    at_low, at_high = acceleration(low), acceleration(high)
+    slope = (at_high - at_low) / (high - low)
+    if slope == 0.0 or not np.isfinite(slope):
+        return None
+    couple = low + (wanted - at_low) / slope
+    for _ in range(refinements):
+        couple += (wanted - acceleration(couple)) / slope
+    acceleration(couple)
+    return float(couple)

@@ -1,0 +1,164 @@
+"""What a compiled MJCF says of a four-bar, under names that two models can be compared by."""
+
+import math
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from fourbar.linkage import BAR_NAMES, FIRST_PIN, MOVING_BARS
+from fourbar_validation.engines.mujoco.anatomy import ENDS, Anatomy
+from fourbar_validation.engines.mujoco.attached import Described, actuators, direct, limits, on_the_drive, tendons
+from fourbar_validation.engines.mujoco.fields import COUNTED, FLAGS, PIN, list_of, members
+
+NOT_HERE = ("opt", "stat", "vis")
+ENUMERATIONS = {"integrator": ("mjtIntegrator", "mjINT_"), "solver": ("mjtSolver", "mjSOL_")}
+OPTIONS = (
+    *("timestep", "integrator", "solver", "tolerance", "iterations", "ls_tolerance", "ls_iterations"),
+    *("noslip_tolerance", "noslip_iterations", "density", "viscosity", "wind", "sleep_tolerance"),
+)
+
+
+def described(anatomy: Anatomy) -> Described:
+    """Lengths, masses, pins, closure, drive and options as compiled; numbers in SI and rad."""
+    model = anatomy.model
+    found: Described = {"plane": anatomy.plane}
+    for bar, name in BAR_NAMES.items():
+        found[f"lengths.{name}"] = anatomy.length(bar)
+    found["lengths.ground_angle"] = anatomy.ground_angle
+    for bar in MOVING_BARS:
+        found |= _bar(anatomy, bar)
+    gravity = model.opt.gravity * _on(model, "GRAVITY")
+    found["gravity.x"], found["gravity.y"] = (float(g) for g in anatomy.in_plane(gravity))
+    found["gravity.across"] = float(gravity @ anatomy.normal)
+    for pin, joint in sorted(anatomy.hinge.items()):
+        found |= _pin(anatomy, pin, joint)
+    found |= _closure(anatomy)
+    found |= _options(model)
+    found |= actuators(anatomy) | tendons(anatomy)
+    others = [
+        model.equality(i).name or f"(unnamed {i})"
+        for i in range(model.neq)
+        if i != anatomy.closure and model.eq_active0[i]
+    ]
+    found["other equalities"] = ", ".join(others) or "none"
+    found |= {f"others.{name}": float(getattr(model, field, 0)) for field, name in COUNTED.items()}
+    for thing in (model, model.opt, model.stat):
+        for field in members(thing):
+            if field not in NOT_HERE and list_of(field) is None:
+                found[f"unknown.{field}"] = np.array2string(np.asarray(getattr(thing, field)), threshold=2**10)
+    return found
+
+
+def called(anatomy: Anatomy) -> dict[str, str]:
+    """Part of a key: the element of the user's file that it is of."""
+    model = anatomy.model
+
+    def element(word: str, name: str, number: int) -> str:
+        return f'{word} "{name}"' if name else f"{word} {number} (unnamed)"
+
+    found = {f"bars.{BAR_NAMES[bar]}": f'body "{model.body(anatomy.root[bar]).name}"' for bar in MOVING_BARS}
+    for pin, joint in anatomy.hinge.items():
+        found[f"pins.{pin}"] = element("joint", model.joint(joint).name, joint)
+    if anatomy.closure is not None:
+        number = anatomy.closure
+        found["closure"] = element(anatomy.closed_by.partition(" ")[0], model.equality(number).name, number)
+    for i in range(len(model.actuator_trntype)):
+        found[f"actuators.{i}"] = element("actuator", model.actuator(i).name, i)
+    return found | {f"tendons.{i}": element("tendon", model.tendon(i).name, i) for i in range(model.ntendon)}
+
+
+def _on(model: mujoco.MjModel, *features: str) -> bool:
+    """Whether no flag switches a feature off; a flag that this MuJoCo does not have switches nothing."""
+    flags = mujoco.mjtDisableBit
+    return not any(model.opt.disableflags & getattr(flags, f"mjDSBL_{name}", 0) for name in features)
+
+
+def _bar(anatomy: Anatomy, bar: int) -> Described:
+    """Mass, mass centre from the first pin, and inertia about it, of a body and all that is welded to it."""
+    model, data = anatomy.model, anatomy.data
+    parts = np.flatnonzero(model.body_weldid == anatomy.root[bar])
+    masses = model.body_mass[parts]
+    mass = float(masses.sum())
+    at = np.array([anatomy.in_plane(data.xipos[part]) for part in parts])
+    centre = masses @ at / mass if mass else at[0]
+    inertia = 0.0
+    for part, m, x in zip(parts, masses, at, strict=True):
+        across = data.ximat[part].reshape(3, 3).T @ anatomy.normal
+        inertia += float(across**2 @ model.body_inertia[part] + m * (x - centre) @ (x - centre))
+    arm = centre - anatomy.in_plane(anatomy.world(data, bar, FIRST_PIN[bar]))
+    x, y = anatomy.line(data, bar)
+    key = f"bars.{BAR_NAMES[bar]}"
+    angle = math.remainder(math.atan2(arm[1], arm[0]) - math.atan2(y, x), math.tau) if arm.any() else 0.0
+    where = {f"{key}.centre.distance": math.hypot(*arm), f"{key}.centre.angle": angle}
+    held = float(masses @ model.body_gravcomp[parts]) / mass if mass else 0.0
+    return {f"{key}.mass": mass, f"{key}.inertia": inertia, **where, f"{key}.gravcomp": held}
+
+
+def _pin(anatomy: Anatomy, pin: str, joint: int) -> Described:
+    model = anatomy.model
+    dof = model.jnt_dofadr[joint]
+    spring, damper = (float(_on(model, name, "PASSIVE")) for name in ("SPRING", "DAMPER"))
+    key = f"pins.{pin}"
+    found: Described = {
+        f"{key}.damping": damper * float(model.dof_damping[dof]),
+        f"{key}.friction": float(model.dof_frictionloss[dof]) * _on(model, "FRICTIONLOSS"),
+        f"{key}.stiffness": spring * float(model.jnt_stiffness[joint]),
+        f"{key}.armature": float(model.dof_armature[dof]),
+        f"{key}.positive": "counter-clockwise" if anatomy.sense[pin] > 0 else "clockwise",
+    }
+    address = model.jnt_qposadr[joint]
+    turned = anatomy.sense[pin] * float(model.qpos_spring[address] - model.qpos0[address])
+    found[f"{key}.spring angle"] = anatomy.rest_angle(pin) + turned
+    for field, name in PIN.items():
+        found |= direct(model, field, dof if field.startswith("dof") else joint, f"{key}.{name}")
+    for field in ("jnt_range", "jnt_actfrcrange"):
+        found |= limits(model, field, joint, key, switched_on=field != "jnt_range" or _on(model, "LIMIT"))
+    return found | on_the_drive(anatomy, pin)
+
+
+def _closure(anatomy: Anatomy) -> Described:
+    model, number = anatomy.model, anatomy.closure
+    found: Described = {"closure.pin": anatomy.cut, "closure.by": anatomy.closed_by}
+    first, second = (bar for bar, ends in ENDS.items() if anatomy.cut in ends)
+    gap = anatomy.world(anatomy.data, first, anatomy.cut) - anatomy.world(anatomy.data, second, anatomy.cut)
+    found["closure.out of plane"] = abs(float(gap @ anatomy.normal))
+    if number is None:
+        return found
+    bodies = (model.eq_obj1id[number], model.eq_obj2id[number])
+    if model.eq_objtype[number] == mujoco.mjtObj.mjOBJ_SITE:
+        bodies = tuple(model.site_bodyid[list(bodies)])
+    first_d, last_d, *opening = (float(x) for x in model.eq_solimp[number])
+    impedance = float(np.clip(first_d, 1e-4, 0.9999))
+    softness = (1.0 - impedance) / impedance * float(model.body_invweight0[list(bodies), 0].sum())
+    names = ("time constant", "damping ratio")
+    found |= {f"closure.{name}": float(x) for name, x in zip(names, model.eq_solref[number], strict=True)}
+    found["closure.impedance"], found["closure.softness"] = impedance, softness
+    found["closure.impedance when open"] = "the same" if first_d == last_d else (last_d, *opening)
+    return found
+
+
+def _options(model: mujoco.MjModel) -> Described:
+    option = model.opt
+    found: Described = {}
+    for name in OPTIONS:
+        kept: Any = getattr(option, name, None)
+        if name in ENUMERATIONS:
+            kind, prefix = ENUMERATIONS[name]
+            found[f"option.{name}"] = getattr(mujoco, kind)(kept).name.removeprefix(prefix)
+        elif kept is not None:
+            found[f"option.{name}"] = float(kept) if np.ndim(kept) == 0 else tuple(map(float, kept))
+    found["option.meaninertia"] = float(model.stat.meaninertia)
+    for state, flags, prefix in (
+        ("off", mujoco.mjtDisableBit, "mjDSBL_"),
+        ("on", mujoco.mjtEnableBit, "mjENBL_"),
+    ):
+        bits = getattr(option, "disableflags" if state == "off" else "enableflags")
+        names = [name for name in flags.__members__ if name.startswith(prefix)]
+        named = [name.removeprefix(prefix) for name in names if bits & int(flags.__members__[name])]
+        names = [name.lower() for name in named if name not in FLAGS]
+        found[f"option.switched {state}"] = ", ".join(names) or "nothing that matters here"
+    groups = [str(group) for group in range(31) if option.disableactuator >> group & 1]
+    found["option.actuatorgroupdisable"] = " ".join(groups) or "none"
+    possible = _on(model, "CONTACT") and (model.npair or (model.geom_contype.any() and model.geom_conaffinity.any()))
+    return found | {"contacts": "possible" if possible else "off"}

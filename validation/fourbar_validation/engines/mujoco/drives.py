@@ -1,0 +1,145 @@
+"""Other means to soften the closure and to drive the crank than the generated MJCF's, for the study of their cost.
+
+Each builds a loop from the generated text; the flywheel of the text is taken out where another
+drive takes its place, and the torque is read where that drive exerts it.
+"""
+
+from collections.abc import Mapping, Sequence
+from functools import partial
+from xml.etree import ElementTree as ET
+
+from fourbar.mjcf.model import text as numbers
+from fourbar_validation.engines.mujoco.closed_loop import O2, ClosedLoop
+
+WHEEL = 1e8
+"""Armature of the kinematic wheel that a joint equality follows, relative to the crank's dof inertia."""
+POSITION_GAIN, VELOCITY_GAIN = 1e6, 1e4
+"""kp of the stiff servo, per (inertia omega^2), and kv of servo and velocity actuator, per (inertia omega)."""
+GENTLE_GAIN = 1.0
+"""Of position and of speed, that an explicit integrator can follow: the drive droops."""
+
+
+class Softened(ClosedLoop):
+    """The compiled model's body_invweight0 scaled: the softness of the closure goes in proportion."""
+
+    def __init__(self, mjcf: str, factor: float) -> None:
+        super().__init__(mjcf)
+        self.model.body_invweight0[:] *= factor
+
+
+class Driven(ClosedLoop):
+    """Another drive in place of the flywheel."""
+
+    def __init__(self, mjcf: str, omega: float) -> None:
+        self.omega = omega
+        root = ET.fromstring(mjcf)
+        crank = root.find(".//joint[@name='O2']")
+        assert crank is not None
+        # what the flywheel was laid out by is a measure of the linkage's inertia about O2
+        self.flywheel = float(crank.attrib.pop("armature"))
+        self.add_drive(root)
+        super().__init__(ET.tostring(root, encoding="unicode"))
+        drive = [i for i in range(self.model.nu) if self.model.actuator(i).name == "servo"]
+        self.servo = drive[0] if drive else None
+
+    def add_drive(self, root: ET.Element) -> None:
+        """Add the drive to the text."""
+        raise NotImplementedError
+
+    def crank_torque(self) -> float:
+        """What the actuator gives the crank."""
+        return float(self.data.actuator_force[self.servo])
+
+
+class Actuated(Driven):
+    """An actuator on O2: of speed alone, or a position servo whose target turns at omega, as `intvelocity`'s does.
+
+    Parameters
+    ----------
+    position : kp per (inertia omega^2); none: kv (omega - omega_2), without a control input, by the affine bias.
+    velocity : kv per (inertia omega).
+    """
+
+    def __init__(self, mjcf: str, omega: float, position: float, velocity: float) -> None:
+        self.kp, self.kv = position, velocity
+        super().__init__(mjcf, omega)
+
+    def add_drive(self, root: ET.Element) -> None:
+        """kp (act - theta_2) + kv (omega - omega_2), act integrating omega."""
+        kp, kv = self.kp * self.flywheel * self.omega**2, self.kv * self.flywheel * abs(self.omega)
+        actuators = root.find("actuator")
+        actuators = ET.SubElement(root, "actuator") if actuators is None else actuators
+        servo = {"dyntype": "integrator"} if kp else {}
+        servo |= {"gaintype": "fixed", "gainprm": numbers(kp), "biastype": "affine"}
+        ET.SubElement(actuators, "general", servo, biasprm=numbers(kv * self.omega, -kp, -kv), name="servo", joint="O2")
+
+    def set_state(self, q: Sequence[float], omega_2: float) -> None:
+        """The target starts where the crank is."""
+        super().set_state(q, omega_2)
+        if self.kp:
+            self.data.act[:] = q[O2]
+            self.data.ctrl[self.servo] = self.omega
+
+
+Servo = partial(Actuated, position=POSITION_GAIN, velocity=VELOCITY_GAIN)
+GentleServo = partial(Actuated, position=GENTLE_GAIN, velocity=GENTLE_GAIN)
+VelocityActuator = partial(Actuated, position=0.0, velocity=VELOCITY_GAIN)
+"""It droops, so the motion that happened is what is compared."""
+GentleVelocityActuator = partial(Actuated, position=0.0, velocity=GENTLE_GAIN)
+
+
+class WheelEquality(Driven):
+    """A joint equality to a kinematic wheel: a second, heavy body that turns at omega next to the linkage."""
+
+    def __init__(self, mjcf: str, omega: float, softness: float = 1.0) -> None:
+        """`softness`: factor on dof_invweight0, how soft the equality is, edited after compile; 1: plain MJCF."""
+        super().__init__(mjcf, omega)
+        self.model.dof_invweight0[:] *= softness
+        self.row = 3  # the closure takes three rows, the joint equality the next
+
+    def add_drive(self, root: ET.Element) -> None:
+        """The wheel comes last, so that O2, A, O4 stay the first degrees of freedom."""
+        ground, equality = root.find(".//body[@name='ground']"), root.find("equality")
+        assert ground is not None and equality is not None
+        wheel = ET.SubElement(ground, "body", name="wheel")
+        ET.SubElement(wheel, "inertial", pos="0 0 0", mass="1", diaginertia="1 1 1")
+        ET.SubElement(wheel, "joint", name="wheel", axis="0 0 1", armature=numbers(WHEEL * self.flywheel))
+        closure = equality.find("connect")
+        assert closure is not None
+        softness = {key: closure.attrib[key] for key in ("solref", "solimp")}
+        ET.SubElement(equality, "joint", softness, joint1="O2", joint2="wheel", polycoef="0 1 0 0 0")
+
+    def place(self, q: Sequence[float]) -> None:
+        """The wheel stands where the crank does."""
+        super().place((*q, q[O2]))
+
+    def set_state(self, q: Sequence[float], omega_2: float) -> None:
+        """The wheel turns as the crank does."""
+        super().set_state(q, omega_2)
+        self.data.qvel[3] = omega_2
+
+    def crank_torque(self) -> float:
+        """The multiplier of the joint equality: its row of the Jacobian is 1 at the crank."""
+        return float(self.data.efc_force[self.row])
+
+
+StiffWheelEquality = partial(WheelEquality, softness=1e-8)
+"""Its softness edited down as far as the closure's is by the pads."""
+
+
+def without(mjcf: str, attributes: Mapping[str, Sequence[str]]) -> str:
+    """A text without these attributes of the elements at these paths: what they say is left to MuJoCo."""
+    root = ET.fromstring(mjcf)
+    for path, names in attributes.items():
+        element = root.find(path)
+        assert element is not None
+        for name in names:
+            element.attrib.pop(name, None)
+    return ET.tostring(root, encoding="unicode")
+
+
+def all_defaults(mjcf: str, _: float = 0.0) -> ClosedLoop:
+    """solref, solimp and the solver left to MuJoCo: 0.02 s, impedance 0.9 to 0.95, Newton to 1e-8."""
+    return ClosedLoop(
+        without(mjcf, {"option": ("solver", "tolerance", "iterations"), "equality/connect": ("solref", "solimp")})
+    )

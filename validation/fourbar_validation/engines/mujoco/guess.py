@@ -1,0 +1,90 @@
+"""Which body of somebody's MJCF is which bar, where nobody says: what hangs together as a four-bar, and its lengths."""
+
+import math
+from collections.abc import Mapping, Sequence
+from itertools import permutations
+
+import mujoco
+
+from fourbar.errors import InputError
+from fourbar.linkage import BAR_NAMES, MOVING_BARS
+from fourbar_validation.engines.mujoco.anatomy import Anatomy, bodies_of, body_named, stated_body
+
+ROLES = tuple(BAR_NAMES[bar] for bar in MOVING_BARS)
+SITES = ("B3", "B4")
+ALIKE = 1e-9
+"""Two guesses whose lengths fit equally well to this are distinguished by the drive."""
+MOST_BODIES = 8
+"""Bodies on hinges among which three are looked for."""
+
+
+def anatomy_of(model: mujoco.MjModel, names: Mapping[str, str], lengths: Sequence[float]) -> tuple[Anatomy, list[str]]:
+    """The four-bar in a model, and a note on what was guessed; names that are stated, or in the file, stand.
+
+    Parameters
+    ----------
+    lengths : of ground, input, coupler and output in the scene, m: the guess that fits them best is taken.
+
+    Raises InputError in one line: why no three bodies fit.
+    """
+    known = {role: names.get(role, role) for role in (*ROLES, *SITES)}
+    bodies = [stated_body(model, names, role) if role in names else body_named(model, role) for role in ROLES]
+    if None not in bodies and (_site(model, known["B3"]) or names.keys() & {*SITES} or not _open_sites(model)):
+        return Anatomy(model, names), []
+    candidates = sorted({int(model.body_weldid[model.jnt_bodyid[joint]]) for joint in range(model.njnt)})
+    free = [body for body in candidates if body not in bodies]
+    missing = [role for role, body in zip(ROLES, bodies, strict=True) if body is None]
+    found: list[tuple[float, bool, Anatomy, dict[str, str]]] = []
+    refused: list[str] = []
+    for chosen in permutations(free[:MOST_BODIES], len(missing)):
+        guess = {role: model.body(body).name for role, body in zip(missing, chosen, strict=True)}
+        if not all(guess.values()):
+            refused.append("a body without a name, which --name cannot state either")
+            continue
+        for sites in _sites(model, {**known, **guess}, names):
+            try:
+                anatomy = Anatomy(model, {**names, **guess, **sites})
+                found.append((_misfit(anatomy, lengths), not anatomy.drives(), anatomy, {**guess, **sites}))
+            except InputError as error:
+                refused.append(error.allowed)
+    if not found:
+        few = (
+            "it has fewer bodies on hinges"
+            if len(free) < len(missing)
+            else "no connect, weld or pair of sites closes it"
+        )
+        why = refused[0] if refused else few
+        nowhere = f"no body is named {', '.join(missing) or 'B3, B4'}, and no guess makes a four-bar ({why})"
+        raise InputError("--mjcf", bodies_of(model), f"{nowhere}; say which is which: --name input=BODY, and so on")
+    best = min(each[0] for each in found)
+    _, _, anatomy, guessed = min((each for each in found if each[0] <= best + ALIKE), key=lambda each: each[1])
+    pairs = ", ".join(f"{role}={name}" for role, name in guessed.items())
+    return anatomy, [f"guessed from what hangs together and from the lengths: {pairs} (--name states it otherwise)"]
+
+
+def _site(model: mujoco.MjModel, name: str) -> bool:
+    return bool(mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SITE, name) >= 0)
+
+
+def _open_sites(model: mujoco.MjModel) -> bool:
+    """Whether only sites can say where the loop closes."""
+    kinds = mujoco.mjtEq
+    return not any(kinds(kind) in (kinds.mjEQ_CONNECT, kinds.mjEQ_WELD) for kind in model.eq_type)
+
+
+def _sites(model: mujoco.MjModel, known: Mapping[str, str], names: Mapping[str, str]) -> list[dict[str, str]]:
+    """Pairs of sites that may mark pin B; none need be stated where a connect or a weld closes the loop."""
+    if not _open_sites(model) or names.keys() & {*SITES} or _site(model, known["B3"]):
+        return [{}]
+    on = {role: [model.site(i).name for i in range(model.nsite) if model.site(i).name
+                 and int(model.body_weldid[model.site_bodyid[i]]) == body_named(model, known[role])]
+          for role in ("coupler", "output")}  # fmt: skip
+    return [{"B3": three, "B4": four} for three in on["coupler"] for four in on["output"]]
+
+
+def _misfit(anatomy: Anatomy, lengths: Sequence[float]) -> float:
+    """How far its lengths are from the scene's: the sum of |log ratio|."""
+    theirs = [anatomy.length(bar) for bar in BAR_NAMES]
+    if min(theirs) <= 0.0:
+        return math.inf
+    return sum(abs(math.log(one / other)) for one, other in zip(theirs, lengths, strict=True))

@@ -1,0 +1,94 @@
+"""MuJoCo's forward dynamics at one state: the torque with which the closed loop accelerates as commanded.
+
+At an exactly closed state the only error is the closure's softness, in proportion to (1-d)/d with
+d the impedance: the values at several d, extrapolated to (1-d)/d = 0, are free of it.
+"""
+
+import math
+import time
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from fourbar.errors import InputError
+from fourbar.mjcf import Settings, mjcf
+from fourbar.mjcf.effects import unwound
+from fourbar.quantities import PIN_FORCES
+from fourbar.scene import Command, Scene
+from fourbar_validation.compare.answer import Answer, Array
+from fourbar_validation.engines.loaded import Values
+from fourbar_validation.engines.loop import Angles, at_each
+from fourbar_validation.engines.mujoco.closed_loop import O2, TURNED_BY, ClosedLoop, couple_for
+
+NAME = "mujoco-one-state"
+RUNGS = (0.9999, 0.9998, 0.9996, 0.9992)
+"""Impedances to extrapolate from; MuJoCo clamps at the first."""
+
+
+@dataclass(slots=True)
+class MujocoOneState:
+    """Forward dynamics at each position by itself, at one impedance or extrapolated from several."""
+
+    impedances: tuple[float, ...] = RUNGS
+    pad: float | None = None
+    name: str = NAME
+
+    def answer(self, scene: Scene, command: Command) -> Answer:
+        """Its answer, or the refusal of a bar that MuJoCo cannot hold."""
+        began = time.perf_counter()
+        setting = "extrapolated" if len(self.impedances) > 1 else f"d = {self.impedances[0]:g}"
+        try:
+            rungs = [_one_impedance(scene, command, d, self.pad) for d in self.impedances]
+        except InputError as error:
+            return Answer(NAME, setting, refusal=str(error))
+        values, assembled = extrapolated(self.impedances, [rung for rung, _ in rungs]), rungs[0][1]
+        return Answer(
+            NAME,
+            setting,
+            command,
+            assembled,
+            values,
+            shared="lengths, masses, inertias, centres, loads and effects as MJCF text; the command",
+            own="assembly, velocities, accelerations, drive torque, pin forces",
+            seconds=time.perf_counter() - began,
+        )
+
+
+def extrapolated(impedances: tuple[float, ...], rungs: list[dict[str, Array]]) -> dict[str, Array]:
+    """The value at x = 0 of the polynomial in x = (1-d)/d through the rungs (Lagrange)."""
+    x = np.array([(1.0 - d) / d for d in impedances])
+    weights = [float(np.prod([xj / (xj - xi) for j, xj in enumerate(x) if j != i])) for i, xi in enumerate(x)]
+    return {name: sum(w * rung[name] for w, rung in zip(weights, rungs, strict=True)) for name in rungs[0]}  # type: ignore[misc]
+
+
+def _one_impedance(
+    scene: Scene, command: Command, d: float, pad: float | None
+) -> tuple[dict[str, Array], NDArray[np.bool_]]:
+    """Torque and pin forces at every position that assembles."""
+    # no flywheel: the torque is on the driven bar itself
+    settings = Settings(timestep=1e-3, impedance=d, pad=pad, flywheel=0.0)
+    loop = ClosedLoop(mjcf(scene, settings, keyframe=False))
+
+    def read(q: Angles, omega_2: float, alpha_2: float) -> Values:
+        loop.set_state(unwound(scene, q), omega_2)
+        torque = _torque(loop, TURNED_BY[scene.drive_bar], alpha_2)
+        return {"torque": math.nan if torque is None else torque, **loop.forces()}
+
+    return at_each(loop, command, ("torque", *PIN_FORCES), read)[:2]
+
+
+def _torque(loop: ClosedLoop, acts_on: list[int], alpha: float) -> float | None:
+    """The couple that gives the crank its acceleration; None at a pole of the torque."""
+    d = loop.data
+
+    def crank_acceleration(couple: float) -> float:
+        d.qfrc_applied[:] = 0.0
+        d.qfrc_applied[acts_on] = couple
+        mujoco.mj_forward(loop.model, d)
+        return float(d.qacc[O2])
+
+    couple = couple_for(crank_acceleration, alpha, 0.0, 1.0, refinements=1)
+    mujoco.mj_rnePostConstraint(loop.model, d)
+    return couple

@@ -1,0 +1,69 @@
+"""Off-screen pictures of MJCF texts by MuJoCo's own renderer, in a process of their own.
+
+A missing or broken OpenGL may end the process that asks for it, so `pictures` asks from outside:
+``python -m fourbar_validation.engines.mujoco.picture`` reads {name: MJCF} and answers {name: base64 of a PNG}.
+"""
+
+import base64
+import io
+import json
+import os
+import subprocess
+import sys
+
+WIDTH, HEIGHT = 480, 360
+SECONDS = 120.0
+"""A picture takes half of one; a driver that takes this long for a handful hangs."""
+MOST = 8
+"""Scenes that are drawn: more cost the reader of a long run minutes."""
+BACKENDS = ("egl", "osmesa") if sys.platform == "linux" else ("glfw",)
+"""Values of MUJOCO_GL that are tried where the environment does not name one."""
+
+
+def pictures(texts: dict[str, str]) -> tuple[dict[str, str], str]:
+    """Base64 PNGs of MJCF texts at their keyframes, and the reason where there are none."""
+    if not texts:
+        return {}, ""
+    if len(texts) > MOST:
+        return {}, f"they are drawn for at most {MOST} scenes"
+    named = os.environ.get("MUJOCO_GL")
+    for backend in (named,) if named else BACKENDS:
+        environment = {**os.environ, "MUJOCO_GL": backend}
+        try:
+            done = subprocess.run(
+                [sys.executable, "-m", __name__],
+                input=json.dumps(texts).encode(),
+                capture_output=True,
+                timeout=SECONDS,
+                env=environment,
+                check=True,
+            )
+            drawn: dict[str, str] = json.loads(done.stdout)
+        except (subprocess.SubprocessError, OSError, ValueError):
+            continue
+        return drawn, ""
+    return {}, "MuJoCo cannot render off screen here (it needs libegl1 or libosmesa6)"
+
+
+def draw(texts: dict[str, str]) -> dict[str, str]:
+    """The same in this process."""
+    import matplotlib.image
+    import mujoco
+
+    from fourbar_validation.engines.mujoco.stepping import opened
+
+    drawn = {}
+    for name, text in texts.items():
+        model, data = opened(text)
+        with mujoco.Renderer(model, HEIGHT, WIDTH) as renderer:
+            renderer.update_scene(data, camera="plane")
+            png = io.BytesIO()
+            matplotlib.image.imsave(png, renderer.render(), format="png")
+        drawn[name] = base64.b64encode(png.getvalue()).decode("ascii")
+    return drawn
+
+
+if __name__ == "__main__":
+    json.dump(draw(json.load(sys.stdin)), sys.stdout)
+    sys.stdout.flush()
+    os._exit(0)  # some drivers crash while Python takes them down, when the pictures are long drawn

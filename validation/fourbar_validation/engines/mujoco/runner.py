@@ -1,0 +1,110 @@
+"""The one runner through time: a model is stepped from the state it is in and read at stated instants."""
+
+from collections.abc import Callable, Iterable
+from typing import NamedTuple
+
+import mujoco
+
+from fourbar.mjcf.effects import unwound
+from fourbar.scene import Command, Scene
+from fourbar_validation.compare.answer import Array
+from fourbar_validation.engines.loop import Position
+from fourbar_validation.engines.mujoco.closed_loop import O2, ClosedLoop, couple_elsewhere
+from fourbar_validation.engines.mujoco.motions import Passage
+
+LIGHT_FLYWHEEL = 1e4
+"""Flywheel of the model that gives T3 or T4: heavy enough to keep the closure's softness
+small, light enough that the torque it needs does not drown in its rounding."""
+Found = tuple[float, float, float] | None
+"""Own joint angles (O2, A, O4), None where the loop does not close."""
+
+
+class Stepper:
+    """Counts the steps of a model from its present state on."""
+
+    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, timestep: float) -> None:
+        self.model, self.data, self.timestep, self.done = model, data, timestep, 0
+
+    def to(self, seconds: float, each: Callable[[float], None] | None = None) -> None:
+        """On to the step nearest to a time; `each` is called with the time after every step."""
+        steps = round(seconds / self.timestep) - self.done
+        if each is None:
+            if steps > 0:
+                mujoco.mj_step(self.model, self.data, steps)
+                self.done += steps
+            return
+        for _ in range(steps):
+            mujoco.mj_step(self.model, self.data)
+            self.done += 1
+            each(self.time)
+
+    @property
+    def time(self) -> float:
+        """What the model's own time must be, s."""
+        return self.done * self.timestep
+
+    def lost(self) -> bool:
+        """Whether MuJoCo reset the data: that starts time again, and clears the warnings."""
+        return bool(self.data.time < self.time * (1.0 - 1e-6))
+
+
+class Reading(NamedTuple):
+    """The driving torque and the pin forces at one state."""
+
+    torque: float | None
+    """N m; None where no couple on the driven bar moves the input."""
+    forces: dict[str, Array]
+
+
+class Run:
+    """One stretch of positions at a prescribed motion; `light` is the model that a drive on bar 3 or 4 is read from."""
+
+    def __init__(
+        self,
+        scene: Scene,
+        loop: ClosedLoop,
+        light: ClosedLoop | None,
+        passage: Passage,
+        start: tuple[float, float, float],
+        timestep: float,
+    ) -> None:
+        self.scene, self.loop, self.light, self.passage = scene, loop, light, passage
+        wound = unwound(scene, start)
+        self.turns = wound[O2] - start[O2]
+        """Whole turns by which MuJoCo's theta_2 is ahead: springs at pins count them, rad."""
+        loop.set_state(wound, passage.omega)
+        self.stepper = Stepper(loop.model, loop.data, timestep)
+
+    def to(self, index: int) -> None:
+        """On to the step nearest to a position."""
+        self.stepper.to(self.passage.seconds(index))
+
+    def read(self) -> Reading:
+        """Of the state that was last forwarded."""
+        torque = self.loop.crank_torque()
+        if self.light is None:
+            return Reading(torque, self.loop.forces())
+        alpha = self.passage.alpha(self.stepper.time)
+        couple = couple_elsewhere(self.loop, self.light, self.scene.drive_bar, alpha, torque)
+        return Reading(couple, self.light.forces())
+
+
+def assembled(position: Position, command: Command, order: Iterable[int]) -> list[Found]:
+    """Own joint angles of every commanded position, found one after the other in an order."""
+    found: list[Found] = [None] * len(command.theta_2)
+    for index in order:
+        found[index] = position.find(float(command.theta_2[index]), int(command.branch[index]))
+    return found
+
+
+def stretches(
+    found: list[Found], order: Iterable[int], joined: Callable[[int, int], bool] = lambda one, other: True
+) -> list[list[int]]:
+    """Positions in order of time, split where the loop does not close, or two neighbours are not joined."""
+    split: list[list[int]] = [[]]
+    for index in order:
+        if found[index] is None or (split[-1] and not joined(split[-1][-1], index)):
+            split.append([])
+        if found[index] is not None:
+            split[-1].append(int(index))
+    return [stretch for stretch in split if stretch]

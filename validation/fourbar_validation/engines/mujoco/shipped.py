@@ -1,0 +1,85 @@
+"""The generated MJCF as it is shipped: it opens closed, its keyframe moves at omega_2, its drive brings it there."""
+
+import math
+
+import mujoco
+import numpy as np
+
+from fourbar.errors import InputError, LimitError, NotAssembledError
+from fourbar.mjcf import mjcf
+from fourbar.scene import Command, Scene
+from fourbar.scene.motion import BRANCH_NAMES
+from fourbar_validation.compare.rows import AGREES, FAILS, UNDECIDED, Row
+from fourbar_validation.compare.tolerance import EPS, SIMULATED, K
+from fourbar_validation.engines.limits import FASTEST, NEAREST_TOGGLE, least_sine
+from fourbar_validation.engines.mujoco.closed_loop import O2, ClosedLoop
+
+NAME = "mujoco-simulated"
+QUANTITY = "as shipped"
+OPEN = 1e4 * K * EPS
+"""Gap in parts of the lengths, and gap speed in parts of the speeds: one rounding near a limit position, where |sin mu|
+is 1e-4 and less MuJoCo is not run."""
+STEPS = 200
+"""A servo of two steps' time constant has brought the input to its speed to e^-100 by then."""
+SPEED = 100.0 * SIMULATED.factor
+"""Of the speed: what loads and the closure make of it in as many steps, ten times what was measured."""
+
+
+def shipped(name: str, scene: Scene, at: Command) -> Row | None:
+    """The worst of the file's rest pose, its keyframe and its drive; None where nothing moves."""
+    omega = scene.motion.omega_2
+    if not omega or scene.motion.law is not None:
+        return None
+    try:
+        loop = ClosedLoop(mjcf(scene))
+    except (InputError, LimitError, NotAssembledError):  # no file is shipped; the simulation's own row says why
+        return None
+    d, size = loop.data, math.fsum(scene.linkage.lengths)
+    found: list[tuple[float, str]] = []
+
+    def closed(what: str) -> None:
+        mujoco.mj_forward(loop.model, d)
+        found.append((math.hypot(*loop.gap()) / (OPEN * size), f"{what}: the loop is open"))
+        other = float(loop.branch() != at.branch[0]) if scene.motion.through == "sign" else 0.0
+        found.append((math.inf if other else 0.0, f"{what}: not {BRANCH_NAMES[int(at.branch[0])]}"))
+
+    mujoco.mj_resetData(loop.model, d)
+    closed("as it opens")
+    mujoco.mj_resetDataKeyframe(loop.model, d, 0)
+    closed("keyframe")
+    first = at.theta_2[np.argmin(np.abs(np.angle(np.exp(1j * (at.theta_2 - d.qpos[O2])))))]
+    apart = abs(math.remainder(float(first - d.qpos[O2]), math.tau))
+    found.append((apart / (K * EPS * max(1.0, abs(float(first)))), "keyframe: theta_2 is none of the scene's"))
+    found.append((abs(float(d.qvel[O2]) / omega - 1.0) / (K * EPS), "keyframe: omega_2"))
+    slip = float(np.hypot(*(loop.jacobian() @ d.qvel[:3])))
+    found.append((slip / (OPEN * size * float(np.abs(d.qvel).max())), "keyframe: the bars' speeds open the loop"))
+    moving = 0.0
+    if scene.motion.alpha_2 == 0.0:  # a servo; from rest as the file opens
+        mujoco.mj_resetData(loop.model, d)
+        moving = omega
+    else:  # a motor: on from the keyframe
+        moving = omega + scene.motion.alpha_2 * STEPS * loop.model.opt.timestep
+    if (beyond := _not_driven(scene, omega, float(d.qpos[O2]), STEPS * loop.model.opt.timestep)) is not None:
+        error, reason = _worst(found)
+        verdict, reason = (FAILS, reason) if error > 1.0 else (UNDECIDED, f"the drive is not run: {beyond}")
+        return Row(name, NAME, "shipped", QUANTITY, error, 1.0, verdict, reason, float(d.qpos[O2]), 1.0)
+    mujoco.mj_step(loop.model, d, STEPS)
+    lost = d.time < 0.5 * STEPS * loop.model.opt.timestep
+    speed = math.inf if lost else abs(float(d.qvel[O2]) - moving) / (SPEED * max(abs(omega), abs(moving)))
+    found.append((speed, f"after {STEPS} steps the input turns at {d.qvel[O2]:.6g} of {moving:.6g} rad/s"))
+    error, reason = _worst(found)
+    verdict = AGREES if error <= 1.0 else FAILS
+    return Row(name, NAME, "shipped", QUANTITY, error, 1.0, verdict, reason, float(d.qpos[O2]), 1.0)
+
+
+def _worst(found: list[tuple[float, str]]) -> tuple[float, str]:
+    return max(found, key=lambda each: math.inf if math.isnan(each[0]) else each[0])
+
+
+def _not_driven(scene: Scene, omega_2: float, theta_2: float, seconds: float) -> str | None:
+    """The declared limit of the simulation that the first steps meet, or None."""
+    if abs(omega_2) > FASTEST.boundary:
+        return FASTEST.reason
+    ahead = np.array([theta_2, theta_2 + omega_2 * seconds])
+    least = least_sine(scene.linkage, ahead, np.array([True, True]))
+    return None if least >= NEAREST_TOGGLE.boundary else NEAREST_TOGGLE.reason

@@ -1,0 +1,253 @@
+"""MuJoCo simulates the closed loop of the generated MJCF, driven at omega_2 through the sweep."""
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+
+from fourbar.errors import InputError, LimitError
+from fourbar.mjcf import RECIPE, Settings, mjcf
+from fourbar.mjcf.document import mass_ratio
+from fourbar.mjcf.effects import unwound
+from fourbar.quantities import UNKNOWNS
+from fourbar.scene import Command, Scene
+from fourbar.scene.motion import Motion
+from fourbar_validation.compare.answer import Answer
+from fourbar_validation.engines.description import speeds
+from fourbar_validation.engines.limits import NEAREST_TOGGLE, least_sine, too_fast_or_loaded
+from fourbar_validation.engines.loaded import Values
+from fourbar_validation.engines.loop import MADE, Position, as_made, blank
+from fourbar_validation.engines.mujoco.called_back import (
+    ActuatorForce,
+    at_full_size,
+    of_loads,
+    receiving,
+    supplying,
+    within,
+)
+from fourbar_validation.engines.mujoco.closed_loop import O2, O4, A, ClosedLoop
+from fourbar_validation.engines.mujoco.motions import Lawful, Passage, Steady, extremes, order_in_time
+from fourbar_validation.engines.mujoco.runner import LIGHT_FLYWHEEL, Run, assembled, stretches
+from fourbar_validation.engines.mujoco.watch import Watch, alarms
+
+SHARED = (
+    "lengths, masses, inertias, centres, loads and effects as MJCF text; tables of loads; omega_2, alpha_2 or the "
+    "motion law, and the branch"
+)
+OWN = "assembly, velocities at the start, the motion through time, accelerations, drive torque, pin forces"
+FINE = np.radians(2.0)
+"""Between positions further apart than this the loop is tried for closure."""
+COLLINEAR = 1e-9
+"""Part of the sum of the lengths, and of half a turn: below what the time step itself can resolve."""
+RESIDUALS = ("closure_gap_m", "speed_error", "time_went_back", "bad_states", "solver_iterations", "steps")
+
+
+@dataclass(frozen=True, slots=True)
+class MujocoSimulated:
+    """Engine "mujoco-simulated"."""
+
+    settings: Settings = RECIPE
+    name: str = "mujoco-simulated"
+
+    def answer(self, scene: Scene, command: Command) -> Answer:
+        """The sweep run through in time; every quantity at the crank's own angle, speed and acceleration."""
+        began = time.perf_counter()
+        try:
+            refusal = _refusal(scene, command)
+            if refusal is None:
+                answer = _Simulation(self.settings, scene, command).answer()
+        except (LimitError, InputError) as error:  # anything else is a failure, not a declared limit
+            refusal = str(error)
+        if refusal is not None:
+            answer = Answer(self.name, self.settings.integrator, refusal=refusal)
+        answer.shared, answer.own, answer.seconds = SHARED, OWN, time.perf_counter() - began
+        return answer
+
+
+def _refusal(scene: Scene, command: Command) -> str | None:
+    """Why this scene is not simulated, or None."""
+    if scene.motion.free is not None:
+        return "a free motion has no commanded sweep"
+    if command.omega_2 is None or not np.any(command.omega_2):
+        return "omega_2 is 0 or not stated: nothing to simulate through time"
+    law = scene.motion.law if command.time is not None else None
+    if law is None and (np.ptp(command.omega_2) != 0.0 or np.ptp(command.alpha_2) != 0.0):
+        return "omega_2 or alpha_2 differs from position to position: that is no one motion through time"
+    if np.ptp(command.theta_2) == 0.0:
+        return "one position: nothing to run through"
+    run = as_run(scene, command)
+    reason = too_fast_or_loaded(run, abs(run.motion.omega_2 or 0.0))
+    if reason is not None:
+        return reason
+    if _passes_change_point(scene, command):
+        return "the sweep meets a change point, where all bars are collinear and MuJoCo's closure loses a direction"
+    return None
+
+
+def _passes_change_point(scene: Scene, command: Command) -> bool:
+    """Whether all four bars come to lie along the ground within the sweep: +-a +-b +-c = d."""
+    d, a, b, c = scene.linkage.lengths
+    least, most = (float(x) - scene.linkage.ground_angle for x in (command.theta_2.min(), command.theta_2.max()))
+    for half_turn in range(math.ceil(least / math.pi - COLLINEAR), math.floor(most / math.pi + COLLINEAR) + 1):
+        diagonal = abs(d - a if half_turn % 2 == 0 else d + a)
+        if min(abs(diagonal - abs(b - c)), abs(diagonal - (b + c))) <= COLLINEAR * (a + b + c + d):
+            return True
+    return False
+
+
+def as_run(scene: Scene, command: Command) -> Scene:
+    """The scene whose MJCF is run through: at the command's positions, a law by its greatest speed and acceleration."""
+    if scene.motion.law is not None:
+        omega, alpha = extremes(scene.motion.law)
+        motion = Motion(command.theta_2, omega, alpha, scene.motion.branch, scene.motion.through)
+        return replace(scene, motion=motion)
+    omega, alpha = float(np.max(command.omega_2)), float(np.max(command.alpha_2))  # type: ignore[arg-type]
+    return replace(scene, motion=replace(scene.motion, theta_2=command.theta_2, omega_2=omega, alpha_2=alpha))
+
+
+class _Simulation:
+    """One scene: its own assembly, then each stretch of positions that assembles, run through in time."""
+
+    def __init__(self, settings: Settings, scene: Scene, command: Command, *, bounded: bool = True) -> None:
+        self.bounded = bounded
+        self.settings, self.command, self.law = settings, command, scene.motion.law
+        # the text is that of the command, which a caller may have given instead of the scene's own
+        self.scene = as_run(scene, command)
+        self.supplied = of_loads(scene)
+        n = len(command.theta_2)
+        self.order = order_in_time(command, self.scene.motion.omega_2 or 0.0, self.law)
+        commanded = (command.theta_2, *speeds(command))
+        self.out = blank(n, UNKNOWNS) | {name: x.copy() for name, x in zip(MADE, commanded, strict=True)}
+        self.branch = command.branch.copy()
+        self.evidence = dict.fromkeys(RESIDUALS, 0.0) | {"mass_ratio": mass_ratio(scene.linkage)}
+        self.steps_per_revolution = 0.0
+        self.predicted = {name: np.zeros(n) for name in UNKNOWNS}
+
+    def answer(self) -> Answer:
+        """The answer over all positions."""
+        position = Position(ClosedLoop(self._text(1e-3)))  # kinematics alone: the timestep plays no part
+        found = assembled(position, self.command, self.order)
+        least = least_sine(self.scene.linkage, self.command.theta_2, np.array([q is not None for q in found]))
+        if self.bounded and least < NEAREST_TOGGLE.boundary:
+            raise LimitError(f"|sin(theta_4 - theta_3)| falls to {least:.1e}; {NEAREST_TOGGLE.reason}")
+        for stretch in stretches(found, self.order, partial(self._closes_between, position)):
+            start = found[stretch[0]]
+            assert start is not None
+            self._run(stretch, start)
+        self.out["theta_2"] = within(self.scene, self.out["theta_2"])
+        at, values = as_made(self.out, self.branch)
+        setting = f"{self.settings.integrator} {self.steps_per_revolution:.0f}/rev"
+        closes = np.array([angles is not None for angles in found])
+        return Answer(
+            "mujoco-simulated",
+            setting,
+            at,
+            closes,
+            values,
+            predicted=self.predicted,
+            alarms=alarms(self.evidence, sum(self.scene.linkage.lengths)),
+            evidence=self.evidence,
+        )
+
+    def _passage(self, stretch: list[int]) -> Passage:
+        """How the input moves through a stretch."""
+        if self.law is not None:
+            return Lawful(self.law, self.command, stretch)
+        motion = self.scene.motion
+        return Steady(self.command, stretch, motion.omega_2 or 0.0, motion.alpha_2)
+
+    def _loop(self, timestep: float, supplied: dict[str, ActuatorForce], flywheel: float | None = None) -> ClosedLoop:
+        """A compiled model that takes from `supplying` what its text cannot say."""
+        return receiving(ClosedLoop(self._text(timestep, flywheel)), supplied)
+
+    def _text(self, timestep: float, flywheel: float | None = None) -> str:
+        """The generated MJCF without its keyframe."""
+        heavy = self.settings.flywheel if flywheel is None else flywheel
+        settings = replace(self.settings, timestep=timestep, timestep_scale=1.0, flywheel=heavy)
+        return mjcf(at_full_size(self.scene), settings, keyframe=False)
+
+    def _closes_between(self, position: Position, one: int, other: int) -> bool:
+        """Whether the loop closes everywhere between two positions."""
+        start, stop = float(self.command.theta_2[one]), float(self.command.theta_2[other])
+        pieces = int(np.ceil(abs(stop - start) / FINE))
+        branch = int(self.command.branch[one])
+        return all(
+            position.find(float(theta_2), branch) is not None for theta_2 in np.linspace(start, stop, pieces + 1)[1:-1]
+        )
+
+    def _run(self, stretch: list[int], start: tuple[float, float, float]) -> None:
+        """Step through one stretch and read at the step nearest to each position."""
+        passage = self._passage(stretch)
+        timestep = passage.timestep(self.settings)
+        if len(stretch) > 1:
+            turn = 2.0 * np.pi / passage.fastest
+            self.steps_per_revolution = max(self.steps_per_revolution, turn / timestep)
+        supplied = self.supplied
+        if self.law is not None:
+            supplied = {**supplied, "drive": lambda m, d: m.dof_armature[O2] * passage.alpha(d.time)}
+        with supplying(supplied):
+            loop = self._loop(timestep, supplied)
+            light = None if self.scene.drive_bar == 2 else self._loop(timestep, supplied, LIGHT_FLYWHEEL)
+            watch = Watch(self._loop(timestep, supplied), self.scene.drive_bar)
+            run = Run(self.scene, loop, light, passage, start, timestep)
+            begins = float(self.command.theta_2[stretch[0]])
+            for index in stretch:
+                run.to(index)
+                self._read(run, watch, index, begins)
+        self.evidence["steps"] += run.stepper.done
+        for name, value in watch.evidence().items():
+            self.evidence[name] = float(np.maximum(self.evidence.get(name, 0.0), value))
+
+    def _read(self, run: Run, watch: Watch, index: int, begins: float) -> None:
+        """Everything of one sample, and what the engine says of itself there."""
+        loop, d, turns = run.loop, run.loop.data, run.turns
+        loop.forward()
+        self._watch(run, begins)
+        q = (float(d.qpos[O2]), float(d.qpos[A]), float(d.qpos[O4]))
+        if unwound(self.scene, q) != q:
+            raise LimitError("a torsion spring is wound by more than half a turn from its rest")
+        self.branch[index] = loop.branch()
+        torque, pins = run.read()
+        if torque is None:
+            raise LimitError(f"the couple on bar {self.scene.drive_bar} does not move the input: a pole of the torque")
+        values: Values = {"torque": torque, **pins}
+        for name, x, ahead in (("theta", d.qpos, turns), ("omega", d.qvel, 0.0), ("alpha", d.qacc, 0.0)):
+            values |= {f"{name}_2": x[O2] - ahead, f"{name}_3": x[O2] + x[A] - ahead, f"{name}_4": x[O4]}
+        for name, value in values.items():
+            self.out[name][index] = value
+        for name, error in watch.look(loop, torque, pins["F43"]).items():
+            self.predicted[name][index] = error
+
+    def _watch(self, run: Run, begins: float) -> None:
+        """Keep the worst of what the engine says of itself."""
+        loop, d, seen = run.loop, run.loop.data, self.evidence
+        speed = run.passage.speed(float(d.qpos[O2]) - run.turns - begins, run.stepper.time)
+        worst = {
+            "closure_gap_m": float(np.hypot(*loop.gap())),
+            "speed_error": float(abs(abs(d.qvel[O2]) - speed) / (run.passage.fastest or 1.0)),
+            "solver_iterations": float(d.solver_niter.max()),
+            "bad_states": float(loop.bad()),
+            "time_went_back": float(run.stepper.lost()),
+        }
+        for name, value in worst.items():
+            seen[name] = float(np.maximum(seen[name], value))
+
+
+def observed_order(scene: Scene, command: Command, error: Callable[[Answer], float]) -> tuple[float, float, float]:
+    """Errors at 4h and 2h with the closure's time constant held in seconds, and log2 of their ratio.
+
+    At the recipe's own h the softness is already of the size of the truncation; the order shows above it.
+    """
+    errors = [
+        error(
+            MujocoSimulated(replace(RECIPE, timestep_scale=scale, time_constant_steps=80.0 / scale)).answer(
+                scene, command
+            )
+        )
+        for scale in (4.0, 2.0)
+    ]
+    ratio = errors[0] / errors[1] if errors[1] else math.inf
+    return errors[0], errors[1], math.log2(ratio) if 0.0 < ratio < math.inf else math.nan

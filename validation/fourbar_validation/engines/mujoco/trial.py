@@ -1,0 +1,171 @@
+"""MuJoCo's settings for a wanted error, and one scene run through in time with any of them.
+
+From the laws that the study of cost measured:
+
+    the closure's time constant    error = STIFF (h/tc)^4, whatever the timestep        -> tc in steps
+    the timestep                   error ~ h^ORDER until a floor                         -> steps
+
+The scene is assembled once by the engine itself; each trial compiles the generated MJCF anew, with
+the drive to be tried, and reports its own motion, torque, pin forces and CPU seconds.
+"""
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+
+import mujoco
+import numpy as np
+
+from fourbar.errors import LimitError
+from fourbar.mjcf import Settings, mjcf
+from fourbar.scene import Command, Scene
+from fourbar_validation.compare.answer import Array
+from fourbar_validation.engines.loop import Position, Trial, as_made, blank
+from fourbar_validation.engines.mujoco.closed_loop import O2, ClosedLoop
+from fourbar_validation.engines.mujoco.motions import Steady, order_in_time
+from fourbar_validation.engines.mujoco.runner import LIGHT_FLYWHEEL, Run, assembled, stretches
+
+STIFF = 4e-2
+"""error (tc/h)^4 of RK4 with tc in steps: measured 1.3e-2 to 6e-2 on crank-rocker, drag link and double rocker."""
+SHORTEST = 3.0
+"""Steps of the time constant: below 2 the closure follows no integrator."""
+LONGEST = 400.0
+"""Beyond it nothing is gained above 1e-12, and the loop is no longer held together over a revolution."""
+ORDER = 4.0
+"""Of RK4; the first guess of the next number of steps, not what decides."""
+FIRST_STEPS, FIRST_ERROR = 60.0, 1e-5
+"""Steps per revolution from which the search begins, by the order, for other errors."""
+FEWEST_STEPS = 6.0
+"""A revolution cannot be followed by less."""
+FLYWHEEL = 1e5
+"""Lighter than the recipe's: the torque, armature times acceleration, is rounded in proportion to it."""
+Build = Callable[[str, float], ClosedLoop]
+"""From the MJCF text and the speed to keep (rad/s) to the loop that is stepped."""
+
+
+def guess(error: float) -> tuple[float, float]:
+    """Steps per revolution and time constant in steps that the laws say for an error."""
+    tc = (STIFF / (error / 2.0)) ** (1.0 / ORDER)
+    steps = FIRST_STEPS * (FIRST_ERROR / error) ** (1.0 / ORDER)
+    return max(steps, FEWEST_STEPS), min(max(tc, SHORTEST), LONGEST)
+
+
+def dialled(steps_per_revolution: float, time_constant_steps: float) -> Settings:
+    """The recommended settings at a number of steps and a time constant; a window has no steps of its own."""
+    return Settings(
+        steps_per_revolution=steps_per_revolution,
+        steps_per_window=1,
+        time_constant_steps=time_constant_steps,
+        flywheel=FLYWHEEL,
+    )
+
+
+@contextmanager
+def silence() -> Iterator[None]:
+    """A setting that fails is a result here: MuJoCo neither prints it nor leaves a log in the working folder."""
+    before = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(lambda _: None)
+    try:
+        yield
+    finally:
+        mujoco.set_mju_user_warning(before)
+
+
+class Rig:
+    """A scene, ready to be tried with any settings.
+
+    Raises LimitError for a scene that cannot be run through in time.
+    """
+
+    def __init__(self, scene: Scene, command: Command) -> None:
+        if scene.motion.free is not None or not np.any(command.omega_2) or np.ptp(command.theta_2) == 0.0:
+            raise LimitError("nothing to run through in time: a sweep of theta_2 at omega_2 is needed")
+        if scene.motion.law is not None:
+            raise LimitError("settings are tried at a constant alpha_2, not along a motion law")
+        self.omega, self.alpha = float(np.max(command.omega_2)), float(np.max(command.alpha_2))  # type: ignore[arg-type]
+        motion = replace(scene.motion, theta_2=command.theta_2, omega_2=self.omega, alpha_2=self.alpha)
+        self.scene, self.command = replace(scene, motion=motion), command
+        order = order_in_time(command, self.omega, None)
+        position = Position(ClosedLoop(mjcf(self.scene, Settings(timestep=1e-3), keyframe=False)))
+        found = assembled(position, command, order)
+        self.stretches = [stretch for stretch in stretches(found, order) if len(stretch) > 1]
+        self.start = {index: angles for index, angles in enumerate(found) if angles is not None}
+        if not self.stretches:
+            raise LimitError("the loop closes at no two neighbouring positions: nothing to run through in time")
+
+    def text(self, settings: Settings, timestep: float) -> str:
+        """The generated MJCF, without its keyframe."""
+        return mjcf(self.scene, replace(settings, timestep=timestep, timestep_scale=1.0), keyframe=False)
+
+    def passage(self, stretch: list[int]) -> Steady:
+        """How the input moves through a stretch."""
+        return Steady(self.command, stretch, self.omega, self.alpha)
+
+    def steps(self, settings: Settings) -> int:
+        """Steps of one run, without making it."""
+        total = 0
+        for stretch in self.stretches:
+            run = self.passage(stretch).run  # a whole number of steps over the stretch
+            total += round(run.time(run.stop) / run.timestep(settings))
+        return total
+
+    def try_out(self, settings: Settings, build: Build | None = None) -> Trial:
+        """Run through every stretch of positions that assembles and read at the step nearest to each."""
+        samples = [index for stretch in self.stretches for index in stretch]
+        out, trial, first = blank(len(samples)), Trial(self.command), 0
+        with silence():
+            for stretch in self.stretches:
+                before, rows = trial.steps, slice(first, first + len(stretch))
+                self._run(stretch, settings, build or _as_written, {name: x[rows] for name, x in out.items()}, trial)
+                trial.stretches += ((rows, trial.steps - before),)
+                first = rows.stop
+                if trial.broken:
+                    break
+        trial.at, trial.quantities = as_made(out, self.command.branch[samples])
+        return trial
+
+    def _run(self, stretch: list[int], settings: Settings, build: Build, out: dict[str, Array], trial: Trial) -> None:
+        passage = self.passage(stretch)
+        timestep = passage.run.timestep(settings)
+        loop = build(self.text(settings, timestep), self.omega)
+        light = None
+        if self.scene.drive_bar != 2:
+            light = ClosedLoop(self.text(replace(settings, flywheel=LIGHT_FLYWHEEL), timestep))
+        run = Run(self.scene, loop, light, passage, self.start[stretch[0]], timestep)
+        for row, index in enumerate(stretch):
+            began = time.process_time()
+            run.to(index)
+            stepped = time.process_time()
+            loop.forward()
+            d = loop.data
+            if run.stepper.lost() or loop.bad() or not np.isfinite(d.qacc).all():
+                trial.broken = "MuJoCo lost the motion: a value not finite, or too large"
+                break
+            torque, pins = run.read()
+            made = {"theta_2": d.qpos[O2] - run.turns, "omega_2": d.qvel[O2], "alpha_2": d.qacc[O2]}
+            for name, value in (made | pins | {"torque": np.nan if torque is None else torque}).items():
+                out[name][row] = value
+            trial.stepping += stepped - began
+            trial.reading += time.process_time() - stepped
+        trial.steps += run.stepper.done
+        trial.steps_per_revolution = max(trial.steps_per_revolution, 2.0 * np.pi / passage.fastest / timestep)
+
+    def seconds_per_step(self, settings: Settings, build: Build | None = None) -> Callable[[int], float]:
+        """CPU seconds of a number of steps from the start of the longest stretch; each call starts there again."""
+        stretch = max(self.stretches, key=len)
+        timestep = self.passage(stretch).run.timestep(settings)
+        loop = (build or _as_written)(self.text(settings, timestep), self.omega)
+
+        def clock(steps: int) -> float:
+            loop.set_state(self.start[stretch[0]], self.omega)
+            with silence():
+                began = time.process_time()
+                mujoco.mj_step(loop.model, loop.data, steps)
+                return time.process_time() - began
+
+        return clock
+
+
+def _as_written(text: str, _: float) -> ClosedLoop:
+    return ClosedLoop(text)

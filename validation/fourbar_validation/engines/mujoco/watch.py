@@ -1,0 +1,180 @@
+"""What a simulation can say of its own error: the loop's residuals, the power balance, and what both do to the answer.
+
+A small closure gap proves little: an explicit step with a closure stiffer than it can follow holds
+the gap at micrometres while accelerations and forces are anything. At every sample this asks
+
+- how far the loop is open in position, in velocity (J v) and in acceleration (J a + J' v),
+- whether the drive's power is that of the moving bars:  T_k omega_k = v . (M a + bias - applied),
+- whether the forces that were read carry the bars:  J^T F43 + e_k T_k = M a + bias - applied,
+- how far speeds, accelerations, forces and torque would move if the loop were closed exactly at the
+  same theta_2, omega_2, alpha_2: the error to expect, by MuJoCo's own inverse dynamics.
+
+The bars alone are evaluated, without flywheel, motor and closure, on data of their own.
+"""
+
+import math
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from fourbar.quantities import PIN_FORCES
+from fourbar_validation.compare.answer import Array
+from fourbar_validation.engines.mujoco.closed_loop import O2, O4, TURNED_BY, A, ClosedLoop
+from fourbar_validation.engines.tree import multipliers
+
+
+@dataclass(frozen=True, slots=True)
+class Limit:
+    """What a residual may be, and why."""
+
+    value: float
+    reason: str
+
+
+LIMITS = {
+    "acceleration_gap": Limit(
+        1e-3, "of the greatest a_B: healthy runs have 1e-7..1e-4, a step that errs by 98 % has 4"
+    ),
+    "power_gap": Limit(1e-4, "of the greatest power: healthy runs have 1e-8..1e-5, that step 4e-2, a stopped solver 1"),
+    "force_gap": Limit(1e-3, "of the greatest joint torque: the solver did not converge; healthy runs have 1e-8..1e-4"),
+}
+"""Residuals of motion and forces that `Watch` measures."""
+EXCUSED = 1e-3
+"""A solver's residual excuses an error of this part of a force, not more."""
+OF_THE_DATA = {
+    "bad_states": Limit(0.0, "MuJoCo warned of a bad position, velocity or acceleration, and reset its data"),
+    "time_went_back": Limit(0.0, "the time ran backwards: the data were reset"),
+    "closure_gap": Limit(1e-5, "of the sum of the lengths: the loop is open"),
+    "speed_error": Limit(1e-4, "of the greatest speed: the crank does not turn as commanded"),
+}
+"""What the data of the simulation tell without a second look."""
+
+
+def alarms(evidence: dict[str, float], size: float) -> list[str]:
+    """What is wrong with a run, in words.
+
+    Parameters
+    ----------
+    evidence : the worst of each residual over the run.
+    size : sum of the lengths, m.
+    """
+    seen = {**evidence, "closure_gap": evidence["closure_gap_m"] / size}
+    return [
+        f"{name} = {seen[name]:.1e} > {limit.value:g}: {limit.reason}"
+        for name, limit in {**OF_THE_DATA, **LIMITS}.items()
+        if name in seen and not seen[name] <= limit.value
+    ]
+
+
+@dataclass(slots=True)
+class _Motion:
+    """The bars at one position, velocity and acceleration."""
+
+    gap: Array
+    """B on bar 3 minus B on bar 4, (2,), m."""
+    slip: Array
+    """Its rate, m/s."""
+    jerk: Array
+    """Its second derivative, m/s^2."""
+    a_B: Array
+    jacobian: Array
+    """Derivative of the gap by the joint angles, (2, 3)."""
+    needed: Array
+    """What the motion asks for in each joint beyond loads and effects, (3,), N m."""
+    answer: dict[str, Array]
+    """theta, omega, alpha of bars 3 and 4, and what inverse dynamics makes of the motion."""
+
+
+class Watch:
+    """Looks at a simulated motion with the bars alone, sample after sample."""
+
+    def __init__(self, bars: ClosedLoop, drive_bar: int) -> None:
+        self.bars = bars
+        model = self.bars.model
+        model.dof_armature[:] = 0.0
+        model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_EQUALITY
+        if self.bars.drive is not None:
+            model.actuator_biastype[self.bars.drive] = mujoco.mjtBias.mjBIAS_NONE
+        self.e_drive = np.zeros(3)
+        self.e_drive[TURNED_BY[drive_bar]] = 1.0
+        self._dot = np.zeros((3, 3))
+        self.worst = dict.fromkeys(LIMITS, 0.0)
+        self._most = dict.fromkeys(LIMITS, 0.0)
+
+    def look(self, loop: ClosedLoop, torque: float, loop_force: Array) -> dict[str, float]:
+        """Take in a forwarded state, the drive's torque and F43 as read; the error to expect of each quantity."""
+        q, v, a = (np.array(field) for field in (loop.data.qpos, loop.data.qvel, loop.data.qacc))
+        seen = self._motion(q, v, a)
+        power = torque * float(self.e_drive @ v)
+        self._keep("acceleration_gap", float(np.hypot(*seen.jerk)), float(np.hypot(*seen.a_B)))
+        terms = abs(power) + float(np.abs(seen.needed * v).sum())
+        self._keep("power_gap", abs(power - float(seen.needed @ v)), terms)
+        carried = seen.jacobian.T @ loop_force
+        unbalanced = float(np.linalg.norm(seen.needed - carried - self.e_drive * torque))
+        self._keep("force_gap", unbalanced, float(np.linalg.norm(seen.needed) + np.linalg.norm(carried)))
+        try:
+            closed = self._closed(q, v, a, seen)
+        except np.linalg.LinAlgError:  # exactly at a limit position nothing closes the loop
+            return dict.fromkeys(seen.answer, math.inf)
+        expected = {name: float(np.linalg.norm(value - closed.answer[name])) for name, value in seen.answer.items()}
+        # what the solver left over: the pin forces differ by as much as F43
+        left = {"torque": abs(torque - float(seen.answer["torque"]))}
+        left |= dict.fromkeys(PIN_FORCES, float(np.linalg.norm(loop_force - seen.answer["F43"])))
+        for name, error in left.items():
+            size = seen.needed if name == "torque" else seen.answer[name]
+            expected[name] += min(error, EXCUSED * float(np.linalg.norm(size)))
+        return expected
+
+    def _keep(self, name: str, value: float, size: float) -> None:
+        self.worst[name] = max(self.worst[name], value) if math.isfinite(value) else math.inf
+        self._most[name] = max(self._most[name], size)
+
+    def evidence(self) -> dict[str, float]:
+        """The worst of each residual, by the largest term that it is a residual of."""
+        most = self._most
+        return {name: worst / most[name] if most[name] else worst for name, worst in self.worst.items()}
+
+    def _motion(self, q: Array, v: Array, a: Array) -> _Motion:
+        bars, d = self.bars, self.bars.data
+        d.qpos[:], d.qvel[:], d.qacc[:] = q, v, a
+        mujoco.mj_inverse(bars.model, d)
+        mujoco.mj_fwdActuation(bars.model, d)
+        jacobian, gap = bars.jacobian(), np.array(bars.gap())
+        rate_3, rate_4 = self._rate("B3"), self._rate("B4")
+        needed = d.qfrc_inverse - d.qfrc_actuator
+        answer: dict[str, Array] = {}
+        for name, x in (("theta", q), ("omega", v), ("alpha", a)):
+            answer[f"{name}_3"], answer[f"{name}_4"] = x[O2] + x[A], x[O4]
+        try:
+            found = multipliers(jacobian, self.e_drive, needed)
+        except np.linalg.LinAlgError:
+            found = np.full(3, np.inf)
+        answer |= {"F43": found[:2], "torque": found[2]}
+        answer |= self._pins(a, found[:2])
+        jerk = jacobian @ a + (rate_3 - rate_4) @ v
+        a_B = bars.jacobian_at("B4") @ a + rate_4 @ v
+        return _Motion(gap, jacobian @ v, jerk, a_B, jacobian, needed, answer)
+
+    def _pins(self, a: Array, loop_force: Array) -> dict[str, Array]:
+        """F12, F32, F14: what carries the bars on the open tree, and the loop force put back."""
+        bars, d = self.bars, self.bars.data
+        mujoco.mj_rnePostConstraint(bars.model, d)
+        on = bars.carried()
+        return {"F14": on["output"] + loop_force, "F32": -(on["coupler"] - loop_force), "F12": on["input"] - loop_force}
+
+    def _closed(self, q: Array, v: Array, a: Array, seen: _Motion) -> _Motion:
+        """The same theta_2, omega_2, alpha_2 with the loop closed in position, velocity and acceleration."""
+        q, v, a = q.copy(), v.copy(), a.copy()
+        others = [A, O4]
+        q[others] -= np.linalg.solve(self.bars.jacobian()[:, others], seen.gap)
+        at = self._motion(q, v, a)
+        v[others] -= np.linalg.solve(self.bars.jacobian()[:, others], at.slip)
+        at = self._motion(q, v, a)
+        a[others] -= np.linalg.solve(self.bars.jacobian()[:, others], at.jerk)
+        return self._motion(q, v, a)
+
+    def _rate(self, site: str) -> Array:
+        model, d, number = self.bars.model, self.bars.data, self.bars.site[site]
+        mujoco.mj_jacDot(model, d, self._dot, None, d.site_xpos[number], model.site_bodyid[number])
+        return np.array(self._dot[:2])

@@ -1,0 +1,273 @@
+"""OpenSim (Simbody): bars 2 and 4 on the ground, bar 3 on bar 4, closed at pin A by its own constraint and solve.
+
+Coordinates are the direction of bar 2, that of bar 4, and that of bar 3 against bar 4. The closing force, the joint
+reactions, the accelerations and the torque that moves bar 2 as commanded come from Simbody's constrained dynamics.
+"""
+
+import math
+from collections.abc import Iterable, Sequence
+from functools import partial
+from typing import Any
+
+import numpy as np
+import opensim as osim
+
+from fourbar.errors import LimitError
+from fourbar.linkage import MOVING_BARS
+from fourbar.scene import Scene
+from fourbar_validation.compare.answer import Array
+from fourbar_validation.engines.description import (
+    ON_BARS,
+    POINTS,
+    about_first_pin,
+    parts,
+    unknown_effect,
+    within_half_a_turn,
+)
+from fourbar_validation.engines.effects import TERM_OF, acting
+from fourbar_validation.engines.loaded import Loaded, Values
+from fourbar_validation.engines.loop import Exact
+
+ZERO = (0.0, 0.0, 0.0)
+"""Nothing along three axes."""
+PER_COORDINATE = {2: np.array([1.0, 0.0, 0.0]), 3: np.array([0.0, 1.0, 1.0]), 4: np.array([0.0, 1.0, 0.0])}
+"""Derivative of each bar's direction by the coordinates."""
+PASSES = 50
+"""Each pass leaves a millionth to a tenth of the multipliers of the one before, down to rounding."""
+LEAST_CONDITIONED = 1e-11
+"""Simbody 4.6 drops a constraint as dependent from 5e-12 to 7e-12 on: 1000 positions near limits of 40 linkages."""
+TIME_IS_ALPHA = (1.0 / 6.0, 0.0, 0.0, 0.0)
+"""t^3/6: the motion prescribed for bar 2, whose second derivative is the time, which is set to alpha_2."""
+
+
+def refusal(scene: Scene) -> str:
+    """The declared limit that a scene meets, or nothing."""
+    if reason := unknown_effect(scene, TERM_OF):
+        return reason
+    for number in MOVING_BARS:
+        if scene.linkage.bar(number).mass == 0.0:
+            return f"bar {number} has no mass; OpenSim takes no such body at the end of a chain, and drops its inertia"
+    return "" if about_first_pin(scene.linkage.input) else "bar 2 has no inertia about O2; Simbody divides by it"
+
+
+class OpenSimBars(Loaded):
+    """The bars, built from the description."""
+
+    own = (
+        "constraint equations with the loop cut at A, joint reactions, closing force and torque by Simbody's "
+        "constrained dynamics, effects from its own state; Newton's method on its gap, and the linear solve for speeds "
+        "and accelerations, are the harness's"
+    )
+
+    def __init__(self, scene: Scene) -> None:
+        if reason := refusal(scene):
+            raise LimitError(reason)
+        osim.Logger.setLevelString("Off")
+        osim.Logger.removeFileSink()
+        linkage = scene.linkage
+        self.model = model = osim.Model()
+        self.ready(scene, acting(scene, self))
+        model.setGravity(vec(*self.field))
+        self.body = {1: model.getGround()}
+        self.part = {part.bar: part for part in parts(linkage)}
+        for bar, part in self.part.items():
+            about_z = osim.Inertia(*[part.inertia] * 3, *ZERO)
+            self.body[bar] = osim.Body(f"bar{bar}", part.mass, vec(*part.centre), about_z)
+            model.addBody(self.body[bar])
+        self.local = {name: (part.bar, at) for part in self.part.values() for name, at in part.points.items()}
+        self.length = {bar: part.length for bar, part in self.part.items()}
+        self.joint = {
+            "O2": self._joint("O2", 1, ZERO, 2, ZERO),
+            "O4": self._joint("O4", 1, self.part[4].foot, 4, ZERO),
+            "B": self._joint("B", 4, (self.length[4], 0.0, 0.0), 3, (self.length[3], 0.0, 0.0)),
+        }
+        self.pin_a = osim.PointConstraint(self.body[2], vec(self.length[2]), self.body[3], vec())
+        self.pin_a.set_isEnforced(False)  # until a position is found: OpenSim would assemble it at angles of its own
+        model.addConstraint(self.pin_a)
+        prescribed = osim.PolynomialFunction(vector(TIME_IS_ALPHA))
+        coordinate = self.joint["O2"].updCoordinate()
+        coordinate.setPrescribedFunction(prescribed)
+        coordinate.setDefaultIsPrescribed(True)
+        self.applied = {bar: self._at_first_pin(bar) for bar in MOVING_BARS}
+        self.state = model.initSystem()
+        self.pin_a.setIsEnforced(self.state, True)
+        self.matter = model.getMatterSubsystem()
+        self.least_conditioned = 1.0
+        """Of the matrix G M^-1 G^T of its multipliers, over the positions moved so far: least over greatest value."""
+
+    def refusal(self) -> str:
+        """Where constraints may have been dropped."""
+        if self.least_conditioned >= LEAST_CONDITIONED:
+            return ""
+        return (
+            f"the matrix of Simbody's multipliers is conditioned by {self.least_conditioned:.1e} at the worst; "
+            f"below {LEAST_CONDITIONED:g} it takes constraints for dependent, and drops them"
+        )
+
+    def _joint(self, name: str, parent: int, at: Any, child: int, on: Any) -> Any:
+        joint = osim.PinJoint(name, self.body[parent], vec(*at), vec(), self.body[child], vec(*on), vec())
+        self.model.addJoint(joint)
+        return joint
+
+    def _at_first_pin(self, bar: int) -> list[Any]:
+        """The components (x, y, moment) of a wrench on a bar at its first pin, to be set at each position."""
+        element = osim.PrescribedForce(f"wrench{bar}", self.body[bar])
+        element.setForceIsInGlobalFrame(True)
+        element.setPointFunctions(*_constants())
+        element.setForceFunctions(*_constants())
+        element.setTorqueFunctions(*_constants())
+        self.model.addForce(element)
+        force, torque = element.updForceFunctions(), element.updTorqueFunctions()
+        return [osim.Constant.safeDownCast(x) for x in (force.get(0), force.get(1), torque.get(2))]
+
+    def place(self, q: Sequence[float]) -> None:
+        """Angles of the bars as given, at rest: Simbody forms its matrices by differences from the present motion."""
+        of_3_to_2, theta_4 = q[1:]
+        theta_2 = within_half_a_turn(q[0])
+        self.state.setTime(0.0)
+        self.state.setU(vector((0.0, 0.0, 0.0)))
+        self.state.setQ(vector((theta_2, theta_4, theta_2 + of_3_to_2 - theta_4)))
+        self.model.realizePosition(self.state)
+
+    def point(self, name: str) -> Array:
+        """A station of a body."""
+        bar, at = self.local[name]
+        return np.array(self.body[bar].findStationLocationInGround(self.state, vec(*at)).to_numpy()[:2])
+
+    def gap(self) -> tuple[float, float]:
+        """A on bar 2 minus A on bar 3, which opens as B would."""
+        x, y = (self.point("end2") - self.point("foot3")).tolist()
+        return x, y
+
+    def jacobian(self) -> Array:
+        """Derivative of the gap by the turns of bar 2, of bar 3 against bar 2, and of bar 4."""
+        by_own = self._station_jacobian("end2") - self._station_jacobian("foot3")
+        return np.column_stack((by_own[:, 0] + by_own[:, 2], by_own[:, 2], by_own[:, 1] - by_own[:, 2]))
+
+    def _station_jacobian(self, name: str) -> Array:
+        (bar, at), matrix = self.local[name], osim.Matrix()
+        self.matter.calcStationJacobian(self.state, self.body[bar].getMobilizedBodyIndex(), vec(*at), matrix)
+        return np.array(matrix.to_numpy())[:2]
+
+    def rotation(self, bar: int) -> Array:
+        """That of the body."""
+        found = self.body[bar].getTransformInGround(self.state).R()
+        return np.array([[found.get(i, j) for j in (0, 1)] for i in (0, 1)])
+
+    def positions(self) -> dict[str, Array]:
+        """Points of the bars."""
+        return {name: self.point(point) for name, point in POINTS.items()}
+
+    def move(self, omega_2: float, alpha_2: float) -> Values:
+        """Speeds and accelerations, pin forces and torque; nothing where a toggle leaves them 0/0."""
+        try:
+            turns, accelerations = self._set_motion(omega_2, alpha_2)
+        except np.linalg.LinAlgError:
+            return {}
+        self.a = accelerations
+        leverage = float(PER_COORDINATE[self.drive_bar] @ turns)
+        # without leverage no torque on that bar moves bar 2
+        return self._motion() | ({} if leverage == 0.0 else self.settled(lambda: self._forces(leverage)))
+
+    def _set_motion(self, omega_2: float, alpha_2: float) -> tuple[Array, Array]:
+        """Turns of the coordinates per turn of bar 2, and their accelerations, from its constraint equations."""
+        equations = self._equations()
+        turns = np.linalg.solve(equations, PER_COORDINATE[2])
+        self.state.setTime(alpha_2)
+        self.state.setU(vector(turns * omega_2))
+        self.model.realizeVelocity(self.state)
+        bias, matrix = osim.Vector(), osim.Matrix()
+        self.matter.calcBiasForAccelerationConstraints(self.state, bias)
+        self.matter.calcProjectedMInv(self.state, matrix)
+        sizes = np.linalg.svd(np.array(matrix.to_numpy())[:3, :3], compute_uv=False)
+        self.least_conditioned = min(self.least_conditioned, float(sizes[-1] / sizes[0]))
+        return turns, np.linalg.solve(equations, -np.array(bias.to_numpy())[:3])
+
+    def _motion(self) -> Values:
+        values: Values = {}
+        for bar in (3, 4):
+            values[f"omega_{bar}"], values[f"alpha_{bar}"] = self.velocity(bar), self.alpha(bar)
+        for name, point in ON_BARS.items():
+            bar, at = self.local[point]
+            drift = self.matter.calcBiasForStationJacobian(self.state, self.body[bar].getMobilizedBodyIndex(), vec(*at))
+            values[f"a_{name}"] = self._station_jacobian(point) @ self.a + np.array(drift.to_numpy()[:2])
+        return values
+
+    def _forces(self, leverage: float) -> dict[str, Any]:
+        """Joint reactions, closing force and torque of its constrained dynamics.
+
+        Simbody holds bar 2 to its motion by a couple: over the leverage it is a torque of the drive. What it finds is
+        given back as forces and found anew, until its multipliers hold nothing but rounding.
+        """
+        self.act()
+        pin_a, torque, closing, before = self.point("end2"), 0.0, np.zeros(2), (math.inf, math.inf)
+        seen: set[tuple[float, float]] = set()
+        for number in range(PASSES):
+            for bar, wrench in self.wrenches.items():
+                for function, value in zip(self.applied[bar], wrench, strict=True):
+                    function.setValue(value)
+            self.state.setTime(self.state.getTime())  # Simbody computes again what depends on it
+            self.model.realizeAcceleration(self.state)
+            couple, force = self._couple_on_2(), self._closing_force()
+            torque, closing = torque + couple / leverage, closing + force
+            self.twist(self.drive_bar, couple / leverage)
+            self.push(2, force, pin_a)
+            self.push(3, -force, pin_a)
+            size = abs(couple), math.hypot(*force)
+            falls = size[0] < before[0] or size[1] < before[1]  # torque, then force, come first
+            if size in seen or (number > 1 and not falls):  # rounding may go round in a circle
+                break
+            before = size
+            seen.add(size)
+        reactions = {name: self._reaction(pin) for pin, name in {"O2": "F12", "B": "F43", "O4": "F14"}.items()}
+        return {**reactions, "F32": closing, "torque": torque}
+
+    def _equations(self) -> Array:
+        """Derivatives of the constraints by the coordinates: the motion of bar 2, and pin A along two axes."""
+        matrix = osim.Matrix()
+        self.matter.calcG(self.state, matrix)
+        return np.array(matrix.to_numpy())[:3]
+
+    def velocity(self, bar: int) -> float:
+        """Of a body; the ground has none."""
+        return 0.0 if bar == 1 else float(self.body[bar].getAngularVelocityInGround(self.state).get(2))
+
+    def alpha(self, bar: int) -> float:
+        """From the accelerations of the coordinates."""
+        return float(PER_COORDINATE[bar] @ self.a)
+
+    def _reaction(self, pin: str) -> Array:
+        return np.array(self.joint[pin].calcReactionOnChildExpressedInGround(self.state).get(1).to_numpy()[:2])
+
+    def _couple_on_2(self) -> float:
+        return float(self.joint["O2"].calcReactionOnChildExpressedInGround(self.state).get(0).get(2))
+
+    def _closing_force(self) -> Array:
+        """Force of bar 3 on bar 2, from the multipliers of the constraint; a force on bodies is -G^T lambda."""
+        on_bodies, on_mobilities = osim.VectorOfSpatialVec(), osim.Vector()
+        multipliers = self.state.getMultipliers()
+        self.matter.calcConstraintForcesFromMultipliers(self.state, multipliers, on_bodies, on_mobilities)
+        found = on_bodies.get(int(self.body[2].getMobilizedBodyIndex())).get(1)
+        return np.array([-found.get(0), -found.get(1)])
+
+
+OpenSimConstraints = partial(Exact, "opensim-constraints", OpenSimBars)
+
+
+def vec(x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Any:
+    """Three components."""
+    return osim.Vec3(float(x), float(y), float(z))
+
+
+def vector(values: Iterable[float]) -> Any:
+    """A vector of Simbody."""
+    numbers = [float(value) for value in values]
+    made = osim.Vector(len(numbers), 0.0)
+    for index, value in enumerate(numbers):
+        made.set(index, value)
+    return made
+
+
+def _constants() -> list[Any]:
+    """Three functions of time that are zero, and may be given another value later."""
+    return [osim.Constant(value) for value in ZERO]

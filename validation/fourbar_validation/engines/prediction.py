@@ -1,0 +1,165 @@
+"""The error that rounding must be expected to make, computed from the description in 320-bit arithmetic.
+
+    predicted = eps (R sum_i w_i |dy/dx_i| + reach sum_j |dy/dz_j|),
+
+the first-order change of a result y, at this very position and for this very quantity, when every
+stored input x_i (lengths, angles, masses, loads, the command) moves in its last digit, and when the
+loop opens with the speed and the acceleration, and the bars get the couples, that rounding leaves in
+an engine whose lever arms are differences of coordinates as long as `reach` (z_j, one rounding of them).
+Where the first order of a torque vanishes, the product of two first orders is what remains: the error of a
+force times that of its lever arm.
+
+It replaces K eps/condition where no power of a sine is the right law: near change points, where a
+torque cancels, and for forces near a toggle, which a law in s^2 would excuse too much.
+"""
+
+import math
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from fourbar.linkage import MOVING_BARS
+from fourbar.quantities import PIN_FORCES, VECTORS
+from fourbar.scene import Command, Scene
+from fourbar_validation.compare.compare import Mask
+from fourbar_validation.compare.tolerance import EPS, Array
+from fourbar_validation.engines.description import centre, speeds
+
+ROUNDINGS = 8.0
+"""R: a chain of some fifty roundings moves a result by sqrt(50) = 7 last digits, as a random walk."""
+
+FIRST_ORDER = 0.1
+"""Where the angles are uncertain by this part of the sine that everything divides by, first order predicts nothing:
+speeds and forces may come out as anything, the torque too, whose own first order can cancel."""
+
+
+def from_data(scene: Scene, at: Command, quantity: str, where: Mask | None = None) -> Array:
+    """For a derivation that works in angles and lengths themselves."""
+    return predicted_error(scene, at, quantity, 0.0, where)
+
+
+def in_world_axes(scene: Scene, at: Command, quantity: str, where: Mask | None = None) -> Array:
+    """For an engine that differences points of the linkage in world axes, as Pinocchio's frame Jacobians do."""
+    return predicted_error(scene, at, quantity, _extent(scene), where)
+
+
+def about_mass_centre(scene: Scene, at: Command, quantity: str, where: Mask | None = None) -> Array:
+    """For an engine that moves a tree of bodies about the mass centre of all of them, as MuJoCo does.
+
+    Every bar is accelerated with the first of its tree and back again by its own joint.
+    """
+    furthest = max(abs(centre(scene.linkage.bar(number))[0]) for number in MOVING_BARS)
+    return predicted_error(scene, at, quantity, _extent(scene) + furthest, where, carried=True)
+
+
+def _extent(scene: Scene) -> float:
+    return math.fsum(scene.linkage.lengths)
+
+
+def predicted_error(
+    scene: Scene,
+    at: Command,
+    quantity: str,
+    reach: float,
+    where: Mask | None = None,
+    *,
+    carried: bool = False,
+) -> Array:
+    """Absolute error predicted for a quantity at each position, or at those of a mask, (n,).
+
+    With `carried` the accelerations of the bars are differences of others as large as the fastest bar's at `reach`.
+    NaN where the loop does not close; infinite at a singular position, where the equations have no answer.
+    """
+    n, (omega, alpha) = len(at.theta_2), speeds(at)
+    errors = np.full(n, np.nan)
+    for i in range(n) if where is None else np.flatnonzero(where).tolist():
+        moved = _sensitivity(scene, float(at.theta_2[i]), int(at.branch[i]), float(omega[i]), float(alpha[i]))
+        if moved is None:
+            continue
+        lost = ROUNDINGS * EPS * moved.data["theta_4"] >= FIRST_ORDER * float(moved.data["condition"])
+        if lost and not quantity.startswith("theta"):
+            errors[i] = math.inf
+            continue
+        errors[i] = moved.first_order(quantity, reach, carried=carried)
+        if quantity == "torque":
+            turned = max(moved.first_order(f"theta_{bar}", reach) for bar in (3, 4))
+            pulled = max(moved.first_order(force, reach, carried=carried) for force in PIN_FORCES)
+            errors[i] += pulled * turned * _extent(scene)
+    return errors
+
+
+class Sensitivity(NamedTuple):
+    """How far each output moves at one position."""
+
+    data: dict[str, float]
+    """|y| + sum w_i |dy/dx_i|; of the condition, its value."""
+    loop: dict[str, float]
+    """By a loop that opens at its fastest bar's speed and acceleration times 1 m, and by couples on the bars of the
+    strongest pin force times 1 m."""
+    carried: dict[str, float]
+    """By couples on the bars of the heaviest bar's inertial force at 1 m of the fastest bar, times 1 m."""
+
+    def first_order(self, name: str, reach: float, *, carried: bool = False) -> float:
+        """The error predicted for an output, vectors by their norm; infinite where it has none."""
+        parts = []
+        name = "sin_mu" if name == "condition" else name
+        for axis in ("_x", "_y") if name in VECTORS else ("",):
+            part = ROUNDINGS * self.data.get(name + axis, math.inf) + reach * self.loop.get(name + axis, 0.0)
+            parts.append(part + reach * reach * self.carried.get(name + axis, 0.0) if carried else part)
+        return EPS * math.hypot(*parts)
+
+
+@lru_cache(maxsize=8192)
+def _sensitivity(scene: Scene, theta_2: float, branch: int, omega_2: float, alpha_2: float) -> Sensitivity | None:
+    """Sensitivities at one position; None where the loop does not close."""
+    from flint import acb, arb
+
+    from fourbar_validation.engines.balls import STEP_BITS, outputs, response, stored
+
+    exact = stored(scene, theta_2, omega_2=omega_2, alpha_2=alpha_2)
+    base = outputs(scene, branch, exact, scene.drive_bar)
+    if base is None:
+        return None
+    step = arb(2) ** -STEP_BITS
+
+    def add(total: dict[str, float], changes: list[dict[str, Any]]) -> None:
+        """The change under the first of several changes of the inputs with which the loop still closes."""
+        moved = (outputs(scene, branch, exact | changed, scene.drive_bar) for changed in changes)
+        for output, rate in response(base, moved).items():
+            total[output] = total.get(output, 0.0) + rate
+
+    data = {name: 1.0 if name.startswith("theta") else abs(float(value.mid())) for name, value in base.items()}
+    for name, weight in _weights({name: float(value) for name, value in exact.items()}).items():
+        add(data, [{name: exact[name] + side * weight * step} for side in (1, -1)])
+    data["condition"] = float(base["condition"].mid())
+    loop: dict[str, float] = {}
+    carried: dict[str, float] = {}
+    if "omega_3" in base:
+        fastest = max(abs(base[f"omega_{bar}"]) for bar in MOVING_BARS)
+        hardest = max(abs(base[f"alpha_{bar}"]) for bar in MOVING_BARS) + fastest * fastest
+        for name in VECTORS:  # points of the bars, by their places in world axes
+            if name.startswith("a_"):
+                loop[f"{name}_x"] = loop[f"{name}_y"] = float(hardest)
+        for name, most in (("slip", fastest), ("jerk", hardest)):
+            for direction in (acb(1), acb(0, 1)):
+                add(loop, [{name: most * step * direction}])
+    if "torque" in base:
+        strongest = max(abs(base[name + axis]) for name in PIN_FORCES for axis in ("_x", "_y"))
+        strongest += abs(base["torque"]) / _extent(scene)  # the couple on a bar is rounded too
+        heaviest = max(scene.linkage.bar(bar).mass for bar in MOVING_BARS)
+        for bar in MOVING_BARS:
+            add(loop, [{f"couple_{bar}": strongest * step}])
+            add(carried, [{f"couple_{bar}": heaviest * hardest * step}])
+    return Sensitivity(data, loop, carried)
+
+
+def _weights(stored: dict[str, float]) -> dict[str, float]:
+    """How much of each input is one rounding: relative, but a chain of bars meets O4 as its longest bar is rounded."""
+    longest = max(stored[name] for name in ("d", "a", "b", "c"))
+    weights = {name: abs(value) for name, value in stored.items() if value != 0.0}
+    weights["d"] = longest
+    # theta_2 - theta_1 is rounded as the larger of them is
+    weights["theta_1"] = max(abs(stored["theta_1"]), abs(stored["theta_2"]), longest / stored["d"])
+    weights["theta_2"] = max(abs(stored["theta_2"]), 1.0)
+    return weights

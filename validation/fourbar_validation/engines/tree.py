@@ -1,0 +1,156 @@
+"""The bars of a four-bar opened at pin B, as a tree of an engine, and what follows from the few numbers that it gives.
+
+Coordinates q = (turn of bar 2 at O2, of bar 3 against bar 2 at A, of bar 4 at O4). With g(q) = B on
+bar 3 minus B on bar 4 and J = dg/dq the loop holds where g = 0, J v = 0, J a + (dJ/dt) v = 0, and
+
+    [J^T e_drive] [lambda; T] = tau(q, v, a),
+
+lambda = F43 and e_drive = the derivative of the driven bar's rotation. Every number comes from the engine.
+"""
+
+from functools import partial
+from typing import Any, Protocol
+
+import numpy as np
+
+from fourbar.linkage import MOVING_BARS
+from fourbar.scene import Scene
+from fourbar_validation.compare.answer import Array
+from fourbar_validation.engines.description import ON_BARS, POINTS
+from fourbar_validation.engines.loaded import Act, Loaded, Values, no_wrenches
+
+
+class Tree(Loaded, Protocol):
+    """Bars opened at pin B; the engine gives points, Jacobians, accelerations, inverse dynamics and joint forces."""
+
+    own: str = (
+        "assembly (Newton on its own gap), velocities (own Jacobian), accelerations (own dJ/dt v), "
+        "inverse dynamics, effects from its own state, loop multipliers, pin forces"
+    )
+    turns: dict[int, Array]
+    """Derivatives of the bars' rotations by the coordinates, constant in the plane."""
+    v: Array
+    a: Array
+
+    def ready(self, scene: Scene, terms: list[Act]) -> None:
+        """To be called by an engine that has built its bars, with what acts on them."""
+        super().ready(scene, terms)
+        self.alone = bool(scene.loads or scene.effects)
+        self.place((0.0, 0.0, 0.0))
+        self.turns = {1: np.zeros(3)} | {bar: self.turn(bar) for bar in MOVING_BARS}
+
+    # what the engine gives
+    def point_jacobian(self, name: str) -> Array:
+        """Derivative of a point, (2, 3), m."""
+
+    def turn(self, bar: int) -> Array:
+        """Derivative of a moving bar's rotation, (3,)."""
+
+    def set_motion(self, v: Array, a: Array) -> None:
+        """Speeds and accelerations of the coordinates."""
+
+    def acceleration(self, name: str) -> Array:
+        """Of a point at the motion last set, (2,), m/s^2."""
+
+    def needed(self, field: tuple[float, float], wrenches: dict[int, list[float]]) -> Array:
+        """Generalised forces that the motion last set asks for beyond gravity and what acts, (3,), N m."""
+
+    def carried(self) -> dict[int, Array]:
+        """Force on each moving bar at its first pin, at the motion last set and under `wrenches`, (2,), N."""
+
+    # what follows
+    def gap(self) -> tuple[float, float]:
+        """B on bar 3 minus B on bar 4."""
+        x, y = (self.point("end3") - self.point("end4")).tolist()
+        return x, y
+
+    def jacobian(self) -> Array:
+        """Difference of the two points' Jacobians."""
+        return self.point_jacobian("end3") - self.point_jacobian("end4")
+
+    def positions(self) -> dict[str, Array]:
+        """Points of the bars."""
+        return {name: np.array(self.point(point)) for name, point in POINTS.items() if name != "A2"}
+
+    def velocity(self, bar: int) -> float:
+        """Angular velocity of a bar, rad/s."""
+        return float(self.turns[bar] @ self.v)
+
+    def alpha(self, bar: int) -> float:
+        """Angular acceleration of a bar, rad/s^2."""
+        return float(self.turns[bar] @ self.a)
+
+    def moving(self, v: Array, a: Array) -> None:
+        """Take speeds and accelerations of the coordinates, for all that follows."""
+        self.v, self.a = v, a
+        self.set_motion(v, a)
+
+    def drift(self, v: Array) -> Array:
+        """Acceleration of the gap at speeds v where a = 0, (2,), m/s^2."""
+        self.moving(v, np.zeros(3))
+        return self.acceleration("end3") - self.acceleration("end4")
+
+    def torques(self) -> Array:
+        """What the motion asks for beyond loads and effects, (3,), N m."""
+        self.act()
+        return self.needed(self.field, self.wrenches)
+
+    def forces(self, loop_force: Array, torque: float) -> dict[str, Array]:
+        """F12, F32, F14 with the loop force on bar 3 at B, its opposite on bar 4, and the drive's couple put back."""
+        self.push(3, loop_force, self.point("end3"))
+        self.push(4, -loop_force, self.point("end4"))
+        self.twist(self.drive_bar, torque)
+        on = self.carried()
+        return {"F12": on[2], "F32": -on[3], "F14": on[4]}
+
+    def move(self, omega_2: float, alpha_2: float) -> Values:
+        """Velocities, accelerations and forces where the tree is placed; nothing where a toggle leaves them 0/0."""
+        jacobian = self.jacobian()
+        try:
+            v = closed(jacobian, omega_2)
+            a = closed(jacobian, alpha_2, *self.drift(v).tolist())
+        except np.linalg.LinAlgError:
+            return {}
+        self.moving(v, a)
+        values: Values = {f"a_{name}": self.acceleration(point) for name, point in ON_BARS.items()}
+        for bar in (3, 4):
+            values[f"omega_{bar}"], values[f"alpha_{bar}"] = self.velocity(bar), self.alpha(bar)
+        solve = partial(multipliers, jacobian, self.turns[self.drive_bar])
+
+        def balanced() -> dict[str, Any]:
+            unknowns = solve(self.torques())
+            return self.forces(unknowns[:2], float(unknowns[2])) | {"F43": unknowns[:2], "torque": unknowns[2]}
+
+        try:
+            values |= self.settled(balanced)
+        except np.linalg.LinAlgError:  # no torque on that bar balances the linkage here
+            return values
+        if self.alone:
+            values["torque_inertia"] = float(solve(self.needed((0.0, 0.0), no_wrenches()))[2])
+        return values
+
+
+def closed(jacobian: Array, of_2: float, x: float = 0.0, y: float = 0.0) -> Array:
+    """Rates of the three coordinates where J rates + (x, y) = 0 and bar 2 has its own; LinAlgError at a toggle."""
+    (e, a, b), (f, c, d) = jacobian.tolist()
+    x, y, det = x + e * of_2, y + f * of_2, a * d - b * c
+    if det == 0.0:
+        raise np.linalg.LinAlgError("the bars are in one line")
+    return np.array([of_2, (b * y - d * x) / det, (c * x - a * y) / det])
+
+
+def multipliers(jacobian: Array, turn: Array, needed: Array) -> Array:
+    """[lambda; T] where [J^T turn] [lambda; T] = tau, (3,); LinAlgError where no torque on that bar balances tau.
+
+    By Cramer's rule: of bar 2 the determinant is that of `closed` to the last digit, so that there are forces wherever
+    there are speeds, as far as rounding leaves them digits; elimination may find the matrix singular there.
+    """
+    (a, b, c), (d, e, f) = jacobian.tolist()
+    (p, q, r), (x, y, z) = turn.tolist(), needed.tolist()
+    u, v, w = b * f - c * e, c * d - a * f, a * e - b * d
+    det = p * u + q * v + r * w
+    if det == 0.0:
+        raise np.linalg.LinAlgError("the torque is at a pole")
+    one = x * (e * r - f * q) + y * (f * p - d * r) + z * (d * q - e * p)
+    other = x * (q * c - r * b) + y * (r * a - p * c) + z * (p * b - q * a)
+    return np.array([one / det, other / det, (x * u + y * v + z * w) / det])

@@ -1,0 +1,1 @@
+"""Studies of the harness and of simulators; nothing that judges needs them."""

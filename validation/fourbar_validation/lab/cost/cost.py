@@ -1,0 +1,178 @@
+"""`python -m validation cost`: the study of scenes, its table, its laws and its pictures."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from pathlib import Path
+
+import click
+
+from fourbar.errors import FAILED, HOLDS
+from fourbar.scene import Scene
+from fourbar.scene import command as command_of
+from fourbar.writing import write_text
+from fourbar_validation.advise.errors import QUANTITIES
+from fourbar_validation.advise.matters import MATTERS, influences, sentence
+from fourbar_validation.compare.rows import csv_text
+from fourbar_validation.engines.mujoco.trial import Rig
+from fourbar_validation.lab.cost.curves import BEST
+from fourbar_validation.lab.cost.laws import Law, laws, lines, pareto, warnings
+from fourbar_validation.lab.cost.study import COLUMNS, STEPPED, Point, Study
+from fourbar_validation.places import MODELS
+from fourbar_validation.report.machine import machine, versions
+from fourbar_validation.report.terminal import lined_up
+from fourbar_validation.scenes.suites import scene_files
+
+DEFAULT_SCENES = (MODELS / "crank_rocker.toml",)
+WANTED = (1e-3, 1e-6)
+"""Errors whose price the table of several scenes has."""
+ORDERS = "Errors are the worst over the scene's positions, each on its scale, against the formulas at the motion made."
+
+
+@click.command(name="cost")
+@click.argument("scenes", nargs=-1, type=click.Path(path_type=Path))
+@click.option(
+    "-o", "--out", type=click.Path(path_type=Path, file_okay=False), default=Path("results/cost"), show_default=True
+)
+@click.option("--effects", is_flag=True, help="Count instead what each effect costs in each engine (`effects-cost`).")
+def cost(scenes: tuple[Path, ...], out: Path, effects: bool) -> int:
+    """What accuracy costs in time: work and precision of every method, on SCENES (default: the crank-rocker).
+
+    An interrupted study is resumed where it stopped. Exit status 1 where the law of any quantity does not hold, or
+    none is decided.
+    """
+    if effects:
+        from fourbar_validation.lab.effects.cost import command
+
+        return int(command.main(["--out", str(out / "effects.md")], standalone_mode=False))
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    files = scene_files(scenes or DEFAULT_SCENES)
+    fitted: list[Law] = []
+    rows: list[tuple[str, ...]] = []
+    for index in range(len(files)):
+        name, scene = files.name(index), files.scene(index)
+        rig = Rig(scene, command_of(scene))
+        study = Study(name, scene, out / name)
+        columns = (
+            TextColumn(name),
+            BarColumn(),
+            MofNCompleteColumn(),
+            TextColumn("{task.description}"),
+            TimeRemainingColumn(),
+        )
+        curves: dict[str, list[Point]] = {}
+        with Progress(*columns, console=Console(stderr=True)) as progress:
+            task = progress.add_task("", total=len(study))
+            for curve, points in study.points():
+                curves[curve] = points
+                progress.update(task, advance=1, description=curve)
+        found = laws(curves)
+        dials = influences(scene, rig, BEST)
+        fitted += [law for law in found if law.decided]
+        written = write(study, curves, found, scene.title or name)
+        click.echo(summary(name, curves, found, study.left_out))
+        click.echo(sentence(dials))
+        held = sum(law.holds for law in found if law.decided)
+        most = dials[0].setting if dials[0].times >= MATTERS else "none by itself"
+        rows.append((name, *cheapest(curves), f"{held} of {sum(law.decided for law in found)}", most))
+        click.echo(f"written to {out / name}: {', '.join(sorted(path.name for path in written))}")
+    if len(rows) > 1:
+        head = ("scene", *(f"RK4 steps for {error:g}" for error in WANTED), "laws hold", "matters most")
+        Console().print(lined_up(head, rows, show_edge=False))
+    if not fitted:
+        click.echo("Nothing was compared: no law has points enough for a fit")
+    return HOLDS if fitted and all(law.holds for law in fitted) else FAILED
+
+
+def write(study: Study, curves: Mapping[str, Sequence[Point]], found: Sequence[Law], title: str) -> list[Path]:
+    """cost.csv, cost.md and the pictures."""
+    from fourbar_validation.lab.cost.pictures import draw
+
+    folder = study.folder.parent
+    paths = [folder / "cost.csv", folder / "cost.md"]
+    write_text(paths[0], to_csv(curves))
+    pictures = draw(curves, subtitle(study.scene, title), folder)
+    write_text(paths[1], report(title, curves, found, study.left_out, pictures))
+    return [*paths, *pictures]
+
+
+def subtitle(scene: Scene, title: str) -> str:
+    """What was run, in one line under the statement of a picture."""
+    acting = [type(effect).__name__.lower() for effect in scene.effects]
+    acting += ["loads"] if scene.loads else []
+    omega = "" if scene.motion.omega_2 is None else f", {scene.motion.omega_2:g} rad/s"
+    return f"{title}{omega}{', ' + ' and '.join(acting) if acting else ''}"
+
+
+def to_csv(curves: Mapping[str, Sequence[Point]]) -> str:
+    """One row per point, floats as repr."""
+    return csv_text(COLUMNS, (asdict(point).values() for points in curves.values() for point in points))
+
+
+def summary(name: str, curves: Mapping[str, Sequence[Point]], found: Sequence[Law], left_out: Sequence[str]) -> str:
+    """What the terminal shows."""
+    text = [f"{name}: what accuracy costs", "", *front_lines(curves), "", *lines(found), ""]
+    text += [f"warning: {line}" for line in warnings(curves)]
+    return "\n".join((*text, *(f"left out: {line}" for line in left_out)))
+
+
+def cheapest(curves: Mapping[str, Sequence[Point]]) -> list[str]:
+    """The least work of a revolution, in RK4 steps, that reaches each of WANTED; a dash where nothing does."""
+    points = [p for name, row in curves.items() if "slow" not in name for p in row if p.kind == STEPPED]
+    work = ([p.rk4_steps for p in points if p.worst <= error] for error in WANTED)
+    return [f"{min(steps):.0f}" if steps else "-" for steps in work]
+
+
+def front_lines(curves: Mapping[str, Sequence[Point]]) -> list[str]:
+    """The Pareto front of everything stepped, by the worse of torque and force."""
+    points = [p for name, row in curves.items() if "slow" not in name for p in row if p.kind == STEPPED]
+    head = f"{'error':>8} {'RK4 steps':>10} {'ms/turn':>8} {'+-':>5}  setting"
+    front = pareto(points, "worst")
+    rows = [
+        f"{p.worst:8.0e} {p.rk4_steps:10.0f} {1e3 * p.seconds_per_revolution:8.2f} {percent(p.scatter):>5}  "
+        f"{p.curve}: {p.setting}"
+        for p in front
+    ]
+    return [head, *rows]
+
+
+def percent(scatter: float) -> str:
+    """The scatter of some timings; a dash where there was one."""
+    return "-" if math.isnan(scatter) else f"{100.0 * scatter:.0f} %"
+
+
+def report(
+    title: str,
+    curves: Mapping[str, Sequence[Point]],
+    found: Sequence[Law],
+    left_out: Sequence[str],
+    pictures: Sequence[Path],
+) -> str:
+    """The study as Markdown."""
+    about = ", ".join(f"{name} {version}" for name, version in versions().items())
+    text = [f"# What accuracy costs: {title}", "", f"{machine()}; {about}. {ORDERS}", ""]
+    text += [f"![{path.stem}]({path.name})" for path in pictures if path.suffix == ".svg"]
+    text += ["", "## Laws", "", *(f"- {law}" for law in lines(found))]
+    text += ["", "## Cheapest for each error", "", "```", *front_lines(curves), "```"]
+    text += ["", "## Where an error jumps, and where more steps buy nothing", ""]
+    text += [f"- {line}" for line in warnings(curves) or ["none"]]
+    text += [
+        "",
+        "## All points",
+        "",
+        f"| setting | {' | '.join(QUANTITIES)} | steps/turn | ms/turn | +- | us/sample | RK4 steps |",
+        "|---|---|---|---|---|---|---|---|---|---|---|",
+    ]
+    for name, points in curves.items():
+        for p in points:
+            text.append(
+                f"| {name}: {p.setting} | {' | '.join(f'{getattr(p, q):.1e}' for q in QUANTITIES)} "
+                f"| {p.steps_per_revolution:.0f} "
+                f"| {1e3 * p.seconds_per_revolution:.3g} | {percent(p.scatter)} "
+                f"| {1e6 * p.seconds_per_sample:.3g} | {p.rk4_steps:.0f} |"
+            )
+    if left_out:
+        text += ["", "## Left out", "", *(f"- {line}" for line in left_out)]
+    return "\n".join(text) + "\n"

@@ -1,0 +1,94 @@
+"""The cheapest setting found by trying them all: what the advice is measured against.
+
+Cost is counted in steps of the recommended RK4 model; a step of another integrator counts by its
+CPU time relative to that, measured once, interleaved.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from functools import partial
+from statistics import median
+from typing import NamedTuple
+
+from fourbar.mjcf import Settings
+from fourbar_validation.advise.advise import MOST_STEPS
+from fourbar_validation.advise.matters import judged
+from fourbar_validation.engines.mujoco.trial import FEWEST_STEPS, Rig, dialled
+from fourbar_validation.lab.stress.timed import in_turns
+
+COARSE, FINE = 2.0, 2.0 ** (1.0 / 3.0)
+"""Ratios of the ladder of steps: first by factors of two, then thirds of an octave below what serves."""
+TIME_CONSTANTS = (3.0, 5.0, 8.0, 12.0, 20.0, 35.0, 60.0, 120.0, 300.0)
+FIRST_ORDER = ("Euler", "implicit", "implicitfast", "discrete")
+FIRST_ORDER_TIME_CONSTANTS = (2.0, 3.0, 6.0, 12.0)
+ROUNDS, STEPS = 15, 400
+
+
+class Found(NamedTuple):
+    """The cheapest that serves."""
+
+    settings: Settings
+    steps: int
+    cost: float
+    """Recommended RK4 steps per run."""
+
+
+def relative_costs(rig: Rig) -> dict[tuple[str, bool], float]:
+    """CPU time of a step, by integrator and pads, relative to RK4 with pads: medians of interleaved rounds."""
+    kinds = [("RK4", True), ("RK4", False), *((name, False) for name in FIRST_ORDER)]
+    clocks = {kind: rig.seconds_per_step(of_kind(kind, dialled(628.0, 20.0))) for kind in kinds}
+    times = in_turns({kind: partial(clock, STEPS) for kind, clock in clocks.items()}, ROUNDS)
+    reference = median(times["RK4", True])
+    return {kind: median(values) / reference for kind, values in times.items()}
+
+
+def of_kind(kind: tuple[str, bool], settings: Settings) -> Settings:
+    """The settings with another integrator, with or without pads."""
+    integrator, pads = kind
+    return replace(settings, integrator=integrator, pad=settings.pad if pads else None)
+
+
+def cheapest(rig: Rig, error: float, costs: Mapping[tuple[str, bool], float]) -> Found | None:
+    """Every integrator, with and without pads, over time constants and steps; None where nothing serves."""
+    best: Found | None = None
+    for kind, ratio in costs.items():
+        fourth_order = kind[0] == "RK4"
+        for tc in TIME_CONSTANTS if fourth_order else FIRST_ORDER_TIME_CONSTANTS:
+            most = MOST_STEPS if best is None else best.cost / ratio
+            if not fourth_order and best is not None and not _serves(rig, kind, tc, most / FINE, error):
+                continue  # not even with as many steps as the best costs
+            steps = _least(rig, kind, tc, most, error)
+            if steps is not None:
+                cost = steps * ratio
+                if best is None or cost < best.cost:
+                    best = Found(_settings(rig, kind, tc, steps), steps, cost)
+    return best
+
+
+def _least(rig: Rig, kind: tuple[str, bool], tc: float, most: float, error: float) -> int | None:
+    """The least steps of the ladder, fewer than `most`, that serve."""
+    for n in _ladder(FEWEST_STEPS, COARSE, most):
+        if _serves(rig, kind, tc, n, error):
+            for finer in (n / FINE**2, n / FINE):
+                if _serves(rig, kind, tc, finer, error):
+                    return int(finer + 0.5)
+            return int(n + 0.5)
+    return None
+
+
+def _ladder(start: float, ratio: float, most: float) -> Iterator[float]:
+    n = start
+    while n < most:
+        yield n
+        n *= ratio
+
+
+def _settings(rig: Rig, kind: tuple[str, bool], tc: float, steps: float) -> Settings:
+    """So many steps over the run."""
+    per_run = rig.steps(dialled(1000.0, tc)) / 1000.0
+    return of_kind(kind, dialled(steps / per_run, tc))
+
+
+def _serves(rig: Rig, kind: tuple[str, bool], tc: float, steps: float, error: float) -> bool:
+    trial = rig.try_out(_settings(rig, kind, tc, steps))
+    return judged(rig.scene, trial).worst <= error

@@ -1,0 +1,145 @@
+"""The formulas' side of the study: double and single precision, the thirteen equations, fifty digits."""
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from fourbar.effects import Actions
+from fourbar.effects.actions import bodies
+from fourbar.evaluation.case import Case, changed, state_at
+from fourbar.formulas.arithmetic import cross
+from fourbar.formulas.motion import State
+from fourbar.formulas.pin_forces import Wrenches
+from fourbar.linkage import MOVING_BARS
+from fourbar.quantities import PIN_FORCES
+from fourbar.scene import Command, Scene
+from fourbar.solve import solve
+from fourbar_validation.advise.errors import Errors, greatest
+from fourbar_validation.compare.answer import Array
+from fourbar_validation.compare.error import relative
+from fourbar_validation.compare.scales import yardstick
+from fourbar_validation.published import thirteen
+
+FIFTY_DIGITS = 167 + 30
+"""Bits: fifty digits, and what some sixty roundings of a well-conditioned position cost."""
+AT_MOST = 25
+"""Positions at which errors against the reference are taken: a few milliseconds each."""
+Quantities = dict[str, Any]
+
+
+def few(at: Command) -> Command:
+    """At most so many positions, evenly over the sweep."""
+    rows = np.unique(np.linspace(0, len(at.theta_2) - 1, min(AT_MOST, len(at.theta_2))).round().astype(int))
+    return at._replace(theta_2=at.theta_2[rows], branch=at.branch[rows])
+
+
+def double(scene: Scene, at: Command) -> Quantities:
+    """`fourbar.solve`."""
+    s = solve(scene, "force", at=at)
+    return {name: getattr(s, name) for name in ("torque", *PIN_FORCES)}
+
+
+def single(scene: Scene, at: Command) -> Quantities:
+    """The same formulas on float32 arrays."""
+    case = changed(Case.of(scene), float)  # NumPy's doubles would prevail
+    path = case.path._replace(u1=np.complex64(case.path.u1))
+    with np.errstate(all="ignore"):
+        theta_2 = at.theta_2.astype(np.float32)
+        speed, growth = (np.float32(value) for value in (at.omega_2 or 0.0, at.alpha_2))
+        position = path.position(theta_2, path.half_angle(theta_2), at.branch)
+        # vectors are made of complex doubles whatever their parts are, and so is what stays parallel
+        state = case.state(path, theta_2, changed(position, _single), at.branch, speed, growth)
+        state = changed(state, _single)
+        found = case.dynamics(state, growth, rounded=_single)
+    assert found.torque.dtype == np.float32
+    return {"torque": found.torque, **{name: _stack(getattr(found.pins, name), len(theta_2)) for name in PIN_FORCES}}
+
+
+def _single(value: Any, *, turned: bool = False) -> Any:
+    """In single precision, both parts of a vector too."""
+    return np.asarray(value).astype(np.complex64 if np.iscomplexobj(value) else np.float32)
+
+
+def _stack(vector: Any, n: int) -> Array:
+    """Components of a complex vector, (n, 2)."""
+    whole = np.broadcast_to(vector, (n,))
+    return np.stack([whole.real, whole.imag], axis=1)
+
+
+def thirteen_equations(scene: Scene, at: Command) -> Quantities:
+    """Kinematics by the formulas, then thirteen equations per position, assembled and solved."""
+    if any(effect.loaded_pins for effect in scene.effects):
+        raise NotImplementedError("friction that depends on the pin forces is not linear in them")
+    x = thirteen.solve_thirteen(_bodies(scene, state_at(scene, at)), scene.drive_bar)
+    columns = {name: getattr(thirteen, name) for name in PIN_FORCES}
+    return {"torque": x[:, thirteen.TORQUE], **{name: x[:, k : k + 2] for name, k in columns.items()}}
+
+
+def _bodies(scene: Scene, state: State) -> thirteen.FreeBodies:
+    """The free bodies with what acts on them, moments about the mass centres."""
+    n, parts = len(state.theta_2), bodies(scene.linkage, scene.effects)
+    actions = Actions(state, parts)
+    for term in (*scene.loads, *scene.effects):
+        term.act(actions, state)
+    acting = actions.wrenches(Wrenches())
+    first, second, force, moment = {}, {}, {}, {}
+    for k, body in zip(MOVING_BARS, parts, strict=True):
+        centre = body.z * state.direction(k)
+        first[k] = _stack(-centre, n)
+        # the thesis's order: bar 4's second pin is B as well, and its first is O4
+        second[k] = _stack(scene.linkage.bar(k).length * state.direction(k) - centre, n)
+        R, M = acting.on(k)
+        force[k] = _stack(body.m * state.acceleration(k, body.z) - R, n)
+        about_G = M - cross(centre, R + 0.0j)
+        moment[k] = np.broadcast_to(body.I * np.asarray(state.alpha(k)), (n,)) - about_G
+    return thirteen.FreeBodies(first, second, force, moment)
+
+
+def fifty_digits(scene: Scene, at: Command, bits: int = FIFTY_DIGITS) -> Quantities:
+    """Balls of the independent reference, (n,) objects."""
+    from flint import arb, ctx
+
+    from fourbar_validation.engines.balls import inputs, outputs
+
+    before, ctx.prec = ctx.prec, bits
+    try:
+        found = []
+        for theta_2, branch in zip(at.theta_2.tolist(), at.branch.tolist(), strict=True):
+            x = {name: arb(value) for name, value in inputs(scene, theta_2).items()}
+            found.append(outputs(scene, branch, x, scene.drive_bar) or {})
+    finally:
+        ctx.prec = before
+    out: Quantities = {"torque": [y.get("torque") for y in found]}
+    return out | {name: [(y.get(f"{name}_x"), y.get(f"{name}_y")) for y in found] for name in PIN_FORCES}
+
+
+def against_reference(scene: Scene, at: Command, quantities: Quantities, reference: Quantities) -> Errors:
+    """Worst errors on their scales against balls of many more digits."""
+    formulas = solve(scene, "force", at=at)
+    worst = {}
+    for name in ("torque", *PIN_FORCES):
+        sizes = yardstick(name, scene, formulas, getattr(formulas, name))
+        found = []
+        for ours, exact, size in zip(quantities[name], reference[name], sizes.tolist(), strict=True):
+            pairs = ((ours, exact),) if name == "torque" else tuple(zip(ours, exact, strict=True))
+            if all(y is not None for _, y in pairs):
+                found.append(float(relative(math.hypot(*(_difference(x, y) for x, y in pairs)), size)))
+        worst[name] = greatest(found)
+    return Errors(**worst)
+
+
+def _difference(ours: Any, exact: Any) -> float:
+    from flint import arb
+
+    ball = ours if isinstance(ours, arb) else arb(float(ours))
+    return abs(float((ball - exact).mid()))
+
+
+METHODS: dict[str, Callable[[Scene, Command], Quantities]] = {
+    "formulas, double": double,
+    "formulas, single": single,
+    "13x13": thirteen_equations,
+    "50 digits": fifty_digits,
+}

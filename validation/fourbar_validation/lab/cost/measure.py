@@ -1,0 +1,202 @@
+"""How good the advice is, on linkages that it has never seen: met, and how near the cheapest."""
+
+import csv
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+from typing import Any
+
+import click
+import numpy as np
+
+from fourbar.errors import LimitError
+from fourbar.formulas.mobility import turns_fully
+from fourbar.scene import Scene, command
+from fourbar.scene.motion import Motion, Sweep
+from fourbar_validation.advise.advise import advise
+from fourbar_validation.advise.matters import judged
+from fourbar_validation.engines.mujoco.trial import Rig
+from fourbar_validation.lab.cost.exhaustive import cheapest, relative_costs
+from fourbar_validation.scenes.random import LinkageType, random_scene
+
+TYPES = (
+    *(LinkageType.CRANK_ROCKER, LinkageType.DRAG_LINK),
+    *(LinkageType.DOUBLE_ROCKER, LinkageType.TRIPLE_ROCKER),
+)
+SPEEDS = (-1.0, 3.0)
+"""log10 of rad/s."""
+ERRORS = (-7.0, -2.0)
+"""log10 of the required error."""
+WINDOW = 0.8
+"""Part of the range of a rocker that is run through: away from its limits."""
+GENTLE = 0.02
+"""|alpha_2| / omega_2^2: over a turn the speed changes by an eighth and never vanishes."""
+POSITIONS, DENSER, SEARCHED = 36, 4, 2
+"""Intervals of the scene; the answer is judged at so many times more, the search decides at so many times more."""
+NEEDED_MET, NEEDED_CHEAP, CHEAP = 0.95, 0.80, 3.0
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """One linkage, one required error."""
+
+    index: int
+    kind: str
+    omega_2: float
+    gravity: bool
+    drive_bar: int
+    asked: float
+    """The required error: a column of its file."""
+    reached: bool
+    """The advice says that it serves."""
+    error: float
+    """Judged at the denser positions."""
+    cost: float
+    """RK4 steps per run of the advice."""
+    cheapest: float
+    """Of the exhaustive search; NaN where it found nothing."""
+    trials: int
+
+    @property
+    def met(self) -> bool:
+        """Within the required error, or rightly called unreachable."""
+        return self.error <= self.asked if self.reached else math.isnan(self.cheapest)
+
+    @property
+    def cheap(self) -> bool:
+        """Within CHEAP times the cheapest; rightly unreachable counts."""
+        if not self.reached:
+            return self.met
+        return not self.cost > CHEAP * self.cheapest
+
+
+def scene_of(seed: int, index: int) -> tuple[Scene, float]:
+    """A random linkage away from its limits, at a random speed, and the error required of it."""
+    scene = random_scene(seed, index, TYPES)
+    rng = np.random.default_rng([seed, index, 1])
+    omega = float(rng.choice([-1.0, 1.0]) * 10.0 ** rng.uniform(*SPEEDS))
+    alpha = float(rng.choice([0.0, omega**2 * rng.uniform(-GENTLE, GENTLE)]))
+    sweep = scene.motion.theta_2
+    assert isinstance(sweep, Sweep)
+    start, stop = sweep.start, sweep.stop
+    if not turns_fully(scene.linkage):
+        middle, half = (start + stop) / 2.0, WINDOW * (stop - start) / 2.0
+        start, stop = middle - half, middle + half
+    motion = Motion(Sweep(start, stop, POSITIONS), omega, alpha, scene.motion.branch)
+    return replace(scene, motion=motion), float(10.0 ** rng.uniform(*ERRORS))
+
+
+def denser(scene: Scene, times: int) -> Scene:
+    """The same motion at more positions."""
+    sweep = scene.motion.theta_2
+    assert isinstance(sweep, Sweep)
+    return replace(scene, motion=replace(scene.motion, theta_2=replace(sweep, steps=sweep.steps * times)))
+
+
+def case(seed: int, index: int, costs: dict[tuple[str, bool], float]) -> Case:
+    """Ask for advice, judge it at denser positions, and search exhaustively."""
+    scene, required = scene_of(seed, index)
+    advice = advise(scene, required)
+    dense, searched = denser(scene, DENSER), denser(scene, SEARCHED)
+    error = judged(dense, Rig(dense, command(dense)).try_out(advice.best.settings)).worst
+    found = cheapest(Rig(searched, command(searched)), required, costs)
+    return Case(
+        index,
+        scene.title.rpartition(" ")[0],
+        scene.motion.omega_2 or 0.0,
+        bool(scene.effects),
+        scene.drive_bar,
+        required,
+        advice.reached,
+        error,
+        float(advice.best.steps),
+        math.nan if found is None else found.cost,
+        len(advice.attempts),
+    )
+
+
+def wilson(successes: int, n: int) -> float:
+    """Lower bound of the Wilson score interval of a proportion, at 95 %."""
+    from scipy.stats import binomtest
+
+    return float(binomtest(successes, n).proportion_ci(0.95, "wilson").low) if n else 0.0
+
+
+def enough(missed: int) -> int:
+    """The least number of cases whose bound is the needed one where so many are not met."""
+    n = missed + 1
+    while wilson(n - missed, n) < NEEDED_MET:
+        n += 1
+    return n
+
+
+def measure(seed: int, count: int, out: Path) -> Iterator[Case]:
+    """The cases, one by one, each written as it comes; what an interrupted run left is kept."""
+    done = {each.index: each for each in kept(out, seed)}
+    out.parent.mkdir(parents=True, exist_ok=True)
+    yield from (done[i] for i in sorted(done) if i < count)
+    if len(done) >= count:
+        return
+    scene, _ = scene_of(seed, 0)
+    costs = relative_costs(Rig(scene, command(scene)))
+    if not out.exists() or not done:
+        out.write_text(f"# seed {seed}\n" + ",".join(field.name for field in fields(Case)) + "\n", encoding="utf-8")
+    for index in range(count):
+        if index in done:
+            continue
+        try:
+            each = case(seed, index, costs)
+        except LimitError as error:
+            raise LimitError(f"linkage {index} of seed {seed}: {error}") from None
+        with out.open("a", encoding="utf-8", newline="") as file:
+            csv.writer(file, lineterminator="\n").writerow([getattr(each, field.name) for field in fields(Case)])
+        yield each
+
+
+def kept(out: Path, seed: int) -> list[Case]:
+    """Cases of the same seed that are already in the file."""
+    if not out.exists():
+        return []
+    first, *lines = out.read_text(encoding="utf-8").splitlines()
+    if first != f"# seed {seed}":
+        return []
+    return [_read(row) for row in csv.DictReader(lines)]
+
+
+def _read(row: dict[str, Any]) -> Case:
+    numbers = {key: float(row[key]) for key in ("omega_2", "asked", "error", "cost", "cheapest")}
+    flags = {key: row[key] == "True" for key in ("gravity", "reached")}
+    counts = {key: int(row[key]) for key in ("index", "drive_bar", "trials")}
+    return Case(kind=row["kind"], **numbers, **flags, **counts)  # type: ignore[arg-type]
+
+
+@click.command(name="advise-study")
+@click.option("--count", type=click.IntRange(min=1), default=400, show_default=True, help="Random linkages.")
+@click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True)
+@click.option("-o", "--out", type=click.Path(path_type=Path, dir_okay=False), default=Path("results/advise-study.csv"))
+def study(count: int, seed: int, out: Path) -> int:
+    """Measure the advice on random linkages; exit 1 where it is not met or not cheap often enough.
+
+    That it is met often enough is a statement on all linkages, which few of them cannot prove: the count that it
+    needs is stated.
+    """
+    from rich.console import Console
+    from rich.progress import track
+
+    cases = list(track(measure(seed, count, out), "advising", total=count, console=Console(stderr=True)))
+    met, cheap = sum(each.met for each in cases), sum(each.cheap for each in cases)
+    unreachable = sum(not each.reached for each in cases)
+    ratios = sorted(each.cost / each.cheapest for each in cases if each.reached and each.cheapest == each.cheapest)
+    bound = wilson(met, len(cases))
+    click.echo(f"met: {met} of {len(cases)}, lower Wilson bound {bound:.3f} (needed {NEEDED_MET})")
+    if bound < NEEDED_MET and (more := enough(len(cases) - met)) > len(cases):
+        click.echo(f"undecided: with {len(cases) - met} not met the bound is reached from --count {more} on")
+    wrongly = sum(not each.met for each in cases if not each.reached)
+    click.echo(f"called unreachable: {unreachable}, of which the search reached {wrongly}")
+    share = cheap / len(cases)
+    click.echo(f"within {CHEAP:g} times the cheapest: {cheap} of {len(cases)}, {share:.3f} (needed {NEEDED_CHEAP})")
+    if ratios:
+        median, high = ratios[len(ratios) // 2], ratios[int(0.95 * (len(ratios) - 1))]
+        click.echo(f"cost over the cheapest: median {median:.2f}, 95 % below {high:.2f}, most {ratios[-1]:.2f}")
+    return 0 if bound >= NEEDED_MET and share >= NEEDED_CHEAP else 1

@@ -1,0 +1,193 @@
+"""Pictures of the study: work and precision, each quantity over the timestep, and the three sources of error."""
+
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from fourbar.show.plot.labels import Label, Labels
+from fourbar.show.plot.style import matplotlib_style, save
+from fourbar_validation.lab.cost import orders
+from fourbar_validation.lab.cost.laws import pareto
+from fourbar_validation.lab.cost.orders import CURVES, Look, headed, line_of
+from fourbar_validation.lab.cost.study import EXACT, FORMULAS, STEPPED, Point
+
+SHOWN: dict[str, Look] = {
+    "Euler, MuJoCo's defaults": ("Euler, MuJoCo's defaults", "#d55e00", "s", (0, (4, 2))),
+    "RK4, MuJoCo's defaults": ("RK4, MuJoCo's defaults", "#e69f00", "D", (0, (1, 1.5))),
+    "Euler, stiff closure": ("Euler, tc held", "#cc79a7", "v", (0, (6, 2, 1, 2))),
+    "RK4, d = 0.9999, tc = 10 h": ("RK4, no pads, tc = 10 h", "#56b4e9", "P", (0, (5, 1))),
+    "Pinocchio forward, RK4": ("Pinocchio forward", "#999999", "x", (0, (3, 2))),
+    "MuJoCo, recommended": ("recommended", "#0072b2", "o", "solid"),
+}
+SOFTNESS: dict[str, Look] = {
+    "at the scene's speed": ("softness d", "#0072b2", "o", "solid"),
+    "at 0.1 rad/s, sag under gravity and loads": ("sag d, slow", "#d55e00", "s", (0, (4, 2))),
+    "at 0.1 rad/s, nothing acts": ("sag d, slow, nothing acts", "#009e73", "^", (0, (1, 1.5))),
+}
+SOLVERS: dict[str, Look] = {
+    "Newton": ("tolerance, Newton", "#0072b2", "o", "solid"),
+    "PGS": ("tolerance, PGS", "#d55e00", "s", (0, (4, 2))),
+    "CG": ("tolerance, CG", "#009e73", "^", (0, (1, 1.5))),
+}
+"""By name in the legend."""
+DEFAULT = "MuJoCo's defaults"
+"""Label of the point that a new user gets."""
+LOWEST = 1e-17
+"""Bottom of the picture; fifty digits lie far below and are named at the edge."""
+NONE = 1e-18
+"""Where a tolerance of 0 is drawn."""
+NAMES = {"torque": "driving torque", "force": "worst pin force"}
+INK = "#333333"
+PALE = "#d9d9d9"
+
+
+def draw(curves: Mapping[str, Sequence[Point]], title: str, folder: Path) -> list[Path]:
+    """All pictures of a scene as SVG and PNG; the files written."""
+    written = []
+    with matplotlib_style():
+        made = {f"work-precision-{quantity}": _work_precision(curves, quantity, title) for quantity in NAMES}
+        if any(name in curves for name, *_ in CURVES.values()):
+            made["orders"] = orders.picture(curves, title)
+        if "tolerance, Newton" in curves:
+            made["sources"] = _sources(curves, title)
+        for name, figure in made.items():
+            for kind in ("svg", "png"):
+                written.append(folder / f"{name}.{kind}")
+                save(figure, written[-1], kind)
+    return written
+
+
+def _work_precision(curves: Mapping[str, Sequence[Point]], quantity: str, title: str) -> Any:
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(9.6, 6.4))
+    axes, labels = figure.add_axes((0.085, 0.1, 0.885, 0.735)), Labels()
+    points = [point for name, row in curves.items() for point in row if "slow" not in name]
+    front = pareto([p for p in points if p.kind == STEPPED], quantity)
+    broad: dict[str, Any] = {"lw": 9.0, "solid_capstyle": "round", "solid_joinstyle": "round", "zorder": 1}
+    axes.plot(*_places(front, quantity), **broad, color=PALE, label="Pareto front of everything stepped")
+    labels.keep_off(axes, *zip(*_places(front, quantity), strict=True))
+    for label, look in SHOWN.items():
+        row = [p for p in curves.get(look[0], ()) if math.isfinite(getattr(p, quantity))]
+        if row:
+            # a cross has no face: with a white edge it would vanish
+            style: dict[str, Any] = {"mec": look[1], "mew": 1.4} if look[2] == "x" else {"mew": 0.6}
+            style["zorder"] = 3 if look[0] == "recommended" else 2
+            line_of(axes, *_places(row, quantity), label, look, ms=5.5, lw=1.8, **style)
+            labels.keep_off(axes, *zip(*_places(row, quantity), strict=True), width=1.8)
+    for point in points:  # what a new user gets
+        if point.setting == DEFAULT and math.isfinite(error := getattr(point, quantity)):
+            axes.plot(*_places([point], quantity), marker="*", ms=19, color="#d55e00", mec="black", mew=0.9, zorder=5)
+            text = f"MuJoCo's defaults (Euler, 2 ms): {short(error)}"
+            _name(labels, axes, point, quantity, text, INK, 10.0)
+    _exact(labels, axes, points, quantity)
+    for point in curves.get("recommended", ())[::2]:
+        text = f"{point.steps_per_revolution:.0f} steps, tc = {point.setting.partition('tc = ')[2]}"
+        _name(labels, axes, point, quantity, text, "#0072b2")
+    if front and front[-1].curve != "recommended":
+        text = front[-1].setting.replace("tc held", "tc a quarter turn")
+        _name(labels, axes, front[-1], quantity, text, "#666666")
+    axes.set(xscale="log", yscale="log", xlabel="CPU time per revolution [ms]")
+    axes.set_ylabel(f"error of the {NAMES[quantity]}, relative to its scale")
+    axes.set_ylim(LOWEST / 4.0, 3.0)
+    low, high = axes.get_xlim()
+    axes.set_xlim(low / 1.3, high * 1.6)
+    axes.grid(visible=True, which="major")
+    axes.tick_params(labelsize=10)
+    axes.xaxis.label.set_fontsize(11)
+    axes.yaxis.label.set_fontsize(11)
+    axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=4, fontsize=8.5)
+    labels.settle(figure)
+    return headed(figure, statement(curves, quantity), title, 0.965, 0.928)
+
+
+def _places(points: Sequence[Point], quantity: str) -> tuple[list[float], list[float]]:
+    """Milliseconds a revolution, and errors; what lies below the picture at its edge."""
+    errors = [max(getattr(point, quantity), LOWEST) for point in points]
+    return [1e3 * point.seconds_per_revolution for point in points], errors
+
+
+def _name(
+    labels: Labels, axes: Any, point: Point, quantity: str, text: str, colour: str = INK, size: float = 8.5
+) -> None:
+    """Words next to a point, where they cover nothing."""
+    (x,), (y,) = _places([point], quantity)
+    labels.keep_off(axes, (x, y), (x, y))
+    labels.add(Label(axes, text, (x, y), (0.5 * x, y), colour, size))  # to the right where that is free
+
+
+def _exact(labels: Labels, axes: Any, points: Sequence[Point], quantity: str) -> None:
+    """Methods that answer each position by itself: one mark each, named next to it."""
+    marks = {EXACT: ("h", "#009e73"), FORMULAS: ("*", "black")}
+    for point in points:
+        if point.kind == STEPPED or (point.curve == "one state" and point.dial > 0.0):
+            continue
+        (marker, colour), value = marks[point.kind], getattr(point, quantity)
+        axes.plot(*_places([point], quantity), marker=marker, ms=9, color=colour, mec="white", mew=0.6, zorder=4)
+        name = point.setting if value >= LOWEST else f"{point.setting}: {short(value)}, far below"
+        _name(labels, axes, point, quantity, name)
+
+
+def short(value: float) -> str:
+    """One digit and its power of ten."""
+    mantissa, _, exponent = f"{value:.0e}".partition("e")
+    return f"{mantissa}e{int(exponent)}"
+
+
+def statement(curves: Mapping[str, Sequence[Point]], quantity: str) -> str:
+    """What the picture means."""
+    four = [p for p in curves.get("recommended", ()) if getattr(p, quantity) <= 1e-4]
+    default = [p for row in curves.values() for p in row if p.setting == DEFAULT]
+    parts = []
+    if four:
+        cheap = min(four, key=lambda p: p.seconds_per_revolution)
+        parts.append(
+            f"Four digits of {NAMES[quantity].removeprefix('driving ').removeprefix('worst ')} cost "
+            f"{1e3 * cheap.seconds_per_revolution:.2g} ms a revolution"
+        )
+    if default and math.isfinite(error := getattr(default[0], quantity)):
+        parts.append(
+            f"the defaults pay {1e3 * default[0].seconds_per_revolution:.2g} ms for an error of {short(error)}"
+        )
+    return "; ".join(parts) or f"Error of the {NAMES[quantity]} against its cost"
+
+
+def _sources(curves: Mapping[str, Sequence[Point]], title: str) -> Any:
+    """Time step, softness and solver tolerance, each with the other two too fine to matter."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(11.5, 5.6))
+    left, right, both = 0.075, 0.985, 0.3
+    panels = [figure.add_axes((left + i * (right - left + 0.012) / 3.0, 0.105, both - 0.008, 0.6)) for i in range(3)]
+    for axes, heading, label, rows in (
+        (panels[0], "Time step", "time step, part of a revolution", CURVES),
+        (panels[1], "Softness of the closure", "1 - d", SOFTNESS),
+        (panels[2], "Solver", "tolerance", SOLVERS),
+    ):
+        for name, look in rows.items():
+            row = [p for p in curves.get(look[0], ()) if math.isfinite(p.worst) and p.worst < 10.0]
+            x = [1.0 / p.dial if axes is panels[0] else p.dial or NONE for p in row]
+            line_of(axes, x, [p.worst for p in row], name, look, ms=5, lw=1.8)
+        axes.set(xscale="log", yscale="log", ylim=(1e-12, 20.0), xlabel=label)
+        axes.set_title(heading, loc="left", fontsize=11, weight="bold", pad=44.0)
+        axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), fontsize=8.5, ncols=2 if axes is panels[0] else 1)
+        axes.grid(visible=True)
+        axes.tick_params(labelsize=9)
+        if axes is not panels[0]:
+            axes.tick_params(labelleft=False)
+    panels[2].set_xticks([NONE, 1e-15, 1e-12, 1e-9, 1e-6], ["0", "1e-15", "1e-12", "1e-9", "1e-6"])
+    _slope(panels[0], 1.0, 4e-3, 3e-3, "1")
+    _slope(panels[0], 4.0, 8e-3, 1e-8, "4")
+    _slope(panels[1], 1.0, 2e-3, 2e-5, "1")
+    panels[0].set_ylabel("worst error of torque and pin forces")
+    sentence = "Three sources, one at a time: time step by its order, softness in proportion, the solver unless at 0"
+    return headed(figure, sentence, title, 0.955, 0.912)
+
+
+def _slope(axes: Any, exponent: float, x: float, y: float, name: str) -> None:
+    """A triangle's hypotenuse with the exponent next to it."""
+    axes.plot([x, 4.0 * x], [y, y * 4.0**exponent], color=INK, lw=1.0)
+    axes.annotate(
+        f"slope {name}", (2.0 * x, y * 2.0**exponent), xytext=(6, -8), textcoords="offset points", fontsize=8.5
+    )

@@ -1,0 +1,299 @@
+"""The work-precision study of one scene: curve after curve, each kept once it is done."""
+
+import json
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass, fields, replace
+from functools import partial
+from pathlib import Path
+from statistics import median
+
+import numpy as np
+
+from fourbar.errors import FourBarError, LimitError
+from fourbar.files import dump
+from fourbar.formulas.mobility import turns_fully
+from fourbar.scene import Command, Scene, command
+from fourbar.writing import write_text
+from fourbar_validation.advise.advise import advise
+from fourbar_validation.advise.errors import NO_ANSWER, Errors, errors
+from fourbar_validation.compare.answer import Engine
+from fourbar_validation.engines.loop import Trial
+from fourbar_validation.engines.mujoco.trial import Rig
+from fourbar_validation.lab.cost import formulas
+from fourbar_validation.lab.cost.curves import BEST, SLOW, Curve, Spot, curves
+from fourbar_validation.lab.stress.timed import in_turns, seconds
+from fourbar_validation.report.machine import versions
+
+ROUNDS, ANSWERS = 7, 3
+"""Timings of each setting, and of an engine that answers position by position."""
+TIMED_STEPS = 200
+"""Steps per timing: some 3 ms of RK4, so that a round of a curve passes within one spell of the machine."""
+FORWARD_STEPS = (20, 40, 80, 160, 320, 640)
+FORWARD_TIME_CONSTANT = 0.25
+REQUIRED = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 2e-9)
+"""Errors for which the advice is drawn."""
+ONE_STATE = (0.9, 0.99, 0.999, 0.9999)
+VERSION = 6
+"""Of what is tried; parts of another one are done again."""
+EXACT, STEPPED, FORMULAS = "exact", "stepped", "formulas"
+
+
+@dataclass(frozen=True, slots=True)
+class Point:
+    """One setting of one method: its errors, and what it costs."""
+
+    curve: str
+    kind: str
+    """ "stepped" through time, "exact" at each position, or "formulas"."""
+    setting: str
+    dial: float
+    """What the curve's dial stands at: steps per revolution, 1-d, tc in steps, tolerance, ..."""
+    steps: int
+    """Of one run through the scene; positions, where nothing is stepped."""
+    steps_per_revolution: float
+    torque: float
+    F12: float
+    F32: float
+    F43: float
+    F14: float
+    seconds_per_revolution: float
+    """CPU; of an exact method: the scene's positions in one revolution."""
+    seconds_per_sample: float
+    """CPU, of reading a sample; of an exact method: of a position."""
+    rk4_steps: float
+    """seconds_per_revolution in steps of the recommended RK4 model."""
+    scatter: float
+    """Of seconds_per_revolution: half of what the middle half of its timings spans, over their median."""
+    broken: str = ""
+
+    @property
+    def force(self) -> float:
+        """The error of the worst pin force."""
+        return max(self.F12, self.F32, self.F43, self.F14)
+
+    @property
+    def worst(self) -> float:
+        """The largest of the errors."""
+        return max(self.torque, self.force)
+
+
+COLUMNS = tuple(field.name for field in fields(Point))
+
+
+class Study:
+    """The parts of a study of one scene, each in its own file."""
+
+    def __init__(self, name: str, scene: Scene, folder: Path) -> None:
+        self.name, self.scene, self.folder = name, scene, folder / "parts"
+        self.command = command(scene)
+        self.left_out: list[str] = []
+        self._rigs: dict[tuple[bool, bool, bool], Rig] = {}
+        identity = json.dumps({"scene": dump(scene), "versions": versions(), "study": VERSION}, sort_keys=True)
+        marker = self.folder / "study.json"
+        if not (marker.is_file() and marker.read_text(encoding="utf-8") == identity):
+            for old in self.folder.glob("*.json"):
+                old.unlink()
+            self.folder.mkdir(parents=True, exist_ok=True)
+            write_text(marker, identity)
+        self.units: dict[str, Callable[[], list[Point]]] = {"formulas": self._formulas, "inverse": self._inverse}
+        self.units["one state"] = self._one_state
+        self.units["Pinocchio forward"] = self._pinocchio_forward
+        self.units["recommended"] = self._recommended
+        for curve in curves(scene):
+            self.units[curve.name] = lambda curve=curve: self._curve(curve)  # type: ignore[misc]
+
+    def __len__(self) -> int:
+        return len(self.units)
+
+    def points(self) -> Iterator[tuple[str, list[Point]]]:
+        """Curve after curve; what is on disk is not done again."""
+        for number, (name, unit) in enumerate(self.units.items()):
+            path = self.folder / f"{number:03d}.json"
+            if path.is_file():
+                kept = json.loads(path.read_text(encoding="utf-8"))
+                self.left_out += kept["left_out"]
+                yield name, [Point(**row) for row in kept["points"]]
+                continue
+            reasons: list[str] = []
+            try:
+                found = unit()
+            except (FourBarError, NotImplementedError) as error:
+                found, reasons = [], [f"{name}: {error}"]
+            self.left_out += reasons
+            write_text(path, json.dumps({"points": [asdict(point) for point in found], "left_out": reasons}))
+            yield name, found
+
+    def rig(self, slow: bool = False, bare: bool = False, settled: bool = False) -> Rig:
+        """The scene assembled for trials: at its own speed or slow, as it is or bare, after a turn or not."""
+        if (slow, bare, settled) not in self._rigs:
+            scene = self.scene
+            if slow:
+                sign = math.copysign(1.0, scene.motion.omega_2 or 1.0)
+                scene = replace(scene, motion=replace(scene.motion, omega_2=sign * SLOW, alpha_2=0.0))
+            if bare:
+                scene = replace(scene, loads=(), effects=())
+            at = command(scene)
+            if settled:
+                before = float(at.theta_2.min() if at.omega_2 > 0.0 else at.theta_2.max())  # type: ignore[operator]
+                before -= math.copysign(2.0 * math.pi, at.omega_2)  # type: ignore[arg-type]
+                at = at._replace(theta_2=np.append(at.theta_2, before), branch=np.append(at.branch, at.branch[0]))
+            self._rigs[slow, bare, settled] = Rig(scene, at)
+        return self._rigs[slow, bare, settled]
+
+    def _curve(self, curve: Curve) -> list[Point]:
+        settled = curve.settled and turns_fully(self.scene.linkage) and self.scene.motion.alpha_2 == 0.0
+        rig = self.rig(curve.slow, curve.bare, settled)
+        return self._stepped(curve.name, curve.spots, rig, settled)
+
+    def _stepped(self, name: str, spots: tuple[Spot, ...], rig: Rig, settled: bool = False) -> list[Point]:
+        """Errors of each spot, and the CPU time of its steps next to that of the recommended model, interleaved."""
+        trials = [rig.try_out(spot.settings, spot.build) for spot in spots]
+        if settled:
+            for trial in trials:
+                _leave_out_first(trial)
+        clocks = [rig.seconds_per_step(spot.settings, spot.build) for spot in spots]
+        per_step, reference = _interleaved(
+            clocks, rig.seconds_per_step(BEST), [min(t.steps, TIMED_STEPS) or 1 for t in trials]
+        )
+        points = []
+        for spot, trial, (cost, scatter) in zip(spots, trials, per_step, strict=True):
+            # the laws are those of the steps themselves: between them the advice judges
+            found = NO_ANSWER if trial.broken else errors(rig.scene, trial.at, trial.quantities)
+            n = trial.steps_per_revolution or spot.settings.steps_per_revolution
+            samples = max(len(trial.at.theta_2), 1)
+            points.append(
+                Point(
+                    *(name, STEPPED, spot.label, spot.x, trial.steps, n, *found),
+                    *(cost * n, trial.reading / samples, cost * n / reference, scatter, trial.broken),
+                )
+            )
+        return points
+
+    def _recommended(self) -> list[Point]:
+        """What the advice gives for each required error, where it is reached."""
+        rig, spots = self.rig(), []
+        for required in REQUIRED:
+            advice = advise(self.scene, required, rig)
+            if advice.reached:
+                spots.append(
+                    Spot(
+                        f"required {required:g}: tc = {advice.best.settings.time_constant_steps:.3g} h",
+                        advice.best.settings,
+                        None,
+                        required,
+                    )
+                )
+            else:
+                self.left_out.append(f"recommended: {advice.reason}")
+        return self._stepped("recommended", tuple(spots), rig)
+
+    def _at_positions(
+        self, name: str, kind: str, label: str, found: Errors, times: Sequence[float], n: int, dial: float = math.nan
+    ) -> Point:
+        """A point of a method that answers each position by itself."""
+        per_revolution = self._positions_per_revolution()
+        reference, (seconds, scatter) = self._rk4_step(), clocked(times)
+        cost = seconds / n * per_revolution
+        return Point(name, kind, label, dial, n, per_revolution, *found, cost, seconds / n, cost / reference, scatter)
+
+    def _positions_per_revolution(self) -> float:
+        span = float(np.ptp(self.command.theta_2)) or 2.0 * math.pi
+        return 2.0 * math.pi / span * max(len(self.command.theta_2) - 1, 1)
+
+    def _rk4_step(self) -> float:
+        try:
+            clock = self.rig().seconds_per_step(BEST)
+        except LimitError:
+            return math.nan
+        return median(clock(TIMED_STEPS) / TIMED_STEPS for _ in range(ROUNDS))
+
+    def _formulas(self) -> list[Point]:
+        few = formulas.few(self.command)
+        exact = formulas.fifty_digits(self.scene, few, 2 * formulas.FIFTY_DIGITS)
+        points = []
+        for label, method in formulas.METHODS.items():
+            try:
+                found = formulas.against_reference(self.scene, few, method(self.scene, few), exact)
+            except (NotImplementedError, AssertionError) as error:
+                self.left_out.append(f"{label}: {error}")
+                continue
+            at = few if label == "50 digits" else self.command
+            times = [seconds(partial(method, self.scene, at)) for _ in range(ROUNDS)]
+            points.append(self._at_positions("formulas", FORMULAS, label, found, times, len(at.theta_2)))
+        return points
+
+    def _inverse(self) -> list[Point]:
+        from fourbar_validation.engines.mujoco.inverse import MujocoInverse
+        from fourbar_validation.engines.pinocchio import PinocchioInverse
+
+        return [self._answered("inverse", engine) for engine in (PinocchioInverse(), MujocoInverse())]
+
+    def _answered(self, curve: str, engine: Engine, label: str = "", dial: float = math.nan) -> Point:
+        """An engine that answers each position."""
+        import time
+
+        times = []
+        for _ in range(ANSWERS):
+            began = time.process_time()
+            answer = engine.answer(self.scene, self.command)
+            times.append(time.process_time() - began)
+        if answer.refusal is not None:
+            raise LimitError(f"{engine.name}: {answer.refusal}")
+        assert answer.assembled is not None
+        rows = np.flatnonzero(answer.assembled)
+        at = self.command._replace(theta_2=self.command.theta_2[rows], branch=self.command.branch[rows])
+        found = errors(self.scene, at, {name: value[rows] for name, value in answer.quantities.items()})
+        return self._at_positions(curve, EXACT, label or engine.name, found, times, len(self.command.theta_2), dial)
+
+    def _one_state(self) -> list[Point]:
+        from fourbar_validation.engines.mujoco.one_state import MujocoOneState
+
+        points = [
+            self._answered("one state", MujocoOneState((d,)), f"MuJoCo at one state, d = {d:g}", (1.0 - d) / d)
+            for d in ONE_STATE
+        ]
+        return [*points, self._answered("one state", MujocoOneState(), "MuJoCo at one state, extrapolated", 0.0)]
+
+    def _pinocchio_forward(self) -> list[Point]:
+        from fourbar_validation.engines.pinocchio_forward import PinocchioForward
+
+        points = []
+        reference = self._rk4_step()
+        for n in FORWARD_STEPS:
+            ran = PinocchioForward(self.scene, self.command, n, FORWARD_TIME_CONSTANT * n).forward()
+            found = errors(self.scene, ran.at, ran.quantities)
+            cost = ran.stepping / ran.steps * ran.steps_per_revolution
+            points.append(
+                Point(
+                    *("Pinocchio forward", STEPPED, f"Pinocchio RK4, {n}/rev", n, ran.steps, ran.steps_per_revolution),
+                    *(*found, cost, math.nan, cost / reference, math.nan),
+                )
+            )
+        return points
+
+
+def _leave_out_first(trial: Trial) -> None:
+    """The turn that a soft closure takes to settle from its exact start."""
+    at = trial.at
+    trial.at = Command(at.theta_2[1:], at.branch[1:], at.omega_2[1:], at.alpha_2[1:])  # type: ignore[index]
+    trial.quantities = {name: values[1:] for name, values in trial.quantities.items()}
+
+
+def clocked(times: Sequence[float]) -> tuple[float, float]:
+    """The median of some timings, and half of what their middle half spans, over it."""
+    low, middle, high = np.percentile(times, (25, 50, 75)).tolist()
+    return middle, 0.5 * (high - low) / middle
+
+
+def _interleaved(
+    clocks: list[Callable[[int], float]], reference: Callable[[int], float], steps: list[int]
+) -> tuple[list[tuple[float, float]], float]:
+    """CPU seconds per step, and their scatter over rounds; all take turns, so that a slow spell hits all of them."""
+
+    def per_step(clock: Callable[[int], float], n: int) -> float:
+        return clock(n) / n
+
+    every = zip((reference, *clocks), (TIMED_STEPS, *steps), strict=True)
+    base, *times = in_turns(dict(enumerate(partial(per_step, *each) for each in every)), ROUNDS).values()
+    return [clocked(kept) for kept in times], median(base)

@@ -1,0 +1,88 @@
+"""This tree's speed against that of another revision: the same timings of both, in turns, within one command."""
+
+import io
+import json
+import os
+import shutil
+import subprocess
+import sys
+import tarfile
+import tempfile
+from pathlib import Path
+from statistics import median
+from typing import NamedTuple
+
+from fourbar.errors import DependencyError, FourBarError, InputError
+from fourbar.quantities import ANGLES, UNKNOWNS
+from fourbar_validation.places import checkout
+from fourbar_validation.run.elsewhere import ended
+
+ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+
+
+class Ratio(NamedTuple):
+    """CPU seconds of a call, medians, and ours over theirs: median, least and greatest of the pairs."""
+
+    ours: float
+    theirs: float
+    ratio: float
+    least: float
+    most: float
+
+
+def against(revision: str, positions: int, rounds: int, tree: Path | None = None) -> dict[str, Ratio]:
+    """Each timing of a tree over that of a revision of its repository.
+
+    Raises InputError where the revision does not exist or is none of this package's, FourBarError where it has not
+    what is timed, DependencyError where git is not installed.
+    """
+    tree = checkout("bench --against") if tree is None else tree
+    with tempfile.TemporaryDirectory(prefix="fourbar-") as folder:
+        unpack(revision, tree, Path(folder))
+        pairs = []
+        for number in range(rounds):
+            turn = [(tree, "this tree"), (Path(folder), revision)]
+            if number % 2:  # who goes second finds a warmer machine
+                turn.reverse()
+            times = {name: timings(where, name, positions) for where, name in turn}
+            pairs.append((times["this tree"], times[revision]))
+    rows = {}
+    for name in pairs[0][0]:
+        ours, theirs = ([times[name] for times in side] for side in zip(*pairs, strict=True))
+        ratios = [a / b for a, b in zip(ours, theirs, strict=True)]
+        rows[name] = Ratio(median(ours), median(theirs), median(ratios), min(ratios), max(ratios))
+    return rows
+
+
+def unpack(revision: str, tree: Path, folder: Path) -> None:
+    """The package as it stood at a revision, into a folder."""
+    if shutil.which("git") is None:
+        raise DependencyError("bench --against needs git, which is not installed")
+    arguments_of_git = ["rev-parse", "--verify", "--quiet", "--end-of-options", f"{revision}^{{commit}}"]
+    commit = _git(tree, arguments_of_git).decode().strip()
+    archive = _git(tree, ["archive", "--format=tar", commit, "fourbar"]) if commit else b""
+    if not archive:
+        raise InputError("--against", revision, f"must be a revision of the git repository of {tree} that has fourbar")
+    with tarfile.open(fileobj=io.BytesIO(archive)) as packed:
+        packed.extractall(folder, filter="data")
+
+
+def _git(tree: Path, arguments: list[str]) -> bytes:
+    """What git says; nothing where it fails."""
+    done = subprocess.run(["git", "-C", str(tree), *arguments], capture_output=True, check=False)
+    return done.stdout if done.returncode == 0 else b""
+
+
+def timings(tree: Path, name: str, positions: int) -> dict[str, float]:
+    """CPU seconds of each timing in a fresh interpreter that imports the package from a tree."""
+    script = str(Path(__file__).with_name("timed.py"))
+    line = [sys.executable, "-P", script, str(positions), *(" ".join(names) for names in (UNKNOWNS, ANGLES))]
+    path = os.pathsep.join(filter(None, (str(tree), os.environ.get("PYTHONPATH"))))
+    done = ended(line, variables=dict.fromkeys(ONE_THREAD, "1") | {"PYTHONPATH": path})
+    if done.why:
+        raise FourBarError(f"{name} cannot be timed: {done.why}")
+    found = json.loads(done.out)
+    if not Path(found["from"]).resolve().is_relative_to(tree.resolve()):
+        raise FourBarError(f"{name} cannot be timed: {found['from']} was imported instead")
+    times: dict[str, float] = found["times"]
+    return times

@@ -1,0 +1,278 @@
+"""Speed side by side in one process: stages, the 13x13 system, C, SymPy, engines, a judged scene; ratios that hold."""
+
+import os
+import subprocess
+import sys
+import tracemalloc
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from statistics import median
+from typing import TYPE_CHECKING, NamedTuple
+
+import click
+import numpy as np
+from numpy.typing import NDArray
+
+from fourbar.effects import Gravity
+from fourbar.errors import BROKEN, FAILED, HOLDS
+from fourbar.evaluation.case import BLOCK
+from fourbar.formulas.mobility import default_range
+from fourbar.linkage import MOVING_BARS, Bar, FourBar
+from fourbar.quantities import ANGLES, UNKNOWNS
+from fourbar.scene import Command, Scene
+from fourbar.show.plot.style import format_of
+from fourbar.solve import solve
+from fourbar_validation.engines.witnesses import WITNESSES, Witness
+from fourbar_validation.lab.stress.against import ONE_THREAD
+from fourbar_validation.lab.stress.against import against as against_revision
+from fourbar_validation.lab.stress.bench_picture import Times, draw_bench
+from fourbar_validation.lab.stress.contenders import (
+    ONE_BY_ONE,
+    POSITIONS,
+    STUDY,
+    engines,
+    interleaved,
+    loops,
+    over_linkages,
+    over_positions,
+)
+from fourbar_validation.lab.stress.limits import JUDGED_BY_SYSTEMS, LIMITS
+from fourbar_validation.lab.stress.timed import LINKAGE, command, example, preallocated, seconds
+from fourbar_validation.published.thirteen import FreeBodies, solve_thirteen
+from fourbar_validation.report.machine import machine
+from fourbar_validation.report.terminal import lined_up
+from fourbar_validation.run.judge import judged
+from fourbar_validation.scenes.random import LinkageType
+from fourbar_validation.scenes.suites import Random
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+Array = NDArray[np.float64]
+
+WITH_LIMITS = FourBar(0.3, Bar(0.25, 0.2), Bar(0.1, 0.5), Bar(0.22, 0.4))
+"""Its input swings between limit positions: each of its positions has to be looked at."""
+THIRTEEN_BATCH = 20_000
+"""Positions per batch of the 13x13 system: larger batches are slower per position (27 MB of matrices each)."""
+IN_C = ("C", "C, vector math")
+OVER_POSITIONS = "all unknowns of a position, over the number of positions (1e6 at once at most)"
+OVER_LINKAGES = "all forces of a linkage at one position, over the number of linkages"
+SOLVED = 100_000
+"""Positions where every array is allocated, and for the error bars, which evaluate the forces 15 times."""
+ALONE = 20
+"""Calls of one position each."""
+PER_SCENE = 50_000
+"""Positions in whose stead one random scene is judged: twenty of them by default."""
+JUDGED = "a scene judged by the exact engines"
+
+
+class Measured(NamedTuple):
+    """What one run found."""
+
+    rows: dict[str, float]
+    over_positions: Times
+    over_linkages: Times
+    not_run: dict[str, str]
+
+
+def bodies_of(scene: Scene, at: Command) -> FreeBodies:
+    """The right-hand sides of the 13x13 system, from the kinematics; not part of what is timed."""
+    s = solve(scene, "acceleration", at=at)
+    gravity = np.array(next((effect.vector for effect in scene.effects if isinstance(effect, Gravity)), (0.0, 0.0)))
+    first = {2: np.zeros_like(s.A), 3: s.A, 4: np.full_like(s.A, (LINKAGE.ground, 0.0))}
+    second = {2: s.A, 3: s.B, 4: s.B}
+    bars = {k: scene.linkage.bar(k) for k in MOVING_BARS}
+    centre = {k: getattr(s, f"G{k}") for k in MOVING_BARS}
+    return FreeBodies(
+        {k: np.ascontiguousarray(first[k] - centre[k]) for k in MOVING_BARS},
+        {k: np.ascontiguousarray(second[k] - centre[k]) for k in MOVING_BARS},
+        {k: np.ascontiguousarray(bars[k].mass * (getattr(s, f"a_G{k}") - gravity)) for k in MOVING_BARS},
+        {k: bars[k].moment_of_inertia * getattr(s, f"alpha_{k}") for k in MOVING_BARS},
+    )
+
+
+def import_cost() -> float:
+    """CPU seconds that `import fourbar` adds over those of `import numpy`, median over fresh interpreters."""
+    clock = "time.process_time()"
+    code = f"import time; a = {clock}; import numpy; b = {clock}; import fourbar; print(({clock} - b) / (b - a))"
+    runs = [subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True) for _ in range(7)]
+    return median(float(run.stdout) for run in runs)
+
+
+def memory(n: int) -> float:
+    """MB allocated at the peak beyond arguments and results."""
+    at = command(n)
+    out = preallocated(UNKNOWNS, at)
+    tracemalloc.start()
+    solve(example(), at=at, out=out, compiled=False)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    return peak / 1e6
+
+
+def floor(theta_2: Array, out: dict[str, Array]) -> Callable[[], object]:
+    """What no formula for two angles does without: a tangent, a square root and two arctangents, block by block."""
+
+    def action() -> None:
+        for start in range(0, len(theta_2), BLOCK):
+            part = slice(start, start + BLOCK)
+            t = np.tan(theta_2[part])
+            root = np.sqrt(np.abs(t, out=t), out=t)
+            for angle in out.values():
+                np.arctan(root, out=angle[part])
+
+    return action
+
+
+@click.command()
+@click.option("--positions", default=1_000_000, show_default=True, type=click.IntRange(1000))
+@click.option("--rounds", default=5, show_default=True, type=click.IntRange(1))
+@click.option(
+    "--largest", default=1_000_000, show_default=True, type=click.IntRange(1000, 10**8), help="For the growth, to 1e8."
+)
+@click.option("--picture", type=click.Path(path_type=Path), metavar="FILE", help="Draw the growth: svg, png or pdf.")
+@click.option("--against", metavar="REVISION", help="This tree's times over those of a git revision, instead.")
+def bench(positions: int, rounds: int, largest: int, picture: Path | None, against: str | None) -> int:
+    """Speed side by side: NumPy, compiled, C, SymPy, engines; over positions and linkages; ratios that must hold."""
+    if picture is not None:
+        format_of(picture)
+    if against is not None:
+        return compared_with(against, positions, rounds)
+    from rich.box import HEAVY_HEAD
+    from rich.console import Console
+
+    if any(os.environ.get(name) != "1" for name in ONE_THREAD):
+        # read when numpy is loaded: too late in this process
+        arguments = ["--positions", positions, "--rounds", rounds, "--largest", largest]
+        arguments += ["--picture", picture] if picture is not None else []
+        line = [sys.executable, "-m", "fourbar_validation", "bench", *map(str, arguments)]
+        status = subprocess.run(line, env=os.environ | dict.fromkeys(ONE_THREAD, "1"), check=False).returncode
+        return status if status >= 0 else BROKEN  # below 0: a signal ended it
+    found = measure(positions, rounds, largest)
+    rows: list[tuple[str, ...]] = []
+    broken: list[str] = []
+    for what, measured in found.rows.items():
+        limit = LIMITS.get(what)
+        if limit is None:
+            rows.append((what, f"{measured:.1f} {'ms' if what == JUDGED else 'ns/position'}"))
+            continue
+        holds = limit.holds(measured)
+        rows.append((what, f"{measured:.2f}", f"{limit.sign} {limit.bound:g}", "holds" if holds else "fails"))
+        broken += [] if holds else [f"{what}: {limit.reason}"]
+    console = Console()
+    title = f"{positions} positions, one core, medians of {rounds} interleaved rounds; {machine()}"
+    console.print(lined_up(("what", "measured", "needed", ""), rows, title=title, box=HEAVY_HEAD))
+    for title, times in ((OVER_POSITIONS, found.over_positions), (OVER_LINKAGES, found.over_linkages)):
+        console.print(_by_count(title, times))
+    for who, reason in found.not_run.items():
+        click.echo(f"not run: {who}: {reason}")
+    if picture is not None:
+        draw_bench(found.over_positions, found.over_linkages, picture)
+    for what in broken:
+        click.echo(f"fails: {what}")
+    return FAILED if broken else HOLDS
+
+
+def _by_count(title: str, times: Times) -> "Table":
+    """One row for each who, one column for each count."""
+    from rich.box import HEAVY_HEAD
+
+    counts = sorted({n for own in times.values() for n in own})
+    rows = [[who, *(f"{own[n]:.4g}" if n in own else "" for n in counts)] for who, own in times.items()]
+    return lined_up(["ns each", *(f"{n:.0e}".replace("e+0", "e") for n in counts)], rows, title=title, box=HEAVY_HEAD)
+
+
+def compared_with(revision: str, positions: int, rounds: int) -> int:
+    """The table of this tree's times over those of a revision; a measurement, held to nothing."""
+    from rich.box import HEAVY_HEAD
+    from rich.console import Console
+    from rich.markup import escape
+
+    rows = []
+    for what, row in against_revision(revision, positions, rounds).items():
+        times = (f"{1e3 * each:.4g}" for each in (row.ours, row.theirs))
+        rows.append((what, *times, *(f"{each:.3f}" for each in (row.ratio, row.least, row.most))))
+    title = f"CPU ms of a call in this tree and at {escape(revision)}, and their ratio; "
+    title += f"{positions} positions, one core, medians of {rounds} pairs in turns; {machine()}"
+    head = ("what", "ours", "theirs", "ratio", "least", "most")
+    Console().print(lined_up(head, rows, title=title, box=HEAVY_HEAD))
+    return HOLDS
+
+
+def measure(positions: int, rounds: int, largest: int) -> Measured:
+    """Rows of the table: the ratios of LIMITS, and ns per position; and the times by how many."""
+    scene, at = example(), command(positions)
+    limits, swing = example(WITH_LIMITS), command(positions, *default_range(WITH_LIMITS))
+    everything, angles = preallocated(UNKNOWNS, at), preallocated(ANGLES, at)
+    batch, solved = min(positions, THIRTEEN_BATCH), command(min(positions, SOLVED))
+    bodies = bodies_of(scene, command(batch))
+    alone, rng = example(theta_2=1.0), np.random.default_rng(0)
+    systems, right = rng.random((1000, 13, 13)), rng.random((1000, 13, 1))
+    peers, others = loops(), engines()
+    actions: dict[str, Callable[[], object]] = {
+        "formulas, all 11 unknowns": lambda: solve(scene, at=at, out=everything, compiled=False),
+        "the same compiled": lambda: solve(scene, at=at, out=everything, compiled=True),
+        "positions only": lambda: solve(scene, at=at, out=angles),
+        "13x13 assembled and solved": lambda: solve_thirteen(bodies, 2),
+        "floor: tangent, root, two arctan": floor(at.theta_2, angles),
+        "input between limits: all": lambda: solve(limits, at=swing, out=everything, compiled=False),
+        "input between limits: positions only": lambda: solve(limits, at=swing, out=angles),
+        "solve to forces, points too": lambda: solve(scene, "force", at=solved, compiled=False),
+        "solve with error bars": lambda: solve(scene, "error", at=solved, compiled=False),
+        "compiled to forces, points too": lambda: solve(scene, "force", at=solved, compiled=True),
+        "compiled with error bars": lambda: solve(scene, "error", at=solved, compiled=True),
+        "13x13 solved, 1000 at once": lambda: np.linalg.solve(systems, right),
+        "one position to forces": lambda: [solve(alone) for _ in range(ALONE)],
+        "one position with error bars": lambda: [solve(alone, "error") for _ in range(ALONE)],
+    }
+    out = np.zeros((15, positions))
+    actions |= {f"{name}, all": partial(loop, at.theta_2, out) for name, loop in peers.here.items() if name in IN_C}
+    if "compiled" in peers.not_run:
+        actions = {name: action for name, action in actions.items() if "compiled" not in name}
+    actions |= others.here
+    times = interleaved(actions, rounds)
+    counts = {"13x13 assembled and solved": batch}
+    to_stages = ["solve to forces, points too", "solve with error bars"]
+    to_stages += ["compiled to forces, points too", "compiled with error bars"]
+    counts |= dict.fromkeys(to_stages, len(solved.theta_2))
+    counts |= dict.fromkeys(others.here, ONE_BY_ONE)
+    counts |= {"13x13 solved, 1000 at once": len(systems)}
+    counts |= dict.fromkeys(("one position to forces", "one position with error bars"), ALONE)
+    rows = {name: 1e9 * value / counts.get(name, positions) for name, value in times.items()}
+    by_positions = over_positions(peers.here, largest, rounds)
+    by_linkages = over_linkages(positions, rounds, compiled="compiled" in peers.here)
+    cost, most = by_positions["NumPy"], max(by_linkages[STUDY])
+    everything_ns, forces = rows["formulas, all 11 unknowns"], rows["solve to forces, points too"]
+    if "compiled" in peers.here:
+        rows["numpy / compiled"] = everything_ns / rows["the same compiled"]
+        rows["compiled error bars / forces"] = rows["compiled with error bars"] / rows["compiled to forces, points too"]
+        if "C" in peers.here:
+            rows["compiled / C"] = rows["the same compiled"] / rows["C, all"]
+    exact = [witness for witness in WITNESSES if not witness.through_time]
+    if not any(witness.missing() for witness in exact):
+        rows[JUDGED] = judging(exact, max(1, positions // PER_SCENE))
+        rows[JUDGED_BY_SYSTEMS] = rows[JUDGED] * 1e6 / rows["13x13 assembled and solved"]
+    rows |= {
+        "13x13 / formulas": rows["13x13 assembled and solved"] / everything_ns,
+        "formulas / positions only": everything_ns / rows["positions only"],
+        "positions only / floor": rows["positions only"] / rows["floor: tangent, root, two arctan"],
+        "solve to forces / formulas": forces / everything_ns,
+        "solve with error bars / to forces": rows["solve with error bars"] / forces,
+        "one position / 13x13 solved": rows["one position to forces"] / rows["13x13 solved, 1000 at once"],
+        "one position with error bars / to forces": rows["one position with error bars"]
+        / rows["one position to forces"],
+        "study of linkages / positions": by_linkages[STUDY][most] / by_linkages[POSITIONS][most],
+        "growth from 1000 positions on": max(cost.values()) / cost[min(cost)],
+        "memory beyond the result, MB": memory(min(positions, 1_000_000)),
+        "import fourbar / import numpy": import_cost(),
+    }
+    return Measured(rows, by_positions, by_linkages, peers.not_run | others.not_run)
+
+
+def judging(witnesses: list[Witness], scenes: int) -> float:
+    """Milliseconds of CPU in which a random scene is judged as `run` does, nothing drawn; the median."""
+    suite = Random(scenes + 1, 0, tuple(LinkageType))
+    each = (partial(judged, suite.name(i), suite.scene(i), witnesses, draw=False) for i in range(scenes + 1))
+    times = [seconds(action) for action in each]
+    return 1e3 * median(times[1:])  # the first one imports the engines

@@ -1,0 +1,192 @@
+"""Families of hard positions, each a generator of scenes of one position from a random generator alone."""
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from fourbar.effects import Load, Point, Spring, Springs, Table, Torsion
+from fourbar.linkage import MOVING_BARS, PINS, Bar, FourBar
+from fourbar.scene import Scene
+from fourbar.scene.point import Point as Marked
+from fourbar.solve import solve
+from fourbar_validation.scenes.random import Ranges, decades, drawn, product, sometimes, uneven_lengths, uniform
+
+
+def ranges_of(spread: float) -> Ranges:
+    """Masses over so many decades to either side, one bar of ten without any; centres anywhere about the bar."""
+    return Ranges(
+        mass=sometimes(0.9, product(decades(-spread, spread), uniform(0.2, 5.0))),
+        inertia=uniform(0.0, 0.5),
+        centre=uniform(-0.5, 1.5),
+        centre_angle=sometimes(0.5, uniform(-3.0, 3.0)),
+        ground_angle=sometimes(0.5, uniform(-3.0, 3.0)),
+        viscous=0.3,
+        friction=0.2,
+        by_length=False,
+    )
+
+
+EVEN, UNEVEN = ranges_of(0.0), ranges_of(3.0)
+
+
+def at_angle(scene: Scene, theta_2: float) -> Scene:
+    """The same scene at theta_2 (rad from theta_1 on)."""
+    angle = scene.linkage.ground_angle + theta_2
+    return replace(scene, motion=replace(scene.motion, theta_2=angle))
+
+
+def random(rng: np.random.Generator) -> Scene:
+    """Lengths within a factor of ten, theta_2 anywhere it assembles."""
+    while True:
+        d, a = rng.uniform(0.1, 1.0, 2)
+        angle = float(rng.uniform(-7.0, 7.0))
+        diagonal = abs(d - a * complex(math.cos(angle), math.sin(angle)))
+        b, c = rng.uniform(0.1, 1.0, 2)
+        if abs(b - c) < diagonal < b + c:
+            return at_angle(drawn(rng, (d, a, b, c), EVEN), angle)
+
+
+def limit(rng: np.random.Generator) -> Scene:
+    """Within 1e-12..1e-2 rad of a limit position of the input."""
+    while True:
+        d, a, b, c = rng.uniform(0.1, 1.0, 4)
+        folded = bool(rng.random() < 0.5)
+        cosine = (a * a + d * d - (b - c if folded else b + c) ** 2) / (2 * a * d)
+        if abs(cosine) < 0.999:
+            offset = 10.0 ** rng.uniform(-12, -2) * (1.0 if folded else -1.0)
+            angle = float(rng.choice([-1.0, 1.0])) * (math.acos(cosine) + offset)
+            return at_angle(drawn(rng, (d, a, b, c), EVEN), angle)
+
+
+def change_point(rng: np.random.Generator) -> Scene:
+    """Within 1e-8..1 rad of a change point: parallelograms, kites, and any s + l = p + q, some off by as little."""
+    x, y = rng.uniform(0.1, 1.0, 2)
+    kind = rng.integers(0, 4)
+    straight = 0.0
+    if kind == 0:  # parallelogram, antiparallelogram
+        lengths = (x, y, x, y)
+        straight = float(rng.choice([0.0, math.pi]))
+    elif kind == 1:  # kite a = b, c = d
+        lengths, straight = (x, y, y, x), math.pi
+    elif kind == 2:  # kite a = d, b = c
+        lengths, straight = (x, x, y, y), 0.0
+    else:
+        # multiples of 2^-20 so that d + a = b + c, or d - a = b - c, holds exactly
+        d, a, b = (float(round(v * 2**20)) / 2**20 for v in sorted(rng.uniform(0.1, 1.0, 3), reverse=True))
+        b = float(min(b, d + a - 0.01))
+        lengths, straight = ((d, a, b, d + a - b), math.pi) if rng.random() < 0.5 else ((d, a, d - a + b, b), 0.0)
+    distance = float(rng.choice([-1.0, 1.0]) * 10.0 ** rng.uniform(-8, 0))
+    if rng.random() < 0.3:
+        k = int(rng.integers(0, 4))
+        lengths = tuple(v * (1.0 + 0.1 * distance**2) if i == k else v for i, v in enumerate(lengths))
+    return at_angle(drawn(rng, lengths, EVEN), straight + distance)
+
+
+def ratios(rng: np.random.Generator) -> Scene:
+    """Crank to ground, coupler to diagonal, and masses, each in ratios from 1e-6 to 1e6."""
+    lengths, angle = uneven_lengths(rng, decades(-6.0, 6.0), decades(-1.0, 1.0))
+    return at_angle(drawn(rng, lengths, UNEVEN), angle)
+
+
+def scales(rng: np.random.Generator) -> Scene:
+    """All lengths times 1e-9..1e9."""
+    scene = random(rng)
+    link, k = scene.linkage, float(10.0 ** rng.uniform(-9, 9))
+    bars = []
+    for number in MOVING_BARS:
+        bar = link.bar(number)
+        bars.append(
+            Bar(bar.length * k, bar.mass, bar.moment_of_inertia * k * k, (bar.mass_centre[0] * k, bar.mass_centre[1]))
+        )
+    loads = tuple(replace(load, at=(load.at[0] * k, load.at[1]), moment=load.moment * k) for load in scene.loads)
+    return replace(scene, linkage=FourBar(link.ground * k, bars[0], bars[1], bars[2], link.ground_angle), loads=loads)
+
+
+def speeds(rng: np.random.Generator) -> Scene:
+    """omega_2 up to 1e6 rad/s, alpha_2 up to 1e12 rad/s^2, and the static case."""
+    scene = random(rng)
+    omega = float(rng.choice([-1.0, 1.0]) * 10.0 ** rng.uniform(-3, 6)) * bool(rng.random() < 0.9)
+    alpha = float(rng.choice([0.0, rng.choice([-1.0, 1.0]) * 10.0 ** rng.uniform(-3, 12)]))
+    return replace(scene, motion=replace(scene.motion, omega_2=omega, alpha_2=alpha))
+
+
+def off(rng: np.random.Generator) -> float:
+    """From what would be rest, relative: within 3e-2 to 1e-5, to either side."""
+    return float(rng.choice([-1.0, 1.0]) * 10.0 ** rng.uniform(-5.0, math.log10(3e-2)))
+
+
+def massless(rng: np.random.Generator) -> Scene:
+    """The random family's linkages under nothing at all: what is added alone makes the forces."""
+    scene = random(rng)
+    d, a, b, c = scene.linkage.lengths
+    return replace(scene, linkage=FourBar(d, Bar(a), Bar(b), Bar(c), scene.linkage.ground_angle), loads=(), effects=())
+
+
+def springs(rng: np.random.Generator) -> Scene:
+    """A spring whose points are nearly as far apart as where it pulls with nothing, its preload in the pull."""
+    scene = massless(rng)
+    one, other = (int(bar) for bar in rng.choice((1, *MOVING_BARS), 2, replace=False))
+    start, end = (Point(bar, *rng.uniform((0.0, -3.0), (1.0, 3.0)).tolist()) for bar in (one, other))
+    marked = replace(scene, points=(Marked("P", one, start[1:]), Marked("Q", other, end[1:])))
+    places = solve(marked, "position").points
+    distance = math.hypot(*(places["Q"] - places["P"])[0])
+    stiffness, preload = float(rng.uniform(10.0, 1000.0)), 0.0
+    if rng.random() < 0.5:
+        preload = float(rng.uniform(-0.5, 2.0)) * stiffness * distance
+    spring = Spring(start, end, stiffness, max(distance * (1.0 + off(rng)) + preload / stiffness, 0.0), preload)
+    return replace(scene, effects=(Springs((spring,)),))
+
+
+def torsion(rng: np.random.Generator) -> Scene:
+    """A torsion spring nearly where its couple is zero, its rest some turns away or none.
+
+    Not at O2: its angle, given in doubles, comes back from the directions to the last digit more often than not, and
+    an error that is zero by chance says nothing of the bar.
+    """
+    scene = massless(rng)
+    found, pin = solve(scene, "position"), str(rng.choice(["A", "B", "O4"]))
+    assert found.theta_3 is not None and found.theta_4 is not None
+    theta = (scene.linkage.ground_angle, found.theta_2[0], found.theta_3[0], found.theta_4[0])
+    first, second = PINS[pin]
+    stiffness, preload = float(rng.uniform(0.1, 10.0)), 0.0
+    if rng.random() < 0.5:
+        preload = float(rng.uniform(-2.0, 2.0)) * stiffness
+    turns = math.tau * float(rng.choice([0, 0, int(rng.integers(-100, 100))]))
+    rest = float(theta[second - 1] - theta[first - 1]) * (1.0 + off(rng)) + preload / stiffness + turns
+    return replace(scene, effects=(Torsion.at(**{pin: (stiffness, rest, preload)}),))
+
+
+def tables(rng: np.random.Generator) -> Scene:
+    """A load over a table, many turns from its angles or none, every other near where its factor is zero.
+
+    The ground is level: against another theta_2 loses digits of all directions after many turns.
+    """
+    scene = massless(rng)
+    linkage = scene.linkage
+    angle = float(np.asarray(scene.motion.theta_2)) - linkage.ground_angle
+    before, after = 10.0 ** rng.uniform(-3.0, 0.3, 2)
+    rise = float(rng.uniform(-2.0, 2.0))
+    first = -rise * before * ((1.0 + off(rng)) if rng.random() < 0.5 else float(rng.uniform(-2.0, 2.0)))
+    table = Table((angle - before, angle + after), (first, first + rise * (before + after)))
+    turns = int(rng.choice([0, 1, -1, int(10.0 ** rng.uniform(0.0, 9.0))]))
+    size, arm = float(rng.uniform(0.1, 10.0)), float(rng.uniform(0.0, 1.0))
+    turned = (float(x) for x in rng.uniform(-3.0, 3.0, 2))
+    frame, moment = str(rng.choice(["world", "bar"])), float(rng.choice([0.0, size]))
+    load = Load(int(rng.choice(MOVING_BARS)), (size, next(turned)), (arm, next(turned)), moment, frame, table)
+    motion = replace(scene.motion, theta_2=angle + math.tau * turns)
+    return replace(scene, linkage=replace(linkage, ground_angle=0.0), loads=(load,), motion=motion)
+
+
+FAMILIES: dict[str, Callable[[np.random.Generator], Scene]] = {
+    "random": random,
+    "limit": limit,
+    "change_point": change_point,
+    "ratios": ratios,
+    "scales": scales,
+    "speeds": speeds,
+    "springs": springs,
+    "torsion": torsion,
+    "tables": tables,
+}

@@ -1,0 +1,60 @@
+"""Drake's own simulation of the SDF file: a discrete plant, its SAP solver, a ball constraint at B."""
+
+from importlib.metadata import version
+from typing import Any
+
+import numpy as np
+from pydrake.multibody.parsing import Parser
+from pydrake.multibody.plant import DiscreteContactApproximation, MultibodyPlant
+from pydrake.systems.analysis import Simulator
+
+from fourbar.mjcf import flywheel
+from fourbar.mjcf.sdf import sdf
+from fourbar.scene import Scene
+from fourbar_validation.engines.description import FIRST_PIN, turned
+from fourbar_validation.lab.subjects.motion import Readings, State, run_through, start, turn, weight
+
+VERSION = version("drake")
+STEPS = (628, 2512)
+CHANGED = "SDF with Drake's ball constraint in place of a fourth joint; its force cannot be read"
+SETTINGS = {"SAP": None}
+
+
+def through(scene: Scene, steps: int, setting: str) -> Readings:
+    """A turn in so many steps, carried by a flywheel, the rotor of an actuator on O2."""
+    timestep, _ = turn(scene, steps)
+    begin, inertia = start(scene), flywheel(scene)
+    plant = MultibodyPlant(timestep)
+    plant.set_discrete_contact_approximation(DiscreteContactApproximation.kSap)
+    Parser(plant).AddModelsFromString(sdf(scene, "drake", begin), "sdf")
+    plant.mutable_gravity_field().set_gravity_vector(weight(scene))
+    joints = [plant.GetJointByName(name) for name in FIRST_PIN.values()]
+    actuator = plant.AddJointActuator("drive", joints[0])
+    actuator.set_default_rotor_inertia(inertia)
+    actuator.set_default_gear_ratio(1.0)
+    plant.Finalize()
+    context = plant.CreateDefaultContext()
+    plant.get_actuation_input_port().FixValue(context, np.zeros(plant.num_actuators()))  # also one of every other joint
+    for joint, speed in zip(joints, begin.qvel, strict=True):
+        joint.set_angular_rate(context, speed)
+    simulator = Simulator(plant, context)
+    done = 0
+
+    def advance(n: int) -> tuple[list[float], float, dict[str, Any]]:
+        nonlocal done
+        simulator.AdvanceTo((done + n - 1) * timestep)
+        angles = [joint.get_angle(context) + q for joint, q in zip(joints, begin.qpos, strict=True)]
+        theta, speed = [angles[0], angles[0] + angles[1], angles[2]], joints[0].get_angular_rate(context)
+        reactions = plant.get_reaction_forces_output_port().Eval(context)
+        on_child = (reactions[int(joint.index())].translational()[:2] for joint in joints)
+        O2, A, O4 = (np.array(turned(angle, *force)) for angle, force in zip(theta, on_child, strict=True))
+        done += n
+        simulator.AdvanceTo(done * timestep)
+        return theta, speed, {"F12": O2, "F32": -A, "F14": O4}
+
+    def read(before: tuple[list[float], float, dict[str, Any]]) -> State:
+        theta, speed, forces = before
+        alpha = (joints[0].get_angular_rate(context) - speed) / timestep
+        return State(theta, speed, alpha, -inertia * alpha, forces)
+
+    return run_through(scene, steps, setting, advance, read)

@@ -1,0 +1,145 @@
+"""Each subject in its own environment, held against the formulas at the states that it reached by itself."""
+
+import json
+import math
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import fourbar
+from fourbar.errors import FourBarError
+from fourbar.quantities import PIN_FORCES
+from fourbar.scene import Command, Scene
+from fourbar_validation.compare.answer import Array
+from fourbar_validation.compare.error import magnitude, relative_error
+from fourbar_validation.compare.rows import in_words
+from fourbar_validation.run.elsewhere import ended, of_the_harness
+
+SUBJECTS = {
+    "mujoco_c": ("MuJoCo", "mujoco"),
+    "mujoco_warp": ("MuJoCo Warp", "mujoco_warp"),
+    "mujoco_mjx": ("MJX", "mujoco.mjx"),
+    "newton_mujoco": ("Newton, MuJoCo solver", "newton"),
+    "newton_kamino": ("Newton, Kamino", "newton"),
+    "genesis_rigid": ("Genesis", "genesis"),
+    "pybullet": ("PyBullet", "pybullet"),
+    "drake_sap": ("Drake, SAP", "pydrake"),
+    "exudyn_simulated": ("Exudyn", "exudyn"),
+}
+"""By module: name, and what must be importable."""
+TORQUE_AND_FORCES = ("torque", *PIN_FORCES)
+
+
+@dataclass(slots=True)
+class Line:
+    """One setting of a subject, over single states or over a turn in so many steps."""
+
+    subject: str
+    version: str
+    setting: str
+    steps: int | None
+    errors: dict[str, float]
+    """Greatest of the readings, by the greatest value in a turn; a quantity that cannot be read is left out."""
+    gap: float
+    """By the longest bar."""
+    cost: float | None
+    """Seconds of the processor for one simulated second."""
+    order: float | None = None
+    """Of the torque's error, from the number of steps before to this one."""
+
+
+@dataclass(slots=True)
+class Standing:
+    """All that the page shows."""
+
+    lines: list[Line] = field(default_factory=list)
+    changed: dict[str, str] = field(default_factory=dict)
+    devices: dict[str, str] = field(default_factory=dict)
+    """What each ran on."""
+    left_out: dict[str, str] = field(default_factory=dict)
+
+
+def examine(scene: Scene, file: Path, pythons: list[Path], seconds: float) -> Standing:
+    """Every subject under the first of the interpreters that has it."""
+    found = Standing()
+    for module, (name, library) in SUBJECTS.items():
+        python = next((python for python in pythons if _has(python, library)), None)
+        if python is None:
+            found.left_out[name] = "not installed under any --python"
+            continue
+        done = of_the_harness(
+            [python, "-m", "fourbar_validation.lab.subjects.work", module, file.absolute()], seconds=seconds
+        )
+        if done.why:
+            found.left_out[name] = done.why
+            continue
+        try:
+            answer = json.loads(done.out)
+            judged, about = lines(scene, name, answer), (answer["changed"], answer["device"])
+        except (AttributeError, IndexError, KeyError, TypeError, ValueError, FourBarError) as error:
+            found.left_out[name] = f"no answer that can be read: {in_words(error)}"
+            continue
+        found.lines += judged
+        found.changed[name], found.devices[name] = map(str, about)
+    return found
+
+
+def lines(scene: Scene, name: str, answer: dict[str, Any]) -> list[Line]:
+    """The judged lines of one subject's answer."""
+    made: list[Line] = []
+    turn = abs(math.tau / scene.motion.omega_2) if scene.motion.omega_2 else math.nan
+    for reading in answer["readings"]:
+        found = errors(scene, reading)
+        steps = reading["steps"]
+        line = Line(
+            name,
+            answer["version"],
+            reading["setting"],
+            steps,
+            found,
+            reading["gap"] / max(scene.linkage.lengths),
+            None if steps is None else reading["seconds"] / turn,
+        )
+        before = made[-1] if made else None
+        if before is not None and steps and before.steps and before.setting == line.setting:
+            ratio = before.errors["torque"] / found["torque"] if found["torque"] else math.inf
+            if 0.0 < ratio < math.inf:  # one that diverged has none
+                line.order = math.log(ratio) / math.log(steps / before.steps)
+        made.append(line)
+    return made
+
+
+def errors(scene: Scene, reading: dict[str, Any]) -> dict[str, float]:
+    """Of torque and pin forces, at the subject's own theta_2, omega_2 and alpha_2; NaN where it answers NaN."""
+    theta = np.array(reading["theta"], dtype=float)
+    n = len(theta)
+    if not n or any(np.shape(reading[name]) != (n,) for name in ("omega_2", "alpha_2")) or theta.shape != (n, 3):
+        raise ValueError("its angles, speeds and accelerations are not of one length")
+    at = Command(
+        theta[:, 0],
+        np.full(n, scene.motion.branch, dtype=np.int8),
+        np.array(reading["omega_2"]),
+        np.array(reading["alpha_2"]),
+    )
+    ours, whole = fourbar.solve(scene, "force", at=at), fourbar.solve(scene, "force")
+    answered: dict[str, Array] = {name: np.array(values, float) for name, values in reading["forces"].items()}
+    answered["torque"] = np.array(reading["torque"], float)
+    found = {}
+    for name in TORQUE_AND_FORCES:
+        if name not in answered:
+            continue
+        size = np.full(n, magnitude(getattr(whole, name)).max())
+        found[name] = float(np.max(relative_error(name, getattr(ours, name), answered[name], size)))  # NaN stays NaN
+    return found
+
+
+def _has(python: Path, library: str) -> bool:
+    look = (
+        "import importlib.util, sys\n"
+        f"try: found = importlib.util.find_spec({library!r})\n"
+        "except ModuleNotFoundError: found = None\n"
+        "sys.exit(found is None)"
+    )
+    return not ended([python, "-c", look]).why

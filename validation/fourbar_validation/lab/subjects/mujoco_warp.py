@@ -1,0 +1,52 @@
+"""MuJoCo Warp, in single precision; `forward` once as a user of MuJoCo would, and twice as the file's comment says."""
+
+from typing import Any
+
+import mujoco_warp as mjw
+import numpy as np
+import warp
+
+from fourbar.scene import Scene
+from fourbar_validation.engines.mujoco.stepping import opened
+from fourbar_validation.lab.subjects.motion import Readings, State, run_through
+from fourbar_validation.lab.subjects.mujoco_c import reading, states_of, text
+
+VERSION = mjw.__version__ if hasattr(mjw, "__version__") else ""
+DEVICE = str(warp.get_preferred_device().name)
+"""Its arrays lie on a GPU where there is one."""
+STEPS = (78, 157)
+CHANGED = "a light flywheel and no pads (--for warp): single precision; midphase may not be switched off"
+SETTINGS = {"forward twice": 2, "forward once": 1}
+
+
+def through(scene: Scene, steps: int, setting: str) -> Readings:
+    """A turn in so many steps."""
+    model, data = opened(text(scene, steps, "warp"))
+    theirs, state = mjw.put_model(model), mjw.put_data(model, data)
+    mjw.step(theirs, mjw.put_data(model, data))  # compiled before the clock runs
+
+    def advance(n: int) -> None:
+        for _ in range(n):
+            mjw.step(theirs, state)
+
+    return run_through(scene, steps, setting, advance, lambda _: _evaluated(model, theirs, state, SETTINGS[setting]))
+
+
+def states(scene: Scene, setting: str) -> Readings:
+    """Single states, each set and evaluated by itself."""
+    written = text(scene, 628, "warp")
+    model, data = opened(written)
+    theirs, state, found = mjw.put_model(model), mjw.put_data(model, data), Readings(setting)
+    for q, v in states_of(written, scene):
+        state.qpos.assign(np.array([q], dtype=np.float32))
+        state.qvel.assign(np.array([v], dtype=np.float32))
+        found.read(scene, _evaluated(model, theirs, state, SETTINGS[setting]))
+    return found
+
+
+def _evaluated(model: Any, theirs: Any, state: Any, times: int) -> State:
+    for _ in range(times):
+        mjw.forward(theirs, state)
+    q, v, a, drive = (x.numpy()[0].astype(float) for x in (state.qpos, state.qvel, state.qacc, state.actuator_force))
+    closing = state.efc.force.numpy()[0, :2].astype(float)
+    return reading(model, q, v, a, drive[model.actuator("drive").id], closing)

@@ -1,0 +1,32 @@
+"""`python -m fourbar_validation.lab.subjects.work MODULE SCENE`: one subject in its own environment; prints JSON.
+
+It needs numpy, mpmath, pint and the simulator.
+"""
+
+import json
+import os
+import sys
+from importlib import import_module
+from pathlib import Path
+from typing import TextIO
+
+import fourbar
+
+
+def main(module: str, file: str, answers: TextIO) -> None:
+    """Every setting: a turn at each number of steps, and single states where the subject takes them."""
+    subject, scene = import_module(f"fourbar_validation.lab.subjects.{module}"), fourbar.load(Path(file))
+    found = []
+    for setting in subject.SETTINGS:
+        if hasattr(subject, "states"):
+            found.append(subject.states(scene, setting))
+        found += [subject.through(scene, steps, setting) for steps in subject.STEPS]
+    answer = {"version": subject.VERSION, "changed": subject.CHANGED, "readings": [each.plain() for each in found]}
+    answer["device"] = getattr(subject, "DEVICE", "CPU")
+    answers.write(json.dumps(answer))
+
+
+if __name__ == "__main__":
+    with os.fdopen(os.dup(1), "w") as stdout:
+        os.dup2(2, 1)  # what a simulator prints is no answer
+        main(sys.argv[1], sys.argv[2], stdout)

@@ -1,0 +1,38 @@
+"""Where things are: this package, the models, and the checkout that both lie in, where there is one."""
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import fourbar
+from fourbar.errors import FourBarError
+
+PACKAGE = Path(__file__).resolve().parent
+FORMULAS = Path(fourbar.__file__).resolve().parent
+CHECKOUT = PACKAGE.parents[1] if (PACKAGE.parents[1] / "pyproject.toml").is_file() else None
+"""The folder of pyproject.toml, models, tests and docs; None where the package is installed without them."""
+MODELS = PACKAGE / "models" if CHECKOUT is None else CHECKOUT / "models"
+PROGRAM = "fourbar-validation" if CHECKOUT is None else "python -m validation"
+"""How the harness is called here."""
+
+
+def checkout(what: str) -> Path:
+    """The checkout; FourBarError, which says what needs one, where there is none."""
+    if CHECKOUT is None:
+        raise FourBarError(f"{what} needs a checkout of the repository; this is the installed package")
+    return CHECKOUT
+
+
+@contextmanager
+def import_path() -> Iterator[str]:
+    """PYTHONPATH for another interpreter: it finds this code there, and no library of this environment."""
+    rest = filter(None, [os.environ.get("PYTHONPATH")])
+    if CHECKOUT is not None:
+        yield os.pathsep.join([str(CHECKOUT), str(PACKAGE.parent), *rest])
+        return
+    with TemporaryDirectory(prefix="fourbar-") as folder:
+        for package in (FORMULAS, PACKAGE):
+            (Path(folder) / package.name).symlink_to(package, target_is_directory=True)
+        yield os.pathsep.join([folder, *rest])

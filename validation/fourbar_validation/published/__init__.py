@@ -1,0 +1,1 @@
+"""Printed figures of the thesis and of public test cases, and ours."""

@@ -1,0 +1,204 @@
+"""The thesis's own program: its 13 unknowns, its units, and its errors, each behind a switch.
+
+Source: I. Linares Mendoza, "Analisis cinematico y dinamico asistido por computadora de mecanismos de
+cuatro barras", UNAM FES Cuautitlan, sections 4.12 and 5.7 and the program's tables in the manual.
+"""
+
+import json
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import fourbar
+from fourbar.linkage import MOVING_BARS
+from fourbar.solution import Array
+from fourbar_validation.compare.tolerance import EPS
+from fourbar_validation.published.thirteen import FreeBodies, assemble
+
+DATA = Path(__file__).parent / "data"
+UNKNOWNS = ("F12x", "F12y", "F32x", "F32y", "F23x", "F23y", "F43x", "F43y", "F14x", "F14y", "F34x", "F34y", "T4")
+LENGTHS = (20.0, 48.0, 55.0, 20.0)
+"""Bars 1 to 4, cm."""
+MASSES = {2: 57.0, 3: 0.544, 4: 0.2}
+"""kg."""
+INERTIA_2 = 57.0 * 153.0**2 / 12.0
+"""kg cm^2; bar 2 is 153 cm long in all."""
+WIDTH = 2.54
+"""cm."""
+OMEGA_2 = 0.2244
+"""rad/s."""
+THETA_1, THETA_2 = math.radians(225.0), math.radians(135.0)
+"""Of sections 4.12 and 5.7, the thesis's convention, rad."""
+CENTRE = {2: 76.5, 3: 27.5, 4: 10.0}
+"""From the bar's first pin to G, cm."""
+LOAD, LOAD_ARM, LOAD_ANGLE = 10.0, 5.0, math.radians(265.0)
+"""Force along x on bar 2, N, and where it acts from G2, cm and rad."""
+COUPLE = -15.0
+"""On each of bars 2, 3, 4, N cm."""
+TO_N = 0.01
+"""1 kg cm/s^2 in N, and 1 kg cm^2/s^2 in N cm."""
+
+
+@dataclass(frozen=True, slots=True)
+class Errors:
+    """What the program did; all False is right."""
+
+    inertia_about_long_axis: bool = False
+    mass_times_acceleration_unscaled: bool = False
+    inertia_times_alpha_unscaled: bool = False
+    sign_in_acceleration_of_G3: bool = False
+    alpha_3_for_acceleration_of_G4: bool = False
+
+
+def printed() -> Any:
+    """The transcribed tables of the thesis."""
+    return json.loads((DATA / "model_mechanism.json").read_text(encoding="utf-8"))
+
+
+def deg(angle: float) -> float:
+    """Degrees in [0, 360), as the thesis has them."""
+    return math.degrees(angle) % 360.0
+
+
+def polar(r: float, angle: float) -> tuple[float, float]:
+    """Components."""
+    return r * math.cos(angle), r * math.sin(angle)
+
+
+def to_ours(theta: float) -> float:
+    """theta_1 or theta_4 of the thesis (its polygon sums to zero) in our convention, and back, rad."""
+    return math.remainder(theta + math.pi, 2.0 * math.pi)
+
+
+def scene(theta_2: Array | float, branch: int = 1) -> fourbar.Scene:
+    """The model mechanism for our formulas, SI, uniform bars of `WIDTH`."""
+    d, a, b, c = (0.01 * length for length in LENGTHS)
+    centre = {bar: (0.01 * distance, 0.0) for bar, distance in CENTRE.items()}
+    linkage = fourbar.FourBar(
+        d,
+        fourbar.Bar(a, MASSES[2], 1e-4 * INERTIA_2, centre[2]),
+        fourbar.Bar(b, MASSES[3], 1e-4 * inertia(3), centre[3]),
+        fourbar.Bar(c, MASSES[4], 1e-4 * inertia(4), centre[4]),
+        ground_angle=to_ours(THETA_1),
+    )
+    loads = [fourbar.Load(2, (LOAD, 0.0), (0.01 * LOAD_ARM, LOAD_ANGLE))]
+    loads += [fourbar.Load(bar, moment=0.01 * COUPLE) for bar in (2, 3, 4)]
+    return fourbar.Scene(linkage, fourbar.Motion(theta_2, OMEGA_2, branch=branch), 4, tuple(loads))
+
+
+def motion(theta_2: Array, branch: int = 1) -> fourbar.Solution:
+    """Position to accelerations of the model mechanism by our formulas, SI."""
+    return fourbar.solve(scene(theta_2, branch), "acceleration")
+
+
+def right_unknowns() -> dict[str, float]:
+    """The 13 unknowns by our formulas at theta_2 = 135 deg, N and N cm."""
+    s = fourbar.solve(scene(THETA_2))
+    assert s.F32 is not None and s.F43 is not None and s.torque is not None
+    pins: dict[str, Any] = {"F12": s.F12, "F32": s.F32, "F23": -s.F32, "F43": s.F43, "F14": s.F14, "F34": -s.F43}
+    forces = {name + axis: float(pins[name][0, k]) for name in pins for k, axis in enumerate("xy")}
+    return {**forces, "T4": 100.0 * float(s.torque[0])}
+
+
+def inertia(bar: int, about_long_axis: bool = False) -> float:
+    """I_G of bar 3 or 4, kg cm^2: m (L^2 + w^2)/12, or m w^2/12 as the thesis has it."""
+    across = 0.0 if about_long_axis else LENGTHS[bar - 1] ** 2
+    return MASSES[bar] * (across + WIDTH**2) / 12.0
+
+
+class Kinematics:
+    """Motion at theta_2 = 135 deg by our formulas, in cm and the thesis's angles, and the arms of the pin forces."""
+
+    def __init__(self) -> None:
+        s = motion(np.array([THETA_2]))
+        self.theta_3, self.theta_4 = float(s.theta_3[0]), to_ours(float(s.theta_4[0]))
+        self.omega, self.alpha = (
+            {bar: float(getattr(s, f"{name}_{bar}")[0]) for bar in MOVING_BARS} for name in ("omega", "alpha")
+        )
+        assert s.a_A is not None
+        self.a_A = 100.0 * s.a_A[0]
+        self.a_G = {bar: 100.0 * getattr(s, f"a_G{bar}")[0] for bar in MOVING_BARS}
+        self.slip = 2.0 * CENTRE[3] * self.alpha[3] * math.sin(self.theta_3)
+        """What erratum 4 adds to the x component of A_G3/A: -(L w^2 cos - L alpha sin) for -(... + ...), eq 4.20."""
+        self.arms = {  # from G; R14 points along B to O4, the thesis's theta_4
+            "R12": polar(-CENTRE[2], THETA_2),
+            "R32": polar(LENGTHS[1] - CENTRE[2], THETA_2),
+            "R23": polar(-CENTRE[3], self.theta_3),
+            "R43": polar(LENGTHS[2] - CENTRE[3], self.theta_3),
+            "R14": polar(CENTRE[4], self.theta_4),
+            "R34": polar(CENTRE[4] - LENGTHS[3], self.theta_4),
+        }
+
+
+def equations(errors: Errors, inertias: tuple[float, float] | None = None) -> tuple[Array, Array]:
+    """Matrix and right side of section 5.7 at theta_2 = 135 deg, N and N cm.
+
+    sum F = m A and sum M_G = I alpha of bars 2, 3, 4; F32 = -F23 and F34 = -F43.
+
+    Parameters
+    ----------
+    errors : which of the named errors to make.
+    inertias : I_G3, I_G4 as typed into the program, kg cm^2; left out: computed.
+    """
+    k = Kinematics()
+    if errors.sign_in_acceleration_of_G3:
+        k.a_G[3][0] += k.slip
+    if errors.alpha_3_for_acceleration_of_G4:  # index 5 for 6
+        k.a_G[4][0] = k.alpha[3]
+    if inertias is None:
+        inertias = inertia(3, errors.inertia_about_long_axis), inertia(4, errors.inertia_about_long_axis)
+    about_G = {2: INERTIA_2, 3: inertias[0], 4: inertias[1]}
+    per_mass = 1.0 if errors.mass_times_acceleration_unscaled else TO_N
+    per_inertia = 1.0 if errors.inertia_times_alpha_unscaled else TO_N
+    force = {bar: per_mass * MASSES[bar] * k.a_G[bar] for bar in MOVING_BARS}
+    moment = {bar: np.array([per_inertia * about_G[bar] * k.alpha[bar] - COUPLE]) for bar in MOVING_BARS}
+    force[2][0] -= LOAD
+    moment[2] += polar(LOAD_ARM, LOAD_ANGLE)[1] * LOAD  # minus the moment of the load, -y F
+    first, second = (
+        {bar: np.array([k.arms[name]]) for bar, name in zip(MOVING_BARS, names, strict=True)}
+        for names in (("R12", "R23", "R14"), ("R32", "R43", "R34"))
+    )
+    matrix, right = assemble(FreeBodies(first, second, force, moment), 4)
+    return matrix[0], right[0]
+
+
+def thesis_program(errors: Errors, inertias: tuple[float, float] | None = None) -> dict[str, float]:
+    """The 13 unknowns of section 5.7 at theta_2 = 135 deg, N and N cm."""
+    unknowns = np.linalg.solve(*equations(errors, inertias))
+    return dict(zip(UNKNOWNS, map(float, unknowns), strict=True))
+
+
+def round_off(errors: Errors, inertias: tuple[float, float] | None = None) -> dict[str, float]:
+    """How far an elimination of these equations may be off in each unknown, whoever makes it: N and N cm.
+
+    13 eps |A^-1| (|A| |x| + |b|): each number of the system carries up to as many roundings as there are
+    unknowns, from its own making and from the elimination (Higham, Accuracy and Stability, 7.2 and 9.3).
+    """
+    matrix, right = equations(errors, inertias)
+    unknowns = np.linalg.solve(matrix, right)
+    moved = np.abs(np.linalg.inv(matrix)) @ (np.abs(matrix) @ np.abs(unknowns) + np.abs(right))
+    return dict(zip(UNKNOWNS, map(float, len(UNKNOWNS) * EPS * moved), strict=True))
+
+
+PRINTED_INERTIAS = (0.2924725333, 0.1075266667)
+TYPED_INERTIAS = (0.292472, 0.107526)
+"""I_G3, I_G4 of the manual's table and of section 5.7, kg cm^2: solved back from the printed unknowns."""
+STEPS: tuple[tuple[str, Errors, tuple[float, float] | None], ...] = (
+    ("", Errors(), None),
+    ("3", Errors(True), None),
+    ("1", Errors(True, True), None),
+    ("2", Errors(True, True, True), None),
+    ("4", Errors(True, True, True, True), None),
+    ("5", Errors(True, True, True, True, True), None),
+    ("manual", Errors(True, True, True, True, True), PRINTED_INERTIAS),
+    ("5b", Errors(True, True, True, True, True), TYPED_INERTIAS),
+)
+"""The errata in the order in which they are made, from right to published."""
+
+
+def ladder() -> list[tuple[str, dict[str, float]]]:
+    """The unknowns after each further erratum, from right to published."""
+    return [(erratum, thesis_program(errors, inertias)) for erratum, errors, inertias in STEPS]

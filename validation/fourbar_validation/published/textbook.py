@@ -1,0 +1,80 @@
+"""Printed answers of public test cases, listed in `textbook.toml`, and of a Maple worksheet, against ours."""
+
+import json
+import math
+import tomllib
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+import fourbar
+from fourbar_validation.places import MODELS
+from fourbar_validation.published.figures import Figure
+
+SCENES = MODELS / "textbook"
+ANSWERS = Path(__file__).parent / "textbook.toml"
+SHEET = Path(__file__).parent / "data" / "maple.json"
+AXES = {"_x": 0, "_y": 1}
+
+
+class Answer(NamedTuple):
+    """A printed answer."""
+
+    scene: str
+    quantity: str
+    position: int
+    printed: str
+    where: str
+    note: str = ""
+
+
+def answers() -> list[Answer]:
+    """All of them."""
+    return [Answer(**entry) for entry in tomllib.loads(ANSWERS.read_text(encoding="utf-8"))["answer"]]
+
+
+def textbook_figures() -> Iterator[Figure]:
+    """Each answer and ours."""
+    for answer in answers():
+        ours = value(_solved(answer.scene), answer.quantity, answer.position)
+        yield Figure("public test cases", f"{answer.scene} {answer.quantity}", answer.printed, ours)
+
+
+def value(solution: fourbar.Solution, quantity: str, position: int) -> float:
+    """A result, its negative, or the difference of two, at one position."""
+    first, minus, second = quantity.partition(" - ")
+    if minus:
+        return value(solution, first, position) - value(solution, second, position)
+    if quantity.startswith("-"):
+        return -value(solution, quantity[1:], position)
+    name, axis = (quantity[:-2], AXES[quantity[-2:]]) if quantity[-2:] in AXES else (quantity, None)
+    found: Any
+    if name == "v_A":
+        assert solution.omega_2 is not None
+        found = solution.omega_2[:, None] * np.stack([-solution.A[:, 1], solution.A[:, 0]], axis=1)
+    else:
+        found = getattr(solution, name)
+    return float(found[position] if axis is None else found[position, axis])
+
+
+@cache
+def _solved(scene: str) -> fourbar.Solution:
+    return fourbar.solve(fourbar.load(SCENES / f"{scene}.toml"))
+
+
+def maple_figures() -> Iterator[Figure]:
+    """The worksheet's two solutions, positions alone, theta_1 = 0, rad; and the constant of its real equation."""
+    sheet = json.loads(SHEET.read_text(encoding="utf-8"))
+    a, b, c, d = (float(sheet["inputs"][name]) for name in "abcd")
+    theta_2 = math.pi / 3.0
+    linkage = fourbar.FourBar(d, fourbar.Bar(a), fourbar.Bar(b), fourbar.Bar(c))
+    real = sheet["reduced_equations"]["real_constant"]
+    yield Figure("Maple", "real constant", real, a * math.cos(theta_2) - d)
+    for branch, solution in zip((1, -1), sheet["solutions"], strict=True):
+        s = fourbar.solve(fourbar.Scene(linkage, fourbar.Motion(theta_2, branch=branch)))
+        for name, angle in (("theta3", s.theta_3), ("theta4", s.theta_4)):
+            key = f"{solution['configuration']} {name}"
+            yield Figure("Maple", key, solution[f"{name}_printed_rad"], float(angle[0]))

@@ -1,0 +1,207 @@
+"""`python -m validation compare`, `accept` and `history`."""
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from itertools import chain, islice
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, TypeVar
+
+import click
+
+from fourbar.errors import HOLDS, InputError
+from fourbar.writing import write_text
+from fourbar_validation.compare.columns import CSV_ROWS
+from fourbar_validation.compare.counts import Counts
+from fourbar_validation.compare.rows import FAILS, Row
+from fourbar_validation.regression import render
+from fourbar_validation.regression.changes import Differences, compared, merged, under_new_names
+from fourbar_validation.regression.history import HISTORY, append
+from fourbar_validation.regression.record import ABOUT, ACCEPTED, TABLES, About, Recorded, accept, baseline, recorded
+from fourbar_validation.regression.scenes import renamed
+from fourbar_validation.regression.times import time_changes
+
+FORMS: dict[str, Callable[[Differences], str]] = {
+    "markdown": render.markdown,
+    "html": render.html,
+    "junit": render.junit,
+}
+"""Forms in which the differences can be written, besides the text that is printed."""
+T = TypeVar("T")
+NAMED = 50
+"""Names of a column that a message lists."""
+CHOICES = {"only": "scene", "engines": "engine", "quantity": "quantity"}
+"""Option, and the column that it chooses by."""
+
+
+def output_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """The options --markdown, --html and --junit."""
+    for form in reversed(FORMS):
+        path = click.Path(path_type=Path, dir_okay=False)
+        text = f"Write the differences as {form} too"
+        text += "; of a run held against nothing its own comparisons." if form == "junit" else "."
+        command = click.option(f"--{form}", type=path, help=text)(command)
+    return command
+
+
+def choosing_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """The options --only, --engines and --quantity."""
+    for option, column in reversed(CHOICES.items()):
+        text = f"These alone, comma-separated: names of column {column}."
+        command = click.option(f"--{option}", metavar="NAMES", help=text)(command)
+    return command
+
+
+def report_differences(
+    old: Path, new: Path, forms: dict[str, Path | None], chosen: dict[str, str | None] | None = None
+) -> int:
+    """Print the differences, write the forms wanted; 1 on a regression, or where nothing was compared."""
+    before, after = recorded(old), recorded(new)
+    names = renamed(before.about.scenes, after.about.scenes)
+    keep = _choice(chosen or {}, lambda column: chain(before.words(column), after.words(column)), names)
+    engines = set(after.words("engine"))
+    times = time_changes(merged(under_new_names(before.times(), names), after.times()))
+    scenes = in_sight(after.scenes(keep))
+    found = compared((before.about, before.scenes(keep)), (after.about, scenes), engines, times)
+    unproven = [str(run.table) for run in (before, after) if not run.verified]
+    found.notes += [f"{table}: not verified, its {ABOUT} states no SHA-256 or is missing" for table in unproven]
+    for form, path in forms.items():
+        if path is not None:
+            write_text(path, FORMS[form](found))
+    click.echo(render.text(found), nl=False)
+    return found.status
+
+
+def in_sight(scenes: Iterable[T]) -> Iterator[T]:
+    """The same, their number shown meanwhile where somebody looks."""
+    from rich.console import Console
+    from rich.progress import MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+    columns = (TextColumn("comparing"), MofNCompleteColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+        yield from progress.track(scenes)
+
+
+def _choice(
+    chosen: dict[str, str | None],
+    words: Callable[[str], Iterable[str]],
+    renamed: Mapping[str, str] = MappingProxyType({}),
+) -> Callable[[Row], bool]:
+    """Whether a row is of what the options name; InputError for a name that does not stand in its column.
+
+    `renamed`: of a scene with an old and a new name either means both.
+    """
+    wanted: dict[str, set[str]] = {}
+    for option, text in chosen.items():
+        if text is None:
+            continue
+        names = {name.strip() for name in text.split(",") if name.strip()}
+        missing, known = set(names), set[str]()
+        for word in words(CHOICES[option]):
+            missing.discard(word)
+            if len(known) < NAMED:
+                known.add(word)
+        for name in sorted(missing) or ([] if names else [text]):
+            raise InputError(f"--{option}", name, "must be among " + ", ".join(sorted(known)))
+        both = {name for pair in renamed.items() if names & {*pair} for name in pair} if option == "only" else set()
+        wanted[CHOICES[option]] = names | both
+    return lambda row: all(getattr(row, column) in names for column, names in wanted.items())
+
+
+@click.command()
+@click.argument("old")
+@click.argument("new", type=click.Path(path_type=Path))
+@choosing_options
+@output_options
+def compare(
+    old: str, new: Path, only: str | None, engines: str | None, quantity: str | None, **forms: Path | None
+) -> int:
+    """Say what changed from OLD (a run's folder, its results.csv, or an accepted name) to NEW.
+
+    Scenes that changed come first, entry by entry; their rows, and those with other settings or at other
+    positions, are named and not compared. What was not wanted of the new run is "not run", and no regression.
+    Exit status 1 on a regression: a verdict that got worse, an error that grew beyond round-off and its allowance,
+    a row that was run for and is gone, a new row that fails; and where nothing was compared.
+    """
+    return report_differences(baseline(old), new, forms, {"only": only, "engines": engines, "quantity": quantity})
+
+
+@click.command(name="accept")
+@click.argument("results", type=click.Path(path_type=Path))
+@click.option("--to", type=click.Path(path_type=Path, file_okay=False), metavar="DIR",
+              help=f"Keep it there; left out: {ACCEPTED}/ next to RESULTS.")  # fmt: skip
+@click.option("--even-failing", is_flag=True, help="Accept a run in which a comparison fails, or none was made.")
+def accept_command(results: Path, to: Path | None, even_failing: bool) -> None:
+    """Record RESULTS (a run's folder) as the accepted state that later runs are compared with.
+
+    It is kept in DIR, and appended to DIR/history.parquet, of which `history` makes a page.
+    """
+    folder = results if results.is_dir() else results.parent
+    target = folder.absolute().parent / ACCEPTED if to is None else to
+    if target.resolve() == folder.resolve():
+        raise InputError("--to", str(target), "must be another folder than that of the results")
+    for name in (*TABLES, ABOUT, HISTORY):
+        if (target / name).is_dir():
+            raise InputError("--to", str(target / name), "must name a file, not a folder")
+    run = recorded(results)
+    counts = Counts(run.rows())
+    if counts.status != HOLDS and not even_failing:
+        why = f"{counts[FAILS]} comparisons fail" if counts[FAILS] else "nothing was compared"
+        raise InputError("RESULTS", str(results), f"must hold, or say --even-failing: {why}")
+    _require_verified(run)
+    too_long = counts.total > CSV_ROWS
+    if not too_long:
+        append(target / HISTORY, *_whole(run))  # first: where it is damaged nothing is written
+    accept(run, target)
+    history = "too many for a history" if too_long else f"appended to {target / HISTORY}"
+    click.echo(f"accepted: {target} ({counts.total} rows; {history})")
+
+
+def _require_verified(run: Recorded) -> None:
+    """InputError for a run of which nothing says whether it lost some of its rows."""
+    if not run.verified:
+        raise InputError("RESULTS", str(run.table), f"needs a {ABOUT} with its rows and SHA-256; `run` writes one")
+
+
+def _whole(run: Recorded) -> tuple[tuple[About, list[Row]], dict[tuple[str, str], float]]:
+    """All rows and times of a run, as a history takes them; InputError where there are too many."""
+    rows = list(islice(run.rows(), CSV_ROWS + 1))
+    if len(rows) > CSV_ROWS:
+        raise InputError("--add", str(run.table), f"must have at most {CSV_ROWS} rows: a history is read as a whole")
+    return (run.about, rows), {(scene, engine): time for scene, some in run.times() for engine, time in some}
+
+
+@click.command()
+@click.argument("history", type=click.Path(path_type=Path))
+@click.option("--add", type=click.Path(path_type=Path), metavar="RESULTS", help="Append this run first.")
+@click.option("-o", "--out", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE",
+              help="Page to write; left out: history.html next to HISTORY.")  # fmt: skip
+@choosing_options
+def history(
+    history: Path, add: Path | None, out: Path | None, only: str | None, engines: str | None, quantity: str | None
+) -> None:
+    """Show HISTORY (a file history.parquet, or the folder that holds it) over time, as a page with charts.
+
+    Error, verdict and time by date, commit and engine version, and the step at which each row changed.
+    """
+    from fourbar_validation.regression.history import read_history
+    from fourbar_validation.regression.history_page import page
+    from fourbar_validation.regression.steps import steps
+
+    file = history / HISTORY if history.is_dir() or not history.suffix else history
+    if add is not None:
+        run = recorded(add)
+        _require_verified(run)
+        append(file, *_whole(run))
+    runs = read_history(file)
+    keep = _choice(
+        {"only": only, "engines": engines, "quantity": quantity},
+        lambda column: (getattr(row, column) for run in runs for row in run.rows),
+    )
+    runs = [run.of(keep) for run in runs]
+    found = steps(runs)
+    target = file.with_name("history.html") if out is None else out
+    write_text(target, page(runs, found))
+    for step in found:
+        click.echo(step.sentence())
+    changed = f"{len(found)} step{'s' if len(found) > 1 else ''} changed something" if found else "nothing changed"
+    click.echo(f"{len(runs)} runs, {changed}: {target}")

@@ -1,0 +1,97 @@
+"""What happened to one row from an old run to a new one."""
+
+import math
+from dataclasses import dataclass
+from enum import Enum
+
+from fourbar_validation.compare.rows import FAILS, VERDICTS, Row
+from fourbar_validation.compare.tolerance import EPS, K
+
+ROUND_OFF = K
+"""Errors of an exact comparison move freely by this many eps/condition: another compiler, another
+order of summation. A move beyond it is a change of the numbers themselves."""
+NOTICEABLE = 1.25
+"""An error that is not round-off has changed where it grew or shrank by this factor."""
+
+
+class Kind(Enum):
+    """What happened to a row; the value is the heading of the report."""
+
+    VERDICT_WORSE = "verdict got worse"
+    WORSE = "worse"
+    GONE = "gone"
+    VERDICT_BETTER = "verdict got better"
+    BETTER = "better"
+    GONE_FAILURE = "gone, and had failed"
+    GREW = "grew within its allowance"
+    NEW = "new"
+    NEW_FAILURE = "new, and fails"
+    OTHER_SCENE = "of a changed scene"
+    OTHER_POSITIONS = "at other positions"
+    OTHER_SETTING = "with another setting"
+    NOT_RUN = "not run"
+    ROUND_OFF = "moved within round-off"
+    SAME = "same"
+
+
+WHOLE = ("all", "watch")
+"""Rows that stand for what went wrong with an engine as a whole: once it is mended they are gone."""
+REGRESSIONS = frozenset((Kind.VERDICT_WORSE, Kind.WORSE, Kind.GONE, Kind.NEW_FAILURE))
+OTHER_QUESTION = (Kind.OTHER_SCENE, Kind.OTHER_POSITIONS, Kind.OTHER_SETTING)
+"""Rows that are not compared: each run answers a question of its own."""
+Key = tuple[str, str, str, str]
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """One row in the old and the new run."""
+
+    kind: Kind
+    key: Key
+    old: Row | None
+    new: Row | None
+    round_off: float
+    """By how much the error may move without meaning, K eps/condition."""
+
+    @property
+    def regression(self) -> bool:
+        """Whether the run should fail for it."""
+        return self.kind in REGRESSIONS
+
+    @property
+    def severity(self) -> tuple[bool, float]:
+        """Whether it fails now, and how many times its error, or round-off, has grown."""
+        new = self.new
+        if new is None or self.old is None:
+            return new is not None and new.failed, 1.0
+        grown = new.error / max(self.old.error, self.round_off)
+        return new.failed, math.inf if math.isnan(grown) else grown
+
+
+def change(key: Key, old: Row | None, new: Row | None) -> Change:
+    """A row of both runs, or of one of them."""
+    if old is None or new is None:
+        fails = new is not None and new.verdict == FAILS
+        kind = Kind.NEW_FAILURE if fails else Kind.NEW
+        if old is not None:
+            kind = Kind.GONE_FAILURE if old.verdict == FAILS and old.quantity in WHOLE else Kind.GONE
+        return Change(kind, key, old, new, math.nan)
+    condition = min((c for c in (old.condition, new.condition) if c > 0.0), default=1.0)
+    round_off = ROUND_OFF * EPS / condition
+    return Change(_kind(old, new, round_off), key, old, new, round_off)
+
+
+def _kind(old: Row, new: Row, round_off: float) -> Kind:
+    if old.verdict != new.verdict:
+        worse = VERDICTS.index(new.verdict) > VERDICTS.index(old.verdict)
+        return Kind.VERDICT_WORSE if worse else Kind.VERDICT_BETTER
+    if not new.compared or old.error == new.error or (math.isnan(old.error) and math.isnan(new.error)):
+        return Kind.SAME
+    if abs(new.error - old.error) <= round_off:
+        return Kind.ROUND_OFF
+    if new.error > NOTICEABLE * old.error or math.isnan(new.error):
+        within = new.passed and new.error <= NOTICEABLE * old.allowed  # an allowance that was widened holds nothing
+        return Kind.GREW if within else Kind.WORSE
+    if old.error > NOTICEABLE * new.error:
+        return Kind.BETTER
+    return Kind.SAME

@@ -1,0 +1,296 @@
+"""Two runs held against each other, scene by scene: both tables are sorted, and neither is ever whole in memory."""
+
+import math
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from heapq import merge, nlargest
+from itertools import groupby
+from typing import TypeVar
+
+from fourbar.errors import FAILED, HOLDS, InputError
+from fourbar_validation.compare.counts import Counts
+from fourbar_validation.compare.identities import FORMULAS
+from fourbar_validation.compare.rows import FAILS, VERDICTS, Row, sorted_rows
+from fourbar_validation.regression.change import OTHER_QUESTION, REGRESSIONS, Change, Key, Kind, change
+from fourbar_validation.regression.fault import Fault
+from fourbar_validation.regression.record import About
+from fourbar_validation.regression.scenes import SceneChange, renamed, scene_changes
+from fourbar_validation.regression.times import Time, TimeChange, time_changes
+
+KEPT = 10_000
+"""Rows of one kind that are listed, the worst of them; all are counted."""
+NAMED = 50
+"""Scenes and engines listed by name that were not run or not compared; the others are counted."""
+T = TypeVar("T")
+ByScene = Iterable[tuple[str, Sequence[T]]]
+"""What is of one scene after the other, in ascending order of their names."""
+
+
+class Named:
+    """Rows by a name; of more than NAMED names the others are one."""
+
+    def __init__(self) -> None:
+        self._rows: Counter[str] = Counter()
+        self._others = 0
+        """Names beyond, each in turn: those of one scene come together."""
+        self._rows_of_others = 0
+        self._last = ""
+
+    def add(self, name: str) -> None:
+        """One row more of a name."""
+        if name in self._rows or len(self._rows) < NAMED:
+            self._rows[name] += 1
+        else:
+            self._others += name != self._last
+            self._rows_of_others += 1
+        self._last = name
+
+    def __iter__(self) -> Iterator[str]:
+        yield from (f"{name} ({count} rows)" for name, count in self._rows.items())
+        if self._others:
+            yield f"and {self._others} more ({self._rows_of_others} rows)"
+
+
+@dataclass(slots=True)
+class Differences:
+    """Everything that differs between two runs."""
+
+    surroundings: list[tuple[str, str, str]]
+    """(what, old, new) of versions, machine and settings."""
+    scenes: list[SceneChange] = field(default_factory=list)
+    """Scenes that ask something else; reported first."""
+    notes: list[str] = field(default_factory=list)
+    """Scenes of another name, and what an older record cannot say."""
+    times: list[TimeChange] = field(default_factory=list)
+    kept: int = KEPT
+    kinds: Counter[Kind] = field(default_factory=Counter)
+    """Rows by what happened to them."""
+    counts: Counts = field(default_factory=Counts)
+    """The rows of the new run by verdict."""
+    fault: Fault = field(default_factory=Fault)
+    _changes: dict[Kind, list[Change]] = field(default_factory=dict)
+    _compared: Counts = field(default_factory=Counts)
+    """The rows of the new run that have their counterpart in the old one."""
+    _scenes_not_run: Named = field(default_factory=Named)
+    _engines_not_run: Named = field(default_factory=Named)
+    _not_compared: Named = field(default_factory=Named)
+
+    def add(self, changes: Sequence[Change]) -> None:
+        """The rows of one scene more."""
+        self.kinds.update(each.kind for each in changes)
+        self.counts.add(each.new for each in changes if each.new is not None)
+        alike = (each for each in changes if each.kind not in OTHER_QUESTION)
+        self._compared.add(each.new for each in alike if each.new is not None and each.old is not None)
+        self.fault.add(changes)
+        there = any(each.new is not None for each in changes)
+        for each in changes:
+            if each.kind is Kind.NOT_RUN and there:
+                self._engines_not_run.add(each.key[1])
+            elif each.kind is Kind.NOT_RUN:
+                self._scenes_not_run.add(f"scene {each.key[0]}")
+            elif each.kind in OTHER_QUESTION and each.old is not None and each.new is not None:
+                self._not_compared.add(_why_not(each, each.old, each.new))
+            some = self._changes.setdefault(each.kind, [])
+            some.append(each)
+            if len(some) > 2 * self.kept:
+                self._changes[each.kind] = nlargest(self.kept, some, key=lambda one: one.severity)
+
+    def of(self, kind: Kind) -> list[Change]:
+        """The changes of one kind, the worst first; at most `kept` of them."""
+        return nlargest(self.kept, self._changes.get(kind, ()), key=lambda one: one.severity)
+
+    @property
+    def changes(self) -> list[Change]:
+        """Those that are kept, by scene, engine, setting and quantity."""
+        return sorted((each for kind in Kind for each in self.of(kind)), key=lambda each: each.key)
+
+    @property
+    def rows(self) -> int:
+        """How many there are."""
+        return self.kinds.total()
+
+    @property
+    def regressed(self) -> int:
+        """How many rows, and times, a run fails for."""
+        return sum(self.kinds[kind] for kind in REGRESSIONS) + len(self.slower)
+
+    @property
+    def other_times(self) -> list[TimeChange]:
+        """Engines whose times changed by more than their scatter."""
+        return [each for each in self.times if each.beyond]
+
+    @property
+    def slower(self) -> list[TimeChange]:
+        """Those that are slower than on the same machine before."""
+        same = all(what != "machine" for what, _, _ in self.surroundings)
+        return [each for each in self.other_times if same and each.slower]
+
+    @property
+    def not_run(self) -> list[str]:
+        """Scenes and engines of the old run that the new one was not run for, each with its number of rows."""
+        return [*self._scenes_not_run, *self._engines_not_run]
+
+    @property
+    def not_compared(self) -> list[str]:
+        """Rows that both runs have, each as the answer to another question: by scene, engine and setting."""
+        return [*self._not_compared]
+
+    @property
+    def compared(self) -> int:
+        """How many rows of the new run have their counterpart in the old one."""
+        return self._compared.total
+
+    @property
+    def nothing(self) -> bool:
+        """Whether no comparison of the new run has its counterpart in the old one."""
+        return self._compared.nothing
+
+    @property
+    def status(self) -> int:
+        """Exit status: 1 on a regression, and where nothing was compared."""
+        return FAILED if self.regressed or self.nothing else HOLDS
+
+
+def _why_not(of: Change, old: Row, new: Row) -> str:
+    if of.kind is Kind.OTHER_SETTING:
+        return f"{of.key[0]} / {of.key[1]}: {old.setting} -> {new.setting}"
+    return f"scene {of.key[0]} {'changed' if of.kind is Kind.OTHER_SCENE else 'has other positions'}"
+
+
+def differences(
+    old: tuple[About, Iterable[Row]],
+    new: tuple[About, Iterable[Row]],
+    times: tuple[Mapping[tuple[str, str], float], Mapping[tuple[str, str], float]] = ({}, {}),
+    kept: int = KEPT,
+) -> Differences:
+    """Compare two runs whose rows are at hand, in any order."""
+    before, after = (sorted_rows(run[1]) for run in (old, new))
+    engines = {row.engine for row in after}
+    names = renamed(old[0].scenes, new[0].scenes)
+    timed = under_new_names(_times_by_scene(times[0]), names), _times_by_scene(times[1])
+    changed = time_changes(merged(*timed))
+    return compared((old[0], by_scene(before)), (new[0], by_scene(after)), engines, changed, kept)
+
+
+def _times_by_scene(times: Mapping[tuple[str, str], float]) -> Iterator[tuple[str, list[Time]]]:
+    for scene, some in groupby(sorted(times.items()), key=lambda item: item[0][0]):
+        yield scene, [(engine, time) for (_, engine), time in some]
+
+
+def compared(
+    old: tuple[About, ByScene[Row]],
+    new: tuple[About, ByScene[Row]],
+    engines: set[str],
+    times: list[TimeChange],
+    kept: int = KEPT,
+) -> Differences:
+    """Compare two runs by their scenes, in ascending order: only where both answer the same question.
+
+    Parameters
+    ----------
+    engines : those that have rows in the new run.
+    """
+    scenes = {each.scene: each for each in scene_changes(old[0].scenes, new[0].scenes)}
+    names = renamed(old[0].scenes, new[0].scenes)
+    surroundings, older = _surroundings(old[0], new[0])
+    notes = [f"renamed: {before} -> {after}" for before, after in names.items()]
+    found = Differences(surroundings, list(scenes.values()), notes, times, kept)
+    known = engines | (new[0].engines or set())
+    for scene, before, after in merged(under_new_names(old[1], names), new[1]):
+        wanted = scene in new[0].scenes if new[0].scenes else bool(after) or not engines
+        rows = _by_key(scene, before), _by_key(scene, after)
+        found.add(_of_scene(*rows, known if wanted else set(), wanted, scenes.get(scene)))
+    if older:
+        found.notes += [f"{found.compared} of {found.rows} rows are compared: the others are of one run alone", *older]
+    return found
+
+
+def under_new_names(scenes: ByScene[T], names: Mapping[str, str]) -> ByScene[T]:
+    """Each scene of the old run by the name that the new one gives it; nothing is held where none has another."""
+    if not names:
+        return scenes
+    return sorted(((names.get(name, name), some) for name, some in scenes), key=lambda each: each[0])
+
+
+def by_scene(rows: Iterable[Row]) -> Iterator[tuple[str, list[Row]]]:
+    """The rows of one scene after the other."""
+    for scene, some in groupby(rows, key=lambda row: row.scene):
+        yield scene, list(some)
+
+
+def merged(old: ByScene[T], new: ByScene[T]) -> Iterator[tuple[str, Sequence[T], Sequence[T]]]:
+    """Each scene that either run has, with what both have of it; InputError where the scenes are not in order."""
+    both = merge(_in_order("OLD", old), _in_order("NEW", new), key=lambda each: each[0])
+    for scene, some in groupby(both, key=lambda each: each[0]):
+        rows = {run: each for _, run, each in some}
+        yield scene, rows.get("OLD", ()), rows.get("NEW", ())
+
+
+def _in_order(run: str, scenes: ByScene[T]) -> Iterator[tuple[str, str, Sequence[T]]]:
+    last = None
+    for scene, rows in scenes:
+        if last is not None and scene <= last:
+            raise InputError(run, scene, f"must stand before scene {last}: a table of `run` is sorted by scene")
+        last = scene
+        yield scene, run, rows
+
+
+def _by_key(scene: str, rows: Iterable[Row]) -> dict[Key, Row]:
+    worst_last = sorted(rows, key=lambda row: VERDICTS.index(row.verdict))  # of two of one name the worse one counts
+    return {(scene, row.engine, row.setting, row.quantity): row for row in worst_last}
+
+
+def _of_scene(
+    before: Mapping[Key, Row], after: Mapping[Key, Row], engines: set[str], wanted: bool, other: SceneChange | None
+) -> list[Change]:
+    """What happened to each row of a scene; `engines`: those it was run for, where it was `wanted` at all."""
+    settings = _other_settings(before, after)
+    changes = []
+    for key in sorted(before.keys() | after.keys()):
+        if key in settings.values():
+            continue  # it stands with its counterpart
+        old, new = before.get(key), after.get(settings.get(key, key))
+        found = change(key, old, new)
+        if new is None and not (wanted and (key[1] in engines or key[1] == FORMULAS)):
+            found = Change(Kind.NOT_RUN, key, old, None, math.nan)
+        elif old is not None and new is not None and (other is not None or key in settings):
+            kind = Kind.OTHER_SETTING if other is None else Kind.OTHER_SCENE
+            kind = Kind.OTHER_POSITIONS if other is not None and other.positions_alone else kind
+            fails = new.verdict == FAILS and old.verdict != FAILS
+            found = Change(Kind.NEW_FAILURE if fails else kind, key, old, new, found.round_off)
+        changes.append(found)
+    return changes
+
+
+def _other_settings(before: Mapping[Key, Row], after: Mapping[Key, Row]) -> dict[Key, Key]:
+    """Rows that both runs have with one setting each, but not the same: old key to new key."""
+
+    def alone(keys: Iterable[Key]) -> dict[tuple[str, str, str], Key]:
+        found: dict[tuple[str, str, str], list[Key]] = {}
+        for key in keys:
+            found.setdefault((key[0], key[1], key[3]), []).append(key)
+        return {name: group[0] for name, group in found.items() if len(group) == 1}
+
+    old, new = alone(before.keys() - after.keys()), alone(after.keys() - before.keys())
+    return {old[name]: new[name] for name in old.keys() & new.keys() if "-" not in (old[name][2], new[name][2])}
+
+
+def _surroundings(old: About, new: About) -> tuple[list[tuple[str, str, str]], list[str]]:
+    """What the runs were made with where it differs, and what a record cannot say."""
+    found = [("commit", old.commit, new.commit)] if old.commit and new.commit else []
+    found += _both(old.versions, new.versions)
+    found.append(("machine", old.machine, new.machine))
+    found += [each for each in _both(old.settings, new.settings) if each[0] != "suite"]
+    suites = [each.settings.get("suite", "not recorded")[:12] for each in (old, new)]
+    notes = []
+    if suites[0] != suites[1] and not (old.scenes and new.scenes):
+        silent = "neither run says" if not (old.scenes or new.scenes) else "the older record does not say"
+        notes.append(f"the scenes' hash is another ({suites[0]} -> {suites[1]}), and {silent} what they ask: "
+                     "a scene that changed cannot be named, rows are compared by name alone")  # fmt: skip
+    return [(what, before, after) for what, before, after in found if before != after], notes
+
+
+def _both(old: Mapping[str, str], new: Mapping[str, str]) -> list[tuple[str, str, str]]:
+    none = "not recorded"
+    return [(what, old.get(what, none), new.get(what, none)) for what in sorted(old.keys() | new.keys())]

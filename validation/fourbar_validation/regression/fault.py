@@ -1,0 +1,115 @@
+"""Whose fault a regression is, and what was wrong: rows by engine and cause, scenes by who disagrees."""
+
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+
+from fourbar_validation.compare.identities import FORMULAS
+from fourbar_validation.compare.rows import Row
+from fourbar_validation.regression.change import Change, Kind
+from fourbar_validation.report.summary import NUMBER
+
+EXACT = "exact"
+"""Setting of an engine that is held to round-off, and sees what is wrong by more."""
+MOST_CAUSES = 200
+"""Causes with a line of their own; the others are one."""
+
+
+@dataclass(slots=True)
+class Group:
+    """Rows of one engine to which the same happened, for one cause."""
+
+    engine: str
+    kind: Kind
+    cause: str
+    rows: int = 0
+    scenes: int = 0
+    of_scenes: int = 0
+    """Of the scenes in which the engine has rows."""
+    quantities: Counter[str] = field(default_factory=Counter)
+    worst: Change | None = None
+
+    def add(self, changes: Sequence[Change]) -> None:
+        """The rows of one scene more."""
+        self.scenes += 1
+        self.rows += len(changes)
+        self.quantities.update(each.key[3] for each in changes)
+        self.worst = max((*changes, *([self.worst] if self.worst else [])), key=lambda each: each.severity)
+
+    def __str__(self) -> str:
+        names = ", ".join(name if n == 1 else f"{name} {n}" for name, n in self.quantities.most_common(6))
+        more = ", ..." if len(self.quantities) > 6 else ""
+        cause = f", {self.cause}" if self.cause else ""
+        return f"{self.engine}, {self.scenes} of {self.of_scenes} scenes, {self.rows} rows ({names}{more}){cause}"
+
+
+class Fault:
+    """Scene by scene; what is kept does not grow with their number."""
+
+    def __init__(self) -> None:
+        self._groups: dict[tuple[str, Kind, str], Group] = {}
+        self._scenes: Counter[str] = Counter()
+        self._who: Counter[tuple[str, frozenset[str]]] = Counter()
+
+    def add(self, changes: Iterable[Change]) -> None:
+        """The rows of one scene."""
+        changes = list(changes)
+        self._scenes.update({each.key[1] for each in changes if each.kind is not Kind.NOT_RUN})
+        groups: dict[tuple[str, Kind, str], list[Change]] = {}
+        for each in changes:
+            groups.setdefault((each.key[1], each.kind, cause(each)), []).append(each)
+        for key, some in groups.items():
+            if key not in self._groups and len(self._groups) >= MOST_CAUSES:
+                key = (*key[:2], "other causes")  # noqa: PLW2901
+            self._groups.setdefault(key, Group(*key)).add(some)
+        worse = {each.key[1] for each in changes if each.regression}
+        if worse:
+            exact = {each.key[1] for each in changes if _compared_exactly(each.old) or _compared_exactly(each.new)}
+            self._who[sentence(worse, exact), frozenset(worse)] += 1
+
+    def groups(self, kinds: Iterable[Kind]) -> list[Group]:
+        """Those of some kinds, the worst first; each with the number of its engine's scenes."""
+        wanted = set(kinds)
+        found = [group for group in self._groups.values() if group.kind in wanted]
+        for group in found:
+            group.of_scenes = self._scenes[group.engine]
+        order = list(Kind)
+        return sorted(found, key=lambda g: (order.index(g.kind), *(-x for x in _severity(g)), -g.rows, g.engine))
+
+    @property
+    def sentences(self) -> list[str]:
+        """Who disagrees, and in how many of their scenes; the most frequent first."""
+        counts: Counter[str] = Counter()
+        of: Counter[str] = Counter()
+        for (text, engines), n in self._who.items():
+            counts[text] += n
+            of[text] = max(of[text], min(self._scenes[engine] for engine in engines))
+        return [f"{text}, {n} of {of[text]} scenes" for text, n in counts.most_common()]
+
+
+def _severity(group: Group) -> tuple[bool, float]:
+    return group.worst.severity if group.worst is not None else (False, 0.0)
+
+
+def _compared_exactly(row: Row | None) -> bool:
+    return row is not None and row.setting == EXACT and row.compared and row.engine != FORMULAS
+
+
+def cause(of: Change) -> str:
+    """What a report says of why, its numbers left out: one cause has one text in all scenes."""
+    if of.kind in (Kind.VERDICT_WORSE, Kind.VERDICT_BETTER, Kind.NEW_FAILURE) and of.new is not None:
+        came = f"{of.old.verdict} -> {of.new.verdict}" if of.old is not None else of.new.verdict
+        return f"{came}: {NUMBER.sub('#', of.new.reason)}"
+    return ""
+
+
+def sentence(worse: set[str], exact: set[str]) -> str:
+    """Who is at fault in a scene where the rows of `worse` regressed; `exact` are the engines held to round-off."""
+    engines = worse - {FORMULAS}
+    if len(exact) > 1 and engines >= exact:
+        if FORMULAS in worse:
+            return "all engines and the identity disagree: the formulas"
+        return "all engines disagree, and the identities hold: the formulas, or what all engines are given"
+    if not engines:
+        return "only the identities: the formulas, or what is stated of them"
+    return f"only {', '.join(sorted(engines))}" + (" and an identity" if FORMULAS in worse else "")

@@ -1,0 +1,246 @@
+"""A recorded run: its table and the versions, machine, settings and scenes it was made with."""
+
+import csv
+import hashlib
+import json
+import os
+import shutil
+import subprocess
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import asdict, dataclass, field
+from datetime import UTC, datetime
+from itertools import groupby
+from pathlib import Path
+from typing import Any, TypeVar
+
+from fourbar.errors import InputError
+from fourbar.writing import naming, write_text
+from fourbar_validation.compare.columns import column_of, read_columns, rows_in
+from fourbar_validation.compare.rows import Row, from_text, plain
+from fourbar_validation.compare.tolerance import SIMULATED, K
+from fourbar_validation.places import CHECKOUT
+from fourbar_validation.report.machine import kernels, machine, versions
+
+SHIPPED = Path(__file__).parent
+"""Where the accepted state of the models of this project is."""
+T = TypeVar("T")
+ACCEPTED = "accepted"
+TABLE, COLUMNS, ABOUT, TIMINGS = "results.csv", "results.parquet", "record.json", "timings.csv"
+TABLES = (TABLE, COLUMNS, TIMINGS)
+UNFINISHED = "run.json"
+"""What a run keeps in its folder until it is finished."""
+
+
+@dataclass(frozen=True, slots=True)
+class About:
+    """What a run was made with."""
+
+    versions: dict[str, str]
+    """Of what decides a number, the kernels that the CPU was given among them."""
+    machine: str
+    settings: dict[str, str]
+    """Engines, suite, and the factors of the tolerances."""
+    scenes: dict[str, dict[str, str]] = field(default_factory=dict)
+    """What each scene asks, by its name; empty in older records and in suites too long for it."""
+    date: str = ""
+    """UTC, ISO 8601; empty in older records."""
+    commit: str = ""
+    """Of the checkout that the run was made in; empty where it is none."""
+
+    @property
+    def engines(self) -> set[str] | None:
+        """Those that were run; None where nothing is known of it."""
+        names = self.settings.get("engines")
+        return None if names is None else set(filter(None, names.split(", ")))
+
+
+def about(factors: Mapping[str, float], suite: str, scenes: Mapping[str, Mapping[str, str]] | None = None) -> About:
+    """The record of a run made here and now; `factors` are the errors allowed to each engine at condition 1."""
+    simulated = factors.get("mujoco-simulated", SIMULATED.factor)
+    settings = {"engines": ", ".join(factors), "suite": suite, "K": repr(K), "simulated": repr(simulated)}
+    described = {name: dict(entries) for name, entries in (scenes or {}).items()}
+    now = datetime.now(UTC).isoformat(timespec="seconds")
+    return About(versions() | kernels(), machine(), settings, described, now, _commit())
+
+
+def _commit() -> str:
+    """Of the folder of this harness, marked where it holds what is not committed; what CI says of itself first."""
+    if stated := os.environ.get("GITHUB_SHA") or os.environ.get("CI_COMMIT_SHA"):
+        return stated[:12]
+    command = ["git", "describe", "--always", "--dirty", "--abbrev=12", "--exclude=*"]
+    if CHECKOUT is None:
+        return ""
+    try:
+        done = subprocess.run(command, cwd=CHECKOUT, capture_output=True, text=True, check=True, timeout=10)
+    except (OSError, subprocess.SubprocessError):
+        return ""
+    return done.stdout.strip()
+
+
+def write_about(record: About, folder: Path) -> None:
+    """Write record.json next to the results, with rows and SHA-256 of each table, and of itself."""
+    there = [path for name in TABLES if (path := folder / name).is_file()]
+    tables = {path.name: {"rows": rows_in(path), "sha256": _sha256(path)} for path in there}
+    kept = asdict(record) | {"tables": tables}
+    write_text(folder / ABOUT, json.dumps(kept | {"sha256": _own_sha256(kept)}, indent=1, sort_keys=True) + "\n")
+
+
+def _sha256(path: Path) -> str:
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def _own_sha256(kept: Mapping[str, Any]) -> str:
+    return hashlib.sha256(json.dumps(kept, sort_keys=True).encode()).hexdigest()
+
+
+def _require_whole(tables: Mapping[str, Mapping[str, Any]], folder: Path, read: str) -> None:
+    """InputError that names the first table of a folder that is not what its record says."""
+    there = {name for name in TABLES if (folder / name).is_file()}
+    for name in sorted({*tables, *there, read}):
+        path = folder / name
+        if name not in tables:
+            why = f"is not of this run: its {ABOUT} does not name it"
+        elif name not in there:
+            why = f"is missing: {ABOUT} says that it has {tables[name]['rows']} rows"
+        elif _sha256(path) == tables[name]["sha256"]:
+            continue
+        else:
+            try:
+                rows = f"{rows_in(path)} rows"
+            except (KeyError, OSError, ValueError):
+                rows = "no rows that can be read"
+            why = f"is damaged: {rows} of {tables[name]['rows']}, and not the SHA-256 that {ABOUT} states"
+        raise InputError("RESULTS", str(path), why)
+
+
+NOTHING_KNOWN = About({}, "unknown machine", {})
+
+
+@dataclass(frozen=True, slots=True)
+class Recorded:
+    """A run as it is kept in a folder: its table is read as it is needed, and never whole."""
+
+    about: About
+    table: Path
+    verified: bool = False
+    """Whether the tables are those that the record was written with; older records do not say."""
+
+    def rows(self) -> Iterator[Row]:
+        """Its rows in their order; InputError where the table is damaged."""
+        yield from self._read(read_columns(self.table))
+
+    def scenes(self, keep: Callable[[Row], bool] = lambda _: True) -> Iterator[tuple[str, list[Row]]]:
+        """The rows that are wanted, scene by scene."""
+        for scene, some in groupby(filter(keep, self.rows()), key=lambda row: row.scene):
+            yield scene, list(some)
+
+    def words(self, column: str) -> Iterator[str]:
+        """What stands in a column of text, some of it more than once."""
+        yield from self._read(column_of(self.table, column))
+
+    def times(self) -> Iterator[tuple[str, list[tuple[str, float]]]]:
+        """Scene by scene, each engine's time over the formulas' there; none where they were not kept."""
+        table = self.table.parent / TIMINGS
+        if not table.is_file():
+            return
+        try:
+            with table.open(newline="", encoding="utf-8") as file:
+                for scene, some in groupby(csv.DictReader(file), key=lambda row: row["scene"]):
+                    yield (
+                        plain(from_text(scene)),
+                        [(plain(from_text(row["engine"])), float(row["times_formulas"])) for row in some],
+                    )
+        except (KeyError, TypeError, ValueError, csv.Error):
+            raise InputError("RESULTS", str(table), "is not a table of times written by `run`") from None
+
+    def _read(self, found: Iterator[T]) -> Iterator[T]:
+        try:
+            yield from found
+        except (KeyError, TypeError, ValueError, OSError):  # a column, a cell or a number is missing, or is no text
+            raise InputError("RESULTS", str(self.table), "is not a table written by `run`") from None
+
+
+def recorded(path: Path) -> Recorded:
+    """A run by its folder, or by a results.csv alone (then nothing is known of how it was made).
+
+    Raises InputError where there is no readable table, an empty or a damaged one, or that of an unfinished run.
+    """
+    table = path / TABLE if path.is_dir() else path
+    long = path / COLUMNS
+    if not table.is_file() and long.is_file():  # too many rows for a text
+        table = long
+    if not table.is_file():
+        raise InputError("RESULTS", str(path), f"must be a folder with {TABLE} or {COLUMNS}, or such a file")
+    if (table.parent / UNFINISHED).is_file():
+        raise InputError("RESULTS", str(table), "must be of a run that was finished: run it again, and it is resumed")
+    record = table.parent / ABOUT
+    found = _described(record, table) if record.is_file() else Recorded(NOTHING_KNOWN, table)
+    if next(found.rows(), None) is None:
+        raise InputError("RESULTS", str(table), "must hold at least one comparison: it has none")
+    return found
+
+
+def _described(record: Path, table: Path) -> Recorded:
+    """A table and what its record says of it; InputError where either is damaged."""
+    try:
+        kept = json.loads(record.read_text(encoding="utf-8"))
+        stated = kept.pop("sha256", None)
+        about, tables = about_of(kept), kept.get("tables")
+    except (AttributeError, KeyError, TypeError, ValueError, RecursionError):
+        raise InputError("RESULTS", str(record), "is not a record written by `run`") from None
+    if stated is None and tables is None:
+        return Recorded(about, table)
+    if stated != _own_sha256(kept):
+        raise InputError("RESULTS", str(record), "is damaged: it is not what `run` wrote")
+    _require_whole(tables, table.parent, table.name)
+    return Recorded(about, table, verified=True)
+
+
+def read_run(path: Path) -> tuple[About, list[Row]]:
+    """What is known of a run, and all its rows."""
+    run = recorded(path)
+    return run.about, list(run.rows())
+
+
+def about_of(kept: dict[str, Any]) -> About:
+    """What a file says of a run; its words are somebody's text."""
+    versions, settings = (_plain(kept[name]) for name in ("versions", "settings"))
+    scenes = {plain(name): _plain(entries) for name, entries in kept.get("scenes", {}).items()}
+    date, commit = (plain(kept.get(name, "")) for name in ("date", "commit"))
+    return About(versions, plain(kept["machine"]), settings, scenes, date, commit)
+
+
+def _plain(entries: dict[str, str]) -> dict[str, str]:
+    return {plain(key): plain(value) for key, value in entries.items()}
+
+
+def baseline(name_or_path: str) -> Path:
+    """A run by its path, or the accepted state of this project's models by its name."""
+    if not Path(name_or_path).exists() and (SHIPPED / name_or_path / TABLE).is_file():
+        return SHIPPED / name_or_path
+    return Path(name_or_path)
+
+
+def accept(run: Recorded, target: Path) -> None:
+    """Keep a run, with its times, as the accepted state in a folder."""
+    target.mkdir(parents=True, exist_ok=True)
+    kept = {run.table.name, TIMINGS}
+    for name in TABLES:
+        if name in kept and (table := run.table.with_name(name)).is_file():
+            _copy(table, target / name)
+        else:
+            (target / name).unlink(missing_ok=True)  # of the state before
+    write_about(run.about, target)
+
+
+def _copy(source: Path, target: Path) -> None:
+    """A file however long, all of it or nothing."""
+    draft = target.with_name(f".{target.name}.part")
+    with naming(target):
+        try:
+            shutil.copyfile(source, draft)
+            os.replace(draft, target)
+        except BaseException:
+            draft.unlink(missing_ok=True)
+            raise

@@ -1,0 +1,129 @@
+"""Differences as text, Markdown, HTML and JUnit XML."""
+
+from collections.abc import Callable, Iterator, Sequence
+
+from fourbar_validation.regression.change import OTHER_QUESTION, Change, Kind
+from fourbar_validation.regression.changes import Differences
+from fourbar_validation.regression.fault import Group
+from fourbar_validation.report.junit import Case, beyond, document
+from fourbar_validation.report.templating import number, rendered
+
+SHOWN = tuple(kind for kind in Kind if kind not in (Kind.SAME, Kind.ROUND_OFF, Kind.NOT_RUN, *OTHER_QUESTION))
+"""By engine and cause; what was not run, or is another question, is named as a whole."""
+AT_MOST = 50
+"""Engines and causes listed in text and Markdown."""
+ROWS = 5
+"""Rows of one kind listed there, the worst of them."""
+
+
+def verdict(found: Differences) -> str:
+    """One line: how many regressions among how many rows, what else moved, and the counts of the new run."""
+    counts = [f"{found.kinds[kind]} {kind.value}" for kind in Kind if found.kinds[kind]]
+    counts += [f"{len(found.slower)} slower"] if found.slower else []
+    many = found.regressed
+    head = f"{many} regression{'s' if many > 1 else ''}" if many else "No regression"
+    if found.nothing and not many:
+        head = "Nothing was compared with the old run"
+    rows = f"{found.compared} of {found.rows}" if found.compared < found.rows else f"{found.rows}"
+    moved = f" in {rows} rows: {', '.join(counts)}" if counts else ""
+    return f"{head}{moved}. New run: {found.counts.sentence()}"
+
+
+def line(change: Change) -> str:
+    """One change in one line of text."""
+    name = " / ".join(part for part in change.key if part)
+    if change.old is None:
+        assert change.new is not None
+        return f"{name}: {change.new.verdict}, error {number(change.new.error)}"
+    if change.new is None:
+        return f"{name}: was {change.old.verdict}, error {number(change.old.error)}"
+    old, new = change.old, change.new
+    words = f"{name}: error {number(old.error)} -> {number(new.error)}"
+    if old.verdict != new.verdict:
+        words += f", {old.verdict} -> {new.verdict} ({new.reason})"
+    return words + f"; round-off moves it by {number(change.round_off)}"
+
+
+def text(found: Differences) -> str:
+    """For a terminal: what is another question first, then what it was made with, then the rows."""
+    lines = [*map(str, found.scenes), *found.notes]
+    lines += [f"{what}: {old} -> {new}" for what, old, new in found.surroundings]
+    lines += [f"not compared: {name}" for name in found.not_compared]
+    lines += [f"not run: {name}" for name in found.not_run]
+    lines += [f"time: {change}" for change in found.other_times]
+    lines += [f"disagree: {sentence}" for sentence in found.fault.sentences]
+    groups, more = _groups(found)
+    lines += [f"{group.kind.value}: {group}" for group in groups] + more
+    for kind in SHOWN:
+        lines += [f"{kind.value}: {each}" for each in _worst(found, kind)]
+    return "\n".join([*lines, verdict(found)]) + "\n"
+
+
+def _groups(found: Differences) -> tuple[list[Group], list[str]]:
+    """The rows that changed by engine and cause, the worst first, and how many more there are."""
+    groups = found.fault.groups(SHOWN)
+    more = len(groups) - AT_MOST
+    return groups[:AT_MOST], [f"and {more} more engines and causes"] if more > 0 else []
+
+
+def _worst(found: Differences, kind: Kind) -> list[str]:
+    """The worst rows of a kind, and how many more there are."""
+    more = found.kinds[kind] - ROWS
+    return [line(each) for each in found.of(kind)[:ROWS]] + ([f"and {more} more"] if more > 0 else [])
+
+
+def other_questions(found: Differences) -> list[tuple[str, list[str]]]:
+    """What is another question, was not run, or took longer, under its headings."""
+    parts = {
+        "The scenes changed": [*map(str, found.scenes), *found.notes],
+        "Not compared": found.not_compared,
+        "Not run": found.not_run,
+        "Times": [*map(str, found.other_times)],
+        "Who disagrees": found.fault.sentences,
+    }
+    return [(heading, texts) for heading, texts in parts.items() if texts]
+
+
+def markdown(found: Differences) -> str:
+    """For a comment on a pull request."""
+    groups, more = _groups(found)
+    return _rendered("changes.md.j2", found, groups, lambda kind: _worst(found, kind), more).rstrip("\n") + "\n"
+
+
+def html(found: Differences) -> str:
+    """A page of its own."""
+    return _rendered("changes.html.j2", found, found.fault.groups(SHOWN), found.of, ())
+
+
+def _rendered(
+    name: str, found: Differences, groups: list[Group], rows: Callable[[Kind], Sequence[object]], more: Sequence[str]
+) -> str:
+    kinds = [(kind, [each for each in groups if each.kind is kind], rows(kind)) for kind in SHOWN if found.kinds[kind]]
+    what = {"verdict": verdict(found), "questions": other_questions(found), "more": more}
+    return rendered("fourbar_validation.regression", name, found=found, kinds=kinds, **what)
+
+
+def junit(found: Differences) -> str:
+    """For the test page of a continuous-integration system: one case per row.
+
+    A regression is a failure, and so is a row that fails as it did before; what was not compared is skipped.
+    """
+    return document(verdict(found), _cases(found))
+
+
+def _cases(found: Differences) -> Iterator[Case]:
+    for change in found.changes:
+        scene, engine, setting, quantity = change.key
+        name, kind = (scene, f"{scene}.{engine} {setting}", quantity), change.kind.value
+        if change.regression or (change.new is not None and change.new.failed):
+            yield Case(*name, "failure", kind, line(change))
+        elif change.new is None:
+            yield Case(*name, "skipped", kind, line(change))
+        elif not change.new.compared:
+            yield Case(*name, "skipped", kind, f"{change.new.verdict}: {change.new.reason}")
+        else:
+            yield Case(*name, "passed")
+    yield from (Case("times", "times", each.engine, "failure", "slower", str(each)) for each in found.slower)
+    yield from beyond(found.rows - len(found.changes))
+    if found.nothing:
+        yield Case("all scenes", "all scenes", "anything is compared", "failure", "nothing compared", verdict(found))

@@ -1,0 +1,95 @@
+"""What a scene states, as flat entries of its file in SI: two runs are compared where it is the same."""
+
+import tomllib
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from fourbar.errors import FourBarError
+from fourbar.files import dump
+from fourbar.scene import Scene
+from fourbar_validation.scenes.suites import Suite
+
+Description = Mapping[str, str]
+
+MOST_DESCRIBED = 2000
+"""Scenes that a record describes, one or two kB each; random linkages follow from their seed."""
+NO_QUESTION = ("title", "source", "pictures")
+"""Entries of a scene file that change no number."""
+WHERE = ("motion.theta_2", "motion.free.steps", "motion.law.steps")
+"""Entries that say at which positions the same question is put."""
+
+
+def descriptions(suite: Suite) -> dict[str, dict[str, str]]:
+    """Each scene of a suite by its name; none of a suite of more than MOST_DESCRIBED."""
+    if len(suite) > MOST_DESCRIBED:
+        return {}
+    return {suite.name(index): description(suite.scene(index)) for index in range(len(suite))}
+
+
+def description(scene: Scene) -> dict[str, str]:
+    """The entries of the scene's file that change a number: "bars.output.inertia": "0.05 kg m^2"."""
+    try:
+        entries = tomllib.loads(dump(scene))
+    except FourBarError:  # a scene that no file can state
+        return {"scene": repr(scene)}
+    return dict(_flat("", {key: value for key, value in entries.items() if key not in NO_QUESTION}))
+
+
+def _flat(prefix: str, value: Any) -> Iterable[tuple[str, str]]:
+    if isinstance(value, dict):
+        for key, each in value.items():
+            yield from _flat(f"{prefix}.{key}" if prefix else key, each)
+    elif isinstance(value, list) and any(isinstance(each, dict) for each in value):
+        for number, each in enumerate(value, 1):
+            yield from _flat(f"{prefix}.{number}", each)
+    else:
+        yield prefix, ", ".join(map(str, value)) if isinstance(value, list) else str(value)
+
+
+@dataclass(frozen=True, slots=True)
+class SceneChange:
+    """What a scene states now, and what it stated."""
+
+    scene: str
+    entries: tuple[tuple[str, str, str], ...]
+    """(key, old, new)."""
+
+    @property
+    def positions_alone(self) -> bool:
+        """Whether the question is the same, at other positions."""
+        return all(key.startswith(WHERE) for key, _, _ in self.entries)
+
+    def __str__(self) -> str:
+        parts = "; ".join(f"{key} {_shorter(old, new)}" for key, old, new in self.entries)
+        return f"scene {self.scene}: {parts}"
+
+
+def _shorter(old: str, new: str) -> str:
+    """ "0.048 -> 0.05 kg m^2": a unit that both have stands once."""
+    (number, _, unit), (_, _, other) = old.partition(" "), new.partition(" ")
+    return f"{number} -> {new}" if unit and unit == other and "," not in old else f"{old} -> {new}"
+
+
+def renamed(old: Mapping[str, Description], new: Mapping[str, Description]) -> dict[str, str]:
+    """Old name to new name of the scenes that state the same under a name that the other run does not have."""
+    names: dict[str, list[str]] = {}
+    for name in sorted(new.keys() - old.keys(), reverse=True):
+        names.setdefault(repr(sorted(new[name].items())), []).append(name)
+    found = ((name, names.get(repr(sorted(old[name].items())))) for name in sorted(old.keys() - new.keys()))
+    return {name: same.pop() for name, same in found if same}
+
+
+def scene_changes(old: Mapping[str, Description], new: Mapping[str, Description]) -> list[SceneChange]:
+    """The scenes of both runs that ask something else now."""
+    found = []
+    for name in sorted(old.keys() & new.keys()):
+        before, after = old[name], new[name]
+        entries = tuple(
+            (key, before.get(key, "not stated"), after.get(key, "not stated"))
+            for key in dict.fromkeys((*before, *after))
+            if before.get(key) != after.get(key)
+        )
+        if entries:
+            found.append(SceneChange(name, entries))
+    return found

@@ -1,0 +1,189 @@
+"""The pictures of one scene: the linkage, every engine's answer over the formulas, and the errors beneath."""
+
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fourbar.quantities import ANGLES, OK
+from fourbar.scene import Command
+from fourbar.show.drawing import drawing
+from fourbar.solution import Solution
+from fourbar.solve import solve
+from fourbar_validation.compare.answer import Answer
+from fourbar_validation.compare.error import magnitude, relative_error
+from fourbar_validation.compare.reversals import Reversal, broken
+from fourbar_validation.compare.scales import yardstick
+from fourbar_validation.compare.tolerance import EPS, EQUIVALENCE, SIMULATED, Array, condition_of
+from fourbar_validation.report.colours import ALLOWED, BAND, GRID, INK, PAPER, by_variable, style_of
+from fourbar_validation.report.record import Record
+from fourbar_validation.report.svg import svg_text
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+MARKS = 10
+"""Marks of one engine on a curve. Every engine has its own positions, so no mark hides another."""
+STRETCHES = 24
+"""Stretches of a sweep; the error shown in each is its largest."""
+FLOOR = EPS / 16.0
+"""Errors below this, zero among them, are drawn here."""
+TORQUE_AND_FORCE = ("torque", "F32")
+MOTION_AND_FORCE = ("theta_4", "F32")
+"""Of a released linkage: its torque is rounding."""
+SUBSCRIPT = str.maketrans("234", "₂₃₄")
+
+
+def scene_figure(record: Record) -> str | None:
+    """SVGs of the linkage and, for a sweep, of the answers; None where nothing assembles."""
+    solution = record.solution
+    if record.scene is None or solution is None or not np.any(solution.status_code == OK):
+        return None
+    linkage = by_variable(drawing(record.scene, solution))
+    if np.count_nonzero(solution.status_code == OK) < 2:
+        return linkage
+    return linkage + _answers(record, solution)
+
+
+def _answers(record: Record, solution: Solution) -> str:
+    """One SVG per quantity: values above, errors of the simulation and of the exact engines on axes of their own."""
+    answers = [answer for answer in record.answers if answer.refusal is None and answer.quantities]
+    shown = TORQUE_AND_FORCE if solution.torque is not None else ANGLES
+    if record.scene is not None and record.scene.motion.free is not None:
+        shown = MOTION_AND_FORCE
+    return "".join(_picture(quantity, record, solution, answers) for quantity in shown)
+
+
+def _picture(quantity: str, record: Record, solution: Solution, answers: list[Answer]) -> str:
+    from matplotlib.figure import Figure
+
+    simulated = [answer for answer in answers if style_of(answer.engine).simulated and quantity in answer.quantities]
+    exact = [answer for answer in answers if not style_of(answer.engine).simulated and quantity in answer.quantities]
+    groups = [group for group in (simulated, exact) if group]
+    figure = Figure(figsize=(4.3, 2.2 + 1.0 * len(groups)), layout="constrained")
+    panels = figure.subplots(1 + len(groups), 1, sharex=True, height_ratios=[1.9, *[1.0] * len(groups)], squeeze=False)
+    axes = list(panels[:, 0])
+    _draw_values(axes[0], quantity, solution, [*exact, *simulated], record.jumps)
+    for below, group in zip(axes[1:], groups, strict=True):
+        _draw_errors(below, quantity, record, solution, group)
+        below.set_ylabel("error / scale" if quantity in TORQUE_AND_FORCE else "error (rad)", fontsize=7.5)
+    axes[-1].set_xlabel("time (s)" if solution.time is not None else "θ₂ (°)")
+    figure.align_ylabels(axes)
+    for panel in axes:
+        panel.grid(color=GRID, lw=0.5)
+        panel.tick_params(labelsize=8, color=GRID)
+        panel.spines[["top", "right"]].set_visible(False)
+        panel.spines[["left", "bottom"]].set_color(GRID)
+    return svg_text(figure, f"{record.name} {quantity}")
+
+
+def _draw_values(axes: "Axes", quantity: str, solution: Solution, answers: list[Answer], jumps: list[Reversal]) -> None:
+    """The formulas as a band, broken at jumps, and each engine's marks on it at positions of its own."""
+    good = solution.status_code == OK
+    ours = np.where(good, _plain(quantity, getattr(solution, quantity)), np.nan)
+    base, line = _base(solution, None), ours
+    if jumps:
+        theta_2, line = broken(solution.theta_2, ours, jumps, lambda side: _plain(quantity, getattr(side, quantity)))
+        base = np.degrees(theta_2)
+    axes.plot(base, line, color=BAND, lw=5, solid_capstyle="butt")
+    for turn, answer in enumerate(answers):
+        theirs = _plain(quantity, answer.quantities[quantity])
+        phase = (turn + 0.5) / (len(answers) * MARKS)
+        places = np.unique(((np.arange(MARKS) / MARKS + phase) * len(theirs)).astype(int))
+        axes.plot(_base(solution, answer.at)[places], theirs[places], **_mark(answer, 5.5))
+    _limit_to_bulk(axes, ours[good])
+    axes.set_ylabel(_label(quantity, solution))
+
+
+def _draw_errors(axes: "Axes", quantity: str, record: Record, solution: Solution, answers: list[Answer]) -> None:
+    """The largest error of each stretch on a logarithmic axis, the worst one ringed, and what is allowed."""
+    from matplotlib.ticker import LogLocator, NullLocator
+
+    good, scene = solution.status_code == OK, record.scene
+    assert scene is not None
+    if style_of(answers[0].engine).simulated:
+        held_to = (r.allowed for r in record.rows if (r.engine, r.quantity) == (answers[0].engine, quantity))
+        allowed = np.full(len(solution), next(held_to, SIMULATED.factor))
+    else:
+        allowed = EQUIVALENCE.allowed(condition_of(quantity, scene.linkage, solution))
+    axes.plot(_base(solution, None), np.where(good, allowed, np.nan), color=ALLOWED, lw=1.1, ls=(0, (5, 2)))
+    low, high = float(np.nanmin(allowed[good])), float(np.nanmax(allowed[good]))
+    for turn, answer in enumerate(answers):
+        formulas = solution if answer.at is None else solve(scene, at=answer.at)
+        mine = getattr(formulas, quantity)
+        size = yardstick(quantity, scene, formulas, mine)
+        error = relative_error(quantity, mine, answer.quantities[quantity], size)
+        places = worst_of_stretches(error, turn / len(answers))
+        if not len(places):
+            continue
+        x, heights = _base(solution, answer.at)[places], np.maximum(error[places], FLOOR)
+        axes.plot(x, heights, **_mark(answer, 3.2) | {"mew": 0.8})
+        worst = int(np.argmax(heights))
+        axes.plot(x[worst], heights[worst], "o", ms=9, mfc="none", mec=style_of(answer.engine).colour, mew=0.9)
+        low, high = min(low, float(heights.min())), max(high, float(heights.max()))
+    axes.set_yscale("log")
+    axes.set_ylim(low / 4.0, 5.0 * high)
+    axes.yaxis.set_major_locator(LogLocator(numticks=5))
+    axes.yaxis.set_minor_locator(NullLocator())
+    middle = int(np.flatnonzero(good)[np.count_nonzero(good) // 2])
+    axes.annotate(
+        "allowed",
+        (float(_base(solution, None)[middle]), float(allowed[middle])),
+        xytext=(0, -9),
+        textcoords="offset points",
+        fontsize=7.5,
+        ha="center",
+        color=ALLOWED,
+    )
+
+
+def worst_of_stretches(error: Array, phase: float) -> np.ndarray[Any, np.dtype[np.intp]]:
+    """Index of the largest error in each of STRETCHES stretches; `phase` in [0, 1) shifts where they begin.
+
+    What is not finite is left out: the table says that it fails.
+    """
+    edges = (np.arange(STRETCHES + 2) - 1.0 + phase) * len(error) / STRETCHES
+    bounds = np.clip(edges.astype(int), 0, len(error))
+    found = []
+    for start, stop in pairwise(bounds):
+        piece = error[start:stop]
+        if np.isfinite(piece).any():
+            found.append(start + int(np.nanargmax(np.where(np.isfinite(piece), piece, np.nan))))
+    return np.array(found, dtype=np.intp)
+
+
+def _mark(answer: Answer, size: float) -> dict[str, Any]:
+    look = style_of(answer.engine)
+    return {"color": look.colour, "ls": "none", "marker": look.marker, "ms": size, "mfc": PAPER, "mew": 1.2}
+
+
+def _plain(quantity: str, values: Array) -> Array:
+    """A scalar as it is (angles in degrees), the magnitude of a vector."""
+    if quantity in ANGLES:
+        return np.degrees(values)
+    return magnitude(values) if values.ndim == 2 else values
+
+
+def _label(quantity: str, solution: Solution) -> str:
+    if quantity == "torque":
+        return f"T{solution.drive_bar} (N m)".translate(SUBSCRIPT)
+    name = quantity.replace("theta_", "θ").translate(SUBSCRIPT)
+    return f"{name} (°)" if quantity in ANGLES else f"|{quantity}| (N)"
+
+
+def _base(solution: Solution, at: Command | None) -> Array:
+    """What a curve is drawn over: the time of a free motion, else theta_2 in degrees."""
+    theta_2 = solution.theta_2 if at is None else at.theta_2
+    if solution.time is not None and len(solution.time) == len(theta_2):
+        return solution.time
+    return np.degrees(theta_2)
+
+
+def _limit_to_bulk(axes: "Axes", values: Array) -> None:
+    """Near a pole the curve leaves the picture; the axis follows the other 96 % of the positions."""
+    low, high = np.nanpercentile(values, [2.0, 98.0])
+    span = high - low
+    if span > 0.0 and (np.nanmax(values) > high + 3 * span or np.nanmin(values) < low - 3 * span):
+        axes.set_ylim(low - 0.5 * span, high + 0.5 * span)
+        note = "axis ends where the curve leaves towards a pole"
+        axes.annotate(note, (0.99, 0.97), xycoords="axes fraction", fontsize=7, ha="right", va="top", color=INK)

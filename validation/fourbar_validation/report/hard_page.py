@@ -1,0 +1,148 @@
+"""The page "where it gets hard": error against distance to the singular position, per engine, and the limits."""
+
+import base64
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from fourbar.quantities import OK
+from fourbar.scene import Command, Scene, command
+from fourbar.solve import solve
+from fourbar_validation.compare.answer import Answer, Array
+from fourbar_validation.compare.error import magnitude, relative, relative_error
+from fourbar_validation.compare.tolerance import DEGRADED, EPS, K, condition_of
+from fourbar_validation.engines.hard_suite import HARD_WITNESSES
+from fourbar_validation.engines.limits import LIMITS
+from fourbar_validation.engines.prediction import in_world_axes
+from fourbar_validation.engines.witnesses import Witness
+from fourbar_validation.report.colours import style_of
+from fourbar_validation.report.svg import drawn, inline
+from fourbar_validation.report.templating import rendered
+from fourbar_validation.scenes.hard_families import CHANGE_POINTS, CRANK, FAMILIES, ROCKER
+from fourbar_validation.scenes.hard_linkages import at, collinear_2_3, collinear_3_4, dressed, linkage_of
+
+DISTANCES = np.logspace(-1, -12, 23)
+"""rad from the singular position."""
+INK = "#777777"
+"""Grey that reads on white and on black."""
+FLOOR = 1e-17
+"""Differences of exactly zero are drawn here."""
+SHOWN = ("torque", "F32")
+SIMULATED_FROM = 3e-3
+"""rad; nearer than this the simulation refuses."""
+
+
+@dataclass(frozen=True, slots=True)
+class Approach:
+    """One approach to a singular position."""
+
+    title: str
+    scene: Scene
+    distances: Array
+
+
+def approaches() -> list[Approach]:
+    """A toggle, a pole of T4, a change point."""
+    rocker, crank = linkage_of(ROCKER, 1), linkage_of(CRANK, 0)
+    (limit, stretched), *_ = collinear_3_4(rocker)
+    (pole, branch), *_ = collinear_2_3(crank)
+    lengths, _, (_, half_turn) = CHANGE_POINTS["parallelogram"]
+    near = DISTANCES[DISTANCES >= 0.99e-8]
+    inward = -1.0 if stretched else 1.0
+    return [
+        Approach("toggle: bars 3, 4 collinear", at(dressed(rocker, 1), limit + inward * DISTANCES), DISTANCES),
+        Approach("pole of T4: omega_4 = 0", at(dressed(crank), pole + DISTANCES, branch, drive_bar=4), DISTANCES),
+        # on the branch that crosses: the one that stays parallel is regular
+        Approach("change point of a parallelogram", at(dressed(lengths), half_turn + near, 1), near),
+    ]
+
+
+def errors(scene: Scene, quantity: str, witness: Witness) -> tuple[Array, Array] | None:
+    """(theta_2, error relative to the value itself) of one engine, or None where it refuses."""
+    where = command(scene)
+    if witness.name == "mujoco-simulated":
+        psi = np.abs(where.theta_2 - where.theta_2[0]) - abs(where.theta_2[-1] - where.theta_2[0])
+        where = Command(where.theta_2[-psi > SIMULATED_FROM], where.branch[-psi > SIMULATED_FROM], *where[2:4])
+    answer: Answer = witness.engine().answer(scene, where)
+    if answer.refusal is not None or quantity not in answer.quantities or answer.at is None:
+        return None
+    ours = solve(scene, "force", at=answer.at)
+    values = getattr(ours, quantity)
+    error = relative_error(quantity, values, answer.quantities[quantity], magnitude(values))
+    keep = (ours.status_code == OK) & np.isfinite(error)
+    return answer.at.theta_2[keep], np.maximum(error[keep], FLOOR)
+
+
+def picture() -> str:
+    """SVG that stands by itself: a column per singular position, a row per quantity; law and prediction drawn in."""
+    from matplotlib.figure import Figure
+
+    columns = approaches()
+    figure = Figure(figsize=(10.5, 6.4), layout="constrained", facecolor="none")
+    axes = figure.subplots(len(SHOWN), len(columns), squeeze=False, sharex="col")
+    for column, approach in enumerate(columns):
+        for row, quantity in enumerate(SHOWN):
+            _draw(axes[row][column], approach, quantity)
+        axes[0][column].set_title(approach.title, fontsize=9)
+        axes[-1][column].set_xlabel("distance in theta_2 [rad]")
+    for row, quantity in enumerate(SHOWN):
+        axes[row][0].set_ylabel(f"error of {quantity}, of its own size")
+    handles, labels = axes[0][0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper center", ncols=4, frameon=False, fontsize=8)
+    return drawn(figure, "where it gets hard")
+
+
+def _draw(axes: Any, approach: Approach, quantity: str) -> None:
+    solution = solve(approach.scene, "force")
+    size = magnitude(getattr(solution, quantity))
+    singular = _singular(approach)
+    predicted = relative(in_world_axes(approach.scene, command(approach.scene), quantity), size)
+    law = K * EPS / condition_of(quantity, approach.scene.linkage, solution)
+    shown = np.isfinite(predicted)
+    axes.loglog(approach.distances, law, color=INK, linestyle=(0, (1, 1)), linewidth=1, label="law K eps/condition")
+    axes.fill_between(
+        approach.distances[shown],
+        predicted[shown],
+        DEGRADED * predicted[shown],
+        color=INK,
+        alpha=0.25,
+        linewidth=0,
+        label="computed: predicted to ten times that",
+    )
+    for witness in HARD_WITNESSES:
+        found = errors(approach.scene, quantity, witness)
+        if found is not None and len(found[0]):
+            style = style_of(witness.name)
+            axes.loglog(
+                np.abs(found[0] - singular),
+                found[1],
+                color=style.colour,
+                marker=style.marker,
+                markersize=3.5,
+                linewidth=0.8,
+                label=witness.name,
+            )
+    axes.set_xlim(approach.distances[0] * 2, approach.distances[-1] / 2)
+    axes.set_ylim(FLOOR, 1e3)
+    axes.grid(visible=True, color=INK, alpha=0.2)
+
+
+def _singular(approach: Approach) -> float:
+    """theta_2 of the singular position: the positions lie at the distances from it."""
+    theta_2 = command(approach.scene).theta_2
+    side = math.copysign(1.0, float(theta_2[0] - theta_2[-1]))
+    return float(theta_2[0]) - side * float(approach.distances[0])
+
+
+def page(svg: str) -> str:
+    """The page, self-contained: the picture, what each family must show, the limits."""
+    return rendered(
+        "fourbar_validation.report",
+        "hard.html.j2",
+        svg=inline(svg),
+        source=base64.b64encode(svg.encode()).decode("ascii"),
+        families=FAMILIES,
+        limits=LIMITS,
+    )

@@ -1,0 +1,154 @@
+"""report.html, one self-contained page: every number leads to its row in results.csv, which it carries; report.md."""
+
+import base64
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+from fourbar.quantities import UNKNOWNS
+from fourbar_validation.compare.counts import Counts
+from fourbar_validation.compare.rows import FAILS, REFUSES, UNDECIDED, Row, sorted_rows, to_csv
+from fourbar_validation.report.costs import cost_figure
+from fourbar_validation.report.record import Record
+from fourbar_validation.report.summary import STATEMENT, Summary, shares
+from fourbar_validation.report.templating import rendered, share
+
+ALL_OPEN = 8
+"""Up to so many scenes all stand open; the bodies of more are packed, and unpacked when they are opened."""
+ORDER = (*UNKNOWNS, "torque_inertia")
+"""Quantities in the order of the computation; others follow by name."""
+
+
+class Cell(NamedTuple):
+    """One comparison and the line of results.csv where it stands."""
+
+    line: int
+    row: Row
+    used: float
+    """error/allowed."""
+
+    @property
+    def kind(self) -> str:
+        """Word for its colour."""
+        return {FAILS: "fails", REFUSES: "refuses", UNDECIDED: "undecided"}.get(self.row.verdict, "holds")
+
+    @property
+    def shown(self) -> str:
+        """What stands in its cell."""
+        return {"refuses": "refuses", "undecided": "undecided"}.get(self.kind, share(self.used))
+
+
+class Figure(NamedTuple):
+    """A picture of a section: an SVG drawn by our own code, which stands in the page, or an image as a data URI."""
+
+    alt: str
+    caption: str
+    svg: str = ""
+    image: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Section:
+    """A part of the report that another module provides: pictures and a table, cells of plain text."""
+
+    key: str
+    """Anchor in the page, for example "hard"."""
+    title: str
+    text: str
+    headings: Sequence[str] = ()
+    rows: Sequence[Sequence[str]] = ()
+    figures: Sequence[Figure] = ()
+    links: Sequence[tuple[str, str]] = ()
+    """(words, file next to the report)."""
+    numbers: tuple[int, int] = (0, 0)
+    """The columns that hold numbers: from, up to."""
+    under: str = ""
+    """Key of the section of the report that it belongs under; nothing: it stands by itself."""
+
+
+@dataclass(frozen=True, slots=True)
+class SceneView:
+    """What the page shows of one scene."""
+
+    scene: Record
+    cells: list[Cell]
+    engines: list[str]
+    quantities: list[str]
+    by_place: dict[tuple[str, str], Cell]
+    """(quantity, engine): the comparison that used most of its allowance."""
+    worst: dict[str, Cell]
+    """engine: its comparison that used most."""
+    picture: str | None
+    """Base64 of a PNG of the MJCF."""
+
+    @property
+    def counts(self) -> Counts:
+        """Its comparisons by verdict."""
+        return Counts(cell.row for cell in self.cells)
+
+
+def html(
+    summary: Summary,
+    first_lines: dict[str, int],
+    *,
+    pictures: Mapping[str, str] | None = None,
+    no_pictures: str = "",
+    sections: Sequence[Section] = (),
+) -> str:
+    """The report as one page that fetches nothing.
+
+    Parameters
+    ----------
+    first_lines : the line of results.csv at which the rows of each scene start.
+    pictures : base64 of a PNG by scene: the MJCF as MuJoCo draws it.
+    no_pictures : why there are none.
+    sections : further parts, for example of the hard cases.
+    """
+    from markupsafe import Markup
+
+    views = [_view(scene, first_lines.get(scene.name, 2), pictures or {}) for scene in summary.shown]
+    csv = base64.b64encode(to_csv(cell.row for view in views for cell in view.cells).encode("utf-8"))
+    failing = sorted((cell for view in views for cell in view.cells if cell.row.failed), key=lambda c: c.line)
+    costs = cost_figure(summary.shown)
+    return rendered(
+        "fourbar_validation.report",
+        "report.html.j2",
+        s=summary,
+        views=views,
+        engines=_engines(cell.row for view in views for cell in view.cells),
+        failing=failing,
+        lazy=len(views) > ALL_OPEN,
+        figures={scene.name: Markup(scene.figure) for scene in summary.shown if scene.figure},  # drawn by our own code
+        cost_figure=Markup(costs) if costs else None,
+        no_pictures=no_pictures,
+        sections=sections,
+        statement=STATEMENT,
+        csv=csv.decode("ascii"),
+    )
+
+
+def markdown(summary: Summary) -> str:
+    """The report as Markdown, short enough for a comment on a pull request."""
+    return rendered("fourbar_validation.report", "report.md.j2", s=summary, statement=STATEMENT)
+
+
+def _view(scene: Record, first_line: int, pictures: Mapping[str, str]) -> SceneView:
+    rows = sorted_rows(scene.rows)
+    cells = [Cell(line, *each) for line, each in enumerate(zip(rows, shares(rows), strict=True), first_line)]
+    ranked = sorted(reversed(cells), key=_rank)  # the last of a place stays, of equals the first
+    by_place = {(cell.row.quantity, cell.row.engine): cell for cell in ranked}
+    worst = {cell.row.engine: cell for cell in ranked}
+    found = {cell.row.quantity for cell in cells}
+    quantities = [name for name in ORDER if name in found] + sorted(found.difference(ORDER))
+    engines = _engines(cell.row for cell in cells)
+    return SceneView(scene, cells, engines, quantities, by_place, worst, pictures.get(scene.name))
+
+
+def _rank(cell: Cell) -> tuple[bool, float]:
+    """What was compared stands before what was not, then what used more of its allowance."""
+    return cell.row.compared, cell.used
+
+
+def _engines(rows: Any) -> list[str]:
+    """Engines by name, the formulas (their identities) last."""
+    return sorted({row.engine for row in rows}, key=lambda name: (name == "formulas", name))

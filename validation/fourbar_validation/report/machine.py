@@ -1,0 +1,101 @@
+"""Where a run was made, and with what: versions, machine, this code, and the build of each engine."""
+
+import hashlib
+import os
+import platform
+from functools import cache
+from importlib.metadata import PackageNotFoundError, distribution, version
+from pathlib import Path
+from typing import Any
+
+from fourbar_validation.places import FORMULAS, PACKAGE
+
+PACKAGES = {"fourbar": "fourbar", "numpy": "numpy", "mujoco": "mujoco", "pinocchio": "pin", "scipy": "scipy"}
+"""Name in the report and name of the distribution."""
+DISTRIBUTIONS = PACKAGES | {name: name for name in ("drake", "exudyn", "opensim")}
+"""With those that need not be there."""
+CODE = (".py", ".toml")
+"""Endings of the files that numbers come from; templates and accepted states change none."""
+BUILT = (".so", ".pyd", ".dylib", ".py")
+"""Endings of the files of an engine that decide its numbers; others hold where and when it was installed."""
+
+
+def versions() -> dict[str, str]:
+    """Version of Python and of every library that decides a number; "not installed" where missing."""
+    found = {"python": platform.python_version()}
+    for name, package in DISTRIBUTIONS.items():
+        try:
+            found[name] = version(package)
+        except PackageNotFoundError:
+            if name in PACKAGES:
+                found[name] = "not installed"
+    return found
+
+
+def machine() -> str:
+    """Processor, number of cores and system, in one line."""
+    return f"{_processor()}, {os.cpu_count()} cores, {platform.system()} {platform.machine()}"
+
+
+def _processor() -> str:
+    try:
+        for line in Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines():
+            if line.startswith("model name"):
+                return line.partition(":")[2].strip()
+    except OSError:
+        pass
+    return platform.processor() or "unknown processor"
+
+
+def kernels() -> dict[str, str]:
+    """Kernel of the BLAS and vector instructions that NumPy took: with others the last digits are others."""
+    import numpy as np
+
+    config: dict[str, Any] = np.show_config(mode="dicts")  # type: ignore[assignment]
+    simd = config["SIMD Extensions"]
+    found = {"cpu_features": " ".join((*simd.get("baseline", ()), *simd.get("found", ())))}
+    try:
+        from threadpoolctl import threadpool_info
+    except ModuleNotFoundError:
+        return found
+    blas = (library for library in threadpool_info() if library["user_api"] == "blas")
+    known = {f"{library['internal_api']} {library.get('architecture') or library['version']}" for library in blas}
+    return found | {"blas_kernel": ", ".join(sorted(known))}
+
+
+@cache
+def code() -> dict[str, str]:
+    """Name and version or hash of everything that decides a number; one run, and all its machines, have one."""
+    builds = {name: build(package) for name, package in DISTRIBUTIONS.items()}
+    known = {f"build of {name}": found for name, found in builds.items() if found and name != "fourbar"}
+    return {"code": modules(FORMULAS, PACKAGE), **versions(), **known}
+
+
+def modules(*packages: Path) -> str:
+    """Hash of the modules of packages, wherever they lie; the scenes that come with a wheel are none of them."""
+    digest = hashlib.sha256()
+    for package in packages:
+        for path in sorted(package.rglob("*")):
+            if path.suffix in CODE and path.is_file() and package / "models" not in path.parents:
+                data = path.read_bytes()
+                digest.update(f"{path.relative_to(package.parent).as_posix()} {len(data)}\n".encode() + data)
+    return digest.hexdigest()[:16]
+
+
+def build(package: str) -> str:
+    """Hash of what an installer wrote down of the files of a package: two builds of one version differ in it."""
+    try:
+        lines = (distribution(package).read_text("RECORD") or "").splitlines()
+    except PackageNotFoundError:
+        return ""
+    files = sorted(line for line in lines if line.partition(",")[0].endswith(BUILT))
+    return hashlib.sha256("\n".join(files).encode()).hexdigest()[:16] if files else ""
+
+
+def differing(here: dict[str, str], there: dict[str, str]) -> str:
+    """The first entry in which two differ, in words; nothing where they are the same."""
+    for name in [*here, *there]:
+        one, other = here.get(name, "none"), there.get(name, "none")
+        if one != other:
+            return f"{name} is {other} there and {one} here"
+    return ""

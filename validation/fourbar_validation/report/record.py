@@ -1,0 +1,89 @@
+"""What is known of one scene once it is judged: one record, whatever it is read for."""
+
+from dataclasses import asdict, dataclass, field, replace
+from typing import Any
+
+from fourbar.scene import Scene
+from fourbar.solution import Solution
+from fourbar_validation.compare.answer import Answer
+from fourbar_validation.compare.identities import FORMULAS
+from fourbar_validation.compare.reversals import Reversal
+from fourbar_validation.compare.rows import MADE_OF, Row, sorted_rows
+
+
+@dataclass(slots=True)
+class Timing:
+    """Seconds that one answer took, measured in the process that gave it."""
+
+    scene: str
+    engine: str
+    setting: str
+    positions: int
+    seconds: float
+
+
+@dataclass(slots=True)
+class Record:
+    """What is known of one scene: while it is judged all that its picture needs, then what is small and storable."""
+
+    name: str
+    scene: Scene | None = None
+    title: str = ""
+    source: str = ""
+    rows: list[Row] = field(default_factory=list)
+    timings: list[Timing] = field(default_factory=list)
+    left_out: list[str] = field(default_factory=list)
+    reversals: list[str] = field(default_factory=list)
+    """Where dry friction reverses and the pin forces jump, in words."""
+    independence: dict[str, tuple[str, str]] = field(default_factory=dict)
+    """engine: (shared with the formulas, found alone)."""
+    evidence: dict[str, dict[str, float]] = field(default_factory=dict)
+    output: dict[str, str] = field(default_factory=dict)
+    """engine: what it printed."""
+    figure: str | None = None
+    """SVG of the answers, or None where there is nothing to draw."""
+    solution: Solution | None = None
+    answers: list[Answer] = field(default_factory=list)
+    jumps: list[Reversal] = field(default_factory=list)
+
+    def kept(self, figure: str | None = None) -> "Record":
+        """Without the scene, the solution and the answers."""
+        return replace(
+            self,
+            independence={answer.engine: (answer.shared, answer.own) for answer in self.answers if answer.own},
+            evidence={answer.engine: answer.evidence for answer in self.answers if answer.evidence},
+            reversals=[str(jump) for jump in self.jumps],
+            figure=figure,
+            scene=None,
+            solution=None,
+            answers=[],
+            jumps=[],
+        )
+
+    def kept_all(self) -> dict[str, Any]:
+        """Everything that is kept, in lists and dictionaries, the rows sorted."""
+        kept = asdict(replace(self, rows=[]))
+        for name in ("scene", "solution", "answers", "jumps"):
+            del kept[name]
+        return kept | {"rows": [[getattr(row, name) for name in MADE_OF] for row in sorted_rows(self.rows)]}
+
+    @classmethod
+    def restore(cls, kept: dict[str, Any]) -> "Record":
+        """From what `kept_all` gave."""
+        rows = [Row(*row) for row in kept["rows"]]
+        timings = [Timing(**timing) for timing in kept["timings"]]
+        independence = {engine: (shared, own) for engine, (shared, own) in kept["independence"].items()}
+        return cls(**{**kept, "timings": timings, "independence": independence, "rows": rows})
+
+    def joined(self, other: "Record") -> "Record":
+        """The same scene with the answers of another set of engines; the rows of the formulas stand once."""
+        known = set(self.rows)
+        return replace(
+            self,
+            rows=[*self.rows, *(row for row in other.rows if row not in known)],
+            timings=[*self.timings, *(timing for timing in other.timings if timing.engine != FORMULAS)],
+            left_out=[*self.left_out, *other.left_out],
+            independence={**self.independence, **other.independence},
+            evidence={**self.evidence, **other.evidence},
+            output={**self.output, **other.output},
+        )

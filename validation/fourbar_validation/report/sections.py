@@ -1,0 +1,105 @@
+"""Parts of report.html from elsewhere: how each family of the hard cases came out, and the study of cost."""
+
+import base64
+from collections.abc import Iterable
+from pathlib import Path
+
+from fourbar.writing import write_text
+from fourbar_validation.compare.columns import read_columns
+from fourbar_validation.compare.counts import Counts
+from fourbar_validation.compare.rows import VERDICTS, Row
+from fourbar_validation.report.html import Figure, Section
+from fourbar_validation.scenes.hard_families import FAMILIES
+
+HARD, PAGE, COST = "hard", "hard.html", "cost"
+"""Folder and page of the hard cases, folder of the study, in OUT."""
+ALT = "Error of each engine over the distance to a toggle, a pole of T4 and a change point"
+CAPTION = (
+    "Error against the formulas, relative to the value itself, towards a singular position. Dotted: the law "
+    "K eps/condition. Band: what rounding was computed to do there, up to ten times that; above it a row fails."
+)
+MUST = "each family of singular and extreme linkages must come out as its statement says. "
+PICTURES = {
+    "work-precision-force.svg": "Error of the worst pin force over the CPU time of a revolution, for every method",
+    "orders.svg": "Error of the driving torque and of each pin force over the time step; a jump is ringed",
+    "sources.svg": "Error over time step, softness of the closure and tolerance of the solver, one at a time",
+}
+"""Pictures of the study, and what they show."""
+LARGEST = 2_000_000
+"""Bytes of a picture that is taken into the page."""
+MOST = 3
+"""Scenes whose study is shown."""
+
+
+def sections(hard: Iterable[Row] | None, out: Path) -> list[Section]:
+    """The hard cases of this run or one in OUT/hard, and the study in OUT/cost, where there are any.
+
+    Of rows of the hard suite the page hard.html is written too.
+    """
+    results = out / HARD / "results.csv"
+    found = []
+    if hard is not None:
+        from fourbar_validation.report.hard_page import page, picture
+        from fourbar_validation.report.svg import inline
+
+        svg = picture()
+        write_text(out / PAGE, page(svg))
+        found.append(hard_cases(hard, inline(svg)))
+    elif results.is_file() and (out / HARD / PAGE).is_file():
+        links = [(f"{HARD}/{name}", f"{HARD}/{name}") for name in (PAGE, "report.html")]
+        found.append(_hard_cases(read_columns(results), f"From the run in {HARD}/: {MUST}", [], links))
+    folders = sorted(path.parent for path in (out / COST).glob("*/cost.csv"))
+    return [*found, *(_study(folder) for folder in folders[:MOST])]
+
+
+def hard_cases(rows: Iterable[Row], picture: str | None = None) -> Section:
+    """Of a run of the hard suite; `picture`: the inline SVG of `fourbar_validation.report.hard_page`."""
+    figures = [Figure(ALT, CAPTION, svg=picture)] if picture else []
+    links = [("Limits of the engines, and the picture to download: " + PAGE, PAGE)]
+    return _hard_cases(rows, MUST.capitalize(), figures, links)
+
+
+def _hard_cases(rows: Iterable[Row], text: str, figures: list[Figure], links: list[tuple[str, str]]) -> Section:
+    found = {family.name: Counts() for family in FAMILIES}
+    scenes: dict[str, set[str]] = {family.name: set() for family in FAMILIES}
+    for row in rows:
+        family = family_of(row.scene)
+        if family is not None:
+            found[family].add([row])
+            scenes[family].add(row.scene)
+    table = [
+        (
+            family.name,
+            str(len(scenes[family.name])),
+            *(str(found[family.name][verdict]) for verdict in VERDICTS),
+            found[family.name].word,
+            family.statement,
+        )
+        for family in FAMILIES
+        if scenes[family.name]
+    ]
+    headings = ("family", "scenes", *VERDICTS, "verdict", "what must happen")
+    return Section(HARD, "Hard cases", text, headings, table, figures, links, (1, 2 + len(VERDICTS)))
+
+
+def family_of(scene: str) -> str | None:
+    """The family whose name a scene's begins with; of several the longest."""
+    names = [family.name for family in FAMILIES if scene.startswith(family.name.replace(" ", "-") + "-")]
+    return max(names, key=len, default=None)
+
+
+def _study(folder: Path) -> Section:
+    figures = []
+    for name, alt in PICTURES.items():
+        picture = folder / name
+        if picture.is_file() and picture.stat().st_size <= LARGEST:
+            data = base64.b64encode(picture.read_bytes()).decode("ascii")
+            figures.append(Figure(alt, f"{alt}.", image=f"data:image/svg+xml;base64,{data}"))
+    text = (
+        f"What each digit of {folder.name} costs, from the study in {COST}/{folder.name}/. Times are per revolution: "
+        "what is stepped runs through it once and reads nothing, what is exact answers each of the scene's positions. "
+    )
+    links = [(name, f"{COST}/{folder.name}/{name}") for name in ("cost.md", "cost.csv")]
+    return Section(
+        f"cost-{folder.name}", f"The study of {folder.name}", text, figures=figures, links=links, under="cost"
+    )

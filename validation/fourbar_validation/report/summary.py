@@ -1,0 +1,277 @@
+"""What every form of the report says, computed once from its scenes."""
+
+import math
+import re
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from heapq import nlargest
+from statistics import median
+from typing import NamedTuple, TypeVar
+
+import numpy as np
+
+from fourbar.errors import HOLDS
+from fourbar_validation.compare.counts import Counts
+from fourbar_validation.compare.error import used
+from fourbar_validation.compare.rows import DEGRADED, REFUSES, Row
+from fourbar_validation.compare.tolerance import EPS, EQUIVALENCE, IDENTITY, NOTHING_TO_TELL, SIMULATED, K, Tolerance
+from fourbar_validation.engines.witnesses import WORK
+from fourbar_validation.report.machine import machine, versions
+from fourbar_validation.report.record import Record
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True, slots=True)
+class Worst:
+    """The row of one scene and engine that comes nearest to, or goes furthest beyond, its allowance."""
+
+    row: Row
+    used: float
+    """error/allowed of that row."""
+    rows: int
+    failed: int
+
+
+@dataclass(frozen=True, slots=True)
+class Cost:
+    """Time of one engine, as a ratio to the formulas on the same scene in the same process."""
+
+    engine: str
+    setting: str
+    times_formulas: float
+    microseconds_per_position: float
+    work: str
+    """What it did for that."""
+
+
+SCENES_SHOWN = 200
+PICTURED = 24
+"""Scenes with pictures, where fewer fail: to draw one takes ten times as long as to judge it by an exact engine."""
+WORST_SHOWN = 80
+LOOSEST_SHOWN = 5
+ORDERS_SHOWN = 20
+FAILURES_KEPT = 1000
+"""Lines of a table at the most; everything is in results.csv."""
+TIMED = 1000
+NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
+"""In a reason: what differs by it alone is one reason."""
+STATEMENT = (
+    f"K = {K:g} for every exact comparison; where eps/condition > {NOTHING_TO_TELL:g} the row is undecided. "
+    "Errors are relative to the largest magnitude over the positions whose condition is at least 0.1; below that "
+    "to the position's own magnitude; angles modulo 2 pi, in rad."
+)
+
+
+class Summary:
+    """The report in data, a run condensed scene by scene; what is kept does not grow with their number."""
+
+    def __init__(self) -> None:
+        self.counts = Counts()
+        self.versions, self.machine = versions(), machine()
+        self.failures: list[Row] = []
+        """At most FAILURES_KEPT of them."""
+        self.pairs = self.loose = 0
+        """Quantities of a scene that were compared, and those of them that no row judges tighter than degraded."""
+        self._loosest: list[Row] = []
+        self.judged = 0
+        """Pairs of scene and engine of which `worst` shows the worst."""
+        self.measured_k: dict[str, float] = {}
+        """Largest error*condition/eps of each exact engine: what K would have sufficed."""
+        self.independence: dict[str, tuple[str, str]] = {}
+        """engine: (shared with the formulas, found alone)."""
+        self.tolerances: Sequence[Tolerance] = (IDENTITY, EQUIVALENCE, SIMULATED)
+        """What the witnesses were held to."""
+        self.missing: Sequence[tuple[str, str]] = ()
+        """(engine, why it could not run here)."""
+        self._refusals: Counter[tuple[str, str]] = Counter()
+        self._first_reason: dict[tuple[str, str], str] = {}
+        self._worst: list[Worst] = []
+        self._costs: dict[tuple[str, str], list[Timed]] = {}
+        self._orders: list[tuple[str, dict[str, float]]] = []
+        self._failing: list[Record] = []
+        self._holding: list[tuple[float, Record]] = []
+
+    def add(self, scene: Record) -> None:
+        """One scene more."""
+        self.counts.add_scene(scene.rows)
+        bad = [row for row in scene.rows if row.failed]
+        self.failures += bad[: FAILURES_KEPT - len(self.failures)]
+        compared, loose = _compared(scene.rows)
+        self.pairs, self.loose = self.pairs + compared, self.loose + len(loose)
+        self._loosest = _top(LOOSEST_SHOWN, [*self._loosest, *loose], _allowance)
+        for engine, reason in sorted(_left_out(scene)):
+            kind = (engine, NUMBER.sub("#", reason))
+            self._refusals[kind] += 1
+            self._first_reason.setdefault(kind, reason)
+        found = _worst(scene.rows)
+        self.judged += len(found)
+        self._worst = _top(WORST_SHOWN, [*self._worst, *found], lambda w: w.used)
+        for row in scene.rows:
+            if row.reason.startswith(EQUIVALENCE.name) and math.isfinite(row.error):
+                k = row.error * row.condition / EPS
+                self.measured_k[row.engine] = max(self.measured_k.get(row.engine, 0.0), k)
+        self.independence.update(scene.independence)
+        _add_costs(scene, self._costs)
+        self._add_orders(scene)
+        if bad:
+            self._failing += [scene][: SCENES_SHOWN - len(self._failing)]
+        else:
+            most = max((w.used for w in found), default=0.0)
+            self._holding = _top(SCENES_SHOWN, [*self._holding, (most, scene)], lambda each: each[0])
+
+    def picture(self, drawn: Record) -> None:
+        """Add what was drawn and measured of a scene that is shown."""
+        for scene in self.shown:
+            if scene.name == drawn.name:
+                scene.figure = drawn.figure
+        self._add_orders(drawn)
+
+    def _add_orders(self, scene: Record) -> None:
+        known = [(scene.name, each) for each in scene.evidence.values() if "observed_order" in each]
+        self._orders = _top(ORDERS_SHOWN, [*self._orders, *known], _lowest)
+
+    @property
+    def verdict(self) -> str:
+        """In one sentence."""
+        left = f"; not run: {', '.join(engine for engine, _ in self.missing)}" if self.missing else ""
+        return self.counts.sentence() + left
+
+    @property
+    def loosest(self) -> str:
+        """How many quantities nobody judges tighter than degraded as predicted, and the worst, in one sentence."""
+        if not self.loose:
+            return ""
+        worst = nlargest(LOOSEST_SHOWN, self._loosest, key=_allowance)
+        named = ", ".join(f"{row.quantity} of {row.scene} (allowed {row.allowed:.1e})" for row in worst)
+        return f'{self.loose} of {self.pairs} quantities of a scene are at best "{DEGRADED}"; the widest: {named}'
+
+    @property
+    def good(self) -> bool:
+        """Whether all that was to be compared was, and holds."""
+        return self.counts.status == HOLDS and not self.missing
+
+    @property
+    def worst(self) -> list[Worst]:
+        """By scene and engine; of more than WORST_SHOWN those that used most of their allowance, in that order."""
+        if self.judged > WORST_SHOWN:
+            return nlargest(WORST_SHOWN, self._worst, key=lambda w: w.used)
+        return sorted(self._worst, key=lambda w: (w.row.scene, w.row.engine, w.row.setting))
+
+    @property
+    def refusals(self) -> list[tuple[str, str, int]]:
+        """(engine, reason, number of scenes): declared limits that were met.
+
+        Reasons that differ by their numbers alone are one, with the numbers of the first scene.
+        """
+        return [(kind[0], self._first_reason[kind], count) for kind, count in sorted(self._refusals.items())]
+
+    @property
+    def costs(self) -> list[Cost]:
+        """What each engine took, by the kind of its setting."""
+        return [
+            Cost(
+                engine,
+                _settings(values),
+                median(t.times for t in values),
+                median(t.microseconds for t in values),
+                WORK[engine].full if engine in WORK else "",
+            )
+            for (engine, _), values in sorted(self._costs.items())
+        ]
+
+    @property
+    def orders(self) -> list[tuple[str, dict[str, float]]]:
+        """(scene, errors at 4h and 2h and observed order) of what is simulated: at most ORDERS_SHOWN, lowest first."""
+        few = len(self._orders) <= ORDERS_SHOWN
+        return self._orders if few else nlargest(ORDERS_SHOWN, self._orders, key=_lowest)
+
+    @property
+    def shown(self) -> list[Record]:
+        """The scenes shown one by one, by name, at most SCENES_SHOWN: those that fail, then those that used most."""
+        return sorted(self._most_used(SCENES_SHOWN), key=lambda scene: scene.name)
+
+    @property
+    def pictured(self) -> list[Record]:
+        """Those of them that have pictures: all that fail, and of the others those that used most."""
+        return self._most_used(PICTURED)
+
+    def _most_used(self, most: int) -> list[Record]:
+        holding = nlargest(most - len(self._failing), self._holding, key=lambda each: each[0])
+        return [*self._failing, *(scene for _, scene in holding)]
+
+
+def _left_out(scene: Record) -> set[tuple[str, str]]:
+    """What was not run, or refused to answer: (engine, reason)."""
+    found = {(row.engine, row.reason) for row in scene.rows if row.verdict == REFUSES}
+    for line in scene.left_out:
+        engine, _, reason = line.partition(": ")
+        found.add((engine, reason))
+    return found
+
+
+def shares(rows: Sequence[Row]) -> list[float]:
+    """error/allowed; infinite without an answer, 0 where nothing is allowed and errs, or nothing was compared."""
+    of_all = used(np.array([row.error for row in rows]), np.array([row.allowed for row in rows]))
+    return [share if row.compared else 0.0 for row, share in zip(rows, of_all.tolist(), strict=True)]
+
+
+def _compared(rows: Sequence[Row]) -> tuple[int, list[Row]]:
+    """How many quantities were compared, and of each that every row calls degraded the row that allows least."""
+    by_quantity: dict[str, list[Row]] = {}
+    for row in rows:
+        if row.compared:
+            by_quantity.setdefault(row.quantity, []).append(row)
+    loose = [of for of in by_quantity.values() if all(row.verdict == DEGRADED for row in of)]
+    return len(by_quantity), [min(of, key=_allowance) for of in loose]
+
+
+def _allowance(row: Row) -> float:
+    return row.allowed
+
+
+def _worst(rows: Sequence[Row]) -> list[Worst]:
+    groups: dict[tuple[str, str], list[tuple[float, Row]]] = {}
+    for share, row in zip(shares(rows), rows, strict=True):
+        if row.compared:
+            groups.setdefault((row.engine, row.setting), []).append((share, row))
+    found = []
+    for group in groups.values():
+        share, row = max(group, key=lambda each: each[0])
+        found.append(Worst(row, share, len(group), sum(each.failed for _, each in group)))
+    return found
+
+
+def _top(most: int, of: list[T], key: Callable[[T], float]) -> list[T]:
+    """The list, cut to its largest once it is twice too long."""
+    return of if len(of) <= 2 * most else nlargest(most, of, key=key)
+
+
+def _lowest(order: tuple[str, dict[str, float]]) -> float:
+    return -order[1]["observed_order"]
+
+
+class Timed(NamedTuple):
+    """One answer's setting, its time over that of the formulas, and per position."""
+
+    setting: str
+    times: float
+    microseconds: float
+
+
+def _add_costs(scene: Record, costs: dict[tuple[str, str], list[Timed]]) -> None:
+    formulas = scene.timings[0].seconds if scene.timings else math.nan
+    refused = {row.engine for row in scene.rows if row.verdict == REFUSES}
+    for t in scene.timings:
+        kept = costs.setdefault((t.engine, t.setting.partition(" ")[0]), [])  # an integrator, whatever its steps
+        if t.engine not in refused and len(kept) < TIMED:
+            kept.append(Timed(t.setting, t.seconds / formulas, 1e6 * t.seconds / t.positions))
+    for key in [key for key, values in costs.items() if not values]:
+        del costs[key]
+
+
+def _settings(of: Sequence[Timed]) -> str:
+    """The setting, or the first and last of those that differ by their number: "RK4 628/rev to 1490/rev"."""
+    known = sorted({t.setting for t in of}, key=lambda name: (len(name), name))
+    return known[0] if len(known) == 1 else f"{known[0]} to {known[-1].partition(' ')[2]}"

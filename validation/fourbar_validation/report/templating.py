@@ -1,0 +1,66 @@
+"""The templates of every report, and how numbers and somebody's text stand in them."""
+
+import base64
+import gzip
+import math
+
+from fourbar_validation.compare.rows import plain
+from fourbar_validation.report.colours import by_variable, declarations, style_of
+
+PLAIN = (1e-2, 1e6)
+"""Numbers between these are written without a power of ten, the larger ones where they are whole."""
+
+
+def rendered(package: str, name: str, /, **what: object) -> str:
+    """A template of a package, an unknown name in it an error; in a page every text is escaped for HTML."""
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    page = name.endswith(".html.j2")  # in Markdown `cell` escapes what would break out
+    made = Environment(
+        loader=PackageLoader(package),
+        undefined=StrictUndefined,
+        autoescape=page,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=not page,
+    )
+    made.filters |= {
+        "number": number,
+        "plain": count_or_size,
+        "degrees": lambda radians: "-" if math.isnan(radians) else f"{math.degrees(radians):.3f}",
+        "share": share,
+        "cell": cell,
+        "packed": lambda text: base64.b64encode(gzip.compress(text.encode("utf-8"), mtime=0)).decode(),
+        "colour": lambda engine: by_variable(style_of(engine).colour),
+        "symbol": lambda engine: style_of(engine).symbol,
+    }
+    return made.get_template(name).render(light=declarations(dark=False), dark=declarations(dark=True), **what)
+
+
+def cell(text: object) -> str:
+    """Text that can neither end a table cell of Markdown nor start markup."""
+    shown = " ".join(plain(str(text)).split())
+    for mark in "\\|`*_[]<>#":
+        shown = shown.replace(mark, f"\\{mark}")
+    return shown.replace("\\<", "&lt;").replace("\\>", "&gt;")
+
+
+def share(value: float) -> str:
+    """error/allowed in two digits."""
+    if math.isinf(value):
+        return "∞"
+    return "0" if value == 0.0 else "<0.01" if value < 0.01 else f"{value:.2f}" if value < 10.0 else f"{value:.1e}"
+
+
+def number(value: float) -> str:
+    """An error: three significant digits and a power of ten; a dash where there is no number."""
+    return "-" if math.isnan(value) else f"{value:.2e}"
+
+
+def count_or_size(value: float) -> str:
+    """Three significant digits, as a person writes them: 628, 0.125, 3.10e-09; a dash where there is no number."""
+    if math.isnan(value):
+        return "-"
+    if value == 0.0 or (float(value).is_integer() and abs(value) < PLAIN[1]):
+        return f"{value:.0f}"
+    return f"{value:.3g}" if PLAIN[0] <= abs(value) < 1000.0 else f"{value:.2e}"

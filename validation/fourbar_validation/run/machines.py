@@ -1,0 +1,181 @@
+"""Chunks of scenes over the workers of a Dask scheduler."""
+
+import logging
+import time
+from collections import Counter
+from collections.abc import Collection, Iterable, Iterator, Sequence
+from concurrent.futures import CancelledError
+from contextlib import suppress
+from typing import TYPE_CHECKING, Any
+
+from fourbar.errors import DependencyError, InputError
+from fourbar_validation.engines.witnesses import Witness
+from fourbar_validation.report.machine import code, differing, machine
+from fourbar_validation.report.record import Record
+from fourbar_validation.run import pool
+from fourbar_validation.scenes.suites import Suite
+
+if TYPE_CHECKING:
+    from distributed import Future
+
+POLL = 0.05
+"""Seconds between two looks at which tasks are done: a look is at this machine's own notes, and asks nobody."""
+ENDING = 2.0
+"""Seconds for taking leave of a scheduler; one that is gone answers never."""
+
+
+class ClusterError(DependencyError):
+    """The scheduler is gone, or its workers are not set up for this run; what is finished is kept."""
+
+
+def here() -> tuple[dict[str, str], str]:
+    """What decides the numbers of this worker, and its machine."""
+    return code(), machine()
+
+
+def judge_alike(
+    wanted: dict[str, str],
+    seconds: float,
+    suite: Suite,
+    scenes: Sequence[int],
+    witnesses: Sequence[Witness],
+    draw: bool,
+) -> list[Record]:
+    """Judge in a worker, which may have joined later: with the code and the libraries of the run, or not at all."""
+    if difference := differing(wanted, code()):
+        raise ClusterError(f"a worker is not set up as this machine: {difference}")
+    return pool.judge_watched(seconds, suite, scenes, witnesses, draw)
+
+
+class Cluster:
+    """The workers of a scheduler: each with this checkout, these libraries, and what witnesses are added."""
+
+    def __init__(self, scheduler: str) -> None:
+        """Connect, and look at every worker.
+
+        Raises InputError for what is no scheduler, ClusterError for one whose workers are set up otherwise.
+        """
+        from distributed import Client
+
+        # what it logs when the scheduler is lost, tracebacks and all, is one line of ours
+        logging.getLogger("distributed.client").setLevel(logging.CRITICAL)
+        self.scheduler = scheduler
+        try:
+            self.client = Client(scheduler, set_as_default=False)  # type: ignore[no-untyped-call]
+        except (OSError, ValueError) as error:  # no answer, or no address
+            why = str(error) or "no answer"
+            raise InputError("--scheduler", scheduler, f"must be the address of a Dask scheduler: {why}") from None
+        try:
+            self.machines = self._alike()
+        except BaseException:
+            self._leave()
+            raise
+
+    def _alike(self) -> str:
+        """The machines of the workers, in words."""
+        try:
+            self.client.wait_for_workers(1, timeout=pool.STALL)
+        except TimeoutError:
+            raise self._no_workers() from None
+        there = self.client.nthreads()  # type: ignore[no-untyped-call]
+        found: Counter[str] = Counter()
+        try:
+            tasks = {self.client.submit(here, workers=[worker], pure=False): worker for worker in there}
+            for task, worker in tasks.items():
+                while not self.done([task], pool.STALL):
+                    if self.lost([task]):
+                        raise self._no_workers()
+                known, where = self.result(task)
+                if difference := differing(code(), known):
+                    raise ClusterError(f"{self.scheduler}: worker {worker} is not set up as this machine: {difference}")
+                found[where] += 1
+        except DependencyError:
+            raise
+        except Exception as error:  # whatever a scheduler or a worker without this checkout comes up with
+            raise self._unfit(error) from None
+        return "; ".join(f"{count} workers on {where}" for where, count in sorted(found.items()))
+
+    def over(
+        self,
+        suite: Suite,
+        chunks: Iterable[pool.Chunk],
+        witnesses: Sequence[Witness],
+        draw: bool,
+        seconds: float | None = None,
+    ) -> Iterator[tuple[int, list[Record]]]:
+        """The records of each chunk as they come; `seconds`: after which a scene is taken to hang."""
+        self.task = (suite, witnesses, draw, pool.longest(suite) if seconds is None else seconds)
+        try:
+            yield from pool.as_done(suite, chunks, witnesses, self)
+        except pool.StalledError:
+            raise self._no_workers() from None
+        finally:
+            self._leave()
+
+    @property
+    def in_flight(self) -> int:
+        """Chunks submitted at a time."""
+        return pool.IN_FLIGHT * max(1, len(self.client.nthreads()))  # type: ignore[no-untyped-call]
+
+    def submit(self, scenes: Sequence[int], who: Sequence[Witness]) -> "Future[list[Record]]":
+        """Hand in some scenes."""
+        suite, _, draw, seconds = self.task
+        task = (code(), seconds, *pool.part(suite, scenes), who, draw)
+        return self.client.submit(judge_alike, *task, retries=0, pure=False)
+
+    def done(self, tasks: "Collection[Future[Any]]", seconds: float) -> "set[Future[Any]]":
+        """Those that are finished, as soon as there is one; none after some seconds."""
+        until = time.monotonic() + seconds
+        while True:
+            finished = {task for task in tasks if task.done()}  # type: ignore[no-untyped-call]
+            if finished or time.monotonic() > until:
+                return finished
+            if not self._connected():
+                raise self._gone()
+            time.sleep(POLL)
+
+    def result(self, task: "Future[Any]") -> Any:
+        """What a task returned or raised; ClusterError where that is not the task's own doing."""
+        while True:
+            try:
+                return task.result(timeout=pool.STALL)
+            except TimeoutError:  # the worker that has it is gone, or the result was lost in transit
+                if self.lost([task]):
+                    raise pool.StalledError from None
+            except CancelledError:  # what was unfinished when the scheduler was lost
+                raise self._gone() from None
+            except ImportError as error:  # a worker that joined later; what an engine does not find is in its row
+                raise self._unfit(error) from None
+            except Exception:
+                if not self._connected():
+                    raise self._gone() from None
+                raise
+
+    def lost(self, _: "Collection[Future[Any]]") -> bool:
+        """Whether no worker is left."""
+        try:
+            return not self.client.nthreads()  # type: ignore[no-untyped-call]
+        except (OSError, RuntimeError):
+            raise self._gone() from None
+
+    def _connected(self) -> bool:
+        comm = self.client.scheduler_comm
+        return self.client.status == "running" and comm is not None and not comm.comm.closed()
+
+    def _leave(self) -> None:
+        """Close without waiting for a scheduler that is gone."""
+        with suppress(OSError, RuntimeError):  # nobody is there, or nobody answers
+            self.client.close(timeout=ENDING)  # type: ignore[no-untyped-call]
+
+    def _gone(self) -> ClusterError:
+        return ClusterError(f"{self.scheduler}: the scheduler is gone; what is finished is kept")
+
+    def _no_workers(self) -> pool.NoWorkersError:
+        return pool.NoWorkersError(f"{self.scheduler}: no workers; start some, what is finished is kept")
+
+    def _unfit(self, error: BaseException) -> ClusterError:
+        why = error.__cause__ or error
+        return ClusterError(
+            f"{self.scheduler}: scheduler and workers must be able to import fourbar_validation (PYTHONPATH) and its "
+            f"libraries: {type(why).__name__}: {' '.join(str(why).split())}"
+        )

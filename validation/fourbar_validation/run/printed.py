@@ -1,0 +1,267 @@
+"""What is printed and no engine answers: error bars, the residual of friction, the law of the motion, long sweeps."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fourbar.effects import Springs, Torsion
+from fourbar.evaluation.case import BLOCK
+from fourbar.linkage import MOVING_BARS, PIN_FORCE
+from fourbar.quantities import FORCES, OK, PIN_FORCES
+from fourbar.scene import Command, Scene
+from fourbar.solution import Solution
+from fourbar.solve import solve
+from fourbar_validation.compare.basis import basis_of, smallest_yardstick, strictest_condition
+from fourbar_validation.compare.compare import turned
+from fourbar_validation.compare.error import magnitude, relative, relative_error, worst
+from fourbar_validation.compare.identities import FORMULAS
+from fourbar_validation.compare.reversals import reversing
+from fourbar_validation.compare.rows import AGREES, FAILS, UNDECIDED, Row
+from fourbar_validation.compare.scales import of_length, term_sizes, yardstick
+from fourbar_validation.compare.tolerance import (
+    DEGRADED,
+    EPS,
+    EQUIVALENCE,
+    IDENTITY,
+    NOTHING_TO_TELL,
+    Array,
+    K,
+    condition_of,
+)
+from fourbar_validation.engines.description import speeds
+from fourbar_validation.engines.exact import BallArithmetic, unknown
+from fourbar_validation.engines.free_body import move
+from fourbar_validation.engines.free_body_effects import acting
+from fourbar_validation.engines.prediction import from_data
+from fourbar_validation.engines.witnesses import not_installed
+
+SAMPLE = 5
+"""Positions of a scene at which the error bars are held to the true error, besides those nearest to a rest."""
+BARS = 10.0
+"""Error bars: 2 in 100 million normal errors exceed ten of them."""
+ROUNDED_SOMEWHERE = 20
+"""Positions with loaded friction of which at least one leaves a residual: by rounding half of them do."""
+
+
+def printed(name: str, scene: Scene, at: Command, solution: Solution, basis: Solution | None) -> Iterator[Row]:
+    """One row per statement that the scene makes."""
+    if scene.points and basis is not None and at.omega_2 is not None:
+        yield points(name, scene, solution, basis)
+    if scene.motion.law is not None and at.time is not None:
+        yield _law(name, scene, at)
+    if at.omega_2 is None:
+        return
+    if at.remainder is None:
+        yield _blocks(name, scene, at, solution)
+        if not unknown(scene) and not_installed("flint") is None:
+            yield from _error_bars(name, scene, at, solution)
+    if solution.friction_residual is not None:
+        yield _residual(name, scene, solution)
+
+
+def points(name: str, scene: Scene, solution: Solution, basis: Solution, least: float = 0.0) -> Row:
+    """Places, velocities and accelerations of the scene's own points, from the angles of another derivation.
+
+    `least`: the condition from which on they are judged.
+    """
+    link, n = scene.linkage, len(basis)
+    zero = np.zeros(n)
+    theta = {1: zero + link.ground_angle, 2: basis.theta_2, 3: basis.theta_3, 4: basis.theta_4}
+    speed = {bar: zero if bar == 1 else _known(basis, f"omega_{bar}", n) for bar in theta}
+    growth = {bar: zero if bar == 1 else _known(basis, f"alpha_{bar}", n) for bar in theta}
+
+    def swing(bar: int, distance: float, angle: float) -> list[NDArray[np.complex128]]:
+        arm = distance * np.exp(1j * (theta[bar] + angle))
+        return [arm, 1j * speed[bar] * arm, (1j * growth[bar] - speed[bar] ** 2) * arm]
+
+    feet = {3: swing(2, link.input.length, 0.0), 4: [link.ground * np.exp(1j * theta[1]), 0.0 * zero, 0.0 * zero]}
+    error = np.zeros(n)
+    usable = (solution.status_code == OK) & (basis.condition >= least)
+    usable &= condition_of("F12", link, basis) * NOTHING_TO_TELL > EPS
+    for point in scene.points:
+        own, foot = swing(point.bar, *point.from_pin), feet.get(point.bar, [zero, zero, zero])
+        tables, like = (solution.points, solution.velocity, solution.acceleration), ("B", "v_B", "a_B")
+        for ours, kind, arm, at_foot in zip(tables, like, own, foot, strict=True):
+            if point.name in ours:
+                theirs = np.stack(((arm + at_foot).real, (arm + at_foot).imag), axis=1)
+                size = np.abs(arm) + np.abs(at_foot) + of_length(scene)
+                if kind != "B":
+                    size = np.abs(arm) + np.abs(at_foot) + term_sizes(kind, scene, basis)
+                apart = relative_error(kind, ours[point.name], theirs, size) * condition_of(kind, link, basis)
+                error = np.where(usable, np.maximum(error, np.where(np.isnan(apart), np.inf, apart)), error)
+    index, allowed = worst(error), EQUIVALENCE.factor * turned(link.ground_angle, solution.theta_2)
+    verdict = UNDECIDED if not usable.any() else AGREES if error[index] <= allowed else FAILS
+    what, place = f"the {len(scene.points)} points of the scene", float(solution.theta_2[index])
+    return Row(name, FORMULAS, "exact", "points", float(error[index]), allowed, verdict, what, place, 1.0)
+
+
+def _known(basis: Solution, quantity: str, n: int) -> Array:
+    values: Array | None = getattr(basis, quantity)
+    return np.zeros(n) if values is None else values
+
+
+def piece(at: Command, where: NDArray[np.intp]) -> Command:
+    """Some positions of a command."""
+
+    def of(value: float | Array | None) -> float | Array | None:
+        return value if value is None or np.ndim(value) == 0 else value[where]  # type: ignore[index]
+
+    time = None if at.time is None else at.time[where]
+    return Command(at.theta_2[where], at.branch[where], of(at.omega_2), of(at.alpha_2), None, time)  # type: ignore[arg-type]
+
+
+def _blocks(name: str, scene: Scene, at: Command, solution: Solution) -> Row:
+    """A sweep of more than one block of positions, at the ends of its blocks, against the scene's own sweep."""
+    n = len(at.theta_2)
+    ok = np.flatnonzero(solution.status_code == OK)
+    long = np.concatenate((np.resize(ok if len(ok) else np.arange(n), BLOCK), np.arange(n)))
+    ends = np.unique([0, BLOCK - 1, BLOCK, len(long) - 1])
+    repeated = piece(at, long)
+    if (
+        sum(len(effect.loaded_pins) for effect in scene.effects) > 1
+    ):  # each may take a search, and the ends are compared
+        repeated.theta_2[1 : BLOCK - 1] = np.nan
+    whole = solve(scene, "force", at=repeated)
+    error = (whole.status_code[ends] != solution.status_code[long[ends]]).astype(float)
+    for quantity in ("sin_mu", "B", "alpha_3", *FORCES):
+        ours = getattr(solution, quantity)
+        one, other = getattr(whole, quantity)[ends], ours[long[ends]]
+        known = np.isfinite(magnitude(other))
+        error[known != np.isfinite(magnitude(one))] = np.inf
+        with np.errstate(all="ignore"):  # beyond the range of doubles there is no size
+            size = yardstick(quantity, scene, solution, ours)[long[ends]]
+        condition = condition_of(quantity, scene.linkage, solution)[long[ends]]
+        # evaluated by the same code, but not in the same company of a processor's registers
+        apart = relative_error(quantity, one, other, size) * condition
+        error[known] = np.maximum(error[known], apart[known])
+    alone = {angle: np.empty(n) for angle in ("theta_3", "theta_4")}
+    solve(scene, at=at, out=alone)  # they are found without vectors then
+    for angle, found in alone.items():
+        apart = relative_error(angle, found, getattr(solution, angle), np.ones(n))
+        apart *= condition_of(angle, scene.linkage, solution) / turned(scene.linkage.ground_angle, at.theta_2)
+        error[-1] = max(error[-1], np.nan_to_num(apart[ok], nan=np.inf).max(initial=0.0))
+    index = worst(error)
+    verdict = AGREES if error[index] <= EQUIVALENCE.factor else FAILS
+    reason = f"{len(long)} positions at once against {n}"
+    theta_2, allowed = float(whole.theta_2[ends[index]]), EQUIVALENCE.factor
+    return Row(name, FORMULAS, "exact", "blocks", float(error[index]), allowed, verdict, reason, theta_2, 1.0)
+
+
+def _error_bars(name: str, scene: Scene, at: Command, solution: Solution) -> Iterator[Row]:
+    """Against the true error, by 320-bit arithmetic; no bar may be larger than what a comparison is allowed."""
+    # the sense of dry friction at a pin at rest is no question of rounding
+    usable = np.flatnonzero((solution.status_code == OK) & ~reversing(scene, solution, EQUIVALENCE.factor))
+    if not len(usable):
+        return
+    spread = np.linspace(0, len(usable) - 1, SAMPLE).astype(int).tolist()
+    where = usable[np.unique([*spread, *(int(np.argmin(pull[usable])) for pull in _pulls(scene, at, solution))])]
+    sampled = piece(at, where)
+    exact, ours = BallArithmetic().answer(scene, sampled), solve(scene, "error", at=sampled)
+    other = basis_of(scene, exact)
+    for bar, quantities in (("torque_error", ("torque",)), ("force_error", PIN_FORCES)):
+        width = getattr(ours, bar)
+        true = np.max([magnitude(getattr(ours, q) - exact.quantities[q]) for q in quantities], axis=0)
+        size = np.max([smallest_yardstick(q, scene, ours, other) for q in quantities], axis=0)
+        condition = strictest_condition(quantities[0], scene.linkage, ours, other)
+        tells = condition * NOTHING_TO_TELL > EPS
+        turns = np.array([turned(scene.linkage.ground_angle, theta_2) for theta_2 in sampled.theta_2])
+        wide = relative(width, size) * condition / (K * EPS * turns)
+        if (beyond := tells & (wide > 1.0)).any():  # as of an engine
+            expected = np.max([from_data(scene, sampled, quantity, beyond) for quantity in quantities], axis=0)
+            wide = np.where(beyond, relative(width, DEGRADED * expected), wide)
+        share = np.where(tells, np.maximum(relative(true, BARS * width), wide), 0.0)
+        share[tells & ~np.isfinite(width)] = np.inf
+        index = worst(share)
+        verdict = UNDECIDED if not tells.any() else AGREES if share[index] <= 1.0 else FAILS
+        reason = f"the error is {true[index]:.1e}, the bar {width[index]:.1e}, of {size[index]:.1e}"
+        place = float(sampled.theta_2[index])
+        yield Row(
+            name, FORMULAS, "exact", bar, float(share[index]), 1.0, verdict, reason, place, float(condition[index])
+        )
+
+
+def _pulls(scene: Scene, at: Command, solution: Solution) -> Iterator[Array]:
+    """What each spring, torsion spring and load over a table does, by the free bodies: (n,), N and N m together."""
+    assert solution.theta_3 is not None and solution.theta_4 is not None
+    motion = move(scene.linkage, at.theta_2, *speeds(at), solution.theta_3, solution.theta_4)
+    alone: list[Scene] = [replace(scene, loads=(load,), effects=()) for load in scene.loads if load.table is not None]
+    for effect in scene.effects:
+        if isinstance(effect, (Springs, Torsion)):
+            kind = type(effect)
+            alone += [replace(scene, loads=(), effects=(kind((one,)),)) for one in effect.springs]  # type: ignore[arg-type]
+    for one in alone:
+        wrenches = acting(one, motion)
+        yield sum(np.abs(wrenches.force[bar]) + np.abs(wrenches.moment[bar]) for bar in MOVING_BARS)  # type: ignore[misc]
+
+
+def _residual(name: str, scene: Scene, solution: Solution) -> Row:
+    """What is left of friction couples is rounding: not more, and somewhere not less."""
+    residual, terms = solution.friction_residual, np.zeros(len(solution))
+    assert residual is not None and solution.drive_condition is not None
+    for effect in scene.effects:
+        for pin, mu, r in getattr(effect, "pins", ()):
+            terms = np.fmax(terms, mu * r * magnitude(getattr(solution, PIN_FORCE[pin])))
+    known = np.isfinite(terms) & (terms > 0.0) & (solution.status_code == OK)
+    if np.any(solution.omega_2 == 0.0) or not known.any():
+        return Row.unmeasured(name, FORMULAS, "exact", "friction_residual", UNDECIDED, "no pin slides under load")
+    error = np.where(known, residual / np.where(known, terms, 1.0) * solution.drive_condition, 0.0)
+    index = worst(error)
+    nowhere = np.count_nonzero(known) >= ROUNDED_SOMEWHERE and not residual[known].any()
+    verdict = FAILS if nowhere or not error[index] <= K * EPS else AGREES
+    reason = "not even rounding is left at any position" if nowhere else "couples of mu r |F|, relative to the largest"
+    place = float(solution.theta_2[index])
+    return Row(name, FORMULAS, "exact", "friction_residual", float(error[index]), K * EPS, verdict, reason, place, 1.0)
+
+
+def _law(name: str, scene: Scene, at: Command) -> Row:
+    """A motion law held to its own table: the piecewise cubic through its points whose acceleration is continuous.
+
+    Each piece is the cubic of Hermite through the table's angles with the speeds at its ends; that it is the law's
+    is decided by the accelerations of neighbouring pieces and by the ends alone. theta_2, omega_2 and alpha_2 of
+    every position, and the conditions on the pieces, by the worst of them.
+    """
+    law = scene.motion.law
+    assert law is not None and at.time is not None and at.omega_2 is not None
+    t, angle = np.array(law.time), np.array(law.theta_2)
+    h, rise = np.diff(t), np.diff(angle) / np.diff(t)
+    speed = law.at(t)[1]
+    first = (6.0 * rise - 4.0 * speed[:-1] - 2.0 * speed[1:]) / h
+    last = (-6.0 * rise + 2.0 * speed[:-1] + 4.0 * speed[1:]) / h
+    farthest = float(np.abs(angle).max())
+    size = float(np.abs(rise).max() + np.abs(speed).max()) + farthest / float(h.min())
+    bent = size / float(h.min())
+    errors = [np.abs(first[1:] - last[:-1]) / bent]
+    if law.ends == "rest":
+        errors.append(np.abs(speed[[0, -1]]) / size)
+    elif law.ends == "periodic":
+        errors.append(np.abs([speed[0] - speed[-1], (first[0] - last[-1]) / h.min()]) / size)
+    else:  # one cubic through the first two pieces, and through the last two
+        jerk = (last - first) / h
+        errors.append(np.abs([jerk[1] - jerk[0], jerk[-1] - jerk[-2]]) * float(h.min()) / bent)
+    piece = np.clip(np.searchsorted(t, at.time, side="right") - 1, 0, len(h) - 1)
+    theta_2, omega_2, alpha_2 = _hermite(
+        at.time - t[piece], angle[piece], speed[piece], first[piece], last[piece], h[piece]
+    )
+    along = [
+        np.abs(theta_2 - at.theta_2) / max(1.0, farthest),
+        np.abs(omega_2 - at.omega_2) / size,
+        np.abs(alpha_2 - at.alpha_2) / bent,
+    ]
+    pieces, position = max(float(each.max(initial=0.0)) for each in errors), worst(np.max(along, axis=0))
+    error = float(np.max([pieces, *(each[position] for each in along)]))
+    verdict = AGREES if error <= IDENTITY.factor else FAILS
+    reason = "the piecewise cubic through the table, its acceleration continuous"
+    place = float(at.theta_2[position])
+    return Row(name, FORMULAS, "exact", "law", error, IDENTITY.factor, verdict, reason, place, 1.0)
+
+
+def _hermite(s: Array, angle: Array, speed: Array, first: Array, last: Array, h: Array) -> tuple[Array, Array, Array]:
+    """Angle, speed and acceleration a time s into a piece, from its acceleration at both ends."""
+    jerk = (last - first) / h
+    return (
+        angle + s * (speed + s * (first / 2.0 + s * jerk / 6.0)),
+        speed + s * (first + s * jerk / 2.0),
+        first + s * jerk,
+    )

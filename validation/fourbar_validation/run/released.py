@@ -1,0 +1,279 @@
+"""Free motions: every engine against the exact solution where there is one, otherwise against the formulas.
+
+An engine's error is predicted by itself: it runs twice, with its step and with twice its step, and
+the difference is what the coarser motion errs by. The finer one must not err by more than ten times that.
+"""
+
+import math
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from pkgutil import resolve_name
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fourbar.effects import Friction, Gravity, Load
+from fourbar.linkage import MOVING_BARS, PINS
+from fourbar.quantities import UNKNOWNS
+from fourbar.scene import Command, Scene
+from fourbar.solution import Solution
+from fourbar.solve import solve
+from fourbar_validation.compare.answer import Array, Released
+from fourbar_validation.compare.basis import basis_of
+from fourbar_validation.compare.compare import compare
+from fourbar_validation.compare.error import in_own_unit, relative, worst
+from fourbar_validation.compare.identities import FORMULAS
+from fourbar_validation.compare.rows import AGREES, DEGRADED, FAILS, REFUSES, UNDECIDED, Row, breakdown
+from fourbar_validation.compare.tolerance import DEGRADED as TIMES_PREDICTED
+from fourbar_validation.compare.tolerance import EQUIVALENCE
+from fourbar_validation.engines.free_body import FreeBody
+from fourbar_validation.engines.output import kept
+from fourbar_validation.engines.witnesses import WITNESSES, Witness, not_installed, predicting_from
+from fourbar_validation.report.record import Record, Timing
+from fourbar_validation.run.printed import piece
+from fourbar_validation.run.shipped.question import member, worst_rows
+
+ENGINES = {
+    "mujoco-forward": ("fourbar_validation.engines.mujoco.released:MujocoForward", 1e-3, "mujoco"),
+    "pinocchio-forward": ("fourbar_validation.engines.pinocchio_forward:PinocchioReleased", 2e-3, "pinocchio"),
+}
+"""Adapter, longest step (s) and library of each engine that integrates by itself."""
+FULL = {"theta_2": 1e-9, "omega_2": 1e-8, "energy": 1e-10, "stopped_at": 1e-9}
+"""Errors (rad, of the greatest speed, of the greatest energies, of the duration) at which a free motion agrees: the
+formulas hold theta_2 to 1e-9 rad over 5 s; a motion of 100 s may amplify that by its duration, so 5 s is the unit."""
+UNIT = 5.0
+
+
+class Pendulum(NamedTuple):
+    """A parallelogram that stays parallel is a pendulum: J phi'' = W sin phi, phi from the upright."""
+
+    J: float
+    W: float
+    phi_0: float
+    omega_0: float
+
+    def motion(self, times: Array) -> tuple[Array, Array]:
+        """phi and phi' (rad, rad/s) of a pendulum that turns over, by Jacobi's elliptic functions."""
+        from scipy.special import ellipj, ellipk, ellipkinc
+
+        k, sense = self.W / self.J, math.copysign(1.0, self.omega_0)
+        bottom = math.sqrt(self.omega_0**2 + 2.0 * k * (1.0 + math.cos(self.phi_0)))  # speed at the lowest point
+        m = 4.0 * k / bottom**2
+        # half the angle from the lowest point is the amplitude; it starts at phi_0 - pi, seen along the motion
+        start = ellipkinc(0.5 * (sense * self.phi_0 - math.pi), m)
+        turns = 0.5 * bottom * times + start
+        whole = np.round(turns / (2.0 * ellipk(m)))  # the amplitude grows by pi in every 2 K
+        _, _, dn, amplitude = ellipj(turns - whole * 2.0 * ellipk(m), m)
+        return sense * (2.0 * (amplitude + math.pi * whole) + math.pi), sense * bottom * dn
+
+
+def as_pendulum(scene: Scene) -> Pendulum | None:
+    """The pendulum that the scene is, or None; it must turn over, or none of this is an answer."""
+    d, a, b, c = scene.linkage.lengths
+    effects = scene.effects
+    if not (a == c and b == d and scene.motion.through == "follow" and not scene.loads and len(effects) == 1):
+        return None
+    down = effects[0]
+    if not (isinstance(down, Gravity) and math.isclose(down.angle, -math.pi / 2) and scene.motion.omega_2):
+        return None
+    J = W = 0.0
+    for number in MOVING_BARS:
+        bar = scene.linkage.bar(number)
+        r, phi = bar.mass_centre
+        if phi != 0.0:
+            return None
+        J += bar.mass * a * a if number == 3 else bar.moment_of_inertia + bar.mass * r * r
+        W += bar.mass * down.magnitude * (a if number == 3 else r)
+    phi_0 = float(np.asarray(scene.motion.theta_2)) - math.pi / 2
+    pendulum = Pendulum(J, W, phi_0, scene.motion.omega_2)
+    over_the_top = scene.motion.omega_2**2 > 2.0 * W / J * (1.0 - math.cos(phi_0))
+    return pendulum if over_the_top else None
+
+
+def judge_released(record: Record, witnesses: Sequence[Witness] = WITNESSES) -> Record:
+    """Rows of the formulas and of every forward engine for a scene with a free motion.
+
+    The motion of the formulas ends where bars 3 and 4 come to lie in one line, unless it follows the path through;
+    an engine moves on. Both are compared as long as both are there, and the instant itself is compared too.
+    """
+    assert record.scene is not None and record.scene.motion.free is not None
+    free = record.scene.motion.free
+    times = np.linspace(0.0, free.duration, free.steps + 1)
+    begin = time.perf_counter()
+    solution = solve(record.scene)
+    record.timings.append(Timing(record.name, "formulas", "exact", len(solution), time.perf_counter() - begin))
+    record.solution = solution
+    assert solution.omega_2 is not None
+    record.rows += _forces(record.name, record.scene, solution, witnesses, record.output)
+    pendulum = as_pendulum(record.scene)
+    truth = _Truth(solution.theta_2, solution.omega_2, solution.stopped_at)
+    if pendulum is not None:
+        phi, rate = pendulum.motion(times)
+        truth = _Truth(phi + math.pi / 2, rate)
+        none = np.zeros(len(solution))
+        ours = Released("formulas", "exact", solution.theta_2, solution.omega_2, none, none)
+        record.rows += _rows(record, ours, None, truth)
+    for name, (adapter, longest, library) in ENGINES.items():
+        if reason := not_installed(library):
+            record.left_out.append(f"{name}: {reason}")
+            continue
+        try:
+            engine: Callable[[float], Any] = resolve_name(adapter)
+            pairs = math.ceil(free.duration / free.steps / (2.0 * longest) - 1e-6)
+            step = free.duration / free.steps / (2.0 * pairs)  # two of them, or more, from one instant to the next
+            begin = time.perf_counter()
+            fine = engine(step).release(record.scene, times)
+            seconds = time.perf_counter() - begin
+            coarse = None if fine.refusal else engine(2.0 * step).release(record.scene, times)
+        except Exception as error:  # whatever an engine raises is its own failure, in its own row
+            record.rows.append(breakdown(record.name, name, error))
+            continue
+        record.timings.append(Timing(record.name, fine.engine, fine.setting, len(times), seconds))
+        if fine.refusal is not None:
+            record.left_out.append(f"{fine.engine}: {fine.refusal}")
+        record.rows += _rows(record, fine, coarse, truth)
+    return record
+
+
+def _forces(
+    name: str, scene: Scene, solution: Solution, witnesses: Sequence[Witness], output: dict[str, str]
+) -> Iterator[Row]:
+    """Motion, pin forces and the torque, which is none, of every instant, by the engines that answer one by one.
+
+    They are given theta_2, omega_2 and alpha_2; that these balance without a torque is the equation of motion.
+    """
+    assert solution.omega_2 is not None and solution.alpha_2 is not None and solution.torque is not None
+    held = replace(scene, motion=replace(scene.motion, free=None, alpha_2=0.0), drive_bar=2)
+    at = Command(solution.theta_2, solution.branch, solution.omega_2, solution.alpha_2)
+    asked = list(_parts(held, at))
+    driven = worst(np.abs(solution.torque))
+    torque = float(np.abs(solution.torque[driven]))
+    what = "a released linkage has no drive"
+    place = float(solution.theta_2[driven])
+    yield Row(name, FORMULAS, "exact", "torque", torque, 0.0, FAILS if torque else AGREES, what, place, 1.0)
+    for witness in witnesses:
+        if witness.tolerance != EQUIVALENCE or "theta_3" not in witness.expected or witness.missing():
+            continue
+        try:
+            with kept(output, witness.name):
+                rows = [
+                    row
+                    for own, where in asked
+                    for row in _at_instants(name, own, piece(at, where), member(solution, where), witness)
+                ]
+        except Exception as error:  # whatever an engine raises is its own failure, in its own row
+            yield breakdown(name, witness.name, error, "forces")
+            continue
+        yield from worst_rows(row for row in rows if row.quantity != "undecided")
+
+
+def _at_instants(name: str, scene: Scene, at: Command, solution: Solution, witness: Witness) -> list[Row]:
+    """Rows of one engine at some instants of the motion."""
+    answer = witness.engine().answer(scene, at)
+    if answer.refusal is not None:
+        return [Row.unmeasured(name, answer.engine, answer.setting, "all", REFUSES, answer.refusal)]
+    basis = basis_of(scene, answer)
+    assert basis is not None
+    # the formulas are conditioned by the angle that is independent there, an engine by theta_2
+    conditioned = replace(solution, condition=basis.condition, drive_condition=basis.drive_condition)
+    conditioned.drive_bar = 2
+    names = [q for q in UNKNOWNS if q in witness.expected]
+    # nor are theta_2, omega_2 and alpha_2 more than that angle's, rounded: what that costs there is computed
+    predicted = predicting_from(witness, scene, at, answer)
+    return compare(name, scene, answer, conditioned, witness.tolerance, names, predicted, basis)
+
+
+def _parts(scene: Scene, at: Command) -> Iterator[tuple[Scene, NDArray[np.intp]]]:
+    """The instants at which the linkage moves, and each standstill with the couples by which dry friction acts there.
+
+    An engine has no friction at rest. A standstill that lasts is held: every pin takes the same part of its torque, and
+    no more than all of it; one that ends begins to move against the whole torque.
+    """
+    assert at.omega_2 is not None
+    friction = next((effect for effect in scene.effects if isinstance(effect, Friction)), None)
+    resting = np.flatnonzero(at.omega_2 == 0.0) if friction is not None else np.empty(0, dtype=int)
+    moving = np.setdiff1d(np.arange(len(at.theta_2)), resting)
+    if len(moving):
+        yield scene, moving
+    if friction is None:
+        return
+    bare = replace(scene, effects=tuple(effect for effect in scene.effects if effect is not friction))
+    numbers = np.stack((at.theta_2, at.alpha_2), axis=1)[resting]
+    for first in resting[np.unique(numbers, axis=0, return_index=True)[1]].tolist():
+        where = np.array([first])
+        here = piece(at, where)
+        needed, begins = FreeBody().answer(bare, here).quantities["torque"][0], float(np.sign(here.alpha_2)[0])
+        turning = FreeBody().answer(bare, here._replace(omega_2=np.ones(1))).quantities
+        rate = {1: 0.0, 2: 1.0, 3: turning["omega_3"][0], 4: turning["omega_4"][0]}
+        slips = {pin: rate[PINS[pin][1]] - rate[PINS[pin][0]] for pin, _ in friction.torques}
+        most = sum(torque * abs(slips[pin]) for pin, torque in friction.torques)
+        part = -begins or float(np.clip(needed / most, -1.0, 1.0))
+        loads = [
+            Load(bar, moment=sense * part * torque * float(np.sign(slips[pin])))
+            for pin, torque in friction.torques
+            for bar, sense in zip(PINS[pin], (-1.0, 1.0), strict=True)
+            if bar != 1
+        ]
+        yield replace(bare, loads=(*scene.loads, *loads)), where
+
+
+class _Truth(NamedTuple):
+    """The motion that engines are held against, to its end."""
+
+    theta_2: Array
+    omega_2: Array
+    stopped_at: float | None = None
+
+
+def _rows(record: Record, fine: Released, coarse: Released | None, truth: _Truth) -> list[Row]:
+    assert record.scene is not None and record.scene.motion.free is not None
+    free, through, n = record.scene.motion.free, record.scene.motion.through, len(truth.theta_2)
+    who = (record.name, fine.engine, fine.setting)
+    if fine.refusal is not None:
+        return [Row.unmeasured(*who, "all", REFUSES, fine.refusal)]
+    if len(fine.theta_2) < n:
+        return [Row.unmeasured(*who, "all", FAILS, f"it stopped after {len(fine.theta_2)} of {n} instants")]
+
+    def numbers(of: Released) -> dict[str, Array]:
+        found = {"theta_2": of.theta_2[:n], "omega_2": of.omega_2[:n]}
+        if coarse is not None:  # the formulas integrate the energy equation itself; their drift is part of their test
+            found["energy"] = of.energy[:n] - of.energy[0]
+            if through == "sign":
+                found["stopped_at"] = _end(of.stopped_at, free.duration)
+        return found
+
+    right_and_size = {
+        "theta_2": (truth.theta_2, 1.0),
+        "omega_2": (truth.omega_2, float(np.abs(truth.omega_2).max())),
+        "energy": (np.zeros(n), float(fine.terms[:n].max())),
+        "stopped_at": (_end(truth.stopped_at, free.duration), 1.0),
+    }
+    rows = []
+    for name, values in numbers(fine).items():
+        right, size = right_and_size[name][0], in_own_unit(np.array(right_and_size[name][1]))
+        error, expected = relative(np.abs(values - right), size), 0.0
+        if coarse is not None:
+            other = numbers(coarse)[name]
+            alike = len(other) == len(values)
+            expected = float(relative(np.abs(values - other).max(), size)) if alike else math.nan
+        index = worst(error)
+        full = FULL[name] * max(1.0, free.duration / UNIT)
+        allowed = max(full, TIMES_PREDICTED * expected)
+        if error[index] <= full:
+            verdict, reason = AGREES, f"a free motion of {free.duration:g} s"
+        elif not (error[index] <= allowed and math.isfinite(expected)):
+            verdict, reason = FAILS, f"{error[index]:.1e} where {expected:.1e} was predicted"
+        elif expected >= 1.0:
+            verdict, reason = UNDECIDED, f"an error of {expected:.1e} of the value is predicted"
+        else:
+            verdict, reason = DEGRADED, f"{error[index]:.1e} of {expected:.1e} predicted from twice the step"
+        place = float(fine.theta_2[n - 1 if name == "stopped_at" else index])
+        rows.append(Row(*who, name, float(error[index]), allowed, verdict, reason, place, 1.0))
+    return rows
+
+
+def _end(stopped_at: float | None, duration: float) -> Array:
+    """When a motion reached its limit, or the stated end, as a part of that duration, (1,)."""
+    return np.array([1.0 if stopped_at is None else stopped_at / duration])

@@ -1,0 +1,87 @@
+"""Proven extremes: nothing that the free bodies find inside the box lies outside, and the bounds are reached."""
+
+from dataclasses import replace
+from itertools import product
+
+import numpy as np
+
+import fourbar
+from fourbar.errors import InputError, LimitError
+from fourbar.scene import Scene
+from fourbar.scene.motion import Motion
+from fourbar_validation.compare.rows import REFUSES, Row
+from fourbar_validation.compare.tolerance import Tolerance
+from fourbar_validation.run.shipped.question import NotAskedError, Question, at_free_bodies, moved, row_of
+
+TORQUE = "torque"
+GIVEN = 1e-4
+"""Of a length: the tolerance that the run gives it."""
+INSIDE = 1.0 - 1e-12
+"""Of a tolerance: the corners that are tried are not beyond it, whatever is rounded."""
+MOST = 3
+"""Tolerances at whose corners linkages are tried; of more the first."""
+POSITIONS = 361
+"""Of the interval; a smooth curve falls off by 1e-4 of its size from its peak to the next of them."""
+LEAST_CONDITION = 0.05
+"""Where the interval comes nearer to a singular position than this, the boxes become too many for a run."""
+BOUNDS = Tolerance(
+    "proven bounds",
+    "1e-8 of the largest value: ten times what the enclosure promises, and what rounding costs the free bodies at "
+    "conditions of at least 0.05",
+    1e-8,
+    conditioned=False,
+)
+
+
+def extremes(question: Question) -> list[Row]:
+    """Judge the proven extremes of the torque: with tolerances, the scene's own or some that the run gives it."""
+    scene = replace(question.scene, points=(), title="", source="", pictures=())
+    _require_conditioned(scene)
+    if not scene.tolerances:
+        lengths = {name: getattr(scene.linkage, name).length for name in ("input", "coupler")}
+        scene = replace(
+            scene, tolerances=tuple(fourbar.Tolerance(f"lengths.{k}", GIVEN * x) for k, x in lengths.items())
+        )
+    try:
+        found = fourbar.extremes(scene, [TORQUE])
+    except (InputError, LimitError) as limit:
+        return [Row.unmeasured(question.name, "extremes", "exact", TORQUE, REFUSES, str(limit))]
+    assert found.nominal is not None
+    ends = [each[TORQUE] for of in (found, found.nominal) for each in (of.least, of.greatest)]
+    theta_2 = np.concatenate(
+        [*(np.linspace(low, high, POSITIONS) for low, high in found.parts), [each.theta_2 for each in ends]]
+    )
+    reach = {each.key: each.reach for each in scene.tolerances[:MOST]}
+    bare = replace(scene, tolerances=(), motion=replace(scene.motion, theta_2=theta_2, through="sign"))
+    corners = [dict(zip(reach, signs, strict=True)) for signs in product((-INSIDE, INSIDE), repeat=len(reach))]
+    torque = np.array(
+        [
+            at_free_bodies(moved(bare, {key: sign * reach[key] for key, sign in corner.items()})).quantities[TORQUE]
+            for corner in ({}, *corners)
+        ]
+    )
+    size = max(abs(end) for each in ends for end in each[:2])
+    error = np.zeros_like(theta_2)
+    for of, values, within in ((found, torque, len(reach) == len(scene.tolerances)), (found.nominal, torque[:1], True)):
+        for sign, each in ((-1.0, of.least[TORQUE]), (1.0, of.greatest[TORQUE])):
+            proven, reached = (each.high, each.low) if sign > 0 else (-each.low, -each.high)
+            beyond = (sign * values).max(axis=0) - proven  # NaN where a linkage has no torque: nothing holds there
+            if within:
+                at = int(np.flatnonzero(theta_2 == each.theta_2)[0])
+                beyond[at] = max(beyond[at], reached - float((sign * values[:, at]).max()))
+            error = np.maximum(error, beyond / size)
+    reason = f"{len(torque)} linkages at {len(theta_2)} positions"
+    return [row_of(question, "extremes", TORQUE, error, BOUNDS, theta_2, reason)]
+
+
+def _require_conditioned(scene: Scene) -> None:
+    """NotAskedError where bars 3 and 4 come near to one line within the interval, not at its ends."""
+    around = np.linspace(0.0, 2.0 * np.pi, POSITIONS)
+    answer = at_free_bodies(replace(scene, motion=Motion(around, None, branch=scene.motion.branch), tolerances=()))
+    assert answer.assembled is not None
+    inside = answer.assembled & np.roll(answer.assembled, 1) & np.roll(answer.assembled, -1)
+    sine = np.abs(answer.quantities["sin_mu"][inside])
+    if not len(sine) or sine.min() < LEAST_CONDITION:
+        raise NotAskedError(
+            f"nearer to a line of bars 3 and 4 than {LEAST_CONDITION:g} a proof takes longer than a run"
+        )

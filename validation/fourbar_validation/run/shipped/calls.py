@@ -1,0 +1,82 @@
+"""The compiled formulas and studies of many linkages, by the free bodies of each linkage for itself."""
+
+from dataclasses import replace
+from importlib.util import find_spec
+
+import numpy as np
+
+import fourbar
+from fourbar.effects import Load
+from fourbar.effects.load import Table
+from fourbar.errors import installing
+from fourbar.scene import Scene
+from fourbar.scene.point import Point
+from fourbar_validation.compare.error import magnitude
+from fourbar_validation.compare.rows import Row
+from fourbar_validation.engines.free_body import FreeBody
+from fourbar_validation.run.shipped.question import (
+    NotAskedError,
+    Question,
+    at_free_bodies,
+    held_to,
+    member,
+    moved,
+    sampled,
+    stated,
+    worst_rows,
+)
+
+MEMBERS = 5
+"""As many as positions: a square study, whose axes nothing but its numbers tells apart."""
+APART = 1e-2
+"""By what part its numbers differ from member to member, of angles in rad."""
+CORNERS = (0.07, 2.3, 4.1, 0.07 + 2.0 * np.pi)
+"""rad from the first position; where the table of a load that the run adds is bent."""
+
+
+def compiled(question: Question) -> list[Row]:
+    """Judge the compiled formulas at every position, with points and a load over a table if the scene has none."""
+    if not find_spec("numba"):
+        raise NotAskedError(f"numba is not installed: {installing('fast')}")
+    scene = furnished(question.scene, question)
+    with np.errstate(all="ignore"):
+        found = fourbar.solve(scene, at=question.at, compiled=True)
+        answer = FreeBody().answer(scene, question.at)
+    return held_to(question, "compiled", scene, found, answer)
+
+
+def furnished(scene: Scene, question: Question) -> Scene:
+    """The scene with a point on each bar and a load over a table, as large as its forces, where it has none."""
+    coupler, first = scene.linkage.coupler, float(question.at.theta_2[0])
+    if not scene.points:
+        arms = {bar: (0.6 * scene.linkage.bar(bar).length, 0.4 * bar) for bar in (2, 3, 4)}
+        scene = replace(scene, points=tuple(Point(f"P{bar}", bar, arm) for bar, arm in arms.items()))
+    size = magnitude(question.free_body.quantities["F12"])
+    known = size[np.isfinite(size) & (size > 0.0)]
+    if not any(load.table for load in scene.loads) and known.size and scene.motion.law is None:
+        force, table = 0.5 * float(np.median(known)), Table(tuple(first + x for x in CORNERS), (1.0, -0.5, 2.0, 1.0))
+        load = Load(3, (force, 0.3), (0.2 * coupler.length, 0.5), 0.1 * force * coupler.length, "bar", table)
+        scene = replace(scene, loads=(*scene.loads, load))
+    return scene
+
+
+def study(question: Question) -> list[Row]:
+    """Judge a square study in which every number varies, member by member."""
+    scene = furnished(sampled(question), question)
+    theta_2 = np.asarray(scene.motion.theta_2)
+    of = stated(scene, fourbar.sensitivity(scene).keys)
+    del of["motion.theta_2"]
+    values = {key: np.array([x + number * APART * step for number in range(MEMBERS)]) for key, (x, step) in of.items()}
+    # the angles of each member lie within those of the scene: nothing says that a table reaches further
+    angles = np.array([theta_2 + APART * number * (theta_2.mean() - theta_2) for number in range(MEMBERS)])
+    members = [
+        moved(replace(scene, motion=replace(scene.motion, theta_2=own)), {k: number * APART * of[k].step for k in of})
+        for number, own in enumerate(angles)
+    ]
+    rows = []
+    with np.errstate(all="ignore"):
+        for how in (False, True) if find_spec("numba") else (False,):
+            found = fourbar.solve(fourbar.vary(scene, values | {"motion.theta_2": angles}), compiled=how)
+            for number, one in enumerate(members):
+                rows += held_to(question, "study", one, member(found, number), at_free_bodies(one))
+    return worst_rows(rows)

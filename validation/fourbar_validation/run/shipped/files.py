@@ -1,0 +1,171 @@
+"""The files of other simulators, SDF and USD, read as text and assembled by the free bodies."""
+
+import cmath
+import math
+import re
+from collections.abc import Callable
+from dataclasses import replace
+from typing import NamedTuple
+from xml.etree import ElementTree as ET
+
+import numpy as np
+
+from fourbar.effects import Effect, Friction, Gravity, Viscous
+from fourbar.errors import InputError, LimitError
+from fourbar.linkage import BAR_NAMES, MOVING_BARS, Bar, FourBar
+from fourbar.mjcf.sdf import sdf as sdf_text
+from fourbar.mjcf.usd import usd as usd_text
+from fourbar.scene import Scene
+from fourbar.solve import solve
+from fourbar_validation.compare.rows import REFUSES, Row
+from fourbar_validation.compare.tolerance import EPS, K
+from fourbar_validation.run.shipped.question import Question, at_free_bodies, held_to, sampled, worst_rows
+
+NUMBER = r"[-+.\deE]+"
+BARS = {BAR_NAMES[number]: number for number in MOVING_BARS}
+
+
+class Body(NamedTuple):
+    """A bar as a file holds it; the numbers are those of the plane."""
+
+    place: complex
+    turn: float
+    mass: float
+    inertia: float
+    centre: complex
+
+
+class Contents(NamedTuple):
+    """What a file says of a linkage."""
+
+    bodies: dict[str, Body]
+    pins: dict[str, complex]
+    """In the world; NaN where the two bars of a pin do not meet."""
+    turns: list[dict[str, float]]
+    """Every statement of the angles of all bars, rad: of the bodies, of the joints, in words."""
+    gravity: complex
+    damping: dict[str, float]
+    """By pin, as the next."""
+    friction: dict[str, float]
+
+
+def sdf(question: Question) -> list[Row]:
+    """Judge the SDF for Gazebo."""
+    return _file(question, "sdf", lambda scene: _of_sdf(sdf_text(scene)))
+
+
+def usd(question: Question) -> list[Row]:
+    """Judge the USD."""
+    return _file(question, "usd", lambda scene: _of_usd(usd_text(scene)))
+
+
+def _file(question: Question, engine: str, read: Callable[[Scene], Contents]) -> list[Row]:
+    """The rows of a file at its own position and at some more; loads are what a simulator adds."""
+    scene = replace(sampled(question), loads=(), points=())
+    theta_2 = np.asarray(scene.motion.theta_2)
+    opened = replace(scene, motion=replace(scene.motion, theta_2=theta_2[:1]))
+    try:
+        held = read(opened)
+    except (LimitError, InputError) as limit:
+        return [Row.unmeasured(question.name, engine, "exact", "all", REFUSES, str(limit))]
+    theirs, rows = assembled(held, opened), []
+    with np.errstate(all="ignore"):
+        for turns in held.turns:
+            answer = at_free_bodies(replace(theirs, motion=replace(scene.motion, theta_2=np.array([turns["input"]]))))
+            answer.quantities |= {f"theta_{BARS[bar]}": np.array([turns[bar]]) for bar in ("coupler", "output")}
+            rows += held_to(question, engine, opened, solve(opened), answer)
+        more = at_free_bodies(replace(theirs, motion=scene.motion))
+        return worst_rows([*rows, *held_to(question, engine, scene, solve(scene), more)])
+
+
+def assembled(held: Contents, scene: Scene) -> Scene:
+    """The scene that a file describes, in the motion and with the drive of another."""
+    bodies, pins = held.bodies, held.pins
+    span = pins["O4"] - pins["O2"]
+    ends = {"input": pins["A"] - pins["O2"], "coupler": pins["B"] - pins["A"], "output": pins["B"] - pins["O4"]}
+    two, three, four = (
+        Bar(abs(end), bodies[name].mass, bodies[name].inertia, cmath.polar(bodies[name].centre))
+        for name, end in ends.items()
+    )
+    effects: tuple[Effect, ...] = (Gravity(*cmath.polar(held.gravity)),)
+    if held.damping:
+        effects += (Viscous.at(**held.damping),)
+    if held.friction:
+        effects += (Friction.at(**held.friction),)
+    return replace(scene, linkage=FourBar(abs(span), two, three, four, cmath.phase(span)), effects=effects)
+
+
+def _of_sdf(text: str) -> Contents:
+    root = ET.fromstring(text)
+
+    def numbers(of: ET.Element, path: str) -> list[float]:
+        return [float(number) for number in of.findtext(path, "nan").split()]
+
+    bodies = {}
+    for link in root.iter("link"):
+        x, y, _, _, _, turn = numbers(link, "pose")
+        centre = complex(*numbers(link, "inertial/pose")[:2])
+        (mass,), (inertia,) = numbers(link, "inertial/mass"), numbers(link, "inertial/inertia/izz")
+        bodies[link.get("name", "")] = Body(complex(x, y), turn, mass, inertia, centre)
+    pins: dict[str, complex] = {}
+    dynamics: dict[str, dict[str, float]] = {"damping": {}, "friction": {}}
+    for joint in root.iter("joint"):
+        pin, child = joint.get("name", ""), bodies[joint.findtext("child", "")]
+        pose = complex(*numbers(joint, "pose")[:2]) if joint.find("pose") is not None else 0j
+        pins[pin] = child.place + pose * cmath.rect(1.0, child.turn)
+        for name, at_pins in dynamics.items():
+            if joint.find(f"axis/dynamics/{name}") is not None:
+                at_pins[pin] = numbers(joint, f"axis/dynamics/{name}")[0]
+    gravity = complex(*numbers(next(root.iter("world")), "gravity")[:2])
+    return Contents(bodies, pins, [_turns(bodies), _noted(text)], gravity, **dynamics)
+
+
+def _of_usd(text: str) -> Contents:
+    def numbers(of: str, key: str) -> list[float]:
+        found = re.search(rf"{re.escape(key)} = (.*)", of)
+        return [float(number) for number in re.findall(NUMBER, found[1])] if found else [math.nan] * 4
+
+    def turn(of: str, key: str) -> float:
+        w, _, _, z = numbers(of, key)
+        return 2.0 * math.atan2(z, w)
+
+    blocks = dict(re.findall(r'def (?:Xform|PhysicsRevoluteJoint|PhysicsScene) "(\w+)"[^{]*\{([^{}]*)\}', text))
+    bodies = {"ground": Body(0j, 0.0, math.nan, math.nan, 0j)}
+    for bar in BARS:
+        of = blocks[bar]
+        place, centre = (complex(*numbers(of, f"{key}")[:2]) for key in ("xformOp:translate", "physics:centerOfMass"))
+        mass, inertia = numbers(of, "physics:mass")[0], numbers(of, "physics:diagonalInertia")[2]
+        bodies[bar] = Body(place, turn(of, "xformOp:orient"), mass, inertia, centre)
+    size = sum(abs(body.place) + abs(body.centre) for body in bodies.values())
+    pins, at_joints = {}, {"ground": 0.0}
+    for pin in ("O2", "A", "O4", "B"):
+        of = blocks[pin]
+        ends = {end: re.search(rf"physics:body{end} = </four_bar/(\w+)>", of) for end in (0, 1)}
+        names = [match[1] if match else "ground" for match in ends.values()]
+        one, other = (
+            bodies[bar].place + complex(*numbers(of, f"physics:localPos{end}")[:2]) * cmath.rect(1.0, bodies[bar].turn)
+            for end, bar in enumerate(names)
+        )
+        pins[pin] = one if abs(one - other) <= K * EPS * size else complex(math.nan)
+        between = turn(of, "physics:localRot0") - turn(of, "physics:localRot1")
+        if pin == "B":
+            at_joints["coupler at B"] = at_joints[names[0]] + between
+        else:
+            at_joints[names[1]] = at_joints[names[0]] + between
+    closing = at_joints | {"coupler": at_joints["coupler at B"]}
+    (pull,), direction = numbers(blocks["physics"], "physics:gravityMagnitude"), "physics:gravityDirection"
+    gravity = pull * complex(*numbers(blocks["physics"], direction)[:2])
+    return Contents(bodies, pins, [_turns(bodies), at_joints, closing, _noted(text)], gravity, {}, {})
+
+
+def _turns(bodies: dict[str, Body]) -> dict[str, float]:
+    return {bar: body.turn for bar, body in bodies.items()}
+
+
+def _noted(text: str) -> dict[str, float]:
+    """The angles that the file states in words."""
+    return {
+        bar: float(found[1])
+        for bar, number in BARS.items()
+        if (found := re.search(f"theta_{number} = ({NUMBER})", text))
+    }

@@ -1,0 +1,198 @@
+"""What a check of something shipped is given, at which positions, and the rows that it answers."""
+
+import json
+import tomllib
+from collections.abc import Iterable, Mapping
+from contextlib import suppress
+from dataclasses import fields, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fourbar.files import dump, loads
+from fourbar.quantities import OK, UNKNOWNS, is_scalar
+from fourbar.scene import Command, Scene, command
+from fourbar.scene.motion import Motion
+from fourbar.solution import Solution
+from fourbar_validation.compare.answer import Answer, Array
+from fourbar_validation.compare.basis import basis_of
+from fourbar_validation.compare.compare import COMPARED, compare
+from fourbar_validation.compare.error import magnitude, used
+from fourbar_validation.compare.reversals import reversing
+from fourbar_validation.compare.rows import AGREES, FAILS, VERDICTS, Row
+from fourbar_validation.compare.tolerance import EQUIVALENCE, WELL_CONDITIONED, Tolerance
+from fourbar_validation.engines.free_body import FreeBody
+from fourbar_validation.engines.witnesses import WITNESSES, predicting_from
+from fourbar_validation.run.printed import points
+
+SAMPLE = 5
+"""Positions at which whatever takes more than one call is judged."""
+FROM_A_CORNER = 0.02
+"""rad; so near to a point of a load's table, where its slope jumps, no differences are formed."""
+NOT_AT_REST = 1e-3
+"""Of the speeds over sin^2 mu; where a dry pin slips less, small changes of a number may reverse it."""
+GOLDEN = 0.5 * (5.0**0.5 - 1.0)
+FREE_BODY = next(witness for witness in WITNESSES if witness.name == FreeBody.name)
+
+
+class Question(NamedTuple):
+    """A scene with a prescribed motion, and what the free bodies and the formulas say of it."""
+
+    name: str
+    scene: Scene
+    at: Command
+    solution: Solution
+    free_body: Answer
+
+
+class NotAskedError(Exception):
+    """A scene has nothing that a check could judge; the message says why."""
+
+
+def sampled(question: Question) -> Scene:
+    """The scene at a few of its positions, such that small changes of its numbers change its quantities little.
+
+    Raises NotAskedError where there are none.
+    """
+    scene, at, solution = question.scene, question.at, question.solution
+    if scene.motion.law is not None:
+        raise NotAskedError("a motion law has no positions of its own choice")
+    basis = basis_of(scene, question.free_body)
+    assert basis is not None and basis.drive_condition is not None and basis.torque is not None
+    fit = (solution.status_code == OK) & (basis.condition >= WELL_CONDITIONED) & np.isfinite(basis.torque)
+    fit &= (basis.drive_condition >= WELL_CONDITIONED) & (at.branch == scene.motion.branch)
+    fit &= ~reversing(scene, solution, NOT_AT_REST) & (solution.omega_2 != 0.0)
+    for load in scene.loads:
+        for corner in () if load.table is None else load.table.theta_2:
+            fit &= np.abs(np.angle(np.exp(1j * (at.theta_2 - corner)))) > FROM_A_CORNER
+    where = np.flatnonzero(fit)
+    if not len(where):
+        raise NotAskedError("no position that is well-conditioned and moves")
+    few = where[np.unique(np.linspace(0, len(where) - 1, SAMPLE + 2).astype(int)[1:-1])]
+    motion = Motion(at.theta_2[few], scene.motion.omega_2, scene.motion.alpha_2, scene.motion.branch)
+    return replace(scene, motion=motion, title="", source="", pictures=())
+
+
+class Stated(NamedTuple):
+    """A number that a scene's file states, and what it may be moved by: most of itself, of an angle most of 1 rad."""
+
+    number: float
+    step: float
+
+
+def stated(scene: Scene, keys: Iterable[str]) -> dict[str, Stated]:
+    """Those of the keys whose numbers the scene's file states; of motion.theta_2 the first.
+
+    What it leaves out (the inertia of a uniform bar, its centre) follows the lengths.
+    """
+    document, found = tomllib.loads(dump(scene)), {}
+    for index, key in enumerate(keys):
+        with suppress(KeyError):
+            table, last = _place(document, key)
+            number, _, unit = str(table[last][0] if isinstance(table[last], list) else table[last]).partition(" ")
+            # no two alike, between 1/2 and 1
+            part = 0.5 + 0.5 * ((index + 1) * GOLDEN % 1.0)
+            found[key] = Stated(float(number), part * (1.0 if unit == "rad" else float(number)))
+    return found
+
+
+def moved(scene: Scene, changes: Mapping[str, float]) -> Scene:
+    """The scene with some of its numbers changed by so much, through the text of its file: keys as there.
+
+    motion.theta_2 moves every position.
+    """
+    document = tomllib.loads(dump(scene))
+    for key, change in changes.items():
+        table, last = _place(document, key)
+        old = table[last]
+        table[last] = [_changed(each, change) for each in old] if isinstance(old, list) else _changed(old, change)
+    return loads("\n".join(f"{json.dumps(key)} = {_toml(value)}" for key, value in document.items()))
+
+
+def _place(document: Any, key: str) -> tuple[Any, Any]:
+    """The table that holds a number, and its name or index there; KeyError where the file leaves it out."""
+    *path, last = [int(part) if part.isdecimal() else part for part in key.split(".")]
+    for part in path:
+        document = document[part]
+    if isinstance(last, str) and last not in document:
+        raise KeyError(key)
+    return document, last
+
+
+def _changed(quantity: str | float, change: float) -> str | float:
+    number, _, unit = str(quantity).partition(" ")
+    return f"{float(number) + change!r} {unit}" if unit else float(number) + change
+
+
+def _toml(value: Any) -> str:
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{json.dumps(key)} = {_toml(each)}" for key, each in value.items()) + "}"
+    return "[" + ",\n".join(map(_toml, value)) + "]" if isinstance(value, list) else json.dumps(value)
+
+
+def at_free_bodies(scene: Scene) -> Answer:
+    """What the free bodies answer at the scene's own positions."""
+    with np.errstate(all="ignore"):
+        return FreeBody().answer(scene, command(scene))
+
+
+def held_to(question: Question, engine: str, scene: Scene, solution: Solution, answer: Answer) -> list[Row]:
+    """The rows of a solution that a public call gave for a scene, against the answer of the free bodies."""
+    answer = replace(answer, engine=engine)
+    assert answer.at is not None
+    predicted = predicting_from(FREE_BODY, scene, answer.at, answer)
+    basis = basis_of(scene, answer)
+    rows = compare(question.name, scene, answer, solution, EQUIVALENCE, COMPARED, predicted, basis)
+    if scene.points and basis is not None:
+        rows.append(replace(points(question.name, scene, solution, basis, WELL_CONDITIONED), engine=engine))
+    return rows
+
+
+def worst_rows(rows: Iterable[Row]) -> list[Row]:
+    """Of several rows of a quantity the worst."""
+    found: dict[tuple[str, str], Row] = {}
+
+    def badness(row: Row) -> tuple[int, float]:
+        return VERDICTS.index(row.verdict), float(used(row.error, row.allowed))
+
+    for row in rows:
+        key = row.setting, row.quantity
+        if key not in found or badness(row) > badness(found[key]):
+            found[key] = row
+    return list(found.values())
+
+
+def row_of(
+    question: Question, engine: str, quantity: str, error: Array, tolerance: Tolerance, theta_2: Array, reason: str
+) -> Row:
+    """The row of a quantity whose errors at some positions are held to one tolerance."""
+    index = int(np.argmax(used(error, tolerance.factor)))
+    verdict = AGREES if used(error[index], tolerance.factor) <= 1.0 else FAILS
+    numbers = float(error[index]), tolerance.factor, verdict, f"{tolerance.name}: {reason}", float(theta_2[index]), 1.0
+    return Row(question.name, engine, "exact", quantity, *numbers)
+
+
+def member(study: Solution, index: int | NDArray[np.intp]) -> Solution:
+    """One linkage of a solved study, or some positions of one linkage."""
+
+    def own(value: Any) -> Any:
+        if isinstance(value, dict):
+            return {name: each[index] for name, each in value.items()}
+        return value[index] if isinstance(value, np.ndarray) else value
+
+    one = replace(study, **{field.name: own(getattr(study, field.name)) for field in fields(study) if field.init})
+    one.points, one.velocity, one.acceleration = (own(of) for of in (study.points, study.velocity, study.acceleration))
+    return one
+
+
+def parts(answer: Answer) -> dict[str, Array]:
+    """The unknowns of a position, vectors as components, pin forces also as their magnitudes."""
+    found = {}
+    for name in UNKNOWNS:
+        values = answer.quantities[name]
+        if is_scalar(name):
+            found[name] = values
+        else:
+            found |= {f"{name}_x": values[:, 0], f"{name}_y": values[:, 1], f"|{name}|": magnitude(values)}
+    return found

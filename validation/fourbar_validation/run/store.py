@@ -1,0 +1,150 @@
+"""The folder of a run: a lock, finished parts, and at the end the results.
+
+lock               held while a run goes on; the system frees it when the process dies
+run.json           what is being run; a rerun of the same thing resumes, of another starts over
+parts/000012       what chunk 12 came to, written whole: a line of JSON that says of which run it is, and the SHA-256
+                   of what follows; then a line of JSON for each record, packed by gzip
+"""
+
+import gzip
+import hashlib
+import json
+import shutil
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from fourbar.errors import DependencyError, FourBarError, InputError
+from fourbar.writing import require_file, write_bytes, write_text
+from fourbar_validation.report.record import Record
+
+WRITTEN = [
+    "lock",
+    "run.json",
+    "record.json",
+    "results.csv",
+    "results.parquet",
+    "timings.csv",
+    "report.md",
+    "report.html",
+]
+"""Files of the folder of a run."""
+
+
+class RunningError(FourBarError):
+    """Another run is writing into the same folder."""
+
+
+class Store:
+    """The parts of one run in its folder: `identity` is what they depend on."""
+
+    def __init__(self, folder: Path, identity: dict[str, Any]) -> None:
+        self.folder, self.parts = folder, folder / "parts"
+        self._identity = json.dumps(identity, indent=1, sort_keys=True) + "\n"
+        self._run = hashlib.sha256(self._identity.encode()).hexdigest()
+        self.notes: list[str] = []
+        """What of an earlier run is made again, and why."""
+
+    @contextmanager
+    def held(self) -> Iterator["Store"]:
+        """Hold the folder for one run and keep the parts that an interrupted run of the same thing left."""
+        from filelock import FileLock, Timeout
+
+        self.folder.mkdir(parents=True, exist_ok=True)
+        for name in WRITTEN:
+            require_file(self.folder / name)
+        if self.parts.exists() and not self.parts.is_dir():
+            raise InputError("--out", str(self.parts), "must be a folder, in which a run keeps its parts")
+        lock = FileLock(self.folder / "lock", timeout=0)
+        try:
+            lock.acquire()
+        except Timeout:
+            raise RunningError(f"{self.folder}: another run is writing into this folder") from None
+        try:
+            self._begin()
+            yield self
+        finally:
+            lock.release()
+
+    def _begin(self) -> None:
+        marker = self.folder / "run.json"
+        same = marker.is_file() and marker.read_text(encoding="utf-8") == self._identity
+        if not same:
+            if marker.is_file() and self.parts.is_dir() and any(self.parts.iterdir()):
+                self.notes.append(f"made again: the parts of another run ({self._other(marker)})")
+            marker.unlink(missing_ok=True)
+            shutil.rmtree(self.parts, ignore_errors=True)
+        self.parts.mkdir(exist_ok=True)
+        for leftover in self.parts.glob(".*.part"):
+            _remove(leftover)
+        if not same:
+            write_text(marker, self._identity)
+
+    def _other(self, marker: Path) -> str:
+        """In what the earlier run differs from this one."""
+        try:
+            before, now = json.loads(marker.read_text(encoding="utf-8")), json.loads(self._identity)
+            return ", ".join(name for name in sorted({*before, *now}) if before.get(name) != now.get(name))
+        except (AttributeError, TypeError, ValueError):
+            return "its run.json is damaged"
+
+    def done(self) -> set[int]:
+        """The chunks whose parts are whole and of this run; others are removed, and noted."""
+        found = set()
+        for path in sorted(self.parts.iterdir()):
+            try:
+                self._packed(path)
+                found.add(int(path.name))
+            except ValueError as error:
+                self.notes.append(f"made again: {path.parent.name}/{path.name}: {error}")
+                _remove(path)
+        return found
+
+    def put(self, chunk: int, records: Sequence[Record]) -> None:
+        """Write a finished chunk."""
+        packed = gzip.compress("\n".join(json.dumps(record.kept_all()) for record in records).encode(), 1, mtime=0)
+        head = {"chunk": chunk, "run": self._run, "sha256": hashlib.sha256(packed).hexdigest()}
+        write_bytes(self._path(chunk), json.dumps(head).encode() + b"\n" + packed)
+
+    def _path(self, chunk: int) -> Path:
+        return self.parts / f"{chunk:06d}"
+
+    def _packed(self, path: Path) -> bytes:
+        """What follows the first line of a part; ValueError that says what is wrong with it."""
+        if not path.is_file():
+            raise ValueError("is no file")
+        first, _, packed = path.read_bytes().partition(b"\n")
+        try:
+            head = dict(json.loads(first))
+        except (TypeError, ValueError):
+            raise ValueError("is damaged") from None
+        if head.get("sha256") != hashlib.sha256(packed).hexdigest():
+            raise ValueError("is damaged")
+        if head.get("run") != self._run:
+            raise ValueError("is of another run")
+        if path.name != str(head.get("chunk")).zfill(6):
+            raise ValueError("is another part")
+        return packed
+
+    def read(self, chunk: int) -> list[Record]:
+        """The records of a chunk, in order; DependencyError where the part was damaged meanwhile."""
+        path = self._path(chunk)
+        try:
+            lines = gzip.decompress(self._packed(path)).decode().splitlines()
+        except (ValueError, FileNotFoundError) as error:
+            raise DependencyError(f"{path}: {error}; run it again, and this part is made again") from None
+        return [Record.restore(json.loads(line)) for line in lines]
+
+    def finish(self) -> None:
+        """The results are written: the parts have served."""
+        shutil.rmtree(self.parts)
+        (self.folder / "run.json").unlink()
+
+
+def _remove(path: Path) -> None:
+    """Whatever lies there under the name of a file."""
+    if path.is_dir() and not path.is_symlink():
+        shutil.rmtree(path)
+    else:
+        path.unlink()

@@ -1,0 +1,238 @@
+"""The hard cases: each family a generator with named parameters and seeds, and one line on what must happen."""
+
+import math
+import tomllib
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from fourbar.effects import Gravity
+from fourbar.linkage import Bar, FourBar
+from fourbar.scene import Scene
+from fourbar.scene.motion import BRANCH_NAMES, Free, Motion, Sweep
+from fourbar_validation.scenes.hard_linkages import (
+    Lengths,
+    at,
+    collinear_2_3,
+    collinear_3_4,
+    dressed,
+    linkage_of,
+    moving,
+    parallel_2_4,
+    with_bars,
+)
+from fourbar_validation.scenes.random import LinkageType
+
+Scenes = Iterator[tuple[str, Scene]]
+ROCKERS = (LinkageType.DOUBLE_ROCKER, LinkageType.TRIPLE_ROCKER)
+CRANK, ROCKER = LinkageType.CRANK_ROCKER, LinkageType.TRIPLE_ROCKER
+REGULAR = (0.5, 0.4, 0.3)
+"""rad from the singular position: positions that set the scale of each quantity."""
+TOGGLE = tuple(10.0**-k for k in range(1, 13))
+NEAR = (1e-1, 3e-2, 1e-2, 3e-3)
+"""rad; as far as a simulation in time follows."""
+POLE = tuple(10.0**-k for k in range(1, 10))
+PLAIN = (0.3, 0.1, 0.25, 0.22)
+"""Lengths of an ordinary crank-rocker, m."""
+CHANGE = tuple(10.0**-k for k in range(1, 9))
+
+
+def toggle(*, distances: tuple[float, ...] = TOGGLE, seeds: range = range(2)) -> Scenes:
+    """Bars 3, 4 collinear, approached from inside, and the same distances beyond it."""
+    for kind in ROCKERS:
+        for seed in seeds:
+            lengths = linkage_of(kind, seed)
+            for psi, stretched in collinear_3_4(lengths):
+                inward = -1.0 if stretched else 1.0
+                inside = psi + inward * np.array([*REGULAR, *distances])
+                beyond = psi - inward * np.array(distances)
+                for branch, name in BRANCH_NAMES.items():
+                    label = f"{kind.value} {seed} {'stretched' if stretched else 'folded'} {name}"
+                    yield label, at(dressed(lengths, seed), [*inside, *beyond[::-1]], branch)
+
+
+def poles(*, bar: int, distances: tuple[float, ...] = POLE, seeds: range = range(2)) -> Scenes:
+    """The position where the driven bar 3 or 4 stands still, from both sides."""
+    offsets = np.array([*(-x for x in (*REGULAR, *distances)), *distances[::-1], *REGULAR[::-1]])
+    for seed in seeds:
+        lengths = linkage_of(CRANK, seed)
+        found = parallel_2_4(lengths) if bar == 3 else collinear_2_3(lengths)
+        for number, (psi, branch) in enumerate(found[:3]):
+            yield f"{seed} {number}", at(dressed(lengths, seed), psi + offsets, branch, drive_bar=bar)
+
+
+def driven_output(*, steps: int = 180, seeds: range = range(2)) -> Scenes:
+    """Drive on bar 4 through a whole turn of the input, across both positions where omega_4 = 0."""
+    for seed in seeds:
+        scene = dressed(linkage_of(CRANK, seed), seed)
+        for branch, name in BRANCH_NAMES.items():
+            motion = Motion(Sweep(0.05, 0.05 + 2 * math.pi, steps), 3.0, 0.0, branch)
+            yield f"{seed} {name}", replace(scene, motion=motion, drive_bar=4)
+
+
+CHANGE_POINTS: dict[str, tuple[Lengths, int, tuple[float, ...]]] = {
+    "parallelogram": ((0.3, 0.1, 0.3, 0.1), 1, (0.0, math.pi)),
+    "antiparallelogram": ((0.3, 0.1, 0.3, 0.1), -1, (0.0, math.pi)),
+    "kite a = b": ((0.3, 0.1, 0.1, 0.3), 1, (math.pi,)),
+    "kite a = d": ((0.1, 0.1, 0.3, 0.3), 1, (0.0,)),
+}
+"""Lengths, branch just beyond psi = 0, change points psi. The kite a = d has A on O4 at its own."""
+
+
+def change_point(*, distances: tuple[float, ...] = CHANGE) -> Scenes:
+    """Close to a change point, on both sides and both branches."""
+    offsets = np.array([*(-x for x in (*REGULAR, *distances)), *distances[::-1], *REGULAR[::-1]])
+    for kind, (lengths, _, points) in CHANGE_POINTS.items():
+        for psi in points:
+            for branch, name in BRANCH_NAMES.items():
+                yield f"{kind} {math.degrees(psi):.0f} {name}", at(dressed(lengths), psi + offsets, branch)
+
+
+def through_change_point(*, steps: int = 73) -> Scenes:
+    """A sweep through the change points, once by the sign of the branch and once along the smooth path."""
+    for kind, (lengths, branch, _) in CHANGE_POINTS.items():
+        for through in ("sign", "follow"):
+            scene = dressed(lengths)
+            start = scene.linkage.ground_angle + 0.3
+            motion = Motion(Sweep(start, start + 2 * math.pi, steps), 3.0, 0.0, branch, through)
+            yield f"{kind} {through}", replace(scene, motion=motion)
+
+
+def near_grashof(*, gaps: tuple[float, ...] = (1e-3, 1e-6, 1e-9, 1e-12), steps: int = 60) -> Scenes:
+    """s + l short of p + q, or beyond it, by a hair: the sweep passes close to where it would change."""
+    for gap in gaps:
+        for sign in (1.0, -1.0):
+            d, a, b = 0.4, 0.1, 0.25
+            scene = dressed((d, a, b, d + a - b + sign * gap))
+            sweep = Sweep(scene.linkage.ground_angle, scene.linkage.ground_angle + 2 * math.pi, steps)
+            yield f"{sign * gap:+.0e}", replace(scene, motion=replace(scene.motion, theta_2=sweep, alpha_2=0.0))
+
+
+def sweep_of(scene: Scene, steps: int = 36) -> Scene:
+    """One turn of the input."""
+    return replace(scene, motion=replace(scene.motion, theta_2=Sweep(0.1, 0.1 + 2 * math.pi, steps), alpha_2=0.0))
+
+
+def bar_ratio(*, exponents: range = range(-6, 0)) -> Scenes:
+    """A crank that is ever shorter against the coupler."""
+    for k in exponents:
+        yield f"1e{k}", sweep_of(dressed((0.3, 0.25 * 10.0**k, 0.25, 0.22)))
+
+
+def mass_ratio(*, exponents: tuple[int, ...] = (-6, -3, 3, 6)) -> Scenes:
+    """One bar heavier or lighter than the others by up to 1e6."""
+    base = sweep_of(dressed(PLAIN))
+    for name, bar in moving(base):
+        for k in exponents:
+            heavy = replace(bar, mass=bar.mass * 10.0**k, inertia=bar.moment_of_inertia * 10.0**k)
+            yield f"{name} 1e{k:+d}", with_bars(base, **{name: heavy})
+
+
+def without_inertia() -> Scenes:
+    """Bars without rotational inertia, without mass, and loads alone on massless bars."""
+    base = sweep_of(dressed(PLAIN))
+    for name, bar in moving(base):
+        yield f"{name} point mass", with_bars(base, **{name: replace(bar, inertia=0.0)})
+        yield f"{name} massless", with_bars(base, **{name: Bar(bar.length)})
+    yield "all massless", with_bars(base, **{name: Bar(bar.length) for name, bar in moving(base)})
+
+
+def far_centres(*, times: tuple[float, ...] = (3.0, 100.0, 1e4)) -> Scenes:
+    """Centres of mass far outside the bar."""
+    base = sweep_of(dressed(PLAIN))
+    for name, bar in moving(base):
+        for k in times:
+            yield f"{name} {k:g}", with_bars(base, **{name: replace(bar, centre=(k * bar.length, 2.0))})
+
+
+def sizes(*, exponents: range = range(-6, 7, 2)) -> Scenes:
+    """The same shape from micrometres to a thousand kilometres."""
+    for k in exponents:
+        yield f"1e{k:+d} m", sweep_of(dressed(tuple(x * 10.0**k for x in PLAIN)))  # type: ignore[arg-type]
+
+
+def speeds(*, exponents: tuple[int, ...] = (-6, -3, 0, 3, 6)) -> Scenes:
+    """omega_2 from 1e-6 to 1e6 rad/s, in both senses."""
+    base = sweep_of(dressed(PLAIN))
+    for k in exponents:
+        for sign, name in ((1.0, "+"), (-1.0, "-")):
+            yield f"{name}1e{k:+d}", replace(base, motion=replace(base.motion, omega_2=sign * 10.0**k))
+
+
+def loads(*, exponents: tuple[int, ...] = (-9, -3, 3, 9)) -> Scenes:
+    """Loads from 1e-9 to 1e9 of the weights."""
+    base = sweep_of(dressed(PLAIN))
+    for k in exponents:
+        scaled = []
+        for load in base.loads:
+            force = None if load.force is None else (load.force[0] * 10.0**k, load.force[1])
+            scaled.append(replace(load, force=force, moment=load.moment * 10.0**k))
+        yield f"1e{k:+d}", replace(base, loads=tuple(scaled))
+
+
+def out_and_back(*, beyond: float = 0.5, steps: int = 40, seeds: range = range(2)) -> Scenes:
+    """A sweep that leaves the range in which the linkage assembles, and comes back."""
+    for seed in seeds:
+        lengths = linkage_of(ROCKER, seed)
+        (psi, stretched), *_ = collinear_3_4(lengths)
+        outward = 1.0 if stretched else -1.0
+        out = np.linspace(psi - outward * 0.6, psi + outward * beyond, steps)
+        for branch, name in BRANCH_NAMES.items():
+            yield f"{seed} {name}", at(dressed(lengths, seed), [*out, *out[::-1]], branch)
+
+
+def thesis_limits(*, steps: int = 120) -> Scenes:
+    """The thesis's double rocker (bars 20, 48, 55, 20 cm) driven from one limit position to the other."""
+    bars = (Bar(0.48, 57.0, 11.119275, (0.765, 0.0)), Bar(0.55, 0.544), Bar(0.20, 0.2))
+    linkage = FourBar(0.20, *bars, math.radians(45.0))
+    (psi, _), *_ = collinear_3_4(linkage.lengths)
+    for branch, name in BRANCH_NAMES.items():
+        sweep = Sweep(linkage.ground_angle + psi, linkage.ground_angle + 2 * math.pi - psi, steps)
+        yield name, Scene(linkage, Motion(sweep, 0.2244, branch=branch), 4)
+
+
+def released(*, durations: tuple[float, ...] = (10.0, 100.0), steps: int = 100) -> Scenes:
+    """IFToMM benchmark A02 with one window: 1 m, 1 kg links, upright, first pin at 1 m/s, gravity 9.81."""
+    bar = Bar(1.0, 1.0)
+    linkage = FourBar(1.0, bar, bar, bar)
+    for duration in durations:
+        motion = Motion(math.pi / 2, -1.0, through="follow", free=Free(duration, steps))
+        yield f"{duration:g} s", Scene(linkage, motion, effects=(Gravity(),))
+
+
+@dataclass(frozen=True, slots=True)
+class Family:
+    """Scenes of one kind of difficulty."""
+
+    name: str
+    statement: str
+    """What must happen; printed with every scene of the family."""
+    scenes: Callable[[], Scenes]
+
+
+STATEMENTS = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
+FAMILIES = tuple(
+    Family(name, STATEMENTS[name], scenes)
+    for name, scenes in {
+        "toggle": toggle,
+        "toggle-near": lambda: toggle(distances=NEAR),
+        "pole-T3": lambda: poles(bar=3),
+        "pole-T4": lambda: poles(bar=4),
+        "driven-output": driven_output,
+        "change-point": change_point,
+        "change-point-through": through_change_point,
+        "near-grashof": near_grashof,
+        "bar-ratio": bar_ratio,
+        "mass-ratio": mass_ratio,
+        "no-inertia": without_inertia,
+        "far-centres": far_centres,
+        "sizes": sizes,
+        "speeds": speeds,
+        "loads": loads,
+        "out-and-back": out_and_back,
+        "thesis-limits": thesis_limits,
+        "released": released,
+    }.items()
+)

@@ -1,0 +1,172 @@
+"""Which scenes a run judges: the named mechanisms of `models/`, the files given, or random linkages."""
+
+import hashlib
+import math
+import tomllib
+from collections import Counter
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+from fourbar.errors import InputError
+from fourbar.files import loads, read_text, reading
+from fourbar.scene import Scene
+from fourbar.scene.motion import DEFAULT_STEPS, Free, Sweep
+from fourbar_validation.compare.rows import plain
+from fourbar_validation.places import MODELS
+from fourbar_validation.scenes.random import LinkageType, random_scene
+
+MOST_POSITIONS = 100_000
+"""Of a scene in a run, where every engine solves each of them: 3 ms each, with all engines."""
+MOST_SECONDS = 100.0
+"""Of a free motion in a run: the engines go through it in steps of 1 to 4 ms, a second in about a second."""
+AS_LONG_AS = 100
+"""Positions that take as long as a second of free motion, generously."""
+
+
+class Suite(Protocol):
+    """An ordered set of named scenes; each is made where it is judged, so a long suite takes no memory."""
+
+    def __len__(self) -> int: ...
+
+    def name(self, index: int) -> str:
+        """Name of a scene; the names are in ascending order."""
+
+    def scene(self, index: int) -> Scene:
+        """The scene itself."""
+
+    def fingerprint(self) -> str:
+        """Changes when any scene does."""
+
+
+@dataclass(frozen=True, slots=True)
+class Files:
+    """Scene files, read once so that a run judges what it began with."""
+
+    texts: tuple[tuple[str, str], ...]
+    """(name, text of the file), sorted by name."""
+    positions: int = 0
+    """The most that any of them asks for, or what takes as long."""
+
+    def __len__(self) -> int:
+        return len(self.texts)
+
+    def name(self, index: int) -> str:
+        return self.texts[index][0]
+
+    def scene(self, index: int) -> Scene:
+        name, text = self.texts[index]
+        return loads(text, name)
+
+    def fingerprint(self) -> str:
+        return hashlib.sha256(repr(self.texts).encode()).hexdigest()
+
+
+@dataclass(frozen=True, slots=True)
+class Random:
+    """`count` random linkages of the given types, or uneven ones; scene i depends on (seed, i) alone."""
+
+    count: int
+    seed: int
+    types: tuple[LinkageType, ...]
+
+    def __len__(self) -> int:
+        return self.count
+
+    def name(self, index: int) -> str:
+        return f"random-{self.seed}-{index:09d}"
+
+    def scene(self, index: int) -> Scene:
+        return random_scene(self.seed, index, self.types)
+
+    def fingerprint(self) -> str:
+        return f"random {self.count} {self.seed} {','.join(kind.value for kind in self.types)}"
+
+
+def model_files() -> list[Path]:
+    """The scene files of `models/`, sorted."""
+    return sorted(MODELS.glob("*.toml"))
+
+
+def scene_files(paths: Iterable[Path]) -> Files:
+    """Read and check scene files; each is named by its stem, or by its path where two stems are alike.
+
+    What does not print in a name is written as its escape. Raises InputError for a file that is bad, and for two of
+    one name, at once: a long run does not start on bad input.
+    """
+    files = list(dict.fromkeys(Path(path) for path in paths))
+    stems = Counter(_printed(file.stem) for file in files)
+    texts: dict[str, str] = {}
+    most = 0
+    for file in files:
+        name = _printed(file.stem)
+        if stems[name] > 1:
+            name = _printed(file.with_suffix("").as_posix())
+        if name in texts:
+            raise InputError("SCENE", str(file), f"must have a name of its own: another file is {name!r} too")
+        text = read_text(file)
+        most = max(most, _positions(loads(text, str(file)), file))
+        texts[name] = text
+    if not texts:
+        raise InputError("SCENE", [], "no scene file to run")
+    return Files(tuple(sorted(texts.items())), most)
+
+
+def _printed(name: str) -> str:
+    return plain(name).replace("\n", "\\n")
+
+
+def _positions(scene: Scene, file: Path) -> int:
+    """How many positions a scene asks for, or what takes as long; InputError beyond the most."""
+    for key, stated in (("motion.theta_2", scene.motion.theta_2), ("motion.free", scene.motion.free)):
+        if isinstance(stated, (Sweep, Free)):
+            if stated.steps >= MOST_POSITIONS:
+                raise InputError(f"{key}.steps", stated.steps, f"must be below {MOST_POSITIONS} in a run", str(file))
+            seconds = stated.duration if isinstance(stated, Free) else 0.0
+            if seconds > MOST_SECONDS:
+                allowed = f"must not exceed {MOST_SECONDS:g} s in a run: engines go through it in steps of 1 ms"
+                raise InputError(f"{key}.duration", seconds, allowed, str(file))
+            return stated.steps + 1 + math.ceil(AS_LONG_AS * seconds)
+    return DEFAULT_STEPS + 1
+
+
+LARGEST_LIST = 16 * 2**20
+"""Bytes; a hundred thousand names."""
+
+
+def suite_file(path: Path) -> Files:
+    """The scenes that a file lists, named from its own folder: TOML with `scenes = [...]`, or one per line.
+
+    An entry may hold * for any name. InputError where an entry leaves the folder or names no file.
+    """
+
+    def refuse(entry: object, allowed: str) -> InputError:
+        return InputError("--suite", entry, allowed, str(path))
+
+    if not path.exists():
+        raise refuse(path.name, 'must be "hard" or a file that lists scenes: there is no such file')
+    text = reading.read_text(path, "--suite", LARGEST_LIST)
+    try:
+        entries = tomllib.loads(text).get("scenes") if path.suffix == ".toml" else _listed(text)
+    except (ValueError, RecursionError):  # no TOML
+        raise refuse(path.name, "is no list of scenes") from None
+    if not isinstance(entries, list) or not all(isinstance(entry, str) and entry for entry in entries):
+        raise refuse(path.name, 'must have scenes = ["a.toml", ...], or one scene file per line')
+    files: list[Path] = []
+    for entry in entries:
+        if Path(entry).is_absolute() or ".." in Path(entry).parts or "\0" in entry:
+            raise refuse(entry, "must lie in the folder of the list, or below it")
+        found = [path.parent / entry]
+        if "*" in entry:
+            found = sorted(file for file in path.parent.glob(entry) if not file.samefile(path))
+        if not found:
+            raise refuse(entry, "names no file")
+        files += found
+    return scene_files(files)
+
+
+def _listed(text: str) -> list[str]:
+    """One entry per line; # begins a comment."""
+    lines = (line.partition("#")[0].strip() for line in text.splitlines())
+    return [line for line in lines if line]

@@ -1,1 +1,0 @@
-"""Studies that use the harness: what accuracy costs, what effects cost, the models."""
