@@ -70,7 +70,8 @@ def sampled(question: Question) -> Scene:
     if not len(where):
         raise NotAskedError("no position that is well-conditioned and moves")
     few = where[np.unique(np.linspace(0, len(where) - 1, SAMPLE + 2).astype(int)[1:-1])]
-    motion = Motion(at.theta_2[few], scene.motion.omega_2, scene.motion.alpha_2, scene.motion.branch)
+    own = scene.motion
+    motion = Motion(at.theta_2[few], own.omega_2, own.alpha_2, own.branch, own.through)
     return replace(scene, motion=motion, title="", source="", pictures=())
 
 
