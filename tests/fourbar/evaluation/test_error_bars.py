@@ -15,6 +15,7 @@ from fourbar_validation.compare.error import magnitude
 from fourbar_validation.engines.exact import BallArithmetic
 from fourbar_validation.lab.stress.mutation.specimens import SPECIMENS
 from fourbar_validation.run import printed
+from fourbar_validation.run.question import Question
 
 TURNS = 2000.0 * np.pi
 
@@ -89,8 +90,10 @@ def test_a_run_judges_the_bars_where_each_spring_is_nearest_to_its_rest(monkeypa
     ]
     seen: list[np.ndarray] = []
     true = fourbar.solve
+    question = Question("", scene, command(scene))
+    assert question.solution is not None
     monkeypatch.setattr(printed, "solve", lambda *given, at: seen.append(at.theta_2) or true(*given, at=at))
-    rows = list(printed._error_bars("", scene, command(scene), whole))
+    rows = list(printed.check_error_bars(question))
     assert {row.verdict for row in rows} == {"agrees"}
     assert {whole.theta_2[np.argmin(np.abs(gap))] for gap in away} <= set(seen[0])
 
@@ -106,8 +109,8 @@ def test_a_bar_is_of_the_motion_that_begins_to_one_side() -> None:
 def test_a_bar_is_as_wide_as_what_a_position_loses() -> None:
     """Where a spring's ends nearly meet the direction in which it pulls is lost, which is no power of any sine."""
     scene = SPECIMENS["ends of a spring nearly meet"]
-    rows = printed.printed("", scene, command(scene), fourbar.solve(scene, "force"), None)
-    assert [row.verdict for row in rows if row.quantity.endswith("_error")] == ["agrees", "agrees"]
+    rows = printed.check_error_bars(Question("", scene, command(scene)))
+    assert [row.verdict for row in rows] == ["agrees", "agrees"]
 
 
 def test_a_long_sweep_searches_for_friction_at_its_ends_alone(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -119,8 +122,9 @@ def test_a_long_sweep_searches_for_friction_at_its_ends_alone(monkeypatch: pytes
         motion=Motion(np.array([0.3, 0.5]), 10.0),
         effects=(fourbar.PinFriction.at(A=(50.0, 0.01), B=(40.0, 0.02)),),
     )
-    solution = fourbar.solve(jammed, "force")
-    assert set(solution.status) == {"jammed"}
+    question = Question("", jammed, command(jammed))
+    assert set(question.solution.status) == {"jammed"}
     del searched[:]
-    assert printed._blocks("", jammed, command(jammed), solution).passed
+    (row,) = printed.check_blocks(question)
+    assert row.passed
     assert 0 < len(searched) < 10

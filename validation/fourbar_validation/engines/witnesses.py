@@ -33,6 +33,8 @@ class Witness:
     """What it is held to where the scene states positions only; nothing: it is then not started."""
     through_time: bool = False
     """Whether it runs through the motion in time."""
+    generated: bool = False
+    """Whether it runs the generated MJCF, which is then compared as it is shipped too."""
     predictor: str = ""
     """ "module:function" that predicts, from the description, the errors to be expected beyond the tolerance; "own":
     the engine's own residuals do; nothing: the tolerance is all."""
@@ -136,6 +138,7 @@ WITNESSES = (
         UNKNOWNS,
         order="fourbar_validation.engines.mujoco.simulate:observed_order",
         through_time=True,
+        generated=True,
         predictor="own",
         library="mujoco",
     ),
