@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from fourbar.formulas.arithmetic import Number, cross
+from fourbar.formulas.arithmetic import Number, anywhere, cross
 from fourbar.formulas.motion import State
 from fourbar.formulas.pin_forces import Bodies, Body, Wrenches
 from fourbar.linkage import PINS, FourBar
@@ -35,12 +35,15 @@ class Actions:
     ----------
     state : positions and motion.
     bodies : of bars 2, 3, 4.
-    side : the sense in which pins at rest are about to turn: +1 as theta_2 grows, -1 as it falls, 0 neither.
+    side : the sense in which pins at rest are about to turn: +1 as theta_2 grows, -1 as it falls, 0 neither; between
+        them the part of its torque that dry friction holds them with.
     rounded : what a number becomes when it is rounded otherwise, for the error bars: of terms, and of what cancels in
         them, as a distance against a spring's length.
     """
 
-    def __init__(self, state: State, bodies: Bodies, side: int = 0, rounded: Callable[..., Number] = as_it_is) -> None:
+    def __init__(
+        self, state: State, bodies: Bodies, side: Number = 0, rounded: Callable[..., Number] = as_it_is
+    ) -> None:
         self.state, self.bodies, self.side, self.rounded = state, bodies, side, rounded
         self.forces: dict[int, Any] = {}
         """Resultants of the bars on which any acts, complex, N."""
@@ -100,7 +103,7 @@ class Actions:
         moves turns in either sense.
         """
         slip, turning = self.state.slip(pin), self.turning(pin)
-        if self.side == 0:
+        if not anywhere(self.side != 0):
             return turning * np.sign(slip * self.state.speed)
         moving = np.where(turning, np.sign(slip * self.state.speed), self.side)
         return np.where(np.equal(self.state.speed, 0.0), self.side * turning * np.sign(slip), moving)

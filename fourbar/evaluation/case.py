@@ -92,8 +92,8 @@ class Case(NamedTuple):
     path: Path
     points: tuple[tuple[str, int, Any], ...] = ()
     """The scene's own: name, bar, and place in the bar's frame at its first pin, complex, m."""
-    side: int = 0
-    """In which sense pins at rest are about to turn."""
+    side: Any = 0
+    """In which sense pins at rest are about to turn, or the part of its torque that dry friction holds them with."""
 
     @classmethod
     def of(cls, scene: Scene) -> "Case":
@@ -170,7 +170,7 @@ class Case(NamedTuple):
         return half, index
 
     def dynamics(
-        self, state: State, acceleration: Any, side: int = 0, rounded: Callable[..., Any] = as_it_is
+        self, state: State, acceleration: Any, side: Any = 0, rounded: Callable[..., Any] = as_it_is
     ) -> Dynamics:
         """Compute pin forces and torque under everything that acts; for the parameters see `Actions`."""
         a, at, k = self.lengths.a, state.at, state.k

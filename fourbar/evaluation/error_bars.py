@@ -99,7 +99,7 @@ def error_bars(
     k = rounded_coefficients(path.lengths, near, k, rounded.next(13))
     k = k if path.bar == 2 else read_backwards(k)
     nearby = state._replace(at=near, k=k, moving=rates(k, state.speed, acceleration))
-    other = case.dynamics(nearby, acceleration, rounded=rounded)
+    other = case.dynamics(nearby, acceleration, case.side, rounded)
     values, others = (*found.pins, found.torque), (*other.pins, other.torque)
     spread = root_mean_square(np.array([after - before for before, after in zip(values, others, strict=True)]))
     size = np.array([np.abs(value) for value in values]).reshape(spread.shape)

@@ -108,7 +108,7 @@ def freely(case: Case, moved: "FreeMotion", part: Part, wanted: int, names: Keys
     if not codes.size:
         return codes, {}, None
     bar = int(moved.bar[part][0])
-    free = case._replace(drive_bar=bar, path=moved.paths[bar])
+    free = case._replace(drive_bar=bar, path=moved.paths[bar], side=moved.side[part])
     q, speed, growth, branch = (x[part] for x in (moved.q, moved.speed, moved.acceleration, moved.sign))
     at = free.path.position(q, free.path.half_angle(q), branch)
     state = free.state(free.path, q, at, branch, speed, growth)._replace(theta_2=moved.command.theta_2[part])

@@ -1,16 +1,19 @@
 """Error bars against the true error, by ball arithmetic, where they once were too small, too large, or none."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import fourbar
-from fourbar.effects import Gravity, Load, Spring, SpringEnd, Springs, Table, Torsion
+from fourbar.effects import Gravity, Load, Spring, SpringEnd, Springs, Table, Torsion, cones
 from fourbar.linkage import Bar, FourBar
 from fourbar.quantities import PIN_FORCES
 from fourbar.scene import Scene, command
 from fourbar.scene.motion import Motion
 from fourbar_validation.compare.error import magnitude
 from fourbar_validation.engines.exact import BallArithmetic
+from fourbar_validation.lab.stress.mutation.specimens import SPECIMENS
 from fourbar_validation.run import printed
 from fourbar_validation.run.question import Question
 
@@ -93,3 +96,35 @@ def test_a_run_judges_the_bars_where_each_spring_is_nearest_to_its_rest(monkeypa
     rows = list(printed.check_error_bars(question))
     assert {row.verdict for row in rows} == {"agrees"}
     assert {whole.theta_2[np.argmin(np.abs(gap))] for gap in away} <= set(seen[0])
+
+
+def test_a_bar_is_of_the_motion_that_begins_to_one_side() -> None:
+    """The bar of a linkage about to move was the friction itself, of which the other evaluation knew nothing."""
+    still = replace(sized(), motion=Motion(np.array([1.0, 2.0]), 0.0), effects=(fourbar.Friction.at(A=0.5, O4=2.0),))
+    for side in (-1, 1):
+        torque_error = fourbar.solve(still, "error", side=side).torque_error
+        assert torque_error is not None and torque_error.max() < 1e-13
+
+
+def test_a_bar_is_as_wide_as_what_a_position_loses() -> None:
+    """Where a spring's ends nearly meet the direction in which it pulls is lost, which is no power of any sine."""
+    scene = SPECIMENS["ends of a spring nearly meet"]
+    rows = printed.check_error_bars(Question("", scene, command(scene)))
+    assert [row.verdict for row in rows] == ["agrees", "agrees"]
+
+
+def test_a_long_sweep_searches_for_friction_at_its_ends_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Eight thousand positions of several loaded pins, each searched from many starts, took eight minutes."""
+    searched, search = [], cones._search
+    monkeypatch.setattr(cones, "_search", lambda *problem: searched.append(1) or search(*problem))
+    jammed = replace(
+        sized(),
+        motion=Motion(np.array([0.3, 0.5]), 10.0),
+        effects=(fourbar.PinFriction.at(A=(50.0, 0.01), B=(40.0, 0.02)),),
+    )
+    question = Question("", jammed, command(jammed))
+    assert set(question.solution.status) == {"jammed"}
+    del searched[:]
+    (row,) = printed.check_blocks(question)
+    assert row.passed
+    assert 0 < len(searched) < 10

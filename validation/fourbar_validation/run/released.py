@@ -12,9 +12,10 @@ from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from fourbar.effects import Gravity
-from fourbar.linkage import MOVING_BARS
+from fourbar.effects import Friction, Gravity, Load
+from fourbar.linkage import MOVING_BARS, PINS
 from fourbar.quantities import UNKNOWNS
 from fourbar.scene import Command, Scene
 from fourbar.solution import Solution
@@ -26,9 +27,11 @@ from fourbar_validation.compare.identities import FORMULAS
 from fourbar_validation.compare.rows import AGREES, DEGRADED, FAILS, REFUSES, UNDECIDED, Row
 from fourbar_validation.compare.tolerance import DEGRADED as TIMES_PREDICTED
 from fourbar_validation.compare.tolerance import EQUIVALENCE
+from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.witnesses import Witness, not_installed, predicting_from
 from fourbar_validation.report.record import Timing
-from fourbar_validation.run.question import Question
+from fourbar_validation.run.question import Question, select_positions
+from fourbar_validation.run.shipped.variants import member, worst_rows
 
 
 def _mujoco(step: float) -> Any:
@@ -150,11 +153,19 @@ def _forces(question: Question) -> Iterator[Row]:
     yield Row(name, FORMULAS, "exact", "torque", torque, 0.0, FAILS if torque else AGREES, what, place, 1.0)
     held = replace(scene, motion=replace(scene.motion, free=None, alpha_2=0.0), drive_bar=2)
     at = Command(solution.theta_2, solution.branch, solution.omega_2, solution.alpha_2)
-    driven_one = Question(name, held, at, output=question.output)
+    driven_ones = [
+        (Question(name, own, select_positions(at, where), output=question.output), member(solution, where))
+        for own, where in _prescribed(held, at)
+    ]
     for witness in question.witnesses:
         if witness.tolerance == EQUIVALENCE and "theta_3" in witness.expected and not witness.missing():
-            rows = partial(_forces_by, witness, driven_one, solution)
+            rows = partial(_worst_forces_by, witness, driven_ones)
             yield from question.attempt(rows, witness.name, "forces")
+
+
+def _worst_forces_by(witness: Witness, driven: list[tuple[Question, Solution]]) -> list[Row]:
+    """Compare what one engine answers to each part of the motion, and keep the worst row of each quantity."""
+    return worst_rows(row for own, solution in driven for row in _forces_by(witness, own, solution))
 
 
 def _forces_by(witness: Witness, driven: Question, solution: Solution) -> list[Row]:
@@ -172,6 +183,40 @@ def _forces_by(witness: Witness, driven: Question, solution: Solution) -> list[R
     predicted = predicting_from(witness, scene, driven.at, answer)
     rows = compare(driven.name, scene, answer, conditioned, witness.tolerance, names, predicted, basis)
     return [row for row in rows if row.quantity != "undecided"]
+
+
+def _prescribed(scene: Scene, at: Command) -> Iterator[tuple[Scene, NDArray[np.intp]]]:
+    """Prescribe the instants at which the linkage moves, and each standstill with the couples of dry friction there.
+
+    An engine has no friction at rest. A standstill that lasts is held: every pin takes the same part of its torque, and
+    no more than all of it; one that ends begins to move against the whole torque.
+    """
+    assert at.omega_2 is not None
+    friction = next((effect for effect in scene.effects if isinstance(effect, Friction)), None)
+    resting = np.flatnonzero(at.omega_2 == 0.0) if friction is not None else np.empty(0, dtype=int)
+    moving = np.setdiff1d(np.arange(len(at.theta_2)), resting)
+    if len(moving):
+        yield scene, moving
+    if friction is None:
+        return
+    bare = replace(scene, effects=tuple(effect for effect in scene.effects if effect is not friction))
+    numbers = np.stack((at.theta_2, at.alpha_2), axis=1)[resting]
+    for first in resting[np.unique(numbers, axis=0, return_index=True)[1]].tolist():
+        where = np.array([first])
+        here = select_positions(at, where)
+        needed, begins = FreeBody().answer(bare, here).quantities["torque"][0], float(np.sign(here.alpha_2)[0])
+        turning = FreeBody().answer(bare, here._replace(omega_2=np.ones(1))).quantities
+        rate = {1: 0.0, 2: 1.0, 3: turning["omega_3"][0], 4: turning["omega_4"][0]}
+        slips = {pin: rate[PINS[pin][1]] - rate[PINS[pin][0]] for pin, _ in friction.torques}
+        most = sum(torque * abs(slips[pin]) for pin, torque in friction.torques)
+        part = -begins or float(np.clip(needed / most, -1.0, 1.0))
+        loads = [
+            Load(bar, moment=sense * part * torque * float(np.sign(slips[pin])))
+            for pin, torque in friction.torques
+            for bar, sense in zip(PINS[pin], (-1.0, 1.0), strict=True)
+            if bar != 1
+        ]
+        yield replace(bare, loads=(*scene.loads, *loads)), where
 
 
 class _Truth(NamedTuple):

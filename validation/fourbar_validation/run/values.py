@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.quantities import NOT_ASSEMBLED, OK, SEVERAL, SINGULAR
+from fourbar.quantities import NO_TORQUE, NOT_ASSEMBLED, OK, OVERFLOW, SEVERAL, SINGULAR
 from fourbar.scene import Scene
 from fourbar.solution import Solution
 from fourbar_validation.compare.compare import Mask, counted, touching
@@ -94,6 +94,13 @@ def compare_status(
         sound = condition_of(quantity, scene.linkage, reference) * NOTHING_TO_TELL > EPS
         differ |= sound & ~large & (np.isfinite(ours) != np.isfinite(theirs))
     differ &= formulas.status_code != NOT_ASSEMBLED
+    if reference.drive_condition is not None:
+        own = [formulas.a_G2, formulas.a_G3, formulas.a_G4, *formulas.acceleration.values()]
+        # where all is there that the forces need, what is lacking is theirs
+        moves = np.isfinite(np.hstack([a for a in own if a is not None])).all(axis=1)
+        in_line = reference.drive_condition < IN_ONE_LINE
+        differ |= (formulas.status_code == OVERFLOW) & moves & in_line
+        differ |= (formulas.status_code == NO_TORQUE) & (reference.drive_condition > NEAR)
     if sines is not None and len(near := np.flatnonzero(_near(scene, formulas, reference))):
         sine = np.abs(sines(near))
         closes, in_line = np.isfinite(sine), formulas.status_code[near] == SINGULAR

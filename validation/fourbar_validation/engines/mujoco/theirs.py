@@ -44,6 +44,8 @@ REFINEMENTS = 3
 ANSWERED = (*UNKNOWNS, *MADE)
 SHARED = "theta_2, omega_2, alpha_2 and the branch; the rest is the file's"
 OWN = "assembly, speeds, accelerations, drive torque and pin forces, by MuJoCo from the file as compiled"
+MOST_KEYFRAMES = 100_000
+"""A linkage has one or a few; MuJoCo reserves as many as a file asks for, minutes long."""
 
 
 @dataclass(slots=True)
@@ -62,6 +64,9 @@ class Examined:
 def compile_text(text: str) -> mujoco.MjModel:
     """Compile a text with MuJoCo; its complaint is an InputError of one line."""
     try:
+        keyframes = mujoco.MjSpec.from_string(text).nkey
+        if keyframes > MOST_KEYFRAMES:
+            raise InputError("--mjcf", None, f"asks for {keyframes} keyframes; up to {MOST_KEYFRAMES} are read")
         model = mujoco.MjModel.from_xml_string(text)
     except ValueError as error:
         raise InputError("MJCF", None, " ".join(f"MuJoCo does not compile it: {error}".split())) from None

@@ -8,6 +8,7 @@ from dataclasses import fields, replace
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fourbar.files import dump, loads
 from fourbar.quantities import OK, UNKNOWNS, is_scalar
@@ -55,7 +56,8 @@ def sampled(question: Question) -> Scene:
     if not len(where):
         raise NotAskedError("no position that is well-conditioned and moves")
     few = where[np.unique(np.linspace(0, len(where) - 1, SAMPLE + 2).astype(int)[1:-1])]
-    motion = Motion(at.theta_2[few], scene.motion.omega_2, scene.motion.alpha_2, scene.motion.branch)
+    own = scene.motion
+    motion = Motion(at.theta_2[few], own.omega_2, own.alpha_2, own.branch, own.through)
     return replace(scene, motion=motion, title="", source="", pictures=())
 
 
@@ -158,8 +160,8 @@ def row_of(
     return Row(question.name, engine, "exact", quantity, *numbers)
 
 
-def member(study: Solution, index: int) -> Solution:
-    """Take one linkage of a solved study."""
+def member(study: Solution, index: int | NDArray[np.intp]) -> Solution:
+    """Take one linkage of a solved study, or some positions of one linkage."""
 
     def own(value: Any) -> Any:
         if isinstance(value, dict):

@@ -135,11 +135,28 @@ SPECIMENS: dict[str, Scene] = {
     "many turns away": Scene(CRANK, Motion(Sweep(20.0, 22.0, 10), 5.0), effects=(Torsion.at(O2=(0.5, 1.0, 0.1)),)),
     "ends of a spring nearly meet": Scene(
         CRANK,
-        Motion(1.0 + np.array([3e-3, 0.1, 1.0]), 10.0),
+        Motion(1.0 + np.array([1e-5, 0.1, 1.0]), 10.0),
         effects=(Springs((Spring(SpringEnd(1, 0.1, 0.8), SpringEnd(2, 0.1, 0.0), 80.0, 0.05),)),),
     ),
+    "held by friction": Scene(CRANK, Motion(1.0, 0.0, free=Free(0.5, 5)), effects=(WEIGHT, Friction.at(B=0.3, O2=2.0))),
+    "held in the end": Scene(CRANK, Motion(1.0, 3.0, free=Free(1.0, 20)), effects=(WEIGHT, Friction.at(A=0.3, O4=1.0))),
+    "from rest against friction": Scene(
+        CRANK, Motion(1.0, 0.0, free=Free(0.5, 20)), effects=(WEIGHT, Friction.at(A=0.01, O4=0.02))
+    ),
     "released to a limit": Scene(ROCKER, Motion(math.radians(50.0), 3.0, free=Free(1.0, 100)), effects=(Gravity(),)),
+    "turning over change points": Scene(
+        FourBar(0.3, Bar(0.1, 0.2), Bar(0.3, 0.5), Bar(0.1, 0.4)),
+        Motion(0.5, 25.0, through="follow", free=Free(0.4, 400)),
+        effects=(Gravity(),),
+    ),
+    "to full accuracy: short diagonal": Scene(
+        uniform(0.859375, 0.853515625, 0.58984375, 0.583984375),
+        Motion(np.array([0.0018, 0.01]), 10.0),
+        effects=(WEIGHT,),
+    ),
+    "no torque": Scene(uniform(0.3, 0.1, 0.3, 0.1), Motion(np.array([0.5, 1.0]), 10.0), 3, effects=(WEIGHT,)),
     "shipped": Scene(SLENDER, TURN, effects=(WEIGHT,), points=POINTS),
+    "shipped, limited": Scene(ROCKER, Motion(Sweep(0.3, 1.4, 22), 3.0), effects=(WEIGHT,)),
     "simulated": Scene(
         CRANK,
         Motion(Sweep(0.1, 6.0, 12), 10.0),
