@@ -11,7 +11,6 @@ from typing import Any
 import flint
 import numpy as np
 import pytest
-from validation.engines.balls import closure, stored, wedge
 
 import fourbar
 import fourbar.effects
@@ -35,6 +34,7 @@ from fourbar.studies.enclosure import _Search
 from fourbar.studies.interval import require
 from fourbar.studies.keys import at_place, entries, with_numbers
 from fourbar.studies.sloped import Sloped, Undecided
+from fourbar_validation.engines.balls import closure, stored, wedge
 
 STRADDLED = [(0.0, 1.0), (0.5, 1.0), (-1.0, 1e-3), (2.0, 2.0), (0.0, 0.0)]
 """Centres and radii: over 0, over whole and half numbers, at a kink, and none at all."""
@@ -95,7 +95,12 @@ def compared(monkeypatch: pytest.MonkeyPatch) -> Iterator[dict[tuple[str, int], 
 
     def noted(holds: Any, fails: Any) -> Any:
         mask, frame = true(holds, fails), sys._getframe(1)
-        while frame.f_back and Path(frame.f_code.co_filename).parts[-2] not in ("effects", "formulas", "scene"):
+        while frame.f_back and Path(frame.f_code.co_filename).parts[-2] not in (
+            "effects",
+            "formulas",
+            "evaluation",
+            "scene",
+        ):
             frame = frame.f_back
         place = "/".join(Path(frame.f_code.co_filename).parts[-2:]), frame.f_lineno
         found[place] = found.get(place, False) or isinstance(mask, Undecided)

@@ -155,7 +155,7 @@ def test_an_answer_that_cannot_be_read_is_left_out_and_the_page_goes_on(
     monkeypatch.setattr(examine, "SUBJECTS", {"one": ("One", "json"), "other": ("Other", "json")})
     monkeypatch.setattr(examine, "_has", lambda *_: True)
     answers = {"one": stated, "other": of_a_turn(torque=[math.nan] * motion.SAMPLES)}
-    monkeypatch.setattr(examine, "ended", lambda line, **_: Ended(answers[line[3]], "", False, ""))
+    monkeypatch.setattr(examine, "of_the_harness", lambda line, **_: Ended(answers[line[3]], "", False, ""))
     found = examine.examine(fourbar.load(PROBLEM), PROBLEM, [Path(sys.executable)], 1.0)
     assert why in found.left_out["One"] and "\x1b" not in found.left_out["One"]
     (line,) = found.lines
@@ -175,7 +175,7 @@ def test_what_a_subject_prints_is_no_part_of_its_answer(tmp_path: Path) -> None:
         "SETTINGS, STEPS = ['s'], [1]\natexit.register(print, 'bye')\n"
         "def through(scene, steps, setting):\n    print('hello'); os.write(1, b'there')\n    return Readings(setting)\n"
     )
-    code = "import sys; from validation import subjects; subjects.__path__.append(sys.argv.pop(1)); import runpy; "
+    code = "import runpy, sys; from fourbar_validation.lab import subjects; subjects.__path__.append(sys.argv.pop(1)); "
     code += "runpy.run_module('fourbar_validation.lab.subjects.work', run_name='__main__', alter_sys=True)"
     line = [sys.executable, "-c", code, str(tmp_path), "loud", str(PROBLEM.absolute())]
     done = subprocess.run(line, cwd=ROOT, capture_output=True, text=True, check=True)
