@@ -83,7 +83,7 @@ def _meeting(lengths: Loop) -> Loop:
 
 
 def _plain(numbers: Any) -> Any:
-    """The same numbers as Python's own, with which a formula of one position is several times quicker."""
+    """Convert numbers to Python's own, with which a formula of one position is several times quicker."""
     return type(numbers)(*(x.item() if isinstance(x, np.generic | np.ndarray) else x for x in numbers))
 
 
@@ -103,7 +103,7 @@ class _Reading:
         return float(smooth_branch(self.path.lengths, q - self.path.theta_1, self.sign)) if self.changes else self.sign
 
     def at(self, q: float) -> tuple[Position, Coefficients]:
-        """The position and its coefficients by q; what is wanted again is kept."""
+        """Compute the position and its coefficients by q; what is wanted again is kept."""
         if self.last is None or self.last[0] != (q, self.sign):
             self.last = (q, self.sign), self._at(q)
         return self.last[1]
@@ -136,7 +136,7 @@ def release(
     *,
     follow: bool = False,
 ) -> FreeMotion:
-    """The motion from theta_2 with omega_2 under the terms, with no driving torque.
+    """Integrate the motion from theta_2 with omega_2 under the effects, with no driving torque.
 
     To 1e-9 rad over 5 s wherever the motion itself does not amplify errors by more than 1000.
 
@@ -319,7 +319,7 @@ class _Run:
     def _root(
         brentq: Any, dense: Callable[[float], Array], f: Callable[[Array], float], low: float, high: float
     ) -> float:
-        """The time at which f of the state is zero; the start of the step where it is zero there already."""
+        """Find the time at which f of the state is zero; the start of the step where it is zero there already."""
         if f(dense(low)) * f(dense(high)) >= 0.0:
             return low
         return float(brentq(lambda t: f(dense(t)), low, high, xtol=1e-15, rtol=1e-15))

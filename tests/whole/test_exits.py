@@ -18,7 +18,7 @@ from fourbar.writing import write_text
 from fourbar_validation.compare.rows import AGREES, FAILS, Row, write_results
 from fourbar_validation.lab.stress.bench import Measured
 from fourbar_validation.lab.stress.forward_error.stability import Tally
-from fourbar_validation.published.figures import Figure
+from fourbar_validation.published.figures import PublishedFigure
 from tests.support.alone import alone
 from tests.support.here import judge_here
 from tests.support.scenes import crank_rocker
@@ -195,7 +195,7 @@ def test_every_command_ends_with_its_status(
 
 def test_a_figure_that_no_erratum_explains_is_status_1(monkeypatch: pytest.MonkeyPatch) -> None:
     assert VALIDATION(["published"]) == HOLDS
-    wrong = Figure("2.4 positions", "1 theta3_1", "167.877224", 167.8)
+    wrong = PublishedFigure("2.4 positions", "1 theta3_1", "167.877224", 167.8)
     monkeypatch.setattr("fourbar_validation.published.check.figures", lambda: iter([wrong]))
     assert VALIDATION(["published"]) == FAILED
 

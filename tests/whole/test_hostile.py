@@ -254,7 +254,7 @@ class Greedy:
 def test_running_out_of_memory_costs_its_own_row(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     suite = suite_file(listed(tmp_path, "a.toml\nb.toml\n"))
     monkeypatch.setattr(fourbar_validation.run.run, "CHUNK", {True: 2, False: 2})
-    greedy = Witness("greedy", f"{__name__}:Greedy", EQUIVALENCE)
+    greedy = Witness("greedy", Greedy, EQUIVALENCE)
     list(run(suite, tmp_path / "run", (*EXACT, greedy), RunOptions(workers=1, drawn=False)))
     failing = [row for row in read_columns(tmp_path / "run" / "results.csv") if row.verdict == FAILS]
     assert {(row.scene, row.engine) for row in failing} == {("b", "greedy")}

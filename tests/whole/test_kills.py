@@ -32,10 +32,10 @@ from fourbar_validation.run import pool
 from fourbar_validation.run.run import Collected, RunOptions, run
 from fourbar_validation.run.selection import chosen
 from fourbar_validation.run.store import RunningError, Store
-from fourbar_validation.scenes.random import LinkageType
+from fourbar_validation.scenes.random import DrawnType
 from fourbar_validation.scenes.suites import AS_LONG_AS, MOST_POSITIONS, Files, Random, Suite, scene_files
 from tests.support.here import judge_here
-from tests.support.unlucky import Few, dies_at_first
+from tests.support.unlucky import Few, Unlucky, dies_at_first
 
 SEED = 7
 KILLS = int(os.environ.get("KILLS", "1"))
@@ -46,7 +46,7 @@ COUNT, IN_A_CHUNK = (220, 20) if FULL else (30, 3)
 SMALL = f"import fourbar_validation.run.run as run; run.CHUNK = {{False: {IN_A_CHUNK}}}; "
 HARNESS = "import runpy; runpy.run_module('validation', run_name='__main__', alter_sys=True)"
 PROGRAM = ("-m", "validation") if FULL else ("-c", SMALL + HARNESS)
-TYPES = tuple(LinkageType)
+TYPES = tuple(DrawnType)
 EXACT = chosen("free-body")
 
 
@@ -77,11 +77,11 @@ def test_an_engine_that_crashes_or_hangs_costs_its_own_rows(tmp_path: Path, monk
 def test_a_worker_ends_itself_in_the_scene_that_hangs_and_with_its_parent() -> None:
     """The limit is that of a scene, whatever the others of its chunk took."""
     judge = (
-        "from tests.support.unlucky import Few; from fourbar_validation.run import pool; "
+        "from tests.support.unlucky import Few, Moody; from fourbar_validation.run import pool; "
         "from fourbar_validation.compare.tolerance import EQUIVALENCE; "
         "from fourbar_validation.engines.witnesses import Witness; "
-        "moody = [Witness('moody', 'tests.support.unlucky:Moody', EQUIVALENCE)]; "
-        "pool.ready(%s); print('ready', flush=True); pool.judge_watched(%s, Few(), [0, 2], moody, False)"
+        "moody = [Witness('moody', Moody, EQUIVALENCE)]; pool.ready(%s); print('ready', flush=True); "
+        "pool.judge_watched(%s, Few(), [0, 2], moody, False)"
     )
     for parent, limit in (("0", 1.0), ("1", 100.0)):  # the parent of the second is another
         line = [sys.executable, "-c", judge % (parent, limit)]
@@ -99,7 +99,7 @@ def test_what_comes_from_outside_is_not_held_against_the_engine(
     for life in range(3):
         (tmp_path / "lives" / f"{how} {life}").touch()
     monkeypatch.setenv("LIVES", str(tmp_path / "lives"))
-    unlucky = Witness("unlucky", "tests.support.unlucky:Unlucky", EQUIVALENCE)
+    unlucky = Witness("unlucky", Unlucky, EQUIVALENCE)
     assert judge_all(Few(("a",)), tmp_path / "run", (*EXACT, unlucky), workers=1).counts[FAILS] == 0
     assert not list((tmp_path / "lives").iterdir())
 
@@ -360,7 +360,7 @@ def test_of_a_long_suite_what_fails_has_pictures_and_what_is_nearest_to_it(
     monkeypatch.setattr("fourbar_validation.report.summary.PICTURED", 3)
     monkeypatch.setattr(fourbar_validation.run.run, "PICTURED", 3)
     monkeypatch.setattr(fourbar_validation.run.run, "html", lambda *_, **__: "")
-    blunders = Witness("blunders", f"{__name__}:Blunders", EQUIVALENCE)
+    blunders = Witness("blunders", Blunders, EQUIVALENCE)
     *_, without = run(Few(), tmp_path / "without", (*EXACT, blunders), RunOptions(drawn=False))
     assert not drawn and not any(record.figure for record in without.shown)  # type: ignore[union-attr]
     once = Blunders.titles.count("b")

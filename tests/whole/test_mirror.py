@@ -35,7 +35,7 @@ JUDGED_BY = {
     "fourbar/studies/test_enclosure.py": "fourbar/studies: interval; fourbar/show: extremes",
     # parts of one document or picture
     "fourbar/mjcf/test_mjcf.py": "fourbar/mjcf: defaults document effects model notes settings",
-    "fourbar/mjcf/test_simulators.py": "fourbar/mjcf: sdf standing usd",
+    "fourbar/mjcf/test_simulators.py": "fourbar/mjcf: assembly sdf usd",
     "fourbar/show/test_animate.py": "fourbar/show/plot: film",
     "fourbar/show/test_notebook.py": "fourbar/files: new; fourbar/show: drawing",
     "fourbar/show/test_page.py": "fourbar/show: page_data tolerances",
@@ -54,14 +54,15 @@ JUDGED_BY = {
     "validation/engines/test_added_guests.py": "validation/engines: checked output workers",
     "validation/engines/test_free_body.py": "validation/engines: free_body_closure free_body_effects",
     "validation/engines/test_hard_suite.py": "validation/scenes: hard_families hard_linkages; "
-    "validation/engines: exact; validation/engines/mujoco: shipped; validation/report: hard_page",
-    "validation/engines/mujoco/test_simulate.py": "validation/engines/mujoco: drives motions runner watch",
+    "validation/compare: nearby; validation/engines: exact; validation/engines/mujoco: shipped; "
+    "validation/report: hard_page",
+    "validation/engines/mujoco/test_simulate.py": "validation/engines/mujoco: drives monitor motions runner",
     "validation/run/shipped/test_shipped.py": "validation/run/shipped: bounds calls changes files variants",
     "validation/run/test_released.py": "validation/engines: pinocchio_forward; validation/engines/mujoco: released",
     "validation/check/test_check.py": "validation/check: fitted judge judgement mistakes theirs; "
     "validation/run: printed",
     "validation/check/test_model.py": "validation/check: causes differences screen; "
-    "validation/engines: memory; validation/engines/mujoco: anatomy attached describe guess mend theirs",
+    "validation/engines: memory; validation/engines/mujoco: attached corrections describe guess theirs topology",
     "validation/published/test_published.py": "validation/published: check figures program textbook "
     "thesis_dynamics thesis_positions thirteen; validation/lab: ladder",
     "validation/regression/test_regression.py": "validation/regression: accept change changes fault history "

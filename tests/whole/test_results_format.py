@@ -26,7 +26,7 @@ from fourbar_validation.run.judge import CHECKS
 from fourbar_validation.run.released import ENGINES, FULL
 from fourbar_validation.run.run import RunOptions, run
 from fourbar_validation.run.selection import chosen
-from fourbar_validation.scenes.random import LinkageType
+from fourbar_validation.scenes.random import DrawnType
 from fourbar_validation.scenes.suites import Random
 from tests.support.here import judge_here
 from tests.support.scenes import crank_rocker
@@ -55,7 +55,7 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
         judge_here(monkeypatch)
         list(
             run(
-                Random(8, 1, tuple(LinkageType)),
+                Random(8, 1, tuple(DrawnType)),
                 folder / "results",
                 chosen("free-body"),
                 RunOptions(workers=1, drawn=False),

@@ -22,8 +22,8 @@ from fourbar.effects import (
     Gravity,
     Load,
     PinFriction,
-    Point,
     Spring,
+    SpringEnd,
     Springs,
     Torsion,
     Viscous,
@@ -47,8 +47,8 @@ LEVEL = FourBar(
     0.1, Bar(0.1, 1.0, 1e-3, (0.05, 0.0)), Bar(0.06, 2.0, 1e-2, (0.03, 0.0)), Bar(0.12, 1.5, 1e-2, (0.06, 0.0))
 )
 """Ground and input are equal: which is shorter is open within their tolerances."""
-MEETING = Spring(Point(1, 0.1005, 0.5), Point(2, 0.1, 0.0), 1000.0, 0.5)
-LOOSE = Spring(Point(1, 0.1, 2.0), Point(3, 0.1, 0.0), 1000.0, 0.5, 500.0)
+MEETING = Spring(SpringEnd(1, 0.1005, 0.5), SpringEnd(2, 0.1, 0.0), 1000.0, 0.5)
+LOOSE = Spring(SpringEnd(1, 0.1, 2.0), SpringEnd(3, 0.1, 0.0), 1000.0, 0.5, 500.0)
 
 
 def scene(

@@ -17,7 +17,7 @@ from fourbar_validation.cli import status as ended
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.rows import FAILS
 from fourbar_validation.engines.mujoco.closed_loop import O2, ClosedLoop
-from fourbar_validation.engines.mujoco.trial import Rig
+from fourbar_validation.engines.mujoco.trial import TrialSetup
 from fourbar_validation.engines.witnesses import WITNESSES
 from fourbar_validation.lab.cost import measure
 from fourbar_validation.lab.cost.exhaustive import cheapest
@@ -67,7 +67,7 @@ def test_the_file_alone_keeps_the_error(tmp_path: Path) -> None:
 def test_what_lies_between_two_steps_is_judged_too() -> None:
     """Two steps are right at both of their ends, and miss what the pin forces do amid them."""
     scene = replace(turning(), motion=fourbar.Motion(fourbar.Sweep(0.0, 1.0, 36), 10.0))
-    rig = Rig(scene, advise.looked_at(scene))
+    rig = TrialSetup(scene, advise.looked_at(scene))
     trial = rig.try_out(advise.dialled(12.0, 6.0))
     assert trial.steps == 2 and errors(scene, trial.at, trial.quantities).worst < 2e-3
     assert matters.judged(scene, trial).worst > 0.1
@@ -120,7 +120,7 @@ def test_unseen_linkages_are_served_and_not_at_three_times_the_cheapest() -> Non
 
 def test_the_search_knows_when_nothing_serves() -> None:
     scene = turning(positions=12)
-    rig = Rig(scene, command(scene))
+    rig = TrialSetup(scene, command(scene))
     assert cheapest(rig, 1e-3, {("RK4", True): 1.0}) is not None
     trials: list[object] = []
     rig.try_out = lambda settings, build=None: trials.append(settings) or hopeless(scene)  # type: ignore[method-assign,func-returns-value]
@@ -128,7 +128,7 @@ def test_the_search_knows_when_nothing_serves() -> None:
 
 
 def hopeless(scene: fourbar.Scene) -> object:
-    made = Rig(scene, command(scene)).try_out(advise.dialled(10.0, 3.0))
+    made = TrialSetup(scene, command(scene)).try_out(advise.dialled(10.0, 3.0))
     made.broken = "lost"
     return made
 
@@ -193,7 +193,7 @@ def test_what_matters_for_a_scene_is_measured_and_stated_with_its_reason() -> No
     hood = fourbar.Scene(fourbar.FourBar(0.11, *bars), motion, effects=(fourbar.Gravity(),))
     for scene, setting, why in ((hood, "the stiffness by pads", "lighter of coupler and output"),
                                 (turning(10.0, 36), "the timestep", "fourth power")):  # fmt: skip
-        rig = Rig(scene, advise.looked_at(scene))
+        rig = TrialSetup(scene, advise.looked_at(scene))
         first, *others = found = matters.influences(scene, rig, advise.dialled(40.0, 12.0))
         assert first.setting == setting and first.times > 10.0 and why in matters.sentence(found)
         assert all(first.times >= other.times for other in others)

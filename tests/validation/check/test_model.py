@@ -32,7 +32,7 @@ from fourbar_validation.compare.compare import compare
 from fourbar_validation.compare.rows import FAILS
 from fourbar_validation.compare.tolerance import SIMULATED
 from fourbar_validation.engines.memory import WORKER_MEMORY
-from fourbar_validation.engines.mujoco.theirs import ONE_STATE, THROUGH_TIME, Examined, examine, examine_mended
+from fourbar_validation.engines.mujoco.theirs import ONE_STATE, THROUGH_TIME, Examined, examine, examine_corrected
 
 CRANK_ROCKER = fourbar.load(Path(__file__).parents[3] / "models" / "crank_rocker.toml")
 GENERATED = mjcf(CRANK_ROCKER)
@@ -163,11 +163,11 @@ def test_loads_under_other_names_and_in_another_order_are_the_same_loads() -> No
 
 
 def described(text: str) -> Mapping[str, float | str]:
-    from fourbar_validation.engines.mujoco.anatomy import Anatomy
     from fourbar_validation.engines.mujoco.describe import described as describe
     from fourbar_validation.engines.mujoco.theirs import compile_text
+    from fourbar_validation.engines.mujoco.topology import Topology
 
-    return describe(Anatomy(compile_text(text), {}))
+    return describe(Topology(compile_text(text), {}))
 
 
 @pytest.mark.parametrize(("old", "new"), [("-9.81", "-9.80"), ('mass="0.5"', 'mass="0.501"')])
@@ -209,7 +209,7 @@ def test_bodies_and_sites_are_guessed_from_what_hangs_together_and_from_the_leng
     assert errors(BARE, found, ONE_STATE)["theta_4"] < STIFF_ENOUGH
 
 
-MENDED = [
+CORRECTED = [
     ("bars.coupler.mass", 'mass="0.5"', 'mass="0.6"'),
     ("bars.output.centre.angle", "0.11883216824898844 0 -0.0167", "0.11883216824898844 0 0.0167"),
     ("lengths.coupler", 'name="r" pos="0.25', 'name="r" pos="0.26'),
@@ -220,9 +220,9 @@ MENDED = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize(("key", "old", "new"), MENDED, ids=[each[0] for each in MENDED])
+@pytest.mark.parametrize(("key", "old", "new"), CORRECTED, ids=[each[0] for each in CORRECTED])
 def test_the_one_thing_that_is_wrong_has_all_of_the_error(key: str, old: str, new: str) -> None:
-    """Mended alone, the file is as good as it was before it was spoilt: by far the greatest share."""
+    """Corrected alone, the file is as good as it was before it was spoilt: by far the greatest share."""
     text = other_plane(f'site1="r" site2="q" {STIFF}')
     assert old in text
     found = examine(BARE, spoilt := text.replace(old, new), {})
@@ -230,7 +230,7 @@ def test_the_one_thing_that_is_wrong_has_all_of_the_error(key: str, old: str, ne
     entries = [(key, wanted[key]), ("option.tolerance", wanted["option.tolerance"])]
     before, *after = (
         [row for row in compare("", BARE, answers[0], solve(BARE, at=answers[0].at), SIMULATED, UNKNOWNS)]
-        for answers in (found.answers, *(each or [] for each in examine_mended(BARE, spoilt, found.names, entries)))
+        for answers in (found.answers, *(each or [] for each in examine_corrected(BARE, spoilt, found.names, entries)))
     )
     chosen = [d for d in differences(generated(BARE).described, found.described) if d.key in dict(entries)]
     first, second = causes(sorted(chosen, key=lambda d: d.key != key), before, after)

@@ -35,7 +35,7 @@ from fourbar_validation.run.judge import judge, judged
 from tests.support.here import judge_here, summary_of
 from tests.support.scenes import crank_rocker
 from tests.validation.regression.test_regression import HERE, ROW, save
-from tests.validation.run.test_judge import Echo
+from tests.validation.run.test_judge import Echo, Refuses
 
 NAN = math.nan
 
@@ -157,7 +157,7 @@ class SilentWithoutEffects(Echo):
     ],
 )
 def test_what_is_wrong_with_the_inertia_alone_is_a_row(engine: type, verdict: str, reason: str) -> None:
-    witness = Witness("echo", f"{__name__}:{engine.__name__}", EQUIVALENCE)
+    witness = Witness("echo", engine, EQUIVALENCE)
     found = [row for row in judge("scene", crank_rocker(), [witness]).rows if row.quantity == "torque_inertia"]
     assert [(row.verdict, row.reason) for row in found] == [(verdict, reason)]
 
@@ -219,7 +219,7 @@ def test_a_run_in_which_nothing_was_compared_says_so_everywhere_and_ends_with_1(
 
 
 def test_every_form_of_a_report_says_the_same_counts() -> None:
-    refused = Witness("echo", "tests.validation.run.test_judge:Refuses", EQUIVALENCE)
+    refused = Witness("echo", Refuses, EQUIVALENCE)
     exact = next(w for w in WITNESSES if w.name == "free-body")
     good, bad = (
         judged(name, crank_rocker(title=name), witnesses, draw=False)

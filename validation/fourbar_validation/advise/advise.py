@@ -18,7 +18,7 @@ from fourbar.scene import command as command_of
 from fourbar.writing import require_file, write_text
 from fourbar_validation.advise.errors import WorstErrors
 from fourbar_validation.advise.matters import MATTERS, influences, judged, sentence
-from fourbar_validation.engines.mujoco.trial import FEWEST_STEPS, LONGEST, ORDER, SHORTEST, Rig, dialled, guess
+from fourbar_validation.engines.mujoco.trial import FEWEST_STEPS, LONGEST, ORDER, SHORTEST, TrialSetup, dialled, guess
 from fourbar_validation.report.terminal import lined_up
 
 MARGIN = 0.7
@@ -77,14 +77,14 @@ class Advice:
         )
 
 
-def advise(scene: Scene, error: float, rig: Rig | None = None) -> Advice:
+def advise(scene: Scene, error: float, rig: TrialSetup | None = None) -> Advice:
     """Search the number of steps, and the time constant around what the law says, by runs of the scene.
 
     Raises LimitError for a scene that cannot be run through in time.
     """
     if not 0.0 < error < 1.0:
         raise InputError("--error", error, "must be a relative error, above 0 and below 1")
-    return _CheapestSearch(scene, error, rig or Rig(scene, looked_at(scene))).advice()
+    return _CheapestSearch(scene, error, rig or TrialSetup(scene, looked_at(scene))).advice()
 
 
 def looked_at(scene: Scene) -> Command:
@@ -100,7 +100,7 @@ def looked_at(scene: Scene) -> Command:
 class _CheapestSearch:
     """Settings tried on one scene, for one required error."""
 
-    def __init__(self, scene: Scene, error: float, rig: Rig) -> None:
+    def __init__(self, scene: Scene, error: float, rig: TrialSetup) -> None:
         self.scene, self.error, self.rig = scene, error, rig
         self.attempts: list[Attempt] = []
 
@@ -202,7 +202,7 @@ def command(scenes: tuple[Path, ...], wanted: float, output: Path | None) -> int
     rows, reached = [], True
     for file, scene in loaded:
         try:
-            rig = Rig(scene, looked_at(scene))
+            rig = TrialSetup(scene, looked_at(scene))
             advice = advise(scene, wanted, rig)
         except LimitError as error:
             reason = f"cannot be simulated: {error}; inverse dynamics with loop multipliers can answer it"

@@ -13,7 +13,7 @@ from fourbar.scene import Command, Scene
 from fourbar.solve import solve
 from fourbar_validation.advise.errors import NO_ANSWER, WorstErrors, errors
 from fourbar_validation.engines.loop import Trial
-from fourbar_validation.engines.mujoco.trial import LONGEST, SHORTEST, Rig
+from fourbar_validation.engines.mujoco.trial import LONGEST, SHORTEST, TrialSetup
 
 MATTERS = 2.0
 """A setting that a change of a factor of two, or its loss, makes the error grow by less does not matter."""
@@ -43,7 +43,7 @@ class SettingInfluence:
 
 
 def judged(scene: Scene, trial: Trial) -> WorstErrors:
-    """WorstErrors of a trial, at its steps and between them; none where MuJoCo lost the motion."""
+    """Compute the errors of a trial, at its steps and between them; none where MuJoCo lost the motion."""
     if trial.broken:
         return NO_ANSWER
     found = [errors(scene, trial.at, trial.quantities)]
@@ -53,7 +53,7 @@ def judged(scene: Scene, trial: Trial) -> WorstErrors:
 
 
 def between(scene: Scene, trial: Trial, samples: slice, steps: int) -> Iterator[WorstErrors]:
-    """WorstErrors amid the steps of a stretch, where they are fewer than its positions: a spline through what was read.
+    """Compute errors amid the steps of a segment, where they are fewer than its positions: by a spline.
 
     A largest force that lies between two steps is not seen at either of them.
     """
@@ -76,7 +76,7 @@ def between(scene: Scene, trial: Trial, samples: slice, steps: int) -> Iterator[
     yield errors(scene, at, there)
 
 
-def influences(scene: Scene, rig: Rig, settings: Settings) -> list[SettingInfluence]:
+def influences(scene: Scene, rig: TrialSetup, settings: Settings) -> list[SettingInfluence]:
     """Every setting changed alone, the one that matters most first."""
     before = judged(scene, rig.try_out(settings)).worst
     found = []
@@ -94,7 +94,7 @@ def sentence(found: list[SettingInfluence]) -> str:
     return f"no setting matters by itself here: changed alone none makes the error {MATTERS:g} times as large"
 
 
-def _changes(scene: Scene, settings: Settings) -> Iterator[tuple[str, str, Settings, Callable[[Rig], str]]]:
+def _changes(scene: Scene, settings: Settings) -> Iterator[tuple[str, str, Settings, Callable[[TrialSetup], str]]]:
     """Say what is changed to what, and what a growth of the error would come from."""
     steps, tc = settings.steps_per_revolution, settings.time_constant_steps
     window = max(settings.steps_per_window // 2, 1)
@@ -128,7 +128,7 @@ def _changes(scene: Scene, settings: Settings) -> Iterator[tuple[str, str, Setti
         )
 
 
-def _why_timestep(rig: Rig) -> str:
+def _why_timestep(rig: TrialSetup) -> str:
     motion = solve(rig.scene, "position", at=rig.command)
     sines = np.abs(motion.sin_mu)
     nearest = int(np.nanargmin(sines))

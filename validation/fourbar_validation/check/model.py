@@ -37,11 +37,11 @@ SECONDS = 120.0
 """A four-bar takes less than one."""
 ABOUT_SHARES = (
     "share: of the error of that quantity, what goes when this one entry alone is as generated; "
-    "a dash: it cannot be mended alone in the compiled file"
+    "a dash: it cannot be corrected alone in the compiled file"
 )
 HEADINGS = ("quantity", "theirs", "generated", "allowed", "verdict")
 EXAMINE = "fourbar_validation.engines.mujoco.theirs:examine"
-MENDED = "fourbar_validation.engines.mujoco.theirs:examine_mended"
+CORRECTED = "fourbar_validation.engines.mujoco.theirs:examine_corrected"
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,8 +107,8 @@ def examine_model(
         found = differences(generated.described, theirs.described, theirs.called)
         entries = [(difference.key, difference.generated) for difference in found]
         failed = any(row.failed for row in rows)
-        mended = examined(MENDED, scene, text, dict(theirs.names), entries) if failed else []
-    after = [[] if answers is None else _rows(name, scene, answers, tolerance) for answers in mended]
+        corrected = examined(CORRECTED, scene, text, dict(theirs.names), entries) if failed else []
+    after = [[] if answers is None else _rows(name, scene, answers, tolerance) for answers in corrected]
     return ModelReport(causes(found, rows, after), costs, theirs.notes)
 
 

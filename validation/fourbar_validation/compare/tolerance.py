@@ -21,6 +21,8 @@ EPS = 2.0**-52
 K = 50.0
 """One factor for every exact comparison. Two evaluations of about fifty roundings each differ by
 sqrt(2 * 50) = 10 of them as a random walk; 50 covers the tails of some 10^5 comparisons."""
+ROUNDINGS = 8.0
+"""A chain of some fifty roundings moves a result by sqrt(50) = 7 last digits, as a random walk."""
 NOTHING_TO_TELL = 1e-3
 """Where eps/condition exceeds this, two correct programs may differ in the third digit: no verdict is drawn."""
 WELL_CONDITIONED = 0.1

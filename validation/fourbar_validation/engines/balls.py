@@ -30,7 +30,7 @@ Values: TypeAlias = dict[str, Ball]
 
 
 def inputs(scene: Scene, theta_2: float) -> dict[str, float]:
-    """The stored doubles that the outputs at one position depend on."""
+    """Collect the stored doubles that the outputs at one position depend on."""
     link, motion = scene.linkage, scene.motion
     d, a, b, c = link.lengths
     values = {"d": d, "a": a, "b": b, "c": c, "theta_1": link.ground_angle, "theta_2": theta_2}
@@ -67,13 +67,13 @@ def inputs(scene: Scene, theta_2: float) -> dict[str, float]:
 
 
 def stored(scene: Scene, theta_2: float, **motion: float) -> Values:
-    """The same as balls of no radius, with another omega_2 or alpha_2 where stated; sets the working precision."""
+    """Give the inputs as balls of no radius, with another omega_2 or alpha_2 where given; set the working precision."""
     ctx.prec = BITS
     return {name: arb(value) for name, value in (inputs(scene, theta_2) | motion).items()}
 
 
 def polar(r: Ball, angle: Ball) -> Complex:
-    """r e^{i angle}."""
+    """Return r e^{i angle}."""
     return acb(r * angle.cos(), r * angle.sin())
 
 
@@ -107,7 +107,7 @@ def linear(rows: list[list[Ball]], right: list[Ball]) -> list[Ball]:
 
 
 def outputs(scene: Scene, branch: int, x: Values, drive_bar: int) -> Values | None:  # noqa: PLR0915 - one system
-    """Every output at one position as balls; vectors as name_x, name_y; None where the loop does not close."""
+    """Compute every output at one position as balls; vectors as name_x, name_y; None where the loop does not close."""
     closed = closure(x, branch)
     if closed is None:
         return None
@@ -121,7 +121,7 @@ def outputs(scene: Scene, branch: int, x: Values, drive_bar: int) -> Values | No
     of_3, of_4 = acb(0, b) * w[3], acb(0, -c) * w[4]
 
     def rates(known: Complex) -> list[Ball]:
-        """Of bars 3 and 4, where b i w3 rate_3 - c i w4 rate_4 is known."""
+        """Solve for the rates of bars 3 and 4, where b i w3 rate_3 - c i w4 rate_4 is given."""
         return linear([[of_3.real, of_4.real], [of_3.imag, of_4.imag]], [known.real, known.imag])
 
     # what a probe opens the loop by: slip, m/s, and jerk, m/s^2
@@ -192,7 +192,7 @@ def _put(y: Values, vectors: dict[str, Complex]) -> None:
 
 
 def _twist(moment: dict[int, Ball], pin: str, couple: Ball) -> None:
-    """A couple on bar j of a pin (i, j), its opposite on bar i; on the ground it does nothing."""
+    """Add a couple to bar j of a pin (i, j), its opposite to bar i; on the ground it does nothing."""
     i, j = PINS[pin]
     for bar, value in ((j, couple), (i, -couple)):
         if bar in moment:
@@ -208,7 +208,7 @@ def _add_effects(
     force: dict[int, Complex],
     moment: dict[int, Ball],
 ) -> None:
-    """Loads and springs, from the directions and first pins of all bars, the ground's too."""
+    """Add loads and springs, from the directions and first pins of all bars, the ground's too."""
     for k, load in enumerate(scene.loads):
         factor = _factor(load.table, x["theta_2"]) if load.table else arb(1)
         axes = w[load.bar] if load.frame == "bar" else acb(1)
@@ -236,7 +236,7 @@ def _add_effects(
 
 
 def _factor(table: Table, theta_2: Ball) -> Ball:
-    """On the straight line between the two points of a table that enclose an angle, taken modulo a turn."""
+    """Interpolate between the two points of a table that enclose an angle, taken modulo a turn."""
     turns = math.floor((float(theta_2.mid()) - table.theta_2[0]) / math.tau + 1e-12)
     angle = theta_2 - 2 * turns * arb.pi()
     after = min(max(bisect(table.theta_2, float(angle.mid())), 1), len(table.theta_2) - 1)
@@ -254,7 +254,7 @@ def _pull(spring: Spring, x: Values, k: int, across: Complex) -> Complex:
 
 
 def response(base: Values, changed: Iterable[Values | None]) -> dict[str, float]:
-    """How far each output moves, by 2^-STEP_BITS, under the first of several changes with which the loop closes."""
+    """Compute how far each output moves, by 2^-STEP_BITS, under the first of several changes that closes the loop."""
     for moved in changed:
         if moved is None:
             continue
@@ -272,7 +272,7 @@ def response(base: Values, changed: Iterable[Values | None]) -> dict[str, float]
 
 
 def reference(scene: Scene, branch: int, theta_2: float) -> tuple[Values, dict[str, float]] | None:
-    """Values at one position as balls, and sum |x_i dy/dx_i| of each; None where the loop does not close."""
+    """Compute values at one position as balls, and sum |x_i dy/dx_i| of each; None where the loop does not close."""
     exact = stored(scene, theta_2)
 
     def evaluate(**changed: Ball) -> Values | None:

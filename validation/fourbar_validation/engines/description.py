@@ -34,7 +34,7 @@ def inertia(bar: Bar) -> float:
 
 
 def centre(bar: Bar) -> tuple[float, float]:
-    """Distance (m) and angle (rad) of the mass centre from the first pin and the bar's line: as stated, or mid-bar."""
+    """Return distance (m) and angle (rad) of the mass centre from pin and bar's line: as specified, or mid-bar."""
     return bar.centre if bar.centre is not None else (bar.length / 2.0, 0.0)
 
 
@@ -44,23 +44,23 @@ def about_first_pin(bar: Bar) -> float:
 
 
 def components(size: float, angle: float) -> tuple[float, float]:
-    """Of a vector, along and across the line from which its angle (rad) counts."""
+    """Resolve a vector along and across the line from which its angle (rad) counts."""
     return size * math.cos(angle), size * math.sin(angle)
 
 
 def within_half_a_turn(angle: float) -> float:
-    """The direction of an angle however many turns away, rad: sums with others then lose none of its digits."""
+    """Reduce an angle to its direction, rad: sums with others then lose none of its digits."""
     return angle if abs(angle) <= math.pi else math.atan2(math.sin(angle), math.cos(angle))
 
 
 def turned(angle: float, x: float, y: float) -> tuple[float, float]:
-    """The vector that is (x, y) along and across a line at an angle (rad)."""
+    """Rotate (x, y) along and across a line at an angle (rad) into world axes."""
     cos, sin = math.cos(angle), math.sin(angle)
     return turned_by(((cos, -sin), (sin, cos)), x, y)
 
 
 def turned_by(rotation: Sequence[Sequence[float]], x: float, y: float) -> tuple[float, float]:
-    """A vector turned by a matrix of two rows."""
+    """Rotate a vector by a matrix of two rows."""
     (a, b), (c, d) = rotation
     return a * x + b * y, c * x + d * y
 
@@ -93,7 +93,7 @@ class Part(NamedTuple):
 
 
 def parts(linkage: FourBar) -> list[Part]:
-    """Bars 2, 3 on 2, and 4."""
+    """Describe bars 2, 3 on 2, and 4."""
     theta_1, d = linkage.ground_angle, linkage.ground
     feet = {2: (1, (0.0, 0.0)), 3: (2, (linkage.input.length, 0.0)), 4: (1, components(d, theta_1))}
     found = []
@@ -106,7 +106,7 @@ def parts(linkage: FourBar) -> list[Part]:
 
 
 def place(point: Any, ground_angle: float) -> tuple[float, float]:
-    """An end of a spring along and across its bar's line from the first pin, on the ground in world axes, m."""
+    """Locate an end of a spring along and across its bar's line from the first pin, on the ground in world axes, m."""
     at = components(point.distance, point.angle)
     return turned(ground_angle, *at) if point.bar == 1 else at
 
@@ -120,7 +120,7 @@ def speeds(at: Command) -> tuple[Array, Array]:
 
 
 def unknown_effect(scene: Scene, table: Container[str]) -> str:
-    """The reason to refuse a scene with an effect that a table has no row for; empty where there is none."""
+    """Give the reason to refuse a scene with an effect that a table has no row for; empty where there is none."""
     return next(
         (f"the effect {effect.key!r} has no model here" for effect in scene.effects if effect.key not in table), ""
     )

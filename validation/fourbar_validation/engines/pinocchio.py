@@ -61,11 +61,11 @@ class PinocchioTree(Tree):
         return np.asarray(self.at[name])
 
     def rotation(self, bar: int) -> Array:
-        """That of the joint."""
+        """Return that of the joint."""
         return np.asarray(self.turned_to[bar])
 
     def point_jacobian(self, name: str) -> Array:
-        """Of a frame."""
+        """Return that of a frame."""
         return np.array(pin.getFrameJacobian(self.model, self.data, self.frame[name], WORLD)[:2])
 
     def turn(self, bar: int) -> Array:
@@ -77,7 +77,7 @@ class PinocchioTree(Tree):
         pin.forwardKinematics(self.model, self.data, self.q, v, a)
 
     def acceleration(self, name: str) -> Array:
-        """Of a frame."""
+        """Return that of a frame."""
         motion = pin.getFrameClassicalAcceleration(self.model, self.data, self.frame[name], WORLD)
         return np.array(motion.linear[:2])
 
@@ -91,7 +91,7 @@ class PinocchioTree(Tree):
         return np.array(pin.rnea(self.model, self.data, self.q, self.v, self.a, self.external))
 
     def carried(self) -> dict[int, Array]:
-        """What each joint transmits in one more pass."""
+        """Compute what each joint transmits in one more pass."""
         self.needed(self.field, self.wrenches)
         return {bar: self.rotation(bar) @ self.joint_force[bar] for bar in self.wrenches}
 

@@ -4,7 +4,6 @@ import math
 from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
-from pkgutil import resolve_name
 
 from fourbar.errors import LimitError
 from fourbar.mjcf.settings import LIGHT
@@ -63,7 +62,8 @@ def _observed_order(question: Question, witness: Witness) -> dict[str, float]:
         rows = compare_answer(question, replace(witness, expected=FORCES), answer)
         return max((row.error for row in rows if row.quantity in FORCES), default=math.nan)  # a refusal has none
 
-    coarse, fine, order = resolve_name(witness.order)(question.scene, question.at, error)
+    assert witness.order is not None
+    coarse, fine, order = witness.order(question.scene, question.at, error)
     seen = {"error_at_4h": coarse, "error_at_2h": fine, "observed_order": order}
     return seen if all(map(math.isfinite, seen.values())) else {}  # a coarse run may leave what the scene covers
 

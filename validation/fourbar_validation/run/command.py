@@ -19,9 +19,9 @@ from fourbar_validation.report.summary import Summary
 from fourbar_validation.run.elsewhere import run_elsewhere
 from fourbar_validation.run.run import WORKERS, Collected, Pictured, RunOptions, run
 from fourbar_validation.run.selection import askable, chosen, selected
-from fourbar_validation.scenes.random import LinkageType
+from fourbar_validation.scenes.random import DrawnType
 
-ALL_TYPES = ",".join(kind.value for kind in LinkageType)
+ALL_TYPES = ",".join(kind.value for kind in DrawnType)
 STAGES = {int: "judging", Collected: "collecting", Pictured: "drawing"}
 """What the progress says."""
 EXCLUDED = (

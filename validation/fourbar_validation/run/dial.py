@@ -5,13 +5,14 @@ the formulas say: how wrong it is against them stays a finding.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from fourbar.scene import Command, Scene
-from fourbar_validation.compare.answer import Answer, Engine
+from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.compare import COMPARED, turning
 from fourbar_validation.compare.error import magnitude, relative
 from fourbar_validation.compare.tolerance import simulated_within
@@ -25,24 +26,11 @@ LEAST_GROWTH, MOST_GROWTH = 1.15, 3.0
 """Factor on the steps from one round to the next."""
 
 
-@dataclass(frozen=True, slots=True)
-class DialledWitness(Witness):
-    """The simulated witness at a wanted error, which is what it is held to."""
-
-    def engine(self) -> Engine:
-        """Start MuJoCo with settings for that error."""
-        return Dialled(self.tolerance.factor)
-
-
 def dialled(witnesses: Sequence[Witness], error: float) -> tuple[Witness, ...]:
     """Lay out whatever runs through time for `error`, which it is held to; exact witnesses stay exact."""
-    own: dict[str, Any] = {"tolerance": simulated_within(error, "steps and softness are laid out for it"), "order": ""}
-    return tuple(
-        DialledWitness(**{part.name: getattr(each, part.name) for part in fields(Witness)} | own)
-        if each.through_time
-        else each
-        for each in witnesses
-    )
+    tolerance = simulated_within(error, "steps and softness are laid out for it")
+    own: dict[str, Any] = {"engine": partial(Dialled, error), "tolerance": tolerance, "order": None}
+    return tuple(replace(each, **own) if each.through_time else each for each in witnesses)
 
 
 @dataclass(slots=True)

@@ -85,7 +85,7 @@ def run(
     chunks = [range(start, min(start + size, len(suite))) for start in range(0, len(suite), size)]
     identity = {
         "scenes": suite.fingerprint(),
-        "witnesses": [repr(witness) for witness in witnesses],
+        "witnesses": [witness.fingerprint() for witness in witnesses],
         **code(),
         "draw": draw,
         "time limit": seconds,

@@ -7,7 +7,7 @@ from fourbar.errors import DependencyError, InputError
 from fourbar_validation.engines import added
 from fourbar_validation.engines.hard_suite import HARD_WITNESSES, Hard, predicting
 from fourbar_validation.engines.witnesses import FURTHER, WITNESSES, Witness
-from fourbar_validation.scenes.random import UNEVEN_TYPE, LinkageType
+from fourbar_validation.scenes.random import UNEVEN_TYPE, DrawnType
 from fourbar_validation.scenes.suites import Random, Suite, model_files, scene_files, suite_file
 
 
@@ -49,7 +49,9 @@ def chosen(
     for name in names or [engines]:
         if name not in known:
             raise InputError("--engines", name, "must be among " + ", ".join(known))
-    return tuple(witness for name, witness in known.items() if name in names or witness.adapter in adapters)
+    return tuple(
+        witness for name, witness in known.items() if name in names or getattr(witness, "adapter", None) in adapters
+    )
 
 
 def askable(witnesses: tuple[Witness, ...], *, by_name: bool) -> tuple[tuple[Witness, ...], list[tuple[str, str]]]:
@@ -60,12 +62,12 @@ def askable(witnesses: tuple[Witness, ...], *, by_name: bool) -> tuple[tuple[Wit
     return tuple(witness for witness in witnesses if not witness.missing()), missing
 
 
-def linkage_types(text: str) -> tuple[LinkageType, ...]:
+def linkage_types(text: str) -> tuple[DrawnType, ...]:
     """Read the types named in a comma-separated list; none for uneven linkages."""
     if text == UNEVEN_TYPE:
         return ()
     try:
-        return tuple(LinkageType(name.strip()) for name in text.split(","))
+        return tuple(DrawnType(name.strip()) for name in text.split(","))
     except ValueError:
-        allowed = ", ".join(kind.value for kind in LinkageType)
+        allowed = ", ".join(kind.value for kind in DrawnType)
         raise InputError("--type", text, f"must be {UNEVEN_TYPE} or a comma-separated list of {allowed}") from None

@@ -19,7 +19,7 @@ from fourbar.show.plot.style import matplotlib_style
 from fourbar_validation.advise.errors import NO_ANSWER, QUANTITIES, WorstErrors, errors
 from fourbar_validation.engines.mujoco import drives
 from fourbar_validation.engines.mujoco.one_state import MujocoOneState
-from fourbar_validation.engines.mujoco.trial import Build, Rig
+from fourbar_validation.engines.mujoco.trial import Build, TrialSetup
 from fourbar_validation.engines.pinocchio_forward import PinocchioForward
 from fourbar_validation.lab.cost import formulas, laws, orders, pictures, study
 from fourbar_validation.lab.cost.cost import cost, front_lines
@@ -36,7 +36,7 @@ def turning(omega: float = 10.0, positions: int = 36) -> fourbar.Scene:
 
 
 def tried(scene: fourbar.Scene, build: Build | None = None) -> Callable[[Settings], WorstErrors]:
-    rig = Rig(scene, command(scene))
+    rig = TrialSetup(scene, command(scene))
 
     def error(settings: Settings) -> WorstErrors:
         trial = rig.try_out(settings, build)

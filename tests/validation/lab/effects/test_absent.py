@@ -82,7 +82,7 @@ def test_instructions_are_judged_by_the_noise_of_the_whole_build(
 def test_no_term_of_an_effect_runs_in_a_scene_without_effects(whole: dict[str, object]) -> None:
     calls = whole["calls"]
     assert isinstance(calls, list) and "inertia_wrenches" in calls
-    names = {*FILE_OF, "Load", "torque_interval", "settle"}
+    names = {*FILE_OF, "Load", "torque_interval", "solve_sliding"}
     assert not [call for call in calls if names & set(call.split("."))]
 
 

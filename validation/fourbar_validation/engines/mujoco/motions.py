@@ -30,7 +30,7 @@ class Steady:
         self.omega, self.fastest = omega, self.run.fastest
 
     def timestep(self, settings: Settings) -> float:
-        """Of the settings for this stretch, s: at least as many steps as positions; any where there is but one."""
+        """Choose the timestep for this segment, s: at least as many steps as positions; any where there is but one."""
         return self.run.timestep(settings, at_least=self.width) if self.width else 1e-3
 
     def seconds(self, index: int) -> float:
@@ -42,7 +42,7 @@ class Steady:
         return math.sqrt(max(self.run.omega**2 + 2.0 * self.run.alpha * turned, 0.0))
 
     def alpha(self, seconds: float) -> float:
-        """What the drive is given, rad/s^2: the same throughout."""
+        """Return what the drive is given, rad/s^2: the same throughout."""
         return self.run.alpha
 
 
@@ -61,7 +61,7 @@ class Lawful:
         self.fastest, self.width = float(np.abs(speeds).max()), float(np.ptp(angles))
 
     def timestep(self, settings: Settings) -> float:
-        """A whole number of steps from each position to the next."""
+        """Divide the time from each position to the next into a whole number of steps."""
         if not self.intervals:
             return 1e-3
         turned = self.duration * self.fastest
@@ -72,15 +72,15 @@ class Lawful:
         return self.duration / (self.intervals * each) * settings.timestep_scale
 
     def seconds(self, index: int) -> float:
-        """As the law was sampled."""
+        """Return it as the law was sampled."""
         return float(self.time[index]) - self.began
 
     def speed(self, turned: float, seconds: float) -> float:
-        """By the time."""
+        """Return it by the time."""
         return float(abs(self.law.at(np.array([self.began + seconds]))[1][0]))
 
     def alpha(self, seconds: float) -> float:
-        """The second derivative of cubic pieces is linear between their ends."""
+        """Interpolate linearly, as the second derivative of cubic pieces is."""
         at, t, f = self.began + seconds, self.knots, self.at_knots
         k = min(max(bisect.bisect_right(t, at), 1), len(t) - 1)
         part = (at - t[k - 1]) / (t[k] - t[k - 1])
@@ -97,7 +97,7 @@ def extremes(law: Law) -> tuple[float, float]:
 
 
 def order_in_time(command: Command, omega: float, law: Law | None) -> NDArray[np.intp]:
-    """Indices of the positions as they are passed."""
+    """Order the positions as they are passed, as indices."""
     if law is not None:
         assert command.time is not None
         return np.argsort(command.time, kind="stable")

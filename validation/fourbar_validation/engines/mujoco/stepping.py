@@ -16,7 +16,7 @@ def opened(text: str) -> tuple[mujoco.MjModel, mujoco.MjData]:
 
 
 def steps(text: str) -> Callable[[int], None]:
-    """A function that steps the model on from its first keyframe, as often as wanted."""
+    """Make a function that steps the model on from its first keyframe, as often as wanted."""
     model, data = opened(text)
 
     def work(amount: int) -> None:
@@ -26,7 +26,7 @@ def steps(text: str) -> Callable[[int], None]:
 
 
 def compiled(text: str) -> dict[str, object]:
-    """The compiled model: sizes, rows of its constraints at the keyframe, flags, and the whole of it as bytes."""
+    """Compile a model: sizes, rows of its constraints at the keyframe, flags, and the whole of it as bytes."""
     model, data = opened(text)
     whole = np.zeros(mujoco.mj_sizeModel(model), dtype=np.uint8)
     mujoco.mj_saveModel(model, None, whole)

@@ -21,10 +21,10 @@ from fourbar.errors import LimitError
 from fourbar.mjcf import Settings, mjcf
 from fourbar.scene import Command, Scene
 from fourbar_validation.compare.answer import Array
-from fourbar_validation.engines.loop import Position, Trial, as_made, blank
+from fourbar_validation.engines.loop import Assembler, Trial, as_made, blank
 from fourbar_validation.engines.mujoco.closed_loop import O2, ClosedLoop
 from fourbar_validation.engines.mujoco.motions import Steady, order_in_time
-from fourbar_validation.engines.mujoco.runner import LIGHT_FLYWHEEL, Run, assembled, stretches
+from fourbar_validation.engines.mujoco.runner import LIGHT_FLYWHEEL, SimulatedRun, assembled, stretches
 
 STIFF = 4e-2
 """error (tc/h)^4 of RK4 with tc in steps: measured 1.3e-2 to 6e-2 on crank-rocker, drag link and double rocker."""
@@ -45,14 +45,14 @@ Build = Callable[[str, float], ClosedLoop]
 
 
 def guess(error: float) -> tuple[float, float]:
-    """Steps per revolution and time constant in steps that the laws say for an error."""
+    """Compute the steps per revolution and the time constant in steps that the laws say for an error."""
     tc = (STIFF / (error / 2.0)) ** (1.0 / ORDER)
     steps = FIRST_STEPS * (FIRST_ERROR / error) ** (1.0 / ORDER)
     return max(steps, FEWEST_STEPS), min(max(tc, SHORTEST), LONGEST)
 
 
 def dialled(steps_per_revolution: float, time_constant_steps: float) -> Settings:
-    """The recommended settings at a number of steps and a time constant; a window has no steps of its own."""
+    """Give the recommended settings at a number of steps and a time constant; a window has no steps of its own."""
     return Settings(
         steps_per_revolution=steps_per_revolution,
         steps_per_window=1,
@@ -63,7 +63,7 @@ def dialled(steps_per_revolution: float, time_constant_steps: float) -> Settings
 
 @contextmanager
 def silence() -> Iterator[None]:
-    """A setting that fails is a result here: MuJoCo neither prints it nor leaves a log in the working folder."""
+    """Silence MuJoCo: a setting that fails is a result here, neither printed nor logged in the working folder."""
     before = mujoco.get_mju_user_warning()
     mujoco.set_mju_user_warning(lambda _: None)
     try:
@@ -72,7 +72,7 @@ def silence() -> Iterator[None]:
         mujoco.set_mju_user_warning(before)
 
 
-class Rig:
+class TrialSetup:
     """A scene, ready to be tried with any settings.
 
     Raises LimitError for a scene that cannot be run through in time.
@@ -87,7 +87,7 @@ class Rig:
         motion = replace(scene.motion, theta_2=command.theta_2, omega_2=self.omega, alpha_2=self.alpha)
         self.scene, self.command = replace(scene, motion=motion), command
         order = order_in_time(command, self.omega, None)
-        position = Position(ClosedLoop(mjcf(self.scene, Settings(timestep=1e-3), keyframe=False)))
+        position = Assembler(ClosedLoop(mjcf(self.scene, Settings(timestep=1e-3), keyframe=False)))
         found = assembled(position, command, order)
         self.stretches = [stretch for stretch in stretches(found, order) if len(stretch) > 1]
         self.start = {index: angles for index, angles in enumerate(found) if angles is not None}
@@ -95,15 +95,15 @@ class Rig:
             raise LimitError("the loop closes at no two neighbouring positions: nothing to run through in time")
 
     def text(self, settings: Settings, timestep: float) -> str:
-        """The generated MJCF, without its keyframe."""
+        """Write the generated MJCF, without its keyframe."""
         return mjcf(self.scene, replace(settings, timestep=timestep, timestep_scale=1.0), keyframe=False)
 
     def passage(self, stretch: list[int]) -> Steady:
-        """How the input moves through a stretch."""
+        """Choose how the input moves through a segment."""
         return Steady(self.command, stretch, self.omega, self.alpha)
 
     def steps(self, settings: Settings) -> int:
-        """Steps of one run, without making it."""
+        """Count the steps of one run, without making it."""
         total = 0
         for stretch in self.stretches:
             run = self.passage(stretch).run  # a whole number of steps over the stretch
@@ -132,7 +132,7 @@ class Rig:
         light = None
         if self.scene.drive_bar != 2:
             light = ClosedLoop(self.text(replace(settings, flywheel=LIGHT_FLYWHEEL), timestep))
-        run = Run(self.scene, loop, light, passage, self.start[stretch[0]], timestep)
+        run = SimulatedRun(self.scene, loop, light, passage, self.start[stretch[0]], timestep)
         for row, index in enumerate(stretch):
             began = time.process_time()
             run.to(index)

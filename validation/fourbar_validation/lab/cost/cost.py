@@ -14,7 +14,7 @@ from fourbar.writing import write_text
 from fourbar_validation.advise.errors import QUANTITIES
 from fourbar_validation.advise.matters import MATTERS, influences, sentence
 from fourbar_validation.compare.rows import csv_text
-from fourbar_validation.engines.mujoco.trial import Rig
+from fourbar_validation.engines.mujoco.trial import TrialSetup
 from fourbar_validation.lab.cost.curves import BEST
 from fourbar_validation.lab.cost.laws import Law, laws, lines, pareto, warnings
 from fourbar_validation.lab.cost.study import COLUMNS, STEPPED, Point, Study
@@ -53,7 +53,7 @@ def cost(scenes: tuple[Path, ...], out: Path, effects: bool) -> int:
     rows: list[tuple[str, ...]] = []
     for index in range(len(files)):
         name, scene = files.name(index), files.scene(index)
-        rig = Rig(scene, command_of(scene))
+        rig = TrialSetup(scene, command_of(scene))
         study = Study(name, scene, out / name)
         columns = (
             TextColumn(name),

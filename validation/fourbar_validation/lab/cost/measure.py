@@ -16,13 +16,13 @@ from fourbar.scene import Scene, command
 from fourbar.scene.motion import Motion, Sweep
 from fourbar_validation.advise.advise import advise
 from fourbar_validation.advise.matters import judged
-from fourbar_validation.engines.mujoco.trial import Rig
+from fourbar_validation.engines.mujoco.trial import TrialSetup
 from fourbar_validation.lab.cost.exhaustive import cheapest, relative_costs
-from fourbar_validation.scenes.random import LinkageType, random_scene
+from fourbar_validation.scenes.random import DrawnType, random_scene
 
 TYPES = (
-    *(LinkageType.CRANK_ROCKER, LinkageType.DRAG_LINK),
-    *(LinkageType.DOUBLE_ROCKER, LinkageType.TRIPLE_ROCKER),
+    *(DrawnType.CRANK_ROCKER, DrawnType.DRAG_LINK),
+    *(DrawnType.DOUBLE_ROCKER, DrawnType.TRIPLE_ROCKER),
 )
 SPEEDS = (-1.0, 3.0)
 """log10 of rad/s."""
@@ -99,8 +99,8 @@ def case(seed: int, index: int, costs: dict[tuple[str, bool], float]) -> Case:
     scene, required = scene_of(seed, index)
     advice = advise(scene, required)
     dense, searched = denser(scene, DENSER), denser(scene, SEARCHED)
-    error = judged(dense, Rig(dense, command(dense)).try_out(advice.best.settings)).worst
-    found = cheapest(Rig(searched, command(searched)), required, costs)
+    error = judged(dense, TrialSetup(dense, command(dense)).try_out(advice.best.settings)).worst
+    found = cheapest(TrialSetup(searched, command(searched)), required, costs)
     return Case(
         index,
         scene.title.rpartition(" ")[0],
@@ -139,7 +139,7 @@ def measure(seed: int, count: int, out: Path) -> Iterator[Case]:
     if len(done) >= count:
         return
     scene, _ = scene_of(seed, 0)
-    costs = relative_costs(Rig(scene, command(scene)))
+    costs = relative_costs(TrialSetup(scene, command(scene)))
     if not out.exists() or not done:
         out.write_text(f"# seed {seed}\n" + ",".join(field.name for field in fields(Case)) + "\n", encoding="utf-8")
     for index in range(count):

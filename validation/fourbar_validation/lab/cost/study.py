@@ -19,7 +19,7 @@ from fourbar_validation.advise.advise import advise
 from fourbar_validation.advise.errors import NO_ANSWER, WorstErrors, errors
 from fourbar_validation.compare.answer import Engine
 from fourbar_validation.engines.loop import Trial
-from fourbar_validation.engines.mujoco.trial import Rig
+from fourbar_validation.engines.mujoco.trial import TrialSetup
 from fourbar_validation.lab.cost import formulas
 from fourbar_validation.lab.cost.curves import BEST, SLOW, Curve, Spot, curves
 from fourbar_validation.lab.stress.timed import in_turns, seconds
@@ -88,7 +88,7 @@ class Study:
         self.name, self.scene, self.folder = name, scene, folder / "parts"
         self.command = command(scene)
         self.left_out: list[str] = []
-        self._rigs: dict[tuple[bool, bool, bool], Rig] = {}
+        self._rigs: dict[tuple[bool, bool, bool], TrialSetup] = {}
         identity = json.dumps({"scene": dump(scene), "versions": versions(), "study": VERSION}, sort_keys=True)
         marker = self.folder / "study.json"
         if not (marker.is_file() and marker.read_text(encoding="utf-8") == identity):
@@ -124,7 +124,7 @@ class Study:
             write_text(path, json.dumps({"points": [asdict(point) for point in found], "left_out": reasons}))
             yield name, found
 
-    def rig(self, slow: bool = False, bare: bool = False, settled: bool = False) -> Rig:
+    def rig(self, slow: bool = False, bare: bool = False, settled: bool = False) -> TrialSetup:
         """The scene assembled for trials: at its own speed or slow, as it is or bare, after a turn or not."""
         if (slow, bare, settled) not in self._rigs:
             scene = self.scene
@@ -138,7 +138,7 @@ class Study:
                 before = float(at.theta_2.min() if at.omega_2 > 0.0 else at.theta_2.max())  # type: ignore[operator]
                 before -= math.copysign(2.0 * math.pi, at.omega_2)  # type: ignore[arg-type]
                 at = at._replace(theta_2=np.append(at.theta_2, before), branch=np.append(at.branch, at.branch[0]))
-            self._rigs[slow, bare, settled] = Rig(scene, at)
+            self._rigs[slow, bare, settled] = TrialSetup(scene, at)
         return self._rigs[slow, bare, settled]
 
     def _curve(self, curve: Curve) -> list[Point]:
@@ -146,7 +146,7 @@ class Study:
         rig = self.rig(curve.slow, curve.bare, settled)
         return self._stepped(curve.name, curve.spots, rig, settled)
 
-    def _stepped(self, name: str, spots: tuple[Spot, ...], rig: Rig, settled: bool = False) -> list[Point]:
+    def _stepped(self, name: str, spots: tuple[Spot, ...], rig: TrialSetup, settled: bool = False) -> list[Point]:
         """Errors of each spot, and the CPU time of its steps next to that of the recommended model, interleaved."""
         trials = [rig.try_out(spot.settings, spot.build) for spot in spots]
         if settled:

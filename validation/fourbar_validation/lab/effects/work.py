@@ -28,7 +28,7 @@ EFFECTS: dict[str, "Callable[[], Effect | None]"] = {
     "pin_friction": lambda: kinds.PinFriction.at(O2=(0.1, 0.01), A=(0.1, 0.01), B=(0.1, 0.01), O4=(0.1, 0.01)),
     "torsion": lambda: kinds.Torsion.at(O4=(2.0, 1.9, 0.1)),
     "springs": lambda: kinds.Springs(
-        (kinds.Spring(kinds.Point(1, 0.1, -1.5), kinds.Point(4, 0.08, 0.0), 200.0, 0.05, 3.0),)
+        (kinds.Spring(kinds.SpringEnd(1, 0.1, -1.5), kinds.SpringEnd(4, 0.08, 0.0), 200.0, 0.05, 3.0),)
     ),
     "flywheel": lambda: kinds.Flywheel(0.02),
     "load": lambda: kinds.Load(4, (3.0, 0.7), (0.05, 1.0), 0.2),

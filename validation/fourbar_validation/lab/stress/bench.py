@@ -43,7 +43,7 @@ from fourbar_validation.published.thirteen import FreeBodies, solve_thirteen
 from fourbar_validation.report.machine import machine
 from fourbar_validation.report.terminal import lined_up
 from fourbar_validation.run.judge import judged
-from fourbar_validation.scenes.random import LinkageType
+from fourbar_validation.scenes.random import DrawnType
 from fourbar_validation.scenes.suites import Random
 
 if TYPE_CHECKING:
@@ -272,7 +272,7 @@ def measure(positions: int, rounds: int, largest: int) -> Measured:
 
 def judging(witnesses: list[Witness], scenes: int) -> float:
     """Milliseconds of CPU in which a random scene is judged as `run` does, nothing drawn; the median."""
-    suite = Random(scenes + 1, 0, tuple(LinkageType))
+    suite = Random(scenes + 1, 0, tuple(DrawnType))
     each = (partial(judged, suite.name(i), suite.scene(i), witnesses, draw=False) for i in range(scenes + 1))
     times = [seconds(action) for action in each]
     return 1e3 * median(times[1:])  # the first one imports the engines

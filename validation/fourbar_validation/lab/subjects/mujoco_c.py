@@ -10,7 +10,7 @@ import numpy as np
 from fourbar.mjcf import SIMULATORS, mjcf
 from fourbar.scene import Scene
 from fourbar_validation.compare.answer import Array
-from fourbar_validation.engines.loop import Position
+from fourbar_validation.engines.loop import Assembler
 from fourbar_validation.engines.mujoco.closed_loop import ClosedLoop
 from fourbar_validation.engines.mujoco.drives import without
 from fourbar_validation.engines.mujoco.stepping import opened
@@ -61,7 +61,7 @@ def states(scene: Scene, setting: str) -> Readings:
 def states_of(written: str, scene: Scene) -> list[tuple[Array, Array]]:
     """Assembled states of a turn, by MuJoCo's own kinematics: Newton on the gap, speeds by its Jacobian."""
     loop, made = ClosedLoop(written), []
-    position, begin = Position(loop), start(scene).qpos[0]
+    position, begin = Assembler(loop), start(scene).qpos[0]
     for theta_2 in (begin + np.linspace(0.0, 2.0 * np.pi, 25)).tolist():
         if (q := position.find(theta_2, scene.motion.branch)) is not None:
             loop.set_state(q, scene.motion.omega_2 or 0.0)

@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from fourbar.effects import Load, Point, Spring, Springs, Table, Torsion
+from fourbar.effects import Load, Spring, SpringEnd, Springs, Table, Torsion
 from fourbar.linkage import MOVING_BARS, PINS, Bar, FourBar
 from fourbar.scene import Scene
-from fourbar.scene.point import Point as Marked
+from fourbar.scene.point import Point
 from fourbar.solve import solve
 from fourbar_validation.scenes.random import Ranges, decades, drawn, product, sometimes, uneven_lengths, uniform
 
@@ -128,8 +128,8 @@ def springs(rng: np.random.Generator) -> Scene:
     """A spring whose points are nearly as far apart as where it pulls with nothing, its preload in the pull."""
     scene = massless(rng)
     one, other = (int(bar) for bar in rng.choice((1, *MOVING_BARS), 2, replace=False))
-    start, end = (Point(bar, *rng.uniform((0.0, -3.0), (1.0, 3.0)).tolist()) for bar in (one, other))
-    marked = replace(scene, points=(Marked("P", one, start[1:]), Marked("Q", other, end[1:])))
+    start, end = (SpringEnd(bar, *rng.uniform((0.0, -3.0), (1.0, 3.0)).tolist()) for bar in (one, other))
+    marked = replace(scene, points=(Point("P", one, start[1:]), Point("Q", other, end[1:])))
     places = solve(marked, "position").points
     distance = math.hypot(*(places["Q"] - places["P"])[0])
     stiffness, preload = float(rng.uniform(10.0, 1000.0)), 0.0

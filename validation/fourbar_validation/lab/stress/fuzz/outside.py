@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from fourbar.effects import Gravity, Point, Spring, Springs, Viscous
+from fourbar.effects import Gravity, Spring, SpringEnd, Springs, Viscous
 from fourbar.errors import InputError, LimitError
 from fourbar.formulas.mobility import change_points
 from fourbar.linkage import MOVING_BARS, Bar, FourBar
@@ -78,7 +78,7 @@ def _nearly_meeting(rng: np.random.Generator, scene: Scene, at: Solution) -> Spr
     meet = feet[bars[0] - 1] + rng.uniform(0.05, 0.3) * np.exp(1j * rng.uniform(-3.0, 3.0))
     apart = np.array([0.0, 10.0 ** rng.uniform(-6, -1) * np.exp(1j * rng.uniform(-3.0, 3.0))])
     in_bars = (meet + apart - feet[bars - 1]) * np.exp(-1j * angles[bars - 1])
-    start, end = (Point(int(bar), float(abs(z)), float(np.angle(z))) for bar, z in zip(bars, in_bars, strict=True))
+    start, end = (SpringEnd(int(bar), float(abs(z)), float(np.angle(z))) for bar, z in zip(bars, in_bars, strict=True))
     return Spring(start, end, 10.0 ** rng.uniform(0, 4), rng.uniform(0.0, 0.5), rng.uniform(-5.0, 5.0))
 
 

@@ -52,9 +52,9 @@ def scenes() -> list[Scene]:
     """Random linkages of every type, drive and branch, and a parallelogram near and on its change point."""
     from fourbar_validation.scenes.hard_families import change_point, sweep_of
     from fourbar_validation.scenes.hard_linkages import dressed
-    from fourbar_validation.scenes.random import LinkageType, random_scene
+    from fourbar_validation.scenes.random import DrawnType, random_scene
 
-    chosen = [random_scene(0, index, tuple(LinkageType)) for index in range(SCENES)]
+    chosen = [random_scene(0, index, tuple(DrawnType)) for index in range(SCENES)]
     chosen.append(sweep_of(dressed((0.3, 0.1, 0.25, 0.22)), 12))
     chosen += [scene for name, scene in change_point(distances=(1e-2, 1e-4)) if name.startswith(("par", "kite a = d"))]
     return chosen
