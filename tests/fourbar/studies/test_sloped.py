@@ -95,7 +95,12 @@ def compared(monkeypatch: pytest.MonkeyPatch) -> Iterator[dict[tuple[str, int], 
 
     def noted(holds: Any, fails: Any) -> Any:
         mask, frame = true(holds, fails), sys._getframe(1)
-        while frame.f_back and Path(frame.f_code.co_filename).parts[-2] not in ("effects", "formulas", "scene"):
+        while frame.f_back and Path(frame.f_code.co_filename).parts[-2] not in (
+            "effects",
+            "formulas",
+            "evaluation",
+            "scene",
+        ):
             frame = frame.f_back
         place = "/".join(Path(frame.f_code.co_filename).parts[-2:]), frame.f_lineno
         found[place] = found.get(place, False) or isinstance(mask, Undecided)

@@ -163,7 +163,7 @@ def reported(capsys: pytest.CaptureFixture[str], revision: str) -> tuple[int, st
 def test_a_revision_that_cannot_be_timed_is_one_line(
     revision: str, words: str, repository: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(against, "TREE", repository)
+    monkeypatch.setattr(against, "checkout", lambda _: repository)
     status, line = reported(capsys, revision)
     assert status == BAD_INPUT and line.startswith("error: ") and line.count("\n") == 1 and words in line
     assert {path.name for path in repository.iterdir()} == {".git", "fourbar"}
@@ -172,7 +172,7 @@ def test_a_revision_that_cannot_be_timed_is_one_line(
 def test_without_a_repository_no_revision_exists(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(against, "TREE", tmp_path)
+    monkeypatch.setattr(against, "checkout", lambda _: tmp_path)
     status, line = reported(capsys, "HEAD")
     assert status == BAD_INPUT and line.count("\n") == 1
 

@@ -175,7 +175,7 @@ def test_what_a_simulator_prints_is_no_part_of_its_answer(tmp_path: Path) -> Non
         "SETTINGS, STEPS = ['s'], [1]\natexit.register(print, 'bye')\n"
         "def through(scene, steps, setting):\n    print('hello'); os.write(1, b'there')\n    return Readings(setting)\n"
     )
-    code = "import sys; from validation import subjects; subjects.__path__.append(sys.argv.pop(1)); import runpy; "
+    code = "import runpy, sys; from fourbar_validation.lab import subjects; subjects.__path__.append(sys.argv.pop(1)); "
     code += "runpy.run_module('fourbar_validation.lab.subjects.work', run_name='__main__', alter_sys=True)"
     line = [sys.executable, "-c", code, str(tmp_path), "loud", str(PROBLEM.absolute())]
     done = subprocess.run(line, cwd=ROOT, capture_output=True, text=True, check=True)

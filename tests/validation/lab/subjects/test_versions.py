@@ -99,7 +99,7 @@ def test_bad_input_is_one_line(
 
 @pytest.mark.parametrize("answer", ["", "bye", "[]", '{"a": NaN}', '{"a": -1.0}', '{"a": "soon"}', '{"b": 1.0}'])
 def test_a_time_that_is_none_is_left_out(answer: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(versions, "ended", lambda _: Ended(answer, "", False, ""))
+    monkeypatch.setattr(versions, "of_the_harness", lambda _: Ended(answer, "", False, ""))
     assert versions.timed(Path("python"), Path("scene.toml"), ["a"]) == {}
 
 
