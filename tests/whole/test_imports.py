@@ -1,6 +1,7 @@
 """Imports run downwards from layer to layer, and `import fourbar` loads numpy alone."""
 
 import ast
+import runpy
 import subprocess
 import sys
 from pathlib import Path
@@ -129,6 +130,11 @@ def test_no_modules_import_each_other_in_a_circle(package: str) -> None:
     while leaves := {name for name, used in uses.items() if not used & uses.keys()}:
         uses = {name: used for name, used in uses.items() if name not in leaves}
     assert not uses
+
+
+def test_the_picture_of_the_layers_is_what_the_imports_make() -> None:
+    picture = (ROOT / "docs" / "architecture.svg").read_text(encoding="utf-8")
+    assert picture == runpy.run_path(str(ROOT / "docs" / "architecture.py"))["text"](), "python docs/architecture.py"
 
 
 def test_the_formulas_know_numpy_and_the_linkage_alone() -> None:

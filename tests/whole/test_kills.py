@@ -29,7 +29,7 @@ from fourbar_validation.report.machine import CODE, build, code, modules
 from fourbar_validation.report.record import Record
 from fourbar_validation.report.summary import Summary
 from fourbar_validation.run import pool
-from fourbar_validation.run.run import Collected, run
+from fourbar_validation.run.run import Collected, RunOptions, run
 from fourbar_validation.run.selection import chosen
 from fourbar_validation.run.store import RunningError, Store
 from fourbar_validation.scenes.random import DrawnType
@@ -53,7 +53,7 @@ EXACT = chosen("free-body")
 def judge_all(
     suite: object, out: Path, witnesses: tuple[Witness, ...] = EXACT, workers: int = 2, seconds: float | None = None
 ) -> Summary:
-    *steps, last = run(suite, out, witnesses, workers=workers, seconds=seconds, drawn=False)  # type: ignore[arg-type]
+    *steps, last = run(suite, out, witnesses, RunOptions(workers=workers, seconds=seconds, drawn=False))  # type: ignore[arg-type]
     assert isinstance(last, Summary)
     assert sum(step for step in steps if isinstance(step, Collected)) == len(suite)  # type: ignore[arg-type]
     return last
@@ -361,7 +361,7 @@ def test_of_a_long_suite_what_fails_has_pictures_and_what_is_nearest_to_it(
     monkeypatch.setattr(fourbar_validation.run.run, "PICTURED", 3)
     monkeypatch.setattr(fourbar_validation.run.run, "html", lambda *_, **__: "")
     blunders = Witness("blunders", Blunders, EQUIVALENCE)
-    *_, without = run(Few(), tmp_path / "without", (*EXACT, blunders), drawn=False)
+    *_, without = run(Few(), tmp_path / "without", (*EXACT, blunders), RunOptions(drawn=False))
     assert not drawn and not any(record.figure for record in without.shown)  # type: ignore[union-attr]
     once = Blunders.titles.count("b")
     *_, last = run(Few(), tmp_path / "with", (*EXACT, blunders))

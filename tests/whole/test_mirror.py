@@ -44,7 +44,7 @@ JUDGED_BY = {
     "validation/engines/mujoco/test_picture.py": "fourbar/mjcf: appearance",
     # a comparison is tested by witnesses with given answers
     "validation/run/test_judge.py": "validation/compare: answer basis compare effects identities rows scales "
-    "tolerance withheld",
+    "tolerance; validation/run: answers command pictures question run values",
     "validation/compare/statements/test_statements.py": "validation/compare/statements: finding limits ranges "
     "transmission",
     # adapters: judged against printed figures, each other, and faults put in front of them
@@ -54,10 +54,10 @@ JUDGED_BY = {
     "validation/engines/test_added_guests.py": "validation/engines: checked output workers",
     "validation/engines/test_free_body.py": "validation/engines: free_body_closure free_body_effects",
     "validation/engines/test_hard_suite.py": "validation/scenes: hard_families hard_linkages; "
-    "validation/compare: nearby; validation/engines: exact; validation/engines/mujoco: shipped; "
-    "validation/report: hard_page",
+    "validation/compare: nearby; validation/engines: exact; "
+    "validation/engines/mujoco: shipped; validation/report: hard_page",
     "validation/engines/mujoco/test_simulate.py": "validation/engines/mujoco: drives monitor motions runner",
-    "validation/run/shipped/test_shipped.py": "validation/run/shipped: bounds calls changes checks files question",
+    "validation/run/shipped/test_shipped.py": "validation/run/shipped: bounds calls changes files variants",
     "validation/run/test_released.py": "validation/engines: pinocchio_forward; validation/engines/mujoco: released",
     "validation/check/test_check.py": "validation/check: fitted judge judgement mistakes theirs; "
     "validation/run: printed",

@@ -9,11 +9,12 @@ from fourbar.errors import run
 from fourbar_validation.places import PROGRAM
 
 COMMANDS = {
-    "run": "fourbar_validation.run.run:command",
+    "run": "fourbar_validation.run.command:command",
     "accept": "fourbar_validation.regression.accept:accept_command",
     "compare": "fourbar_validation.regression.accept:compare",
     "history": "fourbar_validation.regression.accept:history",
     "check": "fourbar_validation.check:check",
+    "check-mjcf": "fourbar_validation.check.model:command",
     "fuzz-files": "fourbar_validation.lab.stress.mutants:fuzz_files",
     "models": "fourbar_validation.lab.models:models",
     "published": "fourbar_validation.lab.ladder:published",

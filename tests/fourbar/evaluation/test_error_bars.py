@@ -12,6 +12,7 @@ from fourbar.scene.motion import Motion
 from fourbar_validation.compare.error import magnitude
 from fourbar_validation.engines.exact import BallArithmetic
 from fourbar_validation.run import printed
+from fourbar_validation.run.question import Question
 
 TURNS = 2000.0 * np.pi
 
@@ -86,7 +87,9 @@ def test_a_run_judges_the_bars_where_each_spring_is_nearest_to_its_rest(monkeypa
     ]
     seen: list[np.ndarray] = []
     true = fourbar.solve
+    question = Question("", scene, command(scene))
+    assert question.solution is not None
     monkeypatch.setattr(printed, "solve", lambda *given, at: seen.append(at.theta_2) or true(*given, at=at))
-    rows = list(printed._error_bars("", scene, command(scene), whole))
+    rows = list(printed.check_error_bars(question))
     assert {row.verdict for row in rows} == {"agrees"}
     assert {whole.theta_2[np.argmin(np.abs(gap))] for gap in away} <= set(seen[0])

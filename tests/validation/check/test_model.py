@@ -16,7 +16,6 @@ import pytest
 from click.testing import CliRunner
 
 import fourbar
-import fourbar_validation.run.run
 from fourbar.effects import Friction
 from fourbar.errors import InputError
 from fourbar.mjcf import mjcf
@@ -360,17 +359,11 @@ def test_a_file_that_overdoes_it_is_one_line_with_its_name(
     text, path = re.sub(old, new, GENERATED), tmp_path / "mine.xml"
     assert text != GENERATED
     path.write_text(text)
-    arguments = [
-        "run",
-        str(Path(__file__).parents[3] / "models" / "crank_rocker.toml"),
-        "--mjcf",
-        str(path),
-        "--out",
-        str(tmp_path / "out"),
-    ]
+    scene = str(Path(__file__).parents[3] / "models" / "crank_rocker.toml")
+    arguments = ["check-mjcf", scene, str(path), "--out", str(tmp_path / "out")]
     assert status(arguments) == 2
     message = capsys.readouterr().err.strip().splitlines()[-1]
-    assert message.startswith(f"error: {path}: --mjcf = 'mine.xml': ") and words in message
+    assert message.startswith(f"error: {path}: MJCF = 'mine.xml': ") and words in message
     assert not (tmp_path / "out").exists()
 
 
@@ -443,8 +436,8 @@ def test_the_command_writes_and_prints_what_it_found(tmp_path: Path) -> None:
     scene = tmp_path / "scene.toml"
     scene.write_text(fourbar.dump(BARE))
     names = [f"--name={role}={name}" for role, name in {**MINE, "coupler": "rod<b>|"}.items()]
-    arguments = [str(scene), "--mjcf", str(path), *names, "--out", str(tmp_path / "out")]
-    result = CliRunner().invoke(fourbar_validation.run.run.command, arguments, standalone_mode=False)
+    arguments = [str(scene), str(path), *names, "--out", str(tmp_path / "out")]
+    result = CliRunner().invoke(model.command, arguments, standalone_mode=False)
     assert result.return_value == 1, result.output
     assert "\x1b" not in result.output
     assert "closure.softness" in result.output
@@ -455,16 +448,9 @@ def test_the_command_writes_and_prints_what_it_found(tmp_path: Path) -> None:
     )
 
 
-@pytest.mark.parametrize("arguments", [["--mjcf", "x.xml"], ["SCENE", "--mjcf", "x.xml", "--name", "wheel=a"]])
-def test_bad_options_are_reported(arguments: list[str], tmp_path: Path) -> None:
-    scene = tmp_path / "scene.toml"
-    scene.write_text(fourbar.dump(BARE))
-    result = CliRunner().invoke(
-        fourbar_validation.run.run.command,
-        [str(scene) if word == "SCENE" else word for word in arguments],
-        standalone_mode=False,
-    )
-    assert isinstance(result.exception, InputError)
+def test_a_role_that_no_body_has_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="ROLE=NAME"):
+        run(tmp_path, GENERATED, "--name", "wheel=a")
 
 
 def run(tmp_path: Path, text: str, *options: str) -> tuple[int | None, list[float]]:
@@ -473,8 +459,8 @@ def run(tmp_path: Path, text: str, *options: str) -> tuple[int | None, list[floa
     scene.write_text(fourbar.dump(BARE))
     path.write_text(text)
     out = tmp_path / f"out{len(options)}"
-    arguments = [str(scene), "--mjcf", str(path), "--out", str(out), *options]
-    result = CliRunner().invoke(fourbar_validation.run.run.command, arguments, standalone_mode=False)
+    arguments = [str(scene), str(path), "--out", str(out), *options]
+    result = CliRunner().invoke(model.command, arguments, standalone_mode=False)
     if result.exception is not None:
         raise result.exception
     return result.return_value, sorted(
@@ -488,13 +474,3 @@ def test_a_required_error_is_what_their_file_is_held_to(tmp_path: Path) -> None:
     assert run(tmp_path, text, "--error", "0.5") == (0, [0.0, 0.5])
     with pytest.raises(InputError, match="above 0 and below 1"):
         run(tmp_path, text, "--error", "2")
-
-
-OTHERS = ["--engines=pinocchio-inverse", "--suite=hard", "--random=3", "--seed=1", "--type=parallelogram",
-          "--against=accepted", "--scheduler=tcp://x", "--python=python3"]  # fmt: skip
-
-
-@pytest.mark.parametrize("option", OTHERS)
-def test_an_option_that_a_file_is_not_examined_by_is_refused(option: str, tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=f"{option.partition('=')[0]}.*--mjcf"):
-        run(tmp_path, GENERATED, option)

@@ -184,11 +184,11 @@ def moved(effect: Effect) -> Effect:
 @contextmanager
 def formulas_see(change: Callable[[Scene], Scene]) -> Iterator[None]:
     """The formulas work on a changed scene, the engines on the true one."""
-    import fourbar_validation.run.judge
+    import fourbar_validation.run.question
 
-    true = fourbar_validation.run.judge.solve
+    true = fourbar_validation.run.question.solve
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(fourbar_validation.run.judge, "solve", lambda scene, *a, **k: true(change(scene), *a, **k))
+        patch.setattr(fourbar_validation.run.question, "solve", lambda scene, *a, **k: true(change(scene), *a, **k))
         yield
 
 

@@ -10,7 +10,7 @@ import pytest
 from markupsafe import escape
 
 import fourbar
-import fourbar_validation.run.judge
+import fourbar_validation.run.question
 from fourbar.mjcf import RECIPE, Settings
 from fourbar.scene import Command, Scene
 from fourbar_validation.compare.answer import Answer
@@ -25,9 +25,8 @@ from fourbar_validation.engines.mujoco.shipped import shipped
 from fourbar_validation.engines.prediction import from_data, in_world_axes
 from fourbar_validation.engines.witnesses import Predictor, Witness, answering_nearby
 from fourbar_validation.report.hard_page import page
-from fourbar_validation.report.record import Record
 from fourbar_validation.run.judge import judge
-from fourbar_validation.run.released import as_pendulum, judge_released
+from fourbar_validation.run.released import as_pendulum
 from fourbar_validation.scenes import hard_families as families
 from fourbar_validation.scenes.hard_families import FAMILIES, TOGGLE, Family, toggle
 from fourbar_validation.scenes.hard_linkages import at, collinear_3_4, dressed, linkage_of
@@ -82,7 +81,7 @@ def test_near_a_toggle_all_but_the_sine_has_its_digits_though_it_has_few_itself(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """A millionth of the torque stood within what the last digits of theta_2 excuse there, for every engine."""
-    lengths, true = linkage_of(DrawnType.TRIPLE_ROCKER, 0), fourbar_validation.run.judge.solve
+    lengths, true = linkage_of(DrawnType.TRIPLE_ROCKER, 0), fourbar_validation.run.question.solve
     (psi, stretched), *_ = collinear_3_4(lengths)
     near = at(dressed(lengths), psi + (-1.0 if stretched else 1.0) * np.array([*families.REGULAR, 1e-9]))
     balls = [witness for witness in HARD_WITNESSES if witness.nearby]
@@ -100,7 +99,7 @@ def test_near_a_toggle_all_but_the_sine_has_its_digits_though_it_has_few_itself(
         solution.torque[-1] *= 1.0 + 1e-6
         return solution
 
-    monkeypatch.setattr(fourbar_validation.run.judge, "solve", spoiled)
+    monkeypatch.setattr(fourbar_validation.run.question, "solve", spoiled)
     assert verdicts()["torque"] == FAILS
 
 
@@ -266,7 +265,7 @@ def test_a_free_motion_through_change_points_in_every_engine() -> None:
     phi, _ = pendulum.motion(np.array([10.0]))
     assert abs(math.cos(phi[0] + math.pi / 2) - 0.478385058) < 1e-9
     assert abs(math.sin(phi[0] + math.pi / 2) - 0.878150179) < 1e-9
-    rows = {(row.engine, row.quantity): row for row in judge_released(Record(name, scene)).rows}
+    rows = {(row.engine, row.quantity): row for row in judge(name, scene).rows}
     assert all(row.passed for row in rows.values())
     assert rows["formulas", "theta_2"].error < 1e-11
     assert rows["pinocchio-forward", "theta_2"].error < 1e-8 and rows["pinocchio-forward", "energy"].error < 1e-9
@@ -286,7 +285,7 @@ def test_an_engine_that_drifts_unpredicted_fails(monkeypatch: pytest.MonkeyPatch
         return released
 
     monkeypatch.setattr(pinocchio_forward.PinocchioReleased, "release", off)
-    rows = judge_released(Record(name, scene)).rows
+    rows = judge(name, scene).rows
     assert [r.verdict for r in rows if (r.engine, r.quantity) == ("pinocchio-forward", "theta_2")] == [FAILS]
 
 

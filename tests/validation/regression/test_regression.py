@@ -246,7 +246,10 @@ def test_what_is_empty_unfinished_or_fails_is_not_accepted(tmp_path: Path) -> No
         (["--against", "no-such-run"], "must be a folder with results.csv"),
         (["--against", "accepted", "--python", "python"], "cannot be combined with --python"),
         (["--html", "changes.html"], "say --against BASELINE or --python PATH too"),
-        (["--name", "coupler=link"], "names a body or site of --mjcf"),
+        (["--mjcf", "theirs.xml", "--name", "coupler=link"], "check-mjcf SCENE THEIRS.xml"),
+        (["--name", "coupler=link"], "check-mjcf SCENE THEIRS.xml"),
+        (["a.toml", "--random", "3"], "leave out the scene files"),
+        (["--suite", "hard", "--random", "3"], "leave out scene files and --random"),
     ],
 )
 def test_options_of_a_run_that_would_do_nothing_are_refused_before_it(

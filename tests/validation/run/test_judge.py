@@ -268,5 +268,5 @@ def test_an_engine_is_started_once_a_scene_and_no_question_is_put_twice(monkeypa
     assert len({(id(of), id(command)) for of, command in put}) == len(put)
     # nor of the bars without loads, which the answer holds too
     assert [of for of, _ in put if of.linkage is scene.linkage] == [scene]
-    judge("scene", scene, [Witness("free-body", Counting, EQUIVALENCE)])
+    judge("scene", scene, [Witness("counting", Counting, EQUIVALENCE)])
     assert Counting.started == 1

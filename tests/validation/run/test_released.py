@@ -116,8 +116,8 @@ def test_formulas_that_stop_too_early_are_found(monkeypatch: pytest.MonkeyPatch)
         solution.branch, solution.status_code = solution.branch[:3], solution.status_code[:3]
         return solution
 
-    monkeypatch.setattr(free, "solve", short)
-    rows = free.judge_released(Record("falling", falling())).rows
+    monkeypatch.setattr("fourbar_validation.run.question.solve", short)
+    rows = judge("falling", falling()).rows
     for engine in free.ENGINES:
         assert row(rows, engine, "stopped_at").verdict == FAILS
 

@@ -16,7 +16,7 @@ from fourbar.mjcf import Settings, mjcf
 from fourbar.scene import Command, Scene
 from fourbar.scene import command as command_of
 from fourbar.writing import require_file, write_text
-from fourbar_validation.advise.errors import Errors
+from fourbar_validation.advise.errors import WorstErrors
 from fourbar_validation.advise.matters import MATTERS, influences, judged, sentence
 from fourbar_validation.engines.mujoco.trial import FEWEST_STEPS, LONGEST, ORDER, SHORTEST, TrialSetup, dialled, guess
 from fourbar_validation.report.terminal import lined_up
@@ -40,7 +40,7 @@ class Attempt:
 
     settings: Settings
     steps: int
-    errors: Errors
+    errors: WorstErrors
     steps_per_revolution: float
 
 
@@ -84,11 +84,11 @@ def advise(scene: Scene, error: float, rig: TrialSetup | None = None) -> Advice:
     """
     if not 0.0 < error < 1.0:
         raise InputError("--error", error, "must be a relative error, above 0 and below 1")
-    return _Search(scene, error, rig or TrialSetup(scene, looked_at(scene))).advice()
+    return _CheapestSearch(scene, error, rig or TrialSetup(scene, looked_at(scene))).advice()
 
 
 def looked_at(scene: Scene) -> Command:
-    """The scene's own positions and others between them: the error peaks there, most of all near a pole of T3, T4."""
+    """Take the scene's positions and others between them: the error peaks there, most near a pole of T3, T4."""
     own = command_of(scene)
     if np.ptp(own.branch) != 0:
         return own
@@ -97,7 +97,7 @@ def looked_at(scene: Scene) -> Command:
     return own._replace(theta_2=theta_2, branch=np.full(theta_2.shape, own.branch[0], dtype=np.int8))
 
 
-class _Search:
+class _CheapestSearch:
     """Settings tried on one scene, for one required error."""
 
     def __init__(self, scene: Scene, error: float, rig: TrialSetup) -> None:
@@ -105,7 +105,7 @@ class _Search:
         self.attempts: list[Attempt] = []
 
     def advice(self) -> Advice:
-        """The cheapest that serves, by bisection in steps, then with shorter and longer time constants."""
+        """Find the cheapest that serves, by bisection in steps, then with shorter and longer time constants."""
         first, tc = guess(self.error)
         self._bisect(tc, first)
         for factor in (0.5, 2.0, 4.0):
@@ -188,7 +188,7 @@ def _nearest(attempts: Sequence[Attempt]) -> Attempt:
     help="Write the MJCF of one SCENE.",
 )
 def command(scenes: tuple[Path, ...], wanted: float, output: Path | None) -> int:
-    """The cheapest MuJoCo settings that keep SCENES within an error; exit 1 where none is found for one of them.
+    """Find the cheapest MuJoCo settings that keep SCENES within an error; exit 1 where none is found for one of them.
 
     Of each scene it says which of the settings matters, and why; of several scenes a table is printed at the end.
     """

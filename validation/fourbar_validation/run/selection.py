@@ -14,7 +14,7 @@ from fourbar_validation.scenes.suites import Random, Suite, model_files, scene_f
 def selected(
     scenes: tuple[Path, ...], named: str | None, count: int | None, seed: int, types: str, adapters: Sequence[str] = ()
 ) -> tuple[Suite, tuple[Witness, ...]]:
-    """The scenes wanted, and the witnesses with what they are held to there."""
+    """Select the scenes, and the witnesses with what they are held to there."""
     if named == "hard":
         own = (*HARD_WITNESSES, *map(predicting, FURTHER))
         return Hard(), (*own, *map(predicting, _added(adapters, own)))
@@ -28,7 +28,7 @@ def selected(
 
 
 def _added(adapters: Sequence[str], own: tuple[Witness, ...]) -> tuple[Witness, ...]:
-    """The witnesses of the command line (`adapters`, "module:Class"), and those that installed packages bring."""
+    """Find the witnesses of the command line (`adapters`, "module:Class"), and those that installed packages bring."""
     known = [witness.name for witness in own]
     here = added.named(adapters, known)
     return (*here, *added.installed([*known, *(witness.name for witness in here)]))
@@ -37,7 +37,7 @@ def _added(adapters: Sequence[str], own: tuple[Witness, ...]) -> tuple[Witness, 
 def chosen(
     engines: str | None, witnesses: tuple[Witness, ...] = WITNESSES, adapters: Sequence[str] = ()
 ) -> tuple[Witness, ...]:
-    """The witnesses named in a comma-separated list, and those of `adapters`, which are named by being given.
+    """Choose the witnesses named in a comma-separated list, and those of `adapters`, which are named by being given.
 
     Where there is no list, all but those that need not be installed.
     """
@@ -55,7 +55,7 @@ def chosen(
 
 
 def askable(witnesses: tuple[Witness, ...], *, by_name: bool) -> tuple[tuple[Witness, ...], list[tuple[str, str]]]:
-    """Those that can answer here, and the others with the reason; DependencyError where those were named."""
+    """Find those that can answer here, and the others with the reason; DependencyError where those were named."""
     missing = [(witness.name, reason) for witness in witnesses if (reason := witness.missing())]
     if missing and by_name:
         raise DependencyError("; ".join(f"{name}: {reason}" for name, reason in missing))
@@ -63,7 +63,7 @@ def askable(witnesses: tuple[Witness, ...], *, by_name: bool) -> tuple[tuple[Wit
 
 
 def linkage_types(text: str) -> tuple[DrawnType, ...]:
-    """The types named in a comma-separated list; none for uneven linkages."""
+    """Read the types named in a comma-separated list; none for uneven linkages."""
     if text == UNEVEN_TYPE:
         return ()
     try:

@@ -16,7 +16,7 @@ import fourbar
 from fourbar.mjcf import Settings
 from fourbar.scene import command
 from fourbar.show.plot.style import matplotlib_style
-from fourbar_validation.advise.errors import NO_ANSWER, QUANTITIES, Errors, errors
+from fourbar_validation.advise.errors import NO_ANSWER, QUANTITIES, WorstErrors, errors
 from fourbar_validation.engines.mujoco import drives
 from fourbar_validation.engines.mujoco.one_state import MujocoOneState
 from fourbar_validation.engines.mujoco.trial import Build, TrialSetup
@@ -35,10 +35,10 @@ def turning(omega: float = 10.0, positions: int = 36) -> fourbar.Scene:
     return fourbar.Scene(LINKAGE, fourbar.Motion(sweep, omega), effects=(fourbar.Gravity(),))
 
 
-def tried(scene: fourbar.Scene, build: Build | None = None) -> Callable[[Settings], Errors]:
+def tried(scene: fourbar.Scene, build: Build | None = None) -> Callable[[Settings], WorstErrors]:
     rig = TrialSetup(scene, command(scene))
 
-    def error(settings: Settings) -> Errors:
+    def error(settings: Settings) -> WorstErrors:
         trial = rig.try_out(settings, build)
         return NO_ANSWER if trial.broken else errors(scene, trial.at, trial.quantities)
 

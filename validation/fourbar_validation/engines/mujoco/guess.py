@@ -57,7 +57,7 @@ def find_topology(
         )
         why = refused[0] if refused else few
         nowhere = f"no body is named {', '.join(missing) or 'B3, B4'}, and no guess makes a four-bar ({why})"
-        raise InputError("--mjcf", bodies_of(model), f"{nowhere}; say which is which: --name input=BODY, and so on")
+        raise InputError("MJCF", bodies_of(model), f"{nowhere}; say which is which: --name input=BODY, and so on")
     best = min(each[0] for each in found)
     _, _, topology, guessed = min((each for each in found if each[0] <= best + ALIKE), key=lambda each: each[1])
     pairs = ", ".join(f"{role}={name}" for role, name in guessed.items())

@@ -64,11 +64,11 @@ def compile_text(text: str) -> mujoco.MjModel:
     try:
         model = mujoco.MjModel.from_xml_string(text)
     except ValueError as error:
-        raise InputError("--mjcf", None, " ".join(f"MuJoCo does not compile it: {error}".split())) from None
+        raise InputError("MJCF", None, " ".join(f"MuJoCo does not compile it: {error}".split())) from None
     except RuntimeError:  # "unknown exception": a size that no memory holds
-        raise InputError("--mjcf", None, "MuJoCo breaks down over it; is a size in it too large?") from None
+        raise InputError("MJCF", None, "MuJoCo breaks down over it; is a size in it too large?") from None
     if not 0.0 < model.opt.timestep < math.inf:
-        raise InputError("--mjcf", None, f"its timestep of {model.opt.timestep:g} s must be above 0")
+        raise InputError("MJCF", None, f"its timestep of {model.opt.timestep:g} s must be above 0")
     return model
 
 
@@ -80,7 +80,7 @@ def examine(scene: Scene, text: str | None, names: Mapping[str, str]) -> Examine
     found = described(topology)
     for key, value in found.items():
         if key.startswith(("bars.", "lengths.")) and not math.isfinite(value):  # type: ignore[arg-type]
-            raise InputError("--mjcf", None, f"{key} is beyond the range of doubles: {value}")
+            raise InputError("MJCF", None, f"{key} is beyond the range of doubles: {value}")
     answers = _answers(loop, scene)
     return Examined(found, called(topology), answers, [*guessed, *loop.notes], topology.names)
 
@@ -131,7 +131,7 @@ def _answered(name: str, scene: Scene, ask: Callable[[], Answer]) -> Answer:
     except LimitError as error:
         answer = Answer(name, "-", refusal=str(error))
     except ArithmeticError as error:  # its numbers are far from those of any linkage
-        raise InputError("--mjcf", None, str(error)) from None
+        raise InputError("MJCF", None, str(error)) from None
     answer.shared, answer.own, answer.seconds = SHARED, OWN, time.perf_counter() - start
     return answer
 

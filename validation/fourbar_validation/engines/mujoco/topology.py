@@ -63,7 +63,7 @@ class Topology:
         for joint in range(model.njnt):
             self._add_hinge(joint)
         if len(self.hinge) != 3:
-            raise InputError("--mjcf", sorted(self.hinge), "must have hinges at three of the pins O2, A, B, O4")
+            raise InputError("MJCF", sorted(self.hinge), "must have hinges at three of the pins O2, A, B, O4")
         (self.cut,) = PINS.keys() - self.hinge.keys()
         self.closure: int | None = None
         self.closed_by = "nothing"
@@ -88,7 +88,7 @@ class Topology:
     def _find_plane(self) -> None:
         hinges = self.model.jnt_type == mujoco.mjtJoint.mjJNT_HINGE
         if not hinges.any():
-            raise InputError("--mjcf", None, "must have hinges at three of the pins O2, A, B, O4")
+            raise InputError("MJCF", None, "must have hinges at three of the pins O2, A, B, O4")
         across = int(np.argmax(np.abs(self.data.xaxis[np.argmax(hinges)])))
         self.plane, self.axes = PLANES[across]
         e = np.eye(3)
@@ -101,14 +101,14 @@ class Topology:
         kind = mujoco.mjtJoint(model.jnt_type[joint])
         if kind != mujoco.mjtJoint.mjJNT_HINGE or None in bars:
             raise InputError(
-                "--mjcf", name, "every joint must be a hinge of the input, coupler or output; name the bodies by --name"
+                "MJCF", name, "every joint must be a hinge of the input, coupler or output; name the bodies by --name"
             )
         pin = PIN_OF.get(frozenset(bars))  # type: ignore[arg-type]
         if pin is None or pin in self.hinge:
-            raise InputError("--mjcf", name, "joins bars that have no pin in common, or have one already")
+            raise InputError("MJCF", name, "joins bars that have no pin in common, or have one already")
         along = float(self.data.xaxis[joint] @ self.normal)
         if abs(along) < 1.0 - STRAIGHT**2:
-            raise InputError("--mjcf", name, f"the hinge must be normal to the {self.plane} plane")
+            raise InputError("MJCF", name, f"the hinge must be normal to the {self.plane} plane")
         self.hinge[pin], self.sense[pin] = joint, math.copysign(1.0, along)
         for bar in bars:
             assert bar is not None
@@ -145,7 +145,7 @@ class Topology:
             site = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SITE, name)
             if self.cut != "B" or site < 0 or self.bar(model.site_bodyid[site]) != bar:
                 raise InputError(
-                    "--mjcf",
+                    "MJCF",
                     self.cut,
                     "no connect or weld closes the loop at this pin; where something else does, say where pin B is: "
                     "--name B3=SITE on the coupler, --name B4=SITE on the output",

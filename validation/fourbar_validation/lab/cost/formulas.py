@@ -16,7 +16,7 @@ from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import PIN_FORCES
 from fourbar.scene import Command, Scene
 from fourbar.solve import solve
-from fourbar_validation.advise.errors import Errors, greatest
+from fourbar_validation.advise.errors import WorstErrors, greatest
 from fourbar_validation.compare.answer import Array
 from fourbar_validation.compare.error import relative
 from fourbar_validation.compare.scales import yardstick
@@ -115,7 +115,7 @@ def fifty_digits(scene: Scene, at: Command, bits: int = FIFTY_DIGITS) -> Quantit
     return out | {name: [(y.get(f"{name}_x"), y.get(f"{name}_y")) for y in found] for name in PIN_FORCES}
 
 
-def against_reference(scene: Scene, at: Command, quantities: Quantities, reference: Quantities) -> Errors:
+def against_reference(scene: Scene, at: Command, quantities: Quantities, reference: Quantities) -> WorstErrors:
     """Worst errors on their scales against balls of many more digits."""
     formulas = solve(scene, "force", at=at)
     worst = {}
@@ -127,7 +127,7 @@ def against_reference(scene: Scene, at: Command, quantities: Quantities, referen
             if all(y is not None for _, y in pairs):
                 found.append(float(relative(math.hypot(*(_difference(x, y) for x, y in pairs)), size)))
         worst[name] = greatest(found)
-    return Errors(**worst)
+    return WorstErrors(**worst)
 
 
 def _difference(ours: Any, exact: Any) -> float:

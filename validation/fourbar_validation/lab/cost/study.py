@@ -16,7 +16,7 @@ from fourbar.formulas.mobility import turns_fully
 from fourbar.scene import Command, Scene, command
 from fourbar.writing import write_text
 from fourbar_validation.advise.advise import advise
-from fourbar_validation.advise.errors import NO_ANSWER, Errors, errors
+from fourbar_validation.advise.errors import NO_ANSWER, WorstErrors, errors
 from fourbar_validation.compare.answer import Engine
 from fourbar_validation.engines.loop import Trial
 from fourbar_validation.engines.mujoco.trial import TrialSetup
@@ -189,7 +189,14 @@ class Study:
         return self._stepped("recommended", tuple(spots), rig)
 
     def _at_positions(
-        self, name: str, kind: str, label: str, found: Errors, times: Sequence[float], n: int, dial: float = math.nan
+        self,
+        name: str,
+        kind: str,
+        label: str,
+        found: WorstErrors,
+        times: Sequence[float],
+        n: int,
+        dial: float = math.nan,
     ) -> Point:
         """A point of a method that answers each position by itself."""
         per_revolution = self._positions_per_revolution()

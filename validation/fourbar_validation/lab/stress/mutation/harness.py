@@ -26,9 +26,9 @@ from fourbar_validation.compare.compare import compare
 from fourbar_validation.compare.identities import identities
 from fourbar_validation.compare.rows import FAILS
 from fourbar_validation.compare.statements.statements import statements
-from fourbar_validation.compare.withheld import withheld
 from fourbar_validation.engines.free_body import NAME as FREE_BODY
 from fourbar_validation.engines.witnesses import WITNESSES, Witness, predicting_from
+from fourbar_validation.run.values import compare_status
 
 CHANGES = 1e-9
 SECONDS = 20
@@ -118,7 +118,7 @@ def caught(scene: Scene, at: Command, answers: list[tuple[Witness, Answer]]) -> 
         predicted = predicting_from(witness, scene, at, answer)
         rows += compare("", scene, answer, solution, witness.tolerance, witness.expected, predicted)
         if witness.name == FREE_BODY and (basis := basis_of(scene, answer)) is not None:
-            rows.append(withheld("", scene, solution, basis))
+            rows.append(compare_status("", scene, solution, basis))
     if not any(row.verdict == FAILS for row in rows):
         rows += [row for witness, answer in answers for row in statements("", scene, witness.engine(), answer)]
     return any(row.verdict == FAILS for row in rows)

@@ -1,6 +1,6 @@
-"""A withheld answer is an answer: where the formulas state no value, another derivation must have none."""
+"""The formulas' own values: the equations that they satisfy, where they have none, and where friction reverses."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,9 +10,14 @@ from fourbar.scene import Scene
 from fourbar.solution import Solution
 from fourbar_validation.compare.compare import Mask, counted, touching
 from fourbar_validation.compare.error import magnitude, worst
-from fourbar_validation.compare.identities import FORMULAS
+from fourbar_validation.compare.identities import FORMULAS, identities
+from fourbar_validation.compare.reversals import reversals
 from fourbar_validation.compare.rows import AGREES, FAILS, Row
 from fourbar_validation.compare.tolerance import EPS, NOTHING_TO_TELL, Array, condition_of
+from fourbar_validation.engines.exact import sines
+from fourbar_validation.engines.free_body import solutions
+from fourbar_validation.engines.witnesses import not_installed
+from fourbar_validation.run.question import Question, select_positions
 
 STAGES = ("omega_3", "alpha_3", "torque")
 """One quantity of each stage that a position may lack."""
@@ -30,15 +35,47 @@ NEAR = 1e-6
 """|sin(theta_4 - theta_3)| below which doubles have no word in it."""
 
 
-def withheld(
+def check_identities(question: Question) -> list[Row]:
+    """Check the equations that the formulas' own numbers must satisfy."""
+    return identities(question.name, question.scene, question.at, question.solution)
+
+
+def check_status(question: Question) -> Iterator[Row]:
+    """Check that the formulas have no value exactly where another derivation has none."""
+    name, scene, reference, free_body = question.name, question.scene, question.reference, question.free_body
+    if reference is not None and question.at.omega_2 is not None:
+        yield compare_status(name, scene, question.solution, reference, *_by_exact_means(question))
+    elif reference is None and (free_body is None or free_body.refusal is None):
+        what = "the free bodies, by which it is judged, broke down"
+        yield Row.unmeasured(name, FORMULAS, "exact", "status", FAILS, what)
+
+
+def _by_exact_means(question: Question) -> tuple[OfSome | None, OfSome | None]:
+    """Give the sine between bars 3 and 4 in many digits, and how many solutions friction has, at some positions."""
+    scene, at = question.scene, question.at
+    unknown = at.remainder is not None or not_installed("flint")
+    loaded = any(effect.loaded_pins for effect in scene.effects)
+    return (
+        None if unknown else lambda where: sines(scene.linkage, select_positions(at, where)),
+        (lambda where: solutions(scene, select_positions(at, where))) if loaded else None,
+    )
+
+
+def find_reversals(question: Question) -> tuple[()]:
+    """Find where dry friction reverses and the pin forces jump; what is drawn there is no comparison."""
+    question.jumps = reversals(question.scene, question.at, question.solution)
+    return ()
+
+
+def compare_status(
     name: str,
     scene: Scene,
     formulas: Solution,
-    basis: Solution,
+    reference: Solution,
     sines: OfSome | None = None,
     solutions: OfSome | None = None,
 ) -> Row:
-    """The positions at which the formulas have a value and `basis` has none, or the reverse, where it has digits left.
+    """Count where the formulas have a value and `reference` has none, or the reverse, where it has digits left.
 
     That a loop does not close is compared by itself where doubles can decide it.
 
@@ -49,15 +86,15 @@ def withheld(
     solutions : how many solutions loaded friction has at some positions.
     """
     differ = np.zeros(len(formulas), dtype=bool)
-    large = _large(scene, basis)
+    large = _large(scene, reference)
     for quantity in STAGES:
-        ours, theirs = getattr(formulas, quantity), getattr(basis, quantity)
+        ours, theirs = getattr(formulas, quantity), getattr(reference, quantity)
         if ours is None or theirs is None:
             continue
-        sound = condition_of(quantity, scene.linkage, basis) * NOTHING_TO_TELL > EPS
+        sound = condition_of(quantity, scene.linkage, reference) * NOTHING_TO_TELL > EPS
         differ |= sound & ~large & (np.isfinite(ours) != np.isfinite(theirs))
     differ &= formulas.status_code != NOT_ASSEMBLED
-    if sines is not None and len(near := np.flatnonzero(_near(scene, formulas, basis))):
+    if sines is not None and len(near := np.flatnonzero(_near(scene, formulas, reference))):
         sine = np.abs(sines(near))
         closes, in_line = np.isfinite(sine), formulas.status_code[near] == SINGULAR
         differ[near] |= (formulas.status_code[near] == NOT_ASSEMBLED) == closes
@@ -77,17 +114,17 @@ def withheld(
     return Row(name, FORMULAS, "exact", "status", float(np.count_nonzero(differ)), 0.0, verdict, reason, theta_2, 1.0)
 
 
-def _near(scene: Scene, formulas: Solution, basis: Solution) -> Mask:
+def _near(scene: Scene, formulas: Solution, reference: Solution) -> Mask:
     """Where bars 3 and 4 are so nearly in line that exact arithmetic has to decide, (n,)."""
     close = touching(scene, formulas.theta_2)
-    return np.asarray(close | (basis.condition < NEAR) | (formulas.condition < NEAR))
+    return np.asarray(close | (reference.condition < NEAR) | (formulas.condition < NEAR))
 
 
-def _large(scene: Scene, basis: Solution) -> Mask:
+def _large(scene: Scene, reference: Solution) -> Mask:
     """Where numbers are so large that the formulas may have to give up, (n,)."""
-    large = np.full(len(basis), max(scene.linkage.lengths) > LARGE or min(scene.linkage.lengths) < 1.0 / LARGE)
+    large = np.full(len(reference), max(scene.linkage.lengths) > LARGE or min(scene.linkage.lengths) < 1.0 / LARGE)
     for name in ("omega_2", "alpha_2", *STAGES, "F12", "F43"):
-        values = getattr(basis, name)
+        values = getattr(reference, name)
         if values is not None:
             large |= magnitude(values) > LARGE
     return np.asarray(large)
