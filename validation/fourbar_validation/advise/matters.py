@@ -48,7 +48,7 @@ def judged(scene: Scene, trial: Trial) -> WorstErrors:
         return NO_ANSWER
     found = [errors(scene, trial.at, trial.quantities)]
     if scene.drive_bar == 2:  # the torque of another bar has poles, through which no curve can be drawn
-        found += [each for stretch in trial.stretches for each in between(scene, trial, *stretch)]
+        found += [each for segment in trial.segments for each in between(scene, trial, *segment)]
     return WorstErrors(*map(max, *found)) if len(found) > 1 else found[0]
 
 

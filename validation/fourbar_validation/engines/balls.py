@@ -135,20 +135,20 @@ def outputs(scene: Scene, branch: int, x: Values, drive_bar: int) -> Values | No
     O4, tip = polar(x["d"], x["theta_1"]), {2: a * w[2], 3: b * w[3], 4: c * w[4]}
     spin = {k: acb(0, omega[k]) for k in MOVING_BARS}
     swing = {k: acb(-omega[k] * omega[k], alpha[k]) for k in MOVING_BARS}
-    foot = {1: zero, 2: zero, 3: tip[2], 4: O4}
+    first_pin = {1: zero, 2: zero, 3: tip[2], 4: O4}
     v_foot, a_foot = ({2: zero, 3: turn[2] * tip[2], 4: zero} for turn in (spin, swing))
     centre = {k: w[k] * polar(x[f"r{k}"], x[f"phi{k}"]) for k in MOVING_BARS}
     acceleration = {k: a_foot[k] + swing[k] * centre[k] for k in MOVING_BARS}
     points = {"A": tip[2], "B": O4 + tip[4], "a_A": a_foot[3], "a_B": swing[4] * tip[4]}
     points |= {"v_A": v_foot[3], "v_B": spin[4] * tip[4]}
     for k in MOVING_BARS:
-        points |= {f"G{k}": foot[k] + centre[k], f"a_G{k}": acceleration[k]}
+        points |= {f"G{k}": first_pin[k] + centre[k], f"a_G{k}": acceleration[k]}
         points[f"v_G{k}"] = v_foot[k] + spin[k] * centre[k]
     _put(y, points)
 
     force = {k: x[f"m{k}"] * polar(x["g"], x["g_angle"]) if "g" in x else zero for k in MOVING_BARS}
     moment = {k: x.get(f"couple_{k}", arb(0)) for k in MOVING_BARS}  # about G; a probe may add one
-    _add_effects(scene, x, {1: polar(arb(1), x["theta_1"]), **w}, foot, centre, force, moment)
+    _add_effects(scene, x, {1: polar(arb(1), x["theta_1"]), **w}, first_pin, centre, force, moment)
     for effect in scene.effects:
         if isinstance(effect, Flywheel):
             moment[effect.bar] -= x["J"] * alpha[effect.bar]
@@ -158,12 +158,12 @@ def outputs(scene: Scene, branch: int, x: Values, drive_bar: int) -> Values | No
         couple = -x.get(f"viscous_{pin}", arb(0)) * slip - x.get(f"friction_{pin}", arb(0)) * sign
         _twist(moment, pin, couple)
     # unknowns F12 F32 F23 F43 F34 F14 (x, y each) and T
-    joints = {2: ((0, "foot"), (1, "tip")), 3: ((2, "foot"), (3, "tip")), 4: ((4, "tip"), (5, "foot"))}
+    joints = {2: ((0, "first_pin"), (1, "tip")), 3: ((2, "first_pin"), (3, "tip")), 4: ((4, "tip"), (5, "first_pin"))}
     matrix = [[arb(0)] * 13 for _ in range(13)]
     known = []
     for n, k in enumerate(MOVING_BARS):
         for column, end in joints[k]:
-            arm = -centre[k] if end == "foot" else tip[k] - centre[k]
+            arm = -centre[k] if end == "first_pin" else tip[k] - centre[k]
             matrix[3 * n][2 * column] = matrix[3 * n + 1][2 * column + 1] = arb(1)
             matrix[3 * n + 2][2 * column], matrix[3 * n + 2][2 * column + 1] = -arm.imag, arm.real
         if k == drive_bar:
@@ -203,7 +203,7 @@ def _add_effects(
     scene: Scene,
     x: Values,
     w: dict[int, Complex],
-    foot: dict[int, Complex],
+    first_pin: dict[int, Complex],
     centre: dict[int, Complex],
     force: dict[int, Complex],
     moment: dict[int, Ball],
@@ -228,7 +228,7 @@ def _add_effects(
                     w[bar] * polar(x[f"{name}_{k}"], x[f"{name}_angle_{k}"])
                     for bar, name in ((start, "start"), (end, "end"))
                 ]
-                pull = _pull(spring, x, k, foot[end] + arms[1] - foot[start] - arms[0])
+                pull = _pull(spring, x, k, first_pin[end] + arms[1] - first_pin[start] - arms[0])
                 for bar, arm, f in ((start, arms[0], pull), (end, arms[1], -pull)):
                     if bar in force:
                         force[bar] += f

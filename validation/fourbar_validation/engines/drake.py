@@ -57,8 +57,8 @@ class DrakeTree(Tree):
             about_g = RotationalInertia(*[part.inertia] * 3)
             inertia = SpatialInertia.MakeFromCentralInertia(part.mass, np.array([*part.centre, 0.0]), about_g)
             body = self.body[part.bar] = plant.AddRigidBody(f"bar{part.bar}", inertia)
-            at, bearer = RigidTransform(np.array([*part.foot, 0.0])), self.body[part.bearer].body_frame()
-            frame = plant.AddFrame(FixedOffsetFrame(f"foot{part.bar}", bearer, at))
+            at, bearer = RigidTransform(np.array([*part.first_pin, 0.0])), self.body[part.bearer].body_frame()
+            frame = plant.AddFrame(FixedOffsetFrame(f"first_pin{part.bar}", bearer, at))
             joint = RevoluteJoint(FIRST_PIN[part.bar], frame, body.body_frame(), UP)
             self.joint[part.bar] = plant.AddJoint(joint)
             self.local |= {name: (body.body_frame(), np.array([*place, 0.0])) for name, place in part.points.items()}

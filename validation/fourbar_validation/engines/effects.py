@@ -67,7 +67,7 @@ def _springs(effect: "Springs", bars: Loaded) -> None:
     """Pull at the engine's own places of the two points."""
     for spring in effect.springs:
         one, other = (
-            bars.foot(point.bar) + bars.turned(point.bar, *components(point.distance, point.angle))
+            bars.first_pin(point.bar) + bars.rotate(point.bar, *components(point.distance, point.angle))
             for point in (spring.start, spring.end)
         )
         vector = np.asarray(other - one)
@@ -91,7 +91,7 @@ def _load(load: "Load", bars: Loaded) -> None:
     force, arm = np.array(components(*(load.force or (0.0, 0.0)))), np.array(components(*load.at))
     factor = 1.0 if load.table is None else look_up(load.table, bars.angle(2))
     if load.frame == "bar":
-        f, at = bars.turned(load.bar, *force), bars.turned(load.bar, *arm)
+        f, at = bars.rotate(load.bar, *force), bars.rotate(load.bar, *arm)
     else:
         f, at = force, arm
     bars.push(load.bar, factor * f, bars.point(f"G{load.bar}") + at)

@@ -66,7 +66,7 @@ class ExudynBars(Loaded):
             "O2": ((0.0, 0.0), (0.0, 0.0)),
             "A": ((0.0, 0.0), end[2]),
             "B": (end[4], end[3]),
-            "O4": (of_bar[4].foot, (0.0, 0.0)),
+            "O4": (of_bar[4].first_pin, (0.0, 0.0)),
         }
         for pin, bars in JOINTS.items():
             markers = [bodies.point(bar, *place) for bar, place in zip(bars, at[pin], strict=True)]
@@ -81,8 +81,10 @@ class ExudynBars(Loaded):
         for bar in MOVING_BARS:
             mass = mbs.AddMarker(MarkerBodyMass(bodyNumber=self.body[bar]))
             mbs.AddLoad(LoadMassProportional(markerNumber=mass, loadVector=[*self.field, 0.0]))
-            foot = bodies.axes(bar)
-            self.load[bar] = tuple(mbs.AddLoad(kind(markerNumber=foot)) for kind in (LoadForceVector, LoadTorqueVector))
+            first_pin = bodies.axes(bar)
+            self.load[bar] = tuple(
+                mbs.AddLoad(kind(markerNumber=first_pin)) for kind in (LoadForceVector, LoadTorqueVector)
+            )
         mbs.Assemble()
         self.state = mbs.systemData
         settings = exu.SimulationSettings()

@@ -81,11 +81,11 @@ def _places(linkage: FourBar, theta_2: Array, theta_3: Array, theta_4: Array) ->
     """Compute the angles of bars 3 and 4, their sine, pins A, B and the mass centres."""
     unit = {2: np.exp(1j * theta_2), 3: np.exp(1j * theta_3), 4: np.exp(1j * theta_4)}
     O4 = linkage.ground * np.exp(1j * linkage.ground_angle)
-    foot = {2: 0.0, 3: linkage.input.length * unit[2], 4: O4}
+    first_pin = {2: 0.0, 3: linkage.input.length * unit[2], 4: O4}
     found = {"theta_3": theta_3, "theta_4": theta_4, "sin_mu": np.sin(theta_4 - theta_3)}
-    found |= {"A": _plane(foot[3]), "B": _plane(O4 + linkage.output.length * unit[4])}
+    found |= {"A": _plane(first_pin[3]), "B": _plane(O4 + linkage.output.length * unit[4])}
     for bar in MOVING_BARS:
-        found[f"G{bar}"] = _plane(foot[bar] + polar(centre(linkage.bar(bar))) * unit[bar])
+        found[f"G{bar}"] = _plane(first_pin[bar] + polar(centre(linkage.bar(bar))) * unit[bar])
     return found
 
 
@@ -101,7 +101,7 @@ def _answered(
     found = {name: unknowns[:, COLUMN[name] : COLUMN[name] + 2] for name in FORCE_AT.values()}
     for bar in MOVING_BARS:
         found |= {f"omega_{bar}": motion.omega[bar], f"alpha_{bar}": motion.alpha[bar]}
-    a_A = motion.swing(2, motion.foot[3])
+    a_A = motion.swing(2, motion.first_pin[3])
     found["drive_condition"] = np.abs(cross(one, other)) * from_jamming
     found |= {"a_A": _plane(a_A), "a_B": _plane(motion.swing(4, scene.linkage.output.length * motion.unit[4]))}
     for bar in MOVING_BARS:
@@ -132,8 +132,8 @@ def move(
     w_3, w_4 = solved(jacobian, _plane(-a * alpha_2 * u_2 - 1j * centripetal)[..., None])[0][..., 0].T
     alpha = {1: np.zeros(n), 2: alpha_2, 3: w_3 / b, 4: w_4 / c}
     zero = np.zeros(n, dtype=complex)
-    foot = {1: zero, 2: zero, 3: a * u_2, 4: zero + d * u_1}
-    return BodyMotion(linkage, theta_2, {1: zero + u_1, 2: u_2, 3: u_3, 4: u_4}, foot, omega, alpha)
+    first_pin = {1: zero, 2: zero, 3: a * u_2, 4: zero + d * u_1}
+    return BodyMotion(linkage, theta_2, {1: zero + u_1, 2: u_2, 3: u_3, 4: u_4}, first_pin, omega, alpha)
 
 
 def balance(scene: Scene, motion: BodyMotion) -> tuple[Array, float, Array | float]:
@@ -200,7 +200,7 @@ def _add_inertia(motion: BodyMotion, wrenches: BodyWrenches) -> None:
         arm, alpha = motion.to_centre(number), motion.alpha[number]
         wrenches.push(number, -bar.mass * motion.swing(number, arm), 0.0)
         wrenches.twist(number, -about_first_pin(bar) * alpha)
-    wrenches.push(3, -motion.linkage.coupler.mass * motion.swing(2, motion.foot[3]), motion.to_centre(3))
+    wrenches.push(3, -motion.linkage.coupler.mass * motion.swing(2, motion.first_pin[3]), motion.to_centre(3))
 
 
 def _matrix(motion: BodyMotion, drive_bar: int) -> Array:

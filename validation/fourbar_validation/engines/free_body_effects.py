@@ -28,7 +28,7 @@ class BodyMotion(NamedTuple):
     theta_2: Array
     unit: dict[int, Complex]
     """Directions e^{i theta}."""
-    foot: dict[int, Complex]
+    first_pin: dict[int, Complex]
     """Where the first pin of each bar is (O2, O2, A, O4), m."""
     omega: dict[int, Array]
     alpha: dict[int, Array]
@@ -40,7 +40,7 @@ class BodyMotion(NamedTuple):
         return self.unit[bar] * polar(centre(self.linkage.bar(bar)))
 
     def swing(self, bar: int, arm: Complex) -> Complex:
-        """Acceleration of the end of an arm of a bar about its foot, m/s^2."""
+        """Acceleration of the end of an arm of a bar about its first pin, m/s^2."""
         return (1j * self.alpha[bar] - self.omega[bar] ** 2) * arm
 
     def slip(self, pin: str) -> Array:
@@ -134,7 +134,7 @@ def _springs(effect: Any, motion: BodyMotion, wrenches: BodyWrenches) -> None:
     """Pull preload + k (distance - length) along the line of the two points; none is known where they coincide."""
     for spring in effect.springs:
         arms = [motion.unit[point.bar] * polar((point.distance, point.angle)) for point in (spring.start, spring.end)]
-        across = motion.foot[spring.end.bar] + arms[1] - motion.foot[spring.start.bar] - arms[0]
+        across = motion.first_pin[spring.end.bar] + arms[1] - motion.first_pin[spring.start.bar] - arms[0]
         if spring.preload == spring.stiffness * spring.length:
             pull = spring.stiffness * across
         else:

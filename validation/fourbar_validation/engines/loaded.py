@@ -9,7 +9,7 @@ import numpy as np
 from fourbar.linkage import MOVING_BARS
 from fourbar.scene import Scene
 from fourbar_validation.compare.answer import Array
-from fourbar_validation.engines.description import FORCE_AT, turned, turned_by
+from fourbar_validation.engines.description import FORCE_AT, rotate, rotate_by
 
 PASSES = 1000
 """Passes over pin loads and the friction they make; each lessens the error where the friction is far from a jam."""
@@ -107,14 +107,14 @@ class Loaded(EngineBars, Protocol):
         along = self.rotation(bar)[:, 0]
         return math.atan2(along[1], along[0])
 
-    def turned(self, bar: int, x: float, y: float) -> Array:
+    def rotate(self, bar: int, x: float, y: float) -> Array:
         """Rotate (x, y) along and across a bar's line into world axes, (2,)."""
-        found = turned(self.ground_angle, x, y) if bar == 1 else turned_by(self.rotation(bar).tolist(), x, y)
+        found = rotate(self.ground_angle, x, y) if bar == 1 else rotate_by(self.rotation(bar).tolist(), x, y)
         return np.array(found)
 
-    def foot(self, bar: int) -> Array:
+    def first_pin(self, bar: int) -> Array:
         """Locate the first pin of a bar (O2, O2, A, O4 of bars 1, 2, 3, 4), m, (2,)."""
-        return np.zeros(2) if bar == 1 else self.point(f"foot{bar}")
+        return np.zeros(2) if bar == 1 else self.point(f"first_pin{bar}")
 
     def gravity(self, field: tuple[float, float]) -> None:
         """Set a field (g_x, g_y) for the engine's own gravity, m/s^2."""
@@ -123,7 +123,7 @@ class Loaded(EngineBars, Protocol):
     def push(self, bar: int, force: Array, point: Array) -> None:
         """Add a force (N, world axes) at a point (m, world axes); on the ground it does nothing."""
         if bar != 1:
-            (x, y), (f_x, f_y), wrench = (point - self.foot(bar)).tolist(), force.tolist(), self.wrenches[bar]
+            (x, y), (f_x, f_y), wrench = (point - self.first_pin(bar)).tolist(), force.tolist(), self.wrenches[bar]
             wrench[0] += f_x
             wrench[1] += f_y
             wrench[2] += x * f_y - y * f_x

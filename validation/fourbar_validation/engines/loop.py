@@ -196,8 +196,8 @@ class Trial:
     """CPU seconds in steps."""
     reading: float = 0.0
     """CPU seconds in reading the samples."""
-    stretches: tuple[tuple[slice, int], ...] = ()
-    """The samples of each stretch, and its steps: several samples are of one step where these are fewer."""
+    segments: tuple[tuple[slice, int], ...] = ()
+    """The samples of each segment, and its steps: several samples are of one step where these are fewer."""
     broken: str = ""
     """Where the engine lost the motion: what it reported of itself."""
 

@@ -78,7 +78,7 @@ class OpenSimBars(Loaded):
         self.length = {bar: part.length for bar, part in self.part.items()}
         self.joint = {
             "O2": self._joint("O2", 1, ZERO, 2, ZERO),
-            "O4": self._joint("O4", 1, self.part[4].foot, 4, ZERO),
+            "O4": self._joint("O4", 1, self.part[4].first_pin, 4, ZERO),
             "B": self._joint("B", 4, (self.length[4], 0.0, 0.0), 3, (self.length[3], 0.0, 0.0)),
         }
         self.pin_a = osim.PointConstraint(self.body[2], vec(self.length[2]), self.body[3], vec())
@@ -136,12 +136,12 @@ class OpenSimBars(Loaded):
 
     def gap(self) -> tuple[float, float]:
         """Return A on bar 2 minus A on bar 3, which opens as B would."""
-        x, y = (self.point("end2") - self.point("foot3")).tolist()
+        x, y = (self.point("end2") - self.point("first_pin3")).tolist()
         return x, y
 
     def jacobian(self) -> Array:
         """Return the derivative of the gap by the angles of bar 2, of bar 3 against bar 2, and of bar 4."""
-        by_own = self._station_jacobian("end2") - self._station_jacobian("foot3")
+        by_own = self._station_jacobian("end2") - self._station_jacobian("first_pin3")
         return np.column_stack((by_own[:, 0] + by_own[:, 2], by_own[:, 2], by_own[:, 1] - by_own[:, 2]))
 
     def _station_jacobian(self, name: str) -> Array:

@@ -38,7 +38,7 @@ class MujocoTree(Tree):
         spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT | mujoco.mjtDisableBit.mjDSBL_CONTACT
         bodies: dict[int, Any] = {1: spec.worldbody}
         for part in parts(scene.linkage):
-            body = bodies[part.bar] = bodies[part.bearer].add_body(name=f"bar{part.bar}", pos=[*part.foot, 0.0])
+            body = bodies[part.bar] = bodies[part.bearer].add_body(name=f"bar{part.bar}", pos=[*part.first_pin, 0.0])
             body.explicitinertial = True
             body.mass, body.ipos, body.inertia = part.mass, [*part.centre, 0.0], [part.inertia] * 3
             body.add_joint(name=FIRST_PIN[part.bar], type=mujoco.mjtJoint.mjJNT_HINGE, axis=[0.0, 0.0, 1.0])

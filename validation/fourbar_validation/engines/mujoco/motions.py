@@ -1,4 +1,4 @@
-"""The input's motion through a stretch of positions, in time: steadily, or by a motion law."""
+"""The input's motion through a segment of positions, in time: steadily, or by a motion law."""
 
 import bisect
 import math
@@ -17,14 +17,14 @@ LOOKED_AT = 2000
 
 
 class Steady:
-    """A stretch of positions in the order of their angles, at constant alpha_2.
+    """A segment of positions in the order of their angles, at constant alpha_2.
 
     As of `Lawful`, `omega` is the speed at the start and `fastest` the greatest |omega_2|, rad/s.
     """
 
-    def __init__(self, command: Command, stretch: Sequence[int], omega: float, alpha: float) -> None:
+    def __init__(self, command: Command, segment: Sequence[int], omega: float, alpha: float) -> None:
         self.theta_2 = command.theta_2
-        commanded = command.theta_2[list(stretch)]
+        commanded = command.theta_2[list(segment)]
         self.run = run_through(commanded, omega, alpha)
         self.width = len(np.unique(commanded)) - 1
         self.omega, self.fastest = omega, self.run.fastest
@@ -34,7 +34,7 @@ class Steady:
         return self.run.timestep(settings, at_least=self.width) if self.width else 1e-3
 
     def seconds(self, index: int) -> float:
-        """When it passes a position, from the start of the stretch: by the angle."""
+        """When it passes a position, from the start of the segment: by the angle."""
         return self.run.time(float(self.theta_2[index]))
 
     def speed(self, turned: float, seconds: float) -> float:
@@ -47,13 +47,13 @@ class Steady:
 
 
 class Lawful:
-    """A stretch of positions in the order of their times, by a motion law."""
+    """A segment of positions in the order of their times, by a motion law."""
 
-    def __init__(self, law: Law, command: Command, stretch: Sequence[int]) -> None:
+    def __init__(self, law: Law, command: Command, segment: Sequence[int]) -> None:
         assert command.time is not None
         self.law, self.time = law, command.time
-        self.began, ends = float(command.time[stretch[0]]), float(command.time[stretch[-1]])
-        self.intervals, self.duration = len(stretch) - 1, ends - self.began
+        self.began, ends = float(command.time[segment[0]]), float(command.time[segment[-1]])
+        self.intervals, self.duration = len(segment) - 1, ends - self.began
         self.omega = float(law.at(np.array([self.began]))[1][0])
         self.knots = list(law.time)
         self.at_knots = law.at(np.array(law.time))[2].tolist()
@@ -87,7 +87,7 @@ class Lawful:
         return float(f[k - 1] + part * (f[k] - f[k - 1]))
 
 
-Passage = Steady | Lawful
+MotionSegment = Steady | Lawful
 
 
 def extremes(law: Law) -> tuple[float, float]:

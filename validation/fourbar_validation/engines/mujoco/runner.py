@@ -10,7 +10,7 @@ from fourbar.scene import Command, Scene
 from fourbar_validation.compare.answer import Array
 from fourbar_validation.engines.loop import Assembler
 from fourbar_validation.engines.mujoco.closed_loop import O2, ClosedLoop, couple_elsewhere
-from fourbar_validation.engines.mujoco.motions import Passage
+from fourbar_validation.engines.mujoco.motions import MotionSegment
 
 LIGHT_FLYWHEEL = 1e4
 """Flywheel of the model that gives T3 or T4: heavy enough to keep the closure's softness
@@ -57,34 +57,34 @@ class Reading(NamedTuple):
 
 
 class SimulatedRun:
-    """One stretch of positions at a prescribed motion; `light` is the model that a drive on bar 3 or 4 is read from."""
+    """One segment of positions at a prescribed motion; `light` is the model that a drive on bar 3 or 4 is read from."""
 
     def __init__(
         self,
         scene: Scene,
         loop: ClosedLoop,
         light: ClosedLoop | None,
-        passage: Passage,
+        motion_segment: MotionSegment,
         start: tuple[float, float, float],
         timestep: float,
     ) -> None:
-        self.scene, self.loop, self.light, self.passage = scene, loop, light, passage
+        self.scene, self.loop, self.light, self.motion_segment = scene, loop, light, motion_segment
         wound = unwound(scene, start)
         self.turns = wound[O2] - start[O2]
         """Whole turns by which MuJoCo's theta_2 is ahead: springs at pins count them, rad."""
-        loop.set_state(wound, passage.omega)
+        loop.set_state(wound, motion_segment.omega)
         self.stepper = Stepper(loop.model, loop.data, timestep)
 
     def to(self, index: int) -> None:
         """Step on to the step nearest to a position."""
-        self.stepper.to(self.passage.seconds(index))
+        self.stepper.to(self.motion_segment.seconds(index))
 
     def read(self) -> Reading:
         """Read torque and pin forces of the state that was last forwarded."""
         torque = self.loop.crank_torque()
         if self.light is None:
             return Reading(torque, self.loop.forces())
-        alpha = self.passage.alpha(self.stepper.time)
+        alpha = self.motion_segment.alpha(self.stepper.time)
         couple = couple_elsewhere(self.loop, self.light, self.scene.drive_bar, alpha, torque)
         return Reading(couple, self.light.forces())
 
@@ -97,7 +97,7 @@ def assembled(position: Assembler, command: Command, order: Iterable[int]) -> li
     return found
 
 
-def stretches(
+def split_segments(
     found: list[Found], order: Iterable[int], joined: Callable[[int, int], bool] = lambda one, other: True
 ) -> list[list[int]]:
     """Split the positions, in order of time, where the loop does not close, or two neighbours are not joined."""
@@ -107,4 +107,4 @@ def stretches(
             split.append([])
         if found[index] is not None:
             split[-1].append(int(index))
-    return [stretch for stretch in split if stretch]
+    return [segment for segment in split if segment]

@@ -30,8 +30,8 @@ from fourbar_validation.engines.mujoco.called_back import (
 )
 from fourbar_validation.engines.mujoco.closed_loop import O2, O4, A, ClosedLoop
 from fourbar_validation.engines.mujoco.monitor import ResidualMonitor, alarms
-from fourbar_validation.engines.mujoco.motions import Lawful, Passage, Steady, extremes, order_in_time
-from fourbar_validation.engines.mujoco.runner import LIGHT_FLYWHEEL, SimulatedRun, assembled, stretches
+from fourbar_validation.engines.mujoco.motions import Lawful, MotionSegment, Steady, extremes, order_in_time
+from fourbar_validation.engines.mujoco.runner import LIGHT_FLYWHEEL, SimulatedRun, assembled, split_segments
 
 SHARED = (
     "lengths, masses, inertias, centres, loads and effects as MJCF text; tables of loads; omega_2, alpha_2 or the "
@@ -109,7 +109,7 @@ def as_run(scene: Scene, command: Command) -> Scene:
 
 
 class _Simulation:
-    """One scene: its own assembly, then each stretch of positions that assembles, run through in time."""
+    """One scene: its own assembly, then each segment of positions that assembles, run through in time."""
 
     def __init__(self, settings: Settings, scene: Scene, command: Command, *, bounded: bool = True) -> None:
         self.bounded = bounded
@@ -133,10 +133,10 @@ class _Simulation:
         least = least_sine(self.scene.linkage, self.command.theta_2, np.array([q is not None for q in found]))
         if self.bounded and least < NEAREST_TOGGLE.boundary:
             raise LimitError(f"|sin(theta_4 - theta_3)| falls to {least:.1e}; {NEAREST_TOGGLE.reason}")
-        for stretch in stretches(found, self.order, partial(self._closes_between, position)):
-            start = found[stretch[0]]
+        for segment in split_segments(found, self.order, partial(self._closes_between, position)):
+            start = found[segment[0]]
             assert start is not None
-            self._run(stretch, start)
+            self._run(segment, start)
         self.out["theta_2"] = within(self.scene, self.out["theta_2"])
         at, values = as_made(self.out, self.branch)
         setting = f"{self.settings.integrator} {self.steps_per_revolution:.0f}/rev"
@@ -152,12 +152,12 @@ class _Simulation:
             evidence=self.evidence,
         )
 
-    def _passage(self, stretch: list[int]) -> Passage:
+    def _motion_segment(self, segment: list[int]) -> MotionSegment:
         """Choose how the input moves through a segment."""
         if self.law is not None:
-            return Lawful(self.law, self.command, stretch)
+            return Lawful(self.law, self.command, segment)
         motion = self.scene.motion
-        return Steady(self.command, stretch, motion.omega_2 or 0.0, motion.alpha_2)
+        return Steady(self.command, segment, motion.omega_2 or 0.0, motion.alpha_2)
 
     def _loop(self, timestep: float, supplied: dict[str, ActuatorForce], flywheel: float | None = None) -> ClosedLoop:
         """Compile a model that takes from `supplying` what its text cannot say."""
@@ -178,23 +178,23 @@ class _Simulation:
             position.find(float(theta_2), branch) is not None for theta_2 in np.linspace(start, stop, pieces + 1)[1:-1]
         )
 
-    def _run(self, stretch: list[int], start: tuple[float, float, float]) -> None:
-        """Step through one stretch and read at the step nearest to each position."""
-        passage = self._passage(stretch)
-        timestep = passage.timestep(self.settings)
-        if len(stretch) > 1:
-            turn = 2.0 * np.pi / passage.fastest
+    def _run(self, segment: list[int], start: tuple[float, float, float]) -> None:
+        """Step through one segment and read at the step nearest to each position."""
+        motion_segment = self._motion_segment(segment)
+        timestep = motion_segment.timestep(self.settings)
+        if len(segment) > 1:
+            turn = 2.0 * np.pi / motion_segment.fastest
             self.steps_per_revolution = max(self.steps_per_revolution, turn / timestep)
         supplied = self.supplied
         if self.law is not None:
-            supplied = {**supplied, "drive": lambda m, d: m.dof_armature[O2] * passage.alpha(d.time)}
+            supplied = {**supplied, "drive": lambda m, d: m.dof_armature[O2] * motion_segment.alpha(d.time)}
         with supplying(supplied):
             loop = self._loop(timestep, supplied)
             light = None if self.scene.drive_bar == 2 else self._loop(timestep, supplied, LIGHT_FLYWHEEL)
             monitor = ResidualMonitor(self._loop(timestep, supplied), self.scene.drive_bar)
-            run = SimulatedRun(self.scene, loop, light, passage, start, timestep)
-            begins = float(self.command.theta_2[stretch[0]])
-            for index in stretch:
+            run = SimulatedRun(self.scene, loop, light, motion_segment, start, timestep)
+            begins = float(self.command.theta_2[segment[0]])
+            for index in segment:
                 run.to(index)
                 self._read(run, monitor, index, begins)
         self.evidence["steps"] += run.stepper.done
@@ -224,10 +224,10 @@ class _Simulation:
     def _keep_worst(self, run: SimulatedRun, begins: float) -> None:
         """Keep the worst of what the engine says of itself."""
         loop, d, seen = run.loop, run.loop.data, self.evidence
-        speed = run.passage.speed(float(d.qpos[O2]) - run.turns - begins, run.stepper.time)
+        speed = run.motion_segment.speed(float(d.qpos[O2]) - run.turns - begins, run.stepper.time)
         worst = {
             "closure_gap_m": float(np.hypot(*loop.gap())),
-            "speed_error": float(abs(abs(d.qvel[O2]) - speed) / (run.passage.fastest or 1.0)),
+            "speed_error": float(abs(abs(d.qvel[O2]) - speed) / (run.motion_segment.fastest or 1.0)),
             "solver_iterations": float(d.solver_niter.max()),
             "bad_states": float(loop.bad()),
             "time_went_back": float(run.stepper.lost()),

@@ -28,7 +28,7 @@ from fourbar_validation.engines.mujoco.corrections import correct
 from fourbar_validation.engines.mujoco.describe import called, described
 from fourbar_validation.engines.mujoco.guess import find_topology
 from fourbar_validation.engines.mujoco.motions import order_in_time
-from fourbar_validation.engines.mujoco.runner import Stepper, assembled, stretches
+from fourbar_validation.engines.mujoco.runner import Stepper, assembled, split_segments
 from fourbar_validation.engines.mujoco.topology import Topology
 from fourbar_validation.engines.tree import closed
 
@@ -288,23 +288,23 @@ def through_time(loop: UserLoop, at: Command) -> Answer:
     assert isinstance(at.omega_2, float) and isinstance(at.alpha_2, float)
     position = Assembler(loop)
     order = order_in_time(at, at.omega_2, None)
-    stretch = max(stretches(assembled(position, at, order), order), key=len, default=[])
-    if len(stretch) < 2:
+    segment = max(split_segments(assembled(position, at, order), order), key=len, default=[])
+    if len(segment) < 2:
         raise LimitError("nowhere do two neighbouring positions assemble in this file")
-    run = run_through(at.theta_2[stretch], at.omega_2, at.alpha_2)
+    run = run_through(at.theta_2[segment], at.omega_2, at.alpha_2)
     timestep, sense = float(model.opt.timestep), loop.topology.sense["O2"]
     steps = run.time(run.stop) / timestep
     if not 1.0 <= steps <= MOST_STEPS:
         raise LimitError(
             f"its timestep of {timestep:g} s makes {steps:.3g} steps of the motion; must be 1 to {MOST_STEPS}"
         )
-    position.find(float(at.theta_2[stretch[0]]), int(at.branch[stretch[0]]))
+    position.find(float(at.theta_2[segment[0]]), int(at.branch[segment[0]]))
     data.qpos[:], data.qvel[:] = loop.data.qpos, loop.speeds(at.omega_2)
     heavy = max(loop.armature, flywheel(loop.scene))
-    out, seen = blank(len(stretch), ANSWERED), {"closure_gap_m": 0.0, "speed_error": 0.0}
+    out, seen = blank(len(segment), ANSWERED), {"closure_gap_m": 0.0, "speed_error": 0.0}
     alarms: list[str] = []
     stepper = Stepper(model, data, timestep)
-    for i, index in enumerate(stretch):
+    for i, index in enumerate(segment):
         model.dof_armature[loop.crank] = heavy
         data.qfrc_applied[loop.crank] = heavy * sense * at.alpha_2
         stepper.to(run.time(float(at.theta_2[index])))
@@ -322,6 +322,6 @@ def through_time(loop: UserLoop, at: Command) -> Answer:
     model.dof_armature[loop.crank] = loop.armature
     known = np.isfinite(out["theta_2"])
     out = {name: array[known] for name, array in out.items()}
-    where, _ = as_made(out, at.branch[stretch][known])
+    where, _ = as_made(out, at.branch[segment][known])
     setting = f"{mujoco.mjtIntegrator(model.opt.integrator).name.removeprefix('mjINT_')} {timestep:g} s"
     return Answer(THROUGH_TIME, setting, where, np.ones(known.sum(), dtype=bool), out, evidence=seen, alarms=alarms)

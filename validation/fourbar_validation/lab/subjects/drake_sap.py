@@ -11,7 +11,7 @@ from pydrake.systems.analysis import Simulator
 from fourbar.mjcf import flywheel
 from fourbar.mjcf.sdf import sdf
 from fourbar.scene import Scene
-from fourbar_validation.engines.description import FIRST_PIN, turned
+from fourbar_validation.engines.description import FIRST_PIN, rotate
 from fourbar_validation.lab.subjects.motion import Instant, Readings, run_through, start, turn, weight
 
 VERSION = version("drake")
@@ -47,7 +47,7 @@ def through(scene: Scene, steps: int, setting: str) -> Readings:
         theta, speed = [angles[0], angles[0] + angles[1], angles[2]], joints[0].get_angular_rate(context)
         reactions = plant.get_reaction_forces_output_port().Eval(context)
         on_child = (reactions[int(joint.index())].translational()[:2] for joint in joints)
-        O2, A, O4 = (np.array(turned(angle, *force)) for angle, force in zip(theta, on_child, strict=True))
+        O2, A, O4 = (np.array(rotate(angle, *force)) for angle, force in zip(theta, on_child, strict=True))
         done += n
         simulator.AdvanceTo(done * timestep)
         return theta, speed, {"F12": O2, "F32": -A, "F14": O4}

@@ -13,7 +13,7 @@ from fourbar.mjcf.simulators import SINGLE
 from fourbar.mjcf.usd import usd
 from fourbar.scene import Scene
 from fourbar_validation.compare.answer import Array
-from fourbar_validation.engines.description import turned
+from fourbar_validation.engines.description import rotate
 from fourbar_validation.lab.subjects.motion import Instant, Readings, as_file, run_through, start, turn
 
 VERSION = version("newton")
@@ -60,7 +60,7 @@ def through(scene: Scene, steps: int, setting: str) -> Readings:
         rows = solver._solver_kamino.data.joints.lambda_kin_j.numpy().astype(float).reshape(4, 5)[:, 1:3]
         forces = {}
         for row, (pin, parent) in zip(rows, PARENTS.items(), strict=True):
-            forces[pin] = np.array(turned(laid[pin] + (0.0 if parent is None else theta[parent]), *row))
+            forces[pin] = np.array(rotate(laid[pin] + (0.0 if parent is None else theta[parent]), *row))
         on_pins = {"F12": forces["O2"], "F32": -forces["A"], "F43": forces["B"], "F14": forces["O4"]}
         return Instant(theta.tolist(), speed, alpha, -inertia * alpha, on_pins)
 

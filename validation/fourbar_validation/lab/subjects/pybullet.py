@@ -30,7 +30,7 @@ def urdf(scene: Scene) -> str:
             f'<link name="{BAR_NAMES[part.bar]}"><inertial><origin xyz="{part.centre[0]!r} {part.centre[1]!r} 0"/>'
             f'<mass value="{part.mass!r}"/><inertia {turned} ixy="0" ixz="0" iyz="0"/></inertial></link>'
             f'<joint name="{FIRST_PIN[part.bar]}" type="continuous"><parent link="{BAR_NAMES[part.bearer]}"/>'
-            f'<child link="{BAR_NAMES[part.bar]}"/><origin xyz="{part.foot[0]!r} {part.foot[1]!r} 0"/>'
+            f'<child link="{BAR_NAMES[part.bar]}"/><origin xyz="{part.first_pin[0]!r} {part.first_pin[1]!r} 0"/>'
             '<axis xyz="0 0 1"/></joint>'
         )
     return "".join([*links, "</robot>"])
