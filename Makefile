@@ -20,14 +20,13 @@ long-test: setup
 	KILLS=50 $(BIN)/python -m pytest tests/whole/test_kills.py tests/validation/run/test_machines.py
 	PACKAGE=all $(BIN)/python -m pytest tests/whole/test_package.py
 	MACHINES=all $(BIN)/python -m pytest tests/whole/test_machines.py
-	INSTRUCTIONS=all $(BIN)/python -m pytest tests/validation/lab/effects/test_cost.py
 	$(BIN)/python -m pytest tests/validation/engines/test_engines.py
 	$(BIN)/python -m pytest tests/fourbar/mjcf/test_simulators.py tests/validation/lab/subjects/test_subjects.py
 	PROBLEMS=all $(BIN)/python -m pytest tests/validation/lab/subjects/test_problems.py
 	RELEASES=pip $(BIN)/python -m pytest tests/validation/lab/subjects/test_versions.py
 	$(BIN)/python -m validation standing
 	FREE_MOTIONS=30 $(BIN)/python -m pytest -n 2 tests/fourbar/evaluation/test_free_motion_reference.py
-	$(BIN)/python -m validation fuzz-files --count 100000
+	$(BIN)/python -m validation fuzz --files --count 100000
 	$(BIN)/python -m validation fuzz
 	$(BIN)/python -m validation stability
 	$(BIN)/python -m validation published
@@ -40,7 +39,7 @@ docs: setup
 	$(BIN)/sphinx-build -W -q docs site
 
 models: setup
-	$(BIN)/python -m validation models
+	$(BIN)/python -m validation write
 
 setup: $(STAMP)
 

@@ -78,7 +78,7 @@ _ON_FIRST_USE = {
 
 
 def _method(module: str, function: str) -> _Any:
-    """A method that a folder above adds to a scene or a solution; loaded when it is called."""
+    """Make a method that a folder above adds to a scene or a solution; its module is loaded when it is called."""
 
     def call(self: _Any, *arguments: _Any, **options: _Any) -> _Any:
         return getattr(_import_module(module), function)(self, *arguments, **options)
@@ -98,6 +98,6 @@ def __getattr__(name: str) -> _Any:
 
 
 def __dir__() -> list[str]:
-    """What a user reaches for; the modules behind it stay out of the list."""
+    """List the public names; the modules behind them stay out of the list."""
     own = [name for name, value in globals().items() if name[0] != "_" and not isinstance(value, _ModuleType)]
     return sorted([*own, *_ON_FIRST_USE, "__version__"])

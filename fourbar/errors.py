@@ -40,11 +40,11 @@ class InputError(FourBarError):
         super().__init__(f"{where}{key} = {shown}: {allowed}")
 
     def __reduce__(self) -> tuple[type, tuple[object, ...]]:
-        """It crosses from one process to another as it was made."""
+        """Let the error cross from one process to another as it was made."""
         return type(self), (self.key, self.value, self.allowed, self.file)
 
     def in_file(self, file: str) -> "InputError":
-        """The same mistake, with the file it was found in."""
+        """Return the same mistake with the name of the file that holds it."""
         return InputError(self.key, self.value, self.allowed, file)
 
 
@@ -122,7 +122,7 @@ def run(group: "click.Group", program: str, arguments: list[str] | None = None) 
 
 
 def _left(left: SystemExit, streams: tuple[TextIO | None, ...]) -> int:
-    """The status of a command that was left by SystemExit.
+    """Return the exit status of a command that raised SystemExit.
 
     Click and rich leave with 1 where the reader of a pipe has gone; it has what it wants. Click lets go of standard
     output then, and does so for every pipe that breaks, that of a worker too.

@@ -32,7 +32,7 @@ MOST_STEPS = 100_000_000
 
 
 def require(key: str, value: object, *, positive: bool = False, at_least_zero: bool = False) -> float:
-    """The value as a float, or an InputError that says what is allowed."""
+    """Return the value as a float, or raise an InputError that says what is allowed."""
     allowed = "a finite number"
     if positive:
         allowed = "a finite number > 0"
@@ -48,14 +48,14 @@ def require(key: str, value: object, *, positive: bool = False, at_least_zero: b
 
 
 def require_whole(key: str, value: object, among: Container[int], allowed: str) -> int:
-    """The value as one of some whole numbers, or an InputError that says what is allowed."""
+    """Return the value as one of some integers, or raise an InputError that says what is allowed."""
     if isinstance(value, bool) or not isinstance(value, Integral) or value not in among:
         raise InputError(key, value, allowed)
     return int(value)
 
 
 def require_numbers(key: str, value: object, allowed: str = "must be finite numbers") -> NDArray[np.float64]:
-    """The value as finite floats, shape () or (n,), or an InputError that says what is allowed."""
+    """Return the value as finite floats, shape () or (n,), or raise an InputError that says what is allowed."""
     try:
         array = np.asarray(value)
     except ValueError:  # rows of different lengths
@@ -66,7 +66,7 @@ def require_numbers(key: str, value: object, allowed: str = "must be finite numb
 
 
 def require_bar(key: str, value: object) -> int:
-    """The number of a moving bar, or an InputError."""
+    """Return the number of a moving bar, or raise an InputError."""
     return require_whole(key, value, MOVING_BARS, "must be 2, 3 or 4")
 
 
@@ -163,12 +163,12 @@ class FourBar:
         return (self.input, self.coupler, self.output)
 
     def bar(self, number: int) -> Bar:
-        """The moving bar 2, 3 or 4."""
+        """Return the moving bar 2, 3 or 4."""
         return self.moving[require_bar("bar", number) - 2]
 
 
 def uniform(ground: float, input: float, coupler: float, output: float, *, per_metre: float = 1.0) -> FourBar:
-    """A linkage of uniform slender bars of the given lengths (m) and mass per metre (kg/m)."""
+    """Make a linkage of uniform slender bars of the given lengths (m) and mass per metre (kg/m)."""
     bars: list[Bar] = []
     density = require("per_metre", per_metre, at_least_zero=True)
     for key, length in (("input", input), ("coupler", coupler), ("output", output)):

@@ -196,7 +196,7 @@ def csv_text(solution: Solution, units: Conversion = SI) -> str:
 
 
 def leading(solution: Solution) -> dict[str, list[Any]]:
-    """The first columns of a table, one entry for each position; of a study also the number of the member."""
+    """List the first columns of a table, one entry for each position; of a study also the number of the member."""
     size = solution.theta_2.size
     first = {
         "status": np.array(STATUS_NAMES)[solution.status_code.ravel()].tolist(),
@@ -236,7 +236,7 @@ def require_units(units: object) -> Conversion:
 
 
 def unit_in(unit: str, units: Conversion) -> tuple[str, float]:
-    """The unit in which a quantity of an SI unit is given, and the factor to it."""
+    """Return the unit in which a quantity of an SI unit is given, and the factor to it."""
     return units.get(unit, (unit, 1.0))
 
 
@@ -253,7 +253,7 @@ def unit_of(name: str) -> str:
 
 
 def values_of(solution: Solution, name: str, units: Conversion = SI) -> Any:
-    """A quantity by its name, those of the scene's own points too; None where it was not evaluated."""
+    """Return a quantity by its name, those of the scene's own points too; None where it was not evaluated."""
     values: Array | None
     if name in UNITS:
         values = getattr(solution, name)

@@ -96,7 +96,7 @@ def solve(
 
 
 def _refuse(at: Command) -> None:
-    """An InputError where a command is none."""
+    """Raise an InputError where a command is none."""
     expect("at", at, Command)
     for name in ("theta_2", "branch"):
         value = getattr(at, name)
@@ -120,7 +120,7 @@ def _refuse(at: Command) -> None:
 
 
 def last_stage(scene: Scene) -> str:
-    """The last stage that a scene states enough for: error bars and all, or positions alone."""
+    """Return the last stage that a scene states enough for: error bars and all, or positions only."""
     motion = scene.motion
     return "position" if motion.omega_2 is None and motion.law is None and motion.free is None else STAGES[-1]
 
@@ -128,7 +128,7 @@ def last_stage(scene: Scene) -> str:
 def requested(
     scene: Scene, shape: tuple[int, ...], omega_2: Any, stage: str | None, out: Mapping[str, Array] | None
 ) -> tuple[int, KeysView[str]]:
-    """The number of the last stage that is evaluated, and the names of the quantities; an InputError as of `solve`.
+    """Return the number of the last stage evaluated, and the names of the quantities; an InputError as of `solve`.
 
     Parameters
     ----------
@@ -165,13 +165,13 @@ def _stages(points: tuple[str, ...]) -> dict[str, str]:
 
 @cache
 def _names(wanted: int, absent: tuple[str, ...], points: tuple[str, ...]) -> KeysView[str]:
-    """The quantities of the stages up to the last one wanted."""
+    """List the quantities of the stages up to the last one wanted."""
     before = STAGES[: wanted + 1]
     return {name: of for name, of in _stages(points).items() if of in before and name not in absent}.keys()
 
 
 def solved(scene: Scene, at: Command, code: NDArray[np.uint8], result: Mapping[str, Array]) -> Solution:
-    """The solution with its arrays in their places."""
+    """Put the arrays of a solution in their places."""
     own: dict[str, dict[str, Array]] = {start: {} for start in OF_POINTS}
     for point in scene.points:
         for start, arrays in own.items():
@@ -213,8 +213,10 @@ def _by_parts(
 def _alone(
     case: Case, where: Command, wanted: int, names: KeysView[str], code: NDArray[np.uint8]
 ) -> dict[str, Array] | None:
-    """A single position in plain numbers, for arrays of one entry cost several times as much; None where any is no
-    number: there NumPy goes on with inf and NaN, and statuses follow."""
+    """Solve a single position in plain numbers, for arrays of one entry cost several times as much.
+
+    None where any is no number: there NumPy goes on with inf and NaN, and statuses follow.
+    """
     try:
         codes, values, _ = commanded(case, where, (0,), wanted, names)
     except ArithmeticError:
@@ -229,7 +231,7 @@ def _alone(
 
 
 def _released(scene: Scene) -> "FreeMotion":
-    """The motion that the linkage makes when it is released."""
+    """Compute the motion that the linkage makes when it is released."""
     from fourbar.evaluation.free_motion import release
 
     free, start = scene.motion.free, command(scene)
@@ -258,7 +260,7 @@ def _absent(scene: Scene) -> tuple[str, ...]:
 
 
 def _highest_stage(out: Mapping[str, Array], positions: tuple[int, ...], stages: Mapping[str, str]) -> int:
-    """The last stage that the quantities named need; an InputError where one cannot be written."""
+    """Find the last stage that the quantities named need; an InputError where one cannot be written."""
     for name, array in out.items():
         if name not in stages:
             raise InputError("out", name, "must be among " + ", ".join(stages))

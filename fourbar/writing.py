@@ -14,7 +14,7 @@ TEMPORARY = ".part"
 
 @contextmanager
 def naming(path: Path) -> Iterator[None]:
-    """What goes wrong with an open file (a full disk) names it, and no temporary one, which no reader knows."""
+    """Name the file in what goes wrong while it is open (a full disk), not the temporary one, which no reader knows."""
     try:
         yield
     except OSError as error:

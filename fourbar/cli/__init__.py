@@ -19,7 +19,7 @@ from fourbar.errors import run
 @click.option("--traceback", is_flag=True, help="Show where an internal error happened.")
 @click.pass_context
 def group(context: click.Context, traceback: bool) -> None:
-    """Closed formulas of the planar four-bar linkage: from a scene file to driving torque and pin forces.
+    """Evaluate closed formulas of the planar four-bar linkage: from a scene file to driving torque and pin forces.
 
     The checks against MuJoCo and Pinocchio are fourbar-validation, with the extra "validation".
 

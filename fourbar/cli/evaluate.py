@@ -130,7 +130,7 @@ def _sensitivity(scene: Path, as_json: bool, out: Path | None) -> None:
 @click.option("--json", "as_json", is_flag=True, help="One object, SI, every digit.")
 @click.option("-o", "--out", type=FILE, metavar="PLOT", help="Draw the bands: svg, png or pdf.")
 def tolerance(scene: Path, samples: int | None, seed: int, as_json: bool, out: Path | None) -> None:
-    """What the [tolerances] of a scene do to torque, pin forces and points, and which dimension does it."""
+    """Show what the [tolerances] of a scene do to torque, pin forces and points, and which dimension does it."""
     from fourbar.show import tolerances as shown
     from fourbar.show.plot import draw_tolerances, format_of
     from fourbar.show.progress import running

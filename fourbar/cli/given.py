@@ -40,7 +40,7 @@ units_option = click.option(
 
 @contextmanager
 def opened(path: Path) -> Iterator["Scene"]:
-    """The scene of a file; InputError where it cannot be printed, or not to the file of -o.
+    """Read the scene of a file; InputError where it cannot be printed, or not to the file of -o.
 
     The output is looked at before anything is solved, which may take minutes. Mistakes that show only then name the
     file too.
@@ -65,7 +65,7 @@ def opened(path: Path) -> Iterator["Scene"]:
 
 @contextmanager
 def waiting(scene: "Scene") -> Iterator[None]:
-    """A long free motion takes minutes: a terminal shows that it is running."""
+    """Show in a terminal that a long free motion, which takes minutes, is running."""
     if scene.motion.free is None:
         yield
         return
@@ -83,7 +83,7 @@ def lengths_of(texts: tuple[str, ...]) -> list[float]:
 
 
 def number_of(key: str, text: str, unit: str, *, positive: bool = False) -> float:
-    """A number of the command line: bare in SI, or with a unit."""
+    """Read a number of the command line: bare in SI, or with a unit."""
     from fourbar.linkage import require
 
     try:
@@ -98,7 +98,7 @@ def number_of(key: str, text: str, unit: str, *, positive: bool = False) -> floa
 
 
 def angle_of(key: str, text: str) -> float:
-    """An angle with its unit, rad: a bare number may have been meant in either."""
+    """Read an angle with its unit, rad: a bare number may have been meant in either."""
     try:
         float(text)
     except ValueError:

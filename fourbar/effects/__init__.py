@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from fourbar.effects.load import Load as Load
     from fourbar.effects.load import Table as Table
     from fourbar.effects.pin_friction import PinFriction as PinFriction
-    from fourbar.effects.spring import Point as Point
     from fourbar.effects.spring import Spring as Spring
+    from fourbar.effects.spring import SpringEnd as SpringEnd
     from fourbar.effects.spring import Springs as Springs
     from fourbar.effects.torsion import Torsion as Torsion
     from fourbar.effects.viscous import Viscous as Viscous
@@ -35,7 +35,7 @@ FILE_OF = {
 OTHERS = {
     "Effect": "effect",
     **dict.fromkeys(("Load", "Table"), "load"),
-    **dict.fromkeys(("Point", "Spring"), "spring"),
+    **dict.fromkeys(("Spring", "SpringEnd"), "spring"),
     "Actions": "actions",
 }
 

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from fourbar.formulas.arithmetic import Number, cross
+from fourbar.formulas.arithmetic import Number, anywhere, cross
 from fourbar.formulas.motion import State
 from fourbar.formulas.pin_forces import Bodies, Body, Wrenches
 from fourbar.linkage import PINS, FourBar
@@ -24,7 +24,7 @@ def bodies(linkage: FourBar, effects: Iterable[Any] = ()) -> Bodies:
 
 
 def as_it_is(number: Number, *, turned: bool = False) -> Number:
-    """The number itself."""
+    """Return the number itself."""
     return number
 
 
@@ -35,16 +35,16 @@ class Actions:
     ----------
     state : positions and motion.
     bodies : of bars 2, 3, 4.
-    side : the sense in which pins at rest are about to turn: +1 as theta_2 grows, -1 as it falls, 0 neither.
+    side : the sense in which pins at rest are about to turn: +1 as theta_2 grows, -1 as it falls, 0 neither; between
+        them the part of its torque that dry friction holds them with.
     rounded : what a number becomes when it is rounded otherwise, for the error bars: of terms, and of what cancels in
         them, as a distance against a spring's length.
     """
 
     def __init__(
-        self, state: State, bodies: Bodies, side: int = 0, rounded: Callable[..., Number] | None = None
+        self, state: State, bodies: Bodies, side: Number = 0, rounded: Callable[..., Number] = as_it_is
     ) -> None:
-        self.state, self.bodies, self.side = state, bodies, side
-        self.rounded = rounded or as_it_is
+        self.state, self.bodies, self.side, self.rounded = state, bodies, side, rounded
         self.forces: dict[int, Any] = {}
         """Resultants of the bars on which any acts, complex, N."""
         self.moments: dict[int, Any] = {}
@@ -53,7 +53,7 @@ class Actions:
         """Between the two bars that meet at a pin, on the second of them, N m."""
 
     def force(self, bar: int, force: Number, arm: Number = 0.0j) -> None:
-        """A force (complex, N, world axes) on a bar; on the ground it does nothing.
+        """Add a force (complex, N, world axes) on a bar; on the ground it does nothing.
 
         Parameters
         ----------
@@ -65,19 +65,18 @@ class Actions:
             self.moment(bar, cross(-force, arm))
 
     def moment(self, bar: int, moment: Number) -> None:
-        """A pure couple on a bar, N m; on the ground it does nothing."""
+        """Add a pure couple on a bar, N m; on the ground it does nothing."""
         if bar != 1:
             moment = self.rounded(moment)
             self.moments[bar] = self.moments[bar] + moment if bar in self.moments else moment
 
     def couple(self, pin: str, couple: Number) -> None:
-        """A couple on the second of the two bars that meet at a pin, and its opposite on the first, N m."""
+        """Add a couple on the second of the two bars that meet at a pin, and its opposite on the first, N m."""
         couple = self.rounded(couple)
         self.couples[pin] = self.couples[pin] + couple if pin in self.couples else couple
 
     def work(self) -> tuple[Number, Number]:
-        """Generalised force Q (power over the speed of the independent angle) of everything, and of what acts on
-        bars 3 and 4 alone, N m."""
+        """Compute the generalised force Q (power over the independent angle's speed) of all and of bars 3, 4, N m."""
         k = self.state.k
         parts = [self.moments[bar] * h for bar, h in ((3, k.h3), (4, k.h4)) if bar in self.moments]
         if 3 in self.forces:
@@ -104,7 +103,7 @@ class Actions:
         moves turns in either sense.
         """
         slip, turning = self.state.slip(pin), self.turning(pin)
-        if self.side == 0:
+        if not anywhere(self.side != 0):
             return turning * np.sign(slip * self.state.speed)
         moving = np.where(turning, np.sign(slip * self.state.speed), self.side)
         return np.where(np.equal(self.state.speed, 0.0), self.side * turning * np.sign(slip), moving)

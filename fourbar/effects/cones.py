@@ -35,7 +35,7 @@ class Sliding(NamedTuple):
     """(n,), in (0, 1]: the least stretch of the equations' slope, 0 where they jam."""
 
 
-def settle(F: Array, C: Array, k: Array) -> Sliding:
+def solve_sliding(F: Array, C: Array, k: Array) -> Sliding:
     """Solve n problems in p unknowns: F (n, p, 2) in N, C (n, p, p, 2) in 1/m, k (n, p) in m."""
     n, p = F.shape[:2]
     known = np.isfinite(F).all(axis=(1, 2)) & np.isfinite(C).all(axis=(1, 2, 3))
@@ -88,7 +88,7 @@ def _quadratic(F: Array, C: Array, k: Array) -> tuple[Array, NDArray[np.uint8]]:
 
 
 def _right_side(F: Array, C: Array, k: Array, x: Array) -> tuple[Array, Array]:
-    """k |F + C x| and its derivative, (n, p) and (n, p, p)."""
+    """Compute k |F + C x| and its derivative, (n, p) and (n, p, p)."""
     force = F + np.einsum("npqi,nq->npi", C, x)
     size = np.hypot(force[..., 0], force[..., 1])
     unit = force / np.where(size == 0.0, 1.0, size)[..., None]
@@ -123,7 +123,7 @@ def _iterate(F: Array, C: Array, k: Array, x: Array) -> Array:
 
 
 def _search(F: Array, C: Array, k: Array) -> tuple[Array, int]:
-    """The least solution of one problem, and whether others were found, from starts over many magnitudes."""
+    """Find the least solution of one problem, and whether it has others, from starts over many magnitudes."""
     p = len(k)
     size = float(np.max(k * np.hypot(F[:, 0], F[:, 1])))
     if size == 0.0:

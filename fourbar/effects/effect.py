@@ -1,7 +1,7 @@
 """What every effect is made of: physics alone."""
 
-from collections.abc import Mapping
-from typing import ClassVar, Self
+from collections.abc import Callable, Mapping
+from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,7 +9,19 @@ from numpy.typing import NDArray
 from fourbar.effects.actions import Actions
 from fourbar.formulas.arithmetic import Number
 from fourbar.formulas.motion import State
+from fourbar.formulas.pin_forces import PinForces
 from fourbar.solution import Array
+
+
+class SolvedFriction(NamedTuple):
+    """Pin forces with the friction that they make."""
+
+    pins: PinForces
+    from_jamming: Any = None
+    """How far the friction is from jamming, in (0, 1]."""
+    residual: Any = None
+    """Largest |mu r |F| - couple| that remains, N m."""
+    status: Any = None
 
 
 class Effect:
@@ -44,13 +56,23 @@ class Effect:
         return ()
 
     def act(self, actions: Actions, state: State) -> None:
-        """Its forces and couples on the bars."""
+        """Add its forces and couples on the bars."""
+
+    def solve_friction(self, actions: Actions, pins: PinForces, eliminate: Callable[..., PinForces]) -> SolvedFriction:
+        """Solve for what depends on the pin forces, where there are `loaded_pins`, and add it to the actions.
+
+        Parameters
+        ----------
+        pins : pin forces under the actions, without it.
+        eliminate : computes the pin forces under some actions, and under inertia if `with_inertia`.
+        """
+        raise NotImplementedError
 
     def act_known(self, actions: Actions, forces: Mapping[str, Array]) -> None:
-        """What `act` leaves to the solution of the pin forces, once these are known (name: (n, 2), N)."""
+        """Add what `act` leaves to the solution of the pin forces, once these are computed (name: (n, 2), N)."""
 
     def counted_from(self, start: State, branch: Number) -> Self:
-        """The same effect in a motion that begins at this position, on this branch."""
+        """Return the same effect in a motion that begins at this position, on this branch."""
         return self
 
     def status(self, state: State, branch: NDArray[np.int8] | None) -> NDArray[np.uint8] | None:

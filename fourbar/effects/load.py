@@ -52,12 +52,12 @@ class Table:
         object.__setattr__(self, "factor", factors)
 
     def at(self, theta_2: Any) -> Any:
-        """The factor; InputError for a position that the table does not cover."""
+        """Interpolate the factor; InputError for a position that the table does not cover."""
         before, gained = self.from_point(theta_2)
         return before + gained
 
     def from_point(self, theta_2: Any) -> tuple[Any, Any]:
-        """The factor at the table's last point before an angle, and what it gains from there to the angle.
+        """Return the factor at the table's last point before an angle, and what it gains from there to the angle.
 
         The difference is theta_2 less the point and whole turns, of which nothing is rounded but the result.
         """
@@ -135,7 +135,7 @@ class Load(Effect):
             actions.moment(self.bar, factor * self.moment)
 
     def greatest_force(self, linkage: FourBar) -> float:
-        """The force counted with its lever, and the couple divided by the bar's length, N."""
+        """Return the force with its lever, and the couple divided by the bar's length, N."""
         bar = linkage.bar(self.bar)
         total = abs(self.moment) / bar.length
         if self.force is not None:

@@ -2,14 +2,13 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fourbar.effects.actions import Actions
-from fourbar.effects.cones import NONE, ONE, settle
-from fourbar.effects.effect import Effect
+from fourbar.effects.cones import NONE, ONE, solve_sliding
+from fourbar.effects.effect import Effect, SolvedFriction
 from fourbar.effects.pins import AT_LEAST_ZERO, checked, rows_of
 from fourbar.errors import InputError
 from fourbar.formulas.arithmetic import anywhere
@@ -17,17 +16,6 @@ from fourbar.formulas.pin_forces import PinForces
 from fourbar.linkage import PIN_FORCE
 from fourbar.quantities import JAMMED, OK, SEVERAL
 from fourbar.solution import Array
-
-
-class Settled(NamedTuple):
-    """Pin forces with the friction that they make."""
-
-    pins: PinForces
-    from_jamming: Array
-    """How far the friction is from jamming, in (0, 1]."""
-    residual: Array
-    """Largest |mu r |F| - couple| that is left, N m."""
-    status: NDArray[np.uint8]
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,32 +53,19 @@ class PinFriction(Effect):
         """The pins at which it acts."""
         return self.loaded_pins
 
-    def settle(
-        self,
-        actions: Actions,
-        pins: PinForces,
-        eliminate: Callable[[Actions], PinForces],
-        by_couples: Callable[[Actions], PinForces],
-    ) -> "Settled":
-        """Pin forces with the couples that fulfil x_p = mu_p r_p |F_p(x)|, their residual and their status.
+    def per_unit(self, actions: Actions, eliminate: Callable[..., PinForces]) -> dict[str, PinForces]:
+        """Compute the pin forces that a couple of 1 N m makes at each pin, against its rotation."""
+        forces = {}
+        for pin in self.loaded_pins:
+            single = Actions(actions.state, actions.bodies)
+            single.couple(pin, -actions.sense(pin))
+            forces[pin] = eliminate(single, with_inertia=False)
+        return forces
 
-        The pin forces are linear in the couples: F_p = F0_p + sum over q of C_pq x_q.
-
-        Parameters
-        ----------
-        actions : of everything else; the couples are added to it.
-        pins : pin forces under those.
-        eliminate : pin forces under some actions, with inertia.
-        by_couples : without it.
-        """
-        names = self.loaded_pins
-        arms = {pin: mu * r for pin, mu, r in self.pins}
-        senses = {pin: actions.sense(pin) for pin in names}
-        per_unit = {}
-        for turned in names:
-            alone = Actions(actions.state, actions.bodies)
-            alone.couple(turned, -senses[turned])
-            per_unit[turned] = by_couples(alone)
+    def solve_friction(self, actions: Actions, pins: PinForces, eliminate: Callable[..., PinForces]) -> SolvedFriction:
+        """Add the couples that fulfil x_p = mu_p r_p |F_p(x)|, F_p = F0_p + sum over q of C_pq x_q."""
+        names, arms = self.loaded_pins, {pin: mu * r for pin, mu, r in self.pins}
+        senses, per_unit = {pin: actions.sense(pin) for pin in names}, self.per_unit(actions, eliminate)
         shape = np.shape(pins.F12)
 
         def column(force: Any) -> Any:
@@ -103,7 +78,7 @@ class PinFriction(Effect):
         C = np.stack(
             [np.stack([column(getattr(per_unit[q], PIN_FORCE[pin])) for q in names], axis=1) for pin in names], axis=1
         )
-        found = settle(F, C, k)
+        found = solve_sliding(F, C, k)
         for p, pin in enumerate(names):
             actions.couple(pin, -senses[pin] * found.x[:, p].reshape(shape))
         done = eliminate(actions)
@@ -112,7 +87,7 @@ class PinFriction(Effect):
             for p, pin in enumerate(names)
         ]
         status = np.where(found.number == ONE, OK, np.where(found.number == NONE, JAMMED, SEVERAL)).astype(np.uint8)
-        return Settled(done, found.from_jamming.reshape(shape), np.max(left, axis=0), status.reshape(shape))
+        return SolvedFriction(done, found.from_jamming.reshape(shape), np.max(left, axis=0), status.reshape(shape))
 
     def act_known(self, actions: Actions, forces: Mapping[str, Array]) -> None:
         """Its couples where the pin forces (name: (n, 2), N) are known already."""

@@ -17,7 +17,7 @@ def rows_of(values: Mapping[str, Any]) -> tuple[Any, ...]:
 
 
 def checked(key: str, rows: object, **limits: dict[str, bool]) -> tuple[Any, ...]:
-    """The rows in the order of the pins, each number of them a float within its limits, or an InputError."""
+    """Return the rows in the order of the pins, each number a float within its limits, or raise InputError."""
     expect(key, rows, tuple, list)
     found: dict[str, tuple[Any, ...]] = {}
     for row in rows:  # type: ignore[attr-defined]

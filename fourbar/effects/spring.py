@@ -19,7 +19,7 @@ COINCIDE = 16.0 * 2.0**-52
 """Two points nearer than this part of their paths from O2, bar by bar, have no direction between them."""
 
 
-class Point(NamedTuple):
+class SpringEnd(NamedTuple):
     """A point of a bar: polar from the bar's first pin (O2 for the ground), the angle from the bar's line."""
 
     bar: int
@@ -44,19 +44,19 @@ class Spring:
     preload : N.
     """
 
-    start: Point
-    end: Point
+    start: SpringEnd
+    end: SpringEnd
     stiffness: float
     length: float = 0.0
     preload: float = 0.0
 
     def __post_init__(self) -> None:
         for key, point in (("from", self.start), ("to", self.end)):
-            if not isinstance(point, Point):
-                raise InputError(f"effects.springs.{key}", point, "must be a fourbar.effects.Point")
+            if not isinstance(point, SpringEnd):
+                raise InputError(f"effects.springs.{key}", point, "must be a fourbar.effects.SpringEnd")
             bar = require_whole(f"effects.springs.{key}.bar", point.bar, BAR_NAMES, "must be 1, 2, 3 or 4")
             place = (require(f"effects.springs.{key}.at", number) for number in point[1:])
-            object.__setattr__(self, {"from": "start", "to": "end"}[key], Point(bar, *place))
+            object.__setattr__(self, {"from": "start", "to": "end"}[key], SpringEnd(bar, *place))
         if self.start.bar == self.end.bar:
             raise InputError("effects.springs.to.bar", self.end.bar, "must be another bar than that of `from`")
         for name, limit in (("stiffness", POSITIVE), ("length", AT_LEAST_ZERO), ("preload", ANY)):
@@ -113,7 +113,7 @@ class Springs(Effect):
         return codes
 
 
-def _place(state: State, point: Point) -> Any:
+def _place(state: State, point: SpringEnd) -> Any:
     return state.point(point.bar, point.in_bar)
 
 

@@ -95,7 +95,7 @@ def _continuous(state: State, branch: Number) -> dict[int, Array]:
     phi = line + _wound(phi - line)
 
     def beyond(angle: Array) -> Array:
-        """An angle between 0 and half a turn, or as far outside as rounding puts it."""
+        """Wrap the angle into half a turn, or as far outside as rounding puts it."""
         return _wound(angle - 0.5 * math.pi) + 0.5 * math.pi
 
     return {
@@ -107,5 +107,5 @@ def _continuous(state: State, branch: Number) -> dict[int, Array]:
 
 
 def _wound(angle: Array | float) -> Array:
-    """The angle in [-pi, pi], itself where it is there."""
+    """Wrap the angle into [-pi, pi]; an angle that lies there stays as it is."""
     return angle - math.tau * np.rint(angle / math.tau)

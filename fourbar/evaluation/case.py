@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.effects.actions import Actions, bodies
+from fourbar.effects.actions import Actions, as_it_is, bodies
+from fourbar.effects.effect import SolvedFriction
 from fourbar.errors import LimitError
 from fourbar.formulas.arithmetic import anywhere, polar, vector
 from fourbar.formulas.motion import Coefficients, State, rates
@@ -45,7 +46,7 @@ Evaluated = tuple[NDArray[np.uint8], dict[str, Any], Position | None]
 
 
 def changed(value: Any, change: Callable[[Any], Any]) -> Any:
-    """The same with each of its floats and arrays changed, in tuples and dataclasses too; all else stays."""
+    """Change each float and array of a value, in tuples and dataclasses too; all else stays."""
     if isinstance(value, (float, np.ndarray)):
         return change(value)
     if isinstance(value, tuple):
@@ -71,13 +72,13 @@ def undecided(factor: Any, constant: Any, size: Any) -> Any:
 
 
 class Dynamics(NamedTuple):
-    """Pin forces and driving torque, and what friction that depends on the pin forces was solved to."""
+    """Pin forces and what friction that depends on them was solved to, as `SolvedFriction`, and the driving torque."""
 
     pins: PinForces
+    from_jamming: Any
+    residual: Any
+    status: Any
     torque: Any
-    from_jamming: Any = None
-    residual: Any = None
-    status: Any = None
 
 
 class Case(NamedTuple):
@@ -91,12 +92,12 @@ class Case(NamedTuple):
     path: Path
     points: tuple[tuple[str, int, Any], ...] = ()
     """The scene's own: name, bar, and place in the bar's frame at its first pin, complex, m."""
-    side: int = 0
-    """In which sense pins at rest are about to turn."""
+    side: Any = 0
+    """In which sense pins at rest are about to turn, or the part of its torque that dry friction holds them with."""
 
     @classmethod
     def of(cls, scene: Scene) -> "Case":
-        """The numbers that stay the same over the positions."""
+        """Collect the numbers that stay the same over the positions."""
         terms, linkage = (*scene.loads, *scene.effects), scene.linkage
         own = path(Loop(*linkage.lengths, 0.0, 0.0), linkage.ground_angle)
         square = own.unit * own.unit
@@ -120,7 +121,7 @@ class Case(NamedTuple):
         return State(self.lengths, theta_1, q, at, k, speed, rates(k, speed, acceleration))
 
     def at(self, where: Command) -> State:
-        """The positions of a command to the input, and their motion."""
+        """Compute the positions of a command to the input, and their motion."""
         half, _ = self.half_angle(where.theta_2, where.remainder)
         found = self.path.position(where.theta_2, half, where.branch)
         omega_2 = 0.0 if where.omega_2 is None else where.omega_2
@@ -132,7 +133,7 @@ class Case(NamedTuple):
         return self._replace(terms=tuple(term.counted_from(state, at.branch) for term in self.terms))
 
     def with_start(self, motion: Command) -> "Case":
-        """The same of a whole motion: it begins where the linkage first assembles, if it keeps its branch."""
+        """Let the effects begin where the linkage first assembles in a motion, if that keeps its branch."""
         half, _ = self.half_angle(motion.theta_2, motion.remainder)
         assembled = (half.outer >= 0.0) & (half.inner >= 0.0)
         if not assembled.any() or np.ptp(motion.branch) != 0:
@@ -141,7 +142,7 @@ class Case(NamedTuple):
         return self.started(Command(motion.theta_2[first], motion.branch[first], 0.0, 0.0, motion.remainder))
 
     def refuse_wound(self, at: Command) -> None:
-        """A LimitError where a free motion winds a spring: from there on it is no longer the spring's."""
+        """Raise a LimitError where a free motion winds a spring: from there on it is no longer the spring's."""
         state = self.at(at)
         for term in self.terms:
             codes = term.status(state, at.branch) if term.counts_turns else None
@@ -153,7 +154,7 @@ class Case(NamedTuple):
                 )
 
     def half_angle(self, theta_2: Array, remainder: Any) -> tuple[HalfAngle, NDArray[np.intp]]:
-        """The half angles, and the indices of those evaluated in many digits."""
+        """Compute the half angles, and the indices of those evaluated in many digits."""
         lengths, half = self.path.lengths, self.path.half_angle(theta_2)
         close: Any = remainder is not None
         if remainder is None:
@@ -169,9 +170,9 @@ class Case(NamedTuple):
         return half, index
 
     def dynamics(
-        self, state: State, acceleration: Any, side: int = 0, rounded: Callable[..., Any] | None = None
+        self, state: State, acceleration: Any, side: Any = 0, rounded: Callable[..., Any] = as_it_is
     ) -> Dynamics:
-        """Pin forces and torque under everything that acts; for the parameters see `Actions`."""
+        """Compute pin forces and torque under everything that acts; for the parameters see `Actions`."""
         a, at, k = self.lengths.a, state.at, state.k
         actions = Actions(state, self.bodies, side, rounded)
         for term in self.terms:
@@ -183,36 +184,27 @@ class Case(NamedTuple):
             of_input, of_others = inertia(a, self.bodies, at, k)
             others = others + of_others * acceleration
             inertial = others + of_input * acceleration
-        if rounded is not None:
+        if rounded is not as_it_is:
             own, mass_at_A = Wrenches(*map(rounded, own)), vector(rounded(mass_at_A.real), rounded(mass_at_A.imag))
             inertial, others = rounded(inertial), rounded(others)
-
-        sine, short = self.path.drive_sine(at, self.drive_bar), anywhere(self.lengths.d < self.lengths.a)
-        if rounded is not None:
-            sine = rounded(sine)
+        sine, short = rounded(self.path.drive_sine(at, self.drive_bar)), anywhere(self.lengths.d < self.lengths.a)
         if self.drive_bar == 4:
-            about_B = coupler_about_B(self.lengths, self.bodies[1], at, state.moving, sine)
-            others = about_B if rounded is None else rounded(about_B)
+            others = rounded(coupler_about_B(self.lengths, self.bodies[1], at, state.moving, sine))
 
-        def eliminate(
-            acting: Actions, own: Wrenches = own, mass_at_A: Any = mass_at_A, others: Any = others
-        ) -> PinForces:
-            w, moment = acting.wrenches(own), 0.0
+        def eliminate(acting: Actions, *, with_inertia: bool = True) -> PinForces:
+            w, mass, rest = (own, mass_at_A, others) if with_inertia else (Wrenches(), 0.0j, 0.0)
+            moment: Any = 0.0
             if self.drive_bar == 4:
-                moment = -(acting.about_B() + others)
+                moment = -(acting.about_B() + rest)
             elif self.drive_bar == 2 and short:
-                moment = acting.work()[1] - others
-            return pin_forces(self.lengths, at, self.drive_bar, sine, w, mass_at_A, moment)
+                moment = acting.work()[1] - rest
+            return pin_forces(self.lengths, at, self.drive_bar, sine, acting.wrenches(w), mass, moment)
 
-        def by_couples(acting: Actions) -> PinForces:
-            return eliminate(acting, Wrenches(), 0.0j, 0.0)
-
-        pins = eliminate(actions)
-        settled: list[Any] = []
+        solved = SolvedFriction(eliminate(actions))
         for term in self.terms:  # a scene holds one effect of a kind, and one kind depends on the forces
             if term.loaded_pins:
-                pins, *settled = term.settle(actions, pins, eliminate, by_couples)  # type: ignore[attr-defined]
-        return Dynamics(pins, driving_torque(k, self.drive_bar, inertial, actions.work()[0]), *settled)
+                solved = term.solve_friction(actions, solved.pins, eliminate)
+        return Dynamics(*solved, driving_torque(k, self.drive_bar, inertial, actions.work()[0]))
 
     def torque_interval(self, state: State, alpha_2: Any, torque: Any) -> tuple[Any, Any, Any]:
         """Least and greatest driving torque where dry friction holds a pin at rest, elsewhere the torque twice, N m.
@@ -232,6 +224,6 @@ class Case(NamedTuple):
 
 
 def state_at(scene: Scene, at: Command) -> State:
-    """The positions of a command and their motion, for what shows them."""
+    """Compute the positions of a command and their motion, for what shows them."""
     with np.errstate(all="ignore"):
         return Case.of(scene).at(at)

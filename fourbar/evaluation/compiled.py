@@ -48,7 +48,7 @@ def number(rows: Any, row: int, i: int) -> Any:
 
 
 def complex_rounded(z: Any, turned: Any, signs: Any, first: int) -> Any:
-    """A complex number, each part changed by one of two signs; without signs itself.
+    """Change each part of a complex number by one of two signs; without signs nothing changes.
 
     A ground at an angle mixes the parts of every direction, and each carries the larger's.
     """
@@ -62,12 +62,12 @@ def complex_rounded(z: Any, turned: Any, signs: Any, first: int) -> Any:
 
 
 def real_rounded(x: Any, signs: Any, first: int) -> Any:
-    """A real number likewise."""
+    """Change a real number likewise."""
     return x if signs is None else rounded_real(x, signs[first])
 
 
 def by_terms(x: Any, size: Any, signs: Any, first: int) -> Any:
-    """A sum changed by the last digit of its terms."""
+    """Change a sum by the last digit of its terms."""
     return x if signs is None else x + size * signs[first]
 
 
@@ -97,18 +97,10 @@ def viscous_of(rows: Any, i: int, pin: int, slip: Any, signs: Any) -> Any:
 
 
 def forces(
-    lengths: Loop,
-    in_unit: Loop,
-    at: Position,
-    k: Coefficients,
-    moving: Rates,
-    rows: Any,
-    i: int,
-    drive_bar: int,
-    turned: Any,
-    signs: Any,
+    at: Position, k: Coefficients, moving: Rates, rows: Any, i: int, drive_bar: int, signs: Any
 ) -> tuple[PinForces, Any, Any]:
-    """Pin forces, torque, and the sine of the drive, as `Case.dynamics` has them."""
+    """Compute pin forces, torque, and the sine of the drive, as `Case.dynamics` has them."""
+    (lengths, in_unit), turned = lengths_of(rows, i), at.u1.imag != 0.0
     a, speed, acceleration = lengths.a, number(rows, 12, i), number(rows, 13, i)
     two, three, four = body_of(rows, i, 2), body_of(rows, i, 3), body_of(rows, i, 4)
     bodies = (two, three, four)
@@ -155,7 +147,7 @@ def thirteen(signs: Any, first: int) -> Any:
 
 
 def lengths_of(rows: Any, i: int) -> tuple[Loop, Loop]:
-    """The lengths in m, and in their unit with E1 and E2."""
+    """Read the lengths in m, and in their unit with E1 and E2."""
     in_unit = Loop(
         *(number(rows, 0, i), number(rows, 1, i), number(rows, 2, i), number(rows, 3, i)),
         *(number(rows, 4, i), number(rows, 5, i)),
@@ -173,19 +165,10 @@ def directions_of(in_unit: Loop, rows: Any, i: int, tangent: Any, of_theta_2: An
     return u1, u2, turned, half
 
 
-def nearby(
-    lengths: Loop,
-    in_unit: Loop,
-    u1: Any,
-    u2: Any,
-    half: HalfAngle,
-    rows: Any,
-    i: int,
-    drive_bar: int,
-    turned: Any,
-    signs: Any,
-) -> tuple[PinForces, Any]:
-    """Pin forces and torque of position i with every number changed in its last digit, as `error_bars` has them."""
+def nearby(rows: Any, i: int, tangent: Any, of_theta_2: Any, drive_bar: int, signs: Any) -> tuple[PinForces, Any]:
+    """Change every number of position i in its last digit, as `error_bars` does; compute pin forces and torque."""
+    lengths, in_unit = lengths_of(rows, i)
+    u1, u2, turned, half = directions_of(in_unit, rows, i, tangent, of_theta_2)
     half = rounded_half_angle(in_unit, half, number(rows, 15, i), False, thirteen(signs, 2))
     u2 = select(turned, u2, vector(half.kk - half.ss, 2.0 * half.sk))
     near = close_loop(in_unit, u1, u2, half, number(rows, 14, i), lengths.d / in_unit.d)
@@ -204,7 +187,7 @@ def nearby(
     )
     k = rounded_coefficients(in_unit, near, k, thirteen(signs, 25))
     moving = rates(k, number(rows, 12, i), number(rows, 13, i))
-    pins, torque, _ = forces(lengths, in_unit, near, k, moving, rows, i, drive_bar, turned, signs)
+    pins, torque, _ = forces(near, k, moving, rows, i, drive_bar, signs)
     return pins, torque
 
 
@@ -228,14 +211,14 @@ def run(tangents: Array, of_theta_2: Array, rows: Any, drive_bar: int, vectors: 
     turns = len(of_theta_2) > 0
     for i in range(len(tangents)):
         lengths, in_unit = lengths_of(rows, i)
-        u1, u2, turned, half = directions_of(in_unit, rows, i, tangents[i], of_theta_2[i] if turns else np.nan)
+        u1, u2, _, half = directions_of(in_unit, rows, i, tangents[i], of_theta_2[i] if turns else np.nan)
         size = 4.0 * in_unit.a * in_unit.d
         close = undecided(half.outer, in_unit.E1, size) or undecided(half.inner, in_unit.E2, size)
         at = close_loop(in_unit, u1, u2, half, number(rows, 14, i), lengths.d / in_unit.d)
         k = coefficients(in_unit, at)
         at = with_sines_of_rates(in_unit, at, k)
         v = rates(k, number(rows, 12, i), number(rows, 13, i))
-        pins, torque, sine = forces(lengths, in_unit, at, k, v, rows, i, drive_bar, turned, None)
+        pins, torque, sine = forces(at, k, v, rows, i, drive_bar, None)
         whole = at.sin_mu + v.omega_3 + v.omega_4 + v.alpha_3 + v.alpha_4 + torque + sine
         total = pins.F12 + pins.F32 + pins.F43 + pins.F14
         left = close or not np.abs(at.sin_mu) > NO_DIGIT_LEFT or not np.isfinite(whole + total.real + total.imag)
@@ -250,7 +233,7 @@ def run(tangents: Array, of_theta_2: Array, rows: Any, drive_bar: int, vectors: 
 def scatter(
     tangents: Array, of_theta_2: Array, rows: Any, drive_bar: int, vectors: Any, scalars: Array, signs: Any
 ) -> None:
-    """The error bars of positions that `run` has evaluated; for the parameters see there.
+    """Compute the error bars of positions that `run` has evaluated; for the parameters see there.
 
     Parameters
     ----------
@@ -260,9 +243,7 @@ def scatter(
     scalars[10 * BLOCK :] = 0.0
     for each in range(EVALUATIONS):
         for i in range(n):
-            lengths, in_unit = lengths_of(rows, i)
-            u1, u2, turned, half = directions_of(in_unit, rows, i, tangents[i], of_theta_2[i] if turns else np.nan)
-            other, T = nearby(lengths, in_unit, u1, u2, half, rows, i, drive_bar, turned, signs[each])
+            other, T = nearby(rows, i, tangents[i], of_theta_2[i] if turns else np.nan, drive_bar, signs[each])
             scalars[10 * BLOCK + i] += square(T - scalars[5 * BLOCK + i])
             scalars[11 * BLOCK + i] += square(other.F12 - vectors[3 * BLOCK + i])
             scalars[12 * BLOCK + i] += square(other.F32 - vectors[4 * BLOCK + i])
@@ -328,8 +309,7 @@ def make_known() -> None:
 
 @cache
 def loop(function: Any, on_disk: bool = True) -> Any:
-    """`run` or `scatter` compiled; on the disk, where a place can be written, for later processes until a source
-    changes."""
+    """Compile `run` or `scatter`; on the disk, where it can be written, for later processes until a source changes."""
     from numba import njit
 
     make_known()

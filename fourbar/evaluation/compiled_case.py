@@ -67,7 +67,7 @@ def carries(case: Case) -> bool:
 
 
 def numbers(case: Case, theta_2: Array, branch: Any, omega_2: Any, alpha_2: Any) -> Any:
-    """What `run` reads of a case and the motion of some positions: (ROWS,) numbers, or an array (ROWS BLOCK,).
+    """Pack what `run` reads of a case and the motion of some positions: (ROWS,) numbers, or an array (ROWS BLOCK,).
 
     Lengths in their unit with E1 and E2; lengths, m; u1; omega_2, alpha_2, branch, what theta_2 - theta_1 loses;
     bodies; viscous pins; loads.
@@ -110,26 +110,26 @@ SPACE = threading.local()
 """Of each thread, what the loop writes of a block: fresh pages for each would cost a tenth of the time."""
 
 
-class Found(NamedTuple):
+class LoopResult(NamedTuple):
     """What the loop writes, for n positions; the next call of the same thread writes over it."""
 
     vectors: NDArray[np.complex128]
     scalars: Array
 
 
-def looped(case: Case, theta_2: Array, branch: Any, omega_2: Any, alpha_2: Any, *, error_bars: bool) -> Found:
+def looped(case: Case, theta_2: Array, branch: Any, omega_2: Any, alpha_2: Any, *, error_bars: bool) -> LoopResult:
     """Up to BLOCK positions of a case that the loop carries; for the parameters see `run`."""
     n, theta_1 = len(theta_2), case.path.theta_1
     of_theta_2 = np.tan(0.5 * theta_2) if anywhere(theta_1 != 0.0) else np.empty(0)
     rows = numbers(case, theta_2, branch, omega_2, alpha_2)
     if not hasattr(SPACE, "found"):
-        SPACE.found = Found(np.empty((7, BLOCK), dtype=complex), np.empty((15, BLOCK)))
+        SPACE.found = LoopResult(np.empty((7, BLOCK), dtype=complex), np.empty((15, BLOCK)))
     vectors, scalars = SPACE.found
     given = np.tan(0.5 * (theta_2 - theta_1)), of_theta_2, rows, case.drive_bar, vectors.ravel(), scalars.ravel()
     _called(run, *given)
     if error_bars:
         _called(scatter, *given, signs())
-    return Found(vectors[:, :n], scalars[:, :n])
+    return LoopResult(vectors[:, :n], scalars[:, :n])
 
 
 def _called(function: Any, *given: Any) -> None:
@@ -140,7 +140,7 @@ def _called(function: Any, *given: Any) -> None:
 
 
 def evaluated(case: Case, where: Command, part: Part, wanted: int, names: KeysView[str]) -> Evaluated:
-    """Some positions of a command through the compiled loop, and through `commanded` what it leaves open."""
+    """Evaluate some positions of a command by the compiled loop, and through `commanded` what it leaves open."""
     theta_2, branch = where.theta_2[part], sign_of(where.branch[part])
     omega_2, alpha_2 = piece(where.omega_2, part), piece(where.alpha_2, part)
     found = looped(case, theta_2, branch, omega_2, alpha_2, error_bars=wanted == ERROR)

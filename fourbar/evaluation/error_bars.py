@@ -65,13 +65,13 @@ class Roundings:
         return (parts + size * next(self.of_parts)).view(complex)[..., 0]
 
     def next(self, count: int) -> list[Any]:
-        """The signs of some more real numbers."""
+        """Return the signs of the next real numbers."""
         return [next(self.of_reals) for _ in range(count)]
 
 
 @cache
 def in_turn() -> tuple[list[NDArray[np.float64]], list[NDArray[np.float64]]]:
-    """The signs of real numbers, each (EVALUATIONS, 1), and of both parts of complex ones, (EVALUATIONS, 1, 2)."""
+    """Return signs for real numbers, each (EVALUATIONS, 1), and for both parts of complex ones, (EVALUATIONS, 1, 2)."""
     of_reals, of_parts = np.split(signs().T, 2)
     pairs = of_parts.reshape(-1, 2, EVALUATIONS).transpose(0, 2, 1)
     return list(of_reals[:, :, None]), list(np.ascontiguousarray(pairs)[:, :, None])
@@ -99,7 +99,7 @@ def error_bars(
     k = rounded_coefficients(path.lengths, near, k, rounded.next(13))
     k = k if path.bar == 2 else read_backwards(k)
     nearby = state._replace(at=near, k=k, moving=rates(k, state.speed, acceleration))
-    other = case.dynamics(nearby, acceleration, rounded=rounded)
+    other = case.dynamics(nearby, acceleration, case.side, rounded)
     values, others = (*found.pins, found.torque), (*other.pins, other.torque)
     spread = root_mean_square(np.array([after - before for before, after in zip(values, others, strict=True)]))
     size = np.array([np.abs(value) for value in values]).reshape(spread.shape)
@@ -110,12 +110,12 @@ def error_bars(
 
 
 def rounded_real(x: Any, sign: Any) -> Any:
-    """The next double up or down."""
+    """Return the next double up or down."""
     return x + x * sign
 
 
 def rounded_half_angle(lengths: Loop, half: HalfAngle, lost: Any, known: Any, signs: Any) -> HalfAngle:
-    """The five numbers with their own roundings, that of theta_2 - theta_1, and those of the two sums.
+    """Compute the five numbers with their own roundings, that of theta_2 - theta_1, and those of the two sums.
 
     Parameters
     ----------
@@ -140,7 +140,7 @@ def rounded_half_angle(lengths: Loop, half: HalfAngle, lost: Any, known: Any, si
 
 
 def rounded_coefficients(lengths: Loop, at: Position, k: Coefficients, signs: Any) -> Coefficients:
-    """The coefficients from parts rounded each: h3 = m - g, h4 = m + g with m = t + q g, and so their slopes.
+    """Compute the coefficients from parts rounded each: h3 = m - g, h4 = m + g with m = t + q g, and so their slopes.
 
     Parameters
     ----------
@@ -180,7 +180,7 @@ def root_mean_square(changes: Any) -> Any:
 
 
 def bar(spread: Any, value: Any) -> Any:
-    """The error bar from the root mean square of the changes and the size of the value.
+    """Compute the error bar from the root mean square of the changes and the size of the value.
 
     A change that leaves no value, or none in the range of a double: of the value itself no digit is left.
     """

@@ -61,6 +61,8 @@ class FreeMotion:
     acceleration: Array
     sign: Array
     """Of the root on the path, (n,)."""
+    side: Array
+    """At a standstill the part of its torque, -1 to 1, that dry friction holds with; +-1: it moves on; else 0, (n,)."""
     energy_drift: float
     """Largest |kinetic energy - work done| over the motion, by the largest of either; 0 where nothing moves."""
     stopped_at: float | None = None
@@ -83,7 +85,7 @@ def _meeting(lengths: Loop) -> Loop:
 
 
 def _plain(numbers: Any) -> Any:
-    """The same numbers as Python's own, with which a formula of one position is several times quicker."""
+    """Convert numbers to Python's own, with which a formula of one position is several times quicker."""
     return type(numbers)(*(x.item() if isinstance(x, np.generic | np.ndarray) else x for x in numbers))
 
 
@@ -103,7 +105,7 @@ class _Reading:
         return float(smooth_branch(self.path.lengths, q - self.path.theta_1, self.sign)) if self.changes else self.sign
 
     def at(self, q: float) -> tuple[Position, Coefficients]:
-        """The position and its coefficients by q; what is wanted again is kept."""
+        """Compute the position and its coefficients by q; what is wanted again is kept."""
         if self.last is None or self.last[0] != (q, self.sign):
             self.last = (q, self.sign), self._at(q)
         return self.last[1]
@@ -136,7 +138,7 @@ def release(
     *,
     follow: bool = False,
 ) -> FreeMotion:
-    """The motion from theta_2 with omega_2 under the terms, with no driving torque.
+    """Integrate the motion from theta_2 with omega_2 under the effects, with no driving torque.
 
     To 1e-9 rad over 5 s wherever the motion itself does not amplify errors by more than 1000.
 
@@ -189,6 +191,7 @@ class _Run:
             raise FourBarError("nothing that moves has inertia: the free motion is undetermined")
         self._change_over()
         self.side = 0.0  # the sense of motion, where dry friction tells the two apart
+        self.holding = 0.0  # at a standstill, the part of its torque that dry friction takes at every pin
         self.dry = self._is_dry()
         self.start_energy = self._kinetic_energy()
 
@@ -255,6 +258,7 @@ class _Run:
         if rate == 0.0:
             ahead, back = self._both_senses()
             if ahead <= 0.0 <= back:
+                self.holding = (ahead + back) / (back - ahead) if ahead < back else 0.0
                 return False
             rate = 1.0 if ahead > 0.0 else -1.0
         self.side = math.copysign(1.0, rate)
@@ -271,9 +275,10 @@ class _Run:
             while len(rows) < len(times) and times[len(rows)] <= upto:
                 rows.append(self._row(at(float(times[len(rows)]))))
 
+        moves = self._starts()
         report(0.0, lambda _: self.y)
         while t < end and stopped is None:
-            if not self._starts():
+            if not moves:
                 report(end, lambda _: self.y)
                 break
             solver = DOP853(self._rates, t, self.y, end, rtol=SCIPY_LEAST, atol=ABSOLUTE)
@@ -301,8 +306,9 @@ class _Run:
                 worst = max(worst, abs(energy - float(self.y[2])))
                 largest = max(largest, abs(energy + self.start_energy), abs(float(self.y[2])))
                 if rested or self._change_over():
+                    moves = self._starts()
                     break
-        theta_2, omega_2, alpha_2, branch, bar, q, speed, growth, sign = np.array(rows).reshape(-1, 9).T
+        theta_2, omega_2, alpha_2, branch, bar, q, speed, growth, sign, side = np.array(rows).reshape(-1, 10).T
         return FreeMotion(
             Command(theta_2, branch.astype(np.int8), omega_2, alpha_2, None, np.asarray(times[: len(rows)])),
             bar.astype(np.int8),
@@ -311,6 +317,7 @@ class _Run:
             speed,
             growth,
             sign,
+            side,
             worst / largest if largest else 0.0,
             stopped,
         )
@@ -319,7 +326,7 @@ class _Run:
     def _root(
         brentq: Any, dense: Callable[[float], Array], f: Callable[[Array], float], low: float, high: float
     ) -> float:
-        """The time at which f of the state is zero; the start of the step where it is zero there already."""
+        """Find the time at which f of the state is zero; the start of the step where it is zero there already."""
         if f(dense(low)) * f(dense(high)) >= 0.0:
             return low
         return float(brentq(lambda t: f(dense(t)), low, high, xtol=1e-15, rtol=1e-15))
@@ -348,7 +355,8 @@ class _Run:
         moving = rates(k, rate, growth)
         sine = _sines(at)[2]
         branch = math.copysign(1.0, sine) if sine else float(self.branch)
-        independent = (float(self.reading.bar), q, rate, growth, self.reading.branch(q))
+        side = (self.side or self.holding) if self.dry and rate == 0.0 else 0.0
+        independent = (float(self.reading.bar), q, rate, growth, self.reading.branch(q), side)
         return theta_2, float(moving.omega_2), float(moving.alpha_2), branch, *independent
 
 

@@ -46,7 +46,7 @@ WITHOUT_FORCES = (NO_DIRECTION, WOUND)
 
 
 def commanded(case: Case, where: Command, part: Part, wanted: int, names: KeysView[str]) -> Evaluated:
-    """Some positions of a command to the input, evaluated.
+    """Evaluate some positions of a command to the input.
 
     Parameters
     ----------
@@ -88,14 +88,14 @@ def _codes(sine: Any, half: HalfAngle, margin: float) -> Any:
 
 
 def sign_of(branch: NDArray[np.int8]) -> Any:
-    """The branch of each position, or one number where all have the same."""
+    """Return the branch of each position, or one number where all have the same."""
     if branch.ndim == 0 or (branch.size and branch.min() == branch.max()):
         return float(branch.flat[0]) if branch.ndim else float(branch)
     return branch
 
 
 def _angles(case: Case, half: HalfAngle, branch: Any, names: Iterable[str]) -> Evaluated:
-    """The same where two angles alone are wanted: without vectors and the rest of the triangle."""
+    """Evaluate the two angles only: without vectors and the rest of the triangle."""
     theta_3, theta_4, root = case.path.angles(half, branch)
     codes = _codes(root, half, NO_DIGIT_LEFT * 2.0 * case.path.lengths.b * case.path.lengths.c)
     found = {"theta_3": theta_3, "theta_4": theta_4}
@@ -103,12 +103,12 @@ def _angles(case: Case, half: HalfAngle, branch: Any, names: Iterable[str]) -> E
 
 
 def freely(case: Case, moved: "FreeMotion", part: Part, wanted: int, names: KeysView[str]) -> Evaluated:
-    """The same at instants of a free motion that have one independent angle; there is no driving torque."""
+    """Evaluate instants of a free motion that have one independent angle; there is no driving torque."""
     codes = np.zeros(len(part[0]), dtype=np.uint8)
     if not codes.size:
         return codes, {}, None
     bar = int(moved.bar[part][0])
-    free = case._replace(drive_bar=bar, path=moved.paths[bar])
+    free = case._replace(drive_bar=bar, path=moved.paths[bar], side=moved.side[part])
     q, speed, growth, branch = (x[part] for x in (moved.q, moved.speed, moved.acceleration, moved.sign))
     at = free.path.position(q, free.path.half_angle(q), branch)
     state = free.state(free.path, q, at, branch, speed, growth)._replace(theta_2=moved.command.theta_2[part])
@@ -133,7 +133,7 @@ def _forces(
     names: KeysView[str],
     exact: NDArray[np.intp] | None,
 ) -> tuple[Any, dict[str, Any]]:
-    """The statuses with those of the effects, and the quantities of the force stage.
+    """Evaluate the force stage: the statuses with those of the effects, and its quantities.
 
     Parameters
     ----------
@@ -171,7 +171,7 @@ def _forces(
 
 
 def piece(value: float | Array | None, part: Part) -> float | Array:
-    """A number for all positions, or the part of an array that belongs to a block."""
+    """Return a number for all positions, or the part of an array that belongs to a block."""
     return value[part] if isinstance(value, np.ndarray) and value.ndim else value or 0.0
 
 

@@ -20,7 +20,7 @@ def all_finite(values: Mapping[str, Any]) -> bool:
 
 
 def withheld(case: Case, found: Evaluated) -> None:
-    """What was evaluated with `withhold` where anything is no number, changed in place."""
+    """Write `withhold` in place wherever a result is no number."""
     codes, values, driven = found
     if not all_finite(values):
         in_line = driven is not None and np.abs(case.path.drive_sine(driven, case.drive_bar)) <= NO_DIGIT_LEFT

@@ -13,7 +13,7 @@ from fourbar.files.fields import Reader, polar, quantity
 from fourbar.linkage import PINS
 
 if TYPE_CHECKING:
-    from fourbar.effects import Effect, Flywheel, Point, Springs
+    from fourbar.effects import Effect, Flywheel, SpringEnd, Springs
 
 MOST_SPRINGS = 1000
 FIELD, INERTIA = OF_EFFECT["gravity"]["magnitude"][0], OF_EFFECT["flywheel"]["inertia"][0]
@@ -38,10 +38,10 @@ def _read_springs(value: object, read: Reader) -> "Springs":
     return kinds.Springs(tuple(springs))
 
 
-def _read_point(read: Reader, key: str, value: object) -> "Point":
+def _read_point(read: Reader, key: str, value: object) -> "SpringEnd":
     entry = read.table(key, value, ("bar", "at"))
     bar = read.whole(f"{key}.bar", entry.get("bar"), 1, 4)
-    return kinds.Point(bar, *(read.polar(f"{key}.at", entry["at"], "m") if "at" in entry else (0.0, 0.0)))
+    return kinds.SpringEnd(bar, *(read.polar(f"{key}.at", entry["at"], "m") if "at" in entry else (0.0, 0.0)))
 
 
 def _write_springs(effect: "Springs") -> Any:
@@ -62,7 +62,7 @@ def _read_flywheel(value: object, read: Reader) -> "Flywheel":
     return kinds.Flywheel(inertia, read.whole(f"{key}.bar", entry.get("bar", 2), 2, 4))
 
 
-class Entry(NamedTuple):
+class EffectFormat(NamedTuple):
     """What a scene file says of one effect."""
 
     read: Callable[[object, Reader], "Effect"]
@@ -73,8 +73,8 @@ class Entry(NamedTuple):
     """One line of a scene file."""
 
 
-def _per_pin(key: str, kind: str, example: str, **left_out: str) -> Entry:
-    """An effect that holds rows (pin, number, ...); where a pin has one number, that stands alone."""
+def _per_pin(key: str, kind: str, example: str, **left_out: str) -> EffectFormat:
+    """Describe an effect that holds rows (pin, number, ...); where a pin has one number, that stands without a list."""
     numbers = OF_EFFECT[key]
 
     def read_rows(value: object, read: Reader) -> "Effect":
@@ -97,11 +97,11 @@ def _per_pin(key: str, kind: str, example: str, **left_out: str) -> Entry:
             rows[pin] = texts.get("", texts)
         return rows
 
-    return Entry(read_rows, write_rows, example)
+    return EffectFormat(read_rows, write_rows, example)
 
 
-REGISTRY: dict[str, Entry] = {
-    "gravity": Entry(
+REGISTRY: dict[str, EffectFormat] = {
+    "gravity": EffectFormat(
         lambda value, read: kinds.Gravity(*read.polar("effects.gravity", value, FIELD)),
         lambda effect: polar(effect.magnitude, effect.angle, FIELD),
         'gravity = ["9.81 m/s^2", "-90 deg"]',
@@ -117,13 +117,13 @@ REGISTRY: dict[str, Entry] = {
         'torsion = { B = { stiffness = "2 N m/rad", rest = "30 deg", preload = "0.1 N m" } }',
         preload="0 N m",
     ),
-    "springs": Entry(
+    "springs": EffectFormat(
         _read_springs,
         _write_springs,
         'springs = [{ from = { bar = 1, at = ["10 cm", "-90 deg"] }, to = { bar = 4, at = ["8 cm", "0 deg"] }, '
         'stiffness = "200 N/m", length = "12 cm", preload = "3 N" }]',
     ),
-    "flywheel": Entry(
+    "flywheel": EffectFormat(
         _read_flywheel,
         lambda effect: {"bar": effect.bar, "inertia": quantity(effect.inertia, INERTIA)},
         'flywheel = { bar = 2, inertia = "0.02 kg m^2" }',
@@ -133,7 +133,7 @@ REGISTRY: dict[str, Entry] = {
 
 
 def written(effect: "Effect") -> Any:
-    """The value of an effect under its key; InputError where a scene file has no form of it."""
+    """Write the value of an effect under its key; InputError where a scene file has no form of it."""
     if effect.key not in REGISTRY:
         raise InputError(f"effects.{effect.key}", type(effect).__name__, "a scene file has no form of this effect")
     return REGISTRY[effect.key].write(effect)

@@ -20,11 +20,11 @@ class Reader:
         self.file = file
 
     def refuse(self, key: str, value: object, allowed: str) -> InputError:
-        """The error for an entry, with the file's name."""
+        """Make the error for an entry, with the file's name."""
         return InputError(key, _shown(value), allowed, self.file)
 
     def table(self, key: str, value: object, allowed: Iterable[str]) -> dict[str, Any]:
-        """A table that holds no other keys than those allowed; `key` is "" for the whole file."""
+        """Read a table that holds no other keys than those allowed; `key` is "" for the top of the file."""
         names = list(allowed)
         if not isinstance(value, dict):
             raise self.refuse(key, value, "must be a table with the keys " + ", ".join(names))
@@ -35,7 +35,7 @@ class Reader:
         return value
 
     def text(self, key: str, value: object) -> str:
-        """A string."""
+        """Read a string."""
         if not isinstance(value, str):
             raise self.refuse(key, value, "must be a text in quotes")
         return value
@@ -48,14 +48,14 @@ class Reader:
         return value
 
     def whole(self, key: str, value: object, least: int, most: int) -> int:
-        """A whole number of a range, both ends included."""
+        """Read an integer of a range, both ends included."""
         if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
             missing = "is missing; " if value is None else ""
             raise self.refuse(key, value, f"{missing}must be a whole number from {least} to {most}")
         return value
 
     def number(self, key: str, value: object) -> float:
-        """A number without a dimension."""
+        """Read a number without a dimension."""
         if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
             missing = "is missing; " if value is None else ""
             raise self.refuse(key, value, f"{missing}must be a finite number without a unit")
@@ -64,7 +64,7 @@ class Reader:
     def quantity(
         self, key: str, value: object, unit: str, *, positive: bool = False, at_least_zero: bool = False
     ) -> float:
-        """A number with a unit, in `unit`; of unit "1" one without."""
+        """Read a number with a unit, in `unit`; of unit "1" one without."""
         if unit == "1":
             return self.number(key, value)
         bound = " > 0" if positive else " >= 0" if at_least_zero else ""
@@ -82,44 +82,44 @@ class Reader:
         return number
 
     def quantities(self, key: str, value: object, unit: str) -> tuple[float, ...]:
-        """A list of numbers with units, in `unit`."""
+        """Read a list of numbers with units, in `unit`."""
         if not isinstance(value, list):
             missing = "is missing; " if value is None else ""
             raise self.refuse(key, value, f'{missing}must be a list like ["1 {unit}", "2 {unit}"]')
         return tuple(self.quantity(f"{key}[{index}]", entry, unit) for index, entry in enumerate(value))
 
     def polar(self, key: str, value: object, unit: str) -> tuple[float, float]:
-        """A pair [magnitude, angle], in `unit` and rad."""
+        """Read a pair [magnitude, angle], in `unit` and rad."""
         if not isinstance(value, list) or len(value) != 2:
             raise self.refuse(key, value, f'must be a pair like ["1 {unit}", "0 deg"]')
         return (self.quantity(f"{key}[0]", value[0], unit), self.quantity(f"{key}[1]", value[1], "rad"))
 
 
 def quantity(value: float, unit: str) -> Any:
-    """A number as it is written: in SI with its unit, every digit kept."""
+    """Write a number in SI with its unit, every digit kept."""
     return value if unit == "1" else f"{float(value)!r} {unit}"
 
 
 def polar(magnitude: float, angle: float, unit: str) -> list[str]:
-    """A pair [magnitude, angle] likewise."""
+    """Write a pair [magnitude, angle] likewise."""
     return [quantity(magnitude, unit), quantity(angle, "rad")]
 
 
 def _hint(word: object, known: list[str]) -> str:
-    """The known word that is nearest to one that is not."""
+    """Suggest the valid word that is nearest to one that is not."""
     close = difflib.get_close_matches(word[:LONGEST_SHOWN], known, 1) if isinstance(word, str) else []
     return f'did you mean "{close[0]}"? ' if close else ""
 
 
 def _joined(key: str, name: str) -> str:
-    """The dotted key; a name that is not a plain word is quoted, so that it stays on one line."""
+    """Join the dotted key; a name that is not a plain word is quoted, so that it stays on one line."""
     if not BARE_KEY.fullmatch(name):
         name = repr(name if len(name) <= LONGEST_SHOWN else name[:LONGEST_SHOWN] + "...")
     return f"{key}.{name}" if key else name
 
 
 def _shown(value: object) -> object:
-    """The value as far as an error line shows it: never long or deep."""
+    """Shorten a value to what an error line shows: never long or deep."""
     if isinstance(value, str):
         return value[: 2 * LONGEST_SHOWN]
     if isinstance(value, dict):

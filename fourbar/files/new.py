@@ -8,7 +8,7 @@ from fourbar.linkage import BAR_NAMES, Bar, FourBar
 
 
 def new_scene(lengths: tuple[str, ...] | list[str]) -> str:
-    """The text of a scene file for four lengths (ground, input, coupler, output), written as they were given.
+    """Write a scene file for four lengths (ground, input, coupler, output), each as it was given.
 
     Bare numbers are metres. Raises InputError for what is no length, and for bars that cannot close.
     """

@@ -52,7 +52,7 @@ class Picture:
         return f"bars.{BAR_NAMES[self.bar]}.picture"
 
     def data_uri(self) -> str:
-        """The picture as it is embedded in a page.
+        """Encode the picture as it is embedded in a page.
 
         Raises InputError where a link leads out of the folder, and as `data_uri` does.
         """
@@ -63,7 +63,7 @@ class Picture:
         return data_uri(self.key, file, self.name)
 
     def moved(self, folder: Path) -> "Picture":
-        """The same file as a scene file in another folder names it.
+        """Return the same file as a scene file in another folder names it.
 
         Raises InputError where it does not lie in that folder.
         """
@@ -74,7 +74,7 @@ class Picture:
 
 
 def data_uri(key: str, path: str | Path, shown: str | None = None) -> str:
-    """A PNG or JPEG file as a data URI.
+    """Encode a PNG or JPEG file as a data URI.
 
     Raises InputError, in one line, as `read_bytes` does, and for a file that begins as neither.
     """

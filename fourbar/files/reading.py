@@ -8,7 +8,7 @@ from fourbar.errors import InputError
 
 
 def read_bytes(path: str | Path, key: str, largest: int, *, shown: str | None = None) -> bytes:
-    """The content of an ordinary file; its kind and its size are looked at before it is opened.
+    """Read an ordinary file; its kind and its size are looked at before it is opened.
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ def read_bytes(path: str | Path, key: str, largest: int, *, shown: str | None = 
 
 
 def read_text(path: str | Path, key: str, largest: int) -> str:
-    """The same as text in UTF-8, with or without a byte order mark, line ends as they are.
+    """Read a file as text in UTF-8, with or without a byte order mark, line ends as they are.
 
     Raises InputError as `read_bytes` does, and for what is no UTF-8.
     """

@@ -42,7 +42,7 @@ MOST_POINTS = 1000
 
 
 def load(path: str | Path) -> Scene:
-    """The scene of a TOML file.
+    """Read the scene of a TOML file.
 
     Raises InputError, in one line with file, key, value and what is allowed, for a file that is
     missing, not a file, too large, not text or not TOML, and for every entry that is wrong.
@@ -52,12 +52,12 @@ def load(path: str | Path) -> Scene:
 
 
 def read_text(path: str | Path) -> str:
-    """The text of a scene file."""
+    """Read the text of a scene file."""
     return reading.read_text(path, "scene file", LARGEST_FILE)
 
 
 def loads(text: str, name: str = "scene") -> Scene:
-    """The scene that a TOML text describes; `name` stands for the file in errors, its folder is that of pictures."""
+    """Read the scene of a TOML text; `name` stands for the file in errors, its folder is that of pictures."""
     shown = name if name.isprintable() else repr(name)
     for number, line in enumerate(text.split("\n"), 1):
         if line.count(".") > MOST_DOTS:
@@ -78,7 +78,7 @@ PLACE = re.compile(r" \(at (?:line (\d+), column (\d+)|end of document)\)$")
 
 
 def _unreadable(text: str, reason: str, shown: str) -> InputError:
-    """What the TOML reader stumbles over, with its line."""
+    """Make the error for what the TOML reader stumbles over, with its line."""
     found = PLACE.search(reason)
     lines = text.split("\n")
     if found is None:
@@ -124,7 +124,7 @@ def _points(read: Reader, value: object) -> tuple[Point, ...]:
 
 
 def _pictures(read: Reader, bars: dict[str, Any], folder: str) -> tuple[Picture, ...]:
-    """The pictures of the bars that have one; the files themselves are read when they are shown."""
+    """Read the names of the bars' pictures; the files themselves are read when they are shown."""
     return tuple(
         Picture(number, read.text(f"bars.{name}.picture", bars[name]["picture"]), folder)
         for name, number in BARS.items()

@@ -34,7 +34,7 @@ def save(scene: Scene, path: str | Path) -> None:
 
 
 def dump(scene: Scene) -> str:
-    """The scene as TOML text, in SI and radians; `loads` gives the same numbers back, bit for bit.
+    """Write the scene as TOML text, in SI and radians; `loads` gives the same numbers back, bit for bit.
 
     Raises InputError for a scene that a file cannot hold: two effects of one kind, a title that is
     no valid text.
@@ -125,7 +125,7 @@ def _table(name: str, entries: dict[str, Any]) -> str:
 
 
 def _value(key: str, value: object) -> str:
-    """A TOML value; strings escape as in JSON, and DEL too."""
+    """Write a TOML value; strings escape as in JSON, and DEL too."""
     if isinstance(value, dict):
         return "{ " + ", ".join(f"{name} = {_value(key, entry)}" for name, entry in value.items()) + " }"
     if isinstance(value, list):

@@ -39,7 +39,7 @@ def read_tolerances(read: Reader, scene: Scene, value: object) -> tuple[Toleranc
 
 
 def _flat(read: Reader, value: object, before: str = "") -> dict[str, Any]:
-    """A table by whole keys, whether these are quoted or dotted."""
+    """Flatten a table to full keys, whether these are quoted or dotted."""
     if not isinstance(value, dict):
         raise read.refuse("tolerances", value, 'must be a table of keys like "lengths.input" = "0.05 mm"')
     found: dict[str, Any] = {}
@@ -49,7 +49,7 @@ def _flat(read: Reader, value: object, before: str = "") -> dict[str, Any]:
 
 
 def written_tolerances(scene: Scene) -> dict[str, Any]:
-    """The table as it is written."""
+    """Write the table of tolerances."""
     known, rows = entries(scene), dict[str, Any]()
     for tolerance in scene.tolerances:
         if tolerance.key not in known:

@@ -45,7 +45,7 @@ class UnitError(ValueError):
 
 
 def to_si(text: str, unit: str) -> float:
-    """The number that `text` states, in `unit`, as the nearest double.
+    """Convert the number in `text` to `unit`, as the nearest double.
 
     Raises UnitError where the text has no number, no unit, an unknown unit, or a unit of another
     dimension than `unit`, and where the number does not fit into a double.
@@ -79,7 +79,7 @@ def to_si(text: str, unit: str) -> float:
 
 
 def factor_to(unit: str, given: str) -> float:
-    """What a number in the unit `given` is multiplied by to be in `unit`.
+    """Return what a number in the unit `given` is multiplied by to be in `unit`.
 
     Raises InputError for a unit that is unknown or of another dimension.
     """
@@ -90,7 +90,7 @@ def factor_to(unit: str, given: str) -> float:
 
 
 def _hint(number: str, name: str, unit: str) -> str:
-    """What may have been meant by a unit that is unknown or of another dimension than `unit`."""
+    """Suggest what may have been meant by a unit that is unknown or of another dimension than `unit`."""
     if len(name) > LONGEST_UNIT:
         return ""
     known = {word.casefold(): word for line in DEFINITIONS.split("\n") for word in re.split(r" = |-? = ", line) if word}
@@ -129,7 +129,7 @@ def _registry() -> Any:
 
 @cache
 def _factor(name: str) -> tuple[Fraction, dict[str, Fraction]]:
-    """What one of the unit is in base units, and its dimension."""
+    """Return what one of the unit is in base units, and its dimension."""
     name = JOINED.sub(" ", name.rstrip("."))
     if len(name) > LONGEST_UNIT or not UNIT.fullmatch(name):
         raise UnitError("the unit cannot be read")

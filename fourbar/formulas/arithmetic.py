@@ -25,7 +25,7 @@ def select(mask: Number, x: Number, y: Number) -> Number:
 
 
 def two_sum(x: Number, y: Number) -> tuple[Number, Number]:
-    """x + y = s + r exactly, s the rounded sum.
+    """Split x + y = s + r exactly, s the rounded sum.
 
     Source: D. E. Knuth, The Art of Computer Programming, vol. 2, 4.2.2, theorem B.
     """
@@ -44,7 +44,7 @@ def exact_difference(p: Number, q: Number, r: Number, s: Number) -> Number:
 
 
 def vector(x: Number, y: Number) -> Number:
-    """x + i y, each part written once: over arrays the sum takes three times as long."""
+    """Make x + i y, each part written once: over arrays the sum takes three times as long."""
     if type(x) is type(y) is float:
         return complex(x, y)
     if hasattr(x, "slopes") or hasattr(y, "slopes"):  # numbers that carry their derivatives
@@ -57,7 +57,7 @@ def vector(x: Number, y: Number) -> Number:
 
 
 def polar(r: Number, phi: Number) -> Number:
-    """r e^{i phi} with the cosine and the sine of the library, exact where phi = 0."""
+    """Compute r e^{i phi} with the cosine and the sine of the library, exact where phi = 0."""
     if type(r) is type(phi) is float:
         return cmath.rect(r, phi)
     return r * np.cos(phi) + 1j * (r * np.sin(phi))
@@ -69,7 +69,7 @@ def angle(u: Number) -> Number:
 
 
 def tangent(x: Number) -> Number:
-    """tan x, of Python's own floats as such."""
+    """Compute tan x, of Python's own floats as such."""
     t = np.tan(x)
     return t.item() if type(x) is float else t
 
@@ -80,7 +80,7 @@ def square_root(x: Number) -> Number:
 
 
 def power_of_two(x: Number) -> Number:
-    """The power of two just above a positive number."""
+    """Return the power of two just above a positive number."""
     return math.ldexp(1.0, math.frexp(x)[1]) if type(x) is float else np.ldexp(1.0, np.frexp(x)[1])
 
 

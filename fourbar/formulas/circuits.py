@@ -24,7 +24,7 @@ class Circuit(NamedTuple):
 
 
 def circuits(linkage: FourBar) -> tuple[Circuit, ...]:
-    """The circuits of a linkage, with the range of theta_2 on each and the branches that belong to it.
+    """List the circuits of a linkage, with the range of theta_2 on each and the branches that belong to it.
 
     A Grashof linkage has two: the branches, where the input turns fully, else the two ranges of
     theta_2. Every other linkage has one; at a change point both branches count as reachable.
@@ -39,7 +39,7 @@ def circuits(linkage: FourBar) -> tuple[Circuit, ...]:
 
 
 def circuit_of(linkage: FourBar, theta_2: Array, branch: int | NDArray[np.int8]) -> NDArray[np.int8]:
-    """The circuit (index into `circuits`) of each position, -1 where it does not assemble, (n,).
+    """Find the circuit (index into `circuits`) of each position, -1 where it does not assemble, (n,).
 
     Parameters
     ----------

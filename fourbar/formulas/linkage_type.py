@@ -36,7 +36,7 @@ class LinkageType(NamedTuple):
 
 
 def classify(linkage: FourBar) -> LinkageType:
-    """The type of a linkage: Grashof condition s + l < p + q and which bar is shortest or longest.
+    """Classify a linkage by the Grashof condition s + l < p + q and by which bar is shortest or longest.
 
     s, l are the shortest and longest lengths, p, q the other two. The sums are exact; equality is
     decided within the rounding of the four lengths. Which of the three sums of two bars and the
@@ -52,7 +52,7 @@ def classify(linkage: FourBar) -> LinkageType:
     whole = math.fsum(lengths.values())
 
     def balance(bar: int, other: int) -> float:
-        """The two bars minus the other two; 0 within the rounding of the lengths."""
+        """Compute the two bars minus the other two; 0 within the rounding of the lengths."""
         total = math.fsum(length if k in (bar, other) else -length for k, length in lengths.items())
         return 0.0 if abs(total) <= TOUCHING * whole else total
 

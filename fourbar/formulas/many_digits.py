@@ -17,7 +17,7 @@ was itself rounded by up to that, so the linkage meant closes there as well as n
 
 
 def half_angle(linkage: FourBar, theta_2: float, offset: Any = None, unit: Any = 1.0, member: int = 0) -> HalfAngle:
-    """The five numbers of `formulas.position.half_angle`, each rounded once.
+    """Compute the five numbers of `formulas.position.half_angle`, each rounded once.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ def half_angle(linkage: FourBar, theta_2: float, offset: Any = None, unit: Any =
 
 
 def decided(linkage: FourBar, unit: float, half: HalfAngle, index: Any, theta_2: Any, offset: Any = None) -> HalfAngle:
-    """The half angles with those of some positions (an index) replaced."""
+    """Replace the half angles of some positions (an index)."""
     flat, shape = np.ravel(theta_2), np.shape(theta_2)
     numbers = [np.array(np.broadcast_to(number, shape)).ravel() for number in half]
     for i in index:

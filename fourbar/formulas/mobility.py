@@ -56,7 +56,7 @@ class Reach(NamedTuple):
     y: float
 
     def sum(self, d: int, own: int, x: int, y: int) -> float:
-        """The exact sum of the lengths with these signs, rounded once."""
+        """Sum the lengths with these signs exactly, rounded once."""
         total = math.fsum((d * self.d, own * self.own, x * self.x, y * self.y))
         return 0.0 if abs(total) <= TOUCHING * (self.d + self.own + self.x + self.y) else total
 
@@ -72,7 +72,7 @@ class Reach(NamedTuple):
         return self.sum(-q, q, p, -p)
 
     def triangle(self, stretched: bool) -> tuple[float, float]:
-        """Angles of the triangle d, l, e at both ends of the ground, rad, from its Heron factors:
+        """Compute the angles of the triangle d, l, e at both ends of the ground, rad, from its Heron factors.
 
         tan^2(psi/2) = (e + l - d)(e + d - l)/((d + l - e)(d + l + e)), and with d, e for d, l.
         """
@@ -85,7 +85,7 @@ class Reach(NamedTuple):
 
 
 def unit_of(linkage: FourBar) -> float:
-    """A power of two near the longest bar, m."""
+    """Return a power of two near the longest bar, m."""
     expect("linkage", linkage, FourBar)
     return math.ldexp(1.0, math.frexp(max(linkage.lengths))[1])
 
@@ -100,13 +100,13 @@ def reach_of(linkage: FourBar, bar: int = 2) -> Reach:
 
 
 def _wrapped(angle: float) -> float:
-    """The angle in (-pi, pi]."""
+    """Wrap the angle into (-pi, pi]."""
     rest = math.remainder(angle, TURN)
     return math.pi if rest <= -math.pi else rest
 
 
 def limit_positions(linkage: FourBar, bar: int = 2) -> tuple[LimitPosition, ...]:
-    """The positions in which a bar reverses, all mirror solutions, counter-clockwise in theta_2 from theta_1.
+    """Find the positions in which a bar reverses, all mirror solutions, counter-clockwise in theta_2 from theta_1.
 
     cos psi = (d^2 + l^2 - (x +- y)^2)/(2 d l), psi the angle between the ground and the bar.
 
@@ -141,7 +141,7 @@ def limit_positions(linkage: FourBar, bar: int = 2) -> tuple[LimitPosition, ...]
 
 
 def intervals(linkage: FourBar, bar: int = 2) -> tuple[tuple[float, float], ...]:
-    """The ranges [from, to] of a bar's angle in which the linkage assembles, rad; `to` may exceed 2 pi.
+    """Find the ranges [from, to] of a bar's angle in which the linkage assembles, rad; `to` may exceed 2 pi.
 
     One range where the bar turns fully (a whole turn from the ground's line) or has one pair of
     limits, two mirror images where it has two pairs; the range that contains the ground's
@@ -165,7 +165,7 @@ def turns_fully(linkage: FourBar, bar: int = 2) -> bool:
 
 
 def default_range(linkage: FourBar) -> tuple[float, float]:
-    """The range of theta_2 that is swept where a scene names none, rad.
+    """Choose the range of theta_2 that is swept where a scene names none, rad.
 
     0..2 pi where the input turns fully; otherwise the first of `intervals`, shrunk by MARGIN at each end.
     """
@@ -210,7 +210,7 @@ def time_ratio(linkage: FourBar) -> float | None:
 
 
 def on_smooth_path(linkage: FourBar, theta_2: Array, branch: int) -> NDArray[np.int8]:
-    """The branch of each position of a sweep that runs smoothly through the change points, (n,).
+    """Choose the branch of each position of a sweep that runs smoothly through the change points, (n,).
 
     At a change point sin(theta_4 - theta_3) passes through zero with its slope, so the smooth path
     changes the sign there. A position on a change point belongs to the side that the sweep comes

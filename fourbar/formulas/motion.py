@@ -35,7 +35,7 @@ class Coefficients(NamedTuple):
 
 
 def coefficients(lengths: Loop, at: Position) -> Coefficients:
-    """The coefficients by theta_2, from the triangle A, B, O4 whose side e turns by t and whose height changes by g:
+    """Compute the coefficients by theta_2 from the triangle A, B, O4: its side e turns by t, its height changes by g.
 
         h3 = m - g,   h4 = m + g,   m = t + q g = 1/2 + w,
         t = (a (a - d) + 2 a d sin^2 h)/e^2,   g = 2 a d sin h cos h/root,   q = (b^2 - c^2)/e^2.
@@ -84,7 +84,7 @@ def side_turns_fast(lengths: Loop, at: Position) -> Number:
 
 
 def with_sines_of_rates(lengths: Loop, at: Position, k: Coefficients) -> Position:
-    """Where the side turns fast, u3 and u4 with small sines that keep their digits, by the instant centres:
+    """Take u3 and u4 from the instant centres where the side turns fast, so that small sines keep their digits.
 
     d sin(theta_4 - theta_1) = b sin(theta_4 - theta_3) (1 - h3),
     d sin(theta_3 - theta_1) = c sin(theta_4 - theta_3) (1 - h4).
@@ -100,7 +100,7 @@ def with_sines_of_rates(lengths: Loop, at: Position, k: Coefficients) -> Positio
 
 
 def with_parallel_pairs(k: Coefficients, first: Number, second: Number) -> Coefficients:
-    """The exact coefficients of bars that stay parallel: h3, h4 = 0, 1 where `first`, 1, 0 where `second`."""
+    """Put in the exact coefficients of bars that stay parallel: h3, h4 = 0, 1 where `first`, 1, 0 where `second`."""
     either = first | second
     h3, h4 = np.where(either, 1.0 * second, k.h3), np.where(either, 1.0 * first, k.h4)
     h23, h43 = np.where(either, 1.0 * first, k.h23), np.where(either, 1.0 * first - 1.0 * second, k.h43)
@@ -173,7 +173,7 @@ class State(NamedTuple):
         return self.at[bar - 1]
 
     def coefficient(self, bar: int) -> Number:
-        """h of bar 1, 2, 3 or 4."""
+        """Return h of bar 1, 2, 3 or 4."""
         return 0.0 if bar == 1 else self.k[bar - 2]
 
     def omega(self, bar: int) -> Number:
@@ -200,7 +200,7 @@ class State(NamedTuple):
         return Frame(self.direction(bar), pin, v_pin, a_pin, 1j * omega, vector(-omega * omega, self.alpha(bar)))
 
     def point(self, bar: int, z: Number) -> Number:
-        """The point z of a bar's frame at its first pin (complex: along + i across), m."""
+        """Place the point z of a bar's frame at its first pin (complex: along + i across), m."""
         return self.foot(bar) + z * self.direction(bar)
 
     def point_coefficient(self, bar: int, z: Number) -> Number:

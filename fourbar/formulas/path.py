@@ -97,7 +97,7 @@ class Path(NamedTuple):
 
 
 def path(lengths: Loop, theta_1: Number, bar: int = 2) -> Path:
-    """The path in the angle of bar 2 or 4."""
+    """Prepare the path in the angle of bar 2 or 4."""
     d, a, b, c, _, _ = lengths
     unit = power_of_two(0.25 * (d + a + b + c))
     d, a, b, c = d / unit, a / unit, b / unit, c / unit
@@ -137,7 +137,7 @@ def drive_sine(at: Position, drive_bar: int) -> Number:
 
 
 def drive_sine_of_triangle(lengths: Loop, at: Position, drive_bar: int) -> Number:
-    """The same from the triangle A, B, O4, where a short ground leaves few digits to directions that differ little:
+    """Compute the drive's sine from the triangle A, B, O4: nearly equal directions of a short ground lose digits.
 
         sin(theta_4 - theta_2) = ((d cos psi - a) root + d sin psi (e^2 - b^2 + c^2))/(2 c e^2),
         sin(theta_3 - theta_2) = ((d cos psi - a) root - d sin psi (e^2 + b^2 - c^2))/(2 b e^2).
@@ -157,7 +157,7 @@ def drive_sine_of_triangle(lengths: Loop, at: Position, drive_bar: int) -> Numbe
 
 
 def smooth_branch(lengths: Loop, psi: Number, sign: Number) -> Number:
-    """The sign of the root on a path that runs smoothly through change points: there cos h or sin h changes its sign.
+    """Return the root's sign on a path that runs smoothly through change points: there cos h or sin h changes its sign.
 
     Parameters
     ----------
@@ -171,7 +171,7 @@ def smooth_branch(lengths: Loop, psi: Number, sign: Number) -> Number:
 
 
 def _turned_round(reading: Path, at: Position) -> Position:
-    """A position of the loop read backwards, in the usual order of the bars."""
+    """Return a position of the loop read backwards, in the usual order of the bars."""
     d, c, b, a, _, _ = reading.lengths
     u1, u2, u3, u4 = -at.u1, at.u4, -at.u3, at.u2
     diagonal = d * u1 - a * u2
@@ -180,5 +180,5 @@ def _turned_round(reading: Path, at: Position) -> Position:
 
 
 def read_backwards(k: Coefficients) -> Coefficients:
-    """The coefficients of the loop read backwards, in the usual order of the bars."""
+    """Return the coefficients of the loop read backwards, in the usual order of the bars."""
     return Coefficients(k.h4, k.h3, k.h2, k.h43, k.h23, k.dh4, k.dh3, k.dh2)

@@ -42,7 +42,7 @@ class Wrenches(NamedTuple):
     """Couple at pin B on bar 4, its opposite on bar 3, in neither M3 nor M4: the small sum M3 + M4 keeps its digits."""
 
     def on(self, bar: int) -> tuple[Number, Number]:
-        """The force and the moment on bar 2, 3 or 4."""
+        """Return the force and the moment on bar 2, 3 or 4."""
         moment = self.M2 if bar == 2 else self.M3 - self.C if bar == 3 else self.M4 + self.C
         return self[bar - 2], moment
 
@@ -102,14 +102,14 @@ def coupler_about_B(lengths: Loop, three: Body, at: Position, moving: Rates, sin
 
 
 def between(M_u: Number, M_v: Number, u: Number, v: Number, sine: Number) -> Number:
-    """The force F with u x F = M_u and v x F = M_v, for unit vectors with u x v = sine: F = (M_u v - M_v u)/sine."""
+    """Solve u x F = M_u and v x F = M_v for F, unit vectors with u x v = sine: F = (M_u v - M_v u)/sine."""
     return (M_u * v - M_v * u) * (1.0 / sine)
 
 
 def pin_forces(
     lengths: Loop, at: Position, drive_bar: int, sine: Number, w: Wrenches, mass_at_A: Number, moment_of_F32: Number
 ) -> PinForces:
-    """The four pin forces; inf or NaN where the two bars that are not driven lie in one line.
+    """Compute the four pin forces; inf or NaN where the two bars that are not driven lie in one line.
 
     With the drive on bar 2 the force at B is written with the diagonal D from A to O4, which closes the
     triangle of bars 3 and 4, so that a couple between them keeps its digits:

@@ -29,7 +29,7 @@ class PointCoefficients(NamedTuple):
 
 
 def point_coefficients(linkage: FourBar, theta_2: Array, branch: Number, bar: int, z: complex) -> PointCoefficients:
-    """d r_P/d theta_2 and d^2 r_P/d theta_2^2 of a point of bar 2, 3 or 4.
+    """Compute d r_P/d theta_2 and d^2 r_P/d theta_2^2 of a point of bar 2, 3 or 4.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ class Centre(NamedTuple):
 
 
 def instant_centres(linkage: FourBar, theta_2: Array, branch: Number) -> dict[tuple[int, int], Centre]:
-    """The six instant centres I_ij, keyed by (i, j) with i < j.
+    """Locate the six instant centres I_ij, keyed by (i, j) with i < j.
 
     I12, I23, I34, I14 are the pins; I13 = line O2 A with line B O4, I24 = line A B with line O2 O4
     (Aronhold-Kennedy). Where two such lines coincide the centre is undetermined: x = y = w = 0.
@@ -100,7 +100,7 @@ class CouplerCurve(NamedTuple):
 def coupler_curve(
     linkage: FourBar, r_along: float, r_across: float, circuit: int = 0, *, branch: int = 1, steps: int = 360
 ) -> CouplerCurve:
-    """The closed coupler curve of one circuit, run smoothly through limits and change points.
+    """Trace the closed coupler curve of one circuit, run smoothly through limits and change points.
 
     Where the input turns fully theta_2 is spaced evenly, over two turns if one turn ends on the
     other branch; else it goes from limit to limit on one branch and back on the other, spaced by

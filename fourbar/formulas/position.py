@@ -62,7 +62,7 @@ class Position(NamedTuple):
 
 
 def loop(d: Number, a: Number, b: Number, c: Number) -> Loop:
-    """The lengths with E1 = (b + c - a - d)(a + b + c + d) and E2 = (d - a - b + c)(d - a + b - c).
+    """Return the lengths with E1 = (b + c - a - d)(a + b + c + d) and E2 = (d - a - b + c)(d - a + b - c).
 
     >>> loop(0.3, 0.1, 0.3, 0.1).E1  # a parallelogram, whose bars come to lie in one line
     0.0
@@ -84,12 +84,12 @@ def direction_of_tangent(t: Number) -> Number:
 
 
 def half_angle(lengths: Loop, psi: Number) -> HalfAngle:
-    """The half angle h of psi = theta_2 - theta_1 (rad), and the factors of Heron's formula."""
+    """Compute the half angle h of psi = theta_2 - theta_1 (rad), and the factors of Heron's formula."""
     return half_angle_of_tangent(lengths, tangent(0.5 * psi))
 
 
 def half_angle_of_tangent(lengths: Loop, t: Number) -> HalfAngle:
-    """The same of t = tan h."""
+    """Compute the same from t = tan h."""
     meets = lengths.E2 == 0.0
     if anywhere(meets):
         t = select(meets, t + np.copysign(HAIR, t), t)
@@ -108,7 +108,7 @@ def half_angle_of_tangent(lengths: Loop, t: Number) -> HalfAngle:
 
 
 def close_loop(lengths: Loop, u1: Number, u2: Number, half: HalfAngle, branch: Number, unit: Number = 1.0) -> Position:
-    """The directions of coupler and output:
+    """Compute the directions of coupler and output.
 
         u3 = (O4 - A) ((e^2 + b^2 - c^2) + i root)/(2 b e^2),   e^2 = (d - a)^2 + 4 a d sin^2 h,
         u4 = (O4 - A) ((b^2 - e^2 - c^2) + i root)/(2 c e^2),   sin(theta_4 - theta_3) = root/(2 b c).
@@ -152,7 +152,7 @@ def parallel_pairs(lengths: Loop, half: HalfAngle, branch: Number) -> tuple[Numb
 
 
 def with_parallel_pairs(at: Position, first: Number, second: Number) -> Position:
-    """The position with the exact directions u3 = u1, u4 = u2 where `first`, u3 = -u2, u4 = -u1 where `second`."""
+    """Put in the exact directions u3 = u1, u4 = u2 where `first`, u3 = -u2, u4 = -u1 where `second`."""
     u3 = np.where(first, at.u1, np.where(second, -at.u2, at.u3))
     u4 = np.where(first, at.u2, np.where(second, -at.u1, at.u4))
     sine = np.where(first | second, np.sign(at.root) * 2.0 * np.abs(at.half.sk), at.sin_mu)

@@ -12,7 +12,7 @@ from fourbar.linkage import FourBar
 
 
 def transmission_angle(state: State) -> Array:
-    """mu = the acute angle between coupler and output, rad, in [0, pi/2], (n,); NaN where not assembled.
+    """Compute mu, the acute angle between coupler and output, rad, in [0, pi/2], (n,); NaN where not assembled.
 
     tan mu = |sin(theta_4 - theta_3)| / |cos(theta_4 - theta_3)|, so mu keeps eps-accuracy near 0 and
     pi/2 as far as the position itself does: |error| about eps/|sin mu|.
@@ -57,7 +57,7 @@ def transmission_extremes(linkage: FourBar) -> TransmissionExtremes:
 
 
 def _angle_at_B(reach: Reach, d: int, own: int) -> float:
-    """The angle between the sides b, c of the triangle b, c, e with e = d (ground) + own (input), signed."""
+    """Compute the angle between the sides b, c of the triangle b, c, e with e = d (ground) + own (input), signed."""
     opposite = max(reach.sum(d, own, 1, -1), 0.0) ** 0.5 * max(reach.sum(d, own, -1, 1), 0.0) ** 0.5
     return 2.0 * math.atan2(opposite, max(reach.sum(-d, -own, 1, 1), 0.0) ** 0.5 * reach.sum(d, own, 1, 1) ** 0.5)
 

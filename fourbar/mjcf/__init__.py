@@ -6,7 +6,7 @@ from fourbar.mjcf.document import flywheel as flywheel
 from fourbar.mjcf.document import mjcf as mjcf
 from fourbar.mjcf.document import run_through as run_through
 from fourbar.mjcf.settings import RECIPE as RECIPE
-from fourbar.mjcf.settings import Run as Run
 from fourbar.mjcf.settings import Settings as Settings
+from fourbar.mjcf.settings import WindowMotion as WindowMotion
 from fourbar.mjcf.simulators import SIMULATORS as SIMULATORS
 from fourbar.mjcf.simulators import mjcf_for as mjcf_for

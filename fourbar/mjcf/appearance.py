@@ -14,7 +14,7 @@ MARGIN = 1.15
 """Width and height of the picture over those of the linkage."""
 
 
-class Frame(NamedTuple):
+class CameraView(NamedTuple):
     """What the camera sees: the box in which pins A and B move."""
 
     x: float
@@ -28,14 +28,14 @@ class Frame(NamedTuple):
         return self.half_height / math.tan(math.radians(0.5 * FOVY))
 
 
-def frame(linkage: FourBar) -> Frame:
-    """The box around the circle of A about O2 and of B about O4: no position leaves it."""
+def frame(linkage: FourBar) -> CameraView:
+    """Compute the box around the circle of A about O2 and of B about O4: no position leaves it."""
     d, a, _, c = linkage.lengths
     x, y = d * math.cos(linkage.ground_angle), d * math.sin(linkage.ground_angle)
     left, right = min(-a, x - c), max(a, x + c)
     low, high = min(-a, y - c), max(a, y + c)
     half = MARGIN * max(0.5 * (high - low), 0.5 * (right - left) / ASPECT)
-    return Frame(0.5 * (left + right), 0.5 * (low + high), half)
+    return CameraView(0.5 * (left + right), 0.5 * (low + high), half)
 
 
 def add_appearance(root: ET.Element, linkage: FourBar) -> None:
@@ -52,7 +52,7 @@ def add_appearance(root: ET.Element, linkage: FourBar) -> None:
 
 
 def add_camera(world: ET.Element, linkage: FourBar) -> None:
-    """The camera `plane`, and a light at the same place."""
+    """Add the camera `plane`, and a light at the same place."""
     seen = frame(linkage)
     place = f"{seen.x!r} {seen.y!r} {seen.distance!r}"
     shining = {"diffuse": ".2 .2 .2", "specular": ".1 .1 .1"}  # with the headlight 1

@@ -21,7 +21,7 @@ def scene_from_lengths(ground: float, input: float, coupler: float, output: floa
 
 
 def defaults_used(scene: Scene) -> list[str]:
-    """The defaults of `scene_from_lengths`, one line each."""
+    """List the defaults of `scene_from_lengths`, one line each."""
     theta_2 = scene.motion.theta_2
     assert isinstance(theta_2, float)
     return [
@@ -34,7 +34,7 @@ def defaults_used(scene: Scene) -> list[str]:
 
 
 def _mid_range(linkage: FourBar) -> float:
-    """The middle of the input's range; a quarter turn from the ground bar where it turns fully.
+    """Return the middle of the input's range; a quarter turn from the ground bar where it turns fully.
 
     Half a turn would start a parallelogram in its change point.
     """

@@ -14,7 +14,7 @@ from fourbar.mjcf.appearance import add_appearance
 from fourbar.mjcf.effects import row, unwound
 from fourbar.mjcf.model import Model, carriable, constant, servo, text
 from fourbar.mjcf.notes import NOTES
-from fourbar.mjcf.settings import RECIPE, Run, Settings, fitted_pad
+from fourbar.mjcf.settings import RECIPE, Settings, WindowMotion, fitted_pad
 from fourbar.quantities import OK
 from fourbar.scene import Command, Scene, command
 from fourbar.solution import Array
@@ -39,7 +39,7 @@ def mjcf(
     keyframe: bool = True,
     start: "Start | None" = None,
 ) -> str:
-    """The MJCF text of a scene: it runs on its own in MuJoCo.
+    """Write the MJCF text of a scene: it runs on its own in MuJoCo.
 
     Parameters
     ----------
@@ -136,7 +136,7 @@ def mass_ratio(linkage: FourBar) -> float:
 
 
 def _quickness(scene: Scene) -> float:
-    """The greater of omega_2^2 and |alpha_2|: by it the accelerations of all bars scale, rad/s^2."""
+    """Return the greater of omega_2^2 and |alpha_2|: by it the accelerations of all bars scale, rad/s^2."""
     return max((scene.motion.omega_2 or AT_REST) ** 2, abs(scene.motion.alpha_2))
 
 
@@ -164,13 +164,13 @@ class Start(NamedTuple):
 
     qpos: tuple[float, float, float]
     qvel: tuple[float, float, float]
-    run: Run
+    run: WindowMotion
 
 
-def run_through(theta_2: Array, omega: float, alpha: float) -> Run:
-    """The motion through positions: counter-clockwise from the least, or clockwise from the greatest."""
+def run_through(theta_2: Array, omega: float, alpha: float) -> WindowMotion:
+    """Choose the motion through positions: counter-clockwise from the least, or clockwise from the greatest."""
     least, most = float(np.min(theta_2)), float(np.max(theta_2))
-    return Run(least, most, omega, alpha) if omega > 0.0 else Run(most, least, omega, alpha)
+    return WindowMotion(least, most, omega, alpha) if omega > 0.0 else WindowMotion(most, least, omega, alpha)
 
 
 def at_start(scene: Scene) -> Start:
@@ -204,5 +204,5 @@ def _span(linkage: FourBar) -> float:
 
 
 def plain(title: str) -> str:
-    """A title that XML can hold: every character that does not print becomes a blank."""
+    """Return a title that XML can hold: every character that does not print becomes a blank."""
     return "".join(character if character.isprintable() else " " for character in title).strip()

@@ -16,7 +16,7 @@ Joints = tuple[float, float, float]
 
 
 def _gravity(effect: "Gravity", model: Model) -> None:
-    """The option ``gravity``."""
+    """Set the option ``gravity``."""
     model.option["gravity"] = (*effect.vector, 0.0)
 
 
@@ -30,13 +30,13 @@ def _weights(effect: "Gravity", linkage: FourBar, speed: float) -> float:
 
 
 def _viscous(effect: "Viscous", model: Model) -> None:
-    """The attribute ``damping`` of the hinge (of a tendon at the cut pin B)."""
+    """Set the attribute ``damping`` of the hinge (of a tendon at the cut pin B)."""
     for pin, k in effect.coefficients:
         model.pin[pin]["damping"] = k
 
 
 def _friction(effect: "Friction", model: Model) -> None:
-    """The attribute ``frictionloss`` of the hinge (of a tendon at the cut pin B)."""
+    """Set the attribute ``frictionloss`` of the hinge (of a tendon at the cut pin B)."""
     for pin, f in effect.torques:
         model.add_dry_friction(pin, f)
 
@@ -70,7 +70,7 @@ def _unwind_torsion(effect: "Torsion", linkage: FourBar, q: Joints) -> Joints:
 
 
 def _springs(effect: "Springs", model: Model) -> None:
-    """A spatial tendon between two sites, its rest length shortened by the preload."""
+    """Add a spatial tendon between two sites, its rest length shortened by the preload."""
     model.springs += effect.springs
 
 
@@ -85,13 +85,13 @@ def _flywheel(effect: "Flywheel", model: Model) -> None:
 
 
 def _load(effect: "Load", model: Model) -> None:
-    """A constant actuator on a site (force) or on the bar (couple)."""
+    """Add a constant actuator on a site (force) or on the bar (couple)."""
     if effect.table is not None:
         raise LimitError("a load that is a table over theta_2 has no counterpart in MJCF")
     model.loads.append(effect)
 
 
-class Row(NamedTuple):
+class MjcfForm(NamedTuple):
     """One effect in MJCF."""
 
     add: Callable[[Any, Model], None]
@@ -102,27 +102,27 @@ class Row(NamedTuple):
     """The angles of pins O2, A, O4, moved by the whole turns that the effect tells apart, rad."""
 
 
-MJCF_OF: dict[str, Row] = {
-    "gravity": Row(_gravity, _weights),
-    "viscous": Row(_viscous, lambda effect, linkage, speed: sum((k for _, k in effect.coefficients), 0.0) * speed),
-    "friction": Row(_friction, lambda effect, linkage, speed: sum((f for _, f in effect.torques), 0.0)),
-    "torsion": Row(_torsion, lambda effect, linkage, speed: effect.greatest_couple, _unwind_torsion),
-    "springs": Row(_springs, _tensions),
-    "flywheel": Row(_flywheel),
-    "load": Row(_load, lambda effect, linkage, speed: effect.greatest_force(linkage) * max(linkage.lengths)),
+MJCF_OF: dict[str, MjcfForm] = {
+    "gravity": MjcfForm(_gravity, _weights),
+    "viscous": MjcfForm(_viscous, lambda effect, linkage, speed: sum((k for _, k in effect.coefficients), 0.0) * speed),
+    "friction": MjcfForm(_friction, lambda effect, linkage, speed: sum((f for _, f in effect.torques), 0.0)),
+    "torsion": MjcfForm(_torsion, lambda effect, linkage, speed: effect.greatest_couple, _unwind_torsion),
+    "springs": MjcfForm(_springs, _tensions),
+    "flywheel": MjcfForm(_flywheel),
+    "load": MjcfForm(_load, lambda effect, linkage, speed: effect.greatest_force(linkage) * max(linkage.lengths)),
 }
 """By the key of an effect; MJCF has no counterpart of what is not here (friction that depends on the pin forces)."""
 
 
-def row(effect: "Effect") -> Row:
-    """The row of an effect; LimitError where it has none."""
+def row(effect: "Effect") -> MjcfForm:
+    """Return the row of an effect; LimitError where it has none."""
     if effect.key not in MJCF_OF:
         raise LimitError(f"the effect {effect.key!r} has no counterpart in MJCF")
     return MJCF_OF[effect.key]
 
 
 def unwound(scene: Scene, q: Joints) -> Joints:
-    """The angles of pins O2, A, O4 as the scene's springs count them, rad."""
+    """Compute the angles of pins O2, A, O4 as the scene's springs count them, rad."""
     for effect in scene.effects:
         q = row(effect).unwind(effect, scene.linkage, q)
     return q

@@ -35,19 +35,19 @@ def text(*numbers: float) -> str:
 
 
 def _body(root: ET.Element, bar: int) -> ET.Element:
-    """The body of a bar."""
+    """Find the body of a bar."""
     body = root.find(f".//body[@name='{BAR_NAMES[bar]}']")
     assert body is not None
     return body
 
 
 def constant(force: float) -> tuple[float, float, float]:
-    """The drive as a motor: bias of an actuator that ignores its control."""
+    """Make the drive a motor: bias of an actuator that ignores its control."""
     return (force, 0.0, 0.0)
 
 
 def servo(gain: float, omega: float) -> tuple[float, float, float]:
-    """The drive as a speed servo, gain (omega - speed): without a control it turns at omega, and there it is idle."""
+    """Make the drive a speed servo, gain (omega - speed): without a control it turns at omega, and there it is idle."""
     return (gain * omega, 0.0, -gain)
 
 
@@ -58,7 +58,7 @@ ALONE = 1e-3
 
 
 def carriable(linkage: FourBar) -> None:
-    """An InputError where a bar is lighter than MuJoCo carries; it says which mass does instead."""
+    """Raise an InputError where a bar is lighter than MuJoCo carries; it says which mass does instead."""
     heaviest = max(linkage.bar(number).mass for number in MOVING_BARS)
     enough = max(A_MILLIONTH * heaviest, 2.0 * FLOOR) if heaviest else ALONE
     part = "a millionth of the heaviest bar's" if heaviest else "which all bars can have where loads alone act"
@@ -131,7 +131,7 @@ class Model:
         ET.SubElement(option, "flag", dict.fromkeys(unneeded, "disable"))
 
     def add_bodies(self, root: ET.Element, flywheel: float) -> None:
-        """ground > (input > coupler), output; light and camera face the plane."""
+        """Add ground > (input > coupler), output; light and camera face the plane."""
         world = ET.SubElement(root, "worldbody")
         add_camera(world, self.linkage)
         ground = ET.SubElement(world, "body", name="ground")
@@ -144,7 +144,7 @@ class Model:
         self._add_bar(ground, 4, self.O4)
 
     def _add_bar(self, parent: ET.Element, number: int, at: tuple[float, float], **drive: float) -> ET.Element:
-        """A bar turning about its first pin; bars 3 and 4 end in the sites that the loop's closure joins."""
+        """Add a bar turning about its first pin; bars 3 and 4 end in the sites that the loop's closure joins."""
         bar, pin = self.linkage.bar(number), FIRST_PIN[number]
         body = ET.SubElement(parent, "body", name=BAR_NAMES[number], pos=text(*at, 0.0))
         if self.rest is not None:
@@ -180,7 +180,7 @@ class Model:
         ET.SubElement(body, "site", name=name, pos=text(x, y, 0.0), size=text(self.radius))
 
     def _add_capsule(self, body: ET.Element, number: int, length: float, z: float) -> None:
-        """A bar's shape: for the eye alone, without mass and without contact."""
+        """Add a bar's shape: for the eye only, without mass and without contact."""
         theta = self.linkage.ground_angle if number == 1 else 0.0
         cos, sin = math.cos(theta), math.sin(theta)
         shape = {
@@ -194,7 +194,7 @@ class Model:
         ET.SubElement(body, "geom", shape, mass="0", contype="0", conaffinity="0")
 
     def add_closure(self, root: ET.Element) -> None:
-        """The loop closes at B."""
+        """Close the loop at B."""
         s, pair = self.settings, {"name": "B", "site1": "B3", "site2": "B4"}
         solref = text(s.time_constant_steps * self.timestep, 1.0)
         solimp = text(s.impedance, s.impedance, 0.001, 0.5, 2.0)
@@ -226,7 +226,7 @@ class Model:
                 self._add_site(_body(root, point.bar), f"{name}_{end}", x, y)
 
     def add_load_sites(self, root: ET.Element) -> None:
-        """The point at which each load acts: G for world axes (the arm becomes a couple), else the point itself."""
+        """Add the point at which each load acts: G for world axes (the arm becomes a couple), else the point itself."""
         for index, load in enumerate(self.loads, 1):
             to_G = self.linkage.bar(load.bar).to_centre
             x, y = to_G.real, to_G.imag

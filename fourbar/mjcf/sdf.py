@@ -4,10 +4,10 @@ from xml.etree import ElementTree as ET
 
 from fourbar.errors import LimitError
 from fourbar.linkage import BAR_NAMES, FIRST_PIN, MOVING_BARS
+from fourbar.mjcf.assembly import PARENT, assemble
 from fourbar.mjcf.document import Start, plain
 from fourbar.mjcf.model import text
 from fourbar.mjcf.notes import NOTES
-from fourbar.mjcf.standing import PARENT, standing
 from fourbar.scene import Scene
 
 DAMPING = {"viscous": ("damping", "coefficients")}
@@ -18,7 +18,7 @@ DRAKE = "http://drake.mit.edu"
 
 
 def sdf(scene: Scene, reader: str = "gazebo", start: Start | None = None) -> str:
-    """The SDF 1.9 text of a scene: a world with gravity, four links, and the pins as joints.
+    """Write the SDF 1.9 text of a scene: a world with gravity, four links, and the pins as joints.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ def sdf(scene: Scene, reader: str = "gazebo", start: Start | None = None) -> str
     Source: sdformat.org/spec, and Drake's documentation of its parser.
     """
     linkage = scene.linkage
-    turn, foot, numbers, inertia, gravity, dynamics = standing(scene, start, f"SDF for {reader}", AT_JOINTS[reader])
+    turn, foot, numbers, inertia, gravity, dynamics = assemble(scene, start, f"SDF for {reader}", AT_JOINTS[reader])
     if reader == "drake" and "B" in dynamics:
         raise LimitError("Drake's ball constraint at pin B has no damping")
     omega_2, at_A, omega_4 = numbers[3:]

@@ -56,7 +56,7 @@ and 1 g on 14.5 kg had the inertial torque 3e-5 and 3e-3 wrong, in proportion to
 
 
 def fitted_pad(acceleration: float, load_ratio: float, mass_ratio: float = 1.0) -> float:
-    """The pad that leaves the closure stiff enough for the loads, and soft enough for one pass of Newton's method.
+    """Choose the pad that leaves the closure stiff enough for the loads, and soft enough for one pass of Newton.
 
     The sag of the closure grows as pad^2 times the loads, the rounding of one pass as 1/(pad^2 times the loads).
 
@@ -74,7 +74,7 @@ FULL_TURN = 2.0 * math.pi * (1.0 - 1e-9)
 """rad; a sweep over 0..360 deg may miss the turn by its rounding."""
 
 
-class Run:
+class WindowMotion:
     """The input's motion through a window of theta_2, in time.
 
     theta_2 = start + omega t + alpha t^2/2 from `start` to `stop`, at the speed `omega` at the start.
@@ -99,7 +99,7 @@ class Run:
         return 2.0 * angle / (self.omega + math.copysign(math.sqrt(squared), self.omega))
 
     def timestep(self, settings: Settings = RECIPE, at_least: int = 0) -> float:
-        """A whole number of steps, at least so many per revolution, per window and in all, s."""
+        """Choose a timestep that divides the turn: at least so many steps per revolution, per window and in all, s."""
         if settings.timestep is not None:
             return settings.timestep * settings.timestep_scale
         duration = self.time(self.stop)

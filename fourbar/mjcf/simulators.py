@@ -34,7 +34,7 @@ SIMULATORS = {
 
 
 def mjcf_for(scene: Scene, simulator: str = "mujoco") -> str:
-    """The MJCF text of a scene for one simulator, its comment naming where torque and pin force are read.
+    """Write the MJCF text of a scene for one simulator, its comment naming where torque and pin force are read.
 
     Raises
     ------

@@ -4,14 +4,14 @@ import json
 import math
 
 from fourbar.linkage import BAR_NAMES, FIRST_PIN, MOVING_BARS
+from fourbar.mjcf.assembly import PARENT, assemble
 from fourbar.mjcf.document import Start, plain
 from fourbar.mjcf.notes import NOTES
-from fourbar.mjcf.standing import PARENT, standing
 from fourbar.scene import Scene
 
 
 def usd(scene: Scene, start: Start | None = None) -> str:
-    """The USD text (.usda) of a scene: three rigid bodies, four revolute joints, the fourth closing the loop.
+    """Write the USD text (.usda) of a scene: three rigid bodies, four revolute joints, the fourth closing the loop.
 
     Parameters
     ----------
@@ -26,7 +26,7 @@ def usd(scene: Scene, start: Start | None = None) -> str:
     Source: openusd.org, UsdPhysics.
     """
     linkage = scene.linkage
-    turn, foot, numbers, inertia, (x, y), _ = standing(scene, start, "USD", {})
+    turn, foot, numbers, inertia, (x, y), _ = assemble(scene, start, "USD", {})
     pull = math.hypot(x, y)
     bodies = []
     for number in MOVING_BARS:

@@ -80,7 +80,7 @@ class Command(NamedTuple):
 
 
 def command(scene: Scene) -> Command:
-    """The positions that the scene's motion names, each with its branch."""
+    """List the positions that the scene's motion names, each with its branch."""
     expect("scene", scene, Scene)
     motion, linkage = scene.motion, scene.linkage
     stated, remainder, time = motion.theta_2, None, None

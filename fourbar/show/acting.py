@@ -63,7 +63,7 @@ def acting(scene: Scene) -> list[Symbol]:
 
 
 def _effect(effect: Any) -> list[Symbol]:
-    """The symbols of one effect; of a kind that is not known here none."""
+    """List the symbols of one effect; none of a kind without one."""
     if effect.key in ROWS:
         entries = getattr(effect, ROWS[effect.key])
         return [Symbol(effect.key, effect.key.replace("_", " "), pin=entry[0]) for entry in entries]

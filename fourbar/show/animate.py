@@ -67,7 +67,7 @@ def write(
 def page(
     scene: Scene, pictures: Mapping[str, str | Path] | None = None, units: Conversion = SI, vectors: bool = False
 ) -> str:
-    """The page as text."""
+    """Write the page as text."""
     from fourbar import __version__
 
     assets = files("fourbar.show").joinpath("page")
@@ -86,7 +86,7 @@ def page(
 
 
 def _content_hash(text: str) -> str:
-    """The name by which the page's own security policy allows an inline script or style."""
+    """Hash an inline script or style: by this name the page's own security policy allows it."""
     return "sha256-" + base64.b64encode(hashlib.sha256(text.encode("utf-8")).digest()).decode("ascii")
 
 

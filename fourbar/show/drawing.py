@@ -19,7 +19,7 @@ MOST_POINTS = 120
 
 
 def drawing(scene: Scene, solution: Solution) -> str:
-    """The linkage at its best conditioned position; ink in the colour of the text around it.
+    """Draw the linkage at its best conditioned position; ink in the colour of the text around it.
 
     Raises NotAssembledError where it assembles nowhere.
     """
@@ -77,7 +77,7 @@ def _text(text: str, x: float, y: float, size: int, colour: str) -> str:
 
 
 def _pin(name: str, at: Point, centre: Point, *, supported: bool) -> str:
-    """A pin, and its name on the side away from the middle of the linkage."""
+    """Draw a pin, and its name on the side away from the middle of the linkage."""
     (x, y), (dx, dy) = at, (at[0] - centre[0], at[1] - centre[1])
     size = max(math.hypot(dx, dy), 1e-9)
     across, up = 15.0 * dx / size, 15.0 * dy / size

@@ -1,5 +1,4 @@
-"""What frame and pins bear over a motion, and what the drive has to deliver, for the choice of bearings and a motor;
-and the energy of a motion through time: what the bars carry, and the work that loads and effects did."""
+"""What frame and pins bear over a motion and what the drive delivers, to choose bearings and a motor; its energy."""
 
 from typing import Any, NamedTuple
 
@@ -140,7 +139,7 @@ def motor_duty(solution: Solution) -> MotorDuty | None:
 
 
 def _energy(solution: Solution, power: Array) -> tuple[float | None, float | None]:
-    """The positive and the negative part of the power, each over time."""
+    """Integrate the positive and the negative part of the power, each over time."""
     omega_2 = solution.omega_2
     if solution.time is not None:
         spans = np.diff(solution.time)
@@ -164,7 +163,7 @@ def _rms(values: Array) -> float:
 
 
 def motor_entry(solution: Solution, units: Conversion) -> dict[str, Any] | None:
-    """The duty and the loads of the pins as the JSON has them, in the units of the output."""
+    """Write the duty and the loads of the pins as the JSON has them, in the units of the output."""
     duty = motor_duty(solution)
     if duty is None:
         return None

@@ -15,7 +15,7 @@ SCHEMA = "fourbar-extremes/1"
 
 
 def heading(scene: Scene, found: Extremes) -> list[str]:
-    """The lines above the table."""
+    """Write the lines above the table."""
     parts = " and ".join(f"{math.degrees(low):.6g} to {math.degrees(high):.6g}" for low, high in found.parts)
     lines = [f"proven over theta_2 = {parts} deg, in {found.boxes} boxes of ball arithmetic"]
     if found.distance:

@@ -32,7 +32,7 @@ class Influence(NamedTuple):
 
 
 def step_of(found: Sensitivity, key: str) -> float:
-    """The change of a number that the influences are for: 1 % of it, of an angle 1 deg."""
+    """Choose the change of a number that the influences are for: 1 % of it, of an angle 1 deg."""
     if found.keys[key].unit == "rad":
         return DEGREE
     return HUNDREDTH * abs(float(found.numbers[list(found.keys).index(key)]))
@@ -61,14 +61,14 @@ def influences(found: Sensitivity, quantity: str) -> list[Influence]:
 
 
 def largest_value(found: Sensitivity, quantity: str) -> float:
-    """The largest magnitude of a quantity over the positions that have one; NaN where none has."""
+    """Find the largest magnitude of a quantity over the positions that have one; NaN where none has."""
     value = found.value(quantity)
     size = np.abs(value) if value.ndim == 1 else np.hypot(*value.T)
     return float(np.nanmax(size)) if np.isfinite(size).any() else math.nan
 
 
 def heading(found: Sensitivity) -> list[str]:
-    """The lines above the table."""
+    """Write the lines above the table."""
     lines = [
         "largest change over the positions by 1 % of a number, of an angle by 1 deg; pin forces by their magnitude",
     ]
@@ -87,7 +87,7 @@ def heading(found: Sensitivity) -> list[str]:
 
 
 def table(found: Sensitivity) -> "Table":
-    """A row for each number that matters, those first that change any quantity most against its largest value."""
+    """List a row for each number that matters, those first that change any quantity most against its largest value."""
     names = shown_quantities(found)
     by = {name: {row.key: row.change for row in influences(found, name)} for name in names}
     rows = [["largest value", *(f"{largest_value(found, name):.4g}" for name in names)]]
@@ -96,7 +96,7 @@ def table(found: Sensitivity) -> "Table":
 
 
 def ranked(found: Sensitivity, names: list[str]) -> list[str]:
-    """The numbers that any of the quantities depends on, by their largest share of a largest value."""
+    """Rank the numbers that any of the quantities depends on, by their largest share of a largest value."""
     share: dict[str, float] = {}
     for name in names:
         size = largest_value(found, name)

@@ -16,7 +16,7 @@ SHOWN = 5
 
 
 def scene_html(scene: "Scene", units: Conversion = SI) -> str:
-    """The linkage drawn, next to what the scene states."""
+    """Draw the linkage, next to what the scene states."""
     from fourbar.show.drawing import drawing
     from fourbar.solve import solve
 
@@ -58,7 +58,7 @@ def _facts(scene: "Scene", units: Conversion) -> list[tuple[str, str]]:
 
 
 def solution_html(solution: Solution, units: Conversion = DEGREES) -> str:
-    """The first and last positions as a table; angles in degrees by default."""
+    """Show the first and last positions as a table; angles in degrees by default."""
     from fourbar.show.tables import columns
 
     if solution.theta_2.ndim == 2:
@@ -100,7 +100,7 @@ class InUnits:
 
 
 def in_units(shown: "Scene | Solution", units: str) -> InUnits:
-    """A scene or a solution as a notebook shows it, in "imperial" or a list of units like "mm N.mm".
+    """Show a scene or a solution of a notebook in "imperial" or a list of units like "mm N.mm".
 
     Raises InputError for what is no such list.
     """

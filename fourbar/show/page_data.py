@@ -76,7 +76,7 @@ def _symbol(symbol: Symbol, theta_2: list[float]) -> dict[str, Any]:
 
 
 def _scene_file(scene: Scene) -> str | None:
-    """The scene as its file, to be downloaded; None where a file has no form of what acts."""
+    """Write the scene as its file, to be downloaded; None where a file has no form of what acts."""
     try:
         return dump(scene)
     except InputError:
@@ -105,7 +105,7 @@ def _sweep(scene: Scene) -> dict[str, Any]:
 
 
 def _through_time(scene: Scene) -> dict[str, Any]:
-    """The one motion that the scene makes: released, or by a law."""
+    """Collect the one motion that the scene makes: released, or by a law."""
     whole = solve(scene)
     assert whole.time is not None and whole.omega_2 is not None and whole.alpha_2 is not None
     where = thinned(Command(whole.theta_2, whole.branch, whole.omega_2, whole.alpha_2, time=whole.time))
@@ -153,7 +153,7 @@ def _rate(duration: float) -> float:
 
 
 def _pace_in_time(whole: Solution, rate: float, shown: int) -> str:
-    """What speed 1 means, when the linkage stops before its time, and whether instants were left out."""
+    """Say what speed 1 means, when the linkage stops before its time, and whether instants were left out."""
     words = "At speed 1× it moves in real time"
     if rate < 1.0:
         words = f"At speed 1× it moves {1.0 / rate:.0f} times slower than it really does"
@@ -184,7 +184,7 @@ def _columns(solution: Solution) -> dict[str, Any]:
 
 
 def _pictures(scene: Scene, pictures: Mapping[str, str | Path]) -> dict[int, str]:
-    """The pictures of the bars as data URIs: those of the scene, and those given in their place."""
+    """Encode the pictures of the bars as data URIs: those of the scene, and those given in their place."""
     found = {}
     for name, path in pictures.items():
         if name not in BARS:

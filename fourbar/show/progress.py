@@ -8,7 +8,7 @@ T = TypeVar("T")
 
 
 def counted(items: Sequence[T], text: str) -> Iterable[T]:
-    """The items, with a bar on standard error that says how many are done; nothing where that is no terminal."""
+    """Pass the items on, with a bar on standard error that says how many are done; no bar where that is no terminal."""
     from rich.console import Console
     from rich.progress import track
 
@@ -18,7 +18,7 @@ def counted(items: Sequence[T], text: str) -> Iterable[T]:
 
 @contextmanager
 def running(text: str) -> Iterator[Callable[[float], None] | None]:
-    """A line that moves on standard error while the body runs; nothing where that is no terminal.
+    """Move a line on standard error while the body runs; nothing where that is no terminal.
 
     Yields what the body may report the share that is done to; None where there is no terminal.
     """

@@ -33,7 +33,7 @@ STEPS = (1, 2, 5, 10, 15, 20, 30, 45, 60, 90)
 def under_heading(
     title: str, lines: list[str], shown: "Table", after: Sequence[str] = (), width: int | None = None
 ) -> str:
-    """A table with its title and what stands above it and below, as text; `width` is that of a terminal."""
+    """Write a table with its title and what stands above it and below, as text; `width` is that of a terminal."""
     from rich.console import Console
     from rich.text import Text
 
@@ -45,7 +45,7 @@ def under_heading(
 
 
 def plain_table(heads: Iterable[str], rows: Iterable[Iterable[str]], left: Iterable[str] = (), gap: int = 1) -> "Table":
-    """A table whose columns stand to the right, but for those headed by one of `left`."""
+    """Make a table whose columns stand to the right, but for those headed by one of `left`."""
     from rich import box
     from rich.table import Table
     from rich.text import Text
@@ -61,7 +61,7 @@ def plain_table(heads: Iterable[str], rows: Iterable[Iterable[str]], left: Itera
 def printed(
     scene: Scene, solution: Solution, width: int | None, units: Conversion = DEGREES, *, every: int | None = None
 ) -> str:
-    """The summary and the table as text.
+    """Write the summary and the table as text.
 
     Parameters
     ----------
@@ -96,7 +96,7 @@ def _ordinal(number: int) -> str:
 
 
 def heading(scene: Scene, solution: Solution, units: Conversion = DEGREES) -> list[str]:
-    """The lines above the table: what was requested, and how many of the positions have an answer."""
+    """Write the lines above the table: what was requested, and how many of the positions have an answer."""
     lengths = zip(BAR_NAMES.values(), scene.linkage.lengths, strict=True)
     drive = f"drive on bar {scene.drive_bar} ({BAR_NAMES[scene.drive_bar]})"
     if scene.motion.free is not None:
@@ -133,7 +133,7 @@ def heading(scene: Scene, solution: Solution, units: Conversion = DEGREES) -> li
 
 
 def _motor(solution: Solution, units: Conversion) -> list[str]:
-    """What the drive delivers, for the choice of a motor."""
+    """Write what the drive delivers, for the choice of a motor."""
     duty = motor_duty(solution)
     if duty is None or len(solution) == 1:
         return []
@@ -157,7 +157,7 @@ def _acting(scene: Scene) -> bool:
 
 
 def value(number: float, unit: str, units: Conversion) -> str:
-    """A number of an SI unit with six digits and the unit it is shown in."""
+    """Write a number of an SI unit with six digits and the unit it is shown in."""
     name, factor = unit_in(unit, units)
     return f"{number * factor:.6g} {name}"
 
@@ -188,7 +188,7 @@ FEW_DIGITS = 1e-8
 
 
 def columns(solution: Solution, units: Conversion = DEGREES) -> dict[str, list[str]]:
-    """The columns of the table, most wanted first: heading with unit -> cells."""
+    """List the columns of the table, most wanted first: heading with unit -> cells."""
     shown: dict[str, list[str]] = {}
 
     def add(name: str, unit: str, values: Array) -> None:
@@ -221,7 +221,7 @@ def columns(solution: Solution, units: Conversion = DEGREES) -> dict[str, list[s
 def table(
     solution: Solution, width: int | None, units: Conversion = DEGREES, *, every: int = 1
 ) -> "tuple[Table, list[str]]":
-    """The table for a terminal of the given width (None: as wide as it needs), and the columns left out of it.
+    """Make the table for a terminal of the given width (None: as wide as it needs), and name the columns left out.
 
     Every so many positions are shown, the last one always.
     """

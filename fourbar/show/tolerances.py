@@ -35,7 +35,7 @@ def part_unit(part: str) -> str:
 
 
 def heading(found: Tolerances) -> list[str]:
-    """The lines above the table."""
+    """Write the lines above the table."""
     lines = [
         *counted(found),
         "each quantity where its first-order worst case is largest; sigma is the standard",
@@ -48,7 +48,7 @@ def heading(found: Tolerances) -> list[str]:
 
 
 def counted(found: Tolerances) -> list[str]:
-    """What was tried, what of it has no answer, and where first order and samples part."""
+    """Say what was tried, what of it has no answer, and where first order and samples part."""
     n = len(found.theta_2)
     count = f"{len(found.scene.tolerances)} tolerance" + ("s" if len(found.scene.tolerances) > 1 else "")
     lines = [f"{count}, {found.samples} samples (seed {found.seed}), {n} positions"]
@@ -65,7 +65,7 @@ def _share(count: int, found: Tolerances) -> str:
 
 
 def parted(found: Tolerances, part: str) -> str:
-    """The word where first order and samples part; empty where they do not."""
+    """Return the word where first order and samples part; empty where they do not."""
     spread = found.spreads[part]
     where = np.flatnonzero(spread.parted)
     if not where.size:
@@ -99,7 +99,7 @@ def table(found: Tolerances) -> "Table":
 
 
 def _most(found: Tolerances, spread: Spread, at: int) -> str:
-    """The two tolerances with the largest shares of the variance."""
+    """Name the two tolerances with the largest shares of the variance."""
     shares, total = spread.shares[:, at], float(spread.shares[:, at].sum())
     if not total > 0.0:
         return ""
@@ -108,7 +108,7 @@ def _most(found: Tolerances, spread: Spread, at: int) -> str:
 
 
 def embedded_tolerances(scene: Scene, theta_2: list[float]) -> dict[str, Any]:
-    """What a page shows of them at its positions: deviations from the nominal, and shares of the variance.
+    """Collect what a page shows of them at its positions: deviations from the nominal, and shares of the variance.
 
     A scene that has none of this (a free motion, SciPy not installed) gives the sentence that says so.
     """

@@ -18,7 +18,7 @@ DERIVED = {
 
 
 def units(text: str) -> Conversion:
-    """The units of a list, or of "SI" or "imperial" (in, lbf, lbf in, lb, deg, rpm).
+    """Read the units of a list, or of "SI" or "imperial" (in, lbf, lbf in, lb, deg, rpm).
 
     A product is joined by dots ("N.mm"). What the list leaves out stays SI, but for speeds and accelerations of
     points, which follow the length, and energy and power, which follow the torque.

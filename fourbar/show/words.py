@@ -15,7 +15,7 @@ BRANCHES = {**BRANCH_NAMES, 0: "both"}
 
 
 def type_lines(linkage: FourBar) -> Iterator[str]:
-    """The type of a linkage, the condition that decides it, what turns, and `mobility_lines`."""
+    """Write the type of a linkage, the condition that decides it, what turns, and `mobility_lines`."""
     found = classify(linkage)
     relation = "<" if found.surplus > 0.0 else ">" if found.surplus < 0.0 else "="
     outer = min(linkage.lengths) + max(linkage.lengths)
@@ -27,7 +27,7 @@ def type_lines(linkage: FourBar) -> Iterator[str]:
 
 
 def type_json(linkage: FourBar) -> str:
-    """The same as one object: SI and radians, null where there is nothing; positions as `LimitPosition` has them."""
+    """Write the type as JSON: SI and radians, null where there is nothing; positions as `LimitPosition` has them."""
     found = classify(linkage)
     document: dict[str, object] = {
         "schema": "fourbar-classify/1",

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from fourbar.effects import Gravity, PinFriction
 from fourbar.effects.actions import Actions
-from fourbar.effects.cones import settle
-from fourbar.effects.pin_friction import Settled
+from fourbar.effects.cones import solve_sliding
+from fourbar.effects.effect import SolvedFriction
 from fourbar.errors import InputError, expect
 from fourbar.evaluation.case import Case
 from fourbar.evaluation.stages import kinematics
@@ -24,7 +24,7 @@ from fourbar.scene.motion import FromLimit
 from fourbar.scene.point import OF_POINTS
 from fourbar.solution import Array, Solution, values_of
 from fourbar.solve import solve
-from fourbar.studies.keys import THETA_2, Entry, at_place, entries, placed
+from fourbar.studies.keys import THETA_2, SceneNumber, at_place, entries, placed
 from fourbar.studies.sloped import Sloped, slopes, values
 
 AT_ONCE = 512
@@ -40,7 +40,7 @@ class Sensitivity:
     scene: Scene
     solution: Solution
     """The quantities themselves."""
-    keys: dict[str, Entry]
+    keys: dict[str, SceneNumber]
     """The p numbers by which they are derived, as in the scene file, pairs and lists by index."""
     numbers: Array
     """Their values, (p,); of motion.theta_2 and of what a motion law varies NaN."""
@@ -62,7 +62,7 @@ class Sensitivity:
         return found
 
     def value(self, quantity: str) -> Array:
-        """The quantity itself, (n,) or (n, 2); InputError as `of`."""
+        """Return the quantity itself, (n,) or (n, 2); InputError as `of`."""
         if not isinstance(quantity, str) or quantity not in self.by:
             raise InputError("sensitivity", quantity, "is not known here; known: " + ", ".join(self.by))
         found: Array = values_of(self.solution, quantity)
@@ -70,7 +70,7 @@ class Sensitivity:
 
 
 def sensitivity(scene: Scene) -> Sensitivity:
-    """The derivatives of every quantity at each position of a scene by each of its numbers.
+    """Differentiate every quantity at each position of a scene by each of its numbers.
 
     d(quantity)/d(key), the other numbers held; what the scene leaves out (the inertia of a uniform bar, its centre
     at mid-bar) follows the length. theta_2 is held too, and "motion.theta_2" is the derivative by it.
@@ -91,7 +91,9 @@ def sensitivity(scene: Scene) -> Sensitivity:
         raise InputError(THETA_2, scene.motion.theta_2, "has no sensitivities: the limit moves with the lengths")
     at, solution, known = command(scene), solve(scene), entries(scene)
     moving = at.omega_2 is not None
-    keys = {THETA_2: Entry((), "rad")} | (known if moving else {k: e for k, e in known.items() if _of_position(k)})
+    keys = {THETA_2: SceneNumber((), "rad")} | (
+        known if moving else {k: e for k, e in known.items() if _of_position(k)}
+    )
     numbers = [np.nan if key == THETA_2 else at_place(scene, entry.place) for key, entry in keys.items()]
     forces = FORCES if any(effect.loaded_pins for effect in scene.effects) else (*FORCES, "drive_condition")
     names = [
@@ -135,7 +137,7 @@ class _Directed(Gravity):
 
     @property
     def field(self) -> Any:
-        """g e^{i angle}."""
+        """Compute g e^{i angle}."""
         return polar(self.magnitude, self.angle)
 
 
@@ -144,13 +146,9 @@ class _Sliding(PinFriction):
 
     __slots__ = ()
 
-    def settle(self, actions: Actions, pins: Any, eliminate: Any, by_couples: Any) -> Settled:
+    def solve_friction(self, actions: Actions, pins: Any, eliminate: Any) -> SolvedFriction:
         names, arms = self.loaded_pins, {pin: mu * r for pin, mu, r in self.pins}
-        senses, per_unit = {pin: actions.sense(pin) for pin in names}, {}
-        for turned in names:
-            alone = Actions(actions.state, actions.bodies)
-            alone.couple(turned, -senses[turned])
-            per_unit[turned] = by_couples(alone)
+        senses, per_unit = {pin: actions.sense(pin) for pin in names}, self.per_unit(actions, eliminate)
         force = [getattr(pins, PIN_FORCE[pin]) for pin in names]
         by = [[getattr(per_unit[q], PIN_FORCE[pin]) for q in names] for pin in names]
         shape = values(pins.F12).shape
@@ -161,7 +159,7 @@ class _Sliding(PinFriction):
 
         C = np.stack([np.stack([plain(c) for c in row], axis=1) for row in by], axis=1)
         k = np.stack([plain(arms[pin]) for pin in names], axis=1)
-        found = settle(np.stack([plain(f) for f in force], axis=1), C, k)
+        found = solve_sliding(np.stack([plain(f) for f in force], axis=1), C, k)
         x = found.x
         gaps, J = [], np.empty((len(x), len(names), len(names)))
         for row, pin in enumerate(names):
@@ -180,12 +178,11 @@ class _Sliding(PinFriction):
         dx[:, :, solvable] = np.moveaxis(np.linalg.solve(matrix, np.moveaxis(rows[:, :, solvable], -1, 0)), 0, -1)
         for row, pin in enumerate(names):
             actions.couple(pin, -senses[pin] * Sloped(x[:, row], dx[row]))
-        none: Any = None
-        return Settled(eliminate(actions), none, none, none)
+        return SolvedFriction(eliminate(actions))
 
 
 def differentiable(scene: Scene) -> Scene:
-    """The scene with effects that say their derivatives too."""
+    """Replace the scene's effects by some that compute their derivatives too."""
     twins: dict[Any, Any] = {
         Gravity: lambda own: _Directed(own.magnitude, own.angle),
         PinFriction: lambda own: _Sliding(own.pins),
@@ -193,8 +190,8 @@ def differentiable(scene: Scene) -> Scene:
     return replace(scene, effects=tuple(twins.get(type(own), lambda own: own)(own) for own in scene.effects))
 
 
-def _seeded(scene: Scene, keys: dict[str, Entry]) -> Scene:
-    """The scene with every number carrying its own unit slope; what it leaves out carries that of its length too."""
+def _seeded(scene: Scene, keys: dict[str, SceneNumber]) -> Scene:
+    """Give every number of the scene its own unit slope; what it leaves out carries that of its length too."""
     scene = differentiable(scene)
     for index, (key, entry) in enumerate(keys.items()):
         if not key.startswith("motion."):
@@ -208,9 +205,9 @@ def unit_slope(index: int, count: int) -> Sloped:
 
 
 def _derivatives(
-    scene: Scene, keys: dict[str, Entry], at: Command, index: NDArray[np.intp], names: KeysView[str], moving: bool
+    scene: Scene, keys: dict[str, SceneNumber], at: Command, index: NDArray[np.intp], names: KeysView[str], moving: bool
 ) -> tuple[dict[str, Any], NDArray[np.bool_]]:
-    """The quantities at some positions, with their slopes; and where dry friction holds a pin at rest."""
+    """Compute the quantities at some positions, with their slopes; and where dry friction holds a pin at rest."""
     place = {key: number for number, key in enumerate(keys)}
 
     def seeded(key: str, number: Any) -> Any:
@@ -238,7 +235,7 @@ def _derivatives(
 
 
 def _position(path: Path, theta_2: Any, branch: Array) -> Position:
-    """The positions, whose directions have the slopes of sines and cosines.
+    """Compute the positions, whose directions have the slopes of sines and cosines.
 
     Those of the tangent of a half angle, which has no bound, lose every digit half a turn from where it is zero.
     """

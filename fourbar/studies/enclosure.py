@@ -71,8 +71,10 @@ class Extremes(NamedTuple):
     """Of the linkage without its tolerances, where it has any."""
 
     def over_estimate(self, name: str, sign: int) -> float | None:
-        """With tolerances: how far the proven greatest (+1) or least (-1) lies from the nominal one, over how far a
-        linkage was found to go, >= 1; None without tolerances, or where none was found to go further."""
+        """Compare how far the proven greatest (+1) or least (-1) lies from the nominal with the farthest linkage found.
+
+        A ratio >= 1; None without tolerances, or where no linkage goes further than the nominal one.
+        """
         if self.nominal is None:
             return None
         own, before = ((x.greatest if sign > 0 else x.least)[name] for x in (self, self.nominal))
@@ -145,7 +147,7 @@ class _Search:
         self.at_start: tuple[dict[str, Sloped], dict[str, Sloped]] | None = None
 
     def number(self, key: str, value: float, moved: Any) -> Sloped:
-        """A number of the scene at all boxes: as a ball over its tolerance, or moved by a part of that."""
+        """Return a number of the scene at all boxes: as a ball over its tolerance, or moved by a part of that."""
         slopes, own = np.zeros((1 + len(self.keys), 1), dtype=object), self.arb(value)
         if key not in self.reach:
             return Sloped(np.array([own], dtype=object), slopes)
@@ -156,7 +158,7 @@ class _Search:
         return Sloped(np.array([own + float(part) * self.reach[key] for part in moved[row - 1]], dtype=object), slopes)
 
     def evaluate(self, theta_2: Balls, moved: Any) -> dict[str, Sloped]:
-        """The quantities, the pin forces and the sine of the transmission angle squared, with their slopes.
+        """Compute the quantities, the pin forces and the sine of the transmission angle squared, with their slopes.
 
         Parameters
         ----------
@@ -194,7 +196,7 @@ class _Search:
         return {"torque": found.torque, **forces, "sine": at.sin_mu * at.sin_mu, "cosine": cosine * cosine}
 
     def over(self, boxes: NDArray[np.float64]) -> tuple[dict[str, Sloped], dict[str, Sloped]]:
-        """The quantities over the boxes and all tolerances, and at the centres without any."""
+        """Evaluate the quantities over the boxes and all tolerances, and at the centres without any."""
         if boxes is self.start and self.at_start is not None:  # every search begins with them
             return self.at_start
         centre, radius = _centred(boxes)
@@ -206,7 +208,7 @@ class _Search:
         return found
 
     def extreme(self, name: str, sign: int) -> Extreme:
-        """The greatest (+1) or least (-1) value, enclosed and rounded outwards."""
+        """Find the greatest (+1) or least (-1) value, enclosed and rounded outwards."""
         arb, of = self.arb, "sine" if name == "transmission" else name
         if of == "sine" and _lowest(sign, self.over(self.start)[1][of]).max() * sign > 0.5:
             of, sign = "cosine", -sign  # near a right angle it has the digits
@@ -220,7 +222,7 @@ class _Search:
         return Extreme(_below(low), _above(high), where)
 
     def enclosed(self, name: str, sign: int) -> tuple[Any, Any, float]:
-        """The greatest (+1) or least (-1) value of what is evaluated between two numbers, and where."""
+        """Enclose the greatest (+1) or least (-1) value of what is evaluated between two numbers, and where it is."""
         finest = FINEST_OF_MANY if self.keys else FINEST
         boxes = self.start
         # all numbers below are relative to the largest value at the start: no square leaves the range of doubles
@@ -267,19 +269,19 @@ class _Search:
 
 
 def _lowest(scale: Any, of: Sloped) -> NDArray[np.float64]:
-    """What the values, scaled, certainly reach; -inf where that is not known."""
+    """Bound the values, scaled, from below; -inf where no bound is certain."""
     found = np.array([_below(scale * value) for value in of.values])
     return np.where(np.isfinite(found), found, -math.inf)
 
 
 def _below(ball: Any) -> float:
-    """The least that a ball holds, rounded outwards."""
+    """Return the least that a ball holds, rounded outwards."""
     low = float(ball.lower())
     return math.nextafter(low, -math.inf) if type(ball)(low) > ball.lower() else low
 
 
 def _above(ball: Any) -> float:
-    """The greatest."""
+    """Return the greatest."""
     return -_below(-ball)
 
 

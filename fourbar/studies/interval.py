@@ -41,7 +41,7 @@ def require(scene: Scene) -> None:
 
 
 def interval(scene: Scene) -> tuple[tuple[tuple[float, float], ...], float]:
-    """The input's whole interval without what lies within DISTANCE of its limits and of poles of the torque."""
+    """Return the input's full interval without what lies within DISTANCE of its limits and of poles of the torque."""
     linkage, first = scene.linkage, float(command(scene).theta_2[0])
     psi = first - linkage.ground_angle
     if abs(psi) > TURN:

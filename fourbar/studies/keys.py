@@ -25,7 +25,7 @@ Place = tuple[str | int, ...]
 """Attributes and indices that lead from a scene to one of its numbers."""
 
 
-class Entry(NamedTuple):
+class SceneNumber(NamedTuple):
     """One number of a scene."""
 
     place: Place
@@ -38,54 +38,54 @@ class Entry(NamedTuple):
         return np.isfinite(values) & low
 
 
-def _pair(key: str, place: Place, unit: str, names: tuple[str | int, str | int] = (0, 1)) -> dict[str, Entry]:
-    """The two entries of a magnitude with its angle."""
+def _pair(key: str, place: Place, unit: str, names: tuple[str | int, str | int] = (0, 1)) -> dict[str, SceneNumber]:
+    """Make the two entries of a magnitude with its angle."""
     one, other = ((*place, name) for name in names)
-    return {f"{key}.0": Entry(one, unit), f"{key}.1": Entry(other, "rad")}
+    return {f"{key}.0": SceneNumber(one, unit), f"{key}.1": SceneNumber(other, "rad")}
 
 
-def _of_effect(effect: Any, key: str, place: Place) -> dict[str, Entry]:
-    """The entries of an effect under its key, at its place."""
+def _of_effect(effect: Any, key: str, place: Place) -> dict[str, SceneNumber]:
+    """List the entries of an effect under its key, at its place."""
     numbers = OF_EFFECT.get(effect.key, {})
     if effect.key == "gravity":
         return _pair(key, place, numbers["magnitude"][0], ("magnitude", "angle"))
     if effect.key in ROWS:
         field = ROWS[effect.key]
         return {
-            f"{key}.{row[0]}.{name}".removesuffix("."): Entry((*place, field, index, column), *of)
+            f"{key}.{row[0]}.{name}".removesuffix("."): SceneNumber((*place, field, index, column), *of)
             for index, row in enumerate(getattr(effect, field))
             for column, (name, of) in enumerate(numbers.items(), 1)
         }
     if effect.key != "springs":
-        return {f"{key}.{name}": Entry((*place, name), *of) for name, of in numbers.items()}
-    found = dict[str, Entry]()
+        return {f"{key}.{name}": SceneNumber((*place, name), *of) for name, of in numbers.items()}
+    found = dict[str, SceneNumber]()
     for index in range(len(effect.springs)):
         spring, own = f"{key}.{index}", (*place, "springs", index)
-        found |= {f"{spring}.{name}": Entry((*own, name), *of) for name, of in numbers.items()}
+        found |= {f"{spring}.{name}": SceneNumber((*own, name), *of) for name, of in numbers.items()}
         for name, end in (("from", "start"), ("to", "end")):
             found |= _pair(f"{spring}.{name}.at", (*own, end), "m", ("distance", "angle"))
     return found
 
 
-def entries(scene: Scene) -> dict[str, Entry]:
-    """The numbers of a scene that a study varies, lengths first, by key; motion.theta_2 is not among them."""
-    found = {"lengths.ground": Entry(("linkage", "ground"), "m", POSITIVE)}
+def entries(scene: Scene) -> dict[str, SceneNumber]:
+    """List the numbers of a scene that a study varies, lengths first, by key; motion.theta_2 is not among them."""
+    found = {"lengths.ground": SceneNumber(("linkage", "ground"), "m", POSITIVE)}
     bars = [BAR_NAMES[number] for number in MOVING_BARS]
-    found |= {f"lengths.{name}": Entry(("linkage", name, "length"), "m", POSITIVE) for name in bars}
-    found["lengths.ground_angle"] = Entry(("linkage", "ground_angle"), "rad")
+    found |= {f"lengths.{name}": SceneNumber(("linkage", name, "length"), "m", POSITIVE) for name in bars}
+    found["lengths.ground_angle"] = SceneNumber(("linkage", "ground_angle"), "rad")
     for name in bars:
         own: Place = ("linkage", name)
-        found[f"bars.{name}.mass"] = Entry((*own, "mass"), "kg", AT_LEAST_ZERO)
-        found[f"bars.{name}.inertia"] = Entry((*own, "inertia"), "kg m^2", AT_LEAST_ZERO)
+        found[f"bars.{name}.mass"] = SceneNumber((*own, "mass"), "kg", AT_LEAST_ZERO)
+        found[f"bars.{name}.inertia"] = SceneNumber((*own, "inertia"), "kg m^2", AT_LEAST_ZERO)
         found |= _pair(f"bars.{name}.centre", (*own, "centre"), "m")
     if scene.motion.law is None:
-        found["motion.omega_2"] = Entry(("motion", "omega_2"), "rad/s")
-        found["motion.alpha_2"] = Entry(("motion", "alpha_2"), "rad/s^2")
+        found["motion.omega_2"] = SceneNumber(("motion", "omega_2"), "rad/s")
+        found["motion.alpha_2"] = SceneNumber(("motion", "alpha_2"), "rad/s^2")
     for index, load in enumerate(scene.loads):
         if load.force is not None:
             found |= _pair(f"loads.{index}.force", ("loads", index, "force"), "N")
             found |= _pair(f"loads.{index}.at", ("loads", index, "at"), "m")
-        found[f"loads.{index}.moment"] = Entry(("loads", index, "moment"), "N m")
+        found[f"loads.{index}.moment"] = SceneNumber(("loads", index, "moment"), "N m")
     for index, point in enumerate(scene.points):
         found |= _pair(f"{point.key}.from_pin", ("points", index, "from_pin"), "m")
     for index, effect in enumerate(scene.effects):
@@ -94,7 +94,7 @@ def entries(scene: Scene) -> dict[str, Entry]:
 
 
 def refusal(key: str, value: object, known: list[str]) -> InputError:
-    """The error for a key that a study cannot vary."""
+    """Make the error for a key that a study cannot vary."""
     expect("key", key, str)
     inner = [name for name in known if name.startswith(f"{key}.")]
     if inner:
@@ -105,7 +105,7 @@ def refusal(key: str, value: object, known: list[str]) -> InputError:
     return InputError(key, value, f'unknown key; did you mean "{close[0]}"?')
 
 
-class Bars(Bar):
+class ManyBars(Bar):
     """The same bar of many linkages: its numbers may be arrays."""
 
     __slots__ = ()
@@ -126,7 +126,7 @@ class Bars(Bar):
 LEFT_OUT = "is left out of the scene and follows the length; state it to give it a tolerance"
 
 
-def left_out(scene: Scene, entry: Entry) -> bool:
+def left_out(scene: Scene, entry: SceneNumber) -> bool:
     """Whether a number is one that the scene leaves to a uniform bar."""
     if entry.place[0] != "linkage" or len(entry.place) < 3:
         return False
@@ -135,7 +135,7 @@ def left_out(scene: Scene, entry: Entry) -> bool:
 
 
 def at_place(whole: Any, place: Place) -> Any:
-    """The number at a place; what a bar leaves out is that of a uniform one."""
+    """Read the number at a place; what a bar leaves out is that of a uniform one."""
     for name in place:
         if isinstance(name, int):
             whole = whole[name]
@@ -147,7 +147,7 @@ def at_place(whole: Any, place: Place) -> Any:
 
 
 def with_numbers(scene: Scene, numbers: Mapping[str, Any]) -> Scene:
-    """A copy with some of its numbers replaced, by key."""
+    """Copy the scene with some of its numbers replaced, by key."""
     known, changed = entries(scene), scene
     for key, number in numbers.items():
         changed = placed(changed, known[key].place, number)
@@ -155,7 +155,7 @@ def with_numbers(scene: Scene, numbers: Mapping[str, Any]) -> Scene:
 
 
 def placed(whole: Any, place: Place, values: Any) -> Any:
-    """A copy with one number replaced; what a constructor checks is not checked again."""
+    """Copy with one number replaced; what a constructor checks is not checked again."""
     if not place:
         return values
     name, *rest = place
@@ -168,7 +168,7 @@ def placed(whole: Any, place: Place, values: Any) -> Any:
     old = getattr(whole, name)
     if isinstance(whole, Bar) and name == "centre" and old is None:
         old = whole.mass_centre
-    new = object.__new__(Bars if isinstance(whole, Bar) else type(whole))
+    new = object.__new__(ManyBars if isinstance(whole, Bar) else type(whole))
     for field in fields(whole):
         value = placed(old, tuple(rest), values) if field.name == name else getattr(whole, field.name)
         object.__setattr__(new, field.name, value)

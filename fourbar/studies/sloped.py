@@ -159,7 +159,7 @@ def _by_name(function: Any, args: Sequence[Any], options: Any) -> Any:
 
 
 def _complex_ball(z: complex) -> Any:
-    """A complex constant for numbers that are balls, which know none of Python's."""
+    """Make a complex constant for numbers that are balls, which accept none of Python's."""
     from flint import acb
 
     return acb(z)
@@ -171,7 +171,7 @@ def values(number: Any) -> Any:
 
 
 def slopes(number: Any) -> Any:
-    """The derivatives; of a constant 0."""
+    """Return the derivatives; of a constant 0."""
     return number.slopes if isinstance(number, Sloped) else 0.0
 
 
@@ -186,7 +186,7 @@ conjugate = _by_entry(lambda z: z.conjugate() if hasattr(z, "conjugate") else z)
 
 
 def _union(x: Any, y: Any) -> Any:
-    """The least ball that holds two."""
+    """Return the least ball that holds two."""
     from flint import acb, arb
 
     kind: Any = acb if any(isinstance(z, (acb, complex)) for z in (x, y)) else arb

@@ -133,7 +133,7 @@ def tolerances(
 
 
 def _members(scene: Scene, samples: int, seed: int) -> Study:
-    """The linkages of the samples."""
+    """Make the linkages of the samples."""
     try:
         from scipy.stats import norm, qmc
     except ImportError:
@@ -171,7 +171,7 @@ def _piece(value: Any, index: NDArray[np.intp]) -> Any:
 
 
 def _parts(name: str, value: Any) -> dict[str, Array]:
-    """A quantity as scalars: components, and the magnitude of a pin force."""
+    """Split a quantity into scalars: components, and the magnitude of a pin force."""
     if is_scalar(name):
         return {name: value}
     found = {f"{name}_x": value[..., 0], f"{name}_y": value[..., 1]}
@@ -179,7 +179,7 @@ def _parts(name: str, value: Any) -> dict[str, Array]:
 
 
 def _of_first_order(found: Sensitivity, name: str, part: str) -> Spread:
-    """The nominal and the first-order figures of a part of a quantity; the samples' are still to come."""
+    """Compute the nominal and the first-order figures of a part of a quantity; the samples' are still to come."""
     value, scene = found.value(name), found.scene
     slopes = np.array([found.of(name, tolerance.key) for tolerance in scene.tolerances])
     if part.startswith("|"):
@@ -197,7 +197,7 @@ def _of_first_order(found: Sensitivity, name: str, part: str) -> Spread:
 
 
 def _fill(spread: Spread, columns: slice, sampled: Array) -> None:
-    """The samples' figures at some positions; where not all members have a value, those of the others."""
+    """Fill in the samples' figures at some positions; where not all members have a value, those of the others."""
     if np.isfinite(sampled).all():
         # of the differences: the sum of many equal numbers is rounded, and so would be their mean
         spread.deviation[columns] = (sampled - np.nan_to_num(spread.nominal[columns])).std(axis=0)

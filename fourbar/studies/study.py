@@ -47,7 +47,7 @@ class Study:
     def solved(
         self, stage: str | None, *, out: Mapping[str, Array] | None = None, side: int = 0, compiled: bool | None = None
     ) -> Solution:
-        """What `fourbar.solve` returns for a study: every quantity as (m, n) or (m, n, 2)."""
+        """Return what `fourbar.solve` does for a study: every quantity as (m, n) or (m, n, 2)."""
         at, shape = self.at, self.at.theta_2.shape
         wanted, names = requested(self.scene, shape, at.omega_2, stage, out)
         result = arrays(names, shape, out)
@@ -77,7 +77,7 @@ class Study:
         return solved(self.scene, at, code, result)
 
     def _command(self, rows: slice, columns: slice) -> Command:
-        """Some positions of some members, one after the other, (k,)."""
+        """List some positions of some members, one after the other, (k,)."""
         count = columns.stop - columns.start
 
         def flat(value: Any) -> Any:
@@ -88,14 +88,14 @@ class Study:
         return Command(*(flat(value) for value in self.at[:4]))
 
     def _members(self, rows: slice, count: int, scene: Scene) -> Scene:
-        """The scene of some members whose numbers are arrays, each repeated for `count` positions."""
+        """Make the scene of some members whose numbers are arrays, each repeated for `count` positions."""
         scene = with_numbers(scene, {key: _repeated(values[rows], count) for key, values in self.values.items()})
         for index, turns in _turns(scene.effects).items():
             scene = placed(scene, ("effects", index, "turns"), tuple(_repeated(turn, count) for turn in turns))
         return scene
 
     def _started(self, rows: slice) -> Scene:
-        """The scene with effects that know where the motion of each member begins: where it first assembles."""
+        """Make the scene with effects that begin where each member's motion does: where it first assembles."""
         if not self.scene.counts_turns:
             return self.scene
         count = rows.stop - rows.start
@@ -134,7 +134,7 @@ def _parts(size: int, most: int) -> Iterator[slice]:
 
 
 def vary(scene: Scene, values: Mapping[str, Any]) -> Study:
-    """m linkages from one scene, for `solve`: some of its numbers as arrays, one entry for each member.
+    """Make m linkages from one scene, for `solve`: some of its numbers as arrays, one entry for each member.
 
     Parameters
     ----------
@@ -187,7 +187,7 @@ def vary(scene: Scene, values: Mapping[str, Any]) -> Study:
 
 
 def _branches(scene: Scene, numbers: Mapping[str, Array], angles: Array, m: int) -> NDArray[np.int8]:
-    """The branch of each position, (m, n); only a member with a change point can follow a path through it."""
+    """Return the branch of each position, (m, n); only a member with a change point can follow a path through it."""
     motion, shape = scene.motion, (m, angles.shape[1])
     own = {key: array for key, array in numbers.items() if key in LENGTHS}
     if motion.through == "follow" and not own and len(angles) == 1:
@@ -204,7 +204,7 @@ def _branches(scene: Scene, numbers: Mapping[str, Array], angles: Array, m: int)
 
 
 def _numbers(key: str, value: Any, known: list[str]) -> Array:
-    """The array given for a key, (m,) or (1,); the angles as they are."""
+    """Return the array given for a key, (m,) or (1,); the angles as they are."""
     if key not in known:
         raise refusal(key, _shown(value), known)
     try:
@@ -221,7 +221,7 @@ def _numbers(key: str, value: Any, known: list[str]) -> Array:
 
 
 def _shown(value: Any) -> object:
-    """A value as far as one line shows it."""
+    """Shorten a value to what one line shows."""
     return f"{type(value).__name__} of shape {value.shape}" if isinstance(value, np.ndarray) else value
 
 

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 import fourbar
 from fourbar.cli import status
-from fourbar.effects import Friction, Gravity, Load, PinFriction, Point, Spring, Springs, Torsion, Viscous
+from fourbar.effects import Friction, Gravity, Load, PinFriction, Spring, SpringEnd, Springs, Torsion, Viscous
 from fourbar.errors import HOLDS, InputError
 from fourbar.linkage import MOVING_BARS, PINS
 from fourbar.quantities import JAMMED, OK, STAGE_OF, STAGES
@@ -78,7 +78,7 @@ def scenes(draw: st.DrawFn) -> Scene:
     """Every drive bar, every effect, magnitudes from the least double to the greatest."""
     linkage = draw(linkages())
     loads = draw(st.lists(st.builds(Load, st.sampled_from(MOVING_BARS), pairs, pairs, numbers), max_size=2))
-    ends = [st.builds(Point, st.just(bar), numbers, angles) for bar in draw(st.permutations([1, *MOVING_BARS]))[:2]]
+    ends = [st.builds(SpringEnd, st.just(bar), numbers, angles) for bar in draw(st.permutations([1, *MOVING_BARS]))[:2]]
     possible = [
         st.builds(Gravity, numbers, angles),
         per_pin.map(lambda pins: Viscous.at(**pins)),
@@ -153,7 +153,7 @@ def test_beyond_the_range_of_doubles_the_status_says_so_from_that_stage_on() -> 
 
 def test_where_it_depends_on_the_position_only_those_positions_are_lost() -> None:
     """The force of a spring of 1e308 N/m, 0.8 m long, at a distance that grows with theta_2."""
-    spring = Spring(Point(1, 3.0, 0.0), Point(2, 1.0, 0.0), 1e308, 0.0)
+    spring = Spring(SpringEnd(1, 3.0, 0.0), SpringEnd(2, 1.0, 0.0), 1e308, 0.0)
     solution = solved(
         Scene(heavy(1.0), Motion(np.array([0.1, 1.0, 3.0]), 1.0), 4, effects=(Springs((spring,)),)), "force"
     )

@@ -33,7 +33,7 @@ from fourbar_validation.engines.mujoco.closed_loop import ClosedLoop
 from fourbar_validation.engines.mujoco.inverse import MujocoTree
 from fourbar_validation.scenes.hard_families import loads, sweep_of
 from fourbar_validation.scenes.hard_linkages import at, dressed, linkage_of, with_bars
-from fourbar_validation.scenes.random import LinkageType
+from fourbar_validation.scenes.random import DrawnType
 
 
 class Measured(NamedTuple):
@@ -52,7 +52,7 @@ def _simulated(scene: Scene) -> Answer:
 
 def _near_toggle(sine: float) -> bool:
     """Whether a sweep that ends where |sin mu| has this value is followed without an alarm."""
-    d, a, b, c = linkage_of(LinkageType.TRIPLE_ROCKER, 1)
+    d, a, b, c = linkage_of(DrawnType.TRIPLE_ROCKER, 1)
     cosine = -math.sqrt(1.0 - sine * sine)
     squared = b * b + c * c - 2.0 * b * c * cosine
     psi = math.acos((d * d + a * a - squared) / (2.0 * d * a))

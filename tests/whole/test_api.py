@@ -16,7 +16,7 @@ import pytest
 
 import fourbar
 from fourbar.cli import status
-from fourbar.effects import Point, Table
+from fourbar.effects import SpringEnd, Table
 from fourbar.files import save
 from tests.support.scenes import crank_rocker
 
@@ -57,7 +57,7 @@ def calls() -> dict[str, tuple[Callable[..., object], tuple[Any, ...]]]:
     link = fourbar.uniform(0.3, 0.1, 0.25, 0.22)
     scene, rows = fourbar.Scene(link, fourbar.Motion(1.0, 10.0)), (("O2", 0.1), ("B", 0.2))
     solution, study = fourbar.solve(scene), fourbar.vary(scene, {"lengths.input": [0.1, 0.11]})
-    out, at, ends = {"torque": np.empty(1)}, fourbar.command(scene), (Point(2, 0.1, 0.2), Point(4, 0.1, 0.2))
+    out, at, ends = {"torque": np.empty(1)}, fourbar.command(scene), (SpringEnd(2, 0.1, 0.2), SpringEnd(4, 0.1, 0.2))
     times, angles = (0.0, 1.0, 2.0, 3.0), (0.0, 0.1, 0.2, 0.1)
 
     def moving(motion: fourbar.Motion) -> object:

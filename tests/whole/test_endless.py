@@ -26,7 +26,7 @@ READING = [
     ["validation", "check", "ENDLESS", "ENDLESS"],
     ["validation", "check", SCENE, "ENDLESS"],
     ["validation", "run", "ENDLESS", "--out", "OUT"],
-    ["validation", "run", SCENE, "--mjcf", "ENDLESS", "--out", "OUT"],
+    ["validation", "check-mjcf", SCENE, "ENDLESS", "--out", "OUT"],
     ["validation", "run", SCENE, "--against", "ENDLESS", "--out", "OUT"],
     ["validation", "run", SCENE, "--python", "ENDLESS", "--out", "OUT"],
     ["validation", "run", "--suite", "ENDLESS", "--out", "OUT"],

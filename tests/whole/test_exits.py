@@ -18,7 +18,7 @@ from fourbar.writing import write_text
 from fourbar_validation.compare.rows import AGREES, FAILS, Row, write_results
 from fourbar_validation.lab.stress.bench import Measured
 from fourbar_validation.lab.stress.forward_error.stability import Tally
-from fourbar_validation.published.figures import Figure
+from fourbar_validation.published.figures import PublishedFigure
 from tests.support.alone import alone
 from tests.support.here import judge_here
 from tests.support.scenes import crank_rocker
@@ -169,15 +169,15 @@ STATUSES: list[tuple[Callable[[list[str]], int], str, int]] = [
     (VALIDATION, "check scene.toml no-such-file", BAD_INPUT),
     (VALIDATION, "run scene.toml --engines free-body --no-pictures --out out", HOLDS),
     (VALIDATION, "run scene.toml --engines nobody --out out", BAD_INPUT),
-    (VALIDATION, "fuzz-files --count 3", HOLDS),
+    (VALIDATION, "fuzz --files --count 3", HOLDS),
     (VALIDATION, "stability --samples 2 --family random --jobs 1", HOLDS),
     (VALIDATION, "stability --samples 0", BAD_INPUT),
     (VALIDATION, "bench --positions 1", BAD_INPUT),
     (VALIDATION, "cost no-such-file", BAD_INPUT),
     (VALIDATION, "advise no-such-file --error 1e-3", BAD_INPUT),
-    (VALIDATION, "advise-study --count 0", BAD_INPUT),
-    (VALIDATION, "effects-cost --engines nobody", BAD_INPUT),
-    (VALIDATION, "mutation --most 3", BAD_INPUT),
+    (VALIDATION, "advise --study --count 0", BAD_INPUT),
+    (VALIDATION, "cost --effects --engines nobody", BAD_INPUT),
+    (VALIDATION, "faults --mutants --most -1", BAD_INPUT),
     (VALIDATION, "fuzz --scenes 0", BAD_INPUT),
     (VALIDATION, "accept no-such-file", BAD_INPUT),
 ]
@@ -193,9 +193,28 @@ def test_every_command_ends_with_its_status(
     assert command([files.get(word, word) for word in line.split()]) == status
 
 
+@pytest.mark.parametrize("old", fourbar_validation.cli.RENAMED)
+def test_an_earlier_name_of_a_command_names_the_new_one(old: str, capsys: pytest.CaptureFixture[str]) -> None:
+    new = fourbar_validation.cli.RENAMED[old]
+    assert old not in fourbar_validation.cli.COMMANDS and set(new.split(", or ")) <= set(
+        fourbar_validation.cli.COMMANDS
+    )
+    assert VALIDATION([old, "--out", "x"]) == BAD_INPUT
+    assert capsys.readouterr().err == f"error: {old} is now called {new}\n"
+
+
+def test_an_option_that_makes_another_command_may_stand_anywhere(capsys: pytest.CaptureFixture[str]) -> None:
+    for line in ("fuzz --files --count 2", "fuzz --count 2 --files"):
+        assert VALIDATION(line.split()) == HOLDS
+        assert "2 mutated scene files, 0 of them" in capsys.readouterr().out
+    assert VALIDATION(["fuzz", "--files", "--scenes", "3"]) == BAD_INPUT
+    assert VALIDATION(["fuzz", "--help"]) == HOLDS
+    assert "See also `fuzz --files --help`." in capsys.readouterr().out
+
+
 def test_a_figure_that_no_erratum_explains_is_status_1(monkeypatch: pytest.MonkeyPatch) -> None:
     assert VALIDATION(["published"]) == HOLDS
-    wrong = Figure("2.4 positions", "1 theta3_1", "167.877224", 167.8)
+    wrong = PublishedFigure("2.4 positions", "1 theta3_1", "167.877224", 167.8)
     monkeypatch.setattr("fourbar_validation.published.check.figures", lambda: iter([wrong]))
     assert VALIDATION(["published"]) == FAILED
 
@@ -269,23 +288,26 @@ PROCESSES = [
     ("fourbar", f"sdf {NO_FILE} -o a.sdf", BAD_INPUT),
     ("fourbar", f"usd {NO_FILE} -o a.usda", BAD_INPUT),
     ("validation", f"history {NO_FILE}", BAD_INPUT),
-    ("validation", "versions nobody", BAD_INPUT),
-    ("validation", "problems --no-such-option", BAD_INPUT),
+    ("validation", "standing --versions nobody", BAD_INPUT),
+    ("validation", "write --problems --no-such-option", BAD_INPUT),
     ("validation", "standing --no-such-option", BAD_INPUT),
     ("validation", f"accept {NO_FILE}", BAD_INPUT),
     ("validation", f"compare accepted {ROOT / 'validation/fourbar_validation/regression/accepted'}", HOLDS),
     ("validation", f"check {NO_FILE} {NO_FILE}", BAD_INPUT),
-    ("validation", "fuzz-files --count 1", HOLDS),
-    ("validation", "models --no-such-option", BAD_INPUT),
+    ("validation", f"check-mjcf {NO_FILE} {NO_FILE}", BAD_INPUT),
+    ("validation", "fuzz --files --count 1", HOLDS),
+    ("validation", "write --no-such-option", BAD_INPUT),
     ("validation", "published --no-such-option", BAD_INPUT),
-    ("validation", "mutation --most 3", BAD_INPUT),
+    ("validation", "faults --mutants --most -1", BAD_INPUT),
     ("validation", "fuzz --scenes 0", BAD_INPUT),
+    ("validation", "faults --workers 0", BAD_INPUT),
+    *(("validation", old, BAD_INPUT) for old in fourbar_validation.cli.RENAMED),
     ("validation", "stability --samples 0", BAD_INPUT),
     ("validation", "bench --positions 1", BAD_INPUT),
     ("validation", f"cost {NO_FILE}", BAD_INPUT),
     ("validation", f"advise {NO_FILE} --error 1e-3", BAD_INPUT),
-    ("validation", "advise-study --count 0", BAD_INPUT),
-    ("validation", "effects-cost --engines nobody", BAD_INPUT),
+    ("validation", "advise --study --count 0", BAD_INPUT),
+    ("validation", "cost --effects --engines nobody", BAD_INPUT),
 ]
 
 
@@ -296,7 +318,11 @@ def test_each_command_in_a_process_of_its_own(program: str, line: str, status: i
 
 
 def test_every_command_is_in_the_table_of_processes() -> None:
-    tried = {(program, line.split()[0]) for program, line, _ in PROCESSES}
+    forms = {form for form in fourbar_validation.cli.COMMANDS if " " in form}
+    tried = {
+        (program, next((form for form in forms if line.startswith(f"{form} ")), line.split()[0]))
+        for program, line, _ in PROCESSES
+    } - {("validation", old) for old in fourbar_validation.cli.RENAMED}
     assert tried == {
         *(("fourbar", name) for name in fourbar.cli.group.commands),
         *(("validation", name) for name in fourbar_validation.cli.COMMANDS),

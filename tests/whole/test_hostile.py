@@ -24,7 +24,7 @@ from fourbar_validation.engines.witnesses import Witness
 from fourbar_validation.report.summary import Summary
 from fourbar_validation.report.terminal import table
 from fourbar_validation.run import pool
-from fourbar_validation.run.run import run
+from fourbar_validation.run.run import RunOptions, run
 from fourbar_validation.run.selection import chosen
 from fourbar_validation.scenes.suites import LARGEST_LIST, suite_file
 from tests.support.here import judge_here
@@ -77,7 +77,7 @@ def test_reports_hold_hostile_text_as_text(
 ) -> None:
     judge_here(monkeypatch)
     out = tmp_path / "deep" / "out"
-    *_, summary = run(Named(), out, EXACT, workers=1)
+    *_, summary = run(Named(), out, EXACT, RunOptions(workers=1))
     assert isinstance(summary, Summary)
     html = (out / "report.html").read_text()
     assert "<script>alert" not in html
@@ -253,8 +253,8 @@ class Greedy:
 def test_running_out_of_memory_costs_its_own_row(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     suite = suite_file(listed(tmp_path, "a.toml\nb.toml\n"))
     monkeypatch.setattr(fourbar_validation.run.run, "CHUNK", {True: 2, False: 2})
-    greedy = Witness("greedy", f"{__name__}:Greedy", EQUIVALENCE)
-    list(run(suite, tmp_path / "run", (*EXACT, greedy), workers=1, drawn=False))
+    greedy = Witness("greedy", Greedy, EQUIVALENCE)
+    list(run(suite, tmp_path / "run", (*EXACT, greedy), RunOptions(workers=1, drawn=False)))
     failing = [row for row in read_columns(tmp_path / "run" / "results.csv") if row.verdict == FAILS]
     assert {(row.scene, row.engine) for row in failing} == {("b", "greedy")}
     assert "MemoryError" in failing[0].reason

@@ -42,7 +42,6 @@ ON_ONE_FLOOR = {
     ("files", "studies"),
     ("scenes", "compare"),
     ("published", "engines"),
-    ("run", "check"),
 }
 """Of two layers on one floor the first may use the second."""
 MOST = {"fourbar": 15, "fourbar_validation": 13}

@@ -28,13 +28,13 @@ from fourbar_validation.report.machine import CODE, build, code, modules
 from fourbar_validation.report.record import Record
 from fourbar_validation.report.summary import Summary
 from fourbar_validation.run import pool
-from fourbar_validation.run.run import Collected, run
+from fourbar_validation.run.run import Collected, RunOptions, run
 from fourbar_validation.run.selection import chosen
 from fourbar_validation.run.store import RunningError, Store
-from fourbar_validation.scenes.random import LinkageType
+from fourbar_validation.scenes.random import DrawnType
 from fourbar_validation.scenes.suites import AS_LONG_AS, MOST_POSITIONS, Files, Random, scene_files
 from tests.support.here import judge_here
-from tests.support.unlucky import Few, dies_at_first
+from tests.support.unlucky import Few, Unlucky, dies_at_first
 
 SEED = 7
 KILLS = int(os.environ.get("KILLS", "1"))
@@ -45,14 +45,14 @@ COUNT, IN_A_CHUNK = (220, 20) if FULL else (30, 3)
 SMALL = f"import fourbar_validation.run.run as run; run.CHUNK = {{False: {IN_A_CHUNK}}}; "
 HARNESS = "import runpy; runpy.run_module('validation', run_name='__main__', alter_sys=True)"
 PROGRAM = ("-m", "validation") if FULL else ("-c", SMALL + HARNESS)
-TYPES = tuple(LinkageType)
+TYPES = tuple(DrawnType)
 EXACT = chosen("free-body")
 
 
 def judge_all(
     suite: object, out: Path, witnesses: tuple[Witness, ...] = EXACT, workers: int = 2, seconds: float | None = None
 ) -> Summary:
-    *steps, last = run(suite, out, witnesses, workers=workers, seconds=seconds, drawn=False)  # type: ignore[arg-type]
+    *steps, last = run(suite, out, witnesses, RunOptions(workers=workers, seconds=seconds, drawn=False))  # type: ignore[arg-type]
     assert isinstance(last, Summary)
     assert sum(step for step in steps if isinstance(step, Collected)) == len(suite)  # type: ignore[arg-type]
     return last
@@ -76,10 +76,10 @@ def test_an_engine_that_crashes_or_hangs_costs_its_own_rows(tmp_path: Path, monk
 def test_a_worker_ends_itself_in_the_scene_that_hangs_and_with_its_parent() -> None:
     """The limit is that of a scene, whatever the others of its chunk took."""
     judge = (
-        "import os; from tests.support.unlucky import Few; from fourbar_validation.engines import workers; "
+        "import os; from tests.support.unlucky import Few, Moody; from fourbar_validation.engines import workers; "
         "from fourbar_validation.compare.tolerance import EQUIVALENCE; from fourbar_validation.run import pool; "
         "from fourbar_validation.engines.witnesses import Witness; "
-        "moody = [Witness('moody', 'tests.support.unlucky:Moody', EQUIVALENCE)]; "
+        "moody = [Witness('moody', Moody, EQUIVALENCE)]; "
         "workers.ready(%s); print('ready', flush=True); "
         "workers.apply_watched(%s, pool.judge_job, pool.jobs(Few(), [0, 2], moody, False))"
     )
@@ -99,7 +99,7 @@ def test_what_comes_from_outside_is_not_held_against_the_engine(
     for life in range(3):
         (tmp_path / "lives" / f"{how} {life}").touch()
     monkeypatch.setenv("LIVES", str(tmp_path / "lives"))
-    unlucky = Witness("unlucky", "tests.support.unlucky:Unlucky", EQUIVALENCE)
+    unlucky = Witness("unlucky", Unlucky, EQUIVALENCE)
     assert judge_all(Few(("a",)), tmp_path / "run", (*EXACT, unlucky), workers=1).counts[FAILS] == 0
     assert not list((tmp_path / "lives").iterdir())
 
@@ -362,8 +362,8 @@ def test_of_a_long_suite_what_fails_has_pictures_and_what_is_nearest_to_it(
     monkeypatch.setattr("fourbar_validation.report.summary.PICTURED", 3)
     monkeypatch.setattr(fourbar_validation.run.run, "PICTURED", 3)
     monkeypatch.setattr(fourbar_validation.run.run, "html", lambda *_, **__: "")
-    blunders = Witness("blunders", f"{__name__}:Blunders", EQUIVALENCE)
-    *_, without = run(Few(), tmp_path / "without", (*EXACT, blunders), drawn=False)
+    blunders = Witness("blunders", Blunders, EQUIVALENCE)
+    *_, without = run(Few(), tmp_path / "without", (*EXACT, blunders), RunOptions(drawn=False))
     assert not drawn and not any(record.figure for record in without.shown)  # type: ignore[union-attr]
     once = Blunders.titles.count("b")
     *_, last = run(Few(), tmp_path / "with", (*EXACT, blunders))

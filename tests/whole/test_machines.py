@@ -13,11 +13,8 @@ import pytest
 from tests.support.another_machine import BEFORE, CORES, ROOT, environment, machine, why_not
 
 ALL = os.environ.get("MACHINES") == "all"
-NUMERICAL = ["fourbar/formulas/test_pin_forces.py", "validation/fourbar_validation/regression/test_accepted.py"]
-NUMERICAL += [
-    "validation/fourbar_validation/published/test_published.py",
-    "validation/fourbar_validation/engines/test_engines.py",
-] * ALL
+NUMERICAL = ["fourbar/formulas/test_pin_forces.py", "validation/regression/test_accepted.py"]
+NUMERICAL += ["validation/published/test_published.py", "validation/engines/test_engines.py"] * ALL
 """Identities, the accepted state of the exact engines; with all kernels printed figures and each engine by itself."""
 
 

@@ -35,7 +35,7 @@ JUDGED_BY = {
     "fourbar/studies/test_enclosure.py": "fourbar/studies: interval; fourbar/show: extremes",
     # parts of one document or picture
     "fourbar/mjcf/test_mjcf.py": "fourbar/mjcf: defaults document effects model notes settings",
-    "fourbar/mjcf/test_simulators.py": "fourbar/mjcf: sdf standing usd",
+    "fourbar/mjcf/test_simulators.py": "fourbar/mjcf: assembly sdf usd",
     "fourbar/show/test_animate.py": "fourbar/show/plot: film",
     "fourbar/show/test_notebook.py": "fourbar/files: new; fourbar/show: drawing",
     "fourbar/show/test_page.py": "fourbar/show: page_data tolerances",
@@ -44,7 +44,7 @@ JUDGED_BY = {
     "validation/engines/mujoco/test_picture.py": "fourbar/mjcf: appearance",
     # a comparison is tested by witnesses with given answers
     "validation/run/test_judge.py": "validation/compare: answer basis compare effects identities rows scales "
-    "tolerance withheld",
+    "tolerance; validation/run: answers command pictures question run values",
     "validation/compare/statements/test_statements.py": "validation/compare/statements: finding limits ranges "
     "transmission",
     # adapters: judged against printed figures, each other, and faults put in front of them
@@ -54,14 +54,15 @@ JUDGED_BY = {
     "validation/engines/test_added_guests.py": "validation/engines: checked output workers",
     "validation/engines/test_free_body.py": "validation/engines: free_body_closure free_body_effects",
     "validation/engines/test_hard_suite.py": "validation/scenes: hard_families hard_linkages; "
-    "validation/engines: exact; validation/engines/mujoco: shipped; validation/report: hard_page",
-    "validation/engines/mujoco/test_simulate.py": "validation/engines/mujoco: drives motions runner watch",
-    "validation/run/shipped/test_shipped.py": "validation/run/shipped: bounds calls changes checks files question",
+    "validation/compare: nearby; validation/engines: exact; validation/engines/mujoco: shipped; "
+    "validation/report: hard_page",
+    "validation/engines/mujoco/test_simulate.py": "validation/engines/mujoco: drives monitor motions runner",
+    "validation/run/shipped/test_shipped.py": "validation/run/shipped: bounds calls changes files variants",
     "validation/run/test_released.py": "validation/engines: pinocchio_forward; validation/engines/mujoco: released",
     "validation/check/test_check.py": "validation/check: fitted judge judgement mistakes theirs; "
     "validation/run: printed",
     "validation/check/test_model.py": "validation/check: causes differences screen; "
-    "validation/engines: memory; validation/engines/mujoco: anatomy attached describe guess mend theirs",
+    "validation/engines: memory; validation/engines/mujoco: attached corrections describe guess theirs topology",
     "validation/published/test_published.py": "validation/published: check figures program textbook "
     "thesis_dynamics thesis_positions thirteen; validation/lab: ladder",
     "validation/regression/test_regression.py": "validation/regression: accept change changes fault history "
@@ -69,18 +70,16 @@ JUDGED_BY = {
     "validation/report/test_report.py": "validation/report: colours costs figures machine record summary svg "
     "templating",
     # studies: each through its command
-    "validation/lab/stress/test_bench.py": "validation/lab/stress: against bench_picture contenders in_c in_sympy "
-    "limits timed",
+    "validation/lab/stress/test_bench.py": "validation/lab/stress: against bench_picture contenders in_c limits timed",
     "validation/lab/stress/forward_error/test_stability.py": "validation/lab/stress/forward_error: families",
     "validation/lab/stress/fuzz/test_fuzz.py": "validation/lab/stress/fuzz: outside scenes shrink",
-    "validation/lab/stress/mutation/test_mutation.py": "validation/lab/stress/mutation: harness",
+    "validation/lab/stress/mutation/test_mutation.py": "validation/lab/stress/mutation: code_mutants harness",
     "validation/lab/stress/mutation/test_planted.py": "validation/lab/stress/mutation: planting specimens",
     "validation/lab/cost/test_cost.py": "validation/lab/cost: curves formulas laws orders pictures study; "
     "validation/advise: errors; validation/engines/mujoco: one_state",
     "validation/advise/test_advise.py": "validation/advise: matters; validation/lab/cost: exhaustive measure; "
     "validation/run: dial; validation/engines/mujoco: trial",
-    "validation/lab/effects/test_cost.py": "validation/lab/effects: counted table work; "
-    "validation/engines/mujoco: stepping",
+    "validation/lab/effects/test_cost.py": "validation/lab/effects: table work; validation/engines/mujoco: stepping",
     # simulators that need not be there: their scripts run where they are installed
     "validation/lab/subjects/test_subjects.py": "validation/lab/subjects: drake_sap examine exudyn_simulated "
     "genesis_rigid motion mujoco_c mujoco_mjx mujoco_warp newton_kamino newton_mujoco pybullet standing work",

@@ -22,11 +22,11 @@ from fourbar_validation.engines.mujoco.shipped import QUANTITY as SHIPPED
 from fourbar_validation.engines.witnesses import FURTHER, WITNESSES, WORK
 from fourbar_validation.regression.change import WHOLE
 from fourbar_validation.regression.record import ACCEPTED, baseline
+from fourbar_validation.run.judge import CHECKS
 from fourbar_validation.run.released import ENGINES, FULL
-from fourbar_validation.run.run import run
+from fourbar_validation.run.run import RunOptions, run
 from fourbar_validation.run.selection import chosen
-from fourbar_validation.run.shipped.checks import CHECKS
-from fourbar_validation.scenes.random import LinkageType
+from fourbar_validation.scenes.random import DrawnType
 from fourbar_validation.scenes.suites import Random
 from tests.support.here import judge_here
 from tests.support.scenes import crank_rocker
@@ -53,7 +53,14 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("run")
     with pytest.MonkeyPatch.context() as monkeypatch:
         judge_here(monkeypatch)
-        list(run(Random(8, 1, tuple(LinkageType)), folder / "results", chosen("free-body"), workers=1, drawn=False))
+        list(
+            run(
+                Random(8, 1, tuple(DrawnType)),
+                folder / "results",
+                chosen("free-body"),
+                RunOptions(workers=1, drawn=False),
+            )
+        )
     return folder
 
 
@@ -72,7 +79,7 @@ def test_every_quantity_is_described_as_the_table_has_it() -> None:
 def test_every_engine_is_described() -> None:
     table = PAGE.partition("## The engines")[2].partition("## The quantities")[0]
     described = re.findall(r"^\| `([\w-]+)` \| [^|]+ \| .+ \|$", table, re.MULTILINE)
-    assert described == ["engine", *WORK, *ENGINES, *(check.__name__ for check in CHECKS)]
+    assert described == ["engine", *WORK, *ENGINES, *(check.rows.__name__ for check in CHECKS if check.shipped)]
     names = {each.name for each in (*WITNESSES, *FURTHER, *HARD_WITNESSES)}
     assert names | {FORMULAS} == set(WORK)
 

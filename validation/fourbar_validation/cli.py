@@ -9,48 +9,76 @@ from fourbar.errors import run
 from fourbar_validation.places import PROGRAM
 
 COMMANDS = {
-    "run": "fourbar_validation.run.run:command",
+    "run": "fourbar_validation.run.command:command",
     "accept": "fourbar_validation.regression.accept:accept_command",
     "compare": "fourbar_validation.regression.accept:compare",
     "history": "fourbar_validation.regression.accept:history",
     "check": "fourbar_validation.check:check",
-    "fuzz-files": "fourbar_validation.lab.stress.mutants:fuzz_files",
-    "models": "fourbar_validation.lab.models:models",
+    "check-mjcf": "fourbar_validation.check.model:command",
     "published": "fourbar_validation.lab.ladder:published",
-    "mutation": "fourbar_validation.lab.stress.mutation.mutation:mutation",
-    "fuzz": "fourbar_validation.lab.stress.fuzz.fuzz:fuzz",
+    "cost": "fourbar_validation.lab.cost.cost:cost",
+    "cost --effects": "fourbar_validation.lab.effects.cost:command",
+    "advise": "fourbar_validation.advise.advise:command",
+    "advise --study": "fourbar_validation.lab.cost.measure:study",
     "stability": "fourbar_validation.lab.stress.forward_error.stability:stability",
     "bench": "fourbar_validation.lab.stress.bench:bench",
-    "cost": "fourbar_validation.lab.cost.cost:cost",
-    "advise": "fourbar_validation.advise.advise:command",
-    "advise-study": "fourbar_validation.lab.cost.measure:study",
+    "fuzz": "fourbar_validation.lab.stress.fuzz.fuzz:fuzz",
+    "fuzz --files": "fourbar_validation.lab.stress.mutants:fuzz_files",
+    "faults": "fourbar_validation.lab.stress.mutation.planted:command",
+    "faults --mutants": "fourbar_validation.lab.stress.mutation.harness:command",
     "standing": "fourbar_validation.lab.subjects.standing:command",
-    "versions": "fourbar_validation.lab.subjects.versions:command",
-    "problems": "fourbar_validation.lab.subjects.problems:command",
-    "effects-cost": "fourbar_validation.lab.effects.cost:command",
+    "standing --versions": "fourbar_validation.lab.subjects.versions:command",
+    "write": "fourbar_validation.lab.models:models",
+    "write --problems": "fourbar_validation.lab.subjects.problems:command",
 }
+"""By name, some with the option that makes another command of it, with options of its own."""
+RENAMED = {
+    "fuzz-files": "fuzz --files",
+    "models": "write",
+    "problems": "write --problems",
+    "mutation": "faults, or faults --mutants",
+    "advise-study": "advise --study",
+    "effects-cost": "cost --effects",
+    "versions": "standing --versions",
+}
+"""Earlier names of commands."""
 
 
 class LazyGroup(click.Group):
     """A group whose commands are imported on demand."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
-        """Every command, in the order a newcomer needs them."""
-        return list(COMMANDS)
+        """List the commands in the order a newcomer needs them, without the options that make others of them."""
+        return [name for name in COMMANDS if " " not in name]
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        """The command of that name."""
+        """Import a command; its help names those that an option makes of it."""
         if cmd_name not in COMMANDS:
             return None
         try:
             command: click.Command = resolve_name(COMMANDS[cmd_name])
         except ModuleNotFoundError as error:
             return _unavailable(cmd_name, error)
+        others = [f"`{name} --help`" for name in COMMANDS if name.startswith(f"{cmd_name} ")]
+        command.epilog = f"See also {', '.join(others)}." if others else None
         return command
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """Choose by name and option."""
+        name, *options = args
+        if name in RENAMED:
+            raise click.UsageError(f"{name} is now called {RENAMED[name]}", ctx)
+        for option in options:
+            if f"{name} {option}" in COMMANDS:
+                options.remove(option)
+                return super().resolve_command(ctx, [f"{name} {option}", *options])
+        return super().resolve_command(ctx, args)
 
 
 def _unavailable(name: str, missing: ModuleNotFoundError) -> click.Command:
-    """A command whose library is not installed: it is listed, and says so where it is called."""
+    """Stand in for a command whose library is not installed: it is listed, and says so where it is called."""
 
     @click.command(name, help=f"Not available: {missing.name} is not installed.")
     @click.argument("arguments", nargs=-1, type=click.UNPROCESSED)
@@ -75,7 +103,7 @@ def group(context: click.Context) -> None:
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Run a command and leave with the exit status of the design."""
+    """Run a command and leave with the exit status."""
     sys.exit(status(arguments))
 
 

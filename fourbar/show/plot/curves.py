@@ -48,7 +48,7 @@ POLE_REASON = {2: "bars 3 and 4 collinear", 3: "ω₃ = 0", 4: "ω₄ = 0"}
 
 
 def bases(axes: "Axes", view: View) -> Array:
-    """The axis of theta_2 (or time), with the positions that do not assemble shaded and the position drawn marked.
+    """Draw the axis of theta_2 (or time), positions that do not assemble shaded and the position drawn marked.
 
     Returns what the curves are drawn over.
     """
@@ -87,7 +87,7 @@ def note(view: View, text: str) -> None:
 
 
 def poles(view: View) -> Indices:
-    """Indices i such that the determinant of the drive changes sign between positions i and i + 1."""
+    """Find indices i such that the determinant of the drive changes sign between positions i and i + 1."""
     s = view.sweep
     if view.scene.motion.free is not None:  # no drive, no pole
         return np.array([], dtype=np.intp)
@@ -97,14 +97,14 @@ def poles(view: View) -> Indices:
 
 
 def broken(values: Array, where: Indices) -> Array:
-    """Copies of a curve's values with NaN at the positions next to a pole, so that no line crosses it."""
+    """Copy a curve's values with NaN at the positions next to a pole, so that no line crosses it."""
     out = np.array(values, dtype=float)
     out[~np.isfinite(out)] = np.nan
     return np.insert(out, where + 1, np.nan)
 
 
 def limit_of(values: list[Array]) -> float | None:
-    """The end of a clipped axis, or None where no value stands far outside the rest."""
+    """Choose the end of a clipped axis, or None where no value stands far outside the rest."""
     size = np.concatenate([np.abs(value[np.isfinite(value)]) for value in values])
     if size.size == 0:
         return None
@@ -193,7 +193,7 @@ draw_point_accelerations = partial(_of_points, letter="a", unit="m/s^2", title="
 
 
 def draw_torque(axes: "Axes", view: View) -> None:
-    """The driving torque, with its poles."""
+    """Draw the driving torque, with its poles."""
     over = bases(axes, view)
     torque, bar = view.sweep.torque, view.scene.drive_bar
     assert torque is not None

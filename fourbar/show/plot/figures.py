@@ -104,7 +104,7 @@ FIGURES: dict[str, tuple[Painter, tuple[float, float], bool]] = {
 
 
 def _painter(scene: Scene, figure: str, branches: str) -> tuple[Painter, tuple[float, float]]:
-    """The painter and the size of a figure, where the scene has what it shows."""
+    """Choose the painter and the size of a figure, where the scene has what it shows."""
     for key, value, allowed in (("figure", figure, tuple(FIGURES)), ("branches", branches, BRANCHES)):
         if not isinstance(value, str) or value not in allowed:
             raise InputError(key, value, "must be one of " + ", ".join(allowed))
@@ -144,7 +144,7 @@ def drawn(
     units: Conversion = SI,
     dimensions: bool = False,
 ) -> Drawing:
-    """A figure of a scene for a notebook (`scene.plot()`).
+    """Draw a figure of a scene for a notebook (`scene.plot()`).
 
     Parameters
     ----------
@@ -193,7 +193,7 @@ def draw(
 
 
 def _composed(painter: Painter, size: tuple[float, float], views: list[View]) -> "Figure":
-    """The figure itself, laid out and labelled."""
+    """Compose the figure itself, laid out and labelled."""
     from matplotlib.figure import Figure
 
     stacked = size[0] > 9.0
@@ -213,7 +213,7 @@ def _composed(painter: Painter, size: tuple[float, float], views: list[View]) ->
 
 
 def _to_one_scale(columns: "list[list[Axes]]") -> None:
-    """The same panel of every branch gets the same limits; polar panels and free bodies share theirs already."""
+    """Give the same panel of every branch the same limits; polar panels and free bodies share theirs already."""
     for panels in zip(*columns, strict=True):
         if len(panels) == 1 or panels[0].name == "polar" or not panels[0].axison:
             continue

@@ -44,7 +44,7 @@ SHORTEST = 1.0
 
 
 def _ffmpeg() -> str:
-    """The program: the machine's own, else the one that imageio-ffmpeg brings."""
+    """Find the program: the machine's own, else the one that imageio-ffmpeg brings."""
     if (own := shutil.which("ffmpeg")) is not None:
         return own
     try:
@@ -104,7 +104,7 @@ def write_film(
 
 
 def frames(shown: View, count: int) -> list[int]:
-    """Indices of the positions shown one after the other: the stretch that assembles around the one drawn."""
+    """Choose the positions shown one after the other, by index: the segment that assembles around the one drawn."""
     closes = shown.sweep.assembled
     here = int(np.argmin(np.abs(shown.sweep.theta_2 - shown.here.theta_2[0])))
     if shown.time is not None and shown.here.time is not None:
@@ -120,15 +120,15 @@ def frames(shown: View, count: int) -> list[int]:
     return there + there[-2:0:-1]
 
 
-def _acting(axes: Any, shown: View, factor: float, size: float) -> Callable[[int], list[symbols.Drawn]]:
-    """The function that draws the symbols of what acts at a position, in place of what stood there.
+def _acting(axes: Any, shown: View, factor: float, size: float) -> Callable[[int], list[symbols.DrawnSymbol]]:
+    """Make the function that draws the symbols of what acts at a position, in place of what stood there.
 
     The window becomes large enough for those of every position.
     """
     everything = acting(shown.scene)
     passing: list[Any] = []
 
-    def draw(index: int) -> list[symbols.Drawn]:
+    def draw(index: int) -> list[symbols.DrawnSymbol]:
         while passing:
             passing.pop().remove()
         place = symbols.place_of(shown.scene.linkage, shown.sweep, index, factor)
@@ -150,7 +150,7 @@ def _acting(axes: Any, shown: View, factor: float, size: float) -> Callable[[int
 
 
 def _names(axes: Any, shown: View, centres: list[int]) -> dict[str, Any]:
-    """The texts of pins, bars, mass centres and own points."""
+    """Write the names of pins, bars, mass centres and own points."""
     texts = {pin: (pin_name(pin), INK) for pin in ("O2", "A", "B", "O4")}
     texts |= {str(number): (str(number), BAR_COLOURS[number]) for number in ENDS}
     texts |= {f"G{number}": (f"$G_{number}$", BAR_COLOURS[number]) for number in centres}
@@ -159,7 +159,7 @@ def _names(axes: Any, shown: View, centres: list[int]) -> dict[str, Any]:
 
 
 def _stage(shown: View, moving: bool) -> tuple["Figure", Any]:
-    """The figure, and the function that moves it to a position of the sweep."""
+    """Make the figure, and the function that moves it to a position of the sweep."""
     from matplotlib.figure import Figure
 
     sweep, linkage = shown.sweep, shown.scene.linkage

@@ -77,7 +77,7 @@ def free_body(view: View, bar: int) -> tuple[list[Arrow], list[Couple]]:
 
 
 def _actions(view: View) -> Iterator[tuple[str, Recorder]]:
-    """Loads and effects, each with what it puts on the bars."""
+    """Collect loads and effects, each with what it puts on the bars."""
     state = view.state()
     for count, load in enumerate(view.scene.loads, start=1):
         recorder = Recorder(view.scene, state)
@@ -92,7 +92,7 @@ def _actions(view: View) -> Iterator[tuple[str, Recorder]]:
 
 
 def draw_free_bodies(figure: "SubFigure", view: View, labels: Labels) -> None:
-    """The three bars, each freed from its pins, with arrows to one scale, over the couples."""
+    """Draw the three bars, each freed from its pins, with arrows to one scale, over the couples."""
     freed = [(v, bar, *free_body(v, bar)) for v in view.alike for bar in MOVING_BARS]  # those of this view first
     panels, below = figure.subplots(2, 3, height_ratios=[PANEL, LINE * max(len(couples) for *_, couples in freed)])
     biggest = max((abs(arrow.force) for *_, arrows, _ in freed for arrow in arrows), default=0.0)
@@ -180,12 +180,12 @@ def _write_couples(axes: "Axes", view: View, couples: list[Couple]) -> None:
 
 
 def _words(text: str) -> str:
-    """A typeset name in plain letters, for the caption."""
+    """Write a typeset name in plain letters, for the caption."""
     return re.sub(r"[$_{}]", "", text.replace("\\,", " ")).replace("-", "−")
 
 
 def _scale_bar(axes: "Axes", scale: float, biggest: float, units: Conversion) -> None:
-    """A round force as a length, under the first panel."""
+    """Draw a round force as a length, under the first panel."""
     if scale == 0.0:
         return
     factor, unit = unit_for(biggest, "N", units)

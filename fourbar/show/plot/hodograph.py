@@ -23,7 +23,7 @@ LONG_NUMBERS = 2000.0
 
 
 def draw_hodograph(axes: "PolarAxes", view: View, names: tuple[str, ...] = tuple(FORCE_COLOURS)) -> None:
-    """The tips of the force vectors drawn from one origin; open dot: start of the sweep, dots every 60 deg."""
+    """Draw the tips of the force vectors from one origin; open dot: start of the sweep, dots every 60 deg."""
     from matplotlib.ticker import MaxNLocator
 
     forces = {name: getattr(view.sweep, name) for name in names}
@@ -63,7 +63,7 @@ def draw_hodograph(axes: "PolarAxes", view: View, names: tuple[str, ...] = tuple
 
 
 def _spacing(view: View) -> tuple[Array, float, str]:
-    """What the dots are evenly spaced in, by how much, and that in words."""
+    """Say what the dots are evenly spaced in, by how much, and that in words."""
     if view.time is None:
         return view.degrees, EVERY, f"{EVERY:g}° of θ₂"
     duration = float(view.time[-1] - view.time[0]) or 1.0
@@ -73,7 +73,7 @@ def _spacing(view: View) -> tuple[Array, float, str]:
 
 
 def _free_direction(forces: list[np.ndarray]) -> float:
-    """The multiple of 22.5 deg that lies furthest from the curves."""
+    """Find the multiple of 22.5 deg that lies furthest from the curves."""
     directions = np.concatenate([np.arctan2(f[:, 1], f[:, 0])[np.isfinite(f).all(axis=1)] for f in forces])
     candidates = np.radians(np.arange(16) * 22.5)
     away = np.abs(np.angle(np.exp(1j * (directions - candidates[:, None])))).min(axis=1, initial=math.pi)

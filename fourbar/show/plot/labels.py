@@ -83,7 +83,7 @@ class Labels:
 
 
 def _inside(axes: "Axes") -> Box:
-    """The panel in pixels."""
+    """Return the panel in pixels."""
     box = axes.get_window_extent()
     return (box.x0, box.y0, box.x1, box.y1)
 
@@ -116,7 +116,7 @@ def _spot(
     mark: float,
     inside: Box,
 ) -> Point:
-    """The centre of the label: the candidate that covers least, the nearest and most outward first."""
+    """Choose the centre of the label: the candidate that covers least, the nearest and most outward first."""
     best, best_cost, edge = at, math.inf, 0.5 * per_point * dots[:, 2]
     for reach in REACH:
         for k in range(DIRECTIONS):

@@ -24,13 +24,13 @@ POINT = "#8A3B78"
 
 
 def pins(view: View, factor: float = 1.0) -> dict[str, Point]:
-    """The four pins at the position drawn, in the order O2, A, B, O4, m or what the factor makes of it."""
+    """Locate the pins at the position drawn, in the order O2, A, B, O4, m or what the factor makes of it."""
     place = place_of(view.scene.linkage, view.here, 0, factor)
     return {name: components(pin) for name, pin in place.pins.items()}
 
 
 def draw_linkage(axes: "Axes", view: View, labels: Labels, *, moving: bool = False) -> None:
-    """The linkage at the position drawn, over the paths of its points; with their velocities where it is `moving`."""
+    """Draw the linkage at the position drawn, over the paths of its points; with velocities where it is `moving`."""
     factor, unit, size = scale_of(view)
     where = pins(view, factor)
     for path, colour, dashes, name in paths(view):
@@ -55,19 +55,7 @@ def draw_linkage(axes: "Axes", view: View, labels: Labels, *, moving: bool = Fal
         axes.plot([x], [y], "D", ms=4.5, mew=1.2, zorder=8, **{**OPEN, "mec": POINT})
         labels.keep_off(axes, (float(x), float(y)), (float(x), float(y)))
         labels.add(Label(axes, name, (float(x), float(y)), middle, POINT, 8.5, 2.5))
-    for number in MOVING_BARS:
-        bar, colour = view.scene.linkage.bar(number), BAR_COLOURS[number]
-        if bar.mass == 0.0:
-            continue
-        x, y = factor * getattr(view.here, f"G{number}")[0]
-        here = (float(x), float(y))
-        r_along, r_across = bar.to_centre.real, bar.to_centre.imag
-        if r_across != 0.0 or not 0.0 <= r_along <= bar.length:  # off the bar: tied to it by a line
-            axes.plot(*zip(where[ENDS[number][0]], here, strict=True), color=colour, lw=0.8, ls=":", zorder=3)
-            labels.keep_off(axes, where[ENDS[number][0]], here)
-        mass_centre(axes, here)
-        labels.keep_off(axes, here, here)
-        labels.add(Label(axes, f"$G_{number}$", here, middle, colour, 8.0, 3.0))
+    _mass_centres(axes, view, labels, where, middle)
     if moving:
         vectors(axes, view, view.here, factor, size)
     place = place_of(view.scene.linkage, view.here, 0, factor)
@@ -84,8 +72,25 @@ def draw_linkage(axes: "Axes", view: View, labels: Labels, *, moving: bool = Fal
     path_legend(axes)
 
 
+def _mass_centres(axes: "Axes", view: View, labels: Labels, where: dict[str, Point], middle: Point) -> None:
+    factor, _, _ = scale_of(view)
+    for number in MOVING_BARS:
+        bar, colour = view.scene.linkage.bar(number), BAR_COLOURS[number]
+        if bar.mass == 0.0:
+            continue
+        x, y = factor * getattr(view.here, f"G{number}")[0]
+        here = (float(x), float(y))
+        r_along, r_across = bar.to_centre.real, bar.to_centre.imag
+        if r_across != 0.0 or not 0.0 <= r_along <= bar.length:  # off the bar: tied to it by a line
+            axes.plot(*zip(where[ENDS[number][0]], here, strict=True), color=colour, lw=0.8, ls=":", zorder=3)
+            labels.keep_off(axes, where[ENDS[number][0]], here)
+        mass_centre(axes, here)
+        labels.keep_off(axes, here, here)
+        labels.add(Label(axes, f"$G_{number}$", here, middle, colour, 8.0, 3.0))
+
+
 def path_legend(axes: "Axes") -> float:
-    """The legend of the paths above the drawing; the distance of the title over it, typographic points."""
+    """Write the legend of the paths above the drawing; return the distance of the title over it, typographic points."""
     legend = axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.005), ncols=3)
     pad = 6.0 + 12.0 * math.ceil(len(legend.get_texts()) / 3)
     axes.set_title(axes.get_title(loc="left"), pad=pad)
@@ -93,13 +98,13 @@ def path_legend(axes: "Axes") -> float:
 
 
 def _bar_name(view: View, number: int) -> str:
-    """The number of a bar, with its length where dimensions are wanted."""
+    """Write the number of a bar, with its length where dimensions are wanted."""
     length = quantity(view.scene.linkage.lengths[number - 1], "m", view.units)
     return f"{number}: {length}" if view.dimensions else str(number)
 
 
 def scale_of(view: View) -> tuple[float, str, float]:
-    """The factor to the unit of length of a drawing, the same for both branches; that unit; the size of a support."""
+    """Choose the factor to the unit of length, the same for both branches; that unit; the size of a support."""
     most = max(largest(v.sweep.A, v.sweep.B, v.sweep.G3, *np.array(list(pins(v).values()))) for v in view.alike)
     factor, unit = length_unit(most, view.units)
     sweep = view.sweep
@@ -108,7 +113,7 @@ def scale_of(view: View) -> tuple[float, str, float]:
 
 
 def pin_name(name: str) -> str:
-    """A pin as it is typeset."""
+    """Write a pin as it is typeset."""
     return f"${name[0]}_{name[1]}$" if len(name) == 2 else f"${name}$"
 
 
@@ -140,7 +145,7 @@ def _ground(axes: "Axes", labels: Labels, O2: Point, O4: Point, size: float) -> 
 
 
 def supports(axes: "Axes", O2: Point, O4: Point, size: float) -> None:
-    """The ground line between the fixed pins, and a hatched support under each."""
+    """Draw the ground line between the fixed pins, and a hatched support under each."""
     from matplotlib.patches import Polygon, Rectangle
 
     axes.plot(*zip(O2, O4, strict=True), color=MUTED, lw=1.0, ls=(0, (8, 3, 2, 3)), zorder=1)
@@ -154,7 +159,7 @@ def supports(axes: "Axes", O2: Point, O4: Point, size: float) -> None:
 
 
 def mass_centre(axes: "Axes", point: Point, ms: float = 7.0) -> "list[Line2D]":
-    """The quartered circle that marks a mass centre."""
+    """Draw the quartered circle that marks a mass centre."""
     from matplotlib.path import Path
 
     x, y = point

@@ -1,5 +1,4 @@
-"""What tolerances do to torque, pin forces and points: bands over the sweep, and whose variance it is; and what these
-quantities depend on most: bars, the longest first."""
+"""What tolerances do to torque, pin forces and points: bands and shares of the variance; and what these depend on."""
 
 import textwrap
 from pathlib import Path

@@ -56,7 +56,7 @@ FORMATS = ("svg", "png", "pdf")
 
 @contextmanager
 def matplotlib_style() -> Iterator[None]:
-    """The settings of `STYLE`, for the time of one drawing.
+    """Apply the settings of `STYLE` for the time of one drawing.
 
     Raises DependencyError where matplotlib is not installed.
     """
@@ -71,7 +71,7 @@ def matplotlib_style() -> Iterator[None]:
 
 
 def format_of(path: str | Path, file_format: str | None = None, formats: tuple[str, ...] = FORMATS) -> str:
-    """The format stated, or that a file's ending names; InputError where it is none of `formats`."""
+    """Return the format given, or the one that a file's ending names; InputError where it is none of `formats`."""
     expect("path", path, str, Path)
     expect("file_format", file_format, str, type(None))
     kind = (file_format or Path(path).suffix.removeprefix(".")).lower()
@@ -86,7 +86,7 @@ def save(figure: "Figure", path: Path, file_format: str) -> None:
 
 
 def rendered(figure: "Figure", file_format: str) -> bytes:
-    """A figure as SVG, PNG or PDF, without a date in it."""
+    """Write a figure as SVG, PNG or PDF, without a date in it."""
     metadata: dict[str, dict[str, Any]] = {
         "svg": {"Date": None, "Creator": "fourbar"},
         "pdf": {"CreationDate": None, "Producer": None, "Creator": "fourbar"},
@@ -101,7 +101,7 @@ CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f\u2028\u2029]+")
 
 
 def plain(text: str, width: int) -> str:
-    """A stranger's text as one line of at most `width` characters."""
+    """Shorten a stranger's text to one line of at most `width` characters."""
     line = " ".join(CONTROL.sub(" ", text).split())
     return line if len(line) <= width else line[: width - 1].rstrip() + "…"
 
@@ -110,7 +110,7 @@ PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "
 
 
 def unit_for(largest: float, unit: str, units: Conversion = SI) -> tuple[float, str]:
-    """The factor from SI and the unit stated, or with the prefix that suits the largest magnitude; a rate has none."""
+    """Choose the factor from SI and the unit given, or the prefix that suits the largest magnitude; a rate has none."""
     if unit in units or "/" in unit:
         name, factor = unit_in(unit, units)
         return factor, name.replace("^2", "²")
@@ -155,7 +155,7 @@ def number(value: float) -> str:
 
 
 def quantity(value: float, unit: str, units: Conversion = SI) -> str:
-    """A number of an SI unit in the unit stated, or with the prefix that suits it."""
+    """Write a quantity of an SI unit in the unit given, or with the prefix that suits it."""
     factor, name = unit_for(abs(value), unit, units)
     return f"{number(factor * value)} {name}"
 
@@ -171,7 +171,7 @@ def degree_ticks(axis: Any, span: float) -> None:
 
 
 def legend_above(axes: "Axes", columns: int = 4) -> None:
-    """The legend between title and panel, where it covers no curve; none where no curve has a value."""
+    """Place the legend between title and panel, where it covers no curve; none where no curve has a value."""
     if not axes.get_legend_handles_labels()[1]:
         return
     legend = axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.02), ncols=columns)

@@ -53,12 +53,12 @@ class Place(NamedTuple):
     """N m; NaN where there is none."""
 
     def point(self, bar: int, z: complex) -> complex:
-        """A point given in the frame of a bar."""
+        """Place a point given in the frame of a bar."""
         return self.foot[bar] + self.factor * z * self.u[bar]
 
 
 @dataclass(slots=True)
-class Drawn:
+class DrawnSymbol:
     """What one symbol has put into a drawing."""
 
     artists: list[Any] = field(default_factory=list)
@@ -72,7 +72,7 @@ class Drawn:
 
 
 def place_of(linkage: FourBar, solution: Solution, index: int, factor: float) -> Place:
-    """The place of one position of a solution."""
+    """Collect what symbols need of one position of a solution."""
     A, B = (factor * complex(*point[index]) for point in (solution.A, solution.B))
     O4 = factor * cmath.rect(linkage.ground, linkage.ground_angle)
     angles = {k: float(getattr(solution, f"theta_{k}")[index]) for k in (2, 3, 4)}
@@ -82,9 +82,9 @@ def place_of(linkage: FourBar, solution: Solution, index: int, factor: float) ->
     return Place({1: 0.0j, 2: 0.0j, 3: A, 4: O4}, u, pins, factor, angles[2], torque)
 
 
-def draw(axes: "Axes", symbol: Symbol, place: Place, size: float) -> Drawn:
+def draw(axes: "Axes", symbol: Symbol, place: Place, size: float) -> DrawnSymbol:
     """One symbol at one position; `size` is that of a support."""
-    drawn, colour = Drawn(text=symbol.name), COLOURS[symbol.kind]
+    drawn, colour = DrawnSymbol(text=symbol.name), COLOURS[symbol.kind]
     if symbol.kind == "gravity":
         _gravity(axes, symbol, drawn)
     elif symbol.kind == "spring":
@@ -117,17 +117,17 @@ def draw(axes: "Axes", symbol: Symbol, place: Place, size: float) -> Drawn:
 
 
 def components(z: complex) -> Point:
-    """x and y."""
+    """Split z into x and y."""
     return (z.real, z.imag)
 
 
-def _line(axes: "Axes", drawn: Drawn, points: Any, colour: str, width: float) -> None:
+def _line(axes: "Axes", drawn: DrawnSymbol, points: Any, colour: str, width: float) -> None:
     x, y = np.real(points), np.imag(points)
     drawn.artists += axes.plot(x, y, color=colour, lw=width, zorder=5)
     drawn.lines.append([(float(a), float(b)) for a, b in zip(x, y, strict=True)])
 
 
-def _arrow(axes: "Axes", tail: complex, tip: complex, colour: str, drawn: Drawn) -> None:
+def _arrow(axes: "Axes", tail: complex, tip: complex, colour: str, drawn: DrawnSymbol) -> None:
     from matplotlib.patches import FancyArrowPatch
 
     arrow = FancyArrowPatch(components(tail), components(tip), zorder=8, color=colour, mutation_scale=10.0, **HEADED)
@@ -136,7 +136,7 @@ def _arrow(axes: "Axes", tail: complex, tip: complex, colour: str, drawn: Drawn)
     drawn.lines.append([components(tail), components(tip)])
 
 
-def _force(axes: "Axes", symbol: Symbol, place: Place, size: float, drawn: Drawn) -> None:
+def _force(axes: "Axes", symbol: Symbol, place: Place, size: float, drawn: DrawnSymbol) -> None:
     u = place.u[symbol.bar] if symbol.turns else 1.0
     tail = place.point(symbol.bar, symbol.at) + place.factor * symbol.beyond * u
     sign = symbol.sign(place.theta_2)
@@ -147,8 +147,8 @@ def _force(axes: "Axes", symbol: Symbol, place: Place, size: float, drawn: Drawn
     drawn.label, drawn.away = components(tip), (tip - tail) / abs(tip - tail)
 
 
-def _turn(axes: "Axes", centre: complex, radius: float, turn: float, colour: str, drawn: Drawn) -> None:
-    """An arc with a head, counter-clockwise where turn > 0; none where nothing turns."""
+def _turn(axes: "Axes", centre: complex, radius: float, turn: float, colour: str, drawn: DrawnSymbol) -> None:
+    """Draw an arc with a head, counter-clockwise where turn > 0; none where nothing turns."""
     if turn == 0.0:
         return
     angles = math.radians(-35.0) * turn + turn * np.linspace(0.0, OPENING, 40)
@@ -159,7 +159,7 @@ def _turn(axes: "Axes", centre: complex, radius: float, turn: float, colour: str
 
 
 def _zigzag(start: complex, end: complex, width: float) -> Any:
-    """A coil spring seen from the side: straight ends, teeth between."""
+    """Draw a coil spring seen from the side: straight ends, teeth between."""
     along = end - start
     across = 1j * along / abs(along) * width if along else 0.0
     teeth = [start, start + 0.15 * along]
@@ -167,8 +167,8 @@ def _zigzag(start: complex, end: complex, width: float) -> Any:
     return np.array([*teeth, start + 0.85 * along, end])
 
 
-def _gravity(axes: "Axes", symbol: Symbol, drawn: Drawn) -> None:
-    """An arrow in the corner, of no length in the plane."""
+def _gravity(axes: "Axes", symbol: Symbol, drawn: DrawnSymbol) -> None:
+    """Draw an arrow in the corner, of no length in the plane."""
     size = abs(symbol.vector)
     if size == 0.0:
         return

@@ -70,7 +70,7 @@ def _marked(view: View) -> list[tuple[list[float], list[float], str, str]]:
 
 
 def _inside(view: View, angle: float, margin: float) -> list[float]:
-    """An angle (rad) and its whole turns that lie in the sweep, degrees."""
+    """List an angle (rad) and its full turns that lie in the sweep, degrees."""
     low, high = float(view.degrees[0]) - margin, float(view.degrees[-1]) + margin
     start = math.degrees(angle)
     first = math.ceil((low - start) / 360.0)

@@ -44,7 +44,7 @@ class View:
 
     @property
     def alike(self) -> "list[View]":
-        """This view and those that share its scales."""
+        """List this view and those that share its scales."""
         return [self, *self.others]
 
     @property
@@ -72,7 +72,7 @@ class View:
 
     @property
     def branch_name(self) -> str:
-        """ "open", "crossed", or "both signs" where the motion follows a smooth path through change points."""
+        """Return "open", "crossed", or "both signs" where the motion follows a smooth path through change points."""
         branch = self.sweep.branch
         return "open" if np.all(branch == 1) else "crossed" if np.all(branch == -1) else "both signs"
 
@@ -92,7 +92,7 @@ def point_vectors(scene: Scene, solution: Solution, letter: str) -> dict[str, Ar
 
 
 def one(vector: Any) -> complex:
-    """The one complex number of an array, at the position drawn."""
+    """Return the one complex number of an array, at the position drawn."""
     return complex(np.ravel(vector)[0])
 
 
@@ -107,16 +107,16 @@ class Recorder(Actions):
         """Bar and couple, N m."""
 
     def force(self, bar: int, force: Number, arm: Number = 0.0j) -> None:
-        """A force on a bar, applied at `arm` from the bar's first pin."""
+        """Add a force on a bar, applied at `arm` from the bar's first pin."""
         self.arrows.append((bar, one(force), one(arm)))
 
     def moment(self, bar: int, moment: Number) -> None:
-        """A pure couple on a bar."""
+        """Add a pure couple on a bar."""
         if bar != 1:
             self.turns.append((bar, one(moment).real))
 
     def couple(self, pin: str, couple: Number) -> None:
-        """A couple on the second of the two bars that meet at a pin, and its opposite on the first."""
+        """Add a couple on the second of the two bars that meet at a pin, and its opposite on the first."""
         first, second = PINS[pin]
         self.moment(second, couple)
         self.moment(first, -couple)
@@ -128,7 +128,7 @@ def over_time(scene: Scene) -> bool:
 
 
 def sweep_command(scene: Scene) -> Command:
-    """The positions of a scene in rising theta_2; a single position is put among those of the default range."""
+    """List the positions of a scene in rising theta_2; a single position is put among those of the default range."""
     motion = scene.motion
     own = command(scene)
     if len(own.theta_2) > 1:
@@ -143,7 +143,7 @@ def sweep_command(scene: Scene) -> Command:
 
 
 def common_position(scenes: "list[Scene]") -> float | None:
-    """A position that shows each of several scenes over the same theta_2; None where each has its own."""
+    """Choose a position that shows each of several scenes over the same theta_2; None where each has its own."""
     if any(over_time(scene) for scene in scenes) or len(command(scenes[0]).theta_2) == 1:
         return None
     sweeps = [solve(scene, at=sweep_command(scene)) for scene in scenes]
@@ -152,12 +152,12 @@ def common_position(scenes: "list[Scene]") -> float | None:
 
 
 def on_branch(scene: Scene, branch: int) -> Scene:
-    """The same scene on the given branch."""
+    """Put the same scene on the given branch."""
     return replace(scene, motion=replace(scene.motion, branch=branch))
 
 
 def view(scene: Scene, position: float | None = None) -> View:
-    """The sweep of a scene, or its motion through time, and one position of it.
+    """Evaluate the sweep of a scene, or its motion through time, and one position of it.
 
     Parameters
     ----------
@@ -189,7 +189,7 @@ def _something(sweep: Solution) -> None:
 
 
 def _through_time(scene: Scene, position: float | None) -> View:
-    """The instant drawn is the first that assembles, or the one whose theta_2 comes nearest to the position."""
+    """Evaluate a motion; drawn is the instant that assembles first, or whose theta_2 comes nearest to the position."""
     sweep = solve(scene)
     _something(sweep)
     assert sweep.time is not None and sweep.omega_2 is not None and sweep.alpha_2 is not None
@@ -213,7 +213,7 @@ def _through_time(scene: Scene, position: float | None) -> View:
 
 
 def representative(sweeps: "list[Solution]") -> float:
-    """A position that shows the bars apart from each other, the same for all sweeps; well conditioned where one is."""
+    """Choose a position, the same for all sweeps, that shows the bars apart; well conditioned where one is."""
     ends = np.flatnonzero(np.diff(np.concatenate([[False], sweeps[0].assembled, [False]]).astype(int))).reshape(-1, 2)
     run = slice(*ends[int(np.argmax(ends[:, 1] - ends[:, 0]))])
     theta_2 = sweeps[0].theta_2[run]

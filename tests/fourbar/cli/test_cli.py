@@ -129,6 +129,18 @@ def test_csv_has_the_same_numbers(run: Fourbar) -> None:
     assert {row["status"] for row in rows} == {"ok"} and {row["drive_bar"] for row in rows} == {"2"}
 
 
+@pytest.mark.parametrize("name", ["=cmd|'calc'!A0", "+1", "-A1", "@SUM(A1)", "P,=1+1", "P\n=1+1"])
+def test_a_heading_of_csv_is_a_word_and_no_formula(name: str, tmp_path: Path, run: Fourbar) -> None:
+    """A spreadsheet calculates a cell that begins with =, and a point's name heads its columns."""
+    save(crank_rocker(points=(fourbar.Point("P", 3, (0.1, 0.7)),)), tmp_path / "scene.toml")
+    header = run("analyze", tmp_path / "scene.toml", "--csv")[1].splitlines()[0]
+    assert "P_x" in header and all(cell.isidentifier() for cell in header.split(","))
+    text = (tmp_path / "scene.toml").read_text()
+    (tmp_path / "scene.toml").write_text(text.replace("P = ", f"{json.dumps(name)} = ", 1))
+    code, out, err = run("analyze", tmp_path / "scene.toml", "--csv")
+    assert (code, out) == (BAD_INPUT, "") and "must be a word of letters" in err
+
+
 def test_degrees_are_of_angles_alone_and_named(run: Fourbar) -> None:
     file = MODELS / "crank_rocker.toml"
     plain, turned = (strict(run("analyze", file, "--json", *more)[1]) for more in ((), ("--degrees",)))

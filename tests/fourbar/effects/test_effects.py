@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import fourbar
-from fourbar.effects import Flywheel, Friction, Gravity, Load, PinFriction, Point, Spring, Springs, Table, Torsion
-from fourbar.effects.cones import NONE, ONE, SEVERAL, settle
+from fourbar.effects import Flywheel, Friction, Gravity, Load, PinFriction, Spring, SpringEnd, Springs, Table, Torsion
+from fourbar.effects.cones import NONE, ONE, SEVERAL, solve_sliding
 from fourbar.errors import InputError, LimitError
 from fourbar.scene import Scene
 from fourbar.scene.motion import Motion, Sweep
@@ -41,7 +41,7 @@ def potential_torque(scene: Scene, energy: object) -> np.ndarray:
 
 
 def test_a_spring_is_the_slope_of_its_energy() -> None:
-    spring = Spring(Point(1, 0.1, -1.5), Point(3, 0.08, 0.2), 200.0, 0.05, 3.0)
+    spring = Spring(SpringEnd(1, 0.1, -1.5), SpringEnd(3, 0.08, 0.2), 200.0, 0.05, 3.0)
 
     def energy(s: fourbar.Solution) -> np.ndarray:
         theta_1 = scene.linkage.ground_angle
@@ -58,7 +58,7 @@ def test_a_spring_is_the_slope_of_its_energy() -> None:
 
 def test_a_spring_without_free_length_has_a_force_where_its_points_meet() -> None:
     """Force k times the distance vector: zero, not NaN, where both ends lie on pin A."""
-    ends = Point(2, 0.1, 0.0), Point(3, 0.0, 0.0)
+    ends = SpringEnd(2, 0.1, 0.0), SpringEnd(3, 0.0, 0.0)
     torque = solve(alone(Springs((Spring(*ends, 100.0),)))).torque
     assert torque is not None and np.array_equal(torque, np.zeros(9))
 
@@ -172,7 +172,7 @@ def test_one_cone_has_one_none_or_two_solutions() -> None:
         ((1.0, 0.0), (1.0 - 2.0**-20, 0.0)): (ONE, 2.0**20, 2.0**-20),
     }
     for (F, C), (number, x, far) in cases.items():
-        found = settle(np.array([[F]]), np.array([[[C]]]), np.array([[1.0]]))
+        found = solve_sliding(np.array([[F]]), np.array([[[C]]]), np.array([[1.0]]))
         assert found.number[0] == number, (F, C)
         assert found.x[0, 0] == pytest.approx(x, rel=1e-15, nan_ok=True), (F, C)
         if far is not None:
@@ -184,7 +184,7 @@ def test_several_cones_one_of_which_is_known() -> None:
     for c1, c2, number in ((0.5, 0.3, ONE), (2.0, 0.3, NONE), (-2.0, 0.3, SEVERAL), (-2.0, -3.0, SEVERAL)):
         F = np.array([[[1.0, 0.0], [2.0, 0.0]]] * 2)
         C = np.array([[[[c1, 0.0], [0.0, 0.0]], [[0.0, 0.0], [c2, 0.0]]]] * 2)
-        found = settle(F, C, np.array([[1.0, 1.0], [0.25, 0.125]]))
+        found = solve_sliding(F, C, np.array([[1.0, 1.0], [0.25, 0.125]]))
         assert list(found.number) == [number, ONE]
         if number != NONE:
             assert found.x[0] == pytest.approx([1.0 / (1.0 - c1), 2.0 / (1.0 - c2)], rel=1e-12)
@@ -293,7 +293,7 @@ def test_each_position_of_a_law_is_that_motion_alone() -> None:
         (lambda: Law((0.0, 1.0, 1.0, 2.0), (0.0, 1.0, 2.0, 3.0)), "motion.law.time"),
         (lambda: Motion(1.0, law=Law((0.0, 1.0), (0.0, 1.0), 5, "rest")), "motion.law"),
         (lambda: Flywheel(1.0, 3), "effects.flywheel.bar"),
-        (lambda: Spring(Point(2, 0.1, 0.0), Point(2, 0.2, 0.0), 1.0), "effects.springs.to.bar"),
+        (lambda: Spring(SpringEnd(2, 0.1, 0.0), SpringEnd(2, 0.2, 0.0), 1.0), "effects.springs.to.bar"),
         (lambda: Torsion.at(A=(0.0, 1.0, 0.0)), "effects.torsion.A.stiffness"),
         (lambda: PinFriction.at(C=(0.1, 0.1)), "effects.pin_friction.C"),
         (lambda: PinFriction.at(A=(-0.1, 0.1)), "effects.pin_friction.A.coefficient"),

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import fourbar
-from fourbar.effects import Gravity, PinFriction, Point, Spring, Springs, Torsion
+from fourbar.effects import Gravity, PinFriction, Spring, SpringEnd, Springs, Torsion
 from fourbar.errors import LimitError
 from fourbar.formulas.mobility import default_range
 from fourbar.linkage import PINS
@@ -39,8 +39,8 @@ def linkage(name: str) -> fourbar.FourBar:
 def test_a_spring_with_both_ends_in_one_pin_has_no_direction(name: str, pin: str) -> None:
     link = linkage(name)
     ends = {
-        "A": (Point(2, link.input.length, 0.0), Point(3, 0.0, 0.0)),
-        "B": (Point(3, link.coupler.length, 0.0), Point(4, link.output.length, 0.0)),
+        "A": (SpringEnd(2, link.input.length, 0.0), SpringEnd(3, 0.0, 0.0)),
+        "B": (SpringEnd(3, link.coupler.length, 0.0), SpringEnd(4, link.output.length, 0.0)),
     }[pin]
     scene = Scene(link, Motion(Sweep(0.3, 5.9, 40), 8.0), effects=(Springs((Spring(*ends, 150.0, 0.05),)),))
     solution = solve(scene, "error")
@@ -53,7 +53,7 @@ def test_a_spring_with_both_ends_in_one_pin_has_no_direction(name: str, pin: str
 
 
 def test_a_spring_whose_ends_meet_once_loses_that_position_alone() -> None:
-    spring = Spring(Point(1, 0.1, 0.5), Point(2, 0.1, 0.0), 200.0, 0.05)
+    spring = Spring(SpringEnd(1, 0.1, 0.5), SpringEnd(2, 0.1, 0.0), 200.0, 0.05)
     at = [0.3, 0.5, 0.5 + 1e-9, 0.7]
     scenes = [
         Scene(linkage("crank-rocker"), Motion(at, 8.0), effects=effects)

@@ -1,17 +1,21 @@
 """Error bars against the true error, by ball arithmetic, where they once were too small, too large, or none."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import fourbar
-from fourbar.effects import Gravity, Load, Point, Spring, Springs, Table, Torsion
+from fourbar.effects import Gravity, Load, Spring, SpringEnd, Springs, Table, Torsion, cones
 from fourbar.linkage import Bar, FourBar
 from fourbar.quantities import PIN_FORCES
 from fourbar.scene import Scene, command
 from fourbar.scene.motion import Motion
 from fourbar_validation.compare.error import magnitude
 from fourbar_validation.engines.exact import BallArithmetic
+from fourbar_validation.lab.stress.mutation.specimens import SPECIMENS
 from fourbar_validation.run import printed
+from fourbar_validation.run.question import Question
 
 TURNS = 2000.0 * np.pi
 
@@ -25,7 +29,7 @@ def sized(k: float = 1.0, turns: float = 0.0) -> Scene:
         Bar(0.22 * k, 0.4, 0.002 * k * k, (0.12 * k, -0.2 + turns)),
         ground_angle=0.2,
     )
-    spring = Spring(Point(1, 0.2 * k, 0.6), Point(3, 0.15 * k, -0.4), 80.0, 0.1 * k, 2.0 * k)
+    spring = Spring(SpringEnd(1, 0.2 * k, 0.6), SpringEnd(3, 0.15 * k, -0.4), 80.0, 0.1 * k, 2.0 * k)
     effects = (Gravity(9.81 * k, -1.3), Springs((spring,)), Torsion.at(B=(0.5 * k * k, 0.7, 0.1 * k * k)))
     load = Load(4, (3.0 * k, 0.7), (0.05 * k, 1.0))
     return Scene(linkage, Motion(np.linspace(0.1, 6.0, 15), 3.0, 2.0), 2, (load,), effects)
@@ -47,7 +51,7 @@ def exactly_one() -> Scene:
 
 SCENES = {f"{k:g} m": sized(k) for k in (1.0, 1e60, 1e-60, 1e-75, 1e100)}
 SCENES |= {"centres of many turns": sized(turns=TURNS), "one": exactly_one()}
-SPRINGS = Springs((Spring(Point(2, 0.1, 0.6), Point(3, 0.05, -0.4), 80.0, 0.01, 2.0),))
+SPRINGS = Springs((Spring(SpringEnd(2, 0.1, 0.6), SpringEnd(3, 0.05, -0.4), 80.0, 0.01, 2.0),))
 SCENES |= {f"{effect.key} near a limit": near_a_limit(effect) for effect in (SPRINGS, Torsion.at(B=(0.5, 0.7, 0.1)))}
 
 
@@ -69,7 +73,7 @@ def test_error_bars_are_of_the_size_of_the_error(name: str) -> None:
 
 def test_a_run_judges_the_bars_where_each_spring_is_nearest_to_its_rest(monkeypatch: pytest.MonkeyPatch) -> None:
     ends = fourbar.Point("P", 1, (0.2, 0.6)), fourbar.Point("Q", 3, (0.15, -0.4))
-    spring = Spring(Point(1, 0.2, 0.6), Point(3, 0.15, -0.4), 80.0, 0.2)
+    spring = Spring(SpringEnd(1, 0.2, 0.6), SpringEnd(3, 0.15, -0.4), 80.0, 0.2)
     table = Table((0.0, 1.0, 4.0, 6.2), (1.0, 1.0, -2.0, -2.0))  # 0 at 2 rad
     scene = Scene(
         FourBar(0.3, Bar(0.1), Bar(0.25), Bar(0.22)),
@@ -86,7 +90,41 @@ def test_a_run_judges_the_bars_where_each_spring_is_nearest_to_its_rest(monkeypa
     ]
     seen: list[np.ndarray] = []
     true = fourbar.solve
+    question = Question("", scene, command(scene))
+    assert question.solution is not None
     monkeypatch.setattr(printed, "solve", lambda *given, at: seen.append(at.theta_2) or true(*given, at=at))
-    rows = list(printed._error_bars("", scene, command(scene), whole))
+    rows = list(printed.check_error_bars(question))
     assert {row.verdict for row in rows} == {"agrees"}
     assert {whole.theta_2[np.argmin(np.abs(gap))] for gap in away} <= set(seen[0])
+
+
+def test_a_bar_is_of_the_motion_that_begins_to_one_side() -> None:
+    """The bar of a linkage about to move was the friction itself, of which the other evaluation knew nothing."""
+    still = replace(sized(), motion=Motion(np.array([1.0, 2.0]), 0.0), effects=(fourbar.Friction.at(A=0.5, O4=2.0),))
+    for side in (-1, 1):
+        torque_error = fourbar.solve(still, "error", side=side).torque_error
+        assert torque_error is not None and torque_error.max() < 1e-13
+
+
+def test_a_bar_is_as_wide_as_what_a_position_loses() -> None:
+    """Where a spring's ends nearly meet the direction in which it pulls is lost, which is no power of any sine."""
+    scene = SPECIMENS["ends of a spring nearly meet"]
+    rows = printed.check_error_bars(Question("", scene, command(scene)))
+    assert [row.verdict for row in rows] == ["agrees", "agrees"]
+
+
+def test_a_long_sweep_searches_for_friction_at_its_ends_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Eight thousand positions of several loaded pins, each searched from many starts, took eight minutes."""
+    searched, search = [], cones._search
+    monkeypatch.setattr(cones, "_search", lambda *problem: searched.append(1) or search(*problem))
+    jammed = replace(
+        sized(),
+        motion=Motion(np.array([0.3, 0.5]), 10.0),
+        effects=(fourbar.PinFriction.at(A=(50.0, 0.01), B=(40.0, 0.02)),),
+    )
+    question = Question("", jammed, command(jammed))
+    assert set(question.solution.status) == {"jammed"}
+    del searched[:]
+    (row,) = printed.check_blocks(question)
+    assert row.passed
+    assert 0 < len(searched) < 10

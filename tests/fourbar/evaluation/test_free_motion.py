@@ -141,3 +141,23 @@ def test_pin_forces_pass_a_limit_position_smoothly(monkeypatch: pytest.MonkeyPat
     change, steps = np.abs(np.diff(F, axis=0)).max(axis=(1, 2)), np.diff(times)
     even = np.abs(np.diff(F[np.isin(times, evenly)], axis=0)).max() / 0.01
     assert np.all(change <= STEEPER * even * steps + BY_ENERGY * size)
+
+
+@pytest.mark.parametrize(("pin", "bar"), [("O2", 2), ("O4", 4)])
+def test_friction_that_holds_at_the_ground_loads_the_pins_as_a_drive_there(pin: str, bar: int) -> None:
+    """The ground's couple on a bar is that of a drive on it, which holds a linkage still just as well."""
+    held = fourbar.Motion(0.3, 0.0, free=fourbar.Free(0.2, 4))
+    s = solve(fourbar.Scene(HANGING, held, effects=(fourbar.Gravity(), fourbar.Friction.at(**{pin: 9.0}))))
+    driven = solve(fourbar.Scene(HANGING, fourbar.Motion(0.3, 0.0), bar, effects=(fourbar.Gravity(),)))
+    assert s.alpha_2 is not None and not s.alpha_2.any()
+    for force in PINS:
+        assert np.allclose(getattr(s, force), getattr(driven, force), rtol=0.0, atol=1e-12)
+
+
+def test_what_begins_to_move_against_friction_does_so_at_once() -> None:
+    motion = fourbar.Motion(0.3, 0.0, free=fourbar.Free(1e-4, 2))
+    s = solve(fourbar.Scene(HANGING, motion, effects=(fourbar.Gravity(), fourbar.Friction.at(O4=0.02))))
+    assert s.alpha_2 is not None and s.alpha_2[0] != 0.0
+    assert np.allclose(s.alpha_2, s.alpha_2[1], rtol=1e-5)
+    for force in PINS:
+        assert np.allclose(getattr(s, force), getattr(s, force)[1], rtol=1e-4, atol=1e-5)

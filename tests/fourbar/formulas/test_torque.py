@@ -333,7 +333,7 @@ def test_bars_whose_inertia_about_the_pin_is_one() -> None:
 def test_springs_tables_and_rest_have_the_torque_of_the_thirteen_equations(drive: int) -> None:
     """What depends on O4, on theta_2 and on rest next to motion, in one sweep."""
     linkage = of(SHAPES["crank-rocker"])
-    ends = fourbar.effects.Point(1, 0.2, 0.3), fourbar.effects.Point(4, 0.15, 0.2)
+    ends = fourbar.effects.SpringEnd(1, 0.2, 0.3), fourbar.effects.SpringEnd(4, 0.15, 0.2)
     table = fourbar.effects.Table((0.0, 2.0, 6.0), (1.0, 3.0, -1.0))
     loads = (fourbar.Load(3, (2.0, 0.3), (0.1, 2.0), 0.4, table=table),)
     effects = (

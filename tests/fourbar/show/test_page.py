@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import fourbar
-from fourbar.effects import Point
+from fourbar.effects import SpringEnd
 from fourbar.files import loads
 from fourbar.show import animate
 from fourbar.show.tolerances import PAGE_SAMPLES
@@ -256,7 +256,7 @@ def test_the_page_names_a_linkage_as_fourbar_does(browse) -> None:
 
 
 def test_what_acts_is_drawn_at_its_place_and_dimensions_on_request(browse) -> None:
-    spring = fourbar.Spring(Point(1, 0.1, -0.5), Point(4, 0.08, 0.0), 20.0, 0.1)
+    spring = fourbar.Spring(SpringEnd(1, 0.1, -0.5), SpringEnd(4, 0.08, 0.0), 20.0, 0.1)
     load = fourbar.Load(3, (2.0, 0.5), (0.03, 1.0), frame="bar")
     scene = crank_rocker(loads=(load,), effects=(fourbar.Springs((spring,)), fourbar.Gravity()))
     driver = browse(animate.page(scene))

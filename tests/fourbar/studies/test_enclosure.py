@@ -13,7 +13,7 @@ import pytest
 import fourbar
 from fourbar import Friction, InputError, Motion, Scene, Sweep, Tolerance
 from fourbar.cli import status
-from fourbar.effects import Gravity, Point, Spring, Springs
+from fourbar.effects import Gravity, Spring, SpringEnd, Springs
 from fourbar.scene import Command
 from fourbar.studies import enclosure, interval
 from fourbar.studies.enclosure import PROVEN, Extremes, extremes
@@ -156,7 +156,7 @@ def test_the_bound_of_a_box_holds_at_its_ends(rocker: tuple[Scene, Extremes]) ->
 
 def meeting(distance: float) -> Scene:
     """A spring whose ends nearly meet once in a turn: the boxes there hold a distance of 0."""
-    spring = Spring(Point(1, distance, 0.5), Point(2, 0.1, 0.0), 1000.0, 0.5)
+    spring = Spring(SpringEnd(1, distance, 0.5), SpringEnd(2, 0.1, 0.0), 1000.0, 0.5)
     return Scene(fourbar.uniform(0.3, 0.1, 0.25, 0.22), Motion(0.0, 10.0), 2, (), (Springs((spring,)),))
 
 
@@ -223,7 +223,7 @@ def test_a_torque_that_springs_balance_is_bounded_by_as_many_boxes_as_are_allowe
     """Its 1e-16 N m would take boxes as narrow as they get."""
     monkeypatch.setattr(enclosure, "MANY", 128)
     bars = (fourbar.Bar(0.1, 2.0, 1e-3, (0.05, 0.0)), fourbar.Bar(0.25), fourbar.Bar(0.22))
-    balancing = Springs((Spring(Point(1, 0.1, 0.5 * math.pi), Point(2, 0.1, 0.0), 80.0),))
+    balancing = Springs((Spring(SpringEnd(1, 0.1, 0.5 * math.pi), SpringEnd(2, 0.1, 0.0), 80.0),))
     scene = Scene(fourbar.FourBar(0.3, *bars), Motion(0.0, 10.0), 2, (), (Gravity(8.0), balancing))
     found = extremes(scene, ["torque"])
     assert 4 * 128 < found.boxes < 20 * 128  # over two searches

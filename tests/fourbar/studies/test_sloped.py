@@ -22,8 +22,8 @@ from fourbar.effects import (
     Gravity,
     Load,
     PinFriction,
-    Point,
     Spring,
+    SpringEnd,
     Springs,
     Torsion,
     Viscous,
@@ -47,8 +47,8 @@ LEVEL = FourBar(
     0.1, Bar(0.1, 1.0, 1e-3, (0.05, 0.0)), Bar(0.06, 2.0, 1e-2, (0.03, 0.0)), Bar(0.12, 1.5, 1e-2, (0.06, 0.0))
 )
 """Ground and input are equal: which is shorter is open within their tolerances."""
-MEETING = Spring(Point(1, 0.1005, 0.5), Point(2, 0.1, 0.0), 1000.0, 0.5)
-LOOSE = Spring(Point(1, 0.1, 2.0), Point(3, 0.1, 0.0), 1000.0, 0.5, 500.0)
+MEETING = Spring(SpringEnd(1, 0.1005, 0.5), SpringEnd(2, 0.1, 0.0), 1000.0, 0.5)
+LOOSE = Spring(SpringEnd(1, 0.1, 2.0), SpringEnd(3, 0.1, 0.0), 1000.0, 0.5, 500.0)
 
 
 def scene(
@@ -95,7 +95,12 @@ def compared(monkeypatch: pytest.MonkeyPatch) -> Iterator[dict[tuple[str, int], 
 
     def noted(holds: Any, fails: Any) -> Any:
         mask, frame = true(holds, fails), sys._getframe(1)
-        while frame.f_back and Path(frame.f_code.co_filename).parts[-2] not in ("effects", "formulas", "scene"):
+        while frame.f_back and Path(frame.f_code.co_filename).parts[-2] not in (
+            "effects",
+            "formulas",
+            "evaluation",
+            "scene",
+        ):
             frame = frame.f_back
         place = "/".join(Path(frame.f_code.co_filename).parts[-2:]), frame.f_lineno
         found[place] = found.get(place, False) or isinstance(mask, Undecided)

@@ -12,8 +12,8 @@ from fourbar.effects import (
     Gravity,
     Load,
     PinFriction,
-    Point,
     Spring,
+    SpringEnd,
     Springs,
     Torsion,
     Viscous,
@@ -33,7 +33,7 @@ LOADS = (
     Load(4, None, (0.0, 0.0), -0.15),
     Load(2, (3.0, 0.2), (0.01, 0.1), 0.0, "bar"),
 )
-SPRINGS = Springs((Spring(Point(1, 0.1, -1.5), Point(4, 0.08, 0.1), 200.0, 0.12, 3.0),))
+SPRINGS = Springs((Spring(SpringEnd(1, 0.1, -1.5), SpringEnd(4, 0.08, 0.1), 200.0, 0.12, 3.0),))
 DRIVEN = (
     *(Gravity(9.81, -1.5), Viscous.at(O2=0.01, A=0.02), Friction.at(B=0.05)),
     *(Torsion.at(B=(2.0, 0.5, 0.1)), SPRINGS, Flywheel(0.02, 2)),

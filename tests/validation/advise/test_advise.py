@@ -17,7 +17,7 @@ from fourbar_validation.cli import status as ended
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.rows import FAILS
 from fourbar_validation.engines.mujoco.closed_loop import O2, ClosedLoop
-from fourbar_validation.engines.mujoco.trial import Rig
+from fourbar_validation.engines.mujoco.trial import TrialSetup
 from fourbar_validation.engines.witnesses import WITNESSES
 from fourbar_validation.lab.cost import measure
 from fourbar_validation.lab.cost.exhaustive import cheapest
@@ -67,7 +67,7 @@ def test_the_file_alone_keeps_the_error(tmp_path: Path) -> None:
 def test_what_lies_between_two_steps_is_judged_too() -> None:
     """Two steps are right at both of their ends, and miss what the pin forces do amid them."""
     scene = replace(turning(), motion=fourbar.Motion(fourbar.Sweep(0.0, 1.0, 36), 10.0))
-    rig = Rig(scene, advise.looked_at(scene))
+    rig = TrialSetup(scene, advise.looked_at(scene))
     trial = rig.try_out(advise.dialled(12.0, 6.0))
     assert trial.steps == 2 and errors(scene, trial.at, trial.quantities).worst < 2e-3
     assert matters.judged(scene, trial).worst > 0.1
@@ -111,7 +111,7 @@ def test_an_error_is_between_0_and_1(required: float) -> None:
 
 
 def test_unseen_linkages_are_served_and_not_at_three_times_the_cheapest() -> None:
-    """A few of those of `advise-study`, of every type, judged between the positions that the advice saw."""
+    """A few of those of `advise --study`, of every type, judged between the positions that the advice saw."""
     costs = {("RK4", True): 1.0}
     for index in range(2):
         case = measure.case(99, index, costs)
@@ -120,7 +120,7 @@ def test_unseen_linkages_are_served_and_not_at_three_times_the_cheapest() -> Non
 
 def test_the_search_knows_when_nothing_serves() -> None:
     scene = turning(positions=12)
-    rig = Rig(scene, command(scene))
+    rig = TrialSetup(scene, command(scene))
     assert cheapest(rig, 1e-3, {("RK4", True): 1.0}) is not None
     trials: list[object] = []
     rig.try_out = lambda settings, build=None: trials.append(settings) or hopeless(scene)  # type: ignore[method-assign,func-returns-value]
@@ -128,7 +128,7 @@ def test_the_search_knows_when_nothing_serves() -> None:
 
 
 def hopeless(scene: fourbar.Scene) -> object:
-    made = Rig(scene, command(scene)).try_out(advise.dialled(10.0, 3.0))
+    made = TrialSetup(scene, command(scene)).try_out(advise.dialled(10.0, 3.0))
     made.broken = "lost"
     return made
 
@@ -136,11 +136,11 @@ def hopeless(scene: fourbar.Scene) -> object:
 def test_a_count_that_cannot_decide_says_which_one_can(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    case = measure.Case(0, "drag-link", 1.0, True, 2, 1e-3, True, 5e-4, 20.0, 19.0, 5)
+    case = measure.AdviceCase(0, "drag-link", 1.0, True, 2, 1e-3, True, 5e-4, 20.0, 19.0, 5)
     monkeypatch.setattr(measure, "case", lambda seed, index, costs: replace(case, index=index))
     monkeypatch.setattr(measure, "relative_costs", lambda rig: {})
     for count, status in ((40, 1), (73, 0)):
-        assert ended(["advise-study", "--count", str(count), "--out", str(tmp_path / f"{count}.csv")]) == status
+        assert ended(["advise", "--study", "--count", str(count), "--out", str(tmp_path / f"{count}.csv")]) == status
         stated = "undecided: with 0 not met the bound is reached from --count 73 on" in capsys.readouterr().out
         assert stated == (status == 1)
 
@@ -148,9 +148,9 @@ def test_a_count_that_cannot_decide_says_which_one_can(
 def test_a_measure_is_resumed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     made: list[int] = []
 
-    def case(seed: int, index: int, costs: object) -> measure.Case:
+    def case(seed: int, index: int, costs: object) -> measure.AdviceCase:
         made.append(index)
-        return measure.Case(index, "drag-link", 1.0, True, 2, 1e-3, True, 5e-4, 20.0, 19.0, 5)
+        return measure.AdviceCase(index, "drag-link", 1.0, True, 2, 1e-3, True, 5e-4, 20.0, 19.0, 5)
 
     monkeypatch.setattr(measure, "case", case)
     monkeypatch.setattr(measure, "relative_costs", lambda rig: {})
@@ -193,7 +193,7 @@ def test_what_matters_for_a_scene_is_measured_and_stated_with_its_reason() -> No
     hood = fourbar.Scene(fourbar.FourBar(0.11, *bars), motion, effects=(fourbar.Gravity(),))
     for scene, setting, why in ((hood, "the stiffness by pads", "lighter of coupler and output"),
                                 (turning(10.0, 36), "the timestep", "fourth power")):  # fmt: skip
-        rig = Rig(scene, advise.looked_at(scene))
+        rig = TrialSetup(scene, advise.looked_at(scene))
         first, *others = found = matters.influences(scene, rig, advise.dialled(40.0, 12.0))
         assert first.setting == setting and first.times > 10.0 and why in matters.sentence(found)
         assert all(first.times >= other.times for other in others)

@@ -16,7 +16,7 @@ from fourbar.errors import BAD_INPUT, FAILED, HOLDS
 from fourbar.quantities import OK, UNITS, VECTORS
 from fourbar.scene import Command, Scene, command
 from fourbar.solve import solve
-from fourbar_validation.check.judge import Tolerance
+from fourbar_validation.check.judge import Allowance
 from fourbar_validation.check.judgement import Judgement, judge_table
 from fourbar_validation.check.theirs import LARGEST_FILE, NOT_JUDGED, read_table
 from fourbar_validation.cli import status
@@ -520,7 +520,7 @@ def test_a_mistake_is_recognised_in_numbers_that_are_right_only_to_the_stated_to
     numbers = right(SCENES["crank_rocker"])
     numbers["torque"] = numbers["torque"] * 1e3 * (1.0 + 1e-4 * np.sin(np.arange(len(numbers["torque"]))))
     table = read_table(write(tmp_path / "theirs.csv", numbers))
-    found = judge_table(SCENES["crank_rocker"], table, Tolerance(rtol=1e-3))
+    found = judge_table(SCENES["crank_rocker"], table, Allowance(rtol=1e-3))
     assert "N mm where N m" in found.explanations[0].text and found.explanations[0].complete
 
 

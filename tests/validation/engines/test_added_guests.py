@@ -23,7 +23,7 @@ from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.report.record import Record
 from fourbar_validation.report.summary import Summary
 from fourbar_validation.run import pool
-from fourbar_validation.run.run import run
+from fourbar_validation.run.run import RunOptions, run
 from fourbar_validation.run.selection import chosen
 from fourbar_validation.scenes.suites import scene_files
 from tests.support.here import judge_here
@@ -326,7 +326,7 @@ def test_parts_judged_with_another_code_or_limit_are_made_again(
 
     def notes(factor: str, seconds: float | None = None) -> list[str]:
         (tmp_path / "near.py").write_text(NEAR.replace("FACTOR", factor))
-        steps = run(suite, tmp_path / "out", added.named(["mine:Mine"], ()), seconds=seconds, drawn=False)
+        steps = run(suite, tmp_path / "out", added.named(["mine:Mine"], ()), RunOptions(seconds=seconds, drawn=False))
         found = []
         for step in steps:
             found += [step] if isinstance(step, str) else []
@@ -345,6 +345,8 @@ def test_a_scene_without_rows_fails(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     save(SCENE, tmp_path / "scene.toml")
     judge_here(monkeypatch)
     monkeypatch.setattr(pool, "judged", lambda name, *_, **__: Record(name))
-    *_, last = run(scene_files((tmp_path / "scene.toml",)), tmp_path / "out", chosen("free-body"), drawn=False)
+    *_, last = run(
+        scene_files((tmp_path / "scene.toml",)), tmp_path / "out", chosen("free-body"), RunOptions(drawn=False)
+    )
     assert isinstance(last, Summary) and last.counts.status == FAILED
     assert "nothing was judged" in (tmp_path / "out" / "results.csv").read_text()

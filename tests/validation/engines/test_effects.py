@@ -19,8 +19,8 @@ from fourbar.effects import (
     Gravity,
     Load,
     PinFriction,
-    Point,
     Spring,
+    SpringEnd,
     Springs,
     Table,
     Torsion,
@@ -48,8 +48,8 @@ ACTING: dict[str, Effect] = {
     "torsion": Torsion.at(O4=(2.0, 1.9, 0.1), B=(1.0, 0.8, -0.2)),
     "springs": Springs(
         (
-            Spring(Point(1, 0.1, -1.5), Point(4, 0.08, 0.2), 200.0, 0.05, 3.0),
-            Spring(Point(2, 0.05, 0.5), Point(3, 0.1, 0.3), 50.0, 0.05, 1.0),
+            Spring(SpringEnd(1, 0.1, -1.5), SpringEnd(4, 0.08, 0.2), 200.0, 0.05, 3.0),
+            Spring(SpringEnd(2, 0.05, 0.5), SpringEnd(3, 0.1, 0.3), 50.0, 0.05, 1.0),
         )
     ),
     "flywheel": Flywheel(0.02, 2),
@@ -57,7 +57,7 @@ ACTING: dict[str, Effect] = {
     "load over theta_2": Load(3, (4.0, 0.7), (0.05, 1.0), 0.2, "world", TABLE),
 }
 EXACT = [witness for witness in WITNESSES if not witness.through_time]
-SIMULATED = [replace(witness, order="") for witness in WITNESSES if witness.through_time]
+SIMULATED = [replace(witness, order=None) for witness in WITNESSES if witness.through_time]
 ENGINES = {"pinocchio-inverse", "mujoco-inverse"}
 """What acts by `TERM_OF`, the table of the engines."""
 INVERSE = {*ENGINES, "free-body"}
@@ -184,11 +184,11 @@ def moved(effect: Effect) -> Effect:
 @contextmanager
 def formulas_see(change: Callable[[Scene], Scene]) -> Iterator[None]:
     """The formulas work on a changed scene, the engines on the true one."""
-    import fourbar_validation.run.judge
+    import fourbar_validation.run.question
 
-    true = fourbar_validation.run.judge.solve
+    true = fourbar_validation.run.question.solve
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(fourbar_validation.run.judge, "solve", lambda scene, *a, **k: true(change(scene), *a, **k))
+        patch.setattr(fourbar_validation.run.question, "solve", lambda scene, *a, **k: true(change(scene), *a, **k))
         yield
 
 
@@ -270,8 +270,8 @@ def test_a_fault_in_the_wrench_on_the_free_bodies_fails_the_run(
     name: str, factor: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def faulty(right: Callable[..., None]) -> Callable[..., None]:
-        def act(effect: Any, motion: Any, wrenches: free_body_effects.Wrenches) -> None:
-            alone = free_body_effects.Wrenches(len(motion.theta_2))
+        def act(effect: Any, motion: Any, wrenches: free_body_effects.BodyWrenches) -> None:
+            alone = free_body_effects.BodyWrenches(len(motion.theta_2))
             right(effect, motion, alone)
             for bar in (2, 3, 4):
                 wrenches.push(bar, factor * alone.force[bar], 0.0)

@@ -4,9 +4,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
-from importlib import import_module
 from importlib.util import find_spec
-from pkgutil import resolve_name
 from typing import Any, ClassVar
 
 import numpy as np
@@ -26,14 +24,14 @@ from fourbar_validation.engines.effects import TERM_OF
 from fourbar_validation.engines.limits import LIGHTEST
 from fourbar_validation.engines.mujoco.inverse import MujocoInverse, MujocoTree
 from fourbar_validation.engines.witnesses import FURTHER, WITNESSES
-from fourbar_validation.scenes.random import LinkageType
+from fourbar_validation.scenes.random import DrawnType
 from fourbar_validation.scenes.suites import Random
 from tests.support.scenes import thesis
 from tests.validation.engines.test_effects import ACTING, scene
 
 WITNESS = {witness.name: witness for witness in (*WITNESSES, *FURTHER) if not witness.through_time}
-TREES = {"pinocchio-inverse": "PinocchioTree", "mujoco-inverse": "MujocoTree", "drake-inverse": "DrakeTree"}
-BARS = {**TREES, "exudyn-constraints": "ExudynBars", "opensim-constraints": "OpenSimBars"}
+TREES = ("pinocchio-inverse", "mujoco-inverse", "drake-inverse")
+BARS = (*TREES, "exudyn-constraints", "opensim-constraints")
 OWN = {"exudyn-constraints": {"viscous", "torsion", "springs"}}
 """Effects that an engine has elements for."""
 PRINTED = 5e-10
@@ -137,7 +135,7 @@ def test_each_load_and_effect(name: str) -> None:
 
 @further
 def test_random_linkages(name: str) -> None:
-    suite = Random(20, 3, tuple(LinkageType))
+    suite = Random(20, 3, tuple(DrawnType))
     for index in range(len(suite)):
         assert failures(name, suite.scene(index), every=6) == [], suite.name(index)
 
@@ -343,21 +341,23 @@ PLANTED = {
 """By engine and method: what is put in its place, and the quantities on which that must show."""
 
 
+SPOILED = Scene(bars(MECHANISMS["crank-rocker"]), Motion(np.linspace(0.3, 6.0, 6), 10.0, 3.0), 4, LOADS, EFFECTS)
+
+
 def judged(name: str) -> set[str]:
-    motion = Motion(np.linspace(0.3, 6.0, 6), 10.0, 3.0)
-    return {found for found, _ in failures(name, Scene(bars(MECHANISMS["crank-rocker"]), motion, 4, LOADS, EFFECTS))}
+    return {found for found, _ in failures(name, SPOILED)}
 
 
 @each_engine
 def test_a_planted_fault_shows(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    owner = getattr(import_module(WITNESS[name].adapter.partition(":")[0]), BARS[name])
+    owner: Any = type(WITNESS[name].engine().build(SPOILED))  # type: ignore[attr-defined]
     assert judged(name) == set()
     for method, (fault, seen) in PLANTED[name].items():
         with monkeypatch.context() as patch:
             patch.setattr(owner, method, fault(getattr(owner, method)))
             assert seen <= judged(name), method
-    right = loop.Position.find
-    monkeypatch.setattr(loop.Position, "find", lambda self, theta_2, branch: right(self, theta_2, -branch))
+    right = loop.Assembler.find
+    monkeypatch.setattr(loop.Assembler, "find", lambda self, theta_2, branch: right(self, theta_2, -branch))
     assert {"theta_3", "theta_4", "torque"} <= judged(name)
 
 
@@ -427,11 +427,8 @@ def test_near_a_jam_an_engine_finds_the_one_solution_that_there_is(
     for arms, jams in ((r, False), (50.0, True)):
         friction = PinFriction.at(**dict.fromkeys(("A", "B", "O4"), (mu, arms)))
         whole = Scene(link, motion, drive, (), (Gravity(), friction))
-        names = (
-            "fourbar_validation.engines.pinocchio:PinocchioInverse",
-            "fourbar_validation.engines.free_body:FreeBody",
-        )
-        answers = [resolve_name(name)().answer(whole, command(whole)) for name in names]
+        names = ("pinocchio-inverse", "free-body")
+        answers = [WITNESS[name].engine().answer(whole, command(whole)) for name in names]
         engine, bodies = (answer.quantities["torque"][0] for answer in answers)
         assert math.isnan(engine) is math.isnan(bodies) is jams
         assert jams or abs(engine - bodies) <= 1e-9 * abs(bodies)  # of some 1e-12 that rounding leaves near a jam

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import fourbar
-from fourbar.effects import Flywheel, Friction, Gravity, Load, PinFriction, Point, Spring, Springs, Viscous
+from fourbar.effects import Flywheel, Friction, Gravity, Load, PinFriction, Spring, SpringEnd, Springs, Viscous
 from fourbar.linkage import PINS
 from fourbar.quantities import STAGE_OF
 from fourbar.scene import Scene, command
@@ -139,7 +139,7 @@ def test_weight_of_a_crank_and_a_flywheel() -> None:
         assert got[name][0] == pytest.approx([0.0, 0.0], abs=1e-14)
 
 
-SPRING = Springs((Spring(Point(1, 0.1, -1.5), Point(4, 0.08, 0.2), 200.0, 0.05, 3.0),))
+SPRING = Springs((Spring(SpringEnd(1, 0.1, -1.5), SpringEnd(4, 0.08, 0.2), 200.0, 0.05, 3.0),))
 TORSION = fourbar.effects.Torsion.at(O4=(2.0, 1.9, 0.1))
 
 

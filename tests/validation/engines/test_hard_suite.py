@@ -10,33 +10,31 @@ import pytest
 from markupsafe import escape
 
 import fourbar
-import fourbar_validation.run.judge
+import fourbar_validation.run.question
 from fourbar.mjcf import RECIPE, Settings
 from fourbar.scene import Command, Scene
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.compare import COMPARED
 from fourbar_validation.compare.rows import AGREES, DEGRADED, FAILS, UNDECIDED, VERDICTS
 from fourbar_validation.compare.tolerance import FULL_ACCURACY
-from fourbar_validation.engines.exact import where_it_closes
 from fourbar_validation.engines.hard_suite import HARD_WITNESSES, Hard
 from fourbar_validation.engines.limits import LIMITS
 from fourbar_validation.engines.mujoco import simulate
 from fourbar_validation.engines.mujoco.closed_loop import ClosedLoop
 from fourbar_validation.engines.mujoco.shipped import shipped
 from fourbar_validation.engines.prediction import from_data, in_world_axes
-from fourbar_validation.engines.witnesses import Witness
+from fourbar_validation.engines.witnesses import Predictor, Witness, answering_nearby
 from fourbar_validation.report.hard_page import page
-from fourbar_validation.report.record import Record
 from fourbar_validation.run.judge import judge
-from fourbar_validation.run.released import as_pendulum, judge_released
+from fourbar_validation.run.released import as_pendulum
 from fourbar_validation.scenes import hard_families as families
 from fourbar_validation.scenes.hard_families import FAMILIES, TOGGLE, Family, toggle
 from fourbar_validation.scenes.hard_linkages import at, collinear_3_4, dressed, linkage_of
-from fourbar_validation.scenes.random import LinkageType
+from fourbar_validation.scenes.random import DrawnType
 from tests.support.engine_limits import MEASURED, Measured
 from tests.support.scenes import crank_rocker
 
-EXACT = tuple(w for w in HARD_WITNESSES if w.name != "mujoco-simulated")
+EXACT = tuple(w for w in HARD_WITNESSES if not w.through_time)
 SWEEP = crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.1, 0.1 + 2 * math.pi, 30), 10.0))
 
 
@@ -65,7 +63,7 @@ def _fewer(scene: Scene, steps: int = 12) -> Scene:
 
 
 def test_beyond_a_toggle_no_engine_finds_a_position() -> None:
-    lengths = linkage_of(LinkageType.TRIPLE_ROCKER, 0)
+    lengths = linkage_of(DrawnType.TRIPLE_ROCKER, 0)
     (psi, stretched), *_ = collinear_3_4(lengths)
     beyond = at(dressed(lengths), psi + (1.0 if stretched else -1.0) * np.array(TOGGLE))
     assert not fourbar.solve(beyond).assembled.any()
@@ -83,7 +81,7 @@ def test_near_a_toggle_all_but_the_sine_has_its_digits_though_it_has_few_itself(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """A millionth of the torque stood within what the last digits of theta_2 excuse there, for every engine."""
-    lengths, true = linkage_of(LinkageType.TRIPLE_ROCKER, 0), fourbar_validation.run.judge.solve
+    lengths, true = linkage_of(DrawnType.TRIPLE_ROCKER, 0), fourbar_validation.run.question.solve
     (psi, stretched), *_ = collinear_3_4(lengths)
     near = at(dressed(lengths), psi + (-1.0 if stretched else 1.0) * np.array([*families.REGULAR, 1e-9]))
     balls = [witness for witness in HARD_WITNESSES if witness.nearby]
@@ -92,7 +90,7 @@ def test_near_a_toggle_all_but_the_sine_has_its_digits_though_it_has_few_itself(
         return {row.quantity: row.verdict for row in judge("", near, balls).rows if row.engine == balls[0].name}
 
     assert set(verdicts().values()) == {AGREES}
-    without = [replace(balls[0], nearby="")]
+    without = [replace(balls[0], nearby=False)]
     rows = {row.quantity: row for row in judge("", near, without).rows if row.engine == balls[0].name}
     assert rows["torque"].verdict == DEGRADED and rows["torque"].allowed > 1e-6
 
@@ -101,16 +99,27 @@ def test_near_a_toggle_all_but_the_sine_has_its_digits_though_it_has_few_itself(
         solution.torque[-1] *= 1.0 + 1e-6
         return solution
 
-    monkeypatch.setattr(fourbar_validation.run.judge, "solve", spoiled)
+    monkeypatch.setattr(fourbar_validation.run.question, "solve", spoiled)
     assert verdicts()["torque"] == FAILS
 
 
 def test_an_answer_nearby_is_one_within_the_rounding_of_theta_2() -> None:
     scene = dressed(families.PLAIN)
     command = fourbar.command(at(scene, [0.7, 0.7 + 4.0 * 2.0**-52, 0.7 + 1e-13]))
-    sine = np.broadcast_to(fourbar.solve(at(scene, [0.7])).sin_mu, 3)
-    found = where_it_closes(scene, command, sine, np.ones(3, dtype=bool))["torque"]
-    assert np.isfinite(found).tolist() == [True, True, False]
+    formulas, balls = fourbar.solve(at(scene, [0.7] * 3)), HARD_WITNESSES[0]
+    nearby = answering_nearby(balls, scene, command, formulas)
+    assert nearby is not None and np.isfinite(nearby(np.ones(3, dtype=bool))["torque"]).tolist() == [True, True, False]
+
+
+def test_an_answer_nearby_has_the_sine_of_the_formulas() -> None:
+    """Of a shift in many digits: 1e-9 rad from a limit position a sine of the formulas is met to its last digit."""
+    lengths = linkage_of(DrawnType.TRIPLE_ROCKER, 0)
+    (psi, stretched), *_ = collinear_3_4(lengths)
+    near = at(dressed(lengths), psi + (-1.0 if stretched else 1.0) * np.array([0.3, 1e-3, 1e-9]))
+    command, formulas = fourbar.command(near), fourbar.solve(near)
+    nearby = answering_nearby(HARD_WITNESSES[0], near, command, formulas)
+    assert nearby is not None
+    np.testing.assert_allclose(nearby(np.ones(3, dtype=bool))["sin_mu"], formulas.sin_mu, rtol=1e-15)
 
 
 class Spoiled:
@@ -133,9 +142,9 @@ class AlmostRight(Spoiled):
     part = 1e-10
 
 
-def verdict_of(engine: type, scene: Scene, predictor: str) -> tuple[str, float]:
+def verdict_of(engine: type, scene: Scene, predictor: Predictor | None) -> tuple[str, float]:
     tolerance = FULL_ACCURACY if predictor else _equivalence()
-    witness = Witness("spoiled", f"{__name__}:{engine.__name__}", tolerance, predictor=predictor)
+    witness = Witness("spoiled", engine, tolerance, predictor=predictor)
     row = next(r for r in judge("scene", scene, [witness]).rows if r.engine == "spoiled" and r.quantity == "F32")
     return row.verdict, row.allowed
 
@@ -148,13 +157,12 @@ def _equivalence() -> Any:
 
 def test_near_a_toggle_a_wrong_force_fails_that_the_law_excuses() -> None:
     """1e-8 rad from a toggle K eps/s^3 allows all; roundings of the data allow 4e-5."""
-    lengths = linkage_of(LinkageType.TRIPLE_ROCKER, 1)
+    lengths = linkage_of(DrawnType.TRIPLE_ROCKER, 1)
     (psi, _), *_ = collinear_3_4(lengths)
     scene = at(dressed(lengths, 1), psi - 1e-8)
-    predictor = "fourbar_validation.engines.prediction:in_world_axes"
-    assert verdict_of(Wrong, scene, "")[0] == AGREES
-    assert verdict_of(Wrong, scene, predictor)[0] == FAILS
-    verdict, allowed = verdict_of(AlmostRight, scene, predictor)
+    assert verdict_of(Wrong, scene, None)[0] == AGREES
+    assert verdict_of(Wrong, scene, in_world_axes)[0] == FAILS
+    verdict, allowed = verdict_of(AlmostRight, scene, in_world_axes)
     assert verdict == DEGRADED and allowed < Wrong.part
 
 
@@ -245,7 +253,7 @@ def test_a_reset_and_what_caused_it_are_seen(what: str, monkeypatch: pytest.Monk
 
 def test_an_alarm_fails_its_row(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(simulate, "alarms", lambda *_: ["the sky falls"])
-    rows = [r for r in judge("scene", SWEEP, [w for w in HARD_WITNESSES if w.name == "mujoco-simulated"]).rows]
+    rows = [r for r in judge("scene", SWEEP, [w for w in HARD_WITNESSES if w.through_time]).rows]
     assert any(row.verdict == FAILS and row.reason == "the sky falls" for row in rows)
 
 
@@ -257,7 +265,7 @@ def test_a_free_motion_through_change_points_in_every_engine() -> None:
     phi, _ = pendulum.motion(np.array([10.0]))
     assert abs(math.cos(phi[0] + math.pi / 2) - 0.478385058) < 1e-9
     assert abs(math.sin(phi[0] + math.pi / 2) - 0.878150179) < 1e-9
-    rows = {(row.engine, row.quantity): row for row in judge_released(Record(name, scene)).rows}
+    rows = {(row.engine, row.quantity): row for row in judge(name, scene).rows}
     assert all(row.passed for row in rows.values())
     assert rows["formulas", "theta_2"].error < 1e-11
     assert rows["pinocchio-forward", "theta_2"].error < 1e-8 and rows["pinocchio-forward", "energy"].error < 1e-9
@@ -277,7 +285,7 @@ def test_an_engine_that_drifts_unpredicted_fails(monkeypatch: pytest.MonkeyPatch
         return released
 
     monkeypatch.setattr(pinocchio_forward.PinocchioReleased, "release", off)
-    rows = judge_released(Record(name, scene)).rows
+    rows = judge(name, scene).rows
     assert [r.verdict for r in rows if (r.engine, r.quantity) == ("pinocchio-forward", "theta_2")] == [FAILS]
 
 

@@ -14,14 +14,14 @@ from fourbar_validation.compare.tolerance import EPS
 from fourbar_validation.lab.ladder import ladder_rows, published
 from fourbar_validation.published import check as command
 from fourbar_validation.published.check import explained, figures, reason
-from fourbar_validation.published.figures import ERRATA, Figure, compare
+from fourbar_validation.published.figures import ERRATA, PublishedFigure, compare
 from fourbar_validation.published.program import (
     DATA,
     LENGTHS,
     STEPS,
     THETA_1,
     THETA_2,
-    Errors,
+    ProgramErrors,
     equations,
     ladder,
     printed,
@@ -56,7 +56,7 @@ def test_the_published_torque_error_by_error() -> None:
 
 def test_the_thesis_without_its_errors_is_ours() -> None:
     """The 13 x 13 system in kg, cm, s against our formulas in SI."""
-    right, program, apart = right_unknowns(), ladder()[0][1], round_off(Errors())
+    right, program, apart = right_unknowns(), ladder()[0][1], round_off(ProgramErrors())
     assert program.keys() == right.keys()
     for name, unknown in program.items():
         assert unknown == pytest.approx(right[name], rel=0.0, abs=apart[name])
@@ -64,7 +64,7 @@ def test_the_thesis_without_its_errors_is_ours() -> None:
 
 def test_round_off_holds_for_other_pivots_and_inputs_typed_otherwise() -> None:
     """Against fifty digits: rows in any order, each number moved by a rounding; the bound is not idle either."""
-    matrix, sides = equations(Errors())
+    matrix, sides = equations(ProgramErrors())
     with mpmath.workdps(50):
         exact = [float(x) for x in mpmath.lu_solve(mpmath.matrix(matrix.tolist()), mpmath.matrix(sides.tolist()))]
     order, worst = np.random.default_rng(0), np.zeros(13)
@@ -72,7 +72,7 @@ def test_round_off_holds_for_other_pivots_and_inputs_typed_otherwise() -> None:
         rows = order.permutation(13)
         typed, right = (x * (1.0 + EPS * order.choice((-1.0, 0.0, 1.0), x.shape)) for x in (matrix[rows], sides[rows]))
         worst = np.maximum(worst, np.abs(np.linalg.solve(typed, right) - exact))
-    ratio = worst / list(round_off(Errors()).values())
+    ratio = worst / list(round_off(ProgramErrors()).values())
     assert ratio.min() > 0.01 and ratio.max() < 1.0
 
 
@@ -162,7 +162,7 @@ def solve_as_printed(sides: list[str], arms: list[list[str]]) -> float:
 
 def test_torques_that_the_errata_state() -> None:
     def program(*made: int) -> float:
-        return thesis_program(Errors(*(number in made for number in (3, 1, 2, 4, 5))))["T4"]
+        return thesis_program(ProgramErrors(*(number in made for number in (3, 1, 2, 4, 5))))["T4"]
 
     right = program()
     states = {name: entry.effect for name, entry in ERRATA.items()}
@@ -274,7 +274,7 @@ def test_the_command_explains_every_difference() -> None:
 
 
 def test_a_difference_without_an_erratum_fails(monkeypatch: pytest.MonkeyPatch) -> None:
-    wrong = Figure("2.4 positions", "1 theta3_1", "167.877224", 167.8772234, ("4",), 167.8)
+    wrong = PublishedFigure("2.4 positions", "1 theta3_1", "167.877224", 167.8772234, ("4",), 167.8)
     for figure in (wrong, wrong._replace(errata=()), wrong._replace(errata=("99",), made=167.877224)):
         assert figure.verdict() == "differs" and not explained(figure) and reason(figure)
         monkeypatch.setattr(command, "figures", lambda figure=figure: iter([figure]))

@@ -25,7 +25,7 @@ def test_nothing_got_worse_since_the_accepted_state() -> None:
     record, accepted = read_run(baseline(ACCEPTED))
     kept = [row for row in accepted if row.engine not in left_out]
     rows = [row for scene in SCENES for row in judge(*scene, EXACT).rows]
-    found = differences((record, kept), (about({}, "models"), rows))
+    found = differences((record, kept), (about((), "models"), rows))
     assert {row.engine for row in kept} == {"formulas", *(witness.name for witness in EXACT)}
     assert not found.regressed, render.text(found)
 

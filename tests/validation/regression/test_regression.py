@@ -23,7 +23,9 @@ from fourbar.errors import InputError
 from fourbar_validation.cli import status
 from fourbar_validation.compare.columns import Columns
 from fourbar_validation.compare.rows import AGREES, FAILS, REFUSES, Row, write_results
-from fourbar_validation.compare.tolerance import EPS
+from fourbar_validation.compare.tolerance import EPS, EQUIVALENCE
+from fourbar_validation.engines.free_body import FreeBody
+from fourbar_validation.engines.witnesses import Witness
 from fourbar_validation.regression import record, render
 from fourbar_validation.regression.accept import accept_command, compare
 from fourbar_validation.regression.change import Kind
@@ -40,7 +42,7 @@ from tests.support.here import judge_here
 
 WithRows = tuple[About, list[Row]]
 ROW = Row("scene", "engine", "exact", "torque", 1e-15, 1e-14, AGREES, "equivalence", 1.0, 1.0)
-HERE = about({"engine": 1.0}, "suite")
+HERE = about([Witness("engine", FreeBody, EQUIVALENCE)], "suite")
 
 
 def kinds(old: list[Row], new: list[Row]) -> list[Kind]:
@@ -246,7 +248,10 @@ def test_what_is_empty_unfinished_or_fails_is_not_accepted(tmp_path: Path) -> No
         (["--against", "no-such-run"], "must be a folder with results.csv"),
         (["--against", "accepted", "--python", "python"], "cannot be combined with --python"),
         (["--html", "changes.html"], "say --against BASELINE or --python PATH too"),
-        (["--name", "coupler=link"], "names a body or site of --mjcf"),
+        (["--mjcf", "theirs.xml", "--name", "coupler=link"], "check-mjcf SCENE THEIRS.xml"),
+        (["--name", "coupler=link"], "check-mjcf SCENE THEIRS.xml"),
+        (["a.toml", "--random", "3"], "leave out the scene files"),
+        (["--suite", "hard", "--random", "3"], "leave out scene files and --random"),
     ],
 )
 def test_options_of_a_run_that_would_do_nothing_are_refused_before_it(
@@ -420,7 +425,8 @@ SCENE = fourbar.load(Path(__file__).parents[3] / "models" / "crank_rocker.toml")
 
 
 def made(rows: list[Row], scenes: dict[str, fourbar.Scene], engines: tuple[str, ...] = ("engine",)) -> WithRows:
-    return about(dict.fromkeys(engines, 1.0), "suite", {name: description(s) for name, s in scenes.items()}), rows
+    witnesses = [Witness(engine, FreeBody, EQUIVALENCE) for engine in engines]
+    return about(witnesses, "suite", {name: description(s) for name, s in scenes.items()}), rows
 
 
 def test_a_scene_that_changed_comes_first_and_its_rows_are_not_compared() -> None:

@@ -7,6 +7,7 @@ import io
 import re
 from dataclasses import replace
 from functools import cache
+from importlib import import_module
 
 import numpy as np
 import pytest
@@ -168,7 +169,7 @@ def test_every_kind_of_scene_is_drawn(motion: fourbar.Motion, pictures: int) -> 
 
 
 def test_an_engine_that_is_missing_is_reported_as_failing() -> None:
-    absent = replace(WITNESSES[0], adapter="fourbar_validation.engines.absent:Absent")
+    absent = replace(WITNESSES[0], engine=lambda: import_module("fourbar_validation.engines.absent").Absent())
     summary, text = report([judged("demo", crank_rocker(), (absent,), draw=False)])
     assert summary.verdict.startswith("FAILS")
     assert "What fails</h2>" in text and "No module named" in text and "∞" in text

@@ -76,7 +76,7 @@ class SlightlyOff(Echo):
 
 
 def rows_of(engine: type, scene: Scene | None = None) -> dict[str, Row]:
-    witness = Witness("echo", f"{__name__}:{engine.__name__}", EQUIVALENCE)
+    witness = Witness("echo", engine, EQUIVALENCE)
     record = judge("scene", scene or crank_rocker(), [witness])
     return {row.quantity: row for row in record.rows if row.engine == "echo"}
 
@@ -187,7 +187,7 @@ def test_positions_alone_need_no_forces() -> None:
 
 
 def test_results_survive_the_file(tmp_path) -> None:  # type: ignore[no-untyped-def]
-    rows = judge("scene", crank_rocker(), [Witness("echo", f"{__name__}:Echo", EQUIVALENCE)]).rows
+    rows = judge("scene", crank_rocker(), [Witness("echo", Echo, EQUIVALENCE)]).rows
     write_results(rows, tmp_path / "results.csv")
     again = list(read_columns(tmp_path / "results.csv"))
     assert to_csv(again) == to_csv(rows)
@@ -199,7 +199,7 @@ def test_results_survive_the_file(tmp_path) -> None:  # type: ignore[no-untyped-
 def test_an_engine_that_raised_an_alarm_is_excused_by_no_prediction_of_its_own() -> None:
     scene = crank_rocker()
     at = command(scene)
-    witness = next(witness for witness in WITNESSES if witness.predictor == "own")
+    witness = next(witness for witness in WITNESSES if witness.residuals)
     answer = Answer(witness.name, "RK4", at, predicted={"torque": np.ones(len(at.theta_2))})
     predicted = predicting_from(witness, scene, at, answer)
     assert predicted is not None and predicted("torque", np.ones(len(at.theta_2), bool))[0] == 1.0
@@ -268,5 +268,5 @@ def test_an_engine_is_started_once_a_scene_and_no_question_is_put_twice(monkeypa
     assert len({(id(of), id(command)) for of, command in put}) == len(put)
     # nor of the bars without loads, which the answer holds too
     assert [of for of, _ in put if of.linkage is scene.linkage] == [scene]
-    judge("scene", scene, [Witness("free-body", f"{__name__}:Counting", EQUIVALENCE)])
+    judge("scene", scene, [Witness("counting", Counting, EQUIVALENCE)])
     assert Counting.started == 1

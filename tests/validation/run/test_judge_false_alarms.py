@@ -16,6 +16,7 @@ from fourbar_validation.engines.witnesses import WITNESSES
 from fourbar_validation.lab.stress.mutation.specimens import SPECIMENS
 from fourbar_validation.run import printed, released
 from fourbar_validation.run.judge import judge
+from fourbar_validation.run.question import Question
 from fourbar_validation.scenes.random import random_scene
 
 EXACT = [witness for witness in WITNESSES if not witness.through_time]
@@ -72,7 +73,7 @@ def test_what_is_wrong_by_more_than_is_predicted_fails(monkeypatch: pytest.Monke
             solution.omega_3 *= 1.0 + 1e-11
         return solution
 
-    monkeypatch.setattr("fourbar_validation.run.judge.solve", off)
+    monkeypatch.setattr("fourbar_validation.run.question.solve", off)
     rows = judge("short", SCENES["short input"], BY_ITSELF).rows
     assert {row.verdict for row in rows if row.quantity == "omega_3"} == {FAILS}
 
@@ -82,9 +83,8 @@ def test_an_error_bar_of_no_error_fails(monkeypatch: pytest.MonkeyPatch) -> None
     true = printed.solve
 
     def judged() -> str:
-        at = fourbar.command(scene)
-        rows = {row.quantity: row.verdict for row in printed.printed("", scene, at, fourbar.solve(scene), None)}
-        return rows["force_error"]
+        rows = printed.check_error_bars(Question("", scene, fourbar.command(scene)))
+        return {row.quantity: row.verdict for row in rows}["force_error"]
 
     def without(scene: Scene, *stage: str, **keywords: object) -> Solution:
         solution: Solution = true(scene, *stage, **keywords)  # type: ignore[arg-type]

@@ -23,7 +23,7 @@ from fourbar_validation.report.machine import code
 from fourbar_validation.report.summary import Summary
 from fourbar_validation.run import machines
 from fourbar_validation.run.machines import ClusterError
-from fourbar_validation.run.run import run
+from fourbar_validation.run.run import RunOptions, run
 from fourbar_validation.scenes.suites import Random
 from tests.support.here import judge_here
 from tests.whole.test_kills import COUNT, EXACT, FULL, IN_A_CHUNK, KILLS, SEED, TYPES, judge_all
@@ -65,7 +65,7 @@ def test_killed_workers_change_no_byte(cluster: object, tmp_path: Path, monkeypa
     kills = 0
     while kills < KILLS:
         out, before = tmp_path / f"dask{kills}", kills
-        for step in run(suite, out, EXACT, drawn=False, scheduler=cluster.scheduler_address):  # type: ignore[attr-defined]
+        for step in run(suite, out, EXACT, RunOptions(drawn=False, scheduler=cluster.scheduler_address)):  # type: ignore[attr-defined]
             alive = [pid for nanny in cluster.workers.values() if (pid := running(nanny))]  # type: ignore[attr-defined]
             if not isinstance(step, Summary) and step and alive and kills < KILLS:
                 with suppress(ProcessLookupError):  # killed before, and its nanny has not noticed yet
@@ -79,7 +79,7 @@ def test_killed_workers_change_no_byte(cluster: object, tmp_path: Path, monkeypa
 @pytest.mark.parametrize("address", ["tcp://127.0.0.1:1", "nonsense"])
 def test_no_scheduler_is_one_line(address: str, tmp_path: Path) -> None:
     with dask.config.set({"distributed.comm.timeouts.connect": "1s"}), pytest.raises(InputError) as caught:
-        list(run(Random(1, SEED, TYPES), tmp_path, EXACT, drawn=False, scheduler=address))
+        list(run(Random(1, SEED, TYPES), tmp_path, EXACT, RunOptions(drawn=False, scheduler=address)))
     assert "must be the address of a Dask scheduler" in str(caught.value) and "\n" not in str(caught.value)
 
 
@@ -130,10 +130,10 @@ def test_a_cluster_without_workers_or_without_the_checkout_is_one_line(
     suite, out = Random(1, SEED, TYPES), tmp_path / "out"
     with monkeypatch.context() as hurried, pytest.raises(workers.NoWorkersError, match="no workers; start some"):
         hurried.setattr(workers, "STALL", 0.5)
-        list(run(suite, out, EXACT, drawn=False, scheduler=address))
+        list(run(suite, out, EXACT, RunOptions(drawn=False, scheduler=address)))
     started("worker", *WORKER)
     with pytest.raises(ClusterError, match="PYTHONPATH") as caught:
-        list(run(suite, out, EXACT, drawn=False, scheduler=address))
+        list(run(suite, out, EXACT, RunOptions(drawn=False, scheduler=address)))
     assert "\n" not in str(caught.value) and "no such module" in str(caught.value)
 
 
@@ -148,7 +148,7 @@ def test_a_lost_scheduler_ends_the_run_and_writes_nothing(
     started("worker", *WORKER)
     suite, steps = Random(100, SEED, TYPES), 0
     with pytest.raises(ClusterError, match="the scheduler is gone; what is finished is kept"):
-        for step in run(suite, tmp_path / "out", EXACT, drawn=False, scheduler=address):
+        for step in run(suite, tmp_path / "out", EXACT, RunOptions(drawn=False, scheduler=address)):
             steps += bool(step)
             if steps:
                 scheduler.send_signal(how)
@@ -163,4 +163,4 @@ def test_a_worker_of_another_code_or_library_is_refused(
 ) -> None:
     monkeypatch.setattr(machines, "code", lambda: code() | {"numpy": "1.0"})
     with pytest.raises(ClusterError, match=r"not set up as this machine: numpy is [2-9]\S+ there and 1\.0 here"):
-        list(run(Random(1, SEED, TYPES), tmp_path, EXACT, drawn=False, scheduler=cluster.scheduler_address))  # type: ignore[attr-defined]
+        list(run(Random(1, SEED, TYPES), tmp_path, EXACT, RunOptions(drawn=False, scheduler=cluster.scheduler_address)))  # type: ignore[attr-defined]

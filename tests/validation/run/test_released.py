@@ -11,7 +11,7 @@ import fourbar
 from fourbar.scene import Scene
 from fourbar.solve import solve
 from fourbar_validation.compare.rows import DEGRADED, FAILS, UNDECIDED, Row
-from fourbar_validation.engines.loop import LimitWatch
+from fourbar_validation.engines.loop import LimitDetector
 from fourbar_validation.report.record import Record
 from fourbar_validation.run import released as free
 from fourbar_validation.run.judge import judge, judged
@@ -116,17 +116,17 @@ def test_formulas_that_stop_too_early_are_found(monkeypatch: pytest.MonkeyPatch)
         solution.branch, solution.status_code = solution.branch[:3], solution.status_code[:3]
         return solution
 
-    monkeypatch.setattr(free, "solve", short)
-    rows = free.judge_released(Record("falling", falling())).rows
+    monkeypatch.setattr("fourbar_validation.run.question.solve", short)
+    rows = judge("falling", falling()).rows
     for engine in free.ENGINES:
         assert row(rows, engine, "stopped_at").verdict == FAILS
 
 
 def test_a_limit_is_seen_once_and_between_two_steps() -> None:
-    watch = LimitWatch(-1)
+    detector = LimitDetector(-1)
     for time, theta_4 in ((1.0, -0.2), (2.0, 0.2), (3.0, -0.2), (4.0, 0.2)):
-        watch.look(time, 0.0, theta_4)
-    assert watch.stopped_at == pytest.approx(1.5, rel=1e-15)
+        detector.look(time, 0.0, theta_4)
+    assert detector.stopped_at == pytest.approx(1.5, rel=1e-15)
 
 
 def test_the_table_says_that_the_motion_ended() -> None:

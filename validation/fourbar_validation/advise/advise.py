@@ -16,9 +16,9 @@ from fourbar.mjcf import Settings, mjcf
 from fourbar.scene import Command, Scene
 from fourbar.scene import command as command_of
 from fourbar.writing import require_file, write_text
-from fourbar_validation.advise.errors import Errors
+from fourbar_validation.advise.errors import WorstErrors
 from fourbar_validation.advise.matters import MATTERS, influences, judged, sentence
-from fourbar_validation.engines.mujoco.trial import FEWEST_STEPS, LONGEST, ORDER, SHORTEST, Rig, dialled, guess
+from fourbar_validation.engines.mujoco.trial import FEWEST_STEPS, LONGEST, ORDER, SHORTEST, TrialSetup, dialled, guess
 from fourbar_validation.report.terminal import lined_up
 
 MARGIN = 0.7
@@ -40,7 +40,7 @@ class Attempt:
 
     settings: Settings
     steps: int
-    errors: Errors
+    errors: WorstErrors
     steps_per_revolution: float
 
 
@@ -55,7 +55,7 @@ class Advice:
     reached: bool
 
     def cells(self) -> tuple[str, str, str]:
-        """Error, steps per revolution and time constant, for a table of several scenes."""
+        """Format error, steps per revolution and time constant for a table of several scenes."""
         error = f"{self.best.errors.worst:.1e}" + ("" if self.reached else " (not reached)")
         return error, f"{self.best.steps_per_revolution:.0f}", f"{self.best.settings.time_constant_steps:.3g}"
 
@@ -77,18 +77,18 @@ class Advice:
         )
 
 
-def advise(scene: Scene, error: float, rig: Rig | None = None) -> Advice:
+def advise(scene: Scene, error: float, rig: TrialSetup | None = None) -> Advice:
     """Search the number of steps, and the time constant around what the law says, by runs of the scene.
 
     Raises LimitError for a scene that cannot be run through in time.
     """
     if not 0.0 < error < 1.0:
         raise InputError("--error", error, "must be a relative error, above 0 and below 1")
-    return _Search(scene, error, rig or Rig(scene, looked_at(scene))).advice()
+    return _CheapestSearch(scene, error, rig or TrialSetup(scene, looked_at(scene))).advice()
 
 
 def looked_at(scene: Scene) -> Command:
-    """The scene's own positions and others between them: the error peaks there, most of all near a pole of T3, T4."""
+    """Take the scene's positions and others between them: the error peaks there, most near a pole of T3, T4."""
     own = command_of(scene)
     if np.ptp(own.branch) != 0:
         return own
@@ -97,15 +97,15 @@ def looked_at(scene: Scene) -> Command:
     return own._replace(theta_2=theta_2, branch=np.full(theta_2.shape, own.branch[0], dtype=np.int8))
 
 
-class _Search:
+class _CheapestSearch:
     """Settings tried on one scene, for one required error."""
 
-    def __init__(self, scene: Scene, error: float, rig: Rig) -> None:
+    def __init__(self, scene: Scene, error: float, rig: TrialSetup) -> None:
         self.scene, self.error, self.rig = scene, error, rig
         self.attempts: list[Attempt] = []
 
     def advice(self) -> Advice:
-        """The cheapest that serves, by bisection in steps, then with shorter and longer time constants."""
+        """Find the cheapest that serves, by bisection in steps, then with shorter and longer time constants."""
         first, tc = guess(self.error)
         self._bisect(tc, first)
         for factor in (0.5, 2.0, 4.0):
@@ -117,7 +117,7 @@ class _Search:
         return Advice(self.error, best, tuple(self.attempts), bool(served))
 
     def _polish(self, tc: float) -> None:
-        """Whether another time constant serves with fewer steps, or serves at all."""
+        """Try whether another time constant serves with fewer steps, or serves at all."""
         served = self._served()
         if not served:
             self._bisect(tc, _nearest(self.attempts).settings.steps_per_revolution)
@@ -154,7 +154,7 @@ class _Search:
             n = max(ahead, FEWEST_STEPS)
 
     def _floored(self, before: Attempt, after: Attempt) -> bool:
-        """More steps bought nothing."""
+        """Tell whether more steps bought nothing."""
         worst = after.errors.worst
         return worst < 1e-2 and worst > LEAST_GAIN * before.errors.worst and after.steps > 1.3 * before.steps
 
@@ -188,7 +188,7 @@ def _nearest(attempts: Sequence[Attempt]) -> Attempt:
     help="Write the MJCF of one SCENE.",
 )
 def command(scenes: tuple[Path, ...], wanted: float, output: Path | None) -> int:
-    """The cheapest MuJoCo settings that keep SCENES within an error; exit 1 where none is found for one of them.
+    """Find the cheapest MuJoCo settings that keep SCENES within an error; exit 1 where none is found for one of them.
 
     Of each scene it says which of the settings matters, and why; of several scenes a table is printed at the end.
     """
@@ -202,7 +202,7 @@ def command(scenes: tuple[Path, ...], wanted: float, output: Path | None) -> int
     rows, reached = [], True
     for file, scene in loaded:
         try:
-            rig = Rig(scene, looked_at(scene))
+            rig = TrialSetup(scene, looked_at(scene))
             advice = advise(scene, wanted, rig)
         except LimitError as error:
             reason = f"cannot be simulated: {error}; inverse dynamics with loop multipliers can answer it"

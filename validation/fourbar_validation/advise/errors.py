@@ -15,7 +15,7 @@ from fourbar_validation.compare.error import relative_error
 from fourbar_validation.compare.scales import yardstick
 
 
-class Errors(NamedTuple):
+class WorstErrors(NamedTuple):
     """Worst relative errors over the positions; inf where there is no answer."""
 
     torque: float
@@ -35,11 +35,11 @@ class Errors(NamedTuple):
         return max(self)
 
 
-QUANTITIES = Errors._fields
-NO_ANSWER = Errors(*[math.inf] * len(QUANTITIES))
+QUANTITIES = WorstErrors._fields
+NO_ANSWER = WorstErrors(*[math.inf] * len(QUANTITIES))
 
 
-def errors(scene: Scene, at: Command, quantities: dict[str, Array]) -> Errors:
+def errors(scene: Scene, at: Command, quantities: dict[str, Array]) -> WorstErrors:
     """Of an answer at the motion that its engine really made.
 
     The torque on bar 3 or 4 has poles where that bar stands still: it is judged where the bar turns
@@ -58,7 +58,7 @@ def errors(scene: Scene, at: Command, quantities: dict[str, Array]) -> Errors:
             where = judged & turning(getattr(formulas, f"omega_{scene.drive_bar}"))
         error = relative_error(name, ours, quantities[name], yardstick(name, scene, formulas, ours))
         worst[name] = greatest(error[where])
-    return Errors(**worst)
+    return WorstErrors(**worst)
 
 
 def greatest(errors: Array | Sequence[float]) -> float:

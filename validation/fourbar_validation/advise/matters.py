@@ -11,9 +11,9 @@ from fourbar.mjcf.document import load_ratio, mass_ratio
 from fourbar.mjcf.settings import LIGHT
 from fourbar.scene import Command, Scene
 from fourbar.solve import solve
-from fourbar_validation.advise.errors import NO_ANSWER, Errors, errors
+from fourbar_validation.advise.errors import NO_ANSWER, WorstErrors, errors
 from fourbar_validation.engines.loop import Trial
-from fourbar_validation.engines.mujoco.trial import LONGEST, SHORTEST, Rig
+from fourbar_validation.engines.mujoco.trial import LONGEST, SHORTEST, TrialSetup
 
 MATTERS = 2.0
 """A setting that a change of a factor of two, or its loss, makes the error grow by less does not matter."""
@@ -26,7 +26,7 @@ MUJOCO_TOLERANCE = 1e-8
 
 
 @dataclass(frozen=True, slots=True)
-class Influence:
+class SettingInfluence:
     """One setting changed alone."""
 
     setting: str
@@ -42,18 +42,18 @@ class Influence:
         return f"{self.setting} matters most here: {self.changed} {lost}, because {self.why}"
 
 
-def judged(scene: Scene, trial: Trial) -> Errors:
-    """Errors of a trial, at its steps and between them; none where MuJoCo lost the motion."""
+def judged(scene: Scene, trial: Trial) -> WorstErrors:
+    """Compute the errors of a trial, at its steps and between them; none where MuJoCo lost the motion."""
     if trial.broken:
         return NO_ANSWER
     found = [errors(scene, trial.at, trial.quantities)]
     if scene.drive_bar == 2:  # the torque of another bar has poles, through which no curve can be drawn
-        found += [each for stretch in trial.stretches for each in between(scene, trial, *stretch)]
-    return Errors(*map(max, *found)) if len(found) > 1 else found[0]
+        found += [each for segment in trial.segments for each in between(scene, trial, *segment)]
+    return WorstErrors(*map(max, *found)) if len(found) > 1 else found[0]
 
 
-def between(scene: Scene, trial: Trial, samples: slice, steps: int) -> Iterator[Errors]:
-    """Errors amid the steps of a stretch, where they are fewer than its positions: a spline through what was read.
+def between(scene: Scene, trial: Trial, samples: slice, steps: int) -> Iterator[WorstErrors]:
+    """Compute errors amid the steps of a segment, where they are fewer than its positions: by a spline.
 
     A largest force that lies between two steps is not seen at either of them.
     """
@@ -76,26 +76,26 @@ def between(scene: Scene, trial: Trial, samples: slice, steps: int) -> Iterator[
     yield errors(scene, at, there)
 
 
-def influences(scene: Scene, rig: Rig, settings: Settings) -> list[Influence]:
+def influences(scene: Scene, rig: TrialSetup, settings: Settings) -> list[SettingInfluence]:
     """Every setting changed alone, the one that matters most first."""
     before = judged(scene, rig.try_out(settings)).worst
     found = []
     for name, changed, other, why in _changes(scene, settings):
         worst = judged(scene, rig.try_out(other)).worst
         times = worst / before if before > 0.0 and math.isfinite(before) else math.nan
-        found.append(Influence(name, changed, worst, times, why(rig)))
+        found.append(SettingInfluence(name, changed, worst, times, why(rig)))
     return sorted(found, key=lambda each: -each.times if each.times == each.times else math.inf)
 
 
-def sentence(found: list[Influence]) -> str:
-    """The one that matters most, and why."""
+def sentence(found: list[SettingInfluence]) -> str:
+    """Name the setting that matters most, and why."""
     if found and found[0].times >= MATTERS:
         return str(found[0])
     return f"no setting matters by itself here: changed alone none makes the error {MATTERS:g} times as large"
 
 
-def _changes(scene: Scene, settings: Settings) -> Iterator[tuple[str, str, Settings, Callable[[Rig], str]]]:
-    """What is changed, in words, to what, and what a growth of the error would come from."""
+def _changes(scene: Scene, settings: Settings) -> Iterator[tuple[str, str, Settings, Callable[[TrialSetup], str]]]:
+    """Say what is changed to what, and what a growth of the error would come from."""
     steps, tc = settings.steps_per_revolution, settings.time_constant_steps
     window = max(settings.steps_per_window // 2, 1)
     coarse = replace(settings, steps_per_revolution=steps / 2.0, steps_per_window=window)
@@ -128,7 +128,7 @@ def _changes(scene: Scene, settings: Settings) -> Iterator[tuple[str, str, Setti
         )
 
 
-def _why_timestep(rig: Rig) -> str:
+def _why_timestep(rig: TrialSetup) -> str:
     motion = solve(rig.scene, "position", at=rig.command)
     sines = np.abs(motion.sin_mu)
     nearest = int(np.nanargmin(sines))

@@ -24,18 +24,18 @@ class Cause:
     """By which that error falls, relative to the scale."""
 
     def percent(self) -> str:
-        """The share, with its quantity."""
+        """Write the share with its quantity."""
         if self.share is None:
             return "-"
         return f"{100.0 * self.share:.0f} % {self.quantity}" if self.share >= MATTERS else "0 %"
 
     def line(self) -> str:
-        """The entry, and both values where they are short."""
+        """Write the entry, and both values where they are short."""
         d = self.difference
         return f"{d.key}: {value(d.theirs)}, generated {value(d.generated)}"
 
     def texts(self) -> list[str]:
-        """What it is in their file, and what it does."""
+        """Say what it is in their file, and what it does."""
         d = self.difference
         return [text for text in (f"in the file: {d.written}" if d.written else "", d.remark) if text]
 
@@ -47,7 +47,7 @@ class Cause:
 
 
 def causes(differences: Sequence[Difference], before: Sequence[Row], after: Sequence[Sequence[Row]]) -> list[Cause]:
-    """The differences with their shares, the one whose mending gains most first; those not mended keep their order.
+    """Order differences by their shares, the one whose correction gains most first; the others keep their order.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ def causes(differences: Sequence[Difference], before: Sequence[Row], after: Sequ
 
 
 def _errors(rows: Sequence[Row]) -> dict[tuple[str, str], float]:
-    """The error of the torque and of each pin force, by method."""
+    """Collect the error of the torque and of each pin force, by method."""
     return {
         (row.engine, row.quantity): row.error for row in rows if row.quantity in FORCES and math.isfinite(row.error)
     }

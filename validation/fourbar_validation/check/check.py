@@ -9,10 +9,10 @@ import click
 from fourbar.errors import InputError
 from fourbar.files import load
 from fourbar.writing import require_file, write_text
-from fourbar_validation.check.judge import Finding, Tolerance
+from fourbar_validation.check.judge import Allowance, Discrepancy
 from fourbar_validation.check.judgement import Judgement, as_json, as_junit, judge_table
 from fourbar_validation.check.mistakes import NEARER, Explanation
-from fourbar_validation.check.theirs import Table, read_table
+from fourbar_validation.check.theirs import TheirTable, read_table
 from fourbar_validation.compare.rows import plain
 
 SHOWN = 3
@@ -30,12 +30,12 @@ def extent(explanation: Explanation) -> str:
     return "; ".join(parts)
 
 
-def tolerance_of(rtol: float | None, atol: float | None) -> Tolerance | None:
-    """What the options state; None where they state nothing."""
+def tolerance_of(rtol: float | None, atol: float | None) -> Allowance | None:
+    """Read the tolerance of the options; None where they give none."""
     for option, value in (("--rtol", rtol), ("--atol", atol)):
         if value is not None and not 0.0 <= value < math.inf:
             raise InputError(option, value, "must be a finite number >= 0")
-    return None if rtol is None and atol is None else Tolerance(rtol or 0.0, atol or 0.0)
+    return None if rtol is None and atol is None else Allowance(rtol or 0.0, atol or 0.0)
 
 
 @click.command()
@@ -68,12 +68,12 @@ def check(
     return judgement.status
 
 
-def show(judgement: Judgement, table: Table, name: str) -> None:
+def show(judgement: Judgement, table: TheirTable, name: str) -> None:
     """Print what differs, what explains it, and the count."""
     from rich.box import SIMPLE_HEAD
     from rich.console import Console
     from rich.markup import escape
-    from rich.table import Table as Shown
+    from rich.table import Table
 
     console = Console(soft_wrap=True)
     for why in dict.fromkeys(table.left_out.values()):
@@ -82,7 +82,7 @@ def show(judgement: Judgement, table: Table, name: str) -> None:
     differing = judgement.differing
     if differing:
         title = f"{escape(plain(name))}: what differs, the {SHOWN} worst of each quantity"
-        shown = Shown(title=title, box=SIMPLE_HEAD, pad_edge=False, show_edge=False, padding=(0, 1, 0, 0))
+        shown = Table(title=title, box=SIMPLE_HEAD, pad_edge=False, show_edge=False, padding=(0, 1, 0, 0))
         for heading in ("line", "theta_2\ndeg", "quantity", "theirs", "ours", "error", "allowed"):
             shown.add_column(heading, justify="right")
         for finding in worst_of_each(differing):
@@ -103,26 +103,26 @@ def show(judgement: Judgement, table: Table, name: str) -> None:
     console.print(f"[bold]{judgement.sentence()}[/]")
 
 
-def worst_of_each(differing: list[Finding]) -> list[Finding]:
-    """The worst findings of each quantity, the worst quantity first."""
-    by_quantity: dict[str, list[Finding]] = {}
+def worst_of_each(differing: list[Discrepancy]) -> list[Discrepancy]:
+    """Choose the largest differences of each quantity, the worst quantity first."""
+    by_quantity: dict[str, list[Discrepancy]] = {}
     for finding in sorted(differing, key=lambda f: -f.error):
         by_quantity.setdefault(finding.quantity, []).append(finding)
     return [finding for findings in by_quantity.values() for finding in findings[:SHOWN]]
 
 
-def with_unit(finding: Finding, table: Table) -> str:
-    """The quantity and the unit of their column."""
+def with_unit(finding: Discrepancy, table: TheirTable) -> str:
+    """Write the quantity with the unit of their column."""
     return f"{finding.quantity} [{plain(table.units[_key(finding, table)].text)}]"
 
 
-def in_their_unit(finding: Finding, table: Table) -> tuple[str, str]:
-    """Both numbers in the unit of their column, with the digits that set them apart."""
+def in_their_unit(finding: Discrepancy, table: TheirTable) -> tuple[str, str]:
+    """Write both numbers in the unit of their column, with the digits that set them apart."""
     factor = table.units[_key(finding, table)].factor
     theirs, ours = ([x / factor for x in numbers] for numbers in (finding.theirs, finding.ours))
     digits = next((d for d in (4, 6, 9, 12) if any(f"{a:.{d}g}" != f"{b:.{d}g}" for a, b in zip(theirs, ours))), 15)  # noqa: B905
     return tuple(", ".join(f"{x:.{digits}g}" for x in numbers) for numbers in (theirs, ours))  # type: ignore[return-value]
 
 
-def _key(finding: Finding, table: Table) -> str:
+def _key(finding: Discrepancy, table: TheirTable) -> str:
     return next(key for key in table.values if table.label(key) == finding.quantity)

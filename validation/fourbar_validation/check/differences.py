@@ -51,7 +51,7 @@ class Difference:
 
 
 def differences(generated: Described, theirs: Described, called: Mapping[str, str] | None = None) -> list[Difference]:
-    """What differs, in the order of the description; `called` says how their file calls what part of a key is of."""
+    """Find what differs, in the order of the description; `called`: what their file calls a part of a key."""
     scale = max(value for key, value in generated.items() if _is_length(key) and isinstance(value, float))
     generated = _numbered_like(theirs, generated)
     found = []
@@ -64,7 +64,7 @@ def differences(generated: Described, theirs: Described, called: Mapping[str, st
 
 
 def _numbered_like(theirs: Described, generated: Described) -> Described:
-    """The generated file's actuators and tendons under the numbers of their counterparts: same role, if possible name.
+    """Number the generated file's actuators and tendons as their counterparts: same role, if possible name.
 
     One without a counterpart keeps a number that theirs does not have.
     """
@@ -88,7 +88,7 @@ def _numbered_like(theirs: Described, generated: Described) -> Described:
 
 
 def _without(key: str) -> Value | None:
-    """What a file has that does not have the key; None: it is left out."""
+    """Give what a file has that lacks the key; None: it is left out."""
     if attached := ATTACHED.fullmatch(key):
         return None if attached[2] else "none"
     if key.startswith("pins."):

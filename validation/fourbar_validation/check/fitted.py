@@ -99,7 +99,7 @@ def _named_ratio(
 
 
 def _plain_ratio(judge: Judge, key: str, near: float) -> tuple[str, float] | None:
-    """A power of ten, or the ratio as fitted; a reversed sign is a mistake of its own."""
+    """Round to a power of ten, or keep the ratio as fitted; a reversed sign is a mistake of its own."""
     if judge.explained(key, -judge.ours(key)):
         return None
     power = round(math.log10(abs(near)))
@@ -110,7 +110,7 @@ def _plain_ratio(judge: Judge, key: str, near: float) -> tuple[str, float] | Non
 
 
 def _change(judge: Judge, wrong: Solution, keys: list[str]) -> Array:
-    """What a changed scene adds to the right numbers, each quantity over its scale, in one line."""
+    """Compute what a changed scene adds to the right numbers, each quantity over its scale, in one line."""
     return np.concatenate([_residual(judge, key, judge.ours(key, wrong), judge.ours(key)) for key in keys])
 
 
@@ -123,7 +123,7 @@ def _residual(judge: Judge, key: str, one: Array, other: Array) -> Array:
 
 
 def _factors(judge: Judge, differing: list[str]) -> Iterator[Mistake]:
-    """A moment of inertia or a mass times a factor: forces and torque are linear in each."""
+    """Try a moment of inertia or a mass times a factor: forces and torque are linear in each."""
     scene = judge.scene
     keys = [key for key in differing if quantity_of(key) in FORCES]
     theirs = np.concatenate([_residual(judge, key, judge.table.values[key], judge.ours(key)) for key in keys])
@@ -159,7 +159,7 @@ def _factors(judge: Judge, differing: list[str]) -> Iterator[Mistake]:
 
 
 def _offset(judge: Judge) -> Iterator[Mistake]:
-    """The crank angle measured from another zero: the offset at which theirs fit best, refined by Gauss and Newton."""
+    """Try the crank angle from another zero: the offset at which theirs fit best, refined by Gauss and Newton."""
     keys = [key for key in judge.table.values if judge.yard(key).any()]
     rows = np.unique(np.linspace(0, len(judge.at.theta_2) - 1, TRIED).round().astype(int))
 
@@ -209,7 +209,7 @@ def _offset(judge: Judge) -> Iterator[Mistake]:
 
 
 def _order(judge: Judge) -> Iterator[Mistake]:
-    """The right numbers in other rows: each row of theirs goes to the nearest of ours."""
+    """Try the right numbers in other rows: each row of theirs goes to the nearest of ours."""
     table, n = judge.table, len(judge.at.theta_2)
     keys = [key for key in table.values if judge.where(key).all() and judge.yard(key).all()]
     if not ENOUGH <= n <= MOST_ROWS or not keys:

@@ -14,7 +14,7 @@ from fourbar.quantities import OK
 from fourbar.scene import Command, Scene, command
 from fourbar.solution import Solution
 from fourbar.solve import solve
-from fourbar_validation.check.theirs import Array, Table, quantity_of
+from fourbar_validation.check.theirs import Array, TheirTable, quantity_of
 from fourbar_validation.compare.error import difference, in_own_unit, magnitude, relative
 from fourbar_validation.compare.scales import yardstick
 from fourbar_validation.compare.tolerance import EPS, EQUIVALENCE, NOTHING_TO_TELL, condition_of
@@ -26,7 +26,7 @@ AS_PRINTED = 4.0 * EPS
 
 
 @dataclass(frozen=True, slots=True)
-class Tolerance:
+class Allowance:
     """What a user allows, as numpy has it: atol + rtol |ours|, atol in the SI unit of each quantity."""
 
     rtol: float = 0.0
@@ -34,7 +34,7 @@ class Tolerance:
 
 
 @dataclass(frozen=True, slots=True)
-class Finding:
+class Discrepancy:
     """One quantity at one position of the user's table, in SI."""
 
     line: int
@@ -72,7 +72,7 @@ class Finding:
 class Judge:
     """Numbers of a table against the formulas at its positions."""
 
-    def __init__(self, scene: Scene, table: Table, tolerance: Tolerance | None) -> None:
+    def __init__(self, scene: Scene, table: TheirTable, tolerance: Allowance | None) -> None:
         self.scene, self.table, self.tolerance = scene, table, tolerance
         self.at = positions(scene, table)
         self.stage = "position" if self.at.omega_2 is None else "force"
@@ -86,16 +86,16 @@ class Judge:
                 raise InputError("header", key, "does not exist in this scene: it has no dry friction")
 
     def ours(self, key: str, solution: Solution | None = None) -> Array:
-        """The formulas' values of a key of the table."""
+        """Give the formulas' values of a key of the table."""
         values: Array = getattr(self.right if solution is None else solution, quantity_of(key))
         return magnitude(values) if key.startswith("|") else values
 
     def where(self, key: str) -> Mask:
-        """The rows in which both state a number, (n,)."""
+        """Mark the rows in which both have a number, (n,)."""
         return np.asarray(self._answered(key) & self.table.stated(key))
 
     def yard(self, key: str) -> Array:
-        """What the error of a key is divided by at each position, (n,)."""
+        """Compute what the error of a key is divided by at each position, (n,)."""
         if key not in self._yards:
             quantity = quantity_of(key)
             self._yards[key] = yardstick(quantity, self.scene, self.right, getattr(self.right, quantity))
@@ -130,7 +130,7 @@ class Judge:
         return relative(apart, scale), np.where(condition * NOTHING_TO_TELL > EPS, allowed, np.inf), apart
 
     def permitted(self, key: str, ours: Array) -> Array | None:
-        """The difference that the stated tolerance allows, (n,), in the quantity's unit."""
+        """Compute the difference that the given tolerance allows, (n,), in the quantity's unit."""
         if self.tolerance is None:
             return None
         return np.asarray(self.tolerance.atol + self.tolerance.rtol * magnitude(ours) + self.table.rounding[key])
@@ -145,7 +145,7 @@ class Judge:
             within |= apart <= permitted[where]
         return bool(where.any() and np.all(within))
 
-    def findings(self) -> list[Finding]:
+    def findings(self) -> list[Discrepancy]:
         """Every number that the table states where the formulas have one."""
         found = []
         for key, theirs in self.table.values.items():
@@ -158,7 +158,7 @@ class Judge:
                 numbers = (float(error[i]), float(allowed[i]), float(apart[i]))
                 most = None if permitted is None else float(permitted[i])
                 found.append(
-                    Finding(self.table.lines[i], label, yours, mine, *numbers, most, float(self.at.theta_2[i]))
+                    Discrepancy(self.table.lines[i], label, yours, mine, *numbers, most, float(self.at.theta_2[i]))
                 )
         return found
 
@@ -172,8 +172,8 @@ class Judge:
         return np.asarray(there.all(axis=1) if there.ndim == 2 else there)
 
 
-def positions(scene: Scene, table: Table) -> Command:
-    """The command at each row of the table: the scene's own where it has the same positions."""
+def positions(scene: Scene, table: TheirTable) -> Command:
+    """Build the command at each row of the table: the scene's own where it has the same positions."""
     base = command(scene)
     if scene.motion.free is not None:
         raise InputError("motion.free", scene.title, "a table is judged at one omega_2 and alpha_2, not while released")

@@ -7,9 +7,9 @@ from dataclasses import asdict, dataclass
 
 from fourbar.errors import FAILED, HOLDS
 from fourbar.scene import Scene
-from fourbar_validation.check.judge import Finding, Judge, Tolerance
+from fourbar_validation.check.judge import Allowance, Discrepancy, Judge
 from fourbar_validation.check.mistakes import Explanation, explain
-from fourbar_validation.check.theirs import Table
+from fourbar_validation.check.theirs import TheirTable
 from fourbar_validation.report.junit import JunitCase, document
 
 
@@ -17,14 +17,14 @@ from fourbar_validation.report.junit import JunitCase, document
 class Judgement:
     """All findings, and the known mistakes that would explain them."""
 
-    findings: list[Finding]
+    findings: list[Discrepancy]
     not_assembled: list[int]
     """Lines at which this linkage does not assemble, or is singular: there is no right answer there."""
     explanations: list[Explanation]
-    tolerance: Tolerance | None = None
+    tolerance: Allowance | None = None
 
     @property
-    def differing(self) -> list[Finding]:
+    def differing(self) -> list[Discrepancy]:
         """The findings that do not agree, though there are digits to judge by."""
         return [finding for finding in self.findings if finding.judged and not finding.agrees]
 
@@ -70,7 +70,7 @@ class Judgement:
         return explained >= {finding.quantity for finding in self.differing}
 
 
-def judge_table(scene: Scene, table: Table, tolerance: Tolerance | None = None) -> Judgement:
+def judge_table(scene: Scene, table: TheirTable, tolerance: Allowance | None = None) -> Judgement:
     """Judge every number by K eps/condition plus half a unit of its last printed digit, and of theta_2's.
 
     With a tolerance that decides, and what explains the rest is held to it too.
@@ -83,7 +83,7 @@ def judge_table(scene: Scene, table: Table, tolerance: Tolerance | None = None) 
     return Judgement(findings, judge.without_answer(), known, tolerance)
 
 
-def as_json(judgement: Judgement, table: Table) -> str:
+def as_json(judgement: Judgement, table: TheirTable) -> str:
     """One object in SI: the counts, every number that differs with theirs and ours, and what explains it."""
     tolerance = judgement.tolerance
     found = {

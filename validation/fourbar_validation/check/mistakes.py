@@ -77,7 +77,7 @@ def _inertial(scene: Scene, at: Command) -> Iterator[Mistake]:
 
 
 def _other_problems(scene: Scene, at: Command) -> Iterator[tuple[str, Scene, Command]]:
-    """The same formulas on the scene that the mistake amounts to."""
+    """Evaluate the same formulas on the scene that the mistake amounts to."""
     yield "the other branch", scene, at._replace(branch=-at.branch)
     yield "theta_2 read as degrees", scene, at._replace(theta_2=np.radians(at.theta_2))
     gravity = [effect for effect in scene.effects if isinstance(effect, Gravity)]
@@ -192,7 +192,7 @@ class Explanation:
 
 
 def explain(judge: Judge, differing: list[str]) -> list[Explanation]:
-    """The mistakes under which quantities that differ agree, the most complete first; then those that come near.
+    """Find the mistakes under which quantities that differ agree, the most complete first; then those that come near.
 
     A mistake that breaks a quantity which agreed as it was is none.
     """

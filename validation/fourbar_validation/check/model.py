@@ -1,4 +1,4 @@
-"""`run SCENE --mjcf THEIRS.xml`: what differs from the generated MJCF, and what it costs in accuracy.
+"""`python -m validation check-mjcf`: what differs from the generated MJCF, and what it costs in accuracy.
 
 The file is somebody's: it is compiled and run in a process of its own, with a limit on time and memory.
 """
@@ -13,6 +13,8 @@ from pathlib import Path
 from pkgutil import resolve_name
 from typing import Any
 
+import click
+
 from fourbar.errors import FourBarError, InputError
 from fourbar.quantities import UNKNOWNS
 from fourbar.scene import Scene
@@ -26,23 +28,24 @@ from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.compare import compare
 from fourbar_validation.compare.counts import Counts
 from fourbar_validation.compare.rows import Row, plain, write_results
-from fourbar_validation.compare.tolerance import SIMULATED, Tolerance
+from fourbar_validation.compare.tolerance import SIMULATED, Tolerance, simulated_within
 from fourbar_validation.engines.memory import WORKER_MEMORY, bound_memory
 from fourbar_validation.report.templating import number, rendered
+from fourbar_validation.scenes.suites import scene_files
 
 SECONDS = 120.0
 """A four-bar takes less than one."""
 ABOUT_SHARES = (
     "share: of the error of that quantity, what goes when this one entry alone is as generated; "
-    "a dash: it cannot be mended alone in the compiled file"
+    "a dash: it cannot be corrected alone in the compiled file"
 )
 HEADINGS = ("quantity", "theirs", "generated", "allowed", "verdict")
 EXAMINE = "fourbar_validation.engines.mujoco.theirs:examine"
-MENDED = "fourbar_validation.engines.mujoco.theirs:examine_mended"
+CORRECTED = "fourbar_validation.engines.mujoco.theirs:examine_corrected"
 
 
 @dataclass(frozen=True, slots=True)
-class Cost:
+class CostOfModel:
     """One quantity by one method: the error of their file, and of the generated one."""
 
     row: Row
@@ -66,11 +69,11 @@ class ModelReport:
 
     causes: list[Cause]
     """What differs, the worst first."""
-    costs: list[Cost]
+    costs: list[CostOfModel]
     notes: list[str]
 
     def methods(self) -> list[str]:
-        """The methods by which their file was evaluated."""
+        """List the methods by which their file was evaluated."""
         return list(dict.fromkeys(cost.method for cost in self.costs))
 
     @property
@@ -80,7 +83,7 @@ class ModelReport:
 
 
 def named(pairs: tuple[str, ...]) -> dict[str, str]:
-    """ROLE=NAME pairs of the command line."""
+    """Read ROLE=NAME pairs of the command line."""
     allowed = ("input", "coupler", "output", "B3", "B4")
     names = {}
     for pair in pairs:
@@ -100,12 +103,12 @@ def examine_model(
         generated, theirs = examined(EXAMINE, scene, None, {}), examined(EXAMINE, scene, text, dict(names))
         ours = {(row.engine, row.quantity): row.error for row in _rows(name, scene, generated.answers, SIMULATED)}
         rows = _rows(name, scene, theirs.answers, tolerance)
-        costs = [Cost(row, ours.get((row.engine, row.quantity), math.nan)) for row in rows]
+        costs = [CostOfModel(row, ours.get((row.engine, row.quantity), math.nan)) for row in rows]
         found = differences(generated.described, theirs.described, theirs.called)
         entries = [(difference.key, difference.generated) for difference in found]
         failed = any(row.failed for row in rows)
-        mended = examined(MENDED, scene, text, dict(theirs.names), entries) if failed else []
-    after = [[] if answers is None else _rows(name, scene, answers, tolerance) for answers in mended]
+        corrected = examined(CORRECTED, scene, text, dict(theirs.names), entries) if failed else []
+    after = [[] if answers is None else _rows(name, scene, answers, tolerance) for answers in corrected]
     return ModelReport(causes(found, rows, after), costs, theirs.notes)
 
 
@@ -119,7 +122,7 @@ def _rows(name: str, scene: Scene, answers: list[Answer], tolerance: Tolerance) 
 
 @contextmanager
 def guarded(mjcf: Path) -> Iterator[Callable[..., Any]]:
-    """What examines a file, an adapter and its arguments, in a process that may crash, hang or run out of memory."""
+    """Examine a file, by an adapter and its arguments, in a process that may crash, hang or run out of memory."""
     from multiprocessing import get_context
 
     from pebble import ProcessExpired, ProcessPool
@@ -131,7 +134,7 @@ def guarded(mjcf: Path) -> Iterator[Callable[..., Any]]:
             try:
                 return pool.schedule(_examine, args=arguments, timeout=SECONDS).result()
             except FourBarError as error:
-                if not isinstance(error, InputError) or error.key != "--mjcf":
+                if not isinstance(error, InputError) or error.key != "MJCF":
                     raise
                 raise InputError(error.key, error.value or mjcf.name, error.allowed, str(mjcf)) from None
             except TimeoutError:
@@ -143,13 +146,13 @@ def guarded(mjcf: Path) -> Iterator[Callable[..., Any]]:
             except KeyboardInterrupt:
                 pool.stop()  # type: ignore[no-untyped-call]  # or the pool would wait for the file to its time limit
                 raise
-            raise InputError("--mjcf", mjcf.name, reason, str(mjcf))
+            raise InputError("MJCF", mjcf.name, reason, str(mjcf))
 
         yield examined
 
 
 def _confine() -> None:
-    """Memory bounded, and MuJoCo's log where it is swept away."""
+    """Bound the memory, and put MuJoCo's log where it is swept away."""
     os.chdir(tempfile.gettempdir())
     bound_memory()
 
@@ -196,8 +199,32 @@ def show(report: ModelReport, mjcf: Path, out: Path) -> None:
 
 
 def markdown(report: ModelReport, mjcf: Path) -> str:
-    """The same as text for a page."""
+    """Write the same as text for a page."""
     what = {"report": report, "mjcf": mjcf.name, "about": ABOUT_SHARES, "headings": ("method", *HEADINGS)}
     what |= {"causes": [cause.cells() for cause in report.causes]}
     what |= {"costs": [(cost.method, *cost.cells()) for cost in report.costs]}
     return rendered("fourbar_validation.check", "theirs.md.j2", **what)
+
+
+@click.command(name="check-mjcf")
+@click.argument("scene", type=click.Path(path_type=Path))
+@click.argument("theirs", metavar="THEIRS.xml", type=click.Path(path_type=Path))
+@click.option(
+    "--name",
+    "names",
+    metavar="ROLE=NAME",
+    multiple=True,
+    help="The body that is the input, coupler or output; B3, B4: the sites of pin B on the coupler and the output, "
+    "where no connect or weld closes the loop. Left out: guessed from structure and lengths, and printed.",
+)
+@click.option("--error", "wanted", type=float, metavar="E", help="The relative error that THEIRS.xml may have.")
+@click.option(
+    "-o", "--out", type=click.Path(path_type=Path, file_okay=False), default=Path("results"), show_default=True
+)
+def command(scene: Path, theirs: Path, names: tuple[str, ...], wanted: float | None, out: Path) -> int:
+    """Compare your own MJCF of SCENE with the generated one, field by field, and say what each difference costs."""
+    suite = scene_files((scene,))
+    tolerance = SIMULATED if wanted is None else simulated_within(wanted, "what this file may be wrong by")
+    report = examine_model(suite.name(0), suite.scene(0), theirs, named(names), tolerance)
+    show(report, theirs, out)
+    return report.counts.status

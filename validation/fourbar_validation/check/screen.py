@@ -28,12 +28,12 @@ a tolerance of 0 nothing else may stop a solver."""
 
 
 def read_mjcf(path: Path) -> str:
-    """The screened text of an MJCF; InputError says in one line what it may not hold."""
+    """Read the text of an MJCF; InputError says in one line what it may not hold."""
 
     def refuse(what: object, allowed: str) -> InputError:
-        return InputError("--mjcf", what, allowed, str(path))
+        return InputError("MJCF", what, allowed, str(path))
 
-    text = read_text(path, "--mjcf", LARGEST_MJCF)
+    text = read_text(path, "MJCF", LARGEST_MJCF)
     for word in ("<!DOCTYPE", "<!ENTITY"):
         if word in text.upper():
             raise refuse(word, "is not allowed: an MJCF needs no document type")

@@ -52,7 +52,7 @@ class Unit:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Table:
+class TheirTable:
     """Somebody's numbers in SI: theta_2 (n,), and per quantity values (n,) or (n, 2) with their rounding.
 
     Of a vector (n,) are its magnitudes, under |name|. What the table does not state is NaN.
@@ -71,23 +71,23 @@ class Table:
     """Headings of columns that are not judged, and why."""
 
     def label(self, key: str) -> str:
-        """The quantity, or the one component of it that the table has."""
+        """Name the quantity, or the one component of it that the table has."""
         values = self.values[key]
         there = [letter for letter, gone in zip("xy", np.isnan(values).T, strict=False) if not gone.all()]
         return f"{key}_{there[0]}" if values.ndim == 2 and len(there) == 1 else key
 
     def stated(self, key: str) -> NDArray[np.bool_]:
-        """The rows in which anything is stated of a quantity, (n,)."""
+        """Mark the rows in which a quantity has any number, (n,)."""
         there = np.isfinite(self.values[key])
         return np.asarray(there.any(axis=1) if there.ndim == 2 else there)
 
 
 def quantity_of(key: str) -> str:
-    """The quantity of a key of `Table.values`."""
+    """Name the quantity of a key of `TheirTable.values`."""
     return key.strip("|")
 
 
-def read_table(path: Path) -> Table:
+def read_table(path: Path) -> TheirTable:
     """Read a CSV table; InputError names the column or line that cannot be read."""
     (_, headings), *rows = _lines(path)
     unit_line = [""] * len(headings)
@@ -114,7 +114,7 @@ def read_table(path: Path) -> Table:
     units = {name: unit for name, unit in columns.values()}
     left_out |= {headings[index]: BLANK for index, (name, _) in columns.items() if np.isnan(numbers[name]).all()}
     lines, rounded = [line for line, _ in rows], _rounded(halves["theta_2"], units["theta_2"])
-    table = Table(numbers["theta_2"], {}, {}, {}, lines, rounded, left_out)
+    table = TheirTable(numbers["theta_2"], {}, {}, {}, lines, rounded, left_out)
     for name in names:
         if name != "theta_2" and not np.isnan(numbers[name]).all():
             _put(table, name, units[name], numbers[name], halves[name])
@@ -124,7 +124,7 @@ def read_table(path: Path) -> Table:
     return table
 
 
-def _put(table: Table, name: str, unit: Unit, numbers: Array, halves: Array) -> None:
+def _put(table: TheirTable, name: str, unit: Unit, numbers: Array, halves: Array) -> None:
     """Enter a column into the table, a component into its vector."""
     halves = np.where(np.isnan(numbers), 0.0, halves)
     if name[-2:] not in ("_x", "_y"):
@@ -146,7 +146,7 @@ def _rounded(halves: Array, unit: Unit) -> Array:
 
 
 def _lines(path: Path) -> list[tuple[int, list[str]]]:
-    """The lines that hold anything, with their numbers; at least a header."""
+    """Read the lines that hold anything, with their numbers; at least a header."""
     text = read_text(path, "table", LARGEST_FILE)
     header = next((line for line in text.splitlines() if line.strip()), "")
     delimiter = next((mark for mark in ";\t" if mark in header), ",")
@@ -204,7 +204,7 @@ def _known() -> str:
 
 
 def _number(path: Path, line: int, cell: str) -> tuple[float, float]:
-    """The number in a cell and half a unit of its last printed digit; NaN for a blank."""
+    """Read the number in a cell and half a unit of its last printed digit; NaN for a blank."""
     text = cell.strip().replace("\N{MINUS SIGN}", "-")
     if not text:
         return math.nan, math.nan

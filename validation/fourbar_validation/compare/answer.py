@@ -48,7 +48,9 @@ class WitnessError(FourBarError):
 class Engine(Protocol):
     """One engine, in one of its forms."""
 
-    name: str
+    @property
+    def name(self) -> str:
+        """As in the results."""
 
     def answer(self, scene: Scene, command: Command) -> Answer:
         """Its answer; it is given the description and the command, never a result of the formulas."""

@@ -1,4 +1,4 @@
-"""By what an answer is judged: conditions and sizes of the formulas and of another derivation, the stricter ones.
+"""Reference conditions: conditions and sizes of the formulas and of another derivation, the stricter ones.
 
 A wrong formula would otherwise widen what it is allowed: an angle between bars 3 and 4 that is too small, an
 acceleration that is too large.
@@ -19,7 +19,7 @@ SIZED_BY = ("omega_3", "alpha_3", "a_G2", "a_G3", "a_G4")
 
 
 def basis_of(scene: Scene, answer: Answer) -> Solution | None:
-    """An answer in the form of a solution, its conditions by the sines between its own angles; None without angles."""
+    """Make a solution of an answer, its conditions by the sines between its own angles; None without angles."""
     if answer.at is None or not {"theta_3", "theta_4"} <= answer.quantities.keys():
         return None
     theta_2, known = answer.at.theta_2, answer.quantities
@@ -45,7 +45,7 @@ def basis_of(scene: Scene, answer: Answer) -> Solution | None:
 
 
 def _add_velocities(linkage: FourBar, theta: dict[int, Array], basis: Solution) -> None:
-    """Of A, B and the mass centres, from the answer's own angles and speeds, m/s."""
+    """Add those of A, B and the mass centres, from the answer's own angles and speeds, m/s."""
 
     def swung(bar: int, distance: float, angle: float) -> Array:
         speed, direction = distance * getattr(basis, f"omega_{bar}"), theta[bar] + angle
@@ -58,13 +58,13 @@ def _add_velocities(linkage: FourBar, theta: dict[int, Array], basis: Solution) 
 
 
 def strictest_condition(quantity: str, linkage: FourBar, formulas: Solution, basis: Solution | None) -> Array:
-    """The better one of two conditions of a quantity at each position, (n,)."""
+    """Take the better of two conditions of a quantity at each position, (n,)."""
     ours = condition_of(quantity, linkage, formulas)
     return ours if basis is None else np.fmin(np.fmax(ours, condition_of(quantity, linkage, basis)), 1.0)
 
 
 def smallest_yardstick(quantity: str, scene: Scene, formulas: Solution, basis: Solution | None) -> Array:
-    """The smaller one of two sizes of a quantity at each position, (n,)."""
+    """Take the smaller of two sizes of a quantity at each position, (n,)."""
     ours = yardstick(quantity, scene, formulas, getattr(formulas, quantity))
     of_motion = basis is not None and (basis.omega_2 is None or all(getattr(basis, q) is not None for q in SIZED_BY))
     if basis is None or not of_motion or getattr(basis, quantity) is None:

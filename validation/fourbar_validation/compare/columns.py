@@ -50,7 +50,7 @@ class Columns:
         return self
 
     def add(self, rows: Sequence[Row]) -> None:
-        """The rows that come next."""
+        """Add the rows that come next."""
         for row in rows:
             if self._line <= CSV_ROWS:
                 self.first_lines.setdefault(row.scene, self._line)
@@ -86,12 +86,12 @@ class Columns:
 
 
 def or_null(value: object) -> object:
-    """A missing number as null: no greatest error is NaN by it, and every reader takes it for none."""
+    """Give a missing number as null: no greatest error is NaN by it, and every reader takes it for none."""
     return None if isinstance(value, float) and math.isnan(value) else value
 
 
 def read_columns(path: Path) -> Iterator[Row]:
-    """The rows of a results.parquet or results.csv, some thousands at a time; words that recur are kept once."""
+    """Read the rows of a results.parquet or results.csv, some thousands at a time; words that recur are kept once."""
     for cells in _batches(path, list(MADE_OF)):
         words: dict[str, str] = {}
         columns = [
@@ -102,7 +102,7 @@ def read_columns(path: Path) -> Iterator[Row]:
 
 
 def column_of(path: Path, column: str) -> Iterator[str]:
-    """The words in a column, each once in every batch."""
+    """Read the words in a column, each once in every batch."""
     for (cells,) in _batches(path, [column]):
         yield from dict.fromkeys(_words(cells, {}))
 

@@ -31,7 +31,6 @@ from fourbar_validation.compare.tolerance import DEGRADED as TIMES_PREDICTED
 from fourbar_validation.compare.tolerance import (
     EPS,
     NOTHING_TO_TELL,
-    SIMULATED,
     Array,
     Tolerance,
 )
@@ -73,7 +72,7 @@ def compare(
     yardsticks: Yardsticks | None = None,
     nearby: Nearby | None = None,
 ) -> list[Row]:
-    """Judge an answer; `formulas` is the solution at `answer.at`, `expected` what the engine must answer.
+    """Compare an answer; `formulas` is the solution at `answer.at`, `expected` what the engine must answer.
 
     What the formulas may be wrong by is decided by the stricter of their own conditions and sizes and those of
     `basis`, another derivation at the same positions; left out: the answer itself.
@@ -85,7 +84,6 @@ def compare(
 
     With `predicted` an error beyond the tolerance must be within DEGRADED times the error to be expected there.
     """
-
     if answer.refusal is not None:
         return [Row.unmeasured(name, answer.engine, answer.setting, "all", REFUSES, answer.refusal)]
     if answer.assembled is None or len(answer.assembled) != len(formulas):
@@ -121,13 +119,13 @@ class _Comparison:
     """What `nearby` answered, once that was required."""
 
     def row(self, quantity: str, verdict: str, reason: str, **numbers: float) -> Row:
-        """A row of this answer."""
+        """Make a row of this answer."""
         error, allowed, theta_2, condition = (float(numbers.get(key, math.nan)) for key in NUMBERS)
         engine, setting = self.answer.engine, self.answer.setting or "-"
         return Row(self.name, engine, setting, quantity, error, allowed, verdict, plain(reason), theta_2, condition)
 
     def assembled(self) -> Row:
-        """Whether both close the loop at the same positions."""
+        """Compare where both close the loop."""
         theirs, ours = self.answer.assembled, self.formulas
         assert theirs is not None
         differ = (theirs != ours.assembled) & ~touching(self.scene, ours.theta_2)
@@ -143,7 +141,7 @@ class _Comparison:
         )
 
     def judged(self, quantity: str) -> Iterator[Row]:
-        """The row of a quantity, if either side has it."""
+        """Compare a quantity, if either side has it."""
         formulas, scene, tolerance = self.formulas, self.scene, self.tolerance
         ours, theirs = getattr(formulas, quantity, None), self.answer.quantities.get(quantity)
         if theirs is None and self.own is not None:
@@ -181,7 +179,7 @@ class _Comparison:
         )
 
     def _measured(self, quantity: str, ours: Array, theirs: Array, where: Mask) -> "tuple[_Finding, Array, Array]":
-        """What is found over the positions `where`, with the errors and the conditions, (n,)."""
+        """Compare at the positions `where`: the result, the errors and the conditions, (n,)."""
         if quantity not in self.yardsticks:
             self.yardsticks[quantity] = (
                 smallest_yardstick(quantity, self.scene, self.formulas, self.basis),
@@ -210,7 +208,7 @@ class _Comparison:
         return found._replace(reason=found.reason + note), error, condition
 
     def undecided(self) -> Iterator[Row]:
-        """A scene of which most numbers are undecided does not hold."""
+        """Fail a scene of which most numbers are undecided."""
         if not self.numbers:
             return
         missing = self.numbers - self.decided
@@ -239,7 +237,7 @@ def _found(
     tolerance: Tolerance,
     predicted: Callable[[Mask], Array] | None,
 ) -> _Finding:
-    """Errors over the positions `where` against the tolerance, `full`, and beyond it against what was predicted there.
+    """Compare errors at the positions `where` with the tolerance, `full`, and beyond it with what was predicted there.
 
     NaN at any of them fails. `full` is 0 where the quantity vanishes; the error is in its own unit there.
     """
@@ -276,12 +274,12 @@ def _found(
 
 
 def turned(ground_angle: float, theta_2: Array | float = 0.0) -> float:
-    """Angles many turns away carry fewer digits of their direction: the largest of them in half turns, at least 1."""
+    """Give the largest angle in half turns, at least 1: many turns away it has fewer digits of its direction."""
     return max(1.0, abs(ground_angle) / np.pi, float(np.abs(theta_2).max(initial=0.0)) / np.pi)
 
 
 def _stated(quantity: str, formulas: Solution, ours: Array) -> Mask:
-    """Where the formulas state one value: beyond the range of doubles the motion is, up to the stage that met it."""
+    """Mark where the formulas have one value: beyond the range of doubles the motion, up to the stage that met it."""
     if quantity in OF_FORCES:
         # at rest a jam is of the motion that would begin
         # where there are several solutions an engine may find another, or none by its own iteration
@@ -293,34 +291,34 @@ def _stated(quantity: str, formulas: Solution, ours: Array) -> Mask:
 
 
 def counted(codes: NDArray[np.uint8]) -> str:
-    """How many positions have which status: "3 singular, 5 no_torque"."""
+    """Count positions by status: "3 singular, 5 no_torque"."""
     counts = np.bincount(codes, minlength=len(STATUS_NAMES)).tolist()
     return ", ".join(f"{count} {name}" for name, count in zip(STATUS_NAMES, counts, strict=True) if count)
 
 
 def closing_margin(scene: Scene, theta_2: Array) -> Array:
-    """By what part of the sum of the lengths the loop closes (> 0) or misses (< 0)."""
+    """Compute by what part of the sum of the lengths the loop closes (> 0) or misses (< 0)."""
     d, a, b, c = scene.linkage.lengths
     e = np.abs(d * np.exp(1j * scene.linkage.ground_angle) - a * np.exp(1j * theta_2))
     return np.asarray(np.minimum(b + c - e, e - abs(b - c)) / of_length(scene))
 
 
 def touching(scene: Scene, theta_2: Array) -> Mask:
-    """Positions at which rounding decides whether the loop closes."""
+    """Mark positions at which rounding decides whether the loop closes."""
     return np.asarray(np.abs(closing_margin(scene, theta_2)) < TOUCHING_MARGIN)
 
 
 def _jumping(quantity: str, scene: Scene, formulas: Solution, tolerance: Tolerance) -> Mask:
-    """Where dry friction reverses and a force may have either value; the motion is prescribed and has one."""
+    """Mark where dry friction reverses and a force may have either value; the motion is prescribed and has one."""
     near_jamming = quantity == "drive_condition" and any(effect.loaded_pins for effect in scene.effects)
     if quantity not in OF_FORCES and not near_jamming:
         return np.zeros(len(formulas), dtype=bool)
-    return reversing(scene, formulas, tolerance.factor, in_time=tolerance.name == SIMULATED.name)
+    return reversing(scene, formulas, tolerance.factor, in_time=tolerance.in_time)
 
 
 def _answerable(quantity: str, scene: Scene, formulas: Solution, tolerance: Tolerance) -> Mask:
-    """Where a quantity may be demanded of an engine of this class."""
-    if quantity == "torque" and scene.drive_bar != 2 and tolerance.name == SIMULATED.name:
+    """Mark where a quantity may be demanded of an engine of this class."""
+    if quantity == "torque" and scene.drive_bar != 2 and tolerance.in_time:
         speed = formulas.omega_3 if scene.drive_bar == 3 else formulas.omega_4
         assert speed is not None
         return turning(speed)
@@ -328,6 +326,6 @@ def _answerable(quantity: str, scene: Scene, formulas: Solution, tolerance: Tole
 
 
 def turning(speed: Array) -> Mask:
-    """Where a driven bar turns fast enough that its torque is no pole's, (n,)."""
+    """Mark where a driven bar turns fast enough that its torque is no pole's, (n,)."""
     fast = np.abs(np.nan_to_num(speed))
     return np.asarray(fast > SLOW_DRIVE * fast.max())

@@ -67,7 +67,7 @@ class Counts:
         return f"{self[FAILS]} fail" if self[FAILS] else "nothing compared" if self.nothing else "holds"
 
     def sentence(self) -> str:
-        """The verdict in one sentence: "all hold" is stated only of what was compared."""
+        """Give the verdict in one sentence: "all hold" is stated only of what was compared."""
         total, failed = self.compared, self[FAILS]
         if failed:
             verdict = f"FAILS: {failed} of {total} comparisons{self._where()} do not hold"

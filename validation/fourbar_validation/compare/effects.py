@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 def _shortest(linkage: FourBar) -> float:
-    """The least length of a moving bar, m."""
+    """Find the least length of a moving bar, m."""
     return min(linkage.bar(number).length for number in MOVING_BARS)
 
 

@@ -24,18 +24,18 @@ def difference(quantity: str, ours: Array, theirs: Array) -> Array:
 
 
 def relative(apart: Array | float, size: Array | float) -> Array:
-    """A difference in parts of a size; a size of 0 demands exactly 0: over the least double any other is huge."""
+    """Divide a difference by a size; a size of 0 demands exactly 0: over the least double any other is huge."""
     with np.errstate(over="ignore"):
         return np.asarray(apart / np.where(size == 0.0, np.nextafter(0.0, 1.0), size))
 
 
 def relative_error(quantity: str, ours: Array, theirs: Array, size: Array) -> Array:
-    """The error of an answer in parts of the size of the quantity, (n,)."""
+    """Compute the error of an answer in parts of the size of the quantity, (n,)."""
     return relative(difference(quantity, ours, theirs), size)
 
 
 def in_own_unit(size: Array) -> Array:
-    """A size that is 1 of its unit where there is nothing to be relative to."""
+    """Replace a size by 1 of its unit where there is nothing to be relative to."""
     return np.where(size == 0.0, 1.0, size)
 
 

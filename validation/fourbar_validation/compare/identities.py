@@ -45,7 +45,7 @@ def identities(name: str, scene: Scene, at: Command, solution: Solution) -> list
 
 
 def _sweep(name: str, scene: Scene, at: Command) -> Row:
-    """A sweep that the scene leaves open: a whole turn, or one degree short of where the loop just closes.
+    """Check a sweep that the scene leaves open: a whole turn, or one degree short of where the loop just closes.
 
     At the end of an interval narrower than four degrees it leaves out a quarter of that, which is half of the sweep.
     """

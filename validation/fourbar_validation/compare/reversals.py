@@ -93,7 +93,7 @@ def _resting(solution: Solution, pin: str, slip: float) -> NDArray[np.bool_]:
 def broken(
     theta_2: Array, values: Array, jumps: list[Reversal], value: Callable[[Solution], Array]
 ) -> tuple[Array, Array]:
-    """A curve, (n,), with both ends of each jump and NaN between them: no line is drawn across.
+    """Give a curve, (n,), both ends of each jump and NaN between them: no line is drawn across.
 
     Parameters
     ----------

@@ -50,7 +50,7 @@ class Row:
 
     @classmethod
     def unmeasured(cls, scene: str, engine: str, setting: str, quantity: str, verdict: str, reason: str) -> "Row":
-        """A verdict without numbers: a refusal, a breakdown, an answer that is missing."""
+        """Make a verdict without numbers: a refusal, a breakdown, an answer that is missing."""
         nan = math.nan
         return cls(scene, engine, setting or "-", quantity, nan, nan, verdict, plain(reason), nan, nan)
 
@@ -66,7 +66,7 @@ class Row:
 
 
 def breakdown(scene: str, engine: str, error: BaseException, part: str = "") -> Row:
-    """The row of an engine that raised, took its process with it, or never came back; `part`: in what."""
+    """Make the row of an engine that raised, took its process with it, or never came back; `part`: in what."""
     if isinstance(error, TimeoutError):
         reason = "the engine hung and was stopped"
     elif type(error).__name__ == "ProcessExpired":  # of Pebble
@@ -111,7 +111,7 @@ def as_text(cell: str) -> str:
 
 
 def from_text(cell: str) -> str:
-    """What `as_text` was given."""
+    """Give back what `as_text` was given."""
     return cell[1:] if cell.startswith(tuple("'" + first for first in FORMULA)) else cell
 
 
@@ -119,17 +119,17 @@ COLUMNS = tuple(column.name for column in fields(Row))
 
 
 def sorted_rows(rows: Iterable[Row]) -> list[Row]:
-    """The rows by scene, engine, setting and quantity."""
+    """Sort rows by scene, engine, setting and quantity."""
     return sorted(rows, key=lambda row: (row.scene, row.engine, row.setting, row.quantity))
 
 
 def to_csv(rows: Iterable[Row]) -> str:
-    """The table as text, sorted, floats as repr, a missing number left empty."""
+    """Write the table as text, sorted, floats as repr, a missing number left empty."""
     return csv_text(COLUMNS, ([_cell(getattr(row, name)) for name in COLUMNS] for row in sorted_rows(rows)))
 
 
 def csv_text(columns: Sequence[str], rows: Iterable[Iterable[object]]) -> str:
-    """A table as CSV, floats as repr, nothing for None, no text that a spreadsheet would calculate."""
+    """Write a table as CSV, floats as repr, nothing for None, no text that a spreadsheet would calculate."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerows([columns] if columns else [])

@@ -24,7 +24,7 @@ VANISHING = 1.0 / K
 
 
 def yardstick(quantity: str, scene: Scene, formulas: Solution, values: Array) -> Array:
-    """What the error of a quantity is divided by at each position, (n,)."""
+    """Compute what the error of a quantity is divided by at each position, (n,)."""
     if UNITS[quantity] in ("rad", "1"):
         return np.ones(len(formulas))
     size = magnitude(values)

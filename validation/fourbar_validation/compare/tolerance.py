@@ -5,11 +5,12 @@ condition is s = |sin(theta_4 - theta_3)|, the drive condition the sine between 
 are not driven, the lever the shorter of bars 3 and 4 over the longest bar.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fourbar.errors import InputError
 from fourbar.linkage import FourBar
 from fourbar.quantities import UNITS
 from fourbar.solution import Solution
@@ -20,6 +21,8 @@ EPS = 2.0**-52
 K = 50.0
 """One factor for every exact comparison. Two evaluations of about fifty roundings each differ by
 sqrt(2 * 50) = 10 of them as a random walk; 50 covers the tails of some 10^5 comparisons."""
+ROUNDINGS = 8.0
+"""A chain of some fifty roundings moves a result by sqrt(50) = 7 last digits, as a random walk."""
 NOTHING_TO_TELL = 1e-3
 """Where eps/condition exceeds this, two correct programs may differ in the third digit: no verdict is drawn."""
 WELL_CONDITIONED = 0.1
@@ -38,9 +41,11 @@ class Tolerance:
     """Error allowed at condition 1, relative to the scale."""
     conditioned: bool
     """Whether it is divided by the condition."""
+    in_time: bool = False
+    """Whether it is of an engine that runs through the motion in time, and has no convention at rest."""
 
     def allowed(self, condition: Array) -> Array:
-        """The relative error allowed at each position, (n,)."""
+        """Compute the relative error allowed at each position, (n,)."""
         if not self.conditioned:
             return np.full_like(condition, self.factor)
         with np.errstate(divide="ignore"):
@@ -66,6 +71,7 @@ SIMULATED = Tolerance(
     "two to ten times what was measured (1e-6 to 4e-6)",
     1e-5,
     conditioned=False,
+    in_time=True,
 )
 FULL_ACCURACY = Tolerance(
     "full accuracy",
@@ -81,8 +87,15 @@ OF_THE_INPUT = frozenset(("theta_2", "omega_2", "alpha_2", "A", "G2", "v_A", "v_
 """Quantities that the input alone decides: they lose none."""
 
 
+def simulated_within(error: float, why: str) -> Tolerance:
+    """Hold what runs through time to a wanted error."""
+    if not 0.0 < error < 1.0:
+        raise InputError("--error", error, "must be a relative error, above 0 and below 1")
+    return replace(SIMULATED, factor=error, reason=f"{error:g} of the scale, as wanted: {why}")
+
+
 def lever(linkage: FourBar) -> float:
-    """min(b, c)/longest bar: a loop closes to eps of its longest bar, which turns a shorter bar 3 or 4 by more.
+    """Compute min(b, c)/longest bar: a loop closes to eps of its longest bar, which turns a shorter bar 3 or 4 by more.
 
     Without it 28 of 10 008 comparisons on 300 random linkages exceed K = 50 (at most 83); with it none exceeds 17.
     """
@@ -91,7 +104,7 @@ def lever(linkage: FourBar) -> float:
 
 
 def condition_of(quantity: str, linkage: FourBar, formulas: Solution) -> Array:
-    """The condition of a quantity at each position: s for positions, s^2 for what follows, times lever and drive."""
+    """Compute a quantity's condition at each position: s for positions, s^2 for what follows, times lever and drive."""
     s, unit = formulas.condition, UNITS[quantity]
     if quantity in OF_THE_INPUT:
         return np.ones_like(s)

@@ -9,6 +9,7 @@ import os
 import sys
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from importlib import import_module
 from importlib.metadata import distributions, entry_points
 from pathlib import Path
@@ -17,7 +18,6 @@ from typing import Any
 
 from fourbar.errors import InputError
 from fourbar.quantities import ANGLES, UNKNOWNS
-from fourbar_validation.compare.answer import Engine
 from fourbar_validation.compare.compare import COMPARED
 from fourbar_validation.compare.identities import FORMULAS
 from fourbar_validation.compare.rows import in_words, one_line, plain
@@ -38,14 +38,12 @@ OURS = frozenset(sys.modules)
 class AddedWitness(Witness):
     """A witness whose answers are looked at before they are compared."""
 
+    adapter: str = ""
+    """Its class, "module:Class"."""
     trouble: str = ""
     """Why its class cannot be used, or nothing."""
     code: str = ""
     """Hash of what its answers come from."""
-
-    def engine(self) -> Engine:
-        """The class of the user, its answers looked at."""
-        return Checked(self)
 
     def missing(self) -> str | None:
         """Why it cannot answer here, or None."""
@@ -57,7 +55,7 @@ class _UnusableError(Exception):
 
 
 def named(adapters: Sequence[str], known: Iterable[str]) -> tuple[Witness, ...]:
-    """The witnesses of the command line; InputError where one is none."""
+    """Read the witnesses of the command line; InputError where one is none."""
     if os.getcwd() not in sys.path:  # a console script does not look there
         sys.path.append(os.getcwd())
     found = list(zip(adapters, _described(adapters, known), strict=True))
@@ -71,7 +69,7 @@ def installed(known: Iterable[str]) -> tuple[Witness, ...]:
     """Those of the entry points; one that cannot be used is missing, with the reason."""
     points = sorted(entry_points(group=GROUP), key=lambda point: point.name)
     return tuple(
-        AddedWitness(plain(point.name), point.value, EQUIVALENCE, trouble=f"{point.value} {each}")
+        _added(plain(point.name), point.value, EQUIVALENCE, trouble=f"{point.value} {each}")
         if isinstance(each, _UnusableError)
         else each
         for point, each in zip(points, _described([point.value for point in points], known), strict=True)
@@ -79,7 +77,7 @@ def installed(known: Iterable[str]) -> tuple[Witness, ...]:
 
 
 def _described(adapters: Sequence[str], known: Iterable[str]) -> list[Witness | _UnusableError]:
-    """What each class says of itself, in another process: nothing of it runs in the one that gives the verdict."""
+    """Ask each class what it says of itself, in another process: nothing of it runs where the verdict is given."""
     if not adapters:
         return []
     names, found = {FORMULAS, *known}, list[Witness | _UnusableError]()
@@ -102,7 +100,7 @@ def _trouble(_: str, error: Exception, __: object) -> _UnusableError:
 
 
 def _describe(adapter: str) -> AddedWitness:
-    """The witness that a class makes, in plain words and numbers; _UnusableError where it is none."""
+    """Describe the witness that a class makes in plain words and numbers; _UnusableError where it is none."""
     module, _, attribute = adapter.partition(":")
     if not module or not attribute:
         raise _UnusableError("must be module:Class")
@@ -126,7 +124,11 @@ def _read(adapter: str, made: Any) -> AddedWitness:
     positions = tuple(quantity for quantity in quantities if quantity in ANGLES)
     tolerance = _tolerance(getattr(made, "tolerance", EQUIVALENCE.name))
     code = _code(sys.modules[adapter.partition(":")[0]])
-    return AddedWitness(name, adapter, tolerance, expected=quantities, positions=positions, stated=False, code=code)
+    return _added(name, adapter, tolerance, expected=quantities, positions=positions, stated=False, code=code)
+
+
+def _added(name: str, adapter: str, tolerance: Tolerance, **rest: Any) -> AddedWitness:
+    return AddedWitness(name, partial(Checked, name, adapter), tolerance, adapter=adapter, **rest)
 
 
 def _code(module: ModuleType) -> str:

@@ -30,7 +30,7 @@ Values: TypeAlias = dict[str, Ball]
 
 
 def inputs(scene: Scene, theta_2: float) -> dict[str, float]:
-    """The stored doubles that the outputs at one position depend on."""
+    """Collect the stored doubles that the outputs at one position depend on."""
     link, motion = scene.linkage, scene.motion
     d, a, b, c = link.lengths
     values = {"d": d, "a": a, "b": b, "c": c, "theta_1": link.ground_angle, "theta_2": theta_2}
@@ -67,13 +67,13 @@ def inputs(scene: Scene, theta_2: float) -> dict[str, float]:
 
 
 def stored(scene: Scene, theta_2: float, **motion: float) -> Values:
-    """The same as balls of no radius, with another omega_2 or alpha_2 where stated; sets the working precision."""
+    """Give the inputs as balls of no radius, with another omega_2 or alpha_2 where given; set the working precision."""
     ctx.prec = BITS
     return {name: arb(value) for name, value in (inputs(scene, theta_2) | motion).items()}
 
 
 def polar(r: Ball, angle: Ball) -> Complex:
-    """r e^{i angle}."""
+    """Return r e^{i angle}."""
     return acb(r * angle.cos(), r * angle.sin())
 
 
@@ -107,7 +107,7 @@ def linear(rows: list[list[Ball]], right: list[Ball]) -> list[Ball]:
 
 
 def outputs(scene: Scene, branch: int, x: Values, drive_bar: int) -> Values | None:  # noqa: PLR0915 - one system
-    """Every output at one position as balls; vectors as name_x, name_y; None where the loop does not close."""
+    """Compute every output at one position as balls; vectors as name_x, name_y; None where the loop does not close."""
     closed = closure(x, branch)
     if closed is None:
         return None
@@ -121,7 +121,7 @@ def outputs(scene: Scene, branch: int, x: Values, drive_bar: int) -> Values | No
     of_3, of_4 = acb(0, b) * w[3], acb(0, -c) * w[4]
 
     def rates(known: Complex) -> list[Ball]:
-        """Of bars 3 and 4, where b i w3 rate_3 - c i w4 rate_4 is known."""
+        """Solve for the rates of bars 3 and 4, where b i w3 rate_3 - c i w4 rate_4 is given."""
         return linear([[of_3.real, of_4.real], [of_3.imag, of_4.imag]], [known.real, known.imag])
 
     # what a probe opens the loop by: slip, m/s, and jerk, m/s^2
@@ -135,20 +135,20 @@ def outputs(scene: Scene, branch: int, x: Values, drive_bar: int) -> Values | No
     O4, tip = polar(x["d"], x["theta_1"]), {2: a * w[2], 3: b * w[3], 4: c * w[4]}
     spin = {k: acb(0, omega[k]) for k in MOVING_BARS}
     swing = {k: acb(-omega[k] * omega[k], alpha[k]) for k in MOVING_BARS}
-    foot = {1: zero, 2: zero, 3: tip[2], 4: O4}
+    first_pin = {1: zero, 2: zero, 3: tip[2], 4: O4}
     v_foot, a_foot = ({2: zero, 3: turn[2] * tip[2], 4: zero} for turn in (spin, swing))
     centre = {k: w[k] * polar(x[f"r{k}"], x[f"phi{k}"]) for k in MOVING_BARS}
     acceleration = {k: a_foot[k] + swing[k] * centre[k] for k in MOVING_BARS}
     points = {"A": tip[2], "B": O4 + tip[4], "a_A": a_foot[3], "a_B": swing[4] * tip[4]}
     points |= {"v_A": v_foot[3], "v_B": spin[4] * tip[4]}
     for k in MOVING_BARS:
-        points |= {f"G{k}": foot[k] + centre[k], f"a_G{k}": acceleration[k]}
+        points |= {f"G{k}": first_pin[k] + centre[k], f"a_G{k}": acceleration[k]}
         points[f"v_G{k}"] = v_foot[k] + spin[k] * centre[k]
     _put(y, points)
 
     force = {k: x[f"m{k}"] * polar(x["g"], x["g_angle"]) if "g" in x else zero for k in MOVING_BARS}
     moment = {k: x.get(f"couple_{k}", arb(0)) for k in MOVING_BARS}  # about G; a probe may add one
-    _add_effects(scene, x, {1: polar(arb(1), x["theta_1"]), **w}, foot, centre, force, moment)
+    _add_effects(scene, x, {1: polar(arb(1), x["theta_1"]), **w}, first_pin, centre, force, moment)
     for effect in scene.effects:
         if isinstance(effect, Flywheel):
             moment[effect.bar] -= x["J"] * alpha[effect.bar]
@@ -158,12 +158,12 @@ def outputs(scene: Scene, branch: int, x: Values, drive_bar: int) -> Values | No
         couple = -x.get(f"viscous_{pin}", arb(0)) * slip - x.get(f"friction_{pin}", arb(0)) * sign
         _twist(moment, pin, couple)
     # unknowns F12 F32 F23 F43 F34 F14 (x, y each) and T
-    joints = {2: ((0, "foot"), (1, "tip")), 3: ((2, "foot"), (3, "tip")), 4: ((4, "tip"), (5, "foot"))}
+    joints = {2: ((0, "first_pin"), (1, "tip")), 3: ((2, "first_pin"), (3, "tip")), 4: ((4, "tip"), (5, "first_pin"))}
     matrix = [[arb(0)] * 13 for _ in range(13)]
     known = []
     for n, k in enumerate(MOVING_BARS):
         for column, end in joints[k]:
-            arm = -centre[k] if end == "foot" else tip[k] - centre[k]
+            arm = -centre[k] if end == "first_pin" else tip[k] - centre[k]
             matrix[3 * n][2 * column] = matrix[3 * n + 1][2 * column + 1] = arb(1)
             matrix[3 * n + 2][2 * column], matrix[3 * n + 2][2 * column + 1] = -arm.imag, arm.real
         if k == drive_bar:
@@ -192,7 +192,7 @@ def _put(y: Values, vectors: dict[str, Complex]) -> None:
 
 
 def _twist(moment: dict[int, Ball], pin: str, couple: Ball) -> None:
-    """A couple on bar j of a pin (i, j), its opposite on bar i; on the ground it does nothing."""
+    """Add a couple to bar j of a pin (i, j), its opposite to bar i; on the ground it does nothing."""
     i, j = PINS[pin]
     for bar, value in ((j, couple), (i, -couple)):
         if bar in moment:
@@ -203,12 +203,12 @@ def _add_effects(
     scene: Scene,
     x: Values,
     w: dict[int, Complex],
-    foot: dict[int, Complex],
+    first_pin: dict[int, Complex],
     centre: dict[int, Complex],
     force: dict[int, Complex],
     moment: dict[int, Ball],
 ) -> None:
-    """Loads and springs, from the directions and first pins of all bars, the ground's too."""
+    """Add loads and springs, from the directions and first pins of all bars, the ground's too."""
     for k, load in enumerate(scene.loads):
         factor = _factor(load.table, x["theta_2"]) if load.table else arb(1)
         axes = w[load.bar] if load.frame == "bar" else acb(1)
@@ -228,7 +228,7 @@ def _add_effects(
                     w[bar] * polar(x[f"{name}_{k}"], x[f"{name}_angle_{k}"])
                     for bar, name in ((start, "start"), (end, "end"))
                 ]
-                pull = _pull(spring, x, k, foot[end] + arms[1] - foot[start] - arms[0])
+                pull = _pull(spring, x, k, first_pin[end] + arms[1] - first_pin[start] - arms[0])
                 for bar, arm, f in ((start, arms[0], pull), (end, arms[1], -pull)):
                     if bar in force:
                         force[bar] += f
@@ -236,7 +236,7 @@ def _add_effects(
 
 
 def _factor(table: Table, theta_2: Ball) -> Ball:
-    """On the straight line between the two points of a table that enclose an angle, taken modulo a turn."""
+    """Interpolate between the two points of a table that enclose an angle, taken modulo a turn."""
     turns = math.floor((float(theta_2.mid()) - table.theta_2[0]) / math.tau + 1e-12)
     angle = theta_2 - 2 * turns * arb.pi()
     after = min(max(bisect(table.theta_2, float(angle.mid())), 1), len(table.theta_2) - 1)
@@ -254,7 +254,7 @@ def _pull(spring: Spring, x: Values, k: int, across: Complex) -> Complex:
 
 
 def response(base: Values, changed: Iterable[Values | None]) -> dict[str, float]:
-    """How far each output moves, by 2^-STEP_BITS, under the first of several changes with which the loop closes."""
+    """Compute how far each output moves, by 2^-STEP_BITS, under the first of several changes that closes the loop."""
     for moved in changed:
         if moved is None:
             continue
@@ -272,7 +272,7 @@ def response(base: Values, changed: Iterable[Values | None]) -> dict[str, float]
 
 
 def reference(scene: Scene, branch: int, theta_2: float) -> tuple[Values, dict[str, float]] | None:
-    """Values at one position as balls, and sum |x_i dy/dx_i| of each; None where the loop does not close."""
+    """Compute values at one position as balls, and sum |x_i dy/dx_i| of each; None where the loop does not close."""
     exact = stored(scene, theta_2)
 
     def evaluate(**changed: Ball) -> Values | None:

@@ -2,6 +2,7 @@
 
 import signal
 from copy import deepcopy
+from pkgutil import resolve_name
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,6 @@ from fourbar.quantities import VECTORS
 from fourbar.scene import Command, Scene
 from fourbar_validation.compare.answer import Answer, Array, Engine, WitnessError
 from fourbar_validation.compare.rows import in_words, one_line
-from fourbar_validation.engines.witnesses import Witness
 
 FURTHEST = 0.1
 """rad, and part of the greatest speed and acceleration: a motion that ends further from the command than this answers
@@ -20,18 +20,18 @@ another question."""
 class Checked:
     """An engine from outside, under the name that it was described by."""
 
-    def __init__(self, witness: Witness) -> None:
-        self.name, self._witness = witness.name, witness
+    def __init__(self, name: str, adapter: str) -> None:
+        self.name, self._adapter = name, adapter
 
     def answer(self, scene: Scene, command: Command) -> Answer:
-        """Its answer; WitnessError where it is none, whatever the engine raises."""
+        """Return its answer; WitnessError where it is none, whatever the engine raises."""
         given_scene, at = deepcopy((scene, command))
         for array in (given_scene.motion.theta_2, *at):
             if isinstance(array, np.ndarray):
                 array.flags.writeable = False
         try:
             with np.errstate():  # as it was before, for the engines that come after
-                engine: Engine = Witness.engine(self._witness)
+                engine: Engine = resolve_name(self._adapter)()
                 return self._read(engine.answer(given_scene, at), command)
         except BaseException as error:
             if isinstance(error, KeyboardInterrupt) and signal.getsignal(signal.SIGINT) != signal.SIG_IGN:
@@ -84,7 +84,7 @@ def _numbers(name: str, value: Any, shape: tuple[int, ...], kinds: str = "iuf") 
 
 
 def _motion(at: Any, command: Command) -> Command:
-    """The motion that a witness says it made, near the one that was commanded."""
+    """Check the motion that a witness says it made: it must be near the one that was commanded."""
     if not isinstance(at, Command):
         raise TypeError(f"at must be the command or one made of it, not a {type(at).__name__}")
     if not np.array_equal(at.branch, command.branch) or (at.omega_2 is None) != (command.omega_2 is None):

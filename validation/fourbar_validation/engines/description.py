@@ -18,7 +18,14 @@ from fourbar_validation.compare.answer import Array
 PINS = {"O2": (1, 2), "A": (2, 3), "B": (3, 4), "O4": (1, 4)}
 FIRST_PIN = {2: "O2", 3: "A", 4: "O4"}
 FORCE_AT = {"O2": "F12", "A": "F32", "B": "F43", "O4": "F14"}
-POINTS = {"A": "foot3", "O4": "foot4", "A2": "end2", "B": "end3", "B4": "end4", **{g: g for g in ("G2", "G3", "G4")}}
+POINTS = {
+    "A": "first_pin3",
+    "O4": "first_pin4",
+    "A2": "end2",
+    "B": "end3",
+    "B4": "end4",
+    **{g: g for g in ("G2", "G3", "G4")},
+}
 """By the name under which a point is answered, what `Part` calls it; A2 and B4 are the ends of bars 2 and 4."""
 ON_BARS = {"A": "end2", "B": "end4", "G2": "G2", "G3": "G3", "G4": "G4"}
 """Points whose accelerations are answered, each as a point of a bar."""
@@ -34,7 +41,7 @@ def inertia(bar: Bar) -> float:
 
 
 def centre(bar: Bar) -> tuple[float, float]:
-    """Distance (m) and angle (rad) of the mass centre from the first pin and the bar's line: as stated, or mid-bar."""
+    """Return distance (m) and angle (rad) of the mass centre from pin and bar's line: as specified, or mid-bar."""
     return bar.centre if bar.centre is not None else (bar.length / 2.0, 0.0)
 
 
@@ -44,23 +51,23 @@ def about_first_pin(bar: Bar) -> float:
 
 
 def components(size: float, angle: float) -> tuple[float, float]:
-    """Of a vector, along and across the line from which its angle (rad) counts."""
+    """Resolve a vector along and across the line from which its angle (rad) counts."""
     return size * math.cos(angle), size * math.sin(angle)
 
 
 def within_half_a_turn(angle: float) -> float:
-    """The direction of an angle however many turns away, rad: sums with others then lose none of its digits."""
+    """Reduce an angle to its direction, rad: sums with others then lose none of its digits."""
     return angle if abs(angle) <= math.pi else math.atan2(math.sin(angle), math.cos(angle))
 
 
-def turned(angle: float, x: float, y: float) -> tuple[float, float]:
-    """The vector that is (x, y) along and across a line at an angle (rad)."""
+def rotate(angle: float, x: float, y: float) -> tuple[float, float]:
+    """Rotate (x, y) along and across a line at an angle (rad) into world axes."""
     cos, sin = math.cos(angle), math.sin(angle)
-    return turned_by(((cos, -sin), (sin, cos)), x, y)
+    return rotate_by(((cos, -sin), (sin, cos)), x, y)
 
 
-def turned_by(rotation: Sequence[Sequence[float]], x: float, y: float) -> tuple[float, float]:
-    """A vector turned by a matrix of two rows."""
+def rotate_by(rotation: Sequence[Sequence[float]], x: float, y: float) -> tuple[float, float]:
+    """Rotate a vector by a matrix of two rows."""
     (a, b), (c, d) = rotation
     return a * x + b * y, c * x + d * y
 
@@ -77,14 +84,14 @@ class Part(NamedTuple):
     bar: int
     bearer: int
     """The bar that carries its first pin; 1: the ground."""
-    foot: tuple[float, float]
+    first_pin: tuple[float, float]
     """That pin in the bearer's axes, of the ground in world axes, m."""
     mass: float
     inertia: float
     """About the mass centre, kg m^2."""
     length: float
     points: dict[str, tuple[float, float]]
-    """foot, G and end, each with the bar's number: its first pin, mass centre and second pin, m."""
+    """first_pin, G and end, each with the bar's number: its first pin, mass centre and second pin, m."""
 
     @property
     def centre(self) -> tuple[float, float]:
@@ -93,22 +100,22 @@ class Part(NamedTuple):
 
 
 def parts(linkage: FourBar) -> list[Part]:
-    """Bars 2, 3 on 2, and 4."""
+    """Describe bars 2, 3 on 2, and 4."""
     theta_1, d = linkage.ground_angle, linkage.ground
-    feet = {2: (1, (0.0, 0.0)), 3: (2, (linkage.input.length, 0.0)), 4: (1, components(d, theta_1))}
+    first_pins = {2: (1, (0.0, 0.0)), 3: (2, (linkage.input.length, 0.0)), 4: (1, components(d, theta_1))}
     found = []
     for number in MOVING_BARS:
         bar = linkage.bar(number)
-        ends = {"foot": (0.0, 0.0), "G": components(*centre(bar)), "end": (bar.length, 0.0)}
+        ends = {"first_pin": (0.0, 0.0), "G": components(*centre(bar)), "end": (bar.length, 0.0)}
         points = {f"{name}{number}": at for name, at in ends.items()}
-        found.append(Part(number, *feet[number], bar.mass, inertia(bar), bar.length, points))
+        found.append(Part(number, *first_pins[number], bar.mass, inertia(bar), bar.length, points))
     return found
 
 
 def place(point: Any, ground_angle: float) -> tuple[float, float]:
-    """An end of a spring along and across its bar's line from the first pin, on the ground in world axes, m."""
+    """Locate an end of a spring along and across its bar's line from the first pin, on the ground in world axes, m."""
     at = components(point.distance, point.angle)
-    return turned(ground_angle, *at) if point.bar == 1 else at
+    return rotate(ground_angle, *at) if point.bar == 1 else at
 
 
 def speeds(at: Command) -> tuple[Array, Array]:
@@ -120,7 +127,7 @@ def speeds(at: Command) -> tuple[Array, Array]:
 
 
 def unknown_effect(scene: Scene, table: Container[str]) -> str:
-    """The reason to refuse a scene with an effect that a table has no row for; empty where there is none."""
+    """Give the reason to refuse a scene with an effect that a table has no row for; empty where there is none."""
     return next(
         (f"the effect {effect.key!r} has no model here" for effect in scene.effects if effect.key not in table), ""
     )

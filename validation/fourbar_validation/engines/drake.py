@@ -31,7 +31,7 @@ UP = (0.0, 0.0, 1.0)
 
 
 def refusal(scene: Scene) -> str:
-    """The declared limit that a scene meets, or nothing."""
+    """Name the declared limit that a scene meets, if any."""
     if reason := unknown_effect(scene, TERM_OF):
         return reason
     for number in FIRST_PIN:
@@ -57,8 +57,8 @@ class DrakeTree(Tree):
             about_g = RotationalInertia(*[part.inertia] * 3)
             inertia = SpatialInertia.MakeFromCentralInertia(part.mass, np.array([*part.centre, 0.0]), about_g)
             body = self.body[part.bar] = plant.AddRigidBody(f"bar{part.bar}", inertia)
-            at, bearer = RigidTransform(np.array([*part.foot, 0.0])), self.body[part.bearer].body_frame()
-            frame = plant.AddFrame(FixedOffsetFrame(f"foot{part.bar}", bearer, at))
+            at, bearer = RigidTransform(np.array([*part.first_pin, 0.0])), self.body[part.bearer].body_frame()
+            frame = plant.AddFrame(FixedOffsetFrame(f"first_pin{part.bar}", bearer, at))
             joint = RevoluteJoint(FIRST_PIN[part.bar], frame, body.body_frame(), UP)
             self.joint[part.bar] = plant.AddJoint(joint)
             self.local |= {name: (body.body_frame(), np.array([*place, 0.0])) for name, place in part.points.items()}
@@ -72,16 +72,16 @@ class DrakeTree(Tree):
         self.plant.SetPositions(self.context, np.array(q, dtype=float))
 
     def point(self, name: str) -> Array:
-        """A point fixed in a body."""
+        """Return a point fixed in a body."""
         return np.array(self.plant.CalcPointsPositions(self.context, *self.local[name], self.world)[:2, 0])
 
     def rotation(self, bar: int) -> Array:
-        """That of the body."""
+        """Return that of the body."""
         pose = self.plant.EvalBodyPoseInWorld(self.context, self.body[bar])
         return np.asarray(pose.rotation().matrix()[:2, :2])
 
     def point_jacobian(self, name: str) -> Array:
-        """Of the translational velocity."""
+        """Return that of the translational velocity."""
         at = (*self.local[name], self.world, self.world)
         return np.asarray(self.plant.CalcJacobianTranslationalVelocity(self.context, BY_SPEEDS, *at)[:2])
 
@@ -110,7 +110,7 @@ class DrakeTree(Tree):
         return np.array(self.plant.CalcInverseDynamics(self.context, self.a, forces))
 
     def carried(self) -> dict[int, Array]:
-        """The reaction port, which finds the accelerations once more."""
+        """Read the reaction port, which finds the accelerations once more."""
         applied = []
         for bar, wrench in self.wrenches.items():
             force = ExternallyAppliedSpatialForce()

@@ -20,43 +20,43 @@ if TYPE_CHECKING:
 
 
 def _gravity(effect: "Gravity", bars: Loaded) -> None:
-    """The engine's own gravity."""
+    """Set the engine's own gravity."""
     bars.gravity(field(effect))
 
 
 def _slip(bars: Loaded, pin: str) -> float:
-    """How much faster the first bar of a pin spins than the second, rad/s."""
+    """Return how much faster the first bar of a pin spins than the second, rad/s."""
     one, other = PINS[pin]
     return bars.velocity(one) - bars.velocity(other)
 
 
 def _twist_at(bars: Loaded, pin: str, couple: float) -> None:
-    """A couple on the second bar of a pin, and its opposite on the first."""
+    """Apply a couple to the second bar of a pin, and its opposite to the first."""
     one, other = PINS[pin]
     bars.twist(other, couple)
     bars.twist(one, -couple)
 
 
 def _viscous(effect: "Viscous", bars: Loaded) -> None:
-    """Couples in proportion to the spin."""
+    """Apply couples in proportion to the spin."""
     for pin, k in effect.coefficients:
         _twist_at(bars, pin, k * _slip(bars, pin))
 
 
 def _friction(effect: "Friction", bars: Loaded) -> None:
-    """Couples of constant size; MuJoCo's own frictionloss is a soft constraint."""
+    """Apply couples of constant size; MuJoCo's own frictionloss is a soft constraint."""
     for pin, f in effect.torques:
         _twist_at(bars, pin, f * float(np.sign(_slip(bars, pin))))
 
 
 def _pin_friction(effect: "PinFriction", bars: Loaded) -> None:
-    """Couples of mu r times the load that the engine found at the pin in its last pass."""
+    """Apply couples of mu r times the load that the engine computed at the pin in its last pass."""
     for pin, mu, r in effect.pins:
         _twist_at(bars, pin, mu * r * bars.pin_loads.get(pin, 0.0) * float(np.sign(_slip(bars, pin))))
 
 
 def _torsion(effect: "Torsion", bars: Loaded) -> None:
-    """Couples from the engine's own angles of the two bars."""
+    """Apply couples from the engine's own angles of the two bars."""
     for pin, k, rest, preload in effect.springs:
         one, other = PINS[pin]
         twist = math.remainder(bars.angle(one) - bars.angle(other) + rest, math.tau)
@@ -64,10 +64,10 @@ def _torsion(effect: "Torsion", bars: Loaded) -> None:
 
 
 def _springs(effect: "Springs", bars: Loaded) -> None:
-    """Pulls at the engine's own places of the two points."""
+    """Pull at the engine's own places of the two points."""
     for spring in effect.springs:
         one, other = (
-            bars.foot(point.bar) + bars.turned(point.bar, *components(point.distance, point.angle))
+            bars.first_pin(point.bar) + bars.rotate(point.bar, *components(point.distance, point.angle))
             for point in (spring.start, spring.end)
         )
         vector = np.asarray(other - one)
@@ -82,16 +82,16 @@ def _springs(effect: "Springs", bars: Loaded) -> None:
 
 
 def _flywheel(effect: "Flywheel", bars: Loaded) -> None:
-    """The couple that turning the wheel takes, from the engine's own angular acceleration."""
+    """Apply the couple that accelerating the wheel takes, from the engine's own angular acceleration."""
     bars.twist(effect.bar, -effect.inertia * bars.alpha(effect.bar))
 
 
 def _load(load: "Load", bars: Loaded) -> None:
-    """A force at its point and a couple; in the bar's frame both vectors turn with the engine's bar."""
+    """Apply a force at its point and a couple; in the bar's frame both vectors rotate with the engine's bar."""
     force, arm = np.array(components(*(load.force or (0.0, 0.0)))), np.array(components(*load.at))
     factor = 1.0 if load.table is None else look_up(load.table, bars.angle(2))
     if load.frame == "bar":
-        f, at = bars.turned(load.bar, *force), bars.turned(load.bar, *arm)
+        f, at = bars.rotate(load.bar, *force), bars.rotate(load.bar, *arm)
     else:
         f, at = force, arm
     bars.push(load.bar, factor * f, bars.point(f"G{load.bar}") + at)
@@ -99,7 +99,7 @@ def _load(load: "Load", bars: Loaded) -> None:
 
 
 def look_up(table: "Table", theta_2: float) -> float:
-    """The factor of a table at one angle, by the two neighbours' chord, apart from the formulas' `at`."""
+    """Interpolate a table at one angle, by the two neighbours' chord, apart from the formulas' `at`."""
     angle = table.theta_2[0] + math.fmod(math.fmod(theta_2 - table.theta_2[0], math.tau) + math.tau, math.tau)
     k = min(max(bisect.bisect_right(table.theta_2, angle), 1), len(table.theta_2) - 1)
     (a, b), (f, g) = table.theta_2[k - 1 : k + 1], table.factor[k - 1 : k + 1]
@@ -120,7 +120,7 @@ TERM_OF: dict[str, Callable[[Any, Loaded], None]] = {
 
 
 def acting(scene: Scene, bars: Loaded, own: Container[str] = ()) -> list[Act]:
-    """What loads and effects do at each state of the bars; gravity, the engine's own, is set once and for all.
+    """List what loads and effects do at each state of the bars; gravity, the engine's own, is set once and for all.
 
     `own`: the keys of effects for which the engine has elements of its own.
     """

@@ -10,20 +10,16 @@ from fourbar.linkage import FourBar
 from fourbar.quantities import VECTORS
 from fourbar.scene import Command, Scene
 from fourbar_validation.compare.answer import Answer, Array
-from fourbar_validation.compare.compare import COMPARED, Mask
-from fourbar_validation.compare.tolerance import EPS
+from fourbar_validation.compare.compare import COMPARED
 from fourbar_validation.engines.description import SHARED, speeds, unknown_effect
 from fourbar_validation.engines.loop import blank
-from fourbar_validation.engines.prediction import ROUNDINGS
 
 NAME = "ball-arithmetic"
-NEWTON = 4
-"""Steps, each of which doubles the digits, from a start that has those of a double but for the last ones."""
 KNOWN = tuple(kind.key for kind in (Gravity, Viscous, Friction, Springs, Torsion, Flywheel))
 
 
 def unknown(scene: Scene) -> str:
-    """The reason to refuse a scene, or nothing."""
+    """Give the reason to refuse a scene, if any."""
     return unknown_effect(scene, KNOWN)
 
 
@@ -33,7 +29,9 @@ class BallArithmetic:
     name = NAME
 
     def answer(self, scene: Scene, command: Command) -> Answer:
-        """Its answer, or the refusal that names an effect it does not know."""
+        """Answer, or refuse by naming an effect that it does not know."""
+        from flint import arb
+
         from fourbar_validation.engines.balls import outputs, stored
 
         if reason := unknown(scene):
@@ -44,6 +42,7 @@ class BallArithmetic:
         for i in range(n):
             motion = {"omega_2": float(omega[i]), "alpha_2": float(alpha[i])}
             exact = stored(scene, float(command.theta_2[i]), **motion)
+            exact["theta_2"] += arb(0 if command.remainder is None else command.remainder)
             values = outputs(scene, int(command.branch[i]), exact, scene.drive_bar)
             if values is None:
                 continue
@@ -61,7 +60,7 @@ class BallArithmetic:
 
 
 def sines(linkage: FourBar, command: Command) -> Array:
-    """sin(theta_4 - theta_3) of each position in many digits, (n,); NaN where the loop does not close."""
+    """Compute sin(theta_4 - theta_3) of each position in many digits, (n,); NaN where the loop does not close."""
     from flint import arb, ctx
 
     from fourbar_validation.engines.balls import BITS, closure, wedge
@@ -77,40 +76,8 @@ def sines(linkage: FourBar, command: Command) -> Array:
     return found
 
 
-def where_it_closes(scene: Scene, at: Command, sin_mu: Array, where: Mask) -> dict[str, Array]:
-    """Every quantity at the theta_2, within its own rounding, at which sin(theta_4 - theta_3) is the one stated.
-
-    Near a limit position the last digits of theta_2 decide this sine, and with it every other number; once they are
-    chosen all the others have their digits. NaN where no theta_2 so near has this sine.
-    """
-    from flint import arb
-
-    from fourbar_validation.engines.balls import STEP_BITS, closure, outputs, stored, wedge
-
-    out, (omega, alpha) = blank(len(where), COMPARED), speeds(at)
-    for i in np.flatnonzero(where & np.isfinite(sin_mu)).tolist():
-        theta_2, branch, square = float(at.theta_2[i]), int(at.branch[i]), arb(float(sin_mu[i])) ** 2
-        x = stored(scene, theta_2, omega_2=float(omega[i]), alpha_2=float(alpha[i]))
-        near, step = (
-            arb(ROUNDINGS * EPS * max(1.0, abs(theta_2), abs(scene.linkage.ground_angle))),
-            arb(2) ** -STEP_BITS,
-        )
-        for _ in range(NEWTON):  # on the square, which is smooth at the limit position itself
-            closed = [closure(x | {"theta_2": x["theta_2"] + by}, branch) for by in (0, step)]
-            if None in closed:
-                break
-            here, ahead = (wedge(*each[1:]) ** 2 for each in closed if each is not None)
-            by = (square - here) * step / (ahead - here)
-            if not abs(x["theta_2"] + by - theta_2) <= near:
-                break
-            x["theta_2"] = arb((x["theta_2"] + by).mid())
-        else:
-            _put(out, i, outputs(scene, branch, x, scene.drive_bar) or {})
-    return out
-
-
 def _put(out: dict[str, Array], i: int, values: dict[str, Any]) -> None:
-    """The numbers of one position into those of all."""
+    """Write the numbers of one position into those of all."""
     for name, array in out.items():
         if name in VECTORS:
             array[i] = _number(values.get(f"{name}_x")), _number(values.get(f"{name}_y"))

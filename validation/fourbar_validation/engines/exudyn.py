@@ -66,7 +66,7 @@ class ExudynBars(Loaded):
             "O2": ((0.0, 0.0), (0.0, 0.0)),
             "A": ((0.0, 0.0), end[2]),
             "B": (end[4], end[3]),
-            "O4": (of_bar[4].foot, (0.0, 0.0)),
+            "O4": (of_bar[4].first_pin, (0.0, 0.0)),
         }
         for pin, bars in JOINTS.items():
             markers = [bodies.point(bar, *place) for bar, place in zip(bars, at[pin], strict=True)]
@@ -81,8 +81,10 @@ class ExudynBars(Loaded):
         for bar in MOVING_BARS:
             mass = mbs.AddMarker(MarkerBodyMass(bodyNumber=self.body[bar]))
             mbs.AddLoad(LoadMassProportional(markerNumber=mass, loadVector=[*self.field, 0.0]))
-            foot = bodies.axes(bar)
-            self.load[bar] = tuple(mbs.AddLoad(kind(markerNumber=foot)) for kind in (LoadForceVector, LoadTorqueVector))
+            first_pin = bodies.axes(bar)
+            self.load[bar] = tuple(
+                mbs.AddLoad(kind(markerNumber=first_pin)) for kind in (LoadForceVector, LoadTorqueVector)
+            )
         mbs.Assemble()
         self.state = mbs.systemData
         settings = exu.SimulationSettings()
@@ -95,7 +97,7 @@ class ExudynBars(Loaded):
         self.e_drive[self.turn[scene.drive_bar]] = 1.0
 
     def place(self, q: Sequence[float]) -> None:
-        """Angles of the bars as given; the pins O2, A and O4 closed, in which Exudyn's constraints are linear."""
+        """Set the bars' angles; the pins O2, A and O4 are closed, in which Exudyn's constraints are linear."""
         of_3_to_2, theta_4 = q[1:]
         theta_2 = within_half_a_turn(q[0])
         coordinates = np.zeros(SIZE)
@@ -125,14 +127,14 @@ class ExudynBars(Loaded):
         return x, y
 
     def jacobian(self) -> Array:
-        """Derivative of the gap by the turns, pins O2, A and O4 kept closed."""
+        """Return the derivative of the gap by the joint angles, pins O2, A and O4 kept closed."""
         turns, pins, b = list(self.turn.values()), self.jacobians[OTHER_ROWS], self.jacobians[B_ROWS]
         shifts = np.linalg.solve(pins[:, self.shifts], -pins[:, turns])
         by_angle = b[:, turns] + b[:, self.shifts] @ shifts
         return np.column_stack((by_angle[:, 0] + by_angle[:, 1], by_angle[:, 1:]))
 
     def angle(self, bar: int) -> float:
-        """Its coordinate, within half a turn; the ground's line as described."""
+        """Read its coordinate, within half a turn; the ground's line as described."""
         return self.ground_angle if bar == 1 else math.remainder(self.q[self.turn[bar]], math.tau)
 
     def _output(self, kind: Any, name: str) -> Array:
@@ -140,28 +142,28 @@ class ExudynBars(Loaded):
         return np.array(self.mbs.GetObjectOutputBody(self.body[bar], kind, at)[:2])
 
     def point(self, name: str) -> Array:
-        """A point of a body."""
+        """Return a point of a body."""
         return self._output(exu.OutputVariableType.Position, name)
 
     def acceleration(self, name: str) -> Array:
-        """Of a point of a body, (2,), m/s^2."""
+        """Return that of a point of a body, (2,), m/s^2."""
         return self._output(exu.OutputVariableType.Acceleration, name)
 
     def rotation(self, bar: int) -> Array:
-        """That of the body."""
+        """Return that of the body."""
         found = self.mbs.GetObjectOutputBody(self.body[bar], exu.OutputVariableType.RotationMatrix, [0.0, 0.0, 0.0])
         return np.reshape(found, (3, 3))[:2, :2]
 
     def velocity(self, bar: int) -> float:
-        """Of its coordinate; the ground has none."""
+        """Read that of its coordinate; the ground has none."""
         return 0.0 if bar == 1 else float(self.v[self.turn[bar]])
 
     def alpha(self, bar: int) -> float:
-        """Of its coordinate."""
+        """Read that of its coordinate."""
         return float(self.a[self.turn[bar]])
 
     def positions(self) -> dict[str, Array]:
-        """Points of the bars."""
+        """Locate the points of the bars."""
         return {name: self.point(point) for name, point in POINTS.items()}
 
     def move(self, omega_2: float, alpha_2: float) -> Values:
@@ -196,7 +198,7 @@ class ExudynBars(Loaded):
             return values
 
     def _applied(self) -> Array:
-        """What acts, less what the speeds ask for, (9,)."""
+        """Sum what acts, less what the speeds ask for, (9,)."""
         if self.terms:
             self.act()
             for bar, (x, y, couple) in self.wrenches.items():

@@ -39,15 +39,15 @@ class Bodies:
             self.body[part.bar] = mbs.AddObject(body)
 
     def point(self, bar: int, x: float = 0.0, y: float = 0.0) -> Any:
-        """A marker of a point of a bar, along and across its line from its first pin; of the ground in world axes."""
+        """Mark a point of a bar, along and across its line from its first pin; of the ground in world axes."""
         return self.mbs.AddMarker(MarkerBodyPosition(bodyNumber=self.body[bar], localPosition=[x, y, 0.0]))
 
     def direction(self, bar: int) -> Any:
-        """A marker of the direction of a bar as a coordinate; of the ground a zero."""
+        """Mark the direction of a bar as a coordinate; of the ground a zero."""
         return self.mbs.AddMarker(MarkerNodeCoordinate(nodeNumber=self.node[bar], coordinate=0 if bar == 1 else 2))
 
     def axes(self, bar: int, turn: float = 0.0) -> Any:
-        """A marker of axes fixed in a bar at its first pin, turned by an angle from its line."""
+        """Mark axes fixed in a bar at its first pin, rotated by an angle from its line."""
         cos, sin = math.cos(turn), math.sin(turn)
         frame = [[cos, -sin, 0.0, 0.0], [sin, cos, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]]
         return self.mbs.AddMarker(MarkerBodyRigid(bodyNumber=self.body[bar], localHT=frame))

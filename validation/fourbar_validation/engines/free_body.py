@@ -17,7 +17,15 @@ from fourbar.scene import Command, Scene
 from fourbar_validation.compare.answer import Answer, Array
 from fourbar_validation.engines.description import FORCE_AT, SHARED, about_first_pin, centre, speeds, unknown_effect
 from fourbar_validation.engines.free_body_closure import Complex, close, cross
-from fourbar_validation.engines.free_body_effects import WRENCH_OF, Motion, Wrenches, acting, polar, sliding_pins, wound
+from fourbar_validation.engines.free_body_effects import (
+    WRENCH_OF,
+    BodyMotion,
+    BodyWrenches,
+    acting,
+    polar,
+    sliding_pins,
+    wound,
+)
 
 NAME = "free-body"
 COLUMN = {"F12": 0, "F32": 2, "F23": 4, "F43": 6, "F34": 8, "F14": 10}
@@ -44,7 +52,7 @@ class FreeBody:
     name = NAME
 
     def answer(self, scene: Scene, command: Command) -> Answer:
-        """Its answer, or the refusal that names an effect it does not know."""
+        """Answer, or refuse by naming an effect that it does not know."""
         if reason := unknown_effect(scene, WRENCH_OF):
             return Answer(NAME, "exact", refusal=reason)
         closed = close(scene.linkage, command.theta_2, command.branch)
@@ -70,14 +78,14 @@ class FreeBody:
 
 
 def _places(linkage: FourBar, theta_2: Array, theta_3: Array, theta_4: Array) -> dict[str, Array]:
-    """Angles of bars 3 and 4, their sine, pins A, B and the mass centres."""
+    """Compute the angles of bars 3 and 4, their sine, pins A, B and the mass centres."""
     unit = {2: np.exp(1j * theta_2), 3: np.exp(1j * theta_3), 4: np.exp(1j * theta_4)}
     O4 = linkage.ground * np.exp(1j * linkage.ground_angle)
-    foot = {2: 0.0, 3: linkage.input.length * unit[2], 4: O4}
+    first_pin = {2: 0.0, 3: linkage.input.length * unit[2], 4: O4}
     found = {"theta_3": theta_3, "theta_4": theta_4, "sin_mu": np.sin(theta_4 - theta_3)}
-    found |= {"A": _plane(foot[3]), "B": _plane(O4 + linkage.output.length * unit[4])}
+    found |= {"A": _plane(first_pin[3]), "B": _plane(O4 + linkage.output.length * unit[4])}
     for bar in MOVING_BARS:
-        found[f"G{bar}"] = _plane(foot[bar] + polar(centre(linkage.bar(bar))) * unit[bar])
+        found[f"G{bar}"] = _plane(first_pin[bar] + polar(centre(linkage.bar(bar))) * unit[bar])
     return found
 
 
@@ -93,7 +101,7 @@ def _answered(
     found = {name: unknowns[:, COLUMN[name] : COLUMN[name] + 2] for name in FORCE_AT.values()}
     for bar in MOVING_BARS:
         found |= {f"omega_{bar}": motion.omega[bar], f"alpha_{bar}": motion.alpha[bar]}
-    a_A = motion.swing(2, motion.foot[3])
+    a_A = motion.swing(2, motion.first_pin[3])
     found["drive_condition"] = np.abs(cross(one, other)) * from_jamming
     found |= {"a_A": _plane(a_A), "a_B": _plane(motion.swing(4, scene.linkage.output.length * motion.unit[4]))}
     for bar in MOVING_BARS:
@@ -109,8 +117,10 @@ def _answered(
     return found | {"torque": unknowns[:, TORQUE]}, residual
 
 
-def move(linkage: FourBar, theta_2: Array, omega_2: Array, alpha_2: Array, theta_3: Array, theta_4: Array) -> Motion:
-    """Speeds and accelerations; NaN where the Jacobian is singular."""
+def move(
+    linkage: FourBar, theta_2: Array, omega_2: Array, alpha_2: Array, theta_3: Array, theta_4: Array
+) -> BodyMotion:
+    """Compute speeds and accelerations; NaN where the Jacobian is singular."""
     d, a, b, c = linkage.lengths
     n = len(theta_2)
     u_1, u_2 = np.exp(1j * linkage.ground_angle), np.exp(1j * theta_2)
@@ -122,13 +132,12 @@ def move(linkage: FourBar, theta_2: Array, omega_2: Array, alpha_2: Array, theta
     w_3, w_4 = solved(jacobian, _plane(-a * alpha_2 * u_2 - 1j * centripetal)[..., None])[0][..., 0].T
     alpha = {1: np.zeros(n), 2: alpha_2, 3: w_3 / b, 4: w_4 / c}
     zero = np.zeros(n, dtype=complex)
-    foot = {1: zero, 2: zero, 3: a * u_2, 4: zero + d * u_1}
-    return Motion(linkage, theta_2, {1: zero + u_1, 2: u_2, 3: u_3, 4: u_4}, foot, omega, alpha)
+    first_pin = {1: zero, 2: zero, 3: a * u_2, 4: zero + d * u_1}
+    return BodyMotion(linkage, theta_2, {1: zero + u_1, 2: u_2, 3: u_3, 4: u_4}, first_pin, omega, alpha)
 
 
-def balance(scene: Scene, motion: Motion) -> tuple[Array, float, Array | float]:
-    """The thirteen unknowns (n, 13), N and N m, the largest residual of the system, relative to its terms, and how far
-    sliding friction is from jamming, in (0, 1]."""
+def balance(scene: Scene, motion: BodyMotion) -> tuple[Array, float, Array | float]:
+    """Solve for the thirteen unknowns (n, 13), N and N m, their residual, and how far friction is from jamming."""
     unknowns, loads, arms, residual = _with_unit_couples(scene, motion)
     total: Array = unknowns[..., 0]
     from_jamming: Array | float = 1.0
@@ -139,14 +148,16 @@ def balance(scene: Scene, motion: Motion) -> tuple[Array, float, Array | float]:
     return total, residual, from_jamming
 
 
-def _with_unit_couples(scene: Scene, motion: Motion) -> tuple[Array, Complex, Array, float]:
-    """The unknowns (n, 13, 1 + p) without sliding friction and per N m of it at each pin; the loads of these pins as
-    complex numbers (n, p, 1 + p), mu r of each (m), and the residual."""
+def _with_unit_couples(scene: Scene, motion: BodyMotion) -> tuple[Array, Complex, Array, float]:
+    """Solve without sliding friction and per N m of it at each pin, (n, 13, 1 + p).
+
+    Returns also the loads of these pins as complex numbers (n, p, 1 + p), mu r of each (m), and the residual.
+    """
     pins, wrenches = sliding_pins(scene), acting(scene, motion)
     _add_inertia(motion, wrenches)
     columns = [_right(motion.linkage, wrenches)]
     for pin in pins:
-        unit = Wrenches(len(motion.theta_2))
+        unit = BodyWrenches(len(motion.theta_2))
         unit.twist_at(pin, -motion.sense(pin))
         columns.append(_right(motion.linkage, unit))
     unknowns, residual = solved(_matrix(motion, scene.drive_bar), np.stack(columns, axis=-1))
@@ -157,7 +168,7 @@ def _with_unit_couples(scene: Scene, motion: Motion) -> tuple[Array, Complex, Ar
 
 
 def solutions(scene: Scene, command: Command) -> Array:
-    """How many pin forces and friction couples balance the linkage at each position, where it moves, (n,)."""
+    """Count the pin forces and friction couples that balance the linkage at each position, where it moves, (n,)."""
     closed = close(scene.linkage, command.theta_2, command.branch)
     motion = move(scene.linkage, command.theta_2, *speeds(command), *closed.theta)
     _, loads, arms, _ = _with_unit_couples(scene, motion)
@@ -165,7 +176,7 @@ def solutions(scene: Scene, command: Command) -> Array:
 
 
 def _number(F: Complex, C: Complex, k: Array) -> int:
-    """Of one position: one where the couples are a contraction, else those found from many starts."""
+    """Count at one position: one where the couples are a contraction, else those reached from many starts."""
     if not (np.isfinite(F).all() and np.isfinite(C).all()):
         return 0
     if np.abs(np.linalg.eigvals(k[:, None] * np.abs(C))).max() < 1.0:
@@ -182,17 +193,17 @@ def _number(F: Complex, C: Complex, k: Array) -> int:
     return len(found)
 
 
-def _add_inertia(motion: Motion, wrenches: Wrenches) -> None:
+def _add_inertia(motion: BodyMotion, wrenches: BodyWrenches) -> None:
     """-m a_G and -I alpha (d'Alembert), moments about the first pin, of which that of bar 3 moves."""
     for number in MOVING_BARS:
         bar = motion.linkage.bar(number)
         arm, alpha = motion.to_centre(number), motion.alpha[number]
         wrenches.push(number, -bar.mass * motion.swing(number, arm), 0.0)
         wrenches.twist(number, -about_first_pin(bar) * alpha)
-    wrenches.push(3, -motion.linkage.coupler.mass * motion.swing(2, motion.foot[3]), motion.to_centre(3))
+    wrenches.push(3, -motion.linkage.coupler.mass * motion.swing(2, motion.first_pin[3]), motion.to_centre(3))
 
 
-def _matrix(motion: Motion, drive_bar: int) -> Array:
+def _matrix(motion: BodyMotion, drive_bar: int) -> Array:
     """Rows: forces on bars 2, 3, 4 and moments over the bar's length, reactions at A and B; (n, 13, 13).
 
     The last column is the torque over the driven bar's length, so that every number is 0, 1 or of a unit vector.
@@ -210,7 +221,7 @@ def _matrix(motion: Motion, drive_bar: int) -> Array:
     return matrix
 
 
-def _right(linkage: FourBar, wrenches: Wrenches) -> Array:
+def _right(linkage: FourBar, wrenches: BodyWrenches) -> Array:
     """Right-hand sides, (n, 13), N."""
     right = np.zeros((len(wrenches.moment[2]), 13))
     for bar, (row, _, _) in ROWS.items():
@@ -236,7 +247,7 @@ def solved(matrix: Array, right: Array) -> tuple[Array, float]:
 
 
 def slide(F: Complex, C: Complex, k: Array) -> Array:
-    """The couples x_p = k_p |F_p + sum over q of C_pq x_q|, (n, p), grown from none; NaN where that ends in a jam.
+    """Grow the couples x_p = k_p |F_p + sum over q of C_pq x_q|, (n, p), from none; NaN where that ends in a jam.
 
     Parameters
     ----------
@@ -267,7 +278,7 @@ def distance_from_jamming(F: Complex, C: Complex, k: Array, x: Array) -> Array:
 
 
 def _slope(F: Complex, C: Complex, k: Array, x: Array) -> tuple[Array, Array]:
-    """Loads of the pins under some couples, (n, p), N, and the slope of the equations of `slide` there, (n, p, p)."""
+    """Compute the loads of the pins under some couples, (n, p), N, and the slope of `slide`'s equations, (n, p, p)."""
     force = F + (C * x[:, None, :]).sum(axis=-1)
     size = np.abs(force)
     direction = force / np.where(size == 0.0, 1.0, size)
@@ -275,7 +286,7 @@ def _slope(F: Complex, C: Complex, k: Array, x: Array) -> tuple[Array, Array]:
 
 
 def _newton(F: Complex, C: Complex, k: Array, x: Array) -> tuple[Array, NDArray[np.bool_], Array]:
-    """The couples from those of a smaller friction, where their equations hold, and the determinant of their slope."""
+    """Improve the couples from those of a smaller friction; return also the determinant of their slope."""
     for _ in range(FRICTION_STEPS):
         size, matrix = _slope(F, C, k, x)
         gap, terms = k * size - x, k * (np.abs(F) + (np.abs(C) * x[:, None, :]).sum(axis=-1))

@@ -67,7 +67,7 @@ def close(linkage: FourBar, theta_2: Array, branch: NDArray[np.int8]) -> Closed:
 
 
 def _between(e: Array, near: float, far: float) -> Array:
-    """The angle between the sides e and near, by half-angle tangents; never such that bars 3 and 4 are in line."""
+    """Compute the angle between the sides e and near, by half-angle tangents; bars 3 and 4 are never in line."""
     above, below = (e - near + far) * (far + near - e), (e + near - far) * (e + near + far)
     angle = 2.0 * np.arctan2(np.sqrt(np.maximum(above, 0.0)), np.sqrt(np.maximum(below, 0.0)))
     return np.clip(angle, IN_LINE, np.pi - 2.0 * IN_LINE)

@@ -21,14 +21,14 @@ HALF_TURN = math.pi * (1.0 - 1e-12)
 """From rest a spring is wound; angles of some turns are known so far."""
 
 
-class Motion(NamedTuple):
+class BodyMotion(NamedTuple):
     """The bars at n positions, by number, each (n,); the ground is bar 1."""
 
     linkage: FourBar
     theta_2: Array
     unit: dict[int, Complex]
     """Directions e^{i theta}."""
-    foot: dict[int, Complex]
+    first_pin: dict[int, Complex]
     """Where the first pin of each bar is (O2, O2, A, O4), m."""
     omega: dict[int, Array]
     alpha: dict[int, Array]
@@ -36,11 +36,11 @@ class Motion(NamedTuple):
     """Speeds of the motion that is about to begin where the linkage rests, rad/s; None: it stays at rest."""
 
     def to_centre(self, bar: int) -> Complex:
-        """From the first pin of a moving bar to its mass centre, m."""
+        """Return the vector from the first pin of a moving bar to its mass centre, m."""
         return self.unit[bar] * polar(centre(self.linkage.bar(bar)))
 
     def swing(self, bar: int, arm: Complex) -> Complex:
-        """Acceleration of the end of an arm of a bar about its foot, m/s^2."""
+        """Acceleration of the end of an arm of a bar about its first pin, m/s^2."""
         return (1j * self.alpha[bar] - self.omega[bar] ** 2) * arm
 
     def slip(self, pin: str) -> Array:
@@ -63,7 +63,7 @@ TURNS_AS_ONE = 64.0 * 2.0**-52
 """Two bars whose speeds differ by less than this part of them turn as one."""
 
 
-class Wrenches:
+class BodyWrenches:
     """Sums of the forces (N) on the moving bars and of their moments (N m) about the first pins, (n,) each."""
 
     def __init__(self, n: int) -> None:
@@ -71,18 +71,18 @@ class Wrenches:
         self.moment: dict[int, Array] = {bar: np.zeros(n) for bar in MOVING_BARS}
 
     def push(self, bar: int, force: Any, arm: Any) -> None:
-        """A force, at `arm` from the bar's first pin; on the ground it does nothing."""
+        """Add a force, at `arm` from the bar's first pin; on the ground it does nothing."""
         if bar in self.force:
             self.force[bar] = self.force[bar] + force
             self.moment[bar] = self.moment[bar] + cross(arm, force)
 
     def twist(self, bar: int, couple: Any) -> None:
-        """A couple; on the ground it does nothing."""
+        """Add a couple; on the ground it does nothing."""
         if bar in self.moment:
             self.moment[bar] = self.moment[bar] + couple
 
     def twist_at(self, pin: str, couple: Any) -> None:
-        """A couple on bar j of a pin (i, j), its opposite on bar i."""
+        """Add a couple to bar j of a pin (i, j), its opposite to bar i."""
         i, j = PINS[pin]
         self.twist(j, couple)
         self.twist(i, -couple)
@@ -102,27 +102,27 @@ def polar(pair: Any) -> complex:
     return complex(length * np.cos(angle), length * np.sin(angle))
 
 
-def _gravity(effect: Any, motion: Motion, wrenches: Wrenches) -> None:
-    """Force m g at every mass centre."""
+def _gravity(effect: Any, motion: BodyMotion, wrenches: BodyWrenches) -> None:
+    """Apply m g at every mass centre."""
     for bar in MOVING_BARS:
         wrenches.push(
             bar, motion.linkage.bar(bar).mass * polar((effect.magnitude, effect.angle)), motion.to_centre(bar)
         )
 
 
-def _viscous(effect: Any, motion: Motion, wrenches: Wrenches) -> None:
+def _viscous(effect: Any, motion: BodyMotion, wrenches: BodyWrenches) -> None:
     """Couple -k (omega_j - omega_i)."""
     for pin, k in effect.coefficients:
         wrenches.twist_at(pin, -k * motion.slip(pin))
 
 
-def _friction(effect: Any, motion: Motion, wrenches: Wrenches) -> None:
+def _friction(effect: Any, motion: BodyMotion, wrenches: BodyWrenches) -> None:
     """Couple -f sign(omega_j - omega_i), none at rest."""
     for pin, f in effect.torques:
         wrenches.twist_at(pin, -f * motion.sense(pin))
 
 
-def _torsion(effect: Any, motion: Motion, wrenches: Wrenches) -> None:
+def _torsion(effect: Any, motion: BodyMotion, wrenches: BodyWrenches) -> None:
     """Couple -(preload + k (theta_j - theta_i - rest)), the angle within half a turn."""
     for pin, k, rest, preload in effect.springs:
         i, j = PINS[pin]
@@ -130,11 +130,11 @@ def _torsion(effect: Any, motion: Motion, wrenches: Wrenches) -> None:
         wrenches.twist_at(pin, -(preload + k * angle))
 
 
-def _springs(effect: Any, motion: Motion, wrenches: Wrenches) -> None:
+def _springs(effect: Any, motion: BodyMotion, wrenches: BodyWrenches) -> None:
     """Pull preload + k (distance - length) along the line of the two points; none is known where they coincide."""
     for spring in effect.springs:
         arms = [motion.unit[point.bar] * polar((point.distance, point.angle)) for point in (spring.start, spring.end)]
-        across = motion.foot[spring.end.bar] + arms[1] - motion.foot[spring.start.bar] - arms[0]
+        across = motion.first_pin[spring.end.bar] + arms[1] - motion.first_pin[spring.start.bar] - arms[0]
         if spring.preload == spring.stiffness * spring.length:
             pull = spring.stiffness * across
         else:
@@ -145,16 +145,16 @@ def _springs(effect: Any, motion: Motion, wrenches: Wrenches) -> None:
         wrenches.push(spring.end.bar, -pull, arms[1])
 
 
-def _flywheel(effect: Any, motion: Motion, wrenches: Wrenches) -> None:
+def _flywheel(effect: Any, motion: BodyMotion, wrenches: BodyWrenches) -> None:
     """Couple -J alpha (d'Alembert)."""
     wrenches.twist(effect.bar, -effect.inertia * motion.alpha[effect.bar])
 
 
-def _later(effect: Any, motion: Motion, wrenches: Wrenches) -> None:
+def _later(effect: Any, motion: BodyMotion, wrenches: BodyWrenches) -> None:
     """Nothing: it depends on the pin forces, and is solved with them."""
 
 
-WRENCH_OF: dict[str, Callable[[Any, Motion, Wrenches], None]] = {
+WRENCH_OF: dict[str, Callable[[Any, BodyMotion, BodyWrenches], None]] = {
     "gravity": _gravity,
     "viscous": _viscous,
     "friction": _friction,
@@ -166,9 +166,9 @@ WRENCH_OF: dict[str, Callable[[Any, Motion, Wrenches], None]] = {
 """By the name under which a scene file knows an effect."""
 
 
-def acting(scene: Scene, motion: Motion) -> Wrenches:
+def acting(scene: Scene, motion: BodyMotion) -> BodyWrenches:
     """Everything that acts on the bars but pins, inertia, drive and what depends on the pin forces."""
-    wrenches = Wrenches(len(motion.theta_2))
+    wrenches = BodyWrenches(len(motion.theta_2))
     for load in scene.loads:
         _load(load, motion, wrenches)
     for effect in scene.effects:
@@ -176,8 +176,8 @@ def acting(scene: Scene, motion: Motion) -> Wrenches:
     return wrenches
 
 
-def _load(load: Any, motion: Motion, wrenches: Wrenches) -> None:
-    """A force at its point, from the mass centre, and a couple; in the bar's frame both vectors turn with the bar."""
+def _load(load: Any, motion: BodyMotion, wrenches: BodyWrenches) -> None:
+    """Apply a force at its point, from the mass centre, and a couple; in the bar's frame both rotate with the bar."""
     turned = motion.unit[load.bar] if load.frame == "bar" else 1.0
     factor = 1.0 if load.table is None else _factor(load.table, motion.theta_2)
     arm = motion.to_centre(load.bar) + turned * polar(load.at)
@@ -186,14 +186,14 @@ def _load(load: Any, motion: Motion, wrenches: Wrenches) -> None:
 
 
 def _factor(table: Any, theta_2: Array) -> Array:
-    """Linear between the points; the angle is taken within half a turn of the middle of the table."""
+    """Interpolate between the points; the angle is taken within half a turn of the middle of the table."""
     middle = 0.5 * (table.theta_2[0] + table.theta_2[-1])
     around = np.remainder(theta_2 - middle + np.pi, 2.0 * np.pi) - np.pi
     return np.asarray(np.interp(middle + around, table.theta_2, table.factor))
 
 
-def wound(scene: Scene, motion: Motion) -> NDArray[np.bool_] | None:
-    """Where a torsion spring is turned by more than half a turn from its rest, followed from where the motion begins.
+def wound(scene: Scene, motion: BodyMotion) -> NDArray[np.bool_] | None:
+    """Find where a torsion spring is wound by more than half a turn from its rest, followed from the motion's start.
 
     None where no spring counts turns, or the motion changes its branch.
     """
@@ -223,6 +223,6 @@ def wound(scene: Scene, motion: Motion) -> NDArray[np.bool_] | None:
 
 
 def sliding_pins(scene: Scene) -> dict[str, float]:
-    """mu r of each pin whose friction depends on its load, m."""
+    """Return mu r of each pin whose friction depends on its load, m."""
     pins = [pin for effect in scene.effects if effect.key == "pin_friction" for pin in effect.pins]  # type: ignore[attr-defined]
     return {name: mu * r for name, mu, r in pins if mu * r != 0.0}

@@ -5,23 +5,25 @@ from functools import cache
 
 from fourbar.scene import Scene
 from fourbar_validation.compare.tolerance import EQUIVALENCE, FULL_ACCURACY
-from fourbar_validation.engines.witnesses import FROM_DATA, WITNESSES, Witness
+from fourbar_validation.engines.exact import BallArithmetic
+from fourbar_validation.engines.prediction import from_data
+from fourbar_validation.engines.witnesses import WITNESSES, Witness
 from fourbar_validation.scenes.hard_families import FAMILIES
 
 BALLS = Witness(
     "ball-arithmetic",
-    "fourbar_validation.engines.exact:BallArithmetic",
+    BallArithmetic,
     FULL_ACCURACY,
-    nearby="fourbar_validation.engines.exact:where_it_closes",
+    nearby=True,
     library="flint",
 )
 
 
 def predicting(witness: Witness) -> Witness:
-    """The witness held to full accuracy, or else to the error predicted for each position."""
+    """Hold the witness to full accuracy, or else to the error predicted for each position."""
     if witness.tolerance not in (EQUIVALENCE, FULL_ACCURACY):
         return witness
-    return replace(witness, tolerance=FULL_ACCURACY, predictor=witness.predictor or FROM_DATA)
+    return replace(witness, tolerance=FULL_ACCURACY, predictor=witness.predictor or from_data)
 
 
 HARD_WITNESSES = tuple(predicting(witness) for witness in (BALLS, *WITNESSES))
@@ -37,21 +39,21 @@ class Hard:
         return len(_scenes(self.families))
 
     def name(self, index: int) -> str:
-        """Name of a scene; ascending."""
+        """Name a scene; ascending."""
         return _scenes(self.families)[index][0]
 
     def scene(self, index: int) -> Scene:
-        """The scene itself."""
+        """Return the scene itself."""
         return _scenes(self.families)[index][1]
 
     def fingerprint(self) -> str:
-        """The families by name, and how many scenes they make."""
+        """Name the families and count their scenes."""
         return f"hard {' '.join(self.families)} {len(self)}"
 
 
 @cache
 def _scenes(families: tuple[str, ...]) -> list[tuple[str, Scene]]:
-    """Names and scenes of some families, by name."""
+    """Make the scenes of some families, by name."""
     found = []
     for family in FAMILIES:
         for label, scene in family.scenes() if family.name in families else ():

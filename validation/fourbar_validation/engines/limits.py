@@ -72,7 +72,7 @@ PROXIMAL = Boundary(
 )
 
 
-class Limit(NamedTuple):
+class DeclaredLimit(NamedTuple):
     """One limit of one engine."""
 
     engine: str
@@ -80,14 +80,14 @@ class Limit(NamedTuple):
 
 
 LIMITS = (
-    *(Limit("mujoco-simulated", of) for of in (NEAREST_TOGGLE, FASTEST, SLOWEST, HEAVIEST, NEAREST_CENTRE)),
-    Limit("mujoco-inverse and mujoco-simulated", LIGHTEST),
-    Limit("pinocchio-forward", PROXIMAL),
+    *(DeclaredLimit("mujoco-simulated", of) for of in (NEAREST_TOGGLE, FASTEST, SLOWEST, HEAVIEST, NEAREST_CENTRE)),
+    DeclaredLimit("mujoco-inverse and mujoco-simulated", LIGHTEST),
+    DeclaredLimit("pinocchio-forward", PROXIMAL),
 )
 
 
 def too_fast_or_loaded(scene: Scene, speed: float) -> str | None:
-    """The limit of speed, load or place of a centre that a scene passes, or None; speed in rad/s."""
+    """Name the limit of speed, load or place of a centre that a scene passes, if any; speed in rad/s."""
     if speed > FASTEST.boundary:
         return FASTEST.reason
     if scene.linkage.input.length * speed**2 < SLOWEST.boundary:
@@ -101,7 +101,7 @@ def too_fast_or_loaded(scene: Scene, speed: float) -> str | None:
 
 
 def least_sine(linkage: FourBar, theta_2: NDArray[np.float64], assembled: NDArray[np.bool_]) -> float:
-    """The least |sin(theta_4 - theta_3)| between one assembled position and the next, by the cosine rule."""
+    """Compute the least |sin(theta_4 - theta_3)| between assembled neighbours, by the cosine rule."""
     d, a, b, c = linkage.lengths
     psi = np.sort(theta_2[assembled] - linkage.ground_angle)
     if not len(psi):

@@ -9,7 +9,7 @@ import numpy as np
 from fourbar.linkage import MOVING_BARS
 from fourbar.scene import Scene
 from fourbar_validation.compare.answer import Array
-from fourbar_validation.engines.description import FORCE_AT, turned, turned_by
+from fourbar_validation.engines.description import FORCE_AT, rotate, rotate_by
 
 PASSES = 1000
 """Passes over pin loads and the friction they make; each lessens the error where the friction is far from a jam."""
@@ -38,13 +38,13 @@ class Assembled(Protocol):
         """B on bar 3 minus B on bar 4, or A on bar 2 minus A on bar 3, m."""
 
     def jacobian(self) -> Array:
-        """Derivative of the gap, (2, 3), m."""
+        """Return the derivative of the gap, (2, 3), m."""
 
     def positions(self) -> dict[str, Array]:
-        """Points O4, A, B, "B4", the end of bar 4, and where pin A is open "A2", that of bar 2; (2,), m."""
+        """Locate O4, A, B, "B4", the end of bar 4, and where pin A is open "A2", that of bar 2; (2,), m."""
 
 
-class Bars(Assembled, Protocol):
+class EngineBars(Assembled, Protocol):
     """An engine holding the bars of a scene, which knows their mass centres (G2, G3, G4 among the points) and moves."""
 
     own: str
@@ -54,7 +54,7 @@ class Bars(Assembled, Protocol):
     ground_angle: float
 
     def angle(self, bar: int) -> float:
-        """Direction of a bar's line, in (-pi, pi], rad."""
+        """Compute the direction of a bar's line, in (-pi, pi], rad."""
 
     def move(self, omega_2: float, alpha_2: float) -> Values:
         """Motion and forces where the bars are placed, by name; empty where a toggle leaves them 0/0."""
@@ -64,7 +64,7 @@ class Bars(Assembled, Protocol):
         return ""
 
 
-class Loaded(Bars, Protocol):
+class Loaded(EngineBars, Protocol):
     """Bars on which loads and effects act, each by its row of the table `effects.TERM_OF`.
 
     The ground (bar 1) does not move; its line points from O2 to O4.
@@ -88,42 +88,42 @@ class Loaded(Bars, Protocol):
 
     # what the engine gives
     def point(self, name: str) -> Array:
-        """A point that `description.parts` names, world axes, (2,), m; perhaps the engine's own memory."""
+        """Locate a point that `description.parts` names, world axes, (2,), m; perhaps the engine's own memory."""
 
     def rotation(self, bar: int) -> Array:
-        """Axes along and across a moving bar's line, (2, 2)."""
+        """Return the axes along and across a moving bar's line, (2, 2)."""
 
     def velocity(self, bar: int) -> float:
-        """Angular velocity of a bar, rad/s."""
+        """Return the angular velocity of a bar, rad/s."""
 
     def alpha(self, bar: int) -> float:
-        """Angular acceleration of a bar, rad/s^2."""
+        """Return the angular acceleration of a bar, rad/s^2."""
 
     # what follows
     def angle(self, bar: int) -> float:
-        """From the bar's axes; the ground's line as described."""
+        """Compute the direction from the bar's axes; the ground's line as described."""
         if bar == 1:
             return self.ground_angle
         along = self.rotation(bar)[:, 0]
         return math.atan2(along[1], along[0])
 
-    def turned(self, bar: int, x: float, y: float) -> Array:
-        """World axes of the vector that is (x, y) along and across a bar's line, (2,)."""
-        found = turned(self.ground_angle, x, y) if bar == 1 else turned_by(self.rotation(bar).tolist(), x, y)
+    def rotate(self, bar: int, x: float, y: float) -> Array:
+        """Rotate (x, y) along and across a bar's line into world axes, (2,)."""
+        found = rotate(self.ground_angle, x, y) if bar == 1 else rotate_by(self.rotation(bar).tolist(), x, y)
         return np.array(found)
 
-    def foot(self, bar: int) -> Array:
-        """First pin of a bar (O2, O2, A, O4 of bars 1, 2, 3, 4), m, (2,)."""
-        return np.zeros(2) if bar == 1 else self.point(f"foot{bar}")
+    def first_pin(self, bar: int) -> Array:
+        """Locate the first pin of a bar (O2, O2, A, O4 of bars 1, 2, 3, 4), m, (2,)."""
+        return np.zeros(2) if bar == 1 else self.point(f"first_pin{bar}")
 
     def gravity(self, field: tuple[float, float]) -> None:
-        """A field (g_x, g_y) for the engine's own gravity, m/s^2."""
+        """Set a field (g_x, g_y) for the engine's own gravity, m/s^2."""
         self.field = field
 
     def push(self, bar: int, force: Array, point: Array) -> None:
         """Add a force (N, world axes) at a point (m, world axes); on the ground it does nothing."""
         if bar != 1:
-            (x, y), (f_x, f_y), wrench = (point - self.foot(bar)).tolist(), force.tolist(), self.wrenches[bar]
+            (x, y), (f_x, f_y), wrench = (point - self.first_pin(bar)).tolist(), force.tolist(), self.wrenches[bar]
             wrench[0] += f_x
             wrench[1] += f_y
             wrench[2] += x * f_y - y * f_x
@@ -140,7 +140,7 @@ class Loaded(Bars, Protocol):
             act()
 
     def settled(self, balanced: Callable[[], dict[str, Any]]) -> dict[str, Any]:
-        """Pin forces and torque that balance what acts, by name; nothing where friction jams.
+        """Solve for pin forces and torque that balance what acts, by name; nothing where friction jams.
 
         Effects that depend on the load of a pin are given the loads of the pass before, until they repeat.
         """
@@ -160,7 +160,7 @@ class Loaded(Bars, Protocol):
         return self._grown(balanced) if self.loaded else forces
 
     def _grown(self, balanced: Callable[[], dict[str, Any]]) -> dict[str, Any]:
-        """The forces with friction grown from none, where passes run away; nothing where the growth ends in a jam.
+        """Grow friction from none, where passes run away; nothing where the growth ends in a jam.
 
         By Newton's steps, the slopes from passes with each load changed a little.
         """
@@ -191,5 +191,5 @@ class Loaded(Bars, Protocol):
 
 
 def no_wrenches() -> dict[int, list[float]]:
-    """Of bars on which nothing acts."""
+    """Return those of bars on which nothing acts."""
     return {bar: [0.0, 0.0, 0.0] for bar in MOVING_BARS}

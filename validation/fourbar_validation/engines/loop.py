@@ -15,7 +15,7 @@ from fourbar.scene import Command, Scene
 from fourbar_validation.compare.answer import Answer, Array
 from fourbar_validation.engines.description import SHARED, speeds
 from fourbar_validation.engines.free_body_closure import LONGEST_STEP, NEWTON_STEPS, STARTS
-from fourbar_validation.engines.loaded import Assembled, Bars, Values
+from fourbar_validation.engines.loaded import Assembled, EngineBars, Values
 
 START_ANGLES = np.radians(STARTS).tolist()
 SHORTEST_STEP = 2.0**-40
@@ -36,14 +36,14 @@ Angles = tuple[float, float, float]
 """Turns of bar 2 at O2, of bar 3 against bar 2 at A, of bar 4 at O4, rad."""
 
 
-class Position:
+class Assembler:
     """Assembles a tree at commanded angles of bar 2, one after another."""
 
     def __init__(self, tree: Assembled) -> None:
         self.tree = tree
 
     def find(self, theta_2: float, branch: int) -> Angles | None:
-        """The configuration on the branch, with the tree placed there, or None where the loop does not close."""
+        """Assemble on the branch and place the tree there; None where the loop does not close."""
         tree = self.tree
         tree.place((theta_2, 0.0, 0.0))
         at = tree.positions()
@@ -72,7 +72,7 @@ class Position:
 
 
 def _triangle_angle(e: float, near: float, far: float) -> float:
-    """The angle between the sides e and near, by half-angle tangents."""
+    """Compute the angle between the sides e and near, by half-angle tangents."""
     above, below = (e - near + far) * (far + near - e), (e + near - far) * (e + near + far)
     return 2.0 * math.atan2(math.sqrt(max(above, 0.0)), math.sqrt(max(below, 0.0)))
 
@@ -117,11 +117,11 @@ class Exact:
     """An engine that answers each position by itself."""
 
     name: str
-    build: Callable[[Scene], Bars]
+    build: Callable[[Scene], EngineBars]
     """Its bars from the description; LimitError says why it cannot hold them."""
 
     def answer(self, scene: Scene, command: Command) -> Answer:
-        """Its answer, or the refusal that names what it does not know or cannot hold."""
+        """Answer, or refuse by naming what it does not know or cannot hold."""
         try:
             bars = self.build(scene)
         except LimitError as error:
@@ -154,10 +154,10 @@ Read = Callable[[Angles, float, float], Values]
 def at_each(
     bars: Assembled, command: Command, names: Iterable[str], read: Read
 ) -> tuple[dict[str, Array], NDArray[np.bool_], float]:
-    """What is read at each position that assembles, NaN elsewhere; where that is; the greatest gap left, m."""
+    """Read each position that assembles, NaN elsewhere; return that, where it assembles, and the greatest gap, m."""
     n, (omega, alpha) = len(command.theta_2), speeds(command)
     missing: dict[str, Any] = {name: (math.nan, math.nan) if name in VECTORS else math.nan for name in names}
-    rows, assembled, gap, position = [missing] * n, np.zeros(n, dtype=bool), 0.0, Position(bars)
+    rows, assembled, gap, position = [missing] * n, np.zeros(n, dtype=bool), 0.0, Assembler(bars)
     for i, (theta_2, branch) in enumerate(zip(command.theta_2.tolist(), command.branch.tolist(), strict=True)):
         if (q := position.find(theta_2, branch)) is not None:
             assembled[i], gap = True, max(gap, math.hypot(*bars.gap()))
@@ -170,12 +170,12 @@ MADE = ("theta_2", "omega_2", "alpha_2")
 
 
 def blank(n: int, names: Iterable[str] = (*MADE, "torque", *PIN_FORCES)) -> dict[str, Array]:
-    """NaN for each of n positions, (n,) or (n, 2)."""
+    """Return NaN for each of n positions, (n,) or (n, 2)."""
     return {name: np.full((n, 2) if name in VECTORS else n, np.nan) for name in names}
 
 
 def as_made(out: dict[str, Array], branch: NDArray[np.int8]) -> tuple[Command, dict[str, Array]]:
-    """The motion that was made, as a command, and the other quantities read on it."""
+    """Split what was read into the motion that was made, as a command, and the other quantities."""
     theta_2, omega_2, alpha_2 = (out[name] for name in MADE)
     rest = {name: values for name, values in out.items() if name not in MADE}
     return Command(theta_2, branch, omega_2, alpha_2), rest
@@ -196,13 +196,13 @@ class Trial:
     """CPU seconds in steps."""
     reading: float = 0.0
     """CPU seconds in reading the samples."""
-    stretches: tuple[tuple[slice, int], ...] = ()
-    """The samples of each stretch, and its steps: several samples are of one step where these are fewer."""
+    segments: tuple[tuple[slice, int], ...] = ()
+    """The samples of each segment, and its steps: several samples are of one step where these are fewer."""
     broken: str = ""
     """Where the engine lost the motion: what it reported of itself."""
 
 
-class LimitWatch:
+class LimitDetector:
     """Sees bars 3 and 4 of one branch come to lie in one line, from step to step of an engine."""
 
     def __init__(self, branch: int) -> None:

@@ -41,7 +41,7 @@ TIME_IS_ALPHA = (1.0 / 6.0, 0.0, 0.0, 0.0)
 
 
 def refusal(scene: Scene) -> str:
-    """The declared limit that a scene meets, or nothing."""
+    """Name the declared limit that a scene meets, if any."""
     if reason := unknown_effect(scene, TERM_OF):
         return reason
     for number in MOVING_BARS:
@@ -78,7 +78,7 @@ class OpenSimBars(Loaded):
         self.length = {bar: part.length for bar, part in self.part.items()}
         self.joint = {
             "O2": self._joint("O2", 1, ZERO, 2, ZERO),
-            "O4": self._joint("O4", 1, self.part[4].foot, 4, ZERO),
+            "O4": self._joint("O4", 1, self.part[4].first_pin, 4, ZERO),
             "B": self._joint("B", 4, (self.length[4], 0.0, 0.0), 3, (self.length[3], 0.0, 0.0)),
         }
         self.pin_a = osim.PointConstraint(self.body[2], vec(self.length[2]), self.body[3], vec())
@@ -96,7 +96,7 @@ class OpenSimBars(Loaded):
         """Of the matrix G M^-1 G^T of its multipliers, over the positions moved so far: least over greatest value."""
 
     def refusal(self) -> str:
-        """Where constraints may have been dropped."""
+        """Tell where constraints may have been dropped."""
         if self.least_conditioned >= LEAST_CONDITIONED:
             return ""
         return (
@@ -110,7 +110,7 @@ class OpenSimBars(Loaded):
         return joint
 
     def _at_first_pin(self, bar: int) -> list[Any]:
-        """The components (x, y, moment) of a wrench on a bar at its first pin, to be set at each position."""
+        """Add the components (x, y, moment) of a wrench on a bar at its first pin, to be set at each position."""
         element = osim.PrescribedForce(f"wrench{bar}", self.body[bar])
         element.setForceIsInGlobalFrame(True)
         element.setPointFunctions(*_constants())
@@ -121,7 +121,7 @@ class OpenSimBars(Loaded):
         return [osim.Constant.safeDownCast(x) for x in (force.get(0), force.get(1), torque.get(2))]
 
     def place(self, q: Sequence[float]) -> None:
-        """Angles of the bars as given, at rest: Simbody forms its matrices by differences from the present motion."""
+        """Set the bars' angles, at rest: Simbody forms its matrices by differences from the present motion."""
         of_3_to_2, theta_4 = q[1:]
         theta_2 = within_half_a_turn(q[0])
         self.state.setTime(0.0)
@@ -130,18 +130,18 @@ class OpenSimBars(Loaded):
         self.model.realizePosition(self.state)
 
     def point(self, name: str) -> Array:
-        """A station of a body."""
+        """Return a station of a body."""
         bar, at = self.local[name]
         return np.array(self.body[bar].findStationLocationInGround(self.state, vec(*at)).to_numpy()[:2])
 
     def gap(self) -> tuple[float, float]:
-        """A on bar 2 minus A on bar 3, which opens as B would."""
-        x, y = (self.point("end2") - self.point("foot3")).tolist()
+        """Return A on bar 2 minus A on bar 3, which opens as B would."""
+        x, y = (self.point("end2") - self.point("first_pin3")).tolist()
         return x, y
 
     def jacobian(self) -> Array:
-        """Derivative of the gap by the turns of bar 2, of bar 3 against bar 2, and of bar 4."""
-        by_own = self._station_jacobian("end2") - self._station_jacobian("foot3")
+        """Return the derivative of the gap by the angles of bar 2, of bar 3 against bar 2, and of bar 4."""
+        by_own = self._station_jacobian("end2") - self._station_jacobian("first_pin3")
         return np.column_stack((by_own[:, 0] + by_own[:, 2], by_own[:, 2], by_own[:, 1] - by_own[:, 2]))
 
     def _station_jacobian(self, name: str) -> Array:
@@ -150,16 +150,16 @@ class OpenSimBars(Loaded):
         return np.array(matrix.to_numpy())[:2]
 
     def rotation(self, bar: int) -> Array:
-        """That of the body."""
+        """Return that of the body."""
         found = self.body[bar].getTransformInGround(self.state).R()
         return np.array([[found.get(i, j) for j in (0, 1)] for i in (0, 1)])
 
     def positions(self) -> dict[str, Array]:
-        """Points of the bars."""
+        """Locate the points of the bars."""
         return {name: self.point(point) for name, point in POINTS.items()}
 
     def move(self, omega_2: float, alpha_2: float) -> Values:
-        """Speeds and accelerations, pin forces and torque; nothing where a toggle leaves them 0/0."""
+        """Compute speeds and accelerations, pin forces and torque; nothing where a toggle leaves them 0/0."""
         try:
             turns, accelerations = self._set_motion(omega_2, alpha_2)
         except np.linalg.LinAlgError:
@@ -170,7 +170,7 @@ class OpenSimBars(Loaded):
         return self._motion() | ({} if leverage == 0.0 else self.settled(lambda: self._forces(leverage)))
 
     def _set_motion(self, omega_2: float, alpha_2: float) -> tuple[Array, Array]:
-        """Turns of the coordinates per turn of bar 2, and their accelerations, from its constraint equations."""
+        """Solve the constraint equations for the coordinates' speeds per speed of bar 2, and their accelerations."""
         equations = self._equations()
         turns = np.linalg.solve(equations, PER_COORDINATE[2])
         self.state.setTime(alpha_2)
@@ -223,17 +223,17 @@ class OpenSimBars(Loaded):
         return {**reactions, "F32": closing, "torque": torque}
 
     def _equations(self) -> Array:
-        """Derivatives of the constraints by the coordinates: the motion of bar 2, and pin A along two axes."""
+        """Differentiate the constraints by the coordinates: the motion of bar 2, and pin A along two axes."""
         matrix = osim.Matrix()
         self.matter.calcG(self.state, matrix)
         return np.array(matrix.to_numpy())[:3]
 
     def velocity(self, bar: int) -> float:
-        """Of a body; the ground has none."""
+        """Read that of a body; the ground has none."""
         return 0.0 if bar == 1 else float(self.body[bar].getAngularVelocityInGround(self.state).get(2))
 
     def alpha(self, bar: int) -> float:
-        """From the accelerations of the coordinates."""
+        """Read it from the accelerations of the coordinates."""
         return float(PER_COORDINATE[bar] @ self.a)
 
     def _reaction(self, pin: str) -> Array:
@@ -243,7 +243,7 @@ class OpenSimBars(Loaded):
         return float(self.joint["O2"].calcReactionOnChildExpressedInGround(self.state).get(0).get(2))
 
     def _closing_force(self) -> Array:
-        """Force of bar 3 on bar 2, from the multipliers of the constraint; a force on bodies is -G^T lambda."""
+        """Compute the force of bar 3 on bar 2 from the constraint's multipliers; on bodies it is -G^T lambda."""
         on_bodies, on_mobilities = osim.VectorOfSpatialVec(), osim.Vector()
         multipliers = self.state.getMultipliers()
         self.matter.calcConstraintForcesFromMultipliers(self.state, multipliers, on_bodies, on_mobilities)
@@ -260,7 +260,7 @@ def vec(x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Any:
 
 
 def vector(values: Iterable[float]) -> Any:
-    """A vector of Simbody."""
+    """Make a vector of Simbody."""
     numbers = [float(value) for value in values]
     made = osim.Vector(len(numbers), 0.0)
     for index, value in enumerate(numbers):

@@ -36,7 +36,7 @@ def kept(outputs: dict[str, str], engine: str) -> Iterator[None]:
 
 
 def printed() -> str:
-    """What was printed since the last call, as plain text; nothing where this process does not keep it."""
+    """Take what was printed since the last call, as plain text; nothing where this process does not keep it."""
     if not _file:
         return ""
     file = _file[0]

@@ -10,7 +10,7 @@ import pinocchio as pin
 from fourbar.errors import LimitError
 from fourbar.scene import Scene
 from fourbar_validation.compare.answer import Array
-from fourbar_validation.engines.description import FIRST_PIN, parts, turned_by, unknown_effect
+from fourbar_validation.engines.description import FIRST_PIN, parts, rotate_by, unknown_effect
 from fourbar_validation.engines.effects import TERM_OF, acting
 from fourbar_validation.engines.loop import Exact
 from fourbar_validation.engines.tree import Tree
@@ -27,7 +27,9 @@ class PinocchioTree(Tree):
         self.model = model = pin.Model()
         self.joint, self.frame = {1: 0}, dict[str, int]()
         for part in parts(scene.linkage):
-            joint = model.addJoint(self.joint[part.bearer], pin.JointModelRZ(), _at(*part.foot), FIRST_PIN[part.bar])
+            joint = model.addJoint(
+                self.joint[part.bearer], pin.JointModelRZ(), _at(*part.first_pin), FIRST_PIN[part.bar]
+            )
             self.joint[part.bar] = joint
             # nothing is appended, no frame either: below 2.2e-16 kg the sum of two inertias has another mass centre
             about_g = np.diag([0.0, 0.0, part.inertia])
@@ -61,11 +63,11 @@ class PinocchioTree(Tree):
         return np.asarray(self.at[name])
 
     def rotation(self, bar: int) -> Array:
-        """That of the joint."""
+        """Return that of the joint."""
         return np.asarray(self.turned_to[bar])
 
     def point_jacobian(self, name: str) -> Array:
-        """Of a frame."""
+        """Return that of a frame."""
         return np.array(pin.getFrameJacobian(self.model, self.data, self.frame[name], WORLD)[:2])
 
     def turn(self, bar: int) -> Array:
@@ -77,7 +79,7 @@ class PinocchioTree(Tree):
         pin.forwardKinematics(self.model, self.data, self.q, v, a)
 
     def acceleration(self, name: str) -> Array:
-        """Of a frame."""
+        """Return that of a frame."""
         motion = pin.getFrameClassicalAcceleration(self.model, self.data, self.frame[name], WORLD)
         return np.array(motion.linear[:2])
 
@@ -86,12 +88,12 @@ class PinocchioTree(Tree):
         self._weigh(field)
         for bar, (x, y, moment) in wrenches.items():
             force, couple = self.external_force[bar]
-            force[:2] = turned_by(self.rotation(bar).T.tolist(), x, y)
+            force[:2] = rotate_by(self.rotation(bar).T.tolist(), x, y)
             couple[2] = moment
         return np.array(pin.rnea(self.model, self.data, self.q, self.v, self.a, self.external))
 
     def carried(self) -> dict[int, Array]:
-        """What each joint transmits in one more pass."""
+        """Compute what each joint transmits in one more pass."""
         self.needed(self.field, self.wrenches)
         return {bar: self.rotation(bar) @ self.joint_force[bar] for bar in self.wrenches}
 

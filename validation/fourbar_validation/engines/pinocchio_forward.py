@@ -14,7 +14,7 @@ from fourbar.mjcf import Settings, flywheel, run_through
 from fourbar.scene import Command, Scene, command
 from fourbar_validation.compare.answer import Array, Released
 from fourbar_validation.engines.loaded import no_wrenches
-from fourbar_validation.engines.loop import LimitWatch, Position, Trial, as_made, blank
+from fourbar_validation.engines.loop import Assembler, LimitDetector, Trial, as_made, blank
 from fourbar_validation.engines.pinocchio import PinocchioTree
 from fourbar_validation.engines.tree import closed, multipliers
 
@@ -53,11 +53,11 @@ class ClosedTree:
 
     def start(self, theta_2: float, branch: int, omega_2: float) -> tuple[Array, Array] | None:
         """Assembled, at the speeds that keep the loop closed; None where it does not close."""
-        q = Position(self.tree).find(theta_2, branch)
+        q = Assembler(self.tree).find(theta_2, branch)
         return None if q is None else (np.array(q), closed(self.tree.jacobian(), omega_2))
 
     def acceleration(self, q: Array, v: Array, tau: Array) -> Any:
-        """Under gravity and generalised forces."""
+        """Accelerate the closed loop under loads, effects and the flywheel's motor."""
         model, data = self.tree.model, self.data
         return pin.constraintDynamics(model, data, q, v, tau, self.models, self.found, self.proximal).copy()
 
@@ -67,7 +67,7 @@ class ClosedTree:
 
 
 def step(f: Acceleration, q: Array, v: Array, h: float) -> tuple[Array, Array]:
-    """One step of the classical Runge-Kutta method."""
+    """Make one step of the classical Runge-Kutta method."""
     a1 = f(q, v)
     v2 = v + 0.5 * h * a1
     a2 = f(q + 0.5 * h * v, v2)
@@ -131,7 +131,7 @@ class PinocchioForward:
         return Trial(at, quantities, done, 2.0 * np.pi / self.run.fastest / self.h, stepping)
 
     def _read(self, q: Array, v: Array, a: Array) -> dict[str, Array | float]:
-        """Torque and pin forces at a state, with the multiplier of the closure that the engine found."""
+        """Compute torque and pin forces at a state, with the multiplier of the closure that the engine solved for."""
         tree = self.tree
         tree.place(q)  # type: ignore[arg-type]
         tree.model.armature = np.zeros(3)
@@ -157,12 +157,12 @@ class PinocchioReleased:
         self.step = step
 
     def release(self, scene: Scene, times: Array) -> Released:
-        """The motion at the given times, rising from 0 (s)."""
+        """Integrate the motion at the given times, rising from 0 (s)."""
         setting = f"RK4 {self.step:g} s"
         if scene.loads or any(not isinstance(effect, Gravity) for effect in scene.effects):
             return Released.refused(NAME, setting, "in forward dynamics only gravity has a model here")
         tree, start, none = PinocchioTree(scene), command(scene), np.zeros(3)
-        loop, watch = ClosedTree(tree, TIME_CONSTANT_STEPS * self.step), LimitWatch(int(start.branch[0]))
+        loop, detector = ClosedTree(tree, TIME_CONSTANT_STEPS * self.step), LimitDetector(int(start.branch[0]))
         state = loop.start(float(start.theta_2[0]), int(start.branch[0]), scene.motion.omega_2 or 0.0)
         if state is None:
             return Released.refused(NAME, setting, "the loop does not close at the start")
@@ -171,9 +171,9 @@ class PinocchioReleased:
             steps = math.ceil((t - now) / self.step - 1e-6)
             for taken in range(1, steps + 1):
                 q, v = step(lambda q, v: loop.acceleration(q, v, none), q, v, (t - now) / steps)
-                watch.look(now + taken * (t - now) / steps, q[0] + q[1], q[2])
+                detector.look(now + taken * (t - now) / steps, q[0] + q[1], q[2])
             now = float(t)
             energy, data = pin.computeMechanicalEnergy(tree.model, tree.data, q, v), tree.data
             rows.append((q[0], v[0], energy, data.kinetic_energy + abs(data.potential_energy)))
         theta_2, omega, energy, terms = np.array(rows).T
-        return Released(NAME, setting, theta_2, omega, energy, terms, watch.stopped_at)
+        return Released(NAME, setting, theta_2, omega, energy, terms, detector.stopped_at)

@@ -23,11 +23,8 @@ from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import PIN_FORCES, VECTORS
 from fourbar.scene import Command, Scene
 from fourbar_validation.compare.compare import Mask
-from fourbar_validation.compare.tolerance import EPS, Array
+from fourbar_validation.compare.tolerance import EPS, ROUNDINGS, Array
 from fourbar_validation.engines.description import centre, speeds
-
-ROUNDINGS = 8.0
-"""R: a chain of some fifty roundings moves a result by sqrt(50) = 7 last digits, as a random walk."""
 
 FIRST_ORDER = 0.1
 """Where the angles are uncertain by this part of the sine that everything divides by, first order predicts nothing:
@@ -35,17 +32,17 @@ speeds and forces may come out as anything, the torque too, whose own first orde
 
 
 def from_data(scene: Scene, at: Command, quantity: str, where: Mask | None = None) -> Array:
-    """For a derivation that works in angles and lengths themselves."""
+    """Predict for a derivation that works in angles and lengths themselves."""
     return predicted_error(scene, at, quantity, 0.0, where)
 
 
 def in_world_axes(scene: Scene, at: Command, quantity: str, where: Mask | None = None) -> Array:
-    """For an engine that differences points of the linkage in world axes, as Pinocchio's frame Jacobians do."""
+    """Predict for an engine that differences points of the linkage in world axes, as Pinocchio's frame Jacobians do."""
     return predicted_error(scene, at, quantity, _extent(scene), where)
 
 
 def about_mass_centre(scene: Scene, at: Command, quantity: str, where: Mask | None = None) -> Array:
-    """For an engine that moves a tree of bodies about the mass centre of all of them, as MuJoCo does.
+    """Predict for an engine that moves a tree of bodies about the mass centre of all of them, as MuJoCo does.
 
     Every bar is accelerated with the first of its tree and back again by its own joint.
     """
@@ -66,7 +63,7 @@ def predicted_error(
     *,
     carried: bool = False,
 ) -> Array:
-    """Absolute error predicted for a quantity at each position, or at those of a mask, (n,).
+    """Predict the absolute error of a quantity at each position, or at those of a mask, (n,).
 
     With `carried` the accelerations of the bars are differences of others as large as the fastest bar's at `reach`.
     NaN where the loop does not close; infinite at a singular position, where the equations have no answer.
@@ -89,7 +86,7 @@ def predicted_error(
     return errors
 
 
-class Sensitivity(NamedTuple):
+class Sensitivities(NamedTuple):
     """How far each output moves at one position."""
 
     data: dict[str, float]
@@ -101,7 +98,7 @@ class Sensitivity(NamedTuple):
     """By couples on the bars of the heaviest bar's inertial force at 1 m of the fastest bar, times 1 m."""
 
     def first_order(self, name: str, reach: float, *, carried: bool = False) -> float:
-        """The error predicted for an output, vectors by their norm; infinite where it has none."""
+        """Predict the error of an output, vectors by their norm; infinite where it has none."""
         parts = []
         name = "sin_mu" if name == "condition" else name
         for axis in ("_x", "_y") if name in VECTORS else ("",):
@@ -111,8 +108,8 @@ class Sensitivity(NamedTuple):
 
 
 @lru_cache(maxsize=8192)
-def _sensitivity(scene: Scene, theta_2: float, branch: int, omega_2: float, alpha_2: float) -> Sensitivity | None:
-    """Sensitivities at one position; None where the loop does not close."""
+def _sensitivity(scene: Scene, theta_2: float, branch: int, omega_2: float, alpha_2: float) -> Sensitivities | None:
+    """Compute the sensitivities at one position; None where the loop does not close."""
     from flint import acb, arb
 
     from fourbar_validation.engines.balls import STEP_BITS, outputs, response, stored
@@ -124,7 +121,7 @@ def _sensitivity(scene: Scene, theta_2: float, branch: int, omega_2: float, alph
     step = arb(2) ** -STEP_BITS
 
     def add(total: dict[str, float], changes: list[dict[str, Any]]) -> None:
-        """The change under the first of several changes of the inputs with which the loop still closes."""
+        """Add the change under the first of several changes of the inputs with which the loop still closes."""
         moved = (outputs(scene, branch, exact | changed, scene.drive_bar) for changed in changes)
         for output, rate in response(base, moved).items():
             total[output] = total.get(output, 0.0) + rate
@@ -151,11 +148,11 @@ def _sensitivity(scene: Scene, theta_2: float, branch: int, omega_2: float, alph
         for bar in MOVING_BARS:
             add(loop, [{f"couple_{bar}": strongest * step}])
             add(carried, [{f"couple_{bar}": heaviest * hardest * step}])
-    return Sensitivity(data, loop, carried)
+    return Sensitivities(data, loop, carried)
 
 
 def _weights(stored: dict[str, float]) -> dict[str, float]:
-    """How much of each input is one rounding: relative, but a chain of bars meets O4 as its longest bar is rounded."""
+    """Weigh each input by one rounding: relative, but a chain of bars meets O4 as its longest bar is rounded."""
     longest = max(stored[name] for name in ("d", "a", "b", "c"))
     weights = {name: abs(value) for name, value in stored.items() if value != 0.0}
     weights["d"] = longest

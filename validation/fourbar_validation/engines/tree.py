@@ -41,22 +41,22 @@ class Tree(Loaded, Protocol):
 
     # what the engine gives
     def point_jacobian(self, name: str) -> Array:
-        """Derivative of a point, (2, 3), m."""
+        """Return the derivative of a point, (2, 3), m."""
 
     def turn(self, bar: int) -> Array:
-        """Derivative of a moving bar's rotation, (3,)."""
+        """Return the derivative of a moving bar's rotation, (3,)."""
 
     def set_motion(self, v: Array, a: Array) -> None:
-        """Speeds and accelerations of the coordinates."""
+        """Set speeds and accelerations of the coordinates."""
 
     def acceleration(self, name: str) -> Array:
-        """Of a point at the motion last set, (2,), m/s^2."""
+        """Return that of a point at the motion last set, (2,), m/s^2."""
 
     def needed(self, field: tuple[float, float], wrenches: dict[int, list[float]]) -> Array:
         """Generalised forces that the motion last set asks for beyond gravity and what acts, (3,), N m."""
 
     def carried(self) -> dict[int, Array]:
-        """Force on each moving bar at its first pin, at the motion last set and under `wrenches`, (2,), N."""
+        """Return the force on each moving bar at its first pin, at the motion and wrenches last set, (2,), N."""
 
     # what follows
     def gap(self) -> tuple[float, float]:
@@ -69,15 +69,15 @@ class Tree(Loaded, Protocol):
         return self.point_jacobian("end3") - self.point_jacobian("end4")
 
     def positions(self) -> dict[str, Array]:
-        """Points of the bars."""
+        """Locate the points of the bars."""
         return {name: np.array(self.point(point)) for name, point in POINTS.items() if name != "A2"}
 
     def velocity(self, bar: int) -> float:
-        """Angular velocity of a bar, rad/s."""
+        """Return the angular velocity of a bar, rad/s."""
         return float(self.turns[bar] @ self.v)
 
     def alpha(self, bar: int) -> float:
-        """Angular acceleration of a bar, rad/s^2."""
+        """Return the angular acceleration of a bar, rad/s^2."""
         return float(self.turns[bar] @ self.a)
 
     def moving(self, v: Array, a: Array) -> None:
@@ -91,7 +91,7 @@ class Tree(Loaded, Protocol):
         return self.acceleration("end3") - self.acceleration("end4")
 
     def torques(self) -> Array:
-        """What the motion asks for beyond loads and effects, (3,), N m."""
+        """Compute what the motion asks for beyond loads and effects, (3,), N m."""
         self.act()
         return self.needed(self.field, self.wrenches)
 
@@ -131,7 +131,7 @@ class Tree(Loaded, Protocol):
 
 
 def closed(jacobian: Array, of_2: float, x: float = 0.0, y: float = 0.0) -> Array:
-    """Rates of the three coordinates where J rates + (x, y) = 0 and bar 2 has its own; LinAlgError at a toggle."""
+    """Solve J rates + (x, y) = 0 for the rates of the coordinates, bar 2's being given; LinAlgError at a toggle."""
     (e, a, b), (f, c, d) = jacobian.tolist()
     x, y, det = x + e * of_2, y + f * of_2, a * d - b * c
     if det == 0.0:

@@ -1,8 +1,8 @@
-"""The witnesses: each one, where its adapter lives, what it needs, and what it is held to."""
+"""The witnesses (independent solvers): what starts each, what it needs, and what it is held to."""
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, fields
 from importlib import import_module
-from pkgutil import resolve_name
 from typing import NamedTuple
 
 import numpy as np
@@ -12,45 +12,61 @@ from fourbar.quantities import OF_DRY_FRICTION, STAGE_OF, UNKNOWNS
 from fourbar.scene import Command, Scene
 from fourbar.solution import Solution
 from fourbar_validation.compare.answer import Answer, Engine
-from fourbar_validation.compare.compare import COMPARED, Nearby, Predicted
+from fourbar_validation.compare.compare import COMPARED, Mask, Nearby, Predicted
+from fourbar_validation.compare.nearby import shift_to
 from fourbar_validation.compare.rows import in_words
-from fourbar_validation.compare.tolerance import EQUIVALENCE, SIMULATED, Tolerance
+from fourbar_validation.compare.tolerance import EQUIVALENCE, SIMULATED, Array, Tolerance
+from fourbar_validation.engines.description import speeds
 from fourbar_validation.engines.exact import unknown
+from fourbar_validation.engines.free_body import FreeBody
+from fourbar_validation.engines.loop import blank
+from fourbar_validation.engines.prediction import about_mass_centre, from_data, in_world_axes
+
+Predictor = Callable[[Scene, Command, str, Mask], Array]
+"""Predicts the absolute error of a quantity at the positions of a mask, (n,)."""
+Order = Callable[[Scene, Command, Callable[[Answer], float]], tuple[float, float, float]]
+"""Runs an engine at two coarser timesteps; their errors and the observed order."""
 
 
 @dataclass(frozen=True, slots=True)
 class Witness:
-    """An engine that bears witness, where its adapter lives, and what it is held to."""
+    """An independent solver, and what it is held to."""
 
     name: str
-    adapter: str
-    """ "module:class"; imported when it answers, so a missing engine costs only its own rows."""
+    engine: Callable[[], Engine]
+    """Starts it; importable by name, and imports the library itself: a missing one costs only its own rows."""
     tolerance: Tolerance
     expected: tuple[str, ...] = COMPARED
-    order: str = ""
-    """ "module:function" that runs the engine at two coarser timesteps; its observed order is shown."""
+    order: Order | None = None
+    """What measures its observed order, which is shown."""
     positions: tuple[str, ...] = ()
     """What it is held to where the scene states positions only; nothing: it is then not started."""
     through_time: bool = False
     """Whether it runs through the motion in time."""
-    predictor: str = ""
-    """ "module:function" that predicts, from the description, the errors to be expected beyond the tolerance; "own":
-    the engine's own residuals do; nothing: the tolerance is all."""
-    nearby: str = ""
-    """ "module:function" that answers again where an error is beyond the tolerance: at the theta_2, within its own
-    rounding, at which its loop closes as that of the formulas does."""
+    generated: bool = False
+    """Whether it runs the generated MJCF, which is then compared as it is shipped too."""
+    predictor: Predictor | None = None
+    """What predicts, from the description, the errors to be expected beyond the tolerance."""
+    residuals: bool = False
+    """Whether the engine's own residuals predict them."""
+    nearby: bool = False
+    """Whether it answers at the angle that `Command.remainder` completes, so that where an error is beyond the
+    tolerance it can answer again within the rounding of theta_2."""
     stated: bool = True
     """Whether an exact engine is held to what the formulas state of the linkage too, whatever its motion."""
     library: str = ""
     """The module that its adapter imports, a key of `EXTRA`; nothing: it needs no more than the formulas."""
 
-    def engine(self) -> Engine:
-        """The adapter."""
-        module, _, name = self.adapter.partition(":")
-        return getattr(import_module(module), name)()  # type: ignore[no-any-return]
+    def fingerprint(self) -> str:
+        """Name everything that its answers and verdicts depend on, alike in every process."""
+        values = (getattr(self, part.name) for part in fields(self))
+        return ", ".join(
+            f"{value.__module__}:{name}" if (name := getattr(value, "__qualname__", "")) else repr(value)
+            for value in values
+        )
 
     def missing(self) -> str | None:
-        """Why it cannot answer in this environment, or None."""
+        """Say why it cannot answer in this environment, if it cannot."""
         return not_installed(self.library) if self.library else None
 
 
@@ -59,7 +75,7 @@ EXTRA = {name: name for name in ("mujoco", "pinocchio", "exudyn", "opensim")} | 
 
 
 def not_installed(library: str) -> str | None:
-    """The reason to give where a module cannot be found, or does not load; None where it does."""
+    """Give the reason where a module cannot be found, or does not load; None where it does."""
     try:
         import_module(library)
     except ModuleNotFoundError as error:
@@ -115,68 +131,116 @@ WORK = {
 }
 """By witness: what is compared is not the same work."""
 OF_A_POSITION = tuple(name for name in COMPARED if STAGE_OF[name] == "position")
-FROM_DATA, IN_WORLD_AXES, ABOUT_MASS_CENTRE = (
-    f"fourbar_validation.engines.prediction:{name}" for name in ("from_data", "in_world_axes", "about_mass_centre")
-)
-"""How an exact engine measures lever arms; with the data as they are, in world axes, or about all bars' mass centre."""
 
 
-def _exact(name: str, adapter: str, library: str, predictor: str = IN_WORLD_AXES) -> Witness:
-    """An engine that answers every position by itself."""
-    return Witness(name, f"fourbar_validation.engines.{adapter}", EQUIVALENCE, predictor=predictor, library=library)
+def _pinocchio() -> Engine:
+    from fourbar_validation.engines.pinocchio import PinocchioInverse
+
+    return PinocchioInverse()
+
+
+def _mujoco() -> Engine:
+    from fourbar_validation.engines.mujoco.inverse import MujocoInverse
+
+    return MujocoInverse()
+
+
+def _simulation() -> Engine:
+    from fourbar_validation.engines.mujoco.simulate import MujocoSimulated
+
+    return MujocoSimulated()
+
+
+def _order_of_simulation(scene: Scene, at: Command, error: Callable[[Answer], float]) -> tuple[float, float, float]:
+    from fourbar_validation.engines.mujoco.simulate import observed_order
+
+    return observed_order(scene, at, error)
+
+
+def _exudyn() -> Engine:
+    from fourbar_validation.engines.exudyn import ExudynConstraints
+
+    return ExudynConstraints()
+
+
+def _opensim() -> Engine:
+    from fourbar_validation.engines.opensim import OpenSimConstraints
+
+    return OpenSimConstraints()
+
+
+def _drake() -> Engine:
+    from fourbar_validation.engines.drake import DrakeInverse
+
+    return DrakeInverse()
 
 
 WITNESSES = (
-    _exact("pinocchio-inverse", "pinocchio:PinocchioInverse", "pinocchio"),
-    _exact("mujoco-inverse", "mujoco.inverse:MujocoInverse", "mujoco", ABOUT_MASS_CENTRE),
+    Witness("pinocchio-inverse", _pinocchio, EQUIVALENCE, predictor=in_world_axes, library="pinocchio"),
+    Witness("mujoco-inverse", _mujoco, EQUIVALENCE, predictor=about_mass_centre, library="mujoco"),
     Witness(
         "mujoco-simulated",
-        "fourbar_validation.engines.mujoco.simulate:MujocoSimulated",
+        _simulation,
         SIMULATED,
         UNKNOWNS,
-        order="fourbar_validation.engines.mujoco.simulate:observed_order",
+        order=_order_of_simulation,
         through_time=True,
-        predictor="own",
+        generated=True,
+        residuals=True,
         library="mujoco",
     ),
     Witness(
         "free-body",
-        "fourbar_validation.engines.free_body:FreeBody",
+        FreeBody,
         EQUIVALENCE,
         (*COMPARED, *OF_DRY_FRICTION),
         positions=OF_A_POSITION,
-        predictor=FROM_DATA,
+        predictor=from_data,
     ),
 )
 FURTHER = (
-    _exact("exudyn-constraints", "exudyn:ExudynConstraints", "exudyn"),
-    _exact("opensim-constraints", "opensim:OpenSimConstraints", "opensim"),
-    _exact("drake-inverse", "drake:DrakeInverse", "pydrake"),
+    Witness("exudyn-constraints", _exudyn, EQUIVALENCE, predictor=in_world_axes, library="exudyn"),
+    Witness("opensim-constraints", _opensim, EQUIVALENCE, predictor=in_world_axes, library="opensim"),
+    Witness("drake-inverse", _drake, EQUIVALENCE, predictor=in_world_axes, library="pydrake"),
 )
 """Engines with extras of their own: they join a run where they are installed, and where they are named."""
 
 
 def predicting_from(witness: Witness, scene: Scene, at: Command, answer: Answer) -> Predicted | None:
-    """What computes the errors to be expected, should any be called for; an alarm leaves an engine no own excuse."""
-    if not witness.predictor or answer.refusal is not None:
+    """Give what computes the errors to be expected, should any be called for; an alarm leaves no own excuse."""
+    if answer.refusal is not None:
         return None
-    if witness.predictor == "own":
+    if witness.residuals:
         if answer.alarms:
             return None
         return lambda quantity, where: answer.predicted.get(quantity, np.zeros(len(where)))
-    if witness.tolerance.conditioned and (not_installed("flint") or unknown(scene)):
+    predict = witness.predictor
+    if predict is None or (witness.tolerance.conditioned and (not_installed("flint") or unknown(scene))):
         return None  # the law in the condition stands alone
-    module, _, name = witness.predictor.partition(":")
-    predict = getattr(import_module(module), name)
     return lambda quantity, where: predict(scene, at, quantity, where)
 
 
 def answering_nearby(witness: Witness, scene: Scene, at: Command, formulas: Solution) -> Nearby | None:
-    """What answers within the rounding of the theta_2 that are stated, where the witness does.
+    """Give what answers within the rounding of the theta_2 that are stated, where the witness does.
 
-    A drive on bar 3 or 4 has poles of its own, which another theta_2 for the same sine does not mend.
+    Near a limit position the last digits of theta_2 decide sin(theta_4 - theta_3), and with it every other number:
+    once they are chosen such that this sine is that of the formulas, all the others have their digits.
+
+    A drive on bar 3 or 4 has poles of its own, which another theta_2 for the same sine does not correct.
     """
     if not witness.nearby or scene.drive_bar != 2 or at.remainder is not None or at.omega_2 is None:
         return None
-    answer = resolve_name(witness.nearby)
-    return lambda where: answer(scene, at, formulas.sin_mu, where)
+    omega, alpha = speeds(at)
+
+    def answer(where: Mask) -> dict[str, Array]:
+        engine, out = witness.engine(), blank(len(where), COMPARED)
+        for i in np.flatnonzero(where & np.isfinite(formulas.sin_mu)).tolist():
+            shift = shift_to(scene.linkage, float(at.theta_2[i]), float(formulas.sin_mu[i]))
+            if shift is not None:
+                one = slice(i, i + 1)
+                moved = Command(at.theta_2[one], at.branch[one], omega[one], alpha[one], shift)
+                for name, values in engine.answer(scene, moved).quantities.items():
+                    out[name][one] = values
+        return out
+
+    return answer

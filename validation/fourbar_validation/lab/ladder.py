@@ -52,7 +52,7 @@ def ladder_rows() -> list[LadderRow]:
 
 
 def show_ladder(console: Any) -> None:
-    """The table of the published torque, error by error."""
+    """Tabulate the published torque, error by error."""
     from rich.table import Table
 
     table = Table(title="The published torque, error by error", show_lines=True)

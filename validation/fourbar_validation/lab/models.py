@@ -1,4 +1,4 @@
-"""`python -m validation models`: write the MJCF of every scene in models/ next to it."""
+"""`python -m validation write`: write the MJCF of every scene in models/ next to it."""
 
 import math
 import re
@@ -19,7 +19,7 @@ ROUND_OFF = 1e-12
 
 
 def stale(files: Iterable[Path]) -> list[Path]:
-    """The scene files whose MJCF is missing or differs from what they generate now, round-off apart."""
+    """Find the scene files whose MJCF is missing or differs from what they generate now, round-off apart."""
     found = []
     for file in files:
         xml = file.with_suffix(".xml")

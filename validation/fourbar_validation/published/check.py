@@ -6,7 +6,7 @@ from collections.abc import Iterator
 import click
 
 from fourbar.errors import FAILED, HOLDS
-from fourbar_validation.published.figures import ERRATA, VERDICTS, Figure
+from fourbar_validation.published.figures import ERRATA, VERDICTS, PublishedFigure
 from fourbar_validation.published.program import STEPS
 from fourbar_validation.published.textbook import maple_figures, textbook_figures
 from fourbar_validation.published.thesis_dynamics import dynamics_figures
@@ -15,22 +15,22 @@ from fourbar_validation.published.thesis_positions import position_figures
 WIDTH = 78
 
 
-def figures() -> Iterator[Figure]:
-    """Every printed figure: the thesis, the Maple worksheet, public test cases."""
+def figures() -> Iterator[PublishedFigure]:
+    """List every published figure: the thesis, the Maple worksheet, public test cases."""
     yield from position_figures()
     yield from dynamics_figures()
     yield from maple_figures()
     yield from textbook_figures()
 
 
-def explained(figure: Figure) -> bool:
-    """Whether a difference is bound to errata that give the printed digits, or to a misprint that none can give."""
+def explained(figure: PublishedFigure) -> bool:
+    """Tell whether a difference has errata that give the published digits, or is a misprint that none can give."""
     if not figure.errata or not set(figure.errata) <= set(ERRATA):
         return False
     return figure.reproduced() or not all(ERRATA[name].reproduced for name in figure.errata)
 
 
-def reason(figure: Figure) -> str:
+def reason(figure: PublishedFigure) -> str:
     """Why a figure differs, in a phrase."""
     if not figure.errata or not set(figure.errata) <= set(ERRATA):
         return "no erratum explains this"

@@ -29,7 +29,7 @@ ERRATA = {entry["id"]: Erratum(**entry) for entry in LISTED}
 """The errata of the sources, as data: `errata.toml` says what each field is."""
 
 
-class Figure(NamedTuple):
+class PublishedFigure(NamedTuple):
     """One printed figure and ours, in the unit printed."""
 
     table: str
@@ -44,16 +44,16 @@ class Figure(NamedTuple):
     """Round-off of whoever printed 15 digits or more, in the unit printed."""
 
     def verdict(self) -> str:
-        """rounded, truncated or differs: how ours compares with the printed digits."""
+        """Say how ours compares with the published digits: rounded, truncated or differs."""
         return compare(self.printed, self.ours, self.noise)
 
     def reproduced(self) -> bool:
-        """Whether the errata give the printed digits, rounded or truncated."""
+        """Tell whether the errata give the published digits, rounded or truncated."""
         return self.made is not None and compare(self.printed, self.made, self.noise) != "differs"
 
 
 def compare(printed: str, value: float, noise: float = 0.0) -> str:
-    """Whether `value` to the printed number of decimals is what is printed: rounded, truncated, or it differs."""
+    """Compare `value` to the published number of decimals: rounded, truncated, or it differs."""
     theirs, ours = Decimal(printed), Decimal(value)
     unit = Decimal(1).scaleb(int(theirs.as_tuple().exponent))
     if ours.quantize(unit, ROUND_HALF_EVEN) == theirs or abs(ours - theirs) <= Decimal(noise):

@@ -43,7 +43,7 @@ TO_N = 0.01
 
 
 @dataclass(frozen=True, slots=True)
-class Errors:
+class ProgramErrors:
     """What the program did; all False is right."""
 
     inertia_about_long_axis: bool = False
@@ -54,12 +54,12 @@ class Errors:
 
 
 def printed() -> Any:
-    """The transcribed tables of the thesis."""
+    """Read the transcribed tables of the thesis."""
     return json.loads((DATA / "model_mechanism.json").read_text(encoding="utf-8"))
 
 
 def deg(angle: float) -> float:
-    """Degrees in [0, 360), as the thesis has them."""
+    """Convert to degrees in [0, 360), as the thesis has them."""
     return math.degrees(angle) % 360.0
 
 
@@ -74,7 +74,7 @@ def to_ours(theta: float) -> float:
 
 
 def scene(theta_2: Array | float, branch: int = 1) -> fourbar.Scene:
-    """The model mechanism for our formulas, SI, uniform bars of `WIDTH`."""
+    """Make the model mechanism for our formulas, SI, uniform bars of `WIDTH`."""
     d, a, b, c = (0.01 * length for length in LENGTHS)
     centre = {bar: (0.01 * distance, 0.0) for bar, distance in CENTRE.items()}
     linkage = fourbar.FourBar(
@@ -95,7 +95,7 @@ def motion(theta_2: Array, branch: int = 1) -> fourbar.Solution:
 
 
 def right_unknowns() -> dict[str, float]:
-    """The 13 unknowns by our formulas at theta_2 = 135 deg, N and N cm."""
+    """Compute the 13 unknowns by our formulas at theta_2 = 135 deg, N and N cm."""
     s = fourbar.solve(scene(THETA_2))
     assert s.F32 is not None and s.F43 is not None and s.torque is not None
     pins: dict[str, Any] = {"F12": s.F12, "F32": s.F32, "F23": -s.F32, "F43": s.F43, "F14": s.F14, "F34": -s.F43}
@@ -133,7 +133,7 @@ class Kinematics:
         }
 
 
-def equations(errors: Errors, inertias: tuple[float, float] | None = None) -> tuple[Array, Array]:
+def equations(errors: ProgramErrors, inertias: tuple[float, float] | None = None) -> tuple[Array, Array]:
     """Matrix and right side of section 5.7 at theta_2 = 135 deg, N and N cm.
 
     sum F = m A and sum M_G = I alpha of bars 2, 3, 4; F32 = -F23 and F34 = -F43.
@@ -165,14 +165,14 @@ def equations(errors: Errors, inertias: tuple[float, float] | None = None) -> tu
     return matrix[0], right[0]
 
 
-def thesis_program(errors: Errors, inertias: tuple[float, float] | None = None) -> dict[str, float]:
-    """The 13 unknowns of section 5.7 at theta_2 = 135 deg, N and N cm."""
+def thesis_program(errors: ProgramErrors, inertias: tuple[float, float] | None = None) -> dict[str, float]:
+    """Compute the 13 unknowns of section 5.7 at theta_2 = 135 deg, N and N cm."""
     unknowns = np.linalg.solve(*equations(errors, inertias))
     return dict(zip(UNKNOWNS, map(float, unknowns), strict=True))
 
 
-def round_off(errors: Errors, inertias: tuple[float, float] | None = None) -> dict[str, float]:
-    """How far an elimination of these equations may be off in each unknown, whoever makes it: N and N cm.
+def round_off(errors: ProgramErrors, inertias: tuple[float, float] | None = None) -> dict[str, float]:
+    """Bound how far an elimination of these equations may be off in each unknown, whoever makes it: N and N cm.
 
     13 eps |A^-1| (|A| |x| + |b|): each number of the system carries up to as many roundings as there are
     unknowns, from its own making and from the elimination (Higham, Accuracy and Stability, 7.2 and 9.3).
@@ -186,19 +186,19 @@ def round_off(errors: Errors, inertias: tuple[float, float] | None = None) -> di
 PRINTED_INERTIAS = (0.2924725333, 0.1075266667)
 TYPED_INERTIAS = (0.292472, 0.107526)
 """I_G3, I_G4 of the manual's table and of section 5.7, kg cm^2: solved back from the printed unknowns."""
-STEPS: tuple[tuple[str, Errors, tuple[float, float] | None], ...] = (
-    ("", Errors(), None),
-    ("3", Errors(True), None),
-    ("1", Errors(True, True), None),
-    ("2", Errors(True, True, True), None),
-    ("4", Errors(True, True, True, True), None),
-    ("5", Errors(True, True, True, True, True), None),
-    ("manual", Errors(True, True, True, True, True), PRINTED_INERTIAS),
-    ("5b", Errors(True, True, True, True, True), TYPED_INERTIAS),
+STEPS: tuple[tuple[str, ProgramErrors, tuple[float, float] | None], ...] = (
+    ("", ProgramErrors(), None),
+    ("3", ProgramErrors(True), None),
+    ("1", ProgramErrors(True, True), None),
+    ("2", ProgramErrors(True, True, True), None),
+    ("4", ProgramErrors(True, True, True, True), None),
+    ("5", ProgramErrors(True, True, True, True, True), None),
+    ("manual", ProgramErrors(True, True, True, True, True), PRINTED_INERTIAS),
+    ("5b", ProgramErrors(True, True, True, True, True), TYPED_INERTIAS),
 )
 """The errata in the order in which they are made, from right to published."""
 
 
 def ladder() -> list[tuple[str, dict[str, float]]]:
-    """The unknowns after each further erratum, from right to published."""
+    """Compute the unknowns after each further erratum, from right to published."""
     return [(erratum, thesis_program(errors, inertias)) for erratum, errors, inertias in STEPS]

@@ -12,7 +12,7 @@ import numpy as np
 
 import fourbar
 from fourbar_validation.places import MODELS
-from fourbar_validation.published.figures import Figure
+from fourbar_validation.published.figures import PublishedFigure
 
 SCENES = MODELS / "textbook"
 ANSWERS = Path(__file__).parent / "textbook.toml"
@@ -20,7 +20,7 @@ SHEET = Path(__file__).parent / "data" / "maple.json"
 AXES = {"_x": 0, "_y": 1}
 
 
-class Answer(NamedTuple):
+class TextbookAnswer(NamedTuple):
     """A printed answer."""
 
     scene: str
@@ -31,20 +31,20 @@ class Answer(NamedTuple):
     note: str = ""
 
 
-def answers() -> list[Answer]:
-    """All of them."""
-    return [Answer(**entry) for entry in tomllib.loads(ANSWERS.read_text(encoding="utf-8"))["answer"]]
+def answers() -> list[TextbookAnswer]:
+    """List all of them."""
+    return [TextbookAnswer(**entry) for entry in tomllib.loads(ANSWERS.read_text(encoding="utf-8"))["answer"]]
 
 
-def textbook_figures() -> Iterator[Figure]:
-    """Each answer and ours."""
+def textbook_figures() -> Iterator[PublishedFigure]:
+    """Compare each answer with ours."""
     for answer in answers():
         ours = value(_solved(answer.scene), answer.quantity, answer.position)
-        yield Figure("public test cases", f"{answer.scene} {answer.quantity}", answer.printed, ours)
+        yield PublishedFigure("public test cases", f"{answer.scene} {answer.quantity}", answer.printed, ours)
 
 
 def value(solution: fourbar.Solution, quantity: str, position: int) -> float:
-    """A result, its negative, or the difference of two, at one position."""
+    """Compute a result, its negative, or the difference of two, at one position."""
     first, minus, second = quantity.partition(" - ")
     if minus:
         return value(solution, first, position) - value(solution, second, position)
@@ -65,16 +65,16 @@ def _solved(scene: str) -> fourbar.Solution:
     return fourbar.solve(fourbar.load(SCENES / f"{scene}.toml"))
 
 
-def maple_figures() -> Iterator[Figure]:
-    """The worksheet's two solutions, positions alone, theta_1 = 0, rad; and the constant of its real equation."""
+def maple_figures() -> Iterator[PublishedFigure]:
+    """Compute the worksheet's two solutions of positions, theta_1 = 0, rad; and the constant of its real equation."""
     sheet = json.loads(SHEET.read_text(encoding="utf-8"))
     a, b, c, d = (float(sheet["inputs"][name]) for name in "abcd")
     theta_2 = math.pi / 3.0
     linkage = fourbar.FourBar(d, fourbar.Bar(a), fourbar.Bar(b), fourbar.Bar(c))
     real = sheet["reduced_equations"]["real_constant"]
-    yield Figure("Maple", "real constant", real, a * math.cos(theta_2) - d)
+    yield PublishedFigure("Maple", "real constant", real, a * math.cos(theta_2) - d)
     for branch, solution in zip((1, -1), sheet["solutions"], strict=True):
         s = fourbar.solve(fourbar.Scene(linkage, fourbar.Motion(theta_2, branch=branch)))
         for name, angle in (("theta3", s.theta_3), ("theta4", s.theta_4)):
             key = f"{solution['configuration']} {name}"
-            yield Figure("Maple", key, solution[f"{name}_printed_rad"], float(angle[0]))
+            yield PublishedFigure("Maple", key, solution[f"{name}_printed_rad"], float(angle[0]))

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from fourbar_validation.published.figures import Figure
+from fourbar_validation.published.figures import PublishedFigure
 from fourbar_validation.published.program import (
     CENTRE,
     COUPLE,
@@ -39,17 +39,17 @@ _, a, b, c = LENGTHS
 
 
 def cut(value: float, decimals: int) -> float:
-    """The value without its further decimals."""
+    """Cut off further decimals."""
     return math.trunc(value * 10.0**decimals) / 10.0**decimals
 
 
 def arm_of_cut_angle(k: Kinematics, decimals: int) -> float:
-    """y of R23 with theta_3 cut to some decimals of a degree first, erratum 12."""
+    """Compute y of R23 with theta_3 cut to some decimals of a degree first, erratum 12."""
     return -CENTRE[3] * math.sin(math.radians(cut(deg(k.theta_3), decimals)))
 
 
 def our_kinematics(k: Kinematics) -> dict[str, float]:
-    """By the names of section 4.12 and of the manual's table.
+    """Compute ours by the names of section 4.12 and of the manual's table.
 
     A alpha_3 + B alpha_4 = C and D alpha_3 + E alpha_4 = F.
     """
@@ -74,7 +74,7 @@ def our_kinematics(k: Kinematics) -> dict[str, float]:
 
 
 def kinematic_slips(k: Kinematics) -> dict[str, tuple[tuple[str, ...], float]]:
-    """The figures that the errata touch, with the value that these lead to."""
+    """List the figures that the errata touch, with the value that these lead to."""
     x, y = k.a_G[3][0] + k.slip, k.a_G[3][1]
     return {
         "A_G3/A_i": (("4",), k.a_G[3][0] - k.a_A[0] + k.slip),
@@ -85,26 +85,26 @@ def kinematic_slips(k: Kinematics) -> dict[str, tuple[tuple[str, ...], float]]:
     }
 
 
-def kinematics(k: Kinematics) -> Iterator[Figure]:
+def kinematics(k: Kinematics) -> Iterator[PublishedFigure]:
     """Section 4.12, and the manual's table of the program's 17 digits."""
     ours, slips = our_kinematics(k), kinematic_slips(k)
     by_hand = {"R23_j": (("12",), arm_of_cut_angle(k, 6)), "R43_j": (("12",), -arm_of_cut_angle(k, 6))}
     for name, text in printed()["published"]["section_4_12_hand"].items():
         errata, made = {**slips, **by_hand}.get(name, ((), None))
-        yield Figure("4.12", name, text, ours[name], errata, made)
+        yield PublishedFigure("4.12", name, text, ours[name], errata, made)
     for name, text in printed()["published"]["manual_program_kinematic"].items():
         errata, made = slips.get(name, ((), None))
         size = {"t": math.degrees(1.0), "R": abs(CENTRE[2]), "A": float(np.abs(k.a_G[2]).max())}.get(name[0], 1.0)
-        yield Figure("manual, kinematics", name, text, ours[name], errata, made, ANGLE_NOISE * size)
+        yield PublishedFigure("manual, kinematics", name, text, ours[name], errata, made, ANGLE_NOISE * size)
 
 
-def dynamics_constants(k: Kinematics) -> Iterator[Figure]:
+def dynamics_constants(k: Kinematics) -> Iterator[PublishedFigure]:
     """Section 5.7: inertias, right sides and moment arms of the 13 equations, and the matrix as printed."""
     source = printed()
     inertias = source["inputs"]["inertia_kg_cm2_printed"]
-    yield Figure("5.7 inertias", "I_G2", inertias["I_G2"], INERTIA_2)
+    yield PublishedFigure("5.7 inertias", "I_G2", inertias["I_G2"], INERTIA_2)
     for bar in (3, 4):
-        yield Figure(
+        yield PublishedFigure(
             "5.7 inertias", f"I_G{bar}", inertias[f"I_G{bar}"], inertia(bar), ("3",), inertia(bar, about_long_axis=True)
         )
     load = polar(LOAD_ARM, LOAD_ANGLE)
@@ -140,7 +140,7 @@ def dynamics_constants(k: Kinematics) -> Iterator[Figure]:
     }
     for name, text in source["published"]["section_5_7_hand_constants"].items():
         errata, changed = by_hand.get(name, ((), None))
-        yield Figure("5.7 constants", name, text, float(ours[name]), errata, changed)
+        yield PublishedFigure("5.7 constants", name, text, float(ours[name]), errata, changed)
     matrix = source["published"]["section_5_7_matrix_as_printed"]
     sides = [f"k{bar}{key}" for bar in (2, 3, 4) for key in ("x", "y", "_5")]
     entries = list(zip(sides, matrix["rhs"], strict=False))
@@ -148,14 +148,14 @@ def dynamics_constants(k: Kinematics) -> Iterator[Figure]:
         entries += [(f"k{bar}_{n}", text) for n, text in enumerate(matrix[row][:4], 1)]
     for name, text in entries:
         errata, changed = {key: value for key, value in slips.items() if "12" not in value[0]}.get(name, ((), None))
-        yield Figure("5.7 matrix", name, text, float(ours[name]), errata, changed)
+        yield PublishedFigure("5.7 matrix", name, text, float(ours[name]), errata, changed)
     for number, text in enumerate(matrix["rhs"][9:], 10):
-        yield Figure("5.7 matrix", f"right side, row {number}", text, 0.0)
-    yield Figure("5.7 matrix", "T4 in row 9", matrix["row9_bar4"][4], 1.0)
+        yield PublishedFigure("5.7 matrix", f"right side, row {number}", text, 0.0)
+    yield PublishedFigure("5.7 matrix", "T4 in row 9", matrix["row9_bar4"][4], 1.0)
 
 
-def unknowns() -> Iterator[Figure]:
-    """The 13 unknowns, of the program (the manual's table) and of section 5.7."""
+def unknowns() -> Iterator[PublishedFigure]:
+    """List the 13 unknowns, of the program (the manual's table) and of section 5.7."""
     right, steps = right_unknowns(), ladder()
     names = tuple(name for name, _, _ in STEPS if name in "12345" and name)
     for key, label, step, last in (
@@ -164,11 +164,11 @@ def unknowns() -> Iterator[Figure]:
     ):
         noise = round_off(*STEPS[step][1:])  # printed with up to 17 digits
         for name, text in printed()["published"][key].items():
-            yield Figure(label, name, text, right[name], (*names, *last), steps[step][1][name], noise[name])
+            yield PublishedFigure(label, name, text, right[name], (*names, *last), steps[step][1][name], noise[name])
 
 
-def dynamics_figures() -> Iterator[Figure]:
-    """Every printed velocity, acceleration, constant and unknown of the thesis."""
+def dynamics_figures() -> Iterator[PublishedFigure]:
+    """List every published velocity, acceleration, constant and unknown of the thesis."""
     k = Kinematics()
     yield from kinematics(k)
     yield from dynamics_constants(k)

@@ -12,13 +12,13 @@ from collections.abc import Iterator
 import numpy as np
 
 from fourbar.formulas.mobility import limit_positions
-from fourbar_validation.published.figures import Figure
+from fourbar_validation.published.figures import PublishedFigure
 from fourbar_validation.published.program import DATA, LENGTHS, THETA_1, THETA_2, deg, motion, printed, scene, to_ours
 
 d, a, b, c = LENGTHS
 
 
-def positions() -> Iterator[Figure]:
+def positions() -> Iterator[PublishedFigure]:
     """Section 2.4's table: theta_3 and theta_4 of both roots at 281 positions."""
     rows = list(csv.DictReader((DATA / "positions.csv").read_text(encoding="utf-8").splitlines()))
     where = np.radians([float(row["theta2_deg"]) for row in rows])
@@ -31,10 +31,10 @@ def positions() -> Iterator[Figure]:
                 ours += 360.0 * round((float(text) - ours) / 360.0)
                 where_it_is = f"{row['theta2_deg']} {name}"
                 lost = ("6",) if where_it_is == "136 theta3_1" else ()
-                yield Figure("2.4 positions", where_it_is, text, ours, lost, 10.0 * ours if lost else None)
+                yield PublishedFigure("2.4 positions", where_it_is, text, ours, lost, 10.0 * ours if lost else None)
 
 
-def half_angle_constants() -> Iterator[Figure]:
+def half_angle_constants() -> Iterator[PublishedFigure]:
     """Section 2.4 at theta_2 = 90 deg: k1 cos + k2 sin + k3 + e^2 = 0 and A t^2 + B t + C = 0, t = tan(theta/2)."""
     theta_2 = math.radians(90.0)
     x, y = a * math.cos(theta_2) + d * math.cos(THETA_1), a * math.sin(theta_2) + d * math.sin(THETA_1)
@@ -50,21 +50,21 @@ def half_angle_constants() -> Iterator[Figure]:
         ours = {"k1": k1, "k2": k2, "k3": k3, "A": k3 + own**2 - k1, "B": 2.0 * k2, "C": k3 + own**2 + k1}
         ours |= {f"{key}_deg": math.degrees(angle) for key, angle in angles.items()}
         for key, text in printed()["published"]["section_2_4_theta2_90"][name].items():
-            yield Figure("2.4 constants", key if key.startswith("theta") else f"{name} {key}", text, ours[key])
+            yield PublishedFigure("2.4 constants", key if key.startswith("theta") else f"{name} {key}", text, ours[key])
 
 
-def simulation_window() -> Iterator[Figure]:
-    """The manual's window: angles e1..e4 in rad and deg, of theta_2 = 0."""
+def simulation_window() -> Iterator[PublishedFigure]:
+    """List the manual's window: angles e1..e4 in rad and deg, of theta_2 = 0."""
     s = motion(np.array([0.0]))
     theta_3, theta_4 = float(s.theta_3[0]), to_ours(float(s.theta_4[0]))
     ours = {"e1_rad": THETA_1, "e2_rad": 0.0, "e3_rad": theta_3, "e4_rad": theta_4, "teta1_deg": deg(THETA_1)}
     ours |= {"tetaDos_deg": 0.0, "anguloTres_deg": deg(theta_3), "anguloCuatro_deg": deg(theta_4)}
     for name, text in printed()["published"]["manual_simulation_window"].items():
         if name != "note":
-            yield Figure("manual, window", name, text, ours[name], ("17",) if name == "tetaDos_deg" else ())
+            yield PublishedFigure("manual, window", name, text, ours[name], ("17",) if name == "tetaDos_deg" else ())
 
 
-def limits() -> Iterator[Figure]:
+def limits() -> Iterator[PublishedFigure]:
     """Table 3.2: cosines whose existence decides, and the limit positions that do exist."""
     linkage = scene(THETA_2).linkage
     output, dead_centre = (limit_positions(linkage, bar) for bar in (4, 2))
@@ -77,18 +77,18 @@ def limits() -> Iterator[Figure]:
     found = {2: deg(output[-1].theta_2), 4: deg(dead_centre[0].theta_2)}
     for row in json.loads((DATA / "limits.json").read_text(encoding="utf-8"))["table_3_2"]:
         number = row["row"]
-        yield Figure("3.2 limits", f"row {number} cosine", row["discriminant_printed"], cosines[number])
+        yield PublishedFigure("3.2 limits", f"row {number} cosine", row["discriminant_printed"], cosines[number])
         if number == 2:
             made = found[2] - deg(THETA_1)
-            yield Figure("3.2 limits", "row 2 theta_2", row["value_printed_deg"], found[2], ("14",), made)
+            yield PublishedFigure("3.2 limits", "row 2 theta_2", row["value_printed_deg"], found[2], ("14",), made)
         if number == 4:
-            yield Figure("3.2 limits", "row 4 theta_2", row["value_printed_deg"], found[4])
+            yield PublishedFigure("3.2 limits", "row 4 theta_2", row["value_printed_deg"], found[4])
             arc = found[4] - math.degrees(to_ours(THETA_1))
-            yield Figure("3.2 limits", "row 4 arc cosine", row["acos_printed_deg"], arc)
+            yield PublishedFigure("3.2 limits", "row 4 arc cosine", row["acos_printed_deg"], arc)
 
 
-def position_figures() -> Iterator[Figure]:
-    """Every printed angle and limit position of the thesis."""
+def position_figures() -> Iterator[PublishedFigure]:
+    """List every published angle and limit position of the thesis."""
     yield from positions()
     yield from half_angle_constants()
     yield from limits()

@@ -31,7 +31,7 @@ F12, F32, F23, F43, F14, F34, TORQUE = 0, 2, 4, 6, 8, 10, 12
 
 
 def assemble(bodies: FreeBodies, drive_bar: int) -> tuple[Array, Array]:
-    """Matrices (n, 13, 13) and right-hand sides (n, 13)."""
+    """Assemble the matrices (n, 13, 13) and right-hand sides (n, 13)."""
     n = len(bodies.inertia_moment[2])
     matrix, right = np.zeros((n, 13, 13)), np.zeros((n, 13))
     for row, bar, first, second in ((0, 2, F12, F32), (3, 3, F23, F43), (6, 4, F14, F34)):
@@ -48,6 +48,6 @@ def assemble(bodies: FreeBodies, drive_bar: int) -> tuple[Array, Array]:
 
 
 def solve_thirteen(bodies: FreeBodies, drive_bar: int) -> Array:
-    """The thirteen unknowns of each position, (n, 13)."""
+    """Solve for the thirteen unknowns of each position, (n, 13)."""
     matrix, right = assemble(bodies, drive_bar)
     return np.asarray(np.linalg.solve(matrix, right[:, :, None])[:, :, 0])

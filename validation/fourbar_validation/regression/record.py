@@ -6,7 +6,7 @@ import json
 import os
 import shutil
 import subprocess
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from datetime import UTC, datetime
 from itertools import groupby
@@ -18,6 +18,7 @@ from fourbar.writing import naming, write_text
 from fourbar_validation.compare.columns import column_of, read_columns, rows_in
 from fourbar_validation.compare.rows import Row, from_text, plain
 from fourbar_validation.compare.tolerance import SIMULATED, K
+from fourbar_validation.engines.witnesses import Witness
 from fourbar_validation.places import CHECKOUT
 from fourbar_validation.report.machine import kernels, machine, versions
 
@@ -54,10 +55,15 @@ class About:
         return None if names is None else set(filter(None, names.split(", ")))
 
 
-def about(factors: Mapping[str, float], suite: str, scenes: Mapping[str, Mapping[str, str]] | None = None) -> About:
-    """Describe a run made here and now; `factors` are the errors allowed to each engine at condition 1."""
-    simulated = factors.get("mujoco-simulated", SIMULATED.factor)
-    settings = {"engines": ", ".join(factors), "suite": suite, "K": repr(K), "simulated": repr(simulated)}
+def about(witnesses: Sequence[Witness], suite: str, scenes: Mapping[str, Mapping[str, str]] | None = None) -> About:
+    """Describe a run made here and now."""
+    simulated = next((each.tolerance.factor for each in witnesses if each.tolerance.in_time), SIMULATED.factor)
+    settings = {
+        "engines": ", ".join(each.name for each in witnesses),
+        "suite": suite,
+        "K": repr(K),
+        "simulated": repr(simulated),
+    }
     described = {name: dict(entries) for name, entries in (scenes or {}).items()}
     now = datetime.now(UTC).isoformat(timespec="seconds")
     return About(versions() | kernels(), machine(), settings, described, now, _commit())

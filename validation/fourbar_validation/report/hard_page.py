@@ -62,7 +62,7 @@ def approaches() -> list[Approach]:
 def errors(scene: Scene, quantity: str, witness: Witness) -> tuple[Array, Array] | None:
     """(theta_2, error relative to the value itself) of one engine, or None where it refuses."""
     where = command(scene)
-    if witness.name == "mujoco-simulated":
+    if witness.through_time:
         psi = np.abs(where.theta_2 - where.theta_2[0]) - abs(where.theta_2[-1] - where.theta_2[0])
         where = Command(where.theta_2[-psi > SIMULATED_FROM], where.branch[-psi > SIMULATED_FROM], *where[2:4])
     answer: Answer = witness.engine().answer(scene, where)

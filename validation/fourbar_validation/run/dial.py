@@ -5,17 +5,17 @@ the formulas say: how wrong it is against them stays a finding.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 
-from fourbar.errors import InputError
 from fourbar.scene import Command, Scene
-from fourbar_validation.compare.answer import Answer, Engine
+from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.compare import COMPARED, turning
 from fourbar_validation.compare.error import magnitude, relative
-from fourbar_validation.compare.tolerance import SIMULATED, Tolerance
+from fourbar_validation.compare.tolerance import simulated_within
 from fourbar_validation.engines.witnesses import Witness
 
 ROUNDS = 6
@@ -26,31 +26,11 @@ LEAST_GROWTH, MOST_GROWTH = 1.15, 3.0
 """Factor on the steps from one round to the next."""
 
 
-@dataclass(frozen=True, slots=True)
-class DialledWitness(Witness):
-    """The simulated witness at a wanted error, which is what it is held to."""
-
-    def engine(self) -> Engine:
-        """MuJoCo with settings for that error."""
-        return Dialled(self.tolerance.factor)
-
-
-def held_to(error: float, why: str) -> Tolerance:
-    """What runs through time, held to a wanted error."""
-    if not 0.0 < error < 1.0:
-        raise InputError("--error", error, "must be a relative error, above 0 and below 1")
-    return replace(SIMULATED, factor=error, reason=f"{error:g} of the scale, as wanted: {why}")
-
-
 def dialled(witnesses: Sequence[Witness], error: float) -> tuple[Witness, ...]:
-    """The witnesses, with whatever runs through time held to `error` and laid out for it; exact ones stay exact."""
-    own: dict[str, Any] = {"tolerance": held_to(error, "steps and softness are laid out for it"), "order": ""}
-    return tuple(
-        DialledWitness(**{part.name: getattr(each, part.name) for part in fields(Witness)} | own)
-        if each.through_time
-        else each
-        for each in witnesses
-    )
+    """Lay out whatever runs through time for `error`, which it is held to; exact witnesses stay exact."""
+    tolerance = simulated_within(error, "steps and softness are laid out for it")
+    own: dict[str, Any] = {"engine": partial(Dialled, error), "tolerance": tolerance, "order": None}
+    return tuple(replace(each, **own) if each.through_time else each for each in witnesses)
 
 
 @dataclass(slots=True)
@@ -61,7 +41,7 @@ class Dialled:
     name: str = "mujoco-simulated"
 
     def answer(self, scene: Scene, command: Command) -> Answer:
-        """Simulated with as many steps as the laws ask for, and more while its own residuals say so."""
+        """Simulate with as many steps as the laws ask for, and more while its own residuals say so."""
         from fourbar_validation.engines.mujoco.simulate import MujocoSimulated
         from fourbar_validation.engines.mujoco.trial import LONGEST, ORDER, dialled, guess
 
@@ -91,12 +71,12 @@ class Dialled:
 
 
 def steps_per_revolution(answer: Answer) -> float:
-    """Of what was simulated: "RK4 628/rev"."""
+    """Read from what was simulated: "RK4 628/rev"."""
     return float(answer.setting.rpartition(" ")[2].removesuffix("/rev"))
 
 
 def expected_error(scene: Scene, answer: Answer) -> float:
-    """The worst error of any quantity that the engine predicts, relative to its largest magnitude (angles: 1 rad)."""
+    """Compute the worst error that the engine predicts, relative to a quantity's largest magnitude (angles: 1 rad)."""
     worst = 0.0
     for name, predicted in answer.predicted.items():
         if name not in COMPARED:

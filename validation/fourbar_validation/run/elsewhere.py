@@ -40,7 +40,7 @@ def ended(
     seconds: float | None = None,
     variables: Mapping[str, str] | None = None,
 ) -> Ended:
-    """A command run to its end, with these variables added to the environment."""
+    """Run a command to its end, with these variables added to the environment."""
     line, environment = [str(part) for part in command], {**os.environ, **(variables or {})}
     try:
         done = subprocess.run(
@@ -60,7 +60,7 @@ def ended(
 
 
 def of_the_harness(line: Sequence[object], *, variables: Mapping[str, str] | None = None, **how: Any) -> Ended:
-    """`ended` for an interpreter that is to find this code, wherever it lies; for `how` see there."""
+    """Run an interpreter that is to find this code, wherever it lies; for `how` see `ended`."""
     with import_path() as path:
         return ended(line, variables={**(variables or {}), "PYTHONPATH": path}, **how)
 

@@ -6,36 +6,48 @@ the difference is what the coarser motion errs by. The finer one must not err by
 
 import math
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import replace
-from pkgutil import resolve_name
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from fourbar.effects import Gravity
-from fourbar.linkage import MOVING_BARS
+from fourbar.effects import Friction, Gravity, Load
+from fourbar.linkage import MOVING_BARS, PINS
 from fourbar.quantities import UNKNOWNS
 from fourbar.scene import Command, Scene
 from fourbar.solution import Solution
-from fourbar.solve import solve
 from fourbar_validation.compare.answer import Array, Released
 from fourbar_validation.compare.basis import basis_of
 from fourbar_validation.compare.compare import compare
 from fourbar_validation.compare.error import in_own_unit, relative, worst
 from fourbar_validation.compare.identities import FORMULAS
-from fourbar_validation.compare.rows import AGREES, DEGRADED, FAILS, REFUSES, UNDECIDED, Row, breakdown
+from fourbar_validation.compare.rows import AGREES, DEGRADED, FAILS, REFUSES, UNDECIDED, Row
 from fourbar_validation.compare.tolerance import DEGRADED as TIMES_PREDICTED
 from fourbar_validation.compare.tolerance import EQUIVALENCE
-from fourbar_validation.engines.output import kept
-from fourbar_validation.engines.witnesses import WITNESSES, Witness, not_installed, predicting_from
-from fourbar_validation.report.record import Record, Timing
+from fourbar_validation.engines.free_body import FreeBody
+from fourbar_validation.engines.witnesses import Witness, not_installed, predicting_from
+from fourbar_validation.report.record import Timing
+from fourbar_validation.run.question import Question, select_positions
+from fourbar_validation.run.shipped.variants import member, worst_rows
 
-ENGINES = {
-    "mujoco-forward": ("fourbar_validation.engines.mujoco.released:MujocoForward", 1e-3, "mujoco"),
-    "pinocchio-forward": ("fourbar_validation.engines.pinocchio_forward:PinocchioReleased", 2e-3, "pinocchio"),
-}
-"""Adapter, longest step (s) and library of each engine that integrates by itself."""
+
+def _mujoco(step: float) -> Any:
+    from fourbar_validation.engines.mujoco.released import MujocoForward
+
+    return MujocoForward(step)
+
+
+def _pinocchio(step: float) -> Any:
+    from fourbar_validation.engines.pinocchio_forward import PinocchioReleased
+
+    return PinocchioReleased(step)
+
+
+ENGINES = {"mujoco-forward": (_mujoco, 1e-3, "mujoco"), "pinocchio-forward": (_pinocchio, 2e-3, "pinocchio")}
+"""What starts it with a step, longest step (s) and library of each engine that integrates by itself."""
 FULL = {"theta_2": 1e-9, "omega_2": 1e-8, "energy": 1e-10, "stopped_at": 1e-9}
 """Errors (rad, of the greatest speed, of the greatest energies, of the duration) at which a free motion agrees: the
 formulas hold theta_2 to 1e-9 rad over 5 s; a motion of 100 s may amplify that by its duration, so 5 s is the unit."""
@@ -51,7 +63,7 @@ class Pendulum(NamedTuple):
     omega_0: float
 
     def motion(self, times: Array) -> tuple[Array, Array]:
-        """phi and phi' (rad, rad/s) of a pendulum that turns over, by Jacobi's elliptic functions."""
+        """Compute phi and phi' (rad, rad/s) of a pendulum that turns over, by Jacobi's elliptic functions."""
         from scipy.special import ellipj, ellipk, ellipkinc
 
         k, sense = self.W / self.J, math.copysign(1.0, self.omega_0)
@@ -66,7 +78,7 @@ class Pendulum(NamedTuple):
 
 
 def as_pendulum(scene: Scene) -> Pendulum | None:
-    """The pendulum that the scene is, or None; it must turn over, or none of this is an answer."""
+    """Give the pendulum that the scene is, or None; it must turn over, or none of this is an answer."""
     d, a, b, c = scene.linkage.lengths
     effects = scene.effects
     if not (a == c and b == d and scene.motion.through == "follow" and not scene.loads and len(effects) == 1):
@@ -88,88 +100,123 @@ def as_pendulum(scene: Scene) -> Pendulum | None:
     return pendulum if over_the_top else None
 
 
-def judge_released(record: Record, witnesses: Sequence[Witness] = WITNESSES) -> Record:
-    """Rows of the formulas and of every forward engine for a scene with a free motion.
+def check_released(question: Question) -> Iterator[Row]:
+    """Compare every forward engine's free motion with that of the formulas, and the forces of each instant.
 
     The motion of the formulas ends where bars 3 and 4 come to lie in one line, unless it follows the path through;
     an engine moves on. Both are compared as long as both are there, and the instant itself is compared too.
     """
-    assert record.scene is not None and record.scene.motion.free is not None
-    free = record.scene.motion.free
+    name, scene, solution = question.name, question.scene, question.solution
+    free = scene.motion.free
+    assert free is not None and solution.omega_2 is not None
     times = np.linspace(0.0, free.duration, free.steps + 1)
-    begin = time.perf_counter()
-    solution = solve(record.scene)
-    record.timings.append(Timing(record.name, "formulas", "exact", len(solution), time.perf_counter() - begin))
-    record.solution = solution
-    assert solution.omega_2 is not None
-    record.rows += _forces(record.name, record.scene, solution, witnesses, record.output)
-    pendulum = as_pendulum(record.scene)
+    yield from _forces(question)
+    pendulum = as_pendulum(scene)
     truth = _Truth(solution.theta_2, solution.omega_2, solution.stopped_at)
     if pendulum is not None:
         phi, rate = pendulum.motion(times)
         truth = _Truth(phi + math.pi / 2, rate)
         none = np.zeros(len(solution))
         ours = Released("formulas", "exact", solution.theta_2, solution.omega_2, none, none)
-        record.rows += _rows(record, ours, None, truth)
-    for name, (adapter, longest, library) in ENGINES.items():
-        if reason := not_installed(library):
-            record.left_out.append(f"{name}: {reason}")
-            continue
-        try:
-            engine: Callable[[float], Any] = resolve_name(adapter)
-            pairs = math.ceil(free.duration / free.steps / (2.0 * longest) - 1e-6)
-            step = free.duration / free.steps / (2.0 * pairs)  # two of them, or more, from one instant to the next
-            begin = time.perf_counter()
-            fine = engine(step).release(record.scene, times)
-            seconds = time.perf_counter() - begin
-            coarse = None if fine.refusal else engine(2.0 * step).release(record.scene, times)
-        except Exception as error:  # whatever an engine raises is its own failure, in its own row
-            record.rows.append(breakdown(record.name, name, error))
-            continue
-        record.timings.append(Timing(record.name, fine.engine, fine.setting, len(times), seconds))
+        yield from _rows(question, ours, None, truth)
+
+    def rows(engine: Callable[[float], Any], longest: float) -> list[Row]:
+        pairs = math.ceil(free.duration / free.steps / (2.0 * longest) - 1e-6)
+        step = free.duration / free.steps / (2.0 * pairs)  # two of them, or more, from one instant to the next
+        begin = time.perf_counter()
+        fine = engine(step).release(scene, times)
+        seconds = time.perf_counter() - begin
+        coarse = None if fine.refusal else engine(2.0 * step).release(scene, times)
+        question.timings.append(Timing(name, fine.engine, fine.setting, len(times), seconds))
         if fine.refusal is not None:
-            record.left_out.append(f"{fine.engine}: {fine.refusal}")
-        record.rows += _rows(record, fine, coarse, truth)
-    return record
+            question.left_out.append(f"{fine.engine}: {fine.refusal}")
+        return _rows(question, fine, coarse, truth)
+
+    for engine, (start, longest, library) in ENGINES.items():
+        if reason := not_installed(library):
+            question.left_out.append(f"{engine}: {reason}")
+        else:
+            yield from question.attempt(partial(rows, start, longest), engine)
 
 
-def _forces(
-    name: str, scene: Scene, solution: Solution, witnesses: Sequence[Witness], output: dict[str, str]
-) -> Iterator[Row]:
-    """Motion, pin forces and the torque, which is none, of every instant, by the engines that answer one by one.
+def _forces(question: Question) -> Iterator[Row]:
+    """Compare motion, pin forces and the torque, which is none, of every instant, by engines that answer one by one.
 
     They are given theta_2, omega_2 and alpha_2; that these balance without a torque is the equation of motion.
     """
+    name, scene, solution = question.name, question.scene, question.solution
     assert solution.omega_2 is not None and solution.alpha_2 is not None and solution.torque is not None
-    held = replace(scene, motion=replace(scene.motion, free=None, alpha_2=0.0), drive_bar=2)
-    at = Command(solution.theta_2, solution.branch, solution.omega_2, solution.alpha_2)
     driven = worst(np.abs(solution.torque))
     torque = float(np.abs(solution.torque[driven]))
     what = "a released linkage has no drive"
     place = float(solution.theta_2[driven])
     yield Row(name, FORMULAS, "exact", "torque", torque, 0.0, FAILS if torque else AGREES, what, place, 1.0)
-    for witness in witnesses:
-        if witness.tolerance != EQUIVALENCE or "theta_3" not in witness.expected or witness.missing():
-            continue
-        try:
-            with kept(output, witness.name):
-                answer = witness.engine().answer(held, at)
-        except Exception as error:  # whatever an engine raises is its own failure, in its own row
-            yield breakdown(name, witness.name, error, "forces")
-            continue
-        if answer.refusal is not None:
-            yield Row.unmeasured(name, answer.engine, answer.setting, "all", REFUSES, answer.refusal)
-            continue
-        basis = basis_of(held, answer)
-        assert basis is not None
-        # the formulas are conditioned by the angle that is independent there, an engine by theta_2
-        conditioned = replace(solution, condition=basis.condition, drive_condition=basis.drive_condition)
-        conditioned.drive_bar = 2
-        names = [q for q in UNKNOWNS if q in witness.expected]
-        # nor are theta_2, omega_2 and alpha_2 more than that angle's, rounded: what that costs there is computed
-        predicted = predicting_from(witness, held, at, answer)
-        rows = compare(name, held, answer, conditioned, witness.tolerance, names, predicted, basis)
-        yield from (row for row in rows if row.quantity != "undecided")
+    held = replace(scene, motion=replace(scene.motion, free=None, alpha_2=0.0), drive_bar=2)
+    at = Command(solution.theta_2, solution.branch, solution.omega_2, solution.alpha_2)
+    driven_ones = [
+        (Question(name, own, select_positions(at, where), output=question.output), member(solution, where))
+        for own, where in _prescribed(held, at)
+    ]
+    for witness in question.witnesses:
+        if witness.tolerance == EQUIVALENCE and "theta_3" in witness.expected and not witness.missing():
+            rows = partial(_worst_forces_by, witness, driven_ones)
+            yield from question.attempt(rows, witness.name, "forces")
+
+
+def _worst_forces_by(witness: Witness, driven: list[tuple[Question, Solution]]) -> list[Row]:
+    """Compare what one engine answers to each part of the motion, and keep the worst row of each quantity."""
+    return worst_rows(row for own, solution in driven for row in _forces_by(witness, own, solution))
+
+
+def _forces_by(witness: Witness, driven: Question, solution: Solution) -> list[Row]:
+    """Compare what one engine answers to the motion as a prescribed one."""
+    answer, scene = driven.answer(witness), driven.scene
+    if answer.refusal is not None:
+        return [Row.unmeasured(driven.name, answer.engine, answer.setting, "all", REFUSES, answer.refusal)]
+    basis = basis_of(scene, answer)
+    assert basis is not None
+    # the formulas are conditioned by the angle that is independent there, an engine by theta_2
+    conditioned = replace(solution, condition=basis.condition, drive_condition=basis.drive_condition)
+    conditioned.drive_bar = 2
+    names = [q for q in UNKNOWNS if q in witness.expected]
+    # nor are theta_2, omega_2 and alpha_2 more than that angle's, rounded: what that costs there is computed
+    predicted = predicting_from(witness, scene, driven.at, answer)
+    rows = compare(driven.name, scene, answer, conditioned, witness.tolerance, names, predicted, basis)
+    return [row for row in rows if row.quantity != "undecided"]
+
+
+def _prescribed(scene: Scene, at: Command) -> Iterator[tuple[Scene, NDArray[np.intp]]]:
+    """Prescribe the instants at which the linkage moves, and each standstill with the couples of dry friction there.
+
+    An engine has no friction at rest. A standstill that lasts is held: every pin takes the same part of its torque, and
+    no more than all of it; one that ends begins to move against the whole torque.
+    """
+    assert at.omega_2 is not None
+    friction = next((effect for effect in scene.effects if isinstance(effect, Friction)), None)
+    resting = np.flatnonzero(at.omega_2 == 0.0) if friction is not None else np.empty(0, dtype=int)
+    moving = np.setdiff1d(np.arange(len(at.theta_2)), resting)
+    if len(moving):
+        yield scene, moving
+    if friction is None:
+        return
+    bare = replace(scene, effects=tuple(effect for effect in scene.effects if effect is not friction))
+    numbers = np.stack((at.theta_2, at.alpha_2), axis=1)[resting]
+    for first in resting[np.unique(numbers, axis=0, return_index=True)[1]].tolist():
+        where = np.array([first])
+        here = select_positions(at, where)
+        needed, begins = FreeBody().answer(bare, here).quantities["torque"][0], float(np.sign(here.alpha_2)[0])
+        turning = FreeBody().answer(bare, here._replace(omega_2=np.ones(1))).quantities
+        rate = {1: 0.0, 2: 1.0, 3: turning["omega_3"][0], 4: turning["omega_4"][0]}
+        slips = {pin: rate[PINS[pin][1]] - rate[PINS[pin][0]] for pin, _ in friction.torques}
+        most = sum(torque * abs(slips[pin]) for pin, torque in friction.torques)
+        part = -begins or float(np.clip(needed / most, -1.0, 1.0))
+        loads = [
+            Load(bar, moment=sense * part * torque * float(np.sign(slips[pin])))
+            for pin, torque in friction.torques
+            for bar, sense in zip(PINS[pin], (-1.0, 1.0), strict=True)
+            if bar != 1
+        ]
+        yield replace(bare, loads=(*scene.loads, *loads)), where
 
 
 class _Truth(NamedTuple):
@@ -180,10 +227,10 @@ class _Truth(NamedTuple):
     stopped_at: float | None = None
 
 
-def _rows(record: Record, fine: Released, coarse: Released | None, truth: _Truth) -> list[Row]:
-    assert record.scene is not None and record.scene.motion.free is not None
-    free, through, n = record.scene.motion.free, record.scene.motion.through, len(truth.theta_2)
-    who = (record.name, fine.engine, fine.setting)
+def _rows(question: Question, fine: Released, coarse: Released | None, truth: _Truth) -> list[Row]:
+    free, through, n = question.scene.motion.free, question.scene.motion.through, len(truth.theta_2)
+    assert free is not None
+    who = (question.name, fine.engine, fine.setting)
     if fine.refusal is not None:
         return [Row.unmeasured(*who, "all", REFUSES, fine.refusal)]
     if len(fine.theta_2) < n:
@@ -228,5 +275,5 @@ def _rows(record: Record, fine: Released, coarse: Released | None, truth: _Truth
 
 
 def _end(stopped_at: float | None, duration: float) -> Array:
-    """When a motion reached its limit, or the stated end, as a part of that duration, (1,)."""
+    """Give when a motion reached its limit, or the stated end, as a part of that duration, (1,)."""
     return np.array([1.0 if stopped_at is None else stopped_at / duration])

@@ -7,14 +7,14 @@ from fourbar.errors import DependencyError, InputError
 from fourbar_validation.engines import added
 from fourbar_validation.engines.hard_suite import HARD_WITNESSES, Hard, predicting
 from fourbar_validation.engines.witnesses import FURTHER, WITNESSES, Witness
-from fourbar_validation.scenes.random import UNEVEN_TYPE, LinkageType
+from fourbar_validation.scenes.random import UNEVEN_TYPE, DrawnType
 from fourbar_validation.scenes.suites import Random, Suite, model_files, scene_files, suite_file
 
 
 def selected(
     scenes: tuple[Path, ...], named: str | None, count: int | None, seed: int, types: str, adapters: Sequence[str] = ()
 ) -> tuple[Suite, tuple[Witness, ...]]:
-    """The scenes wanted, and the witnesses with what they are held to there."""
+    """Select the scenes, and the witnesses with what they are held to there."""
     if named == "hard":
         own = (*HARD_WITNESSES, *map(predicting, FURTHER))
         return Hard(), (*own, *map(predicting, _added(adapters, own)))
@@ -28,7 +28,7 @@ def selected(
 
 
 def _added(adapters: Sequence[str], own: tuple[Witness, ...]) -> tuple[Witness, ...]:
-    """The witnesses of the command line (`adapters`, "module:Class"), and those that installed packages bring."""
+    """Find the witnesses of the command line (`adapters`, "module:Class"), and those that installed packages bring."""
     known = [witness.name for witness in own]
     here = added.named(adapters, known)
     return (*here, *added.installed([*known, *(witness.name for witness in here)]))
@@ -37,7 +37,7 @@ def _added(adapters: Sequence[str], own: tuple[Witness, ...]) -> tuple[Witness, 
 def chosen(
     engines: str | None, witnesses: tuple[Witness, ...] = WITNESSES, adapters: Sequence[str] = ()
 ) -> tuple[Witness, ...]:
-    """The witnesses named in a comma-separated list, and those of `adapters`, which are named by being given.
+    """Choose the witnesses named in a comma-separated list, and those of `adapters`, which are named by being given.
 
     Where there is no list, all but those that need not be installed.
     """
@@ -49,23 +49,25 @@ def chosen(
     for name in names or [engines]:
         if name not in known:
             raise InputError("--engines", name, "must be among " + ", ".join(known))
-    return tuple(witness for name, witness in known.items() if name in names or witness.adapter in adapters)
+    return tuple(
+        witness for name, witness in known.items() if name in names or getattr(witness, "adapter", None) in adapters
+    )
 
 
 def askable(witnesses: tuple[Witness, ...], *, by_name: bool) -> tuple[tuple[Witness, ...], list[tuple[str, str]]]:
-    """Those that can answer here, and the others with the reason; DependencyError where those were named."""
+    """Find those that can answer here, and the others with the reason; DependencyError where those were named."""
     missing = [(witness.name, reason) for witness in witnesses if (reason := witness.missing())]
     if missing and by_name:
         raise DependencyError("; ".join(f"{name}: {reason}" for name, reason in missing))
     return tuple(witness for witness in witnesses if not witness.missing()), missing
 
 
-def linkage_types(text: str) -> tuple[LinkageType, ...]:
-    """The types named in a comma-separated list; none for uneven linkages."""
+def linkage_types(text: str) -> tuple[DrawnType, ...]:
+    """Read the types named in a comma-separated list; none for uneven linkages."""
     if text == UNEVEN_TYPE:
         return ()
     try:
-        return tuple(LinkageType(name.strip()) for name in text.split(","))
+        return tuple(DrawnType(name.strip()) for name in text.split(","))
     except ValueError:
-        allowed = ", ".join(kind.value for kind in LinkageType)
+        allowed = ", ".join(kind.value for kind in DrawnType)
         raise InputError("--type", text, f"must be {UNEVEN_TYPE} or a comma-separated list of {allowed}") from None

@@ -23,11 +23,11 @@ from fourbar_validation.scenes.hard_linkages import (
     parallel_2_4,
     with_bars,
 )
-from fourbar_validation.scenes.random import LinkageType
+from fourbar_validation.scenes.random import DrawnType
 
 Scenes = Iterator[tuple[str, Scene]]
-ROCKERS = (LinkageType.DOUBLE_ROCKER, LinkageType.TRIPLE_ROCKER)
-CRANK, ROCKER = LinkageType.CRANK_ROCKER, LinkageType.TRIPLE_ROCKER
+ROCKERS = (DrawnType.DOUBLE_ROCKER, DrawnType.TRIPLE_ROCKER)
+CRANK, ROCKER = DrawnType.CRANK_ROCKER, DrawnType.TRIPLE_ROCKER
 REGULAR = (0.5, 0.4, 0.3)
 """rad from the singular position: positions that set the scale of each quantity."""
 TOGGLE = tuple(10.0**-k for k in range(1, 13))
@@ -40,7 +40,7 @@ CHANGE = tuple(10.0**-k for k in range(1, 9))
 
 
 def toggle(*, distances: tuple[float, ...] = TOGGLE, seeds: range = range(2)) -> Scenes:
-    """Bars 3, 4 collinear, approached from inside, and the same distances beyond it."""
+    """Approach bars 3, 4 in line from inside, and the same distances beyond it."""
     for kind in ROCKERS:
         for seed in seeds:
             lengths = linkage_of(kind, seed)
@@ -54,7 +54,7 @@ def toggle(*, distances: tuple[float, ...] = TOGGLE, seeds: range = range(2)) ->
 
 
 def poles(*, bar: int, distances: tuple[float, ...] = POLE, seeds: range = range(2)) -> Scenes:
-    """The position where the driven bar 3 or 4 stands still, from both sides."""
+    """Approach the position where the driven bar 3 or 4 stands still, from both sides."""
     offsets = np.array([*(-x for x in (*REGULAR, *distances)), *distances[::-1], *REGULAR[::-1]])
     for seed in seeds:
         lengths = linkage_of(CRANK, seed)
@@ -91,7 +91,7 @@ def change_point(*, distances: tuple[float, ...] = CHANGE) -> Scenes:
 
 
 def through_change_point(*, steps: int = 73) -> Scenes:
-    """A sweep through the change points, once by the sign of the branch and once along the smooth path."""
+    """Sweep through the change points, once by the sign of the branch and once along the smooth path."""
     for kind, (lengths, branch, _) in CHANGE_POINTS.items():
         for through in ("sign", "follow"):
             scene = dressed(lengths)
@@ -101,7 +101,7 @@ def through_change_point(*, steps: int = 73) -> Scenes:
 
 
 def near_grashof(*, gaps: tuple[float, ...] = (1e-3, 1e-6, 1e-9, 1e-12), steps: int = 60) -> Scenes:
-    """s + l short of p + q, or beyond it, by a hair: the sweep passes close to where it would change."""
+    """Miss s + l = p + q by a hair on either side: the sweep passes close to where it would change."""
     for gap in gaps:
         for sign in (1.0, -1.0):
             d, a, b = 0.4, 0.1, 0.25
@@ -111,18 +111,18 @@ def near_grashof(*, gaps: tuple[float, ...] = (1e-3, 1e-6, 1e-9, 1e-12), steps: 
 
 
 def sweep_of(scene: Scene, steps: int = 36) -> Scene:
-    """One turn of the input."""
+    """Sweep through one turn of the input."""
     return replace(scene, motion=replace(scene.motion, theta_2=Sweep(0.1, 0.1 + 2 * math.pi, steps), alpha_2=0.0))
 
 
 def bar_ratio(*, exponents: range = range(-6, 0)) -> Scenes:
-    """A crank that is ever shorter against the coupler."""
+    """Shorten the crank against the coupler, again and again."""
     for k in exponents:
         yield f"1e{k}", sweep_of(dressed((0.3, 0.25 * 10.0**k, 0.25, 0.22)))
 
 
 def mass_ratio(*, exponents: tuple[int, ...] = (-6, -3, 3, 6)) -> Scenes:
-    """One bar heavier or lighter than the others by up to 1e6."""
+    """Make one bar heavier or lighter than the others by up to 1e6."""
     base = sweep_of(dressed(PLAIN))
     for name, bar in moving(base):
         for k in exponents:
@@ -131,7 +131,7 @@ def mass_ratio(*, exponents: tuple[int, ...] = (-6, -3, 3, 6)) -> Scenes:
 
 
 def without_inertia() -> Scenes:
-    """Bars without rotational inertia, without mass, and loads alone on massless bars."""
+    """Take bars without rotational inertia, without mass, and loads only on massless bars."""
     base = sweep_of(dressed(PLAIN))
     for name, bar in moving(base):
         yield f"{name} point mass", with_bars(base, **{name: replace(bar, inertia=0.0)})
@@ -140,7 +140,7 @@ def without_inertia() -> Scenes:
 
 
 def far_centres(*, times: tuple[float, ...] = (3.0, 100.0, 1e4)) -> Scenes:
-    """Centres of mass far outside the bar."""
+    """Put mass centres far outside the bar."""
     base = sweep_of(dressed(PLAIN))
     for name, bar in moving(base):
         for k in times:
@@ -148,7 +148,7 @@ def far_centres(*, times: tuple[float, ...] = (3.0, 100.0, 1e4)) -> Scenes:
 
 
 def sizes(*, exponents: range = range(-6, 7, 2)) -> Scenes:
-    """The same shape from micrometres to a thousand kilometres."""
+    """Scale the same shape from micrometres to a thousand kilometres."""
     for k in exponents:
         yield f"1e{k:+d} m", sweep_of(dressed(tuple(x * 10.0**k for x in PLAIN)))  # type: ignore[arg-type]
 
@@ -162,7 +162,7 @@ def speeds(*, exponents: tuple[int, ...] = (-6, -3, 0, 3, 6)) -> Scenes:
 
 
 def loads(*, exponents: tuple[int, ...] = (-9, -3, 3, 9)) -> Scenes:
-    """Loads from 1e-9 to 1e9 of the weights."""
+    """Load from 1e-9 to 1e9 of the weights."""
     base = sweep_of(dressed(PLAIN))
     for k in exponents:
         scaled = []
@@ -173,7 +173,7 @@ def loads(*, exponents: tuple[int, ...] = (-9, -3, 3, 9)) -> Scenes:
 
 
 def out_and_back(*, beyond: float = 0.5, steps: int = 40, seeds: range = range(2)) -> Scenes:
-    """A sweep that leaves the range in which the linkage assembles, and comes back."""
+    """Sweep out of the range in which the linkage assembles, and back."""
     for seed in seeds:
         lengths = linkage_of(ROCKER, seed)
         (psi, stretched), *_ = collinear_3_4(lengths)
@@ -184,7 +184,7 @@ def out_and_back(*, beyond: float = 0.5, steps: int = 40, seeds: range = range(2
 
 
 def thesis_limits(*, steps: int = 120) -> Scenes:
-    """The thesis's double rocker (bars 20, 48, 55, 20 cm) driven from one limit position to the other."""
+    """Drive the thesis's double rocker (bars 20, 48, 55, 20 cm) from one limit position to the other."""
     bars = (Bar(0.48, 57.0, 11.119275, (0.765, 0.0)), Bar(0.55, 0.544), Bar(0.20, 0.2))
     linkage = FourBar(0.20, *bars, math.radians(45.0))
     (psi, _), *_ = collinear_3_4(linkage.lengths)

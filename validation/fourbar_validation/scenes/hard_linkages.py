@@ -9,7 +9,7 @@ from fourbar.effects import Gravity, Load
 from fourbar.linkage import BAR_NAMES, MOVING_BARS, Bar, FourBar
 from fourbar.scene import Scene
 from fourbar.scene.motion import Motion
-from fourbar_validation.scenes.random import LinkageType, Ranges, random_bars, random_lengths, uniform
+from fourbar_validation.scenes.random import DrawnType, Ranges, random_bars, random_lengths, uniform
 
 Lengths = tuple[float, float, float, float]
 """(ground, input, coupler, output), m."""
@@ -21,13 +21,13 @@ BARS = Ranges(
 )
 
 
-def linkage_of(kind: LinkageType, seed: int) -> Lengths:
+def linkage_of(kind: DrawnType, seed: int) -> Lengths:
     """Random lengths of a type, from its seed alone."""
-    return random_lengths(np.random.default_rng([seed, list(LinkageType).index(kind)]), kind)
+    return random_lengths(np.random.default_rng([seed, list(DrawnType).index(kind)]), kind)
 
 
 def dressed(lengths: Lengths, seed: int = 0) -> Scene:
-    """A scene on these lengths: offset mass centres, gravity, a force and a couple; omega_2 = 3 rad/s, alpha_2 = 2."""
+    """Make a scene on these lengths: offset mass centres, gravity, a force, a couple; 3 rad/s, 2 rad/s^2."""
     rng = np.random.default_rng([seed, 4])
     d, *moving = lengths
     bars = random_bars(rng, moving, BARS)
@@ -41,30 +41,30 @@ def dressed(lengths: Lengths, seed: int = 0) -> Scene:
 
 
 def at(scene: Scene, psi: object, branch: int = 1, **changes: object) -> Scene:
-    """The scene at angles psi = theta_2 - theta_1 (rad) on a branch."""
+    """Set the scene to angles psi = theta_2 - theta_1 (rad) on a branch."""
     theta_2 = scene.linkage.ground_angle + np.atleast_1d(np.asarray(psi, dtype=float))
     motion = replace(scene.motion, theta_2=theta_2, branch=branch)
     return replace(scene, motion=motion, **changes)  # type: ignore[arg-type]
 
 
 def moving(scene: Scene) -> list[tuple[str, Bar]]:
-    """The moving bars by their names."""
+    """Return the moving bars by their names."""
     return [(BAR_NAMES[number], scene.linkage.bar(number)) for number in MOVING_BARS]
 
 
 def with_bars(scene: Scene, **bars: Bar) -> Scene:
-    """The scene with other bars."""
+    """Give the scene other bars."""
     return replace(scene, linkage=replace(scene.linkage, **bars))  # type: ignore[arg-type]
 
 
 def _corners(one: float, other: float, opposite: float) -> list[float]:
-    """The angles, of either sign, between two sides of a triangle, by its third side; none where it does not close."""
+    """Compute the angles, of either sign, between two sides of a triangle by its third side, if it closes."""
     cosine = (one * one + other * other - opposite * opposite) / (2 * one * other) if other else 2.0
     return [math.acos(cosine), -math.acos(cosine)] if abs(cosine) < 1.0 else []
 
 
 def collinear_3_4(lengths: Lengths) -> list[tuple[float, bool]]:
-    """psi in (0, pi) where bars 3, 4 are stretched (True) or folded: a^2 + d^2 - 2 a d cos psi = (b +- c)^2."""
+    """Find psi in (0, pi) with bars 3, 4 stretched (True) or folded: a^2 + d^2 - 2 a d cos psi = (b +- c)^2."""
     d, a, b, c = lengths
     return [
         (psi, stretched) for joined, stretched in ((b + c, True), (b - c, False)) for psi in _corners(d, a, joined)[:1]
@@ -94,5 +94,5 @@ def parallel_2_4(lengths: Lengths) -> list[tuple[float, int]]:
 
 
 def _side(one: complex, other: complex) -> int:
-    """The sign of the turn from one direction to another."""
+    """Return the sign of the rotation from one direction to another."""
     return 1 if (one.conjugate() * other).imag > 0.0 else -1

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from fourbar.effects import Flywheel, Friction, Gravity, Load, Point, Spring, Springs, Torsion, Viscous
+from fourbar.effects import Flywheel, Friction, Gravity, Load, Spring, SpringEnd, Springs, Torsion, Viscous
 from fourbar.formulas.mobility import default_range
 from fourbar.linkage import MOVING_BARS, PINS, Bar, FourBar
 from fourbar.scene import Scene
@@ -34,7 +34,7 @@ def sometimes(share: float, draw: Draw, otherwise: float = 0.0) -> Draw:
 
 
 def product(*draws: Draw) -> Draw:
-    """Of several draws."""
+    """Draw the product of several draws."""
     return lambda rng: math.prod(draw(rng) for draw in draws)
 
 
@@ -74,7 +74,7 @@ class Ranges:
     """Whether the mass is per metre."""
 
 
-class LinkageType(Enum):
+class DrawnType(Enum):
     """What the input and output of a linkage do."""
 
     CRANK_ROCKER = "crank-rocker"
@@ -85,10 +85,10 @@ class LinkageType(Enum):
 
 
 SHORTEST = {
-    LinkageType.DRAG_LINK: 0,
-    LinkageType.CRANK_ROCKER: 1,
-    LinkageType.DOUBLE_ROCKER: 2,
-    LinkageType.ROCKER_CRANK: 3,
+    DrawnType.DRAG_LINK: 0,
+    DrawnType.CRANK_ROCKER: 1,
+    DrawnType.DOUBLE_ROCKER: 2,
+    DrawnType.ROCKER_CRANK: 3,
 }
 """Which of (ground, input, coupler, output) is the shortest bar of a Grashof linkage of that type."""
 UNEVEN_TYPE = "uneven"
@@ -98,7 +98,7 @@ CLEARANCE = 0.02
 """A random linkage keeps this part of its longest bar away from the change-point equality s + l = p + q."""
 
 
-def random_lengths(rng: np.random.Generator, kind: LinkageType) -> tuple[float, float, float, float]:
+def random_lengths(rng: np.random.Generator, kind: DrawnType) -> tuple[float, float, float, float]:
     """(ground, input, coupler, output) of the given type, longest bar 1, away from change points."""
     while True:
         lengths = np.sort(rng.uniform(0.1, 1.0, 4))
@@ -107,7 +107,7 @@ def random_lengths(rng: np.random.Generator, kind: LinkageType) -> tuple[float, 
         surplus = p + q - shortest - longest
         if p + q + shortest - longest < CLEARANCE:
             continue
-        if kind is LinkageType.TRIPLE_ROCKER:
+        if kind is DrawnType.TRIPLE_ROCKER:
             if surplus < -CLEARANCE:
                 return tuple(float(x) for x in rng.permutation(lengths))  # type: ignore[return-value]
         elif surplus > CLEARANCE:
@@ -117,7 +117,7 @@ def random_lengths(rng: np.random.Generator, kind: LinkageType) -> tuple[float, 
 
 
 def random_bars(rng: np.random.Generator, lengths: Sequence[float], ranges: Ranges) -> list[Bar]:
-    """Bars 2, 3, 4 of these lengths (m)."""
+    """Draw bars 2, 3, 4 of these lengths (m)."""
     bars = []
     for length in lengths:
         mass = ranges.mass(rng) * (length if ranges.by_length else 1.0)
@@ -127,7 +127,7 @@ def random_bars(rng: np.random.Generator, lengths: Sequence[float], ranges: Rang
 
 
 def drawn(rng: np.random.Generator, lengths: Sequence[float], ranges: Ranges) -> Scene:
-    """A scene on (ground, input, coupler, output), m, at theta_2 = 0."""
+    """Draw a scene on (ground, input, coupler, output), m, at theta_2 = 0."""
     d, *moving = (float(length) for length in lengths)
     bars = random_bars(rng, moving, ranges)
     linkage = FourBar(d, bars[0], bars[1], bars[2], ranges.ground_angle(rng))
@@ -146,7 +146,7 @@ def drawn(rng: np.random.Generator, lengths: Sequence[float], ranges: Ranges) ->
 
 
 def _load(rng: np.random.Generator, linkage: FourBar, weight: float, ranges: Ranges) -> Load:
-    """A force and a moment, or one of them, on any bar."""
+    """Draw a force and a moment, or one of them, on any bar."""
     bar = int(rng.choice(MOVING_BARS))
     length, size = linkage.bar(bar).length, weight * ranges.load(rng)
     force = None if rng.random() < ranges.without_force else (size, ANY_ANGLE(rng))
@@ -161,7 +161,9 @@ def _sprung(rng: np.random.Generator, linkage: FourBar, weight: float, ranges: R
     size = weight * abs(ranges.load(rng))
     if rng.random() < ranges.sprung:
         one, other = (int(bar) for bar in rng.choice([1, *MOVING_BARS], 2, replace=False))
-        start, end = (Point(bar, linkage.lengths[bar - 1] * ranges.arm(rng), ANY_ANGLE(rng)) for bar in (one, other))
+        start, end = (
+            SpringEnd(bar, linkage.lengths[bar - 1] * ranges.arm(rng), ANY_ANGLE(rng)) for bar in (one, other)
+        )
         length = max(linkage.lengths)
         found.append(
             Springs((Spring(start, end, (size or 1.0) / length, length * ANY_PART(rng), size * EITHER_SIGN(rng)),))
@@ -213,7 +215,7 @@ UNEVEN = Ranges(
 
 
 def uneven_scene(seed: int, index: int) -> Scene:
-    """A linkage whose lengths, masses, arms and loads are in ratios of 1e-5 to 1e5, with every kind of effect."""
+    """Draw a linkage whose lengths, masses, arms and loads are in ratios of 1e-5 to 1e5, with every kind of effect."""
     rng = np.random.default_rng([seed, index])
     lengths, psi = uneven_lengths(rng, TEN_DECADES, TEN_DECADES)
     size = 10.0 ** rng.uniform(-3.0, 3.0)
@@ -234,8 +236,8 @@ MACHINES = Ranges(
 """Bars as machines have them."""
 
 
-def random_scene(seed: int, index: int, types: tuple[LinkageType, ...]) -> Scene:
-    """A linkage with random bars, loads, gravity and drive, at POSITIONS positions over the range it can move.
+def random_scene(seed: int, index: int, types: tuple[DrawnType, ...]) -> Scene:
+    """Draw random bars, loads, gravity and drive, at POSITIONS positions over the range the linkage can move.
 
     Parameters
     ----------

@@ -15,7 +15,7 @@ from fourbar.scene import Scene
 from fourbar.scene.motion import DEFAULT_STEPS, Free, Sweep
 from fourbar_validation.compare.rows import plain
 from fourbar_validation.places import MODELS
-from fourbar_validation.scenes.random import LinkageType, random_scene
+from fourbar_validation.scenes.random import DrawnType, random_scene
 
 MOST_POSITIONS = 100_000
 """Of a scene in a run, where every engine solves each of them: 3 ms each, with all engines."""
@@ -31,13 +31,13 @@ class Suite(Protocol):
     def __len__(self) -> int: ...
 
     def name(self, index: int) -> str:
-        """Name of a scene; the names are in ascending order."""
+        """Name a scene; the names are in ascending order."""
 
     def scene(self, index: int) -> Scene:
-        """The scene itself."""
+        """Return the scene itself."""
 
     def fingerprint(self) -> str:
-        """Changes when any scene does."""
+        """Name the suite; changes when any scene does."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,13 +53,16 @@ class Files:
         return len(self.texts)
 
     def name(self, index: int) -> str:
+        """Name a scene."""
         return self.texts[index][0]
 
     def scene(self, index: int) -> Scene:
+        """Read a scene."""
         name, text = self.texts[index]
         return loads(text, name)
 
     def fingerprint(self) -> str:
+        """Hash the texts."""
         return hashlib.sha256(repr(self.texts).encode()).hexdigest()
 
 
@@ -69,23 +72,26 @@ class Random:
 
     count: int
     seed: int
-    types: tuple[LinkageType, ...]
+    types: tuple[DrawnType, ...]
 
     def __len__(self) -> int:
         return self.count
 
     def name(self, index: int) -> str:
+        """Name a scene."""
         return f"random-{self.seed}-{index:09d}"
 
     def scene(self, index: int) -> Scene:
+        """Draw a scene."""
         return random_scene(self.seed, index, self.types)
 
     def fingerprint(self) -> str:
+        """State what the scenes are drawn from."""
         return f"random {self.count} {self.seed} {','.join(kind.value for kind in self.types)}"
 
 
 def model_files() -> list[Path]:
-    """The scene files of `models/`, sorted."""
+    """List the scene files of `models/`, sorted."""
     return sorted(MODELS.glob("*.toml"))
 
 
@@ -118,7 +124,7 @@ def _printed(name: str) -> str:
 
 
 def _positions(scene: Scene, file: Path) -> int:
-    """How many positions a scene asks for, or what takes as long; InputError beyond the most."""
+    """Count the positions that a scene asks for, or what takes as long; InputError beyond the most."""
     for key, stated in (("motion.theta_2", scene.motion.theta_2), ("motion.free", scene.motion.free)):
         if isinstance(stated, (Sweep, Free)):
             if stated.steps >= MOST_POSITIONS:
@@ -136,7 +142,7 @@ LARGEST_LIST = 16 * 2**20
 
 
 def suite_file(path: Path) -> Files:
-    """The scenes that a file lists, named from its own folder: TOML with `scenes = [...]`, or one per line.
+    """Read the scenes that a file lists, named from its own folder: TOML with `scenes = [...]`, or one per line.
 
     An entry may hold * for any name. InputError where an entry leaves the folder or names no file.
     """
@@ -167,6 +173,6 @@ def suite_file(path: Path) -> Files:
 
 
 def _listed(text: str) -> list[str]:
-    """One entry per line; # begins a comment."""
+    """Read one entry per line; # begins a comment."""
     lines = (line.partition("#")[0].strip() for line in text.splitlines())
     return [line for line in lines if line]

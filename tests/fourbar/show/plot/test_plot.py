@@ -12,7 +12,7 @@ import pytest
 from matplotlib.text import Text
 
 import fourbar
-from fourbar.effects import Effect, Flywheel, PinFriction, Point, Spring, Springs, Torsion
+from fourbar.effects import Effect, Flywheel, PinFriction, Spring, SpringEnd, Springs, Torsion
 from fourbar.effects.actions import bodies
 from fourbar.errors import DependencyError, InputError, NotAssembledError
 from fourbar.formulas.path import state
@@ -197,7 +197,7 @@ EFFECTS = (
     fourbar.Friction.at(B=0.03),
     PinFriction.at(A=(0.2, 0.01), O4=(0.1, 0.02)),
     Torsion.at(B=(0.5, 1.0, 0.1)),
-    Springs((Spring(Point(1, 0.1, -1.5), Point(3, 0.08, 0.2), 50.0, 0.05),)),
+    Springs((Spring(SpringEnd(1, 0.1, -1.5), SpringEnd(3, 0.08, 0.2), 50.0, 0.05),)),
     Flywheel(0.01, 4),
 )
 

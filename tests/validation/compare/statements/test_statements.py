@@ -21,7 +21,7 @@ from fourbar_validation.engines.mujoco.inverse import MujocoInverse
 from fourbar_validation.engines.pinocchio import PinocchioInverse
 from fourbar_validation.engines.witnesses import Witness
 from fourbar_validation.run.judge import judge
-from fourbar_validation.scenes.random import LinkageType, random_scene
+from fourbar_validation.scenes.random import DrawnType, random_scene
 from tests.support.scenes import crank_rocker
 
 ROCKER, TRIPLE, CHANGE = (0.3, 0.1, 0.25, 0.22), (0.22, 0.2, 0.32, 0.18), (0.3, 0.1, 0.3, 0.1)
@@ -56,7 +56,7 @@ def test_what_is_stated_holds(lengths: tuple[float, ...], engine: type) -> None:
 
 def test_what_is_stated_holds_of_random_linkages() -> None:
     for index in range(20):
-        scene = random_scene(1, index, tuple(LinkageType))
+        scene = random_scene(1, index, tuple(DrawnType))
         engine = PinocchioInverse()
         rows = statements("scene", scene, engine, engine.answer(scene, command(scene)))
         assert all(row.passed for row in rows), rows
@@ -190,7 +190,7 @@ class Shy:
 
 
 def test_an_engine_that_refuses_the_positions_of_the_statements_refuses_them_in_a_row() -> None:
-    rows = judge("scene", crank_rocker(), [Witness("shy", f"{__name__}:Shy", EQUIVALENCE)]).rows
+    rows = judge("scene", crank_rocker(), [Witness("shy", Shy, EQUIVALENCE)]).rows
     (row,) = (row for row in rows if row.setting == "statements of the linkage")
     assert (row.verdict, row.reason) == (REFUSES, "too near a limit")
     assert not any(row.failed for row in rows)

@@ -11,19 +11,19 @@ import mujoco
 import numpy as np
 import pytest
 
-from fourbar.effects import Friction, Gravity, Point, Spring, Springs, Torsion, Viscous
+from fourbar.effects import Friction, Gravity, Spring, SpringEnd, Springs, Torsion, Viscous
 from fourbar.errors import InputError
 from fourbar.linkage import PINS
 from fourbar.mjcf import mjcf
 from fourbar_validation.check.differences import differences
 from fourbar_validation.engines.mujoco import fields
-from fourbar_validation.engines.mujoco.anatomy import Anatomy
 from fourbar_validation.engines.mujoco.attached import Described
 from fourbar_validation.engines.mujoco.describe import described
 from fourbar_validation.engines.mujoco.fields import COMPARED, list_of, members
+from fourbar_validation.engines.mujoco.topology import Topology
 from tests.support.scenes import crank_rocker
 
-SPRING = Spring(Point(1, 0.1, -1.5), Point(4, 0.08, 0.2), 200.0, 0.05)
+SPRING = Spring(SpringEnd(1, 0.1, -1.5), SpringEnd(4, 0.08, 0.2), 200.0, 0.05)
 EVERYTHING = crank_rocker(
     effects=(
         Gravity(),
@@ -68,7 +68,7 @@ def _compiled(text: str) -> mujoco.MjModel:
 
 @cache
 def written(text: str) -> Described:
-    return described(Anatomy(compiled(text), {}))
+    return described(Topology(compiled(text), {}))
 
 
 def where(model: mujoco.MjModel, field: str) -> Any:
@@ -94,7 +94,7 @@ def differing(text: str, field: str, element: int) -> Iterator[str]:
         else:
             setattr(thing, field, type(getattr(thing, field))(value))
         try:
-            yield from [d.key for d in differences(written(text), described(Anatomy(model, {})))]
+            yield from [d.key for d in differences(written(text), described(Topology(model, {})))]
         except (InputError, IndexError, StopIteration, ValueError):  # no compiled model has an index out of range
             yield "refused"
 

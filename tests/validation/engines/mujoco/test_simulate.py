@@ -9,18 +9,18 @@ import pytest
 
 import fourbar
 from fourbar.mjcf import RECIPE
-from fourbar.mjcf.settings import Run
+from fourbar.mjcf.settings import WindowMotion
 from fourbar.quantities import UNKNOWNS
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.compare import compare
 from fourbar_validation.compare.rows import AGREES, FAILS, REFUSES
 from fourbar_validation.compare.tolerance import SIMULATED
 from fourbar_validation.engines.mujoco.closed_loop import ClosedLoop
+from fourbar_validation.engines.mujoco.monitor import ResidualMonitor
 from fourbar_validation.engines.mujoco.simulate import MujocoSimulated, observed_order
-from fourbar_validation.engines.mujoco.watch import Watch
 from fourbar_validation.engines.witnesses import WITNESSES
 from fourbar_validation.run.judge import judge
-from fourbar_validation.scenes.random import LinkageType, random_scene
+from fourbar_validation.scenes.random import DrawnType, random_scene
 from tests.support.scenes import crank_rocker, thesis
 
 TURN = fourbar.Sweep(0.1, 0.1 + 2 * math.pi, 90)
@@ -77,7 +77,7 @@ def test_within_1e_5_of_the_scale(name: str) -> None:
 @pytest.mark.parametrize("loaded", [False, True], ids=["bare", "loaded"])
 def test_slow_linkages_hold_as_well(loaded: bool, index: int) -> None:
     """One pass of Newton's method is all they get; under loads the closure must be the stiffer for it."""
-    drawn = random_scene(7, index, tuple(LinkageType))
+    drawn = random_scene(7, index, tuple(DrawnType))
     slow = replace(drawn, motion=replace(drawn.motion, omega_2=0.001 if loaded else 0.01, alpha_2=0.0), drive_bar=2)
     posed = slow if loaded else replace(slow, loads=(), effects=())
     answer = MujocoSimulated().answer(posed, fourbar.command(posed))
@@ -86,7 +86,7 @@ def test_slow_linkages_hold_as_well(loaded: bool, index: int) -> None:
 
 
 def test_an_input_that_speeds_up_covers_the_end_of_its_window_in_as_many_steps() -> None:
-    run = Run(0.0, 3.0, 0.01, 5.0)
+    run = WindowMotion(0.0, 3.0, 0.01, 5.0)
     assert run.fastest * run.timestep(RECIPE) <= 3.0 / RECIPE.steps_per_window
 
 
@@ -154,7 +154,7 @@ def test_error_falls_with_the_fourth_power_of_the_timestep() -> None:
 
 
 def test_a_residual_that_is_no_number_raises_its_alarm(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(Watch, "evidence", lambda self: {"force_gap": math.nan})
+    monkeypatch.setattr(ResidualMonitor, "evidence", lambda self: {"force_gap": math.nan})
     monkeypatch.setattr(ClosedLoop, "gap", lambda self, right=ClosedLoop.gap: (right(self)[0], math.nan)
                         if self.data.time else right(self))  # fmt: skip
     posed = crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.1, 0.4, 3), 10.0))
@@ -175,7 +175,7 @@ def hood(links: float, output: float | None = None) -> fourbar.Scene:
     return fourbar.Scene(fourbar.FourBar(0.11, *bars), motion, effects=(fourbar.Gravity(),), title="hood")
 
 
-SIMULATION = [replace(witness, order="") for witness in WITNESSES if witness.name == "mujoco-simulated"]
+SIMULATION = [replace(witness, order=None) for witness in WITNESSES if witness.name == "mujoco-simulated"]
 
 
 @pytest.mark.parametrize("links", [1e-2, 1e-8])

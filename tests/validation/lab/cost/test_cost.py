@@ -16,10 +16,10 @@ import fourbar
 from fourbar.mjcf import Settings
 from fourbar.scene import command
 from fourbar.show.plot.style import matplotlib_style
-from fourbar_validation.advise.errors import NO_ANSWER, QUANTITIES, Errors, errors
+from fourbar_validation.advise.errors import NO_ANSWER, QUANTITIES, WorstErrors, errors
 from fourbar_validation.engines.mujoco import drives
 from fourbar_validation.engines.mujoco.one_state import MujocoOneState
-from fourbar_validation.engines.mujoco.trial import Build, Rig
+from fourbar_validation.engines.mujoco.trial import Build, TrialSetup
 from fourbar_validation.engines.pinocchio_forward import PinocchioForward
 from fourbar_validation.lab.cost import formulas, laws, orders, pictures, study
 from fourbar_validation.lab.cost.cost import cost, front_lines
@@ -35,10 +35,10 @@ def turning(omega: float = 10.0, positions: int = 36) -> fourbar.Scene:
     return fourbar.Scene(LINKAGE, fourbar.Motion(sweep, omega), effects=(fourbar.Gravity(),))
 
 
-def tried(scene: fourbar.Scene, build: Build | None = None) -> Callable[[Settings], Errors]:
-    rig = Rig(scene, command(scene))
+def tried(scene: fourbar.Scene, build: Build | None = None) -> Callable[[Settings], WorstErrors]:
+    rig = TrialSetup(scene, command(scene))
 
-    def error(settings: Settings) -> Errors:
+    def error(settings: Settings) -> WorstErrors:
         trial = rig.try_out(settings, build)
         return NO_ANSWER if trial.broken else errors(scene, trial.at, trial.quantities)
 
@@ -81,7 +81,7 @@ def test_softness_is_proportional_to_1_minus_d_and_sags_with_the_square_of_tc() 
 
 
 def test_the_defaults_stay_at_their_floor_at_every_timestep(tmp_path: Path) -> None:
-    made = study.Study("s", turning(), tmp_path)
+    made = study.CostStudy("s", turning(), tmp_path)
     (curve,) = [c for c in study.curves(turning()) if c.name == "RK4, MuJoCo's defaults"]
     ladder = made._curve(replace(curve, spots=tuple(spot for spot in curve.spots if spot.x in (320, 2560))))
     coarse, fine = (p.worst for p in ladder)
@@ -182,9 +182,9 @@ def test_what_is_no_number_or_not_compared_has_no_small_error() -> None:
     assert errors(still, command(still), {name: getattr(solution, name) for name in QUANTITIES}).torque == math.inf
 
 
-def point(steps: float, worst: float, curve: str = "c", kind: str = study.STEPPED) -> study.Point:
+def point(steps: float, worst: float, curve: str = "c", kind: str = study.STEPPED) -> study.CostPoint:
     errors = [worst] * len(QUANTITIES)
-    return study.Point(
+    return study.CostPoint(
         curve, kind, f"{steps:g}/rev", steps, int(steps), steps, *errors, steps * 1e-6, 1e-6, steps, 0.03
     )
 
@@ -259,10 +259,10 @@ def test_the_front_holds_what_nothing_beats() -> None:
 def test_a_study_is_resumed_where_it_was_interrupted(tmp_path: Path) -> None:
     done: list[str] = []
 
-    def units(stop: str | None) -> study.Study:
-        made = study.Study("s", turning(), tmp_path)
+    def units(stop: str | None) -> study.CostStudy:
+        made = study.CostStudy("s", turning(), tmp_path)
 
-        def unit(name: str) -> list[study.Point]:
+        def unit(name: str) -> list[study.CostPoint]:
             if name == stop:
                 raise KeyboardInterrupt
             done.append(name)
@@ -276,7 +276,7 @@ def test_a_study_is_resumed_where_it_was_interrupted(tmp_path: Path) -> None:
     found = dict(units(None).points())
     assert done == ["a", "b", "c"] and [p.curve for row in found.values() for p in row] == ["a", "b", "c"]
     assert json.loads((tmp_path / "run.json").read_text())["study"] == study.VERSION
-    other = study.Study("s", turning(20.0), tmp_path)  # another scene in the same folder starts over
+    other = study.CostStudy("s", turning(20.0), tmp_path)  # another scene in the same folder starts over
     other.units = {}
     assert not list(other.points()) and not list((tmp_path / "parts").iterdir())
 

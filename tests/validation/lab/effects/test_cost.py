@@ -1,21 +1,17 @@
-"""Switching off what a bare loop never needs pays: in time, and with `INSTRUCTIONS=all` in instructions under valgrind.
+"""Switching off what a bare loop never needs pays; what every effect costs is measured by `cost --effects`."""
 
-What every effect costs in every engine, and that one which is not named costs nothing, are counted by
-`python -m validation effects-cost` and `effects-cost --absent`: minutes, not seconds.
-"""
-
-import os
 import time
+from pathlib import Path
 
 import pytest
 
-from fourbar_validation.lab.effects.cost import available, counts
+from fourbar.errors import BROKEN, HOLDS
+from fourbar_validation.cli import status
+from fourbar_validation.lab.effects import cost, table
 from fourbar_validation.lab.effects.work import DEFAULT_FLAGS, simulated
 
 SAVED = 0.08
-"""Part of a step's instructions, and of its time, that the flags of the bare scene must save; some 0.2 of the time."""
-NOTHING = 0.01
-"""Gravity is an addition among 100 000 instructions of a step."""
+"""Part of the time of a step that the flags of the bare scene must save; they save some 0.2."""
 
 
 def test_the_bare_scene_steps_faster_than_with_default_flags() -> None:
@@ -29,10 +25,29 @@ def test_the_bare_scene_steps_faster_than_with_default_flags() -> None:
     assert best["none"] <= (1.0 - SAVED) * best[DEFAULT_FLAGS]
 
 
-@pytest.mark.skipif("INSTRUCTIONS" not in os.environ, reason="half a minute of valgrind: part of `make long-test`")
-@pytest.mark.skipif(not available(), reason="valgrind or setarch is not installed: no instruction is counted")
-@pytest.mark.timeout(400)
-def test_the_bare_scene_saves_what_it_does_not_need() -> None:
-    found = counts("mujoco-simulated", ["none", DEFAULT_FLAGS, "gravity"])
-    assert found["none"] <= (1.0 - SAVED) * found[DEFAULT_FLAGS]
-    assert abs(found["gravity"] / found["none"] - 1.0) < NOTHING
+def test_a_workload_with_twice_the_work_costs_twice_as_much(monkeypatch: pytest.MonkeyPatch) -> None:
+    def prepare(effect: str) -> object:
+        return lambda amount: sum(range((1 + (effect == "twice")) * 1000 * amount))
+
+    monkeypatch.setitem(table.ENGINES, "formulas", prepare)
+    measured = table.measure("formulas", "twice", 5)
+    assert 1.5 < measured.median < 2.5 and measured.low <= measured.median <= measured.high and measured.seconds > 0.0
+
+
+def test_the_table_has_a_row_for_each_effect_and_flag(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(table, "measure", lambda engine, effect: table.EffectCost(engine, effect, 2e-6, 1.1, 1.2, 1.25))
+    assert status(["cost", "--effects", "--only", "pin_friction", "-o", str(tmp_path / "effects.md")]) == HOLDS
+    text = (tmp_path / "effects.md").read_text()
+    assert "| none | 2 us | 2 us | 2 us | 2 us |" in text
+    assert "| pin_friction | +20 % [+10, +25] | no counterpart | +20 % [+10, +25] | +20 % [+10, +25] |" in text
+    assert "| none, island left on |  | +20 % [+10, +25] |  |  |" in text and "written to" in capsys.readouterr().out
+
+
+def test_an_engine_that_is_missing_is_named(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(cost, "not_installed", lambda _: "mujoco is not installed")
+    assert status(["cost", "--effects", "--engines", "formulas,mujoco-inverse"]) == BROKEN
+    assert capsys.readouterr().err == "error: mujoco-inverse: mujoco is not installed\n"

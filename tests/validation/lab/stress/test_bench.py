@@ -22,14 +22,14 @@ ROOT = Path(__file__).parents[4]
 
 
 ROUNDING = 1e-11
-"""Relative to the largest of each unknown: a few hundred roundings, fewer digits in the vector math library."""
+"""Relative to the largest of each unknown: a few hundred roundings."""
 
 
 @pytest.fixture
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     """Counts at which the times mean nothing, but everything runs."""
     monkeypatch.setattr(bench, "import_cost", lambda: 0.5)
-    for name, count in (("SHORTEST", 1), ("ONE_BY_ONE", 2), ("MOST_LOOPED", 10)):
+    for name, count in (("SHORTEST", 1), ("MOST_LOOPED", 10)):
         monkeypatch.setattr(contenders, name, count)
 
 
@@ -44,7 +44,7 @@ def test_every_limit_is_of_a_row_that_is_measured(tmp_path: Path) -> None:
     assert set(found.over_linkages["one after the other"]) == {1, 10}
     draw_bench(found.over_positions, found.over_linkages, tmp_path / "bench.svg")
     picture = (tmp_path / "bench.svg").read_text()
-    assert picture.count('<g id="axes_') == 2 and picture.count('<g id="line2d_') > 20
+    assert picture.count('<g id="axes_') == 2 and picture.count('<g id="line2d_') > 15
 
 
 def test_every_contender_finds_the_same_unknowns(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -53,7 +53,6 @@ def test_every_contender_finds_the_same_unknowns(monkeypatch: pytest.MonkeyPatch
     expected = np.concatenate([np.atleast_2d(getattr(own, name).T) for name in UNKNOWNS])
     peers = contenders.loops()
     assert {"NumPy", "C"} <= set(peers.here) or "C" in peers.not_run
-    assert float(np.float64(5e-324) * 1.0) > 0.0  # no library has taken subnormal numbers from this process
     for name, loop in peers.here.items():
         out = np.full((15, 500), np.nan)
         loop(at.theta_2, out)
@@ -72,11 +71,9 @@ def test_more_positions_than_fit_are_evaluated_in_pieces(monkeypatch: pytest.Mon
 
 def test_what_is_missing_is_named_with_its_reason(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PATH", "")
-    for module in ("numba", "sympy"):
-        monkeypatch.setitem(sys.modules, module, None)
+    monkeypatch.setitem(sys.modules, "numba", None)
     peers = contenders.loops()
-    assert set(peers.here) == {"NumPy"} and set(peers.not_run) == {"compiled", "C", "C, vector math", "SymPy"}
-    assert peers.not_run["SymPy"] == "SymPy is not installed: pip install sympy"
+    assert set(peers.here) == {"NumPy"} and set(peers.not_run) == {"compiled", "C"}
     rows = {"growth from 1000 positions on": 1.0}
     monkeypatch.setattr(bench, "measure", lambda *_: bench.Measured(rows, {}, {}, peers.not_run))
     for variable in bench.ONE_THREAD:
@@ -166,7 +163,7 @@ def reported(capsys: pytest.CaptureFixture[str], revision: str) -> tuple[int, st
 def test_a_revision_that_cannot_be_timed_is_one_line(
     revision: str, words: str, repository: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(against, "TREE", repository)
+    monkeypatch.setattr(against, "checkout", lambda _: repository)
     status, line = reported(capsys, revision)
     assert status == BAD_INPUT and line.startswith("error: ") and line.count("\n") == 1 and words in line
     assert {path.name for path in repository.iterdir()} == {".git", "fourbar"}
@@ -175,7 +172,7 @@ def test_a_revision_that_cannot_be_timed_is_one_line(
 def test_without_a_repository_no_revision_exists(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(against, "TREE", tmp_path)
+    monkeypatch.setattr(against, "checkout", lambda _: tmp_path)
     status, line = reported(capsys, "HEAD")
     assert status == BAD_INPUT and line.count("\n") == 1
 

@@ -1,4 +1,4 @@
-"""Simulators as subjects: what is judged, and the findings' scripts where their simulator is installed."""
+"""Simulators under test: what is checked, and the findings' scripts where their simulator is installed."""
 
 import ast
 import json
@@ -37,12 +37,12 @@ IN_EXUDYN = 1e-3
 """Of a turn in 314 steps of its trapezoidal rule; measured 1.2e-4."""
 
 JUDGES = {"examine.py", "problems.py"}
-"""The modules of subjects that state or judge by the formulas; every other hands things to a simulator."""
+"""The modules that state or judge by the formulas; every other hands things to a simulator."""
 
 
 @pytest.fixture
 def sealed(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The writers of model files have no formulas: what a simulator receives is the subject's own assembly."""
+    """The writers of model files have no formulas: what a simulator receives is the simulator's own assembly."""
 
     def refused(*_: Any, **__: Any) -> None:
         raise AssertionError("a simulator would receive what the formulas computed")
@@ -113,13 +113,13 @@ def test_exudyn_refuses_what_it_has_no_element_for() -> None:
         exudyn.through(replace(scene, effects=(Friction.at(B=0.01),)), 314, setting)
 
 
-def test_a_subject_that_diverges_has_its_lines_without_an_order() -> None:
+def test_a_simulator_that_diverges_has_its_lines_without_an_order() -> None:
     scene, n = fourbar.load(PROBLEM), 3
     readings = []
     for steps, torque in ((100, 1.0), (200, math.inf), (400, math.nan), (800, 1.0)):
         found = motion.Readings("its defaults", steps)
         for _ in range(n):
-            found.read(scene, motion.State((1.0, math.nan, 2.0), 10.0, 0.0, torque, {}))
+            found.read(scene, motion.Instant((1.0, math.nan, 2.0), 10.0, 0.0, torque, {}))
         readings.append(found.plain())
     lines = examine.lines(scene, "subject", {"version": "", "readings": readings})
     assert lines[1].errors["torque"] == math.inf and math.isnan(lines[2].errors["torque"])
@@ -127,7 +127,7 @@ def test_a_subject_that_diverges_has_its_lines_without_an_order() -> None:
 
 
 def of_a_turn(**changes: Any) -> str:
-    """What a subject says that stood still and forgot to read its torque, but for some changes."""
+    """What a simulator says that stood still and forgot to read its torque, but for some changes."""
     n = motion.SAMPLES
     reading = {"setting": "s", "steps": 100, "theta": [[1.0, 2.0, 3.0]] * n, "omega_2": [10.0] * n}
     reading |= {"alpha_2": [0.0] * n, "torque": [1.0] * n, "forces": {}, "gap": 0.0, "seconds": 1.0}
@@ -152,14 +152,14 @@ def of_a_turn(**changes: Any) -> str:
 def test_an_answer_that_cannot_be_read_is_left_out_and_the_page_goes_on(
     stated: str, why: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(examine, "SUBJECTS", {"one": ("One", "json"), "other": ("Other", "json")})
+    monkeypatch.setattr(examine, "SIMULATORS", {"one": ("One", "json"), "other": ("Other", "json")})
     monkeypatch.setattr(examine, "_has", lambda *_: True)
     answers = {"one": stated, "other": of_a_turn(torque=[math.nan] * motion.SAMPLES)}
-    monkeypatch.setattr(examine, "ended", lambda line, **_: Ended(answers[line[3]], "", False, ""))
+    monkeypatch.setattr(examine, "of_the_harness", lambda line, **_: Ended(answers[line[3]], "", False, ""))
     found = examine.examine(fourbar.load(PROBLEM), PROBLEM, [Path(sys.executable)], 1.0)
     assert why in found.left_out["One"] and "\x1b" not in found.left_out["One"]
     (line,) = found.lines
-    assert line.subject == "Other" and math.isnan(line.errors["torque"])
+    assert line.simulator == "Other" and math.isnan(line.errors["torque"])
 
 
 @pytest.mark.parametrize("name", ["theta", "omega_2", "alpha_2"])
@@ -169,7 +169,7 @@ def test_a_state_that_is_no_number_has_no_error_that_is_one(name: str) -> None:
     assert math.isnan(examine.errors(fourbar.load(PROBLEM), answer["readings"][0])["torque"])
 
 
-def test_what_a_subject_prints_is_no_part_of_its_answer(tmp_path: Path) -> None:
+def test_what_a_simulator_prints_is_no_part_of_its_answer(tmp_path: Path) -> None:
     (tmp_path / "loud.py").write_text(
         "import atexit, os\nfrom fourbar_validation.lab.subjects.motion import Readings\nVERSION = CHANGED = '-'\n"
         "SETTINGS, STEPS = ['s'], [1]\natexit.register(print, 'bye')\n"
@@ -187,7 +187,7 @@ def test_the_page_is_written_and_names_what_is_not_there(tmp_path: Path, monkeyp
     line = examine.Line("MuJoCo", "4", "generated file", 157, {"torque": 1e-7, "F43": math.nan}, 1e-8, 0.01, 1.5)
     pytest.importorskip("jinja2")
     pytest.importorskip("matplotlib")
-    given = examine.Standing([line], {"MuJoCo": "nothing"}, {"MuJoCo": "CPU"})
+    given = examine.Examination([line], {"MuJoCo": "nothing"}, {"MuJoCo": "CPU"})
     given.left_out["PyBullet"] = "not installed under any --python"
     monkeypatch.setattr("fourbar_validation.lab.subjects.standing.examine", lambda *_: given)
     done = CliRunner().invoke(standing.command, ["--out", str(tmp_path)], catch_exceptions=False)
@@ -212,7 +212,7 @@ def test_each_finding_is_reproduced_where_its_simulator_is(script: Path) -> None
 
 
 COARSE = 0.05
-"""Of a turn in the fewest steps that each subject is examined with; measured 2e-2 and less."""
+"""Of a turn in the fewest steps that each simulator is examined with; measured 2e-2 and less."""
 
 
 COARSE_OF = {"newton_kamino": 0.2}
@@ -220,15 +220,15 @@ COARSE_OF = {"newton_kamino": 0.2}
 
 
 @pytest.mark.usefixtures("sealed")
-@pytest.mark.parametrize("module", examine.SUBJECTS)
-def test_each_subject_that_is_installed_carries_the_loop(module: str) -> None:
-    name, library = examine.SUBJECTS[module]
+@pytest.mark.parametrize("module", examine.SIMULATORS)
+def test_each_simulator_that_is_installed_carries_the_loop(module: str) -> None:
+    name, library = examine.SIMULATORS[module]
     try:
         found = find_spec(library)
     except ModuleNotFoundError:
         found = None
     if found is None:
         pytest.skip(f"not run: {name} is not installed")
-    scene, subject = fourbar.load(PROBLEM), import_module(f"fourbar_validation.lab.subjects.{module}")
-    reading = subject.through(scene, subject.STEPS[0], next(iter(subject.SETTINGS))).plain()
+    scene, simulator = fourbar.load(PROBLEM), import_module(f"fourbar_validation.lab.subjects.{module}")
+    reading = simulator.through(scene, simulator.STEPS[0], next(iter(simulator.SETTINGS))).plain()
     assert max(examine.errors(scene, reading).values()) < COARSE_OF.get(module, COARSE)

@@ -93,14 +93,14 @@ def test_bad_input_is_one_line(
     arguments: list[str], stated: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(releases, "pip", lambda *_: Ended(LISTED, "", False, ""))
-    assert status(["versions", *arguments]) == 2
+    assert status(["standing", "--versions", *arguments]) == 2
     error = capsys.readouterr().err
     assert stated in error and error.count("\n") == 1
 
 
 @pytest.mark.parametrize("answer", ["", "bye", "[]", '{"a": NaN}', '{"a": -1.0}', '{"a": "soon"}', '{"b": 1.0}'])
 def test_a_time_that_is_none_is_left_out(answer: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(versions, "ended", lambda _: Ended(answer, "", False, ""))
+    monkeypatch.setattr(versions, "of_the_harness", lambda _: Ended(answer, "", False, ""))
     assert versions.timed(Path("python"), Path("scene.toml"), ["a"]) == {}
 
 
@@ -171,7 +171,7 @@ def test_the_command_runs_each_version_and_says_why_one_has_no_answer(
     monkeypatch.setattr(versions, "installed", lambda _, version, *__: loads.get(version, (Path("its"), "")))
     monkeypatch.setattr(versions, "run_elsewhere", elsewhere)
     monkeypatch.setattr(versions, "timed", lambda *_: {"pinocchio-inverse": 1e-3})
-    assert status(["versions", "pinocchio", "--out", str(tmp_path)]) == 0
+    assert status(["standing", "--versions", "pinocchio", "--out", str(tmp_path)]) == 0
     printed = capsys.readouterr().out
     for line in (
         "2.7 does not load: libtoy.so.7",
@@ -182,7 +182,9 @@ def test_the_command_runs_each_version_and_says_why_one_has_no_answer(
     assert {file.name for file in tmp_path.glob("versions.*")} == {
         f"versions.{x}" for x in ("md", "svg", "csv", "json")
     }
-    assert status(["versions", "pinocchio", "--to", "3.1", "--out", str(tmp_path)]) == 3, "one version is no history"
+    assert status(["standing", "--versions", "pinocchio", "--to", "3.1", "--out", str(tmp_path)]) == 3, (
+        "one version is no history"
+    )
 
 
 def test_page_table_and_chart_show_each_version_or_why_not() -> None:

@@ -10,19 +10,19 @@ import fourbar
 from fourbar.scene import Scene, command
 from fourbar.studies.keys import entries, left_out
 from fourbar_validation.compare.rows import FAILS, REFUSES, Row
-from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.lab.stress.mutation.specimens import SPECIMENS
-from fourbar_validation.run.shipped import calls, checks, files
-from fourbar_validation.run.shipped.checks import CHECKS, judge_shipped
-from fourbar_validation.run.shipped.question import Question, moved, stated
+from fourbar_validation.run import judge
+from fourbar_validation.run.question import Question
+from fourbar_validation.run.shipped import calls, files
+from fourbar_validation.run.shipped.variants import moved, stated
 
 SHIPPED = SPECIMENS["shipped"]
+CHECKS = [check.rows for check in judge.CHECKS if check.shipped]
 ENGINES = {"compiled", "study", "sensitivity", "extremes", "tolerances", "sdf", "usd"}
 
 
 def rows_of(scene: Scene, engine: str = "") -> list[Row]:
-    at = command(scene)
-    question = Question("", scene, at, fourbar.solve(scene, at=at), FreeBody().answer(scene, at))
+    question = Question("", scene, command(scene))
     return [row for check in CHECKS if engine in ("", check.__name__) for row in check(question)]
 
 
@@ -74,8 +74,7 @@ def narrower(found: Any) -> None:
 def test_a_public_call_that_errs_fails(
     monkeypatch: pytest.MonkeyPatch, engine: str, call: str, change: Callable[[Any], None], quantity: str
 ) -> None:
-    at = command(SHIPPED)
-    question = Question("", SHIPPED, at, fourbar.solve(SHIPPED, at=at), FreeBody().answer(SHIPPED, at))
+    question = Question("", SHIPPED, command(SHIPPED))
     monkeypatch.setattr(fourbar, call, altered(getattr(fourbar, call), change))
     assert quantity in failing(next(check for check in CHECKS if check.__name__ == engine)(question))
 
@@ -117,12 +116,11 @@ def test_what_breaks_down_costs_its_own_rows_and_what_is_missing_is_named(monkey
 
     monkeypatch.setattr(fourbar, "vary", broken)
     monkeypatch.setattr(calls, "find_spec", lambda _: None)
-    monkeypatch.setattr(checks, "CHECKS", CHECKS[:2])
-    at = command(SHIPPED)
-    found = list(judge_shipped("", SHIPPED, at, fourbar.solve(SHIPPED), FreeBody().answer(SHIPPED, at)))
-    (row,) = (each for each in found if isinstance(each, Row))
+    record = judge.judge("", SHIPPED, (), shipped=True)
+    (row,) = (row for row in record.rows if row.engine in ("compiled", "study"))
     assert (row.engine, row.quantity, row.verdict) == ("study", "all", FAILS)
-    assert any(isinstance(line, str) and line.startswith("compiled: numba is not installed") for line in found)
+    assert any(line.startswith("compiled: numba is not installed") for line in record.left_out)
+    assert {row.engine for row in record.rows if row.passed} >= ENGINES - {"compiled", "study"}
 
 
 def test_what_a_file_cannot_hold_is_refused() -> None:
@@ -139,3 +137,14 @@ def test_every_number_that_a_scene_states_is_found_in_its_file(name: str) -> Non
     changed = moved(scene, {"lengths.coupler": 0.01})
     assert changed.linkage.coupler.length == scene.linkage.coupler.length + 0.01
     assert np.array_equal(command(changed).theta_2, command(scene).theta_2)
+
+
+def test_a_check_that_raises_costs_its_own_rows_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    def check_nothing(_: Question) -> list[Row]:
+        raise ArithmeticError("lost")
+
+    whole = judge.judge("", SHIPPED, ()).rows
+    monkeypatch.setattr(judge, "CHECKS", (judge.Check(check_nothing), *judge.CHECKS))
+    (row,) = (row for row in judge.judge("", SHIPPED, ()).rows if row not in whole)
+    assert (row.engine, row.setting, row.quantity, row.verdict) == ("formulas", "check_nothing", "all", FAILS)
+    assert len(whole) > 3

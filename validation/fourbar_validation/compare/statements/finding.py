@@ -34,7 +34,7 @@ class Finding(NamedTuple):
 
 
 def worst(name: str, answer: Answer, quantity: str, findings: Iterable[Finding]) -> Row:
-    """The row of a quantity: the finding that exceeds what it is allowed by most."""
+    """Make the row of a quantity of the finding that exceeds what it is allowed by most."""
     each = list(findings)
     found = each[int(np.argmax(used(np.array([one.error for one in each]), np.array([one.allowed for one in each]))))]
     holds = found.error <= found.allowed
@@ -52,7 +52,7 @@ class Stated:
         self._value = cache(lambda formula, *of: formula(linkage, *of))
 
     def __call__(self, formula: Callable[..., T], *of: int) -> T:
-        """The value of a formula of the linkage, and of a bar where it is of one."""
+        """Evaluate a formula of the linkage, and of a bar where it is of one."""
         value: T = self._value(formula, *of)
         return value
 
@@ -73,12 +73,12 @@ class Seen:
         self._found = given(engine, scene, Command(theta_2, branch.astype(np.int8), 1.0, 0.0)).quantities
 
     def at(self, place: Place, quantity: str) -> float:
-        """A quantity at one of the places."""
+        """Give a quantity at one of the places."""
         return float(self._found[quantity][self._index[place]])
 
 
 def given(engine: Engine, scene: Scene, at: Command) -> Answer:
-    """An engine's answer; LimitError where it refuses those positions."""
+    """Give an engine's answer; LimitError where it refuses those positions."""
     answer = engine.answer(scene, at)
     if answer.refusal is not None:
         raise LimitError(answer.refusal)
@@ -86,12 +86,12 @@ def given(engine: Engine, scene: Scene, at: Command) -> Answer:
 
 
 def wrapped(angle: A) -> A:
-    """Into [-pi, pi)."""
+    """Wrap into [-pi, pi)."""
     return (angle + math.pi) % TURN - math.pi
 
 
 def same(what: str, stated: Sequence[float], found: Sequence[float], linkage: FourBar) -> Finding:
-    """Two lists of angles, modulo 2 pi and in any order: the largest distance of one from the nearest of the other."""
+    """Compare lists of angles, modulo 2 pi in any order: the largest distance of one from the nearest of the other."""
     if not stated or not found:
         return Finding(0.0 if len(stated) == len(found) else math.inf, 0.0, 0.0, what)
     apart = np.abs(wrapped(np.subtract.outer(np.array(stated), np.array(found))))
@@ -100,5 +100,5 @@ def same(what: str, stated: Sequence[float], found: Sequence[float], linkage: Fo
 
 
 def roundoff(linkage: FourBar) -> float:
-    """What two derivations of an angle may differ by, rad: it is one against the ground's."""
+    """Compute what two derivations of an angle may differ by, rad: it is one against the ground's."""
     return EQUIVALENCE.factor * turned(linkage.ground_angle)

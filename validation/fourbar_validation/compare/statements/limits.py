@@ -21,7 +21,7 @@ def places(stated: Stated) -> list[Place]:
 
 
 def limit_positions(stated: Stated, seen: Seen) -> Iterator[Finding]:
-    """The limits of every moving bar; where all bars are collinear no side can be stated."""
+    """Compare the limits of every moving bar; where all bars are collinear no side can be stated."""
     yield Finding(0.0, 0.0, stated.linkage.ground_angle, "the same positions")
     yield from _of_input(stated, seen)
     for bar in (3, 4):
@@ -58,14 +58,14 @@ def _of_input(stated: Stated, seen: Seen) -> Iterator[Finding]:
 
 
 def _inwards(linkage: FourBar, theta_2: float) -> float:
-    """The little that bar 2 turns from its limit to where the loop closes, rad."""
+    """Compute the little that bar 2 turns from its limit to where the loop closes, rad."""
     step = step_beyond(linkage, theta_2)
     ahead, behind = closing_margin(Scene(linkage), np.array([theta_2 + step, theta_2 - step]))
     return step if ahead > behind else -step
 
 
 def _moved(linkage: FourBar, bar: int, limit: mobility.LimitPosition) -> float:
-    """What rounding may turn a limit by: the triangle of the ground, the bar and the other two in one line."""
+    """Compute what rounding may turn a limit by: the triangle of the ground, the bar and the other two in one line."""
     upright = abs(math.sin(limit[MOVING_BARS.index(bar)] - linkage.ground_angle))
     d, *moving = linkage.lengths
     spread = sum(linkage.lengths) / d * (1.0 + sum(moving) / linkage.bar(bar).length)
@@ -79,13 +79,13 @@ def _collinear(linkage: FourBar, bar: int) -> list[bool]:
 
 
 def _of_one_branch(linkage: FourBar, bar: int) -> list[mobility.LimitPosition]:
-    """The limits of a bar that are of one branch, as they should."""
+    """Select the limits of a bar that are of one branch, as they should be."""
     limits = zip(mobility.limit_positions(linkage, bar), _collinear(linkage, bar), strict=True)
     return [limit for limit, collinear in limits if not collinear and limit.branch != 0]
 
 
 def _dead_centres(stated: Stated, bar: int, seen: Seen) -> Iterator[Finding]:
-    """The other two bars are in one line there, and the bar is at rest."""
+    """Check that the other two bars are in one line there, and the bar is at rest."""
     linkage = stated.linkage
     for limit, collinear in zip(stated(mobility.limit_positions, bar), stated(_collinear, bar), strict=True):
         known = (0, 1, -1) if collinear else (1, -1)  # all bars collinear: rounding decides

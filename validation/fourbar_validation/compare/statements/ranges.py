@@ -50,7 +50,7 @@ def _change_points(linkage: FourBar) -> Finding:
 
 
 def step_beyond(linkage: FourBar, theta_2: float) -> float:
-    """The angle, rad, by which bar 2 turns until the loop closes, or misses, by BEYOND more."""
+    """Compute the angle, rad, by which bar 2 turns until the loop closes, or misses, by BEYOND more."""
     d, a, *_ = linkage.lengths
     psi, little = theta_2 - linkage.ground_angle, BEYOND * sum(linkage.lengths)
     e = max(abs(d - a * np.exp(1j * psi)), little)

@@ -98,7 +98,7 @@ def _always(stated: Stated) -> list[float]:
 
 
 def _to_singular(scene: Scene, theta_2: Array, branch: Array, stated: Stated) -> Array:
-    """The angle to the nearest position at which bars are collinear that must not be, inf where there is none."""
+    """Compute the angle to the nearest position where bars must not be collinear and are; inf where there is none."""
     drive, always = scene.drive_bar, _always(stated)
     dead = stated(mobility.limit_positions, drive) if drive != 2 else ()
     nearest = np.full(theta_2.shape, math.inf)

@@ -7,8 +7,8 @@ import numpy as np
 
 from fourbar.linkage import BAR_NAMES, MOVING_BARS
 from fourbar_validation.compare.answer import Array
-from fourbar_validation.engines.mujoco.anatomy import Anatomy
 from fourbar_validation.engines.mujoco.fields import ACTUATOR, RANGES, TENDON
+from fourbar_validation.engines.mujoco.topology import Topology
 
 Value = float | str | tuple[float, ...]
 Described = dict[str, Value]
@@ -18,7 +18,7 @@ DRIVE = {"actuator_damping": "drive damping", "actuator_dampingpoly": "drive dam
 
 
 def direct(model: mujoco.MjModel, field: str, row: int, key: str) -> Described:
-    """One row of a field as it stands; nothing where this MuJoCo does not have it."""
+    """Read one row of a field as it stands; nothing where this MuJoCo does not have it."""
     if not hasattr(model, field):
         return {}
     return {key: _numbers(getattr(model, field)[row])}
@@ -29,7 +29,7 @@ def _numbers(entry: Array) -> Value:
 
 
 def limits(model: mujoco.MjModel, field: str, row: int, key: str, *, switched_on: bool = True) -> Described:
-    """A range, or "free" where it does not hold."""
+    """Read a range, or "free" where it does not hold."""
     holds, name = RANGES[field]
     if not hasattr(model, field):
         return {}
@@ -37,31 +37,31 @@ def limits(model: mujoco.MjModel, field: str, row: int, key: str, *, switched_on
     return {f"{key}.{name}": "free" if free else _numbers(getattr(model, field)[row])}
 
 
-def on_the_drive(anatomy: Anatomy, pin: str) -> Described:
+def on_the_drive(topology: Topology, pin: str) -> Described:
     """Damping that actuators on the crank's pin bring along."""
-    model = anatomy.model
+    model = topology.model
     if pin != "O2":
         return {}
     return {
-        f"pins.O2.{name}": _numbers(getattr(model, field)[anatomy.drives()].sum(axis=0))
+        f"pins.O2.{name}": _numbers(getattr(model, field)[topology.drives()].sum(axis=0))
         for field, name in DRIVE.items()
         if hasattr(model, field)
     }
 
 
-def actuators(anatomy: Anatomy) -> Described:
-    """Every actuator but the drive, which is taken off: what it acts on, where, and with which wrench."""
-    model, found = anatomy.model, Described()
-    for i in sorted({*range(len(model.actuator_trntype))} - {*anatomy.drives()}):
+def actuators(topology: Topology) -> Described:
+    """Describe every actuator but the drive, which is taken off: what it acts on, where, and with which wrench."""
+    model, found = topology.model, Described()
+    for i in sorted({*range(len(model.actuator_trntype))} - {*topology.drives()}):
         key = f"actuators.{i}"
         found[f"{key}.name"] = model.actuator(i).name
         out = int(model.actuator_outadr[i]) if hasattr(model, "actuator_outadr") else i
         gear = model.actuator_gear[out] * model.actuator_biasprm[i, 0]  # a control is 0: the bias is all there is
         site, frame = (int(number) for number in model.actuator_trnid[i])
         if model.actuator_trntype[i] == mujoco.mjtTrn.mjTRN_SITE:
-            found |= _at_site(anatomy, key, gear, site, frame)
+            found |= _at_site(topology, key, gear, site, frame)
         else:
-            found[key] = _target(anatomy, i)
+            found[key] = _target(topology, i)
             found[f"{key}.gear"] = _numbers(gear)
         found[f"{key}.biasprm"] = _numbers(model.actuator_biasprm[i, 1:])
         for field, name in ACTUATOR.items():
@@ -71,43 +71,43 @@ def actuators(anatomy: Anatomy) -> Described:
     return found
 
 
-def _at_site(anatomy: Anatomy, key: str, gear: Array, site: int, frame: int) -> Described:
-    """Force along and across the linkage's plane in the axes that it keeps, (Fx, Fy, Fz, Mx, My, Mz)."""
-    model, data = anatomy.model, anatomy.data
-    bar, bearer = anatomy.bar(model.site_bodyid[site]), anatomy.bar(model.site_bodyid[frame if frame >= 0 else site])
+def _at_site(topology: Topology, key: str, gear: Array, site: int, frame: int) -> Described:
+    """Resolve a force along and across the linkage's plane in the axes that it keeps, (Fx, Fy, Fz, Mx, My, Mz)."""
+    model, data = topology.model, topology.data
+    bar, bearer = topology.bar(model.site_bodyid[site]), topology.bar(model.site_bodyid[frame if frame >= 0 else site])
     axes = data.site_xmat[frame if frame >= 0 else site].reshape(3, 3)
     wrench: list[float] = []
     for vector in (axes @ gear[:3], axes @ gear[3:]):
-        x, y = anatomy.turned_back(bearer, vector) if bearer in MOVING_BARS else anatomy.in_plane(vector)
-        wrench += [float(x), float(y), float(vector @ anatomy.normal)]
+        x, y = topology.turned_back(bearer, vector) if bearer in MOVING_BARS else topology.in_plane(vector)
+        wrench += [float(x), float(y), float(vector @ topology.normal)]
     name = "no bar" if bar is None else f"the {BAR_NAMES[bar]}"
     turning = f"axes of the {BAR_NAMES[bearer]}" if bearer in MOVING_BARS else "world axes"
     at: Value = "anywhere: it has no force"
     if bar is not None and any(wrench[:3]):
-        at = anatomy.along_bar(bar, data.site_xpos[site])
+        at = topology.along_bar(bar, data.site_xpos[site])
     return {key: f"a site of {name}, in {turning}", f"{key}.site": at, f"{key}.gear": tuple(wrench)}
 
 
-def _target(anatomy: Anatomy, actuator: int) -> str:
-    model = anatomy.model
+def _target(topology: Topology, actuator: int) -> str:
+    model = topology.model
     kind, number = model.actuator_trntype[actuator], int(model.actuator_trnid[actuator, 0])
     if kind in (mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtTrn.mjTRN_JOINTINPARENT):
-        return f"pin {next(pin for pin, joint in anatomy.hinge.items() if joint == number)}"
+        return f"pin {next(pin for pin, joint in topology.hinge.items() if joint == number)}"
     return str(mujoco.mjtTrn(kind).name).removeprefix("mjTRN_").lower()
 
 
-def tendons(anatomy: Anatomy) -> Described:
-    """Every tendon: over which pins or between which points, and what it does."""
-    model, found = anatomy.model, Described()
+def tendons(topology: Topology) -> Described:
+    """Describe every tendon: over which pins or between which points, and what it does."""
+    model, found = topology.model, Described()
     for i in range(model.ntendon):
         key = f"tendons.{i}"
         found[f"{key}.name"] = model.tendon(i).name
         run = range(model.tendon_adr[i], model.tendon_adr[i] + model.tendon_num[i])
         spring = [float(x) for x in model.tendon_lengthspring[i]]
         if model.wrap_type[run[0]] == mujoco.mjtWrap.mjWRAP_JOINT:
-            found |= _over_pins(anatomy, key, run, spring, float(model.tendon_length0[i]))
+            found |= _over_pins(topology, key, run, spring, float(model.tendon_length0[i]))
         else:
-            found |= _between_points(anatomy, key, run)
+            found |= _between_points(topology, key, run)
             found[f"{key}.springlength"] = tuple(spring)
         for field, name in TENDON.items():
             found |= direct(model, field, i, f"{key}.{name}")
@@ -116,14 +116,14 @@ def tendons(anatomy: Anatomy) -> Described:
     return found
 
 
-def _over_pins(anatomy: Anatomy, key: str, run: range, spring: Sequence[float], rest: float) -> Described:
-    """A fixed tendon: its coefficients by pin, counter-clockwise positive; its spring by the angles of the bars."""
-    model, turns = anatomy.model, {}
-    for pin, joint in anatomy.hinge.items():
+def _over_pins(topology: Topology, key: str, run: range, spring: Sequence[float], rest: float) -> Described:
+    """Read a fixed tendon: coefficients by pin, counter-clockwise positive; its spring by the angles of the bars."""
+    model, turns = topology.model, {}
+    for pin, joint in topology.hinge.items():
         coefficients = [float(model.wrap_prm[w]) for w in run if model.wrap_objid[w] == joint]
         if coefficients:
-            turns[pin] = anatomy.sense[pin] * sum(coefficients)
-    at_rest = sum(turn * anatomy.rest_angle(pin) for pin, turn in turns.items())
+            turns[pin] = topology.sense[pin] * sum(coefficients)
+    at_rest = sum(turn * topology.rest_angle(pin) for pin, turn in turns.items())
     pins = sorted(turns)
     return {
         key: f"over the pins {', '.join(pins)}",
@@ -132,9 +132,9 @@ def _over_pins(anatomy: Anatomy, key: str, run: range, spring: Sequence[float], 
     }
 
 
-def _between_points(anatomy: Anatomy, key: str, run: range) -> Described:
-    """A spatial tendon: the points of the bars that it runs through; what it winds round counts as no point."""
-    model, data = anatomy.model, anatomy.data
+def _between_points(topology: Topology, key: str, run: range) -> Described:
+    """Read a spatial tendon: the points of the bars that it runs through; what it winds round counts as no point."""
+    model, data = topology.model, topology.data
     bars, path = [], []
     for w in run:
         if model.wrap_type[w] != mujoco.mjtWrap.mjWRAP_SITE:
@@ -142,7 +142,7 @@ def _between_points(anatomy: Anatomy, key: str, run: range) -> Described:
             path += [float(model.wrap_prm[w])]
             continue
         site = int(model.wrap_objid[w])
-        bar = anatomy.bar(model.site_bodyid[site])
+        bar = topology.bar(model.site_bodyid[site])
         bars.append("no bar" if bar is None else BAR_NAMES[bar])
-        path += () if bar is None else anatomy.along_bar(bar, data.site_xpos[site])
+        path += () if bar is None else topology.along_bar(bar, data.site_xpos[site])
     return {key: f"from {' to '.join(bars)}", f"{key}.path": tuple(path)}

@@ -25,7 +25,7 @@ ActuatorForce = Callable[[mujoco.MjModel, mujoco.MjData], float]
 
 
 def at_full_size(scene: Scene) -> Scene:
-    """The scene with loads over theta_2 at the largest size that they ever have: what MJCF can say of them."""
+    """Give the scene with loads over theta_2 at the largest size that they ever have: what MJCF can say of them."""
     loads = []
     for load in scene.loads:
         peak = _peak(load)
@@ -39,7 +39,7 @@ def _peak(load: Load) -> float:
 
 
 def of_loads(scene: Scene) -> dict[str, ActuatorForce]:
-    """For each load over theta_2, by the actuator's name, its factor at MuJoCo's own theta_2, by the largest."""
+    """Evaluate each load over theta_2, by the actuator's name: its factor at MuJoCo's own theta_2, by the largest."""
 
     def force_of(load: Load) -> ActuatorForce:
         table, peak = load.table, _peak(load)
@@ -58,7 +58,7 @@ def of_loads(scene: Scene) -> dict[str, ActuatorForce]:
 
 
 def within(scene: Scene, theta_2: Array) -> Array:
-    """Angles that overran the end of a table by a rounding of the motion, put back on it; LimitError beyond that."""
+    """Put angles that overran the end of a table by a rounding of the motion back on it; LimitError beyond that."""
     inside = theta_2.copy()
     for load in scene.loads:
         if load.table is None:
@@ -74,7 +74,7 @@ def within(scene: Scene, theta_2: Array) -> Array:
 
 
 def receiving(loop: ClosedLoop, supplied: dict[str, ActuatorForce]) -> ClosedLoop:
-    """A loop whose actuators of these names take their force from `supplying`."""
+    """Let the actuators of these names in a loop take their force from `supplying`."""
     for number in range(loop.model.nu):
         if loop.model.actuator(number).name in supplied:
             loop.model.actuator_biastype[number] = mujoco.mjtBias.mjBIAS_USER

@@ -19,7 +19,7 @@ WARNINGS = (mujoco.mjtWarning.mjWARN_BADQPOS, mujoco.mjtWarning.mjWARN_BADQVEL, 
 
 
 def load_force(model: mujoco.MjModel, data: mujoco.MjData, actuator: int) -> Array:
-    """World force of an actuator on a site, (3,): MuJoCo counts it into the force of the parent."""
+    """Return the world force of an actuator on a site, (3,): MuJoCo counts it into the force of the parent."""
     site, frame = model.actuator_trnid[actuator]
     axes = data.site_xmat[frame if frame >= 0 else site].reshape(3, 3)
     return np.asarray(axes @ model.actuator_gear[actuator, :3] * data.actuator_force[actuator])
@@ -44,11 +44,11 @@ class ClosedLoop(Assembled):
         return (float(x[0]), float(x[1]))
 
     def jacobian(self) -> Array:
-        """Derivative of the gap by the joint angles, (2, 3)."""
+        """Return the derivative of the gap by the joint angles, (2, 3)."""
         return self.jacobian_at("B3") - self.jacobian_at("B4")
 
     def jacobian_at(self, site: str) -> Array:
-        """Derivative of a site's position by the joint angles, (2, 3)."""
+        """Return the derivative of a site's position by the joint angles, (2, 3)."""
         mujoco.mj_jacSite(self.model, self.data, self._jac, None, self.site[site])
         return self._jac[:2].copy()
 
@@ -59,12 +59,12 @@ class ClosedLoop(Assembled):
         mujoco.mj_comPos(self.model, self.data)
 
     def positions(self) -> dict[str, Array]:
-        """Pins O4 and A, and B at the end of bar 3 and of bar 4, (2,), m."""
+        """Locate pins O4 and A, and B at the end of bar 3 and of bar 4, (2,), m."""
         x, names = self.data.site_xpos, {"O4": "O4", "A": "A", "B": "B3", "B4": "B4"}
         return {name: x[self.site[site]][:2].copy() for name, site in names.items()}
 
     def branch(self) -> int:
-        """The branch of the state that was last forwarded: det = -b c sin(theta_4 - theta_3)."""
+        """Return the branch of the state that was last forwarded: det = -b c sin(theta_4 - theta_3)."""
         return int(-np.sign(np.linalg.det(self.jacobian()[:, [A, O4]])))
 
     def set_state(self, q: Sequence[float], omega_2: float) -> None:
@@ -79,13 +79,13 @@ class ClosedLoop(Assembled):
         mujoco.mj_rnePostConstraint(self.model, self.data)
 
     def forces(self) -> dict[str, Array]:
-        """Pin forces of the state that was last forwarded, world axes, N."""
+        """Read the pin forces of the state that was last forwarded, world axes, N."""
         on = self.carried()
         closure = self.data.efc_force[:2].copy()
         return {"F12": on["input"], "F32": -on["coupler"], "F43": closure, "F14": on["output"]}
 
     def carried(self) -> dict[str, Array]:
-        """Force of the parent on each bar and all that the bar carries, world axes, N.
+        """Read the force of the parent on each bar and all that the bar carries, world axes, N.
 
         That is cfrc_int, but MuJoCo counts the forces
         of actuators on sites into it; they are taken out again. Those of tendons it keeps apart.
@@ -105,18 +105,18 @@ class ClosedLoop(Assembled):
         return float(flywheel + motor)
 
     def keeps_centre(self, name: str) -> bool:
-        """Whether the compiler left a bar's mass centre where the file has it, and not at the bar's origin."""
+        """Tell whether the compiler left a bar's mass centre where the file has it, and not at the bar's origin."""
         return int(self.model.body_sameframe[self.body[name]]) != int(mujoco.mjtSameFrame.mjSAMEFRAME_BODY)
 
     def bad(self) -> int:
-        """Warnings of a bad position, velocity or acceleration: each resets the data."""
+        """Count warnings of a bad position, velocity or acceleration: each resets the data."""
         return sum(int(self.data.warning[kind].number) for kind in WARNINGS)
 
 
 def couple_elsewhere(
     loop: ClosedLoop, light: ClosedLoop, drive_bar: int, alpha_2: float, crank_torque: float
 ) -> float | None:
-    """The couple on bar 3 or 4 with which the crank accelerates as it did, or None where it does not move the crank.
+    """Solve for the couple on bar 3 or 4 that accelerates the crank as before; None where it does not move the crank.
 
     The accelerations are linear in the couple; two trials give it, and `light` is left at a third, to be read.
 
@@ -152,7 +152,7 @@ def couple_elsewhere(
 def couple_for(
     acceleration: Callable[[float], float], wanted: float, low: float, high: float, refinements: int = 0
 ) -> float | None:
-    """The couple under which an acceleration, linear in it, is the wanted one, and which was evaluated last.
+    """Solve for the couple under which an acceleration, linear in it, is the wanted one, and which was evaluated last.
 
     None where it does not depend on the couple. The difference of the two trials loses digits: each refinement, from
     where the couple before leads, brings some of them back.

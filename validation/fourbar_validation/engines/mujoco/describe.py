@@ -7,9 +7,9 @@ import mujoco
 import numpy as np
 
 from fourbar.linkage import BAR_NAMES, FIRST_PIN, MOVING_BARS
-from fourbar_validation.engines.mujoco.anatomy import ENDS, Anatomy
 from fourbar_validation.engines.mujoco.attached import Described, actuators, direct, limits, on_the_drive, tendons
 from fourbar_validation.engines.mujoco.fields import COUNTED, FLAGS, PIN, list_of, members
+from fourbar_validation.engines.mujoco.topology import ENDS, Topology
 
 NOT_HERE = ("opt", "stat", "vis")
 ENUMERATIONS = {"integrator": ("mjtIntegrator", "mjINT_"), "solver": ("mjtSolver", "mjSOL_")}
@@ -19,27 +19,27 @@ OPTIONS = (
 )
 
 
-def described(anatomy: Anatomy) -> Described:
+def described(topology: Topology) -> Described:
     """Lengths, masses, pins, closure, drive and options as compiled; numbers in SI and rad."""
-    model = anatomy.model
-    found: Described = {"plane": anatomy.plane}
+    model = topology.model
+    found: Described = {"plane": topology.plane}
     for bar, name in BAR_NAMES.items():
-        found[f"lengths.{name}"] = anatomy.length(bar)
-    found["lengths.ground_angle"] = anatomy.ground_angle
+        found[f"lengths.{name}"] = topology.length(bar)
+    found["lengths.ground_angle"] = topology.ground_angle
     for bar in MOVING_BARS:
-        found |= _bar(anatomy, bar)
+        found |= _bar(topology, bar)
     gravity = model.opt.gravity * _on(model, "GRAVITY")
-    found["gravity.x"], found["gravity.y"] = (float(g) for g in anatomy.in_plane(gravity))
-    found["gravity.across"] = float(gravity @ anatomy.normal)
-    for pin, joint in sorted(anatomy.hinge.items()):
-        found |= _pin(anatomy, pin, joint)
-    found |= _closure(anatomy)
+    found["gravity.x"], found["gravity.y"] = (float(g) for g in topology.in_plane(gravity))
+    found["gravity.across"] = float(gravity @ topology.normal)
+    for pin, joint in sorted(topology.hinge.items()):
+        found |= _pin(topology, pin, joint)
+    found |= _closure(topology)
     found |= _options(model)
-    found |= actuators(anatomy) | tendons(anatomy)
+    found |= actuators(topology) | tendons(topology)
     others = [
         model.equality(i).name or f"(unnamed {i})"
         for i in range(model.neq)
-        if i != anatomy.closure and model.eq_active0[i]
+        if i != topology.closure and model.eq_active0[i]
     ]
     found["other equalities"] = ", ".join(others) or "none"
     found |= {f"others.{name}": float(getattr(model, field, 0)) for field, name in COUNTED.items()}
@@ -50,44 +50,44 @@ def described(anatomy: Anatomy) -> Described:
     return found
 
 
-def called(anatomy: Anatomy) -> dict[str, str]:
+def called(topology: Topology) -> dict[str, str]:
     """Part of a key: the element of the user's file that it is of."""
-    model = anatomy.model
+    model = topology.model
 
     def element(word: str, name: str, number: int) -> str:
         return f'{word} "{name}"' if name else f"{word} {number} (unnamed)"
 
-    found = {f"bars.{BAR_NAMES[bar]}": f'body "{model.body(anatomy.root[bar]).name}"' for bar in MOVING_BARS}
-    for pin, joint in anatomy.hinge.items():
+    found = {f"bars.{BAR_NAMES[bar]}": f'body "{model.body(topology.root[bar]).name}"' for bar in MOVING_BARS}
+    for pin, joint in topology.hinge.items():
         found[f"pins.{pin}"] = element("joint", model.joint(joint).name, joint)
-    if anatomy.closure is not None:
-        number = anatomy.closure
-        found["closure"] = element(anatomy.closed_by.partition(" ")[0], model.equality(number).name, number)
+    if topology.closure is not None:
+        number = topology.closure
+        found["closure"] = element(topology.closed_by.partition(" ")[0], model.equality(number).name, number)
     for i in range(len(model.actuator_trntype)):
         found[f"actuators.{i}"] = element("actuator", model.actuator(i).name, i)
     return found | {f"tendons.{i}": element("tendon", model.tendon(i).name, i) for i in range(model.ntendon)}
 
 
 def _on(model: mujoco.MjModel, *features: str) -> bool:
-    """Whether no flag switches a feature off; a flag that this MuJoCo does not have switches nothing."""
+    """Tell whether no flag switches a feature off; a flag that this MuJoCo does not have switches nothing."""
     flags = mujoco.mjtDisableBit
     return not any(model.opt.disableflags & getattr(flags, f"mjDSBL_{name}", 0) for name in features)
 
 
-def _bar(anatomy: Anatomy, bar: int) -> Described:
+def _bar(topology: Topology, bar: int) -> Described:
     """Mass, mass centre from the first pin, and inertia about it, of a body and all that is welded to it."""
-    model, data = anatomy.model, anatomy.data
-    parts = np.flatnonzero(model.body_weldid == anatomy.root[bar])
+    model, data = topology.model, topology.data
+    parts = np.flatnonzero(model.body_weldid == topology.root[bar])
     masses = model.body_mass[parts]
     mass = float(masses.sum())
-    at = np.array([anatomy.in_plane(data.xipos[part]) for part in parts])
+    at = np.array([topology.in_plane(data.xipos[part]) for part in parts])
     centre = masses @ at / mass if mass else at[0]
     inertia = 0.0
     for part, m, x in zip(parts, masses, at, strict=True):
-        across = data.ximat[part].reshape(3, 3).T @ anatomy.normal
+        across = data.ximat[part].reshape(3, 3).T @ topology.normal
         inertia += float(across**2 @ model.body_inertia[part] + m * (x - centre) @ (x - centre))
-    arm = centre - anatomy.in_plane(anatomy.world(data, bar, FIRST_PIN[bar]))
-    x, y = anatomy.line(data, bar)
+    arm = centre - topology.in_plane(topology.world(data, bar, FIRST_PIN[bar]))
+    x, y = topology.line(data, bar)
     key = f"bars.{BAR_NAMES[bar]}"
     angle = math.remainder(math.atan2(arm[1], arm[0]) - math.atan2(y, x), math.tau) if arm.any() else 0.0
     where = {f"{key}.centre.distance": math.hypot(*arm), f"{key}.centre.angle": angle}
@@ -95,8 +95,8 @@ def _bar(anatomy: Anatomy, bar: int) -> Described:
     return {f"{key}.mass": mass, f"{key}.inertia": inertia, **where, f"{key}.gravcomp": held}
 
 
-def _pin(anatomy: Anatomy, pin: str, joint: int) -> Described:
-    model = anatomy.model
+def _pin(topology: Topology, pin: str, joint: int) -> Described:
+    model = topology.model
     dof = model.jnt_dofadr[joint]
     spring, damper = (float(_on(model, name, "PASSIVE")) for name in ("SPRING", "DAMPER"))
     key = f"pins.{pin}"
@@ -105,24 +105,24 @@ def _pin(anatomy: Anatomy, pin: str, joint: int) -> Described:
         f"{key}.friction": float(model.dof_frictionloss[dof]) * _on(model, "FRICTIONLOSS"),
         f"{key}.stiffness": spring * float(model.jnt_stiffness[joint]),
         f"{key}.armature": float(model.dof_armature[dof]),
-        f"{key}.positive": "counter-clockwise" if anatomy.sense[pin] > 0 else "clockwise",
+        f"{key}.positive": "counter-clockwise" if topology.sense[pin] > 0 else "clockwise",
     }
     address = model.jnt_qposadr[joint]
-    turned = anatomy.sense[pin] * float(model.qpos_spring[address] - model.qpos0[address])
-    found[f"{key}.spring angle"] = anatomy.rest_angle(pin) + turned
+    turned = topology.sense[pin] * float(model.qpos_spring[address] - model.qpos0[address])
+    found[f"{key}.spring angle"] = topology.rest_angle(pin) + turned
     for field, name in PIN.items():
         found |= direct(model, field, dof if field.startswith("dof") else joint, f"{key}.{name}")
     for field in ("jnt_range", "jnt_actfrcrange"):
         found |= limits(model, field, joint, key, switched_on=field != "jnt_range" or _on(model, "LIMIT"))
-    return found | on_the_drive(anatomy, pin)
+    return found | on_the_drive(topology, pin)
 
 
-def _closure(anatomy: Anatomy) -> Described:
-    model, number = anatomy.model, anatomy.closure
-    found: Described = {"closure.pin": anatomy.cut, "closure.by": anatomy.closed_by}
-    first, second = (bar for bar, ends in ENDS.items() if anatomy.cut in ends)
-    gap = anatomy.world(anatomy.data, first, anatomy.cut) - anatomy.world(anatomy.data, second, anatomy.cut)
-    found["closure.out of plane"] = abs(float(gap @ anatomy.normal))
+def _closure(topology: Topology) -> Described:
+    model, number = topology.model, topology.closure
+    found: Described = {"closure.pin": topology.cut, "closure.by": topology.closed_by}
+    first, second = (bar for bar, ends in ENDS.items() if topology.cut in ends)
+    gap = topology.world(topology.data, first, topology.cut) - topology.world(topology.data, second, topology.cut)
+    found["closure.out of plane"] = abs(float(gap @ topology.normal))
     if number is None:
         return found
     bodies = (model.eq_obj1id[number], model.eq_obj2id[number])

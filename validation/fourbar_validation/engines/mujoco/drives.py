@@ -43,11 +43,11 @@ class Driven(ClosedLoop):
         self.servo = drive[0] if drive else None
 
     def add_drive(self, root: ET.Element) -> None:
-        """Add the drive to the text."""
+        """Add kp (act - theta_2) + kv (omega - omega_2), act integrating omega."""
         raise NotImplementedError
 
     def crank_torque(self) -> float:
-        """What the actuator gives the crank."""
+        """Read what the actuator gives the crank."""
         return float(self.data.actuator_force[self.servo])
 
 
@@ -65,7 +65,7 @@ class Actuated(Driven):
         super().__init__(mjcf, omega)
 
     def add_drive(self, root: ET.Element) -> None:
-        """kp (act - theta_2) + kv (omega - omega_2), act integrating omega."""
+        """Add kp (act - theta_2) + kv (omega - omega_2), act integrating omega."""
         kp, kv = self.kp * self.flywheel * self.omega**2, self.kv * self.flywheel * abs(self.omega)
         actuators = root.find("actuator")
         actuators = ET.SubElement(root, "actuator") if actuators is None else actuators
@@ -74,7 +74,7 @@ class Actuated(Driven):
         ET.SubElement(actuators, "general", servo, biasprm=numbers(kv * self.omega, -kp, -kv), name="servo", joint="O2")
 
     def set_state(self, q: Sequence[float], omega_2: float) -> None:
-        """The target starts where the crank is."""
+        """Start the target where the crank is."""
         super().set_state(q, omega_2)
         if self.kp:
             self.data.act[:] = q[O2]
@@ -98,7 +98,7 @@ class WheelEquality(Driven):
         self.row = 3  # the closure takes three rows, the joint equality the next
 
     def add_drive(self, root: ET.Element) -> None:
-        """The wheel comes last, so that O2, A, O4 stay the first degrees of freedom."""
+        """Add the wheel last, so that O2, A, O4 stay the first degrees of freedom."""
         ground, equality = root.find(".//body[@name='ground']"), root.find("equality")
         assert ground is not None and equality is not None
         wheel = ET.SubElement(ground, "body", name="wheel")
@@ -110,16 +110,16 @@ class WheelEquality(Driven):
         ET.SubElement(equality, "joint", softness, joint1="O2", joint2="wheel", polycoef="0 1 0 0 0")
 
     def place(self, q: Sequence[float]) -> None:
-        """The wheel stands where the crank does."""
+        """Place the wheel where the crank is."""
         super().place((*q, q[O2]))
 
     def set_state(self, q: Sequence[float], omega_2: float) -> None:
-        """The wheel turns as the crank does."""
+        """Let the wheel rotate as the crank does."""
         super().set_state(q, omega_2)
         self.data.qvel[3] = omega_2
 
     def crank_torque(self) -> float:
-        """The multiplier of the joint equality: its row of the Jacobian is 1 at the crank."""
+        """Read the multiplier of the joint equality: its row of the Jacobian is 1 at the crank."""
         return float(self.data.efc_force[self.row])
 
 
@@ -128,7 +128,7 @@ StiffWheelEquality = partial(WheelEquality, softness=1e-8)
 
 
 def without(mjcf: str, attributes: Mapping[str, Sequence[str]]) -> str:
-    """A text without these attributes of the elements at these paths: what they say is left to MuJoCo."""
+    """Remove these attributes of the elements at these paths from a text: what they say is left to MuJoCo."""
     root = ET.fromstring(mjcf)
     for path, names in attributes.items():
         element = root.find(path)

@@ -171,13 +171,13 @@ FLAGS = {
 
 
 def members(thing: Any) -> list[str]:
-    """The fields of a model or of its options, read off the object itself."""
+    """List the fields of a model or of its options, read off the object itself."""
     return [name for name in dir(thing) if not name.startswith("_") and not callable(getattr(thing, name))]
 
 
 @cache
 def list_of(field: str) -> str | None:
-    """The list that knows a field, the first that fits; None: no list does."""
+    """Find the list that knows a field, the first that fits; None: no list does."""
     if field in COMPARED:
         return "COMPARED"
     lists = {"GATED": GATED, "CANNOT_ACT": CANNOT_ACT, "FOLLOWS": FOLLOWS}

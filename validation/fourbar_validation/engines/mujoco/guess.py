@@ -8,7 +8,7 @@ import mujoco
 
 from fourbar.errors import InputError
 from fourbar.linkage import BAR_NAMES, MOVING_BARS
-from fourbar_validation.engines.mujoco.anatomy import Anatomy, bodies_of, body_named, stated_body
+from fourbar_validation.engines.mujoco.topology import Topology, bodies_of, body_named, stated_body
 
 ROLES = tuple(BAR_NAMES[bar] for bar in MOVING_BARS)
 SITES = ("B3", "B4")
@@ -18,8 +18,10 @@ MOST_BODIES = 8
 """Bodies on hinges among which three are looked for."""
 
 
-def anatomy_of(model: mujoco.MjModel, names: Mapping[str, str], lengths: Sequence[float]) -> tuple[Anatomy, list[str]]:
-    """The four-bar in a model, and a note on what was guessed; names that are stated, or in the file, stand.
+def find_topology(
+    model: mujoco.MjModel, names: Mapping[str, str], lengths: Sequence[float]
+) -> tuple[Topology, list[str]]:
+    """Find the four-bar in a model; add a note on what was guessed. Names that are given, or in the file, stand.
 
     Parameters
     ----------
@@ -30,11 +32,11 @@ def anatomy_of(model: mujoco.MjModel, names: Mapping[str, str], lengths: Sequenc
     known = {role: names.get(role, role) for role in (*ROLES, *SITES)}
     bodies = [stated_body(model, names, role) if role in names else body_named(model, role) for role in ROLES]
     if None not in bodies and (_site(model, known["B3"]) or names.keys() & {*SITES} or not _open_sites(model)):
-        return Anatomy(model, names), []
+        return Topology(model, names), []
     candidates = sorted({int(model.body_weldid[model.jnt_bodyid[joint]]) for joint in range(model.njnt)})
     free = [body for body in candidates if body not in bodies]
     missing = [role for role, body in zip(ROLES, bodies, strict=True) if body is None]
-    found: list[tuple[float, bool, Anatomy, dict[str, str]]] = []
+    found: list[tuple[float, bool, Topology, dict[str, str]]] = []
     refused: list[str] = []
     for chosen in permutations(free[:MOST_BODIES], len(missing)):
         guess = {role: model.body(body).name for role, body in zip(missing, chosen, strict=True)}
@@ -43,8 +45,8 @@ def anatomy_of(model: mujoco.MjModel, names: Mapping[str, str], lengths: Sequenc
             continue
         for sites in _sites(model, {**known, **guess}, names):
             try:
-                anatomy = Anatomy(model, {**names, **guess, **sites})
-                found.append((_misfit(anatomy, lengths), not anatomy.drives(), anatomy, {**guess, **sites}))
+                topology = Topology(model, {**names, **guess, **sites})
+                found.append((_misfit(topology, lengths), not topology.drives(), topology, {**guess, **sites}))
             except InputError as error:
                 refused.append(error.allowed)
     if not found:
@@ -55,11 +57,11 @@ def anatomy_of(model: mujoco.MjModel, names: Mapping[str, str], lengths: Sequenc
         )
         why = refused[0] if refused else few
         nowhere = f"no body is named {', '.join(missing) or 'B3, B4'}, and no guess makes a four-bar ({why})"
-        raise InputError("--mjcf", bodies_of(model), f"{nowhere}; say which is which: --name input=BODY, and so on")
+        raise InputError("MJCF", bodies_of(model), f"{nowhere}; say which is which: --name input=BODY, and so on")
     best = min(each[0] for each in found)
-    _, _, anatomy, guessed = min((each for each in found if each[0] <= best + ALIKE), key=lambda each: each[1])
+    _, _, topology, guessed = min((each for each in found if each[0] <= best + ALIKE), key=lambda each: each[1])
     pairs = ", ".join(f"{role}={name}" for role, name in guessed.items())
-    return anatomy, [f"guessed from what hangs together and from the lengths: {pairs} (--name states it otherwise)"]
+    return topology, [f"guessed from what hangs together and from the lengths: {pairs} (--name states it otherwise)"]
 
 
 def _site(model: mujoco.MjModel, name: str) -> bool:
@@ -67,13 +69,13 @@ def _site(model: mujoco.MjModel, name: str) -> bool:
 
 
 def _open_sites(model: mujoco.MjModel) -> bool:
-    """Whether only sites can say where the loop closes."""
+    """Tell whether only sites can say where the loop closes."""
     kinds = mujoco.mjtEq
     return not any(kinds(kind) in (kinds.mjEQ_CONNECT, kinds.mjEQ_WELD) for kind in model.eq_type)
 
 
 def _sites(model: mujoco.MjModel, known: Mapping[str, str], names: Mapping[str, str]) -> list[dict[str, str]]:
-    """Pairs of sites that may mark pin B; none need be stated where a connect or a weld closes the loop."""
+    """List pairs of sites that may mark pin B; none need be given where a connect or a weld closes the loop."""
     if not _open_sites(model) or names.keys() & {*SITES} or _site(model, known["B3"]):
         return [{}]
     on = {role: [model.site(i).name for i in range(model.nsite) if model.site(i).name
@@ -82,9 +84,9 @@ def _sites(model: mujoco.MjModel, known: Mapping[str, str], names: Mapping[str, 
     return [{"B3": three, "B4": four} for three in on["coupler"] for four in on["output"]]
 
 
-def _misfit(anatomy: Anatomy, lengths: Sequence[float]) -> float:
-    """How far its lengths are from the scene's: the sum of |log ratio|."""
-    theirs = [anatomy.length(bar) for bar in BAR_NAMES]
+def _misfit(topology: Topology, lengths: Sequence[float]) -> float:
+    """Measure how far its lengths are from the scene's: the sum of |log ratio|."""
+    theirs = [topology.length(bar) for bar in BAR_NAMES]
     if min(theirs) <= 0.0:
         return math.inf
     return sum(abs(math.log(one / other)) for one, other in zip(theirs, lengths, strict=True))

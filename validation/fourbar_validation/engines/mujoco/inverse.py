@@ -18,7 +18,7 @@ from fourbar_validation.engines.tree import Tree
 
 
 def refusal(scene: Scene) -> str:
-    """The declared limit that a scene meets, or nothing."""
+    """Name the declared limit that a scene meets, if any."""
     if reason := unknown_effect(scene, TERM_OF):
         return reason
     for part in parts(scene.linkage):
@@ -38,7 +38,7 @@ class MujocoTree(Tree):
         spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT | mujoco.mjtDisableBit.mjDSBL_CONTACT
         bodies: dict[int, Any] = {1: spec.worldbody}
         for part in parts(scene.linkage):
-            body = bodies[part.bar] = bodies[part.bearer].add_body(name=f"bar{part.bar}", pos=[*part.foot, 0.0])
+            body = bodies[part.bar] = bodies[part.bearer].add_body(name=f"bar{part.bar}", pos=[*part.first_pin, 0.0])
             body.explicitinertial = True
             body.mass, body.ipos, body.inertia = part.mass, [*part.centre, 0.0], [part.inertia] * 3
             body.add_joint(name=FIRST_PIN[part.bar], type=mujoco.mjtJoint.mjJNT_HINGE, axis=[0.0, 0.0, 1.0])
@@ -74,11 +74,11 @@ class MujocoTree(Tree):
         return np.asarray(self.at[name])
 
     def rotation(self, bar: int) -> Array:
-        """That of the body."""
+        """Return that of the body."""
         return np.asarray(self.turned_to[bar])
 
     def point_jacobian(self, name: str) -> Array:
-        """Of a site."""
+        """Return that of a site."""
         mujoco.mj_jacSite(self.model, self.data, self._jac, None, self.site[name])
         return self._jac[:2].copy()
 
@@ -88,7 +88,7 @@ class MujocoTree(Tree):
         return np.array(self._jac[2])
 
     def set_motion(self, v: Array, a: Array) -> None:
-        """Speeds of the bodies."""
+        """Set the speeds of the bodies."""
         self.data.qvel[:], self.data.qacc[:] = v, a
         mujoco.mj_comVel(self.model, self.data)
 

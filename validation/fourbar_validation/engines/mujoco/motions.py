@@ -1,4 +1,4 @@
-"""The input's motion through a stretch of positions, in time: steadily, or by a motion law."""
+"""The input's motion through a segment of positions, in time: steadily, or by a motion law."""
 
 import bisect
 import math
@@ -17,24 +17,24 @@ LOOKED_AT = 2000
 
 
 class Steady:
-    """A stretch of positions in the order of their angles, at constant alpha_2.
+    """A segment of positions in the order of their angles, at constant alpha_2.
 
     As of `Lawful`, `omega` is the speed at the start and `fastest` the greatest |omega_2|, rad/s.
     """
 
-    def __init__(self, command: Command, stretch: Sequence[int], omega: float, alpha: float) -> None:
+    def __init__(self, command: Command, segment: Sequence[int], omega: float, alpha: float) -> None:
         self.theta_2 = command.theta_2
-        commanded = command.theta_2[list(stretch)]
+        commanded = command.theta_2[list(segment)]
         self.run = run_through(commanded, omega, alpha)
         self.width = len(np.unique(commanded)) - 1
         self.omega, self.fastest = omega, self.run.fastest
 
     def timestep(self, settings: Settings) -> float:
-        """Of the settings for this stretch, s: at least as many steps as positions; any where there is but one."""
+        """Choose the timestep for this segment, s: at least as many steps as positions; any where there is but one."""
         return self.run.timestep(settings, at_least=self.width) if self.width else 1e-3
 
     def seconds(self, index: int) -> float:
-        """When it passes a position, from the start of the stretch: by the angle."""
+        """When it passes a position, from the start of the segment: by the angle."""
         return self.run.time(float(self.theta_2[index]))
 
     def speed(self, turned: float, seconds: float) -> float:
@@ -42,18 +42,18 @@ class Steady:
         return math.sqrt(max(self.run.omega**2 + 2.0 * self.run.alpha * turned, 0.0))
 
     def alpha(self, seconds: float) -> float:
-        """What the drive is given, rad/s^2: the same throughout."""
+        """Return what the drive is given, rad/s^2: the same throughout."""
         return self.run.alpha
 
 
 class Lawful:
-    """A stretch of positions in the order of their times, by a motion law."""
+    """A segment of positions in the order of their times, by a motion law."""
 
-    def __init__(self, law: Law, command: Command, stretch: Sequence[int]) -> None:
+    def __init__(self, law: Law, command: Command, segment: Sequence[int]) -> None:
         assert command.time is not None
         self.law, self.time = law, command.time
-        self.began, ends = float(command.time[stretch[0]]), float(command.time[stretch[-1]])
-        self.intervals, self.duration = len(stretch) - 1, ends - self.began
+        self.began, ends = float(command.time[segment[0]]), float(command.time[segment[-1]])
+        self.intervals, self.duration = len(segment) - 1, ends - self.began
         self.omega = float(law.at(np.array([self.began]))[1][0])
         self.knots = list(law.time)
         self.at_knots = law.at(np.array(law.time))[2].tolist()
@@ -61,7 +61,7 @@ class Lawful:
         self.fastest, self.width = float(np.abs(speeds).max()), float(np.ptp(angles))
 
     def timestep(self, settings: Settings) -> float:
-        """A whole number of steps from each position to the next."""
+        """Divide the time from each position to the next into a whole number of steps."""
         if not self.intervals:
             return 1e-3
         turned = self.duration * self.fastest
@@ -72,22 +72,22 @@ class Lawful:
         return self.duration / (self.intervals * each) * settings.timestep_scale
 
     def seconds(self, index: int) -> float:
-        """As the law was sampled."""
+        """Return it as the law was sampled."""
         return float(self.time[index]) - self.began
 
     def speed(self, turned: float, seconds: float) -> float:
-        """By the time."""
+        """Return it by the time."""
         return float(abs(self.law.at(np.array([self.began + seconds]))[1][0]))
 
     def alpha(self, seconds: float) -> float:
-        """The second derivative of cubic pieces is linear between their ends."""
+        """Interpolate linearly, as the second derivative of cubic pieces is."""
         at, t, f = self.began + seconds, self.knots, self.at_knots
         k = min(max(bisect.bisect_right(t, at), 1), len(t) - 1)
         part = (at - t[k - 1]) / (t[k] - t[k - 1])
         return float(f[k - 1] + part * (f[k] - f[k - 1]))
 
 
-Passage = Steady | Lawful
+MotionSegment = Steady | Lawful
 
 
 def extremes(law: Law) -> tuple[float, float]:
@@ -97,7 +97,7 @@ def extremes(law: Law) -> tuple[float, float]:
 
 
 def order_in_time(command: Command, omega: float, law: Law | None) -> NDArray[np.intp]:
-    """Indices of the positions as they are passed."""
+    """Order the positions as they are passed, as indices."""
     if law is not None:
         assert command.time is not None
         return np.argsort(command.time, kind="stable")

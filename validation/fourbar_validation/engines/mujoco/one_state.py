@@ -36,7 +36,7 @@ class MujocoOneState:
     name: str = NAME
 
     def answer(self, scene: Scene, command: Command) -> Answer:
-        """Its answer, or the refusal of a bar that MuJoCo cannot hold."""
+        """Answer, or refuse a bar that MuJoCo cannot hold."""
         began = time.perf_counter()
         setting = "extrapolated" if len(self.impedances) > 1 else f"d = {self.impedances[0]:g}"
         try:
@@ -57,7 +57,7 @@ class MujocoOneState:
 
 
 def extrapolated(impedances: tuple[float, ...], rungs: list[dict[str, Array]]) -> dict[str, Array]:
-    """The value at x = 0 of the polynomial in x = (1-d)/d through the rungs (Lagrange)."""
+    """Extrapolate to x = 0 the polynomial in x = (1-d)/d through the rungs (Lagrange)."""
     x = np.array([(1.0 - d) / d for d in impedances])
     weights = [float(np.prod([xj / (xj - xi) for j, xj in enumerate(x) if j != i])) for i, xi in enumerate(x)]
     return {name: sum(w * rung[name] for w, rung in zip(weights, rungs, strict=True)) for name in rungs[0]}  # type: ignore[misc]
@@ -66,7 +66,7 @@ def extrapolated(impedances: tuple[float, ...], rungs: list[dict[str, Array]]) -
 def _one_impedance(
     scene: Scene, command: Command, d: float, pad: float | None
 ) -> tuple[dict[str, Array], NDArray[np.bool_]]:
-    """Torque and pin forces at every position that assembles."""
+    """Compute torque and pin forces at every position that assembles."""
     # no flywheel: the torque is on the driven bar itself
     settings = Settings(timestep=1e-3, impedance=d, pad=pad, flywheel=0.0)
     loop = ClosedLoop(mjcf(scene, settings, keyframe=False))
@@ -80,7 +80,7 @@ def _one_impedance(
 
 
 def _torque(loop: ClosedLoop, acts_on: list[int], alpha: float) -> float | None:
-    """The couple that gives the crank its acceleration; None at a pole of the torque."""
+    """Solve for the couple that gives the crank its acceleration; None at a pole of the torque."""
     d = loop.data
 
     def crank_acceleration(couple: float) -> float:

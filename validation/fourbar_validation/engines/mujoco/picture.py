@@ -46,7 +46,7 @@ def pictures(texts: dict[str, str]) -> tuple[dict[str, str], str]:
 
 
 def draw(texts: dict[str, str]) -> dict[str, str]:
-    """The same in this process."""
+    """Draw in this process."""
     import matplotlib.image
     import mujoco
 

@@ -10,7 +10,7 @@ from fourbar.errors import InputError
 from fourbar.mjcf import RECIPE, mjcf
 from fourbar.scene import Scene, command
 from fourbar_validation.compare.answer import Array, Released
-from fourbar_validation.engines.loop import LimitWatch, Position
+from fourbar_validation.engines.loop import Assembler, LimitDetector
 from fourbar_validation.engines.mujoco.closed_loop import O2, O4, A, ClosedLoop
 from fourbar_validation.engines.mujoco.runner import Stepper
 
@@ -32,7 +32,7 @@ class MujocoForward:
         self.step = step
 
     def release(self, scene: Scene, times: Array) -> Released:
-        """The motion at the given times, rising from 0 (s)."""
+        """Integrate the motion at the given times, rising from 0 (s)."""
         setting, start = f"RK4 {self.step:g} s", command(scene)
         interval = float(times[1] - times[0])  # the times are evenly spaced; the step divides the interval
         timestep = interval / math.ceil(interval / self.step - 1e-6)
@@ -42,16 +42,16 @@ class MujocoForward:
             loop = ClosedLoop(mjcf(bare, settings, keyframe=False))
         except InputError as error:
             return Released.refused(NAME, setting, str(error))
-        q_0 = Position(loop).find(float(start.theta_2[0]), int(start.branch[0]))
+        q_0 = Assembler(loop).find(float(start.theta_2[0]), int(start.branch[0]))
         if q_0 is None:
             return Released.refused(NAME, setting, "the loop does not close at the start")
         loop.model.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_ENERGY
         loop.set_state(q_0, scene.motion.omega_2 or 0.0)
-        rows, q, watch = [], loop.data.qpos, LimitWatch(int(start.branch[0]))
+        rows, q, detector = [], loop.data.qpos, LimitDetector(int(start.branch[0]))
         stepper, work = Stepper(loop.model, loop.data, timestep), _Work(loop.model, loop.data, timestep)
 
         def look(time: float) -> None:
-            watch.look(time, q[O2] + q[A], q[O4])
+            detector.look(time, q[O2] + q[A], q[O4])
             work.add()
 
         for t in times:
@@ -60,7 +60,7 @@ class MujocoForward:
             terms = np.array([*loop.data.energy, -work.done])
             rows.append((loop.data.qpos[O2], loop.data.qvel[O2], terms.sum(), np.abs(terms).sum()))
         theta_2, omega, energy, terms = np.array(rows).T
-        return Released(NAME, setting, theta_2, omega, energy, terms, watch.stopped_at)
+        return Released(NAME, setting, theta_2, omega, energy, terms, detector.stopped_at)
 
 
 class _Work:
@@ -75,7 +75,7 @@ class _Work:
         self.before = self._power()
 
     def add(self) -> None:
-        """Of the step just made; after a Runge-Kutta step some fields are still of the step before."""
+        """Add the step just made; after a Runge-Kutta step some fields are still of the step before."""
         if self.any:
             mujoco.mj_forward(self.model, self.data)
             now = self._power()

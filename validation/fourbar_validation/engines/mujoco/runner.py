@@ -8,9 +8,9 @@ import mujoco
 from fourbar.mjcf.effects import unwound
 from fourbar.scene import Command, Scene
 from fourbar_validation.compare.answer import Array
-from fourbar_validation.engines.loop import Position
+from fourbar_validation.engines.loop import Assembler
 from fourbar_validation.engines.mujoco.closed_loop import O2, ClosedLoop, couple_elsewhere
-from fourbar_validation.engines.mujoco.motions import Passage
+from fourbar_validation.engines.mujoco.motions import MotionSegment
 
 LIGHT_FLYWHEEL = 1e4
 """Flywheel of the model that gives T3 or T4: heavy enough to keep the closure's softness
@@ -26,7 +26,7 @@ class Stepper:
         self.model, self.data, self.timestep, self.done = model, data, timestep, 0
 
     def to(self, seconds: float, each: Callable[[float], None] | None = None) -> None:
-        """On to the step nearest to a time; `each` is called with the time after every step."""
+        """Step on to the step nearest to a time; `each` is called with the time after every step."""
         steps = round(seconds / self.timestep) - self.done
         if each is None:
             if steps > 0:
@@ -44,7 +44,7 @@ class Stepper:
         return self.done * self.timestep
 
     def lost(self) -> bool:
-        """Whether MuJoCo reset the data: that starts time again, and clears the warnings."""
+        """Tell whether MuJoCo reset the data: that starts time again, and clears the warnings."""
         return bool(self.data.time < self.time * (1.0 - 1e-6))
 
 
@@ -56,40 +56,40 @@ class Reading(NamedTuple):
     forces: dict[str, Array]
 
 
-class Run:
-    """One stretch of positions at a prescribed motion; `light` is the model that a drive on bar 3 or 4 is read from."""
+class SimulatedRun:
+    """One segment of positions at a prescribed motion; `light` is the model that a drive on bar 3 or 4 is read from."""
 
     def __init__(
         self,
         scene: Scene,
         loop: ClosedLoop,
         light: ClosedLoop | None,
-        passage: Passage,
+        motion_segment: MotionSegment,
         start: tuple[float, float, float],
         timestep: float,
     ) -> None:
-        self.scene, self.loop, self.light, self.passage = scene, loop, light, passage
+        self.scene, self.loop, self.light, self.motion_segment = scene, loop, light, motion_segment
         wound = unwound(scene, start)
         self.turns = wound[O2] - start[O2]
         """Whole turns by which MuJoCo's theta_2 is ahead: springs at pins count them, rad."""
-        loop.set_state(wound, passage.omega)
+        loop.set_state(wound, motion_segment.omega)
         self.stepper = Stepper(loop.model, loop.data, timestep)
 
     def to(self, index: int) -> None:
-        """On to the step nearest to a position."""
-        self.stepper.to(self.passage.seconds(index))
+        """Step on to the step nearest to a position."""
+        self.stepper.to(self.motion_segment.seconds(index))
 
     def read(self) -> Reading:
-        """Of the state that was last forwarded."""
+        """Read torque and pin forces of the state that was last forwarded."""
         torque = self.loop.crank_torque()
         if self.light is None:
             return Reading(torque, self.loop.forces())
-        alpha = self.passage.alpha(self.stepper.time)
+        alpha = self.motion_segment.alpha(self.stepper.time)
         couple = couple_elsewhere(self.loop, self.light, self.scene.drive_bar, alpha, torque)
         return Reading(couple, self.light.forces())
 
 
-def assembled(position: Position, command: Command, order: Iterable[int]) -> list[Found]:
+def assembled(position: Assembler, command: Command, order: Iterable[int]) -> list[Found]:
     """Own joint angles of every commanded position, found one after the other in an order."""
     found: list[Found] = [None] * len(command.theta_2)
     for index in order:
@@ -97,14 +97,14 @@ def assembled(position: Position, command: Command, order: Iterable[int]) -> lis
     return found
 
 
-def stretches(
+def split_segments(
     found: list[Found], order: Iterable[int], joined: Callable[[int, int], bool] = lambda one, other: True
 ) -> list[list[int]]:
-    """Positions in order of time, split where the loop does not close, or two neighbours are not joined."""
+    """Split the positions, in order of time, where the loop does not close, or two neighbours are not joined."""
     split: list[list[int]] = [[]]
     for index in order:
         if found[index] is None or (split[-1] and not joined(split[-1][-1], index)):
             split.append([])
         if found[index] is not None:
             split[-1].append(int(index))
-    return [stretch for stretch in split if stretch]
+    return [segment for segment in split if segment]

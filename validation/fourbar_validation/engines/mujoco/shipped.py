@@ -26,7 +26,7 @@ SPEED = 100.0 * SIMULATED.factor
 
 
 def shipped(name: str, scene: Scene, at: Command) -> Row | None:
-    """The worst of the file's rest pose, its keyframe and its drive; None where nothing moves."""
+    """Compare the file's rest pose, its keyframe and its drive; give the worst, None where nothing moves."""
     omega = scene.motion.omega_2
     if not omega or scene.motion.law is not None:
         return None
@@ -77,7 +77,7 @@ def _worst(found: list[tuple[float, str]]) -> tuple[float, str]:
 
 
 def _not_driven(scene: Scene, omega_2: float, theta_2: float, seconds: float) -> str | None:
-    """The declared limit of the simulation that the first steps meet, or None."""
+    """Name the declared limit of the simulation that the first steps meet, if any."""
     if abs(omega_2) > FASTEST.boundary:
         return FASTEST.reason
     ahead = np.array([theta_2, theta_2 + omega_2 * seconds])

@@ -19,7 +19,7 @@ from fourbar_validation.compare.answer import Answer
 from fourbar_validation.engines.description import speeds
 from fourbar_validation.engines.limits import NEAREST_TOGGLE, least_sine, too_fast_or_loaded
 from fourbar_validation.engines.loaded import Values
-from fourbar_validation.engines.loop import MADE, Position, as_made, blank
+from fourbar_validation.engines.loop import MADE, Assembler, as_made, blank
 from fourbar_validation.engines.mujoco.called_back import (
     ActuatorForce,
     at_full_size,
@@ -29,9 +29,9 @@ from fourbar_validation.engines.mujoco.called_back import (
     within,
 )
 from fourbar_validation.engines.mujoco.closed_loop import O2, O4, A, ClosedLoop
-from fourbar_validation.engines.mujoco.motions import Lawful, Passage, Steady, extremes, order_in_time
-from fourbar_validation.engines.mujoco.runner import LIGHT_FLYWHEEL, Run, assembled, stretches
-from fourbar_validation.engines.mujoco.watch import Watch, alarms
+from fourbar_validation.engines.mujoco.monitor import ResidualMonitor, alarms
+from fourbar_validation.engines.mujoco.motions import Lawful, MotionSegment, Steady, extremes, order_in_time
+from fourbar_validation.engines.mujoco.runner import LIGHT_FLYWHEEL, SimulatedRun, assembled, split_segments
 
 SHARED = (
     "lengths, masses, inertias, centres, loads and effects as MJCF text; tables of loads; omega_2, alpha_2 or the "
@@ -53,7 +53,7 @@ class MujocoSimulated:
     name: str = "mujoco-simulated"
 
     def answer(self, scene: Scene, command: Command) -> Answer:
-        """The sweep run through in time; every quantity at the crank's own angle, speed and acceleration."""
+        """Run the sweep through in time; read every quantity at the crank's own angle, speed and acceleration."""
         began = time.perf_counter()
         try:
             refusal = _refusal(scene, command)
@@ -68,7 +68,7 @@ class MujocoSimulated:
 
 
 def _refusal(scene: Scene, command: Command) -> str | None:
-    """Why this scene is not simulated, or None."""
+    """Say why this scene is not simulated, or None."""
     if scene.motion.free is not None:
         return "a free motion has no commanded sweep"
     if command.omega_2 is None or not np.any(command.omega_2):
@@ -88,7 +88,7 @@ def _refusal(scene: Scene, command: Command) -> str | None:
 
 
 def _passes_change_point(scene: Scene, command: Command) -> bool:
-    """Whether all four bars come to lie along the ground within the sweep: +-a +-b +-c = d."""
+    """Tell whether all four bars come to lie along the ground within the sweep: +-a +-b +-c = d."""
     d, a, b, c = scene.linkage.lengths
     least, most = (float(x) - scene.linkage.ground_angle for x in (command.theta_2.min(), command.theta_2.max()))
     for half_turn in range(math.ceil(least / math.pi - COLLINEAR), math.floor(most / math.pi + COLLINEAR) + 1):
@@ -99,7 +99,7 @@ def _passes_change_point(scene: Scene, command: Command) -> bool:
 
 
 def as_run(scene: Scene, command: Command) -> Scene:
-    """The scene whose MJCF is run through: at the command's positions, a law by its greatest speed and acceleration."""
+    """Make the scene whose MJCF is run through, a law by its greatest speed and acceleration."""
     if scene.motion.law is not None:
         omega, alpha = extremes(scene.motion.law)
         motion = Motion(command.theta_2, omega, alpha, scene.motion.branch, scene.motion.through)
@@ -109,7 +109,7 @@ def as_run(scene: Scene, command: Command) -> Scene:
 
 
 class _Simulation:
-    """One scene: its own assembly, then each stretch of positions that assembles, run through in time."""
+    """One scene: its own assembly, then each segment of positions that assembles, run through in time."""
 
     def __init__(self, settings: Settings, scene: Scene, command: Command, *, bounded: bool = True) -> None:
         self.bounded = bounded
@@ -127,16 +127,16 @@ class _Simulation:
         self.predicted = {name: np.zeros(n) for name in UNKNOWNS}
 
     def answer(self) -> Answer:
-        """The answer over all positions."""
-        position = Position(ClosedLoop(self._text(1e-3)))  # kinematics alone: the timestep plays no part
+        """Answer over all positions."""
+        position = Assembler(ClosedLoop(self._text(1e-3)))  # kinematics alone: the timestep plays no part
         found = assembled(position, self.command, self.order)
         least = least_sine(self.scene.linkage, self.command.theta_2, np.array([q is not None for q in found]))
         if self.bounded and least < NEAREST_TOGGLE.boundary:
             raise LimitError(f"|sin(theta_4 - theta_3)| falls to {least:.1e}; {NEAREST_TOGGLE.reason}")
-        for stretch in stretches(found, self.order, partial(self._closes_between, position)):
-            start = found[stretch[0]]
+        for segment in split_segments(found, self.order, partial(self._closes_between, position)):
+            start = found[segment[0]]
             assert start is not None
-            self._run(stretch, start)
+            self._run(segment, start)
         self.out["theta_2"] = within(self.scene, self.out["theta_2"])
         at, values = as_made(self.out, self.branch)
         setting = f"{self.settings.integrator} {self.steps_per_revolution:.0f}/rev"
@@ -152,25 +152,25 @@ class _Simulation:
             evidence=self.evidence,
         )
 
-    def _passage(self, stretch: list[int]) -> Passage:
-        """How the input moves through a stretch."""
+    def _motion_segment(self, segment: list[int]) -> MotionSegment:
+        """Choose how the input moves through a segment."""
         if self.law is not None:
-            return Lawful(self.law, self.command, stretch)
+            return Lawful(self.law, self.command, segment)
         motion = self.scene.motion
-        return Steady(self.command, stretch, motion.omega_2 or 0.0, motion.alpha_2)
+        return Steady(self.command, segment, motion.omega_2 or 0.0, motion.alpha_2)
 
     def _loop(self, timestep: float, supplied: dict[str, ActuatorForce], flywheel: float | None = None) -> ClosedLoop:
-        """A compiled model that takes from `supplying` what its text cannot say."""
+        """Compile a model that takes from `supplying` what its text cannot say."""
         return receiving(ClosedLoop(self._text(timestep, flywheel)), supplied)
 
     def _text(self, timestep: float, flywheel: float | None = None) -> str:
-        """The generated MJCF without its keyframe."""
+        """Write the generated MJCF without its keyframe."""
         heavy = self.settings.flywheel if flywheel is None else flywheel
         settings = replace(self.settings, timestep=timestep, timestep_scale=1.0, flywheel=heavy)
         return mjcf(at_full_size(self.scene), settings, keyframe=False)
 
-    def _closes_between(self, position: Position, one: int, other: int) -> bool:
-        """Whether the loop closes everywhere between two positions."""
+    def _closes_between(self, position: Assembler, one: int, other: int) -> bool:
+        """Tell whether the loop closes everywhere between two positions."""
         start, stop = float(self.command.theta_2[one]), float(self.command.theta_2[other])
         pieces = int(np.ceil(abs(stop - start) / FINE))
         branch = int(self.command.branch[one])
@@ -178,34 +178,34 @@ class _Simulation:
             position.find(float(theta_2), branch) is not None for theta_2 in np.linspace(start, stop, pieces + 1)[1:-1]
         )
 
-    def _run(self, stretch: list[int], start: tuple[float, float, float]) -> None:
-        """Step through one stretch and read at the step nearest to each position."""
-        passage = self._passage(stretch)
-        timestep = passage.timestep(self.settings)
-        if len(stretch) > 1:
-            turn = 2.0 * np.pi / passage.fastest
+    def _run(self, segment: list[int], start: tuple[float, float, float]) -> None:
+        """Step through one segment and read at the step nearest to each position."""
+        motion_segment = self._motion_segment(segment)
+        timestep = motion_segment.timestep(self.settings)
+        if len(segment) > 1:
+            turn = 2.0 * np.pi / motion_segment.fastest
             self.steps_per_revolution = max(self.steps_per_revolution, turn / timestep)
         supplied = self.supplied
         if self.law is not None:
-            supplied = {**supplied, "drive": lambda m, d: m.dof_armature[O2] * passage.alpha(d.time)}
+            supplied = {**supplied, "drive": lambda m, d: m.dof_armature[O2] * motion_segment.alpha(d.time)}
         with supplying(supplied):
             loop = self._loop(timestep, supplied)
             light = None if self.scene.drive_bar == 2 else self._loop(timestep, supplied, LIGHT_FLYWHEEL)
-            watch = Watch(self._loop(timestep, supplied), self.scene.drive_bar)
-            run = Run(self.scene, loop, light, passage, start, timestep)
-            begins = float(self.command.theta_2[stretch[0]])
-            for index in stretch:
+            monitor = ResidualMonitor(self._loop(timestep, supplied), self.scene.drive_bar)
+            run = SimulatedRun(self.scene, loop, light, motion_segment, start, timestep)
+            begins = float(self.command.theta_2[segment[0]])
+            for index in segment:
                 run.to(index)
-                self._read(run, watch, index, begins)
+                self._read(run, monitor, index, begins)
         self.evidence["steps"] += run.stepper.done
-        for name, value in watch.evidence().items():
+        for name, value in monitor.evidence().items():
             self.evidence[name] = float(np.maximum(self.evidence.get(name, 0.0), value))
 
-    def _read(self, run: Run, watch: Watch, index: int, begins: float) -> None:
-        """Everything of one sample, and what the engine says of itself there."""
+    def _read(self, run: SimulatedRun, monitor: ResidualMonitor, index: int, begins: float) -> None:
+        """Read everything of one sample, and what the engine says of itself there."""
         loop, d, turns = run.loop, run.loop.data, run.turns
         loop.forward()
-        self._watch(run, begins)
+        self._keep_worst(run, begins)
         q = (float(d.qpos[O2]), float(d.qpos[A]), float(d.qpos[O4]))
         if unwound(self.scene, q) != q:
             raise LimitError("a torsion spring is wound by more than half a turn from its rest")
@@ -218,16 +218,16 @@ class _Simulation:
             values |= {f"{name}_2": x[O2] - ahead, f"{name}_3": x[O2] + x[A] - ahead, f"{name}_4": x[O4]}
         for name, value in values.items():
             self.out[name][index] = value
-        for name, error in watch.look(loop, torque, pins["F43"]).items():
+        for name, error in monitor.look(loop, torque, pins["F43"]).items():
             self.predicted[name][index] = error
 
-    def _watch(self, run: Run, begins: float) -> None:
+    def _keep_worst(self, run: SimulatedRun, begins: float) -> None:
         """Keep the worst of what the engine says of itself."""
         loop, d, seen = run.loop, run.loop.data, self.evidence
-        speed = run.passage.speed(float(d.qpos[O2]) - run.turns - begins, run.stepper.time)
+        speed = run.motion_segment.speed(float(d.qpos[O2]) - run.turns - begins, run.stepper.time)
         worst = {
             "closure_gap_m": float(np.hypot(*loop.gap())),
-            "speed_error": float(abs(abs(d.qvel[O2]) - speed) / (run.passage.fastest or 1.0)),
+            "speed_error": float(abs(abs(d.qvel[O2]) - speed) / (run.motion_segment.fastest or 1.0)),
             "solver_iterations": float(d.solver_niter.max()),
             "bad_states": float(loop.bad()),
             "time_went_back": float(run.stepper.lost()),
@@ -237,7 +237,7 @@ class _Simulation:
 
 
 def observed_order(scene: Scene, command: Command, error: Callable[[Answer], float]) -> tuple[float, float, float]:
-    """Errors at 4h and 2h with the closure's time constant held in seconds, and log2 of their ratio.
+    """Return errors at 4h and 2h with the closure's time constant held in seconds, and log2 of their ratio.
 
     At the recipe's own h the softness is already of the size of the truncation; the order shows above it.
     """

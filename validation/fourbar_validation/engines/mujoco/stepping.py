@@ -1,9 +1,8 @@
-"""An MJCF compiled and opened; bare steps of it, for counting their instructions, and all that it compiles to."""
+"""An MJCF compiled and opened, and bare steps of it."""
 
 from collections.abc import Callable
 
 import mujoco
-import numpy as np
 
 
 def opened(text: str) -> tuple[mujoco.MjModel, mujoco.MjData]:
@@ -16,20 +15,10 @@ def opened(text: str) -> tuple[mujoco.MjModel, mujoco.MjData]:
 
 
 def steps(text: str) -> Callable[[int], None]:
-    """A function that steps the model on from its first keyframe, as often as wanted."""
+    """Make a function that steps the model on from its first keyframe, as often as wanted."""
     model, data = opened(text)
 
     def work(amount: int) -> None:
         mujoco.mj_step(model, data, amount)
 
     return work
-
-
-def compiled(text: str) -> dict[str, object]:
-    """The compiled model: sizes, rows of its constraints at the keyframe, flags, and the whole of it as bytes."""
-    model, data = opened(text)
-    whole = np.zeros(mujoco.mj_sizeModel(model), dtype=np.uint8)
-    mujoco.mj_saveModel(model, None, whole)
-    sizes = {name: int(getattr(model, name)) for name in ("nv", "neq", "nu", "ntendon", "nsensor", "njnt")}
-    flags = {"disabled": int(model.opt.disableflags), "enabled": int(model.opt.enableflags)}
-    return {**sizes, "nefc": int(data.nefc), **flags, "bytes": whole.tobytes()}

@@ -21,15 +21,15 @@ from fourbar.quantities import UNKNOWNS
 from fourbar.scene import Command, Scene, command
 from fourbar_validation.compare.answer import Answer, Array
 from fourbar_validation.engines.loaded import Assembled, Values
-from fourbar_validation.engines.loop import MADE, Angles, Position, as_made, at_each, blank
-from fourbar_validation.engines.mujoco.anatomy import Anatomy
+from fourbar_validation.engines.loop import MADE, Angles, Assembler, as_made, at_each, blank
 from fourbar_validation.engines.mujoco.attached import Described, Value
 from fourbar_validation.engines.mujoco.closed_loop import WARNINGS, couple_for, load_force
+from fourbar_validation.engines.mujoco.corrections import correct
 from fourbar_validation.engines.mujoco.describe import called, described
-from fourbar_validation.engines.mujoco.guess import anatomy_of
-from fourbar_validation.engines.mujoco.mend import mended
+from fourbar_validation.engines.mujoco.guess import find_topology
 from fourbar_validation.engines.mujoco.motions import order_in_time
-from fourbar_validation.engines.mujoco.runner import Stepper, assembled, stretches
+from fourbar_validation.engines.mujoco.runner import Stepper, assembled, split_segments
+from fourbar_validation.engines.mujoco.topology import Topology
 from fourbar_validation.engines.tree import closed
 
 ONE_STATE, THROUGH_TIME = "mjcf-one-state", "mjcf-simulated"
@@ -37,13 +37,15 @@ POSITIONS = 37
 """Positions taken of a sweep: a file is judged as a whole, not position by position."""
 MOST_STEPS = 400_000
 """A revolution at 628 steps per turn is a thousandth of this; more would be minutes."""
-MENDING = 60.0
-"""Seconds in which entries are mended one by one; each takes two evaluations."""
+CORRECTING = 60.0
+"""Seconds in which entries are corrected one by one; each takes two evaluations."""
 REFINEMENTS = 3
 """Secant steps after the first: each gains the digits that the one before has."""
 ANSWERED = (*UNKNOWNS, *MADE)
 SHARED = "theta_2, omega_2, alpha_2 and the branch; the rest is the file's"
 OWN = "assembly, speeds, accelerations, drive torque and pin forces, by MuJoCo from the file as compiled"
+MOST_KEYFRAMES = 100_000
+"""A linkage has one or a few; MuJoCo reserves as many as a file asks for, minutes long."""
 
 
 @dataclass(slots=True)
@@ -60,52 +62,55 @@ class Examined:
 
 
 def compile_text(text: str) -> mujoco.MjModel:
-    """MuJoCo's compiler on a text; its complaint as an InputError of one line."""
+    """Compile a text with MuJoCo; its complaint is an InputError of one line."""
     try:
+        keyframes = mujoco.MjSpec.from_string(text).nkey
+        if keyframes > MOST_KEYFRAMES:
+            raise InputError("--mjcf", None, f"asks for {keyframes} keyframes; up to {MOST_KEYFRAMES} are read")
         model = mujoco.MjModel.from_xml_string(text)
     except ValueError as error:
-        raise InputError("--mjcf", None, " ".join(f"MuJoCo does not compile it: {error}".split())) from None
+        raise InputError("MJCF", None, " ".join(f"MuJoCo does not compile it: {error}".split())) from None
     except RuntimeError:  # "unknown exception": a size that no memory holds
-        raise InputError("--mjcf", None, "MuJoCo breaks down over it; is a size in it too large?") from None
+        raise InputError("MJCF", None, "MuJoCo breaks down over it; is a size in it too large?") from None
     if not 0.0 < model.opt.timestep < math.inf:
-        raise InputError("--mjcf", None, f"its timestep of {model.opt.timestep:g} s must be above 0")
+        raise InputError("MJCF", None, f"its timestep of {model.opt.timestep:g} s must be above 0")
     return model
 
 
 def examine(scene: Scene, text: str | None, names: Mapping[str, str]) -> Examined:
     """Describe an MJCF, evaluate it at single states and through time; None: the one generated from the scene."""
     model = compile_text(mjcf(scene) if text is None else text)
-    anatomy, guessed = anatomy_of(model, names, scene.linkage.lengths)
-    loop = Loop(anatomy, scene)
-    found = described(anatomy)
+    topology, guessed = find_topology(model, names, scene.linkage.lengths)
+    loop = UserLoop(topology, scene)
+    found = described(topology)
     for key, value in found.items():
         if key.startswith(("bars.", "lengths.")) and not math.isfinite(value):  # type: ignore[arg-type]
-            raise InputError("--mjcf", None, f"{key} is beyond the range of doubles: {value}")
+            raise InputError("MJCF", None, f"{key} is beyond the range of doubles: {value}")
     answers = _answers(loop, scene)
-    return Examined(found, called(anatomy), answers, [*guessed, *loop.notes], anatomy.names)
+    return Examined(found, called(topology), answers, [*guessed, *loop.notes], topology.names)
 
 
-def examine_mended(
+def examine_corrected(
     scene: Scene, text: str, names: Mapping[str, str], entries: Sequence[tuple[str, Value]]
 ) -> list[list[Answer] | None]:
-    """The answers of a file with one entry of its description as stated, for each; None where it cannot be set alone.
+    """Answer with one entry of a file's description as specified, for each; None where it cannot be set alone.
 
-    After MENDING seconds the rest are not evaluated either.
+    After CORRECTING seconds the rest are not evaluated either.
     """
-    anatomy = Anatomy(compile_text(text), names)
+    topology = Topology(compile_text(text), names)
     start, found = time.perf_counter(), list[list[Answer] | None]()
     for key, value in entries:
         answers = None
-        if time.perf_counter() - start < MENDING and (model := mended(anatomy, key, value)) is not None:
+        if time.perf_counter() - start < CORRECTING and (model := correct(topology, key, value)) is not None:
             try:
-                answers = _answers(Loop(Anatomy(model, names), scene), scene)
+                answers = _answers(UserLoop(Topology(model, names), scene), scene)
             except FourBarError:  # what the other differences make of it is no four-bar
                 answers = None
         found.append(answers)
     return found
 
 
-def _answers(loop: "Loop", scene: Scene) -> list[Answer]:
+def _answers(loop: "UserLoop", scene: Scene) -> list[Answer]:
     at = _positions(command(scene))
     answers = [_answered(ONE_STATE, scene, lambda: one_state(loop, at))]
     if at.omega_2 is not None and np.any(at.omega_2) and np.ptp(at.theta_2) > 0.0:
@@ -114,7 +119,7 @@ def _answers(loop: "Loop", scene: Scene) -> list[Answer]:
 
 
 def _positions(at: Command) -> Command:
-    """At most so many of the positions, spread evenly."""
+    """Choose at most so many of the positions, spread evenly."""
     n = len(at.theta_2)
     if at.omega_2 is None:
         raise InputError("motion.omega_2", None, "is needed: without a speed there is no torque to compare")
@@ -131,20 +136,20 @@ def _answered(name: str, scene: Scene, ask: Callable[[], Answer]) -> Answer:
     except LimitError as error:
         answer = Answer(name, "-", refusal=str(error))
     except ArithmeticError as error:  # its numbers are far from those of any linkage
-        raise InputError("--mjcf", None, str(error)) from None
+        raise InputError("MJCF", None, str(error)) from None
     answer.shared, answer.own, answer.seconds = SHARED, OWN, time.perf_counter() - start
     return answer
 
 
-class Loop(Assembled):
+class UserLoop(Assembled):
     """Somebody's model with its drive taken off; coordinates x = (theta_2, theta_3 - theta_2, theta_4)."""
 
-    def __init__(self, anatomy: Anatomy, scene: Scene) -> None:
-        self.anatomy, self.scene, self.model = anatomy, scene, anatomy.model
+    def __init__(self, topology: Topology, scene: Scene) -> None:
+        self.topology, self.scene, self.model = topology, scene, topology.model
         self.data = mujoco.MjData(self.model)
         self.notes: list[str] = []
-        self.to_joints, self.from_joints = anatomy.to_joints, np.linalg.inv(anatomy.to_joints)
-        self.crank = None if anatomy.cut == "O2" else int(self.model.jnt_dofadr[anatomy.hinge["O2"]])
+        self.to_joints, self.from_joints = topology.to_joints, np.linalg.inv(topology.to_joints)
+        self.crank = None if topology.cut == "O2" else int(self.model.jnt_dofadr[topology.hinge["O2"]])
         self.armature = 0.0 if self.crank is None else float(self.model.dof_armature[self.crank])
         self._take_off_the_drive()
         self._loads = [i for i in range(self.model.nu) if self.model.actuator_trntype[i] == mujoco.mjtTrn.mjTRN_SITE]
@@ -152,39 +157,39 @@ class Loop(Assembled):
 
     def _take_off_the_drive(self) -> None:
         model = self.model
-        for i in self.anatomy.drives():
+        for i in self.topology.drives():
             model.actuator_gainprm[i], model.actuator_biasprm[i] = 0.0, 0.0
             self.notes.append(f"its drive {model.actuator(i).name!r} on pin O2 is taken off: the torque is solved for")
         for i in range(model.neq):
-            if i != self.anatomy.closure and model.eq_active0[i] and self.anatomy.closed_by != "tendon":
+            if i != self.topology.closure and model.eq_active0[i] and self.topology.closed_by != "tendon":
                 self.data.eq_active[i] = 0
                 self.notes.append(f"its equality {model.equality(i).name or i!r} is switched off: it is no pin")
 
-    # what `Position` asks of a tree
+    # what `Assembler` asks of a tree
     def place(self, x: Sequence[float]) -> None:
         """Move to a configuration."""
-        self.data.qpos[:] = self.anatomy.qpos(x)
+        self.data.qpos[:] = self.topology.qpos(x)
         mujoco.mj_kinematics(self.model, self.data)
         mujoco.mj_comPos(self.model, self.data)
 
     def gap(self) -> tuple[float, float]:
-        """What the cut pin is open by, m: at any pin, up to its sign, A + b e^{i theta_3} - O4 - c e^{i theta_4}."""
-        first, second = (self.anatomy.world(self.data, bar, self.anatomy.cut) for bar in PINS[self.anatomy.cut])
-        x, y = self.anatomy.in_plane(first - second).tolist()
+        """Return the opening of the cut pin, m: for any pin +-(A + b e^{i theta_3} - O4 - c e^{i theta_4})."""
+        first, second = (self.topology.world(self.data, bar, self.topology.cut) for bar in PINS[self.topology.cut])
+        x, y = self.topology.in_plane(first - second).tolist()
         return x, y
 
     def jacobian(self) -> Array:
-        """Derivative of the gap by x, (2, 3)."""
+        """Return the derivative of the gap by x, (2, 3)."""
         rows = []
-        for bar in PINS[self.anatomy.cut]:
-            body, at = self.anatomy.root[bar], self.anatomy.world(self.data, bar, self.anatomy.cut)
+        for bar in PINS[self.topology.cut]:
+            body, at = self.topology.root[bar], self.topology.world(self.data, bar, self.topology.cut)
             mujoco.mj_jac(self.model, self.data, self._jac, None, at, body)
-            rows.append(self._jac[list(self.anatomy.axes)] @ self.to_joints)
+            rows.append(self._jac[list(self.topology.axes)] @ self.to_joints)
         return np.asarray(rows[0] - rows[1])
 
     def positions(self) -> dict[str, Array]:
-        """A, B, O4, and the end of bar 4, laid off bar by bar from O2, (2,), m."""
-        line = {bar: self.anatomy.line(self.data, bar) for bar in (1, 2, 3, 4)}
+        """Locate A, B, O4, and the end of bar 4, laid off bar by bar from O2, (2,), m."""
+        line = {bar: self.topology.line(self.data, bar) for bar in (1, 2, 3, 4)}
         return {"A": line[2], "B": line[2] + line[3], "O4": line[1], "B4": line[1] + line[4]}
 
     def speeds(self, omega_2: float) -> Array:
@@ -199,11 +204,11 @@ class Loop(Assembled):
         data.eq_active[:] = active
         data.qpos[:], data.qvel[:] = q, v
         if self.crank is not None:  # what its own armature takes belongs to the drive
-            data.qfrc_applied[self.crank] = self.armature * self.anatomy.sense["O2"] * alpha_2
-        body = self.anatomy.root[drive]
+            data.qfrc_applied[self.crank] = self.armature * self.topology.sense["O2"] * alpha_2
+        body = self.topology.root[drive]
 
         def acceleration(couple: float) -> float:
-            data.xfrc_applied[body, 3:] = couple * self.anatomy.normal
+            data.xfrc_applied[body, 3:] = couple * self.topology.normal
             mujoco.mj_forward(self.model, data)
             return float((self.from_joints @ data.qacc)[0])
 
@@ -214,30 +219,30 @@ class Loop(Assembled):
             raise LimitError(f"a couple on bar {drive} does not move the crank of this model")
         mujoco.mj_rnePostConstraint(self.model, data)
         values: Values = {"torque": couple}
-        turned = (self.anatomy.angles(data), self.from_joints @ data.qvel, self.from_joints @ data.qacc)
+        turned = (self.topology.angles(data), self.from_joints @ data.qvel, self.from_joints @ data.qacc)
         for name, (two, three, four) in zip(("theta", "omega", "alpha"), turned, strict=True):
             values |= {f"{name}_2": two, f"{name}_3": two + three, f"{name}_4": four}
         return values | self._forces()
 
     def _forces(self) -> dict[str, Array]:
         """F12, F32, F43, F14 in the plane; NaN at a cut pin that no connect or weld holds."""
-        data, anatomy = self.data, self.anatomy
+        data, topology = self.data, self.topology
         on: dict[tuple[int, int], Array] = {}
-        for pin in anatomy.hinge:
-            child, parent = anatomy.turning(pin)
-            force = data.cfrc_int[anatomy.root[child], 3:].copy()
+        for pin in topology.hinge:
+            child, parent = topology.turning(pin)
+            force = data.cfrc_int[topology.root[child], 3:].copy()
             for load in self._loads:
-                if self._carries(anatomy.root[child], self.model.site_bodyid[self.model.actuator_trnid[load, 0]]):
+                if self._carries(topology.root[child], self.model.site_bodyid[self.model.actuator_trnid[load, 0]]):
                     force -= load_force(self.model, data, load)
-            on[parent, child] = anatomy.in_plane(force)
-        bars = PINS[anatomy.cut]
+            on[parent, child] = topology.in_plane(force)
+        bars = PINS[topology.cut]
         force = np.full(2, np.nan)
-        if anatomy.closure is not None:
+        if topology.closure is not None:
             rows = np.flatnonzero(
-                (data.efc_type == mujoco.mjtConstraint.mjCNSTR_EQUALITY) & (data.efc_id == anatomy.closure)
+                (data.efc_type == mujoco.mjtConstraint.mjCNSTR_EQUALITY) & (data.efc_id == topology.closure)
             )
-            force = anatomy.in_plane(data.efc_force[rows[:3]]) if len(rows) else force
-            if anatomy.first == bars[0]:
+            force = topology.in_plane(data.efc_force[rows[:3]]) if len(rows) else force
+            if topology.first == bars[0]:
                 on[bars[1], bars[0]] = force
             else:
                 on[bars[0], bars[1]] = force
@@ -247,14 +252,14 @@ class Loop(Assembled):
         return {name: on[i, j] if (i, j) in on else -on[j, i] for name, (i, j) in wanted.items()}
 
     def _carries(self, bearer: int, body: int) -> bool:
-        """Whether a body hangs, however far down, on another."""
+        """Tell whether a body hangs, however far down, on another."""
         while body not in (bearer, 0):
             body = int(self.model.body_parentid[body])
         return body == bearer
 
 
-def one_state(loop: Loop, at: Command) -> Answer:
-    """Every position by itself."""
+def one_state(loop: UserLoop, at: Command) -> Answer:
+    """Answer every position by itself."""
     contacts = 0
 
     def read(_: Angles, omega_2: float, alpha_2: float) -> Values:
@@ -274,32 +279,32 @@ def one_state(loop: Loop, at: Command) -> Answer:
     return Answer(ONE_STATE, "as compiled", at, assembled, out, evidence=evidence)
 
 
-def through_time(loop: Loop, at: Command) -> Answer:
-    """The longest stretch of positions that assembles, run through at the file's own timestep."""
+def through_time(loop: UserLoop, at: Command) -> Answer:
+    """Run the longest segment of positions that assembles at the file's own timestep."""
     model, data = loop.model, mujoco.MjData(loop.model)
     data.eq_active[:] = loop.data.eq_active
     if loop.crank is None:
         raise LimitError("pin O2 is not a hinge in this file: nothing can keep its crank at a speed")
     assert isinstance(at.omega_2, float) and isinstance(at.alpha_2, float)
-    position = Position(loop)
+    position = Assembler(loop)
     order = order_in_time(at, at.omega_2, None)
-    stretch = max(stretches(assembled(position, at, order), order), key=len, default=[])
-    if len(stretch) < 2:
+    segment = max(split_segments(assembled(position, at, order), order), key=len, default=[])
+    if len(segment) < 2:
         raise LimitError("nowhere do two neighbouring positions assemble in this file")
-    run = run_through(at.theta_2[stretch], at.omega_2, at.alpha_2)
-    timestep, sense = float(model.opt.timestep), loop.anatomy.sense["O2"]
+    run = run_through(at.theta_2[segment], at.omega_2, at.alpha_2)
+    timestep, sense = float(model.opt.timestep), loop.topology.sense["O2"]
     steps = run.time(run.stop) / timestep
     if not 1.0 <= steps <= MOST_STEPS:
         raise LimitError(
             f"its timestep of {timestep:g} s makes {steps:.3g} steps of the motion; must be 1 to {MOST_STEPS}"
         )
-    position.find(float(at.theta_2[stretch[0]]), int(at.branch[stretch[0]]))
+    position.find(float(at.theta_2[segment[0]]), int(at.branch[segment[0]]))
     data.qpos[:], data.qvel[:] = loop.data.qpos, loop.speeds(at.omega_2)
     heavy = max(loop.armature, flywheel(loop.scene))
-    out, seen = blank(len(stretch), ANSWERED), {"closure_gap_m": 0.0, "speed_error": 0.0}
+    out, seen = blank(len(segment), ANSWERED), {"closure_gap_m": 0.0, "speed_error": 0.0}
     alarms: list[str] = []
     stepper = Stepper(model, data, timestep)
-    for i, index in enumerate(stretch):
+    for i, index in enumerate(segment):
         model.dof_armature[loop.crank] = heavy
         data.qfrc_applied[loop.crank] = heavy * sense * at.alpha_2
         stepper.to(run.time(float(at.theta_2[index])))
@@ -317,6 +322,6 @@ def through_time(loop: Loop, at: Command) -> Answer:
     model.dof_armature[loop.crank] = loop.armature
     known = np.isfinite(out["theta_2"])
     out = {name: array[known] for name, array in out.items()}
-    where, _ = as_made(out, at.branch[stretch][known])
+    where, _ = as_made(out, at.branch[segment][known])
     setting = f"{mujoco.mjtIntegrator(model.opt.integrator).name.removeprefix('mjINT_')} {timestep:g} s"
     return Answer(THROUGH_TIME, setting, where, np.ones(known.sum(), dtype=bool), out, evidence=seen, alarms=alarms)

@@ -21,10 +21,10 @@ from fourbar.errors import LimitError
 from fourbar.mjcf import Settings, mjcf
 from fourbar.scene import Command, Scene
 from fourbar_validation.compare.answer import Array
-from fourbar_validation.engines.loop import Position, Trial, as_made, blank
+from fourbar_validation.engines.loop import Assembler, Trial, as_made, blank
 from fourbar_validation.engines.mujoco.closed_loop import O2, ClosedLoop
 from fourbar_validation.engines.mujoco.motions import Steady, order_in_time
-from fourbar_validation.engines.mujoco.runner import LIGHT_FLYWHEEL, Run, assembled, stretches
+from fourbar_validation.engines.mujoco.runner import LIGHT_FLYWHEEL, SimulatedRun, assembled, split_segments
 
 STIFF = 4e-2
 """error (tc/h)^4 of RK4 with tc in steps: measured 1.3e-2 to 6e-2 on crank-rocker, drag link and double rocker."""
@@ -45,14 +45,14 @@ Build = Callable[[str, float], ClosedLoop]
 
 
 def guess(error: float) -> tuple[float, float]:
-    """Steps per revolution and time constant in steps that the laws say for an error."""
+    """Compute the steps per revolution and the time constant in steps that the laws say for an error."""
     tc = (STIFF / (error / 2.0)) ** (1.0 / ORDER)
     steps = FIRST_STEPS * (FIRST_ERROR / error) ** (1.0 / ORDER)
     return max(steps, FEWEST_STEPS), min(max(tc, SHORTEST), LONGEST)
 
 
 def dialled(steps_per_revolution: float, time_constant_steps: float) -> Settings:
-    """The recommended settings at a number of steps and a time constant; a window has no steps of its own."""
+    """Give the recommended settings at a number of steps and a time constant; a window has no steps of its own."""
     return Settings(
         steps_per_revolution=steps_per_revolution,
         steps_per_window=1,
@@ -63,7 +63,7 @@ def dialled(steps_per_revolution: float, time_constant_steps: float) -> Settings
 
 @contextmanager
 def silence() -> Iterator[None]:
-    """A setting that fails is a result here: MuJoCo neither prints it nor leaves a log in the working folder."""
+    """Silence MuJoCo: a setting that fails is a result here, neither printed nor logged in the working folder."""
     before = mujoco.get_mju_user_warning()
     mujoco.set_mju_user_warning(lambda _: None)
     try:
@@ -72,7 +72,7 @@ def silence() -> Iterator[None]:
         mujoco.set_mju_user_warning(before)
 
 
-class Rig:
+class TrialSetup:
     """A scene, ready to be tried with any settings.
 
     Raises LimitError for a scene that cannot be run through in time.
@@ -87,53 +87,53 @@ class Rig:
         motion = replace(scene.motion, theta_2=command.theta_2, omega_2=self.omega, alpha_2=self.alpha)
         self.scene, self.command = replace(scene, motion=motion), command
         order = order_in_time(command, self.omega, None)
-        position = Position(ClosedLoop(mjcf(self.scene, Settings(timestep=1e-3), keyframe=False)))
+        position = Assembler(ClosedLoop(mjcf(self.scene, Settings(timestep=1e-3), keyframe=False)))
         found = assembled(position, command, order)
-        self.stretches = [stretch for stretch in stretches(found, order) if len(stretch) > 1]
+        self.segments = [segment for segment in split_segments(found, order) if len(segment) > 1]
         self.start = {index: angles for index, angles in enumerate(found) if angles is not None}
-        if not self.stretches:
+        if not self.segments:
             raise LimitError("the loop closes at no two neighbouring positions: nothing to run through in time")
 
     def text(self, settings: Settings, timestep: float) -> str:
-        """The generated MJCF, without its keyframe."""
+        """Write the generated MJCF, without its keyframe."""
         return mjcf(self.scene, replace(settings, timestep=timestep, timestep_scale=1.0), keyframe=False)
 
-    def passage(self, stretch: list[int]) -> Steady:
-        """How the input moves through a stretch."""
-        return Steady(self.command, stretch, self.omega, self.alpha)
+    def motion_segment(self, segment: list[int]) -> Steady:
+        """Choose how the input moves through a segment."""
+        return Steady(self.command, segment, self.omega, self.alpha)
 
     def steps(self, settings: Settings) -> int:
-        """Steps of one run, without making it."""
+        """Count the steps of one run, without making it."""
         total = 0
-        for stretch in self.stretches:
-            run = self.passage(stretch).run  # a whole number of steps over the stretch
+        for segment in self.segments:
+            run = self.motion_segment(segment).run  # a whole number of steps over the segment
             total += round(run.time(run.stop) / run.timestep(settings))
         return total
 
     def try_out(self, settings: Settings, build: Build | None = None) -> Trial:
-        """Run through every stretch of positions that assembles and read at the step nearest to each."""
-        samples = [index for stretch in self.stretches for index in stretch]
+        """Run through every segment of positions that assembles and read at the step nearest to each."""
+        samples = [index for segment in self.segments for index in segment]
         out, trial, first = blank(len(samples)), Trial(self.command), 0
         with silence():
-            for stretch in self.stretches:
-                before, rows = trial.steps, slice(first, first + len(stretch))
-                self._run(stretch, settings, build or _as_written, {name: x[rows] for name, x in out.items()}, trial)
-                trial.stretches += ((rows, trial.steps - before),)
+            for segment in self.segments:
+                before, rows = trial.steps, slice(first, first + len(segment))
+                self._run(segment, settings, build or _as_written, {name: x[rows] for name, x in out.items()}, trial)
+                trial.segments += ((rows, trial.steps - before),)
                 first = rows.stop
                 if trial.broken:
                     break
         trial.at, trial.quantities = as_made(out, self.command.branch[samples])
         return trial
 
-    def _run(self, stretch: list[int], settings: Settings, build: Build, out: dict[str, Array], trial: Trial) -> None:
-        passage = self.passage(stretch)
-        timestep = passage.run.timestep(settings)
+    def _run(self, segment: list[int], settings: Settings, build: Build, out: dict[str, Array], trial: Trial) -> None:
+        motion_segment = self.motion_segment(segment)
+        timestep = motion_segment.run.timestep(settings)
         loop = build(self.text(settings, timestep), self.omega)
         light = None
         if self.scene.drive_bar != 2:
             light = ClosedLoop(self.text(replace(settings, flywheel=LIGHT_FLYWHEEL), timestep))
-        run = Run(self.scene, loop, light, passage, self.start[stretch[0]], timestep)
-        for row, index in enumerate(stretch):
+        run = SimulatedRun(self.scene, loop, light, motion_segment, self.start[segment[0]], timestep)
+        for row, index in enumerate(segment):
             began = time.process_time()
             run.to(index)
             stepped = time.process_time()
@@ -149,16 +149,16 @@ class Rig:
             trial.stepping += stepped - began
             trial.reading += time.process_time() - stepped
         trial.steps += run.stepper.done
-        trial.steps_per_revolution = max(trial.steps_per_revolution, 2.0 * np.pi / passage.fastest / timestep)
+        trial.steps_per_revolution = max(trial.steps_per_revolution, 2.0 * np.pi / motion_segment.fastest / timestep)
 
     def seconds_per_step(self, settings: Settings, build: Build | None = None) -> Callable[[int], float]:
-        """CPU seconds of a number of steps from the start of the longest stretch; each call starts there again."""
-        stretch = max(self.stretches, key=len)
-        timestep = self.passage(stretch).run.timestep(settings)
+        """CPU seconds of a number of steps from the start of the longest segment; each call starts there again."""
+        segment = max(self.segments, key=len)
+        timestep = self.motion_segment(segment).run.timestep(settings)
         loop = (build or _as_written)(self.text(settings, timestep), self.omega)
 
         def clock(steps: int) -> float:
-            loop.set_state(self.start[stretch[0]], self.omega)
+            loop.set_state(self.start[segment[0]], self.omega)
             with silence():
                 began = time.process_time()
                 mujoco.mj_step(loop.model, loop.data, steps)

@@ -14,10 +14,10 @@ from fourbar.writing import write_text
 from fourbar_validation.advise.errors import QUANTITIES
 from fourbar_validation.advise.matters import MATTERS, influences, sentence
 from fourbar_validation.compare.rows import csv_text
-from fourbar_validation.engines.mujoco.trial import Rig
+from fourbar_validation.engines.mujoco.trial import TrialSetup
 from fourbar_validation.lab.cost.curves import BEST
-from fourbar_validation.lab.cost.laws import Law, laws, lines, pareto, warnings
-from fourbar_validation.lab.cost.study import COLUMNS, STEPPED, Point, Study
+from fourbar_validation.lab.cost.laws import ErrorLaw, laws, lines, pareto, warnings
+from fourbar_validation.lab.cost.study import COLUMNS, STEPPED, CostPoint, CostStudy
 from fourbar_validation.places import MODELS
 from fourbar_validation.report.machine import machine, versions
 from fourbar_validation.report.terminal import lined_up
@@ -34,27 +34,22 @@ ORDERS = "Errors are the worst over the scene's positions, each on its scale, ag
 @click.option(
     "-o", "--out", type=click.Path(path_type=Path, file_okay=False), default=Path("results/cost"), show_default=True
 )
-@click.option("--effects", is_flag=True, help="Count instead what each effect costs in each engine (`effects-cost`).")
-def cost(scenes: tuple[Path, ...], out: Path, effects: bool) -> int:
-    """What accuracy costs in time: work and precision of every method, on SCENES (default: the crank-rocker).
+def cost(scenes: tuple[Path, ...], out: Path) -> int:
+    """Measure what accuracy costs in time: every method, on SCENES (default: the crank-rocker).
 
     An interrupted study is resumed where it stopped. Exit status 1 where the law of any quantity does not hold, or
     none is decided.
     """
-    if effects:
-        from fourbar_validation.lab.effects.cost import command
-
-        return int(command.main(["--out", str(out / "effects.md")], standalone_mode=False))
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
     files = scene_files(scenes or DEFAULT_SCENES)
-    fitted: list[Law] = []
+    fitted: list[ErrorLaw] = []
     rows: list[tuple[str, ...]] = []
     for index in range(len(files)):
         name, scene = files.name(index), files.scene(index)
-        rig = Rig(scene, command_of(scene))
-        study = Study(name, scene, out / name)
+        rig = TrialSetup(scene, command_of(scene))
+        study = CostStudy(name, scene, out / name)
         columns = (
             TextColumn(name),
             BarColumn(),
@@ -62,7 +57,7 @@ def cost(scenes: tuple[Path, ...], out: Path, effects: bool) -> int:
             TextColumn("{task.description}"),
             TimeRemainingColumn(),
         )
-        curves: dict[str, list[Point]] = {}
+        curves: dict[str, list[CostPoint]] = {}
         with Progress(*columns, console=Console(stderr=True)) as progress:
             task = progress.add_task("", total=len(study))
             for curve, points in study.points():
@@ -86,8 +81,10 @@ def cost(scenes: tuple[Path, ...], out: Path, effects: bool) -> int:
     return HOLDS if fitted and all(law.holds for law in fitted) else FAILED
 
 
-def write(study: Study, curves: Mapping[str, Sequence[Point]], found: Sequence[Law], title: str) -> list[Path]:
-    """cost.csv, cost.md and the pictures."""
+def write(
+    study: CostStudy, curves: Mapping[str, Sequence[CostPoint]], found: Sequence[ErrorLaw], title: str
+) -> list[Path]:
+    """Write cost.csv, cost.md and the pictures."""
     from fourbar_validation.lab.cost.pictures import draw
 
     folder = study.folder
@@ -99,34 +96,36 @@ def write(study: Study, curves: Mapping[str, Sequence[Point]], found: Sequence[L
 
 
 def subtitle(scene: Scene, title: str) -> str:
-    """What was run, in one line under the statement of a picture."""
+    """Describe what was run, in one line under the statement of a picture."""
     acting = [type(effect).__name__.lower() for effect in scene.effects]
     acting += ["loads"] if scene.loads else []
     omega = "" if scene.motion.omega_2 is None else f", {scene.motion.omega_2:g} rad/s"
     return f"{title}{omega}{', ' + ' and '.join(acting) if acting else ''}"
 
 
-def to_csv(curves: Mapping[str, Sequence[Point]]) -> str:
-    """One row per point, floats as repr."""
+def to_csv(curves: Mapping[str, Sequence[CostPoint]]) -> str:
+    """Write one row per point, floats as repr."""
     return csv_text(COLUMNS, (asdict(point).values() for points in curves.values() for point in points))
 
 
-def summary(name: str, curves: Mapping[str, Sequence[Point]], found: Sequence[Law], left_out: Sequence[str]) -> str:
-    """What the terminal shows."""
+def summary(
+    name: str, curves: Mapping[str, Sequence[CostPoint]], found: Sequence[ErrorLaw], left_out: Sequence[str]
+) -> str:
+    """Summarise the study for the terminal."""
     text = [f"{name}: what accuracy costs", "", *front_lines(curves), "", *lines(found), ""]
     text += [f"warning: {line}" for line in warnings(curves)]
     return "\n".join((*text, *(f"left out: {line}" for line in left_out)))
 
 
-def cheapest(curves: Mapping[str, Sequence[Point]]) -> list[str]:
-    """The least work of a revolution, in RK4 steps, that reaches each of WANTED; a dash where nothing does."""
+def cheapest(curves: Mapping[str, Sequence[CostPoint]]) -> list[str]:
+    """Find the least work of a revolution, in RK4 steps, for each of WANTED; a dash where nothing reaches it."""
     points = [p for name, row in curves.items() if "slow" not in name for p in row if p.kind == STEPPED]
     work = ([p.rk4_steps for p in points if p.worst <= error] for error in WANTED)
     return [f"{min(steps):.0f}" if steps else "-" for steps in work]
 
 
-def front_lines(curves: Mapping[str, Sequence[Point]]) -> list[str]:
-    """The Pareto front of everything stepped, by the worse of torque and force."""
+def front_lines(curves: Mapping[str, Sequence[CostPoint]]) -> list[str]:
+    """List the Pareto front of everything stepped, by the worse of torque and force."""
     points = [p for name, row in curves.items() if "slow" not in name for p in row if p.kind == STEPPED]
     head = f"{'error':>8} {'RK4 steps':>10} {'ms/turn':>8} {'+-':>5}  setting"
     front = pareto(points, "worst")
@@ -139,18 +138,18 @@ def front_lines(curves: Mapping[str, Sequence[Point]]) -> list[str]:
 
 
 def percent(scatter: float) -> str:
-    """The scatter of some timings; a dash where there was one."""
+    """Format the scatter of timings; a dash where there was one."""
     return "-" if math.isnan(scatter) else f"{100.0 * scatter:.0f} %"
 
 
 def report(
     title: str,
-    curves: Mapping[str, Sequence[Point]],
-    found: Sequence[Law],
+    curves: Mapping[str, Sequence[CostPoint]],
+    found: Sequence[ErrorLaw],
     left_out: Sequence[str],
     pictures: Sequence[Path],
 ) -> str:
-    """The study as Markdown."""
+    """Write the study as Markdown."""
     about = ", ".join(f"{name} {version}" for name, version in versions().items())
     text = [f"# What accuracy costs: {title}", "", f"{machine()}; {about}. {ORDERS}", ""]
     text += [f"![{path.stem}]({path.name})" for path in pictures if path.suffix == ".svg"]

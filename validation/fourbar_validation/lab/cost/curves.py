@@ -65,14 +65,14 @@ def over(
     settings: Callable[[float], Settings],
     build: Callable[[float], Build | None] = lambda _: None,
 ) -> Curve:
-    """A curve over the values of a dial, each with its label, settings and build."""
+    """Make a curve over the values of a setting, each with its label, settings and build."""
     return Curve(name, tuple(Spot(label.format(x), settings(x), build(x), x) for x in values))
 
 
 def over_steps(
     name: str, settings: Settings, build: Build | None = None, steps: Iterable[int] = STEPS, held: float | None = None
 ) -> Curve:
-    """A curve over the timestep.
+    """Make a curve over the timestep.
 
     Parameters
     ----------
@@ -88,7 +88,7 @@ def over_steps(
 
 
 def curves(scene: Scene) -> list[Curve]:
-    """The design for one scene."""
+    """Design the curves of one scene."""
     found = [_with_default_closure(name, abs(scene.motion.omega_2 or 1.0)) for name in INTEGRATORS]
     for suffix, tc, held in (("pads, tc = 10 h", 10.0, None), ("tc held", 20.0, PART_OF_TURN)):
         for name in INTEGRATORS:

@@ -13,7 +13,7 @@ from typing import NamedTuple
 from fourbar.mjcf import Settings
 from fourbar_validation.advise.advise import MOST_STEPS
 from fourbar_validation.advise.matters import judged
-from fourbar_validation.engines.mujoco.trial import FEWEST_STEPS, Rig, dialled
+from fourbar_validation.engines.mujoco.trial import FEWEST_STEPS, TrialSetup, dialled
 from fourbar_validation.lab.stress.timed import in_turns
 
 COARSE, FINE = 2.0, 2.0 ** (1.0 / 3.0)
@@ -24,7 +24,7 @@ FIRST_ORDER_TIME_CONSTANTS = (2.0, 3.0, 6.0, 12.0)
 ROUNDS, STEPS = 15, 400
 
 
-class Found(NamedTuple):
+class Cheapest(NamedTuple):
     """The cheapest that serves."""
 
     settings: Settings
@@ -33,8 +33,8 @@ class Found(NamedTuple):
     """Recommended RK4 steps per run."""
 
 
-def relative_costs(rig: Rig) -> dict[tuple[str, bool], float]:
-    """CPU time of a step, by integrator and pads, relative to RK4 with pads: medians of interleaved rounds."""
+def relative_costs(rig: TrialSetup) -> dict[tuple[str, bool], float]:
+    """Time a step by integrator and pads, relative to RK4 with pads: medians of interleaved rounds."""
     kinds = [("RK4", True), ("RK4", False), *((name, False) for name in FIRST_ORDER)]
     clocks = {kind: rig.seconds_per_step(of_kind(kind, dialled(628.0, 20.0))) for kind in kinds}
     times = in_turns({kind: partial(clock, STEPS) for kind, clock in clocks.items()}, ROUNDS)
@@ -43,14 +43,14 @@ def relative_costs(rig: Rig) -> dict[tuple[str, bool], float]:
 
 
 def of_kind(kind: tuple[str, bool], settings: Settings) -> Settings:
-    """The settings with another integrator, with or without pads."""
+    """Change the integrator, and leave out the pads where requested."""
     integrator, pads = kind
     return replace(settings, integrator=integrator, pad=settings.pad if pads else None)
 
 
-def cheapest(rig: Rig, error: float, costs: Mapping[tuple[str, bool], float]) -> Found | None:
-    """Every integrator, with and without pads, over time constants and steps; None where nothing serves."""
-    best: Found | None = None
+def cheapest(rig: TrialSetup, error: float, costs: Mapping[tuple[str, bool], float]) -> Cheapest | None:
+    """Try every integrator, with and without pads, over time constants and steps; None where nothing serves."""
+    best: Cheapest | None = None
     for kind, ratio in costs.items():
         fourth_order = kind[0] == "RK4"
         for tc in TIME_CONSTANTS if fourth_order else FIRST_ORDER_TIME_CONSTANTS:
@@ -61,12 +61,12 @@ def cheapest(rig: Rig, error: float, costs: Mapping[tuple[str, bool], float]) ->
             if steps is not None:
                 cost = steps * ratio
                 if best is None or cost < best.cost:
-                    best = Found(_settings(rig, kind, tc, steps), steps, cost)
+                    best = Cheapest(_settings(rig, kind, tc, steps), steps, cost)
     return best
 
 
-def _least(rig: Rig, kind: tuple[str, bool], tc: float, most: float, error: float) -> int | None:
-    """The least steps of the ladder, fewer than `most`, that serve."""
+def _least(rig: TrialSetup, kind: tuple[str, bool], tc: float, most: float, error: float) -> int | None:
+    """Find the least steps of the ladder, fewer than `most`, that serve."""
     for n in _ladder(FEWEST_STEPS, COARSE, most):
         if _serves(rig, kind, tc, n, error):
             for finer in (n / FINE**2, n / FINE):
@@ -83,12 +83,12 @@ def _ladder(start: float, ratio: float, most: float) -> Iterator[float]:
         n *= ratio
 
 
-def _settings(rig: Rig, kind: tuple[str, bool], tc: float, steps: float) -> Settings:
-    """So many steps over the run."""
+def _settings(rig: TrialSetup, kind: tuple[str, bool], tc: float, steps: float) -> Settings:
+    """Set the number of steps of the run."""
     per_run = rig.steps(dialled(1000.0, tc)) / 1000.0
     return of_kind(kind, dialled(steps / per_run, tc))
 
 
-def _serves(rig: Rig, kind: tuple[str, bool], tc: float, steps: float, error: float) -> bool:
+def _serves(rig: TrialSetup, kind: tuple[str, bool], tc: float, steps: float, error: float) -> bool:
     trial = rig.try_out(_settings(rig, kind, tc, steps))
     return judged(rig.scene, trial).worst <= error

@@ -16,7 +16,7 @@ from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import PIN_FORCES
 from fourbar.scene import Command, Scene
 from fourbar.solve import solve
-from fourbar_validation.advise.errors import Errors, greatest
+from fourbar_validation.advise.errors import WorstErrors, greatest
 from fourbar_validation.compare.answer import Array
 from fourbar_validation.compare.error import relative
 from fourbar_validation.compare.scales import yardstick
@@ -30,19 +30,19 @@ Quantities = dict[str, Any]
 
 
 def few(at: Command) -> Command:
-    """At most so many positions, evenly over the sweep."""
+    """Choose at most AT_MOST positions, evenly over the sweep."""
     rows = np.unique(np.linspace(0, len(at.theta_2) - 1, min(AT_MOST, len(at.theta_2))).round().astype(int))
     return at._replace(theta_2=at.theta_2[rows], branch=at.branch[rows])
 
 
 def double(scene: Scene, at: Command) -> Quantities:
-    """`fourbar.solve`."""
+    """Evaluate by `fourbar.solve`."""
     s = solve(scene, "force", at=at)
     return {name: getattr(s, name) for name in ("torque", *PIN_FORCES)}
 
 
 def single(scene: Scene, at: Command) -> Quantities:
-    """The same formulas on float32 arrays."""
+    """Evaluate the formulas on float32 arrays."""
     case = changed(Case.of(scene), float)  # NumPy's doubles would prevail
     path = case.path._replace(u1=np.complex64(case.path.u1))
     with np.errstate(all="ignore"):
@@ -58,18 +58,18 @@ def single(scene: Scene, at: Command) -> Quantities:
 
 
 def _single(value: Any, *, turned: bool = False) -> Any:
-    """In single precision, both parts of a vector too."""
+    """Round to single precision, both parts of a vector too."""
     return np.asarray(value).astype(np.complex64 if np.iscomplexobj(value) else np.float32)
 
 
 def _stack(vector: Any, n: int) -> Array:
-    """Components of a complex vector, (n, 2)."""
+    """Stack the components of a complex vector, (n, 2)."""
     whole = np.broadcast_to(vector, (n,))
     return np.stack([whole.real, whole.imag], axis=1)
 
 
 def thirteen_equations(scene: Scene, at: Command) -> Quantities:
-    """Kinematics by the formulas, then thirteen equations per position, assembled and solved."""
+    """Solve thirteen equations per position, with kinematics by the formulas."""
     if any(effect.loaded_pins for effect in scene.effects):
         raise NotImplementedError("friction that depends on the pin forces is not linear in them")
     x = thirteen.solve_thirteen(_bodies(scene, state_at(scene, at)), scene.drive_bar)
@@ -78,7 +78,7 @@ def thirteen_equations(scene: Scene, at: Command) -> Quantities:
 
 
 def _bodies(scene: Scene, state: State) -> thirteen.FreeBodies:
-    """The free bodies with what acts on them, moments about the mass centres."""
+    """Set up the free bodies with what acts on them, moments about the mass centres."""
     n, parts = len(state.theta_2), bodies(scene.linkage, scene.effects)
     actions = Actions(state, parts)
     for term in (*scene.loads, *scene.effects):
@@ -98,7 +98,7 @@ def _bodies(scene: Scene, state: State) -> thirteen.FreeBodies:
 
 
 def fifty_digits(scene: Scene, at: Command, bits: int = FIFTY_DIGITS) -> Quantities:
-    """Balls of the independent reference, (n,) objects."""
+    """Evaluate balls of the independent reference, (n,) objects."""
     from flint import arb, ctx
 
     from fourbar_validation.engines.balls import inputs, outputs
@@ -115,8 +115,8 @@ def fifty_digits(scene: Scene, at: Command, bits: int = FIFTY_DIGITS) -> Quantit
     return out | {name: [(y.get(f"{name}_x"), y.get(f"{name}_y")) for y in found] for name in PIN_FORCES}
 
 
-def against_reference(scene: Scene, at: Command, quantities: Quantities, reference: Quantities) -> Errors:
-    """Worst errors on their scales against balls of many more digits."""
+def against_reference(scene: Scene, at: Command, quantities: Quantities, reference: Quantities) -> WorstErrors:
+    """Find the worst errors on their scales against balls of many more digits."""
     formulas = solve(scene, "force", at=at)
     worst = {}
     for name in ("torque", *PIN_FORCES):
@@ -127,7 +127,7 @@ def against_reference(scene: Scene, at: Command, quantities: Quantities, referen
             if all(y is not None for _, y in pairs):
                 found.append(float(relative(math.hypot(*(_difference(x, y) for x, y in pairs)), size)))
         worst[name] = greatest(found)
-    return Errors(**worst)
+    return WorstErrors(**worst)
 
 
 def _difference(ours: Any, exact: Any) -> float:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fourbar_validation.advise.errors import QUANTITIES
-from fourbar_validation.lab.cost.study import STEPPED, Point
+from fourbar_validation.lab.cost.study import STEPPED, CostPoint
 
 TOO_LARGE = 0.1
 """A larger error is not small enough for its law: the motion itself is another."""
@@ -31,7 +31,7 @@ EXPECTED_ORDER = {
 
 
 @dataclass(frozen=True, slots=True)
-class Law:
+class ErrorLaw:
     """error ~ dial^exponent of one quantity over the points used."""
 
     name: str
@@ -62,7 +62,7 @@ class Law:
         return f"{'holds' if self.holds else 'FAILS'}, {self.exponent:.2f} +- {self.sigma:.2f}"
 
 
-def lines(found: Sequence[Law]) -> list[str]:
+def lines(found: Sequence[ErrorLaw]) -> list[str]:
     """Each law in one line, quantity by quantity."""
     shown = []
     for name in dict.fromkeys(law.name for law in found):
@@ -86,16 +86,16 @@ def fit(x: Sequence[float], y: Sequence[float]) -> tuple[float, float]:
     return float(found.slope), float(found.stderr) if len(x) > 2 else math.inf
 
 
-def floor(points: Sequence[Point], quantity: str) -> float | None:
-    """The error that more steps no longer lessen, or None where it still falls at the end of the ladder."""
+def floor(points: Sequence[CostPoint], quantity: str) -> float | None:
+    """Find the error that more steps no longer lessen; None where it still falls at the end of the ladder."""
     found = [getattr(point, quantity) for point in _by_steps(points)]
     if len(found) < 2 or not math.isfinite(found[-1]) or found[-1] < FLOORED * found[-2]:
         return None
     return float(found[-1])  # before it two sources may cancel: a dip is not a floor
 
 
-def steps_at_floor(points: Sequence[Point], quantity: str) -> Point | None:
-    """The first point of a ladder beyond which more steps buy nothing."""
+def steps_at_floor(points: Sequence[CostPoint], quantity: str) -> CostPoint | None:
+    """Find the first point of a ladder beyond which more steps buy nothing."""
     least = floor(points, quantity)
     if least is None:
         return None
@@ -103,11 +103,11 @@ def steps_at_floor(points: Sequence[Point], quantity: str) -> Point | None:
     return next(point for point in _by_steps(points) if point not in beyond)
 
 
-def _by_steps(points: Sequence[Point]) -> list[Point]:
+def _by_steps(points: Sequence[CostPoint]) -> list[CostPoint]:
     return sorted(points, key=lambda point: point.steps_per_revolution)
 
 
-def jumps(points: Sequence[Point], quantity: str) -> list[Point]:
+def jumps(points: Sequence[CostPoint], quantity: str) -> list[CostPoint]:
     """Where an error leaps up on a ladder from coarse to fine, once the motion is the scene's."""
     found = []
     for i, point in enumerate(points[1:], 1):
@@ -118,7 +118,7 @@ def jumps(points: Sequence[Point], quantity: str) -> list[Point]:
     return found
 
 
-def laws(curves: Mapping[str, Sequence[Point]]) -> list[Law]:
+def laws(curves: Mapping[str, Sequence[CostPoint]]) -> list[ErrorLaw]:
     """Every law that the study was laid out for, of each quantity, as far as its curves are there."""
     found = []
     one_state = [point for point in curves.get("one state", ()) if point.dial > 0.0]
@@ -135,25 +135,25 @@ def laws(curves: Mapping[str, Sequence[Point]]) -> list[Law]:
     return found + [law for quantity in QUANTITIES if (law := _stiff(curves, quantity)).points > 0]
 
 
-def _law(name: str, quantity: str, points: Sequence[Point], expected: float, *, by_steps: bool = False) -> Law:
+def _law(name: str, quantity: str, points: Sequence[CostPoint], expected: float, *, by_steps: bool = False) -> ErrorLaw:
     least = (floor(points, quantity) or 0.0) if by_steps else 0.0
     dialled = sorted((p for p in points if p.dial > 0.0), key=lambda p: p.dial if by_steps else -p.dial)
     leaps = tuple(_leap(p, dialled, quantity) for p in jumps(dialled, quantity))
     used = [p for p in dialled if ABOVE_FLOOR * least < getattr(p, quantity) < TOO_LARGE]
     if len(used) < FEWEST:
-        return Law(name, quantity, math.nan, math.inf, expected, len(used), leaps)
+        return ErrorLaw(name, quantity, math.nan, math.inf, expected, len(used), leaps)
     x = [1.0 / p.dial if by_steps else p.dial for p in used]
     slope, sigma = fit(x, [getattr(p, quantity) for p in used])
-    return Law(name, quantity, slope, sigma, expected, len(used), leaps)
+    return ErrorLaw(name, quantity, slope, sigma, expected, len(used), leaps)
 
 
-def _leap(point: Point, ladder: Sequence[Point], quantity: str) -> str:
+def _leap(point: CostPoint, ladder: Sequence[CostPoint], quantity: str) -> str:
     before = getattr(ladder[ladder.index(point) - 1], quantity)
     setting = point.setting.removeprefix(f"{point.curve}, ")
     return f"jumps from {before:.1e} to {getattr(point, quantity):.1e} at {setting}"
 
 
-def _stiff(curves: Mapping[str, Sequence[Point]], quantity: str) -> Law:
+def _stiff(curves: Mapping[str, Sequence[CostPoint]], quantity: str) -> ErrorLaw:
     """RK4's floor at a time constant of k steps goes as k^-4, whatever the timestep."""
     floors = {}
     for tc in (3.0, 10.0, 30.0, 100.0):
@@ -162,12 +162,12 @@ def _stiff(curves: Mapping[str, Sequence[Point]], quantity: str) -> Law:
             floors[tc] = least
     name = "floor of RK4 in tc/h"
     if len(floors) < FEWEST:
-        return Law(name, quantity, math.nan, math.inf, -FOURTH_ORDER, len(floors))
+        return ErrorLaw(name, quantity, math.nan, math.inf, -FOURTH_ORDER, len(floors))
     slope, sigma = fit(list(floors), list(floors.values()))
-    return Law(name, quantity, slope, sigma, -FOURTH_ORDER, len(floors))
+    return ErrorLaw(name, quantity, slope, sigma, -FOURTH_ORDER, len(floors))
 
 
-def warnings(curves: Mapping[str, Sequence[Point]]) -> list[str]:
+def warnings(curves: Mapping[str, Sequence[CostPoint]]) -> list[str]:
     """Where a quantity jumps towards finer steps, and where it has passed its floor."""
     found = []
     for name, points in curves.items():
@@ -188,9 +188,9 @@ def warnings(curves: Mapping[str, Sequence[Point]]) -> list[str]:
     return found
 
 
-def pareto(points: Sequence[Point], quantity: str) -> list[Point]:
+def pareto(points: Sequence[CostPoint], quantity: str) -> list[CostPoint]:
     """Points that no other beats in both error and cost, from cheap to accurate."""
-    front: list[Point] = []
+    front: list[CostPoint] = []
     for point in sorted(points, key=lambda p: (p.seconds_per_revolution, getattr(p, quantity))):
         if math.isfinite(getattr(point, quantity)) and (
             not front or getattr(point, quantity) < getattr(front[-1], quantity)

@@ -16,13 +16,13 @@ from fourbar.scene import Scene, command
 from fourbar.scene.motion import Motion, Sweep
 from fourbar_validation.advise.advise import advise
 from fourbar_validation.advise.matters import judged
-from fourbar_validation.engines.mujoco.trial import Rig
+from fourbar_validation.engines.mujoco.trial import TrialSetup
 from fourbar_validation.lab.cost.exhaustive import cheapest, relative_costs
-from fourbar_validation.scenes.random import LinkageType, random_scene
+from fourbar_validation.scenes.random import DrawnType, random_scene
 
 TYPES = (
-    *(LinkageType.CRANK_ROCKER, LinkageType.DRAG_LINK),
-    *(LinkageType.DOUBLE_ROCKER, LinkageType.TRIPLE_ROCKER),
+    *(DrawnType.CRANK_ROCKER, DrawnType.DRAG_LINK),
+    *(DrawnType.DOUBLE_ROCKER, DrawnType.TRIPLE_ROCKER),
 )
 SPEEDS = (-1.0, 3.0)
 """log10 of rad/s."""
@@ -38,7 +38,7 @@ NEEDED_MET, NEEDED_CHEAP, CHEAP = 0.95, 0.80, 3.0
 
 
 @dataclass(frozen=True, slots=True)
-class Case:
+class AdviceCase:
     """One linkage, one required error."""
 
     index: int
@@ -72,7 +72,7 @@ class Case:
 
 
 def scene_of(seed: int, index: int) -> tuple[Scene, float]:
-    """A random linkage away from its limits, at a random speed, and the error required of it."""
+    """Draw a linkage away from its limits, at a random speed, and the error required of it."""
     scene = random_scene(seed, index, TYPES)
     rng = np.random.default_rng([seed, index, 1])
     omega = float(rng.choice([-1.0, 1.0]) * 10.0 ** rng.uniform(*SPEEDS))
@@ -88,20 +88,20 @@ def scene_of(seed: int, index: int) -> tuple[Scene, float]:
 
 
 def denser(scene: Scene, times: int) -> Scene:
-    """The same motion at more positions."""
+    """Divide the same motion into more positions."""
     sweep = scene.motion.theta_2
     assert isinstance(sweep, Sweep)
     return replace(scene, motion=replace(scene.motion, theta_2=replace(sweep, steps=sweep.steps * times)))
 
 
-def case(seed: int, index: int, costs: dict[tuple[str, bool], float]) -> Case:
+def case(seed: int, index: int, costs: dict[tuple[str, bool], float]) -> AdviceCase:
     """Ask for advice, judge it at denser positions, and search exhaustively."""
     scene, required = scene_of(seed, index)
     advice = advise(scene, required)
     dense, searched = denser(scene, DENSER), denser(scene, SEARCHED)
-    error = judged(dense, Rig(dense, command(dense)).try_out(advice.best.settings)).worst
-    found = cheapest(Rig(searched, command(searched)), required, costs)
-    return Case(
+    error = judged(dense, TrialSetup(dense, command(dense)).try_out(advice.best.settings)).worst
+    found = cheapest(TrialSetup(searched, command(searched)), required, costs)
+    return AdviceCase(
         index,
         scene.title.rpartition(" ")[0],
         scene.motion.omega_2 or 0.0,
@@ -117,31 +117,33 @@ def case(seed: int, index: int, costs: dict[tuple[str, bool], float]) -> Case:
 
 
 def wilson(successes: int, n: int) -> float:
-    """Lower bound of the Wilson score interval of a proportion, at 95 %."""
+    """Compute the lower bound of the Wilson score interval of a proportion, at 95 %."""
     from scipy.stats import binomtest
 
     return float(binomtest(successes, n).proportion_ci(0.95, "wilson").low) if n else 0.0
 
 
 def enough(missed: int) -> int:
-    """The least number of cases whose bound is the needed one where so many are not met."""
+    """Find the least number of cases whose bound is the needed one where so many are not met."""
     n = missed + 1
     while wilson(n - missed, n) < NEEDED_MET:
         n += 1
     return n
 
 
-def measure(seed: int, count: int, out: Path) -> Iterator[Case]:
-    """The cases, one by one, each written as it comes; what an interrupted run left is kept."""
+def measure(seed: int, count: int, out: Path) -> Iterator[AdviceCase]:
+    """Yield the cases, each written as it comes; what an interrupted run left is kept."""
     done = {each.index: each for each in kept(out, seed)}
     out.parent.mkdir(parents=True, exist_ok=True)
     yield from (done[i] for i in sorted(done) if i < count)
     if len(done) >= count:
         return
     scene, _ = scene_of(seed, 0)
-    costs = relative_costs(Rig(scene, command(scene)))
+    costs = relative_costs(TrialSetup(scene, command(scene)))
     if not out.exists() or not done:
-        out.write_text(f"# seed {seed}\n" + ",".join(field.name for field in fields(Case)) + "\n", encoding="utf-8")
+        out.write_text(
+            f"# seed {seed}\n" + ",".join(field.name for field in fields(AdviceCase)) + "\n", encoding="utf-8"
+        )
     for index in range(count):
         if index in done:
             continue
@@ -150,12 +152,12 @@ def measure(seed: int, count: int, out: Path) -> Iterator[Case]:
         except LimitError as error:
             raise LimitError(f"linkage {index} of seed {seed}: {error}") from None
         with out.open("a", encoding="utf-8", newline="") as file:
-            csv.writer(file, lineterminator="\n").writerow([getattr(each, field.name) for field in fields(Case)])
+            csv.writer(file, lineterminator="\n").writerow([getattr(each, field.name) for field in fields(AdviceCase)])
         yield each
 
 
-def kept(out: Path, seed: int) -> list[Case]:
-    """Cases of the same seed that are already in the file."""
+def kept(out: Path, seed: int) -> list[AdviceCase]:
+    """Read the cases of the same seed that are already in the file."""
     if not out.exists():
         return []
     first, *lines = out.read_text(encoding="utf-8").splitlines()
@@ -164,14 +166,14 @@ def kept(out: Path, seed: int) -> list[Case]:
     return [_read(row) for row in csv.DictReader(lines)]
 
 
-def _read(row: dict[str, Any]) -> Case:
+def _read(row: dict[str, Any]) -> AdviceCase:
     numbers = {key: float(row[key]) for key in ("omega_2", "asked", "error", "cost", "cheapest")}
     flags = {key: row[key] == "True" for key in ("gravity", "reached")}
     counts = {key: int(row[key]) for key in ("index", "drive_bar", "trials")}
-    return Case(kind=row["kind"], **numbers, **flags, **counts)  # type: ignore[arg-type]
+    return AdviceCase(kind=row["kind"], **numbers, **flags, **counts)  # type: ignore[arg-type]
 
 
-@click.command(name="advise-study")
+@click.command()
 @click.option("--count", type=click.IntRange(min=1), default=400, show_default=True, help="Random linkages.")
 @click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True)
 @click.option("-o", "--out", type=click.Path(path_type=Path, dir_okay=False), default=Path("results/advise-study.csv"))

@@ -5,7 +5,7 @@ from typing import Any
 
 from fourbar_validation.advise.errors import QUANTITIES
 from fourbar_validation.lab.cost.laws import TOO_LARGE, jumps
-from fourbar_validation.lab.cost.study import Point
+from fourbar_validation.lab.cost.study import CostPoint
 
 Look = tuple[str, str, str, Any]
 """Curve, colour for all kinds of colour vision, marker and line that tell it apart in grey."""
@@ -22,20 +22,20 @@ NAMES = {"torque": "driving torque"}
 
 
 def line_of(axes: Any, x: Sequence[float], y: Sequence[float], label: str, look: Look, **style: Any) -> None:
-    """A curve in its colour, with its marker and line."""
+    """Draw a curve in its colour, with its marker and line."""
     _, colour, marker, line = look
     common = {"color": colour, "ls": line, "marker": marker, "mec": "white", "mew": 0.5}
     axes.plot(x, y, label=label, **(common | style))
 
 
 def headed(figure: Any, statement: str, title: str, upper: float, lower: float) -> Any:
-    """With what a picture means, and below it what was run."""
+    """Write what a picture means above it, and what was run."""
     figure.text(0.02, upper, statement, fontsize=12.5, weight="bold", va="center")
     figure.text(0.02, lower, title, fontsize=9.5, color="#666666", va="center")
     return figure
 
 
-def over_the_timestep(axes: Any, curves: Mapping[str, Sequence[Point]], quantity: str) -> None:
+def over_the_timestep(axes: Any, curves: Mapping[str, Sequence[CostPoint]], quantity: str) -> None:
     """Draw one quantity's error over the timestep, by integrator."""
     for label, look in CURVES.items():
         row = sorted(curves.get(look[0], ()), key=lambda point: point.dial)
@@ -46,8 +46,8 @@ def over_the_timestep(axes: Any, curves: Mapping[str, Sequence[Point]], quantity
         axes.plot([1.0 / n for n in leaps], [errors[n] for n in leaps], gid=f"jump-{quantity}", **ring)
 
 
-def picture(curves: Mapping[str, Sequence[Point]], title: str) -> Any:
-    """Panels of all quantities on the same axes."""
+def picture(curves: Mapping[str, Sequence[CostPoint]], title: str) -> Any:
+    """Draw panels of all quantities on the same axes."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(12.5, 4.6))
@@ -65,8 +65,8 @@ def picture(curves: Mapping[str, Sequence[Point]], title: str) -> Any:
     return headed(figure, statement(curves), title, 0.955, 0.905)
 
 
-def statement(curves: Mapping[str, Sequence[Point]]) -> str:
-    """What the picture means."""
+def statement(curves: Mapping[str, Sequence[CostPoint]]) -> str:
+    """Say what the picture means."""
     leaping: dict[str, None] = {}
     never: dict[str, list[str]] = {}
     for label, (name, *_) in CURVES.items():

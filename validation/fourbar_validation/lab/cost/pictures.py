@@ -10,7 +10,7 @@ from fourbar.show.plot.style import matplotlib_style, save
 from fourbar_validation.lab.cost import orders
 from fourbar_validation.lab.cost.laws import pareto
 from fourbar_validation.lab.cost.orders import CURVES, Look, headed, line_of
-from fourbar_validation.lab.cost.study import EXACT, FORMULAS, STEPPED, Point
+from fourbar_validation.lab.cost.study import EXACT, FORMULAS, STEPPED, CostPoint
 
 SHOWN: dict[str, Look] = {
     "Euler, MuJoCo's defaults": ("Euler, MuJoCo's defaults", "#d55e00", "s", (0, (4, 2))),
@@ -42,8 +42,8 @@ INK = "#333333"
 PALE = "#d9d9d9"
 
 
-def draw(curves: Mapping[str, Sequence[Point]], title: str, folder: Path) -> list[Path]:
-    """All pictures of a scene as SVG and PNG; the files written."""
+def draw(curves: Mapping[str, Sequence[CostPoint]], title: str, folder: Path) -> list[Path]:
+    """Draw all pictures of a scene as SVG and PNG; the files written."""
     written = []
     with matplotlib_style():
         made = {f"work-precision-{quantity}": _work_precision(curves, quantity, title) for quantity in NAMES}
@@ -58,7 +58,7 @@ def draw(curves: Mapping[str, Sequence[Point]], title: str, folder: Path) -> lis
     return written
 
 
-def _work_precision(curves: Mapping[str, Sequence[Point]], quantity: str, title: str) -> Any:
+def _work_precision(curves: Mapping[str, Sequence[CostPoint]], quantity: str, title: str) -> Any:
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(9.6, 6.4))
@@ -102,23 +102,23 @@ def _work_precision(curves: Mapping[str, Sequence[Point]], quantity: str, title:
     return headed(figure, statement(curves, quantity), title, 0.965, 0.928)
 
 
-def _places(points: Sequence[Point], quantity: str) -> tuple[list[float], list[float]]:
-    """Milliseconds a revolution, and errors; what lies below the picture at its edge."""
+def _places(points: Sequence[CostPoint], quantity: str) -> tuple[list[float], list[float]]:
+    """Compute ms per revolution, and errors; what lies below the picture at its edge."""
     errors = [max(getattr(point, quantity), LOWEST) for point in points]
     return [1e3 * point.seconds_per_revolution for point in points], errors
 
 
 def _name(
-    labels: Labels, axes: Any, point: Point, quantity: str, text: str, colour: str = INK, size: float = 8.5
+    labels: Labels, axes: Any, point: CostPoint, quantity: str, text: str, colour: str = INK, size: float = 8.5
 ) -> None:
-    """Words next to a point, where they cover nothing."""
+    """Write next to a point, where it covers nothing."""
     (x,), (y,) = _places([point], quantity)
     labels.keep_off(axes, (x, y), (x, y))
     labels.add(Label(axes, text, (x, y), (0.5 * x, y), colour, size))  # to the right where that is free
 
 
-def _exact(labels: Labels, axes: Any, points: Sequence[Point], quantity: str) -> None:
-    """Methods that answer each position by itself: one mark each, named next to it."""
+def _exact(labels: Labels, axes: Any, points: Sequence[CostPoint], quantity: str) -> None:
+    """Mark the methods that answer each position by itself."""
     marks = {EXACT: ("h", "#009e73"), FORMULAS: ("*", "black")}
     for point in points:
         if point.kind == STEPPED or (point.curve == "one state" and point.dial > 0.0):
@@ -130,13 +130,13 @@ def _exact(labels: Labels, axes: Any, points: Sequence[Point], quantity: str) ->
 
 
 def short(value: float) -> str:
-    """One digit and its power of ten."""
+    """Format one digit and its power of ten."""
     mantissa, _, exponent = f"{value:.0e}".partition("e")
     return f"{mantissa}e{int(exponent)}"
 
 
-def statement(curves: Mapping[str, Sequence[Point]], quantity: str) -> str:
-    """What the picture means."""
+def statement(curves: Mapping[str, Sequence[CostPoint]], quantity: str) -> str:
+    """Say what the picture means."""
     four = [p for p in curves.get("recommended", ()) if getattr(p, quantity) <= 1e-4]
     default = [p for row in curves.values() for p in row if p.setting == DEFAULT]
     parts = []
@@ -153,8 +153,8 @@ def statement(curves: Mapping[str, Sequence[Point]], quantity: str) -> str:
     return "; ".join(parts) or f"Error of the {NAMES[quantity]} against its cost"
 
 
-def _sources(curves: Mapping[str, Sequence[Point]], title: str) -> Any:
-    """Time step, softness and solver tolerance, each with the other two too fine to matter."""
+def _sources(curves: Mapping[str, Sequence[CostPoint]], title: str) -> Any:
+    """Draw time step, softness and solver tolerance, each with the other two too fine to matter."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(11.5, 5.6))
@@ -186,7 +186,7 @@ def _sources(curves: Mapping[str, Sequence[Point]], title: str) -> Any:
 
 
 def _slope(axes: Any, exponent: float, x: float, y: float, name: str) -> None:
-    """A triangle's hypotenuse with the exponent next to it."""
+    """Draw a slope with its exponent next to it."""
     axes.plot([x, 4.0 * x], [y, y * 4.0**exponent], color=INK, lw=1.0)
     axes.annotate(
         f"slope {name}", (2.0 * x, y * 2.0**exponent), xytext=(6, -8), textcoords="offset points", fontsize=8.5

@@ -14,10 +14,10 @@ from fourbar.files import dump
 from fourbar.formulas.mobility import turns_fully
 from fourbar.scene import Command, Scene, command
 from fourbar_validation.advise.advise import advise
-from fourbar_validation.advise.errors import NO_ANSWER, Errors, errors
+from fourbar_validation.advise.errors import NO_ANSWER, WorstErrors, errors
 from fourbar_validation.compare.answer import Engine
 from fourbar_validation.engines.loop import Trial
-from fourbar_validation.engines.mujoco.trial import Rig
+from fourbar_validation.engines.mujoco.trial import TrialSetup
 from fourbar_validation.lab.cost import formulas
 from fourbar_validation.lab.cost.curves import BEST, SLOW, Curve, Spot, curves
 from fourbar_validation.lab.stress.timed import in_turns, seconds
@@ -39,7 +39,7 @@ EXACT, STEPPED, FORMULAS = "exact", "stepped", "formulas"
 
 
 @dataclass(frozen=True, slots=True)
-class Point:
+class CostPoint:
     """One setting of one method: its errors, and what it costs."""
 
     curve: str
@@ -77,18 +77,18 @@ class Point:
         return max(self.torque, self.force)
 
 
-COLUMNS = tuple(field.name for field in fields(Point))
+COLUMNS = tuple(field.name for field in fields(CostPoint))
 
 
-class Study:
+class CostStudy:
     """The parts of a study of one scene, each in its own file."""
 
     def __init__(self, name: str, scene: Scene, folder: Path) -> None:
         self.name, self.scene, self.folder = name, scene, folder
         self.command = command(scene)
         self.left_out: list[str] = []
-        self._rigs: dict[tuple[bool, bool, bool], Rig] = {}
-        self.units: dict[str, Callable[[], list[Point]]] = {"formulas": self._formulas, "inverse": self._inverse}
+        self._rigs: dict[tuple[bool, bool, bool], TrialSetup] = {}
+        self.units: dict[str, Callable[[], list[CostPoint]]] = {"formulas": self._formulas, "inverse": self._inverse}
         self.units["one state"] = self._one_state
         self.units["Pinocchio forward"] = self._pinocchio_forward
         self.units["recommended"] = self._recommended
@@ -98,8 +98,8 @@ class Study:
     def __len__(self) -> int:
         return len(self.units)
 
-    def points(self) -> Iterator[tuple[str, list[Point]]]:
-        """Curve after curve; what is on disk is not done again."""
+    def points(self) -> Iterator[tuple[str, list[CostPoint]]]:
+        """Yield curve after curve; what is on disk is not done again."""
         identity = {"scene": dump(self.scene), "versions": versions(), "study": VERSION}
         with Store(self.folder, identity).held() as store:
             done = store.done()
@@ -107,7 +107,7 @@ class Study:
                 if number in done:
                     points, reasons = store.read(number)
                     self.left_out += reasons
-                    yield name, [Point(**row) for row in points]
+                    yield name, [CostPoint(**row) for row in points]
                     continue
                 reasons = []
                 try:
@@ -118,8 +118,8 @@ class Study:
                 store.put(number, [[asdict(point) for point in found], reasons])
                 yield name, found
 
-    def rig(self, slow: bool = False, bare: bool = False, settled: bool = False) -> Rig:
-        """The scene assembled for trials: at its own speed or slow, as it is or bare, after a turn or not."""
+    def rig(self, slow: bool = False, bare: bool = False, settled: bool = False) -> TrialSetup:
+        """Assemble the scene for trials: at its own speed or slow, as it is or bare, after a turn or not."""
         if (slow, bare, settled) not in self._rigs:
             scene = self.scene
             if slow:
@@ -132,16 +132,16 @@ class Study:
                 before = float(at.theta_2.min() if at.omega_2 > 0.0 else at.theta_2.max())  # type: ignore[operator]
                 before -= math.copysign(2.0 * math.pi, at.omega_2)  # type: ignore[arg-type]
                 at = at._replace(theta_2=np.append(at.theta_2, before), branch=np.append(at.branch, at.branch[0]))
-            self._rigs[slow, bare, settled] = Rig(scene, at)
+            self._rigs[slow, bare, settled] = TrialSetup(scene, at)
         return self._rigs[slow, bare, settled]
 
-    def _curve(self, curve: Curve) -> list[Point]:
+    def _curve(self, curve: Curve) -> list[CostPoint]:
         settled = curve.settled and turns_fully(self.scene.linkage) and self.scene.motion.alpha_2 == 0.0
         rig = self.rig(curve.slow, curve.bare, settled)
         return self._stepped(curve.name, curve.spots, rig, settled)
 
-    def _stepped(self, name: str, spots: tuple[Spot, ...], rig: Rig, settled: bool = False) -> list[Point]:
-        """Errors of each spot, and the CPU time of its steps next to that of the recommended model, interleaved."""
+    def _stepped(self, name: str, spots: tuple[Spot, ...], rig: TrialSetup, settled: bool = False) -> list[CostPoint]:
+        """Try each spot: errors, and the CPU time of its steps next to that of the recommended model, interleaved."""
         trials = [rig.try_out(spot.settings, spot.build) for spot in spots]
         if settled:
             for trial in trials:
@@ -157,15 +157,15 @@ class Study:
             n = trial.steps_per_revolution or spot.settings.steps_per_revolution
             samples = max(len(trial.at.theta_2), 1)
             points.append(
-                Point(
+                CostPoint(
                     *(name, STEPPED, spot.label, spot.x, trial.steps, n, *found),
                     *(cost * n, trial.reading / samples, cost * n / reference, scatter, trial.broken),
                 )
             )
         return points
 
-    def _recommended(self) -> list[Point]:
-        """What the advice gives for each required error, where it is reached."""
+    def _recommended(self) -> list[CostPoint]:
+        """Try what the advice gives for each required error, where it is reached."""
         rig, spots = self.rig(), []
         for required in REQUIRED:
             advice = advise(self.scene, required, rig)
@@ -183,13 +183,22 @@ class Study:
         return self._stepped("recommended", tuple(spots), rig)
 
     def _at_positions(
-        self, name: str, kind: str, label: str, found: Errors, times: Sequence[float], n: int, dial: float = math.nan
-    ) -> Point:
-        """A point of a method that answers each position by itself."""
+        self,
+        name: str,
+        kind: str,
+        label: str,
+        found: WorstErrors,
+        times: Sequence[float],
+        n: int,
+        dial: float = math.nan,
+    ) -> CostPoint:
+        """Make a point of a method that answers each position by itself."""
         per_revolution = self._positions_per_revolution()
         reference, (seconds, scatter) = self._rk4_step(), clocked(times)
         cost = seconds / n * per_revolution
-        return Point(name, kind, label, dial, n, per_revolution, *found, cost, seconds / n, cost / reference, scatter)
+        return CostPoint(
+            name, kind, label, dial, n, per_revolution, *found, cost, seconds / n, cost / reference, scatter
+        )
 
     def _positions_per_revolution(self) -> float:
         span = float(np.ptp(self.command.theta_2)) or 2.0 * math.pi
@@ -202,7 +211,7 @@ class Study:
             return math.nan
         return median(clock(TIMED_STEPS) / TIMED_STEPS for _ in range(ROUNDS))
 
-    def _formulas(self) -> list[Point]:
+    def _formulas(self) -> list[CostPoint]:
         few = formulas.few(self.command)
         exact = formulas.fifty_digits(self.scene, few, 2 * formulas.FIFTY_DIGITS)
         points = []
@@ -217,14 +226,14 @@ class Study:
             points.append(self._at_positions("formulas", FORMULAS, label, found, times, len(at.theta_2)))
         return points
 
-    def _inverse(self) -> list[Point]:
+    def _inverse(self) -> list[CostPoint]:
         from fourbar_validation.engines.mujoco.inverse import MujocoInverse
         from fourbar_validation.engines.pinocchio import PinocchioInverse
 
         return [self._answered("inverse", engine) for engine in (PinocchioInverse(), MujocoInverse())]
 
-    def _answered(self, curve: str, engine: Engine, label: str = "", dial: float = math.nan) -> Point:
-        """An engine that answers each position."""
+    def _answered(self, curve: str, engine: Engine, label: str = "", dial: float = math.nan) -> CostPoint:
+        """Time an engine that answers each position."""
         import time
 
         times = []
@@ -240,7 +249,7 @@ class Study:
         found = errors(self.scene, at, {name: value[rows] for name, value in answer.quantities.items()})
         return self._at_positions(curve, EXACT, label or engine.name, found, times, len(self.command.theta_2), dial)
 
-    def _one_state(self) -> list[Point]:
+    def _one_state(self) -> list[CostPoint]:
         from fourbar_validation.engines.mujoco.one_state import MujocoOneState
 
         points = [
@@ -249,7 +258,7 @@ class Study:
         ]
         return [*points, self._answered("one state", MujocoOneState(), "MuJoCo at one state, extrapolated", 0.0)]
 
-    def _pinocchio_forward(self) -> list[Point]:
+    def _pinocchio_forward(self) -> list[CostPoint]:
         from fourbar_validation.engines.pinocchio_forward import PinocchioForward
 
         points = []
@@ -259,7 +268,7 @@ class Study:
             found = errors(self.scene, ran.at, ran.quantities)
             cost = ran.stepping / ran.steps * ran.steps_per_revolution
             points.append(
-                Point(
+                CostPoint(
                     *("Pinocchio forward", STEPPED, f"Pinocchio RK4, {n}/rev", n, ran.steps, ran.steps_per_revolution),
                     *(*found, cost, math.nan, cost / reference, math.nan),
                 )
@@ -268,14 +277,14 @@ class Study:
 
 
 def _leave_out_first(trial: Trial) -> None:
-    """The turn that a soft closure takes to settle from its exact start."""
+    """Leave out the turn that a soft closure takes to settle from its exact start."""
     at = trial.at
     trial.at = Command(at.theta_2[1:], at.branch[1:], at.omega_2[1:], at.alpha_2[1:])  # type: ignore[index]
     trial.quantities = {name: values[1:] for name, values in trial.quantities.items()}
 
 
 def clocked(times: Sequence[float]) -> tuple[float, float]:
-    """The median of some timings, and half of what their middle half spans, over it."""
+    """Compute the median of timings, and half of what their middle half spans, over it."""
     low, middle, high = np.percentile(times, (25, 50, 75)).tolist()
     return middle, 0.5 * (high - low) / middle
 
@@ -283,7 +292,7 @@ def clocked(times: Sequence[float]) -> tuple[float, float]:
 def _interleaved(
     clocks: list[Callable[[int], float]], reference: Callable[[int], float], steps: list[int]
 ) -> tuple[list[tuple[float, float]], float]:
-    """CPU seconds per step, and their scatter over rounds; all take turns, so that a slow spell hits all of them."""
+    """Time the steps, and their scatter over rounds; all take turns, so that a slow spell hits all of them."""
 
     def per_step(clock: Callable[[int], float], n: int) -> float:
         return clock(n) / n

@@ -1,1 +1,1 @@
-"""What each effect costs, and what an absent one leaves."""
+"""What each effect costs in each engine."""

@@ -1,7 +1,4 @@
-"""The table of what effects and flags cost: instructions, and with them wall clock, of runs with and without in turn.
-
-The wall clock is for the reader alone: on a machine that does other things the ratio scatters by several per cent.
-"""
+"""The table of what effects and flags cost in time: runs with and without in turn."""
 
 import gc
 import time
@@ -10,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fourbar_validation.lab.effects.work import EFFECTS, ENGINES
+from fourbar_validation.lab.effects.work import EFFECTS, ENGINES, POSITIONS
 from fourbar_validation.places import PROGRAM
 from fourbar_validation.report.machine import machine, versions
 from fourbar_validation.report.terminal import lined_up
@@ -21,64 +18,55 @@ AMOUNTS = {"formulas": 40, "mujoco-simulated": 1000, "mujoco-inverse": 100, "pin
 """Of one run: 10 to 20 ms, long against the clock's resolution and short against what disturbs it."""
 COMMAND = f"{PROGRAM} cost --effects"
 ABOUT = (
-    "Instructions per position, per step of the simulation (RK4), counted by valgrind within the work alone, and "
-    "relative to the scene without effects; counts of the same work repeat to 0.1 %. In brackets the wall "
-    "clock of runs with and without in turn: the median of the ratios and their middle half. It scatters with whatever "
-    "else the machine does."
+    "Processor time of a position, of a step of the simulation (RK4), in us without effects; with an effect relative "
+    "to that: the median of the ratios of neighbouring runs and their middle half."
 )
 
 
-class Ratio(NamedTuple):
-    """Time with the effect by time of the bare scene, of pairs of neighbouring runs."""
-
-    median: float
-    low: float
-    high: float
-    """The middle half of the pairs lies between them."""
-
-
-class Entry(NamedTuple):
-    """One effect, or one flag, in one engine."""
+class EffectCost(NamedTuple):
+    """Time of one effect, or one flag, in one engine by that of the bare scene, of pairs of neighbouring runs."""
 
     engine: str
     effect: str
-    instructions: float
-    clock: Ratio
+    seconds: float
+    """Of the bare scene, per position or step."""
+    low: float
+    median: float
+    high: float
+    """The middle half of the pairs lies between low and high."""
 
 
-def rows(entries: Iterable[Entry]) -> tuple[list[str], list[list[str]]]:
-    """Engines, and for each effect its name and a cell for each engine."""
-    found = {(one.engine, one.effect): one for one in entries}
-    engines = list(dict.fromkeys(engine for engine, _ in found))
+def rows(costs: Iterable[EffectCost]) -> tuple[list[str], list[list[str]]]:
+    """List the engines, and for each effect its name and a cell for each engine."""
+    by_name = {(one.engine, one.effect): one for one in costs}
+    engines = list(dict.fromkeys(engine for engine, _ in by_name))
     table = []
-    for effect in dict.fromkeys(effect for _, effect in found):
+    for effect in dict.fromkeys(effect for _, effect in by_name):
         cells = [effect]
         for engine in engines:
-            if (engine, effect) not in found:
+            one = by_name.get((engine, effect))
+            if one is None:
                 cells.append("no counterpart" if effect in EFFECTS else "")
-                continue
-            one, bare = found[engine, effect], found[engine, "none"]
-            cell = f"{one.instructions:,.0f}"
-            if one is not bare:
-                clock = ", ".join(f"{100.0 * (each - 1.0):+.0f}" for each in (one.clock.low, one.clock.high))
-                median = f"{100.0 * (one.clock.median - 1.0):+.0f}"
-                cell += f" {100.0 * (one.instructions / bare.instructions - 1.0):+.1f} % [{median}: {clock} %]"
-            cells.append(cell)
+            elif effect == "none":
+                cells.append(f"{1e6 * one.seconds:.3g} us")
+            else:
+                low, median, high = (f"{100.0 * (each - 1.0):+.0f}" for each in one[3:])
+                cells.append(f"{median} % [{low}, {high}]")
         table.append(cells)
     return engines, table
 
 
-def show(entries: Iterable[Entry]) -> None:
-    """Print it."""
+def show(costs: Iterable[EffectCost]) -> None:
+    """Print the table."""
     from rich.console import Console
 
-    engines, table = rows(entries)
+    engines, table = rows(costs)
     Console().print(lined_up(["effect", *engines], table, caption=ABOUT))
 
 
-def markdown(entries: Iterable[Entry]) -> str:
-    """The same as Markdown, with the command, the versions and the machine."""
-    engines, table = rows(entries)
+def markdown(costs: Iterable[EffectCost]) -> str:
+    """Write the table as Markdown, with the command, the versions and the machine."""
+    engines, table = rows(costs)
     lines = ["# What effects cost", "", f"`{COMMAND}`. {ABOUT}", ""]
     lines += ["| " + " | ".join(["", *engines]) + " |", "|---|" + "---:|" * len(engines)]
     lines += ["| " + " | ".join(cells) + " |" for cells in table]
@@ -86,8 +74,8 @@ def markdown(entries: Iterable[Entry]) -> str:
     return "\n".join(lines)
 
 
-def ratio(engine: str, effect: str, rounds: int = ROUNDS) -> Ratio:
-    """The ratio of neighbouring runs: both meet the same disturbances."""
+def measure(engine: str, effect: str, rounds: int = ROUNDS) -> EffectCost:
+    """Time neighbouring runs with and without an effect: both meet the same disturbances."""
     works = [ENGINES[engine](name) for name in ("none", effect)]
     amount = AMOUNTS[engine]
     for work in works:
@@ -98,10 +86,11 @@ def ratio(engine: str, effect: str, rounds: int = ROUNDS) -> Ratio:
     try:
         for number in range(rounds):
             for which in (0, 1) if number % 2 == 0 else (1, 0):
-                start = time.perf_counter()
+                start = time.process_time()
                 works[which](amount)
-                times[number, which] = time.perf_counter() - start
+                times[number, which] = time.process_time() - start
     finally:
         gc.enable()
-    low, median, high = np.percentile(times[:, 1] / times[:, 0], [25, 50, 75])
-    return Ratio(float(median), float(low), float(high))
+    units = amount * (POSITIONS if engine == "formulas" else 1)
+    low, median, high = np.percentile(times[:, 1] / times[:, 0], [25, 50, 75]).tolist()
+    return EffectCost(engine, effect, float(np.median(times[:, 0])) / units, low, median, high)

@@ -1,13 +1,10 @@
-"""Workloads for counting instructions: `python -m fourbar_validation.lab.effects.work ENGINE FEW MANY EFFECT...`."""
+"""What is timed of each effect in each engine: workloads on one linkage."""
 
-import ctypes
-import gc
 import math
 import re
-import sys
 from collections.abc import Callable
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from fourbar import effects as kinds
 from fourbar.linkage import Bar, FourBar
@@ -15,28 +12,25 @@ from fourbar.scene import Scene, command
 from fourbar.scene.motion import Motion, Sweep
 from fourbar.solve import solve
 
-if TYPE_CHECKING:
-    from fourbar.effects import Effect, Load
-
-EFFECTS: dict[str, "Callable[[], Effect | None]"] = {
-    "none": lambda: None,
-    "gravity": lambda: kinds.Gravity(9.81),
-    "viscous": lambda: kinds.Viscous.at(O2=0.01, A=0.01, O4=0.01),
-    "viscous at pin B": lambda: kinds.Viscous.at(B=0.01),
-    "friction": lambda: kinds.Friction.at(O2=0.01, A=0.01, O4=0.01),
-    "friction at pin B": lambda: kinds.Friction.at(B=0.01),
-    "pin_friction": lambda: kinds.PinFriction.at(O2=(0.1, 0.01), A=(0.1, 0.01), B=(0.1, 0.01), O4=(0.1, 0.01)),
-    "torsion": lambda: kinds.Torsion.at(O4=(2.0, 1.9, 0.1)),
-    "springs": lambda: kinds.Springs(
-        (kinds.Spring(kinds.Point(1, 0.1, -1.5), kinds.Point(4, 0.08, 0.0), 200.0, 0.05, 3.0),)
+EFFECTS: dict[str, kinds.Effect | None] = {
+    "none": None,
+    "gravity": kinds.Gravity(9.81),
+    "viscous": kinds.Viscous.at(O2=0.01, A=0.01, O4=0.01),
+    "viscous at pin B": kinds.Viscous.at(B=0.01),
+    "friction": kinds.Friction.at(O2=0.01, A=0.01, O4=0.01),
+    "friction at pin B": kinds.Friction.at(B=0.01),
+    "pin_friction": kinds.PinFriction.at(O2=(0.1, 0.01), A=(0.1, 0.01), B=(0.1, 0.01), O4=(0.1, 0.01)),
+    "torsion": kinds.Torsion.at(O4=(2.0, 1.9, 0.1)),
+    "springs": kinds.Springs(
+        (kinds.Spring(kinds.SpringEnd(1, 0.1, -1.5), kinds.SpringEnd(4, 0.08, 0.0), 200.0, 0.05, 3.0),)
     ),
-    "flywheel": lambda: kinds.Flywheel(0.02),
-    "load": lambda: kinds.Load(4, (3.0, 0.7), (0.05, 1.0), 0.2),
-    "load over theta_2": lambda: kinds.Load(
+    "flywheel": kinds.Flywheel(0.02),
+    "load": kinds.Load(4, (3.0, 0.7), (0.05, 1.0), 0.2),
+    "load over theta_2": kinds.Load(
         4, (3.0, 0.7), (0.05, 1.0), 0.2, "world", kinds.Table((0.0, 3.0, math.tau), (0.0, 1.0, 0.0))
     ),
 }
-"""What is counted, each by itself on the same linkage; made when requested, so that a build without one still works."""
+"""By name, each by itself on the same linkage."""
 DEFAULT_FLAGS = "none, MuJoCo's default flags"
 LEFT_ON = "none, {} left on"
 """One flag of MuJoCo as it is by default, the others as the generated MJCF has them."""
@@ -45,16 +39,16 @@ POSITIONS = 1000
 
 
 def scene(effect: str, positions: int) -> Scene:
-    """A crank-rocker of uniform bars with one effect."""
+    """Build a crank-rocker of uniform bars with one effect."""
     linkage = FourBar(0.3, Bar(0.1, 0.2), Bar(0.25, 0.5), Bar(0.22, 0.4))
-    term = EFFECTS[effect]()
-    loads: tuple[Load, ...] = (term,) if isinstance(term, getattr(kinds, "Load", ())) else ()  # type: ignore[assignment]
-    effects = () if term is None or loads else (term,)
+    acting = EFFECTS[effect]
+    loads = (acting,) if isinstance(acting, kinds.Load) else ()
+    effects = () if acting is None or loads else (acting,)
     return Scene(linkage, Motion(Sweep(0.13, 0.13 + math.tau, positions - 1), 10.0), loads=loads, effects=effects)
 
 
 def formulas(effect: str) -> Callable[[int], Any]:
-    """Pin forces and torque at POSITIONS positions, a given number of times."""
+    """Prepare pin forces and torque at POSITIONS positions, a given number of times."""
     given = scene(effect, POSITIONS)
 
     def work(amount: int) -> None:
@@ -65,7 +59,7 @@ def formulas(effect: str) -> Callable[[int], Any]:
 
 
 def simulated(effect: str) -> Callable[[int], Any]:
-    """A given number of steps of the generated MJCF."""
+    """Prepare a given number of steps of the generated MJCF."""
     from fourbar.mjcf import mjcf
     from fourbar_validation.engines.mujoco.stepping import steps
 
@@ -79,7 +73,7 @@ def simulated(effect: str) -> Callable[[int], Any]:
 
 @cache
 def flags() -> dict[str, str]:
-    """The flags that the MJCF of a bare scene switches off, by the name of the workload that leaves one on."""
+    """List the flags that the MJCF of a bare scene switches off, by the name of the workload that leaves one on."""
     from fourbar.mjcf import mjcf
 
     found = re.findall(r'(\w+)="disable"', mjcf(scene("none", 91)))
@@ -87,7 +81,7 @@ def flags() -> dict[str, str]:
 
 
 def inverse(adapter: str) -> Callable[[str], Callable[[int], Any]]:
-    """Answers of an inverse engine at a given number of positions."""
+    """Make workloads of an inverse engine: its answers at a given number of positions."""
 
     def prepare(effect: str) -> Callable[[int], Any]:
         from importlib import import_module
@@ -110,33 +104,3 @@ ENGINES: dict[str, Callable[[str], Callable[[int], Any]]] = {
     "mujoco-inverse": inverse("fourbar_validation.engines.mujoco.inverse:MujocoInverse"),
     "pinocchio-inverse": inverse("fourbar_validation.engines.pinocchio:PinocchioInverse"),
 }
-
-
-def bracketed(work: Callable[[int], Any], amount: int) -> None:
-    """The work within one call of C through ctypes: valgrind counts what runs inside `ffi_call`, and nothing else."""
-
-    def called(*_: object) -> int:
-        work(amount)
-        return 0
-
-    compares = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p)(called)
-    one = ctypes.create_string_buffer(8)
-    # a search among one element compares once
-    ctypes.CDLL(None).bsearch(one, one, ctypes.c_size_t(1), ctypes.c_size_t(8), compares)
-
-
-def main() -> None:
-    """Prepare everything requested, then work, each by itself, a little and more: what a call costs is in both."""
-    engine, few, many, *effects = sys.argv[1:]
-    works = [ENGINES[engine](effect) for effect in effects]
-    for work in works:
-        work(2)
-    gc.collect()
-    gc.disable()
-    for work in works:
-        bracketed(work, int(few))
-        bracketed(work, int(many))
-
-
-if __name__ == "__main__":
-    main()

@@ -1,4 +1,4 @@
-"""This tree's speed against that of another revision: the same timings of both, in turns, within one command."""
+"""Speed of this tree against that of another revision: the same timings of both, in turns, within one command."""
 
 import io
 import json
@@ -31,7 +31,7 @@ class Ratio(NamedTuple):
 
 
 def against(revision: str, positions: int, rounds: int, tree: Path | None = None) -> dict[str, Ratio]:
-    """Each timing of a tree over that of a revision of its repository.
+    """Divide each timing of a tree by that of a revision of its repository.
 
     Raises InputError where the revision does not exist or is none of this package's, FourBarError where it has not
     what is timed, DependencyError where git is not installed.
@@ -55,7 +55,7 @@ def against(revision: str, positions: int, rounds: int, tree: Path | None = None
 
 
 def unpack(revision: str, tree: Path, folder: Path) -> None:
-    """The package as it stood at a revision, into a folder."""
+    """Unpack the package as it stood at a revision into a folder."""
     if shutil.which("git") is None:
         raise DependencyError("bench --against needs git, which is not installed")
     arguments_of_git = ["rev-parse", "--verify", "--quiet", "--end-of-options", f"{revision}^{{commit}}"]
@@ -68,13 +68,13 @@ def unpack(revision: str, tree: Path, folder: Path) -> None:
 
 
 def _git(tree: Path, arguments: list[str]) -> bytes:
-    """What git says; nothing where it fails."""
+    """Return what git prints; nothing where it fails."""
     done = subprocess.run(["git", "-C", str(tree), *arguments], capture_output=True, check=False)
     return done.stdout if done.returncode == 0 else b""
 
 
 def timings(tree: Path, name: str, positions: int) -> dict[str, float]:
-    """CPU seconds of each timing in a fresh interpreter that imports the package from a tree."""
+    """Time each action, in CPU seconds, in a fresh interpreter that imports the package from a tree."""
     script = str(Path(__file__).with_name("timed.py"))
     line = [sys.executable, "-P", script, str(positions), *(" ".join(names) for names in (UNKNOWNS, ANGLES))]
     path = os.pathsep.join(filter(None, (str(tree), os.environ.get("PYTHONPATH"))))

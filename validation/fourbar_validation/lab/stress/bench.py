@@ -1,4 +1,4 @@
-"""Speed side by side in one process: stages, the 13x13 system, C, SymPy, engines, a judged scene; ratios that hold."""
+"""Speed side by side in one process: stages, the 13x13 system, C, a judged scene; ratios that hold."""
 
 import os
 import subprocess
@@ -28,10 +28,8 @@ from fourbar_validation.lab.stress.against import ONE_THREAD
 from fourbar_validation.lab.stress.against import against as against_revision
 from fourbar_validation.lab.stress.bench_picture import Times, draw_bench
 from fourbar_validation.lab.stress.contenders import (
-    ONE_BY_ONE,
     POSITIONS,
     STUDY,
-    engines,
     interleaved,
     loops,
     over_linkages,
@@ -43,7 +41,7 @@ from fourbar_validation.published.thirteen import FreeBodies, solve_thirteen
 from fourbar_validation.report.machine import machine
 from fourbar_validation.report.terminal import lined_up
 from fourbar_validation.run.judge import judged
-from fourbar_validation.scenes.random import LinkageType
+from fourbar_validation.scenes.random import DrawnType
 from fourbar_validation.scenes.suites import Random
 
 if TYPE_CHECKING:
@@ -55,7 +53,6 @@ WITH_LIMITS = FourBar(0.3, Bar(0.25, 0.2), Bar(0.1, 0.5), Bar(0.22, 0.4))
 """Its input swings between limit positions: each of its positions has to be looked at."""
 THIRTEEN_BATCH = 20_000
 """Positions per batch of the 13x13 system: larger batches are slower per position (27 MB of matrices each)."""
-IN_C = ("C", "C, vector math")
 OVER_POSITIONS = "all unknowns of a position, over the number of positions (1e6 at once at most)"
 OVER_LINKAGES = "all forces of a linkage at one position, over the number of linkages"
 SOLVED = 100_000
@@ -77,7 +74,7 @@ class Measured(NamedTuple):
 
 
 def bodies_of(scene: Scene, at: Command) -> FreeBodies:
-    """The right-hand sides of the 13x13 system, from the kinematics; not part of what is timed."""
+    """Make the right-hand sides of the 13x13 system from the kinematics; not part of what is timed."""
     s = solve(scene, "acceleration", at=at)
     gravity = np.array(next((effect.vector for effect in scene.effects if isinstance(effect, Gravity)), (0.0, 0.0)))
     first = {2: np.zeros_like(s.A), 3: s.A, 4: np.full_like(s.A, (LINKAGE.ground, 0.0))}
@@ -93,7 +90,7 @@ def bodies_of(scene: Scene, at: Command) -> FreeBodies:
 
 
 def import_cost() -> float:
-    """CPU seconds that `import fourbar` adds over those of `import numpy`, median over fresh interpreters."""
+    """Compare the CPU time that `import fourbar` adds with that of `import numpy`: median over fresh interpreters."""
     clock = "time.process_time()"
     code = f"import time; a = {clock}; import numpy; b = {clock}; import fourbar; print(({clock} - b) / (b - a))"
     runs = [subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True) for _ in range(7)]
@@ -101,7 +98,7 @@ def import_cost() -> float:
 
 
 def memory(n: int) -> float:
-    """MB allocated at the peak beyond arguments and results."""
+    """Measure the MB allocated at the peak beyond arguments and results."""
     at = command(n)
     out = preallocated(UNKNOWNS, at)
     tracemalloc.start()
@@ -112,7 +109,7 @@ def memory(n: int) -> float:
 
 
 def floor(theta_2: Array, out: dict[str, Array]) -> Callable[[], object]:
-    """What no formula for two angles does without: a tangent, a square root and two arctangents, block by block."""
+    """Make what no formula for two angles does without: a tangent, a square root and two arctangents, by blocks."""
 
     def action() -> None:
         for start in range(0, len(theta_2), BLOCK):
@@ -134,7 +131,7 @@ def floor(theta_2: Array, out: dict[str, Array]) -> Callable[[], object]:
 @click.option("--picture", type=click.Path(path_type=Path), metavar="FILE", help="Draw the growth: svg, png or pdf.")
 @click.option("--against", metavar="REVISION", help="This tree's times over those of a git revision, instead.")
 def bench(positions: int, rounds: int, largest: int, picture: Path | None, against: str | None) -> int:
-    """Speed side by side: NumPy, compiled, C, SymPy, engines; over positions and linkages; ratios that must hold."""
+    """Time NumPy, compiled formulas, C and the 13x13 system side by side; ratios that must hold."""
     if picture is not None:
         format_of(picture)
     if against is not None:
@@ -175,7 +172,7 @@ def bench(positions: int, rounds: int, largest: int, picture: Path | None, again
 
 
 def _by_count(title: str, times: Times) -> "Table":
-    """One row for each who, one column for each count."""
+    """Lay out one row for each contender, one column for each count."""
     from rich.box import HEAVY_HEAD
 
     counts = sorted({n for own in times.values() for n in own})
@@ -184,7 +181,7 @@ def _by_count(title: str, times: Times) -> "Table":
 
 
 def compared_with(revision: str, positions: int, rounds: int) -> int:
-    """The table of this tree's times over those of a revision; a measurement, held to nothing."""
+    """Print this tree's times over those of a revision; a measurement without limits."""
     from rich.box import HEAVY_HEAD
     from rich.console import Console
     from rich.markup import escape
@@ -201,7 +198,7 @@ def compared_with(revision: str, positions: int, rounds: int) -> int:
 
 
 def measure(positions: int, rounds: int, largest: int) -> Measured:
-    """Rows of the table: the ratios of LIMITS, and ns per position; and the times by how many."""
+    """Measure the ratios of LIMITS and ns per position, and the times by how many."""
     scene, at = example(), command(positions)
     limits, swing = example(WITH_LIMITS), command(positions, *default_range(WITH_LIMITS))
     everything, angles = preallocated(UNKNOWNS, at), preallocated(ANGLES, at)
@@ -209,7 +206,7 @@ def measure(positions: int, rounds: int, largest: int) -> Measured:
     bodies = bodies_of(scene, command(batch))
     alone, rng = example(theta_2=1.0), np.random.default_rng(0)
     systems, right = rng.random((1000, 13, 13)), rng.random((1000, 13, 1))
-    peers, others = loops(), engines()
+    peers = loops()
     actions: dict[str, Callable[[], object]] = {
         "formulas, all 11 unknowns": lambda: solve(scene, at=at, out=everything, compiled=False),
         "the same compiled": lambda: solve(scene, at=at, out=everything, compiled=True),
@@ -227,16 +224,15 @@ def measure(positions: int, rounds: int, largest: int) -> Measured:
         "one position with error bars": lambda: [solve(alone, "error") for _ in range(ALONE)],
     }
     out = np.zeros((15, positions))
-    actions |= {f"{name}, all": partial(loop, at.theta_2, out) for name, loop in peers.here.items() if name in IN_C}
+    if "C" in peers.here:
+        actions["C, all"] = partial(peers.here["C"], at.theta_2, out)
     if "compiled" in peers.not_run:
         actions = {name: action for name, action in actions.items() if "compiled" not in name}
-    actions |= others.here
     times = interleaved(actions, rounds)
     counts = {"13x13 assembled and solved": batch}
     to_stages = ["solve to forces, points too", "solve with error bars"]
     to_stages += ["compiled to forces, points too", "compiled with error bars"]
     counts |= dict.fromkeys(to_stages, len(solved.theta_2))
-    counts |= dict.fromkeys(others.here, ONE_BY_ONE)
     counts |= {"13x13 solved, 1000 at once": len(systems)}
     counts |= dict.fromkeys(("one position to forces", "one position with error bars"), ALONE)
     rows = {name: 1e9 * value / counts.get(name, positions) for name, value in times.items()}
@@ -267,12 +263,12 @@ def measure(positions: int, rounds: int, largest: int) -> Measured:
         "memory beyond the result, MB": memory(min(positions, 1_000_000)),
         "import fourbar / import numpy": import_cost(),
     }
-    return Measured(rows, by_positions, by_linkages, peers.not_run | others.not_run)
+    return Measured(rows, by_positions, by_linkages, peers.not_run)
 
 
 def judging(witnesses: list[Witness], scenes: int) -> float:
-    """Milliseconds of CPU in which a random scene is judged as `run` does, nothing drawn; the median."""
-    suite = Random(scenes + 1, 0, tuple(LinkageType))
+    """Time the check of a random scene as `run` does it, nothing drawn: median CPU time in ms."""
+    suite = Random(scenes + 1, 0, tuple(DrawnType))
     each = (partial(judged, suite.name(i), suite.scene(i), witnesses, draw=False) for i in range(scenes + 1))
     times = [seconds(action) for action in each]
     return 1e3 * median(times[1:])  # the first one imports the engines

@@ -1,4 +1,4 @@
-/* The crank-rocker of timed.py, position to pin forces, as a plain loop: the physical yardstick. */
+/* The crank-rocker of timed.py, position to pin forces, as a plain loop: what the others are compared with. */
 #include <math.h>
 
 void loop(long n, const double *restrict theta_2, double *restrict out) {

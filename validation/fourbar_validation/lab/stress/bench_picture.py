@@ -18,7 +18,7 @@ Times = dict[str, dict[int, float]]
 
 
 def draw_bench(over_positions: Times, over_linkages: Times, path: Path) -> None:
-    """Both growths on logarithmic axes, into a file, whole or not at all."""
+    """Draw both growths on logarithmic axes into a file."""
     kind = format_of(path)
     with matplotlib_style():
         from matplotlib.figure import Figure

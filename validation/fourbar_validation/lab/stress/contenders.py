@@ -12,20 +12,14 @@ from fourbar import vary
 from fourbar.errors import DependencyError
 from fourbar.quantities import UNKNOWNS, VECTORS
 from fourbar.solve import solve
-from fourbar_validation.engines.witnesses import FURTHER, WITNESSES
 from fourbar_validation.lab.stress.bench_picture import Times
-from fourbar_validation.lab.stress.in_c import VECTOR, Loop, c_loop
-from fourbar_validation.lab.stress.in_sympy import sympy_loop
+from fourbar_validation.lab.stress.in_c import Loop, c_loop
 from fourbar_validation.lab.stress.timed import command, example, in_turns, seconds
 
 AT_ONCE = 1_000_000
 """Positions of a call: more are evaluated in pieces of this many, so that their memory is bounded (150 MB)."""
 SHORTEST = 200_000
 """Positions of one timing: fewer are evaluated as often as makes so many."""
-MOST_OF_SYMPY = 1_000_000
-"""Positions beyond which it is not timed: its cost per position no longer changes, and is some microseconds."""
-ONE_BY_ONE = 200
-"""Positions of a peer that takes them one by one, in Python: some tenths of a second."""
 MOST_LINKAGES = 100_000
 MOST_LOOPED = 1000
 """Linkages that are solved one after the other: beyond them the cost of one no longer changes."""
@@ -37,18 +31,18 @@ STUDY, POSITIONS, LOOPED = "study, NumPy", "one linkage, as many positions", "on
 class Peers(NamedTuple):
     """What there is, and why the others are not."""
 
-    here: dict[str, Any]
+    here: dict[str, Loop]
     not_run: dict[str, str]
 
 
 def interleaved(actions: Mapping[str, Callable[[], object]], rounds: int) -> dict[str, float]:
-    """Median time of each action, the first of them apart."""
+    """Time the actions in turn: the median of each, the first round apart."""
     clocks = {name: partial(seconds, action) for name, action in actions.items()}
     return {name: median(times[1:]) for name, times in in_turns(clocks, rounds + 1).items()}
 
 
 def loops() -> Peers:
-    """The closed formulas by several hands: each writes into arrays that are there."""
+    """Collect the closed formulas by several hands: each writes into arrays that are there."""
     scene = example()
     found: dict[str, Loop | str] = {"NumPy": _by_solve(False)}
     try:
@@ -56,13 +50,9 @@ def loops() -> Peers:
         found["compiled"] = _by_solve(True)
     except DependencyError as error:
         found["compiled"] = str(error)
-    found |= {"C": c_loop(), "C, vector math": c_loop(VECTOR), "SymPy": sympy_loop(scene)}
-    return _sorted(found)
-
-
-def _sorted(found: dict[str, Any]) -> Peers:
+    found["C"] = c_loop()
     reasons = {name: each for name, each in found.items() if isinstance(each, str)}
-    return Peers({name: each for name, each in found.items() if name not in reasons}, reasons)
+    return Peers({name: each for name, each in found.items() if not isinstance(each, str)}, reasons)
 
 
 def _by_solve(compiled: bool) -> Loop:
@@ -78,23 +68,8 @@ def _by_solve(compiled: bool) -> Loop:
     return call
 
 
-def engines() -> Peers:
-    """The witnesses that are installed and answer position by position or for all at once, not through time."""
-    scene, at = example(), command(ONE_BY_ONE, 0.3, 6.0)
-    found: dict[str, Any] = {}
-    for witness in (*WITNESSES, *FURTHER):
-        if witness.through_time:
-            continue
-        if (reason := witness.missing()) is not None:
-            found[witness.name] = reason
-            continue
-        engine = witness.engine()
-        found[witness.name] = lambda engine=engine: engine.answer(scene, at)
-    return _sorted(found)
-
-
 def over_positions(peers: dict[str, Loop], largest: int, rounds: int) -> Times:
-    """ns per position for 1000, 10 000, ... positions, into arrays that are there."""
+    """Time a position, in ns, for 1000, 10 000, ... of them, into arrays that are there."""
     times: Times = {name: {} for name in peers}
     for n in [10**k for k in range(3, 9) if 10**k <= largest]:
         theta_2, out = command(min(n, AT_ONCE)).theta_2, np.zeros((15, min(n, AT_ONCE)))
@@ -108,14 +83,14 @@ def over_positions(peers: dict[str, Loop], largest: int, rounds: int) -> Times:
 
             return action
 
-        own = {name: repeated(loop) for name, loop in peers.items() if name != "SymPy" or n <= MOST_OF_SYMPY}
+        own = {name: repeated(loop) for name, loop in peers.items()}
         for name, value in interleaved(own, rounds if n <= AT_ONCE else 1).items():
             times[name][n] = 1e9 * value / evaluated
     return times
 
 
 def over_linkages(largest: int, rounds: int, *, compiled: bool) -> Times:
-    """ns per linkage at one position for 1, 10, ... linkages: made and solved as a study, and one after the other."""
+    """Time a linkage at one position, in ns, for 1, 10, ... of them: solved as a study, and one after the other."""
     scene = example(theta_2=1.0)
     times: Times = {STUDY: {}, POSITIONS: {}, LOOPED: {}}
     times |= {"study, compiled": {}} if compiled else {}

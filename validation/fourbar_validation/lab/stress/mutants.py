@@ -1,4 +1,4 @@
-"""`python -m validation fuzz-files`: scene files are data; mutated ones must end in a scene or in one clear line."""
+"""`python -m validation fuzz --files`: mutated scene files must end in a scene or in one clear line."""
 
 import time
 from collections.abc import Iterator, Sequence
@@ -27,7 +27,7 @@ PIECES = (
 
 
 @dataclass(frozen=True, slots=True)
-class Found:
+class FileFailure:
     """An input that ended in anything but a scene or one line."""
 
     index: int
@@ -36,7 +36,7 @@ class Found:
 
 
 def mutants(seed: int, indices: Sequence[int], originals: Sequence[str]) -> Iterator[tuple[int, str]]:
-    """Mutated scene files; each depends on (seed, index) alone."""
+    """Mutate scene files; each depends on (seed, index) alone."""
     for index in indices:
         rng = np.random.default_rng([seed, index])
         text = originals[int(rng.integers(len(originals)))]
@@ -72,7 +72,7 @@ def _mutated(text: str, rng: np.random.Generator, originals: Sequence[str]) -> s
             return text[:at] + str(int(rng.integers(10))) + text[at + 1 :]
 
 
-def try_out(index: int, text: str) -> Found | None:
+def try_out(index: int, text: str) -> FileFailure | None:
     """Read a mutated file and evaluate what it describes."""
     start = time.perf_counter()
     try:
@@ -83,17 +83,17 @@ def try_out(index: int, text: str) -> Found | None:
                 solve(scene, last_stage(scene), at=at)
     except FourBarError as error:
         if "\n" in str(error):
-            return Found(index, f"more than one line: {error}", text)
+            return FileFailure(index, f"more than one line: {error}", text)
     except MemoryError:
         pass  # more positions than there is memory for: stated as such by the command line
     except Exception as error:
-        return Found(index, f"{type(error).__name__}: {error}", text)
+        return FileFailure(index, f"{type(error).__name__}: {error}", text)
     if time.perf_counter() - start > HANG:
-        return Found(index, f"took {time.perf_counter() - start:.1f} s", text)
+        return FileFailure(index, f"took {time.perf_counter() - start:.1f} s", text)
     return None
 
 
-@click.command(name="fuzz-files")
+@click.command()
 @click.option("--count", type=click.IntRange(min=1), default=100_000, show_default=True)
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
 def fuzz_files(count: int, seed: int) -> int:
@@ -101,11 +101,11 @@ def fuzz_files(count: int, seed: int) -> int:
     from rich.progress import track
 
     originals = [file.read_text(encoding="utf-8") for file in model_files()]
-    found = 0
+    failed = 0
     for index, text in track(mutants(seed, range(count), originals), total=count, description="mutants"):
         trouble = try_out(index, text)
         if trouble is not None:
-            found += 1
+            failed += 1
             click.echo(f"mutant {trouble.index}: {trouble.what}\n{trouble.text!r}")
-    click.echo(f"{count} mutated scene files, {found} of them ended in a traceback or a hang")
-    return 1 if found else 0
+    click.echo(f"{count} mutated scene files, {failed} of them ended in a traceback or a hang")
+    return 1 if failed else 0

@@ -22,23 +22,23 @@ PER_CALL = {"one position to forces": 5_000, "one position with error bars": 20_
 
 
 def example(linkage: FourBar = LINKAGE, theta_2: float | None = 0.0) -> Scene:
-    """The scene that is timed: crank at 10 rad/s, gravity, drive on the input; theta_2 None: its whole range."""
+    """Build the scene that is timed: crank at 10 rad/s, gravity, drive on the input; theta_2 None: its full range."""
     return Scene(linkage, Motion(theta_2, 10.0), 2, (), (Gravity(),))
 
 
 def command(n: int, start: float = 0.0, stop: float = 2.0 * np.pi) -> Command:
-    """n positions, over a revolution unless stated otherwise."""
+    """Command n positions, over a revolution unless specified otherwise."""
     return Command(np.linspace(start, stop, n), np.broadcast_to(np.int8(1), (n,)), 10.0, 0.0)
 
 
 def preallocated(names: Iterable[str], at: Command) -> dict[str, Array]:
-    """Result arrays as `solve` itself lays them out, touched so that no page is faulted in while the clock runs."""
+    """Allocate arrays as `solve` lays them out, touched so that no page is faulted in while the clock runs."""
     first = solve(example(), at=at)
     return {name: getattr(first, name) for name in names}
 
 
 def seconds(action: Callable[[], object], calls: int = 1) -> float:
-    """CPU seconds of one call in this process."""
+    """Time one call in this process, in CPU seconds."""
     start = time.process_time()
     for _ in range(calls):
         action()
@@ -46,7 +46,7 @@ def seconds(action: Callable[[], object], calls: int = 1) -> float:
 
 
 def in_turns(clocks: Mapping[Any, Callable[[], float]], rounds: int) -> dict[Any, list[float]]:
-    """What each clock says, all taking turns so that a slow spell hits all of them."""
+    """Read the clocks in turns, so that a slow spell hits all of them."""
     times: dict[Any, list[float]] = {name: [] for name in clocks}
     for _ in range(rounds):
         for name, clock in clocks.items():
@@ -55,7 +55,7 @@ def in_turns(clocks: Mapping[Any, Callable[[], float]], rounds: int) -> dict[Any
 
 
 def main(positions: int, unknowns: list[str], angles: list[str]) -> dict[str, float]:
-    """CPU seconds of each timing, by name."""
+    """Time each action, in CPU seconds, by name."""
     scene, whole, at, one = example(), example(theta_2=None), command(positions), command(1, 1.0, 1.0)
     everything, alone = preallocated(unknowns, at), preallocated(angles, at)
     actions: dict[str, Callable[[], object]] = {

@@ -1,1 +1,1 @@
-"""Subjects: simulators that are examined by the formulas, each in an environment of its own; none is believed."""
+"""Simulators under test: each is compared with the formulas in an environment of its own."""

@@ -11,8 +11,8 @@ from pydrake.systems.analysis import Simulator
 from fourbar.mjcf import flywheel
 from fourbar.mjcf.sdf import sdf
 from fourbar.scene import Scene
-from fourbar_validation.engines.description import FIRST_PIN, turned
-from fourbar_validation.lab.subjects.motion import Readings, State, run_through, start, turn, weight
+from fourbar_validation.engines.description import FIRST_PIN, rotate
+from fourbar_validation.lab.subjects.motion import Instant, Readings, run_through, start, turn, weight
 
 VERSION = version("drake")
 STEPS = (628, 2512)
@@ -21,7 +21,7 @@ SETTINGS = {"SAP": None}
 
 
 def through(scene: Scene, steps: int, setting: str) -> Readings:
-    """A turn in so many steps, carried by a flywheel, the rotor of an actuator on O2."""
+    """Simulate a turn in so many steps, carried by a flywheel, the rotor of an actuator on O2."""
     timestep, _ = turn(scene, steps)
     begin, inertia = start(scene), flywheel(scene)
     plant = MultibodyPlant(timestep)
@@ -47,14 +47,14 @@ def through(scene: Scene, steps: int, setting: str) -> Readings:
         theta, speed = [angles[0], angles[0] + angles[1], angles[2]], joints[0].get_angular_rate(context)
         reactions = plant.get_reaction_forces_output_port().Eval(context)
         on_child = (reactions[int(joint.index())].translational()[:2] for joint in joints)
-        O2, A, O4 = (np.array(turned(angle, *force)) for angle, force in zip(theta, on_child, strict=True))
+        O2, A, O4 = (np.array(rotate(angle, *force)) for angle, force in zip(theta, on_child, strict=True))
         done += n
         simulator.AdvanceTo(done * timestep)
         return theta, speed, {"F12": O2, "F32": -A, "F14": O4}
 
-    def read(before: tuple[list[float], float, dict[str, Any]]) -> State:
+    def read(before: tuple[list[float], float, dict[str, Any]]) -> Instant:
         theta, speed, forces = before
         alpha = (joints[0].get_angular_rate(context) - speed) / timestep
-        return State(theta, speed, alpha, -inertia * alpha, forces)
+        return Instant(theta, speed, alpha, -inertia * alpha, forces)
 
     return run_through(scene, steps, setting, advance, read)

@@ -1,4 +1,4 @@
-"""Each subject in its own environment, held against the formulas at the states that it reached by itself."""
+"""Each simulator in its own environment, compared with the formulas at the states that it reached by itself."""
 
 import json
 import math
@@ -17,7 +17,7 @@ from fourbar_validation.compare.error import magnitude, relative_error
 from fourbar_validation.compare.rows import in_words
 from fourbar_validation.run.elsewhere import ended, of_the_harness
 
-SUBJECTS = {
+SIMULATORS = {
     "mujoco_c": ("MuJoCo", "mujoco"),
     "mujoco_warp": ("MuJoCo Warp", "mujoco_warp"),
     "mujoco_mjx": ("MJX", "mujoco.mjx"),
@@ -34,9 +34,9 @@ TORQUE_AND_FORCES = ("torque", *PIN_FORCES)
 
 @dataclass(slots=True)
 class Line:
-    """One setting of a subject, over single states or over a turn in so many steps."""
+    """One setting of a simulator, over single states or over a turn in so many steps."""
 
-    subject: str
+    simulator: str
     version: str
     setting: str
     steps: int | None
@@ -51,7 +51,7 @@ class Line:
 
 
 @dataclass(slots=True)
-class Standing:
+class Examination:
     """All that the page shows."""
 
     lines: list[Line] = field(default_factory=list)
@@ -61,10 +61,10 @@ class Standing:
     left_out: dict[str, str] = field(default_factory=dict)
 
 
-def examine(scene: Scene, file: Path, pythons: list[Path], seconds: float) -> Standing:
-    """Every subject under the first of the interpreters that has it."""
-    found = Standing()
-    for module, (name, library) in SUBJECTS.items():
+def examine(scene: Scene, file: Path, pythons: list[Path], seconds: float) -> Examination:
+    """Examine every simulator under the first of the interpreters that has it."""
+    found = Examination()
+    for module, (name, library) in SIMULATORS.items():
         python = next((python for python in pythons if _has(python, library)), None)
         if python is None:
             found.left_out[name] = "not installed under any --python"
@@ -87,7 +87,7 @@ def examine(scene: Scene, file: Path, pythons: list[Path], seconds: float) -> St
 
 
 def lines(scene: Scene, name: str, answer: dict[str, Any]) -> list[Line]:
-    """The judged lines of one subject's answer."""
+    """Compare one simulator's readings with the formulas, line by line."""
     made: list[Line] = []
     turn = abs(math.tau / scene.motion.omega_2) if scene.motion.omega_2 else math.nan
     for reading in answer["readings"]:
@@ -112,7 +112,7 @@ def lines(scene: Scene, name: str, answer: dict[str, Any]) -> list[Line]:
 
 
 def errors(scene: Scene, reading: dict[str, Any]) -> dict[str, float]:
-    """Of torque and pin forces, at the subject's own theta_2, omega_2 and alpha_2; NaN where it answers NaN."""
+    """Compute the errors of torque and pin forces at the simulator's own state; NaN where it answers NaN."""
     theta = np.array(reading["theta"], dtype=float)
     n = len(theta)
     if not n or any(np.shape(reading[name]) != (n,) for name in ("omega_2", "alpha_2")) or theta.shape != (n, 3):

@@ -11,7 +11,7 @@ from fourbar.errors import LimitError
 from fourbar.linkage import PIN_FORCE
 from fourbar.scene import Scene
 from fourbar_validation.engines.exudyn import JOINTS, SIZE, ExudynBars
-from fourbar_validation.lab.subjects.motion import Readings, State, start, turn
+from fourbar_validation.lab.subjects.motion import Instant, Readings, start, turn
 
 VERSION = version("exudyn")
 STEPS = (314, 1256, 5024)
@@ -23,7 +23,7 @@ SETTINGS: dict[str, Any] = {
 
 
 def through(scene: Scene, steps: int, setting: str) -> Readings:
-    """A turn in so many steps; multipliers, speeds and accelerations are all of the end of a step."""
+    """Simulate a turn; multipliers, speeds and accelerations are all of the end of a step."""
     timestep, stops = turn(scene, steps)
     begin, bars = start(scene), ExudynBars(scene)
     if bars.terms:
@@ -48,7 +48,7 @@ def through(scene: Scene, steps: int, setting: str) -> Readings:
             exerted = -np.array(state.GetAECoordinates())  # its multipliers stand on the other side of M a = f
             forces = {PIN_FORCE[pin]: exerted[2 * number : 2 * number + 2] for number, pin in enumerate(JOINTS)}
             theta = [q[turn] for turn in bars.turn.values()]
-            found.read(scene, State(theta, v[bars.turn[2]], a[bars.turn[2]], exerted[-1], forces))
+            found.read(scene, Instant(theta, v[bars.turn[2]], a[bars.turn[2]], exerted[-1], forces))
         return True
 
     mbs.SetPostStepUserFunction(read)

@@ -8,7 +8,7 @@ import numpy as np
 import torch
 
 from fourbar.scene import Scene
-from fourbar_validation.lab.subjects.motion import Readings, State, as_file, run_through, start, turn, weight
+from fourbar_validation.lab.subjects.motion import Instant, Readings, as_file, run_through, start, turn, weight
 from fourbar_validation.lab.subjects.mujoco_c import text
 
 VERSION = version("genesis-world")
@@ -21,7 +21,7 @@ genesis.init(backend=genesis.gpu if torch.cuda.is_available() else genesis.cpu, 
 
 
 def through(scene: Scene, steps: int, setting: str) -> Readings:
-    """A turn in so many steps; torque and force are those with which the step began."""
+    """Simulate a turn; torque and force are those with which the step began."""
     timestep, _ = turn(scene, steps)
     common: dict[str, Any] = {"dt": timestep, "gravity": weight(scene)}
     world = genesis.Scene(
@@ -44,10 +44,10 @@ def through(scene: Scene, steps: int, setting: str) -> Readings:
         world.step()
         return q, speed
 
-    def read(before: tuple[Any, float]) -> State:
+    def read(before: tuple[Any, float]) -> Instant:
         q, speed = before
         alpha = float(solver.get_dofs_acc().cpu().numpy().ravel()[0])
         closing = solver.constraint_solver.efc_force.to_numpy()[:2].ravel()
-        return State((q[0], q[0] + q[1], q[2]), speed, alpha, -armature * alpha, {"F43": closing})
+        return Instant((q[0], q[0] + q[1], q[2]), speed, alpha, -armature * alpha, {"F43": closing})
 
     return run_through(scene, steps, setting, advance, read)

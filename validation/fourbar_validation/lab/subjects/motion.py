@@ -1,4 +1,4 @@
-"""What a subject answers: numbers of a turn that it ran through, or of states that it was given."""
+"""What a simulator answers: numbers of a turn that it ran through, or of states that it was given."""
 
 import math
 import tempfile
@@ -24,11 +24,11 @@ SAMPLES = 12
 """Readings in a turn; the first quarter, in which a closure settles, is not read."""
 
 
-class State(NamedTuple):
-    """What a subject lets read at one instant, SI units."""
+class Instant(NamedTuple):
+    """What a simulator lets read at one instant, SI units."""
 
     theta: Sequence[Any]
-    """theta_2, theta_3, theta_4, of the subject itself, rad."""
+    """theta_2, theta_3, theta_4, of the simulator itself, rad."""
     omega_2: float
     alpha_2: float
     torque: float | None
@@ -38,7 +38,7 @@ class State(NamedTuple):
 
 @dataclass(slots=True)
 class Readings:
-    """One subject under one setting; each list has one entry a reading, SI units."""
+    """One simulator under one setting; each list has one entry a reading, SI units."""
 
     setting: str
     steps: int | None = None
@@ -53,8 +53,8 @@ class Readings:
     seconds: float = 0.0
     """Of the processor's clock, for the steps alone."""
 
-    def read(self, scene: Scene, now: State) -> None:
-        """One more reading."""
+    def read(self, scene: Scene, now: Instant) -> None:
+        """Add a reading."""
         theta = (float(now.theta[0]), float(now.theta[1]), float(now.theta[2]))
         self.theta.append(theta)
         self.omega_2.append(float(now.omega_2))
@@ -66,14 +66,14 @@ class Readings:
         self.gap = float(np.maximum(self.gap, gap(scene, theta)))  # NaN stays NaN
 
     def plain(self) -> dict[str, Any]:
-        """For JSON."""
+        """Return plain values for JSON."""
         return asdict(self)
 
 
 def turn(scene: Scene, steps: int) -> tuple[float, list[int]]:
-    """The timestep (s) with which the input turns once in so many steps, and the steps after which to read."""
+    """Compute the timestep (s) of one turn of the input in so many steps, and the steps after which to read."""
     if not scene.motion.omega_2 or scene.motion.alpha_2 or scene.loads:
-        raise LimitError("subjects run through a turn at constant omega_2 without loads")
+        raise LimitError("simulators run through a turn at constant omega_2 without loads")
     first = steps // 4
     return math.tau / abs(scene.motion.omega_2) / steps, [
         first + round(k * (steps - first) / (SAMPLES - 1)) for k in range(SAMPLES)
@@ -81,9 +81,9 @@ def turn(scene: Scene, steps: int) -> tuple[float, list[int]]:
 
 
 def run_through(
-    scene: Scene, steps: int, setting: str, advance: Callable[[int], Any], read: Callable[[Any], State]
+    scene: Scene, steps: int, setting: str, advance: Callable[[int], Any], read: Callable[[Any], Instant]
 ) -> Readings:
-    """A turn in so many steps.
+    """Simulate a turn in so many steps.
 
     Parameters
     ----------
@@ -100,9 +100,9 @@ def run_through(
 
 
 def start(scene: Scene) -> Start:
-    """The first position that closes, in the direction of motion, and the speeds there: the free body's own assembly.
+    """Assemble the first position that closes, in the direction of motion, and its speeds, as the free body does.
 
-    No subject starts from what the formulas computed.
+    No simulator starts from what the formulas computed.
     """
     at, omega_2 = command(scene), scene.motion.omega_2 or 0.0
     closed = close(scene.linkage, at.theta_2, at.branch)
@@ -118,14 +118,14 @@ def start(scene: Scene) -> Start:
 
 
 def weight(scene: Scene) -> tuple[float, float, float]:
-    """The field of gravity, m/s^2."""
+    """Return the field of gravity, m/s^2."""
     fields = [field_of(effect) for effect in scene.effects if isinstance(effect, Gravity)]
     return (*fields[0], 0.0) if fields else (0.0, 0.0, 0.0)
 
 
 @contextmanager
 def as_file(text: str, name: str) -> Iterator[str]:
-    """The path of a file of that name and text, as long as this lasts: for simulators that read no text."""
+    """Write a file that lasts as long as the context: for simulators that read no text."""
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / name
         file.write_text(text)
@@ -133,7 +133,7 @@ def as_file(text: str, name: str) -> Iterator[str]:
 
 
 def gap(scene: Scene, theta: tuple[float, float, float]) -> float:
-    """Distance of B on bar 3 from B on bar 4 at the bars' directions, m."""
+    """Compute the distance of B on bar 3 from B on bar 4 at the bars' directions, m."""
     linkage = scene.linkage
     a, b, c = (
         bar.length * np.exp(1j * angle)

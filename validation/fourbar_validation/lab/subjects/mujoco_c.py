@@ -10,11 +10,11 @@ import numpy as np
 from fourbar.mjcf import SIMULATORS, mjcf
 from fourbar.scene import Scene
 from fourbar_validation.compare.answer import Array
-from fourbar_validation.engines.loop import Position
+from fourbar_validation.engines.loop import Assembler
 from fourbar_validation.engines.mujoco.closed_loop import ClosedLoop
 from fourbar_validation.engines.mujoco.drives import without
 from fourbar_validation.engines.mujoco.stepping import opened
-from fourbar_validation.lab.subjects.motion import Readings, State, run_through, start, turn
+from fourbar_validation.lab.subjects.motion import Instant, Readings, run_through, start, turn
 
 VERSION = mujoco.__version__
 STEPS = (157, 314, 628, 1256)
@@ -25,7 +25,7 @@ BY_DEFAULT = {"option": ("integrator", "solver", "tolerance", "iterations"), "eq
 
 
 def text(scene: Scene, steps: int, simulator: str | None) -> str:
-    """The generated MJCF, opening in the subjects' start, with so many steps a turn.
+    """Write the MJCF, opening in the simulators' common start, with so many steps a turn.
 
     Without a simulator's name all that the solver is set to goes.
     """
@@ -35,21 +35,21 @@ def text(scene: Scene, steps: int, simulator: str | None) -> str:
     return written if simulator is not None else without(written, BY_DEFAULT)
 
 
-def reading(model: Any, q: Any, v: Any, a: Any, drive: float, closing: Any, **pins: Any) -> State:
-    """As the comment in the file says; q, v, a in the joints' coordinates."""
+def reading(model: Any, q: Any, v: Any, a: Any, drive: float, closing: Any, **pins: Any) -> Instant:
+    """Read as the comment in the file says; q, v, a in the joints' coordinates."""
     torque = drive - model.dof_armature[0] * a[0]
-    return State((q[0], q[0] + q[1], q[2]), v[0], a[0], torque, {"F43": closing, **pins})
+    return Instant((q[0], q[0] + q[1], q[2]), v[0], a[0], torque, {"F43": closing, **pins})
 
 
 def through(scene: Scene, steps: int, setting: str) -> Readings:
-    """A turn in so many steps."""
+    """Simulate a turn in so many steps."""
     model, data = opened(text(scene, steps, SETTINGS[setting]))
     advance = partial(mujoco.mj_step, model, data)
     return run_through(scene, steps, setting, advance, lambda _: _evaluated(model, data))
 
 
 def states(scene: Scene, setting: str) -> Readings:
-    """Single states, each set and evaluated by itself."""
+    """Evaluate single states, each set by itself."""
     written = text(scene, 628, SETTINGS[setting])
     (model, data), found = opened(written), Readings(setting)
     for q, v in states_of(written, scene):
@@ -59,9 +59,9 @@ def states(scene: Scene, setting: str) -> Readings:
 
 
 def states_of(written: str, scene: Scene) -> list[tuple[Array, Array]]:
-    """Assembled states of a turn, by MuJoCo's own kinematics: Newton on the gap, speeds by its Jacobian."""
+    """Assemble states of a turn by MuJoCo's own kinematics: Newton on the gap, speeds by its Jacobian."""
     loop, made = ClosedLoop(written), []
-    position, begin = Position(loop), start(scene).qpos[0]
+    position, begin = Assembler(loop), start(scene).qpos[0]
     for theta_2 in (begin + np.linspace(0.0, 2.0 * np.pi, 25)).tolist():
         if (q := position.find(theta_2, scene.motion.branch)) is not None:
             loop.set_state(q, scene.motion.omega_2 or 0.0)
@@ -69,7 +69,7 @@ def states_of(written: str, scene: Scene) -> list[tuple[Array, Array]]:
     return made
 
 
-def _evaluated(model: Any, data: Any) -> State:
+def _evaluated(model: Any, data: Any) -> Instant:
     mujoco.mj_forward(model, data)
     mujoco.mj_rnePostConstraint(model, data)
     forces = {name: data.cfrc_int[model.body(body).id][3:5] for name, body in PINS.items()}

@@ -9,7 +9,7 @@ from mujoco import mjx
 
 from fourbar.scene import Scene
 from fourbar_validation.engines.mujoco.stepping import opened
-from fourbar_validation.lab.subjects.motion import Readings, State, run_through
+from fourbar_validation.lab.subjects.motion import Instant, Readings, run_through
 from fourbar_validation.lab.subjects.mujoco_c import reading, states_of, text
 
 VERSION = version("mujoco-mjx")
@@ -24,12 +24,12 @@ forward = jax.jit(mjx.forward)
 
 @jax.jit  # type: ignore[untyped-decorator]
 def advance(model: Any, state: Any, steps: int) -> Any:
-    """So many steps, the number left open so that it compiles once."""
+    """Step on, with the number left open so that it compiles once."""
     return jax.lax.fori_loop(0, steps, lambda _, now: mjx.step(model, now), state)
 
 
 def through(scene: Scene, steps: int, setting: str) -> Readings:
-    """A turn in so many steps."""
+    """Simulate a turn in so many steps."""
     model, data = opened(text(scene, steps, SETTINGS[setting]))
     theirs, state = mjx.put_model(model), mjx.put_data(model, data)
     jax.block_until_ready(advance(theirs, state, 1))  # compiled before the clock runs
@@ -43,7 +43,7 @@ def through(scene: Scene, steps: int, setting: str) -> Readings:
 
 
 def states(scene: Scene, setting: str) -> Readings:
-    """Single states, each set and evaluated by itself."""
+    """Evaluate single states, each set by itself."""
     written = text(scene, 628, SETTINGS[setting])
     model, data = opened(written)
     theirs, state, found = mjx.put_model(model), mjx.put_data(model, data), Readings(setting)
@@ -53,7 +53,7 @@ def states(scene: Scene, setting: str) -> Readings:
     return found
 
 
-def _evaluated(model: Any, state: Any) -> State:
+def _evaluated(model: Any, state: Any) -> Instant:
     q, v, a, drive = (np.array(x) for x in (state.qpos, state.qvel, state.qacc, state.actuator_force))
     closing = np.array(getattr(state, "_impl", state).efc_force)[:2]
     return reading(model, q, v, a, drive[model.actuator("drive").id], closing)

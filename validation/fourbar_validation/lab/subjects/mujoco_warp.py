@@ -8,7 +8,7 @@ import warp
 
 from fourbar.scene import Scene
 from fourbar_validation.engines.mujoco.stepping import opened
-from fourbar_validation.lab.subjects.motion import Readings, State, run_through
+from fourbar_validation.lab.subjects.motion import Instant, Readings, run_through
 from fourbar_validation.lab.subjects.mujoco_c import reading, states_of, text
 
 VERSION = mjw.__version__ if hasattr(mjw, "__version__") else ""
@@ -20,7 +20,7 @@ SETTINGS = {"forward twice": 2, "forward once": 1}
 
 
 def through(scene: Scene, steps: int, setting: str) -> Readings:
-    """A turn in so many steps."""
+    """Simulate a turn in so many steps."""
     model, data = opened(text(scene, steps, "warp"))
     theirs, state = mjw.put_model(model), mjw.put_data(model, data)
     mjw.step(theirs, mjw.put_data(model, data))  # compiled before the clock runs
@@ -33,7 +33,7 @@ def through(scene: Scene, steps: int, setting: str) -> Readings:
 
 
 def states(scene: Scene, setting: str) -> Readings:
-    """Single states, each set and evaluated by itself."""
+    """Evaluate single states, each set by itself."""
     written = text(scene, 628, "warp")
     model, data = opened(written)
     theirs, state, found = mjw.put_model(model), mjw.put_data(model, data), Readings(setting)
@@ -44,7 +44,7 @@ def states(scene: Scene, setting: str) -> Readings:
     return found
 
 
-def _evaluated(model: Any, theirs: Any, state: Any, times: int) -> State:
+def _evaluated(model: Any, theirs: Any, state: Any, times: int) -> Instant:
     for _ in range(times):
         mjw.forward(theirs, state)
     q, v, a, drive = (x.numpy()[0].astype(float) for x in (state.qpos, state.qvel, state.qacc, state.actuator_force))

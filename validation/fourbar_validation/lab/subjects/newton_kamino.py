@@ -13,8 +13,8 @@ from fourbar.mjcf.simulators import SINGLE
 from fourbar.mjcf.usd import usd
 from fourbar.scene import Scene
 from fourbar_validation.compare.answer import Array
-from fourbar_validation.engines.description import turned
-from fourbar_validation.lab.subjects.motion import Readings, State, as_file, run_through, start, turn
+from fourbar_validation.engines.description import rotate
+from fourbar_validation.lab.subjects.motion import Instant, Readings, as_file, run_through, start, turn
 
 VERSION = version("newton")
 DEVICE = str(warp.get_preferred_device().name)
@@ -26,7 +26,7 @@ PARENTS = {"O2": None, "A": 0, "O4": None, "B": 2}
 
 
 def through(scene: Scene, steps: int, setting: str) -> Readings:
-    """A turn in so many steps; forces are those of a step, with the state in which it began."""
+    """Simulate a turn; forces are those of a step, with the state in which it began."""
     timestep, _ = turn(scene, steps)
     begin, inertia = start(scene), flywheel(scene, SINGLE)
     carried = replace(scene, effects=(*scene.effects, Flywheel(inertia, 2)))
@@ -54,15 +54,15 @@ def through(scene: Scene, steps: int, setting: str) -> Readings:
         now, then = then, now
         return theta, speed
 
-    def read(before: tuple[Array, float]) -> State:
+    def read(before: tuple[Array, float]) -> Instant:
         theta, speed = before
         alpha = (float(now.joint_qd.numpy()[0]) - speed) / timestep
         rows = solver._solver_kamino.data.joints.lambda_kin_j.numpy().astype(float).reshape(4, 5)[:, 1:3]
         forces = {}
         for row, (pin, parent) in zip(rows, PARENTS.items(), strict=True):
-            forces[pin] = np.array(turned(laid[pin] + (0.0 if parent is None else theta[parent]), *row))
+            forces[pin] = np.array(rotate(laid[pin] + (0.0 if parent is None else theta[parent]), *row))
         on_pins = {"F12": forces["O2"], "F32": -forces["A"], "F43": forces["B"], "F14": forces["O4"]}
-        return State(theta.tolist(), speed, alpha, -inertia * alpha, on_pins)
+        return Instant(theta.tolist(), speed, alpha, -inertia * alpha, on_pins)
 
     return run_through(scene, steps, setting, advance, read)
 

@@ -7,7 +7,7 @@ import newton
 import warp
 
 from fourbar.scene import Scene
-from fourbar_validation.lab.subjects.motion import Readings, State, as_file, run_through, start, turn, weight
+from fourbar_validation.lab.subjects.motion import Instant, Readings, as_file, run_through, start, turn, weight
 from fourbar_validation.lab.subjects.mujoco_c import reading, text
 
 VERSION = version("newton")
@@ -18,7 +18,7 @@ SETTINGS = {"SolverMuJoCo": None}
 
 
 def through(scene: Scene, steps: int, setting: str) -> Readings:
-    """A turn in so many steps."""
+    """Simulate a turn in so many steps."""
     timestep, _ = turn(scene, steps)
     builder = newton.ModelBuilder(gravity=weight(scene))
     with as_file(text(scene, steps, "newton"), "four_bar.xml") as file:
@@ -39,7 +39,7 @@ def through(scene: Scene, steps: int, setting: str) -> Readings:
             solver.step(now, then, control, None, timestep)
             now, then = then, now
 
-    def read(_: None) -> State:
+    def read(_: None) -> Instant:
         data = solver.mjw_data
         for _again in range(2):
             mjw.forward(solver.mjw_model, data)

@@ -1,4 +1,4 @@
-"""`python -m validation problems`: the answers of models/problems as JSON that a simulator's own tests can read."""
+"""`python -m validation write --problems`: the answers of models/problems as JSON for a simulator's own tests."""
 
 import json
 from pathlib import Path
@@ -35,7 +35,7 @@ PROMISED_FOR = 5.0
 
 
 def problem(file: Path) -> dict[str, Any]:
-    """What is given and what is to be answered, each with an error bar.
+    """Collect what is given and what is to be answered, each with an error bar.
 
     Raises LimitError for a scene with more than weights: the description in numbers has no place for it.
     """
@@ -80,7 +80,7 @@ def _prescribed(found: Solution) -> dict[str, Any]:
 
 
 def _released(found: Solution) -> dict[str, Any]:
-    """The motion errs as a time that is off; angle, speed and forces with it."""
+    """Answer a released motion: it errs as a time that is off; angle, speed and forces with it."""
     time, omega, alpha = found.time, found.omega_2, found.alpha_2
     assert time is not None and omega is not None and alpha is not None and found.force_error is not None
     angle = PROMISED * max(1.0, float(time[-1] - time[0]) / PROMISED_FOR)
@@ -97,7 +97,7 @@ def _released(found: Solution) -> dict[str, Any]:
 
 
 def _period(time: Array, theta: Array, omega: Array, alpha: Array) -> float | None:
-    """Between passages upwards through mid-swing, s; None where it does not swing to and fro."""
+    """Measure the time between upward passages through mid-swing, s; None where it does not swing."""
     from scipy.interpolate import BPoly
 
     level = 0.5 * (theta.max() + theta.min())
@@ -130,7 +130,7 @@ def command() -> None:
 
 
 def text(made: dict[str, Any]) -> str:
-    """One entry a line."""
+    """Write JSON, one entry a line."""
     lines = [f"  {json.dumps(key)}: {json.dumps(value)}" for key, value in made["answers"].items()]
     answers = "{\n" + ",\n".join(lines) + "\n }"
     head = [f" {json.dumps(key)}: {json.dumps(value)}" for key, value in made.items() if key != "answers"]

@@ -8,7 +8,7 @@ import pybullet as bullet
 from fourbar.linkage import BAR_NAMES, FIRST_PIN
 from fourbar.scene import Scene
 from fourbar_validation.engines.description import parts
-from fourbar_validation.lab.subjects.motion import Readings, State, as_file, run_through, start, turn, weight
+from fourbar_validation.lab.subjects.motion import Instant, Readings, as_file, run_through, start, turn, weight
 
 VERSION = version("pybullet")
 STEPS = (628, 2512, 10048)
@@ -22,7 +22,7 @@ STRONG = 1e9
 
 
 def urdf(scene: Scene) -> str:
-    """The tree: bars 2 and 3 one after the other, bar 4 on the ground; each link's frame lies in its mass centre."""
+    """Build the tree: bars 2 and 3 in series, bar 4 on the ground; each link's frame lies in its mass centre."""
     links = ['<robot name="four_bar"><link name="ground"/>']
     for part in parts(scene.linkage):
         turned = " ".join(f'{axes}="{part.inertia!r}"' for axes in ("ixx", "iyy", "izz"))
@@ -30,14 +30,14 @@ def urdf(scene: Scene) -> str:
             f'<link name="{BAR_NAMES[part.bar]}"><inertial><origin xyz="{part.centre[0]!r} {part.centre[1]!r} 0"/>'
             f'<mass value="{part.mass!r}"/><inertia {turned} ixy="0" ixz="0" iyz="0"/></inertial></link>'
             f'<joint name="{FIRST_PIN[part.bar]}" type="continuous"><parent link="{BAR_NAMES[part.bearer]}"/>'
-            f'<child link="{BAR_NAMES[part.bar]}"/><origin xyz="{part.foot[0]!r} {part.foot[1]!r} 0"/>'
+            f'<child link="{BAR_NAMES[part.bar]}"/><origin xyz="{part.first_pin[0]!r} {part.first_pin[1]!r} 0"/>'
             '<axis xyz="0 0 1"/></joint>'
         )
     return "".join([*links, "</robot>"])
 
 
 def through(scene: Scene, steps: int, setting: str) -> Readings:
-    """A turn in so many steps; torque and force are those with which the step began."""
+    """Simulate a turn; torque and force are those with which the step began."""
     (timestep, _), begin = turn(scene, steps), start(scene)
     client = bullet.connect(bullet.DIRECT)
     try:
@@ -66,11 +66,11 @@ def through(scene: Scene, steps: int, setting: str) -> Readings:
             bullet.stepSimulation()
             return before
 
-        def read(before: list[Any]) -> State:
+        def read(before: list[Any]) -> Instant:
             after, q, speed = bullet.getJointState(body, 0), [state[0] for state in before], before[0][1]
             force = [-part for part in bullet.getConstraintState(ball)[:2]]  # it speaks of the force on the child
             theta = (q[0], q[0] + q[1], q[2])
-            return State(theta, speed, (after[1] - speed) / timestep, after[3], {"F43": force})
+            return Instant(theta, speed, (after[1] - speed) / timestep, after[3], {"F43": force})
 
         return run_through(scene, steps, setting, advance, read)
     finally:

@@ -1,4 +1,4 @@
-"""Released versions of an engine, each in an environment of its own: which there are, installed, and does it load?"""
+"""Released versions of an engine, each in an environment of its own: listed, installed and loaded."""
 
 import os
 import re
@@ -26,7 +26,7 @@ DONE = "installed"
 
 @dataclass(frozen=True, slots=True)
 class Release:
-    """What the suite found under one version, or why it found nothing."""
+    """The run of the suite under one version, or why there is none."""
 
     version: str
     run: HistoryRun | None
@@ -36,12 +36,12 @@ class Release:
 
 
 def distribution(engine: str) -> str:
-    """What pip knows an engine by."""
+    """Return the name that an engine has for pip."""
     return PACKAGES.get(engine, engine)
 
 
-def known(engine: str) -> str:
-    """Its module; InputError for an engine that there is no adapter of."""
+def module_of(engine: str) -> str:
+    """Return the module of an engine; InputError where it has no adapter."""
     if engine not in MODULES:
         close = get_close_matches(engine, MODULES, n=1) or [name for name in MODULES if distribution(name) == engine]
         hint = f'; did you mean "{close[0]}"?' if close else ""
@@ -50,12 +50,12 @@ def known(engine: str) -> str:
 
 
 def pip(python: Path, *arguments: str) -> Ended:
-    """Pip's answer, with the index that the user has set up for it."""
+    """Run pip, with the index that the user has set up for it."""
     return ended([sys.executable, "-m", "pip", "--python", python, "--disable-pip-version-check", *arguments])
 
 
 def released(engine: str, first: str | None, last: str | None) -> list[str]:
-    """The versions that pip's index has, from the oldest to the newest; of them those from `first` to `last`."""
+    """List the versions of pip's index from `first` to `last`, the oldest first."""
     done = pip(Path(sys.executable), "index", "versions", distribution(engine))
     listed = [line.removeprefix(LISTED) for line in done.out.splitlines() if line.startswith(LISTED)]
     if done.why or not listed:
@@ -73,7 +73,7 @@ def released(engine: str, first: str | None, last: str | None) -> list[str]:
 
 
 def installed(engine: str, version: str, cache: Path, more: Sequence[str] = ()) -> tuple[Path | None, str]:
-    """The interpreter that loads this version and no other; None, and why, where it does not install or load.
+    """Install a version: the interpreter that loads it and no other, or None, and why it does not install or load.
 
     The environment has the engine and what it requires, and `more` where that does not contradict it; all else it takes
     from the one that runs here.
@@ -104,6 +104,6 @@ def installed(engine: str, version: str, cache: Path, more: Sequence[str] = ()) 
 
 
 def _reason(done: Ended) -> str:
-    """The one line of pip's errors that says why."""
+    """Find the line of pip's errors that says why."""
     stated = [line.removeprefix("ERROR:").strip() for line in done.errors.splitlines() if line.startswith("ERROR:")]
     return stated[0].partition(" (from versions")[0] if stated else done.why or "no word"

@@ -11,7 +11,7 @@ import fourbar
 from fourbar.errors import InputError
 from fourbar.writing import write_text
 from fourbar_validation.compare.rows import csv_text
-from fourbar_validation.lab.subjects.examine import TORQUE_AND_FORCES, Line, Standing, examine
+from fourbar_validation.lab.subjects.examine import TORQUE_AND_FORCES, Examination, Line, examine
 from fourbar_validation.places import CHECKOUT, MODELS
 from fourbar_validation.report.machine import machine
 from fourbar_validation.report.svg import drawn, inline
@@ -19,22 +19,24 @@ from fourbar_validation.report.templating import rendered
 
 PROBLEM = MODELS / "problems" / "crank_rocker.toml"
 FINDINGS = None if CHECKOUT is None else CHECKOUT / "docs" / "findings"
-HEAD = ("subject", "version", "setting", "of", *TORQUE_AND_FORCES, "gap at B", "CPU s per s", "order")
+HEAD = ("simulator", "version", "setting", "of", *TORQUE_AND_FORCES, "gap at B", "CPU s per s", "order")
 EXPLAINED = (
-    "Errors of the torque and of each pin force: the greatest of the readings by the greatest value in a turn, at the "
-    "subject's own angle, speed and acceleration. 'states': states set one by one; 'N steps': a turn at constant "
-    "speed, its first quarter not read. Empty: its adapter does not read it. The gap, the drift of the closure, "
-    "is the greatest of the readings by the longest bar, the order that of the torque's error from the line "
-    "above; readings and compilation are not in the time. No line is a ranking: double and single precision, compiled "
-    "and interpreted loops stand side by side."
+    "Errors of the torque and of each pin force are the greatest of the readings, relative to the greatest value in a "
+    "turn; the formulas are evaluated at the simulator's own angle, speed and acceleration. 'states': single states; "
+    "'N steps': a turn at constant speed, without its first quarter. Empty: the simulator does not report it. Gap at "
+    "B: the greatest distance between the ends of bars 3 and 4, relative to the longest bar. Order: of the torque's "
+    "error, from the line above to this one. The time leaves out readings and compilation. No line is a ranking: "
+    "double and single precision, compiled and interpreted loops stand side by side."
 )
 
 
 @click.command()
 @click.argument("scene", type=click.Path(path_type=Path), default=PROBLEM)
-@click.option("--python", "pythons", type=click.Path(path_type=Path), multiple=True, help="An environment of subjects.")
+@click.option(
+    "--python", "pythons", type=click.Path(path_type=Path), multiple=True, help="An environment of simulators."
+)
 @click.option("-o", "--out", type=click.Path(path_type=Path), default=Path("results/standing"), show_default=True)
-@click.option("--time-limit", default=600.0, show_default=True, help="Seconds for each subject.")
+@click.option("--time-limit", default=600.0, show_default=True, help="Seconds for each simulator.")
 def command(scene: Path, pythons: tuple[Path, ...], out: Path, time_limit: float) -> None:
     """Examine every simulator that is installed here or under a --python, and write one page (repeat --python)."""
     for python in pythons:
@@ -44,9 +46,9 @@ def command(scene: Path, pythons: tuple[Path, ...], out: Path, time_limit: float
     out.mkdir(parents=True, exist_ok=True)
     found = examine(given, scene, [Path(sys.executable), *(path.absolute() for path in pythons)], time_limit)
     if not found.lines:
-        raise InputError("--python", ", ".join(map(str, pythons)) or None, "no subject answered there")
+        raise InputError("--python", ", ".join(map(str, pythons)) or None, "no simulator answered there")
     chart = work_precision(found)
-    versions = dict.fromkeys(f"{line.subject} {line.version}" for line in found.lines)
+    versions = dict.fromkeys(f"{line.simulator} {line.version}" for line in found.lines)
     page = {
         "title": given.title,
         "made": f"{machine()}; {', '.join(versions)}",
@@ -64,10 +66,12 @@ def command(scene: Path, pythons: tuple[Path, ...], out: Path, time_limit: float
     write_text(out / "standing.csv", table(found))
     for name, why in found.left_out.items():
         click.echo(f"not examined: {name}: {why}")
-    click.echo(f"wrote {out}/standing.html, .md, .csv, .svg: {len(found.lines)} lines of {len(found.changed)} subjects")
+    click.echo(
+        f"wrote {out}/standing.html, .md, .csv, .svg: {len(found.lines)} lines of {len(found.changed)} simulators"
+    )
 
 
-def _lists(found: Standing) -> dict[str, list[str]]:
+def _lists(found: Examination) -> dict[str, list[str]]:
     changed = [f"{name} ({found.devices[name]}): {what}" for name, what in found.changed.items()]
     return {
         "What had to be changed, and what it ran on": changed,
@@ -79,26 +83,26 @@ def _lists(found: Standing) -> dict[str, list[str]]:
 
 
 def cells(line: Line) -> list[str]:
-    """One line of the table."""
+    """Format one line of the table."""
     of = "states" if line.steps is None else f"{line.steps} steps"
     numbers = [f"{line.errors[name]:.1e}" if name in line.errors else "" for name in TORQUE_AND_FORCES]
     cost = "" if line.cost is None else f"{line.cost:.2g}"
     order = "" if line.order is None else f"{line.order:.1f}"
-    return [line.subject, line.version, line.setting, of, *numbers, f"{line.gap:.1e}", cost, order]
+    return [line.simulator, line.version, line.setting, of, *numbers, f"{line.gap:.1e}", cost, order]
 
 
-def table(found: Standing) -> str:
-    """CSV, every digit."""
+def table(found: Examination) -> str:
+    """Write the table as CSV, every digit."""
     columns = ["subject", "version", "setting", "steps", *TORQUE_AND_FORCES, "gap", "cpu_s_per_s", "order"]
     rows: list[list[Any]] = []
     for line in found.lines:
         values = [line.errors.get(name) for name in TORQUE_AND_FORCES]
-        rows.append([line.subject, line.version, line.setting, line.steps, *values, line.gap, line.cost, line.order])
+        rows.append([line.simulator, line.version, line.setting, line.steps, *values, line.gap, line.cost, line.order])
     return csv_text(columns, rows)
 
 
-def work_precision(found: Standing) -> str:
-    """SVG: error of the torque through a turn by what a simulated second costs."""
+def work_precision(found: Examination) -> str:
+    """Draw the error of the torque through a turn over the cost of a simulated second, as SVG."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(7.5, 4.2), layout="constrained")
@@ -106,15 +110,15 @@ def work_precision(found: Standing) -> str:
     series: dict[tuple[str, str], list[Line]] = {}
     for line in found.lines:
         if line.cost:
-            series.setdefault((line.subject, line.setting), []).append(line)
-    for index, ((subject, setting), lines) in enumerate(series.items()):
+            series.setdefault((line.simulator, line.setting), []).append(line)
+    for index, ((simulator, setting), lines) in enumerate(series.items()):
         axes.loglog(
             [line.cost or 0.0 for line in lines],
             [line.errors["torque"] for line in lines],
             marker="osD^vP*Xh<>"[index % 11],
             markersize=4,
             linewidth=1,
-            label=f"{subject}: {setting}",
+            label=f"{simulator}: {setting}",
         )
     axes.set_xlabel("processor seconds for one simulated second")
     axes.set_ylabel("error of the torque by its greatest value")
@@ -124,7 +128,7 @@ def work_precision(found: Standing) -> str:
 
 
 def findings() -> list[tuple[str, str]]:
-    """Name of each script of a checkout and the first sentence of its docstring."""
+    """List the name of each script of a checkout and the first sentence of its docstring."""
     return [
         (path.name, (ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))) or "").partition("\n")[0])
         for path in sorted(FINDINGS.glob("*.py") if FINDINGS else ())

@@ -1,4 +1,4 @@
-"""`python -m validation versions ENGINE`: the same suite under each released version, and where something changed."""
+"""`python -m validation standing --versions ENGINE`: the same suite under each released version."""
 
 import json
 import math
@@ -16,7 +16,7 @@ from fourbar.scene import command as on_path
 from fourbar.writing import write_text
 from fourbar_validation.engines.witnesses import FURTHER, WITNESSES
 from fourbar_validation.engines.workers import each
-from fourbar_validation.lab.subjects.releases import Release, installed, known, released
+from fourbar_validation.lab.subjects.releases import Release, installed, module_of, released
 from fourbar_validation.lab.subjects.versions_page import changed, written
 from fourbar_validation.places import MODELS
 from fourbar_validation.regression.change import Change, Kind
@@ -64,7 +64,7 @@ def command(
 
     Writes versions.md, .svg, .csv and .json: error and time by version, and the versions where something changed.
     """
-    module = known(engine)
+    module = module_of(engine)
     for scene in scenes:
         fourbar.load(scene)  # before anything is installed
     chosen = released(engine, first, last)
@@ -114,7 +114,7 @@ def _attempt(
 
 
 def timed(python: Path, scene: Path, witnesses: Sequence[str]) -> dict[str, float]:
-    """What one position of a scene costs each witness under another Python, s of the processor's clock."""
+    """Time one position of a scene for each witness under another Python, s of the processor's clock."""
     code = "import sys; from fourbar_validation.lab.subjects.versions import clock; clock(*sys.argv[1:])"
     done = of_the_harness([python, "-c", code, scene, *witnesses])
     try:
@@ -140,12 +140,12 @@ def clock(file: str, *names: str) -> None:
 
 
 def scanned(versions: Sequence[str], attempt: Try, jobs: int) -> list[Release]:
-    """Every version, so many at a time."""
+    """Run every version, `jobs` at a time."""
     return list(each(attempt, versions, jobs, seconds=None))
 
 
 def bisected(versions: Sequence[str], attempt: Try) -> list[Release]:
-    """The versions that had to be run to find those between which something changed.
+    """Run the versions that it takes to find those between which something changed.
 
     Of two versions that say the same, none between is run: what came and went again is not found.
     """

@@ -21,7 +21,7 @@ CLOCK = "cpu_s_a_position"
 
 
 def changed(found: Sequence[Release]) -> list[str]:
-    """One sentence for each version at which something changed: from which on, what, and the row that moved most."""
+    """Describe each version at which something changed: from which on, what, and the row that moved most."""
     ran = [release for release in found if release.run is not None]
     sentences = []
     for step in steps([release.run for release in ran if release.run is not None]):
@@ -36,7 +36,7 @@ def changed(found: Sequence[Release]) -> list[str]:
 
 
 def _moved(change: Change) -> float:
-    """By how many powers of e an error moved; what came or went, last."""
+    """Measure by how many powers of e an error moved; what came or went, last."""
     if change.old is None or change.new is None or not (change.old.error and change.new.error):
         return 0.0
     moved = abs(math.log(change.new.error / change.old.error))
@@ -49,7 +49,7 @@ def _with(step: Step) -> str:
 
 
 def lines(found: Sequence[Release]) -> list[dict[str, Any]]:
-    """A line for each version and witness: greatest errors, verdicts, time; or why it has none."""
+    """List greatest errors, verdicts and time of each version and witness, or why it has none."""
     made: list[dict[str, Any]] = []
     for release in found:
         if release.run is None:
@@ -70,7 +70,7 @@ def lines(found: Sequence[Release]) -> list[dict[str, Any]]:
 
 
 def _last(error: float) -> float:
-    """NaN is the greatest."""
+    """Sort NaN as the greatest."""
     return math.inf if math.isnan(error) else error
 
 
@@ -78,7 +78,7 @@ COLUMNS = ("version", "engine", *TORQUE_AND_FORCES, "compared", FAILS, REFUSES, 
 
 
 def written(engine: str, found: Sequence[Release], left: int, more: Sequence[str] = ()) -> dict[str, str]:
-    """The text of each file by its name."""
+    """Write the text of each file, by its name."""
     rows, sentences = lines(found), changed(found)
     table = csv_text(COLUMNS, ([row.get(name) for name in COLUMNS] for row in rows))
     about = next(release.run.about for release in found if release.run is not None)
@@ -106,7 +106,7 @@ def _cell(name: str, value: Any) -> str:
 
 
 def chart(rows: Sequence[dict[str, Any]]) -> str:
-    """SVG: the greatest error of the torque and of the pin forces, and the time, by version."""
+    """Draw the greatest error of the torque and of the pin forces, and the time, by version, as SVG."""
     from matplotlib.figure import Figure
 
     versions = list(dict.fromkeys(row["version"] for row in rows))

@@ -1,4 +1,4 @@
-"""`python -m fourbar_validation.lab.subjects.work MODULE SCENE`: one subject in its own environment; prints JSON.
+"""`python -m fourbar_validation.lab.subjects.work MODULE SCENE`: one simulator in its own environment; prints JSON.
 
 It needs numpy, mpmath, pint and the simulator.
 """
@@ -14,15 +14,15 @@ import fourbar
 
 
 def main(module: str, file: str, answers: TextIO) -> None:
-    """Every setting: a turn at each number of steps, and single states where the subject takes them."""
-    subject, scene = import_module(f"fourbar_validation.lab.subjects.{module}"), fourbar.load(Path(file))
+    """Try every setting: a turn at each number of steps, and single states where the simulator takes them."""
+    simulator, scene = import_module(f"fourbar_validation.lab.subjects.{module}"), fourbar.load(Path(file))
     found = []
-    for setting in subject.SETTINGS:
-        if hasattr(subject, "states"):
-            found.append(subject.states(scene, setting))
-        found += [subject.through(scene, steps, setting) for steps in subject.STEPS]
-    answer = {"version": subject.VERSION, "changed": subject.CHANGED, "readings": [each.plain() for each in found]}
-    answer["device"] = getattr(subject, "DEVICE", "CPU")
+    for setting in simulator.SETTINGS:
+        if hasattr(simulator, "states"):
+            found.append(simulator.states(scene, setting))
+        found += [simulator.through(scene, steps, setting) for steps in simulator.STEPS]
+    answer = {"version": simulator.VERSION, "changed": simulator.CHANGED, "readings": [each.plain() for each in found]}
+    answer["device"] = getattr(simulator, "DEVICE", "CPU")
     answers.write(json.dumps(answer))
 
 

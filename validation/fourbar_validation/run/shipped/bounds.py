@@ -11,7 +11,8 @@ from fourbar.scene import Scene
 from fourbar.scene.motion import Motion
 from fourbar_validation.compare.rows import REFUSES, Row
 from fourbar_validation.compare.tolerance import Tolerance
-from fourbar_validation.run.shipped.question import NotAskedError, Question, at_free_bodies, moved, row_of
+from fourbar_validation.run.question import NotAskedError, Question
+from fourbar_validation.run.shipped.variants import at_free_bodies, moved, row_of
 
 TORQUE = "torque"
 GIVEN = 1e-4

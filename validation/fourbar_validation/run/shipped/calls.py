@@ -14,17 +14,8 @@ from fourbar.scene.point import Point
 from fourbar_validation.compare.error import magnitude
 from fourbar_validation.compare.rows import Row
 from fourbar_validation.engines.free_body import FreeBody
-from fourbar_validation.run.shipped.question import (
-    NotAskedError,
-    Question,
-    at_free_bodies,
-    held_to,
-    member,
-    moved,
-    sampled,
-    stated,
-    worst_rows,
-)
+from fourbar_validation.run.question import NotAskedError, Question
+from fourbar_validation.run.shipped.variants import at_free_bodies, held_to, member, moved, sampled, stated, worst_rows
 
 MEMBERS = 5
 """As many as positions: a square study, whose axes nothing but its numbers tells apart."""
@@ -46,11 +37,12 @@ def compiled(question: Question) -> list[Row]:
 
 
 def furnished(scene: Scene, question: Question) -> Scene:
-    """The scene with a point on each bar and a load over a table, as large as its forces, where it has none."""
+    """Give the scene a point on each bar and a load over a table, as large as its forces, where it has none."""
     coupler, first = scene.linkage.coupler, float(question.at.theta_2[0])
     if not scene.points:
         arms = {bar: (0.6 * scene.linkage.bar(bar).length, 0.4 * bar) for bar in (2, 3, 4)}
         scene = replace(scene, points=tuple(Point(f"P{bar}", bar, arm) for bar, arm in arms.items()))
+    assert question.free_body is not None
     size = magnitude(question.free_body.quantities["F12"])
     known = size[np.isfinite(size) & (size > 0.0)]
     if not any(load.table for load in scene.loads) and known.size and scene.motion.law is None:

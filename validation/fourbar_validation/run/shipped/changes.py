@@ -15,7 +15,8 @@ from fourbar_validation.compare.answer import Array
 from fourbar_validation.compare.error import magnitude, relative
 from fourbar_validation.compare.rows import Row
 from fourbar_validation.compare.tolerance import Tolerance
-from fourbar_validation.run.shipped.question import Question, at_free_bodies, moved, parts, row_of, sampled, stated
+from fourbar_validation.run.question import Question
+from fourbar_validation.run.shipped.variants import at_free_bodies, moved, parts, row_of, sampled, stated
 
 STEP = 1e-4
 """Of each number, of an angle in rad: what the fourth order leaves out and what rounding adds are then alike."""
@@ -103,7 +104,7 @@ class Expected(NamedTuple):
 
 
 def _expected(scene: Scene) -> dict[str, Expected]:
-    """What the free bodies of changed linkages say, by the parts of the unknowns."""
+    """Compute what the free bodies of changed linkages answer, by the parts of the unknowns."""
     bare = replace(scene, tolerances=())
     nominal = parts(at_free_bodies(bare))
     numbers = stated(bare, [each.key for each in scene.tolerances])
@@ -161,6 +162,6 @@ def _off(spread: Spread, expected: Expected, slight: float) -> Array:
 
 
 def _less(name: str, one: Array, other: Array) -> Array:
-    """A difference, of angles within half a turn."""
+    """Subtract, angles within half a turn."""
     difference = one - other
     return np.asarray(np.angle(np.exp(1j * difference)) if name.startswith("theta") else difference)

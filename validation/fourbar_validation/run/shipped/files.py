@@ -19,13 +19,14 @@ from fourbar.scene import Scene
 from fourbar.solve import solve
 from fourbar_validation.compare.rows import REFUSES, Row
 from fourbar_validation.compare.tolerance import EPS, K
-from fourbar_validation.run.shipped.question import Question, at_free_bodies, held_to, sampled, worst_rows
+from fourbar_validation.run.question import Question
+from fourbar_validation.run.shipped.variants import at_free_bodies, held_to, sampled, worst_rows
 
 NUMBER = r"[-+.\deE]+"
 BARS = {BAR_NAMES[number]: number for number in MOVING_BARS}
 
 
-class Body(NamedTuple):
+class FileBody(NamedTuple):
     """A bar as a file holds it; the numbers are those of the plane."""
 
     place: complex
@@ -38,7 +39,7 @@ class Body(NamedTuple):
 class Contents(NamedTuple):
     """What a file says of a linkage."""
 
-    bodies: dict[str, Body]
+    bodies: dict[str, FileBody]
     pins: dict[str, complex]
     """In the world; NaN where the two bars of a pin do not meet."""
     turns: list[dict[str, float]]
@@ -60,7 +61,7 @@ def usd(question: Question) -> list[Row]:
 
 
 def _file(question: Question, engine: str, read: Callable[[Scene], Contents]) -> list[Row]:
-    """The rows of a file at its own position and at some more; loads are what a simulator adds."""
+    """Compare a file at its own position and at some more; loads are what a simulator adds."""
     scene = replace(sampled(question), loads=(), points=())
     theta_2 = np.asarray(scene.motion.theta_2)
     opened = replace(scene, motion=replace(scene.motion, theta_2=theta_2[:1]))
@@ -79,7 +80,7 @@ def _file(question: Question, engine: str, read: Callable[[Scene], Contents]) ->
 
 
 def assembled(held: Contents, scene: Scene) -> Scene:
-    """The scene that a file describes, in the motion and with the drive of another."""
+    """Build the scene that a file describes, in the motion and with the drive of another."""
     bodies, pins = held.bodies, held.pins
     span = pins["O4"] - pins["O2"]
     ends = {"input": pins["A"] - pins["O2"], "coupler": pins["B"] - pins["A"], "output": pins["B"] - pins["O4"]}
@@ -106,7 +107,7 @@ def _of_sdf(text: str) -> Contents:
         x, y, _, _, _, turn = numbers(link, "pose")
         centre = complex(*numbers(link, "inertial/pose")[:2])
         (mass,), (inertia,) = numbers(link, "inertial/mass"), numbers(link, "inertial/inertia/izz")
-        bodies[link.get("name", "")] = Body(complex(x, y), turn, mass, inertia, centre)
+        bodies[link.get("name", "")] = FileBody(complex(x, y), turn, mass, inertia, centre)
     pins: dict[str, complex] = {}
     dynamics: dict[str, dict[str, float]] = {"damping": {}, "friction": {}}
     for joint in root.iter("joint"):
@@ -130,12 +131,12 @@ def _of_usd(text: str) -> Contents:
         return 2.0 * math.atan2(z, w)
 
     blocks = dict(re.findall(r'def (?:Xform|PhysicsRevoluteJoint|PhysicsScene) "(\w+)"[^{]*\{([^{}]*)\}', text))
-    bodies = {"ground": Body(0j, 0.0, math.nan, math.nan, 0j)}
+    bodies = {"ground": FileBody(0j, 0.0, math.nan, math.nan, 0j)}
     for bar in BARS:
         of = blocks[bar]
         place, centre = (complex(*numbers(of, f"{key}")[:2]) for key in ("xformOp:translate", "physics:centerOfMass"))
         mass, inertia = numbers(of, "physics:mass")[0], numbers(of, "physics:diagonalInertia")[2]
-        bodies[bar] = Body(place, turn(of, "xformOp:orient"), mass, inertia, centre)
+        bodies[bar] = FileBody(place, turn(of, "xformOp:orient"), mass, inertia, centre)
     size = sum(abs(body.place) + abs(body.centre) for body in bodies.values())
     pins, at_joints = {}, {"ground": 0.0}
     for pin in ("O2", "A", "O4", "B"):
@@ -158,12 +159,12 @@ def _of_usd(text: str) -> Contents:
     return Contents(bodies, pins, [_turns(bodies), at_joints, closing, _noted(text)], gravity, {}, {})
 
 
-def _turns(bodies: dict[str, Body]) -> dict[str, float]:
+def _turns(bodies: dict[str, FileBody]) -> dict[str, float]:
     return {bar: body.turn for bar, body in bodies.items()}
 
 
 def _noted(text: str) -> dict[str, float]:
-    """The angles that the file states in words."""
+    """Read the angles that the file states in words."""
     return {
         bar: float(found[1])
         for bar, number in BARS.items()

@@ -103,7 +103,7 @@ def test_an_angle_without_a_value_is_beyond_what_is_allowed(monkeypatch: pytest.
 
     monkeypatch.setattr("fourbar_validation.lab.stress.forward_error.stability.solve", lost)
     tally = run("random", range(2))
-    assert tally.worst["theta_3"][0] == np.inf and tally.worst["theta_4"][0] <= 1.0 and not tally.held()
+    assert tally.worst["theta_3"][0] == np.inf and tally.worst["theta_4"][0] <= 1.0 and not tally.holds()
 
 
 def test_a_tally_adds_up() -> None:

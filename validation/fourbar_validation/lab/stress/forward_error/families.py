@@ -6,16 +6,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from fourbar.effects import Load, Point, Spring, Springs, Table, Torsion
+from fourbar.effects import Load, Spring, SpringEnd, Springs, Table, Torsion
 from fourbar.linkage import MOVING_BARS, PINS, Bar, FourBar
 from fourbar.scene import Scene
-from fourbar.scene.point import Point as Marked
+from fourbar.scene.point import Point
 from fourbar.solve import solve
 from fourbar_validation.scenes.random import Ranges, decades, drawn, product, sometimes, uneven_lengths, uniform
 
 
 def ranges_of(spread: float) -> Ranges:
-    """Masses over so many decades to either side, one bar of ten without any; centres anywhere about the bar."""
+    """Spread masses over decades to either side, one bar of ten without any; centres anywhere about the bar."""
     return Ranges(
         mass=sometimes(0.9, product(decades(-spread, spread), uniform(0.2, 5.0))),
         inertia=uniform(0.0, 0.5),
@@ -32,13 +32,13 @@ EVEN, UNEVEN = ranges_of(0.0), ranges_of(3.0)
 
 
 def at_angle(scene: Scene, theta_2: float) -> Scene:
-    """The same scene at theta_2 (rad from theta_1 on)."""
+    """Put the scene at theta_2 (rad from theta_1 on)."""
     angle = scene.linkage.ground_angle + theta_2
     return replace(scene, motion=replace(scene.motion, theta_2=angle))
 
 
 def random(rng: np.random.Generator) -> Scene:
-    """Lengths within a factor of ten, theta_2 anywhere it assembles."""
+    """Draw lengths within a factor of ten, theta_2 anywhere it assembles."""
     while True:
         d, a = rng.uniform(0.1, 1.0, 2)
         angle = float(rng.uniform(-7.0, 7.0))
@@ -49,7 +49,7 @@ def random(rng: np.random.Generator) -> Scene:
 
 
 def limit(rng: np.random.Generator) -> Scene:
-    """Within 1e-12..1e-2 rad of a limit position of the input."""
+    """Draw a position within 1e-12..1e-2 rad of a limit of the input."""
     while True:
         d, a, b, c = rng.uniform(0.1, 1.0, 4)
         folded = bool(rng.random() < 0.5)
@@ -61,7 +61,7 @@ def limit(rng: np.random.Generator) -> Scene:
 
 
 def change_point(rng: np.random.Generator) -> Scene:
-    """Within 1e-8..1 rad of a change point: parallelograms, kites, and any s + l = p + q, some off by as little."""
+    """Draw within 1e-8..1 rad of a change point: parallelograms, kites, any s + l = p + q, some off by as little."""
     x, y = rng.uniform(0.1, 1.0, 2)
     kind = rng.integers(0, 4)
     straight = 0.0
@@ -85,13 +85,13 @@ def change_point(rng: np.random.Generator) -> Scene:
 
 
 def ratios(rng: np.random.Generator) -> Scene:
-    """Crank to ground, coupler to diagonal, and masses, each in ratios from 1e-6 to 1e6."""
+    """Draw crank to ground, coupler to diagonal, and masses, each in ratios from 1e-6 to 1e6."""
     lengths, angle = uneven_lengths(rng, decades(-6.0, 6.0), decades(-1.0, 1.0))
     return at_angle(drawn(rng, lengths, UNEVEN), angle)
 
 
 def scales(rng: np.random.Generator) -> Scene:
-    """All lengths times 1e-9..1e9."""
+    """Multiply all lengths by 1e-9..1e9."""
     scene = random(rng)
     link, k = scene.linkage, float(10.0 ** rng.uniform(-9, 9))
     bars = []
@@ -105,7 +105,7 @@ def scales(rng: np.random.Generator) -> Scene:
 
 
 def speeds(rng: np.random.Generator) -> Scene:
-    """omega_2 up to 1e6 rad/s, alpha_2 up to 1e12 rad/s^2, and the static case."""
+    """Draw omega_2 up to 1e6 rad/s, alpha_2 up to 1e12 rad/s^2, and the static case."""
     scene = random(rng)
     omega = float(rng.choice([-1.0, 1.0]) * 10.0 ** rng.uniform(-3, 6)) * bool(rng.random() < 0.9)
     alpha = float(rng.choice([0.0, rng.choice([-1.0, 1.0]) * 10.0 ** rng.uniform(-3, 12)]))
@@ -113,23 +113,23 @@ def speeds(rng: np.random.Generator) -> Scene:
 
 
 def off(rng: np.random.Generator) -> float:
-    """From what would be rest, relative: within 3e-2 to 1e-5, to either side."""
+    """Draw a relative deviation of 1e-5 to 3e-2, to either side."""
     return float(rng.choice([-1.0, 1.0]) * 10.0 ** rng.uniform(-5.0, math.log10(3e-2)))
 
 
 def massless(rng: np.random.Generator) -> Scene:
-    """The random family's linkages under nothing at all: what is added alone makes the forces."""
+    """Draw a linkage of the random family without masses, loads and effects: only what is added makes forces."""
     scene = random(rng)
     d, a, b, c = scene.linkage.lengths
     return replace(scene, linkage=FourBar(d, Bar(a), Bar(b), Bar(c), scene.linkage.ground_angle), loads=(), effects=())
 
 
 def springs(rng: np.random.Generator) -> Scene:
-    """A spring whose points are nearly as far apart as where it pulls with nothing, its preload in the pull."""
+    """Draw a spring near the length at which its force is zero, with a preload in every other scene."""
     scene = massless(rng)
     one, other = (int(bar) for bar in rng.choice((1, *MOVING_BARS), 2, replace=False))
-    start, end = (Point(bar, *rng.uniform((0.0, -3.0), (1.0, 3.0)).tolist()) for bar in (one, other))
-    marked = replace(scene, points=(Marked("P", one, start[1:]), Marked("Q", other, end[1:])))
+    start, end = (SpringEnd(bar, *rng.uniform((0.0, -3.0), (1.0, 3.0)).tolist()) for bar in (one, other))
+    marked = replace(scene, points=(Point("P", one, start[1:]), Point("Q", other, end[1:])))
     places = solve(marked, "position").points
     distance = math.hypot(*(places["Q"] - places["P"])[0])
     stiffness, preload = float(rng.uniform(10.0, 1000.0)), 0.0
@@ -140,7 +140,7 @@ def springs(rng: np.random.Generator) -> Scene:
 
 
 def torsion(rng: np.random.Generator) -> Scene:
-    """A torsion spring nearly where its couple is zero, its rest some turns away or none.
+    """Draw a torsion spring near the angle at which its couple is zero, its rest some turns away or none.
 
     Not at O2: its angle, given in doubles, comes back from the directions to the last digit more often than not, and
     an error that is zero by chance says nothing of the bar.
@@ -159,7 +159,7 @@ def torsion(rng: np.random.Generator) -> Scene:
 
 
 def tables(rng: np.random.Generator) -> Scene:
-    """A load over a table, many turns from its angles or none, every other near where its factor is zero.
+    """Draw a load over a table, many turns from its angles or none, every other near where its factor is zero.
 
     The ground is level: against another theta_2 loses digits of all directions after many turns.
     """

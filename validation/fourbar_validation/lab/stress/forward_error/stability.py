@@ -71,10 +71,10 @@ class Tally:
             self.too_large[name] = self.too_large.get(name, 0) + count
 
     def note(self, output: str, ratio: float, sample: str) -> None:
-        """One error over what is allowed."""
+        """Keep the largest error over what is allowed."""
         self.worst[output] = max(self.worst.get(output, (0.0, "")), (ratio, sample))
 
-    def held(self) -> bool:
+    def holds(self) -> bool:
         """Whether anything was compared, and error and error bars are as promised."""
         bars = all(ratio <= TOO_SMALL for ratio in self.too_small.values())
         useful = all(by_chance(count, self.samples) for count in self.too_large.values())
@@ -90,7 +90,7 @@ def by_chance(count: int, samples: int) -> bool:
 
 
 def components(name: str) -> list[tuple[str, Any]]:
-    """The names under which the reference knows an output, and their index in its array."""
+    """List the names that an output has in the reference, and their index in its array."""
     return [(f"{name}_x", (0, 0)), (f"{name}_y", (0, 1))] if name in VECTORS else [(name, 0)]
 
 
@@ -143,7 +143,7 @@ def judge(scene: Scene, tally: Tally, sample: str) -> None:
 
 
 def _ratio(name: str, ours: float, value: Any, sensitivity: float) -> tuple[float, float]:
-    """Error over what is allowed, and the error; a number that the balls cannot tell from the truth has none."""
+    """Compute an error over what is allowed, and the error: 0 where the balls cannot tell it from the truth."""
     error = value - float(ours) if math.isfinite(ours) else math.inf
     size = abs(float(value.mid()))
     if name.startswith("theta"):
@@ -167,7 +167,7 @@ def _run(seed: int, task: tuple[str, range]) -> Tally:
 
 
 def chunks(samples: int) -> Iterator[range]:
-    """The sample numbers in portions of one task."""
+    """Divide the sample numbers into tasks."""
     for start in range(0, samples, CHUNK):
         yield range(start, min(start + CHUNK, samples))
 
@@ -178,7 +178,7 @@ def chunks(samples: int) -> Iterator[range]:
 @click.option("--seed", default=0, show_default=True)
 @click.option("--jobs", default=2, show_default=True, help="Processes.")
 def stability(samples: int, families: tuple[str, ...], seed: int, jobs: int) -> int:
-    """Error of every output against 50-digit arithmetic, and whether the error bars hold."""
+    """Measure the error of every output against 50-digit arithmetic, and whether the error bars hold."""
     from rich.box import HEAVY_HEAD
     from rich.console import Console
     from rich.progress import track
@@ -211,4 +211,4 @@ def stability(samples: int, families: tuple[str, ...], seed: int, jobs: int) -> 
     for family, tally in tallies.items():
         if not tally.worst:
             console.print(f"{family}: nothing was compared")
-    return HOLDS if all(tally.held() for tally in tallies.values()) else FAILED
+    return HOLDS if all(tally.holds() for tally in tallies.values()) else FAILED

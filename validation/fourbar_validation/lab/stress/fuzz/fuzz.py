@@ -36,7 +36,7 @@ LOST = "worker:"
 
 
 def findings(scene: Scene) -> list[str]:
-    """What is wrong with a scene, in one line each; an exception or a warning is a finding too."""
+    """List what is wrong with a scene, in one line each; exceptions and warnings too."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error")
@@ -48,13 +48,13 @@ def findings(scene: Scene) -> list[str]:
 
 
 def _file(scene: Scene) -> list[str]:
-    """Written as a scene file and read again, it must be the same scene to the last digit."""
+    """Write a scene file and read it again: it must be the same scene to the last digit."""
     again = dump(loads(dump(scene)))
     return [] if again == dump(scene) else ["file: a scene that was written and read is another one"]
 
 
 def _assembly(scene: Scene, at: Command, solution: Solution) -> list[str]:
-    """No position where the loop does not close, none missing where it does, by ball arithmetic."""
+    """Compare by ball arithmetic: no position where the loop does not close, none missing where it does."""
     from fourbar_validation.engines.balls import closure, stored
 
     found = []
@@ -115,7 +115,7 @@ def run(count: int, seed: int, out: Path, workers: int, bounds: bool = False) ->
     "-o", "--out", type=click.Path(path_type=Path, file_okay=False), default=Path("results/fuzz"), show_default=True
 )
 def fuzz(scenes: int, bounds: bool, seed: int, workers: int, out: Path) -> int:
-    """Random and adversarial scenes through files, formulas and exact engines; every failure is shrunk and kept."""
+    """Put random scenes through files, formulas and exact engines; every failure is shrunk and kept."""
     from rich.console import Console
     from rich.progress import track
 

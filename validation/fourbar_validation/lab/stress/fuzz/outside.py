@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from fourbar.effects import Gravity, Point, Spring, Springs, Viscous
+from fourbar.effects import Gravity, Spring, SpringEnd, Springs, Viscous
 from fourbar.errors import InputError, LimitError
 from fourbar.formulas.mobility import change_points
 from fourbar.linkage import MOVING_BARS, Bar, FourBar
@@ -31,7 +31,7 @@ WITHIN = 1.0 - 1e-12
 
 
 def scene_of(seed: int, index: int) -> Scene:
-    """A scene of any lengths or near the limit of assembly, with up to two tolerances; many springs nearly meet."""
+    """Draw lengths, some near the limit of assembly, up to two tolerances, and springs whose ends nearly meet."""
     rng = np.random.default_rng([seed, index])
     while True:
         d, a, b, c = rng.uniform(0.1, 1.0, 4)
@@ -70,7 +70,7 @@ def _own(rng: np.random.Generator, length: float) -> tuple[Any, ...]:
 
 
 def _nearly_meeting(rng: np.random.Generator, scene: Scene, at: Solution) -> Spring:
-    """A spring whose ends are a millionth to a tenth of the linkage apart where the motion begins."""
+    """Draw a spring whose ends are a millionth to a tenth of the linkage apart where the motion begins."""
     assert at.theta_3 is not None and at.theta_4 is not None
     link, bars = scene.linkage, rng.choice(4, 2, replace=False) + 1
     angles = np.array([link.ground_angle, scene.motion.theta_2, at.theta_3[0], at.theta_4[0]])
@@ -78,7 +78,7 @@ def _nearly_meeting(rng: np.random.Generator, scene: Scene, at: Solution) -> Spr
     meet = feet[bars[0] - 1] + rng.uniform(0.05, 0.3) * np.exp(1j * rng.uniform(-3.0, 3.0))
     apart = np.array([0.0, 10.0 ** rng.uniform(-6, -1) * np.exp(1j * rng.uniform(-3.0, 3.0))])
     in_bars = (meet + apart - feet[bars - 1]) * np.exp(-1j * angles[bars - 1])
-    start, end = (Point(int(bar), float(abs(z)), float(np.angle(z))) for bar, z in zip(bars, in_bars, strict=True))
+    start, end = (SpringEnd(int(bar), float(abs(z)), float(np.angle(z))) for bar, z in zip(bars, in_bars, strict=True))
     return Spring(start, end, 10.0 ** rng.uniform(0, 4), rng.uniform(0.0, 0.5), rng.uniform(-5.0, 5.0))
 
 
@@ -94,7 +94,7 @@ def findings(scene: Scene) -> list[str]:
 
 
 def _outside(scene: Scene, proven: Extremes, name: str, sign: int) -> list[str]:
-    """What the point that is reached by climbing is beyond the bound, and what the place stated does not reach."""
+    """List what lies beyond the bound at the point reached by climbing, and what the stated place does not reach."""
     extreme = (proven.greatest if sign > 0 else proven.least)[name]
     outer, inner = (extreme.high, extreme.low) if sign > 0 else (extreme.low, extreme.high)
     parts, theta_2 = _climbed(scene, proven.parts, name, sign)
@@ -109,7 +109,7 @@ def _outside(scene: Scene, proven: Extremes, name: str, sign: int) -> list[str]:
 
 
 def _numbers(scene: Scene, parts: Array) -> dict[str, Any]:
-    """The toleranced numbers, moved by parts of their tolerances, (k,) or (k, n)."""
+    """Move the toleranced numbers by parts of their tolerances, (k,) or (k, n)."""
     known = entries(scene)
     return {
         tolerance.key: at_place(scene, known[tolerance.key].place) + WITHIN * tolerance.reach * part
@@ -140,7 +140,7 @@ def _climbed(scene: Scene, intervals: tuple[tuple[float, float], ...], name: str
 
 
 def _sampled(scene: Scene, name: str, sign: int, parts: Array, theta_2: Array) -> Array:
-    """The values in doubles, times the sign, (n,); -inf where there is none."""
+    """Evaluate in doubles, times the sign, (n,); -inf where there is no value."""
     members = vary(replace(scene, tolerances=()), _numbers(scene, parts) | {"motion.theta_2": theta_2[:, None]})
     solution = solve(members, "force")
     if name == "transmission":
@@ -152,7 +152,7 @@ def _sampled(scene: Scene, name: str, sign: int, parts: Array, theta_2: Array) -
 
 
 def _value(scene: Scene, name: str, parts: Array, theta_2: float) -> Any:
-    """The value as a ball, by thirteen equations of the free bodies; NaN where it is not known."""
+    """Evaluate a ball by the thirteen equations of the free bodies; NaN where there is no value."""
     from flint import acb, arb
 
     from fourbar_validation.engines.balls import closure, outputs, stored, wedge

@@ -40,7 +40,7 @@ RANGES = {
 
 
 def scene_of(seed: int, index: int) -> Scene:
-    """The scene of that number; redrawn until its lengths can close at all."""
+    """Draw a scene, anew until its lengths can close at all."""
     rng = np.random.default_rng([seed, index])
     while True:
         try:

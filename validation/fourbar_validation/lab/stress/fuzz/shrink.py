@@ -20,7 +20,7 @@ NEEDED = ("[motion]", "theta_2", "omega_2")
 
 
 def shrunk(scene: Scene, fails: Callable[[Scene], bool]) -> Scene:
-    """The simplest scene found by one change of its file at a time that still fails."""
+    """Simplify a scene by one change of its file at a time while it fails."""
     lines = dump(scene).splitlines()
     for _ in range(ROUNDS):
         before = lines
@@ -39,7 +39,7 @@ def shrunk(scene: Scene, fails: Callable[[Scene], bool]) -> Scene:
 
 
 def _simpler(lines: list[str], number: int) -> Iterator[list[str]]:
-    """The file with one line less, or one table where the line begins it, or with a simpler entry in the line."""
+    """Leave out one line, or the table that it begins, or put a simpler entry in the line."""
     line, until = lines[number], number + 1
     if line.startswith("["):
         until = next((i for i in range(until, len(lines)) if lines[i].startswith("[")), len(lines))

@@ -1,4 +1,4 @@
-"""Every planted fault against the harness, each in a process of its own; none may survive without a reason."""
+"""Injected faults against the harness, each in a process of its own; none may survive without a reason."""
 
 import json
 import os
@@ -6,6 +6,9 @@ import sys
 from collections.abc import Iterator, Sequence
 from typing import Any
 
+import click
+
+from fourbar.errors import FAILED, HOLDS
 from fourbar_validation.engines.workers import each
 from fourbar_validation.lab.stress.mutation import planting
 from fourbar_validation.lab.stress.mutation.planting import ROOT, faults
@@ -16,11 +19,11 @@ SECONDS = 300
 
 
 Failing = dict[str, list[str]]
-"""By specimen: the rows that fail."""
+"""By test scene: the rows that fail."""
 
 
 def outcomes(numbers: Sequence[int]) -> list[Failing] | str:
-    """What fails with the fault of each number, one after another, or why nothing was found; once without any fault."""
+    """Try the fault of each number in turn, or none: the rows that fail, or why there is no result."""
     line = [sys.executable, "-P", planting.__file__, *numbers]
     done = ended(
         line,
@@ -32,7 +35,7 @@ def outcomes(numbers: Sequence[int]) -> list[Failing] | str:
 
 
 def survives(entry: dict[str, Any], found: Failing | str) -> str | None:
-    """Why an entry does not count as caught on each of its specimens, or None."""
+    """Say why an entry does not count as caught on each of its test scenes; None where it does."""
     if isinstance(found, str):
         return f"it raises, which is no physical fault: {found}"
     for specimen, rows in found.items():
@@ -45,7 +48,7 @@ def survives(entry: dict[str, Any], found: Failing | str) -> str | None:
 
 
 def planted(workers: int) -> Iterator[tuple[str, str | None]]:
-    """Every fault with the reason why it survives, or None; first the tree without a fault."""
+    """Try every fault: the reason why it survives, or None; first the tree without a fault."""
     entries = faults()
     tried = each(outcomes, [(), *((n,) for n in range(len(entries)))], workers, seconds=None)
     rows = next(tried)
@@ -54,3 +57,18 @@ def planted(workers: int) -> Iterator[tuple[str, str | None]]:
     for entry, rows in zip(entries, tried, strict=True):
         why = survives(entry, rows if isinstance(rows, str) else rows[0])
         yield entry["fault"], None if why and "harmless" in entry else why
+
+
+@click.command()
+@click.option("--workers", default=2, show_default=True, type=click.IntRange(1))
+def command(workers: int) -> int:
+    """Make each fault of planted.toml in formulas, effects, MJCF and engines, one at a time; each must be caught."""
+    from rich.console import Console
+    from rich.progress import track
+
+    results = list(track(planted(workers), "planting", total=len(faults()) + 1, console=Console(stderr=True)))
+    survivors = [(fault, why) for fault, why in results if why is not None]
+    for fault, why in survivors:
+        click.echo(f"{fault}: {why}")
+    click.echo(f"{len(results) - 1} faults, {len(survivors)} of them survive without a reason on record")
+    return FAILED if survivors else HOLDS

@@ -1,7 +1,7 @@
-"""Planted faults, one after another: a module is loaded with another text, then the harness judges the specimens.
+"""Inject faults, one after another: a module is loaded with another text, then the harness checks the test scenes.
 
 Run by its path, with the packages on PYTHONPATH: `python -P planting.py NUMBER...` prints what failed as JSON, a line
-for each fault; without a number nothing is planted and every specimen must hold. As a module it would import the
+for each fault; without a number nothing is injected and every test scene must hold. As a module it would import the
 project before the fault stands.
 """
 
@@ -20,13 +20,13 @@ ROOT = Path(__file__).parents[5]
 
 
 def faults() -> list[dict[str, Any]]:
-    """Every entry of the list, with the keys fault, file, old, new, specimens, caught_by and perhaps harmless."""
+    """Read the list: the keys of an entry are fault, file, old, new, specimens, caught_by and perhaps harmless."""
     entries: list[dict[str, Any]] = tomllib.loads(FAULTS.read_text(encoding="utf-8"))["planted"]
     return entries
 
 
 def planted(entry: dict[str, Any]) -> dict[str, str]:
-    """By the module's name: its text with the fault; ValueError where the entry no longer fits it."""
+    """Change the text of modules, by their names; ValueError where the entry no longer fits one."""
     texts = {}
     for change in (entry, *([entry["also"]] if "also" in entry else [])):
         text = (ROOT / change["file"]).read_text(encoding="utf-8")
@@ -40,8 +40,8 @@ def planted(entry: dict[str, Any]) -> dict[str, str]:
     return texts
 
 
-class Planter(importlib.abc.MetaPathFinder):
-    """Finds a module that has a fault; all others are found as ever."""
+class FaultFinder(importlib.abc.MetaPathFinder):
+    """Finds a module that has a fault, and no other."""
 
     def __init__(self, entry: dict[str, Any]) -> None:
         self.texts = planted(entry)
@@ -49,7 +49,7 @@ class Planter(importlib.abc.MetaPathFinder):
         """Modules that are not loaded yet."""
 
     def find_spec(self, fullname: str, path: Any, target: Any = None) -> importlib.machinery.ModuleSpec | None:
-        """The module with the fault, or None."""
+        """Find a module with the fault, or None."""
         if fullname not in self.texts:
             return None
         spec = importlib.machinery.PathFinder.find_spec(fullname, path)
@@ -67,13 +67,14 @@ class _Text(importlib.machinery.SourceFileLoader):
         self.text = text
 
     def get_code(self, fullname: str) -> CodeType:
-        """Compiled anew: the cache is of the file."""
+        """Compile the text: the cache is of the file."""
         code: CodeType = self.source_to_code(self.text.encode(), self.path)
         return code
 
 
 def failing(names: list[str]) -> dict[str, list[str]]:
-    """By specimen: the rows that fail, as "engine quantity: reason"."""
+    """Check test scenes: by their names the rows that fail, as "engine quantity: reason"."""
+    from fourbar_validation.engines.hard_suite import HARD_WITNESSES
     from fourbar_validation.engines.witnesses import WITNESSES
     from fourbar_validation.lab.stress.mutation.specimens import SPECIMENS
     from fourbar_validation.run.judge import judge
@@ -81,26 +82,27 @@ def failing(names: list[str]) -> dict[str, list[str]]:
     found = {}
     for name in names or SPECIMENS:
         simulated = name.startswith("simulated")
-        witnesses = [w for w in WITNESSES if simulated or not w.through_time]
+        own = HARD_WITNESSES if name.startswith("to full accuracy") else WITNESSES
+        witnesses = [witness for witness in own if simulated or not witness.through_time]
         rows = judge(name, SPECIMENS[name], witnesses, shipped=name.startswith("shipped")).rows
         found[name] = [f"{row.engine} {row.quantity}: {row.reason}" for row in rows if row.failed]
     return found
 
 
 def main() -> None:
-    """Plant the fault of each number, judge its specimens, print what fails."""
+    """Inject the fault of each number, check its test scenes, print what fails."""
     if len(sys.argv) == 1:
         print(json.dumps(failing([])))
     for number in map(int, sys.argv[1:]):
         for name in [name for name in sys.modules if name.partition(".")[0] in ("fourbar", "fourbar_validation")]:
             del sys.modules[name]  # of the fault before; the engines' libraries stay
         entry = faults()[number]
-        planter = Planter(entry)
-        sys.meta_path.insert(0, planter)
+        finder = FaultFinder(entry)
+        sys.meta_path.insert(0, finder)
         found = failing(entry["specimens"])
-        sys.meta_path.remove(planter)
-        if planter.left:
-            raise RuntimeError(f"the specimens use no {', '.join(planter.left)}")
+        sys.meta_path.remove(finder)
+        if finder.left:
+            raise RuntimeError(f"the specimens use no {', '.join(finder.left)}")
         print(json.dumps(found))
 
 

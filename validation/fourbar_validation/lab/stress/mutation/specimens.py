@@ -11,8 +11,8 @@ from fourbar.effects import (
     Gravity,
     Load,
     PinFriction,
-    Point,
     Spring,
+    SpringEnd,
     Springs,
     Table,
     Torsion,
@@ -23,7 +23,7 @@ from fourbar.linkage import Bar, FourBar, uniform
 from fourbar.scene import Scene
 from fourbar.scene.motion import CROSSED, Free, FromLimit, Motion, Sweep
 from fourbar.scene.motion_law import Law
-from fourbar.scene.point import Point as OwnPoint
+from fourbar.scene.point import Point
 
 CRANK = FourBar(
     0.3,
@@ -41,7 +41,7 @@ LOADS = (
     Load(2, (1.0, 0.3), (0.02, -0.7)),
 )
 WEIGHT = Gravity(9.81, -1.3)
-POINTS = (OwnPoint("P", 3, (0.1, 0.7)), OwnPoint("Q", 4, (0.05, -0.3)), OwnPoint("R", 2, (0.03, 0.2)))
+POINTS = (Point("P", 3, (0.1, 0.7)), Point("Q", 4, (0.05, -0.3)), Point("R", 2, (0.03, 0.2)))
 CRANK_ROCKER = Scene(CRANK, TURN, 2, LOADS, (WEIGHT,), points=POINTS)
 SPECIMENS: dict[str, Scene] = {
     "crank-rocker": CRANK_ROCKER,
@@ -72,8 +72,8 @@ SPECIMENS: dict[str, Scene] = {
         effects=(
             Springs(
                 (
-                    Spring(Point(1, 0.2, 0.6), Point(3, 0.15, -0.4), 80.0, 0.1, 2.0),
-                    Spring(Point(2, 0.05, 0.3), Point(4, 0.1, 0.5), 50.0, 0.12),
+                    Spring(SpringEnd(1, 0.2, 0.6), SpringEnd(3, 0.15, -0.4), 80.0, 0.1, 2.0),
+                    Spring(SpringEnd(2, 0.05, 0.3), SpringEnd(4, 0.1, 0.5), 50.0, 0.12),
                 )
             ),
             Torsion.at(B=(0.5, 0.7, 0.1), O4=(0.3, 1.2, -0.05)),
@@ -135,11 +135,28 @@ SPECIMENS: dict[str, Scene] = {
     "many turns away": Scene(CRANK, Motion(Sweep(20.0, 22.0, 10), 5.0), effects=(Torsion.at(O2=(0.5, 1.0, 0.1)),)),
     "ends of a spring nearly meet": Scene(
         CRANK,
-        Motion(1.0 + np.array([3e-3, 0.1, 1.0]), 10.0),
-        effects=(Springs((Spring(Point(1, 0.1, 0.8), Point(2, 0.1, 0.0), 80.0, 0.05),)),),
+        Motion(1.0 + np.array([1e-5, 0.1, 1.0]), 10.0),
+        effects=(Springs((Spring(SpringEnd(1, 0.1, 0.8), SpringEnd(2, 0.1, 0.0), 80.0, 0.05),)),),
+    ),
+    "held by friction": Scene(CRANK, Motion(1.0, 0.0, free=Free(0.5, 5)), effects=(WEIGHT, Friction.at(B=0.3, O2=2.0))),
+    "held in the end": Scene(CRANK, Motion(1.0, 3.0, free=Free(1.0, 20)), effects=(WEIGHT, Friction.at(A=0.3, O4=1.0))),
+    "from rest against friction": Scene(
+        CRANK, Motion(1.0, 0.0, free=Free(0.5, 20)), effects=(WEIGHT, Friction.at(A=0.01, O4=0.02))
     ),
     "released to a limit": Scene(ROCKER, Motion(math.radians(50.0), 3.0, free=Free(1.0, 100)), effects=(Gravity(),)),
+    "turning over change points": Scene(
+        FourBar(0.3, Bar(0.1, 0.2), Bar(0.3, 0.5), Bar(0.1, 0.4)),
+        Motion(0.5, 25.0, through="follow", free=Free(0.4, 400)),
+        effects=(Gravity(),),
+    ),
+    "to full accuracy: short diagonal": Scene(
+        uniform(0.859375, 0.853515625, 0.58984375, 0.583984375),
+        Motion(np.array([0.0018, 0.01]), 10.0),
+        effects=(WEIGHT,),
+    ),
+    "no torque": Scene(uniform(0.3, 0.1, 0.3, 0.1), Motion(np.array([0.5, 1.0]), 10.0), 3, effects=(WEIGHT,)),
     "shipped": Scene(SLENDER, TURN, effects=(WEIGHT,), points=POINTS),
+    "shipped, limited": Scene(ROCKER, Motion(Sweep(0.3, 1.4, 22), 3.0), effects=(WEIGHT,)),
     "simulated": Scene(
         CRANK,
         Motion(Sweep(0.1, 6.0, 12), 10.0),
@@ -148,7 +165,7 @@ SPECIMENS: dict[str, Scene] = {
         (
             WEIGHT,
             Viscous.at(A=0.002, B=0.003),
-            Springs((Spring(Point(1, 0.2, 0.6), Point(3, 0.15, -0.4), 80.0, 0.1, 2.0),)),
+            Springs((Spring(SpringEnd(1, 0.2, 0.6), SpringEnd(3, 0.15, -0.4), 80.0, 0.1, 2.0),)),
         ),
     ),
     "simulated, dry": Scene(

@@ -1,4 +1,4 @@
-"""What a check of something shipped is given, at which positions, and the rows that it answers."""
+"""What the checks of something shipped share: scenes with other numbers, and the rows of a comparison."""
 
 import json
 import tomllib
@@ -8,10 +8,11 @@ from dataclasses import fields, replace
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fourbar.files import dump, loads
 from fourbar.quantities import OK, UNKNOWNS, is_scalar
-from fourbar.scene import Command, Scene, command
+from fourbar.scene import Scene, command
 from fourbar.scene.motion import Motion
 from fourbar.solution import Solution
 from fourbar_validation.compare.answer import Answer, Array
@@ -22,8 +23,9 @@ from fourbar_validation.compare.reversals import reversing
 from fourbar_validation.compare.rows import AGREES, FAILS, VERDICTS, Row
 from fourbar_validation.compare.tolerance import EQUIVALENCE, WELL_CONDITIONED, Tolerance
 from fourbar_validation.engines.free_body import FreeBody
-from fourbar_validation.engines.witnesses import WITNESSES, predicting_from
+from fourbar_validation.engines.witnesses import predicting_from
 from fourbar_validation.run.printed import points
+from fourbar_validation.run.question import FREE_BODY, NotAskedError, Question
 
 SAMPLE = 5
 """Positions at which whatever takes more than one call is judged."""
@@ -32,32 +34,17 @@ FROM_A_CORNER = 0.02
 NOT_AT_REST = 1e-3
 """Of the speeds over sin^2 mu; where a dry pin slips less, small changes of a number may reverse it."""
 GOLDEN = 0.5 * (5.0**0.5 - 1.0)
-FREE_BODY = next(witness for witness in WITNESSES if witness.name == FreeBody.name)
-
-
-class Question(NamedTuple):
-    """A scene with a prescribed motion, and what the free bodies and the formulas say of it."""
-
-    name: str
-    scene: Scene
-    at: Command
-    solution: Solution
-    free_body: Answer
-
-
-class NotAskedError(Exception):
-    """A scene has nothing that a check could judge; the message says why."""
 
 
 def sampled(question: Question) -> Scene:
-    """The scene at a few of its positions, such that small changes of its numbers change its quantities little.
+    """Take the scene at a few of its positions, such that small changes of its numbers change its quantities little.
 
     Raises NotAskedError where there are none.
     """
     scene, at, solution = question.scene, question.at, question.solution
     if scene.motion.law is not None:
         raise NotAskedError("a motion law has no positions of its own choice")
-    basis = basis_of(scene, question.free_body)
+    basis = question.reference
     assert basis is not None and basis.drive_condition is not None and basis.torque is not None
     fit = (solution.status_code == OK) & (basis.condition >= WELL_CONDITIONED) & np.isfinite(basis.torque)
     fit &= (basis.drive_condition >= WELL_CONDITIONED) & (at.branch == scene.motion.branch)
@@ -69,19 +56,20 @@ def sampled(question: Question) -> Scene:
     if not len(where):
         raise NotAskedError("no position that is well-conditioned and moves")
     few = where[np.unique(np.linspace(0, len(where) - 1, SAMPLE + 2).astype(int)[1:-1])]
-    motion = Motion(at.theta_2[few], scene.motion.omega_2, scene.motion.alpha_2, scene.motion.branch)
+    own = scene.motion
+    motion = Motion(at.theta_2[few], own.omega_2, own.alpha_2, own.branch, own.through)
     return replace(scene, motion=motion, title="", source="", pictures=())
 
 
-class Stated(NamedTuple):
+class FileNumber(NamedTuple):
     """A number that a scene's file states, and what it may be moved by: most of itself, of an angle most of 1 rad."""
 
     number: float
     step: float
 
 
-def stated(scene: Scene, keys: Iterable[str]) -> dict[str, Stated]:
-    """Those of the keys whose numbers the scene's file states; of motion.theta_2 the first.
+def stated(scene: Scene, keys: Iterable[str]) -> dict[str, FileNumber]:
+    """Find those of the keys whose numbers the scene's file states; of motion.theta_2 the first.
 
     What it leaves out (the inertia of a uniform bar, its centre) follows the lengths.
     """
@@ -92,12 +80,12 @@ def stated(scene: Scene, keys: Iterable[str]) -> dict[str, Stated]:
             number, _, unit = str(table[last][0] if isinstance(table[last], list) else table[last]).partition(" ")
             # no two alike, between 1/2 and 1
             part = 0.5 + 0.5 * ((index + 1) * GOLDEN % 1.0)
-            found[key] = Stated(float(number), part * (1.0 if unit == "rad" else float(number)))
+            found[key] = FileNumber(float(number), part * (1.0 if unit == "rad" else float(number)))
     return found
 
 
 def moved(scene: Scene, changes: Mapping[str, float]) -> Scene:
-    """The scene with some of its numbers changed by so much, through the text of its file: keys as there.
+    """Change some numbers of a scene by so much, through the text of its file: keys as there.
 
     motion.theta_2 moves every position.
     """
@@ -110,7 +98,7 @@ def moved(scene: Scene, changes: Mapping[str, float]) -> Scene:
 
 
 def _place(document: Any, key: str) -> tuple[Any, Any]:
-    """The table that holds a number, and its name or index there; KeyError where the file leaves it out."""
+    """Find the table that holds a number, and its name or index there; KeyError where the file leaves it out."""
     *path, last = [int(part) if part.isdecimal() else part for part in key.split(".")]
     for part in path:
         document = document[part]
@@ -131,13 +119,13 @@ def _toml(value: Any) -> str:
 
 
 def at_free_bodies(scene: Scene) -> Answer:
-    """What the free bodies answer at the scene's own positions."""
+    """Ask the free bodies at the scene's own positions."""
     with np.errstate(all="ignore"):
         return FreeBody().answer(scene, command(scene))
 
 
 def held_to(question: Question, engine: str, scene: Scene, solution: Solution, answer: Answer) -> list[Row]:
-    """The rows of a solution that a public call gave for a scene, against the answer of the free bodies."""
+    """Compare a solution that a public call gave for a scene with the answer of the free bodies."""
     answer = replace(answer, engine=engine)
     assert answer.at is not None
     predicted = predicting_from(FREE_BODY, scene, answer.at, answer)
@@ -149,7 +137,7 @@ def held_to(question: Question, engine: str, scene: Scene, solution: Solution, a
 
 
 def worst_rows(rows: Iterable[Row]) -> list[Row]:
-    """Of several rows of a quantity the worst."""
+    """Keep the worst of several rows of a quantity."""
     found: dict[tuple[str, str], Row] = {}
 
     def badness(row: Row) -> tuple[int, float]:
@@ -165,15 +153,15 @@ def worst_rows(rows: Iterable[Row]) -> list[Row]:
 def row_of(
     question: Question, engine: str, quantity: str, error: Array, tolerance: Tolerance, theta_2: Array, reason: str
 ) -> Row:
-    """The row of a quantity whose errors at some positions are held to one tolerance."""
+    """Make the row of a quantity whose errors at some positions are held to one tolerance."""
     index = int(np.argmax(used(error, tolerance.factor)))
     verdict = AGREES if used(error[index], tolerance.factor) <= 1.0 else FAILS
     numbers = float(error[index]), tolerance.factor, verdict, f"{tolerance.name}: {reason}", float(theta_2[index]), 1.0
     return Row(question.name, engine, "exact", quantity, *numbers)
 
 
-def member(study: Solution, index: int) -> Solution:
-    """One linkage of a solved study."""
+def member(study: Solution, index: int | NDArray[np.intp]) -> Solution:
+    """Take one linkage of a solved study, or some positions of one linkage."""
 
     def own(value: Any) -> Any:
         if isinstance(value, dict):
@@ -186,7 +174,7 @@ def member(study: Solution, index: int) -> Solution:
 
 
 def parts(answer: Answer) -> dict[str, Array]:
-    """The unknowns of a position, vectors as components, pin forces also as their magnitudes."""
+    """Split the unknowns of a position: vectors as components, pin forces also as their magnitudes."""
     found = {}
     for name in UNKNOWNS:
         values = answer.quantities[name]

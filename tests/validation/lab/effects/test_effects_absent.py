@@ -1,28 +1,110 @@
 """What a scene does not name does not exist: nothing of it in the formulas, in the MJCF or in the compiled model."""
 
-import math
-import os
+import ast
+import json
+import re
+import shutil
 import subprocess
 import sys
 from pathlib import Path
 from typing import Any
 
 import mujoco
+import numpy as np
 import pytest
 
 import fourbar
+from fourbar import effects
 from fourbar.effects import FILE_OF, Friction, Viscous
-from fourbar.errors import BROKEN, FAILED
 from fourbar.mjcf import mjcf
-from fourbar_validation.cli import status
-from fourbar_validation.lab.effects import absent, cost
-from fourbar_validation.lab.effects.absent import ABSENT, TABLES, build, differences, made
+from fourbar_validation.engines.mujoco.stepping import opened
 from fourbar_validation.report.record import Record
 from fourbar_validation.run.judge import judge
 from tests.support.scenes import crank_rocker
 from tests.validation.engines.test_effects import ACTING
 
 ROOT = Path(fourbar.__file__).parent.parent
+KINDS = {getattr(effects, name).key: getattr(effects, name) for name in (*FILE_OF, "Load")}
+"""Everything that can act, by key."""
+TABLES = ("files/effects.py", "mjcf/effects.py")
+"""Of the package, where an effect has a row."""
+PROBE = """
+import hashlib, json, sys
+sys.path.insert(0, sys.argv[1])
+import fourbar
+from fourbar.mjcf import mjcf
+link = fourbar.FourBar(0.3, fourbar.Bar(0.1, 0.2), fourbar.Bar(0.25, 0.5, 0.004, (0.13, 0.3)), fourbar.Bar(0.22, 0.4))
+scene = fourbar.Scene(link, fourbar.Motion(fourbar.Sweep(0.1, 6.3, 60), 10.0, 5.0))
+fourbar.solve(scene)
+calls = []
+def note(frame, event, argument):
+    if event == "call" and "fourbar" in frame.f_code.co_filename:
+        calls.append(frame.f_code.co_qualname)
+sys.setprofile(note)
+solution = fourbar.solve(scene)
+sys.setprofile(None)
+numbers = {name: hashlib.sha256(getattr(solution, name).tobytes()).hexdigest() for name in solution.evaluated()}
+print(json.dumps({"file": fourbar.__file__, "numbers": numbers, "calls": calls, "mjcf": mjcf(scene)}))
+"""
+"""What a checkout makes of a scene without effects: digests of every array, the calls made, the MJCF."""
+
+
+def build(folder: Path, without: str | None = None) -> Path:
+    """Copy the package; without the file, the registration, the rows and the names of an effect where one is named."""
+    copy = folder / "fourbar"
+    shutil.copytree(ROOT / "fourbar", copy, ignore=shutil.ignore_patterns("__pycache__", "page", "plot"))
+    if without is None:
+        return folder
+    effect = KINDS[without]
+    name, module = effect.__name__, effect.__module__.rpartition(".")[2]
+    (copy / "effects" / f"{module}.py").unlink()
+    gone = (f"import {name} as {name}", f'"{name}": "{module}",', f'), "{module}"),')
+    for path in (copy / "__init__.py", copy / "effects" / "__init__.py"):
+        lines = [line for line in path.read_text().splitlines() if f".{module} import" not in line]
+        lines = [line for line in lines if not line.endswith(gone)]
+        path.write_text(re.sub(rf'"{name}", |\b{name}, |, {name}(?=\))', "", "\n".join(lines)) + "\n")
+    for table in TABLES:
+        path = copy / table
+        path.write_text(without_row(path.read_text(), without))
+    return folder
+
+
+def without_row(text: str, key: str) -> str:
+    """A module without the rows that its tables have under a key."""
+    lines = text.splitlines(keepends=True)
+    for table in ast.walk(ast.parse(text)):
+        if isinstance(table, ast.Dict):
+            for name, row in zip(table.keys, table.values, strict=True):
+                if isinstance(name, ast.Constant) and name.value == key:
+                    lines[name.lineno - 1 : row.end_lineno] = [""] * (row.end_lineno - name.lineno + 1)  # type: ignore[operator]
+    return "".join(lines)
+
+
+def made(root: Path) -> dict[str, object]:
+    """What a checkout makes of the bare scene: bits, calls, MJCF."""
+    line = [sys.executable, "-c", PROBE, str(root)]
+    done = subprocess.run(line, cwd=root, check=True, capture_output=True, text=True)
+    answer: dict[str, object] = json.loads(done.stdout)
+    assert Path(str(answer.pop("file"))).is_relative_to(root)
+    return answer
+
+
+def differences(whole: dict[str, object], other: dict[str, object]) -> list[str]:
+    """What a build makes otherwise than the whole one, in words."""
+    texts = {"numbers": "bits of the results", "mjcf": "bytes of the MJCF", "calls": "list of the terms that run"}
+    found = [text for key, text in texts.items() if whole[key] != other[key]]
+    one, two = (contents(str(answer["mjcf"])) for answer in (whole, other))
+    return found + [f"{key} of the compiled model" for key in one if one[key] != two[key]]
+
+
+def contents(text: str) -> dict[str, object]:
+    """The compiled model: sizes, rows of its constraints at the keyframe, flags, and the whole of it as bytes."""
+    model, data = opened(text)
+    whole = np.zeros(mujoco.mj_sizeModel(model), dtype=np.uint8)
+    mujoco.mj_saveModel(model, None, whole)
+    sizes = {name: int(getattr(model, name)) for name in ("nv", "neq", "nu", "ntendon", "nsensor", "njnt")}
+    flags = {"disabled": int(model.opt.disableflags), "enabled": int(model.opt.enableflags)}
+    return {**sizes, "nefc": int(data.nefc), **flags, "bytes": whole.tobytes()}
 
 
 @pytest.fixture(scope="module")
@@ -30,7 +112,7 @@ def whole() -> dict[str, object]:
     return made(ROOT)
 
 
-@pytest.mark.parametrize("key", ABSENT)
+@pytest.mark.parametrize("key", KINDS)
 def test_a_build_that_never_heard_of_an_effect_gives_the_same_bits(
     key: str, whole: dict[str, object], tmp_path: Path
 ) -> None:
@@ -53,36 +135,12 @@ def test_a_build_that_pays_for_an_absent_effect_is_noticed(whole: dict[str, obje
     found = differences(whole, made(other))
     assert "list of the terms that run" in found and "bytes of the MJCF" in found
     assert "disabled of the compiled model" in found
-    line = [sys.executable, "-m", "fourbar_validation.lab.effects.work", "formulas", "1", "2", "none"]
-    subprocess.run(line, env={**os.environ, "PYTHONPATH": str(other)}, cwd=tmp_path, check=True)  # its work is counted
-
-
-def test_instructions_are_judged_by_the_noise_of_the_whole_build(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    counted = iter([100.0, 100.1, 99.9, 100.12, 100.0, 100.35, 100.37])
-    same = {"numbers": {}, "calls": [], "mjcf": ""}
-    monkeypatch.setattr(absent, "build", lambda root, _: (root / "fourbar" / "effects").mkdir(parents=True))
-    monkeypatch.setattr(absent, "made", lambda _: same)
-    monkeypatch.setattr(absent, "counts", lambda *_: {"none": next(counted)})
-    for module in (absent, cost):
-        monkeypatch.setattr(module, "available", lambda: True)
-        monkeypatch.setattr(module, "not_installed", lambda _: "mujoco is not installed")
-    monkeypatch.setattr(absent, "ABSENT", ("gravity", "viscous"))
-    assert status(["effects-cost", "--absent"]) == FAILED
-    first, gravity, viscous, last = capsys.readouterr().out.splitlines()
-    assert first == "compiled models are not compared: mujoco is not installed"
-    assert gravity.endswith("bits, MJCF and terms are equal; instructions +0.350 %") and "+0.370 %" in viscous
-    assert last == "FAILS: at most 0.36 %, by the noise of the whole build, and no difference are required"
-    assert [absent.Trace("", [], more, 0.0036).holds for more in (0.0035, -0.0037, math.nan)] == [True, False, False]
-    assert status(["effects-cost", "--engines", "formulas,mujoco-inverse"]) == BROKEN
-    assert capsys.readouterr().err == "error: mujoco-inverse: mujoco is not installed\n"
 
 
 def test_no_term_of_an_effect_runs_in_a_scene_without_effects(whole: dict[str, object]) -> None:
     calls = whole["calls"]
     assert isinstance(calls, list) and "inertia_wrenches" in calls
-    names = {*FILE_OF, "Load", "torque_interval", "settle"}
+    names = {*FILE_OF, "Load", "torque_interval", "solve_sliding"}
     assert not [call for call in calls if names & set(call.split("."))]
 
 

@@ -25,7 +25,7 @@ from fourbar_validation.engines.tree import multipliers
 
 
 @dataclass(frozen=True, slots=True)
-class Limit:
+class ResidualLimit:
     """What a residual may be, and why."""
 
     value: float
@@ -33,26 +33,30 @@ class Limit:
 
 
 LIMITS = {
-    "acceleration_gap": Limit(
+    "acceleration_gap": ResidualLimit(
         1e-3, "of the greatest a_B: healthy runs have 1e-7..1e-4, a step that errs by 98 % has 4"
     ),
-    "power_gap": Limit(1e-4, "of the greatest power: healthy runs have 1e-8..1e-5, that step 4e-2, a stopped solver 1"),
-    "force_gap": Limit(1e-3, "of the greatest joint torque: the solver did not converge; healthy runs have 1e-8..1e-4"),
+    "power_gap": ResidualLimit(
+        1e-4, "of the greatest power: healthy runs have 1e-8..1e-5, that step 4e-2, a stopped solver 1"
+    ),
+    "force_gap": ResidualLimit(
+        1e-3, "of the greatest joint torque: the solver did not converge; healthy runs have 1e-8..1e-4"
+    ),
 }
-"""Residuals of motion and forces that `Watch` measures."""
+"""Residuals of motion and forces that `ResidualMonitor` measures."""
 EXCUSED = 1e-3
 """A solver's residual excuses an error of this part of a force, not more."""
 OF_THE_DATA = {
-    "bad_states": Limit(0.0, "MuJoCo warned of a bad position, velocity or acceleration, and reset its data"),
-    "time_went_back": Limit(0.0, "the time ran backwards: the data were reset"),
-    "closure_gap": Limit(1e-5, "of the sum of the lengths: the loop is open"),
-    "speed_error": Limit(1e-4, "of the greatest speed: the crank does not turn as commanded"),
+    "bad_states": ResidualLimit(0.0, "MuJoCo warned of a bad position, velocity or acceleration, and reset its data"),
+    "time_went_back": ResidualLimit(0.0, "the time ran backwards: the data were reset"),
+    "closure_gap": ResidualLimit(1e-5, "of the sum of the lengths: the loop is open"),
+    "speed_error": ResidualLimit(1e-4, "of the greatest speed: the crank does not turn as commanded"),
 }
 """What the data of the simulation tell without a second look."""
 
 
 def alarms(evidence: dict[str, float], size: float) -> list[str]:
-    """What is wrong with a run, in words.
+    """Say what is wrong with a run.
 
     Parameters
     ----------
@@ -86,7 +90,7 @@ class _Motion:
     """theta, omega, alpha of bars 3 and 4, and what inverse dynamics makes of the motion."""
 
 
-class Watch:
+class ResidualMonitor:
     """Looks at a simulated motion with the bars alone, sample after sample."""
 
     def __init__(self, bars: ClosedLoop, drive_bar: int) -> None:
@@ -131,7 +135,7 @@ class Watch:
         self._most[name] = max(self._most[name], size)
 
     def evidence(self) -> dict[str, float]:
-        """The worst of each residual, by the largest term that it is a residual of."""
+        """Return the worst of each residual, by the largest term that it is a residual of."""
         most = self._most
         return {name: worst / most[name] if most[name] else worst for name, worst in self.worst.items()}
 
@@ -164,7 +168,7 @@ class Watch:
         return {"F14": on["output"] + loop_force, "F32": -(on["coupler"] - loop_force), "F12": on["input"] - loop_force}
 
     def _closed(self, q: Array, v: Array, a: Array, seen: _Motion) -> _Motion:
-        """The same theta_2, omega_2, alpha_2 with the loop closed in position, velocity and acceleration."""
+        """Close the loop at the same theta_2, omega_2, alpha_2 in position, velocity and acceleration."""
         q, v, a = q.copy(), v.copy(), a.copy()
         others = [A, O4]
         q[others] -= np.linalg.solve(self.bars.jacobian()[:, others], seen.gap)

@@ -25,18 +25,18 @@ STRAIGHT = 1e-9
 
 
 def body_named(model: mujoco.MjModel, name: str) -> int | None:
-    """The body of a name, by what it is welded to; None where there is none."""
+    """Find the body of a name, by what it is welded to; None where there is none."""
     number = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, name)
     return int(model.body_weldid[number]) if number >= 0 else None
 
 
 def bodies_of(model: mujoco.MjModel) -> str:
-    """The bodies of a file by name, for a message."""
+    """List the bodies of a file by name, for a message."""
     return ", ".join(model.body(i).name or f"(unnamed {i})" for i in range(1, model.nbody))
 
 
 def stated_body(model: mujoco.MjModel, names: Mapping[str, str], role: str) -> int:
-    """The body of a bar by its stated name, or by the bar's; InputError where there is none."""
+    """Find the body of a bar by its given name, or by the bar's; InputError where there is none."""
     name = names.get(role, role)
     body = body_named(model, name)
     if body is None:
@@ -44,7 +44,7 @@ def stated_body(model: mujoco.MjModel, names: Mapping[str, str], role: str) -> i
     return body
 
 
-class Anatomy:
+class Topology:
     """Bars, pins, hinges and closure of a compiled model; everything is measured in its rest state."""
 
     def __init__(self, model: mujoco.MjModel, names: Mapping[str, str]) -> None:
@@ -63,7 +63,7 @@ class Anatomy:
         for joint in range(model.njnt):
             self._add_hinge(joint)
         if len(self.hinge) != 3:
-            raise InputError("--mjcf", sorted(self.hinge), "must have hinges at three of the pins O2, A, B, O4")
+            raise InputError("MJCF", sorted(self.hinge), "must have hinges at three of the pins O2, A, B, O4")
         (self.cut,) = PINS.keys() - self.hinge.keys()
         self.closure: int | None = None
         self.closed_by = "nothing"
@@ -76,19 +76,19 @@ class Anatomy:
         """Joint speeds from those of (theta_2, theta_3 - theta_2, theta_4), (3, 3)."""
 
     def drives(self) -> list[int]:
-        """The actuators that turn pin O2."""
+        """List the actuators that turn pin O2."""
         model, joint = self.model, self.hinge.get("O2")
         on_joints = np.flatnonzero(model.actuator_trntype == mujoco.mjtTrn.mjTRN_JOINT).tolist()
         return [i for i in on_joints if model.actuator_trnid[i, 0] == joint]
 
     def bar(self, body: int) -> int | None:
-        """The bar that a body belongs to; None where it is no part of the four-bar."""
+        """Find the bar that a body belongs to; None where it is no part of the four-bar."""
         return self.bar_of_root.get(int(self.model.body_weldid[body]))
 
     def _find_plane(self) -> None:
         hinges = self.model.jnt_type == mujoco.mjtJoint.mjJNT_HINGE
         if not hinges.any():
-            raise InputError("--mjcf", None, "must have hinges at three of the pins O2, A, B, O4")
+            raise InputError("MJCF", None, "must have hinges at three of the pins O2, A, B, O4")
         across = int(np.argmax(np.abs(self.data.xaxis[np.argmax(hinges)])))
         self.plane, self.axes = PLANES[across]
         e = np.eye(3)
@@ -101,14 +101,14 @@ class Anatomy:
         kind = mujoco.mjtJoint(model.jnt_type[joint])
         if kind != mujoco.mjtJoint.mjJNT_HINGE or None in bars:
             raise InputError(
-                "--mjcf", name, "every joint must be a hinge of the input, coupler or output; name the bodies by --name"
+                "MJCF", name, "every joint must be a hinge of the input, coupler or output; name the bodies by --name"
             )
         pin = PIN_OF.get(frozenset(bars))  # type: ignore[arg-type]
         if pin is None or pin in self.hinge:
-            raise InputError("--mjcf", name, "joins bars that have no pin in common, or have one already")
+            raise InputError("MJCF", name, "joins bars that have no pin in common, or have one already")
         along = float(self.data.xaxis[joint] @ self.normal)
         if abs(along) < 1.0 - STRAIGHT**2:
-            raise InputError("--mjcf", name, f"the hinge must be normal to the {self.plane} plane")
+            raise InputError("MJCF", name, f"the hinge must be normal to the {self.plane} plane")
         self.hinge[pin], self.sense[pin] = joint, math.copysign(1.0, along)
         for bar in bars:
             assert bar is not None
@@ -122,7 +122,7 @@ class Anatomy:
         return np.asarray(self.data.xpos[body] + self.data.xmat[body].reshape(3, 3) @ local)
 
     def _find_closure(self, names: Mapping[str, str]) -> None:
-        """The equality between the two bars of the cut pin, or two sites that mark it."""
+        """Find the equality between the two bars of the cut pin, or two sites that mark it."""
         model, kinds = self.model, mujoco.mjtEq
         for number in range(model.neq):
             kind = kinds(model.eq_type[number])
@@ -145,7 +145,7 @@ class Anatomy:
             site = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SITE, name)
             if self.cut != "B" or site < 0 or self.bar(model.site_bodyid[site]) != bar:
                 raise InputError(
-                    "--mjcf",
+                    "MJCF",
                     self.cut,
                     "no connect or weld closes the loop at this pin; where something else does, say where pin B is: "
                     "--name B3=SITE on the coupler, --name B4=SITE on the output",
@@ -155,7 +155,7 @@ class Anatomy:
             self.closed_by = "tendon"
 
     def _ends(self, number: int, kind: mujoco.mjtEq) -> list[tuple[int, Array]]:
-        """The body and the world point at either end of an equality."""
+        """Return the body and the world point at either end of an equality."""
         model = self.model
         objects = (int(model.eq_obj1id[number]), int(model.eq_obj2id[number]))
         if model.eq_objtype[number] == mujoco.mjtObj.mjOBJ_SITE:
@@ -166,21 +166,21 @@ class Anatomy:
         return [(body, self._on(body, anchor)) for body, anchor in zip(objects, anchors, strict=True)]
 
     def in_plane(self, vector: Array) -> Array:
-        """The two components in the linkage's plane, (2,)."""
+        """Project on the linkage's plane, (2,)."""
         return np.array(vector)[list(self.axes)]
 
     def world(self, data: mujoco.MjData, bar: int, pin: str) -> Array:
-        """Where a bar has a pin, world axes, (3,)."""
+        """Locate a bar's pin, world axes, (3,)."""
         body = self.root[bar]
         return np.asarray(data.xpos[body] + data.xmat[body].reshape(3, 3) @ self.point[bar, pin])
 
     def line(self, data: mujoco.MjData, bar: int) -> Array:
-        """A bar's line from its first pin to its second, in the plane, (2,), m."""
+        """Return a bar's line from its first pin to its second, in the plane, (2,), m."""
         first, second = (self.world(data, bar, pin) for pin in ENDS[bar])
         return self.in_plane(second - first)
 
     def length(self, bar: int) -> float:
-        """Distance between a bar's pins in the plane, m."""
+        """Measure the distance between a bar's pins in the plane, m."""
         return math.hypot(*self.line(self.data, bar))
 
     @property
@@ -189,16 +189,16 @@ class Anatomy:
         return self._line[1]
 
     def rest_angle(self, pin: str) -> float:
-        """What a hinge is turned by in the rest state: the line of the bar that hangs on it from that of its bearer."""
+        """Measure a hinge in the rest state: from the line of its bearer to that of the bar that hangs on it."""
         child, parent = self.turning(pin)
         return self._line[child] - self._line[parent]
 
     def along_bar(self, bar: int, world: Array) -> tuple[float, float]:
-        """Where a point is from a bar's first pin in the rest state: along its line and to its left, m."""
+        """Locate a point from a bar's first pin in the rest state: along its line and to its left, m."""
         return self.turned_back(bar, world - self.world(self.data, bar, ENDS[bar][0]))
 
     def turned_back(self, bar: int, vector: Array) -> tuple[float, float]:
-        """A vector's components along a bar's line in the rest state and to its left."""
+        """Resolve a vector along a bar's line in the rest state and to its left."""
         x, y = self.in_plane(vector)
         cos, sin = math.cos(self._line[bar]), math.sin(self._line[bar])
         return float(cos * x + sin * y), float(cos * y - sin * x)
@@ -212,7 +212,7 @@ class Anatomy:
         return matrix
 
     def turning(self, pin: str) -> tuple[int, int]:
-        """The bar that hangs on the hinge of a pin, and the bar that bears it."""
+        """Return the bar that hangs on the hinge of a pin, and the bar that bears it."""
         body = self.model.jnt_bodyid[self.hinge[pin]]
         child = self.bar(body)
         assert child is not None

@@ -14,12 +14,12 @@ PARENT = {2: 1, 3: 2, 4: 1}
 """The bar that carries each bar's first pin."""
 
 
-class Standing(NamedTuple):
+class Assembly(NamedTuple):
     """Bodies in the plane."""
 
     turn: dict[int, float]
     """Angle of each bar, 1 to 4, that of the ground 0, rad."""
-    foot: dict[int, complex]
+    first_pin: dict[int, complex]
     """First pin of each bar, m."""
     numbers: tuple[float, ...]
     """theta_2, theta_3, theta_4, and the speeds of joints O2, A, O4."""
@@ -31,8 +31,8 @@ class Standing(NamedTuple):
     """By pin what its joint holds."""
 
 
-def standing(scene: Scene, start: Start | None, form: str, at_pins: Mapping[str, tuple[str, str]]) -> Standing:
-    """The linkage in the state given, or that of `at_start`.
+def assemble(scene: Scene, start: Start | None, form: str, at_pins: Mapping[str, tuple[str, str]]) -> Assembly:
+    """Evaluate the linkage in the state given, or in that of `at_start`.
 
     Parameters
     ----------
@@ -65,4 +65,4 @@ def standing(scene: Scene, start: Start | None, form: str, at_pins: Mapping[str,
     foot = {1: 0j, 2: 0j, 3: cmath.rect(linkage.input.length, theta_2)}
     foot[4] = cmath.rect(linkage.ground, linkage.ground_angle)
     turn, numbers = {1: 0.0, 2: theta_2, 3: theta_3, 4: theta_4}, (theta_2, theta_3, theta_4, *speeds)
-    return Standing(turn, foot, numbers, inertia, gravity, dynamics)
+    return Assembly(turn, foot, numbers, inertia, gravity, dynamics)

@@ -1,0 +1,136 @@
+"""Each engine's answer: over the scene's motion, what it says of the linkage, and the inertial part of its torque."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+from functools import partial
+
+from fourbar.errors import LimitError
+from fourbar.mjcf.settings import LIGHT
+from fourbar.quantities import FORCES
+from fourbar_validation.compare.answer import Answer
+from fourbar_validation.compare.compare import compare
+from fourbar_validation.compare.identities import closure
+from fourbar_validation.compare.rows import FAILS, REFUSES, VERDICTS, Row
+from fourbar_validation.compare.statements.finding import Stated
+from fourbar_validation.compare.statements.statements import statements
+from fourbar_validation.compare.tolerance import EQUIVALENCE
+from fourbar_validation.engines.witnesses import Witness, answering_nearby, predicting_from
+from fourbar_validation.report.record import Timing
+from fourbar_validation.run.question import Question
+
+
+def compare_answers(question: Question) -> Iterator[Row]:
+    """Compare every engine's answer with the formulas."""
+    for witness in question.witnesses:
+        yield from question.attempt(partial(_answer, question, witness), witness.name)
+
+
+def _answer(question: Question, witness: Witness) -> Iterator[Row]:
+    answer = question.answer(witness)
+    seconds = question.answered[witness.name][1]
+    question.timings.append(Timing(question.name, answer.engine, answer.setting, len(question.at.theta_2), seconds))
+    if answer.refusal is not None:
+        question.left_out.append(f"{answer.engine}: {answer.refusal}")
+    yield from compare_answer(question, witness, answer)
+    if question.order and witness.order and answer.refusal is None:
+        answer.evidence |= _observed_order(question, witness)
+
+
+def compare_answer(question: Question, witness: Witness, answer: Answer) -> list[Row]:
+    """Compare one answer with the formulas, at the motion that the engine really made."""
+    if answer.at is not None and answer.at is not question.at:
+        question = Question(question.name, question.scene, answer.at)
+    name, scene, formulas = question.name, question.scene, question.solution
+    predicted = predicting_from(witness, scene, question.at, answer)
+    nearby = answering_nearby(witness, scene, question.at, formulas)
+    allowed = witness.tolerance, witness.expected, predicted, question.reference, question.yardsticks, nearby
+    rows = compare(name, scene, answer, formulas, *allowed)
+    if (ratio := answer.evidence.get("mass_ratio", 1.0)) > LIGHT:
+        why = f"; of coupler and output one is {ratio:.1e} times lighter"
+        rows = [replace(row, reason=row.reason + why) if row.failed else row for row in rows]
+    answers = answer.assembled is not None and len(answer.assembled) == len(formulas)  # otherwise a row has failed
+    if answers and answer.at is not None and {"theta_3", "theta_4"} <= answer.quantities.keys():
+        rows.append(closure(name, scene, answer, witness.tolerance))
+    return rows
+
+
+def _observed_order(question: Question, witness: Witness) -> dict[str, float]:
+    """Measure the worst error of the torque and the pin forces at 4h and 2h, and the order in h that they show."""
+
+    def error(answer: Answer) -> float:
+        rows = compare_answer(question, replace(witness, expected=FORCES), answer)
+        return max((row.error for row in rows if row.quantity in FORCES), default=math.nan)  # a refusal has none
+
+    assert witness.order is not None
+    coarse, fine, order = witness.order(question.scene, question.at, error)
+    seen = {"error_at_4h": coarse, "error_at_2h": fine, "observed_order": order}
+    return seen if all(map(math.isfinite, seen.values())) else {}  # a coarse run may leave what the scene covers
+
+
+def compare_statements(question: Question) -> Iterator[Row]:
+    """Compare what the formulas state of the linkage, whatever its motion, with every exact engine."""
+    stated, part = Stated(question.scene.linkage), "statements of the linkage"
+
+    def rows(witness: Witness, answer: Answer) -> list[Row]:
+        predicted = predicting_from(witness, question.scene, question.at, answer)
+        try:
+            return statements(question.name, question.scene, question.engine(witness), answer, stated, predicted)
+        except LimitError as limit:
+            return [Row.unmeasured(question.name, witness.name, part, "all", REFUSES, str(limit))]
+
+    for witness in question.witnesses:
+        answer, _ = question.answered.get(witness.name, (None, 0.0))
+        exact = witness.stated and witness.tolerance == EQUIVALENCE and "theta_3" in witness.expected
+        if exact and answer is not None and answer.refusal is None:
+            yield from question.attempt(partial(rows, witness, answer), witness.name, part)
+
+
+def compare_inertia(question: Question) -> Iterator[Row]:
+    """Compare the inertial part of the torque by itself: loads can hide an inertia that is 24 times wrong.
+
+    An exact engine answers it in the same assembly; another one is started once more.
+    """
+    scene = question.scene
+    if question.at.omega_2 is None or not (scene.loads or scene.effects):
+        return
+    bare = Question(question.name, replace(scene, loads=(), effects=()), question.at, output=question.output)
+    for name, (answer, seconds) in question.answered.items():
+        if "torque_inertia" in answer.quantities:
+            bare.answered[name] = _of_inertia(answer), seconds
+    for witness in question.witnesses:
+        if "torque" in witness.expected:
+            yield from question.attempt(partial(_inertia, question, bare, witness), witness.name, "inertia alone")
+
+
+def _inertia(question: Question, bare: Question, witness: Witness) -> Iterator[Row]:
+    answer, (loaded, _) = bare.answer(witness), question.answered.get(witness.name, (None, 0.0))
+    if answer.refusal is not None and loaded is not None and loaded.refusal is not None:
+        return  # which has its row
+    rows = compare_answer(bare, replace(witness, expected=("torque",)), answer)
+    rows = [row for row in rows if row.quantity == "torque" or row.verdict in (REFUSES, FAILS)]
+    rows = [row for row in rows if row.quantity != "undecided"]
+    if rows:  # what fails besides the torque, or stands in place of it, is not left out
+        worst = max(rows, key=lambda row: VERDICTS.index(row.verdict))
+        reason = worst.reason if worst.quantity in ("torque", "all") else f"{worst.quantity}: {worst.reason}"
+        yield replace(worst, quantity="torque_inertia", reason=reason)
+
+
+def _of_inertia(answer: Answer) -> Answer:
+    """Take the part of an answer that is of the bars' inertia."""
+    alone = {**answer.quantities, "torque": answer.quantities["torque_inertia"]}
+    alone.pop("drive_condition", None)  # which holds how near loads and friction are to jamming
+    return replace(answer, quantities=alone, evidence={}, alarms=[])
+
+
+def check_mjcf(question: Question) -> Iterator[Row]:
+    """Check the generated MJCF as it is shipped, if one is, by the engine that runs it."""
+    for witness in question.witnesses:
+        if witness.generated:
+            from fourbar_validation.engines.mujoco.shipped import shipped
+
+            def rows() -> list[Row]:
+                row = shipped(question.name, question.scene, question.at)
+                return [] if row is None else [row]
+
+            yield from question.attempt(rows, witness.name, "MJCF as shipped")

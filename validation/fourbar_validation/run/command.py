@@ -1,0 +1,192 @@
+"""`python -m validation run`: what is judged, by whom, how, and against what."""
+
+import os
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import click
+
+from fourbar.errors import FAILED, HOLDS, DependencyError, InputError
+from fourbar.writing import require_file, write_text
+from fourbar_validation.compare.columns import read_columns
+from fourbar_validation.compare.rows import FAILS
+from fourbar_validation.places import PROGRAM
+from fourbar_validation.regression.accept import output_options, report_differences
+from fourbar_validation.regression.record import baseline, recorded
+from fourbar_validation.report.junit import cases, document
+from fourbar_validation.report.summary import Summary
+from fourbar_validation.run.elsewhere import run_elsewhere
+from fourbar_validation.run.run import WORKERS, Collected, Pictured, RunOptions, run
+from fourbar_validation.run.selection import askable, chosen, selected
+from fourbar_validation.scenes.random import DrawnType
+
+ALL_TYPES = ",".join(kind.value for kind in DrawnType)
+STAGES = {int: "judging", Collected: "collecting", Pictured: "drawing"}
+"""What the progress says."""
+EXCLUDED = (
+    ("--random", "scenes", "judges random linkages; leave out the scene files"),
+    ("--suite", "scenes", "has its own scenes; leave out scene files and --random"),
+    ("--suite", "--random", "has its own scenes; leave out scene files and --random"),
+    ("--against", "--python", "cannot be combined with --python, which compares with the run made there"),
+)
+"""Option, what it cannot be combined with, and why."""
+OF_RANDOM = ("--seed", "--type")
+
+
+def refuse_moved(context: click.Context, option: click.Parameter, value: tuple[str, ...]) -> None:
+    """Name the command that does what these options did."""
+    if value:
+        allowed = f"is a command of its own: {PROGRAM} check-mjcf SCENE THEIRS.xml"
+        raise InputError("--mjcf", value[0], allowed)
+
+
+@click.command(name="run")
+@click.argument("scenes", nargs=-1, type=click.Path(path_type=Path))
+@click.option(
+    "-o", "--out", type=click.Path(path_type=Path, file_okay=False), default=Path("results"), show_default=True
+)
+@click.option("--engines", metavar="NAMES", help="Comma-separated witnesses; left out: all.")
+@click.option(
+    "--error",
+    "wanted",
+    type=float,
+    metavar="E",
+    help="Simulate no more precisely than this relative error.",
+)
+@click.option("--suite", "named", metavar="hard|FILE", help="Judge the hard cases, or the scenes that FILE lists.")
+@click.option("--random", "count", type=click.IntRange(min=1), help="Judge this many random linkages instead.")
+@click.option("--seed", type=click.IntRange(min=0), metavar="S", help="Of the random linkages; left out: 0.")
+@click.option(
+    "--type",
+    "types",
+    metavar="TYPES",
+    help=f"Of the random linkages, comma-separated: {ALL_TYPES} (all); or uneven: with every ratio over ten decades "
+    "and every effect but loaded friction, for exact engines.",
+)
+@click.option("--workers", type=click.IntRange(min=1), default=WORKERS, show_default=True, help="Processes.")
+@click.option("--scheduler", metavar="ADDRESS", help="Spread over the workers of this Dask scheduler.")
+@click.option("--against", metavar="BASELINE", help="Compare with an accepted name or an earlier run's folder.")
+@click.option(
+    "--python",
+    type=click.Path(path_type=Path),
+    help="Run the suite under this interpreter too (into OUT/elsewhere), and say what changes from there to here.",
+)
+@click.option(
+    "--witness",
+    "adapters",
+    metavar="MODULE:CLASS",
+    multiple=True,
+    help="A witness of your own, to judge with the others (docs/adding-a-witness.md).",
+)
+@click.option(
+    "--time-limit",
+    type=click.FloatRange(min=0.0, min_open=True),
+    metavar="SECONDS",
+    help="End what takes longer on one scene; left out: a minute, and more for many positions.",
+)
+@click.option("--no-pictures", is_flag=True, help="Draw nothing, and measure no observed order of a simulation.")
+@click.option("--mjcf", "--name", multiple=True, hidden=True, expose_value=False, is_eager=True, callback=refuse_moved)
+@output_options
+def command(
+    scenes: tuple[Path, ...],
+    out: Path,
+    engines: str | None,
+    wanted: float | None,
+    named: str | None,
+    count: int | None,
+    seed: int | None,
+    types: str | None,
+    workers: int,
+    scheduler: str | None,
+    against: str | None,
+    python: Path | None,
+    adapters: tuple[str, ...],
+    time_limit: float | None,
+    no_pictures: bool,
+    **forms: Path | None,
+) -> int:
+    """Judge scenes (default: all of models/); write results.csv, timings.csv, report.md and report.html."""
+    from fourbar_validation.report.terminal import table
+
+    of_random = {"--random": count, "--seed": seed, "--type": types}
+    refuse_combinations(
+        {"scenes": scenes or None, "--suite": named, "--against": against, "--python": python} | of_random
+    )
+    for form, path in forms.items():
+        if path is not None:
+            if python is None and against is None and form != "junit":
+                raise InputError(
+                    f"--{form}", str(path), "tells differences; say --against BASELINE or --python PATH too"
+                )
+            require_file(path, *scenes)
+    if against is not None:
+        recorded(baseline(against))  # before anything runs
+    suite, witnesses = selected(scenes, named, count, seed or 0, types or ALL_TYPES, adapters)
+    if wanted is not None:
+        from fourbar_validation.run.dial import dialled
+
+        witnesses = dialled(witnesses, wanted)
+    if python is not None:
+        the_same = of_random | {
+            "--workers": workers,
+            "--engines": engines,
+            "--error": wanted,
+            "--time-limit": time_limit,
+        }
+        the_same |= {"--error": wanted, "--time-limit": time_limit}
+        the_same["--suite"] = named if named in (None, "hard") else os.path.abspath(named)
+        passed_on = [*map(os.path.abspath, scenes), "--no-pictures", *(f"--witness={adapter}" for adapter in adapters)]
+        passed_on += [f"{option}={value}" for option, value in the_same.items() if value is not None]
+        against = str(run_elsewhere(python, passed_on, out / "elsewhere"))
+    present, missing = askable(chosen(engines, witnesses, adapters), by_name=engines is not None)
+    options = RunOptions(workers, scheduler, time_limit, drawn=not no_pictures)
+    result = show_progress(len(suite), run(suite, out, present, options, missing))
+    table(result, out)
+    worse = _report_differences(against, out, forms, result.verdict)
+    if result.counts[FAILS] or worse:
+        return FAILED
+    if missing:
+        there = ",".join(witness.name for witness in present)
+        raise DependencyError(f"{missing[0][1]}, or say --engines {there} where those are all that is wanted")
+    return result.counts.status
+
+
+def refuse_combinations(given: dict[str, Any]) -> None:
+    """Refuse options that contradict each other, or that would do nothing."""
+    for option, other, why in EXCLUDED:
+        if given[option] is not None and given[other] is not None:
+            raise InputError(option, given[option], why)
+    for option in OF_RANDOM:
+        if given[option] is not None and given["--random"] is None:
+            raise InputError(option, given[option], "is of random linkages; say --random N too")
+
+
+def _report_differences(against: str | None, out: Path, forms: dict[str, Path | None], verdict: str) -> int:
+    """Report what differs from an earlier run; where there is none the run's own comparisons as JUnit, if wanted."""
+    if against is not None:
+        return report_differences(baseline(against), out, forms)
+    if (xml := forms["junit"]) is not None:
+        write_text(xml, document(verdict, cases(read_columns(out / "results.parquet"))))
+    return HOLDS
+
+
+def show_progress(scenes: int, steps: Iterable[int | str | Summary]) -> Summary:
+    """Show the progress of a run, and give the summary at its end."""
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
+
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    step: int | str | Summary = 0
+    with Progress(*columns, console=Console(stderr=True)) as progress:
+        tasks: dict[type, TaskID] = {}
+        for step in steps:
+            if isinstance(step, str):
+                progress.console.print(step, markup=False, highlight=False)
+            elif isinstance(step, int):
+                kind = type(step)
+                if kind not in tasks:
+                    tasks[kind] = progress.add_task(STAGES[kind], total=None if kind is Pictured else scenes)
+                progress.advance(tasks[kind], step)
+    assert isinstance(step, Summary)
+    return step

@@ -1,0 +1,121 @@
+"""A scene in question: its positions, what the formulas answer, and what each engine answers, computed once."""
+
+import time
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fourbar.scene import Command, Scene
+from fourbar.solution import Solution
+from fourbar.solve import solve
+from fourbar_validation.compare.answer import Answer, Engine
+from fourbar_validation.compare.basis import basis_of
+from fourbar_validation.compare.compare import Yardsticks
+from fourbar_validation.compare.reversals import Reversal
+from fourbar_validation.compare.rows import Row, breakdown
+from fourbar_validation.compare.tolerance import Array
+from fourbar_validation.engines.free_body import FreeBody
+from fourbar_validation.engines.output import kept
+from fourbar_validation.engines.witnesses import WITNESSES, Witness
+from fourbar_validation.report.record import Timing
+
+FREE_BODY = next(witness for witness in WITNESSES if witness.name == FreeBody.name)
+"""By its answer every other one is checked: nothing is allowed on the word of the formulas alone."""
+
+
+class NotAskedError(Exception):
+    """A scene has nothing that a check could compare; the message says why."""
+
+
+@dataclass(eq=False)
+class Question:
+    """A scene at the positions of a command, and every answer to it."""
+
+    name: str
+    scene: Scene
+    at: Command
+    witnesses: Sequence[Witness] = ()
+    """Those that are to answer."""
+    order: bool = False
+    """Whether the observed order of what is simulated is wanted: two more simulations."""
+    output: dict[str, str] = field(default_factory=dict)
+    """What each engine printed."""
+    left_out: list[str] = field(default_factory=list)
+    """What is not compared, and why."""
+    timings: list[Timing] = field(default_factory=list)
+    jumps: list[Reversal] = field(default_factory=list)
+    answered: dict[str, tuple[Answer, float]] = field(default_factory=dict)
+    """By witness: its answer and the seconds that it took."""
+    yardsticks: Yardsticks = field(default_factory=dict)
+    """Size and condition of each quantity that was compared."""
+    started: dict[str, Engine] = field(default_factory=dict)
+
+    def solve(self) -> Solution:
+        """Solve the scene as far as anything is compared: error bars take ten times as long as all the rest."""
+        if self.scene.motion.free is not None:
+            return solve(self.scene)
+        return solve(self.scene, "position" if self.at.omega_2 is None else "force", at=self.at)
+
+    @cached_property
+    def solution(self) -> Solution:
+        """What the formulas answer."""
+        return self.solve()
+
+    @cached_property
+    def free_body(self) -> Answer | None:
+        """The answer of the free bodies, or None where they break down: a row of their own fails."""
+        try:
+            with np.errstate(all="ignore"):
+                return self.answer(FREE_BODY)
+        except Exception:  # as of any engine
+            return None
+
+    @property
+    def forces_known(self) -> bool:
+        """Whether the free bodies answer forces."""
+        return self.at.omega_2 is not None and self.free_body is not None and self.free_body.refusal is None
+
+    @cached_property
+    def reference(self) -> Solution | None:
+        """Conditions and sizes by free bodies, the reference of every comparison; None: an answer has its own."""
+        try:
+            with np.errstate(all="ignore"):
+                return None if self.free_body is None else basis_of(self.scene, self.free_body)
+        except ArithmeticError:
+            return None
+
+    def engine(self, witness: Witness) -> Engine:
+        """Start the engine of a witness, once."""
+        if witness.name not in self.started:
+            self.started[witness.name] = witness.engine()
+        return self.started[witness.name]
+
+    def answer(self, witness: Witness) -> Answer:
+        """Ask a witness, once."""
+        if witness.name not in self.answered:
+            with kept(self.output, witness.name):
+                engine, begin = self.engine(witness), time.perf_counter()
+                self.answered[witness.name] = engine.answer(self.scene, self.at), time.perf_counter() - begin
+        return self.answered[witness.name][0]
+
+    def attempt(self, check: Callable[[], Iterable[Row]], engine: str, part: str = "") -> Iterator[Row]:
+        """Yield the rows of a check; what it raises is a failure of its own, in a row of its own."""
+        try:
+            yield from check()
+        except NotAskedError as reason:
+            self.left_out.append(f"{engine}: {reason}")
+        except Exception as error:
+            yield breakdown(self.name, engine, error, part)
+
+
+def select_positions(at: Command, where: NDArray[np.intp]) -> Command:
+    """Take some positions of a command."""
+
+    def of(value: float | Array | None) -> float | Array | None:
+        return value if value is None or np.ndim(value) == 0 else value[where]  # type: ignore[index]
+
+    time = None if at.time is None else at.time[where]
+    return Command(at.theta_2[where], at.branch[where], of(at.omega_2), of(at.alpha_2), None, time)  # type: ignore[arg-type]
