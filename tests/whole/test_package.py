@@ -53,7 +53,7 @@ def test_every_file_of_the_package_is_shipped(package: str, folder: str) -> None
             assert (path.parent / "__init__.py").is_file(), path
 
 
-@pytest.mark.parametrize("line", ["models", "problems", "mutation --planted", "bench --against HEAD"])
+@pytest.mark.parametrize("line", ["write", "write --problems", "faults", "bench --against HEAD"])
 def test_what_needs_a_checkout_says_so_in_one_line(
     line: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

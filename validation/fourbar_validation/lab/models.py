@@ -46,6 +46,6 @@ def write_mjcf(files: Iterable[Path]) -> list[Path]:
 @click.command()
 def models() -> None:
     """Write the MJCF of every scene in models/ for which it is stale."""
-    checkout("models")
+    checkout("write")
     for file in write_mjcf(model_files()):
         click.echo(f"wrote {file.with_suffix('.xml').name}")

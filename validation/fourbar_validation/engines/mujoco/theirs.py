@@ -66,7 +66,7 @@ def compile_text(text: str) -> mujoco.MjModel:
     try:
         keyframes = mujoco.MjSpec.from_string(text).nkey
         if keyframes > MOST_KEYFRAMES:
-            raise InputError("--mjcf", None, f"asks for {keyframes} keyframes; up to {MOST_KEYFRAMES} are read")
+            raise InputError("MJCF", None, f"asks for {keyframes} keyframes; up to {MOST_KEYFRAMES} are read")
         model = mujoco.MjModel.from_xml_string(text)
     except ValueError as error:
         raise InputError("MJCF", None, " ".join(f"MuJoCo does not compile it: {error}".split())) from None

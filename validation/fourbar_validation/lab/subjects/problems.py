@@ -123,7 +123,7 @@ def _answer(value: Any, error: Array) -> dict[str, Any]:
 @click.command()
 def command() -> None:
     """Write the answers of every scene in models/problems next to it, as JSON."""
-    checkout("problems")
+    checkout("write --problems")
     for file in sorted(PROBLEMS.glob("*.toml")):
         write_text(file.with_suffix(".json"), text(problem(file)))
         click.echo(f"wrote {file.with_suffix('.json').name}")

@@ -12,6 +12,7 @@ from fourbar.errors import FAILED, HOLDS
 from fourbar_validation.engines.workers import each
 from fourbar_validation.lab.stress.mutation import planting
 from fourbar_validation.lab.stress.mutation.planting import ROOT, faults
+from fourbar_validation.places import checkout
 from fourbar_validation.run.elsewhere import ended
 
 SECONDS = 300
@@ -66,6 +67,7 @@ def command(workers: int) -> int:
     from rich.console import Console
     from rich.progress import track
 
+    checkout("faults")
     results = list(track(planted(workers), "planting", total=len(faults()) + 1, console=Console(stderr=True)))
     survivors = [(fault, why) for fault, why in results if why is not None]
     for fault, why in survivors:
