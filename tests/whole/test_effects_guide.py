@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from fourbar import effects
-from fourbar.errors import FourBarError, InputError, LimitError
+from fourbar.errors import InputError, LimitError
 from fourbar.files import dump, loads
 from fourbar.files import effects as in_files
 from fourbar.files.effects import REGISTRY
@@ -116,8 +116,9 @@ def test_mjcf_has_no_row_of_the_example_and_refuses_it(windage: Any) -> None:
 
 def test_without_its_row_nothing_is_judged_by_another_scale(windage: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delitem(in_scales.SIZE_OF, "windage")
-    with pytest.raises(FourBarError, match="'windage'"):
-        judge("scene", guide_scene(), EXACT)
+    rows = judge("scene", guide_scene(), EXACT).rows
+    engines = {row.engine for row in rows if row.failed and "'windage'" in row.reason}
+    assert engines >= {witness.name for witness in EXACT}
 
 
 def test_without_its_row_a_file_neither_reads_nor_writes_the_example(

@@ -241,7 +241,7 @@ def test_a_free_motion_that_every_engine_refuses_is_not_held(monkeypatch: pytest
         def release(self, scene: Scene, times: object) -> Released:
             return Released.refused("refusing", "-", "a declared limit")
 
-    monkeypatch.setattr(free, "resolve_name", lambda _: Refusing)
+    monkeypatch.setattr(free, "ENGINES", {name: (Refusing, *rest) for name, (_, *rest) in free.ENGINES.items()})
     scene = crank_rocker(motion=fourbar.Motion(1.0, 0.0, free=fourbar.Free(0.2, 20)))
     page = judged("free", scene, (), draw=False)
     sentence = "Nothing was compared on 1 scene: 1 of the formulas' own identities hold; 2 refuse"
