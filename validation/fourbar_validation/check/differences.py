@@ -64,7 +64,7 @@ def differences(generated: Described, theirs: Described, called: Mapping[str, st
 
 
 def _numbered_like(theirs: Described, generated: Described) -> Described:
-    """Number the generated file's actuators and tendons as their counterparts: same role, if possible name.
+    """Renumber the generated file's actuators and tendons as their counterparts: same role, if possible name.
 
     One without a counterpart keeps a number that theirs does not have.
     """

@@ -28,7 +28,7 @@ from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.compare import compare
 from fourbar_validation.compare.counts import Counts
 from fourbar_validation.compare.rows import Row, plain, write_results
-from fourbar_validation.compare.tolerance import SIMULATED, Tolerance, simulated_within
+from fourbar_validation.compare.tolerance import SIMULATED, ErrorBound, simulated_within
 from fourbar_validation.engines.memory import WORKER_MEMORY, bound_memory
 from fourbar_validation.report.templating import number, rendered
 from fourbar_validation.scenes.suites import scene_files
@@ -95,7 +95,7 @@ def named(pairs: tuple[str, ...]) -> dict[str, str]:
 
 
 def examine_model(
-    name: str, scene: Scene, mjcf: Path, names: Mapping[str, str], tolerance: Tolerance = SIMULATED
+    name: str, scene: Scene, mjcf: Path, names: Mapping[str, str], tolerance: ErrorBound = SIMULATED
 ) -> ModelReport:
     """Examine a file in a guarded process, and the generated one before; theirs is held to the tolerance."""
     text = read_mjcf(mjcf)
@@ -112,7 +112,7 @@ def examine_model(
     return ModelReport(causes(found, rows, after), costs, theirs.notes)
 
 
-def _rows(name: str, scene: Scene, answers: list[Answer], tolerance: Tolerance) -> list[Row]:
+def _rows(name: str, scene: Scene, answers: list[Answer], tolerance: ErrorBound) -> list[Row]:
     found = []
     for answer in answers:
         formulas = solve(scene, "force", at=answer.at)

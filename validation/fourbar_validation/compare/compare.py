@@ -32,7 +32,7 @@ from fourbar_validation.compare.tolerance import (
     EPS,
     NOTHING_TO_TELL,
     Array,
-    Tolerance,
+    ErrorBound,
 )
 
 Mask = NDArray[np.bool_]
@@ -65,7 +65,7 @@ def compare(
     scene: Scene,
     answer: Answer,
     formulas: Solution,
-    tolerance: Tolerance,
+    tolerance: ErrorBound,
     expected: Iterable[str],
     predicted: Predicted | None = None,
     basis: Solution | None = None,
@@ -107,7 +107,7 @@ class _Comparison:
     scene: Scene
     answer: Answer
     formulas: Solution
-    tolerance: Tolerance
+    tolerance: ErrorBound
     predicted: Predicted | None
     own: Solution | None
     basis: Solution | None
@@ -234,7 +234,7 @@ def _found(
     condition: Array,
     where: Mask,
     full: Array,
-    tolerance: Tolerance,
+    tolerance: ErrorBound,
     predicted: Callable[[Mask], Array] | None,
 ) -> _Finding:
     """Compare errors at the positions `where` with the tolerance, `full`, and beyond it with what was predicted there.
@@ -308,7 +308,7 @@ def touching(scene: Scene, theta_2: Array) -> Mask:
     return np.asarray(np.abs(closing_margin(scene, theta_2)) < TOUCHING_MARGIN)
 
 
-def _jumping(quantity: str, scene: Scene, formulas: Solution, tolerance: Tolerance) -> Mask:
+def _jumping(quantity: str, scene: Scene, formulas: Solution, tolerance: ErrorBound) -> Mask:
     """Mark where dry friction reverses and a force may have either value; the motion is prescribed and has one."""
     near_jamming = quantity == "drive_condition" and any(effect.loaded_pins for effect in scene.effects)
     if quantity not in OF_FORCES and not near_jamming:
@@ -316,7 +316,7 @@ def _jumping(quantity: str, scene: Scene, formulas: Solution, tolerance: Toleran
     return reversing(scene, formulas, tolerance.factor, in_time=tolerance.in_time)
 
 
-def _answerable(quantity: str, scene: Scene, formulas: Solution, tolerance: Tolerance) -> Mask:
+def _answerable(quantity: str, scene: Scene, formulas: Solution, tolerance: ErrorBound) -> Mask:
     """Mark where a quantity may be demanded of an engine of this class."""
     if quantity == "torque" and scene.drive_bar != 2 and tolerance.in_time:
         speed = formulas.omega_3 if scene.drive_bar == 3 else formulas.omega_4

@@ -21,7 +21,7 @@ from fourbar_validation.compare.error import magnitude, relative, worst
 from fourbar_validation.compare.reversals import reversing
 from fourbar_validation.compare.rows import AGREES, FAILS, UNDECIDED, Row
 from fourbar_validation.compare.scales import of_length
-from fourbar_validation.compare.tolerance import IDENTITY, SIMULATED, Array, Tolerance, condition_of, lever
+from fourbar_validation.compare.tolerance import IDENTITY, SIMULATED, Array, ErrorBound, condition_of, lever
 
 FORMULAS = "formulas"
 IDENTITIES = (
@@ -62,7 +62,7 @@ def _sweep(name: str, scene: Scene, at: Command) -> Row:
     )
 
 
-def closure(name: str, scene: Scene, answer: Answer, simulated: Tolerance = SIMULATED) -> Row:
+def closure(name: str, scene: Scene, answer: Answer, simulated: ErrorBound = SIMULATED) -> Row:
     """Do the own angles of an engine close the loop? Relative to the sum of the lengths."""
     d, a, b, c = scene.linkage.lengths
     assert answer.at is not None and answer.assembled is not None

@@ -32,7 +32,7 @@ DEGRADED = 10.0
 
 
 @dataclass(frozen=True, slots=True)
-class Tolerance:
+class ErrorBound:
     """What a comparison is allowed, with the reason that the report prints."""
 
     name: str
@@ -52,20 +52,20 @@ class Tolerance:
             return self.factor / condition
 
 
-IDENTITY = Tolerance(
+IDENTITY = ErrorBound(
     "identity",
     "K eps of the sum of the absolute terms: an equation that holds in every position, whatever the condition",
     K * EPS,
     conditioned=False,
 )
-EQUIVALENCE = Tolerance(
+EQUIVALENCE = ErrorBound(
     "equivalence",
     "K eps/condition: two exact derivations of one number differ by round-off alone; beyond that ten times the error "
     "computed for the position, from moving every stored number and the closure by one rounding in 320-bit arithmetic",
     K * EPS,
     conditioned=True,
 )
-SIMULATED = Tolerance(
+SIMULATED = ErrorBound(
     "modelling + integration",
     "1e-5 of the scale: the soft loop and the time step of the generated MJCF at about 628 RK4 steps per revolution, "
     "two to ten times what was measured (1e-6 to 4e-6)",
@@ -73,7 +73,7 @@ SIMULATED = Tolerance(
     conditioned=False,
     in_time=True,
 )
-FULL_ACCURACY = Tolerance(
+FULL_ACCURACY = ErrorBound(
     "full accuracy",
     "K eps whatever the condition; beyond that ten times the error computed for the position, quantity by quantity, "
     "from moving every stored number and the closure by one rounding in 320-bit arithmetic",
@@ -87,7 +87,7 @@ OF_THE_INPUT = frozenset(("theta_2", "omega_2", "alpha_2", "A", "G2", "v_A", "v_
 """Quantities that the input alone decides: they lose none."""
 
 
-def simulated_within(error: float, why: str) -> Tolerance:
+def simulated_within(error: float, why: str) -> ErrorBound:
     """Hold what runs through time to a wanted error."""
     if not 0.0 < error < 1.0:
         raise InputError("--error", error, "must be a relative error, above 0 and below 1")

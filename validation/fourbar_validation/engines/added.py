@@ -21,7 +21,7 @@ from fourbar.quantities import ANGLES, UNKNOWNS
 from fourbar_validation.compare.compare import COMPARED
 from fourbar_validation.compare.identities import FORMULAS
 from fourbar_validation.compare.rows import in_words, one_line, plain
-from fourbar_validation.compare.tolerance import EQUIVALENCE, Tolerance
+from fourbar_validation.compare.tolerance import EQUIVALENCE, ErrorBound
 from fourbar_validation.engines import workers
 from fourbar_validation.engines.checked import Checked
 from fourbar_validation.engines.witnesses import Witness
@@ -127,7 +127,7 @@ def _read(adapter: str, made: Any) -> AddedWitness:
     return _added(name, adapter, tolerance, expected=quantities, positions=positions, stated=False, code=code)
 
 
-def _added(name: str, adapter: str, tolerance: Tolerance, **rest: Any) -> AddedWitness:
+def _added(name: str, adapter: str, tolerance: ErrorBound, **rest: Any) -> AddedWitness:
     return AddedWitness(name, partial(Checked, name, adapter), tolerance, adapter=adapter, **rest)
 
 
@@ -142,7 +142,7 @@ def _code(module: ModuleType) -> str:
     return digest.hexdigest()[:16]
 
 
-def _tolerance(stated: Any) -> Tolerance:
+def _tolerance(stated: Any) -> ErrorBound:
     if isinstance(stated, str) and stated == EQUIVALENCE.name:
         return EQUIVALENCE
     try:
@@ -153,4 +153,4 @@ def _tolerance(stated: Any) -> Tolerance:
     if not (0.0 < error < 1.0 and isinstance(reason, str) and reason):
         allowed = f'"{EQUIVALENCE.name}", or a relative error above 0 and below 1 and its reason'
         raise _UnusableError(f"must have a `tolerance` that is {allowed}")
-    return Tolerance("as the witness states", f"{error:g} of the scale: {one_line(reason)}", error, conditioned=False)
+    return ErrorBound("as the witness states", f"{error:g} of the scale: {one_line(reason)}", error, conditioned=False)

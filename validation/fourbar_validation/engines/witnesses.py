@@ -15,7 +15,7 @@ from fourbar_validation.compare.answer import Answer, Engine
 from fourbar_validation.compare.compare import COMPARED, Mask, Nearby, Predicted
 from fourbar_validation.compare.nearby import shift_to
 from fourbar_validation.compare.rows import in_words
-from fourbar_validation.compare.tolerance import EQUIVALENCE, SIMULATED, Array, Tolerance
+from fourbar_validation.compare.tolerance import EQUIVALENCE, SIMULATED, Array, ErrorBound
 from fourbar_validation.engines.description import speeds
 from fourbar_validation.engines.exact import unknown
 from fourbar_validation.engines.free_body import FreeBody
@@ -35,7 +35,7 @@ class Witness:
     name: str
     engine: Callable[[], Engine]
     """Starts it; importable by name, and imports the library itself: a missing one costs only its own rows."""
-    tolerance: Tolerance
+    tolerance: ErrorBound
     expected: tuple[str, ...] = COMPARED
     order: Order | None = None
     """What measures its observed order, which is shown."""

@@ -15,7 +15,7 @@ from fourbar.errors import HOLDS
 from fourbar_validation.compare.counts import Counts
 from fourbar_validation.compare.error import used
 from fourbar_validation.compare.rows import DEGRADED, REFUSES, Row
-from fourbar_validation.compare.tolerance import EPS, EQUIVALENCE, IDENTITY, NOTHING_TO_TELL, SIMULATED, K, Tolerance
+from fourbar_validation.compare.tolerance import EPS, EQUIVALENCE, IDENTITY, NOTHING_TO_TELL, SIMULATED, ErrorBound, K
 from fourbar_validation.engines.witnesses import WORK
 from fourbar_validation.report.machine import machine, versions
 from fourbar_validation.report.record import Record
@@ -81,7 +81,7 @@ class Summary:
         """Largest error*condition/eps of each exact engine: what K would have sufficed."""
         self.independence: dict[str, tuple[str, str]] = {}
         """engine: (shared with the formulas, found alone)."""
-        self.tolerances: Sequence[Tolerance] = (IDENTITY, EQUIVALENCE, SIMULATED)
+        self.tolerances: Sequence[ErrorBound] = (IDENTITY, EQUIVALENCE, SIMULATED)
         """What the witnesses were held to."""
         self.missing: Sequence[tuple[str, str]] = ()
         """(engine, why it could not run here)."""

@@ -10,7 +10,7 @@ from fourbar.errors import InputError, LimitError
 from fourbar.scene import Scene
 from fourbar.scene.motion import Motion
 from fourbar_validation.compare.rows import REFUSES, Row
-from fourbar_validation.compare.tolerance import Tolerance
+from fourbar_validation.compare.tolerance import ErrorBound
 from fourbar_validation.run.question import NotAskedError, Question
 from fourbar_validation.run.shipped.variants import at_free_bodies, moved, row_of
 
@@ -25,7 +25,7 @@ POSITIONS = 361
 """Of the interval; a smooth curve falls off by 1e-4 of its size from its peak to the next of them."""
 LEAST_CONDITION = 0.05
 """Where the interval comes nearer to a singular position than this, the boxes become too many for a run."""
-BOUNDS = Tolerance(
+BOUNDS = ErrorBound(
     "proven bounds",
     "1e-8 of the largest value: ten times what the enclosure promises, and what rounding costs the free bodies at "
     "conditions of at least 0.05",

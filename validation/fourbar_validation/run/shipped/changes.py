@@ -14,13 +14,13 @@ from fourbar.studies.spread import Spread
 from fourbar_validation.compare.answer import Array
 from fourbar_validation.compare.error import magnitude, relative
 from fourbar_validation.compare.rows import Row
-from fourbar_validation.compare.tolerance import Tolerance
+from fourbar_validation.compare.tolerance import ErrorBound
 from fourbar_validation.run.question import Question
 from fourbar_validation.run.shipped.variants import at_free_bodies, moved, parts, row_of, sampled, stated
 
 STEP = 1e-4
 """Of each number, of an angle in rad: what the fourth order leaves out and what rounding adds are then alike."""
-DIFFERENCES = Tolerance(
+DIFFERENCES = ErrorBound(
     "differences",
     "1e-7 of the sum of the absolute terms: the fourth-order difference of free bodies at positions whose condition is "
     "at least 0.1, where it leaves out 1e-11 and rounding adds 1e-10",
@@ -30,7 +30,7 @@ DIFFERENCES = Tolerance(
 """What the derivatives along one direction in which every number changes are held to."""
 SAMPLES, DRAWN = 1024, 20_000
 """Of the tolerances; and of the sum of the first order by which percentiles are judged."""
-SPREAD = Tolerance(
+SPREAD = ErrorBound(
     "spread",
     "3 % of a deviation or of a worst case, of a percentile 30 % of one: 1024 quasi-random samples against cubature "
     "and 20 000 draws, twice what they were seen to differ by",

@@ -21,7 +21,7 @@ from fourbar_validation.compare.compare import COMPARED, compare
 from fourbar_validation.compare.error import magnitude, used
 from fourbar_validation.compare.reversals import reversing
 from fourbar_validation.compare.rows import AGREES, FAILS, VERDICTS, Row
-from fourbar_validation.compare.tolerance import EQUIVALENCE, WELL_CONDITIONED, Tolerance
+from fourbar_validation.compare.tolerance import EQUIVALENCE, WELL_CONDITIONED, ErrorBound
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.witnesses import predicting_from
 from fourbar_validation.run.printed import points
@@ -151,7 +151,7 @@ def worst_rows(rows: Iterable[Row]) -> list[Row]:
 
 
 def row_of(
-    question: Question, engine: str, quantity: str, error: Array, tolerance: Tolerance, theta_2: Array, reason: str
+    question: Question, engine: str, quantity: str, error: Array, tolerance: ErrorBound, theta_2: Array, reason: str
 ) -> Row:
     """Make the row of a quantity whose errors at some positions are held to one tolerance."""
     index = int(np.argmax(used(error, tolerance.factor)))
