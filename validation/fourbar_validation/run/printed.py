@@ -21,7 +21,6 @@ from fourbar_validation.compare.reversals import reversing
 from fourbar_validation.compare.rows import AGREES, FAILS, UNDECIDED, Row
 from fourbar_validation.compare.scales import of_length, term_sizes, yardstick
 from fourbar_validation.compare.tolerance import (
-    DEGRADED,
     EPS,
     EQUIVALENCE,
     IDENTITY,
@@ -153,9 +152,9 @@ def check_error_bars(question: Question) -> Iterator[Row]:
         tells = condition * NOTHING_TO_TELL > EPS
         turns = np.array([turned(scene.linkage.ground_angle, theta_2) for theta_2 in sampled.theta_2])
         wide = relative(width, size) * condition / (K * EPS * turns)
-        if (beyond := tells & (wide > 1.0)).any():  # as of an engine
+        if (beyond := tells & (wide > 1.0)).any():  # by what rounding the data does, no more
             expected = np.max([from_data(scene, sampled, quantity, beyond) for quantity in quantities], axis=0)
-            wide = np.where(beyond, relative(width, DEGRADED * expected), wide)
+            wide = np.where(beyond, relative(width, expected), wide)
         share = np.where(tells, np.maximum(relative(true, BARS * width), wide), 0.0)
         share[tells & ~np.isfinite(width)] = np.inf
         index = worst(share)
