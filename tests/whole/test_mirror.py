@@ -43,7 +43,7 @@ JUDGED_BY = {
     "studies style symbols transmission view",
     "validation/engines/mujoco/test_picture.py": "fourbar/mjcf: appearance",
     # a comparison is tested by witnesses with given answers
-    "validation/run/test_judge.py": "validation/compare: answer basis compare effects identities rows scales "
+    "validation/run/test_judge.py": "validation/compare: answer basis compare effects identities rows "
     "tolerance; validation/run: answers command pictures question run values",
     "validation/compare/statements/test_statements.py": "validation/compare/statements: finding limits ranges "
     "transmission",
