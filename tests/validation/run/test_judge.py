@@ -9,11 +9,12 @@ import fourbar
 from fourbar.formulas.mobility import limit_positions
 from fourbar.quantities import FORCES
 from fourbar.scene import Command, Scene, command
+from fourbar.scene.motion import FromLimit
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.columns import read_columns
 from fourbar_validation.compare.compare import COMPARED
 from fourbar_validation.compare.rows import AGREES, FAILS, REFUSES, UNDECIDED, Row, to_csv, write_results
-from fourbar_validation.compare.tolerance import EPS, EQUIVALENCE, K
+from fourbar_validation.compare.tolerance import EPS, EQUIVALENCE, FULL_ACCURACY, K
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.witnesses import WITNESSES, Witness, predicting_from
 from fourbar_validation.run.judge import judge
@@ -178,6 +179,25 @@ def test_where_no_digit_is_left_nothing_is_judged() -> None:
             assert "eps/condition" in rows["torque"].reason
             return
     pytest.fail("neither side of the limit assembles")
+
+
+def test_a_scene_of_which_most_numbers_are_undecided_does_not_hold() -> None:
+    rocker = fourbar.uniform(0.3, 0.25, 0.1, 0.22)
+    row = rows_of(Echo, Scene(rocker, fourbar.Motion(FromLimit(1, 1e-32), 1.0)))["undecided"]
+    assert row.verdict == FAILS and row.error > row.allowed == 0.5
+
+
+def test_a_loop_said_to_be_open_a_thousand_roundings_from_its_limit_fails() -> None:
+    rocker = fourbar.uniform(0.3, 0.25, 0.1, 0.22)
+    first = limit_positions(rocker)[0].theta_2
+    thetas = np.array([first + 0.2, first + 0.3, first + 0.4, first + 0.5, first + 0.6, first + 1e-12])
+    assert rows_of(Elsewhere, Scene(rocker, fourbar.Motion(thetas, 1.0)))["assembled"].verdict == FAILS
+
+
+def test_an_engine_that_may_answer_within_the_rounding_of_theta_2_is_held_to_that_answer() -> None:
+    witness = Witness("echo", SlightlyOff, FULL_ACCURACY, nearby=True)
+    rows = {row.quantity: row for row in judge("", crank_rocker(), [witness]).rows if row.engine == "echo"}
+    assert rows["torque"].verdict == FAILS and rows["F12"].verdict == AGREES
 
 
 def test_positions_alone_need_no_forces() -> None:
