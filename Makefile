@@ -3,8 +3,10 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
+LONG := kills package machines engines simulators problems releases standing free fuzz accuracy suites
 
-.PHONY: validate test long-test models docs setup clean
+.PHONY: validate test long-test $(LONG:%=long-%) models docs setup clean
+
 
 validate: setup
 	$(BIN)/python -m validation run
@@ -15,21 +17,35 @@ test: setup
 	$(BIN)/mypy
 	$(BIN)/python -m pytest -n 2 --dist worksteal
 
-# hours: everything that `make test` samples, in full
-long-test: setup
+# hours: everything that `make test` samples, in full; each part ends within one hour on two cores
+long-test: $(LONG:%=long-%)
+$(LONG:%=long-%): setup
+
+long-kills:
 	KILLS=50 $(BIN)/python -m pytest tests/whole/test_kills.py tests/validation/run/test_machines.py
+long-package:
 	PACKAGE=all $(BIN)/python -m pytest tests/whole/test_package.py
+long-machines:
 	MACHINES=all $(BIN)/python -m pytest tests/whole/test_machines.py
+long-engines:
 	$(BIN)/python -m pytest tests/validation/engines/test_engines.py
+long-simulators:
 	$(BIN)/python -m pytest tests/fourbar/mjcf/test_simulators.py tests/validation/lab/subjects/test_subjects.py
+long-problems:
 	PROBLEMS=all $(BIN)/python -m pytest tests/validation/lab/subjects/test_problems.py
+long-releases:
 	RELEASES=pip $(BIN)/python -m pytest tests/validation/lab/subjects/test_versions.py
+long-standing:
 	$(BIN)/python -m validation standing
+long-free:
 	FREE_MOTIONS=30 $(BIN)/python -m pytest -n 2 tests/fourbar/evaluation/test_free_motion_reference.py
+long-fuzz:
 	$(BIN)/python -m validation fuzz --files --count 100000
-	$(BIN)/python -m validation fuzz
+	$(BIN)/python -m validation fuzz --scenes 50000
+long-accuracy:
 	$(BIN)/python -m validation stability
 	$(BIN)/python -m validation published
+long-suites:
 	$(BIN)/python -m validation run --suite hard --out results/hard
 	$(BIN)/python -m validation run --random 1000 --out results/random
 
