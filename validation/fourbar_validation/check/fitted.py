@@ -16,7 +16,7 @@ from fourbar.solution import Solution
 from fourbar.solve import solve
 from fourbar_validation.check.judge import Judge, Mistake
 from fourbar_validation.check.theirs import Array, quantity_of
-from fourbar_validation.compare.error import difference, in_own_unit
+from fourbar_validation.compare.tolerance import difference, in_own_unit
 from fourbar_validation.scenes.hard_linkages import with_bars
 
 OTHER_UNITS = {

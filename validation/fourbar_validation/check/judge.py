@@ -15,9 +15,17 @@ from fourbar.scene import Command, Scene, command
 from fourbar.solution import Solution
 from fourbar.solve import solve
 from fourbar_validation.check.theirs import Array, TheirTable, quantity_of
-from fourbar_validation.compare.error import difference, in_own_unit, magnitude, relative
-from fourbar_validation.compare.scales import yardstick
-from fourbar_validation.compare.tolerance import EPS, EQUIVALENCE, NOTHING_TO_TELL, condition_of
+from fourbar_validation.compare.scales import scale_of
+from fourbar_validation.compare.tolerance import (
+    EPS,
+    EQUIVALENCE,
+    NOTHING_TO_TELL,
+    condition_of,
+    difference,
+    in_own_unit,
+    magnitude,
+    relative,
+)
 
 Mask = NDArray[np.bool_]
 
@@ -98,7 +106,7 @@ class Judge:
         """Compute what the error of a key is divided by at each position, (n,)."""
         if key not in self._yards:
             quantity = quantity_of(key)
-            self._yards[key] = yardstick(quantity, self.scene, self.right, getattr(self.right, quantity))
+            self._yards[key] = scale_of(quantity, self.scene, self.right, getattr(self.right, quantity))
         return self._yards[key]
 
     @cached_property

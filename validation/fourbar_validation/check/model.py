@@ -25,7 +25,7 @@ from fourbar_validation.check.causes import Cause, causes
 from fourbar_validation.check.differences import differences
 from fourbar_validation.check.screen import read_mjcf
 from fourbar_validation.compare.answer import Answer
-from fourbar_validation.compare.compare import compare
+from fourbar_validation.compare.compare import Comparison
 from fourbar_validation.compare.counts import Counts
 from fourbar_validation.compare.rows import Row, plain, write_results
 from fourbar_validation.compare.tolerance import SIMULATED, ErrorBound, simulated_within
@@ -116,7 +116,7 @@ def _rows(name: str, scene: Scene, answers: list[Answer], tolerance: ErrorBound)
     found = []
     for answer in answers:
         formulas = solve(scene, "force", at=answer.at)
-        found += compare(name, scene, answer, formulas, tolerance, UNKNOWNS)
+        found += Comparison(name, scene, answer, formulas, tolerance, UNKNOWNS).rows()
     return found
 
 

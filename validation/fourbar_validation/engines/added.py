@@ -19,8 +19,7 @@ from typing import Any
 from fourbar.errors import InputError
 from fourbar.quantities import ANGLES, UNKNOWNS
 from fourbar_validation.compare.compare import COMPARED
-from fourbar_validation.compare.identities import FORMULAS
-from fourbar_validation.compare.rows import in_words, one_line, plain
+from fourbar_validation.compare.rows import FORMULAS, in_words, one_line, plain
 from fourbar_validation.compare.tolerance import EQUIVALENCE, ErrorBound
 from fourbar_validation.engines import workers
 from fourbar_validation.engines.checked import Checked

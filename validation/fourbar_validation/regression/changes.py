@@ -10,8 +10,7 @@ from typing import TypeVar
 
 from fourbar.errors import FAILED, HOLDS, InputError
 from fourbar_validation.compare.counts import Counts
-from fourbar_validation.compare.identities import FORMULAS
-from fourbar_validation.compare.rows import FAILS, VERDICTS, Row, sorted_rows
+from fourbar_validation.compare.rows import FAILS, FORMULAS, VERDICTS, Row, sorted_rows
 from fourbar_validation.regression.change import OTHER_QUESTION, REGRESSIONS, Change, Key, Kind, change
 from fourbar_validation.regression.fault import Fault
 from fourbar_validation.regression.record import About

@@ -4,8 +4,7 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
-from fourbar_validation.compare.identities import FORMULAS
-from fourbar_validation.compare.rows import Row
+from fourbar_validation.compare.rows import FORMULAS, Row
 from fourbar_validation.regression.change import Change, Kind
 from fourbar_validation.report.summary import NUMBER
 

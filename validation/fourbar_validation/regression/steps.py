@@ -4,8 +4,7 @@ import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from fourbar_validation.compare.identities import FORMULAS
-from fourbar_validation.compare.rows import Row
+from fourbar_validation.compare.rows import FORMULAS, Row
 from fourbar_validation.regression.change import Change, Key, Kind
 from fourbar_validation.regression.changes import Differences, differences
 from fourbar_validation.regression.history import HistoryRun

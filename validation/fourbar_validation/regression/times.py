@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from fourbar_validation.compare.identities import FORMULAS
+from fourbar_validation.compare.rows import FORMULAS
 
 SCATTERS = 3.0
 """A change of the mean ratio is one beyond this many of its standard errors over the scenes."""

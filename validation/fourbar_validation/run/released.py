@@ -20,13 +20,11 @@ from fourbar.quantities import UNKNOWNS
 from fourbar.scene import Command, Scene
 from fourbar.solution import Solution
 from fourbar_validation.compare.answer import Array, Released
-from fourbar_validation.compare.basis import basis_of
-from fourbar_validation.compare.compare import compare
-from fourbar_validation.compare.error import in_own_unit, relative, worst
-from fourbar_validation.compare.identities import FORMULAS
-from fourbar_validation.compare.rows import AGREES, DEGRADED, FAILS, REFUSES, UNDECIDED, Row
+from fourbar_validation.compare.compare import Comparison
+from fourbar_validation.compare.rows import AGREES, DEGRADED, FAILS, FORMULAS, REFUSES, UNDECIDED, Row
+from fourbar_validation.compare.scales import reference_of
 from fourbar_validation.compare.tolerance import DEGRADED as TIMES_PREDICTED
-from fourbar_validation.compare.tolerance import EQUIVALENCE
+from fourbar_validation.compare.tolerance import EQUIVALENCE, in_own_unit, relative, worst
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.witnesses import Witness, not_installed, predicting_from
 from fourbar_validation.report.record import Timing
@@ -173,7 +171,7 @@ def _forces_by(witness: Witness, driven: Question, solution: Solution) -> list[R
     answer, scene = driven.answer(witness), driven.scene
     if answer.refusal is not None:
         return [Row.unmeasured(driven.name, answer.engine, answer.setting, "all", REFUSES, answer.refusal)]
-    basis = basis_of(scene, answer)
+    basis = reference_of(scene, answer)
     assert basis is not None
     # the formulas are conditioned by the angle that is independent there, an engine by theta_2
     conditioned = replace(solution, condition=basis.condition, drive_condition=basis.drive_condition)
@@ -181,7 +179,7 @@ def _forces_by(witness: Witness, driven: Question, solution: Solution) -> list[R
     names = [q for q in UNKNOWNS if q in witness.expected]
     # nor are theta_2, omega_2 and alpha_2 more than that angle's, rounded: what that costs there is computed
     predicted = predicting_from(witness, scene, driven.at, answer)
-    rows = compare(driven.name, scene, answer, conditioned, witness.tolerance, names, predicted, basis)
+    rows = Comparison(driven.name, scene, answer, conditioned, witness.tolerance, names, predicted, basis).rows()
     return [row for row in rows if row.quantity != "undecided"]
 
 

@@ -18,8 +18,8 @@ from fourbar.scene import Command, Scene
 from fourbar.solve import solve
 from fourbar_validation.advise.errors import WorstErrors, greatest
 from fourbar_validation.compare.answer import Array
-from fourbar_validation.compare.error import relative
-from fourbar_validation.compare.scales import yardstick
+from fourbar_validation.compare.scales import scale_of
+from fourbar_validation.compare.tolerance import relative
 from fourbar_validation.published import thirteen
 
 FIFTY_DIGITS = 167 + 30
@@ -120,7 +120,7 @@ def against_reference(scene: Scene, at: Command, quantities: Quantities, referen
     formulas = solve(scene, "force", at=at)
     worst = {}
     for name in ("torque", *PIN_FORCES):
-        sizes = yardstick(name, scene, formulas, getattr(formulas, name))
+        sizes = scale_of(name, scene, formulas, getattr(formulas, name))
         found = []
         for ours, exact, size in zip(quantities[name], reference[name], sizes.tolist(), strict=True):
             pairs = ((ours, exact),) if name == "torque" else tuple(zip(ours, exact, strict=True))

@@ -11,8 +11,8 @@ from fourbar.effects.load import Table
 from fourbar.errors import installing
 from fourbar.scene import Scene
 from fourbar.scene.point import Point
-from fourbar_validation.compare.error import magnitude
 from fourbar_validation.compare.rows import Row
+from fourbar_validation.compare.tolerance import magnitude
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.run.question import NotAskedError, Question
 from fourbar_validation.run.shipped.variants import at_free_bodies, held_to, member, moved, sampled, stated, worst_rows

@@ -12,9 +12,8 @@ from fourbar.quantities import FORCES, UNKNOWNS
 from fourbar.scene import Scene
 from fourbar.studies.spread import Spread
 from fourbar_validation.compare.answer import Array
-from fourbar_validation.compare.error import magnitude, relative
 from fourbar_validation.compare.rows import Row
-from fourbar_validation.compare.tolerance import ErrorBound
+from fourbar_validation.compare.tolerance import ErrorBound, magnitude, relative
 from fourbar_validation.run.question import Question
 from fourbar_validation.run.shipped.variants import at_free_bodies, moved, parts, row_of, sampled, stated
 

@@ -16,12 +16,11 @@ from fourbar.scene import Scene, command
 from fourbar.scene.motion import Motion
 from fourbar.solution import Solution
 from fourbar_validation.compare.answer import Answer, Array
-from fourbar_validation.compare.basis import basis_of
-from fourbar_validation.compare.compare import COMPARED, compare
-from fourbar_validation.compare.error import magnitude, used
+from fourbar_validation.compare.compare import COMPARED, Comparison
 from fourbar_validation.compare.reversals import reversing
 from fourbar_validation.compare.rows import AGREES, FAILS, VERDICTS, Row
-from fourbar_validation.compare.tolerance import EQUIVALENCE, WELL_CONDITIONED, ErrorBound
+from fourbar_validation.compare.scales import reference_of
+from fourbar_validation.compare.tolerance import EQUIVALENCE, WELL_CONDITIONED, ErrorBound, magnitude, used
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.witnesses import predicting_from
 from fourbar_validation.run.printed import points
@@ -129,10 +128,10 @@ def held_to(question: Question, engine: str, scene: Scene, solution: Solution, a
     answer = replace(answer, engine=engine)
     assert answer.at is not None
     predicted = predicting_from(FREE_BODY, scene, answer.at, answer)
-    basis = basis_of(scene, answer)
-    rows = compare(question.name, scene, answer, solution, EQUIVALENCE, COMPARED, predicted, basis)
+    basis = reference_of(scene, answer)
+    rows = Comparison(question.name, scene, answer, solution, EQUIVALENCE, COMPARED, predicted, basis).rows()
     if scene.points and basis is not None:
-        rows.append(replace(points(question.name, scene, solution, basis, WELL_CONDITIONED), engine=engine))
+        rows.append(replace(points(question, solution, basis, WELL_CONDITIONED), engine=engine))
     return rows
 
 

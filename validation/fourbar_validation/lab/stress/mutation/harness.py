@@ -22,15 +22,15 @@ from fourbar.scene import Command, Scene
 from fourbar.scene import command as command_of
 from fourbar.solve import solve
 from fourbar_validation.compare.answer import Answer
-from fourbar_validation.compare.basis import basis_of
-from fourbar_validation.compare.compare import compare
-from fourbar_validation.compare.identities import identities
+from fourbar_validation.compare.compare import Comparison
 from fourbar_validation.compare.rows import FAILS
-from fourbar_validation.compare.statements.statements import statements
+from fourbar_validation.compare.scales import reference_of
 from fourbar_validation.engines.free_body import NAME as FREE_BODY
 from fourbar_validation.engines.witnesses import WITNESSES, Witness, predicting_from
 from fourbar_validation.lab.stress.mutation.code_mutants import Mutant, mutants
-from fourbar_validation.run.values import compare_status
+from fourbar_validation.run.answers import statements
+from fourbar_validation.run.formulas import check_identities, compare_status
+from fourbar_validation.run.question import Question
 
 CHANGES = 1e-9
 SECONDS = 20
@@ -110,13 +110,13 @@ def changed(before: dict[str, Any], after: dict[str, Any]) -> bool:
 
 def caught(scene: Scene, at: Command, answers: list[tuple[Witness, Answer]]) -> bool:
     """Check a scene: whether any comparison or identity fails."""
-    solution = solve(scene, at=at)
-    rows = identities("", scene, at, solution)
+    question = Question("", scene, at)
+    solution, rows = question.solution, list(check_identities(question))
     for witness, answer in answers:
         predicted = predicting_from(witness, scene, at, answer)
-        rows += compare("", scene, answer, solution, witness.tolerance, witness.expected, predicted)
-        if witness.name == FREE_BODY and (basis := basis_of(scene, answer)) is not None:
-            rows.append(compare_status("", scene, solution, basis))
+        rows += Comparison("", scene, answer, solution, witness.tolerance, witness.expected, predicted).rows()
+        if witness.name == FREE_BODY and (basis := reference_of(scene, answer)) is not None:
+            rows.append(compare_status(question, basis))
     if not any(row.verdict == FAILS for row in rows):
         rows += [row for witness, answer in answers for row in statements("", scene, witness.engine(), answer)]
     return any(row.verdict == FAILS for row in rows)
