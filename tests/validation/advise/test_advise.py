@@ -140,7 +140,7 @@ def test_a_count_that_cannot_decide_says_which_one_can(
     monkeypatch.setattr(measure, "case", lambda seed, index, costs: replace(case, index=index))
     monkeypatch.setattr(measure, "relative_costs", lambda rig: {})
     for count, status in ((40, 1), (73, 0)):
-        assert ended(["advise", "--study", "--count", str(count), "--out", str(tmp_path / f"{count}.csv")]) == status
+        assert ended(["advise", "--study", "--count", str(count), "--out", str(tmp_path / str(count))]) == status
         stated = "undecided: with 0 not met the bound is reached from --count 73 on" in capsys.readouterr().out
         assert stated == (status == 1)
 
@@ -154,7 +154,7 @@ def test_a_measure_is_resumed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
 
     monkeypatch.setattr(measure, "case", case)
     monkeypatch.setattr(measure, "relative_costs", lambda rig: {})
-    out = tmp_path / "study.csv"
+    out = tmp_path / "study"
     list(measure.measure(3, 2, out))
     cases = list(measure.measure(3, 4, out))
     assert made == [0, 1, 2, 3] and [each.index for each in cases] == made and all(each.met for each in cases)
