@@ -104,20 +104,20 @@ def examine_model(
         ours = {(row.engine, row.quantity): row.error for row in _rows(name, scene, generated.answers, SIMULATED)}
         rows = _rows(name, scene, theirs.answers, tolerance)
         costs = [CostOfModel(row, ours.get((row.engine, row.quantity), math.nan)) for row in rows]
-        found = differences(generated.described, theirs.described, theirs.called)
-        entries = [(difference.key, difference.generated) for difference in found]
+        result = differences(generated.described, theirs.described, theirs.called)
+        entries = [(difference.key, difference.generated) for difference in result]
         failed = any(row.failed for row in rows)
         corrected = examined(CORRECTED, scene, text, dict(theirs.names), entries) if failed else []
     after = [[] if answers is None else _rows(name, scene, answers, tolerance) for answers in corrected]
-    return ModelReport(causes(found, rows, after), costs, theirs.notes)
+    return ModelReport(causes(result, rows, after), costs, theirs.notes)
 
 
 def _rows(name: str, scene: Scene, answers: list[Answer], tolerance: ErrorBound) -> list[Row]:
-    found = []
+    result = []
     for answer in answers:
         formulas = solve(scene, "force", at=answer.at)
-        found += Comparison(name, scene, answer, formulas, tolerance, UNKNOWNS).rows()
-    return found
+        result += Comparison(name, scene, answer, formulas, tolerance, UNKNOWNS).rows()
+    return result
 
 
 @contextmanager

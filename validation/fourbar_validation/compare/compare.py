@@ -177,11 +177,11 @@ class Comparison:
         if not where.any():
             yield self.row(quantity, UNDECIDED, "no position at which both may be held to it" + note)
             return
-        found, error, condition = self._measured(quantity, ours, theirs, where)
-        self.decided += found.decided
-        at = {"theta_2": formulas.theta_2[found.worst], "condition": condition[found.worst]}
+        result, error, condition = self._measured(quantity, ours, theirs, where)
+        self.decided += result.decided
+        at = {"theta_2": formulas.theta_2[result.worst], "condition": condition[result.worst]}
         yield self.row(
-            quantity, found.verdict, found.reason + note, error=error[found.worst], allowed=found.allowed, **at
+            quantity, result.verdict, result.reason + note, error=error[result.worst], allowed=result.allowed, **at
         )
 
     def _measured(self, quantity: str, ours: Array, theirs: Array, where: Mask) -> "tuple[_Finding, Array, Array]":
@@ -210,8 +210,8 @@ class Comparison:
                 of_data = relative(predicted(quantity, where), size)
                 return np.where(np.isfinite(again), np.fmin(of_data, full), of_data)
 
-        found = _found(error, condition, where, full, self.tolerance, expected)
-        return found._replace(reason=found.reason + note), error, condition
+        result = _judge_errors(error, condition, where, full, self.tolerance, expected)
+        return result._replace(reason=result.reason + note), error, condition
 
     def undecided(self) -> Iterator[Row]:
         """Fail a scene of which most numbers are undecided."""
@@ -235,7 +235,7 @@ class _Finding(NamedTuple):
     """Positions of which a verdict is drawn."""
 
 
-def _found(
+def _judge_errors(
     error: Array,
     condition: Array,
     where: Mask,

@@ -136,7 +136,7 @@ def _force_terms(scene: Scene, formulas: Solution) -> Array:
 
 
 SIZED_BY = ("omega_3", "alpha_3", "a_G2", "a_G3", "a_G4")
-"""What the size of a force is made of; a basis without them has none."""
+"""What the size of a force is made of; a reference without them has none."""
 
 
 def reference_of(scene: Scene, answer: Answer) -> Solution | None:
@@ -146,48 +146,50 @@ def reference_of(scene: Scene, answer: Answer) -> Solution | None:
     theta_2, known = answer.at.theta_2, answer.quantities
     theta = {2: theta_2, 3: known["theta_3"], 4: known["theta_4"]}
     code = np.full(len(theta_2), OK, dtype=np.uint8)
-    basis = Solution(scene.title, scene.drive_bar, code, answer.at.branch, theta_2=theta_2)
+    reference = Solution(scene.title, scene.drive_bar, code, answer.at.branch, theta_2=theta_2)
     for name in UNITS:
         if name in known:
-            setattr(basis, name, known[name])
+            setattr(reference, name, known[name])
     if answer.at.omega_2 is not None:
-        basis.omega_2, basis.alpha_2 = (
+        reference.omega_2, reference.alpha_2 = (
             np.broadcast_to(np.asarray(x, float), theta_2.shape) for x in (answer.at.omega_2, answer.at.alpha_2)
         )
-        if basis.omega_3 is not None and basis.omega_4 is not None:
-            _add_velocities(scene.linkage, theta, basis)
+        if reference.omega_3 is not None and reference.omega_4 is not None:
+            _add_velocities(scene.linkage, theta, reference)
     one, other = (theta[bar] for bar in theta if bar != scene.drive_bar)
-    basis.sin_mu = np.sin(theta[4] - theta[3])
-    basis.condition = np.abs(basis.sin_mu)
-    if basis.drive_condition is None:  # one that knows how near friction is to jamming answers it
+    reference.sin_mu = np.sin(theta[4] - theta[3])
+    reference.condition = np.abs(reference.sin_mu)
+    if reference.drive_condition is None:  # one that knows how near friction is to jamming answers it
         # not of their difference: of an angle many turns away that has fewer digits than its sine
-        basis.drive_condition = np.abs(np.sin(other) * np.cos(one) - np.cos(other) * np.sin(one))
-    return basis
+        reference.drive_condition = np.abs(np.sin(other) * np.cos(one) - np.cos(other) * np.sin(one))
+    return reference
 
 
-def _add_velocities(linkage: FourBar, theta: dict[int, Array], basis: Solution) -> None:
+def _add_velocities(linkage: FourBar, theta: dict[int, Array], reference: Solution) -> None:
     """Add those of A, B and the mass centres, from the answer's own angles and speeds, m/s."""
 
     def swung(bar: int, distance: float, angle: float) -> Array:
-        speed, direction = distance * getattr(basis, f"omega_{bar}"), theta[bar] + angle
+        speed, direction = distance * getattr(reference, f"omega_{bar}"), theta[bar] + angle
         return np.stack((-speed * np.sin(direction), speed * np.cos(direction)), axis=1)
 
-    basis.v_A, basis.v_B = swung(2, linkage.input.length, 0.0), swung(4, linkage.output.length, 0.0)
+    reference.v_A, reference.v_B = swung(2, linkage.input.length, 0.0), swung(4, linkage.output.length, 0.0)
     for bar in MOVING_BARS:
         centre = swung(bar, *linkage.bar(bar).mass_centre)
-        setattr(basis, f"v_G{bar}", centre + basis.v_A if bar == 3 else centre)
+        setattr(reference, f"v_G{bar}", centre + reference.v_A if bar == 3 else centre)
 
 
-def strictest_condition(quantity: str, linkage: FourBar, formulas: Solution, basis: Solution | None) -> Array:
+def strictest_condition(quantity: str, linkage: FourBar, formulas: Solution, reference: Solution | None) -> Array:
     """Take the better of two conditions of a quantity at each position, (n,)."""
     ours = condition_of(quantity, linkage, formulas)
-    return ours if basis is None else np.fmin(np.fmax(ours, condition_of(quantity, linkage, basis)), 1.0)
+    return ours if reference is None else np.fmin(np.fmax(ours, condition_of(quantity, linkage, reference)), 1.0)
 
 
-def smallest_scale(quantity: str, scene: Scene, formulas: Solution, basis: Solution | None) -> Array:
+def smallest_scale(quantity: str, scene: Scene, formulas: Solution, reference: Solution | None) -> Array:
     """Take the smaller of two sizes of a quantity at each position, (n,)."""
     ours = scale_of(quantity, scene, formulas, getattr(formulas, quantity))
-    of_motion = basis is not None and (basis.omega_2 is None or all(getattr(basis, q) is not None for q in SIZED_BY))
-    if basis is None or not of_motion or getattr(basis, quantity) is None:
+    of_motion = reference is not None and (
+        reference.omega_2 is None or all(getattr(reference, q) is not None for q in SIZED_BY)
+    )
+    if reference is None or not of_motion or getattr(reference, quantity) is None:
         return ours
-    return np.fmin(ours, scale_of(quantity, scene, basis, getattr(basis, quantity)))
+    return np.fmin(ours, scale_of(quantity, scene, reference, getattr(reference, quantity)))

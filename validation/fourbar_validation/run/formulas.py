@@ -108,8 +108,8 @@ def _sums(question: Question) -> Iterator[Row]:
             if term.loaded_pins:
                 term.act_known(actions, {name: getattr(solution, name) for name in PIN_FORCE.values()})
     acting = actions.wrenches(Wrenches())
-    n, foot = len(solution), complex(np.ravel(state.foot(4))[0])
-    O4 = np.array([foot.real, foot.imag])
+    n, first_pin = len(solution), complex(np.ravel(state.foot(4))[0])
+    O4 = np.array([first_pin.real, first_pin.imag])
     force = solution.F12 + solution.F14
     force_terms = magnitude(solution.F12) + magnitude(solution.F14)
     moment = solution.torque + _cross(O4, solution.F14)

@@ -52,43 +52,43 @@ def check_points(question: Question) -> Iterator[Row]:
         yield points(question, question.solution, question.reference)
 
 
-def points(question: Question, solution: Solution, basis: Solution, least: float = 0.0) -> Row:
+def points(question: Question, solution: Solution, reference: Solution, least: float = 0.0) -> Row:
     """Compare places, velocities and accelerations of the scene's own points, from the angles of another derivation.
 
     `least`: the condition from which on they are judged.
     """
-    scene, link, n = question.scene, question.scene.linkage, len(basis)
+    scene, link, n = question.scene, question.scene.linkage, len(reference)
     zero = np.zeros(n)
-    theta = {1: zero + link.ground_angle, 2: basis.theta_2, 3: basis.theta_3, 4: basis.theta_4}
-    speed = {bar: zero if bar == 1 else _known(basis, f"omega_{bar}", n) for bar in theta}
-    growth = {bar: zero if bar == 1 else _known(basis, f"alpha_{bar}", n) for bar in theta}
+    theta = {1: zero + link.ground_angle, 2: reference.theta_2, 3: reference.theta_3, 4: reference.theta_4}
+    speed = {bar: zero if bar == 1 else _known(reference, f"omega_{bar}", n) for bar in theta}
+    growth = {bar: zero if bar == 1 else _known(reference, f"alpha_{bar}", n) for bar in theta}
 
     def swing(bar: int, distance: float, angle: float) -> list[NDArray[np.complex128]]:
         arm = distance * np.exp(1j * (theta[bar] + angle))
         return [arm, 1j * speed[bar] * arm, (1j * growth[bar] - speed[bar] ** 2) * arm]
 
-    feet = {3: swing(2, link.input.length, 0.0), 4: [link.ground * np.exp(1j * theta[1]), 0.0 * zero, 0.0 * zero]}
+    first_pins = {3: swing(2, link.input.length, 0.0), 4: [link.ground * np.exp(1j * theta[1]), 0.0 * zero, 0.0 * zero]}
     error = np.zeros(n)
-    usable = (solution.status_code == OK) & (basis.condition >= least)
-    usable &= condition_of("F12", link, basis) * NOTHING_TO_TELL > EPS
+    usable = (solution.status_code == OK) & (reference.condition >= least)
+    usable &= condition_of("F12", link, reference) * NOTHING_TO_TELL > EPS
     for point in scene.points:
-        own, foot = swing(point.bar, *point.from_pin), feet.get(point.bar, [zero, zero, zero])
+        own, first_pin = swing(point.bar, *point.from_pin), first_pins.get(point.bar, [zero, zero, zero])
         tables, like = (solution.points, solution.velocity, solution.acceleration), ("B", "v_B", "a_B")
-        for ours, kind, arm, at_foot in zip(tables, like, own, foot, strict=True):
+        for ours, kind, arm, at_foot in zip(tables, like, own, first_pin, strict=True):
             if point.name in ours:
                 theirs = np.stack(((arm + at_foot).real, (arm + at_foot).imag), axis=1)
                 size = np.abs(arm) + np.abs(at_foot) + of_length(scene.linkage)
                 if kind != "B":
-                    size = np.abs(arm) + np.abs(at_foot) + term_sizes(kind, scene, basis)
-                apart = relative_error(kind, ours[point.name], theirs, size) * condition_of(kind, link, basis)
+                    size = np.abs(arm) + np.abs(at_foot) + term_sizes(kind, scene, reference)
+                apart = relative_error(kind, ours[point.name], theirs, size) * condition_of(kind, link, reference)
                 error = np.where(usable, np.maximum(error, np.where(np.isnan(apart), np.inf, apart)), error)
     allowed = EQUIVALENCE.factor * half_turns(link.ground_angle, solution.theta_2)
     what = f"the {len(scene.points)} points of the scene"
     return question.row("points", error, allowed, what, usable, theta_2=solution.theta_2)
 
 
-def _known(basis: Solution, quantity: str, n: int) -> Array:
-    values: Array | None = getattr(basis, quantity)
+def _known(reference: Solution, quantity: str, n: int) -> Array:
+    values: Array | None = getattr(reference, quantity)
     return np.zeros(n) if values is None else values
 
 
@@ -119,8 +119,8 @@ def check_blocks(question: Question) -> Iterator[Row]:
         error[known] = np.maximum(error[known], apart[known])
     alone = {angle: np.empty(n) for angle in ("theta_3", "theta_4")}
     solve(scene, at=at, out=alone)  # they are found without vectors then
-    for angle, found in alone.items():
-        apart = relative_error(angle, found, getattr(solution, angle), np.ones(n))
+    for angle, result in alone.items():
+        apart = relative_error(angle, result, getattr(solution, angle), np.ones(n))
         apart *= condition_of(angle, scene.linkage, solution) / half_turns(scene.linkage.ground_angle, at.theta_2)
         error[-1] = max(error[-1], np.nan_to_num(apart[ok], nan=np.inf).max(initial=0.0))
     reason = f"{len(long)} positions at once against {n}"

@@ -74,11 +74,6 @@ class Question:
         except Exception:  # as of any engine
             return None
 
-    @property
-    def forces_known(self) -> bool:
-        """Whether the free bodies answer forces."""
-        return self.at.omega_2 is not None and self.free_body is not None and self.free_body.refusal is None
-
     @cached_property
     def reference(self) -> Solution | None:
         """Conditions and sizes by free bodies, the reference of every comparison; None: an answer has its own."""

@@ -171,15 +171,15 @@ def _forces_by(witness: Witness, driven: Question, solution: Solution) -> list[R
     answer, scene = driven.answer(witness), driven.scene
     if answer.refusal is not None:
         return [Row.unmeasured(driven.name, answer.engine, answer.setting, "all", REFUSES, answer.refusal)]
-    basis = reference_of(scene, answer)
-    assert basis is not None
+    reference = reference_of(scene, answer)
+    assert reference is not None
     # the formulas are conditioned by the angle that is independent there, an engine by theta_2
-    conditioned = replace(solution, condition=basis.condition, drive_condition=basis.drive_condition)
+    conditioned = replace(solution, condition=reference.condition, drive_condition=reference.drive_condition)
     conditioned.drive_bar = 2
     names = [q for q in UNKNOWNS if q in witness.expected]
     # nor are theta_2, omega_2 and alpha_2 more than that angle's, rounded: what that costs there is computed
     predicted = predicting_from(witness, scene, driven.at, answer)
-    rows = Comparison(driven.name, scene, answer, conditioned, witness.tolerance, names, predicted, basis).rows()
+    rows = Comparison(driven.name, scene, answer, conditioned, witness.tolerance, names, predicted, reference).rows()
     return [row for row in rows if row.quantity != "undecided"]
 
 
@@ -235,12 +235,12 @@ def _rows(question: Question, fine: Released, coarse: Released | None, truth: _T
         return [Row.unmeasured(*who, "all", FAILS, f"it stopped after {len(fine.theta_2)} of {n} instants")]
 
     def numbers(of: Released) -> dict[str, Array]:
-        found = {"theta_2": of.theta_2[:n], "omega_2": of.omega_2[:n]}
+        result = {"theta_2": of.theta_2[:n], "omega_2": of.omega_2[:n]}
         if coarse is not None:  # the formulas integrate the energy equation itself; their drift is part of their test
-            found["energy"] = of.energy[:n] - of.energy[0]
+            result["energy"] = of.energy[:n] - of.energy[0]
             if through == "sign":
-                found["stopped_at"] = _end(of.stopped_at, free.duration)
-        return found
+                result["stopped_at"] = _end(of.stopped_at, free.duration)
+        return result
 
     right_and_size = {
         "theta_2": (truth.theta_2, 1.0),

@@ -34,12 +34,12 @@ class Finding(NamedTuple):
 def worst(name: str, answer: Answer, quantity: str, findings: Sequence[Finding]) -> Row:
     """Make the row of a quantity of the finding that exceeds what it is allowed by most."""
     errors, bounds = (np.array(column) for column in zip(*(each[:2] for each in findings), strict=True))
-    found = findings[int(np.argmax(used(errors, bounds)))]
-    holds = found.error <= found.allowed
-    error, allowed, theta_2 = (float(number) for number in found[:3])
-    verdict, condition = AGREES if holds else FAILS, float(EQUIVALENCE.factor / max(found.allowed, EQUIVALENCE.factor))
+    result = findings[int(np.argmax(used(errors, bounds)))]
+    holds = result.error <= result.allowed
+    error, allowed, theta_2 = (float(number) for number in result[:3])
+    verdict, condition = AGREES if holds else FAILS, float(EQUIVALENCE.factor / max(result.allowed, EQUIVALENCE.factor))
     who = (name, answer.engine, answer.setting)
-    return Row(*who, quantity, error, allowed, verdict, found.what, theta_2, condition)
+    return Row(*who, quantity, error, allowed, verdict, result.what, theta_2, condition)
 
 
 def look(engine: Engine, linkage: FourBar, places: Iterable[Place]) -> Seen:

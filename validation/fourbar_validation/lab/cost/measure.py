@@ -100,7 +100,7 @@ def case(seed: int, index: int, costs: dict[tuple[str, bool], float]) -> AdviceC
     advice = advise(scene, required)
     dense, searched = denser(scene, DENSER), denser(scene, SEARCHED)
     error = judged(dense, TrialSetup(dense, command(dense)).try_out(advice.best.settings)).worst
-    found = cheapest(TrialSetup(searched, command(searched)), required, costs)
+    result = cheapest(TrialSetup(searched, command(searched)), required, costs)
     return AdviceCase(
         index,
         scene.title.rpartition(" ")[0],
@@ -111,7 +111,7 @@ def case(seed: int, index: int, costs: dict[tuple[str, bool], float]) -> AdviceC
         advice.reached,
         error,
         float(advice.best.steps),
-        math.nan if found is None else found.cost,
+        math.nan if result is None else result.cost,
         len(advice.attempts),
     )
 

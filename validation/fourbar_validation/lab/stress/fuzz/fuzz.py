@@ -58,16 +58,16 @@ def _assembly(scene: Scene, at: Command, solution: Solution) -> list[str]:
     """Compare by ball arithmetic: no position where the loop does not close, none missing where it does."""
     from fourbar_validation.engines.balls import closure, stored
 
-    found = []
+    result = []
     margin = np.abs(closing_margin(scene.linkage, at.theta_2))
     for i, theta_2 in enumerate(at.theta_2):
         closes = closure(stored(scene, float(theta_2)), int(at.branch[i])) is not None
         if closes != bool(solution.assembled[i]) and margin[i] > TOUCHING_MARGIN:
-            found.append(f"assembled: the formulas say {bool(solution.assembled[i])} at theta_2 = {theta_2!r}")
+            result.append(f"assembled: the formulas say {bool(solution.assembled[i])} at theta_2 = {theta_2!r}")
         angles = (solution.theta_3[i], solution.theta_4[i])
         if np.isfinite(angles).any() and not solution.assembled[i]:
-            found.append(f"assembled: angles where the loop does not close, theta_2 = {theta_2!r}")
-    return found
+            result.append(f"assembled: angles where the loop does not close, theta_2 = {theta_2!r}")
+    return result
 
 
 def _engines(question: Question) -> list[str]:
@@ -101,8 +101,8 @@ def run(count: int, seed: int, out: Path, workers: int, bounds: bool = False) ->
         yield from (store.read(stop)[0] for stop in sorted(done))
         todo = [chunk for chunk in chunks.items() if chunk[0] not in done]
         of, longest = partial(examine, seed, bounds), None if bounds else processes.SECONDS
-        for stop, found in processes.over_processes(of, todo, workers, seconds=longest, instead=_lost):
-            wrong = {str(number): each for number, each in zip(chunks[stop], found, strict=True) if each}
+        for stop, result in processes.over_processes(of, todo, workers, seconds=longest, instead=_lost):
+            wrong = {str(number): each for number, each in zip(chunks[stop], result, strict=True) if each}
             store.put(stop, [wrong])
             yield wrong
 
@@ -123,8 +123,8 @@ def fuzz(scenes: int, bounds: bool, seed: int, workers: int, out: Path) -> int:
     console = Console(stderr=True)
     wrong: dict[str, list[str]] = {}
     chunks = -(-scenes // (CHUNK_OF_PROOFS if bounds else CHUNK))
-    for found in track(run(scenes, seed, out, workers, bounds), "fuzzing", total=chunks, console=console):
-        wrong |= found
+    for result in track(run(scenes, seed, out, workers, bounds), "fuzzing", total=chunks, console=console):
+        wrong |= result
     for number in sorted(wrong, key=int)[:SHOWN]:
         source, name = wrong[number][0], "bounds_seed" if bounds else "seed"
         scene = (outside.scene_of if bounds else scene_of)(seed, int(number))
